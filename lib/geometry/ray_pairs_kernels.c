@@ -44,7 +44,8 @@ static inline ebpo_bounded ray_pairs_dot(const plane_normal *n, const ebpo_pair 
     return out;
 }
 
-static void ray_pairs_plane(const ebpo_segment *ray, const double triangle[3][3], ebpo_plane_pairs *out)
+static void ray_pairs_plane(const ebpo_segment *ray, const double triangle[3][3],
+                            ebpo_plane_pairs *out)
 {
     ebpo_pair f[3], g[3], to_plane[3], d[3];
     for (int k = 0; k < 3; k++) {
@@ -61,8 +62,8 @@ static void ray_pairs_plane(const ebpo_segment *ray, const double triangle[3][3]
     out->has_quotient = ebpo_pair_quotient(a.x, b.x, error, out->quotient);
 }
 
-static void ray_pairs_edge(const double d[3], const ebpo_pair a[3], const double from[3], const double to[3],
-                 ebpo_bounded *out)
+static void ray_pairs_edge(const double d[3], const ebpo_pair a[3], const double from[3],
+                           const double to[3], ebpo_bounded *out)
 {
     ebpo_pair direction[3], e[3];
     for (int k = 0; k < 3; k++) {

@@ -117,7 +117,8 @@ bool ebpo_attribute_reserve(ebpo_workspace *workspace, ebpo_attribute *a, uint64
 }
 
 /* Into a text of `size` bytes, which says "and more" when it is full. */
-static void attributes_append(char *to, size_t size, const char *format, va_list args) EBPO_PRINTF(3, 0);
+static void attributes_append(char *to, size_t size, const char *format, va_list args)
+    EBPO_PRINTF(3, 0);
 
 static void attributes_append(char *to, size_t size, const char *format, va_list args)
 {
@@ -462,7 +463,8 @@ static int attributes_beginning(const ebpo_attribute_name *name, const char *end
     return name->n >= n && memcmp(name->s + name->n - n, end, n) == 0 ? (int)(name->n - n) : -1;
 }
 
-static unsigned attributes_match(const char *const ends[4], const ebpo_attribute_name *names, unsigned count)
+static unsigned attributes_match(const char *const ends[4], const ebpo_attribute_name *names,
+                                 unsigned count)
 {
     unsigned n = 0;
     int before = attributes_beginning(&names[0], ends[0]);

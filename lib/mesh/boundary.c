@@ -206,7 +206,8 @@ static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
 
 /* The edge that leaves for `neighbour` (the source's number) among the sorted [begin, end); NONE
  * when there is none. */
-static uint64_t boundary_departure(const chaining *c, uint64_t begin, uint64_t end, uint64_t neighbour)
+static uint64_t boundary_departure(const chaining *c, uint64_t begin, uint64_t end,
+                                   uint64_t neighbour)
 {
     while (begin < end) {
         uint64_t middle = begin + (end - begin) / 2;
@@ -232,9 +233,10 @@ static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b,
         for (uint64_t i = a; i < b; i++) {
             uint64_t edge = c->arrivals[i].edge;
             uint32_t neighbour = fan_end(c, vertex, c->edges[edge].face);
-            uint64_t next = neighbour == EBPO_NO_INDEX
-                                ? NONE
-                                : boundary_departure(c, d, e, ebpo_mesh_source_vertex(c->mesh, neighbour));
+            uint64_t next =
+                neighbour == EBPO_NO_INDEX
+                    ? NONE
+                    : boundary_departure(c, d, e, ebpo_mesh_source_vertex(c->mesh, neighbour));
             if (next != NONE && !c->continued[next])
                 boundary_connect(c, edge, next);
         }

@@ -9,7 +9,8 @@
 #include "core/error.h"
 #include "mesh/attributes.h"
 
-static ebpo_colour_column colours_find(const ebpo_attributes *in, const char *element, const char *name)
+static ebpo_colour_column colours_find(const ebpo_attributes *in, const char *element,
+                                       const char *name)
 {
     size_t length = strlen(name);
     for (uint64_t i = 0; i < in->count; i++) {
@@ -84,7 +85,7 @@ bool ebpo_attributes_coloured(const ebpo_attributes *in)
 enum { CHANNELS = EBPO_COLOUR_CHANNELS };
 
 static ebpo_status colours_make(uint8_t **out, const ebpo_attributes *from, const char *element,
-                        uint64_t count, ebpo_error *error)
+                                uint64_t count, ebpo_error *error)
 {
     ebpo_colour_column channels[CHANNELS];
     *out = NULL;
@@ -109,7 +110,8 @@ static bool all_the_same(const uint8_t *rgba, uint64_t count)
 ebpo_status ebpo_mesh_colours(const ebpo_mesh *mesh, ebpo_colours *out, ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
-    ebpo_status status = colours_make(&out->vertex, mesh->attributes, "vertex", mesh->vertex_count, error);
+    ebpo_status status =
+        colours_make(&out->vertex, mesh->attributes, "vertex", mesh->vertex_count, error);
     if (status == EBPO_OK)
         status = colours_make(&out->face, mesh->attributes, "face", mesh->face_count, error);
     if (status != EBPO_OK)

@@ -571,7 +571,8 @@ ebpo_status ebpo_mesh_groups_new(const ebpo_named_run *runs, uint64_t count, ebp
     if (count >= EBPO_NO_INDEX)
         return ebpo_fail(error, EBPO_E_LIMIT, "there are too many names of groups");
     n.out = ebpo_alloc_zero(1, sizeof *n.out);
-    ebpo_status status = n.out ? components_make(&n, error) : ebpo_fail_memory(error, sizeof *n.out);
+    ebpo_status status =
+        n.out ? components_make(&n, error) : ebpo_fail_memory(error, sizeof *n.out);
     free(n.order);
     free(n.alike);
     free(n.number);
@@ -672,7 +673,8 @@ static ebpo_status gather_vertices(ebpo_components *c, ebpo_error *error)
     if (!v->of)
         return ebpo_workspace_fail(workspace, c->mesh->vertex_count * sizeof *v->of, error);
     for (uint64_t n = 0; n < c->count; n++)
-        qsort(v->of + v->begin[n], v->begin[n + 1] - v->begin[n], sizeof *v->of, components_ascending);
+        qsort(v->of + v->begin[n], v->begin[n + 1] - v->begin[n], sizeof *v->of,
+              components_ascending);
     return EBPO_OK;
 }
 
@@ -690,7 +692,8 @@ static ebpo_status list_groups(ebpo_components *c, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status components_check(const ebpo_mesh *mesh, const ebpo_mesh_groups *groups, ebpo_error *error)
+static ebpo_status components_check(const ebpo_mesh *mesh, const ebpo_mesh_groups *groups,
+                                    ebpo_error *error)
 {
     ebpo_status status = ebpo_components_check(mesh, error);
     if (status != EBPO_OK)

@@ -44,7 +44,7 @@ typedef struct filling {
 } filling;
 
 static ebpo_status fill_holes_collect(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                           ebpo_error *error)
+                                      ebpo_error *error)
 {
     filling *f = context;
     scratch *s = &f->scratch[worker];

@@ -160,7 +160,7 @@ static ebpo_status join_lists(const places *p, const ebpo_found_list *lists, uns
 
 /* In one list, which does not depend on who noted what. */
 static ebpo_status find_places_gather(places *p, const ebpo_found_list *lists, unsigned count,
-                          ebpo_error *error)
+                                      ebpo_error *error)
 {
     ebpo_workspace *workspace = p->mesh->workspace;
     ebpo_found_list joined = { NULL, 0, 0, false };

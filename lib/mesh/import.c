@@ -67,8 +67,8 @@ static ebpo_status read_once(ebpo_mesh *mesh, ebpo_import_format format, const u
 }
 
 static ebpo_status import_import(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
-                          uint64_t size, const char *name, ebpo_workspace *workspace,
-                          bool attributes, ebpo_obj_runs *runs, ebpo_error *error)
+                                 uint64_t size, const char *name, ebpo_workspace *workspace,
+                                 bool attributes, ebpo_obj_runs *runs, ebpo_error *error)
 {
     static const char *const formats[] = { "obj", "stl", "off" };
     ebpo_mesh mesh = { .workspace = workspace };
@@ -95,7 +95,8 @@ ebpo_status ebpo_import_groups(ebpo_mesh *out, const uint8_t *data, uint64_t siz
                                ebpo_error *error)
 {
     *runs = (ebpo_obj_runs){ 0 };
-    return import_import(out, EBPO_IMPORT_OBJ, data, size, name, workspace, attributes, runs, error);
+    return import_import(out, EBPO_IMPORT_OBJ, data, size, name, workspace, attributes, runs,
+                         error);
 }
 
 /* --- which format it is --- */

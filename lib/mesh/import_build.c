@@ -500,8 +500,8 @@ static inline bool has_key(const char *xyz, size_t size, const uint64_t key[3])
 }
 
 /* The size is a constant where this is called, and compiled as such. */
-static inline uint64_t build_weld(char *xyz, size_t size, uint64_t count, uint32_t *map, uint32_t *table,
-                            uint64_t slots)
+static inline uint64_t build_weld(char *xyz, size_t size, uint64_t count, uint32_t *map,
+                                  uint32_t *table, uint64_t slots)
 {
     uint32_t kept = 0;
     for (uint64_t i = 0; i < count; i++) {

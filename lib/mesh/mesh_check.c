@@ -111,7 +111,7 @@ static double cross_length(const ebpo_units *u, const double cross[3])
 }
 
 static void check_measure(face_block *block, const ebpo_units *units, const double centre[3],
-                    const double a[3], const double cross[3])
+                          const double a[3], const double cross[3])
 {
     ebpo_sum_add(&block->area2, cross_length(units, cross));
     ebpo_sum_add(&block->volume6, (a[0] - centre[0]) * cross[0] + (a[1] - centre[1]) * cross[1] +
@@ -119,14 +119,14 @@ static void check_measure(face_block *block, const ebpo_units *units, const doub
 }
 
 static void check_note(const ebpo_check *check, unsigned worker, ebpo_finding *finding,
-                 ebpo_finding_kind kind, uint64_t face)
+                       ebpo_finding_kind kind, uint64_t face)
 {
     ebpo_check_note(check, worker, finding, kind, ebpo_mesh_source_face(check->mesh, face),
                     (uint32_t)face, (uint32_t)face);
 }
 
 static ebpo_status check_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                         ebpo_error *error)
+                               ebpo_error *error)
 {
     (void)error;
     const face_pass *pass = context;
@@ -138,7 +138,8 @@ static ebpo_status check_faces(void *context, uint64_t begin, uint64_t end, unsi
         check_join(parents, v[0], v[1]);
         check_join(parents, v[1], v[2]);
         if (ebpo_face_repeats_index(v)) {
-            check_note(pass->check, worker, &block.index_repeated, EBPO_FOUND_INDEX_REPEATED_FACE, f);
+            check_note(pass->check, worker, &block.index_repeated, EBPO_FOUND_INDEX_REPEATED_FACE,
+                       f);
             check_note(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
             continue;
         }
@@ -169,8 +170,8 @@ ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error)
         return ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
     for (int k = 0; k < 3; k++)
         pass.centre[k] = ldexp(0.5 * r->min[k] + 0.5 * r->max[k], -check->units.exponent[k]);
-    ebpo_status status = ebpo_parallel_for(check->threads, NULL, count, FACE_GRAIN, check_faces, &pass,
-                                           &check->progress, "measuring faces", error);
+    ebpo_status status = ebpo_parallel_for(check->threads, NULL, count, FACE_GRAIN, check_faces,
+                                           &pass, &check->progress, "measuring faces", error);
     ebpo_sum area2 = { .adds = 0 }, volume6 = { .adds = 0 };
     for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {
         ebpo_sum_merge(&area2, &pass.blocks[i].area2);
@@ -306,7 +307,7 @@ static bool check_repeated(const ebpo_check *check, star_block *block, scratch *
 }
 
 static ebpo_status check_stars(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                         ebpo_error *error)
+                               ebpo_error *error)
 {
     star_pass *pass = context;
     const ebpo_check *check = pass->check;
@@ -388,7 +389,7 @@ done:
 enum { VERTEX_GRAIN = 1 << 15 };
 
 static ebpo_status check_coordinates(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                               ebpo_error *error)
+                                     ebpo_error *error)
 {
     (void)worker;
     const ebpo_check *c = context;
@@ -428,7 +429,7 @@ typedef struct vertex_pass {
 } vertex_pass;
 
 static ebpo_status check_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                            ebpo_error *error)
+                                  ebpo_error *error)
 {
     (void)error;
     const vertex_pass *pass = context;
@@ -478,8 +479,8 @@ ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error)
     if (!pass.blocks)
         return ebpo_fail_memory(error, blocks * sizeof *pass.blocks);
     ebpo_status status =
-        ebpo_parallel_for(check->threads, check->mesh->workspace, count, VERTEX_GRAIN, check_vertices,
-                          &pass, &check->progress, "checking vertices", error);
+        ebpo_parallel_for(check->threads, check->mesh->workspace, count, VERTEX_GRAIN,
+                          check_vertices, &pass, &check->progress, "checking vertices", error);
     for (uint64_t i = 0; status == EBPO_OK && i < blocks; i++) {
         const vertex_block *b = &pass.blocks[i];
         for (int k = 0; k < 3; k++) {

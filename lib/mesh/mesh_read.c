@@ -76,8 +76,8 @@ static ebpo_status import_groups(ebpo_mesh *out, const ebpo_whole_file *file, co
 }
 
 static ebpo_status read_parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
-                         const ebpo_mesh_read_options *wanted, ebpo_mesh_groups **groups,
-                         ebpo_error *error)
+                              const ebpo_mesh_read_options *wanted, ebpo_mesh_groups **groups,
+                              ebpo_error *error)
 {
     const char *dot = strrchr(ebpo_path_name(path), '.');
     const char *foreign;

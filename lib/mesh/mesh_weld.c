@@ -406,7 +406,7 @@ static ebpo_status weld_run(welding *w, ebpo_error *error)
 
 /* Distance 0: by equal positions. */
 static ebpo_status mesh_weld_weld(ebpo_mesh *mesh, double distance, ebpo_mend_record *record,
-                        ebpo_error *error)
+                                  ebpo_error *error)
 {
     welding w = { .mesh = mesh, .distance = distance };
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);

@@ -177,7 +177,10 @@ static uint64_t hash_of(obj_word word)
     return ebpo_hash_number(hash);
 }
 
-static bool obj_names_same(obj_word a, obj_word b) { return a.n == b.n && memcmp(a.s, b.s, a.n) == 0; }
+static bool obj_names_same(obj_word a, obj_word b)
+{
+    return a.n == b.n && memcmp(a.s, b.s, a.n) == 0;
+}
 
 /* Place of the name in the table: where its number is, or would go. 0 is a free slot, as the number
  * 0 has no name. */
@@ -374,8 +377,8 @@ static bool read_number(const char **at, const char *end, int64_t *number)
 }
 
 /* Numbers count from 1, or back from what stands before the face. */
-static bool obj_faces_resolve(const obj_reading *r, import_sort sort, uint64_t total, int64_t number,
-                    uint32_t *row)
+static bool obj_faces_resolve(const obj_reading *r, import_sort sort, uint64_t total,
+                              int64_t number, uint32_t *row)
 {
     int64_t at = number > 0 ? number - 1 : (int64_t)r->rows[sort] + number;
     *row = (uint32_t)at;

@@ -182,7 +182,8 @@ static bool read_count(off_word word, uint64_t *value)
 
 static ebpo_status fail_counts(const off_reading *r)
 {
-    return off_fail(r, "no counts of vertices, faces and edges follow the word OFF; repair the file");
+    return off_fail(r,
+                    "no counts of vertices, faces and edges follow the word OFF; repair the file");
 }
 
 /* Edges: on the line of the faces, or alone on the next one; some programs leave their count out.
@@ -237,9 +238,10 @@ static ebpo_status read_head(off_reading *r)
             return fail_counts(r);
     }
     if (!read_count(word, &r->vertices))
-        return named ? fail_counts(r)
-                     : off_fail(r, "neither the word OFF nor counts stand there; this is not an OFF "
-                               "file that can be read");
+        return named
+                   ? fail_counts(r)
+                   : off_fail(r, "neither the word OFF nor counts stand there; this is not an OFF "
+                                 "file that can be read");
     if (!ebpo_off_next(&r->text, &word) || !read_count(word, &r->faces))
         return fail_counts(r);
     read_edges(r);
@@ -409,13 +411,14 @@ static ebpo_status read_corner(off_reading *r, uint64_t row, uint64_t corners)
         return ebpo_fail_memory(r->build->error, r->build->corners * sizeof *c);
     if (!next_needed(r, false, &word) || !read_count(word, &index))
         return off_fail(r,
-                    "face %" PRIu64 " names fewer than its %" PRIu64 " vertices; repair the file",
-                    row, corners);
+                        "face %" PRIu64 " names fewer than its %" PRIu64
+                        " vertices; repair the file",
+                        row, corners);
     if (index >= r->vertices)
         return off_fail(r,
-                    "face %" PRIu64 " names vertex %" PRIu64 ", but there are %" PRIu64
-                    " vertices; repair the file or drop the face",
-                    row, index, r->vertices);
+                        "face %" PRIu64 " names vertex %" PRIu64 ", but there are %" PRIu64
+                        " vertices; repair the file or drop the face",
+                        row, index, r->vertices);
     c->vertex = (uint32_t)index;
     c->row[IMPORT_COLOURS] = r->colours ? c->vertex : IMPORT_NONE;
     c->row[IMPORT_NORMALS] = r->normals ? c->vertex : IMPORT_NONE;
@@ -435,9 +438,9 @@ static ebpo_status read_face(off_reading *r, uint64_t row)
         return off_fail(r, "face %" PRIu64 " has no number of corners; repair the file", row);
     if (corners > r->size / 2)
         return off_fail(r,
-                    "face %" PRIu64 " has %" PRIu64 " corners, more than fit into the file; "
-                    "repair it",
-                    row, corners);
+                        "face %" PRIu64 " has %" PRIu64 " corners, more than fit into the file; "
+                        "repair it",
+                        row, corners);
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < corners && status == EBPO_OK; i++)
         status = read_corner(r, row, corners);
@@ -496,7 +499,7 @@ static ebpo_status read_rows(off_reading *r)
         r->more = ebpo_off_next(&r->text, &word);
     if (status == EBPO_OK && r->more && r->rows == ROWS_ANYHOW)
         status = off_fail(r, "there is more behind the last face, though lines have several rows; "
-                         "repair the counts");
+                             "repair the counts");
     return status;
 }
 

@@ -286,7 +286,7 @@ static ebpo_status join_around(orienting *o, const ebpo_link *links, uint64_t us
         const ebpo_edge_face *a = &e->face[i], *b = a + 1;
         uint64_t turned = a->out == b->out;
         if (!orient_join(o->above, (uint32_t)(a->patch >> 1), (uint32_t)(b->patch >> 1),
-                  (turned ^ a->patch ^ b->patch) & 1))
+                         (turned ^ a->patch ^ b->patch) & 1))
             orient_flag(o, (uint32_t)(a->patch >> 1), CONTRADICTED);
     }
     return EBPO_OK;
@@ -411,7 +411,7 @@ static void add_volume(orienting *o, patch *p, const ebpo_sum *sum, double most)
 
 /* The sum is exact, so it does not matter which thread adds what. */
 static ebpo_status orient_measure(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                           ebpo_error *error)
+                                  ebpo_error *error)
 {
     orienting *o = context;
     const ebpo_mesh *mesh = o->mesh;
@@ -457,7 +457,7 @@ static void orient_decide(patch *p)
 }
 
 static ebpo_status orient_flip(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                        ebpo_error *error)
+                               ebpo_error *error)
 {
     orienting *o = context;
     (void)worker, (void)error;
@@ -502,7 +502,8 @@ static ebpo_status turn_patches(orienting *o, ebpo_error *error)
         return EBPO_OK;
     count_faces(o);
     o->frame = ebpo_mesh_frame_of(o->mesh);
-    ebpo_status status = ebpo_parallel_for(0, NULL, count, FACE_GRAIN, orient_measure, o, NULL, "", error);
+    ebpo_status status =
+        ebpo_parallel_for(0, NULL, count, FACE_GRAIN, orient_measure, o, NULL, "", error);
     for (uint64_t i = 0; i < o->patch_count; i++)
         orient_decide(&o->patches[i]);
     return status == EBPO_OK

@@ -61,8 +61,8 @@ static unsigned find_together(const ply_property *property, uint64_t left)
     return count ? ebpo_attribute_names_together(names, count) : 1;
 }
 
-static void ply_attributes_lose(const ply_parser *p, const ply_element *element, const ply_property *property,
-                 const char *why)
+static void ply_attributes_lose(const ply_parser *p, const ply_element *element,
+                                const ply_property *property, const char *why)
 {
     char of[PLY_WORD_TEXT], name[PLY_WORD_TEXT];
     ebpo_ply_word_text(of, element->name);
@@ -90,13 +90,15 @@ static ebpo_status plan_array(ply_parser *p, const ply_element *element, ply_pro
     if (!take_word(a.element, sizeof a.element, element->name) ||
         !take_names(a.names, sizeof a.names, property, columns) ||
         to->count == EBPO_ATTRIBUTE_ARRAYS) {
-        ply_attributes_lose(p, element, property, "its name is too long or no text, or there are too many");
+        ply_attributes_lose(p, element, property,
+                            "its name is too long or no text, or there are too many");
         return EBPO_OK;
     }
     bool face = element->kind == PLY_KIND_FACE;
     a.rows = face ? 0 : element->count;
     if (is_second(to, &a, a.rows)) {
-        ply_attributes_lose(p, element, property, "a second element of this name, of another length");
+        ply_attributes_lose(p, element, property,
+                            "a second element of this name, of another length");
         return EBPO_OK;
     }
     ebpo_attribute *made = ebpo_attributes_add(to, &a);

@@ -260,7 +260,8 @@ static bool ply_binary_report(void *user, const char *stage, uint64_t done, uint
                                   t->p->size);
 }
 
-static void ply_binary_put(const plain *t, const ply_property *property, uint64_t row, const uint8_t *at)
+static void ply_binary_put(const plain *t, const ply_property *property, uint64_t row,
+                           const uint8_t *at)
 {
     if (ebpo_ply_is_attribute(property))
         ebpo_ply_put_value(t->p, property, row,
@@ -268,7 +269,7 @@ static void ply_binary_put(const plain *t, const ply_property *property, uint64_
 }
 
 static ebpo_status ply_binary_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                            ebpo_error *error)
+                                       ebpo_error *error)
 {
     const plain *t = context;
     const ply_property *property = t->p->header.property + t->element->first;
@@ -308,7 +309,7 @@ static void put_face(const plain *t, uint64_t row, const uint8_t *at)
 
 /* After a row that deviates nothing is where it was expected; those rows are read again. */
 static ebpo_status ply_binary_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                         ebpo_error *error)
+                                    ebpo_error *error)
 {
     plain *t = context;
     uint64_t count = t->p->header.element[t->p->header.vertex].count;

@@ -183,7 +183,7 @@ static bool is_finite(const ebpo_mesh *mesh, uint64_t v)
 }
 
 static ebpo_status ply_faces_find(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                        ebpo_error *error)
+                                  ebpo_error *error)
 {
     leaving *l = context;
     (void)worker, (void)error;
@@ -266,8 +266,8 @@ ebpo_status ebpo_ply_leave_unused(ply_parser *p)
     leaving l = { .p = p };
     ebpo_mesh *mesh = p->mesh;
     uint64_t count = mesh->vertex_count;
-    ebpo_status status =
-        ebpo_parallel_for(p->threads, mesh->workspace, count, GRAIN, ply_faces_find, &l, NULL, "", p->error);
+    ebpo_status status = ebpo_parallel_for(p->threads, mesh->workspace, count, GRAIN,
+                                           ply_faces_find, &l, NULL, "", p->error);
     if (status == EBPO_OK && l.found)
         status = ply_faces_choose(&l);
     if (status == EBPO_OK && l.found && !l.refused && l.kept < count) {

@@ -192,7 +192,8 @@ static ply_role role_of(const ply_element *element, const ply_property *property
                : c == 'z' ? PLY_ROLE_Z
                           : PLY_ROLE_NONE;
     }
-    bool corners = ply_header_is(property->name, "vertex_indices") || ply_header_is(property->name, "vertex_index");
+    bool corners = ply_header_is(property->name, "vertex_indices") ||
+                   ply_header_is(property->name, "vertex_index");
     if ((element->kind == PLY_KIND_FACE || element->kind == PLY_KIND_STRIPS) && property->list &&
         corners)
         return PLY_ROLE_CORNERS;

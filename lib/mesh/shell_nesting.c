@@ -376,8 +376,8 @@ static ebpo_status ebpo_nesting_cast(nesting *n, ebpo_error *error)
         if (status == EBPO_OK)
             status = shell_rays_hire(&all, error);
         if (status == EBPO_OK)
-            status = ebpo_parallel_for(n->threads, workspace, n->count, SHELL_RAYS_GRAIN, cast_rays, &all,
-                                       NULL, "", error);
+            status = ebpo_parallel_for(n->threads, workspace, n->count, SHELL_RAYS_GRAIN, cast_rays,
+                                       &all, NULL, "", error);
     }
     free_casting(&all);
     return status;
@@ -518,13 +518,13 @@ static ebpo_status shell_nesting_nest(nesting *n, ebpo_error *error)
     ebpo_status status = list_shells(n, error);
     if (status != EBPO_OK || n->count < 2)
         return status;
-    status =
-        ebpo_parallel_for(n->threads, NULL, n->count, SHELL_NESTING_GRAIN, sample_shells, n, NULL, "", error);
+    status = ebpo_parallel_for(n->threads, NULL, n->count, SHELL_NESTING_GRAIN, sample_shells, n,
+                               NULL, "", error);
     if (status == EBPO_OK)
         status = make_tree(n, error);
     if (status == EBPO_OK)
-        status =
-            ebpo_parallel_for(n->threads, NULL, n->count, SHELL_NESTING_GRAIN, find_crowded, n, NULL, "", error);
+        status = ebpo_parallel_for(n->threads, NULL, n->count, SHELL_NESTING_GRAIN, find_crowded, n,
+                                   NULL, "", error);
     if (status == EBPO_OK)
         status = ebpo_nesting_probe(n, error);
     return status == EBPO_OK ? ebpo_nesting_cast(n, error) : status;

@@ -32,7 +32,10 @@ typedef struct stl_bytes {
 
 static uint64_t stated_faces(const uint8_t *head) { return ebpo_load32(head + COUNT); }
 
-static uint64_t stated_size(const uint8_t *head) { return STL_BINARY_HEAD + RECORD * stated_faces(head); }
+static uint64_t stated_size(const uint8_t *head)
+{
+    return STL_BINARY_HEAD + RECORD * stated_faces(head);
+}
 
 /* Counts the models that take all bytes, one behind the other; 0: there are other bytes. */
 static uint64_t count_models(const uint8_t *data, uint64_t size)
@@ -52,8 +55,8 @@ static uint64_t end_with_payload(ebpo_workspace *workspace, const uint8_t *data,
 {
     uint64_t at = STL_BINARY_HEAD;
     EBPO_FOR_ITEMS(workspace, i, 0, stated_faces(data)) {
-        uint64_t next =
-            size - at < RECORD ? UINT64_MAX : at + RECORD + ebpo_load16(data + at + STL_BINARY_WORD);
+        uint64_t next = size - at < RECORD ? UINT64_MAX
+                                           : at + RECORD + ebpo_load16(data + at + STL_BINARY_WORD);
         if (next > size)
             return UINT64_MAX;
         at = next;
@@ -68,9 +71,10 @@ bool ebpo_stl_states_size(const uint8_t *data, uint64_t known, uint64_t size)
 
 bool ebpo_stl_fits_binary(const uint8_t *data, uint64_t size)
 {
-    return size >= STL_BINARY_HEAD && (count_models(data, size) ||
-                            (stated_size(data) < size &&
-                             end_with_payload(NULL, data, size) == size && stated_faces(data)));
+    return size >= STL_BINARY_HEAD &&
+           (count_models(data, size) ||
+            (stated_size(data) < size && end_with_payload(NULL, data, size) == size &&
+             stated_faces(data)));
 }
 
 static ebpo_status fail_ambiguous(const import_build *b, const uint8_t *data, uint64_t size)
@@ -84,7 +88,8 @@ static ebpo_status fail_ambiguous(const import_build *b, const uint8_t *data, ui
 
 /* Finds out what the bytes behind the stated facets are; EBPO_E_FORMAT where that is not certain.
  */
-static ebpo_status stl_binary_explain(const import_build *b, const uint8_t *data, uint64_t size, stl_bytes *is)
+static ebpo_status stl_binary_explain(const import_build *b, const uint8_t *data, uint64_t size,
+                                      stl_bytes *is)
 {
     uint64_t end = stated_size(data), held = (size - STL_BINARY_HEAD) / RECORD;
     *is = (stl_bytes){ .models = 1 };
@@ -183,7 +188,8 @@ ebpo_status ebpo_stl_read_binary(import_build *b, const uint8_t *data, uint64_t 
                                  uint64_t *plain)
 {
     *plain = 0;
-    if (size < STL_BINARY_HEAD || (ebpo_bytes_are_text(data, size) && !ebpo_stl_fits_binary(data, size)))
+    if (size < STL_BINARY_HEAD ||
+        (ebpo_bytes_are_text(data, size) && !ebpo_stl_fits_binary(data, size)))
         return fail_head(b, data, size);
     uint64_t faces = stated_faces(data), words = 0;
     if (stated_size(data) > size)
@@ -260,7 +266,7 @@ static void colour_of(const stl_colours *s, uint16_t word, uint8_t rgb[3])
 }
 
 static ebpo_status stl_colours_add(ebpo_mesh *mesh, const char *names, ebpo_attribute_type type,
-                       uint32_t columns, uint8_t **values, ebpo_error *error)
+                                   uint32_t columns, uint8_t **values, ebpo_error *error)
 {
     ebpo_attribute head = { .element = "face", .type = type, .columns = columns };
     head.list = EBPO_ATTRIBUTE_NO_LIST;
@@ -277,7 +283,8 @@ static ebpo_status stl_colours_add(ebpo_mesh *mesh, const char *names, ebpo_attr
 static ebpo_status add_colours(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *error)
 {
     uint8_t *values = NULL;
-    ebpo_status status = stl_colours_add(mesh, "red green blue", EBPO_ATTRIBUTE_UINT8, 3, &values, error);
+    ebpo_status status =
+        stl_colours_add(mesh, "red green blue", EBPO_ATTRIBUTE_UINT8, 3, &values, error);
     for (uint64_t f = 0; f < s->faces && status == EBPO_OK; f++)
         colour_of(s, word_of(s, f), values + 3 * f);
     return status;
@@ -286,7 +293,8 @@ static ebpo_status add_colours(ebpo_mesh *mesh, const stl_colours *s, ebpo_error
 static ebpo_status add_words(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *error)
 {
     uint8_t *values = NULL;
-    ebpo_status status = stl_colours_add(mesh, "attribute", EBPO_ATTRIBUTE_UINT16, 1, &values, error);
+    ebpo_status status =
+        stl_colours_add(mesh, "attribute", EBPO_ATTRIBUTE_UINT16, 1, &values, error);
     for (uint64_t f = 0; f < s->faces && status == EBPO_OK; f++) {
         uint16_t word = word_of(s, f);
         memcpy(values + f * sizeof word, &word, sizeof word);
@@ -300,7 +308,7 @@ static ebpo_status add_words(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *
  * else white. Nothing of a file in text. The mesh's faces are those of the file. EBPO_E_MEMORY,
  * EBPO_E_IO. */
 static ebpo_status ebpo_import_stl_colours(ebpo_mesh *mesh, const uint8_t *data, uint64_t size,
-                                    ebpo_error *error)
+                                           ebpo_error *error)
 {
     stl_colours s = { .data = data, .faces = mesh->face_count };
     if (size != FIRST + FACE * s.faces || ebpo_load32(data + HEADER) != s.faces)

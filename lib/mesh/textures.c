@@ -94,7 +94,8 @@ static bool is_digest(ebpo_texture_bytes bytes, ebpo_texture_bytes sha256,
     ebpo_sha256_begin(&state);
     EBPO_FOR_PIECES(workspace, at, bytes.count, TEXTURES_STEP)
         ebpo_sha256_add(&state, (const uint8_t *)bytes.at + at,
-                        bytes.count - at < TEXTURES_STEP ? (size_t)(bytes.count - at) : TEXTURES_STEP);
+                        bytes.count - at < TEXTURES_STEP ? (size_t)(bytes.count - at)
+                                                         : TEXTURES_STEP);
     ebpo_sha256_end(&state, digest);
     return sha256.count == TEXTURES_DIGEST && !ebpo_digest_differs(sha256.at, digest);
 }
@@ -207,7 +208,8 @@ static bool read_header(naming *n)
     return good;
 }
 
-static bool textures_mark(numbered *to, const uint32_t *faces, uint64_t count, ebpo_workspace *workspace)
+static bool textures_mark(numbered *to, const uint32_t *faces, uint64_t count,
+                          ebpo_workspace *workspace)
 {
     const ebpo_attribute *a = to->of_faces;
     to->used = ebpo_alloc_zero(to->count + 1, sizeof *to->used);
@@ -301,8 +303,8 @@ static ebpo_status textures_cut(naming *n, ebpo_attribute *a, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status textures_keep(naming *n, ebpo_attribute *bytes, const uint32_t *faces, uint64_t count,
-                        ebpo_error *error)
+static ebpo_status textures_keep(naming *n, ebpo_attribute *bytes, const uint32_t *faces,
+                                 uint64_t count, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->all->workspace;
     uint64_t kept = 0;
@@ -518,7 +520,8 @@ static span skip_options(span rest)
 {
     while (rest.n > 1 && rest.s[0] == '-') {
         span option = take_word(&rest);
-        bool numbers = texture_names_is(option, "-o") || texture_names_is(option, "-s") || texture_names_is(option, "-t");
+        bool numbers = texture_names_is(option, "-o") || texture_names_is(option, "-s") ||
+                       texture_names_is(option, "-t");
         int most = numbers ? 3 : texture_names_is(option, "-mm") ? 2 : 1;
         for (int i = 0; i < most; i++) {
             span ahead = rest, value = take_word(&ahead);
@@ -557,7 +560,12 @@ void ebpo_obj_libraries(const uint8_t *text, uint64_t bytes,
 }
 
 /* Of material libraries: bytes of all, and names that are tried. */
-enum { LIBRARY_BYTES = 1 << 25, LIBRARIES = 100, TEXTURE_FILES_DIGEST = 32, TEXTURE_FILES_STEP = 1 << 20 };
+enum {
+    LIBRARY_BYTES = 1 << 25,
+    LIBRARIES = 100,
+    TEXTURE_FILES_DIGEST = 32,
+    TEXTURE_FILES_STEP = 1 << 20
+};
 #define IMAGE_BYTES ((uint64_t)1 << 30)
 
 typedef struct finding {
@@ -673,7 +681,8 @@ static ebpo_status make_digest(const ebpo_whole_file *file, const char *name,
         return ebpo_fail_memory(error, TEXTURE_FILES_STEP);
     ebpo_sha256_begin(&state);
     for (uint64_t at = 0; at < file->size && status == EBPO_OK; at += TEXTURE_FILES_STEP) {
-        size_t bytes = file->size - at < TEXTURE_FILES_STEP ? (size_t)(file->size - at) : TEXTURE_FILES_STEP;
+        size_t bytes =
+            file->size - at < TEXTURE_FILES_STEP ? (size_t)(file->size - at) : TEXTURE_FILES_STEP;
         if (piece)
             status = ebpo_whole_file_read(file, at, piece, bytes, name, error);
         if (status == EBPO_OK)
@@ -725,7 +734,8 @@ static ebpo_status add_image(finding *f, ebpo_attributes *to, const ebpo_texture
 
 /* --- notes --- */
 
-static void texture_files_lose(ebpo_attributes *to, uint64_t count, const char *one, const char *several)
+static void texture_files_lose(ebpo_attributes *to, uint64_t count, const char *one,
+                               const char *several)
 {
     if (count == 1)
         ebpo_attributes_lose(to, "%s", one);
@@ -736,17 +746,24 @@ static void texture_files_lose(ebpo_attributes *to, uint64_t count, const char *
 static void note_losses(const finding *f, ebpo_attributes *to)
 {
     uint64_t known = f->names.count - f->absent - f->outside - f->large;
-    texture_files_lose(to, f->names.left_out, "a name or a use of an image (there is no room for more)",
-         "%" PRIu64 " names and uses of images (there is no room for more)");
+    texture_files_lose(to, f->names.left_out,
+                       "a name or a use of an image (there is no room for more)",
+                       "%" PRIu64 " names and uses of images (there is no room for more)");
     texture_files_lose(to, f->libraries, "names of images (a material library cannot be read)",
-         "names of images (%" PRIu64 " material libraries cannot be read)");
-    texture_files_lose(to, f->absent, "the digest of an image (there is no such file beside the source)",
-         "the digests of %" PRIu64 " images (there are no such files beside the source)");
-    texture_files_lose(to, f->outside, "the digest of an image (its name leads out of the source's folder)",
-         "the digests of %" PRIu64 " images (their names lead out of the source's folder)");
-    texture_files_lose(to, f->large, "an image of more than 1 GiB", "%" PRIu64 " images of more than 1 GiB");
-    texture_files_lose(to, f->keep ? 0 : known, "the bytes of an image (--embed-textures keeps them)",
-         "the bytes of %" PRIu64 " images (--embed-textures keeps them)");
+                       "names of images (%" PRIu64 " material libraries cannot be read)");
+    texture_files_lose(to, f->absent,
+                       "the digest of an image (there is no such file beside the source)",
+                       "the digests of %" PRIu64
+                       " images (there are no such files beside the source)");
+    texture_files_lose(to, f->outside,
+                       "the digest of an image (its name leads out of the source's folder)",
+                       "the digests of %" PRIu64
+                       " images (their names lead out of the source's folder)");
+    texture_files_lose(to, f->large, "an image of more than 1 GiB",
+                       "%" PRIu64 " images of more than 1 GiB");
+    texture_files_lose(to, f->keep ? 0 : known,
+                       "the bytes of an image (--embed-textures keeps them)",
+                       "the bytes of %" PRIu64 " images (--embed-textures keeps them)");
 }
 
 /* The element is ours, whatever a PLY says of one of that name. */

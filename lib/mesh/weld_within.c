@@ -265,7 +265,7 @@ static uint64_t number_staying(grouping *g, uint32_t *from)
 }
 
 static ebpo_status weld_within_group(grouping *g, uint32_t *from, uint64_t *kept, double *moved,
-                         ebpo_error *error)
+                                     ebpo_error *error)
 {
     const ebpo_mesh *mesh = g->mesh;
     ebpo_workspace *workspace = mesh->workspace;

@@ -6,10 +6,8 @@
 #include <time.h>
 
 #include "exact_twin.h"
-#include "extras/collide/contact.h"
-#include "extras/collide/pair_distance.h"
-#include "extras/collide/pair_filter.h"
-#include "extras/collide/posed_block.h"
+#include "extras/collide/face_pairs.h"
+#include "extras/collide/posed_frames.h"
 #include "geometry/triangle_pair.h"
 #include "pair_twin.h"
 

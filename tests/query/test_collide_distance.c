@@ -9,7 +9,7 @@
 
 #include "check_main.h"
 #include "models_twin.h"
-#include "extras/collide/pair_distance.h"
+#include "extras/collide/face_pairs.h"
 #include "solids.h"
 
 static const char *const names[] = { "cube",           "torus",      "touching_shells",

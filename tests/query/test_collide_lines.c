@@ -7,7 +7,7 @@
 #include <ebpo/collide.h>
 
 #include "check_main.h"
-#include "extras/collide/contact.h"
+#include "extras/collide/face_pairs.h"
 #include "query_kit.h"
 
 typedef struct gathered {

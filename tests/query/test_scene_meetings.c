@@ -11,7 +11,7 @@
 #include "check_main.h"
 #include "exact_twin.h"
 #include "model_file.h"
-#include "extras/collide/pair_distance.h"
+#include "extras/collide/face_pairs.h"
 #include "geometry/pose.h"
 #include "query_kit.h"
 

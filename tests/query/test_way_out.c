@@ -9,7 +9,7 @@
 
 #include "check_main.h"
 #include "models_twin.h"
-#include "extras/collide/pair_sweep.h"
+#include "extras/collide/face_pairs.h"
 #include "solids.h"
 #include "sweep_twin.h"
 

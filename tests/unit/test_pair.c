@@ -7,9 +7,8 @@
 
 #include "check_main.h"
 #include "exact_twin.h"
-#include "extras/collide/contact.h"
-#include "extras/collide/pair_filter.h"
-#include "extras/collide/posed_block.h"
+#include "extras/collide/face_pairs.h"
+#include "extras/collide/posed_frames.h"
 #include "geometry/triangle_pair.h"
 #include "pair_twin.h"
 #include "solids.h"

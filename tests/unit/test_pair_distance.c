@@ -4,7 +4,7 @@
 
 #include "check_main.h"
 #include "exact_twin.h"
-#include "extras/collide/pair_distance.h"
+#include "extras/collide/face_pairs.h"
 #include "geometry/triangle_pair.h"
 #include "pair_twin.h"
 #include "solids.h"

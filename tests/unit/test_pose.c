@@ -6,7 +6,7 @@
 
 #include "check_main.h"
 #include "exact_twin.h"
-#include "extras/collide/posed_block.h"
+#include "extras/collide/posed_frames.h"
 #include "solids.h"
 
 enum { CASES = 20000 };

@@ -1,3 +1,11 @@
+/* Boolean expressions over solids at poses: union, intersection, difference and symmetric
+ * difference, evaluated at points of the world.
+ *
+ * An expression is a list of nodes, each of which refers to earlier nodes or operands. What is
+ * known of the operands (in, out, or unknown) gives what is possible for the result; an operand on
+ * whose boundary a point lies counts with both sides. Only operands that can still change the
+ * result are queried. Proofs: docs/develop/booleans.md. The object is immutable after it is made;
+ * each thread has its own contexts. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -10,10 +18,9 @@
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "extras/boolean/boolean.h"
-#include "geometry/level_nodes.h"
 #include "geometry/predicates.h"
+#include "geometry/level_nodes.h"
 #include "query/query_model.h"
-#include "query/query_node.h"
 
 static ebpo_status check_node(const ebpo_boolean_node *node, uint32_t number, uint32_t operands,
                               ebpo_error *error)
@@ -36,8 +43,9 @@ static ebpo_status check_node(const ebpo_boolean_node *node, uint32_t number, ui
     return EBPO_OK;
 }
 
-ebpo_status ebpo_expression_make(ebpo_expression *out, const ebpo_boolean_node *nodes,
-                                 uint32_t count, uint32_t operands, ebpo_error *error)
+/* EBPO_E_LIMIT, EBPO_E_ARGUMENT as ebpo_boolean_new says. */
+static ebpo_status make_expression(ebpo_expression *out, const ebpo_boolean_node *nodes,
+                                   uint32_t count, uint32_t operands, ebpo_error *error)
 {
     if (count == 0 || count > EBPO_BOOLEAN_NODES_MAX)
         return ebpo_fail(error, EBPO_E_LIMIT, "an expression of %" PRIu32 " nodes; give 1 to %d",
@@ -52,24 +60,23 @@ ebpo_status ebpo_expression_make(ebpo_expression *out, const ebpo_boolean_node *
     return EBPO_OK;
 }
 
-static unsigned expression_opposite(unsigned may)
+static unsigned may_not(unsigned may)
 {
     return (may & EBPO_MAY_IN ? EBPO_MAY_OUT : 0u) | (may & EBPO_MAY_OUT ? EBPO_MAY_IN : 0u);
 }
 
 /* In both: possible if it is in both; not in both: possible if it is not in either. */
-static unsigned expression_both(unsigned a, unsigned b)
+static unsigned may_in_both(unsigned a, unsigned b)
 {
     return (a & b & EBPO_MAY_IN) | ((a | b) & EBPO_MAY_OUT);
 }
 
-static unsigned expression_combine(int32_t operation, unsigned a, unsigned b)
+static unsigned combine_values(int32_t operation, unsigned a, unsigned b)
 {
     switch (operation) {
-    case EBPO_BOOLEAN_UNION:
-        return expression_opposite(expression_both(expression_opposite(a), expression_opposite(b)));
-    case EBPO_BOOLEAN_INTERSECTION: return expression_both(a, b);
-    case EBPO_BOOLEAN_DIFFERENCE: return expression_both(a, expression_opposite(b));
+    case EBPO_BOOLEAN_UNION: return may_not(may_in_both(may_not(a), may_not(b)));
+    case EBPO_BOOLEAN_INTERSECTION: return may_in_both(a, b);
+    case EBPO_BOOLEAN_DIFFERENCE: return may_in_both(a, may_not(b));
     default: break;
     }
     if (a == EBPO_MAY_BOTH || b == EBPO_MAY_BOTH)
@@ -83,7 +90,7 @@ unsigned ebpo_expression_value(const ebpo_expression *e, uint64_t known, uint64_
     for (uint32_t i = 0; i < e->count; i++) {
         const ebpo_boolean_node *n = &e->node[i];
         if (n->operation != EBPO_BOOLEAN_OPERAND)
-            may[i] = (uint8_t)expression_combine(n->operation, may[n->left], may[n->right]);
+            may[i] = (uint8_t)combine_values(n->operation, may[n->left], may[n->right]);
         else
             may[i] = !(known >> n->left & 1) ? EBPO_MAY_BOTH
                      : in >> n->left & 1     ? EBPO_MAY_IN
@@ -137,121 +144,6 @@ void ebpo_expression_box(const ebpo_expression *e, const double (*box)[6], doubl
     memcpy(out, of[e->count - 1], sizeof of[0]);
 }
 
-/* The cube's ball is brought into the model. If its tree's white and black nodes do not decide, the
- * nearest face does. */
-
-enum {
-    SEEN_FACES = 4, /* beside EBPO_MAY_IN and EBPO_MAY_OUT: perhaps faces */
-    NODES_MOST = 64 /* looked at for a black and a white one once faces are seen */
-};
-
-typedef struct ball {
-    const ebpo_model *model;
-    ebpo_box box;
-    const double *p;
-    double square; /* of its radius */
-    unsigned seen; /* perhaps in the ball */
-    unsigned sure; /* of EBPO_MAY_IN and EBPO_MAY_OUT: certainly in it */
-    unsigned nodes;
-} ball;
-
-/* Squared distance of the cell, right to 2^-50 of itself while it is not almost 0. */
-static double square_to(const ball *b, ebpo_cell cell)
-{
-    double low[3], high[3], sum = 0;
-    ebpo_cell_bounds(&b->box, cell, low, high);
-    for (int k = 0; k < 3; k++) {
-        double d = fmax(fmax(low[k] - b->p[k], b->p[k] - high[k]), 0);
-        sum += d * d;
-    }
-    return sum;
-}
-
-static void solid_in_cube_look(ball *b, const ebpo_node *node)
-{
-    bool enough = b->sure == EBPO_MAY_BOTH || (b->seen & SEEN_FACES && ++b->nodes > NODES_MOST);
-    double square = enough ? 0 : square_to(b, node->cell);
-    if (enough || square * (1 - 0x1p-48) > b->square + 0x1p-1000)
-        return;
-    if (ebpo_node_is_uniform(node)) {
-        unsigned kind = node->type == EBPO_BLACK ? EBPO_MAY_IN : EBPO_MAY_OUT;
-        b->seen |= kind;
-        if (square < b->square * (1 - 0x1p-48) && b->square > 0x1p-900)
-            b->sure |= kind;
-    } else if (node->type != EBPO_GRAY || node->pruned || ebpo_node_is_below(node)) {
-        b->seen |= SEEN_FACES;
-    } else {
-        for (unsigned octant = 0; octant < 8; octant++) {
-            ebpo_node child = ebpo_model_child(b->model, node, octant);
-            solid_in_cube_look(b, &child);
-        }
-    }
-}
-
-/* EBPO_MAY_IN or EBPO_MAY_OUT: no face is in the ball. EBPO_MAY_BOTH: one is. 0: not known. What is
- * said is what the faces would say, so that nothing depends on what is in memory. */
-static unsigned decide_by_nodes(const ebpo_model *model, const double p[3], double radius)
-{
-    ball b = { .model = model,
-               .box = ebpo_model_box(model),
-               .p = p,
-
-               .square = radius * radius };
-    double low[3], high[3];
-    ebpo_node root = ebpo_model_root(model);
-    ebpo_cell_bounds(&b.box, root.cell, low, high);
-    for (int k = 0; k < 3; k++) { /* beyond the root cell all is out */
-        double beyond = radius - fmin(p[k] - low[k], high[k] - p[k]);
-        if (!(beyond < -0x1p-48 * radius))
-            b.seen |= EBPO_MAY_OUT;
-        if (beyond > 0x1p-48 * radius)
-            b.sure |= EBPO_MAY_OUT;
-    }
-    solid_in_cube_look(&b, &root);
-    if (b.sure == EBPO_MAY_BOTH) /* between a black and a white point there is a face */
-        return EBPO_MAY_BOTH;
-    return b.seen == EBPO_MAY_IN || b.seen == EBPO_MAY_OUT ? b.seen : 0;
-}
-
-/* What the faces say of the ball. */
-static ebpo_status look_at_faces(ebpo_context *context, const double p[3], double radius,
-                                 unsigned *may, ebpo_error *error)
-{
-    ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
-    ebpo_distance_result nearest;
-    ebpo_inside_result inside;
-    o.max_distance = radius;
-    o.unsigned_distance = true;
-    *may = EBPO_MAY_BOTH;
-    ebpo_status status = ebpo_distance(context, p, &o, &nearest, error);
-    if (status != EBPO_OK || nearest.distance < INFINITY)
-        return status;
-    status = ebpo_inside(context, p, NULL, &inside, error);
-    if (status == EBPO_OK && inside.where != EBPO_ON)
-        *may = inside.where == EBPO_IN ? EBPO_MAY_IN : EBPO_MAY_OUT;
-    return status;
-}
-
-ebpo_status ebpo_solid_in_cube(const ebpo_posed_solid *s, ebpo_context *context,
-                               const double centre[3], double half, unsigned *may, unsigned *way,
-                               ebpo_error *error)
-{
-    double p[3], doubt;
-    *way = EBPO_CUBE_BY_BOX;
-    *may = EBPO_MAY_OUT;
-    if (!ebpo_posed_solid_near(s, centre, half))
-        return EBPO_OK;
-    ebpo_unpose(s, centre, p, &doubt);
-    /* 1.7321 is more than the root of 3 */
-    double radius = 1.7321 * half / s->posing.scale * (1 + 0x1p-40) + doubt;
-    *may = decide_by_nodes(s->model, p, radius);
-    *way = EBPO_CUBE_BY_NODES;
-    if (*may)
-        return EBPO_OK;
-    *way = EBPO_CUBE_BY_FACES;
-    return look_at_faces(context, p, radius, may, error);
-}
-
 /* --- making --- */
 
 ebpo_status ebpo_fail_operand(const ebpo_model *model, uint32_t number, const ebpo_error *cause,
@@ -286,8 +178,8 @@ static ebpo_status make_contexts(ebpo_boolean *b, ebpo_error *error)
     return status;
 }
 
-static ebpo_status boolean_fill(ebpo_boolean *b, const ebpo_boolean_operand *operands,
-                                ebpo_error *error)
+static ebpo_status fill_operands(ebpo_boolean *b, const ebpo_boolean_operand *operands,
+                                 ebpo_error *error)
 {
     b->solid = ebpo_alloc_zero(b->count, sizeof *b->solid);
     b->pose = ebpo_alloc_zero(b->count, sizeof *b->pose);
@@ -317,9 +209,9 @@ ebpo_status ebpo_boolean_new(const ebpo_boolean_operand *operands, uint32_t oper
         return ebpo_fail_memory(error, sizeof *b);
     b->count = operand_count;
     b->threads = ebpo_thread_count(wanted.threads);
-    status = ebpo_expression_make(&b->expression, nodes, node_count, operand_count, error);
+    status = make_expression(&b->expression, nodes, node_count, operand_count, error);
     if (status == EBPO_OK)
-        status = boolean_fill(b, operands, error);
+        status = fill_operands(b, operands, error);
     if (status == EBPO_OK)
         *out = b;
     else
@@ -378,8 +270,8 @@ static void add_opinion(opinion *o, uint32_t i, ebpo_rule rule, const ebpo_posed
     o->on = true;
 }
 
-static void boolean_conclude(const ebpo_boolean *b, const opinion *o, unsigned may,
-                             ebpo_boolean_result *out)
+static void conclude_result(const ebpo_boolean *b, const opinion *o, unsigned may,
+                            ebpo_boolean_result *out)
 {
     if (may == EBPO_MAY_BOTH && o->flat) {
         uint64_t all = ~UINT64_C(0);
@@ -404,7 +296,7 @@ ebpo_status ebpo_boolean_ask(const ebpo_boolean *b, unsigned worker, const doubl
         add_opinion(&o, i, b->solid[i].model->info->rule, &sides);
         may = ebpo_expression_value(&b->expression, o.known, o.above);
     }
-    boolean_conclude(b, &o, may, out);
+    conclude_result(b, &o, may, out);
     return EBPO_OK;
 }
 

@@ -1,3 +1,10 @@
+/* The cells of the result of a boolean expression: cells of an octree of the world that are inside
+ * as a whole, and mixed ones of the finest level.
+ *
+ * Level by level the children of all mixed cells are classified on all processor cores, and those
+ * that are mixed go to the next level. Everything is kept in the order of octcodes, so the result
+ * does not depend on the number of threads. Their volumes bound the volume of the result. The
+ * surface between cells that are taken and others is a mesh of squares. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -9,99 +16,24 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "extras/boolean/boolean_cells.h"
+#include "extras/boolean/world_cell.h"
 #include "extras/collide/collider.h"
 #include "geometry/cells.h"
 
-/* In-cells and mixed cells of a result. */
-
 /* An in-cell, as octcodes of the finest level. */
-typedef struct ebpo_in_run {
+typedef struct in_run {
     ebpo_octcode first;
     uint64_t count;
-} ebpo_in_run;
+} in_run;
 
 struct ebpo_boolean_cells {
     ebpo_world world;
-    ebpo_in_run *in; /* ascending */
+    in_run *in; /* ascending */
     uint64_t in_count, in_capacity;
     ebpo_octcode *mixed; /* of the finest level, ascending */
     uint64_t mixed_count, mixed_capacity;
     uint64_t ways[EBPO_CUBE_WAYS];
 };
-
-/* Smaller or larger than 2^+-this, and volumes of cells would leave the range of doubles. */
-enum { MOST_POWER = 300 };
-
-static ebpo_status fail_place(const double box[6], int level, ebpo_error *error)
-{
-    return ebpo_fail(error, EBPO_E_LIMIT,
-                     "the result is around (%g, %g, %g), up to %g long: corners of cells of level "
-                     "%d would be no exact doubles; give a lower level, or move the world's origin "
-                     "closer",
-                     box[0], box[1], box[2],
-                     fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2])), level);
-}
-
-static ebpo_status fail_range(double most, ebpo_error *error)
-{
-    return ebpo_fail(error, EBPO_E_LIMIT,
-                     "the result is up to %g long, and volumes of cells are doubles from 2^-%d to "
-                     "2^%d only; scale the models by their poses",
-                     most, MOST_POWER, MOST_POWER);
-}
-
-ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, ebpo_error *error)
-{
-    double boxes[EBPO_BOOLEAN_OPERANDS_MAX][6], box[6];
-    int power;
-    *out = (ebpo_world){ .level = level };
-    for (uint32_t i = 0; i < b->count; i++)
-        memcpy(boxes[i], b->solid[i].box, sizeof boxes[i]);
-    ebpo_expression_box(&b->expression, (const double(*)[6])boxes, box);
-    if (box[0] > box[3])
-        return EBPO_OK;
-    double most = fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));
-    frexp(1.07 * most, &power); /* 16 / 15 and its rounding: the origin is on a grid of 1 / 16 */
-    if (most == 0 || power < -MOST_POWER || power > MOST_POWER)
-        return fail_range(most, error);
-    out->edge = ldexp(1, power);
-    double grid = out->edge / 16, finest = ldexp(out->edge, -(level > 4 ? level : 4) - 1);
-    for (int k = 0; k < 3; k++) {
-        out->origin[k] = floor(box[k] / grid) * grid;
-        if (!(fabs(out->origin[k]) + out->edge <= 0x1p53 * finest))
-            return fail_place(box, level, error);
-    }
-    return EBPO_OK;
-}
-
-ebpo_status ebpo_world_cell_ask(const ebpo_boolean *b, unsigned worker, const ebpo_world *w,
-                                ebpo_world_cell *c, unsigned *may, uint8_t *ways, ebpo_error *error)
-{
-    double centre[3], half = ebpo_world_edge(w, c->cell.level + 1);
-    for (int k = 0; k < 3; k++)
-        centre[k] = ebpo_world_wall(w, k, c->cell.level + 1, 2 * c->cell.at[k] + 1);
-    *may = ebpo_expression_value(&b->expression, c->known, c->in);
-    for (uint32_t i = 0; i < b->count && *may == EBPO_MAY_BOTH; i++) {
-        unsigned operand, way;
-        if (c->known >> i & 1)
-            continue;
-        ebpo_status status = ebpo_solid_in_cube(&b->solid[i], ebpo_boolean_context(b, worker, i),
-                                                centre, half, &operand, &way, error);
-        if (status != EBPO_OK)
-            return status;
-        ways[way]++;
-        if (operand == EBPO_MAY_BOTH)
-            continue;
-        c->known |= UINT64_C(1) << i;
-        c->in |= (uint64_t)(operand == EBPO_MAY_IN) << i;
-        *may = ebpo_expression_value(&b->expression, c->known, c->in);
-    }
-    return EBPO_OK;
-}
-
-/* Level by level: the children of all mixed cells are asked about, on all cores, and those that are
- * mixed go to the next level. Everything is kept in the order of octcodes. */
 
 enum { PARENTS = 1 << 14, GRAIN = 64 };
 
@@ -141,7 +73,7 @@ static ebpo_status keep_in(ebpo_boolean_cells *cells, ebpo_cell cell, ebpo_error
     if (!ebpo_grow(&cells->in, &cells->in_capacity, cells->in_count + 1, sizeof *cells->in))
         return ebpo_fail_memory(error, (cells->in_count + 1) * sizeof *cells->in);
     cells->in[cells->in_count++] =
-        (ebpo_in_run){ ebpo_octcode_of_cell(cell) << 3 * up, UINT64_C(1) << 3 * up };
+        (in_run){ ebpo_octcode_of_cell(cell) << 3 * up, UINT64_C(1) << 3 * up };
     return EBPO_OK;
 }
 
@@ -214,11 +146,11 @@ static void swap_lists(walk *w)
 
 static int by_first(const void *a, const void *b)
 {
-    const ebpo_in_run *x = a, *y = b;
+    const in_run *x = a, *y = b;
     return (x->first > y->first) - (x->first < y->first);
 }
 
-static ebpo_status boolean_cells_run(walk *w, ebpo_error *error)
+static ebpo_status walk_levels(walk *w, ebpo_error *error)
 {
     w->asked = ebpo_alloc(8 * PARENTS, sizeof *w->asked);
     if (!w->asked)
@@ -254,7 +186,7 @@ ebpo_status ebpo_boolean_cells_new(ebpo_boolean *boolean, const ebpo_cells_optio
         return ebpo_fail_memory(error, sizeof *w.cells);
     status = ebpo_world_make(&w.cells->world, boolean, w.options.level, error);
     if (status == EBPO_OK && w.cells->world.edge > 0)
-        status = boolean_cells_run(&w, error);
+        status = walk_levels(&w, error);
     if (status == EBPO_OK)
         *out = w.cells;
     else
@@ -272,7 +204,7 @@ void ebpo_boolean_cells_free(ebpo_boolean_cells *cells)
 }
 
 /* So many finest cells, rounded down or up. */
-static double boolean_cells_volume(const ebpo_boolean_cells *c, uint64_t count, bool up)
+static double cells_volume(const ebpo_boolean_cells *c, uint64_t count, bool up)
 {
     double cells = (double)count, edge = ebpo_world_edge(&c->world, c->world.level);
     if (count >> 53)
@@ -287,8 +219,8 @@ ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells, ebpo_bool
     for (uint64_t i = 0; i < cells->in_count; i++)
         in += cells->in[i].count;
     const ebpo_world *w = &cells->world;
-    ebpo_boolean_volume v = { .lo = boolean_cells_volume(cells, in, false),
-                              .hi = boolean_cells_volume(cells, in + cells->mixed_count, true),
+    ebpo_boolean_volume v = { .lo = cells_volume(cells, in, false),
+                              .hi = cells_volume(cells, in + cells->mixed_count, true),
                               .origin = { w->origin[0], w->origin[1], w->origin[2] },
                               .edge = w->edge,
                               .in_cells = cells->in_count,
@@ -300,8 +232,8 @@ ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells, ebpo_bool
     return EBPO_GIVE(ebpo_boolean_volume, out, &v);
 }
 
-/* The squares between cells that are taken and cells that are not. In-cells and out-cells have no
- * wall in common, so each such square is a side of a mixed cell. */
+/* --- the mesh: in-cells and out-cells share no cell face, so each square is a side of a mixed cell
+ * --- */
 
 /* A corner of finest cells: x, y and z, 21 bits each. */
 typedef uint64_t corner;

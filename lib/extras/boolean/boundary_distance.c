@@ -1,3 +1,10 @@
+/* The distance of a point to the boundary of the result of a boolean expression.
+ *
+ * The boundary is a part of the operands' faces, so no point of it is nearer than the nearest
+ * face. If the result changes just behind that face, that is the distance. If not, a search over
+ * cells of the world, the nearest first, bounds the distance to the other side: cells that are
+ * decided end the search, mixed ones are divided down to the tolerance or the greatest number of
+ * cells. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -7,12 +14,10 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/sort.h"
-#include "extras/boolean/boolean_cells.h"
-
-/* How far it is to the other side: a search over cells of the world, the nearest first. */
+#include "extras/boolean/world_cell.h"
 
 /* Right to some ulp, without overflow. */
-static inline double ebpo_rounded_length(const double x[3])
+static inline double scaled_length(const double x[3])
 {
     double most = fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
     if (!(most > 0) || isinf(most))
@@ -21,7 +26,7 @@ static inline double ebpo_rounded_length(const double x[3])
     return most * sqrt(a * a + b * b + c * c);
 }
 
-typedef struct ebpo_boundary_search {
+typedef struct boundary_search {
     const ebpo_boolean *boolean;
     const double *point;
     unsigned side; /* EBPO_MAY_IN or EBPO_MAY_OUT: what is left behind */
@@ -31,7 +36,7 @@ typedef struct ebpo_boundary_search {
     /* No point of the other side is nearer than lo for certain, one is at most hi away; hi: what is
      * known before. Both INFINITY: there is none. */
     double lo, hi;
-} ebpo_boundary_search;
+} boundary_search;
 
 typedef struct waiting {
     double near; /* no point of the cell is nearer */
@@ -47,7 +52,7 @@ static bool is_nearer(const waiting *a, const waiting *b) { return a->near < b->
 
 EBPO_HEAP(heap, waiting, is_nearer)
 
-static ebpo_status boundary_search_push(queue *q, waiting w, ebpo_error *error)
+static ebpo_status push_waiting(queue *q, waiting w, ebpo_error *error)
 {
     if (!ebpo_grow(&q->list, &q->capacity, q->count + 1, sizeof *q->list))
         return ebpo_fail_memory(error, (q->count + 1) * sizeof *q->list);
@@ -56,25 +61,25 @@ static ebpo_status boundary_search_push(queue *q, waiting w, ebpo_error *error)
 }
 
 /* From the point to the nearest one of the closed cell, right to some ulp. */
-static double distance_to(const ebpo_boundary_search *s, const ebpo_world *w, ebpo_cell cell)
+static double distance_to(const boundary_search *s, const ebpo_world *w, ebpo_cell cell)
 {
     double d[3];
     for (int k = 0; k < 3; k++)
         d[k] = fmax(fmax(ebpo_world_wall(w, k, cell.level, cell.at[k]) - s->point[k],
                          s->point[k] - ebpo_world_wall(w, k, cell.level, cell.at[k] + 1)),
                     0);
-    return ebpo_rounded_length(d);
+    return scaled_length(d);
 }
 
-static ebpo_status push_cell(const ebpo_boundary_search *s, const ebpo_world *w, queue *q,
+static ebpo_status push_cell(const boundary_search *s, const ebpo_world *w, queue *q,
                              const ebpo_world_cell *c, ebpo_error *error)
 {
     double near = distance_to(s, w, c->cell) * (1 - 0x1p-46);
-    return near < s->hi ? boundary_search_push(q, (waiting){ near, *c }, error) : EBPO_OK;
+    return near < s->hi ? push_waiting(q, (waiting){ near, *c }, error) : EBPO_OK;
 }
 
 /* Beyond the root all is out. */
-static void look_beyond_root(ebpo_boundary_search *s, const ebpo_world *w)
+static void look_beyond_root(boundary_search *s, const ebpo_world *w)
 {
     for (int k = 0; k < 3 && s->side == EBPO_MAY_IN; k++)
         s->hi = fmin(s->hi, fmin(fabs(s->point[k] - w->origin[k]),
@@ -83,8 +88,8 @@ static void look_beyond_root(ebpo_boundary_search *s, const ebpo_world *w)
 }
 
 /* The cell at hand; *unclear: the least distance at which cells of the finest level are mixed. */
-static ebpo_status boundary_search_settle(ebpo_boundary_search *s, const ebpo_world *w, queue *q,
-                                          waiting *at, double *unclear, ebpo_error *error)
+static ebpo_status settle_cell(boundary_search *s, const ebpo_world *w, queue *q, waiting *at,
+                               double *unclear, ebpo_error *error)
 {
     unsigned may;
     uint8_t ways[EBPO_CUBE_WAYS] = { 0 };
@@ -105,8 +110,8 @@ static ebpo_status boundary_search_settle(ebpo_boundary_search *s, const ebpo_wo
     return status;
 }
 
-static ebpo_status boundary_search_search(ebpo_boundary_search *s, const ebpo_world *w, queue *q,
-                                          ebpo_error *error)
+static ebpo_status search_cells(boundary_search *s, const ebpo_world *w, queue *q,
+                                ebpo_error *error)
 {
     const ebpo_world_cell root = { { 0, { 0, 0, 0 } }, 0, 0 };
     double unclear = INFINITY;
@@ -120,7 +125,7 @@ static ebpo_status boundary_search_search(ebpo_boundary_search *s, const ebpo_wo
             break;
         waiting at = heap_take(q->list, q->count--);
         s->cells++;
-        status = boundary_search_settle(s, w, q, &at, &unclear, error);
+        status = settle_cell(s, w, q, &at, &unclear, error);
     }
     s->lo = fmin(fmin(q->count ? q->list[0].near : INFINITY, unclear), s->hi);
     return status;
@@ -135,20 +140,19 @@ static ebpo_status make_world(ebpo_world *w, const ebpo_boolean *b, ebpo_error *
     return ebpo_world_make(w, b, level, error);
 }
 
-static ebpo_status ebpo_boundary_search_run(ebpo_boundary_search *s, ebpo_error *error)
+static ebpo_status search_boundary(boundary_search *s, ebpo_error *error)
 {
     ebpo_world w;
     queue q = { NULL, 0, 0 };
     ebpo_status status = make_world(&w, s->boolean, error);
     s->lo = INFINITY;
     if (status == EBPO_OK && w.edge > 0)
-        status = boundary_search_search(s, &w, &q, error);
+        status = search_cells(s, &w, &q, error);
     free(q.list);
     return status;
 }
 
-/* The boundary is a part of the operands' faces: no point of it is nearer than the nearest face. If
- * the result changes just behind that face, no more is needed. */
+/* --- the query --- */
 
 typedef struct measuring {
     const ebpo_boolean *b;
@@ -161,7 +165,7 @@ static ebpo_status try_point(const measuring *m, const double q[3], ebpo_error *
 {
     ebpo_boolean_result there;
     const double way[3] = { q[0] - m->w[0], q[1] - m->w[1], q[2] - m->w[2] };
-    double away = ebpo_rounded_length(way) * (1 + 0x1p-46);
+    double away = scaled_length(way) * (1 + 0x1p-46);
     if (!(away < m->out->hi))
         return EBPO_OK;
     ebpo_status status = ebpo_boolean_ask(m->b, 0, q, &there, error);
@@ -221,15 +225,15 @@ static ebpo_status look_at_operands(const measuring *m, ebpo_error *error)
 }
 
 static ebpo_status look_at_cells(const measuring *m, const ebpo_boundary_options *o, unsigned side,
-                                 double hi, ebpo_boundary_search *s, ebpo_error *error)
+                                 double hi, boundary_search *s, ebpo_error *error)
 {
-    *s = (ebpo_boundary_search){ .boolean = m->b,
-                                 .point = m->w,
-                                 .side = side,
-                                 .tolerance = o->tolerance,
-                                 .most = o->cells ? o->cells : 100000,
-                                 .hi = hi };
-    ebpo_status status = ebpo_boundary_search_run(s, error);
+    *s = (boundary_search){ .boolean = m->b,
+                            .point = m->w,
+                            .side = side,
+                            .tolerance = o->tolerance,
+                            .most = o->cells ? o->cells : 100000,
+                            .hi = hi };
+    ebpo_status status = search_boundary(s, error);
     m->out->cells += s->cells;
     return status;
 }
@@ -237,7 +241,7 @@ static ebpo_status look_at_cells(const measuring *m, const ebpo_boundary_options
 static ebpo_status measure_off(const measuring *m, const ebpo_boundary_options *o,
                                ebpo_error *error)
 {
-    ebpo_boundary_search s;
+    boundary_search s;
     ebpo_boundary_distance *out = m->out;
     out->hi = INFINITY;
     ebpo_status status = look_at_operands(m, error);
@@ -255,7 +259,7 @@ static ebpo_status measure_off(const measuring *m, const ebpo_boundary_options *
 static ebpo_status measure_unsure(const measuring *m, const ebpo_boundary_options *o,
                                   ebpo_error *error)
 {
-    ebpo_boundary_search in, out;
+    boundary_search in, out;
     ebpo_status status = look_at_cells(m, o, EBPO_MAY_OUT, INFINITY, &in, error);
     if (status == EBPO_OK)
         status = look_at_cells(m, o, EBPO_MAY_IN, INFINITY, &out, error);

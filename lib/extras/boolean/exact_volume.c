@@ -1,3 +1,12 @@
+/* The exact volume of the result of a boolean expression, where no face of an operand intersects
+ * one of another.
+ *
+ * Each patch of connected faces is then in or out of every other operand as a whole. So it bounds
+ * the result, from within or from without, or it does not. The signed volumes below the faces that
+ * do add up to the volume. They are summed without rounding: in a long accumulator of doubles'
+ * products where these are doubles, otherwise in integers (GMP); the sum is rounded once. Where
+ * faces intersect, the result says which, and why there is no exact volume. Proof:
+ * docs/develop/booleans.md, "Exact volumes". */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -11,34 +20,33 @@
 #include "core/parallel.h"
 #include "extras/boolean/boolean.h"
 #include "extras/collide/collider.h"
-#include "extras/collide/contacts.h"
+#include "extras/collide/face_patches.h"
 #include "extras/collide/posed_solid.h"
-#include "extras/collide/unmet_patches.h"
+#include "extras/collide/pair_faces.h"
 #include "geometry/expansion.h"
 #include "geometry/integer_vectors.h"
-#include "geometry/level_nodes.h"
 #include "geometry/predicates.h"
+#include "geometry/level_nodes.h"
 #include "mesh/sum.h"
 
-/* Signed volumes below faces, summed without rounding: of a closed surface that looks outward they
- * are the volume within. One thread each; sums of several threads are merged. */
+/* --- sums of signed volumes --- */
 
 /* Six times the volumes of tetrahedra from the origin. */
-typedef struct ebpo_volume_sum {
+typedef struct volume_sum {
     ebpo_sum usual; /* of faces whose products doubles can hold */
     mpz_t other;    /* of all others, in units of 2^EBPO_VOLUME_UNIT */
-} ebpo_volume_sum;
+} volume_sum;
 
 /* Of products of three doubles; of each all 53 bits count, also of the least one, 2^-1074. */
 enum { EBPO_VOLUME_UNIT = -3 * (1074 + 52) };
 
-static void ebpo_volume_sum_begin(ebpo_volume_sum *s)
+static void volume_sum_begin(volume_sum *s)
 {
     s->usual = (ebpo_sum){ 0 };
     mpz_init(s->other);
 }
 
-static void ebpo_volume_sum_end(ebpo_volume_sum *s) { mpz_clear(s->other); }
+static void volume_sum_end(volume_sum *s) { mpz_clear(s->other); }
 
 /* Products of three such numbers, and what rounding leaves of them, are doubles: their lowest bit
  * is 3 (250 + 52) below 1 at most. */
@@ -93,7 +101,7 @@ static void add_other(mpz_t sum, const double t[3][3], int times)
 }
 
 /* Of the face t, counter-clockwise seen from outside; times: 1 or -1. Corners are finite. */
-static void ebpo_volume_sum_add(ebpo_volume_sum *s, const double t[3][3], int times)
+static void volume_sum_add(volume_sum *s, const double t[3][3], int times)
 {
     if (is_usual(t))
         add_usual(&s->usual, t, times);
@@ -101,7 +109,7 @@ static void ebpo_volume_sum_add(ebpo_volume_sum *s, const double t[3][3], int ti
         add_other(s->other, t, times);
 }
 
-static void ebpo_volume_sum_merge(ebpo_volume_sum *s, const ebpo_volume_sum *more)
+static void volume_sum_merge(volume_sum *s, const volume_sum *more)
 {
     ebpo_sum_merge(&s->usual, &more->usual);
     mpz_add(s->other, s->other, more->other);
@@ -124,7 +132,7 @@ static void to_integer(mpz_t out, const ebpo_sum *sum)
 
 /* Returns the double nearest to the volume, ties to even; infinite beyond doubles. In *scaled and
  * *exponent the volume in units of 2^exponent, in which it is about 1, rounded likewise. */
-static double ebpo_volume_sum_value(const ebpo_volume_sum *s, double *scaled, int64_t *exponent)
+static double volume_sum_value(const volume_sum *s, double *scaled, int64_t *exponent)
 {
     mpz_t all, six;
     mpz_init(all);
@@ -140,9 +148,7 @@ static double ebpo_volume_sum_value(const ebpo_volume_sum *s, double *scaled, in
     return value;
 }
 
-/* Where no face of an operand meets one of another, each patch of faces is in or out of every other
- * operand as a whole. So it bounds the result, from within or from without, or it does not; signed
- * volumes below those that do add up. Proof: docs/develop/booleans.md, "Exact volumes". */
+/* --- the measurement --- */
 
 static const char stage[] = "exact volume";
 
@@ -154,7 +160,7 @@ typedef struct measuring {
     ebpo_exact_volume *out;
     uint64_t first;                           /* operands that are asked, a bit for each, and */
     uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]; /* of each of these: those that are equal to it */
-    ebpo_volume_sum *sum;                     /* [threads] */
+    volume_sum *sum;                          /* [threads] */
 } measuring;
 
 static bool is_asked(const measuring *m, uint32_t i) { return m->first >> i & 1; }
@@ -197,7 +203,7 @@ static void bound_by_box(measuring *m)
     m->out->volume = ebpo_certain_of(0, most);
 }
 
-static void exact_volume_doubt(measuring *m, ebpo_volume_doubt why, uint32_t i, uint32_t k)
+static void note_doubt(measuring *m, ebpo_volume_doubt why, uint32_t i, uint32_t k)
 {
     m->out->doubt = why;
     m->out->operand[0] = i;
@@ -209,9 +215,9 @@ static void check_models(measuring *m)
     for (uint32_t i = 0; i < m->b->count && !m->out->doubt; i++) {
         const ebpo_model *model = m->b->solid[i].model;
         if (is_asked(m, i) && model->info->pruned)
-            exact_volume_doubt(m, EBPO_VOLUME_SUBSET, i, i);
+            note_doubt(m, EBPO_VOLUME_SUBSET, i, i);
         else if (is_asked(m, i) && !model->whole)
-            exact_volume_doubt(m, EBPO_VOLUME_IN_PARTS, i, i);
+            note_doubt(m, EBPO_VOLUME_IN_PARTS, i, i);
     }
 }
 
@@ -230,14 +236,6 @@ static ebpo_status make_collider(const measuring *m, uint32_t i, uint32_t k,
     return ebpo_collider_new(m->b->solid[i].model, m->b->solid[k].model, &how, out, error);
 }
 
-static bool boxes_apart(const double a[6], const double b[6])
-{
-    for (int k = 0; k < 3; k++)
-        if (a[k] > b[3 + k] || b[k] > a[3 + k])
-            return true;
-    return false;
-}
-
 static void name_faces(ebpo_exact_volume *out, const ebpo_face_pair *pair)
 {
     out->file_face[0] = pair->file_face_a;
@@ -252,14 +250,15 @@ static ebpo_status check_pair(measuring *m, uint32_t i, uint32_t k, ebpo_error *
     ebpo_collide_options options;
     ebpo_face_pair pair;
     int32_t found = 0;
-    if (boxes_apart(m->b->solid[i].box, m->b->solid[k].box))
+    const double *x = m->b->solid[i].box, *y = m->b->solid[k].box;
+    if (ebpo_box_gap(x, x + 3, y, y + 3) > 0)
         return EBPO_OK;
     ebpo_status status = make_collider(m, i, k, &options, &collider, error);
     if (status != EBPO_OK)
         return status;
     status = ebpo_collide_first(collider, &options, &pair, &found, error);
     if (status == EBPO_OK && found) {
-        exact_volume_doubt(m, EBPO_VOLUME_OPERANDS_MEET, i, k);
+        note_doubt(m, EBPO_VOLUME_OPERANDS_MEET, i, k);
         name_faces(m->out, &pair);
     }
     ebpo_collider_free(collider);
@@ -306,7 +305,7 @@ static bool take_self(void *user, const ebpo_face_pair *pairs, uint64_t count)
     for (uint64_t i = 0; i < count && !o->m->out->doubt; i++) {
         if (!has_area(o, pairs[i].file_face_a) || !has_area(o, pairs[i].file_face_b))
             continue; /* bounds nothing */
-        exact_volume_doubt(o->m, EBPO_VOLUME_FACES_MEET, o->number, o->number);
+        note_doubt(o->m, EBPO_VOLUME_FACES_MEET, o->number, o->number);
         name_faces(o->m->out, &pairs[i]);
     }
     return !o->m->out->doubt;
@@ -415,7 +414,7 @@ static ebpo_status add_faces(void *user, uint64_t begin, uint64_t end, unsigned 
         if (times == 0)
             continue;
         pose_face(o, f, t);
-        ebpo_volume_sum_add(&o->m->sum[worker], (const double(*)[3])t, times);
+        volume_sum_add(&o->m->sum[worker], (const double(*)[3])t, times);
     }
     return EBPO_OK;
 }
@@ -481,24 +480,24 @@ static ebpo_status add_operands(measuring *m, ebpo_error *error)
     if (!m->sum)
         return ebpo_fail_memory(error, threads * sizeof *m->sum);
     for (unsigned i = 0; i < threads; i++)
-        ebpo_volume_sum_begin(&m->sum[i]);
+        volume_sum_begin(&m->sum[i]);
     for (uint32_t i = 0; i < m->b->count && status == EBPO_OK && !m->out->doubt; i++) {
         ebpo_error cause = EBPO_ERROR_INIT;
         if (is_asked(m, i) && add_operand(m, i, &cause) != EBPO_OK)
             status = ebpo_fail_operand(m->b->solid[i].model, i, &cause, error);
     }
     for (unsigned i = 1; i < threads; i++)
-        ebpo_volume_sum_merge(&m->sum[0], &m->sum[i]);
+        volume_sum_merge(&m->sum[0], &m->sum[i]);
     double scaled, volume;
     int64_t exponent;
-    volume = ebpo_volume_sum_value(&m->sum[0], &scaled, &exponent);
+    volume = volume_sum_value(&m->sum[0], &scaled, &exponent);
     if (status == EBPO_OK && !m->out->doubt) {
         m->out->volume = ebpo_certain_of(volume, volume);
         m->out->scaled = scaled;
         m->out->exponent = exponent;
     }
     for (unsigned i = 0; i < threads; i++)
-        ebpo_volume_sum_end(&m->sum[i]);
+        volume_sum_end(&m->sum[i]);
     free(m->sum);
     return status;
 }

@@ -1,3 +1,11 @@
+/* What is on either side of a posed face of two models. The face is cut into pieces along the
+ * faces of both models that intersect it (face_pieces.h). For a point of each piece the winding
+ * numbers of both models give the sides on which each model is.
+ *
+ * All decisions are exact: points are fractions, posed coordinates are the doubles that
+ * geometry/pose.h defines. Only the faces near a point are looked up in the models' hierarchies,
+ * so a model may be loaded in parts. Proofs: docs/develop/collision.md, "Relation of two models".
+ */
 #include "core/strict_fp.h"
 
 #include "extras/collide/around_face.h"
@@ -151,7 +159,7 @@ static ebpo_status sides_of_solid(const looking *l, const ebpo_piece *piece, int
     return status;
 }
 
-static ebpo_status around_face_look(void *user, const ebpo_piece *piece, ebpo_error *error)
+static ebpo_status look_around_piece(void *user, const ebpo_piece *piece, ebpo_error *error)
 {
     const looking *l = user;
     ebpo_around around;
@@ -172,7 +180,7 @@ static ebpo_status around_face_look(void *user, const ebpo_piece *piece, ebpo_er
 /* EBPO_E_CANCELLED comes from `look` alone, and means enough. */
 static ebpo_status visit_pieces(looking *l, ebpo_face_cuts *pieces, ebpo_error *error)
 {
-    ebpo_status status = ebpo_face_pieces_visit(pieces, around_face_look, l, error);
+    ebpo_status status = ebpo_face_pieces_visit(pieces, look_around_piece, l, error);
     return status == EBPO_E_CANCELLED ? EBPO_OK : status;
 }
 

@@ -2,7 +2,7 @@
 #ifndef EBPO_COLLIDE_AROUND_FACE_H
 #define EBPO_COLLIDE_AROUND_FACE_H
 
-#include "extras/collide/contacts.h"
+#include "extras/collide/pair_faces.h"
 #include "extras/collide/face_pieces.h"
 #include "extras/collide/posed_solid.h"
 

@@ -1,3 +1,12 @@
+/* How deep the surface of one model is in the solid of another: the greatest distance of a point
+ * of the surface inside the solid to the boundary of the solid.
+ *
+ * A branch-and-bound search goes through the cells of the surface's octree, then through faces and
+ * parts of faces. Each is enclosed in a ball; the distance at its centre bounds how deep a point
+ * of it can be. A heap gives the part that may be deepest. The search ends when no part can be
+ * deeper than the best point and the tolerance, or at the deadline; lo and hi then bound the
+ * depth. The steps do not depend on what is in memory. Bounds: docs/develop/collision.md, "Depth".
+ * One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -5,30 +14,29 @@
 #include <string.h>
 
 #include "core/alloc.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/os.h"
-#include "core/parallel.h"
 #include "core/sort.h"
+#include "core/parallel.h"
 #include "extras/collide/collider.h"
+#include "extras/collide/subtree_search.h"
 #include "extras/collide/posed_solid.h"
-#include "extras/collide/posed_subtrees.h"
 #include "geometry/cells.h"
 #include "geometry/distance.h"
 #include "geometry/vec3.h"
 #include "query/query_model.h"
 #include "query/query_node.h"
 
-/* How deep parts of a surface are in a solid: balls that hold some of it, and faces, which wait to
- * be divided. One thread. */
+/* --- the search: balls, faces and parts of faces --- */
 
 /* A part of a face. */
-typedef struct ebpo_depth_part {
+typedef struct depth_part {
     double most;         /* no point of it is deeper */
     double corner[3][3]; /* in the world */
-} ebpo_depth_part;
+} depth_part;
 
-typedef struct ebpo_depth_search {
+typedef struct depth_search {
     /* In: */
     ebpo_context *from; /* of the surface's model */
     const ebpo_posing *posing;
@@ -42,32 +50,24 @@ typedef struct ebpo_depth_search {
     double lo, hi;
     /* Begins as 0: */
     double left, lost; /* the greatest `most` of what was left out; what rounding moves points by */
-    ebpo_depth_part *part; /* a heap, the greatest first */
+    depth_part *part;  /* a heap, the greatest first */
     uint64_t count, capacity, asked;
-} ebpo_depth_search;
+} depth_search;
 
 /* Something of the surface is within `radius` of a point, all of it; and a point of it certainly
  * within `far`, INFINITY if that is not known. */
-typedef struct ebpo_depth_ball {
+typedef struct depth_ball {
     double radius, far;
     /* Out: whether it matters still, and how deep it is at most. */
     bool open;
     double most;
-} ebpo_depth_ball;
-
-/* Faces that may be deep in a solid, found by the cells of their octree. One thread. */
-
-/* How deep the surface of one model is in a solid: branch and bound over its octree, then its faces
- * and parts of these. Bounds: docs/develop/collision.md, "Depth". One thread. */
-
-/* EBPO_E_MEMORY, EBPO_E_CANCELLED, and those of ebpo_distance. */
-static ebpo_status ebpo_depth_search_run(ebpo_depth_search *search, ebpo_error *error);
+} depth_ball;
 
 /* --- one point --- */
 
 /* How deep it is in the solid, less than 0 outside: surely within *lo .. *hi. rounding: how far it
  * may be from where it should be. */
-static ebpo_status depth_at(ebpo_depth_search *s, const double w[3], double *lo, double *hi,
+static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, double *hi,
                             double *rounding, ebpo_error *error)
 {
     double p[3], doubt, scale = s->solid->posing.scale;
@@ -92,7 +92,7 @@ static ebpo_status depth_at(ebpo_depth_search *s, const double w[3], double *lo,
 
 /* No point of the triangle in the solid is deeper than it is away from the face that was nearest to
  * the last point asked about; and that is convex, so its corners tell. */
-static double most_at_corners(const ebpo_depth_search *s, const double corner[3][3])
+static double most_at_corners(const depth_search *s, const double corner[3][3])
 {
     double most = 0, p[3], doubt;
     for (int i = 0; i < 3; i++) {
@@ -106,14 +106,11 @@ static double most_at_corners(const ebpo_depth_search *s, const double corner[3]
 
 /* --- the heap --- */
 
-static bool is_deeper(const ebpo_depth_part *a, const ebpo_depth_part *b)
-{
-    return a->most > b->most;
-}
+static bool is_deeper(const depth_part *a, const depth_part *b) { return a->most > b->most; }
 
-EBPO_HEAP(heap, ebpo_depth_part, is_deeper)
+EBPO_HEAP(heap, depth_part, is_deeper)
 
-static bool depth_parts_push(ebpo_depth_search *s, const ebpo_depth_part *part)
+static bool push_part(depth_search *s, const depth_part *part)
 {
     if (!ebpo_grow(&s->part, &s->capacity, s->count + 1, sizeof *s->part))
         return false;
@@ -123,14 +120,14 @@ static bool depth_parts_push(ebpo_depth_search *s, const ebpo_depth_part *part)
 
 /* --- parts --- */
 
-static bool ebpo_depth_is_late(const ebpo_depth_search *s)
+static bool is_search_late(const depth_search *s)
 {
     return s->late != UINT64_MAX && ebpo_clock() >= s->late;
 }
 
 /* What rounding alone leaves in doubt is no reason to divide: parts of faces that lie on others
  * have no end. */
-static bool is_enough(ebpo_depth_search *s, double most, double rounding)
+static bool is_enough(depth_search *s, double most, double rounding)
 {
     if (most > s->lo + s->tolerance + 4 * (rounding + s->lost))
         return false;
@@ -143,8 +140,8 @@ static double most_within(double hi, double radius)
     return (hi + radius) * (hi + radius > 0 ? 1 + 0x1p-50 : 1);
 }
 
-static ebpo_status ebpo_depth_ask_ball(ebpo_depth_search *s, const double middle[3],
-                                       ebpo_depth_ball *ball, ebpo_error *error)
+static ebpo_status ask_ball(depth_search *s, const double middle[3], depth_ball *ball,
+                            ebpo_error *error)
 {
     double lo, hi, rounding;
     ball->open = false;
@@ -160,8 +157,8 @@ static ebpo_status ebpo_depth_ask_ball(ebpo_depth_search *s, const double middle
 }
 
 /* The part is within `radius` of the centre, a point of it. */
-static ebpo_status depth_parts_offer(ebpo_depth_search *s, ebpo_depth_part *part,
-                                     const double centre[3], double radius, ebpo_error *error)
+static ebpo_status offer_part(depth_search *s, depth_part *part, const double centre[3],
+                              double radius, ebpo_error *error)
 {
     double lo, hi, rounding;
     if (!ebpo_posed_solid_near(s->solid, centre, radius))
@@ -179,14 +176,13 @@ static ebpo_status depth_parts_offer(ebpo_depth_search *s, ebpo_depth_part *part
         s->left = fmax(s->left, part->most);
         return EBPO_OK;
     }
-    return depth_parts_push(s, part) ? EBPO_OK
-                                     : ebpo_fail_memory(error, s->capacity * sizeof *s->part);
+    return push_part(s, part) ? EBPO_OK : ebpo_fail_memory(error, s->capacity * sizeof *s->part);
 }
 
-static ebpo_status offer_triangle(ebpo_depth_search *s, const double a[3], const double b[3],
+static ebpo_status offer_triangle(depth_search *s, const double a[3], const double b[3],
                                   const double c[3], ebpo_error *error)
 {
-    ebpo_depth_part part;
+    depth_part part;
     double centre[3], radius = 0;
     const double *corner[3] = { a, b, c };
     for (int k = 0; k < 3; k++)
@@ -195,26 +191,24 @@ static ebpo_status offer_triangle(ebpo_depth_search *s, const double a[3], const
         memcpy(part.corner[i], corner[i], sizeof part.corner[i]);
         radius = fmax(radius, ebpo_length_between(corner[i], centre));
     }
-    return depth_parts_offer(s, &part, centre, radius * (1 + 0x1p-50) + s->lost, error);
+    return offer_part(s, &part, centre, radius * (1 + 0x1p-50) + s->lost, error);
 }
 
 /* A face, at its pose. */
-static ebpo_status ebpo_depth_offer_face(ebpo_depth_search *s, const double corner[3][3],
-                                         ebpo_error *error)
+static ebpo_status offer_face(depth_search *s, const double corner[3][3], ebpo_error *error)
 {
     return offer_triangle(s, corner[0], corner[1], corner[2], error);
 }
 
 /* The middle of corner k and the next one. */
-static void middle_of(const ebpo_depth_part *p, int k, double out[3])
+static void middle_of(const depth_part *p, int k, double out[3])
 {
     for (int i = 0; i < 3; i++)
         out[i] = p->corner[k][i] + (p->corner[(k + 1) % 3][i] - p->corner[k][i]) / 2;
 }
 
 /* Into two, by the middle of edge k. */
-static ebpo_status halve_triangle(ebpo_depth_search *s, const ebpo_depth_part *p, int k,
-                                  ebpo_error *error)
+static ebpo_status halve_triangle(depth_search *s, const depth_part *p, int k, ebpo_error *error)
 {
     double middle[3];
     const double *opposite = p->corner[(k + 2) % 3];
@@ -226,8 +220,7 @@ static ebpo_status halve_triangle(ebpo_depth_search *s, const ebpo_depth_part *p
 
 /* Into four, by the middles of the edges; but a long one into two, as quarters of it would lie
  * beside each other, ever more of them as near to what is near to one. */
-static ebpo_status divide_triangle(ebpo_depth_search *s, const ebpo_depth_part *p,
-                                   ebpo_error *error)
+static ebpo_status divide_triangle(depth_search *s, const depth_part *p, ebpo_error *error)
 {
     double middle[3][3], length[3];
     int longest = 0, shortest = 0;
@@ -247,21 +240,23 @@ static ebpo_status divide_triangle(ebpo_depth_search *s, const ebpo_depth_part *
 }
 
 /* No part that waits is deeper than what is known and the tolerance. */
-static bool ebpo_depth_is_done(const ebpo_depth_search *s)
+static bool is_search_done(const depth_search *s)
 {
     return s->count == 0 || !(s->part[0].most > s->lo + s->tolerance);
 }
 
 /* The part that may be deepest: it is not done. */
-static ebpo_status ebpo_depth_divide_next(ebpo_depth_search *s, ebpo_error *error)
+static ebpo_status divide_next(depth_search *s, ebpo_error *error)
 {
-    ebpo_depth_part part = heap_take(s->part, s->count--);
+    depth_part part = heap_take(s->part, s->count--);
     return divide_triangle(s, &part, error);
 }
 
-/* The octree's cells are the same whatever is in memory of a model: so is every step of the search,
- * and the interval that it ends with. Level by level, and in each in the order of the file: then a
- * subtree is loaded about once for each of its levels that matter. */
+/* --- cells of the octree --- */
+
+/* Cells are visited level by level, and on each level in the order of the file, so that a subtree
+ * is loaded about once for each level that matters. The cells do not depend on what is in memory,
+ * and neither does the interval in which the search ends. */
 
 /* What is in a cell may be so deep. */
 typedef struct open_cell {
@@ -275,7 +270,7 @@ typedef struct listed_face {
 } listed_face;
 
 typedef struct going_down {
-    ebpo_depth_search *s;
+    depth_search *s;
     ebpo_posed_subtrees at; /* the pose of the surface */
     open_cell *open, *next; /* of a level, and of the one below it */
     uint64_t open_count, open_capacity, next_count, next_capacity;
@@ -302,7 +297,7 @@ static ebpo_status offer_faces(going_down *g, ebpo_error *error)
         qsort(g->face, g->face_count, sizeof *g->face, by_number);
     for (uint64_t i = 0; i < g->face_count && status == EBPO_OK; i++)
         if (i == 0 || g->face[i].number != g->face[i - 1].number)
-            status = ebpo_depth_offer_face(g->s, (const double(*)[3])g->face[i].corner, error);
+            status = offer_face(g->s, (const double(*)[3])g->face[i].corner, error);
     g->face_count = 0;
     return status;
 }
@@ -337,17 +332,16 @@ static ebpo_status add_leaf(going_down *g, const ebpo_node *leaf, ebpo_error *er
 
 static ebpo_status offer_cell(going_down *g, ebpo_cell cell, ebpo_error *error)
 {
-    ebpo_depth_search *s = g->s;
+    depth_search *s = g->s;
     double corner[8][3], middle[3], diagonal = ebpo_posed_diagonal(&g->at, cell);
-    ebpo_depth_ball ball = { .radius = diagonal / 2 * (1 + 0x1p-17) + 2 * s->lost,
-                             .far = INFINITY };
+    depth_ball ball = { .radius = diagonal / 2 * (1 + 0x1p-17) + 2 * s->lost, .far = INFINITY };
     ebpo_posed_cell(&g->at, cell, corner);
     for (int k = 0; k < 3; k++)
         middle[k] = corner[0][k] / 2 + corner[7][k] / 2;
     if (!g->at.model->info->pruned) /* a face has a point in the cell, or near it */
         ball.far = ball.radius + EBPO_NEAR_SHARE * diagonal;
     open_cell open = { .cell = cell };
-    ebpo_status status = ebpo_depth_ask_ball(s, middle, &ball, error);
+    ebpo_status status = ask_ball(s, middle, &ball, error);
     if (status != EBPO_OK || !ball.open)
         return status;
     open.most = ball.most;
@@ -372,7 +366,7 @@ static ebpo_status find_node(going_down *g, ebpo_cell cell, ebpo_node *out, ebpo
     }
 }
 
-static ebpo_status depth_cells_divide(going_down *g, ebpo_cell cell, ebpo_error *error)
+static ebpo_status divide_cell(going_down *g, ebpo_cell cell, ebpo_error *error)
 {
     ebpo_node node;
     ebpo_status status = find_node(g, cell, &node, error);
@@ -392,16 +386,16 @@ static ebpo_status depth_cells_divide(going_down *g, ebpo_cell cell, ebpo_error 
 
 static ebpo_status divide_level(going_down *g, ebpo_error *error)
 {
-    ebpo_depth_search *s = g->s;
+    depth_search *s = g->s;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < g->open_count && status == EBPO_OK; i++) {
         const open_cell *c = &g->open[i];
-        if (!(c->most > s->lo + s->tolerance) || ebpo_depth_is_late(s))
+        if (!(c->most > s->lo + s->tolerance) || is_search_late(s))
             s->left = fmax(s->left, c->most);
         else if (i % 64 == 0 && !ebpo_progress_step(s->progress, "depth", 0, 0, error))
             return EBPO_E_CANCELLED;
         else
-            status = depth_cells_divide(g, c->cell, error);
+            status = divide_cell(g, c->cell, error);
     }
     return status == EBPO_OK ? offer_faces(g, error) : status;
 }
@@ -418,8 +412,8 @@ static void swap_levels(going_down *g)
     g->next_capacity = capacity;
 }
 
-/* Offers all faces that may matter, which wait then. As ebpo_depth_search_run. */
-static ebpo_status ebpo_depth_offer_cells(ebpo_depth_search *s, ebpo_error *error)
+/* Offers all faces that may matter, which wait then. As run_depth_search. */
+static ebpo_status offer_cells(depth_search *s, ebpo_error *error)
 {
     going_down g = { .s = s, .at = { .model = s->from->model, .posing = *s->posing } };
     ebpo_node root = ebpo_model_root(g.at.model);
@@ -432,22 +426,23 @@ static ebpo_status ebpo_depth_offer_cells(ebpo_depth_search *s, ebpo_error *erro
     return status;
 }
 
-static ebpo_status depth_search_search(ebpo_depth_search *s, ebpo_error *error)
+static ebpo_status search_parts(depth_search *s, ebpo_error *error)
 {
-    ebpo_status status = ebpo_depth_offer_cells(s, error);
-    while (status == EBPO_OK && !ebpo_depth_is_done(s) && !ebpo_depth_is_late(s)) {
+    ebpo_status status = offer_cells(s, error);
+    while (status == EBPO_OK && !is_search_done(s) && !is_search_late(s)) {
         if (s->asked % 64 == 0 && !ebpo_progress_step(s->progress, "depth", 0, 0, error))
             return EBPO_E_CANCELLED;
-        status = ebpo_depth_divide_next(s, error);
+        status = divide_next(s, error);
     }
     return status;
 }
 
-static ebpo_status ebpo_depth_search_run(ebpo_depth_search *s, ebpo_error *error)
+/* EBPO_E_MEMORY, EBPO_E_CANCELLED, and those of ebpo_distance. */
+static ebpo_status run_depth_search(depth_search *s, ebpo_error *error)
 {
     s->lost = 0x1p-46 * s->reach;
     s->lo = 0;
-    ebpo_status status = depth_search_search(s, error);
+    ebpo_status status = search_parts(s, error);
     s->hi = fmax(s->lo, s->left);
     if (s->count > 0)
         s->hi = fmax(s->hi, s->part[0].most);
@@ -456,7 +451,7 @@ static ebpo_status ebpo_depth_search_run(ebpo_depth_search *s, ebpo_error *error
     return status;
 }
 
-/* How deep the surfaces of two models are in each other. */
+/* --- the query --- */
 
 /* Of the caller's model `solid` (0: A), which holds the other one's surface. */
 static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance, ebpo_certain *out,
@@ -470,15 +465,15 @@ static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance
         status = ebpo_posed_solid_make(&posed, c->model[solid], pose, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_depth_search s = { .from = c->context[!solid],
-                            .posing = &q->posing[solid == q->turned].posing,
-                            .reach = q->reach,
-                            .solid = &posed,
-                            .context = c->context[solid],
-                            .tolerance = tolerance,
-                            .late = q->late,
-                            .progress = &q->options.progress };
-    status = ebpo_depth_search_run(&s, error);
+    depth_search s = { .from = c->context[!solid],
+                       .posing = &q->posing[solid == q->turned].posing,
+                       .reach = q->reach,
+                       .solid = &posed,
+                       .context = c->context[solid],
+                       .tolerance = tolerance,
+                       .late = q->late,
+                       .progress = &q->options.progress };
+    status = run_depth_search(&s, error);
     if (status == EBPO_OK)
         *out = ebpo_certain_of(s.lo, s.hi);
     return status;
@@ -493,7 +488,7 @@ static ebpo_status make_contexts(ebpo_collider *c, ebpo_error *error)
     return status;
 }
 
-static uint64_t depth_loads(const ebpo_collider *c)
+static uint64_t subtree_loads(const ebpo_collider *c)
 {
     uint64_t sum = 0;
     for (int i = 0; i < 2; i++)
@@ -513,7 +508,7 @@ ebpo_status ebpo_collide_depth(ebpo_collider *c, const ebpo_collide_options *opt
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;
-    uint64_t loaded = depth_loads(c), read = ebpo_collision_bytes_read(&q);
+    uint64_t loaded = subtree_loads(c), read = ebpo_collision_bytes_read(&q);
     status = make_contexts(c, error);
     if (status == EBPO_OK && a_in_b)
         status = depth_in(&q, 1, tolerance, a_in_b, error);
@@ -521,7 +516,7 @@ ebpo_status ebpo_collide_depth(ebpo_collider *c, const ebpo_collide_options *opt
         status = depth_in(&q, 0, tolerance, b_in_a, error);
     for (int i = 0; i < 2; i++)
         ebpo_context_let_go(c->context[i]);
-    c->loads += depth_loads(c) - loaded;
+    c->loads += subtree_loads(c) - loaded;
     c->bytes_read += ebpo_collision_bytes_read(&q) - read;
     return status;
 }

@@ -1,25 +1,343 @@
+/* The distance of two models at poses, and the pair of faces that has it.
+ *
+ * The kernels of gap_walk_kernels.c walk through pairs of nodes in floats and drop what is
+ * certainly farther than the limit. What remains waits, and is decided here: in doubles with error
+ * bounds (ebpo_triangles_distance_bounds), and exactly where the bounds overlap. Of pairs at the
+ * same distance the first in the order of the files wins, so the result is the same with every
+ * processor and number of threads.
+ *
+ * Models in parts are searched in pairs of subtrees, the smallest gap of envelopes first; a
+ * subtree is loaded only if its envelope is nearer than the best pair so far. A collider remembers
+ * its last pair, from which the next search begins. Bounds: docs/develop/collision.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
 #include <string.h>
 
+#include <ebpo/base.h>
+
 #include "core/alloc.h"
+#include "core/os.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "extras/collide/collider.h"
-#include "extras/collide/contact.h"
-#include "extras/collide/nearest_pair.h"
-#include "extras/collide/posed_subtrees.h"
+#include "extras/collide/face_pairs.h"
+#include "extras/collide/hierarchy_walk.h"
+#include "extras/collide/subtree_search.h"
 #include "geometry/triangle_pair.h"
 
-/* The nearest faces of two models, of which subtrees are loaded as they may matter. One thread. */
+/* Two faces, as in their files and at their poses. */
+typedef struct ebpo_face_two {
+    uint64_t file[2], source[2]; /* their numbers */
+    double own[2][3][3], corner[2][3][3];
+    ebpo_pair_distance_bounds bounds;
+} ebpo_face_two;
+
+/* Of one pair of accels, or of several, one after the other. */
+typedef struct nearest_pair {
+    /* In: */
+    double tolerance; /* 0: exact */
+    double at_least;  /* NAN: not asked */
+    uint64_t late;    /* by ebpo_clock; UINT64_MAX: never */
+    const ebpo_progress *progress;
+    /* Out: lo <= distance <= hi, equal if the answer is exact. */
+    double lo, hi;
+    bool found;
+    bool meets;      /* `best` does, and is not the least one that does */
+    int is_at_least; /* 1, 0; -1: not asked, or open */
+    ebpo_face_two best;
+    bool ended; /* before all was seen: what was not is not nearer than: */
+    double left;
+    ebpo_error *error; /* of `status`, while it is being searched */
+    ebpo_status status;
+} nearest_pair;
+
+typedef const double (*corners)[3];
+#define CORNERS(face, side) ((corners)(face)->corner[side])
+
+/* --- one pair --- */
+
+static void pose_faces(const ebpo_posing *const posing[2], ebpo_face_two *out)
+{
+    for (int i = 0; i < 6; i++)
+        ebpo_posing_apply(posing[i / 3], out->own[i / 3][i % 3], out->corner[i / 3][i % 3]);
+    ebpo_triangles_distance_bounds(CORNERS(out, 0), CORNERS(out, 1), &out->bounds);
+}
+
+static void look_at_slots(const ebpo_gap_search *g, const uint32_t slot[2], ebpo_face_two *out)
+{
+    const ebpo_posing *posing[2] = { &g->posing[0].posing, &g->posing[1].posing };
+    for (int s = 0; s < 2; s++) {
+        uint32_t local = ebpo_accel_slot_face(g->accel[s], slot[s]);
+        out->file[s] = ebpo_accel_file_face(g->accel[s], local);
+        out->source[s] = ebpo_accel_source_face(g->accel[s], local);
+        ebpo_accel_triangle(g->accel[s], slot[s], out->own[s]);
+    }
+    pose_faces(posing, out);
+}
+
+/* Of equal distances the first in the order of the files. */
+static bool is_earlier(const ebpo_face_two *f, const ebpo_face_two *than)
+{
+    return f->file[0] != than->file[0] ? f->file[0] < than->file[0] : f->file[1] < than->file[1];
+}
+
+static bool is_nearer(const ebpo_face_two *f, const ebpo_face_two *than)
+{
+    if (f->bounds.hi < than->bounds.lo)
+        return true;
+    if (f->bounds.lo > than->bounds.hi)
+        return false;
+    int order = 0;
+    if (!ebpo_same_distance(CORNERS(f, 0), CORNERS(f, 1), &f->bounds, CORNERS(than, 0),
+                            CORNERS(than, 1), &than->bounds))
+        order = ebpo_triangles_distance_compare(CORNERS(f, 0), CORNERS(f, 1), CORNERS(than, 0),
+                                                CORNERS(than, 1));
+    return order < 0 || (order == 0 && is_earlier(f, than));
+}
+
+/* --- all that wait --- */
+
+/* Rounded up, in the search's unit. */
+static float to_unit(const ebpo_gap_search *g, double distance)
+{
+    return (float)(distance * g->posing[0].unit * (1 + 0x1p-22)) + 0x1p-100f;
+}
+
+/* Of a pair that is apart; false: that is enough. */
+static bool compare_to_asked(nearest_pair *n, const ebpo_face_two *f)
+{
+    if (!(f->bounds.lo < n->at_least) ||
+        (!(f->bounds.hi < n->at_least) &&
+         ebpo_triangles_distance_compare_to(CORNERS(f, 0), CORNERS(f, 1), n->at_least) >= 0))
+        return true;
+    n->is_at_least = 0;
+    n->best = *f;
+    n->found = true;
+    return false;
+}
+
+/* A tolerance asks for bounds only: the least of each. They are too wide for a gap that is tiny
+ * beside its faces, whose direction doubles hardly know: then for the exact distance, rounded. */
+static void take_within_tolerance(nearest_pair *n, const ebpo_face_two *given)
+{
+    ebpo_face_two f = *given;
+    double hi = n->found ? fmin(f.bounds.hi, n->best.bounds.hi) : f.bounds.hi;
+    if (f.bounds.lo < hi - n->tolerance) {
+        double exact = ebpo_triangles_distance(CORNERS(&f, 0), CORNERS(&f, 1));
+        f.bounds.lo = nextafter(exact, 0);
+        f.bounds.hi = nextafter(exact, INFINITY);
+    }
+    n->lo = fmin(n->lo, f.bounds.lo);
+    if (!n->found || f.bounds.hi < n->best.bounds.hi)
+        n->best = f;
+    n->found = true;
+}
+
+/* False: enough. */
+static bool consider_faces(nearest_pair *n, const ebpo_face_two *f)
+{
+    if (!(f->bounds.lo > 0) &&
+        ebpo_triangle_pair(CORNERS(f, 0), CORNERS(f, 1)) != EBPO_PAIR_APART) {
+        n->best = *f;
+        n->found = n->meets = true;
+        return false;
+    }
+    if (!isnan(n->at_least))
+        return compare_to_asked(n, f);
+    if (n->tolerance > 0)
+        take_within_tolerance(n, f);
+    else if (!n->found || is_nearer(f, &n->best)) {
+        n->best = *f;
+        n->found = true;
+    }
+    return true;
+}
+
+static bool take_faces(ebpo_gap_search *g, nearest_pair *n, const uint32_t slot[2])
+{
+    ebpo_face_two f;
+    look_at_slots(g, slot, &f);
+    ebpo_gap_set_best(g, to_unit(g, f.bounds.hi), slot[0], slot[1]);
+    return consider_faces(n, &f);
+}
+
+static bool go_on(ebpo_gap_search *g)
+{
+    nearest_pair *n = g->user;
+    if (!ebpo_progress_step(n->progress, "distance", 0, 0, n->error))
+        n->status = EBPO_E_CANCELLED;
+    g->ended = n->status != EBPO_OK || (n->late != UINT64_MAX && ebpo_clock() >= n->late);
+    return !g->ended;
+}
+
+/* Of those that nobody will look at. Not by fmin: gcc 12 for ARM fails to compile such loops. */
+static double least_waiting(const ebpo_gap_search *g, unsigned first)
+{
+    double least = INFINITY;
+    for (unsigned i = first; i < g->waits; i++)
+        if ((double)g->waiting[i].low < least)
+            least = (double)g->waiting[i].low;
+    return fmax(least / g->posing[0].unit * (1 - 0x1p-20), 0);
+}
+
+/* Many may be at nearly the same distance, where models have flat parts. */
+static bool judge_waiting(ebpo_gap_search *g)
+{
+    nearest_pair *n = g->user;
+    bool more = true;
+    unsigned judged = 0, i = 0;
+    for (; i < g->waits && more; i++)
+        if (!(g->waiting[i].low > g->limit))
+            more = take_faces(g, n, g->waiting[i].slot) && (++judged % 16 || go_on(g));
+    if (!more)
+        n->lo = fmin(n->lo, least_waiting(g, i));
+    g->waits = 0;
+    return more;
+}
+
+/* --- the answer --- */
+
+/* Of what has not been seen. */
+static double left_over(const ebpo_gap_search *g)
+{
+    double least = INFINITY;
+    for (uint64_t i = 0; i < g->count; i++)
+        if ((double)g->stack[i].key < least)
+            least = (double)g->stack[i].key;
+    return sqrt(fmax(least, 0)) / g->posing[0].unit * (1 - 0x1p-18);
+}
+
+static void end_exact(nearest_pair *n)
+{
+    n->lo = n->hi = ebpo_triangles_distance(CORNERS(&n->best, 0), CORNERS(&n->best, 1));
+}
+
+static void end_open(nearest_pair *n)
+{
+    n->hi = n->found ? n->best.bounds.hi : INFINITY;
+    n->lo = fmin(fmin(n->lo, n->hi), n->left);
+    if (n->tolerance > 0)
+        n->lo = fmin(n->lo, n->hi - n->tolerance);
+    else if (n->found)
+        n->lo = fmin(n->lo, n->best.bounds.lo);
+    n->lo = fmax(n->lo, 0);
+}
+
+static void nearest_pair_end(nearest_pair *n)
+{
+    bool asked = !isnan(n->at_least);
+    if (n->meets) {
+        n->lo = n->hi = 0;
+        n->is_at_least = asked ? n->at_least <= 0 : -1;
+    } else if (asked) {
+        if (n->is_at_least < 0 && !n->ended)
+            n->is_at_least = 1;
+        n->lo = n->is_at_least == 1 ? n->at_least : fmin(n->lo, n->at_least);
+        if (n->is_at_least == 1)
+            n->hi = INFINITY;
+        else
+            end_open(n);
+    } else if (!n->ended && n->tolerance == 0 && n->found)
+        end_exact(n);
+    else
+        end_open(n);
+}
+
+/* What was not looked at is not nearer. */
+static void nearest_pair_leave(nearest_pair *n, double left)
+{
+    n->ended = true;
+    n->left = fmin(n->left, left);
+}
+
+/* --- the search --- */
+
+/* What is asked has been set. */
+static void nearest_pair_begin(nearest_pair *n)
+{
+    n->lo = n->left = INFINITY;
+    n->found = n->meets = n->ended = false;
+    n->status = EBPO_OK;
+    n->is_at_least = -1;
+}
+
+/* A pair of faces that is known from before: own, file and source are set. */
+static void nearest_pair_start(nearest_pair *n, const ebpo_posing posing[2],
+                               const ebpo_face_two *pair)
+{
+    const ebpo_posing *const two[2] = { &posing[0], &posing[1] };
+    ebpo_face_two f = *pair;
+    pose_faces(two, &f);
+    (void)consider_faces(n, &f);
+}
+
+/* Two faces of `g`, by their slots, that are known to meet. */
+static void nearest_pair_met(nearest_pair *n, const ebpo_gap_search *g, const uint32_t slot[2])
+{
+    look_at_slots(g, slot, &n->best);
+    n->found = n->meets = true;
+}
+
+/* What is farther away does not matter any more. */
+static double nearest_pair_limit(const nearest_pair *n)
+{
+    if (!isnan(n->at_least))
+        return n->at_least;
+    return n->found ? n->best.bounds.hi - n->tolerance : INFINITY;
+}
+
+/* Nothing is left to be found out. */
+static bool nearest_pair_is_done(const nearest_pair *n)
+{
+    return n->meets || n->is_at_least >= 0 || n->ended || n->status != EBPO_OK;
+}
+
+/* What is known limits the search. */
+static void begin_search(const nearest_pair *n, ebpo_gap_search *g)
+{
+    g->tolerance = (float)(n->tolerance * g->posing[0].unit * (1 - 0x1p-20));
+    if (!isnan(n->at_least)) {
+        ebpo_gap_set_limit(g, to_unit(g, n->at_least));
+    } else if (n->found) {
+        g->best = to_unit(g, n->best.bounds.hi);
+        ebpo_gap_set_limit(g, g->best - g->tolerance);
+    }
+}
+
+/* What waits, and the pair that is less than `before` and that nobody has judged yet. */
+static void judge_rest(ebpo_gap_search *g, nearest_pair *n, float before)
+{
+    if (nearest_pair_is_done(n) || !judge_waiting(g) || n->meets || !isnan(n->at_least))
+        return;
+    if (n->tolerance > 0 && g->best < before)
+        take_faces(g, n, g->best_slot);
+}
+
+/* Of two more accels, with which `g` has been begun. EBPO_E_MEMORY, EBPO_E_CANCELLED. */
+static ebpo_status nearest_pair_search(nearest_pair *n, ebpo_gap_search *g, ebpo_error *error)
+{
+    g->user = n;
+    g->judge = judge_waiting;
+    g->go_on = go_on;
+    n->error = error;
+    begin_search(n, g);
+    float before = g->best;
+    ebpo_gap_kernels_best()->walk(g);
+    if (g->no_memory)
+        return ebpo_fail_memory(error, g->capacity * sizeof *g->stack);
+    judge_rest(g, n, before);
+    if (g->ended)
+        nearest_pair_leave(n, left_over(g));
+    return n->status;
+}
 
 static const char stage[] = "distance";
 
 typedef struct searching {
     ebpo_subtree_search subtrees;
-    ebpo_nearest_pair *n;
+    nearest_pair *n;
     double hi; /* cells tell that the distance is not greater */
 } searching;
 
@@ -27,9 +345,8 @@ typedef struct searching {
 
 /* Goes on with `n` in two more accels of the question's models. `may_meet`: the walk for the first
  * contact comes first, as bounds say little where faces meet. */
-static ebpo_status ebpo_distance_of_accels(const ebpo_collision *q,
-                                           const ebpo_accel *const accel[2], bool may_meet,
-                                           ebpo_nearest_pair *n, ebpo_error *error)
+static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel *const accel[2],
+                                      bool may_meet, nearest_pair *n, ebpo_error *error)
 {
     ebpo_collider *c = q->collider;
     ebpo_posing posing[2] = { q->posing[0].posing, q->posing[1].posing };
@@ -41,10 +358,10 @@ static ebpo_status ebpo_distance_of_accels(const ebpo_collision *q,
     if (status != EBPO_OK)
         return status;
     if (meet == 1) {
-        ebpo_nearest_pair_met(n, c->gap, c->walk.met_slot);
+        nearest_pair_met(n, c->gap, c->walk.met_slot);
         return EBPO_OK;
     }
-    status = ebpo_nearest_pair_search(n, c->gap, error);
+    status = nearest_pair_search(n, c->gap, error);
     c->node_pairs += c->gap->node_pairs;
     c->block_pairs += c->gap->block_pairs;
     return status;
@@ -58,12 +375,12 @@ static ebpo_status look_at(searching *s, const ebpo_node_gap *pair, ebpo_error *
     bool there;
     ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &there, error);
     return status == EBPO_OK && there
-               ? ebpo_distance_of_accels(s->subtrees.question, accel, pair->gap == 0, s->n, error)
+               ? distance_of_accels(s->subtrees.question, accel, pair->gap == 0, s->n, error)
                : status;
 }
 
-static ebpo_status distance_add(searching *s, const ebpo_posed_node node[2], double gap,
-                                ebpo_error *error)
+static ebpo_status add_node_pair(searching *s, const ebpo_posed_node node[2], double gap,
+                                 ebpo_error *error)
 {
     ebpo_node_gaps *nodes = &s->subtrees.nodes;
     ebpo_model *const *model = s->subtrees.question->model;
@@ -73,42 +390,41 @@ static ebpo_status distance_add(searching *s, const ebpo_posed_node node[2], dou
             return EBPO_OK;
     ebpo_status status = ebpo_node_gap_of(nodes, node, &pair.gap, error);
     pair.gap = fmax(pair.gap, gap); /* the nodes are in those above them */
-    if (status != EBPO_OK || pair.gap > fmin(s->hi, ebpo_nearest_pair_limit(s->n)))
+    if (status != EBPO_OK || pair.gap > fmin(s->hi, nearest_pair_limit(s->n)))
         return status;
     if (!model[0]->info->pruned && !model[1]->info->pruned)
         s->hi = fmin(s->hi, ebpo_node_far_bound(nodes, node));
     return ebpo_node_gaps_push(nodes, &pair, error);
 }
 
-static ebpo_status distance_divide(searching *s, const ebpo_node_gap *pair, int side,
-                                   ebpo_error *error)
+static ebpo_status divide_pair(searching *s, const ebpo_node_gap *pair, int side, ebpo_error *error)
 {
     ebpo_posed_node part[2] = { pair->node[0], pair->node[1] };
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         part[side] = ebpo_posed_child(&s->subtrees.nodes.side[side], &pair->node[side], octant);
-        status = distance_add(s, part, pair->gap, error);
+        status = add_node_pair(s, part, pair->gap, error);
     }
     return status;
 }
 
 /* Pairs come by their gaps: behind the first that is too far away there is nothing. */
-static ebpo_status search_nearest_parts(searching *s, ebpo_error *error)
+static ebpo_status search_subtrees(searching *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_node_gaps *nodes = &s->subtrees.nodes;
     const ebpo_collision *q = s->subtrees.question;
-    while (nodes->count > 0 && status == EBPO_OK && !ebpo_nearest_pair_is_done(s->n)) {
+    while (nodes->count > 0 && status == EBPO_OK && !nearest_pair_is_done(s->n)) {
         ebpo_node_gap pair = ebpo_node_gaps_pop(nodes);
         int side = ebpo_subtree_search_side(&s->subtrees, pair.node);
-        if (pair.gap > ebpo_nearest_pair_limit(s->n))
+        if (pair.gap > nearest_pair_limit(s->n))
             return EBPO_OK;
         if (ebpo_collision_is_late(q))
-            ebpo_nearest_pair_leave(s->n, pair.gap);
+            nearest_pair_leave(s->n, pair.gap);
         else
-            status = side < 0 ? look_at(s, &pair, error) : distance_divide(s, &pair, side, error);
-        if (ebpo_nearest_pair_is_done(s->n)) /* nobody looks at the others */
-            ebpo_nearest_pair_leave(s->n, pair.gap);
+            status = side < 0 ? look_at(s, &pair, error) : divide_pair(s, &pair, side, error);
+        if (nearest_pair_is_done(s->n)) /* nobody looks at the others */
+            nearest_pair_leave(s->n, pair.gap);
         if (!ebpo_progress_step(&q->options.progress, stage, 0, 0, error))
             return EBPO_E_CANCELLED;
     }
@@ -117,23 +433,22 @@ static ebpo_status search_nearest_parts(searching *s, ebpo_error *error)
 
 /* Goes on with `n` in all pairs of subtrees whose envelopes are not farther apart than what has
  * been found, the nearest first: the same as of whole models. */
-static ebpo_status ebpo_distance_of_parts(const ebpo_collision *q, ebpo_nearest_pair *n,
-                                          ebpo_error *error)
+static ebpo_status distance_of_parts(const ebpo_collision *q, nearest_pair *n, ebpo_error *error)
 {
     searching s = { .n = n, .hi = INFINITY };
     ebpo_status status = ebpo_subtree_search_begin(&s.subtrees, q, error);
     if (status == EBPO_OK) {
         ebpo_posed_node root[2] = { ebpo_posed_root(&s.subtrees.nodes.side[0]),
                                     ebpo_posed_root(&s.subtrees.nodes.side[1]) };
-        status = distance_add(&s, root, 0, error);
+        status = add_node_pair(&s, root, 0, error);
     }
     if (status == EBPO_OK)
-        status = search_nearest_parts(&s, error);
+        status = search_subtrees(&s, error);
     ebpo_subtree_search_end(&s.subtrees);
     return status;
 }
 
-/* The distance of two models at poses. */
+/* --- the query --- */
 
 static ebpo_status check_options(const ebpo_clearance_options *o, ebpo_error *error)
 {
@@ -155,7 +470,7 @@ static void meeting_point(const ebpo_face_two *f, ebpo_pair_kind kind, double po
         point[0][k] = point[1][k] = end[0].point[k];
 }
 
-static void tell_pair(const ebpo_collision *q, const ebpo_nearest_pair *n, ebpo_clearance *out)
+static void tell_pair(const ebpo_collision *q, const nearest_pair *n, ebpo_clearance *out)
 {
     const ebpo_face_two *f = &n->best;
     int a = q->turned, b = !q->turned;
@@ -189,8 +504,7 @@ static ebpo_face_two in_order(const ebpo_collision *q, const ebpo_face_two *f)
     return out;
 }
 
-static ebpo_status distance_keep(const ebpo_collision *q, const ebpo_nearest_pair *n,
-                                 ebpo_error *error)
+static ebpo_status keep_nearest(const ebpo_collision *q, const nearest_pair *n, ebpo_error *error)
 {
     ebpo_collider *c = q->collider;
     if (!c->nearest)
@@ -201,13 +515,13 @@ static ebpo_status distance_keep(const ebpo_collision *q, const ebpo_nearest_pai
     return EBPO_OK;
 }
 
-static void distance_start(const ebpo_collision *q, ebpo_nearest_pair *n)
+static void start_search(const ebpo_collision *q, nearest_pair *n)
 {
     const ebpo_posing posing[2] = { q->posing[0].posing, q->posing[1].posing };
     ebpo_face_two known = in_order(q, q->collider->nearest);
-    ebpo_nearest_pair_start(n, posing, &known);
-    if (ebpo_nearest_pair_is_done(n))
-        ebpo_nearest_pair_leave(n, 0);
+    nearest_pair_start(n, posing, &known);
+    if (nearest_pair_is_done(n))
+        nearest_pair_leave(n, 0);
 }
 
 /* --- the search --- */
@@ -217,8 +531,8 @@ static bool has_faces(const ebpo_model *m)
     return m->whole ? m->whole->bound_count > 0 : m->info->face_count > 0;
 }
 
-static ebpo_status search_nearest_faces(const ebpo_collision *q, bool warm, ebpo_nearest_pair *n,
-                                        ebpo_error *error)
+static ebpo_status search_nearest(const ebpo_collision *q, bool warm, nearest_pair *n,
+                                  ebpo_error *error)
 {
     ebpo_collider *c = q->collider;
     const ebpo_accel *accel[2] = { q->model[0]->whole, q->model[1]->whole };
@@ -227,11 +541,11 @@ static ebpo_status search_nearest_faces(const ebpo_collision *q, bool warm, ebpo
     if (!c->gap)
         return ebpo_fail_memory(error, sizeof *c->gap);
     if (warm && c->nearest)
-        distance_start(q, n);
-    if (ebpo_nearest_pair_is_done(n))
+        start_search(q, n);
+    if (nearest_pair_is_done(n))
         return EBPO_OK;
-    return ebpo_collision_is_in_parts(q) ? ebpo_distance_of_parts(q, n, error)
-                                         : ebpo_distance_of_accels(q, accel, true, n, error);
+    return ebpo_collision_is_in_parts(q) ? distance_of_parts(q, n, error)
+                                         : distance_of_accels(q, accel, true, n, error);
 }
 
 ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *options,
@@ -256,19 +570,19 @@ ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *
         out->at_least = wanted.at_least < 0 ? -1 : 1;
         return EBPO_OK;
     }
-    ebpo_nearest_pair n = { .tolerance = wanted.tolerance,
-                            .at_least = wanted.at_least < 0 ? NAN : wanted.at_least,
-                            .late = q.late,
-                            .progress = &q.options.progress };
-    ebpo_nearest_pair_begin(&n);
-    status = search_nearest_faces(&q, wanted.warm, &n, error);
+    nearest_pair n = { .tolerance = wanted.tolerance,
+                       .at_least = wanted.at_least < 0 ? NAN : wanted.at_least,
+                       .late = q.late,
+                       .progress = &q.options.progress };
+    nearest_pair_begin(&n);
+    status = search_nearest(&q, wanted.warm, &n, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_nearest_pair_end(&n);
+    nearest_pair_end(&n);
     out->distance = ebpo_certain_of(n.lo, n.hi);
     out->at_least = n.is_at_least;
     if (!n.found)
         return EBPO_OK;
     tell_pair(&q, &n, out);
-    return distance_keep(&q, &n, error);
+    return keep_nearest(&q, &n, error);
 }

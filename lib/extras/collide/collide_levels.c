@@ -1,3 +1,10 @@
+/* What the levels of two octrees tell of two models at poses, without their faces: bounds of the
+ * distance, and whether both solids certainly have a point in common.
+ *
+ * Pairs of nodes come by the gaps of their envelopes, the smallest first (subtree_search.h). A gap
+ * is a lower bound of the distance. Two nodes with faces bound it from above. A black cell belongs
+ * to its solid as a whole: if it holds a whole cell with faces of the other model, or a point of a
+ * black one, both solids have a common point. One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -5,13 +12,10 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
-#include "extras/collide/posed_subtrees.h"
-
-/* What the levels of two trees tell of models at poses: by envelopes and black cells, without
- * faces. One thread each. */
+#include "extras/collide/subtree_search.h"
 
 /* Zero at first. */
-typedef struct ebpo_level_search {
+typedef struct level_search {
     const ebpo_collision *question;
     ebpo_node_gaps nodes;
     /* out */
@@ -19,7 +23,7 @@ typedef struct ebpo_level_search {
     uint64_t open_pairs; /* that may have faces that meet */
     bool meets;          /* a point is of both, of solids or of faces: certain */
     bool may_meet;       /* a pair is left that may have such a point */
-} ebpo_level_search;
+} level_search;
 
 static const char stage[] = "pairs of nodes";
 
@@ -30,7 +34,7 @@ static const double wall_share = 0x1p-14;
 
 typedef enum content { NOTHING, FACES, SOLID } content;
 
-static content content_of(const ebpo_level_search *g, int side, const ebpo_posed_node *node)
+static content content_of(const level_search *g, int side, const ebpo_posed_node *node)
 {
     const ebpo_info *info = g->nodes.side[side].model->info;
     if (ebpo_entry_kind_of(node->entry) != EBPO_ENTRY_UNIFORM)
@@ -39,7 +43,7 @@ static content content_of(const ebpo_level_search *g, int side, const ebpo_posed
                                                                                         : NOTHING;
 }
 
-static bool has_children(const ebpo_level_search *g, const ebpo_posed_node *node)
+static bool has_children(const level_search *g, const ebpo_posed_node *node)
 {
     int level = g->question->options.level;
     return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_GRAY &&
@@ -68,7 +72,7 @@ static bool is_within(const double corner[8][3], const double p[3], double reach
 }
 
 /* A cell and what is near it: of a node with faces one comes there. */
-static void level_search_widen(double corner[8][3], double share)
+static void widen_cell(double corner[8][3], double share)
 {
     double middle[3];
     for (int i = 0; i < 3; i++)
@@ -80,13 +84,12 @@ static void level_search_widen(double corner[8][3], double share)
 
 /* `solid` is of a black node: all of where a face of the other one must be is in it, or, if that is
  * black as well, one of some points. */
-static bool shares_point(const ebpo_level_search *g, double solid[8][3], double other[8][3],
-                         bool black)
+static bool shares_point(const level_search *g, double solid[8][3], double other[8][3], bool black)
 {
     int within = 0;
     double middle[3], reach = g->question->reach;
     if (!black)
-        level_search_widen(other, 2 * EBPO_NEAR_SHARE);
+        widen_cell(other, 2 * EBPO_NEAR_SHARE);
     for (int c = 0; c < 8; c++)
         within += is_within((const double(*)[3])solid, other[c], reach);
     for (int i = 0; i < 3; i++)
@@ -94,7 +97,7 @@ static bool shares_point(const ebpo_level_search *g, double solid[8][3], double 
     return black ? within > 0 || is_within((const double(*)[3])solid, middle, reach) : within == 8;
 }
 
-static bool certainly_meet(const ebpo_level_search *g, const ebpo_posed_node node[2],
+static bool certainly_meet(const level_search *g, const ebpo_posed_node node[2],
                            const content has[2])
 {
     for (int i = 0; i < 2; i++) {
@@ -111,8 +114,8 @@ static bool certainly_meet(const ebpo_level_search *g, const ebpo_posed_node nod
 
 /* --- pairs --- */
 
-static ebpo_status level_search_add(ebpo_level_search *g, const ebpo_posed_node node[2], double gap,
-                                    ebpo_error *error)
+static ebpo_status add_node_pair(level_search *g, const ebpo_posed_node node[2], double gap,
+                                 ebpo_error *error)
 {
     content has[2] = { content_of(g, 0, &node[0]), content_of(g, 1, &node[1]) };
     ebpo_node_gap pair = { { node[0], node[1] }, 0 };
@@ -130,13 +133,13 @@ static ebpo_status level_search_add(ebpo_level_search *g, const ebpo_posed_node 
     return ebpo_node_gaps_push(&g->nodes, &pair, error);
 }
 
-static bool has_faces(const ebpo_level_search *g, const ebpo_node_gap *pair)
+static bool has_faces(const level_search *g, const ebpo_node_gap *pair)
 {
     return content_of(g, 0, &pair->node[0]) == FACES && content_of(g, 1, &pair->node[1]) == FACES;
 }
 
 /* It is not divided. */
-static void close_pair(ebpo_level_search *g, const ebpo_node_gap *pair)
+static void close_pair(level_search *g, const ebpo_node_gap *pair)
 {
     bool faces = has_faces(g, pair);
     if (faces)
@@ -147,8 +150,7 @@ static void close_pair(ebpo_level_search *g, const ebpo_node_gap *pair)
     g->open_pairs += faces;
 }
 
-static ebpo_status level_search_divide(ebpo_level_search *g, const ebpo_node_gap *pair,
-                                       ebpo_error *error)
+static ebpo_status divide_pair(level_search *g, const ebpo_node_gap *pair, ebpo_error *error)
 {
     bool down[2] = { has_children(g, &pair->node[0]), has_children(g, &pair->node[1]) };
     int side = !down[0] ? 1 : !down[1] ? 0 : ebpo_node_larger(&g->nodes, pair->node);
@@ -156,7 +158,7 @@ static ebpo_status level_search_divide(ebpo_level_search *g, const ebpo_node_gap
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         part[side] = ebpo_posed_child(&g->nodes.side[side], &pair->node[side], octant);
-        status = level_search_add(g, part, pair->gap, error);
+        status = add_node_pair(g, part, pair->gap, error);
     }
     return status;
 }
@@ -164,14 +166,14 @@ static ebpo_status level_search_divide(ebpo_level_search *g, const ebpo_node_gap
 /* --- the search --- */
 
 /* Nothing is decided of what waits; its least gap is all that is known. */
-static void close_all(ebpo_level_search *g)
+static void close_all(level_search *g)
 {
     for (uint64_t i = 0; i < g->nodes.count; i++)
         close_pair(g, &g->nodes.heap[i]);
     g->nodes.count = 0;
 }
 
-static bool is_full(const ebpo_level_search *g)
+static bool is_full(const level_search *g)
 {
     return g->nodes.count * sizeof *g->nodes.heap + g->nodes.side[0].bytes +
                g->nodes.side[1].bytes >
@@ -180,7 +182,7 @@ static bool is_full(const ebpo_level_search *g)
 
 /* Pairs come by their gaps: behind the first that is closed, and those that may meet, nothing is to
  * be found out. */
-static ebpo_status level_search_search(ebpo_level_search *g, ebpo_error *error)
+static ebpo_status search_levels(level_search *g, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     while (g->nodes.count > 0 && status == EBPO_OK) {
@@ -193,7 +195,7 @@ static ebpo_status level_search_search(ebpo_level_search *g, ebpo_error *error)
             close_pair(g, &pair);
             close_all(g);
         } else if (has_children(g, &pair.node[0]) || has_children(g, &pair.node[1])) {
-            status = level_search_divide(g, &pair, error);
+            status = divide_pair(g, &pair, error);
         } else {
             close_pair(g, &pair);
         }
@@ -203,8 +205,7 @@ static ebpo_status level_search_search(ebpo_level_search *g, ebpo_error *error)
     return status;
 }
 
-static ebpo_status ebpo_level_search_run(ebpo_level_search *g, const ebpo_collision *q,
-                                         ebpo_error *error)
+static ebpo_status level_search_run(level_search *g, const ebpo_collision *q, ebpo_error *error)
 {
     g->question = q;
     g->lo = g->hi = INFINITY;
@@ -213,13 +214,13 @@ static ebpo_status ebpo_level_search_run(ebpo_level_search *g, const ebpo_collis
         return status;
     ebpo_posed_node root[2] = { ebpo_posed_root(&g->nodes.side[0]),
                                 ebpo_posed_root(&g->nodes.side[1]) };
-    status = level_search_add(g, root, 0, error);
-    return status == EBPO_OK ? level_search_search(g, error) : status;
+    status = add_node_pair(g, root, 0, error);
+    return status == EBPO_OK ? search_levels(g, error) : status;
 }
 
-static void ebpo_level_search_free(ebpo_level_search *g) { ebpo_node_gaps_free(&g->nodes); }
+static void level_search_free(level_search *g) { ebpo_node_gaps_free(&g->nodes); }
 
-/* What levels tell of two models at poses. */
+/* --- the query --- */
 
 static int32_t last_level(const ebpo_model *m, int level)
 {
@@ -227,7 +228,7 @@ static int32_t last_level(const ebpo_model *m, int level)
     return level < 0 || level > last ? last : level;
 }
 
-static void levels_tell(const ebpo_collision *q, const ebpo_level_search *g, ebpo_level_result *out)
+static void fill_result(const ebpo_collision *q, const level_search *g, ebpo_level_result *out)
 {
     double lo = fmin(g->lo, g->hi);
     int32_t figure = isinf(lo)                 ? EBPO_FIGURE_EXACT
@@ -246,13 +247,13 @@ ebpo_status ebpo_collide_levels(ebpo_collider *c, const ebpo_collide_options *op
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    ebpo_level_search g = { .open_pairs = 0 };
+    level_search g = { .open_pairs = 0 };
     *out = (ebpo_level_result){ .common = -1, .contact = -1 };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
-        status = ebpo_level_search_run(&g, &q, error);
+        status = level_search_run(&g, &q, error);
     if (status == EBPO_OK)
-        levels_tell(&q, &g, out);
-    ebpo_level_search_free(&g);
+        fill_result(&q, &g, out);
+    level_search_free(&g);
     return status;
 }

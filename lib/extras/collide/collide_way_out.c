@@ -1,3 +1,11 @@
+/* How far one model has to move along a direction until both models have no common point: the last
+ * time of contact.
+ *
+ * A heap holds pairs of nodes, those first that may part last. Their extents along the direction
+ * and along two axes at right angles to it bound the time of the last contact. Pairs of faces are
+ * bounded in doubles (ebpo_sweep_most) and decided exactly (ebpo_sweep_last). Models in parts are
+ * searched in pairs of subtrees: a subtree is loaded only if its envelope may part later than the
+ * last contact found. Bounds: docs/develop/collision.md, "The way out". One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -6,32 +14,28 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "core/parallel.h"
 #include "core/sort.h"
+#include "core/parallel.h"
 #include "extras/collide/collider.h"
-#include "extras/collide/pair_sweep.h"
-#include "extras/collide/posed_subtrees.h"
+#include "extras/collide/face_pairs.h"
+#include "extras/collide/subtree_search.h"
 #include "geometry/vec3.h"
 
-/* Until when two models have common points, one of which moves along a direction: pairs of nodes of
- * both hierarchies, those first that may part last, then pairs of faces. Bounds:
- * docs/develop/collision.md, "The way out". One thread. */
-
 /* Children of nodes of both: the node's number * 8 + lane. */
-typedef struct ebpo_way_pair {
+typedef struct way_pair {
     double most; /* they have no common point later */
     uint32_t a, b;
-} ebpo_way_pair;
+} way_pair;
 
 /* One model beside the direction: what its frame's axes, posed, are along three axes at right
  * angles, of which the first is the direction. */
-typedef struct ebpo_way_side {
+typedef struct way_side {
     const ebpo_accel *accel;
     const ebpo_posing *posing;
     double row[3][3], base[3];
-} ebpo_way_side;
+} way_side;
 
-typedef struct ebpo_way_search {
+typedef struct way_search {
     /* In: */
     const ebpo_collision *question;
     double direction[3]; /* in which the question's first model moves; the greatest is 1/2 .. 1 */
@@ -40,29 +44,26 @@ typedef struct ebpo_way_search {
     ebpo_face_pair pair; /* of the caller's A and B */
     double hi;           /* what was left out is not later, certainly: less than 0, nothing was */
     /* Begins as 0: */
-    ebpo_way_side side[2];
-    double axis[3][3];    /* at right angles; the first is the direction */
-    double step, lost;    /* direction along the first axis; what rounding moves extents by */
-    double sure;          /* `last` is not earlier */
-    ebpo_way_pair *pairs; /* a heap, the greatest first */
+    way_side side[2];
+    double axis[3][3]; /* at right angles; the first is the direction */
+    double step, lost; /* direction along the first axis; what rounding moves extents by */
+    double sure;       /* `last` is not earlier */
+    way_pair *pairs;   /* a heap, the greatest first */
     uint64_t count, capacity, looked;
-} ebpo_way_search;
+} way_search;
 
 /* Where a convex set, or what is in it, is along the axes. */
-typedef struct ebpo_way_extent {
+typedef struct way_extent {
     double low[3], high[3];
-} ebpo_way_extent;
-
-/* Until when two models have common points, of which subtrees are loaded as they may matter. One
- * thread. */
+} way_extent;
 
 /* --- the heap --- */
 
-static bool is_later(const ebpo_way_pair *a, const ebpo_way_pair *b) { return a->most > b->most; }
+static bool is_later(const way_pair *a, const way_pair *b) { return a->most > b->most; }
 
-EBPO_HEAP(heap, ebpo_way_pair, is_later)
+EBPO_HEAP(heap, way_pair, is_later)
 
-static bool way_search_push(ebpo_way_search *s, const ebpo_way_pair *pair)
+static bool push_pair(way_search *s, const way_pair *pair)
 {
     if (!ebpo_grow(&s->pairs, &s->capacity, s->count + 1, sizeof *s->pairs))
         return false;
@@ -72,12 +73,12 @@ static bool way_search_push(ebpo_way_search *s, const ebpo_way_pair *pair)
 
 /* --- extents along the three axes --- */
 
-static ebpo_way_extent way_search_extent_of(const ebpo_way_search *s, int which, uint32_t ref)
+static way_extent extent_of(const way_search *s, int which, uint32_t ref)
 {
-    const ebpo_way_side *side = &s->side[which];
+    const way_side *side = &s->side[which];
     const ebpo_bound *b = &side->accel->bound[ref / 8];
     double middle[3], half[3];
-    ebpo_way_extent out;
+    way_extent out;
     for (int k = 0; k < 3; k++) {
         ebpo_bound_sides ends = ebpo_bound_side(b, (int)(ref % 8), k);
         middle[k] = (ends.low + ends.high) / 2;
@@ -94,8 +95,7 @@ static ebpo_way_extent way_search_extent_of(const ebpo_way_search *s, int which,
 }
 
 /* The greatest t at which what has these extents may have a common point; less than 0: none. */
-static double ebpo_way_most(const ebpo_way_search *s, const ebpo_way_extent *a,
-                            const ebpo_way_extent *b)
+static double way_most(const way_search *s, const way_extent *a, const way_extent *b)
 {
     for (int i = 1; i < 3; i++)
         if (b->low[i] - a->high[i] > s->lost || a->low[i] - b->high[i] > s->lost)
@@ -124,9 +124,9 @@ static void make_axes(const double d[3], double axis[3][3])
     }
 }
 
-static void make_side(ebpo_way_search *s, int which, const ebpo_accel *accel)
+static void make_side(way_search *s, int which, const ebpo_accel *accel)
 {
-    ebpo_way_side *side = &s->side[which];
+    way_side *side = &s->side[which];
     double centre[3];
     side->accel = accel;
     side->posing = &s->question->posing[which].posing;
@@ -144,7 +144,7 @@ static void make_side(ebpo_way_search *s, int which, const ebpo_accel *accel)
 /* --- faces --- */
 
 /* In the order of the question's models. */
-static bool comes_first(const ebpo_way_search *s, const ebpo_met_pair *x)
+static bool comes_first(const way_search *s, const ebpo_met_pair *x)
 {
     uint64_t a = ebpo_accel_file_face(s->side[0].accel, x->a),
              b = ebpo_accel_file_face(s->side[1].accel, x->b);
@@ -153,7 +153,7 @@ static bool comes_first(const ebpo_way_search *s, const ebpo_met_pair *x)
     return a != has[turned] ? a < has[turned] : b < has[!turned];
 }
 
-static void look_at_faces(ebpo_way_search *s, const double a[3][3], const double b[3][3],
+static void look_at_faces(way_search *s, const double a[3][3], const double b[3][3],
                           const ebpo_met_pair *pair)
 {
     double most = ebpo_sweep_most(a, b, s->direction, INFINITY);
@@ -175,7 +175,7 @@ static void look_at_faces(ebpo_way_search *s, const double a[3][3], const double
     ebpo_sweep_time_clear(&t);
 }
 
-static void look_at_blocks(ebpo_way_search *s, uint32_t block_a, uint32_t block_b)
+static void look_at_blocks(way_search *s, uint32_t block_a, uint32_t block_b)
 {
     const uint32_t block[2] = { block_a, block_b };
     const ebpo_meshlet *m[2];
@@ -196,39 +196,38 @@ static void look_at_blocks(ebpo_way_search *s, uint32_t block_a, uint32_t block_
 
 /* --- the search --- */
 
-static uint32_t child_of(const ebpo_way_search *s, int which, uint32_t ref)
+static uint32_t child_of(const way_search *s, int which, uint32_t ref)
 {
     return s->side[which].accel->bound[ref / 8].child[ref % 8];
 }
 
-static double size_of(const ebpo_way_extent *e)
+static double size_of(const way_extent *e)
 {
     return e->high[0] - e->low[0] + (e->high[1] - e->low[1]) + (e->high[2] - e->low[2]);
 }
 
 /* All children of one node with one child, or a node's children, of the other model. */
-static ebpo_status offer_children(ebpo_way_search *s, int which, uint32_t node, uint32_t other,
+static ebpo_status offer_children(way_search *s, int which, uint32_t node, uint32_t other,
                                   ebpo_error *error)
 {
-    ebpo_way_extent seen[2];
-    seen[!which] = way_search_extent_of(s, !which, other);
+    way_extent seen[2];
+    seen[!which] = extent_of(s, !which, other);
     for (uint32_t i = 0; i < s->side[which].accel->bound[node].count; i++) {
         uint32_t ref[2];
         ref[which] = node * 8 + i;
         ref[!which] = other;
-        seen[which] = way_search_extent_of(s, which, ref[which]);
-        ebpo_way_pair pair = { ebpo_way_most(s, &seen[0], &seen[1]), ref[0], ref[1] };
+        seen[which] = extent_of(s, which, ref[which]);
+        way_pair pair = { way_most(s, &seen[0], &seen[1]), ref[0], ref[1] };
         if (pair.most < s->sure)
             continue;
-        if (!way_search_push(s, &pair))
+        if (!push_pair(s, &pair))
             return ebpo_fail_memory(error, s->capacity * sizeof *s->pairs);
     }
     return EBPO_OK;
 }
 
 /* The larger one, if both are nodes. */
-static ebpo_status way_search_divide(ebpo_way_search *s, const ebpo_way_pair *pair,
-                                     ebpo_error *error)
+static ebpo_status divide_pair(way_search *s, const way_pair *pair, ebpo_error *error)
 {
     uint32_t child[2] = { child_of(s, 0, pair->a), child_of(s, 1, pair->b) };
     bool block[2] = { child[0] & EBPO_IS_BLOCK, child[1] & EBPO_IS_BLOCK };
@@ -236,14 +235,13 @@ static ebpo_status way_search_divide(ebpo_way_search *s, const ebpo_way_pair *pa
         look_at_blocks(s, child[0] & ~EBPO_IS_BLOCK, child[1] & ~EBPO_IS_BLOCK);
         return EBPO_OK;
     }
-    ebpo_way_extent a = way_search_extent_of(s, 0, pair->a),
-                    b = way_search_extent_of(s, 1, pair->b);
+    way_extent a = extent_of(s, 0, pair->a), b = extent_of(s, 1, pair->b);
     int which = block[0] || (!block[1] && size_of(&b) > size_of(&a));
     return offer_children(s, which, child[which], which ? pair->a : pair->b, error);
 }
 
 /* Once; `last` is the caller's to clear. */
-static void ebpo_way_search_begin(ebpo_way_search *s)
+static void way_search_begin(way_search *s)
 {
     ebpo_sweep_time_init(&s->last);
     make_axes(s->direction, s->axis);
@@ -254,7 +252,7 @@ static void ebpo_way_search_begin(ebpo_way_search *s)
                                 EBPO_NO_FACE, EBPO_PAIR_APART, 0 };
 }
 
-static ebpo_status offer_tops(ebpo_way_search *s, ebpo_error *error)
+static ebpo_status offer_tops(way_search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     const ebpo_accel *b = s->side[1].accel;
@@ -264,8 +262,8 @@ static ebpo_status offer_tops(ebpo_way_search *s, ebpo_error *error)
 }
 
 /* Goes on with two accels of the question's models. EBPO_E_MEMORY, EBPO_E_CANCELLED. */
-static ebpo_status ebpo_way_search_run(ebpo_way_search *s, const ebpo_accel *const accel[2],
-                                       ebpo_error *error)
+static ebpo_status way_search_run(way_search *s, const ebpo_accel *const accel[2],
+                                  ebpo_error *error)
 {
     const ebpo_progress *progress = &s->question->options.progress;
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
@@ -280,8 +278,8 @@ static ebpo_status ebpo_way_search_run(ebpo_way_search *s, const ebpo_accel *con
             status = EBPO_E_CANCELLED;
             break;
         }
-        ebpo_way_pair pair = heap_take(s->pairs, s->count--);
-        status = way_search_divide(s, &pair, error);
+        way_pair pair = heap_take(s->pairs, s->count--);
+        status = divide_pair(s, &pair, error);
     }
     if (s->count > 0 && s->pairs[0].most >= s->sure)
         s->hi = fmax(s->hi, s->pairs[0].most);
@@ -291,17 +289,18 @@ static ebpo_status ebpo_way_search_run(ebpo_way_search *s, const ebpo_accel *con
     return status;
 }
 
-/* The point that two faces have in common last is in a cell of each model that lists its face, one
- * of which has been moved: so their subtrees have it in both envelopes, and these part no sooner.
- */
+/* --- pairs of subtrees --- */
+
+/* The last common point of two faces is in a cell of each model that lists its face, where one
+ * model has been moved. So both subtrees' envelopes hold it, and part no sooner. */
 
 typedef struct searching {
     ebpo_subtree_search subtrees; /* `gap`: less the time until which they may meet */
-    ebpo_way_search *way;
+    way_search *way;
 } searching;
 
-static ebpo_status way_extent_of(searching *s, int which, ebpo_cell cell, ebpo_way_extent *out,
-                                 ebpo_error *error)
+static ebpo_status cell_extent(searching *s, int which, ebpo_cell cell, way_extent *out,
+                               ebpo_error *error)
 {
     ebpo_posed_subtrees *side = &s->subtrees.nodes.side[which];
     ebpo_convex hull;
@@ -321,28 +320,29 @@ static ebpo_status way_extent_of(searching *s, int which, ebpo_cell cell, ebpo_w
     return status;
 }
 
-static ebpo_status way_add(searching *s, const ebpo_posed_node node[2], ebpo_error *error)
+static ebpo_status add_node_pair(searching *s, const ebpo_posed_node node[2], ebpo_error *error)
 {
-    ebpo_way_extent extent[2];
+    way_extent extent[2];
     for (int i = 0; i < 2; i++) {
         if (ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_UNIFORM)
             return EBPO_OK;
-        ebpo_status status = way_extent_of(s, i, node[i].cell, &extent[i], error);
+        ebpo_status status = cell_extent(s, i, node[i].cell, &extent[i], error);
         if (status != EBPO_OK)
             return status;
     }
-    ebpo_node_gap pair = { { node[0], node[1] }, -ebpo_way_most(s->way, &extent[0], &extent[1]) };
+    ebpo_node_gap pair = { { node[0], node[1] }, -way_most(s->way, &extent[0], &extent[1]) };
     return -pair.gap < s->way->sure ? EBPO_OK
                                     : ebpo_node_gaps_push(&s->subtrees.nodes, &pair, error);
 }
 
-static ebpo_status way_divide(searching *s, const ebpo_node_gap *pair, int side, ebpo_error *error)
+static ebpo_status divide_node_pair(searching *s, const ebpo_node_gap *pair, int side,
+                                    ebpo_error *error)
 {
     ebpo_posed_node part[2] = { pair->node[0], pair->node[1] };
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         part[side] = ebpo_posed_child(&s->subtrees.nodes.side[side], &pair->node[side], octant);
-        status = way_add(s, part, error);
+        status = add_node_pair(s, part, error);
     }
     return status;
 }
@@ -353,18 +353,18 @@ static ebpo_status look_at(searching *s, const ebpo_node_gap *pair, ebpo_error *
     bool there;
     int side = ebpo_subtree_search_side(&s->subtrees, pair->node);
     if (side >= 0)
-        return way_divide(s, pair, side, error);
+        return divide_node_pair(s, pair, side, error);
     ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &there, error);
-    return status == EBPO_OK && there ? ebpo_way_search_run(s->way, accel, error) : status;
+    return status == EBPO_OK && there ? way_search_run(s->way, accel, error) : status;
 }
 
-static ebpo_status way_search(searching *s, ebpo_error *error)
+static ebpo_status search_node_pairs(searching *s, ebpo_error *error)
 {
     const ebpo_collision *q = s->subtrees.question;
     ebpo_node_gaps *nodes = &s->subtrees.nodes;
     ebpo_posed_node root[2] = { ebpo_posed_root(&nodes->side[0]),
                                 ebpo_posed_root(&nodes->side[1]) };
-    ebpo_status status = way_add(s, root, error);
+    ebpo_status status = add_node_pair(s, root, error);
     while (status == EBPO_OK && nodes->count > 0) {
         ebpo_node_gap pair = ebpo_node_gaps_pop(nodes);
         if (-pair.gap < s->way->sure)
@@ -382,20 +382,20 @@ static ebpo_status way_search(searching *s, ebpo_error *error)
 
 /* Goes on with the search in all pairs of subtrees whose envelopes may part as late as what has
  * been found, the latest first: the same as of whole models. */
-static ebpo_status ebpo_way_of_parts(ebpo_way_search *way, ebpo_error *error)
+static ebpo_status way_of_parts(way_search *way, ebpo_error *error)
 {
     searching s = { .way = way };
     ebpo_status status = ebpo_subtree_search_begin(&s.subtrees, way->question, error);
     if (status == EBPO_OK)
-        status = way_search(&s, error);
+        status = search_node_pairs(&s, error);
     ebpo_subtree_search_end(&s.subtrees);
     return status;
 }
 
-/* How far one model has to be moved to be clear of another. */
+/* --- the query --- */
 
 /* The question's first model's direction, times a power of two, which is told. */
-static int set_direction(ebpo_way_search *s, const double direction[3])
+static int set_direction(way_search *s, const double direction[3])
 {
     int exponent;
     (void)frexp(fmax(fabs(direction[0]), fmax(fabs(direction[1]), fabs(direction[2]))), &exponent);
@@ -405,7 +405,7 @@ static int set_direction(ebpo_way_search *s, const double direction[3])
     return exponent;
 }
 
-static void way_out_tell(const ebpo_way_search *s, int exponent, ebpo_way_out *out)
+static void fill_way_out(const way_search *s, int exponent, ebpo_way_out *out)
 {
     double lo = 0, hi = ldexp(s->hi, -exponent) * (1 + 0x1p-50);
     *out = (ebpo_way_out){ .pair = s->pair };
@@ -429,14 +429,14 @@ ebpo_status ebpo_collide_way_out(ebpo_collider *c, const ebpo_collide_options *o
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_way_search s = { .question = &q };
+    way_search s = { .question = &q };
     int exponent = set_direction(&s, direction);
-    ebpo_way_search_begin(&s);
+    way_search_begin(&s);
     const ebpo_accel *const whole[2] = { q.model[0]->whole, q.model[1]->whole };
-    status = ebpo_collision_is_in_parts(&q) ? ebpo_way_of_parts(&s, error)
-                                            : ebpo_way_search_run(&s, whole, error);
+    status =
+        ebpo_collision_is_in_parts(&q) ? way_of_parts(&s, error) : way_search_run(&s, whole, error);
     if (status == EBPO_OK)
-        way_out_tell(&s, exponent, out);
+        fill_way_out(&s, exponent, out);
     ebpo_sweep_time_clear(&s.last);
     return status;
 }

@@ -1,3 +1,9 @@
+/* Outputs for other programs: pairs of intersecting faces in an HDF5 file, and meshes in a PLY
+ * file with the faces that matter in red.
+ *
+ * Rows are written as they are found, in blocks, so memory does not grow with their number. PLY
+ * files read vertices and faces from a source in ascending order: a mesh in memory or a model in
+ * parts. Outputs appear only when they are complete (io/publish.h). */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -7,8 +13,8 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "extras/collide/contacts.h"
-#include "extras/collide/collide_write.h"
+#include "extras/collide/pair_faces.h"
+#include "extras/collide/red_mesh.h"
 #include "hdf5_write/h5.h"
 #include "io/publish.h"
 
@@ -99,8 +105,7 @@ ebpo_status ebpo_red_meshes_print(const ebpo_red_mesh *meshes, int count, ebpo_p
                      : EBPO_OK;
 }
 
-/* Pairs of two models in an HDF5 file for other programs; both models in a PLY file, the faces that
- * meet red. */
+/* --- pairs of two models --- */
 
 /* --- HDF5 --- */
 
@@ -149,7 +154,7 @@ static ebpo_status make_tables(writing *w, ebpo_error *error)
     return status;
 }
 
-static bool write_flush(writing *w)
+static bool flush_rows(writing *w)
 {
     const void *const data[TABLES] = { w->faces,  w->file_faces,    w->kind,
                                        w->points, w->contact_faces, w->on };
@@ -191,7 +196,7 @@ static bool take_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
         w->kind[n] = (uint8_t)pairs[i].kind;
         if (pairs[i].kind == EBPO_PAIR_CROSSING && !note_contact(w, &pairs[i]))
             return false;
-        if (w->pairs == ROWS && !write_flush(w))
+        if (w->pairs == ROWS && !flush_rows(w))
             return false;
     }
     return true;
@@ -207,7 +212,7 @@ static ebpo_status write_tables(writing *w, const char *path, ebpo_publish *targ
         status = ebpo_collide_all(q->collider, &q->options, take_rows, w, w->error);
     if (status == EBPO_OK)
         status = w->status;
-    if (status == EBPO_OK && !write_flush(w))
+    if (status == EBPO_OK && !flush_rows(w))
         status = w->status;
     for (int i = 0; i < TABLES; i++)
         ebpo_h5_close_table(&w->out, &w->table[i]);

@@ -1,6 +1,10 @@
+/* A collider: two models, options, and what queries keep for the next ones. All queries begin with
+ * ebpo_collision_begin, which checks the options and puts the models in an order that swapping
+ * them does not change, so that results do not depend on the order of the caller.
+ *
+ * A collider belongs to one thread at a time. Colliders of models that are subsets are refused,
+ * except where the caller knows what is left out (ebpo_collider_of_parts). */
 #include "core/strict_fp.h"
-
-#include "extras/collide/collider.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -10,7 +14,8 @@
 #include "core/os.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "extras/collide/gap_search.h"
+#include "extras/collide/collider.h"
+#include "extras/collide/hierarchy_walk.h"
 #include "extras/collide/posed_solid.h"
 #include "query/query_model.h"
 
@@ -173,4 +178,19 @@ ebpo_face_pair ebpo_collision_pair(const ebpo_collision *q, const ebpo_accel *fi
                            ebpo_accel_source_face(second, met->b) };
     int a = q->turned, b = !q->turned;
     return (ebpo_face_pair){ source[a], source[b], file[a], file[b], met->kind, 0 };
+}
+
+/* Which kernels a walk uses. */
+
+void ebpo_pair_walk_begin(ebpo_pair_walk *w, const ebpo_accel_pair *pair)
+{
+    w->pair = pair;
+    w->kernels = ebpo_walk_kernels_best();
+    w->filter = ebpo_pair_kernels_best();
+    w->top = w->group = w->met_count = 0;
+    w->begin = 0;
+    w->end = pair->accel[0]->face_count;
+    for (int i = 0; i < 2 * EBPO_TURNED_NODES; i++)
+        w->turned[i / EBPO_TURNED_NODES][i % EBPO_TURNED_NODES].node = EBPO_NO_CHILD;
+    ebpo_posed_faces_forget(w->posed);
 }

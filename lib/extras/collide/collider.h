@@ -1,4 +1,4 @@
-/* A collider's parts, and what all questions begin with. */
+/* A collider, and what all queries of two models begin with. */
 #ifndef EBPO_COLLIDE_COLLIDER_H
 #define EBPO_COLLIDE_COLLIDER_H
 
@@ -6,9 +6,14 @@
 
 #include <ebpo/collide.h>
 
-#include "extras/collide/of_parts.h"
-#include "extras/collide/pair_walk.h"
+#include "extras/collide/hierarchy_walk.h"
 #include "query/query_model.h"
+
+/* As ebpo_collider_new, of models that may be subsets: results are about the faces that are there.
+ */
+EBPO_MUST_USE ebpo_status ebpo_collider_of_parts(ebpo_model *a, ebpo_model *b,
+                                                 const ebpo_collider_options *options,
+                                                 ebpo_collider **out, ebpo_error *error);
 
 struct ebpo_collider {
     ebpo_model *model[2]; /* as the caller has them */
@@ -52,6 +57,10 @@ uint64_t ebpo_collision_bytes_read(const ebpo_collision *collision);
 
 /* A model is not all in memory. */
 bool ebpo_collision_is_in_parts(const ebpo_collision *collision);
+
+/* The walk is zero or has been used before: its memory stays. The pair must live as long as the
+ * walk is used. */
+void ebpo_pair_walk_begin(ebpo_pair_walk *walk, const ebpo_accel_pair *pair);
 
 /* Adds a walk's counts to the collider's. */
 void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);

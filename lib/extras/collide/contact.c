@@ -1,8 +1,14 @@
-/* Which edges pierce is decided by exact signs, where by double-double arithmetic: bounds in
- * docs/develop/collision.md. */
+/* Where two crossing faces intersect: the ends of the common segment.
+ *
+ * Exact signs (geometry/predicates.h) decide which edges pierce the other face, so the result has
+ * the right combinatorics. The point where an edge pierces a plane is computed in double-double
+ * arithmetic; where numbers are too large or too small for its bounds, exactly with GMP and
+ * rounded once. Neither the order of the faces nor that of their corners changes a bit of the
+ * points. Bounds: docs/develop/collision.md, "Contact of a crossing pair". Pure functions, any
+ * thread. */
 #include "core/strict_fp.h"
 
-#include "extras/collide/contact.h"
+#include "extras/collide/face_pairs.h"
 
 #include <math.h>
 #include <string.h>
@@ -69,7 +75,7 @@ static bool share_of_edge(const piercing *p, ebpo_pair *share)
 }
 
 /* False: numbers so large or small that bounds do not hold. */
-static bool contact_ordinary(const piercing *p)
+static bool is_ordinary(const piercing *p)
 {
     const double *const all[] = { p->end[0], p->end[1], p->plane[0], p->plane[1], p->plane[2] };
     for (int k = 0; k < 3; k++) {
@@ -86,7 +92,7 @@ static bool contact_ordinary(const piercing *p)
 static bool point_by_pairs(const piercing *p, double out[3])
 {
     ebpo_pair share, d[3];
-    if (!contact_ordinary(p) || !share_of_edge(p, &share))
+    if (!is_ordinary(p) || !share_of_edge(p, &share))
         return false;
     ebpo_pair_differences(p->end[0], p->end[1], d);
     for (int k = 0; k < 3; k++)
@@ -153,7 +159,7 @@ static void point_by_integers(const piercing *p, double out[3])
         ebpo_vectorz_clear(all[i]);
 }
 
-static void contact_pierce(const piercing *p, double out[3])
+static void compute_piercing(const piercing *p, double out[3])
 {
     if (!point_by_pairs(p, out))
         point_by_integers(p, out);
@@ -183,11 +189,11 @@ static void end_of(const edge *e, double out[3])
         return;
     }
     piercing p = piercing_of(e->face, e->from, e->to, e->plane);
-    contact_pierce(&p, out);
+    compute_piercing(&p, out);
 }
 
 /* Of two edges that meet: one that ends there, else the lesser one. */
-static const edge *contact_chosen(const edge *a, const edge *b)
+static const edge *choose_edge(const edge *a, const edge *b)
 {
     if (a->ends_there || b->ends_there)
         return a->ends_there ? a : b;
@@ -200,7 +206,7 @@ static const edge *contact_chosen(const edge *a, const edge *b)
 /* `order`: negative: the end is that of A's edge, positive: of B's, 0: of both. */
 static void set_end(const edge *a, const edge *b, int order, ebpo_contact_end *out)
 {
-    end_of(order < 0 ? a : order > 0 ? b : contact_chosen(a, b), out->point);
+    end_of(order < 0 ? a : order > 0 ? b : choose_edge(a, b), out->point);
     out->on_a = order <= 0 ? feature_of(a) : EBPO_NEAR_INTERIOR;
     out->on_b = order >= 0 ? feature_of(b) : EBPO_NEAR_INTERIOR;
 }

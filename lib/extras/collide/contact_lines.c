@@ -1,3 +1,10 @@
+/* Lines of contact: the segments of all crossing pairs, joined where they end at the same features
+ * of the same faces.
+ *
+ * Each end has a key: the edge or corner of the face that it is on, and the face of the other
+ * model. Ends with equal keys are the same point. Corners have numbers, equal for equal
+ * coordinates (face_patches.h). A line goes on where exactly one segment ends and one begins;
+ * elsewhere it ends. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -7,73 +14,8 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "extras/collide/contacts.h"
-#include "extras/collide/contact_lines.h"
-
-static uint64_t hash_of(const double x[3])
-{
-    uint64_t bits[3], h = 0;
-    memcpy(bits, x, sizeof bits);
-    for (int k = 0; k < 3; k++) {
-        h = (h ^ bits[k]) * UINT64_C(0x9e3779b97f4a7c15);
-        h ^= h >> 32;
-    }
-    return h;
-}
-
-static bool corner_ids_same(const double p[3], const double q[3])
-{
-    return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
-}
-
-/* Where the corner is in the table, or a free place. */
-static uint32_t *corner_ids_find(const ebpo_corner_ids *ids, const double x[3])
-{
-    uint64_t i = hash_of(x) & (ids->table_size - 1);
-    while (ids->table[i] && !corner_ids_same(ids->at[ids->table[i] - 1], x))
-        i = (i + 1) & (ids->table_size - 1);
-    return &ids->table[i];
-}
-
-static bool corner_ids_enlarge(ebpo_corner_ids *ids)
-{
-    uint64_t size = ids->table_size ? 2 * ids->table_size : 1024;
-    uint32_t *table = ebpo_alloc_zero(size, sizeof *table);
-    if (!table)
-        return false;
-    free(ids->table);
-    ids->table = table;
-    ids->table_size = size;
-    for (uint64_t i = 0; i < ids->count; i++)
-        *corner_ids_find(ids, ids->at[i]) = (uint32_t)i + 1;
-    return true;
-}
-
-bool ebpo_corner_id(ebpo_corner_ids *ids, const double x[3], uint32_t *id)
-{
-    const double corner[3] = { x[0] + 0.0, x[1] + 0.0, x[2] + 0.0 }; /* no -0 */
-    if ((2 * ids->count >= ids->table_size && !corner_ids_enlarge(ids)) ||
-        ids->count >= UINT32_MAX - 1)
-        return false;
-    uint32_t *at = corner_ids_find(ids, corner);
-    if (*at == 0) {
-        if (!ebpo_grow(&ids->at, &ids->capacity, ids->count + 1, sizeof *ids->at))
-            return false;
-        memcpy(ids->at[ids->count++], corner, sizeof corner);
-        *at = (uint32_t)ids->count;
-    }
-    *id = *at - 1;
-    return true;
-}
-
-void ebpo_corner_ids_free(ebpo_corner_ids *ids)
-{
-    free(ids->at);
-    free(ids->table);
-    *ids = (ebpo_corner_ids){ 0 };
-}
-
-/* Segments of contact, joined to lines where they end at the same features of the same faces. */
+#include "extras/collide/pair_faces.h"
+#include "extras/collide/face_patches.h"
 
 #define NONE UINT32_MAX
 
@@ -211,7 +153,7 @@ static int by_features(const void *x, const void *y)
     return order ? order : (p->end > q->end) - (p->end < q->end);
 }
 
-static void contact_lines_join(lines *l)
+static void join_segments(lines *l)
 {
     uint64_t n = 2 * l->count;
     if (n > 0)
@@ -277,8 +219,7 @@ static bool make_line(lines *l, uint32_t i)
     return true;
 }
 
-static ebpo_status contact_lines_tell(lines *l, ebpo_polylines_fn take, void *user,
-                                      ebpo_error *error)
+static ebpo_status give_lines(lines *l, ebpo_polylines_fn take, void *user, ebpo_error *error)
 {
     for (uint64_t i = 0; i < l->count; i++) {
         if (l->segment[i].told)
@@ -291,7 +232,7 @@ static ebpo_status contact_lines_tell(lines *l, ebpo_polylines_fn take, void *us
     return EBPO_OK;
 }
 
-static ebpo_status contact_lines_failed(const lines *l, ebpo_error *error)
+static ebpo_status fail_lines(const lines *l, ebpo_error *error)
 {
     if (l->no_memory)
         return ebpo_fail_memory(error, l->capacity * sizeof *l->segment);
@@ -335,10 +276,10 @@ ebpo_status ebpo_collide_polylines(ebpo_collider *c, const ebpo_collide_options 
     if (status == EBPO_OK)
         status = l.status;
     if (status == EBPO_OK && (l.full || l.no_memory))
-        status = contact_lines_failed(&l, error);
+        status = fail_lines(&l, error);
     if (status == EBPO_OK) {
-        contact_lines_join(&l);
-        status = contact_lines_tell(&l, take, user, error);
+        join_segments(&l);
+        status = give_lines(&l, take, user, error);
     }
     free_lines(&l);
     return status;

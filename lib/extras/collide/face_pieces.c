@@ -1,3 +1,11 @@
+/* The pieces of a face that other faces cut: a point of each piece, exact.
+ *
+ * Other faces cut the face in segments in its plane, seen along the axis of the largest component
+ * of its normal: p and q are the two other coordinates. Coordinates are GMP fractions. Values of p
+ * at which a cut begins, ends or crosses another one are events. Between neighbouring events (a
+ * strip) the cuts have one order in q, so the strip is divided into parts without a cut inside.
+ * Parts of neighbouring strips that share an open interval belong to one piece. Faces in the same
+ * plane count by their winding. docs/develop/collision.md, "Relation of two models". One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,7 +30,8 @@ static bool room_for_cut(ebpo_face_cuts *f)
     return true;
 }
 
-void ebpo_face_add_event(ebpo_face_cuts *f, const mpq_t p)
+/* Adds a value of p, or a point (p, q); without memory the face says so. */
+static void add_event(ebpo_face_cuts *f, const mpq_t p)
 {
     if (!ebpo_grow(&f->event, &f->event_capacity, f->events + 1, sizeof *f->event)) {
         f->no_memory = true;
@@ -33,7 +42,7 @@ void ebpo_face_add_event(ebpo_face_cuts *f, const mpq_t p)
     mpq_set(f->event[f->events++], p);
 }
 
-void ebpo_face_add_vertex(ebpo_face_cuts *f, const mpq_t p, const mpq_t q)
+static void add_vertex(ebpo_face_cuts *f, const mpq_t p, const mpq_t q)
 {
     if (!f->all_cuts)
         return;
@@ -71,7 +80,7 @@ static void choose_view(ebpo_face_cuts *f)
     }
 }
 
-static void face_cuts_difference(mpq_t out, mpq_t scratch, double a, double b)
+static void difference_of(mpq_t out, mpq_t scratch, double a, double b)
 {
     mpq_set_d(out, a);
     mpq_set_d(scratch, b);
@@ -85,10 +94,10 @@ static void set_plane(ebpo_face_cuts *f)
     mpq_set_ui(f->offset, 0, 1);
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        face_cuts_difference(s[0], s[4], t[1][u], t[0][u]);
-        face_cuts_difference(s[1], s[4], t[2][v], t[0][v]);
-        face_cuts_difference(s[2], s[4], t[1][v], t[0][v]);
-        face_cuts_difference(s[3], s[4], t[2][u], t[0][u]);
+        difference_of(s[0], s[4], t[1][u], t[0][u]);
+        difference_of(s[1], s[4], t[2][v], t[0][v]);
+        difference_of(s[2], s[4], t[1][v], t[0][v]);
+        difference_of(s[3], s[4], t[2][u], t[0][u]);
         mpq_mul(s[0], s[0], s[1]);
         mpq_mul(s[2], s[2], s[3]);
         mpq_sub(f->normal[k], s[0], s[2]);
@@ -104,8 +113,8 @@ static void finish_cut(ebpo_face_cuts *f)
     ebpo_face_cut *c = &f->cut[f->cuts];
     int order = mpq_cmp(c->p[0], c->p[1]);
     if (order == 0 && mpq_equal(c->q[0], c->q[1])) {
-        ebpo_face_add_event(f, c->p[0]);
-        ebpo_face_add_vertex(f, c->p[0], c->q[0]);
+        add_event(f, c->p[0]);
+        add_vertex(f, c->p[0], c->q[0]);
         return;
     }
     if (order > 0) {
@@ -118,8 +127,8 @@ static void finish_cut(ebpo_face_cuts *f)
         mpq_div(c->slope, c->slope, f->scratch[0]);
     }
     for (int i = 0; i < 2; i++) {
-        ebpo_face_add_event(f, c->p[i]);
-        ebpo_face_add_vertex(f, c->p[i], c->q[i]);
+        add_event(f, c->p[i]);
+        add_vertex(f, c->p[i], c->q[i]);
     }
     f->cuts++;
 }
@@ -197,7 +206,7 @@ static void set_piercing(ebpo_face_cuts *f, int end, const double a[3], const do
     mpq_div(s[0], s[0], s[1]); /* the share of the edge */
     for (int i = 0; i < 2; i++) {
         int k = i == 0 ? f->u : f->v;
-        face_cuts_difference(s[2], s[4], b[k], a[k]);
+        difference_of(s[2], s[4], b[k], a[k]);
         mpq_mul(s[2], s[2], s[0]);
         mpq_set_d(s[3], a[k]);
         mpq_add(i == 0 ? f->cut[f->cuts].p[end] : f->cut[f->cuts].q[end], s[2], s[3]);
@@ -256,12 +265,13 @@ void ebpo_face_cuts_add(ebpo_face_cuts *f, const double t[3][3], int model)
         f->no_memory = true;
 }
 
-int ebpo_face_side_of_edge(ebpo_face_cuts *f, const double a[3], const double b[3], const mpq_t p,
-                           const mpq_t q)
+/* Sign of the turn from a to b to the point. */
+static int side_of_edge(ebpo_face_cuts *f, const double a[3], const double b[3], const mpq_t p,
+                        const mpq_t q)
 {
     mpq_t *s = f->scratch;
-    face_cuts_difference(s[0], s[4], b[f->u], a[f->u]);
-    face_cuts_difference(s[1], s[4], b[f->v], a[f->v]);
+    difference_of(s[0], s[4], b[f->u], a[f->u]);
+    difference_of(s[1], s[4], b[f->v], a[f->v]);
     mpq_set_d(s[2], a[f->u]);
     mpq_sub(s[2], p, s[2]);
     mpq_set_d(s[3], a[f->v]);
@@ -282,14 +292,12 @@ bool ebpo_face_cuts_target(ebpo_face_cuts *f, const mpq_t x[3])
     f->has_target = mpq_sgn(s[0]) == 0;
     for (int i = 0; i < 3 && f->has_target; i++)
         f->has_target =
-            ebpo_face_side_of_edge(f, f->corner[i], f->corner[(i + 1) % 3], x[f->u], x[f->v]) *
-                f->turn >=
-            0;
+            side_of_edge(f, f->corner[i], f->corner[(i + 1) % 3], x[f->u], x[f->v]) * f->turn >= 0;
     if (!f->has_target)
         return false;
     mpq_set(f->target[0], x[f->u]);
     mpq_set(f->target[1], x[f->v]);
-    ebpo_face_add_event(f, f->target[0]);
+    add_event(f, f->target[0]);
     return true;
 }
 
@@ -323,11 +331,6 @@ void ebpo_face_cuts_free(ebpo_face_cuts *f)
     *f = (ebpo_face_cuts){ 0 };
 }
 
-/* Cuts are segments in the face's plane, seen along an axis. Between neighbouring events (ends and
- * crossings of cuts) strips have the same order of cuts all along: a point in the middle of each
- * part of a strip is one of each piece. Parts of neighbouring strips that have an open interval in
- * common belong to one piece. */
-
 /* --- events --- */
 
 static void at_p(const ebpo_face_cut *c, const mpq_t p, mpq_t out)
@@ -339,7 +342,7 @@ static void at_p(const ebpo_face_cut *c, const mpq_t p, mpq_t out)
 
 static bool is_upright(const ebpo_face_cut *c) { return mpq_equal(c->p[0], c->p[1]) != 0; }
 
-static bool face_pieces_reaches(const ebpo_face_cut *c, const mpq_t p)
+static bool cut_reaches(const ebpo_face_cut *c, const mpq_t p)
 {
     return mpq_cmp(c->p[0], p) <= 0 && mpq_cmp(c->p[1], p) >= 0;
 }
@@ -357,20 +360,20 @@ static void cross_two(ebpo_face_cuts *f, const ebpo_face_cut *a, const ebpo_face
     mpq_sub(s[2], s[2], b->q[0]);
     mpq_sub(s[1], s[1], s[2]);
     mpq_div(s[1], s[1], s[0]);
-    if (!face_pieces_reaches(a, s[1]) || !face_pieces_reaches(b, s[1]))
+    if (!cut_reaches(a, s[1]) || !cut_reaches(b, s[1]))
         return;
-    ebpo_face_add_event(f, s[1]);
+    add_event(f, s[1]);
     at_p(a, s[1], s[2]);
-    ebpo_face_add_vertex(f, s[1], s[2]);
+    add_vertex(f, s[1], s[2]);
 }
 
 /* Its p is an event already. */
 static void cross_upright(ebpo_face_cuts *f, const ebpo_face_cut *upright, const ebpo_face_cut *c)
 {
-    if (!f->all_cuts || is_upright(c) || !face_pieces_reaches(c, upright->p[0]))
+    if (!f->all_cuts || is_upright(c) || !cut_reaches(c, upright->p[0]))
         return;
     at_p(c, upright->p[0], f->scratch[2]);
-    ebpo_face_add_vertex(f, upright->p[0], f->scratch[2]);
+    add_vertex(f, upright->p[0], f->scratch[2]);
 }
 
 static int by_value(const void *x, const void *y) { return mpq_cmp((mpq_srcptr)x, (mpq_srcptr)y); }
@@ -402,7 +405,7 @@ static void find_events(ebpo_face_cuts *f)
 /* --- strips --- */
 
 /* A fraction between both, with few bits where a double is. */
-static void face_pieces_between(const mpq_t low, const mpq_t high, mpq_t out)
+static void fraction_between(const mpq_t low, const mpq_t high, mpq_t out)
 {
     double middle = mpq_get_d(low) / 2 + mpq_get_d(high) / 2;
     mpq_set_d(out, middle);
@@ -414,7 +417,7 @@ static void face_pieces_between(const mpq_t low, const mpq_t high, mpq_t out)
 
 enum { LEFT, MIDDLE, RIGHT };
 
-static mpq_t *face_pieces_value(const ebpo_face_cuts *f, uint32_t cut, int where)
+static mpq_t *value_at(const ebpo_face_cuts *f, uint32_t cut, int where)
 {
     return &f->value[3 * (uint64_t)cut + (unsigned)where];
 }
@@ -445,10 +448,10 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
         const ebpo_face_cut *c = &f->cut[i];
         if (is_upright(c) || mpq_cmp(c->p[0], p[LEFT]) > 0 || mpq_cmp(c->p[1], p[RIGHT]) < 0)
             continue;
-        at_p(c, p[MIDDLE], *face_pieces_value(f, i, MIDDLE));
+        at_p(c, p[MIDDLE], *value_at(f, i, MIDDLE));
         uint64_t at = n++;
-        for (; at > 0 && mpq_cmp(*face_pieces_value(f, f->order[at - 1], MIDDLE),
-                                 *face_pieces_value(f, i, MIDDLE)) > 0;
+        for (;
+             at > 0 && mpq_cmp(*value_at(f, f->order[at - 1], MIDDLE), *value_at(f, i, MIDDLE)) > 0;
              at--)
             f->order[at] = f->order[at - 1];
         f->order[at] = i;
@@ -461,9 +464,8 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
     /* an edge of the face may stand after an equal cut: nothing is between them */
     for (uint64_t i = (uint64_t)(low < 0 ? 0 : low); low >= 0 && i <= (uint64_t)high; i++) {
         f->order[kept++] = f->order[i];
-        at_p(&f->cut[f->order[kept - 1]], p[LEFT], *face_pieces_value(f, f->order[kept - 1], LEFT));
-        at_p(&f->cut[f->order[kept - 1]], p[RIGHT],
-             *face_pieces_value(f, f->order[kept - 1], RIGHT));
+        at_p(&f->cut[f->order[kept - 1]], p[LEFT], *value_at(f, f->order[kept - 1], LEFT));
+        at_p(&f->cut[f->order[kept - 1]], p[RIGHT], *value_at(f, f->order[kept - 1], RIGHT));
     }
     return kept;
 }
@@ -503,7 +505,7 @@ static bool is_in_flat(ebpo_face_cuts *f, const ebpo_flat_face *t, const mpq_t p
 {
     int turn = t->same_way ? f->turn : -f->turn;
     for (int i = 0; i < 3; i++)
-        if (ebpo_face_side_of_edge(f, t->corner[i], t->corner[(i + 1) % 3], p, q) * turn <= 0)
+        if (side_of_edge(f, t->corner[i], t->corner[(i + 1) % 3], p, q) * turn <= 0)
             return false;
     return true;
 }
@@ -530,8 +532,8 @@ static bool is_at_target(const ebpo_face_cuts *f, const mpq_t p[3], uint32_t low
 {
     for (int where = LEFT; f->has_target && where <= RIGHT; where += RIGHT)
         if (mpq_equal(f->target[0], p[where]) &&
-            mpq_cmp(*face_pieces_value(f, low, where), f->target[1]) <= 0 &&
-            mpq_cmp(f->target[1], *face_pieces_value(f, high, where)) <= 0)
+            mpq_cmp(*value_at(f, low, where), f->target[1]) <= 0 &&
+            mpq_cmp(f->target[1], *value_at(f, high, where)) <= 0)
             return true;
     return false;
 }
@@ -545,16 +547,15 @@ static ebpo_status visit_strip(ebpo_face_cuts *f, strip_scratch *s, int now, ebp
     f->ends[now] = 0;
     for (uint64_t i = 0; i + 1 < n && status == EBPO_OK; i++) {
         uint32_t low = f->order[i], high = f->order[i + 1];
-        if (mpq_equal(*face_pieces_value(f, low, MIDDLE), *face_pieces_value(f, high, MIDDLE)))
+        if (mpq_equal(*value_at(f, low, MIDDLE), *value_at(f, high, MIDDLE)))
             continue;
         ebpo_piece_end *e = &f->end[now][f->ends[now]++];
-        mpq_set(e->low, *face_pieces_value(f, low, RIGHT));
-        mpq_set(e->high, *face_pieces_value(f, high, RIGHT));
+        mpq_set(e->low, *value_at(f, low, RIGHT));
+        mpq_set(e->high, *value_at(f, high, RIGHT));
         if (!wall && !f->all_cuts &&
-            goes_on(f, !now, *face_pieces_value(f, low, LEFT), *face_pieces_value(f, high, LEFT)))
+            goes_on(f, !now, *value_at(f, low, LEFT), *value_at(f, high, LEFT)))
             continue;
-        face_pieces_between(*face_pieces_value(f, low, MIDDLE), *face_pieces_value(f, high, MIDDLE),
-                            s->q);
+        fraction_between(*value_at(f, low, MIDDLE), *value_at(f, high, MIDDLE), s->q);
         status = visit_at(f, s->p[MIDDLE], s->q, s->x,
                           is_at_target(f, (const mpq_t *)s->p, low, high), visit, user, error);
     }
@@ -575,7 +576,7 @@ ebpo_status ebpo_face_pieces_visit(ebpo_face_cuts *f, ebpo_piece_fn visit, void 
     for (uint64_t i = 0; i + 1 < f->events && status == EBPO_OK; i++) {
         mpq_set(s.p[LEFT], f->event[i]);
         mpq_set(s.p[RIGHT], f->event[i + 1]);
-        face_pieces_between(f->event[i], f->event[i + 1], s.p[MIDDLE]);
+        fraction_between(f->event[i], f->event[i + 1], s.p[MIDDLE]);
         status = visit_strip(f, &s, (int)(i % 2), visit, user, error);
     }
     mpq_clears(s.p[0], s.p[1], s.p[2], s.q, s.x[0], s.x[1], s.x[2], NULL);
@@ -595,8 +596,8 @@ ebpo_status ebpo_face_pieces_vertices(ebpo_face_cuts *f, ebpo_vertex_fn visit, v
     for (uint64_t i = 0; i < f->vertices && status == EBPO_OK; i++) {
         bool within = true;
         for (int k = 0; k < 3 && within; k++)
-            within = ebpo_face_side_of_edge(f, f->corner[k], f->corner[(k + 1) % 3],
-                                            f->vertex[i][0], f->vertex[i][1]) *
+            within = side_of_edge(f, f->corner[k], f->corner[(k + 1) % 3], f->vertex[i][0],
+                                  f->vertex[i][1]) *
                          f->turn >=
                      0;
         if (!within)

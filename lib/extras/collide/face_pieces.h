@@ -1,5 +1,5 @@
-/* A face and what other faces have in common with it: segments in its plane, in fractions. One
- * thread. */
+/* The pieces of a face that other faces cut, exact: a point of each, in fractions, on none of the
+ * cuts. docs/develop/collision.md, "Relation of two models". One thread. */
 #ifndef EBPO_COLLIDE_FACE_PIECES_H
 #define EBPO_COLLIDE_FACE_PIECES_H
 
@@ -61,15 +61,7 @@ void ebpo_face_cuts_add(ebpo_face_cuts *f, const double other[3][3], int model);
 bool ebpo_face_cuts_target(ebpo_face_cuts *f, const mpq_t x[3]);
 void ebpo_face_cuts_free(ebpo_face_cuts *f);
 
-/* For face_pieces.c. Values of p and q; without memory the face says so. */
-void ebpo_face_add_event(ebpo_face_cuts *f, const mpq_t p);
-void ebpo_face_add_vertex(ebpo_face_cuts *f, const mpq_t p, const mpq_t q);
-/* Sign of the turn from a to b to the point. */
-int ebpo_face_side_of_edge(ebpo_face_cuts *f, const double a[3], const double b[3], const mpq_t p,
-                           const mpq_t q);
-
-/* The pieces of a face that has been cut by others, exact: a point of each, in fractions, on none
- * of the cuts. docs/develop/collision.md, "Relation of two models". One thread. */
+/* --- pieces --- */
 
 /* Around a piece's point. */
 typedef struct ebpo_piece {

@@ -1,10 +1,154 @@
-/* The walk through pairs of nodes, compiled for several processors. */
+/* The walk through pairs of nodes of two hierarchies for the distance of two models, eight
+ * children at a time, in floats. It is compiled for several instruction sets with the same
+ * results.
+ *
+ * Gaps of boxes and slabs bound the distance of two nodes from below, and so do gaps along the
+ * direction of the best pair. Until a limit is known the walk goes in depth; then a heap gives the
+ * smallest bound first. Pairs of blocks give pairs of faces with the bounds that a nearest pair of
+ * points proves. Nothing that is dropped is nearer than the limit; what remains is decided in
+ * collide_distance.c. Bounds: docs/develop/collision.md, "Bounds of pairs of nodes" and "Distance
+ * of two faces". */
 #include "core/strict_fp.h"
 
-#include "extras/collide/children_eight.inc"
-#include "extras/collide/gap_eight.inc"
-#include "extras/collide/gap_search.h"
-#include "extras/collide/posed_faces.inc"
+#include <math.h>
+
+#include "core/simd.h"
+#include "extras/collide/hierarchy_walk.h"
+#include "extras/collide/posed_eight.inc"
+
+/* --- pairs of faces --- */
+
+typedef struct place8 {
+    f8 x[3];
+} place8;
+
+typedef struct triangle8 {
+    place8 corner[3];
+} triangle8;
+
+EBPO_EIGHT f8 place_dot8(const place8 *a, const place8 *b)
+{
+    return f8_add(f8_add(f8_mul(a->x[0], b->x[0]), f8_mul(a->x[1], b->x[1])),
+                  f8_mul(a->x[2], b->x[2]));
+}
+EBPO_EIGHT place8 place_minus8(const place8 *a, const place8 *b)
+{
+    place8 out;
+    for (int k = 0; k < 3; k++)
+        out.x[k] = f8_sub(a->x[k], b->x[k]);
+    return out;
+}
+/* a + t b */
+EBPO_EIGHT place8 place_along8(const place8 *a, f8 t, const place8 *b)
+{
+    place8 out;
+    for (int k = 0; k < 3; k++)
+        out.x[k] = f8_add(a->x[k], f8_mul(t, b->x[k]));
+    return out;
+}
+EBPO_EIGHT f8 minor_of8(f8 a, f8 b, f8 c, f8 d) { return f8_sub(f8_mul(a, d), f8_mul(b, c)); }
+EBPO_EIGHT place8 place_cross8(const place8 *a, const place8 *b)
+{
+    return (place8){ { minor_of8(a->x[1], a->x[2], b->x[1], b->x[2]),
+                       minor_of8(a->x[2], a->x[0], b->x[2], b->x[0]),
+                       minor_of8(a->x[0], a->x[1], b->x[0], b->x[1]) } };
+}
+/* What is no number becomes 0. */
+EBPO_EIGHT f8 within_unit8(f8 t) { return f8_min(f8_max(t, f8_all(0)), f8_all(1)); }
+
+/* The best pair of points so far: from A's to B's. */
+typedef struct nearest8 {
+    f8 square;
+    place8 way;
+} nearest8;
+
+EBPO_EIGHT void offer_nearest8(nearest8 *n, const place8 *way, f8 square)
+{
+    f8 better = f8_less(square, n->square);
+    n->square = f8_pick(better, square, n->square);
+    for (int k = 0; k < 3; k++)
+        n->way.x[k] = f8_pick(better, way->x[k], n->way.x[k]);
+}
+
+/* Edges with their squared lengths, and these inverted. */
+typedef struct edges8 {
+    place8 edge[3];
+    f8 square[3], inverse[3];
+} edges8;
+
+EBPO_EIGHT edges8 edges_of8(const triangle8 *t)
+{
+    edges8 out;
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; i++) {
+        out.edge[i] = place_minus8(&t->corner[i == 2 ? 0 : i + 1], &t->corner[i]);
+        out.square[i] = place_dot8(&out.edge[i], &out.edge[i]);
+        out.inverse[i] = f8_div(f8_all(1), out.square[i]);
+    }
+    return out;
+}
+
+EBPO_EIGHT void offer_edges8(nearest8 *n, const place8 *p, const edges8 *a, int i, const place8 *q,
+                             const edges8 *b, int j)
+{
+    const place8 *e = &a->edge[i], *f = &b->edge[j];
+    place8 w = place_minus8(q, p);
+    f8 ef = place_dot8(e, f), ew = place_dot8(e, &w), fw = place_dot8(f, &w);
+    f8 area = minor_of8(a->square[i], ef, ef, b->square[j]);
+    f8 s = within_unit8(f8_div(minor_of8(ew, fw, ef, b->square[j]), area));
+    f8 t = within_unit8(f8_mul(f8_sub(f8_mul(s, ef), fw), b->inverse[j]));
+    s = within_unit8(f8_mul(f8_add(f8_mul(t, ef), ew), a->inverse[i]));
+    place8 way = place_along8(&w, t, f);
+    way = place_along8(&way, f8_sub(f8_all(0), s), e);
+    offer_nearest8(n, &way, place_dot8(&way, &way));
+}
+
+/* Corners that lie over the inner part of the face. sign: 1 when the corners are A's. */
+EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 *of,
+                               const triangle8 *corners, float sign)
+{
+    const place8 *e = &of->edge[0];
+    place8 f = place_minus8(&face->corner[2], &face->corner[0]), normal = place_cross8(e, &f),
+           to_e = place_cross8(&f, &normal), to_f = place_cross8(&normal, e);
+    f8 inverse = f8_div(f8_all(1), place_dot8(&normal, &normal)), zero = f8_all(0);
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; i++) {
+        place8 d = place_minus8(&corners->corner[i], &face->corner[0]);
+        f8 s = f8_mul(place_dot8(&d, &to_e), inverse), t = f8_mul(place_dot8(&d, &to_f), inverse);
+        f8 over = f8_and(f8_and(f8_at_most(zero, s), f8_at_most(zero, t)),
+                         f8_at_most(f8_add(s, t), f8_all(1)));
+        place8 up = place_along8(&d, f8_sub(zero, s), e);
+        up = place_along8(&up, f8_sub(zero, t), &f);
+        f8 square = f8_pick(over, place_dot8(&up, &up), f8_all(INFINITY));
+        for (int k = 0; k < 3; k++)
+            up.x[k] = f8_mul(up.x[k], f8_all(-sign));
+        offer_nearest8(n, &up, square);
+    }
+}
+
+/* No coordinate is greater than `size`, or farther than `error` from what it stands for. */
+EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float size, float error,
+                                 f8 *low, f8 *high, place8 *way)
+{
+    edges8 of_a = edges_of8(a), of_b = edges_of8(b);
+    nearest8 n = { f8_all(INFINITY), { { f8_all(0), f8_all(0), f8_all(0) } } };
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; i++)
+#pragma GCC unroll 3
+        for (int j = 0; j < 3; j++)
+            offer_edges8(&n, &a->corner[i], &of_a, i, &b->corner[j], &of_b, j);
+    offer_corners8(&n, a, &of_a, b, -1);
+    offer_corners8(&n, b, &of_b, a, 1);
+    f8 most = f8_max3(place_dot8(&n.way, &a->corner[0]), place_dot8(&n.way, &a->corner[1]),
+                      place_dot8(&n.way, &a->corner[2])),
+       least = f8_min3(place_dot8(&n.way, &b->corner[0]), place_dot8(&n.way, &b->corner[1]),
+                       place_dot8(&n.way, &b->corner[2]));
+    f8 length = f8_sqrt(n.square), lost = f8_all(40 * 0x1p-24f * size + 4 * error + 0x1p-60f);
+    f8 gap = f8_div(f8_mul(f8_sub(least, most), f8_all(1 - 0x1p-20f)), length);
+    *low = f8_pick(f8_less(f8_all(0x1p-110f), n.square), f8_sub(gap, lost), f8_all(-1));
+    *high = f8_add(f8_mul(length, f8_all(1 + 0x1p-20f)), lost);
+    *way = n.way;
+}
 
 /* --- nodes --- */
 
@@ -52,7 +196,7 @@ EBPO_EIGHT void node_slabs(ebpo_gap_node *out, const ebpo_bound_slab *b, const e
                                  f8_all(4 * slack)));
 }
 
-EBPO_EIGHT f8 sine8(f8 cosine)
+EBPO_EIGHT f8 sine_of8(f8 cosine)
 {
     return f8_sqrt(f8_max(f8_sub(f8_all(1 + 0x1p-18f), f8_mul(cosine, cosine)), f8_all(0)));
 }
@@ -70,7 +214,7 @@ EBPO_EIGHT void node_reach(ebpo_gap_node *out, const float along[3])
         cosine = f8_add(cosine, f8_mul(f8_load(out->axis[0][k]), a));
     }
     slabs = f8_add(slabs, f8_add(f8_mul(f8_abs(cosine), f8_load(out->thick)),
-                                 f8_mul(sine8(cosine), f8_load(out->radius))));
+                                 f8_mul(sine_of8(cosine), f8_load(out->radius))));
     f8_store(out->reach, f8_min(boxes, slabs));
 }
 
@@ -132,7 +276,7 @@ EBPO_EIGHT f8 slab_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j)
         size_p = f8_add(size_p, f8_mul(f8_abs(f8_load(p->axis[1][k])), f8_all(q->half[0][k][j])));
         size_q = f8_add(size_q, f8_mul(f8_abs(aq_there), f8_load(p->half[0][k])));
     }
-    f8 cosine = f8_abs(dot), sine = sine8(dot), thick_p = f8_load(p->thick),
+    f8 cosine = f8_abs(dot), sine = sine_of8(dot), thick_p = f8_load(p->thick),
        thick_q = f8_all(q->thick[j]), none = f8_all(0);
     f8 far_p =
         f8_sub(f8_abs(by_p), f8_add(f8_mul(cosine, thick_q), f8_mul(sine, f8_all(q->radius[j]))));
@@ -144,7 +288,8 @@ EBPO_EIGHT f8 slab_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j)
 }
 
 /* Squared lower bounds of eight children's distances to one; where boxes meet, less than 0. */
-EBPO_EIGHT f8 keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const ebpo_gap_node *q, int j)
+EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const ebpo_gap_node *q,
+                        int j)
 {
     f8 slack = f8_all(g->frames.slack), most = f8_all(-INFINITY), zero = f8_all(0);
     f8 square = f8_max(box_gaps8(p, q, j, 0, slack, &most), box_gaps8(p, q, j, 1, slack, &most));
@@ -223,7 +368,7 @@ EBPO_EIGHT void push_eight(ebpo_gap_search *g, uint64_t base, int side, const eb
                            const ebpo_gap_node *q, int j)
 {
     const ebpo_bound *b = &g->accel[side]->bound[p->node];
-    f8 keys = keys8(g, p, q, j);
+    f8 keys = gap_keys8(g, p, q, j);
     unsigned near = f8_bits(f8_at_most(keys, f8_all(g->square))) & ((1u << b->count) - 1);
     float key[8];
     f8_store(key, keys);
@@ -413,7 +558,7 @@ static float child_size(ebpo_gap_search *g, int side, uint32_t child)
 }
 
 /* Pushes what is below; false: enough. */
-static bool gap_walk_visit(ebpo_gap_search *g, const ebpo_gap_visit *v)
+static bool visit_pair(ebpo_gap_search *g, const ebpo_gap_visit *v)
 {
     uint32_t child[2];
     bool block[2];
@@ -438,7 +583,7 @@ static bool gap_walk_visit(ebpo_gap_search *g, const ebpo_gap_visit *v)
     return true;
 }
 
-static void gap_walk_walk(ebpo_gap_search *g)
+static void walk_gaps(ebpo_gap_search *g)
 {
     if (!ebpo_gap_room(g))
         return;
@@ -450,7 +595,7 @@ static void gap_walk_walk(ebpo_gap_search *g)
             return;
         ebpo_gap_visit v = pop_visit(g);
         fetch_next(g);
-        if (far_along(g, &v) || gap_walk_visit(g, &v))
+        if (far_along(g, &v) || visit_pair(g, &v))
             continue;
         g->stack[g->count++] = v; /* it has been looked at in part, or not at all */
         g->ended = true;
@@ -458,4 +603,4 @@ static void gap_walk_walk(ebpo_gap_search *g)
     }
 }
 
-const ebpo_gap_kernels EBPO_KERNEL(ebpo_gap_kernels) = { gap_walk_walk };
+const ebpo_gap_kernels EBPO_KERNEL(ebpo_gap_kernels) = { walk_gaps };

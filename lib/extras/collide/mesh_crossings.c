@@ -1,6 +1,10 @@
-/* Faces of one mesh that meet otherwise than as neighbours. The mesh becomes a temporary file,
- * and that a model under a budget: so it may be larger than memory. Only the faces
- * matter, so it is built as a surface without planes, which takes a fraction of the time. */
+/* Faces of one mesh that intersect other than as neighbours.
+ *
+ * The mesh becomes a temporary file, and that a model under a memory budget, so the mesh may be
+ * larger than memory. Only its faces matter, so it is built as a surface without planes, which
+ * takes a fraction of the time. The crossings are then those of the model with itself
+ * (ebpo_collide_self_posed); the mesh in memory gives their positions. An optional PLY file shows
+ * the faces in red. */
 #include "core/strict_fp.h"
 
 #include <stdio.h>
@@ -14,10 +18,9 @@
 #include "core/fp_env.h"
 #include "core/workspace.h"
 #include "extras/collide/collider.h"
-#include "extras/collide/collide_write.h"
+#include "extras/collide/red_mesh.h"
 #include "format/write_file.h"
-#include "extras/collide/contact.h"
-#include "extras/collide/pair_distance.h"
+#include "extras/collide/face_pairs.h"
 
 typedef struct crossings {
     ebpo_crossings_options options;
@@ -35,8 +38,8 @@ typedef struct crossings {
 
 /* --- the model --- */
 
-static ebpo_status crossings_build(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                         ebpo_error *error)
+static ebpo_status build_model(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                               ebpo_error *error)
 {
     ebpo_build_options how = EBPO_BUILD_OPTIONS_INIT;
     ebpo_mesh_report surface = *report;
@@ -55,7 +58,7 @@ static void drop_levels(ebpo_tree *tree)
 }
 
 /* libhdf5 wants a name, so the file has one until it has been opened. */
-static ebpo_status crossings_store(crossings *c, const char *folder, ebpo_error *error)
+static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *error)
 {
     ebpo_write_options how = EBPO_WRITE_OPTIONS_INIT;
     ebpo_publish named = EBPO_PUBLISH_INIT;
@@ -116,14 +119,14 @@ static void common_point(const double a[3][3], const double b[3][3], int32_t kin
     memcpy(out, nearest.point[0], sizeof nearest.point[0]);
 }
 
-static void crossings_note(crossings *c, uint64_t face)
+static void note_face(crossings *c, uint64_t face)
 {
     uint64_t bit = UINT64_C(1) << face % 64;
     c->sum.faces += !(c->met[face / 64] & bit);
     c->met[face / 64] |= bit;
 }
 
-static void crossings_tell(crossings *c, const ebpo_face_pair *pair, ebpo_crossing *out)
+static void fill_crossing(crossings *c, const ebpo_face_pair *pair, ebpo_crossing *out)
 {
     double a[3][3], b[3][3];
     bool swap = pair->face_a > pair->face_b;
@@ -135,7 +138,7 @@ static void crossings_tell(crossings *c, const ebpo_face_pair *pair, ebpo_crossi
     common_point((const double(*)[3])a, (const double(*)[3])b, pair->kind, out->point);
     c->sum.pairs[pair->kind]++;
     for (int i = 0; i < 2; i++)
-        crossings_note(c, out->face[i]);
+        note_face(c, out->face[i]);
 }
 
 enum { TOLD_AT_ONCE = 256 };
@@ -147,7 +150,7 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
     for (uint64_t at = 0; at < count && !c->enough; at += TOLD_AT_ONCE) {
         uint64_t n = count - at < TOLD_AT_ONCE ? count - at : TOLD_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
-            crossings_tell(c, &pairs[at + i], &out[i]);
+            fill_crossing(c, &pairs[at + i], &out[i]);
         c->enough = c->take && !c->take(c->user, out, n);
     }
     return !c->enough;
@@ -155,7 +158,7 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 
 /* --- the call --- */
 
-static ebpo_status crossings_paint(crossings *c, ebpo_workspace *workspace, ebpo_error *error)
+static ebpo_status paint_crossings(crossings *c, ebpo_workspace *workspace, ebpo_error *error)
 {
     ebpo_read_options how = EBPO_READ_OPTIONS_INIT;
     ebpo_mesh mesh;
@@ -171,24 +174,24 @@ static ebpo_status crossings_paint(crossings *c, ebpo_workspace *workspace, ebpo
     return status == EBPO_OK ? ebpo_publish_commit(&c->target, error) : status;
 }
 
-static ebpo_status crossings_search(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                          ebpo_workspace *workspace, ebpo_error *error)
+static ebpo_status search_crossings(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                                    ebpo_workspace *workspace, ebpo_error *error)
 {
     ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
     how.progress = c->options.progress;
-    ebpo_status status = crossings_build(c, mesh, report, error);
+    ebpo_status status = build_model(c, mesh, report, error);
     if (status != EBPO_OK)
         return status;
     c->met = ebpo_alloc_zero(c->tree.mesh.face_count / 64 + 1, sizeof *c->met);
     if (!c->met)
         return ebpo_fail_memory(error, c->tree.mesh.face_count / 8);
-    status = crossings_store(c, ebpo_workspace_folder(workspace), error);
+    status = store_model(c, ebpo_workspace_folder(workspace), error);
     drop_levels(&c->tree);
     if (status == EBPO_OK)
         status = make_collider(c, ebpo_workspace_memory(workspace), error);
     if (status == EBPO_OK)
         status = ebpo_collide_self(c->collider, &how, take_pairs, c, error);
-    return status == EBPO_OK && c->options.ply ? crossings_paint(c, workspace, error) : status;
+    return status == EBPO_OK && c->options.ply ? paint_crossings(c, workspace, error) : status;
 }
 
 static void close_all(crossings *c)
@@ -218,7 +221,7 @@ ebpo_status ebpo_mesh_crossings(ebpo_mesh *mesh, const ebpo_mesh_report *report,
     if (status == EBPO_OK && c.options.ply)
         status = ebpo_publish_begin(&c.target, c.options.ply, error);
     if (status == EBPO_OK)
-        status = crossings_search(&c, mesh, report, workspace ? workspace : own, error);
+        status = search_crossings(&c, mesh, report, workspace ? workspace : own, error);
     ebpo_mesh_free(mesh);
     close_all(&c);
     ebpo_workspace_free(own);

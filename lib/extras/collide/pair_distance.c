@@ -1,13 +1,18 @@
-/* Bounds from a nearest pair of points that need not be the nearest: proof in
- * docs/develop/collision.md. All is seen from A's first corner, so that where the faces lie does
- * not matter. */
+/* The distance of two triangles: bounds in doubles, and exact comparisons.
+ *
+ * Bounds come from a pair of near points, which need not be the nearest: its distance bounds from
+ * above, the planes at right angles to the line between the points from below. All is seen from
+ * A's first corner, so that the position of the faces does not matter. Where bounds do not decide,
+ * the squared distance is a fraction of integers: the least over corners and faces, and over edges
+ * whose inner points are nearest. docs/develop/collision.md, "Distance of two faces". Pure
+ * functions, any thread; the results are the same with every compiler and its flags. */
 #include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
-#include "extras/collide/pair_distance.h"
+#include "extras/collide/face_pairs.h"
 #include "geometry/distance.h"
 #include "geometry/integer_vectors.h"
 #include "geometry/triangle_pair.h"
@@ -26,8 +31,8 @@ typedef struct search {
     double room; /* of the points: from where their features end, as a part of the reach */
 } search;
 
-static void pair_distance_offer(search *s, int first, const double p[3], const double q[3],
-                                int on_p, int on_q, double room)
+static void offer_points(search *s, int first, const double p[3], const double q[3], int on_p,
+                         int on_q, double room)
 {
     double d[3];
     ebpo_vec3_subtract(p, q, d);
@@ -44,7 +49,7 @@ static void pair_distance_offer(search *s, int first, const double p[3], const d
 
 /* --- edges with edges --- */
 
-static void pair_distance_along(const double from[3], const double edge[3], double t, double out[3])
+static void point_along(const double from[3], const double edge[3], double t, double out[3])
 {
     for (int k = 0; k < 3; k++)
         out[k] = from[k] + t * edge[k];
@@ -71,12 +76,12 @@ static void offer_edges(search *s, int i, int j)
     double on_e = area > 0 ? within_unit((ef * fw - ff * ew) / area) : 0;
     double on_f = ff > 0 ? within_unit((on_e * ef + fw) / ff) : 0;
     on_e = ee > 0 ? within_unit((on_f * ef - ew) / ee) : 0;
-    pair_distance_along(p, e, on_e, x);
-    pair_distance_along(q, f, on_f, y);
+    point_along(p, e, on_e, x);
+    point_along(q, f, on_f, y);
     bool edges = on_e > 0 && on_e < 1 && on_f > 0 && on_f < 1;
     double room = fmin(room_on_edge(on_e, ee), room_on_edge(on_f, ff));
-    pair_distance_offer(s, 0, x, y, on_edge(i, on_e), on_edge(j, on_f),
-                        edges && !(area > 0x1p-20 * ee * ff) ? 0 : room);
+    offer_points(s, 0, x, y, on_edge(i, on_e), on_edge(j, on_f),
+                 edges && !(area > 0x1p-20 * ee * ff) ? 0 : room);
 }
 
 /* --- corners with planes --- */
@@ -102,8 +107,8 @@ static void offer_corner(search *s, int of, int i)
         foot[k] = plane[0][k] + (on_e * e[k] + on_f * f[k]);
     double least = fmin(fmin(on_e, on_f), 1 - on_e - on_f), ee = ebpo_vec3_dot(e, e),
            ff = ebpo_vec3_dot(f, f);
-    pair_distance_offer(s, of, corner, foot, i, 6,
-                        nn > 0x1p-20 * ee * ff ? least * sqrt(nn / fmax(ee, ff)) : 0);
+    offer_points(s, of, corner, foot, i, 6,
+                 nn > 0x1p-20 * ee * ff ? least * sqrt(nn / fmax(ee, ff)) : 0);
 }
 
 /* --- bounds --- */
@@ -249,8 +254,7 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
             out->point[of][k] = a[0][k] + s.point[of][k];
 }
 
-/* The squared distance of two faces as a fraction of integers: the least over corners and faces,
- * and over edges whose inner points are nearest. */
+/* --- exact distances: fractions of integers --- */
 
 typedef struct fraction {
     mpz_t square, denominator; /* of units */

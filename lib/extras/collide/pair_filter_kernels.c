@@ -1,9 +1,13 @@
-/* The filter of pairs.
- * Include core/strict_fp.h first. Letters are those of docs/develop/collision.md. */
+/* The filter of pairs of faces, eight at a time in floats: which are certainly apart, and which
+ * certainly cross. It is compiled for several instruction sets with the same results.
+ *
+ * First the boxes, then the sides of both planes, then the intervals on the common line of the
+ * planes are compared, each with a proved error bound. All others are open and are decided
+ * exactly. Letters are those of docs/develop/collision.md. */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
-#include "extras/collide/pair_filter.h"
+#include "extras/collide/face_pairs.h"
 
 typedef struct vector8 {
     f8 x[3];
@@ -25,13 +29,13 @@ EBPO_EIGHT f8 vector8_dot(vector8 a, vector8 b)
     return f8_add(f8_add(f8_mul(a.x[0], b.x[0]), f8_mul(a.x[1], b.x[1])), f8_mul(a.x[2], b.x[2]));
 }
 
-EBPO_EIGHT f8 minor8(f8 a, f8 b, f8 c, f8 d) { return f8_sub(f8_mul(a, d), f8_mul(b, c)); }
+EBPO_EIGHT f8 minor_of8(f8 a, f8 b, f8 c, f8 d) { return f8_sub(f8_mul(a, d), f8_mul(b, c)); }
 
 EBPO_EIGHT vector8 vector8_cross(vector8 a, vector8 b)
 {
-    return (vector8){ { minor8(a.x[1], a.x[2], b.x[1], b.x[2]),
-                        minor8(a.x[2], a.x[0], b.x[2], b.x[0]),
-                        minor8(a.x[0], a.x[1], b.x[0], b.x[1]) } };
+    return (vector8){ { minor_of8(a.x[1], a.x[2], b.x[1], b.x[2]),
+                        minor_of8(a.x[2], a.x[0], b.x[2], b.x[0]),
+                        minor_of8(a.x[0], a.x[1], b.x[0], b.x[1]) } };
 }
 
 /* At least the length. */
@@ -116,7 +120,7 @@ EBPO_EIGHT alone8 alone_of8(const f8 above[3])
 }
 
 /* Corner `first` after the one that is alone. */
-EBPO_EIGHT vector8 turned8(const face8 *f, const alone8 *alone, int first)
+EBPO_EIGHT vector8 turned_corner8(const face8 *f, const alone8 *alone, int first)
 {
     const vector8 *c = f->corner;
     return vector8_pick(alone->is0, c[first],
@@ -128,8 +132,10 @@ EBPO_EIGHT ebpo_pair_masks on_line8(const face8 *a, const face8 *b, const sides8
                                     const sides8 *side_b, f8 bound)
 {
     alone8 alone_a = alone_of8(side_a->above), alone_b = alone_of8(side_b->above);
-    vector8 p = turned8(a, &alone_a, 0), a1 = turned8(a, &alone_a, 1), a2 = turned8(a, &alone_a, 2);
-    vector8 u = turned8(b, &alone_b, 0), b1 = turned8(b, &alone_b, 1), b2 = turned8(b, &alone_b, 2);
+    vector8 p = turned_corner8(a, &alone_a, 0), a1 = turned_corner8(a, &alone_a, 1),
+            a2 = turned_corner8(a, &alone_a, 2);
+    vector8 u = turned_corner8(b, &alone_b, 0), b1 = turned_corner8(b, &alone_b, 1),
+            b2 = turned_corner8(b, &alone_b, 2);
     vector8 q = vector8_less(vector8_pick(alone_b.above, a1, a2), p),
             r = vector8_less(vector8_pick(alone_b.above, a2, a1), p),
             v = vector8_less(vector8_pick(alone_a.above, b1, b2), p),
@@ -144,7 +150,7 @@ EBPO_EIGHT ebpo_pair_masks on_line8(const face8 *a, const face8 *b, const sides8
 /* --- bounds --- */
 
 /* m * (4 e (n1) + 12 v n2) */
-EBPO_EIGHT f8 bound8(f8 e, f8 m, f8 n1, f8 n2)
+EBPO_EIGHT f8 error_bound8(f8 e, f8 m, f8 n1, f8 n2)
 {
     f8 inputs = f8_mul(f8_mul(e, f8_all(4)), n1), rounding = f8_mul(n2, f8_all(12 * 0x1p-24f));
     return f8_mul(m, f8_add(inputs, rounding));
@@ -153,7 +159,7 @@ EBPO_EIGHT f8 bound8(f8 e, f8 m, f8 n1, f8 n2)
 /* Of a plane with edges of length l, and corners at a distance of d. */
 EBPO_EIGHT f8 plane_bound8(f8 e, f8 l, f8 d)
 {
-    return bound8(e, l, f8_add(f8_add(d, d), l), f8_mul(l, d));
+    return error_bound8(e, l, f8_add(f8_add(d, d), l), f8_mul(l, d));
 }
 
 EBPO_EIGHT f8 edges_size8(vector8 e1, vector8 e2, f8 e)
@@ -162,7 +168,7 @@ EBPO_EIGHT f8 edges_size8(vector8 e1, vector8 e2, f8 e)
 }
 
 /* Without boxes. `out`: those known to be apart. */
-EBPO_EIGHT ebpo_pair_masks faces8(const face8 *a, const face8 *b, f8 e, ebpo_pair_masks out)
+EBPO_EIGHT ebpo_pair_masks decide_faces8(const face8 *a, const face8 *b, f8 e, ebpo_pair_masks out)
 {
     vector8 e1 = vector8_less(a->corner[1], a->corner[0]),
             e2 = vector8_less(a->corner[2], a->corner[0]),
@@ -182,7 +188,7 @@ EBPO_EIGHT ebpo_pair_masks faces8(const face8 *a, const face8 *b, f8 e, ebpo_pai
     if (!certain)
         return out;
     f8 w = f8_add(f8_add(d, la), lb), la2 = f8_add(la, la),
-       bound = bound8(e, w, f8_add(w, f8_add(la2, la2)), f8_mul(la2, w));
+       bound = error_bound8(e, w, f8_add(w, f8_add(la2, la2)), f8_mul(la2, w));
     ebpo_pair_masks line = on_line8(a, b, &side_a, &side_b, bound);
     out.apart |= (uint8_t)(line.apart & certain);
     out.crossing = (uint8_t)(line.crossing & certain);
@@ -200,12 +206,12 @@ EBPO_EIGHT face8 load_eight(const float *block)
 
 EBPO_EIGHT f8 usable_error8(float error) { return f8_all(error > 0x1p-40f ? error : 0x1p-40f); }
 
-EBPO_EIGHT ebpo_pair_masks filter8(const face8 *a, const face8 *b, float error)
+EBPO_EIGHT ebpo_pair_masks filter_faces8(const face8 *a, const face8 *b, float error)
 {
     f8 e = usable_error8(error);
     box8 box_a = box_of8(a), box_b = box_of8(b);
     ebpo_pair_masks out = { (uint8_t)boxes_apart8(&box_a, &box_b, e), 0 };
-    return out.apart == 255 ? out : faces8(a, b, e, out);
+    return out.apart == 255 ? out : decide_faces8(a, b, e, out);
 }
 
 static ebpo_pair_masks filter_one(const float *a, const float *b, float error)
@@ -214,13 +220,13 @@ static ebpo_pair_masks filter_one(const float *a, const float *b, float error)
 #pragma GCC unroll 9
     for (int i = 0; i < 9; i++)
         f.corner[i / 3].x[i % 3] = f8_all(a[i]);
-    return filter8(&f, &g, error);
+    return filter_faces8(&f, &g, error);
 }
 
 static ebpo_pair_masks filter_eight(const float *a, const float *b, float error)
 {
     face8 f = load_eight(a), g = load_eight(b);
-    return filter8(&f, &g, error);
+    return filter_faces8(&f, &g, error);
 }
 
 /* --- blocks --- */
@@ -278,7 +284,7 @@ static void filter_blocks(const float *a, unsigned lanes_a, const float *b, unsi
     for (int at = 0; at < near.count; at += 8) {
         face8 x = load_lanes(a, near.a + at), y = load_lanes(b, near.b + at);
         unsigned used = near.count - at < 8 ? (1u << (near.count - at)) - 1 : 255;
-        ebpo_pair_masks m = faces8(&x, &y, e, (ebpo_pair_masks){ (uint8_t)~used, 0 });
+        ebpo_pair_masks m = decide_faces8(&x, &y, e, (ebpo_pair_masks){ (uint8_t)~used, 0 });
         for (unsigned rest = used & ~(unsigned)m.apart; rest; rest &= rest - 1) {
             int lane = __builtin_ctz(rest);
             int crossing = m.crossing >> lane & 1 ? EBPO_CERTAINLY_CROSSING : 0;

@@ -1,8 +1,14 @@
-/* Seen along the direction both faces are convex polygons with heights; the difference of heights
- * is concave where they overlap, so it is greatest over a corner of one, or where edges cross. */
+/* Two triangles of which one moves along a direction: the last time at which they have a common
+ * point.
+ *
+ * Seen along the direction both faces are convex polygons with heights. The difference of heights
+ * is concave where they overlap, so it is greatest over a corner of one polygon or where edges
+ * cross. The exact time is a fraction of integers (GMP). A bound in doubles comes from separating
+ * axes: normals, and products of edges with each other and with the direction.
+ * docs/develop/collision.md, "The way out". Pure functions, any thread. */
 #include "core/strict_fp.h"
 
-#include "extras/collide/pair_sweep.h"
+#include "extras/collide/face_pairs.h"
 
 #include <math.h>
 
@@ -77,8 +83,8 @@ static void sweep_clear(sweep *s)
 }
 
 /* x . (y cross z); `m` is lost. */
-static void pair_sweep_triple(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebpo_vectorz *y,
-                   const ebpo_vectorz *z)
+static void triple_product(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebpo_vectorz *y,
+                           const ebpo_vectorz *z)
 {
     ebpo_vectorz_cross(&s->m, y, z);
     ebpo_vectorz_dot(out, x, &s->m);
@@ -86,7 +92,7 @@ static void pair_sweep_triple(sweep *s, mpz_t out, const ebpo_vectorz *x, const 
 
 /* top / bottom is a time of contact. `other`: of the face that does not move, seen from which time
  * goes the other way. */
-static void pair_sweep_take(sweep *s, bool other)
+static void take_time(sweep *s, bool other)
 {
     if (mpz_sgn(s->bottom) < 0) {
         mpz_neg(s->top, s->top);
@@ -134,7 +140,7 @@ static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
     for (int k = 0; k < 3; k++) {
         ebpo_vectorz_subtract(&s->u, next_corner(s, of, k), &s->corner[of][k]);
         ebpo_vectorz_subtract(&s->v, corner, &s->corner[of][k]);
-        pair_sweep_triple(s, s->share, &s->d, &s->u, &s->v);
+        triple_product(s, s->share, &s->d, &s->u, &s->v);
         signs[mpz_sgn(s->share) + 1]++;
     }
     return signs[0] == 0 || signs[2] == 0;
@@ -150,7 +156,7 @@ static void corners_and_face(sweep *s, int of)
         ebpo_vectorz_subtract(&s->w, &s->corner[!of][0], &s->corner[of][i]);
         ebpo_vectorz_dot(s->top, &s->n, &s->w);
         ebpo_vectorz_dot(s->bottom, &s->n, &s->d);
-        pair_sweep_take(s, of == 1);
+        take_time(s, of == 1);
     }
 }
 
@@ -161,17 +167,17 @@ static void two_edges(sweep *s, int i, int j)
     ebpo_vectorz_subtract(&s->u, next_corner(s, 0, i), p);
     ebpo_vectorz_subtract(&s->v, next_corner(s, 1, j), q);
     ebpo_vectorz_subtract(&s->w, q, p);
-    pair_sweep_triple(s, s->bottom, &s->d, &s->u, &s->v);
+    triple_product(s, s->bottom, &s->d, &s->u, &s->v);
     if (mpz_sgn(s->bottom) == 0)
         return;
-    pair_sweep_triple(s, s->share, &s->d, &s->w, &s->v);
+    triple_product(s, s->share, &s->d, &s->w, &s->v);
     if (!is_share(s))
         return;
-    pair_sweep_triple(s, s->share, &s->d, &s->w, &s->u);
+    triple_product(s, s->share, &s->d, &s->w, &s->u);
     if (!is_share(s))
         return;
-    pair_sweep_triple(s, s->top, &s->w, &s->u, &s->v);
-    pair_sweep_take(s, false);
+    triple_product(s, s->top, &s->w, &s->u, &s->v);
+    take_time(s, false);
 }
 
 /* Of a corner of face `of` that is over an edge of the other: w = t d - x v. */
@@ -185,11 +191,11 @@ static void corner_and_edge(sweep *s, int of, int i, int j)
     ebpo_vectorz_dot(s->share, &s->w, &s->n);
     if (mpz_sgn(s->bottom) == 0 || mpz_sgn(s->share) != 0)
         return;
-    pair_sweep_triple(s, s->share, &s->n, &s->w, &s->d);
+    triple_product(s, s->share, &s->n, &s->w, &s->d);
     if (!is_share(s))
         return;
-    pair_sweep_triple(s, s->top, &s->n, &s->w, &s->v);
-    pair_sweep_take(s, of == 1);
+    triple_product(s, s->top, &s->n, &s->w, &s->v);
+    take_time(s, of == 1);
 }
 
 /* Of two corners one of which is over the other: w = t d. */
@@ -202,10 +208,10 @@ static void two_corners(sweep *s, int i, int j)
             return;
     ebpo_vectorz_dot(s->top, &s->w, &s->d);
     ebpo_vectorz_dot(s->bottom, &s->d, &s->d);
-    pair_sweep_take(s, false);
+    take_time(s, false);
 }
 
-static void pair_sweep_look(sweep *s)
+static void look_at_faces(sweep *s)
 {
     bool upright[2] = { !find_normal(s, 0), !find_normal(s, 1) };
     for (int of = 0; of < 2; of++)
@@ -240,7 +246,7 @@ void ebpo_sweep_last(const double a[3][3], const double b[3][3], const double di
     }
     out->ever = false;
     out->unit = unit - along;
-    pair_sweep_look(&s);
+    look_at_faces(&s);
     sweep_clear(&s);
 }
 

@@ -1,19 +1,24 @@
-/* Going down two hierarchies. No operation here is an estimate, so both builds go the
- * same way. Why nothing is lost: docs/develop/collision.md, "Going down two hierarchies". */
+/* The walk through two hierarchies to the pairs of faces that intersect, eight children at a time,
+ * in floats. It is compiled for several instruction sets with the same results.
+ *
+ * Boxes and slabs of one model's nodes are seen from the other model's frame and compared on the
+ * axes of both. Bounds are rounded outwards, so nothing is lost. The larger of two nodes is
+ * divided first. Two blocks go to the filter of pairs (pair_filter_kernels.c), and what that
+ * leaves open to ebpo_pair_walk_decide. docs/develop/collision.md, "Going down two hierarchies". */
 #include "core/strict_fp.h"
 
-#include "extras/collide/children_eight.inc"
-#include "extras/collide/pair_walk.h"
-#include "extras/collide/posed_faces.inc"
+#include "core/simd.h"
+#include "extras/collide/hierarchy_walk.h"
+#include "extras/collide/posed_eight.inc"
 
 /* --- nodes --- */
 
-EBPO_EIGHT f8 dot8(const f8 a[3], const f8 b[3])
+EBPO_EIGHT f8 vector_dot8(const f8 a[3], const f8 b[3])
 {
     return f8_add(f8_add(f8_mul(a[0], b[0]), f8_mul(a[1], b[1])), f8_mul(a[2], b[2]));
 }
 
-EBPO_EIGHT void store3(float out[3][8], const f8 x[3])
+EBPO_EIGHT void store_vector8(float out[3][8], const f8 x[3])
 {
     for (int k = 0; k < 3; k++)
         f8_store(out[k], x[k]);
@@ -30,14 +35,14 @@ EBPO_EIGHT void turn_boxes(const ebpo_accel_pair *p, int side, const ebpo_bound 
         decode_boxes8(b, k, p->unit[side], &c[k], &e[k]);
         longest = step > longest ? step : longest;
     }
-    turn8(p->into[1 - side], c, c2);
-    turn8(p->size[1 - side], e, e2);
+    turn_vector8(p->into[1 - side], c, c2);
+    turn_vector8(p->size[1 - side], e, e2);
     out->size = 255 * longest;
-    store3(out->c, c);
-    store3(out->e, e);
+    store_vector8(out->c, c);
+    store_vector8(out->e, e);
     f8_store(out->extent, f8_add(f8_add(e[0], e[1]), e[2]));
-    store3(out->c2, c2);
-    store3(out->e2, e2);
+    store_vector8(out->c2, c2);
+    store_vector8(out->e2, e2);
 }
 
 /* Without an axis the slab says nothing. */
@@ -51,15 +56,15 @@ EBPO_EIGHT void turn_slabs(const ebpo_accel_pair *p, int side, const ebpo_bound_
 #pragma GCC unroll 3
     for (int k = 0; k < 3; k++)
         mid[k] = f8_add(c[k], f8_mul(a[k], f8_add(from, to)));
-    turn8(p->into[1 - side], a, a2);
-    turn8(p->into[1 - side], mid, mid2);
+    turn_vector8(p->into[1 - side], a, a2);
+    turn_vector8(p->into[1 - side], mid, mid2);
     out->slabs = f8_bits(some) != 0;
     f8_store(out->half, f8_pick(some, f8_sub(to, from), f8_all(0x1p100f)));
     f8_store(out->radius, f8_mul(f8_mul(f8_from_shorts(s->radius), f8_all(s->aside_step)), unit));
-    store3(out->axis, a);
-    store3(out->mid, mid);
-    store3(out->axis2, a2);
-    store3(out->mid2, mid2);
+    store_vector8(out->axis, a);
+    store_vector8(out->mid, mid);
+    store_vector8(out->axis2, a2);
+    store_vector8(out->mid2, mid2);
 }
 
 static void turn_node(const ebpo_accel_pair *p, int side, uint32_t node, ebpo_turned_node *out)
@@ -159,22 +164,22 @@ EBPO_EIGHT f8 slab_gaps(const two_nodes *t, int j)
         own_box[k] = f8_sub(f8_load(p->c[k]), q_mid);
         e[k] = f8_all(q->e[k][j]);
     }
-    f8 cosine = f8_abs(dot8(axis, other)),
+    f8 cosine = f8_abs(vector_dot8(axis, other)),
        sine = f8_sqrt(f8_max(f8_sub(f8_all(t->sine), f8_mul(cosine, cosine)), zero));
     f8 p_half = f8_load(p->half), p_radius = f8_load(p->radius), q_half = f8_all(q->half[j]),
        q_radius = f8_all(q->radius[j]);
-    f8 by_slab = f8_sub(f8_abs(dot8(axis, from_mid)),
+    f8 by_slab = f8_sub(f8_abs(vector_dot8(axis, from_mid)),
                         f8_add(f8_mul(cosine, q_half), f8_mul(sine, q_radius))),
-       by_box = f8_sub(f8_abs(dot8(axis, from_box)), dot8(axis2, e));
+       by_box = f8_sub(f8_abs(vector_dot8(axis, from_box)), vector_dot8(axis2, e));
     f8 gap = f8_sub(f8_max(by_slab, by_box), p_half);
 #pragma GCC unroll 3
     for (int k = 0; k < 3; k++) {
         e[k] = f8_load(p->e[k]);
         axis[k] = f8_abs(other[k]);
     }
-    by_slab = f8_sub(f8_abs(dot8(other, from_mid)),
+    by_slab = f8_sub(f8_abs(vector_dot8(other, from_mid)),
                      f8_add(f8_mul(cosine, p_half), f8_mul(sine, p_radius)));
-    by_box = f8_sub(f8_abs(dot8(other, own_box)), dot8(axis, e));
+    by_box = f8_sub(f8_abs(vector_dot8(other, own_box)), vector_dot8(axis, e));
     return f8_max(gap, f8_sub(f8_max(by_slab, by_box), q_half));
 }
 
@@ -294,7 +299,7 @@ EBPO_EIGHT int side_to_divide(uint32_t a, uint32_t b, float size_a, float size_b
     return size_a > LONGER * size_b ? 0 : size_b > LONGER * size_a ? 1 : 2;
 }
 
-EBPO_EIGHT bool pair_walk_divide(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uint32_t b, bool first)
+EBPO_EIGHT bool divide_pair(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uint32_t b, bool first)
 {
     w->node_pairs++;
     if (!ebpo_pair_walk_room(w, 65))
@@ -361,7 +366,7 @@ EBPO_EIGHT bool run_any(ebpo_pair_walk *w, uint64_t pairs, bool first)
             break;
         uint32_t a = below_child(sa, r.a), b = below_child(sb, r.b);
         bool fine = a & b & EBPO_IS_BLOCK ? blocks_meet(w, a & ~EBPO_IS_BLOCK, b & ~EBPO_IS_BLOCK)
-                                          : pair_walk_divide(w, r, a, b, first);
+                                          : divide_pair(w, r, a, b, first);
         if (!fine)
             return false;
         if (first && w->met_count)
@@ -388,7 +393,7 @@ static bool walk_expand(ebpo_pair_walk *w, ebpo_node_pair r)
 {
     uint32_t a = below_child(w->pair->accel[0], r.a), b = below_child(w->pair->accel[1], r.b);
     if (!(a & b & EBPO_IS_BLOCK))
-        return pair_walk_divide(w, r, a, b, false);
+        return divide_pair(w, r, a, b, false);
     if (!ebpo_pair_walk_room(w, 1))
         return false;
     push_pair(w, r.a, r.b, r.key);

@@ -1,9 +1,19 @@
+/* Solids at poses: on which side of a solid a point of the world is, exact on posed coordinates.
+ *
+ * The point is brought into the model's coordinates with a bound of the error. If no face is near,
+ * the winding number there is the answer. Otherwise the faces near the point are posed and decide:
+ * from a point farther away, whose winding number is known, axis-parallel segments lead to the
+ * point in question, and their crossings are counted exactly. Points with fractions as coordinates
+ * are reached from the nearest double in three such segments.
+ *
+ * Solids are not changed: any thread may use them, each with its own context. Proofs:
+ * docs/develop/booleans.md and docs/develop/collision.md, "Relation of two models". */
 #include "core/strict_fp.h"
+
+#include <ebpo/collide.h>
 
 #include <math.h>
 #include <string.h>
-
-#include <ebpo/collide.h>
 
 #include "core/error.h"
 #include "core/fp_env.h"
@@ -49,7 +59,7 @@ bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b)
            x->solid == y->solid && x->rule == y->rule;
 }
 
-/* Points of the world asked of models; bounds: docs/develop/booleans.md. */
+/* --- points in the coordinates of the model --- */
 
 /* More than the roundings of a bound's own computation. */
 static const double more = 1 + 0x1p-40;
@@ -137,8 +147,9 @@ void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double 
     }
 }
 
-ebpo_status ebpo_posed_solid_clear(ebpo_context *context, const double p[3], double doubt,
-                                   bool *clear, ebpo_error *error)
+/* No face of the model is within `doubt` of p, for certain. */
+static ebpo_status is_clear_of_faces(ebpo_context *context, const double p[3], double doubt,
+                                     bool *clear, ebpo_error *error)
 {
     double low[3], high[3];
     const uint64_t *faces;
@@ -152,9 +163,7 @@ ebpo_status ebpo_posed_solid_clear(ebpo_context *context, const double p[3], dou
     return status;
 }
 
-/* Points that are so close to a solid's faces that their place in its model is in doubt: the faces
- * near them are posed, and decide. From a point farther away, where the winding number is known, an
- * axis-parallel segment leads to the point in question; what it crosses is counted. */
+/* --- sides of a point --- */
 
 /* --- faces --- */
 
@@ -200,7 +209,7 @@ static void take_on(looking *l, const double t[3][3])
     l->jump += ebpo_axis_crossing(from, nextafter(l->w[axis], INFINITY), axis, t[0], t[1], t[2]);
 }
 
-static bool posed_sides_take(void *user, const ebpo_triangles *triangles)
+static bool take_near_triangles(void *user, const ebpo_triangles *triangles)
 {
     looking *l = user;
     for (uint64_t i = 0; i < triangles->count; i++) {
@@ -232,7 +241,7 @@ static ebpo_status try_anchor(const ebpo_posed_solid *s, ebpo_context *context, 
     if (*found)
         return EBPO_OK;
     ebpo_unpose(s, a->at, p, &doubt);
-    ebpo_status status = ebpo_posed_solid_clear(context, p, doubt, found, error);
+    ebpo_status status = is_clear_of_faces(context, p, doubt, found, error);
     if (status == EBPO_OK && *found)
         status = ebpo_inside(context, p, NULL, &inside, error);
     a->winding = inside.winding;
@@ -270,7 +279,7 @@ static ebpo_status decide_by_faces(const ebpo_posed_solid *s, ebpo_context *cont
     memcpy(l.low, upward ? w : a.at, sizeof l.low);
     l.to = upward ? a.at[a.axis] : w[a.axis];
     ebpo_unpose_box(s, w, a.at, low, high);
-    status = ebpo_triangles_in_box(context, low, high, posed_sides_take, &l, error);
+    status = ebpo_triangles_in_box(context, low, high, take_near_triangles, &l, error);
     if (status != EBPO_OK)
         return status;
     out->above = upward ? a.winding - l.crossed : a.winding + l.crossed;
@@ -288,7 +297,7 @@ ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo_context *cont
     if (!ebpo_posed_solid_near(s, w, 0))
         return EBPO_OK;
     ebpo_unpose(s, w, p, &doubt);
-    ebpo_status status = ebpo_posed_solid_clear(context, p, doubt, &clear, error);
+    ebpo_status status = is_clear_of_faces(context, p, doubt, &clear, error);
     if (status == EBPO_OK && !clear)
         return decide_by_faces(s, context, w, doubt, out, error);
     if (status == EBPO_OK)
@@ -298,8 +307,7 @@ ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo_context *cont
     return status;
 }
 
-/* From the nearest double, where the winding number is known, three axis-parallel segments lead to
- * the point; what they cross is counted in integers. */
+/* --- winding numbers at points with fractions --- */
 
 /* Points in units of 2^unit / denominator. */
 typedef struct path {
@@ -401,8 +409,7 @@ static int side_of_plane(path *p, const ebpo_vectorz *at)
 }
 
 /* Of the corners, along the axis from one point to another above it. */
-static int exact_winding_crossing(path *p, int axis, const ebpo_vectorz *from,
-                                  const ebpo_vectorz *to)
+static int count_crossing(path *p, int axis, const ebpo_vectorz *from, const ebpo_vectorz *to)
 {
     int turn = side_of_line(p, axis, 0, from);
     if (turn == 0 || side_of_line(p, axis, 1, from) != turn ||
@@ -412,7 +419,7 @@ static int exact_winding_crossing(path *p, int axis, const ebpo_vectorz *from,
     return -turn;
 }
 
-static bool exact_winding_take(void *user, const ebpo_triangles *triangles)
+static bool take_path_triangles(void *user, const ebpo_triangles *triangles)
 {
     path *p = user;
     for (uint64_t i = 0; i < triangles->count; i++) {
@@ -425,9 +432,9 @@ static bool exact_winding_take(void *user, const ebpo_triangles *triangles)
         for (int k = 0; k < 3; k++) {
             int up = mpz_cmp(p->at[k + 1].x[k], p->at[k].x[k]);
             if (up > 0)
-                p->crossed += exact_winding_crossing(p, k, &p->at[k], &p->at[k + 1]);
+                p->crossed += count_crossing(p, k, &p->at[k], &p->at[k + 1]);
             else if (up < 0)
-                p->crossed -= exact_winding_crossing(p, k, &p->at[k + 1], &p->at[k]);
+                p->crossed -= count_crossing(p, k, &p->at[k + 1], &p->at[k]);
         }
     }
     return true;
@@ -456,7 +463,7 @@ ebpo_status ebpo_exact_winding(const ebpo_posed_solid *s, ebpo_context *context,
         return status;
     make_path(&p);
     ebpo_unpose_box(s, corner[0], corner[1], low, high);
-    status = ebpo_triangles_in_box(context, low, high, exact_winding_take, &p, error);
+    status = ebpo_triangles_in_box(context, low, high, take_path_triangles, &p, error);
     *winding += p.crossed;
     clear_path(&p);
     return status;

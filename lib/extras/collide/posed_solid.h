@@ -1,8 +1,11 @@
-/* A model at a pose. Pure functions, any thread. */
+/* Models at poses: their extent, and on which side of a solid a point of the world is, exact on
+ * posed coordinates. Proofs: docs/develop/booleans.md. Solids are not changed: any thread may use
+ * them, each with its own context. */
 #ifndef EBPO_COLLIDE_POSED_SOLID_H
 #define EBPO_COLLIDE_POSED_SOLID_H
 
 #include <gmp.h>
+#include <math.h>
 
 #include "geometry/pose.h"
 #include "query/query_model.h"
@@ -15,10 +18,6 @@ double ebpo_posed_reach(const ebpo_posing *posing, const double reach[3]);
 
 /* One file, or two of the same content: the same faces, and the same is meant by them. */
 bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b);
-
-/* A solid at a pose: where a point of the world lies in its model's coordinates, and whether it is
- * inside, exact on posed coordinates. Proofs: docs/develop/booleans.md. Solids are not changed:
- * any thread, each with a context of its own. */
 
 typedef struct ebpo_posed_solid {
     ebpo_model *model;
@@ -36,6 +35,16 @@ EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_mode
 /* False: w is certainly outside, beyond the box by more than `margin` (0 or more) on an axis. */
 bool ebpo_posed_solid_near(const ebpo_posed_solid *s, const double w[3], double margin);
 
+/* Returns the greatest gap between two boxes on an axis: above 0 where they are apart. */
+static inline double ebpo_box_gap(const double a_low[3], const double a_high[3],
+                                  const double b_low[3], const double b_high[3])
+{
+    double most = -INFINITY;
+    for (int k = 0; k < 3; k++)
+        most = fmax(most, fmax(a_low[k] - b_high[k], b_low[k] - a_high[k]));
+    return most;
+}
+
 /* The point in the model's coordinates that the true motion brings to w, and *doubt: that point is
  * within it of p, and so is what rounding has moved. If no face of the model is within *doubt of p,
  * the posed model has at w the winding number that the model has at p. */
@@ -45,13 +54,6 @@ void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], doub
  * (corners of it, in any order) when posed. */
 void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double b[3], double low[3],
                      double high[3]);
-
-/* No face of the model is within `doubt` of p, for certain. */
-EBPO_MUST_USE ebpo_status ebpo_posed_solid_clear(ebpo_context *context, const double p[3],
-                                                 double doubt, bool *clear, ebpo_error *error);
-
-/* Which side of a solid at a pose a point of the world is on: exact on posed coordinates. Proofs:
- * docs/develop/booleans.md. Any thread, each with a context of its own. */
 
 /* Around a point of the world. */
 typedef struct ebpo_posed_sides {
@@ -68,11 +70,8 @@ EBPO_MUST_USE ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo
                                                  const double w[3], ebpo_posed_sides *out,
                                                  ebpo_error *error);
 
-/* The winding number of a posed model at a point whose coordinates are fractions. Proofs:
- * docs/develop/collision.md, "Relation of two models". One thread with its context. */
-
-/* At x shifted by (d0, d1, d2) as in ebpo_axis_crossing: never on a face. Coordinates are canonical
- * and no farther than doubles reach. */
+/* The winding number at x, whose coordinates are canonical fractions no farther than doubles reach,
+ * shifted by (d0, d1, d2) as in ebpo_axis_crossing: never on a face. */
 EBPO_MUST_USE ebpo_status ebpo_exact_winding(const ebpo_posed_solid *s, ebpo_context *context,
                                              const mpq_t x[3], int32_t *winding, ebpo_error *error);
 

@@ -1,3 +1,11 @@
+/* The subtrees of a model at a pose, and where each can have faces: convex envelopes, and gaps
+ * between them. A model in parts has the subtrees that are loaded on demand; a whole model is a
+ * single one.
+ *
+ * Envelopes are the cell's polytope, cut by the planes that are in memory for it and for its last
+ * ancestors, then posed. They are kept in a hash table by octcode. Gaps are lower bounds of the
+ * distance of two convex sets, found by the iteration of Gilbert (1966): every direction gives a
+ * bound, so it may stop at any time. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -7,10 +15,9 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hash.h"
-#include "core/sort.h"
 #include "extras/collide/posed_subtrees.h"
-#include "geometry/cells.h"
 #include "geometry/vec3.h"
+#include "geometry/cells.h"
 #include "geometry/polytope.h"
 #include "query/query_node.h"
 
@@ -25,7 +32,7 @@ static void middle_of(const ebpo_convex *c, double out[3])
 }
 
 /* The point that is farthest along a direction, or (sign -1) against it. */
-static const double *convex_gap_farthest(const ebpo_convex *c, const double n[3], double sign)
+static const double *farthest_point(const ebpo_convex *c, const double n[3], double sign)
 {
     int best = 0;
     double most = -INFINITY;
@@ -56,7 +63,7 @@ double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough
         double length2 = ebpo_vec3_dot(v, v), along, step2 = 0, back = 0;
         if (!(length2 > 0x1p-900 && length2 < 0x1p900)) /* squares are not what they should be */
             break;
-        const double *p = convex_gap_farthest(a, v, 1), *q = convex_gap_farthest(b, v, -1);
+        const double *p = farthest_point(a, v, 1), *q = farthest_point(b, v, -1);
         for (int k = 0; k < 3; k++)
             w[k] = q[k] - p[k];
         along = ebpo_vec3_dot(v, w) / sqrt(length2);
@@ -111,7 +118,7 @@ static int by_code(const void *x, const void *y)
     return (p->code > q->code) - (p->code < q->code);
 }
 
-static ebpo_status posed_subtrees_order(ebpo_posed_subtrees *s, ebpo_error *error)
+static ebpo_status order_subtrees(ebpo_posed_subtrees *s, ebpo_error *error)
 {
     const ebpo_top *top = s->model->top;
     place *at = ebpo_alloc(s->count, sizeof *at);
@@ -137,7 +144,7 @@ ebpo_status ebpo_posed_subtrees_make(ebpo_posed_subtrees *out, const ebpo_model 
     out->rank = ebpo_alloc_zero(out->count, sizeof *out->rank);
     if (!out->rank)
         return ebpo_fail_memory(error, out->count * sizeof *out->rank);
-    return model->whole ? EBPO_OK : posed_subtrees_order(out, error);
+    return model->whole ? EBPO_OK : order_subtrees(out, error);
 }
 
 void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s)
@@ -206,8 +213,8 @@ double ebpo_posed_diagonal(const ebpo_posed_subtrees *s, ebpo_cell cell)
 
 /* --- envelopes --- */
 
-static void posed_subtrees_cut(const ebpo_posed_subtrees *s, const ebpo_posed_node *node,
-                               ebpo_polytope *envelope)
+static void cut_node(const ebpo_posed_subtrees *s, const ebpo_posed_node *node,
+                     ebpo_polytope *envelope)
 {
     uint32_t count = 0;
     ebpo_node as = ebpo_entry_node(node->entry, node->cell, s->model->info->rule);
@@ -225,7 +232,7 @@ static void cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_poly
     for (int level = 0;; level++) {
         bool matters = level + LEVELS_OF_PLANES > cell.level;
         if (matters)
-            posed_subtrees_cut(s, &node, out);
+            cut_node(s, &node, out);
         if (level == cell.level)
             return;
         unsigned octant = ebpo_cell_octant(cell, level);
@@ -257,7 +264,7 @@ static posed_hull *make_hull(const ebpo_posed_subtrees *s, ebpo_cell cell)
     return out;
 }
 
-static posed_hull **posed_subtrees_find(posed_hull **hull, uint64_t slots, ebpo_octcode code)
+static posed_hull **find_hull(posed_hull **hull, uint64_t slots, ebpo_octcode code)
 {
     uint64_t at;
     EBPO_HASH_FIND(at, ebpo_hash_number(code), slots - 1, !hull[at] || hull[at]->code == code);
@@ -265,7 +272,7 @@ static posed_hull **posed_subtrees_find(posed_hull **hull, uint64_t slots, ebpo_
 }
 
 /* Room for one more. */
-static bool posed_subtrees_widen(ebpo_posed_subtrees *s)
+static bool widen_table(ebpo_posed_subtrees *s)
 {
     if (4 * (s->hulls + 1) <= 3 * s->slots)
         return true;
@@ -275,7 +282,7 @@ static bool posed_subtrees_widen(ebpo_posed_subtrees *s)
         return false;
     for (uint64_t i = 0; i < s->slots; i++)
         if (s->hull[i])
-            *posed_subtrees_find(hull, slots, s->hull[i]->code) = s->hull[i];
+            *find_hull(hull, slots, s->hull[i]->code) = s->hull[i];
     free(s->hull);
     s->hull = hull;
     s->bytes += (slots - s->slots) * sizeof *hull;
@@ -286,9 +293,9 @@ static bool posed_subtrees_widen(ebpo_posed_subtrees *s)
 ebpo_status ebpo_posed_envelope(ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_convex *out,
                                 ebpo_error *error)
 {
-    if (!posed_subtrees_widen(s))
+    if (!widen_table(s))
         return ebpo_fail_memory(error, 2 * s->slots * sizeof *s->hull);
-    posed_hull **hull = posed_subtrees_find(s->hull, s->slots, ebpo_octcode_of_cell(cell));
+    posed_hull **hull = find_hull(s->hull, s->slots, ebpo_octcode_of_cell(cell));
     if (!*hull) {
         *hull = make_hull(s, cell);
         if (!*hull)
@@ -297,153 +304,5 @@ ebpo_status ebpo_posed_envelope(ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_con
         s->bytes += sizeof **hull + (uint64_t)(*hull)->count * sizeof *(*hull)->point;
     }
     *out = (ebpo_convex){ (*hull)->count, (const double(*)[3])(*hull)->point };
-    return EBPO_OK;
-}
-
-ebpo_status ebpo_node_gaps_begin(ebpo_node_gaps *g, const ebpo_collision *q, ebpo_error *error)
-{
-    ebpo_status status = EBPO_OK;
-    g->reach = q->reach;
-    for (int i = 0; i < 2 && status == EBPO_OK; i++)
-        status = ebpo_posed_subtrees_make(&g->side[i], q->model[i], &q->posing[i].posing, error);
-    return status;
-}
-
-void ebpo_node_gaps_free(ebpo_node_gaps *g)
-{
-    for (int i = 0; i < 2; i++)
-        ebpo_posed_subtrees_free(&g->side[i]);
-    free(g->heap);
-}
-
-int ebpo_node_larger(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
-{
-    return ebpo_posed_diagonal(&g->side[0], node[0].cell) <
-           ebpo_posed_diagonal(&g->side[1], node[1].cell);
-}
-
-static double slack_of(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
-{
-    return ebpo_posed_slack(&g->side[0], node[0].cell, g->reach) +
-           ebpo_posed_slack(&g->side[1], node[1].cell, g->reach);
-}
-
-static bool is_nearer(const ebpo_node_gap *a, const ebpo_node_gap *b) { return a->gap < b->gap; }
-
-EBPO_HEAP(heap, ebpo_node_gap, is_nearer)
-
-ebpo_status ebpo_node_gaps_push(ebpo_node_gaps *g, const ebpo_node_gap *pair, ebpo_error *error)
-{
-    if (!ebpo_grow(&g->heap, &g->capacity, g->count + 1, sizeof *g->heap))
-        return ebpo_fail_memory(error, (g->count + 1) * sizeof *g->heap);
-    heap_add(g->heap, g->count++, pair);
-    return EBPO_OK;
-}
-
-ebpo_node_gap ebpo_node_gaps_pop(ebpo_node_gaps *g) { return heap_take(g->heap, g->count--); }
-
-double ebpo_node_far_bound(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
-{
-    double corner[2][8][3], near = 0;
-    ebpo_convex convex[2];
-    for (int i = 0; i < 2; i++) {
-        ebpo_posed_cell(&g->side[i], node[i].cell, corner[i]);
-        convex[i] = (ebpo_convex){ 8, (const double(*)[3])corner[i] };
-        near += EBPO_NEAR_SHARE * ebpo_posed_diagonal(&g->side[i], node[i].cell);
-    }
-    return ebpo_convex_span(&convex[0], &convex[1]) + near + slack_of(g, node);
-}
-
-ebpo_status ebpo_node_gap_of(ebpo_node_gaps *g, const ebpo_posed_node node[2], double *out,
-                             ebpo_error *error)
-{
-    ebpo_convex convex[2];
-    for (int i = 0; i < 2; i++) {
-        ebpo_status status = ebpo_posed_envelope(&g->side[i], node[i].cell, &convex[i], error);
-        if (status != EBPO_OK)
-            return status;
-    }
-    *out = fmax(ebpo_convex_gap(&convex[0], &convex[1], INFINITY) - slack_of(g, node), 0);
-    return EBPO_OK;
-}
-
-ebpo_status ebpo_subtree_search_begin(ebpo_subtree_search *s, const ebpo_collision *q,
-                                      ebpo_error *error)
-{
-    s->question = q;
-    s->read_before = ebpo_collision_bytes_read(q);
-    ebpo_status status = ebpo_node_gaps_begin(&s->nodes, q, error);
-    for (int i = 0; i < 2 && status == EBPO_OK; i++) {
-        s->seen[i] = ebpo_alloc_zero(s->nodes.side[i].count + 1, sizeof *s->seen[i]);
-        if (!s->seen[i])
-            return ebpo_fail_memory(error, s->nodes.side[i].count);
-        if (!q->model[i]->whole)
-            status = ebpo_context_new(q->model[i], &s->context[i], error);
-    }
-    return status;
-}
-
-void ebpo_subtree_search_end(ebpo_subtree_search *s)
-{
-    ebpo_collider *c = s->question->collider;
-    c->bytes_read += ebpo_collision_bytes_read(s->question) - s->read_before;
-    for (int i = 0; i < 2; i++) {
-        c->loads += s->context[i] ? s->context[i]->loaded : 0;
-        ebpo_context_free(s->context[i]);
-        free(s->seen[i]);
-    }
-    ebpo_node_gaps_free(&s->nodes);
-}
-
-static bool is_gray(const ebpo_posed_node *node)
-{
-    return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_GRAY;
-}
-
-/* Nodes of a whole model are divided for their bounds only: not below the size of the other one's
- * subtree. */
-int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node node[2])
-{
-    int larger = ebpo_node_larger(&s->nodes, node);
-    if (is_gray(&node[larger]))
-        return larger;
-    return is_gray(&node[!larger]) && !s->question->model[!larger]->whole ? !larger : -1;
-}
-
-/* Of a whole model and one in parts several pairs of nodes call for the same subtree: once. */
-static bool was_seen(const ebpo_subtree_search *s, const uint32_t number[2])
-{
-    for (int i = 0; i < 2; i++)
-        if (s->question->model[!i]->whole && s->seen[i][number[i]])
-            return true;
-    return false;
-}
-
-ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s, const ebpo_posed_node node[2],
-                                     const ebpo_accel *accel[2], bool *there, ebpo_error *error)
-{
-    ebpo_collider *c = s->question->collider;
-    uint32_t number[2];
-    *there = false;
-    for (int i = 0; i < 2; i++) {
-        const ebpo_model *m = s->question->model[i];
-        number[i] = m->whole ? 0 : ebpo_entry_value(node[i].entry);
-        if (!m->whole && m->top->below[number[i]].pruned)
-            return EBPO_OK; /* what it had is not in this file */
-    }
-    if (was_seen(s, number))
-        return EBPO_OK;
-    c->subtree_pairs++;
-    for (int i = 0; i < 2; i++) {
-        ebpo_accel *loaded = s->question->model[i]->whole;
-        ebpo_status status =
-            loaded ? EBPO_OK : ebpo_context_subtree(s->context[i], number[i], &loaded, error);
-        if (status != EBPO_OK)
-            return status;
-        c->subtrees += !s->seen[i][number[i]];
-        s->seen[i][number[i]] = true;
-        accel[i] = loaded;
-    }
-    *there = true;
     return EBPO_OK;
 }

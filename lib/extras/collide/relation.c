@@ -1,7 +1,16 @@
-/* How two models lie to each other: which of the parts of space that are in both, in one and in the
- * other there are, found around pieces of faces. */
+/* The relation of two models at poses: disjoint, touching, intersecting, one inside the other, or
+ * equal.
+ *
+ * The boundary of two models divides space into parts; the relation says which of these exist: in
+ * both, in the first alone, in the second alone. Each part is bounded by pieces of faces, so it is
+ * found around them (around_face.h). A crossing pair nearly always decides. If not, all faces that
+ * intersect the other model are examined, then one face of each patch that does not: such a patch
+ * is on one side as a whole. A patch whose side would tell nothing new is skipped, without loading
+ * its subtree where the side is known. If the deadline passes, the relation is open.
+ * docs/develop/collision.md, "Relation of two models". One thread. */
 #include "core/strict_fp.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,10 +20,121 @@
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "extras/collide/around_face.h"
-#include "extras/collide/contacts.h"
+#include "extras/collide/face_patches.h"
+#include "extras/collide/pair_faces.h"
 #include "extras/collide/posed_solid.h"
-#include "extras/collide/unmet_patches.h"
+#include "extras/collide/posed_subtrees.h"
 #include "geometry/predicates.h"
+#include "geometry/level_nodes.h"
+
+/* --- patches without contact --- */
+
+/* Subtrees of one of a question's models; a whole one is its only subtree. */
+typedef struct unmet_patches {
+    const ebpo_collision *question;
+    ebpo_two_models *two;
+    int m;
+    uint64_t subtrees;
+    /* Of the subtree asked for last: its own faces, by numbers in the file, and for each the first
+     * of its patch (face_patches.h), less `first`. */
+    uint64_t first, count;
+    uint32_t *patch;
+} unmet_patches;
+
+static void unmet_patches_begin(unmet_patches *u, const ebpo_collision *question,
+                                ebpo_two_models *two, int m)
+{
+    const ebpo_model *model = question->model[m];
+    *u = (unmet_patches){ .question = question, .two = two, .m = m };
+    u->subtrees = model->whole ? 1 : model->top->below_count;
+}
+
+static void unmet_patches_end(unmet_patches *u) { free(u->patch); }
+
+static ebpo_status find_patches(unmet_patches *u, const ebpo_accel *subtree, const uint32_t *slots,
+                                const uint64_t *met, ebpo_error *error)
+{
+    u->first = subtree->first_face;
+    u->count = subtree->face_count - subtree->outer_count;
+    return ebpo_face_patches(subtree, slots, met, &u->patch, error);
+}
+
+/* met: a bit for each face of the model. Loads the subtree, and lets go of it. */
+static ebpo_status unmet_patches_find(unmet_patches *u, uint64_t number, const uint64_t *met,
+                                      ebpo_error *error)
+{
+    const ebpo_model *model = u->question->model[u->m];
+    ebpo_context *context = u->two->context[u->m];
+    ebpo_accel *subtree;
+    free(u->patch);
+    u->patch = NULL;
+    if (model->whole)
+        return find_patches(u, model->whole, u->two->faces[u->m]->slots, met, error);
+    ebpo_status status = ebpo_context_subtree(context, (uint32_t)number, &subtree, error);
+    if (status != EBPO_OK)
+        return status;
+    uint32_t *slots = ebpo_face_slots(subtree);
+    status = slots ? find_patches(u, subtree, slots, met, error)
+                   : ebpo_fail_memory(error, subtree->face_count * sizeof *slots);
+    free(slots);
+    ebpo_context_let_go(context);
+    return status;
+}
+
+static bool note_any(void *user, const ebpo_triangles *triangles)
+{
+    bool *any = user;
+    *any |= triangles->count > 0;
+    return !*any;
+}
+
+/* Whether the solid has all of a ball around a point of the world inside, or outside. */
+static ebpo_status side_of_ball(const unmet_patches *u, const double middle[3], double radius,
+                                int *in, ebpo_error *error)
+{
+    const ebpo_posed_solid *other = &u->two->model[!u->m];
+    ebpo_context *context = u->two->context[!u->m];
+    double low[3], high[3], p[3], doubt;
+    bool near = false;
+    ebpo_inside_result inside;
+    ebpo_unpose(other, middle, p, &doubt);
+    double room = (radius / other->posing.scale + 2 * doubt) * (1 + 0x1p-20);
+    for (int k = 0; k < 3; k++) {
+        low[k] = nextafter(p[k] - room, -INFINITY);
+        high[k] = nextafter(p[k] + room, INFINITY);
+    }
+    ebpo_status status = ebpo_triangles_in_box(context, low, high, note_any, &near, error);
+    if (status != EBPO_OK || near)
+        return status;
+    status = ebpo_inside(context, p, NULL, &inside, error);
+    *in = ebpo_rule_inside(u->two->rule[!u->m], inside.winding);
+    return status;
+}
+
+/* The cell has a point of each of its own faces; so does the ball around it. If no face of the
+ * other model comes near the ball, it is on one side, and so is each face that meets none. */
+static ebpo_status unmet_patches_side(const unmet_patches *u, uint64_t number, int *in,
+                                      ebpo_error *error)
+{
+    const ebpo_model *model = u->question->model[u->m];
+    ebpo_posed_subtrees as = { .model = model, .posing = u->question->posing[u->m].posing };
+    double corner[8][3], middle[3];
+    *in = -1;
+    if (model->whole)
+        return EBPO_OK;
+    ebpo_cell cell = model->top->below[number].cell;
+    double radius =
+        ebpo_posed_diagonal(&as, cell) / 2 + ebpo_posed_slack(&as, cell, u->question->reach);
+    ebpo_posed_cell(&as, cell, corner);
+    for (int k = 0; k < 3; k++)
+        middle[k] = corner[0][k] / 2 + corner[7][k] / 2;
+    if (ebpo_posed_solid_near(&u->two->model[!u->m], middle, radius))
+        return side_of_ball(u, middle, radius, in, error);
+    *in = 0;
+    return EBPO_OK;
+}
+
+/* --- the state of the search --- */
 
 static const char stage[] = "relation";
 
@@ -35,16 +155,16 @@ typedef struct relating {
     ebpo_status status;
 } relating;
 
-static bool relation_mixed(const relating *r) { return r->two.solid[0] != r->two.solid[1]; }
+static bool is_mixed(const relating *r) { return r->two.solid[0] != r->two.solid[1]; }
 
-static bool relation_surfaces(const relating *r) { return !r->two.solid[0] && !r->two.solid[1]; }
+static bool are_surfaces(const relating *r) { return !r->two.solid[0] && !r->two.solid[1]; }
 
 /* Nothing that is still to be looked at can change the relation. */
 static bool is_decided(const relating *r)
 {
-    if (relation_mixed(r))
+    if (is_mixed(r))
         return r->both && r->only[r->two.solid[0]];
-    return r->both && (relation_surfaces(r) ? r->only[0] || r->only[1] : r->only[0] && r->only[1]);
+    return r->both && (are_surfaces(r) ? r->only[0] || r->only[1] : r->only[0] && r->only[1]);
 }
 
 static uint64_t face_count(const relating *r, int m)
@@ -52,7 +172,7 @@ static uint64_t face_count(const relating *r, int m)
     return r->question->model[m]->info->face_count;
 }
 
-static bool relation_bit(const uint64_t *bits, uint64_t i) { return bits[i / 64] >> i % 64 & 1; }
+static bool has_bit(const uint64_t *bits, uint64_t i) { return bits[i / 64] >> i % 64 & 1; }
 
 static void set_bit(uint64_t *bits, uint64_t i) { bits[i / 64] |= UINT64_C(1) << i % 64; }
 
@@ -71,7 +191,7 @@ static void note_solids(relating *r, const ebpo_around *a)
     r->only[1] |= (a->in[1] & ~a->in[0]) != 0;
 }
 
-static bool relation_note(void *user, const ebpo_around *a)
+static bool note_piece(void *user, const ebpo_around *a)
 {
     const facing *f = user;
     relating *r = f->r;
@@ -81,7 +201,7 @@ static bool relation_note(void *user, const ebpo_around *a)
     if (r->two.solid[0] && r->two.solid[1])
         note_solids(r, a);
     else {
-        r->both |= relation_mixed(r) && other == EBPO_SIDE_BOTH;
+        r->both |= is_mixed(r) && other == EBPO_SIDE_BOTH;
         r->only[f->m] |= other == 0;
     }
     return !is_decided(r);
@@ -91,10 +211,10 @@ static bool relation_note(void *user, const ebpo_around *a)
 static bool look_at(relating *r, int m, uint64_t face)
 {
     facing f = { r, m };
-    if ((relation_mixed(r) && r->two.solid[m]) || relation_bit(r->seen[m], face))
+    if ((is_mixed(r) && r->two.solid[m]) || has_bit(r->seen[m], face))
         return true;
     set_bit(r->seen[m], face);
-    r->status = ebpo_look_around_face(&r->two, m, face, relation_note, &f, r->error);
+    r->status = ebpo_look_around_face(&r->two, m, face, note_piece, &f, r->error);
     if (r->status == EBPO_OK && ++r->looked_at % 64 == 0 &&
         !ebpo_progress_step(&r->question->options.progress, stage, 0, 0, r->error))
         r->status = EBPO_E_CANCELLED;
@@ -138,7 +258,7 @@ static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t coun
     for (uint64_t i = 0; i < count && more; i++) {
         set_bit(r->met[turned], pairs[i].file_face_a);
         set_bit(r->met[!turned], pairs[i].file_face_b);
-        if (relation_surfaces(r))
+        if (are_surfaces(r))
             more = note_pair(r, &pairs[i]);
         else if (pairs[i].kind == EBPO_PAIR_CROSSING)
             more = look_at_pair(r, &pairs[i]);
@@ -179,7 +299,7 @@ static void look_at_met(relating *r)
     for (int m = 0; m < 2; m++) {
         uint64_t count = face_count(r, m);
         for (uint64_t f = 0; f < count && goes_on(r); f++)
-            if (relation_bit(r->met[m], f))
+            if (has_bit(r->met[m], f))
                 (void)look_at(r, m, f);
     }
 }
@@ -190,17 +310,17 @@ static void look_at_met(relating *r)
  * tell nothing more? */
 static bool side_is_told(const relating *r, int m, bool in)
 {
-    if (relation_mixed(r))
+    if (is_mixed(r))
         return in ? r->both : r->only[m];
     return in ? r->both && r->only[!m] : r->only[m];
 }
 
 /* Own faces of a subtree that meet none of the other model, as long as their patch may tell more.
  */
-static void look_through(relating *r, const ebpo_unmet_patches *u, uint64_t *done)
+static void look_through(relating *r, const unmet_patches *u, uint64_t *done)
 {
     for (uint64_t i = 0; i < u->count && goes_on(r); i++) {
-        if (relation_bit(r->met[u->m], u->first + i) || relation_bit(done, u->patch[i]))
+        if (has_bit(r->met[u->m], u->first + i) || has_bit(done, u->patch[i]))
             continue;
         r->told = false;
         (void)look_at(r, u->m, u->first + i);
@@ -216,9 +336,9 @@ static ebpo_status fail_bits(uint64_t count, ebpo_error *error)
     return ebpo_fail_memory(error, count / 8);
 }
 
-static void look_at_subtree(relating *r, ebpo_unmet_patches *u, uint64_t number)
+static void look_at_subtree(relating *r, unmet_patches *u, uint64_t number)
 {
-    r->status = ebpo_unmet_patches_find(u, number, r->met[u->m], r->error);
+    r->status = unmet_patches_find(u, number, r->met[u->m], r->error);
     if (r->status != EBPO_OK)
         return;
     uint64_t *done = make_bits(u->count);
@@ -230,26 +350,26 @@ static void look_at_subtree(relating *r, ebpo_unmet_patches *u, uint64_t number)
 }
 
 /* All faces of the subtree are on a side that has been told: it need not be loaded. */
-static bool is_settled(relating *r, const ebpo_unmet_patches *u, uint64_t number)
+static bool is_settled(relating *r, const unmet_patches *u, uint64_t number)
 {
     int in = -1;
     if (side_is_told(r, u->m, true) || side_is_told(r, u->m, false))
-        r->status = ebpo_unmet_patches_side(u, number, &in, r->error);
+        r->status = unmet_patches_side(u, number, &in, r->error);
     return in >= 0 && side_is_told(r, u->m, in);
 }
 
 static void look_at_patches(relating *r, int m)
 {
-    ebpo_unmet_patches u;
-    if (relation_mixed(r) && r->two.solid[m])
+    unmet_patches u;
+    if (is_mixed(r) && r->two.solid[m])
         return;
-    ebpo_unmet_patches_begin(&u, r->question, &r->two, m);
+    unmet_patches_begin(&u, r->question, &r->two, m);
     for (uint64_t i = 0; i < u.subtrees && goes_on(r); i++) {
         if (!is_settled(r, &u, i) && r->status == EBPO_OK)
             look_at_subtree(r, &u, i);
         r->open |= ebpo_collision_is_late(r->question);
     }
-    ebpo_unmet_patches_end(&u);
+    unmet_patches_end(&u);
 }
 
 /* --- common points of models that have no inner ones in common --- */
@@ -289,7 +409,7 @@ static ebpo_status find_touch(relating *r, ebpo_error *error)
     ebpo_status status = take_pairs(r, take_sound, error);
     uint64_t count = face_count(r, 0);
     for (uint64_t f = 0; f < count && status == EBPO_OK && !r->touch && !r->open; f++) {
-        if (relation_bit(r->met[0], f))
+        if (has_bit(r->met[0], f))
             status = ebpo_face_has_common_point(&r->two, 0, f, &r->touch, error);
         r->open |= ebpo_collision_is_late(r->question);
     }
@@ -303,7 +423,7 @@ static bool has_unmet_area(relating *r, int m)
     bool has = false;
     for (uint64_t f = 0; f < face_count(r, m) && r->status == EBPO_OK && !has; f++) {
         double t[3][3];
-        if (!relation_bit(r->met[m], f))
+        if (!has_bit(r->met[m], f))
             r->status = ebpo_two_models_face(&r->two, m, f, t, &has, r->error);
     }
     return has;
@@ -321,7 +441,7 @@ static void look_for_any(relating *r)
 {
     uint64_t count = face_count(r, 0);
     r->out->contact = count > 0;
-    if (relation_surfaces(r))
+    if (are_surfaces(r))
         r->both = r->touch = has_unmet_area(r, 0);
     for (uint64_t f = 0; f < count && goes_on(r) && !r->both; f++)
         (void)look_at(r, 0, f);
@@ -335,7 +455,7 @@ static ebpo_status look_at_first(relating *r, ebpo_error *error)
     ebpo_face_pair pair;
     ebpo_status status = ebpo_collide_first(q->collider, &options, &pair, &r->out->contact, error);
     r->open |= r->out->contact < 0;
-    if (status != EBPO_OK || r->out->contact != 1 || relation_surfaces(r))
+    if (status != EBPO_OK || r->out->contact != 1 || are_surfaces(r))
         return status;
     (void)look_at_pair(r, &pair);
     return r->status;
@@ -344,9 +464,9 @@ static ebpo_status look_at_first(relating *r, ebpo_error *error)
 static ebpo_status look_at_contacts(relating *r, ebpo_error *error)
 {
     ebpo_status status = take_pairs(r, take_contacts, error);
-    for (int m = 0; m < 2 && r->both && relation_surfaces(r) && goes_on(r); m++)
+    for (int m = 0; m < 2 && r->both && are_surfaces(r) && goes_on(r); m++)
         r->only[m] = has_unmet_area(r, m);
-    if (status == EBPO_OK && (r->both || !relation_surfaces(r)))
+    if (status == EBPO_OK && (r->both || !are_surfaces(r)))
         look_at_met(r);
     return status == EBPO_OK ? r->status : status;
 }
@@ -356,11 +476,11 @@ static ebpo_status gather_facts(relating *r, ebpo_error *error)
     ebpo_status status = look_at_first(r, error);
     if (status == EBPO_OK && r->out->contact == 1 && goes_on(r))
         status = look_at_contacts(r, error);
-    for (int m = 0; m < 2 && status == EBPO_OK && !relation_surfaces(r); m++) {
+    for (int m = 0; m < 2 && status == EBPO_OK && !are_surfaces(r); m++) {
         look_at_patches(r, m);
         status = r->status;
     }
-    if (status == EBPO_OK && !r->open && !r->both && !relation_surfaces(r) && r->out->contact == 1)
+    if (status == EBPO_OK && !r->open && !r->both && !are_surfaces(r) && r->out->contact == 1)
         status = find_touch(r, error);
     return status;
 }
@@ -370,42 +490,39 @@ static ebpo_relation relation_of(const relating *r)
 {
     if (r->open)
         return EBPO_RELATION_OPEN;
-    if (relation_surfaces(r))
+    if (are_surfaces(r))
         return !r->touch                    ? EBPO_DISJOINT
                : !r->both                   ? EBPO_TOUCHING
                : !r->only[0] && !r->only[1] ? EBPO_EQUAL
                                             : EBPO_INTERSECTING;
     for (int m = 0; m < 2; m++)
-        if (relation_mixed(r) && !r->two.solid[m] && !r->only[m] && (r->both || r->touch))
+        if (is_mixed(r) && !r->two.solid[m] && !r->only[m] && (r->both || r->touch))
             return m ? EBPO_B_INSIDE_A : EBPO_A_INSIDE_B;
     if (!r->both)
         return r->touch ? EBPO_TOUCHING : EBPO_DISJOINT;
-    if (relation_mixed(r) || (r->only[0] && r->only[1]))
+    if (is_mixed(r) || (r->only[0] && r->only[1]))
         return EBPO_INTERSECTING;
     return r->only[0] ? EBPO_B_INSIDE_A : r->only[1] ? EBPO_A_INSIDE_B : EBPO_EQUAL;
 }
 
-static ebpo_relation relation_turned(ebpo_relation r)
+static ebpo_relation turned_relation(ebpo_relation r)
 {
     return r == EBPO_A_INSIDE_B ? EBPO_B_INSIDE_A : r == EBPO_B_INSIDE_A ? EBPO_A_INSIDE_B : r;
 }
 
-static bool boxes_apart(const ebpo_two_models *two)
+static bool are_boxes_apart(const ebpo_two_models *two)
 {
     const double *a = two->model[0].box, *b = two->model[1].box;
-    for (int k = 0; k < 3; k++)
-        if (a[k] > b[3 + k] || b[k] > a[3 + k])
-            return true;
-    return false;
+    return ebpo_box_gap(a, a + 3, b, b + 3) > 0;
 }
 
-static ebpo_status relation_relate(relating *r, ebpo_error *error)
+static ebpo_status find_relation(relating *r, ebpo_error *error)
 {
     const ebpo_collision *q = r->question;
     ebpo_status status = ebpo_two_models_begin(&r->two, &r->places, error);
     if (status != EBPO_OK)
         return status;
-    r->out->contact = boxes_apart(&r->two) ? 0 : -1;
+    r->out->contact = are_boxes_apart(&r->two) ? 0 : -1;
     if (r->out->contact == 0)
         return EBPO_OK;
     for (int m = 0; m < 2; m++) {
@@ -429,7 +546,7 @@ static void count_loads(const relating *r, uint64_t bytes_told, uint64_t read_be
     c->bytes_read = bytes_told + ebpo_collision_bytes_read(r->question) - read_before;
 }
 
-static void relation_end(relating *r)
+static void end_relating(relating *r)
 {
     ebpo_two_models_end(&r->two);
     ebpo_pair_faces_end(&r->places);
@@ -452,10 +569,10 @@ ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *
     if (status != EBPO_OK)
         return status;
     uint64_t told = c->bytes_read, before = ebpo_collision_bytes_read(&q);
-    status = relation_relate(&r, error);
+    status = find_relation(&r, error);
     ebpo_relation relation = relation_of(&r);
-    out->relation = (int32_t)(q.turned ? relation_turned(relation) : relation);
+    out->relation = (int32_t)(q.turned ? turned_relation(relation) : relation);
     count_loads(&r, told, before);
-    relation_end(&r);
+    end_relating(&r);
     return status;
 }

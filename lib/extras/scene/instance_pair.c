@@ -17,7 +17,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "extras/collide/of_parts.h"
+#include "extras/collide/collider.h"
 #include "extras/scene/instance_pair.h"
 #include "geometry/pose.h"
 

@@ -20,9 +20,8 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "extras/collide/contact.h"
-#include "extras/collide/contacts.h"
-#include "extras/collide/pair_distance.h"
+#include "extras/collide/face_pairs.h"
+#include "extras/collide/pair_faces.h"
 #include "extras/scene/instance_pair.h"
 
 /* Two instances at their poses. */

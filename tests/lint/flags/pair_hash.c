@@ -7,9 +7,7 @@
 #include <stdio.h>
 
 #include "exact_twin.h"
-#include "extras/collide/contact.h"
-#include "extras/collide/pair_distance.h"
-#include "extras/collide/pair_filter.h"
+#include "extras/collide/face_pairs.h"
 #include "geometry/pose.h"
 #include "geometry/triangle_pair.h"
 #include "pair_twin.h"

@@ -1,11 +1,11 @@
 /* Meshes in a PLY file for looking at, with faces that matter in red. */
-#ifndef EBPO_COLLIDE_COLLIDE_WRITE_H
-#define EBPO_COLLIDE_COLLIDE_WRITE_H
+#ifndef EBPO_COLLIDE_RED_MESH_H
+#define EBPO_COLLIDE_RED_MESH_H
 
 #include <ebpo/mesh.h>
 
-#include "geometry/pose.h"
 #include "io/publish.h"
+#include "geometry/pose.h"
 
 /* Where a mesh comes from: a vertex, and the corners of a face, asked for in ascending order. */
 typedef struct ebpo_red_source {

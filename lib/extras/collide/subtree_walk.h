@@ -1,6 +1,6 @@
 /* All pairs of faces that meet, of models that are loaded in parts: the same as of whole ones. */
-#ifndef EBPO_COLLIDE_SUBTREE_PAIRS_H
-#define EBPO_COLLIDE_SUBTREE_PAIRS_H
+#ifndef EBPO_COLLIDE_SUBTREE_WALK_H
+#define EBPO_COLLIDE_SUBTREE_WALK_H
 
 #include "extras/collide/collider.h"
 

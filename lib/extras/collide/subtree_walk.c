@@ -1,3 +1,14 @@
+/* All pairs of intersecting faces of models that are loaded in parts, with the same result as of
+ * whole models.
+ *
+ * Two faces with a common point are listed by the subtrees whose cells hold that point, so it
+ * suffices to search pairs of subtrees whose envelopes may touch. These pairs are found before a
+ * subtree is loaded, and sorted so that a loaded subtree is soon used again. Several threads
+ * search pairs of subtrees. A face that several subtrees list is found more than once, so pairs
+ * wait, are sorted and made unique, and are given in order as soon as no earlier one can come.
+ *
+ * When too many wait for the collider's memory, pairs of the first model's later faces are dropped
+ * and found again in another round. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -9,46 +20,43 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "extras/collide/collider.h"
-#include "extras/collide/subtree_pairs.h"
+#include "extras/collide/subtree_walk.h"
 #include "extras/collide/posed_subtrees.h"
 #include "geometry/vec3.h"
 
-/* Which subtrees of two models may have faces that meet, before any of them is loaded. */
-
-typedef struct ebpo_subtree_pair {
+/* Subtrees that may have faces that intersect. */
+typedef struct subtree_pair {
     uint32_t a, b;
     uint32_t rank_a, rank_b; /* in the order of the files' faces */
     double apart;            /* distance of their middles over the sum of their sizes */
-} ebpo_subtree_pair;
+} subtree_pair;
 
-typedef struct ebpo_subtree_pairs {
-    ebpo_subtree_pair *pair;
+typedef struct subtree_pairs {
+    subtree_pair *pair;
     uint64_t count, capacity;
     uint64_t subtrees[2]; /* different ones of each model */
-} ebpo_subtree_pairs;
-
-/* Faces that meet in two subtrees, which are loaded for it. One thread each. */
+} subtree_pairs;
 
 /* Faces that meet, with their numbers: [0] of the question's first model. */
-typedef struct ebpo_told_pair {
+typedef struct told_pair {
     uint32_t file[2], source[2];
     int32_t kind;
-} ebpo_told_pair;
+} told_pair;
 
 /* Zero at first. Its contexts hold the two subtrees that it has come to last. */
-typedef struct ebpo_subtree_walk {
+typedef struct subtree_walk {
     const ebpo_collision *question;
     bool self;
     ebpo_context *context[2]; /* of models that are in parts */
     ebpo_pair_walk walk;
-    ebpo_told_pair *told; /* of the last pair, in no order; no face with itself */
+    told_pair *told; /* of the last pair, in no order; no face with itself */
     uint64_t count, capacity;
     uint64_t first_end; /* faces that the first's subtree lists have lesser numbers */
     bool late;          /* the deadline has passed before all was found */
-} ebpo_subtree_walk;
+} subtree_walk;
 
 typedef struct finding {
-    ebpo_subtree_pairs *out;
+    subtree_pairs *out;
     ebpo_posed_subtrees *side[2];
     double reach;
     bool self;
@@ -90,14 +98,14 @@ static bool is_pruned(const ebpo_posed_subtrees *s, uint32_t number)
     return !s->model->whole && s->model->top->below[number].pruned;
 }
 
-static ebpo_status pairs_add(const finding *f, const ebpo_posed_node node[2])
+static ebpo_status add_subtree_pair(const finding *f, const ebpo_posed_node node[2])
 {
     uint32_t a = ebpo_entry_value(node[0].entry), b = ebpo_entry_value(node[1].entry);
     ebpo_convex convex[2];
     double slack = slack_of(f, node);
     if (is_pruned(f->side[0], a) || is_pruned(f->side[1], b))
         return EBPO_OK; /* what it had is not in this file */
-    ebpo_subtree_pair pair = { a, b, f->side[0]->rank[a], f->side[1]->rank[b], apart_of(f, node) };
+    subtree_pair pair = { a, b, f->side[0]->rank[a], f->side[1]->rank[b], apart_of(f, node) };
     if (f->self && pair.rank_a > pair.rank_b)
         return EBPO_OK;
     ebpo_status status = ebpo_posed_envelope(f->side[0], node[0].cell, &convex[0], f->error);
@@ -105,7 +113,7 @@ static ebpo_status pairs_add(const finding *f, const ebpo_posed_node node[2])
         status = ebpo_posed_envelope(f->side[1], node[1].cell, &convex[1], f->error);
     if (status != EBPO_OK || ebpo_convex_gap(&convex[0], &convex[1], slack) > slack)
         return status;
-    ebpo_subtree_pairs *out = f->out;
+    subtree_pairs *out = f->out;
     if (!ebpo_grow(&out->pair, &out->capacity, out->count + 1, sizeof *out->pair))
         return ebpo_fail_memory(f->error, (out->count + 1) * sizeof *out->pair);
     out->pair[out->count++] = pair;
@@ -114,7 +122,7 @@ static ebpo_status pairs_add(const finding *f, const ebpo_posed_node node[2])
 
 /* --- the descent --- */
 
-static ebpo_status pairs_descend(const finding *f, const ebpo_posed_node node[2])
+static ebpo_status descend_pair(const finding *f, const ebpo_posed_node node[2])
 {
     bool below[2];
     for (int i = 0; i < 2; i++) {
@@ -125,7 +133,7 @@ static ebpo_status pairs_descend(const finding *f, const ebpo_posed_node node[2]
     if (cells_apart(f, node))
         return EBPO_OK;
     if (below[0] && below[1])
-        return pairs_add(f, node);
+        return add_subtree_pair(f, node);
     bool larger = ebpo_posed_diagonal(f->side[0], node[0].cell) >=
                   ebpo_posed_diagonal(f->side[1], node[1].cell);
     int down = below[0] ? 1 : below[1] ? 0 : larger ? 0 : 1;
@@ -133,7 +141,7 @@ static ebpo_status pairs_descend(const finding *f, const ebpo_posed_node node[2]
     ebpo_status status = EBPO_OK;
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
         part[down] = ebpo_posed_child(f->side[down], &node[down], octant);
-        status = pairs_descend(f, part);
+        status = descend_pair(f, part);
     }
     return status;
 }
@@ -142,22 +150,22 @@ static ebpo_status pairs_descend(const finding *f, const ebpo_posed_node node[2]
 
 static int by_places(const void *x, const void *y)
 {
-    const ebpo_subtree_pair *p = x, *q = y;
+    const subtree_pair *p = x, *q = y;
     if (p->rank_a != q->rank_a)
         return p->rank_a < q->rank_a ? -1 : 1;
     return (p->rank_b > q->rank_b) - (p->rank_b < q->rank_b);
 }
 
-static void turn_round(ebpo_subtree_pair *pair, uint64_t count)
+static void turn_round(subtree_pair *pair, uint64_t count)
 {
     for (uint64_t i = 0; i < count / 2; i++) {
-        ebpo_subtree_pair other = pair[i];
+        subtree_pair other = pair[i];
         pair[i] = pair[count - 1 - i];
         pair[count - 1 - i] = other;
     }
 }
 
-static void sort_back_and_forth(ebpo_subtree_pairs *p)
+static void sort_back_and_forth(subtree_pairs *p)
 {
     if (p->count)
         qsort(p->pair, p->count, sizeof *p->pair, by_places);
@@ -169,7 +177,7 @@ static void sort_back_and_forth(ebpo_subtree_pairs *p)
     }
 }
 
-static ebpo_status count_seconds(ebpo_subtree_pairs *p, uint64_t most, ebpo_error *error)
+static ebpo_status count_seconds(subtree_pairs *p, uint64_t most, ebpo_error *error)
 {
     bool *seen = ebpo_alloc_zero(most, sizeof *seen);
     if (!seen)
@@ -187,14 +195,14 @@ static ebpo_status count_seconds(ebpo_subtree_pairs *p, uint64_t most, ebpo_erro
  * back and forth in the second's, so that what was loaded is used again soon. `self`: both are one
  * model at one pose; each pair once, the first's place not behind the second's. Freed by the
  * caller (`pair`), also after a failure. */
-static ebpo_status ebpo_subtree_pairs_find(ebpo_subtree_pairs *out, ebpo_posed_subtrees *a,
-                                           ebpo_posed_subtrees *b, double reach, bool self,
-                                           ebpo_error *error)
+static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a,
+                                      ebpo_posed_subtrees *b, double reach, bool self,
+                                      ebpo_error *error)
 {
     finding f = { out, { a, b }, reach, self, error };
     ebpo_posed_node root[2] = { ebpo_posed_subtree_root(a), ebpo_posed_subtree_root(b) };
-    *out = (ebpo_subtree_pairs){ .count = 0 };
-    ebpo_status status = pairs_descend(&f, root);
+    *out = (subtree_pairs){ .count = 0 };
+    ebpo_status status = descend_pair(&f, root);
     if (status != EBPO_OK)
         return status;
     sort_back_and_forth(out);
@@ -203,21 +211,21 @@ static ebpo_status ebpo_subtree_pairs_find(ebpo_subtree_pairs *out, ebpo_posed_s
 
 static int by_nearness(const void *x, const void *y)
 {
-    const ebpo_subtree_pair *p = x, *q = y;
+    const subtree_pair *p = x, *q = y;
     if (p->apart != q->apart)
         return p->apart < q->apart ? -1 : 1;
     return by_places(x, y);
 }
 
 /* By `apart`, the least first. */
-static void ebpo_subtree_pairs_nearest_first(ebpo_subtree_pairs *p)
+static void sort_nearest_first(subtree_pairs *p)
 {
     if (p->count)
         qsort(p->pair, p->count, sizeof *p->pair, by_nearness);
 }
 
-static ebpo_status ebpo_subtree_walk_begin(ebpo_subtree_walk *w, const ebpo_collision *question,
-                                           bool self, ebpo_error *error)
+static ebpo_status subtree_walk_begin(subtree_walk *w, const ebpo_collision *question, bool self,
+                                      ebpo_error *error)
 {
     w->question = question;
     w->self = self;
@@ -231,7 +239,7 @@ static ebpo_status ebpo_subtree_walk_begin(ebpo_subtree_walk *w, const ebpo_coll
 }
 
 /* Subtrees that it had to load. */
-static uint64_t ebpo_subtree_walk_loads(const ebpo_subtree_walk *w)
+static uint64_t subtree_walk_loads(const subtree_walk *w)
 {
     uint64_t loads = 0;
     for (int i = 0; i < 2; i++)
@@ -240,13 +248,13 @@ static uint64_t ebpo_subtree_walk_loads(const ebpo_subtree_walk *w)
 }
 
 /* Others may have the room of its subtrees. */
-static void ebpo_subtree_walk_let_go(ebpo_subtree_walk *w)
+static void subtree_walk_let_go(subtree_walk *w)
 {
     for (int i = 0; i < 2; i++)
         ebpo_context_let_go(w->context[i]);
 }
 
-static void ebpo_subtree_walk_free(ebpo_subtree_walk *w)
+static void subtree_walk_free(subtree_walk *w)
 {
     for (int i = 0; i < 2; i++)
         ebpo_context_free(w->context[i]);
@@ -254,15 +262,15 @@ static void ebpo_subtree_walk_free(ebpo_subtree_walk *w)
     free(w->told);
 }
 
-static int ebpo_told_pair_compare(const void *x, const void *y)
+static int compare_told_pairs(const void *x, const void *y)
 {
-    const ebpo_told_pair *p = x, *q = y;
+    const told_pair *p = x, *q = y;
     if (p->file[0] != q->file[0])
         return p->file[0] < q->file[0] ? -1 : 1;
     return (p->file[1] > q->file[1]) - (p->file[1] < q->file[1]);
 }
 
-static ebpo_face_pair ebpo_told_pair_tell(const ebpo_collision *q, const ebpo_told_pair *t)
+static ebpo_face_pair tell_told_pair(const ebpo_collision *q, const told_pair *t)
 {
     int a = q->turned, b = !q->turned;
     return (ebpo_face_pair){ t->source[a], t->source[b], t->file[a], t->file[b], t->kind, 0 };
@@ -270,8 +278,8 @@ static ebpo_face_pair ebpo_told_pair_tell(const ebpo_collision *q, const ebpo_to
 
 /* --- one pair --- */
 
-static ebpo_status walk_load(ebpo_subtree_walk *w, int side, uint32_t number,
-                             const ebpo_accel **out, ebpo_error *error)
+static ebpo_status load_subtree(subtree_walk *w, int side, uint32_t number, const ebpo_accel **out,
+                                ebpo_error *error)
 {
     ebpo_accel *loaded = w->question->model[side]->whole;
     ebpo_status status =
@@ -280,15 +288,14 @@ static ebpo_status walk_load(ebpo_subtree_walk *w, int side, uint32_t number,
     return status;
 }
 
-static ebpo_status walk_tell(ebpo_subtree_walk *w, const ebpo_accel *const accel[2],
-                             ebpo_error *error)
+static ebpo_status tell_pairs(subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
 {
     const ebpo_pair_walk *found = &w->walk;
     if (!ebpo_grow(&w->told, &w->capacity, found->met_count, sizeof *w->told))
         return ebpo_fail_memory(error, found->met_count * sizeof *w->told);
     for (uint64_t i = 0; i < found->met_count; i++) {
         uint32_t local[2] = { found->met[i].a, found->met[i].b };
-        ebpo_told_pair t = { .kind = found->met[i].kind };
+        told_pair t = { .kind = found->met[i].kind };
         for (int side = 0; side < 2; side++) {
             t.file[side] = (uint32_t)ebpo_accel_file_face(accel[side], local[side]);
             t.source[side] = (uint32_t)ebpo_accel_source_face(accel[side], local[side]);
@@ -296,7 +303,7 @@ static ebpo_status walk_tell(ebpo_subtree_walk *w, const ebpo_accel *const accel
         if (w->self && t.file[0] == t.file[1])
             continue;
         if (w->self && t.file[0] > t.file[1])
-            t = (ebpo_told_pair){ { t.file[1], t.file[0] }, { t.source[1], t.source[0] }, t.kind };
+            t = (told_pair){ { t.file[1], t.file[0] }, { t.source[1], t.source[0] }, t.kind };
         w->told[w->count++] = t;
     }
     return EBPO_OK;
@@ -307,8 +314,7 @@ static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
     return ebpo_fail_memory(error, (w->capacity + 64) * sizeof *w->stack);
 }
 
-static ebpo_status walk_down(ebpo_subtree_walk *w, const ebpo_accel *const accel[2],
-                             ebpo_error *error)
+static ebpo_status walk_down(subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
 {
     const ebpo_collision *q = w->question;
     const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
@@ -329,20 +335,19 @@ static ebpo_status walk_down(ebpo_subtree_walk *w, const ebpo_accel *const accel
         if ((w->late = ebpo_collision_is_late(q)))
             return EBPO_OK;
     }
-    return walk_tell(w, accel, error);
+    return tell_pairs(w, accel, error);
 }
 
 /* Fills in what has been found. */
-static ebpo_status ebpo_subtree_walk_pair(ebpo_subtree_walk *w, const ebpo_subtree_pair *pair,
-                                          ebpo_error *error)
+static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
     w->count = 0;
-    ebpo_status status = walk_load(w, 0, pair->a, &accel[0], error);
+    ebpo_status status = load_subtree(w, 0, pair->a, &accel[0], error);
     if (status == EBPO_OK && w->self && pair->a == pair->b)
         accel[1] = accel[0];
     else if (status == EBPO_OK)
-        status = walk_load(w, 1, pair->b, &accel[1], error);
+        status = load_subtree(w, 1, pair->b, &accel[1], error);
     if (status != EBPO_OK)
         return status;
     w->first_end = accel[0]->first_face + (accel[0]->face_count - accel[0]->outer_count);
@@ -351,10 +356,7 @@ static ebpo_status ebpo_subtree_walk_pair(ebpo_subtree_walk *w, const ebpo_subtr
     return walk_down(w, accel, error);
 }
 
-/* Pairs of subtrees are gone through once, each finds its pairs of faces. A face that several
- * subtrees list is met more than once, and pairs come in any order, so they wait, sorted now and
- * then. When they are too many for the collider's memory, those of the first model's later faces
- * are dropped, and found again when the others have been given. */
+/* --- waiting pairs --- */
 
 static const char stage[] = "pairs of subtrees";
 
@@ -365,21 +367,21 @@ typedef struct gathering_parts {
     const ebpo_collision *question;
     bool self;
     ebpo_posed_subtrees subtrees[2];
-    ebpo_subtree_pairs pairs;
+    subtree_pairs pairs;
     uint64_t *end; /* of each of the first's subtrees: its faces are before; 0: not known yet */
-    ebpo_subtree_walk *walk; /* one for each thread */
+    subtree_walk *walk; /* one for each thread */
     unsigned threads;
     uint64_t read_before;
     pthread_mutex_t lock; /* for what follows */
     uint64_t from, to;    /* faces of the first model that matter now */
-    ebpo_told_pair *told;
+    told_pair *told;
     uint64_t count, capacity;
     uint64_t most; /* that wait */
 } gathering_parts;
 
-static void gather_parts_count(const gathering_parts *g, ebpo_subtree_walk *w)
+static void count_walk(const gathering_parts *g, subtree_walk *w)
 {
-    g->question->collider->loads += ebpo_subtree_walk_loads(w);
+    g->question->collider->loads += subtree_walk_loads(w);
     ebpo_collider_count(g->question->collider, &w->walk);
 }
 
@@ -389,9 +391,9 @@ static void sort_once(gathering_parts *g)
 {
     uint64_t kept = 0;
     if (g->count)
-        qsort(g->told, g->count, sizeof *g->told, ebpo_told_pair_compare);
+        qsort(g->told, g->count, sizeof *g->told, compare_told_pairs);
     for (uint64_t i = 0; i < g->count; i++)
-        if (kept == 0 || ebpo_told_pair_compare(&g->told[kept - 1], &g->told[i]) != 0)
+        if (kept == 0 || compare_told_pairs(&g->told[kept - 1], &g->told[i]) != 0)
             g->told[kept++] = g->told[i];
     g->count = kept;
 }
@@ -413,8 +415,7 @@ static void make_room(gathering_parts *g)
         g->most = 2 * g->count;
 }
 
-static ebpo_status gather_parts_hold(gathering_parts *g, const ebpo_subtree_walk *w,
-                                     ebpo_error *error)
+static ebpo_status hold_pairs(gathering_parts *g, const subtree_walk *w, ebpo_error *error)
 {
     for (uint64_t i = 0; i < w->count; i++) {
         if (w->told[i].file[0] < g->from || w->told[i].file[0] >= g->to)
@@ -433,7 +434,7 @@ static ebpo_status gather_parts_hold(gathering_parts *g, const ebpo_subtree_walk
 /* --- going through --- */
 
 /* All faces that its first subtree lists have been given. */
-static bool is_done(gathering_parts *g, const ebpo_subtree_pair *pair)
+static bool is_done(gathering_parts *g, const subtree_pair *pair)
 {
     (void)pthread_mutex_lock(&g->lock);
     uint64_t end = g->end[pair->a];
@@ -441,12 +442,12 @@ static bool is_done(gathering_parts *g, const ebpo_subtree_pair *pair)
     return end && end <= g->from;
 }
 
-static ebpo_status gather_parts_keep(gathering_parts *g, const ebpo_subtree_pair *pair,
-                                     const ebpo_subtree_walk *w, ebpo_error *error)
+static ebpo_status keep_pairs(gathering_parts *g, const subtree_pair *pair, const subtree_walk *w,
+                              ebpo_error *error)
 {
     (void)pthread_mutex_lock(&g->lock);
     g->end[pair->a] = w->first_end;
-    ebpo_status status = gather_parts_hold(g, w, error);
+    ebpo_status status = hold_pairs(g, w, error);
     (void)pthread_mutex_unlock(&g->lock);
     return status;
 }
@@ -455,14 +456,14 @@ static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned 
                              ebpo_error *error)
 {
     gathering_parts *g = user;
-    ebpo_subtree_walk *w = &g->walk[worker];
+    subtree_walk *w = &g->walk[worker];
     for (uint64_t i = begin; i < end; i++) {
-        const ebpo_subtree_pair *pair = &g->pairs.pair[i];
+        const subtree_pair *pair = &g->pairs.pair[i];
         if (is_done(g, pair))
             continue;
-        ebpo_status status = ebpo_subtree_walk_pair(w, pair, error);
+        ebpo_status status = subtree_walk_pair(w, pair, error);
         if (status == EBPO_OK)
-            status = gather_parts_keep(g, pair, w, error);
+            status = keep_pairs(g, pair, w, error);
         if (status != EBPO_OK)
             return status;
         if (w->late || ebpo_collision_is_late(g->question))
@@ -486,8 +487,8 @@ static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
         return status;
     }
     for (unsigned i = 1; i < g->threads; i++) {
-        gather_parts_count(g, &g->walk[i]);
-        ebpo_subtree_walk_free(&g->walk[i]);
+        count_walk(g, &g->walk[i]);
+        subtree_walk_free(&g->walk[i]);
     }
     g->threads = 1;
     g->count = 0;
@@ -499,15 +500,15 @@ static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
 enum { GIVEN_AT_ONCE = 1024 };
 
 /* False: enough. */
-static bool gather_parts_give(const gathering_parts *g, ebpo_pairs_fn take, void *user)
+static bool give_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *user)
 {
     ebpo_face_pair out[GIVEN_AT_ONCE];
     for (unsigned i = 0; i < g->threads; i++) /* who takes them may want the room */
-        ebpo_subtree_walk_let_go(&g->walk[i]);
+        subtree_walk_let_go(&g->walk[i]);
     for (uint64_t at = 0; at < g->count; at += GIVEN_AT_ONCE) {
         uint64_t n = g->count - at < GIVEN_AT_ONCE ? g->count - at : GIVEN_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
-            out[i] = ebpo_told_pair_tell(g->question, &g->told[at + i]);
+            out[i] = tell_told_pair(g->question, &g->told[at + i]);
         if (!take(user, out, n))
             return false;
     }
@@ -525,7 +526,7 @@ static ebpo_status in_passes(gathering_parts *g, ebpo_pairs_fn take, void *user,
         if (status != EBPO_OK)
             return status;
         sort_once(g);
-        if (!gather_parts_give(g, take, user))
+        if (!give_waiting(g, take, user))
             return EBPO_OK;
     }
     return EBPO_OK;
@@ -533,7 +534,7 @@ static ebpo_status in_passes(gathering_parts *g, ebpo_pairs_fn take, void *user,
 
 /* --- both questions --- */
 
-static ebpo_status gather_parts_begin(gathering_parts *g, unsigned threads, ebpo_error *error)
+static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_error *error)
 {
     const ebpo_collision *q = g->question;
     ebpo_status status = EBPO_OK;
@@ -546,10 +547,10 @@ static ebpo_status gather_parts_begin(gathering_parts *g, unsigned threads, ebpo
         status =
             ebpo_posed_subtrees_make(&g->subtrees[i], q->model[i], &q->posing[i].posing, error);
     for (unsigned i = 0; i < threads && status == EBPO_OK; i++)
-        status = ebpo_subtree_walk_begin(&g->walk[i], q, g->self, error);
+        status = subtree_walk_begin(&g->walk[i], q, g->self, error);
     if (status == EBPO_OK)
-        status = ebpo_subtree_pairs_find(&g->pairs, &g->subtrees[0], &g->subtrees[1], q->reach,
-                                         g->self, error);
+        status = find_subtree_pairs(&g->pairs, &g->subtrees[0], &g->subtrees[1], q->reach, g->self,
+                                    error);
     if (status != EBPO_OK)
         return status;
     q->collider->subtree_pairs += g->pairs.count;
@@ -558,12 +559,12 @@ static ebpo_status gather_parts_begin(gathering_parts *g, unsigned threads, ebpo
     return g->end ? EBPO_OK : ebpo_fail_memory(error, g->subtrees[0].count * sizeof *g->end);
 }
 
-static void gather_parts_end(gathering_parts *g)
+static void end_gathering(gathering_parts *g)
 {
     g->question->collider->bytes_read += ebpo_collision_bytes_read(g->question) - g->read_before;
     for (unsigned i = 0; i < g->threads; i++) {
-        gather_parts_count(g, &g->walk[i]);
-        ebpo_subtree_walk_free(&g->walk[i]);
+        count_walk(g, &g->walk[i]);
+        subtree_walk_free(&g->walk[i]);
     }
     for (int i = 0; i < 2; i++)
         ebpo_posed_subtrees_free(&g->subtrees[i]);
@@ -580,29 +581,29 @@ ebpo_status ebpo_gather_parts(const ebpo_collision *q, bool self, ebpo_pairs_fn 
     gathering_parts g = { .question = q, .self = self };
     (void)pthread_mutex_init(&g.lock, NULL);
     ebpo_status status =
-        gather_parts_begin(&g, ebpo_thread_count(q->collider->options.threads), error);
+        begin_gathering(&g, ebpo_thread_count(q->collider->options.threads), error);
     if (status == EBPO_OK)
         status = in_passes(&g, take, user, error);
-    gather_parts_end(&g);
+    end_gathering(&g);
     return status;
 }
 
 /* The least of the pairs of faces that the first two subtrees have which have any. */
-static ebpo_status gather_parts_search(gathering_parts *g, ebpo_face_pair *out, int32_t *found,
-                                       ebpo_error *error)
+static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, int32_t *found,
+                                      ebpo_error *error)
 {
     const ebpo_collision *q = g->question;
-    ebpo_subtree_walk *w = &g->walk[0];
+    subtree_walk *w = &g->walk[0];
     for (uint64_t i = 0; i < g->pairs.count; i++) {
-        ebpo_status status = ebpo_subtree_walk_pair(w, &g->pairs.pair[i], error);
+        ebpo_status status = subtree_walk_pair(w, &g->pairs.pair[i], error);
         if (status != EBPO_OK)
             return status;
         *found = w->late || ebpo_collision_is_late(q) ? -1 : w->count > 0;
         if (*found < 0)
             return EBPO_OK;
         if (*found) {
-            qsort(w->told, w->count, sizeof *w->told, ebpo_told_pair_compare);
-            *out = ebpo_told_pair_tell(q, &w->told[0]);
+            qsort(w->told, w->count, sizeof *w->told, compare_told_pairs);
+            *out = tell_told_pair(q, &w->told[0]);
             return EBPO_OK;
         }
         if (!ebpo_progress_step(&q->options.progress, stage, i, g->pairs.count, error))
@@ -616,11 +617,11 @@ ebpo_status ebpo_first_of_parts(const ebpo_collision *q, ebpo_face_pair *out, in
 {
     gathering_parts g = { .question = q };
     (void)pthread_mutex_init(&g.lock, NULL);
-    ebpo_status status = gather_parts_begin(&g, 1, error);
+    ebpo_status status = begin_gathering(&g, 1, error);
     if (status == EBPO_OK) {
-        ebpo_subtree_pairs_nearest_first(&g.pairs);
-        status = gather_parts_search(&g, out, found, error);
+        sort_nearest_first(&g.pairs);
+        status = search_first_parts(&g, out, found, error);
     }
-    gather_parts_end(&g);
+    end_gathering(&g);
     return status;
 }

@@ -1,3 +1,9 @@
+/* The faces of pairs, looked up by their numbers in the file, and where crossing ones intersect.
+ *
+ * A whole model is in memory: its slots say where in the blocks each face is. Faces of a model in
+ * parts are read through the cache of chunks. A pair is posed by ebpo_posing_apply, as in all
+ * exact tests. ebpo_collide_contacts returns the segments of all crossing pairs in the order of
+ * pairs. One thread. */
 #include "core/strict_fp.h"
 
 #include <string.h>
@@ -5,8 +11,8 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
-#include "extras/collide/contact.h"
-#include "extras/collide/contacts.h"
+#include "extras/collide/face_pairs.h"
+#include "extras/collide/pair_faces.h"
 
 uint32_t *ebpo_face_slots(const ebpo_accel *subtree)
 {
@@ -85,9 +91,10 @@ ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face, dou
     return status;
 }
 
-/* Contact segments of all crossing pairs, in the order of pairs. */
+/* --- contact segments --- */
 
-ebpo_status ebpo_collider_slots(ebpo_collider *c, ebpo_error *error)
+/* Slots of those models that are in memory, once for a collider. EBPO_E_MEMORY. */
+static ebpo_status make_slots(ebpo_collider *c, ebpo_error *error)
 {
     for (int i = 0; i < 2; i++) {
         if (!c->model[i]->whole)
@@ -104,7 +111,7 @@ ebpo_status ebpo_pair_faces_begin(ebpo_pair_faces *f, const ebpo_collision *q, e
 {
     ebpo_collider *c = q->collider;
     f->question = q;
-    ebpo_status status = ebpo_collider_slots(c, error);
+    ebpo_status status = make_slots(c, error);
     for (int i = 0; i < 2 && status == EBPO_OK; i++)
         ebpo_faces_by_number_begin(&f->side[i], c->model[i], c->slots[i]);
     return status;
@@ -155,7 +162,7 @@ typedef struct telling {
     ebpo_status status;
 } telling;
 
-static bool contacts_tell(void *user, const ebpo_face_pair *pairs, uint64_t count)
+static bool give_segments(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     telling *t = user;
     ebpo_contact_segment out[SEGMENTS_AT_ONCE];
@@ -187,7 +194,7 @@ ebpo_status ebpo_collide_contacts(ebpo_collider *c, const ebpo_collide_options *
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&t.faces, &q, error);
     if (status == EBPO_OK)
-        status = ebpo_collide_all(c, options, contacts_tell, &t, error);
+        status = ebpo_collide_all(c, options, give_segments, &t, error);
     ebpo_pair_faces_end(&t.faces);
     return status == EBPO_OK ? t.status : status;
 }

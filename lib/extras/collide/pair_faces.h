@@ -1,13 +1,14 @@
-/* Where the faces of a subtree, or of a whole model, are in its blocks. Any thread. */
-#ifndef EBPO_COLLIDE_CONTACTS_H
-#define EBPO_COLLIDE_CONTACTS_H
+/* The faces of pairs by their numbers in the file, at their poses, and where crossing ones
+ * intersect. */
+#ifndef EBPO_COLLIDE_PAIR_FACES_H
+#define EBPO_COLLIDE_PAIR_FACES_H
 
 #include "extras/collide/collider.h"
 #include "query/accel.h"
 #include "query/query_model.h"
 
-/* Slots by local numbers, which in a whole model are those in the file. NULL: no memory. The caller
- * frees it. */
+/* Returns where the faces of a subtree, or of a whole model, are in its blocks: slots by local
+ * numbers, which in a whole model are those in the file. NULL: no memory. The caller frees it. */
 uint32_t *ebpo_face_slots(const ebpo_accel *subtree);
 
 /* Corners of single faces by their numbers in the file: of a whole model from its blocks, of one in
@@ -15,7 +16,7 @@ uint32_t *ebpo_face_slots(const ebpo_accel *subtree);
 
 typedef struct ebpo_faces_by_number {
     const ebpo_model *model;
-    const uint32_t *slots;           /* of a whole model: face_slots.h; else NULL */
+    const uint32_t *slots;           /* of a whole model: ebpo_face_slots; else NULL */
     ebpo_held_chunk faces, vertices; /* where the last ones were */
 } ebpo_faces_by_number;
 
@@ -32,8 +33,6 @@ EBPO_MUST_USE ebpo_status ebpo_faces_by_number_vertex(ebpo_faces_by_number *f, u
 /* Lets go of what it holds; zero is fine. */
 void ebpo_faces_by_number_end(ebpo_faces_by_number *f);
 
-/* Where crossing faces meet, as callers are told. */
-
 /* A pair with its faces, of the caller's A and B: as in the files, and at their poses. */
 typedef struct ebpo_posed_pair {
     double own[2][3][3], corner[2][3][3];
@@ -44,9 +43,6 @@ typedef struct ebpo_pair_faces {
     const ebpo_collision *question;
     ebpo_faces_by_number side[2]; /* of the caller's A and B */
 } ebpo_pair_faces;
-
-/* Slots of those models that are in memory, once for a collider. EBPO_E_MEMORY. */
-EBPO_MUST_USE ebpo_status ebpo_collider_slots(ebpo_collider *collider, ebpo_error *error);
 
 /* Ended also after a failure; zero is fine. */
 EBPO_MUST_USE ebpo_status ebpo_pair_faces_begin(ebpo_pair_faces *f, const ebpo_collision *question,

@@ -1,9 +1,13 @@
-/* Cells of an octree of the world, with what is known of them. */
-#ifndef EBPO_BOOLEAN_BOOLEAN_CELLS_H
-#define EBPO_BOOLEAN_BOOLEAN_CELLS_H
+/* Cells of an octree of the world, and whether a cube is inside or outside of a solid at a pose. */
+#ifndef EBPO_BOOLEAN_WORLD_CELL_H
+#define EBPO_BOOLEAN_WORLD_CELL_H
 
 #include "extras/boolean/boolean.h"
+#include "extras/collide/posed_solid.h"
 #include "geometry/cells.h"
+
+/* What has decided. */
+enum { EBPO_CUBE_BY_BOX, EBPO_CUBE_BY_NODES, EBPO_CUBE_BY_FACES, EBPO_CUBE_WAYS };
 
 /* The root: corners and centres of cells down to `level` are exact. */
 typedef struct ebpo_world {

@@ -1,7 +1,8 @@
-/* Blocks of faces at a pose, as the floats that the filter of pairs takes, with proved errors
- * (docs/develop/collision.md, "From blocks to the filter"). Pure functions, any thread. */
-#ifndef EBPO_COLLIDE_POSED_BLOCK_H
-#define EBPO_COLLIDE_POSED_BLOCK_H
+/* Models at poses in floats, with proved errors: blocks of faces as the filter of pairs takes
+ * them, and two models' frames seen from each other (docs/develop/collision.md, "From blocks to
+ * the filter" and "Going down two hierarchies"). Pure functions, any thread. */
+#ifndef EBPO_COLLIDE_POSED_FRAMES_H
+#define EBPO_COLLIDE_POSED_FRAMES_H
 
 #include <stdbool.h>
 
@@ -59,8 +60,53 @@ void ebpo_posed_block_make_wide(ebpo_posed_block *out, const ebpo_block_posing *
 float ebpo_posed_block_place(const ebpo_posed_block *b, double unit, const double origin[3],
                              float out[3][EBPO_POSED_VERTICES]);
 
-/* How two models' frames lie to each other at their poses: what boxes and slabs of one are seen as
- * from the other, in floats. Pure functions, any thread. */
+/* Eight faces of a block as the kernels of pairs take them, seen from `base`. */
+typedef struct ebpo_posed_faces {
+    _Alignas(32) float x[9][8]; /* 3 corner + axis */
+    double base[3];             /* posed coordinates of the block's first vertex */
+    float error, reach;         /* as in ebpo_posed_block */
+    uint32_t block;             /* EBPO_NO_CHILD: none is here */
+    uint8_t lanes;
+} ebpo_posed_faces;
+
+/* Of each model so many are kept. */
+enum { EBPO_POSED_FACES = 32 };
+
+static inline void ebpo_posed_faces_forget(ebpo_posed_faces faces[2][EBPO_POSED_FACES])
+{
+    for (int i = 0; i < 2 * EBPO_POSED_FACES; i++)
+        faces[i / EBPO_POSED_FACES][i % EBPO_POSED_FACES].block = EBPO_NO_CHILD;
+}
+
+/* Two accels at their poses, each in its own frame, made ready for going down both hierarchies
+ * together. Immutable; any thread.
+ *
+ * Frames are measured in one unit: the first's, or the second's if that is the larger one. What is
+ * known of each is linear in the frame of the other, whatever the poses' matrices are like; only
+ * slabs rest upon lengths (docs/develop/collision.md, "Going down two hierarchies"). */
+
+typedef struct ebpo_accel_pair {
+    const ebpo_accel *accel[2];
+    const ebpo_block_posing *posing[2];
+    float unit[2];     /* what a length of a frame is multiplied by */
+    double turn[3][3]; /* a vector of the second's frame to the first's */
+    double place[3];   /* the second's origin in the first's frame */
+    /* The same in floats: a vector of the other's frame to frame i; and the sizes of the entries,
+     * rounded up. */
+    float into[2][3][3], size[2][3][3];
+    float doubt;      /* what posing and these numbers are off, in the unit */
+    float slab_share; /* of the sizes of nodes, for what slabs lose */
+    float sine_room;  /* added to the squared sine of two slabs' axes */
+    bool slabs;       /* they may be asked */
+    bool apart;       /* the boxes around all faces have no common point */
+} ebpo_accel_pair;
+
+/* reach: at least every posed coordinate of both models. The posings must live as long. */
+void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2],
+                          const ebpo_block_posing *const posing[2], double reach);
+
+/* How two models' frames lie to each other: what boxes and slabs of one are, seen from the other.
+ */
 
 /* y = x * unit, x in the accel's frame; the other model's y is turn y + shift. */
 typedef struct ebpo_turned_frame {

@@ -1,0 +1,201 @@
+/* Cells of an octree of the world, and whether the result of a boolean expression is the same in
+ * all of a cell.
+ *
+ * For each operand the ball around the cell is brought into the model. The box, then the white and
+ * black nodes of the model's tree, then the nearest face decide whether the cell is inside,
+ * outside, or may hold a face. A cell keeps what is known of the operands, so that its children
+ * need not query them again. The root is a power of two in size, so corners and centres are exact.
+ */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/error.h"
+#include "extras/boolean/world_cell.h"
+#include "query/query_node.h"
+
+enum {
+    SEEN_FACES = 4, /* beside EBPO_MAY_IN and EBPO_MAY_OUT: perhaps faces */
+    NODES_MOST = 64 /* looked at for a black and a white one once faces are seen */
+};
+
+typedef struct ball {
+    const ebpo_model *model;
+    ebpo_box box;
+    const double *p;
+    double square; /* of its radius */
+    unsigned seen; /* perhaps in the ball */
+    unsigned sure; /* of EBPO_MAY_IN and EBPO_MAY_OUT: certainly in it */
+    unsigned nodes;
+} ball;
+
+/* Squared distance of the cell, right to 2^-50 of itself while it is not almost 0. */
+static double square_to(const ball *b, ebpo_cell cell)
+{
+    double low[3], high[3], sum = 0;
+    ebpo_cell_bounds(&b->box, cell, low, high);
+    for (int k = 0; k < 3; k++) {
+        double d = fmax(fmax(low[k] - b->p[k], b->p[k] - high[k]), 0);
+        sum += d * d;
+    }
+    return sum;
+}
+
+static void look_at_node(ball *b, const ebpo_node *node)
+{
+    bool enough = b->sure == EBPO_MAY_BOTH || (b->seen & SEEN_FACES && ++b->nodes > NODES_MOST);
+    double square = enough ? 0 : square_to(b, node->cell);
+    if (enough || square * (1 - 0x1p-48) > b->square + 0x1p-1000)
+        return;
+    if (ebpo_node_is_uniform(node)) {
+        unsigned kind = node->type == EBPO_BLACK ? EBPO_MAY_IN : EBPO_MAY_OUT;
+        b->seen |= kind;
+        if (square < b->square * (1 - 0x1p-48) && b->square > 0x1p-900)
+            b->sure |= kind;
+    } else if (node->type != EBPO_GRAY || node->pruned || ebpo_node_is_below(node)) {
+        b->seen |= SEEN_FACES;
+    } else {
+        for (unsigned octant = 0; octant < 8; octant++) {
+            ebpo_node child = ebpo_model_child(b->model, node, octant);
+            look_at_node(b, &child);
+        }
+    }
+}
+
+/* EBPO_MAY_IN or EBPO_MAY_OUT: no face is in the ball. EBPO_MAY_BOTH: one is. 0: not known. What is
+ * said is what the faces would say, so that nothing depends on what is in memory. */
+static unsigned decide_by_nodes(const ebpo_model *model, const double p[3], double radius)
+{
+    ball b = { .model = model,
+               .box = ebpo_model_box(model),
+               .p = p,
+
+               .square = radius * radius };
+    double low[3], high[3];
+    ebpo_node root = ebpo_model_root(model);
+    ebpo_cell_bounds(&b.box, root.cell, low, high);
+    for (int k = 0; k < 3; k++) { /* beyond the root cell all is out */
+        double beyond = radius - fmin(p[k] - low[k], high[k] - p[k]);
+        if (!(beyond < -0x1p-48 * radius))
+            b.seen |= EBPO_MAY_OUT;
+        if (beyond > 0x1p-48 * radius)
+            b.sure |= EBPO_MAY_OUT;
+    }
+    look_at_node(&b, &root);
+    if (b.sure == EBPO_MAY_BOTH) /* between a black and a white point there is a face */
+        return EBPO_MAY_BOTH;
+    return b.seen == EBPO_MAY_IN || b.seen == EBPO_MAY_OUT ? b.seen : 0;
+}
+
+/* What the faces say of the ball. */
+static ebpo_status look_at_faces(ebpo_context *context, const double p[3], double radius,
+                                 unsigned *may, ebpo_error *error)
+{
+    ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
+    ebpo_distance_result nearest;
+    ebpo_inside_result inside;
+    o.max_distance = radius;
+    o.unsigned_distance = true;
+    *may = EBPO_MAY_BOTH;
+    ebpo_status status = ebpo_distance(context, p, &o, &nearest, error);
+    if (status != EBPO_OK || nearest.distance < INFINITY)
+        return status;
+    status = ebpo_inside(context, p, NULL, &inside, error);
+    if (status == EBPO_OK && inside.where != EBPO_ON)
+        *may = inside.where == EBPO_IN ? EBPO_MAY_IN : EBPO_MAY_OUT;
+    return status;
+}
+
+/* An axis-parallel cube by its centre and half its edge. *may: EBPO_MAY_IN when all of the closed
+ * cube is inner to the solid, EBPO_MAY_OUT when none of it belongs to it, on posed coordinates;
+ * EBPO_MAY_BOTH when a face may be within half the cube's diagonal of its centre. */
+static ebpo_status solid_in_cube(const ebpo_posed_solid *s, ebpo_context *context,
+                                 const double centre[3], double half, unsigned *may, unsigned *way,
+                                 ebpo_error *error)
+{
+    double p[3], doubt;
+    *way = EBPO_CUBE_BY_BOX;
+    *may = EBPO_MAY_OUT;
+    if (!ebpo_posed_solid_near(s, centre, half))
+        return EBPO_OK;
+    ebpo_unpose(s, centre, p, &doubt);
+    /* 1.7321 is more than the root of 3 */
+    double radius = 1.7321 * half / s->posing.scale * (1 + 0x1p-40) + doubt;
+    *may = decide_by_nodes(s->model, p, radius);
+    *way = EBPO_CUBE_BY_NODES;
+    if (*may)
+        return EBPO_OK;
+    *way = EBPO_CUBE_BY_FACES;
+    return look_at_faces(context, p, radius, may, error);
+}
+
+/* Smaller or larger than 2^+-this, and volumes of cells would leave the range of doubles. */
+enum { MOST_POWER = 300 };
+
+static ebpo_status fail_place(const double box[6], int level, ebpo_error *error)
+{
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "the result is around (%g, %g, %g), up to %g long: corners of cells of level "
+                     "%d would be no exact doubles; give a lower level, or move the world's origin "
+                     "closer",
+                     box[0], box[1], box[2],
+                     fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2])), level);
+}
+
+static ebpo_status fail_range(double most, ebpo_error *error)
+{
+    return ebpo_fail(error, EBPO_E_LIMIT,
+                     "the result is up to %g long, and volumes of cells are doubles from 2^-%d to "
+                     "2^%d only; scale the models by their poses",
+                     most, MOST_POWER, MOST_POWER);
+}
+
+ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, ebpo_error *error)
+{
+    double boxes[EBPO_BOOLEAN_OPERANDS_MAX][6], box[6];
+    int power;
+    *out = (ebpo_world){ .level = level };
+    for (uint32_t i = 0; i < b->count; i++)
+        memcpy(boxes[i], b->solid[i].box, sizeof boxes[i]);
+    ebpo_expression_box(&b->expression, (const double(*)[6])boxes, box);
+    if (box[0] > box[3])
+        return EBPO_OK;
+    double most = fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));
+    frexp(1.07 * most, &power); /* 16 / 15 and its rounding: the origin is on a grid of 1 / 16 */
+    if (most == 0 || power < -MOST_POWER || power > MOST_POWER)
+        return fail_range(most, error);
+    out->edge = ldexp(1, power);
+    double grid = out->edge / 16, finest = ldexp(out->edge, -(level > 4 ? level : 4) - 1);
+    for (int k = 0; k < 3; k++) {
+        out->origin[k] = floor(box[k] / grid) * grid;
+        if (!(fabs(out->origin[k]) + out->edge <= 0x1p53 * finest))
+            return fail_place(box, level, error);
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_world_cell_ask(const ebpo_boolean *b, unsigned worker, const ebpo_world *w,
+                                ebpo_world_cell *c, unsigned *may, uint8_t *ways, ebpo_error *error)
+{
+    double centre[3], half = ebpo_world_edge(w, c->cell.level + 1);
+    for (int k = 0; k < 3; k++)
+        centre[k] = ebpo_world_wall(w, k, c->cell.level + 1, 2 * c->cell.at[k] + 1);
+    *may = ebpo_expression_value(&b->expression, c->known, c->in);
+    for (uint32_t i = 0; i < b->count && *may == EBPO_MAY_BOTH; i++) {
+        unsigned operand, way;
+        if (c->known >> i & 1)
+            continue;
+        ebpo_status status = solid_in_cube(&b->solid[i], ebpo_boolean_context(b, worker, i), centre,
+                                           half, &operand, &way, error);
+        if (status != EBPO_OK)
+            return status;
+        ways[way]++;
+        if (operand == EBPO_MAY_BOTH)
+            continue;
+        c->known |= UINT64_C(1) << i;
+        c->in |= (uint64_t)(operand == EBPO_MAY_IN) << i;
+        *may = ebpo_expression_value(&b->expression, c->known, c->in);
+    }
+    return EBPO_OK;
+}

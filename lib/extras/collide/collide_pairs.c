@@ -1,0 +1,402 @@
+/* Which pairs of faces of two models intersect: the first contact, and all pairs in one order.
+ *
+ * All pairs: the walk through both hierarchies (pair_walk_kernels.c) is expanded to enough pairs
+ * of nodes, which are shared among threads. Their results are sorted by the numbers of the first
+ * face, then of the second, so the order does not depend on the number of threads. When the memory
+ * of the collider is too small for all pairs, runs of the first model's faces are searched one
+ * after the other. Models in parts are left to subtree_walk.h. */
+#include "core/strict_fp.h"
+
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "extras/collide/collider.h"
+#include "extras/collide/hierarchy_walk.h"
+#include "extras/collide/subtree_walk.h"
+
+/* All pairs of faces of two accels that intersect, for a run of the first accel's faces. Zero at
+ * first. */
+typedef struct gathering {
+    const ebpo_collision *question;
+    bool self;
+    ebpo_node_pair *part; /* of the descent, from which threads go on */
+    uint64_t parts, part_capacity;
+    ebpo_pair_walk *walk; /* one for each thread */
+    unsigned threads;
+    uint64_t most; /* pairs */
+    _Atomic uint64_t found;
+    _Atomic bool full; /* there are more than so many */
+    ebpo_met_pair *met;
+    uint64_t met_count, met_capacity;
+} gathering;
+
+/* --- sorting --- */
+
+/* Radix sort from the least digit on; a digit has so many bits that counting them takes no longer
+ * than moving the pairs. */
+enum { LEAST_BITS = 4, MOST_BITS = 11 };
+
+static inline uint32_t digit_of(const ebpo_met_pair *m, bool by_a, unsigned shift, unsigned bits)
+{
+    return (by_a ? m->a : m->b) >> shift & ((1u << bits) - 1);
+}
+
+static void sort_by_digit(const ebpo_met_pair *from, ebpo_met_pair *to, uint64_t count, bool by_a,
+                          unsigned shift, unsigned bits)
+{
+    uint64_t begin[(1 << MOST_BITS) + 1];
+    memset(begin, 0, ((1u << bits) + 1) * sizeof *begin);
+    for (uint64_t i = 0; i < count; i++)
+        begin[digit_of(&from[i], by_a, shift, bits) + 1]++;
+    for (unsigned d = 0; d < 1u << bits; d++)
+        begin[d + 1] += begin[d];
+    for (uint64_t i = 0; i < count; i++)
+        to[begin[digit_of(&from[i], by_a, shift, bits)]++] = from[i];
+}
+
+static unsigned bits_for(uint64_t count)
+{
+    unsigned bits = LEAST_BITS;
+    while (bits < MOST_BITS && count >> bits > 1)
+        bits++;
+    return bits;
+}
+
+/* `spare` has room for as many; the result is in `met`. The numbers are below most_a and most_b. */
+static void sort_met_pairs(ebpo_met_pair *met, ebpo_met_pair *spare, uint64_t count,
+                           uint32_t most_a, uint32_t most_b)
+{
+    ebpo_met_pair *from = met, *to = spare;
+    unsigned bits = bits_for(count);
+    if (count < 2)
+        return;
+    for (int by_a = 0; by_a < 2; by_a++)
+        for (unsigned shift = 0; shift < 32 && (by_a ? most_a : most_b) >> shift; shift += bits) {
+            sort_by_digit(from, to, count, by_a, shift, bits);
+            ebpo_met_pair *other = from;
+            from = to;
+            to = other;
+        }
+    if (from != met)
+        memcpy(met, from, count * sizeof *met);
+}
+
+/* --- the first contact --- */
+
+/* -1: late. */
+static ebpo_status search_first(const ebpo_collision *q, ebpo_pair_walk *w, const char *stage,
+                                int32_t *found, ebpo_error *error)
+{
+    if (!w->kernels->start(w))
+        return ebpo_fail_memory(error, w->capacity * sizeof *w->stack);
+    while (w->top > 0) {
+        if (!w->kernels->run(w, EBPO_WALK_PAIRS))
+            return ebpo_fail_memory(error, w->capacity * sizeof *w->stack);
+        if (w->top > 0 && ebpo_collision_is_late(q)) {
+            *found = -1;
+            return EBPO_OK;
+        }
+        if (!ebpo_progress_step(&q->options.progress, stage, 0, 0, error))
+            return EBPO_E_CANCELLED;
+    }
+    *found = w->met_count > 0;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_collision_first(const ebpo_collision *q, const ebpo_accel *const accel[2],
+                                 const char *stage, int32_t *found, ebpo_error *error)
+{
+    ebpo_pair_walk *w = &q->collider->walk;
+    ebpo_accel_pair pair;
+    const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
+    *found = 0;
+    if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
+        return EBPO_OK;
+    ebpo_accel_pair_make(&pair, accel, posing, q->reach);
+    if (pair.apart)
+        return EBPO_OK;
+    ebpo_pair_walk_begin(w, &pair);
+    w->first = true;
+    w->self = false;
+    ebpo_status status = search_first(q, w, stage, found, error);
+    ebpo_collider_count(q->collider, w);
+    return status;
+}
+
+ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *options,
+                               ebpo_face_pair *out, int32_t *found, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_collision q;
+    *out = (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE, EBPO_NO_FACE, 0, 0 };
+    *found = 0;
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    if (status == EBPO_OK && ebpo_collision_is_in_parts(&q))
+        return ebpo_first_of_parts(&q, out, found, error);
+    if (status != EBPO_OK)
+        return status;
+    const ebpo_accel *accel[2] = { q.model[0]->whole, q.model[1]->whole };
+    status = ebpo_collision_first(&q, accel, "first contact", found, error);
+    if (status == EBPO_OK && *found == 1)
+        *out = ebpo_collision_pair(&q, q.model[0]->whole, q.model[1]->whole, &c->walk.met[0]);
+    return status;
+}
+
+static const char stage[] = "pairs of faces";
+
+/* Enough for any number of threads: results do not depend on it, but the work's evenness does. */
+enum { PARTS = 512, PARTS_EACH = 64 };
+
+static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
+{
+    return ebpo_fail_memory(error, (w->capacity + 64) * sizeof *w->stack);
+}
+
+static bool hold_node_pairs(gathering *g, const ebpo_node_pair *pairs, uint64_t count)
+{
+    if (!ebpo_grow(&g->part, &g->part_capacity, count, sizeof *g->part))
+        return false;
+    if (count)
+        memcpy(g->part, pairs, count * sizeof *pairs);
+    g->parts = count;
+    return true;
+}
+
+/* One generation of the descent after the other, until there are parts enough or only blocks. */
+static bool make_parts(gathering *g, ebpo_pair_walk *w)
+{
+    bool fine = w->kernels->start(w) && hold_node_pairs(g, w->stack, w->top);
+    for (bool more = true; fine && more && g->parts && g->parts < PARTS;) {
+        uint64_t divided = w->node_pairs;
+        w->top = 0;
+        for (uint64_t i = 0; i < g->parts && fine; i++)
+            fine = w->kernels->expand(w, g->part[i]);
+        more = w->node_pairs > divided;
+        fine = fine && hold_node_pairs(g, w->stack, w->top);
+    }
+    w->top = 0;
+    return fine;
+}
+
+static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned worker,
+                             ebpo_error *error)
+{
+    gathering *g = user;
+    ebpo_pair_walk *w = &g->walk[worker];
+    if (!ebpo_pair_walk_room(w, end - begin))
+        return no_memory(w, error);
+    memcpy(w->stack, g->part + begin, (end - begin) * sizeof *w->stack);
+    w->top = end - begin;
+    while (w->top > 0 && !g->full) {
+        uint64_t before = w->met_count;
+        if (!w->kernels->run(w, EBPO_WALK_PAIRS))
+            return no_memory(w, error);
+        uint64_t more = w->met_count - before;
+        if (atomic_fetch_add(&g->found, more) + more > g->most)
+            g->full = true;
+        if (ebpo_collision_is_late(g->question))
+            return ebpo_fail(error, EBPO_E_CANCELLED, "%s: the deadline has passed", stage);
+    }
+    return EBPO_OK;
+}
+
+/* The collider's, if they are not in use: a question may be asked by what is given another's pairs.
+ */
+static bool take_walks(gathering *g)
+{
+    ebpo_collider *c = g->question->collider;
+    if (c->walks) {
+        g->walk = c->walks;
+        g->threads = c->walk_count;
+        c->walks = NULL;
+        return true;
+    }
+    g->threads = ebpo_thread_count(c->options.threads);
+    g->walk = ebpo_alloc_lines(g->threads, sizeof *g->walk);
+    return g->walk != NULL;
+}
+
+static ebpo_status prepare_walks(gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
+                                 uint32_t end, ebpo_error *error)
+{
+    if (!g->walk && !take_walks(g))
+        return ebpo_fail_memory(error, g->threads * sizeof *g->walk);
+    for (unsigned i = 0; i < g->threads; i++) {
+        ebpo_pair_walk_begin(&g->walk[i], pair);
+        g->walk[i].first = false;
+        g->walk[i].self = g->walk[i].neighbours = g->self;
+        g->walk[i].begin = begin;
+        g->walk[i].end = end;
+    }
+    g->found = 0;
+    g->full = false;
+    return EBPO_OK;
+}
+
+/* Puts together what threads have found. */
+static ebpo_status put_together(gathering *g, const ebpo_accel_pair *pair, ebpo_error *error)
+{
+    uint64_t count = 0;
+    for (unsigned i = 0; i < g->threads; i++)
+        count += g->walk[i].met_count;
+    if (!ebpo_grow(&g->met, &g->met_capacity, 2 * count, sizeof *g->met))
+        return ebpo_fail_memory(error, 2 * count * sizeof *g->met);
+    g->met_count = 0;
+    for (unsigned i = 0; i < g->threads; i++) {
+        const ebpo_pair_walk *w = &g->walk[i];
+        if (w->met_count)
+            memcpy(g->met + g->met_count, w->met, w->met_count * sizeof *w->met);
+        g->met_count += w->met_count;
+    }
+    if (count)
+        sort_met_pairs(g->met, g->met + count, count, pair->accel[0]->face_count,
+                       pair->accel[1]->face_count);
+    return EBPO_OK;
+}
+
+/* Of faces `begin` to `end` of the pair's first accel: fills in `met`, sorted; or `full`. */
+static ebpo_status gather_pairs(gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
+                                uint32_t end, ebpo_error *error)
+{
+    ebpo_status status = prepare_walks(g, pair, begin, end, error);
+    if (status != EBPO_OK)
+        return status;
+    if (!make_parts(g, &g->walk[0]))
+        return no_memory(&g->walk[0], error);
+    uint64_t grain = g->parts / PARTS_EACH + 1;
+    status = ebpo_parallel_for(g->threads, NULL, g->parts, grain, run_parts, g,
+                               &g->question->options.progress, stage, error);
+    for (unsigned i = 0; i < g->threads; i++)
+        ebpo_collider_count(g->question->collider, &g->walk[i]);
+    if (status != EBPO_OK || g->full)
+        return status;
+    return put_together(g, pair, error);
+}
+
+/* For the next question; stacks and pairs have another size then. */
+static void give_walks_back(gathering *g)
+{
+    ebpo_collider *c = g->question->collider;
+    for (unsigned i = 0; g->walk && i < g->threads; i++)
+        ebpo_pair_walk_free(&g->walk[i]);
+    if (c->walks) {
+        free(g->walk);
+        return;
+    }
+    c->walks = g->walk;
+    c->walk_count = g->threads;
+}
+
+static void gathering_free(gathering *g)
+{
+    give_walks_back(g);
+    free(g->part);
+    free(g->met);
+}
+
+/* --- all pairs --- */
+
+/* Pairs as they are handed out. */
+typedef struct giving {
+    const ebpo_collision *question;
+    const ebpo_accel_pair *pair;
+    ebpo_pairs_fn take;
+    void *user;
+    bool enough;
+} giving;
+
+enum { GIVEN_AT_ONCE = 1024 };
+
+static void give_pairs(giving *v, const ebpo_met_pair *met, uint64_t count)
+{
+    ebpo_face_pair out[GIVEN_AT_ONCE];
+    for (uint64_t at = 0; at < count && !v->enough; at += GIVEN_AT_ONCE) {
+        uint64_t n = count - at < GIVEN_AT_ONCE ? count - at : GIVEN_AT_ONCE;
+        for (uint64_t i = 0; i < n; i++)
+            out[i] = ebpo_collision_pair(v->question, v->pair->accel[0], v->pair->accel[1],
+                                         &met[at + i]);
+        v->enough = !v->take(v->user, out, n);
+    }
+}
+
+/* Runs of faces of the first model: as long as what they find has room, twice as long after one
+ * that had. A single face may take more. */
+static ebpo_status in_runs(giving *v, gathering *g, ebpo_error *error)
+{
+    uint32_t faces = v->pair->accel[0]->face_count, run = faces;
+    uint64_t most = v->question->collider->options.memory / (2 * sizeof(ebpo_met_pair)) + 1;
+    for (uint32_t begin = 0; begin < faces && !v->enough;) {
+        uint32_t end = faces - begin > run ? begin + run : faces;
+        g->most = end - begin == 1 ? UINT64_MAX : most;
+        ebpo_status status = gather_pairs(g, v->pair, begin, end, error);
+        if (status != EBPO_OK)
+            return status;
+        run = end - begin;
+        if (g->full) {
+            run = run / 2;
+            continue;
+        }
+        give_pairs(v, g->met, g->met_count);
+        begin = end;
+        run = run < faces / 2 ? 2 * run : faces;
+    }
+    return EBPO_OK;
+}
+
+static ebpo_status all_pairs(const ebpo_collision *q, bool self, ebpo_pairs_fn take, void *user,
+                             ebpo_error *error)
+{
+    if (ebpo_collision_is_in_parts(q))
+        return ebpo_gather_parts(q, self, take, user, error);
+    const ebpo_accel *accel[2] = { q->model[0]->whole, q->model[1]->whole };
+    const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
+    ebpo_accel_pair pair;
+    if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
+        return EBPO_OK;
+    ebpo_accel_pair_make(&pair, accel, posing, q->reach);
+    if (pair.apart)
+        return EBPO_OK;
+    giving v = { q, &pair, take, user, false };
+    gathering g = { .question = q, .self = self };
+    ebpo_status status = in_runs(&v, &g, error);
+    gathering_free(&g);
+    return status;
+}
+
+ebpo_status ebpo_collide_all(ebpo_collider *c, const ebpo_collide_options *options,
+                             ebpo_pairs_fn take, void *user, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_collision q;
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    return status == EBPO_OK ? all_pairs(&q, false, take, user, error) : status;
+}
+
+ebpo_status ebpo_collide_self(ebpo_collider *c, const ebpo_collide_options *options,
+                              ebpo_pairs_fn take, void *user, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_collision q;
+    ebpo_collide_options here = EBPO_COLLIDE_OPTIONS_INIT;
+    if (c->model[0] != c->model[1])
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "one model with itself: the collider has two");
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    if (status != EBPO_OK)
+        return status;
+    here.deadline_ns = q.options.deadline_ns;
+    here.progress = q.options.progress;
+    return ebpo_collide_self_posed(c, &here, take, user, error);
+}
+
+ebpo_status ebpo_collide_self_posed(ebpo_collider *c, const ebpo_collide_options *options,
+                                    ebpo_pairs_fn take, void *user, ebpo_error *error)
+{
+    ebpo_collision q;
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    return status == EBPO_OK ? all_pairs(&q, true, take, user, error) : status;
+}

@@ -1,0 +1,263 @@
+/* Patches of faces: the connected components of a mesh, over corners with equal coordinates or
+ * over edges that two faces share. Faces are joined with a disjoint-set forest whose roots are the
+ * first faces of their patches. Corners are numbered by a hash table: equal coordinates, equal
+ * numbers (0 and -0 are equal).
+ *
+ * Faces that intersect no face of the other model lie with their whole patch on one side of it;
+ * the relation of two models and exact volumes of results rest on that. */
+#include "core/strict_fp.h"
+
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "extras/collide/face_patches.h"
+#include "extras/collide/hierarchy_walk.h"
+#include "geometry/predicates.h"
+
+/* --- joined faces --- */
+
+/* Of the faces joined so far; paths get shorter. At first first[face] = face. */
+static inline uint32_t first_joined(uint32_t *first, uint32_t face)
+{
+    while (first[face] != face) {
+        first[face] = first[first[face]];
+        face = first[face];
+    }
+    return face;
+}
+
+static inline void join_faces(uint32_t *first, uint32_t a, uint32_t b)
+{
+    a = first_joined(first, a);
+    b = first_joined(first, b);
+    first[a > b ? a : b] = a > b ? b : a;
+}
+
+static uint64_t hash_of(const double x[3])
+{
+    uint64_t bits[3], h = 0;
+    memcpy(bits, x, sizeof bits);
+    for (int k = 0; k < 3; k++) {
+        h = (h ^ bits[k]) * UINT64_C(0x9e3779b97f4a7c15);
+        h ^= h >> 32;
+    }
+    return h;
+}
+
+static bool same_corner(const double p[3], const double q[3])
+{
+    return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
+}
+
+/* Where the corner is in the table, or a free place. */
+static uint32_t *find_corner(const ebpo_corner_ids *ids, const double x[3])
+{
+    uint64_t i = hash_of(x) & (ids->table_size - 1);
+    while (ids->table[i] && !same_corner(ids->at[ids->table[i] - 1], x))
+        i = (i + 1) & (ids->table_size - 1);
+    return &ids->table[i];
+}
+
+static bool enlarge_table(ebpo_corner_ids *ids)
+{
+    uint64_t size = ids->table_size ? 2 * ids->table_size : 1024;
+    uint32_t *table = ebpo_alloc_zero(size, sizeof *table);
+    if (!table)
+        return false;
+    free(ids->table);
+    ids->table = table;
+    ids->table_size = size;
+    for (uint64_t i = 0; i < ids->count; i++)
+        *find_corner(ids, ids->at[i]) = (uint32_t)i + 1;
+    return true;
+}
+
+bool ebpo_corner_id(ebpo_corner_ids *ids, const double x[3], uint32_t *id)
+{
+    const double corner[3] = { x[0] + 0.0, x[1] + 0.0, x[2] + 0.0 }; /* no -0 */
+    if ((2 * ids->count >= ids->table_size && !enlarge_table(ids)) || ids->count >= UINT32_MAX - 1)
+        return false;
+    uint32_t *at = find_corner(ids, corner);
+    if (*at == 0) {
+        if (!ebpo_grow(&ids->at, &ids->capacity, ids->count + 1, sizeof *ids->at))
+            return false;
+        memcpy(ids->at[ids->count++], corner, sizeof corner);
+        *at = (uint32_t)ids->count;
+    }
+    *id = *at - 1;
+    return true;
+}
+
+void ebpo_corner_ids_free(ebpo_corner_ids *ids)
+{
+    free(ids->at);
+    free(ids->table);
+    *ids = (ebpo_corner_ids){ 0 };
+}
+
+typedef struct joining {
+    ebpo_corner_ids corners;
+    uint32_t *user; /* of each corner: a face that has it */
+    uint64_t users;
+} joining;
+
+static bool join_face(joining *j, uint32_t *patch, uint32_t face, const double t[3][3])
+{
+    for (int i = 0; i < 3; i++) {
+        uint32_t id;
+        uint64_t known = j->corners.count;
+        if (!ebpo_corner_id(&j->corners, t[i], &id) ||
+            !ebpo_grow(&j->user, &j->users, j->corners.count, sizeof *j->user))
+            return false;
+        if (id < known)
+            join_faces(patch, j->user[id], face);
+        else
+            j->user[id] = face;
+    }
+    return true;
+}
+
+ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
+                              const uint64_t *left_out, uint32_t **out, ebpo_error *error)
+{
+    joining j = { 0 };
+    uint32_t count = subtree->face_count - subtree->outer_count;
+    uint32_t *patch = ebpo_alloc(count, sizeof *patch);
+    bool fine = patch != NULL;
+    for (uint32_t f = 0; f < count && fine; f++)
+        patch[f] = f;
+    for (uint32_t f = 0; f < count && fine; f++) {
+        double t[3][3];
+        uint64_t number = subtree->first_face + f;
+        if (left_out[number / 64] >> number % 64 & 1)
+            continue;
+        ebpo_accel_triangle(subtree, slots[subtree->outer_count + f], t);
+        fine = join_face(&j, patch, f, (const double(*)[3])t);
+    }
+    for (uint32_t f = 0; f < count && fine; f++)
+        patch[f] = first_joined(patch, f);
+    ebpo_corner_ids_free(&j.corners);
+    free(j.user);
+    if (!fine) {
+        free(patch);
+        return ebpo_fail_memory(error, count * sizeof *patch);
+    }
+    *out = patch;
+    return EBPO_OK;
+}
+
+/* --- patches over edges --- */
+
+/* Each edge is listed at its corner with the smaller number, as the other corner and the face. Two
+ * equal entries of a sorted list connect their faces. */
+
+#define NO_CORNER UINT32_MAX
+
+typedef struct edges {
+    const ebpo_accel *whole;
+    uint32_t (*corner)[3]; /* of each face; NO_CORNER: it has no area */
+    uint64_t *end;         /* of each corner's list: it begins where that of the one before ends */
+    uint64_t *edge;        /* other corner << 32 | face */
+    uint32_t *patch;
+} edges;
+
+static bool number_corners(edges *e, ebpo_corner_ids *ids, const uint32_t *slots,
+                           const ebpo_posing *posing)
+{
+    for (uint32_t f = 0; f < e->whole->face_count; f++) {
+        double t[3][3];
+        ebpo_posed_triangle(e->whole, posing, slots[f], t);
+        bool area = !ebpo_zero_area(t[0], t[1], t[2]);
+        e->patch[f] = f;
+        e->corner[f][0] = NO_CORNER;
+        for (int i = 0; i < 3 && area; i++)
+            if (!ebpo_corner_id(ids, t[i], &e->corner[f][i]))
+                return false;
+    }
+    return true;
+}
+
+/* Edge i of a face: its lesser corner and the other one. False: the face has no area. */
+static bool edge_of(const edges *e, uint32_t f, int i, uint32_t *lesser, uint32_t *other)
+{
+    uint32_t a = e->corner[f][i], b = e->corner[f][i == 2 ? 0 : i + 1];
+    *lesser = a < b ? a : b;
+    *other = a < b ? b : a;
+    return e->corner[f][0] != NO_CORNER;
+}
+
+/* Counts first, then fills lists from their ends. */
+static void list_edges(edges *e, uint64_t corners)
+{
+    uint32_t at, other;
+    for (uint32_t f = 0; f < e->whole->face_count; f++)
+        for (int i = 0; i < 3; i++)
+            if (edge_of(e, f, i, &at, &other))
+                e->end[at + 1]++;
+    for (uint64_t c = 0; c < corners; c++)
+        e->end[c + 1] += e->end[c];
+    for (uint32_t f = 0; f < e->whole->face_count; f++)
+        for (int i = 0; i < 3; i++)
+            if (edge_of(e, f, i, &at, &other))
+                e->edge[e->end[at]++] = (uint64_t)other << 32 | f;
+}
+
+static int compare_edges(const void *a, const void *b)
+{
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void join_list(edges *e, uint64_t *list, uint64_t count)
+{
+    if (count > 1)
+        qsort(list, count, sizeof *list, compare_edges);
+    for (uint64_t i = 0, next; i < count; i = next) {
+        for (next = i + 1; next < count && list[next] >> 32 == list[i] >> 32;)
+            next++;
+        if (next - i == 2)
+            join_faces(e->patch, (uint32_t)list[i], (uint32_t)list[i + 1]);
+    }
+}
+
+static bool join_edges(edges *e, uint64_t corners)
+{
+    uint64_t faces = e->whole->face_count;
+    e->end = ebpo_alloc_zero(corners + 1, sizeof *e->end);
+    e->edge = ebpo_alloc(3 * faces, sizeof *e->edge);
+    if (!e->end || !e->edge)
+        return false;
+    list_edges(e, corners);
+    for (uint64_t c = 0; c < corners; c++) {
+        uint64_t begin = c ? e->end[c - 1] : 0;
+        join_list(e, e->edge + begin, e->end[c] - begin);
+    }
+    for (uint32_t f = 0; f < faces; f++)
+        e->patch[f] = first_joined(e->patch, f);
+    return true;
+}
+
+ebpo_status ebpo_edge_patches(const ebpo_accel *whole, const uint32_t *slots,
+                              const ebpo_posing *posing, uint32_t **out, ebpo_error *error)
+{
+    ebpo_corner_ids ids = { 0 };
+    edges e = { .whole = whole };
+    e.corner = ebpo_alloc(whole->face_count, sizeof *e.corner);
+    e.patch = ebpo_alloc(whole->face_count, sizeof *e.patch);
+    bool fine = e.corner && e.patch && number_corners(&e, &ids, slots, posing);
+    uint64_t corners = ids.count;
+    ebpo_corner_ids_free(&ids);
+    fine = fine && join_edges(&e, corners);
+    free(e.corner);
+    free(e.end);
+    free(e.edge);
+    if (!fine) {
+        free(e.patch);
+        return ebpo_fail_memory(error, whole->face_count * (uint64_t)60);
+    }
+    *out = e.patch;
+    return EBPO_OK;
+}

@@ -1,0 +1,234 @@
+/* The states of the two walks through the hierarchies of two models, and what the kernels of these
+ * walks call: pair_walk_kernels.c looks for faces that intersect, gap_walk_kernels.c for the
+ * nearest ones. Each state has a stack of pairs of nodes and keeps the nodes and blocks that it
+ * has turned last. One thread each.
+ *
+ * Pairs of faces that the float filter cannot decide are decided here exactly. When both models
+ * are one mesh, the corner or edge that neighbouring faces share is no contact. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/pair.h>
+
+#include "core/alloc.h"
+#include "extras/collide/hierarchy_walk.h"
+#include "geometry/triangle_pair.h"
+#include "geometry/predicates.h"
+
+/* --- neighbours in one mesh --- */
+
+void ebpo_pair_walk_free(ebpo_pair_walk *w)
+{
+    free(w->stack);
+    free(w->met);
+    w->stack = NULL;
+    w->met = NULL;
+    w->capacity = w->met_capacity = 0;
+}
+
+bool ebpo_pair_walk_room(ebpo_pair_walk *w, uint64_t more)
+{
+    return w->top + more <= w->capacity ||
+           ebpo_grow(&w->stack, &w->capacity, w->top + more, sizeof *w->stack);
+}
+
+void ebpo_posed_triangle(const ebpo_accel *accel, const ebpo_posing *posing, uint32_t slot,
+                         double out[3][3])
+{
+    double t[3][3];
+    ebpo_accel_triangle(accel, slot, t);
+    for (int i = 0; i < 3; i++)
+        ebpo_posing_apply(posing, t[i], out[i]);
+}
+
+/* The edge against corner i, as a face without area. */
+static void edge_opposite(const double a[3][3], int i, double out[3][3])
+{
+    memcpy(out[0], a[(i + 1) % 3], sizeof out[0]);
+    memcpy(out[1], a[(i + 2) % 3], sizeof out[1]);
+    memcpy(out[2], out[1], sizeof out[2]);
+}
+
+static bool edge_meets(const double a[3][3], int i, const double b[3][3])
+{
+    double edge[3][3];
+    edge_opposite(a, i, edge);
+    return ebpo_triangle_pair((const double(*)[3])edge, b) != EBPO_PAIR_APART;
+}
+
+/* Two convex sets with one corner in common have more if, going from there to another common point
+ * and on, one comes to an edge against that corner while still in the other face. */
+static ebpo_pair_kind one_corner(const double a[3][3], int i, const double b[3][3], int k)
+{
+    ebpo_pair_kind kind = ebpo_triangle_pair(a, b);
+    if (kind == EBPO_PAIR_TOUCHING && !edge_meets(a, i, b) && !edge_meets(b, k, a))
+        return EBPO_PAIR_APART;
+    return kind;
+}
+
+/* With an edge in common, planes that differ have no other point. */
+static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3])
+{
+    for (int k = 0; k < 3; k++)
+        if (ebpo_orient3d(a[0], a[1], a[2], b[k]) != 0)
+            return EBPO_PAIR_APART;
+    return ebpo_triangle_pair(a, b) == EBPO_PAIR_COPLANAR ? EBPO_PAIR_COPLANAR : EBPO_PAIR_APART;
+}
+
+/* As ebpo_triangle_pair, but EBPO_PAIR_APART where the common points are the corner, or the edge
+ * between corners, that both faces have (equal coordinates). Swapping changes nothing. */
+static ebpo_pair_kind neighbour_kind(const double a[3][3], const double b[3][3])
+{
+    int shared = 0, in_a = 0, in_b = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            if (ebpo_corner_order(a[i], b[k]) == 0) {
+                shared++;
+                in_a = i;
+                in_b = k;
+            }
+    if (shared == 0)
+        return ebpo_triangle_pair(a, b);
+    return shared == 1 ? one_corner(a, in_a, b, in_b) : one_edge(a, b);
+}
+
+static ebpo_pair_kind exact_kind(ebpo_pair_walk *w, uint32_t slot_a, uint32_t slot_b)
+{
+    const ebpo_accel_pair *p = w->pair;
+    double a[3][3], b[3][3];
+    ebpo_posed_triangle(p->accel[0], &p->posing[0]->posing, slot_a, a);
+    ebpo_posed_triangle(p->accel[1], &p->posing[1]->posing, slot_b, b);
+    w->exact++;
+    return w->neighbours ? neighbour_kind((const double(*)[3])a, (const double(*)[3])b)
+                         : ebpo_triangle_pair((const double(*)[3])a, (const double(*)[3])b);
+}
+
+bool ebpo_pair_walk_decide(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b,
+                           const ebpo_block_pairs *pairs)
+{
+    const ebpo_accel *const *s = w->pair->accel;
+    uint32_t face_a = ebpo_accel_meshlet(s[0], block_a)->face,
+             face_b = ebpo_accel_meshlet(s[1], block_b)->face;
+    if (!ebpo_grow(&w->met, &w->met_capacity, w->met_count + pairs->count, sizeof *w->met))
+        return false;
+    for (unsigned i = 0; i < pairs->count; i++) {
+        uint32_t lane_a = pairs->pair[i] & 7, lane_b = pairs->pair[i] >> 3 & 7;
+        ebpo_met_pair met = { face_a + lane_a, face_b + lane_b, EBPO_PAIR_CROSSING };
+        if (met.a < w->begin || met.a >= w->end || (w->self && met.a >= met.b))
+            continue;
+        if (w->neighbours || !(pairs->pair[i] & EBPO_CERTAINLY_CROSSING))
+            met.kind = (int32_t)exact_kind(w, block_a * EBPO_BLOCK + lane_a,
+                                           block_b * EBPO_BLOCK + lane_b);
+        if (met.kind == EBPO_PAIR_APART)
+            continue;
+        w->met_slot[0] = block_a * EBPO_BLOCK + lane_a;
+        w->met_slot[1] = block_b * EBPO_BLOCK + lane_b;
+        w->met[w->met_count++] = met;
+        if (w->first)
+            break;
+    }
+    return true;
+}
+
+void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
+                    const ebpo_posing posing[2], double reach)
+{
+    for (int s = 0; s < 2; s++) {
+        g->accel[s] = accel[s];
+        ebpo_block_posing_make(&g->posing[s], &posing[s], reach);
+        for (int i = 0; i < EBPO_GAP_NODES; i++)
+            g->node[s][i].node = EBPO_NO_CHILD;
+    }
+    ebpo_posed_faces_forget(g->faces);
+    ebpo_two_frames_make(&g->frames, accel, g->posing);
+    g->count = g->waits = 0;
+    g->node_pairs = g->block_pairs = 0;
+    g->ended = g->no_memory = g->is_heap = false;
+    g->limit = g->square = g->best = INFINITY;
+    g->tolerance = 0;
+    g->way_number = 0;
+    for (int k = 0; k < 3; k++) /* what centres show is better than nothing */
+        g->way[k] = k == 0;
+    ebpo_gap_set_way(g, g->way);
+    double centre[2][3];
+    float way[3];
+    for (int s = 0; s < 2; s++)
+        ebpo_posing_apply(&posing[s], accel[s]->centre, centre[s]);
+    for (int k = 0; k < 3; k++)
+        way[k] = (float)((centre[1][k] - centre[0][k]) * g->posing[0].unit);
+    ebpo_gap_set_way(g, way);
+}
+
+ebpo_gap_search *ebpo_gap_new(void) { return ebpo_alloc_lines(1, sizeof(ebpo_gap_search)); }
+
+void ebpo_gap_free(ebpo_gap_search *g)
+{
+    if (g)
+        free(g->stack);
+    free(g);
+}
+
+void ebpo_gap_set_limit(ebpo_gap_search *g, float limit)
+{
+    if (!(limit < g->limit))
+        return;
+    g->limit = limit;
+    g->square = limit < 0 ? -INFINITY : limit * limit * (1 + 0x1p-18f) + 0x1p-120f;
+}
+
+void ebpo_gap_set_best(ebpo_gap_search *g, float best, uint32_t slot_a, uint32_t slot_b)
+{
+    if (!(best < g->best))
+        return;
+    g->best = best;
+    g->best_slot[0] = slot_a;
+    g->best_slot[1] = slot_b;
+    ebpo_gap_set_limit(g, best - g->tolerance);
+}
+
+static float float_dot(const float a[3], const float b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Shorter than 1: gaps along it are not too great. */
+void ebpo_gap_set_way(ebpo_gap_search *g, const float way[3])
+{
+    float length = sqrtf(float_dot(way, way));
+    if (!(length > 0x1p-50f && length < 0x1p60f))
+        return;
+    for (int k = 0; k < 3; k++)
+        g->way[k] = way[k] * ((1 - 0x1p-19f) / length);
+    g->way_number++;
+    for (int s = 0; s < 2; s++)
+        for (int k = 0; k < 3; k++) {
+            float sum = 0;
+            for (int i = 0; i < 3; i++)
+                sum += g->frames.frame[s].in_world[i][k] * g->way[i];
+            g->along[s][k] = s ? -sum : sum;
+        }
+    g->along_shift = float_dot(g->frames.frame[1].shift, g->along[0]);
+}
+
+bool ebpo_gap_room(ebpo_gap_search *g)
+{
+    if (ebpo_grow(&g->stack, &g->capacity, g->count + 64, sizeof *g->stack))
+        return true;
+    g->no_memory = g->ended = true;
+    return false;
+}
+
+bool ebpo_gap_wait_room(ebpo_gap_search *g)
+{
+    unsigned kept = 0;
+    if (g->waits + 64 <= EBPO_GAP_CANDIDATES)
+        return true;
+    for (unsigned i = 0; i < g->waits; i++)
+        if (!(g->waiting[i].low > g->limit))
+            g->waiting[kept++] = g->waiting[i];
+    g->waits = kept;
+    return g->waits + 64 <= EBPO_GAP_CANDIDATES || g->judge(g);
+}

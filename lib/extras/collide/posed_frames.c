@@ -1,0 +1,249 @@
+/* Models at poses in floats, with proved error bounds: the vertices of blocks as the filter of
+ * pairs takes them, and how the frames of two models lie to each other.
+ *
+ * A unit, a power of two, brings posed coordinates into the range of floats. Blocks are turned in
+ * floats and placed relative to their first vertex, whose posed coordinates are doubles. Matrices
+ * between frames come with the sizes of their entries, from which the kernels bound their errors.
+ * Where frames are too different for floats, nothing is dropped. docs/develop/collision.md, "From
+ * blocks to the filter". Pure functions, any thread. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "extras/collide/posed_frames.h"
+
+/* --- blocks: loops over 24 vertices, which compilers turn into vectors --- */
+
+enum { MOST = EBPO_POSED_VERTICES };
+
+static float greater_of(float a, float b) { return a > b ? a : b; }
+
+double ebpo_block_unit(double reach)
+{
+    int exponent;
+    frexp(reach > 0x1p-900 ? reach : 0x1p-900, &exponent);
+    return ldexp(1, 30 - exponent);
+}
+
+void ebpo_block_posing_make(ebpo_block_posing *out, const ebpo_posing *posing, double reach)
+{
+    out->posing = *posing;
+    out->unit = ebpo_block_unit(reach);
+    double size = posing->scale * out->unit * (1 + 0x1p-18);
+    out->size = (float)(size * (1 + 0x1p-20));
+    out->doubt = (float)(0x1p-49 * reach * out->unit);
+    out->fits = size > 0x1p-60 && size < 0x1p60;
+    for (int i = 0; i < 9; i++)
+        out->matrix[i / 3][i % 3] = (float)(posing->matrix[i / 3][i % 3] * out->unit);
+}
+
+void ebpo_posed_block_make(ebpo_posed_block *out, const ebpo_block_posing *p, const float *vertex,
+                           unsigned vertices)
+{
+    const float base[3] = { vertex[0], vertex[vertices], vertex[2 * vertices] };
+    ebpo_posing_apply(&p->posing, (const double[3]){ base[0], base[1], base[2] }, out->base);
+    float most = 0, d[3][MOST] = { { 0 } };
+    for (unsigned k = 0; k < 3; k++)
+        for (unsigned i = 0; i < vertices; i++)
+            d[k][i] = vertex[k * vertices + i] - base[k];
+    for (int i = 0; i < MOST; i++)
+        most = greater_of(most, fabsf(d[0][i]) + fabsf(d[1][i]) + fabsf(d[2][i]));
+    for (int k = 0; k < 3; k++) {
+        const float *m = p->matrix[k];
+        for (int i = 0; i < MOST; i++)
+            out->x[k][i] = (m[0] * d[0][i] + m[1] * d[1][i]) + m[2] * d[2][i];
+    }
+    out->vertices = vertices;
+    out->reach = ebpo_posed_block_reach(p, most);
+    out->error = ebpo_posed_block_error(p, out->reach);
+}
+
+void ebpo_posed_block_make_wide(ebpo_posed_block *out, const ebpo_block_posing *p,
+                                const double *vertex, unsigned vertices)
+{
+    const double base[3] = { vertex[0], vertex[vertices], vertex[2 * vertices] };
+    ebpo_posing_apply(&p->posing, base, out->base);
+    memset(out->x, 0, sizeof out->x);
+    out->reach = 0;
+    for (unsigned i = 0; i < vertices; i++) {
+        double v[3] = { vertex[i], vertex[vertices + i], vertex[2 * vertices + i] }, posed[3];
+        ebpo_posing_apply(&p->posing, v, posed);
+        for (int k = 0; k < 3; k++) {
+            out->x[k][i] = (float)((posed[k] - out->base[k]) * p->unit);
+            out->reach = greater_of(out->reach, fabsf(out->x[k][i]));
+        }
+    }
+    out->vertices = vertices;
+    out->error = 2 * 0x1p-24f * out->reach + p->doubt;
+}
+
+float ebpo_posed_block_place(const ebpo_posed_block *b, double unit, const double origin[3],
+                             float out[3][EBPO_POSED_VERTICES])
+{
+    float most = 0;
+    for (int k = 0; k < 3; k++) {
+        float shift = (float)((b->base[k] - origin[k]) * unit);
+        most = greater_of(most, fabsf(shift));
+        for (int i = 0; i < MOST; i++)
+            out[k][i] = b->x[k][i] + shift;
+    }
+    return b->error + 0x1.2p-24f * b->reach + 2.5f * 0x1p-24f * most;
+}
+
+/* 3x3 matrices in doubles, near rotations. */
+static void invert_matrix(const double m[3][3], double out[3][3])
+{
+    double det = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            int r1 = (k + 1) % 3, r2 = (k + 2) % 3, c1 = (i + 1) % 3, c2 = (i + 2) % 3;
+            out[i][k] = m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1];
+        }
+    for (int k = 0; k < 3; k++)
+        det += m[0][k] * out[k][0];
+    for (int i = 0; i < 9; i++)
+        out[i / 3][i % 3] /= det;
+}
+
+static void turn_vector(const double m[3][3], const double x[3], double out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = m[i][0] * x[0] + m[i][1] * x[1] + m[i][2] * x[2];
+}
+
+static void to_floats(const double m[3][3], float out[3][3], float size[3][3])
+{
+    for (int i = 0; i < 9; i++) {
+        out[i / 3][i % 3] = (float)m[i / 3][i % 3];
+        size[i / 3][i % 3] = fabsf(out[i / 3][i % 3]) * (1 + 0x1p-22f);
+    }
+}
+
+/* Frames too different or too strange for floats: every pair of nodes is looked at. */
+static void look_at_all(ebpo_accel_pair *out)
+{
+    out->unit[0] = out->unit[1] = 1;
+    for (int i = 0; i < 9; i++)
+        out->turn[i / 3][i % 3] = i % 4 == 0;
+    out->place[0] = out->place[1] = out->place[2] = 0;
+    to_floats((const double(*)[3])out->turn, out->into[0], out->size[0]);
+    to_floats((const double(*)[3])out->turn, out->into[1], out->size[1]);
+    out->doubt = INFINITY;
+    out->slabs = out->apart = false;
+}
+
+/* By the axes of the first's frame; spheres would not do better. */
+static bool turned_boxes_apart(const ebpo_accel_pair *p)
+{
+    double first = p->accel[0]->reach * (double)p->unit[0],
+           second = p->accel[1]->reach * (double)p->unit[1];
+    for (int i = 0; i < 3; i++) {
+        double size = first + (double)p->doubt;
+        for (int k = 0; k < 3; k++)
+            size += fabs(p->turn[i][k]) * second;
+        if (fabs(p->place[i]) > size * (1 + 0x1p-40))
+            return true;
+    }
+    return false;
+}
+
+/* per_world: lengths of each frame for one of the world. */
+static void choose_units(ebpo_accel_pair *out, const double per_world[2])
+{
+    double ratio = per_world[0] / per_world[1];
+    out->slabs = ratio > 0x1p-60 && ratio < 0x1p60;
+    out->unit[0] = ratio > 1 ? (float)fmax(1 / ratio, 0x1p-60) : 1;
+    out->unit[1] = ratio > 1 ? 1 : (float)fmax(ratio, 0x1p-60);
+}
+
+void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2],
+                          const ebpo_block_posing *const posing[2], double reach)
+{
+    double per_world[2], rotation[2][3][3], back[3][3], middle[3], seen[3];
+    for (int i = 0; i < 2; i++) {
+        out->accel[i] = accel[i];
+        out->posing[i] = posing[i];
+        per_world[i] = accel[i]->scale / posing[i]->posing.scale;
+        ebpo_posing_rotation(&posing[i]->posing, rotation[i]);
+    }
+    choose_units(out, per_world);
+    double unit = (double)out->unit[0] * per_world[0],
+           ratio = unit / ((double)out->unit[1] * per_world[1]);
+    if (!(unit > 0x1p-900 && unit < 0x1p900 && ratio > 0x1p-900 && ratio < 0x1p900 &&
+          reach * unit < 0x1p100)) {
+        look_at_all(out);
+        return;
+    }
+    invert_matrix((const double(*)[3])rotation[0], back);
+    for (int k = 0; k < 3; k++) {
+        double column[3] = { rotation[1][0][k], rotation[1][1][k], rotation[1][2][k] };
+        turn_vector((const double(*)[3])back, column, seen);
+        for (int i = 0; i < 3; i++)
+            out->turn[i][k] = seen[i] * ratio;
+    }
+    ebpo_posing_apply(&posing[1]->posing, accel[1]->centre, middle);
+    for (int i = 0; i < 3; i++)
+        middle[i] -= posing[0]->posing.translation[i];
+    turn_vector((const double(*)[3])back, middle, seen);
+    for (int i = 0; i < 3; i++)
+        out->place[i] = seen[i] * unit - accel[0]->centre[i] * (posing[0]->posing.scale * unit);
+    to_floats((const double(*)[3])out->turn, out->into[0], out->size[0]);
+    invert_matrix((const double(*)[3])out->turn, back);
+    to_floats((const double(*)[3])back, out->into[1], out->size[1]);
+    double deviation = posing[0]->posing.deviation + posing[1]->posing.deviation;
+    out->doubt = (float)(0x1p-44 * reach * unit) + 0x1p-100f;
+    out->slab_share = (float)(0x1p-17 + 8 * deviation);
+    out->sine_room = (float)(0x1p-17 + 16 * deviation);
+    out->apart = turned_boxes_apart(out);
+}
+
+static double greatest_coordinate(const double x[3])
+{
+    return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
+}
+
+/* Frame `from` seen from frame `to`; offset: from's centre less to's, in the world. */
+static void turn_into(ebpo_turned_frame *out, double from[3][3], double to[3][3],
+                      const double offset[3])
+{
+    for (int i = 0; i < 3; i++) {
+        double shift = 0;
+        for (int j = 0; j < 3; j++) {
+            double turn = 0;
+            for (int k = 0; k < 3; k++)
+                turn += to[k][i] * from[k][j];
+            out->turn[i][j] = (float)turn;
+            out->turn_size[i][j] = fabsf(out->turn[i][j]);
+            out->in_world[i][j] = (float)from[i][j];
+            shift += to[j][i] * offset[j];
+        }
+        out->shift[i] = (float)shift;
+    }
+}
+
+void ebpo_two_frames_make(ebpo_two_frames *out, const ebpo_accel *const accel[2],
+                          const ebpo_block_posing posing[2])
+{
+    double rotation[2][3][3], centre[2][3], offset[2][3], size = 0, lost = 0, deviation = 0;
+    double unit = posing[0].unit;
+    for (int s = 0; s < 2; s++) {
+        const ebpo_posing *p = &posing[s].posing;
+        double length = accel[s]->reach / accel[s]->scale,
+               far = greatest_coordinate(accel[s]->centre) + length;
+        ebpo_posing_rotation(p, rotation[s]);
+        ebpo_posing_apply(p, accel[s]->centre, centre[s]);
+        out->frame[s].unit = (float)(p->scale / accel[s]->scale * unit);
+        size += length * p->scale * unit;
+        lost += 2 * ebpo_posing_error(p, 1.7321 * far) * unit;
+        deviation += 2 * p->deviation + 0x1p-50;
+    }
+    for (int k = 0; k < 3; k++) {
+        offset[0][k] = (centre[0][k] - centre[1][k]) * unit;
+        offset[1][k] = -offset[0][k];
+    }
+    double all = size + 1.7321 * greatest_coordinate(offset[0]);
+    for (int s = 0; s < 2; s++)
+        turn_into(&out->frame[s], rotation[s], rotation[1 - s], offset[s]);
+    out->slack = (float)((0x1p-19 * all + 2 * deviation * all + 2 * lost) * (1 + 0x1p-20));
+}

@@ -1,0 +1,164 @@
+/* Pairs of nodes of two posed trees, the smallest gap first, down to subtrees that are loaded on
+ * demand. The gap of two envelopes bounds the distance of all that is in the nodes.
+ *
+ * Depth, levels, distances and the way out search with it; each has its own measure of the best
+ * result and of when it is enough. Of two nodes the larger one is divided first. Several pairs of
+ * nodes of a whole model and one in parts may need the same subtree: it is visited once. One
+ * thread. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/sort.h"
+#include "extras/collide/subtree_search.h"
+
+ebpo_status ebpo_node_gaps_begin(ebpo_node_gaps *g, const ebpo_collision *q, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    g->reach = q->reach;
+    for (int i = 0; i < 2 && status == EBPO_OK; i++)
+        status = ebpo_posed_subtrees_make(&g->side[i], q->model[i], &q->posing[i].posing, error);
+    return status;
+}
+
+void ebpo_node_gaps_free(ebpo_node_gaps *g)
+{
+    for (int i = 0; i < 2; i++)
+        ebpo_posed_subtrees_free(&g->side[i]);
+    free(g->heap);
+}
+
+int ebpo_node_larger(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
+{
+    return ebpo_posed_diagonal(&g->side[0], node[0].cell) <
+           ebpo_posed_diagonal(&g->side[1], node[1].cell);
+}
+
+static double slack_of(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
+{
+    return ebpo_posed_slack(&g->side[0], node[0].cell, g->reach) +
+           ebpo_posed_slack(&g->side[1], node[1].cell, g->reach);
+}
+
+static bool is_nearer(const ebpo_node_gap *a, const ebpo_node_gap *b) { return a->gap < b->gap; }
+
+EBPO_HEAP(heap, ebpo_node_gap, is_nearer)
+
+ebpo_status ebpo_node_gaps_push(ebpo_node_gaps *g, const ebpo_node_gap *pair, ebpo_error *error)
+{
+    if (!ebpo_grow(&g->heap, &g->capacity, g->count + 1, sizeof *g->heap))
+        return ebpo_fail_memory(error, (g->count + 1) * sizeof *g->heap);
+    heap_add(g->heap, g->count++, pair);
+    return EBPO_OK;
+}
+
+ebpo_node_gap ebpo_node_gaps_pop(ebpo_node_gaps *g) { return heap_take(g->heap, g->count--); }
+
+double ebpo_node_far_bound(const ebpo_node_gaps *g, const ebpo_posed_node node[2])
+{
+    double corner[2][8][3], near = 0;
+    ebpo_convex convex[2];
+    for (int i = 0; i < 2; i++) {
+        ebpo_posed_cell(&g->side[i], node[i].cell, corner[i]);
+        convex[i] = (ebpo_convex){ 8, (const double(*)[3])corner[i] };
+        near += EBPO_NEAR_SHARE * ebpo_posed_diagonal(&g->side[i], node[i].cell);
+    }
+    return ebpo_convex_span(&convex[0], &convex[1]) + near + slack_of(g, node);
+}
+
+ebpo_status ebpo_node_gap_of(ebpo_node_gaps *g, const ebpo_posed_node node[2], double *out,
+                             ebpo_error *error)
+{
+    ebpo_convex convex[2];
+    for (int i = 0; i < 2; i++) {
+        ebpo_status status = ebpo_posed_envelope(&g->side[i], node[i].cell, &convex[i], error);
+        if (status != EBPO_OK)
+            return status;
+    }
+    *out = fmax(ebpo_convex_gap(&convex[0], &convex[1], INFINITY) - slack_of(g, node), 0);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_subtree_search_begin(ebpo_subtree_search *s, const ebpo_collision *q,
+                                      ebpo_error *error)
+{
+    s->question = q;
+    s->read_before = ebpo_collision_bytes_read(q);
+    ebpo_status status = ebpo_node_gaps_begin(&s->nodes, q, error);
+    for (int i = 0; i < 2 && status == EBPO_OK; i++) {
+        s->seen[i] = ebpo_alloc_zero(s->nodes.side[i].count + 1, sizeof *s->seen[i]);
+        if (!s->seen[i])
+            return ebpo_fail_memory(error, s->nodes.side[i].count);
+        if (!q->model[i]->whole)
+            status = ebpo_context_new(q->model[i], &s->context[i], error);
+    }
+    return status;
+}
+
+void ebpo_subtree_search_end(ebpo_subtree_search *s)
+{
+    ebpo_collider *c = s->question->collider;
+    c->bytes_read += ebpo_collision_bytes_read(s->question) - s->read_before;
+    for (int i = 0; i < 2; i++) {
+        c->loads += s->context[i] ? s->context[i]->loaded : 0;
+        ebpo_context_free(s->context[i]);
+        free(s->seen[i]);
+    }
+    ebpo_node_gaps_free(&s->nodes);
+}
+
+static bool is_gray(const ebpo_posed_node *node)
+{
+    return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_GRAY;
+}
+
+/* Nodes of a whole model are divided for their bounds only: not below the size of the other one's
+ * subtree. */
+int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node node[2])
+{
+    int larger = ebpo_node_larger(&s->nodes, node);
+    if (is_gray(&node[larger]))
+        return larger;
+    return is_gray(&node[!larger]) && !s->question->model[!larger]->whole ? !larger : -1;
+}
+
+/* Of a whole model and one in parts several pairs of nodes call for the same subtree: once. */
+static bool was_seen(const ebpo_subtree_search *s, const uint32_t number[2])
+{
+    for (int i = 0; i < 2; i++)
+        if (s->question->model[!i]->whole && s->seen[i][number[i]])
+            return true;
+    return false;
+}
+
+ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s, const ebpo_posed_node node[2],
+                                     const ebpo_accel *accel[2], bool *there, ebpo_error *error)
+{
+    ebpo_collider *c = s->question->collider;
+    uint32_t number[2];
+    *there = false;
+    for (int i = 0; i < 2; i++) {
+        const ebpo_model *m = s->question->model[i];
+        number[i] = m->whole ? 0 : ebpo_entry_value(node[i].entry);
+        if (!m->whole && m->top->below[number[i]].pruned)
+            return EBPO_OK; /* what it had is not in this file */
+    }
+    if (was_seen(s, number))
+        return EBPO_OK;
+    c->subtree_pairs++;
+    for (int i = 0; i < 2; i++) {
+        ebpo_accel *loaded = s->question->model[i]->whole;
+        ebpo_status status =
+            loaded ? EBPO_OK : ebpo_context_subtree(s->context[i], number[i], &loaded, error);
+        if (status != EBPO_OK)
+            return status;
+        c->subtrees += !s->seen[i][number[i]];
+        s->seen[i][number[i]] = true;
+        accel[i] = loaded;
+    }
+    *there = true;
+    return EBPO_OK;
+}
