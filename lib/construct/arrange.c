@@ -1,5 +1,12 @@
-/* Vertices and faces along a Morton curve: then every cell's vertices are one run, and neighbours
- * in space are neighbours in memory. */
+/* Sorts a mesh's vertices and faces along a Morton curve. Afterwards the vertices of every cell are
+ * one run, and neighbours in space are neighbours in memory.
+ *
+ * The curve's box is chosen first: a cell face has to be exact in doubles at every level in use.
+ * Vertices are sorted by the octcode of their cell and, within a cell, by position, so that equal
+ * positions are neighbours; vertices without faces go behind the others. Faces follow their least
+ * vertex. Sorting uses the mesh's workspace, so that meshes larger than memory are sorted too. The
+ * order of the source is kept in the mesh's arrangement. The result depends on the mesh alone, not
+ * on the number of threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -39,7 +46,7 @@ static bool is_referenced(const arranging *a, uint64_t v)
     return a->referenced[v / 8] >> v % 8 & 1;
 }
 
-/* --- what is there --- */
+/* --- marking referenced vertices, choosing the box --- */
 
 static ebpo_status mark_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
@@ -158,7 +165,7 @@ typedef struct float_record {
 
 /* The wall numbers around a coordinate; division may round to the wrong side of a wall, comparing
  * with the exact wall does not. */
-static uint32_t arrange_slot(const ebpo_box *box, int axis, int level, double x)
+static uint32_t cell_slot(const ebpo_box *box, int axis, int level, double x)
 {
     double cells = (double)(1u << level), at = (x - box->origin[axis]) / (box->size[axis] / cells);
     uint32_t k = at <= 0 ? 0 : at >= cells ? (1u << level) - 1 : (uint32_t)at;
@@ -178,7 +185,7 @@ static uint64_t key_of(const arranging *a, uint64_t v)
     ebpo_mesh_position(a->mesh, v, p);
     ebpo_cell cell = { box->grid_level, { 0, 0, 0 } };
     for (int k = 0; k < 3; k++)
-        cell.at[k] = arrange_slot(box, k, cell.level, p[k]);
+        cell.at[k] = cell_slot(box, k, cell.level, p[k]);
     return ebpo_octcode_of_cell(cell) << 3 * (EBPO_MAX_LEVEL - box->grid_level) |
            (a->together || is_referenced(a, v) ? 0 : UNREFERENCED);
 }
@@ -290,7 +297,7 @@ static ebpo_status fill_ranks(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-static ebpo_status arrange_translate(void *context, uint64_t begin, uint64_t end, unsigned worker,
+static ebpo_status translate_corners(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                      ebpo_error *error)
 {
     arranging *a = context;
@@ -334,7 +341,7 @@ static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *e
         pass.begin = pass.end++;
         if (status == EBPO_OK)
             status = ebpo_parallel_for(a->threads, mesh->workspace, mesh->face_count, GRAIN,
-                                       arrange_translate, a, &progress, "ordering faces", error);
+                                       translate_corners, a, &progress, "ordering faces", error);
     }
     free(a->rank);
     a->rank = NULL;
@@ -409,12 +416,12 @@ static ebpo_status sort_faces(arranging *a, ebpo_error *error)
     return ebpo_sort_run(&sort, error);
 }
 
-/* --- all --- */
+/* --- the whole mesh --- */
 
 /* A mesh that was arranged already: the source's numbers of vertices come from its own map; those
  * of faces were sorted by. */
-static void arrange_compose(const struct ebpo_arrangement *before, ebpo_workspace *workspace,
-                            uint32_t *map, uint64_t count)
+static void compose_maps(const struct ebpo_arrangement *before, ebpo_workspace *workspace,
+                         uint32_t *map, uint64_t count)
 {
     EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, before ? count : 0)
         map[i] = before->vertex_source[map[i]];
@@ -424,7 +431,7 @@ static void put_in_place(arranging *a)
 {
     ebpo_mesh *mesh = a->mesh;
     struct ebpo_arrangement *before = mesh->arrangement;
-    arrange_compose(before, mesh->workspace, a->to->vertex_source, mesh->vertex_count);
+    compose_maps(before, mesh->workspace, a->to->vertex_source, mesh->vertex_count);
     ebpo_arrangement_free(before);
     ebpo_array_free(mesh->workspace, mesh->xyz32);
     ebpo_array_free(mesh->workspace, mesh->xyz64);
@@ -439,7 +446,7 @@ static void put_in_place(arranging *a)
     a->faces = NULL;
 }
 
-static ebpo_status arrange_run(arranging a, int level, ebpo_error *error)
+static ebpo_status arrange_by_curve(arranging a, int level, ebpo_error *error)
 {
     ebpo_mesh *mesh = a.mesh;
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
@@ -488,103 +495,18 @@ ebpo_status ebpo_mesh_arrange(ebpo_mesh *mesh, unsigned threads, ebpo_progress p
 ebpo_status ebpo_arrange_to_mend(ebpo_mesh *mesh, unsigned threads, const ebpo_progress *progress,
                                  ebpo_error *error)
 {
-    return arrange_run((arranging){ .mesh = mesh,
-                                    .threads = ebpo_thread_count(threads),
-                                    .progress = progress,
-                                    .together = true },
-                       -1, error);
+    return arrange_by_curve((arranging){ .mesh = mesh,
+                                         .threads = ebpo_thread_count(threads),
+                                         .progress = progress,
+                                         .together = true },
+                            -1, error);
 }
 
 ebpo_status ebpo_arrange(ebpo_mesh *mesh, int level, unsigned threads,
                          const ebpo_progress *progress, ebpo_error *error)
 {
-    return arrange_run((arranging){ .mesh = mesh,
-                                    .threads = ebpo_thread_count(threads),
-                                    .progress = progress },
-                       level, error);
-}
-
-/* A mesh made ready for building: mended as asked, in the order of the curve, checked. */
-
-typedef struct preparation {
-    ebpo_mesh *mesh;
-    const ebpo_prepare_options *options;
-    ebpo_prepared *out;
-} preparation;
-
-/* What is too large for an exact grid can be checked all the same; building says so again. */
-static ebpo_status unless_too_large(ebpo_status status, const ebpo_error *local, ebpo_error *error)
-{
-    if (status == EBPO_OK || status == EBPO_E_LIMIT)
-        return EBPO_OK;
-    if (error)
-        *error = *local;
-    return status;
-}
-
-static ebpo_status prepare_mend(const preparation *p, bool weld, ebpo_error *error)
-{
-    const ebpo_prepare_options *o = p->options;
-    unsigned steps = (weld ? EBPO_MEND_WELD : 0) | (o->orient ? EBPO_MEND_ORIENT : 0) |
-                     (o->flip ? EBPO_MEND_FLIP : 0) | (o->fill_holes ? EBPO_MEND_FILL : 0) |
-                     (o->drop_duplicates ? EBPO_MEND_DROP : 0);
-    if (!ebpo_progress_stage(&o->progress, "mending", error))
-        return EBPO_E_CANCELLED;
-    return ebpo_mesh_mend(p->mesh, steps, o->weld_distance, &p->out->record, error);
-}
-
-/* In the order of the curve before anything else, so that each step goes through memory in order,
- * however little of it there is. */
-static ebpo_status arrange_and_mend(const preparation *p, bool weld, ebpo_error *error)
-{
-    const ebpo_prepare_options *o = p->options;
-    ebpo_error local = EBPO_ERROR_INIT;
-    ebpo_status status = ebpo_arrange_to_mend(p->mesh, o->threads, &o->progress, &local);
-    status = unless_too_large(status, &local, error);
-    if (status == EBPO_OK)
-        status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->before, error);
-    return status == EBPO_OK ? prepare_mend(p, weld, error) : status;
-}
-
-static ebpo_status prepare_prepare(const preparation *p, ebpo_error *error)
-{
-    const ebpo_prepare_options *o = p->options;
-    /* STL has no shared vertices */
-    bool weld = o->weld || o->weld_distance > 0 || strncmp(p->mesh->source_format, "stl", 3) == 0;
-    ebpo_status status = EBPO_OK;
-    if (!(o->weld_distance >= 0))
-        return ebpo_fail(
-            error, EBPO_E_ARGUMENT,
-            "weld_distance has to be 0, which is for equal positions, or above, not %g",
-            o->weld_distance);
-    p->out->mended = weld || o->orient || o->flip || o->fill_holes || o->drop_duplicates;
-    if (p->out->mended)
-        status = arrange_and_mend(p, weld, error);
-    if (status == EBPO_OK) {
-        ebpo_error local = EBPO_ERROR_INIT;
-        status = ebpo_arrange(p->mesh, -1, o->threads, &o->progress, &local);
-        status = unless_too_large(status, &local, error);
-    }
-    if (status == EBPO_OK)
-        status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->report, error);
-    if (status == EBPO_OK && !p->out->mended)
-        p->out->before = p->out->report;
-    return status;
-}
-
-ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh, const ebpo_prepare_options *options,
-                              ebpo_prepared *out, ebpo_error *error)
-{
-    EBPO_DEFAULT_FP;
-    static const ebpo_prepared nothing = EBPO_PREPARED_INIT;
-    ebpo_prepare_options wanted = EBPO_PREPARE_OPTIONS_INIT;
-    ebpo_prepared made = EBPO_PREPARED_INIT;
-    preparation p = { mesh, &wanted, &made };
-    ebpo_status status = EBPO_CHECK_SIZED(ebpo_prepared, out, error);
-    if (status == EBPO_OK)
-        status = EBPO_TAKE(ebpo_prepare_options, &wanted, options, error);
-    if (status == EBPO_OK)
-        status = prepare_prepare(&p, error);
-    EBPO_GIVE(ebpo_prepared, out, status == EBPO_OK ? &made : &nothing);
-    return status;
+    return arrange_by_curve((arranging){ .mesh = mesh,
+                                         .threads = ebpo_thread_count(threads),
+                                         .progress = progress },
+                            level, error);
 }

@@ -1,11 +1,11 @@
 /* The builder's state, which its stages share. Before them, vertices and faces are arranged along
  * the curve. Then:
- *   1. the top: faces to the pieces that the tree is cut into (split), winding numbers
+ *   1. the top: faces to the pieces that the tree is cut into (partition), winding numbers
  *      (corner_windings), planes that are chosen from the leaves up (propose), the envelopes above
- *      the pieces (construct_top);
+ *      the pieces (envelopes);
  *   2. piece by piece, on all cores: faces to cells (partition), their numbers (face_numbers),
- *      envelopes and the piece's part of each level (emit), put out of the way (pack);
- *   3. the levels' arrays (join_levels), final vertex numbers (face_numbers).
+ *      envelopes and the piece's part of each level (emit_levels), moved to the store (pieces);
+ *   3. the levels' arrays (emit_levels), final vertex numbers (face_numbers).
  * A piece is a subtree. It needs nothing of another but what the top tells it, and gives back
  * nothing but its part of the levels and its faces' numbers. */
 #ifndef EBPO_CONSTRUCT_BUILDER_H

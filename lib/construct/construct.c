@@ -1,4 +1,10 @@
-/* From a mesh to a tree: the stages in their order. */
+/* Builds the tree of a mesh: runs the stages that builder.h lists, in their order, and fills in the
+ * facts of the result.
+ *
+ * Between the stages stand only the checks of options and the choice of the deepest level (EBP
+ * 2017, equation 3). Pieces are worked on by all threads; a piece's envelopes need its parent's, so
+ * the top of the tree comes first. With a selection from the leaves up, the planes of all nodes are
+ * chosen before that. ebpo_build takes over the mesh and frees it, also on failure. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -149,7 +155,7 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
 }
 
 /* A tree that is deeper than the order is good for needs another one. */
-static ebpo_status construct_arrange(ebpo_builder *b, ebpo_mesh *mesh, ebpo_error *error)
+static ebpo_status arrange_for_levels(ebpo_builder *b, ebpo_mesh *mesh, ebpo_error *error)
 {
     const ebpo_progress *progress = &b->options->progress;
     ebpo_status status = mesh->arrangement && mesh->arrangement->key
@@ -170,9 +176,8 @@ static ebpo_status construct_arrange(ebpo_builder *b, ebpo_mesh *mesh, ebpo_erro
     return ebpo_bounds_make(b, error);
 }
 
-static ebpo_status construct_prepare(ebpo_builder *b, ebpo_mesh *mesh,
-                                     const ebpo_mesh_report *report,
-                                     const ebpo_build_options *options, ebpo_error *error)
+static ebpo_status builder_begin(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_mesh_report *report,
+                                 const ebpo_build_options *options, ebpo_error *error)
 {
     b->options = options;
     b->threads = ebpo_thread_count(options->threads);
@@ -187,7 +192,7 @@ static ebpo_status construct_prepare(ebpo_builder *b, ebpo_mesh *mesh,
             mesh->source_name[0] ? mesh->source_name : "the mesh",
             (unsigned long long)report->unbalanced_edges.count);
     b->max_level = options->max_level >= 0 ? options->max_level : level_limit(report);
-    return construct_arrange(b, mesh, error);
+    return arrange_for_levels(b, mesh, error);
 }
 
 static void builder_free(ebpo_builder *b)
@@ -311,7 +316,7 @@ ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
         status = check_options(&wanted, &out->info, error);
     }
     if (status == EBPO_OK)
-        status = construct_prepare(&b, mesh, report, &wanted, error);
+        status = builder_begin(&b, mesh, report, &wanted, error);
     if (status == EBPO_OK)
         fill_info(&out->info, &b, mesh, report, mend);
     if (status == EBPO_OK)

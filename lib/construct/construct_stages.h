@@ -1,66 +1,65 @@
-/* A piece's nodes and its leaves' lists of faces. */
+/* The stages of building, as construct.c runs them; builder.h lists them in order. Each function
+ * works on one piece (ebpo_branch) or on the whole builder. Stages that allocate report
+ * EBPO_E_MEMORY or EBPO_E_IO, long ones EBPO_E_CANCELLED. */
 #ifndef EBPO_CONSTRUCT_CONSTRUCT_STAGES_H
 #define EBPO_CONSTRUCT_CONSTRUCT_STAGES_H
 
 #include "construct/builder.h"
 #include "construct/planes.h"
 
+/* --- partition.c: the nodes of a piece and the face lists of its leaves --- */
+
 ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *error);
-bool ebpo_build_is_leaf(const ebpo_builder *b, int level, uint64_t count);
 /* EBPO_E_LIMIT when there are more leaves, or more faces listed in them, than a mesh of that many
  * faces may have. */
 ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_t entries,
                                    ebpo_error *error);
-/* Notes which of the faces list[0 .. count) (places in the branch's list, or faces) are not wholly
- * inside. False: out of memory. */
-bool ebpo_build_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
-                         const uint32_t *list, uint64_t count, ebpo_build_detail *detail);
 
-/* The top of the tree, and the lists of faces of the pieces below it. */
-
+/* Cuts the top of the tree, and lists the faces of the pieces below it. */
 ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error);
 
-/* Selections from the leaves up (the theses'), before the walk from the root down writes what they
- * chose. */
+/* --- propose.c: selections from the leaves up (the theses') --- */
 
 /* All branches; nothing to do for a selection from the root. After the corner windings.
  * Pieces are partitioned for it, and forgotten again. */
 EBPO_MUST_USE ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error);
 
-/* A piece to its part of the levels' arrays. */
+/* --- emit_levels.c --- */
 
 typedef struct ebpo_emit_scratch ebpo_emit_scratch;
 ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_workspace *workspace,
                                    ebpo_error *error);
 void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch);
 
-/* leaf_refs still holds the faces' numbers along the curve, not the final ones. */
+/* Writes a piece's part of the levels' arrays; leaf_refs still holds the faces' numbers along the
+ * curve, not the final ones. */
 ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s,
                             ebpo_error *error);
 
-/* The levels' arrays from what the pieces made. */
-
+/* Joins the levels' arrays from the parts of the pieces. */
 ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error);
 
-/* Which octants of a cell a face may touch. */
+/* --- triangle_cell.c --- */
 
 /* Bit i set: the face may touch the closed octant i of the cell, which it is known to touch
  * (conservatively). An octant that the face touches is never missing. */
 unsigned ebpo_octants_touched(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face);
 
-/* Final numbers of faces and vertices: in the order in which the leaves list them first. */
+/* --- face_numbers.c: final numbers, in the order in which leaves list them first --- */
 
 /* Numbers a piece's fresh faces. */
 ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error);
 /* The mesh in its final order. */
 ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error);
 
-/* Colours of gray nodes: means of those of the faces below. format-spec/README.md, section 19. */
+/* --- gray_colours.c (format-spec/README.md, section 19) --- */
 
 /* Of a tree whose levels, mesh and attributes are there, and have colours. EBPO_E_MEMORY,
  * EBPO_E_IO, EBPO_E_CANCELLED. */
 EBPO_MUST_USE ebpo_status ebpo_build_gray_colours(const ebpo_builder *b, ebpo_tree *out,
                                                   ebpo_error *error);
+
+/* --- corner_windings.c --- */
 
 /* Of all branches, before the pieces are partitioned. */
 ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error);
@@ -82,6 +81,8 @@ bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t chi
 /* Bit i is set when corner i is inside by the builder's rule. */
 unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8]);
 
+/* --- envelopes.c --- */
+
 typedef struct ebpo_envelope_scratch ebpo_envelope_scratch;
 ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error);
 void ebpo_scratch_free(ebpo_envelope_scratch *scratch);
@@ -92,8 +93,7 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, cons
                      uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
                      uint32_t codes[EBPO_PLANES_STORED]);
 
-/* What the top's gray nodes keep until the levels are joined. */
-
+/* The planes of a gray node of the top, kept until the levels are joined. */
 typedef struct ebpo_top_envelope {
     uint32_t codes[EBPO_PLANES_STORED];
     int count;

@@ -1,7 +1,13 @@
-/* Winding numbers at cell corners. A subtree's corner differences come from its own leaves alone; a
- * walk from corner to corner along the children's edges adds them up, and the root's lowest corner
- * lies outside the model, where the winding number is 0. Replaces the special cases of BP
- * 2008, 3.4.1.1. */
+/* Computes winding numbers at the corners of cells. They decide which corners, and which cells
+ * without faces, are inside.
+ *
+ * In one cell, a corner's number follows from another's by the signed crossings of faces along the
+ * cell's edges; all corners are taken as shifted by the same infinitely small amount, so a face
+ * through a corner is no special case (ebpo_axis_crossing). For the tree, each node keeps its
+ * corners' differences from its corner 0. A gray node's come from its children's; a walk along the
+ * children's edges adds them up. The root's lowest corner is outside the model: its winding number
+ * is 0. This replaces the special cases of BP 2008, 3.4.1.1. Where two paths to a corner disagree
+ * the mesh does not balance, and the model is a surface. */
 #include "core/strict_fp.h"
 
 #include <string.h>
@@ -10,6 +16,8 @@
 #include "construct/planes.h"
 #include "core/error.h"
 #include "geometry/predicates.h"
+
+/* --- the corners of a tree's nodes --- */
 
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
                          const uint32_t *places, uint64_t count, ebpo_triangle *capacity,
@@ -118,7 +126,7 @@ unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32
     return mask;
 }
 
-/* Winding numbers at a cell's corners, from one corner along the cell's edges. */
+/* --- the corners of one cell --- */
 
 /* The walls that a face reaches: bit 2 k lower, 2 k + 1 upper wall of axis k. What is strictly to
  * one side of a wall, or of the cell, is sure not to cross an edge there, however little the edge

@@ -1,5 +1,14 @@
-/* Subtrees to stretches of level arrays: a depth-first walk meets the nodes of each level in
- * octcode order. */
+/* Turns finished pieces into the arrays of the levels.
+ *
+ * A depth-first walk of a piece visits the nodes of each level in octcode order, so a piece's part
+ * of each level array is one stretch. Stretches are joined in the depth-first order of the pieces,
+ * which is octcode order too. The nodes of the top add stretches of their own. Leaves refer to
+ * faces by their numbers along the curve until all pieces are done, as the final numbers of another
+ * piece's faces are not known before.
+ *
+ * Arrays without information are left out: those that the options do not ask for, and those whose
+ * values readers assume anyway. Volumes are added in a fixed order, so the number of threads does
+ * not change the result. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -13,6 +22,8 @@
 #include "core/parallel.h"
 #include "geometry/level_nodes.h"
 #include "geometry/polytope.h"
+
+/* --- a piece's stretches --- */
 
 struct ebpo_emit_scratch {
     ebpo_envelope_scratch *envelope;
@@ -155,7 +166,7 @@ static bool emit_empty(emitter *e, ebpo_cell cell, int32_t winding)
     return ebpo_piece_level_add_empty(&e->s->out[cell.level], black, winding);
 }
 
-static bool emit_emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
+static bool emit_node(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
                       ebpo_polytope *envelope);
 
 static unsigned filled_children(const ebpo_branch *s, uint32_t child)
@@ -184,7 +195,7 @@ static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t wi
             ebpo_polytope_half(z, 1, o >> 1 & 1, y);
         if (filled >> o & 1)
             ebpo_polytope_half(y, 0, o & 1, x);
-        if (!emit_emit(e, child + o, ebpo_cell_child(cell, o), winding + offset[o], x))
+        if (!emit_node(e, child + o, ebpo_cell_child(cell, o), winding + offset[o], x))
             return false;
     }
     return true;
@@ -220,7 +231,7 @@ static bool emit_gray(emitter *e, const ebpo_build_node *node, ebpo_cell cell, i
     return emit_children(e, node->child, cell, winding, offset, envelope);
 }
 
-static bool emit_emit(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
+static bool emit_node(emitter *e, uint32_t index, ebpo_cell cell, int32_t winding,
                       ebpo_polytope *envelope)
 {
     ebpo_build_node node = e->s->nodes[index];
@@ -238,13 +249,12 @@ ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, e
     s->out = ebpo_array_zero(b->workspace, EBPO_LEVELS_MAX, sizeof *s->out);
     for (int level = 0; s->out && level < EBPO_LEVELS_MAX; level++)
         s->out[level].level.workspace = b->workspace;
-    if (!s->out || !emit_emit(&e, 0, s->cell, s->winding, s->above))
+    if (!s->out || !emit_node(&e, 0, s->cell, s->winding, s->above))
         return ebpo_workspace_fail_while(b->workspace, "while computing envelopes", error);
     return EBPO_OK;
 }
 
-/* All stretches of level arrays joined in depth-first order, which is octcode order in each level.
- */
+/* --- joining the stretches --- */
 
 typedef struct joiner {
     ebpo_builder *b;
@@ -261,7 +271,7 @@ static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
     return ebpo_workspace_fail_while(b->workspace, "while joining levels", error);
 }
 
-static bool join_levels_push(joiner *j, ebpo_piece_level *out)
+static bool push_stretch(joiner *j, ebpo_piece_level *out)
 {
     if (!ebpo_grow(&j->stretch, &j->capacity, j->count + 1, sizeof *j->stretch))
         return false;
@@ -269,12 +279,12 @@ static bool join_levels_push(joiner *j, ebpo_piece_level *out)
     return true;
 }
 
-static ebpo_piece_level *join_levels_current(joiner *j)
+static ebpo_piece_level *current_stretch(joiner *j)
 {
     if (j->current)
         return j->current;
     ebpo_piece_level *out = ebpo_array_zero(j->b->workspace, EBPO_LEVELS_MAX, sizeof *out);
-    if (!out || !join_levels_push(j, out)) {
+    if (!out || !push_stretch(j, out)) {
         ebpo_array_free(j->b->workspace, out);
         return NULL;
     }
@@ -291,21 +301,21 @@ static ebpo_node_type type_of(const ebpo_builder *b, const ebpo_build_node *n, i
     return type;
 }
 
-static bool join_levels_walk(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
+static bool collect_stretches(joiner *j, uint32_t index, ebpo_cell cell, int32_t winding)
 {
     ebpo_builder *b = j->b;
     ebpo_build_node node = b->top.nodes[index];
     if (node.type == EBPO_LEAF) {
         ebpo_piece_level *out = b->sub[node.detail].out;
         b->sub[node.detail].out = NULL;
-        if (!join_levels_push(j, out)) {
+        if (!push_stretch(j, out)) {
             ebpo_piece_levels_free(out);
             return false;
         }
         j->current = NULL;
         return true;
     }
-    ebpo_piece_level *out = join_levels_current(j);
+    ebpo_piece_level *out = current_stretch(j);
     if (!out)
         return false;
     if (node.type == EBPO_WHITE)
@@ -322,7 +332,7 @@ static bool join_levels_walk(joiner *j, uint32_t index, ebpo_cell cell, int32_t 
         !ebpo_piece_level_add_group(&out[cell.level + 1], types))
         return false;
     for (uint32_t o = 0; o < 8; o++)
-        if (!join_levels_walk(j, node.child + o, ebpo_cell_child(cell, o), winding + offset[o]))
+        if (!collect_stretches(j, node.child + o, ebpo_cell_child(cell, o), winding + offset[o]))
             return false;
     return true;
 }
@@ -494,8 +504,7 @@ static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uin
 static bool root_group(joiner *j)
 {
     ebpo_builder *b = j->b;
-    ebpo_piece_level *first =
-        join_levels_current(j); /* never a piece's, whose arrays may be packed */
+    ebpo_piece_level *first = current_stretch(j); /* never a piece's, whose arrays may be packed */
     return first &&
            ebpo_piece_level_add_group(&first[0], (uint16_t)type_of(b, &b->top.nodes[0], 0));
 }
@@ -504,7 +513,7 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
 {
     joiner j = { .b = b, .level = out->level };
     ebpo_status status =
-        root_group(&j) && join_levels_walk(&j, 0, b->top.cell, 0) ? EBPO_OK : no_memory(b, error);
+        root_group(&j) && collect_stretches(&j, 0, b->top.cell, 0) ? EBPO_OK : no_memory(b, error);
     uint64_t refs = 0, all = 0;
     for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
         for (int per = 0; per <= EBPO_PER_GROUP; per++)

@@ -1,5 +1,15 @@
-/* Candidate normals of a gray node: those of the faces below it; where there are many, the mean of
- * each occupied bin of the octahedral map, with bins no finer than needed. */
+/* Chooses the planes of gray nodes, from the root down. The candidates are directions of the convex
+ * hull of the solid within the cell.
+ *
+ * - Few points: the facets of their hull.
+ * - Many points, or points that span no volume: the hull of the extreme points. Each round asks how
+ *   far the solid reaches along the facets' normals (supports.h), and the answers are more points.
+ * - Besides, normals of the faces below the node: where there are many, the mean of each occupied
+ *   bin of the octahedral map, with bins no finer than needed.
+ *
+ * The selection (selections.c) takes planes from the candidates. A support is an upper bound, so a
+ * plane never cuts off a part of the solid, however bad a candidate is. The nodes above the pieces
+ * are computed here too, level by level, so that every piece knows its parent's envelope. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,24 +26,25 @@
 #include "core/hash.h"
 #include "core/parallel.h"
 #include "geometry/polytope.h"
+#include "geometry/vec3.h"
 
-/* Candidate normals of a gray node, from the faces below it. */
+/* --- candidates: normals of faces --- */
 
-enum { EBPO_CANDIDATES_SAMPLE = 4096, EBPO_CANDIDATES_BINS = 16384 };
+enum { CANDIDATES_SAMPLE = 4096, CANDIDATES_BINS = 16384 };
 
 /* A bin of the octahedral map, and the normals in it. */
-typedef struct ebpo_normal_bin {
+typedef struct normal_bin {
     uint32_t key; /* 0: free */
     uint32_t count;
     uint64_t sum_u, sum_v;
-} ebpo_normal_bin;
+} normal_bin;
 
 /* Memory of one thread, which is too large for its stack; begins as zeros. */
-typedef struct ebpo_candidates_scratch {
-    ebpo_normal_bin table[EBPO_CANDIDATES_BINS]; /* by hash; all are free between calls */
-    uint32_t sample[EBPO_CANDIDATES_SAMPLE];
+typedef struct candidates_scratch {
+    normal_bin table[CANDIDATES_BINS]; /* by hash; all are free between calls */
+    uint32_t sample[CANDIDATES_SAMPLE];
     int slots[EBPO_PLANES_CANDIDATES]; /* the bins that are not free */
-} ebpo_candidates_scratch;
+} candidates_scratch;
 
 /* Every `step`-th of the entries, or of the branch's whole list. */
 static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint32_t *entries,
@@ -48,7 +59,7 @@ static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint
             *count % 16 == 0) /* each is in a different part of the workspace's files */
             ebpo_release_pages(b->workspace);
         ebpo_branch_triangle(b, s, entries ? entries[i] : (uint32_t)i, &face);
-        if (*count < EBPO_CANDIDATES_SAMPLE && ebpo_face_normal_code(&b->box, &face, &normal))
+        if (*count < CANDIDATES_SAMPLE && ebpo_face_normal_code(&b->box, &face, &normal))
             sample[(*count)++] = normal;
     }
     *skip = i - end;
@@ -60,7 +71,7 @@ static int take_sample(const ebpo_builder *b, const ebpo_branch *s, const ebpo_b
     int count = 0;
     uint64_t skip = 0, total = 0;
     if (s->list) {
-        uint64_t step = (d->entry_end - d->entry_begin) / EBPO_CANDIDATES_SAMPLE + 1;
+        uint64_t step = (d->entry_end - d->entry_begin) / CANDIDATES_SAMPLE + 1;
         sample_faces(b, s, s->entries, d->entry_begin, d->entry_end, &skip, step, sample, &count);
         return count;
     }
@@ -68,13 +79,13 @@ static int take_sample(const ebpo_builder *b, const ebpo_branch *s, const ebpo_b
         total += b->sub[i].list_count;
     for (uint64_t i = d->entry_begin; i < d->entry_end; i++)
         sample_faces(b, &b->sub[i], NULL, 0, b->sub[i].list_count, &skip,
-                     total / EBPO_CANDIDATES_SAMPLE + 1, sample, &count);
+                     total / CANDIDATES_SAMPLE + 1, sample, &count);
     return count;
 }
 
 /* Fills the table with bins of `width` codes; false when more than `most` are occupied. */
-static bool fill_bins(ebpo_normal_bin *table, int *used, int *slots, const uint32_t *sample,
-                      int count, uint32_t width, int most)
+static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *sample, int count,
+                      uint32_t width, int most)
 {
     for (int i = 0; i < *used; i++)
         table[slots[i]].key = 0;
@@ -83,12 +94,12 @@ static bool fill_bins(ebpo_normal_bin *table, int *used, int *slots, const uint3
         uint32_t u = sample[i] & 1023, v = sample[i] >> 10 & 1023,
                  key = 1 + u / width + (v / width << 10);
         uint64_t at;
-        EBPO_HASH_FIND(at, ebpo_hash_number(key), EBPO_CANDIDATES_BINS - 1,
+        EBPO_HASH_FIND(at, ebpo_hash_number(key), CANDIDATES_BINS - 1,
                        !table[at].key || table[at].key == key);
         if (!table[at].key) {
             if (*used == most)
                 return false;
-            table[at] = (ebpo_normal_bin){ key, 0, 0, 0 };
+            table[at] = (normal_bin){ key, 0, 0, 0 };
             slots[(*used)++] = (int)at;
         }
         table[at].count++;
@@ -99,17 +110,17 @@ static bool fill_bins(ebpo_normal_bin *table, int *used, int *slots, const uint3
 }
 
 /* At most `most` of them; returns how many. */
-static int ebpo_build_candidates(const ebpo_builder *b, ebpo_candidates_scratch *scratch,
-                                 const ebpo_branch *s, const ebpo_build_detail *detail, int most,
-                                 ebpo_candidate *out)
+static int build_candidates(const ebpo_builder *b, candidates_scratch *scratch,
+                            const ebpo_branch *s, const ebpo_build_detail *detail, int most,
+                            ebpo_candidate *out)
 {
-    ebpo_normal_bin *table = scratch->table;
+    normal_bin *table = scratch->table;
     int used = 0, count = take_sample(b, s, detail, scratch->sample);
     uint32_t width = 1;
     while (!fill_bins(table, &used, scratch->slots, scratch->sample, count, width, most))
         width = width < 4 ? 4 : width + width / 2;
     for (int i = 0; i < used; i++) {
-        ebpo_normal_bin *t = &table[scratch->slots[i]];
+        normal_bin *t = &table[scratch->slots[i]];
         uint32_t u = (uint32_t)((t->sum_u + t->count / 2) / t->count),
                  v = (uint32_t)((t->sum_v + t->count / 2) / t->count);
         out[i] = (ebpo_candidate){ .normal = u | v << 10, .support = -1e300 };
@@ -118,9 +129,7 @@ static int ebpo_build_candidates(const ebpo_builder *b, ebpo_candidates_scratch 
     return used;
 }
 
-/* The planes of a gray node, from the root down: candidates are the directions of the solid's hull
- * in the cell. Few points: their hull. Many, or none that span a volume: the hull of the extreme
- * ones, found by asking in its own directions, and normals of faces. */
+/* --- scratch memory and supports --- */
 
 enum {
     TOP_LEVELS = 4,   /* nearly free of bytes */
@@ -143,7 +152,7 @@ struct ebpo_envelope_scratch {
     double core[EBPO_HULL_POINTS][3]; /* extreme points of the solid in the cell */
     int core_count;
     ebpo_hull_facet facet[EBPO_HULL_FACETS];
-    ebpo_candidates_scratch of_faces;
+    candidates_scratch of_faces;
 };
 
 ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error)
@@ -161,8 +170,8 @@ void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
 
 /* A support from which on a plane cannot remove epsilon, nor a needle: a cap of height h of a body
  * of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
-static double envelopes_hopeless(const ebpo_polytope *envelope, double volume, const int32_t n[3],
-                                 double epsilon)
+static double hopeless_below(const ebpo_polytope *envelope, double volume, const int32_t n[3],
+                             double epsilon)
 {
     double most = -1e300, least = 1e300;
     for (int i = 0; i < envelope->vertex_count; i++) {
@@ -182,7 +191,7 @@ static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_pol
 {
     int32_t n[3], d;
     ebpo_plane_code_decode(normal, n, &d);
-    double enough = envelopes_hopeless(envelope, volume, n, epsilon);
+    double enough = hopeless_below(envelope, volume, n, epsilon);
     double support = ebpo_supports_find_from(&s->supports, n, enough, (const double(*)[3])s->core,
                                              s->core_count, where);
     if (support < enough && s->count < EBPO_PLANES_CANDIDATES)
@@ -252,7 +261,7 @@ static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, 
             continue;
         try_normal(s, normal, envelope, volume, epsilon, where);
         most--;
-        if (f->n[0] * where[0] + f->n[1] * where[1] + f->n[2] * where[2] > f->d + worth)
+        if (ebpo_vec3_dot(f->n, where) > f->d + worth)
             add_core(s, where);
     }
     return s->core_count > before;
@@ -336,7 +345,7 @@ static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s,
 {
     bool top = level <= TOP_LEVELS;
     ebpo_candidate faces[FACES_BELOW];
-    int count = ebpo_build_candidates(b, &s->of_faces, branch, detail, FACES_BELOW, faces);
+    int count = build_candidates(b, &s->of_faces, branch, detail, FACES_BELOW, faces);
     s->core_count = 0;
     try_all_around(s);
     for (int i = 0; i < count; i++) {
@@ -385,8 +394,7 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo
     return count;
 }
 
-/* The nodes above the subtrees: their envelopes level by level, so that every subtree knows its
- * parent's. */
+/* --- the nodes above the pieces, level by level --- */
 
 typedef struct pending {
     uint32_t node; /* gray, in the top */
@@ -467,7 +475,7 @@ static void wave_free(wave *w)
     *w = (wave){ .b = w->b };
 }
 
-static ebpo_status construct_top_start(ebpo_builder *b, wave *w, ebpo_error *error)
+static ebpo_status wave_begin(ebpo_builder *b, wave *w, ebpo_error *error)
 {
     ebpo_polytope *cube = ebpo_array_alloc(b->workspace, 1, sizeof *cube);
     if (!cube)
@@ -491,7 +499,7 @@ ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error)
     if (!b->top_envelope)
         return no_memory(b, error);
     wave now = { .b = b }, next = { .b = b };
-    ebpo_status status = construct_top_start(b, &now, error);
+    ebpo_status status = wave_begin(b, &now, error);
     ebpo_pass pass = { &b->options->progress, 0, 0, b->top.detail_count };
     ebpo_progress progress = ebpo_pass_progress(&pass);
     while (status == EBPO_OK && now.count) {

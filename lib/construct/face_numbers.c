@@ -1,4 +1,10 @@
-/* Final numbers: faces by the first leaf, depth first, that they touch; vertices by first use. */
+/* Gives faces and vertices their final numbers, and puts the mesh into that order.
+ *
+ * A face is numbered in the first leaf, depth first, that lists it; a vertex by the first face that
+ * uses it. So a leaf's new faces are one range in the file, and only the others need references. A
+ * piece numbers its fresh faces, those that no earlier piece lists, so pieces are independent of
+ * each other. Attributes move with their vertices and faces. The format describes the order in
+ * format-spec/README.md. */
 #include "core/strict_fp.h"
 
 #include "construct/construct_stages.h"

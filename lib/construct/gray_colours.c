@@ -1,19 +1,25 @@
-/* From the deepest level up: a group of eight gives the sums of the gray node above it. Nothing is
- * kept of faces; what they give is computed for each leaf that lists them, as leaves list few more
- * than there are. */
+/* Computes the colours of gray nodes: the mean, by area, of the colours of the faces below
+ * (format-spec/README.md, section 19).
+ *
+ * Levels go from the deepest up: a group of eight gives the sums of the gray node above it. Nothing
+ * is kept for each face; a face's part is computed for each leaf that lists it, as leaves list few
+ * more faces than there are. Weights and sums are integers, so the result is exact and does not
+ * depend on the number of threads. The colours are those of the vertices; those of faces count
+ * where vertices have none, or all the same. lib/verify computes the same colours in another way.
+ */
 #include "core/strict_fp.h"
-
-#include "construct/construct_stages.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#include "mesh/attributes.h"
+#include "construct/construct_stages.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/wide.h"
 #include "geometry/level_nodes.h"
+#include "geometry/vec3.h"
+#include "mesh/attributes.h"
 
 enum { GROUP_GRAIN = 1 << 12, GROUPS_A_TIME = 16 };
 
@@ -42,16 +48,15 @@ typedef struct colouring {
 static uint64_t weight_of(const colouring *c, uint64_t face)
 {
     const uint32_t *corner = c->tree->mesh.faces + 3 * face;
-    double p[3][3], u[3], v[3];
+    double p[3][3], u[3], v[3], normal[3];
     for (int k = 0; k < 3; k++)
         ebpo_mesh_position(&c->tree->mesh, corner[k], p[k]);
     for (int k = 0; k < 3; k++) {
         u[k] = (p[1][k] - p[0][k]) / c->size;
         v[k] = (p[2][k] - p[0][k]) / c->size;
     }
-    double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2],
-           z = u[0] * v[1] - u[1] * v[0];
-    return 1 + (uint64_t)(sqrt(x * x + y * y + z * z) * 0x1p32);
+    ebpo_vec3_cross(u, v, normal);
+    return 1 + (uint64_t)(ebpo_vec3_length(normal) * 0x1p32);
 }
 
 static void add_face(const colouring *c, uint64_t face, colour_sums *sums)

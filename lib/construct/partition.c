@@ -1,6 +1,14 @@
-/* Faces to cells: a piece becomes a subtree, depth first. What a node is depends on its cell and
- * its faces alone, so neither the pieces nor the threads show in the result. Source: EBP 2017, 3.3
- * (assignment of faces to leaves); BP 2008, 3.3.1 (coalescing). */
+/* Assigns faces to cells. First the top of the tree is cut until the pieces below it are small
+ * enough to be processed in parallel; then each piece becomes a subtree, depth first.
+ *
+ * What a node is depends on its cell and its faces alone, and where the top ends on the model
+ * alone, so neither pieces nor threads nor the machine show in the result. Sources: EBP 2017, 3.3
+ * (assignment of faces to leaves); BP 2008, 3.3.1 (coalescing nodes with few faces).
+ *
+ * The cut of the top also computes what a piece has to know of the others: which of its faces no
+ * earlier piece lists ("fresh"), and the winding numbers at its corners. A mesh with huge faces and
+ * a deep maximum level would list every face in millions of cells: leaves and entries are limited
+ * by the number of faces. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -15,6 +23,8 @@
 #include "core/hash.h"
 #include "core/parallel.h"
 #include "geometry/ray.h"
+
+/* --- a piece: limits and lists --- */
 
 enum { RELEASE_FACES = 1 << 13 };
 
@@ -44,7 +54,7 @@ typedef struct grower {
     ebpo_error *error;
 } grower;
 
-bool ebpo_build_is_leaf(const ebpo_builder *b, int level, uint64_t count)
+static bool is_leaf(const ebpo_builder *b, int level, uint64_t count)
 {
     return level == b->max_level || count <= b->options->leaf_faces;
 }
@@ -62,15 +72,15 @@ ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_
                      (unsigned long long)most_leaves, (unsigned long long)most_entries);
 }
 
-static ebpo_status partition_no_memory(ebpo_error *error)
+static ebpo_status no_memory_for_cells(ebpo_error *error)
 {
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while assigning faces to cells");
 }
 
 /* Faces with a vertex outside the cell's run of vertices reach over its walls (or touch an upper
  * one). */
-bool ebpo_build_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
-                         const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
+static bool note_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
+                          const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
 {
     uint64_t begin, end;
     ebpo_build_vertex_range(b, cell, &begin, &end);
@@ -97,7 +107,7 @@ static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, u
     if (!ebpo_branch_detail(g->b, s, &node->detail) ||
         !ebpo_array_grow_late(g->b->workspace, &s->entries, &s->entry_capacity,
                               s->entry_count + count, sizeof *s->entries))
-        return partition_no_memory(g->error);
+        return no_memory_for_cells(g->error);
     ebpo_build_detail *d = &s->details[node->detail];
     d->entry_begin = s->entry_count;
     ebpo_array_copy(b->workspace, s->entries + s->entry_count, g->stack + at,
@@ -111,18 +121,18 @@ static ebpo_status grow_leaf(grower *g, ebpo_build_node *node, ebpo_cell cell, u
         return status;
     if (!ebpo_grow(&g->faces, &g->faces_capacity,
                    count < EBPO_CORNER_FACES ? count : EBPO_CORNER_FACES, sizeof *g->faces))
-        return partition_no_memory(g->error);
+        return no_memory_for_cells(g->error);
     ebpo_branch_corners(b, s, cell, g->stack + at, count, g->faces, d->delta);
     return EBPO_OK;
 }
 
 /* Splits the list at stack[at] into eight lists at stack[top]. */
-static ebpo_status partition_split(grower *g, ebpo_cell cell, uint64_t at, uint64_t count,
-                                   uint64_t top, uint64_t begin[9])
+static ebpo_status split_list(grower *g, ebpo_cell cell, uint64_t at, uint64_t count, uint64_t top,
+                              uint64_t begin[9])
 {
     const ebpo_builder *b = g->b;
     if (!ebpo_array_grow_late(g->b->workspace, &g->mask, &g->mask_capacity, count, 1))
-        return partition_no_memory(g->error);
+        return no_memory_for_cells(g->error);
     uint64_t sizes[8] = { 0 };
     EBPO_FOR_ITEMS_EVERY(b->workspace, RELEASE_FACES, i, 0, count) {
         ebpo_triangle face;
@@ -137,7 +147,7 @@ static ebpo_status partition_split(grower *g, ebpo_cell cell, uint64_t at, uint6
         begin[o + 1] = begin[o] + sizes[o];
     if (!ebpo_array_grow_late(g->b->workspace, &g->stack, &g->stack_capacity, begin[8],
                               sizeof *g->stack))
-        return partition_no_memory(g->error);
+        return no_memory_for_cells(g->error);
     uint64_t next[8];
     memcpy(next, begin, sizeof next);
     EBPO_FOR_ITEMS_EVERY(b->workspace, RELEASE_FACES, i, 0, count)
@@ -146,7 +156,7 @@ static ebpo_status partition_split(grower *g, ebpo_cell cell, uint64_t at, uint6
     return EBPO_OK;
 }
 
-/* --- coalescing what turned out to be few --- */
+/* --- coalescing nodes with few faces --- */
 
 static uint64_t set_slot(const face_set *set, uint32_t face)
 {
@@ -186,7 +196,7 @@ static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, ui
     uint64_t most =
         g->b->options->leaf_faces < g->b->face_count ? g->b->options->leaf_faces : g->b->face_count;
     if (!set_start(&g->set, most))
-        return partition_no_memory(g->error);
+        return no_memory_for_cells(g->error);
     for (uint64_t i = d.entry_begin; i < d.entry_end; i++) {
         uint64_t slot = set_slot(&g->set, s->entries[i]);
         if (g->set.slots[slot].round == g->set.round)
@@ -211,13 +221,13 @@ static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, ui
 }
 
 /* The node's list is stack[at] to stack[at + count - 1]; the stack is free from `top` on. */
-static ebpo_status partition_grow(grower *g, uint32_t index, ebpo_cell cell, uint64_t at,
-                                  uint64_t count, uint64_t top)
+static ebpo_status grow_node(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, uint64_t count,
+                             uint64_t top)
 {
     ebpo_branch *s = g->s;
     if (count == 0)
         return EBPO_OK; /* stays white until the labels are known */
-    if (ebpo_build_is_leaf(g->b, cell.level, count)) {
+    if (is_leaf(g->b, cell.level, count)) {
         ebpo_build_node node = { 0 };
         ebpo_status status = grow_leaf(g, &node, cell, at, count);
         s->nodes[index] = node;
@@ -225,7 +235,7 @@ static ebpo_status partition_grow(grower *g, uint32_t index, ebpo_cell cell, uin
     }
     uint64_t begin[9];
     uint32_t detail, child;
-    ebpo_status status = partition_split(g, cell, at, count, top, begin);
+    ebpo_status status = split_list(g, cell, at, count, top, begin);
     if (status == EBPO_OK)
         status = ebpo_build_check_branch(s, g->error);
     if (status != EBPO_OK)
@@ -233,14 +243,14 @@ static ebpo_status partition_grow(grower *g, uint32_t index, ebpo_cell cell, uin
     if (s->detail_count % EBPO_ITEMS_SCATTERED == 0)
         ebpo_release_pages(g->b->workspace);
     if (!ebpo_branch_detail(g->b, s, &detail) || !ebpo_branch_children(g->b, s, &child))
-        return partition_no_memory(g->error);
+        return no_memory_for_cells(g->error);
     s->nodes[index] = (ebpo_build_node){ EBPO_GRAY, child, detail };
     ebpo_build_detail d = { .entry_begin = s->entry_count };
-    if (!ebpo_build_crossing(g->b, s, cell, g->stack + at, count, &d))
-        status = partition_no_memory(g->error);
+    if (!note_crossing(g->b, s, cell, g->stack + at, count, &d))
+        status = no_memory_for_cells(g->error);
     for (unsigned o = 0; o < 8 && status == EBPO_OK; o++)
-        status = partition_grow(g, child + o, ebpo_cell_child(cell, o), begin[o],
-                                begin[o + 1] - begin[o], begin[8]);
+        status = grow_node(g, child + o, ebpo_cell_child(cell, o), begin[o],
+                           begin[o + 1] - begin[o], begin[8]);
     if (status != EBPO_OK)
         return status;
     d.entry_end = s->entry_count;
@@ -256,12 +266,12 @@ static ebpo_status grow_from_list(grower *g)
     if (!ebpo_array_grow_late(g->b->workspace, &g->stack, &g->stack_capacity, s->list_count,
                               sizeof *g->stack) ||
         !ebpo_array_grow_late(g->b->workspace, &s->nodes, &s->node_capacity, 1, sizeof *s->nodes))
-        return partition_no_memory(g->error);
+        return no_memory_for_cells(g->error);
     for (uint64_t i = 0; i < s->list_count; i++)
         g->stack[i] = (uint32_t)i;
     memset(&s->nodes[0], 0, sizeof s->nodes[0]);
     s->node_count = 1;
-    return partition_grow(g, 0, s->cell, 0, s->list_count, s->list_count);
+    return grow_node(g, 0, s->cell, 0, s->list_count, s->list_count);
 }
 
 ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *error)
@@ -277,15 +287,12 @@ ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *er
     return status;
 }
 
-/* The top of the tree: cut until the pieces are small enough to be processed in parallel. That
- * depends on the model alone, never on the machine. What a piece must know of the others is
- * computed here: which of its faces no earlier piece lists, and the winding numbers at its corners.
- */
+/* --- the top of the tree --- */
 
 /* Pieces have at most this many faces, but there are no more than about PIECES_MOST pieces. */
 enum { PIECE_FACES = 4096, PIECES_MOST = 2048, SPLIT_GRAIN = 1 << 13 };
 
-static ebpo_status split_no_memory(const ebpo_builder *b, ebpo_error *error)
+static ebpo_status no_memory_for_pieces(const ebpo_builder *b, ebpo_error *error)
 {
     return ebpo_workspace_fail_while(b->workspace, "while cutting the tree into pieces", error);
 }
@@ -386,10 +393,10 @@ static ebpo_status make_room(ebpo_builder *b, top_split *t, uint32_t *lists[8], 
     ebpo_branch *s = &b->top;
     for (unsigned o = 0; o < 8; o++)
         if (!(t->to[o] = lists[o] = ebpo_array_alloc(b->workspace, sizes[o], sizeof *lists[o])))
-            return split_no_memory(b, error);
+            return no_memory_for_pieces(b, error);
     if (!ebpo_array_grow_late(b->workspace, &s->crossing, &s->cross_capacity,
                               s->cross_count + sizes[8], sizeof *s->crossing))
-        return split_no_memory(b, error);
+        return no_memory_for_pieces(b, error);
     /* without any, there is no array yet */
     t->to[8] = s->crossing ? s->crossing + s->cross_count : NULL;
     s->cross_count += sizes[8];
@@ -410,7 +417,7 @@ static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *li
                     .mask = ebpo_array_alloc(b->workspace, count, sizeof *t.mask),
                     .begin = ebpo_alloc(count / SPLIT_GRAIN + 1, sizeof *t.begin) };
     ebpo_build_vertex_range(b, cell, &t.first_vertex, &t.end_vertex);
-    ebpo_status status = t.mask && t.begin ? EBPO_OK : split_no_memory(b, error);
+    ebpo_status status = t.mask && t.begin ? EBPO_OK : no_memory_for_pieces(b, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(b->threads, b->workspace, count, SPLIT_GRAIN, make_masks, &t,
                                    &progress, "cutting into pieces", error);
@@ -464,7 +471,7 @@ static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, 
     if (status == EBPO_OK &&
         (!ebpo_grow(&b->sub, &b->sub_capacity, b->sub_count + 1, sizeof *b->sub) ||
          !mark_fresh(b, &s, c->listed)))
-        status = split_no_memory(b, c->error);
+        status = no_memory_for_pieces(b, c->error);
     if (status != EBPO_OK) {
         ebpo_array_free(b->workspace, list);
         return status;
@@ -481,7 +488,7 @@ static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t
 {
     ebpo_builder *b = c->b;
     ebpo_branch *s = &b->top;
-    if (count <= c->piece || ebpo_build_is_leaf(b, cell.level, count)) {
+    if (count <= c->piece || is_leaf(b, cell.level, count)) {
         ebpo_build_node node = { 0 };
         ebpo_status status = add_piece(c, &node, cell, list, count);
         s->nodes[index] = node;
@@ -494,7 +501,7 @@ static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t
         status = split_top(b, cell, list, count, lists, sizes, c->error);
     if (status == EBPO_OK &&
         (!ebpo_branch_detail(b, s, &detail) || !ebpo_branch_children(b, s, &child)))
-        status = split_no_memory(b, c->error);
+        status = no_memory_for_pieces(b, c->error);
     if (status == EBPO_OK) {
         s->nodes[index] = (ebpo_build_node){ EBPO_GRAY, child, detail };
         s->details[detail] = (ebpo_build_detail){ .entry_begin = b->sub_count,
@@ -513,7 +520,7 @@ static ebpo_status grow_top(cutting *c, uint32_t index, ebpo_cell cell, uint32_t
     return status;
 }
 
-static ebpo_status split_cut(ebpo_builder *b, ebpo_error *error)
+static ebpo_status cut_top(ebpo_builder *b, ebpo_error *error)
 {
     uint32_t *all = ebpo_array_alloc(b->workspace, b->face_count, sizeof *all);
     cutting c = { b,
@@ -528,7 +535,7 @@ static ebpo_status split_cut(ebpo_builder *b, ebpo_error *error)
         !ebpo_array_grow_late(b->workspace, &b->top.nodes, &b->top.node_capacity, 1,
                               sizeof *b->top.nodes)) {
         ebpo_array_free(b->workspace, all);
-        status = split_no_memory(b, error);
+        status = no_memory_for_pieces(b, error);
     } else {
         memset(&b->top.nodes[0], 0, sizeof b->top.nodes[0]);
         b->top.node_count = 1;
@@ -540,7 +547,7 @@ static ebpo_status split_cut(ebpo_builder *b, ebpo_error *error)
     return status;
 }
 
-/* --- corners --- */
+/* --- winding numbers at the corners of pieces --- */
 
 static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                      ebpo_error *error)
@@ -549,7 +556,7 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
     (void)worker;
     ebpo_triangle *faces = ebpo_alloc(EBPO_CORNER_FACES, sizeof *faces);
     if (!faces)
-        return split_no_memory(b, error);
+        return no_memory_for_pieces(b, error);
     for (uint64_t i = begin; i < end; i++) {
         ebpo_branch *s = &b->sub[i];
         ebpo_branch_corners(b, s, s->cell, NULL, s->list_count, faces, s->root_delta);
@@ -587,12 +594,12 @@ static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
 ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error)
 {
     b->top.cell = (ebpo_cell){ 0, { 0, 0, 0 } };
-    ebpo_status status = split_cut(b, error);
+    ebpo_status status = cut_top(b, error);
     if (status == EBPO_OK)
         status = fit_largest_piece(b, error);
     b->number = ebpo_array_alloc(b->workspace, b->face_count, sizeof *b->number);
     if (status == EBPO_OK && !b->number)
-        status = split_no_memory(b, error);
+        status = no_memory_for_pieces(b, error);
     if (status == EBPO_OK)
         ebpo_array_fill(b->workspace, b->number, 0xff, b->face_count * sizeof *b->number);
     if (status == EBPO_OK && b->solid)

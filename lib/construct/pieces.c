@@ -1,3 +1,10 @@
+/* Holds what the pieces of the tree own while they are built: nodes, details and lists; their
+ * stretches of the levels' arrays; proposed planes; and the store.
+ *
+ * A piece is a subtree that one thread builds. Its arrays grow in memory or in the builder's
+ * workspace. When a piece is done, its results move to the store, blocks of the workspace that are
+ * filled one after the other and read once, when the levels are joined. Without a workspace nothing
+ * moves. */
 #include "core/strict_fp.h"
 
 #include <pthread.h>
@@ -9,6 +16,8 @@
 #include "core/error.h"
 #include "core/workspace.h"
 #include "geometry/polytope.h"
+
+/* --- stretches of the levels' arrays --- */
 
 void ebpo_piece_levels_free(ebpo_piece_level *out)
 {
@@ -58,6 +67,8 @@ bool ebpo_piece_level_add_empty(ebpo_piece_level *out, bool black, int32_t windi
     (*array)[(*count)++] = winding;
     return true;
 }
+
+/* --- proposed planes --- */
 
 void ebpo_handover_free(ebpo_handover *h)
 {
@@ -128,7 +139,7 @@ bool ebpo_proposals_make(ebpo_branch *s)
     return p->first && p->count;
 }
 
-/* Where pieces put what they made until the levels are joined. */
+/* --- the store --- */
 
 enum { STORE_BYTES = 16 << 20, ALIGNMENT = 8 };
 
@@ -147,7 +158,7 @@ static size_t reserve_for(uint64_t count, size_t size)
     return (count * size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
 }
 
-static char *take_capacity(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
+static char *store_take(ebpo_builder *b, struct ebpo_store *s, size_t bytes)
 {
     if (!s->block_count || bytes > s->left) {
         size_t block = bytes > STORE_BYTES ? bytes : STORE_BYTES;
@@ -177,17 +188,17 @@ static bool make_store(ebpo_builder *b)
     return b->store != NULL;
 }
 
-static char *pack_reserve(ebpo_builder *b, size_t bytes)
+static char *store_reserve(ebpo_builder *b, size_t bytes)
 {
     pthread_mutex_lock(&b->store->lock);
-    char *at = take_capacity(b, b->store, bytes);
+    char *at = store_take(b, b->store, bytes);
     pthread_mutex_unlock(&b->store->lock);
     return at;
 }
 
 void *ebpo_store_reserve(ebpo_builder *b, uint64_t bytes)
 {
-    return make_store(b) ? pack_reserve(b, reserve_for(bytes, 1)) : NULL;
+    return make_store(b) ? store_reserve(b, reserve_for(bytes, 1)) : NULL;
 }
 
 static size_t capacity_of(const ebpo_level *level, int id)
@@ -239,6 +250,8 @@ void ebpo_store_free(struct ebpo_store *store)
     pthread_mutex_destroy(&store->lock);
     free(store);
 }
+
+/* --- nodes --- */
 
 bool ebpo_branch_detail(const ebpo_builder *b, ebpo_branch *s, uint32_t *index)
 {

@@ -1,4 +1,4 @@
-/* What a piece adds to the levels' arrays, while it is made. */
+/* What the pieces of the tree own while they are built (pieces.c). */
 #ifndef EBPO_CONSTRUCT_PIECES_H
 #define EBPO_CONSTRUCT_PIECES_H
 
@@ -6,6 +6,8 @@
 
 #include "construct/builder.h"
 #include "format/schema.h"
+
+/* --- a piece's part of the levels' arrays --- */
 
 /* Of one level. */
 typedef struct ebpo_piece_level {
@@ -21,7 +23,7 @@ bool ebpo_piece_level_add_empty(ebpo_piece_level *out, bool black, int32_t windi
 /* All levels of a piece. */
 void ebpo_piece_levels_free(ebpo_piece_level *out);
 
-/* Planes that were chosen from the leaves up, and what nodes hand to their parents on the way. */
+/* --- planes that were chosen from the leaves up, and what nodes hand to their parents --- */
 
 /* A plane that a node's parent may choose from: its normal, and n . xi of the face that it comes
  * from. */
@@ -60,7 +62,7 @@ bool ebpo_handover_add(ebpo_handover *h, uint32_t normal, double origin);
 /* Adds what a child hands over, from its coordinates to its parent's. */
 bool ebpo_handover_gather(ebpo_handover *given, const ebpo_handover *child, unsigned octant);
 
-/* The store: where pieces put what they made until the levels are joined. */
+/* --- the store: holds the results of pieces until the levels are joined --- */
 
 /* Moves what a piece gave to the store, out of the way: to be read once, when the levels are
  * joined. Nothing to do without a workspace. */
@@ -70,7 +72,7 @@ ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_piece_level *out, ebpo_error *
 void *ebpo_store_reserve(ebpo_builder *b, uint64_t bytes);
 void ebpo_store_free(struct ebpo_store *store);
 
-/* The nodes of a subtree under construction. */
+/* --- the nodes of a piece --- */
 
 /* Adds an empty detail, or eight empty nodes. False: out of memory. */
 bool ebpo_branch_detail(const ebpo_builder *b, ebpo_branch *s, uint32_t *index);

@@ -1,4 +1,6 @@
-/* Choosing the planes of an envelope, and the support of the solid that bounds them. */
+/* Choosing the planes of an envelope: candidates and selections (selections.c), a leaf's planes
+ * (leaf_planes.c), faces against cells (triangle_cell.c), the small hull (hull_directions.c), and
+ * winding numbers at a cell's corners (corner_windings.c). */
 #ifndef EBPO_CONSTRUCT_PLANES_H
 #define EBPO_CONSTRUCT_PLANES_H
 
@@ -59,11 +61,6 @@ ebpo_select_fn ebpo_selection_function(ebpo_selection selection);
  */
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
-/* The theses' (theses.c). */
-int ebpo_select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
-int ebpo_select_offset(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
-int ebpo_select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
-
 /* How many of `count` candidates: `percent` of them, rounded up (EBP 2017, equation 5); or, with
  * k_root > 0, BP's K: k_root / 2^level, halved on while it is not below `count` (2008, 3.5.1); all
  * of them where that is below 1 to begin with (as there). EBPO_PLANES_STORED where it would be
@@ -110,12 +107,7 @@ int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *f
                      uint64_t count, unsigned inside_corners, double epsilon,
                      ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX]);
 
-/* The plane that a candidate would be, for ebpo_polytope_clip; false when only the whole cell would
- * do. */
-bool ebpo_candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3],
-                          double *offset);
-
-/* A small convex hull, for directions only: what it gets wrong costs volume, never containment. */
+/* --- a small convex hull, for directions only: errors cost volume, never containment --- */
 
 enum { EBPO_HULL_POINTS = 8192, EBPO_HULL_FACETS = 2048 };
 

@@ -1,4 +1,11 @@
-/* Planes from the leaves up, of the nodes of a piece. */
+/* Chooses planes from the leaves up, for the theses' selections (EBP 2017, 3.4.1). The walk from
+ * the root down writes the chosen planes later.
+ *
+ * A leaf's candidates are the planes of its faces; a gray node's are the planes that its children
+ * have chosen. Each node clips the whole cell, and its support comes from the corners of the
+ * children's envelopes and from the solid itself, so containment never rests on rounded corners.
+ * Each piece is partitioned, its planes are chosen, and its nodes are forgotten again; then the
+ * nodes of the top follow, deepest level first, those of one level in parallel. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -14,8 +21,6 @@
 #include "core/parallel.h"
 #include "geometry/cells.h"
 #include "geometry/polytope.h"
-
-/* Planes from the leaves up, of the nodes of a piece. */
 
 /* Corners of a child's envelope are rounded: what that may be in a support, in cells, many times
  * over. */
@@ -92,8 +97,8 @@ static double moved_by(const ebpo_offer *offer, double support, const double siz
 }
 
 /* Chooses among p->candidates, notes the planes and makes what the parent will get. */
-static bool propose_nodes_choose(proposer *p, uint32_t detail, ebpo_cell cell,
-                                 const ebpo_handover *given, ebpo_handover *out)
+static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, const ebpo_handover *given,
+                          ebpo_handover *out)
 {
     const ebpo_build_options *o = p->b->options;
     ebpo_proposals *all = p->s->proposals;
@@ -194,7 +199,7 @@ static bool propose_leaf(proposer *p, uint32_t detail, ebpo_cell cell, int32_t w
     bool good = offer_faces(p, d, cell, &given) && make_candidates(p, &given);
     if (good) {
         leaf_supports(p, d, cell, winding, given.offer_count);
-        good = propose_nodes_choose(p, detail, cell, &given, out);
+        good = choose_planes(p, detail, cell, &given, out);
     }
     ebpo_handover_free(&given);
     return good;
@@ -226,11 +231,11 @@ static bool propose_gray(proposer *p, uint32_t detail, ebpo_cell cell, int32_t w
 {
     return make_candidates(p, given) &&
            gray_supports(p, &p->s->details[detail], cell, winding, given) &&
-           propose_nodes_choose(p, detail, cell, given, out);
+           choose_planes(p, detail, cell, given, out);
 }
 
-static bool propose_nodes_propose(proposer *p, uint32_t index, ebpo_cell cell, int32_t winding,
-                                  ebpo_handover *out)
+static bool propose_node(proposer *p, uint32_t index, ebpo_cell cell, int32_t winding,
+                         ebpo_handover *out)
 {
     ebpo_build_node node = p->s->nodes[index];
     if (node.type == EBPO_LEAF)
@@ -243,8 +248,8 @@ static bool propose_nodes_propose(proposer *p, uint32_t index, ebpo_cell cell, i
     ebpo_child_windings(p->b, p->s, node.child, offset);
     for (unsigned o = 0; o < 8 && good; o++) {
         ebpo_handover child = { 0 };
-        good = propose_nodes_propose(p, node.child + o, ebpo_cell_child(cell, o),
-                                     winding + offset[o], &child) &&
+        good = propose_node(p, node.child + o, ebpo_cell_child(cell, o), winding + offset[o],
+                            &child) &&
                ebpo_handover_gather(&given, &child, o);
         ebpo_handover_free(&child);
     }
@@ -260,9 +265,8 @@ static void proposer_free(proposer *p)
 }
 
 /* One gray node, from what its children gave. False: out of memory. */
-static bool ebpo_propose_alone(const ebpo_builder *b, ebpo_branch *s, uint32_t detail,
-                               ebpo_cell cell, int32_t winding, ebpo_handover *given,
-                               ebpo_handover *out)
+static bool propose_one_gray(const ebpo_builder *b, ebpo_branch *s, uint32_t detail, ebpo_cell cell,
+                             int32_t winding, ebpo_handover *given, ebpo_handover *out)
 {
     proposer p = { .b = b, .s = s, .select = ebpo_selection_function(b->options->select) };
     bool good = propose_gray(&p, detail, cell, winding, given, out);
@@ -270,15 +274,15 @@ static bool ebpo_propose_alone(const ebpo_builder *b, ebpo_branch *s, uint32_t d
     return good;
 }
 
-/* --- whole pieces --- */
+/* --- pieces --- */
 
-static ebpo_status propose_nodes_no_memory(ebpo_error *error)
+static ebpo_status no_memory(ebpo_error *error)
 {
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while choosing planes");
 }
 
 /* Moves them to the builder's store until the walk down needs them. */
-static ebpo_status propose_nodes_pack(ebpo_builder *b, ebpo_branch *s, ebpo_error *error)
+static ebpo_status pack_proposals(ebpo_builder *b, ebpo_branch *s, ebpo_error *error)
 {
     ebpo_proposals *p = s->proposals;
     uint64_t n = s->detail_count,
@@ -306,8 +310,8 @@ static ebpo_status propose_nodes_pack(ebpo_builder *b, ebpo_branch *s, ebpo_erro
 
 /* A task over the builder's pieces: partitions each, chooses for its nodes and forgets the nodes.
  */
-static ebpo_status ebpo_propose_pieces(void *context, uint64_t first, uint64_t last,
-                                       unsigned worker, ebpo_error *error)
+static ebpo_status propose_pieces(void *context, uint64_t first, uint64_t last, unsigned worker,
+                                  ebpo_error *error)
 {
     ebpo_builder *b = context;
     proposer p = { .b = b, .select = ebpo_selection_function(b->options->select) };
@@ -318,23 +322,17 @@ static ebpo_status ebpo_propose_pieces(void *context, uint64_t first, uint64_t l
         status = ebpo_build_partition(b, p.s, error);
         if (status == EBPO_OK &&
             (!ebpo_proposals_make(p.s) ||
-             !propose_nodes_propose(&p, 0, p.s->cell, p.s->winding, &p.s->proposals->root)))
-            status = propose_nodes_no_memory(error);
+             !propose_node(&p, 0, p.s->cell, p.s->winding, &p.s->proposals->root)))
+            status = no_memory(error);
         if (status == EBPO_OK)
-            status = propose_nodes_pack(b, p.s, error);
+            status = pack_proposals(b, p.s, error);
         ebpo_branch_forget(p.s);
     }
     proposer_free(&p);
     return status;
 }
 
-/* Planes from the leaves up, of the nodes above the pieces, and the order in which all are chosen.
- */
-
-static ebpo_status propose_no_memory(ebpo_error *error)
-{
-    return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while choosing planes");
-}
+/* --- the top --- */
 
 /* The top's gray nodes, deepest first; those of one level side by side. */
 typedef struct top_node {
@@ -408,13 +406,12 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
             good = ebpo_handover_gather(&n->given, root, o);
             ebpo_handover_free(root);
         }
-        good =
-            good && ebpo_propose_alone(b, &alone, detail, n->cell, n->winding, &n->given, &n->out);
+        good = good && propose_one_gray(b, &alone, detail, n->cell, n->winding, &n->given, &n->out);
         if (good) {
             const uint32_t *codes = ebpo_proposed(&alone, detail, &n->count);
             memcpy(n->codes, codes, (size_t)n->count * sizeof *codes);
         } else
-            status = propose_no_memory(error);
+            status = no_memory(error);
         ebpo_handover_free(&n->given);
         ebpo_proposals_free(alone.proposals);
     }
@@ -460,7 +457,7 @@ static ebpo_status propose_top(top_list *t, ebpo_pass *pass, ebpo_error *error)
             top_node *n = &t->nodes[i];
             if (n->parent != UINT64_MAX &&
                 !ebpo_handover_gather(&t->nodes[n->parent].given, &n->out, n->octant))
-                status = propose_no_memory(error);
+                status = no_memory(error);
             ebpo_handover_free(&n->out);
         }
         end_of_level = t->base;
@@ -474,18 +471,18 @@ ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
         !(b->options->parts & (EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES)))
         return EBPO_OK;
     top_list t = { .b = b };
-    ebpo_status status = list_top(&t) ? EBPO_OK : propose_no_memory(error);
+    ebpo_status status = list_top(&t) ? EBPO_OK : no_memory(error);
     ebpo_pass pass = { &b->options->progress, 0, b->sub_count, b->sub_count + t.count };
     ebpo_progress progress = ebpo_pass_progress(&pass);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, ebpo_propose_pieces,
-                                   b, &progress, "choosing planes", error);
+        status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, propose_pieces, b,
+                                   &progress, "choosing planes", error);
     atomic_store(&b->leaf_count, 0); /* the pieces are made once more */
     atomic_store(&b->entry_count, 0);
     if (status == EBPO_OK)
         status = propose_top(&t, &pass, error);
     if (status == EBPO_OK && !note_top(&t))
-        status = propose_no_memory(error);
+        status = no_memory(error);
     for (uint64_t i = 0; i < t.count; i++) {
         ebpo_handover_free(&t.nodes[i].given);
         ebpo_handover_free(&t.nodes[i].out);

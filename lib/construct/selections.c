@@ -1,6 +1,16 @@
-/* Greedy selection: the plane that removes most volume first. Gains only shrink while the envelope
- * does, so a gain computed earlier bounds the present one, and most candidates are never evaluated
- * again (lazy evaluation). */
+/* Selects the planes of an envelope from candidates: one function for each ebpo_selection, and the
+ * table of them at the end. Names and settings of selections are in format/head_facts.c;
+ * CONTRIBUTING.md describes how to add one.
+ *
+ * - greedy (inherit): the plane that removes most volume comes first. Gains only shrink while the
+ *   envelope does, so an earlier gain bounds the present one, and most candidates are never
+ *   evaluated again (lazy evaluation). Volume alone leaves needles; planes that cut off what
+ *   reaches far come last.
+ * - random, offset, k-medoids: the theses' (EBP 2017, 3.3.4.3; BP 2008, 3.4.2). They choose a
+ *   number of candidates, whatever these cut.
+ *
+ * A selection clips the envelope that it is given and returns the codes of its planes. Results
+ * depend on the arguments alone; random choices use the seed of the node. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -11,6 +21,9 @@
 #include "core/alloc.h"
 #include "core/hash.h"
 #include "geometry/polytope.h"
+#include "geometry/vec3.h"
+
+/* --- greedy --- */
 
 typedef struct ranked {
     double gain; /* an upper bound; exact for the envelope of `round` */
@@ -26,8 +39,10 @@ typedef struct contest {
     int gains, reaches;
 } contest;
 
-bool ebpo_candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3],
-                          double *offset)
+/* The plane that a candidate would be, for ebpo_polytope_clip; false when only the whole cell would
+ * do. */
+static bool candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3],
+                            double *offset)
 {
     int32_t v[3], d;
     if (!ebpo_plane_code_decode(ebpo_plane_code_make(candidate->normal, 0), v, &d))
@@ -42,19 +57,17 @@ bool ebpo_candidate_plane(const ebpo_candidate *candidate, uint32_t *code, doubl
 }
 
 /* How far the envelope reaches along n. */
-static void select_extent(const ebpo_polytope *p, const double n[3], double *least, double *most)
+static void envelope_extent(const ebpo_polytope *p, const double n[3], double *least, double *most)
 {
     double low = 1e300, high = -1e300;
     for (int i = 0; i < p->vertex_count; i++) {
-        double e = n[0] * p->vertex[i][0] + n[1] * p->vertex[i][1] + n[2] * p->vertex[i][2];
+        double e = ebpo_vec3_dot(n, p->vertex[i]);
         high = e > high ? e : high;
         low = e < low ? e : low;
     }
     *least = low;
     *most = high;
 }
-
-static double length_of(const double n[3]) { return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]); }
 
 static void rank_candidates(const ebpo_polytope *envelope, double volume,
                             const ebpo_candidate *candidates, int count, double epsilon,
@@ -64,18 +77,18 @@ static void rank_candidates(const ebpo_polytope *envelope, double volume,
     for (int i = 0; i < count && i < EBPO_PLANES_CANDIDATES; i++) {
         ranked r = { .round = -1 };
         double least, most;
-        if (!ebpo_candidate_plane(&candidates[i], &r.code, r.n, &r.d))
+        if (!candidate_plane(&candidates[i], &r.code, r.n, &r.d))
             continue;
-        select_extent(envelope, r.n, &least, &most);
+        envelope_extent(envelope, r.n, &least, &most);
         r.gain = ebpo_polytope_cap_bound(volume, most - least, most - r.d);
         if (r.gain >= epsilon && r.gain > 0)
             c->by_gain[c->gains++] = r;
-        if (reach > 0 && most - r.d > reach * length_of(r.n)) /* cutting only shortens it */
+        if (reach > 0 && most - r.d > reach * ebpo_vec3_length(r.n)) /* cutting only shortens it */
             c->by_reach[c->reaches++] = r;
     }
 }
 
-static bool select_before(const ranked *a, const ranked *b)
+static bool ranks_before(const ranked *a, const ranked *b)
 {
     return a->gain > b->gain || (a->gain == b->gain && a->code < b->code);
 }
@@ -85,9 +98,9 @@ static void sift_down(ranked *heap, int count, int i)
 {
     ranked item = heap[i];
     for (int child = 2 * i + 1; child < count; child = 2 * i + 1) {
-        if (child + 1 < count && select_before(&heap[child + 1], &heap[child]))
+        if (child + 1 < count && ranks_before(&heap[child + 1], &heap[child]))
             child++;
-        if (!select_before(&heap[child], &item))
+        if (!ranks_before(&heap[child], &item))
             break;
         heap[i] = heap[child];
         i = child;
@@ -118,8 +131,8 @@ static int cut_needles(ebpo_polytope *envelope, contest *c, double reach, int mo
         int which = -1, left = 0;
         for (int i = 0; i < c->reaches; i++) {
             double low, high;
-            select_extent(envelope, c->by_reach[i].n, &low, &high);
-            double depth = (high - c->by_reach[i].d) / length_of(c->by_reach[i].n);
+            envelope_extent(envelope, c->by_reach[i].n, &low, &high);
+            double depth = (high - c->by_reach[i].d) / ebpo_vec3_length(c->by_reach[i].n);
             if (!(depth > reach))
                 continue;
             c->by_reach[left] = c->by_reach[i];
@@ -184,20 +197,17 @@ int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, i
     return cut_needles(envelope, &c, ebpo_needle, most, taken, codes);
 }
 
-/* The theses' selections (EBP 2017, 3.3.4.3; BP 2008, 3.4.2): which of the candidates, whatever
- * they cut. */
-
 /* Clips by the chosen candidates in ascending order of their numbers. Those that cut nothing when
  * their turn comes are not kept. Not more than `most` are chosen (ebpo_selection_wanted):
  * candidates are sorted by direction, and what was left out here would all face one way. */
-static int theses_take(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen,
-                       uint32_t *codes)
+static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen,
+                          uint32_t *codes)
 {
     int taken = 0;
     for (int i = 0; i < choice->count && taken < choice->most; i++) {
         double n[3], offset;
         uint32_t code;
-        if (!chosen[i] || !ebpo_candidate_plane(&choice->candidates[i], &code, n, &offset))
+        if (!chosen[i] || !candidate_plane(&choice->candidates[i], &code, n, &offset))
             continue;
         if (ebpo_polytope_clip(envelope, n, offset, taken) == EBPO_CLIP_CUT)
             codes[taken++] = code;
@@ -205,9 +215,9 @@ static int theses_take(ebpo_polytope *envelope, const ebpo_choice *choice, const
     return taken;
 }
 
-/* --- at random --- */
+/* --- random --- */
 
-int ebpo_select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+static int select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
 {
     if (!choice->count)
         return 0;
@@ -217,7 +227,7 @@ int ebpo_select_random(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
     uint64_t state = choice->seed, first = ebpo_random_next(&state) % (uint64_t)choice->count;
     for (int i = 0; i < choice->wanted && i < choice->count; i++)
         chosen[(first + (uint64_t)i) % (uint64_t)choice->count] = true;
-    int taken = theses_take(envelope, choice, chosen, codes);
+    int taken = clip_by_chosen(envelope, choice, chosen, codes);
     free(chosen);
     return taken;
 }
@@ -237,7 +247,7 @@ static int by_offset(const void *a, const void *b)
     return x->which - y->which;
 }
 
-int ebpo_select_offset(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+static int select_offset(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
 {
     if (!choice->count)
         return 0;
@@ -250,7 +260,7 @@ int ebpo_select_offset(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
         qsort(order, (size_t)choice->count, sizeof *order, by_offset);
         for (int i = 0; i < choice->wanted && i < choice->count; i++)
             chosen[order[i].which] = true;
-        taken = theses_take(envelope, choice, chosen, codes);
+        taken = clip_by_chosen(envelope, choice, chosen, codes);
     }
     free(order);
     free(chosen);
@@ -365,7 +375,7 @@ static void choose_at_random(clustering *c, uint64_t seed)
     }
 }
 
-static void theses_assign(clustering *c)
+static void assign_medoids(clustering *c)
 {
     for (int i = 0; i < c->count; i++) {
         const float *row = c->distance + (size_t)i * (size_t)c->count;
@@ -444,7 +454,8 @@ static void single_medoid(clustering *c)
     c->chosen[at] = true;
 }
 
-int ebpo_select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
+/* The theses' (theses.c). */
+static int select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
 {
     /* each lowers the cost; this only guards against rounding in circles */
     enum { SWAPS_MOST = 100000 };
@@ -461,22 +472,22 @@ int ebpo_select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, uin
         else if (all.wanted < all.count) {
             int swaps = 0;
             do
-                theses_assign(&c);
+                assign_medoids(&c);
             while (swap_once(&c) && ++swaps < SWAPS_MOST);
         }
-        taken = theses_take(envelope, choice, c.chosen, codes);
+        taken = clip_by_chosen(envelope, choice, c.chosen, codes);
     }
     clustering_free(&c);
     return taken;
 }
 
-/* The function of each selection; its name and settings: format/head_facts.c. */
+/* --- the table --- */
 
 static const ebpo_select_fn selection_functions[] = {
     [EBPO_SELECT_INHERIT] = ebpo_select_greedy,
-    [EBPO_SELECT_KMEDOIDS] = ebpo_select_kmedoids,
-    [EBPO_SELECT_OFFSET] = ebpo_select_offset,
-    [EBPO_SELECT_RANDOM] = ebpo_select_random,
+    [EBPO_SELECT_KMEDOIDS] = select_kmedoids,
+    [EBPO_SELECT_OFFSET] = select_offset,
+    [EBPO_SELECT_RANDOM] = select_random,
 };
 _Static_assert(sizeof selection_functions / sizeof *selection_functions == EBPO_SELECTION_COUNT,
                "each selection of ebpo/build.h needs a line in this table");

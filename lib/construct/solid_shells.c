@@ -1,9 +1,11 @@
-/* Which closed components are apart. Where no faces of two components have a common point, each
- * component is as a whole in or out of every other one, and winding numbers on its sides follow
- * from the nesting. Faces are compared only where the boxes of their components do not settle it: a
- * face of a component whose box is not within another one's, and that comes to that other box. Both
- * passes stop after a number of steps that grows with the faces only; the components then count as
- * not apart. */
+/* Finds the closed components of a mesh that are apart, and computes which of them bound the solid.
+ *
+ * Where no faces of two components have a common point, each component as a whole is inside or
+ * outside every other one, and the winding numbers on its sides follow from the nesting. Faces are
+ * compared only where the boxes of components do not settle it: a face of a component whose box is
+ * not within another one's, and that comes to that other box. Both passes stop after a number of
+ * steps that is proportional to the faces; the components then count as not apart. The counts serve
+ * `ebpo check`, the apart components the solid's volume. */
 #include "core/strict_fp.h"
 
 #include "construct/solid_shells.h"
@@ -148,7 +150,7 @@ static ebpo_status plant_faces(comparing *c, ebpo_error *error)
                                      error);
 }
 
-static ebpo_status solid_shells_compare(comparing *c, ebpo_error *error)
+static ebpo_status compare_shells(comparing *c, ebpo_error *error)
 {
     const nesting *n = &c->s->nesting;
     ebpo_workspace *workspace = c->s->mesh->workspace;
@@ -173,7 +175,7 @@ static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
 {
     comparing c = { .s = s, .apart = true };
     c.most = STEPS_PER_FACE * s->mesh->face_count + STEPS_AT_LEAST;
-    ebpo_status status = s->nesting.count > 1 ? solid_shells_compare(&c, error) : EBPO_OK;
+    ebpo_status status = s->nesting.count > 1 ? compare_shells(&c, error) : EBPO_OK;
     s->apart = c.apart;
     ebpo_box_tree_free(&c.faces);
     ebpo_array_free(s->mesh->workspace, c.exposed);
@@ -235,7 +237,7 @@ int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, eb
            (ebpo_rule_inside(rule, one->around + sign) - ebpo_rule_inside(rule, one->around));
 }
 
-/* ---- counting ---- */
+/* --- counting --- */
 
 static void count_one(const nesting *n, const shell *one, ebpo_shells *made)
 {

@@ -1,6 +1,13 @@
-/* Support of runs of vertices by boxes of boxes. Rounding is monotone, so a box's bound computed in
- * the same order of operations is never below that of a point in it: skipping a box never loses the
- * greatest point. */
+/* Computes the support of the solid in a cell: the greatest n . xi over the mesh vertices in the
+ * cell, the points where faces cross the cell's faces, and the corners of the cell inside. It is
+ * the offset of a plane with normal n.
+ *
+ * With few vertices all points are gathered, each once, and searched in stretches that share a box.
+ * With many, only crossings and corners are gathered; vertices are searched by a hierarchy of boxes
+ * over their runs along the curve. Rounding is monotone: a box's bound, computed by the same
+ * operations in the same order, is never below that of a point in it, so skipping a box never loses
+ * the greatest point. Searches stop early once they have reached a support with which the plane
+ * could not gain anything. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -14,7 +21,9 @@
 #include "geometry/cells.h"
 #include "geometry/polytope.h"
 
-static void vertex_bounds_join(double (*box)[3], const double low[3], const double high[3])
+/* --- runs of vertices, by boxes of boxes --- */
+
+static void join_box(double (*box)[3], const double low[3], const double high[3])
 {
     for (int k = 0; k < 3; k++) {
         box[0][k] = low[k] < box[0][k] ? low[k] : box[0][k];
@@ -43,7 +52,7 @@ ebpo_status ebpo_bounds_make(ebpo_builder *b, ebpo_error *error)
                 memcpy(box[i / EBPO_BOUNDS_FAN][0], low, sizeof p);
                 memcpy(box[i / EBPO_BOUNDS_FAN][1], high, sizeof p);
             } else
-                vertex_bounds_join(box[i / EBPO_BOUNDS_FAN], low, high);
+                join_box(box[i / EBPO_BOUNDS_FAN], low, high);
         }
         below = n;
     }
@@ -64,7 +73,7 @@ typedef struct query {
     double best;
 } query;
 
-static double vertex_bounds_value(const query *q, const double low[3], const double high[3])
+static double bound_value(const query *q, const double low[3], const double high[3])
 {
     double x = (q->n[0] < 0 ? low[0] : high[0]), y = (q->n[1] < 0 ? low[1] : high[1]),
            z = (q->n[2] < 0 ? low[2] : high[2]);
@@ -73,7 +82,7 @@ static double vertex_bounds_value(const query *q, const double low[3], const dou
            q->n[2] * ((z - q->corner[2]) / q->size[2]);
 }
 
-static void vertex_bounds_visit(query *q, int level, uint64_t block)
+static void visit_block(query *q, int level, uint64_t block)
 {
     /* `level` 0 is the vertices themselves. */
     uint64_t width = 1;
@@ -84,7 +93,7 @@ static void vertex_bounds_visit(query *q, int level, uint64_t block)
     if (level == 0) {
         double p[3];
         ebpo_mesh_position(q->b->mesh, block, p);
-        double v = vertex_bounds_value(q, p, p);
+        double v = bound_value(q, p, p);
         if (v > q->best) {
             q->best = v;
             q->at = block;
@@ -92,15 +101,17 @@ static void vertex_bounds_visit(query *q, int level, uint64_t block)
         return;
     }
     const double(*box)[3] = (const double(*)[3])q->b->bounds.box[level - 1][block];
-    if (vertex_bounds_value(q, box[0], box[1]) <= q->best)
+    if (bound_value(q, box[0], box[1]) <= q->best)
         return;
     uint64_t below = level > 1 ? q->b->bounds.count[level - 2] : q->b->vertex_count;
     for (uint64_t i = block * EBPO_BOUNDS_FAN; i < (block + 1) * EBPO_BOUNDS_FAN && i < below; i++)
-        vertex_bounds_visit(q, level - 1, i);
+        visit_block(q, level - 1, i);
 }
 
-double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin,
-                           uint64_t end, double least, uint64_t *at)
+/* Greatest n . xi over vertices [begin, end), in coordinates of the cell that holds them, and
+ * `least`; `*at`: the vertex, or EBPO_NO_VERTEX when `least` is the greatest. */
+static double bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3],
+                             uint64_t begin, uint64_t end, double least, uint64_t *at)
 {
     query q = { .b = b, .begin = begin, .end = end, .at = EBPO_NO_VERTEX, .best = least };
     for (int k = 0; k < 3; k++) {
@@ -117,7 +128,7 @@ double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n
     }
     if (begin < end)
         for (uint64_t block = begin / width; block * width < end; block++)
-            vertex_bounds_visit(&q, level, block);
+            visit_block(&q, level, block);
     *at = q.at;
     return q.best;
 }
@@ -143,6 +154,8 @@ void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *be
     *begin = lower_bound(b->key, b->vertex_count, code << below);
     *end = *begin + lower_bound(b->key + *begin, b->vertex_count - *begin, (code + 1) << below);
 }
+
+/* --- the points of a node --- */
 
 enum { FEW_VERTICES = 4096, TABLE_MOST = 1 << 16, MANY_POINTS = 1 << 15 };
 
@@ -239,8 +252,8 @@ static bool clear_table(ebpo_supports *s, uint64_t points)
     return true;
 }
 
-static bool supports_gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch,
-                            const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
+static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch,
+                          const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
 {
     uint64_t begin, end;
     ebpo_build_vertex_range(b, cell, &begin, &end);
@@ -265,8 +278,8 @@ static bool supports_gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_
 }
 
 /* Which of the points in a stretch has the value `best`. */
-static void supports_locate(const ebpo_supports *s, uint64_t first, const double n[3], double best,
-                            double where[3])
+static void locate_point(const ebpo_supports *s, uint64_t first, const double n[3], double best,
+                         double where[3])
 {
     for (uint64_t i = first; i < s->count && i < first + 4 * EBPO_STRETCH; i++) {
         double(*p)[4] = s->point[i / 4];
@@ -289,7 +302,7 @@ static void among_points(const ebpo_supports *s, const double n[3], double enoug
                                        (s->count + 3) / 4 };
     uint64_t stretch = s->sweep->highest(&points, n, enough, support);
     if (stretch != UINT64_MAX)
-        supports_locate(s, stretch, n, *support, where);
+        locate_point(s, stretch, n, *support, where);
 }
 
 static bool box_points(ebpo_supports *s)
@@ -316,7 +329,7 @@ static bool box_points(ebpo_supports *s)
 bool ebpo_supports_gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch,
                           const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding)
 {
-    return supports_gather(s, b, branch, detail, cell, winding) && box_points(s);
+    return gather_points(s, b, branch, detail, cell, winding) && box_points(s);
 }
 
 double ebpo_supports_find(const ebpo_supports *s, const int32_t n[3], double enough,
@@ -342,7 +355,7 @@ double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], 
     ebpo_release_pages(s->workspace); /* that many vertices are spread over the whole file */
     uint64_t at;
     double p[3] = { 0, 0, 0 };
-    support = ebpo_bounds_support(s->b, s->cell, n, s->begin, s->end, support, &at);
+    support = bounds_support(s->b, s->cell, n, s->begin, s->end, support, &at);
     if (at != EBPO_NO_VERTEX)
         ebpo_mesh_position(s->b->mesh, at, p);
     if (at != EBPO_NO_VERTEX)

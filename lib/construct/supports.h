@@ -1,22 +1,20 @@
-/* Runs of vertices along the curve, and how far they reach in a direction. */
+/* The support of the solid in a gray node's cell, and bounds of runs of vertices along the curve
+ * (supports.c). */
 #ifndef EBPO_CONSTRUCT_SUPPORTS_H
 #define EBPO_CONSTRUCT_SUPPORTS_H
 
 #include "construct/builder.h"
 #include "construct/sweep.h"
 
+/* --- runs of vertices --- */
+
 /* The vertices in a cell. */
 void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *begin, uint64_t *end);
 
 ebpo_status ebpo_bounds_make(ebpo_builder *b, ebpo_error *error);
-/* Greatest n . xi over vertices [begin, end), in coordinates of the cell that holds them, and
- * `least`; `*at`: the vertex, or EBPO_NO_VERTEX when `least` is the greatest. */
-double ebpo_bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3], uint64_t begin,
-                           uint64_t end, double least, uint64_t *at);
 void ebpo_bounds_free(ebpo_bounds *bounds);
 
-/* The support of the solid in a gray node's cell: the greatest n . xi over mesh vertices in the
- * cell, points where faces cross its walls, and its corners inside. */
+/* --- the support of the solid: over vertices, crossings of cell faces, and inside corners --- */
 
 typedef struct ebpo_supports {
     const ebpo_builder *b;

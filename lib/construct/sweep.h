@@ -1,5 +1,6 @@
-/* The two inner loops of hulls and supports, four doubles at a time. Kernels
- * (core/cpu.h): every instruction set does the same operations in the same order. */
+/* The two inner loops of hulls and supports, four doubles at a time (sweep_kernels.c). They are
+ * compiled once for each instruction set, with the same operations in the same order, so results
+ * are the same. */
 #ifndef EBPO_CONSTRUCT_SWEEP_H
 #define EBPO_CONSTRUCT_SWEEP_H
 

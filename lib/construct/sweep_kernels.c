@@ -1,4 +1,7 @@
-/* Sweeps over planes and points (sweep.h). */
+/* The two inner loops of hulls and supports, four doubles at a time: planes that a point lies
+ * above, and the greatest value among points. meson.build compiles this file once for each
+ * instruction set; the operations and their order are the same in each, so results are too. The
+ * interface is sweep.h; core/cpu.h chooses the variant. */
 #include "core/strict_fp.h"
 
 #include "construct/sweep.h"
@@ -9,7 +12,7 @@
 
 typedef v4d v4d_stored __attribute__((aligned(8), may_alias));
 
-static v4d sweep_four(const double *at) { return *(const v4d_stored *)at; }
+static v4d load_four(const double *at) { return *(const v4d_stored *)at; }
 
 static int list_bits(unsigned bits, int first, uint16_t *list, int capacity, int count)
 {
@@ -19,16 +22,16 @@ static int list_bits(unsigned bits, int first, uint16_t *list, int capacity, int
     return count;
 }
 
-static int sweep_seen(const ebpo_sweep_planes *planes, const double p[3], double beyond,
-                      double above, uint16_t *list, int capacity)
+static int planes_seen(const ebpo_sweep_planes *planes, const double p[3], double beyond,
+                       double above, uint16_t *list, int capacity)
 {
     uint8_t sees[EBPO_SWEEP_PLANES / 4 + 1];
     v4d x = v4d_all(p[0]), y = v4d_all(p[1]), z = v4d_all(p[2]), far = v4d_all(beyond),
         near = v4d_all(above);
     v4l any = { 0, 0, 0, 0 };
     for (int i = 0; i < planes->fours; i++) {
-        v4d height = sweep_four(planes->nx + 4 * i) * x + sweep_four(planes->ny + 4 * i) * y +
-                     sweep_four(planes->nz + 4 * i) * z - sweep_four(planes->d + 4 * i);
+        v4d height = load_four(planes->nx + 4 * i) * x + load_four(planes->ny + 4 * i) * y +
+                     load_four(planes->nz + 4 * i) * z - load_four(planes->d + 4 * i);
         any |= height > far;
         sees[i] = (uint8_t)v4l_mask(height > near);
     }
@@ -49,16 +52,16 @@ static double reach_of(const double box[7], const double n[3])
 
 static v4d values_of(const double p[4][4], v4d nx, v4d ny, v4d nz)
 {
-    return nx * sweep_four(p[0]) + ny * sweep_four(p[1]) + nz * sweep_four(p[2]) + sweep_four(p[3]);
+    return nx * load_four(p[0]) + ny * load_four(p[1]) + nz * load_four(p[2]) + load_four(p[3]);
 }
 
-static v4d sweep_greater(v4d a, v4d b)
+static v4d greater_of(v4d a, v4d b)
 {
     v4l m = a > b;
     return (v4d)(((v4l)a & m) | ((v4l)b & ~m));
 }
 
-static uint64_t sweep_highest(const ebpo_sweep_points *points, const double n[3], double enough,
+static uint64_t highest_value(const ebpo_sweep_points *points, const double n[3], double enough,
                               double *best)
 {
     v4d nx = v4d_all(n[0]), ny = v4d_all(n[1]), nz = v4d_all(n[2]);
@@ -69,7 +72,7 @@ static uint64_t sweep_highest(const ebpo_sweep_points *points, const double n[3]
         uint64_t end = points->fours - first < EBPO_STRETCH ? points->fours : first + EBPO_STRETCH;
         v4d most = v4d_all(*best);
         for (uint64_t i = first; i < end; i++)
-            most = sweep_greater(values_of(points->point[i], nx, ny, nz), most);
+            most = greater_of(values_of(points->point[i], nx, ny, nz), most);
         for (int lane = 0; lane < 4; lane++)
             if (most[lane] > *best)
                 *best = most[lane], stretch = 4 * first;
@@ -77,4 +80,4 @@ static uint64_t sweep_highest(const ebpo_sweep_points *points, const double n[3]
     return stretch;
 }
 
-const ebpo_sweep EBPO_KERNEL(ebpo_sweep) = { sweep_seen, sweep_highest };
+const ebpo_sweep EBPO_KERNEL(ebpo_sweep) = { planes_seen, highest_value };

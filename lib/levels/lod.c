@@ -1,3 +1,13 @@
+/* Computes the polygons of a level: the envelopes of its nodes, as triangles.
+ *
+ * The walk goes from the root down, each envelope cut from its parent's by the node's own planes. A
+ * leaf's planes come from the file, or from its faces (construct/leaf_planes.c), or it keeps its
+ * parent's envelope. The top of the tree is walked first; the subtrees below it are independent and
+ * go to all threads. Where the tree is cut depends on the tree alone, and pieces are joined in
+ * octcode order, so the number of threads does not change the result.
+ *
+ * The parts: polyhedra as triangles; the model, which is what a walk reads; leaves; colours of
+ * nodes; the walk. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -15,11 +25,11 @@
 #include "geometry/polytope.h"
 #include "levels/lod.h"
 
-/* Colours of a level's nodes. */
-
 static const uint64_t count_limit = UINT32_MAX - 1;
 
-void ebpo_polyhedra_free(ebpo_polyhedra *piece)
+/* --- polyhedra as triangles --- */
+
+static void polyhedra_free(ebpo_polyhedra *piece)
 {
     free(piece->xyz);
     free(piece->faces);
@@ -106,7 +116,7 @@ ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p, co
     return EBPO_OK;
 }
 
-static void polyhedra_append(ebpo_mesh *out, const ebpo_polyhedra *piece)
+static void append_mesh(ebpo_mesh *out, const ebpo_polyhedra *piece)
 {
     if (piece->vertex_count)
         memcpy(out->xyz64 + 3 * out->vertex_count, piece->xyz,
@@ -165,13 +175,15 @@ ebpo_status ebpo_polyhedra_join(ebpo_mesh *out, ebpo_lod_nodes *out_nodes,
                                 vertices * 3 * sizeof(double) + faces * 3 * sizeof(uint32_t));
     }
     for (uint64_t i = 0; i < count; i++) {
-        polyhedra_append(out, pieces[i]);
+        append_mesh(out, pieces[i]);
         if (out_nodes)
             append_nodes(out_nodes, pieces[i]);
-        ebpo_polyhedra_free(pieces[i]);
+        polyhedra_free(pieces[i]);
     }
     return EBPO_OK;
 }
+
+/* --- the model --- */
 
 void ebpo_lod_model_free(ebpo_lod_model *model)
 {
@@ -229,7 +241,7 @@ ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file, int 
     return status;
 }
 
-/* Envelopes of leaves. */
+/* --- envelopes of leaves --- */
 
 static bool take_face(const ebpo_mesh *mesh, uint64_t face, ebpo_triangle *out)
 {
@@ -306,8 +318,11 @@ ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, ui
     return EBPO_OK;
 }
 
-ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
-                          ebpo_leaf_scratch *scratch, ebpo_polytope *envelope, ebpo_error *error)
+/* Cuts `envelope` (on entry the parent's in this cell) to that of leaf number `leaf` of the cell's
+ * level. */
+static ebpo_status cut_to_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
+                               ebpo_leaf_scratch *scratch, ebpo_polytope *envelope,
+                               ebpo_error *error)
 {
     const ebpo_level *level = &model->level[cell.level];
     const ebpo_level_ranks *ranks = &model->ranks[cell.level];
@@ -321,6 +336,8 @@ ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t 
         return EBPO_OK;
     return ebpo_lod_leaf_planes(model, cell, leaf, scratch, envelope, codes, &count, error);
 }
+
+/* --- colours of nodes --- */
 
 /* Down from the root: of the last gray node on the way, which is the node or its parent. */
 static bool find_colour(const ebpo_lod_model *model, uint64_t octcode, uint32_t *colour)
@@ -342,7 +359,7 @@ static bool find_colour(const ebpo_lod_model *model, uint64_t octcode, uint32_t 
     return found;
 }
 
-static void ebpo_lod_add_colours(ebpo_lod_nodes *nodes, const ebpo_lod_model *model)
+static void add_colours(ebpo_lod_nodes *nodes, const ebpo_lod_model *model)
 {
     for (uint64_t i = 0; i < nodes->node_count; i++) {
         ebpo_lod_node *node = &nodes->nodes[i];
@@ -386,9 +403,7 @@ ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes, uint64_t vertex_count,
     return EBPO_OK;
 }
 
-/* A level's envelopes: from the root down, each cut from its parent's. The top of the tree is
- * walked first; the subtrees that hang from it are independent of each other. Where it is cut
- * depends on the tree alone, so the result does not depend on the number of threads. */
+/* --- the walk --- */
 
 enum { SEEDS_WANTED = 128 };
 
@@ -422,7 +437,8 @@ typedef struct walker {
     ebpo_error *error;
 } walker;
 
-static ebpo_status lod_emit(walker *w, const ebpo_polytope *p, ebpo_cell cell, ebpo_node_type type)
+static ebpo_status emit_polytope(walker *w, const ebpo_polytope *p, ebpo_cell cell,
+                                 ebpo_node_type type)
 {
     ebpo_polyhedra *piece = &w->out[cell.level];
     piece->volume += ebpo_polytope_volume(p) * ebpo_cell_volume(&w->j->model->box, cell.level);
@@ -449,7 +465,7 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
         ebpo_planes_cut(envelope, level->planes + w->j->model->ranks[cell.level].plane_first[gray],
                         level->plane_counts[gray]);
     if (cell.level == w->j->model->target)
-        return lod_emit(w, envelope, cell, EBPO_GRAY);
+        return emit_polytope(w, envelope, cell, EBPO_GRAY);
     if (cell.level == w->stop) {
         seed *s = &w->j->seeds[w->j->seed_count++];
         s->cell = cell;
@@ -457,7 +473,7 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
         return EBPO_OK;
     }
     if (is_pruned(w->j->model, cell.level, gray))
-        return lod_emit(w, envelope, cell, EBPO_GRAY);
+        return emit_polytope(w, envelope, cell, EBPO_GRAY);
     return visit_group(w, gray, cell, envelope);
 }
 
@@ -472,8 +488,8 @@ static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_c
     uint64_t rank = ranks->before[type][group] + ebpo_group_count(types, type, octant);
     if (type == EBPO_GRAY)
         return visit_gray(w, rank, cell, envelope);
-    ebpo_status status = ebpo_lod_leaf(model, cell, rank, w->scratch, envelope, w->error);
-    return status == EBPO_OK ? lod_emit(w, envelope, cell, EBPO_LEAF) : status;
+    ebpo_status status = cut_to_leaf(model, cell, rank, w->scratch, envelope, w->error);
+    return status == EBPO_OK ? emit_polytope(w, envelope, cell, EBPO_LEAF) : status;
 }
 
 /* Black nodes are their whole cell. */
@@ -481,7 +497,7 @@ static ebpo_status visit_black(walker *w, ebpo_cell cell)
 {
     ebpo_polytope cube;
     ebpo_polytope_cube(&cube);
-    return lod_emit(w, &cube, cell, EBPO_BLACK);
+    return emit_polytope(w, &cube, cell, EBPO_BLACK);
 }
 
 static ebpo_status visit_root(walker *w)
@@ -531,7 +547,7 @@ static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsig
         /* Seeds are in octcode order, and all gray nodes of their level: the i-th has the i-th
          * group below it. */
         ebpo_status status = is_pruned(j->model, s->cell.level, i)
-                                 ? lod_emit(&w, &s->envelope, s->cell, EBPO_GRAY)
+                                 ? emit_polytope(&w, &s->envelope, s->cell, EBPO_GRAY)
                                  : visit_group(&w, i, s->cell, &s->envelope);
         if (status != EBPO_OK)
             return status;
@@ -548,7 +564,7 @@ static int choose_split(const ebpo_lod_model *model)
     return level;
 }
 
-static ebpo_status lod_prepare(job *j, unsigned threads, ebpo_error *error)
+static ebpo_status job_prepare(job *j, unsigned threads, ebpo_error *error)
 {
     j->split = choose_split(j->model);
     uint64_t seeds = j->split < j->model->target ? j->model->level[j->split].gray_count : 0;
@@ -562,7 +578,7 @@ static ebpo_status lod_prepare(job *j, unsigned threads, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status lod_walk(job *j, unsigned threads, const ebpo_progress *progress,
+static ebpo_status job_walk(job *j, unsigned threads, const ebpo_progress *progress,
                             ebpo_error *error)
 {
     walker top = { j, j->pieces[0], &j->scratch[0], j->halves[0], j->split, error };
@@ -574,7 +590,7 @@ static ebpo_status lod_walk(job *j, unsigned threads, const ebpo_progress *progr
 }
 
 /* Level after level, and within one level first the top's nodes or the seeds' in their order. */
-static ebpo_status lod_join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume,
+static ebpo_status job_join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume,
                             ebpo_error *error)
 {
     uint64_t count = j->seed_count + 1, listed = 0;
@@ -598,7 +614,7 @@ static void job_free(job *j, unsigned threads)
 {
     for (uint64_t i = 0; j->pieces && i <= j->seed_count; i++)
         for (int level = 0; level < EBPO_LEVELS_MAX; level++)
-            ebpo_polyhedra_free(&j->pieces[i][level]);
+            polyhedra_free(&j->pieces[i][level]);
     for (unsigned i = 0; j->scratch && i < threads; i++)
         free(j->scratch[i].faces);
     free(j->pieces);
@@ -674,14 +690,14 @@ ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, int level, const ebpo_lo
     job j = {
         .model = &model, .walls = wanted.walls, .polygons = out != NULL, .nodes = nodes != NULL
     };
-    status = lod_prepare(&j, threads, error);
+    status = job_prepare(&j, threads, error);
     if (status == EBPO_OK)
-        status = lod_walk(&j, threads, &wanted.progress, error);
+        status = job_walk(&j, threads, &wanted.progress, error);
     if (status == EBPO_OK)
-        status = lod_join(&j, out, nodes, volume, error);
+        status = job_join(&j, out, nodes, volume, error);
     if (status == EBPO_OK && nodes) {
         add_windings(nodes, &model);
-        ebpo_lod_add_colours(nodes, &model);
+        add_colours(nodes, &model);
     }
     if (status != EBPO_OK)
         ebpo_lod_nodes_free(nodes);

@@ -1,4 +1,5 @@
-/* Polyhedra as triangles, collected piece by piece and joined in a fixed order. */
+/* Polygons of a level (lod.c): polyhedra as triangles, the model that a walk reads, and the planes
+ * of leaves. */
 #ifndef EBPO_LEVELS_LOD_H
 #define EBPO_LEVELS_LOD_H
 
@@ -9,6 +10,8 @@
 #include "geometry/cells.h"
 #include "geometry/level_nodes.h"
 #include "geometry/polytope.h"
+
+/* --- polyhedra as triangles, collected piece by piece and joined in a fixed order --- */
 
 /* What one walk found at one level. */
 typedef struct ebpo_polyhedra {
@@ -21,8 +24,6 @@ typedef struct ebpo_polyhedra {
     uint64_t node_count, node_capacity, polygon_count, polygon_capacity;
     double volume;
 } ebpo_polyhedra;
-
-void ebpo_polyhedra_free(ebpo_polyhedra *piece);
 
 /* Appends the polytope (cell coordinates) of a cell's node as triangle fans; with `walls` false
  * without the polygons on the cell's walls. */
@@ -37,8 +38,8 @@ EBPO_MUST_USE ebpo_status ebpo_polyhedra_join(ebpo_mesh *out, ebpo_lod_nodes *no
                                               ebpo_polyhedra *const *pieces, uint64_t count,
                                               ebpo_error *error);
 
-/* What a walk down the tree needs: the levels, their ranks, and the faces from which leaves derive
- * their planes. Read only while walking. */
+/* --- the model: levels, ranks, and the faces from which leaves derive planes; read only while
+ * walking --- */
 
 typedef enum ebpo_leaf_source {
     EBPO_LEAF_STORED,   /* planes from the file */
@@ -73,12 +74,6 @@ typedef struct ebpo_leaf_scratch {
     ebpo_triangle *faces;
     uint64_t capacity;
 } ebpo_leaf_scratch;
-
-/* Cuts `envelope` (on entry the parent's in this cell) to that of leaf number `leaf` of the cell's
- * level. */
-EBPO_MUST_USE ebpo_status ebpo_lod_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
-                                        ebpo_leaf_scratch *scratch, ebpo_polytope *envelope,
-                                        ebpo_error *error);
 
 /* The triangles that a leaf lists, in scratch->faces. */
 EBPO_MUST_USE ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell,

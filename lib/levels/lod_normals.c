@@ -1,10 +1,12 @@
-/* Which way a level's polygons are lit. A polygon on a plane lies nearly as the surface below it.
- * One on a wall between cells, a step from one envelope to the next, says nothing of the surface:
- * it takes the direction that the planes around it have.
+/* Computes normals for the polygons of a level, for shading.
  *
- * For each of the six sides: at every corner of a drawn cell the mean, by area, of the plane
- * polygons of the nodes around it that look to that side; between corners, linearly. Planes of the
- * other side of a thin part do not count. */
+ * A polygon on a plane is nearly parallel to the surface below it and has the plane's direction. A
+ * polygon on a cell face is a step from one envelope to the next and says nothing of the surface:
+ * it gets the direction of the planes around it.
+ *
+ * For each of the six sides: at every corner of a drawn cell, the mean, by area, of the plane
+ * polygons of the nodes around the corner that look to that side; between corners, linear
+ * interpolation. Planes of the other side of a thin part do not count. */
 #include "core/strict_fp.h"
 
 #include <ebpo/lod.h>
@@ -79,7 +81,7 @@ static int side_of(const ebpo_box *box, ebpo_cell cell, const ebpo_mesh *mesh, c
     return ON_PLANE;
 }
 
-static void lod_normals_describe(lighting *l, const ebpo_mesh *mesh)
+static void describe_polygons(lighting *l, const ebpo_mesh *mesh)
 {
     const uint32_t *face = mesh->faces;
     polygon *p = l->polygons;
@@ -185,7 +187,7 @@ static void direction_at(const lighting *l, ebpo_cell cell, const uint32_t at[8]
     }
 }
 
-static void lod_normals_put(const double direction[3], float out[3])
+static void put_normal(const double direction[3], float out[3])
 {
     double length = sqrt(ebpo_vec3_dot(direction, direction));
     for (int k = 0; k < 3 && length > 0; k++)
@@ -202,12 +204,12 @@ static void light_side(const lighting *l, int side, float *out)
             if (p->side != side)
                 continue;
             direction_at(l, ebpo_cell_of_octcode(node->octcode), l->at[i], p->middle, direction);
-            lod_normals_put(direction, out);
+            put_normal(direction, out);
         }
     }
 }
 
-static ebpo_status lod_normals_prepare(lighting *l, ebpo_error *error)
+static ebpo_status lighting_prepare(lighting *l, ebpo_error *error)
 {
     uint64_t nodes = l->nodes->node_count, polygons = l->nodes->polygon_count;
     l->polygons = ebpo_alloc(polygons, sizeof *l->polygons);
@@ -219,8 +221,8 @@ static ebpo_status lod_normals_prepare(lighting *l, ebpo_error *error)
                                                 nodes * (sizeof *l->at + 8 * sizeof *l->sum));
 }
 
-static ebpo_status lod_normals_check(const ebpo_mesh *mesh, const ebpo_lod_nodes *nodes,
-                                     ebpo_error *error)
+static ebpo_status check_nodes(const ebpo_mesh *mesh, const ebpo_lod_nodes *nodes,
+                               ebpo_error *error)
 {
     uint64_t triangles = 0;
     if (!mesh->xyz64 && mesh->face_count)
@@ -239,14 +241,14 @@ ebpo_status ebpo_lod_normals(const ebpo_info *info, const ebpo_mesh *mesh,
                              const ebpo_lod_nodes *nodes, float *out, ebpo_error *error)
 {
     lighting l = { .box = ebpo_root_box(info), .nodes = nodes };
-    ebpo_status status = lod_normals_check(mesh, nodes, error);
+    ebpo_status status = check_nodes(mesh, nodes, error);
     if (status == EBPO_OK)
-        status = lod_normals_prepare(&l, error);
+        status = lighting_prepare(&l, error);
     if (status == EBPO_OK) {
-        lod_normals_describe(&l, mesh);
+        describe_polygons(&l, mesh);
         memset(out, 0, nodes->polygon_count * 3 * sizeof *out);
         for (uint64_t i = 0; i < nodes->polygon_count; i++)
-            lod_normals_put(l.polygons[i].area, out + 3 * i);
+            put_normal(l.polygons[i].area, out + 3 * i);
     }
     for (int side = 0; side < SIDES && status == EBPO_OK; side++) {
         sum_side(&l, side);

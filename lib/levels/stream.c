@@ -1,3 +1,14 @@
+/* Delivers a file level by level, node by node in octcode order, for readers that show or process a
+ * model while it arrives.
+ *
+ * Of a level that has been passed only the types stay, and with polygons the planes: enough to walk
+ * down to the nodes of the next level. Within a level, the depth-first walk from the root visits
+ * groups, nodes of each type and planes in the order in which they are stored; so running counts
+ * find them, without tables of sums.
+ *
+ * Half-spaces and polygons are converted from a cell's coordinates to the model's with bounded
+ * rounding: a point of the cell that satisfies a plane's code also satisfies the delivered plane.
+ * Points on cell faces get the faces' own coordinates, so that neighbours agree to the last bit. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -16,6 +27,8 @@
 #include "geometry/cells.h"
 #include "geometry/level_nodes.h"
 #include "levels/stream.h"
+
+/* --- from cell to model coordinates --- */
 
 /* With t the cell's shortest side and N = t n / size, the half-space is N . (p - corner) <= t d /
  * 4096. For any normal a, any factor f > 0, and p in the cell: a . p = a . corner + f N . (p -
@@ -48,8 +61,10 @@ void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3]
              (16 * DBL_EPSILON * reach + 4 * DBL_MIN * bulk + 64 * DBL_TRUE_MIN);
 }
 
-void ebpo_polytope_to_world(const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell,
-                            double (*out)[3])
+/* Vertices of the polytope, rounded; those on the cell's walls get the walls' own coordinates, so
+ * that neighbours agree to the last bit. */
+static void polytope_to_world(const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell,
+                              double (*out)[3])
 {
     uint8_t sides[EBPO_POLYTOPE_VERTICES];
     ebpo_polytope_sides(p, sides);
@@ -57,6 +72,8 @@ void ebpo_polytope_to_world(const ebpo_polytope *p, const ebpo_box *box, ebpo_ce
         for (int k = 0; k < 3; k++)
             out[v][k] = ebpo_wall_point(box, cell, k, p->vertex[v][k], sides[v]);
 }
+
+/* --- the members of an ebpo_stream_node --- */
 
 void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
                      ebpo_node_type type)
@@ -84,7 +101,7 @@ void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box, const eb
                             ebpo_node_buffers *capacity)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(out->octcode);
-    ebpo_polytope_to_world(p, box, cell, capacity->vertices);
+    polytope_to_world(p, box, cell, capacity->vertices);
     for (int f = 0; f <= p->face_count; f++)
         capacity->polygon_first[f] = p->first[f];
     for (int i = 0; i < p->corner_count; i++)
@@ -97,7 +114,30 @@ void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box, const eb
     out->corners = capacity->corners;
 }
 
-void ebpo_level_walk_begin(ebpo_level_walk *walk, const ebpo_level *level, int target, bool pruned)
+/* --- walking the nodes of one level --- */
+
+typedef struct level_walk_node {
+    ebpo_octcode octcode;
+    ebpo_node_type type;
+    uint64_t rank;         /* among the nodes of its type in the level */
+    const uint32_t *codes; /* its own planes */
+    unsigned code_count;
+} level_walk_node;
+
+typedef struct level_walk {
+    /* [target + 1] lent; of those above the target only types, plane counts and planes are used */
+    const ebpo_level *level;
+    int target, depth;
+    bool pruned; /* the file is a subset: empty groups hold no nodes */
+    struct {
+        uint64_t group, rank[4], plane, leaf_plane; /* so many were passed in this level */
+        unsigned octant;                            /* next one of the group */
+        /* the node last passed: in levels above `depth` the ancestor */
+        level_walk_node node;
+    } at[EBPO_LEVELS_MAX];
+} level_walk;
+
+static void level_walk_begin(level_walk *walk, const ebpo_level *level, int target, bool pruned)
 {
     memset(walk, 0, sizeof *walk);
     walk->level = level;
@@ -106,11 +146,11 @@ void ebpo_level_walk_begin(ebpo_level_walk *walk, const ebpo_level *level, int t
 }
 
 /* The next node of the level at `depth`, of which there is one. */
-static ebpo_level_walk_node *level_walk_pass(ebpo_level_walk *w, int depth)
+static level_walk_node *pass_node(level_walk *w, int depth)
 {
     const ebpo_level *level = &w->level[depth];
     unsigned octant = w->at[depth].octant++;
-    ebpo_level_walk_node *node = &w->at[depth].node;
+    level_walk_node *node = &w->at[depth].node;
     node->octcode = depth ? ebpo_octcode_child(w->at[depth - 1].node.octcode, octant) : 1;
     node->type = ebpo_group_type(level->types[w->at[depth].group], octant);
     node->rank = w->at[depth].rank[node->type]++;
@@ -128,7 +168,8 @@ static ebpo_level_walk_node *level_walk_pass(ebpo_level_walk *w, int depth)
     return node;
 }
 
-bool ebpo_level_walk_next(ebpo_level_walk *w, ebpo_level_walk_node *out)
+/* The next node of the target level; false after the last. */
+static bool level_walk_next(level_walk *w, level_walk_node *out)
 {
     for (;;) {
         int depth = w->depth;
@@ -145,7 +186,7 @@ bool ebpo_level_walk_next(ebpo_level_walk *w, ebpo_level_walk_node *out)
             w->at[depth].octant = 8;
             continue;
         }
-        const ebpo_level_walk_node *node = level_walk_pass(w, depth);
+        const level_walk_node *node = pass_node(w, depth);
         if (depth == w->target) {
             *out = *node;
             return true;
@@ -156,28 +197,29 @@ bool ebpo_level_walk_next(ebpo_level_walk *w, ebpo_level_walk_node *out)
 }
 
 /* Of the ancestor at `depth`, and those above it. */
-static const ebpo_polytope *level_walk_ancestor(const ebpo_level_walk *w, int depth,
-                                                ebpo_envelope_stack *e)
+static const ebpo_polytope *ancestor_envelope(const level_walk *w, int depth,
+                                              ebpo_envelope_stack *e)
 {
-    const ebpo_level_walk_node *node = &w->at[depth].node;
+    const level_walk_node *node = &w->at[depth].node;
     const ebpo_polytope *held = ebpo_envelope_held(e, node->octcode);
     if (held)
         return held;
     if (depth)
-        (void)level_walk_ancestor(w, depth - 1, e);
+        (void)ancestor_envelope(w, depth - 1, e);
     return ebpo_envelope_put(e, node->octcode, node->codes, node->code_count);
 }
 
-const ebpo_polytope *ebpo_level_walk_envelope(const ebpo_level_walk *w,
-                                              const ebpo_level_walk_node *node,
-                                              ebpo_envelope_stack *e)
+/* Envelope of the node that ebpo_level_walk_next gave last, in coordinates of its cell; gray nodes
+ * and leaves: from the cube down, cut by the planes of all ancestors and its own. Black nodes: the
+ * cube. Lent until the next call with these envelopes. */
+static const ebpo_polytope *level_walk_envelope(const level_walk *w, const level_walk_node *node,
+                                                ebpo_envelope_stack *e)
 {
     return node->type == EBPO_BLACK ? ebpo_envelope_put_cube(e, node->octcode)
-                                    : level_walk_ancestor(w, w->target, e);
+                                    : ancestor_envelope(w, w->target, e);
 }
 
-/* Levels one after the other. Of a level that has been passed only its types stay, and with
- * polygons its planes: enough to walk down to the nodes of the next one. */
+/* --- the stream --- */
 
 enum { PIECE = 4096 };
 
@@ -191,7 +233,7 @@ struct ebpo_stream {
     uint64_t bytes;
     double
         uniform_volume; /* volume of the leaves and black nodes of all levels before the next one */
-    ebpo_level_walk walk;
+    level_walk walk;
     ebpo_envelope_stack *envelopes; /* with polygons */
     ebpo_node_buffers capacity;
 };
@@ -282,7 +324,7 @@ typedef struct volumes {
 typedef struct job {
     const ebpo_stream *stream;
     int target;
-    ebpo_level_walk *starts;        /* [pieces] */
+    level_walk *starts;             /* [pieces] */
     volumes *found;                 /* [pieces] */
     ebpo_envelope_stack *envelopes; /* [threads] */
 } job;
@@ -294,13 +336,12 @@ static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsig
     double cell = ebpo_cell_volume(&j->stream->box, j->target);
     (void)error;
     for (uint64_t i = begin; i < end; i++) {
-        ebpo_level_walk walk = j->starts[i];
-        ebpo_level_walk_node node;
-        for (int k = 0; k < PIECE && ebpo_level_walk_next(&walk, &node); k++)
+        level_walk walk = j->starts[i];
+        level_walk_node node;
+        for (int k = 0; k < PIECE && level_walk_next(&walk, &node); k++)
             if (node.type != EBPO_WHITE)
                 *(node.type == EBPO_GRAY ? &j->found[i].gray : &j->found[i].uniform_volume) +=
-                    ebpo_polytope_volume(
-                        ebpo_level_walk_envelope(&walk, &node, &j->envelopes[worker])) *
+                    ebpo_polytope_volume(level_walk_envelope(&walk, &node, &j->envelopes[worker])) *
                     cell;
     }
     return EBPO_OK;
@@ -310,15 +351,15 @@ static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsig
  * number of threads, so neither does the sum. */
 static void find_starts(job *j)
 {
-    ebpo_level_walk walk;
-    ebpo_level_walk_node node;
-    ebpo_level_walk_begin(&walk, j->stream->kept, j->target, j->stream->info->pruned);
+    level_walk walk;
+    level_walk_node node;
+    level_walk_begin(&walk, j->stream->kept, j->target, j->stream->info->pruned);
     uint64_t seen = 0;
     do {
         if (seen % PIECE == 0)
             j->starts[seen / PIECE] = walk;
         seen++;
-    } while (ebpo_level_walk_next(&walk, &node));
+    } while (level_walk_next(&walk, &node));
 }
 
 static ebpo_status cut_volumes(const ebpo_stream *s, int target, uint64_t nodes, volumes *out,
@@ -357,7 +398,7 @@ static volumes stated_volumes(const ebpo_stream *s, int level)
                           (double)summary->black_count * ebpo_cell_volume(&s->box, level) };
 }
 
-/* --- levels --- */
+/* --- advancing to the next level --- */
 
 void ebpo_stream_prefetch(const ebpo_stream *s, int last)
 {
@@ -401,15 +442,15 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
     s->uniform_volume += v.uniform_volume;
     s->bytes += ebpo_reader_level_bytes(s->file, next) +
                 (next == s->info->index_level ? s->info->chunk_index_bytes : 0);
-    ebpo_level_walk_begin(&s->walk, s->kept, next, s->info->pruned);
+    level_walk_begin(&s->walk, s->kept, next, s->info->pruned);
     *out = (ebpo_stream_level){ next, nodes, s->bytes, v.gray + s->uniform_volume };
     *more = true;
     return EBPO_OK;
 }
 
-/* --- nodes --- */
+/* --- returning nodes --- */
 
-static int32_t winding_of(const ebpo_level *level, const ebpo_level_walk_node *node)
+static int32_t winding_of(const ebpo_level *level, const level_walk_node *node)
 {
     switch (node->type) {
     case EBPO_WHITE: return level->white_winding ? level->white_winding[node->rank] : 0;
@@ -421,8 +462,7 @@ static int32_t winding_of(const ebpo_level *level, const ebpo_level_walk_node *n
 }
 
 /* Of a node that is not gray: its parent's, which was passed before it. */
-static void add_colour(const ebpo_stream *s, const ebpo_level_walk_node *node,
-                       ebpo_stream_node *out)
+static void add_colour(const ebpo_stream *s, const level_walk_node *node, ebpo_stream_node *out)
 {
     bool gray = node->type == EBPO_GRAY;
     int level = s->level - !gray;
@@ -436,12 +476,12 @@ ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *m
                                   ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_level_walk_node node;
+    level_walk_node node;
     *more = false;
     if (s->level < 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "no level has been read yet; call ebpo_stream_next_level first");
-    if (!ebpo_level_walk_next(&s->walk, &node))
+    if (!level_walk_next(&s->walk, &node))
         return EBPO_OK;
     ebpo_node_begin(out, &s->box, node.octcode, node.type);
     out->winding = winding_of(&s->kept[s->level], &node);
@@ -449,8 +489,7 @@ ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *m
     if (s->options.planes || s->options.polygons)
         ebpo_node_add_planes(out, &s->box, node.codes, node.code_count, &s->capacity);
     if (s->options.polygons && node.type != EBPO_WHITE)
-        ebpo_node_add_polygons(out, &s->box,
-                               ebpo_level_walk_envelope(&s->walk, &node, s->envelopes),
+        ebpo_node_add_polygons(out, &s->box, level_walk_envelope(&s->walk, &node, s->envelopes),
                                &s->capacity);
     *more = true;
     return EBPO_OK;

@@ -1,3 +1,13 @@
+/* Delivers a view: one group of siblings after the other, those first that the observer's priority
+ * puts first, until the view's limits are reached.
+ *
+ * Each step takes the top of the frontier (view_cut.h), reads the group of its children, with the
+ * faces of leaves if they are wanted, and returns the siblings; when all are delivered they replace
+ * their parent in the cut. When the observer changes, the frontier is sorted again; what has been
+ * delivered stays.
+ *
+ * For files behind a network, the chunks that a group needs are requested together, and with them
+ * the chunks of the groups that come soon, as far as the reader's memory allows. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -13,12 +23,10 @@
 #include "format/slice.h"
 #include "format/subtree_index.h"
 #include "geometry/cells.h"
-#include "levels/frontier.h"
-
-/* The faces of leaves in a view stream. */
+#include "levels/view_cut.h"
 
 /* Of the siblings that are being delivered, and which faces have been. */
-typedef struct ebpo_view_leaves {
+typedef struct view_leaves {
     const ebpo_info *info;
     ebpo_slice slice[8]; /* of the leaves among them */
     uint8_t *given;      /* a bit for each face of the file */
@@ -28,23 +36,19 @@ typedef struct ebpo_view_leaves {
     uint8_t *repeated;
     uint64_t capacity[3];
     ebpo_view_faces now;
-} ebpo_view_leaves;
+} view_leaves;
 
 /* A group of siblings; `parent` is an octcode, 0 of the root's group. */
-typedef struct ebpo_view_group {
+typedef struct view_group {
     ebpo_group_number number;
     uint64_t parent;
-} ebpo_view_group;
-
-/* What a view stream needs of a file far away: asked for together, and ahead. */
+} view_group;
 
 /* To which level the view goes below a node, at most. */
-typedef struct ebpo_view_depth {
+typedef struct view_depth {
     int (*level)(const void *user, uint64_t octcode);
     const void *user;
-} ebpo_view_depth;
-
-/* Inside an ebpo_view_stream. */
+} view_depth;
 
 struct ebpo_view_stream {
     const ebpo_file *file;
@@ -64,14 +68,13 @@ struct ebpo_view_stream {
     ebpo_group read;
     ebpo_envelope_stack *envelopes; /* with polygons */
     ebpo_node_buffers capacity;
-    ebpo_view_leaves *leaves; /* with faces */
+    view_leaves *leaves; /* with faces */
     /* what is deeper, or smaller, is not announced yet */
     int soon_level;
     double soon_pixels;
 };
 
-static ebpo_status ebpo_view_leaves_new(ebpo_view_leaves **out, const ebpo_file *file,
-                                        ebpo_error *error)
+static ebpo_status view_leaves_new(view_leaves **out, const ebpo_file *file, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(file);
     *out = NULL;
@@ -79,7 +82,7 @@ static ebpo_status ebpo_view_leaves_new(ebpo_view_leaves **out, const ebpo_file 
         return ebpo_fail(error, EBPO_E_ABSENT,
                          "view options: faces are asked for, and the file was written without its "
                          "mesh; build it again with it");
-    ebpo_view_leaves *l = ebpo_alloc_zero(1, sizeof *l);
+    view_leaves *l = ebpo_alloc_zero(1, sizeof *l);
     if (l)
         l->given = ebpo_alloc_zero(info->face_count / 8 + 1, 1);
     if (!l || !l->given) {
@@ -91,13 +94,13 @@ static ebpo_status ebpo_view_leaves_new(ebpo_view_leaves **out, const ebpo_file 
     return EBPO_OK;
 }
 
-static void drop_slices(ebpo_view_leaves *l)
+static void drop_slices(view_leaves *l)
 {
     for (unsigned octant = 0; octant < 8; octant++)
         ebpo_slice_free(&l->slice[octant]);
 }
 
-static void ebpo_view_leaves_free(ebpo_view_leaves *l)
+static void view_leaves_free(view_leaves *l)
 {
     if (!l)
         return;
@@ -110,8 +113,8 @@ static void ebpo_view_leaves_free(ebpo_view_leaves *l)
 }
 
 /* The node of an octant of a group that has been read, if it is a leaf. */
-static bool ebpo_view_leaf_of(const ebpo_view_group *group, const ebpo_group *read, unsigned octant,
-                              ebpo_node *out)
+static bool leaf_of_group(const view_group *group, const ebpo_group *read, unsigned octant,
+                          ebpo_node *out)
 {
     if (ebpo_group_type(read->types, octant) != EBPO_LEAF ||
         octant >= ebpo_group_octants(group->number.level))
@@ -124,9 +127,9 @@ static bool ebpo_view_leaf_of(const ebpo_view_group *group, const ebpo_group *re
     return true;
 }
 
-/* --- reading --- */
+/* --- faces of leaves: reading --- */
 
-static ebpo_status make_room(ebpo_view_leaves *l, uint64_t faces, ebpo_error *error)
+static ebpo_status make_room(view_leaves *l, uint64_t faces, ebpo_error *error)
 {
     bool fine = ebpo_grow(&l->corners, &l->capacity[0], faces, sizeof *l->corners) &&
                 ebpo_grow(&l->numbers, &l->capacity[1], faces, sizeof *l->numbers) &&
@@ -136,15 +139,14 @@ static ebpo_status make_room(ebpo_view_leaves *l, uint64_t faces, ebpo_error *er
 }
 
 /* The faces of all leaves of a group that has been read. On failure there are none. */
-static ebpo_status ebpo_view_leaves_read(ebpo_view_leaves *l, ebpo_chunks *chunks,
-                                         const ebpo_view_group *group, const ebpo_group *read,
-                                         ebpo_error *error)
+static ebpo_status view_leaves_read(view_leaves *l, ebpo_chunks *chunks, const view_group *group,
+                                    const ebpo_group *read, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_node leaf;
     drop_slices(l);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
-        if (ebpo_view_leaf_of(group, read, octant, &leaf)) {
+        if (leaf_of_group(group, read, octant, &leaf)) {
             status = ebpo_slice_read_parts(&l->slice[octant], chunks, &leaf, 0, error);
             if (status == EBPO_OK)
                 status = make_room(l, l->slice[octant].mesh.face_count, error);
@@ -154,15 +156,12 @@ static ebpo_status ebpo_view_leaves_read(ebpo_view_leaves *l, ebpo_chunks *chunk
     return status;
 }
 
-/* --- giving --- */
+/* --- faces of leaves: returning them --- */
 
 /* About no node. */
-static void ebpo_view_leaves_give_none(ebpo_view_leaves *l)
-{
-    l->now = (ebpo_view_faces)EBPO_VIEW_FACES_INIT;
-}
+static void give_no_leaf(view_leaves *l) { l->now = (ebpo_view_faces)EBPO_VIEW_FACES_INIT; }
 
-static void take_face(ebpo_view_leaves *l, const ebpo_slice *slice, uint32_t face)
+static void take_face(view_leaves *l, const ebpo_slice *slice, uint32_t face)
 {
     const ebpo_mesh *mesh = &slice->mesh;
     uint64_t number = ebpo_slice_file_face(slice, face);
@@ -177,10 +176,10 @@ static void take_face(ebpo_view_leaves *l, const ebpo_slice *slice, uint32_t fac
 }
 
 /* From now on `now` is about the node of this octant, which has been given with that. */
-static void ebpo_view_leaves_give(ebpo_view_leaves *l, unsigned octant)
+static void give_leaf(view_leaves *l, unsigned octant)
 {
     const ebpo_slice *slice = &l->slice[octant];
-    ebpo_view_leaves_give_none(l);
+    give_no_leaf(l);
     l->now.face_count = slice->mesh.face_count;
     l->now.corners = (const double(*)[3][3])l->corners;
     l->now.numbers = l->numbers;
@@ -189,36 +188,38 @@ static void ebpo_view_leaves_give(ebpo_view_leaves *l, unsigned octant)
         take_face(l, slice, face);
 }
 
+/* --- fetching: requests --- */
+
 typedef struct fetching {
     ebpo_chunks *chunks;
     const ebpo_partial *partial;
     const ebpo_frontier *frontier;
     unsigned wanted;
     bool faces;
-    const ebpo_view_depth *depth;
+    const view_depth *depth;
 } fetching;
 
 /* The children of a node that waits to be refined. */
-static ebpo_view_group ebpo_view_children(const ebpo_waiting *w)
+static view_group children_of(const ebpo_waiting *w)
 {
-    return (ebpo_view_group){ { ebpo_octcode_level(w->octcode) + 1, w->below }, w->octcode };
+    return (view_group){ { ebpo_octcode_level(w->octcode) + 1, w->below }, w->octcode };
 }
 
 /* What comes next, and after it what comes soon; returns how many groups. Of those that stand
  * together in blocks of so many, one. */
-static unsigned view_fetch_coming(const fetching *f, const ebpo_view_group *first, unsigned block,
-                                  ebpo_view_group groups[EBPO_FRONTIER_BLOCKS])
+static unsigned coming_groups(const fetching *f, const view_group *first, unsigned block,
+                              view_group groups[EBPO_FRONTIER_BLOCKS])
 {
     uint64_t best[EBPO_FRONTIER_BLOCKS];
     unsigned count = ebpo_frontier_blocks(f->frontier, block, best);
     groups[0] = *first;
     for (unsigned i = 0; i < count; i++) /* the first is the one at hand */
-        groups[i] = ebpo_view_children(&f->frontier->at[best[i]]);
+        groups[i] = children_of(&f->frontier->at[best[i]]);
     return count ? count : 1;
 }
 
 /* Reads all that a group takes, for nothing but to find out what is missing. */
-static void try_group(const fetching *f, const ebpo_view_group *group)
+static void try_group(const fetching *f, const view_group *group)
 {
     ebpo_group read;
     ebpo_node leaf;
@@ -226,21 +227,21 @@ static void try_group(const fetching *f, const ebpo_view_group *group)
                                          f->wanted, &read, NULL);
     for (unsigned octant = 0; octant < 8 && f->faces && status == EBPO_OK; octant++) {
         ebpo_slice slice;
-        if (ebpo_view_leaf_of(group, &read, octant, &leaf) &&
+        if (leaf_of_group(group, &read, octant, &leaf) &&
             ebpo_slice_read_parts(&slice, f->chunks, &leaf, 0, NULL) == EBPO_OK)
             ebpo_slice_free(&slice);
     }
 }
 
-/* --- subtrees --- */
+/* --- fetching: subtrees --- */
 
-static bool below_subtrees(const fetching *f, const ebpo_view_group *group)
+static bool below_subtrees(const fetching *f, const view_group *group)
 {
     return group->parent && ebpo_subtree_table_has(f->chunks->file, group->number.level);
 }
 
 /* The number of the subtree that a group stands in: its root's rank among gray nodes. */
-static uint64_t subtree_of(const fetching *f, const ebpo_view_group *group)
+static uint64_t subtree_of(const fetching *f, const view_group *group)
 {
     int last = ebpo_octcode_level(group->parent), level = f->chunks->file->info.subtree_level;
     ebpo_partial_node node = { 0, 0 };
@@ -263,8 +264,7 @@ typedef struct entering {
 } entering;
 
 /* In which subtrees these groups stand, each once; not what waits at a root. */
-static void enter_groups(const fetching *f, const ebpo_view_group *groups, unsigned count,
-                         entering *e)
+static void enter_groups(const fetching *f, const view_group *groups, unsigned count, entering *e)
 {
     int level = f->chunks->file->info.subtree_level;
     for (unsigned i = 0; i < count; i++) {
@@ -281,7 +281,7 @@ static void enter_groups(const fetching *f, const ebpo_view_group *groups, unsig
 
 /* The subtrees that the view will come to from a node above them: the types of the levels in
  * between are in memory, or else are noted as missing. */
-static void enter_below(const fetching *f, const ebpo_view_group *children, entering *e)
+static void enter_below(const fetching *f, const view_group *children, entering *e)
 {
     int level = children->number.level;
     ebpo_group read;
@@ -296,7 +296,7 @@ static void enter_below(const fetching *f, const ebpo_view_group *children, ente
         if (level == f->chunks->file->info.subtree_level)
             e->list[e->count++] = (entered){ rank, octcode };
         else
-            enter_below(f, &(ebpo_view_group){ { level + 1, rank }, octcode }, e);
+            enter_below(f, &(view_group){ { level + 1, rank }, octcode }, e);
     }
 }
 
@@ -306,7 +306,7 @@ static void enter_frontier(const fetching *f, entering *e)
     int level = f->chunks->file->info.subtree_level;
     for (uint64_t i = 0; i < f->frontier->count && e->count < SUBTREES_MOST; i++) {
         const ebpo_waiting *w = &f->frontier->at[i];
-        ebpo_view_group children = ebpo_view_children(w);
+        view_group children = children_of(w);
         if (w->turn == EBPO_TURN_SEEN && children.number.level <= level)
             enter_below(f, &children, e);
         else if (w->turn == EBPO_TURN_SEEN && children.number.level == level + 1)
@@ -317,7 +317,7 @@ static void enter_frontier(const fetching *f, entering *e)
 /* Of the subtrees of these groups, all that the view will come to, as far as `most` bytes go.
  * Faces: not where it goes through so many that it comes to the end of none soon; then what the
  * next groups take is enough. */
-static bool try_subtrees(const fetching *f, const ebpo_view_group *groups, unsigned count,
+static bool try_subtrees(const fetching *f, const view_group *groups, unsigned count,
                          const ebpo_chunk_keys *keys, uint64_t most)
 {
     entering e;
@@ -344,18 +344,17 @@ static bool try_subtrees(const fetching *f, const ebpo_view_group *groups, unsig
 /* The chunks that the group waits for next, and, unless they have been announced before, behind
  * these what the next groups take: so one batch is used up before the next one is told. How many
  * are its own. */
-static unsigned view_fetch_collect(const fetching *f, const ebpo_view_group *group,
-                                   ebpo_chunk_keys *keys)
+static unsigned collect_chunks(const fetching *f, const view_group *group, ebpo_chunk_keys *keys)
 {
     enum { FACES_BLOCK = 64, TRIED = 64 }; /* trying is work */
-    ebpo_view_group groups[EBPO_FRONTIER_BLOCKS];
+    view_group groups[EBPO_FRONTIER_BLOCKS];
     ebpo_chunk_keys_begin(keys);
     ebpo_chunks_collect(f->chunks, keys);
     try_group(f, group);
     unsigned own = keys->count;
     uint64_t most = keys->bytes + ebpo_chunks_room(f->chunks);
     if (own && !ebpo_chunks_announced(f->chunks, keys)) {
-        unsigned count = view_fetch_coming(f, group, f->faces ? FACES_BLOCK : 1, groups);
+        unsigned count = coming_groups(f, group, f->faces ? FACES_BLOCK : 1, groups);
         bool told = try_subtrees(f, groups, count, keys, most);
         for (unsigned i = 1; i < count && i < TRIED && !told && keys->bytes < most; i++)
             try_group(f, &groups[i]);
@@ -366,14 +365,14 @@ static unsigned view_fetch_collect(const fetching *f, const ebpo_view_group *gro
 
 /* Pass by pass: lists, references, faces, vertices, with what ranks take in between. Beyond that,
  * reading goes on without having been announced. */
-static ebpo_status fetch_tried(const fetching *f, const ebpo_view_group *group, ebpo_error *error)
+static ebpo_status fetch_tried(const fetching *f, const view_group *group, ebpo_error *error)
 {
     enum { PASSES = 12 };
     ebpo_chunk_keys keys;
     ebpo_status status = EBPO_OK;
     unsigned own = 1;
     for (int pass = 0; pass < PASSES && own && status == EBPO_OK; pass++) {
-        own = view_fetch_collect(f, group, &keys);
+        own = collect_chunks(f, group, &keys);
         if (own)
             status = ebpo_chunks_fetch(f->chunks, &keys, own, error);
     }
@@ -381,15 +380,15 @@ static ebpo_status fetch_tried(const fetching *f, const ebpo_view_group *group, 
 }
 
 /* Nodes alone, of levels above the subtrees or of files without. */
-static ebpo_status fetch_nodes(const fetching *f, const ebpo_view_group *group, ebpo_error *error)
+static ebpo_status fetch_nodes(const fetching *f, const view_group *group, ebpo_error *error)
 {
-    ebpo_view_group groups[EBPO_FRONTIER_BLOCKS];
+    view_group groups[EBPO_FRONTIER_BLOCKS];
     ebpo_group_number numbers[EBPO_FRONTIER_BLOCKS];
     if (!ebpo_group_is_far(f->chunks, &group->number, f->wanted))
         return EBPO_OK;
     if (f->chunks->limit == UINT64_MAX)
         ebpo_expect_top(f->chunks->file); /* with it what the subtrees ask for first */
-    unsigned count = view_fetch_coming(f, group, EBPO_GROUP_BLOCK, groups);
+    unsigned count = coming_groups(f, group, EBPO_GROUP_BLOCK, groups);
     for (unsigned i = 0; i < count; i++)
         numbers[i] = groups[i].number;
     return ebpo_group_fetch(f->chunks, numbers, count, f->wanted, error);
@@ -399,10 +398,10 @@ static ebpo_status fetch_nodes(const fetching *f, const ebpo_view_group *group, 
  * `faces` those of its leaves take and is not in memory, and announces with it what the next groups
  * of the frontier take: where the file has a table of subtrees, all of the subtrees in which they
  * are. Counted chunks: EBPO_E_LIMIT as ebpo_group_read. */
-static ebpo_status ebpo_view_fetch(ebpo_chunks *chunks, const ebpo_partial *partial,
-                                   const ebpo_frontier *frontier, const ebpo_view_group *group,
-                                   unsigned wanted, bool faces, const ebpo_view_depth *depth,
-                                   ebpo_error *error)
+static ebpo_status fetch_group(ebpo_chunks *chunks, const ebpo_partial *partial,
+                               const ebpo_frontier *frontier, const view_group *group,
+                               unsigned wanted, bool faces, const view_depth *depth,
+                               ebpo_error *error)
 {
     fetching f = { chunks, partial, frontier, wanted, faces, depth };
     ebpo_status status = EBPO_OK;
@@ -411,8 +410,6 @@ static ebpo_status ebpo_view_fetch(ebpo_chunks *chunks, const ebpo_partial *part
     return status == EBPO_OK && (faces || below_subtrees(&f, group)) ? fetch_tried(&f, group, error)
                                                                      : status;
 }
-
-/* One group of siblings after the other, chosen from the gray nodes of the cut. */
 
 enum { MEMORY_LEAST = 1 << 20 };
 
@@ -484,7 +481,7 @@ ebpo_status ebpo_view_stream_new(const ebpo_file *file, const ebpo_view_options 
         status = ebpo_chunks_make_counted(&s->chunks, file, s->options.memory, error);
     s->partial.windings = s->options.windings;
     if (status == EBPO_OK && s->options.faces)
-        status = ebpo_view_leaves_new(&s->leaves, file, error);
+        status = view_leaves_new(&s->leaves, file, error);
     if (status == EBPO_OK && s->options.polygons &&
         !(s->envelopes = ebpo_alloc_zero(1, sizeof *s->envelopes)))
         status = ebpo_fail_memory(error, sizeof *s->envelopes);
@@ -502,7 +499,7 @@ void ebpo_view_stream_free(ebpo_view_stream *s)
     ebpo_chunks_free(s->chunks);
     ebpo_partial_free(&s->partial);
     ebpo_frontier_free(&s->frontier);
-    ebpo_view_leaves_free(s->leaves);
+    view_leaves_free(s->leaves);
     free(s->envelopes);
     free(s);
 }
@@ -523,7 +520,7 @@ static ebpo_turn turn_of(const ebpo_view_stream *s, int level, ebpo_seen look)
     return o->unseen == EBPO_UNSEEN_NEVER ? EBPO_TURN_NEVER : EBPO_TURN_UNSEEN;
 }
 
-static void view_stream_rank(const ebpo_view_stream *s, ebpo_waiting *w)
+static void rank_waiting(const ebpo_view_stream *s, ebpo_waiting *w)
 {
     ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(w->octcode));
     w->key =
@@ -550,23 +547,23 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
     if (status != EBPO_OK)
         return status;
     for (uint64_t i = 0; i < s->frontier.count; i++)
-        view_stream_rank(s, &s->frontier.at[i]);
+        rank_waiting(s, &s->frontier.at[i]);
     ebpo_frontier_sort(&s->frontier);
     return EBPO_OK;
 }
 
-static ebpo_status read_now(ebpo_view_stream *s, const ebpo_view_group *group, unsigned wanted,
+static ebpo_status read_now(ebpo_view_stream *s, const view_group *group, unsigned wanted,
                             ebpo_error *error)
 {
     ebpo_status status = ebpo_group_read(s->chunks, group->number.level, group->number.group,
                                          wanted, &s->read, error);
     return status == EBPO_OK && s->leaves
-               ? ebpo_view_leaves_read(s->leaves, s->chunks, group, &s->read, error)
+               ? view_leaves_read(s->leaves, s->chunks, group, &s->read, error)
                : status;
 }
 
 /* Of a file far away, from memory alone; false: there is more to it. */
-static bool read_at_once(ebpo_view_stream *s, const ebpo_view_group *group, unsigned wanted)
+static bool read_at_once(ebpo_view_stream *s, const view_group *group, unsigned wanted)
 {
     ebpo_chunk_keys missing;
     ebpo_chunk_keys_begin(&missing);
@@ -614,19 +611,19 @@ static int depth_below(const void *user, uint64_t octcode)
 }
 
 /* Into s->read, and with faces those of its leaves. */
-static ebpo_status read_group(ebpo_view_stream *s, const ebpo_view_group *group, ebpo_error *error)
+static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo_error *error)
 {
     unsigned wanted = (s->options.planes || s->options.polygons ? EBPO_GROUP_PLANES : 0u) |
                       (s->options.windings ? EBPO_GROUP_WINDINGS : 0u);
     ebpo_status status = EBPO_OK;
     ebpo_chunks_limit(s->chunks, s->options.bytes ? s->options.bytes : UINT64_MAX);
-    ebpo_view_depth depth = { depth_below, s };
+    view_depth depth = { depth_below, s };
     if (ebpo_input_expects(&s->chunks->file->in)) {
         if (read_at_once(s, group, wanted))
             return EBPO_OK;
         set_soon(s, group->parent ? group->parent : 1);
-        status = ebpo_view_fetch(s->chunks, &s->partial, &s->frontier, group, wanted,
-                                 s->leaves != NULL, &depth, error);
+        status = fetch_group(s->chunks, &s->partial, &s->frontier, group, wanted, s->leaves != NULL,
+                             &depth, error);
     }
     return status == EBPO_OK ? read_now(s, group, wanted, error) : status;
 }
@@ -636,7 +633,7 @@ static ebpo_status read_group(ebpo_view_stream *s, const ebpo_view_group *group,
 static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_error *error)
 {
     bool root = s->partial.group_count == 0;
-    ebpo_view_group group = { { 0, 0 }, 0 };
+    view_group group = { { 0, 0 }, 0 };
     if (!root && (s->frontier.count == 0 || s->frontier.at[0].turn == EBPO_TURN_NEVER)) {
         *end = EBPO_VIEW_DONE;
         return EBPO_OK;
@@ -648,7 +645,7 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
         return EBPO_OK;
     }
     if (!root)
-        group = ebpo_view_children(&s->frontier.at[0]);
+        group = children_of(&s->frontier.at[0]);
     ebpo_error why = EBPO_ERROR_INIT;
     ebpo_status status = read_group(s, &group, &why);
     if (status == EBPO_E_LIMIT && ebpo_chunks_refused(s->chunks)) {
@@ -699,7 +696,7 @@ static void end_group(ebpo_view_stream *s)
                                .below = ebpo_partial_children(&s->partial, node),
                                .group = group,
                                .octant = (uint8_t)octant };
-            view_stream_rank(s, &w);
+            rank_waiting(s, &w);
             ebpo_frontier_push(&s->frontier, w);
         }
     }
@@ -709,7 +706,7 @@ static void end_group(ebpo_view_stream *s)
 /* --- nodes --- */
 
 /* All about a node of `grown`; `complete` is left to the caller. */
-static void ebpo_view_fill(ebpo_view_stream *s, ebpo_partial_node node, ebpo_view_node *out)
+static void fill_node(ebpo_view_stream *s, ebpo_partial_node node, ebpo_view_node *out)
 {
     ebpo_node_type type = ebpo_partial_type(&s->partial, node);
     memset(out, 0, sizeof *out);
@@ -739,7 +736,7 @@ ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo
     EBPO_DEFAULT_FP;
     *end = EBPO_VIEW_NODE;
     if (s->leaves)
-        ebpo_view_leaves_give_none(s->leaves);
+        give_no_leaf(s->leaves);
     while (!s->delivering) {
         ebpo_status status = begin_group(s, end, error);
         if (status != EBPO_OK || *end != EBPO_VIEW_NODE)
@@ -747,9 +744,9 @@ ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo
     }
     uint32_t group = (uint32_t)(s->partial.group_count - 1);
     unsigned octant = s->step++ ^ s->flip;
-    ebpo_view_fill(s, (ebpo_partial_node){ group, (uint8_t)octant }, out);
+    fill_node(s, (ebpo_partial_node){ group, (uint8_t)octant }, out);
     if (s->leaves)
-        ebpo_view_leaves_give(s->leaves, octant);
+        give_leaf(s->leaves, octant);
     s->delivered++;
     out->complete = s->step == (group ? 8 : 1);
     if (out->complete)
@@ -757,7 +754,7 @@ ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo
     return EBPO_OK;
 }
 
-/* What of a view has been delivered: faces of a leaf, the cut, and figures. */
+/* --- what has been delivered: the cut, statistics, faces --- */
 
 typedef struct visitor {
     ebpo_view_stream *stream;
@@ -772,7 +769,7 @@ static bool visit_node(visitor *v, ebpo_partial_node node)
     const ebpo_partial *partial = &v->stream->partial;
     uint32_t below = partial->group[node.group].child[node.octant];
     if (below == 0) {
-        ebpo_view_fill(v->stream, node, &v->node);
+        fill_node(v->stream, node, &v->node);
         v->node.complete = true;
         return v->visit(v->user, &v->node);
     }

@@ -1,3 +1,8 @@
+/* Counts checks and violations of the verifier, and keeps the first violation of each kind.
+ *
+ * Each thread counts into its own tally; tallies are merged. "First" is by place in the file:
+ * level, octcode, face, plane, then by the text. So the report is the same whichever thread finds a
+ * violation, and in whatever order tallies are merged. */
 #include "verify/tally.h"
 
 #include <inttypes.h>
@@ -42,8 +47,8 @@ static int print_place(char *out, size_t size, const ebpo_verify_place *place)
 
 /* Equal places (two findings about one node) are told apart by their text, so that merging does not
  * depend on order. */
-static void tally_record(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
-                         const char *text)
+static void record_violation(ebpo_tally *tally, ebpo_verify_kind kind,
+                             const ebpo_verify_place *place, const char *text)
 {
     int order = tally->violations[kind] ? compare_places(place, &tally->place[kind]) : -1;
     tally->violations[kind]++;
@@ -53,13 +58,13 @@ static void tally_record(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_ve
     }
 }
 
-static void record_va(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
-                      const char *format, va_list args)
+static void record_arguments(ebpo_tally *tally, ebpo_verify_kind kind,
+                             const ebpo_verify_place *place, const char *format, va_list args)
 {
     char text[sizeof tally->first[kind]];
     int length = print_place(text, sizeof text, place);
     vsnprintf(text + length, sizeof text - (size_t)length, format, args);
-    tally_record(tally, kind, place, text);
+    record_violation(tally, kind, place, text);
 }
 
 void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
@@ -72,7 +77,7 @@ void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_v
     }
     va_list args;
     va_start(args, format);
-    record_va(tally, kind, place, format, args);
+    record_arguments(tally, kind, place, format, args);
     va_end(args);
 }
 
@@ -83,7 +88,8 @@ bool ebpo_tally_check(ebpo_tally *tally, ebpo_verify_kind kind, bool holds, cons
         return true;
     va_list args;
     va_start(args, format);
-    record_va(tally, kind, &(ebpo_verify_place){ 0, EBPO_NO_FACE, EBPO_NO_PLANE }, format, args);
+    record_arguments(tally, kind, &(ebpo_verify_place){ 0, EBPO_NO_FACE, EBPO_NO_PLANE }, format,
+                     args);
     va_end(args);
     return false;
 }
@@ -93,7 +99,7 @@ void ebpo_tally_merge(ebpo_tally *into, const ebpo_tally *from)
     for (int kind = 0; kind < EBPO_VERIFY_KINDS; kind++) {
         into->checks[kind] += from->checks[kind];
         if (from->violations[kind]) {
-            tally_record(into, (ebpo_verify_kind)kind, &from->place[kind], from->first[kind]);
+            record_violation(into, (ebpo_verify_kind)kind, &from->place[kind], from->first[kind]);
             into->violations[kind] += from->violations[kind] - 1;
         }
     }

@@ -1,5 +1,5 @@
-/* Counting checks and violations, and keeping the first violation of each kind in file order,
- * whichever thread finds it. */
+/* Counts of checks and violations, and the first violation of each kind in file order, whichever
+ * thread finds it (tally.c). */
 #ifndef EBPO_VERIFY_TALLY_H
 #define EBPO_VERIFY_TALLY_H
 

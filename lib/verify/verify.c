@@ -1,5 +1,15 @@
-/* From the root down, node by node; no byte is computed: whether it is the right one is a question
- * of two products. */
+/* Verifies a file: runs all checks in order and makes the report. This folder is the judge of the
+ * others: it uses nothing of construct, of the writer or of query, and keeps its own vector
+ * functions. Cells, half-spaces and clipping are computed here in another way than in the builder;
+ * only the exact predicates are shared (tests/lint/test_layers.py checks the folders).
+ *
+ * The order: chunk directory and chunk checksums (verify_chunks.c), the content's checksum, whether
+ * the arrays fit together; only then structure, nesting, colours, the walk (containment, lists,
+ * labels), subtrees, and chunks of faces; last the source mesh and unused bytes. Damage that
+ * reading reports is a violation, not an error of the call.
+ *
+ * Colours of gray nodes are checked here, from the root down. No byte is computed: two products say
+ * whether it is the nearest to the mean. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -17,7 +27,7 @@
 #include "verify/verify_parts.h"
 #include "verify/verify_tree.h"
 
-/* Colours of gray nodes against those of the faces below. */
+/* --- colours of gray nodes --- */
 
 enum { NODES_A_TIME = 128 };
 
@@ -101,14 +111,14 @@ static void check_node(const judging *j, const ebpo_twin_node *node, const total
                              "its colour %06" PRIx32 " is not the mean of the faces below", colour);
 }
 
-static void colours_judge(judging *j, const ebpo_twin_node *node, totals *above)
+static void judge_node(judging *j, const ebpo_twin_node *node, totals *above)
 {
     totals sum = { { { 0, 0 } } };
     if (node->type == EBPO_LEAF)
         add_list(j, node, &sum);
     for (unsigned octant = 0; octant < 8 && node->type == EBPO_GRAY; octant++) {
         ebpo_twin_node child = ebpo_twin_child(j->view, node, octant);
-        colours_judge(j, &child, &sum);
+        judge_node(j, &child, &sum);
     }
     if (node->type == EBPO_GRAY)
         check_node(j, node, &sum);
@@ -127,8 +137,7 @@ static bool vertices_differ(const judging *j)
 
 /* Of a tree with colours whose shape was checked; where it has no mesh, its mesh has no colours, or
  * it is a subset, nothing can be said. EBPO_E_MEMORY. */
-static ebpo_status ebpo_check_colours(ebpo_tally *tally, const ebpo_twin_tree *view,
-                                      ebpo_error *error)
+static ebpo_status check_colours(ebpo_tally *tally, const ebpo_twin_tree *view, ebpo_error *error)
 {
     const ebpo_tree *tree = view->tree;
     judging j = { .tally = tally, .view = view };
@@ -142,13 +151,12 @@ static ebpo_status ebpo_check_colours(ebpo_tally *tally, const ebpo_twin_tree *v
         j.longest = fmax(j.longest, view->box.size[k]);
     totals all = { { { 0, 0 } } };
     ebpo_twin_node root = ebpo_twin_root(view);
-    colours_judge(&j, &root, &all);
+    judge_node(&j, &root, &all);
     ebpo_colours_free(&j.colours);
     return EBPO_OK;
 }
 
-/* Proves a file's promises. Of the builder's geometry only the exact predicates are used: cells,
- * half-spaces and clipping are done here in another way. */
+/* --- the checks in order --- */
 
 /* `file`: where the tree is from, or NULL. */
 static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, const ebpo_tree *tree,
@@ -162,7 +170,7 @@ static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, cons
         return status;
     ebpo_check_structure(tally, &view);
     ebpo_check_nesting(tally, &view);
-    status = ebpo_check_colours(tally, &view, error);
+    status = check_colours(tally, &view, error);
     if (status == EBPO_OK)
         status = ebpo_verify_walk(tally, &view, options, error);
     if (status == EBPO_OK && file)
@@ -185,7 +193,7 @@ static bool is_finding(ebpo_status status)
     return status == EBPO_E_FORMAT || status == EBPO_E_VERSION || status == EBPO_E_LIMIT;
 }
 
-static ebpo_read_options verify_reading(const ebpo_verify_options *options)
+static ebpo_read_options read_options_of(const ebpo_verify_options *options)
 {
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     read.threads = options->threads;
@@ -197,7 +205,7 @@ static ebpo_status check_content(const ebpo_file *file, const ebpo_verify_option
                                  ebpo_tally *tally, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
-    ebpo_read_options read = verify_reading(options);
+    ebpo_read_options read = read_options_of(options);
     ebpo_status status = ebpo_file_check_content(file, &read, &own);
     if (status == EBPO_OK || is_finding(status)) {
         ebpo_tally_check(tally, EBPO_VERIFY_CONTENT, status == EBPO_OK, "%s", own.message);
@@ -210,7 +218,7 @@ static ebpo_status check_tree(const ebpo_file *file, const ebpo_verify_options *
                               ebpo_tally *tally, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
-    ebpo_read_options read = verify_reading(options);
+    ebpo_read_options read = read_options_of(options);
     ebpo_tree tree = { 0 };
     ebpo_status status = ebpo_file_read_tree(file, &read, &tree, &own);
     if (status == EBPO_OK || is_finding(status))
@@ -227,7 +235,7 @@ static ebpo_status check_source(const ebpo_file *file, const ebpo_verify_options
                                 ebpo_tally *tally, ebpo_error *error)
 {
     ebpo_error own = EBPO_ERROR_INIT;
-    ebpo_read_options read = verify_reading(options);
+    ebpo_read_options read = read_options_of(options);
     read.attributes = options->source->attributes != NULL;
     ebpo_mesh stored;
     bool ordered = false;

@@ -1,3 +1,11 @@
+/* Verifies how the file stores its chunks (format-spec/README.md, sections 7 and 20).
+ *
+ * - Chunks of faces with the coding `gates` are decoded by a second reader, which follows the
+ *   specification line by line without regard to speed, and compared with what the library decoded.
+ * - The directory of all chunks is compared with HDF5's own index.
+ * - Bytes of the file that belong to nothing are counted. They change no answer, but a change of
+ *   them must not go unseen.
+ * - Chunk checksums are compared with the chunks, which are read without the reader's check. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,42 +20,44 @@
 #include "hdf5_read/head.h"
 #include "verify/verify_parts.h"
 
+/* --- a second reader of the coding gates --- */
+
 enum { OPEN_MOST = 64, NEAR = 32 };
 
 typedef struct pair {
     uint64_t a, b;
 } pair;
 
-typedef struct twin {
+typedef struct gates_reader {
     const uint8_t *low, *more, *end;
     pair open[OPEN_MOST + 1]; /* newest last */
     size_t count;
     uint64_t seen;
-} twin;
+} gates_reader;
 
-static void twin_open(twin *t, uint64_t a, uint64_t b)
+static void open_edge(gates_reader *t, uint64_t a, uint64_t b)
 {
     t->open[t->count++] = (pair){ a, b };
     if (t->count > OPEN_MOST)
         memmove(t->open, t->open + 1, --t->count * sizeof *t->open);
 }
 
-static void twin_remove(twin *t, size_t at)
+static void remove_edge(gates_reader *t, size_t at)
 {
     memmove(t->open + at, t->open + at + 1, (--t->count - at) * sizeof *t->open);
 }
 
-static void twin_pass(twin *t, uint64_t a, uint64_t b)
+static void pass_edge(gates_reader *t, uint64_t a, uint64_t b)
 {
     for (size_t back = 1; back <= NEAR && back <= t->count; back++)
         if (t->open[t->count - back].a == a && t->open[t->count - back].b == b) {
-            twin_remove(t, t->count - back);
+            remove_edge(t, t->count - back);
             return;
         }
-    twin_open(t, b, a);
+    open_edge(t, b, a);
 }
 
-static bool twin_number(twin *t, uint64_t *vertex)
+static bool read_vertex(gates_reader *t, uint64_t *vertex)
 {
     uint64_t number = *t->low++;
     if (number > 240)
@@ -70,7 +80,7 @@ static bool twin_number(twin *t, uint64_t *vertex)
 }
 
 /* Place of the newest open edge with that end; count: none. */
-static size_t twin_newest(const twin *t, bool first, uint64_t vertex)
+static size_t newest_edge(const gates_reader *t, bool first, uint64_t vertex)
 {
     for (size_t i = t->count; i > 0; i--)
         if ((first ? t->open[i - 1].a : t->open[i - 1].b) == vertex)
@@ -78,43 +88,43 @@ static size_t twin_newest(const twin *t, bool first, uint64_t vertex)
     return t->count;
 }
 
-static bool twin_across(twin *t, unsigned gate, unsigned third, uint64_t *face)
+static bool read_across(gates_reader *t, unsigned gate, unsigned third, uint64_t *face)
 {
     uint64_t c = 0;
     unsigned kind = third / 3, k = third % 3;
     if (gate > t->count)
         return false;
     pair e = t->open[t->count - gate];
-    twin_remove(t, t->count - gate);
-    size_t at = kind == 1   ? twin_newest(t, true, e.b)
-                : kind == 2 ? twin_newest(t, false, e.a)
+    remove_edge(t, t->count - gate);
+    size_t at = kind == 1   ? newest_edge(t, true, e.b)
+                : kind == 2 ? newest_edge(t, false, e.a)
                 : kind >= 4 ? t->count - 1 - (kind - 4)
                             : 0;
     if (kind != 0 && kind != 3 && (kind >= 4 ? kind - 4 >= t->count : at == t->count))
         return false;
     if (kind == 0)
         c = t->seen++;
-    else if (kind == 3 && !twin_number(t, &c))
+    else if (kind == 3 && !read_vertex(t, &c))
         return false;
     else if (kind != 3)
         c = kind == 1 ? t->open[at].b : t->open[at].a;
     if (kind == 1 || kind == 2)
-        twin_remove(t, at);
+        remove_edge(t, at);
     if (kind == 0) {
-        twin_open(t, c, e.b);
-        twin_open(t, e.a, c);
+        open_edge(t, c, e.b);
+        open_edge(t, e.a, c);
     }
     if (kind >= 2)
-        twin_pass(t, e.b, c);
+        pass_edge(t, e.b, c);
     if (kind == 1 || kind >= 3)
-        twin_pass(t, c, e.a);
+        pass_edge(t, c, e.a);
     face[k] = e.a;
     face[(k + 1) % 3] = e.b;
     face[(k + 2) % 3] = c;
     return true;
 }
 
-static bool twin_codes(const uint8_t *in, uint32_t rows, uint64_t *seen, uint32_t *faces)
+static bool read_gates(const uint8_t *in, uint32_t rows, uint64_t *seen, uint32_t *faces)
 {
     for (size_t i = 0; i < 3 * (size_t)rows; i++) {
         uint64_t code = 0;
@@ -133,10 +143,10 @@ static bool twin_codes(const uint8_t *in, uint32_t rows, uint64_t *seen, uint32_
 
 bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uint32_t *faces)
 {
-    twin t;
+    gates_reader t;
     size_t thirds = 0, numbers = 0;
     if (in[0] == 1)
-        return twin_codes(in, rows, seen, faces);
+        return read_gates(in, rows, seen, faces);
     for (uint32_t i = 0; i < rows; i++)
         thirds += in[i] != 0;
     for (size_t i = 0; i < thirds; i++)
@@ -151,12 +161,12 @@ bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uin
         uint64_t face[3];
         bool fine = true;
         if (in[i]) {
-            fine = twin_across(&t, in[i], *third++, face);
+            fine = read_across(&t, in[i], *third++, face);
         } else {
             for (int k = 0; k < 3 && fine; k++)
-                fine = twin_number(&t, &face[k]);
+                fine = read_vertex(&t, &face[k]);
             for (int k = 0; k < 3 && fine; k++)
-                twin_open(&t, face[(k + 1) % 3], face[k]);
+                open_edge(&t, face[(k + 1) % 3], face[k]);
         }
         for (int k = 0; k < 3 && fine; k++)
             faces[3 * i + (uint32_t)k] = (uint32_t)face[k];
@@ -170,11 +180,11 @@ bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uin
     return true;
 }
 
-/* Faces that are stored across edges, read by the plain twin. */
+/* --- gates against the reader --- */
 
 enum { CORNERS_MOST = EBPO_CHUNK_BYTES_MAX / 4 };
 
-static void gates_compare_chunk(ebpo_tally *tally, const uint8_t *streams, uint32_t *faces,
+static void compare_gates_chunk(ebpo_tally *tally, const uint8_t *streams, uint32_t *faces,
                                 const ebpo_tree *tree, uint64_t row, uint64_t rows, uint64_t *seen)
 {
     const uint32_t *corners = tree->mesh.faces + 3 * row;
@@ -187,7 +197,7 @@ static void gates_compare_chunk(ebpo_tally *tally, const uint8_t *streams, uint3
                            row);
 }
 
-static ebpo_status gates_compare(ebpo_tally *tally, const ebpo_file *file, const ebpo_tree *tree,
+static ebpo_status compare_gates(ebpo_tally *tally, const ebpo_file *file, const ebpo_tree *tree,
                                  ebpo_idle_reader *r, uint32_t *faces, ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(file, EBPO_A_FACES, 0);
@@ -197,7 +207,7 @@ static ebpo_status gates_compare(ebpo_tally *tally, const ebpo_file *file, const
         uint64_t left = array->shape.rows - row;
         status = ebpo_reader_gates(file, row / rows, &r->reader, r->raw, error);
         if (status == EBPO_OK)
-            gates_compare_chunk(tally, r->raw, faces, tree, row, left < rows ? left : rows, &seen);
+            compare_gates_chunk(tally, r->raw, faces, tree, row, left < rows ? left : rows, &seen);
     }
     return status;
 }
@@ -209,17 +219,16 @@ ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file, const ebp
         return EBPO_OK;
     ebpo_idle_reader *r = ebpo_idle_readers_take(&ebpo_reader_own(file)->idle);
     uint32_t *faces = ebpo_alloc(CORNERS_MOST, sizeof *faces);
-    ebpo_status status = r && faces ? gates_compare(tally, file, tree, r, faces, error)
+    ebpo_status status = r && faces ? compare_gates(tally, file, tree, r, faces, error)
                                     : ebpo_fail_memory(error, CORNERS_MOST * sizeof *faces);
     free(faces);
     ebpo_idle_readers_give(&ebpo_reader_own(file)->idle, r);
     return status;
 }
 
-/* The list of all chunks, against HDF5's own index. */
+/* --- the chunk directory --- */
 
-#define PLACES_CHECK(condition, ...) \
-    ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
+#define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
 /* An array as HDF5 tells it, and how many of its chunks the list has had. */
 typedef struct indexed {
@@ -296,7 +305,7 @@ static ebpo_status read_list(places_comparison *c, ebpo_error *error)
     return status;
 }
 
-static indexed *places_find(places_comparison *c, uint32_t number)
+static indexed *find_indexed(places_comparison *c, uint32_t number)
 {
     for (unsigned i = 0; i < c->arrays; i++)
         if (c->array[i].number == number)
@@ -314,28 +323,28 @@ static void compare_row(places_comparison *c, uint64_t row, uint64_t at, uint32_
 {
     ebpo_tally *tally = c->tally;
     uint32_t number = (uint32_t)(c->list[row] >> 32);
-    indexed *of = places_find(c, number);
+    indexed *of = find_indexed(c, number);
     if (!of) {
-        PLACES_CHECK(number >= 4096,
-                     "/subtrees/places, row %" PRIu64 ": number %" PRIu32
-                     " is of an array that is not in the file",
-                     row, number);
+        CHECK(number >= 4096,
+              "/subtrees/places, row %" PRIu64 ": number %" PRIu32
+              " is of an array that is not in the file",
+              row, number);
         return;
     }
-    if (!PLACES_CHECK(of->listed < of->count,
-                      "/subtrees/places, row %" PRIu64 ": %s has only %" PRIu64 " chunks", row,
-                      of->array->path, of->count))
+    if (!CHECK(of->listed < of->count,
+               "/subtrees/places, row %" PRIu64 ": %s has only %" PRIu64 " chunks", row,
+               of->array->path, of->count))
         return;
     const ebpo_chunk_place *chunk = &of->chunks[of->listed++];
-    PLACES_CHECK(chunk->address == at && chunk->bytes == bytes,
-                 "/subtrees/places, row %" PRIu64 ": %" PRIu32 " bytes at %" PRIu64
-                 " as chunk %" PRIu64 " of %s, but HDF5 has %" PRIu32 " at %" PRIu64,
-                 row, bytes, at, of->listed - 1, of->array->path, chunk->bytes, chunk->address);
+    CHECK(chunk->address == at && chunk->bytes == bytes,
+          "/subtrees/places, row %" PRIu64 ": %" PRIu32 " bytes at %" PRIu64 " as chunk %" PRIu64
+          " of %s, but HDF5 has %" PRIu32 " at %" PRIu64,
+          row, bytes, at, of->listed - 1, of->array->path, chunk->bytes, chunk->address);
     if (is_top(c, of) && chunk->address + chunk->bytes > c->top)
         c->top = chunk->address + chunk->bytes;
 }
 
-static void places_compare(places_comparison *c)
+static void compare_directory(places_comparison *c)
 {
     ebpo_tally *tally = c->tally;
     uint64_t at = c->array[0].chunks[0].address;
@@ -345,14 +354,13 @@ static void places_compare(places_comparison *c)
         at += bytes;
     }
     for (unsigned i = 0; i < c->arrays; i++)
-        PLACES_CHECK(c->array[i].listed == c->array[i].count,
-                     "/subtrees/places has %" PRIu64 " of the %" PRIu64 " chunks of %s",
-                     c->array[i].listed, c->array[i].count, c->array[i].array->path);
+        CHECK(c->array[i].listed == c->array[i].count,
+              "/subtrees/places has %" PRIu64 " of the %" PRIu64 " chunks of %s",
+              c->array[i].listed, c->array[i].count, c->array[i].array->path);
     uint64_t top = c->file->info.top_bytes;
-    PLACES_CHECK(top == 0 || (top >= c->top && top <= c->file->info.file_bytes),
-                 "top_bytes states %" PRIu64
-                 ", but what looking up a subtree takes ends at %" PRIu64,
-                 top, c->top);
+    CHECK(top == 0 || (top >= c->top && top <= c->file->info.file_bytes),
+          "top_bytes states %" PRIu64 ", but what looking up a subtree takes ends at %" PRIu64, top,
+          c->top);
 }
 
 ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
@@ -375,19 +383,18 @@ ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
     if (status == EBPO_OK)
         status = read_list(c, &own);
     if (status == EBPO_OK)
-        places_compare(c);
+        compare_directory(c);
     for (unsigned i = 0; i < c->arrays; i++)
         free(c->array[i].chunks);
     free(c->list);
     free(c);
     if (status != EBPO_E_FORMAT)
         return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);
-    PLACES_CHECK(false, "%s", own.message);
+    CHECK(false, "%s", own.message);
     return EBPO_OK;
 }
 
-/* Bytes of the file that belong to nothing. What stands there changes no answer, but a change of it
- * shall not go unseen. */
+/* --- bytes that belong to nothing --- */
 
 typedef struct survey {
     const ebpo_file *file;
@@ -521,10 +528,7 @@ ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progres
     return status == EBPO_OK || status == EBPO_E_FORMAT ? EBPO_OK : ebpo_fail_with(error, &own);
 }
 
-/* The list of how chunks end, against the chunks: read by itself, without the reader's check. */
-
-#define SUMS_CHECK(condition, ...) \
-    ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
+/* --- chunk checksums --- */
 
 enum { SUM_BYTES = 4, UNKNOWN = 20000 };
 
@@ -552,22 +556,22 @@ static uint32_t number_of(const ebpo_array_in *a)
     }
 }
 
-static ebpo_status sums_compare_chunk(sums_comparison *c, const ebpo_array_in *a, uint64_t chunk,
-                                      uint64_t row, ebpo_error *error)
+static ebpo_status compare_sum(sums_comparison *c, const ebpo_array_in *a, uint64_t chunk,
+                               uint64_t row, ebpo_error *error)
 {
     ebpo_tally *tally = c->tally;
     ebpo_chunk_place at = a->chunks[chunk];
     uint8_t end[SUM_BYTES] = { 0 };
-    if (!SUMS_CHECK(at.bytes >= SUM_BYTES, "%s, chunk %" PRIu64 ": less than four bytes", a->path,
-                    chunk))
+    if (!CHECK(at.bytes >= SUM_BYTES, "%s, chunk %" PRIu64 ": less than four bytes", a->path,
+               chunk))
         return EBPO_OK;
     ebpo_status status = ebpo_input_read(&ebpo_reader_own(c->file)->in,
                                          at.address + at.bytes - SUM_BYTES, SUM_BYTES, end, error);
     if (status == EBPO_OK)
-        SUMS_CHECK(ebpo_load32(end) == (uint32_t)c->list[row],
-                   "%s, chunk %" PRIu64 ": /chunk_sums, row %" PRIu64 ", says %08" PRIx32
-                   ", but it ends with %08" PRIx32,
-                   a->path, chunk, row, (uint32_t)c->list[row], ebpo_load32(end));
+        CHECK(ebpo_load32(end) == (uint32_t)c->list[row],
+              "%s, chunk %" PRIu64 ": /chunk_sums, row %" PRIu64 ", says %08" PRIx32
+              ", but it ends with %08" PRIx32,
+              a->path, chunk, row, (uint32_t)c->list[row], ebpo_load32(end));
     return status;
 }
 
@@ -581,13 +585,13 @@ static ebpo_status compare_array(sums_comparison *c, const ebpo_array_in *a, ebp
     uint64_t found = 0, chunks = ebpo_shape_chunks(&a->shape);
     for (uint64_t row = 0; row < c->rows && status == EBPO_OK; row++)
         if ((uint32_t)(c->list[row] >> 32) == number && found++ < chunks)
-            status = sums_compare_chunk(c, a, found - 1, row, error);
-    SUMS_CHECK(found == chunks, "/chunk_sums has %" PRIu64 " rows of the %" PRIu64 " chunks of %s",
-               found, chunks, a->path);
+            status = compare_sum(c, a, found - 1, row, error);
+    CHECK(found == chunks, "/chunk_sums has %" PRIu64 " rows of the %" PRIu64 " chunks of %s",
+          found, chunks, a->path);
     return status;
 }
 
-static ebpo_status sums_compare(sums_comparison *c, ebpo_error *error)
+static ebpo_status compare_sums(sums_comparison *c, ebpo_error *error)
 {
     const ebpo_file *file = c->file;
     ebpo_status status = EBPO_OK;
@@ -614,10 +618,10 @@ ebpo_status ebpo_check_sums(ebpo_tally *tally, const ebpo_file *file, ebpo_error
         status = ebpo_long_chunk_read(file, a, &list, &own);
     sums_comparison c = { tally, file, list, a->shape.rows };
     if (status == EBPO_OK)
-        status = sums_compare(&c, &own);
+        status = compare_sums(&c, &own);
     free(list);
     if (status != EBPO_E_FORMAT)
         return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);
-    SUMS_CHECK(false, "%s", own.message);
+    CHECK(false, "%s", own.message);
     return EBPO_OK;
 }

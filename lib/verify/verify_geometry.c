@@ -1,6 +1,11 @@
-/* A triangle is clipped by the six walls, one after the other (Sutherland and Hodgman, "Reentrant
- * polygon clipping", 1974). With exact numbers and closed half-spaces the corners that remain span
- * the intersection, down to a single point of contact. */
+/* Decides whether a face touches a cell, whether a face's part in a cell keeps to the node's
+ * planes, and how often a ray meets a face. Floating point with error bounds decides most cases;
+ * the rest goes to rationals (GMP), so every answer is exact. Nothing is shared with the builder
+ * but the exact predicates.
+ *
+ * The parts, each with its method: clipping in rationals (Sutherland and Hodgman, "Reentrant
+ * polygon clipping", 1974), separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996), winding
+ * numbers by rays, containment by weak duality. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -148,8 +153,16 @@ bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo
  * normal, and the products of their edges; for a box and a triangle, also one without area, these
  * are all that is needed. */
 
-static const double touch_eps = 0x1p-53;
+static const double eps = 0x1p-53;
 static const double slack = 0x1p-900; /* covers underflow */
+
+/* Corners of a face in cell coordinates. Each coordinate is off by at most 4 * 2^-53 of its
+ * absolute value (and 2^-1000). */
+typedef struct local_face {
+    double at[3][3];
+    double reach[3];    /* largest absolute coordinate on each axis, at least 1 */
+    unsigned contained; /* bit i: corner i lies in the closed cell; exact */
+} local_face;
 
 typedef enum verdict { APART, MEET, UNSURE } verdict;
 
@@ -164,7 +177,7 @@ ebpo_frame ebpo_frame_make(const ebpo_box *box, ebpo_cell cell)
     return frame;
 }
 
-void ebpo_local_make(ebpo_local *out, const ebpo_frame *frame, const ebpo_corners *face)
+static void local_make(local_face *out, const ebpo_frame *frame, const ebpo_corners *face)
 {
     out->contained = 0;
     for (int k = 0; k < 3; k++)
@@ -199,7 +212,7 @@ static double scaled_difference(double a, double b, double inverse)
 }
 
 /* The axis edge x (unit vector k), edge from corner i to j, l being the third corner. */
-static verdict edge_axis(const ebpo_local *p, const double edge[3], int i, int l, int k)
+static verdict edge_axis(const local_face *p, const double edge[3], int i, int l, int k)
 {
     int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
     double eu = edge[u], ev = edge[v];
@@ -209,11 +222,11 @@ static verdict edge_axis(const ebpo_local *p, const double edge[3], int i, int l
     double b = ev * p->at[l][u] - eu * p->at[l][v];
     double low = (ev < 0 ? ev : 0) - (eu > 0 ? eu : 0),
            high = (ev > 0 ? ev : 0) - (eu < 0 ? eu : 0);
-    double error = 32 * touch_eps * (fabs(ev) * p->reach[u] + fabs(eu) * p->reach[v]) + slack;
+    double error = 32 * eps * (fabs(ev) * p->reach[u] + fabs(eu) * p->reach[v]) + slack;
     return compare_intervals(a < b ? a : b, a < b ? b : a, low, high, error);
 }
 
-static verdict normal_axis(const ebpo_local *p, double edge[3][3])
+static verdict normal_axis(const local_face *p, double edge[3][3])
 {
     double value = 0, low = 0, high = 0, error = slack;
     for (int k = 0; k < 3; k++) {
@@ -223,7 +236,7 @@ static verdict normal_axis(const ebpo_local *p, double edge[3][3])
         value += n * p->at[0][k];
         low += n < 0 ? n : 0;
         high += n > 0 ? n : 0;
-        error += 32 * touch_eps * (fabs(left) + fabs(right)) * p->reach[k];
+        error += 32 * eps * (fabs(left) + fabs(right)) * p->reach[k];
     }
     return compare_intervals(value, value, low, high, error);
 }
@@ -231,8 +244,8 @@ static verdict normal_axis(const ebpo_local *p, double edge[3][3])
 /* The axes but the box' own, which the caller decided exactly. */
 static verdict separating_axes(const ebpo_frame *frame, const ebpo_corners *face)
 {
-    ebpo_local p;
-    ebpo_local_make(&p, frame, face);
+    local_face p;
+    local_make(&p, frame, face);
     double edge[3][3];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
@@ -283,7 +296,7 @@ static int orient_in(int u, int v, const double a[3], const double b[3], const d
 }
 
 /* Turns of the face around p seen in the plane (u, v), counter-clockwise positive. */
-static int winding_turns(const double p[3], int u, int v, const ebpo_corners *face)
+static int turns_around(const double p[3], int u, int v, const ebpo_corners *face)
 {
     int sum = 0;
     for (int i = 0; i < 3; i++) {
@@ -313,7 +326,7 @@ static int shifted_side(const double p[3], const ebpo_corners *face)
     return side != 0 ? side : orient_in(0, 1, a, b, c);
 }
 
-static bool winding_outside(const double p[3], int k, const ebpo_corners *face)
+static bool is_outside(const double p[3], int k, const ebpo_corners *face)
 {
     double a = face->at[0][k], b = face->at[1][k], c = face->at[2][k];
     return (a > p[k] && b > p[k] && c > p[k]) || (a <= p[k] && b <= p[k] && c <= p[k]);
@@ -322,12 +335,12 @@ static bool winding_outside(const double p[3], int k, const ebpo_corners *face)
 int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face)
 {
     int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
-    if (winding_outside(p, u, face) || winding_outside(p, v, face))
+    if (is_outside(p, u, face) || is_outside(p, v, face))
         return 0;
     double a = face->at[0][axis], b = face->at[1][axis], c = face->at[2][axis], x = p[axis];
     if (a <= x && b <= x && c <= x)
         return 0;
-    int turn = winding_turns(p, u, v, face);
+    int turn = turns_around(p, u, v, face);
     if (axis == 1)
         turn = -turn; /* (x, z) is left-handed seen along y */
     if (turn == 0 || (a > x && b > x && c > x))
@@ -341,9 +354,7 @@ int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face)
  * face by one wall, or on the face by two walls. So rounded m still give certain bounds, and
  * nothing has to be clipped. What stays undecided is clipped in rationals. */
 
-static const double containment_eps = 0x1p-53;
-
-void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_twin_tree *view,
+void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_twin_tree *view,
                          const ebpo_twin_node *node)
 {
     uint32_t count;
@@ -361,21 +372,20 @@ void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_twin_tree *view,
     }
 }
 
-static double containment_dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static double containment_highest(const ebpo_local *face, const double n[3])
+static double highest_corner(const local_face *face, const double n[3])
 {
-    double a = containment_dot(n, face->at[0]), b = containment_dot(n, face->at[1]),
-           c = containment_dot(n, face->at[2]);
+    double a = dot_product(n, face->at[0]), b = dot_product(n, face->at[1]),
+           c = dot_product(n, face->at[2]);
     return fmax(a, fmax(b, c));
 }
 
 /* The bound above for one m, rounding included. */
-static bool containment_certified(const ebpo_local *face, const double n[3], const double m[3],
-                                  double bound)
+static bool is_certified(const local_face *face, const double n[3], const double m[3], double bound)
 {
     double rest[3], cube = 0, size = 0;
     for (int k = 0; k < 3; k++) {
@@ -383,20 +393,20 @@ static bool containment_certified(const ebpo_local *face, const double n[3], con
         cube += m[k] > 0 ? m[k] : 0;
         size += (fabs(n[k]) + fabs(m[k])) * face->reach[k];
     }
-    return containment_highest(face, rest) + cube + 16 * containment_eps * size <= bound;
+    return highest_corner(face, rest) + cube + 16 * eps * size <= bound;
 }
 
 /* m along one axis, so that n - m is level along an edge. */
-static bool certified_by_wall(const ebpo_local *face, const double n[3], double bound)
+static bool certified_by_wall(const local_face *face, const double n[3], double bound)
 {
     for (int i = 0; i < 3; i++) {
         const double *a = face->at[i], *b = face->at[(i + 1) % 3];
         double edge[3] = { b[0] - a[0], b[1] - a[1], b[2] - a[2] };
-        double rise = containment_dot(n, edge);
+        double rise = dot_product(n, edge);
         for (int k = 0; k < 3; k++) {
             double m[3] = { 0, 0, 0 };
             m[k] = rise / edge[k];
-            if (edge[k] != 0 && containment_certified(face, n, m, bound))
+            if (edge[k] != 0 && is_certified(face, n, m, bound))
                 return true;
         }
     }
@@ -404,7 +414,7 @@ static bool certified_by_wall(const ebpo_local *face, const double n[3], double 
 }
 
 /* m along two axes, so that n - m is normal to the face. */
-static bool certified_by_two_walls(const ebpo_local *face, const double n[3], double bound)
+static bool certified_by_two_walls(const local_face *face, const double n[3], double bound)
 {
     double p[3], q[3], normal[3];
     for (int k = 0; k < 3; k++) {
@@ -417,29 +427,28 @@ static bool certified_by_two_walls(const ebpo_local *face, const double n[3], do
         double m[3], factor = n[j] / normal[j];
         for (int k = 0; k < 3; k++)
             m[k] = k == j ? 0 : n[k] - factor * normal[k];
-        if (normal[j] != 0 && containment_certified(face, n, m, bound))
+        if (normal[j] != 0 && is_certified(face, n, m, bound))
             return true;
     }
     return false;
 }
 
 /* A corner of the face in the cell and surely beyond the plane: no need for rationals. */
-static bool corner_beyond(const ebpo_local *face, const double n[3], double bound, double error)
+static bool corner_beyond(const local_face *face, const double n[3], double bound, double error)
 {
     for (int i = 0; i < 3; i++)
-        if ((face->contained >> i & 1) && containment_dot(n, face->at[i]) > bound + error)
+        if ((face->contained >> i & 1) && dot_product(n, face->at[i]) > bound + error)
             return true;
     return false;
 }
 
-static bool face_keeps(ebpo_tally *tally, const ebpo_half_spaces *planes, int i,
-                       const ebpo_frame *frame, const ebpo_corners *face, const ebpo_local *local)
+static bool face_keeps(ebpo_tally *tally, const ebpo_node_planes *planes, int i,
+                       const ebpo_frame *frame, const ebpo_corners *face, const local_face *local)
 {
     const double *n = planes->n[i];
     double bound = planes->bound[i],
-           error = 16 * containment_eps * 511 *
-                   fmax(local->reach[0], fmax(local->reach[1], local->reach[2]));
-    if (containment_highest(local, n) <= bound - error)
+           error = 16 * eps * 511 * fmax(local->reach[0], fmax(local->reach[1], local->reach[2]));
+    if (highest_corner(local, n) <= bound - error)
         return true;
     if (corner_beyond(local, n, bound, error))
         return false;
@@ -449,12 +458,12 @@ static bool face_keeps(ebpo_tally *tally, const ebpo_half_spaces *planes, int i,
     return ebpo_exact_half_space(frame->low, frame->high, face, planes->normal[i], planes->d[i]);
 }
 
-void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                const ebpo_twin_node *node, const ebpo_frame *frame,
                                const ebpo_corners *face, uint64_t number)
 {
-    ebpo_local local;
-    ebpo_local_make(&local, frame, face);
+    local_face local;
+    local_make(&local, frame, face);
     tally->checks[EBPO_VERIFY_CONTAINMENT] += (uint64_t)planes->count;
     for (int i = 0; i < planes->count; i++)
         if (!face_keeps(tally, planes, i, frame, face, &local))
@@ -463,7 +472,7 @@ void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes
                                  "the plane cuts off a part of the face in the cell");
 }
 
-void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                   const ebpo_twin_node *node, unsigned corners)
 {
     for (int i = 0; i < planes->count; i++)

@@ -1,5 +1,5 @@
-/* Triangle against cell in rationals (GMP): the last word where floating point cannot tell. Slow;
- * pure; any thread. */
+/* Exact tests of faces against cells and planes, and winding numbers by rays (verify_geometry.c).
+ * Pure; any thread. */
 #ifndef EBPO_VERIFY_VERIFY_GEOMETRY_H
 #define EBPO_VERIFY_VERIFY_GEOMETRY_H
 
@@ -11,6 +11,8 @@
 #include "geometry/cells.h"
 #include "verify/tally.h"
 #include "verify/verify_tree.h"
+
+/* --- rationals: slow, exact --- */
 
 /* A face: corners in the model's coordinates, exact. */
 typedef struct ebpo_corners {
@@ -25,8 +27,7 @@ bool ebpo_exact_touches(const double low[3], const double high[3], const ebpo_co
 bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo_corners *face,
                            const int32_t n[3], int32_t d);
 
-/* A face in the coordinates of a cell, and whether it touches the closed cell: floating point with
- * error bounds, rationals when in doubt. */
+/* --- floating point with error bounds, rationals when in doubt --- */
 
 /* A cell: its walls (exact) and the reciprocals of its sizes (rounded). */
 typedef struct ebpo_frame {
@@ -34,16 +35,6 @@ typedef struct ebpo_frame {
 } ebpo_frame;
 
 ebpo_frame ebpo_frame_make(const ebpo_box *box, ebpo_cell cell);
-
-/* Corners of a face in cell coordinates. Each coordinate is off by at most 4 * 2^-53 of its
- * absolute value (and 2^-1000). */
-typedef struct ebpo_local {
-    double at[3][3];
-    double reach[3];    /* largest absolute coordinate on each axis, at least 1 */
-    unsigned contained; /* bit i: corner i lies in the closed cell; exact */
-} ebpo_local;
-
-void ebpo_local_make(ebpo_local *out, const ebpo_frame *frame, const ebpo_corners *face);
 
 static inline bool ebpo_corner_in_cell(const ebpo_frame *frame, const double p[3])
 {
@@ -68,30 +59,30 @@ int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face);
 /* Corners of a face of a mesh. */
 void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out);
 
-/* Containment: no point of a face in the cell, and no inside corner of the cell, is cut off by the
- * node's own planes. */
+/* --- containment: no point of a face in the cell, and no inside corner, is cut off by the node's
+ * planes --- */
 
-enum { EBPO_HALF_SPACES_MAX = 255 }; /* counts are bytes */
+enum { EBPO_NODE_PLANES_MAX = 255 }; /* counts are bytes */
 
 /* A node's own planes, decoded. Codes that stand for no plane are left out (they are violations
  * elsewhere). */
-typedef struct ebpo_half_spaces {
+typedef struct ebpo_node_planes {
     int count;
-    double n[EBPO_HALF_SPACES_MAX][3], bound[EBPO_HALF_SPACES_MAX]; /* n . xi <= bound; exact */
-    int32_t normal[EBPO_HALF_SPACES_MAX][3], d[EBPO_HALF_SPACES_MAX];
-    uint32_t number[EBPO_HALF_SPACES_MAX]; /* place among the node's codes */
-} ebpo_half_spaces;
+    double n[EBPO_NODE_PLANES_MAX][3], bound[EBPO_NODE_PLANES_MAX]; /* n . xi <= bound; exact */
+    int32_t normal[EBPO_NODE_PLANES_MAX][3], d[EBPO_NODE_PLANES_MAX];
+    uint32_t number[EBPO_NODE_PLANES_MAX]; /* place among the node's codes */
+} ebpo_node_planes;
 
-void ebpo_half_spaces_of(ebpo_half_spaces *out, const ebpo_twin_tree *view,
+void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_twin_tree *view,
                          const ebpo_twin_node *node);
 
 /* A face that touches the cell. */
-void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                const ebpo_twin_node *node, const ebpo_frame *frame,
                                const ebpo_corners *face, uint64_t number);
 
 /* Cell corners, bit i for corner i (bit 0 x, bit 1 y, bit 2 z). */
-void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_half_spaces *planes,
+void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
                                   const ebpo_twin_node *node, unsigned corners);
 
 #endif

@@ -1,3 +1,14 @@
+/* Verifies labels: the winding numbers of cells. Two proofs:
+ *
+ * - By links, for all cells: equal points must have equal winding numbers, whichever cell gives
+ *   them. A cell without faces has one number for all its corners; a leaf gives one for its lowest
+ *   corner, and the others follow by signed crossings along its edges; the 64 corners of a gray
+ *   node's children are 27 points. The root's corners are outside. Every cell is linked to the root
+ *   that way, so all numbers are right when all links hold and the lists are complete
+ *   (verify_lists.c).
+ * - By rays through the whole mesh, for all cells or an even sample, without any of that. The
+ *   points are sorted into columns along x, and each face looks for those that it is in front of;
+ *   so the faces are gone through once, in their order, and only the points are held in memory. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -12,218 +23,7 @@
 #include "verify/verify_labels.h"
 #include "verify/verify_geometry.h"
 
-static void lists_unlisted(ebpo_tally *tally, const ebpo_twin_node *node, uint32_t face,
-                           const char *text)
-{
-    ebpo_tally_violation(tally, EBPO_VERIFY_LISTS,
-                         &(ebpo_verify_place){ node->code, face, EBPO_NO_PLANE }, "%s", text);
-}
-
-/* The list in ascending order: references, then the new range (the file's shape was checked). */
-typedef struct face_list {
-    const uint32_t *refs;
-    uint32_t ref_count, new_count;
-    uint64_t first;
-} face_list;
-
-static face_list list_of(const ebpo_twin_tree *view, const ebpo_twin_node *leaf)
-{
-    const ebpo_level *level = &view->tree->level[leaf->cell.level];
-    face_list list = { .first = level->leaf_first[leaf->rank],
-                       .new_count = level->leaf_new[leaf->rank] };
-    list.refs = ebpo_twin_refs(view, leaf, &list.ref_count);
-    return list;
-}
-
-/* Faces that touch a node ascend, as those of its parent do. */
-static bool lists_among(const uint32_t *faces, uint64_t count, uint32_t face)
-{
-    uint64_t low = 0, high = count;
-    while (low < high) {
-        uint64_t middle = low + (high - low) / 2;
-        if (faces[middle] < face)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low < count && faces[low] == face;
-}
-
-/* A listed face that does not touch the leaf must touch it widened by 1/256: level-limited
- * distances rest on that. */
-static void check_near(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
-                       uint32_t face)
-{
-    ebpo_frame frame = ebpo_frame_make(&view->box, leaf->cell);
-    ebpo_corners corners;
-    for (int k = 0; k < 3; k++) {
-        double more = (frame.high[k] - frame.low[k]) * 0x1p-8;
-        frame.low[k] -= more;
-        frame.high[k] += more;
-        frame.inverse[k] = 1 / (frame.high[k] - frame.low[k]);
-    }
-    ebpo_face_corners(&view->tree->mesh, face, &corners);
-    if (!ebpo_face_touches(&frame, &corners, tally))
-        lists_unlisted(tally, leaf, face, "the leaf lists a face that does not come near it");
-}
-
-static void check_spare(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
-                        const face_list *list, const uint32_t *faces, uint64_t count)
-{
-    EBPO_FOR_ITEMS_SCATTERED(view->workspace, i, 0, list->ref_count)
-        if (!lists_among(faces, count, list->refs[i]))
-            check_near(tally, view, leaf, list->refs[i]);
-    EBPO_FOR_ITEMS_SCATTERED(view->workspace, i, 0, list->new_count)
-        if (!lists_among(faces, count, (uint32_t)(list->first + i)))
-            check_near(tally, view, leaf, (uint32_t)(list->first + i));
-}
-
-static void check_leaf(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
-                       const uint32_t *faces, uint64_t count)
-{
-    face_list list = list_of(view, leaf);
-    uint64_t found = 0;
-    uint32_t at = 0;
-    EBPO_FOR_ITEMS(view->workspace, i, 0, count) {
-        uint32_t face = faces[i];
-        while (at < list.ref_count && list.refs[at] < face)
-            at++;
-        bool listed = (at < list.ref_count && list.refs[at] == face) ||
-                      (face >= list.first && face - list.first < list.new_count);
-        found += listed;
-        if (!listed)
-            lists_unlisted(tally, leaf, face, "the face touches the leaf, which does not list it");
-    }
-    EBPO_FOR_ITEMS(view->workspace, i, 1, list.ref_count)
-        if (list.refs[i] <= list.refs[i - 1])
-            lists_unlisted(tally, leaf, list.refs[i],
-                           "the list names the face twice or not in order");
-    if (list.ref_count && list.refs[list.ref_count - 1] >= list.first)
-        lists_unlisted(tally, leaf, list.refs[list.ref_count - 1],
-                       "the list refers to a face that is not below its first new face");
-    tally->checks[EBPO_VERIFY_LISTS] += count + list.ref_count + list.new_count;
-    uint64_t spare = (uint64_t)list.ref_count + list.new_count - found;
-    tally->spare_entries += spare;
-    if (spare)
-        check_spare(tally, view, leaf, &list, faces, count);
-}
-
-void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_twin_tree *view,
-                               const ebpo_twin_node *node, const uint32_t *faces, uint64_t count)
-{
-    if (node->type == EBPO_LEAF) {
-        check_leaf(tally, view, node, faces, count);
-        return;
-    }
-    tally->checks[EBPO_VERIFY_LISTS] += count ? count : 1;
-    EBPO_FOR_ITEMS(view->workspace, i, 0, count)
-        lists_unlisted(tally, node, faces[i],
-                       node->type == EBPO_WHITE ? "the face touches a white cell"
-                                                : "the face touches a black cell");
-}
-
-enum { LIMIT_OF_LISTS = 1 << 16 };
-
-/* Different faces listed below a node, as long as they are no more than `limit`: twice as many are
- * held, however many there are, or where that were many a bit for each of the mesh. */
-typedef struct gathering {
-    uint32_t *faces;
-    uint8_t *seen; /* NULL where `faces` are held */
-    uint64_t count, capacity, limit;
-    bool more; /* than the limit */
-    bool short_of_memory;
-} gathering;
-
-static int compare_numbers(const void *a, const void *b)
-{
-    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    return (x > y) - (x < y);
-}
-
-static void keep_different(gathering *g)
-{
-    uint64_t kept = g->count > 0;
-    if (g->count)
-        qsort(g->faces, g->count, sizeof *g->faces, compare_numbers);
-    for (uint64_t i = 1; i < g->count; i++)
-        if (g->faces[i] != g->faces[kept - 1])
-            g->faces[kept++] = g->faces[i];
-    g->count = kept;
-    g->more |= kept > g->limit;
-}
-
-static void lists_see(gathering *g, uint64_t face)
-{
-    uint8_t bit = (uint8_t)(1u << (face & 7));
-    g->count += !(g->seen[face >> 3] & bit);
-    g->seen[face >> 3] |= bit;
-    g->more |= g->count > g->limit;
-}
-
-static void see_list(gathering *g, const face_list *list)
-{
-    for (uint32_t i = 0; i < list->ref_count; i++)
-        lists_see(g, list->refs[i]);
-    for (uint32_t i = 0; i < list->new_count; i++)
-        lists_see(g, list->first + i);
-}
-
-/* A list names no face twice, so that one longer than the limit decides. */
-static void gather_list(gathering *g, const face_list *list)
-{
-    uint64_t more = (uint64_t)list->ref_count + list->new_count;
-    if (more > g->limit) {
-        g->more = true;
-        return;
-    }
-    if (g->seen) {
-        see_list(g, list);
-        return;
-    }
-    if (g->count + more > 2 * g->limit + 64)
-        keep_different(g);
-    if (!ebpo_grow(&g->faces, &g->capacity, g->count + more, sizeof *g->faces)) {
-        g->short_of_memory = true;
-        return;
-    }
-    for (uint32_t i = 0; i < list->ref_count; i++)
-        g->faces[g->count++] = list->refs[i];
-    for (uint32_t i = 0; i < list->new_count; i++)
-        g->faces[g->count++] = (uint32_t)(list->first + i);
-}
-
-static void lists_gather(gathering *g, const ebpo_twin_tree *view, const ebpo_twin_node *node)
-{
-    if (g->more || g->short_of_memory)
-        return;
-    if (node->type == EBPO_LEAF) {
-        face_list list = list_of(view, node);
-        gather_list(g, &list);
-    }
-    for (unsigned octant = 0; node->type == EBPO_GRAY && octant < 8; octant++) {
-        ebpo_twin_node child = ebpo_twin_child(view, node, octant);
-        lists_gather(g, view, &child);
-    }
-}
-
-bool ebpo_lists_more_faces(const ebpo_twin_tree *view, const ebpo_twin_node *node, uint64_t limit)
-{
-    gathering g = { .limit = limit };
-    uint64_t faces = view->tree->mesh.face_count;
-    if (limit >= faces)
-        return false;
-    if (limit > LIMIT_OF_LISTS) {
-        g.seen = ebpo_array_zero(view->workspace, faces / 8 + 1, 1);
-        g.short_of_memory = !g.seen;
-    }
-    lists_gather(&g, view, node);
-    if (!g.seen)
-        keep_different(&g);
-    free(g.faces);
-    ebpo_array_free(view->workspace, g.seen);
-    /* memory that is short proves nothing against the file */
-    return g.more || g.short_of_memory;
-}
+/* --- rays --- */
 
 enum { SIDE_MAX = 2048, FACE_GRAIN = 1 << 14 };
 
@@ -318,7 +118,7 @@ static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *
 }
 
 /* Several threads may meet at one point. */
-static void rays_look(const columns *c, const ebpo_corners *face, uint64_t begin, uint64_t end)
+static void count_hits(const columns *c, const ebpo_corners *face, uint64_t begin, uint64_t end)
 {
     for (uint64_t i = begin; i < end; i++) {
         int hit = ebpo_ray_hit(c->point[i].at, 0, face);
@@ -327,8 +127,8 @@ static void rays_look(const columns *c, const ebpo_corners *face, uint64_t begin
     }
 }
 
-static ebpo_status rays_follow(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                               ebpo_error *error)
+static ebpo_status follow_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
 {
     const columns *c = context;
     (void)worker;
@@ -340,8 +140,8 @@ static ebpo_status rays_follow(void *context, uint64_t begin, uint64_t end, unsi
         column_range r = columns_of_face(c, &face);
         /* the columns of a row stand side by side */
         for (uint64_t z = r.from[1]; z <= r.to[1]; z++) {
-            rays_look(c, &face, c->first[z * c->side + r.from[0]],
-                      c->first[z * c->side + r.to[0] + 1]);
+            count_hits(c, &face, c->first[z * c->side + r.from[0]],
+                       c->first[z * c->side + r.to[0] + 1]);
             if (++rows % EBPO_ITEMS_SCATTERED == 0)
                 ebpo_release_pages(c->mesh->workspace);
         }
@@ -358,12 +158,14 @@ ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_mesh *mesh, con
         c.point[i].found = 0;
     if (status == EBPO_OK)
         status = ebpo_parallel_for(threads, mesh->workspace, mesh->face_count, FACE_GRAIN,
-                                   rays_follow, &c, progress, "following rays", error);
+                                   follow_faces, &c, progress, "following rays", error);
     free(c.first);
     return status;
 }
 
-double ebpo_rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t count)
+/* About how many points a face would look at in all, were `count` points spread evenly over the
+ * box. */
+static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t count)
 {
     columns c = grid_for(mesh, box, count);
     uint64_t covered = 0; /* columns, over all faces */
@@ -376,6 +178,8 @@ double ebpo_rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t count
     return (double)covered * (double)count / (double)(c.side * c.side);
 }
 
+/* --- which cells are checked by rays --- */
+
 enum { SAMPLES_LEAST = 4096, SAMPLES_MANY = 1 << 20, CELLS_ALL = 1 << 22 };
 /* Points looked at by faces, in all: some seconds. */
 static const double ray_work_affordable = 4e8;
@@ -383,9 +187,8 @@ static const double ray_work_affordable = 4e8;
 static uint64_t usual_samples(const ebpo_twin_tree *view, uint64_t cells)
 {
     uint64_t samples = cells <= CELLS_ALL ? cells : SAMPLES_MANY;
-    return ebpo_rays_work(&view->tree->mesh, &view->box, samples) <= ray_work_affordable
-               ? samples
-               : SAMPLES_LEAST;
+    return rays_work(&view->tree->mesh, &view->box, samples) <= ray_work_affordable ? samples
+                                                                                    : SAMPLES_LEAST;
 }
 
 void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_twin_tree *view, uint64_t samples)
@@ -419,7 +222,7 @@ void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_twin_tree *view, uin
 }
 
 /* True for `take` of the `cells` ranks, evenly spread. */
-static bool labels_planned(const ebpo_label_plan *plan, const ebpo_twin_node *node)
+static bool is_planned(const ebpo_label_plan *plan, const ebpo_twin_node *node)
 {
     uint64_t cells = plan->cells[node->cell.level][node->type],
              take = plan->take[node->cell.level][node->type];
@@ -428,6 +231,8 @@ static bool labels_planned(const ebpo_label_plan *plan, const ebpo_twin_node *no
     /* (rank + 1) * take / cells is another integer than rank * take / cells */
     return ebpo_wide_modulo(ebpo_wide_product(node->rank, take), cells) >= cells - take;
 }
+
+/* --- corners and links --- */
 
 static void corner_position(const ebpo_frame *frame, unsigned corner, double out[3])
 {
@@ -453,7 +258,7 @@ static void add_crossings(int64_t change[7], const ebpo_frame *frame, const ebpo
     }
 }
 
-void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_twin_tree *view,
+void ebpo_terminal_windings(ebpo_node_windings *out, const ebpo_twin_tree *view,
                             const ebpo_twin_node *node, const ebpo_frame *frame,
                             const uint32_t *faces, uint64_t count)
 {
@@ -491,7 +296,7 @@ bool ebpo_label_note(ebpo_ray_points *points, const ebpo_twin_tree *view,
                      const ebpo_twin_node *node, const ebpo_frame *frame,
                      const ebpo_label_plan *plan)
 {
-    if (!labels_planned(plan, node))
+    if (!is_planned(plan, node))
         return true;
     ebpo_ray_point p = { { frame->low[0], frame->low[1], frame->low[2] },
                          node->code,
@@ -524,11 +329,11 @@ static int shared_point(unsigned octant, unsigned corner)
 }
 
 void ebpo_check_links(ebpo_tally *tally, const ebpo_twin_node *node,
-                      const ebpo_corner_windings children[8], ebpo_corner_windings *out)
+                      const ebpo_node_windings children[8], ebpo_node_windings *out)
 {
     int64_t value[27];
     bool known[27] = { false };
-    *out = (ebpo_corner_windings){ { 0 }, 0 };
+    *out = (ebpo_node_windings){ { 0 }, 0 };
     for (unsigned octant = 0; octant < 8; octant++)
         for (unsigned corner = 0; corner < 8; corner++) {
             int point = shared_point(octant, corner);
@@ -556,7 +361,7 @@ void ebpo_check_links(ebpo_tally *tally, const ebpo_twin_node *node,
         }
 }
 
-void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_corner_windings *root)
+void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_node_windings *root)
 {
     for (unsigned i = 0; i < 8; i++) {
         if (!(root->known >> i & 1))
@@ -571,7 +376,7 @@ void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_corner_windings *root
     }
 }
 
-unsigned ebpo_windings_inside(const ebpo_twin_tree *view, const ebpo_corner_windings *corners)
+unsigned ebpo_windings_inside(const ebpo_twin_tree *view, const ebpo_node_windings *corners)
 {
     unsigned inside = 0;
     for (unsigned i = 0; i < 8; i++)

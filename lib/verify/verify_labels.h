@@ -1,4 +1,5 @@
-/* Face lists of leaves against the faces that touch them. */
+/* Labels: winding numbers of the cells' corners, verified by links and by rays (verify_labels.c).
+ */
 #ifndef EBPO_VERIFY_VERIFY_LABELS_H
 #define EBPO_VERIFY_VERIFY_LABELS_H
 
@@ -9,17 +10,7 @@
 #include "verify/verify_geometry.h"
 #include "verify/verify_tree.h"
 
-/* `faces`: numbers of the `count` faces that touch the cell, ascending. A leaf must list them all,
- * a white or black cell has none. */
-void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_twin_tree *view,
-                               const ebpo_twin_node *node, const uint32_t *faces, uint64_t count);
-
-/* Whether the leaves below a gray node list more than `limit` different faces. */
-bool ebpo_lists_more_faces(const ebpo_twin_tree *view, const ebpo_twin_node *node, uint64_t limit);
-
-/* Winding numbers of many points by rays through the whole mesh: the points are sorted into columns
- * along x, and every face looks for those that it lies before. So the faces are gone through once,
- * in their order, and what is held is for the points alone. */
+/* --- rays: winding numbers of many points --- */
 
 /* A point, and what the file says about it. */
 typedef struct ebpo_ray_point {
@@ -46,26 +37,13 @@ EBPO_MUST_USE ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_m
                                            const ebpo_box *box, unsigned threads,
                                            const ebpo_progress *progress, ebpo_error *error);
 
-/* About how many points a face would look at in all, were `count` points spread evenly over the
- * box. */
-double ebpo_rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t count);
-
-/* Labels: winding numbers of the cells' corners.
- *
- * Two proofs. (1) By links, for all cells: equal points must have equal winding numbers whichever
- * cell tells them. A cell without faces has one number for all its corners; a leaf gives one for
- * its lowest corner and the others follow by signed crossings along its edges; the 64 corners of a
- * gray node's children are 27 points. The root's corners are outside. As every cell is linked to
- * the root that way, all numbers are right when all links hold (and the lists are complete, which
- * is checked elsewhere). (2) By rays through the whole mesh, for all cells or a sample, without any
- * of that.
- */
+/* --- labels --- */
 
 /* Winding numbers of a cell's corners (bit 0 x, bit 1 y, bit 2 z). */
-typedef struct ebpo_corner_windings {
+typedef struct ebpo_node_windings {
     int64_t at[8];
     unsigned known; /* bit i: at[i] is set; not all are in a file without mesh */
-} ebpo_corner_windings;
+} ebpo_node_windings;
 
 /* Which cells are checked by rays: of each level and type, every n-th or so. */
 typedef struct ebpo_label_plan {
@@ -76,7 +54,7 @@ typedef struct ebpo_label_plan {
 void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_twin_tree *view, uint64_t samples);
 
 /* Corner windings of a leaf, white or black node; `faces`: the `count` faces that touch it. */
-void ebpo_terminal_windings(ebpo_corner_windings *out, const ebpo_twin_tree *view,
+void ebpo_terminal_windings(ebpo_node_windings *out, const ebpo_twin_tree *view,
                             const ebpo_twin_node *node, const ebpo_frame *frame,
                             const uint32_t *faces, uint64_t count);
 
@@ -94,12 +72,12 @@ void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points);
 
 /* Compares the children of a gray node with each other and gives the node's own corners. */
 void ebpo_check_links(ebpo_tally *tally, const ebpo_twin_node *node,
-                      const ebpo_corner_windings children[8], ebpo_corner_windings *out);
+                      const ebpo_node_windings children[8], ebpo_node_windings *out);
 
 /* The root's corners are outside. */
-void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_corner_windings *root);
+void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_node_windings *root);
 
 /* Bit i: corner i lies in the solid. */
-unsigned ebpo_windings_inside(const ebpo_twin_tree *view, const ebpo_corner_windings *corners);
+unsigned ebpo_windings_inside(const ebpo_twin_tree *view, const ebpo_node_windings *corners);
 
 #endif

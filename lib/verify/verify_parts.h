@@ -1,4 +1,4 @@
-/* Verifying a tree in memory. */
+/* The parts of verifying a file, as verify.c calls them. */
 #ifndef EBPO_VERIFY_VERIFY_PARTS_H
 #define EBPO_VERIFY_VERIFY_PARTS_H
 
@@ -8,19 +8,21 @@
 #include "verify/tally.h"
 #include "verify/verify_tree.h"
 
+/* --- verify.c --- */
+
 /* All checks but content and source. A tree whose arrays do not fit together ends with structure
  * violations and is not looked at further. */
 EBPO_MUST_USE ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree,
                                            const ebpo_verify_options *options, ebpo_error *error);
 
-/* The coding `gates` (format-spec/README.md, section 7) read once more: what that page says, line
- * by line, without a thought of speed. */
+/* --- verify_chunks.c: a second reader of the coding gates (format-spec/README.md, section 7) ---
+ */
 
 /* A chunk of `rows` faces, of 13 bytes each; rows > 0. `seen`: vertices seen before it, and then
  * after it. False, with nothing told of `faces`, where the page says to refuse. */
 bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uint32_t *faces);
 
-/* The mesh in the file against the mesh that it was made from. */
+/* --- verify_source.c: the mesh in the file against its source --- */
 
 /* Does the recorded mending again on a copy of `source` and compares bit for bit. `stored`: the
  * file's mesh; `ordered`: it is in the source's order (else vertices and faces are compared as
@@ -32,7 +34,7 @@ EBPO_MUST_USE ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *
                                             const ebpo_mesh *source, const ebpo_read_options *read,
                                             ebpo_error *error);
 
-/* The part `subtrees` (format-spec/README.md, section 9) against what it speaks of. */
+/* --- verify_subtrees.c, verify_chunks.c: the parts of the file --- */
 
 /* Every column of the table, by visiting the tree depth first; and the blocks from elsewhere, each
  * listed that is needed, and no other. Nothing to do in files without subtrees. */
@@ -60,7 +62,17 @@ EBPO_MUST_USE ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_pro
 EBPO_MUST_USE ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file,
                                            const ebpo_tree *tree, ebpo_error *error);
 
-/* Walking down the tree with the faces that touch each node: containment, lists and labels. */
+/* --- verify_lists.c: face lists of leaves against the faces that touch them --- */
+
+/* `faces`: numbers of the `count` faces that touch the cell, ascending. A leaf must list them all,
+ * a white or black cell has none. */
+void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_twin_tree *view,
+                               const ebpo_twin_node *node, const uint32_t *faces, uint64_t count);
+
+/* Whether the leaves below a gray node list more than `limit` different faces. */
+bool ebpo_lists_more_faces(const ebpo_twin_tree *view, const ebpo_twin_node *node, uint64_t limit);
+
+/* --- verify_walk.c: containment, lists and labels, with the faces that touch each node --- */
 
 /* Adds to the tally. The result does not depend on the number of threads. */
 EBPO_MUST_USE ebpo_status ebpo_verify_walk(ebpo_tally *tally, const ebpo_twin_tree *view,

@@ -1,3 +1,11 @@
+/* Compares the mesh in a file with the mesh that it was made from.
+ *
+ * The recorded repairs are done again on a copy of the source, which must then be bit for bit the
+ * file's mesh. In the source's order vertices and faces are compared one by one, otherwise as
+ * multisets. Of a subset, and of a component's file, the faces and vertices are compared with those
+ * of their numbers in the source. Attributes must be the source's, in its order, but for elements
+ * that were left out. Of a file whose coordinates an earlier version rounded, that is the only
+ * violation. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -132,8 +140,8 @@ static bool same_head(const ebpo_attribute *a, const ebpo_attribute *b)
 }
 
 /* The digest and the bytes of an image that was not there are no claim. */
-static bool source_unknown(const ebpo_attribute *source, uint64_t at, const ebpo_attribute *stored,
-                           uint64_t i)
+static bool image_unknown(const ebpo_attribute *source, uint64_t at, const ebpo_attribute *stored,
+                          uint64_t i)
 {
     return !ebpo_texture_list(source, at).count || !ebpo_texture_list(stored, i).count;
 }
@@ -149,7 +157,7 @@ static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
     EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, stored->rows) {
         uint64_t at = number ? number[i] : i;
         differ += at < source->rows && !ebpo_attribute_same_row(source, at, stored, i) &&
-                  !(textures && source_unknown(source, at, stored, i));
+                  !(textures && image_unknown(source, at, stored, i));
     }
     tally->checks[EBPO_VERIFY_SOURCE] += stored->rows - 1;
     CHECK(differ == 0, "%" PRIu64 " rows of the attribute %s of %s are not those of the source",
@@ -203,15 +211,15 @@ static int compare_faces(const void *a, const void *b, void *mesh)
 }
 
 /* 0 .. count - 1, sorted; NULL when memory is short. */
-static uint32_t *source_sorted(const ebpo_mesh *mesh, uint64_t count,
-                               int (*source_compare)(const void *, const void *, void *))
+static uint32_t *sorted_order(const ebpo_mesh *mesh, uint64_t count,
+                              int (*compare)(const void *, const void *, void *))
 {
     uint32_t *order = ebpo_array_alloc(mesh->workspace, count, sizeof *order);
     if (!order)
         return NULL;
     EBPO_FOR_ITEMS(mesh->workspace, i, 0, count)
         order[i] = (uint32_t)i;
-    ebpo_sort_with(order, count, sizeof *order, source_compare, (void *)(uintptr_t)mesh);
+    ebpo_sort_with(order, count, sizeof *order, compare, (void *)(uintptr_t)mesh);
     return order;
 }
 
@@ -219,8 +227,8 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
                                    bool faces, ebpo_error *error)
 {
     uint64_t count = faces ? a->face_count : a->vertex_count, differ = 0;
-    uint32_t *left = source_sorted(a, count, faces ? compare_faces : compare_vertices);
-    uint32_t *right = source_sorted(b, count, faces ? compare_faces : compare_vertices);
+    uint32_t *left = sorted_order(a, count, faces ? compare_faces : compare_vertices);
+    uint32_t *right = sorted_order(b, count, faces ? compare_faces : compare_vertices);
     bool short_of_memory = !left || !right;
     EBPO_FOR_ITEMS_SCATTERED(a->workspace, i, 0, short_of_memory ? 0 : count)
         differ += faces ? face_order(a, left[i], b, right[i]) != 0
@@ -323,7 +331,7 @@ static bool was_rounded(const ebpo_info *info, const ebpo_mesh *source)
            strncmp(source->source_format, "ply", 3) != 0;
 }
 
-static ebpo_status source_compare(ebpo_tally *tally, const ebpo_mesh *mended,
+static ebpo_status compare_meshes(ebpo_tally *tally, const ebpo_mesh *mended,
                                   const ebpo_mesh *stored, bool ordered, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -395,7 +403,7 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
               " and %" PRIu64,
               made->vertex_count, made->face_count, stored->vertex_count, stored->face_count);
     if (status == EBPO_OK && stored && !by_number)
-        status = source_compare(tally, made, stored, ordered, error);
+        status = compare_meshes(tally, made, stored, ordered, error);
     else if (status == EBPO_OK && mapped)
         status = compare_some(tally, file, made, read, error);
     else if (status == EBPO_OK && stored)

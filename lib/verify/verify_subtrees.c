@@ -1,6 +1,9 @@
-/* The table of subtrees, counted anew: one visit of the whole tree, leaf by leaf in the order of
- * the faces. Writer and reader go level by level; nothing of theirs is used but how arrays are
- * read. */
+/* Verifies the table of subtrees (format-spec/README.md, section 9) by counting it anew: one visit
+ * of the whole tree, leaf by leaf in the order of the faces.
+ *
+ * Every column of every row is recomputed: ranks, faces, vertices, and the blocks of shared faces
+ * and vertices that are stored with other subtrees, each listed that is needed, and no other.
+ * Writer and reader go level by level; nothing of theirs is used but the reading of arrays. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -62,7 +65,7 @@ typedef struct recount {
     bool no_memory;
 } recount;
 
-static bool subtrees_add(ebpo_workspace *workspace, numbers *list, uint32_t number)
+static bool add_number(ebpo_workspace *workspace, numbers *list, uint32_t number)
 {
     if (list->count && list->at[list->count - 1] == number)
         return true;
@@ -73,7 +76,7 @@ static bool subtrees_add(ebpo_workspace *workspace, numbers *list, uint32_t numb
     return true;
 }
 
-static int subtrees_ascending(const void *a, const void *b)
+static int compare_numbers(const void *a, const void *b)
 {
     uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
     return (x > y) - (x < y);
@@ -83,7 +86,7 @@ static void sort_once(numbers *list)
 {
     uint64_t kept = 0;
     if (list->count)
-        qsort(list->at, list->count, sizeof *list->at, subtrees_ascending);
+        qsort(list->at, list->count, sizeof *list->at, compare_numbers);
     for (uint64_t i = 0; i < list->count; i++)
         if (!kept || list->at[kept - 1] != list->at[i])
             list->at[kept++] = list->at[i];
@@ -97,7 +100,7 @@ static bool add_block(numbers *list, uint32_t block)
         sort_once(list);
         list->different = list->count;
     }
-    return subtrees_add(NULL, list, block);
+    return add_number(NULL, list, block);
 }
 
 static const char *column_name(const recount *c, unsigned column, int *level)
@@ -108,7 +111,7 @@ static const char *column_name(const recount *c, unsigned column, int *level)
     return level_names[(column - FIRST_LEVEL) % OF_A_LEVEL];
 }
 
-/* --- a subtree is complete --- */
+/* --- comparing a complete subtree with its row --- */
 
 /* The distances that must be listed, against those that are. */
 static void compare_outer(recount *c, const char *what, uint64_t from, const numbers *needed,
@@ -185,7 +188,7 @@ static void check_row(recount *c)
     memset(c->row, 0, sizeof c->row);
 }
 
-/* --- visiting --- */
+/* --- visiting the tree --- */
 
 /* Faces that are new in a leaf, and vertices that are new in these. */
 static void see_faces(recount *c, uint64_t count)
@@ -215,7 +218,7 @@ static void see_leaf(recount *c, const ebpo_twin_node *leaf, uint64_t *row)
         const uint32_t *face = ebpo_twin_refs(c->view, leaf, &references);
         uint64_t end = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
         EBPO_FOR_ITEMS(c->view->workspace, i, 0, references)
-            if (!subtrees_add(c->view->workspace, &c->outer_faces, face[i]))
+            if (!add_number(c->view->workspace, &c->outer_faces, face[i]))
                 c->no_memory = true;
         row[REFERENCES] += references;
         row[END] += end - c->end[leaf->cell.level];

@@ -1,3 +1,15 @@
+/* A tree in memory as the verifier sees it, and the checks that need no face: nesting and
+ * structure.
+ *
+ * - Nodes are found by rank: counts before each group of siblings give the place of a node's
+ *   children, planes, lists and winding number.
+ * - Structure: the arrays fit together (ebpo_check_shape; nothing else is checked before), and the
+ *   tree is one that the format allows: summaries, leaf sizes, the order of faces, the root box,
+ *   balanced edges of a solid.
+ * - Nesting: a node's envelope is its own planes and all its ancestors', so it is within its
+ *   parent's by definition, as long as a plane means the same in every cell's coordinates. That is
+ *   checked in integers on points of sampled cells: each plane is taken down to the cell, and the
+ *   point is taken up to the plane. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -11,6 +23,8 @@
 #include "geometry/polytope.h"
 #include "mesh/mesh_parts.h"
 #include "verify/verify_tree.h"
+
+/* --- finding nodes --- */
 
 /* Adds what a group holds to the running counts. */
 static void add_group(ebpo_twin_group *sum, const ebpo_twin_tree *view, const ebpo_level *level,
@@ -68,8 +82,8 @@ void ebpo_twin_free(ebpo_twin_tree *view)
 }
 
 /* Fills in type and rank. */
-static ebpo_twin_node twin_tree_place(const ebpo_twin_tree *view, ebpo_octcode code, ebpo_cell cell,
-                                      uint64_t group, unsigned octant)
+static ebpo_twin_node node_in_group(const ebpo_twin_tree *view, ebpo_octcode code, ebpo_cell cell,
+                                    uint64_t group, unsigned octant)
 {
     const ebpo_level *level = &view->tree->level[cell.level];
     ebpo_twin_node node = { code, cell, group, octant, ebpo_twin_type(level, group, octant), 0 };
@@ -81,7 +95,7 @@ static ebpo_twin_node twin_tree_place(const ebpo_twin_tree *view, ebpo_octcode c
 
 ebpo_twin_node ebpo_twin_root(const ebpo_twin_tree *view)
 {
-    return twin_tree_place(view, 1, (ebpo_cell){ 0, { 0, 0, 0 } }, 0, 0);
+    return node_in_group(view, 1, (ebpo_cell){ 0, { 0, 0, 0 } }, 0, 0);
 }
 
 bool ebpo_twin_is_pruned(const ebpo_twin_tree *view, const ebpo_twin_node *node)
@@ -99,7 +113,7 @@ ebpo_twin_node ebpo_twin_child(const ebpo_twin_tree *view, const ebpo_twin_node 
     ebpo_cell cell = { node->cell.level + 1, { 0 } };
     for (int k = 0; k < 3; k++)
         cell.at[k] = 2 * node->cell.at[k] + (octant >> k & 1);
-    return twin_tree_place(view, ebpo_octcode_child(node->code, octant), cell, node->rank, octant);
+    return node_in_group(view, ebpo_octcode_child(node->code, octant), cell, node->rank, octant);
 }
 
 /* Group of `level` that holds the gray node of this rank. */
@@ -116,7 +130,9 @@ static uint64_t group_of_gray(const ebpo_twin_tree *view, int level, uint64_t ra
     return low;
 }
 
-ebpo_twin_node ebpo_twin_at(const ebpo_twin_tree *view, int level, uint64_t group, unsigned octant)
+/* The node at a place of a level; climbs to the root to find its cell. */
+static ebpo_twin_node twin_at(const ebpo_twin_tree *view, int level, uint64_t group,
+                              unsigned octant)
 {
     unsigned path[EBPO_LEVELS_MAX];
     path[level] = octant;
@@ -176,6 +192,8 @@ int64_t ebpo_twin_winding(const ebpo_twin_tree *view, const ebpo_twin_node *node
     }
 }
 
+/* --- nesting --- */
+
 enum { NODES_PER_LEVEL = 256, POINTS_PER_NODE = 8, POINT_BITS = 16 };
 
 static void check_codes(ebpo_tally *tally, const ebpo_twin_tree *view, int l, ebpo_node_type type,
@@ -199,9 +217,8 @@ static void check_codes(ebpo_tally *tally, const ebpo_twin_tree *view, int l, eb
                 tally->checks[EBPO_VERIFY_NESTING]++;
                 if (!ebpo_plane_decode(codes[i], n, &d))
                     ebpo_tally_violation(tally, EBPO_VERIFY_NESTING,
-                                         &(ebpo_verify_place){
-                                             ebpo_twin_at(view, l, group, octant).code,
-                                             EBPO_NO_FACE, i },
+                                         &(ebpo_verify_place){ twin_at(view, l, group, octant).code,
+                                                               EBPO_NO_FACE, i },
                                          "the code %08x stands for no plane", (unsigned)codes[i]);
             }
         }
@@ -306,8 +323,8 @@ static uint64_t next_random(uint64_t *state)
 }
 
 /* Random points of the cell, and its corners. */
-static void nesting_check_node(ebpo_tally *tally, const ebpo_twin_tree *view,
-                               const ebpo_twin_node *node)
+static void check_nesting_at(ebpo_tally *tally, const ebpo_twin_tree *view,
+                             const ebpo_twin_node *node)
 {
     chain c;
     chain_to(&c, view, node);
@@ -338,58 +355,53 @@ void ebpo_check_nesting(ebpo_tally *tally, const ebpo_twin_tree *view)
                                 ? i
                                 : cells / NODES_PER_LEVEL * i +
                                       cells % NODES_PER_LEVEL * i / NODES_PER_LEVEL + i % 8;
-            ebpo_twin_node node = ebpo_twin_at(view, l, (cell % cells) / 8, (unsigned)(cell % 8));
-            nesting_check_node(tally, view, &node);
+            ebpo_twin_node node = twin_at(view, l, (cell % cells) / 8, (unsigned)(cell % 8));
+            check_nesting_at(tally, view, &node);
         }
     }
 }
 
-#define STRUCTURE_CHECK(condition, ...) \
-    ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
+#define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
+
+/* --- structure: the arrays fit together --- */
 
 static bool head_shape(ebpo_tally *tally, const ebpo_info *info)
 {
-    if (!STRUCTURE_CHECK(info->level_count >= 1 && info->level_count <= EBPO_LEVELS_MAX,
-                         "the file has %d levels; 1 to %d are possible", info->level_count,
-                         EBPO_LEVELS_MAX))
+    if (!CHECK(info->level_count >= 1 && info->level_count <= EBPO_LEVELS_MAX,
+               "the file has %d levels; 1 to %d are possible", info->level_count, EBPO_LEVELS_MAX))
         return false;
     ebpo_box box = { .grid_level = info->grid_level };
     for (int k = 0; k < 3; k++) {
         box.origin[k] = info->box_origin[k];
         box.size[k] = info->box_size[k];
     }
-    return STRUCTURE_CHECK(ebpo_box_valid(&box),
-                           "the root box is not on a dyadic grid down to level %d",
-                           info->grid_level) &&
-           STRUCTURE_CHECK(info->level_count - 1 <= info->grid_level,
-                           "level %d lies below the grid level %d, where cells are not exact",
-                           info->level_count - 1, info->grid_level) &&
-           STRUCTURE_CHECK((unsigned)info->rule <= EBPO_RULE_POSITIVE, "unknown rule %d",
-                           (int)info->rule);
+    return CHECK(ebpo_box_valid(&box), "the root box is not on a dyadic grid down to level %d",
+                 info->grid_level) &&
+           CHECK(info->level_count - 1 <= info->grid_level,
+                 "level %d lies below the grid level %d, where cells are not exact",
+                 info->level_count - 1, info->grid_level) &&
+           CHECK((unsigned)info->rule <= EBPO_RULE_POSITIVE, "unknown rule %d", (int)info->rule);
 }
 
 static bool types_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
     uint64_t groups = l == 0 ? 1 : tree->level[l - 1].gray_count;
-    if (!STRUCTURE_CHECK(level->group_count == groups,
-                         "level %d has %" PRIu64 " groups of siblings for %" PRIu64
-                         " gray nodes above",
-                         l, level->group_count, groups) ||
-        !STRUCTURE_CHECK(level->types || groups == 0, "level %d has no types", l))
+    if (!CHECK(level->group_count == groups,
+               "level %d has %" PRIu64 " groups of siblings for %" PRIu64 " gray nodes above", l,
+               level->group_count, groups) ||
+        !CHECK(level->types || groups == 0, "level %d has no types", l))
         return false;
     uint64_t count[4] = { 0 };
     EBPO_FOR_ITEMS(level->workspace, group, 0, groups)
         for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++)
             count[ebpo_twin_type(level, group, octant)]++;
-    return STRUCTURE_CHECK(count[EBPO_GRAY] == level->gray_count &&
-                               count[EBPO_LEAF] == level->leaf_count &&
-                               count[EBPO_WHITE] == level->white_count &&
-                               count[EBPO_BLACK] == level->black_count,
-                           "level %d: the types do not add up to its counts of nodes", l) &&
-           STRUCTURE_CHECK(l + 1 < tree->info.level_count || level->gray_count == 0 ||
-                               tree->info.pruned,
-                           "level %d, the last one, has gray nodes", l);
+    return CHECK(count[EBPO_GRAY] == level->gray_count && count[EBPO_LEAF] == level->leaf_count &&
+                     count[EBPO_WHITE] == level->white_count &&
+                     count[EBPO_BLACK] == level->black_count,
+                 "level %d: the types do not add up to its counts of nodes", l) &&
+           CHECK(l + 1 < tree->info.level_count || level->gray_count == 0 || tree->info.pruned,
+                 "level %d, the last one, has gray nodes", l);
 }
 
 /* Per-node counts and the array they share out. */
@@ -397,25 +409,24 @@ static bool counted_shape(ebpo_tally *tally, const ebpo_level *level, int l, con
                           uint64_t nodes, const uint8_t *counts, uint64_t total,
                           const uint32_t *items)
 {
-    if (!STRUCTURE_CHECK((counts || nodes == 0) && (items || total == 0),
-                         "level %d: %s are missing", l, what))
+    if (!CHECK((counts || nodes == 0) && (items || total == 0), "level %d: %s are missing", l,
+               what))
         return false;
     uint64_t sum = 0;
     EBPO_FOR_ITEMS(level->workspace, i, 0, nodes)
         sum += counts[i];
-    return STRUCTURE_CHECK(sum == total,
-                           "level %d: counts of %s sum to %" PRIu64 ", but there are %" PRIu64, l,
-                           what, sum, total);
+    return CHECK(sum == total, "level %d: counts of %s sum to %" PRIu64 ", but there are %" PRIu64,
+                 l, what, sum, total);
 }
 
 static bool windings_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
     if (tree->info.solid)
-        return STRUCTURE_CHECK(level->leaf_winding || level->leaf_count == 0,
-                               "level %d: winding numbers of leaves are missing", l);
-    return STRUCTURE_CHECK(!level->leaf_winding && !level->black_winding && !level->white_winding,
-                           "level %d: a surface has no winding numbers", l);
+        return CHECK(level->leaf_winding || level->leaf_count == 0,
+                     "level %d: winding numbers of leaves are missing", l);
+    return CHECK(!level->leaf_winding && !level->black_winding && !level->white_winding,
+                 "level %d: a surface has no winding numbers", l);
 }
 
 static bool leaf_faces_in_range(const ebpo_level *level, uint64_t leaf, uint64_t first_ref,
@@ -434,26 +445,26 @@ static bool leaf_faces_in_range(const ebpo_level *level, uint64_t leaf, uint64_t
 static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
-    if (!STRUCTURE_CHECK((level->leaf_first && level->leaf_new && level->leaf_ref_count) ||
-                             level->leaf_count == 0,
-                         "level %d: face lists of leaves are missing", l) ||
-        !STRUCTURE_CHECK(level->leaf_refs || level->ref_count == 0,
-                         "level %d: back-references are missing", l))
+    if (!CHECK((level->leaf_first && level->leaf_new && level->leaf_ref_count) ||
+                   level->leaf_count == 0,
+               "level %d: face lists of leaves are missing", l) ||
+        !CHECK(level->leaf_refs || level->ref_count == 0, "level %d: back-references are missing",
+               l))
         return false;
     uint64_t refs = 0, fresh = 0;
     EBPO_FOR_ITEMS(level->workspace, leaf, 0, level->leaf_count) {
         refs += level->leaf_ref_count[leaf];
         fresh += level->leaf_new[leaf];
     }
-    if (!STRUCTURE_CHECK(refs == level->ref_count && fresh == level->new_count,
-                         "level %d: lists hold %" PRIu64 " new faces and %" PRIu64
-                         " references, counts say %" PRIu64 " and %" PRIu64,
-                         l, fresh, refs, level->new_count, level->ref_count))
+    if (!CHECK(refs == level->ref_count && fresh == level->new_count,
+               "level %d: lists hold %" PRIu64 " new faces and %" PRIu64
+               " references, counts say %" PRIu64 " and %" PRIu64,
+               l, fresh, refs, level->new_count, level->ref_count))
         return false;
     refs = 0;
     bool ok = true;
     EBPO_FOR_ITEMS(level->workspace, leaf, 0, level->leaf_count) {
-        ok &= STRUCTURE_CHECK(
+        ok &= CHECK(
             leaf_faces_in_range(level, leaf, refs, tree->mesh.face_count),
             "level %d, leaf %" PRIu64
             ": its list leaves the faces, or its references do not ascend below its first new face",
@@ -466,17 +477,17 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
 {
     const ebpo_mesh *mesh = &tree->mesh;
-    if (!STRUCTURE_CHECK(mesh->vertex_count == tree->info.vertex_count &&
-                             mesh->face_count == tree->info.face_count,
-                         "the mesh has %" PRIu64 " vertices and %" PRIu64
-                         " faces, the head says %" PRIu64 " and %" PRIu64,
-                         mesh->vertex_count, mesh->face_count, tree->info.vertex_count,
-                         tree->info.face_count) ||
-        !STRUCTURE_CHECK(!!mesh->xyz32 != !!mesh->xyz64 && mesh->faces &&
-                             mesh->vertex_count < UINT32_MAX && mesh->face_count < UINT32_MAX,
-                         "the mesh has no vertices or no faces") ||
-        !STRUCTURE_CHECK(!!mesh->xyz64 == tree->info.double_coordinates,
-                         "the head and the mesh differ about the kind of coordinates"))
+    if (!CHECK(mesh->vertex_count == tree->info.vertex_count &&
+                   mesh->face_count == tree->info.face_count,
+               "the mesh has %" PRIu64 " vertices and %" PRIu64 " faces, the head says %" PRIu64
+               " and %" PRIu64,
+               mesh->vertex_count, mesh->face_count, tree->info.vertex_count,
+               tree->info.face_count) ||
+        !CHECK(!!mesh->xyz32 != !!mesh->xyz64 && mesh->faces && mesh->vertex_count < UINT32_MAX &&
+                   mesh->face_count < UINT32_MAX,
+               "the mesh has no vertices or no faces") ||
+        !CHECK(!!mesh->xyz64 == tree->info.double_coordinates,
+               "the head and the mesh differ about the kind of coordinates"))
         return false;
     uint64_t outside = 0, infinite = 0;
     EBPO_FOR_ITEMS(mesh->workspace, i, 0, 3 * mesh->face_count)
@@ -487,10 +498,9 @@ static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
         infinite += !isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]);
     }
     bool corners_fine =
-        STRUCTURE_CHECK(outside == 0,
-                        "%" PRIu64 " corners of faces name vertices that do not exist", outside);
-    return STRUCTURE_CHECK(infinite == 0, "%" PRIu64 " vertices are not finite", infinite) &&
-           corners_fine;
+        CHECK(outside == 0, "%" PRIu64 " corners of faces name vertices that do not exist",
+              outside);
+    return CHECK(infinite == 0, "%" PRIu64 " vertices are not finite", infinite) && corners_fine;
 }
 
 static bool colours_shape(ebpo_tally *tally, const ebpo_level *level, int l)
@@ -498,7 +508,7 @@ static bool colours_shape(ebpo_tally *tally, const ebpo_level *level, int l)
     uint32_t all = 0;
     EBPO_FOR_ITEMS(level->workspace, i, 0, level->gray_colours ? level->gray_count : 0)
         all |= level->gray_colours[i];
-    return STRUCTURE_CHECK(all < 1 << 24, "level %d: a colour is above 2^24 - 1", l);
+    return CHECK(all < 1 << 24, "level %d: a colour is above 2^24 - 1", l);
 }
 
 /* What the checks above do not look for by name. Counted only when it fails. */
@@ -511,7 +521,7 @@ static bool arrays_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
         if (!ebpo_schema_is_held(id) || spec->if_needed || !(spec->needs & has) ||
             ebpo_level_array(level, id) || !ebpo_level_rows(level, id))
             continue;
-        return STRUCTURE_CHECK(false, "level %d: %s is missing", l, spec->name);
+        return CHECK(false, "level %d: %s is missing", l, spec->name);
     }
     return true;
 }
@@ -539,10 +549,7 @@ bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree)
     return true;
 }
 
-/* What a tree must be beyond fitting its arrays. */
-
-#define STRUCTURE_TREE_CHECK(condition, ...) \
-    ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
+/* --- structure: the tree --- */
 
 /* A volume cannot be more than that of the cells it lies in; the slack is for the rounding of sums.
  * Coordinates beyond about 1e102 or below 1e-102 have volumes that no double holds: the format
@@ -560,24 +567,21 @@ static void check_summary(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
     const ebpo_level_summary *stored = &tree->info.level[l];
-    STRUCTURE_TREE_CHECK(stored->gray_count == level->gray_count &&
-                             stored->leaf_count == level->leaf_count &&
-                             stored->white_count == level->white_count &&
-                             stored->black_count == level->black_count,
-                         "level %d: the head's counts of nodes differ from the level's", l);
-    STRUCTURE_TREE_CHECK(stored->plane_count == level->plane_count &&
-                             stored->leaf_plane_count == level->leaf_plane_count,
-                         "level %d: the head's counts of planes differ from the level's", l);
-    STRUCTURE_TREE_CHECK(stored->new_count == level->new_count &&
-                             stored->ref_count == level->ref_count,
-                         "level %d: the head's counts of faces differ from the level's", l);
-    STRUCTURE_TREE_CHECK(stored->gray_volume == level->gray_volume &&
-                             stored->leaf_volume == level->leaf_volume,
-                         "level %d: the head's volumes differ from the level's", l);
-    STRUCTURE_TREE_CHECK(volume_possible(level->gray_volume, level->gray_count, l, &tree->info) &&
-                             volume_possible(level->leaf_volume, level->leaf_count, l, &tree->info),
-                         "level %d: envelopes of volume %g and %g do not fit their cells", l,
-                         level->gray_volume, level->leaf_volume);
+    CHECK(stored->gray_count == level->gray_count && stored->leaf_count == level->leaf_count &&
+              stored->white_count == level->white_count &&
+              stored->black_count == level->black_count,
+          "level %d: the head's counts of nodes differ from the level's", l);
+    CHECK(stored->plane_count == level->plane_count &&
+              stored->leaf_plane_count == level->leaf_plane_count,
+          "level %d: the head's counts of planes differ from the level's", l);
+    CHECK(stored->new_count == level->new_count && stored->ref_count == level->ref_count,
+          "level %d: the head's counts of faces differ from the level's", l);
+    CHECK(stored->gray_volume == level->gray_volume && stored->leaf_volume == level->leaf_volume,
+          "level %d: the head's volumes differ from the level's", l);
+    CHECK(volume_possible(level->gray_volume, level->gray_count, l, &tree->info) &&
+              volume_possible(level->leaf_volume, level->leaf_count, l, &tree->info),
+          "level %d: envelopes of volume %g and %g do not fit their cells", l, level->gray_volume,
+          level->leaf_volume);
 }
 
 typedef struct descent {
@@ -588,7 +592,7 @@ typedef struct descent {
     uint64_t pruned[EBPO_LEVELS_MAX];
 } descent;
 
-static void node_check(descent *d, const ebpo_twin_node *node, bool holds, const char *text)
+static void record_check(descent *d, const ebpo_twin_node *node, bool holds, const char *text)
 {
     d->tally->checks[EBPO_VERIFY_STRUCTURE]++;
     if (!holds)
@@ -604,26 +608,26 @@ static void check_leaf(descent *d, const ebpo_twin_node *leaf)
     if (!d->view->has_mesh)
         return;
     uint64_t listed = (uint64_t)level->leaf_new[leaf->rank] + level->leaf_ref_count[leaf->rank];
-    node_check(
+    record_check(
         d, leaf, level->leaf_first[leaf->rank] == d->next_face,
         "the leaf's new faces do not follow those of the leaf before it in depth-first order");
-    node_check(d, leaf, listed > 0, "the leaf lists no face");
-    node_check(d, leaf, leaf->cell.level >= info->max_level || listed <= info->leaf_faces,
-               "the leaf lists more faces than a leaf above the maximum level may");
+    record_check(d, leaf, listed > 0, "the leaf lists no face");
+    record_check(d, leaf, leaf->cell.level >= info->max_level || listed <= info->leaf_faces,
+                 "the leaf lists more faces than a leaf above the maximum level may");
     d->next_face = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
 }
 
 static void check_gray(descent *d, const ebpo_twin_node *node);
 
-static void structure_tree_check_node(descent *d, const ebpo_twin_node *node)
+static void check_node(descent *d, const ebpo_twin_node *node)
 {
     if (node->type == EBPO_LEAF)
         check_leaf(d, node);
     else if (node->type == EBPO_GRAY)
         check_gray(d, node);
     else if (node->type == EBPO_BLACK)
-        node_check(d, node, d->view->tree->info.solid,
-                   "a surface has no inside, but the node is black");
+        record_check(d, node, d->view->tree->info.solid,
+                     "a surface has no inside, but the node is black");
 }
 
 static void check_gray(descent *d, const ebpo_twin_node *node)
@@ -632,17 +636,17 @@ static void check_gray(descent *d, const ebpo_twin_node *node)
         d->pruned[node->cell.level]++;
         return;
     }
-    node_check(d, node, node->cell.level < d->view->tree->info.max_level,
-               "a node at the maximum level is gray");
+    record_check(d, node, node->cell.level < d->view->tree->info.max_level,
+                 "a node at the maximum level is gray");
     bool touched = false;
     if (d->grays++ % EBPO_ITEMS_IN_ORDER == 0)
         ebpo_release_pages(d->view->workspace);
     for (unsigned octant = 0; octant < 8; octant++) {
         ebpo_twin_node child = ebpo_twin_child(d->view, node, octant);
         touched |= child.type >= EBPO_LEAF;
-        structure_tree_check_node(d, &child);
+        check_node(d, &child);
     }
-    node_check(d, node, touched, "the node is gray, but no child of it is gray or a leaf");
+    record_check(d, node, touched, "the node is gray, but no child of it is gray or a leaf");
 }
 
 static void check_vertices(ebpo_tally *tally, const ebpo_twin_tree *view)
@@ -658,11 +662,10 @@ static void check_vertices(ebpo_tally *tally, const ebpo_twin_tree *view)
         first = within || outside ? first : i;
         outside += !within;
     }
-    STRUCTURE_TREE_CHECK(outside == 0,
-                         "%" PRIu64
-                         " corners of faces are not strictly inside the root box, face %" PRIu64
-                         " first",
-                         outside, first / 3);
+    CHECK(outside == 0,
+          "%" PRIu64 " corners of faces are not strictly inside the root box, face %" PRIu64
+          " first",
+          outside, first / 3);
 }
 
 /* A sum of signed random values, one for each undirected edge: it vanishes when directions cancel,
@@ -687,19 +690,17 @@ void ebpo_check_structure(ebpo_tally *tally, const ebpo_twin_tree *view)
         check_summary(tally, tree, l);
     descent d = { .tally = tally, .view = view };
     ebpo_twin_node root = ebpo_twin_root(view);
-    structure_tree_check_node(&d, &root);
+    check_node(&d, &root);
     for (int l = 0; l < tree->info.level_count; l++)
-        STRUCTURE_TREE_CHECK(d.pruned[l] == tree->info.level[l].pruned_count,
-                             "level %d: %" PRIu64 " nodes are pruned, the head says %" PRIu64, l,
-                             d.pruned[l], tree->info.level[l].pruned_count);
+        CHECK(d.pruned[l] == tree->info.level[l].pruned_count,
+              "level %d: %" PRIu64 " nodes are pruned, the head says %" PRIu64, l, d.pruned[l],
+              tree->info.level[l].pruned_count);
     if (!view->has_mesh)
         return;
-    STRUCTURE_TREE_CHECK(d.next_face == tree->mesh.face_count,
-                         "leaves list %" PRIu64 " of %" PRIu64 " faces", d.next_face,
-                         tree->mesh.face_count);
+    CHECK(d.next_face == tree->mesh.face_count, "leaves list %" PRIu64 " of %" PRIu64 " faces",
+          d.next_face, tree->mesh.face_count);
     check_vertices(tally, view);
     if (tree->info.solid && !tree->info.pruned) /* a part of a mesh need not balance */
-        STRUCTURE_TREE_CHECK(
-            edges_balance(&tree->mesh),
-            "the file says solid, but the directions of the mesh's edges do not cancel");
+        CHECK(edges_balance(&tree->mesh),
+              "the file says solid, but the directions of the mesh's edges do not cancel");
 }

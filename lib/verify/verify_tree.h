@@ -1,5 +1,5 @@
-/* Finding one's way in a tree held in memory: children by rank, and the counts that ranks rest on.
- */
+/* A tree in memory as the verifier sees it (verify_tree.c): children by rank, and the checks of
+ * nesting and structure. */
 #ifndef EBPO_VERIFY_VERIFY_TREE_H
 #define EBPO_VERIFY_VERIFY_TREE_H
 
@@ -7,6 +7,8 @@
 
 #include "geometry/cells.h"
 #include "verify/tally.h"
+
+/* --- finding nodes --- */
 
 /* How many of each thing come before a group of siblings in its level. */
 typedef struct ebpo_twin_group {
@@ -50,8 +52,6 @@ bool ebpo_twin_is_pruned(const ebpo_twin_tree *view, const ebpo_twin_node *node)
 /* Child of a gray node that is not pruned. */
 ebpo_twin_node ebpo_twin_child(const ebpo_twin_tree *view, const ebpo_twin_node *node,
                                unsigned octant);
-/* The node at a place of a level; climbs to the root to find its cell. */
-ebpo_twin_node ebpo_twin_at(const ebpo_twin_tree *view, int level, uint64_t group, unsigned octant);
 
 /* Codes of the node's own planes (gray: the level's planes; leaf: stored leaf planes); NULL and 0
  * when there are none. */
@@ -73,7 +73,7 @@ static inline bool ebpo_twin_inside(const ebpo_twin_tree *view, int64_t winding)
     }
 }
 
-/* Nesting: plane codes that decode, and coordinates that agree from level to level. */
+/* --- nesting: plane codes decode, and coordinates agree from level to level --- */
 
 /* A node's envelope is its own planes and all its ancestors', so it lies in its parent's by
  * definition, as long as a plane means the same in every cell's coordinates: checked in integers on
@@ -81,8 +81,7 @@ static inline bool ebpo_twin_inside(const ebpo_twin_tree *view, int64_t winding)
  * plane. */
 void ebpo_check_nesting(ebpo_tally *tally, const ebpo_twin_tree *view);
 
-/* Structure: whether the arrays fit together, and whether the tree is one that the format allows.
- */
+/* --- structure: the arrays fit together, and the format allows the tree --- */
 
 /* Everything that the other checks rely on to stay within arrays. False when something is wrong:
  * then nothing else can be checked. */

@@ -1,6 +1,11 @@
-/* Nodes with many faces come first, one after the other, with their faces shared out to all
- * threads; what remains below are many smaller subtrees, each walked depth-first by one thread.
- * Every face is tested exactly against every cell that it comes near. */
+/* Walks down the tree with the faces that touch each node, and checks containment, lists and labels
+ * there.
+ *
+ * Nodes with many faces come first, one after the other, with their faces shared out to all
+ * threads. The smaller subtrees below are each walked depth first by one thread. Every face is
+ * tested exactly against every cell that it comes near. Points whose winding number is to be
+ * checked by rays are collected on the way and followed through the mesh at the end. The tally does
+ * not depend on the number of threads. */
 #include "core/strict_fp.h"
 
 #include "verify/verify_parts.h"
@@ -33,7 +38,7 @@ typedef struct face_stack {
 typedef struct worker {
     ebpo_tally tally;
     face_stack stack;
-    ebpo_half_spaces planes;
+    ebpo_node_planes planes;
     ebpo_ray_points points;
     uint64_t visited; /* faces */
 } worker;
@@ -44,7 +49,7 @@ typedef struct upper_node {
     uint32_t *faces;
     uint64_t face_count;
     uint64_t children; /* the first of eight, in the same array */
-    ebpo_corner_windings corners;
+    ebpo_node_windings corners;
 } upper_node;
 
 typedef struct walk {
@@ -146,7 +151,7 @@ static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_twin_node *
 
 /* What is left to do at a gray node when its children are done. */
 static void finish_gray(const walk *w, worker *self, const ebpo_twin_node *node,
-                        const ebpo_corner_windings children[8], ebpo_corner_windings *corners)
+                        const ebpo_node_windings children[8], ebpo_node_windings *corners)
 {
     if (!w->view->tree->info.solid)
         return;
@@ -154,7 +159,7 @@ static void finish_gray(const walk *w, worker *self, const ebpo_twin_node *node,
     unsigned inside = ebpo_windings_inside(w->view, corners);
     if (inside == 0)
         return;
-    ebpo_half_spaces_of(&self->planes, w->view, node);
+    ebpo_node_planes_of(&self->planes, w->view, node);
     ebpo_check_corners_contained(&self->tally, &self->planes, node, inside);
 }
 
@@ -165,20 +170,20 @@ static bool is_terminal(const walk *w, const ebpo_twin_node *node)
 
 /* The faces may be all of the mesh. */
 static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_twin_node *node,
-                                 const uint32_t *faces, uint64_t count,
-                                 ebpo_corner_windings *corners, ebpo_error *error)
+                                 const uint32_t *faces, uint64_t count, ebpo_node_windings *corners,
+                                 ebpo_error *error)
 {
     const ebpo_twin_tree *view = w->view;
     ebpo_frame frame = ebpo_frame_make(&view->box, node->cell);
     if (view->has_mesh && node->type != EBPO_GRAY) /* pruned */
         ebpo_check_terminal_lists(&self->tally, view, node, faces, count);
-    ebpo_half_spaces_of(&self->planes, view, node);
+    ebpo_node_planes_of(&self->planes, view, node);
     EBPO_FOR_ITEMS_SCATTERED(w->options->workspace, i, 0, self->planes.count ? count : 0) {
         ebpo_corners face;
         ebpo_face_corners(&view->tree->mesh, faces[i], &face);
         ebpo_check_face_contained(&self->tally, &self->planes, node, &frame, &face, faces[i]);
     }
-    *corners = (ebpo_corner_windings){ { 0 }, 0 };
+    *corners = (ebpo_node_windings){ { 0 }, 0 };
     if (!view->tree->info.solid || node->type == EBPO_GRAY)
         return EBPO_OK;
     ebpo_check_terminal_label(&self->tally, view, node);
@@ -210,7 +215,7 @@ static bool stack_reserve(face_stack *s, uint64_t need)
 
 /* The node's faces are [first, first + count) on the stack. */
 static ebpo_status walk_down(const walk *w, worker *self, const ebpo_twin_node *node,
-                             uint64_t first, uint64_t count, ebpo_corner_windings *corners,
+                             uint64_t first, uint64_t count, ebpo_node_windings *corners,
                              ebpo_error *error)
 {
     face_stack *s = &self->stack;
@@ -220,10 +225,10 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_twin_node *
         return ebpo_fail_memory(error, (first + 2 * count) * 5);
     family f;
     family_make(&f, &w->view->box, node);
-    ebpo_half_spaces_of(&self->planes, w->view, node);
+    ebpo_node_planes_of(&self->planes, w->view, node);
     visit_faces(w, self, node, &f, s->faces + first, s->octants + first, count);
     check_worth(w, &self->tally, node, count);
-    ebpo_corner_windings children[8];
+    ebpo_node_windings children[8];
     for (unsigned octant = 0; octant < 8; octant++) {
         uint64_t own = 0;
         for (uint64_t i = 0; i < count; i++)
@@ -247,7 +252,7 @@ static ebpo_status shared_task(void *context, uint64_t begin, uint64_t end, unsi
     worker *self = &w->workers[number];
     family f;
     family_make(&f, &w->view->box, &w->shared->node);
-    ebpo_half_spaces_of(&self->planes, w->view, &w->shared->node);
+    ebpo_node_planes_of(&self->planes, w->view, &w->shared->node);
     visit_faces(w, self, &w->shared->node, &f, w->shared->faces + begin, w->shared_octants + begin,
                 end - begin);
     return EBPO_OK;
@@ -368,7 +373,7 @@ static void finish_upper(walk *w)
         upper_node *n = &w->upper[at];
         if (n->children == 0)
             continue;
-        ebpo_corner_windings children[8];
+        ebpo_node_windings children[8];
         for (unsigned octant = 0; octant < 8; octant++)
             children[octant] = w->upper[n->children + octant].corners;
         finish_gray(w, &w->workers[0], &n->node, children, &n->corners);

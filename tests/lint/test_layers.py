@@ -5,6 +5,7 @@ lib/layers.txt and tools/layers.txt say which module stands on which floor. A fi
 it includes its header, or when its object file asks for a symbol that the other's defines (a
 declaration written by hand needs no header); X.c, X.h and X.inc count as one. Held to:
 - a file uses files of its own module and of lower floors only, not of siblings;
+- verify, the judge, uses nothing of what it judges: no file of construct, of the writer or of query;
 - no circles of files, neither within a module nor across;
 - only lib/hdf5_write includes <hdf5.h>, and only lib/io <curl/curl.h>.
 LIBRARY is the static library of lib/, OBJECTS the folder of those of tools/."""
@@ -15,6 +16,9 @@ import subprocess
 import sys
 
 OWNERS = {"hdf5.h": "hdf5_write", "curl/": "io"}  # who alone includes what
+# The judge shares no code with what it judges: not with the builder, the writer (hdf5_write, and the
+# files of format that write) or the queries; and it keeps its own vector functions.
+INDEPENDENT = {"verify": ("construct/", "hdf5_write/", "query/", "format/write_", "geometry/vec3")}
 
 
 class Tree:
@@ -97,6 +101,14 @@ class Tree:
                                          f"uses {self.root.name}/{used} "
                                          f"(floor {self.floors.get(b)}): {', '.join(sorted(by))}")
 
+    def check_independence(self):
+        for user in sorted(self.uses):
+            barred = INDEPENDENT.get(self.folder(user), ())
+            for used, by in sorted(self.uses[user].items()):
+                if used.startswith(barred):
+                    self.problems.append(f"{self.root.name}/{user} uses {self.root.name}/{used}, "
+                                         f"but has to be independent of it: {', '.join(sorted(by))}")
+
     def shortest_circle(self, start):
         """The files of the shortest way from `start` back to itself; [] when there is none."""
         came, queue = {start: None}, collections.deque([start])
@@ -138,6 +150,8 @@ def main():
             tree.problems.append(f"{folder}: {nm} found hardly any symbols in "
                                  f"{', '.join(binaries)[:200]}")
         tree.check_floors()
+        if folder == "lib":
+            tree.check_independence()
         tree.check_circles()
         problems += tree.problems
     print("\n".join(problems) or "modules use lower floors only, and no files go in a circle")

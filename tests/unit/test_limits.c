@@ -21,7 +21,7 @@
 #include "random_tree.h"
 #include "read_by.h"
 #include "scratch.h"
-#include "levels/frontier.h"
+#include "levels/view_cut.h"
 #include "query/accel_parts.h"
 
 static const uint64_t TWO32 = UINT64_C(1) << 32;

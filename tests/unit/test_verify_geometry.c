@@ -92,7 +92,7 @@ START_TEST(half_space_certificates_agree_with_rationals)
         ebpo_corners face = some_face(&frame, &state);
         if (!ebpo_exact_touches(frame.low, frame.high, &face))
             continue;
-        ebpo_half_spaces planes = { .count = 1 };
+        ebpo_node_planes planes = { .count = 1 };
         uint32_t code = (uint32_t)(ebpo_test_random(&state) % 1023) |
                         (uint32_t)(ebpo_test_random(&state) % 1023) << 10 |
                         (uint32_t)(ebpo_test_random(&state) % 4095) << 20;

@@ -1,4 +1,13 @@
-/* Which repairs make a solid of a mesh: they are tried. */
+/* Prepares a mesh for building, and finds out which repairs make a solid of it.
+ *
+ * ebpo_mesh_prepare sorts the mesh along the curve first, so that each later step goes through
+ * memory in order; then it checks, repairs what the options ask for, sorts again and checks again.
+ * A mesh that is too large for an exact grid is still checked; building refuses it.
+ *
+ * ebpo_mesh_try_repairs applies sequences of repairs to copies of the mesh, shorter sequences
+ * first, until one leaves a solid without doubts. Doubts say why a solid may not be what its author
+ * meant: holes that were filled over much of the surface, a volume that is negative, or one that is
+ * small for the area (a sheet). */
 #include "core/strict_fp.h"
 
 #include <ebpo/repair.h>
@@ -6,10 +15,98 @@
 #include <math.h>
 #include <string.h>
 
+#include "construct/arrange.h"
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "mesh/mesh_parts.h"
+
+/* --- preparing --- */
+
+typedef struct preparation {
+    ebpo_mesh *mesh;
+    const ebpo_prepare_options *options;
+    ebpo_prepared *out;
+} preparation;
+
+/* What is too large for an exact grid can be checked all the same; building says so again. */
+static ebpo_status unless_too_large(ebpo_status status, const ebpo_error *local, ebpo_error *error)
+{
+    if (status == EBPO_OK || status == EBPO_E_LIMIT)
+        return EBPO_OK;
+    if (error)
+        *error = *local;
+    return status;
+}
+
+static ebpo_status mend_as_asked(const preparation *p, bool weld, ebpo_error *error)
+{
+    const ebpo_prepare_options *o = p->options;
+    unsigned steps = (weld ? EBPO_MEND_WELD : 0) | (o->orient ? EBPO_MEND_ORIENT : 0) |
+                     (o->flip ? EBPO_MEND_FLIP : 0) | (o->fill_holes ? EBPO_MEND_FILL : 0) |
+                     (o->drop_duplicates ? EBPO_MEND_DROP : 0);
+    if (!ebpo_progress_stage(&o->progress, "mending", error))
+        return EBPO_E_CANCELLED;
+    return ebpo_mesh_mend(p->mesh, steps, o->weld_distance, &p->out->record, error);
+}
+
+/* In the order of the curve before anything else, so that each step goes through memory in order,
+ * however little of it there is. */
+static ebpo_status arrange_and_mend(const preparation *p, bool weld, ebpo_error *error)
+{
+    const ebpo_prepare_options *o = p->options;
+    ebpo_error local = EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_arrange_to_mend(p->mesh, o->threads, &o->progress, &local);
+    status = unless_too_large(status, &local, error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->before, error);
+    return status == EBPO_OK ? mend_as_asked(p, weld, error) : status;
+}
+
+static ebpo_status prepare_in_order(const preparation *p, ebpo_error *error)
+{
+    const ebpo_prepare_options *o = p->options;
+    /* STL has no shared vertices */
+    bool weld = o->weld || o->weld_distance > 0 || strncmp(p->mesh->source_format, "stl", 3) == 0;
+    ebpo_status status = EBPO_OK;
+    if (!(o->weld_distance >= 0))
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "weld_distance has to be 0, which is for equal positions, or above, not %g",
+            o->weld_distance);
+    p->out->mended = weld || o->orient || o->flip || o->fill_holes || o->drop_duplicates;
+    if (p->out->mended)
+        status = arrange_and_mend(p, weld, error);
+    if (status == EBPO_OK) {
+        ebpo_error local = EBPO_ERROR_INIT;
+        status = ebpo_arrange(p->mesh, -1, o->threads, &o->progress, &local);
+        status = unless_too_large(status, &local, error);
+    }
+    if (status == EBPO_OK)
+        status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->report, error);
+    if (status == EBPO_OK && !p->out->mended)
+        p->out->before = p->out->report;
+    return status;
+}
+
+ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh, const ebpo_prepare_options *options,
+                              ebpo_prepared *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    static const ebpo_prepared nothing = EBPO_PREPARED_INIT;
+    ebpo_prepare_options wanted = EBPO_PREPARE_OPTIONS_INIT;
+    ebpo_prepared made = EBPO_PREPARED_INIT;
+    preparation p = { mesh, &wanted, &made };
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_prepared, out, error);
+    if (status == EBPO_OK)
+        status = EBPO_TAKE(ebpo_prepare_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = prepare_in_order(&p, error);
+    EBPO_GIVE(ebpo_prepared, out, status == EBPO_OK ? &made : &nothing);
+    return status;
+}
+
+/* --- trying repairs: types --- */
 
 enum {
     WELD = EBPO_MEND_WELD,
@@ -29,7 +126,7 @@ typedef struct trying {
     ebpo_repairs *out;
 } trying;
 
-/* ---- doubts ---- */
+/* --- doubts about a result --- */
 
 /* A loop of n edges was filled with n - 2 faces, which have n - 3 edges of their own. */
 static bool mostly_open(const ebpo_mesh_report *report, const ebpo_mend_record *record)
@@ -83,7 +180,7 @@ uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
     return doubts | doubts_of_volume(report);
 }
 
-/* ---- sequences ---- */
+/* --- sequences of repairs --- */
 
 static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
 {
@@ -142,7 +239,7 @@ static ebpo_status begin_with(trying *t, start from, unsigned step, start *then,
     return try_steps(t, then->steps, error);
 }
 
-static ebpo_status try_repairs_drop(trying *t, start from, start *then, ebpo_error *error)
+static ebpo_status drop_repeated(trying *t, start from, start *then, ebpo_error *error)
 {
     return from.report->repeated_faces.count ? begin_with(t, from, DROP, then, error) : EBPO_OK;
 }
@@ -155,7 +252,7 @@ static ebpo_status weld_first(trying *t, start *from, ebpo_error *error)
         return EBPO_OK;
     ebpo_status status = try_more(t, bare, ORIENT, error);
     if (status == EBPO_OK)
-        status = try_repairs_drop(t, bare, &dropped, error);
+        status = drop_repeated(t, bare, &dropped, error);
     if (status == EBPO_OK)
         status = begin_with(t, bare, WELD, from, error);
     return status == EBPO_OK ? try_more(t, dropped, ORIENT, error) : status;
@@ -171,7 +268,7 @@ static ebpo_status try_all(trying *t, ebpo_error *error)
     if (status == EBPO_OK)
         status = try_more(t, plain, FILL, error);
     if (status == EBPO_OK)
-        status = try_repairs_drop(t, plain, &dropped, error);
+        status = drop_repeated(t, plain, &dropped, error);
     if (status == EBPO_OK)
         status = try_more(t, dropped, ORIENT, error);
     if (status == EBPO_OK)

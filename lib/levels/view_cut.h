@@ -1,6 +1,7 @@
-/* What an observer makes of cells: how far, how large, whether seen, what is in front. */
-#ifndef EBPO_LEVELS_FRONTIER_H
-#define EBPO_LEVELS_FRONTIER_H
+/* The cut of a view (view_cut.c): the observer, the part of the tree that has been delivered, and
+ * the frontier. */
+#ifndef EBPO_LEVELS_VIEW_CUT_H
+#define EBPO_LEVELS_VIEW_CUT_H
 
 #include <ebpo/base.h>
 #include <ebpo/view.h>
@@ -9,6 +10,8 @@
 #include "geometry/cells.h"
 #include "geometry/level_nodes.h"
 #include "levels/stream.h"
+
+/* --- the observer: distance and size of cells, whether they are seen, their order --- */
 
 /* Made ready. Lengths are in units of about the root cell's longest side (a power of two of the
  * model's unit), so that squares neither overflow nor vanish. */
@@ -47,9 +50,9 @@ unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *viewpoint, const ebpo_box *
 uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *viewpoint, const ebpo_box *box,
                             ebpo_priority priority, ebpo_octcode octcode, double distance2);
 
-/* The part of a tree that has been delivered: groups of siblings, each linked to its parent once it
- * is complete. */
+/* --- the part of a tree that has been delivered --- */
 
+/* A group of siblings, linked to its parent once it is complete. */
 typedef struct ebpo_partial_group {
     uint64_t parent;     /* octcode; 0: the root's group */
     uint64_t first_gray; /* rank in its level of the group's first gray node */
@@ -109,7 +112,7 @@ const uint32_t *ebpo_partial_codes(const ebpo_partial *partial, ebpo_partial_nod
 const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *partial, ebpo_partial_node node,
                                            ebpo_envelope_stack *envelopes);
 
-/* The gray nodes of a cut: a heap, the next one to be refined on top. */
+/* --- the frontier: the gray nodes of the cut in a heap, the next one to be refined on top --- */
 
 /* Whether a node's turn comes at all. */
 typedef enum ebpo_turn { EBPO_TURN_SEEN, EBPO_TURN_UNSEEN, EBPO_TURN_NEVER } ebpo_turn;

@@ -1,3 +1,13 @@
+/* The cut of a view: which nodes of the tree have been delivered, and which of them is refined
+ * next.
+ *
+ * - An observer, made ready as a viewpoint, says of a cell how far it is, how large in pixels, and
+ *   whether it is in the frustum. It gives each node a key: the order of priority. Comparisons
+ *   allow for rounding: a cell that is hardly seen counts as seen.
+ * - The partial tree holds the groups of siblings that have been delivered, each linked to its
+ *   parent once it is complete.
+ * - The frontier holds the gray nodes of the cut in a binary heap, the next one to be refined on
+ *   top. Equal keys are ordered by octcode, so that the order is the same everywhere. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -8,20 +18,16 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "geometry/cells.h"
-#include "levels/frontier.h"
 #include "geometry/vec3.h"
+#include "levels/view_cut.h"
+
+/* --- the observer --- */
 
 /* of a sum of three products, generously: what is hardly seen counts as seen */
 static const double SLACK = 1e-12;
 
-static void observer_cross(const double a[3], const double b[3], double out[3])
-{
-    for (int k = 0; k < 3; k++)
-        out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
-}
-
 /* To length 1, whatever its length; false for (0, 0, 0). */
-static bool observer_normalise(const double v[3], double out[3])
+static bool normalise_vector(const double v[3], double out[3])
 {
     double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
     if (!(largest > 0))
@@ -39,7 +45,7 @@ static bool all_finite(const double v[3])
     return isfinite(v[0]) && isfinite(v[1]) && isfinite(v[2]);
 }
 
-static ebpo_status observer_check(const ebpo_observer *o, ebpo_error *error)
+static ebpo_status check_observer(const ebpo_observer *o, ebpo_error *error)
 {
     if (!all_finite(o->eye) || !all_finite(o->direction) || !all_finite(o->up))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
@@ -58,17 +64,17 @@ static ebpo_status make_frustum(ebpo_viewpoint *s, const ebpo_observer *o, doubl
                                 ebpo_error *error)
 {
     double forward[3], side[2][3], up[3];
-    s->everywhere = !observer_normalise(o->direction, forward);
+    s->everywhere = !normalise_vector(o->direction, forward);
     if (s->everywhere)
         return EBPO_OK;
-    if (!observer_normalise(o->up, up))
+    if (!normalise_vector(o->up, up))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the observer's upward direction is (0, 0, 0)");
-    observer_cross(forward, up, side[0]);
-    if (ebpo_vec3_dot(side[0], side[0]) < 1e-12 || !observer_normalise(side[0], side[0]))
+    ebpo_vec3_cross(forward, up, side[0]);
+    if (ebpo_vec3_dot(side[0], side[0]) < 1e-12 || !normalise_vector(side[0], side[0]))
         return ebpo_fail(
             error, EBPO_E_ARGUMENT,
             "the observer's upward direction lies along the viewing direction; give another one");
-    observer_cross(side[0], forward, side[1]);
+    ebpo_vec3_cross(side[0], forward, side[1]);
     double tangents[2] = { tangent * ((double)o->width / o->height), tangent };
     for (int i = 0; i < 2; i++)
         for (int k = 0; k < 3; k++) {
@@ -85,7 +91,7 @@ ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
     memset(out, 0, sizeof *out);
     if (!observer)
         return EBPO_OK;
-    ebpo_status status = observer_check(observer, error);
+    ebpo_status status = check_observer(observer, error);
     if (status != EBPO_OK)
         return status;
     int exponent;
@@ -149,8 +155,7 @@ unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *s, const ebpo_box *box, ebp
 
 /* Octants from the root down, each as seen from the eye: reading them as one number gives the
  * enumeration's order. */
-static uint64_t observer_enumerate(const ebpo_viewpoint *s, const ebpo_box *box,
-                                   ebpo_octcode octcode)
+static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_octcode octcode)
 {
     int level = ebpo_octcode_level(octcode);
     ebpo_cell cell = ebpo_cell_of_octcode(octcode);
@@ -166,7 +171,7 @@ static uint64_t observer_enumerate(const ebpo_viewpoint *s, const ebpo_box *box,
 }
 
 /* Doubles that are not negative sort as their bits do. */
-static uint64_t observer_bits(double v)
+static uint64_t double_bits(double v)
 {
     uint64_t out;
     memcpy(&out, &v, sizeof out);
@@ -177,14 +182,16 @@ uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_p
                             ebpo_octcode octcode, double distance2)
 {
     switch (priority) {
-    case EBPO_PRIORITY_DISTANCE: return observer_bits(distance2);
+    case EBPO_PRIORITY_DISTANCE: return double_bits(distance2);
     case EBPO_PRIORITY_PIXELS:
-        return ~observer_bits(s->diagonal2[ebpo_octcode_level(octcode)] / distance2);
-    case EBPO_PRIORITY_FRONT_TO_BACK: return observer_enumerate(s, box, octcode);
+        return ~double_bits(s->diagonal2[ebpo_octcode_level(octcode)] / distance2);
+    case EBPO_PRIORITY_FRONT_TO_BACK: return octants_key(s, box, octcode);
     case EBPO_PRIORITY_LEVEL:
     default: return octcode;
     }
 }
+
+/* --- the partial tree --- */
 
 void ebpo_partial_free(ebpo_partial *partial)
 {
@@ -274,7 +281,9 @@ const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *g, ebpo_partial_n
     return envelope;
 }
 
-static bool frontier_before(const ebpo_waiting *a, const ebpo_waiting *b)
+/* --- the frontier --- */
+
+static bool waits_before(const ebpo_waiting *a, const ebpo_waiting *b)
 {
     if (a->turn != b->turn)
         return a->turn < b->turn;
@@ -294,13 +303,13 @@ ebpo_status ebpo_frontier_reserve(ebpo_frontier *f, uint64_t more, ebpo_error *e
                : ebpo_fail_memory(error, (f->count + more) * sizeof *f->at);
 }
 
-static void frontier_sink(ebpo_frontier *f, uint64_t i)
+static void sink_down(ebpo_frontier *f, uint64_t i)
 {
     ebpo_waiting node = f->at[i];
     for (uint64_t below = 2 * i + 1; below < f->count; below = 2 * i + 1) {
-        if (below + 1 < f->count && frontier_before(&f->at[below + 1], &f->at[below]))
+        if (below + 1 < f->count && waits_before(&f->at[below + 1], &f->at[below]))
             below++;
-        if (!frontier_before(&f->at[below], &node))
+        if (!waits_before(&f->at[below], &node))
             break;
         f->at[i] = f->at[below];
         i = below;
@@ -311,7 +320,7 @@ static void frontier_sink(ebpo_frontier *f, uint64_t i)
 void ebpo_frontier_push(ebpo_frontier *f, ebpo_waiting node)
 {
     uint64_t i = f->count++;
-    for (; i > 0 && frontier_before(&node, &f->at[(i - 1) / 2]); i = (i - 1) / 2)
+    for (; i > 0 && waits_before(&node, &f->at[(i - 1) / 2]); i = (i - 1) / 2)
         f->at[i] = f->at[(i - 1) / 2];
     f->at[i] = node;
 }
@@ -321,14 +330,14 @@ ebpo_waiting ebpo_frontier_pop(ebpo_frontier *f)
     ebpo_waiting top = f->at[0];
     f->at[0] = f->at[--f->count];
     if (f->count)
-        frontier_sink(f, 0);
+        sink_down(f, 0);
     return top;
 }
 
 void ebpo_frontier_sort(ebpo_frontier *f)
 {
     for (uint64_t i = f->count / 2; i-- > 0;)
-        frontier_sink(f, i);
+        sink_down(f, i);
 }
 
 /* A table of blocks by hash; those for which there is no room are left out. */
@@ -353,7 +362,7 @@ unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
         if (!slot[at].block && count == EBPO_FRONTIER_BLOCKS)
             continue;
         count += !slot[at].block;
-        if (!slot[at].block || frontier_before(w, &f->at[slot[at].place]))
+        if (!slot[at].block || waits_before(w, &f->at[slot[at].place]))
             slot[at].place = i;
         slot[at].block = block;
     }
@@ -361,7 +370,7 @@ unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
     for (unsigned at = 0; at < SLOTS; at++)
         if (slot[at].block) {
             unsigned i = count++;
-            for (; i > 0 && frontier_before(&f->at[slot[at].place], &f->at[places[i - 1]]); i--)
+            for (; i > 0 && waits_before(&f->at[slot[at].place], &f->at[places[i - 1]]); i--)
                 places[i] = places[i - 1];
             places[i] = slot[at].place;
         }

@@ -1,0 +1,275 @@
+/* Computes a small convex hull, of which only the directions of the facets are used: what rounding
+ * gets wrong costs volume of an envelope, never containment.
+ *
+ * The hull grows point by point: each point beyond the hull replaces the facets that it sees (a
+ * beneath-beyond algorithm in doubles). Points that are extreme along the axes and diagonals come
+ * first, so that most others are never outside. Facets are kept as planes by coordinate, for the
+ * kernel that tests a point against all of them (sweep.h). Limits: EBPO_HULL_POINTS points,
+ * EBPO_HULL_FACETS facets; what does not fit is left out. Ties are ordered by numbers of points, so
+ * that all machines return the same facets in the same order. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "construct/planes.h"
+#include "construct/sweep.h"
+#include "geometry/vec3.h"
+
+static const double flat = 1e-9; /* what is nearer to a plane lies in it */
+
+_Static_assert((int)EBPO_HULL_FACETS <= (int)EBPO_SWEEP_PLANES, "sweeps have room for the facets");
+
+enum { ROOM = EBPO_HULL_FACETS, WAYS = 14, VISIBLE = 192 };
+
+/* Planes by coordinate: each point is tested against all of them. */
+typedef struct hull {
+    const ebpo_sweep *sweep;
+    const double (*p)[3];
+    /* behind the last one, up to a full four: planes that nothing sees */
+    double nx[ROOM + 4], ny[ROOM + 4], nz[ROOM + 4], d[ROOM + 4];
+    double length[ROOM], beyond;
+    uint16_t corner[ROOM][3];
+    int count, capacity;
+} hull;
+
+static void cross_of(const double (*p)[3], int a, int b, int c, double n[3])
+{
+    double u[3], v[3];
+    ebpo_vec3_subtract(p[b], p[a], u);
+    ebpo_vec3_subtract(p[c], p[a], v);
+    ebpo_vec3_cross(u, v, n);
+}
+
+static void set_plane(hull *h, int i, const double n[3], double d)
+{
+    h->nx[i] = n[0];
+    h->ny[i] = n[1];
+    h->nz[i] = n[2];
+    h->d[i] = d;
+}
+
+/* The facet at place i; false when it has no area. */
+static bool make_facet(hull *h, int i, int a, int b, int c)
+{
+    double n[3];
+    cross_of(h->p, a, b, c, n);
+    double length = ebpo_vec3_length(n);
+    if (!(length > 1e-18))
+        return false;
+    const double *p = h->p[a];
+    for (int k = 0; k < 3; k++)
+        n[k] /= length;
+    set_plane(h, i, n, ebpo_vec3_dot(n, p));
+    h->length[i] = length;
+    h->corner[i][0] = (uint16_t)a;
+    h->corner[i][1] = (uint16_t)b;
+    h->corner[i][2] = (uint16_t)c;
+    return true;
+}
+
+static void move_facet(hull *h, int to, int from)
+{
+    set_plane(h, to, (const double[3]){ h->nx[from], h->ny[from], h->nz[from] }, h->d[from]);
+    h->length[to] = h->length[from];
+    memcpy(h->corner[to], h->corner[from], sizeof h->corner[to]);
+}
+
+static void set_count(hull *h, int count)
+{
+    static const double none[3];
+    h->count = count;
+    for (int i = count; i % 4; i++)
+        set_plane(h, i, none, 1e300);
+}
+
+/* --- the first four facets --- */
+
+/* The most extreme points along the axes and the diagonals, both ways. */
+static void find_extremes(const double (*p)[3], int count, int at[WAYS])
+{
+    double best[WAYS];
+    for (int w = 0; w < WAYS; w++)
+        best[w] = -INFINITY, at[w] = 0;
+    for (int i = 0; i < count; i++) {
+        double x = p[i][0], y = p[i][1], z = p[i][2],
+               v[WAYS / 2] = { x, y, z, x + y + z, x + y - z, x - y + z, x - y - z };
+        for (int w = 0; w < WAYS / 2; w++) {
+            if (v[w] > best[2 * w])
+                best[2 * w] = v[w], at[2 * w] = i;
+            if (-v[w] > best[2 * w + 1])
+                best[2 * w + 1] = -v[w], at[2 * w + 1] = i;
+        }
+    }
+}
+
+static double distance_squared(const double a[3], const double b[3])
+{
+    double d[3];
+    ebpo_vec3_subtract(a, b, d);
+    return ebpo_vec3_dot(d, d);
+}
+
+static double height_above(const double n[3], const double from[3], const double p[3])
+{
+    double way[3];
+    ebpo_vec3_subtract(p, from, way);
+    return ebpo_vec3_dot(n, way);
+}
+
+/* Four points far from each other; false when there are none that span a volume. */
+static bool first_four(const double (*p)[3], int count, const int ways[WAYS], int corner[4])
+{
+    double best = -1, n[3];
+    for (int w = 0; w < 6; w += 2)
+        if (distance_squared(p[ways[w]], p[ways[w + 1]]) > best)
+            best = distance_squared(p[ways[w]], p[ways[w + 1]]), corner[0] = ways[w + 1],
+            corner[1] = ways[w];
+    best = 0;
+    corner[2] = corner[3] = 0;
+    for (int i = 0; i < count; i++) {
+        cross_of(p, corner[0], corner[1], i, n);
+        if (ebpo_vec3_dot(n, n) > best)
+            best = ebpo_vec3_dot(n, n), corner[2] = i;
+    }
+    if (!(best > flat * flat))
+        return false;
+    cross_of(p, corner[0], corner[1], corner[2], n);
+    double length = ebpo_vec3_length(n), side = 0;
+    for (int i = 0; i < count; i++) {
+        double h = height_above(n, p[corner[0]], p[i]);
+        if (fabs(h) > fabs(side))
+            side = h, corner[3] = i;
+    }
+    if (side > 0) { /* the fourth lies behind the first three */
+        int swap = corner[1];
+        corner[1] = corner[2];
+        corner[2] = swap;
+    }
+    return fabs(side) > flat * length;
+}
+
+static bool first_facets(hull *h, const int c[4])
+{
+    static const int sides[4][3] = { { 0, 1, 2 }, { 0, 3, 1 }, { 1, 3, 2 }, { 2, 3, 0 } };
+    for (int i = 0; i < 4; i++)
+        if (!make_facet(h, i, c[sides[i][0]], c[sides[i][1]], c[sides[i][2]]))
+            return false;
+    set_count(h, 4);
+    return true;
+}
+
+/* --- adding a point --- */
+
+/* Edges as from << 16 | to, and turned around; to a multiple of four, with what is none. */
+static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *edges,
+                    uint32_t *twins)
+{
+    int listed = 0;
+    for (int i = 0; i < seen; i++) {
+        const uint16_t *corner = h->corner[visible[i]];
+        for (int e = 0; e < 3; e++) {
+            uint32_t from = corner[e], to = corner[e == 2 ? 0 : e + 1];
+            edges[listed] = from << 16 | to;
+            twins[listed++] = to << 16 | from;
+        }
+    }
+    for (int i = listed; i % 4; i++)
+        edges[i] = 0;
+    return listed;
+}
+
+/* No early exit from the loop, so that compilers vectorise it. */
+static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
+{
+    uint32_t found = 0;
+    for (int i = 0; i < 4 * fours; i++)
+        found |= edges[i] == edge;
+    return found;
+}
+
+/* Slots that got no new facet are filled from the end. */
+static void close_gaps(hull *h, const uint16_t *place, int from, int to, int count)
+{
+    for (int i = to - 1; i >= from; i--) /* places ascend */
+        if (place[i] != --count)
+            move_facet(h, place[i], count);
+    set_count(h, count);
+}
+
+/* False when no more points are to be added: too much in one step. (Then facets may overlap; they
+ * still give directions.) */
+static bool add_point(hull *h, int point)
+{
+    uint16_t visible[VISIBLE];
+    uint32_t edges[3 * VISIBLE], twins[3 * VISIBLE];
+    const ebpo_sweep_planes planes = { h->nx, h->ny, h->nz, h->d, (h->count + 3) / 4 };
+    int seen = h->sweep->seen(&planes, h->p[point], h->beyond, flat, visible, VISIBLE), made = 0,
+        count = h->count;
+    if (seen == 0)
+        return true;
+    if (seen > VISIBLE)
+        return false;
+    int listed = edges_of(h, visible, seen, edges, twins);
+    for (int i = 0; i < listed; i++) {
+        if (has_edge(edges, (listed + 3) / 4, twins[i]))
+            continue;
+        if (made >= seen && count == h->capacity)
+            return false;
+        int place = made < seen ? visible[made] : count;
+        if (!make_facet(h, place, (int)(edges[i] >> 16), (int)(edges[i] & 0xffff), point))
+            continue;
+        count += made++ >= seen;
+    }
+    if (made < seen)
+        close_gaps(h, visible, made, seen, count);
+    else
+        set_count(h, count);
+    return true;
+}
+
+static void grow_hull(hull *h, int count, const int ways[WAYS])
+{
+    for (int w = 0; w < WAYS; w++)
+        if (!add_point(h, ways[w]))
+            return;
+    for (int i = 0; i < count; i++)
+        if (!add_point(h, i))
+            return;
+}
+
+int ebpo_hull_facets(const double (*points)[3], int count, double tolerance,
+                     ebpo_hull_facet *facets, int capacity)
+{
+    hull h;
+    int corner[4] = { 0 }, ways[WAYS];
+    h.sweep = ebpo_sweep_best();
+    h.p = points;
+    h.count = 0;
+    h.capacity = capacity < ROOM ? capacity : ROOM;
+    h.beyond = tolerance;
+    if (count < 4 || capacity < 4 || count > EBPO_HULL_POINTS)
+        return 0;
+    find_extremes(points, count, ways);
+    if (!first_four(points, count, ways, corner) || !first_facets(&h, corner))
+        return 0;
+    grow_hull(&h, count, ways);
+    for (int i = 0; i < h.count; i++)
+        facets[i] = (ebpo_hull_facet){ .corner = { h.corner[i][0], h.corner[i][1], h.corner[i][2] },
+                                       .n = { h.nx[i], h.ny[i], h.nz[i] },
+                                       .d = h.d[i],
+                                       .area = h.length[i] / 2 };
+    return h.count;
+}
+
+int ebpo_hull_by_area(const void *a, const void *b)
+{
+    const ebpo_hull_facet *f = a, *g = b;
+    if (f->area != g->area)
+        return f->area < g->area ? 1 : -1;
+    for (int i = 0; i < 3; i++)
+        if (f->corner[i] != g->corner[i])
+            return f->corner[i] < g->corner[i] ? -1 : 1;
+    return 0;
+}

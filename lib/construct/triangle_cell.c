@@ -1,0 +1,185 @@
+/* Tests a face against a cell: which octants of the cell it may touch, whether it misses the cell,
+ * and its part within the cell as a polygon.
+ *
+ * Everything errs on the safe side by a bound on the rounding, so no exact arithmetic is needed:
+ * including a neighbour costs little, missing one is an error of the file. The tests use the face's
+ * bounding box, its plane and the cross products of its edges with the axes (separating axes).
+ * Clipping widens the cell by the bound, so that a face that touches the closed cell always leaves
+ * points. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+
+#include "construct/construct_stages.h"
+#include "construct/planes.h"
+#include "geometry/polytope.h"
+#include "geometry/vec3.h"
+
+/* Cell coordinates: one rounding in the subtraction, one in the division; corners and sizes of
+ * cells are exact. */
+static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
+                      double x[3][3])
+{
+    double most = 1;
+    for (int k = 0; k < 3; k++) {
+        double corner = ebpo_wall(box, k, cell.level, cell.at[k]);
+        double size = box->size[k] / (double)(1u << cell.level);
+        for (int i = 0; i < 3; i++) {
+            x[i][k] = (face->corner[i][k] - corner) / size;
+            double a = fabs(x[i][k]);
+            most = a > most ? a : most;
+        }
+    }
+    return most;
+}
+
+/* With coordinates up to M: 2.01 u M from to_cell, and at most 8 u M for each of six clips; 128 u M
+ * covers their sum. One value for all faces that do not reach far: then the points that two faces
+ * share come out the same from both. */
+static double slack_for(double most) { return most <= 2 ? 0x1p-45 : most * 0x1p-46; }
+
+static int clip_wall(double in[9][3], int count, int axis, double sign, double limit,
+                     double out[9][3])
+{
+    int kept = 0;
+    for (int i = 0; i < count; i++) {
+        const double *a = in[i], *b = in[i + 1 < count ? i + 1 : 0];
+        double da = sign * a[axis] - limit, db = sign * b[axis] - limit;
+        if (da <= 0) {
+            for (int k = 0; k < 3; k++)
+                out[kept][k] = a[k];
+            kept++;
+        }
+        if ((da < 0 && db > 0) || (da > 0 && db < 0)) {
+            bool back = da > 0; /* from the inner end, whichever way the face runs along its edge */
+            const double *from = back ? b : a, *to = back ? a : b;
+            double t = back ? db / (db - da) : da / (da - db);
+            for (int k = 0; k < 3; k++)
+                out[kept][k] = from[k] + t * (to[k] - from[k]);
+            out[kept][axis] = sign * limit;
+            kept++;
+        }
+    }
+    return kept;
+}
+
+int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
+                       double points[9][3], double *slack)
+{
+    double x[3][3], other[9][3], e = slack_for(to_cell(box, cell, face, x));
+    *slack = e;
+    int count = 3;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            points[i][k] = x[i][k];
+    for (int k = 0; k < 3; k++) {
+        double low = fmin(x[0][k], fmin(x[1][k], x[2][k])),
+               high = fmax(x[0][k], fmax(x[1][k], x[2][k]));
+        if (low > 1 + e || high < -e)
+            return 0;
+        if (high <= 1 + e && low >= -e)
+            continue;
+        int n = clip_wall(points, count, k, 1, 1 + e, other);
+        count = clip_wall(other, n, k, -1, e, points);
+    }
+    return count;
+}
+
+typedef struct separation {
+    double x[3][3], edge[3][3], normal[3];
+    double most;
+} separation;
+
+static void separation_prepare(separation *s)
+{
+    for (int i = 0; i < 3; i++)
+        ebpo_vec3_subtract(s->x[(i + 1) % 3], s->x[i], s->edge[i]);
+    ebpo_vec3_cross(s->edge[0], s->edge[1], s->normal);
+}
+
+/* True when the plane of the face or a cross product of one of its edges with an axis separates it
+ * from the cube around `centre`. Errors: edges 4 u M; cross terms below 64 u M^2; the plane's below
+ * 512 u M^3 (u = 2^-53). */
+static bool is_separated(const separation *s, const double centre[3], double half)
+{
+    double m = s->most, tolerance = 0x1p-44 * m * m * m;
+    double distance = 0, radius = 0;
+    for (int k = 0; k < 3; k++) {
+        distance += s->normal[k] * (s->x[0][k] - centre[k]);
+        radius += fabs(s->normal[k]);
+    }
+    if (fabs(distance) > half * radius + tolerance)
+        return true;
+    tolerance = 0x1p-46 * m * m;
+    for (int i = 0; i < 3; i++) {
+        const double *p = s->x[i], *q = s->x[(i + 2) % 3], *e = s->edge[i];
+        for (int k = 0; k < 3; k++) {
+            int a = (k + 1) % 3, b = (k + 2) % 3;
+            double dp = e[a] * (p[b] - centre[b]) - e[b] * (p[a] - centre[a]);
+            double dq = e[a] * (q[b] - centre[b]) - e[b] * (q[a] - centre[a]);
+            double r = half * (fabs(e[a]) + fabs(e[b])) + tolerance;
+            if ((dp > r && dq > r) || (dp < -r && dq < -r))
+                return true;
+        }
+    }
+    return false;
+}
+
+/* By the walls between the octants, which are exact. */
+static unsigned octants_of_bounds(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
+{
+    static const unsigned low_side[3] = { 0x55, 0x33, 0x0f };
+    unsigned mask = 255;
+    for (int k = 0; k < 3; k++) {
+        double wall = ebpo_wall(box, k, cell.level + 1, 2 * cell.at[k] + 1), a = face->corner[0][k],
+               b = face->corner[1][k], c = face->corner[2][k];
+        if (a > wall && b > wall && c > wall)
+            mask &= ~low_side[k];
+        if (a < wall && b < wall && c < wall)
+            mask &= low_side[k];
+    }
+    return mask;
+}
+
+unsigned ebpo_octants_touched(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
+{
+    unsigned mask = octants_of_bounds(box, cell, face);
+    if ((mask & (mask - 1)) == 0)
+        return mask;
+    separation s;
+    s.most = to_cell(box, cell, face, s.x);
+    separation_prepare(&s);
+    for (unsigned octant = 0; octant < 8; octant++) {
+        if (!(mask >> octant & 1))
+            continue;
+        double centre[3];
+        for (int k = 0; k < 3; k++)
+            centre[k] = octant >> k & 1 ? 0.75 : 0.25;
+        if (is_separated(&s, centre, 0.25))
+            mask &= ~(1u << octant);
+    }
+    return mask;
+}
+
+bool ebpo_triangle_misses_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
+{
+    separation s;
+    s.most = to_cell(box, cell, face, s.x);
+    double e = slack_for(s.most);
+    for (int k = 0; k < 3; k++)
+        if (fmin(s.x[0][k], fmin(s.x[1][k], s.x[2][k])) > 1 + e ||
+            fmax(s.x[0][k], fmax(s.x[1][k], s.x[2][k])) < -e)
+            return true;
+    separation_prepare(&s);
+    return is_separated(&s, (const double[3]){ 0.5, 0.5, 0.5 }, 0.5);
+}
+
+bool ebpo_face_normal_code(const ebpo_box *box, const ebpo_triangle *face, uint32_t *normal)
+{
+    /* In coordinates scaled by the root box, which has the same shape as every cell, the normal
+     * needs no further scaling. */
+    separation s;
+    s.most = to_cell(box, (ebpo_cell){ 0, { 0, 0, 0 } }, face, s.x);
+    separation_prepare(&s);
+    return ebpo_plane_code_normal(s.normal, normal);
+}

@@ -1,0 +1,228 @@
+/* Verifies the face lists of leaves against the faces that touch them.
+ *
+ * A leaf must list every face that touches its closed cell; a white or black cell has none. A
+ * listed face that does not touch the leaf must touch the cell widened by 1/256, because the
+ * builder's test errs on the safe side; such entries are counted, not reported. For gray nodes that
+ * ought to be leaves, the different faces below are counted up to the limit. When memory is short
+ * the count proves nothing, and the node passes. */
+#include "core/strict_fp.h"
+
+#include <stdlib.h>
+
+#include "core/alloc.h"
+#include "core/workspace.h"
+#include "verify/verify_geometry.h"
+#include "verify/verify_parts.h"
+
+static void report_unlisted(ebpo_tally *tally, const ebpo_twin_node *node, uint32_t face,
+                            const char *text)
+{
+    ebpo_tally_violation(tally, EBPO_VERIFY_LISTS,
+                         &(ebpo_verify_place){ node->code, face, EBPO_NO_PLANE }, "%s", text);
+}
+
+/* The list in ascending order: references, then the new range (the file's shape was checked). */
+typedef struct face_list {
+    const uint32_t *refs;
+    uint32_t ref_count, new_count;
+    uint64_t first;
+} face_list;
+
+static face_list list_of(const ebpo_twin_tree *view, const ebpo_twin_node *leaf)
+{
+    const ebpo_level *level = &view->tree->level[leaf->cell.level];
+    face_list list = { .first = level->leaf_first[leaf->rank],
+                       .new_count = level->leaf_new[leaf->rank] };
+    list.refs = ebpo_twin_refs(view, leaf, &list.ref_count);
+    return list;
+}
+
+/* Faces that touch a node ascend, as those of its parent do. */
+static bool is_among(const uint32_t *faces, uint64_t count, uint32_t face)
+{
+    uint64_t low = 0, high = count;
+    while (low < high) {
+        uint64_t middle = low + (high - low) / 2;
+        if (faces[middle] < face)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < count && faces[low] == face;
+}
+
+/* A listed face that does not touch the leaf must touch it widened by 1/256: level-limited
+ * distances rest on that. */
+static void check_near(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
+                       uint32_t face)
+{
+    ebpo_frame frame = ebpo_frame_make(&view->box, leaf->cell);
+    ebpo_corners corners;
+    for (int k = 0; k < 3; k++) {
+        double more = (frame.high[k] - frame.low[k]) * 0x1p-8;
+        frame.low[k] -= more;
+        frame.high[k] += more;
+        frame.inverse[k] = 1 / (frame.high[k] - frame.low[k]);
+    }
+    ebpo_face_corners(&view->tree->mesh, face, &corners);
+    if (!ebpo_face_touches(&frame, &corners, tally))
+        report_unlisted(tally, leaf, face, "the leaf lists a face that does not come near it");
+}
+
+static void check_spare(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
+                        const face_list *list, const uint32_t *faces, uint64_t count)
+{
+    EBPO_FOR_ITEMS_SCATTERED(view->workspace, i, 0, list->ref_count)
+        if (!is_among(faces, count, list->refs[i]))
+            check_near(tally, view, leaf, list->refs[i]);
+    EBPO_FOR_ITEMS_SCATTERED(view->workspace, i, 0, list->new_count)
+        if (!is_among(faces, count, (uint32_t)(list->first + i)))
+            check_near(tally, view, leaf, (uint32_t)(list->first + i));
+}
+
+static void check_leaf(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
+                       const uint32_t *faces, uint64_t count)
+{
+    face_list list = list_of(view, leaf);
+    uint64_t found = 0;
+    uint32_t at = 0;
+    EBPO_FOR_ITEMS(view->workspace, i, 0, count) {
+        uint32_t face = faces[i];
+        while (at < list.ref_count && list.refs[at] < face)
+            at++;
+        bool listed = (at < list.ref_count && list.refs[at] == face) ||
+                      (face >= list.first && face - list.first < list.new_count);
+        found += listed;
+        if (!listed)
+            report_unlisted(tally, leaf, face, "the face touches the leaf, which does not list it");
+    }
+    EBPO_FOR_ITEMS(view->workspace, i, 1, list.ref_count)
+        if (list.refs[i] <= list.refs[i - 1])
+            report_unlisted(tally, leaf, list.refs[i],
+                            "the list names the face twice or not in order");
+    if (list.ref_count && list.refs[list.ref_count - 1] >= list.first)
+        report_unlisted(tally, leaf, list.refs[list.ref_count - 1],
+                        "the list refers to a face that is not below its first new face");
+    tally->checks[EBPO_VERIFY_LISTS] += count + list.ref_count + list.new_count;
+    uint64_t spare = (uint64_t)list.ref_count + list.new_count - found;
+    tally->spare_entries += spare;
+    if (spare)
+        check_spare(tally, view, leaf, &list, faces, count);
+}
+
+void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_twin_tree *view,
+                               const ebpo_twin_node *node, const uint32_t *faces, uint64_t count)
+{
+    if (node->type == EBPO_LEAF) {
+        check_leaf(tally, view, node, faces, count);
+        return;
+    }
+    tally->checks[EBPO_VERIFY_LISTS] += count ? count : 1;
+    EBPO_FOR_ITEMS(view->workspace, i, 0, count)
+        report_unlisted(tally, node, faces[i],
+                        node->type == EBPO_WHITE ? "the face touches a white cell"
+                                                 : "the face touches a black cell");
+}
+
+enum { LIMIT_OF_LISTS = 1 << 16 };
+
+/* Different faces listed below a node, as long as they are no more than `limit`: twice as many are
+ * held, however many there are, or where that were many a bit for each of the mesh. */
+typedef struct gathering {
+    uint32_t *faces;
+    uint8_t *seen; /* NULL where `faces` are held */
+    uint64_t count, capacity, limit;
+    bool more; /* than the limit */
+    bool short_of_memory;
+} gathering;
+
+static int compare_numbers(const void *a, const void *b)
+{
+    uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void keep_different(gathering *g)
+{
+    uint64_t kept = g->count > 0;
+    if (g->count)
+        qsort(g->faces, g->count, sizeof *g->faces, compare_numbers);
+    for (uint64_t i = 1; i < g->count; i++)
+        if (g->faces[i] != g->faces[kept - 1])
+            g->faces[kept++] = g->faces[i];
+    g->count = kept;
+    g->more |= kept > g->limit;
+}
+
+static void see_face(gathering *g, uint64_t face)
+{
+    uint8_t bit = (uint8_t)(1u << (face & 7));
+    g->count += !(g->seen[face >> 3] & bit);
+    g->seen[face >> 3] |= bit;
+    g->more |= g->count > g->limit;
+}
+
+static void see_list(gathering *g, const face_list *list)
+{
+    for (uint32_t i = 0; i < list->ref_count; i++)
+        see_face(g, list->refs[i]);
+    for (uint32_t i = 0; i < list->new_count; i++)
+        see_face(g, list->first + i);
+}
+
+/* A list names no face twice, so that one longer than the limit decides. */
+static void gather_list(gathering *g, const face_list *list)
+{
+    uint64_t more = (uint64_t)list->ref_count + list->new_count;
+    if (more > g->limit) {
+        g->more = true;
+        return;
+    }
+    if (g->seen) {
+        see_list(g, list);
+        return;
+    }
+    if (g->count + more > 2 * g->limit + 64)
+        keep_different(g);
+    if (!ebpo_grow(&g->faces, &g->capacity, g->count + more, sizeof *g->faces)) {
+        g->short_of_memory = true;
+        return;
+    }
+    for (uint32_t i = 0; i < list->ref_count; i++)
+        g->faces[g->count++] = list->refs[i];
+    for (uint32_t i = 0; i < list->new_count; i++)
+        g->faces[g->count++] = (uint32_t)(list->first + i);
+}
+
+static void gather_below(gathering *g, const ebpo_twin_tree *view, const ebpo_twin_node *node)
+{
+    if (g->more || g->short_of_memory)
+        return;
+    if (node->type == EBPO_LEAF) {
+        face_list list = list_of(view, node);
+        gather_list(g, &list);
+    }
+    for (unsigned octant = 0; node->type == EBPO_GRAY && octant < 8; octant++) {
+        ebpo_twin_node child = ebpo_twin_child(view, node, octant);
+        gather_below(g, view, &child);
+    }
+}
+
+bool ebpo_lists_more_faces(const ebpo_twin_tree *view, const ebpo_twin_node *node, uint64_t limit)
+{
+    gathering g = { .limit = limit };
+    uint64_t faces = view->tree->mesh.face_count;
+    if (limit >= faces)
+        return false;
+    if (limit > LIMIT_OF_LISTS) {
+        g.seen = ebpo_array_zero(view->workspace, faces / 8 + 1, 1);
+        g.short_of_memory = !g.seen;
+    }
+    gather_below(&g, view, node);
+    if (!g.seen)
+        keep_different(&g);
+    free(g.faces);
+    ebpo_array_free(view->workspace, g.seen);
+    /* memory that is short proves nothing against the file */
+    return g.more || g.short_of_memory;
+}
