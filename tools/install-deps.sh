@@ -45,7 +45,7 @@ fi
 limit=${EBPO_NPM_SECONDS:-600}
 # npm alone waits for a silent server for many minutes, and says nothing.
 npm_ci() { # options...
-    (cd "$here/viewer" && timeout --foreground "$limit" npm ci --silent --no-audit --no-fund \
+    (cd "$here/web" && timeout --foreground "$limit" npm ci --silent --no-audit --no-fund \
         --fetch-timeout=60000 --fetch-retries=1 "$@" && cp package-lock.json node_modules/.installed)
 }
 # Whether the registry says anything at all, be it "no such page"; asking takes no longer than a minute.
@@ -66,7 +66,7 @@ fetched() {
     }
 }
 # Without network they come of npm's cache, if it has them all.
-if [ $modules != no ] && ! cmp -s "$here/viewer/package-lock.json" "$here/viewer/node_modules/.installed" &&
+if [ $modules != no ] && ! cmp -s "$here/web/package-lock.json" "$here/web/node_modules/.installed" &&
     ! npm_ci --offline && { ! registry_answers || ! fetched; }; then
     [ $modules = tests ] || exit 1
     echo "install-deps.sh: the viewer's tests will be skipped" >&2
