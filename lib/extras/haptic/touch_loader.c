@@ -35,7 +35,7 @@ static ebpo_status known_ask(ebpo_touch *t, ebpo_known_place *out, ebpo_error *e
     return EBPO_OK;
 }
 
-/* touch_known.c: the loading thread asks about the place where a probe is. True: it has moved. */
+/* The loading thread asks about the place where a probe is. True: it has moved. */
 static ebpo_status learn_place(ebpo_touch *t, bool *moved, ebpo_error *error)
 {
     ebpo_known_place *known = &t->known[t->own_known];

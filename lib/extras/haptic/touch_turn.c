@@ -254,7 +254,7 @@ static void tool_step_limit(ebpo_touch *t, double way[EBPO_SCREW], uint32_t *fla
         way[k] *= part;
 }
 
-/* tool_step.c: a tool's next piece of way; flags are given when it is there. False: it cannot
+/* A tool's next piece of way; flags are given when it is there. False: it cannot
  * begin. */
 static bool begin_tool_way(ebpo_touch *t, const double wanted[EBPO_SCREW], uint32_t *flags)
 {
