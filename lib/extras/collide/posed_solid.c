@@ -377,7 +377,8 @@ static int turn_of(path *p, int axis, const ebpo_vectorz *a, const ebpo_vectorz 
     return mpz_sgn(p->number[0]);
 }
 
-/* As in geometry/triangle_predicates.c: the side of the shifted point of a line and of the plane. */
+/* As in geometry/triangle_predicates.c: the side of the shifted point of a line and of the plane.
+ */
 static int side_of_line(path *p, int axis, int i, const ebpo_vectorz *at)
 {
     const ebpo_vectorz *a = &p->corner[i], *b = &p->corner[i == 2 ? 0 : i + 1];

@@ -317,7 +317,7 @@ static ebpo_status without(ebpo_error *error)
 }
 
 static ebpo_status map_draw_plane(const map_job *j, const double *values, const char *path,
-                           ebpo_error *error)
+                                  ebpo_error *error)
 {
     (void)j;
     (void)values;
@@ -326,7 +326,7 @@ static ebpo_status map_draw_plane(const map_job *j, const double *values, const 
 }
 
 static ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const char *path,
-                          ebpo_error *error)
+                                 ebpo_error *error)
 {
     (void)j;
     (void)mesh;
