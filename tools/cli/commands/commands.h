@@ -1,8 +1,9 @@
-/* The commands: one cmd_*.c for each, main.c has their table. */
+/* The commands: one cmd_NAME.c for each. Their table is in options/meson.build. */
 #ifndef EBPO_TOOLS_COMMANDS_H
 #define EBPO_TOOLS_COMMANDS_H
 
 #include "cli/args.h"
+#include "cli/options/command_table.h"
 
 typedef struct command {
     const arg_spec *spec;
@@ -12,11 +13,12 @@ typedef struct command {
     int (*run)(void *values, const char **operand);
 } command;
 
-extern const command command_convert, command_check, command_info, command_levels, command_extract,
-    command_export, command_measure, command_render, command_verify;
-extern const command command_inside, command_distance, command_ray, command_box, command_bench,
-    command_subset, command_fetch, command_view, command_report, command_repack, command_repair,
-    command_scene, command_boolean, command_collide, command_map, command_touch, command_paint,
-    command_catalogue;
+#define COMMAND_GROUP(title, list) list
+#define ABSENT_GROUP(title, names)
+#define COMMAND(name) extern const command command_##name;
+COMMAND_TABLE
+#undef COMMAND_GROUP
+#undef ABSENT_GROUP
+#undef COMMAND
 
 #endif

@@ -15,39 +15,17 @@
 #include "cli/commands/version_facts.h"
 #include "ebpo_config.h"
 
-/* The commands of one part of `ebpo help`; `extras`: where the build has them. */
+/* The commands of one part of `ebpo help`; without extras some are absent. */
 typedef struct command_group {
     const char *title;
     const command *const *commands; /* NULL ends it */
-    const char *extras;             /* their names, for a build that lacks them; NULL: none */
+    const char *extras;             /* names of commands that this build lacks; NULL: none */
 } command_group;
 
-#define COMMANDS(...) \
-    (const command *const[]) { __VA_ARGS__, NULL }
-#if EBPO_HAVE_EXTRAS
-#define EXTRAS(names, ...) COMMANDS(__VA_ARGS__), NULL
-#else
-#define EXTRAS(names, ...) NULL, names
-#endif
-
-static const command_group groups[] = {
-    { "create and inspect",
-      COMMANDS(&command_convert, &command_check, &command_repair, &command_info, &command_verify,
-               &command_render, &command_export),
-      NULL },
-    { "query",
-      COMMANDS(&command_inside, &command_distance, &command_ray, &command_box, &command_measure),
-      NULL },
-    { "remote files and subsets",
-      COMMANDS(&command_fetch, &command_view, &command_extract, &command_subset, &command_repack,
-               &command_catalogue),
-      NULL },
-    { "several models",
-      EXTRAS("collide boolean scene", &command_collide, &command_boolean, &command_scene) },
-    { "maps, haptics, paint",
-      EXTRAS("map touch paint", &command_map, &command_touch, &command_paint) },
-    { "study and measure", COMMANDS(&command_levels, &command_bench, &command_report), NULL },
-};
+#define COMMAND_GROUP(title, list) { title, (const command *const[]){ list NULL }, NULL },
+#define ABSENT_GROUP(title, names) { title, NULL, names },
+#define COMMAND(name) &command_##name,
+static const command_group groups[] = { COMMAND_TABLE };
 enum { GROUPS = sizeof groups / sizeof *groups };
 
 static const command *find_command(const char *name)
