@@ -24,7 +24,7 @@ typedef struct command_group {
 
 #define COMMAND_GROUP(title, list) { title, (const command *const[]){ list NULL }, NULL },
 #define ABSENT_GROUP(title, names) { title, NULL, names },
-#define COMMAND(name) &command_##name,
+#define COMMAND(name)              &command_##name,
 static const command_group groups[] = { COMMAND_TABLE };
 enum { GROUPS = sizeof groups / sizeof *groups };
 
