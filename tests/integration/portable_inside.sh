@@ -66,16 +66,10 @@ fi
 units="dialects ply head container predicates face_gates chunk_sums source import number slice wide
     far_offsets"
 programs="tools/ebpo samples/ebpo-generate tests/vectors/make_vectors tests/vectors/test_vectors \
-    tests/lint/flags/fp_hash_usual tests/lint/flags/predicates_hash_small"
-targets=$(ninja -C /build -t targets all | sed -n 's/: c_LINKER$//p')
-chosen=
-for unit in $units; do
-    echo "$targets" | grep -qx "tests/unit/test_$unit" && chosen="$chosen tests/unit/test_$unit"
-done
-[ "$tests" = chosen ] ||
-    chosen=$(echo "$targets" | grep -E '^tests/(unit|answers)/test_[a-z_]*$' | tr '\n' ' ')
+    tests/lint/flags/fp_hash_usual tests/lint/flags/predicates_hash_small tests/unit/test_unit \
+    tests/query/test_query"
 # shellcheck disable=SC2086
-ninja -C /build -k 0 -j "${EBPO_JOBS:-$(nproc)}" $programs $chosen >/build.log 2>&1 || {
+ninja -C /build -k 0 -j "${EBPO_JOBS:-$(nproc)}" $programs >/build.log 2>&1 || {
     grep -A3 -E ' (fatal )?error: |undefined reference' /build.log | head -60
     exit 1
 }
@@ -84,14 +78,18 @@ rm -rf /made
 mkdir -p /made/bin /made/tmp
 export TMPDIR=/made/tmp
 for program in $programs; do wrap "/build/$program"; done
-for unit in $chosen; do wrap "/build/$unit"; done
 cd /made
 check vectors bin/test_vectors $EBPO_VECTORS /made/bin/make_vectors
 mkdir -p vectors && check vectors-made bin/make_vectors /made/vectors # for same_chunks.py
 check vectors-verified sh /ebpo/tests/vectors/verify_vectors.sh bin/ebpo $EBPO_VECTORS/passed
 check hashes python3 /ebpo/tests/lint/flags/fp_flags.py /ebpo/tests/lint/flags/fp_golden.txt \
     bin/fp_hash_usual
-for unit in $chosen; do check "${unit##*/}" "bin/${unit##*/}"; done
+[ "$tests" = all ] || for unit in $units; do check "$unit" bin/test_unit "$unit"; done
+if [ "$tests" = all ]; then
+    suites() { "$1" 2>&1 | sed -n 's/.*SUITE is one of//p'; } # as its usage lists them
+    for unit in $(suites bin/test_unit); do check "$unit" bin/test_unit "$unit"; done
+    for query in $(suites bin/test_query); do check "$query" bin/test_query "$query"; done
+fi
 check golden python3 /ebpo/tests/integration/golden.py bin/ebpo bin/ebpo-generate \
     /ebpo/tests/integration/golden.json
 

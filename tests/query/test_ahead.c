@@ -121,7 +121,7 @@ START_TEST(the_nearest_come_first_and_a_larger_reach_only_adds)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(ahead)
 {
     Suite *suite = suite_create("ahead");
     TCase *tests = tcase_create("ahead");

@@ -352,7 +352,7 @@ START_TEST(what_is_no_expression_is_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(boolean)
 {
     Suite *s = suite_create("boolean");
     TCase *c = tcase_create("boolean");

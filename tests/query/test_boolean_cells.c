@@ -410,7 +410,7 @@ START_TEST(what_cannot_be_is_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(boolean_cells)
 {
     Suite *s = suite_create("boolean_cells");
     TCase *c = tcase_create("boolean_cells"), *threads = tcase_create("threads");

@@ -738,7 +738,7 @@ START_TEST(it_can_be_cancelled)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(boolean_volume)
 {
     Suite *s = suite_create("boolean_volume");
     TCase *c = tcase_create("boolean_volume");

@@ -289,7 +289,7 @@ START_TEST(kernels_for_any_processor_answer_the_same)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(bounds)
 {
     Suite *suite = suite_create("bounds");
     TCase *bounds = tcase_create("bounds");

@@ -576,7 +576,7 @@ START_TEST(poses_are_refused_and_questions_end_early)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(collide)
 {
     TCase *tests = tcase_create("collide"), *threads = tcase_create("threads"),
           *nested = tcase_create("nested");

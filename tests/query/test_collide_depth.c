@@ -211,7 +211,7 @@ START_TEST(what_has_no_depth_is_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(collide_depth)
 {
     TCase *tests = tcase_create("collide_depth");
     tcase_set_timeout(tests, 900);

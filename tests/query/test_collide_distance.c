@@ -293,7 +293,7 @@ START_TEST(what_is_no_number_is_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(collide_distance)
 {
     TCase *tests = tcase_create("collide_distance");
     tcase_set_timeout(tests, 900);

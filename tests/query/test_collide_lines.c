@@ -283,7 +283,7 @@ START_TEST(lines_need_memory_and_end_early)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(collide_lines)
 {
     TCase *tests = tcase_create("collide_lines");
     tcase_set_timeout(tests, 900);

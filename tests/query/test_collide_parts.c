@@ -537,7 +537,7 @@ START_TEST(small_models_are_whole_and_too_small_budgets_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(collide_parts)
 {
     TCase *tests = tcase_create("collide_parts");
     tcase_set_timeout(tests, 900);

@@ -242,7 +242,7 @@ START_TEST(enough_ends_it)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(crossings)
 {
     Suite *suite = suite_create("crossings");
     TCase *tests = tcase_create("meshes");

@@ -300,7 +300,7 @@ START_TEST(what_cannot_be_measured_is_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(deviation)
 {
     Suite *suite = suite_create("deviation");
     TCase *tests = tcase_create("deviation");

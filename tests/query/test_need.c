@@ -420,7 +420,7 @@ START_TEST(what_cannot_be_kept_to_is_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(need)
 {
     Suite *suite = suite_create("need");
     TCase *tests = tcase_create("need");

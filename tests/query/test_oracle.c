@@ -426,7 +426,7 @@ START_TEST(flat_boxes_and_points_meet_what_they_touch)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(oracle)
 {
     Suite *suite = suite_create("oracle");
     TCase *tests = tcase_create("oracle");

@@ -109,7 +109,7 @@ START_TEST(surfaces_have_distances_but_no_inside)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(query)
 {
     Suite *suite = suite_create("query");
     TCase *points = tcase_create("points"), *refusals = tcase_create("refusals");

@@ -183,7 +183,7 @@ START_TEST(levels_and_deadlines_bound_far_points)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(query_far)
 {
     Suite *suite = suite_create("query_far");
     TCase *tests = tcase_create("far");

@@ -24,7 +24,7 @@ START_TEST(real_models_answer_like_brute_force)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(query_models)
 {
     Suite *suite = suite_create("query_models");
     TCase *tests = tcase_create("models");

@@ -637,7 +637,7 @@ START_TEST(leaves_that_are_found_out_meanwhile_give_the_same_answers)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(query_modes)
 {
     Suite *suite = suite_create("query_modes");
     TCase *tests = tcase_create("modes"), *threads = tcase_create("threads");

@@ -89,7 +89,7 @@ START_TEST(random_solids_answer_like_brute_force)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(query_random)
 {
     Suite *suite = suite_create("query_random");
     TCase *tests = tcase_create("random");

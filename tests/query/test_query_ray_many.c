@@ -230,7 +230,7 @@ START_TEST(solids_are_tight)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(query_ray_many)
 {
     Suite *suite = suite_create("query_ray_many");
     TCase *many = tcase_create("many"), *tight = tcase_create("tight");

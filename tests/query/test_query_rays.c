@@ -399,7 +399,7 @@ START_TEST(triangles_of_all_of_a_model_keep_to_its_budget)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(query_rays)
 {
     Suite *suite = suite_create("query_rays");
     TCase *rays = tcase_create("rays"), *boxes = tcase_create("boxes");

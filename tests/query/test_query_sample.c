@@ -268,7 +268,7 @@ START_TEST(what_is_not_there_is_said)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(query_sample)
 {
     Suite *suite = suite_create("query_sample");
     TCase *tests = tcase_create("sample");

@@ -198,7 +198,7 @@ START_TEST(the_nearest_of_tiny_faces_is_found_where_squares_underflow)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(query_stiff)
 {
     Suite *suite = suite_create("query_stiff");
     TCase *tests = tcase_create("stiff");

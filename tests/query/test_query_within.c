@@ -380,7 +380,7 @@ START_TEST(normals_may_be_left_out)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(query_within)
 {
     Suite *s = suite_create("query_within");
     TCase *t = tcase_create("within");

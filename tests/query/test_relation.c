@@ -579,7 +579,7 @@ START_TEST(a_deadline_leaves_it_open)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(relation)
 {
     TCase *tests = tcase_create("relation");
     tcase_set_timeout(tests, 900);

@@ -329,7 +329,7 @@ START_TEST(two_instances_collide_as_models)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(scene_meetings)
 {
     Suite *suite = suite_create("scene_meetings");
     TCase *tests = tcase_create("scene_meetings");

@@ -350,7 +350,7 @@ START_TEST(threads_change_nothing)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(scene_routes)
 {
     Suite *suite = suite_create("scene_routes");
     TCase *tests = tcase_create("scene_routes"), *threads = tcase_create("threads");

@@ -449,7 +449,7 @@ START_TEST(a_budget_buys_what_was_told)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(skeleton)
 {
     Suite *suite = suite_create("skeleton");
     TCase *tests = tcase_create("skeleton");

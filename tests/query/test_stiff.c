@@ -43,7 +43,7 @@ START_TEST(stiff_cases_convert_verify_and_answer_exactly_or_are_refused_clearly)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(stiff)
 {
     if (test_arguments[0])
         wanted = test_arguments[0];

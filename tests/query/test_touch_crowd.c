@@ -2,6 +2,7 @@
  * size all of them nearly touch it. It must be held when it touches and not before, as a plain twin
  * says that measures the distance from every face; come to rest where no way leads nearer to the
  * hand; and look at no more in a tick than a ball in the open may. */
+#include <stdlib.h>
 #include <ebpo/touch.h>
 #include <math.h>
 #include <stdio.h>
@@ -329,7 +330,7 @@ START_TEST(a_large_ball_touches_a_sphere)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(touch_crowd)
 {
     Suite *suite = suite_create("touch_crowd");
     TCase *crowd = tcase_create("crowd");

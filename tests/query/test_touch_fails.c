@@ -102,7 +102,7 @@ START_TEST(a_source_that_fails_is_told_in_ticks)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(touch_fails)
 {
     Suite *suite = suite_create("touch_fails");
     TCase *tests = tcase_create("all");

@@ -1,6 +1,7 @@
 /* A hand that touches: never through a face and never closer than its radius, judged by arithmetic
  * that does not round, however wildly it is moved; forces on a plane, by formula; friction; energy;
  * and nothing is called in a tick that could make it late. */
+#include <stdlib.h>
 #include <ebpo/touch.h>
 #include <math.h>
 #include <string.h>
@@ -580,7 +581,7 @@ START_TEST(a_ball_goes_away_from_many_faces)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(touch_hand)
 {
     Suite *suite = suite_create("touch_hand");
     TCase *hand = tcase_create("hand");

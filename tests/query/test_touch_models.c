@@ -2,6 +2,7 @@
  * through no face and no closer than they may, with no energy out of the wall. Judged by arithmetic
  * that does not round, on the faces that a grid of this program's own finds around each step. A
  * million ticks each are played with EBPO_TEST_SCALE=500. */
+#include <stdlib.h>
 #include <ebpo/touch.h>
 #include <math.h>
 #include <stdio.h>
@@ -397,7 +398,7 @@ START_TEST(stiff_cases_hold_hands_and_tools)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(touch_models)
 {
     Suite *suite = suite_create("touch_models");
     TCase *models = tcase_create("models");

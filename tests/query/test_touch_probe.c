@@ -1,5 +1,6 @@
 /* A probe that nothing stops: its bounds hold the exact distance, with its sign, wherever it jumps
  * and however little is loaded; and nothing is called in a tick that could make it late. */
+#include <stdlib.h>
 #include <ebpo/touch.h>
 #include <math.h>
 
@@ -220,7 +221,7 @@ START_TEST(a_probe_has_no_other_ticks)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(touch_probe)
 {
     Suite *suite = suite_create("touch_probe");
     TCase *probes = tcase_create("probe");

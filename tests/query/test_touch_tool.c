@@ -1,6 +1,7 @@
 /* A tool of many points: none goes through a face, nor closer than half a skin, however wildly hand
  * and tool are moved and turned, judged by arithmetic that does not round; force and torque on a
  * plane, by formula; energy; and nothing is called in a tick that could make it late. */
+#include <stdlib.h>
 #include <ebpo/touch.h>
 #include <math.h>
 
@@ -471,7 +472,7 @@ START_TEST(many_points_take_no_longer)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(touch_tool)
 {
     Suite *suite = suite_create("touch_tool");
     TCase *tools = tcase_create("tool");

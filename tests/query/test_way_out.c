@@ -364,7 +364,7 @@ START_TEST(what_is_no_direction_is_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(way_out)
 {
     TCase *tests = tcase_create("way out");
     tcase_set_timeout(tests, 900);

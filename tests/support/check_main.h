@@ -7,9 +7,15 @@
 /* What each program defines: its tests. It may end the program with
  * TEST_SKIPPED after saying why. */
 Suite *test_suite(void);
+
+/* Begins the definition of one suite of a program that has many (suites.c.in). */
+#define TEST_SUITE(name)       \
+    Suite *name##_suite(void); \
+    Suite *name##_suite(void)
+
 enum { TEST_SKIPPED = 77 };
 
-/* What the program was called with, without its own name; ends with NULL. */
+/* What the program was called with, without its own name and the suite's; ends with NULL. */
 extern char **test_arguments;
 
 #endif

@@ -233,7 +233,7 @@ START_TEST(what_cannot_be_arranged_is_refused_and_stays)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(arrange)
 {
     Suite *suite = suite_create("arrange");
     TCase *tests = tcase_create("all");

@@ -308,7 +308,7 @@ START_TEST(bad_options_leave_nothing_behind)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(build)
 {
     Suite *suite = suite_create("build");
     TCase *tests = tcase_create("build");

@@ -897,7 +897,7 @@ START_TEST(the_budget_holds_under_four_threads_and_the_background)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(cache)
 {
     Suite *suite = suite_create("cache");
     TCase *tests = tcase_create("cache");

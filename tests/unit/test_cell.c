@@ -243,7 +243,7 @@ START_TEST(octcode_valid_refuses_codes_without_leading_one)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(cell)
 {
     TCase *tests = tcase_create("cell");
     tcase_set_timeout(tests, 120);

@@ -221,7 +221,7 @@ START_TEST(a_file_that_is_written_over_in_place_is_noticed)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(changes)
 {
     Suite *suite = suite_create("changes");
     TCase *tests = tcase_create("changes");

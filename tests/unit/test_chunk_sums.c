@@ -178,7 +178,7 @@ START_TEST(there_is_no_third_choice)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(chunk_sums)
 {
     Suite *suite = suite_create("chunk_sums");
     TCase *tests = tcase_create("sums");

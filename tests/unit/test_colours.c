@@ -101,7 +101,7 @@ START_TEST(faces_come_first_when_vertices_are_all_the_same)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(colours)
 {
     Suite *suite = suite_create("colours");
     TCase *tests = tcase_create("colours");

@@ -352,7 +352,7 @@ START_TEST(bad_meshes_are_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(components)
 {
     Suite *suite = suite_create("components");
     TCase *tests = tcase_create("components");

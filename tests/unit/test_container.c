@@ -753,7 +753,7 @@ START_TEST(codings_return_every_bit_pattern)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(container)
 {
     Suite *suite = suite_create("container");
     TCase *tests = tcase_create("container"), *empty = tcase_create("empty");

@@ -385,7 +385,7 @@ START_TEST(point_on_triangle_includes_edges_corners_and_flat_faces)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(crossing)
 {
     TCase *tests = tcase_create("crossing");
     tcase_set_timeout(tests, 300);

@@ -1,5 +1,4 @@
 /* Cursors: the same nodes whatever holds them, those that a plain walk through the levels lists. */
-#include <check.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,17 +8,13 @@
 #include <ebpo/build.h>
 #include <ebpo/subset.h>
 
+#include "check_main.h"
 #include "model_file.h"
 #include "geometry/cursor.h"
 #include "geometry/level_nodes.h"
 #include "query/query_node.h"
 #include "random_tree.h"
 #include "solids.h"
-
-/* libhdf5 1.10 itself leaks when it gives up on a damaged object header; that is not what we look
- * for here. */
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static char folder[] = "/tmp/ebpo-cursor-XXXXXX", path[64], part_path[64];
 
@@ -455,7 +450,7 @@ START_TEST(nodes_of_a_real_model_are_the_same_whatever_holds_them)
 }
 END_TEST
 
-int main(void)
+TEST_SUITE(cursor)
 {
     TCase *tests = tcase_create("cursor");
     tcase_set_timeout(tests, 600);
@@ -465,9 +460,5 @@ int main(void)
     tcase_add_test(tests, nodes_of_a_real_model_are_the_same_whatever_holds_them);
     Suite *suite = suite_create("cursor");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

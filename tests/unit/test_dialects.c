@@ -402,7 +402,7 @@ START_TEST(damaged_dialects_are_whole_or_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(dialects)
 {
     TCase *tests = tcase_create("dialects");
     tcase_set_timeout(tests, 60);

@@ -346,7 +346,7 @@ START_TEST(processors_with_fma_give_the_same_bits)
 END_TEST
 #endif
 
-Suite *test_suite(void)
+TEST_SUITE(distance)
 {
     Suite *suite = suite_create("distance");
     TCase *exact = tcase_create("exact");

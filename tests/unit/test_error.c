@@ -1,15 +1,12 @@
 /* What an error tells beside its message. */
-#include <check.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <ebpo/ebpo.h>
 
+#include "check_main.h"
 #include "query_kit.h"
-
-__attribute__((visibility("default"))) const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 
 static void assert_begins(const ebpo_error *error)
 {
@@ -95,7 +92,7 @@ START_TEST(nothing_is_left_of_an_earlier_error)
 }
 END_TEST
 
-int main(void)
+TEST_SUITE(error)
 {
     Suite *suite = suite_create("error");
     TCase *tests = tcase_create("error");
@@ -105,9 +102,5 @@ int main(void)
     tcase_add_test(tests, an_array_of_a_damaged_file);
     tcase_add_test(tests, nothing_is_left_of_an_earlier_error);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return suite;
 }

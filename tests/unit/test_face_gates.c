@@ -172,7 +172,7 @@ START_TEST(streams_are_as_long_as_they_should_be)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(face_gates)
 {
     Suite *s = suite_create("face_gates");
     TCase *tests = tcase_create("face_gates");

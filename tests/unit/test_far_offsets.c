@@ -587,7 +587,7 @@ static void enter(void)
     path = scratch("far");
 }
 
-Suite *test_suite(void)
+TEST_SUITE(far_offsets)
 {
     Suite *suite = suite_create("far offsets");
     TCase *tests = tcase_create("far offsets");

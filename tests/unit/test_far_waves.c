@@ -228,7 +228,7 @@ START_TEST(a_view_that_ends_from_afar_takes_few_waves)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(far_waves)
 {
     Suite *suite = suite_create("far_waves");
     TCase *tests = tcase_create("far_waves");

@@ -247,7 +247,7 @@ START_TEST(subsets_keep_them)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(gray_colours)
 {
     Suite *suite = suite_create("gray_colours");
     TCase *tests = tcase_create("gray_colours");

@@ -1,9 +1,9 @@
 /* The hash table and the random numbers that all modules share. */
-#include <check.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "check_main.h"
 #include "core/hash.h"
 
 enum { KEYS = 12288, SLOTS = 16384 }; /* three quarters full */
@@ -98,7 +98,7 @@ START_TEST(random_numbers_are_those_of_splitmix64)
 }
 END_TEST
 
-int main(void)
+TEST_SUITE(hash)
 {
     TCase *tests = tcase_create("tests");
     tcase_add_loop_test(tests, keys_are_found_at_once, 0, 7);
@@ -107,9 +107,5 @@ int main(void)
     tcase_add_test(tests, random_numbers_are_those_of_splitmix64);
     Suite *suite = suite_create("hash");
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_ENV);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+    return suite;
 }

@@ -327,7 +327,7 @@ START_TEST(other_layouts_are_refused_by_name)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(head)
 {
     Suite *suite = suite_create("head");
     TCase *tests = tcase_create("head");

@@ -861,7 +861,7 @@ static void make_data(void)
         data[i] = (uint8_t)(next_random(&random) >> 24);
 }
 
-Suite *test_suite(void)
+TEST_SUITE(http)
 {
     make_data();
     if (!test_arguments[0] || !web_start(test_arguments[0], data, DATA_BYTES)) {

@@ -305,7 +305,7 @@ START_TEST(bunny_of_glmark2_is_closed_when_it_is_there)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(import)
 {
     TCase *tests = tcase_create("import");
     tcase_set_timeout(tests, 60);

@@ -284,7 +284,7 @@ START_TEST(words_of_stl_that_are_no_colours_are_kept)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(import_attributes)
 {
     TCase *tests = tcase_create("import attributes");
     tcase_add_test(tests, what_agrees_at_a_vertex_is_the_vertex_s);

@@ -446,7 +446,7 @@ START_TEST(pipes_and_folders_are_refused_without_hanging)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(io)
 {
     TCase *tests = tcase_create("io");
     tcase_add_checked_fixture(tests, enter, leave);

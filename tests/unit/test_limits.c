@@ -447,7 +447,7 @@ static void enter(void)
     path = scratch("limits");
 }
 
-Suite *test_suite(void)
+TEST_SUITE(limits)
 {
     Suite *suite = suite_create("limits");
     TCase *tests = tcase_create("limits");

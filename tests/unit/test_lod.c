@@ -298,7 +298,7 @@ START_TEST(a_cancelled_run_leaves_nothing)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(lod)
 {
     Suite *suite = suite_create("lod");
     TCase *cases = tcase_create("lod");

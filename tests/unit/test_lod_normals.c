@@ -257,7 +257,7 @@ START_TEST(nodes_of_another_level_are_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(lod_normals)
 {
     Suite *suite = suite_create("lod_normals");
     TCase *cases = tcase_create("lod_normals");

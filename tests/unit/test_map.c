@@ -398,7 +398,7 @@ START_TEST(painted_meshes_come_back_from_ply)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(map)
 {
     Suite *suite = suite_create("map");
     TCase *tests = tcase_create("map");

@@ -584,7 +584,7 @@ START_TEST(files_without_mesh_cannot_be_measured)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(measure)
 {
     Suite *suite = suite_create("measure");
     TCase *tests = tcase_create("mass");

@@ -379,7 +379,7 @@ START_TEST(what_was_mended_is_arranged_again_by_building)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(mend)
 {
     Suite *suite = suite_create("mend");
     TCase *tests = tcase_create("all");

@@ -625,7 +625,7 @@ START_TEST(filled_scans_are_balanced)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(mesh)
 {
     Suite *suite = suite_create("mesh");
     TCase *checking = tcase_create("checking"), *mending = tcase_create("mending");

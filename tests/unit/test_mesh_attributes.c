@@ -620,7 +620,7 @@ START_TEST(a_file_tells_its_attributes)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(mesh_attributes)
 {
     Suite *suite = suite_create("attributes");
     TCase *tests = tcase_create("attributes");

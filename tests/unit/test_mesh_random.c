@@ -206,7 +206,7 @@ START_TEST(mending_random_meshes_keeps_its_promises)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(mesh_random)
 {
     Suite *suite = suite_create("mesh, random");
     TCase *all = tcase_create("all");

@@ -298,7 +298,7 @@ START_TEST(integers_are_read_whole_or_not_at_all)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(number)
 {
     TCase *tests = tcase_create("number");
     tcase_set_timeout(tests, 120);

@@ -186,7 +186,7 @@ START_TEST(points_lie_between_the_walls_of_the_cells_that_are_found)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(octree)
 {
     TCase *tests = tcase_create("octree");
     tcase_set_timeout(tests, 120);

@@ -155,7 +155,7 @@ START_TEST(shells_that_share_a_vertex_or_an_edge_are_counted_one_by_one)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(orient)
 {
     Suite *suite = suite_create("orient");
     TCase *tests = tcase_create("all");

@@ -1,6 +1,5 @@
 /* Who owns what: arrays in a workspace and others of one file side by side, and an open file that
  * threads share. Meant for AddressSanitizer, LeakSanitizer and ThreadSanitizer. */
-#include <check.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,6 +8,7 @@
 
 #include <ebpo/ebpo.h>
 
+#include "check_main.h"
 #include "core/workspace.h"
 #include "solids.h"
 
@@ -227,7 +227,7 @@ START_TEST(threads_share_an_open_file)
 }
 END_TEST
 
-int main(void)
+TEST_SUITE(ownership)
 {
     Suite *suite = suite_create("ownership");
     TCase *tests = tcase_create("ownership");
@@ -236,9 +236,5 @@ int main(void)
     tcase_add_test(tests, verifying_leaves_nothing_behind);
     tcase_add_test(tests, threads_share_an_open_file);
     suite_add_tcase(suite, tests);
-    SRunner *runner = srunner_create(suite);
-    srunner_run_all(runner, CK_NORMAL);
-    int failed = srunner_ntests_failed(runner);
-    srunner_free(runner);
-    return failed ? EXIT_FAILURE : EXIT_SUCCESS;
+    return suite;
 }

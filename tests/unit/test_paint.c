@@ -695,7 +695,7 @@ START_TEST(baked_colours_keep_their_types)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(paint)
 {
     Suite *s = suite_create("paint");
     TCase *c = tcase_create("paint");

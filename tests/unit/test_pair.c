@@ -479,7 +479,7 @@ START_TEST(contacts_are_where_faces_meet)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(pair)
 {
     TCase *tests = tcase_create("pair");
     tcase_set_timeout(tests, 1000);

@@ -117,7 +117,7 @@ START_TEST(what_is_said_to_be_equal_is)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(pair_distance)
 {
     TCase *tests = tcase_create("pair_distance");
     tcase_set_timeout(tests, 1000);

@@ -288,7 +288,7 @@ START_TEST(kinds_have_names_and_colours)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(places)
 {
     Suite *suite = suite_create("places");
     TCase *tests = tcase_create("all");

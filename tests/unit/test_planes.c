@@ -241,7 +241,7 @@ START_TEST(lazy_greedy_takes_what_plain_greedy_takes)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(planes)
 {
     Suite *suite = suite_create("planes");
     TCase *tests = tcase_create("planes");

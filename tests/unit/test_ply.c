@@ -838,7 +838,7 @@ START_TEST(igea_in_strips_is_igea_in_triangles)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(ply)
 {
     TCase *tests = tcase_create("ply");
     tcase_set_timeout(tests, 120);

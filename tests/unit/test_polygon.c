@@ -550,7 +550,7 @@ START_TEST(large_outlines_take_bounded_time)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(polygon)
 {
     TCase *tests = tcase_create("polygon");
     tcase_set_timeout(tests, 120);

@@ -213,7 +213,7 @@ START_TEST(planes_keep_their_meaning_in_child_cells)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(polytope)
 {
     Suite *suite = suite_create("polytope");
     TCase *tests = tcase_create("polytope");

@@ -271,7 +271,7 @@ START_TEST(posed_blocks_are_within_their_errors)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(pose)
 {
     TCase *tests = tcase_create("pose");
     tcase_set_timeout(tests, 300);

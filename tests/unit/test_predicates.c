@@ -141,7 +141,7 @@ START_TEST(sign_of_products_equals_rational_sum)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(predicates)
 {
     TCase *tests = tcase_create("predicates");
     tcase_set_timeout(tests, 300);

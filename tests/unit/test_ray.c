@@ -711,7 +711,7 @@ START_TEST(boxes_of_points_meet_what_they_lie_on)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(ray)
 {
     Suite *suite = suite_create("ray");
     TCase *rays = tcase_create("rays"), *boxes = tcase_create("boxes");

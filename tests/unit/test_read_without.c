@@ -83,7 +83,7 @@ START_TEST(test_read_without)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(read_without)
 {
     Suite *s = suite_create("read_without");
     TCase *tc = tcase_create("levels");

@@ -179,7 +179,7 @@ START_TEST(sheets_and_what_is_inside_out_are_doubted)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(repairs)
 {
     Suite *suite = suite_create("repairs");
     TCase *tests = tcase_create("all");

@@ -557,7 +557,7 @@ START_TEST(pairs_as_twin)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(scene)
 {
     Suite *suite = suite_create("scene");
     TCase *c = tcase_create("scene");

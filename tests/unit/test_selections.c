@@ -583,7 +583,7 @@ START_TEST(no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(selections)
 {
     Suite *suite = suite_create("selections");
     TCase *tests = tcase_create("choosing"), *files = tcase_create("files"),

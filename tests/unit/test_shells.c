@@ -216,7 +216,7 @@ START_TEST(chains_are_as_deep_as_they_were_made)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(shells)
 {
     Suite *suite = suite_create("shells");
     TCase *tests = tcase_create("all");

@@ -192,7 +192,7 @@ START_TEST(structs_that_were_not_begun)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(sized)
 {
     Suite *suite = suite_create("sized");
     TCase *tests = tcase_create("sized");

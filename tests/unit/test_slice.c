@@ -797,7 +797,7 @@ START_TEST(subtrees_of_a_real_model_add_up)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(slice)
 {
     Suite *suite = suite_create("slice");
     TCase *cases = tcase_create("slice");

@@ -634,7 +634,7 @@ START_TEST(threads_open_one_file_at_once)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(source)
 {
     Suite *suite = suite_create("source");
     TCase *tests = tcase_create("source");

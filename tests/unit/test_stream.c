@@ -661,7 +661,7 @@ START_TEST(real_models_lie_within_their_streamed_planes)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(stream)
 {
     Suite *suite = suite_create("stream");
     TCase *tests = tcase_create("stream");

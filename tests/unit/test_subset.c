@@ -705,7 +705,7 @@ START_TEST(subsets_that_lie_do_no_harm)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(subset)
 {
     Suite *suite = suite_create("subset");
     TCase *tests = tcase_create("subset");

@@ -851,7 +851,7 @@ START_TEST(changed_bytes_never_lead_outside)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(subtree)
 {
     Suite *suite = suite_create("subtree");
     TCase *tests = tcase_create("subtree");

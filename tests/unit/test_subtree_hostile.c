@@ -242,7 +242,7 @@ START_TEST(rows_that_lie_together_are_noticed_or_do_no_harm)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(subtree_hostile)
 {
     Suite *suite = suite_create("subtree_hostile");
     TCase *tests = tcase_create("subtree_hostile");

@@ -423,7 +423,7 @@ START_TEST(a_line_that_is_down_is_not_tried_for_each_point)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(subtree_table)
 {
     Suite *suite = suite_create("subtree_table");
     TCase *tests = tcase_create("subtree_table");

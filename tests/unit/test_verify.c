@@ -501,7 +501,7 @@ START_TEST(real_models_keep_their_promises)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(verify)
 {
     TCase *tests = tcase_create("verify");
     tcase_set_timeout(tests, 300);

@@ -263,7 +263,7 @@ START_TEST(looking_at_unused_bytes_may_be_stopped)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(verify_file)
 {
     TCase *tests = tcase_create("verify file");
     tcase_set_timeout(tests, 300);

@@ -178,7 +178,7 @@ START_TEST(rays_along_all_axes_agree_also_through_vertices_and_edges)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(verify_geometry)
 {
     TCase *tests = tcase_create("verify geometry");
     tcase_set_timeout(tests, 300);

@@ -192,7 +192,7 @@ START_TEST(subsets_have_rows_for_pruned_nodes)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(verify_subtrees)
 {
     Suite *suite = suite_create("verify_subtrees");
     TCase *tests = tcase_create("verify_subtrees");

@@ -855,7 +855,7 @@ START_TEST(options_that_make_no_sense_are_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(view)
 {
     Suite *suite = suite_create("view");
     TCase *tests = tcase_create("view");

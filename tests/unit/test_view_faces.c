@@ -269,7 +269,7 @@ START_TEST(without_the_option_or_a_mesh_there_are_none)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(view_faces)
 {
     Suite *suite = suite_create("view_faces");
     TCase *tests = tcase_create("view_faces");

@@ -200,7 +200,7 @@ START_TEST(distances_that_make_no_sense_are_refused)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(weld_within)
 {
     Suite *suite = suite_create("weld_within");
     TCase *tests = tcase_create("all");

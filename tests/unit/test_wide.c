@@ -106,7 +106,7 @@ START_TEST(products_are_those_of_gmp)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(wide)
 {
     Suite *suite = suite_create("wide");
     TCase *tests = tcase_create("wide");

@@ -216,7 +216,7 @@ enum { LETS_GO = 1 };
 enum { LETS_GO = 0 };
 #endif
 
-Suite *test_suite(void)
+TEST_SUITE(workspace)
 {
     Suite *suite = suite_create("workspace");
     TCase *tests = tcase_create("arrays");
