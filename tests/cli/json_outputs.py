@@ -206,6 +206,9 @@ def main():
         environment["URL"] = f"http://127.0.0.1:{server.server_port}"
         for number, feature, name, command in lines_of(os.path.join(HERE, "json.tests")):
             absent = "extras" not in features.split(",") and run_tests.EXTRAS.search(command)
+            if run_tests.lacks_terminal(command):
+                print(f"skipped: {command} (there is no pseudo-terminal)")
+                absent = True
             if absent or feature and feature not in features.split(","):
                 seen.add(name.partition(":")[0])
                 ran |= set(re.findall(r"ebpo ([a-z]+)", command))

@@ -12,13 +12,15 @@ later lines see what earlier ones wrote. Outputs are regular expressions (search
 newlines); an empty one means that there must be no output,
 * means anything, @NAME that the output equals the file NAME beside this script. "png:0" runs the
 line only when FEATURES (words with commas between) has png, "no-png:2" only when it has not. Without
-"extras" among them, lines with commands of the extras are left out. Lines that begin with # are
-comments.
+"extras" among them, lines with commands of the extras are left out. Lines that need a terminal are
+skipped, and counted, where no pseudo-terminal can be had. Lines that begin with # are comments.
 
 python3 within a line is the interpreter that runs this script: where a machine has several, that
 one was chosen for its modules, and another first in PATH may lack them.
 """
+import functools
 import os
+import pty
 import re
 import subprocess
 import sys
@@ -27,6 +29,23 @@ import tempfile
 HERE = os.path.dirname(os.path.abspath(__file__))
 # What a build with -Dextras=disabled lacks.
 EXTRAS = re.compile(r"\bebpo (?:help )?(?:boolean|collide|map|paint|scene|touch)\b|--crossings|components_agree")
+
+NEEDS_TERMINAL = re.compile(r"\bscript -|shows_progress\.py")
+
+
+@functools.cache
+def has_terminal():
+    """Whether the system has pseudo-terminals; containers without /dev/pts have none."""
+    try:
+        for end in pty.openpty():
+            os.close(end)
+    except OSError:
+        return False
+    return True
+
+
+def lacks_terminal(command):
+    return bool(NEEDS_TERMINAL.search(command)) and not has_terminal()
 
 
 def output_fits(expected, actual):
@@ -43,6 +62,8 @@ def output_fits(expected, actual):
 def wanted(field, command, features):
     """The exit code of a line, or None if the line is for another build."""
     condition, _, code = field.rpartition(":")
+    if lacks_terminal(command):
+        return None
     if "extras" not in features and condition != "no-extras" and EXTRAS.search(command):
         return None
     if condition.startswith("no-"):
@@ -99,7 +120,7 @@ def python_in(folder):
 
 def main():
     tool, inputs, features, tests = sys.argv[1:]
-    bad = lines = without = 0
+    bad = lines = without = silent = 0
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as commands:
         python_in(commands)
         path = [commands, os.path.dirname(os.path.abspath(tool)), os.environ["PATH"]]
@@ -108,12 +129,15 @@ def main():
         subprocess.run([inputs, folder], check=True)
         for number, line in lines_of(tests):
             lines += 1
+            silent += lacks_terminal(line)
             without += wanted(line.split(" | ", 1)[0].strip(), line, features.split(",")) is None
             wrong = run_line(line, folder, environment, features.split(","))
             if wrong:
                 bad += 1
                 print(f"{tests}:{number}: {line}\n{wrong}")
-    print(f"{tests}: {lines} lines, {bad} failed, {without} of other builds")
+    print(f"{tests}: {lines} lines, {bad} failed, {without - silent} of other builds")
+    if silent:
+        print(f"skipped: {silent} lines, as there is no pseudo-terminal")
     return 1 if bad or not lines else 0
 
 

@@ -13,6 +13,9 @@ import sys
 import tempfile
 import time
 
+sys.dont_write_bytecode = True
+from run import has_terminal
+
 folder = pathlib.Path(sys.argv[1]).resolve()
 ASKED = {  # what is typed: what has to be offered
     "ebpo rep": ["repack", "repair", "report"],
@@ -59,6 +62,9 @@ wrong, asked = 0, 0
 for shell, ask in ("fish", by_fish), ("zsh", by_zsh):
     if not shutil.which(shell):
         print(f"{shell} is not installed")
+        continue
+    if shell == "zsh" and not has_terminal():
+        print("skipped: zsh, as there is no pseudo-terminal")
         continue
     for line, words in ASKED.items():
         found, asked = ask(line), asked + 1

@@ -23,7 +23,7 @@ static void watch_call(void)
     type __wrap_##name parameters;               \
     type __wrap_##name parameters                \
     {                                            \
-        watch_call();                                 \
+        watch_call();                            \
         return __real_##name arguments;          \
     }
 WATCH(void *, malloc, (size_t n), (n))

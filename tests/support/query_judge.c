@@ -1,8 +1,8 @@
 /* Models made for the tests of questions, and what the oracle says to the answers. */
+#include "check_main.h"
 #include "query_kit.h"
 #include "scratch.h"
 
-#include <check.h>
 #include <float.h>
 #include <math.h>
 #include <stdio.h>

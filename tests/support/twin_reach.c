@@ -1,6 +1,6 @@
+#include "check_main.h"
 #include "twin_reach.h"
 
-#include <check.h>
 #include <math.h>
 
 #include "solids.h"

@@ -1,5 +1,4 @@
 /* The coding of faces across edges against the verifier's plain reader. */
-#include <check.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -7,7 +7,6 @@
 
 #include "check_main.h"
 #include "counted_source.h"
-#include "expect.h"
 #include "scratch.h"
 #include "solids.h"
 #include "two_layouts.h"
@@ -33,10 +32,10 @@ static answer ask(const ebpo_file *file, const counted_source *far, const double
     uint64_t opened = far ? far->batches + far->alone : 0;
     options.threads = 1;
     options.memory = 64 << 20;
-    EXPECT(ebpo_model_new(file, &options, &model, NULL) == EBPO_OK);
-    EXPECT(ebpo_context_new(model, &context, NULL) == EBPO_OK);
-    EXPECT((inside ? ebpo_inside(context, p, NULL, &where, NULL)
-                   : ebpo_distance(context, p, NULL, &distance, NULL)) == EBPO_OK);
+    ck_assert(ebpo_model_new(file, &options, &model, NULL) == EBPO_OK);
+    ck_assert(ebpo_context_new(model, &context, NULL) == EBPO_OK);
+    ck_assert((inside ? ebpo_inside(context, p, NULL, &where, NULL)
+                      : ebpo_distance(context, p, NULL, &distance, NULL)) == EBPO_OK);
     ebpo_context_free(context);
     ebpo_model_free(model);
     return (answer){ distance.distance, where.where, far ? far->batches + far->alone - opened : 0 };
@@ -58,7 +57,7 @@ START_TEST(a_question_from_afar_takes_few_waves)
         answer a = ask(far, &c, p, n % 2), b = ask(l.without, NULL, p, n % 2);
         counted_close(&c, far);
         ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
-        EXPECT(a.distance == b.distance && a.where == b.where);
+        ck_assert(a.distance == b.distance && a.where == b.where);
     }
     two_layouts_close(&l);
 }
@@ -81,9 +80,9 @@ static double sum_within(const ebpo_file *file, const double p[3], double radius
     options.threads = 1;
     options.memory = 64 << 20;
     within.radius = radius;
-    EXPECT(ebpo_model_new(file, &options, &model, NULL) == EBPO_OK);
-    EXPECT(ebpo_context_new(model, &context, NULL) == EBPO_OK);
-    EXPECT(ebpo_distance_within(context, p, &within, add_up, &sum, NULL) == EBPO_OK);
+    ck_assert(ebpo_model_new(file, &options, &model, NULL) == EBPO_OK);
+    ck_assert(ebpo_context_new(model, &context, NULL) == EBPO_OK);
+    ck_assert(ebpo_distance_within(context, p, &within, add_up, &sum, NULL) == EBPO_OK);
     ebpo_context_free(context);
     ebpo_model_free(model);
     return sum;
@@ -99,7 +98,7 @@ START_TEST(a_radius_from_afar_takes_few_waves)
     two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
     ebpo_file *far = counted_open(&c, l.packed, true);
     uint64_t opened = c.batches + c.alone;
-    EXPECT(sum_within(far, p, 1) == sum_within(l.without, p, 1));
+    ck_assert(sum_within(far, p, 1) == sum_within(l.without, p, 1));
     ck_assert_msg(c.batches + c.alone - opened <= WAVES, "%d waves",
                   (int)(c.batches + c.alone - opened));
     counted_close(&c, far);
@@ -125,7 +124,7 @@ START_TEST(a_box_from_afar_takes_few_waves)
     }
     ebpo_file *far = counted_open(&c, l.packed, true);
     uint64_t opened = c.batches + c.alone;
-    EXPECT(ebpo_subset(far, scratch("box.ebpo.h5"), &box, NULL) == EBPO_OK);
+    ck_assert(ebpo_subset(far, scratch("box.ebpo.h5"), &box, NULL) == EBPO_OK);
     ck_assert_msg(c.batches + c.alone - opened <= WAVES, "%d waves",
                   (int)(c.batches + c.alone - opened));
     ck_assert_msg(c.asked < c.size / 2, "%d of %d bytes", (int)c.asked, (int)c.size);
@@ -140,9 +139,9 @@ static uint64_t count_nodes(const ebpo_file *file, const ebpo_view_options *opti
     ebpo_view_node node;
     ebpo_view_end end;
     uint64_t count = 0;
-    EXPECT(ebpo_view_stream_new(file, options, &stream, NULL) == EBPO_OK);
+    ck_assert(ebpo_view_stream_new(file, options, &stream, NULL) == EBPO_OK);
     do {
-        EXPECT(ebpo_view_stream_next(stream, &node, &end, NULL) == EBPO_OK);
+        ck_assert(ebpo_view_stream_next(stream, &node, &end, NULL) == EBPO_OK);
         count += end == EBPO_VIEW_NODE;
     } while (end == EBPO_VIEW_NODE);
     ebpo_view_stream_free(stream);
@@ -179,7 +178,7 @@ START_TEST(a_view_from_afar_takes_few_waves)
     uint64_t opened = c.batches + c.alone, nodes = count_nodes(far, &view);
     ck_assert_msg(c.batches + c.alone - opened <= WAVES, "%d waves",
                   (int)(c.batches + c.alone - opened));
-    EXPECT(nodes == count_nodes(l.without, &view) && nodes > 1000);
+    ck_assert(nodes == count_nodes(l.without, &view) && nodes > 1000);
     counted_close(&c, far);
     two_layouts_close(&l);
 }
@@ -192,7 +191,7 @@ static const char *by_number(const ebpo_file *file)
     const char *path = scratch("by_number.ebpo.h5");
     all.subtree_faces = 400;
     all.face_coding = EBPO_FACES_HIGH_WATER;
-    EXPECT(ebpo_subset(file, path, &all, NULL) == EBPO_OK);
+    ck_assert(ebpo_subset(file, path, &all, NULL) == EBPO_OK);
     return path;
 }
 
@@ -220,8 +219,8 @@ START_TEST(a_view_that_ends_from_afar_takes_few_waves)
         uint64_t opened = c.batches + c.alone, nodes = count_nodes(far, &view),
                  waves = c.batches + c.alone - opened;
         ck_assert_msg(waves <= ends[i].waves, "%d waves of view %d", (int)waves, (int)i);
-        EXPECT(c.asked <= (view.bytes ? view.bytes : c.size / 5));
-        EXPECT(view.bytes || nodes == count_nodes(l.without, &view));
+        ck_assert(c.asked <= (view.bytes ? view.bytes : c.size / 5));
+        ck_assert(view.bytes || nodes == count_nodes(l.without, &view));
         counted_close(&c, far);
     }
     two_layouts_close(&l);

@@ -10,7 +10,6 @@
 #include <ebpo/paint.h>
 
 #include "check_main.h"
-#include "expect.h"
 #include "io/unfinished.h"
 #include "model_file.h"
 #include "scratch.h"
@@ -90,10 +89,10 @@ static ebpo_paint_areas measured(const opened *o, unsigned fineness, unsigned th
 /* Between its bounds, which are not far apart, and well met. */
 static void expect_area(const ebpo_paint_area *a, double area, double apart, double off)
 {
-    EXPECT_MSG(a->lo <= area * (1 + 1e-12) && area <= a->hi * (1 + 1e-12),
-               "%.17g is not from %.17g to %.17g", area, a->lo, a->hi);
-    EXPECT_MSG(a->hi - a->lo <= apart * area, "%g to %g", a->lo, a->hi);
-    EXPECT_MSG(fabs(a->value - area) <= off * area, "%.17g for %.17g", a->value, area);
+    ck_assert_msg(a->lo <= area * (1 + 1e-12) && area <= a->hi * (1 + 1e-12),
+                  "%.17g is not from %.17g to %.17g", area, a->lo, a->hi);
+    ck_assert_msg(a->hi - a->lo <= apart * area, "%g to %g", a->lo, a->hi);
+    ck_assert_msg(fabs(a->value - area) <= off * area, "%.17g for %.17g", a->value, area);
 }
 
 /* --- files --- */
@@ -109,27 +108,27 @@ static void same_paint(const ebpo_paint *a, const ebpo_paint *b)
     ck_assert(ebpo_paint_get_info(a, &x) == EBPO_OK && ebpo_paint_get_info(b, &y) == EBPO_OK);
     same_text(x.model_sha256, y.model_sha256);
     same_text(x.model_name, y.model_name);
-    EXPECT(x.source_numbers == y.source_numbers && x.layer_count == y.layer_count);
-    EXPECT(x.note_count == y.note_count && x.stroke_count == y.stroke_count);
+    ck_assert(x.source_numbers == y.source_numbers && x.layer_count == y.layer_count);
+    ck_assert(x.note_count == y.note_count && x.stroke_count == y.stroke_count);
     for (uint64_t i = 0; ebpo_paint_get_layer(a, i, &k) == EBPO_OK; i++) {
-        EXPECT(ebpo_paint_get_layer(b, i, &l) == EBPO_OK && k.colour == l.colour);
-        EXPECT(k.opacity == l.opacity && k.visible == l.visible);
+        ck_assert(ebpo_paint_get_layer(b, i, &l) == EBPO_OK && k.colour == l.colour);
+        ck_assert(k.opacity == l.opacity && k.visible == l.visible);
         same_text(k.title, l.title);
         same_text(k.author, l.author);
         same_text(k.date, l.date);
         same_text(k.description, l.description);
     }
     for (uint64_t i = 0; ebpo_paint_get_note(a, i, &m) == EBPO_OK; i++) {
-        EXPECT(ebpo_paint_get_note(b, i, &n) == EBPO_OK && m.layer == n.layer);
-        EXPECT(memcmp(&m.at, &n.at, sizeof m.at) == 0);
+        ck_assert(ebpo_paint_get_note(b, i, &n) == EBPO_OK && m.layer == n.layer);
+        ck_assert(memcmp(&m.at, &n.at, sizeof m.at) == 0);
         same_text(m.title, n.title);
         same_text(m.body, n.body);
     }
     for (uint64_t i = 0; ebpo_paint_get_stroke(a, i, &s) == EBPO_OK; i++) {
-        EXPECT(ebpo_paint_get_stroke(b, i, &t) == EBPO_OK && s.layer == t.layer);
-        EXPECT(s.kind == t.kind && s.colour == t.colour && s.radius == t.radius);
-        EXPECT(s.time == t.time && s.point_count == t.point_count);
-        EXPECT(memcmp(s.points, t.points, s.point_count * sizeof *s.points) == 0);
+        ck_assert(ebpo_paint_get_stroke(b, i, &t) == EBPO_OK && s.layer == t.layer);
+        ck_assert(s.kind == t.kind && s.colour == t.colour && s.radius == t.radius);
+        ck_assert(s.time == t.time && s.point_count == t.point_count);
+        ck_assert(memcmp(s.points, t.points, s.point_count * sizeof *s.points) == 0);
     }
 }
 
@@ -598,9 +597,9 @@ static void check_points(const ebpo_paint *paint, const ebpo_mesh *mesh)
                 double sum = 0;
                 for (int v = 0; v < 3; v++)
                     sum += w[v] * mesh->xyz64[3 * mesh->faces[3 * q->face + (unsigned)v] + c];
-                EXPECT(fabs(sum - q->place[c]) < 1e-8);
+                ck_assert(fabs(sum - q->place[c]) < 1e-8);
             }
-            EXPECT(fabs(q->place[1] - 4) <= 0.5 && q->place[2] == 0);
+            ck_assert(fabs(q->place[1] - 4) <= 0.5 && q->place[2] == 0);
         }
 }
 
@@ -681,13 +680,13 @@ START_TEST(baked_colours_keep_their_types)
     for (uint64_t i = 0; i < mesh.vertex_count; i++) {
         const double *x = mesh.xyz64 + 3 * i;
         bool near = hypot(x[0] - 4, x[1] - 4) <= 1.1;
-        EXPECT(rgba[4 * i] == (near ? 0x40 : 0) && rgba[4 * i + 2] == (near ? 0xc0 : 0));
+        ck_assert(rgba[4 * i] == (near ? 0x40 : 0) && rgba[4 * i + 2] == (near ? 0xc0 : 0));
     }
     ebpo_colours own;
     model_must(ebpo_paint_dye_mesh(&mesh, rgba, &error), "dyeing", &error);
     model_must(ebpo_mesh_colours(&mesh, &own, &error), "colours", &error);
     for (uint64_t i = 0; i < mesh.vertex_count; i++)
-        EXPECT(memcmp(own.vertex + 4 * i, rgba + 4 * i, 3) == 0);
+        ck_assert(memcmp(own.vertex + 4 * i, rgba + 4 * i, 3) == 0);
     ebpo_colours_free(&own);
     free(rgba);
     ebpo_mesh_free(&mesh);

@@ -10,6 +10,7 @@
 #include "check_main.h"
 #include "exact_twin.h"
 #include "geometry/ray.h"
+#include "solids.h"
 
 enum { ROUNDS = 11000, RAY_KINDS = 12, BOX_KINDS = 7 };
 
@@ -434,14 +435,17 @@ START_TEST(rays_meet_triangles_as_rational_clipping_says)
 {
     tally count = { 0 };
     uint64_t state = 11 + (uint64_t)_i;
-    for (int i = 0; i < (_i == 11 ? ROUNDS / 4 : ROUNDS); i++) {
+    const int most = _i == 11 ? ROUNDS / 4 : ROUNDS;
+    const int rounds = (int)ebpo_test_scaled((uint64_t)most * 9 / 10) + most / 10;
+    const long least = 400L * rounds / most;
+    for (int i = 0; i < rounds; i++) {
         ebpo_segment ray;
         double triangle[3][3];
         ray_case(_i, &ray, triangle, &state);
         check_ray(&ray, (const double(*)[3])triangle, _i, &count);
         check_limits(&ray, (const double(*)[3])triangle, _i, &count);
     }
-    ck_assert_msg(count.hits + count.touches > 400 && count.misses > 400,
+    ck_assert_msg(count.hits + count.touches > least && count.misses > least,
                   "kind %d: %ld hits, %ld touches, %ld misses", _i, count.hits, count.touches,
                   count.misses);
 }
@@ -451,7 +455,8 @@ START_TEST(rays_meet_triangles_of_hard_coordinates)
 {
     tally count = { 0 };
     uint64_t state = 99;
-    for (int i = 0; i < 1500; i++)
+    const int rounds = (int)ebpo_test_scaled(1400) + 100;
+    for (int i = 0; i < rounds; i++)
         for (int kind = 0; kind < TWIN_KINDS; kind++) {
             double p[12], triangle[3][3];
             ebpo_segment ray = { .t_max = INFINITY };
@@ -469,7 +474,8 @@ START_TEST(rays_meet_triangles_of_hard_coordinates)
             check_ray(&ray, (const double(*)[3])triangle, kind, &count);
             check_limits(&ray, (const double(*)[3])triangle, kind, &count);
         }
-    ck_assert(count.hits > 100 && count.touches > 100 && count.misses > 100);
+    ck_assert(count.hits > rounds / 15 && count.touches > rounds / 15 &&
+              count.misses > rounds / 15);
 }
 END_TEST
 
@@ -478,7 +484,8 @@ START_TEST(hits_are_ordered_as_rationals_are)
 {
     uint64_t state = 5;
     long ties = 0, other = 0;
-    for (int i = 0; i < 60000; i++) {
+    const int rounds = (int)ebpo_test_scaled(59000) + 1000;
+    for (int i = 0; i < rounds; i++) {
         ebpo_segment ray;
         double a[3][3], b[3][3], other_case[3][3];
         interval ra, rb;
@@ -513,7 +520,7 @@ START_TEST(hits_are_ordered_as_rationals_are)
         interval_clear(&ra);
         interval_clear(&rb);
     }
-    ck_assert_msg(ties > 3000 && other > 3000, "%ld ties, %ld others", ties, other);
+    ck_assert_msg(ties > rounds / 20 && other > rounds / 20, "%ld ties, %ld others", ties, other);
 }
 END_TEST
 

@@ -10,7 +10,6 @@
 
 #include "check_main.h"
 #include "counted_source.h"
-#include "expect.h"
 #include "model_file.h"
 #include "geometry/level_nodes.h"
 #include "geometry/cells.h"
@@ -152,12 +151,12 @@ static void compare_planes(const pair *p, const ebpo_level *l, const twin_node *
     if (n->type == EBPO_LEAF && l->leaf_plane_counts)
         count = l->leaf_plane_counts[n->rank[EBPO_LEAF]];
     if (!p->nodes.plane_first) {
-        EXPECT(count == 0);
+        ck_assert(count == 0);
         return;
     }
     uint32_t first = p->nodes.plane_first[number];
-    EXPECT(p->nodes.plane_first[number + 1] - first == count);
-    EXPECT(count == 0 || memcmp(p->nodes.planes + first, codes + n->plane, count * 4) == 0);
+    ck_assert(p->nodes.plane_first[number + 1] - first == count);
+    ck_assert(count == 0 || memcmp(p->nodes.planes + first, codes + n->plane, count * 4) == 0);
 }
 
 static void compare_list(pair *p, const ebpo_level *l, const twin_node *n, uint64_t number)
@@ -166,11 +165,11 @@ static void compare_list(pair *p, const ebpo_level *l, const twin_node *n, uint6
     uint64_t rank = n->rank[EBPO_LEAF];
     uint32_t refs = n->type == EBPO_LEAF ? l->leaf_ref_count[rank] : 0,
              fresh = n->type == EBPO_LEAF ? l->leaf_new[rank] : 0;
-    EXPECT(p->faces.list_first[number + 1] - first == refs + fresh);
+    ck_assert(p->faces.list_first[number + 1] - first == refs + fresh);
     for (uint32_t k = 0; k < refs + fresh; k++) {
         uint64_t face = k < refs ? l->leaf_refs[n->refs + k] : l->leaf_first[rank] + (k - refs);
-        EXPECT(p->faces.list[first + k] < p->faces.face_count);
-        EXPECT(p->faces.numbers[p->faces.list[first + k]] == face);
+        ck_assert(p->faces.list[first + k] < p->faces.face_count);
+        ck_assert(p->faces.numbers[p->faces.list[first + k]] == face);
         if (p->listed[face] < 2)
             p->listed[face] = k < refs ? 1 : 2;
     }
@@ -186,18 +185,18 @@ static void compare_level(pair *p, int i, bool has_faces)
         const twin_node *n = &p->t->node[level][k];
         if (n->octcode >> 3 * i != p->octcode)
             continue;
-        EXPECT(number < p->nodes.level_first[i + 1]);
-        EXPECT(p->nodes.octcodes[number] == n->octcode);
-        EXPECT(p->nodes.types[number] == n->type);
-        EXPECT(!p->nodes.windings == !p->t->tree.info.solid);
+        ck_assert(number < p->nodes.level_first[i + 1]);
+        ck_assert(p->nodes.octcodes[number] == n->octcode);
+        ck_assert(p->nodes.types[number] == n->type);
+        ck_assert(!p->nodes.windings == !p->t->tree.info.solid);
         if (p->nodes.windings)
-            EXPECT(p->nodes.windings[number] == (n->type == EBPO_GRAY ? 0 : winding_of(l, n)));
+            ck_assert(p->nodes.windings[number] == (n->type == EBPO_GRAY ? 0 : winding_of(l, n)));
         compare_planes(p, l, n, number);
         if (has_faces)
             compare_list(p, l, n, number);
         number++;
     }
-    EXPECT(number == p->nodes.level_first[i + 1]);
+    ck_assert(number == p->nodes.level_first[i + 1]);
 }
 
 /* Children are where the next level has their octcodes, or nowhere. */
@@ -208,13 +207,13 @@ static void compare_children(const pair *p)
         uint32_t first = p->nodes.children[i];
         if (first == EBPO_NO_CHILDREN)
             continue;
-        EXPECT(p->nodes.types[i] == EBPO_GRAY);
-        EXPECT((uint64_t)first + 8 <= p->nodes.node_count);
+        ck_assert(p->nodes.types[i] == EBPO_GRAY);
+        ck_assert((uint64_t)first + 8 <= p->nodes.node_count);
         for (unsigned octant = 0; octant < 8; octant++)
-            EXPECT(p->nodes.octcodes[first + octant] == (p->nodes.octcodes[i] << 3 | octant));
+            ck_assert(p->nodes.octcodes[first + octant] == (p->nodes.octcodes[i] << 3 | octant));
         linked += 8;
     }
-    EXPECT(linked == p->nodes.node_count); /* each has its parent */
+    ck_assert(linked == p->nodes.node_count); /* each has its parent */
 }
 
 static void compare_corner(const pair *p, uint64_t face, int corner)
@@ -222,16 +221,16 @@ static void compare_corner(const pair *p, uint64_t face, int corner)
     const ebpo_mesh *mesh = &p->t->tree.mesh;
     uint64_t ours = p->faces.faces[3 * face + (uint64_t)corner],
              theirs = mesh->faces[3 * (uint64_t)p->faces.numbers[face] + (uint64_t)corner];
-    EXPECT(ours < p->faces.vertex_count);
-    EXPECT(!p->faces.xyz32 == !mesh->xyz32 && !p->faces.xyz64 == !mesh->xyz64);
+    ck_assert(ours < p->faces.vertex_count);
+    ck_assert(!p->faces.xyz32 == !mesh->xyz32 && !p->faces.xyz64 == !mesh->xyz64);
     if (mesh->xyz32) {
-        EXPECT(memcmp(p->faces.xyz32 + 3 * ours, mesh->xyz32 + 3 * theirs, 12) == 0);
-        EXPECT(memcmp(p->faces.corners32 + 9 * face + 3 * (uint64_t)corner,
-                      mesh->xyz32 + 3 * theirs, 12) == 0);
+        ck_assert(memcmp(p->faces.xyz32 + 3 * ours, mesh->xyz32 + 3 * theirs, 12) == 0);
+        ck_assert(memcmp(p->faces.corners32 + 9 * face + 3 * (uint64_t)corner,
+                         mesh->xyz32 + 3 * theirs, 12) == 0);
     } else {
-        EXPECT(memcmp(p->faces.xyz64 + 3 * ours, mesh->xyz64 + 3 * theirs, 24) == 0);
-        EXPECT(memcmp(p->faces.corners64 + 9 * face + 3 * (uint64_t)corner,
-                      mesh->xyz64 + 3 * theirs, 24) == 0);
+        ck_assert(memcmp(p->faces.xyz64 + 3 * ours, mesh->xyz64 + 3 * theirs, 24) == 0);
+        ck_assert(memcmp(p->faces.corners64 + 9 * face + 3 * (uint64_t)corner,
+                         mesh->xyz64 + 3 * theirs, 24) == 0);
     }
 }
 
@@ -242,13 +241,13 @@ static void compare_faces(const pair *p)
         listed += p->listed[i] > 0;
         fresh += p->listed[i] == 2;
     }
-    EXPECT(p->faces.face_count == listed && p->faces.outer_count == listed - fresh);
+    ck_assert(p->faces.face_count == listed && p->faces.outer_count == listed - fresh);
     for (uint64_t i = 0; i < listed; i++) {
-        EXPECT(i == 0 || p->faces.numbers[i] > p->faces.numbers[i - 1]);
-        EXPECT(p->listed[p->faces.numbers[i]] == (i < p->faces.outer_count ? 1 : 2));
-        EXPECT(!p->faces.source == !p->t->tree.face_source);
+        ck_assert(i == 0 || p->faces.numbers[i] > p->faces.numbers[i - 1]);
+        ck_assert(p->listed[p->faces.numbers[i]] == (i < p->faces.outer_count ? 1 : 2));
+        ck_assert(!p->faces.source == !p->t->tree.face_source);
         if (p->faces.source)
-            EXPECT(p->faces.source[i] == p->t->tree.face_source[p->faces.numbers[i]]);
+            ck_assert(p->faces.source[i] == p->t->tree.face_source[p->faces.numbers[i]]);
         for (int corner = 0; corner < 3; corner++)
             compare_corner(p, i, corner);
     }
@@ -263,9 +262,9 @@ static void compare_above(const pair *p)
             k++;
         const twin_node *n = &p->t->node[level][k];
         uint64_t count = l->plane_counts ? l->plane_counts[n->rank[EBPO_GRAY]] : 0;
-        EXPECT(p->nodes.above_first[level + 1] - p->nodes.above_first[level] == count);
-        EXPECT(count == 0 || memcmp(p->nodes.above_planes + p->nodes.above_first[level],
-                                    l->planes + n->plane, count * 4) == 0);
+        ck_assert(p->nodes.above_first[level + 1] - p->nodes.above_first[level] == count);
+        ck_assert(count == 0 || memcmp(p->nodes.above_planes + p->nodes.above_first[level],
+                                       l->planes + n->plane, count * 4) == 0);
     }
 }
 
@@ -278,16 +277,16 @@ static void check_subtree(const twin *t, const ebpo_file *file, const twin_node 
     p.level = ebpo_octcode_level(root->octcode);
     ck_assert_msg(ebpo_subtree_open(file, root->octcode, options, &p.subtree, &error) == EBPO_OK,
                   "%s", error.message);
-    EXPECT(ebpo_subtree_get_nodes(p.subtree, &p.nodes) == EBPO_OK);
+    ck_assert(ebpo_subtree_get_nodes(p.subtree, &p.nodes) == EBPO_OK);
     bool has_faces = ebpo_subtree_get_faces(p.subtree, &p.faces, &error) == EBPO_OK;
-    EXPECT(has_faces == (options->levels < 0));
-    EXPECT(p.nodes.level == p.level && p.nodes.level_first[0] == 0);
-    EXPECT(options->levels < 0 || p.nodes.level_count <= options->levels + 1);
-    EXPECT(options->memory == 0 || p.nodes.memory <= options->memory);
+    ck_assert(has_faces == (options->levels < 0));
+    ck_assert(p.nodes.level == p.level && p.nodes.level_first[0] == 0);
+    ck_assert(options->levels < 0 || p.nodes.level_count <= options->levels + 1);
+    ck_assert(options->memory == 0 || p.nodes.memory <= options->memory);
     p.listed = calloc(t->tree.mesh.face_count + 1, 1);
     for (int i = 0; i < p.nodes.level_count; i++)
         compare_level(&p, i, has_faces);
-    EXPECT(p.nodes.node_count == p.nodes.level_first[p.nodes.level_count]);
+    ck_assert(p.nodes.node_count == p.nodes.level_first[p.nodes.level_count]);
     compare_children(&p);
     compare_above(&p);
     if (has_faces)
@@ -413,19 +412,19 @@ END_TEST
 
 static void same_node(const ebpo_stream_node *a, const ebpo_stream_node *b)
 {
-    EXPECT(a->octcode == b->octcode && a->type == b->type && a->winding == b->winding);
-    EXPECT(memcmp(a->min, b->min, sizeof a->min) == 0 &&
-           memcmp(a->max, b->max, sizeof a->max) == 0);
-    EXPECT(a->plane_count == b->plane_count && a->volume == b->volume);
+    ck_assert(a->octcode == b->octcode && a->type == b->type && a->winding == b->winding);
+    ck_assert(memcmp(a->min, b->min, sizeof a->min) == 0 &&
+              memcmp(a->max, b->max, sizeof a->max) == 0);
+    ck_assert(a->plane_count == b->plane_count && a->volume == b->volume);
     for (uint32_t i = 0; i < a->plane_count; i++)
-        EXPECT(memcmp(a->planes[i], b->planes[i], sizeof a->planes[i]) == 0);
-    EXPECT(a->vertex_count == b->vertex_count && a->polygon_count == b->polygon_count);
+        ck_assert(memcmp(a->planes[i], b->planes[i], sizeof a->planes[i]) == 0);
+    ck_assert(a->vertex_count == b->vertex_count && a->polygon_count == b->polygon_count);
     for (uint32_t i = 0; i < a->vertex_count; i++)
-        EXPECT(memcmp(a->vertices[i], b->vertices[i], sizeof a->vertices[i]) == 0);
+        ck_assert(memcmp(a->vertices[i], b->vertices[i], sizeof a->vertices[i]) == 0);
     for (uint32_t i = 0; a->polygon_count && i <= a->polygon_count; i++)
-        EXPECT(a->polygon_first[i] == b->polygon_first[i]);
+        ck_assert(a->polygon_first[i] == b->polygon_first[i]);
     for (uint32_t i = 0; a->polygon_count && i < a->polygon_first[a->polygon_count]; i++)
-        EXPECT(a->corners[i] == b->corners[i]);
+        ck_assert(a->corners[i] == b->corners[i]);
 }
 
 /* Subtrees below these nodes of a level, by octcode. */
@@ -440,9 +439,9 @@ static ebpo_subtree *open_around(const ebpo_file *file, uint64_t octcode, int le
     if (ebpo_subtree_open(file, octcode >> 3 * (up > 0 ? up : 0), &options, &subtree, NULL) !=
         EBPO_OK)
         return NULL;
-    EXPECT(ebpo_subtree_get_nodes(subtree, &nodes) == EBPO_OK);
+    ck_assert(ebpo_subtree_get_nodes(subtree, &nodes) == EBPO_OK);
     for (*number = 0; nodes.octcodes[*number] != octcode; ++*number)
-        EXPECT(*number + 1 < nodes.node_count);
+        ck_assert(*number + 1 < nodes.node_count);
     return subtree;
 }
 
@@ -539,9 +538,9 @@ START_TEST(inherited_half_spaces_bound_the_envelope)
         for (uint32_t v = 0; v < n.node.vertex_count && n.node.type != EBPO_BLACK; v++)
             for (uint32_t h = 0; h < n.inherited_count; h++) {
                 const double *x = n.node.vertices[v], *a = n.inherited[h];
-                EXPECT(a[0] * x[0] + a[1] * x[1] + a[2] * x[2] <= a[3] + 1e-9);
+                ck_assert(a[0] * x[0] + a[1] * x[1] + a[2] * x[2] <= a[3] + 1e-9);
             }
-        EXPECT(n.inherited_count == planes_above(&nodes, i));
+        ck_assert(n.inherited_count == planes_above(&nodes, i));
         inherited += n.inherited_count;
     }
     ck_assert_uint_gt(inherited, nodes.node_count);
@@ -677,13 +676,13 @@ START_TEST(octcodes_of_points_are_those_of_the_cells_around_them)
             p[k] = low[k] + info->box_size[k] * ebpo_test_random_unit(&state);
         }
         uint64_t octcode = ebpo_octcode_at(info, p, level);
-        EXPECT(ebpo_octcode_level(octcode) == level);
+        ck_assert(ebpo_octcode_level(octcode) == level);
         for (int i = 1; i <= level; i++)
             for (int k = 0; k < 3; k++) {
                 double half = info->box_size[k] / (double)(1u << i);
                 if (octcode >> 3 * (level - i) >> k & 1)
                     low[k] += half;
-                EXPECT(p[k] >= low[k] && p[k] <= low[k] + half);
+                ck_assert(p[k] >= low[k] && p[k] <= low[k] + half);
             }
     }
     ck_assert_uint_eq(ebpo_octcode_at(info, outside, 3), 0);
@@ -792,14 +791,14 @@ END_TEST
 static void check_bounds(const ebpo_subtree_nodes *n, const ebpo_subtree_faces *f, bool has_faces)
 {
     for (uint64_t i = 0; i < n->node_count; i++) {
-        EXPECT(n->children[i] == EBPO_NO_CHILDREN || n->children[i] + 8 <= n->node_count);
-        EXPECT(!n->plane_first || n->plane_first[i] <= n->plane_first[i + 1]);
-        EXPECT(!has_faces || f->list_first[i] <= f->list_first[i + 1]);
+        ck_assert(n->children[i] == EBPO_NO_CHILDREN || n->children[i] + 8 <= n->node_count);
+        ck_assert(!n->plane_first || n->plane_first[i] <= n->plane_first[i + 1]);
+        ck_assert(!has_faces || f->list_first[i] <= f->list_first[i + 1]);
     }
     for (uint32_t i = 0; has_faces && i < f->list_first[n->node_count]; i++)
-        EXPECT(f->list[i] < f->face_count);
+        ck_assert(f->list[i] < f->face_count);
     for (uint64_t i = 0; has_faces && i < 3 * f->face_count; i++)
-        EXPECT(f->faces[i] < f->vertex_count);
+        ck_assert(f->faces[i] < f->vertex_count);
 }
 
 static bool try_changed(const uint8_t *data, uint64_t size, uint64_t octcode)
@@ -811,15 +810,15 @@ static bool try_changed(const uint8_t *data, uint64_t size, uint64_t octcode)
     ebpo_status status = ebpo_open_memory(data, size, NULL, &file, NULL);
     if (status == EBPO_OK)
         status = ebpo_subtree_open(file, octcode, NULL, &subtree, NULL);
-    EXPECT(status == EBPO_OK || status == EBPO_E_FORMAT || status == EBPO_E_ARGUMENT ||
-           status == EBPO_E_LIMIT || status == EBPO_E_VERSION || status == EBPO_E_ABSENT);
+    ck_assert(status == EBPO_OK || status == EBPO_E_FORMAT || status == EBPO_E_ARGUMENT ||
+              status == EBPO_E_LIMIT || status == EBPO_E_VERSION || status == EBPO_E_ABSENT);
     if (status == EBPO_OK) {
         ebpo_subtree_node node = EBPO_SUBTREE_NODE_INIT;
-        EXPECT(ebpo_subtree_get_nodes(subtree, &nodes) == EBPO_OK);
+        ck_assert(ebpo_subtree_get_nodes(subtree, &nodes) == EBPO_OK);
         bool has_faces = ebpo_subtree_get_faces(subtree, &faces, NULL) == EBPO_OK;
         check_bounds(&nodes, &faces, has_faces);
         for (uint64_t i = 0; i < nodes.node_count; i += 97)
-            EXPECT(ebpo_subtree_get_node(subtree, i, true, &node, NULL) == EBPO_OK);
+            ck_assert(ebpo_subtree_get_node(subtree, i, true, &node, NULL) == EBPO_OK);
     }
     ebpo_subtree_close(subtree);
     ebpo_close(file);

@@ -12,7 +12,6 @@
 #include "format/slice.h"
 #include "format/subtree_index.h"
 #include "counted_source.h"
-#include "expect.h"
 #include "geometry/level_nodes.h"
 #include "random_tree.h"
 #include "read_by.h"
@@ -110,10 +109,10 @@ static void plain_free(plain_table *t)
 static void check_faces(const plain_table *t, const ebpo_subtree_row *row, uint64_t *face,
                         uint64_t *vertex)
 {
-    EXPECT(row->face >= *face && row->vertex >= *vertex);
+    ck_assert(row->face >= *face && row->vertex >= *vertex);
     *face = row->face + row->after[EBPO_S_FACES] - row->before[EBPO_S_FACES];
     *vertex = row->vertex + row->after[EBPO_S_VERTICES] - row->before[EBPO_S_VERTICES];
-    EXPECT(*face <= t->tree.mesh.face_count && *vertex <= t->tree.mesh.vertex_count);
+    ck_assert(*face <= t->tree.mesh.face_count && *vertex <= t->tree.mesh.vertex_count);
 }
 
 static void check_rows(const plain_table *t, ebpo_chunks *chunks)
@@ -121,10 +120,10 @@ static void check_rows(const plain_table *t, ebpo_chunks *chunks)
     uint64_t face = 0, vertex = 0;
     for (uint64_t i = 0; i < t->subtrees; i++) {
         ebpo_subtree_row row;
-        EXPECT(ebpo_subtree_table_row(chunks, i, &row, NULL) == EBPO_OK);
-        EXPECT(row.subtree == i);
+        ck_assert(ebpo_subtree_table_row(chunks, i, &row, NULL) == EBPO_OK);
+        ck_assert(row.subtree == i);
         for (unsigned k = EBPO_SUBTREE_LEVELS; k < t->cols; k++)
-            EXPECT(row.before[k] == t->sum[i][k] && row.after[k] == t->sum[i + 1][k]);
+            ck_assert(row.before[k] == t->sum[i][k] && row.after[k] == t->sum[i + 1][k]);
         if (t->tree.mesh.faces)
             check_faces(t, &row, &face, &vertex);
     }
@@ -139,8 +138,8 @@ static void check_find(const plain_table *t, ebpo_chunks *chunks)
             ebpo_subtree_row row;
             for (uint64_t i = 0; i < t->subtrees; i++)
                 last = t->sum[i][k] <= item ? i : last;
-            EXPECT(ebpo_subtree_table_find(chunks, k, item, &row, NULL) == EBPO_OK);
-            EXPECT(row.subtree == last);
+            ck_assert(ebpo_subtree_table_find(chunks, k, item, &row, NULL) == EBPO_OK);
+            ck_assert(row.subtree == last);
         }
 }
 
@@ -148,9 +147,9 @@ static void check_table(const ebpo_file *file)
 {
     plain_table t;
     ebpo_chunks *chunks;
-    EXPECT(ebpo_file_info(file)->subtree_level > 0);
+    ck_assert(ebpo_file_info(file)->subtree_level > 0);
     plain_make(&t, file);
-    EXPECT(ebpo_chunks_make(&chunks, file, 0, NULL) == EBPO_OK);
+    ck_assert(ebpo_chunks_make(&chunks, file, 0, NULL) == EBPO_OK);
     check_rows(&t, chunks);
     check_find(&t, chunks);
     ebpo_chunks_free(chunks);
@@ -163,9 +162,9 @@ static void check_same(const two_layouts *l, uint64_t step)
 {
     const ebpo_info *a = ebpo_file_info(l->with), *b = ebpo_file_info(l->without);
     uint64_t turn = 0;
-    EXPECT(memcmp(a->content_sha256, b->content_sha256, 32) == 0);
-    EXPECT(b->subtree_level == 0);
-    EXPECT(ebpo_file_check_content(l->with, READ_BY(1), NULL) == EBPO_OK);
+    ck_assert(memcmp(a->content_sha256, b->content_sha256, 32) == 0);
+    ck_assert(b->subtree_level == 0);
+    ck_assert(ebpo_file_check_content(l->with, READ_BY(1), NULL) == EBPO_OK);
     for (int level = 0; level < a->level_count; level++) {
         uint64_t count, *codes = octcodes_of_level(l->without, level, &count);
         for (uint64_t i = 0; i < count; i++) {
@@ -173,7 +172,7 @@ static void check_same(const two_layouts *l, uint64_t step)
             if (turn++ % step)
                 continue;
             uint64_t sum = subtree_sum(l->without, codes[i], &without);
-            EXPECT(subtree_sum(l->with, codes[i], &with) == sum && with == without);
+            ck_assert(subtree_sum(l->with, codes[i], &with) == sum && with == without);
         }
         free(codes);
     }
@@ -318,8 +317,8 @@ static int64_t subtree_of(ebpo_chunks *chunks, const placed *p)
     if (p->id == EBPO_A_TYPES && p->level == info->subtree_level + 1)
         return (int64_t)p->row;
     placed gray = { 0, EBPO_A_PLANE_COUNTS, p->level - 1, p->row };
-    EXPECT(ebpo_subtree_table_find(chunks, column_of(info, p->id == EBPO_A_TYPES ? &gray : p),
-                                   p->row, &row, NULL) == EBPO_OK);
+    ck_assert(ebpo_subtree_table_find(chunks, column_of(info, p->id == EBPO_A_TYPES ? &gray : p),
+                                      p->row, &row, NULL) == EBPO_OK);
     return (int64_t)row.subtree;
 }
 
@@ -336,25 +335,25 @@ START_TEST(chunks_lie_in_the_order_of_the_specification)
         two_layouts_write(&l, &tree, ~0u, EBPO_CODEC_ZSTD, 60);
     }
     const ebpo_info *info = ebpo_file_info(l.with);
-    EXPECT(ebpo_file_locate(l.with, NULL, NULL) == EBPO_OK);
-    EXPECT(ebpo_chunks_make(&chunks, l.with, 0, NULL) == EBPO_OK);
+    ck_assert(ebpo_file_locate(l.with, NULL, NULL) == EBPO_OK);
+    ck_assert(ebpo_chunks_make(&chunks, l.with, 0, NULL) == EBPO_OK);
     placed *p = malloc(sizeof *p << 20);
     uint64_t count = list_chunks(l.with, p), sorted = 0;
-    EXPECT(count > 100);
+    ck_assert(count > 100);
     for (uint64_t i = 1; i < count; i++) {
         unsigned before = step_of(info, &p[i - 1]), step = step_of(info, &p[i]);
         ck_assert_msg(step >= before, "%s of level %d, row %d, after %s of level %d, row %d",
                       ebpo_schema[p[i].id].name, p[i].level, (int)p[i].row,
                       ebpo_schema[p[i - 1].id].name, p[i - 1].level, (int)p[i - 1].row);
         if (step == 1 && info->top_bytes)
-            EXPECT(p[i].address < info->top_bytes);
+            ck_assert(p[i].address < info->top_bytes);
         if (step != before || step < 100 || step >= 600)
             continue;
         int64_t a = subtree_of(chunks, &p[i - 1]), b = subtree_of(chunks, &p[i]);
-        EXPECT(a < 0 || b < 0 || a <= b);
+        ck_assert(a < 0 || b < 0 || a <= b);
         sorted++;
     }
-    EXPECT(sorted > 20);
+    ck_assert(sorted > 20);
     free(p);
     ebpo_chunks_free(chunks);
     two_layouts_close(&l);
@@ -371,13 +370,13 @@ START_TEST(a_list_that_is_not_what_the_table_counts_is_refused)
     ebpo_status status;
     two_layouts_build(&l, ebpo_test_torus(2, 0.7, 60, 40), 6, ALL, EBPO_CODEC_NONE, 40);
     hid_t h5 = H5Fopen(l.packed, H5F_ACC_RDWR, H5P_DEFAULT);
-    EXPECT(h5 >= 0 && H5Ldelete(h5, "/subtrees/outer", H5P_DEFAULT) >= 0 && H5Fclose(h5) >= 0);
-    EXPECT(ebpo_open(l.packed, &file, NULL) == EBPO_OK);
+    ck_assert(h5 >= 0 && H5Ldelete(h5, "/subtrees/outer", H5P_DEFAULT) >= 0 && H5Fclose(h5) >= 0);
+    ck_assert(ebpo_open(l.packed, &file, NULL) == EBPO_OK);
     uint64_t count, refused = 0,
                     *octcode = octcodes_of_level(file, ebpo_file_info(file)->subtree_level, &count);
     for (uint64_t i = 0; i < count; i++) {
         (void)subtree_sum(file, octcode[i], &status);
-        EXPECT(status == EBPO_OK || status == EBPO_E_FORMAT);
+        ck_assert(status == EBPO_OK || status == EBPO_E_FORMAT);
         refused += status == EBPO_E_FORMAT;
     }
     ck_assert_uint_gt(refused, 0);
@@ -407,13 +406,13 @@ START_TEST(a_line_that_is_down_is_not_tried_for_each_point)
         ebpo_test_circle(i, POINTS, &p[i][0], &p[i][1]);
     ebpo_file *far = counted_open(&c, l.packed, true);
     options.cut_level = ebpo_file_info(far)->subtree_level;
-    EXPECT(ebpo_model_new(far, &options, &model, NULL) == EBPO_OK);
-    EXPECT(ebpo_context_new(model, &context, NULL) == EBPO_OK);
+    ck_assert(ebpo_model_new(far, &options, &model, NULL) == EBPO_OK);
+    ck_assert(ebpo_context_new(model, &context, NULL) == EBPO_OK);
     c.failing = true;
-    EXPECT(ebpo_distance_many(context, p[0], POINTS, NULL, found, &error) == EBPO_E_IO);
+    ck_assert(ebpo_distance_many(context, p[0], POINTS, NULL, found, &error) == EBPO_E_IO);
     ck_assert_msg(c.failed < 16, "%d tries", (int)c.failed);
     c.failing = false;
-    EXPECT(ebpo_distance_many(context, p[0], POINTS, NULL, found, &error) == EBPO_OK);
+    ck_assert(ebpo_distance_many(context, p[0], POINTS, NULL, found, &error) == EBPO_OK);
     ebpo_context_free(context);
     ebpo_model_free(model);
     counted_close(&c, far);

@@ -10,7 +10,6 @@
 
 #include "check_main.h"
 #include "counted_source.h"
-#include "expect.h"
 #include "model_file.h"
 #include "random_tree.h"
 #include "scratch.h"
@@ -119,7 +118,7 @@ static uint64_t find(const records *all, uint64_t octcode)
         else
             high = middle;
     }
-    EXPECT(low < all->count && all->at[low].octcode == octcode);
+    ck_assert(low < all->count && all->at[low].octcode == octcode);
     return low;
 }
 
@@ -249,7 +248,8 @@ static ebpo_view_end next(ebpo_view_stream *stream, ebpo_view_node *node)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_view_end end;
-    EXPECT_MSG(ebpo_view_stream_next(stream, node, &end, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_view_stream_next(stream, node, &end, &error) == EBPO_OK, "%s",
+                  error.message);
     return end;
 }
 
@@ -308,17 +308,17 @@ static double plain_key(const viewer *v, uint64_t i)
 static void expect_first(const viewer *v, uint64_t parent)
 {
     double key = plain_key(v, parent);
-    EXPECT(wanted(v, parent));
+    ck_assert(wanted(v, parent));
     for (uint64_t i = 0; i < v->all->count; i++) {
         if (!v->in_cut[i] || i == parent || !wanted(v, i))
             continue;
-        EXPECT_MSG(v->seen[parent] >= v->seen[i], "%llu, which is not seen, before %llu",
-                   (unsigned long long)v->all->at[parent].octcode,
-                   (unsigned long long)v->all->at[i].octcode);
+        ck_assert_msg(v->seen[parent] >= v->seen[i], "%llu, which is not seen, before %llu",
+                      (unsigned long long)v->all->at[parent].octcode,
+                      (unsigned long long)v->all->at[i].octcode);
         if (v->seen[parent] == v->seen[i])
-            EXPECT_MSG(plain_key(v, i) >= key * (1 - 1e-9), "%llu waits while %llu is refined",
-                       (unsigned long long)v->all->at[i].octcode,
-                       (unsigned long long)v->all->at[parent].octcode);
+            ck_assert_msg(plain_key(v, i) >= key * (1 - 1e-9), "%llu waits while %llu is refined",
+                          (unsigned long long)v->all->at[i].octcode,
+                          (unsigned long long)v->all->at[parent].octcode);
     }
 }
 
@@ -326,28 +326,28 @@ static void take(viewer *v, const ebpo_view_node *n, bool check_order)
 {
     uint64_t i = find(v->all, n->node.octcode), parent = n->node.octcode >> 3;
     record r = record_of(&n->node);
-    EXPECT_MSG(same(&r, &v->all->at[i]), "node %llu is not what the file says",
-               (unsigned long long)r.octcode);
-    EXPECT(!v->come[i] && n->level == level_of(r.octcode));
+    ck_assert_msg(same(&r, &v->all->at[i]), "node %llu is not what the file says",
+                  (unsigned long long)r.octcode);
+    ck_assert(!v->come[i] && n->level == level_of(r.octcode));
     if (v->observer) {
         double reach = plain_reach(v->observer, &r), pixels = plain_pixels(v->observer, &r);
-        EXPECT(fabs(reach) < 1e-9 || n->seen == (reach > 0));
-        EXPECT(fabs(n->distance - plain_distance(v->observer, &r)) <= 1e-9 * (1 + n->distance));
-        EXPECT(n->pixels == pixels || fabs(n->pixels - pixels) <= 1e-9 * pixels);
+        ck_assert(fabs(reach) < 1e-9 || n->seen == (reach > 0));
+        ck_assert(fabs(n->distance - plain_distance(v->observer, &r)) <= 1e-9 * (1 + n->distance));
+        ck_assert(n->pixels == pixels || fabs(n->pixels - pixels) <= 1e-9 * pixels);
     } else {
-        EXPECT(n->seen && isnan(n->distance) && isnan(n->pixels));
+        ck_assert(n->seen && isnan(n->distance) && isnan(n->pixels));
     }
     v->come[i] = 1;
     v->seen[i] = n->seen;
     v->count++;
     if (parent && v->siblings == 0) {
-        EXPECT_MSG(v->in_cut[find(v->all, parent)], "a child before its parent is in the cut");
+        ck_assert_msg(v->in_cut[find(v->all, parent)], "a child before its parent is in the cut");
         if (check_order)
             expect_first(v, find(v->all, parent));
     }
-    EXPECT(v->siblings == 0 || v->all->at[v->group[0]].octcode >> 3 == parent);
+    ck_assert(v->siblings == 0 || v->all->at[v->group[0]].octcode >> 3 == parent);
     v->group[v->siblings++] = i;
-    EXPECT(n->complete == (v->siblings == (parent ? 8 : 1)));
+    ck_assert(n->complete == (v->siblings == (parent ? 8 : 1)));
     if (n->complete) {
         if (parent) {
             v->in_cut[find(v->all, parent)] = 0;
@@ -376,12 +376,12 @@ static bool visit(void *user, const ebpo_view_node *n)
     uint64_t i = find(c->v->all, n->node.octcode);
     record r = record_of(&n->node);
     double in, out;
-    EXPECT(same(&r, &c->v->all->at[i]) && n->complete && c->v->in_cut[i] && !c->met[i]);
+    ck_assert(same(&r, &c->v->all->at[i]) && n->complete && c->v->in_cut[i] && !c->met[i]);
     c->met[i] = 1;
     c->types[n->node.type]++;
     c->share += ldexp(1, -3 * n->level);
     if (c->ray && ray_meets(c->v->observer->eye, c->ray, &r, &in, &out)) {
-        EXPECT_MSG(in >= c->last_in, "the cut is not front to back");
+        ck_assert_msg(in >= c->last_in, "the cut is not front to back");
         c->last_in = out - 1e-9 * (1 + out);
     }
     return ++c->count != c->stop;
@@ -407,14 +407,14 @@ static void expect_cut(const viewer *v, ebpo_view_stream *stream, uint64_t *rand
     ck_assert_uint_eq(c.count, kept);
     /* different cells that cover as much as the root, none within another as all are in the
      * viewer's cut: */
-    EXPECT(c.share == (v->count ? 1 : 0));
+    ck_assert(c.share == (v->count ? 1 : 0));
     ebpo_view_stream_get_stats(stream, &stats);
     uint64_t waiting = 0;
     double pixels = 0;
     for (uint64_t i = 0; i < v->all->count; i++)
         if (v->in_cut[i]) {
             for (uint64_t above = v->all->at[i].octcode >> 3; above; above >>= 3)
-                EXPECT(!v->in_cut[find(v->all, above)]);
+                ck_assert(!v->in_cut[find(v->all, above)]);
             waiting += wanted(v, i);
             if (v->all->at[i].type == EBPO_GRAY && v->observer && v->seen[i])
                 pixels = fmax(pixels, plain_pixels(v->observer, &v->all->at[i]));
@@ -423,8 +423,8 @@ static void expect_cut(const viewer *v, ebpo_view_stream *stream, uint64_t *rand
     for (int k = 0; k < 4; k++)
         ck_assert_uint_eq(stats.cut[k], c.types[k]);
     ck_assert_uint_eq(stats.waiting, waiting);
-    EXPECT(v->observer ? stats.pixels == pixels || fabs(stats.pixels - pixels) < 1e-9 * pixels
-                       : isnan(stats.pixels));
+    ck_assert(v->observer ? stats.pixels == pixels || fabs(stats.pixels - pixels) < 1e-9 * pixels
+                          : isnan(stats.pixels));
     if (c.count > 2) { /* one may stop */
         cutter some = { .v = v, .met = calloc(v->all->count, 1), .stop = c.count / 2 };
         ebpo_view_stream_cut(stream, visit, &some);
@@ -533,7 +533,7 @@ START_TEST(pruned_nodes_of_subsets_stay_in_the_cut)
             take(&v, &node, false);
         ck_assert_uint_eq(v.count, all.count);
         ebpo_view_stream_cut(stream, add_share, &share);
-        EXPECT(share == 1);
+        ck_assert(share == 1);
         ebpo_view_stream_get_stats(stream, &stats);
         ck_assert_uint_eq(stats.waiting, 0);
         ck_assert_uint_eq(stats.cut[EBPO_GRAY], pruned);
@@ -574,9 +574,9 @@ START_TEST(refining_front_to_back_follows_every_ray)
             for (uint64_t b = a + 1; b < v.refined; b++) /* later, so not before a */
                 if (ray_meets(observer.eye, direction, &all.at[find(&all, v.order[b])], &in[1],
                               &out[1])) {
-                    EXPECT_MSG(out[1] > in[0] + 1e-9 * (1 + in[0]),
-                               "%llu is in front of %llu, and comes later",
-                               (unsigned long long)v.order[b], (unsigned long long)v.order[a]);
+                    ck_assert_msg(out[1] > in[0] + 1e-9 * (1 + in[0]),
+                                  "%llu is in front of %llu, and comes later",
+                                  (unsigned long long)v.order[b], (unsigned long long)v.order[a]);
                     pairs++;
                 }
         }
@@ -611,8 +611,8 @@ START_TEST(what_is_small_far_deep_or_unseen_is_not_refined)
             take(&v, &node, true);
         for (uint64_t i = 0; i < all.count; i++) {
             uint64_t parent = all.at[i].octcode >> 3;
-            EXPECT(v.come[i] ==
-                   (parent == 0 || (v.come[find(&all, parent)] && wanted(&v, find(&all, parent)))));
+            ck_assert(v.come[i] == (parent == 0 || (v.come[find(&all, parent)] &&
+                                                    wanted(&v, find(&all, parent)))));
         }
         expect_cut(&v, stream, &random);
         viewer_free(&v);
@@ -641,7 +641,7 @@ START_TEST(an_observer_who_moves_changes_what_comes_next)
         observer = observer_of(file, &random);
         options.priority = (ebpo_priority)(ebpo_test_random(&random) % PRIORITIES);
         v.options = options;
-        EXPECT(ebpo_view_stream_change(stream, &options, NULL) == EBPO_OK);
+        ck_assert(ebpo_view_stream_change(stream, &options, NULL) == EBPO_OK);
         for (uint64_t i = 0; i < all.count; i++)
             v.seen[i] = plain_reach(&observer, &all.at[i]) > -1e-13;
         expect_cut(&v, stream, &random);
@@ -654,11 +654,11 @@ START_TEST(an_observer_who_moves_changes_what_comes_next)
     uint64_t count = 0, parent = 0;
     bool within = false;
     for (; next(stream, &node) == EBPO_VIEW_NODE; count++) {
-        EXPECT(!within || node.node.octcode >> 3 == parent);
+        ck_assert(!within || node.node.octcode >> 3 == parent);
         parent = node.node.octcode >> 3;
         within = !node.complete;
         observer = observer_of(file, &random);
-        EXPECT(ebpo_view_stream_change(stream, &options, NULL) == EBPO_OK);
+        ck_assert(ebpo_view_stream_change(stream, &options, NULL) == EBPO_OK);
     }
     ck_assert_uint_eq(count, all.count);
     ebpo_view_stream_free(stream);
@@ -796,7 +796,7 @@ START_TEST(one_may_try_again_after_a_failure_and_streams_do_not_disturb_each_oth
         }
         if (end != EBPO_VIEW_NODE)
             break;
-        EXPECT(node.node.octcode == all[count++]);
+        ck_assert(node.node.octcode == all[count++]);
         (void)next(other, &node);
     }
     ck_assert_uint_eq(count, all_count);

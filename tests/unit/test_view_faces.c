@@ -7,7 +7,6 @@
 
 #include "check_main.h"
 #include "counted_source.h"
-#include "expect.h"
 #include "model_file.h"
 #include "random_tree.h"
 #include "scratch.h"
@@ -81,7 +80,7 @@ static void check_corners(const twin *t, const ebpo_view_faces *f)
             double corner[3];
             ebpo_test_point(&t->mesh, t->mesh.faces[3 * (uint64_t)f->numbers[i] + (uint64_t)k],
                             corner);
-            EXPECT(memcmp(corner, f->corners[i][k], sizeof corner) == 0);
+            ck_assert(memcmp(corner, f->corners[i][k], sizeof corner) == 0);
         }
 }
 
@@ -92,20 +91,20 @@ static void check_leaf(twin *t, const ebpo_file *file, uint64_t octcode, const e
     ebpo_subtree_faces own = EBPO_SUBTREE_FACES_INIT;
     uint64_t fresh = 0;
     if (t->leaves++ % 97 == 0) {
-        EXPECT(ebpo_subtree_open(file, octcode, NULL, &subtree, NULL) == EBPO_OK);
-        EXPECT(ebpo_subtree_get_faces(subtree, &own, NULL) == EBPO_OK);
-        EXPECT(own.face_count == f->face_count);
+        ck_assert(ebpo_subtree_open(file, octcode, NULL, &subtree, NULL) == EBPO_OK);
+        ck_assert(ebpo_subtree_get_faces(subtree, &own, NULL) == EBPO_OK);
+        ck_assert(own.face_count == f->face_count);
         for (uint64_t i = 0; i < own.face_count; i++)
-            EXPECT(own.numbers[i] == f->numbers[i]);
+            ck_assert(own.numbers[i] == f->numbers[i]);
         ebpo_subtree_close(subtree);
     }
     for (uint64_t i = 0; i < f->face_count; i++) {
-        EXPECT(f->numbers[i] < t->mesh.face_count);
-        EXPECT(f->repeated[i] == t->given[f->numbers[i]]);
+        ck_assert(f->numbers[i] < t->mesh.face_count);
+        ck_assert(f->repeated[i] == t->given[f->numbers[i]]);
         fresh += !f->repeated[i];
         t->given[f->numbers[i]] = 1;
     }
-    EXPECT(fresh == f->new_count);
+    ck_assert(fresh == f->new_count);
     t->fresh += fresh;
     t->repeated += f->face_count - fresh;
     check_corners(t, f);
@@ -121,9 +120,9 @@ static ebpo_view_end take_all(ebpo_view_stream *stream, const ebpo_file *whole, 
         ebpo_view_faces faces = EBPO_VIEW_FACES_INIT;
         ck_assert_msg(ebpo_view_stream_next(stream, &node, &end, &error) == EBPO_OK, "%s",
                       error.message);
-        EXPECT(ebpo_view_stream_get_faces(stream, &faces) == EBPO_OK);
+        ck_assert(ebpo_view_stream_get_faces(stream, &faces) == EBPO_OK);
         if (end != EBPO_VIEW_NODE || node.node.type != EBPO_LEAF)
-            EXPECT(faces.face_count == 0 && faces.new_count == 0);
+            ck_assert(faces.face_count == 0 && faces.new_count == 0);
         else
             check_leaf(t, whole, node.node.octcode, &faces);
         if (end != EBPO_VIEW_NODE)
@@ -227,10 +226,10 @@ START_TEST(one_may_try_again_after_a_failure)
         ebpo_status status = ebpo_view_stream_next(stream, &node, &end, NULL);
         c.failing = false;
         failed += status == EBPO_E_IO;
-        EXPECT(status == EBPO_OK || status == EBPO_E_IO);
-        EXPECT(ebpo_view_stream_get_faces(stream, &faces) == EBPO_OK);
+        ck_assert(status == EBPO_OK || status == EBPO_E_IO);
+        ck_assert(ebpo_view_stream_get_faces(stream, &faces) == EBPO_OK);
         if (status != EBPO_OK)
-            EXPECT(faces.face_count == 0);
+            ck_assert(faces.face_count == 0);
         else if (end != EBPO_VIEW_NODE)
             break;
         else if (node.node.type == EBPO_LEAF)

@@ -1,5 +1,4 @@
 /* Integers of 128 bits, against GMP's. */
-#include <check.h>
 #include <gmp.h>
 
 #include "core/hash.h"
