@@ -698,7 +698,7 @@ START_TEST(boxes_meet_triangles_as_rational_clipping_says)
     long meets = 0, apart = 0;
     uint64_t state = 21 + (uint64_t)_i;
     const int most = _i == 6 ? ROUNDS / 2 : ROUNDS, rounds = scaled_rounds(most);
-    const long least = 300L * rounds / most;
+    const long least = 200L * rounds / most;
     for (int i = 0; i < rounds; i++) {
         double triangle[3][3], min[3], max[3];
         box_case(_i, triangle, min, max, &state);
