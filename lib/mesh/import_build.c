@@ -310,20 +310,18 @@ ebpo_status ebpo_import_end(import_build *b)
     return status;
 }
 
-ebpo_status ebpo_import_notes(import_build *b)
-{
-    ebpo_mesh *mesh = b->mesh;
-    if (!mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
-        return ebpo_fail_memory(b->error, sizeof *mesh->attributes);
-    return EBPO_OK;
-}
-
 void ebpo_import_word_text(char text[IMPORT_WORD_TEXT], const char *s, size_t n)
 {
     n = n < IMPORT_WORD_TEXT ? n : IMPORT_WORD_TEXT - 1;
     for (size_t i = 0; i < n; i++)
         text[i] = s[i] < ' ' || s[i] > '~' ? '?' : s[i];
     text[n] = 0;
+}
+
+void ebpo_import_runs_free(ebpo_import_runs *runs)
+{
+    free(runs->of);
+    *runs = (ebpo_import_runs){ 0 };
 }
 
 void ebpo_import_free(import_build *b)

@@ -7,9 +7,12 @@
 #define EBPO_MESH_IMPORT_BUILD_H
 
 #include <locale.h>
+#include <string.h>
 
 #include <ebpo/base.h>
 #include <ebpo/mesh.h>
+
+#include "core/text.h"
 
 #define IMPORT_MOST (UINT64_C(0xfffffffe))
 #define IMPORT_NONE UINT32_MAX /* no vertex has this number */
@@ -103,10 +106,6 @@ EBPO_MUST_USE ebpo_status ebpo_import_end(import_build *b);
  * say the same; else to the faces, one for the face or as lists of its three corners'. */
 EBPO_MUST_USE ebpo_status ebpo_import_attributes(import_build *b);
 
-/* Gives the mesh attributes where it has none, so that what was left out can be noted.
- * EBPO_E_MEMORY. */
-EBPO_MUST_USE ebpo_status ebpo_import_notes(import_build *b);
-
 /* Copies a word for a message: at most 40 characters, what is not printable becomes '?'. */
 enum { IMPORT_WORD_TEXT = 41 };
 void ebpo_import_word_text(char text[IMPORT_WORD_TEXT], const char *s, size_t n);
@@ -124,40 +123,55 @@ void ebpo_import_free(import_build *b);
 EBPO_MUST_USE ebpo_status ebpo_import_weld(void *xyz, bool doubles, uint64_t count, uint32_t *map,
                                            uint64_t *welded, ebpo_error *error);
 
-/* Reading OFF files, by words: rows may go over lines, and lines hold several rows. Sources: the
- * manual of Geomview 1.9.4, "OFF Files"; CGAL and MeshLab, whose colours are of three or four
- * values.
- */
+/* --- formats --- */
 
-/* Whether a file begins with the word OFF, with letters before it that say what vertices have. */
-bool ebpo_off_recognise(const uint8_t *data, uint64_t size);
+/* Faces that stand under one name each. */
+typedef struct ebpo_import_runs {
+    ebpo_named_run *of; /* [count] the first is what stands before any name; that is "" */
+    uint64_t count, capacity;
+} ebpo_import_runs;
 
-/* Makes the mesh, and its attributes if they are kept. Errors are those of ebpo_import_memory. */
-EBPO_MUST_USE ebpo_status ebpo_off_read(import_build *b, const uint8_t *data, uint64_t size);
+void ebpo_import_runs_free(ebpo_import_runs *runs);
 
-/* Binary STL files. */
+/* A file that is in memory, and what is wanted of it. */
+typedef struct ebpo_import_job {
+    const uint8_t *data;
+    uint64_t size;
+    const char *name;              /* a path or any other name, shown without its folders */
+    ebpo_workspace *workspace;     /* for arrays; NULL: they are in memory */
+    bool attributes;               /* properties beyond positions and corners are kept */
+    unsigned threads;              /* 0: all cores; the mesh does not depend on it */
+    const ebpo_progress *progress; /* NULL: nobody is told */
+    /* NULL, or empty at first: gets the runs of a format that names groups; their names point into
+     * `data`. No more than one run: the file has no names. */
+    ebpo_import_runs *runs;
+} ebpo_import_job;
 
-/* True where all bytes are those of binary models: of one, also with the bytes that its facets'
- * attribute byte counts state, or of several, one behind the other. */
-bool ebpo_stl_fits_binary(const uint8_t *data, uint64_t size);
+/* What is known of a format: a row of the table in import.c. */
+typedef struct ebpo_import_format {
+    const char *called; /* in messages: its name with an article, "an OBJ" */
+    const char *ending; /* of names: ".obj"; without the dot it is the mesh's source_format */
+    /* True where a file begins as those of this format do. */
+    bool (*recognise)(const uint8_t *data, uint64_t size);
+    bool mark_comes_first; /* the name does not count, whichever format it says */
+    bool has_no_mark;      /* files of other formats might begin so, too */
+    /* One of two, the other is NULL. Adds what the file holds to a mesh that is being made; or
+     * makes the whole mesh, tells of progress, and clears `out` on failure. Errors are those of
+     * ebpo_import_memory. */
+    ebpo_status (*build)(import_build *b, const ebpo_import_job *job);
+    ebpo_status (*read)(ebpo_mesh *out, const ebpo_import_job *job, ebpo_error *error);
+} ebpo_import_format;
 
-/* True if the first `known` bytes of a file state that a binary model takes `size` bytes. */
+/* The name without its article. */
+static inline const char *ebpo_import_name(const ebpo_import_format *format)
+{
+    return strchr(format->called, ' ') + 1;
+}
+
+/* The rows, each in the file of its reader. */
+extern const ebpo_import_format ebpo_import_ply, ebpo_import_obj, ebpo_import_stl, ebpo_import_off;
+
+/* True if the first `known` bytes of a file state that a binary STL model takes `size` bytes. */
 bool ebpo_stl_states_size(const uint8_t *data, uint64_t known, uint64_t size);
-
-/* Reads the facets as vertices, three each, and notes bytes that are not read. *plain: the size of
- * the one model whose facets have their two bytes of attributes; 0: it is another file. */
-EBPO_MUST_USE ebpo_status ebpo_stl_read_binary(import_build *b, const uint8_t *data, uint64_t size,
-                                               uint64_t *plain);
-
-/* Reading STL files, in text and binary. Source: "StereoLithography Interface Specification", 3D
- * Systems, 1989. */
-
-/* True for the bytes of an STL file: binary if all of them are those of the faces that it states,
- * whatever it begins with; else text that begins with the word solid. */
-bool ebpo_stl_recognise(const uint8_t *data, uint64_t size);
-
-/* Makes the mesh. A file that is called STL is text if it says so and has the word facet. Normals
- * are not read: they follow from corners. Errors are those of ebpo_import_memory. */
-EBPO_MUST_USE ebpo_status ebpo_stl_read(import_build *b, const uint8_t *data, uint64_t size);
 
 #endif

@@ -36,7 +36,7 @@ typedef struct obj_reading {
     uint64_t line;               /* where the statement began */
     uint64_t rows[IMPORT_SORTS]; /* of the file's vertices, normals, texture coordinates; in the
                                     second pass of those so far */
-    ebpo_obj_runs *runs;         /* NULL: not asked for */
+    ebpo_import_runs *runs;      /* NULL: not asked for */
     obj_losses losses;
     obj_names names;
 } obj_reading;
@@ -149,13 +149,7 @@ bool ebpo_obj_word_is(obj_word word, const char *text)
 
 enum { RUNS_MOST = 100000000, MATERIALS_MOST = 10000000 };
 
-void ebpo_obj_runs_free(ebpo_obj_runs *runs)
-{
-    free(runs->of);
-    *runs = (ebpo_obj_runs){ 0 };
-}
-
-ebpo_status ebpo_obj_runs_add(ebpo_obj_runs *runs, obj_word run, const char *name,
+ebpo_status ebpo_obj_runs_add(ebpo_import_runs *runs, obj_word run, const char *name,
                               ebpo_error *error)
 {
     if (runs->count == RUNS_MOST)
@@ -724,7 +718,9 @@ static bool any_unread(const obj_losses *l)
 static ebpo_status note_all(obj_reading *r)
 {
     ebpo_mesh *mesh = r->build->mesh;
-    ebpo_status status = any_unread(&r->losses) ? ebpo_import_notes(r->build) : EBPO_OK;
+    ebpo_status status = any_unread(&r->losses)
+                             ? ebpo_mesh_need_attributes(r->build->mesh, r->build->error)
+                             : EBPO_OK;
     if (status != EBPO_OK)
         return status;
     if (mesh->attributes)
@@ -751,13 +747,34 @@ static ebpo_status read_all(obj_reading *r)
     return status == EBPO_OK ? note_all(r) : status;
 }
 
-ebpo_status ebpo_obj_read(import_build *b, const uint8_t *data, uint64_t size, ebpo_obj_runs *runs)
+static ebpo_status build_obj(import_build *b, const ebpo_import_job *job)
 {
-    obj_reading r = { .build = b, .data = data, .size = size, .runs = runs };
-    r.text = ebpo_obj_text(data, size);
+    obj_reading r = { .build = b, .data = job->data, .size = job->size, .runs = job->runs };
+    r.text = ebpo_obj_text(r.data, r.size);
     ebpo_status status = read_all(&r);
-    if (status == EBPO_OK && r.losses.groups && b->attributes && !runs)
+    if (status == EBPO_OK && r.losses.groups && b->attributes && !r.runs)
         ebpo_attributes_lose(b->mesh->attributes, "names of groups and objects");
     ebpo_obj_names_free(&r.names, b->mesh->workspace);
     return status;
 }
+
+/* An OBJ file has no mark: its first word is one of those that such files begin with. */
+static bool begins_as_obj(const uint8_t *data, uint64_t size)
+{
+    static const char *const words[] = { "v", "vt", "vn", "vp",     "f",
+                                         "g", "o",  "s",  "mtllib", "usemtl" };
+    obj_text t = ebpo_obj_text(data, size);
+    obj_word word;
+    if (!ebpo_obj_next_statement(&t, &word))
+        return false;
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (ebpo_obj_word_is(word, words[i]))
+            return true;
+    return false;
+}
+
+const ebpo_import_format ebpo_import_obj = { .called = "an OBJ",
+                                             .ending = ".obj",
+                                             .recognise = begins_as_obj,
+                                             .has_no_mark = true,
+                                             .build = build_obj };

@@ -40,16 +40,8 @@ bool ebpo_obj_word_is(obj_word word, const char *text);
 
 /* Names in OBJ files: of materials, which faces have numbers of, and of groups. */
 
-/* Faces that stand under one `g` or `o` line. */
-typedef struct ebpo_obj_runs {
-    ebpo_named_run *of; /* [count] the first is what stands before any name; that is "" */
-    uint64_t count, capacity;
-} ebpo_obj_runs;
-
-void ebpo_obj_runs_free(ebpo_obj_runs *runs);
-
 /* Begins a run. EBPO_E_LIMIT, EBPO_E_MEMORY. */
-EBPO_MUST_USE ebpo_status ebpo_obj_runs_add(ebpo_obj_runs *runs, obj_word run, const char *name,
+EBPO_MUST_USE ebpo_status ebpo_obj_runs_add(ebpo_import_runs *runs, obj_word run, const char *name,
                                             ebpo_error *error);
 
 typedef struct obj_names {
@@ -75,14 +67,5 @@ EBPO_MUST_USE ebpo_status ebpo_obj_keep_materials(obj_names *names, ebpo_mesh *m
                                                   ebpo_error *error);
 
 void ebpo_obj_names_free(obj_names *names, ebpo_workspace *workspace);
-
-/* Reading OBJ files: polygons, colours, normals, texture coordinates, names of materials and
- * groups.
- */
-
-/* Makes the mesh, and its attributes if they are kept. `runs`: NULL, or gets the runs of groups.
- * Errors are those of ebpo_import_memory. */
-EBPO_MUST_USE ebpo_status ebpo_obj_read(import_build *b, const uint8_t *data, uint64_t size,
-                                        ebpo_obj_runs *runs);
 
 #endif

@@ -1,3 +1,6 @@
+/* Reading OFF files, by words: rows may go over lines, and lines hold several rows. Sources: the
+ * manual of Geomview 1.9.4, "OFF Files"; CGAL and MeshLab, whose colours are of three or four
+ * values. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -160,7 +163,9 @@ static size_t read_kind(off_word word, off_reading *r, bool *dimension)
     return named ? (size_t)(s + 3 - word.s) : 0;
 }
 
-bool ebpo_off_recognise(const uint8_t *data, uint64_t size)
+/* True where a file begins with the word OFF, with letters before it that say what vertices have.
+ */
+static bool has_off_word(const uint8_t *data, uint64_t size)
 {
     off_text t = { (const char *)data + ebpo_text_mark(data, size), (const char *)data + size, 1 };
     off_word word;
@@ -459,7 +464,7 @@ static ebpo_status note_unread(off_reading *r)
 {
     ebpo_mesh *mesh = r->build->mesh;
     bool any = r->divided || r->surplus_vertices || r->surplus_faces || r->more;
-    ebpo_status status = any ? ebpo_import_notes(r->build) : EBPO_OK;
+    ebpo_status status = any ? ebpo_mesh_need_attributes(r->build->mesh, r->build->error) : EBPO_OK;
     if (!any || status != EBPO_OK)
         return status;
     ebpo_attributes_count_unread(mesh->attributes,
@@ -503,10 +508,10 @@ static ebpo_status read_rows(off_reading *r)
     return status;
 }
 
-ebpo_status ebpo_off_read(import_build *b, const uint8_t *data, uint64_t size)
+static ebpo_status build_off(import_build *b, const ebpo_import_job *job)
 {
-    off_reading r = { .build = b, .begin = (const char *)data, .size = size };
-    r.text = (off_text){ r.begin + ebpo_text_mark(data, size), r.begin + size, 1 };
+    off_reading r = { .build = b, .begin = (const char *)job->data, .size = job->size };
+    r.text = (off_text){ r.begin + ebpo_text_mark(job->data, r.size), r.begin + r.size, 1 };
     ebpo_status status = read_head(&r);
     if (status == EBPO_OK)
         status = read_rows(&r);
@@ -519,3 +524,7 @@ ebpo_status ebpo_off_read(import_build *b, const uint8_t *data, uint64_t size)
         note_losses(&r, b->mesh->attributes);
     return status == EBPO_OK ? note_unread(&r) : status;
 }
+
+const ebpo_import_format ebpo_import_off = {
+    .called = "an OFF", .ending = ".off", .recognise = has_off_word, .build = build_off
+};

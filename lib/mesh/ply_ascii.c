@@ -38,8 +38,8 @@ static bool next_token(ply_parser *p, ply_word *token)
 
 static ebpo_status fail_token(const rows *r, const char *what, ply_word token)
 {
-    char text[PLY_WORD_TEXT];
-    ebpo_ply_word_text(text, token);
+    char text[IMPORT_WORD_TEXT];
+    ebpo_import_word_text(text, token.s, token.n);
     return ebpo_ply_fail(r->p, "%s '%s' in %s %" PRIu64 "; repair the file", what, text,
                          ebpo_ply_row_name(r->element), r->row);
 }

@@ -64,9 +64,9 @@ static unsigned find_together(const ply_property *property, uint64_t left)
 static void ply_attributes_lose(const ply_parser *p, const ply_element *element,
                                 const ply_property *property, const char *why)
 {
-    char of[PLY_WORD_TEXT], name[PLY_WORD_TEXT];
-    ebpo_ply_word_text(of, element->name);
-    ebpo_ply_word_text(name, property->name);
+    char of[IMPORT_WORD_TEXT], name[IMPORT_WORD_TEXT];
+    ebpo_import_word_text(of, element->name.s, element->name.n);
+    ebpo_import_word_text(name, property->name.s, property->name.n);
     ebpo_attributes_lose(p->mesh->attributes, "property '%s' of '%s' (%s)", name, of, why);
 }
 
@@ -132,10 +132,9 @@ static ebpo_status plan_element(ply_parser *p, const ply_element *element)
 
 ebpo_status ebpo_ply_attributes_plan(ply_parser *p)
 {
-    p->mesh->attributes = ebpo_attributes_make(p->mesh->workspace);
-    if (!p->mesh->attributes)
-        return ebpo_fail_memory(p->error, sizeof *p->mesh->attributes);
-    ebpo_status status = EBPO_OK;
+    ebpo_status status = ebpo_mesh_need_attributes(p->mesh, p->error);
+    if (status != EBPO_OK)
+        return status;
     for (uint64_t i = 0; i < p->header.elements && status == EBPO_OK; i++)
         status = plan_element(p, &p->header.element[i]);
     p->lost = ebpo_alloc_zero(EBPO_ATTRIBUTE_ARRAYS, sizeof *p->lost);
@@ -236,9 +235,9 @@ uint64_t ebpo_ply_text_bits(ply_parser *p, const ply_property *property, ply_wor
     uint64_t bits = 0;
     if (text_bits(p, property->type, token, &bits) || p->lost[property->attribute])
         return bits;
-    char text[PLY_WORD_TEXT], name[PLY_WORD_TEXT];
-    ebpo_ply_word_text(text, token);
-    ebpo_ply_word_text(name, property->name);
+    char text[IMPORT_WORD_TEXT], name[IMPORT_WORD_TEXT];
+    ebpo_import_word_text(text, token.s, token.n);
+    ebpo_import_word_text(name, property->name.s, property->name.n);
     const ebpo_attribute *a = &p->mesh->attributes->array[property->attribute];
     ebpo_attributes_lose(p->mesh->attributes,
                          "property '%s' of '%s' (row %" PRIu64 " has '%s', which is none of its "

@@ -253,7 +253,7 @@ static void move_attributes(const leaving *l)
 
 static ebpo_status ply_faces_note(const leaving *l, uint64_t left)
 {
-    ebpo_status status = ebpo_ply_notes(l->p);
+    ebpo_status status = ebpo_mesh_need_attributes(l->p->mesh, l->p->error);
     if (status == EBPO_OK)
         ebpo_attributes_count_unread(
             l->p->mesh->attributes,

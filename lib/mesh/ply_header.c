@@ -48,18 +48,10 @@ static bool ply_header_is(ply_word word, const char *text)
     return strlen(text) == word.n && memcmp(word.s, text, word.n) == 0;
 }
 
-void ebpo_ply_word_text(char text[PLY_WORD_TEXT], ply_word word)
-{
-    size_t n = word.n < PLY_WORD_TEXT - 1 ? word.n : PLY_WORD_TEXT - 1;
-    for (size_t i = 0; i < n; i++)
-        text[i] = word.s[i] >= ' ' && word.s[i] <= '~' ? word.s[i] : '?';
-    text[n] = 0;
-}
-
 static ebpo_status ply_header_fail(const reader *r, const char *what, ply_word word)
 {
-    char text[PLY_WORD_TEXT];
-    ebpo_ply_word_text(text, word);
+    char text[IMPORT_WORD_TEXT];
+    ebpo_import_word_text(text, word.s, word.n);
     return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
                           "line %" PRIu64
                           ": %s '%s'; this is not a PLY header as the format describes it",
@@ -388,14 +380,6 @@ ebpo_status ebpo_ply_fail(const ply_parser *p, const char *format, ...)
                         "byte %" PRIu64 ": %s", p->at, text);
 }
 
-ebpo_status ebpo_ply_notes(ply_parser *p)
-{
-    ebpo_mesh *mesh = p->mesh;
-    if (!mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
-        return ebpo_fail_memory(p->error, sizeof *mesh->attributes);
-    return EBPO_OK;
-}
-
 const char *ebpo_ply_row_name(const ply_element *element)
 {
     static const char *const names[] = { "element", "vertex", "face", "strip" };
@@ -404,8 +388,8 @@ const char *ebpo_ply_row_name(const ply_element *element)
 
 ebpo_status ebpo_ply_fail_end(const ply_parser *p, const ply_element *element, uint64_t row)
 {
-    char name[PLY_WORD_TEXT];
-    ebpo_ply_word_text(name, element->name);
+    char name[IMPORT_WORD_TEXT];
+    ebpo_import_word_text(name, element->name.s, element->name.n);
     return ebpo_ply_fail(p,
                          "the file ends after %" PRIu64 " bytes within row %" PRIu64
                          " of the %" PRIu64 " of element '%s'; it is cut short, get it again",

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "io/file_source.h"
+#include "mesh/import_build.h"
 #include "mesh/ply.h"
 #include "mesh/ply_parts.h"
 
@@ -44,8 +45,8 @@ static ebpo_status check_counts(ply_parser *p)
             left -= need;
             continue;
         }
-        char name[PLY_WORD_TEXT];
-        ebpo_ply_word_text(name, e->name);
+        char name[IMPORT_WORD_TEXT];
+        ebpo_import_word_text(name, e->name.s, e->name.n);
         if (p->header.encoding == PLY_ASCII || e->has_list)
             return ebpo_fail_file(
                 p->error, EBPO_E_FORMAT, p->name,
@@ -183,8 +184,9 @@ static void ply_parse_describe(ply_parser *p)
 static ebpo_status note_unread(ply_parser *p)
 {
     bool more = p->header.encoding == PLY_ASCII && ebpo_ply_ascii_more(p);
-    ebpo_status status =
-        p->surplus_values || more || p->most_rounded > 0 ? ebpo_ply_notes(p) : EBPO_OK;
+    ebpo_status status = p->surplus_values || more || p->most_rounded > 0
+                             ? ebpo_mesh_need_attributes(p->mesh, p->error)
+                             : EBPO_OK;
     if (status != EBPO_OK)
         return status;
     if (more)
@@ -258,6 +260,18 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
     *out = mesh;
     return status;
 }
+
+static ebpo_status read_ply(ebpo_mesh *out, const ebpo_import_job *job, ebpo_error *error)
+{
+    return ebpo_ply_parse_all(out, job->data, job->size, job->name, job->workspace, job->attributes,
+                              job->threads, job->progress, error);
+}
+
+const ebpo_import_format ebpo_import_ply = { .called = "a PLY",
+                                             .ending = ".ply",
+                                             .recognise = ebpo_ply_recognise,
+                                             .mark_comes_first = true,
+                                             .read = read_ply };
 
 ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *name, double **xyz,
                                   uint64_t *count, ebpo_error *error)

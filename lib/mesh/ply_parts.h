@@ -9,6 +9,7 @@
 #include <ebpo/mesh.h>
 
 #include "mesh/attributes.h"
+#include "mesh/import_build.h"
 
 typedef enum ply_encoding { PLY_ASCII, PLY_LITTLE, PLY_BIG } ply_encoding;
 typedef enum ply_type {
@@ -83,10 +84,6 @@ void ebpo_ply_header_free(ply_header *header);
  * a mark of the order of bytes, and have blanks behind it. NULL: there is no such line. */
 const char *ebpo_ply_first_line(const uint8_t *data, uint64_t size, char *line_end);
 
-/* A word for a message: at most 40 characters, what is not printable ASCII becomes '?'. */
-enum { PLY_WORD_TEXT = 41 };
-void ebpo_ply_word_text(char text[PLY_WORD_TEXT], ply_word word);
-
 /* Bytes of one value in a binary file: 1, 2, 4 or 8. */
 unsigned ebpo_ply_type_bytes(ply_type type);
 
@@ -125,10 +122,6 @@ typedef struct ply_parser {
 ebpo_status ebpo_ply_fail(const ply_parser *p, const char *format, ...) EBPO_PRINTF(2, 3);
 /* The file ends within row `row` of `element`. */
 ebpo_status ebpo_ply_fail_end(const ply_parser *p, const ply_element *element, uint64_t row);
-
-/* Gives the mesh attributes where it has none, so that what was left out can be noted.
- * EBPO_E_MEMORY. */
-EBPO_MUST_USE ebpo_status ebpo_ply_notes(ply_parser *p);
 
 /* "vertex", "face", "strip" or "element" for messages. */
 const char *ebpo_ply_row_name(const ply_element *element);
