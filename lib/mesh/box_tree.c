@@ -4,7 +4,7 @@
 #include "core/workspace.h"
 #include "mesh/box_tree.h"
 
-mesh_point *ebpo_point_tree_add(point_tree *tree)
+ebpo_tree_point *ebpo_point_tree_add(ebpo_point_tree *tree)
 {
     if (!ebpo_array_grow_late(tree->workspace, &tree->point, &tree->capacity, tree->count + 1,
                               sizeof *tree->point))
@@ -12,15 +12,15 @@ mesh_point *ebpo_point_tree_add(point_tree *tree)
     return &tree->point[tree->count++];
 }
 
-void ebpo_point_tree_free(point_tree *tree)
+void ebpo_point_tree_free(ebpo_point_tree *tree)
 {
     ebpo_array_free(tree->workspace, tree->point);
     ebpo_array_free(tree->workspace, tree->node);
 }
 
-static point_box box_of_points(const mesh_point *p, uint64_t count)
+static ebpo_point_box box_of_points(const ebpo_tree_point *p, uint64_t count)
 {
-    point_box box;
+    ebpo_point_box box;
     for (int k = 0; k < 3; k++)
         box.min[k] = box.max[k] = p[0].at[k];
     for (uint64_t i = 1; i < count; i++)
@@ -32,7 +32,7 @@ static point_box box_of_points(const mesh_point *p, uint64_t count)
 }
 
 /* Halves, as their difference may be beyond the doubles. */
-static int longest_axis(const point_box *box)
+static int longest_axis(const ebpo_point_box *box)
 {
     int best = 0;
     double most = -1;
@@ -44,15 +44,15 @@ static int longest_axis(const point_box *box)
     return best;
 }
 
-static void swap_points(mesh_point *a, mesh_point *b)
+static void swap_points(ebpo_tree_point *a, ebpo_tree_point *b)
 {
-    mesh_point t = *a;
+    ebpo_tree_point t = *a;
     *a = *b;
     *b = t;
 }
 
 /* What is before p[middle] is not greater along the axis, what is behind it not less (Hoare). */
-static void split_points(mesh_point *p, uint64_t count, uint64_t middle, int axis)
+static void split_points(ebpo_tree_point *p, uint64_t count, uint64_t middle, int axis)
 {
     uint64_t low = 0, high = count - 1;
     while (low < high) {
@@ -74,20 +74,21 @@ static void split_points(mesh_point *p, uint64_t count, uint64_t middle, int axi
     }
 }
 
-static void build_node(const point_tree *tree, uint64_t node, mesh_point *p, uint64_t count)
+static void build_node(const ebpo_point_tree *tree, uint64_t node, ebpo_tree_point *p,
+                       uint64_t count)
 {
     tree->node[node] = box_of_points(p, count);
-    if (count <= POINT_TREE_LEAF)
+    if (count <= EBPO_POINT_TREE_LEAF)
         return;
     split_points(p, count, count / 2, longest_axis(&tree->node[node]));
     build_node(tree, 2 * node + 1, p, count / 2);
     build_node(tree, 2 * node + 2, p + count / 2, count - count / 2);
 }
 
-bool ebpo_point_tree_build(point_tree *tree)
+bool ebpo_point_tree_build(ebpo_point_tree *tree)
 {
     uint64_t nodes = 1;
-    for (uint64_t most = tree->count; most > POINT_TREE_LEAF; most -= most / 2)
+    for (uint64_t most = tree->count; most > EBPO_POINT_TREE_LEAF; most -= most / 2)
         nodes = 2 * nodes + 1;
     if (tree->count == 0)
         return true;
@@ -99,35 +100,36 @@ bool ebpo_point_tree_build(point_tree *tree)
 }
 
 typedef struct point_walking {
-    const point_tree *tree;
-    point_box_fn wanted;
-    points_fn visit;
+    const ebpo_point_tree *tree;
+    ebpo_point_box_fn wanted;
+    ebpo_tree_points_fn visit;
     void *user;
 } point_walking;
 
-static bool walk_points(const point_walking *w, uint64_t node, mesh_point *p, uint64_t count)
+static bool walk_points(const point_walking *w, uint64_t node, ebpo_tree_point *p, uint64_t count)
 {
     if (!w->wanted(w->user, &w->tree->node[node]))
         return true;
-    if (count <= POINT_TREE_LEAF)
+    if (count <= EBPO_POINT_TREE_LEAF)
         return w->visit(w->user, p, count);
     return walk_points(w, 2 * node + 1, p, count / 2) &&
            walk_points(w, 2 * node + 2, p + count / 2, count - count / 2);
 }
 
-bool ebpo_point_tree_walk(const point_tree *tree, point_box_fn wanted, points_fn visit, void *user)
+bool ebpo_point_tree_walk(const ebpo_point_tree *tree, ebpo_point_box_fn wanted,
+                          ebpo_tree_points_fn visit, void *user)
 {
     point_walking w = { tree, wanted, visit, user };
     return tree->count == 0 || walk_points(&w, 0, tree->point, tree->count);
 }
 
 typedef struct filling {
-    box_tree *tree;
-    box_of_fn box_of;
+    ebpo_box_tree *tree;
+    ebpo_box_of_fn box_of;
     const void *user;
 } filling;
 
-static void join_boxes(point_box *box, const point_box *other)
+static void join_boxes(ebpo_point_box *box, const ebpo_point_box *other)
 {
     for (int k = 0; k < 3; k++) {
         box->min[k] = other->min[k] < box->min[k] ? other->min[k] : box->min[k];
@@ -135,10 +137,10 @@ static void join_boxes(point_box *box, const point_box *other)
     }
 }
 
-static void fill_node(const filling *f, uint64_t node, const mesh_point *p, uint64_t count)
+static void fill_node(const filling *f, uint64_t node, const ebpo_tree_point *p, uint64_t count)
 {
-    point_box *box = &f->tree->filled[node], other;
-    if (count <= POINT_TREE_LEAF) {
+    ebpo_point_box *box = &f->tree->filled[node], other;
+    if (count <= EBPO_POINT_TREE_LEAF) {
         f->box_of(f->user, &p[0], box);
         for (uint64_t i = 1; i < count; i++) {
             f->box_of(f->user, &p[i], &other);
@@ -152,10 +154,10 @@ static void fill_node(const filling *f, uint64_t node, const mesh_point *p, uint
     join_boxes(box, &f->tree->filled[2 * node + 2]);
 }
 
-bool ebpo_box_tree_build(box_tree *tree, box_of_fn box_of, const void *user)
+bool ebpo_box_tree_build(ebpo_box_tree *tree, ebpo_box_of_fn box_of, const void *user)
 {
     filling f = { tree, box_of, user };
-    point_tree *points = &tree->points;
+    ebpo_point_tree *points = &tree->points;
     if (points->count == 0)
         return true;
     if (!ebpo_point_tree_build(points))
@@ -167,31 +169,32 @@ bool ebpo_box_tree_build(box_tree *tree, box_of_fn box_of, const void *user)
     return true;
 }
 
-void ebpo_box_tree_free(box_tree *tree)
+void ebpo_box_tree_free(ebpo_box_tree *tree)
 {
     ebpo_array_free(tree->points.workspace, tree->filled);
     ebpo_point_tree_free(&tree->points);
 }
 
 typedef struct box_walking {
-    const box_tree *tree;
-    box_node_fn wanted;
-    points_fn visit;
+    const ebpo_box_tree *tree;
+    ebpo_box_node_fn wanted;
+    ebpo_tree_points_fn visit;
     void *user;
 } box_walking;
 
-static bool walk_boxes(const box_walking *w, uint64_t node, mesh_point *p, uint64_t count)
+static bool walk_boxes(const box_walking *w, uint64_t node, ebpo_tree_point *p, uint64_t count)
 {
-    box_node n = { &w->tree->points.node[node], &w->tree->filled[node], count };
+    ebpo_box_node n = { &w->tree->points.node[node], &w->tree->filled[node], count };
     if (!w->wanted(w->user, &n))
         return true;
-    if (count <= POINT_TREE_LEAF)
+    if (count <= EBPO_POINT_TREE_LEAF)
         return w->visit(w->user, p, count);
     return walk_boxes(w, 2 * node + 1, p, count / 2) &&
            walk_boxes(w, 2 * node + 2, p + count / 2, count - count / 2);
 }
 
-bool ebpo_box_tree_walk(const box_tree *tree, box_node_fn wanted, points_fn visit, void *user)
+bool ebpo_box_tree_walk(const ebpo_box_tree *tree, ebpo_box_node_fn wanted,
+                        ebpo_tree_points_fn visit, void *user)
 {
     box_walking w = { tree, wanted, visit, user };
     return tree->points.count == 0 || walk_boxes(&w, 0, tree->points.point, tree->points.count);

@@ -1,6 +1,6 @@
 /* Reading meshes of all formats. The table below has one row for each format. A new format is a
- * file NAME.c that has its reader and its row, a declaration of the row in import_build.h, and a
- * line in the table. */
+ * file NAME.c that has its reader and its row, a declaration of the row in import_build.h, and
+ * a line in the table. */
 #include "core/strict_fp.h"
 
 #include "mesh/import.h"
@@ -55,7 +55,7 @@ static ebpo_status read_once(ebpo_mesh *mesh, const ebpo_import_format *format,
                              ebpo_error *error)
 {
     ebpo_workspace *workspace = mesh->workspace;
-    import_build b;
+    ebpo_import_build b;
     ebpo_status status =
         ebpo_import_begin(&b, mesh, ebpo_path_name(job->name), job->attributes, doubles, error);
     if (status == EBPO_OK && job->attributes)

@@ -14,33 +14,33 @@
 
 #include "core/text.h"
 
-#define IMPORT_MOST (UINT64_C(0xfffffffe))
-#define IMPORT_NONE UINT32_MAX /* no vertex has this number */
+#define EBPO_IMPORT_MOST (UINT64_C(0xfffffffe))
+#define EBPO_IMPORT_NONE UINT32_MAX /* no vertex has this number */
 
-typedef enum import_sort {
-    IMPORT_COLOURS,
-    IMPORT_NORMALS,
-    IMPORT_TEXTURE,
-    IMPORT_SORTS
-} import_sort;
+typedef enum ebpo_import_sort {
+    EBPO_IMPORT_COLOURS,
+    EBPO_IMPORT_NORMALS,
+    EBPO_IMPORT_TEXTURE,
+    EBPO_IMPORT_SORTS
+} ebpo_import_sort;
 
 /* Values that corners name. */
-typedef struct import_table {
+typedef struct ebpo_import_table {
     float *values; /* [rows][columns] */
     uint64_t rows, capacity;
-    uint32_t *index; /* [faces of the mesh][3] rows; IMPORT_NONE: none; only with attributes */
+    uint32_t *index; /* [faces of the mesh][3] rows; EBPO_IMPORT_NONE: none; only with attributes */
     uint64_t index_capacity;
     bool named;   /* some corner names a row */
     bool bytes;   /* values are whole numbers up to 255, and kept as such */
     bool of_face; /* the file says it of faces */
-} import_table;
+} ebpo_import_table;
 
 /* A corner of a polygon: a vertex of the file, and rows of the tables. */
-typedef struct import_corner {
-    uint32_t vertex, row[IMPORT_SORTS];
-} import_corner;
+typedef struct ebpo_import_corner {
+    uint32_t vertex, row[EBPO_IMPORT_SORTS];
+} ebpo_import_corner;
 
-typedef struct import_build {
+typedef struct ebpo_import_build {
     const char *name;
     ebpo_error *error;
     ebpo_mesh *mesh;
@@ -53,65 +53,67 @@ typedef struct import_build {
     size_t position_size; /* bytes */
     void *xyz;            /* [vertices][3] of the file */
     uint64_t vertices, vertex_capacity;
-    uint32_t *use; /* [vertices] the number by first use; IMPORT_NONE: not yet used */
+    uint32_t *use; /* [vertices] the number by first use; EBPO_IMPORT_NONE: not yet used */
     uint64_t face_capacity;
-    import_table table[IMPORT_SORTS];
+    ebpo_import_table table[EBPO_IMPORT_SORTS];
 
-    import_corner *corner; /* of the polygon being read */
+    ebpo_import_corner *corner; /* of the polygon being read */
     uint64_t corners, corner_capacity;
     void *scratch; /* for cutting it */
     uint64_t scratch_capacity;
-} import_build;
+} ebpo_import_build;
 
 /* Positions are floats, or doubles. EBPO_E_MEMORY. On failure nothing is left to free. */
-EBPO_MUST_USE ebpo_status ebpo_import_begin(import_build *b, ebpo_mesh *mesh, const char *name,
+EBPO_MUST_USE ebpo_status ebpo_import_begin(ebpo_import_build *b, ebpo_mesh *mesh, const char *name,
                                             bool attributes, bool doubles, ebpo_error *error);
 
 /* Reads s[0 .. n) as a coordinate: the nearest float or double. False: it is no number. */
-bool ebpo_import_coordinate(import_build *b, double *value, const char *s, size_t n);
+bool ebpo_import_coordinate(ebpo_import_build *b, double *value, const char *s, size_t n);
 
 /* Reads a number again and divides it by a weight. A float stands for the quotient where it equals
  * it. */
-void ebpo_import_quotient(import_build *b, double *value, const char *s, size_t n, double weight);
+void ebpo_import_quotient(ebpo_import_build *b, double *value, const char *s, size_t n,
+                          double weight);
 
 /* Reads a value of a row: the nearest float. False: it is no number. */
-bool ebpo_import_value(import_build *b, float *value, const char *s, size_t n);
+bool ebpo_import_value(ebpo_import_build *b, float *value, const char *s, size_t n);
 
 /* Adds a vertex of the file. EBPO_E_LIMIT, EBPO_E_MEMORY, EBPO_E_IO. EBPO_E_UNSUPPORTED, without a
  * message: floats do not keep its text (`loses_digits`); the file is to be read again with
  * doubles. */
-EBPO_MUST_USE ebpo_status ebpo_import_position(import_build *b, const double xyz[3]);
+EBPO_MUST_USE ebpo_status ebpo_import_position(ebpo_import_build *b, const double xyz[3]);
 
 /* Likewise of a binary file, which holds floats. */
-EBPO_MUST_USE ebpo_status ebpo_import_vertex(import_build *b, const float xyz[3]);
+EBPO_MUST_USE ebpo_status ebpo_import_vertex(ebpo_import_build *b, const float xyz[3]);
 
 /* Adds a row to a table, of as many values as the sort has columns. Likewise. */
-EBPO_MUST_USE ebpo_status ebpo_import_row(import_build *b, import_sort sort, const float *values);
-unsigned ebpo_import_columns(import_sort sort);
+EBPO_MUST_USE ebpo_status ebpo_import_row(ebpo_import_build *b, ebpo_import_sort sort,
+                                          const float *values);
+unsigned ebpo_import_columns(ebpo_import_sort sort);
 
 /* All vertices and rows are there: faces may come. */
-EBPO_MUST_USE ebpo_status ebpo_import_faces(import_build *b);
+EBPO_MUST_USE ebpo_status ebpo_import_faces(ebpo_import_build *b);
 
 /* Room for one corner more of the polygon being read; NULL: no memory. */
-import_corner *ebpo_import_corner(import_build *b);
+ebpo_import_corner *ebpo_import_add_corner(ebpo_import_build *b);
 
 /* The corners make a polygon; it is cut into triangles, or counted as left out where it has fewer
  * than three corners. Begins the next. EBPO_E_LIMIT, EBPO_E_MEMORY, EBPO_E_IO. */
-EBPO_MUST_USE ebpo_status ebpo_import_polygon(import_build *b);
+EBPO_MUST_USE ebpo_status ebpo_import_polygon(ebpo_import_build *b);
 
 /* Positions become one vertex each. EBPO_E_FORMAT: there are no faces. */
-EBPO_MUST_USE ebpo_status ebpo_import_end(import_build *b);
+EBPO_MUST_USE ebpo_status ebpo_import_end(ebpo_import_build *b);
 
 /* Adds what the tables hold to the mesh's attributes: to the vertices where all corners at a vertex
  * say the same; else to the faces, one for the face or as lists of its three corners'. */
-EBPO_MUST_USE ebpo_status ebpo_import_attributes(import_build *b);
+EBPO_MUST_USE ebpo_status ebpo_import_attributes(ebpo_import_build *b);
 
 /* Copies a word for a message: at most 40 characters, what is not printable becomes '?'. */
-enum { IMPORT_WORD_TEXT = 41 };
-void ebpo_import_word_text(char text[IMPORT_WORD_TEXT], const char *s, size_t n);
+enum { EBPO_IMPORT_WORD_TEXT = 41 };
+void ebpo_import_word_text(char text[EBPO_IMPORT_WORD_TEXT], const char *s, size_t n);
 
 /* Frees all but the mesh. */
-void ebpo_import_free(import_build *b);
+void ebpo_import_free(ebpo_import_build *b);
 
 /* Joining vertices at identical positions. */
 
@@ -158,7 +160,7 @@ typedef struct ebpo_import_format {
     /* One of two, the other is NULL. Adds what the file holds to a mesh that is being made; or
      * makes the whole mesh, tells of progress, and clears `out` on failure. Errors are those of
      * ebpo_import_memory. */
-    ebpo_status (*build)(import_build *b, const ebpo_import_job *job);
+    ebpo_status (*build)(ebpo_import_build *b, const ebpo_import_job *job);
     ebpo_status (*read)(ebpo_mesh *out, const ebpo_import_job *job, ebpo_error *error);
 } ebpo_import_format;
 

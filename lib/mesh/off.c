@@ -105,7 +105,7 @@ enum { MOST_REST = 16, RELEASE = 1 << 22 };
 typedef enum rows_in { ROW_A_LINE, ROWS_OVER_LINES, ROWS_ANYHOW } rows_in;
 
 typedef struct off_reading {
-    import_build *build;
+    ebpo_import_build *build;
     const char *begin;
     off_text text;
     uint64_t next_release; /* byte */
@@ -287,7 +287,7 @@ static void take_rest(off_reading *r)
 }
 
 /* Numbers of the rest from `first` on, into a row of a table. */
-static ebpo_status off_keep(off_reading *r, import_sort sort, int first, bool *good)
+static ebpo_status off_keep(off_reading *r, ebpo_import_sort sort, int first, bool *good)
 {
     float value[3] = { 0, 0, 0 };
     int columns = (int)ebpo_import_columns(sort);
@@ -295,7 +295,7 @@ static ebpo_status off_keep(off_reading *r, import_sort sort, int first, bool *g
     for (int k = 0; k < columns && *good; k++) {
         off_word word = r->rest[first + k];
         *good = ebpo_import_value(r->build, &value[k], word.s, word.n);
-        if (sort != IMPORT_COLOURS)
+        if (sort != EBPO_IMPORT_COLOURS)
             continue;
         /* the range first, in this way: what is not a number has no int */
         bool byte = value[k] >= 0 && value[k] <= 255;
@@ -312,18 +312,19 @@ static ebpo_status keep_rest(off_reading *r)
     bool fine = left >= 0, good;
     ebpo_status status = EBPO_OK;
     if (r->normals) {
-        status = off_keep(r, IMPORT_NORMALS, 0, &good);
+        status = off_keep(r, EBPO_IMPORT_NORMALS, 0, &good);
         fine &= good;
     }
     if (r->colours && status == EBPO_OK) {
-        status = off_keep(r, IMPORT_COLOURS, at, &good);
+        status = off_keep(r, EBPO_IMPORT_COLOURS, at, &good);
         fine &= good && (left == 3 || left == 4);
         r->alpha |= left == 4;
     } else {
         fine &= left == 0;
     }
     if (r->texture && status == EBPO_OK) {
-        status = off_keep(r, IMPORT_TEXTURE, r->rest_count - 2 > 0 ? r->rest_count - 2 : 0, &good);
+        status =
+            off_keep(r, EBPO_IMPORT_TEXTURE, r->rest_count - 2 > 0 ? r->rest_count - 2 : 0, &good);
         fine &= good;
     }
     r->surplus_vertices += !fine;
@@ -353,7 +354,7 @@ static ebpo_status take_rest_anyhow(off_reading *r, uint64_t row)
 
 static ebpo_status fail_number(const off_reading *r, off_word word, uint64_t row)
 {
-    char text[IMPORT_WORD_TEXT];
+    char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
     return off_fail(r, "no number: '%s' in vertex %" PRIu64 "; repair the file", text, row);
 }
@@ -387,9 +388,9 @@ static ebpo_status read_vertex(off_reading *r, uint64_t row)
 /* One value is a place in a table of colours that no file has. */
 static ebpo_status keep_face(off_reading *r, uint32_t *row)
 {
-    import_table *t = &r->build->table[IMPORT_COLOURS];
+    ebpo_import_table *t = &r->build->table[EBPO_IMPORT_COLOURS];
     bool good = true;
-    *row = IMPORT_NONE;
+    *row = EBPO_IMPORT_NONE;
     r->indexed += r->rest_count == 1;
     r->surplus_faces += r->rest_count == 2 || r->rest_count > 4;
     if (r->rest_count != 3 && r->rest_count != 4)
@@ -400,7 +401,7 @@ static ebpo_status keep_face(off_reading *r, uint32_t *row)
     }
     r->alpha |= r->rest_count == 4;
     t->of_face = true;
-    ebpo_status status = off_keep(r, IMPORT_COLOURS, 0, &good);
+    ebpo_status status = off_keep(r, EBPO_IMPORT_COLOURS, 0, &good);
     r->surplus_faces += !good;
     if (t->rows)
         *row = (uint32_t)(t->rows - 1);
@@ -409,7 +410,7 @@ static ebpo_status keep_face(off_reading *r, uint32_t *row)
 
 static ebpo_status read_corner(off_reading *r, uint64_t row, uint64_t corners)
 {
-    import_corner *c = ebpo_import_corner(r->build);
+    ebpo_import_corner *c = ebpo_import_add_corner(r->build);
     off_word word;
     uint64_t index;
     if (!c)
@@ -425,15 +426,15 @@ static ebpo_status read_corner(off_reading *r, uint64_t row, uint64_t corners)
                         " vertices; repair the file or drop the face",
                         row, index, r->vertices);
     c->vertex = (uint32_t)index;
-    c->row[IMPORT_COLOURS] = r->colours ? c->vertex : IMPORT_NONE;
-    c->row[IMPORT_NORMALS] = r->normals ? c->vertex : IMPORT_NONE;
-    c->row[IMPORT_TEXTURE] = r->texture ? c->vertex : IMPORT_NONE;
+    c->row[EBPO_IMPORT_COLOURS] = r->colours ? c->vertex : EBPO_IMPORT_NONE;
+    c->row[EBPO_IMPORT_NORMALS] = r->normals ? c->vertex : EBPO_IMPORT_NONE;
+    c->row[EBPO_IMPORT_TEXTURE] = r->texture ? c->vertex : EBPO_IMPORT_NONE;
     return EBPO_OK;
 }
 
 static ebpo_status read_face(off_reading *r, uint64_t row)
 {
-    import_build *b = r->build;
+    ebpo_import_build *b = r->build;
     uint64_t corners;
     uint32_t colour;
     off_word word;
@@ -453,8 +454,8 @@ static ebpo_status read_face(off_reading *r, uint64_t row)
         return status;
     take_rest(r);
     status = keep_face(r, &colour);
-    for (uint64_t i = 0; i < corners && colour != IMPORT_NONE; i++)
-        b->corner[i].row[IMPORT_COLOURS] = colour;
+    for (uint64_t i = 0; i < corners && colour != EBPO_IMPORT_NONE; i++)
+        b->corner[i].row[EBPO_IMPORT_COLOURS] = colour;
     return status == EBPO_OK ? ebpo_import_polygon(b) : status;
 }
 
@@ -508,7 +509,7 @@ static ebpo_status read_rows(off_reading *r)
     return status;
 }
 
-static ebpo_status build_off(import_build *b, const ebpo_import_job *job)
+static ebpo_status build_off(ebpo_import_build *b, const ebpo_import_job *job)
 {
     off_reading r = { .build = b, .begin = (const char *)job->data, .size = job->size };
     r.text = (off_text){ r.begin + ebpo_text_mark(job->data, r.size), r.begin + r.size, 1 };
@@ -517,7 +518,7 @@ static ebpo_status build_off(import_build *b, const ebpo_import_job *job)
         status = read_rows(&r);
     if (status == EBPO_OK)
         status = ebpo_import_end(b);
-    b->table[IMPORT_COLOURS].bytes = !r.broken && r.most > 1;
+    b->table[EBPO_IMPORT_COLOURS].bytes = !r.broken && r.most > 1;
     if (status == EBPO_OK && b->attributes)
         status = ebpo_import_attributes(b);
     if (status == EBPO_OK && b->attributes)

@@ -81,7 +81,7 @@ static bool fits_binary(const uint8_t *data, uint64_t size)
              stated_faces(data)));
 }
 
-static ebpo_status fail_ambiguous(const import_build *b, const uint8_t *data, uint64_t size)
+static ebpo_status fail_ambiguous(const ebpo_import_build *b, const uint8_t *data, uint64_t size)
 {
     return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
                           "states %" PRIu64 " faces, which take %" PRIu64 " of its %" PRIu64
@@ -92,8 +92,8 @@ static ebpo_status fail_ambiguous(const import_build *b, const uint8_t *data, ui
 
 /* Finds out what the bytes behind the stated facets are; EBPO_E_FORMAT where that is not certain.
  */
-static ebpo_status stl_binary_explain(const import_build *b, const uint8_t *data, uint64_t size,
-                                      stl_bytes *is)
+static ebpo_status stl_binary_explain(const ebpo_import_build *b, const uint8_t *data,
+                                      uint64_t size, stl_bytes *is)
 {
     uint64_t end = stated_size(data), held = (size - STL_BINARY_HEAD) / RECORD;
     *is = (stl_bytes){ .models = 1 };
@@ -120,7 +120,7 @@ static ebpo_status stl_binary_explain(const import_build *b, const uint8_t *data
     return EBPO_OK;
 }
 
-static ebpo_status read_facets(import_build *b, const uint8_t *model, bool payload)
+static ebpo_status read_facets(ebpo_import_build *b, const uint8_t *model, bool payload)
 {
     const uint8_t *at = model + STL_BINARY_HEAD;
     ebpo_status status = EBPO_OK;
@@ -141,7 +141,7 @@ static ebpo_status read_facets(import_build *b, const uint8_t *model, bool paylo
 }
 
 /* Counts the facets of a model whose last two bytes are not zero. */
-static uint64_t count_words(const import_build *b, const uint8_t *model)
+static uint64_t count_words(const ebpo_import_build *b, const uint8_t *model)
 {
     uint64_t words = 0;
     EBPO_FOR_ITEMS(b->mesh->workspace, i, 0, stated_faces(model))
@@ -149,7 +149,7 @@ static uint64_t count_words(const import_build *b, const uint8_t *model)
     return words;
 }
 
-static ebpo_status stl_binary_note(import_build *b, const stl_bytes *is, uint64_t words)
+static ebpo_status stl_binary_note(ebpo_import_build *b, const stl_bytes *is, uint64_t words)
 {
     ebpo_status status =
         is->payload || is->behind || words ? ebpo_mesh_need_attributes(b->mesh, b->error) : EBPO_OK;
@@ -169,9 +169,9 @@ static ebpo_status stl_binary_note(import_build *b, const stl_bytes *is, uint64_
     return EBPO_OK;
 }
 
-static ebpo_status fail_head(const import_build *b, const uint8_t *data, uint64_t size)
+static ebpo_status fail_head(const ebpo_import_build *b, const uint8_t *data, uint64_t size)
 {
-    char word[IMPORT_WORD_TEXT];
+    char word[EBPO_IMPORT_WORD_TEXT];
     uint64_t at = 0, end;
     if (!ebpo_bytes_are_text(data, size))
         return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
@@ -191,7 +191,8 @@ static ebpo_status fail_head(const import_build *b, const uint8_t *data, uint64_
 
 /* Reads the facets as vertices, three each, and notes bytes that are not read. *plain: the size of
  * the one model whose facets have their two bytes of attributes; 0: it is another file. */
-static ebpo_status read_binary(import_build *b, const uint8_t *data, uint64_t size, uint64_t *plain)
+static ebpo_status read_binary(ebpo_import_build *b, const uint8_t *data, uint64_t size,
+                               uint64_t *plain)
 {
     *plain = 0;
     if (size < STL_BINARY_HEAD || (ebpo_bytes_are_text(data, size) && !fits_binary(data, size)))
@@ -202,7 +203,7 @@ static ebpo_status read_binary(import_build *b, const uint8_t *data, uint64_t si
                               "states %" PRIu64 " faces, but its %" PRIu64 " bytes hold %" PRIu64
                               "; it is cut short or no STL file",
                               faces, size, (size - STL_BINARY_HEAD) / RECORD);
-    if (3 * faces > IMPORT_MOST)
+    if (3 * faces > EBPO_IMPORT_MOST)
         return ebpo_fail_file(b->error, EBPO_E_LIMIT, b->name,
                               "states %" PRIu64 " faces of three corners each, more than 2^32 - 2 "
                               "corners; split the model",
@@ -350,7 +351,7 @@ static bool has_stl_mark(const uint8_t *data, uint64_t size)
 /* --- text --- */
 
 typedef struct stl_text {
-    import_build *build;
+    ebpo_import_build *build;
     const char *begin, *at, *end;
     uint64_t line;
     uint64_t loops, corners; /* so far; of this loop */
@@ -383,7 +384,7 @@ static bool stl_is(stl_word word, const char *text)
 
 static ebpo_status fail_word(const stl_text *t, const char *wanted, stl_word word)
 {
-    char text[IMPORT_WORD_TEXT];
+    char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
     return ebpo_fail_file(t->build->error, EBPO_E_FORMAT, t->build->name,
                           "line %" PRIu64 ": '%s' where %s should stand, in facet %" PRIu64
@@ -531,11 +532,11 @@ static ebpo_status read_text(stl_text *t)
 
 /* --- both --- */
 
-static ebpo_status make_faces(import_build *b)
+static ebpo_status make_faces(ebpo_import_build *b)
 {
     ebpo_status status = ebpo_import_faces(b);
     for (uint64_t i = 0; i < b->vertices && status == EBPO_OK; i++) {
-        import_corner *c = ebpo_import_corner(b);
+        ebpo_import_corner *c = ebpo_import_add_corner(b);
         if (!c)
             return ebpo_fail_memory(b->error, 3 * sizeof *c);
         memset(c, 0xff, sizeof *c);
@@ -563,7 +564,7 @@ static bool is_text(const uint8_t *data, uint64_t size)
 
 /* Makes the mesh. A file that is called STL is text if it says so and has the word facet. Normals
  * are not read: they follow from corners. */
-static ebpo_status build_stl(import_build *b, const ebpo_import_job *job)
+static ebpo_status build_stl(ebpo_import_build *b, const ebpo_import_job *job)
 {
     const uint8_t *data = job->data;
     uint64_t size = job->size;
