@@ -138,7 +138,7 @@ static ebpo_status plant_faces(comparing *c, ebpo_error *error)
 {
     const ebpo_mesh *mesh = c->s->mesh;
     bool planted = true;
-    c->faces.points.workspace = mesh->workspace;
+    c->faces.workspace = mesh->workspace;
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
         uint32_t one = shell_of_face(c, f);
         if (planted && one != EBPO_NO_INDEX && c->reached[one])
@@ -146,8 +146,8 @@ static ebpo_status plant_faces(comparing *c, ebpo_error *error)
     }
     return planted && ebpo_box_tree_build(&c->faces, ebpo_face_box, mesh)
                ? EBPO_OK
-               : ebpo_workspace_fail(mesh->workspace,
-                                     c->faces.points.count * sizeof(ebpo_tree_point), error);
+               : ebpo_workspace_fail(mesh->workspace, c->faces.count * sizeof(ebpo_tree_point),
+                                     error);
 }
 
 static ebpo_status compare_shells(comparing *c, ebpo_error *error)
@@ -165,7 +165,7 @@ static ebpo_status compare_shells(comparing *c, ebpo_error *error)
         ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_exposed, c, NULL, "", error);
     if (status == EBPO_OK && c->apart)
         status = plant_faces(c, error);
-    if (status == EBPO_OK && c->apart && c->faces.points.count)
+    if (status == EBPO_OK && c->apart && c->faces.count)
         status = ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_meeting, c, NULL, "",
                                    error);
     return status;

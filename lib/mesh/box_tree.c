@@ -4,18 +4,12 @@
 #include "core/workspace.h"
 #include "mesh/box_tree.h"
 
-ebpo_tree_point *ebpo_point_tree_add(ebpo_point_tree *tree)
+ebpo_tree_point *ebpo_box_tree_add(ebpo_box_tree *tree)
 {
     if (!ebpo_array_grow_late(tree->workspace, &tree->point, &tree->capacity, tree->count + 1,
                               sizeof *tree->point))
         return NULL;
     return &tree->point[tree->count++];
-}
-
-void ebpo_point_tree_free(ebpo_point_tree *tree)
-{
-    ebpo_array_free(tree->workspace, tree->point);
-    ebpo_array_free(tree->workspace, tree->node);
 }
 
 static ebpo_point_box box_of_points(const ebpo_tree_point *p, uint64_t count)
@@ -74,21 +68,20 @@ static void split_points(ebpo_tree_point *p, uint64_t count, uint64_t middle, in
     }
 }
 
-static void build_node(const ebpo_point_tree *tree, uint64_t node, ebpo_tree_point *p,
-                       uint64_t count)
+static void build_node(const ebpo_box_tree *tree, uint64_t node, ebpo_tree_point *p, uint64_t count)
 {
     tree->node[node] = box_of_points(p, count);
-    if (count <= EBPO_POINT_TREE_LEAF)
+    if (count <= EBPO_BOX_TREE_LEAF)
         return;
     split_points(p, count, count / 2, longest_axis(&tree->node[node]));
     build_node(tree, 2 * node + 1, p, count / 2);
     build_node(tree, 2 * node + 2, p + count / 2, count - count / 2);
 }
 
-bool ebpo_point_tree_build(ebpo_point_tree *tree)
+static bool build_nodes(ebpo_box_tree *tree)
 {
     uint64_t nodes = 1;
-    for (uint64_t most = tree->count; most > EBPO_POINT_TREE_LEAF; most -= most / 2)
+    for (uint64_t most = tree->count; most > EBPO_BOX_TREE_LEAF; most -= most / 2)
         nodes = 2 * nodes + 1;
     if (tree->count == 0)
         return true;
@@ -97,30 +90,6 @@ bool ebpo_point_tree_build(ebpo_point_tree *tree)
         return false;
     build_node(tree, 0, tree->point, tree->count);
     return true;
-}
-
-typedef struct point_walking {
-    const ebpo_point_tree *tree;
-    ebpo_point_box_fn wanted;
-    ebpo_tree_points_fn visit;
-    void *user;
-} point_walking;
-
-static bool walk_points(const point_walking *w, uint64_t node, ebpo_tree_point *p, uint64_t count)
-{
-    if (!w->wanted(w->user, &w->tree->node[node]))
-        return true;
-    if (count <= EBPO_POINT_TREE_LEAF)
-        return w->visit(w->user, p, count);
-    return walk_points(w, 2 * node + 1, p, count / 2) &&
-           walk_points(w, 2 * node + 2, p + count / 2, count - count / 2);
-}
-
-bool ebpo_point_tree_walk(const ebpo_point_tree *tree, ebpo_point_box_fn wanted,
-                          ebpo_tree_points_fn visit, void *user)
-{
-    point_walking w = { tree, wanted, visit, user };
-    return tree->count == 0 || walk_points(&w, 0, tree->point, tree->count);
 }
 
 typedef struct filling {
@@ -140,7 +109,7 @@ static void join_boxes(ebpo_point_box *box, const ebpo_point_box *other)
 static void fill_node(const filling *f, uint64_t node, const ebpo_tree_point *p, uint64_t count)
 {
     ebpo_point_box *box = &f->tree->filled[node], other;
-    if (count <= EBPO_POINT_TREE_LEAF) {
+    if (count <= EBPO_BOX_TREE_LEAF) {
         f->box_of(f->user, &p[0], box);
         for (uint64_t i = 1; i < count; i++) {
             f->box_of(f->user, &p[i], &other);
@@ -157,45 +126,46 @@ static void fill_node(const filling *f, uint64_t node, const ebpo_tree_point *p,
 bool ebpo_box_tree_build(ebpo_box_tree *tree, ebpo_box_of_fn box_of, const void *user)
 {
     filling f = { tree, box_of, user };
-    ebpo_point_tree *points = &tree->points;
-    if (points->count == 0)
-        return true;
-    if (!ebpo_point_tree_build(points))
+    if (!build_nodes(tree))
         return false;
-    tree->filled = ebpo_array_alloc(points->workspace, points->node_capacity, sizeof *tree->filled);
+    if (tree->count == 0 || !box_of)
+        return true;
+    tree->filled = ebpo_array_alloc(tree->workspace, tree->node_capacity, sizeof *tree->filled);
     if (!tree->filled)
         return false;
-    fill_node(&f, 0, points->point, points->count);
+    fill_node(&f, 0, tree->point, tree->count);
     return true;
 }
 
 void ebpo_box_tree_free(ebpo_box_tree *tree)
 {
-    ebpo_array_free(tree->points.workspace, tree->filled);
-    ebpo_point_tree_free(&tree->points);
+    ebpo_array_free(tree->workspace, tree->filled);
+    ebpo_array_free(tree->workspace, tree->point);
+    ebpo_array_free(tree->workspace, tree->node);
 }
 
-typedef struct box_walking {
+typedef struct walking {
     const ebpo_box_tree *tree;
+    const ebpo_point_box *filled;
     ebpo_box_node_fn wanted;
     ebpo_tree_points_fn visit;
     void *user;
-} box_walking;
+} walking;
 
-static bool walk_boxes(const box_walking *w, uint64_t node, ebpo_tree_point *p, uint64_t count)
+static bool walk_node(const walking *w, uint64_t node, ebpo_tree_point *p, uint64_t count)
 {
-    ebpo_box_node n = { &w->tree->points.node[node], &w->tree->filled[node], count };
+    ebpo_box_node n = { &w->tree->node[node], &w->filled[node], count };
     if (!w->wanted(w->user, &n))
         return true;
-    if (count <= EBPO_POINT_TREE_LEAF)
+    if (count <= EBPO_BOX_TREE_LEAF)
         return w->visit(w->user, p, count);
-    return walk_boxes(w, 2 * node + 1, p, count / 2) &&
-           walk_boxes(w, 2 * node + 2, p + count / 2, count - count / 2);
+    return walk_node(w, 2 * node + 1, p, count / 2) &&
+           walk_node(w, 2 * node + 2, p + count / 2, count - count / 2);
 }
 
 bool ebpo_box_tree_walk(const ebpo_box_tree *tree, ebpo_box_node_fn wanted,
                         ebpo_tree_points_fn visit, void *user)
 {
-    box_walking w = { tree, wanted, visit, user };
-    return tree->points.count == 0 || walk_boxes(&w, 0, tree->points.point, tree->points.count);
+    walking w = { tree, tree->filled ? tree->filled : tree->node, wanted, visit, user };
+    return tree->count == 0 || walk_node(&w, 0, tree->point, tree->count);
 }

@@ -20,8 +20,7 @@
 
 /* Of one thread: what may be within the host that it looks at. */
 typedef struct seeker {
-    ebpo_point_tree
-        probes; /* EBPO_SHELL_SAMPLES of each of these shells; values are winding numbers */
+    ebpo_box_tree probes; /* the samples of each of these shells; values are winding numbers */
     struct probing *all;
     const ebpo_shell *host;
     const double (*face)[3];
@@ -41,7 +40,7 @@ static bool add_probes(seeker *w, uint32_t number)
 {
     const ebpo_shell *one = &w->all->n->shells[number];
     for (int d = 0; d < EBPO_SHELL_SAMPLES; d++) {
-        ebpo_tree_point *p = ebpo_point_tree_add(&w->probes);
+        ebpo_tree_point *p = ebpo_box_tree_add(&w->probes);
         if (!p)
             return false;
         *p = (ebpo_tree_point){ .number = number };
@@ -108,9 +107,9 @@ static bool ebpo_face_may_meet_lines(const double t[3][3], const ebpo_point_box 
     return true;
 }
 
-static bool near_face(void *user, const ebpo_point_box *box)
+static bool near_face(void *user, const ebpo_box_node *node)
 {
-    return ebpo_face_may_meet_lines(((const seeker *)user)->face, box);
+    return ebpo_face_may_meet_lines(((const seeker *)user)->face, node->points);
 }
 
 /* What segments from the probes along x to the host's end cross. */
@@ -131,7 +130,7 @@ static void cross_host(seeker *w)
         double t[3][3];
         ebpo_face_corners(c->mesh, c->faces.of[i], t);
         w->face = (const double(*)[3])t;
-        (void)ebpo_point_tree_walk(&w->probes, near_face, cross_face, w);
+        (void)ebpo_box_tree_walk(&w->probes, near_face, cross_face, w);
     }
 }
 
@@ -168,7 +167,7 @@ static ebpo_status find_inner(void *context, uint64_t begin, uint64_t end, unsig
             continue;
         w->probes.count = 0;
         if (!ebpo_box_tree_walk(&all->n->tree, near_host, list_inner, w) ||
-            !ebpo_point_tree_build(&w->probes))
+            !ebpo_box_tree_build(&w->probes, NULL, NULL))
             return ebpo_workspace_fail(w->probes.workspace,
                                        (w->probes.count + EBPO_SHELL_SAMPLES) *
                                            sizeof(ebpo_tree_point),
@@ -193,7 +192,7 @@ static ebpo_status ebpo_nesting_probe(ebpo_nesting *n, ebpo_error *error)
     ebpo_status status =
         ebpo_parallel_for(n->threads, workspace, n->count, 1, find_inner, &all, NULL, "", error);
     for (unsigned t = 0; t < n->threads; t++)
-        ebpo_point_tree_free(&all.seeker[t].probes);
+        ebpo_box_tree_free(&all.seeker[t].probes);
     free(all.seeker);
     return status;
 }
@@ -314,8 +313,7 @@ static ebpo_status add_faces(casting *all, uint64_t host, ebpo_error *error)
                              c->faces.begin[component + 1]) {
         if (!ebpo_face_add(&all->faces, c->mesh, c->faces.of[i], (int32_t)host))
             return ebpo_workspace_fail(c->mesh->workspace,
-                                       (all->faces.points.count + 1) * sizeof(ebpo_tree_point),
-                                       error);
+                                       (all->faces.count + 1) * sizeof(ebpo_tree_point), error);
     }
     return EBPO_OK;
 }
@@ -328,8 +326,8 @@ static ebpo_status shell_rays_plant(casting *all, ebpo_error *error)
         status = add_faces(all, h, error);
     if (status != EBPO_OK || ebpo_box_tree_build(&all->faces, ebpo_face_box, mesh))
         return status;
-    return ebpo_workspace_fail(mesh->workspace,
-                               2 * all->faces.points.count * sizeof(ebpo_point_box), error);
+    return ebpo_workspace_fail(mesh->workspace, 2 * all->faces.count * sizeof(ebpo_point_box),
+                               error);
 }
 
 static ebpo_status shell_rays_hire(casting *all, ebpo_error *error)
@@ -366,7 +364,7 @@ static void free_casting(casting *all)
 static ebpo_status ebpo_nesting_cast(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->components->mesh->workspace;
-    casting all = { .n = n, .faces = { .points = { .workspace = workspace } } };
+    casting all = { .n = n, .faces = { .workspace = workspace } };
     all.host = ebpo_array_alloc(workspace, n->count, sizeof *all.host);
     if (!all.host)
         return ebpo_workspace_fail(workspace, n->count * sizeof *all.host, error);
@@ -503,9 +501,9 @@ static void box_of_shell(const void *user, const ebpo_tree_point *p, ebpo_point_
 static ebpo_status make_tree(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->components->mesh->workspace;
-    n->tree.points.workspace = workspace;
+    n->tree.workspace = workspace;
     for (uint64_t i = 0; i < n->count; i++) {
-        ebpo_tree_point *p = ebpo_point_tree_add(&n->tree.points);
+        ebpo_tree_point *p = ebpo_box_tree_add(&n->tree);
         if (!p)
             return ebpo_workspace_fail(workspace, n->count * sizeof *p, error);
         *p = (ebpo_tree_point){ .number = (uint32_t)i };

@@ -57,7 +57,7 @@ static inline bool ebpo_face_add(ebpo_box_tree *tree, const ebpo_mesh *mesh, uin
                                  int32_t value)
 {
     ebpo_point_box box;
-    ebpo_tree_point *p = ebpo_point_tree_add(&tree->points);
+    ebpo_tree_point *p = ebpo_box_tree_add(tree);
     if (!p)
         return false;
     *p = (ebpo_tree_point){ .number = face, .value = value };
