@@ -26,8 +26,8 @@ typedef struct ebpo_box_tree {
     /* of points; 2 i + 1 and 2 i + 2 are the halves of i, the first of count / 2 points */
     ebpo_point_box *node;
     uint64_t node_capacity;
-    ebpo_point_box
-        *filled; /* as node: what the boxes of a node's things fill; NULL: points alone */
+    /* as node: what the boxes of a node's things fill; NULL: there are points alone */
+    ebpo_point_box *filled;
 } ebpo_box_tree;
 
 /* Returns room for one more; NULL when memory is short. */
