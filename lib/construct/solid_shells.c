@@ -28,7 +28,7 @@ typedef struct comparing {
     ebpo_solid_shells *s;
     uint8_t *exposed; /* [faces] the face comes to the box of a shell that its own is not within */
     uint8_t *reached; /* [shells] some face of another shell does so here */
-    box_tree faces;   /* of shells that are reached; value: the shell */
+    ebpo_box_tree faces; /* of shells that are reached; value: the shell */
     uint64_t steps, most;
     bool apart; /* until now */
 } comparing;
@@ -36,7 +36,7 @@ typedef struct comparing {
 /* What one face is compared with. */
 typedef struct visitor {
     comparing *c;
-    point_box box;
+    ebpo_point_box box;
     uint64_t steps;
     uint32_t face, shell;
 } visitor;
@@ -47,7 +47,7 @@ static uint32_t shell_of_face(const comparing *c, uint64_t face)
     return c->s->shell_of[all->of_face[face]];
 }
 
-static bool boxes_meet(const point_box *a, const double min[3], const double max[3])
+static bool boxes_meet(const ebpo_point_box *a, const double min[3], const double max[3])
 {
     for (int k = 0; k < 3; k++)
         if (a->min[k] > max[k] || a->max[k] < min[k])
@@ -55,18 +55,18 @@ static bool boxes_meet(const point_box *a, const double min[3], const double max
     return true;
 }
 
-static bool is_near(void *user, const box_node *node)
+static bool is_near(void *user, const ebpo_box_node *node)
 {
     return boxes_meet(&((const visitor *)user)->box, node->filled->min, node->filled->max);
 }
 
-static bool visit_shells(void *user, mesh_point *points, uint64_t count)
+static bool visit_shells(void *user, ebpo_tree_point *points, uint64_t count)
 {
     visitor *v = user;
-    const shell *all = v->c->s->nesting.shells, *own = &all[v->shell];
+    const ebpo_shell *all = v->c->s->nesting.shells, *own = &all[v->shell];
     v->steps += count;
     for (uint64_t i = 0; i < count; i++) {
-        const shell *other = &all[points[i].number];
+        const ebpo_shell *other = &all[points[i].number];
         bool inner = ebpo_shell_box_within(own, other) && !ebpo_shell_box_within(other, own);
         if (other == own || inner || !boxes_meet(&v->box, other->min, other->max))
             continue;
@@ -76,7 +76,7 @@ static bool visit_shells(void *user, mesh_point *points, uint64_t count)
     return v->steps < v->c->most;
 }
 
-static bool visit_faces(void *user, mesh_point *points, uint64_t count)
+static bool visit_faces(void *user, ebpo_tree_point *points, uint64_t count)
 {
     visitor *v = user;
     const ebpo_mesh *mesh = v->c->s->mesh;
@@ -84,7 +84,7 @@ static bool visit_faces(void *user, mesh_point *points, uint64_t count)
     v->steps += count;
     ebpo_face_corners(mesh, v->face, a);
     for (uint64_t i = 0; i < count; i++) {
-        point_box box;
+        ebpo_point_box box;
         if (points[i].value == (int32_t)v->shell)
             continue;
         ebpo_face_box(mesh, &points[i], &box);
@@ -100,12 +100,12 @@ static bool visit_faces(void *user, mesh_point *points, uint64_t count)
 }
 
 /* Shows each face to the tree of shells, or each exposed face to the tree of faces. */
-static ebpo_status compare_faces(comparing *c, uint64_t begin, uint64_t end, const box_tree *tree,
-                                 points_fn visit)
+static ebpo_status compare_faces(comparing *c, uint64_t begin, uint64_t end,
+                                 const ebpo_box_tree *tree, ebpo_tree_points_fn visit)
 {
     EBPO_FOR_ITEMS_SCATTERED(c->s->mesh->workspace, f, begin, end) {
         visitor v = { .c = c, .face = (uint32_t)f, .shell = shell_of_face(c, f) };
-        mesh_point p = { .number = (uint32_t)f };
+        ebpo_tree_point p = { .number = (uint32_t)f };
         if (v.shell == EBPO_NO_INDEX || (visit == visit_faces && !c->exposed[f]))
             continue;
         if (!__atomic_load_n(&c->apart, __ATOMIC_RELAXED))
@@ -138,7 +138,7 @@ static ebpo_status plant_faces(comparing *c, ebpo_error *error)
 {
     const ebpo_mesh *mesh = c->s->mesh;
     bool planted = true;
-    c->faces.points.workspace = mesh->workspace;
+    c->faces.workspace = mesh->workspace;
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
         uint32_t one = shell_of_face(c, f);
         if (planted && one != EBPO_NO_INDEX && c->reached[one])
@@ -146,13 +146,13 @@ static ebpo_status plant_faces(comparing *c, ebpo_error *error)
     }
     return planted && ebpo_box_tree_build(&c->faces, ebpo_face_box, mesh)
                ? EBPO_OK
-               : ebpo_workspace_fail(mesh->workspace, c->faces.points.count * sizeof(mesh_point),
+               : ebpo_workspace_fail(mesh->workspace, c->faces.count * sizeof(ebpo_tree_point),
                                      error);
 }
 
 static ebpo_status compare_shells(comparing *c, ebpo_error *error)
 {
-    const nesting *n = &c->s->nesting;
+    const ebpo_nesting *n = &c->s->nesting;
     ebpo_workspace *workspace = c->s->mesh->workspace;
     uint64_t count = c->s->mesh->face_count;
     c->exposed = ebpo_array_alloc(workspace, count, sizeof *c->exposed);
@@ -165,7 +165,7 @@ static ebpo_status compare_shells(comparing *c, ebpo_error *error)
         ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_exposed, c, NULL, "", error);
     if (status == EBPO_OK && c->apart)
         status = plant_faces(c, error);
-    if (status == EBPO_OK && c->apart && c->faces.points.count)
+    if (status == EBPO_OK && c->apart && c->faces.count)
         status = ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_meeting, c, NULL, "",
                                    error);
     return status;
@@ -187,7 +187,7 @@ static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
  * bounds parts whose volumes cancel. Two faces that are closed are one face and its back. */
 static bool is_simple(const ebpo_components *c, uint64_t i)
 {
-    const mesh_component *one = &c->list[i];
+    const ebpo_found_component *one = &c->list[i];
     bool flat = c->faces.begin[i + 1] - c->faces.begin[i] <= 2;
     for (int k = 0; k < 3; k++)
         flat |= one->min[k] == one->max[k];
@@ -199,7 +199,7 @@ ebpo_status ebpo_solid_shells_find(ebpo_solid_shells *out, const ebpo_mesh *mesh
 {
     bool simple = true;
     *out = (ebpo_solid_shells){ .mesh = mesh };
-    nesting *n = &out->nesting;
+    ebpo_nesting *n = &out->nesting;
     ebpo_status status = ebpo_components_check(mesh, error);
     if (status == EBPO_OK)
         status = ebpo_mesh_find_shells(mesh, threads, &out->closed, error);
@@ -231,7 +231,7 @@ int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, eb
 {
     if (shells->shell_of[component] == EBPO_NO_INDEX)
         return 1;
-    const shell *one = &shells->nesting.shells[shells->shell_of[component]];
+    const ebpo_shell *one = &shells->nesting.shells[shells->shell_of[component]];
     int sign = ebpo_shell_looks_inwards(&shells->nesting, one) ? -1 : 1;
     return sign *
            (ebpo_rule_inside(rule, one->around + sign) - ebpo_rule_inside(rule, one->around));
@@ -239,7 +239,7 @@ int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, eb
 
 /* --- counting --- */
 
-static void count_one(const nesting *n, const shell *one, ebpo_shells *made)
+static void count_one(const ebpo_nesting *n, const ebpo_shell *one, ebpo_shells *made)
 {
     bool inwards = ebpo_shell_looks_inwards(n, one), cavity = ebpo_shell_is_cavity(one);
     made->inside_out += inwards && !cavity;
@@ -251,7 +251,7 @@ static void count_one(const nesting *n, const shell *one, ebpo_shells *made)
 static void add_beyond(const ebpo_solid_shells *s, ebpo_shells *made)
 {
     ebpo_mesh_frame frame = ebpo_mesh_frame_of(s->mesh);
-    const nesting *n = &s->nesting;
+    const ebpo_nesting *n = &s->nesting;
     int power = frame.scaled ? frame.exponent[0] + frame.exponent[1] + frame.exponent[2] : 0;
     for (int rule = 0; rule < RULES; rule++) {
         double sum = 0;

@@ -11,7 +11,7 @@
 typedef struct ebpo_solid_shells {
     const ebpo_mesh *mesh; /* borrowed */
     uint32_t *closed; /* of ebpo_mesh_find_shells; the nesting's components have it as `of_face` */
-    nesting nesting;
+    ebpo_nesting nesting;
     uint32_t *shell_of; /* [components] among the shells; EBPO_NO_INDEX: without a volume */
     bool apart;         /* every component is closed, and no faces of two have a common point */
 } ebpo_solid_shells;

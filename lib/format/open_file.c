@@ -26,8 +26,6 @@
 #include "io/byte_source.h"
 #include "io/file_source.h"
 #include "mesh/import.h"
-#include "mesh/ply.h"
-#include "mesh/import_build.h"
 
 /* The word says how the numbers are to be read: with another one they would be read wrong. In files
  * of 1.0, and in the first ones of 1.1, `delta` stands at leaf_skip, too. */
@@ -243,25 +241,31 @@ static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
                : EBPO_OK;
 }
 
-/* Returns what a file is by its first bytes that is no model but often given for one, and what to
- * do with it; NULL: it is not known, or the head's error says it. */
-static const char *other_kind(const uint8_t *begin, uint64_t size, uint64_t whole_size)
+/* Returns true where the head's error says what a file is: it begins as HDF5 does, or as another
+ * kind that is known by its bytes. */
+static bool head_names_kind(const uint8_t *begin, uint64_t size)
 {
-    static const char *const meshes[] = {
-        [EBPO_IMPORT_OBJ] = "an OBJ; make one of it with 'ebpo convert'",
-        [EBPO_IMPORT_STL] = "an STL; make one of it with 'ebpo convert'",
-        [EBPO_IMPORT_OFF] = "an OFF; make one of it with 'ebpo convert'"
-    };
-    ebpo_import_format format;
-    if (ebpo_ply_recognise(begin, size))
-        return "a PLY; make one of it with 'ebpo convert'";
+    return (size && begin[0] == 0x89) || ebpo_foreign_bytes(begin, size);
+}
+
+/* Returns the format of the mesh that begins with these bytes; NULL: it is none. */
+static const ebpo_import_format *mesh_format(const uint8_t *begin, uint64_t size,
+                                             uint64_t whole_size)
+{
+    const ebpo_import_format *format = ebpo_import_recognise(begin, size, "");
+    if (format && format->mark_comes_first)
+        return format;
     if (ebpo_stl_states_size(begin, size, whole_size)) /* which begins with any bytes */
-        return meshes[EBPO_IMPORT_STL];
-    if ((size && begin[0] == 0x89) || ebpo_foreign_bytes(begin, size)) /* HDF5; the head says it */
-        return NULL;
-    if (ebpo_import_recognise(&format, begin, size, ""))
-        return meshes[format];
-    return size == 0 ? "an empty file; get a fresh copy of it"
+        return &ebpo_import_stl;
+    return head_names_kind(begin, size) ? NULL : format;
+}
+
+/* Returns what a file is by its first bytes that is neither a model nor a mesh but often given for
+ * one, and what to do with it; NULL: it is not known, or the head's error says it. */
+static const char *other_kind(const uint8_t *begin, uint64_t size)
+{
+    return size == 0                      ? "an empty file; get a fresh copy of it"
+           : head_names_kind(begin, size) ? NULL
            : begin[0] == '{'
                ? "JSON; a scene is for 'ebpo scene', and some commands take a catalogue"
                : NULL;
@@ -274,7 +278,12 @@ static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *er
     uint8_t begin[BEGIN];
     if (ebpo_input_read(&file->in, 0, size, begin, NULL) != EBPO_OK)
         return status;
-    const char *kind = other_kind(begin, size, file->in.source.size);
+    const ebpo_import_format *mesh = mesh_format(begin, size, file->in.source.size);
+    if (mesh)
+        return ebpo_fail_file(error, status, file->in.shown,
+                              "is not an .ebpo.h5 file, but %s; make one of it with 'ebpo convert'",
+                              mesh->called);
+    const char *kind = other_kind(begin, size);
     return kind ? ebpo_fail_file(error, status, file->in.shown, "is not an .ebpo.h5 file, but %s",
                                  kind)
                 : status;

@@ -59,6 +59,13 @@ ebpo_attributes *ebpo_attributes_make(ebpo_workspace *workspace)
     return made;
 }
 
+ebpo_status ebpo_mesh_need_attributes(ebpo_mesh *mesh, ebpo_error *error)
+{
+    if (!mesh->attributes)
+        mesh->attributes = ebpo_attributes_make(mesh->workspace);
+    return mesh->attributes ? EBPO_OK : ebpo_fail_memory(error, sizeof *mesh->attributes);
+}
+
 static void attributes_clear(ebpo_workspace *workspace, ebpo_attribute *a)
 {
     if (!a->borrowed) {

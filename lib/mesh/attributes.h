@@ -45,6 +45,9 @@ typedef struct ebpo_attributes {
 ebpo_attributes *ebpo_attributes_make(ebpo_workspace *workspace);
 void ebpo_attributes_free(ebpo_attributes *attributes); /* NULL: nothing */
 
+/* Gives a mesh attributes where it has none, so that something can be noted. EBPO_E_MEMORY. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_need_attributes(ebpo_mesh *mesh, ebpo_error *error);
+
 /* Whether there is anything to keep. */
 static inline bool ebpo_attributes_hold(const ebpo_attributes *attributes)
 {

@@ -4,7 +4,7 @@
 #include "core/workspace.h"
 #include "mesh/box_tree.h"
 
-mesh_point *ebpo_point_tree_add(point_tree *tree)
+ebpo_tree_point *ebpo_box_tree_add(ebpo_box_tree *tree)
 {
     if (!ebpo_array_grow_late(tree->workspace, &tree->point, &tree->capacity, tree->count + 1,
                               sizeof *tree->point))
@@ -12,15 +12,9 @@ mesh_point *ebpo_point_tree_add(point_tree *tree)
     return &tree->point[tree->count++];
 }
 
-void ebpo_point_tree_free(point_tree *tree)
+static ebpo_point_box box_of_points(const ebpo_tree_point *p, uint64_t count)
 {
-    ebpo_array_free(tree->workspace, tree->point);
-    ebpo_array_free(tree->workspace, tree->node);
-}
-
-static point_box box_of_points(const mesh_point *p, uint64_t count)
-{
-    point_box box;
+    ebpo_point_box box;
     for (int k = 0; k < 3; k++)
         box.min[k] = box.max[k] = p[0].at[k];
     for (uint64_t i = 1; i < count; i++)
@@ -32,7 +26,7 @@ static point_box box_of_points(const mesh_point *p, uint64_t count)
 }
 
 /* Halves, as their difference may be beyond the doubles. */
-static int longest_axis(const point_box *box)
+static int longest_axis(const ebpo_point_box *box)
 {
     int best = 0;
     double most = -1;
@@ -44,15 +38,15 @@ static int longest_axis(const point_box *box)
     return best;
 }
 
-static void swap_points(mesh_point *a, mesh_point *b)
+static void swap_points(ebpo_tree_point *a, ebpo_tree_point *b)
 {
-    mesh_point t = *a;
+    ebpo_tree_point t = *a;
     *a = *b;
     *b = t;
 }
 
 /* What is before p[middle] is not greater along the axis, what is behind it not less (Hoare). */
-static void split_points(mesh_point *p, uint64_t count, uint64_t middle, int axis)
+static void split_points(ebpo_tree_point *p, uint64_t count, uint64_t middle, int axis)
 {
     uint64_t low = 0, high = count - 1;
     while (low < high) {
@@ -74,20 +68,20 @@ static void split_points(mesh_point *p, uint64_t count, uint64_t middle, int axi
     }
 }
 
-static void build_node(const point_tree *tree, uint64_t node, mesh_point *p, uint64_t count)
+static void build_node(const ebpo_box_tree *tree, uint64_t node, ebpo_tree_point *p, uint64_t count)
 {
     tree->node[node] = box_of_points(p, count);
-    if (count <= POINT_TREE_LEAF)
+    if (count <= EBPO_BOX_TREE_LEAF)
         return;
     split_points(p, count, count / 2, longest_axis(&tree->node[node]));
     build_node(tree, 2 * node + 1, p, count / 2);
     build_node(tree, 2 * node + 2, p + count / 2, count - count / 2);
 }
 
-bool ebpo_point_tree_build(point_tree *tree)
+static bool build_nodes(ebpo_box_tree *tree)
 {
     uint64_t nodes = 1;
-    for (uint64_t most = tree->count; most > POINT_TREE_LEAF; most -= most / 2)
+    for (uint64_t most = tree->count; most > EBPO_BOX_TREE_LEAF; most -= most / 2)
         nodes = 2 * nodes + 1;
     if (tree->count == 0)
         return true;
@@ -98,36 +92,13 @@ bool ebpo_point_tree_build(point_tree *tree)
     return true;
 }
 
-typedef struct point_walking {
-    const point_tree *tree;
-    point_box_fn wanted;
-    points_fn visit;
-    void *user;
-} point_walking;
-
-static bool walk_points(const point_walking *w, uint64_t node, mesh_point *p, uint64_t count)
-{
-    if (!w->wanted(w->user, &w->tree->node[node]))
-        return true;
-    if (count <= POINT_TREE_LEAF)
-        return w->visit(w->user, p, count);
-    return walk_points(w, 2 * node + 1, p, count / 2) &&
-           walk_points(w, 2 * node + 2, p + count / 2, count - count / 2);
-}
-
-bool ebpo_point_tree_walk(const point_tree *tree, point_box_fn wanted, points_fn visit, void *user)
-{
-    point_walking w = { tree, wanted, visit, user };
-    return tree->count == 0 || walk_points(&w, 0, tree->point, tree->count);
-}
-
 typedef struct filling {
-    box_tree *tree;
-    box_of_fn box_of;
+    ebpo_box_tree *tree;
+    ebpo_box_of_fn box_of;
     const void *user;
 } filling;
 
-static void join_boxes(point_box *box, const point_box *other)
+static void join_boxes(ebpo_point_box *box, const ebpo_point_box *other)
 {
     for (int k = 0; k < 3; k++) {
         box->min[k] = other->min[k] < box->min[k] ? other->min[k] : box->min[k];
@@ -135,10 +106,10 @@ static void join_boxes(point_box *box, const point_box *other)
     }
 }
 
-static void fill_node(const filling *f, uint64_t node, const mesh_point *p, uint64_t count)
+static void fill_node(const filling *f, uint64_t node, const ebpo_tree_point *p, uint64_t count)
 {
-    point_box *box = &f->tree->filled[node], other;
-    if (count <= POINT_TREE_LEAF) {
+    ebpo_point_box *box = &f->tree->filled[node], other;
+    if (count <= EBPO_BOX_TREE_LEAF) {
         f->box_of(f->user, &p[0], box);
         for (uint64_t i = 1; i < count; i++) {
             f->box_of(f->user, &p[i], &other);
@@ -152,47 +123,49 @@ static void fill_node(const filling *f, uint64_t node, const mesh_point *p, uint
     join_boxes(box, &f->tree->filled[2 * node + 2]);
 }
 
-bool ebpo_box_tree_build(box_tree *tree, box_of_fn box_of, const void *user)
+bool ebpo_box_tree_build(ebpo_box_tree *tree, ebpo_box_of_fn box_of, const void *user)
 {
     filling f = { tree, box_of, user };
-    point_tree *points = &tree->points;
-    if (points->count == 0)
-        return true;
-    if (!ebpo_point_tree_build(points))
+    if (!build_nodes(tree))
         return false;
-    tree->filled = ebpo_array_alloc(points->workspace, points->node_capacity, sizeof *tree->filled);
+    if (tree->count == 0 || !box_of)
+        return true;
+    tree->filled = ebpo_array_alloc(tree->workspace, tree->node_capacity, sizeof *tree->filled);
     if (!tree->filled)
         return false;
-    fill_node(&f, 0, points->point, points->count);
+    fill_node(&f, 0, tree->point, tree->count);
     return true;
 }
 
-void ebpo_box_tree_free(box_tree *tree)
+void ebpo_box_tree_free(ebpo_box_tree *tree)
 {
-    ebpo_array_free(tree->points.workspace, tree->filled);
-    ebpo_point_tree_free(&tree->points);
+    ebpo_array_free(tree->workspace, tree->filled);
+    ebpo_array_free(tree->workspace, tree->point);
+    ebpo_array_free(tree->workspace, tree->node);
 }
 
-typedef struct box_walking {
-    const box_tree *tree;
-    box_node_fn wanted;
-    points_fn visit;
+typedef struct walking {
+    const ebpo_box_tree *tree;
+    const ebpo_point_box *filled;
+    ebpo_box_node_fn wanted;
+    ebpo_tree_points_fn visit;
     void *user;
-} box_walking;
+} walking;
 
-static bool walk_boxes(const box_walking *w, uint64_t node, mesh_point *p, uint64_t count)
+static bool walk_node(const walking *w, uint64_t node, ebpo_tree_point *p, uint64_t count)
 {
-    box_node n = { &w->tree->points.node[node], &w->tree->filled[node], count };
+    ebpo_box_node n = { &w->tree->node[node], &w->filled[node], count };
     if (!w->wanted(w->user, &n))
         return true;
-    if (count <= POINT_TREE_LEAF)
+    if (count <= EBPO_BOX_TREE_LEAF)
         return w->visit(w->user, p, count);
-    return walk_boxes(w, 2 * node + 1, p, count / 2) &&
-           walk_boxes(w, 2 * node + 2, p + count / 2, count - count / 2);
+    return walk_node(w, 2 * node + 1, p, count / 2) &&
+           walk_node(w, 2 * node + 2, p + count / 2, count - count / 2);
 }
 
-bool ebpo_box_tree_walk(const box_tree *tree, box_node_fn wanted, points_fn visit, void *user)
+bool ebpo_box_tree_walk(const ebpo_box_tree *tree, ebpo_box_node_fn wanted,
+                        ebpo_tree_points_fn visit, void *user)
 {
-    box_walking w = { tree, wanted, visit, user };
-    return tree->points.count == 0 || walk_boxes(&w, 0, tree->points.point, tree->points.count);
+    walking w = { tree, tree->filled ? tree->filled : tree->node, wanted, visit, user };
+    return tree->count == 0 || walk_node(&w, 0, tree->point, tree->count);
 }

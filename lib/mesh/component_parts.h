@@ -8,32 +8,32 @@
 #include "mesh/mesh_parts.h"
 
 /* Faces that share vertices. */
-typedef struct mesh_component {
+typedef struct ebpo_found_component {
     uint64_t first; /* the least source number of its faces */
     uint32_t face;  /* that face, in the mesh as it is */
     bool open;      /* an edge is not used as often in one direction as in the other */
     double volume;  /* of a closed one, signed, in a unit of all components' own (mesh_frame.h) */
     double min[3], max[3];
     uint32_t host; /* of a cavity: what it is in; else itself */
-} mesh_component;
+} ebpo_found_component;
 
 /* Numbers of faces or vertices, those of one group together, each group's ascending. */
-typedef struct mesh_groups {
+typedef struct ebpo_number_groups {
     uint64_t *begin; /* [groups + 1] into `of` */
     uint32_t *of;
-} mesh_groups;
+} ebpo_number_groups;
 
 struct ebpo_components {
     const ebpo_mesh *mesh;
     const ebpo_mesh_groups *named; /* NULL: components; else neither list, number nor place */
     uint64_t count;                /* first all, then those that are no cavity of another one */
-    mesh_component *list;          /* [all] */
+    ebpo_found_component *list;    /* [all] */
     ebpo_component *facts;         /* [count] */
     /* [face_count] the component of each face, borrowed; NULL: that of its vertices */
     uint32_t *of_face;
     uint32_t *number; /* [vertex_count] the component; EBPO_NO_INDEX: no face names the vertex */
     uint32_t *place;  /* [vertex_count] among its component's vertices */
-    mesh_groups faces, vertices;
+    ebpo_number_groups faces, vertices;
 };
 
 /* EBPO_E_FORMAT: no faces, or one names a vertex that is not there. EBPO_E_ARGUMENT. */
@@ -41,7 +41,7 @@ EBPO_MUST_USE ebpo_status ebpo_components_check(const ebpo_mesh *mesh, ebpo_erro
 
 /* Of faces (else vertices) by their components or named groups. */
 EBPO_MUST_USE ebpo_status ebpo_components_group(const ebpo_components *c, bool faces,
-                                                mesh_groups *g, ebpo_error *error);
+                                                ebpo_number_groups *g, ebpo_error *error);
 
 /* Components, each with its faces, edges and volume, but no cavity joined to another one; freed by
  * ebpo_components_free. On failure as well. `closed`: NULL, or of ebpo_mesh_find_shells: each shell

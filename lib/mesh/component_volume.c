@@ -111,7 +111,8 @@ static ebpo_status look_at_edges(measuring *m, unsigned threads, const ebpo_prog
 /* ---- volumes ---- */
 
 /* Six times that of the tetrahedron from `base`, in the frame. */
-static double term_of(const measuring *m, mesh_component *c, uint64_t face, const double base[3])
+static double term_of(const measuring *m, ebpo_found_component *c, uint64_t face,
+                      const double base[3])
 {
     const ebpo_mesh *mesh = m->components->mesh;
     double t[3][3], cross[3];
@@ -138,7 +139,7 @@ static ebpo_status sum_volumes(void *context, uint64_t begin, uint64_t end, unsi
     ebpo_components *c = m->components;
     (void)worker, (void)error;
     for (uint64_t n = begin; n < end; n++) {
-        mesh_component *one = &c->list[n];
+        ebpo_found_component *one = &c->list[n];
         ebpo_sum sum = { .adds = 0 };
         double base[3], most = 0;
         ebpo_frame_position(&m->frame, c->mesh, c->mesh->faces[3 * (uint64_t)one->face], base);
@@ -197,7 +198,7 @@ static int compare_cavities(const void *x, const void *y)
 static int compare_hosts(const void *x, const void *y, void *list)
 {
     uint32_t a = *(const uint32_t *)x, b = *(const uint32_t *)y;
-    const mesh_component *l = list;
+    const ebpo_found_component *l = list;
     if (l[a].volume != l[b].volume)
         return l[a].volume < l[b].volume ? -1 : 1;
     return a < b ? -1 : 1;
@@ -207,7 +208,7 @@ static void list_both(placing *p)
 {
     const ebpo_components *c = p->components;
     for (uint64_t i = 0; i < c->count; i++) {
-        const mesh_component *m = &c->list[i];
+        const ebpo_found_component *m = &c->list[i];
         if (!m->open && m->volume > 0)
             p->hosts[p->host_count++] = (uint32_t)i;
         if (m->open || !(m->volume < 0))
@@ -235,7 +236,7 @@ static uint64_t from_y(const placing *p, double y)
 }
 
 /* What segments from the cavities along x to the host's end cross. */
-static void cross_face(placing *p, const mesh_component *host, uint64_t face)
+static void cross_face(placing *p, const ebpo_found_component *host, uint64_t face)
 {
     const ebpo_mesh *mesh = p->components->mesh;
     double t[3][3], low, high;
@@ -252,7 +253,7 @@ static void cross_face(placing *p, const mesh_component *host, uint64_t face)
 }
 
 /* A cavity that may be in the host and is in none yet. */
-static bool any_within(const placing *p, const mesh_component *host)
+static bool any_within(const placing *p, const ebpo_found_component *host)
 {
     for (uint64_t i = from_y(p, host->min[1]); i < p->count && p->cavities[i].at[1] <= host->max[1];
          i++) {
@@ -267,7 +268,7 @@ static bool any_within(const placing *p, const mesh_component *host)
 static void fill_host(placing *p, uint32_t number)
 {
     const ebpo_components *c = p->components;
-    const mesh_component *host = &c->list[number];
+    const ebpo_found_component *host = &c->list[number];
     if (!any_within(p, host))
         return;
     EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[number],

@@ -69,7 +69,7 @@ static void join_vertices(const ebpo_mesh *mesh, const uint32_t *closed, uint32_
 
 static int compare_first(const void *x, const void *y)
 {
-    const mesh_component *a = x, *b = y;
+    const ebpo_found_component *a = x, *b = y;
     return a->first < b->first ? -1 : 1;
 }
 
@@ -81,7 +81,7 @@ static ebpo_status add_face(ebpo_components *c, uint64_t f, uint32_t *number, ui
         if (!ebpo_array_grow(c->mesh->workspace, &c->list, capacity, c->count + 1, sizeof *c->list))
             return ebpo_workspace_fail(c->mesh->workspace, (c->count + 1) * sizeof *c->list, error);
         *number = (uint32_t)c->count;
-        c->list[c->count++] = (mesh_component){ .first = UINT64_MAX };
+        c->list[c->count++] = (ebpo_found_component){ .first = UINT64_MAX };
     }
     if (source < c->list[*number].first) {
         c->list[*number].first = source;
@@ -136,7 +136,7 @@ static uint32_t component_of(const ebpo_components *c, bool faces, uint64_t i)
 }
 
 /* Counted, then each in its place: ascending within a group. */
-static void fill_groups(const ebpo_components *c, bool faces, mesh_groups *g)
+static void fill_groups(const ebpo_components *c, bool faces, ebpo_number_groups *g)
 {
     uint64_t items = faces ? c->mesh->face_count : c->mesh->vertex_count, sum = 0;
     memset(g->begin, 0, (c->count + 1) * sizeof *g->begin);
@@ -159,7 +159,7 @@ static void fill_groups(const ebpo_components *c, bool faces, mesh_groups *g)
     g->begin[0] = 0;
 }
 
-ebpo_status ebpo_components_group(const ebpo_components *c, bool faces, mesh_groups *g,
+ebpo_status ebpo_components_group(const ebpo_components *c, bool faces, ebpo_number_groups *g,
                                   ebpo_error *error)
 {
     uint64_t items = faces ? c->mesh->face_count : c->mesh->vertex_count;
@@ -660,7 +660,7 @@ static int components_ascending(const void *x, const void *y)
 static ebpo_status gather_vertices(ebpo_components *c, ebpo_error *error)
 {
     ebpo_workspace *workspace = c->mesh->workspace;
-    mesh_groups *v = &c->vertices;
+    ebpo_number_groups *v = &c->vertices;
     uint32_t *seen = ebpo_array_alloc(workspace, c->mesh->vertex_count, sizeof *seen);
     v->begin = ebpo_array_alloc(workspace, c->count + 1, sizeof *v->begin);
     if (seen && v->begin) {

@@ -1,3 +1,6 @@
+/* Reading meshes of all formats. The table below has one row for each format. A new format is a
+ * file NAME.c that has its reader and its row, a declaration of the row in import_build.h, and
+ * a line in the table. */
 #include "core/strict_fp.h"
 
 #include "mesh/import.h"
@@ -7,11 +10,24 @@
 #include <strings.h>
 
 #include "mesh/attributes.h"
+#include "core/parallel.h"
 #include "core/workspace.h"
 #include "core/error.h"
 #include "mesh/import_build.h"
-#include "mesh/obj.h"
 #include "io/file_source.h"
+
+/* In the order in which a file is tried. Messages name the formats from the last row to the first.
+ */
+static const ebpo_import_format *const formats[] = {
+    &ebpo_import_off,
+    &ebpo_import_stl,
+    &ebpo_import_obj,
+    &ebpo_import_ply,
+};
+
+enum { FORMATS = sizeof formats / sizeof *formats, LIST_TEXT = 24 * FORMATS };
+
+/* --- a mesh of the values and faces that a reader finds --- */
 
 void ebpo_import_clear(ebpo_mesh *mesh)
 {
@@ -22,17 +38,7 @@ void ebpo_import_clear(ebpo_mesh *mesh)
     *mesh = (ebpo_mesh){ 0 };
 }
 
-static ebpo_status read_format(import_build *b, ebpo_import_format format, const uint8_t *data,
-                               uint64_t size, ebpo_obj_runs *runs)
-{
-    switch (format) {
-    case EBPO_IMPORT_OBJ: return ebpo_obj_read(b, data, size, runs);
-    case EBPO_IMPORT_OFF: return ebpo_off_read(b, data, size);
-    default: return ebpo_stl_read(b, data, size);
-    }
-}
-
-/* None that would say nothing. */
+/* Frees attributes that would say nothing. */
 static void drop_empty(ebpo_mesh *mesh)
 {
     ebpo_attributes *a = mesh->attributes;
@@ -44,45 +50,42 @@ static void drop_empty(ebpo_mesh *mesh)
 
 /* Reads the file with positions of floats or doubles; *again: floats do not keep its text. On
  * failure nothing is left but the mesh's workspace. */
-static ebpo_status read_once(ebpo_mesh *mesh, ebpo_import_format format, const uint8_t *data,
-                             uint64_t size, const char *name, bool attributes, bool doubles,
-                             ebpo_obj_runs *runs, bool *again, ebpo_error *error)
+static ebpo_status read_once(ebpo_mesh *mesh, const ebpo_import_format *format,
+                             const ebpo_import_job *job, bool doubles, bool *again,
+                             ebpo_error *error)
 {
     ebpo_workspace *workspace = mesh->workspace;
-    import_build b;
-    ebpo_status status = ebpo_import_begin(&b, mesh, name, attributes, doubles, error);
-    if (status == EBPO_OK && attributes && !(mesh->attributes = ebpo_attributes_make(workspace)))
-        status = ebpo_fail_memory(error, sizeof *mesh->attributes);
+    ebpo_import_build b;
+    ebpo_status status =
+        ebpo_import_begin(&b, mesh, ebpo_path_name(job->name), job->attributes, doubles, error);
+    if (status == EBPO_OK && job->attributes)
+        status = ebpo_mesh_need_attributes(mesh, error);
     if (status == EBPO_OK)
-        status = read_format(&b, format, data, size, runs);
+        status = format->build(&b, job);
     ebpo_import_free(&b);
     *again = status != EBPO_OK && b.loses_digits && !doubles;
     if (status != EBPO_OK) {
         ebpo_import_clear(mesh);
         mesh->workspace = workspace;
-        if (runs)
-            ebpo_obj_runs_free(runs);
+        if (job->runs)
+            ebpo_import_runs_free(job->runs);
     }
     return status;
 }
 
-static ebpo_status import_import(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
-                                 uint64_t size, const char *name, ebpo_workspace *workspace,
-                                 bool attributes, ebpo_obj_runs *runs, ebpo_error *error)
+static ebpo_status build_mesh(ebpo_mesh *out, const ebpo_import_format *format,
+                              const ebpo_import_job *job, ebpo_error *error)
 {
-    static const char *const formats[] = { "obj", "stl", "off" };
-    ebpo_mesh mesh = { .workspace = workspace };
+    ebpo_mesh mesh = { .workspace = job->workspace };
     bool again;
-    name = ebpo_path_name(name);
-    ebpo_status status =
-        read_once(&mesh, format, data, size, name, attributes, false, runs, &again, error);
+    ebpo_status status = read_once(&mesh, format, job, false, &again, error);
     if (again)
-        status = read_once(&mesh, format, data, size, name, attributes, true, runs, &again, error);
+        status = read_once(&mesh, format, job, true, &again, error);
     if (status == EBPO_OK) {
         drop_empty(&mesh);
-        snprintf(mesh.source_name, sizeof mesh.source_name, "%s", name);
-        snprintf(mesh.source_format, sizeof mesh.source_format, "%s", formats[format]);
-        mesh.source_size = size;
+        snprintf(mesh.source_name, sizeof mesh.source_name, "%s", ebpo_path_name(job->name));
+        snprintf(mesh.source_format, sizeof mesh.source_format, "%s", format->ending + 1);
+        mesh.source_size = job->size;
     } else {
         mesh.workspace = NULL;
     }
@@ -90,71 +93,90 @@ static ebpo_status import_import(ebpo_mesh *out, ebpo_import_format format, cons
     return status;
 }
 
-ebpo_status ebpo_import_groups(ebpo_mesh *out, const uint8_t *data, uint64_t size, const char *name,
-                               ebpo_workspace *workspace, bool attributes, ebpo_obj_runs *runs,
-                               ebpo_error *error)
-{
-    *runs = (ebpo_obj_runs){ 0 };
-    return import_import(out, EBPO_IMPORT_OBJ, data, size, name, workspace, attributes, runs,
-                         error);
-}
-
 /* --- which format it is --- */
 
-/* An OBJ file has no mark: its first word is one of those that such files begin with. */
-static bool is_obj(const uint8_t *data, uint64_t size)
+static bool name_ends(const char *name, const char *ending)
 {
-    static const char *const words[] = { "v", "vt", "vn", "vp",     "f",
-                                         "g", "o",  "s",  "mtllib", "usemtl" };
-    obj_text t = ebpo_obj_text(data, size);
-    obj_word word;
-    if (!ebpo_obj_next_statement(&t, &word))
-        return false;
-    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-        if (ebpo_obj_word_is(word, words[i]))
+    size_t n = strlen(name), length = strlen(ending);
+    return n >= length && strcasecmp(name + n - length, ending) == 0;
+}
+
+const ebpo_import_format *ebpo_import_recognise(const uint8_t *data, uint64_t size,
+                                                const char *name)
+{
+    for (size_t i = 0; i < FORMATS; i++)
+        if (formats[i]->mark_comes_first && formats[i]->recognise(data, size))
+            return formats[i];
+    for (size_t i = 0; i < FORMATS; i++)
+        if (formats[i]->recognise(data, size) || name_ends(name, formats[i]->ending))
+            return formats[i];
+    return NULL;
+}
+
+/* True for a file that has the mark of some format, whatever other kind it looks like. */
+static bool has_mark(const uint8_t *data, uint64_t size)
+{
+    for (size_t i = 0; i < FORMATS; i++)
+        if (!formats[i]->has_no_mark && formats[i]->recognise(data, size))
             return true;
     return false;
 }
 
-bool ebpo_import_recognise(ebpo_import_format *format, const uint8_t *data, uint64_t size,
-                           const char *name)
+/* A name that ends as those of another format do hides a format that has no mark. */
+static ebpo_status check_name(const ebpo_import_format *format, const ebpo_import_job *job,
+                              ebpo_error *error)
 {
-    size_t n = strlen(name);
-    const char *ending = n >= 4 ? name + n - 4 : "";
-    if (ebpo_off_recognise(data, size) || strcasecmp(ending, ".off") == 0)
-        *format = EBPO_IMPORT_OFF;
-    else if (ebpo_stl_recognise(data, size) || strcasecmp(ending, ".stl") == 0)
-        *format = EBPO_IMPORT_STL;
-    else if (strcasecmp(ending, ".obj") == 0 || is_obj(data, size))
-        *format = EBPO_IMPORT_OBJ;
-    else
-        return false;
-    return true;
-}
-
-/* OBJ has no mark, so a name that ends in .stl or .off hides one. */
-static ebpo_status check_name(ebpo_import_format format, const uint8_t *data, uint64_t size,
-                              const char *name, ebpo_error *error)
-{
-    bool marked = format == EBPO_IMPORT_OFF   ? ebpo_off_recognise(data, size)
-                  : format == EBPO_IMPORT_STL ? ebpo_stl_recognise(data, size)
-                                              : true;
-    if (marked || !ebpo_bytes_are_text(data, size) || !is_obj(data, size))
+    if (format->has_no_mark || format->recognise(job->data, job->size) ||
+        !ebpo_bytes_are_text(job->data, job->size))
         return EBPO_OK;
-    return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(name),
-                          "begins as an OBJ file does, but its name says %s; rename it to end in "
-                          ".obj",
-                          format == EBPO_IMPORT_OFF ? "OFF" : "STL");
+    for (size_t i = 0; i < FORMATS; i++) {
+        const ebpo_import_format *other = formats[i];
+        if (other->has_no_mark && other->recognise(job->data, job->size))
+            return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(job->name),
+                                  "begins as %s file does, but its name says %s; rename it to end "
+                                  "in %s",
+                                  other->called, ebpo_import_name(format), other->ending);
+    }
+    return EBPO_OK;
 }
 
-ebpo_status ebpo_import_memory(ebpo_mesh *out, ebpo_import_format format, const uint8_t *data,
-                               uint64_t size, const char *name, ebpo_workspace *workspace,
-                               bool attributes, ebpo_error *error)
+/* "PLY, OBJ, STL or OFF" */
+static void list_names(char text[LIST_TEXT])
 {
-    ebpo_status status = check_name(format, data, size, name, error);
-    if (status != EBPO_OK) {
-        *out = (ebpo_mesh){ 0 };
-        return status;
-    }
-    return import_import(out, format, data, size, name, workspace, attributes, NULL, error);
+    int at = 0;
+    for (size_t i = FORMATS; i-- > 0 && at < LIST_TEXT;)
+        at += snprintf(text + at, (size_t)(LIST_TEXT - at), "%s%s",
+                       i == FORMATS - 1 ? ""
+                       : i > 0          ? ", "
+                                        : " or ",
+                       ebpo_import_name(formats[i]));
+}
+
+ebpo_status ebpo_import_memory(ebpo_mesh *out, const ebpo_import_format *format,
+                               const ebpo_import_job *job, ebpo_error *error)
+{
+    *out = (ebpo_mesh){ 0 };
+    if (format->read)
+        return format->read(out, job, error);
+    if (!ebpo_progress_stage(job->progress, "reading", error))
+        return EBPO_E_CANCELLED;
+    ebpo_status status = check_name(format, job, error);
+    return status == EBPO_OK ? build_mesh(out, format, job, error) : status;
+}
+
+ebpo_status ebpo_import_any(ebpo_mesh *out, const ebpo_import_job *job, ebpo_error *error)
+{
+    const char *foreign = ebpo_foreign_bytes(job->data, job->size),
+               *name = ebpo_path_name(job->name);
+    const ebpo_import_format *format = ebpo_import_recognise(job->data, job->size, job->name);
+    char list[LIST_TEXT];
+    if (foreign && has_mark(job->data, job->size)) /* a binary STL file begins with any bytes */
+        foreign = NULL;
+    if (!foreign && format)
+        return ebpo_import_memory(out, format, job, error);
+    *out = (ebpo_mesh){ 0 };
+    if (foreign)
+        return ebpo_fail_file(error, EBPO_E_FORMAT, name, "%s", foreign);
+    list_names(list);
+    return ebpo_fail_file(error, EBPO_E_FORMAT, name, "unrecognised format; expected %s", list);
 }

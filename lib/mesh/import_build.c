@@ -16,36 +16,36 @@
 #include "mesh/attributes.h"
 #include "mesh/import_build.h"
 
-static ebpo_status fail_many(const import_build *b)
+static ebpo_status fail_many(const ebpo_import_build *b)
 {
     return ebpo_fail_file(b->error, EBPO_E_LIMIT, b->name,
                           "more than 2^32 - 2 vertices, triangles or values of one kind; split the "
                           "model");
 }
 
-static ebpo_status fail_memory(const import_build *b, uint64_t bytes)
+static ebpo_status fail_memory(const ebpo_import_build *b, uint64_t bytes)
 {
     return ebpo_workspace_fail(b->mesh->workspace, bytes, b->error);
 }
 
-unsigned ebpo_import_columns(import_sort sort) { return sort == IMPORT_TEXTURE ? 2 : 3; }
+unsigned ebpo_import_columns(ebpo_import_sort sort) { return sort == EBPO_IMPORT_TEXTURE ? 2 : 3; }
 
-ebpo_status ebpo_import_begin(import_build *b, ebpo_mesh *mesh, const char *name, bool attributes,
-                              bool doubles, ebpo_error *error)
+ebpo_status ebpo_import_begin(ebpo_import_build *b, ebpo_mesh *mesh, const char *name,
+                              bool attributes, bool doubles, ebpo_error *error)
 {
-    *b = (import_build){ .name = name,
-                         .error = error,
-                         .mesh = mesh,
-                         .attributes = attributes,
-                         .doubles = doubles,
-                         .position_size = 3 * (doubles ? sizeof(double) : sizeof(float)) };
+    *b = (ebpo_import_build){ .name = name,
+                              .error = error,
+                              .mesh = mesh,
+                              .attributes = attributes,
+                              .doubles = doubles,
+                              .position_size = 3 * (doubles ? sizeof(double) : sizeof(float)) };
     b->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     return b->c_locale ? EBPO_OK : ebpo_fail_memory(error, 0);
 }
 
 /* --- numbers --- */
 
-bool ebpo_import_coordinate(import_build *b, double *value, const char *s, size_t n)
+bool ebpo_import_coordinate(ebpo_import_build *b, double *value, const char *s, size_t n)
 {
     float narrow;
     bool kept;
@@ -58,7 +58,8 @@ bool ebpo_import_coordinate(import_build *b, double *value, const char *s, size_
     return true;
 }
 
-void ebpo_import_quotient(import_build *b, double *value, const char *s, size_t n, double weight)
+void ebpo_import_quotient(ebpo_import_build *b, double *value, const char *s, size_t n,
+                          double weight)
 {
     double number = 0;
     (void)ebpo_number_double(&number, s, n, b->c_locale);
@@ -66,7 +67,7 @@ void ebpo_import_quotient(import_build *b, double *value, const char *s, size_t 
     b->loses_digits |= (double)(float)*value != *value;
 }
 
-bool ebpo_import_value(import_build *b, float *value, const char *s, size_t n)
+bool ebpo_import_value(ebpo_import_build *b, float *value, const char *s, size_t n)
 {
     bool kept;
     bool good = ebpo_number_float_kept(value, &kept, s, n, b->c_locale);
@@ -76,11 +77,11 @@ bool ebpo_import_value(import_build *b, float *value, const char *s, size_t n)
 
 /* --- vertices and rows --- */
 
-ebpo_status ebpo_import_position(import_build *b, const double xyz[3])
+ebpo_status ebpo_import_position(ebpo_import_build *b, const double xyz[3])
 {
     if (b->loses_digits && !b->doubles)
         return EBPO_E_UNSUPPORTED;
-    if (b->vertices == IMPORT_MOST)
+    if (b->vertices == EBPO_IMPORT_MOST)
         return fail_many(b);
     if (!ebpo_array_grow(b->mesh->workspace, &b->xyz, &b->vertex_capacity, b->vertices + 1,
                          b->position_size))
@@ -95,17 +96,17 @@ ebpo_status ebpo_import_position(import_build *b, const double xyz[3])
     return EBPO_OK;
 }
 
-ebpo_status ebpo_import_vertex(import_build *b, const float xyz[3])
+ebpo_status ebpo_import_vertex(ebpo_import_build *b, const float xyz[3])
 {
     const double wide[3] = { (double)xyz[0], (double)xyz[1], (double)xyz[2] };
     return ebpo_import_position(b, wide);
 }
 
-ebpo_status ebpo_import_row(import_build *b, import_sort sort, const float *values)
+ebpo_status ebpo_import_row(ebpo_import_build *b, ebpo_import_sort sort, const float *values)
 {
-    import_table *t = &b->table[sort];
+    ebpo_import_table *t = &b->table[sort];
     size_t bytes = ebpo_import_columns(sort) * sizeof *values;
-    if (t->rows == IMPORT_MOST)
+    if (t->rows == EBPO_IMPORT_MOST)
         return fail_many(b);
     if (!ebpo_array_grow(b->mesh->workspace, &t->values, &t->capacity, t->rows + 1, bytes))
         return fail_memory(b, (t->rows + 1) * bytes);
@@ -113,7 +114,7 @@ ebpo_status ebpo_import_row(import_build *b, import_sort sort, const float *valu
     return EBPO_OK;
 }
 
-ebpo_status ebpo_import_faces(import_build *b)
+ebpo_status ebpo_import_faces(ebpo_import_build *b)
 {
     ebpo_mesh *mesh = b->mesh;
     b->use = ebpo_array_alloc(mesh->workspace, b->vertices, sizeof *b->use);
@@ -130,7 +131,7 @@ ebpo_status ebpo_import_faces(import_build *b)
 
 /* --- polygons --- */
 
-import_corner *ebpo_import_corner(import_build *b)
+ebpo_import_corner *ebpo_import_add_corner(ebpo_import_build *b)
 {
     if (!ebpo_grow(&b->corner, &b->corner_capacity, b->corners + 1, sizeof *b->corner))
         return NULL;
@@ -143,13 +144,13 @@ static void *positions_of(const ebpo_mesh *mesh)
 }
 
 /* The first polygon that names a vertex gives it its number. */
-static void number_vertices(import_build *b)
+static void number_vertices(ebpo_import_build *b)
 {
     ebpo_mesh *mesh = b->mesh;
     for (uint64_t i = 0; i < b->corners; i++) {
         uint32_t vertex = b->corner[i].vertex;
         uint64_t from = 3 * (uint64_t)vertex, to = 3 * mesh->vertex_count;
-        if (b->use[vertex] != IMPORT_NONE)
+        if (b->use[vertex] != EBPO_IMPORT_NONE)
             continue;
         if (b->doubles)
             memcpy(mesh->xyz64 + to, (const double *)b->xyz + from, 3 * sizeof *mesh->xyz64);
@@ -160,7 +161,7 @@ static void number_vertices(import_build *b)
 }
 
 /* Faces before the first row have none. */
-static bool make_room_in(import_build *b, import_table *t, uint64_t faces)
+static bool make_room_in(ebpo_import_build *b, ebpo_import_table *t, uint64_t faces)
 {
     ebpo_workspace *workspace = b->mesh->workspace;
     bool first = !t->index;
@@ -171,38 +172,38 @@ static bool make_room_in(import_build *b, import_table *t, uint64_t faces)
     return true;
 }
 
-static ebpo_status make_room(import_build *b, uint64_t more)
+static ebpo_status make_room(ebpo_import_build *b, uint64_t more)
 {
     ebpo_mesh *mesh = b->mesh;
     uint64_t need = mesh->face_count + more;
-    if (more > IMPORT_MOST - mesh->face_count)
+    if (more > EBPO_IMPORT_MOST - mesh->face_count)
         return fail_many(b);
     bool fine = ebpo_array_grow(mesh->workspace, &mesh->faces, &b->face_capacity, need,
                                 3 * sizeof *mesh->faces);
-    for (int i = 0; i < IMPORT_SORTS && fine; i++)
+    for (int i = 0; i < EBPO_IMPORT_SORTS && fine; i++)
         fine = !b->attributes || !b->table[i].rows || make_room_in(b, &b->table[i], need);
     return fine ? EBPO_OK : fail_memory(b, need * 3 * sizeof *mesh->faces);
 }
 
-static void put_triangle(import_build *b, uint32_t a, uint32_t second, uint32_t third)
+static void put_triangle(ebpo_import_build *b, uint32_t a, uint32_t second, uint32_t third)
 {
     const uint32_t corner[3] = { a, second, third };
     uint64_t at = 3 * b->mesh->face_count++;
     for (uint64_t k = 0; k < 3; k++) {
-        const import_corner *c = &b->corner[corner[k]];
+        const ebpo_import_corner *c = &b->corner[corner[k]];
         b->mesh->faces[at + k] = b->use[c->vertex];
-        for (int i = 0; i < IMPORT_SORTS; i++) {
-            import_table *t = &b->table[i];
+        for (int i = 0; i < EBPO_IMPORT_SORTS; i++) {
+            ebpo_import_table *t = &b->table[i];
             if (t->index)
                 t->index[at + k] = c->row[i];
-            t->named |= c->row[i] != IMPORT_NONE;
+            t->named |= c->row[i] != EBPO_IMPORT_NONE;
         }
     }
 }
 
 /* Scratch holds, one behind the other: positions of corners, triangles, and what cutting asks for.
  */
-static ebpo_status reserve_scratch(import_build *b, uint64_t n)
+static ebpo_status reserve_scratch(ebpo_import_build *b, uint64_t n)
 {
     uint64_t bytes;
     if (!ebpo_mul_ok(n, 3 * sizeof(double) + 4 * sizeof(uint32_t), &bytes) ||
@@ -212,7 +213,7 @@ static ebpo_status reserve_scratch(import_build *b, uint64_t n)
     return EBPO_OK;
 }
 
-static void load_position(const import_build *b, uint64_t vertex, double xyz[3])
+static void load_position(const ebpo_import_build *b, uint64_t vertex, double xyz[3])
 {
     const float *narrow = b->xyz;
     const double *wide = b->xyz;
@@ -220,7 +221,7 @@ static void load_position(const import_build *b, uint64_t vertex, double xyz[3])
         xyz[k] = b->doubles ? wide[3 * vertex + k] : (double)narrow[3 * vertex + k];
 }
 
-static ebpo_status build_cut(import_build *b, uint32_t n)
+static ebpo_status build_cut(ebpo_import_build *b, uint32_t n)
 {
     ebpo_status status = reserve_scratch(b, n);
     if (status != EBPO_OK)
@@ -249,7 +250,7 @@ static ebpo_status build_cut(import_build *b, uint32_t n)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_import_polygon(import_build *b)
+ebpo_status ebpo_import_polygon(ebpo_import_build *b)
 {
     uint64_t n = b->corners;
     ebpo_status status = EBPO_OK;
@@ -283,7 +284,7 @@ static void build_trim(ebpo_mesh *mesh, size_t position_size)
     mesh->faces = faces ? faces : mesh->faces;
 }
 
-ebpo_status ebpo_import_end(import_build *b)
+ebpo_status ebpo_import_end(ebpo_import_build *b)
 {
     ebpo_mesh *mesh = b->mesh;
     ebpo_workspace *workspace = mesh->workspace;
@@ -310,26 +311,24 @@ ebpo_status ebpo_import_end(import_build *b)
     return status;
 }
 
-ebpo_status ebpo_import_notes(import_build *b)
+void ebpo_import_word_text(char text[EBPO_IMPORT_WORD_TEXT], const char *s, size_t n)
 {
-    ebpo_mesh *mesh = b->mesh;
-    if (!mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
-        return ebpo_fail_memory(b->error, sizeof *mesh->attributes);
-    return EBPO_OK;
-}
-
-void ebpo_import_word_text(char text[IMPORT_WORD_TEXT], const char *s, size_t n)
-{
-    n = n < IMPORT_WORD_TEXT ? n : IMPORT_WORD_TEXT - 1;
+    n = n < EBPO_IMPORT_WORD_TEXT ? n : EBPO_IMPORT_WORD_TEXT - 1;
     for (size_t i = 0; i < n; i++)
         text[i] = s[i] < ' ' || s[i] > '~' ? '?' : s[i];
     text[n] = 0;
 }
 
-void ebpo_import_free(import_build *b)
+void ebpo_import_runs_free(ebpo_import_runs *runs)
+{
+    free(runs->of);
+    *runs = (ebpo_import_runs){ 0 };
+}
+
+void ebpo_import_free(ebpo_import_build *b)
 {
     ebpo_workspace *workspace = b->mesh->workspace;
-    for (int i = 0; i < IMPORT_SORTS; i++) {
+    for (int i = 0; i < EBPO_IMPORT_SORTS; i++) {
         ebpo_array_free(workspace, b->table[i].values);
         ebpo_array_free(workspace, b->table[i].index);
     }
@@ -345,14 +344,14 @@ void ebpo_import_free(import_build *b)
 
 static const struct {
     const char *names, *list_name;
-} sorts[IMPORT_SORTS] = { { "red green blue", "color" },
-                          { "nx ny nz", "normal" },
-                          { "s t", "texcoord" } };
+} sorts[EBPO_IMPORT_SORTS] = { { "red green blue", "color" },
+                               { "nx ny nz", "normal" },
+                               { "s t", "texcoord" } };
 
 typedef struct placing {
-    const import_build *b;
-    const import_table *table;
-    import_sort sort;
+    const ebpo_import_build *b;
+    const ebpo_import_table *table;
+    ebpo_import_sort sort;
     size_t bytes; /* of a row, as it is kept */
 } placing;
 
@@ -390,8 +389,8 @@ static const void *value_at(const placing *p, uint64_t corner)
 {
     static const float none[3] = { 0, 0, 0 };
     uint32_t row = p->table->index[corner];
-    return row == IMPORT_NONE ? (const char *)none
-                              : (const char *)p->table->values + row * p->bytes;
+    return row == EBPO_IMPORT_NONE ? (const char *)none
+                                   : (const char *)p->table->values + row * p->bytes;
 }
 
 /* *fits: all corners at a vertex say the same. */
@@ -446,18 +445,18 @@ static ebpo_status place_in_lists(const placing *p)
 }
 
 /* In place: what is written lies below what is still to be read. */
-static void make_bytes(import_table *t, size_t columns)
+static void make_bytes(ebpo_import_table *t, size_t columns)
 {
     uint8_t *to = (uint8_t *)t->values;
     for (uint64_t i = 0; i < t->rows * columns; i++)
         to[i] = (uint8_t)t->values[i];
 }
 
-ebpo_status ebpo_import_attributes(import_build *b)
+ebpo_status ebpo_import_attributes(ebpo_import_build *b)
 {
     ebpo_status status = EBPO_OK;
-    for (int i = 0; i < IMPORT_SORTS && status == EBPO_OK; i++) {
-        placing p = { b, &b->table[i], (import_sort)i, 0 };
+    for (int i = 0; i < EBPO_IMPORT_SORTS && status == EBPO_OK; i++) {
+        placing p = { b, &b->table[i], (ebpo_import_sort)i, 0 };
         bool fits = false;
         if (!p.table->index || !p.table->named)
             continue;

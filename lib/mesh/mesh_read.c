@@ -9,12 +9,10 @@
 #include "core/checksum.h"
 #include "core/workspace.h"
 #include "mesh/import.h"
-#include "mesh/import_build.h"
 #include "mesh/textures.h"
 #include "io/file_source.h"
 #include "mesh/mesh_parts.h"
 #include "mesh/component_parts.h"
-#include "mesh/ply.h"
 
 enum { HASH_STEP = 1 << 22 };
 
@@ -52,51 +50,25 @@ static void hash_end(hashing *h)
         pthread_join(h->thread, NULL);
 }
 
-static ebpo_status parse_ply(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
-                             const ebpo_mesh_read_options *wanted, ebpo_error *error)
-{
-    return ebpo_ply_parse_all(out, file->data, file->size, path, wanted->workspace,
-                              wanted->attributes != 0, wanted->threads, &wanted->progress, error);
-}
-
-/* With its groups, if it names any. */
-static ebpo_status import_groups(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
-                                 const ebpo_mesh_read_options *wanted, ebpo_mesh_groups **groups,
-                                 ebpo_error *error)
-{
-    ebpo_obj_runs runs;
-    ebpo_status status = ebpo_import_groups(out, file->data, file->size, path, wanted->workspace,
-                                            wanted->attributes != 0, &runs, error);
-    if (status != EBPO_OK)
-        return status;
-    if (runs.count > 1)
-        status = ebpo_mesh_groups_new(runs.of, runs.count, groups, error);
-    ebpo_obj_runs_free(&runs);
-    return status;
-}
-
+/* With its groups, if these are asked for and it names any. */
 static ebpo_status read_parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
                               const ebpo_mesh_read_options *wanted, ebpo_mesh_groups **groups,
                               ebpo_error *error)
 {
-    const char *dot = strrchr(ebpo_path_name(path), '.');
-    const char *foreign;
-    ebpo_import_format format;
-    if (ebpo_ply_recognise(file->data, file->size))
-        return parse_ply(out, file, path, wanted, error);
-    if (!ebpo_stl_recognise(file->data, file->size) &&
-        (foreign = ebpo_foreign_bytes(file->data, file->size)))
-        return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(path), "%s", foreign);
-    if (ebpo_import_recognise(&format, file->data, file->size, path))
-        return !ebpo_progress_stage(&wanted->progress, "reading", error) ? EBPO_E_CANCELLED
-               : groups && format == EBPO_IMPORT_OBJ
-                   ? import_groups(out, file, path, wanted, groups, error)
-                   : ebpo_import_memory(out, format, file->data, file->size, path,
-                                        wanted->workspace, wanted->attributes != 0, error);
-    if (dot && strcasecmp(dot, ".ply") == 0) /* its reader says best what is wrong */
-        return parse_ply(out, file, path, wanted, error);
-    return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(path),
-                          "unrecognised format; expected PLY, OBJ, STL or OFF");
+    ebpo_import_runs runs = { 0 };
+    const ebpo_import_job job = { .data = file->data,
+                                  .size = file->size,
+                                  .name = path,
+                                  .workspace = wanted->workspace,
+                                  .attributes = wanted->attributes != 0,
+                                  .threads = wanted->threads,
+                                  .progress = &wanted->progress,
+                                  .runs = groups ? &runs : NULL };
+    ebpo_status status = ebpo_import_any(out, &job, error);
+    if (status == EBPO_OK && runs.count > 1)
+        status = ebpo_mesh_groups_new(runs.of, runs.count, groups, error);
+    ebpo_import_runs_free(&runs);
+    return status;
 }
 
 /* A file that is changed while it is read may be of no form at all: then that is what is told. */

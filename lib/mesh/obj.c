@@ -22,23 +22,23 @@
 typedef struct obj_losses {
     uint64_t weights, surplus;              /* vertices divided by w; with values beyond */
     uint64_t curves, unknown, unknown_line; /* statements; where the first unknown one is */
-    uint64_t absent[IMPORT_SORTS];          /* corners that name values that are not there */
+    uint64_t absent[EBPO_IMPORT_SORTS];     /* corners that name values that are not there */
     uint64_t uncoloured, alpha, no_numbers; /* vertices, vertices, normals and coordinates */
     bool third, smoothing, library, groups;
 } obj_losses;
 
 typedef struct obj_reading {
-    import_build *build;
+    ebpo_import_build *build;
     const uint8_t *data;
     uint64_t size;
-    obj_text text;
-    uint64_t next_release;       /* byte */
-    uint64_t line;               /* where the statement began */
-    uint64_t rows[IMPORT_SORTS]; /* of the file's vertices, normals, texture coordinates; in the
-                                    second pass of those so far */
-    ebpo_obj_runs *runs;         /* NULL: not asked for */
+    ebpo_obj_text text;
+    uint64_t next_release;            /* byte */
+    uint64_t line;                    /* where the statement began */
+    uint64_t rows[EBPO_IMPORT_SORTS]; /* of the file's vertices, normals, texture coordinates; in
+                                    the second pass of those so far */
+    ebpo_import_runs *runs;           /* NULL: not asked for */
     obj_losses losses;
-    obj_names names;
+    ebpo_obj_names names;
 } obj_reading;
 
 /* EBPO_E_FORMAT, with the statement's line. */
@@ -50,10 +50,10 @@ static bool ends_line(char c) { return c == '\n' || c == '\r'; }
 
 static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 
-obj_text ebpo_obj_text(const uint8_t *data, uint64_t size)
+ebpo_obj_text ebpo_obj_text_begin(const uint8_t *data, uint64_t size)
 {
-    return (obj_text){ (const char *)data + ebpo_text_mark(data, size), (const char *)data + size,
-                       1, false };
+    return (ebpo_obj_text){ (const char *)data + ebpo_text_mark(data, size),
+                            (const char *)data + size, 1, false };
 }
 
 /* Characters at which a word may end. */
@@ -78,7 +78,7 @@ static const char *joined_end(const char *at, const char *end)
     return at < end && ends_line(*at) ? at : NULL;
 }
 
-static void skip_blanks(obj_text *t)
+static void skip_blanks(ebpo_obj_text *t)
 {
     const char *joined;
     while (t->at < t->end) {
@@ -93,7 +93,7 @@ static void skip_blanks(obj_text *t)
     }
 }
 
-bool ebpo_obj_next_word(obj_text *t, obj_word *word)
+bool ebpo_obj_next_word(ebpo_obj_text *t, ebpo_obj_word *word)
 {
     skip_blanks(t);
     const char *s = t->at;
@@ -103,17 +103,17 @@ bool ebpo_obj_next_word(obj_text *t, obj_word *word)
     while (at < t->end && (!may_end[(uint8_t)*at] || (*at == '\\' && !joined_end(at, t->end))))
         at++;
     t->at = at;
-    *word = (obj_word){ s, (size_t)(at - s) };
+    *word = (ebpo_obj_word){ s, (size_t)(at - s) };
     return true;
 }
 
-static void skip_line(obj_text *t)
+static void skip_line(ebpo_obj_text *t)
 {
     while (t->at < t->end && !ends_line(*t->at))
         t->at++;
 }
 
-obj_word ebpo_obj_name(obj_text *t)
+ebpo_obj_word ebpo_obj_name(ebpo_obj_text *t)
 {
     while (t->at < t->end && is_blank(*t->at))
         t->at++;
@@ -121,10 +121,10 @@ obj_word ebpo_obj_name(obj_text *t)
     skip_line(t);
     for (stop = t->at; stop > s && is_blank(stop[-1]);)
         stop--;
-    return (obj_word){ s, (size_t)(stop - s) };
+    return (ebpo_obj_word){ s, (size_t)(stop - s) };
 }
 
-bool ebpo_obj_next_statement(obj_text *t, obj_word *word)
+bool ebpo_obj_next_statement(ebpo_obj_text *t, ebpo_obj_word *word)
 {
     bool begun = t->begun;
     t->begun = true;
@@ -142,20 +142,14 @@ bool ebpo_obj_next_statement(obj_text *t, obj_word *word)
     }
 }
 
-bool ebpo_obj_word_is(obj_word word, const char *text)
+bool ebpo_obj_word_is(ebpo_obj_word word, const char *text)
 {
     return word.n == strlen(text) && memcmp(word.s, text, word.n) == 0;
 }
 
 enum { RUNS_MOST = 100000000, MATERIALS_MOST = 10000000 };
 
-void ebpo_obj_runs_free(ebpo_obj_runs *runs)
-{
-    free(runs->of);
-    *runs = (ebpo_obj_runs){ 0 };
-}
-
-ebpo_status ebpo_obj_runs_add(ebpo_obj_runs *runs, obj_word run, const char *name,
+ebpo_status ebpo_obj_runs_add(ebpo_import_runs *runs, ebpo_obj_word run, const char *name,
                               ebpo_error *error)
 {
     if (runs->count == RUNS_MOST)
@@ -169,7 +163,7 @@ ebpo_status ebpo_obj_runs_add(ebpo_obj_runs *runs, obj_word run, const char *nam
 
 /* --- materials --- */
 
-static uint64_t hash_of(obj_word word)
+static uint64_t hash_of(ebpo_obj_word word)
 {
     uint64_t hash = word.n;
     for (size_t i = 0; i < word.n; i++)
@@ -177,14 +171,14 @@ static uint64_t hash_of(obj_word word)
     return ebpo_hash_number(hash);
 }
 
-static bool obj_names_same(obj_word a, obj_word b)
+static bool obj_names_same(ebpo_obj_word a, ebpo_obj_word b)
 {
     return a.n == b.n && memcmp(a.s, b.s, a.n) == 0;
 }
 
 /* Place of the name in the table: where its number is, or would go. 0 is a free slot, as the number
  * 0 has no name. */
-static uint64_t obj_names_find(const obj_names *names, obj_word word)
+static uint64_t obj_names_find(const ebpo_obj_names *names, ebpo_obj_word word)
 {
     uint64_t at;
     EBPO_HASH_FIND(at, hash_of(word), names->slots - 1,
@@ -192,7 +186,7 @@ static uint64_t obj_names_find(const obj_names *names, obj_word word)
     return at;
 }
 
-static bool grow_table(obj_names *names)
+static bool grow_table(ebpo_obj_names *names)
 {
     uint64_t slots = ebpo_hash_slots(4 * (names->count + 1));
     uint32_t *slot = ebpo_alloc_zero(slots, sizeof *slot);
@@ -206,7 +200,7 @@ static bool grow_table(obj_names *names)
     return true;
 }
 
-ebpo_status ebpo_obj_use_material(obj_names *names, obj_word material, ebpo_error *error)
+ebpo_status ebpo_obj_use_material(ebpo_obj_names *names, ebpo_obj_word material, ebpo_error *error)
 {
     if (names->count >= MATERIALS_MOST)
         return ebpo_fail(error, EBPO_E_LIMIT, "there are more than %d names of materials",
@@ -216,7 +210,7 @@ ebpo_status ebpo_obj_use_material(obj_names *names, obj_word material, ebpo_erro
         (2 * need > names->slots && !grow_table(names)))
         return ebpo_fail_memory(error, need * sizeof *names->material);
     if (!names->count)
-        names->material[names->count++] = (obj_word){ "DefaultMaterial", 15 };
+        names->material[names->count++] = (ebpo_obj_word){ "DefaultMaterial", 15 };
     uint64_t at = obj_names_find(names, material);
     if (!names->slot[at]) {
         names->material[names->count] = material;
@@ -226,7 +220,7 @@ ebpo_status ebpo_obj_use_material(obj_names *names, obj_word material, ebpo_erro
     return EBPO_OK;
 }
 
-ebpo_status ebpo_obj_give_material(obj_names *names, const ebpo_mesh *mesh, ebpo_error *error)
+ebpo_status ebpo_obj_give_material(ebpo_obj_names *names, const ebpo_mesh *mesh, ebpo_error *error)
 {
     if (!ebpo_array_grow(mesh->workspace, &names->of_face, &names->face_capacity, mesh->face_count,
                          sizeof *names->of_face))
@@ -237,7 +231,7 @@ ebpo_status ebpo_obj_give_material(obj_names *names, const ebpo_mesh *mesh, ebpo
     return EBPO_OK;
 }
 
-static void print_names(FILE *out, const obj_names *names)
+static void print_names(FILE *out, const ebpo_obj_names *names)
 {
     for (uint64_t i = 0; i < names->count; i++) {
         fprintf(out, "comment material %llu ", (unsigned long long)i);
@@ -266,7 +260,8 @@ static void print_properties(FILE *out, const ebpo_attributes *attributes, const
 }
 
 /* A header of PLY, as such files are written again. */
-static ebpo_status make_header(const ebpo_mesh *mesh, const obj_names *names, ebpo_error *error)
+static ebpo_status make_header(const ebpo_mesh *mesh, const ebpo_obj_names *names,
+                               ebpo_error *error)
 {
     ebpo_attributes *attributes = mesh->attributes;
     const char *type = mesh->xyz64 ? "double" : "float";
@@ -294,7 +289,7 @@ static ebpo_status make_header(const ebpo_mesh *mesh, const obj_names *names, eb
     return EBPO_OK;
 }
 
-ebpo_status ebpo_obj_keep_materials(obj_names *names, ebpo_mesh *mesh, ebpo_error *error)
+ebpo_status ebpo_obj_keep_materials(ebpo_obj_names *names, ebpo_mesh *mesh, ebpo_error *error)
 {
     ebpo_attribute head = { .element = "face", .names = "material", .columns = 1 };
     if (!names->count)
@@ -314,7 +309,7 @@ ebpo_status ebpo_obj_keep_materials(obj_names *names, ebpo_mesh *mesh, ebpo_erro
     return make_header(mesh, names, error);
 }
 
-void ebpo_obj_names_free(obj_names *names, ebpo_workspace *workspace)
+void ebpo_obj_names_free(ebpo_obj_names *names, ebpo_workspace *workspace)
 {
     free(names->material);
     free(names->slot);
@@ -335,7 +330,7 @@ ebpo_status ebpo_obj_fail(const obj_reading *r, const char *format, ...)
 }
 
 /* The next statement's first word; lets pages go now and then. */
-static bool ebpo_obj_step(obj_reading *r, obj_word *word)
+static bool ebpo_obj_step(obj_reading *r, ebpo_obj_word *word)
 {
     uint64_t at = (uint64_t)(r->text.at - (const char *)r->data);
     if (at >= r->next_release) {
@@ -350,11 +345,11 @@ static bool ebpo_obj_step(obj_reading *r, obj_word *word)
 /* The second pass: faces, and under which names they stand. */
 
 /* What the parts of a corner, v/vt/vn, behind the first are numbers of. */
-static const import_sort sort_of[2] = { IMPORT_TEXTURE, IMPORT_NORMALS };
+static const ebpo_import_sort sort_of[2] = { EBPO_IMPORT_TEXTURE, EBPO_IMPORT_NORMALS };
 
-static ebpo_status fail_corner(const obj_reading *r, obj_word word)
+static ebpo_status fail_corner(const obj_reading *r, ebpo_obj_word word)
 {
-    char text[IMPORT_WORD_TEXT];
+    char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
     return ebpo_obj_fail(r,
                          "a face has the corner '%s', but it takes v, v/vt, v//vn or v/vt/vn; "
@@ -377,7 +372,7 @@ static bool read_number(const char **at, const char *end, int64_t *number)
 }
 
 /* Numbers count from 1, or back from what stands before the face. */
-static bool obj_faces_resolve(const obj_reading *r, import_sort sort, uint64_t total,
+static bool obj_faces_resolve(const obj_reading *r, ebpo_import_sort sort, uint64_t total,
                               int64_t number, uint32_t *row)
 {
     int64_t at = number > 0 ? number - 1 : (int64_t)r->rows[sort] + number;
@@ -395,45 +390,46 @@ static ebpo_status obj_faces_fail_vertex(const obj_reading *r, int64_t number)
     return number ? ebpo_obj_fail(r,
                                   "a face names vertex %" PRId64 ", but only %" PRIu64
                                   " stand before it; repair the file or drop the face",
-                                  number, r->rows[IMPORT_COLOURS])
+                                  number, r->rows[EBPO_IMPORT_COLOURS])
                   : ebpo_obj_fail(r, "a face names vertex 0, but they count from 1; repair the "
                                      "file");
 }
 
-static ebpo_status add_corner(obj_reading *r, const uint64_t total[IMPORT_SORTS], obj_word word)
+static ebpo_status add_corner(obj_reading *r, const uint64_t total[EBPO_IMPORT_SORTS],
+                              ebpo_obj_word word)
 {
     const char *at = word.s, *end = word.s + word.n;
-    import_corner *c = ebpo_import_corner(r->build);
+    ebpo_import_corner *c = ebpo_import_add_corner(r->build);
     int64_t number;
     if (!c)
         return ebpo_fail_memory(r->build->error, r->build->corners * sizeof *c);
     memset(c, 0xff, sizeof *c);
     if (!read_number(&at, end, &number))
         return fail_corner(r, word);
-    if (!obj_faces_resolve(r, IMPORT_COLOURS, r->build->vertices, number, &c->vertex))
+    if (!obj_faces_resolve(r, EBPO_IMPORT_COLOURS, r->build->vertices, number, &c->vertex))
         return obj_faces_fail_vertex(r, number);
-    c->row[IMPORT_COLOURS] = c->vertex;
+    c->row[EBPO_IMPORT_COLOURS] = c->vertex;
     for (int i = 0; i < 2 && at < end; i++) {
-        import_sort sort = sort_of[i];
+        ebpo_import_sort sort = sort_of[i];
         at++;
         if (at == end || *at == '/') /* not given */
             continue;
         if (!read_number(&at, end, &number))
             return fail_corner(r, word);
         if (!obj_faces_resolve(r, sort, total[sort], number, &c->row[sort])) {
-            c->row[sort] = IMPORT_NONE;
+            c->row[sort] = EBPO_IMPORT_NONE;
             r->losses.absent[sort]++;
         }
     }
     return at == end ? EBPO_OK : fail_corner(r, word);
 }
 
-static ebpo_status read_face(obj_reading *r, const uint64_t total[IMPORT_SORTS])
+static ebpo_status read_face(obj_reading *r, const uint64_t total[EBPO_IMPORT_SORTS])
 {
-    import_build *b = r->build;
+    ebpo_import_build *b = r->build;
     ebpo_mesh *mesh = b->mesh;
     uint64_t before = mesh->face_count;
-    obj_word word;
+    ebpo_obj_word word;
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK && ebpo_obj_next_word(&r->text, &word))
         status = add_corner(r, total, word);
@@ -447,8 +443,8 @@ static ebpo_status read_face(obj_reading *r, const uint64_t total[IMPORT_SORTS])
 /* Faces so far have the material so far. */
 static ebpo_status use_material(obj_reading *r)
 {
-    import_build *b = r->build;
-    obj_word name = ebpo_obj_name(&r->text);
+    ebpo_import_build *b = r->build;
+    ebpo_obj_word name = ebpo_obj_name(&r->text);
     if (!b->attributes || !name.n)
         return EBPO_OK;
     ebpo_status status = ebpo_obj_give_material(&r->names, b->mesh, b->error);
@@ -457,13 +453,13 @@ static ebpo_status use_material(obj_reading *r)
 
 static ebpo_status begin_run(obj_reading *r)
 {
-    obj_word name = ebpo_obj_name(&r->text);
+    ebpo_obj_word name = ebpo_obj_name(&r->text);
     r->losses.groups |= name.n > 0;
     return r->runs ? ebpo_obj_runs_add(r->runs, name, r->build->name, r->build->error) : EBPO_OK;
 }
 
 /* Free-form geometry, points and lines; and what says how these are drawn, which no mesh needs. */
-static bool is_curve(obj_word word)
+static bool is_curve(ebpo_obj_word word)
 {
     static const char *const words[] = { "p",    "l",    "vp",    "cstype", "deg",  "bmat",
                                          "step", "curv", "curv2", "surf",   "parm", "trim",
@@ -475,7 +471,7 @@ static bool is_curve(obj_word word)
     return false;
 }
 
-static bool is_display(obj_word word)
+static bool is_display(ebpo_obj_word word)
 {
     static const char *const words[] = { "mg",        "bevel",  "c_interp", "d_interp",
                                          "lod",       "usemap", "maplib",   "shadow_obj",
@@ -486,13 +482,13 @@ static bool is_display(obj_word word)
     return false;
 }
 
-static void note_other(obj_reading *r, obj_word word)
+static void note_other(obj_reading *r, ebpo_obj_word word)
 {
     obj_losses *l = &r->losses;
     if (ebpo_obj_word_is(word, "mtllib")) {
         l->library |= ebpo_obj_name(&r->text).n > 0;
     } else if (ebpo_obj_word_is(word, "s")) {
-        obj_word value = ebpo_obj_name(&r->text);
+        ebpo_obj_word value = ebpo_obj_name(&r->text);
         l->smoothing |= value.n && !ebpo_obj_word_is(value, "off") && !ebpo_obj_word_is(value, "0");
     } else if (is_curve(word)) {
         l->curves++;
@@ -501,12 +497,15 @@ static void note_other(obj_reading *r, obj_word word)
     }
 }
 
-static ebpo_status read_statement(obj_reading *r, const uint64_t total[IMPORT_SORTS], obj_word word)
+static ebpo_status read_statement(obj_reading *r, const uint64_t total[EBPO_IMPORT_SORTS],
+                                  ebpo_obj_word word)
 {
     if (*word.s == 'v' && word.n <= 2) {
         char second = word.n == 2 ? word.s[1] : 0;
         if (!second || second == 'n' || second == 't') {
-            r->rows[second == 'n' ? IMPORT_NORMALS : second ? IMPORT_TEXTURE : IMPORT_COLOURS]++;
+            r->rows[second == 'n' ? EBPO_IMPORT_NORMALS
+                    : second      ? EBPO_IMPORT_TEXTURE
+                                  : EBPO_IMPORT_COLOURS]++;
             return EBPO_OK;
         }
     }
@@ -523,14 +522,14 @@ static ebpo_status read_statement(obj_reading *r, const uint64_t total[IMPORT_SO
 /* The faces, with what is said on the way. Errors are those of ebpo_import_memory. */
 static ebpo_status ebpo_obj_read_faces(obj_reading *r)
 {
-    import_build *b = r->build;
-    uint64_t total[IMPORT_SORTS];
-    obj_word word;
+    ebpo_import_build *b = r->build;
+    uint64_t total[EBPO_IMPORT_SORTS];
+    ebpo_obj_word word;
     ebpo_status status =
-        r->runs ? ebpo_obj_runs_add(r->runs, (obj_word){ "", 0 }, b->name, b->error) : EBPO_OK;
+        r->runs ? ebpo_obj_runs_add(r->runs, (ebpo_obj_word){ "", 0 }, b->name, b->error) : EBPO_OK;
     memcpy(total, r->rows, sizeof total);
     memset(r->rows, 0, sizeof r->rows);
-    r->text = ebpo_obj_text(r->data, r->size);
+    r->text = ebpo_obj_text_begin(r->data, r->size);
     r->next_release = 0;
     while (status == EBPO_OK && ebpo_obj_step(r, &word))
         status = read_statement(r, total, word);
@@ -545,7 +544,7 @@ static ebpo_status ebpo_obj_read_faces(obj_reading *r)
 
 enum { MOST_WORDS = 8 };
 
-static int read_words(obj_reading *r, obj_word word[MOST_WORDS])
+static int read_words(obj_reading *r, ebpo_obj_word word[MOST_WORDS])
 {
     int n = 0;
     while (n < MOST_WORDS && ebpo_obj_next_word(&r->text, &word[n]))
@@ -556,7 +555,8 @@ static int read_words(obj_reading *r, obj_word word[MOST_WORDS])
 /* --- vertices --- */
 
 /* Numbers of as many words; false: *bad is none. */
-static bool read_floats(const obj_reading *r, const obj_word *word, int n, float *value, int *bad)
+static bool read_floats(const obj_reading *r, const ebpo_obj_word *word, int n, float *value,
+                        int *bad)
 {
     for (*bad = 0; *bad < n; ++*bad)
         if (!ebpo_import_value(r->build, &value[*bad], word[*bad].s, word[*bad].n))
@@ -564,7 +564,7 @@ static bool read_floats(const obj_reading *r, const obj_word *word, int n, float
     return true;
 }
 
-static bool read_position(const obj_reading *r, const obj_word *word, double xyz[3], int *bad)
+static bool read_position(const obj_reading *r, const ebpo_obj_word *word, double xyz[3], int *bad)
 {
     for (*bad = 0; *bad < 3; ++*bad)
         if (!ebpo_import_coordinate(r->build, &xyz[*bad], word[*bad].s, word[*bad].n))
@@ -572,16 +572,16 @@ static bool read_position(const obj_reading *r, const obj_word *word, double xyz
     return true;
 }
 
-static ebpo_status obj_fail_vertex(const obj_reading *r, obj_word word)
+static ebpo_status obj_fail_vertex(const obj_reading *r, ebpo_obj_word word)
 {
-    char text[IMPORT_WORD_TEXT];
+    char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
     return ebpo_obj_fail(r, "no number: '%s' in vertex %" PRIu64 "; repair the file", text,
                          r->build->vertices + 1);
 }
 
 /* Homogeneous coordinates, as w is where it is no 1. */
-static ebpo_status obj_divide(obj_reading *r, const obj_word word[4], double xyz[3])
+static ebpo_status obj_divide(obj_reading *r, const ebpo_obj_word word[4], double xyz[3])
 {
     double w;
     if (!ebpo_number_double(&w, word[3].s, word[3].n, r->build->c_locale) || w == 0)
@@ -593,11 +593,11 @@ static ebpo_status obj_divide(obj_reading *r, const obj_word word[4], double xyz
 }
 
 /* A vertex has the row of its own number. */
-static ebpo_status add_colour(obj_reading *r, const obj_word word[3], bool coloured)
+static ebpo_status add_colour(obj_reading *r, const ebpo_obj_word word[3], bool coloured)
 {
     static const float none[3] = { 0, 0, 0 };
-    import_build *b = r->build;
-    import_table *t = &b->table[IMPORT_COLOURS];
+    ebpo_import_build *b = r->build;
+    ebpo_import_table *t = &b->table[EBPO_IMPORT_COLOURS];
     float colour[3];
     int bad = 0;
     ebpo_status status = EBPO_OK;
@@ -605,21 +605,21 @@ static ebpo_status add_colour(obj_reading *r, const obj_word word[3], bool colou
         return EBPO_OK;
     while (t->rows + 1 < b->vertices && status == EBPO_OK) {
         r->losses.uncoloured++;
-        status = ebpo_import_row(b, IMPORT_COLOURS, none);
+        status = ebpo_import_row(b, EBPO_IMPORT_COLOURS, none);
     }
     r->losses.uncoloured += !coloured;
     if (coloured && !read_floats(r, word, 3, colour, &bad)) {
         r->losses.no_numbers++;
         coloured = false;
     }
-    return status == EBPO_OK ? ebpo_import_row(b, IMPORT_COLOURS, coloured ? colour : none)
+    return status == EBPO_OK ? ebpo_import_row(b, EBPO_IMPORT_COLOURS, coloured ? colour : none)
                              : status;
 }
 
 /* x y z, x y z w, x y z red green blue, or these with an alpha. */
 static ebpo_status read_vertex(obj_reading *r)
 {
-    obj_word word[MOST_WORDS];
+    ebpo_obj_word word[MOST_WORDS];
     double xyz[3];
     int n = read_words(r, word), bad;
     if (n < 3)
@@ -639,11 +639,11 @@ static ebpo_status read_vertex(obj_reading *r)
 
 /* --- normals and texture coordinates --- */
 
-static ebpo_status read_row(obj_reading *r, import_sort sort)
+static ebpo_status read_row(obj_reading *r, ebpo_import_sort sort)
 {
-    obj_word word[MOST_WORDS];
+    ebpo_obj_word word[MOST_WORDS];
     float value[3] = { 0, 0, 0 };
-    int bad, n, wanted = sort == IMPORT_NORMALS ? 3 : 1;
+    int bad, n, wanted = sort == EBPO_IMPORT_NORMALS ? 3 : 1;
     r->rows[sort]++;
     if (!r->build->attributes)
         return EBPO_OK;
@@ -652,13 +652,13 @@ static ebpo_status read_row(obj_reading *r, import_sort sort)
         r->losses.no_numbers++;
         memset(value, 0, sizeof value);
     }
-    r->losses.third |= sort == IMPORT_TEXTURE && value[2] != 0;
+    r->losses.third |= sort == EBPO_IMPORT_TEXTURE && value[2] != 0;
     return ebpo_import_row(r->build, sort, value);
 }
 
 static ebpo_status read_values(obj_reading *r)
 {
-    obj_word word;
+    ebpo_obj_word word;
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK && ebpo_obj_step(r, &word)) {
         if (*word.s != 'v' || word.n > 2)
@@ -666,9 +666,9 @@ static ebpo_status read_values(obj_reading *r)
         if (word.n == 1)
             status = read_vertex(r);
         else if (word.s[1] == 'n' || word.s[1] == 't')
-            status = read_row(r, word.s[1] == 'n' ? IMPORT_NORMALS : IMPORT_TEXTURE);
+            status = read_row(r, word.s[1] == 'n' ? EBPO_IMPORT_NORMALS : EBPO_IMPORT_TEXTURE);
     }
-    r->rows[IMPORT_COLOURS] = r->build->vertices;
+    r->rows[EBPO_IMPORT_COLOURS] = r->build->vertices;
     return status;
 }
 
@@ -680,10 +680,10 @@ static void note_unread(const obj_reading *r, ebpo_attributes *to)
     const obj_losses *l = &r->losses;
     ebpo_attributes_count_unread(
         to, "texture coordinates that corners of faces name and that are not in the file",
-        l->absent[IMPORT_TEXTURE]);
+        l->absent[EBPO_IMPORT_TEXTURE]);
     ebpo_attributes_count_unread(to,
                                  "normals that corners of faces name and that are not in the file",
-                                 l->absent[IMPORT_NORMALS]);
+                                 l->absent[EBPO_IMPORT_NORMALS]);
     ebpo_attributes_count_unread(to, "weights of vertices, by which coordinates were divided",
                                  l->weights);
     ebpo_attributes_count_unread(to, "vertices' values beyond coordinates and colours", l->surplus);
@@ -717,14 +717,16 @@ static void note_losses(const obj_reading *r, ebpo_attributes *to)
 
 static bool any_unread(const obj_losses *l)
 {
-    return l->absent[IMPORT_TEXTURE] || l->absent[IMPORT_NORMALS] || l->weights || l->surplus ||
-           l->curves || l->unknown;
+    return l->absent[EBPO_IMPORT_TEXTURE] || l->absent[EBPO_IMPORT_NORMALS] || l->weights ||
+           l->surplus || l->curves || l->unknown;
 }
 
 static ebpo_status note_all(obj_reading *r)
 {
     ebpo_mesh *mesh = r->build->mesh;
-    ebpo_status status = any_unread(&r->losses) ? ebpo_import_notes(r->build) : EBPO_OK;
+    ebpo_status status = any_unread(&r->losses)
+                             ? ebpo_mesh_need_attributes(r->build->mesh, r->build->error)
+                             : EBPO_OK;
     if (status != EBPO_OK)
         return status;
     if (mesh->attributes)
@@ -736,7 +738,7 @@ static ebpo_status note_all(obj_reading *r)
 
 static ebpo_status read_all(obj_reading *r)
 {
-    import_build *b = r->build;
+    ebpo_import_build *b = r->build;
     ebpo_status status = read_values(r);
     if (status == EBPO_OK)
         status = ebpo_import_faces(b);
@@ -751,13 +753,34 @@ static ebpo_status read_all(obj_reading *r)
     return status == EBPO_OK ? note_all(r) : status;
 }
 
-ebpo_status ebpo_obj_read(import_build *b, const uint8_t *data, uint64_t size, ebpo_obj_runs *runs)
+static ebpo_status build_obj(ebpo_import_build *b, const ebpo_import_job *job)
 {
-    obj_reading r = { .build = b, .data = data, .size = size, .runs = runs };
-    r.text = ebpo_obj_text(data, size);
+    obj_reading r = { .build = b, .data = job->data, .size = job->size, .runs = job->runs };
+    r.text = ebpo_obj_text_begin(r.data, r.size);
     ebpo_status status = read_all(&r);
-    if (status == EBPO_OK && r.losses.groups && b->attributes && !runs)
+    if (status == EBPO_OK && r.losses.groups && b->attributes && !r.runs)
         ebpo_attributes_lose(b->mesh->attributes, "names of groups and objects");
     ebpo_obj_names_free(&r.names, b->mesh->workspace);
     return status;
 }
+
+/* An OBJ file has no mark: its first word is one of those that such files begin with. */
+static bool begins_as_obj(const uint8_t *data, uint64_t size)
+{
+    static const char *const words[] = { "v", "vt", "vn", "vp",     "f",
+                                         "g", "o",  "s",  "mtllib", "usemtl" };
+    ebpo_obj_text t = ebpo_obj_text_begin(data, size);
+    ebpo_obj_word word;
+    if (!ebpo_obj_next_statement(&t, &word))
+        return false;
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (ebpo_obj_word_is(word, words[i]))
+            return true;
+    return false;
+}
+
+const ebpo_import_format ebpo_import_obj = { .called = "an OBJ",
+                                             .ending = ".obj",
+                                             .recognise = begins_as_obj,
+                                             .has_no_mark = true,
+                                             .build = build_obj };

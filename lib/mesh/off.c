@@ -1,3 +1,6 @@
+/* Reading OFF files, by words: rows may go over lines, and lines hold several rows. Sources: the
+ * manual of Geomview 1.9.4, "OFF Files"; CGAL and MeshLab, whose colours are of three or four
+ * values. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -102,7 +105,7 @@ enum { MOST_REST = 16, RELEASE = 1 << 22 };
 typedef enum rows_in { ROW_A_LINE, ROWS_OVER_LINES, ROWS_ANYHOW } rows_in;
 
 typedef struct off_reading {
-    import_build *build;
+    ebpo_import_build *build;
     const char *begin;
     off_text text;
     uint64_t next_release; /* byte */
@@ -160,7 +163,9 @@ static size_t read_kind(off_word word, off_reading *r, bool *dimension)
     return named ? (size_t)(s + 3 - word.s) : 0;
 }
 
-bool ebpo_off_recognise(const uint8_t *data, uint64_t size)
+/* True where a file begins with the word OFF, with letters before it that say what vertices have.
+ */
+static bool has_off_word(const uint8_t *data, uint64_t size)
 {
     off_text t = { (const char *)data + ebpo_text_mark(data, size), (const char *)data + size, 1 };
     off_word word;
@@ -282,7 +287,7 @@ static void take_rest(off_reading *r)
 }
 
 /* Numbers of the rest from `first` on, into a row of a table. */
-static ebpo_status off_keep(off_reading *r, import_sort sort, int first, bool *good)
+static ebpo_status off_keep(off_reading *r, ebpo_import_sort sort, int first, bool *good)
 {
     float value[3] = { 0, 0, 0 };
     int columns = (int)ebpo_import_columns(sort);
@@ -290,7 +295,7 @@ static ebpo_status off_keep(off_reading *r, import_sort sort, int first, bool *g
     for (int k = 0; k < columns && *good; k++) {
         off_word word = r->rest[first + k];
         *good = ebpo_import_value(r->build, &value[k], word.s, word.n);
-        if (sort != IMPORT_COLOURS)
+        if (sort != EBPO_IMPORT_COLOURS)
             continue;
         /* the range first, in this way: what is not a number has no int */
         bool byte = value[k] >= 0 && value[k] <= 255;
@@ -307,18 +312,19 @@ static ebpo_status keep_rest(off_reading *r)
     bool fine = left >= 0, good;
     ebpo_status status = EBPO_OK;
     if (r->normals) {
-        status = off_keep(r, IMPORT_NORMALS, 0, &good);
+        status = off_keep(r, EBPO_IMPORT_NORMALS, 0, &good);
         fine &= good;
     }
     if (r->colours && status == EBPO_OK) {
-        status = off_keep(r, IMPORT_COLOURS, at, &good);
+        status = off_keep(r, EBPO_IMPORT_COLOURS, at, &good);
         fine &= good && (left == 3 || left == 4);
         r->alpha |= left == 4;
     } else {
         fine &= left == 0;
     }
     if (r->texture && status == EBPO_OK) {
-        status = off_keep(r, IMPORT_TEXTURE, r->rest_count - 2 > 0 ? r->rest_count - 2 : 0, &good);
+        status =
+            off_keep(r, EBPO_IMPORT_TEXTURE, r->rest_count - 2 > 0 ? r->rest_count - 2 : 0, &good);
         fine &= good;
     }
     r->surplus_vertices += !fine;
@@ -348,7 +354,7 @@ static ebpo_status take_rest_anyhow(off_reading *r, uint64_t row)
 
 static ebpo_status fail_number(const off_reading *r, off_word word, uint64_t row)
 {
-    char text[IMPORT_WORD_TEXT];
+    char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
     return off_fail(r, "no number: '%s' in vertex %" PRIu64 "; repair the file", text, row);
 }
@@ -382,9 +388,9 @@ static ebpo_status read_vertex(off_reading *r, uint64_t row)
 /* One value is a place in a table of colours that no file has. */
 static ebpo_status keep_face(off_reading *r, uint32_t *row)
 {
-    import_table *t = &r->build->table[IMPORT_COLOURS];
+    ebpo_import_table *t = &r->build->table[EBPO_IMPORT_COLOURS];
     bool good = true;
-    *row = IMPORT_NONE;
+    *row = EBPO_IMPORT_NONE;
     r->indexed += r->rest_count == 1;
     r->surplus_faces += r->rest_count == 2 || r->rest_count > 4;
     if (r->rest_count != 3 && r->rest_count != 4)
@@ -395,7 +401,7 @@ static ebpo_status keep_face(off_reading *r, uint32_t *row)
     }
     r->alpha |= r->rest_count == 4;
     t->of_face = true;
-    ebpo_status status = off_keep(r, IMPORT_COLOURS, 0, &good);
+    ebpo_status status = off_keep(r, EBPO_IMPORT_COLOURS, 0, &good);
     r->surplus_faces += !good;
     if (t->rows)
         *row = (uint32_t)(t->rows - 1);
@@ -404,7 +410,7 @@ static ebpo_status keep_face(off_reading *r, uint32_t *row)
 
 static ebpo_status read_corner(off_reading *r, uint64_t row, uint64_t corners)
 {
-    import_corner *c = ebpo_import_corner(r->build);
+    ebpo_import_corner *c = ebpo_import_add_corner(r->build);
     off_word word;
     uint64_t index;
     if (!c)
@@ -420,15 +426,15 @@ static ebpo_status read_corner(off_reading *r, uint64_t row, uint64_t corners)
                         " vertices; repair the file or drop the face",
                         row, index, r->vertices);
     c->vertex = (uint32_t)index;
-    c->row[IMPORT_COLOURS] = r->colours ? c->vertex : IMPORT_NONE;
-    c->row[IMPORT_NORMALS] = r->normals ? c->vertex : IMPORT_NONE;
-    c->row[IMPORT_TEXTURE] = r->texture ? c->vertex : IMPORT_NONE;
+    c->row[EBPO_IMPORT_COLOURS] = r->colours ? c->vertex : EBPO_IMPORT_NONE;
+    c->row[EBPO_IMPORT_NORMALS] = r->normals ? c->vertex : EBPO_IMPORT_NONE;
+    c->row[EBPO_IMPORT_TEXTURE] = r->texture ? c->vertex : EBPO_IMPORT_NONE;
     return EBPO_OK;
 }
 
 static ebpo_status read_face(off_reading *r, uint64_t row)
 {
-    import_build *b = r->build;
+    ebpo_import_build *b = r->build;
     uint64_t corners;
     uint32_t colour;
     off_word word;
@@ -448,8 +454,8 @@ static ebpo_status read_face(off_reading *r, uint64_t row)
         return status;
     take_rest(r);
     status = keep_face(r, &colour);
-    for (uint64_t i = 0; i < corners && colour != IMPORT_NONE; i++)
-        b->corner[i].row[IMPORT_COLOURS] = colour;
+    for (uint64_t i = 0; i < corners && colour != EBPO_IMPORT_NONE; i++)
+        b->corner[i].row[EBPO_IMPORT_COLOURS] = colour;
     return status == EBPO_OK ? ebpo_import_polygon(b) : status;
 }
 
@@ -459,7 +465,7 @@ static ebpo_status note_unread(off_reading *r)
 {
     ebpo_mesh *mesh = r->build->mesh;
     bool any = r->divided || r->surplus_vertices || r->surplus_faces || r->more;
-    ebpo_status status = any ? ebpo_import_notes(r->build) : EBPO_OK;
+    ebpo_status status = any ? ebpo_mesh_need_attributes(r->build->mesh, r->build->error) : EBPO_OK;
     if (!any || status != EBPO_OK)
         return status;
     ebpo_attributes_count_unread(mesh->attributes,
@@ -503,19 +509,23 @@ static ebpo_status read_rows(off_reading *r)
     return status;
 }
 
-ebpo_status ebpo_off_read(import_build *b, const uint8_t *data, uint64_t size)
+static ebpo_status build_off(ebpo_import_build *b, const ebpo_import_job *job)
 {
-    off_reading r = { .build = b, .begin = (const char *)data, .size = size };
-    r.text = (off_text){ r.begin + ebpo_text_mark(data, size), r.begin + size, 1 };
+    off_reading r = { .build = b, .begin = (const char *)job->data, .size = job->size };
+    r.text = (off_text){ r.begin + ebpo_text_mark(job->data, r.size), r.begin + r.size, 1 };
     ebpo_status status = read_head(&r);
     if (status == EBPO_OK)
         status = read_rows(&r);
     if (status == EBPO_OK)
         status = ebpo_import_end(b);
-    b->table[IMPORT_COLOURS].bytes = !r.broken && r.most > 1;
+    b->table[EBPO_IMPORT_COLOURS].bytes = !r.broken && r.most > 1;
     if (status == EBPO_OK && b->attributes)
         status = ebpo_import_attributes(b);
     if (status == EBPO_OK && b->attributes)
         note_losses(&r, b->mesh->attributes);
     return status == EBPO_OK ? note_unread(&r) : status;
 }
+
+const ebpo_import_format ebpo_import_off = {
+    .called = "an OFF", .ending = ".off", .recognise = has_off_word, .build = build_off
+};

@@ -11,8 +11,8 @@
 #include "mesh/ply_parts.h"
 
 typedef struct rows {
-    ply_parser *p;
-    const ply_element *element;
+    ebpo_ply_parser *p;
+    const ebpo_ply_element *element;
     uint64_t row;
     uint64_t to; /* of attributes: of a face that of its first triangle */
     bool store;
@@ -23,7 +23,7 @@ typedef struct rows {
 static bool is_blank(uint8_t c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
 /* False at the end of the file. */
-static bool next_token(ply_parser *p, ply_word *token)
+static bool next_token(ebpo_ply_parser *p, ebpo_ply_word *token)
 {
     const uint8_t *at = p->data + p->at, *end = p->data + p->size;
     for (; at < end && is_blank(*at); at++)
@@ -36,17 +36,17 @@ static bool next_token(ply_parser *p, ply_word *token)
     return token->n > 0;
 }
 
-static ebpo_status fail_token(const rows *r, const char *what, ply_word token)
+static ebpo_status fail_token(const rows *r, const char *what, ebpo_ply_word token)
 {
-    char text[PLY_WORD_TEXT];
-    ebpo_ply_word_text(text, token);
+    char text[EBPO_IMPORT_WORD_TEXT];
+    ebpo_import_word_text(text, token.s, token.n);
     return ebpo_ply_fail(r->p, "%s '%s' in %s %" PRIu64 "; repair the file", what, text,
                          ebpo_ply_row_name(r->element), r->row);
 }
 
 static ebpo_status next_integer(rows *r, int64_t *value)
 {
-    ply_word token;
+    ebpo_ply_word token;
     if (!next_token(r->p, &token))
         return ebpo_ply_fail_end(r->p, r->element, r->row);
     if (!ebpo_number_integer(value, token.s, token.n))
@@ -56,7 +56,7 @@ static ebpo_status next_integer(rows *r, int64_t *value)
 
 /* Reads a coordinate that the header declares as a float. Where a float does not keep its text, a
  * mesh notes by how much it is rounded; points, of which nothing can be noted, get the double. */
-static bool parse_float(ply_parser *p, ply_word token, double *value)
+static bool parse_float(ebpo_ply_parser *p, ebpo_ply_word token, double *value)
 {
     float narrow;
     bool kept;
@@ -72,18 +72,18 @@ static bool parse_float(ply_parser *p, ply_word token, double *value)
     return true;
 }
 
-static bool parse_coordinate(const rows *r, const ply_property *property, ply_word token)
+static bool parse_coordinate(const rows *r, const ebpo_ply_property *property, ebpo_ply_word token)
 {
-    ply_parser *p = r->p;
+    ebpo_ply_parser *p = r->p;
     ebpo_mesh *mesh = p->mesh;
-    uint64_t place = 3 * r->row + (uint64_t)(property->role - PLY_ROLE_X);
+    uint64_t place = 3 * r->row + (uint64_t)(property->role - EBPO_PLY_ROLE_X);
     double value = 0;
     int64_t whole = 0;
-    bool good = property->type == PLY_FLOAT32 ? parse_float(p, token, &value)
-                : property->type == PLY_FLOAT64
+    bool good = property->type == EBPO_PLY_FLOAT32 ? parse_float(p, token, &value)
+                : property->type == EBPO_PLY_FLOAT64
                     ? ebpo_number_double(&value, token.s, token.n, p->c_locale)
                     : ebpo_number_integer(&whole, token.s, token.n);
-    if (property->type < PLY_FLOAT32)
+    if (property->type < EBPO_PLY_FLOAT32)
         value = (double)whole;
     if (mesh->xyz32)
         mesh->xyz32[place] = (float)value;
@@ -94,17 +94,17 @@ static bool parse_coordinate(const rows *r, const ply_property *property, ply_wo
 
 static ebpo_status read_corners(rows *r, uint64_t count)
 {
-    ply_parser *p = r->p;
+    ebpo_ply_parser *p = r->p;
     ebpo_status status = ebpo_ply_reserve_corners(p, count);
     uint64_t vertices = p->header.element[p->header.vertex].count;
-    bool strips = r->element->kind == PLY_KIND_STRIPS;
+    bool strips = r->element->kind == EBPO_PLY_KIND_STRIPS;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         int64_t index;
         status = next_integer(r, &index);
         if (status != EBPO_OK)
             break;
         if (strips && (index == -1 || index == UINT32_MAX))
-            p->corners[i] = PLY_RESTART;
+            p->corners[i] = EBPO_PLY_RESTART;
         else if ((uint64_t)index >= vertices)
             status = ebpo_ply_fail_index(p, r->element, r->row, index);
         else
@@ -116,20 +116,20 @@ static ebpo_status read_corners(rows *r, uint64_t count)
 
 static ebpo_status skip_tokens(rows *r, uint64_t count)
 {
-    ply_word token;
+    ebpo_ply_word token;
     for (uint64_t i = 0; i < count; i++)
         if (!next_token(r->p, &token))
             return ebpo_ply_fail_end(r->p, r->element, r->row);
     return EBPO_OK;
 }
 
-static ebpo_status store_list(rows *r, const ply_property *property, uint64_t count)
+static ebpo_status store_list(rows *r, const ebpo_ply_property *property, uint64_t count)
 {
     unsigned bytes = ebpo_ply_type_bytes(property->type);
     uint8_t *items;
     ebpo_status status = ebpo_ply_put_list(r->p, property, r->to, count, &items);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        ply_word token;
+        ebpo_ply_word token;
         if (!next_token(r->p, &token))
             return ebpo_ply_fail_end(r->p, r->element, r->row);
         ebpo_ply_store_bits(items + i * bytes, bytes,
@@ -138,9 +138,9 @@ static ebpo_status store_list(rows *r, const ply_property *property, uint64_t co
     return status;
 }
 
-static ebpo_status read_list(rows *r, const ply_property *property)
+static ebpo_status read_list(rows *r, const ebpo_ply_property *property)
 {
-    ply_parser *p = r->p;
+    ebpo_ply_parser *p = r->p;
     int64_t count;
     ebpo_status status = next_integer(r, &count);
     if (status != EBPO_OK)
@@ -155,23 +155,23 @@ static ebpo_status read_list(rows *r, const ply_property *property)
             " items, more than the rest of the file can hold; it is cut short or damaged",
             ebpo_ply_row_name(r->element), r->row, count);
     }
-    if (r->store && property->role == PLY_ROLE_CORNERS)
+    if (r->store && property->role == EBPO_PLY_ROLE_CORNERS)
         return read_corners(r, (uint64_t)count);
     if (r->store && ebpo_ply_is_attribute(property))
         return store_list(r, property, (uint64_t)count);
     return skip_tokens(r, (uint64_t)count);
 }
 
-static ebpo_status read_property(rows *r, const ply_property *property)
+static ebpo_status read_property(rows *r, const ebpo_ply_property *property)
 {
     if (property->list)
         return read_list(r, property);
-    ply_word token;
+    ebpo_ply_word token;
     if (!next_token(r->p, &token))
         return ebpo_ply_fail_end(r->p, r->element, r->row);
-    if (r->store && property->role != PLY_ROLE_NONE && !parse_coordinate(r, property, token))
-        return fail_token(r,
-                          property->type < PLY_FLOAT32 ? "no whole number:" : "no number:", token);
+    if (r->store && property->role != EBPO_PLY_ROLE_NONE && !parse_coordinate(r, property, token))
+        return fail_token(r, property->type < EBPO_PLY_FLOAT32 ? "no whole number:" : "no number:",
+                          token);
     if (r->store && ebpo_ply_is_attribute(property))
         ebpo_ply_put_value(r->p, property, r->to,
                            ebpo_ply_text_bits(r->p, property, token, r->row));
@@ -181,7 +181,7 @@ static ebpo_status read_property(rows *r, const ply_property *property)
 static bool ends_line(uint8_t c) { return c == '\n' || c == '\r'; }
 
 /* Whether the line goes on. */
-static bool more_here(ply_parser *p)
+static bool more_here(ebpo_ply_parser *p)
 {
     while (p->at < p->size && is_blank(p->data[p->at]) && !ends_line(p->data[p->at]))
         p->at++;
@@ -191,8 +191,8 @@ static bool more_here(ply_parser *p)
 /* A row that has gone on to another line has no values too many: an earlier one has too few. */
 static ebpo_status end_row(rows *r)
 {
-    ply_parser *p = r->p;
-    ply_word token;
+    ebpo_ply_parser *p = r->p;
+    ebpo_ply_word token;
     uint64_t before = p->surplus_values;
     while (more_here(p)) {
         next_token(p, &token);
@@ -212,7 +212,7 @@ static ebpo_status end_row(rows *r)
 
 static void begin_row(rows *r)
 {
-    ply_parser *p = r->p;
+    ebpo_ply_parser *p = r->p;
     for (; p->at < p->size && is_blank(p->data[p->at]); p->at++)
         p->line += p->data[p->at] == (uint8_t)p->header.line_end;
     r->line = p->line;
@@ -220,8 +220,8 @@ static void begin_row(rows *r)
 
 static ebpo_status read_row(rows *r)
 {
-    const ply_property *property = r->p->header.property + r->element->first;
-    bool face = r->element->kind == PLY_KIND_FACE;
+    const ebpo_ply_property *property = r->p->header.property + r->element->first;
+    bool face = r->element->kind == EBPO_PLY_KIND_FACE;
     begin_row(r);
     r->to = face ? r->p->mesh->face_count : r->row;
     ebpo_status status = face && r->store ? ebpo_ply_attributes_reserve(r->p, r->to + 1) : EBPO_OK;
@@ -229,25 +229,25 @@ static ebpo_status read_row(rows *r)
         status = read_property(r, property + i);
     if (status == EBPO_OK)
         status = end_row(r);
-    if (status == EBPO_OK && r->store && r->element->kind == PLY_KIND_FACE)
+    if (status == EBPO_OK && r->store && r->element->kind == EBPO_PLY_KIND_FACE)
         return ebpo_ply_add_polygon(r->p, r->row);
-    if (status == EBPO_OK && r->store && r->element->kind == PLY_KIND_STRIPS)
+    if (status == EBPO_OK && r->store && r->element->kind == EBPO_PLY_KIND_STRIPS)
         return ebpo_ply_add_strip(r->p, r->row);
     return status;
 }
 
-bool ebpo_ply_ascii_more(ply_parser *p)
+bool ebpo_ply_ascii_more(ebpo_ply_parser *p)
 {
-    ply_word token;
+    ebpo_ply_word token;
     return next_token(p, &token);
 }
 
-ebpo_status ebpo_ply_ascii_element(ply_parser *p, const ply_element *element, bool store)
+ebpo_status ebpo_ply_ascii_element(ebpo_ply_parser *p, const ebpo_ply_element *element, bool store)
 {
     rows r = { .p = p,
                .element = element,
                .once = store,
-               .store = store && (element->kind != PLY_KIND_OTHER || p->lost) };
+               .store = store && (element->kind != EBPO_PLY_KIND_OTHER || p->lost) };
     ebpo_status status = EBPO_OK;
     if (!element->properties) /* rows without values: nothing is written for them that we need to
                                  see */

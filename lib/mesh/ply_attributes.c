@@ -12,11 +12,11 @@
 #include "geometry/decimal.h"
 #include "mesh/ply_parts.h"
 
-_Static_assert((int)PLY_INT8 == (int)EBPO_ATTRIBUTE_INT8 &&
-                   (int)PLY_FLOAT64 == (int)EBPO_ATTRIBUTE_FLOAT64,
+_Static_assert((int)EBPO_PLY_INT8 == (int)EBPO_ATTRIBUTE_INT8 &&
+                   (int)EBPO_PLY_FLOAT64 == (int)EBPO_ATTRIBUTE_FLOAT64,
                "a property's type is that of its attribute");
 
-static ebpo_status fail_rows(const ply_parser *p, uint64_t bytes)
+static ebpo_status fail_rows(const ebpo_ply_parser *p, uint64_t bytes)
 {
     return ebpo_workspace_fail(p->mesh->workspace, bytes, p->error);
 }
@@ -24,7 +24,7 @@ static ebpo_status fail_rows(const ply_parser *p, uint64_t bytes)
 /* --- which arrays --- */
 
 /* Words of a header as text of a file; false: too long, or no text. */
-static bool take_word(char *to, size_t capacity, ply_word word)
+static bool take_word(char *to, size_t capacity, ebpo_ply_word word)
 {
     if (word.n == 0 || word.n >= capacity)
         return false;
@@ -33,7 +33,7 @@ static bool take_word(char *to, size_t capacity, ply_word word)
     return strlen(to) == word.n && ebpo_text_ok(to);
 }
 
-static bool take_names(char *to, size_t capacity, const ply_property *property, unsigned count)
+static bool take_names(char *to, size_t capacity, const ebpo_ply_property *property, unsigned count)
 {
     for (unsigned i = 0; i < count; i++) {
         if (!take_word(to, capacity, property[i].name))
@@ -49,11 +49,11 @@ static bool take_names(char *to, size_t capacity, const ply_property *property, 
 }
 
 /* Neighbours of one type whose names go together. */
-static unsigned find_together(const ply_property *property, uint64_t left)
+static unsigned find_together(const ebpo_ply_property *property, uint64_t left)
 {
     ebpo_attribute_name names[4];
     unsigned count = 0;
-    while (count < 4 && count < left && property[count].role == PLY_ROLE_NONE &&
+    while (count < 4 && count < left && property[count].role == EBPO_PLY_ROLE_NONE &&
            !property[count].list && property[count].type == property[0].type) {
         names[count] = (ebpo_attribute_name){ property[count].name.s, property[count].name.n };
         count++;
@@ -61,12 +61,12 @@ static unsigned find_together(const ply_property *property, uint64_t left)
     return count ? ebpo_attribute_names_together(names, count) : 1;
 }
 
-static void ply_attributes_lose(const ply_parser *p, const ply_element *element,
-                                const ply_property *property, const char *why)
+static void ply_attributes_lose(const ebpo_ply_parser *p, const ebpo_ply_element *element,
+                                const ebpo_ply_property *property, const char *why)
 {
-    char of[PLY_WORD_TEXT], name[PLY_WORD_TEXT];
-    ebpo_ply_word_text(of, element->name);
-    ebpo_ply_word_text(name, property->name);
+    char of[EBPO_IMPORT_WORD_TEXT], name[EBPO_IMPORT_WORD_TEXT];
+    ebpo_import_word_text(of, element->name.s, element->name.n);
+    ebpo_import_word_text(name, property->name.s, property->name.n);
     ebpo_attributes_lose(p->mesh->attributes, "property '%s' of '%s' (%s)", name, of, why);
 }
 
@@ -79,8 +79,8 @@ static bool is_second(const ebpo_attributes *to, const ebpo_attribute *a, uint64
     return false;
 }
 
-static ebpo_status plan_array(ply_parser *p, const ply_element *element, ply_property *property,
-                              unsigned columns)
+static ebpo_status plan_array(ebpo_ply_parser *p, const ebpo_ply_element *element,
+                              ebpo_ply_property *property, unsigned columns)
 {
     ebpo_attributes *to = p->mesh->attributes;
     ebpo_attribute a = { .type = (ebpo_attribute_type)property->type,
@@ -94,7 +94,7 @@ static ebpo_status plan_array(ply_parser *p, const ply_element *element, ply_pro
                             "its name is too long or no text, or there are too many");
         return EBPO_OK;
     }
-    bool face = element->kind == PLY_KIND_FACE;
+    bool face = element->kind == EBPO_PLY_KIND_FACE;
     a.rows = face ? 0 : element->count;
     if (is_second(to, &a, a.rows)) {
         ply_attributes_lose(p, element, property,
@@ -113,15 +113,15 @@ static ebpo_status plan_array(ply_parser *p, const ply_element *element, ply_pro
                                                                 : fail_rows(p, rows * columns * 8);
 }
 
-static ebpo_status plan_element(ply_parser *p, const ply_element *element)
+static ebpo_status plan_element(ebpo_ply_parser *p, const ebpo_ply_element *element)
 {
-    ply_property *property = p->header.property + element->first;
+    ebpo_ply_property *property = p->header.property + element->first;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < element->properties && status == EBPO_OK;) {
         unsigned columns = 1;
-        if (property[i].role == PLY_ROLE_NONE && element->kind == PLY_KIND_STRIPS) {
+        if (property[i].role == EBPO_PLY_ROLE_NONE && element->kind == EBPO_PLY_KIND_STRIPS) {
             ply_attributes_lose(p, element, &property[i], "of strips");
-        } else if (property[i].role == PLY_ROLE_NONE && element->count) {
+        } else if (property[i].role == EBPO_PLY_ROLE_NONE && element->count) {
             columns = find_together(property + i, element->properties - i);
             status = plan_array(p, element, property + i, columns);
         }
@@ -130,12 +130,11 @@ static ebpo_status plan_element(ply_parser *p, const ply_element *element)
     return status;
 }
 
-ebpo_status ebpo_ply_attributes_plan(ply_parser *p)
+ebpo_status ebpo_ply_attributes_plan(ebpo_ply_parser *p)
 {
-    p->mesh->attributes = ebpo_attributes_make(p->mesh->workspace);
-    if (!p->mesh->attributes)
-        return ebpo_fail_memory(p->error, sizeof *p->mesh->attributes);
-    ebpo_status status = EBPO_OK;
+    ebpo_status status = ebpo_mesh_need_attributes(p->mesh, p->error);
+    if (status != EBPO_OK)
+        return status;
     for (uint64_t i = 0; i < p->header.elements && status == EBPO_OK; i++)
         status = plan_element(p, &p->header.element[i]);
     p->lost = ebpo_alloc_zero(EBPO_ATTRIBUTE_ARRAYS, sizeof *p->lost);
@@ -146,7 +145,7 @@ ebpo_status ebpo_ply_attributes_plan(ply_parser *p)
 
 /* --- values --- */
 
-ebpo_status ebpo_ply_attributes_reserve(ply_parser *p, uint64_t faces)
+ebpo_status ebpo_ply_attributes_reserve(ebpo_ply_parser *p, uint64_t faces)
 {
     ebpo_attributes *to = p->mesh->attributes;
     if (!p->lost || faces <= p->faces_reserved)
@@ -173,7 +172,7 @@ void ebpo_ply_store_bits(uint8_t *at, unsigned bytes, uint64_t bits)
     }
 }
 
-void ebpo_ply_put_value(const ply_parser *p, const ply_property *property, uint64_t row,
+void ebpo_ply_put_value(const ebpo_ply_parser *p, const ebpo_ply_property *property, uint64_t row,
                         uint64_t bits)
 {
     ebpo_attribute *a = &p->mesh->attributes->array[property->attribute];
@@ -181,7 +180,7 @@ void ebpo_ply_put_value(const ply_parser *p, const ply_property *property, uint6
     ebpo_ply_store_bits(a->values + (row * a->columns + property->column) * bytes, bytes, bits);
 }
 
-ebpo_status ebpo_ply_put_list(ply_parser *p, const ply_property *property, uint64_t row,
+ebpo_status ebpo_ply_put_list(ebpo_ply_parser *p, const ebpo_ply_property *property, uint64_t row,
                               uint64_t count, uint8_t **items)
 {
     ebpo_attribute *a = &p->mesh->attributes->array[property->attribute];
@@ -194,7 +193,7 @@ ebpo_status ebpo_ply_put_list(ply_parser *p, const ply_property *property, uint6
     return EBPO_OK;
 }
 
-static bool ply_attributes_fits(int64_t value, ply_type type)
+static bool ply_attributes_fits(int64_t value, ebpo_ply_type type)
 {
     static const int64_t least[] = { INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0 },
                          most[] = { INT8_MAX,   UINT8_MAX, INT16_MAX,
@@ -202,7 +201,7 @@ static bool ply_attributes_fits(int64_t value, ply_type type)
     return value >= least[type] && value <= most[type];
 }
 
-static bool text_bits(ply_parser *p, ply_type type, ply_word token, uint64_t *bits)
+static bool text_bits(ebpo_ply_parser *p, ebpo_ply_type type, ebpo_ply_word token, uint64_t *bits)
 {
     int64_t whole;
     float narrow;
@@ -210,14 +209,14 @@ static bool text_bits(ply_parser *p, ply_type type, ply_word token, uint64_t *bi
     double wide;
     bool kept;
     switch (type) {
-    case PLY_FLOAT32:
+    case EBPO_PLY_FLOAT32:
         if (!ebpo_number_float_kept(&narrow, &kept, token.s, token.n, p->c_locale))
             return false;
         p->rounded += !kept;
         memcpy(&narrow_bits, &narrow, sizeof narrow);
         *bits = narrow_bits;
         return true;
-    case PLY_FLOAT64:
+    case EBPO_PLY_FLOAT64:
         if (!ebpo_number_double(&wide, token.s, token.n, p->c_locale))
             return false;
         memcpy(bits, &wide, sizeof wide);
@@ -230,15 +229,15 @@ static bool text_bits(ply_parser *p, ply_type type, ply_word token, uint64_t *bi
     }
 }
 
-uint64_t ebpo_ply_text_bits(ply_parser *p, const ply_property *property, ply_word token,
-                            uint64_t row)
+uint64_t ebpo_ply_text_bits(ebpo_ply_parser *p, const ebpo_ply_property *property,
+                            ebpo_ply_word token, uint64_t row)
 {
     uint64_t bits = 0;
     if (text_bits(p, property->type, token, &bits) || p->lost[property->attribute])
         return bits;
-    char text[PLY_WORD_TEXT], name[PLY_WORD_TEXT];
-    ebpo_ply_word_text(text, token);
-    ebpo_ply_word_text(name, property->name);
+    char text[EBPO_IMPORT_WORD_TEXT], name[EBPO_IMPORT_WORD_TEXT];
+    ebpo_import_word_text(text, token.s, token.n);
+    ebpo_import_word_text(name, property->name.s, property->name.n);
     const ebpo_attribute *a = &p->mesh->attributes->array[property->attribute];
     ebpo_attributes_lose(p->mesh->attributes,
                          "property '%s' of '%s' (row %" PRIu64 " has '%s', which is none of its "
@@ -257,7 +256,7 @@ static void repeat_columns(const ebpo_attribute *a, uint64_t row, uint64_t end)
         memcpy(a->values + i * bytes, a->values + row * bytes, bytes);
 }
 
-static ebpo_status repeat_list(ply_parser *p, ebpo_attribute *a, uint64_t row, uint64_t end)
+static ebpo_status repeat_list(ebpo_ply_parser *p, ebpo_attribute *a, uint64_t row, uint64_t end)
 {
     size_t bytes = ebpo_attribute_bytes(a->type);
     uint64_t begin = row ? a->ends[row - 1] : 0, count = a->ends[row] - begin;
@@ -271,7 +270,7 @@ static ebpo_status repeat_list(ply_parser *p, ebpo_attribute *a, uint64_t row, u
     return EBPO_OK;
 }
 
-ebpo_status ebpo_ply_repeat_face(ply_parser *p, uint64_t row)
+ebpo_status ebpo_ply_repeat_face(ebpo_ply_parser *p, uint64_t row)
 {
     uint64_t end = p->mesh->face_count;
     ebpo_status status = EBPO_OK;
@@ -289,7 +288,7 @@ ebpo_status ebpo_ply_repeat_face(ply_parser *p, uint64_t row)
 
 /* --- strips --- */
 
-void ebpo_ply_blank_faces(ply_parser *p, uint64_t first)
+void ebpo_ply_blank_faces(ebpo_ply_parser *p, uint64_t first)
 {
     uint64_t end = p->mesh->face_count;
     for (uint64_t i = 0; p->lost && i < p->mesh->attributes->count; i++) {
@@ -308,15 +307,16 @@ void ebpo_ply_blank_faces(ply_parser *p, uint64_t first)
 /* --- the end --- */
 
 /* The header says no more than the mesh. */
-static bool is_plain(const ply_header *h)
+static bool is_plain(const ebpo_ply_header *h)
 {
     static const char *const names[] = { "x", "y", "z", "vertex_indices" };
     if (h->notes || h->elements != 2 || h->vertex != 0 || h->face != 1 || h->properties != 4)
         return false;
     for (int i = 0; i < 4; i++) {
-        const ply_property *property = &h->property[i];
-        bool type = i < 3 ? property->type == h->property[0].type && property->type >= PLY_FLOAT32
-                          : property->count_type == PLY_UINT8 && property->type == PLY_INT32;
+        const ebpo_ply_property *property = &h->property[i];
+        bool type =
+            i < 3 ? property->type == h->property[0].type && property->type >= EBPO_PLY_FLOAT32
+                  : property->count_type == EBPO_PLY_UINT8 && property->type == EBPO_PLY_INT32;
         if (!type || property->name.n != strlen(names[i]) ||
             memcmp(property->name.s, names[i], property->name.n) != 0)
             return false;
@@ -325,7 +325,7 @@ static bool is_plain(const ply_header *h)
 }
 
 /* Lines as they are, each ended by one line feed; the first is "ply" and no more. */
-static ebpo_status take_header(ply_parser *p)
+static ebpo_status take_header(ebpo_ply_parser *p)
 {
     ebpo_attributes *to = p->mesh->attributes;
     to->header = ebpo_alloc(p->header.body, 1);
@@ -345,13 +345,13 @@ static ebpo_status take_header(ply_parser *p)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_ply_attributes_end(ply_parser *p)
+ebpo_status ebpo_ply_attributes_end(ebpo_ply_parser *p)
 {
     ebpo_attributes *to = p->mesh->attributes;
     if (!p->lost)
         return EBPO_OK;
     ebpo_status status = is_plain(&p->header) ? EBPO_OK : take_header(p);
-    if (p->header.encoding != PLY_ASCII && p->at < p->size)
+    if (p->header.encoding != EBPO_PLY_ASCII && p->at < p->size)
         ebpo_attributes_lose(to, "%" PRIu64 " bytes behind the last element", p->size - p->at);
     if (p->rounded)
         ebpo_attributes_lose(to, "digits of %" PRIu64 " values that the header declares as float",

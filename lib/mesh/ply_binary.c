@@ -26,19 +26,19 @@ static inline uint64_t ebpo_ply_load(const uint8_t *at, unsigned bytes, bool swa
     }
 }
 
-static inline int64_t ebpo_ply_load_integer(const uint8_t *at, ply_type type, bool swap)
+static inline int64_t ebpo_ply_load_integer(const uint8_t *at, ebpo_ply_type type, bool swap)
 {
     uint64_t raw = ebpo_ply_load(at, ebpo_ply_type_bytes(type), swap);
     switch (type) {
-    case PLY_INT8: return (int8_t)raw;
-    case PLY_INT16: return (int16_t)raw;
-    case PLY_INT32: return (int32_t)raw;
+    case EBPO_PLY_INT8: return (int8_t)raw;
+    case EBPO_PLY_INT16: return (int16_t)raw;
+    case EBPO_PLY_INT32: return (int32_t)raw;
     default: return (int64_t)raw;
     }
 }
 
 /* The value of an x, y or z at `at` becomes that of vertex `row`. */
-void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ply_property *property,
+void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ebpo_ply_property *property,
                                const uint8_t *at, bool swap);
 
 /* Rows of one size, on all cores. */
@@ -46,9 +46,9 @@ void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ply_property
 /* Reads the rows from p->at on as far as all have one size, and says how many these were: all
  * vertices or none; the faces before the first that is no triangle, or names a vertex that is not
  * there. The others, and what is wrong with them, are the row by row reader's. */
-ebpo_status ebpo_ply_plain_vertices(ply_parser *p, const ply_element *element, bool swap,
+ebpo_status ebpo_ply_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_element *element, bool swap,
                                     uint64_t *done);
-ebpo_status ebpo_ply_plain_faces(ply_parser *p, const ply_element *element, bool swap,
+ebpo_status ebpo_ply_plain_faces(ebpo_ply_parser *p, const ebpo_ply_element *element, bool swap,
                                  uint64_t *done);
 
 static float load_float(const uint8_t *at, bool swap)
@@ -59,11 +59,11 @@ static float load_float(const uint8_t *at, bool swap)
     return value;
 }
 
-static double load_number(const uint8_t *at, ply_type type, bool swap)
+static double load_number(const uint8_t *at, ebpo_ply_type type, bool swap)
 {
-    if (type == PLY_FLOAT32)
+    if (type == EBPO_PLY_FLOAT32)
         return (double)load_float(at, swap);
-    if (type != PLY_FLOAT64)
+    if (type != EBPO_PLY_FLOAT64)
         return (double)ebpo_ply_load_integer(at, type, swap);
     uint64_t raw = ebpo_ply_load(at, 8, swap);
     double value;
@@ -72,10 +72,10 @@ static double load_number(const uint8_t *at, ply_type type, bool swap)
 }
 
 /* Floats go through as bits: not even the payload of a NaN changes. */
-void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ply_property *property,
+void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ebpo_ply_property *property,
                                const uint8_t *at, bool swap)
 {
-    uint64_t place = 3 * row + (uint64_t)(property->role - PLY_ROLE_X);
+    uint64_t place = 3 * row + (uint64_t)(property->role - EBPO_PLY_ROLE_X);
     if (mesh->xyz64) {
         mesh->xyz64[place] = load_number(at, property->type, swap);
     } else {
@@ -87,33 +87,33 @@ void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ply_property
 /* The body of a binary PLY file, of either byte order. */
 
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
-enum { FOREIGN = PLY_BIG };
+enum { FOREIGN = EBPO_PLY_BIG };
 #else
-enum { FOREIGN = PLY_LITTLE };
+enum { FOREIGN = EBPO_PLY_LITTLE };
 #endif
 
 typedef struct rows {
-    ply_parser *p;
-    const ply_element *element;
+    ebpo_ply_parser *p;
+    const ebpo_ply_element *element;
     uint64_t row;
     uint64_t to; /* of attributes: of a face that of its first triangle */
     bool swap;   /* the file's byte order is not the machine's */
     bool store;
 } rows;
 
-static ebpo_status store_corners(rows *r, const ply_property *property, uint64_t count)
+static ebpo_status store_corners(rows *r, const ebpo_ply_property *property, uint64_t count)
 {
-    ply_parser *p = r->p;
+    ebpo_ply_parser *p = r->p;
     ebpo_status status = ebpo_ply_reserve_corners(p, count);
     if (status != EBPO_OK)
         return status;
     uint64_t vertices = p->header.element[p->header.vertex].count;
-    bool strips = r->element->kind == PLY_KIND_STRIPS;
+    bool strips = r->element->kind == EBPO_PLY_KIND_STRIPS;
     unsigned bytes = ebpo_ply_type_bytes(property->type);
     for (uint64_t i = 0; i < count; i++) {
         int64_t index = ebpo_ply_load_integer(p->data + p->at + i * bytes, property->type, r->swap);
         if (strips && (index == -1 || index == UINT32_MAX)) {
-            p->corners[i] = PLY_RESTART;
+            p->corners[i] = EBPO_PLY_RESTART;
         } else if ((uint64_t)index >= vertices) {
             p->at += i * bytes;
             return ebpo_ply_fail_index(p, r->element, r->row, index);
@@ -125,9 +125,9 @@ static ebpo_status store_corners(rows *r, const ply_property *property, uint64_t
     return EBPO_OK;
 }
 
-static ebpo_status store_list(rows *r, const ply_property *property, uint64_t count)
+static ebpo_status store_list(rows *r, const ebpo_ply_property *property, uint64_t count)
 {
-    ply_parser *p = r->p;
+    ebpo_ply_parser *p = r->p;
     unsigned bytes = ebpo_ply_type_bytes(property->type);
     uint8_t *items;
     ebpo_status status = ebpo_ply_put_list(p, property, r->to, count, &items);
@@ -137,9 +137,9 @@ static ebpo_status store_list(rows *r, const ply_property *property, uint64_t co
     return status;
 }
 
-static ebpo_status read_list(rows *r, const ply_property *property)
+static ebpo_status read_list(rows *r, const ebpo_ply_property *property)
 {
-    ply_parser *p = r->p;
+    ebpo_ply_parser *p = r->p;
     unsigned count_bytes = ebpo_ply_type_bytes(property->count_type),
              bytes = ebpo_ply_type_bytes(property->type);
     if (p->size - p->at < count_bytes)
@@ -154,7 +154,7 @@ static ebpo_status read_list(rows *r, const ply_property *property)
         return ebpo_ply_fail_end(p, r->element, r->row);
     p->at += count_bytes;
     ebpo_status status = EBPO_OK;
-    if (r->store && property->role == PLY_ROLE_CORNERS)
+    if (r->store && property->role == EBPO_PLY_ROLE_CORNERS)
         status = store_corners(r, property, (uint64_t)count);
     else if (r->store && ebpo_ply_is_attribute(property))
         status = store_list(r, property, (uint64_t)count);
@@ -166,15 +166,15 @@ static ebpo_status read_list(rows *r, const ply_property *property)
 /* The row's number among attributes, with room for it. */
 static ebpo_status begin_row(rows *r)
 {
-    bool face = r->element->kind == PLY_KIND_FACE;
+    bool face = r->element->kind == EBPO_PLY_KIND_FACE;
     r->to = face ? r->p->mesh->face_count : r->row;
     return face && r->store ? ebpo_ply_attributes_reserve(r->p, r->to + 1) : EBPO_OK;
 }
 
 static ebpo_status read_row(rows *r)
 {
-    ply_parser *p = r->p;
-    const ply_property *property = p->header.property + r->element->first;
+    ebpo_ply_parser *p = r->p;
+    const ebpo_ply_property *property = p->header.property + r->element->first;
     ebpo_status begun = begin_row(r);
     if (begun != EBPO_OK)
         return begun;
@@ -188,15 +188,15 @@ static ebpo_status read_row(rows *r)
         unsigned bytes = ebpo_ply_type_bytes(property->type);
         if (p->size - p->at < bytes)
             return ebpo_ply_fail_end(p, r->element, r->row);
-        if (r->store && property->role != PLY_ROLE_NONE)
+        if (r->store && property->role != EBPO_PLY_ROLE_NONE)
             ebpo_ply_store_coordinate(p->mesh, r->row, property, p->data + p->at, r->swap);
         else if (r->store && ebpo_ply_is_attribute(property))
             ebpo_ply_put_value(p, property, r->to, ebpo_ply_load(p->data + p->at, bytes, r->swap));
         p->at += bytes;
     }
-    if (r->store && r->element->kind == PLY_KIND_FACE)
+    if (r->store && r->element->kind == EBPO_PLY_KIND_FACE)
         return ebpo_ply_add_polygon(p, r->row);
-    if (r->store && r->element->kind == PLY_KIND_STRIPS)
+    if (r->store && r->element->kind == EBPO_PLY_KIND_STRIPS)
         return ebpo_ply_add_strip(p, r->row);
     return EBPO_OK;
 }
@@ -204,7 +204,7 @@ static ebpo_status read_row(rows *r)
 /* Rows of one size need no reading to be stepped over. */
 static ebpo_status step_over(rows *r)
 {
-    ply_parser *p = r->p;
+    ebpo_ply_parser *p = r->p;
     uint64_t bytes = r->element->row_bytes, count = r->element->count;
     if (bytes && count > (p->size - p->at) / bytes) {
         r->row = (p->size - p->at) / bytes;
@@ -214,18 +214,18 @@ static ebpo_status step_over(rows *r)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_ply_binary_element(ply_parser *p, const ply_element *element, bool store)
+ebpo_status ebpo_ply_binary_element(ebpo_ply_parser *p, const ebpo_ply_element *element, bool store)
 {
     rows r = { .p = p,
                .element = element,
                .swap = (int)p->header.encoding == (int)FOREIGN,
-               .store = store && (element->kind != PLY_KIND_OTHER || p->lost) };
+               .store = store && (element->kind != EBPO_PLY_KIND_OTHER || p->lost) };
     if (!element->properties || (!r.store && !element->has_list))
         return step_over(&r);
     ebpo_status status = EBPO_OK;
-    if (r.store && (element->kind == PLY_KIND_VERTEX || element->kind == PLY_KIND_OTHER))
+    if (r.store && (element->kind == EBPO_PLY_KIND_VERTEX || element->kind == EBPO_PLY_KIND_OTHER))
         status = ebpo_ply_plain_vertices(p, element, r.swap, &r.row);
-    else if (r.store && element->kind == PLY_KIND_FACE)
+    else if (r.store && element->kind == EBPO_PLY_KIND_FACE)
         status = ebpo_ply_plain_faces(p, element, r.swap, &r.row);
     for (; r.row < element->count && status == EBPO_OK; r.row++) {
         status = read_row(&r);
@@ -241,12 +241,12 @@ ebpo_status ebpo_ply_binary_element(ply_parser *p, const ply_element *element, b
 enum { GRAIN = 1 << 14 };
 
 typedef struct plain {
-    ply_parser *p;
-    const ply_element *element;
-    const ply_property *corners;    /* faces */
-    uint64_t row_bytes, corners_at; /* in a row */
-    uint64_t first;                 /* face of the mesh that row 0 becomes */
-    uint64_t deviates;              /* the first row that is no triangle of vertices that exist */
+    ebpo_ply_parser *p;
+    const ebpo_ply_element *element;
+    const ebpo_ply_property *corners; /* faces */
+    uint64_t row_bytes, corners_at;   /* in a row */
+    uint64_t first;                   /* face of the mesh that row 0 becomes */
+    uint64_t deviates;                /* the first row that is no triangle of vertices that exist */
     ebpo_progress progress;
     bool swap;
 } plain;
@@ -260,7 +260,7 @@ static bool ply_binary_report(void *user, const char *stage, uint64_t done, uint
                                   t->p->size);
 }
 
-static void ply_binary_put(const plain *t, const ply_property *property, uint64_t row,
+static void ply_binary_put(const plain *t, const ebpo_ply_property *property, uint64_t row,
                            const uint8_t *at)
 {
     if (ebpo_ply_is_attribute(property))
@@ -272,12 +272,12 @@ static ebpo_status ply_binary_vertices(void *context, uint64_t begin, uint64_t e
                                        ebpo_error *error)
 {
     const plain *t = context;
-    const ply_property *property = t->p->header.property + t->element->first;
+    const ebpo_ply_property *property = t->p->header.property + t->element->first;
     (void)worker, (void)error;
     const uint8_t *at = t->p->data + t->p->at + begin * t->row_bytes;
     for (uint64_t row = begin; row < end; row++)
         for (uint64_t i = 0; i < t->element->properties; i++) {
-            if (property[i].role != PLY_ROLE_NONE)
+            if (property[i].role != EBPO_PLY_ROLE_NONE)
                 ebpo_ply_store_coordinate(t->p->mesh, row, &property[i], at, t->swap);
             else
                 ply_binary_put(t, &property[i], row, at);
@@ -298,7 +298,7 @@ static ebpo_status ply_binary_deviate(plain *t, uint64_t row)
 /* The other properties of a row of a triangle. */
 static void put_face(const plain *t, uint64_t row, const uint8_t *at)
 {
-    const ply_property *property = t->p->header.property + t->element->first;
+    const ebpo_ply_property *property = t->p->header.property + t->element->first;
     for (uint64_t i = 0; i < t->element->properties; i++) {
         ply_binary_put(t, &property[i], t->first + row, at);
         at += property[i].list ? ebpo_ply_type_bytes(property[i].count_type) +
@@ -340,12 +340,12 @@ static bool describe_triangles(plain *t)
 {
     uint64_t at = 0;
     for (uint64_t i = 0; i < t->element->properties; i++) {
-        const ply_property *property = t->p->header.property + t->element->first + i;
+        const ebpo_ply_property *property = t->p->header.property + t->element->first + i;
         if (!property->list) {
             at += ebpo_ply_type_bytes(property->type);
             continue;
         }
-        if (property->role != PLY_ROLE_CORNERS || t->corners)
+        if (property->role != EBPO_PLY_ROLE_CORNERS || t->corners)
             return false;
         t->corners = property;
         t->corners_at = at;
@@ -359,7 +359,7 @@ static bool describe_triangles(plain *t)
 
 static ebpo_status ply_binary_run(plain *t, ebpo_task_fn task)
 {
-    ply_parser *p = t->p;
+    ebpo_ply_parser *p = t->p;
     bool watched = p->progress && p->progress->report;
     t->progress = (ebpo_progress){ watched ? ply_binary_report : NULL, t };
     ebpo_status status = ebpo_parallel_for(p->threads, p->mesh->workspace, t->element->count, GRAIN,
@@ -367,7 +367,7 @@ static ebpo_status ply_binary_run(plain *t, ebpo_task_fn task)
     return status == EBPO_E_CANCELLED ? ebpo_ply_fail_stopped(p) : status;
 }
 
-ebpo_status ebpo_ply_plain_vertices(ply_parser *p, const ply_element *element, bool swap,
+ebpo_status ebpo_ply_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_element *element, bool swap,
                                     uint64_t *done)
 {
     plain t = { .p = p, .element = element, .row_bytes = element->row_bytes, .swap = swap };
@@ -383,7 +383,7 @@ ebpo_status ebpo_ply_plain_vertices(ply_parser *p, const ply_element *element, b
     return status;
 }
 
-ebpo_status ebpo_ply_plain_faces(ply_parser *p, const ply_element *element, bool swap,
+ebpo_status ebpo_ply_plain_faces(ebpo_ply_parser *p, const ebpo_ply_element *element, bool swap,
                                  uint64_t *done)
 {
     plain t = { .p = p, .element = element, .swap = swap, .deviates = element->count };

@@ -15,7 +15,7 @@
 
 #define MOST_FACES (UINT64_C(0xfffffffe))
 
-ebpo_status ebpo_ply_reserve_corners(ply_parser *p, uint64_t count)
+ebpo_status ebpo_ply_reserve_corners(ebpo_ply_parser *p, uint64_t count)
 {
     p->corner_count = 0;
     if (!ebpo_grow(&p->corners, &p->corner_capacity, count, sizeof *p->corners))
@@ -23,8 +23,8 @@ ebpo_status ebpo_ply_reserve_corners(ply_parser *p, uint64_t count)
     return EBPO_OK;
 }
 
-ebpo_status ebpo_ply_fail_index(const ply_parser *p, const ply_element *element, uint64_t row,
-                                int64_t index)
+ebpo_status ebpo_ply_fail_index(const ebpo_ply_parser *p, const ebpo_ply_element *element,
+                                uint64_t row, int64_t index)
 {
     return ebpo_ply_fail(p,
                          "%s %" PRIu64 " names vertex %" PRId64 ", but there are %" PRIu64
@@ -33,7 +33,7 @@ ebpo_status ebpo_ply_fail_index(const ply_parser *p, const ply_element *element,
                          p->header.element[p->header.vertex].count, ebpo_ply_row_name(element));
 }
 
-static ebpo_status face_capacity(ply_parser *p, uint64_t more)
+static ebpo_status face_capacity(ebpo_ply_parser *p, uint64_t more)
 {
     ebpo_mesh *mesh = p->mesh;
     if (more > MOST_FACES - mesh->face_count)
@@ -56,7 +56,7 @@ static void add_triangle(ebpo_mesh *mesh, uint32_t a, uint32_t b, uint32_t c)
 
 /* Scratch holds, one behind the other: corner positions, triangles, and what the triangulation asks
  * for. */
-static ebpo_status scratch_capacity(ply_parser *p, uint64_t n)
+static ebpo_status scratch_capacity(ebpo_ply_parser *p, uint64_t n)
 {
     uint64_t each = 3 * sizeof(double) + 3 * sizeof(uint32_t) + sizeof(uint32_t), bytes;
     if (!ebpo_mul_ok(n, each, &bytes) ||
@@ -74,7 +74,7 @@ static void corner_position(const ebpo_mesh *mesh, uint32_t vertex, double out[3
                              : (double)mesh->xyz32[3 * (uint64_t)vertex + k];
 }
 
-static ebpo_status ply_faces_triangulate(ply_parser *p, uint32_t n, uint64_t row)
+static ebpo_status ply_faces_triangulate(ebpo_ply_parser *p, uint32_t n, uint64_t row)
 {
     ebpo_status status = scratch_capacity(p, n);
     if (status == EBPO_OK)
@@ -107,7 +107,7 @@ static ebpo_status ply_faces_triangulate(ply_parser *p, uint32_t n, uint64_t row
     return ebpo_ply_repeat_face(p, first);
 }
 
-ebpo_status ebpo_ply_add_polygon(ply_parser *p, uint64_t row)
+ebpo_status ebpo_ply_add_polygon(ebpo_ply_parser *p, uint64_t row)
 {
     if (p->corner_count < 3) {
         p->mesh->polygons_dropped++;
@@ -140,7 +140,7 @@ static void ply_faces_unroll(ebpo_mesh *mesh, const uint32_t *v, uint64_t n)
     }
 }
 
-ebpo_status ebpo_ply_add_strip(ply_parser *p, uint64_t row)
+ebpo_status ebpo_ply_add_strip(ebpo_ply_parser *p, uint64_t row)
 {
     (void)row;
     uint64_t n = p->corner_count;
@@ -148,7 +148,7 @@ ebpo_status ebpo_ply_add_strip(ply_parser *p, uint64_t row)
     ebpo_status status = n < 3 ? EBPO_OK : face_capacity(p, n - 2);
     for (uint64_t begin = 0; begin < n && status == EBPO_OK;) {
         uint64_t end = begin;
-        while (end < n && p->corners[end] != PLY_RESTART)
+        while (end < n && p->corners[end] != EBPO_PLY_RESTART)
             end++;
         if (end - begin >= 3)
             ply_faces_unroll(p->mesh, p->corners + begin, end - begin);
@@ -165,7 +165,7 @@ ebpo_status ebpo_ply_add_strip(ply_parser *p, uint64_t row)
 enum { GRAIN = 1 << 15, WORD = 64 };
 
 typedef struct leaving {
-    ply_parser *p;
+    ebpo_ply_parser *p;
     bool found;   /* some coordinate is not finite */
     bool refused; /* such a vertex is used: the check will refuse the mesh, by the file's numbers */
     uint64_t *used; /* bit v: a face names vertex v */
@@ -253,7 +253,7 @@ static void move_attributes(const leaving *l)
 
 static ebpo_status ply_faces_note(const leaving *l, uint64_t left)
 {
-    ebpo_status status = ebpo_ply_notes(l->p);
+    ebpo_status status = ebpo_mesh_need_attributes(l->p->mesh, l->p->error);
     if (status == EBPO_OK)
         ebpo_attributes_count_unread(
             l->p->mesh->attributes,
@@ -261,7 +261,7 @@ static ebpo_status ply_faces_note(const leaving *l, uint64_t left)
     return status;
 }
 
-ebpo_status ebpo_ply_leave_unused(ply_parser *p)
+ebpo_status ebpo_ply_leave_unused(ebpo_ply_parser *p)
 {
     leaving l = { .p = p };
     ebpo_mesh *mesh = p->mesh;

@@ -17,7 +17,7 @@
 enum { MAX_WORDS = 6 }; /* no statement has more than five; a sixth shows that there are too many */
 
 typedef struct reader {
-    ply_header *header;
+    ebpo_ply_header *header;
     const char *at, *end;
     uint64_t line;
     const char *name;
@@ -27,39 +27,33 @@ typedef struct reader {
 
 static const struct {
     const char *word;
-    ply_type type;
+    ebpo_ply_type type;
 } type_names[] = {
-    { "char", PLY_INT8 },       { "uchar", PLY_UINT8 },    { "short", PLY_INT16 },
-    { "ushort", PLY_UINT16 },   { "int", PLY_INT32 },      { "uint", PLY_UINT32 },
-    { "float", PLY_FLOAT32 },   { "double", PLY_FLOAT64 }, { "int8", PLY_INT8 },
-    { "uint8", PLY_UINT8 },     { "int16", PLY_INT16 },    { "uint16", PLY_UINT16 },
-    { "int32", PLY_INT32 },     { "uint32", PLY_UINT32 },  { "float32", PLY_FLOAT32 },
-    { "float64", PLY_FLOAT64 },
+    { "char", EBPO_PLY_INT8 },       { "uchar", EBPO_PLY_UINT8 },
+    { "short", EBPO_PLY_INT16 },     { "ushort", EBPO_PLY_UINT16 },
+    { "int", EBPO_PLY_INT32 },       { "uint", EBPO_PLY_UINT32 },
+    { "float", EBPO_PLY_FLOAT32 },   { "double", EBPO_PLY_FLOAT64 },
+    { "int8", EBPO_PLY_INT8 },       { "uint8", EBPO_PLY_UINT8 },
+    { "int16", EBPO_PLY_INT16 },     { "uint16", EBPO_PLY_UINT16 },
+    { "int32", EBPO_PLY_INT32 },     { "uint32", EBPO_PLY_UINT32 },
+    { "float32", EBPO_PLY_FLOAT32 }, { "float64", EBPO_PLY_FLOAT64 },
 };
 
-unsigned ebpo_ply_type_bytes(ply_type type)
+unsigned ebpo_ply_type_bytes(ebpo_ply_type type)
 {
     static const unsigned char bytes[] = { 1, 1, 2, 2, 4, 4, 4, 8 };
     return bytes[type];
 }
 
-static bool ply_header_is(ply_word word, const char *text)
+static bool ply_header_is(ebpo_ply_word word, const char *text)
 {
     return strlen(text) == word.n && memcmp(word.s, text, word.n) == 0;
 }
 
-void ebpo_ply_word_text(char text[PLY_WORD_TEXT], ply_word word)
+static ebpo_status ply_header_fail(const reader *r, const char *what, ebpo_ply_word word)
 {
-    size_t n = word.n < PLY_WORD_TEXT - 1 ? word.n : PLY_WORD_TEXT - 1;
-    for (size_t i = 0; i < n; i++)
-        text[i] = word.s[i] >= ' ' && word.s[i] <= '~' ? word.s[i] : '?';
-    text[n] = 0;
-}
-
-static ebpo_status ply_header_fail(const reader *r, const char *what, ply_word word)
-{
-    char text[PLY_WORD_TEXT];
-    ebpo_ply_word_text(text, word);
+    char text[EBPO_IMPORT_WORD_TEXT];
+    ebpo_import_word_text(text, word.s, word.n);
     return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
                           "line %" PRIu64
                           ": %s '%s'; this is not a PLY header as the format describes it",
@@ -68,14 +62,14 @@ static ebpo_status ply_header_fail(const reader *r, const char *what, ply_word w
 
 /* The next line without its end, and without the '\r' of a DOS file. False at the end of the data.
  */
-static bool next_line(reader *r, ply_word *line)
+static bool next_line(reader *r, ebpo_ply_word *line)
 {
     if (r->at == r->end)
         return false;
     const char *stop = memchr(r->at, r->header->line_end, (size_t)(r->end - r->at));
     if (!stop)
         return false;
-    *line = (ply_word){ r->at, (size_t)(stop - r->at) };
+    *line = (ebpo_ply_word){ r->at, (size_t)(stop - r->at) };
     if (line->n && line->s[line->n - 1] == '\r')
         line->n--;
     r->at = stop + 1;
@@ -83,7 +77,7 @@ static bool next_line(reader *r, ply_word *line)
     return true;
 }
 
-static int ply_header_split(ply_word line, ply_word words[MAX_WORDS])
+static int ply_header_split(ebpo_ply_word line, ebpo_ply_word words[MAX_WORDS])
 {
     int n = 0;
     const char *s = line.s, *end = line.s + line.n;
@@ -101,7 +95,7 @@ static int ply_header_split(ply_word line, ply_word words[MAX_WORDS])
     return n;
 }
 
-static bool parse_type(ply_word word, ply_type *type)
+static bool parse_type(ebpo_ply_word word, ebpo_ply_type *type)
 {
     for (size_t i = 0; i < sizeof type_names / sizeof *type_names; i++)
         if (ply_header_is(word, type_names[i].word)) {
@@ -111,7 +105,7 @@ static bool parse_type(ply_word word, ply_type *type)
     return false;
 }
 
-static bool parse_count(ply_word word, uint64_t *count)
+static bool parse_count(ebpo_ply_word word, uint64_t *count)
 {
     *count = 0;
     for (size_t i = 0; i < word.n; i++) {
@@ -124,16 +118,16 @@ static bool parse_count(ply_word word, uint64_t *count)
 }
 
 /* "format ascii 1.0" */
-static ebpo_status format_statement(reader *r, const ply_word *words, int n)
+static ebpo_status format_statement(reader *r, const ebpo_ply_word *words, int n)
 {
     if (n != 3 || r->format_seen)
         return ply_header_fail(r, "unexpected statement", words[0]);
     if (ply_header_is(words[1], "ascii"))
-        r->header->encoding = PLY_ASCII;
+        r->header->encoding = EBPO_PLY_ASCII;
     else if (ply_header_is(words[1], "binary_little_endian"))
-        r->header->encoding = PLY_LITTLE;
+        r->header->encoding = EBPO_PLY_LITTLE;
     else if (ply_header_is(words[1], "binary_big_endian"))
-        r->header->encoding = PLY_BIG;
+        r->header->encoding = EBPO_PLY_BIG;
     else
         return ply_header_fail(r, "unknown format", words[1]);
     if (!ply_header_is(words[2], "1.0"))
@@ -142,18 +136,18 @@ static ebpo_status format_statement(reader *r, const ply_word *words, int n)
     return EBPO_OK;
 }
 
-static ebpo_status note_kind(reader *r, ply_element *element)
+static ebpo_status note_kind(reader *r, ebpo_ply_element *element)
 {
-    ply_header *h = r->header;
+    ebpo_ply_header *h = r->header;
     int64_t *place;
     if (ply_header_is(element->name, "vertex")) {
-        element->kind = PLY_KIND_VERTEX;
+        element->kind = EBPO_PLY_KIND_VERTEX;
         place = &h->vertex;
     } else if (ply_header_is(element->name, "face")) {
-        element->kind = PLY_KIND_FACE;
+        element->kind = EBPO_PLY_KIND_FACE;
         place = &h->face;
     } else if (ply_header_is(element->name, "tristrips")) {
-        element->kind = PLY_KIND_STRIPS;
+        element->kind = EBPO_PLY_KIND_STRIPS;
         place = &h->strips;
     } else {
         return EBPO_OK;
@@ -165,10 +159,10 @@ static ebpo_status note_kind(reader *r, ply_element *element)
 }
 
 /* "element vertex 8" */
-static ebpo_status element_statement(reader *r, const ply_word *words, int n)
+static ebpo_status element_statement(reader *r, const ebpo_ply_word *words, int n)
 {
-    ply_header *h = r->header;
-    ply_element element = { .line = r->line, .first = h->properties };
+    ebpo_ply_header *h = r->header;
+    ebpo_ply_element element = { .line = r->line, .first = h->properties };
     if (n != 3)
         return ply_header_fail(r, "a name and a count should follow", words[0]);
     if (!parse_count(words[2], &element.count))
@@ -183,49 +177,51 @@ static ebpo_status element_statement(reader *r, const ply_word *words, int n)
     return EBPO_OK;
 }
 
-static ply_role role_of(const ply_element *element, const ply_property *property)
+static ebpo_ply_role role_of(const ebpo_ply_element *element, const ebpo_ply_property *property)
 {
-    if (element->kind == PLY_KIND_VERTEX && !property->list && property->name.n == 1) {
+    if (element->kind == EBPO_PLY_KIND_VERTEX && !property->list && property->name.n == 1) {
         char c = property->name.s[0];
-        return c == 'x'   ? PLY_ROLE_X
-               : c == 'y' ? PLY_ROLE_Y
-               : c == 'z' ? PLY_ROLE_Z
-                          : PLY_ROLE_NONE;
+        return c == 'x'   ? EBPO_PLY_ROLE_X
+               : c == 'y' ? EBPO_PLY_ROLE_Y
+               : c == 'z' ? EBPO_PLY_ROLE_Z
+                          : EBPO_PLY_ROLE_NONE;
     }
     bool corners = ply_header_is(property->name, "vertex_indices") ||
                    ply_header_is(property->name, "vertex_index");
-    if ((element->kind == PLY_KIND_FACE || element->kind == PLY_KIND_STRIPS) && property->list &&
-        corners)
-        return PLY_ROLE_CORNERS;
-    return PLY_ROLE_NONE;
+    if ((element->kind == EBPO_PLY_KIND_FACE || element->kind == EBPO_PLY_KIND_STRIPS) &&
+        property->list && corners)
+        return EBPO_PLY_ROLE_CORNERS;
+    return EBPO_PLY_ROLE_NONE;
 }
 
-static bool role_taken(const ply_header *h, const ply_element *element, ply_role role)
+static bool role_taken(const ebpo_ply_header *h, const ebpo_ply_element *element,
+                       ebpo_ply_role role)
 {
     for (uint64_t i = element->first; i < h->properties; i++)
-        if (role != PLY_ROLE_NONE && h->property[i].role == role)
+        if (role != EBPO_PLY_ROLE_NONE && h->property[i].role == role)
             return true;
     return false;
 }
 
 /* "property float x" or "property list uchar int vertex_indices" */
-static ebpo_status property_statement(reader *r, const ply_word *words, int n)
+static ebpo_status property_statement(reader *r, const ebpo_ply_word *words, int n)
 {
-    ply_header *h = r->header;
+    ebpo_ply_header *h = r->header;
     if (!h->elements)
         return ply_header_fail(r, "no element stands before", words[0]);
-    ply_property property = { .list = n > 1 && ply_header_is(words[1], "list"), .attribute = -1 };
+    ebpo_ply_property property = { .list = n > 1 && ply_header_is(words[1], "list"),
+                                   .attribute = -1 };
     if (n != (property.list ? 5 : 3))
         return ply_header_fail(r, "too few or too many words in", words[0]);
     if (!parse_type(words[n - 2], &property.type))
         return ply_header_fail(r, "unknown type", words[n - 2]);
     if (property.list &&
-        (!parse_type(words[2], &property.count_type) || property.count_type >= PLY_FLOAT32))
+        (!parse_type(words[2], &property.count_type) || property.count_type >= EBPO_PLY_FLOAT32))
         return ply_header_fail(r, "no type for a list's length:", words[2]);
     property.name = words[n - 1];
-    ply_element *element = &h->element[h->elements - 1];
+    ebpo_ply_element *element = &h->element[h->elements - 1];
     property.role = role_of(element, &property);
-    if (property.role == PLY_ROLE_CORNERS && property.type >= PLY_FLOAT32)
+    if (property.role == EBPO_PLY_ROLE_CORNERS && property.type >= EBPO_PLY_FLOAT32)
         return ply_header_fail(r, "no type for vertex numbers:", words[n - 2]);
     if (role_taken(h, element, property.role))
         return ply_header_fail(r, "a second property", property.name);
@@ -238,9 +234,9 @@ static ebpo_status property_statement(reader *r, const ply_word *words, int n)
     return EBPO_OK;
 }
 
-static ebpo_status ply_header_statement(reader *r, ply_word line, bool *ended)
+static ebpo_status ply_header_statement(reader *r, ebpo_ply_word line, bool *ended)
 {
-    ply_word words[MAX_WORDS];
+    ebpo_ply_word words[MAX_WORDS];
     int n = ply_header_split(line, words);
     if (n == 0 || ply_header_is(words[0], "comment") || ply_header_is(words[0], "obj_info")) {
         r->header->notes++;
@@ -276,7 +272,7 @@ const char *ebpo_ply_first_line(const uint8_t *data, uint64_t size, char *line_e
 
 static ebpo_status check_magic(reader *r, uint64_t size)
 {
-    ply_word line;
+    ebpo_ply_word line;
     const char *end = ebpo_ply_first_line((const uint8_t *)r->at, size, &r->header->line_end);
     const char *foreign = end ? NULL : ebpo_foreign_bytes((const uint8_t *)r->at, size);
     if (foreign)
@@ -291,7 +287,7 @@ static ebpo_status check_magic(reader *r, uint64_t size)
 static ebpo_status ply_header_statements(reader *r, bool whole)
 {
     bool ended = false;
-    ply_word line = { "", 0 };
+    ebpo_ply_word line = { "", 0 };
     while (!ended) {
         if (!next_line(r, &line))
             return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
@@ -307,7 +303,7 @@ static ebpo_status ply_header_statements(reader *r, bool whole)
     return EBPO_OK;
 }
 
-static bool has_role(const ply_header *h, const ply_element *element, ply_role role)
+static bool has_role(const ebpo_ply_header *h, const ebpo_ply_element *element, ebpo_ply_role role)
 {
     for (uint64_t i = 0; i < element->properties; i++)
         if (h->property[element->first + i].role == role)
@@ -317,33 +313,35 @@ static bool has_role(const ply_header *h, const ply_element *element, ply_role r
 
 static ebpo_status check_roles(const reader *r)
 {
-    const ply_header *h = r->header;
+    const ebpo_ply_header *h = r->header;
     if (h->vertex < 0)
         return ebpo_fail_file(
             r->error, EBPO_E_FORMAT, r->name,
             "line %" PRIu64 ": the header names no element 'vertex'; there is no mesh in this file",
             r->line);
     for (uint64_t i = 0; i < h->elements; i++) {
-        const ply_element *e = &h->element[i];
+        const ebpo_ply_element *e = &h->element[i];
         static const char *const missing[] = { "", "x", "y", "z", "vertex_indices" };
-        ply_role from = e->kind == PLY_KIND_VERTEX ? PLY_ROLE_X : PLY_ROLE_CORNERS;
-        ply_role to = e->kind == PLY_KIND_VERTEX ? PLY_ROLE_Z : PLY_ROLE_CORNERS;
-        for (int role = (int)from; role <= (int)to && e->kind != PLY_KIND_OTHER; role++)
-            if (!has_role(h, e, (ply_role)role))
+        ebpo_ply_role from =
+            e->kind == EBPO_PLY_KIND_VERTEX ? EBPO_PLY_ROLE_X : EBPO_PLY_ROLE_CORNERS;
+        ebpo_ply_role to =
+            e->kind == EBPO_PLY_KIND_VERTEX ? EBPO_PLY_ROLE_Z : EBPO_PLY_ROLE_CORNERS;
+        for (int role = (int)from; role <= (int)to && e->kind != EBPO_PLY_KIND_OTHER; role++)
+            if (!has_role(h, e, (ebpo_ply_role)role))
                 return ebpo_fail_file(
                     r->error, EBPO_E_FORMAT, r->name,
                     "line %" PRIu64
                     ": this element has no %s '%s'; the mesh cannot be read without",
-                    e->line, role == PLY_ROLE_CORNERS ? "list" : "property", missing[role]);
+                    e->line, role == EBPO_PLY_ROLE_CORNERS ? "list" : "property", missing[role]);
     }
     return EBPO_OK;
 }
 
-ebpo_status ebpo_ply_header_parse(ply_header *out, const uint8_t *data, uint64_t size,
+ebpo_status ebpo_ply_header_parse(ebpo_ply_header *out, const uint8_t *data, uint64_t size,
                                   const char *name, ebpo_error *error)
 {
-    *out = (ply_header){ .line_end = '\n', .vertex = -1, .face = -1, .strips = -1 };
-    uint64_t visible = size < PLY_HEADER_LONGEST ? size : PLY_HEADER_LONGEST;
+    *out = (ebpo_ply_header){ .line_end = '\n', .vertex = -1, .face = -1, .strips = -1 };
+    uint64_t visible = size < EBPO_PLY_HEADER_LONGEST ? size : EBPO_PLY_HEADER_LONGEST;
     reader r = { .header = out,
                  .at = (const char *)data,
                  .end = (const char *)data + visible,
@@ -361,7 +359,7 @@ ebpo_status ebpo_ply_header_parse(ply_header *out, const uint8_t *data, uint64_t
     return status;
 }
 
-void ebpo_ply_header_free(ply_header *header)
+void ebpo_ply_header_free(ebpo_ply_header *header)
 {
     free(header->element);
     free(header->property);
@@ -374,50 +372,43 @@ void ebpo_ply_header_free(ply_header *header)
 
 enum { REPORT_BYTES = 1 << 22 };
 
-ebpo_status ebpo_ply_fail(const ply_parser *p, const char *format, ...)
+ebpo_status ebpo_ply_fail(const ebpo_ply_parser *p, const char *format, ...)
 {
     char text[320];
     va_list args;
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    if (p->header.encoding == PLY_ASCII)
+    if (p->header.encoding == EBPO_PLY_ASCII)
         return ebpo_fail_file(p->error, EBPO_E_FORMAT, p->name, "line %" PRIu64 ": %s", p->line,
                               text);
     return ebpo_fail_at(p->error, EBPO_E_FORMAT, p->name, "", (int64_t)p->at,
                         "byte %" PRIu64 ": %s", p->at, text);
 }
 
-ebpo_status ebpo_ply_notes(ply_parser *p)
-{
-    ebpo_mesh *mesh = p->mesh;
-    if (!mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
-        return ebpo_fail_memory(p->error, sizeof *mesh->attributes);
-    return EBPO_OK;
-}
-
-const char *ebpo_ply_row_name(const ply_element *element)
+const char *ebpo_ply_row_name(const ebpo_ply_element *element)
 {
     static const char *const names[] = { "element", "vertex", "face", "strip" };
     return names[element->kind];
 }
 
-ebpo_status ebpo_ply_fail_end(const ply_parser *p, const ply_element *element, uint64_t row)
+ebpo_status ebpo_ply_fail_end(const ebpo_ply_parser *p, const ebpo_ply_element *element,
+                              uint64_t row)
 {
-    char name[PLY_WORD_TEXT];
-    ebpo_ply_word_text(name, element->name);
+    char name[EBPO_IMPORT_WORD_TEXT];
+    ebpo_import_word_text(name, element->name.s, element->name.n);
     return ebpo_ply_fail(p,
                          "the file ends after %" PRIu64 " bytes within row %" PRIu64
                          " of the %" PRIu64 " of element '%s'; it is cut short, get it again",
                          p->size, row, element->count, name);
 }
 
-ebpo_status ebpo_ply_fail_stopped(const ply_parser *p)
+ebpo_status ebpo_ply_fail_stopped(const ebpo_ply_parser *p)
 {
     return ebpo_fail(p->error, EBPO_E_CANCELLED, "stopped on request while reading %s", p->name);
 }
 
-ebpo_status ebpo_ply_report(ply_parser *p)
+ebpo_status ebpo_ply_report(ebpo_ply_parser *p)
 {
     p->next_report = p->at + REPORT_BYTES;
     ebpo_release_pages(p->mesh->workspace);

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/fp_env.h"
 #include "io/file_source.h"
+#include "mesh/import_build.h"
 #include "mesh/ply.h"
 #include "mesh/ply_parts.h"
 
@@ -23,30 +24,30 @@ bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
 }
 
 /* Least bytes of all rows; false when they exceed any file. */
-static bool least_bytes(const ply_parser *p, const ply_element *element, uint64_t *bytes)
+static bool least_bytes(const ebpo_ply_parser *p, const ebpo_ply_element *element, uint64_t *bytes)
 {
     uint64_t row = element->row_bytes;
-    if (p->header.encoding == PLY_ASCII &&
+    if (p->header.encoding == EBPO_PLY_ASCII &&
         !ebpo_mul_ok(element->properties, 2, &row)) /* a digit and a blank */
         return false;
     return ebpo_mul_ok(element->count, row, bytes);
 }
 
 /* Before anything is allocated: can the file hold what its header claims? */
-static ebpo_status check_counts(ply_parser *p)
+static ebpo_status check_counts(ebpo_ply_parser *p)
 {
     uint64_t left = p->size - p->header.body;
-    left += p->header.encoding == PLY_ASCII; /* the last blank may be missing */
+    left += p->header.encoding == EBPO_PLY_ASCII; /* the last blank may be missing */
     for (uint64_t i = 0; i < p->header.elements; i++) {
-        const ply_element *e = &p->header.element[i];
+        const ebpo_ply_element *e = &p->header.element[i];
         uint64_t need;
         if (least_bytes(p, e, &need) && need <= left) {
             left -= need;
             continue;
         }
-        char name[PLY_WORD_TEXT];
-        ebpo_ply_word_text(name, e->name);
-        if (p->header.encoding == PLY_ASCII || e->has_list)
+        char name[EBPO_IMPORT_WORD_TEXT];
+        ebpo_import_word_text(name, e->name.s, e->name.n);
+        if (p->header.encoding == EBPO_PLY_ASCII || e->has_list)
             return ebpo_fail_file(
                 p->error, EBPO_E_FORMAT, p->name,
                 "line %" PRIu64 ": %" PRIu64
@@ -59,9 +60,9 @@ static ebpo_status check_counts(ply_parser *p)
     return EBPO_OK;
 }
 
-static ebpo_status check_parts(const ply_parser *p)
+static ebpo_status check_parts(const ebpo_ply_parser *p)
 {
-    const ply_header *h = &p->header;
+    const ebpo_ply_header *h = &p->header;
     uint64_t vertices = h->element[h->vertex].count,
              faces = h->face >= 0 ? h->element[h->face].count : 0;
     if (vertices > MOST_VERTICES || faces > MOST_VERTICES)
@@ -80,21 +81,21 @@ static ebpo_status check_parts(const ply_parser *p)
 
 /* Floats stay floats when all three coordinates are; doubles hold every other type exactly. Points
  * are doubles. */
-static bool all_float(const ply_parser *p)
+static bool all_float(const ebpo_ply_parser *p)
 {
-    const ply_header *h = &p->header;
-    const ply_element *vertex = &h->element[h->vertex];
+    const ebpo_ply_header *h = &p->header;
+    const ebpo_ply_element *vertex = &h->element[h->vertex];
     for (uint64_t i = 0; i < vertex->properties; i++) {
-        const ply_property *property = &h->property[vertex->first + i];
-        if (property->role != PLY_ROLE_NONE && property->type != PLY_FLOAT32)
+        const ebpo_ply_property *property = &h->property[vertex->first + i];
+        if (property->role != EBPO_PLY_ROLE_NONE && property->type != EBPO_PLY_FLOAT32)
             return false;
     }
     return !p->strict;
 }
 
-static ebpo_status allocate_vertices(ply_parser *p)
+static ebpo_status allocate_vertices(ebpo_ply_parser *p)
 {
-    const ply_header *h = &p->header;
+    const ebpo_ply_header *h = &p->header;
     ebpo_mesh *mesh = p->mesh;
     mesh->vertex_count = h->element[h->vertex].count;
     size_t width = all_float(p) ? sizeof(float) : sizeof(double);
@@ -105,14 +106,14 @@ static ebpo_status allocate_vertices(ply_parser *p)
         mesh->xyz64 = coordinates;
     if (!coordinates)
         return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * 3 * width, p->error);
-    if (h->encoding == PLY_ASCII && !(p->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0)))
+    if (h->encoding == EBPO_PLY_ASCII && !(p->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0)))
         return ebpo_fail_memory(p->error, 0);
     return EBPO_OK;
 }
 
-static ebpo_status ply_parse_allocate(ply_parser *p)
+static ebpo_status ply_parse_allocate(ebpo_ply_parser *p)
 {
-    const ply_header *h = &p->header;
+    const ebpo_ply_header *h = &p->header;
     p->face_capacity = h->face >= 0 ? h->element[h->face].count : 0;
     p->mesh->faces =
         ebpo_array_alloc(p->mesh->workspace, p->face_capacity, 3 * sizeof *p->mesh->faces);
@@ -122,15 +123,15 @@ static ebpo_status ply_parse_allocate(ply_parser *p)
     return allocate_vertices(p);
 }
 
-static ebpo_status read_element(ply_parser *p, const ply_element *element, bool store)
+static ebpo_status read_element(ebpo_ply_parser *p, const ebpo_ply_element *element, bool store)
 {
-    return p->header.encoding == PLY_ASCII ? ebpo_ply_ascii_element(p, element, store)
-                                           : ebpo_ply_binary_element(p, element, store);
+    return p->header.encoding == EBPO_PLY_ASCII ? ebpo_ply_ascii_element(p, element, store)
+                                                : ebpo_ply_binary_element(p, element, store);
 }
 
 /* Faces that come before the vertices are skipped and read afterwards: cutting a polygon takes its
  * positions. */
-static ebpo_status read_early_faces(ply_parser *p)
+static ebpo_status read_early_faces(ebpo_ply_parser *p)
 {
     uint64_t at = p->at, line = p->line;
     p->at = p->header.body;
@@ -144,7 +145,7 @@ static ebpo_status read_early_faces(ply_parser *p)
     return status;
 }
 
-static ebpo_status read_body(ply_parser *p)
+static ebpo_status read_body(ebpo_ply_parser *p)
 {
     ebpo_status status = EBPO_OK;
     p->at = p->header.body;
@@ -162,7 +163,7 @@ static ebpo_status read_body(ply_parser *p)
 }
 
 /* The face array grew by halves; give back what is left over. */
-static void ply_parse_trim(ply_parser *p)
+static void ply_parse_trim(ebpo_ply_parser *p)
 {
     if (p->face_capacity == p->mesh->face_count || p->mesh->workspace)
         return;
@@ -171,7 +172,7 @@ static void ply_parse_trim(ply_parser *p)
         p->mesh->faces = faces;
 }
 
-static void ply_parse_describe(ply_parser *p)
+static void ply_parse_describe(ebpo_ply_parser *p)
 {
     static const char *const formats[] = { "ply-ascii", "ply-le", "ply-be" };
     snprintf(p->mesh->source_name, sizeof p->mesh->source_name, "%s", p->name);
@@ -180,11 +181,12 @@ static void ply_parse_describe(ply_parser *p)
     p->mesh->source_size = p->size;
 }
 
-static ebpo_status note_unread(ply_parser *p)
+static ebpo_status note_unread(ebpo_ply_parser *p)
 {
-    bool more = p->header.encoding == PLY_ASCII && ebpo_ply_ascii_more(p);
-    ebpo_status status =
-        p->surplus_values || more || p->most_rounded > 0 ? ebpo_ply_notes(p) : EBPO_OK;
+    bool more = p->header.encoding == EBPO_PLY_ASCII && ebpo_ply_ascii_more(p);
+    ebpo_status status = p->surplus_values || more || p->most_rounded > 0
+                             ? ebpo_mesh_need_attributes(p->mesh, p->error)
+                             : EBPO_OK;
     if (status != EBPO_OK)
         return status;
     if (more)
@@ -205,7 +207,7 @@ static ebpo_status note_unread(ply_parser *p)
 }
 
 /* All but the mesh. */
-static void ply_parse_release(ply_parser *p)
+static void ply_parse_release(ebpo_ply_parser *p)
 {
     if (p->c_locale)
         freelocale(p->c_locale);
@@ -220,13 +222,13 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
                                const ebpo_progress *progress, ebpo_error *error)
 {
     ebpo_mesh mesh = { .workspace = workspace };
-    ply_parser p = { .data = data,
-                     .size = size,
-                     .name = ebpo_path_name(name),
-                     .mesh = &mesh,
-                     .threads = threads,
-                     .progress = progress,
-                     .error = error };
+    ebpo_ply_parser p = { .data = data,
+                          .size = size,
+                          .name = ebpo_path_name(name),
+                          .mesh = &mesh,
+                          .threads = threads,
+                          .progress = progress,
+                          .error = error };
     ebpo_status status = ebpo_ply_header_parse(&p.header, data, size, p.name, error);
     if (status == EBPO_OK)
         status = check_counts(&p);
@@ -259,12 +261,24 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
     return status;
 }
 
+static ebpo_status read_ply(ebpo_mesh *out, const ebpo_import_job *job, ebpo_error *error)
+{
+    return ebpo_ply_parse_all(out, job->data, job->size, job->name, job->workspace, job->attributes,
+                              job->threads, job->progress, error);
+}
+
+const ebpo_import_format ebpo_import_ply = { .called = "a PLY",
+                                             .ending = ".ply",
+                                             .recognise = ebpo_ply_recognise,
+                                             .mark_comes_first = true,
+                                             .read = read_ply };
+
 ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *name, double **xyz,
                                   uint64_t *count, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_mesh mesh = { 0 };
-    ply_parser p = {
+    ebpo_ply_parser p = {
         .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .error = error
     };
     p.strict = true; /* nobody could be told of what is left out */

@@ -24,14 +24,14 @@
  * order of the header that they were read with, or in their own. */
 
 typedef struct ply_out_property {
-    ply_role role;      /* of positions and corners; else an attribute's: */
+    ebpo_ply_role role; /* of positions and corners; else an attribute's: */
     uint32_t attribute; /* which array */
     uint32_t column;
-    ply_type type, count_type; /* of positions: as they are written */
+    ebpo_ply_type type, count_type; /* of positions: as they are written */
 } ply_out_property;
 
 typedef struct ply_out_element {
-    ply_kind kind;
+    ebpo_ply_kind kind;
     uint64_t rows, first, properties; /* in ply_layout.property */
 } ply_out_element;
 
@@ -54,7 +54,7 @@ typedef struct making {
     const ebpo_mesh *mesh;
     FILE *text;  /* the header */
     bool *taken; /* [arrays * EBPO_ATTRIBUTE_COLUMNS] columns that stand in the header */
-    ply_type index_type;
+    ebpo_ply_type index_type;
     bool faces; /* the element of faces stands in the header */
     bool no_memory;
 } making;
@@ -62,7 +62,7 @@ typedef struct making {
 static const char *const type_words[] = { "char", "uchar", "short", "ushort",
                                           "int",  "uint",  "float", "double" };
 
-static ply_out_element *add_element(making *m, ply_kind kind, uint64_t rows)
+static ply_out_element *add_element(making *m, ebpo_ply_kind kind, uint64_t rows)
 {
     ply_layout *l = m->out;
     if (!ebpo_grow(&l->element, &l->element_capacity, l->elements + 1, sizeof *l->element)) {
@@ -92,79 +92,83 @@ static uint64_t array_count(const making *m)
 
 /* --- positions and corners --- */
 
-static ply_type position_type(const ebpo_mesh *mesh)
+static ebpo_ply_type position_type(const ebpo_mesh *mesh)
 {
-    return mesh->xyz64 ? PLY_FLOAT64 : PLY_FLOAT32;
+    return mesh->xyz64 ? EBPO_PLY_FLOAT64 : EBPO_PLY_FLOAT32;
 }
 
 /* Whether a coordinate is a value of the type, bit for bit. */
-static bool ply_write_holds(ply_type type, double v)
+static bool ply_write_holds(ebpo_ply_type type, double v)
 {
     static const double least[] = { INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0 }, most[] = {
         INT8_MAX, UINT8_MAX, INT16_MAX, UINT16_MAX, INT32_MAX, UINT32_MAX
     };
     uint64_t bits, back;
     double again;
-    if (type == PLY_FLOAT64)
+    if (type == EBPO_PLY_FLOAT64)
         return true;
-    if (type != PLY_FLOAT32 && !(v >= least[type] && v <= most[type]))
+    if (type != EBPO_PLY_FLOAT32 && !(v >= least[type] && v <= most[type]))
         return false;
-    again = type == PLY_FLOAT32 ? (double)(float)v : (double)(int64_t)v;
+    again = type == EBPO_PLY_FLOAT32 ? (double)(float)v : (double)(int64_t)v;
     memcpy(&bits, &v, sizeof v);
     memcpy(&back, &again, sizeof again);
     return bits == back;
 }
 
 /* The type of the header, if all coordinates of the axis are values of it. */
-static ply_type axis_type(const making *m, ply_role role, ply_type wanted)
+static ebpo_ply_type axis_type(const making *m, ebpo_ply_role role, ebpo_ply_type wanted)
 {
     const ebpo_mesh *mesh = m->mesh;
-    uint64_t axis = (uint64_t)(role - PLY_ROLE_X);
+    uint64_t axis = (uint64_t)(role - EBPO_PLY_ROLE_X);
     if (!mesh->xyz64)
-        return PLY_FLOAT32;
-    EBPO_FOR_ITEMS(mesh->workspace, i, 0, wanted == PLY_FLOAT64 ? 0 : mesh->vertex_count)
+        return EBPO_PLY_FLOAT32;
+    EBPO_FOR_ITEMS(mesh->workspace, i, 0, wanted == EBPO_PLY_FLOAT64 ? 0 : mesh->vertex_count)
         if (!ply_write_holds(wanted, mesh->xyz64[3 * i + axis]))
-            return PLY_FLOAT64;
+            return EBPO_PLY_FLOAT64;
     return wanted;
 }
 
 /* A line of the header that is followed, as it is: types have several names. */
-static void put_line(making *m, ply_word line) { fprintf(m->text, "%.*s\n", (int)line.n, line.s); }
+static void put_line(making *m, ebpo_ply_word line)
+{
+    fprintf(m->text, "%.*s\n", (int)line.n, line.s);
+}
 
 /* `line`: of the header, which names the type that is wanted; or of no length. */
-static void add_position(making *m, ply_role role, ply_type wanted, ply_word line)
+static void add_position(making *m, ebpo_ply_role role, ebpo_ply_type wanted, ebpo_ply_word line)
 {
-    ply_type type = axis_type(m, role, wanted);
+    ebpo_ply_type type = axis_type(m, role, wanted);
     if (line.n && type == wanted)
         put_line(m, line);
     else
-        fprintf(m->text, "property %s %c\n", type_words[type], "xyz"[role - PLY_ROLE_X]);
+        fprintf(m->text, "property %s %c\n", type_words[type], "xyz"[role - EBPO_PLY_ROLE_X]);
     add_property(m, (ply_out_property){ .role = role, .type = type });
 }
 
-static void add_corners(making *m, ply_type count, ply_type wanted, ply_word name, ply_word line)
+static void add_corners(making *m, ebpo_ply_type count, ebpo_ply_type wanted, ebpo_ply_word name,
+                        ebpo_ply_word line)
 {
     static const uint64_t most[] = { INT8_MAX,   UINT8_MAX, INT16_MAX,
                                      UINT16_MAX, INT32_MAX, UINT32_MAX };
-    ply_type type = m->mesh->vertex_count <= most[wanted] ? wanted : m->index_type;
+    ebpo_ply_type type = m->mesh->vertex_count <= most[wanted] ? wanted : m->index_type;
     if (line.n && type == wanted)
         put_line(m, line);
     else
         fprintf(m->text, "property list %s %s %.*s\n", type_words[count], type_words[type],
                 (int)name.n, name.s);
-    add_property(m,
-                 (ply_out_property){ .role = PLY_ROLE_CORNERS, .type = type, .count_type = count });
+    add_property(m, (ply_out_property){
+                        .role = EBPO_PLY_ROLE_CORNERS, .type = type, .count_type = count });
 }
 
 /* --- attributes --- */
 
-static bool is_word(const char *s, size_t n, ply_word word)
+static bool is_word(const char *s, size_t n, ebpo_ply_word word)
 {
     return n == word.n && memcmp(s, word.s, n) == 0;
 }
 
 /* The column of that name, or -1. */
-static int find_column(const ebpo_attribute *a, const bool *taken, ply_word name)
+static int find_column(const ebpo_attribute *a, const bool *taken, ebpo_ply_word name)
 {
     const char *s = a->names;
     for (int column = 0; *s; column++) {
@@ -180,15 +184,15 @@ static void add_column(making *m, uint64_t array, uint32_t column)
 {
     const ebpo_attribute *a = &m->mesh->attributes->array[array];
     m->taken[array * EBPO_ATTRIBUTE_COLUMNS + column] = true;
-    add_property(m, (ply_out_property){ .role = PLY_ROLE_NONE,
+    add_property(m, (ply_out_property){ .role = EBPO_PLY_ROLE_NONE,
                                         .attribute = (uint32_t)array,
                                         .column = column,
-                                        .type = (ply_type)a->type,
-                                        .count_type = (ply_type)a->list });
+                                        .type = (ebpo_ply_type)a->type,
+                                        .count_type = (ebpo_ply_type)a->list });
 }
 
 /* A property of the header becomes the column that it was read into; false: there is none. */
-static bool add_named(making *m, ply_word element, const ply_property *property)
+static bool add_named(making *m, ebpo_ply_word element, const ebpo_ply_property *property)
 {
     for (uint64_t i = 0; i < array_count(m); i++) {
         const ebpo_attribute *a = &m->mesh->attributes->array[i];
@@ -227,7 +231,7 @@ static void add_rest(making *m, const char *element)
     }
 }
 
-static uint64_t rows_of(const making *m, ply_word element)
+static uint64_t rows_of(const making *m, ebpo_ply_word element)
 {
     for (uint64_t i = 0; i < array_count(m); i++) {
         const ebpo_attribute *a = &m->mesh->attributes->array[i];
@@ -243,30 +247,31 @@ static void begin_faces(making *m)
 {
     m->faces = true;
     fprintf(m->text, "element face %" PRIu64 "\n", m->mesh->face_count);
-    add_element(m, PLY_KIND_FACE, m->mesh->face_count);
+    add_element(m, EBPO_PLY_KIND_FACE, m->mesh->face_count);
 }
 
-static void end_element(making *m, ply_kind kind)
+static void end_element(making *m, ebpo_ply_kind kind)
 {
-    if (kind == PLY_KIND_VERTEX)
+    if (kind == EBPO_PLY_KIND_VERTEX)
         add_rest(m, "vertex");
-    else if (kind == PLY_KIND_FACE)
+    else if (kind == EBPO_PLY_KIND_FACE)
         add_rest(m, "face");
 }
 
-static const ply_word usual_corners = { "vertex_indices", 14 };
+static const ebpo_ply_word usual_corners = { "vertex_indices", 14 };
 
 static void make_plain(making *m)
 {
     fprintf(m->text, "ply\nformat binary_little_endian 1.0\nelement vertex %" PRIu64 "\n",
             m->mesh->vertex_count);
-    add_element(m, PLY_KIND_VERTEX, m->mesh->vertex_count);
+    add_element(m, EBPO_PLY_KIND_VERTEX, m->mesh->vertex_count);
     for (int k = 0; k < 3; k++)
-        add_position(m, (ply_role)(PLY_ROLE_X + k), position_type(m->mesh), (ply_word){ "", 0 });
-    end_element(m, PLY_KIND_VERTEX);
+        add_position(m, (ebpo_ply_role)(EBPO_PLY_ROLE_X + k), position_type(m->mesh),
+                     (ebpo_ply_word){ "", 0 });
+    end_element(m, EBPO_PLY_KIND_VERTEX);
     begin_faces(m);
-    add_corners(m, PLY_UINT8, m->index_type, usual_corners, (ply_word){ "", 0 });
-    end_element(m, PLY_KIND_FACE);
+    add_corners(m, EBPO_PLY_UINT8, m->index_type, usual_corners, (ebpo_ply_word){ "", 0 });
+    end_element(m, EBPO_PLY_KIND_FACE);
     fputs("end_header\n", m->text);
 }
 
@@ -274,9 +279,9 @@ static void make_plain(making *m)
 
 typedef struct following {
     making *m;
-    ply_header header;
+    ebpo_ply_header header;
     uint64_t element, property; /* statements met so far */
-    ply_kind kind;              /* of the element that is open, as it is written */
+    ebpo_ply_kind kind;         /* of the element that is open, as it is written */
     uint64_t rows;              /* of that element */
     bool skipped;               /* it is left out */
 } following;
@@ -291,17 +296,17 @@ static void follow_element(following *f)
 {
     making *m = f->m;
     close_element(f);
-    const ply_element *e = &f->header.element[f->element++];
-    f->kind = e->kind == PLY_KIND_STRIPS ? PLY_KIND_FACE : e->kind;
-    f->rows = e->kind == PLY_KIND_VERTEX  ? m->mesh->vertex_count
-              : e->kind == PLY_KIND_OTHER ? rows_of(m, e->name)
-                                          : m->mesh->face_count;
-    f->skipped = f->kind == PLY_KIND_FACE ? m->faces : f->rows == 0 && e->count != 0;
-    if (e->kind == PLY_KIND_STRIPS && f->header.face >= 0)
+    const ebpo_ply_element *e = &f->header.element[f->element++];
+    f->kind = e->kind == EBPO_PLY_KIND_STRIPS ? EBPO_PLY_KIND_FACE : e->kind;
+    f->rows = e->kind == EBPO_PLY_KIND_VERTEX  ? m->mesh->vertex_count
+              : e->kind == EBPO_PLY_KIND_OTHER ? rows_of(m, e->name)
+                                               : m->mesh->face_count;
+    f->skipped = f->kind == EBPO_PLY_KIND_FACE ? m->faces : f->rows == 0 && e->count != 0;
+    if (e->kind == EBPO_PLY_KIND_STRIPS && f->header.face >= 0)
         f->skipped = true;
     if (f->skipped)
         return;
-    if (f->kind == PLY_KIND_FACE) {
+    if (f->kind == EBPO_PLY_KIND_FACE) {
         begin_faces(m);
         return;
     }
@@ -310,24 +315,24 @@ static void follow_element(following *f)
 }
 
 /* An element without rows has its properties all the same. */
-static void follow_property(following *f, ply_word line)
+static void follow_property(following *f, ebpo_ply_word line)
 {
     making *m = f->m;
-    const ply_element *e = &f->header.element[f->element - 1];
-    const ply_property *property = &f->header.property[f->property++];
+    const ebpo_ply_element *e = &f->header.element[f->element - 1];
+    const ebpo_ply_property *property = &f->header.property[f->property++];
     if (f->skipped)
         return;
-    if (property->role == PLY_ROLE_CORNERS && e->kind == PLY_KIND_STRIPS)
-        add_corners(m, PLY_UINT8, property->type, property->name, (ply_word){ "", 0 });
-    else if (property->role == PLY_ROLE_CORNERS)
+    if (property->role == EBPO_PLY_ROLE_CORNERS && e->kind == EBPO_PLY_KIND_STRIPS)
+        add_corners(m, EBPO_PLY_UINT8, property->type, property->name, (ebpo_ply_word){ "", 0 });
+    else if (property->role == EBPO_PLY_ROLE_CORNERS)
         add_corners(m, property->count_type, property->type, property->name, line);
-    else if (property->role != PLY_ROLE_NONE)
+    else if (property->role != EBPO_PLY_ROLE_NONE)
         add_position(m, property->role, property->type, line);
     else if (add_named(m, e->name, property) || f->rows == 0)
         put_line(m, line);
 }
 
-static bool ply_write_begins(ply_word line, const char *word)
+static bool ply_write_begins(ebpo_ply_word line, const char *word)
 {
     size_t n = strlen(word), at = 0;
     while (at < line.n && (line.s[at] == ' ' || line.s[at] == '\t'))
@@ -336,7 +341,7 @@ static bool ply_write_begins(ply_word line, const char *word)
            (line.n - at == n || line.s[at + n] == ' ' || line.s[at + n] == '\t');
 }
 
-static void follow_line(following *f, ply_word line)
+static void follow_line(following *f, ebpo_ply_word line)
 {
     if (ply_write_begins(line, "format"))
         fputs("format binary_little_endian 1.0\n", f->m->text);
@@ -352,7 +357,7 @@ static void ply_write_follow(following *f, const char *at, const char *end)
 {
     while (at < end && !f->m->no_memory) {
         const char *stop = memchr(at, '\n', (size_t)(end - at));
-        ply_word line = { at, (size_t)((stop ? stop : end) - at) };
+        ebpo_ply_word line = { at, (size_t)((stop ? stop : end) - at) };
         if (ply_write_begins(line, "end_header"))
             close_element(f);
         if (line.n && line.s[line.n - 1] == '\r')
@@ -387,7 +392,8 @@ ebpo_status ebpo_ply_layout_make(ply_layout *out, const ebpo_mesh *mesh, ebpo_er
     *out = (ply_layout){ .element = NULL };
     making m = { .out = out,
                  .mesh = mesh,
-                 .index_type = mesh->vertex_count < UINT64_C(1) << 31 ? PLY_INT32 : PLY_UINT32 };
+                 .index_type =
+                     mesh->vertex_count < UINT64_C(1) << 31 ? EBPO_PLY_INT32 : EBPO_PLY_UINT32 };
     m.taken = ebpo_alloc_zero(array_count(&m) + 1, EBPO_ATTRIBUTE_COLUMNS);
     if (ebpo_text_stream_begin(&header))
         m.text = header.file;
@@ -473,12 +479,12 @@ static void ply_write_put(writing *w, unsigned bytes, uint64_t bits)
 
 static void put_position(writing *w, const ply_out_property *p, uint64_t row)
 {
-    uint64_t at = 3 * row + (uint64_t)(p->role - PLY_ROLE_X), bits = 0;
+    uint64_t at = 3 * row + (uint64_t)(p->role - EBPO_PLY_ROLE_X), bits = 0;
     float narrow = w->mesh->xyz32 ? w->mesh->xyz32[at] : (float)w->mesh->xyz64[at];
-    if (p->type == PLY_FLOAT32) {
+    if (p->type == EBPO_PLY_FLOAT32) {
         memcpy(&bits, &narrow, sizeof narrow);
         bits = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__ ? bits : bits >> 32;
-    } else if (p->type == PLY_FLOAT64) {
+    } else if (p->type == EBPO_PLY_FLOAT64) {
         memcpy(&bits, &w->mesh->xyz64[at], sizeof bits);
     } else {
         bits = (uint64_t)(int64_t)w->mesh->xyz64[at]; /* the layout has seen that it is one */
@@ -524,9 +530,9 @@ static void put_row(writing *w, uint64_t row)
 {
     const ply_out_property *p = w->layout->property + w->element->first;
     for (uint64_t i = 0; i < w->element->properties; i++, p++) {
-        if (p->role == PLY_ROLE_NONE)
+        if (p->role == EBPO_PLY_ROLE_NONE)
             put_attribute(w, p, row);
-        else if (p->role == PLY_ROLE_CORNERS)
+        else if (p->role == EBPO_PLY_ROLE_CORNERS)
             put_corners(w, p, row);
         else
             put_position(w, p, row);

@@ -20,40 +20,40 @@
 
 /* Of one thread: what may be within the host that it looks at. */
 typedef struct seeker {
-    point_tree probes; /* SHELL_SAMPLES of each of these shells; values are winding numbers */
+    ebpo_box_tree probes; /* the samples of each of these shells; values are winding numbers */
     struct probing *all;
-    const shell *host;
+    const ebpo_shell *host;
     const double (*face)[3];
 } seeker;
 
 typedef struct probing {
-    nesting *n;
+    ebpo_nesting *n;
     seeker *seeker; /* one for each worker */
 } probing;
 
-static bool near_host(void *user, const box_node *node)
+static bool near_host(void *user, const ebpo_box_node *node)
 {
     return ebpo_shell_may_hold(((const seeker *)user)->host, node);
 }
 
 static bool add_probes(seeker *w, uint32_t number)
 {
-    const shell *one = &w->all->n->shells[number];
-    for (int d = 0; d < SHELL_SAMPLES; d++) {
-        mesh_point *p = ebpo_point_tree_add(&w->probes);
+    const ebpo_shell *one = &w->all->n->shells[number];
+    for (int d = 0; d < EBPO_SHELL_SAMPLES; d++) {
+        ebpo_tree_point *p = ebpo_box_tree_add(&w->probes);
         if (!p)
             return false;
-        *p = (mesh_point){ .number = number };
+        *p = (ebpo_tree_point){ .number = number };
         memcpy(p->at, one->sample[d], sizeof p->at);
     }
     return true;
 }
 
-static bool list_inner(void *user, mesh_point *points, uint64_t count)
+static bool list_inner(void *user, ebpo_tree_point *points, uint64_t count)
 {
     seeker *w = user;
     for (uint64_t i = 0; i < count; i++) {
-        const shell *one = &w->all->n->shells[points[i].number];
+        const ebpo_shell *one = &w->all->n->shells[points[i].number];
         if (one != w->host && ebpo_shell_box_within(one, w->host) &&
             !add_probes(w, points[i].number))
             return false;
@@ -64,7 +64,7 @@ static bool list_inner(void *user, mesh_point *points, uint64_t count)
 /* Whether a line along the edge from t[0] to t[1], in the plane of y and z, separates the box from
  * the triangle. Certain: errors of rounding are bounded, and what is not a number separates
  * nothing. */
-static bool shell_probes_separates(const double *const t[3], const point_box *box)
+static bool shell_probes_separates(const double *const t[3], const ebpo_point_box *box)
 {
     static const double ROUNDING = 0x1p-49, TINY = 0x1p-1000;
     const double *a = t[0], e[2] = { a[2] - t[1][2], t[1][1] - a[1] };
@@ -86,7 +86,7 @@ static bool shell_probes_separates(const double *const t[3], const point_box *bo
 }
 
 /* False only if no line along x from somewhere in the box meets the triangle. */
-static bool ebpo_face_may_meet_lines(const double t[3][3], const point_box *box)
+static bool ebpo_face_may_meet_lines(const double t[3][3], const ebpo_point_box *box)
 {
     bool before = false;
     for (int i = 0; i < 3; i++)
@@ -107,13 +107,13 @@ static bool ebpo_face_may_meet_lines(const double t[3][3], const point_box *box)
     return true;
 }
 
-static bool near_face(void *user, const point_box *box)
+static bool near_face(void *user, const ebpo_box_node *node)
 {
-    return ebpo_face_may_meet_lines(((const seeker *)user)->face, box);
+    return ebpo_face_may_meet_lines(((const seeker *)user)->face, node->points);
 }
 
 /* What segments from the probes along x to the host's end cross. */
-static bool cross_face(void *user, mesh_point *points, uint64_t count)
+static bool cross_face(void *user, ebpo_tree_point *points, uint64_t count)
 {
     seeker *w = user;
     for (uint64_t i = 0; i < count; i++)
@@ -130,27 +130,27 @@ static void cross_host(seeker *w)
         double t[3][3];
         ebpo_face_corners(c->mesh, c->faces.of[i], t);
         w->face = (const double(*)[3])t;
-        (void)ebpo_point_tree_walk(&w->probes, near_face, cross_face, w);
+        (void)ebpo_box_tree_walk(&w->probes, near_face, cross_face, w);
     }
 }
 
 static int by_number(const void *x, const void *y)
 {
-    const mesh_point *a = x, *b = y;
+    const ebpo_tree_point *a = x, *b = y;
     return (a->number > b->number) - (a->number < b->number);
 }
 
 static void count_inner(const seeker *w)
 {
-    const mesh_point *p = w->probes.point;
+    const ebpo_tree_point *p = w->probes.point;
     qsort(w->probes.point, w->probes.count, sizeof *p, by_number);
-    for (uint64_t i = 0; i < w->probes.count; i += SHELL_SAMPLES) {
+    for (uint64_t i = 0; i < w->probes.count; i += EBPO_SHELL_SAMPLES) {
         bool within = true;
-        for (uint64_t d = 0; d < SHELL_SAMPLES; d++)
+        for (uint64_t d = 0; d < EBPO_SHELL_SAMPLES; d++)
             within &= p[i + d].value != 0;
         if (!within)
             continue;
-        shell *inner = &w->all->n->shells[p[i].number];
+        ebpo_shell *inner = &w->all->n->shells[p[i].number];
         __atomic_fetch_add(&inner->depth, 1, __ATOMIC_RELAXED);
         __atomic_fetch_sub(&inner->around, p[i].value, __ATOMIC_RELAXED); /* it ends outside */
     }
@@ -167,9 +167,10 @@ static ebpo_status find_inner(void *context, uint64_t begin, uint64_t end, unsig
             continue;
         w->probes.count = 0;
         if (!ebpo_box_tree_walk(&all->n->tree, near_host, list_inner, w) ||
-            !ebpo_point_tree_build(&w->probes))
+            !ebpo_box_tree_build(&w->probes, NULL, NULL))
             return ebpo_workspace_fail(w->probes.workspace,
-                                       (w->probes.count + SHELL_SAMPLES) * sizeof(mesh_point),
+                                       (w->probes.count + EBPO_SHELL_SAMPLES) *
+                                           sizeof(ebpo_tree_point),
                                        error);
         if (w->probes.count == 0)
             continue;
@@ -180,7 +181,7 @@ static ebpo_status find_inner(void *context, uint64_t begin, uint64_t end, unsig
 }
 
 /* Each face is shown to the samples that are near it; adds to the depths. */
-static ebpo_status ebpo_nesting_probe(nesting *n, ebpo_error *error)
+static ebpo_status ebpo_nesting_probe(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->components->mesh->workspace;
     probing all = { n, ebpo_alloc_zero(n->threads, sizeof *all.seeker) };
@@ -191,7 +192,7 @@ static ebpo_status ebpo_nesting_probe(nesting *n, ebpo_error *error)
     ebpo_status status =
         ebpo_parallel_for(n->threads, workspace, n->count, 1, find_inner, &all, NULL, "", error);
     for (unsigned t = 0; t < n->threads; t++)
-        ebpo_point_tree_free(&all.seeker[t].probes);
+        ebpo_box_tree_free(&all.seeker[t].probes);
     free(all.seeker);
     return status;
 }
@@ -203,15 +204,15 @@ enum { SHELL_RAYS_GRAIN = 16 };
 
 /* What the rays of the shell that is looked at cross of one host. */
 typedef struct tally {
-    int32_t winding[SHELL_SAMPLES];
+    int32_t winding[EBPO_SHELL_SAMPLES];
     uint32_t shell; /* whose rays these are, and one more */
 } tally;
 
 typedef struct casting {
-    nesting *n;
+    ebpo_nesting *n;
     uint32_t *host; /* the crowded ones, numbers of shells */
     uint64_t host_count;
-    box_tree faces; /* number: the face; value: its place in `host` */
+    ebpo_box_tree faces; /* number: the face; value: its place in `host` */
     struct caster *caster;
 } casting;
 
@@ -223,14 +224,14 @@ typedef struct caster {
     uint64_t seen_count;
     uint32_t shell;
     int sample;
-    point_box at; /* that sample: a box without extent */
+    ebpo_point_box at; /* that sample: a box without extent */
 } caster;
 
-static bool on_ray(void *user, const box_node *node)
+static bool on_ray(void *user, const ebpo_box_node *node)
 {
     const caster *w = user;
     const double *at = w->at.min;
-    const point_box *box = node->filled;
+    const ebpo_point_box *box = node->filled;
     return at[0] <= box->max[0] && at[1] >= box->min[1] && at[1] <= box->max[1] &&
            at[2] >= box->min[2] && at[2] <= box->max[2];
 }
@@ -245,10 +246,10 @@ static tally *tally_of(caster *w, int32_t host)
     return t;
 }
 
-static bool cross_faces(void *user, mesh_point *points, uint64_t count)
+static bool cross_faces(void *user, ebpo_tree_point *points, uint64_t count)
 {
     caster *w = user;
-    const nesting *n = w->all->n;
+    const ebpo_nesting *n = w->all->n;
     for (uint64_t i = 0; i < count; i++) {
         double t[3][3];
         if (w->all->host[points[i].value] == w->shell)
@@ -291,7 +292,7 @@ static ebpo_status cast_rays(void *context, uint64_t begin, uint64_t end, unsign
         int32_t around = 0;
         w->shell = (uint32_t)i;
         w->seen_count = 0;
-        for (w->sample = 0; hosts && w->sample < SHELL_SAMPLES; w->sample++) {
+        for (w->sample = 0; hosts && w->sample < EBPO_SHELL_SAMPLES; w->sample++) {
             const double *at = all->n->shells[i].sample[w->sample];
             memcpy(w->at.min, at, sizeof w->at.min);
             memcpy(w->at.max, at, sizeof w->at.max);
@@ -312,7 +313,7 @@ static ebpo_status add_faces(casting *all, uint64_t host, ebpo_error *error)
                              c->faces.begin[component + 1]) {
         if (!ebpo_face_add(&all->faces, c->mesh, c->faces.of[i], (int32_t)host))
             return ebpo_workspace_fail(c->mesh->workspace,
-                                       (all->faces.points.count + 1) * sizeof(mesh_point), error);
+                                       (all->faces.count + 1) * sizeof(ebpo_tree_point), error);
     }
     return EBPO_OK;
 }
@@ -325,7 +326,7 @@ static ebpo_status shell_rays_plant(casting *all, ebpo_error *error)
         status = add_faces(all, h, error);
     if (status != EBPO_OK || ebpo_box_tree_build(&all->faces, ebpo_face_box, mesh))
         return status;
-    return ebpo_workspace_fail(mesh->workspace, 2 * all->faces.points.count * sizeof(point_box),
+    return ebpo_workspace_fail(mesh->workspace, 2 * all->faces.count * sizeof(ebpo_point_box),
                                error);
 }
 
@@ -360,10 +361,10 @@ static void free_casting(casting *all)
 }
 
 /* A ray from each sample goes through a tree of all of their faces; adds to the depths. */
-static ebpo_status ebpo_nesting_cast(nesting *n, ebpo_error *error)
+static ebpo_status ebpo_nesting_cast(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->components->mesh->workspace;
-    casting all = { .n = n, .faces = { .points = { .workspace = workspace } } };
+    casting all = { .n = n, .faces = { .workspace = workspace } };
     all.host = ebpo_array_alloc(workspace, n->count, sizeof *all.host);
     if (!all.host)
         return ebpo_workspace_fail(workspace, n->count * sizeof *all.host, error);
@@ -406,13 +407,13 @@ static bool shell_nesting_before(const double a[3], const double b[3], int d)
 static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
 {
-    nesting *n = context;
+    ebpo_nesting *n = context;
     const ebpo_components *c = n->components;
     (void)worker, (void)error;
     for (uint64_t s = begin; s < end; s++) {
-        shell *one = &n->shells[s];
-        const mesh_component *m = &c->list[one->component];
-        for (int d = 0; d < SHELL_SAMPLES; d++)
+        ebpo_shell *one = &n->shells[s];
+        const ebpo_found_component *m = &c->list[one->component];
+        for (int d = 0; d < EBPO_SHELL_SAMPLES; d++)
             ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)m->face], one->sample[d]);
         memcpy(one->min, m->min, sizeof one->min);
         memcpy(one->max, m->max, sizeof one->max);
@@ -421,7 +422,7 @@ static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, un
             for (uint64_t k = 0; k < 3; k++) {
                 double at[3];
                 ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)c->faces.of[i] + k], at);
-                for (int d = 0; d < SHELL_SAMPLES; d++)
+                for (int d = 0; d < EBPO_SHELL_SAMPLES; d++)
                     if (shell_nesting_before(at, one->sample[d], d))
                         memcpy(one->sample[d], at, sizeof at);
             }
@@ -433,13 +434,13 @@ static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, un
 /* ---- which may be within which ---- */
 
 typedef struct crowd {
-    const nesting *n;
-    const shell *host;
+    const ebpo_nesting *n;
+    const ebpo_shell *host;
     uint64_t inner; /* shells with a box within the host's, and the host */
 } crowd;
 
 /* What is within as a whole is counted, and not entered. */
-static bool count_node(void *user, const box_node *node)
+static bool count_node(void *user, const ebpo_box_node *node)
 {
     crowd *c = user;
     bool within = true;
@@ -452,7 +453,7 @@ static bool count_node(void *user, const box_node *node)
     return !within;
 }
 
-static bool count_shells(void *user, mesh_point *points, uint64_t count)
+static bool count_shells(void *user, ebpo_tree_point *points, uint64_t count)
 {
     crowd *c = user;
     for (uint64_t i = 0; i < count; i++)
@@ -463,14 +464,14 @@ static bool count_shells(void *user, mesh_point *points, uint64_t count)
 static ebpo_status find_crowded(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                 ebpo_error *error)
 {
-    nesting *n = context;
+    ebpo_nesting *n = context;
     const uint64_t *faces = n->components->faces.begin;
     (void)worker, (void)error;
     for (uint64_t i = begin; i < end; i++) {
-        shell *host = &n->shells[i];
+        ebpo_shell *host = &n->shells[i];
         crowd c = { n, host, 0 };
         (void)ebpo_box_tree_walk(&n->tree, count_node, count_shells, &c);
-        host->crowded = (c.inner - 1) * SHELL_SAMPLES >
+        host->crowded = (c.inner - 1) * EBPO_SHELL_SAMPLES >
                         CROWD * (faces[host->component + (uint64_t)1] - faces[host->component]);
     }
     return EBPO_OK;
@@ -478,7 +479,7 @@ static ebpo_status find_crowded(void *context, uint64_t begin, uint64_t end, uns
 
 /* ---- all of it ---- */
 
-static ebpo_status list_shells(nesting *n, ebpo_error *error)
+static ebpo_status list_shells(ebpo_nesting *n, ebpo_error *error)
 {
     const ebpo_components *c = n->components;
     n->shells = ebpo_array_alloc(c->mesh->workspace, c->count, sizeof *n->shells);
@@ -486,34 +487,34 @@ static ebpo_status list_shells(nesting *n, ebpo_error *error)
         return ebpo_workspace_fail(c->mesh->workspace, c->count * sizeof *n->shells, error);
     for (uint64_t i = 0; i < c->count; i++)
         if (!c->list[i].open && (c->list[i].volume < 0 || c->list[i].volume > 0))
-            n->shells[n->count++] = (shell){ .component = (uint32_t)i };
+            n->shells[n->count++] = (ebpo_shell){ .component = (uint32_t)i };
     return EBPO_OK;
 }
 
-static void box_of_shell(const void *user, const mesh_point *p, point_box *out)
+static void box_of_shell(const void *user, const ebpo_tree_point *p, ebpo_point_box *out)
 {
-    const shell *one = &((const nesting *)user)->shells[p->number];
+    const ebpo_shell *one = &((const ebpo_nesting *)user)->shells[p->number];
     memcpy(out->min, one->min, sizeof out->min);
     memcpy(out->max, one->max, sizeof out->max);
 }
 
-static ebpo_status make_tree(nesting *n, ebpo_error *error)
+static ebpo_status make_tree(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->components->mesh->workspace;
-    n->tree.points.workspace = workspace;
+    n->tree.workspace = workspace;
     for (uint64_t i = 0; i < n->count; i++) {
-        mesh_point *p = ebpo_point_tree_add(&n->tree.points);
+        ebpo_tree_point *p = ebpo_box_tree_add(&n->tree);
         if (!p)
             return ebpo_workspace_fail(workspace, n->count * sizeof *p, error);
-        *p = (mesh_point){ .number = (uint32_t)i };
+        *p = (ebpo_tree_point){ .number = (uint32_t)i };
         memcpy(p->at, n->shells[i].sample[0], sizeof p->at);
     }
     return ebpo_box_tree_build(&n->tree, box_of_shell, n)
                ? EBPO_OK
-               : ebpo_workspace_fail(workspace, 2 * n->count * sizeof(point_box), error);
+               : ebpo_workspace_fail(workspace, 2 * n->count * sizeof(ebpo_point_box), error);
 }
 
-static ebpo_status shell_nesting_nest(nesting *n, ebpo_error *error)
+static ebpo_status shell_nesting_nest(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_status status = list_shells(n, error);
     if (status != EBPO_OK || n->count < 2)
@@ -530,8 +531,8 @@ static ebpo_status shell_nesting_nest(nesting *n, ebpo_error *error)
     return status == EBPO_OK ? ebpo_nesting_cast(n, error) : status;
 }
 
-ebpo_status ebpo_nesting_find(nesting *n, const ebpo_mesh *mesh, uint32_t *closed, unsigned threads,
-                              const ebpo_progress *progress, ebpo_error *error)
+ebpo_status ebpo_nesting_find(ebpo_nesting *n, const ebpo_mesh *mesh, uint32_t *closed,
+                              unsigned threads, const ebpo_progress *progress, ebpo_error *error)
 {
     n->threads = ebpo_thread_count(threads);
     ebpo_status status =
@@ -539,7 +540,7 @@ ebpo_status ebpo_nesting_find(nesting *n, const ebpo_mesh *mesh, uint32_t *close
     return status == EBPO_OK ? shell_nesting_nest(n, error) : status;
 }
 
-void ebpo_nesting_free(nesting *n, const ebpo_mesh *mesh)
+void ebpo_nesting_free(ebpo_nesting *n, const ebpo_mesh *mesh)
 {
     ebpo_box_tree_free(&n->tree);
     ebpo_array_free(mesh->workspace, n->shells);
@@ -559,7 +560,7 @@ static uint64_t turn_shell(const ebpo_components *c, uint32_t component)
 ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed, ebpo_mend_record *record,
                                   ebpo_error *error)
 {
-    nesting n = { .components = NULL };
+    ebpo_nesting n = { .components = NULL };
     uint64_t turned = 0;
     if (mesh->face_count == 0)
         return EBPO_OK;

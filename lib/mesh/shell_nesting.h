@@ -9,31 +9,31 @@
 
 /* A component is within another one, its host, if these vertices are: the least and the greatest
  * along each axis. */
-enum { SHELL_SAMPLES = 6 };
+enum { EBPO_SHELL_SAMPLES = 6 };
 
-typedef struct shell {
-    double sample[SHELL_SAMPLES][3];
+typedef struct ebpo_shell {
+    double sample[EBPO_SHELL_SAMPLES][3];
     double min[3], max[3];
     uint32_t component;
     uint32_t depth; /* closed components that it is within */
     int32_t around; /* the sum of their winding numbers there */
     bool crowded;   /* a host to many for the faces that it has: rays lead to it */
-} shell;
+} ebpo_shell;
 
-typedef struct nesting {
+typedef struct ebpo_nesting {
     ebpo_components *components;
-    shell *shells; /* closed, with a volume */
+    ebpo_shell *shells; /* closed, with a volume */
     uint64_t count;
-    box_tree tree; /* of shells' boxes; the points are sample[0] */
+    ebpo_box_tree tree; /* of shells' boxes; the points are sample[0] */
     unsigned threads;
-} nesting;
+} ebpo_nesting;
 
-static inline bool ebpo_shell_looks_inwards(const nesting *n, const shell *one)
+static inline bool ebpo_shell_looks_inwards(const ebpo_nesting *n, const ebpo_shell *one)
 {
     return n->components->list[one->component].volume < 0;
 }
 
-static inline bool ebpo_shell_is_cavity(const shell *one) { return one->depth % 2 != 0; }
+static inline bool ebpo_shell_is_cavity(const ebpo_shell *one) { return one->depth % 2 != 0; }
 
 static inline void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, double t[3][3])
 {
@@ -42,7 +42,7 @@ static inline void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, doubl
 }
 
 /* Gives the box of a face to a box tree over faces of the mesh `user`. */
-static inline void ebpo_face_box(const void *user, const mesh_point *p, point_box *out)
+static inline void ebpo_face_box(const void *user, const ebpo_tree_point *p, ebpo_point_box *out)
 {
     double t[3][3];
     ebpo_face_corners(user, p->number, t);
@@ -53,21 +53,21 @@ static inline void ebpo_face_box(const void *user, const mesh_point *p, point_bo
 }
 
 /* Adds a face to such a tree. False when memory is short. */
-static inline bool ebpo_face_add(box_tree *tree, const ebpo_mesh *mesh, uint32_t face,
+static inline bool ebpo_face_add(ebpo_box_tree *tree, const ebpo_mesh *mesh, uint32_t face,
                                  int32_t value)
 {
-    point_box box;
-    mesh_point *p = ebpo_point_tree_add(&tree->points);
+    ebpo_point_box box;
+    ebpo_tree_point *p = ebpo_box_tree_add(tree);
     if (!p)
         return false;
-    *p = (mesh_point){ .number = face, .value = value };
+    *p = (ebpo_tree_point){ .number = face, .value = value };
     ebpo_face_box(mesh, p, &box);
     for (int k = 0; k < 3; k++)
         p->at[k] = box.min[k] / 2 + box.max[k] / 2;
     return true;
 }
 
-static inline bool ebpo_shell_box_within(const shell *inner, const shell *outer)
+static inline bool ebpo_shell_box_within(const ebpo_shell *inner, const ebpo_shell *outer)
 {
     for (int k = 0; k < 3; k++)
         if (inner->min[k] < outer->min[k] || inner->max[k] > outer->max[k])
@@ -76,7 +76,7 @@ static inline bool ebpo_shell_box_within(const shell *inner, const shell *outer)
 }
 
 /* Whether shells of the node may be within the host: their first samples near it. */
-static inline bool ebpo_shell_may_hold(const shell *host, const box_node *node)
+static inline bool ebpo_shell_may_hold(const ebpo_shell *host, const ebpo_box_node *node)
 {
     for (int k = 0; k < 3; k++)
         if (node->points->min[k] > host->max[k] || node->points->max[k] < host->min[k])
@@ -88,9 +88,9 @@ static inline bool ebpo_shell_may_hold(const shell *host, const box_node *node)
 
 /* Zeroed to begin with; to be freed on failure as well. `closed`: of ebpo_mesh_find_shells,
  * borrowed until then, and changed. */
-EBPO_MUST_USE ebpo_status ebpo_nesting_find(nesting *n, const ebpo_mesh *mesh, uint32_t *closed,
-                                            unsigned threads, const ebpo_progress *progress,
-                                            ebpo_error *error);
-void ebpo_nesting_free(nesting *n, const ebpo_mesh *mesh);
+EBPO_MUST_USE ebpo_status ebpo_nesting_find(ebpo_nesting *n, const ebpo_mesh *mesh,
+                                            uint32_t *closed, unsigned threads,
+                                            const ebpo_progress *progress, ebpo_error *error);
+void ebpo_nesting_free(ebpo_nesting *n, const ebpo_mesh *mesh);
 
 #endif

@@ -1,5 +1,7 @@
-/* Binary STL files: a head of 80 bytes, a count, facets of 50 bytes. The last two bytes of a facet
- * are, by the format, the number of bytes that follow it; most programs keep a colour there. */
+/* Reading STL files, in text and binary. Source: "StereoLithography Interface Specification", 3D
+ * Systems, 1989. Binary ones have a head of 80 bytes, a count, facets of 50 bytes. The last two
+ * bytes of a facet are, by the format, the number of bytes that follow it; most programs keep a
+ * colour there. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -69,7 +71,9 @@ bool ebpo_stl_states_size(const uint8_t *data, uint64_t known, uint64_t size)
     return known >= STL_BINARY_HEAD && size > STL_BINARY_HEAD && stated_size(data) == size;
 }
 
-bool ebpo_stl_fits_binary(const uint8_t *data, uint64_t size)
+/* True where all bytes are those of binary models: of one, also with the bytes that its facets'
+ * attribute byte counts state, or of several, one behind the other. */
+static bool fits_binary(const uint8_t *data, uint64_t size)
 {
     return size >= STL_BINARY_HEAD &&
            (count_models(data, size) ||
@@ -77,7 +81,7 @@ bool ebpo_stl_fits_binary(const uint8_t *data, uint64_t size)
              stated_faces(data)));
 }
 
-static ebpo_status fail_ambiguous(const import_build *b, const uint8_t *data, uint64_t size)
+static ebpo_status fail_ambiguous(const ebpo_import_build *b, const uint8_t *data, uint64_t size)
 {
     return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
                           "states %" PRIu64 " faces, which take %" PRIu64 " of its %" PRIu64
@@ -88,8 +92,8 @@ static ebpo_status fail_ambiguous(const import_build *b, const uint8_t *data, ui
 
 /* Finds out what the bytes behind the stated facets are; EBPO_E_FORMAT where that is not certain.
  */
-static ebpo_status stl_binary_explain(const import_build *b, const uint8_t *data, uint64_t size,
-                                      stl_bytes *is)
+static ebpo_status stl_binary_explain(const ebpo_import_build *b, const uint8_t *data,
+                                      uint64_t size, stl_bytes *is)
 {
     uint64_t end = stated_size(data), held = (size - STL_BINARY_HEAD) / RECORD;
     *is = (stl_bytes){ .models = 1 };
@@ -116,7 +120,7 @@ static ebpo_status stl_binary_explain(const import_build *b, const uint8_t *data
     return EBPO_OK;
 }
 
-static ebpo_status read_facets(import_build *b, const uint8_t *model, bool payload)
+static ebpo_status read_facets(ebpo_import_build *b, const uint8_t *model, bool payload)
 {
     const uint8_t *at = model + STL_BINARY_HEAD;
     ebpo_status status = EBPO_OK;
@@ -137,7 +141,7 @@ static ebpo_status read_facets(import_build *b, const uint8_t *model, bool paylo
 }
 
 /* Counts the facets of a model whose last two bytes are not zero. */
-static uint64_t count_words(const import_build *b, const uint8_t *model)
+static uint64_t count_words(const ebpo_import_build *b, const uint8_t *model)
 {
     uint64_t words = 0;
     EBPO_FOR_ITEMS(b->mesh->workspace, i, 0, stated_faces(model))
@@ -145,9 +149,10 @@ static uint64_t count_words(const import_build *b, const uint8_t *model)
     return words;
 }
 
-static ebpo_status stl_binary_note(import_build *b, const stl_bytes *is, uint64_t words)
+static ebpo_status stl_binary_note(ebpo_import_build *b, const stl_bytes *is, uint64_t words)
 {
-    ebpo_status status = is->payload || is->behind || words ? ebpo_import_notes(b) : EBPO_OK;
+    ebpo_status status =
+        is->payload || is->behind || words ? ebpo_mesh_need_attributes(b->mesh, b->error) : EBPO_OK;
     if (status != EBPO_OK || !b->mesh->attributes)
         return status;
     ebpo_attributes *to = b->mesh->attributes;
@@ -164,9 +169,9 @@ static ebpo_status stl_binary_note(import_build *b, const stl_bytes *is, uint64_
     return EBPO_OK;
 }
 
-static ebpo_status fail_head(const import_build *b, const uint8_t *data, uint64_t size)
+static ebpo_status fail_head(const ebpo_import_build *b, const uint8_t *data, uint64_t size)
 {
-    char word[IMPORT_WORD_TEXT];
+    char word[EBPO_IMPORT_WORD_TEXT];
     uint64_t at = 0, end;
     if (!ebpo_bytes_are_text(data, size))
         return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
@@ -184,12 +189,13 @@ static ebpo_status fail_head(const import_build *b, const uint8_t *data, uint64_
                           word);
 }
 
-ebpo_status ebpo_stl_read_binary(import_build *b, const uint8_t *data, uint64_t size,
-                                 uint64_t *plain)
+/* Reads the facets as vertices, three each, and notes bytes that are not read. *plain: the size of
+ * the one model whose facets have their two bytes of attributes; 0: it is another file. */
+static ebpo_status read_binary(ebpo_import_build *b, const uint8_t *data, uint64_t size,
+                               uint64_t *plain)
 {
     *plain = 0;
-    if (size < STL_BINARY_HEAD ||
-        (ebpo_bytes_are_text(data, size) && !ebpo_stl_fits_binary(data, size)))
+    if (size < STL_BINARY_HEAD || (ebpo_bytes_are_text(data, size) && !fits_binary(data, size)))
         return fail_head(b, data, size);
     uint64_t faces = stated_faces(data), words = 0;
     if (stated_size(data) > size)
@@ -197,7 +203,7 @@ ebpo_status ebpo_stl_read_binary(import_build *b, const uint8_t *data, uint64_t 
                               "states %" PRIu64 " faces, but its %" PRIu64 " bytes hold %" PRIu64
                               "; it is cut short or no STL file",
                               faces, size, (size - STL_BINARY_HEAD) / RECORD);
-    if (3 * faces > IMPORT_MOST)
+    if (3 * faces > EBPO_IMPORT_MOST)
         return ebpo_fail_file(b->error, EBPO_E_LIMIT, b->name,
                               "states %" PRIu64 " faces of three corners each, more than 2^32 - 2 "
                               "corners; split the model",
@@ -307,8 +313,8 @@ static ebpo_status add_words(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *
  * bit 15 is 0, else the colour that stands there; of others (VisCAM) blue first, where bit 15 is 1,
  * else white. Nothing of a file in text. The mesh's faces are those of the file. EBPO_E_MEMORY,
  * EBPO_E_IO. */
-static ebpo_status ebpo_import_stl_colours(ebpo_mesh *mesh, const uint8_t *data, uint64_t size,
-                                           ebpo_error *error)
+static ebpo_status keep_stl_colours(ebpo_mesh *mesh, const uint8_t *data, uint64_t size,
+                                    ebpo_error *error)
 {
     stl_colours s = { .data = data, .faces = mesh->face_count };
     if (size != FIRST + FACE * s.faces || ebpo_load32(data + HEADER) != s.faces)
@@ -335,15 +341,17 @@ static bool begins_solid(const uint8_t *data, uint64_t size)
            (size == 5 || is_blank((char)data[5]));
 }
 
-bool ebpo_stl_recognise(const uint8_t *data, uint64_t size)
+/* True for the bytes of an STL file: binary if all of them are those of the faces that it states,
+ * whatever it begins with; else text that begins with the word solid. */
+static bool has_stl_mark(const uint8_t *data, uint64_t size)
 {
-    return begins_solid(data, size) || ebpo_stl_fits_binary(data, size);
+    return begins_solid(data, size) || fits_binary(data, size);
 }
 
 /* --- text --- */
 
 typedef struct stl_text {
-    import_build *build;
+    ebpo_import_build *build;
     const char *begin, *at, *end;
     uint64_t line;
     uint64_t loops, corners; /* so far; of this loop */
@@ -376,7 +384,7 @@ static bool stl_is(stl_word word, const char *text)
 
 static ebpo_status fail_word(const stl_text *t, const char *wanted, stl_word word)
 {
-    char text[IMPORT_WORD_TEXT];
+    char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
     return ebpo_fail_file(t->build->error, EBPO_E_FORMAT, t->build->name,
                           "line %" PRIu64 ": '%s' where %s should stand, in facet %" PRIu64
@@ -524,11 +532,11 @@ static ebpo_status read_text(stl_text *t)
 
 /* --- both --- */
 
-static ebpo_status make_faces(import_build *b)
+static ebpo_status make_faces(ebpo_import_build *b)
 {
     ebpo_status status = ebpo_import_faces(b);
     for (uint64_t i = 0; i < b->vertices && status == EBPO_OK; i++) {
-        import_corner *c = ebpo_import_corner(b);
+        ebpo_import_corner *c = ebpo_import_add_corner(b);
         if (!c)
             return ebpo_fail_memory(b->error, 3 * sizeof *c);
         memset(c, 0xff, sizeof *c);
@@ -546,7 +554,7 @@ static bool is_text(const uint8_t *data, uint64_t size)
     uint64_t look = size < LOOK_AHEAD ? size : LOOK_AHEAD;
     const uint8_t *at = data, *end = data + look;
     if (!begins_solid(data, size) || memchr(data, 0, size < STL_HEAD ? size : STL_HEAD) ||
-        ebpo_stl_fits_binary(data, size))
+        fits_binary(data, size))
         return false;
     for (; at + 5 <= end; at++)
         if (strncasecmp((const char *)at, "facet", 5) == 0)
@@ -554,27 +562,34 @@ static bool is_text(const uint8_t *data, uint64_t size)
     return memchr(data, 0, look) == NULL;
 }
 
-ebpo_status ebpo_stl_read(import_build *b, const uint8_t *data, uint64_t size)
+/* Makes the mesh. A file that is called STL is text if it says so and has the word facet. Normals
+ * are not read: they follow from corners. */
+static ebpo_status build_stl(ebpo_import_build *b, const ebpo_import_job *job)
 {
+    const uint8_t *data = job->data;
+    uint64_t size = job->size;
     const char *text = (const char *)data + ebpo_text_mark(data, size);
     stl_text t = {
         .build = b, .begin = text, .at = text, .end = (const char *)data + size, .line = 1
     };
     uint64_t plain = 0;
-    ebpo_status status =
-        is_text(data, size) ? read_text(&t) : ebpo_stl_read_binary(b, data, size, &plain);
+    ebpo_status status = is_text(data, size) ? read_text(&t) : read_binary(b, data, size, &plain);
     if (status == EBPO_OK)
         status = make_faces(b);
     if (status == EBPO_OK && t.odd)
-        status = ebpo_import_notes(b);
+        status = ebpo_mesh_need_attributes(b->mesh, b->error);
     if (status == EBPO_OK && t.odd)
         ebpo_attributes_note_unread(b->mesh->attributes,
                                     "words that STL does not have: %" PRIu64
                                     ", the first in line %" PRIu64,
                                     t.odd, t.odd_line);
     if (status == EBPO_OK && b->attributes && plain)
-        status = ebpo_import_stl_colours(b->mesh, data, plain, b->error);
+        status = keep_stl_colours(b->mesh, data, plain, b->error);
     if (status == EBPO_OK && b->attributes && t.solids > 1)
         ebpo_attributes_lose(b->mesh->attributes, "names of solids");
     return status;
 }
+
+const ebpo_import_format ebpo_import_stl = {
+    .called = "an STL", .ending = ".stl", .recognise = has_stl_mark, .build = build_stl
+};

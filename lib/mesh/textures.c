@@ -786,8 +786,9 @@ static ebpo_status add_images(finding *f, ebpo_mesh *mesh)
         return ebpo_fail_memory(f->error, sizeof *f->names.of);
     if (!f->names.count && !f->names.left_out && !f->libraries)
         return EBPO_OK;
-    if (!mesh->attributes && !(mesh->attributes = ebpo_attributes_make(mesh->workspace)))
-        return ebpo_fail_memory(f->error, sizeof *mesh->attributes);
+    status = ebpo_mesh_need_attributes(mesh, f->error);
+    if (status != EBPO_OK)
+        return status;
     for (uint64_t i = 0; i < f->names.count && status == EBPO_OK; i++)
         status = add_image(f, mesh->attributes, &f->names.of[i]);
     note_losses(f, mesh->attributes);

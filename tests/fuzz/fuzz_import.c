@@ -36,26 +36,28 @@ static void names(const uint8_t *data, size_t size)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static const char *const endings[] = { "fuzz.obj", "fuzz.stl", "fuzz.off" };
-    ebpo_import_format format;
     ebpo_mesh mesh;
-    ebpo_obj_runs runs;
+    ebpo_import_runs runs = { 0 };
     ebpo_error error = EBPO_ERROR_INIT;
     if (size < 1)
         return 0;
     uint8_t what = *data++;
     const char *name = endings[what % 3];
     uint8_t *file = fuzz_copy(data, --size);
+    ebpo_import_job job = { .data = file, .size = size, .name = name, .attributes = what & 16 };
+    const ebpo_import_format *format;
     if (what & 4)
         names(file, size);
     else if (what & 8) {
-        if (ebpo_import_groups(&mesh, file, size, name, NULL, true, &runs, &error) == EBPO_OK) {
+        job.runs = &runs;
+        job.attributes = true;
+        if (ebpo_import_memory(&mesh, &ebpo_import_obj, &job, &error) == EBPO_OK) {
             check(&mesh);
-            ebpo_obj_runs_free(&runs);
+            ebpo_import_runs_free(&runs);
             ebpo_mesh_free(&mesh);
         }
-    } else if (ebpo_import_recognise(&format, file, size, name)) {
-        ebpo_status status =
-            ebpo_import_memory(&mesh, format, file, size, name, NULL, what & 16, &error);
+    } else if ((format = ebpo_import_recognise(file, size, name)) && format != &ebpo_import_ply) {
+        ebpo_status status = ebpo_import_memory(&mesh, format, &job, &error);
         fuzz_must(status == EBPO_OK || (error.status == status && error.message[0]));
         if (status == EBPO_OK) {
             check(&mesh);

@@ -2,8 +2,11 @@
 """The form of what is written by hand: test_form.py SOURCE_ROOT
 
 C has the lines of .clang-format (tools/dev/format.sh --check); here are lines that are too long,
-and files of one name. Lines of tables and code in Markdown, links and long words cannot be broken
-and are let off.
+files of one name, and names in C. Lines of tables and code in Markdown, links and long words cannot
+be broken and are let off.
+- A file-local function says what it does: `read_rows`, not `read`, a bare word that could stand in
+  any file.
+- What a header of lib declares has the library's prefix, as test_layers.py wants it of symbols.
 """
 import collections
 import pathlib
@@ -19,6 +22,11 @@ MADE = re.compile(  # by programs
 # Names that tell nothing without their folder, and need not; public headers are <ebpo/NAME.h>.
 COMMON = {"meson.build", "README.md"}
 APART = ("tests/fuzz/seeds/", "lib/include/")
+# Vectors of numbers and their operations, which stand for operators: a prefix would hide the formulas.
+UNPREFIXED = {"lib/core/simd.h"}
+NO_CODE = re.compile(  # comments, texts, preprocessor lines, attributes
+    r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"|^[ \t]*#(?:[^\n]*\\\n)*[^\n]*|__attribute__\(\(.*?\)\)|'
+    r"\bEBPO_PRINTF\([^)]*\)", re.S | re.M)
 
 
 def tracked(root):
@@ -71,13 +79,53 @@ def equal_names(names):
                 yield f"equal names: {', '.join(found)}"
 
 
+def c_code(text):
+    """The code alone, in the lines where it was."""
+    return NO_CODE.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
+
+
+def bare_functions(root, names):
+    for name in names:
+        if not name.startswith(("lib/", "tools/")) or not name.endswith((".c", ".h", ".inc", ".cpp")):
+            continue
+        code = c_code(text_of(root / name))
+        for found in re.finditer(r"^static\b[^;={}()]*?[ *](\w+)\(", code, re.M):
+            if found[1].isalpha():
+                yield (f"{name}:{code.count(chr(10), 0, found.start(1)) + 1}: the name of the function "
+                       f"{found[1]} is a bare word; let it say what it does")
+
+
+def declared_names(text):
+    """Types, functions, constants and macros of a header."""
+    code = c_code(text)
+    yield from re.findall(r"\b(?:struct|enum|union)\s+(\w+)\s*[{;]", code)
+    yield from re.findall(r"^\}\s*(\w+)\s*;", code, re.M)
+    yield from re.findall(r"^typedef\s[^{};]*?\(\*(\w+)\)\(", code, re.M)
+    yield from re.findall(r"^typedef\s[^{}();]*?\b(\w+)(?:\[.*?\])?;", code, re.M)
+    yield from re.findall(r"^(?!typedef\b)[A-Za-z_][\w \t*\n]*?[ *](\w+)\(", code, re.M)
+    for body in re.findall(r"\benum\s*\w*\s*\{(.*?)\}", code, re.S):
+        yield from re.findall(r"(?:^|,)\s*([A-Za-z_]\w*)", re.sub(r"\([^()]*\)", "", body))
+    yield from re.findall(r"^[ \t]*#[ \t]*define[ \t]+(\w+)", text, re.M)
+
+
+def unprefixed_names(root, names):
+    tables = [text_of(root / name) for name in names if name.startswith("lib/") and name.endswith(".inc")]
+    undone = {macro for text in tables for macro in re.findall(r"^#undef (\w+)", text, re.M)}
+    for name in names:
+        if name.startswith("lib/") and name.endswith(".h") and name not in UNPREFIXED:
+            for declared in sorted(set(declared_names(text_of(root / name))) - undone):
+                if not declared.lower().startswith(("ebpo_", "_")):
+                    yield f"{name}: {declared} lacks the prefix ebpo_"
+
+
 def main():
     root = pathlib.Path(sys.argv[1])
     if not (root / ".git").exists():
         print("skipped: this is no git repository")
         return 77
     names = tracked(root)
-    problems = [*long_lines(root, names), *equal_names(names)]
+    problems = [*long_lines(root, names), *equal_names(names), *bare_functions(root, names),
+                *unprefixed_names(root, names)]
     print("\n".join(problems) or f"{len(names)} files are in form")
     return 1 if problems else 0
 

@@ -7,7 +7,8 @@ declaration written by hand needs no header); X.c, X.h and X.inc count as one. H
 - a file uses files of its own module and of lower floors only, not of siblings;
 - verify, the judge, uses nothing of what it judges: no file of construct, of the writer or of query;
 - no circles of files, neither within a module nor across;
-- only lib/hdf5_write includes <hdf5.h>, and only lib/io <curl/curl.h>.
+- only lib/hdf5_write includes <hdf5.h>, and only lib/io <curl/curl.h>;
+- every symbol of lib that other files can see begins with ebpo_.
 LIBRARY is the static library of lib/, OBJECTS the folder of those of tools/."""
 import collections
 import pathlib
@@ -87,10 +88,16 @@ class Tree:
                 wanted.append((source, found.group(3)))
             else:
                 defined[found.group(3)] = source
+                self.check_symbol(source, found.group(3))
         for source, symbol in wanted:
             if symbol in defined:
                 self.note(source, defined[symbol], symbol)
         return len(defined)
+
+    def check_symbol(self, source, symbol):
+        """Compilers make symbols that begin with an underscore."""
+        if self.root.name == "lib" and not symbol.startswith(("ebpo_", "_")):
+            self.problems.append(f"lib/{source}: the external symbol {symbol} lacks the prefix ebpo_")
 
     def check_floors(self):
         for user in sorted(self.uses):

@@ -167,9 +167,8 @@ START_TEST(stl_corners_beyond_the_limit_are_refused_before_anything_is_allocated
     if (!data)
         return;
     ebpo_store32(data + 80, faces);
-    ck_assert_int_eq(ebpo_import_memory(&mesh, EBPO_IMPORT_STL, data, size, "a.stl", NULL, true,
-                                        &error),
-                     EBPO_E_LIMIT);
+    const ebpo_import_job job = { .data = data, .size = size, .name = "a.stl", .attributes = true };
+    ck_assert_int_eq(ebpo_import_memory(&mesh, &ebpo_import_stl, &job, &error), EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "split") != NULL, "%s", error.message);
     munmap(data, (size_t)size);
 }

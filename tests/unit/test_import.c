@@ -16,31 +16,36 @@
 static ebpo_status import(ebpo_mesh *mesh, const char *name, const void *data, size_t size,
                           ebpo_error *error)
 {
-    ebpo_import_format format;
     uint8_t *exact = malloc(size ? size : 1);
     memcpy(exact, data, size);
     ebpo_status status = EBPO_E_ARGUMENT;
-    if (ebpo_import_recognise(&format, exact, size, name))
-        status = ebpo_import_memory(mesh, format, exact, size, name, NULL, true, error);
+    const ebpo_import_job job = { .data = exact, .size = size, .name = name, .attributes = true };
+    const ebpo_import_format *format = ebpo_import_recognise(exact, size, name);
+    if (format)
+        status = ebpo_import_memory(mesh, format, &job, error);
     free(exact);
     return status;
 }
 
+static const ebpo_import_format *recognise_text(const char *text, const char *name)
+{
+    return ebpo_import_recognise((const uint8_t *)text, strlen(text), name);
+}
+
 START_TEST(formats_are_told_by_bytes_then_by_name)
 {
-    ebpo_import_format format;
     uint8_t stl[134] = { 0 };
     stl[80] = 1;
-    ck_assert(ebpo_import_recognise(&format, stl, sizeof stl, "x") && format == EBPO_IMPORT_STL);
-    ck_assert(!ebpo_import_recognise(&format, stl, sizeof stl - 1, "x"));
-    ck_assert(ebpo_import_recognise(&format, (const uint8_t *)"OFF\n", 4, "x.obj") &&
-              format == EBPO_IMPORT_OFF);
-    ck_assert(!ebpo_import_recognise(&format, (const uint8_t *)"OFFER", 5, "x"));
-    ck_assert(ebpo_import_recognise(&format, (const uint8_t *)"solid a\n", 8, "x") &&
-              format == EBPO_IMPORT_STL);
-    ck_assert(ebpo_import_recognise(&format, (const uint8_t *)"v 0 0 0\n", 8, "a.OBJ") &&
-              format == EBPO_IMPORT_OBJ);
-    ck_assert(!ebpo_import_recognise(&format, (const uint8_t *)"", 0, "obj"));
+    ck_assert_ptr_eq(ebpo_import_recognise(stl, sizeof stl, "x"), &ebpo_import_stl);
+    ck_assert_ptr_null(ebpo_import_recognise(stl, sizeof stl - 1, "x"));
+    ck_assert_ptr_eq(recognise_text("OFF\n", "x.obj"), &ebpo_import_off);
+    ck_assert_ptr_null(recognise_text("OFFER", "x"));
+    ck_assert_ptr_eq(recognise_text("solid a\n", "x"), &ebpo_import_stl);
+    ck_assert_ptr_eq(recognise_text("v 0 0 0\n", "a.OBJ"), &ebpo_import_obj);
+    ck_assert_ptr_eq(recognise_text("ply\n", "a.off"), &ebpo_import_ply);
+    ck_assert_ptr_eq(recognise_text("v 0 0 0\n", "a.ply"), &ebpo_import_obj);
+    ck_assert_ptr_eq(recognise_text("version\n", "a.PLY"), &ebpo_import_ply);
+    ck_assert_ptr_null(recognise_text("", "obj"));
 }
 END_TEST
 
@@ -185,14 +190,14 @@ START_TEST(a_budget_does_not_change_the_mesh)
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
     char *text = long_strip(20000, _i ? "00000000001" : "");
-    const uint8_t *data = (const uint8_t *)text;
-    uint64_t size = strlen(text);
     ck_assert(ebpo_workspace_make_any(&w, 1 << 20, NULL, &error) == EBPO_OK);
-    ck_assert(ebpo_import_memory(&mesh, EBPO_IMPORT_OBJ, data, size, "a.obj", NULL, true, &error) ==
-              EBPO_OK);
-    ck_assert_msg(ebpo_import_memory(&within, EBPO_IMPORT_OBJ, data, size, "a.obj", w, true,
-                                     &error) == EBPO_OK,
-                  "%s", error.message);
+    ebpo_import_job job = {
+        .data = (const uint8_t *)text, .size = strlen(text), .name = "a.obj", .attributes = true
+    };
+    ck_assert(ebpo_import_memory(&mesh, &ebpo_import_obj, &job, &error) == EBPO_OK);
+    job.workspace = w;
+    ck_assert_msg(ebpo_import_memory(&within, &ebpo_import_obj, &job, &error) == EBPO_OK, "%s",
+                  error.message);
     ck_assert(mesh.face_count == 40000 && mesh.vertex_count == 40002);
     ck_assert(within.face_count == 40000 && within.vertex_count == 40002);
     ck_assert_mem_eq(mesh.faces, within.faces, mesh.face_count * 12);

@@ -12,18 +12,20 @@
 
 static ebpo_mesh mesh;
 
-static void import(ebpo_import_format format, const void *data, size_t size)
+static void import(const ebpo_import_format *format, const void *data, size_t size)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     uint8_t *exact = malloc(size);
     memcpy(exact, data, size);
-    ebpo_status status =
-        ebpo_import_memory(&mesh, format, exact, size, "model", NULL, true, &error);
+    const ebpo_import_job job = {
+        .data = exact, .size = size, .name = "model", .attributes = true
+    };
+    ebpo_status status = ebpo_import_memory(&mesh, format, &job, &error);
     free(exact);
     ck_assert_msg(status == EBPO_OK, "%s", error.message);
 }
 
-static void import_text(ebpo_import_format format, const char *text)
+static void import_text(const ebpo_import_format *format, const char *text)
 {
     import(format, text, strlen(text));
 }
@@ -59,7 +61,7 @@ START_TEST(what_agrees_at_a_vertex_is_the_vertex_s)
     static const float colours[] = { 1, 0, 0, 0, 0, 1, 0, 1, 0, 0.5f, 0.25f, 0 };
     static const float normals[] = { 0, 0, -1, 0, 1, 0, 1, 0, 0, 0, 0, 1 };
     static const float texture[] = { 0, 0, 0, 0.5f, 0.5f, 0, 1, 1 };
-    import_text(EBPO_IMPORT_OBJ,
+    import_text(&ebpo_import_obj,
                 "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nv 0 0 1 0.5 0.25 0\n"
                 "vn 0 0 -1\nvn 1 0 0\nvn 0 1 0\nvn 0 0 1\nvt 0 0\nvt 0.5 0\nvt 0 0.5\nvt 1 1\n"
                 "f 1/1/1 3/3/3 2/2/2\nf 1/1/1 2/2/2 4/4/4\nf 1/1/1 4/4/4 3/3/3\n"
@@ -78,7 +80,7 @@ START_TEST(what_agrees_on_a_face_is_the_face_s_and_else_in_lists)
     static const float normals[] = { 0, 0, -1, 0, -1, 0, -1, 0, 0, 1, 1, 1 };
     static const float texture[] = { 0, 0, 0, 0.5f, 0.5f, 0,    0.5f, 0, 0,    0, 0, 0.5f,
                                      0, 0, 0, 0.5f, 0.5f, 0.5f, 0,    0, 0.5f, 0, 0, 0.5f };
-    import_text(EBPO_IMPORT_OBJ,
+    import_text(&ebpo_import_obj,
                 POSITIONS "vn 0 0 -1\nvn 0 -1 0\nvn -1 0 0\nvn 1 1 1\nvt 0 0\nvt 0.5 0\nvt 0 "
                           "0.5\nvt 0.5 0.5\n"
                           "f 1/1/1 3/3/1 2/2/1\nf 1/2/2 2/1/2 4/3/2\nf 1/1/3 4/3/3 3/4/3\n"
@@ -93,7 +95,7 @@ END_TEST
 /* A quadrilateral that is cut into triangles: each corner keeps what is its own. */
 START_TEST(corners_of_polygons_keep_their_values)
 {
-    import_text(EBPO_IMPORT_OBJ,
+    import_text(&ebpo_import_obj,
                 "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
                 "f 1/1 2/2 3/3 4/4\nf 1/2 2/3 5/4\n");
     const ebpo_attribute *a = find("face", "texcoord");
@@ -109,8 +111,8 @@ END_TEST
 START_TEST(materials_are_numbers_of_faces_and_names_in_the_header)
 {
     static const uint32_t numbers[] = { 1, 1, 1, 2 };
-    import_text(EBPO_IMPORT_OBJ, "mtllib a.mtl\ns 1\nusemtl red paint\n" POSITIONS
-                                 "f 1 3 2\nf 1 2 4\no here\nf 1 4 3\nusemtl b\nf 2 3 4\n");
+    import_text(&ebpo_import_obj, "mtllib a.mtl\ns 1\nusemtl red paint\n" POSITIONS
+                                  "f 1 3 2\nf 1 2 4\no here\nf 1 4 3\nusemtl b\nf 2 3 4\n");
     const ebpo_attribute *a = find("face", "material");
     ck_assert(a && a->type == EBPO_ATTRIBUTE_UINT32 && mesh.attributes->count == 1);
     ck_assert_mem_eq(a->values, numbers, sizeof numbers);
@@ -128,7 +130,7 @@ END_TEST
 START_TEST(faces_before_the_first_material_have_none)
 {
     static const uint32_t numbers[] = { 0, 1 };
-    import_text(EBPO_IMPORT_OBJ, POSITIONS "f 1 3 2\nusemtl a\nf 1 2 4\n");
+    import_text(&ebpo_import_obj, POSITIONS "f 1 3 2\nusemtl a\nf 1 2 4\n");
     const ebpo_attribute *a = find("face", "material");
     ck_assert(a != NULL);
     ck_assert_mem_eq(a->values, numbers, sizeof numbers);
@@ -139,10 +141,10 @@ END_TEST
 
 START_TEST(nothing_is_made_of_nothing)
 {
-    import_text(EBPO_IMPORT_OBJ, "# only a mesh\ns off\n" POSITIONS FACES);
+    import_text(&ebpo_import_obj, "# only a mesh\ns off\n" POSITIONS FACES);
     ck_assert(!mesh.attributes && !ebpo_mesh_has_attributes(&mesh));
     ebpo_mesh_free(&mesh);
-    import_text(EBPO_IMPORT_OBJ, "o name\ns 0\n" POSITIONS FACES);
+    import_text(&ebpo_import_obj, "o name\ns 0\n" POSITIONS FACES);
     ck_assert(mesh.attributes && !ebpo_mesh_has_attributes(&mesh));
     ck_assert_str_eq(ebpo_mesh_attributes_lost(&mesh), "names of groups and objects");
     ebpo_mesh_free(&mesh);
@@ -156,7 +158,7 @@ static void import_off(const char *head, const char *vertex, const char *last)
             "%sOFF\n4 4 6\n0 0 0 %s\n1 0 0 %s\n0 1 0 %s\n0 0 1 %s\n"
             "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2 %s\n",
             head, vertex, vertex, vertex, vertex, last);
-    import_text(EBPO_IMPORT_OFF, text);
+    import_text(&ebpo_import_off, text);
 }
 
 static void expect_bytes(const ebpo_attribute *a, const uint8_t *values, uint64_t count)
@@ -213,7 +215,7 @@ END_TEST
 START_TEST(what_faces_name_and_is_not_there_is_told)
 {
     static const float texture[] = { 0.5f, 0.25f, 0, 0, 0, 0, 0, 0, 0, 0, 0.5f, 0.25f };
-    import_text(EBPO_IMPORT_OBJ, POSITIONS "vt 0.5 0.25\nf 1/1 3/2 2/7\nf 1//1 2 4/1\n");
+    import_text(&ebpo_import_obj, POSITIONS "vt 0.5 0.25\nf 1/1 3/2 2/7\nf 1//1 2 4/1\n");
     expect_floats(find("face", "texcoord"), true, texture, 12);
     ck_assert_str_eq(ebpo_mesh_unread(&mesh),
                      "texture coordinates that corners of faces name and that are not in the "
@@ -224,7 +226,7 @@ END_TEST
 
 START_TEST(a_third_texture_coordinate_is_noted)
 {
-    import_text(EBPO_IMPORT_OBJ, POSITIONS "vt 0 0 0.5\nf 1/1 3/1 2/1\nf 1/1 2/1 4/1\n");
+    import_text(&ebpo_import_obj, POSITIONS "vt 0 0 0.5\nf 1/1 3/1 2/1\nf 1/1 2/1 4/1\n");
     ck_assert_str_eq(mesh.attributes->lost, "the third texture coordinate");
     ebpo_mesh_free(&mesh);
 }
@@ -247,7 +249,7 @@ static void import_stl(const char *head, const uint16_t words[STL_FACES])
         data[84 + 50 * i + 48] = (uint8_t)words[i];
         data[84 + 50 * i + 49] = (uint8_t)(words[i] >> 8);
     }
-    import(EBPO_IMPORT_STL, data, sizeof data);
+    import(&ebpo_import_stl, data, sizeof data);
 }
 
 static void expect_stl(const uint16_t words[STL_FACES], const uint8_t rgb[3 * STL_FACES])

@@ -21,12 +21,15 @@ void answer_text_free(answer_text *t)
     *t = (answer_text){ .bytes = NULL };
 }
 
-static void empty(answer_text *t) { t->count = t->answer = t->piece = t->row = t->cut_count = 0; }
+static void clear_counts(answer_text *t)
+{
+    t->count = t->answer = t->piece = t->row = t->cut_count = 0;
+}
 
 void answer_text_lose(answer_text *t)
 {
     t->failed = true;
-    empty(t);
+    clear_counts(t);
 }
 
 /* Drops what is behind the last complete row. */
@@ -94,7 +97,7 @@ bool answer_text_leave(answer_text *t, const char *command)
     if (fine && at < t->count)
         fine = command_write(command, t->bytes + at, t->count - at);
     t->gone = (t->row ? 0 : t->gone) + t->count - t->row;
-    empty(t);
+    clear_counts(t);
     t->refused |= !fine;
     return fine;
 }

@@ -34,7 +34,7 @@ static inline char *put_double(char *at, double v)
 }
 
 /* Between the numbers of a line. */
-static inline char between(answer_form form) { return form == ANSWERS_CSV ? ',' : ' '; }
+static inline char separator_of(answer_form form) { return form == ANSWERS_CSV ? ',' : ' '; }
 
 static char *put_json_real(char *at, const char *lead, double v)
 {
@@ -51,7 +51,7 @@ static char *put_json_reals(char *at, const char *lead, const double v[3])
 }
 
 /* Ends the answer to a row of the input. */
-static void end(answer_text *t, answer_form form, char *at)
+static void end_row(answer_text *t, answer_form form, char *at)
 {
     if (form != ANSWERS_RAW)
         *at++ = '\n';
@@ -93,7 +93,7 @@ static char *put_attributes(char *at, answer_form form, const ebpo_sampler *samp
         else if (form == ANSWERS_JSON)
             at = none ? at : put_json_real(at, k ? ", " : "", values[k]);
         else {
-            *at++ = between(form);
+            *at++ = separator_of(form);
             at = none ? put_text(at, "-") : number_write(at, values[k]);
         }
     return count && form == ANSWERS_JSON && !none ? put_text(at, "]") : at;
@@ -111,7 +111,7 @@ static char *put_model(char *at, answer_form form, const uint64_t *model)
     if (form == ANSWERS_JSON)
         at = put_text(at, ", \"model\": ");
     else
-        *at++ = between(form);
+        *at++ = separator_of(form);
     return *model != UINT64_MAX ? number_write_uint(at, *model)
                                 : put_text(at, form == ANSWERS_JSON ? "null" : "-");
 }
@@ -148,8 +148,8 @@ void answers_inside(answer_text *t, answer_form form, const ebpo_inside_result *
         if (form == ANSWERS_RAW)
             at = put_u64(at, (uint64_t)(uint32_t)r->winding << 32 | (uint32_t)r->where);
         else
-            at = form == ANSWERS_JSON ? inside_json(at, r) : inside_line(at, between(form), r);
-        end(t, form, at);
+            at = form == ANSWERS_JSON ? inside_json(at, r) : inside_line(at, separator_of(form), r);
+        end_row(t, form, at);
     }
 }
 
@@ -206,7 +206,7 @@ static char *put_limited(char *at, answer_form form, const ebpo_distance_result 
         return put_text(put_json_real(put_json_real(at, "{\"lo\": ", r->lo), ", \"hi\": ", r->hi),
                         "}");
     at = number_write(at, r->lo);
-    *at++ = between(form);
+    *at++ = separator_of(form);
     return number_write(at, r->hi);
 }
 
@@ -215,7 +215,7 @@ static char *put_distance(char *at, answer_form form, const ebpo_distance_result
 {
     at = form == ANSWERS_RAW    ? distance_raw(at, r)
          : form == ANSWERS_JSON ? distance_json(at, r)
-                                : distance_line(at, between(form), r);
+                                : distance_line(at, separator_of(form), r);
     at = put_model(at, form, model);
     at = put_attributes(at, form, sampler, r->point, r->face);
     return form == ANSWERS_JSON ? put_text(at, "}") : at;
@@ -229,7 +229,7 @@ void answers_distance(answer_text *t, answer_form form, bool limited,
         char *at = answer_text_room(t);
         at = limited ? put_limited(at, form, &results[i])
                      : put_distance(at, form, &results[i], sampler, model ? &model[i] : NULL);
-        end(t, form, at);
+        end_row(t, form, at);
     }
 }
 
@@ -261,7 +261,7 @@ void answers_near_end(answer_text *t, answer_form form, bool none, const ebpo_sa
         at = put_distance(at, form, &nothing, sampler, NULL);
     else if (form == ANSWERS_JSON)
         at = put_text(at, none ? "[]" : "]");
-    end(t, form, at);
+    end_row(t, form, at);
 }
 
 /* --- rays and boxes --- */
@@ -271,7 +271,7 @@ static char *put_hit(char *at, answer_form form, const ebpo_ray_hit *hit)
     if (form == ANSWERS_RAW)
         return put_u64(put_u64(put_double(at, hit->t), hit->face), (uint64_t)(int64_t)hit->side);
     bool json = form == ANSWERS_JSON;
-    char lead[2] = { json ? 0 : between(form), 0 };
+    char lead[2] = { json ? 0 : separator_of(form), 0 };
     at = json ? put_json_real(at, "{\"t\": ", hit->t) : number_write(at, hit->t);
     at = number_write_uint(put_text(at, json ? ", \"face\": " : lead), hit->face);
     return number_write_int(put_text(at, json ? ", \"side\": " : lead), hit->side);
@@ -306,7 +306,7 @@ void answers_ray_first(answer_text *t, answer_form form, const ebpo_ray *rays,
             at = put_model(at, form, &model[i]);
         if (none && form == ANSWERS_CSV)
             at = put_attributes(at, form, sampler, rays[i].origin, EBPO_NO_FACE);
-        end(t, form, at);
+        end_row(t, form, at);
     }
 }
 
@@ -315,9 +315,9 @@ void answers_ray_any(answer_text *t, answer_form form, const bool *any, uint64_t
     static const char *const words[2][2] = { { "no", "yes" }, { "false", "true" } };
     for (uint64_t i = 0; i < count; i++) {
         char *at = answer_text_room(t);
-        end(t, form,
-            form == ANSWERS_RAW ? put_u64(at, any[i])
-                                : put_text(at, words[form == ANSWERS_JSON][any[i]]));
+        end_row(t, form,
+                form == ANSWERS_RAW ? put_u64(at, any[i])
+                                    : put_text(at, words[form == ANSWERS_JSON][any[i]]));
     }
 }
 
@@ -332,7 +332,7 @@ static void begin_list(answer_text *t, answer_form form, uint64_t count)
 
 static void end_list(answer_text *t, answer_form form)
 {
-    end(t, form, put_text(answer_text_room(t), form == ANSWERS_JSON ? "]" : ""));
+    end_row(t, form, put_text(answer_text_room(t), form == ANSWERS_JSON ? "]" : ""));
 }
 
 /* Room for the next item of a list, with what is before it. */
@@ -342,7 +342,7 @@ static char *next_item(answer_text *t, answer_form form, bool first)
     if (form == ANSWERS_JSON)
         return put_text(at, first ? "" : ", ");
     if (form != ANSWERS_RAW)
-        *at++ = between(form);
+        *at++ = separator_of(form);
     return at;
 }
 
@@ -371,7 +371,7 @@ void answers_box(answer_text *t, answer_form form, const uint64_t *faces, uint64
 static char *put_names(char *at, answer_form form, const char *names)
 {
     for (; *names; names++)
-        *at++ = *names == ',' ? between(form) : *names;
+        *at++ = *names == ',' ? separator_of(form) : *names;
     return at;
 }
 
@@ -379,8 +379,8 @@ void answers_header(answer_text *t, answer_form form, const char *names, const c
 {
     char *at = put_names(answer_text_room(t), form, names);
     if (attributes) {
-        *at++ = between(form);
+        *at++ = separator_of(form);
         at = put_names(at, form, attributes);
     }
-    end(t, form, at);
+    end_row(t, form, at);
 }

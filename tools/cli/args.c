@@ -126,7 +126,7 @@ static const arg_option *find_letter(const arg_spec *spec, char letter)
 }
 
 /* An option that shares a beginning of at least three letters, for "did you mean". */
-static const char *resembling(const arg_spec *spec, const char *name)
+static const char *find_resembling(const arg_spec *spec, const char *name)
 {
     const char *best = NULL;
     size_t best_length = 2;
@@ -142,9 +142,9 @@ static const char *resembling(const arg_spec *spec, const char *name)
     return best;
 }
 
-static arg_result unknown(const arg_spec *spec, const char *shown, const char *name)
+static arg_result fail_unknown(const arg_spec *spec, const char *shown, const char *name)
 {
-    const char *near = resembling(spec, name);
+    const char *near = find_resembling(spec, name);
     if (near)
         return wrong(spec, "unknown option '%s'; did you mean '--%s'?", shown, near);
     return wrong(spec, "unknown option '%s'", shown);
@@ -159,7 +159,7 @@ typedef struct parser {
     void *values;
 } parser;
 
-static arg_result take(parser *p, const arg_option *o, const char *joined)
+static arg_result take_option(parser *p, const arg_option *o, const char *joined)
 {
     if (o == &help_option) {
         args_help(p->spec);
@@ -181,8 +181,8 @@ static arg_result take_long(parser *p)
     size_t length = strcspn(name, "=");
     const arg_option *o = find_long(p->spec, name, length);
     if (!o)
-        return unknown(p->spec, shown, name);
-    return take(p, o, name[length] ? name + length + 1 : NULL);
+        return fail_unknown(p->spec, shown, name);
+    return take_option(p, o, name[length] ? name + length + 1 : NULL);
 }
 
 /* -qh is -q -h; the rest after a letter with a value is the value. */
@@ -192,9 +192,9 @@ static arg_result take_letters(parser *p)
     for (const char *c = shown + 1; *c; c++) {
         const arg_option *o = find_letter(p->spec, *c);
         if (!o)
-            return unknown(p->spec, shown, c);
+            return fail_unknown(p->spec, shown, c);
         bool rest = o->kind != ARG_FLAG && c[1];
-        arg_result result = take(p, o, rest ? c + 1 : NULL);
+        arg_result result = take_option(p, o, rest ? c + 1 : NULL);
         if (result != ARGS_RUN || rest)
             return result;
     }

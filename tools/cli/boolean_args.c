@@ -14,7 +14,7 @@ typedef struct parsing {
     int depth;
 } parsing;
 
-static bool fail(const parsing *p, const char *what)
+static bool fail_here(const parsing *p, const char *what)
 {
     command_usage(p->name, "expression '%s', column %d: %s", p->text, (int)(p->at - p->text) + 1,
                   what);
@@ -23,10 +23,10 @@ static bool fail(const parsing *p, const char *what)
 
 static void skip_blanks(parsing *p) { p->at += strspn(p->at, " \t\r\n"); }
 
-static bool add(parsing *p, int32_t operation, uint32_t left, uint32_t right, uint32_t *number)
+static bool add_node(parsing *p, int32_t operation, uint32_t left, uint32_t right, uint32_t *number)
 {
     if (p->out->count == EBPO_BOOLEAN_NODES_MAX)
-        return fail(p, "too many operations");
+        return fail_here(p, "too many operations");
     *number = p->out->count++;
     p->out->node[*number] = (ebpo_boolean_node){ operation, left, right, 0 };
     return true;
@@ -39,23 +39,23 @@ static bool read_atom(parsing *p, uint32_t *number)
     skip_blanks(p);
     if (*p->at == '(') {
         if (++p->depth > DEEPEST)
-            return fail(p, "too many parentheses in each other");
+            return fail_here(p, "too many parentheses in each other");
         p->at++;
         if (!read_sum(p, number))
             return false;
         if (*p->at != ')')
-            return fail(p, "expected an operator or ')'");
+            return fail_here(p, "expected an operator or ')'");
         p->at++;
         p->depth--;
     } else if (*p->at >= 'A' && *p->at <= 'Z') {
         uint32_t operand = (uint32_t)(*p->at - 'A');
         if (operand >= p->operands)
-            return fail(p, "there is no such model");
+            return fail_here(p, "there is no such model");
         p->at++;
-        if (!add(p, EBPO_BOOLEAN_OPERAND, operand, 0, number))
+        if (!add_node(p, EBPO_BOOLEAN_OPERAND, operand, 0, number))
             return false;
     } else {
-        return fail(p, "expected a model (A, B, ...) or '('");
+        return fail_here(p, "expected a model (A, B, ...) or '('");
     }
     skip_blanks(p);
     return true;
@@ -68,7 +68,8 @@ static bool read_product(parsing *p, uint32_t *number)
         return false;
     while (*p->at == '&' || *p->at == '*') {
         p->at++;
-        if (!read_atom(p, &right) || !add(p, EBPO_BOOLEAN_INTERSECTION, *number, right, number))
+        if (!read_atom(p, &right) ||
+            !add_node(p, EBPO_BOOLEAN_INTERSECTION, *number, right, number))
             return false;
     }
     return true;
@@ -90,7 +91,7 @@ static bool read_sum(parsing *p, uint32_t *number)
         return false;
     while ((operation = operation_of(*p->at)) != EBPO_BOOLEAN_OPERAND) {
         p->at++;
-        if (!read_product(p, &right) || !add(p, operation, *number, right, number))
+        if (!read_product(p, &right) || !add_node(p, operation, *number, right, number))
             return false;
     }
     return true;
@@ -103,7 +104,7 @@ bool boolean_read(const char *name, const char *text, uint32_t operands, boolean
     out->count = 0;
     if (!read_sum(&p, &root))
         return false;
-    return *p.at == 0 || fail(&p, "expected an operator or the end");
+    return *p.at == 0 || fail_here(&p, "expected an operator or the end");
 }
 
 /* --- poses --- */

@@ -7,7 +7,7 @@
 
 #include "cli/words.h"
 
-static void newline(json *j)
+static void begin_line(json *j)
 {
     fputc('\n', j->out);
     for (int i = 0; i < j->depth; i++)
@@ -31,7 +31,7 @@ int json_utf8_length(const char *text)
     return bad ? 0 : length;
 }
 
-static void quoted(json *j, const char *text)
+static void print_quoted(json *j, const char *text)
 {
     fputc('"', j->out);
     for (const unsigned char *s = (const unsigned char *)text; *s;) {
@@ -50,23 +50,23 @@ static void quoted(json *j, const char *text)
 }
 
 /* Comma, new line and key before a value. */
-static void lead(json *j, const char *key)
+static void begin_value(json *j, const char *key)
 {
     if (j->depth) {
         if (j->filled[j->depth])
             fputc(',', j->out);
         j->filled[j->depth] = true;
-        newline(j);
+        begin_line(j);
     }
     if (key) {
-        quoted(j, key);
+        print_quoted(j, key);
         fputs(": ", j->out);
     }
 }
 
 static void open_level(json *j, const char *key, char open, char close)
 {
-    lead(j, key);
+    begin_value(j, key);
     assert(j->depth + 1 < JSON_DEPTH);
     fputc(open, j->out);
     j->depth++;
@@ -97,7 +97,7 @@ void json_end(json *j)
     bool filled = j->filled[j->depth];
     j->depth--;
     if (filled)
-        newline(j);
+        begin_line(j);
     fputc(close, j->out);
 }
 
@@ -110,44 +110,44 @@ void json_finish(json *j)
 
 void json_text(json *j, const char *key, const char *text)
 {
-    lead(j, key);
-    quoted(j, text);
+    begin_value(j, key);
+    print_quoted(j, text);
 }
 
 void json_uint(json *j, const char *key, uint64_t v)
 {
-    lead(j, key);
+    begin_value(j, key);
     fprintf(j->out, "%llu", (unsigned long long)v);
 }
 
 void json_int(json *j, const char *key, int64_t v)
 {
-    lead(j, key);
+    begin_value(j, key);
     fprintf(j->out, "%lld", (long long)v);
 }
 
 void json_real(json *j, const char *key, double v)
 {
     char text[32];
-    lead(j, key);
+    begin_value(j, key);
     fputs(json_number(v, text), j->out);
 }
 
 void json_bool(json *j, const char *key, bool v)
 {
-    lead(j, key);
+    begin_value(j, key);
     fputs(v ? "true" : "false", j->out);
 }
 
 void json_null(json *j, const char *key)
 {
-    lead(j, key);
+    begin_value(j, key);
     fputs("null", j->out);
 }
 
 void json_reals(json *j, const char *key, const double *v, int count)
 {
-    lead(j, key);
+    begin_value(j, key);
     fputc('[', j->out);
     for (int i = 0; i < count; i++)
         fprintf(j->out, "%s%s", i ? ", " : "", json_number(v[i], (char[32]){ 0 }));

@@ -4,7 +4,7 @@
 
 #include "cli/words.h"
 
-static void parts(FILE *out, const ebpo_model_plan *p)
+static void print_parts(FILE *out, const ebpo_model_plan *p)
 {
     char top[40], chunks[40], skeletons[40], subtree[40];
     fprintf(out, "          levels 0 to %d stay, %s; %" PRIu64 " subtrees below, %s the average\n",
@@ -25,7 +25,7 @@ void memory_facts(FILE *out, const ebpo_model_plan *p)
             p->budget ? words_bytes(budget, sizeof budget, p->budget) : "no budget",
             p->resident ? "everything" : "not everything");
     if (!p->resident)
-        parts(out, p);
+        print_parts(out, p);
     fprintf(out, "          everything takes up to %s, the least that does is about %s\n",
             words_bytes(whole, sizeof whole, p->whole), words_bytes(least, sizeof least, p->least));
 }

@@ -109,7 +109,7 @@ static void print_reading(FILE *out, const ebpo_mesh *mesh)
                 words_plural(text, sizeof text, mesh->polygons_dropped, "polygon", "polygons"));
 }
 
-static const char *kind(const ebpo_mesh_report *report)
+static const char *kind_of_mesh(const ebpo_mesh_report *report)
 {
     if (!report->balanced)
         return "a surface: its edges do not balance, so there is no inside";
@@ -193,7 +193,7 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
         fprintf(out, " (%s, %s, %s)", mesh->source_format,
                 words_bytes(bytes, sizeof bytes, mesh->source_size),
                 mesh->xyz32 ? "float" : "double");
-    fprintf(out, "\n  %s\n", kind(report));
+    fprintf(out, "\n  %s\n", kind_of_mesh(report));
     fprintf(out, "  %s",
             words_plural(parts, sizeof parts, report->components, "component", "components"));
     if (report->boundary_loops)

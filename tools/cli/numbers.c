@@ -66,7 +66,7 @@ static char *digits_of(char *out, double v)
 #define digits_of number_charconv_digits
 #endif
 
-static char *zeros(char *out, int count)
+static char *put_zeros(char *out, int count)
 {
     if (count > 0)
         memset(out, '0', (size_t)count);
@@ -78,10 +78,10 @@ static char *write_fixed(char *out, const char *digits, int count, int exponent)
 {
     int whole = exponent < 0 ? 0 : exponent + 1 < count ? exponent + 1 : count;
     memcpy(out, digits, (size_t)whole);
-    out = zeros(out + whole, exponent < 0 ? 1 : exponent + 1 - count);
+    out = put_zeros(out + whole, exponent < 0 ? 1 : exponent + 1 - count);
     if (whole < count) {
         *out++ = '.';
-        out = zeros(out, -exponent - 1);
+        out = put_zeros(out, -exponent - 1);
         memcpy(out, digits + whole, (size_t)(count - whole));
         out += count - whole;
     }

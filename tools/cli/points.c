@@ -17,7 +17,7 @@
 
 /* --- opening --- */
 
-static bool cannot(points *p, const char *what, int number)
+static bool fail_input(points *p, const char *what, int number)
 {
     fprintf(stderr, "ebpo %s: %s: %s%s%s\n", p->command, p->name, what, number ? ": " : "",
             number ? strerror(number) : "");
@@ -51,14 +51,14 @@ bool points_open_shard(points *p, const char *by, const char *path, points_kind 
     if (!standard)
         p->fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
     if (p->fd < 0)
-        return cannot(p, "cannot be opened", errno);
+        return fail_input(p, "cannot be opened", errno);
     off_t at = lseek(p->fd, 0, SEEK_CUR);
     if (at >= 0 && fstat(p->fd, &st) == 0 && S_ISREG(st.st_mode) && st.st_size > at)
         p->bytes_total = (uint64_t)(st.st_size - at);
     p->rows_known = raw && p->bytes_total;
     p->rows_total = p->bytes_total / (8 * (uint64_t)p->layout.per_row);
     p->rest = malloc(p->rest_capacity + 1);
-    return p->rest || cannot(p, "not enough memory", 0);
+    return p->rest || fail_input(p, "not enough memory", 0);
 }
 
 void points_close(points *p)
@@ -169,7 +169,7 @@ static void take_held(points *p, points_block *b)
     p->held_at += b->row_count;
 }
 
-static void begin(points *p, points_block *b)
+static void begin_input(points *p, points_block *b)
 {
     if (!p->begun && !p->failed)
         p->ended |= !points_recognise(p, b);
@@ -178,7 +178,7 @@ static void begin(points *p, points_block *b)
 
 bool points_begin(points *p)
 {
-    begin(p, &p->batch);
+    begin_input(p, &p->batch);
     return !p->failed && points_pass(p, &p->batch);
 }
 
@@ -190,7 +190,7 @@ bool points_take(points *p, points_block *b)
     b->failed = false;
     b->first = !p->taken && !p->line_from;
     p->taken = true;
-    begin(p, b);
+    begin_input(p, b);
     if (b->failed || p->failed)
         return b->failed;
     if (p->held) {
@@ -217,7 +217,7 @@ bool points_take(points *p, points_block *b)
 /* --- in order --- */
 
 /* Places are told as people count: lines, or points from 1. */
-static void say(const points *p, const points_block *b)
+static void say_fault(const points *p, const points_block *b)
 {
     static const char *const names[] = { "point", "ray", "box" };
     fprintf(stderr, "ebpo %s: %s: ", p->command, p->name);
@@ -235,7 +235,7 @@ static void say(const points *p, const points_block *b)
 bool points_pass(points *p, points_block *b)
 {
     if (b->failed)
-        say(p, b);
+        say_fault(p, b);
     p->failed |= b->failed;
     p->line += b->lines;
     p->row += b->row_count;

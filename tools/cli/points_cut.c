@@ -11,7 +11,7 @@
 #include "cli/points.h"
 #include "cli/points_header.h"
 
-static bool wrong(points *p, const char *what)
+static bool fail_cut(points *p, const char *what)
 {
     fprintf(stderr, "ebpo %s: %s: %s\n", p->command, p->name, what);
     p->failed = true;
@@ -19,14 +19,14 @@ static bool wrong(points *p, const char *what)
 }
 
 /* From here on only bytes `from` to `to` of the file are taken. */
-static bool limit(points *p, uint64_t from, uint64_t to)
+static bool limit_bytes(points *p, uint64_t from, uint64_t to)
 {
     p->rest_count = 0;
     p->limited = true;
     p->bytes_left = p->bytes_total = to - from;
     p->bytes_taken = 0;
     p->ended = false;
-    return lseek(p->fd, (off_t)from, SEEK_SET) >= 0 || wrong(p, strerror(errno));
+    return lseek(p->fd, (off_t)from, SEEK_SET) >= 0 || fail_cut(p, strerror(errno));
 }
 
 /* --- numbers --- */
@@ -35,16 +35,16 @@ static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t numbe
 {
     uint64_t each = (uint64_t)(p->layout.per_row * p->layout.bytes), rows = (size - begin) / each;
     if (p->rows_told && (size - begin) / each != p->rows_total)
-        return wrong(p, rows > p->rows_total
-                            ? "holds more rows than its shape tells; it is something else"
-                            : "holds fewer rows than its shape tells; it is cut short");
+        return fail_cut(p, rows > p->rows_total
+                               ? "holds more rows than its shape tells; it is something else"
+                               : "holds fewer rows than its shape tells; it is cut short");
     uint64_t first = points_share(rows, number, of), end = points_share(rows, number + 1, of);
     p->row = first;
     p->rows_told = false; /* that was looked at here */
     p->rows_known = true;
     p->rows_total = end - first;
     /* what is left over behind the last row is told by the last part */
-    return limit(p, begin + first * each, number + 1 < of ? begin + end * each : size);
+    return limit_bytes(p, begin + first * each, number + 1 < of ? begin + end * each : size);
 }
 
 static bool cut_held(points *p, uint64_t number, uint64_t of)
@@ -71,7 +71,7 @@ static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
         if (got < 0 && errno == EINTR)
             continue;
         if (got < 0)
-            return wrong(p, strerror(errno)), UINT64_MAX;
+            return fail_cut(p, strerror(errno)), UINT64_MAX;
         const char *end = memchr(piece, '\n', (size_t)got);
         if (end)
             return from + (uint64_t)(end - piece) + 1;
@@ -88,14 +88,14 @@ static bool take_names(points *p, uint64_t begin, uint64_t *out)
 {
     points_block b = { .bytes = malloc(POINTS_LINE + 1), .first = true };
     ssize_t got = b.bytes ? pread(p->fd, b.bytes, POINTS_LINE, (off_t)begin) : -1;
-    bool fine = got >= 0 || wrong(p, b.bytes ? strerror(errno) : "not enough memory");
+    bool fine = got >= 0 || fail_cut(p, b.bytes ? strerror(errno) : "not enough memory");
     b.count = got > 0 ? (size_t)got : 0;
     if (fine && b.count > 0) {
         fine = points_take_header(p, &b);
         if (!fine)
             (void)points_pass(p, &b);
         else if (!p->fields && got == POINTS_LINE)
-            fine = wrong(p, "holds no line of names in its first bytes");
+            fine = fail_cut(p, "holds no line of names in its first bytes");
     }
     *out = begin + b.begin;
     points_block_free(&b);
@@ -115,7 +115,7 @@ static bool cut_text(points *p, uint64_t begin, uint64_t size, uint64_t number, 
     if (to == UINT64_MAX)
         return false;
     p->line_from = from;
-    return limit(p, from, number + 1 < of ? to : size);
+    return limit_bytes(p, from, number + 1 < of ? to : size);
 }
 
 /* --- all of them --- */
@@ -124,7 +124,7 @@ bool points_cut(points *p, uint64_t number, uint64_t of)
 {
     struct stat st = { .st_size = 0 };
     if (!p->held && (p->fd < 0 || fstat(p->fd, &st) != 0 || !S_ISREG(st.st_mode)))
-        return wrong(p, "is no file, of which a shard could take its part");
+        return fail_cut(p, "is no file, of which a shard could take its part");
     if (!points_begin(p))
         return false;
     if (p->held)

@@ -224,7 +224,7 @@ bool points_open_dataset(points *p, const char *path, uint64_t number, uint64_t 
 
 /* --- all of them --- */
 
-static bool begins(const points *p, const char *with, size_t count)
+static bool begins_with(const points *p, const char *with, size_t count)
 {
     return p->rest_count >= count && memcmp(p->rest, with, count) == 0;
 }
@@ -233,8 +233,8 @@ static bool begins(const points *p, const char *with, size_t count)
  * is about 1e219 or 1e243. */
 static bool begins_as_ply(const points *p)
 {
-    if (!begins(p, "ply\n", 4) && !begins(p, "ply\r", 4) &&
-        (p->raw || (!begins(p, "ply ", 4) && !begins(p, "ply\t", 4))))
+    if (!begins_with(p, "ply\n", 4) && !begins_with(p, "ply\r", 4) &&
+        (p->raw || (!begins_with(p, "ply ", 4) && !begins_with(p, "ply\t", 4))))
         return false;
     for (size_t i = 5; i < HEAD && p->raw; i++)
         if (i >= p->rest_count || p->rest[i] < 'a' || p->rest[i] > 'z')
@@ -274,13 +274,13 @@ static bool refuse_hdf5(points *p, points_block *b)
     return false;
 }
 
-static bool recognise(points *p, points_block *b)
+static bool recognise_format(points *p, points_block *b)
 {
-    if (begins(p, "\211HDF\r\n\032\n", HEAD))
+    if (begins_with(p, "\211HDF\r\n\032\n", HEAD))
         return refuse_hdf5(p, b);
-    if (begins(p, "\223NUMPY", 6))
+    if (begins_with(p, "\223NUMPY", 6))
         return read_npy(p, b);
-    if (!p->raw && begins(p, "\xef\xbb\xbf", 3)) /* byte order mark */
+    if (!p->raw && begins_with(p, "\xef\xbb\xbf", 3)) /* byte order mark */
         points_drop(p, 3);
     if (begins_as_ply(p) && !p->raw)
         return read_ply(p, b);
@@ -302,5 +302,5 @@ bool points_recognise(points *p, points_block *b)
             break;
         points_fill(p, b);
     }
-    return !b->failed && recognise(p, b);
+    return !b->failed && recognise_format(p, b);
 }

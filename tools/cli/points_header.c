@@ -12,7 +12,7 @@ static bool is_blank(char c)
 }
 
 /* Without blanks around it, and without quotes: `end` is where it goes to. */
-static char *trim(char *s, char *end)
+static char *trim_field(char *s, char *end)
 {
     while (s < end && is_blank(*s))
         s++;
@@ -46,7 +46,7 @@ int points_split(char separator, char *s, char *end, char *field[POINTS_FIELDS])
         if (!separator && s == end)
             break;
         char *stop = field_end(separator, s, end);
-        field[count++] = trim(s, stop);
+        field[count++] = trim_field(s, stop);
         if (stop == end)
             break;
         s = stop + 1;
@@ -80,7 +80,7 @@ static bool all_numbers(char **field, int fields)
 }
 
 /* By name; or the first ones, where there are not more than needed. */
-static bool choose(points *p, char **field, int fields)
+static bool choose_fields(points *p, char **field, int fields)
 {
     int needed = points_raw_width(p->kind), width = points_width(p->kind), found = 0;
     for (int i = 0; i < width; i++) {
@@ -128,7 +128,7 @@ bool points_take_header(points *p, points_block *b)
                             "holds numbers, which --header would take for names; leave --header "
                             "out, or put a line of names first");
     }
-    if (choose(p, field, fields)) {
+    if (choose_fields(p, field, fields)) {
         p->fields = fields;
         return true;
     }

@@ -43,7 +43,7 @@ static bool rows_room(const points *p, points_block *b, uint64_t rows)
 
 /* --- raw numbers --- */
 
-static double load(points_layout layout, const char *at)
+static double load_number(points_layout layout, const char *at)
 {
     uint64_t bits = 0;
     double v;
@@ -97,7 +97,7 @@ static void parse_numbers(const points *p, points_block *b)
         double *row = b->room + i * width;
         row[width - 1] = p->tmax;
         for (uint64_t k = 0; k < each; k++)
-            row[k] = load(p->layout, b->bytes + (i * each + k) * bytes);
+            row[k] = load_number(p->layout, b->bytes + (i * each + k) * bytes);
     }
     check_rows(p, b, count);
 }

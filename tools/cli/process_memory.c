@@ -30,7 +30,7 @@ static uint64_t taken_already(void)
 
 /* Stacks of threads count as a whole, though hardly any of each is used. So many threads; 0: one
  * for each core. */
-static uint64_t stacks(int64_t threads)
+static uint64_t bytes_of_stacks(int64_t threads)
 {
     struct rlimit stack;
     long cores = sysconf(_SC_NPROCESSORS_ONLN);
@@ -45,7 +45,7 @@ static uint64_t stacks(int64_t threads)
 static void limit_to(uint64_t bytes, int64_t threads, bool given)
 {
     struct rlimit limit;
-    uint64_t already = taken_already(), all = already + stacks(threads) + bytes;
+    uint64_t already = taken_already(), all = already + bytes_of_stacks(threads) + bytes;
     if (!already || all < bytes || getrlimit(RLIMIT_DATA, &limit) != 0)
         return;
     if (!given)

@@ -24,7 +24,7 @@ static void draw_rate(const progress_line *line, double speed, uint64_t total)
         fprintf(stderr, ", %s/s", words_count(rate, sizeof rate, speed));
 }
 
-static void draw(progress_line *line, double now, uint64_t done, uint64_t total)
+static void draw_line(progress_line *line, double now, uint64_t done, uint64_t total)
 {
     char count[32];
     double passed = now - line->begun, speed = passed > 0 ? (double)done / passed : 0;
@@ -74,7 +74,7 @@ static void begin_stage(progress_line *line, const char *stage, double now)
     line->last = 0;
 }
 
-static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
+static bool report_progress(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     progress_line *line = user;
     double now = progress_now();
@@ -84,7 +84,7 @@ static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
     }
     if (line->active && now - line->last > 0.1) {
         line->last = now;
-        draw(line, now, done, total);
+        draw_line(line, now, done, total);
     }
     return true;
 }
@@ -92,12 +92,12 @@ static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
 ebpo_progress progress_start(progress_line *line, const char *command, bool quiet)
 {
     *line = (progress_line){ .command = command, .active = !quiet && isatty(STDERR_FILENO) };
-    return (ebpo_progress){ report, line };
+    return (ebpo_progress){ report_progress, line };
 }
 
 void progress_tell(progress_line *line, const char *stage, uint64_t done, uint64_t total)
 {
-    (void)report(line, stage, done, total);
+    (void)report_progress(line, stage, done, total);
 }
 
 void progress_plan(progress_line *line, const int *plan, int count, const uint64_t *faces)

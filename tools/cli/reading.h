@@ -4,7 +4,7 @@
 
 #include <ebpo/file.h>
 
-static inline ebpo_read_options reading(int64_t threads, ebpo_workspace *workspace)
+static inline ebpo_read_options reading_options(int64_t threads, ebpo_workspace *workspace)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
     options.threads = (unsigned)threads;

@@ -44,13 +44,13 @@ static void clean_up(void)
         rmdir(folder);
 }
 
-static int failed(const char *command, const char *what)
+static int fail_stream(const char *command, const char *what)
 {
     fprintf(stderr, "ebpo %s: %s: %s\n", command, what, strerror(errno));
     return EXIT_FAILED;
 }
 
-static bool copy(int from, int to)
+static bool copy_stream(int from, int to)
 {
     static char piece[PIECE];
     for (;;) {
@@ -77,7 +77,7 @@ static int make_folder(const char *command)
     int length =
         snprintf(made, sizeof made, "%s/ebpo-XXXXXX", where && *where ? where : "/var/tmp");
     if (length >= (int)sizeof made || !mkdtemp(made))
-        return failed(command, "no temporary folder; set TMPDIR to one that can be written");
+        return fail_stream(command, "no temporary folder; set TMPDIR to one that can be written");
     snprintf(folder, sizeof folder, "%s", made);
     signals_scratch(clean_up);
     return EXIT_FINE;
@@ -92,11 +92,11 @@ static int take_input(const char *command, const char **operand)
         return code;
     snprintf(input, sizeof input, "%.*s/standard-input", PATH_MOST - 32, folder);
     int to = open(input, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-    bool fine = to >= 0 && copy(STDIN_FILENO, to);
+    bool fine = to >= 0 && copy_stream(STDIN_FILENO, to);
     if (to >= 0 && close(to) != 0)
         fine = false;
     *operand = input;
-    return fine ? EXIT_FINE : failed(command, "standard input, copied to a temporary file");
+    return fine ? EXIT_FINE : fail_stream(command, "standard input, copied to a temporary file");
 }
 
 static int take_output(const char *command, const char **operand)
@@ -110,7 +110,7 @@ static int take_output(const char *command, const char **operand)
     fflush(stdout);
     printed_to = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
     if (printed_to < 0 || dup2(STDERR_FILENO, STDOUT_FILENO) < 0)
-        return failed(command, "standard output");
+        return fail_stream(command, "standard output");
     *operand = output;
     return EXIT_FINE;
 }
@@ -155,8 +155,8 @@ int standard_files_end(const arg_spec *spec, int code)
     if (printed_to >= 0) {
         fflush(stdout);
         int from = code == EXIT_FINE ? open(output, O_RDONLY | O_CLOEXEC) : -1;
-        if (code == EXIT_FINE && (from < 0 || !copy(from, printed_to)))
-            code = failed(spec->command, "standard output");
+        if (code == EXIT_FINE && (from < 0 || !copy_stream(from, printed_to)))
+            code = fail_stream(spec->command, "standard output");
         if (from >= 0)
             close(from);
         dup2(printed_to, STDOUT_FILENO);

@@ -171,7 +171,8 @@ void textures_json(json *j, const textures *t)
 
 /* --- files --- */
 
-static ebpo_status fail(ebpo_error *error, ebpo_status status, const char *path, const char *what)
+static ebpo_status fail_file(ebpo_error *error, ebpo_status status, const char *path,
+                             const char *what)
 {
     error->status = status;
     snprintf(error->message, sizeof error->message, "%s: %s", path, what);
@@ -180,7 +181,7 @@ static ebpo_status fail(ebpo_error *error, ebpo_status status, const char *path,
 
 static ebpo_status fail_system(ebpo_error *error, const char *path)
 {
-    return fail(error, EBPO_E_IO, path, strerror(errno));
+    return fail_file(error, EBPO_E_IO, path, strerror(errno));
 }
 
 /* A name of this kind: words between slashes, none of which leads upwards. */
@@ -199,7 +200,7 @@ static bool leads_below(const char *name)
 }
 
 /* Slashes between words once only: materials double their backslashes. Nor words ".". */
-static void tidy(char *name)
+static void tidy_name(char *name)
 {
     char *to = name;
     for (const char *c = name; *c; c++) {
@@ -226,7 +227,7 @@ static char *safe_name(span s)
         good = (unsigned char)*c >= ' ' && *c != 127;
     }
     if (good)
-        tidy(name);
+        tidy_name(name);
     if (good && leads_below(name))
         return name;
     free(name);
@@ -319,19 +320,23 @@ static ebpo_status check_names(const textures *t, ebpo_error *error)
         char *name = safe_name(list_of(t, NAME, i)), *shown = text_of(list_of(t, NAME, i));
         ebpo_status status =
             name ? EBPO_OK
-                 : fail(error, EBPO_E_FORMAT, shown ? shown : "?",
-                        "an image's name that leads out of the folder; nothing was written");
+                 : fail_file(error, EBPO_E_FORMAT, shown ? shown : "?",
+                             "an image's name that leads out of the folder; nothing was written");
         free(name);
         free(shown);
         if (status != EBPO_OK)
             return status;
     }
     return kept ? EBPO_OK
-                : fail(error, EBPO_E_ABSENT, "no images",
-                       "the file has the bytes of none; ebpo convert --embed-textures keeps them");
+                : fail_file(
+                      error, EBPO_E_ABSENT, "no images",
+                      "the file has the bytes of none; ebpo convert --embed-textures keeps them");
 }
 
-static bool same(span a, span b) { return a.n == b.n && (!a.n || memcmp(a.s, b.s, a.n) == 0); }
+static bool spans_equal(span a, span b)
+{
+    return a.n == b.n && (!a.n || memcmp(a.s, b.s, a.n) == 0);
+}
 
 /* Whether a row before this one is the same image under the same name, written otherwise. */
 static bool is_again(const textures *t, uint64_t row)
@@ -339,7 +344,7 @@ static bool is_again(const textures *t, uint64_t row)
     char *name = safe_name(list_of(t, NAME, row));
     bool again = false;
     for (uint64_t i = 0; i < row && name && !again; i++) {
-        if (!is_kept(t, i) || !same(list_of(t, BYTES, i), list_of(t, BYTES, row)))
+        if (!is_kept(t, i) || !spans_equal(list_of(t, BYTES, i), list_of(t, BYTES, row)))
             continue;
         char *before = safe_name(list_of(t, NAME, i));
         again = before && strcmp(before, name) == 0;
@@ -356,7 +361,7 @@ static ebpo_status write_one(const textures *t, uint64_t row, int top, uint64_t 
     char *name = safe_name(list_of(t, NAME, row)), *shown = text_of(list_of(t, NAME, row));
     ebpo_status status = EBPO_OK;
     if (!name || !shown)
-        status = fail(error, EBPO_E_MEMORY, "no memory", "an image's name");
+        status = fail_file(error, EBPO_E_MEMORY, "no memory", "an image's name");
     else if (write_file(top, name, list_of(t, BYTES, row)))
         ++*written;
     else if (errno != EEXIST || !is_again(t, row))

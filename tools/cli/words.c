@@ -20,7 +20,7 @@ void words_init(void)
         selection_words[i] = ebpo_selection_describe((ebpo_selection)i)->name;
 }
 
-static char *scaled(char *out, size_t capacity, double v, const char *unit)
+static char *print_scaled(char *out, size_t capacity, double v, const char *unit)
 {
     static const char prefix[] = " kMGTPE";
     int i = 0;
@@ -35,7 +35,10 @@ static char *scaled(char *out, size_t capacity, double v, const char *unit)
     return out;
 }
 
-char *words_count(char *out, size_t capacity, double v) { return scaled(out, capacity, v, ""); }
+char *words_count(char *out, size_t capacity, double v)
+{
+    return print_scaled(out, capacity, v, "");
+}
 
 char *words_real(double x, char out[32])
 {
@@ -51,7 +54,7 @@ void words_print_reals(const double *v, int count, const char *between)
 
 char *words_bytes(char *out, size_t capacity, uint64_t bytes)
 {
-    return scaled(out, capacity, (double)bytes, "B");
+    return print_scaled(out, capacity, (double)bytes, "B");
 }
 
 char *words_plural(char *out, size_t capacity, uint64_t count, const char *one, const char *many)

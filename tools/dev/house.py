@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""How large functions and files are, for lib, tools and tests, and what is beyond the limits.
+"""Counts functions and files of lib, tools and tests, and names those beyond the limits.
 
     tools/dev/house.py [--json] [FOLDER...]
 
+Public headers (folders named include) are not counted as files. Short .c files need a reason.
 Lines of a function: from its name to its closing brace, comments within included. Functions are
 found by ctags (universal-ctags) where it is installed, else by the form that .clang-format gives
 them: a brace in the first column opens one and closes it. Exit code 1: something is beyond.
@@ -17,7 +18,7 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-LONGEST_FUNCTION, LONGEST_FILE = 60, 500
+LONGEST_FUNCTION, LONGEST_FILE, SHORTEST_FILE = 60, 900, 60
 
 
 def by_ctags(paths):
@@ -71,27 +72,35 @@ def survey(folder):
     paths = [pathlib.Path(n) for n in names if n.endswith((".c", ".h", ".inc", ".cpp", ".hpp"))]
     functions = list((by_ctags if has_ctags() else by_form)(paths))
     lines = {p: len((ROOT / p).read_text().splitlines()) for p in paths}
+    public = [p for p in paths if "include" in p.parts]
+    headers = [p for p in paths if p.suffix == ".h" and p not in public]
     return {
         "folder": folder,
         "functions": sizes(f[3] for f in functions),
-        "files": sizes(lines.values()),
+        "files": sizes(n for p, n in lines.items() if p not in public),
+        ".c files": sizes(n for p, n in lines.items() if p.suffix == ".c"),
+        "headers": sizes(lines[p] for p in headers),
         "long_functions": [{"where": f"{p}:{at}", "name": n, "lines": length}
                            for p, n, at, length in functions if length > LONGEST_FUNCTION],
-        "long_files": [{"where": str(p), "lines": n} for p, n in lines.items() if n > LONGEST_FILE],
+        "long_files": [{"where": str(p), "lines": n} for p, n in lines.items()
+                       if n > LONGEST_FILE and p not in public],
+        "short_files": [{"where": str(p), "lines": n} for p, n in lines.items()
+                        if n < SHORTEST_FILE and p.suffix == ".c"],
     }
 
 
 def table(found):
     print("| folder | what | count | median | 90 % | largest |\n|---|---|---|---|---|---|")
     for one in found:
-        for what in ("functions", "files"):
+        for what in ("functions", "files", ".c files", "headers"):
             s = one[what]
             print(f"| {one['folder']} | {what}, lines | {s['count']} | {s['median']} | "
                   f"{s['90%']} | {s['largest']} |")
-    for what, limit in (("functions", LONGEST_FUNCTION), ("files", LONGEST_FILE)):
-        beyond = sorted((x for one in found for x in one["long_" + what]),
-                        key=lambda x: -x["lines"])
-        print(f"\n{len(beyond)} {what} of more than {limit} lines")
+    for what, limit in (("long_functions", f"functions of more than {LONGEST_FUNCTION} lines"),
+                        ("long_files", f"files of more than {LONGEST_FILE} lines"),
+                        ("short_files", f".c files of less than {SHORTEST_FILE} lines")):
+        beyond = sorted((x for one in found for x in one[what]), key=lambda x: -x["lines"])
+        print(f"\n{len(beyond)} {limit}")
         for x in beyond:
             print(f"  {x['lines']:5}  {x['where']}  {x.get('name', '')}".rstrip())
 

@@ -58,7 +58,7 @@ static int fill_from_mesh(bench_points *out, ebpo_file *file, const bench_scene 
     return good ? EXIT_FINE : command_no_memory("bench");
 }
 
-static int fill(bench_points *out, ebpo_file *file, generator what, uint64_t seed)
+static int fill_rows(bench_points *out, ebpo_file *file, generator what, uint64_t seed)
 {
     const ebpo_mesh_report *report = &ebpo_file_info(file)->report;
     bench_scene scene;
@@ -78,8 +78,8 @@ static int fill(bench_points *out, ebpo_file *file, generator what, uint64_t see
     return EXIT_FINE;
 }
 
-static int generate(bench_points *out, const char *model, const remote_values *remote,
-                    generator what, uint64_t seed, double tmax)
+static int generate_rows(bench_points *out, const char *model, const remote_values *remote,
+                         generator what, uint64_t seed, double tmax)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
@@ -87,7 +87,7 @@ static int generate(bench_points *out, const char *model, const remote_values *r
     if (code == EXIT_FINE && remote_open(&file, model, remote, &error) != EBPO_OK)
         code = command_failed("bench", &error);
     if (code == EXIT_FINE)
-        code = fill(out, file, what, seed);
+        code = fill_rows(out, file, what, seed);
     if (code == EXIT_FINE && out->kind == POINTS_RAYS)
         for (uint64_t i = 0; i < out->count; i++)
             out->rows[7 * i + 6] = fmin(out->rows[7 * i + 6], tmax);
@@ -138,7 +138,7 @@ int bench_points_make(bench_points *out, points_kind kind, const char *model,
     if (by > PATH && by < NO_GENERATOR && kind != POINTS_RAYS)
         return command_usage("bench", "--points %s makes rays; add --query ray", what);
     if (by != NO_GENERATOR)
-        return generate(out, model, remote, by, seed, tmax);
+        return generate_rows(out, model, remote, by, seed, tmax);
     points in;
     out->count = 0;
     int code = EXIT_FAILED;

@@ -7,7 +7,7 @@
 
 enum { WIDTH = 7 };
 
-static double diagonal(const bench_scene *s)
+static double scene_diagonal(const bench_scene *s)
 {
     double square = 0;
     for (int k = 0; k < 3; k++)
@@ -48,7 +48,7 @@ void bench_rays_uniform(const bench_scene *s, uint64_t seed, uint64_t count, dou
 
 void bench_rays_segments(const bench_scene *s, uint64_t seed, uint64_t count, double *rows)
 {
-    double length = diagonal(s) / 20;
+    double length = scene_diagonal(s) / 20;
     bench_rays_uniform(s, seed, count, rows);
     for (double *row = rows; row < rows + WIDTH * count; row += WIDTH) {
         for (int k = 3; k < 6; k++)
@@ -74,7 +74,7 @@ static void make_across(const double along[3], double right[3], double up[3])
 
 void bench_rays_camera(const bench_scene *s, uint64_t seed, uint64_t count, double *rows)
 {
-    double along[3], right[3], up[3], size = diagonal(s);
+    double along[3], right[3], up[3], size = scene_diagonal(s);
     uint64_t side = (uint64_t)ceil(sqrt((double)count));
     random_direction(&seed, along);
     make_across(along, right, up);
@@ -125,7 +125,7 @@ void bench_rays_degenerate(const bench_scene *s, const ebpo_mesh *mesh, uint64_t
             memcpy(row, a, sizeof a);
         if (i % 4 == 3) {
             unsigned axis = (unsigned)(bench_random(&seed) % 3);
-            row[axis] = (float)(s->low[axis] - 0.1 * diagonal(s));
+            row[axis] = (float)(s->low[axis] - 0.1 * scene_diagonal(s));
             for (unsigned k = 0; k < 3; k++)
                 row[3 + k] = k == axis;
         }

@@ -128,7 +128,7 @@ ebpo_status bench_ask(const bench_job *job, ebpo_context *context, uint64_t numb
 }
 
 /* Of ascending times: the least one that no more than 1 - thousandths / 1000 of them exceed. */
-static uint64_t quantile(const uint64_t *sorted, uint64_t count, unsigned thousandths)
+static uint64_t time_quantile(const uint64_t *sorted, uint64_t count, unsigned thousandths)
 {
     uint64_t below = count / 1000 * thousandths + (count % 1000 * thousandths + 999) / 1000;
     return sorted[below ? below - 1 : 0];
@@ -154,9 +154,9 @@ ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t c
         sum += (double)job->ns[i];
     qsort(job->ns, job->count, sizeof *job->ns, compare_u64);
     out->mean = sum / (double)job->count;
-    out->p50 = quantile(job->ns, job->count, 500);
-    out->p99 = quantile(job->ns, job->count, 990);
-    out->p999 = quantile(job->ns, job->count, 999);
+    out->p50 = time_quantile(job->ns, job->count, 500);
+    out->p99 = time_quantile(job->ns, job->count, 990);
+    out->p999 = time_quantile(job->ns, job->count, 999);
     out->max = job->ns[job->count - 1];
     return EBPO_OK;
 }

@@ -30,40 +30,40 @@ double bench_random_unit(uint64_t *state) { return (double)(bench_random(state) 
 
 /* --- vectors --- */
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
+static void cross_product(const double a[3], const double b[3], double out[3])
 {
     out[0] = a[1] * b[2] - a[2] * b[1];
     out[1] = a[2] * b[0] - a[0] * b[2];
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-static void subtract(const double a[3], const double b[3], double out[3])
+static void subtract_vectors(const double a[3], const double b[3], double out[3])
 {
     for (int k = 0; k < 3; k++)
         out[k] = a[k] - b[k];
 }
 
 /* v += s w */
-static void add(double v[3], double s, const double w[3])
+static void add_scaled(double v[3], double s, const double w[3])
 {
     for (int k = 0; k < 3; k++)
         v[k] += s * w[k];
 }
 
 /* False when there is no direction. */
-static bool normalise(double v[3])
+static bool normalise_vector(double v[3])
 {
     double most = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
     if (!(most > 0) || !isfinite(most))
         return false;
     for (int k = 0; k < 3; k++)
         v[k] /= most; /* squares neither vanish nor overflow then */
-    double length = sqrt(dot(v, v));
+    double length = sqrt(dot_product(v, v));
     for (int k = 0; k < 3; k++)
         v[k] /= length;
     return true;
@@ -88,7 +88,7 @@ static bool index_vertices(walker *w)
     return true;
 }
 
-static void vertex(const ebpo_mesh *m, uint32_t number, double out[3])
+static void read_vertex(const ebpo_mesh *m, uint32_t number, double out[3])
 {
     for (int k = 0; k < 3; k++)
         out[k] = m->xyz32 ? (double)m->xyz32[3 * (uint64_t)number + (unsigned)k]
@@ -108,7 +108,7 @@ static int edge_corner(const ebpo_mesh *m, uint64_t face, uint32_t a, uint32_t b
 
 /* The face beyond the edge from a to b, the opposite one first; UINT64_MAX: there is none. `third`:
  * its other corner. */
-static uint64_t neighbour(const walker *w, uint32_t a, uint32_t b, uint32_t *third)
+static uint64_t find_neighbour(const walker *w, uint32_t a, uint32_t b, uint32_t *third)
 {
     for (int any = 0; any < 2; any++)
         for (uint64_t i = w->first[a]; i < w->first[a + 1]; i++) {
@@ -125,33 +125,33 @@ static uint64_t neighbour(const walker *w, uint32_t a, uint32_t b, uint32_t *thi
 /* --- the walk --- */
 
 /* False for a face without area. */
-static bool enter(walker *w, uint64_t face)
+static bool enter_face(walker *w, uint64_t face)
 {
     double e0[3], e1[3];
     w->face = face;
     for (int i = 0; i < 3; i++)
-        vertex(w->mesh, w->mesh->faces[3 * face + (unsigned)i], w->corner[i]);
-    subtract(w->corner[1], w->corner[0], e0);
-    subtract(w->corner[2], w->corner[0], e1);
-    cross(e0, e1, w->n);
-    return normalise(w->n);
+        read_vertex(w->mesh, w->mesh->faces[3 * face + (unsigned)i], w->corner[i]);
+    subtract_vectors(w->corner[1], w->corner[0], e0);
+    subtract_vectors(w->corner[2], w->corner[0], e1);
+    cross_product(e0, e1, w->n);
+    return normalise_vector(w->n);
 }
 
 /* To the middle of the face, along its first edge. */
-static void stand(walker *w)
+static void stand_on_face(walker *w)
 {
     for (int k = 0; k < 3; k++)
         w->p[k] = w->corner[0][k] / 3 + w->corner[1][k] / 3 + w->corner[2][k] / 3;
-    subtract(w->corner[1], w->corner[0], w->d);
-    normalise(w->d);
+    subtract_vectors(w->corner[1], w->corner[0], w->d);
+    normalise_vector(w->d);
 }
 
 /* To any face with an area; false when a thousand have none. */
-static bool land(walker *w)
+static bool land_anywhere(walker *w)
 {
     for (int i = 0; i < 1000; i++)
-        if (enter(w, bench_random(&w->random) % w->mesh->face_count)) {
-            stand(w);
+        if (enter_face(w, bench_random(&w->random) % w->mesh->face_count)) {
+            stand_on_face(w);
             return true;
         }
     return false;
@@ -159,88 +159,88 @@ static bool land(walker *w)
 
 /* How far the face's edge i is ahead; infinite when it is behind. `inward`: unit normal of the edge
  * in the plane. */
-static double ahead(const walker *w, int i, double inward[3])
+static double edge_distance(const walker *w, int i, double inward[3])
 {
     double edge[3], from[3];
-    subtract(w->corner[(i + 1) % 3], w->corner[i], edge);
-    cross(w->n, edge, inward);
-    if (!normalise(inward))
+    subtract_vectors(w->corner[(i + 1) % 3], w->corner[i], edge);
+    cross_product(w->n, edge, inward);
+    if (!normalise_vector(inward))
         return INFINITY;
-    subtract(w->p, w->corner[i], from);
-    double rate = dot(w->d, inward);
-    return rate < 0 ? fmax(0, dot(from, inward) / -rate) : INFINITY;
+    subtract_vectors(w->p, w->corner[i], from);
+    double rate = dot_product(w->d, inward);
+    return rate < 0 ? fmax(0, dot_product(from, inward) / -rate) : INFINITY;
 }
 
 /* Over the edge i as if the two faces lay in one plane; at the end of the surface, back. */
-static bool pass(walker *w, int i)
+static bool pass_edge(walker *w, int i)
 {
     const uint32_t *f = w->mesh->faces + 3 * w->face;
     uint32_t third = 0;
     double edge[3], inward[3];
-    uint64_t next = neighbour(w, f[i], f[(i + 1) % 3], &third);
+    uint64_t next = find_neighbour(w, f[i], f[(i + 1) % 3], &third);
     if (next == UINT64_MAX) {
-        ahead(w, i, inward);
-        add(w->d, -2 * dot(w->d, inward), inward);
-        return normalise(w->d);
+        edge_distance(w, i, inward);
+        add_scaled(w->d, -2 * dot_product(w->d, inward), inward);
+        return normalise_vector(w->d);
     }
     double origin[3] = { w->corner[i][0], w->corner[i][1], w->corner[i][2] };
-    subtract(w->corner[(i + 1) % 3], origin, edge);
-    if (!normalise(edge) || !enter(w, next))
-        return land(w);
-    vertex(w->mesh, third, inward);
-    subtract(inward, origin, inward);
-    add(inward, -dot(inward, edge), edge);
-    if (!normalise(inward))
-        return land(w);
-    double along = dot(w->d, edge), across = sqrt(fmax(0, 1 - along * along));
+    subtract_vectors(w->corner[(i + 1) % 3], origin, edge);
+    if (!normalise_vector(edge) || !enter_face(w, next))
+        return land_anywhere(w);
+    read_vertex(w->mesh, third, inward);
+    subtract_vectors(inward, origin, inward);
+    add_scaled(inward, -dot_product(inward, edge), edge);
+    if (!normalise_vector(inward))
+        return land_anywhere(w);
+    double along = dot_product(w->d, edge), across = sqrt(fmax(0, 1 - along * along));
     for (int k = 0; k < 3; k++)
         w->d[k] = along * edge[k] + across * inward[k];
-    return normalise(w->d) || land(w);
+    return normalise_vector(w->d) || land_anywhere(w);
 }
 
-static bool advance(walker *w, double left)
+static bool advance_walker(walker *w, double left)
 {
     for (int hop = 0; hop < HOPS_MAX; hop++) {
         int nearest = 0;
         double distance = INFINITY, ignored[3];
         for (int i = 0; i < 3; i++) {
-            double here = ahead(w, i, ignored);
+            double here = edge_distance(w, i, ignored);
             if (here < distance) {
                 distance = here;
                 nearest = i;
             }
         }
         double now = fmin(distance, left);
-        add(w->p, now, w->d);
+        add_scaled(w->p, now, w->d);
         left -= now;
         if (!(left > 0) || isinf(distance))
             return true;
-        if (!pass(w, nearest))
+        if (!pass_edge(w, nearest))
             return false;
     }
-    stand(w); /* round and round a vertex */
+    stand_on_face(w); /* round and round a vertex */
     return true;
 }
 
-static void turn(walker *w)
+static void turn_walker(walker *w)
 {
     double left[3], off[3];
     w->turn = 0.99 * w->turn + 0.0005 * (bench_random_unit(&w->random) - 0.5);
-    cross(w->n, w->d, left);
-    add(w->d, w->turn, left);
-    add(w->d, -dot(w->d, w->n), w->n);
-    if (!normalise(w->d))
-        stand(w);
-    subtract(w->p, w->corner[0], off);
-    add(w->p, -dot(off, w->n), w->n); /* back onto the face: rounding adds up */
+    cross_product(w->n, w->d, left);
+    add_scaled(w->d, w->turn, left);
+    add_scaled(w->d, -dot_product(w->d, w->n), w->n);
+    if (!normalise_vector(w->d))
+        stand_on_face(w);
+    subtract_vectors(w->p, w->corner[0], off);
+    add_scaled(w->p, -dot_product(off, w->n), w->n); /* back onto the face: rounding adds up */
     for (int k = 0; k < 3; k++)
         w->side[k] = 0.95 * w->side[k] + 0.05 * w->n[k];
-    if (!normalise(w->side))
+    if (!normalise_vector(w->side))
         memcpy(w->side, w->n, sizeof w->side);
 }
 
 /* Between -1 and 1, like a sine, with a period of 1. */
-static double wave(double phase)
+static double wave_height(double phase)
 {
     double x = 2 * phase - 1;
     return 4 * x * (1 - fabs(x));
@@ -252,14 +252,14 @@ bool bench_walk(const ebpo_mesh *mesh, double mean_edge, double diagonal, uint64
     walker w = { .mesh = mesh, .random = seed };
     double step = mean_edge > 0 ? mean_edge / 10 : diagonal / 1000;
     bool good = index_vertices(&w);
-    if (good && (good = land(&w)))
+    if (good && (good = land_anywhere(&w)))
         memcpy(w.side, w.n, sizeof w.side);
     for (uint64_t i = 0; i < count && good; i++) {
-        double swing = 0.01 * diagonal * wave((double)(i % SWING_STEPS) / SWING_STEPS);
+        double swing = 0.01 * diagonal * wave_height((double)(i % SWING_STEPS) / SWING_STEPS);
         for (int k = 0; k < 3; k++)
             out[3 * i + (unsigned)k] = w.p[k] + swing * w.side[k];
-        good = advance(&w, step);
-        turn(&w);
+        good = advance_walker(&w, step);
+        turn_walker(&w);
     }
     free(w.first);
     free(w.around);

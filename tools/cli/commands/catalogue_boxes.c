@@ -55,7 +55,7 @@ static bool morton_order(const double (*points)[3], size_t count, uint32_t *numb
 
 /* --- the tree --- */
 
-static closed_box around(const closed_box *boxes, size_t count)
+static closed_box box_around(const closed_box *boxes, size_t count)
 {
     closed_box all = boxes[0];
     for (size_t i = 1; i < count; i++)
@@ -102,8 +102,8 @@ bool catalogue_boxes_make(catalogue_boxes *t, const closed_box *boxes, const uin
         if (!box)
             return false;
         for (size_t i = 0; i < here; i++)
-            box[i] = around(t->box[t->levels - 1] + i * FAN,
-                            i + 1 < here ? (size_t)FAN : below - i * FAN);
+            box[i] = box_around(t->box[t->levels - 1] + i * FAN,
+                                i + 1 < here ? (size_t)FAN : below - i * FAN);
         t->count[t->levels] = here;
     }
     return true;
@@ -130,7 +130,7 @@ typedef struct walk {
     bool failed;
 } walk;
 
-static void append(walk *w, uint32_t box, double least)
+static void append_pair(walk *w, uint32_t box, double least)
 {
     box_pairs *o = w->out;
     if (o->count == o->capacity) {
@@ -147,32 +147,32 @@ static void append(walk *w, uint32_t box, double least)
 }
 
 /* At most BOX_LEVELS deep. */
-static void descend(walk *w, int level, size_t node) /* NOLINT(misc-no-recursion) */
+static void descend_tree(walk *w, int level, size_t node) /* NOLINT(misc-no-recursion) */
 {
     double least = 0;
     if (w->failed || !w->keep(w, &w->t->box[level][node], &least))
         return;
     if (level == 0) {
         if (w->out)
-            append(w, w->t->number[node], least);
+            append_pair(w, w->t->number[node], least);
         return;
     }
     size_t end = (node + 1) * FAN;
     end = end < w->t->count[level - 1] ? end : w->t->count[level - 1];
     for (size_t child = node * FAN; child < end; child++)
-        descend(w, level - 1, child);
+        descend_tree(w, level - 1, child);
 }
 
-static bool go(walk *w)
+static bool walk_tree(walk *w)
 {
     if (w->t->levels)
-        descend(w, w->t->levels - 1, 0);
+        descend_tree(w, w->t->levels - 1, 0);
     return !w->failed;
 }
 
 /* --- points --- */
 
-static bool holds(walk *w, const closed_box *b, double *least)
+static bool holds_point(walk *w, const closed_box *b, double *least)
 {
     (void)least;
     for (int k = 0; k < 3; k++)
@@ -184,19 +184,19 @@ static bool holds(walk *w, const closed_box *b, double *least)
 bool catalogue_boxes_holding(const catalogue_boxes *t, const double p[3], uint32_t item,
                              box_pairs *out)
 {
-    walk w = { .t = t, .p = p, .item = item, .out = out, .keep = holds };
-    return go(&w);
+    walk w = { .t = t, .p = p, .item = item, .out = out, .keep = holds_point };
+    return walk_tree(&w);
 }
 
 /* Also where squares are beyond doubles. */
-static double length(const double v[3]) { return hypot(hypot(v[0], v[1]), v[2]); }
+static double vector_length(const double v[3]) { return hypot(hypot(v[0], v[1]), v[2]); }
 
 static double least_length(const closed_box *b, const double p[3])
 {
     double v[3];
     for (int k = 0; k < 3; k++)
         v[k] = fmax(fmax(b->min[k] - p[k], p[k] - b->max[k]), 0);
-    return length(v);
+    return vector_length(v);
 }
 
 static double greatest_length(const closed_box *b, const double p[3])
@@ -204,7 +204,7 @@ static double greatest_length(const closed_box *b, const double p[3])
     double v[3];
     for (int k = 0; k < 3; k++)
         v[k] = fmax(b->max[k] - p[k], p[k] - b->min[k]);
-    return length(v);
+    return vector_length(v);
 }
 
 static bool may_be_near(walk *w, const closed_box *b, double *least)
@@ -226,10 +226,10 @@ bool catalogue_boxes_near(const catalogue_boxes *t, const double p[3], double mo
                           box_pairs *out)
 {
     walk w = { .t = t, .p = p, .reach = most, .item = item, .keep = comes_nearer };
-    (void)go(&w);
+    (void)walk_tree(&w);
     w.out = out;
     w.keep = may_be_near;
-    return go(&w);
+    return walk_tree(&w);
 }
 
 /* --- rays --- */
@@ -262,5 +262,5 @@ bool catalogue_boxes_on_ray(const catalogue_boxes *t, const double o[3], const d
         w.pad = fmax(w.pad, fabs(o[k]));
     }
     w.pad *= 2 * BOX_SLACK;
-    return go(&w);
+    return walk_tree(&w);
 }

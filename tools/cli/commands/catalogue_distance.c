@@ -21,8 +21,8 @@ static int nearest_first(const void *a, const void *b)
                                 : (x->box > y->box) - (x->box < y->box);
 }
 
-static ebpo_status take(const search *s, const model_run *run, const held_model *model,
-                        ebpo_distance_result *told, ebpo_error *error)
+static ebpo_status take_nearer(const search *s, const model_run *run, const held_model *model,
+                               ebpo_distance_result *told, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (size_t i = 0; i < run->count && status == EBPO_OK; i++) {
@@ -38,8 +38,8 @@ static ebpo_status take(const search *s, const model_run *run, const held_model 
     return status;
 }
 
-static ebpo_status ask(ebpo_context *context, const held_model *model, void *user,
-                       ebpo_error *error)
+static ebpo_status ask_distances(ebpo_context *context, const held_model *model, void *user,
+                                 ebpo_error *error)
 {
     const model_run *run = user;
     const search *s = run->user;
@@ -54,7 +54,7 @@ static ebpo_status ask(ebpo_context *context, const held_model *model, void *use
     o.unsigned_distance = true;
     ebpo_status status = ebpo_distance_many(context, run->rows, run->count, &o, told, error);
     if (status == EBPO_OK)
-        status = take(s, run, model, told, error);
+        status = take_nearer(s, run, model, told, error);
     free(told);
     return status;
 }
@@ -83,14 +83,14 @@ static ebpo_status ask_in_turn(search *s, size_t *begin, size_t points, ebpo_err
                 turn[i] = begin[i + 1]; /* boxes behind it are farther still */
             }
         }
-        status = catalogue_runs(s->m, &s->asks, s->points, 3, true, ask, s, error);
+        status = catalogue_runs(s->m, &s->asks, s->points, 3, true, ask_distances, s, error);
     } while (s->asks.count && status == EBPO_OK);
     free(turn);
     return status;
 }
 
 /* From `at` on, as many as there is room for; returns where it ended. */
-static ebpo_status stretch(search *s, uint64_t *at, uint64_t count, ebpo_error *error)
+static ebpo_status answer_stretch(search *s, uint64_t *at, uint64_t count, ebpo_error *error)
 {
     enum { POINTS_AT_A_TIME = 1 << 20 };
     uint64_t most = count - *at < POINTS_AT_A_TIME ? count - *at : POINTS_AT_A_TIME;
@@ -120,8 +120,8 @@ static ebpo_status stretch(search *s, uint64_t *at, uint64_t count, ebpo_error *
     return status;
 }
 
-static ebpo_status sign(catalogue_models *m, const double *points, uint64_t count,
-                        ebpo_distance_result *out, ebpo_error *error)
+static ebpo_status sign_distances(catalogue_models *m, const double *points, uint64_t count,
+                                  ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_inside_result *where = malloc(count * sizeof *where);
     ebpo_status status =
@@ -148,9 +148,9 @@ ebpo_status catalogue_distance(catalogue_models *m, const double *points, uint64
         model[i] = CATALOGUE_NO_MODEL;
     }
     for (uint64_t at = 0; at < count && status == EBPO_OK;)
-        status = stretch(&s, &at, count, error);
+        status = answer_stretch(&s, &at, count, error);
     free(s.near.pair);
     return status == EBPO_OK && count && !m->surface && !unsigned_distance
-               ? sign(m, points, count, out, error)
+               ? sign_distances(m, points, count, out, error)
                : status;
 }

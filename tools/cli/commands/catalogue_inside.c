@@ -8,8 +8,8 @@ typedef struct found {
     bool in, on;
 } found;
 
-static ebpo_status ask(ebpo_context *context, const held_model *model, void *user,
-                       ebpo_error *error)
+static ebpo_status ask_inside(ebpo_context *context, const held_model *model, void *user,
+                              ebpo_error *error)
 {
     const model_run *run = user;
     found *all = run->user;
@@ -38,7 +38,7 @@ static ebpo_status ask_all(catalogue_models *m, const double *points, uint64_t c
             if (!catalogue_boxes_holding(&m->all, points + 3 * at, (uint32_t)at, &pairs))
                 status = catalogue_no_memory(error);
         if (status == EBPO_OK)
-            status = catalogue_runs(m, &pairs, points, 3, false, ask, all, error);
+            status = catalogue_runs(m, &pairs, points, 3, false, ask_inside, all, error);
     }
     free(pairs.pair);
     return status;
@@ -53,8 +53,8 @@ typedef struct doubtful {
     size_t count;
 } doubtful;
 
-static ebpo_status judge(catalogue_models *m, const double *points, doubtful *d, found *all,
-                         ebpo_error *error)
+static ebpo_status judge_doubtful(catalogue_models *m, const double *points, doubtful *d,
+                                  found *all, ebpo_error *error)
 {
     ebpo_status status = catalogue_on_surface(m, points, d->number, d->count, d->real, error);
     size_t capped = 0;
@@ -90,7 +90,7 @@ static ebpo_status of_whole(catalogue_models *m, const double *points, uint64_t 
         for (uint64_t i = 0; i < count; i++)
             if (all[i].on)
                 d.number[d.count++] = (uint32_t)i;
-        status = judge(m, points, &d, all, error);
+        status = judge_doubtful(m, points, &d, all, error);
     }
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         found *f = &all[i];

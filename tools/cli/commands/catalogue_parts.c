@@ -85,7 +85,7 @@ static ebpo_status ask_rays(ebpo_context *context, const held_model *model, void
 }
 
 /* Numbers that look like chance (splitmix64), always the same ones. */
-static double between(uint64_t *state)
+static double next_random(uint64_t *state)
 {
     uint64_t z = *state += 0x9e3779b97f4a7c15;
     z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
@@ -144,7 +144,7 @@ ebpo_status catalogue_crossings(catalogue_models *m, const double *points, const
     for (size_t i = 0; fine && i < count; i++)
         place[i] = (uint32_t)i;
     for (int i = 0; i < DIRECTIONS && left && status == EBPO_OK; i++) {
-        double d[3] = { between(&state), between(&state), between(&state) };
+        double d[3] = { next_random(&state), next_random(&state), next_random(&state) };
         status = cast_all(m, rows, left, d, &c, error);
         if (status == EBPO_OK)
             left = keep_unknown(rows, place, left, &c, winding);

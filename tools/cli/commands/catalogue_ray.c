@@ -13,7 +13,7 @@ typedef struct search {
 
 /* Returns a ray whose direction is longer by a power of two, exactly, so that every hit's t is
  * finite. */
-static ebpo_ray longer(const ebpo_ray *ray)
+static ebpo_ray lengthen_ray(const ebpo_ray *ray)
 {
     enum { ENOUGH = 3 }; /* coordinates are at most 2^1025 apart */
     ebpo_ray out = *ray;
@@ -37,7 +37,7 @@ static ebpo_status is_nearer(const search *s, ebpo_context *context, const ebpo_
     *nearer = hit->t < kept->t;
     if (hit->face == EBPO_NO_FACE || hit->t < INFINITY)
         return EBPO_OK;
-    ebpo_ray along = longer(ray);
+    ebpo_ray along = lengthen_ray(ray);
     ebpo_ray_hit there;
     how.sides = s->sides;
     how.threads = 1;
@@ -50,8 +50,8 @@ static ebpo_status is_nearer(const search *s, ebpo_context *context, const ebpo_
 
 /* Asks one model. Models come in their order: of equal t the first one's stays. What is behind is
  * not looked for. */
-static ebpo_status ask(ebpo_context *context, const held_model *model, void *user,
-                       ebpo_error *error)
+static ebpo_status ask_rays(ebpo_context *context, const held_model *model, void *user,
+                            ebpo_error *error)
 {
     const model_run *run = user;
     const search *s = run->user;
@@ -98,8 +98,8 @@ ebpo_status catalogue_ray(catalogue_models *m, const ebpo_ray *rays, uint64_t co
                 status = catalogue_no_memory(error);
         }
         if (status == EBPO_OK)
-            status = catalogue_runs(m, &pairs, (const double *)(const void *)rays, 7, true, ask, &s,
-                                    error);
+            status = catalogue_runs(m, &pairs, (const double *)(const void *)rays, 7, true,
+                                    ask_rays, &s, error);
     }
     free(pairs.pair);
     free(s.far);

@@ -50,7 +50,7 @@ typedef struct reader {
     ebpo_error *error;
 } reader;
 
-static ebpo_status bad(const reader *r, const char *what)
+static ebpo_status fail_catalogue(const reader *r, const char *what)
 {
     return catalogue_fail(r->error, EBPO_E_FORMAT, r->c->path,
                           "not a catalogue: models[%" PRIu64 "]: %s", r->number, what);
@@ -78,7 +78,7 @@ static ebpo_status read_path(const reader *r, const json_t *model, const char *k
         return EBPO_OK;
     snprintf(what, sizeof what, "%s is no text", key);
     if (!json_is_string(value))
-        return bad(r, what);
+        return fail_catalogue(r, what);
     *out = path_of(r, json_string_value(value));
     return *out ? EBPO_OK : no_memory(r);
 }
@@ -95,7 +95,7 @@ static ebpo_status read_digest(const reader *r, const json_t *model, const char 
     }
     snprintf(what, sizeof what,
              "%s is no digest, without which another file would be taken for the model", key);
-    return bad(r, what);
+    return fail_catalogue(r, what);
 }
 
 static bool read_corner(const json_t *model, const char *key, double out[3])
@@ -113,10 +113,10 @@ static bool read_corner(const json_t *model, const char *key, double out[3])
 static ebpo_status read_box(const reader *r, const json_t *model, catalogue_entry *e)
 {
     if (!read_corner(model, "box_min", e->min) || !read_corner(model, "box_max", e->max))
-        return bad(r, "a box has two corners, box_min and box_max, of three numbers");
+        return fail_catalogue(r, "a box has two corners, box_min and box_max, of three numbers");
     for (int k = 0; k < 3; k++)
         if (e->min[k] > e->max[k])
-            return bad(r, "box_min is above box_max");
+            return fail_catalogue(r, "box_min is above box_max");
     return EBPO_OK;
 }
 
@@ -130,7 +130,7 @@ static ebpo_status read_paths(const reader *r, const json_t *model, catalogue_en
     if (status == EBPO_OK)
         status = read_path(r, model, "numbers", &e->numbers);
     if (status == EBPO_OK && !e->path)
-        return bad(r, "has no path");
+        return fail_catalogue(r, "has no path");
     e->unseen = json_is_null(json_object_get(model, "surface"));
     return status;
 }
@@ -139,14 +139,14 @@ static ebpo_status read_entry(const reader *r, const json_t *model, catalogue_en
 {
     const json_t *solid = json_object_get(model, "solid");
     if (!json_is_object(model))
-        return bad(r, "a model is an object");
+        return fail_catalogue(r, "a model is an object");
     ebpo_status status = read_paths(r, model, e);
     if (status == EBPO_OK)
         status = read_digest(r, model, "content_sha256", e->digest);
     if (status == EBPO_OK && e->surface)
         status = read_digest(r, model, "surface_sha256", e->surface_digest);
     if (status == EBPO_OK && !json_is_boolean(solid))
-        return bad(r, "solid is true or false");
+        return fail_catalogue(r, "solid is true or false");
     e->solid = json_is_true(solid);
     return status == EBPO_OK ? read_box(r, model, e) : status;
 }
@@ -206,7 +206,7 @@ static ebpo_status read_root(reader *r, const json_t *root)
     return read_models(r, root);
 }
 
-static ebpo_status parse(reader *r, const char *text, size_t size)
+static ebpo_status parse_catalogue(reader *r, const char *text, size_t size)
 {
     json_error_t why;
     json_t *root = json_loadb(text, size, JSON_DECODE_INT_AS_REAL, &why);
@@ -267,7 +267,7 @@ ebpo_status catalogue_read(const char *path, catalogue **out, ebpo_error *error)
                              : catalogue_fail(error, EBPO_E_MEMORY, path, "not enough memory");
     if (status == EBPO_OK) {
         c->hash = fnv1a(text, (size_t)c->bytes);
-        status = parse(&r, text, (size_t)c->bytes);
+        status = parse_catalogue(&r, text, (size_t)c->bytes);
     }
     free(text);
     free(r.folder);

@@ -28,7 +28,7 @@ static void place_json(json *j, const ebpo_crossing *c)
     json_end(j);
 }
 
-static bool take(void *user, const ebpo_crossing *crossings, uint64_t count)
+static bool take_crossing(void *user, const ebpo_crossing *crossings, uint64_t count)
 {
     places *p = user;
     progress_wipe(p->line);
@@ -97,7 +97,7 @@ ebpo_status check_crossings(ebpo_mesh *mesh, const ebpo_mesh_report *report,
         json_object(j, "crossings");
         json_array(j, "pairs");
     }
-    ebpo_status status = ebpo_mesh_crossings(mesh, report, options, take, &p, &sum, error);
+    ebpo_status status = ebpo_mesh_crossings(mesh, report, options, take_crossing, &p, &sum, error);
     progress_wipe(line);
     if (j)
         end_json(j, &sum, status == EBPO_OK);

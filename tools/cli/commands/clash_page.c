@@ -47,7 +47,7 @@ static double clash_depth(const ebpo_scene_meeting *m)
 }
 
 /* Below 0: the first is worse. */
-static int compare(const ebpo_scene_meeting *m, const ebpo_scene_meeting *n)
+static int compare_meetings(const ebpo_scene_meeting *m, const ebpo_scene_meeting *n)
 {
     if (rank_of(m) != rank_of(n))
         return rank_of(n) - rank_of(m);
@@ -66,7 +66,7 @@ static int compare_pairs(const void *p, const void *q)
 
 static int compare_clashes(const void *p, const void *q)
 {
-    int order = compare(&((const clash *)p)->worst, &((const clash *)q)->worst);
+    int order = compare_meetings(&((const clash *)p)->worst, &((const clash *)q)->worst);
     return order ? order : compare_pairs(p, q);
 }
 
@@ -87,7 +87,7 @@ static void note_again(clash *c, double time, const ebpo_scene_meeting *m)
 {
     c->frames++;
     c->last = time;
-    if (compare(m, &c->worst) < 0) {
+    if (compare_meetings(m, &c->worst) < 0) {
         c->worst = *m;
         c->time = time;
     }

@@ -35,8 +35,8 @@ static void look_at(camera *view, const double min[3], const double max[3], int 
     camera_fit(view, &box, azimuth, elevation, UP, WIDTH, height);
 }
 
-static ebpo_status draw(picture *out, int x, int y, int height, const camera *view,
-                        const painted_mesh *p, unsigned threads, ebpo_error *error)
+static ebpo_status draw_model(picture *out, int x, int y, int height, const camera *view,
+                              const painted_mesh *p, unsigned threads, ebpo_error *error)
 {
     raster_style style = { .colour = { 0.66, 0.54, 0.40 }, .paint = p->paint };
     unsigned count = threads && threads < THREADS_MOST ? threads : 4;
@@ -47,7 +47,7 @@ static ebpo_status draw(picture *out, int x, int y, int height, const camera *vi
 
 /* --- one clash --- */
 
-static void widen(double min[3], double max[3], const double p[3])
+static void widen_box(double min[3], double max[3], const double p[3])
 {
     for (int k = 0; k < 3; k++) {
         min[k] = fmin(min[k], p[k]);
@@ -55,7 +55,7 @@ static void widen(double min[3], double max[3], const double p[3])
     }
 }
 
-static double longest(const double min[3], const double max[3])
+static double longest_side(const double min[3], const double max[3])
 {
     return fmax(max[0] - min[0], fmax(max[1] - min[1], max[2] - min[2]));
 }
@@ -74,17 +74,18 @@ static ebpo_status find_region(const ebpo_scene *scene, const clash *c, double m
         if (status != EBPO_OK)
             return status;
     }
-    int small = longest(min[1], max[1]) < longest(min[0], max[0]);
-    double size = longest(min[small], max[small]), contact = longest(m->place_min, m->place_max);
+    int small = longest_side(min[1], max[1]) < longest_side(min[0], max[0]);
+    double size = longest_side(min[small], max[small]),
+           contact = longest_side(m->place_min, m->place_max);
     bool zoom = placed && m->crossing && contact > 0 && 8 * contact < size;
     const double *low = zoom ? m->place_min : min[small], *high = zoom ? m->place_max : max[small];
     if (placed) {
-        widen(min[small], max[small], m->place_min);
-        widen(min[small], max[small], m->place_max);
+        widen_box(min[small], max[small], m->place_min);
+        widen_box(min[small], max[small], m->place_max);
     }
     for (int k = 0; k < 3; k++)
         middle[k] = low[k] / 2 + high[k] / 2;
-    *reach = (zoom ? 4 : 0.6) * longest(low, high);
+    *reach = (zoom ? 4 : 0.6) * longest_side(low, high);
     return EBPO_OK;
 }
 
@@ -118,7 +119,7 @@ static ebpo_status draw_clash(const painted_mesh *p, const camera *view, clash *
     size_t size = 0;
     ebpo_status status = picture_make(&on, WIDTH, HEIGHT, ground) ? EBPO_OK : no_memory(error);
     if (status == EBPO_OK)
-        status = draw(&on, 0, 0, HEIGHT, view, p, threads, error);
+        status = draw_model(&on, 0, 0, HEIGHT, view, p, threads, error);
     if (status == EBPO_OK)
         status = picture_encode_png(on.rgb, WIDTH, HEIGHT, 3, "picture", &png, &size, error);
     if (status == EBPO_OK && !(c->picture = picture_data_uri(png, size)))
@@ -247,7 +248,8 @@ static ebpo_status draw_tile(clash_strip *s, const painted_mesh *p, double time,
     int x = s->done % s->columns * WIDTH, y = s->done / s->columns * HEIGHT;
     look_at(&view, s->min, s->max, HEIGHT - caption);
     s->done++;
-    ebpo_status status = draw(&s->picture, x, y, HEIGHT - caption, &view, p, s->threads, error);
+    ebpo_status status =
+        draw_model(&s->picture, x, y, HEIGHT - caption, &view, p, s->threads, error);
     snprintf(text, sizeof text, "time %.4g: %llu meet", time, (unsigned long long)count);
     if (status == EBPO_OK && caption)
         status =

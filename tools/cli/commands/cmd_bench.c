@@ -180,7 +180,8 @@ static int compare_answers(const bench_job *job, const void *batch)
     return EXIT_FINE;
 }
 
-static int measure(const bench_job *job, query_session *s, int repeat, void *batch, results *r)
+static int measure_rounds(const bench_job *job, query_session *s, int repeat, void *batch,
+                          results *r)
 {
     bench_figures f[REPEAT_MAX] = { { 0 } };
     ebpo_error error = EBPO_ERROR_INIT;
@@ -375,8 +376,8 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
 
 /* --- the command --- */
 
-static int bench(bench_job *job, const values *v, const bench_points *p, const char *path,
-                 const ebpo_model_options *holding, void *batch)
+static int bench_model(bench_job *job, const values *v, const bench_points *p, const char *path,
+                       const ebpo_model_options *holding, void *batch)
 {
     results r = { .clock_ns = bench_clock_cost(),
                   .model = EBPO_MODEL_STATS_INIT,
@@ -389,7 +390,7 @@ static int bench(bench_job *job, const values *v, const bench_points *p, const c
         code = query_open(&s, "bench", path, holding, job->inside.level, &v->q.remote);
     r.open_seconds = (double)(tool_clock() - begin) * 1e-9;
     if (code == EXIT_FINE)
-        code = measure(job, &s, (int)v->repeat, batch, &r);
+        code = measure_rounds(job, &s, (int)v->repeat, batch, &r);
     if (s.file)
         r.traffic = traffic_of(s.file);
     query_close(&s);
@@ -404,7 +405,7 @@ static int bench(bench_job *job, const values *v, const bench_points *p, const c
     return EXIT_FINE;
 }
 
-static int prepare(const values *v, const char *path, bench_points *p)
+static int prepare_points(const values *v, const char *path, bench_points *p)
 {
     points_kind kind = v->query >= BENCH_RAY ? POINTS_RAYS : POINTS;
     *p = (bench_points){ .rows = NULL };
@@ -418,7 +419,7 @@ static const values usual = {
     .q = QUERY_VALUES_INIT, .points = "uniform", .seed = -1, .repeat = 1
 };
 
-static int run(void *given, const char **operand)
+static int run_bench(void *given, const char **operand)
 {
     values *v = given;
     ebpo_model_options holding;
@@ -429,7 +430,7 @@ static int run(void *given, const char **operand)
         return EXIT_USAGE;
     if (v->seed < 0)
         v->seed = 1;
-    int code = prepare(v, operand[0], &p);
+    int code = prepare_points(v, operand[0], &p);
     job.query = (bench_query)v->query;
     job.rows = p.rows;
     job.width = points_width(p.kind);
@@ -443,7 +444,7 @@ static int run(void *given, const char **operand)
         code = command_no_memory("bench");
     }
     if (code == EXIT_FINE)
-        code = bench(&job, v, &p, operand[0], &holding, batch);
+        code = bench_model(&job, v, &p, operand[0], &holding, batch);
     free(batch);
     free(job.answers);
     free(job.ns);
@@ -451,4 +452,4 @@ static int run(void *given, const char **operand)
     return code;
 }
 
-const command command_bench = { &spec, sizeof usual, &usual, run };
+const command command_bench = { &spec, sizeof usual, &usual, run_bench };

@@ -252,8 +252,8 @@ static int ask_points(const values *v, ebpo_boolean *b)
 
 /* --- cells --- */
 
-static ebpo_status convert(ebpo_mesh *mesh, const values *v, ebpo_progress progress,
-                           ebpo_error *error)
+static ebpo_status convert_cells(ebpo_mesh *mesh, const values *v, ebpo_progress progress,
+                                 ebpo_error *error)
 {
     ebpo_prepared prepared = EBPO_PREPARED_INIT;
     ebpo_prepare_options preparing = EBPO_PREPARE_OPTIONS_INIT;
@@ -291,7 +291,7 @@ static ebpo_status write_cells(const ebpo_boolean_cells *cells, cell_answer *a,
     } else if (words_end_with(v->out, ".ply")) {
         status = ebpo_mesh_write_ply(&mesh, v->out, error);
     } else {
-        status = convert(&mesh, v, progress, error);
+        status = convert_cells(&mesh, v, progress, error);
     }
     ebpo_mesh_free(&mesh);
     return status;
@@ -367,8 +367,9 @@ static int check_values(const values *v, const char **models, uint32_t count)
     return EXIT_FINE;
 }
 
-static int answer(const values *v, const boolean_nodes *nodes, const query_session *sessions,
-                  const ebpo_pose *poses, const char **models, uint32_t count)
+static int answer_expression(const values *v, const boolean_nodes *nodes,
+                             const query_session *sessions, const ebpo_pose *poses,
+                             const char **models, uint32_t count)
 {
     ebpo_boolean_operand operands[MODELS];
     ebpo_boolean *b;
@@ -386,7 +387,7 @@ static int answer(const values *v, const boolean_nodes *nodes, const query_sessi
 
 static const values usual = { .query = QUERY_VALUES_INIT, .level = 6, .tolerance = 0.01 };
 
-static int run(void *given, const char **operand)
+static int run_boolean(void *given, const char **operand)
 {
     const values *v = given;
     boolean_nodes nodes;
@@ -409,10 +410,10 @@ static int run(void *given, const char **operand)
     for (uint32_t i = 0; i < count && code == EXIT_FINE; i++)
         code = query_open(&sessions[i], "boolean", models[i], &holding, -1, &v->query.remote);
     if (code == EXIT_FINE)
-        code = answer(v, &nodes, sessions, poses, models, count);
+        code = answer_expression(v, &nodes, sessions, poses, models, count);
     for (uint32_t i = 0; i < count; i++)
         query_close(&sessions[i]);
     return code;
 }
 
-const command command_boolean = { &spec, sizeof usual, &usual, run };
+const command command_boolean = { &spec, sizeof usual, &usual, run_boolean };

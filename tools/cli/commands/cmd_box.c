@@ -7,8 +7,8 @@
 
 #include "cli/options/box.inc"
 
-static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
-                          ebpo_error *error)
+static ebpo_status answer_boxes(const query_job *job, query_worker *w, const double *rows,
+                                uint64_t count, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK && !answer_text_is_over(w->text); i++) {
@@ -22,13 +22,13 @@ static ebpo_status answer(const query_job *job, query_worker *w, const double *r
     return status;
 }
 
-static const char *columns(const query_job *job)
+static const char *box_columns(const query_job *job)
 {
     (void)job;
     return "count,faces";
 }
 
-static const char *dtype(const query_job *job, unsigned *bytes)
+static const char *box_dtype(const query_job *job, unsigned *bytes)
 {
     (void)job;
     *bytes = 0;
@@ -37,17 +37,17 @@ static const char *dtype(const query_job *job, unsigned *bytes)
 
 static const query_values usual = QUERY_VALUES_INIT;
 
-static int run(void *given, const char **operand)
+static int run_box(void *given, const char **operand)
 {
     query_values *v = given;
     query_job job = { .command = "box",
                       .values = v,
                       .kind = POINTS_BOXES,
                       .parts_share = 0.25, /* docs/measured/asking.md */
-                      .answer = answer,
-                      .columns = columns,
-                      .dtype = dtype };
+                      .answer = answer_boxes,
+                      .columns = box_columns,
+                      .dtype = box_dtype };
     return query_run(&job, operand[0], operand[1]);
 }
 
-const command command_box = { &spec, sizeof usual, &usual, run };
+const command command_box = { &spec, sizeof usual, &usual, run_box };

@@ -129,7 +129,7 @@ static void look_at(catalogue *c, size_t number)
     free(name);
 }
 
-static void *work(void *user)
+static void *look_at_files(void *user)
 {
     catalogue *c = user;
     pthread_mutex_lock(&c->lock);
@@ -159,9 +159,9 @@ static bool look_at_all(catalogue *c)
     if (!c->entry)
         return false;
     pthread_mutex_init(&c->lock, NULL);
-    while (started + 1 < wanted && command_thread(&thread[started], work, c) == 0)
+    while (started + 1 < wanted && command_thread(&thread[started], look_at_files, c) == 0)
         started++;
-    work(c);
+    look_at_files(c);
     while (started > 0)
         pthread_join(thread[--started], NULL);
     pthread_mutex_destroy(&c->lock);
@@ -366,7 +366,7 @@ static bool overwrites_model(const catalogue *c, int *code)
     return false;
 }
 
-static int make(catalogue *c)
+static int make_catalogue(catalogue *c)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     if (!folder_files_find(&c->files, "catalogue", c->folder))
@@ -397,7 +397,7 @@ static int make(catalogue *c)
     return left_out(c) ? EXIT_DIFFERS : EXIT_FINE;
 }
 
-static int run(void *given, const char **operand)
+static int run_catalogue(void *given, const char **operand)
 {
     const values *v = given;
     progress_line line;
@@ -413,7 +413,7 @@ static int run(void *given, const char **operand)
         c.out = strdup(v->out);
     else if (!folder || asprintf(&c.out, "%s/catalogue.json", folder) < 0)
         c.out = NULL;
-    int code = c.out ? make(&c) : command_no_memory("catalogue");
+    int code = c.out ? make_catalogue(&c) : command_no_memory("catalogue");
     for (size_t i = 0; c.entry && i < c.files.count; i++) {
         free(c.entry[i].why);
         free(c.entry[i].path);
@@ -427,4 +427,4 @@ static int run(void *given, const char **operand)
     return code;
 }
 
-const command command_catalogue = { &spec, sizeof usual, &usual, run };
+const command command_catalogue = { &spec, sizeof usual, &usual, run_catalogue };

@@ -81,7 +81,7 @@ static void place_words(const ebpo_mesh_place *p)
     puts(p->face_count > FACES_SHOWN ? " ..." : "");
 }
 
-static bool take(void *user, const ebpo_mesh_place *p)
+static bool take_place(void *user, const ebpo_mesh_place *p)
 {
     telling *t = user;
     bool first = t->count[p->kind]++ == 0;
@@ -124,7 +124,7 @@ static ebpo_status check_places(const ebpo_mesh *mesh, const char *to, unsigned 
     t.words = !quiet && !how.ply;
     if (j)
         json_array(j, "places");
-    ebpo_status status = ebpo_mesh_places(mesh, &how, take, &t, NULL, error);
+    ebpo_status status = ebpo_mesh_places(mesh, &how, take_place, &t, NULL, error);
     progress_wipe(line);
     if (j)
         json_end(j);
@@ -191,8 +191,8 @@ static ebpo_status search_crossings(const values *v, mesh_input *p, ebpo_progres
 }
 #endif
 
-static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo_progress progress,
-                          progress_line *line, ebpo_error *error)
+static ebpo_status report_findings(const values *v, mesh_input *p, const char *path,
+                                   ebpo_progress progress, progress_line *line, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     json j;
@@ -220,8 +220,8 @@ static ebpo_status report(const values *v, mesh_input *p, const char *path, ebpo
     return status;
 }
 
-static ebpo_status check(const values *v, const char *path, mesh_input *p,
-                         ebpo_workspace *workspace, ebpo_error *error)
+static ebpo_status check_mesh(const values *v, const char *path, mesh_input *p,
+                              ebpo_workspace *workspace, ebpo_error *error)
 {
     progress_line line;
     ebpo_progress progress = progress_start(&line, "check", v->quiet);
@@ -232,14 +232,14 @@ static ebpo_status check(const values *v, const char *path, mesh_input *p,
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;
-    status = report(v, p, standard_files_shown(path), progress, &line, error);
+    status = report_findings(v, p, standard_files_shown(path), progress, &line, error);
     ebpo_mesh_free(&p->mesh);
     return status;
 }
 
 static const values usual = { 0 };
 
-static int run(void *given, const char **operand)
+static int run_check(void *given, const char **operand)
 {
     values *v = given;
     if (!memory_good("check", &v->memory) || mending_check("check", v->mend) != EXIT_FINE)
@@ -267,11 +267,11 @@ static int run(void *given, const char **operand)
     if (status == EBPO_OK)
         status = memory_make(&workspace, &v->memory, &error);
     if (status == EBPO_OK)
-        status = check(v, operand[0], &p, workspace, &error);
+        status = check_mesh(v, operand[0], &p, workspace, &error);
     ebpo_workspace_free(workspace);
     if (status != EBPO_OK)
         return command_failed("check", &error);
     return v->require_solid && p.doubts ? EXIT_NOT_SOLID : EXIT_FINE;
 }
 
-const command command_check = { &spec, sizeof usual, &usual, run };
+const command command_check = { &spec, sizeof usual, &usual, run_check };

@@ -466,7 +466,7 @@ static void tell_stats(const ebpo_collider *c, bool as_json)
                 (unsigned long long)s.loads, (unsigned long long)s.bytes_read);
 }
 
-static int ask(collide_values *v, ebpo_model *a, ebpo_model *b, ebpo_collide_options *how)
+static int ask_collider(collide_values *v, ebpo_model *a, ebpo_model *b, ebpo_collide_options *how)
 {
     ebpo_collider_options with = EBPO_COLLIDER_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -545,7 +545,7 @@ static int open_both(query_session *a, query_session *b, const collide_values *v
     return code;
 }
 
-static int run(void *given, const char **operand)
+static int run_collide(void *given, const char **operand)
 {
     collide_values *v = given;
     ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
@@ -578,7 +578,7 @@ static int run(void *given, const char **operand)
     setvbuf(stdout, NULL, _IOFBF, 1 << 18);
     int code = open_both(&a, &b, v, operand, &holding);
     if (code == EXIT_FINE)
-        code = ask(v, a.model, b.model ? b.model : a.model, &how);
+        code = ask_collider(v, a.model, b.model ? b.model : a.model, &how);
     query_close(&b);
     query_close(&a);
     ebpo_budget_free(holding.budget);
@@ -587,4 +587,4 @@ static int run(void *given, const char **operand)
 
 static const collide_values usual = { .query = QUERY_VALUES_INIT, .far = COLLIDE_FAR_INIT };
 
-const command command_collide = { &spec, sizeof usual, &usual, run };
+const command command_collide = { &spec, sizeof usual, &usual, run_collide };

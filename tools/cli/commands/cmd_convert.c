@@ -255,12 +255,12 @@ static int check_values(const values *v, const char *in, const char *out)
     return EXIT_FINE;
 }
 
-static bool judges(const values *v) { return v->max_error > 0 || v->target_size; }
+static bool judges_file(const values *v) { return v->max_error > 0 || v->target_size; }
 
 static int check_need(const values *v, ebpo_subset_options *need)
 {
     int code = subset_need("convert", v->max_error, v->target_size, need);
-    if (code == EXIT_FINE && judges(v) && v->without & EBPO_PART_MESH)
+    if (code == EXIT_FINE && judges_file(v) && v->without & EBPO_PART_MESH)
         return command_usage("convert",
                              "--max-error and --target-size measure against the mesh; leave it out "
                              "with --profile lod instead of --without mesh");
@@ -401,7 +401,7 @@ typedef struct part_build {
 static ebpo_status part_fits(void *user, uint64_t faces, ebpo_error *error)
 {
     const part_build *b = user;
-    return judges(b->v) ? room_to_judge(b->v, faces, b->in, b->workspace, error) : EBPO_OK;
+    return judges_file(b->v) ? room_to_judge(b->v, faces, b->in, b->workspace, error) : EBPO_OK;
 }
 
 static ebpo_status build_part(void *user, mesh_input *part, const char *path,
@@ -412,7 +412,7 @@ static ebpo_status build_part(void *user, mesh_input *part, const char *path,
     return build_and_write(b->v, part, path, b->need, progress, &times, error);
 }
 
-static bool splits(const values *v) { return v->split_components || v->split_groups; }
+static bool splits_mesh(const values *v) { return v->split_components || v->split_groups; }
 
 static ebpo_status build_parts(part_build *build, mesh_input *p, const char *folder,
                                const ebpo_mesh_groups *groups, progress_line *line,
@@ -444,7 +444,7 @@ static stage_facts plan_stages(const values *v, const char *in)
                           .solid = true,
                           .from_leaves =
                               ebpo_selection_describe((ebpo_selection)v->select)->from_leaves,
-                          .judged = judges(v),
+                          .judged = judges_file(v),
                           .leaf_planes = parts_of(v) & EBPO_PART_LEAF_PLANES,
                           .times = EBPO_BUILD_TIMES_INIT };
 }
@@ -458,8 +458,8 @@ static const values usual = { .max_level = -1,
                               .seed = -1 };
 
 /* What was read is not what may be built. */
-static ebpo_status refuse(const values *v, const mesh_input *p, const char *in,
-                          const ebpo_workspace *workspace, ebpo_error *error)
+static ebpo_status refuse_mesh(const values *v, const mesh_input *p, const char *in,
+                               const ebpo_workspace *workspace, ebpo_error *error)
 {
     if (v->require_solid && !v->split_groups && p->doubts) {
         snprintf(error->message, sizeof error->message,
@@ -468,8 +468,9 @@ static ebpo_status refuse(const values *v, const mesh_input *p, const char *in,
                                              : "probably not the solid that was meant");
         return error->status = EBPO_E_NOT_SOLID;
     }
-    return judges(v) && !splits(v) ? room_to_judge(v, p->mesh.face_count, in, workspace, error)
-                                   : EBPO_OK;
+    return judges_file(v) && !splits_mesh(v)
+               ? room_to_judge(v, p->mesh.face_count, in, workspace, error)
+               : EBPO_OK;
 }
 
 static ebpo_status no_groups(const char *in, ebpo_error *error)
@@ -482,9 +483,9 @@ static ebpo_status no_groups(const char *in, ebpo_error *error)
     return error->status;
 }
 
-static ebpo_status convert(const values *v, const char *in, const char *out,
-                           const ebpo_subset_options *need, ebpo_workspace *workspace,
-                           ebpo_error *error)
+static ebpo_status convert_mesh(const values *v, const char *in, const char *out,
+                                const ebpo_subset_options *need, ebpo_workspace *workspace,
+                                ebpo_error *error)
 {
     progress_line line;
     ebpo_progress progress = progress_start(&line, "convert", v->quiet);
@@ -492,7 +493,7 @@ static ebpo_status convert(const values *v, const char *in, const char *out,
     int plan[STAGE_PLAN_MAX];
     mesh_input p = { .mesh = { 0 } };
     ebpo_mesh_groups *groups = NULL;
-    if (!splits(v))
+    if (!splits_mesh(v))
         progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
     double begun = progress_now();
     ebpo_status status =
@@ -504,10 +505,10 @@ static ebpo_status convert(const values *v, const char *in, const char *out,
     p.rule = (ebpo_rule)v->rule;
     convert_told told = told_of(v, in, out);
     convert_tell_mesh(&told, &p);
-    status = refuse(v, &p, in, workspace, error);
+    status = refuse_mesh(v, &p, in, workspace, error);
     if (status == EBPO_OK && v->split_groups && !groups)
         status = no_groups(in, error);
-    if (status == EBPO_OK && splits(v)) {
+    if (status == EBPO_OK && splits_mesh(v)) {
         part_build build = { v, need, in, workspace };
         status = build_parts(&build, &p, out, groups, &line, progress, begun, error);
         ebpo_mesh_groups_free(groups);
@@ -528,7 +529,7 @@ static ebpo_status convert(const values *v, const char *in, const char *out,
                : status;
 }
 
-static int run(void *given, const char **operand)
+static int run_convert(void *given, const char **operand)
 {
     const ebpo_build_options defaults = EBPO_BUILD_OPTIONS_INIT;
     ebpo_subset_options need = EBPO_SUBSET_OPTIONS_INIT;
@@ -542,15 +543,15 @@ static int run(void *given, const char **operand)
         code = check_need(v, &need);
     if (code != EXIT_FINE)
         return code;
-    ebpo_status status = splits(v) ? parts_begin(operand[1], v->split_groups, &error)
-                                   : ebpo_check_output(operand[1], &error);
+    ebpo_status status = splits_mesh(v) ? parts_begin(operand[1], v->split_groups, &error)
+                                        : ebpo_check_output(operand[1], &error);
     if (status == EBPO_OK)
         status = memory_make(&workspace, &v->memory, &error);
     if (status == EBPO_OK)
-        status = convert(v, operand[0], operand[1], &need, workspace, &error);
+        status = convert_mesh(v, operand[0], operand[1], &need, workspace, &error);
     ebpo_workspace_free(workspace);
     parts_end();
     return status == EBPO_OK ? EXIT_FINE : command_failed("convert", &error);
 }
 
-const command command_convert = { &spec, sizeof usual, &usual, run };
+const command command_convert = { &spec, sizeof usual, &usual, run_convert };

@@ -9,7 +9,7 @@
 #include "cli/options/distance.inc"
 
 /* Then all that is certain is an interval. */
-static bool limited(const ebpo_distance_options *o)
+static bool is_limited(const ebpo_distance_options *o)
 {
     return o->mode == EBPO_DISTANCE_EXACT && (o->level >= 0 || o->deadline_ns);
 }
@@ -21,7 +21,7 @@ typedef struct listing {
     bool begun;
 } listing;
 
-static bool list(void *user, const ebpo_near_face *face)
+static bool list_face(void *user, const ebpo_near_face *face)
 {
     listing *l = user;
     answers_near(l->text, l->form, face, !l->begun, l->sampler);
@@ -38,7 +38,7 @@ static ebpo_status answer_lists(const query_job *job, query_worker *w, const dou
     o.most = (uint64_t)job->values->nearest;
     for (uint64_t i = 0; i < count && status == EBPO_OK && !answer_text_is_over(w->text); i++) {
         listing l = { job->sampler, w->text, job->form, false };
-        status = ebpo_distance_within(w->context, rows + 3 * i, &o, list, &l, error);
+        status = ebpo_distance_within(w->context, rows + 3 * i, &o, list_face, &l, error);
         if (status == EBPO_OK)
             answers_near_end(w->text, job->form, !l.begun, job->sampler);
     }
@@ -51,8 +51,8 @@ static uint64_t *models_of(const query_worker *w, uint64_t count)
     return (uint64_t *)(void *)((ebpo_distance_result *)w->results + count);
 }
 
-static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
-                          ebpo_error *error)
+static ebpo_status answer_distances(const query_job *job, query_worker *w, const double *rows,
+                                    uint64_t count, ebpo_error *error)
 {
     if (job->models)
         return catalogue_distance(job->models, rows, count, job->distance.max_distance,
@@ -63,22 +63,24 @@ static ebpo_status answer(const query_job *job, query_worker *w, const double *r
     return ebpo_distance_many(w->context, rows, count, &job->distance, w->results, error);
 }
 
-static void print(const query_job *job, query_worker *w, const double *rows, uint64_t count)
+static void print_distances(const query_job *job, query_worker *w, const double *rows,
+                            uint64_t count)
 {
     (void)rows;
     if (!query_lists(job->values))
-        answers_distance(w->text, job->form, !job->models && limited(&job->distance), w->results,
+        answers_distance(w->text, job->form, !job->models && is_limited(&job->distance), w->results,
                          count, job->sampler, job->models ? models_of(w, count) : NULL);
 }
 
-static const char *columns(const query_job *job)
+static const char *distance_columns(const query_job *job)
 {
     return job->models ? "distance,x,y,z,nx,ny,nz,face,model"
-           : limited(&job->distance) && !query_lists(job->values) ? "lo,hi"
-                                                                  : "distance,x,y,z,nx,ny,nz,face";
+           : is_limited(&job->distance) && !query_lists(job->values)
+               ? "lo,hi"
+               : "distance,x,y,z,nx,ny,nz,face";
 }
 
-static const char *dtype(const query_job *job, unsigned *bytes)
+static const char *distance_dtype(const query_job *job, unsigned *bytes)
 {
     if (query_lists(job->values))
         return NULL;
@@ -87,8 +89,8 @@ static const char *dtype(const query_job *job, unsigned *bytes)
         return "[('distance', '<f8'), ('point', '<f8', (3,)), ('normal', '<f8', (3,)), ('face', "
                "'<u8'), ('model', '<u8')]";
     }
-    *bytes = limited(&job->distance) ? 16 : 64;
-    return limited(&job->distance)
+    *bytes = is_limited(&job->distance) ? 16 : 64;
+    return is_limited(&job->distance)
                ? "[('lo', '<f8'), ('hi', '<f8')]"
                : "[('distance', '<f8'), ('point', '<f8', (3,)), ('normal', '<f8', (3,)), ('face', "
                  "'<u8')]";
@@ -96,7 +98,7 @@ static const char *dtype(const query_job *job, unsigned *bytes)
 
 static const query_values usual = QUERY_VALUES_INIT;
 
-static int run(void *given, const char **operand)
+static int run_distance(void *given, const char **operand)
 {
     query_values *v = given;
     if (!query_distance_fits("distance", v) ||
@@ -112,11 +114,11 @@ static int run(void *given, const char **operand)
                       .kind = POINTS,
                       .result_bytes = sizeof(ebpo_distance_result),
                       .parts_share = 0.65, /* docs/measured/asking.md */
-                      .answer = answer,
-                      .print = print,
-                      .columns = columns,
-                      .dtype = dtype };
+                      .answer = answer_distances,
+                      .print = print_distances,
+                      .columns = distance_columns,
+                      .dtype = distance_dtype };
     return query_run(&job, operand[0], operand[1]);
 }
 
-const command command_distance = { &spec, sizeof usual, &usual, run };
+const command command_distance = { &spec, sizeof usual, &usual, run_distance };

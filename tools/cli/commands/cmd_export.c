@@ -186,7 +186,7 @@ static int write_out(const values *v, const char *in, const char *out, const cha
 
 static const values usual = { .format = -1, .level = -1, .remote = REMOTE_VALUES_INIT };
 
-static int run(void *given, const char **operand)
+static int run_export(void *given, const char **operand)
 {
     values *v = given;
     char second[4096];
@@ -210,4 +210,4 @@ static int run(void *given, const char **operand)
     return write_out(v, operand[0], operand[1], second, &o);
 }
 
-const command command_export = { &spec, sizeof usual, &usual, run };
+const command command_export = { &spec, sizeof usual, &usual, run_export };

@@ -113,9 +113,9 @@ static void warn_of_elements(const ebpo_file *file, bool source_order, const cha
                 remote_shown(path));
 }
 
-static ebpo_status take(ebpo_file *file, const values *v, const char *path,
-                        ebpo_workspace *workspace, ebpo_progress progress, extracted *out,
-                        ebpo_error *error)
+static ebpo_status take_part(ebpo_file *file, const values *v, const char *path,
+                             ebpo_workspace *workspace, ebpo_progress progress, extracted *out,
+                             ebpo_error *error)
 {
     if (v->subtree > 0)
         return take_subtree(file, v, path, workspace, out, error);
@@ -128,7 +128,7 @@ static ebpo_status take(ebpo_file *file, const values *v, const char *path,
         return ebpo_lod_level(file, (int)v->level, &lod, &out->mesh, &out->volume, error);
     }
     bool source_order = false;
-    ebpo_read_options read = reading(v->threads, workspace);
+    ebpo_read_options read = reading_options(v->threads, workspace);
     read.attributes = 1;
     ebpo_status status = ebpo_file_read_source_mesh(file, &read, &out->mesh, &source_order, error);
     if (status == EBPO_OK && !source_order)
@@ -161,7 +161,7 @@ static ebpo_status take_textures(const ebpo_file *file, const values *v, ebpo_er
     return status;
 }
 
-static void summarise(const values *v, const char *path, const extracted *out)
+static void print_summary(const values *v, const char *path, const extracted *out)
 {
     char vertices[40], faces[40], volume[TABLE_CELL];
     words_plural(vertices, sizeof vertices, out->mesh.vertex_count, "vertex", "vertices");
@@ -189,7 +189,7 @@ static void summarise_json(const values *v, const char *path, const extracted *o
 
 static const values usual = { .level = -1, .subtree = -1, .remote = REMOTE_VALUES_INIT };
 
-static int run(void *given, const char **operand)
+static int run_extract(void *given, const char **operand)
 {
     values *v = given;
     int code = check_values(v, operand[0], operand[1]);
@@ -211,7 +211,7 @@ static int run(void *given, const char **operand)
     if (status == EBPO_OK && v->textures)
         status = take_textures(file, v, &error);
     if (status == EBPO_OK && operand[1])
-        status = take(file, v, operand[0], workspace, progress, &out, &error);
+        status = take_part(file, v, operand[0], workspace, progress, &out, &error);
     if (status == EBPO_OK && operand[1])
         status = ebpo_mesh_write_ply(&out.mesh, operand[1], &error);
     progress_wipe(&line);
@@ -220,7 +220,7 @@ static int run(void *given, const char **operand)
         if (v->json)
             summarise_json(v, operand[1], &out, &t);
         else if (operand[1] && !v->quiet)
-            summarise(v, operand[1], &out);
+            print_summary(v, operand[1], &out);
         if (!v->json)
             remote_tell(&t, &v->remote, false);
     }
@@ -232,4 +232,4 @@ static int run(void *given, const char **operand)
     return status == EBPO_OK ? EXIT_FINE : command_failed("extract", &error);
 }
 
-const command command_extract = { &spec, sizeof usual, &usual, run };
+const command command_extract = { &spec, sizeof usual, &usual, run_extract };

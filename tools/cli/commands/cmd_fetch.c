@@ -52,7 +52,7 @@ typedef struct ticker {
     double last;
 } ticker;
 
-static bool tick(void *user)
+static bool show_bytes(void *user)
 {
     ticker *t = user;
     ebpo_http_stats s = EBPO_HTTP_STATS_INIT;
@@ -75,7 +75,7 @@ static bool tick(void *user)
     return false;
 }
 
-static void wipe(ticker *t)
+static void wipe_ticker(ticker *t)
 {
     t->active = false;
     if (t->shown)
@@ -106,8 +106,8 @@ static bool tell_resuming(const subset_values *v, ebpo_file *file, const char *u
 
 enum { BOX_BLOCK = 8192 };
 
-static int fetch(subset_values *v, const char *url, const char *out, const char *part,
-                 ebpo_subset_options *subset)
+static int fetch_subset(subset_values *v, const char *url, const char *out, const char *part,
+                        ebpo_subset_options *subset)
 {
     double begun = progress_now();
     ebpo_error error = EBPO_ERROR_INIT;
@@ -115,7 +115,7 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
     ticker t = { .last = 0 };
     atomic_init(&t.active, !v->quiet && isatty(STDERR_FILENO));
     atomic_init(&t.file, NULL);
-    v->remote.stop = tick;
+    v->remote.stop = show_bytes;
     v->remote.stop_user = &t;
     if (part) {
         v->remote.cache = part;
@@ -133,7 +133,7 @@ static int fetch(subset_values *v, const char *url, const char *out, const char 
     if (status == EBPO_OK)
         status = ebpo_subset(file, out, subset, &error);
     bool usage = status == EBPO_E_ARGUMENT;
-    wipe(&t);
+    wipe_ticker(&t);
     if (status == EBPO_OK) {
         traffic seen = traffic_of(file);
         status = subset_tell(v, out, ebpo_file_info(file), &seen, progress_now() - begun, &error);
@@ -184,7 +184,7 @@ static bool out_fits(const char *out, const char *part)
 
 static const subset_values usual = SUBSET_VALUES_INIT;
 
-static int run(void *given, const char **operand)
+static int run_fetch(void *given, const char **operand)
 {
     subset_values *v = given;
     ebpo_subset_options subset;
@@ -196,10 +196,10 @@ static int run(void *given, const char **operand)
     char *part = NULL; /* with a folder of the user's, that one does */
     if (ebpo_is_url(operand[0]) && !v->remote.cache && asprintf(&part, "%s.part", operand[1]) < 0)
         return command_no_memory("fetch");
-    code =
-        out_fits(operand[1], part) ? fetch(v, operand[0], operand[1], part, &subset) : EXIT_FAILED;
+    code = out_fits(operand[1], part) ? fetch_subset(v, operand[0], operand[1], part, &subset)
+                                      : EXIT_FAILED;
     free(part);
     return code;
 }
 
-const command command_fetch = { &spec, sizeof usual, &usual, run };
+const command command_fetch = { &spec, sizeof usual, &usual, run_fetch };

@@ -64,7 +64,7 @@ static void print_json(const values *v, const char *path, const ebpo_file *file,
     json_finish(&j);
 }
 
-static int run(void *given, const char **operand)
+static int run_info(void *given, const char **operand)
 {
     values *v = given;
     uint64_t bytes;
@@ -100,4 +100,4 @@ static int run(void *given, const char **operand)
     return EXIT_FINE;
 }
 
-const command command_info = { &spec, sizeof usual, &usual, run };
+const command command_info = { &spec, sizeof usual, &usual, run_info };

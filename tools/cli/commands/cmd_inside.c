@@ -7,26 +7,26 @@
 
 #include "cli/options/inside.inc"
 
-static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
-                          ebpo_error *error)
+static ebpo_status answer_inside(const query_job *job, query_worker *w, const double *rows,
+                                 uint64_t count, ebpo_error *error)
 {
     return job->models ? catalogue_inside(job->models, rows, count, w->results, error)
                        : ebpo_inside_many(w->context, rows, count, &job->inside, w->results, error);
 }
 
-static void print(const query_job *job, query_worker *w, const double *rows, uint64_t count)
+static void print_inside(const query_job *job, query_worker *w, const double *rows, uint64_t count)
 {
     (void)rows;
     answers_inside(w->text, job->form, w->results, count);
 }
 
-static const char *columns(const query_job *job)
+static const char *inside_columns(const query_job *job)
 {
     return job->inside.level >= 0 || job->inside.deadline_ns ? "where,winding,doubt"
                                                              : "where,winding";
 }
 
-static const char *dtype(const query_job *job, unsigned *bytes)
+static const char *inside_dtype(const query_job *job, unsigned *bytes)
 {
     (void)job;
     *bytes = 8;
@@ -35,7 +35,7 @@ static const char *dtype(const query_job *job, unsigned *bytes)
 
 static const query_values usual = QUERY_VALUES_INIT;
 
-static int run(void *given, const char **operand)
+static int run_inside(void *given, const char **operand)
 {
     query_values *v = given;
     if (!query_inside_fits("inside", v))
@@ -45,11 +45,11 @@ static int run(void *given, const char **operand)
                       .kind = POINTS,
                       .result_bytes = sizeof(ebpo_inside_result),
                       .parts_share = 0.05, /* docs/measured/asking.md */
-                      .answer = answer,
-                      .print = print,
-                      .columns = columns,
-                      .dtype = dtype };
+                      .answer = answer_inside,
+                      .print = print_inside,
+                      .columns = inside_columns,
+                      .dtype = inside_dtype };
     return query_run(&job, operand[0], operand[1]);
 }
 
-const command command_inside = { &spec, sizeof usual, &usual, run };
+const command command_inside = { &spec, sizeof usual, &usual, run_inside };

@@ -33,7 +33,7 @@ typedef struct printer {
 } printer;
 
 /* Of the last level's volume; a flat surface has none. */
-static double share(const printer *p, double volume)
+static double volume_share(const printer *p, double volume)
 {
     double last = facts_volume(p->info, p->info->level_count - 1);
     return !isfinite(last) ? NAN : last > 0 ? 100 * volume / last : 100;
@@ -50,7 +50,8 @@ static void print_level(const printer *p, const ebpo_stream_level *level, double
            level->level, s->gray_count, s->leaf_count, facts_white(p->info, level->level),
            s->black_count, s->plane_count + s->leaf_plane_count,
            table_cell(volume, "%.10g", level->volume),
-           table_cell(percent, "%.2f", share(p, level->volume)), level->cumulative_bytes, ms);
+           table_cell(percent, "%.2f", volume_share(p, level->volume)), level->cumulative_bytes,
+           ms);
 }
 
 static void begin_json_level(printer *p, const ebpo_stream_level *level, double ms)
@@ -65,7 +66,7 @@ static void begin_json_level(printer *p, const ebpo_stream_level *level, double 
     json_uint(&p->j, "planes", s->plane_count);
     json_uint(&p->j, "leaf_planes", s->leaf_plane_count);
     json_real(&p->j, "volume", level->volume);
-    json_real(&p->j, "percent_of_last", share(p, level->volume));
+    json_real(&p->j, "percent_of_last", volume_share(p, level->volume));
     json_uint(&p->j, "cumulative_bytes", level->cumulative_bytes);
     json_real(&p->j, "ms", ms);
 }
@@ -173,8 +174,8 @@ static void print_legend(const ebpo_info *info)
         table_beyond(stdout);
 }
 
-static ebpo_status tell(printer *p, ebpo_file *file, const char *path, bool *arrived,
-                        ebpo_error *error)
+static ebpo_status stream_levels(printer *p, ebpo_file *file, const char *path, bool *arrived,
+                                 ebpo_error *error)
 {
     int last = p->info->level_count - 1;
     ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
@@ -211,7 +212,7 @@ static ebpo_status tell(printer *p, ebpo_file *file, const char *path, bool *arr
 
 static const values usual = { .to = -1, .remote = REMOTE_VALUES_INIT };
 
-static int run(void *given, const char **operand)
+static int run_levels(void *given, const char **operand)
 {
     values *v = given;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -225,7 +226,7 @@ static int run(void *given, const char **operand)
         return command_failed("levels", &error);
     p.info = ebpo_file_info(file);
     bool there = command_has_level("levels", p.info, v->to), arrived = true;
-    ebpo_status status = there ? tell(&p, file, operand[0], &arrived, &error) : EBPO_OK;
+    ebpo_status status = there ? stream_levels(&p, file, operand[0], &arrived, &error) : EBPO_OK;
     ebpo_close(file);
     if (!there)
         return EXIT_USAGE;
@@ -234,4 +235,4 @@ static int run(void *given, const char **operand)
     return status == EBPO_OK ? EXIT_FINE : command_failed("levels", &error);
 }
 
-const command command_levels = { &spec, sizeof usual, &usual, run };
+const command command_levels = { &spec, sizeof usual, &usual, run_levels };

@@ -36,7 +36,7 @@ static bool read_reals(const char *text, int count, double *out)
     return true;
 }
 
-static int wrong(const char *option, const char *value, const char *expected)
+static int refuse_value(const char *option, const char *value, const char *expected)
 {
     return command_usage("map", "%s '%s': expected %s", option, value, expected);
 }
@@ -47,7 +47,7 @@ bool map_read_size(const char *text, int *width, int *height)
     if (sscanf(text, "%5dx%5d%c", width, height, &rest) == 2 && *width >= 2 && *width <= 8192 &&
         *height >= 2 && *height <= 8192)
         return true;
-    wrong("--size", text, "a width, an x and a height, each from 2 to 8192");
+    refuse_value("--size", text, "a width, an x and a height, each from 2 to 8192");
     return false;
 }
 
@@ -58,7 +58,8 @@ static int find_box(const map_job *j, double low[3], double high[3])
     if (j->v->box) {
         if (!read_reals(j->v->box, 6, all) || !(all[0] < all[3]) || !(all[1] < all[4]) ||
             !(all[2] < all[5]))
-            return wrong("--box", j->v->box, "six numbers, the low corner below the high one");
+            return refuse_value("--box", j->v->box,
+                                "six numbers, the low corner below the high one");
         memcpy(low, all, 3 * sizeof *low);
         memcpy(high, all + 3, 3 * sizeof *high);
     }
@@ -118,9 +119,10 @@ static int find_rectangle(const map_job *j, rectangle *r)
         return EXIT_FINE;
     }
     if (!read_reals(j->v->plane, 9, all))
-        return wrong("--plane", j->v->plane,
-                     "x=V, y=V or z=V with a number or a share such as 50%, or nine numbers: a "
-                     "corner and two edges");
+        return refuse_value(
+            "--plane", j->v->plane,
+            "x=V, y=V or z=V with a number or a share such as 50%, or nine numbers: a "
+            "corner and two edges");
     if (j->v->box)
         return command_usage("map", "--box belongs to --grid and to planes across an axis");
     if (j->v->margin != MAP_MARGIN)
@@ -130,7 +132,7 @@ static int find_rectangle(const map_job *j, rectangle *r)
     for (int c = 0; c < 3; c++)
         dot += r->edge[0][c] / a * (r->edge[1][c] / b);
     if (!(a > 0) || !(b > 0) || !isfinite(a) || !isfinite(b) || fabs(dot) > 1e-9)
-        return wrong("--plane", j->v->plane, "two edges with a length, at right angles");
+        return refuse_value("--plane", j->v->plane, "two edges with a length, at right angles");
     return EXIT_FINE;
 }
 
@@ -182,7 +184,7 @@ static int lattice_of_grid(map_job *j)
         count[c] = good ? (uint64_t)numbers[c] : 0;
     }
     if (!good)
-        return wrong("--grid", j->v->grid, "three whole numbers, each from 1 to 1048576");
+        return refuse_value("--grid", j->v->grid, "three whole numbers, each from 1 to 1048576");
     int code = find_box(j, low, high);
     if (code != EXIT_FINE)
         return code;
@@ -213,7 +215,7 @@ static ebpo_status no_picture_memory(ebpo_error *error)
     return error->status = EBPO_E_MEMORY;
 }
 
-static void put(picture *p, int x, int y, const uint8_t rgb[3])
+static void put_pixel(picture *p, int x, int y, const uint8_t rgb[3])
 {
     uint8_t *to = p->rgb + 3 * ((size_t)y * (size_t)p->width + (size_t)x);
     for (int c = 0; c < 3; c++)
@@ -232,7 +234,7 @@ static ebpo_status draw_legend(const map_job *j, picture *p, int x, bool has_sig
         uint8_t rgb[3];
         ebpo_map_colour((ebpo_map_palette)j->v->palette, distance, j->range, rgb);
         for (int i = 0; i < BAR; i++)
-            put(p, x + EDGE + i, y, rgb);
+            put_pixel(p, x + EDGE + i, y, rgb);
     }
     for (int i = 0; i < 3 && bottom - top >= 3 * LINE && status == EBPO_OK; i++) {
         char text[32];
@@ -273,7 +275,7 @@ static ebpo_status map_draw_plane(const map_job *j, const double *values, const 
             uint8_t rgb[3];
             ebpo_map_colour((ebpo_map_palette)j->v->palette,
                             values[(size_t)y * (size_t)width + (size_t)x], j->range, rgb);
-            put(&p, x, height - 1 - y, on_surface(values, width, height, x, y) ? ink : rgb);
+            put_pixel(&p, x, height - 1 - y, on_surface(values, width, height, x, y) ? ink : rgb);
         }
     ebpo_status status = draw_legend(j, &p, width, has_signs(j), error);
     if (status == EBPO_OK)
@@ -309,7 +311,7 @@ static ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const 
 
 #else
 
-static ebpo_status without(ebpo_error *error)
+static ebpo_status fail_without_png(ebpo_error *error)
 {
     snprintf(error->message, sizeof error->message,
              "this build draws no pictures: it has no libpng; install libpng and rebuild ebpo");
@@ -322,7 +324,7 @@ static ebpo_status map_draw_plane(const map_job *j, const double *values, const 
     (void)j;
     (void)values;
     (void)path;
-    return without(error);
+    return fail_without_png(error);
 }
 
 static ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const char *path,
@@ -331,7 +333,7 @@ static ebpo_status map_draw_mesh(const map_job *j, const ebpo_mesh *mesh, const 
     (void)j;
     (void)mesh;
     (void)path;
-    return without(error);
+    return fail_without_png(error);
 }
 
 #endif
@@ -426,7 +428,7 @@ static double *points_of(const ebpo_mesh *m)
     return points;
 }
 
-static ebpo_status paint(map_job *j, ebpo_mesh *m, const double *distances, ebpo_error *error)
+static ebpo_status paint_map(map_job *j, ebpo_mesh *m, const double *distances, ebpo_error *error)
 {
     if (j->range == 0)
         j->range = j->stats.percentile_unsigned[5];
@@ -441,7 +443,8 @@ static ebpo_status paint(map_job *j, ebpo_mesh *m, const double *distances, ebpo
     return status;
 }
 
-static ebpo_status bound(map_job *j, const ebpo_mesh *m, const double *distances, ebpo_error *error)
+static ebpo_status find_reach(map_job *j, const ebpo_mesh *m, const double *distances,
+                              ebpo_error *error)
 {
     ebpo_map_reach_options o = EBPO_MAP_REACH_OPTIONS_INIT;
     o.threads = j->options.threads;
@@ -466,9 +469,9 @@ static ebpo_status map_vertices(map_job *j, ebpo_progress progress, ebpo_error *
     if (status == EBPO_OK)
         status = ebpo_map_describe(distances, m.vertex_count, &j->stats, error);
     if (status == EBPO_OK && j->v->bounds)
-        status = bound(j, &m, distances, error);
+        status = find_reach(j, &m, distances, error);
     if (status == EBPO_OK && (j->v->out || j->v->picture))
-        status = paint(j, &m, distances, error);
+        status = paint_map(j, &m, distances, error);
     free(points);
     free(distances);
     ebpo_mesh_free(&m);
@@ -524,7 +527,7 @@ static int check_output(const map_values *v)
     return EXIT_FINE;
 }
 
-static int check(const map_values *v)
+static int check_values(const map_values *v)
 {
     int kinds = (v->plane != NULL) + (v->grid != NULL) + (v->from != NULL);
     if (kinds != 1)
@@ -542,7 +545,7 @@ static int check(const map_values *v)
     return check_output(v);
 }
 
-static int overwrites(const char *path, const map_values *v)
+static int check_outputs(const char *path, const map_values *v)
 {
     const char *outs[] = { v->out, v->picture }, *ins[] = { path, v->from };
     for (int i = 0; i < 4; i++)
@@ -632,7 +635,7 @@ static void json_stats(const map_job *j, json *out)
         json_text(out, "picture", j->v->picture);
 }
 
-static void tell(const map_job *j)
+static void tell_map(const map_job *j)
 {
     traffic t = traffic_of(j->file);
     if (!j->v->json) {
@@ -681,11 +684,11 @@ static int run_job(map_job *j, uint64_t memory)
         status = v->from ? map_vertices(j, progress, &error) : map_plane_or_grid(j, &error);
     progress_wipe(&line);
     if (status == EBPO_OK)
-        tell(j);
+        tell_map(j);
     return status == EBPO_OK ? EXIT_FINE : command_failed("map", &error);
 }
 
-static int run(void *given, const char **operand)
+static int run_map(void *given, const char **operand)
 {
     map_values *v = given;
     map_job j = { .v = v,
@@ -695,13 +698,13 @@ static int run(void *given, const char **operand)
                   .reach = EBPO_MAP_REACH_INIT,
                   .range = v->range };
     uint64_t memory = 0;
-    int code = check(v);
+    int code = check_values(v);
     if (code == EXIT_FINE && v->memory && !words_read_size(v->memory, &memory))
         code = command_usage("map", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
     if (code == EXIT_FINE && v->size && !map_read_size(v->size, &j.width, &j.height))
         code = EXIT_USAGE;
     if (code == EXIT_FINE)
-        code = overwrites(operand[0], v);
+        code = check_outputs(operand[0], v);
     if (code == EXIT_FINE && !command_wants_hdf5("map", operand[0]))
         code = EXIT_FAILED;
     if (code != EXIT_FINE)
@@ -719,4 +722,4 @@ static int run(void *given, const char **operand)
     return code;
 }
 
-const command command_map = { &spec, sizeof usual, &usual, run };
+const command command_map = { &spec, sizeof usual, &usual, run_map };

@@ -261,7 +261,7 @@ static ebpo_status derive_levels(ebpo_file *file, const values *v, ebpo_progress
     return status;
 }
 
-static int measure(const char *path, const values *v)
+static int measure_file(const char *path, const values *v)
 {
     ebpo_deviation levels[EBPO_LEVELS_MAX];
     ebpo_limit limits[EBPO_LEVELS_MAX];
@@ -314,12 +314,12 @@ static const values usual = { .tolerance = 0.05,
                               .questions = 200000,
                               .remote = REMOTE_VALUES_INIT };
 
-static int run(void *given, const char **operand)
+static int run_measure(void *given, const char **operand)
 {
     values *v = given;
     if (!process_memory_take("measure", v->memory, v->threads))
         return EXIT_USAGE;
-    return command_wants_hdf5("measure", operand[0]) ? measure(operand[0], v) : EXIT_FAILED;
+    return command_wants_hdf5("measure", operand[0]) ? measure_file(operand[0], v) : EXIT_FAILED;
 }
 
-const command command_measure = { &spec, sizeof usual, &usual, run };
+const command command_measure = { &spec, sizeof usual, &usual, run_measure };

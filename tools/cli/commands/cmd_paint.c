@@ -129,7 +129,7 @@ static bool paint_read_path(const paint_values *v, ebpo_paint_hand **hand, uint6
 
 /* --- changes and baking --- */
 
-static ebpo_status fail(ebpo_error *error, ebpo_status status, const char *what)
+static ebpo_status fail_paint(ebpo_error *error, ebpo_status status, const char *what)
 {
     *error = (ebpo_error){ .status = status, .offset = -1 };
     snprintf(error->message, sizeof error->message, "%s", what);
@@ -149,20 +149,21 @@ static ebpo_status paint_layer(const paint_job *j, uint64_t *layer, ebpo_error *
     ebpo_paint_info info = info_of(j);
     *layer = j->v->layer >= 0 ? (uint64_t)j->v->layer : info.layer_count - 1;
     if (info.layer_count == 0)
-        return fail(error, EBPO_E_ARGUMENT, "the paint has no layer; add one with --new-layer");
+        return fail_paint(error, EBPO_E_ARGUMENT,
+                          "the paint has no layer; add one with --new-layer");
     if (*layer < info.layer_count)
         return EBPO_OK;
     char what[120];
     snprintf(what, sizeof what,
              "there is no layer %llu: layers are counted from 0, and the paint has %llu",
              (unsigned long long)*layer, (unsigned long long)info.layer_count);
-    return fail(error, EBPO_E_ARGUMENT, what);
+    return fail_paint(error, EBPO_E_ARGUMENT, what);
 }
 
 /* --- layers and notes --- */
 
 /* What of a layer is said on the command line. */
-static void say(const paint_values *v, ebpo_paint_layer *layer)
+static void set_layer_facts(const paint_values *v, ebpo_paint_layer *layer)
 {
     layer->title = v->new_layer ? v->new_layer : v->title ? v->title : layer->title;
     layer->author = v->author ? v->author : layer->author;
@@ -179,7 +180,7 @@ static void say(const paint_values *v, ebpo_paint_layer *layer)
 static ebpo_status add_layer(paint_job *j, ebpo_error *error)
 {
     ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
-    say(j->v, &layer);
+    set_layer_facts(j->v, &layer);
     return ebpo_paint_add_layer(j->paint, &layer, NULL, error);
 }
 
@@ -191,7 +192,7 @@ static ebpo_status set_layer(paint_job *j, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     ebpo_paint_get_layer(j->paint, number, &layer);
-    say(j->v, &layer);
+    set_layer_facts(j->v, &layer);
     return ebpo_paint_set_layer(j->paint, number, &layer, error);
 }
 
@@ -224,7 +225,7 @@ static ebpo_status add_note(paint_job *j, ebpo_error *error)
         return status;
     char *body = as_lines(j->v->note);
     if (!body)
-        return fail(error, EBPO_E_MEMORY, "not enough memory for the note");
+        return fail_paint(error, EBPO_E_MEMORY, "not enough memory for the note");
     note.title = j->v->title;
     note.author = j->v->author;
     note.date = j->v->date;
@@ -236,7 +237,8 @@ static ebpo_status add_note(paint_job *j, ebpo_error *error)
 
 /* --- strokes --- */
 
-static ebpo_status lay(paint_job *j, const ebpo_paint_hand *hand, uint64_t count, ebpo_error *error)
+static ebpo_status lay_stroke(paint_job *j, const ebpo_paint_hand *hand, uint64_t count,
+                              ebpo_error *error)
 {
     const paint_values *v = j->v;
     ebpo_paint_pen pen = EBPO_PAINT_PEN_INIT;
@@ -260,12 +262,13 @@ static ebpo_status lay(paint_job *j, const ebpo_paint_hand *hand, uint64_t count
     status = ebpo_paint_lay(j->paint, j->context, hand, count, &pen, &j->laid, error);
     return status != EBPO_OK || j->laid.points
                ? status
-               : fail(error, EBPO_E_ARGUMENT,
-                      "the pen was nowhere on the surface: give a greater --within or a path that "
-                      "is closer");
+               : fail_paint(
+                     error, EBPO_E_ARGUMENT,
+                     "the pen was nowhere on the surface: give a greater --within or a path that "
+                     "is closer");
 }
 
-static ebpo_status undo(paint_job *j, ebpo_error *error)
+static ebpo_status undo_strokes(paint_job *j, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     uint64_t strokes = info_of(j).stroke_count;
@@ -273,7 +276,7 @@ static ebpo_status undo(paint_job *j, ebpo_error *error)
         char what[80];
         snprintf(what, sizeof what, "--undo %lld: the paint has not so many strokes, but %llu",
                  (long long)j->v->undo, (unsigned long long)strokes);
-        return fail(error, EBPO_E_ARGUMENT, what);
+        return fail_paint(error, EBPO_E_ARGUMENT, what);
     }
     for (int64_t i = 0; i < j->v->undo && status == EBPO_OK; i++)
         status = ebpo_paint_remove_stroke(j->paint, info_of(j).stroke_count - 1, error);
@@ -291,7 +294,7 @@ static ebpo_status paint_change(paint_job *j, const ebpo_paint_hand *hand, uint6
     else if (hand || v->note)
         ;
     else if (v->undo)
-        status = undo(j, error);
+        status = undo_strokes(j, error);
     else if (v->remove_stroke >= 0)
         status = ebpo_paint_remove_stroke(j->paint, (uint64_t)v->remove_stroke, error);
     else if (v->remove_note >= 0)
@@ -301,7 +304,7 @@ static ebpo_status paint_change(paint_job *j, const ebpo_paint_hand *hand, uint6
     else
         status = set_layer(j, error);
     if (status == EBPO_OK && hand)
-        status = lay(j, hand, count, error);
+        status = lay_stroke(j, hand, count, error);
     if (status == EBPO_OK && v->note)
         status = add_note(j, error);
     return status == EBPO_OK ? ebpo_paint_save(j->paint, v->out ? v->out : j->paint_path, error)
@@ -327,7 +330,7 @@ static uint8_t *own_colours(paint_job *j, const ebpo_mesh *mesh, ebpo_error *err
         return rgba;
     rgba = malloc(4 * mesh->vertex_count);
     if (!rgba)
-        (void)fail(error, EBPO_E_MEMORY, "not enough memory for the colours of all vertices");
+        (void)fail_paint(error, EBPO_E_MEMORY, "not enough memory for the colours of all vertices");
     for (uint64_t i = 0; rgba && i < 4 * mesh->vertex_count; i++)
         rgba[i] = (uint8_t)(base >> (24 - 8 * (i % 4)));
     return rgba;
@@ -409,14 +412,14 @@ static bool sets_layer(const paint_values *v)
            (says_of_layer(v) || v->title || v->author || v->date || v->colour);
 }
 
-static int removals(const paint_values *v)
+static int count_removals(const paint_values *v)
 {
     return (v->undo > 0) + (v->remove_stroke >= 0) + (v->remove_note >= 0) + (v->remove_layer >= 0);
 }
 
-static bool changes(const paint_values *v)
+static bool changes_paint(const paint_values *v)
 {
-    return v->new_layer || v->path || v->note || removals(v) || sets_layer(v);
+    return v->new_layer || v->path || v->note || count_removals(v) || sets_layer(v);
 }
 
 static int check_pen(const paint_values *v)
@@ -458,9 +461,9 @@ static int check_texts(const paint_values *v)
     return EXIT_FINE;
 }
 
-static int check(const paint_values *v)
+static int check_values(const paint_values *v)
 {
-    int kinds = removals(v) + (v->new_layer || v->path || v->note || sets_layer(v)) +
+    int kinds = count_removals(v) + (v->new_layer || v->path || v->note || sets_layer(v)) +
                 (v->bake != NULL) + v->area;
     if (kinds > 1)
         return command_usage("paint", "one thing at a time: add or change, --undo or one --remove, "
@@ -483,7 +486,7 @@ static int check(const paint_values *v)
         return command_usage("paint", "--fineness belongs to --area");
     if (v->points && !v->json)
         return command_usage("paint", "--points needs --json");
-    if (v->out && !changes(v))
+    if (v->out && !changes_paint(v))
         return command_usage("paint", "--output is for a paint that is changed");
     if (v->layer >= 0 && !v->path && !v->note && !sets_layer(v))
         return command_usage("paint", "--layer N: what of it? --remove-layer removes one");
@@ -493,7 +496,7 @@ static int check(const paint_values *v)
 
 static bool needs_model(const paint_values *v) { return v->path || v->note || v->bake || v->area; }
 
-static int overwrites(const paint_job *j)
+static int check_outputs(const paint_job *j)
 {
     const char *outs[] = { j->v->out, j->v->bake }, *paint = j->paint_path, *model = j->model_path;
     for (int i = 0; i < 2; i++)
@@ -518,8 +521,8 @@ static ebpo_status open_paint(paint_job *j, ebpo_error *error)
     const paint_values *v = j->v;
     bool absent = access(j->paint_path, F_OK) != 0 && errno == ENOENT,
          make = v->new_layer && j->file,
-         in_place = changes(v) && (!v->out || strcmp(v->out, j->paint_path) == 0 ||
-                                   command_same_file(v->out, j->paint_path));
+         in_place = changes_paint(v) && (!v->out || strcmp(v->out, j->paint_path) == 0 ||
+                                         command_same_file(v->out, j->paint_path));
     if (absent && !make) {
         *error = (ebpo_error){ .status = EBPO_E_IO, .offset = -1 };
         snprintf(
@@ -548,7 +551,7 @@ static ebpo_status open_model(paint_job *j, uint64_t memory, ebpo_error *error)
     return status == EBPO_OK ? ebpo_context_new(j->model, &j->context, error) : status;
 }
 
-static ebpo_status measure(paint_job *j, ebpo_error *error)
+static ebpo_status measure_areas(paint_job *j, ebpo_error *error)
 {
     ebpo_paint_options o = EBPO_PAINT_OPTIONS_INIT;
     o.fineness = (unsigned)j->v->fineness;
@@ -557,12 +560,12 @@ static ebpo_status measure(paint_job *j, ebpo_error *error)
     return ebpo_paint_measure(j->paint, j->context, &o, &j->areas, error);
 }
 
-static ebpo_status work(paint_job *j, const ebpo_paint_hand *hand, uint64_t count, uint64_t memory,
-                        ebpo_error *error)
+static ebpo_status do_paint_work(paint_job *j, const ebpo_paint_hand *hand, uint64_t count,
+                                 uint64_t memory, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
-    j->changed = changes(j->v);
+    j->changed = changes_paint(j->v);
     ebpo_paint_get_info(j->paint, &info);
     bool check =
         j->file && (info.point_count || info.note_count) && (j->changed || needs_model(j->v));
@@ -575,7 +578,7 @@ static ebpo_status work(paint_job *j, const ebpo_paint_hand *hand, uint64_t coun
     if (status == EBPO_OK && j->v->bake)
         status = paint_bake(j, error);
     if (status == EBPO_OK && j->v->area)
-        status = measure(j, error);
+        status = measure_areas(j, error);
     return status;
 }
 
@@ -596,7 +599,7 @@ static int run_job(paint_job *j, const ebpo_paint_hand *hand, uint64_t count, ui
         int code = command_failed("paint", &error);
         return status == EBPO_E_ARGUMENT ? EXIT_DIFFERS : code;
     }
-    status = work(j, hand, count, memory, &error);
+    status = do_paint_work(j, hand, count, memory, &error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return command_failed("paint", &error);
@@ -604,7 +607,7 @@ static int run_job(paint_job *j, const ebpo_paint_hand *hand, uint64_t count, ui
     return EXIT_FINE;
 }
 
-static int run(void *given, const char **operand)
+static int run_paint(void *given, const char **operand)
 {
     const paint_values *v = given;
     paint_job j = { .v = v,
@@ -615,13 +618,13 @@ static int run(void *given, const char **operand)
                     .areas = EBPO_PAINT_AREAS_INIT };
     ebpo_paint_hand *hand = NULL;
     uint64_t memory = 0, count = 0;
-    int code = check(v);
+    int code = check_values(v);
     if (code == EXIT_FINE && v->memory && !words_read_size(v->memory, &memory))
         code = command_usage("paint", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
     if (code == EXIT_FINE && needs_model(v) && !j.model_path)
         code = command_usage("paint", "the model is needed: ebpo paint PAINT FILE");
     if (code == EXIT_FINE)
-        code = overwrites(&j);
+        code = check_outputs(&j);
     if (code == EXIT_FINE && j.model_path && !command_wants_hdf5("paint", j.model_path))
         code = EXIT_FAILED;
     if (code == EXIT_FINE && v->path && !paint_read_path(v, &hand, &count))
@@ -637,4 +640,4 @@ static int run(void *given, const char **operand)
     return code;
 }
 
-const command command_paint = { &spec, sizeof usual, &usual, run };
+const command command_paint = { &spec, sizeof usual, &usual, run_paint };

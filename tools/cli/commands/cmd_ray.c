@@ -29,8 +29,8 @@ static uint64_t *models_of(const query_worker *w, uint64_t count)
     return (uint64_t *)(void *)((ebpo_ray_hit *)w->results + count);
 }
 
-static ebpo_status answer(const query_job *job, query_worker *w, const double *rows, uint64_t count,
-                          ebpo_error *error)
+static ebpo_status answer_rays(const query_job *job, query_worker *w, const double *rows,
+                               uint64_t count, ebpo_error *error)
 {
     const ebpo_ray *rays = (const ebpo_ray *)(const void *)rows;
     ebpo_ray_options how = EBPO_RAY_OPTIONS_INIT;
@@ -46,7 +46,7 @@ static ebpo_status answer(const query_job *job, query_worker *w, const double *r
     return ebpo_ray_first_many(w->context, rays, count, &how, w->results, error);
 }
 
-static void print(const query_job *job, query_worker *w, const double *rows, uint64_t count)
+static void print_rays(const query_job *job, query_worker *w, const double *rows, uint64_t count)
 {
     const ebpo_ray *rays = (const ebpo_ray *)(const void *)rows;
     if (job->values->any)
@@ -56,7 +56,7 @@ static void print(const query_job *job, query_worker *w, const double *rows, uin
                           job->models ? models_of(w, count) : NULL);
 }
 
-static const char *columns(const query_job *job)
+static const char *ray_columns(const query_job *job)
 {
     return job->values->any   ? "hit"
            : job->values->all ? "hits,t,face,side"
@@ -64,7 +64,7 @@ static const char *columns(const query_job *job)
                               : "t,face,side";
 }
 
-static const char *dtype(const query_job *job, unsigned *bytes)
+static const char *ray_dtype(const query_job *job, unsigned *bytes)
 {
     *bytes = job->values->any ? 8 : 24;
     if (job->models) {
@@ -78,7 +78,7 @@ static const char *dtype(const query_job *job, unsigned *bytes)
 
 static const query_values usual = QUERY_VALUES_INIT;
 
-static int run(void *given, const char **operand)
+static int run_ray(void *given, const char **operand)
 {
     query_values *v = given;
     if (v->any && v->all)
@@ -90,11 +90,11 @@ static int run(void *given, const char **operand)
                       .kind = POINTS_RAYS,
                       .result_bytes = sizeof(ebpo_ray_hit),
                       .parts_share = 0.6, /* docs/measured/asking.md */
-                      .answer = answer,
-                      .print = print,
-                      .columns = columns,
-                      .dtype = dtype };
+                      .answer = answer_rays,
+                      .print = print_rays,
+                      .columns = ray_columns,
+                      .dtype = ray_dtype };
     return query_run(&job, operand[0], operand[1]);
 }
 
-const command command_ray = { &spec, sizeof usual, &usual, run };
+const command command_ray = { &spec, sizeof usual, &usual, run_ray };

@@ -107,7 +107,7 @@ static bool parse_levels(job *j)
     }
 }
 
-static int parse(job *j)
+static int parse_values(job *j)
 {
     char rest;
     const values *v = &j->v;
@@ -136,7 +136,7 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
 {
     const ebpo_info *info = ebpo_file_info(file);
     unsigned threads = (unsigned)j->v.threads;
-    ebpo_read_options read = reading(j->v.threads, NULL);
+    ebpo_read_options read = reading_options(j->v.threads, NULL);
     if (t->level == MESH) {
         snprintf(t->caption, sizeof t->caption, "mesh, %llu faces",
                  (unsigned long long)info->face_count);
@@ -230,7 +230,7 @@ static void paint_background(picture *p)
 }
 
 /* All tiles show the model from one place: that from which the coarsest fits. */
-static const tile *coarsest(const job *j)
+static const tile *coarsest_tile(const job *j)
 {
     const tile *best = &j->tiles[0];
     for (int i = 1; i < j->tile_count; i++)
@@ -269,7 +269,7 @@ static ebpo_status draw_tile(const job *j, const tile *t, picture *p, const came
     return status;
 }
 
-static ebpo_status draw(const job *j, picture *p, ebpo_error *error)
+static ebpo_status draw_tiles(const job *j, picture *p, ebpo_error *error)
 {
     int columns = j->tile_count <= 5             ? j->tile_count
                   : (j->tile_count + 1) / 2 <= 6 ? (j->tile_count + 1) / 2
@@ -279,7 +279,7 @@ static ebpo_status draw(const job *j, picture *p, ebpo_error *error)
     int caption = caption_height(j, width);
     ebpo_status status = EBPO_OK;
     camera view;
-    const tile *first = coarsest(j);
+    const tile *first = coarsest_tile(j);
     if (height <= caption) {
         snprintf(error->message, sizeof error->message,
                  "--size %s has no room for %d tiles; choose a larger one", j->v.size,
@@ -297,7 +297,7 @@ static ebpo_status draw(const job *j, picture *p, ebpo_error *error)
     return status;
 }
 
-static ebpo_status render(job *j, bool is_file, ebpo_progress progress, ebpo_error *error)
+static ebpo_status render_picture(job *j, bool is_file, ebpo_progress progress, ebpo_error *error)
 {
     static const uint8_t white[3] = { 255, 255, 255 };
     picture p = { 0 };
@@ -308,7 +308,7 @@ static ebpo_status render(job *j, bool is_file, ebpo_progress progress, ebpo_err
         status = error->status = EBPO_E_MEMORY;
     }
     if (status == EBPO_OK)
-        status = draw(j, &p, error);
+        status = draw_tiles(j, &p, error);
     if (status == EBPO_OK)
         status = picture_write_png(&p, j->out, error);
     picture_free(&p);
@@ -350,7 +350,7 @@ static void tell_json(const job *j)
 
 static int run_job(job *j)
 {
-    int code = parse(j);
+    int code = parse_values(j);
     if (code != EXIT_FINE)
         return code;
     if (command_overwrites("render", j->in, j->out))
@@ -361,7 +361,7 @@ static int run_job(job *j)
     progress_line line;
     ebpo_progress progress = progress_start(&line, "render", j->v.quiet);
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_status status = render(j, is_file, progress, &error);
+    ebpo_status status = render_picture(j, is_file, progress, &error);
     progress_wipe(&line);
     if (status == EBPO_OK && j->v.json)
         tell_json(j);
@@ -374,7 +374,7 @@ static const values usual = {
     .level = -1, .view = "30,20", .size = "1200x900", .up = 1, .remote = REMOTE_VALUES_INIT
 };
 
-static int run(void *given, const char **operand)
+static int run_render(void *given, const char **operand)
 {
 #if EBPO_HAVE_PNG
     values *v = given;
@@ -397,4 +397,4 @@ static int run(void *given, const char **operand)
 #endif
 }
 
-const command command_render = { &spec, sizeof usual, &usual, run };
+const command command_render = { &spec, sizeof usual, &usual, run_render };

@@ -39,8 +39,8 @@ static int check_values(const values *v, ebpo_write_options *write)
 }
 
 /* The codec, when the file's own is to stay. */
-static ebpo_status settle(const values *v, const ebpo_info *info, ebpo_write_options *write,
-                          ebpo_error *error)
+static ebpo_status settle_codec(const values *v, const ebpo_info *info, ebpo_write_options *write,
+                                ebpo_error *error)
 {
     write->codec = v->codec >= 0 ? (ebpo_codec)v->codec : info->codec;
     if (!v->zstd_level || write->codec == EBPO_CODEC_ZSTD)
@@ -78,8 +78,8 @@ static void print_json(const values *v, const ebpo_info *info, const ebpo_stored
     json_finish(&j);
 }
 
-static ebpo_status tell(const values *v, const char *out, const ebpo_file *from, double seconds,
-                        ebpo_error *error)
+static ebpo_status tell_sizes(const values *v, const char *out, const ebpo_file *from,
+                              double seconds, ebpo_error *error)
 {
     ebpo_file *file = NULL;
     ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
@@ -101,7 +101,7 @@ static ebpo_status tell(const values *v, const char *out, const ebpo_file *from,
 
 static const values usual = { .codec = -1, .remote = REMOTE_VALUES_INIT };
 
-static int run(void *given, const char **operand)
+static int run_repack(void *given, const char **operand)
 {
     const values *v = given;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
@@ -121,12 +121,12 @@ static int run(void *given, const char **operand)
     if (status == EBPO_OK)
         status = remote_open(&file, operand[0], &v->remote, &error);
     if (status == EBPO_OK)
-        status = settle(v, ebpo_file_info(file), &write, &error);
+        status = settle_codec(v, ebpo_file_info(file), &write, &error);
     if (status == EBPO_OK)
         status = written = ebpo_file_repack(file, operand[1], &read, &write, &error);
     progress_wipe(&line);
     if (status == EBPO_OK)
-        status = tell(v, operand[1], file, progress_now() - begun, &error);
+        status = tell_sizes(v, operand[1], file, progress_now() - begun, &error);
     ebpo_close(file);
     ebpo_workspace_free(read.workspace);
     code = status == EBPO_OK ? EXIT_FINE : command_failed("repack", &error);
@@ -135,4 +135,4 @@ static int run(void *given, const char **operand)
     return differs ? EXIT_DIFFERS : code;
 }
 
-const command command_repack = { &spec, sizeof usual, &usual, run };
+const command command_repack = { &spec, sizeof usual, &usual, run_repack };

@@ -139,7 +139,7 @@ static ebpo_status look_at_levels(patient *p, ebpo_error *error)
     return status;
 }
 
-static void forget(patient *p)
+static void forget_fates(patient *p)
 {
     memset(p->fate, 0, sizeof p->fate);
     memset(p->why, 0, sizeof p->why);
@@ -147,7 +147,7 @@ static void forget(patient *p)
 
 static ebpo_status look_at_all(patient *p, ebpo_error *error)
 {
-    forget(p);
+    forget_fates(p);
     ebpo_status status = look_at_mesh(p, error);
     if (status == EBPO_OK)
         status = look_at_attributes(p, error);
@@ -225,7 +225,7 @@ static int in_order(const void *a, const void *b)
 }
 
 /* The numbers of a map, ascending. */
-static uint32_t *sorted(const uint32_t *map, uint64_t count)
+static uint32_t *sorted_numbers(const uint32_t *map, uint64_t count)
 {
     uint32_t *out = malloc(count * sizeof *out);
     if (!out)
@@ -246,8 +246,8 @@ static ebpo_status numbers_of(const patient *p, remade *r, ebpo_error *error)
     ebpo_status status = ebpo_file_read_maps(p->file, &read, &maps, error);
     if (status != EBPO_OK)
         return status;
-    r->vertex_source = sorted(maps.vertex_source, p->info->vertex_count);
-    r->face_source = sorted(maps.face_source, p->info->face_count);
+    r->vertex_source = sorted_numbers(maps.vertex_source, p->info->vertex_count);
+    r->face_source = sorted_numbers(maps.face_source, p->info->face_count);
     ebpo_maps_free(&maps);
     if (r->vertex_source && r->face_source)
         return EBPO_OK;
@@ -316,7 +316,7 @@ static ebpo_status from_source(patient *p, remade *r, ebpo_error *error)
 
 /* --- making --- */
 
-static ebpo_build_options building(const patient *p)
+static ebpo_build_options building_options(const patient *p)
 {
     ebpo_build_options o = EBPO_BUILD_OPTIONS_INIT;
     const ebpo_info *info = p->info;
@@ -344,9 +344,9 @@ static ebpo_build_options building(const patient *p)
 }
 
 /* The mesh is consumed. */
-static ebpo_status make(const patient *p, remade *r, ebpo_error *error)
+static ebpo_status make_file(const patient *p, remade *r, ebpo_error *error)
 {
-    ebpo_build_options build = building(p);
+    ebpo_build_options build = building_options(p);
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_tree tree;
     ebpo_status status = ebpo_build(&r->mesh, &r->report, &r->record, &build, &tree, error);
@@ -365,7 +365,7 @@ static ebpo_status make(const patient *p, remade *r, ebpo_error *error)
     return status;
 }
 
-static ebpo_status compare(patient *p, ebpo_error *error)
+static ebpo_status compare_content(patient *p, ebpo_error *error)
 {
     ebpo_file *made;
     ebpo_status status = remote_open_own(p->v->out, &made, error);
@@ -385,7 +385,7 @@ static ebpo_status compare(patient *p, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status refuse(const patient *p, const char *why, ebpo_error *error)
+static ebpo_status refuse_repair(const patient *p, const char *why, ebpo_error *error)
 {
     snprintf(error->message, sizeof error->message, "%s", why);
     (void)p;
@@ -400,36 +400,37 @@ static ebpo_status refuse_mesh(const patient *p, ebpo_error *error)
              "the file's mesh cannot be read, and all else is made of it; give the mesh that the "
              "file was made from with --source (%.300s)",
              p->why[MESH]);
-    return refuse(p, why, error);
+    return refuse_repair(p, why, error);
 }
 
-static ebpo_status repair(patient *p, ebpo_error *error)
+static ebpo_status repair_file(patient *p, ebpo_error *error)
 {
     remade r = { .vertex_source = NULL };
     if (p->info->pruned)
-        return refuse(p,
-                      "the file is a subset: of what was left out nothing can be made again; take "
-                      "another subset of the original",
-                      error);
+        return refuse_repair(
+            p,
+            "the file is a subset: of what was left out nothing can be made again; take "
+            "another subset of the original",
+            error);
     ebpo_status status = patient_look(p, error);
     if (status != EBPO_OK)
         return status;
     if (!p->v->source && p->fate[MESH] == LOST)
         return refuse_mesh(p, error);
     if (!p->v->source && p->fate[MESH] != KEPT)
-        return refuse(
+        return refuse_repair(
             p,
             "the file has no mesh, of which all else is made; give the mesh that the file "
             "was made from with --source",
             error);
     status = p->v->source ? from_source(p, &r, error) : from_file(p, &r, error);
     if (status == EBPO_OK)
-        status = make(p, &r, error);
+        status = make_file(p, &r, error);
     else
         ebpo_mesh_free(&r.mesh);
     free(r.vertex_source);
     free(r.face_source);
-    return status == EBPO_OK ? compare(p, error) : status;
+    return status == EBPO_OK ? compare_content(p, error) : status;
 }
 
 /* --- telling --- */
@@ -476,7 +477,7 @@ static int code_of(const patient *p)
 
 static const values usual = { 0 };
 
-static int run(void *given, const char **operand)
+static int run_repair(void *given, const char **operand)
 {
     const values *v = given;
     progress_line line;
@@ -501,7 +502,7 @@ static int run(void *given, const char **operand)
         status = ebpo_open_with(operand[0], &how, &p.file, &error);
     if (status == EBPO_OK) {
         p.info = ebpo_file_info(p.file);
-        status = repair(&p, &error);
+        status = repair_file(&p, &error);
     }
     progress_wipe(&line);
     if (status == EBPO_OK && v->json)
@@ -513,4 +514,4 @@ static int run(void *given, const char **operand)
     return status == EBPO_OK ? code_of(&p) : command_failed("repair", &error);
 }
 
-const command command_repair = { &spec, sizeof usual, &usual, run };
+const command command_repair = { &spec, sizeof usual, &usual, run_repair };

@@ -17,7 +17,7 @@ static const char *const up_words[] = { "x", "y", "z", NULL };
 
 #include "cli/options/report.inc"
 
-static int wrong(const char *option, const char *value, const char *expected)
+static int refuse_value(const char *option, const char *value, const char *expected)
 {
     return command_usage("report", "%s: '%s' is not %s", option, value, expected);
 }
@@ -42,14 +42,14 @@ static int add_setting(comparison *c, const report_values *v, const char *word)
     plane_setting *s = &c->setting[c->settings++];
     s->percent = v->percent ? strtod(word, &end) : 40;
     if (v->percent && (*end || !(s->percent >= 0) || !(s->percent <= 100)))
-        return wrong("--percent", word, "a number from 0 to 100");
+        return refuse_value("--percent", word, "a number from 0 to 100");
     if (!v->percent)
         snprintf(s->k_root, sizeof s->k_root, "%s", word);
     snprintf(s->word, sizeof s->word, v->percent ? "-%s%%" : "-K%s", word);
     for (const plane_setting *other = c->setting; other < s; other++)
         if (strcmp(other->word, s->word) == 0)
-            return wrong(v->percent ? "--percent" : "--k-root", word,
-                         "another number than one before it");
+            return refuse_value(v->percent ? "--percent" : "--k-root", word,
+                                "another number than one before it");
     selection_options chosen = { v->select,  v->percent ? s->percent : -1,
                                  v->epsilon, v->percent ? NULL : s->k_root,
                                  v->normals, -1 };
@@ -71,12 +71,12 @@ static int read_settings(comparison *c, const report_values *v)
         return command_usage("report", "--percent and --k-root cannot be used together; give one");
     for (const char *at = list; *at && code == EXIT_FINE;) {
         if (c->settings == SETTINGS_MAX || !next_word(&at, word, sizeof word))
-            return wrong(v->percent ? "--percent" : "--k-root", list,
-                         "at most 12 numbers with commas between them");
+            return refuse_value(v->percent ? "--percent" : "--k-root", list,
+                                "at most 12 numbers with commas between them");
         code = add_setting(c, v, word);
     }
     if (c->settings == 0)
-        return wrong(v->percent ? "--percent" : "--k-root", list, "a number");
+        return refuse_value(v->percent ? "--percent" : "--k-root", list, "a number");
     if (c->settings == 1)
         c->setting[0].word[0] = 0;
     return code;
@@ -87,14 +87,15 @@ static int read_options(comparison *c, report_values *v, bool mesh)
     char rest;
     word_levels levels = { .last = EBPO_LEVELS_MAX - 1, .is_run = true };
     if (v->levels && (!words_read_levels(v->levels, &levels) || !levels.is_run))
-        return wrong("--levels", v->levels,
-                     "one level or a first and a last one, such as 0-6 or 3-");
+        return refuse_value("--levels", v->levels,
+                            "one level or a first and a last one, such as 0-6 or 3-");
     c->first = levels.first;
     c->last = levels.last;
     if (sscanf(v->view, "%lf,%lf%c", &c->azimuth, &c->elevation, &rest) != 2 ||
         !(fabs(c->azimuth) <= 360) || !(fabs(c->elevation) <= 90))
-        return wrong("--view", v->view,
-                     "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
+        return refuse_value(
+            "--view", v->view,
+            "an azimuth from -360 to 360, a comma, and an elevation from -90 to 90");
     bool building = v->select || v->percent || v->k_root || v->normals >= 0 || v->max_level >= 0 ||
                     v->leaf_faces >= 0 || v->epsilon >= 0 || v->keep;
     if (!mesh && building)
@@ -155,7 +156,7 @@ static void drop_built(const comparison *c)
             remove(c->methods[i].path);
 }
 
-static void summary(const comparison *c, const char *place)
+static void print_summary(const comparison *c, const char *place)
 {
     printf("%s: ", place);
     for (int i = 0; i < c->count; i++)
@@ -169,7 +170,7 @@ static void summary(const comparison *c, const char *place)
 
 /* --- the work --- */
 
-static ebpo_status measure(comparison *c, ebpo_error *error)
+static ebpo_status measure_methods(comparison *c, ebpo_error *error)
 {
     ebpo_status status = report_make_points(c, error);
     for (int i = 0; i < c->count && status == EBPO_OK; i++)
@@ -186,14 +187,15 @@ static ebpo_status measure(comparison *c, ebpo_error *error)
     return status;
 }
 
-static int work(comparison *c, const char *const *operand, const char *place, progress_line *line)
+static int make_report(comparison *c, const char *const *operand, const char *place,
+                       progress_line *line)
 {
     double begun = progress_now();
     ebpo_error error = EBPO_ERROR_INIT;
     int code = report_find_methods(c, operand);
     if (code != EXIT_FINE)
         return code;
-    ebpo_status status = measure(c, &error);
+    ebpo_status status = measure_methods(c, &error);
     c->seconds = progress_now() - begun;
     if (status == EBPO_OK)
         status = write_all(c, &error);
@@ -209,7 +211,7 @@ static int work(comparison *c, const char *const *operand, const char *place, pr
     if (c->v->json)
         report_to_json(stdout, c, false);
     else if (!c->v->quiet)
-        summary(c, place);
+        print_summary(c, place);
     return EXIT_FINE;
 }
 
@@ -231,7 +233,7 @@ static const report_values usual = { .normals = -1,
                                      .view = "30,20",
                                      .remote = REMOTE_VALUES_INIT };
 
-static int run(void *given, const char **operand)
+static int run_report(void *given, const char **operand)
 {
     report_values *v = given;
     char named_after_input[256];
@@ -251,7 +253,7 @@ static int run(void *given, const char **operand)
     c.progress = progress_start(&line, "report", v->quiet);
     c.methods = calloc(METHODS_MAX, sizeof *c.methods);
     if (c.methods) {
-        code = work(&c, operand, place, &line);
+        code = make_report(&c, operand, place, &line);
     } else {
         code = command_no_memory("report");
     }
@@ -261,4 +263,4 @@ static int run(void *given, const char **operand)
     return code;
 }
 
-const command command_report = { &spec, sizeof usual, &usual, run };
+const command command_report = { &spec, sizeof usual, &usual, run_report };

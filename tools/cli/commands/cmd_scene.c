@@ -443,7 +443,7 @@ static const char *wrong_options(int deed, scene_values *v, ebpo_load_options *l
     return deeds[deed].run == scene_report ? wrong_report(v) : NULL;
 }
 
-static int run(void *given, const char **operand)
+static int run_scene(void *given, const char **operand)
 {
     scene_values *v = given;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -483,4 +483,4 @@ static int run(void *given, const char **operand)
 
 static const scene_values usual = SCENE_VALUES_INIT;
 
-const command command_scene = { &spec, sizeof usual, &usual, run };
+const command command_scene = { &spec, sizeof usual, &usual, run_scene };

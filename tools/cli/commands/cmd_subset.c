@@ -12,7 +12,7 @@
 
 static const subset_values usual = SUBSET_VALUES_INIT;
 
-static int run(void *given, const char **operand)
+static int run_subset(void *given, const char **operand)
 {
     subset_values *v = given;
     ebpo_subset_options subset;
@@ -43,4 +43,4 @@ static int run(void *given, const char **operand)
     return status == EBPO_OK ? EXIT_FINE : command_failed("subset", &error);
 }
 
-const command command_subset = { &spec, sizeof usual, &usual, run };
+const command command_subset = { &spec, sizeof usual, &usual, run_subset };

@@ -74,20 +74,23 @@ static void touch_play_behind(void)
     (void)munlockall();
 }
 
-static int compare(const void *a, const void *b)
+static int compare_times(const void *a, const void *b)
 {
     float x = *(const float *)a, y = *(const float *)b;
     return (x > y) - (x < y);
 }
 
 /* The least time that so many of all do not exceed. */
-static double quantile(const float *sorted, uint64_t count, double part)
+static double time_quantile(const float *sorted, uint64_t count, double part)
 {
     uint64_t rank = (uint64_t)ceil(part * (double)count);
     return sorted[rank > 0 ? rank - 1 : 0];
 }
 
-static void sort(float *times, uint64_t count) { qsort(times, count, sizeof *times, compare); }
+static void sort_times(float *times, uint64_t count)
+{
+    qsort(times, count, sizeof *times, compare_times);
+}
 
 /* Of each tick. */
 typedef struct spans {
@@ -101,17 +104,17 @@ static void sum_up(const spans *s, uint64_t count, touch_times *out)
         out->bins[bin < TOUCH_BINS ? bin : TOUCH_BINS - 1]++;
         out->over_ms += s->took[i] > 1e-3F;
     }
-    sort(s->took, count);
-    sort(s->wake, count);
-    sort(s->cpu, count);
-    out->p50 = quantile(s->took, count, 0.5);
-    out->p99 = quantile(s->took, count, 0.99);
-    out->p99_9 = quantile(s->took, count, 0.999);
-    out->p99_99 = quantile(s->took, count, 0.9999);
+    sort_times(s->took, count);
+    sort_times(s->wake, count);
+    sort_times(s->cpu, count);
+    out->p50 = time_quantile(s->took, count, 0.5);
+    out->p99 = time_quantile(s->took, count, 0.99);
+    out->p99_9 = time_quantile(s->took, count, 0.999);
+    out->p99_99 = time_quantile(s->took, count, 0.9999);
     out->most = s->took[count - 1];
-    out->wake_p99_9 = quantile(s->wake, count, 0.999);
+    out->wake_p99_9 = time_quantile(s->wake, count, 0.999);
     out->wake_most = s->wake[count - 1];
-    out->cpu_p99_9 = quantile(s->cpu, count, 0.999);
+    out->cpu_p99_9 = time_quantile(s->cpu, count, 0.999);
     out->cpu_most = s->cpu[count - 1];
 }
 
@@ -133,7 +136,7 @@ static uint64_t thread_clock(void)
     return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
 }
 
-static void move(ebpo_touch *touch, const touch_pose *hand, touch_answer *a)
+static void move_ball(ebpo_touch *touch, const touch_pose *hand, touch_answer *a)
 {
     ebpo_touch_result r;
     ebpo_touch_move(touch, hand->place, &r);
@@ -146,7 +149,7 @@ static void move(ebpo_touch *touch, const touch_pose *hand, touch_answer *a)
     a->flags = r.flags;
 }
 
-static void turn(ebpo_touch *touch, const touch_pose *hand, touch_answer *a)
+static void turn_tool(ebpo_touch *touch, const touch_pose *hand, touch_answer *a)
 {
     ebpo_touch_turned r;
     ebpo_touch_turn(touch, hand->place, hand->turn, &r);
@@ -160,7 +163,7 @@ static void turn(ebpo_touch *touch, const touch_pose *hand, touch_answer *a)
     a->flags = r.flags;
 }
 
-static void sense(const touch_play *p, const touch_pose *hand, touch_answer *a)
+static void sense_distance(const touch_play *p, const touch_pose *hand, touch_answer *a)
 {
     ebpo_touch_sensed r;
     ebpo_touch_sense(p->touch, hand->place, &r);
@@ -187,9 +190,9 @@ static bool play_tick(const touch_play *p, uint64_t i, touch_times *out)
     if (p->record)
         p->record[i] = hand;
     switch (p->kind) {
-    case EBPO_TOUCH_BALL: move(p->touch, &hand, &answer); break;
-    case EBPO_TOUCH_PROBE: sense(p, &hand, &answer); break;
-    case EBPO_TOUCH_TOOL: turn(p->touch, &hand, &answer); break;
+    case EBPO_TOUCH_BALL: move_ball(p->touch, &hand, &answer); break;
+    case EBPO_TOUCH_PROBE: sense_distance(p, &hand, &answer); break;
+    case EBPO_TOUCH_TOOL: turn_tool(p->touch, &hand, &answer); break;
     }
     p->device->write(p->device->self, &answer);
     out->between_mean += answer.hi - answer.lo; /* a sum, until the end */
@@ -483,7 +486,7 @@ static ebpo_status open_hand(job *j, const double start[3], ebpo_error *error)
     return ebpo_touch_new(j->model, &wanted, start, &j->touch, error);
 }
 
-static double diagonal(const ebpo_info *info)
+static double model_diagonal(const ebpo_info *info)
 {
     return hypot(hypot(info->box_size[0], info->box_size[1]), info->box_size[2]);
 }
@@ -508,11 +511,11 @@ static ebpo_status play_nothing(job *j, ebpo_error *error)
     return fine ? EBPO_OK : no_memory(error, "the times of ticks");
 }
 
-static ebpo_status play(job *j, ebpo_error *error)
+static ebpo_status play_hand(job *j, ebpo_error *error)
 {
     const values *v = j->v;
     touch_play all = { v->rate,    v->seconds, j->touch,
-                       &j->device, j->kind,    diagonal(ebpo_file_info(j->file)) / 20,
+                       &j->device, j->kind,    model_diagonal(ebpo_file_info(j->file)) / 20,
                        NULL };
     if (v->record) {
         j->record = calloc(touch_play_ticks(&all), sizeof *j->record);
@@ -562,7 +565,7 @@ static int run_job(job *j, uint64_t memory)
     if (status == EBPO_OK)
         status = open_hand(j, start.place, &error);
     if (status == EBPO_OK)
-        status = play(j, &error);
+        status = play_hand(j, &error);
     if (status == EBPO_OK && j->v->record)
         status = write_record(j, &error);
     if (status != EBPO_OK)
@@ -575,7 +578,7 @@ static int run_job(job *j, uint64_t memory)
 }
 
 /* 0: nothing is wrong with them. */
-static int check(const values *v, uint64_t *memory)
+static int check_values(const values *v, uint64_t *memory)
 {
     if (v->memory && !words_read_size(v->memory, memory))
         return command_usage("touch", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
@@ -595,7 +598,7 @@ static int check(const values *v, uint64_t *memory)
 }
 
 /* The record would replace what is read. */
-static bool overwrites(const values *v, const char *model)
+static bool overwrites_input(const values *v, const char *model)
 {
     const char *in[] = { model, v->path, v->tool };
     for (int i = 0; v->record && i < 3; i++)
@@ -604,7 +607,7 @@ static bool overwrites(const values *v, const char *model)
     return false;
 }
 
-static int run(void *given, const char **operand)
+static int run_touch(void *given, const char **operand)
 {
     const values *v = given;
     job j = { .v = v,
@@ -615,8 +618,8 @@ static int run(void *given, const char **operand)
               .stats = EBPO_TOUCH_STATS_INIT,
               .memory = EBPO_MODEL_STATS_INIT };
     uint64_t memory = 0;
-    int code = check(v, &memory);
-    if (code != 0 || overwrites(v, operand[0]))
+    int code = check_values(v, &memory);
+    if (code != 0 || overwrites_input(v, operand[0]))
         return EXIT_USAGE;
     bool fine = command_wants_hdf5("touch", operand[0]) && read_tool(&j) &&
                 (!v->path || touch_path_open(&j.device, v->path)) &&
@@ -639,4 +642,4 @@ static const values usual = { .rate = 1000,
                               .faces = 1 << 14,
                               .remote = REMOTE_VALUES_INIT };
 
-const command command_touch = { &spec, sizeof usual, &usual, run };
+const command command_touch = { &spec, sizeof usual, &usual, run_touch };

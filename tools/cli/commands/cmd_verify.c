@@ -126,8 +126,9 @@ static void print_json(const ebpo_verify_report *report, const char *path, const
     json_finish(&j);
 }
 
-static ebpo_status verify(const values *v, const char *path, ebpo_progress progress,
-                          ebpo_verify_report *report, unseen *u, traffic *t, ebpo_error *error)
+static ebpo_status verify_model(const values *v, const char *path, ebpo_progress progress,
+                                ebpo_verify_report *report, unseen *u, traffic *t,
+                                ebpo_error *error)
 {
     ebpo_mesh source = { 0 };
     ebpo_file *file = NULL;
@@ -164,7 +165,7 @@ static ebpo_status verify(const values *v, const char *path, ebpo_progress progr
 
 static const values usual = { .remote = REMOTE_VALUES_INIT };
 
-static int run(void *given, const char **operand)
+static int run_verify(void *given, const char **operand)
 {
     values *v = given;
     if (!memory_good("verify", &v->memory))
@@ -177,7 +178,7 @@ static int run(void *given, const char **operand)
     ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
     unseen u = { "" };
     traffic t;
-    ebpo_status status = verify(v, operand[0], progress, &report, &u, &t, &error);
+    ebpo_status status = verify_model(v, operand[0], progress, &report, &u, &t, &error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return command_failed("verify", &error);
@@ -192,4 +193,4 @@ static int run(void *given, const char **operand)
     return report.violations ? EXIT_FAILED : EXIT_FINE;
 }
 
-const command command_verify = { &spec, sizeof usual, &usual, run };
+const command command_verify = { &spec, sizeof usual, &usual, run_verify };

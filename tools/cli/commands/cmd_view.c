@@ -212,8 +212,8 @@ static ebpo_status tell_nodes(printer *p, ebpo_view_stream *stream, ebpo_view_en
     return *arrived ? status : EBPO_OK;
 }
 
-static ebpo_status tell(printer *p, ebpo_file *file, const char *path,
-                        const ebpo_view_options *wanted, bool *arrived, ebpo_error *error)
+static ebpo_status stream_nodes(printer *p, ebpo_file *file, const char *path,
+                                const ebpo_view_options *wanted, bool *arrived, ebpo_error *error)
 {
     ebpo_view_stream *stream = NULL;
     ebpo_view_end end = EBPO_VIEW_NODE;
@@ -272,7 +272,7 @@ static const values usual = { .order = -1,
                               .count = -1,
                               .remote = REMOTE_VALUES_INIT };
 
-static int run(void *given, const char **operand)
+static int run_view(void *given, const char **operand)
 {
     values *v = given;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -292,7 +292,8 @@ static int run(void *given, const char **operand)
     if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)
         return command_failed("view", &error);
     bool there = command_has_level("view", ebpo_file_info(file), v->to), arrived = true;
-    ebpo_status status = there ? tell(&p, file, operand[0], &wanted, &arrived, &error) : EBPO_OK;
+    ebpo_status status =
+        there ? stream_nodes(&p, file, operand[0], &wanted, &arrived, &error) : EBPO_OK;
     ebpo_close(file);
     if (!there)
         return EXIT_USAGE;
@@ -301,4 +302,4 @@ static int run(void *given, const char **operand)
     return status == EBPO_OK ? EXIT_FINE : command_failed("view", &error);
 }
 
-const command command_view = { &spec, sizeof usual, &usual, run };
+const command command_view = { &spec, sizeof usual, &usual, run_view };

@@ -83,7 +83,7 @@ static int part_compare_names(const void *a, const void *b)
 }
 
 /* Each byte that cannot be there as \xNN, as far as there is room. */
-static size_t spell(char *out, const char *own)
+static size_t spell_name(char *out, const char *own)
 {
     size_t size = 0;
     bool first = is_selector(own);
@@ -108,7 +108,7 @@ static void part_shown_name(char out[PART_SHOWN_SIZE], const char *own, uint64_t
         snprintf(out, PART_SHOWN_SIZE, "%s", own);
         return;
     }
-    size_t size = spell(out, own);
+    size_t size = spell_name(out, own);
     size +=
         (size_t)snprintf(out + size, PART_SHOWN_SIZE - size, " #%llu", (unsigned long long)number);
     while (size + 1 < PART_SHOWN_SIZE &&
@@ -295,7 +295,7 @@ static const char *shown_name(const part *p) { return p->shown ? p->shown : p->n
 
 /* ---- files ---- */
 
-static bool report(void *user, const char *stage, uint64_t done, uint64_t total)
+static bool report_part(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     const writing *w = user;
     const ebpo_progress *outer = &w->run->progress;
@@ -323,7 +323,7 @@ static ebpo_status look_at(part *p, const char *path, ebpo_error *error)
 /* The mesh of one, checked; mending was the whole mesh's. */
 static ebpo_status take_mesh(const writing *w, uint64_t number, mesh_input *out, ebpo_error *error)
 {
-    ebpo_progress progress = { report, (void *)(uintptr_t)w };
+    ebpo_progress progress = { report_part, (void *)(uintptr_t)w };
     *out = *w->whole;
     ebpo_status status = ebpo_components_mesh(w->components, number, &out->mesh, error);
     if (status == EBPO_OK)
@@ -339,7 +339,7 @@ static ebpo_status take_mesh(const writing *w, uint64_t number, mesh_input *out,
 
 static ebpo_status write_part(writing *w, uint64_t number, ebpo_error *error)
 {
-    ebpo_progress progress = { report, w };
+    ebpo_progress progress = { report_part, w };
     mesh_input one;
     char *path = path_of(w->parts[number].file);
     if (!path)

@@ -12,7 +12,7 @@
 
 enum { HEAD_MOST = 4096 };
 
-static ebpo_status bad(const face_numbers_file *f, ebpo_error *error, const char *what)
+static ebpo_status fail_numbers(const face_numbers_file *f, ebpo_error *error, const char *what)
 {
     return catalogue_fail(error, EBPO_E_FORMAT, f->path,
                           "is no .npy array of integers with one dimension: %s", what);
@@ -58,19 +58,19 @@ static ebpo_status read_head(face_numbers_file *f, ebpo_error *error)
     ssize_t got = pread(f->fd, text, HEAD_MOST, 0);
     const unsigned char *b = (const unsigned char *)text;
     if (got < 12 || memcmp(text, "\x93NUMPY", 6) != 0 || b[6] < 1 || b[6] > 3)
-        return bad(f, error, "it begins otherwise");
+        return fail_numbers(f, error, "it begins otherwise");
     size_t first = b[6] == 1 ? 10 : 12, length = (size_t)b[8] | (size_t)b[9] << 8;
     if (b[6] > 1)
         length |= (size_t)b[10] << 16 | (size_t)b[11] << 24;
     if (length > (size_t)got - first)
-        return bad(f, error, "its head is too long");
+        return fail_numbers(f, error, "its head is too long");
     text[first + length] = 0;
     if (strlen(text + first) != length || !read_type(f, value_of(text + first, "'descr'")) ||
         !read_shape(f, value_of(text + first, "'shape'")))
-        return bad(f, error, "its head tells something else");
+        return fail_numbers(f, error, "its head tells something else");
     f->begin = (off_t)(first + length);
     if (fstat(f->fd, &st) != 0 || f->count > (uint64_t)(st.st_size - f->begin) / f->bytes)
-        return bad(f, error, "it is shorter than its head tells");
+        return fail_numbers(f, error, "it is shorter than its head tells");
     return EBPO_OK;
 }
 

@@ -17,7 +17,7 @@ static bool is_of_model(const char *name)
 }
 
 /* Takes `path`, also when it fails. */
-static bool add(folder_files *f, char *path)
+static bool add_path(folder_files *f, char *path)
 {
     if (path && f->count == f->capacity) {
         size_t capacity = f->capacity ? 2 * f->capacity : 256;
@@ -36,7 +36,7 @@ static bool add(folder_files *f, char *path)
     return true;
 }
 
-static char *joined(const char *a, const char *b)
+static char *join_path(const char *a, const char *b)
 {
     char *text = NULL;
     if (asprintf(&text, *a ? "%s/%s" : "%s%s", a, b) < 0)
@@ -57,8 +57,8 @@ char *folder_files_shown(const char *path)
 static bool tell_unread(folder_files *f, const char *folder, const char *below, const char *name)
 {
     const char *why = strerror(errno);
-    char *within = *name ? joined(below, name) : strdup(below);
-    char *path = !within ? NULL : *within ? joined(folder, within) : strdup(folder);
+    char *within = *name ? join_path(below, name) : strdup(below);
+    char *path = !within ? NULL : *within ? join_path(folder, within) : strdup(folder);
     char *shown = path ? folder_files_shown(path) : NULL;
     if (shown)
         fprintf(stderr, "ebpo %s: %s: cannot be read: %s\n", f->command, shown, why);
@@ -88,9 +88,9 @@ static bool look_at(folder_files *f, DIR *dir, const char *folder, const char *b
     /* a link that leads nowhere is told when it is opened; one to a folder is none of ours */
     if (!enter && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISDIR(st.st_mode))
         return true;
-    char *path = joined(below, name);
+    char *path = join_path(below, name);
     if (!path || !enter)
-        return add(f, path);
+        return add_path(f, path);
     bool fine = look_into(f, folder, path);
     free(path);
     return fine;
@@ -98,7 +98,7 @@ static bool look_at(folder_files *f, DIR *dir, const char *folder, const char *b
 
 static DIR *open_folder(folder_files *f, const char *folder, const char *below)
 {
-    char *path = *below ? joined(folder, below) : strdup(folder);
+    char *path = *below ? join_path(folder, below) : strdup(folder);
     DIR *dir = path ? opendir(path) : NULL;
     f->no_memory |= !path;
     if (path && !dir)

@@ -108,8 +108,8 @@ static ebpo_status open_model(const held_models *h, held_model *m, ebpo_error *e
 }
 
 /* Once, by the first of those that want it. */
-static ebpo_status ready(const held_models *h, held_model *m, ebpo_context **context,
-                         ebpo_error *error)
+static ebpo_status ready_context(const held_models *h, held_model *m, ebpo_context **context,
+                                 ebpo_error *error)
 {
     pthread_mutex_lock(&m->opening);
     ebpo_status status = m->model ? EBPO_OK : open_model(h, m, error);
@@ -183,7 +183,7 @@ static void add_up(const held_model *m, ebpo_model_stats *sums)
     sums->distance_loads += s.distance_loads;
 }
 
-static void drop(held_models *h, held_model *m)
+static void drop_model(held_models *h, held_model *m)
 {
     if (m->model) {
         add_up(m, &h->gone.sums);
@@ -197,7 +197,7 @@ static void drop(held_models *h, held_model *m)
     held_free(m);
 }
 
-static bool fits(const held_models *h, uint64_t size, unsigned more)
+static bool has_room(const held_models *h, uint64_t size, unsigned more)
 {
     return h->open + more <= h->open_most &&
            (!h->options.memory || h->taken + size <= h->options.memory);
@@ -208,16 +208,16 @@ static bool fits(const held_models *h, uint64_t size, unsigned more)
 static bool make_room(held_models *h, uint64_t size, const held_model *but)
 {
     unsigned more = but == NULL;
-    for (held_model *m = h->last, *next; m && !fits(h, size, more); m = next) {
+    for (held_model *m = h->last, *next; m && !has_room(h, size, more); m = next) {
         next = m->before;
         if (!m->users && m != but)
-            drop(h, m);
+            drop_model(h, m);
     }
-    return fits(h, size, more) || !h->busy;
+    return has_room(h, size, more) || !h->busy;
 }
 
 /* NULL: not enough memory. */
-static held_model *take(held_models *h, uint64_t key)
+static held_model *take_model(held_models *h, uint64_t key)
 {
     held_model *m;
     pthread_mutex_lock(&h->lock);
@@ -254,7 +254,7 @@ static void give_back(held_models *h, held_model *m)
     if (!--m->users) {
         h->busy--;
         if (!m->model || ebpo_model_get_stats(m->model, &s) != EBPO_OK) {
-            drop(h, m);
+            drop_model(h, m);
         } else {
             h->taken += s.memory - m->bytes;
             m->bytes = s.memory;
@@ -285,11 +285,11 @@ ebpo_status holding_ask(held_models *h, uint64_t number, bool surface, holding_q
                         void *user, ebpo_error *error)
 {
     ebpo_context *context = NULL;
-    held_model *m = take(h, 2 * number + (surface && h->c->entry[number].surface));
+    held_model *m = take_model(h, 2 * number + (surface && h->c->entry[number].surface));
     if (!m)
         return catalogue_fail(error, EBPO_E_MEMORY, NULL, "not enough memory");
     pthread_rwlock_rdlock(&m->asking);
-    ebpo_status status = ready(h, m, &context, error);
+    ebpo_status status = ready_context(h, m, &context, error);
     if (status == EBPO_OK)
         status = ask(context, m, user, error);
     bool again = status == EBPO_E_LIMIT && context;
@@ -343,7 +343,7 @@ void holding_free(held_models *h)
     if (!h)
         return;
     while (h->first)
-        drop(h, h->first);
+        drop_model(h, h->first);
     free(h->slot);
     pthread_mutex_destroy(&h->lock);
     pthread_cond_destroy(&h->changed);

@@ -48,7 +48,7 @@ static void print_commands(FILE *out)
     }
 }
 
-static void usage(FILE *out)
+static void print_usage(FILE *out)
 {
     fprintf(out, "usage: ebpo COMMAND [options] ...\n\nEBP-Octree in HDF5: closed triangle meshes "
                  "as trees of convex envelopes.\n");
@@ -96,7 +96,7 @@ static int print_help(int argc, char **argv)
         return EXIT_USAGE;
     }
     if (argc < 3) {
-        usage(stdout);
+        print_usage(stdout);
         return EXIT_FINE;
     }
     const command *c = find_command(argv[2]);
@@ -149,10 +149,10 @@ static int run_parsed(const command *c, int argc, char **argv)
     return code;
 }
 
-static int dispatch(int argc, char **argv)
+static int dispatch_command(int argc, char **argv)
 {
     if (argc < 2) {
-        usage(stderr);
+        print_usage(stderr);
         return EXIT_USAGE;
     }
     const char *name = argv[1];
@@ -173,7 +173,7 @@ int main(int argc, char **argv)
     signals_install();
     words_init();
     process_memory_usual();
-    int code = dispatch(argc, argv);
+    int code = dispatch_command(argc, argv);
     const command *c = argc > 1 ? find_command(argv[1]) : NULL;
     if (!command_flush(c ? c->spec->command : NULL) && code == EXIT_FINE)
         code = EXIT_FAILED;

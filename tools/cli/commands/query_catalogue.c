@@ -11,7 +11,7 @@
 #include "cli/model_sums.h"
 
 /* What a catalogue is not asked, in the order in which it is said. */
-static const char *refused(const query_job *job)
+static const char *refused_option(const query_job *job)
 {
     const query_values *v = job->values;
     return job->kind == POINTS_BOXES ? "ebpo box"
@@ -32,7 +32,7 @@ static const char *refused(const query_job *job)
 
 bool query_catalogue_fits(const query_job *job)
 {
-    const char *what = refused(job);
+    const char *what = refused_option(job);
     if (what)
         command_usage(job->command, "%s asks one model, not a catalogue", what);
     return !what;

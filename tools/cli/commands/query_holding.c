@@ -18,7 +18,7 @@ enum { LOADS_BELIEVED = 8, CERTAIN = 4 };
 
 /* As if not all of it fitted: a model with subtrees is cut at their roots, each of which is one
  * read. */
-static void cut(query_holding *h)
+static void cut_at_subtrees(query_holding *h)
 {
     ebpo_model_options *o = &h->options;
     ebpo_model_plan parts = EBPO_MODEL_PLAN_INIT;
@@ -36,7 +36,7 @@ static void cut(query_holding *h)
 }
 
 /* Half of what is free is the most, or the least that will do. */
-static void decide(query_holding *h)
+static void decide_memory(query_holding *h)
 {
     uint64_t half = (h->free_memory = ebpo_free_memory()) / 2;
     h->plan = (ebpo_model_plan)EBPO_MODEL_PLAN_INIT;
@@ -46,7 +46,7 @@ static void decide(query_holding *h)
     if (ebpo_model_memory(h->session.file, &h->options, &h->plan, NULL) != EBPO_OK ||
         (h->plan.resident && h->plan.whole <= SMALL))
         return;
-    cut(h);
+    cut_at_subtrees(h);
     h->waiting = h->plan.resident && h->subtrees;
 }
 
@@ -78,7 +78,7 @@ int query_holding_open(query_holding *h, const char *command, const char *path,
     const ebpo_info *info = ebpo_file_info(h->session.file);
     h->automatic = nothing_wished(v, options) && !ebpo_is_url(path) && info->parts & EBPO_PART_MESH;
     if (h->automatic)
-        decide(h);
+        decide_memory(h);
     return query_open_model(&h->session, command, &h->options);
 }
 
@@ -97,7 +97,7 @@ void query_holding_close(query_holding *h)
 
 /* --- contexts --- */
 
-static ebpo_status ready(query_holding *h, ebpo_context **context, ebpo_error *error)
+static ebpo_status ready_context(query_holding *h, ebpo_context **context, ebpo_error *error)
 {
     if (*context)
         return EBPO_OK;
@@ -139,7 +139,7 @@ void query_holding_forget(query_holding *h, ebpo_context **context)
  * the time that questions take, which go from subtree to subtree. All at once pays when so much has
  * been spent, which is at most twice of what would have been best; or at the beginning, when the
  * questions that are still to come will need all of it by far. */
-static bool pays(query_holding *h, double total)
+static bool loading_pays(query_holding *h, double total)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
     if (ebpo_model_get_stats(h->session.model, &s) != EBPO_OK || s.loads < LOADS_BELIEVED)
@@ -175,7 +175,7 @@ static ebpo_status bring_in_all(query_holding *h, ebpo_error *error)
 }
 
 /* Once, by whom it occurs to first; others wait. */
-static ebpo_status change(query_holding *h, ebpo_error *error)
+static ebpo_status change_holding(query_holding *h, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     pthread_rwlock_wrlock(&h->lock);
@@ -186,13 +186,13 @@ static ebpo_status change(query_holding *h, ebpo_error *error)
     return status;
 }
 
-static ebpo_status enter(query_holding *h, ebpo_context **context, ebpo_error *error)
+static ebpo_status enter_model(query_holding *h, ebpo_context **context, ebpo_error *error)
 {
     pthread_rwlock_rdlock(&h->lock);
     if (h->elsewhere)
         return EBPO_OK;
-    ebpo_status status =
-        h->session.model ? ready(h, context, error) : EBPO_E_CANCELLED; /* another one failed */
+    ebpo_status status = h->session.model ? ready_context(h, context, error)
+                                          : EBPO_E_CANCELLED; /* another one failed */
     if (status != EBPO_OK)
         pthread_rwlock_unlock(&h->lock);
     return status;
@@ -201,19 +201,19 @@ static ebpo_status enter(query_holding *h, ebpo_context **context, ebpo_error *e
 ebpo_status query_holding_enter(query_holding *h, ebpo_context **context, double total,
                                 ebpo_error *error)
 {
-    ebpo_status status = enter(h, context, error);
-    if (status != EBPO_OK || !h->waiting || !pays(h, total))
+    ebpo_status status = enter_model(h, context, error);
+    if (status != EBPO_OK || !h->waiting || !loading_pays(h, total))
         return status;
     pthread_rwlock_unlock(&h->lock);
-    status = change(h, error);
-    return status == EBPO_OK ? enter(h, context, error) : status;
+    status = change_holding(h, error);
+    return status == EBPO_OK ? enter_model(h, context, error) : status;
 }
 
 bool query_holding_enter_alone(query_holding *h, ebpo_context **context)
 {
     pthread_rwlock_wrlock(&h->lock);
     drop_contexts(h);
-    if (!h->elsewhere && h->session.model && ready(h, context, NULL) == EBPO_OK)
+    if (!h->elsewhere && h->session.model && ready_context(h, context, NULL) == EBPO_OK)
         return true;
     pthread_rwlock_unlock(&h->lock);
     return false;

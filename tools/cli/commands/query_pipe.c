@@ -61,7 +61,7 @@ typedef struct pipe_line {
 
 /* --- answers leave in order --- */
 
-static void stop(pipe_line *p)
+static void stop_pipe(pipe_line *p)
 {
     p->stopped = true;
     if (p->waker >= 0)
@@ -86,7 +86,7 @@ static bool has_turn(slot *s)
 
 /* Long answers leave in the block's turn. Before it they stop at a row, behind which they go on
  * when the model has been let go. */
-static void spill(answer_text *t, void *user)
+static void spill_answers(answer_text *t, void *user)
 {
     slot *s = user;
     if (has_turn(s))
@@ -108,7 +108,7 @@ static void tell_progress(pipe_line *p, const slot *s)
 }
 
 /* The answers, then what is wrong behind them. False: nothing may follow. */
-static bool leave(pipe_line *p, slot *s)
+static bool leave_block(pipe_line *p, slot *s)
 {
     bool left = answer_text_leave(&s->text, p->job->command);
     if (!left || s->status != EBPO_OK || s->block.failed)
@@ -125,7 +125,7 @@ static bool leave(pipe_line *p, slot *s)
 }
 
 /* Who finishes the oldest block lets it leave, with all those behind it that are done. */
-static void finish(pipe_line *p, slot *s)
+static void finish_block(pipe_line *p, slot *s)
 {
     pthread_mutex_lock(&p->lock);
     s->done = true;
@@ -135,12 +135,12 @@ static void finish(pipe_line *p, slot *s)
             break;
         p->leaving = true;
         pthread_mutex_unlock(&p->lock);
-        bool go_on = leave(p, oldest);
+        bool go_on = leave_block(p, oldest);
         pthread_mutex_lock(&p->lock);
         p->leaving = oldest->done = false;
         p->left++;
         if (!go_on)
-            stop(p);
+            stop_pipe(p);
         pthread_cond_broadcast(&p->moved);
     }
     pthread_mutex_unlock(&p->lock);
@@ -205,7 +205,7 @@ static bool answer_piece(pipe_line *p, query_worker *w, slot *s, const double *r
 
 /* The first questions come in small pieces, each as large as all before it: after each it may be
  * decided to bring in all of the model. Questions that fail together are answered one by one. */
-static void answer(pipe_line *p, query_worker *w, slot *s)
+static void answer_block(pipe_line *p, query_worker *w, slot *s)
 {
     const points_block *b = &s->block;
     uint64_t width = (uint64_t)points_width(p->job->kind), most = b->row_count;
@@ -231,13 +231,13 @@ static void answer(pipe_line *p, query_worker *w, slot *s)
 
 /* --- threads --- */
 
-static void *work(void *user);
+static void *work_on_blocks(void *user);
 
 /* Another thread joins when there is more than a little to do. */
 static void call_another(pipe_line *p)
 {
     crew *next = &p->crew[p->working];
-    if (p->working < p->threads && command_thread(&next->thread, work, next) == 0)
+    if (p->working < p->threads && command_thread(&next->thread, work_on_blocks, next) == 0)
         p->working++;
 }
 
@@ -264,7 +264,7 @@ static void end_taking(pipe_line *p, bool took)
 }
 
 /* NULL: there is no more. */
-static slot *take(pipe_line *p)
+static slot *take_block(pipe_line *p)
 {
     if (!begin_to_take(p))
         return NULL;
@@ -279,14 +279,14 @@ static slot *take(pipe_line *p)
     return took ? s : NULL;
 }
 
-static void *work(void *user)
+static void *work_on_blocks(void *user)
 {
     crew *c = user;
     pipe_line *p = c->pipe;
-    for (slot *s = take(p); s; s = take(p)) {
+    for (slot *s = take_block(p); s; s = take_block(p)) {
         points_parse(p->in, &s->block);
-        answer(p, &c->worker, s);
-        finish(p, s);
+        answer_block(p, &c->worker, s);
+        finish_block(p, s);
     }
     return NULL;
 }
@@ -305,7 +305,7 @@ static void make_waker(pipe_line *p)
     p->waker = ends[1];
 }
 
-static bool make(pipe_line *p)
+static bool make_slots(pipe_line *p)
 {
     p->slot = calloc(p->slots, sizeof *p->slot);
     p->crew = calloc(p->threads, sizeof *p->crew);
@@ -317,7 +317,7 @@ static bool make(pipe_line *p)
         p->slot[i].pipe = p;
         if (p->in->together > POINTS_BATCH)
             p->slot[i].text.spill_at = KEPT_EACH * p->in->together;
-        p->slot[i].text.spill = spill;
+        p->slot[i].text.spill = spill_answers;
         p->slot[i].text.user = &p->slot[i];
     }
     for (unsigned i = 0; i < p->threads; i++)
@@ -327,7 +327,7 @@ static bool make(pipe_line *p)
     return true;
 }
 
-static void unmake(pipe_line *p)
+static void free_slots(pipe_line *p)
 {
     for (unsigned i = 0; p->crew && i < p->threads; i++) {
         query_holding_forget(p->holding, &p->crew[i].worker.context);
@@ -374,12 +374,12 @@ int query_pipe_run(const query_job *job, query_holding *holding, points *in, uns
                   : 1;
     pthread_mutex_init(&p.lock, NULL);
     pthread_cond_init(&p.moved, NULL);
-    p.code = make(&p) ? EXIT_FINE : command_no_memory(job->command);
+    p.code = make_slots(&p) ? EXIT_FINE : command_no_memory(job->command);
     if (p.code == EXIT_FINE)
         p.code = ask_nothing(&p, &p.crew[0].worker);
     if (p.code == EXIT_FINE) {
         p.working = 1;
-        work(&p.crew[0]);
+        work_on_blocks(&p.crew[0]);
         /* threads are called by those before them, which have ended here */
         for (unsigned i = 1; i < p.working; i++)
             pthread_join(p.crew[i].thread, NULL);
@@ -388,7 +388,7 @@ int query_pipe_run(const query_job *job, query_holding *holding, points *in, uns
         if (p.code == EXIT_FINE && in->failed)
             p.code = EXIT_FAILED;
     }
-    unmake(&p);
+    free_slots(&p);
     pthread_mutex_destroy(&p.lock);
     pthread_cond_destroy(&p.moved);
     return p.code;

@@ -56,8 +56,8 @@ static int open_sampler(query_job *job, const query_holding *holding, ebpo_sampl
     return EXIT_FINE;
 }
 
-static int ask(query_job *job, query_holding *holding, points *in,
-               const ebpo_model_options *options)
+static int ask_all(query_job *job, query_holding *holding, points *in,
+                   const ebpo_model_options *options)
 {
     progress_line line;
     /* the line stands between answers where both go to one terminal */
@@ -75,7 +75,7 @@ static int ask(query_job *job, query_holding *holding, points *in,
 
 /* Forms of answers exclude each other; --raw, which tells of the questions too, gives way to them.
  */
-static bool fits(const query_job *job)
+static bool form_fits(const query_job *job)
 {
     const query_values *v = job->values;
     unsigned bytes;
@@ -111,7 +111,7 @@ enum { TOGETHER_IN_PARTS = 1 << 20 };
 /* What is kept of one of them in one array, at most. */
 enum { TOGETHER_BYTES = 1024 };
 
-static uint64_t together(const query_values *v, const query_holding *holding)
+static uint64_t bytes_together(const query_values *v, const query_holding *holding)
 {
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     const uint64_t most = SIZE_MAX / TOGETHER_BYTES; /* on machines of 32 bits */
@@ -136,8 +136,8 @@ static int open_asked(query_job *job, const char *model, const ebpo_model_option
 }
 
 /* With the model, of what is in `in`. */
-static int run(query_job *job, const char *model, points *in, const ebpo_model_options *options,
-               query_shard *shard)
+static int run_query(query_job *job, const char *model, points *in,
+                     const ebpo_model_options *options, query_shard *shard)
 {
     query_holding holding;
     ebpo_sampler *sampler = NULL;
@@ -147,8 +147,8 @@ static int run(query_job *job, const char *model, points *in, const ebpo_model_o
     if (code == EXIT_FINE)
         code = query_shard_begin(shard);
     if (code == EXIT_FINE) {
-        in->together = together(job->values, &holding);
-        code = ask(job, &holding, in, options);
+        in->together = bytes_together(job->values, &holding);
+        code = ask_all(job, &holding, in, options);
         code = query_shard_end(shard, job, code);
     }
     ebpo_sampler_free(sampler);
@@ -174,7 +174,7 @@ static int open_and_run(query_job *job, const char *model, const char *path,
     in.header = v->header;
     if (fine && shard->of)
         fine = points_cut(&in, shard->number, shard->of);
-    code = fine ? run(job, model, &in, options, shard) : EXIT_FAILED;
+    code = fine ? run_query(job, model, &in, options, shard) : EXIT_FAILED;
     points_close(&in);
     return code;
 }
@@ -185,7 +185,7 @@ int query_run(query_job *job, const char *model, const char *path)
     query_shard shard;
     if (!query_options_from(job->command, job->values, &options, &job->inside, &job->distance))
         return EXIT_USAGE;
-    if (!fits(job) || (catalogue_is(model) && !query_catalogue_fits(job)))
+    if (!form_fits(job) || (catalogue_is(model) && !query_catalogue_fits(job)))
         return EXIT_USAGE;
     job->form = form_of(job->values);
     int code = EXIT_USAGE;

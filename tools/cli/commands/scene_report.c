@@ -301,7 +301,7 @@ static ebpo_status begin_strip(report *r, ebpo_error *error)
     return error->status = missing ? EBPO_E_UNSUPPORTED : EBPO_E_MEMORY;
 }
 
-static ebpo_status begin(report *r, ebpo_error *error)
+static ebpo_status begin_report(report *r, ebpo_error *error)
 {
     const char *out = r->v->out;
     if (r->prints && r->v->json) {
@@ -339,7 +339,7 @@ static ebpo_status finish_files(report *r, ebpo_error *error)
     return r->page ? write_page(r, error) : EBPO_OK;
 }
 
-static void finish(report *r, double seconds)
+static void finish_report(report *r, double seconds)
 {
     if (r->prints && r->v->json) {
         json_end(&r->j);
@@ -389,7 +389,7 @@ ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *sc
     r.how.depth = v->depth;
     r.how.threads = (unsigned)v->threads;
     r.how.progress = progress_start(&line, "scene", v->quiet);
-    ebpo_status status = begin(&r, error);
+    ebpo_status status = begin_report(&r, error);
     for (uint64_t n = 0; n < r.frames && status == EBPO_OK; n++) {
         status = ask_frame(&r, time_of(v, n, r.frames), error);
         if (status == EBPO_OK)
@@ -399,7 +399,7 @@ ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *sc
         status = finish_files(&r, error);
     progress_wipe(&line);
     if (status == EBPO_OK)
-        finish(&r, progress_now() - begun);
+        finish_report(&r, progress_now() - begun);
     ebpo_scene_record_free(r.record);
     clash_strip_free(r.strip);
     clash_free(&r.clashes);

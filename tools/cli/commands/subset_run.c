@@ -134,7 +134,7 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
     return subset_need(name, v->max_error, v->target_size, out);
 }
 
-static ebpo_status wrong(ebpo_error *error, const char *shown, const char *what)
+static ebpo_status refuse_values(ebpo_error *error, const char *shown, const char *what)
 {
     error->status = EBPO_E_ARGUMENT;
     snprintf(error->message, sizeof error->message, "%.200s: %s", shown, what);
@@ -148,18 +148,18 @@ ebpo_status subset_settle(const subset_values *v, const ebpo_info *info, const c
     if (out->last_level >= info->level_count && !info->pruned) {
         snprintf(what, sizeof what, "there is no level %d; the file has levels 0 to %d",
                  out->last_level, info->level_count - 1);
-        return wrong(error, shown, what);
+        return refuse_values(error, shown, what);
     }
     bool named = v->parts && v->parts[0] != '-';
     if (named && out->parts & ~info->parts) {
         char parts[80];
         snprintf(what, sizeof what, "--parts asks for %s, which the file does not have",
                  words_parts(parts, sizeof parts, out->parts & ~info->parts));
-        return wrong(error, shown, what);
+        return refuse_values(error, shown, what);
     }
     if (named && out->parts & EBPO_PART_MAPS && !(out->parts & EBPO_PART_MESH))
-        return wrong(error, shown,
-                     "--parts asks for maps without the mesh that they number; add mesh");
+        return refuse_values(error, shown,
+                             "--parts asks for maps without the mesh that they number; add mesh");
     if (!v->parts && v->profile < 0 && out->last_level >= 0 &&
         out->last_level < info->level_count - 1)
         out->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);
@@ -171,8 +171,9 @@ ebpo_status subset_settle(const subset_values *v, const ebpo_info *info, const c
     out->codec = v->codec >= 0 ? (ebpo_codec)v->codec : info->codec;
     out->codec_level = (int)v->zstd_level;
     if (v->zstd_level && out->codec != EBPO_CODEC_ZSTD)
-        return wrong(error, shown,
-                     "--zstd-level does not apply to the codec of this file; add --codec zstd");
+        return refuse_values(
+            error, shown,
+            "--zstd-level does not apply to the codec of this file; add --codec zstd");
     return EBPO_OK;
 }
 

@@ -25,7 +25,7 @@ static void place_at(const own *o, double angle, double height, double radius, d
     out[o->up] = o->origin[o->up] + o->size[o->up] * (0.5 + height);
 }
 
-static ebpo_status look(own *o, ebpo_context *context, ebpo_error *error)
+static ebpo_status look_around(own *o, ebpo_context *context, ebpo_error *error)
 {
     for (int h = 0; h < HIGH; h++)
         for (int a = 0; a < ROUND; a++) {
@@ -45,7 +45,7 @@ static ebpo_status look(own *o, ebpo_context *context, ebpo_error *error)
     return EBPO_OK;
 }
 
-static double surface(const own *o, double angle, double height)
+static double surface_distance(const own *o, double angle, double height)
 {
     double a = angle / (2 * pi) * ROUND, h = (height / 0.9 + 0.5) * (HIGH - 1);
     int i = (int)floor(a), j = (int)fmin(fmax(floor(h), 0), HIGH - 2);
@@ -61,7 +61,7 @@ static bool pose_at(void *self, uint64_t tick, touch_pose *out)
     double seconds = (double)tick / o->rate, angle = 2 * pi * seconds / 8;
     double height = 0.4 * sin(0.31 * angle), nod = 0.06 * cos(3.7 * angle);
     double begun = fmax(0, 1 - seconds); /* from outside of all */
-    double radius = surface(o, angle, height) + o->clear + nod - 0.01;
+    double radius = surface_distance(o, angle, height) + o->clear + nod - 0.01;
     place_at(o, angle, height, radius + begun * (0.9 + o->clear - radius), out->place);
     for (int k = 0; k < 4; k++)
         out->turn[k] = 0;
@@ -70,7 +70,7 @@ static bool pose_at(void *self, uint64_t tick, touch_pose *out)
     return true;
 }
 
-static bool begin(void *self, double seconds, touch_pose *first)
+static bool begin_own(void *self, double seconds, touch_pose *first)
 {
     (void)seconds;
     return pose_at(self, 0, first);
@@ -82,7 +82,7 @@ static void write_answer(void *self, const touch_answer *answer)
     (void)answer;
 }
 
-static uint64_t ticks(void *self)
+static uint64_t count_ticks(void *self)
 {
     (void)self;
     return 0;
@@ -93,7 +93,7 @@ ebpo_status touch_own_open(touch_device *out, ebpo_model *model, const ebpo_info
 {
     own *o = calloc(1, sizeof *o);
     ebpo_context *context = NULL;
-    *out = (touch_device){ begin, pose_at, write_answer, ticks, free, o };
+    *out = (touch_device){ begin_own, pose_at, write_answer, count_ticks, free, o };
     ebpo_status status = ebpo_context_new(model, &context, error);
     if (status != EBPO_OK || !o)
         return status != EBPO_OK ? status : EBPO_E_MEMORY;
@@ -106,7 +106,7 @@ ebpo_status touch_own_open(touch_device *out, ebpo_model *model, const ebpo_info
         if (o->size[k] > o->size[o->up])
             o->up = k;
     }
-    status = look(o, context, error);
+    status = look_around(o, context, error);
     ebpo_context_free(context);
     return status;
 }

@@ -13,7 +13,7 @@ typedef struct path {
     uint64_t count, capacity;
 } path;
 
-static const char *skip(const char *at)
+static const char *skip_blanks(const char *at)
 {
     while (*at == ' ' || *at == '\t' || *at == '\r' || *at == '\n')
         at++;
@@ -21,9 +21,9 @@ static const char *skip(const char *at)
 }
 
 /* The numbers of a line; -1: something else is in it. */
-static int numbers(const char *line, size_t length, double out[7])
+static int read_numbers(const char *line, size_t length, double out[7])
 {
-    const char *at = skip(line), *end = line + length;
+    const char *at = skip_blanks(line), *end = line + length;
     int count = 0;
     while (*at && *at != '#') {
         const char *after;
@@ -31,7 +31,7 @@ static int numbers(const char *line, size_t length, double out[7])
         if (after == at || count == 7 || !isfinite(x) || fabs(x) > 0x1p200)
             return -1;
         out[count++] = x;
-        at = skip(after);
+        at = skip_blanks(after);
     }
     return count;
 }
@@ -44,7 +44,7 @@ static bool make_unit(double q[4])
     return length >= 0x1p-200;
 }
 
-static bool add(path *p, const double v[7], int count)
+static bool add_pose(path *p, const double v[7], int count)
 {
     if (p->count == p->capacity) {
         uint64_t more = p->capacity ? 2 * p->capacity : 1024;
@@ -69,9 +69,10 @@ static bool read_lines(path *p, FILE *in, const char *name)
     for (uint64_t n = 1; fine && (length = getline(&line, &room, in)) >= 0; n++) {
         double v[7];
         const char *text = n == 1 ? number_skip_mark(line) : line;
-        int count =
-            strlen(line) == (size_t)length ? numbers(text, (size_t)(line + length - text), v) : -1;
-        fine = count == 0 || ((count == 3 || count == 7) && add(p, v, count));
+        int count = strlen(line) == (size_t)length
+                        ? read_numbers(text, (size_t)(line + length - text), v)
+                        : -1;
+        fine = count == 0 || ((count == 3 || count == 7) && add_pose(p, v, count));
         if (!fine)
             fprintf(stderr,
                     "ebpo touch: %s, line %llu: expected three numbers, or seven of which the last "
@@ -88,7 +89,7 @@ static bool read_lines(path *p, FILE *in, const char *name)
     return fine && p->count > 0;
 }
 
-static bool begin(void *self, double seconds, touch_pose *first)
+static bool begin_path(void *self, double seconds, touch_pose *first)
 {
     (void)seconds;
     *first = ((path *)self)->pose[0];
@@ -110,9 +111,9 @@ static void write_answer(void *self, const touch_answer *answer)
     (void)answer;
 }
 
-static uint64_t ticks(void *self) { return ((path *)self)->count; }
+static uint64_t count_ticks(void *self) { return ((path *)self)->count; }
 
-static void end(void *self)
+static void end_path(void *self)
 {
     free(((path *)self)->pose);
     free(self);
@@ -123,7 +124,7 @@ bool touch_path_open(touch_device *out, const char *name)
     path *p = calloc(1, sizeof *p);
     bool standard = strcmp(name, "-") == 0;
     FILE *in = standard ? stdin : fopen(name, "r");
-    *out = (touch_device){ begin, read_pose, write_answer, ticks, end, p };
+    *out = (touch_device){ begin_path, read_pose, write_answer, count_ticks, end_path, p };
     bool fine = p && in;
     if (!in)
         fprintf(stderr, "ebpo touch: %s: cannot be opened: %s\n", name, strerror(errno));

@@ -35,7 +35,7 @@ typedef struct udp {
 
 /* --- bytes: little-endian, whatever the machine is --- */
 
-static uint64_t get(const uint8_t *at, int bytes)
+static uint64_t get_bytes(const uint8_t *at, int bytes)
 {
     uint64_t v = 0;
     for (int i = 0; i < bytes; i++)
@@ -45,13 +45,13 @@ static uint64_t get(const uint8_t *at, int bytes)
 
 static double get_real(const uint8_t *at)
 {
-    uint64_t bits = get(at, 8);
+    uint64_t bits = get_bytes(at, 8);
     double v;
     memcpy(&v, &bits, sizeof v);
     return v;
 }
 
-static uint8_t *put(uint8_t *at, uint64_t v, int bytes)
+static uint8_t *put_bytes(uint8_t *at, uint64_t v, int bytes)
 {
     for (int i = 0; i < bytes; i++)
         at[i] = (uint8_t)(v >> 8 * i);
@@ -63,7 +63,7 @@ static uint8_t *put_reals(uint8_t *at, const double *v, int count)
     for (int i = 0; i < count; i++) {
         uint64_t bits;
         memcpy(&bits, &v[i], sizeof bits);
-        at = put(at, bits, 8);
+        at = put_bytes(at, bits, 8);
     }
     return at;
 }
@@ -88,12 +88,12 @@ static bool read_pose(const uint8_t *p, touch_pose *out)
 }
 
 /* False: it is no packet of the device, or an old one. */
-static bool take(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_in *from)
+static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_in *from)
 {
     touch_pose pose;
-    if (size != PLACE_BYTES || memcmp(p, "EBPT", 4) != 0 || get(p + 4, 2) != VERSION)
+    if (size != PLACE_BYTES || memcmp(p, "EBPT", 4) != 0 || get_bytes(p + 4, 2) != VERSION)
         return false;
-    uint64_t kind = get(p + 6, 2), sequence = get(p + 8, 8);
+    uint64_t kind = get_bytes(p + 6, 2), sequence = get_bytes(p + 8, 8);
     if (u->known && (from->sin_port != u->device.sin_port ||
                      from->sin_addr.s_addr != u->device.sin_addr.s_addr || sequence <= u->sequence))
         return false;
@@ -106,7 +106,7 @@ static bool take(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_i
     u->known = true;
     u->device = *from;
     u->sequence = sequence;
-    u->tag = get(p + 16, 8);
+    u->tag = get_bytes(p + 16, 8);
     return true;
 }
 
@@ -120,7 +120,7 @@ static void take_all(udp *u)
                                 (struct sockaddr *)&from, &length);
         if (size < 0 && errno != ECONNREFUSED) /* the device is gone: it may come back */
             return;
-        if (size >= 0 && !(length == sizeof from && take(u, bytes, size, &from)))
+        if (size >= 0 && !(length == sizeof from && take_packet(u, bytes, size, &from)))
             u->ignored++;
     }
 }
@@ -135,7 +135,7 @@ static void tell_port(const udp *u)
     fprintf(stderr, "ebpo touch: waits for a device at %s, port %u\n", text, ntohs(at.sin_port));
 }
 
-static bool begin(void *self, double seconds, touch_pose *first)
+static bool begin_udp(void *self, double seconds, touch_pose *first)
 {
     udp *u = self;
     tell_port(u);
@@ -167,10 +167,10 @@ static void write_answer(void *self, const touch_answer *a)
     udp *u = self;
     uint8_t bytes[FEEL_BYTES], *at = bytes;
     memcpy(at, "EBPT", 4);
-    at = put(at + 4, VERSION, 2);
-    at = put(at, FEEL, 2);
-    at = put(at, u->sequence, 8);
-    at = put(at, u->tag, 8);
+    at = put_bytes(at + 4, VERSION, 2);
+    at = put_bytes(at, FEEL, 2);
+    at = put_bytes(at, u->sequence, 8);
+    at = put_bytes(at, u->tag, 8);
     at = put_reals(at, a->force, 3);
     at = put_reals(at, a->torque, 3);
     at = put_reals(at, a->proxy.place, 3);
@@ -179,21 +179,21 @@ static void write_answer(void *self, const touch_answer *a)
     at = put_reals(at, &a->lo, 1);
     at = put_reals(at, &a->hi, 1);
     at = put_reals(at, a->normal, 3);
-    at = put(at, a->face, 8);
-    at = put(at, a->flags, 4);
+    at = put_bytes(at, a->face, 8);
+    at = put_bytes(at, a->flags, 4);
     memcpy(at, a->rgb, 3);
     at[3] = a->where;
     (void)sendto(u->socket, bytes, sizeof bytes, MSG_DONTWAIT, (const struct sockaddr *)&u->device,
                  sizeof u->device);
 }
 
-static uint64_t ticks(void *self)
+static uint64_t count_ticks(void *self)
 {
     (void)self;
     return 0;
 }
 
-static void end(void *self)
+static void end_udp(void *self)
 {
     udp *u = self;
     if (u && u->socket >= 0)
@@ -232,7 +232,7 @@ bool touch_udp_open(touch_device *out, const char *name)
 {
     struct sockaddr_in at;
     udp *u = calloc(1, sizeof *u);
-    *out = (touch_device){ begin, read_place, write_answer, ticks, end, u };
+    *out = (touch_device){ begin_udp, read_place, write_answer, count_ticks, end_udp, u };
     if (!u)
         return false;
     u->socket = -1;

@@ -14,7 +14,7 @@ typedef struct longer {
     const char *path;
 } longer;
 
-static ebpo_status fail(const char *path, ebpo_error *error)
+static ebpo_status fail_path(const char *path, ebpo_error *error)
 {
     snprintf(error->message, sizeof error->message, "%s: %s", path, strerror(errno));
     return error->status = EBPO_E_IO;
@@ -34,7 +34,7 @@ static ebpo_status read_longer(void *user, uint64_t offset, uint64_t size, void 
         if (got == 0)
             errno = EIO; /* it has been shortened */
         if (got <= 0)
-            return fail(l->path, error);
+            return fail_path(l->path, error);
         to += got;
         offset += (uint64_t)got;
     }
@@ -58,7 +58,7 @@ ebpo_status unlisted_open(const char *path, uint64_t most_expansion, ebpo_file *
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     longer *l = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode) ? malloc(sizeof *l) : NULL;
     if (!l) {
-        ebpo_status status = fail(path, error);
+        ebpo_status status = fail_path(path, error);
         if (fd >= 0)
             close(fd);
         return status;

@@ -20,7 +20,7 @@ typedef struct installation {
 
 /* A path of what was installed, which is from the program's folder unless it is absolute; "": there
  * is no such file. */
-static void locate(const char *program, const char *path, const char *name, char out[PATH_MAX])
+static void locate_file(const char *program, const char *path, const char *name, char out[PATH_MAX])
 {
     char joined[3 * PATH_MAX];
     int folder = path[0] == '/' ? 0 : (int)(strrchr(program, '/') - program + 1);
@@ -29,7 +29,7 @@ static void locate(const char *program, const char *path, const char *name, char
         out[0] = 0;
 }
 
-static void look(installation *i)
+static void look_at_installation(installation *i)
 {
     Dl_info library;
     if (!realpath("/proc/self/exe", i->program))
@@ -38,15 +38,15 @@ static void look(installation *i)
     bool known = function && dladdr(function, &library) && library.dli_fname;
     if (!known || !realpath(library.dli_fname, i->library))
         i->library[0] = 0;
-    locate(i->program, EBPO_LIBRARY_FROM_BIN, "", i->own);
+    locate_file(i->program, EBPO_LIBRARY_FROM_BIN, "", i->own);
     i->plugin[0] = 0;
     if (*EBPO_PLUGIN_FROM_BIN)
-        locate(i->program, EBPO_PLUGIN_FROM_BIN, "/libebpo_h5zstd.so", i->plugin);
+        locate_file(i->program, EBPO_PLUGIN_FROM_BIN, "/libebpo_h5zstd.so", i->plugin);
     if (i->plugin[0])
         *strrchr(i->plugin, '/') = 0;
 }
 
-static void print(const installation *i)
+static void print_installation(const installation *i)
 {
     printf("program: %s\nlibrary: %s (%s)\nHDF5 plugin: %s\n", i->program,
            i->library[0] ? i->library : "unknown", ebpo_version(),
@@ -58,7 +58,7 @@ static void print(const installation *i)
 }
 
 /* Not printed with the rest: whoever asks for the version alone is told, too. */
-static int warn(const installation *i)
+static int warn_of_other(const installation *i)
 {
     bool other = i->own[0] && i->library[0] && !command_same_file(i->own, i->library);
     if (other)
@@ -83,10 +83,10 @@ int version_tell(const char *argument)
         return EXIT_USAGE;
     }
     installation i;
-    look(&i);
+    look_at_installation(&i);
     printf("ebpo %s, format %s\n", ebpo_version(),
            words_format(format, sizeof format, EBPO_FORMAT_MAJOR, EBPO_FORMAT_MINOR));
     if (verbose)
-        print(&i);
-    return warn(&i);
+        print_installation(&i);
+    return warn_of_other(&i);
 }

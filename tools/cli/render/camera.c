@@ -5,19 +5,19 @@
 
 static const double margin = 0.94; /* share of the picture that the model may fill */
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void vertex(const ebpo_mesh *mesh, uint64_t i, double out[3])
+static void read_vertex(const ebpo_mesh *mesh, uint64_t i, double out[3])
 {
     for (uint64_t k = 0; k < 3; k++)
         out[k] = mesh->xyz32 ? (double)mesh->xyz32[3 * i + k] : mesh->xyz64[3 * i + k];
 }
 
 /* At azimuth 0 the eye looks along -z when y is up, along y when z is up, along -z when x is up. */
-static void aim(camera *c, double azimuth, double elevation, int up_axis)
+static void aim_camera(camera *c, double azimuth, double elevation, int up_axis)
 {
     static const double rights[3][3] = { { 0, -1, 0 }, { 1, 0, 0 }, { 1, 0, 0 } };
     static const double fronts[3][3] = { { 0, 0, 1 }, { 0, 0, 1 }, { 0, -1, 0 } };
@@ -32,12 +32,12 @@ static void aim(camera *c, double azimuth, double elevation, int up_axis)
     }
 }
 
-static void centre(camera *c, const ebpo_mesh *mesh)
+static void centre_model(camera *c, const ebpo_mesh *mesh)
 {
     double low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY };
     for (uint64_t i = 0; i < mesh->vertex_count; i++) {
         double v[3];
-        vertex(mesh, i, v);
+        read_vertex(mesh, i, v);
         for (int k = 0; k < 3; k++) {
             low[k] = fmin(low[k], v[k]);
             high[k] = fmax(high[k], v[k]);
@@ -49,18 +49,19 @@ static void centre(camera *c, const ebpo_mesh *mesh)
 
 /* The distance at which every vertex is seen, and by how much the picture is then off its middle.
  */
-static void measure(camera *c, const ebpo_mesh *mesh, double aspect, double *shift_x,
-                    double *shift_y)
+static void measure_view(camera *c, const ebpo_mesh *mesh, double aspect, double *shift_x,
+                         double *shift_y)
 {
     double tx = c->tangent * aspect * margin, ty = c->tangent * margin, distance = 0;
     double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY };
     for (int pass = 0; pass < 2; pass++) {
         for (uint64_t i = 0; i < mesh->vertex_count; i++) {
             double v[3];
-            vertex(mesh, i, v);
+            read_vertex(mesh, i, v);
             for (int k = 0; k < 3; k++)
                 v[k] -= c->target[k];
-            double x = dot(v, c->right), y = dot(v, c->up), z = dot(v, c->back);
+            double x = dot_product(v, c->right), y = dot_product(v, c->up),
+                   z = dot_product(v, c->back);
             if (pass == 0) {
                 distance = fmax(distance, z + fmax(fabs(x) / tx, fabs(y) / ty));
                 continue;
@@ -85,12 +86,12 @@ void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double eleva
     double aspect = (double)width / height, sx, sy;
     memset(out, 0, sizeof *out);
     out->tangent = 0.22; /* a long lens: 25 degrees */
-    aim(out, azimuth, elevation, up_axis);
-    centre(out, mesh);
+    aim_camera(out, azimuth, elevation, up_axis);
+    centre_model(out, mesh);
     for (int round = 0; round < 3; round++) {
-        measure(out, mesh, aspect, &sx, &sy);
+        measure_view(out, mesh, aspect, &sx, &sy);
         for (int k = 0; k < 3; k++)
             out->target[k] += sx * out->right[k] + sy * out->up[k];
     }
-    measure(out, mesh, aspect, &sx, &sy);
+    measure_view(out, mesh, aspect, &sx, &sy);
 }

@@ -47,7 +47,7 @@ static struct {
  * would then not be the one that was asked for. */
 static enum { UNTRIED, LOADED, MISSING, FAILED } loaded;
 
-static void load(void)
+static void load_cairo(void)
 {
     if (loaded != UNTRIED)
         return;
@@ -64,12 +64,12 @@ static void load(void)
 
 bool picture_has_captions(void)
 {
-    load();
+    load_cairo();
     return loaded != MISSING;
 }
 
 /* *good: memory sufficed. */
-static cairo_surface_t *coverage(int width, int height, const char *text, bool *good)
+static cairo_surface_t *text_coverage(int width, int height, const char *text, bool *good)
 {
     cairo_surface_t *surface = lib.image_surface_create(CAIRO_FORMAT_A8, width, height);
     cairo_t *cairo = lib.create(surface);
@@ -101,14 +101,14 @@ ebpo_status picture_caption(picture *p, int x, int y, int width, int height,
                             const uint8_t colour[3], const char *text, ebpo_error *error)
 {
     bool good = false;
-    load();
+    load_cairo();
     if (loaded == MISSING)
         return EBPO_OK;
     if (loaded == FAILED)
         return no_memory("libcairo, which draws captions, cannot be loaded: memory is short, or "
                          "the library damaged",
                          error);
-    cairo_surface_t *surface = coverage(width, height, text, &good);
+    cairo_surface_t *surface = text_coverage(width, height, text, &good);
     const unsigned char *row = good ? lib.image_surface_get_data(surface) : NULL;
     good = row != NULL;
     for (int j = 0; row && j < height; j++, row += lib.image_surface_get_stride(surface))

@@ -10,7 +10,7 @@ typedef struct maker {
     bool filling;
 } maker;
 
-static bool add(void *user, const ebpo_view_node *v)
+static bool add_node(void *user, const ebpo_view_node *v)
 {
     maker *m = user;
     const ebpo_stream_node *n = &v->node;
@@ -35,7 +35,7 @@ static bool add(void *user, const ebpo_view_node *v)
 ebpo_status cut_mesh_write(ebpo_view_stream *stream, const char *path, ebpo_error *error)
 {
     maker m = { .filling = false };
-    ebpo_view_stream_cut(stream, add, &m);
+    ebpo_view_stream_cut(stream, add_node, &m);
     uint64_t vertices = m.mesh.vertex_count, faces = m.mesh.face_count;
     if (vertices > UINT32_MAX - 1 || faces > UINT32_MAX - 1) {
         snprintf(error->message, sizeof error->message,
@@ -50,7 +50,7 @@ ebpo_status cut_mesh_write(ebpo_view_stream *stream, const char *path, ebpo_erro
     if (m.mesh.xyz64 && m.mesh.faces) {
         m.mesh.vertex_count = m.mesh.face_count = 0;
         m.filling = true;
-        ebpo_view_stream_cut(stream, add, &m);
+        ebpo_view_stream_cut(stream, add_node, &m);
         status = ebpo_mesh_write_ply(&m.mesh, path, error);
     } else {
         snprintf(error->message, sizeof error->message,

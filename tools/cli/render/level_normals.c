@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void spread(const ebpo_lod_nodes *nodes, const float *of_polygon, float *of_triangle)
+static void spread_normals(const ebpo_lod_nodes *nodes, const float *of_polygon, float *of_triangle)
 {
     for (uint64_t i = 0; i < nodes->polygon_count; i++, of_polygon += 3)
         for (unsigned n = nodes->corners[i]; n > 2; n--, of_triangle += 3)
@@ -26,7 +26,7 @@ ebpo_status level_normals(const ebpo_info *info, const ebpo_mesh *mesh, const eb
         status = error->status = EBPO_E_MEMORY;
     }
     if (status == EBPO_OK) {
-        spread(nodes, of_polygon, *out);
+        spread_normals(nodes, of_polygon, *out);
     } else {
         free(*out);
         *out = NULL;

@@ -36,12 +36,12 @@ typedef struct raster {
     double linear[256]; /* sRGB values as light */
 } raster;
 
-static double dot(const double a[3], const double b[3])
+static double dot_product(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void cross(const double a[3], const double b[3], double out[3])
+static void cross_product(const double a[3], const double b[3], double out[3])
 {
     out[0] = a[1] * b[2] - a[2] * b[1];
     out[1] = a[2] * b[0] - a[0] * b[2];
@@ -55,12 +55,12 @@ static void to_camera(const raster *r, uint64_t i, double out[3])
     for (uint64_t k = 0; k < 3; k++)
         v[k] = (r->mesh->xyz32 ? (double)r->mesh->xyz32[3 * i + k] : r->mesh->xyz64[3 * i + k]) -
                r->view->target[k];
-    out[0] = dot(v, r->view->right);
-    out[1] = dot(v, r->view->up);
-    out[2] = dot(v, r->view->back);
+    out[0] = dot_product(v, r->view->right);
+    out[1] = dot_product(v, r->view->up);
+    out[2] = dot_product(v, r->view->back);
 }
 
-static seen project(const raster *r, const double v[3])
+static seen project_point(const raster *r, const double v[3])
 {
     double inverse = 1 / (r->view->distance - v[2]);
     return (seen){ r->width / 2.0 + r->focal * v[0] * inverse,
@@ -74,8 +74,8 @@ static bool unit_normal(double (*c)[3], double out[3])
         u[k] = c[1][k] - c[0][k];
         v[k] = c[2][k] - c[0][k];
     }
-    cross(u, v, out);
-    double length = sqrt(dot(out, out));
+    cross_product(u, v, out);
+    double length = sqrt(dot_product(out, out));
     for (int k = 0; k < 3; k++)
         out[k] /= length;
     return length > 0;
@@ -85,7 +85,7 @@ static bool unit_normal(double (*c)[3], double out[3])
 
 /* Which sides (bit i: from corner i to the next) are outlines of the polygon: in the fans of
  * ebpo_lod_level the sides between neighbouring triangles of one plane are none. */
-static unsigned outline(const raster *r, uint64_t face, const double normal[3])
+static unsigned outline_sides(const raster *r, uint64_t face, const double normal[3])
 {
     const uint32_t *f = r->mesh->faces + 3 * face;
     unsigned sides = 7;
@@ -99,7 +99,7 @@ static unsigned outline(const raster *r, uint64_t face, const double normal[3])
             continue;
         for (int i = 0; i < 3; i++)
             to_camera(r, g[i], c[i]);
-        if (!unit_normal(c, other) || dot(normal, other) > 1 - 1e-9)
+        if (!unit_normal(c, other) || dot_product(normal, other) > 1 - 1e-9)
             sides &= step > 0 ? ~4u : ~1u;
     }
     return sides;
@@ -126,7 +126,7 @@ static bool make_sides(const seen p[3], sides *out)
     return true;
 }
 
-static int clamp(double v, int most) { return v < 0 ? 0 : v > most ? most : (int)v; }
+static int clamp_index(double v, int most) { return v < 0 ? 0 : v > most ? most : (int)v; }
 
 static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned outlines)
 {
@@ -141,10 +141,10 @@ static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned ou
     double gy = ((p[2].inverse - p[0].inverse) * (p[1].x - p[0].x) -
                  (p[1].inverse - p[0].inverse) * (p[2].x - p[0].x)) /
                 det;
-    int x0 = clamp(fmin(p[0].x, fmin(p[1].x, p[2].x)), r->width),
-        x1 = clamp(fmax(p[0].x, fmax(p[1].x, p[2].x)) + 1, r->width);
-    int y0 = clamp(fmin(p[0].y, fmin(p[1].y, p[2].y)), r->height),
-        y1 = clamp(fmax(p[0].y, fmax(p[1].y, p[2].y)) + 1, r->height);
+    int x0 = clamp_index(fmin(p[0].x, fmin(p[1].x, p[2].x)), r->width),
+        x1 = clamp_index(fmax(p[0].x, fmax(p[1].x, p[2].x)) + 1, r->width);
+    int y0 = clamp_index(fmin(p[0].y, fmin(p[1].y, p[2].y)), r->height),
+        y1 = clamp_index(fmax(p[0].y, fmax(p[1].y, p[2].y)) + 1, r->height);
     for (int y = y0; y < y1; y++)
         for (int x = x0; x < x1; x++) {
             double sx = x + 0.5, sy = y + 0.5, d[3];
@@ -169,9 +169,9 @@ static void light_from(const raster *r, uint64_t face, double n[3])
     if (!given || (given[0] == 0 && given[1] == 0 && given[2] == 0))
         return;
     double v[3] = { (double)given[0], (double)given[1], (double)given[2] };
-    n[0] = dot(v, r->view->right);
-    n[1] = dot(v, r->view->up);
-    n[2] = dot(v, r->view->back);
+    n[0] = dot_product(v, r->view->right);
+    n[1] = dot_product(v, r->view->up);
+    n[2] = dot_product(v, r->view->back);
 }
 
 static void draw_face(raster *r, uint64_t face)
@@ -182,22 +182,22 @@ static void draw_face(raster *r, uint64_t face)
     if (!unit_normal(c, n))
         return;
     double to_eye[3] = { -c[0][0], -c[0][1], r->view->distance - c[0][2] };
-    bool front = dot(n, to_eye) > 0;
+    bool front = dot_product(n, to_eye) > 0;
     if (!front && r->style->closed)
         return;
     if (front && r->style->paint && r->style->paint[face] & RASTER_HOLLOW)
         return;
-    unsigned outlines = r->style->edges ? outline(r, face, n) : 0;
+    unsigned outlines = r->style->edges ? outline_sides(r, face, n) : 0;
     light_from(r, face, n);
     for (int k = 0; k < 3; k++)
         r->normal[face][k] = (float)(front ? n[k] : -n[k]);
-    seen p[3] = { project(r, c[0]), project(r, c[1]), project(r, c[2]) };
+    seen p[3] = { project_point(r, c[0]), project_point(r, c[1]), project_point(r, c[2]) };
     fill_triangle(r, p, (uint32_t)face, outlines);
 }
 
 /* --- second step --- */
 
-static void position(const raster *r, int x, int y, double inverse, double out[3])
+static void sample_position(const raster *r, int x, int y, double inverse, double out[3])
 {
     double depth = 1 / inverse, scale = depth * r->per_focal;
     out[0] = (x + 0.5 - r->width / 2.0) * scale;
@@ -207,11 +207,11 @@ static void position(const raster *r, int x, int y, double inverse, double out[3
 
 /* How much of the sky near a sample is hidden, 0 .. 1: points on a spiral around it that lie above
  * its plane. */
-static double occlusion(const raster *r, int x, int y, const sample *at, const float n[3],
-                        double reach)
+static double sky_hidden(const raster *r, int x, int y, const sample *at, const float n[3],
+                         double reach)
 {
     double p[3], sum = 0;
-    position(r, x, y, at->inverse, p);
+    sample_position(r, x, y, at->inverse, p);
     uint32_t hash = ((uint32_t)x * 73856093u ^ (uint32_t)y * 19349663u) * 2654435761u;
     const double *turn = r->turn[hash >> 24];
     double radius = reach * r->focal * at->inverse, tx = radius * turn[0], ty = radius * turn[1];
@@ -224,12 +224,12 @@ static double occlusion(const raster *r, int x, int y, const sample *at, const f
         if (other->inverse <= 0)
             continue;
         double q[3];
-        position(r, qx, qy, other->inverse, q);
+        sample_position(r, qx, qy, other->inverse, q);
         double v[3] = { q[0] - p[0], q[1] - p[1], q[2] - p[2] };
         double height = (double)n[0] * v[0] + (double)n[1] * v[1] + (double)n[2] * v[2];
         if (height <= 0)
             continue;
-        double square = dot(v, v), above = height / sqrt(square) - 0.08;
+        double square = dot_product(v, v), above = height / sqrt(square) - 0.08;
         if (above > 0)
             sum += above / (1 + square / (reach * reach));
     }
@@ -249,8 +249,8 @@ static void corner_shares(const raster *r, uint32_t face, const double p[3], dou
     for (int k = 0; k < 3; k++)
         n[k] = (double)r->normal[face][k];
     for (int i = 0; i < 3; i++) {
-        cross(from[(i + 1) % 3], from[(i + 2) % 3], part);
-        sum += out[i] = fabs(dot(part, n));
+        cross_product(from[(i + 1) % 3], from[(i + 2) % 3], part);
+        sum += out[i] = fabs(dot_product(part, n));
     }
     for (int i = 0; i < 3; i++)
         out[i] = sum > 0 ? out[i] / sum : 1.0 / 3;
@@ -274,7 +274,7 @@ static void colour_at(const raster *r, int x, int y, const sample *at, double ou
         return;
     double p[3], shares[3];
     const uint32_t *corner = r->mesh->faces + 3 * (uint64_t)face;
-    position(r, x, y, (double)at->inverse, p);
+    sample_position(r, x, y, (double)at->inverse, p);
     corner_shares(r, face, p, shares);
     for (unsigned k = 0; k < 3; k++) {
         out[k] = 0;
@@ -285,7 +285,8 @@ static void colour_at(const raster *r, int x, int y, const sample *at, double ou
 
 /* Key light from the upper left, a weak fill from the right, the sky above, a gloss. Linear light.
  */
-static void light(const raster *r, int x, int y, const sample *at, double hidden, double out[3])
+static void light_sample(const raster *r, int x, int y, const sample *at, double hidden,
+                         double out[3])
 {
     double colour[3];
     colour_at(r, x, y, at, colour);
@@ -293,8 +294,9 @@ static void light(const raster *r, int x, int y, const sample *at, double hidden
     static const double key[3] = { -0.46, 0.62, 0.635 }, fill[3] = { 0.86, 0.10, 0.50 },
                         half[3] = { -0.254, 0.343, 0.904 };
     double m[3] = { (double)n[0], (double)n[1], (double)n[2] };
-    double k = fmax(0, dot(m, key)), f = fmax(0, dot(m, fill)), sky = 0.5 + 0.5 * m[1];
-    double gloss = fmax(0, dot(m, half));
+    double k = fmax(0, dot_product(m, key)), f = fmax(0, dot_product(m, fill)),
+           sky = 0.5 + 0.5 * m[1];
+    double gloss = fmax(0, dot_product(m, half));
     for (int i = 0; i < 5; i++) /* to the 32nd */
         gloss *= gloss;
     gloss *= 0.12;
@@ -343,7 +345,7 @@ static void resolve_pixel(const raster *r, int x, int y, double reach, uint8_t *
             double c[3] = { r->linear[rgb[0]], r->linear[rgb[1]], r->linear[rgb[2]] };
             if (at->inverse > 0) {
                 uint32_t face = at->what & ~EDGE;
-                light(r, i, j, at, occlusion(r, i, j, at, r->normal[face], reach), c);
+                light_sample(r, i, j, at, sky_hidden(r, i, j, at, r->normal[face], reach), c);
                 for (int k = 0; k < 3 && at->what & EDGE; k++)
                     c[k] = 0.45 * c[k] + 0.55 * ink[k];
             }
@@ -375,8 +377,8 @@ static void *resolve_rows(void *argument)
     return NULL;
 }
 
-static void resolve(const raster *r, picture *out, int x, int y, int width, int height,
-                    unsigned threads)
+static void resolve_picture(const raster *r, picture *out, int x, int y, int width, int height,
+                            unsigned threads)
 {
     share shares[THREADS_MAX];
     unsigned count = threads < 1 ? 1 : threads < THREADS_MAX ? threads : THREADS_MAX, started = 1;
@@ -430,7 +432,7 @@ ebpo_status raster_draw(picture *out, int x, int y, int width, int height, const
     for (uint64_t face = 0; face < mesh->face_count; face++)
         draw_face(&r, face);
     make_tables(&r);
-    resolve(&r, out, x, y, width, height, threads);
+    resolve_picture(&r, out, x, y, width, height, threads);
 done:
     free(r.samples);
     free(r.normal);

@@ -9,8 +9,8 @@
 /* loads take their time: no more of the points than this */
 enum { BUDGET_POINTS = 500 };
 
-static ebpo_status ask(const comparison *c, ebpo_model *model, int cut, double *f,
-                       ebpo_error *error)
+static ebpo_status ask_within_budget(const comparison *c, ebpo_model *model, int cut, double *f,
+                                     ebpo_error *error)
 {
     uint64_t count = c->points < BUDGET_POINTS ? c->points : BUDGET_POINTS;
     double *width = malloc(count * sizeof *width);
@@ -57,7 +57,7 @@ static ebpo_status one_budget(comparison *c, method *m, ebpo_file *file, int i, 
         ebpo_model_get_stats(model, &stats);
         if (!stats.resident)
             f[OF_BUDGET_LEVEL] = stats.cut_level;
-        status = ask(c, model, stats.resident ? -1 : stats.cut_level, f, error);
+        status = ask_within_budget(c, model, stats.resident ? -1 : stats.cut_level, f, error);
     }
     ebpo_model_free(model);
     return status;

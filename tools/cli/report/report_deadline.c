@@ -11,8 +11,8 @@ typedef struct timing {
     uint64_t exact, late;
 } timing;
 
-static ebpo_status ask(const comparison *c, ebpo_context *context, unsigned us, uint64_t clock_cost,
-                       timing *t, ebpo_error *error)
+static ebpo_status ask_in_time(const comparison *c, ebpo_context *context, unsigned us,
+                               uint64_t clock_cost, timing *t, ebpo_error *error)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.deadline_ns = UINT64_C(1000) * us;
@@ -34,7 +34,7 @@ static ebpo_status ask(const comparison *c, ebpo_context *context, unsigned us, 
     return EBPO_OK;
 }
 
-static void note(const comparison *c, timing *t, double *f)
+static void note_timing(const comparison *c, timing *t, double *f)
 {
     double count = (double)c->points;
     f[OF_DUE_EXACT] = (double)t->exact / count;
@@ -62,9 +62,9 @@ ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int ro
     for (int i = 0; i < DEADLINES && status == EBPO_OK; i++) {
         if (c->progress.report)
             c->progress.report(c->progress.user, "deadlines", (uint64_t)i, DEADLINES);
-        status = ask(c, context, deadlines_us[i], clock_cost, &t, error);
+        status = ask_in_time(c, context, deadlines_us[i], clock_cost, &t, error);
         if (status == EBPO_OK)
-            note(c, &t, m->round[round].due[i]);
+            note_timing(c, &t, m->round[round].due[i]);
     }
     free(t.width);
     free(t.took);

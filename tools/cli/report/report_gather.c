@@ -103,7 +103,7 @@ static ebpo_status solid_volume(const comparison *c, method *m, const ebpo_file 
 }
 
 /* With all that the file holds. */
-static ebpo_status volumes(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+static ebpo_status gather_volumes(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     ebpo_status status = solid_volume(c, m, file, error);
     if (status == EBPO_OK)
@@ -144,7 +144,7 @@ static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_
 
 /* --- the limit, and how far envelopes reach --- */
 
-static ebpo_status limits(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+static ebpo_status gather_limits(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     for (int i = c->first; i <= method_last(c, m); i++) {
         ebpo_limit limit = EBPO_LIMIT_INIT;
@@ -170,8 +170,8 @@ static ebpo_status limits(comparison *c, method *m, ebpo_file *file, ebpo_error 
     return EBPO_OK;
 }
 
-static ebpo_status deviations(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
-                              ebpo_error *error)
+static ebpo_status gather_deviations(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                                     ebpo_error *error)
 {
     ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
     const uint64_t samples = options.samples;
@@ -211,7 +211,7 @@ static ebpo_status with_model(comparison *c, method *m, ebpo_file *file, ebpo_er
         return status;
     ebpo_model_get_stats(model, &stats);
     m->whole[OF_MEMORY_BYTES] = (double)stats.memory;
-    status = deviations(c, m, file, model, error);
+    status = gather_deviations(c, m, file, model, error);
     if (status == EBPO_OK && c->v->need)
         status = report_needs(c, m, file, model, error);
     ebpo_model_free(model);
@@ -224,7 +224,7 @@ ebpo_status report_gather(comparison *c, method *m, ebpo_error *error)
     ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
     from_head(c, m);
     if (status == EBPO_OK)
-        status = volumes(c, m, file, error);
+        status = gather_volumes(c, m, file, error);
     if (status == EBPO_OK)
         status = levels_alone(c, m, file, error);
     if (status == EBPO_OK)
@@ -232,7 +232,7 @@ ebpo_status report_gather(comparison *c, method *m, ebpo_error *error)
     if (status == EBPO_OK)
         status = report_thesis(c, m, file, error);
     if (status == EBPO_OK)
-        status = limits(c, m, file, error);
+        status = gather_limits(c, m, file, error);
     if (status == EBPO_OK)
         status = with_model(c, m, file, error);
     ebpo_close(file);

@@ -39,7 +39,7 @@ static double area_of(const ebpo_mesh *mesh, uint64_t face, double unit)
                 pow(a[0] * b[1] - a[1] * b[0], 2));
 }
 
-static uint64_t pick(const double *sums, uint64_t count, double value)
+static uint64_t pick_by_sum(const double *sums, uint64_t count, double value)
 {
     uint64_t low = 0, high = count - 1;
     while (low < high) {
@@ -57,7 +57,7 @@ static void near_point(const ebpo_mesh *mesh, const double *sums, double reach, 
                        double out[3])
 {
     uint64_t face =
-        pick(sums, mesh->face_count, bench_random_unit(random) * sums[mesh->face_count - 1]);
+        pick_by_sum(sums, mesh->face_count, bench_random_unit(random) * sums[mesh->face_count - 1]);
     double s = bench_random_unit(random), t = bench_random_unit(random), p[3][3], d[3];
     if (s + t > 1) {
         s = 1 - s;
@@ -77,7 +77,7 @@ static ebpo_status make_near(comparison *c, const method *m, ebpo_error *error)
 {
     ebpo_file *file = NULL;
     ebpo_mesh mesh = { 0 };
-    ebpo_read_options read = reading(c->v->threads, NULL);
+    ebpo_read_options read = reading_options(c->v->threads, NULL);
     double sum = 0, *sums = NULL;
     uint64_t random = (uint64_t)c->v->seed + 1;
     ebpo_status status = remote_open(&file, m->path, &c->v->remote, error);
@@ -129,8 +129,8 @@ typedef struct asker {
 } asker;
 
 /* Nanoseconds a point; answers in a->distance or a->inside. */
-static ebpo_status timed(asker *a, bool distance, const double *points, int level, double *ns,
-                         ebpo_error *error)
+static ebpo_status time_questions(asker *a, bool distance, const double *points, int level,
+                                  double *ns, ebpo_error *error)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.level = level;
@@ -158,13 +158,14 @@ static double share_of_maybe(const asker *a)
 static ebpo_status inside_at(asker *a, int level, ebpo_error *error)
 {
     double *f = a->m->level[level], ignored;
-    ebpo_status status = timed(a, false, a->c->uniform, level, &a->round->inside[level], error);
+    ebpo_status status =
+        time_questions(a, false, a->c->uniform, level, &a->round->inside[level], error);
     if (status != EBPO_OK || !a->first)
         return status;
     f[OF_MAYBE_UNIFORM] = share_of_maybe(a);
     if (!a->c->near)
         return EBPO_OK;
-    status = timed(a, false, a->c->near, level, &ignored, error);
+    status = time_questions(a, false, a->c->near, level, &ignored, error);
     f[OF_MAYBE_NEAR] = share_of_maybe(a);
     return status;
 }
@@ -172,7 +173,8 @@ static ebpo_status inside_at(asker *a, int level, ebpo_error *error)
 static ebpo_status distance_at(asker *a, int level, ebpo_error *error)
 {
     double *f = a->m->level[level], sum = 0;
-    ebpo_status status = timed(a, true, a->c->uniform, level, &a->round->distance[level], error);
+    ebpo_status status =
+        time_questions(a, true, a->c->uniform, level, &a->round->distance[level], error);
     if (status != EBPO_OK || !a->first)
         return status;
     for (uint64_t i = 0; i < a->c->points; i++) {
@@ -186,13 +188,14 @@ static ebpo_status distance_at(asker *a, int level, ebpo_error *error)
 }
 
 /* Needs the mesh. */
-static ebpo_status exact(asker *a, ebpo_error *error)
+static ebpo_status time_exact(asker *a, ebpo_error *error)
 {
-    ebpo_status status = a->m->info.solid ? timed(a, false, a->c->uniform, EBPO_LEVEL_ALL,
-                                                  &a->round->exact_inside, error)
+    ebpo_status status = a->m->info.solid ? time_questions(a, false, a->c->uniform, EBPO_LEVEL_ALL,
+                                                           &a->round->exact_inside, error)
                                           : EBPO_OK;
     if (status == EBPO_OK)
-        status = timed(a, true, a->c->uniform, EBPO_LEVEL_ALL, &a->round->exact_distance, error);
+        status = time_questions(a, true, a->c->uniform, EBPO_LEVEL_ALL, &a->round->exact_distance,
+                                error);
     if (status == EBPO_OK)
         return EBPO_OK;
     a->round->exact_inside = a->round->exact_distance = NAN;
@@ -213,7 +216,7 @@ static ebpo_status ask_all(asker *a, ebpo_error *error)
         if (status == EBPO_OK)
             status = distance_at(a, i, error);
     }
-    return status == EBPO_OK ? exact(a, error) : status;
+    return status == EBPO_OK ? time_exact(a, error) : status;
 }
 
 ebpo_status report_limited(comparison *c, method *m, ebpo_model *model, int round,

@@ -53,7 +53,7 @@ static ebpo_status read_range(void *user, uint64_t offset, uint64_t size, void *
     return EBPO_OK;
 }
 
-static void announce(void *user, const ebpo_range *ranges, size_t count)
+static void announce_ranges(void *user, const ebpo_range *ranges, size_t count)
 {
     for (size_t i = 0; i < count; i++)
         (void)ask_for(user, ranges[i].offset, ranges[i].size);
@@ -71,7 +71,7 @@ static ebpo_status have_level(line *l, const char *path, int level, ebpo_error *
     source.user = l;
     source.size = l->size;
     source.read = read_range;
-    source.prefetch = announce;
+    source.prefetch = announce_ranges;
     source.prefetched = l->size < HEAD_BYTES ? l->size : HEAD_BYTES;
     l->trips = l->bytes = 0;
     memset(l->arrives, 0, (l->size / PIECE + 1) * sizeof *l->arrives);

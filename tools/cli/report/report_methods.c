@@ -10,7 +10,7 @@
 #include "cli/selection_args.h"
 #include "cli/words.h"
 
-static int told(const char *message, const char *what)
+static int refuse_method(const char *message, const char *what)
 {
     fprintf(stderr, "ebpo report: %s: %s; try 'ebpo report --help'\n", what, message);
     return EXIT_USAGE;
@@ -28,7 +28,7 @@ static bool same_model(const ebpo_info *a, const ebpo_info *b)
            memcmp(&a->report.volume, &b->report.volume, sizeof a->report.volume) == 0;
 }
 
-static int learn(comparison *c, method *m)
+static int learn_file(comparison *c, method *m)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
@@ -69,17 +69,18 @@ static int add_file(comparison *c, const char *path)
     else
         usable_stem(path, name, sizeof name);
     if (strlen(path) >= sizeof c->methods->path)
-        return told("the name is too long", path);
+        return refuse_method("the name is too long", path);
     if (strpbrk(name, "/,\"\n"))
-        return told(
+        return refuse_method(
             "a method's name has no '/', comma, quotation mark or new line; give another --name",
             name);
     for (int i = 0; i < c->count; i++)
         if (strcmp(c->methods[i].name, name) == 0)
-            return told("two methods would have this name; give a --name for each file", name);
+            return refuse_method("two methods would have this name; give a --name for each file",
+                                 name);
     method *m = &c->methods[c->count++];
     method_begin(m, name, path);
-    return learn(c, m);
+    return learn_file(c, m);
 }
 
 /* --- from a mesh --- */
@@ -166,8 +167,8 @@ static int build_all(comparison *c, const char *mesh)
     for (int i = 0; selection_words[i]; i++)
         count += c->v->select >> i & 1 ? settings_of(c, i) : 0;
     if (count > METHODS_MAX)
-        return told("more than 12 methods; give fewer selections, or fewer numbers of planes",
-                    mesh);
+        return refuse_method(
+            "more than 12 methods; give fewer selections, or fewer numbers of planes", mesh);
     for (int i = 0; selection_words[i]; i++)
         for (int k = 0; c->v->select >> i & 1 && k < settings_of(c, i) && code == EXIT_FINE; k++)
             code = build_method(c, mesh, i,
@@ -179,7 +180,7 @@ static int build_all(comparison *c, const char *mesh)
 
 /* --- both --- */
 
-static int find(comparison *c, const char *const *operand)
+static int find_files(comparison *c, const char *const *operand)
 {
     report_stem(operand[0], c->model, sizeof c->model);
     for (int i = 0; operand[i]; i++) {
@@ -187,10 +188,11 @@ static int find(comparison *c, const char *const *operand)
         if (is_hdf5 < 0)
             return EXIT_FAILED;
         if (!is_hdf5 && operand[1])
-            return told("a mesh stands alone; its methods are named by --select", operand[i]);
+            return refuse_method("a mesh stands alone; its methods are named by --select",
+                                 operand[i]);
         if (!is_hdf5 && c->v->names.count)
-            return told("the methods of a mesh have the selections' names; leave --name away",
-                        operand[i]);
+            return refuse_method(
+                "the methods of a mesh have the selections' names; leave --name away", operand[i]);
         if (!is_hdf5)
             return build_all(c, operand[i]);
         int code = add_file(c, operand[i]);
@@ -202,7 +204,7 @@ static int find(comparison *c, const char *const *operand)
 
 int report_find_methods(comparison *c, const char *const *operand)
 {
-    int code = find(c, operand);
+    int code = find_files(c, operand);
     const ebpo_mesh_report *r = &c->methods->info.report;
     if (code != EXIT_FINE)
         return code;

@@ -10,8 +10,8 @@ static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the diagonal */
 static const double sizes[] = { 3, 5, 10, 50 };   /* percent of the first file */
 
 /* What a viewer needs: envelopes without mesh. */
-static ebpo_status cut(const comparison *c, ebpo_file *file, const need_result *n, const char *path,
-                       ebpo_error *error)
+static ebpo_status cut_subset(const comparison *c, ebpo_file *file, const need_result *n,
+                              const char *path, ebpo_error *error)
 {
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
     options.parts = ebpo_profile_parts(EBPO_PROFILE_LOD);
@@ -24,8 +24,8 @@ static ebpo_status cut(const comparison *c, ebpo_file *file, const need_result *
     return ebpo_subset(file, path, &options, error);
 }
 
-static ebpo_status reach(const comparison *c, ebpo_model *model, const char *path, need_result *n,
-                         ebpo_error *error)
+static ebpo_status measure_reach(const comparison *c, ebpo_model *model, const char *path,
+                                 need_result *n, ebpo_error *error)
 {
     ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
     options.questions = REPORT_QUESTIONS;
@@ -80,10 +80,10 @@ static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_mode
     *n = (need_result){ kind, asked, { NAN, NAN, NAN, NAN, NAN } };
     snprintf(path, sizeof path, "%s/need.ebpo.h5", c->folder);
     uint64_t begin = tool_clock();
-    ebpo_status status = cut(c, file, n, path, error);
+    ebpo_status status = cut_subset(c, file, n, path, error);
     n->figure[OF_NEED_SECONDS] = 1e-9 * (double)(tool_clock() - begin);
     if (status == EBPO_OK)
-        status = reach(c, model, path, n, error);
+        status = measure_reach(c, model, path, n, error);
     unlink(path);
     n->figure[OF_NEED_RATIO] = kind == NEED_ERROR ? n->figure[OF_NEED_FAR_HI] / fmax(asked, own)
                                                   : n->figure[OF_NEED_BYTES] / asked;

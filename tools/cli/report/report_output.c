@@ -15,7 +15,7 @@
 
 static char being_made[4096]; /* for the signal handler */
 
-static int told(int code, const char *path, const char *what)
+static int fail_output(int code, const char *path, const char *what)
 {
     fprintf(stderr, "ebpo report: %s: %s\n", path, what);
     return code;
@@ -87,18 +87,18 @@ static int look_into(const char *place, DIR *folder, const char *const *operand)
                      "is a folder with an input in it, '%.255s', and would be replaced; give "
                      "another one with -o",
                      name);
-            return told(EXIT_USAGE, place, text);
+            return fail_output(EXIT_USAGE, place, text);
         }
         if (!is_ours(place, name)) {
             snprintf(text, sizeof text,
                      "is a folder with something else than a report in it, '%.255s'; give another "
                      "one with -o",
                      name);
-            return told(EXIT_FAILED, place, text);
+            return fail_output(EXIT_FAILED, place, text);
         }
     }
     if (!empty && !report)
-        return told(
+        return fail_output(
             EXIT_FAILED, place,
             "is a folder without report.json, so it may be no report; give another one with -o");
     return EXIT_FINE;
@@ -108,10 +108,11 @@ static int place_is_free(const char *place, const char *const *operand)
 {
     struct stat st;
     if (lstat(place, &st) != 0)
-        return errno == ENOENT ? EXIT_FINE : told(EXIT_FAILED, place, strerror(errno));
+        return errno == ENOENT ? EXIT_FINE : fail_output(EXIT_FAILED, place, strerror(errno));
     DIR *folder = S_ISDIR(st.st_mode) ? opendir(place) : NULL;
     if (!folder)
-        return told(EXIT_FAILED, place, "is in the way and no folder; give another one with -o");
+        return fail_output(EXIT_FAILED, place,
+                           "is in the way and no folder; give another one with -o");
     int code = look_into(place, folder, operand);
     closedir(folder);
     return code;
@@ -144,7 +145,7 @@ static void abandon_file(const char *stem, const char *ending)
     being_made[length] = 0;
 }
 
-static void abandon(void)
+static void abandon_files(void)
 {
     if (!being_made[0])
         return;
@@ -160,7 +161,7 @@ static void abandon(void)
 void output_drop(const char *folder)
 {
     if (folder[0] && !remove_folder(folder, false))
-        abandon();
+        abandon_files();
     being_made[0] = 0;
 }
 
@@ -178,7 +179,8 @@ static bool make_folder(const char *place, size_t length, char *folder, size_t c
         const char *cause = strncmp(error.message, hidden, strlen(hidden)) == 0
                                 ? error.message + strlen(hidden) + 2 /* and ": " */
                                 : error.message;
-        return told(EXIT_FAILED, access(hidden, F_OK) == 0 ? hidden : place, cause) == EXIT_FINE;
+        return fail_output(EXIT_FAILED, access(hidden, F_OK) == 0 ? hidden : place, cause) ==
+               EXIT_FINE;
     }
     bool fits = strlen(making) < capacity && strlen(making) < sizeof being_made - 300;
     if (fits)
@@ -186,7 +188,7 @@ static bool make_folder(const char *place, size_t length, char *folder, size_t c
     else
         rmdir(making);
     free(making);
-    return fits || told(EXIT_USAGE, place, "the name is too long") == EXIT_FINE;
+    return fits || fail_output(EXIT_USAGE, place, "the name is too long") == EXIT_FINE;
 }
 
 int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity)
@@ -196,7 +198,7 @@ int output_begin(const char *place, const char *const *operand, char *folder, si
         length--;
     folder[0] = 0;
     if (length + 80 > capacity || length + 400 > sizeof being_made)
-        return told(EXIT_USAGE, place, "the name is too long");
+        return fail_output(EXIT_USAGE, place, "the name is too long");
     int code = place_is_free(place, operand);
     if (code != EXIT_FINE)
         return code;
@@ -204,7 +206,7 @@ int output_begin(const char *place, const char *const *operand, char *folder, si
         return EXIT_FAILED;
     chmod(folder, 0755);
     memcpy(being_made, folder, strlen(folder) + 1);
-    signals_also(abandon);
+    signals_also(abandon_files);
     return EXIT_FINE;
 }
 
@@ -237,7 +239,7 @@ bool output_commit(const char *place, const char *folder)
     snprintf(older, sizeof older, "%s.old", folder);
     moved = errno != ENOENT && rename(target, older) == 0;
     if (rename(folder, target) != 0) {
-        told(EXIT_FAILED, place, strerror(errno));
+        fail_output(EXIT_FAILED, place, strerror(errno));
         if (moved && rename(older, target) != 0)
             fprintf(stderr, "ebpo report: the report that was there is now %s\n", older);
         return false;

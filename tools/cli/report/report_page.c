@@ -42,7 +42,7 @@ static void pictures_to_json(FILE *out, const comparison *c)
     json_finish(&j);
 }
 
-static void put(FILE *out, const comparison *c, const char *name, size_t length)
+static void put_part(FILE *out, const comparison *c, const char *name, size_t length)
 {
     const page_part *part = find_part(name, length);
     if (part->name)
@@ -61,7 +61,7 @@ void report_page(FILE *out, const comparison *c)
     for (const char *begin, *end; (begin = strstr(at, "{{")) && (end = strstr(begin, "}}"));
          at = end + 2) {
         fwrite(at, 1, (size_t)(begin - at), out);
-        put(out, c, begin + 2, (size_t)(end - begin - 2));
+        put_part(out, c, begin + 2, (size_t)(end - begin - 2));
     }
     fputs(at, out);
 }

@@ -47,8 +47,9 @@ static void make_see_through(const picture *black, const picture *white, uint8_t
     }
 }
 
-static ebpo_status draw(const comparison *c, const ebpo_mesh *mesh, const camera *view, int width,
-                        int height, const raster_style *style, char **uri, ebpo_error *error)
+static ebpo_status draw_picture(const comparison *c, const ebpo_mesh *mesh, const camera *view,
+                                int width, int height, const raster_style *style, char **uri,
+                                ebpo_error *error)
 {
     static const uint8_t grounds[2][3] = { { 0, 0, 0 }, { 255, 255, 255 } };
     unsigned threads = c->v->threads ? (unsigned)c->v->threads : machine_cores();
@@ -85,7 +86,8 @@ static ebpo_status level_mesh(const comparison *c, ebpo_file *file, int level, e
 }
 
 /* All levels of all methods are seen from one place, from which the coarsest of each fits. */
-static ebpo_status fit(const comparison *c, ebpo_file *const *file, camera *view, ebpo_error *error)
+static ebpo_status fit_camera(const comparison *c, ebpo_file *const *file, camera *view,
+                              ebpo_error *error)
 {
     ebpo_mesh all = { 0 };
     ebpo_status status = EBPO_OK;
@@ -127,7 +129,7 @@ static ebpo_status draw_level(const comparison *c, ebpo_file *file, int level, c
         status = level_normals(ebpo_file_info(file), &mesh, &nodes, &normals, error);
     style.normals = normals;
     if (status == EBPO_OK && mesh.face_count)
-        status = draw(c, &mesh, view, TILE_WIDTH, TILE_HEIGHT, &style, uri, error);
+        status = draw_picture(c, &mesh, view, TILE_WIDTH, TILE_HEIGHT, &style, uri, error);
     free(normals);
     ebpo_lod_nodes_free(&nodes);
     ebpo_mesh_free(&mesh);
@@ -144,19 +146,19 @@ static ebpo_status one_method(comparison *c, method *m, ebpo_file *file, const c
     return method_without(m, "pictures", status, error);
 }
 
-static ebpo_status portrait(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
+static ebpo_status draw_portrait(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     raster_style style = { .colour = { 0.66, 0.54, 0.40 },
                            .closed = m->info.solid && m->info.report.manifold };
     ebpo_mesh mesh = { 0 };
     camera view;
-    ebpo_read_options read = reading(c->v->threads, NULL);
+    ebpo_read_options read = reading_options(c->v->threads, NULL);
     ebpo_status status = ebpo_file_read_mesh(file, &read, &mesh, error);
     if (status == EBPO_OK && mesh.face_count) {
         camera_fit(&view, &mesh, c->azimuth, c->elevation, c->v->up, PORTRAIT_WIDTH,
                    PORTRAIT_HEIGHT);
-        status =
-            draw(c, &mesh, &view, PORTRAIT_WIDTH, PORTRAIT_HEIGHT, &style, &c->portrait, error);
+        status = draw_picture(c, &mesh, &view, PORTRAIT_WIDTH, PORTRAIT_HEIGHT, &style,
+                              &c->portrait, error);
     }
     ebpo_mesh_free(&mesh);
     return method_without(m, "picture of the model", status, error);
@@ -170,9 +172,9 @@ ebpo_status report_pictures(comparison *c, ebpo_error *error)
     for (int i = 0; i < c->count && status == EBPO_OK; i++)
         status = remote_open(&file[i], c->methods[i].path, &c->v->remote, error);
     if (status == EBPO_OK)
-        status = portrait(c, &c->methods[0], file[0], error);
+        status = draw_portrait(c, &c->methods[0], file[0], error);
     if (status == EBPO_OK)
-        status = fit(c, file, &view, error);
+        status = fit_camera(c, file, &view, error);
     for (int i = 0; i < c->count && status == EBPO_OK; i++) {
         if (c->progress.report)
             c->progress.report(c->progress.user, "pictures", (uint64_t)i, (uint64_t)c->count);

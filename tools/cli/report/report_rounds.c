@@ -34,7 +34,7 @@ static ebpo_status have_level(const comparison *c, const method *m, int level, d
     return status;
 }
 
-static ebpo_status having(comparison *c, method *m, int round, ebpo_error *error)
+static ebpo_status time_having(comparison *c, method *m, int round, ebpo_error *error)
 {
     traffic t = { 0 };
     for (int i = c->first; i <= method_last(c, m); i++) {
@@ -55,7 +55,7 @@ ebpo_status report_round(comparison *c, method *m, int round, ebpo_error *error)
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     ebpo_file *file = NULL;
     ebpo_model *model = NULL;
-    ebpo_status status = having(c, m, round, error);
+    ebpo_status status = time_having(c, m, round, error);
     options.threads = (unsigned)c->v->threads;
     if (status == EBPO_OK)
         status = remote_open(&file, m->path, &c->v->remote, error);
@@ -75,10 +75,10 @@ ebpo_status report_round(comparison *c, method *m, int round, ebpo_error *error)
 
 /* --- medians --- */
 
-#define MEDIAN(field) median(m->round[0].field, m->round[1].field, m->round[2].field)
+#define MEDIAN(field) median_of_rounds(m->round[0].field, m->round[1].field, m->round[2].field)
 
 /* NAN when one is: then the figure could not be had. */
-static double median(double a, double b, double c)
+static double median_of_rounds(double a, double b, double c)
 {
     double v[ROUNDS] = { a, b, c };
     return isnan(a) || isnan(b) || isnan(c) ? NAN : quantile_of(v, ROUNDS, 0.5);

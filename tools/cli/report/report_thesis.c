@@ -69,7 +69,7 @@ static double leaf_costs(sent *s, const ebpo_level *l)
     return sum;
 }
 
-static bool begin(sent *s)
+static bool begin_counting(sent *s)
 {
     s->normals = calloc((size_t)NORMAL_SPAN * NORMAL_SPAN * 2 / 8 + 1, 1);
     s->faces = calloc(s->mesh.face_count / 8 + 1, 1);
@@ -83,7 +83,7 @@ static ebpo_status add_up(comparison *c, method *m, ebpo_file *file, sent *s, eb
     double sum = 0;
     for (int i = 0; i <= method_last(c, m); i++) {
         ebpo_level l;
-        ebpo_read_options read = reading(c->v->threads, NULL);
+        ebpo_read_options read = reading_options(c->v->threads, NULL);
         ebpo_status status = ebpo_file_read_level(file, i, &read, &l, error);
         if (status != EBPO_OK)
             return status;
@@ -106,9 +106,9 @@ ebpo_status report_thesis(comparison *c, method *m, ebpo_file *file, ebpo_error 
         method_note(m, "theses' cost model", "is that of a whole tree; this file is a subset");
         return EBPO_OK;
     }
-    ebpo_read_options read = reading(c->v->threads, NULL);
+    ebpo_read_options read = reading_options(c->v->threads, NULL);
     ebpo_status status = ebpo_file_read_mesh(file, &read, &s.mesh, error);
-    if (status == EBPO_OK && !begin(&s)) {
+    if (status == EBPO_OK && !begin_counting(&s)) {
         snprintf(error->message, sizeof error->message,
                  "not enough memory for a mark on each face and vertex");
         status = error->status = EBPO_E_MEMORY;

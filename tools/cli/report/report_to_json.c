@@ -5,7 +5,7 @@
 #include "cli/report/report_data.h"
 #include "cli/words.h"
 
-static void names(json *j, const char *scope, const figure_name *q, int count)
+static void print_names(json *j, const char *scope, const figure_name *q, int count)
 {
     for (int i = 0; i < count; i++) {
         json_object(j, NULL);
@@ -20,7 +20,7 @@ static void names(json *j, const char *scope, const figure_name *q, int count)
     }
 }
 
-static void figures(json *j, const figure_name *q, const double *v, int count)
+static void print_figures(json *j, const figure_name *q, const double *v, int count)
 {
     for (int i = 0; i < count; i++)
         json_real(j, q[i].name, v[i]);
@@ -40,12 +40,12 @@ static void one_method(json *j, const comparison *c, const method *m)
         json_real(j, "k_root", m->info.k_root);
     json_int(j, "levels_in_file", m->levels);
     json_bool(j, "leaf_planes_stored", m->info.parts & EBPO_PART_LEAF_PLANES);
-    figures(j, whole_figures, m->whole, WHOLE_FIGURES);
+    print_figures(j, whole_figures, m->whole, WHOLE_FIGURES);
     json_array(j, "levels");
     for (int i = c->first; i <= method_last(c, m); i++) {
         json_object(j, NULL);
         json_int(j, "level", i);
-        figures(j, level_figures, m->level[i], LEVEL_FIGURES);
+        print_figures(j, level_figures, m->level[i], LEVEL_FIGURES);
         json_end(j);
     }
     json_end(j);
@@ -53,7 +53,7 @@ static void one_method(json *j, const comparison *c, const method *m)
     for (int i = 0; i < DEADLINES; i++) {
         json_object(j, NULL);
         json_uint(j, "microseconds", deadlines_us[i]);
-        figures(j, deadline_figures, m->due[i], DEADLINE_FIGURES);
+        print_figures(j, deadline_figures, m->due[i], DEADLINE_FIGURES);
         json_end(j);
     }
     json_end(j);
@@ -61,7 +61,7 @@ static void one_method(json *j, const comparison *c, const method *m)
     for (int i = 0; i < BUDGETS; i++) {
         json_object(j, NULL);
         json_uint(j, "part", budget_parts[i]);
-        figures(j, budget_figures, m->budget[i], BUDGET_FIGURES);
+        print_figures(j, budget_figures, m->budget[i], BUDGET_FIGURES);
         json_end(j);
     }
     json_end(j);
@@ -70,7 +70,7 @@ static void one_method(json *j, const comparison *c, const method *m)
         json_object(j, NULL);
         json_real(j, m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes",
                   m->need[i].asked);
-        figures(j, need_figures, m->need[i].figure, NEED_FIGURES);
+        print_figures(j, need_figures, m->need[i].figure, NEED_FIGURES);
         json_end(j);
     }
     json_end(j);
@@ -81,7 +81,7 @@ static void one_method(json *j, const comparison *c, const method *m)
     json_end(j);
 }
 
-static void model(json *j, const comparison *c)
+static void print_model(json *j, const comparison *c)
 {
     const ebpo_info *info = &c->methods->info;
     char hex[65];
@@ -119,7 +119,7 @@ void report_to_json(FILE *out, const comparison *c, bool in_page)
     json_text(&j, "processor", machine_processor());
     json_uint(&j, "cores", machine_cores());
     json_end(&j);
-    model(&j, c);
+    print_model(&j, c);
     json_object(&j, "levels");
     json_int(&j, "first", c->first);
     json_int(&j, "last", comparison_last(c));
@@ -127,11 +127,11 @@ void report_to_json(FILE *out, const comparison *c, bool in_page)
     if (c->without_pictures)
         json_text(&j, "without_pictures", c->without_pictures);
     json_array(&j, "quantities");
-    names(&j, "method", whole_figures, WHOLE_FIGURES);
-    names(&j, "level", level_figures, LEVEL_FIGURES);
-    names(&j, "deadline", deadline_figures, DEADLINE_FIGURES);
-    names(&j, "budget", budget_figures, BUDGET_FIGURES);
-    names(&j, "need", need_figures, NEED_FIGURES);
+    print_names(&j, "method", whole_figures, WHOLE_FIGURES);
+    print_names(&j, "level", level_figures, LEVEL_FIGURES);
+    print_names(&j, "deadline", deadline_figures, DEADLINE_FIGURES);
+    print_names(&j, "budget", budget_figures, BUDGET_FIGURES);
+    print_names(&j, "need", need_figures, NEED_FIGURES);
     json_end(&j);
     json_array(&j, "methods");
     for (int i = 0; i < c->count; i++)
