@@ -27,9 +27,6 @@ enum { STRETCH_LEAST = 1 << 10, STRETCH_MOST = 1 << 16, LAP = 1 << 22, UNORDERED
 /* Stretches for each thread, that none waits long for the last one. */
 enum { STRETCHES_EACH = 4 };
 
-enum { RAY_WIDTH = sizeof(ebpo_ray) / sizeof(double) };
-_Static_assert(sizeof(ebpo_ray) == 7 * sizeof(double), "a ray is a row of seven numbers");
-
 ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *error)
 {
     return c->seen.levels ? EBPO_OK
@@ -116,21 +113,6 @@ ebpo_status ebpo_catalogue_ask_all(const ebpo_catalogue_asker *a, const double *
 
 /* --- stretches --- */
 
-typedef ebpo_status (*stretch_fn)(const ebpo_catalogue_asker *a, const double *rows, uint32_t count,
-                                  void *out, uint64_t *model, ebpo_error *error);
-
-typedef struct job {
-    ebpo_catalogue_asker asker;
-    stretch_fn ask;
-    const char *stage;
-    size_t width, result; /* numbers of a row; bytes of an answer */
-    bool ordered;         /* along the curve */
-    const double *rows;   /* these three are of the lap that is asked */
-    char *out;
-    uint64_t *model;       /* or NULL */
-    const uint32_t *order; /* of the lap; NULL: as they come */
-} job;
-
 /* What one thread asks, put together in the order of the curve. */
 typedef struct gathered {
     double *rows;
@@ -138,8 +120,8 @@ typedef struct gathered {
     uint64_t *model;
 } gathered;
 
-static ebpo_status ask_gathered(const job *j, const uint32_t *order, uint32_t count, gathered *g,
-                                ebpo_error *error)
+static ebpo_status ask_gathered(const ebpo_catalogue_job *j, const uint32_t *order, uint32_t count,
+                                gathered *g, ebpo_error *error)
 {
     for (uint32_t i = 0; i < count; i++)
         memcpy(g->rows + i * j->width, j->rows + order[i] * j->width, j->width * sizeof *g->rows);
@@ -155,7 +137,7 @@ static ebpo_status ask_gathered(const job *j, const uint32_t *order, uint32_t co
 static ebpo_status ask_stretch(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
-    const job *j = context;
+    const ebpo_catalogue_job *j = context;
     uint32_t count = (uint32_t)(end - begin);
     (void)worker;
     if (!j->order)
@@ -185,7 +167,8 @@ static ebpo_status see_whole(ebpo_context *context, const ebpo_catalogue_held *m
 }
 
 /* Whether it pays to put so many points in order. */
-static ebpo_status needs_order(const job *j, uint64_t count, bool *needs, ebpo_error *error)
+static ebpo_status needs_order(const ebpo_catalogue_job *j, uint64_t count, bool *needs,
+                               ebpo_error *error)
 {
     const ebpo_catalogue_asker *a = &j->asker;
     bool whole = false;
@@ -197,8 +180,8 @@ static ebpo_status needs_order(const job *j, uint64_t count, bool *needs, ebpo_e
     return status;
 }
 
-static ebpo_status ask_lap(job *j, uint64_t count, bool in_order, const ebpo_progress *progress,
-                           ebpo_error *error)
+static ebpo_status ask_lap(ebpo_catalogue_job *j, uint64_t count, bool in_order,
+                           const ebpo_progress *progress, ebpo_error *error)
 {
     const ebpo_catalogue_box *box = j->asker.c->all.box[j->asker.c->all.levels - 1];
     unsigned threads = ebpo_thread_count(j->asker.options->threads);
@@ -220,7 +203,7 @@ static ebpo_status ask_lap(job *j, uint64_t count, bool in_order, const ebpo_pro
     return status;
 }
 
-static ebpo_status ask_laps(job *j, uint64_t count, ebpo_error *error)
+ebpo_status ebpo_catalogue_ask_rows(ebpo_catalogue_job *j, uint64_t count, ebpo_error *error)
 {
     bool in_order;
     ebpo_status status = needs_order(j, count, &in_order, error);
@@ -236,10 +219,8 @@ static ebpo_status ask_laps(job *j, uint64_t count, ebpo_error *error)
     return status;
 }
 
-/* --- the public questions --- */
-
-static ebpo_status take_options(ebpo_catalogue_ask_options *own,
-                                const ebpo_catalogue_ask_options *given, ebpo_error *error)
+ebpo_status ebpo_catalogue_take_options(ebpo_catalogue_ask_options *own,
+                                        const ebpo_catalogue_ask_options *given, ebpo_error *error)
 {
     *own = (ebpo_catalogue_ask_options)EBPO_CATALOGUE_ASK_OPTIONS_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_catalogue_ask_options, own, given, error);
@@ -249,63 +230,4 @@ static ebpo_status take_options(ebpo_catalogue_ask_options *own,
     if (status == EBPO_OK && (unsigned)own->sides > EBPO_RAY_BACK)
         status = ebpo_fail_value(error);
     return status;
-}
-
-ebpo_status ebpo_catalogue_inside(const ebpo_catalogue *c, ebpo_catalogue_models *models,
-                                  const double *points, uint64_t count,
-                                  const ebpo_catalogue_ask_options *options,
-                                  ebpo_inside_result *out, ebpo_error *error)
-{
-    EBPO_DEFAULT_FP;
-    ebpo_catalogue_ask_options own;
-    job j = { { c, models, &own },   .ask = ebpo_catalogue_ask_inside,
-              .stage = "inside",     .width = 3,
-              .result = sizeof *out, .ordered = true,
-              .rows = points,        .out = (char *)out };
-    ebpo_status status = take_options(&own, options, error);
-    if (status == EBPO_OK && c->surface)
-        status = ebpo_fail_file(error, EBPO_E_NOT_SOLID, c->surface->path,
-                                "is a surface: there is no inside");
-    if (status == EBPO_OK)
-        status = ebpo_check_points(points, count, error);
-    return status == EBPO_OK ? ask_laps(&j, count, error) : status;
-}
-
-ebpo_status ebpo_catalogue_distance(const ebpo_catalogue *c, ebpo_catalogue_models *models,
-                                    const double *points, uint64_t count,
-                                    const ebpo_catalogue_ask_options *options,
-                                    ebpo_distance_result *out, uint64_t *model, ebpo_error *error)
-{
-    EBPO_DEFAULT_FP;
-    ebpo_catalogue_ask_options own;
-    job j = { { c, models, &own },   .ask = ebpo_catalogue_ask_distance,
-              .stage = "distance",   .width = 3,
-              .result = sizeof *out, .ordered = true,
-              .rows = points,        .out = (char *)out,
-              .model = model };
-    ebpo_status status = take_options(&own, options, error);
-    if (status == EBPO_OK)
-        status = ebpo_catalogue_need_surface(c, error);
-    if (status == EBPO_OK)
-        status = ebpo_check_points(points, count, error);
-    return status == EBPO_OK ? ask_laps(&j, count, error) : status;
-}
-
-ebpo_status ebpo_catalogue_ray(const ebpo_catalogue *c, ebpo_catalogue_models *models,
-                               const ebpo_ray *rays, uint64_t count,
-                               const ebpo_catalogue_ask_options *options, ebpo_ray_hit *out,
-                               uint64_t *model, ebpo_error *error)
-{
-    EBPO_DEFAULT_FP;
-    ebpo_catalogue_ask_options own;
-    job j = { { c, models, &own },   .ask = ebpo_catalogue_ask_rays,
-              .stage = "rays",       .width = RAY_WIDTH,
-              .result = sizeof *out, .rows = (const double *)(const void *)rays,
-              .out = (char *)out,    .model = model };
-    ebpo_status status = take_options(&own, options, error);
-    if (status == EBPO_OK)
-        status = ebpo_catalogue_need_surface(c, error);
-    if (status == EBPO_OK)
-        status = ebpo_check_ray_rows(rays, count, error);
-    return status == EBPO_OK ? ask_laps(&j, count, error) : status;
 }

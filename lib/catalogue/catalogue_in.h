@@ -119,18 +119,35 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_ask_all(const ebpo_catalogue_asker *a, 
 /* EBPO_E_ABSENT: the catalogue tells of caps alone. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *error);
 
-/* --- questions about a stretch of rows, which one thread asks: catalogue_inside.c,
- * catalogue_nearest.c. Rows are points, or as an ebpo_ray; `model` may be NULL for the first. ---
- */
+/* --- many rows, by any number of threads: catalogue_ask.c --- */
+
+/* Asks about a stretch of rows, which are points, or as an ebpo_ray, in one thread. */
+typedef ebpo_status (*ebpo_catalogue_stretch)(const ebpo_catalogue_asker *a, const double *rows,
+                                              uint32_t count, void *out, uint64_t *model,
+                                              ebpo_error *error);
+
+typedef struct ebpo_catalogue_job {
+    ebpo_catalogue_asker asker;
+    ebpo_catalogue_stretch ask;
+    const char *stage;
+    size_t width, result; /* numbers of a row; bytes of an answer */
+    bool ordered;         /* along the curve: rows are points */
+    const double *rows;   /* of the questions that are left, as are the two below */
+    char *out;
+    uint64_t *model;       /* or NULL */
+    const uint32_t *order; /* set while rows are asked */
+} ebpo_catalogue_job;
+
+EBPO_MUST_USE ebpo_status ebpo_catalogue_ask_rows(ebpo_catalogue_job *job, uint64_t count,
+                                                  ebpo_error *error);
+EBPO_MUST_USE ebpo_status ebpo_catalogue_take_options(ebpo_catalogue_ask_options *own,
+                                                      const ebpo_catalogue_ask_options *given,
+                                                      ebpo_error *error);
+
+/* --- where a stretch of points is: catalogue_inside.c --- */
 
 EBPO_MUST_USE ebpo_status ebpo_catalogue_ask_inside(const ebpo_catalogue_asker *a,
                                                     const double *rows, uint32_t count, void *out,
                                                     uint64_t *model, ebpo_error *error);
-EBPO_MUST_USE ebpo_status ebpo_catalogue_ask_distance(const ebpo_catalogue_asker *a,
-                                                      const double *rows, uint32_t count, void *out,
-                                                      uint64_t *model, ebpo_error *error);
-EBPO_MUST_USE ebpo_status ebpo_catalogue_ask_rays(const ebpo_catalogue_asker *a, const double *rows,
-                                                  uint32_t count, void *out, uint64_t *model,
-                                                  ebpo_error *error);
 
 #endif

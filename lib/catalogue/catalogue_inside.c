@@ -22,6 +22,8 @@
 #include "catalogue/catalogue_in.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/fp_env.h"
+#include "query/query_model.h"
 
 /* Rays that are tried before a point is given up. */
 enum { DIRECTIONS = 64 };
@@ -233,4 +235,24 @@ ebpo_status ebpo_catalogue_ask_inside(const ebpo_catalogue_asker *a, const doubl
     }
     free(all);
     return status;
+}
+
+ebpo_status ebpo_catalogue_inside(const ebpo_catalogue *c, ebpo_catalogue_models *models,
+                                  const double *points, uint64_t count,
+                                  const ebpo_catalogue_ask_options *options,
+                                  ebpo_inside_result *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_catalogue_ask_options own;
+    ebpo_catalogue_job j = { { c, models, &own },   .ask = ebpo_catalogue_ask_inside,
+                             .stage = "inside",     .width = 3,
+                             .result = sizeof *out, .ordered = true,
+                             .rows = points,        .out = (char *)out };
+    ebpo_status status = ebpo_catalogue_take_options(&own, options, error);
+    if (status == EBPO_OK && c->surface)
+        status = ebpo_fail_file(error, EBPO_E_NOT_SOLID, c->surface->path,
+                                "is a surface: there is no inside");
+    if (status == EBPO_OK)
+        status = ebpo_check_points(points, count, error);
+    return status == EBPO_OK ? ebpo_catalogue_ask_rows(&j, count, error) : status;
 }

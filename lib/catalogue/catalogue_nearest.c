@@ -18,6 +18,8 @@
 #include "catalogue/catalogue_in.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/fp_env.h"
+#include "query/query_model.h"
 
 /* --- distances --- */
 
@@ -159,9 +161,8 @@ static ebpo_status sign_distances(const ebpo_catalogue_asker *a, const double *p
     return status;
 }
 
-ebpo_status ebpo_catalogue_ask_distance(const ebpo_catalogue_asker *a, const double *rows,
-                                        uint32_t count, void *out, uint64_t *model,
-                                        ebpo_error *error)
+static ebpo_status ask_distance(const ebpo_catalogue_asker *a, const double *rows, uint32_t count,
+                                void *out, uint64_t *model, ebpo_error *error)
 {
     ebpo_distance_result *told = out;
     search s = { .a = a,
@@ -182,7 +183,27 @@ ebpo_status ebpo_catalogue_ask_distance(const ebpo_catalogue_asker *a, const dou
                : status;
 }
 
+ebpo_status ebpo_catalogue_distance(const ebpo_catalogue *c, ebpo_catalogue_models *models,
+                                    const double *points, uint64_t count,
+                                    const ebpo_catalogue_ask_options *options,
+                                    ebpo_distance_result *out, uint64_t *model, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_catalogue_ask_options own;
+    ebpo_catalogue_job j = { { c, models, &own }, .ask = ask_distance,   .stage = "distance",
+                             .width = 3,          .result = sizeof *out, .ordered = true,
+                             .rows = points,      .out = (char *)out,    .model = model };
+    ebpo_status status = ebpo_catalogue_take_options(&own, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_catalogue_need_surface(c, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_points(points, count, error);
+    return status == EBPO_OK ? ebpo_catalogue_ask_rows(&j, count, error) : status;
+}
+
 /* --- rays --- */
+
+_Static_assert(sizeof(ebpo_ray) == 7 * sizeof(double), "a ray is a row of seven numbers");
 
 typedef struct shot {
     ebpo_ray_sides sides;
@@ -273,8 +294,8 @@ static ebpo_status ask_hits(ebpo_context *context, const ebpo_catalogue_held *mo
     return status;
 }
 
-ebpo_status ebpo_catalogue_ask_rays(const ebpo_catalogue_asker *a, const double *rows,
-                                    uint32_t count, void *out, uint64_t *model, ebpo_error *error)
+static ebpo_status ask_rays(const ebpo_catalogue_asker *a, const double *rows, uint32_t count,
+                            void *out, uint64_t *model, ebpo_error *error)
 {
     shot s = { a->options->sides, out, model, ebpo_alloc(count, sizeof *s.far) };
     if (!s.far)
@@ -288,4 +309,23 @@ ebpo_status ebpo_catalogue_ask_rays(const ebpo_catalogue_asker *a, const double 
                                                 ask_hits, &s, error);
     free(s.far);
     return status;
+}
+
+ebpo_status ebpo_catalogue_ray(const ebpo_catalogue *c, ebpo_catalogue_models *models,
+                               const ebpo_ray *rays, uint64_t count,
+                               const ebpo_catalogue_ask_options *options, ebpo_ray_hit *out,
+                               uint64_t *model, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_catalogue_ask_options own;
+    ebpo_catalogue_job j = { { c, models, &own },   .ask = ask_rays,
+                             .stage = "rays",       .width = 7,
+                             .result = sizeof *out, .rows = (const double *)(const void *)rays,
+                             .out = (char *)out,    .model = model };
+    ebpo_status status = ebpo_catalogue_take_options(&own, options, error);
+    if (status == EBPO_OK)
+        status = ebpo_catalogue_need_surface(c, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_ray_rows(rays, count, error);
+    return status == EBPO_OK ? ebpo_catalogue_ask_rows(&j, count, error) : status;
 }

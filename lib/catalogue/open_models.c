@@ -15,7 +15,6 @@
 #include "core/strict_fp.h"
 
 #include <pthread.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
@@ -147,12 +146,11 @@ static ebpo_status open_model(const ebpo_catalogue_models *models, const ebpo_ca
         m->model = model;
         return EBPO_OK;
     }
-    size_t end = strlen(why.message);
-    if (status == EBPO_E_LIMIT && c->count > 1)
-        snprintf(why.message + end, sizeof why.message - end,
-                 " (of the memory each model may take one part in %d)",
-                 c->count < SHARES ? (int)c->count : SHARES);
     close_model(m);
+    if (status == EBPO_E_LIMIT && c->count > 1)
+        return ebpo_fail_file(error, status, m->key.path,
+                              "%.380s (of the memory each model may take one part in %d)",
+                              why.message, c->count < SHARES ? (int)c->count : SHARES);
     why.status = status;
     return ebpo_fail_with(error, &why);
 }
