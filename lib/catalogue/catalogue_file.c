@@ -409,6 +409,8 @@ static ebpo_status parse_text(reader *r, const char *text, size_t size)
 {
     json_error_t why;
     json_t *root = json_loadb(text, size, JSON_DECODE_INT_AS_REAL, &why);
+    if (!root && json_error_code(&why) == json_error_out_of_memory)
+        return ebpo_fail_memory(r->error, size);
     if (!root)
         return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->c->path, "not a catalogue: line %d: %s",
                               why.line, why.text);
@@ -432,15 +434,16 @@ static ebpo_status read_text(ebpo_catalogue *c, char **text, ebpo_error *error)
     int fd = open(c->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (fd < 0)
         return ebpo_fail_errno(error, c->path, "cannot be read");
-    bool is_file = fstat(fd, &st) == 0 && S_ISREG(st.st_mode);
-    FILE *in = is_file ? fdopen(fd, "r") : NULL;
+    ebpo_status status = EBPO_OK;
+    if (fstat(fd, &st) != 0)
+        status = ebpo_fail_errno(error, c->path, "cannot be read");
+    else if (!S_ISREG(st.st_mode))
+        status = ebpo_fail_file(error, EBPO_E_FORMAT, c->path, "cannot be read: is no file");
+    FILE *in = status == EBPO_OK ? fdopen(fd, "r") : NULL;
     if (!in) {
         close(fd);
-        return is_file
-                   ? ebpo_fail_memory(error, BUFSIZ)
-                   : ebpo_fail_file(error, EBPO_E_FORMAT, c->path, "cannot be read: is no file");
+        return status == EBPO_OK ? ebpo_fail_memory(error, BUFSIZ) : status;
     }
-    ebpo_status status = EBPO_OK;
     c->file_bytes = (uint64_t)st.st_size;
     *text = c->file_bytes <= MOST_BYTES ? malloc((size_t)c->file_bytes + 1) : NULL;
     if (c->file_bytes > MOST_BYTES)

@@ -62,6 +62,8 @@ static ebpo_status read_head(ebpo_catalogue_numbers *f, ebpo_error *error)
     struct stat st;
     ssize_t got = pread(f->fd, text, HEAD_MOST, 0);
     const unsigned char *b = (const unsigned char *)text;
+    if (got < 0)
+        return ebpo_fail_errno(error, f->path, "cannot be read");
     if (got < 12 || memcmp(text, "\x93NUMPY", 6) != 0 || b[6] < 1 || b[6] > 3)
         return bad_numbers(f, error, "it begins otherwise");
     size_t first = b[6] == 1 ? 10 : 12, length = (size_t)b[8] | (size_t)b[9] << 8;
@@ -85,10 +87,13 @@ ebpo_status ebpo_catalogue_numbers_open(ebpo_catalogue_numbers *f, const char *p
     struct stat st;
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY); /* no pipe is waited for */
     *f = (ebpo_catalogue_numbers){ .path = path, .fd = fd };
-    if (f->fd < 0 || fstat(f->fd, &st) != 0 || !S_ISREG(st.st_mode)) {
-        const char *why = f->fd < 0 ? strerror(errno) : "is no file";
+    if (fd < 0)
+        return ebpo_fail_file(error,
+                              errno == ENOENT || errno == ENOTDIR ? EBPO_E_FORMAT : EBPO_E_IO, path,
+                              "cannot be read as a .npy: %s", strerror(errno));
+    if (fstat(fd, &st) != 0 || !S_ISREG(st.st_mode)) {
         ebpo_catalogue_numbers_close(f);
-        return ebpo_fail_file(error, EBPO_E_FORMAT, path, "cannot be read as a .npy: %s", why);
+        return ebpo_fail_file(error, EBPO_E_FORMAT, path, "cannot be read as a .npy: is no file");
     }
     ebpo_status status = read_head(f, error);
     if (status != EBPO_OK)
