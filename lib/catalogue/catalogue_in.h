@@ -49,7 +49,7 @@ bool ebpo_catalogue_held_whole(const ebpo_catalogue_held *model);
 EBPO_MUST_USE ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *model, uint64_t *face,
                                                    ebpo_error *error);
 
-/* --- numbers of faces: face_numbers.c --- */
+/* --- numbers of faces: part_numbers.c --- */
 
 /* Numbers of faces in the whole, of a part: a .npy of integers, read where they are wanted. */
 typedef struct ebpo_catalogue_numbers {
