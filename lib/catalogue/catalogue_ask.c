@@ -157,27 +157,11 @@ static ebpo_status ask_stretch(void *context, uint64_t begin, uint64_t end, unsi
 
 /* --- laps --- */
 
-static ebpo_status see_whole(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
-                             ebpo_error *error)
-{
-    (void)context;
-    (void)error;
-    *(bool *)user = ebpo_catalogue_held_whole(model);
-    return EBPO_OK;
-}
-
 /* Whether it pays to put so many points in order. */
-static ebpo_status needs_order(const ebpo_catalogue_job *j, uint64_t count, bool *needs,
-                               ebpo_error *error)
+static bool needs_order(const ebpo_catalogue_job *j, uint64_t count)
 {
-    const ebpo_catalogue_asker *a = &j->asker;
-    bool whole = false;
-    ebpo_status status = EBPO_OK;
-    *needs = j->ordered && count > UNORDERED;
-    if (*needs && a->c->count == 1)
-        status = ebpo_catalogue_lend(a->models, a->c, 0, false, see_whole, &whole, error);
-    *needs &= !whole;
-    return status;
+    return j->ordered && count > UNORDERED &&
+           !ebpo_catalogue_in_memory(j->asker.models, j->asker.c);
 }
 
 static ebpo_status ask_lap(ebpo_catalogue_job *j, uint64_t count, bool in_order,
@@ -205,8 +189,8 @@ static ebpo_status ask_lap(ebpo_catalogue_job *j, uint64_t count, bool in_order,
 
 ebpo_status ebpo_catalogue_ask_rows(ebpo_catalogue_job *j, uint64_t count, ebpo_error *error)
 {
-    bool in_order;
-    ebpo_status status = needs_order(j, count, &in_order, error);
+    bool in_order = needs_order(j, count);
+    ebpo_status status = EBPO_OK;
     for (uint64_t at = 0; at < count && status == EBPO_OK; at += LAP) {
         uint64_t here = count - at < LAP ? count - at : LAP;
         ebpo_pass pass = { &j->asker.options->progress, at, at + here, count };

@@ -118,8 +118,8 @@ void ebpo_catalogue_free(ebpo_catalogue *c)
     free(c);
 }
 
-static ebpo_status ended(ebpo_catalogue *c, ebpo_status status, ebpo_catalogue **out,
-                         ebpo_error *error)
+static ebpo_status end_making(ebpo_catalogue *c, ebpo_status status, ebpo_catalogue **out,
+                              ebpo_error *error)
 {
     if (status == EBPO_OK)
         status = finish_catalogue(c, error);
@@ -196,7 +196,7 @@ ebpo_status ebpo_catalogue_new(const ebpo_catalogue_entry *entries, uint64_t cou
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "a catalogue has one model at least, and at most 2^32 - 2");
     ebpo_status status = begin_catalogue(options, &c, error);
-    return status == EBPO_OK ? ended(c, copy_entries(c, entries, count, error), out, error)
+    return status == EBPO_OK ? end_making(c, copy_entries(c, entries, count, error), out, error)
                              : status;
 }
 
@@ -485,5 +485,5 @@ ebpo_status ebpo_catalogue_open(const char *path, const ebpo_catalogue_options *
     if (status != EBPO_OK)
         return status;
     c->how.folder = NULL;
-    return ended(c, read_file(c, path, error), out, error);
+    return end_making(c, read_file(c, path, error), out, error);
 }

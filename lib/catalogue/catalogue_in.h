@@ -42,8 +42,8 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models,
                                               bool surface, ebpo_catalogue_question ask, void *user,
                                               ebpo_error *error);
 
-/* True: all of the model is in memory. */
-bool ebpo_catalogue_held_whole(const ebpo_catalogue_held *model);
+/* True: the catalogue has one model, which is open and all in memory. */
+bool ebpo_catalogue_in_memory(ebpo_catalogue_models *models, const ebpo_catalogue *c);
 
 /* A face's number in the whole, where the catalogue tells it; *face may be EBPO_NO_FACE. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *model, uint64_t *face,

@@ -395,10 +395,16 @@ ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models, const ebpo_catalo
     return status;
 }
 
-bool ebpo_catalogue_held_whole(const ebpo_catalogue_held *m)
+bool ebpo_catalogue_in_memory(ebpo_catalogue_models *models, const ebpo_catalogue *c)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
-    return ebpo_model_get_stats(m->model, &s) == EBPO_OK && s.resident;
+    wanted key = key_of(c, c->entry, false);
+    pthread_mutex_lock(&models->lock);
+    key.share = share_of(models, c);
+    const ebpo_catalogue_held *m = c->count == 1 ? find_model(models, &key) : NULL;
+    bool whole = m && m->model && ebpo_model_get_stats(m->model, &s) == EBPO_OK && s.resident;
+    pthread_mutex_unlock(&models->lock);
+    return whole;
 }
 
 ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *m, uint64_t *face,
