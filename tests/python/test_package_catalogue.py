@@ -4,7 +4,9 @@ import json
 import os
 import pathlib
 import shutil
+import signal
 import threading
+import time
 
 from package_kit import Case, answers, model, np, points, run
 
@@ -221,6 +223,17 @@ class Holdings(Case):
         for entry in Catalogue.of(spheres()[:1]).entries:
             with self.assertRaises(ebpo.IOFailure):
                 Catalogue([entry._replace(path=os.path.abspath("moved/01.ebpo.h5"))]).inside(P)
+
+
+class Interrupts(Case):
+    def test_long_questions_end_at_once(self):
+        catalogue, p = Catalogue.of(spheres()), points(3_000_000, seed=1, reach=2)
+        began = time.monotonic()
+        timer = threading.Timer(.5, os.kill, (os.getpid(), signal.SIGINT))
+        timer.start()
+        with self.assertRaises(KeyboardInterrupt):
+            catalogue.distance(p)
+        self.assertLess(time.monotonic() - began, 10)
 
 
 class Hostile(Case):

@@ -471,20 +471,27 @@ START_TEST(questions_are_checked_and_may_be_stopped)
 }
 END_TEST
 
+static TCase *case_with_models(Suite *suite, const char *name)
+{
+    TCase *added = tcase_create(name);
+    tcase_set_timeout(added, 600);
+    tcase_add_unchecked_fixture(added, make_models, free_models);
+    tcase_add_checked_fixture(added, scratch_enter, scratch_leave);
+    suite_add_tcase(suite, added);
+    return added;
+}
+
 Suite *test_suite(void)
 {
     Suite *suite = suite_create("catalogue");
-    TCase *all = tcase_create("catalogue");
-    tcase_set_timeout(all, 600);
-    tcase_add_unchecked_fixture(all, make_models, free_models);
-    tcase_add_checked_fixture(all, scratch_enter, scratch_leave);
-    tcase_add_test(all, models_are_asked_as_one);
-    tcase_add_test(all, models_are_closed_and_opened_again);
-    tcase_add_test(all, a_budget_may_be_too_small);
-    tcase_add_test(all, parts_answer_as_the_whole);
-    tcase_add_test(all, caps_alone_are_no_surface);
-    tcase_add_test(all, files_are_opened_by_the_caller);
-    tcase_add_test(all, questions_are_checked_and_may_be_stopped);
-    suite_add_tcase(suite, all);
+    TCase *alone = case_with_models(suite, "catalogue"),
+          *threads = case_with_models(suite, "threads");
+    tcase_add_test(alone, models_are_asked_as_one);
+    tcase_add_test(alone, a_budget_may_be_too_small);
+    tcase_add_test(alone, parts_answer_as_the_whole);
+    tcase_add_test(alone, caps_alone_are_no_surface);
+    tcase_add_test(alone, questions_are_checked_and_may_be_stopped);
+    tcase_add_test(threads, models_are_closed_and_opened_again);
+    tcase_add_test(threads, files_are_opened_by_the_caller);
     return suite;
 }

@@ -6,6 +6,7 @@ import functools
 import os
 import pathlib
 import re
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Callable, Iterator, NamedTuple
 
@@ -21,6 +22,7 @@ from .errors import ArgumentError, Error
 from .holding import CLOSE_FILE, OPEN_FILE, opened_by, opener, ours, raised_by
 
 BLOCK = 1 << 22  # rows whose answers are in memory twice; the library puts so many in order together
+LONG = 1 << 14  # rows that may take longer than one waits
 RULES = ("nonzero", "evenodd", "positive")
 
 NEAREST = np.dtype([("distance", "f8"), ("point", "f8", 3), ("normal", "f8", 3), ("face", "i8"), ("model", "i8")])
@@ -130,14 +132,16 @@ class Catalogue:
         for begin in range(0, max(1, count), BLOCK):
             end = min(count, begin + BLOCK)
             asked = rows(begin, end)
-            with Reporter(lambda *_: True) as progress:  # by which it may be interrupted
+            out = (answers.ctypes.data, numbers.ctypes.data)[:1 if function == "ebpo_catalogue_inside" else 2]
+
+            def work(progress: Any) -> None:
                 how = made(c.ebpo_catalogue_ask_options, progress=progress, threads=threads, **options)
-                out = (answers.ctypes.data,) if function == "ebpo_catalogue_inside" else \
-                    (answers.ctypes.data, numbers.ctypes.data)
-                try:
-                    call(function, self._made, models, asked.ctypes.data, end - begin, ctypes.byref(how), *out)
-                except Error as error:
-                    raise numbered(raised_by(error), begin) from None
+                call(function, self._made, models, asked.ctypes.data, end - begin, ctypes.byref(how), *out)
+
+            try:
+                interruptible(work, end - begin)
+            except Error as error:
+                raise numbered(raised_by(error), begin) from None
             yield slice(begin, end), answers[:end - begin], numbers[:end - begin]
 
     def locate(self, points: Any, *, memory: int | str | None = None, threads: int | None = None) -> np.ndarray:
@@ -215,6 +219,32 @@ class Catalogue:
                 out[name][where] = answers[name]
             out["face"][where], out["model"][where] = answers["face"].view(np.int64), models.view(np.int64)
         return out[0] if o.single and d.single else out
+
+
+def interruptible(work: Callable[[Any], None], rows: int) -> None:
+    """Calls work(progress). In the main thread, where an interrupt comes, another thread does what takes long."""
+    if rows < LONG or threading.current_thread() is not threading.main_thread():
+        work(c.ebpo_progress())
+        return
+    stopped, failed = threading.Event(), []
+
+    def body() -> None:
+        try:
+            work(progress)
+        except BaseException as error:
+            failed.append(error)
+
+    with Reporter(lambda *_: not stopped.is_set()) as progress:
+        thread = threading.Thread(target=body, daemon=True)
+        thread.start()
+        try:
+            thread.join()
+        except BaseException:
+            stopped.set()
+            thread.join()
+            raise
+    if failed:
+        raise failed[0]
 
 
 def numbered(error: BaseException, first: int) -> BaseException:
