@@ -52,9 +52,8 @@ typedef struct ebpo_catalogue_entry {
     double min[3], max[3];
 
     /*
-     * More that the head of its file tells, for readers of the catalogue: bytes of the file, faces
-     * and vertices, and below the rule, and whether the file has a mesh and is pruned. bytes 0:
-     * none of these is known, and none is written.
+     * More that the head of its file tells, for readers of the catalogue; questions do not need it.
+     * If file_bytes is 0, none of these six is known, and none is written.
      */
     uint64_t file_bytes, face_count, vertex_count;
     ebpo_rule rule;
@@ -147,7 +146,8 @@ EBPO_API void ebpo_catalogue_free(ebpo_catalogue *catalogue);
 
 /*
  * Writes the catalogue as a JSON file, which appears whole or not at all. Paths that begin with the
- * folder of `path`, letter by letter, become relative.
+ * folder of `path`, letter by letter, become relative; others stay as they are, and relative ones
+ * begin in that folder when they are read again.
  *
  * EBPO_E_ARGUMENT: a path is not UTF-8, which JSON demands. EBPO_E_IO, EBPO_E_MEMORY.
  *

@@ -84,7 +84,7 @@ class Catalogue:
 
     @classmethod
     def open(cls, path: Any, **options: Any) -> Catalogue:
-        """Of what `ebpo catalogue` or `save` has written. FormatError, VersionError: it is not that."""
+        """Of what `ebpo catalogue` or `save` has written. FormatError, VersionError: it is not that; IOFailure."""
         name = path_bytes(pathlib.Path(path).absolute())
         read = Handle.made("ebpo_catalogue_open", name, None, free="ebpo_catalogue_free")
         facts = made(c.ebpo_catalogue_facts)
