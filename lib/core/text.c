@@ -9,7 +9,7 @@
 #include "core/alloc.h"
 #include "core/text.h"
 
-bool ebpo_text_ok(const char *text)
+bool ebpo_text_is_utf8(const char *text)
 {
     const uint8_t *p = (const uint8_t *)text;
     while (*p) {
@@ -18,17 +18,24 @@ bool ebpo_text_ok(const char *text)
                         : *p >= 0xe0 && *p < 0xf0 ? 2
                         : *p >= 0xf0 && *p < 0xf5 ? 3
                                                   : 9;
-        if (more == 9 || *p < 0x20 || *p == 0x7f)
+        if (more == 9)
             return false;
         if ((*p == 0xe0 && p[1] < 0xa0) || (*p == 0xed && p[1] >= 0xa0) ||
-            (*p == 0xf0 && p[1] < 0x90) || (*p == 0xf4 && p[1] >= 0x90) ||
-            (*p == 0xc2 && p[1] < 0xa0))
-            return false; /* overlong, surrogate, beyond Unicode, control */
+            (*p == 0xf0 && p[1] < 0x90) || (*p == 0xf4 && p[1] >= 0x90))
+            return false; /* overlong, surrogate, beyond Unicode */
         for (p++; more; more--, p++)
             if (*p < 0x80 || *p > 0xbf)
                 return false;
     }
     return true;
+}
+
+bool ebpo_text_ok(const char *text)
+{
+    for (const uint8_t *p = (const uint8_t *)text; *p; p++)
+        if (*p < 0x20 || *p == 0x7f || (*p == 0xc2 && p[1] < 0xa0))
+            return false; /* a control character */
+    return ebpo_text_is_utf8(text);
 }
 
 uint64_t ebpo_text_mark(const void *text, uint64_t size)

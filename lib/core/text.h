@@ -7,6 +7,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
+bool ebpo_text_is_utf8(const char *text);
 /* True for UTF-8 without control characters. */
 bool ebpo_text_ok(const char *text);
 

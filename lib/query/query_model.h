@@ -88,6 +88,10 @@ static inline ebpo_box ebpo_model_box(const ebpo_model *m) { return ebpo_root_bo
 EBPO_MUST_USE ebpo_status ebpo_check_points(const double *points, uint64_t count,
                                             ebpo_error *error);
 
+/* EBPO_E_ARGUMENT for a ray that is none, with its number. */
+EBPO_MUST_USE ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t count,
+                                              ebpo_error *error);
+
 /* EBPO_E_LIMIT when the budget does not hold the leaf alone, for one context;
  * EBPO_LOAD_NODES loads it past the cache. */
 EBPO_MUST_USE ebpo_status ebpo_model_has_room(const ebpo_model *model, const ebpo_node *leaf,

@@ -597,15 +597,15 @@ static ebpo_segment segment_of(const ebpo_ray *r)
     return s;
 }
 
-static ebpo_status check_rays(const batch *b, const ebpo_model *m, ebpo_error *error)
+ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t count, ebpo_error *error)
 {
-    for (uint64_t i = 0; i < b->count; i++) {
-        ebpo_segment ray = segment_of(&b->rays[i]);
+    for (uint64_t i = 0; i < count; i++) {
+        ebpo_segment ray = segment_of(&rays[i]);
         const char *fault = ray_fault(&ray);
         if (fault)
             return ebpo_fail(error, EBPO_E_ARGUMENT, "ray %" PRIu64 " %s", i, fault);
     }
-    return ebpo_check_mesh(m, error);
+    return EBPO_OK;
 }
 
 static ebpo_status make_contexts(batch *b, ebpo_context *own, ebpo_error *error)
@@ -641,7 +641,9 @@ static ebpo_status answer_all(batch *b, ebpo_context *context, const ebpo_ray_op
     if (status == EBPO_OK && b->options.sides > EBPO_RAY_BACK)
         status = ebpo_fail_value(error);
     if (status == EBPO_OK)
-        status = check_rays(b, m, error);
+        status = ebpo_check_ray_rows(b->rays, b->count, error);
+    if (status == EBPO_OK)
+        status = ebpo_check_mesh(m, error);
     if (status != EBPO_OK || b->count == 0)
         return status;
     bool shared = m->whole || m->options.loading == EBPO_LOAD_CACHE;

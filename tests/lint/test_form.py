@@ -17,7 +17,7 @@ import sys
 COLUMNS = {".build": 100, ".py": 140, ".sh": 120, ".md": 120, ".txt": 120}
 OTHERS = 199  # of C where it is a table, .tests, .js, .css, man pages, ...
 MADE = re.compile(  # by programs
-    r"^(docs/measured/|format-spec/vectors/|tests/fuzz/seeds/|tests/lint/flags/fp_golden\.txt$|"
+    r"^(docs/measured/|format-spec/vectors/|tests/fuzz/seeds/|tests/lint/flags/fp_golden\.txt$|tests/lint/libebpo\.abi$|"
     r".*package-lock\.json$|.*\.svg$)")
 # Names that tell nothing without their folder, and need not; public headers are <ebpo/NAME.h>.
 COMMON = {"meson.build", "README.md"}

@@ -140,14 +140,14 @@ class Answers(Case):
     def test_errors_number_points_in_the_whole(self):
         bad, rays = P.copy(), np.concatenate([2 * P, D], axis=1)
         bad[12_345, 1], rays[7777, 3:] = np.nan, 0
-        with self.assertRaisesRegex(ebpo.ArgumentError, "number 12345 "):
+        with self.assertRaisesRegex(ebpo.ArgumentError, "point 12345 "):
             ed.inside("scan.ebpo.h5", bad, chunk=1000).compute(scheduler="sync")
         with self.assertRaisesRegex(ebpo.ArgumentError, "ray 7777 "):
             ed.ask("ray", "scan.ebpo.h5", rays, chunk=1000).compute(scheduler="sync")
         with self.assertRaisesRegex(ebpo.ArgumentError, "ray 0 needs a t_max"):
             ed.ask("ray", "scan.ebpo.h5", rays, chunk=1000, t_max=-1).compute(scheduler="sync")
         some = dask.array.from_array(bad, chunks=(1000, 3))
-        with self.assertRaisesRegex(ebpo.ArgumentError, "number 345 "):
+        with self.assertRaisesRegex(ebpo.ArgumentError, "point 345 "):
             ed.inside("scan.ebpo.h5", some[some[:, 0] != 9]).compute(scheduler="sync")
 
     def test_files_that_change(self):

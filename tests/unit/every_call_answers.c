@@ -377,6 +377,72 @@ static ebpo_status call_subtree(every_call_env *e)
     return status;
 }
 
+static ebpo_status ask_catalogue(const ebpo_catalogue *catalogue, ebpo_catalogue_models *models,
+                                 ebpo_error *error)
+{
+    static const double points[2][3] = { { 3, 0.1, 0.2 }, { 4, 0, 0 } };
+    static const ebpo_ray ray = { { -9, 0.1, 0.2 }, { 1, 0, 0 }, 99 };
+    ebpo_catalogue_ask_options one = EBPO_CATALOGUE_ASK_OPTIONS_INIT;
+    ebpo_inside_result inside[2];
+    ebpo_distance_result distance[2];
+    ebpo_ray_hit hit;
+    uint64_t model[2];
+    one.threads = 1;
+    ebpo_status status =
+        ebpo_catalogue_inside(catalogue, models, points[0], 2, &one, inside, error);
+    if (status == EBPO_OK)
+        status =
+            ebpo_catalogue_distance(catalogue, models, points[0], 2, &one, distance, model, error);
+    ebpo_catalogue_models_set_memory(models, 64 << 20);
+    if (status == EBPO_OK)
+        status = ebpo_catalogue_ray(catalogue, models, &ray, 1, &one, &hit, model, error);
+    return status;
+}
+
+static ebpo_status ask_catalogue_file(const char *path, ebpo_error *error)
+{
+    ebpo_catalogue *catalogue;
+    ebpo_catalogue_models *models = NULL;
+    ebpo_catalogue_models_options few = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
+    ebpo_catalogue_models_stats stats = EBPO_CATALOGUE_MODELS_STATS_INIT;
+    ebpo_catalogue_facts facts = EBPO_CATALOGUE_FACTS_INIT;
+    few.threads = 1;
+    ebpo_status status = ebpo_catalogue_open(path, NULL, &catalogue, error);
+    if (status == EBPO_OK)
+        status = ebpo_catalogue_get_facts(catalogue, &facts);
+    if (status == EBPO_OK && ebpo_catalogue_get_entry(catalogue, facts.count - 1))
+        status = ebpo_catalogue_models_new(&few, &models, error);
+    if (status == EBPO_OK)
+        status = ask_catalogue(catalogue, models, error);
+    if (status == EBPO_OK)
+        status = ebpo_catalogue_models_get_stats(models, &stats, NULL);
+    if (status == EBPO_OK)
+        ebpo_catalogue_models_close_idle(models);
+    ebpo_catalogue_models_free(models);
+    ebpo_catalogue_free(catalogue);
+    return status;
+}
+
+static ebpo_status call_catalogue(every_call_env *e)
+{
+    ebpo_catalogue *catalogue;
+    ebpo_catalogue_options options = EBPO_CATALOGUE_OPTIONS_INIT;
+    ebpo_catalogue_entry entry;
+    options.folder = scratch(NULL);
+    options.parts = true;
+    ebpo_catalogue_entry_of(e->file, EVERY_CALL_MODEL, &entry);
+    ebpo_status status = ebpo_catalogue_new(&entry, 1, &options, &catalogue, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_catalogue_save(catalogue, scratch("c.json"), e->error);
+    if (status == EBPO_OK)
+        status = ask_catalogue_file(scratch("c.json"), e->error);
+    ebpo_catalogue_free(catalogue);
+    every_call_pause();
+    unlink(scratch("c.json"));
+    every_call_resume();
+    return status;
+}
+
 const every_call every_call_answers[] = {
     { "sample", call_sample },
     { "ask", call_ask },
@@ -393,5 +459,6 @@ const every_call every_call_answers[] = {
     { "stream", call_stream },
     { "view", call_view },
     { "subtree", call_subtree },
+    { "catalogue", call_catalogue },
     { NULL, NULL },
 };

@@ -14,6 +14,7 @@
  *   file.h        files: writing, opening, reading
  *   http.h        files on web servers
  *   query.h       point in solid, distance, rays, boxes, mass
+ *   catalogue.h   many models that are asked as one, or the parts of one
  *   pair.h        how two faces lie to each other
  *   pose.h        where a model is in the world
  *   stream.h      levels, coarse to fine
@@ -53,6 +54,7 @@
 #include <ebpo/file.h>
 #include <ebpo/http.h>
 #include <ebpo/query.h>
+#include <ebpo/catalogue.h>
 #include <ebpo/pair.h>
 #include <ebpo/pose.h>
 #include <ebpo/stream.h>

@@ -34,11 +34,7 @@ typedef struct entry {
     char *why;
     char *path;  /* as the catalogue has it */
     char *shown; /* below the folder, as messages have it */
-    ebpo_rule rule;
-    bool solid, mesh, pruned;
-    uint64_t bytes, faces, vertices;
-    uint8_t content[32];
-    double min[3], max[3];
+    ebpo_catalogue_entry told;
 } entry;
 
 typedef struct catalogue {
@@ -61,22 +57,7 @@ enum { THREADS_MOST = 64 };
 
 /* --- heads --- */
 
-static void take_facts(entry *e, const ebpo_info *info)
-{
-    e->known = true;
-    e->rule = info->rule;
-    e->solid = info->solid;
-    e->mesh = (info->parts & EBPO_PART_MESH) != 0;
-    e->pruned = info->pruned;
-    e->bytes = info->file_bytes;
-    e->faces = info->face_count;
-    e->vertices = info->vertex_count;
-    memcpy(e->content, info->content_sha256, sizeof e->content);
-    memcpy(e->min, info->report.min, sizeof e->min);
-    memcpy(e->max, info->report.max, sizeof e->max);
-}
-
-static bool is_box(const entry *e)
+static bool has_box(const ebpo_catalogue_entry *e)
 {
     for (int k = 0; k < 3; k++)
         if (!isfinite(e->min[k]) || !isfinite(e->max[k]) || e->min[k] > e->max[k])
@@ -119,8 +100,9 @@ static void look_at(catalogue *c, size_t number)
     } else if (!is_utf8(e->path)) {
         leave_out(c, e, "its name is not UTF-8; give it another one");
     } else if (remote_open(&file, name, &how, &error) == EBPO_OK) {
-        take_facts(e, ebpo_file_info(file));
-        if (!is_box(e))
+        ebpo_catalogue_entry_of(file, e->path, &e->told);
+        e->known = true;
+        if (!has_box(&e->told))
             leave_out(c, e, "has no box, as it has no faces");
     } else {
         leave_out(c, e, error.message[0] ? error.message : ebpo_status_name(error.status));
@@ -176,13 +158,13 @@ static void add_up(catalogue *c)
         c->max[k] = -DBL_MAX;
     }
     for (size_t i = 0; i < c->files.count; i++) {
-        const entry *e = &c->entry[i];
-        if (!e->known)
+        const ebpo_catalogue_entry *e = &c->entry[i].told;
+        if (!c->entry[i].known)
             continue;
         c->models++;
         c->solids += e->solid;
-        c->faces += e->faces;
-        c->bytes += e->bytes;
+        c->faces += e->face_count;
+        c->bytes += e->file_bytes;
         for (int k = 0; k < 3; k++) {
             c->min[k] = fmin(c->min[k], e->min[k]);
             c->max[k] = fmax(c->max[k], e->max[k]);
@@ -243,49 +225,32 @@ static int find_way(catalogue *c)
 
 /* --- the file --- */
 
-static void write_entry(const catalogue *c, json *j, size_t number)
-{
-    const entry *e = &c->entry[number];
-    char hex[65];
-    words_hex(e->content, hex);
-    json_object(j, NULL);
-    json_text(j, "path", e->path);
-    json_uint(j, "bytes", e->bytes);
-    json_text(j, "content_sha256", hex);
-    json_uint(j, "faces", e->faces);
-    json_uint(j, "vertices", e->vertices);
-    json_bool(j, "solid", e->solid);
-    json_text(j, "rule", words_rule(e->rule));
-    json_bool(j, "mesh", e->mesh);
-    json_bool(j, "pruned", e->pruned);
-    json_reals(j, "box_min", e->min, 3);
-    json_reals(j, "box_max", e->max, 3);
-    json_end(j);
-}
-
+/* Paths of entries begin in the file's folder. */
 static int write_all(const catalogue *c)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
-    if (!out)
+    ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
+    ebpo_catalogue *made = NULL;
+    const char *slash = strrchr(c->out, '/');
+    char *folder = slash ? strndup(c->out, (size_t)(slash - c->out) + 1) : strdup("");
+    ebpo_catalogue_entry *entries = calloc(c->models, sizeof *entries);
+    uint64_t count = 0;
+    if (!folder || !entries) {
+        free(folder);
+        free(entries);
         return command_no_memory("catalogue");
-    json j;
-    json_begin(&j, out);
-    json_object(&j, NULL);
-    json_text(&j, "format", "ebpo-catalogue");
-    json_uint(&j, "version", 1);
-    json_array(&j, "models");
+    }
     for (size_t i = 0; i < c->files.count; i++)
         if (c->entry[i].known)
-            write_entry(c, &j, i);
-    json_finish(&j);
-    int code = fclose(out) == 0 ? EXIT_FINE : command_no_memory("catalogue");
-    if (code == EXIT_FINE && ebpo_write_file(c->out, text, size, &error) != EBPO_OK)
-        code = command_failed("catalogue", &error);
-    free(text);
-    return code;
+            entries[count++] = c->entry[i].told;
+    how.folder = folder;
+    ebpo_status status = ebpo_catalogue_new(entries, count, &how, &made, &error);
+    if (status == EBPO_OK)
+        status = ebpo_catalogue_save(made, c->out, &error);
+    ebpo_catalogue_free(made);
+    free(entries);
+    free(folder);
+    return status == EBPO_OK ? EXIT_FINE : command_failed("catalogue", &error);
 }
 
 /* --- what is told --- */

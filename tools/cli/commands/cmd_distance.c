@@ -4,6 +4,7 @@
 
 #include "cli/command.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/query_catalogue.h"
 #include "cli/commands/query_run.h"
 
 #include "cli/options/distance.inc"
@@ -54,10 +55,10 @@ static uint64_t *models_of(const query_worker *w, uint64_t count)
 static ebpo_status answer_distances(const query_job *job, query_worker *w, const double *rows,
                                     uint64_t count, ebpo_error *error)
 {
-    if (job->models)
-        return catalogue_distance(job->models, rows, count, job->distance.max_distance,
-                                  job->distance.unsigned_distance, w->results, models_of(w, count),
-                                  error);
+    ebpo_catalogue_ask_options how = query_catalogue_options(job);
+    if (job->catalogue)
+        return ebpo_catalogue_distance(job->catalogue, job->models, rows, count, &how, w->results,
+                                       models_of(w, count), error);
     if (count && query_lists(job->values))
         return answer_lists(job, w, rows, count, error);
     return ebpo_distance_many(w->context, rows, count, &job->distance, w->results, error);
@@ -68,23 +69,22 @@ static void print_distances(const query_job *job, query_worker *w, const double 
 {
     (void)rows;
     if (!query_lists(job->values))
-        answers_distance(w->text, job->form, !job->models && is_limited(&job->distance), w->results,
-                         count, job->sampler, job->models ? models_of(w, count) : NULL);
+        answers_distance(w->text, job->form, !job->catalogue && is_limited(&job->distance), w->results,
+                         count, job->sampler, job->catalogue ? models_of(w, count) : NULL);
 }
 
 static const char *distance_columns(const query_job *job)
 {
-    return job->models ? "distance,x,y,z,nx,ny,nz,face,model"
-           : is_limited(&job->distance) && !query_lists(job->values)
-               ? "lo,hi"
-               : "distance,x,y,z,nx,ny,nz,face";
+    return job->catalogue ? "distance,x,y,z,nx,ny,nz,face,model"
+           : is_limited(&job->distance) && !query_lists(job->values) ? "lo,hi"
+                                                                  : "distance,x,y,z,nx,ny,nz,face";
 }
 
 static const char *distance_dtype(const query_job *job, unsigned *bytes)
 {
     if (query_lists(job->values))
         return NULL;
-    if (job->models) {
+    if (job->catalogue) {
         *bytes = 72;
         return "[('distance', '<f8'), ('point', '<f8', (3,)), ('normal', '<f8', (3,)), ('face', "
                "'<u8'), ('model', '<u8')]";

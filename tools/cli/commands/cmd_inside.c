@@ -3,6 +3,7 @@
 
 #include "cli/command.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/query_catalogue.h"
 #include "cli/commands/query_run.h"
 
 #include "cli/options/inside.inc"
@@ -10,8 +11,11 @@
 static ebpo_status answer_inside(const query_job *job, query_worker *w, const double *rows,
                                  uint64_t count, ebpo_error *error)
 {
-    return job->models ? catalogue_inside(job->models, rows, count, w->results, error)
-                       : ebpo_inside_many(w->context, rows, count, &job->inside, w->results, error);
+    ebpo_catalogue_ask_options how = query_catalogue_options(job);
+    return job->catalogue
+               ? ebpo_catalogue_inside(job->catalogue, job->models, rows, count, &how, w->results,
+                                       error)
+               : ebpo_inside_many(w->context, rows, count, &job->inside, w->results, error);
 }
 
 static void print_inside(const query_job *job, query_worker *w, const double *rows, uint64_t count)

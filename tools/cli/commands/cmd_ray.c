@@ -4,6 +4,7 @@
 
 #include "cli/command.h"
 #include "cli/commands/commands.h"
+#include "cli/commands/query_catalogue.h"
 #include "cli/commands/query_run.h"
 
 #include "cli/options/ray.inc"
@@ -36,9 +37,11 @@ static ebpo_status answer_rays(const query_job *job, query_worker *w, const doub
     ebpo_ray_options how = EBPO_RAY_OPTIONS_INIT;
     how.sides = (ebpo_ray_sides)job->values->ray_sides;
     how.threads = 1; /* others ask about other rays */
-    if (job->models)
-        return catalogue_ray(job->models, rays, count, how.sides, w->results, models_of(w, count),
-                             error);
+    if (job->catalogue) {
+        ebpo_catalogue_ask_options all = query_catalogue_options(job);
+        return ebpo_catalogue_ray(job->catalogue, job->models, rays, count, &all, w->results,
+                                  models_of(w, count), error);
+    }
     if (job->values->all)
         return answer_all(job, w, rays, count, &how, error);
     if (job->values->any)
@@ -53,21 +56,21 @@ static void print_rays(const query_job *job, query_worker *w, const double *rows
         answers_ray_any(w->text, job->form, w->results, count);
     else if (!job->values->all)
         answers_ray_first(w->text, job->form, rays, w->results, count, job->sampler,
-                          job->models ? models_of(w, count) : NULL);
+                          job->catalogue ? models_of(w, count) : NULL);
 }
 
 static const char *ray_columns(const query_job *job)
 {
     return job->values->any   ? "hit"
            : job->values->all ? "hits,t,face,side"
-           : job->models      ? "t,face,side,model"
+           : job->catalogue   ? "t,face,side,model"
                               : "t,face,side";
 }
 
 static const char *ray_dtype(const query_job *job, unsigned *bytes)
 {
     *bytes = job->values->any ? 8 : 24;
-    if (job->models) {
+    if (job->catalogue) {
         *bytes = 32;
         return "[('t', '<f8'), ('face', '<u8'), ('side', '<i8'), ('model', '<u8')]";
     }

@@ -3,7 +3,6 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
@@ -30,6 +29,12 @@ static const char *refused_option(const query_job *job)
                                      : NULL;
 }
 
+bool query_catalogue_named(const char *name)
+{
+    size_t length = strlen(name);
+    return length > 5 && strcmp(name + length - 5, ".json") == 0 && !ebpo_is_url(name);
+}
+
 bool query_catalogue_fits(const query_job *job)
 {
     const char *what = refused_option(job);
@@ -38,50 +43,64 @@ bool query_catalogue_fits(const query_job *job)
     return !what;
 }
 
+static ebpo_status open_as_told(void *user, const char *path, ebpo_file **out, ebpo_error *error)
+{
+    return remote_open(out, path, user, error);
+}
+
 int query_catalogue_open(query_job *job, const char *path, const ebpo_model_options *options)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const query_values *v = job->values;
-    catalogue *c = NULL;
-    holding_options o = { .memory = v->memory ? options->memory : ebpo_free_memory() / 2,
-                          .threads = options->threads,
-                          .remote = &v->remote };
-    if (catalogue_read(path, &c, &error) != EBPO_OK)
-        return command_failed(job->command, &error);
-    job->models = calloc(1, sizeof *job->models);
-    if (job->models && catalogue_models_make(job->models, c, &o))
-        return EXIT_FINE;
-    if (!job->models)
-        catalogue_free(c);
-    return command_no_memory(job->command);
+    ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
+    ebpo_catalogue_models_options o = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
+    how.open_file = open_as_told;
+    how.user = (void *)&v->remote;
+    o.memory = v->memory ? options->memory : ebpo_free_memory() / 2;
+    o.threads = options->threads;
+    ebpo_status status = ebpo_catalogue_open(path, &how, &job->catalogue, &error);
+    if (status == EBPO_OK)
+        status = ebpo_catalogue_models_new(&o, &job->models, &error);
+    return status == EBPO_OK ? EXIT_FINE : command_failed(job->command, &error);
 }
 
 void query_catalogue_close(query_job *job)
 {
-    catalogue *c = job->models ? (catalogue *)job->models->c : NULL;
-    if (job->models)
-        catalogue_models_free(job->models);
-    catalogue_free(c);
-    free(job->models);
+    ebpo_catalogue_models_free(job->models);
+    ebpo_catalogue_free(job->catalogue);
     job->models = NULL;
+    job->catalogue = NULL;
+}
+
+ebpo_catalogue_ask_options query_catalogue_options(const query_job *job)
+{
+    ebpo_catalogue_ask_options o = EBPO_CATALOGUE_ASK_OPTIONS_INIT;
+    o.threads = 1; /* others ask about other rows */
+    o.max_distance = job->distance.max_distance;
+    o.unsigned_distance = job->distance.unsigned_distance;
+    o.sides = (ebpo_ray_sides)job->values->ray_sides;
+    return o;
 }
 
 void query_catalogue_tell(const query_job *job)
 {
-    holding_counts n;
-    holding_get_counts(job->models->held, &n);
+    ebpo_catalogue_facts facts = EBPO_CATALOGUE_FACTS_INIT;
+    ebpo_catalogue_models_stats n = EBPO_CATALOGUE_MODELS_STATS_INIT;
+    ebpo_model_stats sums = EBPO_MODEL_STATS_INIT;
+    ebpo_catalogue_get_facts(job->catalogue, &facts);
+    ebpo_catalogue_models_get_stats(job->models, &n, &sums);
     if (!job->values->json) {
-        stats_print(stderr, &n.sums);
+        stats_print(stderr, &sums);
         fprintf(stderr, "catalogue: %" PRIu64 " models, opened %" PRIu64 ", closed %" PRIu64 "\n",
-                job->models->c->count, n.opened, n.closed);
+                facts.count, n.opened, n.closed);
         return;
     }
     json j;
     json_begin(&j, stderr);
     json_object(&j, NULL);
-    stats_json(&j, &n.sums);
+    stats_json(&j, &sums);
     json_object(&j, "catalogue");
-    json_uint(&j, "models", job->models->c->count);
+    json_uint(&j, "models", facts.count);
     json_uint(&j, "opened", n.opened);
     json_uint(&j, "closed", n.closed);
     json_finish(&j);
@@ -92,24 +111,28 @@ void query_catalogue_tell(const query_job *job)
 int query_catalogue_facts(json *j, const char *command, const char *path)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    catalogue *c = NULL;
+    ebpo_catalogue *c = NULL;
+    ebpo_catalogue_facts facts = EBPO_CATALOGUE_FACTS_INIT;
     struct stat st;
     char hash[20];
-    if (catalogue_read(path, &c, &error) != EBPO_OK)
+    if (ebpo_catalogue_open(path, NULL, &c, &error) != EBPO_OK)
         return command_failed(command, &error);
-    snprintf(hash, sizeof hash, "%016" PRIx64, c->hash);
+    ebpo_catalogue_get_facts(c, &facts);
+    snprintf(hash, sizeof hash, "%016" PRIx64, facts.file_hash);
     json_object(j, "catalogue");
-    json_uint(j, "bytes", c->bytes);
+    json_uint(j, "bytes", facts.file_bytes);
     json_text(j, "fnv1a", hash); /* it has the digest of each model */
     json_array(j, "numbers");
-    for (uint64_t i = 0; i < c->count; i++)
-        if (c->entry[i].numbers && stat(c->entry[i].numbers, &st) == 0) {
-            json_uint(j, NULL, (uint64_t)st.st_size);
-            json_int(j, NULL, st.st_mtim.tv_sec);
-            json_int(j, NULL, st.st_mtim.tv_nsec);
-        }
+    for (uint64_t i = 0; i < facts.count; i++) {
+        const char *numbers = ebpo_catalogue_get_entry(c, i)->numbers;
+        if (!numbers || stat(numbers, &st) != 0)
+            continue;
+        json_uint(j, NULL, (uint64_t)st.st_size);
+        json_int(j, NULL, st.st_mtim.tv_sec);
+        json_int(j, NULL, st.st_mtim.tv_nsec);
+    }
     json_end(j);
     json_end(j);
-    catalogue_free(c);
+    ebpo_catalogue_free(c);
     return EXIT_FINE;
 }

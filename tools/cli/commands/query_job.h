@@ -2,7 +2,8 @@
 #ifndef EBPO_TOOLS_QUERY_JOB_H
 #define EBPO_TOOLS_QUERY_JOB_H
 
-#include "cli/commands/catalogue_models.h"
+#include <ebpo/catalogue.h>
+
 #include "cli/answers.h"
 #include "cli/points.h"
 #include "cli/query_args.h"
@@ -36,8 +37,9 @@ struct query_job {
     ebpo_distance_options distance;
     answer_form form;
     const ebpo_sampler *sampler; /* of --attribute; NULL: none */
-    catalogue_models *models;    /* a catalogue is asked in place of a model; NULL: a model */
-    bool continues;              /* answers go on behind those of another run: without names */
+    ebpo_catalogue *catalogue;   /* is asked in place of a model; NULL: a model is asked */
+    ebpo_catalogue_models *models;
+    bool continues; /* answers go on behind those of another run: without names */
 };
 
 #endif

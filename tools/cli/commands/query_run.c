@@ -127,7 +127,7 @@ static uint64_t bytes_together(const query_values *v, const query_holding *holdi
 static int open_asked(query_job *job, const char *model, const ebpo_model_options *options,
                       query_holding *holding)
 {
-    if (!catalogue_is(model))
+    if (!query_catalogue_named(model))
         return query_holding_open(holding, job->command, model, job->values, options,
                                   job->parts_share);
     query_holding_elsewhere(holding, job->command);
@@ -154,7 +154,7 @@ static int run_query(query_job *job, const char *model, points *in,
     ebpo_sampler_free(sampler);
     if (holding.session.model && job->values->remote.stats)
         tell_stats(job, &holding);
-    if (job->models && job->values->remote.stats)
+    if (job->catalogue && job->values->remote.stats)
         query_catalogue_tell(job);
     query_catalogue_close(job);
     query_holding_close(&holding);
@@ -185,7 +185,7 @@ int query_run(query_job *job, const char *model, const char *path)
     query_shard shard;
     if (!query_options_from(job->command, job->values, &options, &job->inside, &job->distance))
         return EXIT_USAGE;
-    if (!form_fits(job) || (catalogue_is(model) && !query_catalogue_fits(job)))
+    if (!form_fits(job) || (query_catalogue_named(model) && !query_catalogue_fits(job)))
         return EXIT_USAGE;
     job->form = form_of(job->values);
     int code = EXIT_USAGE;

@@ -122,7 +122,7 @@ static int tell_model(json *j, const query_shard *s)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     char hex[65];
-    if (catalogue_is(s->model))
+    if (query_catalogue_named(s->model))
         return query_catalogue_facts(j, s->command, s->model);
     if (remote_open(&file, s->model, &s->v->remote, &error) != EBPO_OK)
         return command_failed(s->command, &error);
@@ -175,7 +175,7 @@ static int look_at_inputs(const query_shard *s, const query_job *job, char **fac
 {
     struct stat st;
     const char *dataset;
-    if (!catalogue_is(s->model) && !command_wants_hdf5(s->command, s->model))
+    if (!query_catalogue_named(s->model) && !command_wants_hdf5(s->command, s->model))
         return EXIT_FAILED;
     if (!points_file(s->points, &st, &dataset)) {
         fprintf(stderr, "ebpo %s: %s: cannot be opened: %s\n", s->command, s->points,

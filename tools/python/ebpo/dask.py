@@ -113,11 +113,10 @@ def answer_block(block: np.ndarray, what: str, asked: Catalogue, means: Means, o
     rows = (block[:, :3], block[:, 3:]) if what == "ray" else (block,)
     try:
         return ask(*rows, **rest, **means.options)
-    except ArgumentError:
+    except ArgumentError as error:
         begin = block_info[0]["array-location"][0][0] if block_info else np.nan
         if begin == begin:  # of some chunks Dask does not know where they begin
-            check = cat.check_rays if what == "ray" else cat.check_points
-            check(*rows, *([rest.get("t_max", np.inf)] if what == "ray" else []), first=int(begin))
+            cat.numbered(error, int(begin))
         raise
 
 

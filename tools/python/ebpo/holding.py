@@ -1,149 +1,116 @@
 """The models that a process holds between questions, all within one budget."""
 from __future__ import annotations
 
-import contextlib
-import threading
-from collections import OrderedDict
-from typing import Any, Iterator
+import ctypes
+import os
+from typing import Any
 
-from ._library import size_in_bytes
-from .errors import FormatError
-from .model import Model
-from .model import open as open_model
+from . import _declared as c
+from ._library import Handle, lib, made, size_in_bytes, text
+from .errors import BY_STATUS, Error
+from .sources import opened, shown
 
 BUDGET = 1 << 30
-SHARES = 8  # models that are asked at a time at most, where there are many
-COUNTED = ("bytes_read", "reads", "loads", "hits", "evicted")
+CODES = {kind: code for code, kind in BY_STATUS.items()}
+IO, CANCELLED = -3, -9
+ENTRY: dict = {name: kind for name, kind in c.ebpo_catalogue_options._fields_}
+
+_files: dict[int, Handle] = {}  # that the library has open, by their addresses
+_options: list[dict] = []  # of catalogues; an opener's number is a place here, from 1 on
+_numbers: dict[str, int] = {}
+_raised: dict[str, BaseException] = {}  # what is no failure of the library, by its message
 
 
-class Held:
-    """A model, how many use it, and what it may take while they do."""
+def opener(options: dict) -> int:
+    """The number by which catalogues with these options of URLs know how files are opened."""
+    key = repr(sorted(options.items()))
+    if key not in _numbers:
+        _options.append(options)
+        _numbers[key] = len(_options)
+    return _numbers[key]
 
-    def __init__(self, share: int) -> None:
-        self.share, self.users, self.lock = share, 1, threading.Lock()
-        self.model: Model | None = None
 
-    @property
-    def bytes(self) -> int:
-        if self.users or self.model is None:
-            return self.share
-        return int(self.model.stats["memory"])
+def opened_by(name: str, options: dict) -> Handle:
+    """An ebpo_file. Options are those of URLs; long work waits for servers that are away for some minutes."""
+    http: dict = {}
+    if "://" in name:
+        http = dict(options)
+        if name.startswith(("http://", "https://")) and "storage_options" not in options:
+            http = {"time_limit": 300.0, "retries": 60, **options}
+    storage, most = http.pop("storage_options", None), http.pop("most_expansion", None)
+    return opened(name, http, storage, most or 0)
+
+
+def _open_file(number: int, path: bytes, out: int, error: int) -> int:
+    """For the library, in any thread."""
+    try:
+        file = opened_by(os.fsdecode(path), _options[number - 1])
+        _files[file.pointer.value] = file
+        ctypes.c_void_p.from_address(out).value = file.pointer.value
+        return 0
+    except BaseException as raised:
+        struct = c.ebpo_error.from_address(error) if error else made(c.ebpo_error)
+        code = CODES.get(type(raised), CANCELLED if isinstance(raised, KeyboardInterrupt) else IO)
+        said = str(raised) if type(raised) in CODES else f"{type(raised).__name__}: {raised}"
+        struct.status, struct.message = code, shown(said)[:479]
+        if isinstance(raised, Error):
+            struct.file, struct.object = shown(raised.file)[:255], shown(raised.object)[:63]
+        if type(raised) not in CODES:
+            _raised[text(struct.message)] = raised
+        return code
+
+
+def _close_file(_number: int, file: int) -> None:
+    _files.pop(file, None)
+
+
+OPEN_FILE, CLOSE_FILE = ENTRY["open_file"](_open_file), ENTRY["close_file"](_close_file)
+
+
+def raised_by(error: Error) -> BaseException:
+    """What was raised in a function that opened a file, of the failure that came of it."""
+    return _raised.pop(str(error), error)
 
 
 class Holding:
-    """Models that stay open, the least recently asked goes first. Any number of threads.
+    """Models of catalogues that stay open, the least recently asked goes first. Any number of threads.
 
     memory: bytes for all of them together.
     """
 
     def __init__(self, memory: int | str | None = None) -> None:
-        self.memory = size_in_bytes(memory) or BUDGET
-        self._held: OrderedDict[Any, Held] = OrderedDict()
-        self._changed = threading.Condition()
-        self._gone = dict.fromkeys(("opened", "closed", *COUNTED), 0)
+        self._memory = size_in_bytes(memory) or BUDGET
+        options = made(c.ebpo_catalogue_models_options, memory=self._memory)
+        self.models = Handle.made("ebpo_catalogue_models_new", ctypes.byref(options), free="ebpo_catalogue_models_free")
 
-    @contextlib.contextmanager
-    def model(self, source: str, digest: str = "", among: int = 1, **options: Any) -> Iterator[Model]:
-        """The model of a path or URL, opened if it is not held.
+    @property
+    def memory(self) -> int:
+        return self._memory
 
-        digest: its content_sha256; another one is a FormatError: the file has changed. "": any.
-        among: it is one of so many models, which share the budget.
-        """
-        share = self.memory // max(1, min(among, SHARES))
-        key = source, digest, share, repr(sorted(options.items()))
-        held = self._take(key, share)
-        try:
-            with held.lock:  # of several that want it one opens it
-                if held.model is None:
-                    held.model = self._opened(source, digest, share, options)
-            yield held.model
-        finally:
-            self._give_back(key, held)
-
-    def _opened(self, source: str, digest: str, share: int, options: dict) -> Model:
-        model = open_model(source, memory=share, **options)
-        found = model.info.content_sha256
-        if digest and found != digest:
-            model.close()
-            raise FormatError(f"{source}: the file has changed: its content is {found[:16]}..., and the question is about "
-                              f"{digest[:16]}...; ask anew", "EBPO_E_FORMAT", source)
-        with self._changed:
-            self._gone["opened"] += 1
-        return model
-
-    def _take(self, key: Any, share: int) -> Held:
-        with self._changed:
-            while True:
-                if key in self._held:
-                    held = self._held[key]
-                    self._held.move_to_end(key)
-                    more = held.share - held.bytes  # it may grow again
-                    if not self._make_room(more, held):
-                        self._changed.wait()
-                        continue
-                    held.users += 1
-                    return held
-                if self._make_room(share, None):
-                    held = self._held[key] = Held(share)
-                    return held
-                self._changed.wait()
-
-    def _make_room(self, size: int, but: Held | None) -> bool:
-        """Closes what is idle until there is room; whether there is, or nothing else is held."""
-        taken = sum(held.bytes for held in self._held.values())
-        for key in [key for key, held in self._held.items() if not held.users and held is not but]:
-            if taken + size <= self.memory:
-                break
-            taken -= self._held[key].bytes
-            self._close(key)
-        busy = any(held.users for held in self._held.values() if held is not but)
-        return taken + size <= self.memory or not busy
-
-    def _close(self, key: Any) -> None:
-        model = self._held.pop(key).model
-        if model is not None:
-            self._count(model, self._gone)
-            self._gone["closed"] += 1
-            model.close()
-
-    @staticmethod
-    def _count(model: Model, counts: dict) -> None:
-        stats = model.stats
-        for name in COUNTED:
-            counts[name] += stats[name]
-
-    def _give_back(self, key: Any, held: Held) -> None:
-        with self._changed:
-            held.users -= 1
-            if not held.users and (held.model is None or held.model._made is None):  # of no use, or refused
-                self._held.pop(key, None)
-                if held.model is not None:
-                    held.model.close()
-            self._changed.notify_all()
+    @memory.setter
+    def memory(self, size: int | str) -> None:
+        self._memory = size_in_bytes(size) or BUDGET
+        lib.ebpo_catalogue_models_set_memory(self.models, self._memory)
 
     def counts(self) -> dict[str, int]:
         """Since the process began: opened, closed: models; bytes_read, reads, loads, hits, evicted: as in
         `Model.stats`, of all of them; now: models, memory (bytes)."""
-        with self._changed:
-            counts = dict(self._gone, models=len(self._held), memory=0)
-            for held in self._held.values():
-                if held.model is not None and held.model._made is not None:
-                    self._count(held.model, counts)
-                    counts["memory"] += int(held.model.stats["memory"])
-        return counts
+        told, sums = made(c.ebpo_catalogue_models_stats), made(c.ebpo_model_stats)
+        lib.ebpo_catalogue_models_get_stats(self.models, ctypes.byref(told), ctypes.byref(sums))
+        counts = {name: getattr(sums, name) for name in ("bytes_read", "reads", "loads", "hits", "evicted", "memory")}
+        return dict(counts, opened=told.opened, closed=told.closed, models=told.open)
 
     def clear(self) -> None:
         """Closes what nobody uses."""
-        with self._changed:
-            for key in [key for key, held in self._held.items() if not held.users]:
-                self._close(key)
+        lib.ebpo_catalogue_models_close_idle(self.models)
 
 
 _ours = Holding()
+_ours.models._end.detach()  # it ends with the process; threads may still be asking
 
 
 def ours(memory: int | str | None = None) -> Holding:
     """That of this process. A budget that is given holds from now on."""
     if memory is not None:
-        _ours.memory = size_in_bytes(memory) or BUDGET
+        _ours.memory = memory
     return _ours

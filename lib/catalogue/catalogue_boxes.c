@@ -1,10 +1,22 @@
-#include "cli/commands/catalogue_boxes.h"
+/* Which of many boxes points and rays come to.
+ *
+ * Boxes are in a tree: eight neighbours along the Morton curve of their centres have a box around
+ * them on the next level, up to one that holds all. A question goes down from there, and leaves out
+ * what it cannot come to. The tree does not change once it is made, so that any number of threads
+ * may ask it.
+ *
+ * What is left out is certain to be of no use: lengths are rounded some ten times here, each by
+ * 2^-53, and only what is farther by a share of 2^-40 is left out. So boxes may be named that a
+ * question does not come to, and the model then says so; none is missing. */
+#include "core/strict_fp.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
-enum { FAN = 8, BITS = 21 };
+#include "catalogue/catalogue_boxes.h"
+#include "core/alloc.h"
+
+enum { FAN = 8, BITS = 21, LEVELS = EBPO_CATALOGUE_LEVELS };
 
 /* --- order --- */
 
@@ -33,18 +45,12 @@ static uint64_t code_of(const double p[3], const double min[3], const double max
     return code;
 }
 
-/* numbers[count] of points, along the curve of a box around them. False: not enough memory. */
-static bool morton_order(const double (*points)[3], size_t count, uint32_t *numbers)
+bool ebpo_catalogue_morton_order(const double *points, size_t count, const double min[3],
+                                 const double max[3], uint32_t *numbers)
 {
-    double min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
-    coded *all = malloc(count * sizeof *all + 1);
-    for (size_t i = 0; i < count; i++)
-        for (int k = 0; k < 3; k++) {
-            min[k] = fmin(min[k], points[i][k]);
-            max[k] = fmax(max[k], points[i][k]);
-        }
+    coded *all = ebpo_alloc(count, sizeof *all);
     for (size_t i = 0; all && i < count; i++)
-        all[i] = (coded){ code_of(points[i], min, max), (uint32_t)i };
+        all[i] = (coded){ code_of(points + 3 * i, min, max), (uint32_t)i };
     if (all)
         qsort(all, count, sizeof *all, by_code);
     for (size_t i = 0; all && i < count; i++)
@@ -55,9 +61,9 @@ static bool morton_order(const double (*points)[3], size_t count, uint32_t *numb
 
 /* --- the tree --- */
 
-static closed_box box_around(const closed_box *boxes, size_t count)
+static ebpo_catalogue_box box_around(const ebpo_catalogue_box *boxes, size_t count)
 {
-    closed_box all = boxes[0];
+    ebpo_catalogue_box all = boxes[0];
     for (size_t i = 1; i < count; i++)
         for (int k = 0; k < 3; k++) {
             all.min[k] = fmin(all.min[k], boxes[i].min[k]);
@@ -66,18 +72,20 @@ static closed_box box_around(const closed_box *boxes, size_t count)
     return all;
 }
 
-static bool make_lowest(catalogue_boxes *t, const closed_box *boxes, const uint32_t *numbers,
-                        size_t count)
+/* The boxes in the order of their centres. */
+static bool make_lowest(ebpo_catalogue_boxes *t, const ebpo_catalogue_box *boxes,
+                        const uint32_t *numbers, size_t count)
 {
-    double(*centre)[3] = malloc(count * sizeof *centre);
-    uint32_t *order = malloc(count * sizeof *order);
-    t->number = malloc(count * sizeof *t->number);
-    t->box[0] = malloc(count * sizeof *t->box[0]);
+    ebpo_catalogue_box all = box_around(boxes, count);
+    double(*centre)[3] = ebpo_alloc(count, sizeof *centre);
+    uint32_t *order = ebpo_alloc(count, sizeof *order);
+    t->number = ebpo_alloc(count, sizeof *t->number);
+    t->box[0] = ebpo_alloc(count, sizeof *t->box[0]);
     bool fine = centre && order && t->number && t->box[0];
     for (size_t i = 0; fine && i < count; i++)
         for (int k = 0; k < 3; k++)
             centre[i][k] = boxes[i].min[k] / 2 + boxes[i].max[k] / 2;
-    fine = fine && morton_order((const double(*)[3])centre, count, order);
+    fine = fine && ebpo_catalogue_morton_order(centre[0], count, all.min, all.max, order);
     for (size_t i = 0; fine && i < count; i++) {
         t->number[i] = numbers[order[i]];
         t->box[0][i] = boxes[order[i]];
@@ -87,10 +95,10 @@ static bool make_lowest(catalogue_boxes *t, const closed_box *boxes, const uint3
     return fine;
 }
 
-bool catalogue_boxes_make(catalogue_boxes *t, const closed_box *boxes, const uint32_t *numbers,
-                          size_t count)
+bool ebpo_catalogue_boxes_make(ebpo_catalogue_boxes *t, const ebpo_catalogue_box *boxes,
+                               const uint32_t *numbers, size_t count)
 {
-    *t = (catalogue_boxes){ .levels = 0 };
+    *t = (ebpo_catalogue_boxes){ .levels = 0 };
     if (!count)
         return true;
     if (!make_lowest(t, boxes, numbers, count))
@@ -98,7 +106,7 @@ bool catalogue_boxes_make(catalogue_boxes *t, const closed_box *boxes, const uin
     t->count[0] = count;
     for (t->levels = 1; t->count[t->levels - 1] > 1; t->levels++) {
         size_t below = t->count[t->levels - 1], here = (below + FAN - 1) / FAN;
-        closed_box *box = t->box[t->levels] = malloc(here * sizeof *box);
+        ebpo_catalogue_box *box = t->box[t->levels] = ebpo_alloc(here, sizeof *box);
         if (!box)
             return false;
         for (size_t i = 0; i < here; i++)
@@ -109,45 +117,39 @@ bool catalogue_boxes_make(catalogue_boxes *t, const closed_box *boxes, const uin
     return true;
 }
 
-void catalogue_boxes_free(catalogue_boxes *t)
+void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t)
 {
     free(t->number);
-    for (int level = 0; level < BOX_LEVELS; level++)
+    for (int level = 0; level < LEVELS; level++)
         free(t->box[level]);
-    *t = (catalogue_boxes){ .levels = 0 };
+    *t = (ebpo_catalogue_boxes){ .levels = 0 };
 }
 
 /* --- going down --- */
 
 typedef struct walk {
-    const catalogue_boxes *t;
+    const ebpo_catalogue_boxes *t;
     const double *p, *d; /* the point, or the ray's origin and direction */
     double reach;        /* near: what is farther is not wanted */
     double pad;          /* ray: more than what is rounded */
     uint32_t item;
-    box_pairs *out; /* NULL: only `reach` is found */
-    bool (*keep)(struct walk *w, const closed_box *box, double *least);
+    ebpo_catalogue_pairs *out; /* NULL: only `reach` is found */
+    bool (*keep)(struct walk *w, const ebpo_catalogue_box *box, double *least);
     bool failed;
 } walk;
 
 static void append_pair(walk *w, uint32_t box, double least)
 {
-    box_pairs *o = w->out;
-    if (o->count == o->capacity) {
-        size_t more = o->capacity ? 2 * o->capacity : 1024;
-        box_pair *pair = realloc(o->pair, more * sizeof *pair);
-        if (!pair) {
-            w->failed = true;
-            return;
-        }
-        o->pair = pair;
-        o->capacity = more;
+    ebpo_catalogue_pairs *o = w->out;
+    if (!ebpo_grow(&o->pair, &o->capacity, o->count + 1, sizeof *o->pair)) {
+        w->failed = true;
+        return;
     }
-    o->pair[o->count++] = (box_pair){ box, w->item, least };
+    o->pair[o->count++] = (ebpo_catalogue_pair){ box, w->item, least };
 }
 
-/* At most BOX_LEVELS deep. */
-static void descend_tree(walk *w, int level, size_t node) /* NOLINT(misc-no-recursion) */
+/* Recursion: at most LEVELS deep. */
+static void descend_boxes(walk *w, int level, size_t node) /* NOLINT(misc-no-recursion) */
 {
     double least = 0;
     if (w->failed || !w->keep(w, &w->t->box[level][node], &least))
@@ -160,19 +162,19 @@ static void descend_tree(walk *w, int level, size_t node) /* NOLINT(misc-no-recu
     size_t end = (node + 1) * FAN;
     end = end < w->t->count[level - 1] ? end : w->t->count[level - 1];
     for (size_t child = node * FAN; child < end; child++)
-        descend_tree(w, level - 1, child);
+        descend_boxes(w, level - 1, child);
 }
 
-static bool walk_tree(walk *w)
+static bool walk_boxes(walk *w)
 {
     if (w->t->levels)
-        descend_tree(w, w->t->levels - 1, 0);
+        descend_boxes(w, w->t->levels - 1, 0);
     return !w->failed;
 }
 
 /* --- points --- */
 
-static bool holds_point(walk *w, const closed_box *b, double *least)
+static bool holds_point(walk *w, const ebpo_catalogue_box *b, double *least)
 {
     (void)least;
     for (int k = 0; k < 3; k++)
@@ -181,17 +183,17 @@ static bool holds_point(walk *w, const closed_box *b, double *least)
     return true;
 }
 
-bool catalogue_boxes_holding(const catalogue_boxes *t, const double p[3], uint32_t item,
-                             box_pairs *out)
+bool ebpo_catalogue_boxes_holding(const ebpo_catalogue_boxes *t, const double p[3], uint32_t item,
+                                  ebpo_catalogue_pairs *out)
 {
     walk w = { .t = t, .p = p, .item = item, .out = out, .keep = holds_point };
-    return walk_tree(&w);
+    return walk_boxes(&w);
 }
 
 /* Also where squares are beyond doubles. */
 static double vector_length(const double v[3]) { return hypot(hypot(v[0], v[1]), v[2]); }
 
-static double least_length(const closed_box *b, const double p[3])
+static double least_length(const ebpo_catalogue_box *b, const double p[3])
 {
     double v[3];
     for (int k = 0; k < 3; k++)
@@ -199,7 +201,7 @@ static double least_length(const closed_box *b, const double p[3])
     return vector_length(v);
 }
 
-static double greatest_length(const closed_box *b, const double p[3])
+static double greatest_length(const ebpo_catalogue_box *b, const double p[3])
 {
     double v[3];
     for (int k = 0; k < 3; k++)
@@ -207,14 +209,14 @@ static double greatest_length(const closed_box *b, const double p[3])
     return vector_length(v);
 }
 
-static bool may_be_near(walk *w, const closed_box *b, double *least)
+static bool may_be_near(walk *w, const ebpo_catalogue_box *b, double *least)
 {
     *least = least_length(b, w->p);
-    return *least * (1 - BOX_SLACK) <= w->reach;
+    return *least * (1 - EBPO_CATALOGUE_SLACK) <= w->reach;
 }
 
 /* Something of a box is nearer than its farthest corner. */
-static bool comes_nearer(walk *w, const closed_box *b, double *least)
+static bool comes_nearer(walk *w, const ebpo_catalogue_box *b, double *least)
 {
     if (!may_be_near(w, b, least))
         return false;
@@ -222,19 +224,19 @@ static bool comes_nearer(walk *w, const closed_box *b, double *least)
     return true;
 }
 
-bool catalogue_boxes_near(const catalogue_boxes *t, const double p[3], double most, uint32_t item,
-                          box_pairs *out)
+bool ebpo_catalogue_boxes_near(const ebpo_catalogue_boxes *t, const double p[3], double most,
+                               uint32_t item, ebpo_catalogue_pairs *out)
 {
     walk w = { .t = t, .p = p, .reach = most, .item = item, .keep = comes_nearer };
-    (void)walk_tree(&w);
+    (void)walk_boxes(&w);
     w.out = out;
     w.keep = may_be_near;
-    return walk_tree(&w);
+    return walk_boxes(&w);
 }
 
 /* --- rays --- */
 
-static bool may_be_met(walk *w, const closed_box *b, double *least)
+static bool may_be_met(walk *w, const ebpo_catalogue_box *b, double *least)
 {
     double near = -INFINITY, far = INFINITY;
     (void)least;
@@ -249,18 +251,18 @@ static bool may_be_met(walk *w, const closed_box *b, double *least)
         near = fmax(near, fmin(one, other));
         far = fmin(far, fmax(one, other));
     }
-    return !(near > far + BOX_SLACK * fabs(far)) && !(far < 0);
+    return !(near > far + EBPO_CATALOGUE_SLACK * fabs(far)) && !(far < 0);
 }
 
-bool catalogue_boxes_on_ray(const catalogue_boxes *t, const double o[3], const double d[3],
-                            uint32_t item, box_pairs *out)
+bool ebpo_catalogue_boxes_on_ray(const ebpo_catalogue_boxes *t, const double o[3],
+                                 const double d[3], uint32_t item, ebpo_catalogue_pairs *out)
 {
     walk w = { .t = t, .p = o, .d = d, .item = item, .out = out, .keep = may_be_met };
     for (int k = 0; t->levels && k < 3; k++) {
-        const closed_box *all = t->box[t->levels - 1];
+        const ebpo_catalogue_box *all = t->box[t->levels - 1];
         w.pad = fmax(w.pad, fmax(fabs(all->min[k]), fabs(all->max[k])));
         w.pad = fmax(w.pad, fabs(o[k]));
     }
-    w.pad *= 2 * BOX_SLACK;
-    return walk_tree(&w);
+    w.pad *= 2 * EBPO_CATALOGUE_SLACK;
+    return walk_boxes(&w);
 }

@@ -1,0 +1,217 @@
+/* Questions to a catalogue: they are cut into stretches, each of which a thread asks by itself, and
+ * of a stretch each model is asked once.
+ *
+ * Points are taken by laps of some millions, and of each lap along the Morton curve of the
+ * catalogue's box, so that a stretch comes to few models and to few of their subtrees; what has its
+ * answers at hand, a single model that is all in memory, needs no order. Rays are asked in their
+ * own order, as each model puts those that it gets in order itself.
+ *
+ * An answer depends on its point or ray alone: neither on the stretch, nor on the threads, nor on
+ * which models happen to be open. A thread holds the results of its stretch only, and one model at
+ * a time. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "catalogue/catalogue_in.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "query/query_model.h"
+
+/* Rows of a stretch; so many are put in order together; fewer are not worth it. */
+enum { STRETCH_LEAST = 1 << 10, STRETCH_MOST = 1 << 16, LAP = 1 << 22, UNORDERED = 1 << 8 };
+/* Stretches for each thread, that none waits long for the last one. */
+enum { STRETCHES_EACH = 4 };
+
+ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *error)
+{
+    return c->seen.levels ? EBPO_OK
+                          : ebpo_fail_file(error, EBPO_E_ABSENT, ebpo_catalogue_shown(c),
+                                           "tells of caps alone, and of no surface; ask inside, or "
+                                           "the catalogue of all parts");
+}
+
+/* --- each model once --- */
+
+static int by_model(const void *a, const void *b)
+{
+    const ebpo_catalogue_pair *x = a, *y = b;
+    return x->box != y->box ? (x->box < y->box ? -1 : 1)
+                            : (x->item > y->item) - (x->item < y->item);
+}
+
+/* Pairs of one model, of which there are the most. They are sorted. */
+static uint64_t longest_run(const ebpo_catalogue_pairs *pairs)
+{
+    uint64_t longest = 0;
+    for (uint64_t at = 0, begin = 0; at < pairs->count; at++) {
+        if (pairs->pair[at].box != pairs->pair[begin].box)
+            begin = at;
+        longest = at + 1 - begin > longest ? at + 1 - begin : longest;
+    }
+    return longest;
+}
+
+ebpo_status ebpo_catalogue_ask_runs(const ebpo_catalogue_asker *a, ebpo_catalogue_pairs *pairs,
+                                    const double *rows, size_t width, bool surface,
+                                    ebpo_catalogue_question ask, void *user, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    if (pairs->count == 0)
+        return EBPO_OK;
+    qsort(pairs->pair, pairs->count, sizeof *pairs->pair, by_model);
+    uint64_t longest = longest_run(pairs);
+    double *some = ebpo_alloc(longest, width * sizeof *some);
+    if (!some)
+        return ebpo_fail_memory(error, longest * width * sizeof *some);
+    for (uint64_t at = 0; at < pairs->count && status == EBPO_OK;) {
+        const ebpo_catalogue_pair *pair = pairs->pair + at;
+        ebpo_catalogue_run run = { .model = pair->box, .pair = pair, .rows = some, .user = user };
+        for (; at < pairs->count && pairs->pair[at].box == run.model; at++, run.count++)
+            memcpy(some + run.count * width, rows + pairs->pair[at].item * width,
+                   width * sizeof *some);
+        status = ebpo_catalogue_lend(a->models, a->c, run.model, surface, ask, &run, error);
+    }
+    free(some);
+    return status;
+}
+
+bool ebpo_catalogue_find_point(const ebpo_catalogue_boxes *boxes, const double *row, uint32_t item,
+                               ebpo_catalogue_pairs *out)
+{
+    return ebpo_catalogue_boxes_holding(boxes, row, item, out);
+}
+
+bool ebpo_catalogue_find_ray(const ebpo_catalogue_boxes *boxes, const double *row, uint32_t item,
+                             ebpo_catalogue_pairs *out)
+{
+    return ebpo_catalogue_boxes_on_ray(boxes, row, row + 3, item, out);
+}
+
+ebpo_status ebpo_catalogue_ask_all(const ebpo_catalogue_asker *a, const double *rows,
+                                   uint32_t count, size_t width, ebpo_catalogue_find find,
+                                   bool surface, ebpo_catalogue_question ask, void *user,
+                                   ebpo_error *error)
+{
+    const ebpo_catalogue_boxes *boxes = surface ? &a->c->seen : &a->c->all;
+    ebpo_catalogue_pairs pairs = { NULL, 0, 0 };
+    ebpo_status status = EBPO_OK;
+    for (uint32_t at = 0; at < count && status == EBPO_OK; pairs.count = 0) {
+        for (; at < count && pairs.count < EBPO_CATALOGUE_PAIRS && status == EBPO_OK; at++)
+            if (!find(boxes, rows + at * width, at, &pairs))
+                status = ebpo_fail_memory(error, pairs.count * sizeof *pairs.pair);
+        if (status == EBPO_OK)
+            status = ebpo_catalogue_ask_runs(a, &pairs, rows, width, surface, ask, user, error);
+    }
+    free(pairs.pair);
+    return status;
+}
+
+/* --- stretches --- */
+
+/* What one thread asks, put together in the order of the curve. */
+typedef struct gathered {
+    double *rows;
+    char *out;
+    uint64_t *model;
+} gathered;
+
+static ebpo_status ask_gathered(const ebpo_catalogue_job *j, const uint32_t *order, uint32_t count,
+                                gathered *g, ebpo_error *error)
+{
+    for (uint32_t i = 0; i < count; i++)
+        memcpy(g->rows + i * j->width, j->rows + order[i] * j->width, j->width * sizeof *g->rows);
+    ebpo_status status = j->ask(&j->asker, g->rows, count, g->out, g->model, error);
+    for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
+        memcpy(j->out + order[i] * j->result, g->out + i * j->result, j->result);
+        if (j->model)
+            j->model[order[i]] = g->model[i];
+    }
+    return status;
+}
+
+static ebpo_status ask_stretch(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
+{
+    const ebpo_catalogue_job *j = context;
+    uint32_t count = (uint32_t)(end - begin);
+    (void)worker;
+    if (!j->order)
+        return j->ask(&j->asker, j->rows + begin * j->width, count, j->out + begin * j->result,
+                      j->model ? j->model + begin : NULL, error);
+    gathered g = { ebpo_alloc(count, j->width * sizeof *g.rows), ebpo_alloc(count, j->result),
+                   ebpo_alloc(count, sizeof *g.model) };
+    ebpo_status status =
+        g.rows && g.out && g.model
+            ? ask_gathered(j, j->order + begin, count, &g, error)
+            : ebpo_fail_memory(error, count * (j->result + j->width * sizeof *g.rows));
+    free(g.rows);
+    free(g.out);
+    free(g.model);
+    return status;
+}
+
+/* --- laps --- */
+
+/* Whether it pays to put so many points in order. */
+static bool needs_order(const ebpo_catalogue_job *j, uint64_t count)
+{
+    return j->ordered && count > UNORDERED &&
+           !ebpo_catalogue_in_memory(j->asker.models, j->asker.c);
+}
+
+static ebpo_status ask_lap(ebpo_catalogue_job *j, uint64_t count, bool in_order,
+                           const ebpo_progress *progress, ebpo_error *error)
+{
+    const ebpo_catalogue_box *box = j->asker.c->all.box[j->asker.c->all.levels - 1];
+    unsigned threads = ebpo_thread_count(j->asker.options->threads);
+    uint64_t grain = count / ((uint64_t)threads * STRETCHES_EACH) + 1;
+    uint32_t *order = in_order ? ebpo_alloc(count, sizeof *order) : NULL;
+    if (in_order &&
+        (!order || !ebpo_catalogue_morton_order(j->rows, count, box->min, box->max, order))) {
+        free(order);
+        return ebpo_fail_memory(error, count * sizeof *order);
+    }
+    if (threads == 1 || grain > STRETCH_MOST)
+        grain = STRETCH_MOST;
+    if (grain < STRETCH_LEAST)
+        grain = STRETCH_LEAST;
+    j->order = order;
+    ebpo_status status =
+        ebpo_parallel_for(threads, NULL, count, grain, ask_stretch, j, progress, j->stage, error);
+    free(order);
+    return status;
+}
+
+ebpo_status ebpo_catalogue_ask_rows(ebpo_catalogue_job *j, uint64_t count, ebpo_error *error)
+{
+    bool in_order = needs_order(j, count);
+    ebpo_status status = EBPO_OK;
+    for (uint64_t at = 0; at < count && status == EBPO_OK; at += LAP) {
+        uint64_t here = count - at < LAP ? count - at : LAP;
+        ebpo_pass pass = { &j->asker.options->progress, at, at + here, count };
+        ebpo_progress told = ebpo_pass_progress(&pass);
+        status = ask_lap(j, here, in_order, count > LAP ? &told : pass.to, error);
+        j->rows += here * j->width;
+        j->out += here * j->result;
+        j->model += j->model ? here : 0;
+    }
+    return status;
+}
+
+ebpo_status ebpo_catalogue_take_options(ebpo_catalogue_ask_options *own,
+                                        const ebpo_catalogue_ask_options *given, ebpo_error *error)
+{
+    *own = (ebpo_catalogue_ask_options)EBPO_CATALOGUE_ASK_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_catalogue_ask_options, own, given, error);
+    if (status == EBPO_OK && !(own->max_distance >= 0))
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "maximum distance %g: give 0 or more",
+                           own->max_distance);
+    if (status == EBPO_OK && (unsigned)own->sides > EBPO_RAY_BACK)
+        status = ebpo_fail_value(error);
+    return status;
+}

@@ -1,0 +1,489 @@
+/* Catalogues: a list of entries, made of a JSON file or of an array.
+ *
+ * A catalogue file is untrusted input. Every member that is used is checked for its kind and range
+ * before the catalogue is there: paths are texts, digests are 64 hexadecimal digits, boxes have two
+ * corners of three finite numbers each, and none is turned inside out. Whether that is true of the
+ * models is checked when one is opened (open_models.c). Members that are not known are left out.
+ *
+ * Paths are kept as they are opened: relative ones of a file begin in its folder. A catalogue does
+ * not change once it is made, and any number of threads may use it.
+ *
+ * Source: docs/guide/clusters.md has the format. */
+#include "core/strict_fp.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "catalogue/catalogue_in.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+
+/* Some millions of models; more would be read into many times as much memory. */
+enum { MOST_BYTES = 1 << 30, DIGEST_LETTERS = 64 };
+
+const char *const ebpo_catalogue_rules[] = { "nonzero", "evenodd", "positive" };
+enum { RULES = sizeof ebpo_catalogue_rules / sizeof ebpo_catalogue_rules[0] };
+
+const char *ebpo_catalogue_shown(const ebpo_catalogue *c)
+{
+    return c->path ? c->path : "the catalogue";
+}
+
+/* --- making --- */
+
+/* Returns a path as it is opened, seen from a folder ("" or with '/' behind it); NULL: not enough
+ * memory. */
+static char *joined_path(const char *folder, const char *path)
+{
+    bool whole = *path == '/' || strstr(path, "://");
+    size_t before = whole ? 0 : strlen(folder), size = strlen(path) + 1;
+    char *joined = malloc(before + size);
+    if (joined) {
+        memcpy(joined, folder, before);
+        memcpy(joined + before, path, size);
+    }
+    return joined;
+}
+
+/* Of the models that count, by all or by those that are seen. */
+static bool make_boxes(ebpo_catalogue_boxes *boxes, const ebpo_catalogue *c, bool seen)
+{
+    ebpo_catalogue_box *box = ebpo_alloc(c->count, sizeof *box);
+    uint32_t *number = ebpo_alloc(c->count, sizeof *number);
+    size_t count = 0;
+    for (uint64_t i = 0; box && number && i < c->count; i++) {
+        const ebpo_catalogue_entry *e = &c->entry[i];
+        if (seen && e->unseen)
+            continue;
+        memcpy(box[count].min, e->min, sizeof e->min);
+        memcpy(box[count].max, e->max, sizeof e->max);
+        number[count++] = (uint32_t)i;
+    }
+    bool fine = box && number && ebpo_catalogue_boxes_make(boxes, box, number, count);
+    free(box);
+    free(number);
+    return fine;
+}
+
+/* What is made of the entries, when all of them are there. */
+static ebpo_status finish_catalogue(ebpo_catalogue *c, ebpo_error *error)
+{
+    for (uint64_t i = 0; i < c->count && !c->surface; i++)
+        c->surface = c->entry[i].solid ? NULL : &c->entry[i];
+    return make_boxes(&c->all, c, false) && make_boxes(&c->seen, c, true)
+               ? EBPO_OK
+               : ebpo_fail_memory(error, c->count * sizeof(ebpo_catalogue_box));
+}
+
+static ebpo_status begin_catalogue(const ebpo_catalogue_options *options, ebpo_catalogue **out,
+                                   ebpo_error *error)
+{
+    *out = NULL;
+    ebpo_catalogue *c = calloc(1, sizeof *c);
+    if (!c)
+        return ebpo_fail_memory(error, sizeof *c);
+    c->how = (ebpo_catalogue_options)EBPO_CATALOGUE_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_catalogue_options, &c->how, options, error);
+    if (status == EBPO_OK && (unsigned)c->how.rule >= RULES)
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "there is no rule %d", (int)c->how.rule);
+    if (status == EBPO_OK)
+        *out = c;
+    else
+        free(c);
+    return status;
+}
+
+void ebpo_catalogue_free(ebpo_catalogue *c)
+{
+    if (!c)
+        return;
+    for (uint64_t i = 0; c->entry && i < c->count; i++) {
+        free((char *)c->entry[i].path);
+        free((char *)c->entry[i].surface);
+        free((char *)c->entry[i].numbers);
+    }
+    ebpo_catalogue_boxes_free(&c->all);
+    ebpo_catalogue_boxes_free(&c->seen);
+    free(c->entry);
+    free(c->path);
+    free(c);
+}
+
+static ebpo_status end_making(ebpo_catalogue *c, ebpo_status status, ebpo_catalogue **out,
+                              ebpo_error *error)
+{
+    if (status == EBPO_OK)
+        status = finish_catalogue(c, error);
+    if (status == EBPO_OK) {
+        *out = c;
+    } else {
+        ebpo_catalogue_free(c);
+        *out = NULL;
+    }
+    return status;
+}
+
+/* --- of entries --- */
+
+static const char *fault_of_entry(const ebpo_catalogue_entry *e)
+{
+    if (!e->path || !*e->path)
+        return "has no path";
+    if (e->surface && (!*e->surface || e->unseen))
+        return "has no surface, and yet a path of one";
+    if ((unsigned)e->rule >= RULES)
+        return "has no rule that is known";
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(e->min[k]) || !isfinite(e->max[k]) || e->min[k] > e->max[k])
+            return "has no box: min is above max, or a corner is not finite";
+    return NULL;
+}
+
+static bool copy_entry(ebpo_catalogue_entry *to, const ebpo_catalogue_entry *from,
+                       const char *folder)
+{
+    *to = *from;
+    to->path = joined_path(folder, from->path);
+    to->surface = from->surface ? joined_path(folder, from->surface) : NULL;
+    to->numbers = from->numbers ? joined_path(folder, from->numbers) : NULL;
+    return to->path && !to->surface == !from->surface && !to->numbers == !from->numbers;
+}
+
+static ebpo_status copy_entries(ebpo_catalogue *c, const ebpo_catalogue_entry *entries,
+                                uint64_t count, ebpo_error *error)
+{
+    const char *given = c->how.folder ? c->how.folder : "";
+    size_t length = strlen(given);
+    char *folder = malloc(length + 2);
+    c->entry = ebpo_alloc_zero(count, sizeof *c->entry);
+    if (folder) {
+        memcpy(folder, given, length + 1);
+        if (length && folder[length - 1] != '/')
+            memcpy(folder + length, "/", 2);
+    }
+    bool fine = folder && c->entry;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < count && fine && status == EBPO_OK; i++) {
+        const char *fault = fault_of_entry(&entries[i]);
+        c->count = i + 1;
+        if (fault)
+            status = ebpo_fail(error, EBPO_E_ARGUMENT, "entry %" PRIu64 " %s", i, fault);
+        else
+            fine = copy_entry(&c->entry[i], &entries[i], folder);
+    }
+    free(folder);
+    c->how.folder = NULL;
+    return fine ? status : ebpo_fail_memory(error, count * sizeof *c->entry);
+}
+
+ebpo_status ebpo_catalogue_new(const ebpo_catalogue_entry *entries, uint64_t count,
+                               const ebpo_catalogue_options *options, ebpo_catalogue **out,
+                               ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_catalogue *c;
+    *out = NULL;
+    if (count == 0 || count >= UINT32_MAX)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "a catalogue has one model at least, and at most 2^32 - 2");
+    ebpo_status status = begin_catalogue(options, &c, error);
+    return status == EBPO_OK ? end_making(c, copy_entries(c, entries, count, error), out, error)
+                             : status;
+}
+
+void ebpo_catalogue_entry_of(const ebpo_file *file, const char *path, ebpo_catalogue_entry *out)
+{
+    const ebpo_info *info = ebpo_file_info(file);
+    *out = (ebpo_catalogue_entry){ .path = path,
+                                   .file_bytes = info->file_bytes,
+                                   .face_count = info->face_count,
+                                   .vertex_count = info->vertex_count,
+                                   .rule = info->rule,
+                                   .mesh = (info->parts & EBPO_PART_MESH) != 0,
+                                   .pruned = info->pruned,
+                                   .solid = info->solid };
+    memcpy(out->digest, info->content_sha256, sizeof out->digest);
+    memcpy(out->min, info->report.min, sizeof out->min);
+    memcpy(out->max, info->report.max, sizeof out->max);
+}
+
+/* --- facts --- */
+
+ebpo_status ebpo_catalogue_get_facts(const ebpo_catalogue *c, ebpo_catalogue_facts *out)
+{
+    ebpo_catalogue_facts facts = EBPO_CATALOGUE_FACTS_INIT;
+    facts.path = c->path;
+    facts.count = c->count;
+    facts.file_bytes = c->file_bytes;
+    facts.file_hash = c->file_hash;
+    facts.rule = c->how.rule;
+    facts.parts = c->how.parts;
+    return EBPO_GIVE(ebpo_catalogue_facts, out, &facts);
+}
+
+const ebpo_catalogue_entry *ebpo_catalogue_get_entry(const ebpo_catalogue *c, uint64_t number)
+{
+    return number < c->count ? &c->entry[number] : NULL;
+}
+
+/* --- reading: values --- */
+
+typedef struct reader {
+    ebpo_catalogue *c;
+    char *folder;    /* with '/' behind it, or "" */
+    uint64_t number; /* of the model that is read */
+    ebpo_error *error;
+} reader;
+
+static ebpo_status bad_model(const reader *r, const char *what)
+{
+    return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->c->path,
+                          "not a catalogue: models[%" PRIu64 "]: %s", r->number, what);
+}
+
+static ebpo_status bad_file(const reader *r, const char *what)
+{
+    return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->c->path, "not a catalogue: %s", what);
+}
+
+/* *out: NULL where the member is not there, is null or empty. */
+static ebpo_status read_path(const reader *r, const json_t *model, const char *key,
+                             const char **out)
+{
+    const json_t *value = json_object_get(model, key);
+    char what[64];
+    if (!value || json_is_null(value) || (json_is_string(value) && !json_string_length(value)))
+        return EBPO_OK;
+    snprintf(what, sizeof what, "%s is no text", key);
+    if (!json_is_string(value))
+        return bad_model(r, what);
+    *out = joined_path(r->folder, json_string_value(value));
+    return *out ? EBPO_OK : ebpo_fail_memory(r->error, json_string_length(value));
+}
+
+static ebpo_status read_digest(const reader *r, const json_t *model, const char *key,
+                               uint8_t out[32])
+{
+    static const char letters[] = "0123456789abcdef";
+    const char *text = json_string_value(json_object_get(model, key));
+    char what[128];
+    if (text && strlen(text) == DIGEST_LETTERS && strspn(text, letters) == DIGEST_LETTERS) {
+        for (int i = 0; i < DIGEST_LETTERS / 2; i++)
+            out[i] = (uint8_t)((strchr(letters, text[2 * i]) - letters) << 4 |
+                               (strchr(letters, text[2 * i + 1]) - letters));
+        return EBPO_OK;
+    }
+    snprintf(what, sizeof what,
+             "%s is no digest, without which another file would be taken for the model", key);
+    return bad_model(r, what);
+}
+
+static bool read_corner(const json_t *model, const char *key, double out[3])
+{
+    const json_t *value = json_object_get(model, key);
+    bool fine = json_array_size(value) == 3;
+    for (size_t k = 0; fine && k < 3; k++) {
+        const json_t *x = json_array_get(value, k);
+        out[k] = json_number_value(x);
+        fine = json_is_number(x) && isfinite(out[k]);
+    }
+    return fine;
+}
+
+static ebpo_status read_box(const reader *r, const json_t *model, ebpo_catalogue_entry *e)
+{
+    if (!read_corner(model, "box_min", e->min) || !read_corner(model, "box_max", e->max))
+        return bad_model(r, "a box has two corners, box_min and box_max, of three numbers");
+    for (int k = 0; k < 3; k++)
+        if (e->min[k] > e->max[k])
+            return bad_model(r, "box_min is above box_max");
+    return EBPO_OK;
+}
+
+static bool read_rule(const json_t *of, ebpo_rule *out)
+{
+    const json_t *rule = json_object_get(of, "rule");
+    bool found = !rule;
+    *out = EBPO_RULE_NONZERO;
+    for (int i = 0; json_is_string(rule) && i < RULES; i++)
+        if (strcmp(ebpo_catalogue_rules[i], json_string_value(rule)) == 0) {
+            *out = (ebpo_rule)i;
+            found = true;
+        }
+    return found;
+}
+
+/* A count that nothing depends on; 0 where it is none. */
+static uint64_t read_count(const json_t *model, const char *key)
+{
+    double count = json_number_value(json_object_get(model, key));
+    return count >= 0 && count < 0x1p64 ? (uint64_t)count : 0;
+}
+
+/* --- reading: models --- */
+
+static ebpo_status read_paths(const reader *r, const json_t *model, ebpo_catalogue_entry *e)
+{
+    ebpo_status status = read_path(r, model, "path", &e->path);
+    if (status == EBPO_OK)
+        status = read_path(r, model, "surface", &e->surface);
+    if (status == EBPO_OK)
+        status = read_path(r, model, "numbers", &e->numbers);
+    if (status == EBPO_OK && !e->path)
+        return bad_model(r, "has no path");
+    e->unseen = json_is_null(json_object_get(model, "surface"));
+    return status;
+}
+
+static ebpo_status read_entry(const reader *r, const json_t *model, ebpo_catalogue_entry *e)
+{
+    const json_t *solid = json_object_get(model, "solid");
+    if (!json_is_object(model))
+        return bad_model(r, "a model is an object");
+    ebpo_status status = read_paths(r, model, e);
+    if (status == EBPO_OK)
+        status = read_digest(r, model, "content_sha256", e->digest);
+    if (status == EBPO_OK && e->surface)
+        status = read_digest(r, model, "surface_sha256", e->surface_digest);
+    if (status == EBPO_OK && !json_is_boolean(solid))
+        return bad_model(r, "solid is true or false");
+    e->solid = json_is_true(solid);
+    e->file_bytes = read_count(model, "bytes");
+    e->face_count = read_count(model, "faces");
+    e->vertex_count = read_count(model, "vertices");
+    (void)read_rule(model, &e->rule);
+    e->mesh = json_is_true(json_object_get(model, "mesh"));
+    e->pruned = json_is_true(json_object_get(model, "pruned"));
+    return status == EBPO_OK ? read_box(r, model, e) : status;
+}
+
+static ebpo_status read_models(reader *r, const json_t *root)
+{
+    const json_t *models = json_object_get(root, "models");
+    ebpo_catalogue *c = r->c;
+    ebpo_status status = EBPO_OK;
+    uint64_t count = json_array_size(models);
+    if (count == 0 || count >= UINT32_MAX)
+        return bad_file(r, "\"models\" is a list of one model at least");
+    c->entry = ebpo_alloc_zero(count, sizeof *c->entry);
+    if (!c->entry)
+        return ebpo_fail_memory(r->error, count * sizeof *c->entry);
+    c->count = count;
+    for (; r->number < count && status == EBPO_OK; r->number++)
+        status = read_entry(r, json_array_get(models, r->number), &c->entry[r->number]);
+    return status;
+}
+
+/* --- reading: the whole --- */
+
+static ebpo_status read_root(reader *r, const json_t *root)
+{
+    ebpo_catalogue *c = r->c;
+    const char *format = json_string_value(json_object_get(root, "format"));
+    const json_t *version = json_object_get(root, "version"),
+                 *parts = json_object_get(root, "parts");
+    if (!format || strcmp(format, "ebpo-catalogue") != 0)
+        return bad_file(r, "there is no \"format\": \"ebpo-catalogue\"");
+    if (json_number_value(version) != 1)
+        return ebpo_fail_file(r->error, EBPO_E_VERSION, c->path,
+                              "a catalogue of version %g; this program reads 1",
+                              json_number_value(version));
+    if (parts && !json_is_boolean(parts))
+        return bad_file(r, "parts is true or false");
+    c->how.parts = json_is_true(parts);
+    if (!read_rule(root, &c->how.rule))
+        return bad_file(r, "rule is nonzero, evenodd or positive");
+    return read_models(r, root);
+}
+
+static ebpo_status parse_text(reader *r, const char *text, size_t size)
+{
+    json_error_t why;
+    json_t *root = json_loadb(text, size, JSON_DECODE_INT_AS_REAL, &why);
+    if (!root && json_error_code(&why) == json_error_out_of_memory)
+        return ebpo_fail_memory(r->error, size);
+    if (!root)
+        return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->c->path, "not a catalogue: line %d: %s",
+                              why.line, why.text);
+    ebpo_status status = read_root(r, root);
+    json_decref(root);
+    return status;
+}
+
+static uint64_t hash_text(const char *text, size_t size)
+{
+    uint64_t hash = UINT64_C(0xcbf29ce484222325);
+    for (size_t i = 0; i < size; i++)
+        hash = (hash ^ (unsigned char)text[i]) * UINT64_C(0x100000001b3);
+    return hash;
+}
+
+/* The file's text, of c->file_bytes, to be freed. Pipes are not waited for. */
+static ebpo_status read_text(ebpo_catalogue *c, char **text, ebpo_error *error)
+{
+    struct stat st;
+    int fd = open(c->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    if (fd < 0)
+        return ebpo_fail_errno(error, c->path, "cannot be read");
+    ebpo_status status = EBPO_OK;
+    if (fstat(fd, &st) != 0)
+        status = ebpo_fail_errno(error, c->path, "cannot be read");
+    else if (!S_ISREG(st.st_mode))
+        status = ebpo_fail_file(error, EBPO_E_FORMAT, c->path, "cannot be read: is no file");
+    FILE *in = status == EBPO_OK ? fdopen(fd, "r") : NULL;
+    if (!in) {
+        close(fd);
+        return status == EBPO_OK ? ebpo_fail_memory(error, BUFSIZ) : status;
+    }
+    c->file_bytes = (uint64_t)st.st_size;
+    *text = c->file_bytes <= MOST_BYTES ? malloc((size_t)c->file_bytes + 1) : NULL;
+    if (c->file_bytes > MOST_BYTES)
+        status = ebpo_fail_file(error, EBPO_E_LIMIT, c->path,
+                                "too long for a catalogue: more than 1 GiB");
+    else if (!*text)
+        status = ebpo_fail_memory(error, c->file_bytes + 1);
+    else if (fread(*text, 1, (size_t)c->file_bytes + 1, in) != c->file_bytes)
+        status = ebpo_fail_file(error, EBPO_E_IO, c->path, "was changed while it was read");
+    fclose(in);
+    return status;
+}
+
+static ebpo_status read_file(ebpo_catalogue *c, const char *path, ebpo_error *error)
+{
+    char *text = NULL;
+    const char *slash = strrchr(path, '/');
+    reader r = { .c = c, .error = error };
+    c->path = strdup(path);
+    r.folder = slash ? strndup(path, (size_t)(slash - path) + 1) : strdup("");
+    ebpo_status status = c->path && r.folder ? read_text(c, &text, error)
+                                             : ebpo_fail_memory(error, strlen(path) + 1);
+    if (status == EBPO_OK) {
+        c->file_hash = hash_text(text, (size_t)c->file_bytes);
+        status = parse_text(&r, text, (size_t)c->file_bytes);
+    }
+    free(text);
+    free(r.folder);
+    return status;
+}
+
+ebpo_status ebpo_catalogue_open(const char *path, const ebpo_catalogue_options *options,
+                                ebpo_catalogue **out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_catalogue *c;
+    *out = NULL;
+    ebpo_status status = begin_catalogue(options, &c, error);
+    if (status != EBPO_OK)
+        return status;
+    c->how.folder = NULL;
+    return end_making(c, read_file(c, path, error), out, error);
+}

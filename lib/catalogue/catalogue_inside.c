@@ -1,0 +1,258 @@
+/* Where points are: winding numbers, summed over the models whose boxes hold them.
+ *
+ * Of independent models a point is inside that is inside of any, and a model that has the point on
+ * a face adds 0 to the sum.
+ *
+ * Parts of one model are closed by caps, which are no surface of the whole; the winding numbers of
+ * all parts add up to the whole's where the point is on no face and no cap. A point that a part
+ * says is on something is doubtful: it is on the whole's surface if a real face meets the box of
+ * this one point, which is decided exactly. Else it is on a cap, and its winding number is counted
+ * along a ray through the surfaces, which have no caps: faces that the ray goes out through less
+ * those that it goes in through. A ray that meets an edge or runs along a face tells nothing, and
+ * another one is cast. Directions are always the same ones, and every ray that tells the number
+ * tells the same.
+ *
+ * Source: docs/guide/clusters.md, "Beyond 2^32 faces". */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "catalogue/catalogue_in.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "query/query_model.h"
+
+/* Rays that are tried before a point is given up. */
+enum { DIRECTIONS = 64 };
+
+/* Of a point, so far. */
+typedef struct found {
+    int64_t winding;
+    bool in, on;
+} found;
+
+static ebpo_status ask_windings(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
+                                ebpo_error *error)
+{
+    const ebpo_catalogue_run *run = user;
+    found *all = run->user;
+    ebpo_inside_result *told = ebpo_alloc(run->count, sizeof *told);
+    (void)model;
+    if (!told)
+        return ebpo_fail_memory(error, run->count * sizeof *told);
+    ebpo_status status = ebpo_inside_many(context, run->rows, run->count, NULL, told, error);
+    for (uint64_t i = 0; i < run->count && status == EBPO_OK; i++) {
+        found *f = &all[run->pair[i].item];
+        f->winding += told[i].winding;
+        f->in |= told[i].where == EBPO_IN;
+        f->on |= told[i].where == EBPO_ON;
+    }
+    free(told);
+    return status;
+}
+
+/* --- doubtful points of parts: on faces --- */
+
+/* Points on faces or caps of a part, of which there is no sum yet. */
+typedef struct doubtful {
+    uint32_t count;
+    uint32_t *number; /* [count] among all points */
+    double *rows;     /* [count][7] as rays */
+    bool *real;       /* [count] it is on a face of the whole */
+    int64_t *sum;     /* [count] of the ray that was cast last */
+    bool *plain;      /* [count] that ray tells the winding number */
+} doubtful;
+
+static ebpo_status ask_box(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
+                           ebpo_error *error)
+{
+    const ebpo_catalogue_run *run = user;
+    const doubtful *d = run->user;
+    ebpo_status status = EBPO_OK;
+    (void)model;
+    for (uint64_t i = 0; i < run->count && status == EBPO_OK; i++) {
+        const uint64_t *faces;
+        uint64_t count = 0;
+        const double *p = run->rows + 7 * i;
+        if (!d->real[run->pair[i].item])
+            status = ebpo_faces_in_box(context, p, p, &faces, &count, error);
+        if (status == EBPO_OK && count)
+            d->real[run->pair[i].item] = true;
+    }
+    return status;
+}
+
+/* Keeps the points that are wanted, by `known`; those that go are told of to `all`. */
+static void keep_unknown(doubtful *d, const bool *known, bool on, found *all)
+{
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < d->count; i++) {
+        if (known[i]) {
+            all[d->number[i]].on = on;
+            all[d->number[i]].winding = on ? 0 : d->sum[i];
+            continue;
+        }
+        memmove(d->rows + (size_t)7 * kept, d->rows + (size_t)7 * i, 3 * sizeof *d->rows);
+        d->number[kept++] = d->number[i];
+    }
+    d->count = kept;
+}
+
+/* --- doubtful points of parts: on caps --- */
+
+static ebpo_status ask_crossings(ebpo_context *context, const ebpo_catalogue_held *model,
+                                 void *user, ebpo_error *error)
+{
+    const ebpo_catalogue_run *run = user;
+    const doubtful *d = run->user;
+    const ebpo_ray_hit *hits;
+    const uint64_t *begin;
+    ebpo_ray_options how = EBPO_RAY_OPTIONS_INIT;
+    (void)model;
+    how.threads = 1;
+    ebpo_status status = ebpo_ray_all_many(context, (const ebpo_ray *)(const void *)run->rows,
+                                           run->count, &how, &hits, &begin, error);
+    for (uint64_t i = 0; i < run->count && status == EBPO_OK; i++)
+        for (uint64_t k = begin[i]; k < begin[i + 1]; k++) {
+            d->sum[run->pair[i].item] -= hits[k].side;
+            d->plain[run->pair[i].item] &= hits[k].side != 0;
+        }
+    return status;
+}
+
+/* Numbers that look like chance (splitmix64), always the same ones. */
+static double random_between(uint64_t *state)
+{
+    uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
+    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
+    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
+    return (double)((z ^ z >> 31) >> 11) * 0x1p-52 - 1;
+}
+
+/* One ray from each of the points that are left. */
+static ebpo_status cast_rays(const ebpo_catalogue_asker *a, doubtful *d, uint64_t *state,
+                             ebpo_error *error)
+{
+    double direction[3];
+    for (int k = 0; k < 3; k++)
+        direction[k] = random_between(state);
+    for (uint32_t i = 0; i < d->count; i++) {
+        double *row = d->rows + (size_t)7 * i;
+        memcpy(row + 3, direction, sizeof direction);
+        row[6] = INFINITY;
+        d->sum[i] = 0;
+        d->plain[i] = true;
+    }
+    return ebpo_catalogue_ask_all(a, d->rows, d->count, 7, ebpo_catalogue_find_ray, true,
+                                  ask_crossings, d, error);
+}
+
+static ebpo_status judge_points(const ebpo_catalogue_asker *a, doubtful *d, found *all,
+                                ebpo_error *error)
+{
+    uint64_t state = 20;
+    ebpo_status status = ebpo_catalogue_need_surface(a->c, error);
+    if (status == EBPO_OK)
+        status = ebpo_catalogue_ask_all(a, d->rows, d->count, 7, ebpo_catalogue_find_point, true,
+                                        ask_box, d, error);
+    if (status == EBPO_OK)
+        keep_unknown(d, d->real, true, all);
+    for (int i = 0; i < DIRECTIONS && d->count && status == EBPO_OK; i++) {
+        status = cast_rays(a, d, &state, error);
+        if (status == EBPO_OK)
+            keep_unknown(d, d->plain, false, all);
+    }
+    if (status == EBPO_OK && d->count)
+        status = ebpo_fail_file(error, EBPO_E_LIMIT, ebpo_catalogue_shown(a->c),
+                                "no ray from %g %g %g tells its winding number", d->rows[0],
+                                d->rows[1], d->rows[2]);
+    return status;
+}
+
+/* --- parts together --- */
+
+static ebpo_status judge_doubtful(const ebpo_catalogue_asker *a, const double *points,
+                                  uint32_t count, found *all, ebpo_error *error)
+{
+    uint32_t most = 0;
+    for (uint32_t i = 0; i < count; i++)
+        most += all[i].on;
+    if (most == 0)
+        return EBPO_OK;
+    doubtful d = { 0,
+                   ebpo_alloc(most, sizeof *d.number),
+                   ebpo_alloc(most, 7 * sizeof *d.rows),
+                   ebpo_alloc_zero(most, sizeof *d.real),
+                   ebpo_alloc_zero(most, sizeof *d.sum),
+                   ebpo_alloc(most, sizeof *d.plain) };
+    bool fine = d.number && d.rows && d.real && d.sum && d.plain;
+    for (uint32_t i = 0; i < count && fine; i++)
+        if (all[i].on) {
+            memcpy(d.rows + (size_t)7 * d.count, points + (size_t)3 * i, 3 * sizeof *points);
+            memset(d.rows + (size_t)7 * d.count + 3, 0, 4 * sizeof *d.rows);
+            d.number[d.count++] = i;
+        }
+    ebpo_status status =
+        fine ? judge_points(a, &d, all, error) : ebpo_fail_memory(error, most * 8 * sizeof *d.rows);
+    free(d.number);
+    free(d.rows);
+    free(d.real);
+    free(d.sum);
+    free(d.plain);
+    return status;
+}
+
+static bool is_inside(ebpo_rule rule, int64_t winding)
+{
+    return rule == EBPO_RULE_NONZERO   ? winding != 0
+           : rule == EBPO_RULE_EVENODD ? winding % 2 != 0
+                                       : winding > 0;
+}
+
+ebpo_status ebpo_catalogue_ask_inside(const ebpo_catalogue_asker *a, const double *rows,
+                                      uint32_t count, void *out, uint64_t *model, ebpo_error *error)
+{
+    ebpo_inside_result *told = out;
+    const ebpo_catalogue_options *how = &a->c->how;
+    found *all = ebpo_alloc_zero(count, sizeof *all);
+    (void)model;
+    if (!all)
+        return ebpo_fail_memory(error, count * sizeof *all);
+    ebpo_status status = ebpo_catalogue_ask_all(a, rows, count, 3, ebpo_catalogue_find_point, false,
+                                                ask_windings, all, error);
+    if (status == EBPO_OK && how->parts)
+        status = judge_doubtful(a, rows, count, all, error);
+    for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
+        const found *f = &all[i];
+        bool in = how->parts ? !f->on && is_inside(how->rule, f->winding) : f->in;
+        told[i] = (ebpo_inside_result){ .where = in      ? EBPO_IN
+                                                 : f->on ? EBPO_ON
+                                                         : EBPO_OUT,
+                                        .winding = (int32_t)f->winding };
+    }
+    free(all);
+    return status;
+}
+
+ebpo_status ebpo_catalogue_inside(const ebpo_catalogue *c, ebpo_catalogue_models *models,
+                                  const double *points, uint64_t count,
+                                  const ebpo_catalogue_ask_options *options,
+                                  ebpo_inside_result *out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_catalogue_ask_options own;
+    ebpo_catalogue_job j = { { c, models, &own },   .ask = ebpo_catalogue_ask_inside,
+                             .stage = "inside",     .width = 3,
+                             .result = sizeof *out, .ordered = true,
+                             .rows = points,        .out = (char *)out };
+    ebpo_status status = ebpo_catalogue_take_options(&own, options, error);
+    if (status == EBPO_OK && c->surface)
+        status = ebpo_fail_file(error, EBPO_E_NOT_SOLID, c->surface->path,
+                                "is a surface: there is no inside");
+    if (status == EBPO_OK)
+        status = ebpo_check_points(points, count, error);
+    return status == EBPO_OK ? ebpo_catalogue_ask_rows(&j, count, error) : status;
+}

@@ -1,0 +1,498 @@
+/* The models that are open, of any number of catalogues, all within one memory budget.
+ *
+ * A model is known by the path and digest of its file, how that is opened, which numbers its faces
+ * have, and its share of the budget: an equal one for each model of its catalogue, but at least an
+ * eighth. The first question that needs it opens it; who asks holds it, and its share is taken as
+ * long as anybody does. When there is no room, those that nobody holds are closed, the one that was
+ * asked longest ago first; if that is not enough, the question waits until others are done. A
+ * thread holds one model at a time, so that none waits for itself.
+ *
+ * What a file turns out to be is compared with what its catalogue says: the digest when it is
+ * opened, and the box whenever it is lent, as two entries may tell of one file differently.
+ *
+ * Locks: one for the list and its sums, which is never held while a question is asked or a file is
+ * opened; each model has one for opening it and one for asking it. */
+#include "core/strict_fp.h"
+
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+
+#include "catalogue/catalogue_in.h"
+#include "core/error.h"
+
+/* Models that are asked at a time at most, where there are many; open ones at most, for which the
+ * system may allow fewer: each has a file or two. */
+enum { SHARES = 8, OPEN_MOST = 256, DESCRIPTORS_EACH = 4, CONTEXTS_KEPT = 256 };
+
+/* What is asked for, and what a model is known by. */
+typedef struct wanted {
+    const char *path, *numbers; /* numbers NULL: none */
+    uint8_t digest[32];
+    uint64_t share; /* bytes; 0: as many as it needs */
+    ebpo_catalogue_open_fn open_file;
+    ebpo_catalogue_close_fn close_file;
+    void *user;
+} wanted;
+
+struct ebpo_catalogue_held {
+    ebpo_catalogue_held *before, *behind; /* in the order of use, the latest first */
+    wanted key;                           /* whose texts are its own */
+    unsigned users;                       /* these are under the lock of all models */
+    uint64_t bytes;                       /* that are counted */
+    pthread_mutex_t opening; /* of what follows, until there is a model; and of the contexts */
+    pthread_rwlock_t asking; /* alone: to ask when nobody else does */
+    ebpo_file *file;
+    ebpo_model *_Atomic model; /* for sums it is looked at without that lock */
+    ebpo_catalogue_numbers numbers;
+    ebpo_context *idle[CONTEXTS_KEPT];
+    unsigned idle_count;
+};
+
+struct ebpo_catalogue_models {
+    unsigned threads, open_most;
+    pthread_mutex_t lock; /* of all below */
+    pthread_cond_t changed;
+    uint64_t memory;
+    ebpo_catalogue_held *first, *last;
+    unsigned held, busy;
+    uint64_t taken;
+    uint64_t closed;       /* models that had been open */
+    ebpo_model_stats gone; /* their sums */
+};
+
+/* --- one model --- */
+
+static ebpo_status check_digest(const ebpo_catalogue *c, const ebpo_catalogue_held *m,
+                                ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(m->file);
+    if (memcmp(info->content_sha256, m->key.digest, sizeof m->key.digest) == 0)
+        return EBPO_OK;
+    return ebpo_fail_file(error, EBPO_E_FORMAT, m->key.path,
+                          "is not the file that %.150s tells of, by its content_sha256: it has "
+                          "changed; make the catalogue anew",
+                          ebpo_catalogue_shown(c));
+}
+
+static ebpo_status check_box(const ebpo_catalogue *c, const ebpo_catalogue_entry *e,
+                             const ebpo_catalogue_held *m, ebpo_error *error)
+{
+    const ebpo_mesh_report *found = &ebpo_file_info(m->file)->report;
+    for (int k = 0; k < 3; k++)
+        if (!(e->min[k] <= found->min[k] && found->max[k] <= e->max[k]))
+            return ebpo_fail_file(error, EBPO_E_FORMAT, m->key.path,
+                                  "is not within the box that %.150s tells; make the catalogue "
+                                  "anew",
+                                  ebpo_catalogue_shown(c));
+    return EBPO_OK;
+}
+
+static ebpo_status open_numbers(ebpo_catalogue_held *m, ebpo_error *error)
+{
+    uint64_t faces = ebpo_file_info(m->file)->face_count;
+    if (!m->key.numbers)
+        return EBPO_OK;
+    ebpo_status status = ebpo_catalogue_numbers_open(&m->numbers, m->key.numbers, error);
+    if (status == EBPO_OK && m->numbers.count != faces)
+        status = ebpo_fail_file(error, EBPO_E_FORMAT, m->key.numbers, "%llu numbers of %llu faces",
+                                (unsigned long long)m->numbers.count, (unsigned long long)faces);
+    return status;
+}
+
+static void close_model(ebpo_catalogue_held *m)
+{
+    while (m->idle_count)
+        ebpo_context_free(m->idle[--m->idle_count]);
+    ebpo_model_free(m->model);
+    if (m->file && m->key.close_file)
+        m->key.close_file(m->key.user, m->file);
+    else
+        ebpo_close(m->file);
+    ebpo_catalogue_numbers_close(&m->numbers);
+    m->model = NULL;
+    m->file = NULL;
+}
+
+static ebpo_status open_file(ebpo_catalogue_held *m, ebpo_error *error)
+{
+    const wanted *key = &m->key;
+    m->file = NULL;
+    if (!key->open_file)
+        return ebpo_open(key->path, &m->file, error);
+    ebpo_status status = key->open_file(key->user, key->path, &m->file, error);
+    return status == EBPO_OK && !m->file ? ebpo_fail_file(error, EBPO_E_ARGUMENT, key->path,
+                                                          "the function that opens files gave none")
+                                         : status;
+}
+
+static ebpo_status open_model(const ebpo_catalogue_models *models, const ebpo_catalogue *c,
+                              ebpo_catalogue_held *m, ebpo_error *error)
+{
+    ebpo_error why = EBPO_ERROR_INIT;
+    ebpo_model *model = NULL;
+    ebpo_model_options o = EBPO_MODEL_OPTIONS_INIT;
+    o.memory = m->key.share;
+    o.threads = models->threads;
+    ebpo_status status = open_file(m, &why);
+    if (status == EBPO_OK)
+        status = check_digest(c, m, &why);
+    if (status == EBPO_OK)
+        status = open_numbers(m, &why);
+    if (status == EBPO_OK)
+        status = ebpo_model_new(m->file, &o, &model, &why);
+    if (status == EBPO_OK) {
+        m->model = model;
+        return EBPO_OK;
+    }
+    close_model(m);
+    if (status == EBPO_E_LIMIT && c->count > 1)
+        return ebpo_fail_file(error, status, m->key.path,
+                              "%.380s (of the memory each model may take one part in %d)",
+                              why.message, c->count < SHARES ? (int)c->count : SHARES);
+    why.status = status;
+    return ebpo_fail_with(error, &why);
+}
+
+/* Once, by the first of those that want it. */
+static ebpo_status ready_model(const ebpo_catalogue_models *models, const ebpo_catalogue *c,
+                               ebpo_catalogue_held *m, ebpo_context **context, ebpo_error *error)
+{
+    pthread_mutex_lock(&m->opening);
+    ebpo_status status = m->model ? EBPO_OK : open_model(models, c, m, error);
+    *context = status == EBPO_OK && m->idle_count ? m->idle[--m->idle_count] : NULL;
+    pthread_mutex_unlock(&m->opening);
+    return status == EBPO_OK && !*context ? ebpo_context_new(m->model, context, error) : status;
+}
+
+static void put_by(ebpo_catalogue_held *m, ebpo_context *context)
+{
+    pthread_mutex_lock(&m->opening);
+    bool kept = context && m->idle_count < CONTEXTS_KEPT;
+    if (kept)
+        m->idle[m->idle_count++] = context;
+    pthread_mutex_unlock(&m->opening);
+    if (!kept)
+        ebpo_context_free(context);
+}
+
+static void held_free(ebpo_catalogue_held *m)
+{
+    close_model(m);
+    pthread_mutex_destroy(&m->opening);
+    pthread_rwlock_destroy(&m->asking);
+    free((char *)m->key.path);
+    free((char *)m->key.numbers);
+    free(m);
+}
+
+static ebpo_catalogue_held *held_new(const wanted *key)
+{
+    ebpo_catalogue_held *m = calloc(1, sizeof *m);
+    if (!m)
+        return NULL;
+    m->key = *key;
+    m->key.path = strdup(key->path);
+    m->key.numbers = key->numbers ? strdup(key->numbers) : NULL;
+    m->numbers.fd = -1;
+    pthread_mutex_init(&m->opening, NULL);
+    pthread_rwlock_init(&m->asking, NULL);
+    if (m->key.path && !m->key.numbers == !key->numbers)
+        return m;
+    held_free(m);
+    return NULL;
+}
+
+/* --- all of them, under the lock --- */
+
+static bool same_key(const wanted *a, const wanted *b)
+{
+    return memcmp(a->digest, b->digest, sizeof a->digest) == 0 && a->share == b->share &&
+           a->user == b->user && a->open_file == b->open_file && a->close_file == b->close_file &&
+           strcmp(a->path, b->path) == 0 && !a->numbers == !b->numbers &&
+           (!a->numbers || strcmp(a->numbers, b->numbers) == 0);
+}
+
+static void unlink_model(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
+{
+    *(m->before ? &m->before->behind : &h->first) = m->behind;
+    *(m->behind ? &m->behind->before : &h->last) = m->before;
+    m->before = m->behind = NULL;
+}
+
+static void link_first(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
+{
+    m->behind = h->first;
+    *(h->first ? &h->first->before : &h->last) = m;
+    h->first = m;
+}
+
+static void add_up(const ebpo_catalogue_held *m, ebpo_model_stats *sums)
+{
+    ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
+    if (!m->model || ebpo_model_get_stats(m->model, &s) != EBPO_OK)
+        return;
+    sums->memory += s.memory;
+    sums->hits += s.hits;
+    sums->loads += s.loads;
+    sums->evicted += s.evicted;
+    sums->bytes_read += s.bytes_read;
+    sums->reads += s.reads;
+    sums->open_seconds += s.open_seconds;
+    sums->load_seconds += s.load_seconds;
+    sums->distances += s.distances;
+    sums->distance_subtrees += s.distance_subtrees;
+    sums->distance_loads += s.distance_loads;
+}
+
+static void drop_model(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
+{
+    if (m->model) {
+        add_up(m, &h->gone);
+        h->gone.memory = 0;
+        h->closed++;
+    }
+    h->taken -= m->bytes;
+    h->held--;
+    unlink_model(h, m);
+    held_free(m);
+}
+
+static bool has_room(const ebpo_catalogue_models *h, uint64_t size, unsigned more)
+{
+    return h->held + more <= h->open_most && (!h->memory || h->taken + size <= h->memory);
+}
+
+/* Closes what is idle until there is room for `size` bytes more; whether there is, or nothing else
+ * is used, so that waiting would not help. */
+static bool make_room(ebpo_catalogue_models *h, uint64_t size, const ebpo_catalogue_held *but)
+{
+    unsigned more = but == NULL;
+    for (ebpo_catalogue_held *m = h->last, *next; m && !has_room(h, size, more); m = next) {
+        next = m->before;
+        if (!m->users && m != but)
+            drop_model(h, m);
+    }
+    return has_room(h, size, more) || !h->busy;
+}
+
+static ebpo_catalogue_held *find_model(const ebpo_catalogue_models *h, const wanted *key)
+{
+    ebpo_catalogue_held *m = h->first;
+    while (m && !same_key(&m->key, key))
+        m = m->behind;
+    return m;
+}
+
+static uint64_t share_of(const ebpo_catalogue_models *h, const ebpo_catalogue *c)
+{
+    uint64_t share = h->memory / (c->count < SHARES ? c->count : SHARES);
+    return h->memory && !share ? 1 : share; /* 0 would be without limit */
+}
+
+/* NULL: not enough memory. */
+static ebpo_catalogue_held *take_model(ebpo_catalogue_models *h, const ebpo_catalogue *c,
+                                       wanted *key)
+{
+    ebpo_catalogue_held *m;
+    pthread_mutex_lock(&h->lock);
+    for (;;) {
+        key->share = share_of(h, c);
+        m = find_model(h, key);
+        uint64_t more = !m ? key->share : m->bytes < key->share ? key->share - m->bytes : 0;
+        if ((m && m->users) || make_room(h, more, m))
+            break;
+        pthread_cond_wait(&h->changed, &h->lock);
+    }
+    if (!m) {
+        m = held_new(key);
+        h->held += m != NULL;
+    } else {
+        unlink_model(h, m);
+    }
+    if (m) {
+        link_first(h, m);
+        if (!m->users++) {
+            h->busy++;
+            h->taken += key->share - m->bytes; /* what it takes now may become less, or more */
+            m->bytes = key->share;
+        }
+    }
+    pthread_mutex_unlock(&h->lock);
+    return m;
+}
+
+/* What is of no use, as it could not be opened, goes. */
+static void give_back(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
+{
+    ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
+    pthread_mutex_lock(&h->lock);
+    if (!--m->users) {
+        h->busy--;
+        if (!m->model || ebpo_model_get_stats(m->model, &s) != EBPO_OK) {
+            drop_model(h, m);
+        } else {
+            h->taken += s.memory - m->bytes;
+            m->bytes = s.memory;
+        }
+    }
+    pthread_cond_broadcast(&h->changed);
+    pthread_mutex_unlock(&h->lock);
+}
+
+/* --- lending --- */
+
+/* Contexts hold what they were last asked about: they go, that there is room for one. */
+static ebpo_status ask_alone(ebpo_catalogue_held *m, ebpo_catalogue_question ask, void *user,
+                             ebpo_error *error)
+{
+    ebpo_context *context = NULL;
+    pthread_rwlock_wrlock(&m->asking);
+    while (m->idle_count)
+        ebpo_context_free(m->idle[--m->idle_count]);
+    ebpo_status status = ebpo_context_new(m->model, &context, error);
+    if (status == EBPO_OK)
+        status = ask(context, m, user, error);
+    put_by(m, context);
+    pthread_rwlock_unlock(&m->asking);
+    return status;
+}
+
+static wanted key_of(const ebpo_catalogue *c, const ebpo_catalogue_entry *e, bool surface)
+{
+    wanted key = { .path = surface ? e->surface : e->path,
+                   .numbers = surface || !e->surface ? e->numbers : NULL,
+                   .open_file = c->how.open_file,
+                   .close_file = c->how.close_file,
+                   .user = c->how.user };
+    memcpy(key.digest, surface ? e->surface_digest : e->digest, sizeof key.digest);
+    return key;
+}
+
+ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models, const ebpo_catalogue *c,
+                                uint64_t number, bool surface, ebpo_catalogue_question ask,
+                                void *user, ebpo_error *error)
+{
+    ebpo_context *context = NULL;
+    const ebpo_catalogue_entry *e = &c->entry[number];
+    wanted key = key_of(c, e, surface && e->surface);
+    ebpo_catalogue_held *m = take_model(models, c, &key);
+    if (!m)
+        return ebpo_fail_memory(error, sizeof *m);
+    pthread_rwlock_rdlock(&m->asking);
+    ebpo_status status = ready_model(models, c, m, &context, error);
+    if (status == EBPO_OK)
+        status = check_box(c, e, m, error);
+    if (status == EBPO_OK)
+        status = ask(context, m, user, error);
+    bool again = status == EBPO_E_LIMIT && context;
+    put_by(m, context);
+    pthread_rwlock_unlock(&m->asking);
+    if (again)
+        status = ask_alone(m, ask, user, error);
+    give_back(models, m);
+    return status;
+}
+
+bool ebpo_catalogue_in_memory(ebpo_catalogue_models *models, const ebpo_catalogue *c)
+{
+    ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
+    wanted key = key_of(c, c->entry, false);
+    pthread_mutex_lock(&models->lock);
+    key.share = share_of(models, c);
+    const ebpo_catalogue_held *m = c->count == 1 ? find_model(models, &key) : NULL;
+    bool whole = m && m->model && ebpo_model_get_stats(m->model, &s) == EBPO_OK && s.resident;
+    pthread_mutex_unlock(&models->lock);
+    return whole;
+}
+
+ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *m, uint64_t *face,
+                                     ebpo_error *error)
+{
+    return m->numbers.fd < 0 || *face == EBPO_NO_FACE
+               ? EBPO_OK
+               : ebpo_catalogue_numbers_get(&m->numbers, face, error);
+}
+
+/* --- beginning and end --- */
+
+static unsigned may_be_open(void)
+{
+    struct rlimit most;
+    if (getrlimit(RLIMIT_NOFILE, &most) != 0 || most.rlim_cur / (2 * DESCRIPTORS_EACH) >= OPEN_MOST)
+        return OPEN_MOST;
+    unsigned fit = (unsigned)most.rlim_cur / (2 * DESCRIPTORS_EACH);
+    return fit ? fit : 1;
+}
+
+ebpo_status ebpo_catalogue_models_new(const ebpo_catalogue_models_options *options,
+                                      ebpo_catalogue_models **out, ebpo_error *error)
+{
+    ebpo_catalogue_models_options own = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
+    *out = NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_catalogue_models_options, &own, options, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_catalogue_models *h = calloc(1, sizeof *h);
+    if (!h)
+        return ebpo_fail_memory(error, sizeof *h);
+    h->memory = own.memory;
+    h->threads = own.threads;
+    h->gone = (ebpo_model_stats)EBPO_MODEL_STATS_INIT;
+    h->open_most = may_be_open();
+    pthread_mutex_init(&h->lock, NULL);
+    pthread_cond_init(&h->changed, NULL);
+    *out = h;
+    return EBPO_OK;
+}
+
+void ebpo_catalogue_models_free(ebpo_catalogue_models *h)
+{
+    if (!h)
+        return;
+    while (h->first)
+        drop_model(h, h->first);
+    pthread_mutex_destroy(&h->lock);
+    pthread_cond_destroy(&h->changed);
+    free(h);
+}
+
+void ebpo_catalogue_models_set_memory(ebpo_catalogue_models *h, uint64_t memory)
+{
+    pthread_mutex_lock(&h->lock);
+    h->memory = memory;
+    pthread_cond_broadcast(&h->changed);
+    pthread_mutex_unlock(&h->lock);
+}
+
+void ebpo_catalogue_models_close_idle(ebpo_catalogue_models *h)
+{
+    pthread_mutex_lock(&h->lock);
+    for (ebpo_catalogue_held *m = h->first, *next; m; m = next) {
+        next = m->behind;
+        if (!m->users)
+            drop_model(h, m);
+    }
+    pthread_cond_broadcast(&h->changed);
+    pthread_mutex_unlock(&h->lock);
+}
+
+ebpo_status ebpo_catalogue_models_get_stats(ebpo_catalogue_models *h,
+                                            ebpo_catalogue_models_stats *out,
+                                            ebpo_model_stats *sums)
+{
+    ebpo_catalogue_models_stats n = EBPO_CATALOGUE_MODELS_STATS_INIT;
+    pthread_mutex_lock(&h->lock);
+    ebpo_model_stats all = h->gone;
+    n.closed = h->closed;
+    for (const ebpo_catalogue_held *m = h->first; m; m = m->behind) {
+        add_up(m, &all);
+        n.open += m->model != NULL;
+    }
+    all.budget = h->memory;
+    pthread_mutex_unlock(&h->lock);
+    n.opened = n.closed + n.open;
+    ebpo_status status = EBPO_GIVE(ebpo_catalogue_models_stats, out, &n);
+    return status == EBPO_OK && sums ? EBPO_GIVE(ebpo_model_stats, sums, &all) : status;
+}

@@ -1,0 +1,130 @@
+/* Numbers of faces in the whole, of a part: a .npy of integers with one dimension (NumPy's format,
+ * versions 1 to 3), of which single numbers are read where they are wanted, by any thread.
+ *
+ * The file is untrusted input, as is the catalogue that names it. Its head is read once: the type,
+ * the order of bytes, and how many numbers there are, which must fit the file's size. A number that
+ * no face has, negative or beyond 2^63, is refused when it is met. */
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "catalogue/catalogue_in.h"
+#include "core/error.h"
+
+enum { HEAD_MOST = 4096 };
+
+static ebpo_status bad_numbers(const ebpo_catalogue_numbers *f, ebpo_error *error, const char *what)
+{
+    return ebpo_fail_file(error, EBPO_E_FORMAT, f->path,
+                          "is no .npy array of integers with one dimension: %s", what);
+}
+
+/* What stands behind 'key': in the head; or NULL. */
+static const char *value_of(const char *head, const char *key)
+{
+    const char *at = strstr(head, key);
+    at = at ? strchr(at + strlen(key), ':') : NULL;
+    return at ? at + 1 + strspn(at + 1, " ") : NULL;
+}
+
+/* '<i8' and the like; where the head ends earlier, nothing behind its end is looked at. */
+static bool read_type(ebpo_catalogue_numbers *f, const char *at)
+{
+    if (!at || (*at != '\'' && *at != '"') || strlen(at) < sizeof "'<i8'" - 1 ||
+        !strchr("<>|=", at[1]) || !strchr("iu", at[2]) || !strchr("1248", at[3]) || at[4] != *at)
+        return false;
+    f->big_endian = at[1] == '>';
+    f->is_signed = at[2] == 'i';
+    f->bytes = (unsigned)(at[3] - '0');
+    return true;
+}
+
+/* (N,) */
+static bool read_shape(ebpo_catalogue_numbers *f, const char *at)
+{
+    char *end;
+    if (!at || *at != '(' || at[1] < '0' || at[1] > '9')
+        return false;
+    errno = 0;
+    f->count = strtoull(at + 1, &end, 10);
+    end += strspn(end, " ");
+    return errno == 0 && *end == ',' && end[1 + strspn(end + 1, " ")] == ')';
+}
+
+/* Versions 1 to 3 differ in how long the length of the head is. */
+static ebpo_status read_head(ebpo_catalogue_numbers *f, ebpo_error *error)
+{
+    char text[HEAD_MOST + 1];
+    struct stat st;
+    ssize_t got = pread(f->fd, text, HEAD_MOST, 0);
+    const unsigned char *b = (const unsigned char *)text;
+    if (got < 0)
+        return ebpo_fail_errno(error, f->path, "cannot be read");
+    if (got < 12 || memcmp(text, "\x93NUMPY", 6) != 0 || b[6] < 1 || b[6] > 3)
+        return bad_numbers(f, error, "it begins otherwise");
+    size_t first = b[6] == 1 ? 10 : 12, length = (size_t)b[8] | (size_t)b[9] << 8;
+    if (b[6] > 1)
+        length |= (size_t)b[10] << 16 | (size_t)b[11] << 24;
+    if (length > (size_t)got - first)
+        return bad_numbers(f, error, "its head is too long");
+    text[first + length] = 0;
+    if (strlen(text + first) != length || !read_type(f, value_of(text + first, "'descr'")) ||
+        !read_shape(f, value_of(text + first, "'shape'")))
+        return bad_numbers(f, error, "its head tells something else");
+    f->begin = (int64_t)(first + length);
+    if (fstat(f->fd, &st) != 0 || f->count > (uint64_t)(st.st_size - f->begin) / f->bytes)
+        return bad_numbers(f, error, "it is shorter than its head tells");
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_catalogue_numbers_open(ebpo_catalogue_numbers *f, const char *path,
+                                        ebpo_error *error)
+{
+    struct stat st;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY); /* no pipe is waited for */
+    *f = (ebpo_catalogue_numbers){ .path = path, .fd = fd };
+    if (fd < 0)
+        return ebpo_fail_file(error,
+                              errno == ENOENT || errno == ENOTDIR ? EBPO_E_FORMAT : EBPO_E_IO, path,
+                              "cannot be read as a .npy: %s", strerror(errno));
+    if (fstat(fd, &st) != 0 || !S_ISREG(st.st_mode)) {
+        ebpo_catalogue_numbers_close(f);
+        return ebpo_fail_file(error, EBPO_E_FORMAT, path, "cannot be read as a .npy: is no file");
+    }
+    ebpo_status status = read_head(f, error);
+    if (status != EBPO_OK)
+        ebpo_catalogue_numbers_close(f);
+    return status;
+}
+
+void ebpo_catalogue_numbers_close(ebpo_catalogue_numbers *f)
+{
+    if (f->fd >= 0)
+        close(f->fd);
+    f->fd = -1;
+}
+
+ebpo_status ebpo_catalogue_numbers_get(const ebpo_catalogue_numbers *f, uint64_t *face,
+                                       ebpo_error *error)
+{
+    unsigned char b[8];
+    uint64_t number = 0;
+    if (*face >= f->count)
+        return ebpo_fail_file(error, EBPO_E_FORMAT, f->path, "has no number of face %" PRIu64,
+                              *face);
+    if (pread(f->fd, b, f->bytes, (off_t)(f->begin + (int64_t)(*face * f->bytes))) !=
+        (ssize_t)f->bytes)
+        return ebpo_fail_file(error, EBPO_E_IO, f->path, "cannot be read at number %" PRIu64,
+                              *face);
+    for (unsigned i = 0; i < f->bytes; i++)
+        number = number << 8 | b[f->big_endian ? i : f->bytes - 1 - i];
+    if ((f->is_signed || f->bytes == 8) && number >> (8 * f->bytes - 1))
+        return ebpo_fail_file(error, EBPO_E_FORMAT, f->path,
+                              "number %" PRIu64 " is negative or beyond 2^63", *face);
+    *face = number;
+    return EBPO_OK;
+}

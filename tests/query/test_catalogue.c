@@ -1,0 +1,497 @@
+/* Catalogues: what many models say as one, beside each of them by itself; parts with caps beside
+ * the whole; budgets that hold few of the models; and functions of the caller. */
+#include <math.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/catalogue.h>
+
+#include "check_main.h"
+#include "npy_numbers.h"
+#include "query_kit.h"
+
+enum { MODELS = 32, POINTS = 1440, RAYS = 800 };
+
+static query_model model[MODELS];
+static ebpo_catalogue_entry entry[MODELS];
+static double *points; /* [POINTS][3] */
+static ebpo_ray *rays; /* [RAYS] */
+
+static ebpo_mesh box_mesh(double x, double y, double z, double size)
+{
+    const double low[3] = { x, y, z }, high[3] = { x + size, y + size, z + size };
+    return ebpo_test_box(low, high, 16);
+}
+
+/* Some overlap, some touch, one is there twice; all have about as many faces. */
+static ebpo_mesh mesh_of(int i)
+{
+    const double centre[3] = { 0.25 * i, 0.25 * (i % 3), 0.125 * (i % 5) };
+    return i == 11      ? box_mesh(0, 0, 0, 1)
+           : i % 4 == 0 ? box_mesh(centre[0], centre[1], centre[2], 1)
+           : i % 4 == 1 ? ebpo_test_sphere(centre, 0.75, 4)
+           : i % 4 == 2 ? box_mesh(centre[0], 0, 0, 0.5)
+                        : ebpo_test_sphere(centre, 1.5, 4);
+}
+
+static void make_models(void)
+{
+    uint64_t seed = 7;
+    for (int i = 0; i < MODELS; i++) {
+        query_model_make(&model[i], "catalogue", mesh_of(i), &query_variants[0]);
+        ebpo_catalogue_entry_of(model[i].file, model[i].path, &entry[i]);
+    }
+    points = query_room(POINTS, 3 * sizeof *points);
+    rays = query_room(RAYS, sizeof *rays);
+    for (int i = 0; i < MODELS; i++)
+        query_make_points(&model[i], POINTS / MODELS, seed + (uint64_t)i,
+                          points + 3 * (POINTS / MODELS) * i);
+    for (int i = 0; i < RAYS; i++) {
+        ebpo_ray *r = &rays[i];
+        query_make_ray(&model[i % MODELS], &seed, r->origin, r->direction, &r->t_max);
+        for (int k = 0; k < 3; k++)
+            if (!isfinite(r->direction[k]))
+                r->direction[k] = copysign(1e308, r->direction[k]);
+    }
+}
+
+static void free_models(void)
+{
+    for (int i = 0; i < MODELS; i++)
+        query_model_free(&model[i]);
+    free(points);
+    free(rays);
+}
+
+/* --- what is asked, and what each model says --- */
+
+typedef struct asked {
+    ebpo_catalogue *catalogue;
+    ebpo_catalogue_models *models;
+} asked;
+
+static asked ask_entries(const ebpo_catalogue_entry *entries, uint64_t count, uint64_t memory)
+{
+    asked a = { NULL, NULL };
+    ebpo_catalogue_models_options o = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
+    o.memory = memory;
+    o.threads = 1;
+    ASSERT_OK(ebpo_catalogue_new(entries, count, NULL, &a.catalogue, error));
+    ASSERT_OK(ebpo_catalogue_models_new(&o, &a.models, error));
+    return a;
+}
+
+static void end_asking(asked *a)
+{
+    ebpo_catalogue_models_free(a->models);
+    ebpo_catalogue_free(a->catalogue);
+}
+
+static ebpo_catalogue_ask_options on_threads(unsigned threads)
+{
+    ebpo_catalogue_ask_options o = EBPO_CATALOGUE_ASK_OPTIONS_INIT;
+    o.threads = threads;
+    return o;
+}
+
+static void judge_inside(const ebpo_inside_result *got)
+{
+    for (int p = 0; p < POINTS; p++) {
+        int32_t winding = 0;
+        bool in = false, on = false;
+        for (int i = 0; i < MODELS; i++) {
+            ebpo_inside_result told;
+            ASSERT_OK(ebpo_inside(model[i].context, points + 3 * p, NULL, &told, error));
+            winding += told.winding;
+            in |= told.where == EBPO_IN;
+            on |= told.where == EBPO_ON;
+        }
+        ck_assert_int_eq(got[p].winding, winding);
+        ck_assert_int_eq(got[p].where, in ? EBPO_IN : on ? EBPO_ON : EBPO_OUT);
+    }
+}
+
+static void judge_distance(const ebpo_distance_result *got, const uint64_t *nearest,
+                           double max_distance, const ebpo_inside_result *where)
+{
+    ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
+    o.unsigned_distance = true;
+    for (int p = 0; p < POINTS; p++) {
+        ebpo_distance_result best = { .distance = INFINITY, .face = EBPO_NO_FACE };
+        uint64_t first = EBPO_CATALOGUE_NO_MODEL;
+        for (int i = 0; i < MODELS; i++) {
+            ebpo_distance_result told;
+            ASSERT_OK(ebpo_distance(model[i].context, points + 3 * p, &o, &told, error));
+            if (told.distance < best.distance && told.distance <= max_distance) {
+                best = told;
+                first = (uint64_t)i;
+            }
+        }
+        bool in = where && where[p].where == EBPO_IN && isfinite(best.distance);
+        ck_assert_double_eq(got[p].distance, in ? -best.distance : best.distance);
+        ck_assert_uint_eq(got[p].face, best.face);
+        ck_assert_uint_eq(nearest[p], first);
+        ck_assert(first == EBPO_CATALOGUE_NO_MODEL ||
+                  memcmp(got[p].point, best.point, sizeof best.point) == 0);
+    }
+}
+
+static void judge_rays(const ebpo_ray_hit *got, const uint64_t *met)
+{
+    for (int r = 0; r < RAYS; r++) {
+        ebpo_ray_hit best = { INFINITY, EBPO_NO_FACE, 0 };
+        uint64_t first = EBPO_CATALOGUE_NO_MODEL;
+        for (int i = 0; i < MODELS; i++) {
+            ebpo_ray_hit told;
+            bool hit;
+            ASSERT_OK(ebpo_ray_first(model[i].context, rays[r].origin, rays[r].direction,
+                                     rays[r].t_max, &told, &hit, error));
+            if (hit && (told.t < best.t || best.face == EBPO_NO_FACE)) {
+                best = told;
+                first = (uint64_t)i;
+            }
+        }
+        if (isinf(best.t) && best.face != EBPO_NO_FACE)
+            continue; /* several may be beyond doubles */
+        ck_assert_double_eq(got[r].t, best.t);
+        ck_assert_uint_eq(got[r].face, best.face);
+        ck_assert_int_eq(got[r].side, best.side);
+        ck_assert_uint_eq(met[r], first);
+    }
+}
+
+static void ask_everything(asked *a, unsigned threads)
+{
+    ebpo_catalogue_ask_options o = on_threads(threads);
+    ebpo_inside_result *inside = query_room(POINTS, sizeof *inside);
+    ebpo_distance_result *distance = query_room(POINTS, sizeof *distance);
+    ebpo_ray_hit *hits = query_room(RAYS, sizeof *hits);
+    uint64_t *number = query_room(POINTS, sizeof *number);
+    ASSERT_OK(ebpo_catalogue_inside(a->catalogue, a->models, points, POINTS, &o, inside, error));
+    judge_inside(inside);
+    ASSERT_OK(ebpo_catalogue_distance(a->catalogue, a->models, points, POINTS, &o, distance, number,
+                                      error));
+    judge_distance(distance, number, INFINITY, inside);
+    o.max_distance = 0.25;
+    o.unsigned_distance = true;
+    ASSERT_OK(ebpo_catalogue_distance(a->catalogue, a->models, points, POINTS, &o, distance, number,
+                                      error));
+    judge_distance(distance, number, 0.25, NULL);
+    ASSERT_OK(ebpo_catalogue_ray(a->catalogue, a->models, rays, RAYS, &o, hits, number, error));
+    judge_rays(hits, number);
+    free(inside);
+    free(distance);
+    free(hits);
+    free(number);
+}
+
+START_TEST(models_are_asked_as_one)
+{
+    asked a = ask_entries(entry, MODELS, 0);
+    ask_everything(&a, 1);
+    ask_everything(&a, 3);
+    end_asking(&a);
+}
+END_TEST
+
+/* So much that eight models are asked at a time, and not all of them stay. */
+static uint64_t little_memory(void)
+{
+    uint64_t most = 0;
+    for (int i = 0; i < MODELS; i++) {
+        ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
+        ASSERT_OK(ebpo_model_memory(model[i].file, NULL, &plan, error));
+        most = plan.least > most ? plan.least : most;
+    }
+    return 8 * most;
+}
+
+static ebpo_catalogue_models_stats stats_of(const asked *a, ebpo_model_stats *sums)
+{
+    ebpo_catalogue_models_stats stats = EBPO_CATALOGUE_MODELS_STATS_INIT;
+    *sums = (ebpo_model_stats)EBPO_MODEL_STATS_INIT;
+    ck_assert_int_eq(ebpo_catalogue_models_get_stats(a->models, &stats, sums), EBPO_OK);
+    return stats;
+}
+
+START_TEST(models_are_closed_and_opened_again)
+{
+    ebpo_model_stats sums;
+    uint64_t memory = little_memory();
+    asked a = ask_entries(entry, MODELS, memory);
+    ask_everything(&a, 1);
+    ebpo_catalogue_models_stats stats = stats_of(&a, &sums);
+    ck_assert_uint_gt(stats.closed, 0);
+    ck_assert_uint_gt(stats.opened, MODELS);
+    ck_assert_uint_eq(stats.opened, stats.closed + stats.open);
+    ck_assert_uint_le(sums.memory, memory);
+    ck_assert_uint_eq(sums.budget, memory);
+    ask_everything(&a, 4);
+    ebpo_catalogue_models_set_memory(a.models, 0);
+    ask_everything(&a, 2);
+    ebpo_catalogue_models_close_idle(a.models);
+    ck_assert_uint_eq(stats_of(&a, &sums).open, 0);
+    ck_assert_uint_eq(sums.memory, 0);
+    end_asking(&a);
+}
+END_TEST
+
+START_TEST(a_budget_may_be_too_small)
+{
+    ebpo_error said = EBPO_ERROR_INIT;
+    ebpo_inside_result out[1];
+    const double middle[3] = { 0.5, 0.5, 0.5 };
+    asked a = ask_entries(entry, MODELS, 1000);
+    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, middle, 1, NULL, out, &said),
+                     EBPO_E_LIMIT);
+    ck_assert_ptr_nonnull(strstr(said.message, "one part in 8"));
+    end_asking(&a);
+}
+END_TEST
+
+/* --- parts --- */
+
+/* The box of one side, 0 to 1 or 1 to 2 along x, as it is between caps at x = 1. */
+static ebpo_mesh half_box(int side, bool capped)
+{
+    const double low[3] = { side, 0, 0 }, high[3] = { side + 1, 1, 1 };
+    ebpo_mesh mesh = ebpo_test_box(low, high, 2);
+    uint64_t kept = 0;
+    for (uint64_t f = 0; f < mesh.face_count && !capped; f++) {
+        bool cap = true;
+        for (int k = 0; k < 3; k++)
+            cap &= mesh.xyz64[3 * mesh.faces[3 * f + k]] == 1;
+        if (!cap)
+            memmove(mesh.faces + 3 * kept++, mesh.faces + 3 * f, 3 * sizeof *mesh.faces);
+    }
+    mesh.face_count = capped ? mesh.face_count : kept;
+    return mesh;
+}
+
+typedef struct halves {
+    query_model closed[2], open[2], whole;
+    ebpo_catalogue_entry entry[2];
+    asked a;
+} halves;
+
+static void make_halves(halves *h)
+{
+    ebpo_catalogue_options o = EBPO_CATALOGUE_OPTIONS_INIT;
+    const double low[3] = { 0, 0, 0 }, high[3] = { 2, 1, 1 };
+    query_model_make(&h->whole, "whole", ebpo_test_box(low, high, 2), &query_variants[0]);
+    for (int i = 0; i < 2; i++) {
+        ebpo_catalogue_entry *e = &h->entry[i];
+        const char *numbers = scratch(i ? "1.npy" : "0.npy");
+        query_model_make(&h->closed[i], "half", half_box(i, true), &query_variants[0]);
+        query_model_make(&h->open[i], "surface", half_box(i, false), &query_variants[0]);
+        ebpo_catalogue_entry_of(h->closed[i].file, h->closed[i].path, e);
+        e->surface = h->open[i].path;
+        memcpy(e->surface_digest, ebpo_file_info(h->open[i].file)->content_sha256, 32);
+        e->numbers = numbers;
+        write_numbers(numbers, h->open[i].mesh.face_count, 1000 * (i + 1));
+    }
+    o.parts = true;
+    ASSERT_OK(ebpo_catalogue_new(h->entry, 2, &o, &h->a.catalogue, error));
+    ASSERT_OK(ebpo_catalogue_models_new(NULL, &h->a.models, error));
+}
+
+static void free_halves(halves *h)
+{
+    end_asking(&h->a);
+    for (int i = 0; i < 2; i++) {
+        query_model_free(&h->closed[i]);
+        query_model_free(&h->open[i]);
+    }
+    query_model_free(&h->whole);
+}
+
+/* A grid that has points on faces, on the cap, on its border, and elsewhere. */
+static uint64_t grid_points(double *out)
+{
+    uint64_t count = 0;
+    for (int x = -1; x <= 9; x++)
+        for (int y = -1; y <= 5; y++)
+            for (int z = -1; z <= 5; z++, count++) {
+                out[3 * count] = x * 0.25;
+                out[3 * count + 1] = y * 0.25;
+                out[3 * count + 2] = z * 0.25;
+            }
+    return count;
+}
+
+START_TEST(parts_answer_as_the_whole)
+{
+    halves h;
+    double at[3 * 11 * 7 * 7];
+    ebpo_inside_result got[11 * 7 * 7], expected[11 * 7 * 7];
+    ebpo_distance_result near[11 * 7 * 7], nearest[11 * 7 * 7];
+    uint64_t number[11 * 7 * 7], count = grid_points(at);
+    make_halves(&h);
+    ASSERT_OK(ebpo_catalogue_inside(h.a.catalogue, h.a.models, at, count, NULL, got, error));
+    ASSERT_OK(ebpo_inside_many(h.whole.context, at, count, NULL, expected, error));
+    ASSERT_OK(
+        ebpo_catalogue_distance(h.a.catalogue, h.a.models, at, count, NULL, near, number, error));
+    ASSERT_OK(ebpo_distance_many(h.whole.context, at, count, NULL, nearest, error));
+    for (uint64_t i = 0; i < count; i++) {
+        ck_assert_int_eq(got[i].where, expected[i].where);
+        ck_assert_int_eq(got[i].winding, expected[i].winding);
+        ck_assert_double_eq(near[i].distance, nearest[i].distance);
+        ck_assert_uint_le(number[i], 1);
+        ck_assert_uint_eq(near[i].face / 1000, number[i] + 1);
+    }
+    ebpo_ray through = { { -1, 0.3, 0.4 }, { 1, 0, 0 }, INFINITY },
+             back = { { 3, 0.3, 0.4 }, { -1, 0, 0 }, INFINITY };
+    ebpo_ray_hit hit;
+    ASSERT_OK(
+        ebpo_catalogue_ray(h.a.catalogue, h.a.models, &through, 1, NULL, &hit, number, error));
+    ck_assert(hit.t == 1 && hit.face / 1000 == 1 && number[0] == 0 && hit.side == 1);
+    through.origin[0] = 0.5; /* no cap is in the way */
+    ASSERT_OK(
+        ebpo_catalogue_ray(h.a.catalogue, h.a.models, &through, 1, NULL, &hit, number, error));
+    ck_assert(hit.t == 1.5 && hit.face / 1000 == 2 && number[0] == 1 && hit.side == -1);
+    ASSERT_OK(ebpo_catalogue_ray(h.a.catalogue, h.a.models, &back, 1, NULL, &hit, number, error));
+    ck_assert(hit.t == 1 && number[0] == 1);
+    free_halves(&h);
+}
+END_TEST
+
+START_TEST(caps_alone_are_no_surface)
+{
+    ebpo_error said = EBPO_ERROR_INIT;
+    ebpo_catalogue_entry caps = entry[0];
+    ebpo_inside_result where;
+    ebpo_distance_result distance;
+    uint64_t number;
+    const double middle[3] = { 0.5, 0.5, 0.5 };
+    caps.unseen = true;
+    asked a = ask_entries(&caps, 1, 0);
+    ASSERT_OK(ebpo_catalogue_inside(a.catalogue, a.models, middle, 1, NULL, &where, error));
+    ck_assert_int_eq(where.where, EBPO_IN);
+    ck_assert_int_eq(ebpo_catalogue_distance(a.catalogue, a.models, middle, 1, NULL, &distance,
+                                             &number, &said),
+                     EBPO_E_ABSENT);
+    end_asking(&a);
+}
+END_TEST
+
+/* --- functions of the caller --- */
+
+typedef struct opener {
+    atomic_int opened, closed;
+    int fails; /* which opening; 0: none */
+} opener;
+
+static ebpo_status open_counted(void *user, const char *path, ebpo_file **out, ebpo_error *error)
+{
+    opener *o = user;
+    if (++o->opened == o->fails) {
+        o->opened--;
+        error->status = EBPO_E_IO;
+        snprintf(error->message, sizeof error->message, "the tape is torn");
+        return EBPO_E_IO;
+    }
+    return ebpo_open(path, out, error);
+}
+
+static void close_counted(void *user, ebpo_file *file)
+{
+    ((opener *)user)->closed++;
+    ebpo_close(file);
+}
+
+START_TEST(files_are_opened_by_the_caller)
+{
+    ebpo_error said = EBPO_ERROR_INIT;
+    opener o = { .fails = 3 };
+    ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
+    ebpo_catalogue_models_options few = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
+    ebpo_inside_result *out = query_room(POINTS, sizeof *out);
+    asked a;
+    how.open_file = open_counted;
+    how.close_file = close_counted;
+    how.user = &o;
+    few.memory = little_memory();
+    ASSERT_OK(ebpo_catalogue_new(entry, MODELS, &how, &a.catalogue, error));
+    ASSERT_OK(ebpo_catalogue_models_new(&few, &a.models, error));
+    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, points, POINTS, NULL, out, &said),
+                     EBPO_E_IO);
+    ck_assert_str_eq(said.message, "the tape is torn");
+    o.fails = 0;
+    ask_everything(&a, 2);
+    ck_assert_int_gt(o.closed, 0);
+    end_asking(&a);
+    ck_assert_int_eq(o.opened, o.closed);
+    free(out);
+}
+END_TEST
+
+static bool stop_at_once(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    (void)stage;
+    (void)done;
+    (void)total;
+    ++*(int *)user;
+    return false;
+}
+
+START_TEST(questions_are_checked_and_may_be_stopped)
+{
+    ebpo_error said = EBPO_ERROR_INIT;
+    ebpo_catalogue_ask_options o = on_threads(1);
+    ebpo_inside_result *out = query_room(POINTS, sizeof *out);
+    ebpo_distance_result distance;
+    ebpo_ray ray = { { 9, 9, 9 }, { 0, 0, 0 }, 1 };
+    ebpo_ray_hit hit;
+    uint64_t number;
+    int calls = 0;
+    asked a = ask_entries(entry, MODELS, 0);
+    ebpo_model_stats sums;
+    double far[6] = { 99, 99, 99, 99, NAN, 99 };
+    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, far, 2, &o, out, &said),
+                     EBPO_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(said.message, "point 1 "));
+    ck_assert_int_eq(ebpo_catalogue_ray(a.catalogue, a.models, &ray, 1, &o, &hit, &number, &said),
+                     EBPO_E_ARGUMENT);
+    o.max_distance = -1;
+    ck_assert_int_eq(ebpo_catalogue_distance(a.catalogue, a.models, far, 1, &o, &distance, &number,
+                                             &said),
+                     EBPO_E_ARGUMENT);
+    o.max_distance = INFINITY;
+    ASSERT_OK(ebpo_catalogue_inside(a.catalogue, a.models, far, 1, &o, out, error));
+    ck_assert_int_eq(out[0].where, EBPO_OUT);
+    ck_assert_uint_eq(stats_of(&a, &sums).opened, 0);
+    o.progress = (ebpo_progress){ stop_at_once, &calls };
+    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, points, POINTS, &o, out, &said),
+                     EBPO_E_CANCELLED);
+    ck_assert_int_eq(calls, 1);
+    end_asking(&a);
+    free(out);
+}
+END_TEST
+
+static TCase *case_with_models(Suite *suite, const char *name)
+{
+    TCase *added = tcase_create(name);
+    tcase_set_timeout(added, 600);
+    tcase_add_unchecked_fixture(added, make_models, free_models);
+    tcase_add_checked_fixture(added, scratch_enter, scratch_leave);
+    suite_add_tcase(suite, added);
+    return added;
+}
+
+TEST_SUITE(catalogue)
+{
+    Suite *suite = suite_create("catalogue");
+    TCase *alone = case_with_models(suite, "catalogue"),
+          *threads = case_with_models(suite, "threads");
+    tcase_add_test(alone, models_are_asked_as_one);
+    tcase_add_test(alone, a_budget_may_be_too_small);
+    tcase_add_test(alone, parts_answer_as_the_whole);
+    tcase_add_test(alone, caps_alone_are_no_surface);
+    tcase_add_test(alone, questions_are_checked_and_may_be_stopped);
+    tcase_add_test(threads, models_are_closed_and_opened_again);
+    tcase_add_test(threads, files_are_opened_by_the_caller);
+    return suite;
+}
