@@ -69,15 +69,17 @@ static void print_distances(const query_job *job, query_worker *w, const double 
 {
     (void)rows;
     if (!query_lists(job->values))
-        answers_distance(w->text, job->form, !job->catalogue && is_limited(&job->distance), w->results,
-                         count, job->sampler, job->catalogue ? models_of(w, count) : NULL);
+        answers_distance(w->text, job->form, !job->catalogue && is_limited(&job->distance),
+                         w->results, count, job->sampler,
+                         job->catalogue ? models_of(w, count) : NULL);
 }
 
 static const char *distance_columns(const query_job *job)
 {
     return job->catalogue ? "distance,x,y,z,nx,ny,nz,face,model"
-           : is_limited(&job->distance) && !query_lists(job->values) ? "lo,hi"
-                                                                  : "distance,x,y,z,nx,ny,nz,face";
+           : is_limited(&job->distance) && !query_lists(job->values)
+               ? "lo,hi"
+               : "distance,x,y,z,nx,ny,nz,face";
 }
 
 static const char *distance_dtype(const query_job *job, unsigned *bytes)
