@@ -266,7 +266,7 @@ START_TEST(boxes_that_are_left_out_do_not_matter)
 }
 END_TEST
 
-Suite *test_suite(void)
+TEST_SUITE(catalogue_file)
 {
     Suite *suite = suite_create("catalogue_file");
     TCase *all = tcase_create("catalogue_file");
