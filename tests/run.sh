@@ -4,7 +4,7 @@
 #   tests/run.sh quick   gcc alone and few inputs, in at most 3 minutes: while you work
 #   tests/run.sh full    every check in every build, with all inputs: before a release
 #   tests/run.sh [quick|full] BUILD...   only these builds of the tier
-# Builds: gcc; clang; sanitize (clang with address and undefined); gcc-sanitize; thread; memory (the fuzz
+# Builds: gcc; clang; sanitize (gcc with address and undefined); undefined (clang); thread; memory (the fuzz
 # targets and their corpora); posix (without what Linux has beyond POSIX). plan() says what each tier leaves out.
 # No model files are needed; those in ../shared/models or $EBPO_MODELS are tested too.
 set -eu
@@ -14,7 +14,7 @@ case "${1:-}" in quick | full) tier=$1 && shift ;; esac
 [ $# -gt 0 ] || case $tier in
 quick) set -- gcc ;;
 default) set -- gcc sanitize thread memory ;;
-full) set -- gcc clang sanitize gcc-sanitize thread memory posix ;;
+full) set -- gcc clang sanitize undefined thread memory posix ;;
 esac
 
 # Prints the share of random inputs (EBPO_TEST_SCALE) and the suites that a tier leaves out of a build.
@@ -23,10 +23,10 @@ plan() { # build
     case $tier-$1 in
     quick-*) echo "0.02 full costly once viewer flags calls" ;;
     full-gcc) echo "1" ;;
-    full-clang | full-sanitize | full-gcc-sanitize) echo "0.2" ;;
+    full-clang | full-sanitize | full-undefined) echo "0.2" ;;
     default-gcc) echo "0.1 full" ;;
     default-clang) echo "0.1 full once costly viewer flags calls" ;;
-    default-sanitize | default-gcc-sanitize) echo "0.02 full once costly viewer flags" ;;
+    default-sanitize | default-undefined) echo "0.02 full once costly viewer flags" ;;
     *-thread | *-memory) echo "1" ;; # one suite
     *-posix) echo "0.1" ;;           # the tests that are named here
     esac
@@ -47,8 +47,8 @@ run() { # build
     # shellcheck disable=SC2046
     case $1 in
     gcc | clang) CC=$1 configure "$1" ;;
-    sanitize) CC=clang configure "$1" $(sanitized address,undefined) -Doptimization=1 ;;
-    gcc-sanitize) CC=gcc configure "$1" $(sanitized address,undefined) ;;
+    sanitize) CC=gcc configure "$1" $(sanitized address,undefined) -Doptimization=1 ;;
+    undefined) CC=clang configure "$1" $(sanitized undefined) -Doptimization=1 ;;
     thread) CC=gcc configure "$1" $(sanitized thread) ;;
     posix) CC=gcc configure "$1" -Dposix_only=true ;;
     # Without libraries that are not instrumented, as far as possible; msan_outside.c describes the rest.
@@ -75,10 +75,10 @@ EOF
 
 for build in "$@"; do
     case $build in
-    gcc | clang | sanitize | gcc-sanitize | thread | memory | posix) ;;
+    gcc | clang | sanitize | undefined | thread | memory | posix) ;;
     *)
         echo "usage: tests/run.sh [quick|full]" \
-            "[gcc] [clang] [sanitize] [gcc-sanitize] [thread] [memory] [posix]" >&2
+            "[gcc] [clang] [sanitize] [undefined] [thread] [memory] [posix]" >&2
         exit 2
         ;;
     esac
