@@ -189,7 +189,7 @@ ebpo_status ebpo_ply_put_list(ebpo_ply_parser *p, const ebpo_ply_property *prope
     if (!ebpo_attribute_reserve(p->mesh->workspace, a, row + 1, begin + count))
         return fail_rows(p, (begin + count) * bytes);
     a->ends[row] = begin + count;
-    *items = a->values + begin * bytes;
+    *items = a->values ? a->values + begin * bytes : NULL; /* none as long as all rows are empty */
     return EBPO_OK;
 }
 

@@ -65,7 +65,7 @@ static void twin_add(twin *t, int level, ebpo_octcode code, unsigned type)
     twin_node n = { .octcode = code, .type = (ebpo_node_type)type, .rank = rank };
     if (type == EBPO_GRAY && l->plane_counts) {
         n.count = l->plane_counts[rank];
-        n.codes = l->planes + t->plane[level];
+        n.codes = l->planes ? l->planes + t->plane[level] : NULL;
         t->plane[level] += n.count;
     }
     if (type == EBPO_LEAF && l->leaf_plane_counts) {
