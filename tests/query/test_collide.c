@@ -483,6 +483,8 @@ START_TEST(faces_that_cross_within_a_model_are_found)
     ck_assert_uint_eq(at, got.count);
     ebpo_collider_free(collider);
     for (int level = -1; level < 4; level++) {
+        if (ebpo_test_scale() < 1 && level >= 0 && level != _i % 4)
+            continue;
         pair_list parts = { 0 };
         ebpo_model *model = in_parts(&m, level);
         ebpo_collider_options with = EBPO_COLLIDER_OPTIONS_INIT;

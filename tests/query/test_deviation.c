@@ -201,6 +201,8 @@ START_TEST(scale_and_place_scale_and_place_the_result)
     query_model unit;
     query_model_make(&unit, "torus", ebpo_test_torus(3, 1, 24, 12), &stored);
     for (int i = 0; i < 6; i++) {
+        if (ebpo_test_scale() < 1 && i % 5)
+            continue; /* only the least and the greatest */
         query_model m;
         double matrix[3][3] = { { scale[i], 0, 0 }, { 0, scale[i], 0 }, { 0, 0, scale[i] } },
                nowhere[3] = { 0, 0, 0 };

@@ -315,7 +315,8 @@ START_TEST(parts_are_chosen_from_full_to_lod)
     result r;
     ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT;
     uint64_t bytes[3];
-    query_model_make(&m, "torus", ebpo_test_torus(3, 1, 96, 48), &stored);
+    uint32_t around = ebpo_test_scale() < 1 ? 48 : 96;
+    query_model_make(&m, "torus", ebpo_test_torus(3, 1, around, around / 2), &stored);
     for (int i = 0; i < 3; i++) {
         static const ebpo_profile order[] = { EBPO_PROFILE_FULL, EBPO_PROFILE_COLLISION,
                                               EBPO_PROFILE_LOD };
@@ -343,7 +344,8 @@ START_TEST(threads_and_a_detour_by_a_tree_do_not_change_the_bytes)
 {
     query_model m;
     ebpo_error error = EBPO_ERROR_INIT;
-    query_model_make(&m, "torus", ebpo_test_torus(3, 1, 48, 24), &stored);
+    uint32_t around = ebpo_test_scale() < 1 ? 24 : 48;
+    query_model_make(&m, "torus", ebpo_test_torus(3, 1, around, around / 2), &stored);
     for (int i = 0; i < 2; i++) {
         char path[3][120];
         static uint8_t bytes[3][1 << 20];

@@ -270,7 +270,8 @@ static void survive(int call, bool with_workspace, unsigned kinds)
     every_call_env e;
     begin(&e, with_workspace);
     fine(c->call(&e));
-    for (int onward = 0; onward < 2; onward++)
+    const bool both = ebpo_test_scale() >= 1;
+    for (int onward = both ? 0 : call % 2; onward < (both ? 2 : call % 2 + 1); onward++)
         for (uint64_t n = 1; call_with_failure(c, &e, kinds, n, onward); n += 1 + n / dense)
             ;
     fine(c->call(&e));
