@@ -521,7 +521,7 @@ START_TEST(headers_stay_with_the_server_that_they_were_given_for)
     for (int i = 0; i < 6; i++) {
         ebpo_error error = EBPO_ERROR_INIT;
         ebpo_http_options o = quick();
-        char away[16];
+        char away[24];
         o.headers = headers;
         o.user = i < 4 ? NULL : "name:secret";
         snprintf(away, sizeof away, "away-%d", i);
