@@ -39,23 +39,26 @@ configure() { # build, meson options...
     shift
     [ -d "$folder" ] || meson setup "$folder" -Dwerror=true -Dtests=enabled "$@"
 }
-sanitized() { # sanitizers
-    stop=-fno-sanitize-recover=all,-g1 # lines for reports, without variables: compiles faster
-    echo "-Db_sanitize=$1 -Db_lundef=false --buildtype=debugoptimized -Dc_args=$stop -Dcpp_args=$stop"
+configure_sanitized() { # compiler, build, sanitizers, meson options...
+    compiler=$1 folder=$2 sanitizers=$3
+    shift 3
+    # -g1: reports have lines, and compiling is faster than with variables.
+    flags='-fno-sanitize-recover=all -g1'
+    CC=$compiler configure "$folder" -Db_sanitize="$sanitizers" -Db_lundef=false \
+        --buildtype=debugoptimized -Dc_args="$flags" -Dcpp_args="$flags" "$@"
 }
 run() { # build
-    # shellcheck disable=SC2046
     case $1 in
     gcc | clang) CC=$1 configure "$1" ;;
-    sanitize) CC=gcc configure "$1" $(sanitized address,undefined) -Doptimization=1 ;;
-    undefined) CC=clang configure "$1" $(sanitized undefined) -Doptimization=1 ;;
-    thread) CC=gcc configure "$1" $(sanitized thread) ;;
+    sanitize) configure_sanitized gcc "$1" address,undefined -Doptimization=1 ;;
+    undefined) configure_sanitized clang "$1" undefined -Doptimization=1 ;;
+    thread) configure_sanitized gcc "$1" thread ;;
     posix) CC=gcc configure "$1" -Dposix_only=true ;;
     # Without libraries that are not instrumented, as far as possible; msan_outside.c describes the rest.
     memory)
-        CC=clang configure "$1" $(sanitized memory) -Dtests=disabled -Dfuzzing=true \
-            -Dhdf5=disabled -Dhttp=disabled -Dassimp=disabled -Drender=disabled \
-            -Dcaptions=disabled -Dqhull=disabled -Doptimization=0
+        configure_sanitized clang "$1" memory -Dtests=disabled -Dfuzzing=true -Dhdf5=disabled \
+            -Dhttp=disabled -Dassimp=disabled -Drender=disabled -Dcaptions=disabled \
+            -Dqhull=disabled -Doptimization=0
         ;;
     esac
     read -r share left_out <<EOF
