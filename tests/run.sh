@@ -24,7 +24,7 @@ plan() { # build
     quick-*) echo "0.02 full costly once viewer calls" ;;
     full-gcc) echo "1" ;;
     full-clang | full-sanitize | full-undefined) echo "0.2" ;;
-    default-gcc) echo "0.1 full viewer" ;;
+    default-gcc) echo "0.05 full viewer" ;;
     default-clang) echo "0.1 full once costly viewer calls" ;;
     default-sanitize | default-undefined) echo "0.02 full once costly viewer" ;;
     *-thread | *-memory) echo "1" ;; # one suite
