@@ -57,7 +57,7 @@ static const uint64_t LONGEST = PTRDIFF_MAX / 8 / 3;
  * list, which is done here. */
 static bool is_shuffled(ebpo_pipeline pipeline)
 {
-    return pipeline == EBPO_PIPELINE_ZSTD || pipeline == EBPO_PIPELINE_DEFLATE;
+    return ebpo_pipeline_facts_of(pipeline)->compresses;
 }
 
 ebpo_status ebpo_long_chunk_encode(const uint64_t *values, uint64_t count, ebpo_pipeline pipeline,

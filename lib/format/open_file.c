@@ -193,9 +193,7 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
     if (status == EBPO_OK)
         status = ebpo_attributes_open(file, head, error);
     ebpo_pipeline pipeline = file->level_array[0][EBPO_A_TYPES].shape.pipeline;
-    info->codec = pipeline == EBPO_PIPELINE_ZSTD      ? EBPO_CODEC_ZSTD
-                  : pipeline == EBPO_PIPELINE_DEFLATE ? EBPO_CODEC_DEFLATE
-                                                      : EBPO_CODEC_NONE;
+    info->codec = pipeline == EBPO_PIPELINE_BARE ? EBPO_CODEC_NONE : (ebpo_codec)pipeline;
     if (status == EBPO_OK)
         status = check_pipelines(file, error);
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;

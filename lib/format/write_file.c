@@ -561,11 +561,8 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
 static ebpo_status check_options(const ebpo_write_options *options, const char *path,
                                  ebpo_error *error)
 {
-    int most = options->codec == EBPO_CODEC_ZSTD      ? 22
-               : options->codec == EBPO_CODEC_DEFLATE ? 9
-                                                      : 0;
     if ((unsigned)options->codec > EBPO_CODEC_NONE || options->codec_level < 0 ||
-        options->codec_level > most)
+        options->codec_level > ebpo_pipeline_facts_of((ebpo_pipeline)options->codec)->level_most)
         return ebpo_fail_file(
             error, EBPO_E_ARGUMENT, path,
             "no such codec or codec level; zstd takes 1 to 22, deflate 1 to 9, none takes 0");

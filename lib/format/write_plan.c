@@ -606,9 +606,11 @@ static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
 
 static ebpo_pipeline pipeline_of(ebpo_codec codec)
 {
-    return codec == EBPO_CODEC_ZSTD      ? EBPO_PIPELINE_ZSTD
-           : codec == EBPO_CODEC_DEFLATE ? EBPO_PIPELINE_DEFLATE
-                                         : EBPO_PIPELINE_CHECKSUM;
+    _Static_assert((int)EBPO_CODEC_ZSTD == (int)EBPO_PIPELINE_ZSTD &&
+                       (int)EBPO_CODEC_DEFLATE == (int)EBPO_PIPELINE_DEFLATE &&
+                       (int)EBPO_CODEC_NONE == (int)EBPO_PIPELINE_CHECKSUM,
+                   "pipelines begin with the codecs, in their order");
+    return (ebpo_pipeline)codec;
 }
 
 static void add_array(ebpo_plan *plan, ebpo_array_id id, int level)

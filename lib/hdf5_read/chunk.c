@@ -145,20 +145,21 @@ typedef struct codec {
 } codec;
 
 static const codec codecs[] = {
-    [EBPO_PIPELINE_ZSTD] = { { { EBPO_FILTER_ZSTD }, 1, EBPO_ZSTD_LEVEL, true, false },
+    [EBPO_PIPELINE_ZSTD] = { { { EBPO_FILTER_ZSTD }, 1, EBPO_ZSTD_LEVEL, 22, true, false },
                              ebpo_zstd_encode,
                              ebpo_zstd_decode },
     [EBPO_PIPELINE_DEFLATE] = { { { EBPO_FILTER_DEFLATE, EBPO_FILTER_FLETCHER },
                                   2,
                                   EBPO_DEFLATE_LEVEL,
+                                  9,
                                   true,
                                   true },
                                 deflate_encode,
                                 deflate_decode },
-    [EBPO_PIPELINE_CHECKSUM] = { { { EBPO_FILTER_FLETCHER }, 1, 0, false, true },
+    [EBPO_PIPELINE_CHECKSUM] = { { { EBPO_FILTER_FLETCHER }, 1, 0, 0, false, true },
                                  copy_out,
                                  copy_in },
-    [EBPO_PIPELINE_BARE] = { { { 0 }, 0, 0, false, false }, copy_out, copy_in },
+    [EBPO_PIPELINE_BARE] = { { { 0 }, 0, 0, 0, false, false }, copy_out, copy_in },
 };
 _Static_assert(sizeof codecs / sizeof *codecs == EBPO_PIPELINE_COUNT,
                "each pipeline of chunk.h needs a row in this table");

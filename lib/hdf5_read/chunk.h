@@ -12,8 +12,8 @@
 
 #include "hdf5_read/codec.h"
 
-/* Filter pipelines. Shuffle comes first where elements have more than one byte (but not in the last
- * two). */
+/* Filter pipelines; the first ones are those of ebpo_codec, in its order. Shuffle comes first where
+ * elements have more than one byte (but not in the last two). */
 typedef enum ebpo_pipeline {
     EBPO_PIPELINE_ZSTD,     /* shuffle, zstd frame with content size and checksum */
     EBPO_PIPELINE_DEFLATE,  /* shuffle, zlib stream, fletcher32 */
@@ -35,6 +35,7 @@ typedef struct ebpo_pipeline_facts {
     unsigned filter[2]; /* in the order in which they are applied, without shuffle */
     int filter_count;
     int level;       /* the usual one, which headers state; 0: it has none */
+    int level_most;  /* the greatest that may be asked for */
     bool compresses; /* and elements of several bytes are shuffled before */
     bool fletcher;   /* a fletcher32 checksum comes last */
 } ebpo_pipeline_facts;
