@@ -26,7 +26,7 @@ plan() { # build
     full-clang | full-sanitize | full-undefined) echo "0.2" ;;
     default-gcc) echo "0.05 full viewer" ;;
     default-clang) echo "0.1 full once costly viewer calls" ;;
-    default-sanitize | default-undefined) echo "0.02 full once costly viewer" ;;
+    default-sanitize | default-undefined) echo "0.02 full once costly viewer calls" ;;
     *-thread | *-memory) echo "1" ;; # one suite
     *-posix) echo "0.1" ;;           # the tests that are named here
     esac

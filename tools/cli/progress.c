@@ -56,7 +56,7 @@ void progress_end_stage(progress_line *line)
 }
 
 /* What does not fit is counted with the last one. */
-static void begin_stage(progress_line *line, const char *stage, double now)
+static void begin_stage(progress_line *line, const char *stage)
 {
     int i = 0;
     while (i < line->stage_count && strcmp(line->stages[i].name, stage) != 0)
@@ -70,7 +70,6 @@ static void begin_stage(progress_line *line, const char *stage, double now)
             line->at = i;
             break;
         }
-    line->begun = now;
     line->last = 0;
 }
 
@@ -80,7 +79,7 @@ static bool report_progress(void *user, const char *stage, uint64_t done, uint64
     double now = progress_now();
     if (!line->stage || (stage != line->stage && strcmp(stage, line->stage) != 0)) {
         progress_end_stage(line);
-        begin_stage(line, stage, now);
+        begin_stage(line, stage);
     }
     if (line->active && now - line->last > 0.1) {
         line->last = now;
