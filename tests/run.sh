@@ -37,7 +37,7 @@ without_linux="io workspace source many_threads touch_hand touch_probe touch_udp
 configure() { # build, meson options...
     folder=build-$1
     shift
-    [ -d "$folder" ] || meson setup "$folder" -Dwerror=true -Dtests=enabled "$@"
+    [ -f "$folder/build.ninja" ] || meson setup "$folder" -Dwerror=true -Dtests=enabled "$@"
 }
 configure_sanitized() { # compiler, build, sanitizers, meson options...
     compiler=$1 folder=$2 sanitizers=$3

@@ -31,8 +31,8 @@ ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *err
 {
     return c->seen.levels ? EBPO_OK
                           : ebpo_fail_file(error, EBPO_E_ABSENT, ebpo_catalogue_shown(c),
-                                           "tells of caps alone, and of no surface; ask inside, or "
-                                           "the catalogue of all parts");
+                                           "tells of caps alone, and of no surface; ask the "
+                                           "catalogue of all parts");
 }
 
 /* --- each model once --- */

@@ -140,6 +140,8 @@ static const char *fault_of_entry(const ebpo_catalogue_entry *e)
         return "has no path";
     if (e->surface && (!*e->surface || e->unseen))
         return "has no surface, and yet a path of one";
+    if (e->numbers && !*e->numbers)
+        return "has an empty path of numbers";
     if ((unsigned)e->rule >= RULES)
         return "has no rule that is known";
     for (int k = 0; k < 3; k++)

@@ -1,4 +1,5 @@
-/* Catalogues as files: JSON that ebpo_catalogue_open reads again, bit for bit the same entries.
+/* Catalogues as files: JSON that ebpo_catalogue_open reads again. Boxes are the same bit for bit,
+ * and counts below 2^53; entries without `file_bytes` are written without their counts.
  *
  * Paths that begin with the folder of the file become relative to it, so that a folder of models
  * and its catalogue can be moved together; a path that would then be read as another one stays as

@@ -11,7 +11,7 @@
  * opened, and the box whenever it is lent, as two entries may tell of one file differently.
  *
  * Locks: one for the list and its sums, which is never held while a question is asked or a file is
- * opened; each model has one for opening it and one for asking it. */
+ * opened, but while one is closed; each model has one for opening it and one for asking it. */
 #include "core/strict_fp.h"
 
 #include <pthread.h>

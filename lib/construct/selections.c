@@ -454,7 +454,7 @@ static void single_medoid(clustering *c)
     c->chosen[at] = true;
 }
 
-/* The theses' (theses.c). */
+/* The selections of the theses. */
 static int select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
 {
     /* each lowers the cost; this only guards against rounding in circles */

@@ -1,4 +1,5 @@
-/* Three ways, each exact where it applies, tried in order of cost: 1. Digits below 2^53 times or
+/* Decimal text as the nearest float or double. There are three ways, each exact where it applies,
+ * tried in order of cost: 1. Digits below 2^53 times or
  * over a power of ten up to 10^22: both are doubles, so one operation rounds once (Clinger, "How to
  * read floating point numbers accurately", 1990). That double also decides the float, unless it
  * lies exactly between two floats (then rounding twice may err). 2. Up to 19 digits over a power of

@@ -1,3 +1,8 @@
+/* Boundary edges of a mesh, which one face uses, and the closed chains (loops) that they form: the
+ * holes. Edges are collected by threads, joined and sorted by their first vertex; where several
+ * loops pass one vertex, the fans of faces around it decide which edge continues which. Loops begin
+ * at their least vertex and stand in the source's order, so the result does not depend on threads
+ * or on the order of the faces. */
 #include "mesh/boundary.h"
 
 #include <stdlib.h>

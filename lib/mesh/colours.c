@@ -1,3 +1,6 @@
+/* Colours of a mesh's vertices, corners or faces from its attributes: which properties are colours
+ * (by the names that PLY files use), and their values as RGBA in bytes. Used for exports, pictures
+ * and the means of gray nodes. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

@@ -12,7 +12,7 @@ typedef struct ebpo_found_component {
     uint64_t first; /* the least source number of its faces */
     uint32_t face;  /* that face, in the mesh as it is */
     bool open;      /* an edge is not used as often in one direction as in the other */
-    double volume;  /* of a closed one, signed, in a unit of all components' own (mesh_frame.h) */
+    double volume;  /* of a closed one, signed, in a unit of all components' own (mesh_parts.h) */
     double min[3], max[3];
     uint32_t host; /* of a cavity: what it is in; else itself */
 } ebpo_found_component;

@@ -1,3 +1,6 @@
+/* Filling holes: each boundary loop becomes a fan or a triangulation of its own outline
+ * (geometry/polygon.h), turned so that edges cancel. Nothing else of the mesh changes, and the
+ * record of the repair says what was added. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>

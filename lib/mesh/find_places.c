@@ -23,28 +23,26 @@
 
 /* A mesh with the places of findings in colours. */
 
-typedef struct ebpo_places_picture {
+typedef struct places_picture {
     const ebpo_mesh *mesh;
     uint8_t *face; /* the kind that each shows, as the mesh has them now */
     ebpo_publish target;
-} ebpo_places_picture;
+} places_picture;
 
-#define EBPO_PLACES_PICTURE_INIT      \
+#define PLACES_PICTURE_INIT           \
     {                                 \
         NULL, NULL, EBPO_PUBLISH_INIT \
     }
 
-EBPO_MUST_USE ebpo_status ebpo_places_picture_begin(ebpo_places_picture *picture,
-                                                    const ebpo_mesh *mesh, const char *path,
-                                                    ebpo_error *error);
+static ebpo_status begin_picture(places_picture *picture, const ebpo_mesh *mesh, const char *path,
+                                 ebpo_error *error);
 /* faces   of the mesh as it is now */
-void ebpo_places_picture_note(ebpo_places_picture *picture, const ebpo_found *found,
-                              const uint64_t *faces, uint64_t count);
+static void note_in_picture(places_picture *picture, const ebpo_found *found, const uint64_t *faces,
+                            uint64_t count);
 /* report   for the legend */
-EBPO_MUST_USE ebpo_status ebpo_places_picture_write(ebpo_places_picture *picture,
-                                                    const ebpo_mesh_report *report,
-                                                    ebpo_error *error);
-void ebpo_places_picture_end(ebpo_places_picture *picture);
+static ebpo_status write_picture(places_picture *picture, const ebpo_mesh_report *report,
+                                 ebpo_error *error);
+static void end_picture(places_picture *picture);
 
 static const struct finding_kind {
     const char *name;
@@ -90,7 +88,7 @@ typedef struct places {
     ebpo_stars stars;
     uint64_t *faces; /* around a place */
     uint64_t face_count, face_capacity;
-    ebpo_places_picture picture;
+    places_picture picture;
 } places;
 
 /* A place with what it is sorted by: its kind, then the number that the report has. */
@@ -284,7 +282,7 @@ static ebpo_status tell_all(places *p, ebpo_error *error)
         if (!faces_of(p, f))
             return ebpo_workspace_fail(workspace, p->face_capacity * 2 * sizeof *p->faces, error);
         if (p->options.ply)
-            ebpo_places_picture_note(&p->picture, f, p->faces, p->face_count);
+            note_in_picture(&p->picture, f, p->faces, p->face_count);
         if (i % BETWEEN_STEPS == 0 &&
             !ebpo_progress_step(&p->options.progress, "places", i, p->all.count, error))
             return EBPO_E_CANCELLED;
@@ -329,11 +327,11 @@ static ebpo_status find_places_find(places *p, ebpo_mesh_report *report, ebpo_er
         status = ebpo_stars_build(&p->stars, p->mesh, ebpo_thread_count(p->options.threads),
                                   &p->options.progress, error);
     if (status == EBPO_OK && p->options.ply)
-        status = ebpo_places_picture_begin(&p->picture, p->mesh, p->options.ply, error);
+        status = begin_picture(&p->picture, p->mesh, p->options.ply, error);
     if (status == EBPO_OK)
         status = tell_all(p, error);
     if (status == EBPO_OK && p->options.ply)
-        status = ebpo_places_picture_write(&p->picture, report, error);
+        status = write_picture(&p->picture, report, error);
     return status;
 }
 
@@ -346,7 +344,7 @@ ebpo_status ebpo_mesh_places(const ebpo_mesh *mesh, const ebpo_places_options *o
                  .options = EBPO_PLACES_OPTIONS_INIT,
                  .take = take,
                  .user = user,
-                 .picture = EBPO_PLACES_PICTURE_INIT };
+                 .picture = PLACES_PICTURE_INIT };
     ebpo_mesh_report found = { .edges = 0 };
     ebpo_status status = EBPO_TAKE(ebpo_places_options, &p.options, options, error);
     if (status == EBPO_OK)
@@ -355,7 +353,7 @@ ebpo_status ebpo_mesh_places(const ebpo_mesh *mesh, const ebpo_places_options *o
     ebpo_array_free(mesh->workspace, p.component);
     ebpo_array_free(mesh->workspace, p.faces);
     ebpo_stars_free(&p.stars);
-    ebpo_places_picture_end(&p.picture);
+    end_picture(&p.picture);
     if (report)
         *report = found;
     return status;
@@ -363,8 +361,8 @@ ebpo_status ebpo_mesh_places(const ebpo_mesh *mesh, const ebpo_places_options *o
 
 enum { NOTHING = UINT8_MAX, VERTEX_BYTES = 3 * 8, FACE_BYTES = 1 + 3 * 4 + 3 };
 
-ebpo_status ebpo_places_picture_begin(ebpo_places_picture *picture, const ebpo_mesh *mesh,
-                                      const char *path, ebpo_error *error)
+static ebpo_status begin_picture(places_picture *picture, const ebpo_mesh *mesh, const char *path,
+                                 ebpo_error *error)
 {
     picture->mesh = mesh;
     picture->face = ebpo_array_alloc(mesh->workspace, mesh->face_count, 1);
@@ -374,8 +372,8 @@ ebpo_status ebpo_places_picture_begin(ebpo_places_picture *picture, const ebpo_m
     return ebpo_publish_begin(&picture->target, path, error);
 }
 
-void ebpo_places_picture_note(ebpo_places_picture *picture, const ebpo_found *found,
-                              const uint64_t *faces, uint64_t count)
+static void note_in_picture(places_picture *picture, const ebpo_found *found, const uint64_t *faces,
+                            uint64_t count)
 {
     uint8_t kind = (uint8_t)found->kind;
     for (uint64_t i = 0; i < count; i++)
@@ -401,7 +399,7 @@ static uint64_t count_of(const ebpo_mesh_report *r, int kind)
     return counts[kind];
 }
 
-static void print_header(const ebpo_places_picture *p, FILE *f, const ebpo_mesh_report *report)
+static void print_header(const places_picture *p, FILE *f, const ebpo_mesh_report *report)
 {
     fputs("ply\nformat binary_little_endian 1.0\n", f);
     for (int kind = 0; kind < EBPO_FINDING_KINDS; kind++) {
@@ -444,7 +442,7 @@ static uint32_t *in_source_order(const ebpo_mesh *mesh, const uint32_t *source, 
     return order;
 }
 
-static bool put_vertex(const ebpo_places_picture *p, FILE *f, uint64_t v)
+static bool put_vertex(const places_picture *p, FILE *f, uint64_t v)
 {
     uint8_t row[VERTEX_BYTES];
     double x[3];
@@ -458,7 +456,7 @@ static bool put_vertex(const ebpo_places_picture *p, FILE *f, uint64_t v)
 }
 
 /* rank   of each vertex among those that were written; NULL: their numbers */
-static bool put_face(const ebpo_places_picture *p, FILE *f, uint64_t face, const uint32_t *rank)
+static bool put_face(const places_picture *p, FILE *f, uint64_t face, const uint32_t *rank)
 {
     uint8_t row[FACE_BYTES] = { 3 };
     for (int k = 0; k < 3; k++) {
@@ -490,7 +488,7 @@ static ebpo_status order_all(const ebpo_mesh *mesh, written *w, ebpo_error *erro
     return EBPO_OK;
 }
 
-static bool put_all(const ebpo_places_picture *p, FILE *f, const written *w)
+static bool put_all(const places_picture *p, FILE *f, const written *w)
 {
     const ebpo_mesh *mesh = p->mesh;
     bool good = true;
@@ -501,8 +499,8 @@ static bool put_all(const ebpo_places_picture *p, FILE *f, const written *w)
     return good;
 }
 
-ebpo_status ebpo_places_picture_write(ebpo_places_picture *picture, const ebpo_mesh_report *report,
-                                      ebpo_error *error)
+static ebpo_status write_picture(places_picture *picture, const ebpo_mesh_report *report,
+                                 ebpo_error *error)
 {
     const ebpo_mesh *mesh = picture->mesh;
     written w = { NULL, NULL, NULL };
@@ -521,7 +519,7 @@ ebpo_status ebpo_places_picture_write(ebpo_places_picture *picture, const ebpo_m
     return status == EBPO_OK ? ebpo_publish_commit(&picture->target, error) : status;
 }
 
-void ebpo_places_picture_end(ebpo_places_picture *picture)
+static void end_picture(places_picture *picture)
 {
     if (picture->mesh)
         ebpo_array_free(picture->mesh->workspace, picture->face);

@@ -1,3 +1,9 @@
+/* Reading OBJ files in two passes: the first counts vertices, normals, texture coordinates and
+ * corners; the second fills the mesh. A corner names its values by numbers, which may be negative
+ * (counted from the end) and must exist. Materials and groups become attributes or runs of faces;
+ * what a mesh cannot hold (curves, lines, points) is counted and reported.
+ *
+ * Source: "Object Files (.obj)", appendix B1 of Wavefront's Advanced Visualizer manual, 3.0. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -15,8 +21,6 @@
 #include "mesh/attributes.h"
 #include "mesh/import_build.h"
 #include "mesh/obj.h"
-
-/* What both passes over an OBJ file share. */
 
 /* What the file says and the mesh does not have. */
 typedef struct obj_losses {
@@ -40,11 +44,6 @@ typedef struct obj_reading {
     obj_losses losses;
     ebpo_obj_names names;
 } obj_reading;
-
-/* EBPO_E_FORMAT, with the statement's line. */
-ebpo_status ebpo_obj_fail(const obj_reading *r, const char *format, ...) EBPO_PRINTF(2, 3);
-
-/* The second pass over an OBJ file. */
 
 static bool ends_line(char c) { return c == '\n' || c == '\r'; }
 
@@ -318,7 +317,9 @@ void ebpo_obj_names_free(ebpo_obj_names *names, ebpo_workspace *workspace)
 
 enum { RELEASE = 1 << 22 };
 
-ebpo_status ebpo_obj_fail(const obj_reading *r, const char *format, ...)
+/* EBPO_E_FORMAT, with the statement's line. */
+EBPO_PRINTF(2, 3)
+static ebpo_status fail_statement(const obj_reading *r, const char *format, ...)
 {
     char text[320];
     va_list args;
@@ -351,10 +352,10 @@ static ebpo_status fail_corner(const obj_reading *r, ebpo_obj_word word)
 {
     char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
-    return ebpo_obj_fail(r,
-                         "a face has the corner '%s', but it takes v, v/vt, v//vn or v/vt/vn; "
-                         "repair the file",
-                         text);
+    return fail_statement(r,
+                          "a face has the corner '%s', but it takes v, v/vt, v//vn or v/vt/vn; "
+                          "repair the file",
+                          text);
 }
 
 /* [+-] digits, up to `end` or a slash. */
@@ -383,16 +384,16 @@ static bool obj_faces_resolve(const obj_reading *r, ebpo_import_sort sort, uint6
 static ebpo_status obj_faces_fail_vertex(const obj_reading *r, int64_t number)
 {
     if (number > 0)
-        return ebpo_obj_fail(r,
-                             "a face names vertex %" PRId64 ", but there are %" PRIu64
-                             " vertices; repair the file or drop the face",
-                             number, r->build->vertices);
-    return number ? ebpo_obj_fail(r,
-                                  "a face names vertex %" PRId64 ", but only %" PRIu64
-                                  " stand before it; repair the file or drop the face",
-                                  number, r->rows[EBPO_IMPORT_COLOURS])
-                  : ebpo_obj_fail(r, "a face names vertex 0, but they count from 1; repair the "
-                                     "file");
+        return fail_statement(r,
+                              "a face names vertex %" PRId64 ", but there are %" PRIu64
+                              " vertices; repair the file or drop the face",
+                              number, r->build->vertices);
+    return number ? fail_statement(r,
+                                   "a face names vertex %" PRId64 ", but only %" PRIu64
+                                   " stand before it; repair the file or drop the face",
+                                   number, r->rows[EBPO_IMPORT_COLOURS])
+                  : fail_statement(r, "a face names vertex 0, but they count from 1; repair the "
+                                      "file");
 }
 
 static ebpo_status add_corner(obj_reading *r, const uint64_t total[EBPO_IMPORT_SORTS],
@@ -576,8 +577,8 @@ static ebpo_status obj_fail_vertex(const obj_reading *r, ebpo_obj_word word)
 {
     char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
-    return ebpo_obj_fail(r, "no number: '%s' in vertex %" PRIu64 "; repair the file", text,
-                         r->build->vertices + 1);
+    return fail_statement(r, "no number: '%s' in vertex %" PRIu64 "; repair the file", text,
+                          r->build->vertices + 1);
 }
 
 /* Homogeneous coordinates, as w is where it is no 1. */
@@ -623,10 +624,10 @@ static ebpo_status read_vertex(obj_reading *r)
     double xyz[3];
     int n = read_words(r, word), bad;
     if (n < 3)
-        return ebpo_obj_fail(r,
-                             "vertex %" PRIu64 " has %d coordinates, not three; write z as well "
-                             "(0 in a plane), or repair the file",
-                             r->build->vertices + 1, n);
+        return fail_statement(r,
+                              "vertex %" PRIu64 " has %d coordinates, not three; write z as well "
+                              "(0 in a plane), or repair the file",
+                              r->build->vertices + 1, n);
     if (!read_position(r, word, xyz, &bad))
         return obj_fail_vertex(r, word[bad]);
     ebpo_status status = n == 4 ? obj_divide(r, word, xyz) : EBPO_OK;

@@ -18,7 +18,7 @@
 #include "mesh/attributes.h"
 #include "mesh/import_build.h"
 
-/* The words of an OFF file. */
+/* --- words --- */
 
 typedef struct off_text {
     const char *at, *end;
@@ -29,15 +29,6 @@ typedef struct off_word {
     const char *s;
     size_t n;
 } off_word;
-
-/* The next word, past comments and ends of lines; false at the end of the file. */
-bool ebpo_off_next(off_text *t, off_word *word);
-
-/* The next word of this line; false at its end. */
-bool ebpo_off_next_here(off_text *t, off_word *word);
-
-/* Lines that have words, from the next line on. */
-uint64_t ebpo_off_lines(const off_text *t);
 
 static bool ends_line(char c) { return c == '\n' || c == '\r'; }
 
@@ -51,7 +42,8 @@ static bool begins_comment(const char *word, const char *at, const char *end)
                            at[1] && strchr("IQS", at[1]));
 }
 
-bool ebpo_off_next_here(off_text *t, off_word *word)
+/* The next word of this line; false at its end. */
+static bool next_word_here(off_text *t, off_word *word)
 {
     while (t->at < t->end && is_blank(*t->at))
         t->at++;
@@ -76,26 +68,28 @@ static bool next_line(off_text *t)
     return true;
 }
 
-bool ebpo_off_next(off_text *t, off_word *word)
+/* The next word, past comments and ends of lines; false at the end of the file. */
+static bool next_word(off_text *t, off_word *word)
 {
-    while (!ebpo_off_next_here(t, word))
+    while (!next_word_here(t, word))
         if (!next_line(t))
             return false;
     return true;
 }
 
-uint64_t ebpo_off_lines(const off_text *t)
+/* Lines that have words, from the next line on. */
+static uint64_t count_lines(const off_text *t)
 {
     off_text ahead = *t;
     off_word word;
     uint64_t lines = 0;
     do {
-        while (ebpo_off_next_here(&ahead, &word))
+        while (next_word_here(&ahead, &word))
             continue;
         if (!next_line(&ahead))
             return lines;
         off_text line = ahead;
-        lines += ebpo_off_next_here(&line, &word);
+        lines += next_word_here(&line, &word);
     } while (true);
 }
 
@@ -169,7 +163,7 @@ static bool has_off_word(const uint8_t *data, uint64_t size)
 {
     off_text t = { (const char *)data + ebpo_text_mark(data, size), (const char *)data + size, 1 };
     off_word word;
-    bool dimension, found = ebpo_off_next(&t, &word) && t.at < t.end;
+    bool dimension, found = next_word(&t, &word) && t.at < t.end;
     size_t length = found ? read_kind(word, NULL, &dimension) : 0;
     return length && memcmp(word.s + length - 3, "OFF", 3) == 0;
 }
@@ -198,9 +192,8 @@ static void read_edges(off_reading *r)
     off_text ahead = r->text;
     off_word word, none;
     uint64_t edges;
-    bool same_line = ebpo_off_next_here(&ahead, &word);
-    bool found =
-        same_line || (ebpo_off_next(&ahead, &word) && !(ebpo_off_next_here(&ahead, &none)));
+    bool same_line = next_word_here(&ahead, &word);
+    bool found = same_line || (next_word(&ahead, &word) && !(next_word_here(&ahead, &none)));
     if (found && read_count(word, &edges))
         r->text = ahead;
 }
@@ -211,9 +204,9 @@ static ebpo_status find_rows(off_reading *r)
 {
     off_text here = r->text;
     off_word word;
-    uint64_t lines = ebpo_off_lines(&r->text), rows = r->vertices + r->faces;
+    uint64_t lines = count_lines(&r->text), rows = r->vertices + r->faces;
     r->rows = lines == rows ? ROW_A_LINE : lines > rows ? ROWS_OVER_LINES : ROWS_ANYHOW;
-    if (r->rows != ROWS_ANYHOW && ebpo_off_next_here(&here, &word))
+    if (r->rows != ROWS_ANYHOW && next_word_here(&here, &word))
         return fail_counts(r);
     return EBPO_OK;
 }
@@ -222,14 +215,14 @@ static ebpo_status read_head(off_reading *r)
 {
     off_word word;
     bool dimension = false;
-    if (!ebpo_off_next(&r->text, &word))
+    if (!next_word(&r->text, &word))
         return off_fail(r, "the file is empty; there is no mesh in it");
     off_text behind = r->text;
     size_t named = read_kind(word, r, &dimension);
     if (named) {
         off_word next;
         r->text.at = word.s + named;
-        bool more = ebpo_off_next(&r->text, &next);
+        bool more = next_word(&r->text, &next);
         if (more && next.n == 6 && strncasecmp(next.s, "BINARY", 6) == 0)
             return ebpo_fail_file(r->build->error, EBPO_E_UNSUPPORTED, r->build->name,
                                   "is a binary OFF file; save it as text, or as PLY");
@@ -247,7 +240,7 @@ static ebpo_status read_head(off_reading *r)
                    ? fail_counts(r)
                    : off_fail(r, "neither the word OFF nor counts stand there; this is not an OFF "
                                  "file that can be read");
-    if (!ebpo_off_next(&r->text, &word) || !read_count(word, &r->faces))
+    if (!next_word(&r->text, &word) || !read_count(word, &r->faces))
         return fail_counts(r);
     read_edges(r);
     if (r->vertices > r->size / 6 || r->faces > r->size / 2)
@@ -272,8 +265,8 @@ static void let_go(off_reading *r)
 /* A word that the row has to have. `first`: it may stand on a line of its own. */
 static bool next_needed(off_reading *r, bool first, off_word *word)
 {
-    return first || r->rows != ROW_A_LINE ? ebpo_off_next(&r->text, word)
-                                          : ebpo_off_next_here(&r->text, word);
+    return first || r->rows != ROW_A_LINE ? next_word(&r->text, word)
+                                          : next_word_here(&r->text, word);
 }
 
 /* What else the line has; where lines have several rows, that is the next ones. */
@@ -281,7 +274,7 @@ static void take_rest(off_reading *r)
 {
     off_word word;
     r->rest_count = 0;
-    while (r->rows != ROWS_ANYHOW && ebpo_off_next_here(&r->text, &word))
+    while (r->rows != ROWS_ANYHOW && next_word_here(&r->text, &word))
         if (r->rest_count < MOST_REST)
             r->rest[r->rest_count++] = word;
 }
@@ -347,7 +340,7 @@ static ebpo_status take_rest_anyhow(off_reading *r, uint64_t row)
         return EBPO_OK;
     }
     for (r->rest_count = 0; r->rest_count < wanted; r->rest_count++)
-        if (!ebpo_off_next(&r->text, &r->rest[r->rest_count]))
+        if (!next_word(&r->text, &r->rest[r->rest_count]))
             return fail_end(r, "vertex", row + 1);
     return EBPO_OK;
 }
@@ -502,7 +495,7 @@ static ebpo_status read_rows(off_reading *r)
     for (uint64_t i = 0; i < r->faces && status == EBPO_OK; i++, let_go(r))
         status = read_face(r, i);
     if (status == EBPO_OK)
-        r->more = ebpo_off_next(&r->text, &word);
+        r->more = next_word(&r->text, &word);
     if (status == EBPO_OK && r->more && r->rows == ROWS_ANYHOW)
         status = off_fail(r, "there is more behind the last face, though lines have several rows; "
                              "repair the counts");

@@ -1,3 +1,7 @@
+/* Turning faces so that neighbours agree. Faces joined by edges with two faces form patches, of
+ * which one decides the direction of all; edges with more than two faces are paired by the angle
+ * around them. Each closed patch is then turned outwards, or inwards where it bounds a cavity
+ * (shell_nesting.c). Decisions are exact, and do not depend on threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>

@@ -1,4 +1,5 @@
-/* Properties become arrays of attributes; see ply_parts.h. */
+/* Properties of a PLY file's elements that are neither positions nor corners become arrays of
+ * attributes: numbers and lists, each in the type that the file gives it (ply_parts.h). */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

@@ -1,3 +1,8 @@
+/* The body of a binary PLY file, of either byte order. Rows of one size are read on all cores; the
+ * others row by row, which also says what is wrong with a row. Positions become those of the mesh,
+ * faces are divided into triangles, other properties go to the attributes.
+ *
+ * Source: Greg Turk, "The PLY Polygon File Format", 1994. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -10,9 +15,9 @@
 #include "core/parallel.h"
 #include "mesh/ply_parts.h"
 
-/* The numbers of a binary body, of either byte order. */
+/* --- numbers --- */
 
-static inline uint64_t ebpo_ply_load(const uint8_t *at, unsigned bytes, bool swap)
+static inline uint64_t load_raw(const uint8_t *at, unsigned bytes, bool swap)
 {
     uint8_t b1;
     uint16_t b2;
@@ -26,9 +31,9 @@ static inline uint64_t ebpo_ply_load(const uint8_t *at, unsigned bytes, bool swa
     }
 }
 
-static inline int64_t ebpo_ply_load_integer(const uint8_t *at, ebpo_ply_type type, bool swap)
+static inline int64_t load_integer(const uint8_t *at, ebpo_ply_type type, bool swap)
 {
-    uint64_t raw = ebpo_ply_load(at, ebpo_ply_type_bytes(type), swap);
+    uint64_t raw = load_raw(at, ebpo_ply_type_bytes(type), swap);
     switch (type) {
     case EBPO_PLY_INT8: return (int8_t)raw;
     case EBPO_PLY_INT16: return (int16_t)raw;
@@ -37,23 +42,9 @@ static inline int64_t ebpo_ply_load_integer(const uint8_t *at, ebpo_ply_type typ
     }
 }
 
-/* The value of an x, y or z at `at` becomes that of vertex `row`. */
-void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ebpo_ply_property *property,
-                               const uint8_t *at, bool swap);
-
-/* Rows of one size, on all cores. */
-
-/* Reads the rows from p->at on as far as all have one size, and says how many these were: all
- * vertices or none; the faces before the first that is no triangle, or names a vertex that is not
- * there. The others, and what is wrong with them, are the row by row reader's. */
-ebpo_status ebpo_ply_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_element *element, bool swap,
-                                    uint64_t *done);
-ebpo_status ebpo_ply_plain_faces(ebpo_ply_parser *p, const ebpo_ply_element *element, bool swap,
-                                 uint64_t *done);
-
 static float load_float(const uint8_t *at, bool swap)
 {
-    uint32_t raw = (uint32_t)ebpo_ply_load(at, 4, swap);
+    uint32_t raw = (uint32_t)load_raw(at, 4, swap);
     float value;
     memcpy(&value, &raw, sizeof value);
     return value;
@@ -64,27 +55,25 @@ static double load_number(const uint8_t *at, ebpo_ply_type type, bool swap)
     if (type == EBPO_PLY_FLOAT32)
         return (double)load_float(at, swap);
     if (type != EBPO_PLY_FLOAT64)
-        return (double)ebpo_ply_load_integer(at, type, swap);
-    uint64_t raw = ebpo_ply_load(at, 8, swap);
+        return (double)load_integer(at, type, swap);
+    uint64_t raw = load_raw(at, 8, swap);
     double value;
     memcpy(&value, &raw, sizeof value);
     return value;
 }
 
 /* Floats go through as bits: not even the payload of a NaN changes. */
-void ebpo_ply_store_coordinate(ebpo_mesh *mesh, uint64_t row, const ebpo_ply_property *property,
-                               const uint8_t *at, bool swap)
+static void store_coordinate(ebpo_mesh *mesh, uint64_t row, const ebpo_ply_property *property,
+                             const uint8_t *at, bool swap)
 {
     uint64_t place = 3 * row + (uint64_t)(property->role - EBPO_PLY_ROLE_X);
     if (mesh->xyz64) {
         mesh->xyz64[place] = load_number(at, property->type, swap);
     } else {
-        uint32_t raw = (uint32_t)ebpo_ply_load(at, 4, swap);
+        uint32_t raw = (uint32_t)load_raw(at, 4, swap);
         memcpy(&mesh->xyz32[place], &raw, sizeof raw);
     }
 }
-
-/* The body of a binary PLY file, of either byte order. */
 
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
 enum { FOREIGN = EBPO_PLY_BIG };
@@ -111,7 +100,7 @@ static ebpo_status store_corners(rows *r, const ebpo_ply_property *property, uin
     bool strips = r->element->kind == EBPO_PLY_KIND_STRIPS;
     unsigned bytes = ebpo_ply_type_bytes(property->type);
     for (uint64_t i = 0; i < count; i++) {
-        int64_t index = ebpo_ply_load_integer(p->data + p->at + i * bytes, property->type, r->swap);
+        int64_t index = load_integer(p->data + p->at + i * bytes, property->type, r->swap);
         if (strips && (index == -1 || index == UINT32_MAX)) {
             p->corners[i] = EBPO_PLY_RESTART;
         } else if ((uint64_t)index >= vertices) {
@@ -133,7 +122,7 @@ static ebpo_status store_list(rows *r, const ebpo_ply_property *property, uint64
     ebpo_status status = ebpo_ply_put_list(p, property, r->to, count, &items);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         ebpo_ply_store_bits(items + i * bytes, bytes,
-                            ebpo_ply_load(p->data + p->at + i * bytes, bytes, r->swap));
+                            load_raw(p->data + p->at + i * bytes, bytes, r->swap));
     return status;
 }
 
@@ -144,7 +133,7 @@ static ebpo_status read_list(rows *r, const ebpo_ply_property *property)
              bytes = ebpo_ply_type_bytes(property->type);
     if (p->size - p->at < count_bytes)
         return ebpo_ply_fail_end(p, r->element, r->row);
-    int64_t count = ebpo_ply_load_integer(p->data + p->at, property->count_type, r->swap);
+    int64_t count = load_integer(p->data + p->at, property->count_type, r->swap);
     if (count < 0)
         return ebpo_ply_fail(p,
                              "%s %" PRIu64 " has a list of %" PRId64 " items; the file is damaged",
@@ -189,9 +178,9 @@ static ebpo_status read_row(rows *r)
         if (p->size - p->at < bytes)
             return ebpo_ply_fail_end(p, r->element, r->row);
         if (r->store && property->role != EBPO_PLY_ROLE_NONE)
-            ebpo_ply_store_coordinate(p->mesh, r->row, property, p->data + p->at, r->swap);
+            store_coordinate(p->mesh, r->row, property, p->data + p->at, r->swap);
         else if (r->store && ebpo_ply_is_attribute(property))
-            ebpo_ply_put_value(p, property, r->to, ebpo_ply_load(p->data + p->at, bytes, r->swap));
+            ebpo_ply_put_value(p, property, r->to, load_raw(p->data + p->at, bytes, r->swap));
         p->at += bytes;
     }
     if (r->store && r->element->kind == EBPO_PLY_KIND_FACE)
@@ -214,6 +203,11 @@ static ebpo_status step_over(rows *r)
     return EBPO_OK;
 }
 
+static ebpo_status read_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_element *element,
+                                       bool swap, uint64_t *done);
+static ebpo_status read_plain_faces(ebpo_ply_parser *p, const ebpo_ply_element *element, bool swap,
+                                    uint64_t *done);
+
 ebpo_status ebpo_ply_binary_element(ebpo_ply_parser *p, const ebpo_ply_element *element, bool store)
 {
     rows r = { .p = p,
@@ -224,9 +218,9 @@ ebpo_status ebpo_ply_binary_element(ebpo_ply_parser *p, const ebpo_ply_element *
         return step_over(&r);
     ebpo_status status = EBPO_OK;
     if (r.store && (element->kind == EBPO_PLY_KIND_VERTEX || element->kind == EBPO_PLY_KIND_OTHER))
-        status = ebpo_ply_plain_vertices(p, element, r.swap, &r.row);
+        status = read_plain_vertices(p, element, r.swap, &r.row);
     else if (r.store && element->kind == EBPO_PLY_KIND_FACE)
-        status = ebpo_ply_plain_faces(p, element, r.swap, &r.row);
+        status = read_plain_faces(p, element, r.swap, &r.row);
     for (; r.row < element->count && status == EBPO_OK; r.row++) {
         status = read_row(&r);
         if (status == EBPO_OK && ebpo_ply_report_due(p))
@@ -265,7 +259,7 @@ static void ply_binary_put(const plain *t, const ebpo_ply_property *property, ui
 {
     if (ebpo_ply_is_attribute(property))
         ebpo_ply_put_value(t->p, property, row,
-                           ebpo_ply_load(at, ebpo_ply_type_bytes(property->type), t->swap));
+                           load_raw(at, ebpo_ply_type_bytes(property->type), t->swap));
 }
 
 static ebpo_status ply_binary_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -278,7 +272,7 @@ static ebpo_status ply_binary_vertices(void *context, uint64_t begin, uint64_t e
     for (uint64_t row = begin; row < end; row++)
         for (uint64_t i = 0; i < t->element->properties; i++) {
             if (property[i].role != EBPO_PLY_ROLE_NONE)
-                ebpo_ply_store_coordinate(t->p->mesh, row, &property[i], at, t->swap);
+                store_coordinate(t->p->mesh, row, &property[i], at, t->swap);
             else
                 ply_binary_put(t, &property[i], row, at);
             at += ebpo_ply_type_bytes(property[i].type);
@@ -320,9 +314,9 @@ static ebpo_status ply_binary_faces(void *context, uint64_t begin, uint64_t end,
     uint32_t *face = t->p->mesh->faces + 3 * (t->first + begin);
     for (uint64_t row = begin; row < end; row++, at += t->row_bytes) {
         for (unsigned k = 0; k <= 3; k++) {
-            int64_t value = k ? ebpo_ply_load_integer(at + count_bytes + (k - 1) * bytes,
-                                                      t->corners->type, t->swap)
-                              : ebpo_ply_load_integer(at, t->corners->count_type, t->swap);
+            int64_t value =
+                k ? load_integer(at + count_bytes + (k - 1) * bytes, t->corners->type, t->swap)
+                  : load_integer(at, t->corners->count_type, t->swap);
             if (k ? (uint64_t)value >= count : value != 3)
                 return ply_binary_deviate(t, row);
             if (k)
@@ -367,8 +361,11 @@ static ebpo_status ply_binary_run(plain *t, ebpo_task_fn task)
     return status == EBPO_E_CANCELLED ? ebpo_ply_fail_stopped(p) : status;
 }
 
-ebpo_status ebpo_ply_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_element *element, bool swap,
-                                    uint64_t *done)
+/* Reads the rows from p->at on as far as all have one size, and says how many these were: all
+ * vertices or none; the faces before the first that is no triangle, or names a vertex that is not
+ * there. The others, and what is wrong with them, are the row by row reader's. */
+static ebpo_status read_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_element *element,
+                                       bool swap, uint64_t *done)
 {
     plain t = { .p = p, .element = element, .row_bytes = element->row_bytes, .swap = swap };
     *done = 0;
@@ -383,8 +380,8 @@ ebpo_status ebpo_ply_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_element *
     return status;
 }
 
-ebpo_status ebpo_ply_plain_faces(ebpo_ply_parser *p, const ebpo_ply_element *element, bool swap,
-                                 uint64_t *done)
+static ebpo_status read_plain_faces(ebpo_ply_parser *p, const ebpo_ply_element *element, bool swap,
+                                    uint64_t *done)
 {
     plain t = { .p = p, .element = element, .swap = swap, .deviates = element->count };
     *done = 0;

@@ -44,10 +44,7 @@ typedef struct ply_layout {
     size_t header_bytes;
 } ply_layout;
 
-/* `mesh` has been checked. */
-EBPO_MUST_USE ebpo_status ebpo_ply_layout_make(ply_layout *out, const ebpo_mesh *mesh,
-                                               ebpo_error *error);
-void ebpo_ply_layout_free(ply_layout *layout);
+static void free_layout(ply_layout *layout);
 
 typedef struct making {
     ply_layout *out;
@@ -386,7 +383,8 @@ static bool make_as_source(making *m)
 
 /* --- either --- */
 
-ebpo_status ebpo_ply_layout_make(ply_layout *out, const ebpo_mesh *mesh, ebpo_error *error)
+/* `mesh` has been checked. */
+static ebpo_status make_layout(ply_layout *out, const ebpo_mesh *mesh, ebpo_error *error)
 {
     ebpo_text_stream header;
     *out = (ply_layout){ .element = NULL };
@@ -409,11 +407,11 @@ ebpo_status ebpo_ply_layout_make(ply_layout *out, const ebpo_mesh *mesh, ebpo_er
     free(m.taken);
     if (!m.no_memory)
         return EBPO_OK;
-    ebpo_ply_layout_free(out);
+    free_layout(out);
     return ebpo_fail_memory(error, sizeof *out);
 }
 
-void ebpo_ply_layout_free(ply_layout *layout)
+static void free_layout(ply_layout *layout)
 {
     free(layout->element);
     free(layout->property);
@@ -560,7 +558,7 @@ ebpo_status ebpo_mesh_write_ply(const ebpo_mesh *mesh, const char *path, ebpo_er
     writing w = { .mesh = mesh, .layout = &layout };
     ebpo_status status = ply_write_check(mesh, error);
     if (status == EBPO_OK)
-        status = ebpo_ply_layout_make(&layout, mesh, error);
+        status = make_layout(&layout, mesh, error);
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&out, path, error);
     if (status != EBPO_OK)
@@ -579,7 +577,7 @@ ebpo_status ebpo_mesh_write_ply(const ebpo_mesh *mesh, const char *path, ebpo_er
     status = ebpo_publish_commit(&out, error);
 done:
     ebpo_publish_abort(&out);
-    ebpo_ply_layout_free(&layout);
+    free_layout(&layout);
     free(w.buffer);
     return status;
 }

@@ -1,4 +1,7 @@
-/* The samples of what may be within a host, in a tree, and each of its faces against it. */
+/* Nesting of closed shells: which shell lies within which, and turning each so that it points
+ * outwards, or inwards where it bounds a cavity. Samples of all shells stand in a tree of boxes.
+ * Near the faces of a host each sample is decided by probes; in crowded hosts by rays. Decisions
+ * are exact (geometry/predicates.h), so the result does not depend on threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -13,10 +16,6 @@
 #include "core/workspace.h"
 #include "geometry/predicates.h"
 #include "mesh/shell_nesting.h"
-
-/* What is within hosts that are not crowded. */
-
-/* What is within crowded hosts. */
 
 /* Of one thread: what may be within the host that it looks at. */
 typedef struct seeker {

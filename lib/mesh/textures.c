@@ -1,3 +1,7 @@
+/* Image files that a source names, kept in the file: a row of the element `ebpo:texture` for each,
+ * with its name and its bytes (format-spec/README.md, "Attributes"). Names come from comments of a
+ * PLY file and from the material libraries of an OBJ file; files are looked for beside the source
+ * only, and one that is missing, too large or no image is reported and left out. */
 #include "core/strict_fp.h"
 
 #include <errno.h>

@@ -41,8 +41,8 @@ typedef struct ebpo_catalogue_entry {
     /* Of a part: what distances and rays see, which has no caps. NULL: the same model. */
     const char *surface;
 
-    /* Of a part: a .npy of integers, the numbers in the whole of the surface's faces. NULL: faces
-     * keep their numbers. */
+    /* Of a part: a .npy of integers, the numbers in the whole of the surface's faces; not empty.
+     * NULL: faces keep their numbers. */
     const char *numbers;
 
     /* content_sha256 of the two files. */
@@ -74,7 +74,10 @@ typedef struct ebpo_catalogue_entry {
 typedef ebpo_status (*ebpo_catalogue_open_fn)(void *user, const char *path, ebpo_file **out,
                                               ebpo_error *error);
 
-/* Closes it, in any thread. */
+/*
+ * Closes it, in any thread. It must not call a function of the same ebpo_catalogue_models, whose
+ * lock is held meanwhile.
+ */
 typedef void (*ebpo_catalogue_close_fn)(void *user, ebpo_file *file);
 
 typedef struct ebpo_catalogue_options {
@@ -321,6 +324,7 @@ typedef struct ebpo_catalogue_ask_options {
  *
  * Of parts the answer is exactly the whole's, also on caps: inside is what the rule says of the
  * sum. EBPO_E_LIMIT: 64 rays from a point on a cap all meet edges (nobody has seen that).
+ * EBPO_E_ABSENT: a point is on a cap, and the catalogue has no surface of any part.
  *
  * EBPO_E_NOT_SOLID: a model is a surface.
  *
