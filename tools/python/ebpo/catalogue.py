@@ -226,23 +226,33 @@ def interruptible(work: Callable[[Any], None], rows: int) -> None:
     if rows < LONG or threading.current_thread() is not threading.main_thread():
         work(c.ebpo_progress())
         return
-    stopped, failed = threading.Event(), []
+    stopped, ended, once, failed = threading.Event(), threading.Event(), threading.Lock(), []
 
     def body() -> None:
+        if not once.acquire(blocking=False):  # an interrupt of start() may have it called again
+            return
         try:
             work(progress)
         except BaseException as error:
             failed.append(error)
+        finally:
+            ended.set()
 
+    # Not Thread.join: once interrupted, it takes a running thread for one that has ended, and the library
+    # would go on in memory that is freed.
+    interrupt = None
     with Reporter(lambda *_: not stopped.is_set()) as progress:
-        thread = threading.Thread(target=body, daemon=True)
-        thread.start()
-        try:
-            thread.join()
-        except BaseException:
-            stopped.set()
-            thread.join()
-            raise
+        while not ended.is_set():
+            try:
+                if not once.locked():
+                    thread = threading.Thread(target=body, daemon=True)
+                    thread.start()
+                ended.wait()
+            except KeyboardInterrupt as error:
+                stopped.set()
+                interrupt = error
+    if interrupt:
+        raise interrupt
     if failed:
         raise failed[0]
 
