@@ -26,6 +26,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
+#include "core/hash.h"
 
 /* Some millions of models; more would be read into many times as much memory. */
 enum { MOST_BYTES = 1 << 30, DIGEST_LETTERS = 64 };
@@ -421,14 +422,6 @@ static ebpo_status parse_text(reader *r, const char *text, size_t size)
     return status;
 }
 
-static uint64_t hash_text(const char *text, size_t size)
-{
-    uint64_t hash = UINT64_C(0xcbf29ce484222325);
-    for (size_t i = 0; i < size; i++)
-        hash = (hash ^ (unsigned char)text[i]) * UINT64_C(0x100000001b3);
-    return hash;
-}
-
 /* The file's text, of c->file_bytes, to be freed. Pipes are not waited for. */
 static ebpo_status read_text(ebpo_catalogue *c, char **text, ebpo_error *error)
 {
@@ -469,7 +462,7 @@ static ebpo_status read_file(ebpo_catalogue *c, const char *path, ebpo_error *er
     ebpo_status status = c->path && r.folder ? read_text(c, &text, error)
                                              : ebpo_fail_memory(error, strlen(path) + 1);
     if (status == EBPO_OK) {
-        c->file_hash = hash_text(text, (size_t)c->file_bytes);
+        c->file_hash = ebpo_hash_bytes(EBPO_HASH_BYTES_BEGIN, text, (size_t)c->file_bytes);
         status = parse_text(&r, text, (size_t)c->file_bytes);
     }
     free(text);

@@ -23,6 +23,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
+#include "core/hash.h"
 #include "query/query_model.h"
 
 /* Rays that are tried before a point is given up. */
@@ -123,22 +124,13 @@ static ebpo_status ask_crossings(ebpo_context *context, const ebpo_catalogue_hel
     return status;
 }
 
-/* Numbers that look like chance (splitmix64), always the same ones. */
-static double random_between(uint64_t *state)
-{
-    uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-    return (double)((z ^ z >> 31) >> 11) * 0x1p-52 - 1;
-}
-
 /* One ray from each of the points that are left. */
 static ebpo_status cast_rays(const ebpo_catalogue_asker *a, doubtful *d, uint64_t *state,
                              ebpo_error *error)
 {
     double direction[3];
     for (int k = 0; k < 3; k++)
-        direction[k] = random_between(state);
+        direction[k] = 2 * ebpo_random_unit(ebpo_random_next(state)) - 1;
     for (uint32_t i = 0; i < d->count; i++) {
         double *row = d->rows + (size_t)7 * i;
         memcpy(row + 3, direction, sizeof direction);

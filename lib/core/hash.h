@@ -4,6 +4,7 @@
 #ifndef EBPO_CORE_HASH_H
 #define EBPO_CORE_HASH_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 /* All bits of the key show in the low bits, those that choose the slot. */
@@ -16,6 +17,15 @@ static inline uint64_t ebpo_hash_number(uint64_t key)
 static inline uint64_t ebpo_hash_three(const uint64_t key[3])
 {
     return ebpo_hash_number(ebpo_hash_number(ebpo_hash_number(key[0]) + key[1]) + key[2]);
+}
+
+/* FNV-1a of bytes, continued from `hash`, which is EBPO_HASH_BYTES_BEGIN for the first ones. */
+#define EBPO_HASH_BYTES_BEGIN UINT64_C(0xcbf29ce484222325)
+static inline uint64_t ebpo_hash_bytes(uint64_t hash, const void *bytes, size_t size)
+{
+    for (size_t i = 0; i < size; i++)
+        hash = (hash ^ ((const uint8_t *)bytes)[i]) * UINT64_C(0x100000001b3);
+    return hash;
 }
 
 /* The number of slots: the least power of two that is not below `least`, and 16 at least. A table

@@ -22,6 +22,7 @@
 #include <ebpo/base.h>
 
 #include "core/error.h"
+#include "core/hash.h"
 #include "io/file_source.h"
 #include "io/unfinished.h"
 
@@ -118,9 +119,7 @@ static uint32_t system_number(void)
         close(fd);
     if (size < 32 || stat("/proc/self/ns/pid", &space) != 0)
         return 0;
-    uint64_t sum = 0xcbf29ce484222325u ^ space.st_ino; /* FNV-1a */
-    for (ssize_t i = 0; i < size; i++)
-        sum = (sum ^ (uint8_t)start[i]) * 0x100000001b3u;
+    uint64_t sum = ebpo_hash_bytes(EBPO_HASH_BYTES_BEGIN ^ space.st_ino, start, (size_t)size);
     return (uint32_t)(sum ^ sum >> 32);
 }
 

@@ -228,12 +228,15 @@ class Holdings(Case):
 class Interrupts(Case):
     def test_long_questions_end_at_once(self):
         catalogue, p = Catalogue.of(spheres()), points(3_000_000, seed=1, reach=2)
-        began = time.monotonic()
+        before, began = len(os.listdir("/proc/self/task")), time.monotonic()
         timer = threading.Timer(.5, os.kill, (os.getpid(), signal.SIGINT))
         timer.start()
         with self.assertRaises(KeyboardInterrupt):
             catalogue.distance(p)
         self.assertLess(time.monotonic() - began, 10)
+        timer.join()
+        # no thread is left that would write into arrays that are freed
+        self.assertEqual(len(os.listdir("/proc/self/task")), before)
 
 
 class Hostile(Case):

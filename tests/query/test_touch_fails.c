@@ -1,6 +1,7 @@
 /* A model in parts whose source fails for good while a hand is moved: each kind of hand is told
  * in its ticks that loading has stopped, and why when it asks. */
 #include <ebpo/touch.h>
+#include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +14,8 @@
 typedef struct line {
     uint8_t *data;
     uint64_t size;
-    atomic_bool down; /* the loader reads in a thread of its own */
+    pthread_t hand;          /* the thread of the ticks; the loader reads in one of its own */
+    atomic_bool waits, down; /* the loader waits; all reads fail */
     atomic_int refused;
 } line;
 
@@ -21,6 +23,9 @@ static ebpo_status read_line(void *user, uint64_t offset, uint64_t size, void *d
                              ebpo_error *error)
 {
     line *l = user;
+    /* Else the loader may have read all that the hand will need before the line is down. */
+    while (atomic_load(&l->waits) && !pthread_equal(pthread_self(), l->hand))
+        nanosleep(&(struct timespec){ .tv_nsec = 300000 }, NULL);
     if (atomic_load(&l->down)) {
         atomic_fetch_add(&l->refused, 1);
         error->status = EBPO_E_IO;
@@ -77,6 +82,8 @@ START_TEST(a_source_that_fails_is_told_in_ticks)
     open_line(&l, m.path, &file);
     parts.cut_level = 2;
     ASSERT_OK(ebpo_model_new(file, &parts, &model, error));
+    l.hand = pthread_self();
+    atomic_store(&l.waits, true);
     o.kind = kind;
     o.look = 0.5;
     o.radius = kind == EBPO_TOUCH_BALL ? 0.1 : 0;
@@ -86,6 +93,7 @@ START_TEST(a_source_that_fails_is_told_in_ticks)
     ck_assert_uint_eq(tick_of(touch, kind, far) & EBPO_TOUCH_STOPPED, 0);
     ck_assert_int_eq(ebpo_touch_check(touch, &why), EBPO_OK);
     atomic_store(&l.down, true);
+    atomic_store(&l.waits, false);
     for (int i = 0; !(tick_of(touch, kind, near) & EBPO_TOUCH_STOPPED); i++) {
         ck_assert_msg(i < 20000, "nothing is told; %d reads failed", atomic_load(&l.refused));
         nanosleep(&(struct timespec){ .tv_nsec = 300000 }, NULL);
