@@ -1,7 +1,7 @@
 #!/bin/sh
 # Builds the project and runs its tests, and stops at the first failure. Warnings are errors.
-#   tests/run.sh         what CI runs, in at most 15 minutes on two cores
-#   tests/run.sh quick   gcc alone and few inputs, in at most 3 minutes: while you work
+#   tests/run.sh         what CI runs
+#   tests/run.sh quick   gcc alone and few inputs: while you work
 #   tests/run.sh full    every check in every build, with all inputs: before a release
 #   tests/run.sh [quick|full] BUILD...   only these builds of the tier
 # Builds: gcc; clang; sanitize (gcc with address and undefined); undefined (clang); thread; memory (the fuzz
