@@ -13,7 +13,7 @@ tier=default
 case "${1:-}" in quick | full) tier=$1 && shift ;; esac
 [ $# -gt 0 ] || case $tier in
 quick) set -- gcc ;;
-default) set -- gcc sanitize thread memory ;;
+default) set -- gcc sanitize thread ;;
 full) set -- gcc clang sanitize undefined thread memory posix ;;
 esac
 
@@ -26,8 +26,9 @@ plan() { # build
     full-clang | full-sanitize | full-undefined) echo "0.2" ;;
     default-gcc) echo "0.05 full viewer" ;;
     default-clang) echo "0.1 full once costly viewer calls" ;;
-    default-sanitize | default-undefined) echo "0.02 full once costly viewer calls" ;;
-    *-thread | *-memory) echo "1" ;; # one suite
+    default-sanitize | default-undefined) echo "0.02 full once costly slow viewer calls" ;;
+    full-thread | *-memory) echo "1" ;; # one suite
+    *-thread) echo "0.3" ;;
     *-posix) echo "0.1" ;;           # the tests that are named here
     esac
 }
