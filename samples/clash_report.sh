@@ -11,10 +11,10 @@ samples=$(dirname "$0")
 python3 "$samples/many_parts.py" "$folder" "$parts"
 cd "$folder"
 for out in clashes.html clashes.h5; do
-    ebpo scene report --quiet --from 0 --to 10 --step 0.5 --count --places --depth 0.01 \
+    ebpo scene report --quiet --from 0 --to 10 --step 0.5 --count --locations --depth 0.01 \
         --output $out plant.scene.json
 done
 ebpo scene report --quiet --from 0 --to 10 --step 1.25 --output clashes.png plant.scene.json
-ebpo scene report --quiet --from 0 --to 10 --step 0.5 --places --depth 0.01 --csv \
+ebpo scene report --quiet --from 0 --to 10 --step 0.5 --locations --depth 0.01 --csv \
     plant.scene.json >clashes.csv
 ls clashes.*

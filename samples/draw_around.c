@@ -1,6 +1,6 @@
-/* The real faces around a point, of a model of any size, from a disk or by HTTP: reads the subtree
- * of the cell of a level that the point is in, and writes its faces as PLY. Of 28 million faces
- * below level 6 a cell has about 2,000.
+/* Writes the faces around a point as PLY, for a model of any size, from a disk or by HTTP: reads
+ * the subtree of the cell that contains the point. In a model of 28 million faces, a cell of level
+ * 6 has about 2,000.
  *
  *     draw_around FILE.ebpo.h5|URL X Y Z LEVEL OUT.ply
  *     cc draw_around.c $(pkg-config --cflags --libs ebpo) */
@@ -11,8 +11,8 @@
 
 static bool write_faces(const ebpo_subtree_faces *faces, const char *path, ebpo_error *error)
 {
-    /* Lent, so that it is not freed. The members are not const, and ebpo_mesh_write_ply leaves them
-     * alone. */
+    /* Lent, so it is not freed. The members are not const, but ebpo_mesh_write_ply does not change
+     * them. */
     ebpo_mesh mesh = { .vertex_count = faces->vertex_count,
                        .face_count = faces->face_count,
                        .xyz32 = (float *)faces->xyz32,
@@ -21,15 +21,15 @@ static bool write_faces(const ebpo_subtree_faces *faces, const char *path, ebpo_
     return ebpo_mesh_write_ply(&mesh, path, error) == EBPO_OK;
 }
 
-static void tell(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
-                 const ebpo_subtree_faces *faces)
+static void report(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
+                   const ebpo_subtree_faces *faces)
 {
     ebpo_file_stats stats = EBPO_FILE_STATS_INIT;
     ebpo_file_get_stats(file, &stats);
     printf("node %" PRIu64 " of level %d: %" PRIu64 " nodes below it, %" PRIu64 " faces, %" PRIu64
            " of them shared with subtrees before it; %" PRIu64 " of %" PRIu64 " bytes read\n",
            nodes->octcodes[0], nodes->level, nodes->node_count - 1, faces->face_count,
-           faces->outer_count, stats.bytes_read, ebpo_file_info(file)->file_bytes);
+           faces->shared_count, stats.bytes_read, ebpo_file_info(file)->file_bytes);
 }
 
 int main(int argc, char **argv)
@@ -47,14 +47,14 @@ int main(int argc, char **argv)
     }
     for (int k = 0; k < 3; k++)
         point[k] = strtod(argv[2 + k], NULL);
-    options.parts = EBPO_PART_MESH;     /* no envelopes, no numbers in the source */
-    options.memory = UINT64_C(1) << 30; /* of a level that is too coarse the message says so */
+    options.parts = EBPO_PART_MESH;     /* no envelopes, no source indices */
+    options.memory = UINT64_C(1) << 30; /* error if the cell of LEVEL needs more */
     options.or_leaf_above = true;
     if (ebpo_open(argv[1], &file, &error) != EBPO_OK)
         goto done;
     uint64_t octcode = ebpo_octcode_at(ebpo_file_info(file), point, atoi(argv[5]));
     if (octcode == 0) {
-        fprintf(stderr, "draw_around: the point is not in the model's box, or LEVEL is no level\n");
+        fprintf(stderr, "draw_around: the point is outside the model's box, or LEVEL is invalid\n");
         ebpo_close(file);
         return 1;
     }
@@ -62,7 +62,7 @@ int main(int argc, char **argv)
         ebpo_subtree_get_nodes(subtree, &nodes) == EBPO_OK &&
         ebpo_subtree_get_faces(subtree, &faces, &error) == EBPO_OK &&
         write_faces(&faces, argv[6], &error))
-        tell(file, &nodes, &faces);
+        report(file, &nodes, &faces);
 done:
     if (error.status != EBPO_OK)
         fprintf(stderr, "draw_around: %s\n", error.message);

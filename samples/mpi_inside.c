@@ -1,23 +1,23 @@
-/* Which points are inside, on all processes of an MPI program, as simulation codes ask it:
+/* Classifies points as inside, outside or on the surface, on all processes of an MPI program:
  *
  *     mpirun -n 4 mpi_inside MODEL.ebpo.h5 POINTS.raw ANSWERS.raw [MEGABYTES]
  *
- * POINTS.raw holds three doubles for each point, ANSWERS.raw gets two int32 for each: where (0 out,
- * 1 inside, 2 on the surface) and the winding number, as `ebpo inside --raw` prints them. The bytes
- * do not depend on the number of processes. Each process opens the model itself, within MEGABYTES
- * (default 256). An error of one ends all, and no answers are left.
- */
+ * POINTS.raw holds three doubles for each point. ANSWERS.raw gets two int32 for each, as `ebpo
+ * inside --raw` prints them: location (0 outside, 1 inside, 2 on the surface) and winding number.
+ * The bytes do not depend on the number of processes. Each process opens the model, within
+ * MEGABYTES (default 256). An error of one process ends all, and no results are left. */
 #include <ebpo/ebpo.h>
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/stat.h>
 
-enum { TOGETHER = 1 << 18 }; /* points of a process between two reads of all */
+enum { TOGETHER = 1 << 18 }; /* points of a process in each collective read */
 
 static int rank, ranks;
 
-/* Who has an error says it; all end. Every process must come here. */
+/* Prints the error of the process that has one; then all processes end. Every process must call it.
+ */
 static int all_fine(int fine, const char *what)
 {
     int every;
@@ -27,7 +27,7 @@ static int all_fine(int fine, const char *what)
     return every;
 }
 
-/* The file's errors as text. */
+/* Reports an MPI error of a file as text. */
 static int mpi_fine(int code, const char *path)
 {
     char why[MPI_MAX_ERROR_STRING] = "", what[MPI_MAX_ERROR_STRING + 512];
@@ -38,18 +38,19 @@ static int mpi_fine(int code, const char *path)
     return all_fine(code == MPI_SUCCESS, what);
 }
 
-/* The library numbers the points that it was given together. */
-static int asked_fine(ebpo_status status, MPI_Offset first, const char *message)
+/* The library numbers the points of one call. */
+static int queried_fine(ebpo_status status, MPI_Offset first, const char *message)
 {
     char what[sizeof(ebpo_error) + 64];
-    snprintf(what, sizeof what, "of the points from number %lld on: %s", (long long)first, message);
+    snprintf(what, sizeof what, "in the points from index %lld on: %s", (long long)first, message);
     return all_fine(status == EBPO_OK, what);
 }
 
-/* Points from `first` on, `count` of them: read, asked and written with those of all others. */
-static int ask_stretch(ebpo_context *context, MPI_File in, MPI_File out, const char *const *paths,
-                       MPI_Offset first, int count, double *points, ebpo_inside_result *results,
-                       int *answers)
+/* Reads, queries and writes `count` points from `first` on, together with those of the other
+ * processes. */
+static int query_stretch(ebpo_context *context, MPI_File in, MPI_File out, const char *const *paths,
+                         MPI_Offset first, int count, double *points, ebpo_inside_result *results,
+                         int *answers)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     MPI_Status got;
@@ -58,12 +59,12 @@ static int ask_stretch(ebpo_context *context, MPI_File in, MPI_File out, const c
     if (!mpi_fine(code, paths[0]))
         return 0;
     MPI_Get_count(&got, MPI_DOUBLE, &doubles);
-    if (!all_fine(doubles == 3 * count, "the points became fewer while they were read"))
+    if (!all_fine(doubles == 3 * count, "the points file became shorter during reading"))
         return 0;
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
     ebpo_status status =
         ebpo_inside_many(context, points, (uint64_t)count, &options, results, &error);
-    if (!asked_fine(status, first, error.message))
+    if (!queried_fine(status, first, error.message))
         return 0;
     for (int i = 0; i < count; i++) {
         answers[2 * i] = (int)results[i].where;
@@ -73,9 +74,10 @@ static int ask_stretch(ebpo_context *context, MPI_File in, MPI_File out, const c
     return mpi_fine(code, paths[1]);
 }
 
-/* All take stretches in turn, as many of them as each other: reading together needs everyone. */
-static int ask_all(ebpo_context *context, MPI_File in, MPI_File out, const char *const *paths,
-                   MPI_Offset rows)
+/* Processes the stretches of points in turn. All processes take the same number of stretches,
+ * because collective reads need every process. */
+static int query_all(ebpo_context *context, MPI_File in, MPI_File out, const char *const *paths,
+                     MPI_Offset rows)
 {
     double *points = malloc(sizeof *points * 3 * TOGETHER);
     ebpo_inside_result *results = malloc(sizeof *results * TOGETHER);
@@ -83,8 +85,8 @@ static int ask_all(ebpo_context *context, MPI_File in, MPI_File out, const char 
     int fine = all_fine(points && results && answers, "not enough memory");
     for (MPI_Offset at = 0; fine && at < rows; at += (MPI_Offset)TOGETHER * ranks) {
         MPI_Offset first = at + (MPI_Offset)TOGETHER * rank, left = first < rows ? rows - first : 0;
-        fine = ask_stretch(context, in, out, paths, first, left < TOGETHER ? (int)left : TOGETHER,
-                           points, results, answers);
+        fine = query_stretch(context, in, out, paths, first, left < TOGETHER ? (int)left : TOGETHER,
+                             points, results, answers);
     }
     free(points);
     free(results);
@@ -92,7 +94,7 @@ static int ask_all(ebpo_context *context, MPI_File in, MPI_File out, const char 
     return fine;
 }
 
-/* Answers are written in place: an input would be gone. */
+/* Results are written directly to the file, which would destroy an input. */
 static int is_input(const char *input, const char *answers)
 {
     struct stat a, b;
@@ -100,7 +102,7 @@ static int is_input(const char *input, const char *answers)
            a.st_ino == b.st_ino;
 }
 
-static int ask_files(ebpo_context *context, const char *points, const char *answers)
+static int query_files(ebpo_context *context, const char *points, const char *answers)
 {
     const char *const paths[] = { points, answers };
     MPI_File in, out;
@@ -109,12 +111,12 @@ static int ask_files(ebpo_context *context, const char *points, const char *answ
                   points))
         return 0;
     int fine = mpi_fine(MPI_File_get_size(in, &bytes), points) &&
-               all_fine(bytes % 24 == 0, "the points are no rows of three doubles");
+               all_fine(bytes % 24 == 0, "the points file does not contain rows of three doubles");
     if (fine && mpi_fine(MPI_File_open(MPI_COMM_WORLD, answers, MPI_MODE_WRONLY | MPI_MODE_CREATE,
                                        MPI_INFO_NULL, &out),
                          answers)) {
         fine = mpi_fine(MPI_File_set_size(out, bytes / 3), answers) &&
-               ask_all(context, in, out, paths, bytes / 24);
+               query_all(context, in, out, paths, bytes / 24);
         fine = mpi_fine(MPI_File_close(&out), answers) && fine;
         if (!fine && rank == 0)
             MPI_File_delete(answers, MPI_INFO_NULL);
@@ -125,7 +127,7 @@ static int ask_files(ebpo_context *context, const char *points, const char *answ
     return fine;
 }
 
-static int ask_model(const char *const *path, double megabytes)
+static int query_model(const char *const *path, double megabytes)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
@@ -135,14 +137,14 @@ static int ask_model(const char *const *path, double megabytes)
     options.memory = (uint64_t)(megabytes * 1e6);
     options.threads = 1;
     if (!all_fine(!is_input(path[0], path[2]) && !is_input(path[1], path[2]),
-                  "the answers would overwrite the model or the points"))
+                  "the results would overwrite the model or the points"))
         return 0;
     ebpo_status status = ebpo_open(path[0], &file, &error);
     if (status == EBPO_OK)
         status = ebpo_model_new(file, &options, &model, &error);
     if (status == EBPO_OK)
         status = ebpo_context_new(model, &context, &error);
-    int fine = all_fine(status == EBPO_OK, error.message) && ask_files(context, path[1], path[2]);
+    int fine = all_fine(status == EBPO_OK, error.message) && query_files(context, path[1], path[2]);
     ebpo_context_free(context);
     ebpo_model_free(model);
     ebpo_close(file);
@@ -159,7 +161,7 @@ int main(int argc, char **argv)
     int fine = 0;
     if ((argc == 4 || argc == 5) && !*end && megabytes > 0 && megabytes < 1e9) {
         const char *const path[] = { argv[1], argv[2], argv[3] };
-        fine = ask_model(path, megabytes);
+        fine = query_model(path, megabytes);
     } else if (rank == 0) {
         fprintf(stderr, "usage: mpi_inside MODEL.ebpo.h5 POINTS.raw ANSWERS.raw [MEGABYTES]\n");
     }

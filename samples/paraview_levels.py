@@ -1,4 +1,4 @@
-"""Draws in ParaView what `ebpo export FILE OUT.xdmf --levels A-B --mesh` wrote:
+"""Draws in ParaView the output of `ebpo export FILE OUT.xdmf --levels A-B --mesh` wrote:
 
     xvfb-run -a pvpython samples/paraview_levels.py OUT.xdmf PICTURE.png [COARSE [FINE]]
 

@@ -1,4 +1,4 @@
-/* Which points are inside, and how far away is the surface? Reads lines "x y z" and answers each.
+/* Reads lines "x y z" and prints for each point if it is inside, and its distance from the surface.
  *
  *     query MODEL.ebpo.h5 <points.txt
  *     cc query.c $(pkg-config --cflags --libs ebpo) */
@@ -8,9 +8,9 @@
 
 static const char *const words[] = { "OUT", "IN", "ON", "MAYBE" };
 
-static bool answer(ebpo_context *context, bool solid, const double point[3], ebpo_error *error)
+static bool result(ebpo_context *context, bool solid, const double point[3], ebpo_error *error)
 {
-    ebpo_inside_result where = { EBPO_MAYBE, 0, 0 }; /* a surface has no inside, but distances */
+    ebpo_inside_result where = { EBPO_MAYBE, 0, 0 }; /* a surface has distances, but no inside */
     ebpo_distance_result nearest;
     if ((solid && ebpo_inside(context, point, NULL, &where, error) != EBPO_OK) ||
         ebpo_distance(context, point, NULL, &nearest, error) != EBPO_OK)
@@ -25,7 +25,7 @@ int main(int argc, char **argv)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    ebpo_model *model = NULL;     /* as a whole; ebpo_model_options hold it to less memory */
+    ebpo_model *model = NULL;     /* entirely in memory; ebpo_model_options can limit it */
     ebpo_context *context = NULL; /* one for each thread */
     char line[1000];
     double p[3];
@@ -40,14 +40,14 @@ int main(int argc, char **argv)
             continue;
         good = count == 3 && line[end] == 0;
         if (good)
-            good = answer(context, ebpo_file_info(file)->solid, p, &error);
+            good = result(context, ebpo_file_info(file)->solid, p, &error);
         else
             snprintf(error.message, sizeof error.message, "line %ld: three numbers are expected",
                      number);
     }
     if (!good)
         fprintf(stderr, "query: %s\n", error.message);
-    good = fflush(stdout) == 0 && !ferror(stdout) && good; /* a full disk shows here */
+    good = fflush(stdout) == 0 && !ferror(stdout) && good; /* a full disk is detected here */
     if (ferror(stdout))
         perror("query: standard output");
     ebpo_context_free(context);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Which points are inside, and how far away is the surface? With the package for Python.
+"""Classifies points and computes their distances to the surface with the Python package.
 
     PYTHONPATH=/usr/local/lib/ebpo/python samples/query.py MODEL.ebpo.h5 <points.txt
 

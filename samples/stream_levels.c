@@ -1,5 +1,5 @@
-/* A coarse-to-fine viewer's main loop: each level's envelopes as closed polyhedra, drawn (here:
- * summed up) as soon as the level is there.
+/* Main loop of a coarse-to-fine viewer: draws (here: sums) the envelopes of each level as closed
+ * polyhedra as soon as the level is read.
  *
  *     stream_levels FILE.ebpo.h5 [LEVEL]
  *     cc stream_levels.c $(pkg-config --cflags --libs ebpo) */
@@ -30,7 +30,7 @@ int main(int argc, char **argv)
         uint64_t polyhedra = 0, polygons = 0;
         while (ebpo_stream_next_node(stream, &node, &more, &error) == EBPO_OK && more) {
             polyhedra += node.polygon_count > 0; /* white nodes have none */
-            /* a renderer would take node.vertices, polygon_first and corners here */
+            /* a renderer would use node.vertices, polygon_first and corners here */
             polygons += node.polygon_count;
         }
         printf("level %d after %" PRIu64 " bytes: %" PRIu64 " new polyhedra with %" PRIu64

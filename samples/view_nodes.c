@@ -1,5 +1,5 @@
-/* What a viewer with a camera does: the nodes that are largest on the picture first, until no
- * visible one is larger than 16 pixels or a budget is spent; then the camera moves.
+/* Main loop of a viewer with a camera: gets the nodes that are largest in the image first, until no
+ * visible node is larger than 16 pixels or a budget is used; then the camera moves.
  *
  *     view_nodes FILE.ebpo.h5 X Y Z [BYTES]
  *     cc view_nodes.c $(pkg-config --cflags --libs ebpo) */
@@ -12,7 +12,7 @@ static bool draw(void *user, const ebpo_view_node *node)
 {
     *(uint64_t *)user += node->seen ? node->node.polygon_count
                                     : 0; /* a renderer would draw node->node.vertices, polygon_first
-                                            and corners here, front to back */
+                                          * and corners here, front to back */
     return true;
 }
 
@@ -58,7 +58,7 @@ int main(int argc, char **argv)
         printf("%" PRIu64 " nodes more, %" PRIu64 " bytes read: %" PRIu64
                " polygons to draw, no node larger than %.3g pixels\n",
                arrived, stats.bytes_read, polygons, stats.pixels);
-        /* Half as far from the middle: what is there already is not read again. */
+        /* Moves the camera to half the distance. Nodes in memory are not read again. */
         for (int k = 0; k < 3; k++)
             observer.eye[k] += (middle[k] - observer.eye[k]) / 2;
         if (error.status == EBPO_OK && ebpo_view_stream_change(stream, &options, &error) != EBPO_OK)

@@ -32,8 +32,8 @@ plan() { # build
     *-posix) echo "0.1" ;;           # the tests that are named here
     esac
 }
-without_linux="io workspace source many_threads touch_hand touch_probe touch_udp
-    cli_convert cli_files cli_query cli_touch cli_usage"
+without_linux="io workspace source many_threads haptic_ball haptic_probe haptic_udp
+    cli_convert cli_files cli_query cli_haptic cli_usage"
 
 configure() { # build, meson options...
     folder=build-$1

@@ -8,7 +8,7 @@ here=$(cd "$(dirname "$0")" && pwd)
 viewer="nginx-light nodejs"
 command -v npm >/dev/null || viewer="$viewer npm"
 modules=no
-# dpkg-dev tells meson where libraries go on Debian.
+# meson finds the library folder of Debian with dpkg-dev.
 packages="gcc dpkg-dev pkg-config meson ninja-build libhdf5-dev libzstd-dev zlib1g-dev \
     g++ libgmp-dev nettle-dev libassimp-dev libpng-dev libcairo2-dev libjs-chart.js \
     libcurl4-openssl-dev libqhull-dev libjansson-dev"
@@ -48,7 +48,7 @@ npm_ci() { # options...
     (cd "$here/web" && timeout --foreground "$limit" npm ci --silent --no-audit --no-fund \
         --fetch-timeout=60000 --fetch-retries=1 "$@" && cp package-lock.json node_modules/.installed)
 }
-# Whether the registry says anything at all, be it "no such page"; asking takes no longer than a minute.
+# Checks that the registry responds, with any status, within one minute.
 registry_answers() {
     told=$(timeout 60 npm ping --fetch-timeout=25000 --fetch-retries=1 --fetch-retry-mintimeout=1000 2>&1) &&
         return 0

@@ -1,14 +1,13 @@
-/* Questions to a catalogue: they are cut into stretches, each of which a thread asks by itself, and
- * of a stretch each model is asked once.
+/* Queries to a catalogue: they are cut into stretches, each processed by one thread, and each model
+ * is queried once per stretch.
  *
- * Points are taken by laps of some millions, and of each lap along the Morton curve of the
- * catalogue's box, so that a stretch comes to few models and to few of their subtrees; what has its
- * answers at hand, a single model that is all in memory, needs no order. Rays are asked in their
- * own order, as each model puts those that it gets in order itself.
+ * Points are taken by laps of some millions, and each lap along the Morton curve of the catalogue's
+ * box, so that a stretch visits few models and few of their subtrees; a single model that is all in
+ * memory needs no order. Rays are processed in their given order, as each model orders its rays
+ * itself.
  *
- * An answer depends on its point or ray alone: neither on the stretch, nor on the threads, nor on
- * which models happen to be open. A thread holds the results of its stretch only, and one model at
- * a time. */
+ * A result depends on its point or ray alone: not on the stretch, the threads, or the models that
+ * happen to be open. A thread holds the results of its stretch only, and one model at a time. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,17 +21,17 @@
 #include "core/parallel.h"
 #include "query/query_model.h"
 
-/* Rows of a stretch; so many are put in order together; fewer are not worth it. */
-enum { STRETCH_LEAST = 1 << 10, STRETCH_MOST = 1 << 16, LAP = 1 << 22, UNORDERED = 1 << 8 };
-/* Stretches for each thread, that none waits long for the last one. */
+/* Rows of a stretch; number of rows that are ordered together; fewer are not worth it. */
+enum { STRETCH_LEAST = 1 << 10, STRETCH_MAX = 1 << 16, LAP = 1 << 22, UNORDERED = 1 << 8 };
+/* Stretches for each thread, so that none waits long for the last one. */
 enum { STRETCHES_EACH = 4 };
 
 ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *error)
 {
     return c->seen.levels ? EBPO_OK
                           : ebpo_fail_file(error, EBPO_E_ABSENT, ebpo_catalogue_shown(c),
-                                           "tells of caps alone, and of no surface; ask the "
-                                           "catalogue of all parts");
+                                           "contains caps only, no surface; query the catalogue "
+                                           "of all parts");
 }
 
 /* --- each model once --- */
@@ -44,7 +43,7 @@ static int by_model(const void *a, const void *b)
                             : (x->item > y->item) - (x->item < y->item);
 }
 
-/* Pairs of one model, of which there are the most. They are sorted. */
+/* Returns the largest number of pairs with one model. The pairs are sorted. */
 static uint64_t longest_run(const ebpo_catalogue_pairs *pairs)
 {
     uint64_t longest = 0;
@@ -56,9 +55,9 @@ static uint64_t longest_run(const ebpo_catalogue_pairs *pairs)
     return longest;
 }
 
-ebpo_status ebpo_catalogue_ask_runs(const ebpo_catalogue_asker *a, ebpo_catalogue_pairs *pairs,
-                                    const double *rows, size_t width, bool surface,
-                                    ebpo_catalogue_question ask, void *user, ebpo_error *error)
+ebpo_status ebpo_catalogue_query_runs(const ebpo_catalogue_querier *a, ebpo_catalogue_pairs *pairs,
+                                      const double *rows, size_t width, bool surface,
+                                      ebpo_catalogue_query run_query, void *user, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     if (pairs->count == 0)
@@ -74,7 +73,7 @@ ebpo_status ebpo_catalogue_ask_runs(const ebpo_catalogue_asker *a, ebpo_catalogu
         for (; at < pairs->count && pairs->pair[at].box == run.model; at++, run.count++)
             memcpy(some + run.count * width, rows + pairs->pair[at].item * width,
                    width * sizeof *some);
-        status = ebpo_catalogue_lend(a->models, a->c, run.model, surface, ask, &run, error);
+        status = ebpo_catalogue_lend(a->models, a->c, run.model, surface, run_query, &run, error);
     }
     free(some);
     return status;
@@ -92,10 +91,10 @@ bool ebpo_catalogue_find_ray(const ebpo_catalogue_boxes *boxes, const double *ro
     return ebpo_catalogue_boxes_on_ray(boxes, row, row + 3, item, out);
 }
 
-ebpo_status ebpo_catalogue_ask_all(const ebpo_catalogue_asker *a, const double *rows,
-                                   uint32_t count, size_t width, ebpo_catalogue_find find,
-                                   bool surface, ebpo_catalogue_question ask, void *user,
-                                   ebpo_error *error)
+ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_querier *a, const double *rows,
+                                     uint32_t count, size_t width, ebpo_catalogue_find find,
+                                     bool surface, ebpo_catalogue_query run_query, void *user,
+                                     ebpo_error *error)
 {
     const ebpo_catalogue_boxes *boxes = surface ? &a->c->seen : &a->c->all;
     ebpo_catalogue_pairs pairs = { NULL, 0, 0 };
@@ -105,7 +104,8 @@ ebpo_status ebpo_catalogue_ask_all(const ebpo_catalogue_asker *a, const double *
             if (!find(boxes, rows + at * width, at, &pairs))
                 status = ebpo_fail_memory(error, pairs.count * sizeof *pairs.pair);
         if (status == EBPO_OK)
-            status = ebpo_catalogue_ask_runs(a, &pairs, rows, width, surface, ask, user, error);
+            status =
+                ebpo_catalogue_query_runs(a, &pairs, rows, width, surface, run_query, user, error);
     }
     free(pairs.pair);
     return status;
@@ -113,19 +113,19 @@ ebpo_status ebpo_catalogue_ask_all(const ebpo_catalogue_asker *a, const double *
 
 /* --- stretches --- */
 
-/* What one thread asks, put together in the order of the curve. */
+/* Input of one thread, gathered in the order of the curve. */
 typedef struct gathered {
     double *rows;
     char *out;
     uint64_t *model;
 } gathered;
 
-static ebpo_status ask_gathered(const ebpo_catalogue_job *j, const uint32_t *order, uint32_t count,
-                                gathered *g, ebpo_error *error)
+static ebpo_status query_gathered(const ebpo_catalogue_job *j, const uint32_t *order,
+                                  uint32_t count, gathered *g, ebpo_error *error)
 {
     for (uint32_t i = 0; i < count; i++)
         memcpy(g->rows + i * j->width, j->rows + order[i] * j->width, j->width * sizeof *g->rows);
-    ebpo_status status = j->ask(&j->asker, g->rows, count, g->out, g->model, error);
+    ebpo_status status = j->run_query(&j->querier, g->rows, count, g->out, g->model, error);
     for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
         memcpy(j->out + order[i] * j->result, g->out + i * j->result, j->result);
         if (j->model)
@@ -134,20 +134,20 @@ static ebpo_status ask_gathered(const ebpo_catalogue_job *j, const uint32_t *ord
     return status;
 }
 
-static ebpo_status ask_stretch(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                               ebpo_error *error)
+static ebpo_status query_stretch(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     const ebpo_catalogue_job *j = context;
     uint32_t count = (uint32_t)(end - begin);
     (void)worker;
     if (!j->order)
-        return j->ask(&j->asker, j->rows + begin * j->width, count, j->out + begin * j->result,
-                      j->model ? j->model + begin : NULL, error);
+        return j->run_query(&j->querier, j->rows + begin * j->width, count,
+                            j->out + begin * j->result, j->model ? j->model + begin : NULL, error);
     gathered g = { ebpo_alloc(count, j->width * sizeof *g.rows), ebpo_alloc(count, j->result),
                    ebpo_alloc(count, sizeof *g.model) };
     ebpo_status status =
         g.rows && g.out && g.model
-            ? ask_gathered(j, j->order + begin, count, &g, error)
+            ? query_gathered(j, j->order + begin, count, &g, error)
             : ebpo_fail_memory(error, count * (j->result + j->width * sizeof *g.rows));
     free(g.rows);
     free(g.out);
@@ -157,18 +157,18 @@ static ebpo_status ask_stretch(void *context, uint64_t begin, uint64_t end, unsi
 
 /* --- laps --- */
 
-/* Whether it pays to put so many points in order. */
+/* Returns true if ordering this many points is worth the time. */
 static bool needs_order(const ebpo_catalogue_job *j, uint64_t count)
 {
     return j->ordered && count > UNORDERED &&
-           !ebpo_catalogue_in_memory(j->asker.models, j->asker.c);
+           !ebpo_catalogue_in_memory(j->querier.models, j->querier.c);
 }
 
-static ebpo_status ask_lap(ebpo_catalogue_job *j, uint64_t count, bool in_order,
-                           const ebpo_progress *progress, ebpo_error *error)
+static ebpo_status query_lap(ebpo_catalogue_job *j, uint64_t count, bool in_order,
+                             const ebpo_progress *progress, ebpo_error *error)
 {
-    const ebpo_catalogue_box *box = j->asker.c->all.box[j->asker.c->all.levels - 1];
-    unsigned threads = ebpo_thread_count(j->asker.options->threads);
+    const ebpo_catalogue_box *box = j->querier.c->all.box[j->querier.c->all.levels - 1];
+    unsigned threads = ebpo_thread_count(j->querier.options->threads);
     uint64_t grain = count / ((uint64_t)threads * STRETCHES_EACH) + 1;
     uint32_t *order = in_order ? ebpo_alloc(count, sizeof *order) : NULL;
     if (in_order &&
@@ -176,26 +176,26 @@ static ebpo_status ask_lap(ebpo_catalogue_job *j, uint64_t count, bool in_order,
         free(order);
         return ebpo_fail_memory(error, count * sizeof *order);
     }
-    if (threads == 1 || grain > STRETCH_MOST)
-        grain = STRETCH_MOST;
+    if (threads == 1 || grain > STRETCH_MAX)
+        grain = STRETCH_MAX;
     if (grain < STRETCH_LEAST)
         grain = STRETCH_LEAST;
     j->order = order;
     ebpo_status status =
-        ebpo_parallel_for(threads, NULL, count, grain, ask_stretch, j, progress, j->stage, error);
+        ebpo_parallel_for(threads, NULL, count, grain, query_stretch, j, progress, j->stage, error);
     free(order);
     return status;
 }
 
-ebpo_status ebpo_catalogue_ask_rows(ebpo_catalogue_job *j, uint64_t count, ebpo_error *error)
+ebpo_status ebpo_catalogue_query_rows(ebpo_catalogue_job *j, uint64_t count, ebpo_error *error)
 {
     bool in_order = needs_order(j, count);
     ebpo_status status = EBPO_OK;
     for (uint64_t at = 0; at < count && status == EBPO_OK; at += LAP) {
         uint64_t here = count - at < LAP ? count - at : LAP;
-        ebpo_pass pass = { &j->asker.options->progress, at, at + here, count };
-        ebpo_progress told = ebpo_pass_progress(&pass);
-        status = ask_lap(j, here, in_order, count > LAP ? &told : pass.to, error);
+        ebpo_pass pass = { &j->querier.options->progress, at, at + here, count };
+        ebpo_progress reported = ebpo_pass_progress(&pass);
+        status = query_lap(j, here, in_order, count > LAP ? &reported : pass.to, error);
         j->rows += here * j->width;
         j->out += here * j->result;
         j->model += j->model ? here : 0;
@@ -203,13 +203,16 @@ ebpo_status ebpo_catalogue_ask_rows(ebpo_catalogue_job *j, uint64_t count, ebpo_
     return status;
 }
 
-ebpo_status ebpo_catalogue_take_options(ebpo_catalogue_ask_options *own,
-                                        const ebpo_catalogue_ask_options *given, ebpo_error *error)
+ebpo_status ebpo_catalogue_take_options(ebpo_catalogue_query_options *own,
+                                        const ebpo_catalogue_query_options *given,
+                                        ebpo_error *error)
 {
-    *own = (ebpo_catalogue_ask_options)EBPO_CATALOGUE_ASK_OPTIONS_INIT;
-    ebpo_status status = EBPO_TAKE(ebpo_catalogue_ask_options, own, given, error);
+    *own = (ebpo_catalogue_query_options)EBPO_CATALOGUE_QUERY_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_catalogue_query_options, own, given, error);
     if (status == EBPO_OK && !(own->max_distance >= 0))
-        status = ebpo_fail(error, EBPO_E_ARGUMENT, "maximum distance %g: give 0 or more",
+        status = ebpo_fail(error, EBPO_E_ARGUMENT,
+                           "maximum distance %g is invalid; give 0 or "
+                           "more",
                            own->max_distance);
     if (status == EBPO_OK && (unsigned)own->sides > EBPO_RAY_BACK)
         status = ebpo_fail_value(error);

@@ -1,13 +1,12 @@
-/* Which of many boxes points and rays come to.
+/* Finds the boxes that points and rays reach.
  *
  * Boxes are in a tree: eight neighbours along the Morton curve of their centres have a box around
- * them on the next level, up to one that holds all. A question goes down from there, and leaves out
- * what it cannot come to. The tree does not change once it is made, so that any number of threads
- * may ask it.
+ * them on the next level, up to one that contains all. A query goes down from there and skips boxes
+ * that it cannot reach. The tree is immutable, so any number of threads may query it.
  *
- * What is left out is certain to be of no use: lengths are rounded some ten times here, each by
- * 2^-53, and only what is farther by a share of 2^-40 is left out. So boxes may be named that a
- * question does not come to, and the model then says so; none is missing. */
+ * Skipped boxes are certainly irrelevant: lengths are rounded some ten times here, each by 2^-53,
+ * and only boxes farther by a share of 2^-40 are skipped. So boxes may be returned that a query
+ * does not reach, and the model then finds nothing; none is missing. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -72,7 +71,7 @@ static ebpo_catalogue_box box_around(const ebpo_catalogue_box *boxes, size_t cou
     return all;
 }
 
-/* The boxes in the order of their centres. */
+/* Sorts the boxes by their centres. */
 static bool make_lowest(ebpo_catalogue_boxes *t, const ebpo_catalogue_box *boxes,
                         const uint32_t *numbers, size_t count)
 {
@@ -130,10 +129,10 @@ void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t)
 typedef struct walk {
     const ebpo_catalogue_boxes *t;
     const double *p, *d; /* the point, or the ray's origin and direction */
-    double reach;        /* near: what is farther is not wanted */
-    double pad;          /* ray: more than what is rounded */
+    double reach;        /* near: boxes farther away are not wanted */
+    double pad;          /* ray: more than the rounding error */
     uint32_t item;
-    ebpo_catalogue_pairs *out; /* NULL: only `reach` is found */
+    ebpo_catalogue_pairs *out; /* NULL: only `reach` is computed */
     bool (*keep)(struct walk *w, const ebpo_catalogue_box *box, double *least);
     bool failed;
 } walk;
@@ -148,7 +147,7 @@ static void append_pair(walk *w, uint32_t box, double least)
     o->pair[o->count++] = (ebpo_catalogue_pair){ box, w->item, least };
 }
 
-/* Recursion: at most LEVELS deep. */
+/* Visits boxes recursively, at most LEVELS deep. */
 static void descend_boxes(walk *w, int level, size_t node) /* NOLINT(misc-no-recursion) */
 {
     double least = 0;
@@ -190,7 +189,7 @@ bool ebpo_catalogue_boxes_holding(const ebpo_catalogue_boxes *t, const double p[
     return walk_boxes(&w);
 }
 
-/* Also where squares are beyond doubles. */
+/* Returns the length, also where squares overflow. */
 static double vector_length(const double v[3]) { return hypot(hypot(v[0], v[1]), v[2]); }
 
 static double least_length(const ebpo_catalogue_box *b, const double p[3])
@@ -215,7 +214,7 @@ static bool may_be_near(walk *w, const ebpo_catalogue_box *b, double *least)
     return *least * (1 - EBPO_CATALOGUE_SLACK) <= w->reach;
 }
 
-/* Something of a box is nearer than its farthest corner. */
+/* Lowers `reach` to the box's farthest corner: part of a box is nearer than that. */
 static bool comes_nearer(walk *w, const ebpo_catalogue_box *b, double *least)
 {
     if (!may_be_near(w, b, least))
@@ -236,7 +235,7 @@ bool ebpo_catalogue_boxes_near(const ebpo_catalogue_boxes *t, const double p[3],
 
 /* --- rays --- */
 
-static bool may_be_met(walk *w, const ebpo_catalogue_box *b, double *least)
+static bool may_be_found(walk *w, const ebpo_catalogue_box *b, double *least)
 {
     double near = -INFINITY, far = INFINITY;
     (void)least;
@@ -257,7 +256,7 @@ static bool may_be_met(walk *w, const ebpo_catalogue_box *b, double *least)
 bool ebpo_catalogue_boxes_on_ray(const ebpo_catalogue_boxes *t, const double o[3],
                                  const double d[3], uint32_t item, ebpo_catalogue_pairs *out)
 {
-    walk w = { .t = t, .p = o, .d = d, .item = item, .out = out, .keep = may_be_met };
+    walk w = { .t = t, .p = o, .d = d, .item = item, .out = out, .keep = may_be_found };
     for (int k = 0; t->levels && k < 3; k++) {
         const ebpo_catalogue_box *all = t->box[t->levels - 1];
         w.pad = fmax(w.pad, fmax(fabs(all->min[k]), fabs(all->max[k])));

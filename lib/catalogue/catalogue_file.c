@@ -1,12 +1,12 @@
 /* Catalogues: a list of entries, made of a JSON file or of an array.
  *
- * A catalogue file is untrusted input. Every member that is used is checked for its kind and range
- * before the catalogue is there: paths are texts, digests are 64 hexadecimal digits, boxes have two
- * corners of three finite numbers each, and none is turned inside out. Whether that is true of the
- * models is checked when one is opened (open_models.c). Members that are not known are left out.
+ * A catalogue file is untrusted input. Every used member is checked for its kind and range before
+ * the catalogue is made: paths are texts, digests are 64 hexadecimal digits, boxes have two corners
+ * of three finite numbers each, and none is inverted. open_models.c compares these with a model
+ * when it is opened. Unknown members are ignored.
  *
- * Paths are kept as they are opened: relative ones of a file begin in its folder. A catalogue does
- * not change once it is made, and any number of threads may use it.
+ * Paths are kept as they are opened: relative ones of a file begin in its folder. A catalogue is
+ * immutable, and any number of threads may use it.
  *
  * Source: docs/guide/clusters.md has the format. */
 #include "core/strict_fp.h"
@@ -28,8 +28,8 @@
 #include "core/fp_env.h"
 #include "core/hash.h"
 
-/* Some millions of models; more would be read into many times as much memory. */
-enum { MOST_BYTES = 1 << 30, DIGEST_LETTERS = 64 };
+/* Some millions of models; a larger file would take many times as much memory. */
+enum { MAX_BYTES = 1 << 30, DIGEST_LETTERS = 64 };
 
 const char *const ebpo_catalogue_rules[] = { "nonzero", "evenodd", "positive" };
 enum { RULES = sizeof ebpo_catalogue_rules / sizeof ebpo_catalogue_rules[0] };
@@ -41,7 +41,7 @@ const char *ebpo_catalogue_shown(const ebpo_catalogue *c)
 
 /* --- making --- */
 
-/* Returns a path as it is opened, seen from a folder ("" or with '/' behind it); NULL: not enough
+/* Returns a path as it is opened, relative to a folder ("" or ending in '/'); NULL: not enough
  * memory. */
 static char *joined_path(const char *folder, const char *path)
 {
@@ -55,7 +55,7 @@ static char *joined_path(const char *folder, const char *path)
     return joined;
 }
 
-/* Of the models that count, by all or by those that are seen. */
+/* Makes the boxes of all models, or of those that rays and distances use. */
 static bool make_boxes(ebpo_catalogue_boxes *boxes, const ebpo_catalogue *c, bool seen)
 {
     ebpo_catalogue_box *box = ebpo_alloc(c->count, sizeof *box);
@@ -75,7 +75,7 @@ static bool make_boxes(ebpo_catalogue_boxes *boxes, const ebpo_catalogue *c, boo
     return fine;
 }
 
-/* What is made of the entries, when all of them are there. */
+/* Computes the derived data when all entries are set. */
 static ebpo_status finish_catalogue(ebpo_catalogue *c, ebpo_error *error)
 {
     for (uint64_t i = 0; i < c->count && !c->surface; i++)
@@ -95,7 +95,7 @@ static ebpo_status begin_catalogue(const ebpo_catalogue_options *options, ebpo_c
     c->how = (ebpo_catalogue_options)EBPO_CATALOGUE_OPTIONS_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_catalogue_options, &c->how, options, error);
     if (status == EBPO_OK && (unsigned)c->how.rule >= RULES)
-        status = ebpo_fail(error, EBPO_E_ARGUMENT, "there is no rule %d", (int)c->how.rule);
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "unknown winding rule %d", (int)c->how.rule);
     if (status == EBPO_OK)
         *out = c;
     else
@@ -140,11 +140,11 @@ static const char *fault_of_entry(const ebpo_catalogue_entry *e)
     if (!e->path || !*e->path)
         return "has no path";
     if (e->surface && (!*e->surface || e->unseen))
-        return "has no surface, and yet a path of one";
+        return "has no surface, but a path of a surface";
     if (e->numbers && !*e->numbers)
-        return "has an empty path of numbers";
+        return "has an empty path of face numbers";
     if ((unsigned)e->rule >= RULES)
-        return "has no rule that is known";
+        return "has an unknown winding rule";
     for (int k = 0; k < 3; k++)
         if (!isfinite(e->min[k]) || !isfinite(e->max[k]) || e->min[k] > e->max[k])
             return "has no box: min is above max, or a corner is not finite";
@@ -197,7 +197,7 @@ ebpo_status ebpo_catalogue_new(const ebpo_catalogue_entry *entries, uint64_t cou
     *out = NULL;
     if (count == 0 || count >= UINT32_MAX)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "a catalogue has one model at least, and at most 2^32 - 2");
+                         "a catalogue needs at least one model, and at most 2^32 - 2");
     ebpo_status status = begin_catalogue(options, &c, error);
     return status == EBPO_OK ? end_making(c, copy_entries(c, entries, count, error), out, error)
                              : status;
@@ -242,8 +242,8 @@ const ebpo_catalogue_entry *ebpo_catalogue_get_entry(const ebpo_catalogue *c, ui
 
 typedef struct reader {
     ebpo_catalogue *c;
-    char *folder;    /* with '/' behind it, or "" */
-    uint64_t number; /* of the model that is read */
+    char *folder;    /* ending in '/', or "" */
+    uint64_t number; /* index of the model that is read */
     ebpo_error *error;
 } reader;
 
@@ -258,7 +258,7 @@ static ebpo_status bad_file(const reader *r, const char *what)
     return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->c->path, "not a catalogue: %s", what);
 }
 
-/* *out: NULL where the member is not there, is null or empty. */
+/* Reads a path; *out: NULL where the member is missing, null or empty. */
 static ebpo_status read_path(const reader *r, const json_t *model, const char *key,
                              const char **out)
 {
@@ -266,7 +266,7 @@ static ebpo_status read_path(const reader *r, const json_t *model, const char *k
     char what[64];
     if (!value || json_is_null(value) || (json_is_string(value) && !json_string_length(value)))
         return EBPO_OK;
-    snprintf(what, sizeof what, "%s is no text", key);
+    snprintf(what, sizeof what, "%s is not a text", key);
     if (!json_is_string(value))
         return bad_model(r, what);
     *out = joined_path(r->folder, json_string_value(value));
@@ -286,7 +286,7 @@ static ebpo_status read_digest(const reader *r, const json_t *model, const char 
         return EBPO_OK;
     }
     snprintf(what, sizeof what,
-             "%s is no digest, without which another file would be taken for the model", key);
+             "%s is not a digest; without one, another file could be taken for the model", key);
     return bad_model(r, what);
 }
 
@@ -305,7 +305,7 @@ static bool read_corner(const json_t *model, const char *key, double out[3])
 static ebpo_status read_box(const reader *r, const json_t *model, ebpo_catalogue_entry *e)
 {
     if (!read_corner(model, "box_min", e->min) || !read_corner(model, "box_max", e->max))
-        return bad_model(r, "a box has two corners, box_min and box_max, of three numbers");
+        return bad_model(r, "a box needs two corners, box_min and box_max, of three numbers");
     for (int k = 0; k < 3; k++)
         if (e->min[k] > e->max[k])
             return bad_model(r, "box_min is above box_max");
@@ -325,7 +325,7 @@ static bool read_rule(const json_t *of, ebpo_rule *out)
     return found;
 }
 
-/* A count that nothing depends on; 0 where it is none. */
+/* Returns a count that is only informative; 0 where it is invalid. */
 static uint64_t read_count(const json_t *model, const char *key)
 {
     double count = json_number_value(json_object_get(model, key));
@@ -351,14 +351,14 @@ static ebpo_status read_entry(const reader *r, const json_t *model, ebpo_catalog
 {
     const json_t *solid = json_object_get(model, "solid");
     if (!json_is_object(model))
-        return bad_model(r, "a model is an object");
+        return bad_model(r, "a model is not an object");
     ebpo_status status = read_paths(r, model, e);
     if (status == EBPO_OK)
         status = read_digest(r, model, "content_sha256", e->digest);
     if (status == EBPO_OK && e->surface)
         status = read_digest(r, model, "surface_sha256", e->surface_digest);
     if (status == EBPO_OK && !json_is_boolean(solid))
-        return bad_model(r, "solid is true or false");
+        return bad_model(r, "solid is not true or false");
     e->solid = json_is_true(solid);
     e->file_bytes = read_count(model, "bytes");
     e->face_count = read_count(model, "faces");
@@ -376,7 +376,7 @@ static ebpo_status read_models(reader *r, const json_t *root)
     ebpo_status status = EBPO_OK;
     uint64_t count = json_array_size(models);
     if (count == 0 || count >= UINT32_MAX)
-        return bad_file(r, "\"models\" is a list of one model at least");
+        return bad_file(r, "\"models\" is not a list of at least one model");
     c->entry = ebpo_alloc_zero(count, sizeof *c->entry);
     if (!c->entry)
         return ebpo_fail_memory(r->error, count * sizeof *c->entry);
@@ -386,7 +386,7 @@ static ebpo_status read_models(reader *r, const json_t *root)
     return status;
 }
 
-/* --- reading: the whole --- */
+/* --- reading: the whole file --- */
 
 static ebpo_status read_root(reader *r, const json_t *root)
 {
@@ -395,16 +395,16 @@ static ebpo_status read_root(reader *r, const json_t *root)
     const json_t *version = json_object_get(root, "version"),
                  *parts = json_object_get(root, "parts");
     if (!format || strcmp(format, "ebpo-catalogue") != 0)
-        return bad_file(r, "there is no \"format\": \"ebpo-catalogue\"");
+        return bad_file(r, "\"format\": \"ebpo-catalogue\" is missing");
     if (json_number_value(version) != 1)
         return ebpo_fail_file(r->error, EBPO_E_VERSION, c->path,
-                              "a catalogue of version %g; this program reads 1",
+                              "unsupported catalogue version %g; this program reads 1",
                               json_number_value(version));
     if (parts && !json_is_boolean(parts))
-        return bad_file(r, "parts is true or false");
+        return bad_file(r, "parts is not true or false");
     c->how.parts = json_is_true(parts);
     if (!read_rule(root, &c->how.rule))
-        return bad_file(r, "rule is nonzero, evenodd or positive");
+        return bad_file(r, "rule is not nonzero, evenodd or positive");
     return read_models(r, root);
 }
 
@@ -422,7 +422,7 @@ static ebpo_status parse_text(reader *r, const char *text, size_t size)
     return status;
 }
 
-/* The file's text, of c->file_bytes, to be freed. Pipes are not waited for. */
+/* Reads the file's text, of c->file_bytes, which the caller frees. Does not wait for pipes. */
 static ebpo_status read_text(ebpo_catalogue *c, char **text, ebpo_error *error)
 {
     struct stat st;
@@ -433,15 +433,16 @@ static ebpo_status read_text(ebpo_catalogue *c, char **text, ebpo_error *error)
     if (fstat(fd, &st) != 0)
         status = ebpo_fail_errno(error, c->path, "cannot be read");
     else if (!S_ISREG(st.st_mode))
-        status = ebpo_fail_file(error, EBPO_E_FORMAT, c->path, "cannot be read: is no file");
+        status =
+            ebpo_fail_file(error, EBPO_E_FORMAT, c->path, "cannot be read: not a regular file");
     FILE *in = status == EBPO_OK ? fdopen(fd, "r") : NULL;
     if (!in) {
         close(fd);
         return status == EBPO_OK ? ebpo_fail_memory(error, BUFSIZ) : status;
     }
     c->file_bytes = (uint64_t)st.st_size;
-    *text = c->file_bytes <= MOST_BYTES ? malloc((size_t)c->file_bytes + 1) : NULL;
-    if (c->file_bytes > MOST_BYTES)
+    *text = c->file_bytes <= MAX_BYTES ? malloc((size_t)c->file_bytes + 1) : NULL;
+    if (c->file_bytes > MAX_BYTES)
         status = ebpo_fail_file(error, EBPO_E_LIMIT, c->path,
                                 "too long for a catalogue: more than 1 GiB");
     else if (!*text)

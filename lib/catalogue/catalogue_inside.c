@@ -1,16 +1,16 @@
-/* Where points are: winding numbers, summed over the models whose boxes hold them.
+/* Classifies points by winding numbers, summed over the models whose boxes contain them.
  *
- * Of independent models a point is inside that is inside of any, and a model that has the point on
+ * With independent models a point is inside if it is inside any, and a model that has the point on
  * a face adds 0 to the sum.
  *
  * Parts of one model are closed by caps, which are no surface of the whole; the winding numbers of
- * all parts add up to the whole's where the point is on no face and no cap. A point that a part
- * says is on something is doubtful: it is on the whole's surface if a real face meets the box of
- * this one point, which is decided exactly. Else it is on a cap, and its winding number is counted
- * along a ray through the surfaces, which have no caps: faces that the ray goes out through less
- * those that it goes in through. A ray that meets an edge or runs along a face tells nothing, and
- * another one is cast. Directions are always the same ones, and every ray that tells the number
- * tells the same.
+ * all parts add up to the whole's where the point is on no face and no cap. A point that is on a
+ * face of some part is doubtful: it is on the whole's surface if a real face intersects the box of
+ * this one point, which is decided exactly. Otherwise it is on a cap, and its winding number is
+ * counted along a ray through the surfaces, which have no caps: faces that the ray leaves through
+ * less those that it enters through. A ray that hits an edge or runs along a face does not decide,
+ * and another one is cast. Directions are always the same ones, and every deciding ray gives the
+ * same number.
  *
  * Source: docs/guide/clusters.md, "Beyond 2^32 faces". */
 #include "core/strict_fp.h"
@@ -26,49 +26,49 @@
 #include "core/hash.h"
 #include "query/query_model.h"
 
-/* Rays that are tried before a point is given up. */
+/* Maximum number of rays tried for a point. */
 enum { DIRECTIONS = 64 };
 
-/* Of a point, so far. */
+/* Result for a point so far. */
 typedef struct found {
     int64_t winding;
     bool in, on;
 } found;
 
-static ebpo_status ask_windings(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
-                                ebpo_error *error)
+static ebpo_status query_windings(ebpo_context *context, const ebpo_catalogue_held *model,
+                                  void *user, ebpo_error *error)
 {
     const ebpo_catalogue_run *run = user;
     found *all = run->user;
-    ebpo_inside_result *told = ebpo_alloc(run->count, sizeof *told);
+    ebpo_inside_result *reported = ebpo_alloc(run->count, sizeof *reported);
     (void)model;
-    if (!told)
-        return ebpo_fail_memory(error, run->count * sizeof *told);
-    ebpo_status status = ebpo_inside_many(context, run->rows, run->count, NULL, told, error);
+    if (!reported)
+        return ebpo_fail_memory(error, run->count * sizeof *reported);
+    ebpo_status status = ebpo_inside_many(context, run->rows, run->count, NULL, reported, error);
     for (uint64_t i = 0; i < run->count && status == EBPO_OK; i++) {
         found *f = &all[run->pair[i].item];
-        f->winding += told[i].winding;
-        f->in |= told[i].where == EBPO_IN;
-        f->on |= told[i].where == EBPO_ON;
+        f->winding += reported[i].winding;
+        f->in |= reported[i].where == EBPO_IN;
+        f->on |= reported[i].where == EBPO_ON;
     }
-    free(told);
+    free(reported);
     return status;
 }
 
 /* --- doubtful points of parts: on faces --- */
 
-/* Points on faces or caps of a part, of which there is no sum yet. */
+/* Points on faces or caps of a part, which have no sum yet. */
 typedef struct doubtful {
     uint32_t count;
-    uint32_t *number; /* [count] among all points */
+    uint32_t *number; /* [count] index among all points */
     double *rows;     /* [count][7] as rays */
     bool *real;       /* [count] it is on a face of the whole */
-    int64_t *sum;     /* [count] of the ray that was cast last */
-    bool *plain;      /* [count] that ray tells the winding number */
+    int64_t *sum;     /* [count] sum of the last ray */
+    bool *plain;      /* [count] that ray gives the winding number */
 } doubtful;
 
-static ebpo_status ask_box(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
-                           ebpo_error *error)
+static ebpo_status query_box(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
+                             ebpo_error *error)
 {
     const ebpo_catalogue_run *run = user;
     const doubtful *d = run->user;
@@ -86,7 +86,7 @@ static ebpo_status ask_box(ebpo_context *context, const ebpo_catalogue_held *mod
     return status;
 }
 
-/* Keeps the points that are wanted, by `known`; those that go are told of to `all`. */
+/* Writes the results of the points with `known` to `all`, and keeps the others. */
 static void keep_unknown(doubtful *d, const bool *known, bool on, found *all)
 {
     uint32_t kept = 0;
@@ -104,8 +104,8 @@ static void keep_unknown(doubtful *d, const bool *known, bool on, found *all)
 
 /* --- doubtful points of parts: on caps --- */
 
-static ebpo_status ask_crossings(ebpo_context *context, const ebpo_catalogue_held *model,
-                                 void *user, ebpo_error *error)
+static ebpo_status query_crossings(ebpo_context *context, const ebpo_catalogue_held *model,
+                                   void *user, ebpo_error *error)
 {
     const ebpo_catalogue_run *run = user;
     const doubtful *d = run->user;
@@ -124,8 +124,8 @@ static ebpo_status ask_crossings(ebpo_context *context, const ebpo_catalogue_hel
     return status;
 }
 
-/* One ray from each of the points that are left. */
-static ebpo_status cast_rays(const ebpo_catalogue_asker *a, doubtful *d, uint64_t *state,
+/* Casts one ray from each of the remaining points. */
+static ebpo_status cast_rays(const ebpo_catalogue_querier *a, doubtful *d, uint64_t *state,
                              ebpo_error *error)
 {
     double direction[3];
@@ -138,18 +138,18 @@ static ebpo_status cast_rays(const ebpo_catalogue_asker *a, doubtful *d, uint64_
         d->sum[i] = 0;
         d->plain[i] = true;
     }
-    return ebpo_catalogue_ask_all(a, d->rows, d->count, 7, ebpo_catalogue_find_ray, true,
-                                  ask_crossings, d, error);
+    return ebpo_catalogue_query_all(a, d->rows, d->count, 7, ebpo_catalogue_find_ray, true,
+                                    query_crossings, d, error);
 }
 
-static ebpo_status judge_points(const ebpo_catalogue_asker *a, doubtful *d, found *all,
+static ebpo_status judge_points(const ebpo_catalogue_querier *a, doubtful *d, found *all,
                                 ebpo_error *error)
 {
     uint64_t state = 20;
     ebpo_status status = ebpo_catalogue_need_surface(a->c, error);
     if (status == EBPO_OK)
-        status = ebpo_catalogue_ask_all(a, d->rows, d->count, 7, ebpo_catalogue_find_point, true,
-                                        ask_box, d, error);
+        status = ebpo_catalogue_query_all(a, d->rows, d->count, 7, ebpo_catalogue_find_point, true,
+                                          query_box, d, error);
     if (status == EBPO_OK)
         keep_unknown(d, d->real, true, all);
     for (int i = 0; i < DIRECTIONS && d->count && status == EBPO_OK; i++) {
@@ -159,14 +159,14 @@ static ebpo_status judge_points(const ebpo_catalogue_asker *a, doubtful *d, foun
     }
     if (status == EBPO_OK && d->count)
         status = ebpo_fail_file(error, EBPO_E_LIMIT, ebpo_catalogue_shown(a->c),
-                                "no ray from %g %g %g tells its winding number", d->rows[0],
+                                "no ray from %g %g %g gives its winding number", d->rows[0],
                                 d->rows[1], d->rows[2]);
     return status;
 }
 
 /* --- parts together --- */
 
-static ebpo_status judge_doubtful(const ebpo_catalogue_asker *a, const double *points,
+static ebpo_status judge_doubtful(const ebpo_catalogue_querier *a, const double *points,
                                   uint32_t count, found *all, ebpo_error *error)
 {
     uint32_t most = 0;
@@ -204,26 +204,27 @@ static bool is_inside(ebpo_rule rule, int64_t winding)
                                        : winding > 0;
 }
 
-ebpo_status ebpo_catalogue_ask_inside(const ebpo_catalogue_asker *a, const double *rows,
-                                      uint32_t count, void *out, uint64_t *model, ebpo_error *error)
+ebpo_status ebpo_catalogue_query_inside(const ebpo_catalogue_querier *a, const double *rows,
+                                        uint32_t count, void *out, uint64_t *model,
+                                        ebpo_error *error)
 {
-    ebpo_inside_result *told = out;
+    ebpo_inside_result *reported = out;
     const ebpo_catalogue_options *how = &a->c->how;
     found *all = ebpo_alloc_zero(count, sizeof *all);
     (void)model;
     if (!all)
         return ebpo_fail_memory(error, count * sizeof *all);
-    ebpo_status status = ebpo_catalogue_ask_all(a, rows, count, 3, ebpo_catalogue_find_point, false,
-                                                ask_windings, all, error);
+    ebpo_status status = ebpo_catalogue_query_all(a, rows, count, 3, ebpo_catalogue_find_point,
+                                                  false, query_windings, all, error);
     if (status == EBPO_OK && how->parts)
         status = judge_doubtful(a, rows, count, all, error);
     for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
         const found *f = &all[i];
         bool in = how->parts ? !f->on && is_inside(how->rule, f->winding) : f->in;
-        told[i] = (ebpo_inside_result){ .where = in      ? EBPO_IN
-                                                 : f->on ? EBPO_ON
-                                                         : EBPO_OUT,
-                                        .winding = (int32_t)f->winding };
+        reported[i] = (ebpo_inside_result){ .where = in      ? EBPO_IN
+                                                     : f->on ? EBPO_ON
+                                                             : EBPO_OUT,
+                                            .winding = (int32_t)f->winding };
     }
     free(all);
     return status;
@@ -231,20 +232,20 @@ ebpo_status ebpo_catalogue_ask_inside(const ebpo_catalogue_asker *a, const doubl
 
 ebpo_status ebpo_catalogue_inside(const ebpo_catalogue *c, ebpo_catalogue_models *models,
                                   const double *points, uint64_t count,
-                                  const ebpo_catalogue_ask_options *options,
+                                  const ebpo_catalogue_query_options *options,
                                   ebpo_inside_result *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_catalogue_ask_options own;
-    ebpo_catalogue_job j = { { c, models, &own },   .ask = ebpo_catalogue_ask_inside,
+    ebpo_catalogue_query_options own;
+    ebpo_catalogue_job j = { { c, models, &own },   .run_query = ebpo_catalogue_query_inside,
                              .stage = "inside",     .width = 3,
                              .result = sizeof *out, .ordered = true,
                              .rows = points,        .out = (char *)out };
     ebpo_status status = ebpo_catalogue_take_options(&own, options, error);
     if (status == EBPO_OK && c->surface)
         status = ebpo_fail_file(error, EBPO_E_NOT_SOLID, c->surface->path,
-                                "is a surface: there is no inside");
+                                "is a surface: it has no inside");
     if (status == EBPO_OK)
         status = ebpo_check_points(points, count, error);
-    return status == EBPO_OK ? ebpo_catalogue_ask_rows(&j, count, error) : status;
+    return status == EBPO_OK ? ebpo_catalogue_query_rows(&j, count, error) : status;
 }

@@ -1,11 +1,11 @@
-/* Catalogues as files: JSON that ebpo_catalogue_open reads again. Boxes are the same bit for bit,
- * and counts below 2^53; entries without `file_bytes` are written without their counts.
+/* Writes catalogues as JSON files for ebpo_catalogue_open. Boxes are the same bit for bit, and
+ * counts below 2^53; entries without `file_bytes` are written without their counts.
  *
  * Paths that begin with the folder of the file become relative to it, so that a folder of models
- * and its catalogue can be moved together; a path that would then be read as another one stays as
- * it is. Numbers have the fewest digits that read back as the same double, whatever the locale.
- * What JSON cannot hold, a path that is not UTF-8, is refused before anything is written. The file
- * appears whole or not at all (io/publish.h).
+ * and its catalogue can be moved together; a path that would then be read differently stays as it
+ * is. Numbers have the fewest digits that read back as the same double, in any locale. A path that
+ * is not UTF-8, which JSON cannot represent, is refused before anything is written. The file is
+ * replaced atomically (io/publish.h).
  *
  * Source: docs/guide/clusters.md has the format. */
 #include "core/strict_fp.h"
@@ -36,8 +36,8 @@ static void write_text(FILE *to, const char *text)
     fputc('"', to);
 }
 
-/* The fewest digits that read back as the same double, "1.5e+00", in any locale. Returns how many
- * there are, which are put in `digits`, and the exponent of ten. */
+/* Returns the fewest digits that read back as the same double, "1.5e+00", in any locale: their
+ * number, the digits in `digits`, and the exponent of ten. */
 static int fewest_digits(double x, char digits[20], int *exponent)
 {
     char text[40];
@@ -57,7 +57,7 @@ static int fewest_digits(double x, char digits[20], int *exponent)
     return count;
 }
 
-/* As printf's %.17g has it, with no more digits than are needed. */
+/* Writes a number in the form of printf's %.17g, with no more digits than needed. */
 static void write_number(FILE *to, double x)
 {
     char digits[20];
@@ -93,8 +93,8 @@ static void write_digest(FILE *to, const char *key, const uint8_t digest[32])
     fputc('"', to);
 }
 
-/* A path without the folder (with '/' behind it, or ""), if it begins with that and is none of
- * another kind without it. */
+/* Writes a path without the folder (ending in '/', or ""), if it begins with that and the rest is a
+ * relative path. */
 static void write_path(FILE *to, const char *before, const char *key, const char *path,
                        const char *folder)
 {
@@ -157,8 +157,8 @@ static ebpo_status check_text(uint64_t number, const char *text, ebpo_error *err
     return !text || ebpo_text_is_utf8(text)
                ? EBPO_OK
                : ebpo_fail(error, EBPO_E_ARGUMENT,
-                           "entry %" PRIu64 " has a path that is not UTF-8, which JSON demands; "
-                           "give the file another name",
+                           "entry %" PRIu64 " has a path that is not UTF-8, which JSON requires; "
+                           "rename the file",
                            number);
 }
 

@@ -1,17 +1,17 @@
-/* The models that are open, of any number of catalogues, all within one memory budget.
+/* Open models of any number of catalogues, all within one memory budget.
  *
- * A model is known by the path and digest of its file, how that is opened, which numbers its faces
- * have, and its share of the budget: an equal one for each model of its catalogue, but at least an
- * eighth. The first question that needs it opens it; who asks holds it, and its share is taken as
- * long as anybody does. When there is no room, those that nobody holds are closed, the one that was
- * asked longest ago first; if that is not enough, the question waits until others are done. A
+ * A model is identified by the path and digest of its file, the options of opening, its face
+ * numbers, and its share of the budget: an equal one for each model of its catalogue, but at least
+ * an eighth. The first query that needs it opens it. A querying thread holds it, and its share is
+ * taken as long as any thread does. When memory is short, models that no thread holds are closed,
+ * the least recently used first; if that is not enough, the query waits until others are done. A
  * thread holds one model at a time, so that none waits for itself.
  *
- * What a file turns out to be is compared with what its catalogue says: the digest when it is
- * opened, and the box whenever it is lent, as two entries may tell of one file differently.
+ * The file is compared with its catalogue: the digest when it is opened, and the box whenever it is
+ * lent, as two entries may describe one file differently.
  *
- * Locks: one for the list and its sums, which is never held while a question is asked or a file is
- * opened, but while one is closed; each model has one for opening it and one for asking it. */
+ * Locks: one for the list and its sums, which is never held during a query or while a file is
+ * opened, but while one is closed; each model has one for opening and one for queries. */
 #include "core/strict_fp.h"
 
 #include <pthread.h>
@@ -22,15 +22,15 @@
 #include "catalogue/catalogue_in.h"
 #include "core/error.h"
 
-/* Models that are asked at a time at most, where there are many; open ones at most, for which the
- * system may allow fewer: each has a file or two. */
-enum { SHARES = 8, OPEN_MOST = 256, DESCRIPTORS_EACH = 4, CONTEXTS_KEPT = 256 };
+/* Maximum number of models that are queried at a time, where there are many; maximum number of open
+ * ones, for which the system may allow fewer: each has a file or two. */
+enum { SHARES = 8, OPEN_MAX = 256, DESCRIPTORS_EACH = 4, CONTEXTS_KEPT = 256 };
 
-/* What is asked for, and what a model is known by. */
+/* The requested model, which identifies it. */
 typedef struct wanted {
     const char *path, *numbers; /* numbers NULL: none */
     uint8_t digest[32];
-    uint64_t share; /* bytes; 0: as many as it needs */
+    uint64_t share; /* bytes; 0: no limit */
     ebpo_catalogue_open_fn open_file;
     ebpo_catalogue_close_fn close_file;
     void *user;
@@ -38,27 +38,27 @@ typedef struct wanted {
 
 struct ebpo_catalogue_held {
     ebpo_catalogue_held *before, *behind; /* in the order of use, the latest first */
-    wanted key;                           /* whose texts are its own */
-    unsigned users;                       /* these are under the lock of all models */
-    uint64_t bytes;                       /* that are counted */
-    pthread_mutex_t opening; /* of what follows, until there is a model; and of the contexts */
-    pthread_rwlock_t asking; /* alone: to ask when nobody else does */
+    wanted key;                           /* it owns its texts */
+    unsigned users;                       /* the next fields are under the lock of all models */
+    uint64_t bytes;                       /* counted bytes */
+    pthread_mutex_t opening; /* protects the next fields until there is a model; and the contexts */
+    pthread_rwlock_t querying; /* exclusive: for a query while no other one runs */
     ebpo_file *file;
-    ebpo_model *_Atomic model; /* for sums it is looked at without that lock */
+    ebpo_model *_Atomic model; /* read without that lock for sums */
     ebpo_catalogue_numbers numbers;
     ebpo_context *idle[CONTEXTS_KEPT];
     unsigned idle_count;
 };
 
 struct ebpo_catalogue_models {
-    unsigned threads, open_most;
-    pthread_mutex_t lock; /* of all below */
+    unsigned threads, open_max;
+    pthread_mutex_t lock; /* protects all fields below */
     pthread_cond_t changed;
     uint64_t memory;
     ebpo_catalogue_held *first, *last;
     unsigned held, busy;
     uint64_t taken;
-    uint64_t closed;       /* models that had been open */
+    uint64_t closed;       /* number of closed models */
     ebpo_model_stats gone; /* their sums */
 };
 
@@ -71,8 +71,8 @@ static ebpo_status check_digest(const ebpo_catalogue *c, const ebpo_catalogue_he
     if (memcmp(info->content_sha256, m->key.digest, sizeof m->key.digest) == 0)
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_FORMAT, m->key.path,
-                          "is not the file that %.150s tells of, by its content_sha256: it has "
-                          "changed; make the catalogue anew",
+                          "does not match the content_sha256 of %.150s: it has changed; make the "
+                          "catalogue again",
                           ebpo_catalogue_shown(c));
 }
 
@@ -83,8 +83,8 @@ static ebpo_status check_box(const ebpo_catalogue *c, const ebpo_catalogue_entry
     for (int k = 0; k < 3; k++)
         if (!(e->min[k] <= found->min[k] && found->max[k] <= e->max[k]))
             return ebpo_fail_file(error, EBPO_E_FORMAT, m->key.path,
-                                  "is not within the box that %.150s tells; make the catalogue "
-                                  "anew",
+                                  "is not within the box that %.150s has for it; make the "
+                                  "catalogue again",
                                   ebpo_catalogue_shown(c));
     return EBPO_OK;
 }
@@ -123,7 +123,8 @@ static ebpo_status open_file(ebpo_catalogue_held *m, ebpo_error *error)
         return ebpo_open(key->path, &m->file, error);
     ebpo_status status = key->open_file(key->user, key->path, &m->file, error);
     return status == EBPO_OK && !m->file ? ebpo_fail_file(error, EBPO_E_ARGUMENT, key->path,
-                                                          "the function that opens files gave none")
+                                                          "the function that opens files returned "
+                                                          "none")
                                          : status;
 }
 
@@ -149,13 +150,13 @@ static ebpo_status open_model(const ebpo_catalogue_models *models, const ebpo_ca
     close_model(m);
     if (status == EBPO_E_LIMIT && c->count > 1)
         return ebpo_fail_file(error, status, m->key.path,
-                              "%.380s (of the memory each model may take one part in %d)",
+                              "%.380s (each model may take one part in %d of the memory)",
                               why.message, c->count < SHARES ? (int)c->count : SHARES);
     why.status = status;
     return ebpo_fail_with(error, &why);
 }
 
-/* Once, by the first of those that want it. */
+/* Opens the model once, by the first thread that needs it. */
 static ebpo_status ready_model(const ebpo_catalogue_models *models, const ebpo_catalogue *c,
                                ebpo_catalogue_held *m, ebpo_context **context, ebpo_error *error)
 {
@@ -181,7 +182,7 @@ static void held_free(ebpo_catalogue_held *m)
 {
     close_model(m);
     pthread_mutex_destroy(&m->opening);
-    pthread_rwlock_destroy(&m->asking);
+    pthread_rwlock_destroy(&m->querying);
     free((char *)m->key.path);
     free((char *)m->key.numbers);
     free(m);
@@ -197,14 +198,14 @@ static ebpo_catalogue_held *held_new(const wanted *key)
     m->key.numbers = key->numbers ? strdup(key->numbers) : NULL;
     m->numbers.fd = -1;
     pthread_mutex_init(&m->opening, NULL);
-    pthread_rwlock_init(&m->asking, NULL);
+    pthread_rwlock_init(&m->querying, NULL);
     if (m->key.path && !m->key.numbers == !key->numbers)
         return m;
     held_free(m);
     return NULL;
 }
 
-/* --- all of them, under the lock --- */
+/* --- all models, under the lock --- */
 
 static bool same_key(const wanted *a, const wanted *b)
 {
@@ -259,22 +260,22 @@ static void drop_model(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
     held_free(m);
 }
 
-static bool has_room(const ebpo_catalogue_models *h, uint64_t size, unsigned more)
+static bool has_capacity(const ebpo_catalogue_models *h, uint64_t size, unsigned more)
 {
-    return h->held + more <= h->open_most && (!h->memory || h->taken + size <= h->memory);
+    return h->held + more <= h->open_max && (!h->memory || h->taken + size <= h->memory);
 }
 
-/* Closes what is idle until there is room for `size` bytes more; whether there is, or nothing else
- * is used, so that waiting would not help. */
-static bool make_room(ebpo_catalogue_models *h, uint64_t size, const ebpo_catalogue_held *but)
+/* Closes idle models until `size` more bytes are available. Returns true if they are, or if nothing
+ * else is used, so that waiting would not help. */
+static bool reserve_space(ebpo_catalogue_models *h, uint64_t size, const ebpo_catalogue_held *but)
 {
     unsigned more = but == NULL;
-    for (ebpo_catalogue_held *m = h->last, *next; m && !has_room(h, size, more); m = next) {
+    for (ebpo_catalogue_held *m = h->last, *next; m && !has_capacity(h, size, more); m = next) {
         next = m->before;
         if (!m->users && m != but)
             drop_model(h, m);
     }
-    return has_room(h, size, more) || !h->busy;
+    return has_capacity(h, size, more) || !h->busy;
 }
 
 static ebpo_catalogue_held *find_model(const ebpo_catalogue_models *h, const wanted *key)
@@ -288,10 +289,10 @@ static ebpo_catalogue_held *find_model(const ebpo_catalogue_models *h, const wan
 static uint64_t share_of(const ebpo_catalogue_models *h, const ebpo_catalogue *c)
 {
     uint64_t share = h->memory / (c->count < SHARES ? c->count : SHARES);
-    return h->memory && !share ? 1 : share; /* 0 would be without limit */
+    return h->memory && !share ? 1 : share; /* 0 would mean no limit */
 }
 
-/* NULL: not enough memory. */
+/* Returns NULL without memory. */
 static ebpo_catalogue_held *take_model(ebpo_catalogue_models *h, const ebpo_catalogue *c,
                                        wanted *key)
 {
@@ -301,7 +302,7 @@ static ebpo_catalogue_held *take_model(ebpo_catalogue_models *h, const ebpo_cata
         key->share = share_of(h, c);
         m = find_model(h, key);
         uint64_t more = !m ? key->share : m->bytes < key->share ? key->share - m->bytes : 0;
-        if ((m && m->users) || make_room(h, more, m))
+        if ((m && m->users) || reserve_space(h, more, m))
             break;
         pthread_cond_wait(&h->changed, &h->lock);
     }
@@ -315,7 +316,7 @@ static ebpo_catalogue_held *take_model(ebpo_catalogue_models *h, const ebpo_cata
         link_first(h, m);
         if (!m->users++) {
             h->busy++;
-            h->taken += key->share - m->bytes; /* what it takes now may become less, or more */
+            h->taken += key->share - m->bytes; /* its use may grow or shrink from now on */
             m->bytes = key->share;
         }
     }
@@ -323,7 +324,7 @@ static ebpo_catalogue_held *take_model(ebpo_catalogue_models *h, const ebpo_cata
     return m;
 }
 
-/* What is of no use, as it could not be opened, goes. */
+/* Gives a model back; removes one that could not be opened. */
 static void give_back(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
@@ -343,19 +344,20 @@ static void give_back(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
 
 /* --- lending --- */
 
-/* Contexts hold what they were last asked about: they go, that there is room for one. */
-static ebpo_status ask_alone(ebpo_catalogue_held *m, ebpo_catalogue_question ask, void *user,
-                             ebpo_error *error)
+/* Queries alone. Contexts hold their last subtrees: they are freed to make memory available for
+ * one. */
+static ebpo_status query_alone(ebpo_catalogue_held *m, ebpo_catalogue_query run_query, void *user,
+                               ebpo_error *error)
 {
     ebpo_context *context = NULL;
-    pthread_rwlock_wrlock(&m->asking);
+    pthread_rwlock_wrlock(&m->querying);
     while (m->idle_count)
         ebpo_context_free(m->idle[--m->idle_count]);
     ebpo_status status = ebpo_context_new(m->model, &context, error);
     if (status == EBPO_OK)
-        status = ask(context, m, user, error);
+        status = run_query(context, m, user, error);
     put_by(m, context);
-    pthread_rwlock_unlock(&m->asking);
+    pthread_rwlock_unlock(&m->querying);
     return status;
 }
 
@@ -371,7 +373,7 @@ static wanted key_of(const ebpo_catalogue *c, const ebpo_catalogue_entry *e, boo
 }
 
 ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models, const ebpo_catalogue *c,
-                                uint64_t number, bool surface, ebpo_catalogue_question ask,
+                                uint64_t number, bool surface, ebpo_catalogue_query run_query,
                                 void *user, ebpo_error *error)
 {
     ebpo_context *context = NULL;
@@ -380,17 +382,17 @@ ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models, const ebpo_catalo
     ebpo_catalogue_held *m = take_model(models, c, &key);
     if (!m)
         return ebpo_fail_memory(error, sizeof *m);
-    pthread_rwlock_rdlock(&m->asking);
+    pthread_rwlock_rdlock(&m->querying);
     ebpo_status status = ready_model(models, c, m, &context, error);
     if (status == EBPO_OK)
         status = check_box(c, e, m, error);
     if (status == EBPO_OK)
-        status = ask(context, m, user, error);
+        status = run_query(context, m, user, error);
     bool again = status == EBPO_E_LIMIT && context;
     put_by(m, context);
-    pthread_rwlock_unlock(&m->asking);
+    pthread_rwlock_unlock(&m->querying);
     if (again)
-        status = ask_alone(m, ask, user, error);
+        status = query_alone(m, run_query, user, error);
     give_back(models, m);
     return status;
 }
@@ -420,8 +422,8 @@ ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *m, uint64_t *fac
 static unsigned may_be_open(void)
 {
     struct rlimit most;
-    if (getrlimit(RLIMIT_NOFILE, &most) != 0 || most.rlim_cur / (2 * DESCRIPTORS_EACH) >= OPEN_MOST)
-        return OPEN_MOST;
+    if (getrlimit(RLIMIT_NOFILE, &most) != 0 || most.rlim_cur / (2 * DESCRIPTORS_EACH) >= OPEN_MAX)
+        return OPEN_MAX;
     unsigned fit = (unsigned)most.rlim_cur / (2 * DESCRIPTORS_EACH);
     return fit ? fit : 1;
 }
@@ -440,7 +442,7 @@ ebpo_status ebpo_catalogue_models_new(const ebpo_catalogue_models_options *optio
     h->memory = own.memory;
     h->threads = own.threads;
     h->gone = (ebpo_model_stats)EBPO_MODEL_STATS_INIT;
-    h->open_most = may_be_open();
+    h->open_max = may_be_open();
     pthread_mutex_init(&h->lock, NULL);
     pthread_cond_init(&h->changed, NULL);
     *out = h;

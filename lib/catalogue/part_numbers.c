@@ -1,9 +1,9 @@
-/* Numbers of faces in the whole, of a part: a .npy of integers with one dimension (NumPy's format,
- * versions 1 to 3), of which single numbers are read where they are wanted, by any thread.
+/* Numbers in the whole of a part's faces: a .npy of integers with one dimension (NumPy's format,
+ * versions 1 to 3), from which any thread reads single numbers when needed.
  *
- * The file is untrusted input, as is the catalogue that names it. Its head is read once: the type,
- * the order of bytes, and how many numbers there are, which must fit the file's size. A number that
- * no face has, negative or beyond 2^63, is refused when it is met. */
+ * The file is untrusted input, as is the catalogue that refers to it. Its header is read once: the
+ * type, the byte order, and the count of numbers, which must match the file's size. An invalid face
+ * number, negative or beyond 2^63, is refused when it is read. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -15,15 +15,15 @@
 #include "catalogue/catalogue_in.h"
 #include "core/error.h"
 
-enum { HEAD_MOST = 4096 };
+enum { HEAD_MAX = 4096 };
 
 static ebpo_status bad_numbers(const ebpo_catalogue_numbers *f, ebpo_error *error, const char *what)
 {
     return ebpo_fail_file(error, EBPO_E_FORMAT, f->path,
-                          "is no .npy array of integers with one dimension: %s", what);
+                          "is not a .npy array of integers with one dimension: %s", what);
 }
 
-/* What stands behind 'key': in the head; or NULL. */
+/* Returns the text after 'key': in the header; or NULL. */
 static const char *value_of(const char *head, const char *key)
 {
     const char *at = strstr(head, key);
@@ -31,7 +31,7 @@ static const char *value_of(const char *head, const char *key)
     return at ? at + 1 + strspn(at + 1, " ") : NULL;
 }
 
-/* '<i8' and the like; where the head ends earlier, nothing behind its end is looked at. */
+/* Reads '<i8' and the like; reads nothing beyond the end of the header. */
 static bool read_type(ebpo_catalogue_numbers *f, const char *at)
 {
     if (!at || (*at != '\'' && *at != '"') || strlen(at) < sizeof "'<i8'" - 1 ||
@@ -43,7 +43,7 @@ static bool read_type(ebpo_catalogue_numbers *f, const char *at)
     return true;
 }
 
-/* (N,) */
+/* Reads (N,) */
 static bool read_shape(ebpo_catalogue_numbers *f, const char *at)
 {
     char *end;
@@ -55,29 +55,29 @@ static bool read_shape(ebpo_catalogue_numbers *f, const char *at)
     return errno == 0 && *end == ',' && end[1 + strspn(end + 1, " ")] == ')';
 }
 
-/* Versions 1 to 3 differ in how long the length of the head is. */
+/* Reads the header. Versions 1 to 3 differ in the size of the header's length. */
 static ebpo_status read_head(ebpo_catalogue_numbers *f, ebpo_error *error)
 {
-    char text[HEAD_MOST + 1];
+    char text[HEAD_MAX + 1];
     struct stat st;
-    ssize_t got = pread(f->fd, text, HEAD_MOST, 0);
+    ssize_t got = pread(f->fd, text, HEAD_MAX, 0);
     const unsigned char *b = (const unsigned char *)text;
     if (got < 0)
         return ebpo_fail_errno(error, f->path, "cannot be read");
     if (got < 12 || memcmp(text, "\x93NUMPY", 6) != 0 || b[6] < 1 || b[6] > 3)
-        return bad_numbers(f, error, "it begins otherwise");
+        return bad_numbers(f, error, "invalid start of the file");
     size_t first = b[6] == 1 ? 10 : 12, length = (size_t)b[8] | (size_t)b[9] << 8;
     if (b[6] > 1)
         length |= (size_t)b[10] << 16 | (size_t)b[11] << 24;
     if (length > (size_t)got - first)
-        return bad_numbers(f, error, "its head is too long");
+        return bad_numbers(f, error, "the header is too long");
     text[first + length] = 0;
     if (strlen(text + first) != length || !read_type(f, value_of(text + first, "'descr'")) ||
         !read_shape(f, value_of(text + first, "'shape'")))
-        return bad_numbers(f, error, "its head tells something else");
+        return bad_numbers(f, error, "unsupported header");
     f->begin = (int64_t)(first + length);
     if (fstat(f->fd, &st) != 0 || f->count > (uint64_t)(st.st_size - f->begin) / f->bytes)
-        return bad_numbers(f, error, "it is shorter than its head tells");
+        return bad_numbers(f, error, "the file is shorter than its header requires");
     return EBPO_OK;
 }
 
@@ -85,7 +85,8 @@ ebpo_status ebpo_catalogue_numbers_open(ebpo_catalogue_numbers *f, const char *p
                                         ebpo_error *error)
 {
     struct stat st;
-    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY); /* no pipe is waited for */
+    int fd =
+        open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY); /* does not wait for a pipe */
     *f = (ebpo_catalogue_numbers){ .path = path, .fd = fd };
     if (fd < 0)
         return ebpo_fail_file(error,
@@ -93,7 +94,9 @@ ebpo_status ebpo_catalogue_numbers_open(ebpo_catalogue_numbers *f, const char *p
                               "cannot be read as a .npy: %s", strerror(errno));
     if (fstat(fd, &st) != 0 || !S_ISREG(st.st_mode)) {
         ebpo_catalogue_numbers_close(f);
-        return ebpo_fail_file(error, EBPO_E_FORMAT, path, "cannot be read as a .npy: is no file");
+        return ebpo_fail_file(error, EBPO_E_FORMAT, path,
+                              "cannot be read as a .npy: not a regular "
+                              "file");
     }
     ebpo_status status = read_head(f, error);
     if (status != EBPO_OK)

@@ -29,15 +29,15 @@ enum { GRAIN = 1 << 15 };
 typedef struct arranging {
     ebpo_mesh *mesh;
     unsigned threads;
-    bool together; /* referenced or not, vertices go where their positions say */
+    bool together; /* true: vertices are sorted by position, referenced or not */
     const ebpo_progress *progress;
-    uint8_t *referenced;    /* bit v: a face names vertex v */
-    double (*bounds)[2][3]; /* of each GRAIN of vertices */
+    uint8_t *referenced;    /* bit v: a face uses vertex v */
+    double (*bounds)[2][3]; /* bounds of each GRAIN of vertices */
     struct ebpo_arrangement *to;
     float *xyz32;
     double *xyz64;
     uint32_t *rank, *corners, *faces;
-    /* the window of `rank`: of vertices with these source numbers */
+    /* the window of `rank`: vertices with these source numbers */
     uint64_t rank_first, rank_count;
 } arranging;
 
@@ -97,8 +97,8 @@ static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Exact walls at deep levels enlarge the box around a model that is small and far from the origin:
- * the deepest level at which that hardly matters. */
+/* Chooses the deepest level at which exact cell faces hardly enlarge the box; they enlarge it
+ * around a small model far from the origin. */
 static bool choose_box(ebpo_box *out, const double min[3], const double max[3], int level)
 {
     static const double larger = 1 + 0x1p-16;
@@ -152,32 +152,32 @@ static ebpo_status measure_all(arranging *a, int level, ebpo_error *error)
 
 typedef struct vertex_record {
     uint64_t key;
-    uint32_t at, unused; /* in the mesh as it is */
+    uint32_t at, unused; /* index in the mesh before sorting */
     double p[3];
 } vertex_record;
 
-/* The same with floats' bits, in 24 bytes. */
+/* Vertex record with the bits of floats, in 24 bytes. */
 typedef struct float_record {
     uint64_t key;
     uint32_t at;
     float p[3];
 } float_record;
 
-/* The wall numbers around a coordinate; division may round to the wrong side of a wall, comparing
- * with the exact wall does not. */
+/* Returns the number of the cell that holds a coordinate; division may round to the wrong side of a
+ * cell face, comparing with the exact cell face does not. */
 static uint32_t cell_slot(const ebpo_box *box, int axis, int level, double x)
 {
     double cells = (double)(1u << level), at = (x - box->origin[axis]) / (box->size[axis] / cells);
     uint32_t k = at <= 0 ? 0 : at >= cells ? (1u << level) - 1 : (uint32_t)at;
-    while (k > 0 && x < ebpo_wall(box, axis, level, k))
+    while (k > 0 && x < ebpo_cell_face(box, axis, level, k))
         k--;
-    while (k + 1 < 1u << level && x >= ebpo_wall(box, axis, level, k + 1))
+    while (k + 1 < 1u << level && x >= ebpo_cell_face(box, axis, level, k + 1))
         k++;
     return k;
 }
 
-/* An octcode as if of level 20, so that sorting knows where its leading bits are. What no face
- * names goes behind all that is. */
+/* Returns an octcode as if of level 20, so that sorting knows the position of its leading bits.
+ * Vertices without faces go behind all others. */
 static uint64_t key_of(const arranging *a, uint64_t v)
 {
     const ebpo_box *box = &a->to->box;
@@ -210,7 +210,8 @@ static ebpo_status make_vertices(void *context, uint64_t begin, uint64_t end, vo
     return EBPO_OK;
 }
 
-/* Of one cell: by position, so that equal ones are neighbours; then as they were. */
+/* Orders vertices of one cell by position, so that equal ones are neighbours; then by their old
+ * order. */
 static int compare_points(const double p[3], const double q[3], uint32_t a, uint32_t b)
 {
     for (int k = 0; k < 3; k++)
@@ -250,7 +251,7 @@ static void take_vertices(void *context, uint64_t place, const void *records, ui
         if (a->to->key)
             a->to->key[place] =
                 (key & ~UNREFERENCED) >> 3 * (EBPO_MAX_LEVEL - a->to->box.grid_level);
-        a->to->vertex_source[place] = at; /* told in the source's numbers at the end */
+        a->to->vertex_source[place] = at; /* converted to the source's numbers at the end */
     }
 }
 
@@ -310,16 +311,16 @@ static ebpo_status translate_corners(void *context, uint64_t begin, uint64_t end
     return EBPO_OK;
 }
 
-/* By windows of vertices that fit into memory, all faces for each: memory is gone through in order,
- * but for the window. */
+/* Translates faces by windows of vertices that fit into memory, all faces for each: memory is
+ * accessed in order, except in the window. */
 static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *error)
 {
     ebpo_mesh *mesh = a->mesh;
-    ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
-    figures.memory = UINT64_MAX;
+    ebpo_workspace_stats metrics = EBPO_WORKSPACE_STATS_INIT;
+    metrics.memory = UINT64_MAX;
     if (mesh->workspace)
-        ebpo_workspace_get_stats(mesh->workspace, &figures);
-    uint64_t window = figures.memory / 8 / sizeof *a->rank;
+        ebpo_workspace_get_stats(mesh->workspace, &metrics);
+    uint64_t window = metrics.memory / 8 / sizeof *a->rank;
     a->rank_count = mesh->vertex_count < window ? mesh->vertex_count : window ? window : 1;
     a->rank = ebpo_alloc(a->rank_count, sizeof *a->rank);
     a->corners = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *a->corners);
@@ -418,8 +419,8 @@ static ebpo_status sort_faces(arranging *a, ebpo_error *error)
 
 /* --- the whole mesh --- */
 
-/* A mesh that was arranged already: the source's numbers of vertices come from its own map; those
- * of faces were sorted by. */
+/* Composes the maps of a mesh that was arranged already: the source's numbers of vertices come from
+ * its map; those of faces were the sort keys. */
 static void compose_maps(const struct ebpo_arrangement *before, ebpo_workspace *workspace,
                          uint32_t *map, uint64_t count)
 {
@@ -457,7 +458,7 @@ static ebpo_status arrange_by_curve(arranging a, int level, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     if (mesh->arrangement && mesh->arrangement->key && mesh->arrangement->level == level)
-        return EBPO_OK; /* it would come out the same */
+        return EBPO_OK; /* the result would be the same */
     a.to = ebpo_alloc_zero(1, sizeof *a.to);
     if (a.to)
         a.to->workspace = mesh->workspace;
@@ -492,8 +493,8 @@ ebpo_status ebpo_mesh_arrange(ebpo_mesh *mesh, unsigned threads, ebpo_progress p
     return ebpo_arrange(mesh, -1, threads, &progress, error);
 }
 
-ebpo_status ebpo_arrange_to_mend(ebpo_mesh *mesh, unsigned threads, const ebpo_progress *progress,
-                                 ebpo_error *error)
+ebpo_status ebpo_arrange_to_repair(ebpo_mesh *mesh, unsigned threads, const ebpo_progress *progress,
+                                   ebpo_error *error)
 {
     return arrange_by_curve((arranging){ .mesh = mesh,
                                          .threads = ebpo_thread_count(threads),

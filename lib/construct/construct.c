@@ -1,10 +1,10 @@
-/* Builds the tree of a mesh: runs the stages that builder.h lists, in their order, and fills in the
- * facts of the result.
+/* Builds the tree of a mesh: runs the stages that builder.h lists, in order, and fills in the facts
+ * of the result.
  *
- * Between the stages stand only the checks of options and the choice of the deepest level (EBP
- * 2017, equation 3). Pieces are worked on by all threads; a piece's envelopes need its parent's, so
- * the top of the tree comes first. With a selection from the leaves up, the planes of all nodes are
- * chosen before that. ebpo_build takes over the mesh and frees it, also on failure. */
+ * This file checks options and chooses the deepest level (EBP 2017, equation 3). All threads
+ * process pieces; a piece's envelopes need its parent's, so the top of the tree comes first. With a
+ * selection from the leaves up, the planes of all nodes are chosen before that. ebpo_build takes
+ * over the mesh and frees it, also on failure. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -24,7 +24,7 @@
 #include "construct/supports.h"
 #include "ebpo_config.h"
 
-/* EBP 2017, equation 3: the least i >= 1 with L / 2^i below the mean edge. */
+/* Implements EBP 2017, equation 3: the least i >= 1 with L / 2^i below the mean edge. */
 static int level_limit(const ebpo_mesh_report *report)
 {
     double side = 0;
@@ -45,7 +45,7 @@ static ebpo_status check_text(const char *name, const char *text, size_t capacit
         return ebpo_fail(error, EBPO_E_ARGUMENT, "%s is longer than %zu bytes", name, capacity - 1);
     for (const unsigned char *c = (const unsigned char *)text; *c; c++)
         if (*c < 32 || *c == 127)
-            return ebpo_fail(error, EBPO_E_ARGUMENT, "%s holds a control character", name);
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "%s contains a control character", name);
     return EBPO_OK;
 }
 
@@ -80,11 +80,11 @@ static ebpo_status check_options(const ebpo_build_options *o, const ebpo_info *i
 static void copy_text(char *to, const char *from)
 {
     if (from)
-        strcpy(to, from); /* check_options saw to the length */
+        strcpy(to, from); /* check_options checked the length */
 }
 
-/* Names of files may be any bytes; the format wants text. What is neither printable ASCII nor part
- * of a valid UTF-8 sequence becomes "_". */
+/* Copies a name. Names of files may be any bytes; the format requires text. A byte that is neither
+ * printable ASCII nor part of a valid UTF-8 sequence becomes "_". */
 static void copy_name(char *to, const char *from)
 {
     while (*from) {
@@ -97,8 +97,8 @@ static void copy_name(char *to, const char *from)
         bool fine = length > 0 && c[0] >= 32 && c[0] != 127;
         for (int i = 1; i < length && fine; i++)
             fine = (c[i] & 0xc0) == 0x80;
-        /* Control characters of Latin 1, sequences longer than need be, surrogates, what lies
-         * beyond Unicode. */
+        /* Control characters of Latin 1, overlong sequences, surrogates, code points beyond
+         * Unicode. */
         if ((c[0] == 0xc2 && c[1] < 0xa0) || (c[0] == 0xe0 && c[1] < 0xa0) ||
             (c[0] == 0xed && c[1] >= 0xa0) || (c[0] == 0xf0 && c[1] < 0x90) ||
             (c[0] == 0xf4 && c[1] >= 0x90))
@@ -111,7 +111,7 @@ static void copy_name(char *to, const char *from)
 }
 
 static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *mesh,
-                      const ebpo_mesh_report *report, const ebpo_mend_record *mend)
+                      const ebpo_mesh_report *report, const ebpo_repair_record *repair_record)
 {
     const ebpo_build_options *o = b->options;
     info->version_major = EBPO_FORMAT_MAJOR;
@@ -129,9 +129,11 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     info->double_coordinates = mesh->xyz64 != NULL;
     info->vertex_count = mesh->vertex_count;
     info->face_count = mesh->face_count;
-    info->source_vertex_count = ebpo_mesh_whole_vertices(mesh) + (mend ? mend->welded_vertices : 0);
+    info->source_vertex_count =
+        ebpo_mesh_whole_vertices(mesh) + (repair_record ? repair_record->welded_vertices : 0);
     info->source_face_count =
-        ebpo_mesh_whole_faces(mesh) + (mend ? mend->dropped_faces - mend->added_faces : 0);
+        ebpo_mesh_whole_faces(mesh) +
+        (repair_record ? repair_record->dropped_faces - repair_record->added_faces : 0);
     memcpy(info->box_origin, b->box.origin, sizeof info->box_origin);
     memcpy(info->box_size, b->box.size, sizeof info->box_size);
     info->grid_level = b->box.grid_level;
@@ -144,8 +146,8 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
     info->k_root = traits->from_leaves ? o->k_root : 0;
     info->normals = traits->takes_normals ? o->normals : 0;
     info->seed = traits->takes_seed ? o->seed : 0;
-    if (mend)
-        info->mend = *mend;
+    if (repair_record)
+        info->repair_record = *repair_record;
     info->report = *report;
     info->parts = o->parts;
     if (!ebpo_attributes_hold(mesh->attributes) || !(o->parts & EBPO_PART_MESH))
@@ -154,7 +156,7 @@ static void fill_info(ebpo_info *info, const ebpo_builder *b, const ebpo_mesh *m
         info->parts &= ~(uint32_t)EBPO_PART_COLOURS;
 }
 
-/* A tree that is deeper than the order is good for needs another one. */
+/* Arranges the mesh again if the tree is deeper than its order supports. */
 static ebpo_status arrange_for_levels(ebpo_builder *b, ebpo_mesh *mesh, ebpo_error *error)
 {
     const ebpo_progress *progress = &b->options->progress;
@@ -185,10 +187,9 @@ static ebpo_status builder_begin(ebpo_builder *b, ebpo_mesh *mesh, const ebpo_me
     if (!b->solid && options->require_solid)
         return ebpo_fail(
             error, EBPO_E_NOT_SOLID,
-            "%s does not balance (%llu edges are not used as often one way as the "
-            "other), so it does not bound a solid; "
-            "'ebpo check' tells which repairs leave one; leave out --require-solid for a "
-            "surface model",
+            "%s does not balance (%llu edges are not used as often one way as the other), so it "
+            "does not bound a solid; run 'ebpo check' to see the repairs that make one, or omit "
+            "--require-solid for a surface model",
             mesh->source_name[0] ? mesh->source_name : "the mesh",
             (unsigned long long)report->unbalanced_edges.count);
     b->max_level = options->max_level >= 0 ? options->max_level : level_limit(report);
@@ -210,7 +211,7 @@ static void builder_free(ebpo_builder *b)
 typedef struct piece_job {
     ebpo_builder *b;
     ebpo_emit_scratch **scratch;             /* [threads] */
-    _Atomic uint64_t cells_ns, envelopes_ns; /* of all threads */
+    _Atomic uint64_t cells_ns, envelopes_ns; /* sums over all threads */
 } piece_job;
 
 static ebpo_status work_on_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -255,8 +256,8 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
     return status;
 }
 
-/* From the root down, each piece is finished in one pass. From the leaves up, the top needs all
- * pieces first: their cells are made twice rather than kept. */
+/* Builds the tree. From the root down, each piece is finished in one pass. From the leaves up, the
+ * top needs all pieces first: their cells are made twice rather than kept. */
 static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
 {
     ebpo_status status = ebpo_build_corner_windings(b, error);
@@ -291,12 +292,12 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
 }
 
 ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                       const ebpo_mend_record *mend, const ebpo_build_options *options,
+                       const ebpo_repair_record *repair_record, const ebpo_build_options *options,
                        ebpo_tree *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_build_options wanted = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_build_times times = EBPO_BUILD_TIMES_INIT, *asked = NULL;
+    ebpo_build_times times = EBPO_BUILD_TIMES_INIT, *queried = NULL;
     ebpo_builder b = { .workspace = mesh->workspace,
                        .top.workspace = mesh->workspace,
                        .bounds.workspace = mesh->workspace };
@@ -305,24 +306,24 @@ ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
         out->level[i].workspace = mesh->workspace;
     ebpo_status status = EBPO_TAKE(ebpo_build_options, &wanted, options, error);
-    /* other bits stand for other needs of arrays */
+    /* other bits request other arrays */
     wanted.parts &= EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES |
                     EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS;
     if (status == EBPO_OK && wanted.times)
         status = EBPO_CHECK_SIZED(ebpo_build_times, wanted.times, error);
     if (status == EBPO_OK) {
-        asked = wanted.times;
+        queried = wanted.times;
         wanted.times = &times;
         status = check_options(&wanted, &out->info, error);
     }
     if (status == EBPO_OK)
         status = builder_begin(&b, mesh, report, &wanted, error);
     if (status == EBPO_OK)
-        fill_info(&out->info, &b, mesh, report, mend);
+        fill_info(&out->info, &b, mesh, report, repair_record);
     if (status == EBPO_OK)
         status = run_stages(&b, mesh, out, error);
-    if (asked)
-        EBPO_GIVE(ebpo_build_times, asked, &times);
+    if (queried)
+        EBPO_GIVE(ebpo_build_times, queried, &times);
     builder_free(&b);
     ebpo_mesh_free(mesh);
     if (status != EBPO_OK)

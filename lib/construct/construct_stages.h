@@ -1,6 +1,6 @@
-/* The stages of building, as construct.c runs them; builder.h lists them in order. Each function
- * works on one piece (ebpo_branch) or on the whole builder. Stages that allocate report
- * EBPO_E_MEMORY or EBPO_E_IO, long ones EBPO_E_CANCELLED. */
+/* The stages of building, run by construct.c; builder.h lists them in order. Each function
+ * processes one piece (ebpo_branch) or the whole builder. Stages that allocate report EBPO_E_MEMORY
+ * or EBPO_E_IO, long ones EBPO_E_CANCELLED. */
 #ifndef EBPO_CONSTRUCT_CONSTRUCT_STAGES_H
 #define EBPO_CONSTRUCT_CONSTRUCT_STAGES_H
 
@@ -10,18 +10,18 @@
 /* --- partition.c: the nodes of a piece and the face lists of its leaves --- */
 
 ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *error);
-/* EBPO_E_LIMIT when there are more leaves, or more faces listed in them, than a mesh of that many
- * faces may have. */
+/* Returns EBPO_E_LIMIT when there are more leaves, or more faces listed in them, than the limits
+ * for a mesh with that many faces. */
 ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_t entries,
                                    ebpo_error *error);
 
 /* Cuts the top of the tree, and lists the faces of the pieces below it. */
 ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error);
 
-/* --- propose.c: selections from the leaves up (the theses') --- */
+/* --- propose.c: selections from the leaves up (of the theses) --- */
 
-/* All branches; nothing to do for a selection from the root. After the corner windings.
- * Pieces are partitioned for it, and forgotten again. */
+/* Chooses planes for all branches, after the corner windings; does nothing for a selection from the
+ * root. Pieces are partitioned for it, and their nodes are freed again. */
 EBPO_MUST_USE ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error);
 
 /* --- emit_levels.c --- */
@@ -31,7 +31,7 @@ ebpo_status ebpo_emit_scratch_make(ebpo_emit_scratch **out, ebpo_workspace *work
                                    ebpo_error *error);
 void ebpo_emit_scratch_free(ebpo_emit_scratch *scratch);
 
-/* Writes a piece's part of the levels' arrays; leaf_refs still holds the faces' numbers along the
+/* Writes a piece's part of the levels' arrays; leaf_refs still has the faces' numbers along the
  * curve, not the final ones. */
 ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, ebpo_branch *s,
                             ebpo_error *error);
@@ -41,44 +41,44 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
 
 /* --- triangle_cell.c --- */
 
-/* Bit i set: the face may touch the closed octant i of the cell, which it is known to touch
- * (conservatively). An octant that the face touches is never missing. */
-unsigned ebpo_octants_touched(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face);
+/* Returns a mask; bit i set: the face, which touches the cell, may touch its closed octant i
+ * (conservative). An octant that the face touches is never missing. */
+unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face);
 
 /* --- face_numbers.c: final numbers, in the order in which leaves list them first --- */
 
 /* Numbers a piece's fresh faces. */
 ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error);
-/* The mesh in its final order. */
+/* Puts the mesh into its final order. */
 ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, ebpo_error *error);
 
 /* --- gray_colours.c (format-spec/README.md, section 19) --- */
 
-/* Of a tree whose levels, mesh and attributes are there, and have colours. EBPO_E_MEMORY,
+/* Computes colours for a tree with levels, mesh and coloured attributes. Returns EBPO_E_MEMORY,
  * EBPO_E_IO, EBPO_E_CANCELLED. */
 EBPO_MUST_USE ebpo_status ebpo_build_gray_colours(const ebpo_builder *b, ebpo_tree *out,
                                                   ebpo_error *error);
 
 /* --- corner_windings.c --- */
 
-/* Of all branches, before the pieces are partitioned. */
+/* Computes the windings of all branches, before the pieces are partitioned. */
 ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error);
-/* Winding number at corner 0 of each child minus that of the parent's, from the children's corner
- * differences. */
+/* Computes the winding number at corner 0 of each child minus that of the parent, from the
+ * children's corner differences. */
 void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                          int32_t offset[8]);
-/* The corner differences of a cell from the branch's faces that touch it: list[places[i]], or with
- * NULL the first `count` of the list. Long lists are processed EBPO_CORNER_FACES at a time, so
- * `capacity` needs the lesser of that and `count`. */
+/* Computes the corner differences of a cell from the branch's faces that touch it: list[places[i]],
+ * or with NULL the first `count` of the list. Long lists are processed EBPO_CORNER_FACES at a time,
+ * so `capacity` needs the lesser of that and `count`. */
 enum { EBPO_CORNER_FACES = 1 << 14 };
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
                          const uint32_t *places, uint64_t count, ebpo_triangle *capacity,
                          int32_t delta[8]);
-/* A gray node's own corner differences from its children's. Crossings along any way between two
- * corners agree when the mesh balances: false when they do not. */
+/* Computes a gray node's corner differences from its children's. Crossings along all paths between
+ * two corners agree when the mesh balances; returns false when they do not. */
 bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                        int32_t delta[8]);
-/* Bit i is set when corner i is inside by the builder's rule. */
+/* Returns a mask; bit i is set when corner i is inside by the builder's rule. */
 unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32_t delta[8]);
 
 /* --- envelopes.c --- */
@@ -87,8 +87,8 @@ typedef struct ebpo_envelope_scratch ebpo_envelope_scratch;
 ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error);
 void ebpo_scratch_free(ebpo_envelope_scratch *scratch);
 
-/* The own planes of a gray node, chosen now or proposed before; `envelope` is its parent's cut to
- * its cell, then its own. Returns their number, -1: out of memory. */
+/* Sets the planes of a gray node itself, chosen now or proposed before; `envelope` is its parent's
+ * cut to its cell, then its envelope. Returns their number, -1: out of memory. */
 int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s,
                      uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
                      uint32_t codes[EBPO_PLANES_STORED]);
@@ -100,7 +100,7 @@ typedef struct ebpo_top_envelope {
     double volume;
 } ebpo_top_envelope;
 
-/* The nodes above the subtrees. */
+/* Computes the envelopes of the nodes above the subtrees. */
 ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error);
 
 #endif

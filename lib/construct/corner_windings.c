@@ -2,12 +2,12 @@
  * without faces, are inside.
  *
  * In one cell, a corner's number follows from another's by the signed crossings of faces along the
- * cell's edges; all corners are taken as shifted by the same infinitely small amount, so a face
- * through a corner is no special case (ebpo_axis_crossing). For the tree, each node keeps its
- * corners' differences from its corner 0. A gray node's come from its children's; a walk along the
- * children's edges adds them up. The root's lowest corner is outside the model: its winding number
- * is 0. This replaces the special cases of BP 2008, 3.4.1.1. Where two paths to a corner disagree
- * the mesh does not balance, and the model is a surface. */
+ * cell's edges; all corners are shifted by the same infinitely small amount, so a face through a
+ * corner is no special case (ebpo_axis_crossing). For the tree, each node keeps its corners'
+ * differences from its corner 0. A gray node's come from its children's, added along the children's
+ * edges. The root's lowest corner is outside the model: its winding number is 0. This replaces the
+ * special cases of BP 2008, 3.4.1.1. Where two paths to a corner disagree the mesh does not
+ * balance, and the model is a surface. */
 #include "core/strict_fp.h"
 
 #include <string.h>
@@ -37,7 +37,7 @@ void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell 
     }
 }
 
-/* False when crossings along two ways to a corner do not agree. */
+/* Returns false when crossings along two paths to a corner do not agree. */
 static bool child_offsets(const int32_t *child_delta[8], int32_t offset[8])
 {
     offset[0] = 0;
@@ -57,7 +57,7 @@ static bool child_offsets(const int32_t *child_delta[8], int32_t offset[8])
     return agree;
 }
 
-/* The corner differences of the eight children; those of empty ones are zero. */
+/* Sets the corner differences of the eight children; those of empty ones are zero. */
 static void child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                          const int32_t *child_delta[8])
 {
@@ -128,10 +128,10 @@ unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32
 
 /* --- the corners of one cell --- */
 
-/* The walls that a face reaches: bit 2 k lower, 2 k + 1 upper wall of axis k. What is strictly to
- * one side of a wall, or of the cell, is sure not to cross an edge there, however little the edge
- * is shifted. */
-static unsigned walls_reached(const double wall[3][2], const ebpo_triangle *f)
+/* Returns the cell faces that a face reaches: bit 2 k lower, 2 k + 1 upper one of axis k. A face
+ * strictly on one side of a cell face, or of the cell, crosses no edge there, however little the
+ * edge is shifted. */
+static unsigned cell_faces_reached(const double cell_face[3][2], const ebpo_triangle *f)
 {
     unsigned reached = 0;
     for (int k = 0; k < 3; k++) {
@@ -139,42 +139,42 @@ static unsigned walls_reached(const double wall[3][2], const ebpo_triangle *f)
         double low = a < b ? a : b, high = a < b ? b : a;
         low = c < low ? c : low;
         high = c > high ? c : high;
-        if (high < wall[k][0] || low > wall[k][1])
+        if (high < cell_face[k][0] || low > cell_face[k][1])
             return 0;
-        reached |= (unsigned)(low <= wall[k][0] && high >= wall[k][0]) << 2 * k |
-                   (unsigned)(low <= wall[k][1] && high >= wall[k][1]) << (2 * k + 1);
+        reached |= (unsigned)(low <= cell_face[k][0] && high >= cell_face[k][0]) << 2 * k |
+                   (unsigned)(low <= cell_face[k][1] && high >= cell_face[k][1]) << (2 * k + 1);
     }
     return reached;
 }
 
-/* The edge to each corner from an earlier one: its axis, that corner, and the two walls that it
- * lies in. */
+/* The edge to each corner from an earlier one: its axis, that corner, and the two cell faces that
+ * contain it. */
 static const struct {
     int axis, before;
-    unsigned walls;
+    unsigned cell_faces;
 } edge_to[8] = { { 0, 0, 0 },    { 0, 0, 0x14 }, { 1, 0, 0x11 }, { 1, 1, 0x12 },
                  { 2, 0, 0x05 }, { 2, 1, 0x06 }, { 2, 2, 0x09 }, { 2, 3, 0x0a } };
 
 void ebpo_corner_windings(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
                           uint64_t count, int32_t delta[8])
 {
-    double wall[3][2];
+    double cell_face[3][2];
     int32_t along[8] = { 0 };
     for (int k = 0; k < 3; k++)
         for (uint32_t s = 0; s < 2; s++)
-            wall[k][s] = ebpo_wall(box, k, cell.level, cell.at[k] + s);
+            cell_face[k][s] = ebpo_cell_face(box, k, cell.level, cell.at[k] + s);
     for (uint64_t i = 0; i < count; i++) {
         const ebpo_triangle *f = &faces[i];
-        unsigned reached = walls_reached((const double(*)[2])wall, f);
-        if ((reached & (reached - 1)) == 0) /* two at least */
+        unsigned reached = cell_faces_reached((const double(*)[2])cell_face, f);
+        if ((reached & (reached - 1)) == 0) /* at least two */
             continue;
         for (int corner = 1; corner < 8; corner++) {
             int axis = edge_to[corner].axis, before = edge_to[corner].before;
-            if ((reached & edge_to[corner].walls) != edge_to[corner].walls)
+            if ((reached & edge_to[corner].cell_faces) != edge_to[corner].cell_faces)
                 continue;
-            const double from[3] = { wall[0][before & 1], wall[1][before >> 1 & 1],
-                                     wall[2][before >> 2 & 1] };
-            along[corner] += ebpo_axis_crossing(from, wall[axis][1], axis, f->corner[0],
+            const double from[3] = { cell_face[0][before & 1], cell_face[1][before >> 1 & 1],
+                                     cell_face[2][before >> 2 & 1] };
+            along[corner] += ebpo_axis_crossing(from, cell_face[axis][1], axis, f->corner[0],
                                                 f->corner[1], f->corner[2]);
         }
     }

@@ -2,13 +2,13 @@
  *
  * A depth-first walk of a piece visits the nodes of each level in octcode order, so a piece's part
  * of each level array is one stretch. Stretches are joined in the depth-first order of the pieces,
- * which is octcode order too. The nodes of the top add stretches of their own. Leaves refer to
- * faces by their numbers along the curve until all pieces are done, as the final numbers of another
- * piece's faces are not known before.
+ * which is octcode order too. The nodes of the top add separate stretches. Leaves refer to faces by
+ * their numbers along the curve until all pieces are done, as the final numbers of another piece's
+ * faces are not known before.
  *
- * Arrays without information are left out: those that the options do not ask for, and those whose
- * values readers assume anyway. Volumes are added in a fixed order, so the number of threads does
- * not change the result. */
+ * Arrays without information are omitted: those that the options exclude, and those with only
+ * default values. Volumes are added in a fixed order, so the number of threads does not change the
+ * result. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -27,7 +27,7 @@
 
 struct ebpo_emit_scratch {
     ebpo_envelope_scratch *envelope;
-    ebpo_triangle *faces; /* of one leaf */
+    ebpo_triangle *faces; /* faces of one leaf */
     uint64_t faces_capacity;
     ebpo_workspace *workspace;
     /* [a level][3] halves of the envelopes on the path to a node, along z, y, x; too large for the
@@ -113,8 +113,8 @@ static bool gather_faces(emitter *e, const ebpo_build_detail *d)
     return true;
 }
 
-/* Planes that are to be stored: the selection's own. Else readers derive them. -1: out of memory.
- */
+/* Returns planes to be stored: those of the selection. Otherwise readers derive them. -1: out of
+ * memory. */
 static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
                        ebpo_polytope *envelope, uint32_t *codes)
 {
@@ -177,9 +177,9 @@ static unsigned filled_children(const ebpo_branch *s, uint32_t child)
     return mask;
 }
 
-/* In octant order; neighbours share the halves that their envelopes are cut from. A half that
- * rounding leaves nothing of stays the whole cube, and so do its parts: too large, never too small.
- */
+/* Emits children in octant order; neighbours share the halves that their envelopes are cut from. A
+ * half that becomes empty by rounding stays the whole cube, and so do its parts: too large, never
+ * too small. */
 static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t winding,
                           const int32_t offset[8], const ebpo_polytope *envelope)
 {
@@ -258,10 +258,10 @@ ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, e
 
 typedef struct joiner {
     ebpo_builder *b;
-    ebpo_piece_level **stretch; /* depth first: pieces of the top and whole subtrees by turns */
+    ebpo_piece_level **stretch; /* depth first: alternately pieces of the top and whole subtrees */
     uint64_t count, capacity;
     ebpo_piece_level *current;
-    ebpo_level *level; /* what comes out */
+    ebpo_level *level; /* result */
 } joiner;
 
 static const char stage[] = "joining levels";
@@ -353,14 +353,14 @@ static bool any_has(const joiner *j, int level, int id)
     return false;
 }
 
-static void fill_usual(const joiner *j, char *to, uint64_t bytes, int id)
+static void fill_default(const joiner *j, char *to, uint64_t bytes, int id)
 {
-    int64_t usual = ebpo_schema[id].usual; /* files are little-endian, and so are we */
+    int64_t standard = ebpo_schema[id].standard; /* files are little-endian, as is this machine */
     EBPO_FOR_ITEMS(j->b->workspace, i, 0, bytes / ebpo_schema[id].held_size)
-        memcpy(to + i * ebpo_schema[id].held_size, &usual, ebpo_schema[id].held_size);
+        memcpy(to + i * ebpo_schema[id].held_size, &standard, ebpo_schema[id].held_size);
 }
 
-/* An array that none of the stretches has stays away. */
+/* Joins an array; one that no stretch has is omitted. */
 static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
 {
     uint64_t total = ebpo_level_rows(out, id), size = ebpo_schema[id].held_size;
@@ -376,8 +376,8 @@ static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
         size_t bytes = (size_t)(ebpo_level_rows(from, id) * size);
         if (array)
             ebpo_array_copy(j->b->workspace, to, array, bytes);
-        else /* a stretch in which all elements have the usual value */
-            fill_usual(j, to, bytes, id);
+        else /* a stretch in which all elements have the default value */
+            fill_default(j, to, bytes, id);
         to += bytes;
         if (!j->stretch[i][level].packed)
             ebpo_array_free(j->b->workspace, array);
@@ -412,11 +412,11 @@ enum { LEAF_GRAIN = 1 << 13 };
 typedef struct numbering {
     const ebpo_builder *b;
     ebpo_level *level;
-    uint64_t *first; /* of each block of leaves: its start in leaf_refs */
+    uint64_t *first; /* start of each block of leaves in leaf_refs */
 } numbering;
 
-/* Leaves refer to faces by their numbers along the curve, as other pieces' final ones were not
- * known: now they are. */
+/* Replaces face numbers along the curve in the leaves by the final ones, now that those of all
+ * pieces are known. */
 static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                 ebpo_error *error)
 {
@@ -433,7 +433,7 @@ static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, uns
     return EBPO_OK;
 }
 
-/* `all`: references of all levels, of which `before` have been numbered. */
+/* Numbers the references. `all`: references of all levels, of which `before` are numbered. */
 static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t before, uint64_t all,
                                ebpo_error *error)
 {
@@ -456,14 +456,13 @@ static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t be
     return status;
 }
 
-/* Arrays that say only what is understood anyway, or that belong to parts that are not wanted, are
- * left out. */
+/* Omits arrays with only default values, and arrays of unwanted parts. */
 static void leave_out(const ebpo_builder *b, ebpo_level *l)
 {
     uint32_t parts = b->options->parts;
     ebpo_level_drop(l, ~(parts | (b->solid ? EBPO_NEEDS_SOLID : 0) | EBPO_NEEDS_ALWAYS));
     for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
-        if (ebpo_schema[id].if_needed && ebpo_level_is_usual(l, id)) {
+        if (ebpo_schema[id].if_needed && ebpo_level_is_default(l, id)) {
             ebpo_array_free(l->workspace, ebpo_level_array(l, id));
             ebpo_level_set_array(l, id, NULL);
         }
@@ -484,7 +483,7 @@ static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Volumes are added in a fixed order, whatever the number of threads. */
+/* Adds volumes in a fixed order, independent of the number of threads. */
 static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uint64_t all,
                                 ebpo_error *error)
 {
@@ -504,7 +503,8 @@ static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uin
 static bool root_group(joiner *j)
 {
     ebpo_builder *b = j->b;
-    ebpo_piece_level *first = current_stretch(j); /* never a piece's, whose arrays may be packed */
+    ebpo_piece_level *first = current_stretch(j); /* never a piece's stretch, whose arrays may be
+                                                   * packed */
     return first &&
            ebpo_piece_level_add_group(&first[0], (uint16_t)type_of(b, &b->top.nodes[0], 0));
 }

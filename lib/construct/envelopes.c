@@ -2,9 +2,10 @@
  * hull of the solid within the cell.
  *
  * - Few points: the facets of their hull.
- * - Many points, or points that span no volume: the hull of the extreme points. Each round asks how
- *   far the solid reaches along the facets' normals (supports.h), and the answers are more points.
- * - Besides, normals of the faces below the node: where there are many, the mean of each occupied
+ * - Many points, or points that span no volume: the hull of the extreme points. Each round finds
+ *   the
+ *   supports of the solid along the facets' normals (supports.h), and adds their points.
+ * - Also normals of the faces below the node: where there are many, the mean of each occupied
  *   bin of the octahedral map, with bins no finer than needed.
  *
  * The selection (selections.c) takes planes from the candidates. A support is an upper bound, so a
@@ -39,14 +40,14 @@ typedef struct normal_bin {
     uint64_t sum_u, sum_v;
 } normal_bin;
 
-/* Memory of one thread, which is too large for its stack; begins as zeros. */
+/* Memory of one thread, which is too large for its stack; initialised with zeros. */
 typedef struct candidates_scratch {
     normal_bin table[CANDIDATES_BINS]; /* by hash; all are free between calls */
     uint32_t sample[CANDIDATES_SAMPLE];
     int slots[EBPO_PLANES_CANDIDATES]; /* the bins that are not free */
 } candidates_scratch;
 
-/* Every `step`-th of the entries, or of the branch's whole list. */
+/* Samples every `step`-th of the entries, or of the branch's whole list. */
 static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint32_t *entries,
                          uint64_t begin, uint64_t end, uint64_t *skip, uint64_t step,
                          uint32_t *sample, int *count)
@@ -83,7 +84,7 @@ static int take_sample(const ebpo_builder *b, const ebpo_branch *s, const ebpo_b
     return count;
 }
 
-/* Fills the table with bins of `width` codes; false when more than `most` are occupied. */
+/* Fills the table with bins of `width` codes; returns false when more than `most` are occupied. */
 static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *sample, int count,
                       uint32_t width, int most)
 {
@@ -109,7 +110,7 @@ static bool fill_bins(normal_bin *table, int *used, int *slots, const uint32_t *
     return true;
 }
 
-/* At most `most` of them; returns how many. */
+/* Makes at most `most` candidates; returns their number. */
 static int build_candidates(const ebpo_builder *b, candidates_scratch *scratch,
                             const ebpo_branch *s, const ebpo_build_detail *detail, int most,
                             ebpo_candidate *out)
@@ -132,20 +133,20 @@ static int build_candidates(const ebpo_builder *b, candidates_scratch *scratch,
 /* --- scratch memory and supports --- */
 
 enum {
-    TOP_LEVELS = 4,   /* nearly free of bytes */
-    MANY_LEVELS = 2,  /* round solids deserve more planes there: 73 nodes at most */
+    TOP_LEVELS = 4,   /* levels that take hardly any bytes */
+    MANY_LEVELS = 2,  /* round solids need more planes there: 73 nodes at most */
     FACES_BELOW = 16, /* normals of faces that are tried below the top */
-    HULL_BELOW = 24,  /* and directions of the hull, in a round */
+    HULL_BELOW = 24,  /* directions of the hull, per round below the top */
     HULL_ROUNDS = 3,
-    HULL_DIRECTIONS = 160, /* at most, in a round */
-    TABLE = 1024           /* of normals */
+    HULL_DIRECTIONS = 160, /* maximum per round */
+    TABLE = 1024           /* entries of the table of normals */
 };
 
 struct ebpo_envelope_scratch {
     ebpo_supports supports;
     ebpo_candidate candidates[EBPO_PLANES_CANDIDATES];
     int count;
-    /* normals, of candidates and of those that were dropped */
+    /* normals of candidates and of dropped ones */
     uint32_t tried[2 * EBPO_PLANES_CANDIDATES];
     int tried_count;
     uint32_t normals[TABLE];          /* 1 + normal, by hash */
@@ -168,8 +169,8 @@ void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
     free(scratch);
 }
 
-/* A support from which on a plane cannot remove epsilon, nor a needle: a cap of height h of a body
- * of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
+/* Returns the support below which a plane cannot remove epsilon or a needle: a cap of height h of a
+ * body of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
 static double hopeless_below(const ebpo_polytope *envelope, double volume, const int32_t n[3],
                              double epsilon)
 {
@@ -184,8 +185,8 @@ static double hopeless_below(const ebpo_polytope *envelope, double volume, const
     return most - fmin((most - least) * epsilon / (3 * volume), ebpo_needle * length);
 }
 
-/* Tries one more direction. It is dropped as soon as it turns out that it cannot gain epsilon. The
- * extreme point is kept for the hull. */
+/* Tries one more direction. Drops it as soon as it cannot gain epsilon. Keeps the extreme point for
+ * the hull. */
 static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_polytope *envelope,
                        double volume, double epsilon, double where[3])
 {
@@ -219,8 +220,8 @@ static void add_core(ebpo_envelope_scratch *s, const double where[3])
     s->core_count++;
 }
 
-/* The directions to the walls, edges and corners of a cell: then the hull is known from all sides,
- * whatever the faces look like. */
+/* Tries the directions to the faces, edges and corners of a cell: then the hull is known from all
+ * sides, independent of the faces. */
 static void try_all_around(ebpo_envelope_scratch *s)
 {
     for (int i = 0; i < 27; i++) {
@@ -243,12 +244,12 @@ static bool was_tried(const ebpo_envelope_scratch *s, uint32_t normal)
     return false;
 }
 
-/* One round: the hull of the points known so far proposes its facets, and what reaches beyond a
- * facet is one more point. False when nothing was new. */
+/* Runs one round: tries the facets of the hull of the known points; an extreme point beyond a facet
+ * is added. Returns false when nothing was new. */
 static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume,
                        double epsilon, int most)
 {
-    static const double worth = 1e-3; /* of the cell */
+    static const double worth = 1e-3; /* share of the cell */
     int facets = ebpo_hull_facets((const double(*)[3])s->core, s->core_count, 1e-9, s->facet,
                                   EBPO_HULL_FACETS),
         before = s->core_count;
@@ -277,10 +278,11 @@ static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, do
 
 /* --- few points --- */
 
-/* Points so near to the hull give directions that are hardly different. */
+/* Points this near to the hull give nearly equal directions. */
 static const double hull_tolerance = 1e-3;
 
-/* All points of the node; false when they are too many, or some are known by their bounds only. */
+/* Takes all points of the node; returns false when they are too many, or some are known by their
+ * bounds only. */
 static bool take_points(ebpo_envelope_scratch *s)
 {
     const ebpo_supports *from = &s->supports;
@@ -294,7 +296,7 @@ static bool take_points(ebpo_envelope_scratch *s)
     return true;
 }
 
-/* False when the table has it. */
+/* Returns false when the table has it. */
 static bool new_normal(ebpo_envelope_scratch *s, uint32_t normal)
 {
     uint64_t at;
@@ -306,7 +308,8 @@ static bool new_normal(ebpo_envelope_scratch *s, uint32_t normal)
     return true;
 }
 
-/* The hull's facets as candidates; the volume of the hull, or -1 when there is none. */
+/* Adds the hull's facets as candidates; returns the volume of the hull, or -1 when there is none.
+ */
 static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
 {
     int facets = ebpo_hull_facets((const double(*)[3])s->core, s->core_count, tolerance, s->facet,
@@ -335,8 +338,8 @@ static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
 
 /* --- the node --- */
 
-/* Top levels are nearly free of bytes, and a needle that fills a thousandth of its cell deserves
- * planes all the same. */
+/* Returns the share for top levels: they take hardly any bytes, and a needle that fills a
+ * thousandth of its cell still needs planes. */
 static double top_share(double volume) { return 0.1 * sqrt(fmax(0, volume)); }
 
 static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s,
@@ -397,10 +400,10 @@ int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *s, const ebpo
 /* --- the nodes above the pieces, level by level --- */
 
 typedef struct pending {
-    uint32_t node; /* gray, in the top */
+    uint32_t node; /* gray node in the top */
     ebpo_cell cell;
     int32_t winding;
-    ebpo_polytope *envelope; /* the parent's cut to the cell, then its own */
+    ebpo_polytope *envelope; /* the parent's envelope cut to the cell, then its envelope */
 } pending;
 
 typedef struct wave {
@@ -437,9 +440,9 @@ static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, u
     return status;
 }
 
-/* The children of a finished node: gray ones wait for the next wave, subtrees get what they need.
- */
-static bool hand_down(ebpo_builder *b, const pending *p, wave *next)
+/* Handles the children of a finished node: gray ones wait for the next round, subtrees get their
+ * input. */
+static bool device_down(ebpo_builder *b, const pending *p, wave *next)
 {
     const ebpo_build_node *node = &b->top.nodes[p->node];
     int32_t offset[8];
@@ -508,7 +511,7 @@ ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error)
         status = ebpo_parallel_for(b->threads, NULL, now.count, 1, wave_envelopes, &now, &progress,
                                    "top envelopes", error);
         for (uint64_t i = 0; i < now.count && status == EBPO_OK; i++)
-            if (!hand_down(b, &now.nodes[i], &next))
+            if (!device_down(b, &now.nodes[i], &next))
                 status = no_memory(b, error);
         wave_free(&now);
         now = next;

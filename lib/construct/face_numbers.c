@@ -2,8 +2,8 @@
  *
  * A face is numbered in the first leaf, depth first, that lists it; a vertex by the first face that
  * uses it. So a leaf's new faces are one range in the file, and only the others need references. A
- * piece numbers its fresh faces, those that no earlier piece lists, so pieces are independent of
- * each other. Attributes move with their vertices and faces. The format describes the order in
+ * piece numbers its fresh faces, which no earlier piece lists, so pieces are independent of each
+ * other. Attributes move with their vertices and faces. The format describes the order in
  * format-spec/README.md. */
 #include "core/strict_fp.h"
 
@@ -52,7 +52,7 @@ ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error
     return EBPO_OK;
 }
 
-/* order[i]: mesh vertex that gets final number i. */
+/* Sets order[i]: mesh vertex that gets final number i. */
 static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const uint32_t *face_at,
                            uint32_t *order, uint32_t *final)
 {
@@ -74,7 +74,7 @@ static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const u
     }
 }
 
-/* What comes after the order is known: all of it is moving, on all cores. */
+/* Task after the order is known: moves data, on all cores. */
 typedef struct moving {
     const ebpo_builder *b;
     const ebpo_mesh *mesh;
@@ -160,7 +160,7 @@ ebpo_status ebpo_build_mesh(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, eb
     ebpo_mesh *m = &out->mesh;
     *m = *mesh;
     m->arrangement = NULL;
-    mesh->attributes = NULL; /* they are the tree's */
+    mesh->attributes = NULL; /* owned by the tree */
     m->xyz32 = mesh->xyz64 ? NULL : ebpo_array_alloc(b->workspace, nv, 3 * sizeof(float));
     m->xyz64 = mesh->xyz64 ? ebpo_array_alloc(b->workspace, nv, 3 * sizeof(double)) : NULL;
     m->faces = ebpo_array_alloc(b->workspace, nf, 3 * sizeof(uint32_t));

@@ -4,7 +4,7 @@
  * Levels go from the deepest up: a group of eight gives the sums of the gray node above it. Nothing
  * is kept for each face; a face's part is computed for each leaf that lists it, as leaves list few
  * more faces than there are. Weights and sums are integers, so the result is exact and does not
- * depend on the number of threads. The colours are those of the vertices; those of faces count
+ * depend on the number of threads. The colours are those of the vertices; face colours are used
  * where vertices have none, or all the same. lib/verify computes the same colours in another way.
  */
 #include "core/strict_fp.h"
@@ -23,26 +23,26 @@
 
 enum { GROUP_GRAIN = 1 << 12, GROUPS_A_TIME = 16 };
 
-/* Over the faces below a node, as often as leaves list them. */
+/* Sums over the faces below a node, as often as leaves list them. */
 typedef struct colour_sums {
     ebpo_wide colour[3], weight; /* weight times three times the colour; three times the weight */
 } colour_sums;
 
-/* What comes before a block of groups in its level. */
+/* Counts before a block of groups in its level. */
 typedef struct block_start {
     uint64_t leaf, gray, ref;
 } block_start;
 
 typedef struct colouring {
     ebpo_tree *tree;
-    double size; /* greatest of the box */
+    double size; /* largest side of the box */
     bool by_face;
     ebpo_colour_column column[EBPO_COLOUR_CHANNELS];
-    const ebpo_level *level; /* whose groups are added up */
+    const ebpo_level *level; /* level whose groups are added up */
     const block_start *start;
-    const colour_sums *below; /* of the level's gray nodes */
-    colour_sums *above;       /* of its groups */
-    uint32_t *colours;        /* of its groups */
+    const colour_sums *below; /* sums of the level's gray nodes */
+    colour_sums *above;       /* sums of its groups */
+    uint32_t *colours;        /* colours of its groups */
 } colouring;
 
 static uint64_t weight_of(const colouring *c, uint64_t face)
@@ -88,7 +88,7 @@ static void add_leaf(const colouring *c, uint64_t leaf, uint64_t ref, colour_sum
         add_face(c, l->leaf_refs[ref + i], sums);
 }
 
-/* The nearest integer to colour / weight, half of one upwards: a byte, found bit by bit. */
+/* Returns the nearest integer to colour / weight, halves rounded up: a byte, found bit by bit. */
 static uint32_t mean_of_channel(ebpo_wide colour, ebpo_wide weight)
 {
     ebpo_wide most = ebpo_wide_plus(ebpo_wide_left(colour, 1), weight);
@@ -146,7 +146,7 @@ static block_start *find_starts(const colouring *c)
     return start;
 }
 
-/* The gray nodes of the level above `level`. */
+/* Colours the gray nodes of the level above `level`. */
 static ebpo_status colour_level(const ebpo_builder *b, colouring *c, int level,
                                 const ebpo_progress *progress, ebpo_error *error)
 {

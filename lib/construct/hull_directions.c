@@ -1,12 +1,12 @@
-/* Computes a small convex hull, of which only the directions of the facets are used: what rounding
- * gets wrong costs volume of an envelope, never containment.
+/* Computes a small convex hull, of which only the directions of the facets are used: rounding
+ * errors cost volume of an envelope, never containment.
  *
  * The hull grows point by point: each point beyond the hull replaces the facets that it sees (a
  * beneath-beyond algorithm in doubles). Points that are extreme along the axes and diagonals come
  * first, so that most others are never outside. Facets are kept as planes by coordinate, for the
  * kernel that tests a point against all of them (sweep.h). Limits: EBPO_HULL_POINTS points,
- * EBPO_HULL_FACETS facets; what does not fit is left out. Ties are ordered by numbers of points, so
- * that all machines return the same facets in the same order. */
+ * EBPO_HULL_FACETS facets; further ones are omitted. Ties are ordered by numbers of points, so that
+ * all machines return the same facets in the same order. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,20 +17,20 @@
 #include "construct/sweep.h"
 #include "geometry/vec3.h"
 
-static const double flat = 1e-9; /* what is nearer to a plane lies in it */
+static const double flat = 1e-9; /* points nearer to a plane are on it */
 
-_Static_assert((int)EBPO_HULL_FACETS <= (int)EBPO_SWEEP_PLANES, "sweeps have room for the facets");
+_Static_assert((int)EBPO_HULL_FACETS <= (int)EBPO_SWEEP_PLANES, "sweeps have space for the facets");
 
-enum { ROOM = EBPO_HULL_FACETS, WAYS = 14, VISIBLE = 192 };
+enum { SPACE = EBPO_HULL_FACETS, WAYS = 14, VISIBLE = 192 };
 
 /* Planes by coordinate: each point is tested against all of them. */
 typedef struct hull {
     const ebpo_sweep *sweep;
     const double (*p)[3];
-    /* behind the last one, up to a full four: planes that nothing sees */
-    double nx[ROOM + 4], ny[ROOM + 4], nz[ROOM + 4], d[ROOM + 4];
-    double length[ROOM], beyond;
-    uint16_t corner[ROOM][3];
+    /* padding to a multiple of four: planes that no point sees */
+    double nx[SPACE + 4], ny[SPACE + 4], nz[SPACE + 4], d[SPACE + 4];
+    double length[SPACE], beyond;
+    uint16_t corner[SPACE][3];
     int count, capacity;
 } hull;
 
@@ -50,7 +50,7 @@ static void set_plane(hull *h, int i, const double n[3], double d)
     h->d[i] = d;
 }
 
-/* The facet at place i; false when it has no area. */
+/* Makes the facet at index i; returns false when it has no area. */
 static bool make_facet(hull *h, int i, int a, int b, int c)
 {
     double n[3];
@@ -86,7 +86,7 @@ static void set_count(hull *h, int count)
 
 /* --- the first four facets --- */
 
-/* The most extreme points along the axes and the diagonals, both ways. */
+/* Finds the most extreme points along the axes and the diagonals, both ways. */
 static void find_extremes(const double (*p)[3], int count, int at[WAYS])
 {
     double best[WAYS];
@@ -118,7 +118,7 @@ static double height_above(const double n[3], const double from[3], const double
     return ebpo_vec3_dot(n, way);
 }
 
-/* Four points far from each other; false when there are none that span a volume. */
+/* Finds four points far from each other; returns false when no four span a volume. */
 static bool first_four(const double (*p)[3], int count, const int ways[WAYS], int corner[4])
 {
     double best = -1, n[3];
@@ -142,7 +142,7 @@ static bool first_four(const double (*p)[3], int count, const int ways[WAYS], in
         if (fabs(h) > fabs(side))
             side = h, corner[3] = i;
     }
-    if (side > 0) { /* the fourth lies behind the first three */
+    if (side > 0) { /* the fourth is behind the first three */
         int swap = corner[1];
         corner[1] = corner[2];
         corner[2] = swap;
@@ -162,9 +162,9 @@ static bool first_facets(hull *h, const int c[4])
 
 /* --- adding a point --- */
 
-/* Edges as from << 16 | to, and turned around; to a multiple of four, with what is none. */
+/* Lists edges as from << 16 | to, and reversed; padded to a multiple of four with invalid edges. */
 static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *edges,
-                    uint32_t *twins)
+                    uint32_t *references)
 {
     int listed = 0;
     for (int i = 0; i < seen; i++) {
@@ -172,7 +172,7 @@ static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *
         for (int e = 0; e < 3; e++) {
             uint32_t from = corner[e], to = corner[e == 2 ? 0 : e + 1];
             edges[listed] = from << 16 | to;
-            twins[listed++] = to << 16 | from;
+            references[listed++] = to << 16 | from;
         }
     }
     for (int i = listed; i % 4; i++)
@@ -180,7 +180,8 @@ static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *
     return listed;
 }
 
-/* No early exit from the loop, so that compilers vectorise it. */
+/* Returns true if the edge is in the list. No early exit from the loop, so that compilers vectorise
+ * it. */
 static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
 {
     uint32_t found = 0;
@@ -189,21 +190,21 @@ static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
     return found;
 }
 
-/* Slots that got no new facet are filled from the end. */
+/* Fills slots without a new facet from the end. */
 static void close_gaps(hull *h, const uint16_t *place, int from, int to, int count)
 {
-    for (int i = to - 1; i >= from; i--) /* places ascend */
+    for (int i = to - 1; i >= from; i--) /* `place` ascends */
         if (place[i] != --count)
             move_facet(h, place[i], count);
     set_count(h, count);
 }
 
-/* False when no more points are to be added: too much in one step. (Then facets may overlap; they
- * still give directions.) */
+/* Returns false when no more points can be added: too many facets in one step. (Then facets may
+ * overlap; they still give directions.) */
 static bool add_point(hull *h, int point)
 {
     uint16_t visible[VISIBLE];
-    uint32_t edges[3 * VISIBLE], twins[3 * VISIBLE];
+    uint32_t edges[3 * VISIBLE], references[3 * VISIBLE];
     const ebpo_sweep_planes planes = { h->nx, h->ny, h->nz, h->d, (h->count + 3) / 4 };
     int seen = h->sweep->seen(&planes, h->p[point], h->beyond, flat, visible, VISIBLE), made = 0,
         count = h->count;
@@ -211,9 +212,9 @@ static bool add_point(hull *h, int point)
         return true;
     if (seen > VISIBLE)
         return false;
-    int listed = edges_of(h, visible, seen, edges, twins);
+    int listed = edges_of(h, visible, seen, edges, references);
     for (int i = 0; i < listed; i++) {
-        if (has_edge(edges, (listed + 3) / 4, twins[i]))
+        if (has_edge(edges, (listed + 3) / 4, references[i]))
             continue;
         if (made >= seen && count == h->capacity)
             return false;
@@ -247,7 +248,7 @@ int ebpo_hull_facets(const double (*points)[3], int count, double tolerance,
     h.sweep = ebpo_sweep_best();
     h.p = points;
     h.count = 0;
-    h.capacity = capacity < ROOM ? capacity : ROOM;
+    h.capacity = capacity < SPACE ? capacity : SPACE;
     h.beyond = tolerance;
     if (count < 4 || capacity < 4 || count > EBPO_HULL_POINTS)
         return 0;

@@ -4,7 +4,7 @@
  * The candidates' directions are those of the convex hull of the extreme points: the corners of the
  * faces' parts in the cell, and the cell's corners inside. With too many points, or with all in one
  * plane, the directions are the normals of the faces. A plane's offset is the support of all
- * points, plus what rounding may add, so no part of a face in the cell is cut off. */
+ * points, plus a bound of the rounding error, so no part of a face in the cell is cut off. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,11 +18,11 @@
 
 enum { LEAF_CANDIDATES = 64, LEAF_POINTS = 192, LEAF_TABLE = 512 };
 
-/* Extreme points of the solid in the cell, and what rounding may add to a coordinate. */
+/* Extreme points of the solid in the cell, and a bound of the rounding error of a coordinate. */
 typedef struct leaf_points {
     double at[LEAF_POINTS][3], slack[LEAF_POINTS];
     int count;
-    /* by hash: 1 + place of the point; most corners of faces come several times */
+    /* hash table: 1 + index of the point; most corners of faces occur several times */
     uint8_t number[LEAF_TABLE];
 } leaf_points;
 
@@ -63,7 +63,7 @@ static bool add_point(leaf_points *points, const double p[3], double slack)
     return true;
 }
 
-/* False when there are more than fit. */
+/* Returns false when there are too many. */
 static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
                           uint64_t count, unsigned inside, leaf_points *points)
 {
@@ -100,8 +100,8 @@ static int hull_normals(const leaf_points *points, ebpo_candidate *out)
 
 /* --- many points, or all of them in a plane: the faces' directions --- */
 
-/* Distinct normals of the faces, of many an even sample; and the opposite ones, for solids and
- * surfaces without thickness. */
+/* Collects distinct normals of the faces (an even sample of many), and the opposite ones, for
+ * solids and surfaces without thickness. */
 static int face_normals(const ebpo_box *box, const ebpo_triangle *faces, uint64_t count,
                         ebpo_candidate *out)
 {

@@ -1,14 +1,14 @@
 /* Assigns faces to cells. First the top of the tree is cut until the pieces below it are small
  * enough to be processed in parallel; then each piece becomes a subtree, depth first.
  *
- * What a node is depends on its cell and its faces alone, and where the top ends on the model
- * alone, so neither pieces nor threads nor the machine show in the result. Sources: EBP 2017, 3.3
- * (assignment of faces to leaves); BP 2008, 3.3.1 (coalescing nodes with few faces).
+ * A node depends on its cell and its faces alone, and the end of the top on the model alone, so the
+ * result is independent of pieces, threads and machine. Sources: EBP 2017, 3.3 (assignment of faces
+ * to leaves); BP 2008, 3.3.1 (coalescing nodes with few faces).
  *
- * The cut of the top also computes what a piece has to know of the others: which of its faces no
- * earlier piece lists ("fresh"), and the winding numbers at its corners. A mesh with huge faces and
- * a deep maximum level would list every face in millions of cells: leaves and entries are limited
- * by the number of faces. */
+ * The cut of the top also computes the input of a piece that depends on others: which of its faces
+ * no earlier piece lists ("fresh"), and the winding numbers at its corners. A mesh with huge faces
+ * and a deep maximum level would list every face in millions of cells: leaves and entries are
+ * limited by the number of faces. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -32,7 +32,7 @@ enum { RELEASE_FACES = 1 << 13 };
 static const uint64_t leaves_per_face = 64, leaves_always = 1 << 22, entries_per_face = 512,
                       entries_always = 1 << 26;
 
-/* Faces seen below a node; a round number saves clearing. */
+/* Faces found below a node; a round number saves clearing. */
 typedef struct face_set {
     struct {
         uint32_t face, round;
@@ -44,11 +44,11 @@ typedef struct face_set {
 typedef struct grower {
     ebpo_builder *b;
     ebpo_branch *s;
-    uint32_t *stack; /* lists of the nodes on the way down, one behind the other */
+    uint32_t *stack; /* lists of the nodes on the way down, one after the other */
     uint64_t stack_used, stack_capacity;
     uint8_t *mask;
     uint64_t mask_capacity;
-    ebpo_triangle *faces; /* room for a leaf's */
+    ebpo_triangle *faces; /* capacity for one leaf */
     uint64_t faces_capacity;
     face_set set;
     ebpo_error *error;
@@ -62,14 +62,14 @@ static bool is_leaf(const ebpo_builder *b, int level, uint64_t count)
 ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_t entries,
                                    ebpo_error *error)
 {
-    uint64_t most_leaves = leaves_always + leaves_per_face * face_count,
-             most_entries = entries_always + entries_per_face * face_count;
-    if (leaves <= most_leaves && entries <= most_entries)
+    uint64_t max_leaves = leaves_always + leaves_per_face * face_count,
+             max_entries = entries_always + entries_per_face * face_count;
+    if (leaves <= max_leaves && entries <= max_entries)
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the faces touch too many cells (more than %llu leaves or %llu listed faces): "
                      "lower --max-level or raise --leaf-faces",
-                     (unsigned long long)most_leaves, (unsigned long long)most_entries);
+                     (unsigned long long)max_leaves, (unsigned long long)max_entries);
 }
 
 static ebpo_status no_memory_for_cells(ebpo_error *error)
@@ -77,8 +77,8 @@ static ebpo_status no_memory_for_cells(ebpo_error *error)
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while assigning faces to cells");
 }
 
-/* Faces with a vertex outside the cell's run of vertices reach over its walls (or touch an upper
- * one). */
+/* Notes faces that cross the cell's faces (or touch an upper one): they have a vertex outside the
+ * cell's run of vertices. */
 static bool note_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
                           const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
 {
@@ -137,7 +137,7 @@ static ebpo_status split_list(grower *g, ebpo_cell cell, uint64_t at, uint64_t c
     EBPO_FOR_ITEMS_EVERY(b->workspace, RELEASE_FACES, i, 0, count) {
         ebpo_triangle face;
         ebpo_branch_triangle(b, g->s, g->stack[at + i], &face);
-        unsigned mask = ebpo_octants_touched(&b->box, cell, &face);
+        unsigned mask = ebpo_octants_visited(&b->box, cell, &face);
         g->mask[i] = (uint8_t)mask;
         for (int o = 0; o < 8; o++)
             sizes[o] += mask >> o & 1;
@@ -171,7 +171,7 @@ static bool set_has(const face_set *set, uint32_t face)
     return set->slots[set_slot(set, face)].round == set->round;
 }
 
-/* Room for one face more than a leaf may list. */
+/* Prepares for one face more than a leaf may list. */
 static bool set_start(face_set *set, uint64_t most)
 {
     if (!set->slots) {
@@ -184,9 +184,9 @@ static bool set_start(face_set *set, uint64_t most)
     return set->slots != NULL;
 }
 
-/* A face that passes by at the distance of a rounding error may be listed here and, where cells are
- * smaller, no more. When the leaves below a gray node list no more faces than one leaf may, the
- * node is a leaf of just those; when they list none, it is empty. */
+/* Collapses a gray node with few faces. A face at the distance of a rounding error may be listed
+ * here but not in smaller cells. When the leaves below a gray node list no more faces than one leaf
+ * may, the node becomes a leaf of these faces; when they list none, it is empty. */
 static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, uint64_t at,
                                    uint64_t count)
 {
@@ -202,7 +202,7 @@ static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, ui
         if (g->set.slots[slot].round == g->set.round)
             continue;
         if (g->set.count++ == most)
-            return EBPO_OK; /* gray it stays */
+            return EBPO_OK; /* it stays gray */
         g->set.slots[slot].face = s->entries[i];
         g->set.slots[slot].round = g->set.round;
     }
@@ -220,13 +220,13 @@ static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, ui
     return status;
 }
 
-/* The node's list is stack[at] to stack[at + count - 1]; the stack is free from `top` on. */
+/* Grows a node. Its list is stack[at] to stack[at + count - 1]; the stack is free from `top` on. */
 static ebpo_status grow_node(grower *g, uint32_t index, ebpo_cell cell, uint64_t at, uint64_t count,
                              uint64_t top)
 {
     ebpo_branch *s = g->s;
     if (count == 0)
-        return EBPO_OK; /* stays white until the labels are known */
+        return EBPO_OK; /* stays white until winding numbers are known */
     if (is_leaf(g->b, cell.level, count)) {
         ebpo_build_node node = { 0 };
         ebpo_status status = grow_leaf(g, &node, cell, at, count);
@@ -289,8 +289,8 @@ ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *er
 
 /* --- the top of the tree --- */
 
-/* Pieces have at most this many faces, but there are no more than about PIECES_MOST pieces. */
-enum { PIECE_FACES = 4096, PIECES_MOST = 2048, SPLIT_GRAIN = 1 << 13 };
+/* Pieces have at most this many faces, but there are no more than about PIECES_MAX pieces. */
+enum { PIECE_FACES = 4096, PIECES_MAX = 2048, SPLIT_GRAIN = 1 << 13 };
 
 static ebpo_status no_memory_for_pieces(const ebpo_builder *b, ebpo_error *error)
 {
@@ -305,15 +305,16 @@ typedef struct top_split {
     const uint32_t *list;
     uint64_t count;
     uint64_t first_vertex, end_vertex; /* in the cell */
-    uint16_t *mask;       /* bits 0 to 7: octants; bit 8: the face crosses the cell's walls */
-    uint64_t (*begin)[9]; /* of each block: how many of each bit; then where they go */
+    uint16_t *mask;       /* bits 0 to 7: octants; bit 8: the face crosses the cell's faces */
+    uint64_t (*begin)[9]; /* count of each bit for each block; then its destination */
     uint32_t *to[9];
 } top_split;
 
-/* Exact where it matters: each face that a piece lists must turn up in one of its leaves. */
+/* Returns the octants, exact where needed: each face that a piece lists must be in one of its
+ * leaves. */
 static unsigned octants_exactly(const ebpo_builder *b, ebpo_cell cell, const ebpo_triangle *face)
 {
-    unsigned mask = ebpo_octants_touched(&b->box, cell, face);
+    unsigned mask = ebpo_octants_visited(&b->box, cell, face);
     if ((mask & (mask - 1)) == 0)
         return mask;
     for (unsigned octant = 0; octant < 8; octant++) {
@@ -322,10 +323,10 @@ static unsigned octants_exactly(const ebpo_builder *b, ebpo_cell cell, const ebp
         double low[3], high[3];
         ebpo_cell child = ebpo_cell_child(cell, octant);
         for (int k = 0; k < 3; k++) {
-            low[k] = ebpo_wall(&b->box, k, child.level, child.at[k]);
-            high[k] = ebpo_wall(&b->box, k, child.level, child.at[k] + 1);
+            low[k] = ebpo_cell_face(&b->box, k, child.level, child.at[k]);
+            high[k] = ebpo_cell_face(&b->box, k, child.level, child.at[k] + 1);
         }
-        if (!ebpo_triangle_meets_box(face->corner, low, high))
+        if (!ebpo_triangle_intersects_box(face->corner, low, high))
             mask &= ~(1u << octant);
     }
     return mask;
@@ -353,8 +354,8 @@ static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-static ebpo_status hand_out(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                            ebpo_error *error)
+static ebpo_status device_out(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     top_split *t = context;
     uint64_t *next = t->begin[begin / SPLIT_GRAIN];
@@ -367,14 +368,14 @@ static ebpo_status hand_out(void *context, uint64_t begin, uint64_t end, unsigne
     return EBPO_OK;
 }
 
-/* Those that a piece lists already. */
+/* Returns the number of faces that a piece lists already. */
 static uint64_t faces_done(const ebpo_builder *b)
 {
     const ebpo_branch *last = b->sub_count ? &b->sub[b->sub_count - 1] : NULL;
     return last ? last->first + last->fresh_count : 0;
 }
 
-/* Sizes of blocks to places of blocks. */
+/* Turns sizes of blocks into positions of blocks. */
 static void add_up(top_split *t, uint64_t sizes[9])
 {
     memset(sizes, 0, 9 * sizeof *sizes);
@@ -386,9 +387,9 @@ static void add_up(top_split *t, uint64_t sizes[9])
         }
 }
 
-/* Those that cross the walls are appended to the top's. */
-static ebpo_status make_room(ebpo_builder *b, top_split *t, uint32_t *lists[8], uint64_t sizes[9],
-                             ebpo_error *error)
+/* Makes space for lists. Faces that cross the cell's faces are appended to the top's. */
+static ebpo_status reserve_space(ebpo_builder *b, top_split *t, uint32_t *lists[8],
+                                 uint64_t sizes[9], ebpo_error *error)
 {
     ebpo_branch *s = &b->top;
     for (unsigned o = 0; o < 8; o++)
@@ -406,7 +407,7 @@ static ebpo_status make_room(ebpo_builder *b, top_split *t, uint32_t *lists[8], 
 static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *list, uint64_t count,
                              uint32_t *lists[8], uint64_t sizes[9], ebpo_error *error)
 {
-    /* stays so for the node: asked for all the same, to be stopped */
+    /* constant for the node; called to allow cancellation */
     uint64_t done = faces_done(b);
     ebpo_pass pass = { &b->options->progress, done, done, b->face_count };
     ebpo_progress progress = ebpo_pass_progress(&pass);
@@ -423,17 +424,17 @@ static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *li
                                    &progress, "cutting into pieces", error);
     if (status == EBPO_OK) {
         add_up(&t, sizes);
-        status = make_room(b, &t, lists, sizes, error);
+        status = reserve_space(b, &t, lists, sizes, error);
     }
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, b->workspace, count, SPLIT_GRAIN, hand_out, &t,
+        status = ebpo_parallel_for(b->threads, b->workspace, count, SPLIT_GRAIN, device_out, &t,
                                    &progress, "cutting into pieces", error);
     ebpo_array_free(b->workspace, t.mask);
     free(t.begin);
     return status;
 }
 
-/* Those of the piece's faces that no piece before it lists. */
+/* Marks the faces of the piece that no piece before it lists. */
 static bool mark_fresh(ebpo_builder *b, ebpo_branch *s, uint8_t *listed)
 {
     s->fresh = ebpo_alloc_zero(s->list_count / 8 + 1, 1);
@@ -455,12 +456,12 @@ typedef struct cutting {
     ebpo_builder *b;
     uint64_t piece;
     uint8_t *listed;  /* bit f: a piece lists face f */
-    uint64_t entries; /* of the pieces' lists */
+    uint64_t entries; /* entries of the pieces' lists */
     ebpo_error *error;
 } cutting;
 
-/* Takes over `list`. A piece has a leaf at least, and its leaves list all of its faces: what is too
- * much for them is too much here, and found out before it is made. */
+/* Takes over `list`. A piece has at least one leaf, and its leaves list all of its faces: so the
+ * limits of leaves are checked here, before the piece is made. */
 static ebpo_status add_piece(cutting *c, ebpo_build_node *node, ebpo_cell cell, uint32_t *list,
                              uint64_t count)
 {
@@ -524,11 +525,11 @@ static ebpo_status cut_top(ebpo_builder *b, ebpo_error *error)
 {
     uint32_t *all = ebpo_array_alloc(b->workspace, b->face_count, sizeof *all);
     cutting c = { b,
-                  b->face_count / PIECES_MOST > PIECE_FACES ? b->face_count / PIECES_MOST
-                                                            : PIECE_FACES,
+                  b->face_count / PIECES_MAX > PIECE_FACES ? b->face_count / PIECES_MAX
+                                                           : PIECE_FACES,
                   ebpo_array_zero(b->workspace, b->face_count / 8 + 1, 1), 0, error };
-    if (c.piece < 2 * (uint64_t)b->options
-                          ->leaf_faces) /* so that no node of the top can turn out to be a leaf */
+    if (c.piece <
+        2 * (uint64_t)b->options->leaf_faces) /* so that no node of the top can become a leaf */
         c.piece = 2 * (uint64_t)b->options->leaf_faces;
     ebpo_status status = EBPO_OK;
     if (!all || !c.listed ||
@@ -565,28 +566,28 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
     return EBPO_OK;
 }
 
-/* A piece is processed in its thread's own memory, and cells of the deepest level are not cut,
- * however many faces they list: so no more threads than fit into half of the budget. */
+/* Limits the number of threads to those that fit into half of the budget. A piece is processed in
+ * its thread's memory, and cells of the deepest level are not cut, however many faces they list. */
 static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
 {
-    /* points that a hull is made of; measured: a million faces at one vertex */
+    /* points of a hull; measured: a million faces at one vertex */
     enum { BYTES_A_FACE = 160 };
-    ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
-    figures.memory = 0;
+    ebpo_workspace_stats metrics = EBPO_WORKSPACE_STATS_INIT;
+    metrics.memory = 0;
     uint64_t most = 1;
     if (b->workspace)
-        ebpo_workspace_get_stats(b->workspace, &figures);
-    if (figures.memory < EBPO_WORKSPACE_MIN)
-        return EBPO_OK; /* none, or a test's */
+        ebpo_workspace_get_stats(b->workspace, &metrics);
+    if (metrics.memory < EBPO_WORKSPACE_MIN)
+        return EBPO_OK; /* none, or one of a test */
     for (uint64_t i = 0; i < b->sub_count; i++)
         most = b->sub[i].list_count > most ? b->sub[i].list_count : most;
-    uint64_t fit = figures.memory / 2 / BYTES_A_FACE / most;
+    uint64_t fit = metrics.memory / 2 / BYTES_A_FACE / most;
     if (fit < 1)
         return ebpo_fail(
             error, EBPO_E_LIMIT,
-            "a cell of level %d, the deepest that was allowed, lists %llu faces, for which half of "
-            "the memory budget of %llu bytes is too little; allow more levels or more memory",
-            b->max_level, (unsigned long long)most, (unsigned long long)figures.memory);
+            "a cell of level %d, the deepest allowed level, lists %llu faces, for which half of "
+            "the memory budget of %llu bytes is too small; allow more levels or more memory",
+            b->max_level, (unsigned long long)most, (unsigned long long)metrics.memory);
     b->threads = b->threads < fit ? b->threads : (unsigned)fit;
     return EBPO_OK;
 }

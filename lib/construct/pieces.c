@@ -1,4 +1,4 @@
-/* Holds what the pieces of the tree own while they are built: nodes, details and lists; their
+/* Holds the data of the pieces of the tree during the build: nodes, details and lists; their
  * stretches of the levels' arrays; proposed planes; and the store.
  *
  * A piece is a subtree that one thread builds. Its arrays grow in memory or in the builder's
@@ -48,7 +48,7 @@ bool ebpo_piece_level_add_gray(ebpo_piece_level *out, const uint32_t *codes, int
                               l->plane_count + (uint64_t)count, sizeof *l->planes))
         return false;
     l->plane_counts[l->gray_count++] = (uint8_t)count;
-    if (count) /* the array may not be there yet */
+    if (count) /* the array may not exist yet */
         memcpy(l->planes + l->plane_count, codes, (size_t)count * sizeof *codes);
     l->plane_count += (uint64_t)count;
     l->gray_volume += volume;
@@ -149,7 +149,7 @@ struct ebpo_store {
     pthread_mutex_t lock;
     char **blocks;
     uint64_t block_count, block_capacity;
-    size_t left; /* in the last one, at its end */
+    size_t left; /* free bytes at the end of the last one */
     size_t last_bytes;
 };
 

@@ -1,13 +1,13 @@
-/* Prepares a mesh for building, and finds out which repairs make a solid of it.
+/* Prepares a mesh for building, and finds repairs that make it a solid.
  *
- * ebpo_mesh_prepare sorts the mesh along the curve first, so that each later step goes through
- * memory in order; then it checks, repairs what the options ask for, sorts again and checks again.
- * A mesh that is too large for an exact grid is still checked; building refuses it.
+ * ebpo_mesh_prepare sorts the mesh along the curve first, so that each later step accesses memory
+ * in order; then it checks, repairs as the options request, sorts again and checks again. A mesh
+ * that is too large for an exact grid is still checked; building refuses it.
  *
  * ebpo_mesh_try_repairs applies sequences of repairs to copies of the mesh, shorter sequences
- * first, until one leaves a solid without doubts. Doubts say why a solid may not be what its author
- * meant: holes that were filled over much of the surface, a volume that is negative, or one that is
- * small for the area (a sheet). */
+ * first, until one leaves a solid without doubts. Doubts are reasons why a solid may differ from
+ * the author's intention: holes that were filled over much of the surface, a volume that is
+ * negative, or one that is small for the area (a sheet). */
 #include "core/strict_fp.h"
 
 #include <ebpo/repair.h>
@@ -29,7 +29,8 @@ typedef struct preparation {
     ebpo_prepared *out;
 } preparation;
 
-/* What is too large for an exact grid can be checked all the same; building says so again. */
+/* Accepts coordinates too large for an exact grid, as checking is still possible; building reports
+ * them again. */
 static ebpo_status unless_too_large(ebpo_status status, const ebpo_error *local, ebpo_error *error)
 {
     if (status == EBPO_OK || status == EBPO_E_LIMIT)
@@ -39,28 +40,28 @@ static ebpo_status unless_too_large(ebpo_status status, const ebpo_error *local,
     return status;
 }
 
-static ebpo_status mend_as_asked(const preparation *p, bool weld, ebpo_error *error)
+static ebpo_status repair_as_queried(const preparation *p, bool weld, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
-    unsigned steps = (weld ? EBPO_MEND_WELD : 0) | (o->orient ? EBPO_MEND_ORIENT : 0) |
-                     (o->flip ? EBPO_MEND_FLIP : 0) | (o->fill_holes ? EBPO_MEND_FILL : 0) |
-                     (o->drop_duplicates ? EBPO_MEND_DROP : 0);
-    if (!ebpo_progress_stage(&o->progress, "mending", error))
+    unsigned steps = (weld ? EBPO_REPAIR_WELD : 0) | (o->orient ? EBPO_REPAIR_ORIENT : 0) |
+                     (o->flip ? EBPO_REPAIR_FLIP : 0) | (o->fill_holes ? EBPO_REPAIR_FILL : 0) |
+                     (o->drop_duplicates ? EBPO_REPAIR_DROP : 0);
+    if (!ebpo_progress_stage(&o->progress, "repairing", error))
         return EBPO_E_CANCELLED;
-    return ebpo_mesh_mend(p->mesh, steps, o->weld_distance, &p->out->record, error);
+    return ebpo_mesh_repair(p->mesh, steps, o->weld_distance, &p->out->record, error);
 }
 
-/* In the order of the curve before anything else, so that each step goes through memory in order,
- * however little of it there is. */
-static ebpo_status arrange_and_mend(const preparation *p, bool weld, ebpo_error *error)
+/* Sorts along the curve first, so that each step accesses memory in order, however little memory
+ * there is. */
+static ebpo_status arrange_and_repair(const preparation *p, bool weld, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
     ebpo_error local = EBPO_ERROR_INIT;
-    ebpo_status status = ebpo_arrange_to_mend(p->mesh, o->threads, &o->progress, &local);
+    ebpo_status status = ebpo_arrange_to_repair(p->mesh, o->threads, &o->progress, &local);
     status = unless_too_large(status, &local, error);
     if (status == EBPO_OK)
         status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->before, error);
-    return status == EBPO_OK ? mend_as_asked(p, weld, error) : status;
+    return status == EBPO_OK ? repair_as_queried(p, weld, error) : status;
 }
 
 static ebpo_status prepare_in_order(const preparation *p, ebpo_error *error)
@@ -70,13 +71,12 @@ static ebpo_status prepare_in_order(const preparation *p, ebpo_error *error)
     bool weld = o->weld || o->weld_distance > 0 || strncmp(p->mesh->source_format, "stl", 3) == 0;
     ebpo_status status = EBPO_OK;
     if (!(o->weld_distance >= 0))
-        return ebpo_fail(
-            error, EBPO_E_ARGUMENT,
-            "weld_distance has to be 0, which is for equal positions, or above, not %g",
-            o->weld_distance);
-    p->out->mended = weld || o->orient || o->flip || o->fill_holes || o->drop_duplicates;
-    if (p->out->mended)
-        status = arrange_and_mend(p, weld, error);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "invalid weld_distance %g; give 0 (equal positions) or more",
+                         o->weld_distance);
+    p->out->was_repaired = weld || o->orient || o->flip || o->fill_holes || o->drop_duplicates;
+    if (p->out->was_repaired)
+        status = arrange_and_repair(p, weld, error);
     if (status == EBPO_OK) {
         ebpo_error local = EBPO_ERROR_INIT;
         status = ebpo_arrange(p->mesh, -1, o->threads, &o->progress, &local);
@@ -84,7 +84,7 @@ static ebpo_status prepare_in_order(const preparation *p, ebpo_error *error)
     }
     if (status == EBPO_OK)
         status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->report, error);
-    if (status == EBPO_OK && !p->out->mended)
+    if (status == EBPO_OK && !p->out->was_repaired)
         p->out->before = p->out->report;
     return status;
 }
@@ -109,13 +109,13 @@ ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh, const ebpo_prepare_options *optio
 /* --- trying repairs: types --- */
 
 enum {
-    WELD = EBPO_MEND_WELD,
-    ORIENT = EBPO_MEND_ORIENT,
-    FILL = EBPO_MEND_FILL,
-    DROP = EBPO_MEND_DROP
+    WELD = EBPO_REPAIR_WELD,
+    ORIENT = EBPO_REPAIR_ORIENT,
+    FILL = EBPO_REPAIR_FILL,
+    DROP = EBPO_REPAIR_DROP
 };
 
-/* The root of the area is a length; sheets are thinner than this share of it. */
+/* The square root of the area is a length; sheets are thinner than this share of it. */
 static const double THIN = 0.01;
 
 typedef struct trying {
@@ -128,8 +128,9 @@ typedef struct trying {
 
 /* --- doubts about a result --- */
 
-/* A loop of n edges was filled with n - 2 faces, which have n - 3 edges of their own. */
-static bool mostly_open(const ebpo_mesh_report *report, const ebpo_mend_record *record)
+/* Returns true if much of the surface was filled. Filling a loop of n edges adds n - 2 faces with n
+ * - 3 new edges. */
+static bool mostly_open(const ebpo_mesh_report *report, const ebpo_repair_record *record)
 {
     uint64_t boundary = record->added_faces + 2 * record->filled_holes;
     uint64_t before = report->edges - (record->added_faces - record->filled_holes);
@@ -137,7 +138,7 @@ static bool mostly_open(const ebpo_mesh_report *report, const ebpo_mend_record *
 }
 
 static uint32_t doubts_of_filling(double area, const ebpo_mesh_report *report,
-                                  const ebpo_mend_record *record)
+                                  const ebpo_repair_record *record)
 {
     uint32_t doubts = 0;
     if (!record || !record->filled_holes)
@@ -151,8 +152,9 @@ static uint32_t doubts_of_filling(double area, const ebpo_mesh_report *report,
     return doubts;
 }
 
-/* A sheet, or turned inside out. Of what lies far from 1 volume and area overflow or vanish, though
- * they keep their signs: only what has no thickness is surely a sheet then. */
+/* Finds sheets and solids turned inside out. For coordinates far from 1, volume and area overflow
+ * or vanish, though they keep their signs: then only a volume without thickness is certainly a
+ * sheet. */
 static uint32_t doubts_of_volume(const ebpo_mesh_report *report)
 {
     enum { FAR = 1000 };
@@ -171,7 +173,7 @@ static uint32_t doubts_of_volume(const ebpo_mesh_report *report)
 }
 
 uint32_t ebpo_mesh_doubts(double area, const ebpo_mesh_report *report,
-                          const ebpo_mend_record *record)
+                          const ebpo_repair_record *record)
 {
     EBPO_DEFAULT_FP;
     uint32_t doubts = doubts_of_filling(area, report, record);
@@ -193,7 +195,7 @@ static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
     if (status != EBPO_OK)
         return status;
     one->steps = steps;
-    status = ebpo_mesh_mend(&copy, steps, 0, &one->record, error);
+    status = ebpo_mesh_repair(&copy, steps, 0, &one->record, error);
     if (status == EBPO_OK)
         status = ebpo_mesh_check(&copy, t->threads, silent, &one->report, error);
     ebpo_mesh_free(&copy);
@@ -206,7 +208,7 @@ static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Whether steps that begin where `base` was found may leave a solid. */
+/* Returns true if steps after the one that found `base` may leave a solid. */
 static bool may_help(const ebpo_mesh_report *base, unsigned steps)
 {
     bool open = base->boundary_edges.count > 0;
@@ -217,10 +219,10 @@ static bool may_help(const ebpo_mesh_report *base, unsigned steps)
     return !(steps & ORIENT) || turned || open;
 }
 
-/* What was done before, and what the mesh is then. */
+/* The steps done before, and the resulting mesh. */
 typedef struct start {
     unsigned steps;
-    const ebpo_mesh_report *report; /* NULL: that was not done */
+    const ebpo_mesh_report *report; /* NULL: not done */
 } start;
 
 static ebpo_status try_more(trying *t, start from, unsigned more, ebpo_error *error)
@@ -230,7 +232,7 @@ static ebpo_status try_more(trying *t, start from, unsigned more, ebpo_error *er
     return try_steps(t, from.steps | more, error);
 }
 
-/* Tries what the step leaves by itself; *then is where others may begin. */
+/* Tries the result of the step alone; *then is the start for other steps. */
 static ebpo_status begin_with(trying *t, start from, unsigned step, start *then, ebpo_error *error)
 {
     if (t->out->chosen >= 0)
@@ -244,7 +246,7 @@ static ebpo_status drop_repeated(trying *t, start from, start *then, ebpo_error 
     return from.report->repeated_faces.count ? begin_with(t, from, DROP, then, error) : EBPO_OK;
 }
 
-/* Merging comes first where there is something to merge, unless nothing is open. */
+/* Tries merging first where there are vertices to merge, unless nothing is open. */
 static ebpo_status weld_first(trying *t, start *from, ebpo_error *error)
 {
     start bare = *from, dropped = { 0, NULL };
@@ -258,7 +260,7 @@ static ebpo_status weld_first(trying *t, start *from, ebpo_error *error)
     return status == EBPO_OK ? try_more(t, dropped, ORIENT, error) : status;
 }
 
-/* Fewer steps first. */
+/* Tries all sequences, shorter ones first. */
 static ebpo_status try_all(trying *t, ebpo_error *error)
 {
     start plain = { 0, t->given }, dropped = { 0, NULL };
@@ -278,7 +280,7 @@ static ebpo_status try_all(trying *t, ebpo_error *error)
     return status == EBPO_OK ? try_more(t, dropped, ORIENT | FILL, error) : status;
 }
 
-/* A plausible solid stays what it is; but one may want to know. */
+/* Tries dropping on a plausible solid, for information; the solid is not changed. */
 static ebpo_status try_dropping(trying *t, ebpo_error *error)
 {
     ebpo_status status = try_steps(t, DROP, error);

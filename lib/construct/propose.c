@@ -1,11 +1,11 @@
-/* Chooses planes from the leaves up, for the theses' selections (EBP 2017, 3.4.1). The walk from
- * the root down writes the chosen planes later.
+/* Chooses planes from the leaves up, for the selections of the theses (EBP 2017, 3.4.1). The walk
+ * from the root down writes the chosen planes later.
  *
  * A leaf's candidates are the planes of its faces; a gray node's are the planes that its children
  * have chosen. Each node clips the whole cell, and its support comes from the corners of the
- * children's envelopes and from the solid itself, so containment never rests on rounded corners.
- * Each piece is partitioned, its planes are chosen, and its nodes are forgotten again; then the
- * nodes of the top follow, deepest level first, those of one level in parallel. */
+ * children's envelopes and from the solid itself, so containment never depends on rounded corners.
+ * Each piece is partitioned, its planes are chosen, and its nodes are freed again; then the nodes
+ * of the top follow, deepest level first, those of one level in parallel. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,8 +22,8 @@
 #include "geometry/cells.h"
 #include "geometry/polytope.h"
 
-/* Corners of a child's envelope are rounded: what that may be in a support, in cells, many times
- * over. */
+/* Bound of the rounding error of corners of a child's envelope in a support, in cells, with a large
+ * margin. */
 static const double rounded = 1e-9;
 
 typedef struct proposer {
@@ -42,7 +42,7 @@ static int by_normal(const void *a, const void *b)
     const ebpo_offer *x = a, *y = b;
     if (x->normal != y->normal)
         return x->normal < y->normal ? -1 : 1;
-    /* of equal normals the one that has to move least */
+    /* among equal normals, the one that moves least */
     return x->origin > y->origin ? -1 : x->origin < y->origin;
 }
 
@@ -54,9 +54,9 @@ static int by_normal_alone(const void *a, const void *b)
 
 /* More candidates than this are thinned out evenly: only leaves without a limit on faces have that
  * many, and k-medoids compares all pairs. */
-enum { CANDIDATES_MOST = 4096 };
+enum { CANDIDATES_MAX = 4096 };
 
-/* Of equal normals one is left. Their supports are still to be found. */
+/* Keeps one of equal normals. Supports are computed later. */
 static bool make_candidates(proposer *p, ebpo_handover *given)
 {
     uint64_t kept = 0;
@@ -66,7 +66,7 @@ static bool make_candidates(proposer *p, ebpo_handover *given)
     for (uint64_t i = 0; i < given->offer_count; i++)
         if (i == 0 || given->offers[i].normal != given->offers[i - 1].normal)
             given->offers[kept++] = given->offers[i];
-    uint64_t step = kept / CANDIDATES_MOST + 1;
+    uint64_t step = kept / CANDIDATES_MAX + 1;
     given->offer_count = 0;
     for (uint64_t i = 0; i < kept; i += step)
         given->offers[given->offer_count++] = given->offers[i];
@@ -96,7 +96,7 @@ static double moved_by(const ebpo_offer *offer, double support, const double siz
     return (support - offer->origin) * least / sqrt(square);
 }
 
-/* Chooses among p->candidates, notes the planes and makes what the parent will get. */
+/* Chooses among p->candidates, stores the planes and makes the data for the parent. */
 static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, const ebpo_handover *given,
                           ebpo_handover *out)
 {
@@ -161,7 +161,7 @@ static bool offer_faces(proposer *p, const ebpo_build_detail *d, ebpo_cell cell,
             continue;
         ebpo_plane_code_decode(normal, n, &e);
         for (int k = 0; k < 3; k++) {
-            double corner = ebpo_wall(&b->box, k, cell.level, cell.at[k]),
+            double corner = ebpo_cell_face(&b->box, k, cell.level, cell.at[k]),
                    size = b->box.size[k] / (double)(1u << cell.level);
             for (int c = 0; c < 3; c++)
                 origin += n[k] * ((t.corner[c][k] - corner) / size) / 3;
@@ -207,7 +207,7 @@ static bool propose_leaf(proposer *p, uint32_t detail, ebpo_cell cell, int32_t w
 
 /* --- gray nodes: the children's planes, around the children's envelopes --- */
 
-/* Besides the children's envelopes the solid itself counts, so that the guarantee never rests on
+/* Uses the solid itself besides the children's envelopes, so that the guarantee never depends on
  * rounded corners. */
 static bool gray_supports(proposer *p, const ebpo_build_detail *d, ebpo_cell cell, int32_t winding,
                           const ebpo_handover *given)
@@ -264,7 +264,7 @@ static void proposer_free(proposer *p)
     free(p->candidates);
 }
 
-/* One gray node, from what its children gave. False: out of memory. */
+/* Handles one gray node, from its children's data. Returns false when out of memory. */
 static bool propose_one_gray(const ebpo_builder *b, ebpo_branch *s, uint32_t detail, ebpo_cell cell,
                              int32_t winding, ebpo_handover *given, ebpo_handover *out)
 {
@@ -281,7 +281,7 @@ static ebpo_status no_memory(ebpo_error *error)
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while choosing planes");
 }
 
-/* Moves them to the builder's store until the walk down needs them. */
+/* Moves the proposals to the builder's store until the walk down needs them. */
 static ebpo_status pack_proposals(ebpo_builder *b, ebpo_branch *s, ebpo_error *error)
 {
     ebpo_proposals *p = s->proposals;
@@ -308,8 +308,8 @@ static ebpo_status pack_proposals(ebpo_builder *b, ebpo_branch *s, ebpo_error *e
     return EBPO_OK;
 }
 
-/* A task over the builder's pieces: partitions each, chooses for its nodes and forgets the nodes.
- */
+/* Runs a task over the builder's pieces: partitions each, chooses for its nodes and frees the
+ * nodes. */
 static ebpo_status propose_pieces(void *context, uint64_t first, uint64_t last, unsigned worker,
                                   ebpo_error *error)
 {
@@ -334,13 +334,13 @@ static ebpo_status propose_pieces(void *context, uint64_t first, uint64_t last, 
 
 /* --- the top --- */
 
-/* The top's gray nodes, deepest first; those of one level side by side. */
+/* The top's gray nodes, deepest first; those of one level in parallel. */
 typedef struct top_node {
     uint32_t node;
     ebpo_cell cell;
     int32_t winding;
     ebpo_handover given, out;
-    uint64_t parent; /* place in the list */
+    uint64_t parent; /* index in the list */
     unsigned octant;
     uint32_t codes[EBPO_PLANES_STORED];
     int count;
@@ -352,7 +352,7 @@ typedef struct top_list {
     uint64_t count, capacity, base;
 } top_list;
 
-/* Breadth first, so that a level's nodes are one stretch; windings come down on the way. */
+/* Lists breadth first, so that a level's nodes are one stretch; passes windings down on the way. */
 static bool list_top(top_list *t)
 {
     ebpo_builder *b = t->b;
@@ -394,7 +394,7 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
     for (uint64_t i = first; i < last && status == EBPO_OK; i++) {
         top_node *n = &t->nodes[t->base + i];
         const ebpo_build_node *node = &b->top.nodes[n->node];
-        ebpo_branch alone = b->top; /* with proposals of its own: neighbours are at work */
+        ebpo_branch alone = b->top; /* with separate proposals: other threads are running */
         uint32_t detail = node->detail;
         alone.proposals = NULL;
         bool good = ebpo_proposals_make(&alone);
@@ -477,7 +477,7 @@ ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, propose_pieces, b,
                                    &progress, "choosing planes", error);
-    atomic_store(&b->leaf_count, 0); /* the pieces are made once more */
+    atomic_store(&b->leaf_count, 0); /* the pieces are made again */
     atomic_store(&b->entry_count, 0);
     if (status == EBPO_OK)
         status = propose_top(&t, &pass, error);

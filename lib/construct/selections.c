@@ -4,13 +4,13 @@
  *
  * - greedy (inherit): the plane that removes most volume comes first. Gains only shrink while the
  *   envelope does, so an earlier gain bounds the present one, and most candidates are never
- *   evaluated again (lazy evaluation). Volume alone leaves needles; planes that cut off what
- *   reaches far come last.
- * - random, offset, k-medoids: the theses' (EBP 2017, 3.3.4.3; BP 2008, 3.4.2). They choose a
+ *   evaluated again (lazy evaluation). Volume alone leaves needles; planes that cut off far
+ *   parts come last.
+ * - random, offset, k-medoids: from the theses (EBP 2017, 3.3.4.3; BP 2008, 3.4.2). They choose a
  *   number of candidates, whatever these cut.
  *
- * A selection clips the envelope that it is given and returns the codes of its planes. Results
- * depend on the arguments alone; random choices use the seed of the node. */
+ * A selection clips the given envelope and returns the codes of its planes. Results depend on the
+ * arguments alone; random choices use the seed of the node. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -26,21 +26,21 @@
 /* --- greedy --- */
 
 typedef struct ranked {
-    double gain; /* an upper bound; exact for the envelope of `round` */
+    double gain; /* upper bound; exact for the envelope of `round` */
     double n[3], d;
     uint32_t code;
     int round; /* -1: never evaluated */
 } ranked;
 
-/* Candidates that may still be worth a plane: by the volume that they remove (a heap), and by how
- * far the envelope reaches beyond them. */
+/* Candidates that may still be worth a plane: by removed volume (a heap), and by the extent of the
+ * envelope beyond them. */
 typedef struct contest {
     ranked by_gain[EBPO_PLANES_CANDIDATES], by_reach[EBPO_PLANES_CANDIDATES];
     int gains, reaches;
 } contest;
 
-/* The plane that a candidate would be, for ebpo_polytope_clip; false when only the whole cell would
- * do. */
+/* Makes the plane of a candidate, for ebpo_polytope_clip; returns false when only the whole cell
+ * would do. */
 static bool candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3],
                             double *offset)
 {
@@ -56,7 +56,7 @@ static bool candidate_plane(const ebpo_candidate *candidate, uint32_t *code, dou
     return true;
 }
 
-/* How far the envelope reaches along n. */
+/* Computes the extent of the envelope along n. */
 static void envelope_extent(const ebpo_polytope *p, const double n[3], double *least, double *most)
 {
     double low = 1e300, high = -1e300;
@@ -83,7 +83,7 @@ static void rank_candidates(const ebpo_polytope *envelope, double volume,
         r.gain = ebpo_polytope_cap_bound(volume, most - least, most - r.d);
         if (r.gain >= epsilon && r.gain > 0)
             c->by_gain[c->gains++] = r;
-        if (reach > 0 && most - r.d > reach * ebpo_vec3_length(r.n)) /* cutting only shortens it */
+        if (reach > 0 && most - r.d > reach * ebpo_vec3_length(r.n)) /* cutting only reduces it */
             c->by_reach[c->reaches++] = r;
     }
 }
@@ -121,8 +121,8 @@ static void drop_first(ranked *heap, int *count)
         sift_down(heap, *count, 0);
 }
 
-/* Volume alone leaves needles, which have next to none: cuts off what reaches far, farthest first.
- * A plane that clipping refuses is left out, and the next one tried. */
+/* Cuts off needles, which have hardly any volume: the farthest extents first. Skips a plane that
+ * clipping refuses. */
 static int cut_needles(ebpo_polytope *envelope, contest *c, double reach, int most, int taken,
                        uint32_t *codes)
 {
@@ -197,9 +197,9 @@ int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, i
     return cut_needles(envelope, &c, ebpo_needle, most, taken, codes);
 }
 
-/* Clips by the chosen candidates in ascending order of their numbers. Those that cut nothing when
- * their turn comes are not kept. Not more than `most` are chosen (ebpo_selection_wanted):
- * candidates are sorted by direction, and what was left out here would all face one way. */
+/* Clips by the chosen candidates in ascending order of their numbers. Drops those that then cut
+ * nothing. No more than `most` are chosen (ebpo_selection_wanted): candidates are sorted by
+ * direction, and omitted ones here would all face one way. */
 static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen,
                           uint32_t *codes)
 {
@@ -276,13 +276,13 @@ typedef struct clustering {
     float *distance;       /* [count][count] */
     int *medoid;           /* [wanted] */
     bool *chosen;          /* [count] */
-    int *nearest;          /* [count] place in `medoid` */
+    int *nearest;          /* [count] index in `medoid` */
     float *first, *second; /* [count] distance of the nearest medoid and of the next */
     double *lost, *gain;   /* [wanted] */
 } clustering;
 
-/* The angle of (x, y) from the x axis, -pi .. pi, to about 1e-15, by operations that round alike
- * everywhere: implementations of libm differ, and choices must not. */
+/* Returns the angle of (x, y) from the x axis, -pi .. pi, to about 1e-15, by operations that round
+ * identically everywhere: implementations of libm differ, and choices must not. */
 static double angle_of(double y, double x)
 {
     double least = fmin(fabs(x), fabs(y)), most = fmax(fabs(x), fabs(y));
@@ -302,7 +302,7 @@ static double angle_of(double y, double x)
     return y < 0 ? -angle : angle;
 }
 
-/* The normal in the model's coordinates, as a unit vector or as the theses' two angles. */
+/* Sets the normal in the model's coordinates, as a unit vector or as the theses' two angles. */
 static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[3])
 {
     int32_t n[3], d;
@@ -393,7 +393,7 @@ static void assign_medoids(clustering *c)
     }
 }
 
-/* The change of the total cost when candidate `h` takes the place of each medoid; the best of them.
+/* Computes the change of the total cost when candidate `h` replaces each medoid; returns the best.
  */
 static double best_swap_for(clustering *c, int h, int *which)
 {
@@ -418,7 +418,7 @@ static double best_swap_for(clustering *c, int h, int *which)
 static bool swap_once(clustering *c)
 {
     int leave = -1, enter = -1;
-    double best = -1e-9; /* less is rounding */
+    double best = -1e-9; /* smaller gains are rounding errors */
     memset(c->lost, 0, (size_t)c->wanted * sizeof *c->lost);
     for (int i = 0; i < c->count; i++)
         c->lost[c->nearest[i]] += (double)c->second[i] - (double)c->first[i];
@@ -438,7 +438,7 @@ static bool swap_once(clustering *c)
     return true;
 }
 
-/* With one medoid there is no second nearest. */
+/* Handles one medoid, which has no second nearest. */
 static void single_medoid(clustering *c)
 {
     double best = INFINITY;
@@ -454,11 +454,11 @@ static void single_medoid(clustering *c)
     c->chosen[at] = true;
 }
 
-/* The selections of the theses. */
+/* Selects by k-medoids. */
 static int select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes)
 {
-    /* each lowers the cost; this only guards against rounding in circles */
-    enum { SWAPS_MOST = 100000 };
+    /* each swap lowers the cost; this only prevents endless loops by rounding */
+    enum { SWAPS_MAX = 100000 };
     ebpo_choice all = *choice;
     if (!choice->count || choice->wanted < 1)
         return 0;
@@ -473,7 +473,7 @@ static int select_kmedoids(ebpo_polytope *envelope, const ebpo_choice *choice, u
             int swaps = 0;
             do
                 assign_medoids(&c);
-            while (swap_once(&c) && ++swaps < SWAPS_MOST);
+            while (swap_once(&c) && ++swaps < SWAPS_MAX);
         }
         taken = clip_by_chosen(envelope, choice, c.chosen, codes);
     }
@@ -497,8 +497,8 @@ ebpo_select_fn ebpo_selection_function(ebpo_selection selection)
     return (unsigned)selection < EBPO_SELECTION_COUNT ? selection_functions[selection] : NULL;
 }
 
-/* Equation 5, or BP's K. */
-static int asked_for(int count, int level, double percent, double k_root)
+/* Returns equation 5, or BP's K. */
+static int queried_for(int count, int level, double percent, double k_root)
 {
     if (!(k_root > 0))
         return (int)ceil(count * percent / 100);
@@ -512,6 +512,6 @@ static int asked_for(int count, int level, double percent, double k_root)
 
 int ebpo_selection_wanted(int count, int level, double percent, double k_root)
 {
-    int wanted = asked_for(count, level, percent, k_root);
+    int wanted = queried_for(count, level, percent, k_root);
     return wanted < EBPO_PLANES_STORED ? wanted : EBPO_PLANES_STORED;
 }

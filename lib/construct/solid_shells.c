@@ -2,10 +2,10 @@
  *
  * Where no faces of two components have a common point, each component as a whole is inside or
  * outside every other one, and the winding numbers on its sides follow from the nesting. Faces are
- * compared only where the boxes of components do not settle it: a face of a component whose box is
- * not within another one's, and that comes to that other box. Both passes stop after a number of
- * steps that is proportional to the faces; the components then count as not apart. The counts serve
- * `ebpo check`, the apart components the solid's volume. */
+ * compared only where the boxes of components do not decide: a face of a component whose box is not
+ * within another one's, and that reaches that other box. Both passes stop after a number of steps
+ * that is proportional to the faces; the components then count as not apart. `ebpo check` uses the
+ * counts, the solid's volume the apart components. */
 #include "core/strict_fp.h"
 
 #include "construct/solid_shells.h"
@@ -26,14 +26,15 @@ enum { RULES = 3, GRAIN = 1 << 13, STEPS_PER_FACE = 64, STEPS_AT_LEAST = 1 << 22
 
 typedef struct comparing {
     ebpo_solid_shells *s;
-    uint8_t *exposed; /* [faces] the face comes to the box of a shell that its own is not within */
-    uint8_t *reached; /* [shells] some face of another shell does so here */
-    ebpo_box_tree faces; /* of shells that are reached; value: the shell */
+    uint8_t *exposed;    /* [faces] the face reaches the box of a shell that does not contain its
+                          * shell's box */
+    uint8_t *reached;    /* [shells] some face of another shell reaches this box */
+    ebpo_box_tree faces; /* faces of reached shells; value: the shell */
     uint64_t steps, most;
-    bool apart; /* until now */
+    bool apart; /* result so far */
 } comparing;
 
-/* What one face is compared with. */
+/* The face that others are compared with. */
 typedef struct visitor {
     comparing *c;
     ebpo_point_box box;
@@ -47,7 +48,7 @@ static uint32_t shell_of_face(const comparing *c, uint64_t face)
     return c->s->shell_of[all->of_face[face]];
 }
 
-static bool boxes_meet(const ebpo_point_box *a, const double min[3], const double max[3])
+static bool boxes_intersect(const ebpo_point_box *a, const double min[3], const double max[3])
 {
     for (int k = 0; k < 3; k++)
         if (a->min[k] > max[k] || a->max[k] < min[k])
@@ -57,7 +58,7 @@ static bool boxes_meet(const ebpo_point_box *a, const double min[3], const doubl
 
 static bool is_near(void *user, const ebpo_box_node *node)
 {
-    return boxes_meet(&((const visitor *)user)->box, node->filled->min, node->filled->max);
+    return boxes_intersect(&((const visitor *)user)->box, node->filled->min, node->filled->max);
 }
 
 static bool visit_shells(void *user, ebpo_tree_point *points, uint64_t count)
@@ -68,7 +69,7 @@ static bool visit_shells(void *user, ebpo_tree_point *points, uint64_t count)
     for (uint64_t i = 0; i < count; i++) {
         const ebpo_shell *other = &all[points[i].number];
         bool inner = ebpo_shell_box_within(own, other) && !ebpo_shell_box_within(other, own);
-        if (other == own || inner || !boxes_meet(&v->box, other->min, other->max))
+        if (other == own || inner || !boxes_intersect(&v->box, other->min, other->max))
             continue;
         v->c->exposed[v->face] = 1;
         __atomic_store_n(&v->c->reached[points[i].number], 1, __ATOMIC_RELAXED);
@@ -88,7 +89,7 @@ static bool visit_faces(void *user, ebpo_tree_point *points, uint64_t count)
         if (points[i].value == (int32_t)v->shell)
             continue;
         ebpo_face_box(mesh, &points[i], &box);
-        if (!boxes_meet(&v->box, box.min, box.max))
+        if (!boxes_intersect(&v->box, box.min, box.max))
             continue;
         ebpo_face_corners(mesh, points[i].number, b);
         if (ebpo_triangle_pair((const double(*)[3])a, (const double(*)[3])b) != EBPO_PAIR_APART) {
@@ -99,7 +100,7 @@ static bool visit_faces(void *user, ebpo_tree_point *points, uint64_t count)
     return v->steps < v->c->most;
 }
 
-/* Shows each face to the tree of shells, or each exposed face to the tree of faces. */
+/* Compares each face with the tree of shells, or each exposed face with the tree of faces. */
 static ebpo_status compare_faces(comparing *c, uint64_t begin, uint64_t end,
                                  const ebpo_box_tree *tree, ebpo_tree_points_fn visit)
 {
@@ -126,8 +127,8 @@ static ebpo_status find_exposed(void *context, uint64_t begin, uint64_t end, uns
     return compare_faces(c, begin, end, &c->s->nesting.tree, visit_shells);
 }
 
-static ebpo_status find_meeting(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                ebpo_error *error)
+static ebpo_status find_clash(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     comparing *c = context;
     (void)worker, (void)error;
@@ -166,8 +167,8 @@ static ebpo_status compare_shells(comparing *c, ebpo_error *error)
     if (status == EBPO_OK && c->apart)
         status = plant_faces(c, error);
     if (status == EBPO_OK && c->apart && c->faces.count)
-        status = ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_meeting, c, NULL, "",
-                                   error);
+        status =
+            ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_clash, c, NULL, "", error);
     return status;
 }
 
@@ -183,8 +184,8 @@ static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
     return status;
 }
 
-/* Returns false for an open component, and for one that has no volume although it is not flat: it
- * bounds parts whose volumes cancel. Two faces that are closed are one face and its back. */
+/* Returns false for an open component, and for one without volume that is not flat: it bounds parts
+ * whose volumes cancel. Two closed faces are one face and its back. */
 static bool is_simple(const ebpo_components *c, uint64_t i)
 {
     const ebpo_found_component *one = &c->list[i];
@@ -247,7 +248,7 @@ static void count_one(const ebpo_nesting *n, const ebpo_shell *one, ebpo_shells 
     made->nested += !inwards && cavity;
 }
 
-/* Adds up what the solid of each rule has beyond the integral of the winding number. */
+/* Adds for each rule the volume of the solid beyond the integral of the winding number. */
 static void add_beyond(const ebpo_solid_shells *s, ebpo_shells *made)
 {
     ebpo_mesh_frame frame = ebpo_mesh_frame_of(s->mesh);

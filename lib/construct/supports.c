@@ -6,8 +6,8 @@
  * With many, only crossings and corners are gathered; vertices are searched by a hierarchy of boxes
  * over their runs along the curve. Rounding is monotone: a box's bound, computed by the same
  * operations in the same order, is never below that of a point in it, so skipping a box never loses
- * the greatest point. Searches stop early once they have reached a support with which the plane
- * could not gain anything. */
+ * the greatest point. Searches stop early at a support with which the plane could not gain
+ * anything. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -84,7 +84,7 @@ static double bound_value(const query *q, const double low[3], const double high
 
 static void visit_block(query *q, int level, uint64_t block)
 {
-    /* `level` 0 is the vertices themselves. */
+    /* `level` 0: the vertices themselves. */
     uint64_t width = 1;
     for (int i = 0; i < level; i++)
         width *= EBPO_BOUNDS_FAN;
@@ -108,14 +108,14 @@ static void visit_block(query *q, int level, uint64_t block)
         visit_block(q, level - 1, i);
 }
 
-/* Greatest n . xi over vertices [begin, end), in coordinates of the cell that holds them, and
- * `least`; `*at`: the vertex, or EBPO_NO_VERTEX when `least` is the greatest. */
+/* Returns the greatest n . xi over vertices [begin, end), in coordinates of the cell that contains
+ * them, and `least`; `*at`: the vertex, or EBPO_NO_VERTEX when `least` is the greatest. */
 static double bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3],
                              uint64_t begin, uint64_t end, double least, uint64_t *at)
 {
     query q = { .b = b, .begin = begin, .end = end, .at = EBPO_NO_VERTEX, .best = least };
     for (int k = 0; k < 3; k++) {
-        q.corner[k] = ebpo_wall(&b->box, k, cell.level, cell.at[k]);
+        q.corner[k] = ebpo_cell_face(&b->box, k, cell.level, cell.at[k]);
         q.size[k] = b->box.size[k] / (double)(1u << cell.level);
         q.n[k] = n[k];
     }
@@ -157,7 +157,7 @@ void ebpo_build_vertex_range(const ebpo_builder *b, ebpo_cell cell, uint64_t *be
 
 /* --- the points of a node --- */
 
-enum { FEW_VERTICES = 4096, TABLE_MOST = 1 << 16, MANY_POINTS = 1 << 15 };
+enum { FEW_VERTICES = 4096, TABLE_MAX = 1 << 16, MANY_POINTS = 1 << 15 };
 
 static bool is_point(const ebpo_supports *s, unsigned i, const double x[3])
 {
@@ -165,7 +165,7 @@ static bool is_point(const ebpo_supports *s, unsigned i, const double x[3])
     return p[0][i % 4] == x[0] && p[1][i % 4] == x[1] && p[2][i % 4] == x[2];
 }
 
-/* True when the point is there already; its slack is then the greater of the two. */
+/* Returns true when the point exists already; its slack becomes the greater of the two. */
 static bool known_point(ebpo_supports *s, const double x[3], double slack)
 {
     uint64_t bits[3], at;
@@ -196,7 +196,7 @@ static bool add_point(ebpo_supports *s, const double x[3], double slack)
     double(*p)[4] = s->point[s->count / 4],
     values[4] = { x[0], x[1], x[2], EBPO_NORMAL_NORM * slack };
     unsigned own = s->count % 4;
-    for (int k = 0; k < 4; k++) /* the others of four are copies of the first until they come */
+    for (int k = 0; k < 4; k++) /* the others of four are copies of the first until they are set */
         for (unsigned lane = own; lane < (own ? own + 1 : 4); lane++)
             p[k][lane] = values[k];
     s->count++;
@@ -208,13 +208,14 @@ static bool add_vertices(ebpo_supports *s, uint64_t begin, uint64_t end)
     const ebpo_builder *b = s->b;
     double corner[3], size[3];
     for (int k = 0; k < 3; k++) {
-        corner[k] = ebpo_wall(&b->box, k, s->cell.level, s->cell.at[k]);
+        corner[k] = ebpo_cell_face(&b->box, k, s->cell.level, s->cell.at[k]);
         size[k] = b->box.size[k] / (double)(1u << s->cell.level);
     }
     for (uint64_t i = begin; i < end; i++) {
         double p[3];
         ebpo_mesh_position(b->mesh, i, p);
-        /* Two roundings of values up to 1, far below the slack that ebpo_plane_code_offset adds. */
+        /* Two rounding errors of values up to 1, far below the slack that ebpo_plane_code_offset
+         * adds. */
         if (!add_point(s,
                        (const double[3]){ (p[0] - corner[0]) / size[0],
                                           (p[1] - corner[1]) / size[1],
@@ -227,7 +228,7 @@ static bool add_vertices(ebpo_supports *s, uint64_t begin, uint64_t end)
 
 static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebpo_build_detail *d)
 {
-    /* of the top: each is in a different part of the workspace's files */
+    /* for the top: each is in a different part of the workspace's files */
     const uint64_t every = branch->list ? 1024 : 32;
     EBPO_FOR_ITEMS_EVERY(s->workspace, every, i, d->cross_begin, d->cross_end) {
         ebpo_triangle face;
@@ -241,10 +242,10 @@ static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebp
     return true;
 }
 
-/* Sized for about that many points. */
+/* Clears the table, sized for about `points` points. */
 static bool clear_table(ebpo_supports *s, uint64_t points)
 {
-    uint64_t size = ebpo_hash_slots(2 * points < TABLE_MOST ? 2 * points : TABLE_MOST);
+    uint64_t size = ebpo_hash_slots(2 * points < TABLE_MAX ? 2 * points : TABLE_MAX);
     s->place_count = size;
     if (!ebpo_array_grow_late(s->workspace, &s->place, &s->place_capacity, size, sizeof *s->place))
         return false;
@@ -268,7 +269,7 @@ static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_br
         return false;
     s->begin = few ? 0 : begin;
     s->end = few ? 0 : end;
-    /* Corners first: they reach far and show soonest which directions are hopeless. */
+    /* Corners first: they are far out and show early which directions are hopeless. */
     unsigned corners = ebpo_inside_corners(b, winding, detail->delta);
     for (int i = 0; i < 8; i++)
         if (corners >> i & 1 &&
@@ -277,7 +278,7 @@ static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_br
     return (!few || add_vertices(s, begin, end)) && add_crossings(s, branch, detail);
 }
 
-/* Which of the points in a stretch has the value `best`. */
+/* Finds the point of a stretch with the value `best`. */
 static void locate_point(const ebpo_supports *s, uint64_t first, const double n[3], double best,
                          double where[3])
 {
@@ -292,7 +293,7 @@ static void locate_point(const ebpo_supports *s, uint64_t first, const double n[
     }
 }
 
-/* Raises `support`. */
+/* Raises `support` to the maximum of the points. */
 static void among_points(const ebpo_supports *s, const double n[3], double enough, double *support,
                          double where[3])
 {
@@ -360,7 +361,7 @@ double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], 
         ebpo_mesh_position(s->b->mesh, at, p);
     if (at != EBPO_NO_VERTEX)
         for (int k = 0; k < 3; k++)
-            where[k] = (p[k] - ebpo_wall(&s->b->box, k, s->cell.level, s->cell.at[k])) /
+            where[k] = (p[k] - ebpo_cell_face(&s->b->box, k, s->cell.level, s->cell.at[k])) /
                        (s->b->box.size[k] / (double)(1u << s->cell.level));
     return support;
 }

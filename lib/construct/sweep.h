@@ -9,32 +9,32 @@
 
 enum {
     EBPO_STRETCH = 8,        /* fours of points that share a box */
-    EBPO_SWEEP_PLANES = 2048 /* at most */
+    EBPO_SWEEP_PLANES = 2048 /* maximum */
 };
 
-/* Planes n . x = d by coordinate; what fills the last four is a plane that nothing sees. */
+/* Planes n . x = d by coordinate; the padding of the last four is a plane that no point sees. */
 typedef struct ebpo_sweep_planes {
     const double *nx, *ny, *nz, *d;
     int fours;
 } ebpo_sweep_planes;
 
-/* Points in fours, by coordinate: x, y, z, and what is added to n . x. What fills the last four is
- * a copy. */
+/* Points in fours, by coordinate: x, y, z, and an addition to n . x. The padding of the last four
+ * is a copy. */
 typedef struct ebpo_sweep_points {
     const double (*point)[4][4]; /* [fours] */
-    /* of each stretch: least and greatest coordinates, greatest addition */
+    /* for each stretch: least and greatest coordinates, greatest addition */
     const double (*box)[7];
     uint64_t fours;
 } ebpo_sweep_points;
 
 typedef struct ebpo_sweep {
-    /* Planes that p lies above by more than `above`, if it is beyond any by more than `beyond`
-     * (else none): writes the first `capacity` numbers and returns how many there are. */
+    /* Finds planes that p is above by more than `above`, if it is beyond any by more than `beyond`
+     * (else none): writes the first `capacity` numbers and returns their total number. */
     int (*seen)(const ebpo_sweep_planes *planes, const double p[3], double beyond, double above,
                 uint16_t *list, int capacity);
     /* Raises *best to the greatest value among the points; ends when it has reached `enough`.
-     * Returns the first point's number of the stretch that the value is from; UINT64_MAX: none is
-     * greater. */
+     * Returns the first point's number of the stretch with this value; UINT64_MAX: none is greater.
+     */
     uint64_t (*highest)(const ebpo_sweep_points *points, const double n[3], double enough,
                         double *best);
 } ebpo_sweep;

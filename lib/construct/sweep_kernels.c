@@ -1,7 +1,7 @@
-/* The two inner loops of hulls and supports, four doubles at a time: planes that a point lies
- * above, and the greatest value among points. meson.build compiles this file once for each
- * instruction set; the operations and their order are the same in each, so results are too. The
- * interface is sweep.h; core/cpu.h chooses the variant. */
+/* The two inner loops of hulls and supports, four doubles at a time: planes that a point is above,
+ * and the greatest value among points. meson.build compiles this file once for each instruction
+ * set; the operations and their order are the same in each, so results are too. The interface is
+ * sweep.h; core/cpu.h chooses the variant. */
 #include "core/strict_fp.h"
 
 #include "construct/sweep.h"
@@ -42,7 +42,7 @@ static int planes_seen(const ebpo_sweep_planes *planes, const double p[3], doubl
     return count;
 }
 
-/* What a stretch may reach at most: computed like the points' own values, so rounding does not make
+/* Returns an upper bound for a stretch: computed like the points' values, so rounding does not make
  * it less. */
 static double reach_of(const double box[7], const double n[3])
 {

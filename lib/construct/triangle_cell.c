@@ -1,11 +1,11 @@
-/* Tests a face against a cell: which octants of the cell it may touch, whether it misses the cell,
- * and its part within the cell as a polygon.
+/* Tests a face against a cell: octants of the cell that it may touch, a test for no contact, and
+ * its part within the cell as a polygon.
  *
- * Everything errs on the safe side by a bound on the rounding, so no exact arithmetic is needed:
+ * All tests are conservative by a bound of the rounding error, so no exact arithmetic is needed:
  * including a neighbour costs little, missing one is an error of the file. The tests use the face's
  * bounding box, its plane and the cross products of its edges with the axes (separating axes).
- * Clipping widens the cell by the bound, so that a face that touches the closed cell always leaves
- * points. */
+ * Clipping enlarges the cell by the bound, so that a face that touches the closed cell always
+ * leaves points. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -15,14 +15,14 @@
 #include "geometry/polytope.h"
 #include "geometry/vec3.h"
 
-/* Cell coordinates: one rounding in the subtraction, one in the division; corners and sizes of
- * cells are exact. */
+/* Converts to cell coordinates: one rounding in the subtraction, one in the division; corners and
+ * sizes of cells are exact. */
 static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
                       double x[3][3])
 {
     double most = 1;
     for (int k = 0; k < 3; k++) {
-        double corner = ebpo_wall(box, k, cell.level, cell.at[k]);
+        double corner = ebpo_cell_face(box, k, cell.level, cell.at[k]);
         double size = box->size[k] / (double)(1u << cell.level);
         for (int i = 0; i < 3; i++) {
             x[i][k] = (face->corner[i][k] - corner) / size;
@@ -33,13 +33,13 @@ static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *
     return most;
 }
 
-/* With coordinates up to M: 2.01 u M from to_cell, and at most 8 u M for each of six clips; 128 u M
- * covers their sum. One value for all faces that do not reach far: then the points that two faces
- * share come out the same from both. */
+/* Returns the slack. With coordinates up to M: 2.01 u M from to_cell, and at most 8 u M for each of
+ * six clips; 128 u M covers their sum. One value for all faces with small coordinates: then shared
+ * points of two faces are computed identically from both. */
 static double slack_for(double most) { return most <= 2 ? 0x1p-45 : most * 0x1p-46; }
 
-static int clip_wall(double in[9][3], int count, int axis, double sign, double limit,
-                     double out[9][3])
+static int clip_cell_face(double in[9][3], int count, int axis, double sign, double limit,
+                          double out[9][3])
 {
     int kept = 0;
     for (int i = 0; i < count; i++) {
@@ -51,7 +51,7 @@ static int clip_wall(double in[9][3], int count, int axis, double sign, double l
             kept++;
         }
         if ((da < 0 && db > 0) || (da > 0 && db < 0)) {
-            bool back = da > 0; /* from the inner end, whichever way the face runs along its edge */
+            bool back = da > 0; /* from the inner end, independent of the direction of the edge */
             const double *from = back ? b : a, *to = back ? a : b;
             double t = back ? db / (db - da) : da / (da - db);
             for (int k = 0; k < 3; k++)
@@ -79,8 +79,8 @@ int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle 
             return 0;
         if (high <= 1 + e && low >= -e)
             continue;
-        int n = clip_wall(points, count, k, 1, 1 + e, other);
-        count = clip_wall(other, n, k, -1, e, points);
+        int n = clip_cell_face(points, count, k, 1, 1 + e, other);
+        count = clip_cell_face(other, n, k, -1, e, points);
     }
     return count;
 }
@@ -97,9 +97,9 @@ static void separation_prepare(separation *s)
     ebpo_vec3_cross(s->edge[0], s->edge[1], s->normal);
 }
 
-/* True when the plane of the face or a cross product of one of its edges with an axis separates it
- * from the cube around `centre`. Errors: edges 4 u M; cross terms below 64 u M^2; the plane's below
- * 512 u M^3 (u = 2^-53). */
+/* Returns true when the plane of the face or a cross product of one of its edges with an axis
+ * separates it from the cube around `centre`. Errors: edges 4 u M; cross terms below 64 u M^2; the
+ * plane's below 512 u M^3 (u = 2^-53). */
 static bool is_separated(const separation *s, const double centre[3], double half)
 {
     double m = s->most, tolerance = 0x1p-44 * m * m * m;
@@ -125,23 +125,23 @@ static bool is_separated(const separation *s, const double centre[3], double hal
     return false;
 }
 
-/* By the walls between the octants, which are exact. */
+/* Uses the planes between the octants, which are exact. */
 static unsigned octants_of_bounds(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
 {
     static const unsigned low_side[3] = { 0x55, 0x33, 0x0f };
     unsigned mask = 255;
     for (int k = 0; k < 3; k++) {
-        double wall = ebpo_wall(box, k, cell.level + 1, 2 * cell.at[k] + 1), a = face->corner[0][k],
-               b = face->corner[1][k], c = face->corner[2][k];
-        if (a > wall && b > wall && c > wall)
+        double cell_face = ebpo_cell_face(box, k, cell.level + 1, 2 * cell.at[k] + 1),
+               a = face->corner[0][k], b = face->corner[1][k], c = face->corner[2][k];
+        if (a > cell_face && b > cell_face && c > cell_face)
             mask &= ~low_side[k];
-        if (a < wall && b < wall && c < wall)
+        if (a < cell_face && b < cell_face && c < cell_face)
             mask &= low_side[k];
     }
     return mask;
 }
 
-unsigned ebpo_octants_touched(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
+unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
 {
     unsigned mask = octants_of_bounds(box, cell, face);
     if ((mask & (mask - 1)) == 0)

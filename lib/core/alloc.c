@@ -1,6 +1,7 @@
-/* Memory from malloc, with checked sizes: the number of items comes from a file or a mesh, and the
- * product of it and their size may not fit. Arrays that may be larger than memory come from a
- * workspace instead (workspace.c). Also the count that keeps what is being made below a limit. */
+/* Memory from malloc with checked sizes: the number of items comes from a file or a mesh, and its
+ * product with the item size may overflow. Arrays that may be larger than memory come from a
+ * workspace instead (workspace.c). Also counts the memory of an object that is being built against
+ * a limit. */
 #include "core/alloc.h"
 
 #include <inttypes.h>
@@ -64,31 +65,31 @@ bool ebpo_grow(void *array, uint64_t *capacity, uint64_t need, size_t size)
     return true;
 }
 
-/* --- memory that making something may take --- */
+/* --- memory limit of an object that is being built --- */
 
-ebpo_status ebpo_room_check(ebpo_room *room, uint64_t bytes, ebpo_error *error)
+ebpo_status ebpo_quota_check(ebpo_quota *space, uint64_t bytes, ebpo_error *error)
 {
-    if (!room || (room->taken <= room->most && bytes <= room->most - room->taken))
+    if (!space || (space->taken <= space->most && bytes <= space->most - space->taken))
         return EBPO_OK;
-    uint64_t all = bytes > UINT64_MAX - room->taken ? UINT64_MAX : room->taken + bytes,
-             grown = room->most + room->most / 4 + 1;
-    room->needed = all > grown ? all : grown;
+    uint64_t all = bytes > UINT64_MAX - space->taken ? UINT64_MAX : space->taken + bytes,
+             grown = space->most + space->most / 4 + 1;
+    space->needed = all > grown ? all : grown;
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the memory budget leaves %" PRIu64
                      " bytes for this, which takes up to %" PRIu64,
-                     room->most, all);
+                     space->most, all);
 }
 
-ebpo_status ebpo_room_take(ebpo_room *room, uint64_t bytes, ebpo_error *error)
+ebpo_status ebpo_quota_take(ebpo_quota *space, uint64_t bytes, ebpo_error *error)
 {
-    ebpo_status status = ebpo_room_check(room, bytes, error);
-    if (room && status == EBPO_OK)
-        room->taken += bytes;
+    ebpo_status status = ebpo_quota_check(space, bytes, error);
+    if (space && status == EBPO_OK)
+        space->taken += bytes;
     return status;
 }
 
-void ebpo_room_give(ebpo_room *room, uint64_t bytes)
+void ebpo_quota_give(ebpo_quota *space, uint64_t bytes)
 {
-    if (room)
-        room->taken -= bytes;
+    if (space)
+        space->taken -= bytes;
 }

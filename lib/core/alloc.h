@@ -1,41 +1,44 @@
-/* Allocation with checked sizes: every array whose size comes from a file or a mesh is allocated
+/* Allocation with checked sizes. Every array whose size comes from a file or a mesh is allocated
  * here, or by a workspace (core/workspace.h) if it may be larger than memory. */
 #ifndef EBPO_CORE_ALLOC_H
 #define EBPO_CORE_ALLOC_H
 
 #include <ebpo/base.h>
 
-/* a * b into *out; false when it does not fit 64 bits. */
+/* Writes a * b to *out; returns false when it does not fit 64 bits. */
 static inline bool ebpo_mul_ok(uint64_t a, uint64_t b, uint64_t *out)
 {
     return !__builtin_mul_overflow(a, b, out);
 }
 
-/* count * size bytes, uninitialised; NULL when the product overflows or memory is short. A count of
- * 0 gives a valid pointer. */
+/* Allocates count * size uninitialised bytes; returns NULL when the product overflows or memory is
+ * short. A count of 0 gives a valid pointer. */
 void *ebpo_alloc(uint64_t count, size_t size);
-/* The same, zeroed. */
+/* Same as ebpo_alloc, but zeroed. */
 void *ebpo_alloc_zero(uint64_t count, size_t size);
-/* The same, at the beginning of a cache line: for what is read and written by vectors. */
+/* Same as ebpo_alloc, but aligned to a cache line, for data that vector instructions read and
+ * write. */
 void *ebpo_alloc_lines(uint64_t count, size_t size);
-/* Resizes to count * size bytes; on NULL the old block stays valid. */
+/* Resizes to count * size bytes. When it returns NULL, the old block stays valid. */
 void *ebpo_realloc(void *block, uint64_t count, size_t size);
 
-/* Makes room for `need` items in a growing array (*capacity items of `size` bytes at *array),
- * growing it by half. False when memory is short; the array stays valid. */
+/* Ensures capacity for `need` items in a growing array (*capacity items of `size` bytes at *array),
+ * which grows by half. Returns false when memory is short; the array stays valid. */
 bool ebpo_grow(void *array, uint64_t *capacity, uint64_t need, size_t size);
 
-/* Memory that making something may take, counted while it is made. */
+/* A limit for the memory of an object that is being built. */
 
-/* One thread. `needed` is set by what is refused: so much might do, always more than `most`. */
-typedef struct ebpo_room {
+/* Used by one thread. A refused request sets `needed`: a limit that might suffice, always above
+ * `most`. */
+typedef struct ebpo_quota {
     uint64_t most, taken, needed;
-} ebpo_room;
+} ebpo_quota;
 
-/* EBPO_E_LIMIT if there is no room for so much beside what is taken. NULL: no limit. */
-EBPO_MUST_USE ebpo_status ebpo_room_check(ebpo_room *room, uint64_t bytes, ebpo_error *error);
-/* The same, and takes it. */
-EBPO_MUST_USE ebpo_status ebpo_room_take(ebpo_room *room, uint64_t bytes, ebpo_error *error);
-void ebpo_room_give(ebpo_room *room, uint64_t bytes);
+/* Returns EBPO_E_LIMIT if `bytes` more bytes exceed the limit. If `space` is NULL, there is no
+ * limit. */
+EBPO_MUST_USE ebpo_status ebpo_quota_check(ebpo_quota *space, uint64_t bytes, ebpo_error *error);
+/* Same as ebpo_quota_check, and counts the bytes as taken. */
+EBPO_MUST_USE ebpo_status ebpo_quota_take(ebpo_quota *space, uint64_t bytes, ebpo_error *error);
+void ebpo_quota_give(ebpo_quota *space, uint64_t bytes);
 
 #endif

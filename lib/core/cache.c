@@ -1,10 +1,10 @@
-/* Caches of items under a budget. A pool has one lock, one table of slots by cache and key, and
- * one order of last use for all its caches; a cache with a budget of its own has a pool of its
- * own. Room for an item is reserved before it is loaded, and the lock is not held while a source
- * loads or releases: a slot is LOADING meanwhile, and those who want the same key wait for it.
- * Requests for room that have to wait are served in the order in which they came, or a large one
- * might wait for ever. A background thread loads what was announced; it evicts nothing that is in
- * use or was announced with it. */
+/* Caches of items under a budget. A pool has one lock, one table of slots by cache and key, and one
+ * order of last use for all its caches; a cache with a separate budget has its own pool. Memory for
+ * an item is reserved before it is loaded, and the lock is not held while a source loads or
+ * releases. Meanwhile the slot is LOADING, and threads that want the same key wait. Waiting
+ * reservations are served in order of arrival; otherwise a large one might wait for ever. A
+ * background thread loads prefetched keys; it evicts no item that is in use or in the same
+ * prefetch. */
 #include <inttypes.h>
 #include <pthread.h>
 #include <signal.h>
@@ -20,14 +20,14 @@
 #include "core/os.h"
 #include "core/parallel.h"
 
-/* What caches hold that share a budget: a table by cache and key, and the order of last use of what
- * is not in use. */
+/* Items of all caches that share a budget: a table by cache and key, and the order of last use of
+ * the unused items. */
 
 typedef enum cache_slot_state { LOADING, READY, FAILED } cache_slot_state;
 
 struct ebpo_cache;
 
-/* One key of one cache. In the table while LOADING or READY; a FAILED one lives on until its last
+/* One key of one cache. In the table while LOADING or READY; a FAILED slot lives until its last
  * waiter has seen it. */
 typedef struct cache_slot {
     struct ebpo_cache *owner;
@@ -35,34 +35,34 @@ typedef struct cache_slot {
     cache_slot_state state;
     unsigned pins, waiters;
     void *item;
-    struct cache_slot *chain;         /* in its bucket, or in a list of items that leave */
-    struct cache_slot *older, *newer; /* READY and not pinned: by last use */
+    struct cache_slot *chain;         /* next in its bucket, or in a list of leaving items */
+    struct cache_slot *older, *newer; /* READY and not pinned: neighbours in order of last use */
 } cache_slot;
 
-/* Chains by hash: unlike in core/hash.h, keys are taken out again. */
+/* Chains by hash: unlike in core/hash.h, keys are removed again. */
 typedef struct cache_slots {
     cache_slot **bucket;
     uint64_t bucket_count, count;
     cache_slot *oldest, *newest;
 } cache_slots;
 
-/* A cache's parts, and how room is made in the budget that caches share. Inside lib/core. */
+/* Parts of a cache, and reservations in the budget that caches share. */
 
-/* One order of last use for all its caches, and one lock; a cache of its own budget has one too. */
+/* One lock and one order of last use for all its caches; a cache with a separate budget has a pool
+ * too. */
 struct ebpo_cache_pool {
     uint64_t budget;
     pthread_mutex_t lock;   /* guards all below; never held while a source is called */
-    pthread_cond_t changed; /* loads ended, room came free */
+    pthread_cond_t changed; /* loads ended, or memory became free */
     cache_slots slots;
-    uint64_t bytes, peak_bytes; /* of all caches, and what has been taken for good */
+    uint64_t bytes, peak_bytes; /* bytes of all caches, and permanently taken ones */
     uint64_t pinned;            /* bytes of items that are in use */
-    uint64_t taken;             /* for good: ebpo_cache_pool_take */
-    uint64_t aside_most;
-    /* bytes reserved for loads under way, and of items on their way out: these become free or
-     * pinned without anyone's help */
+    uint64_t taken;             /* permanently: ebpo_cache_pool_take */
+    uint64_t aside_max;
+    /* bytes reserved for running loads, and bytes of items being released: these become free or
+     * pinned without further action */
     uint64_t passing;
-    /* gets that wait for room are served in the order they came, or a large one might wait for ever
-     */
+    /* waiting gets are served in order of arrival; otherwise a large one might wait for ever */
     uint64_t tickets, serving;
 };
 
@@ -70,34 +70,34 @@ struct ebpo_cache {
     ebpo_cache_source source;
     char name[32];
     ebpo_cache_pool *pool;
-    bool alone; /* the pool is its own */
-    /* the background has something to do: apart from `changed`, or each unpin would wake it */
-    pthread_cond_t asked;
-    uint64_t aside_most, aside;
-    uint64_t leaving; /* items that are out of the table and are being released */
+    bool alone; /* the pool belongs to this cache alone */
+    /* the background thread has work: separate from `changed`, or each unpin would wake it */
+    pthread_cond_t queried;
+    uint64_t aside_max, aside;
+    uint64_t leaving; /* items that are out of the table and being released */
     ebpo_cache_stats stats;
     bool ahead_runs, stop;
     pthread_t ahead_thread;
     uint64_t ahead[EBPO_CACHE_AHEAD];
     unsigned ahead_count, ahead_next;
-    uint64_t asking; /* how often something was asked for */
+    uint64_t querying; /* number of prefetch requests */
 };
 
-/* What there must be room for. The background yields to everyone else, and drops nothing that was
- * asked for together. */
+/* A reservation. The background thread yields to all others, and drops no item of the same
+ * prefetch. */
 typedef struct cache_demand {
-    ebpo_cache *cache; /* NULL: for good */
+    ebpo_cache *cache; /* NULL: permanent */
     uint64_t key, peak;
     bool ahead;
-    bool aside; /* of what is set aside anyway */
-    bool known; /* the peak, from an attempt before */
+    bool aside; /* part of the bytes that are set aside anyway */
+    bool known; /* the peak is known from an earlier attempt */
 } cache_demand;
 
-/* What follows is called with the lock held, which may be let go meanwhile. */
+/* The functions below are called with the lock held, and may release it meanwhile. */
 
-typedef enum cache_capacity { ROOM_MADE, ROOM_LATER, ROOM_NEVER } cache_capacity;
+typedef enum cache_capacity { CAPACITY_MADE, CAPACITY_LATER, CAPACITY_NEVER } cache_capacity;
 
-/* False: out of memory. Its user frees the slots, then `bucket`. */
+/* Returns false if memory is short. The caller frees the slots, then `bucket`. */
 static bool make_slots(cache_slots *t)
 {
     enum { BUCKETS = 64 };
@@ -113,7 +113,7 @@ static cache_slot **bucket_of(cache_slot **bucket, uint64_t bucket_count,
     return &bucket[hash & (bucket_count - 1)];
 }
 
-/* NULL: it has none of this key. */
+/* Returns the slot of a key, or NULL. */
 static cache_slot *find_slot(const cache_slots *t, const struct ebpo_cache *owner, uint64_t key)
 {
     cache_slot *s = *bucket_of(t->bucket, t->bucket_count, owner, key);
@@ -122,7 +122,7 @@ static cache_slot *find_slot(const cache_slots *t, const struct ebpo_cache *owne
     return s;
 }
 
-/* Without memory the chains stay long, and that is all. */
+/* Enlarges the table; if memory is short, the chains stay long. */
 static void grow_table(cache_slots *t)
 {
     uint64_t count = 2 * t->bucket_count;
@@ -141,7 +141,8 @@ static void grow_table(cache_slots *t)
     t->bucket_count = count;
 }
 
-/* A new one, LOADING, in the table but not in the order; NULL: out of memory. */
+/* Adds a slot, LOADING, in the table but not in the order of use; returns NULL if memory is short.
+ */
 static cache_slot *add_slot(cache_slots *t, struct ebpo_cache *owner, uint64_t key)
 {
     cache_slot *s = ebpo_alloc_zero(1, sizeof *s);
@@ -166,7 +167,7 @@ static void take_slot_out(cache_slots *t, cache_slot *s)
     t->count--;
 }
 
-/* Into the order of last use as the newest, and out of it. */
+/* Adds a slot to the order of last use as the newest, or removes it. */
 static void link_slot(cache_slots *t, cache_slot *s)
 {
     s->older = t->newest;
@@ -181,7 +182,7 @@ static void unlink_slot(cache_slots *t, cache_slot *s)
     *(s->newer ? &s->newer->older : &t->newest) = s->older;
 }
 
-/* Room in a budget: what is used least recently goes, whoever's it is. */
+/* Reservations in a budget: the least recently used item of any cache is dropped first. */
 
 static void count_bytes(ebpo_cache_pool *p, ebpo_cache *c, uint64_t bytes)
 {
@@ -195,7 +196,7 @@ static void count_bytes(ebpo_cache_pool *p, ebpo_cache *c, uint64_t bytes)
         c->stats.peak_bytes = c->stats.bytes;
 }
 
-static bool is_asked_ahead(const ebpo_cache *c, uint64_t key)
+static bool is_queried_ahead(const ebpo_cache *c, uint64_t key)
 {
     for (unsigned i = 0; i < c->ahead_count; i++)
         if (c->ahead[i] == key)
@@ -203,8 +204,8 @@ static bool is_asked_ahead(const ebpo_cache *c, uint64_t key)
     return false;
 }
 
-/* Items that are out of the table: their bytes count until they are really gone, or another thread
- * would use them twice. */
+/* Releases items that are out of the table. Their bytes count until they are released, or another
+ * thread would use these bytes twice. */
 static void release_leaving(ebpo_cache_pool *p, cache_slot *leaving)
 {
     if (!leaving)
@@ -224,7 +225,7 @@ static void release_leaving(ebpo_cache_pool *p, cache_slot *leaving)
     pthread_cond_broadcast(&p->changed);
 }
 
-/* Takes an item out of the table, into the list of those that leave; and releases these. */
+/* Moves an item from the table to the list of leaving items. */
 static void drop_item(ebpo_cache_pool *p, cache_slot *s, cache_slot **leaving)
 {
     unlink_slot(&p->slots, s);
@@ -235,7 +236,7 @@ static void drop_item(ebpo_cache_pool *p, cache_slot *s, cache_slot **leaving)
     *leaving = s;
 }
 
-/* Bytes that the background may not drop: what was asked for together. */
+/* Returns the bytes that the background thread may not drop: items of the same prefetch. */
 static uint64_t kept_for(const ebpo_cache_pool *p, const cache_demand *d)
 {
     uint64_t bytes = 0;
@@ -251,28 +252,28 @@ static uint64_t saturated_sum(uint64_t a, uint64_t b)
     return a > UINT64_MAX - b ? UINT64_MAX : a + b;
 }
 
-/* Of the budget, what nothing can be dropped for. */
+/* Returns the bytes of the budget that no dropped item can free. */
 static uint64_t held_for(const ebpo_cache_pool *p, const cache_demand *d)
 {
-    uint64_t held = saturated_sum(saturated_sum(p->pinned, p->taken), p->aside_most);
+    uint64_t held = saturated_sum(saturated_sum(p->pinned, p->taken), p->aside_max);
     return saturated_sum(saturated_sum(held, kept_for(p, d)), d->aside ? 0 : d->peak);
 }
 
-/* Reserves d->peak, dropping the least recently used items. ROOM_LATER: when loads under way end.
- */
-static cache_capacity make_room(ebpo_cache_pool *p, const cache_demand *d)
+/* Reserves d->peak, dropping the least recently used items. CAPACITY_LATER: possible when running
+ * loads end. */
+static cache_capacity reserve_space(ebpo_cache_pool *p, const cache_demand *d)
 {
     while (p->budget && saturated_sum(p->bytes, d->peak) > p->budget) {
         uint64_t held = held_for(p, d);
         if (held > p->budget)
-            return ROOM_NEVER;
+            return CAPACITY_NEVER;
         if (saturated_sum(held, p->passing) > p->budget)
-            return ROOM_LATER;
+            return CAPACITY_LATER;
         cache_slot *leaving = NULL;
         uint64_t left = saturated_sum(p->bytes, d->peak);
         for (cache_slot *s = p->slots.oldest, *newer; s && left > p->budget; s = newer) {
             newer = s->newer;
-            if (d->ahead && s->owner == d->cache && is_asked_ahead(d->cache, s->key))
+            if (d->ahead && s->owner == d->cache && is_queried_ahead(d->cache, s->key))
                 continue;
             left -= s->bytes;
             s->owner->stats.evicted++;
@@ -282,22 +283,23 @@ static cache_capacity make_room(ebpo_cache_pool *p, const cache_demand *d)
     }
     count_bytes(p, d->cache, d->peak);
     p->passing += d->peak;
-    return ROOM_MADE;
+    return CAPACITY_MADE;
 }
 
-/* The same, in turn, as soon as there is room. False: there will be none. */
+/* Same as reserve_space, in order of arrival, waiting for free memory. Returns false if there will
+ * be none. */
 static bool wait_in_turn(ebpo_cache_pool *p, const cache_demand *d)
 {
     uint64_t ticket = p->tickets++;
-    cache_capacity got = ROOM_LATER;
-    while (ticket != p->serving || (got = make_room(p, d)) == ROOM_LATER)
+    cache_capacity got = CAPACITY_LATER;
+    while (ticket != p->serving || (got = reserve_space(p, d)) == CAPACITY_LATER)
         pthread_cond_wait(&p->changed, &p->lock);
     p->serving++;
     pthread_cond_broadcast(&p->changed);
-    return got == ROOM_MADE;
+    return got == CAPACITY_MADE;
 }
 
-/* What was reserved for a load. */
+/* Gives back the reservation of a load. */
 static void give_back_reserved(ebpo_cache *c, uint64_t reserved)
 {
     c->stats.bytes -= reserved;
@@ -379,13 +381,13 @@ static void pin_slot(ebpo_cache *c, cache_slot *s)
 
 /* --- loading --- */
 
-static ebpo_status wait_for_room(ebpo_cache *c, uint64_t peak, ebpo_error *error)
+static ebpo_status wait_for_capacity(ebpo_cache *c, uint64_t peak, ebpo_error *error)
 {
     ebpo_cache_pool *p = c->pool;
     cache_demand d = { .cache = c, .peak = peak };
     if (wait_in_turn(p, &d))
         return EBPO_OK;
-    uint64_t used = saturated_sum(saturated_sum(p->pinned, p->taken), p->aside_most);
+    uint64_t used = saturated_sum(saturated_sum(p->pinned, p->taken), p->aside_max);
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the %s cache's budget is %" PRIu64 " bytes, of which %" PRIu64
                      " are in use, and one %s more takes up to %" PRIu64 "; a budget of %" PRIu64
@@ -393,8 +395,8 @@ static ebpo_status wait_for_room(ebpo_cache *c, uint64_t peak, ebpo_error *error
                      c->name, p->budget, used, c->name, peak, saturated_sum(used, peak));
 }
 
-/* Ends a load: `reserved` gives way to the item, which is pinned by whoever waits for it (and `own`
- * times more), or to nothing. */
+/* Ends a load: the item replaces `reserved` and is pinned by each waiting thread (and `own` times
+ * more); after a failure only `reserved` is given back. */
 static void end_load(ebpo_cache *c, cache_slot *s, bool loaded, uint64_t reserved, unsigned own)
 {
     give_back_reserved(c, reserved);
@@ -423,8 +425,8 @@ static ebpo_status estimate_bytes(ebpo_cache *c, uint64_t key, uint64_t *peak, e
     return status;
 }
 
-/* Calls the source, without the lock; an item that is larger than was said cannot stay. *needed:
- * what the source asks for, or 0. */
+/* Calls the source, without the lock; an item larger than its estimate is dropped. *needed: bytes
+ * that the source requests, or 0. */
 static ebpo_status call_load(ebpo_cache *c, cache_slot *s, uint64_t reserved, uint64_t *needed,
                              ebpo_error *error)
 {
@@ -446,14 +448,14 @@ static ebpo_status call_load(ebpo_cache *c, cache_slot *s, uint64_t reserved, ui
     return status;
 }
 
-/* With room for s's load, more of it each time that the source asks for that; *reserved: what ends
- * with the load. The lock is held at beginning and end. */
-static ebpo_status load_with_room(ebpo_cache *c, cache_slot *s, uint64_t peak, uint64_t *reserved,
-                                  ebpo_error *error)
+/* Loads s, enlarging the reservation each time the source requests it; *reserved: bytes that are
+ * given back when the load ends. The lock is held at beginning and end. */
+static ebpo_status load_with_capacity(ebpo_cache *c, cache_slot *s, uint64_t peak,
+                                      uint64_t *reserved, ebpo_error *error)
 {
     for (;;) {
         uint64_t needed = 0;
-        ebpo_status status = wait_for_room(c, peak, error);
+        ebpo_status status = wait_for_capacity(c, peak, error);
         if (status != EBPO_OK)
             return status;
         *reserved = peak;
@@ -468,10 +470,11 @@ static ebpo_status load_with_room(ebpo_cache *c, cache_slot *s, uint64_t peak, u
     }
 }
 
-/* The lock is held at beginning and end. */
+/* Loads on this thread. The lock is held at beginning and end. */
 static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_error *error)
 {
-    cache_slot *s = add_slot(&c->pool->slots, c, key); /* from here on others wait for this load */
+    cache_slot *s = add_slot(&c->pool->slots, c, key); /* from here on other threads wait for this
+                                                        * load */
     uint64_t peak = 0, reserved = 0;
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
@@ -479,7 +482,7 @@ static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_erro
     ebpo_status status = estimate_bytes(c, key, &peak, error);
     pthread_mutex_lock(&c->pool->lock);
     if (status == EBPO_OK)
-        status = load_with_room(c, s, peak, &reserved, error);
+        status = load_with_capacity(c, s, peak, &reserved, error);
     if (status == EBPO_OK) {
         c->stats.loads++;
         *item = s->item;
@@ -488,7 +491,8 @@ static ebpo_status load_here(ebpo_cache *c, uint64_t key, void **item, ebpo_erro
     return status;
 }
 
-/* Waits for another thread's load; false when it failed. The pin is already taken for us. */
+/* Waits for another thread's load; returns false when it failed. That thread pins the item for this
+ * one. */
 static bool wait_for(ebpo_cache *c, cache_slot *s, void **item)
 {
     s->waiters++;
@@ -518,7 +522,7 @@ static ebpo_status wait_or_load(ebpo_cache *c, uint64_t key, void **item, ebpo_e
     return load_here(c, key, item, error);
 }
 
-/* Pins an item that is there. */
+/* Pins an item that is in memory. */
 static bool take_ready(ebpo_cache *c, uint64_t key, void **item)
 {
     cache_slot *s = find_slot(&c->pool->slots, c, key);
@@ -581,8 +585,8 @@ void ebpo_cache_unpin(ebpo_cache *c, uint64_t key)
 void ebpo_cache_set_aside(ebpo_cache *c, uint64_t most)
 {
     pthread_mutex_lock(&c->pool->lock);
-    c->pool->aside_most += most - c->aside_most;
-    c->aside_most = most;
+    c->pool->aside_max += most - c->aside_max;
+    c->aside_max = most;
     pthread_mutex_unlock(&c->pool->lock);
 }
 
@@ -590,10 +594,10 @@ bool ebpo_cache_take_aside(ebpo_cache *c, uint64_t bytes)
 {
     cache_demand d = { .cache = c, .peak = bytes, .aside = true };
     pthread_mutex_lock(&c->pool->lock);
-    bool taken = bytes <= c->aside_most - c->aside;
+    bool taken = bytes <= c->aside_max - c->aside;
     if (taken) {
         c->aside += bytes;
-        taken = make_room(c->pool, &d) == ROOM_MADE;
+        taken = reserve_space(c->pool, &d) == CAPACITY_MADE;
         *(taken ? &c->pool->passing : &c->aside) -= bytes;
     }
     pthread_mutex_unlock(&c->pool->lock);
@@ -610,10 +614,10 @@ void ebpo_cache_give_back_aside(ebpo_cache *c, uint64_t bytes)
     pthread_mutex_unlock(&c->pool->lock);
 }
 
-/* --- ahead --- */
+/* --- prefetch --- */
 
-/* Loads d->key in the background, or lets it be; false when it must wait for the loads of others.
- * Nobody waits for our key meanwhile: whoever wants it loads it. */
+/* Loads d->key in the background, or skips it; returns false when it must wait for other loads. No
+ * thread waits for this key meanwhile: a thread that needs it loads it. */
 static bool load_ahead(ebpo_cache *c, cache_demand *d)
 {
     cache_slot *s =
@@ -625,12 +629,12 @@ static bool load_ahead(ebpo_cache *c, cache_demand *d)
         d->known = estimate_bytes(c, d->key, &d->peak, NULL) == EBPO_OK;
         pthread_mutex_lock(&c->pool->lock);
     }
-    cache_capacity got = !d->known                              ? ROOM_NEVER
-                         : c->pool->serving != c->pool->tickets ? ROOM_LATER
-                                                                : make_room(c->pool, d);
-    if (got != ROOM_MADE) {
+    cache_capacity got = !d->known                              ? CAPACITY_NEVER
+                         : c->pool->serving != c->pool->tickets ? CAPACITY_LATER
+                                                                : reserve_space(c->pool, d);
+    if (got != CAPACITY_MADE) {
         end_load(c, s, false, 0, 0);
-        return got == ROOM_NEVER;
+        return got == CAPACITY_NEVER;
     }
     pthread_mutex_unlock(&c->pool->lock);
     uint64_t needed;
@@ -648,25 +652,25 @@ static void *run_ahead(void *context)
     pthread_mutex_lock(&c->pool->lock);
     while (!c->stop) {
         if (c->ahead_next == c->ahead_count) {
-            pthread_cond_wait(&c->asked, &c->pool->lock);
+            pthread_cond_wait(&c->queried, &c->pool->lock);
             continue;
         }
-        uint64_t asking = c->asking;
+        uint64_t querying = c->querying;
         if (!d.known || d.key != c->ahead[c->ahead_next])
             d = (cache_demand){ .cache = c, .key = c->ahead[c->ahead_next], .ahead = true };
         bool done = load_ahead(c, &d);
         if (done)
             d.known = false;
-        if (done && asking == c->asking)
+        if (done && querying == c->querying)
             c->ahead_next++;
-        else if (!done && asking == c->asking && !c->stop)
+        else if (!done && querying == c->querying && !c->stop)
             pthread_cond_wait(&c->pool->changed, &c->pool->lock);
     }
     pthread_mutex_unlock(&c->pool->lock);
     return NULL;
 }
 
-/* Signals are for the program's own threads. */
+/* Starts the background thread with signals blocked: they are for the program's own threads. */
 static bool start_ahead(ebpo_cache *c)
 {
     sigset_t all, before;
@@ -677,14 +681,14 @@ static bool start_ahead(ebpo_cache *c)
     return started;
 }
 
-/* Takes the list, without repetitions. What is there already becomes the newest, the first key
- * last: it is about to be used. */
+/* Takes the list, without repetitions. Items in memory become the newest, the first key last,
+ * because it is used next. */
 static void take_list(ebpo_cache *c, const uint64_t *keys, unsigned count)
 {
     c->ahead_count = c->ahead_next = 0;
-    c->asking++;
+    c->querying++;
     for (unsigned i = 0; i < count && i < EBPO_CACHE_AHEAD; i++)
-        if (!is_asked_ahead(c, keys[i]))
+        if (!is_queried_ahead(c, keys[i]))
             c->ahead[c->ahead_count++] = keys[i];
     for (unsigned i = c->ahead_count; i-- > 0;) {
         cache_slot *s = find_slot(&c->pool->slots, c, c->ahead[i]);
@@ -701,12 +705,12 @@ void ebpo_cache_prefetch(ebpo_cache *c, const uint64_t *keys, unsigned count)
     take_list(c, keys, count);
     if (!c->ahead_runs && c->ahead_count)
         c->ahead_runs = start_ahead(c);
-    pthread_cond_signal(&c->asked);
+    pthread_cond_signal(&c->queried);
     pthread_cond_broadcast(&c->pool->changed);
     pthread_mutex_unlock(&c->pool->lock);
 }
 
-/* --- the whole --- */
+/* --- the cache --- */
 
 ebpo_status ebpo_cache_make_in(ebpo_cache **out, const ebpo_cache_source *source, const char *name,
                                ebpo_cache_pool *pool, ebpo_error *error)
@@ -717,7 +721,7 @@ ebpo_status ebpo_cache_make_in(ebpo_cache **out, const ebpo_cache_source *source
     c->source = *source;
     strncpy(c->name, name, sizeof c->name - 1);
     c->pool = pool;
-    pthread_cond_init(&c->asked, NULL);
+    pthread_cond_init(&c->queried, NULL);
     return EBPO_OK;
 }
 
@@ -736,7 +740,7 @@ ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source, c
     return status;
 }
 
-/* The lock is held. */
+/* Drops unpinned items; the lock is held. */
 static void drop_unpinned(ebpo_cache *c)
 {
     cache_slot *leaving = NULL;
@@ -767,7 +771,7 @@ static void stop_ahead(ebpo_cache *c)
     pthread_mutex_lock(&c->pool->lock);
     c->stop = true;
     pthread_cond_broadcast(&c->pool->changed);
-    pthread_cond_signal(&c->asked);
+    pthread_cond_signal(&c->queried);
     pthread_mutex_unlock(&c->pool->lock);
     if (c->ahead_runs)
         pthread_join(c->ahead_thread, NULL);
@@ -781,13 +785,13 @@ void ebpo_cache_free(ebpo_cache *c)
     stop_ahead(c);
     pthread_mutex_lock(&p->lock);
     drop_unpinned(c);
-    while (c->leaving) /* others drop them, to make room */
+    while (c->leaving) /* other threads drop them for reservations */
         pthread_cond_wait(&p->changed, &p->lock);
     p->bytes -= c->aside;
-    p->aside_most -= c->aside_most;
+    p->aside_max -= c->aside_max;
     pthread_cond_broadcast(&p->changed);
     pthread_mutex_unlock(&p->lock);
-    pthread_cond_destroy(&c->asked);
+    pthread_cond_destroy(&c->queried);
     if (c->alone)
         ebpo_cache_pool_free(p);
     free(c);

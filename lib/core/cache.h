@@ -1,5 +1,5 @@
-/* Caches: items found by key, loaded when they are missing, under a budget that several caches may
- * share; those used least recently go first. Any thread may call. */
+/* Caches: items found by key and loaded when missing, under a budget that several caches may share.
+ * The least recently used items are dropped first. Thread-safe. */
 #ifndef EBPO_CORE_CACHE_H
 #define EBPO_CORE_CACHE_H
 
@@ -7,93 +7,92 @@
 
 typedef struct ebpo_cache ebpo_cache;
 
-/* Where items come from. Called without locks held, by any thread; estimate and load never twice at
- * a time for one key. They may use other caches, and of this one ebpo_cache_take_aside only. */
+/* The source of items. Called without locks held, by any thread; estimate and load never run twice
+ * at once for one key. They may use other caches, and of this cache only ebpo_cache_take_aside. */
 typedef struct ebpo_cache_source {
     void *user;
-    /* Bytes that loading `key` will take, the item itself included; room for that is made first.
-     * *keep: what the item takes once loaded. */
+    /* Estimates the bytes that loading `key` takes, including the item; they are reserved first.
+     * *keep: bytes of the loaded item. */
     ebpo_status (*estimate)(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                             ebpo_error *error);
-    /* May take `most` bytes meanwhile: what was said, UINT64_MAX without a budget. *bytes: of the
-     * item. Where that does not do: EBPO_E_LIMIT, with what might do, more than `most`, in *bytes;
-     * then room for so much is made, and it is called again. An item that is larger is dropped,
-     * and the get fails with EBPO_E_LIMIT. */
+    /* Loads an item within `most` bytes: the estimate, or UINT64_MAX without a budget. *bytes: size
+     * of the item. If `most` is too little, it returns EBPO_E_LIMIT with a sufficient size, above
+     * `most`, in *bytes; that size is then reserved and load is called again. A larger item is
+     * dropped, and the get fails with EBPO_E_LIMIT. */
     ebpo_status (*load)(void *user, uint64_t key, uint64_t most, void **item, uint64_t *bytes,
                         ebpo_error *error);
     void (*release)(void *user, void *item);
 } ebpo_cache_source;
 
 typedef struct ebpo_cache_stats {
-    uint64_t hits;                       /* finds that needed no waiting */
-    uint64_t loads, prefetched, evicted; /* by get, in the background, to make room */
-    /* items, what loads under way may take, and what has been taken aside */
+    uint64_t hits;                       /* lookups that did not wait */
+    uint64_t loads, prefetched, evicted; /* loads by get, loads in the background, items dropped */
+    /* items, reservations of running loads, and bytes set aside */
     uint64_t bytes, peak_bytes;
-    double load_seconds; /* that callers of get waited */
+    double load_seconds; /* time that callers of get waited */
 } ebpo_cache_stats;
 
-/* Keys that may be asked for ahead. */
+/* Number of keys that may be prefetched. */
 enum { EBPO_CACHE_AHEAD = 64 };
 
-/* A budget that caches share: of all their items the least recently used go first. */
+/* A budget shared by caches: the least recently used of all their items are dropped first. */
 typedef struct ebpo_cache_pool ebpo_cache_pool;
 
 EBPO_MUST_USE ebpo_status ebpo_cache_pool_make(ebpo_cache_pool **out, uint64_t budget,
                                                ebpo_error *error);
-/* After its caches; NULL is fine. */
+/* Frees the pool; call it after freeing its caches. NULL is allowed. */
 void ebpo_cache_pool_free(ebpo_cache_pool *pool);
-/* Takes bytes of the budget for something else, until they are given back; items are dropped for
- * it. EBPO_E_LIMIT: what is in use leaves no room. */
+/* Takes bytes of the budget for another purpose until they are given back; drops items for it.
+ * EBPO_E_LIMIT: items in use leave too little. */
 EBPO_MUST_USE ebpo_status ebpo_cache_pool_take(ebpo_cache_pool *pool, uint64_t bytes,
                                                ebpo_error *error);
 void ebpo_cache_pool_give_back(ebpo_cache_pool *pool, uint64_t bytes);
-/* All, the most that there ever were, and what has been taken so. */
+/* Returns the current bytes, the peak, and the bytes taken by ebpo_cache_pool_take. */
 void ebpo_cache_pool_get_bytes(ebpo_cache_pool *pool, uint64_t *now, uint64_t *peak,
                                uint64_t *taken);
 
-/* Things in memory under a budget: found by key, loaded when missing, the least recently used go
- * first. Any thread may call. */
+/* Items in memory under a budget: found by key, loaded when missing; the least recently used are
+ * dropped first. Thread-safe. */
 
-/* `budget` in bytes, 0: no limit. `name` ("subtree") is for messages. */
+/* Makes a cache. `budget` in bytes, 0: no limit. `name` ("subtree") is for messages. */
 EBPO_MUST_USE ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source,
                                           const char *name, uint64_t budget, ebpo_error *error);
-/* One of those that share a pool, which outlives it. */
+/* Makes a cache in a shared pool, which must outlive it. */
 EBPO_MUST_USE ebpo_status ebpo_cache_make_in(ebpo_cache **out, const ebpo_cache_source *source,
                                              const char *name, ebpo_cache_pool *pool,
                                              ebpo_error *error);
-/* Stops the background thread, releases all items; none may be pinned. NULL is fine. */
+/* Stops the background thread and releases all items; none may be pinned. NULL is allowed. */
 void ebpo_cache_free(ebpo_cache *cache);
 
 /* Finds or loads an item and pins it: it stays until unpinned as often as it was got. Waits while
- * another thread loads the same key, or while a background load holds the room. EBPO_E_LIMIT when
- * the budget has no room even with everything unpinned gone; it says how much would do. *hit may be
- * NULL. */
+ * another thread loads the same key, or while a background load holds the memory. EBPO_E_LIMIT when
+ * the item does not fit the budget even with all unpinned items dropped; the message states a
+ * sufficient budget. *hit may be NULL. */
 EBPO_MUST_USE ebpo_status ebpo_cache_get(ebpo_cache *cache, uint64_t key, void **item, bool *hit,
                                          ebpo_error *error);
-/* True if an item is there now; no use of it, no hit. */
+/* Returns true if an item is in memory now; does not count as use or hit. */
 bool ebpo_cache_has(ebpo_cache *cache, uint64_t key);
 void ebpo_cache_unpin(ebpo_cache *cache, uint64_t key);
 
-/* Pins an item if it is there; false, without waiting, when it is not. */
+/* Pins an item if it is in memory; otherwise returns false without waiting. */
 bool ebpo_cache_try(ebpo_cache *cache, uint64_t key, void **item);
 
-/* Asks a background thread (started by the first call) to load these, in this order; what was asked
- * before and is not done yet is forgotten. Loading in the background evicts only what is unpinned
- * and not among the keys asked for; its failures are silent (the key will be loaded when it is
- * needed). At most EBPO_CACHE_AHEAD keys; what is beyond is ignored. Those that are there already
- * count as just used. */
+/* Requests that a background thread (started by the first call) loads these keys in this order;
+ * pending earlier requests are dropped. Background loads evict only items that are unpinned and not
+ * among the keys; their failures are silent (get will load the key when needed). Keys beyond
+ * EBPO_CACHE_AHEAD are ignored. Items that are in memory already count as just used. */
 void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count);
 
-/* Of the budget so many bytes at most may be taken for what stays beside the items; loads are
- * refused as if all of them were. Before the cache is used. */
+/* Sets the most bytes of the budget that data beside the items may take; loads are refused as if
+ * all of them were taken. Call it before the cache is used. */
 void ebpo_cache_set_aside(ebpo_cache *cache, uint64_t most);
-/* Takes some of them, and drops items for it. False: they are all taken, or items in use
- * and loads under way leave no room now. */
+/* Takes some of these bytes, and drops items for it. Returns false if they are all taken, or if
+ * items in use and running loads leave too little now. */
 bool ebpo_cache_take_aside(ebpo_cache *cache, uint64_t bytes);
-/* What was taken so and is not needed any more. */
+/* Gives back bytes that were taken aside and are not needed any more. */
 void ebpo_cache_give_back_aside(ebpo_cache *cache, uint64_t bytes);
 
-/* Drops everything that is not pinned. */
+/* Drops all unpinned items. */
 void ebpo_cache_clear(ebpo_cache *cache);
 
 void ebpo_cache_get_stats(ebpo_cache *cache, ebpo_cache_stats *out);

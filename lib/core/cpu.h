@@ -1,9 +1,9 @@
 /* Kernels: inner loops that are compiled once for each instruction set, with the same results.
  *
- * A kernel is a table of functions in NAME_kernels.c, which defines it as EBPO_KERNEL(table). Its
- * header declares it by EBPO_KERNELS(type, table), and callers use table_best(). lib/meson.build
- * has one row for each instruction set: its suffix and its flags. Tests compile the base set alone,
- * with other flags (EBPO_BASE_KERNELS_ONLY). */
+ * A kernel is a table of functions in NAME_kernels.c, defined as EBPO_KERNEL(table). Its header
+ * declares it by EBPO_KERNELS(type, table), and callers use table_best(). lib/meson.build has one
+ * row for each instruction set: its suffix and its flags. Tests compile only the base set, with
+ * other flags (EBPO_BASE_KERNELS_ONLY). */
 #ifndef EBPO_CORE_CPU_H
 #define EBPO_CORE_CPU_H
 
@@ -26,7 +26,7 @@
     static inline const type *name##_best(void) { return &name##_base; }
 #endif
 
-/* Says whether this processor has AVX2 and FMA (x86-64-v3). */
+/* Returns true if this processor has AVX2 and FMA (x86-64-v3). */
 bool ebpo_cpu_has_v3(void);
 
 #endif

@@ -5,7 +5,7 @@
 #include <stdint.h>
 #include <string.h>
 
-/* A number as little-endian machines have it in memory, and back. */
+/* Converts a number between the machine's and little-endian byte order. */
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
 static inline uint16_t ebpo_little16(uint16_t v) { return v; }
 static inline uint32_t ebpo_little32(uint32_t v) { return v; }

@@ -1,8 +1,8 @@
-/* Where a public function meets its caller. Errors: the status, and a message that names file,
- * object and offset; the first cause is handed on, not replaced. Structs that begin with their
- * size (ebpo/base.h): options are taken, and results filled in, for a caller that was compiled
- * with an older or a newer version of the header; fields that this version does not know must be
- * zero. */
+/* Errors and versioned structs of public functions. An error has a status and a message that names
+ * file, object and offset; the first cause is passed on, not replaced. Structs that begin with
+ * their size (ebpo/base.h) work for callers that were compiled with an older or newer version of
+ * the header: options are read and results filled in accordingly. Fields unknown to this version
+ * must be zero. */
 #include <ctype.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -35,7 +35,8 @@ const char *ebpo_status_name(ebpo_status status)
     return "unknown status";
 }
 
-/* Always one line, even if a file name or another library's message has several. */
+/* Replaces line breaks, so that the message is one line even if a file name or another library's
+ * message has several. */
 static void keep_to_one_line(char *text)
 {
     for (; *text; text++)
@@ -110,8 +111,8 @@ ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *wha
     return ebpo_fail_file(error, EBPO_E_IO, path, "%s: %s", what, strerror(errno));
 }
 
-/* No struct has been smaller than its size and one member, and none will be larger than two
- * pages. */
+/* No version of a struct is smaller than its size field and one member, or larger than two pages.
+ */
 enum { SMALLEST = 2 * sizeof(size_t), LARGEST = 8192 };
 
 static bool is_plausible_size(size_t size)
@@ -129,8 +130,8 @@ ebpo_status ebpo_sized_check(size_t size, const char *type, ebpo_error *error)
         macro[n] = (char)toupper((unsigned char)type[n]);
     macro[n] = 0;
     return ebpo_fail(error, EBPO_E_ARGUMENT,
-                     "%s: its struct_size is %zu, which no version has; begin it with %s_INIT",
-                     type, size, macro);
+                     "%s: invalid struct_size %zu; initialise the struct with %s_INIT", type, size,
+                     macro);
 }
 
 ebpo_status ebpo_sized_take(void *own, size_t own_size, const void *given, size_t given_size,
@@ -144,8 +145,8 @@ ebpo_status ebpo_sized_take(void *own, size_t own_size, const void *given, size_
     for (size_t i = own_size; i < given_size; i++)
         if (bytes[i])
             return ebpo_fail(error, EBPO_E_UNSUPPORTED,
-                             "%s: something is set in it that libebpo %s does not know; leave it "
-                             "away, or use a newer library",
+                             "%s: a field is set that libebpo %s does not support; clear it, or "
+                             "use a newer library",
                              type, ebpo_version());
     memcpy((unsigned char *)own + sizeof(size_t), bytes + sizeof(size_t), common - sizeof(size_t));
     return EBPO_OK;

@@ -1,5 +1,5 @@
-/* Where public functions meet their callers: they fill in the caller's ebpo_error, and read and
- * write structs that begin with their size. */
+/* Errors and versioned structs of public functions: they fill in the caller's ebpo_error, and read
+ * and write structs that begin with their size. */
 #ifndef EBPO_CORE_ERROR_H
 #define EBPO_CORE_ERROR_H
 
@@ -10,43 +10,42 @@
 ebpo_status ebpo_fail(ebpo_error *error, ebpo_status status, const char *format, ...)
     EBPO_PRINTF(3, 4);
 
-/* The same about a file: the message becomes "`file`: ...". */
+/* Same as ebpo_fail about a file: the message becomes "`file`: ...". */
 ebpo_status ebpo_fail_file(ebpo_error *error, ebpo_status status, const char *file,
                            const char *format, ...) EBPO_PRINTF(4, 5);
 
-/* The same about an object in it, "`file`: `object`: ..."; "": about none. `offset` of the byte at
- * fault is told beside the message; -1: not known. */
+/* Same as ebpo_fail about an object in a file: "`file`: `object`: ..."; "" means no object.
+ * `offset` is the byte at fault, reported beside the message; -1: not known. */
 ebpo_status ebpo_fail_at(ebpo_error *error, ebpo_status status, const char *file,
                          const char *object, int64_t offset, const char *format, ...)
     EBPO_PRINTF(6, 7);
 
-/* Hands on what another call has said. */
+/* Passes on the error of another call. */
 ebpo_status ebpo_fail_with(ebpo_error *error, const ebpo_error *cause);
 
-/* EBPO_E_MEMORY with the number of bytes that could not be had. */
+/* Returns EBPO_E_MEMORY with the number of bytes that could not be allocated. */
 ebpo_status ebpo_fail_memory(ebpo_error *error, uint64_t bytes);
 
-/* EBPO_E_IO: "`path`: `what`: strerror(errno)". */
+/* Returns EBPO_E_IO: "`path`: `what`: strerror(errno)". */
 ebpo_status ebpo_fail_errno(ebpo_error *error, const char *path, const char *what);
 
-/* Structs that begin with their size (ebpo/base.h): taking the caller's options, and filling in
- * what the caller has made room for, whichever version of the header the caller was compiled with.
- */
+/* Structs that begin with their size (ebpo/base.h): reads the caller's options and fills in the
+ * caller's results, for any version of the header that the caller was compiled with. */
 
-/* Takes options into `own` (a pointer), which holds the usual ones; given NULL, it keeps them.
- * EBPO_E_ARGUMENT: struct_size was never set; EBPO_E_UNSUPPORTED: something is set that this
- * version does not know. */
+/* Reads options into *own, which holds the defaults; a NULL `given` keeps them. EBPO_E_ARGUMENT:
+ * struct_size was not set; EBPO_E_UNSUPPORTED: a field is set that this version does not support.
+ */
 #define EBPO_TAKE(type, own, given, error)  \
     (!(given) ? EBPO_OK                     \
      : (given)->struct_size == sizeof(type) \
          ? (*(own) = *(given), EBPO_OK)     \
          : ebpo_sized_take((own), sizeof(type), (given), (given)->struct_size, #type, error))
 
-/* EBPO_E_ARGUMENT when the caller's struct, to be filled in later, does not say its size. */
+/* Returns EBPO_E_ARGUMENT when the caller's result struct does not state its size. */
 #define EBPO_CHECK_SIZED(type, out, error) ebpo_sized_check((out)->struct_size, #type, error)
 
-/* Fills in as much of `filled` as the caller's struct has, and zeros beyond; the caller's size
- * stays. Nothing where no size was set. */
+/* Copies as much of `filled` as the caller's struct has, and zeros beyond; the caller's size stays.
+ * Does nothing if no size was set. */
 #define EBPO_GIVE(type, out, filled) \
     ebpo_sized_give((out), (out)->struct_size, (filled), sizeof(type))
 

@@ -1,27 +1,28 @@
 /* The floating-point environment of public functions: rounding to nearest, denormals kept, no
  * traps, whatever the caller has set.
  *
- * EBPO_DEFAULT_FP; as the first line of a public function puts the caller's environment aside until
- * the function returns, by any way. It costs a few nanoseconds where the environment is the default
- * one, as nothing is written then. Threads that the function starts inherit the environment.
- * Exception flags that the caller had raised stay; those of the library's own operations are added
- * or not. */
+ * EBPO_DEFAULT_FP; as the first line of a public function saves the caller's environment and
+ * restores it on every return. It costs a few nanoseconds where the environment is the default one,
+ * because nothing is written then. Threads that the function starts inherit the environment.
+ * Exception flags that the caller had raised stay; the flags of the library's own operations may be
+ * added. */
 #ifndef EBPO_CORE_FP_ENV_H
 #define EBPO_CORE_FP_ENV_H
 
 #if defined(__SSE2__)
 #include <xmmintrin.h>
 
-/* Only SSE decides results: strict_fp.h refuses x87 arithmetic. */
+/* Only SSE determines results: strict_fp.h rejects x87 arithmetic. */
 typedef struct ebpo_fp_env {
     unsigned control;
 } ebpo_fp_env;
 
-/* Of the control register, all but the six exception flags; and its default: all exceptions masked,
- * to nearest, no flush to zero, no denormals-are-zero. */
+/* Mask of the control register without the six exception flags, and its default: all exceptions
+ * masked, to nearest, no flush to zero, no denormals-are-zero. */
 enum { EBPO_FP_CONTROL = 0xffc0, EBPO_FP_DEFAULT = 0x1f80 };
 
-/* The asm keeps the compiler from moving memory reads, and what is computed from them, across. */
+/* Sets the default environment. The asm prevents the compiler from moving memory reads, and
+ * computations with them, across. */
 static inline ebpo_fp_env ebpo_fp_enter(void)
 {
     ebpo_fp_env env = { _mm_getcsr() };

@@ -1,13 +1,13 @@
-/* Hash tables, one way for all: open addressing in an array of a power of two of slots, nothing is
- * taken out. What a slot holds is its user's: a key, the number of what has the key, a count. And
- * random numbers. */
+/* Hash tables with open addressing, and random numbers. A table is an array whose number of slots
+ * is a power of two; entries are never removed. The user of a table decides what a slot holds: a
+ * key, an index, a count. */
 #ifndef EBPO_CORE_HASH_H
 #define EBPO_CORE_HASH_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/* All bits of the key show in the low bits, those that choose the slot. */
+/* Mixes all bits of the key into the low bits, which choose the slot. */
 static inline uint64_t ebpo_hash_number(uint64_t key)
 {
     key = (key ^ key >> 31) * UINT64_C(0x9e3779b97f4a7c15);
@@ -19,7 +19,7 @@ static inline uint64_t ebpo_hash_three(const uint64_t key[3])
     return ebpo_hash_number(ebpo_hash_number(ebpo_hash_number(key[0]) + key[1]) + key[2]);
 }
 
-/* FNV-1a of bytes, continued from `hash`, which is EBPO_HASH_BYTES_BEGIN for the first ones. */
+/* Continues the FNV-1a hash `hash` with bytes; it is EBPO_HASH_BYTES_BEGIN for the first bytes. */
 #define EBPO_HASH_BYTES_BEGIN UINT64_C(0xcbf29ce484222325)
 static inline uint64_t ebpo_hash_bytes(uint64_t hash, const void *bytes, size_t size)
 {
@@ -28,8 +28,8 @@ static inline uint64_t ebpo_hash_bytes(uint64_t hash, const void *bytes, size_t 
     return hash;
 }
 
-/* The number of slots: the least power of two that is not below `least`, and 16 at least. A table
- * that is fuller than three quarters gets slow. */
+/* Returns the number of slots: the smallest power of two that is at least `least` and at least 16.
+ * Tables that are more than three quarters full are slow. */
 static inline uint64_t ebpo_hash_slots(uint64_t least)
 {
     uint64_t slots = 16;
@@ -38,17 +38,17 @@ static inline uint64_t ebpo_hash_slots(uint64_t least)
     return slots;
 }
 
-/* Sets `at` to the slot that a key of this hash has or would get, of mask + 1 slots. `found`, an
- * expression in `at`: the slot is free, or holds the key. One slot has to be free. */
+/* Sets `at` to the slot that a key with this hash has or would get, out of mask + 1 slots. `found`
+ * is an expression in `at`: the slot is free or holds the key. At least one slot must be free. */
 #define EBPO_HASH_FIND(at, hash, mask, found)                          \
     for ((at) = (hash) & (mask); !(found); (at) = ((at) + 1) & (mask)) \
     continue
 
-/* Random numbers that are the same everywhere: SplitMix64 (Steele, Lea, Flood 2014). */
+/* Random numbers that are the same on all machines: SplitMix64 (Steele, Lea, Flood 2014). */
 
 #define EBPO_RANDOM_STEP UINT64_C(0x9e3779b97f4a7c15)
 
-/* Different numbers become numbers that look unrelated. */
+/* Maps different numbers to different numbers that look unrelated. */
 static inline uint64_t ebpo_random_mix(uint64_t x)
 {
     x = (x ^ x >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
@@ -56,13 +56,13 @@ static inline uint64_t ebpo_random_mix(uint64_t x)
     return x ^ x >> 31;
 }
 
-/* The next number of a stream; any state is a good one to begin with. */
+/* Returns the next number of a stream; any initial state is suitable. */
 static inline uint64_t ebpo_random_next(uint64_t *state)
 {
     return ebpo_random_mix(*state += EBPO_RANDOM_STEP);
 }
 
-/* In [0, 1), from the upper 53 bits. */
+/* Returns a number in [0, 1) from the upper 53 bits. */
 static inline double ebpo_random_unit(uint64_t number) { return (double)(number >> 11) * 0x1p-53; }
 
 #endif

@@ -1,5 +1,5 @@
-/* What depends on the operating system: the clock, the machine's cores and memory, its pages, and
- * files without names (os_machine.c, os_files.c). */
+/* Functions that depend on the operating system: clock, cores, memory, pages, and unnamed files
+ * (os_machine.c, os_files.c). */
 #ifndef EBPO_CORE_OS_H
 #define EBPO_CORE_OS_H
 
@@ -7,7 +7,7 @@
 #include <stdint.h>
 #include <time.h>
 
-/* A clock that does not go back: nanoseconds since some time. */
+/* Returns nanoseconds since an arbitrary time, from a clock that never goes back. */
 static inline uint64_t ebpo_clock(void)
 {
     struct timespec t;
@@ -15,25 +15,26 @@ static inline uint64_t ebpo_clock(void)
     return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
 }
 
-/* The same in seconds. */
+/* Returns the same clock in seconds. */
 static inline double ebpo_seconds(void) { return 1e-9 * (double)ebpo_clock(); }
 
-/* Cores that this process may use, at least 1. */
+/* Returns the number of cores that this process may use, at least 1. */
 int ebpo_cores(void);
 
-/* Asks the system to hold an array in pages of 2 MiB, as far as whole ones fit within it (no more
- * memory is taken): translating addresses is a fifth of what a search in a large model costs. To be
- * called before the array is filled; only advice, any pointer and size will do. */
+/* Asks the system to back an array with pages of 2 MiB, as far as whole pages fit within it (no
+ * more memory is taken): address translation is a fifth of the time of a search in a large model.
+ * Call it before the array is filled. It is only advice; any pointer and size are allowed. */
 void ebpo_prefer_huge_pages(void *array, size_t bytes);
 
-/* Bytes: the machine's, or the least that a control group of this process allows. */
+/* Returns the bytes of memory: the machine's, or the lowest limit of a control group of this
+ * process. */
 uint64_t ebpo_machine_memory(void);
 
-/* A temporary file that no name leads to: a descriptor; -1 and errno when it cannot be made. */
+/* Creates an unnamed temporary file. Returns its descriptor, or -1 with errno. */
 int ebpo_open_unnamed(const char *folder);
 
-/* Removes the file that is being made just now, if it has a name: for signal handlers, just before
- * the process ends. */
+/* Removes the file that is being created, if it has a name. For signal handlers, just before the
+ * process ends. */
 void ebpo_workspace_abandon(void);
 
 #endif

@@ -1,6 +1,6 @@
-/* Temporary files that no name leads to. Where the system cannot make them without a name, they
- * have one for a moment: it is known before the file exists, so that a signal handler can remove
- * it. One file at a time. */
+/* Unnamed temporary files. Where the system cannot make them without a name, they have one for a
+ * moment: it is recorded before the file exists, so that a signal handler can remove it. One file
+ * at a time. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -13,8 +13,8 @@
 
 enum { PATH_BYTES = 4096 + 64 }; /* the longest name of a folder, and of a file in it */
 
-/* The name that a file has for a moment, where files cannot be made without one: a signal may come
- * in that moment. One at a time. */
+/* The temporary name where files cannot be made without one; a signal may come at that moment. One
+ * at a time. */
 static pthread_mutex_t passing_lock = PTHREAD_MUTEX_INITIALIZER;
 static atomic_bool is_passing;
 static char passing[PATH_BYTES];
@@ -34,7 +34,7 @@ static int open_and_unlink(const char *folder)
     pthread_mutex_lock(&passing_lock);
     for (int attempt = 0; attempt < 100 && fd < 0; attempt++) {
         snprintf(passing, sizeof passing, "%s/.ebpo-%ld-%u.tmp", folder, (long)getpid(), counter++);
-        /* before it exists, so that there is no moment in which it would be left behind */
+        /* set before the file exists, so that a signal never leaves it behind */
         atomic_store(&is_passing, true);
         fd = open(passing, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
         if (fd >= 0)

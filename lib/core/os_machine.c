@@ -1,8 +1,7 @@
-/* The machine as the operating system shows it: the processor's instruction sets and cores, the
- * memory that this process may use, and large pages. Memory is that of the machine or the least
- * limit of a control group of this process, version 1 or 2 (cgroups(7)), as in containers; advice
- * on pages changes nothing when the system declines it. On systems without these files the answers
- * are those of sysconf. */
+/* Reads the machine's properties from the operating system: instruction sets, cores, the memory
+ * that this process may use, and large pages. Memory is that of the machine or the lowest limit of
+ * a control group of this process, version 1 or 2 (cgroups(7)), as in containers. The system may
+ * ignore advice on pages. On systems without these files the values come from sysconf. */
 #include <sched.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -27,7 +26,7 @@ bool ebpo_cpu_has_v3(void)
 
 enum { PATH_BYTES = 4096 };
 
-/* The number that a file holds; 0 when it holds none ("max"), or is not there. */
+/* Returns the number in a file; 0 when it is missing or holds none ("max"). */
 static uint64_t number_in(const char *path)
 {
     unsigned long long value = 0;
@@ -40,7 +39,7 @@ static uint64_t number_in(const char *path)
     return value;
 }
 
-/* The number behind a word that begins a line; 0 when there is none. */
+/* Returns the number after a word that begins a line; 0 when there is none. */
 static uint64_t number_of(const char *path, const char *word)
 {
     char line[256];
@@ -55,7 +54,7 @@ static uint64_t number_of(const char *path, const char *word)
     return value;
 }
 
-/* How the two versions of control groups call what is asked for. */
+/* File names in the two versions of control groups. */
 typedef struct group_files {
     const char *mounted, *limit, *used, *cached;
 } group_files;
@@ -65,8 +64,8 @@ static const group_files files_of[] = {
       "total_inactive_file" },
 };
 
-/* The least limit of the group `path` (it is cut short) and of those above it; `free`: of what is
- * left of it. What files have left in memory is free. */
+/* Returns the least limit of the group `path` (which is cut short) and the groups above it; with
+ * `free`, the least free memory. Cached file data counts as free. */
 static uint64_t least_limit(const group_files *files, char *path, bool free, uint64_t least)
 {
     for (;;) {
@@ -89,9 +88,9 @@ static uint64_t least_limit(const group_files *files, char *path, bool free, uin
     }
 }
 
-/* Of the control groups of this process (cgroups(7): lines "0::/path", or of version 1
- * "4:memory:/path"); within a container the path may not be there, but the topmost group is its
- * own. */
+/* Returns the memory limit of the control groups of this process (cgroups(7): lines "0::/path", or
+ * in version 1 "4:memory:/path"). Within a container the path may be missing, but the topmost group
+ * is the container's own. */
 static uint64_t group_memory(const char *groups, bool free, uint64_t least)
 {
     char line[PATH_BYTES];

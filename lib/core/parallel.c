@@ -1,8 +1,8 @@
-/* Threads: a run of independent pieces of work, handed out in ascending order to the threads of
- * the run, of which the calling one is the first; it alone reports progress. Which thread takes
- * which piece is not determined, so results may not depend on it; of several failures the one of
- * the lowest piece is returned. All threads of the library are started here, with a stack of a
- * fixed size and the floating-point environment of the call. */
+/* Threads: runs independent pieces of work, in ascending order, on several threads. The calling
+ * thread is the first of them and alone reports progress. The thread of a piece is not determined,
+ * so results must not depend on it; of several failures, the one of the lowest piece is returned.
+ * All threads of the library are started here, with a fixed stack size and the floating-point
+ * environment of the call. */
 #include "core/parallel.h"
 
 #include <stdatomic.h>
@@ -12,7 +12,7 @@
 #include "core/fp_env.h"
 #include "core/workspace.h"
 
-/* No work of the library takes a quarter of this stack; sanitizers take some times as much. */
+/* The library uses less than a quarter of this stack; sanitizers use several times as much. */
 enum { MAX_THREADS = 256, STACK_BYTES = 4 << 20 };
 
 typedef struct run {
@@ -24,7 +24,7 @@ typedef struct run {
     const char *stage;
     _Atomic uint64_t next, done;
     atomic_bool stop;
-    pthread_mutex_t lock; /* guards the three below */
+    pthread_mutex_t lock; /* guards the three fields below */
     uint64_t failed_at;
     ebpo_status status;
     ebpo_error error;
@@ -118,7 +118,7 @@ static bool report_pass(void *user, const char *stage, uint64_t done, uint64_t t
 {
     const ebpo_pass *p = user;
     double share = total ? (double)done / (double)total : 0;
-    enum { PARTS = 1024 }; /* a pass may be one of few */
+    enum { PARTS = 1024 }; /* a pass may be one of a few */
     return p->to->report(p->to->user, stage,
                          PARTS * p->begin + (uint64_t)(share * PARTS * (double)(p->end - p->begin)),
                          PARTS * p->of);
@@ -142,7 +142,7 @@ ebpo_status ebpo_parallel_for(unsigned threads, ebpo_workspace *workspace, uint6
               .stage = stage,
               .lock = PTHREAD_MUTEX_INITIALIZER,
               .status = EBPO_OK };
-    /* Every stage reports its beginning, however short it is: callers add up times by stage. */
+    /* Every stage reports its beginning, however short it is: callers sum times by stage. */
     if (!ebpo_progress_step(progress, stage, 0, count, error))
         return EBPO_E_CANCELLED;
     threads = ebpo_thread_count(threads);

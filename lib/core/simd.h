@@ -1,6 +1,6 @@
-/* Vectors by name, for kernels (core/cpu.h): eight floats, four doubles, and three doubles, one
- * for each axis. Eight floats are one register with AVX2, otherwise two of 16 bytes (gcc 12 makes
- * poor code of its own 32-byte vectors for these). Masks are all ones or all zeros in a lane. */
+/* Named vector types for kernels (core/cpu.h): eight floats, four doubles, and three doubles, one
+ * for each axis. Eight floats are one register with AVX2, otherwise two of 16 bytes (gcc 12
+ * generates poor code for 32-byte vectors there). Masks are all ones or all zeros in a lane. */
 #ifndef EBPO_CORE_SIMD_H
 #define EBPO_CORE_SIMD_H
 
@@ -40,12 +40,12 @@ EBPO_EIGHT f8 f8_or(f8 a, f8 b) { return _mm256_or_ps(a, b); }
 EBPO_EIGHT f8 f8_xor(f8 a, f8 b) { return _mm256_xor_ps(a, b); }
 EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no) { return _mm256_blendv_ps(no, yes, mask); }
 EBPO_EIGHT unsigned f8_bits(f8 mask) { return (unsigned)_mm256_movemask_ps(mask); }
-/* x[from[0]], x[from[1]], ...; all of x[0] to x[7] may be read. */
+/* Returns x[from[0]], x[from[1]], ...; all of x[0] to x[7] may be read. */
 EBPO_EIGHT f8 f8_load_lanes(const float *x, const int32_t *from)
 {
     return _mm256_permutevar8x32_ps(_mm256_loadu_ps(x), _mm256_loadu_si256((const __m256i *)from));
 }
-/* All ones in the lanes whose bits are set, zeros in the others. */
+/* Returns all ones in the lanes whose bits are set, zeros in the others. */
 EBPO_EIGHT f8 f8_mask(unsigned lanes)
 {
     __m256i bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128),
@@ -56,13 +56,13 @@ EBPO_EIGHT f8 f8_abs(f8 a)
 {
     return _mm256_and_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(0x7fffffff)));
 }
-/* Eight numbers below 16, and 16 floats from which they pick. */
+/* Eight numbers below 16, which select from 16 floats. */
 typedef struct n8 {
     __m256i low, high; /* the lower three bits count; all ones from 8 on */
 } n8;
 typedef struct f8_table {
     f8 first;
-    __m256i other; /* what turns a number of the first eight into that of the others */
+    __m256i other; /* converts a number of the first eight to that of the others */
 } f8_table;
 EBPO_EIGHT n8 n8_from_bits(uint32_t bits)
 {
@@ -140,7 +140,7 @@ EBPO_EIGHT f8 f8_pick(f8 mask, f8 yes, f8 no)
     EBPO_BOTH(((i4)yes.half[h] & (i4)mask.half[h]) | ((i4)no.half[h] & ~(i4)mask.half[h]));
 }
 
-/* Eight numbers below 16, and 16 floats from which they pick. */
+/* Eight numbers below 16, which select from 16 floats. */
 typedef struct n8 {
     uint32_t bits;
 } n8;
@@ -220,20 +220,20 @@ EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
 #endif
 #endif
 
-/* f8_load_twice: four floats, each half of the eight being these; f8_spread0 to 3: one of such four
- * in all lanes. */
+/* f8_load_twice loads four floats into both halves; f8_spread0 to 3 copy one of such four to all
+ * lanes. */
 EBPO_EIGHT f8 f8_min3(f8 a, f8 b, f8 c) { return f8_min(a, f8_min(b, c)); }
 EBPO_EIGHT f8 f8_max3(f8 a, f8 b, f8 c) { return f8_max(a, f8_max(b, c)); }
 
-/* 1 / a to about 2^-22, not always the same on all processors: for filters only. No number for 0.
- */
+/* Returns 1 / a to about 2^-22; results differ between processors, so only for filters. Not a
+ * number for 0. */
 EBPO_EIGHT f8 f8_inverse(f8 a)
 {
     f8 x = f8_about_inverse(a);
     return f8_mul(x, f8_sub(f8_all(2), f8_mul(a, x)));
 }
 
-/* The least of the eight, none of which may be no number. */
+/* Returns the least of the eight, none of which may be NaN. */
 EBPO_EIGHT float f8_least(f8 a)
 {
 #if defined(__AVX2__)
@@ -252,8 +252,8 @@ EBPO_EIGHT float f8_least(f8 a)
 #endif
 }
 
-/* Four doubles at a time, in the compiler's own vectors. Inlined everywhere: no call passes one on,
- * whatever the ABI for them. */
+/* Four doubles at a time, in the compiler's own vectors. All functions are inline, so no call
+ * passes one under any ABI. */
 
 #if !defined(__clang__)
 #pragma GCC diagnostic push
@@ -290,15 +290,16 @@ static inline unsigned v4l_mask(v4l m)
 #pragma GCC diagnostic pop
 #endif
 
-/* Three doubles at a time, one for each axis: a register with AVX2, otherwise plain arithmetic. The
- * same bits either way. */
+/* Three doubles at a time, one for each axis: a register with AVX2, otherwise plain arithmetic,
+ * with the same bits. */
 
 #if defined(__AVX2__)
 
-typedef __m256d d3; /* the fourth is some number that nobody looks at */
+typedef __m256d d3; /* the fourth is unused */
 
 EBPO_EIGHT d3 d3_all(double x) { return _mm256_set1_pd(x); }
-/* One by one: what was just stored one by one is not there as a whole yet. */
+/* Loads one by one, because values that were just stored one by one cannot be forwarded as a
+ * vector. */
 EBPO_EIGHT d3 d3_load(const double x[3]) { return _mm256_setr_pd(x[0], x[1], x[2], 0); }
 EBPO_EIGHT d3 d3_add(d3 a, d3 b) { return _mm256_add_pd(a, b); }
 EBPO_EIGHT d3 d3_sub(d3 a, d3 b) { return _mm256_sub_pd(a, b); }
@@ -306,23 +307,23 @@ EBPO_EIGHT d3 d3_mul(d3 a, d3 b) { return _mm256_mul_pd(a, b); }
 EBPO_EIGHT d3 d3_div(d3 a, d3 b) { return _mm256_div_pd(a, b); }
 EBPO_EIGHT d3 d3_max(d3 a, d3 b) { return _mm256_max_pd(a, b); }
 EBPO_EIGHT d3 d3_abs(d3 a) { return _mm256_andnot_pd(_mm256_set1_pd(-0.0), a); }
-/* a, not negative, with the signs of b */
+/* Returns a, not negative, with the signs of b. */
 EBPO_EIGHT d3 d3_signed(d3 a, d3 b)
 {
     return _mm256_or_pd(a, _mm256_and_pd(b, _mm256_set1_pd(-0.0)));
 }
-/* A bit for each that has a sign. */
+/* Returns a bit for each component with its sign bit set. */
 EBPO_EIGHT unsigned d3_signs(d3 a) { return (unsigned)_mm256_movemask_pd(a) & 7; }
 EBPO_EIGHT void d3_store(double x[4], d3 a) { _mm256_storeu_pd(x, a); }
-/* As floats, rounded to nearest; of which the fourth counts for nothing. */
+/* Stores as floats, rounded to nearest; the fourth is unused. */
 EBPO_EIGHT void d3_store_floats(float x[4], d3 a) { _mm_storeu_ps(x, _mm256_cvtpd_ps(a)); }
-/* The same, one place later. */
+/* Same, one position later. */
 EBPO_EIGHT void d3_store_floats_after(float x[4], d3 a)
 {
     __m128 y = _mm256_cvtpd_ps(a);
     _mm_storeu_ps(x, _mm_shuffle_ps(y, y, _MM_SHUFFLE(2, 1, 0, 3)));
 }
-/* What is lost by rounding to floats. */
+/* Returns the error of rounding to floats. */
 EBPO_EIGHT d3 d3_beyond_floats(d3 a) { return d3_sub(a, _mm256_cvtps_pd(_mm256_cvtpd_ps(a))); }
 
 #else

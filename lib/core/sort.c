@@ -1,7 +1,7 @@
-/* Sorting of records that do not fit into memory: they are made, dealt to groups by the leading
- * bits of their keys, and each group is sorted in memory, by digits of its keys and then by the
- * comparison where keys are equal. Three passes, each of which reads and writes in order or at as
- * many places as there are groups, so that a workspace may keep the records in files. The result
+/* Sorts records that do not fit into memory. Records are made, distributed to groups by the leading
+ * bits of their keys, and each group is sorted in memory: by digits of the keys, then by the
+ * comparison where keys are equal. Each of these three passes reads and writes in order, or at as
+ * many positions as there are groups, so a workspace may keep the records in files. The result
  * depends neither on the number of threads nor on memory. */
 #include "core/sort.h"
 
@@ -12,12 +12,12 @@
 #include "core/error.h"
 #include "core/parallel.h"
 
-/* Records of a group, more or less: few enough for a core's own cache. No more groups than places
- * that may be written to at a time. */
+/* Approximate number of records of a group, which fit a core's own cache. The number of groups is
+ * limited to the positions that may be written to at once. */
 enum {
     GROUP = 1 << 16,
     LARGE_GROUP = 4 * GROUP,
-    GROUPS_MOST = 1024,
+    GROUPS_MAX = 1024,
     GRAIN = 1 << 14,
     DIGIT = 256,
     ALONE = 1 << 12,
@@ -26,9 +26,9 @@ enum {
 
 typedef struct sorting {
     const ebpo_sort *s;
-    uint8_t *made, *dealt; /* records: as made, and by groups */
-    uint64_t *first;       /* [groups + 1] of each group, in `dealt` */
-    uint64_t *next;        /* [groups] where its next records go */
+    uint8_t *made, *dealt; /* records as made, and by groups */
+    uint64_t *first;       /* [groups + 1] first record of each group in `dealt` */
+    uint64_t *next;        /* [groups] position of the group's next records */
     uint32_t *group_of;    /* [EBPO_SORT_BINS] */
     uint64_t *in_bin;      /* [EBPO_SORT_BINS] */
     uint64_t groups;
@@ -54,10 +54,10 @@ static ebpo_status make_records(void *context, uint64_t begin, uint64_t end, uns
     return status;
 }
 
-/* Neighbouring bins go together until they are enough. */
+/* Joins neighbouring bins until a group has enough records. */
 static bool form_groups(sorting *t)
 {
-    uint64_t enough = t->s->count / GROUPS_MOST > GROUP ? t->s->count / GROUPS_MOST : GROUP,
+    uint64_t enough = t->s->count / GROUPS_MAX > GROUP ? t->s->count / GROUPS_MAX : GROUP,
              capacity = 0, sum = 0;
     t->groups = 0;
     for (uint32_t bin = 0; bin < EBPO_SORT_BINS; bin++) {
@@ -79,14 +79,14 @@ static bool form_groups(sorting *t)
     return t->next != NULL;
 }
 
-/* Sorts a piece by groups, in the core's own cache, and moves each group's records together: in
- * whatever order they arrive, there are no more jumps than groups. */
+/* Sorts a piece by groups, in the core's own cache, then moves each group's records together. So
+ * the number of jumps is at most the number of groups, whatever the order of the records. */
 static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
-    uint64_t past[GROUPS_MOST * 2], at = 0; /* where each group's records end, here */
+    uint64_t past[GROUPS_MAX * 2], at = 0; /* end of each group's records, in this piece */
     (void)worker;
     memset(past, 0, (size_t)t->groups * sizeof *past);
     uint8_t *here = ebpo_alloc(end - begin, s->record);
@@ -120,7 +120,7 @@ static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, u
 
 typedef struct keyed {
     uint64_t key;
-    uint64_t at; /* in the group */
+    uint64_t at; /* index in the group */
 } keyed;
 
 static keyed *sort_by_digits(keyed *from, keyed *to, uint64_t count)
@@ -150,11 +150,11 @@ static keyed *sort_by_digits(keyed *from, keyed *to, uint64_t count)
     return from;
 }
 
-/* The records of one key, [begin, end), by insertion while they are few. */
+/* Sorts the records [begin, end) of one key; by insertion if they are few. */
 static void break_ties(const ebpo_sort *s, uint8_t *records, uint64_t begin, uint64_t end)
 {
     enum { FEW = 16 };
-    uint8_t held[EBPO_SORT_RECORD_MOST];
+    uint8_t held[EBPO_SORT_RECORD_MAX];
     if (end - begin > FEW) {
         qsort(records + begin * s->record, (size_t)(end - begin), s->record, s->compare);
         return;
@@ -210,7 +210,7 @@ static ebpo_status sort_groups(void *context, uint64_t begin, uint64_t end, unsi
     return status;
 }
 
-/* So few that they are one group: neither bins nor threads. */
+/* Sorts records that are so few that they form one group, without bins or threads. */
 static ebpo_status run_alone(sorting *t, ebpo_error *error)
 {
     const ebpo_sort *s = t->s;
@@ -228,19 +228,20 @@ static ebpo_status run_alone(sorting *t, ebpo_error *error)
     return status;
 }
 
-/* Each thread has a group in its hands: an eighth of the budget for all of them. */
+/* Returns the number of threads. Each thread holds one group; all together take an eighth of the
+ * budget. */
 static unsigned threads_for_groups(const sorting *t)
 {
     const ebpo_sort *s = t->s;
-    ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
-    figures.memory = UINT64_MAX;
+    ebpo_workspace_stats metrics = EBPO_WORKSPACE_STATS_INIT;
+    metrics.memory = UINT64_MAX;
     uint64_t largest = 1;
     if (s->workspace)
-        ebpo_workspace_get_stats(s->workspace, &figures);
+        ebpo_workspace_get_stats(s->workspace, &metrics);
     for (uint64_t g = 0; g < t->groups; g++)
         largest = t->first[g + 1] - t->first[g] > largest ? t->first[g + 1] - t->first[g] : largest;
     uint64_t fit =
-        figures.memory / 8 /
+        metrics.memory / 8 /
         ((largest < LARGE_GROUP ? largest : LARGE_GROUP) * (2 * sizeof(keyed) + s->record));
     return fit < 1 ? 1 : s->threads < fit ? s->threads : (unsigned)fit;
 }
@@ -270,7 +271,7 @@ static ebpo_status run_passes(sorting *t, ebpo_error *error)
 
 ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error)
 {
-    if (sort->record > EBPO_SORT_RECORD_MOST)
+    if (sort->record > EBPO_SORT_RECORD_MAX)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "records of %zu bytes are not sorted",
                          sort->record);
     sorting t = { .s = sort };

@@ -1,7 +1,7 @@
-/* Sorting: records in far larger numbers than memory holds, qsort with a context, and heaps.
- * Records are distributed to groups by the leading bits of their keys, and each group, a
- * contiguous part of the result, is sorted by itself. Arrays are read and written in order, or at
- * as many positions at a time as there are groups. */
+/* Sorting: more records than memory holds, qsort with a context, and heaps. Records are distributed
+ * to groups by the leading bits of their keys; each group is a contiguous part of the result and is
+ * sorted separately. Arrays are read and written in order, or at as many positions at once as there
+ * are groups. */
 #ifndef EBPO_CORE_SORT_H
 #define EBPO_CORE_SORT_H
 
@@ -10,33 +10,34 @@
 
 #include "core/workspace.h"
 
-enum { EBPO_SORT_BINS = 1 << 18, EBPO_SORT_PASSES = 3, EBPO_SORT_RECORD_MOST = 64 };
+enum { EBPO_SORT_BINS = 1 << 18, EBPO_SORT_PASSES = 3, EBPO_SORT_RECORD_MAX = 64 };
 
 typedef struct ebpo_sort {
     ebpo_workspace *workspace;
     unsigned threads;
     const ebpo_progress *progress;
     const char *stage;
-    /* of this stage, that its caller has done; sorting takes EBPO_SORT_PASSES */
+    /* passes of this stage that the caller has finished; sorting takes EBPO_SORT_PASSES */
     uint64_t passes_before;
     uint64_t count;
-    size_t record;  /* bytes, at most EBPO_SORT_RECORD_MOST; each begins with its key, 8 bytes */
-    unsigned shift; /* key >> shift is below EBPO_SORT_BINS, for all keys */
+    size_t record;  /* bytes of a record, at most EBPO_SORT_RECORD_MAX; each begins with its key, 8
+                     * bytes */
+    unsigned shift; /* key >> shift is below EBPO_SORT_BINS for all keys */
     void *context;
-    /* Writes the records of items [begin, end). From any thread. */
+    /* Writes the records of items [begin, end). Called from any thread. */
     ebpo_status (*make)(void *context, uint64_t begin, uint64_t end, void *records,
                         ebpo_error *error);
-    /* Decides between records of one key, which must differ: less than 0 when `a` comes first. */
+    /* Orders records with equal keys, which must differ: less than 0 when `a` comes first. */
     int (*compare)(const void *a, const void *b);
     /* Receives the sorted records, group by group, from any thread; the first has position `place`.
      */
     void (*take)(void *context, uint64_t place, const void *records, uint64_t count);
 } ebpo_sort;
 
-/* The result does not depend on threads or memory. */
+/* Sorts; the result does not depend on threads or memory. */
 EBPO_MUST_USE ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error);
 
-/* qsort with a context for the comparison, which systems have in different forms or not at all. */
+/* qsort with a context for the comparison; systems have it in different forms or not at all. */
 
 typedef int (*ebpo_compare_with)(const void *a, const void *b, void *context);
 
@@ -47,7 +48,7 @@ static inline void ebpo_sort_with(void *items, size_t count, size_t size, ebpo_c
     qsort_r(items, count, size, compare, context);
 }
 #else
-/* qsort compares on the thread that called it. */
+/* qsort calls the comparison on the thread that called qsort. */
 static _Thread_local struct {
     ebpo_compare_with compare;
     void *context;
@@ -58,7 +59,7 @@ static inline int ebpo_compare_now(const void *a, const void *b)
     return ebpo_sorting.compare(a, b, ebpo_sorting.context);
 }
 
-/* Never from within a comparison. */
+/* Sorts with a context; must not be called from within a comparison. */
 static inline void ebpo_sort_with(void *items, size_t count, size_t size, ebpo_compare_with compare,
                                   void *context)
 {
@@ -68,13 +69,12 @@ static inline void ebpo_sort_with(void *items, size_t count, size_t size, ebpo_c
 }
 #endif
 
-/* Binary heaps in arrays that the caller lets grow: the item that comes before all others stands
- * first. One thread. */
+/* Binary heaps in arrays that the caller enlarges; the first item is the one that comes before all
+ * others. For one thread. */
 
-/* Two functions for items of a type, `before(a, b)` told of const pointers: NAME_add puts an item
- * into a heap of `count` others, which has room for it; NAME_take takes out the first one of
- * `count`, 1 or more. Of equal ones, which comes first depends on nothing but the order of calls.
- */
+/* Defines two functions for items of a type; `before(a, b)` takes const pointers. NAME_add adds an
+ * item to a heap of `count` others, which has capacity for it. NAME_take removes the first of
+ * `count` items, 1 or more. The order of equal items depends only on the order of calls. */
 #define EBPO_HEAP(name, type, before)                                                 \
     static void name##_add(type *heap, uint64_t count, const type *added)             \
     {                                                                                 \

@@ -1,8 +1,8 @@
-/* Included first by the files whose results rest on IEEE double arithmetic, one rounding for each
- * operation, to nearest. Refuses compilers and flags that do not promise that; turns contraction
- * into FMA off even where the flags forgot to or ask for it, and with gcc the SLP vectoriser, which
+/* Included first by files whose results depend on IEEE double arithmetic with one rounding to
+ * nearest for each operation. Rejects compilers and flags that do not guarantee this. Disables
+ * contraction into FMA even if the flags request it. With gcc, disables the SLP vectoriser, which
  * drops the rounding of neighbouring (double)(float) casts (gcc 12).
- * tests/lint/flags/test_strict_fp.py holds the sources and this file to it. */
+ * tests/lint/flags/test_strict_fp.py checks the sources and this file. */
 #ifndef EBPO_CORE_STRICT_FP_H
 #define EBPO_CORE_STRICT_FP_H
 
@@ -16,7 +16,7 @@
 #error \
     "exact predicates need strict floating point: build without -funsafe-math-optimizations and its parts (-fassociative-math, -freciprocal-math, -fno-signed-zeros)"
 #endif
-/* 16 is 0 for double; it only widens what compilers do with _Float16. */
+/* 16 is the same as 0 for double; it only changes how compilers treat _Float16. */
 #if FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
 #error \
     "exact predicates need FLT_EVAL_METHOD 0, without excess precision: on x86 build with -msse2 -mfpmath=sse"
@@ -25,8 +25,9 @@ _Static_assert(FLT_RADIX == 2 && DBL_MANT_DIG == 53 && DBL_MAX_EXP == 1024,
                "exact predicates need IEEE 754 binary64");
 
 #if defined(__clang__)
-/* Its unsafe-math flags define no macro, but give way to this. -ffp-contract=fast does not, and
- * cannot be seen either: tests/lint/flags/fp_flags.py detects it. */
+/* clang's unsafe-math flags define no macro, but these pragmas override them. They do not override
+ * -ffp-contract=fast, which is not detectable here either: tests/lint/flags/fp_flags.py detects it.
+ */
 #pragma float_control(precise, on)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__)

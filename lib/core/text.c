@@ -1,6 +1,6 @@
-/* Text as files hold it: the check for UTF-8 without control characters (RFC 3629), dates and
- * times of ISO 8601 by the calendar, and streams into memory that report a lack of memory, which
- * open_memstream does not always do. */
+/* Checks text for UTF-8 without control characters (RFC 3629) and ISO 8601 dates and times for
+ * validity. Provides streams into memory that report a lack of memory, which open_memstream does
+ * not always do. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -45,7 +45,7 @@ uint64_t ebpo_text_mark(const void *text, uint64_t size)
 
 /* --- dates --- */
 
-/* Reads `count` digits as a number from `least` to `most`; *text goes on behind them. */
+/* Reads `count` digits as a number from `least` to `most`; moves *text behind them. */
 static bool take_digits(const char **text, int count, int least, int most, int *out)
 {
     *out = 0;
@@ -64,7 +64,7 @@ static int days_of(int year, int month)
     return days[month - 1] + (month == 2 && leaps);
 }
 
-/* Returns true for HH:MM, HH:MM:SS or with decimals of seconds, and then Z, +HH:MM, -HH:MM or
+/* Returns true for HH:MM, HH:MM:SS or with decimals of seconds, followed by Z, +HH:MM, -HH:MM or
  * nothing. */
 static bool is_time(const char *t)
 {
@@ -114,7 +114,7 @@ static ssize_t keep_text(void *cookie, const char *data, size_t bytes)
     ebpo_text_stream *s = cookie;
     if (s->failed || !ebpo_grow(&s->text, &s->capacity, s->bytes + bytes + 1, 1)) {
         s->failed = true;
-        return 0; /* which stdio takes for an error */
+        return 0; /* stdio takes this for an error */
     }
     memcpy(s->text + s->bytes, data, bytes);
     s->bytes += bytes;

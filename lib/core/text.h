@@ -1,4 +1,4 @@
-/* Text as files hold it: UTF-8, dates, streams into memory, named runs. */
+/* Text in files: UTF-8, dates, streams into memory, named runs. */
 #ifndef EBPO_CORE_TEXT_H
 #define EBPO_CORE_TEXT_H
 
@@ -8,35 +8,36 @@
 #include <stdio.h>
 
 bool ebpo_text_is_utf8(const char *text);
-/* True for UTF-8 without control characters. */
+/* Returns true for UTF-8 without control characters. */
 bool ebpo_text_ok(const char *text);
 
-/* Returns the length of the mark of the order of bytes (UTF-8) that text begins with, or 0. */
+/* Returns the length of the UTF-8 byte order mark at the beginning of text, or 0. */
 uint64_t ebpo_text_mark(const void *text, uint64_t size);
 
-/* A stream into memory that tells when memory was short: those of the C library (open_memstream)
- * may lose what did not fit and say nothing. They serve where there is nothing better. */
+/* A stream into memory that reports a lack of memory: open_memstream of the C library may lose data
+ * silently. It is used only where there is no alternative. */
 
 typedef struct ebpo_text_stream {
-    char *text; /* NUL-terminated when it has ended; the caller's, for free() */
+    char *text; /* NUL-terminated after the end; the caller frees it */
     uint64_t bytes, capacity;
-    FILE *file; /* to print to */
+    FILE *file; /* stream to print to */
     bool failed;
-    size_t size;       /* of open_memstream */
-    char buffer[1024]; /* the stream's, so that it needs none of its own */
+    size_t size;       /* for open_memstream */
+    char buffer[1024]; /* buffer of the stream, so that it allocates none */
 } ebpo_text_stream;
 
-/* `s` may not move until it has ended. False: no memory, and nothing is left to end. */
+/* Begins a stream; `s` must not move until the stream has ended. Returns false if memory is short;
+ * then there is nothing to end. */
 bool ebpo_text_stream_begin(ebpo_text_stream *s);
-/* False: something is missing; there is no text then. */
+/* Ends a stream. Returns false if data is missing; then there is no text. */
 bool ebpo_text_stream_end(ebpo_text_stream *s);
 
-/* What a file has under one name, from where it is said to where the next one is. */
+/* A named part of a file, from the line that names it to the next name. */
 
 typedef struct ebpo_named_run {
-    const char *name; /* within the file's bytes, without spaces around it */
+    const char *name; /* points into the file's bytes, without surrounding spaces */
     size_t size;
-    uint64_t faces; /* triangles, which follow those of the run before */
+    uint64_t faces; /* number of triangles, which follow those of the previous run */
 } ebpo_named_run;
 
 #endif

@@ -1,11 +1,12 @@
-/* Integers of 128 bits, modulo 2^128, also where compilers have none (on machines of 32 bits). */
+/* Integers of 128 bits, modulo 2^128, also for compilers without such a type (on 32-bit machines).
+ */
 #ifndef EBPO_CORE_WIDE_H
 #define EBPO_CORE_WIDE_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Signed ones are in two's complement. */
+/* Signed values are in two's complement. */
 typedef struct ebpo_wide {
     uint64_t high, low;
 } ebpo_wide;
@@ -16,7 +17,7 @@ static inline ebpo_wide ebpo_wide_plus(ebpo_wide a, ebpo_wide b)
     return (ebpo_wide){ a.high + b.high + (low < a.low), low };
 }
 
-/* Exact; for compilers that have nothing better. */
+/* Returns the exact product, for compilers without a 128-bit product. */
 static inline ebpo_wide ebpo_wide_product_by_halves(uint64_t a, uint64_t b)
 {
     uint64_t al = (uint32_t)a, ah = a >> 32, bl = (uint32_t)b, bh = b >> 32;
@@ -26,7 +27,7 @@ static inline ebpo_wide ebpo_wide_product_by_halves(uint64_t a, uint64_t b)
     return ebpo_wide_plus(p, (ebpo_wide){ two >> 32, two << 32 });
 }
 
-/* Exact. */
+/* Returns the exact product. */
 static inline ebpo_wide ebpo_wide_product(uint64_t a, uint64_t b)
 {
 #ifdef EBPO_HAVE_INT128
@@ -37,7 +38,7 @@ static inline ebpo_wide ebpo_wide_product(uint64_t a, uint64_t b)
 #endif
 }
 
-/* Exact, signed. */
+/* Returns the exact signed product. */
 static inline ebpo_wide ebpo_wide_signed_product(int64_t a, int64_t b)
 {
     ebpo_wide p = ebpo_wide_product((uint64_t)a, (uint64_t)b);
@@ -52,7 +53,7 @@ static inline ebpo_wide ebpo_wide_times(ebpo_wide a, uint64_t b)
     return p;
 }
 
-/* By n in 0 .. 127. */
+/* Shifts left by n in 0 .. 127. */
 static inline ebpo_wide ebpo_wide_left(ebpo_wide a, int n)
 {
     if (n >= 64)
@@ -60,7 +61,7 @@ static inline ebpo_wide ebpo_wide_left(ebpo_wide a, int n)
     return n ? (ebpo_wide){ a.high << n | a.low >> (64 - n), a.low << n } : a;
 }
 
-/* By n in 0 .. 127, of unsigned ones. */
+/* Shifts an unsigned value right by n in 0 .. 127. */
 static inline ebpo_wide ebpo_wide_right(ebpo_wide a, int n)
 {
     if (n >= 64)
@@ -68,13 +69,13 @@ static inline ebpo_wide ebpo_wide_right(ebpo_wide a, int n)
     return n ? (ebpo_wide){ a.high >> n, a.low >> n | a.high << (64 - n) } : a;
 }
 
-/* Unsigned: a < b. */
+/* Returns a < b, unsigned. */
 static inline bool ebpo_wide_less(ebpo_wide a, ebpo_wide b)
 {
     return a.high != b.high ? a.high < b.high : a.low < b.low;
 }
 
-/* Signed: a <= b. */
+/* Returns a <= b, signed. */
 static inline bool ebpo_wide_signed_at_most(ebpo_wide a, ebpo_wide b)
 {
     const uint64_t sign = UINT64_C(1) << 63;
@@ -82,7 +83,7 @@ static inline bool ebpo_wide_signed_at_most(ebpo_wide a, ebpo_wide b)
                            (ebpo_wide){ a.high ^ sign, a.low });
 }
 
-/* a modulo m, unsigned; m in 1 .. 2^63. */
+/* Returns a modulo m, unsigned; m in 1 .. 2^63. */
 static inline uint64_t ebpo_wide_modulo(ebpo_wide a, uint64_t m)
 {
     uint64_t rest = a.high % m;

@@ -1,10 +1,9 @@
-/* Workspaces: the owners of large arrays. An array is an extent of whole pages, in memory while
- * half of the budget lasts and in an unnamed temporary file after that; arrays below LEAST_EXTENT
- * are parts of a pool, and those below a page are malloc's. Each extent holds its workspace, so
- * that either may be freed first. A file's pages count for the budget only while they are
- * resident: loops release them between pieces of work (ebpo_release_pages), and what was written
- * stays in the file. Any thread may allocate and free. How a build keeps to a budget is described
- * in docs/develop/design.md. */
+/* Workspaces: the owners of large arrays. An array is an extent of whole pages, in memory up to
+ * half of the budget and then in an unnamed temporary file. Arrays below LEAST_EXTENT are parts of
+ * a pool, and those below a page come from malloc. Each extent holds its workspace, so either may
+ * be freed first. Pages of a file count towards the budget only while resident: loops release them
+ * between pieces of work (ebpo_release_pages), and written data stays in the file. Any thread may
+ * allocate and free. docs/develop/design.md describes how a build keeps to a budget. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -22,10 +21,10 @@
 #include "core/os.h"
 #include "core/workspace.h"
 
-/* What a workspace is made of. */
+/* Parts of a workspace. */
 
-/* Arrays smaller than a page are malloc's; those smaller than an extent are parts of a pool, which
- * is one: a build has thousands of them. */
+/* Arrays smaller than a page come from malloc. Those smaller than an extent are parts of a pool,
+ * which is one extent: a build has thousands of them. */
 enum { PAGE_BYTES = 4096, LEAST_EXTENT = 1 << 16, POOL_BYTES = 1 << 20, BUCKET_BITS = 10 };
 
 typedef enum extent_kind { EXTENT_OWN, EXTENT_POOL, EXTENT_PART } extent_kind;
@@ -34,27 +33,26 @@ typedef struct extent {
     void *at;
     size_t bytes;
     extent_kind kind;
-    bool filed;          /* in a file */
-    struct extent *pool; /* of a part */
-    size_t used;         /* of a pool: bytes given out; and the parts that are not freed */
+    bool filed;          /* true if in a file */
+    struct extent *pool; /* pool of a part */
+    size_t used; /* for a pool: bytes given out, and the number of parts that are not freed */
     uint64_t parts;
     struct extent *next;
 } extent;
 
 struct ebpo_workspace {
-    pthread_mutex_t lock; /* guards the figures */
+    pthread_mutex_t lock; /* guards the statistics */
     pthread_mutex_t pool_lock;
-    ebpo_workspace_stats figures;
-    uint64_t holders;   /* and the owner is one */
-    extent *pool;       /* that the next part comes from; NULL: none */
-    _Atomic int failed; /* errno of the last allocation in a file that failed, 0: memory */
+    ebpo_workspace_stats metrics;
+    uint64_t holders;   /* number of holders, including the owner */
+    extent *pool;       /* pool for the next part; NULL: none */
+    _Atomic int failed; /* errno of the last failed allocation in a file, 0: memory */
     int statm;          /* /proc/self/statm */
-    /* bytes of files, libraries among them, that stayed resident when pages were released */
+    /* bytes of files, including libraries, that stayed resident when pages were released */
     uint64_t floor;
     size_t page;
     char folder[EBPO_FOLDER_BYTES];
-    /* its extents by address: pieces of a build have their arrays freed one by one, so there are
-     * thousands at most */
+    /* extents by address: arrays of a build are freed one by one, so there are thousands at most */
     pthread_mutex_t table_lock;
     extent *table[1 << BUCKET_BITS];
 };
@@ -65,7 +63,7 @@ static inline extent **extent_bucket(ebpo_workspace *w, const void *at)
     return &w->table[page * UINT64_C(0x9e3779b97f4a7c15) >> (64 - BUCKET_BITS)];
 }
 
-/* The extents of a workspace: whole pages of memory, or of files. */
+/* Extents of a workspace: whole pages of memory or of files. */
 
 static ebpo_status choose_folder(ebpo_workspace *w, const char *wanted, ebpo_error *error)
 {
@@ -114,7 +112,7 @@ ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory, const
     pthread_mutex_init(&w->lock, NULL);
     pthread_mutex_init(&w->pool_lock, NULL);
     pthread_mutex_init(&w->table_lock, NULL);
-    w->figures.memory = memory;
+    w->metrics.memory = memory;
     w->holders = 1;
     w->page = (size_t)sysconf(_SC_PAGESIZE);
     w->statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
@@ -126,7 +124,7 @@ ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory, const
     return status;
 }
 
-/* One holder less, of which each extent is one; the last one frees it. */
+/* Removes one holder; each extent is one. The last one frees the workspace. */
 static void leave_workspace(ebpo_workspace *w)
 {
     pthread_mutex_lock(&w->lock);
@@ -152,16 +150,16 @@ ebpo_status ebpo_workspace_get_stats(const ebpo_workspace *workspace, ebpo_works
 {
     ebpo_workspace *w = (ebpo_workspace *)workspace;
     pthread_mutex_lock(&w->lock);
-    ebpo_workspace_stats figures = w->figures;
+    ebpo_workspace_stats metrics = w->metrics;
     pthread_mutex_unlock(&w->lock);
-    return EBPO_GIVE(ebpo_workspace_stats, out, &figures);
+    return EBPO_GIVE(ebpo_workspace_stats, out, &metrics);
 }
 
 const char *ebpo_workspace_folder(const ebpo_workspace *workspace) { return workspace->folder; }
 
 uint64_t ebpo_workspace_memory(const ebpo_workspace *workspace)
 {
-    return workspace->figures.memory;
+    return workspace->metrics.memory;
 }
 
 ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes, ebpo_error *error)
@@ -198,8 +196,8 @@ static void enter_extent(ebpo_workspace *w, extent *b)
 
 static bool is_at(const extent *b, const void *at) { return b->at == at && b->kind != EXTENT_POOL; }
 
-/* Takes the extent that begins there out of the table; NULL: it is none of the workspace's. Not
- * pools: their first parts begin where they do. */
+/* Removes the extent that begins there from the table; returns NULL if the workspace has none.
+ * Never a pool: its first part begins at the same address. */
 static extent *take_extent(ebpo_workspace *w, const void *at)
 {
     pthread_mutex_lock(&w->table_lock);
@@ -214,10 +212,10 @@ static extent *take_extent(ebpo_workspace *w, const void *at)
     return found;
 }
 
-/* Says where it goes, and counts it. */
+/* Chooses memory or file, and counts the bytes. */
 static bool choose_and_count(ebpo_workspace *w, size_t bytes)
 {
-    ebpo_workspace_stats *f = &w->figures;
+    ebpo_workspace_stats *f = &w->metrics;
     pthread_mutex_lock(&w->lock);
     bool filed = f->held + bytes > f->memory / 2;
     if (filed) {
@@ -236,17 +234,17 @@ static bool choose_and_count(ebpo_workspace *w, size_t bytes)
 static void count_off(ebpo_workspace *w, size_t bytes, bool filed)
 {
     pthread_mutex_lock(&w->lock);
-    *(filed ? &w->figures.filed : &w->figures.held) -= bytes;
+    *(filed ? &w->metrics.filed : &w->metrics.held) -= bytes;
     pthread_mutex_unlock(&w->lock);
     leave_workspace(w);
 }
 
-/* 0, or why not. */
+/* Allocates blocks of a file; returns 0 or an errno value. */
 static int take_blocks(int fd, size_t bytes)
 {
 #ifdef EBPO_HAVE_POSIX_FALLOCATE
     int fault;
-    do /* some file systems give way to signals */
+    do /* on some file systems signals interrupt this */
         fault = posix_fallocate(fd, 0, (off_t)bytes);
     while (fault == EINTR);
     return fault;
@@ -262,8 +260,8 @@ static int take_blocks(int fd, size_t bytes)
 #endif
 }
 
-/* The file's blocks are had before it is written to: a full disk would otherwise show as a signal.
- */
+/* Maps a file whose blocks are allocated before it is written to; otherwise a full disk would raise
+ * a signal. */
 static void *map_file(ebpo_workspace *w, size_t bytes)
 {
     int fd = ebpo_open_unnamed(w->folder), fault = fd < 0 ? errno : take_blocks(fd, bytes);
@@ -287,10 +285,10 @@ static void *map_memory(ebpo_workspace *w, size_t bytes)
     return at;
 }
 
-/* NULL: the workspace's `failed` tells why. */
+/* Makes an extent; returns NULL with the reason in the workspace's `failed`. */
 static extent *make_extent(ebpo_workspace *w, size_t bytes, extent_kind kind)
 {
-    ebpo_release_pages(w); /* those who make many write to them without more ado */
+    ebpo_release_pages(w); /* callers that make many may write without releasing pages */
     extent *b = ebpo_alloc_zero(1, sizeof *b);
     if (!b) {
         w->failed = 0;
@@ -317,7 +315,7 @@ static void unmap_extent(ebpo_workspace *w, extent *b)
 
 /* --- parts of pools --- */
 
-/* No place is given out twice, so parts are zero. */
+/* Makes a part. No position is given out twice, so parts are zero. */
 static extent *make_part(ebpo_workspace *w, size_t bytes)
 {
     extent *part = ebpo_alloc_zero(1, sizeof *part);
@@ -363,7 +361,7 @@ static void leave_pool(ebpo_workspace *w, extent *pool)
     unmap_extent(w, pool);
 }
 
-/* A part's memory or blocks; whether it can be done or not. */
+/* Gives back a part's memory or blocks, if possible. */
 static void give_back(const extent *b)
 {
 #ifdef EBPO_HAVE_MADV_REMOVE
@@ -379,14 +377,15 @@ static void free_extent(ebpo_workspace *w, extent *b)
         unmap_extent(w, b);
         return;
     }
-    if (w->page == PAGE_BYTES) /* whole pages, so none of a neighbour's */
+    if (w->page == PAGE_BYTES) /* only whole pages, so that no neighbour is affected */
         give_back(b);
     extent *pool = b->pool;
     free(b);
     leave_pool(w, pool);
 }
 
-/* Small ones and those without a workspace are not in the table: malloc never gives whole pages. */
+/* Allocates an array. Small arrays and those without a workspace are not in the table: malloc never
+ * returns whole pages. */
 static void *alloc_array(ebpo_workspace *w, uint64_t count, size_t size, bool zero)
 {
     uint64_t bytes;
@@ -416,7 +415,7 @@ void *ebpo_array_zero(ebpo_workspace *workspace, uint64_t count, size_t size)
 
 void ebpo_array_free(ebpo_workspace *workspace, void *array)
 {
-    /* malloc never gives whole pages but by chance: the table knows */
+    /* malloc returns whole pages only by chance: the table decides */
     extent *b = workspace && array && (uintptr_t)array % PAGE_BYTES == 0
                     ? take_extent(workspace, array)
                     : NULL;
@@ -482,7 +481,7 @@ static residency read_residency(const ebpo_workspace *w)
     ssize_t got = w->statm >= 0 ? pread(w->statm, text, sizeof text - 1, 0) : -1;
     text[got > 0 ? got : 0] = 0;
     if (sscanf(text, "%llu %llu %llu", &size, &pages, &of_files) != 3)
-        return (residency){ UINT64_MAX, UINT64_MAX }; /* not known: let go always */
+        return (residency){ UINT64_MAX, UINT64_MAX }; /* not known: always release */
     return (residency){ pages * w->page, of_files * w->page };
 }
 
@@ -491,29 +490,29 @@ static void let_go(const extent *b)
 #ifdef EBPO_HAVE_MADVISE
     madvise(b->at, b->bytes, MADV_DONTNEED);
 #else
-    msync(b->at, b->bytes, MS_ASYNC); /* the system then takes them when it is short */
+    msync(b->at, b->bytes, MS_ASYNC); /* the system then reclaims them when memory is short */
 #endif
 }
 
 void ebpo_release_pages(ebpo_workspace *workspace)
 {
     ebpo_workspace *w = workspace;
-    if (!w || read_residency(w).all <= w->figures.memory / 4 * 3)
+    if (!w || read_residency(w).all <= w->metrics.memory / 4 * 3)
         return;
     pthread_mutex_lock(&w->table_lock);
-    residency now = read_residency(w); /* another thread may have done it meanwhile */
-    if (now.all <= w->figures.memory / 4 * 3 ||
-        now.files < w->floor + w->figures.memory / 16) { /* there is hardly anything to let go of */
+    residency now = read_residency(w); /* another thread may have released pages meanwhile */
+    if (now.all <= w->metrics.memory / 4 * 3 ||
+        now.files < w->floor + w->metrics.memory / 16) { /* there is hardly anything to release */
         pthread_mutex_unlock(&w->table_lock);
         return;
     }
     for (int i = 0; i < 1 << BUCKET_BITS; i++)
         for (extent *b = w->table[i]; b; b = b->next)
             if (b->kind != EXTENT_PART && b->filed)
-                /* of a file: what was written stays in it */
+                /* for a file: written data stays in it */
                 let_go(b);
-    /* Other threads bring pages in meanwhile, which are no floor: it rises slowly. */
-    uint64_t left = read_residency(w).files, most = w->floor + w->figures.memory / 64;
+    /* Other threads bring in pages meanwhile, which do not count as floor: it rises slowly. */
+    uint64_t left = read_residency(w).files, most = w->floor + w->metrics.memory / 64;
     w->floor = left < most ? left : most;
     pthread_mutex_unlock(&w->table_lock);
 }

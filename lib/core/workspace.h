@@ -1,56 +1,59 @@
 /* Workspaces: arrays in memory or, beyond half of the budget, in temporary files; and loops over
- * such arrays, which release pages on the way. */
+ * such arrays, which release pages as they proceed. */
 #ifndef EBPO_CORE_WORKSPACE_H
 #define EBPO_CORE_WORKSPACE_H
 
 #include <ebpo/workspace.h>
 
-/* ebpo_workspace_new without a least: for tests, which want small models in files. */
+/* Same as ebpo_workspace_new without a minimum, for tests that keep small models in files. */
 EBPO_MUST_USE ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory,
                                                   const char *temp_dir, ebpo_error *error);
 
-/* Why the last allocation of this size failed: EBPO_E_MEMORY, or EBPO_E_IO with the folder. */
+/* Reports why the last allocation of this size failed: EBPO_E_MEMORY, or EBPO_E_IO with the folder.
+ */
 ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes, ebpo_error *error);
-/* Likewise where the size is not known any more; `what` as in "while joining levels". */
+/* Same, when the size is not known any more; `what` as in "while joining levels". */
 ebpo_status ebpo_workspace_fail_while(const ebpo_workspace *workspace, const char *what,
                                       ebpo_error *error);
 
-/* The folder of its temporary files: a name of less than EBPO_FOLDER_BYTES bytes, the workspace's.
- */
+/* Returns the folder of the temporary files, shorter than EBPO_FOLDER_BYTES bytes and owned by the
+ * workspace. */
 enum { EBPO_FOLDER_BYTES = 4096 };
 const char *ebpo_workspace_folder(const ebpo_workspace *workspace);
-/* Its budget in bytes. */
+/* Returns the budget in bytes. */
 uint64_t ebpo_workspace_memory(const ebpo_workspace *workspace);
 
-/* Keeping to a budget: pages of files can be released, what was written stays in the file. */
+/* Budget: pages of files can be released; written data stays in the file. */
 
-/* Between pieces of work, by each thread and for each few megabytes touched: releases pages of
- * files when the budget is nearly used up. Cheap; NULL is fine. Loops (below) and runs
- * of pieces (core/parallel.h) call it: only what is neither, as a recursion, needs to itself. */
+/* Releases pages of files when the budget is nearly used up. Call it between pieces of work, on
+ * each thread and for every few megabytes visited; it is cheap, and NULL is allowed. Loops (below)
+ * and runs of pieces (core/parallel.h) call it; only other code, such as a recursion, needs to. */
 void ebpo_release_pages(ebpo_workspace *workspace);
 
-/* After so many items: of arrays gone through in order, or where each may bring in 16 pages. */
+/* Numbers of items between releases: for arrays visited in order, and where each item may bring in
+ * 16 pages. */
 enum { EBPO_ITEMS_IN_ORDER = 1 << 15, EBPO_ITEMS_SCATTERED = 1 << 7 };
 
-/* Loops over the items of large arrays. A workspace with a budget keeps arrays in files, and what a
- * loop has touched stays in memory until it is let go of: these loops do that on the way, so that
- * bodies need not think of it. Bodies may `continue`, `break` and return; `end` is evaluated once,
- * and where `workspace` is NULL all this costs a test. */
+/* Loops over the items of large arrays. A workspace with a budget keeps arrays in files, whose
+ * visited pages stay in memory until released: these loops release them, so that bodies need not.
+ * Bodies may `continue`, `break` and return; `end` is evaluated once. With a NULL `workspace` the
+ * cost is one test. */
 
-/* Pages are released whenever `i`, a uint64_t, becomes a multiple of `every`, a power of two: what
- * so many bodies touch should not exceed a few megabytes. */
+/* Releases pages whenever `i`, a uint64_t, becomes a multiple of `every`, a power of two. That many
+ * bodies should visit at most a few megabytes. */
 #define EBPO_FOR_ITEMS_EVERY(workspace, every, i, begin, end) \
     for (uint64_t i = (begin), i##_end = (end); i < i##_end; ebpo_items_step(workspace, every, ++i))
 
-/* Of a loop that goes through arrays in order. */
+/* A loop that visits arrays in order. */
 #define EBPO_FOR_ITEMS(workspace, i, begin, end) \
     EBPO_FOR_ITEMS_EVERY(workspace, EBPO_ITEMS_IN_ORDER, i, begin, end)
 
-/* Of one that jumps about: each jump may bring in 16 pages. */
+/* A loop with scattered access: each item may bring in 16 pages. */
 #define EBPO_FOR_ITEMS_SCATTERED(workspace, i, begin, end) \
     EBPO_FOR_ITEMS_EVERY(workspace, EBPO_ITEMS_SCATTERED, i, begin, end)
 
-/* Pieces of a few megabytes, or of fewer bytes that take long: `at` is where each begins. */
+/* Loops over pieces of a few megabytes, or of fewer bytes if they take long; each begins at `at`.
+ */
 #define EBPO_FOR_PIECES(workspace, at, end, piece)         \
     for (uint64_t at = 0, at##_end = (end); at < at##_end; \
          at += (piece), ebpo_release_pages(workspace))
@@ -63,23 +66,24 @@ static inline void ebpo_items_step(ebpo_workspace *workspace, uint64_t every, ui
 
 /* Arrays in memory or in temporary files. */
 
-/* count * size bytes, uninitialised; NULL when the product overflows, memory is short or the disk
- * full (ebpo_workspace_fail tells which). Without a workspace: malloc's. The workspace is the
- * owner: whoever holds the array holds it too, and frees the one with the other. */
+/* Allocates count * size uninitialised bytes; returns NULL when the product overflows, memory is
+ * short or the disk full (ebpo_workspace_fail reports which). A NULL workspace means malloc. The
+ * array belongs to the workspace: a holder of the array also holds the workspace, and frees one
+ * with the other. */
 void *ebpo_array_alloc(ebpo_workspace *workspace, uint64_t count, size_t size);
-/* The same, zeroed. */
+/* Same, zeroed. */
 void *ebpo_array_zero(ebpo_workspace *workspace, uint64_t count, size_t size);
-/* Like ebpo_grow, for arrays of this kind. */
+/* Same as ebpo_grow, for workspace arrays. */
 bool ebpo_array_grow(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,
                      size_t size);
-/* ebpo_grow while the array is small, as nearly all of a kind are, and the above once it is large.
+/* Uses ebpo_grow while the array is small, as nearly all are, and ebpo_array_grow once it is large.
  */
 bool ebpo_array_grow_late(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,
                           size_t size);
-/* An array of `workspace`; without one, malloc's. NULL is fine. */
+/* Frees an array of `workspace`, or of malloc if `workspace` is NULL. A NULL array is allowed. */
 void ebpo_array_free(ebpo_workspace *workspace, void *array);
 
-/* memcpy and memset for arrays. */
+/* Copies or fills arrays, as memcpy and memset. */
 void ebpo_array_copy(ebpo_workspace *workspace, void *to, const void *from, uint64_t bytes);
 void ebpo_array_fill(ebpo_workspace *workspace, void *array, int byte, uint64_t bytes);
 

@@ -1,8 +1,8 @@
-/* Bounds of the distance that an envelope reaches beyond the model. ebpo_bound_envelope is a
- * branch and bound over the pieces of fragments.c: each piece has an upper bound from the
- * distance of its centre and from its nearest face, and the largest distance found is the lower
- * bound. The second part decides for the nodes of a level whether their envelopes are within
- * max_error, on several threads, and keeps what it found for other limits. */
+/* Bounds the distance by which an envelope extends beyond the model. ebpo_bound_envelope is a
+ * branch and bound over the pieces of fragments.c: each piece has an upper bound from the distance
+ * of its centre and from its nearest face, and the largest distance found is the lower bound. The
+ * second part decides for the nodes of a level if their envelopes are within max_error, on several
+ * threads, and keeps its results for other limits. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -35,7 +35,7 @@ void ebpo_bounder_free(ebpo_bounder *b)
     memset(b, 0, sizeof *b);
 }
 
-/* --- what is known of a piece --- */
+/* --- measures of a piece --- */
 
 static void find_centre(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_fragment_measure *l)
 {
@@ -58,13 +58,13 @@ static ebpo_status query_distance(ebpo_bounder *b, const double xi[3], double *d
     ebpo_distance_result result;
     double p[3];
     ebpo_cell_frame_point(&b->frame, xi, p);
-    b->questions++;
+    b->queries++;
     ebpo_status status = ebpo_distance(b->context, p, NULL, &result, b->error);
     *distance = ebpo_cell_frame_length(&b->frame, result.distance);
     return status;
 }
 
-/* Without doubt in the envelope, whatever was rounded. */
+/* Returns true if the point is certainly in the envelope, despite rounding. */
 static bool is_in_envelope(const ebpo_bounder *b, const double xi[3])
 {
     for (int i = 0; i < b->halves.count; i++) {
@@ -75,9 +75,9 @@ static bool is_in_envelope(const ebpo_bounder *b, const double xi[3])
     return true;
 }
 
-/* Pieces reach a little beyond the envelope, and where it is sharp all of a piece may lie there. So
- * a point outside is pulled towards the middle until it is inside: its distance changes by no more
- * than it was moved. */
+/* Pieces extend a little beyond the envelope, and where it is sharp all of a piece may be outside.
+ * So a point outside is pulled towards the middle until it is inside: its distance changes by at
+ * most the length of the pull. */
 static void pull_in(const ebpo_bounder *b, const double xi[3], double out[3])
 {
     double share = 0;
@@ -130,7 +130,7 @@ static ebpo_status measure_fragment(ebpo_bounder *b, const ebpo_fragment *fragme
         fmin(fmin(fragment->upper, corner), fmax(0, l->distance + l->reach)) + 4 * b->frame.grain;
     if (l->upper <= b->target || (l->distance < 0 && corner <= -l->distance))
         return EBPO_OK;
-    /* The likeliest place of the largest distance: that corner, moved off the rounded surface. */
+    /* The corner most likely to have the largest distance, moved off the rounded surface. */
     double xi[3], d;
     for (int k = 0; k < 3; k++)
         xi[k] = fmin(fmax(fragment->p.vertex[farthest][k] +
@@ -151,8 +151,8 @@ static ebpo_status begin_search(ebpo_bounder *b)
     ebpo_fragment *first = NULL;
     if (!ebpo_tree_find(b->whole, b->frame.cell, &node))
         return ebpo_fail(b->error, EBPO_E_ARGUMENT,
-                         "the model has no node of level %d where the level has one: they are not "
-                         "of the same file",
+                         "the model has no node of level %d where the level has one: they are "
+                         "not from the same file",
                          b->frame.cell.level);
     b->fragment_count = b->face_count = 0;
     if (node.type == EBPO_BLACK)
@@ -210,24 +210,23 @@ ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell, const ebpo_boun
     b->quit = ebpo_cell_frame_length(&b->frame, goal->too_much);
     b->ratio = goal->ratio;
     b->lo = b->hi = 0;
-    b->questions = 0;
+    b->queries = 0;
     ebpo_status status = begin_search(b);
-    while (status == EBPO_OK && b->fragment_count && b->questions < goal->questions &&
-           b->lo <= b->quit)
+    while (status == EBPO_OK && b->fragment_count && b->queries < goal->queries && b->lo <= b->quit)
         status = search_step(b);
     for (uint64_t i = 0; i < b->fragment_count; i++)
         ebpo_bound_raise(b, b->fragments[i].upper);
     *out = (ebpo_reach_bound){ b->lo > 0 ? ldexp(b->lo, b->frame.exponent) : 0,
                                ebpo_cell_frame_model_length(&b->frame, b->hi),
                                { b->place[0], b->place[1], b->place[2] },
-                               b->questions };
+                               b->queries };
     return status;
 }
 
 static void merge_bounds(ebpo_reach_bound *known, const ebpo_reach_bound *found)
 {
     known->hi = fmin(known->hi, found->hi);
-    known->questions += found->questions;
+    known->queries += found->queries;
     if (found->lo <= known->lo)
         return;
     known->lo = found->lo;
@@ -239,7 +238,7 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
 {
     ebpo_reach_bound found;
     ebpo_bound_goal now = *goal;
-    uint64_t asked = 0;
+    uint64_t queried = 0;
     ebpo_status status = EBPO_OK;
     if (isinf(out->hi)) {
         ebpo_cell_frame frame;
@@ -250,29 +249,29 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
     }
     for (;;) {
         double good = fmax(goal->enough, goal->ratio * out->lo);
-        if (status != EBPO_OK || out->hi <= good || asked >= goal->questions ||
+        if (status != EBPO_OK || out->hi <= good || queried >= goal->queries ||
             out->lo > goal->too_much)
             return status;
         now.enough = fmax(out->hi / 2, good);
-        now.questions = goal->questions - asked;
+        now.queries = goal->queries - queried;
         status = ebpo_bound_envelope(b, cell, &now, &found, error);
         if (status != EBPO_OK)
             return status;
         bool stuck = found.hi >= out->hi && found.lo <= out->lo;
-        asked += found.questions;
+        queried += found.queries;
         merge_bounds(out, &found);
         if (stuck)
-            return EBPO_OK; /* rounding is all there is left */
+            return EBPO_OK; /* only rounding remains */
     }
 }
 
-/* a node that takes more is refined: its children's envelopes are smaller and closer */
-enum { QUESTIONS = 4096 };
+/* a node that needs more is refined: its children's envelopes are smaller and closer */
+enum { QUERIES = 4096 };
 
 /* The least max_error that was found to be enough, the largest one that was not, and a certain
- * lower bound. A search for a larger max_error asks no more and accepts no more (error_bound.h), so
- * these tell what it would find; an upper bound from another search would not, as this one might
- * run out of questions just above it. */
+ * lower bound. A search for a larger max_error sends no more queries and accepts no more
+ * (error_bound.h), so these predict its result. An upper bound from another search would not, as
+ * this one might use up its queries just above it. */
 typedef struct memory {
     double enough, failed, lo;
 } memory;
@@ -285,7 +284,7 @@ struct ebpo_tolerance {
     ebpo_progress progress;
     memory *gray[EBPO_LEVELS_MAX], *leaf[EBPO_LEVELS_MAX];
     ebpo_bounder *bounders;     /* [threads] */
-    ebpo_tolerance_node *nodes; /* of the call at hand */
+    ebpo_tolerance_node *nodes; /* nodes of the current call */
     double max_error;
 };
 
@@ -352,14 +351,14 @@ static ebpo_status judge_node(ebpo_tolerance *n, ebpo_bounder *b, ebpo_tolerance
 {
     ebpo_node own;
     ebpo_reach_bound found;
-    ebpo_bound_goal goal = { n->max_error, n->max_error, 0, QUESTIONS };
+    ebpo_bound_goal goal = { n->max_error, n->max_error, 0, QUERIES };
     node->enough = false;
-    if (!node->asked)
+    if (!node->queried)
         return EBPO_OK;
     if (!ebpo_tree_find(&n->tree, node->cell, &own) ||
         (own.type != EBPO_GRAY && own.type != EBPO_LEAF))
         return ebpo_fail(error, EBPO_E_FORMAT,
-                         "level %d: a node is missing in its tree; run ebpo verify",
+                         "level %d: a node is missing in the tree; run ebpo verify",
                          node->cell.level);
     memory *m = own.type == EBPO_GRAY ? &n->gray[node->cell.level][own.rank]
                                       : &n->leaf[node->cell.level][own.rank];
@@ -398,20 +397,20 @@ ebpo_status ebpo_tolerance_judge(ebpo_tolerance *n, ebpo_tolerance_node *nodes, 
     n->nodes = nodes;
     n->max_error = max_error;
     return ebpo_parallel_for(n->threads, NULL, count, 8, judge_some, n, &n->progress,
-                             "judging envelopes", error);
+                             "measuring envelopes", error);
 }
 
-ebpo_status ebpo_tolerance_most(ebpo_tolerance *n, double *out, ebpo_error *error)
+ebpo_status ebpo_tolerance_max(ebpo_tolerance *n, double *out, ebpo_error *error)
 {
     ebpo_node own;
     ebpo_reach_bound found = { 0, INFINITY, { 0, 0, 0 }, 0 };
     ebpo_cell root = { 0, { 0, 0, 0 } };
-    ebpo_bound_goal goal = { 0, INFINITY, 1.02, QUESTIONS };
+    ebpo_bound_goal goal = { 0, INFINITY, 1.02, QUERIES };
     (void)ebpo_tree_bounds(&n->tree, root, true, &own, &n->bounders[0].halves);
     if (own.type == EBPO_LEAF || !n->planes)
         n->bounders[0].halves.count = 0;
     ebpo_status status = ebpo_bound_closely(&n->bounders[0], root, &goal, &found, error);
-    /* A search of its own may need a little more; with the root cell's diagonal none is left. */
+    /* A separate search may need slightly more; with the root cell's diagonal none is needed. */
     ebpo_tolerance_node node = { root, true, false };
     double most = found.hi > 0 ? found.hi : DBL_MIN;
     *out = most;

@@ -1,7 +1,7 @@
-/* Exports of levels and of the mesh in other programs' formats. The table below has one row for
- * each format: its name, its second file, what it holds, and the function that writes it. A new
- * format is a value of ebpo_export_format, a row here, and a file export_NAME.c with the function,
- * which is declared in export_job.h. Functions that all writers share are in export_job.c. */
+/* Exports levels and the mesh in other programs' formats. The table below has one row for each
+ * format: its name, its second file, its contents, and the function that writes it. A new format is
+ * a value of ebpo_export_format, a row here, and a file export_NAME.c with the function, which is
+ * declared in export_job.h. Functions that all writers share are in export_job.c. */
 #include <ebpo/export.h>
 
 #include <stdio.h>
@@ -48,7 +48,7 @@ static const ebpo_export_row formats[] = {
     [EBPO_EXPORT_STL] = { .name = "stl", .one_block = true, .write = WRITE_BY_ASSIMP },
 };
 
-/* Returns NULL for a value that is no format. */
+/* Returns NULL for an invalid format value. */
 static const ebpo_export_row *format_row(ebpo_export_format format)
 {
     return (unsigned)format < sizeof formats / sizeof *formats ? &formats[format] : NULL;
@@ -74,7 +74,7 @@ bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *
         length = snprintf(out, capacity, "%.*s%s",
                           (int)(dot && dot != name ? dot - path : (int)strlen(path)), path,
                           row->second_ending);
-    else /* readers take what follows the first ":" as the path within the HDF5 file */
+    else /* readers take the text after the first ":" as the path within the HDF5 file */
         length = strchr(name, ':') ? -1 : snprintf(out, capacity, "%s%s", path, row->second_ending);
     return length >= 0 && (size_t)length < capacity;
 }
@@ -83,31 +83,30 @@ static ebpo_status check_export(const ebpo_info *info, const ebpo_export_row *ro
                                 const ebpo_export_options *o, ebpo_error *error)
 {
     int blocks = ebpo_block_count(o),
-        asked = o->first_level < 0 || o->first_level >= info->level_count ? o->first_level
-                                                                          : o->last_level;
+        queried = o->first_level < 0 || o->first_level >= info->level_count ? o->first_level
+                                                                            : o->last_level;
     if (blocks == 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "nothing to export; give a level or the mesh");
+    if (o->first_level <= o->last_level && (queried < 0 || queried >= info->level_count))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "there is nothing to export: ask for a level or for the mesh");
-    if (o->first_level <= o->last_level && (asked < 0 || asked >= info->level_count))
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "there is no level %d; this file has levels 0 to %d", asked,
+                         "there is no level %d; this file has levels 0 to %d", queried,
                          info->level_count - 1);
     if (o->vertex_colours && (!o->mesh || !row || !row->takes_colours))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "colours can be given to the mesh in glTF, GLB and OBJ only");
+                         "colours are supported for the mesh in glTF, GLB and OBJ only");
     if (row && row->one_block && blocks > 1)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "an STL file holds one thing: one level, or the mesh");
+                         "an STL file contains one object: one level, or the mesh");
     return EBPO_OK;
 }
 
 static ebpo_status write_format(const ebpo_export_job *job, ebpo_error *error)
 {
     if (!job->row)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%d is not an export format", (int)job->format);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "invalid export format %d", (int)job->format);
     if (!job->row->write)
         return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, job->path,
-                              "this build has no assimp, which writes %s; build it with "
+                              "this build has no assimp, which writes %s; build with "
                               "libassimp-dev installed, or export XDMF or VTKHDF",
                               job->row->name);
     return job->row->write(job, error);
@@ -131,8 +130,8 @@ ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_for
         return status;
     if (!ebpo_export_second_file(format, path, second, sizeof second))
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, path,
-                              "cannot be used with this format: it is too long or contains a ':'; "
-                              "choose another name");
+                              "cannot be used with this format: the name is too long or contains "
+                              "a ':'; choose another name");
     if (wanted.first_level <= wanted.last_level)
         ebpo_file_prefetch_levels(file, 0, wanted.last_level);
     status =

@@ -1,7 +1,7 @@
-/* OBJ and STL through assimp's exporters, which write float32 coordinates. The blocks of a job
- * become one assimp scene, whose arrays are lent to assimp for the call. assimp writes one file
- * only, under a temporary name until it is complete; every other name that it asks for is an error.
- * A build without assimp does not compile this file, and the table in export.c has no function for
+/* Writes OBJ and STL through assimp's exporters, which write float32 coordinates. The blocks of a
+ * job become one assimp scene, which borrows their arrays for the call. assimp writes only one
+ * file, under a temporary name until it is complete; every other name that it opens is an error. A
+ * build without assimp does not compile this file, and the table in export.c has no function for
  * these formats. */
 #include "core/strict_fp.h"
 
@@ -25,12 +25,12 @@
 /* --- the file that assimp writes --- */
 
 typedef struct scene_file {
-    const char *path; /* lent */
+    const char *path; /* borrowed */
     ebpo_publish publish;
     FILE *stream; /* NULL: assimp has not opened it */
-    bool failed;  /* a write came short; `why` is its errno */
+    bool failed;  /* a write failed; `why` is its errno */
     int why;
-    char unknown[128]; /* another name that assimp wanted to write to, or "" */
+    char unknown[128]; /* another name that assimp opened for writing, or "" */
 } scene_file;
 
 typedef struct cursor {
@@ -40,7 +40,7 @@ typedef struct cursor {
 
 static cursor *cursor_of(struct aiFile *file) { return (cursor *)(void *)file->UserData; }
 
-/* assimp ignores what this returns, so the failure is kept. */
+/* Keeps the failure: assimp ignores the result of this callback. */
 static void note_failure(scene_file *target)
 {
     target->why = target->failed ? target->why : errno;
@@ -62,7 +62,7 @@ static size_t read_bytes(struct aiFile *file, char *to, size_t size, size_t coun
     return 0;
 }
 
-static size_t tell_stream(struct aiFile *file)
+static size_t report_stream(struct aiFile *file)
 {
     off_t at = ftello(cursor_of(file)->stream);
     return at > 0 ? (size_t)at : 0;
@@ -77,9 +77,9 @@ static enum aiReturn seek_stream(struct aiFile *file, size_t offset, enum aiOrig
 
 static size_t file_size(struct aiFile *file)
 {
-    size_t at = tell_stream(file), end;
+    size_t at = report_stream(file), end;
     (void)seek_stream(file, 0, aiOrigin_END);
-    end = tell_stream(file);
+    end = report_stream(file);
     (void)seek_stream(file, at, aiOrigin_SET);
     return end;
 }
@@ -110,7 +110,7 @@ static struct aiFile *open_file(struct aiFileIO *io, const char *name, const cha
     }
     target->stream = stream;
     *c = (cursor){ target, stream };
-    *file = (struct aiFile){ read_bytes,  write_bytes,  tell_stream,          file_size,
+    *file = (struct aiFile){ read_bytes,  write_bytes,  report_stream,        file_size,
                              seek_stream, flush_stream, (aiUserData)(void *)c };
     return file;
 }
@@ -128,7 +128,7 @@ static void scene_file_begin(scene_file *file, const char *path)
     *file = (scene_file){ .path = path, .publish = EBPO_PUBLISH_INIT };
 }
 
-/* Hands the file to assimp by the last part of its name; no other name exists for it. `io` points
+/* Offers the file to assimp by the last part of its name; no other name exists for it. `io` points
  * into `file`. */
 static void scene_file_offer(scene_file *file, struct aiFileIO *io)
 {
@@ -139,8 +139,8 @@ static ebpo_status scene_file_commit(scene_file *file, ebpo_error *error)
 {
     if (file->unknown[0])
         return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, file->path,
-                              "this assimp wants to write a file '%s' too, which nobody knows of; "
-                              "take another format",
+                              "this version of assimp also writes an unexpected file '%s'; "
+                              "choose another format",
                               file->unknown);
     if (file->failed) {
         errno = file->why;
@@ -148,21 +148,21 @@ static ebpo_status scene_file_commit(scene_file *file, ebpo_error *error)
     }
     if (!file->stream)
         return ebpo_fail_file(error, EBPO_E_UNSUPPORTED, file->path,
-                              "this assimp has written nothing; take another format");
+                              "this version of assimp has written nothing; choose another format");
     return ebpo_publish_commit(&file->publish, error);
 }
 
-/* Removes it, unless it was committed. */
+/* Removes the file, unless it was committed. */
 static void scene_file_abort(scene_file *file) { ebpo_publish_abort(&file->publish); }
 
-/* --- the scene that assimp is lent --- */
+/* --- the scene for assimp --- */
 
 enum { PARTS_MAX = EBPO_LEVELS_MAX + 1 };
 
 /* assimp has one error text for the whole process. */
 static pthread_mutex_t assimp_mutex = PTHREAD_MUTEX_INITIALIZER;
 
-/* All that assimp is lent. It copies before it changes anything. */
+/* All that assimp borrows. It copies before it changes anything. */
 typedef struct scene {
     struct aiScene root;
     struct aiNode top, node[PARTS_MAX], *children[PARTS_MAX];
@@ -197,7 +197,7 @@ static ebpo_status add_vertices(scene *s, struct aiMesh *to, const ebpo_mesh *fr
     return status;
 }
 
-/* assimp writes them behind the positions. */
+/* assimp writes colours after the positions. */
 static ebpo_status add_colours(struct aiMesh *to, const ebpo_block *block, ebpo_error *error)
 {
     const uint8_t *rgba = block->colours.vertex;
@@ -212,7 +212,7 @@ static ebpo_status add_colours(struct aiMesh *to, const ebpo_block *block, ebpo_
     return EBPO_OK;
 }
 
-/* Takes the triangles over from the block. */
+/* Moves the triangles from the block. */
 static ebpo_status add_faces(struct aiMesh *to, ebpo_mesh *from, ebpo_error *error)
 {
     to->mNumFaces = (unsigned)from->face_count;
@@ -274,7 +274,7 @@ static void scene_free(scene *s)
 static ebpo_status gather_scene(scene *s, const ebpo_export_job *job, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(job->file);
-    /* Of the mesh known before anything is read. */
+    /* The mesh can be checked before anything is read. */
     ebpo_status status = job->options->mesh ? ebpo_export_check_scene(job->path, info->vertex_count,
                                                                       info->face_count, error)
                                             : EBPO_OK;
@@ -290,8 +290,7 @@ static ebpo_status gather_scene(scene *s, const ebpo_export_job *job, ebpo_error
         ebpo_block_free(&block);
     }
     if (status == EBPO_OK && s->count == 0)
-        status =
-            ebpo_fail_file(error, EBPO_E_ARGUMENT, job->path, "there would be no triangle in it");
+        status = ebpo_fail_file(error, EBPO_E_ARGUMENT, job->path, "it would contain no triangle");
     finish_scene(s);
     job->report->largest_change = s->largest_change;
     return status;
@@ -308,7 +307,7 @@ static ebpo_status write_scene(const scene *s, const ebpo_export_job *job, scene
     if (aiExportSceneEx(&s->root, id, ebpo_path_name(job->path), &io, 0) != aiReturn_SUCCESS &&
         !file->failed)
         status = ebpo_fail_file(error, EBPO_E_UNSUPPORTED, job->path,
-                                "assimp cannot write it (%.200s); take another format",
+                                "assimp cannot write it (%.200s); choose another format",
                                 aiGetErrorString());
     pthread_mutex_unlock(&assimp_mutex);
     return status;
@@ -321,7 +320,7 @@ ebpo_status ebpo_export_assimp(const ebpo_export_job *job, ebpo_error *error)
     scene *s = ebpo_alloc_zero(1, sizeof *s);
     if (!s)
         return ebpo_fail_memory(error, sizeof *s);
-    /* Before the work, so that a folder which cannot be written is found out at once. */
+    /* Begins before the work, so that a folder without write permission is reported at once. */
     ebpo_status status = ebpo_publish_begin(&file.publish, job->path, error);
     if (status == EBPO_OK)
         status = gather_scene(s, job, error);

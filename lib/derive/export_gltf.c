@@ -1,6 +1,6 @@
-/* glTF 2.0, as one file (GLB) or as a text with a .bin beside it. Coordinates are float32
- * relative to the middle of the root cell, which is the translation of the nodes. assimp is not
- * used here: its exporter joins vertices that are less than 1e-5 apart, whatever the size of the
+/* Writes glTF 2.0, as one file (GLB) or as a text with a .bin file beside it. Coordinates are
+ * float32 relative to the middle of the root cell, which is the translation of the nodes. assimp is
+ * not used here: its exporter joins vertices that are less than 1e-5 apart, at any size of the
  * model. Source: Khronos, "glTF 2.0 Specification", sections 3 and 4. */
 #include "core/strict_fp.h"
 
@@ -41,10 +41,10 @@ typedef struct model {
     const char *bin_name; /* NULL: in the same file */
 } model;
 
-/* --- what is to be written --- */
+/* --- content --- */
 
-/* Far from zero a float32 has few digits left for the model: then vertices are relative to the
- * middle of the box, which becomes the nodes' translation. */
+/* Far from zero a float32 has few digits left: then vertices are relative to the middle of the box,
+ * which becomes the nodes' translation. */
 static void choose_origin(model *m, const ebpo_info *info)
 {
     double size = 0, far = 0;
@@ -70,7 +70,7 @@ static void find_bounds(part *p)
     }
 }
 
-/* Views of a part, in this order; each its own accessor. */
+/* Views of a part, in this order; each has an accessor. */
 enum { VIEW_POSITIONS, VIEW_CORNERS, VIEW_COLOURS, VIEWS };
 
 static uint64_t view_bytes(const part *p, int view)
@@ -82,7 +82,7 @@ static uint64_t view_bytes(const part *p, int view)
                                    : 0;
 }
 
-/* The number of a part's first accessor, and of its first view. */
+/* Returns the number of a part's first accessor and first view. */
 static int first_view(const model *m, int number)
 {
     int n = 0;
@@ -132,8 +132,7 @@ static ebpo_status gather_model(model *m, const ebpo_export_job *job, ebpo_error
     memcpy(job->report->origin, m->origin, sizeof m->origin);
     job->report->largest_change = m->largest_change;
     if (status == EBPO_OK && m->count == 0)
-        return ebpo_fail_file(error, EBPO_E_ARGUMENT, job->path,
-                              "there would be no triangle in it");
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, job->path, "it would contain no triangle");
     return status;
 }
 
@@ -141,7 +140,7 @@ static ebpo_status gather_model(model *m, const ebpo_export_job *job, ebpo_error
 
 static void print_name(FILE *f, const char *name)
 {
-    static const char hex[] = "0123456789ABCDEF"; /* a URI: what is not plain is written as %XX */
+    static const char hex[] = "0123456789ABCDEF"; /* a URI: other characters are written as %XX */
     for (; *name; name++) {
         unsigned char c = (unsigned char)*name;
         if ((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
@@ -152,7 +151,7 @@ static void print_name(FILE *f, const char *name)
     }
 }
 
-/* Three numbers as JSON wants them, in any locale. */
+/* Prints three numbers as JSON, in any locale. */
 static void print_three(FILE *f, const char *before, const double x[3])
 {
     fputs(before, f);
@@ -278,7 +277,7 @@ static void write_words(FILE *f, const void *words, uint64_t count)
     }
 }
 
-/* COLOR_0 is linear, where a mesh's colours are sRGB; 16 bits keep all of these apart. */
+/* COLOR_0 is linear, and a mesh's colours are sRGB; 16 bits keep all of these distinct. */
 static void write_colours(FILE *f, const uint8_t *rgba, uint64_t count)
 {
     uint16_t linear[256];
@@ -365,7 +364,7 @@ ebpo_status ebpo_export_gltf(const ebpo_export_job *job, ebpo_error *error)
     if (!m)
         return ebpo_fail_memory(error, sizeof *m);
     m->bin_name = *job->second ? ebpo_path_name(job->second) : NULL;
-    /* Before the work, so that a folder which cannot be written is found out at once. */
+    /* Begins before the work, so that a folder without write permission is reported at once. */
     ebpo_status status = ebpo_publish_begin(&light, job->path, error);
     if (status == EBPO_OK && m->bin_name)
         status = ebpo_publish_begin(&heavy, job->second, error);

@@ -1,7 +1,7 @@
-/* What all export formats share: a block (one level with its nodes, or the mesh with its
- * source's numbers, and colours) read from the file, its columns of numbers for each node or
- * polygon, its coordinates as float32 for the formats that contain no more, and the entries in
- * the report. Limits of formats are checked before anything is read where the counts are known. */
+/* Functions that all export formats share. They read a block from the file: one level with its
+ * nodes, or the mesh with its source's numbers; and colours. They make its columns for each node or
+ * polygon, float32 coordinates for formats that need them, and the entries in the report. Limits of
+ * formats are checked before anything is read where the counts are known. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -23,8 +23,8 @@ const ebpo_column ebpo_columns[EBPO_COLUMNS] = {
     { "type", EBPO_H5_I32 },        /* as in ebpo_node_type; mesh -1 */
     { "winding", EBPO_H5_I32 },     /* black: in the cell; leaf: at its lowest corner; else 0 */
     { "volume", EBPO_H5_F64 },      /* of the envelope; mesh 0 */
-    { "source_face", EBPO_H5_I64 }, /* number in the source mesh; envelopes, and without maps: -1 */
-    { "lod", EBPO_H5_I32 },         /* level of detail that it belongs to; mesh -1 */
+    { "source_face", EBPO_H5_I64 }, /* number in the source mesh; envelopes, or without maps: -1 */
+    { "lod", EBPO_H5_I32 },         /* its level of detail; mesh -1 */
 };
 
 int ebpo_block_count(const ebpo_export_options *o)
@@ -39,7 +39,7 @@ int ebpo_block_level(const ebpo_export_options *o, int i)
                : -1;
 }
 
-/* Those that the caller gave, in place of the mesh's own. */
+/* Takes the caller's colours instead of the mesh's. */
 static ebpo_status take_colours(ebpo_block *out, const uint8_t *rgba, ebpo_error *error)
 {
     uint64_t bytes = 4 * out->mesh.vertex_count;
@@ -67,7 +67,7 @@ static ebpo_status read_mesh(ebpo_block *out, const ebpo_file *file, ebpo_block_
         status = ebpo_mesh_colours(&out->mesh, &out->colours, error);
     if (status == EBPO_OK && options->vertex_colours)
         status = take_colours(out, options->vertex_colours, error);
-    ebpo_attributes_free(out->mesh.attributes); /* other ones are not exported */
+    ebpo_attributes_free(out->mesh.attributes); /* other attributes are not exported */
     out->mesh.attributes = NULL;
     if (status == EBPO_OK && order == EBPO_FILE_ORDER &&
         ebpo_file_info(file)->parts & EBPO_PART_MAPS)
@@ -211,10 +211,10 @@ static void report_colours(const ebpo_export_job *job, const ebpo_colours *colou
 {
     if (colours->vertex)
         job->report->vertex_colours =
-            job->row->holds_vertex_colours ? EBPO_EXPORT_WRITTEN : EBPO_EXPORT_LEFT_OUT;
+            job->row->holds_vertex_colours ? EBPO_EXPORT_WRITTEN : EBPO_EXPORT_OMITTED;
     if (colours->face)
         job->report->face_colours =
-            job->row->holds_face_colours ? EBPO_EXPORT_WRITTEN : EBPO_EXPORT_LEFT_OUT;
+            job->row->holds_face_colours ? EBPO_EXPORT_WRITTEN : EBPO_EXPORT_OMITTED;
 }
 
 ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int i, ebpo_block_order order,
@@ -253,6 +253,6 @@ ebpo_status ebpo_export_check_scene(const char *path, uint64_t vertices, uint64_
     return ebpo_fail_file(
         error, EBPO_E_LIMIT, path,
         "would have %" PRIu64 " vertices and %" PRIu64
-        " triangles, more corners than assimp can number; take another format, or a coarser level",
+        " triangles, more corners than assimp supports; choose another format, or a coarser level",
         vertices, faces);
 }

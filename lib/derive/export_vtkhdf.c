@@ -1,6 +1,6 @@
-/* VTKHDF 1.0: a file with one unstructured grid of polygons. This version has neither blocks
- * (2.1 has) nor polyhedra (2.5 has), so levels are distinguished by the cell array `lod`, and
- * each level and the mesh is a partition. Source: VTK's documentation, "VTKHDF file format". */
+/* Writes VTKHDF 1.0: a file with one unstructured grid of polygons. This version has neither blocks
+ * (2.1 has) nor polyhedra (2.5 has), so the cell array `lod` distinguishes levels, and each level
+ * and the mesh is a partition. Source: VTK's documentation, "VTKHDF file format". */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -22,7 +22,7 @@ enum {
     CELL_COUNT,
     CORNER_COUNT,
     SOURCE_VERTEX,
-    VERTEX_COLOURS, /* these two are made when a block has some */
+    VERTEX_COLOURS, /* these two are made when a block has colours */
     FACE_COLOURS,
     FIRST_COLUMN,
     TABLES = FIRST_COLUMN + EBPO_COLUMNS
@@ -85,7 +85,7 @@ static ebpo_status make_tables(writer *w, bool floats, ebpo_error *error)
     return status;
 }
 
-/* Appends and frees. NULL: memory was short. */
+/* Appends and frees the values; NULL means that memory was short. */
 static ebpo_status append_table(writer *w, int table, void *values, uint64_t count,
                                 ebpo_error *error)
 {
@@ -138,7 +138,7 @@ static ebpo_status append_cells(writer *w, const ebpo_block *block, uint64_t cel
     return status;
 }
 
-/* White up to so many rows: of blocks without colours. */
+/* Appends white up to this number of rows, for blocks without colours. */
 static ebpo_status pad_colours(writer *w, int table, uint64_t rows, ebpo_error *error)
 {
     uint8_t white[4 * 1024];

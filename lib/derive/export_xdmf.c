@@ -1,4 +1,4 @@
-/* XDMF 3: a text that refers to arrays in an HDF5 file beside it. Each level is a grid of
+/* Writes XDMF 3: a text that refers to arrays in an HDF5 file beside it. Each level is a grid of
  * polyhedra, one for each node, and the mesh a grid of triangles. VTK reads polyhedra with its
  * Xdmf3 readers, not with the older XDMF reader. Both files are published together. */
 #include <inttypes.h>
@@ -16,7 +16,7 @@ enum { XDMF_POLYHEDRON = 16 };
 typedef struct writer {
     ebpo_h5_out out;
     FILE *text;
-    const char *heavy; /* the HDF5 file's name as the text gives it */
+    const char *heavy; /* the HDF5 file's name in the text */
 } writer;
 
 static void print_escaped(FILE *f, const char *s)
@@ -29,7 +29,7 @@ static void print_escaped(FILE *f, const char *s)
     }
 }
 
-/* Writes the array and names it in the text. NULL: memory was short. */
+/* Writes the array and names it in the text; NULL means that memory was short. */
 static ebpo_status put_array(writer *w, const ebpo_block *block, const char *name,
                              ebpo_h5_number number, uint32_t cols, const void *values,
                              uint64_t rows, ebpo_error *error)
@@ -66,8 +66,8 @@ static ebpo_status put_attribute(writer *w, const ebpo_block *block, const char 
     return status;
 }
 
-/* For each polyhedron its kind, the number of its polygons, and for each of these the number of its
- * corners and the corners. */
+/* Writes for each polyhedron its kind, the number of its polygons, and for each polygon the number
+ * of its corners and the corners. */
 static ebpo_status put_polyhedra(writer *w, const ebpo_block *block, ebpo_error *error)
 {
     const ebpo_lod_nodes *nodes = &block->nodes;
@@ -191,7 +191,7 @@ static ebpo_status write_blocks(writer *w, const ebpo_export_job *job, ebpo_erro
         ebpo_block block;
         status = ebpo_export_read_block(job, i, EBPO_FILE_ORDER, &block, error);
         if (status == EBPO_OK &&
-            (block.level < 0 || block.nodes.node_count)) /* VTK gives up at a grid without cells */
+            (block.level < 0 || block.nodes.node_count)) /* VTK stops at a grid without cells */
             status = put_block(w, &block, error);
         ebpo_block_free(&block);
     }

@@ -1,11 +1,10 @@
 /* Pieces of an envelope, for bounds of its distance to the model: convex polytopes in the cell
- * coordinates of a node, which together cover the envelope. Lengths are in units of a power of
- * two near the cell's longest side, so that nothing overflows or vanishes. Every cut leaves
- * slightly too much on both sides, so that nothing is lost to the tolerances of
- * ebpo_polytope_clip. Pieces follow the model's tree down to leaves and are then cut along the
- * planes of faces, or halved, until each is inside, outside, or small. The file also reads the
- * trees: the one whose envelopes are measured, and the whole model's, which determines what is
- * solid. */
+ * coordinates of a node, which together cover the envelope. Lengths are in units of a power of two
+ * near the cell's longest side, so that nothing overflows or underflows. Every cut keeps slightly
+ * too much on both sides, so that the tolerances of ebpo_polytope_clip lose nothing. Pieces follow
+ * the model's tree down to leaves and are then cut along the planes of faces, or halved, until each
+ * is inside, outside, or small. The file also reads the trees: the one whose envelopes are
+ * measured, and the whole model's, which determines the solid. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,7 +16,7 @@
 #include "format/reader.h"
 #include "geometry/distance.h"
 
-/* outweighs the few roundings of a sum of squares and its root */
+/* exceeds the few roundings of a sum of squares and its root */
 static const double up = 1 + 0x1p-40;
 
 void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell cell)
@@ -25,8 +24,8 @@ void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell c
     double longest = 0, largest = 0;
     out->cell = cell;
     for (int k = 0; k < 3; k++) {
-        out->low[k] = ebpo_wall(box, k, cell.level, cell.at[k]);
-        out->high[k] = ebpo_wall(box, k, cell.level, cell.at[k] + 1);
+        out->low[k] = ebpo_cell_face(box, k, cell.level, cell.at[k]);
+        out->high[k] = ebpo_cell_face(box, k, cell.level, cell.at[k] + 1);
         out->size[k] = box->size[k] * ebpo_half_power(cell.level);
         longest = fmax(longest, out->size[k]);
         largest = fmax(largest, fmax(fabs(out->low[k]), fabs(out->high[k])));
@@ -36,7 +35,7 @@ void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell c
     out->factor[1] = ldexp(1, -out->exponent - -out->exponent / 2);
     for (int k = 0; k < 3; k++)
         out->side[k] = out->size[k] * out->factor[0] * out->factor[1];
-    /* A few ulp of the largest coordinate, and of the least number there is. */
+    /* A few ulp of the largest coordinate, and of the least positive number. */
     out->grain = 0x1p-49 * ebpo_cell_frame_length(out, largest) + 0x1p-50 +
                  ebpo_cell_frame_length(out, 0x1p-1070);
 }
@@ -95,7 +94,7 @@ double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
     return bounds.hi + f->grain;
 }
 
-/* A triangle of the model in cell coordinates; returns a bound on their error. */
+/* Converts a triangle of the model to cell coordinates; returns a bound on their error. */
 static double cell_frame_triangle(const ebpo_cell_frame *f, const double triangle[3][3],
                                   double out[3][3])
 {
@@ -124,15 +123,15 @@ void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out)
     }
 }
 
-/* The part with x[axis] <= at (side 0) or >= at (side 1), and what of the other side is thin.
- * False: there is none, or it is thin. */
+/* Computes the part with x[axis] <= at (side 0) or >= at (side 1), plus a thin part of the other
+ * side. Returns false if there is none, or it is thin. */
 static bool cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo_polytope *out)
 {
     double n[3] = { 0, 0, 0 };
     ebpo_extent e;
     ebpo_extent_of(p, &e);
-    /* Clipping gives up where next to nothing would be left, and a box around a thin part reaches
-     * far beyond it. So thin parts go with the thick ones. */
+    /* Clipping fails where next to nothing would remain, and a box around a thin part extends far
+     * beyond it. So thin parts go with the thick ones. */
     bool high_is_thin = e.max[axis] - at <= EBPO_CUT_THIN,
          low_is_thin = !high_is_thin && at - e.min[axis] <= EBPO_CUT_THIN;
     if (side ? high_is_thin : low_is_thin)
@@ -140,12 +139,12 @@ static bool cut_axis(const ebpo_polytope *p, int axis, int side, double at, ebpo
     ebpo_polytope_copy(out, p);
     n[axis] = side ? -1 : 1;
     if (!high_is_thin && !low_is_thin)
-        /* where it gives up all the same, too much is kept */
+        /* where it still fails, too much is kept */
         (void)ebpo_polytope_clip(out, n, (side ? -at : at) + EBPO_CUT_SLACK, CUT_TAG);
     return true;
 }
 
-/* The part with n . x <= d, |n| = 1; false when clipping gives up. */
+/* Computes the part with n . x <= d, |n| = 1; returns false when clipping fails. */
 static bool cut_plane(const ebpo_polytope *p, const double n[3], double d, ebpo_polytope *out)
 {
     ebpo_polytope_copy(out, p);
@@ -158,13 +157,12 @@ ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_file *file, uns
     const ebpo_info *info = ebpo_file_info(file);
     if (!(info->parts & EBPO_PART_MESH))
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
-                              "how far envelopes reach beyond the model is measured against its "
-                              "mesh, which the file does not have; use a file with it "
-                              "(`ebpo convert`)");
+                              "error bounds are measured against the mesh, which the file does "
+                              "not have; use a file with it (`ebpo convert`)");
     if (info->pruned)
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
-                              "is a subset, and how far envelopes reach beyond the model is "
-                              "measured against all of its mesh; use the original");
+                              "is a subset, and error bounds are measured against the whole "
+                              "mesh; use the original");
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     read.threads = threads;
     ebpo_status status = ebpo_lod_model_read(out, file, info->level_count - 1, &read, error);
@@ -214,9 +212,9 @@ ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebpo_node *leaf,
     return status;
 }
 
-/* so many faces are cut along; with more, halving makes them fewer */
+/* most faces to cut along; with more, halving reduces them */
 enum { CUT_FACES = 64 };
-/* a plane cuts a piece that reaches so far to both sides; in cells, above what ebpo_polytope_clip
+/* a plane cuts a piece that extends this far to both sides; in cells, above what ebpo_polytope_clip
  * refuses */
 static const double side_least = 2e-7;
 
@@ -253,8 +251,8 @@ static ebpo_status push_polytope(ebpo_bounder *b, ebpo_fragment_kind kind,
     return status;
 }
 
-/* Gives the piece those of `count` triangles that may meet it; they may be at the beginning of the
- * stack of faces. */
+/* Gives the piece those of `count` triangles that may intersect it; they may be at the beginning of
+ * the stack of faces. */
 static ebpo_status give_faces(ebpo_bounder *b, ebpo_fragment *fragment, uint64_t first,
                               uint64_t count)
 {
@@ -295,9 +293,9 @@ ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
 
 /* --- cutting --- */
 
-/* Walls of a cell `levels` below the node's, in cell coordinates. */
-static void find_walls(const ebpo_bounder *b, ebpo_cell cell, int levels, double low[3],
-                       double high[3])
+/* Finds the cell faces of a cell `levels` below the node's, in cell coordinates. */
+static void find_cell_faces(const ebpo_bounder *b, ebpo_cell cell, int levels, double low[3],
+                            double high[3])
 {
     double side = ebpo_half_power(levels);
     for (int k = 0; k < 3; k++) {
@@ -307,30 +305,30 @@ static void find_walls(const ebpo_bounder *b, ebpo_cell cell, int levels, double
     }
 }
 
-/* A piece reaches up to EBPO_CUT_THIN, or the slack of a cut, beyond its cell, where a neighbour's
- * part was thin and went with it. That is measured in the node's cells: far below, it is not small
- * beside the piece's own cell. What is known of the cell holds for the points beyond it, too, when
- * their distance to it is added. */
+/* A piece extends up to EBPO_CUT_THIN, or the slack of a cut, beyond its cell, where a neighbour's
+ * thin part went with it. That is measured in the node's cells: far below, it is not small compared
+ * with the piece's cell. Bounds of the cell hold for the points beyond it, too, when their distance
+ * to it is added. */
 static double find_beyond(const ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3], origin[3] = { 0, 0, 0 }, apart[3];
     ebpo_extent e;
     ebpo_extent_of(p, &e);
-    find_walls(b, cell, levels, low, high);
+    find_cell_faces(b, cell, levels, low, high);
     for (int k = 0; k < 3; k++)
         apart[k] = fmax(fmax(low[k] - e.min[k], e.max[k] - high[k]), 0);
     return ebpo_cell_frame_apart(&b->frame, apart, origin);
 }
 
-/* Inside, but for what thin part of the neighbours went with it: more than the slack, by which
- * neighbours overlap. */
+/* Inside, except for thin parts of the neighbours: more than the slack, by which neighbours
+ * overlap. */
 static void bound_black(ebpo_bounder *b, const ebpo_polytope *p, ebpo_cell cell, int levels)
 {
     double low[3], high[3];
     bool thin = false;
     ebpo_extent e;
     ebpo_extent_of(p, &e);
-    find_walls(b, cell, levels, low, high);
+    find_cell_faces(b, cell, levels, low, high);
     for (int k = 0; k < 3; k++)
         thin = thin || e.min[k] < low[k] - EBPO_CUT_SLACK || e.max[k] > high[k] + EBPO_CUT_SLACK;
     if (thin)
@@ -396,8 +394,8 @@ static ebpo_status cut_longest(ebpo_bounder *b, const ebpo_fragment *fragment,
     return status;
 }
 
-/* The plane of a face in cell coordinates, n of length 1; false when rounding leaves it too
- * uncertain to rely on. */
+/* Computes the plane of a face in cell coordinates, n of length 1; returns false when rounding
+ * leaves it too uncertain. */
 static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double *d)
 {
     double t[3][3], u[3], v[3],
@@ -411,8 +409,8 @@ static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double
     double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), edge = 0;
     for (int k = 0; k < 3; k++)
         edge += fabs(u[k]) + fabs(v[k]);
-    /* A corner off by the error tilts the plane by about error * edge / length, over distances of a
-     * cell or an edge. */
+    /* An error of a corner tilts the plane by about error * edge / length, over distances of a cell
+     * or an edge. */
     if (!(length > 0) || !(error * edge / length * (1 + edge) < 1e-9))
         return false;
     for (int k = 0; k < 3; k++)
@@ -421,7 +419,7 @@ static bool find_plane(const ebpo_bounder *b, uint64_t face, double n[3], double
     return true;
 }
 
-/* Both halves along a plane, |n| = 1; not `done` when clipping gives up. */
+/* Pushes both halves along a plane, |n| = 1; not `done` when clipping fails. */
 static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
                              ebpo_fragment_kind kind, const double n[3], double d, bool *done)
 {
@@ -439,7 +437,7 @@ static ebpo_status cut_along(ebpo_bounder *b, const ebpo_fragment *fragment,
 }
 
 /* Over a face, its plane's distance is the face's: pieces of about its size are cut along the prism
- * above it, so that flat places need no fine ones. */
+ * above it, so that flat places need no small ones. */
 static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
                              const ebpo_fragment_measure *l)
 {
@@ -477,29 +475,30 @@ static ebpo_status cut_prism(ebpo_bounder *b, const ebpo_fragment *fragment,
             most = fmax(most, e);
             least = fmin(least, e);
         }
-        if (most > side_least && least < -side_least) /* never with NAN, of a face without area */
+        if (most > side_least && least < -side_least) /* never for NAN, from a face without area */
             status = cut_along(b, fragment, EBPO_FRAGMENT_OUTSIDE, n, d, &done);
     }
     return status != EBPO_OK || done ? status : cut_longest(b, fragment, EBPO_FRAGMENT_OUTSIDE);
 }
 
-/* No face passes through the piece, but some may through its outermost bit: a segment from the
- * centre to a point behind one ends so far behind it. So it is with the leaf's walls, where the
- * piece reaches beyond them by more than cuts overlap: faces there are in the neighbour's list, not
- * in this one. */
+/* No face passes through the piece, but some may through its outermost part: a segment from the
+ * centre to a point behind one ends this far behind it. The same holds for the leaf's cell faces,
+ * where the piece extends beyond them by more than cuts overlap: faces there are in the neighbour's
+ * list, not in this one. */
 static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
                            const ebpo_fragment_measure *l)
 {
     double share = 0, low[3], high[3];
     ebpo_extent all;
     ebpo_extent_of(&fragment->p, &all);
-    find_walls(b, fragment->node.cell, fragment->levels, low, high);
+    find_cell_faces(b, fragment->node.cell, fragment->levels, low, high);
     for (int k = 0; k < 3; k++)
         for (int side = 0; side < 2; side++) {
             double other = side ? all.max[k] - high[k] : low[k] - all.min[k],
                    own = side ? high[k] - l->centre[k] : l->centre[k] - low[k];
             if (other > EBPO_CUT_SLACK && !(own > 0))
-                return INFINITY; /* the centre is beyond the wall: only its own distance is known */
+                return INFINITY; /* the centre is beyond the cell face: only its own distance is
+                                  * known */
             if (other > EBPO_CUT_SLACK)
                 share = fmax(share, (other + 2e-9) / (other + 2e-9 + own));
         }
@@ -519,13 +518,13 @@ static double behind_faces(const ebpo_bounder *b, const ebpo_fragment *fragment,
     return share * l->reach + b->frame.grain;
 }
 
-/* The cell is thinner on some axis than coordinates are sharp. */
+/* Returns true if the cell is thinner on some axis than the precision of coordinates. */
 static bool is_flat(const ebpo_bounder *b)
 {
     return fmin(fmin(b->frame.side[0], b->frame.side[1]), b->frame.side[2]) < 1e10 * b->frame.grain;
 }
 
-/* A piece within a leaf, with an inside and an outside. */
+/* Cuts a piece within a leaf, with an inside and an outside. */
 static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_fragment *fragment,
                             const ebpo_fragment_measure *l)
 {
@@ -547,7 +546,7 @@ static ebpo_status cut_leaf(ebpo_bounder *b, const ebpo_fragment *fragment,
     }
     if (status != EBPO_OK || done)
         return status;
-    if (!known && is_flat(b)) /* sides cannot be told apart: as a surface */
+    if (!known && is_flat(b)) /* sides cannot be distinguished: treat it as a surface */
         return cut_prism(b, fragment, l);
     if (!known)
         return cut_longest(b, fragment, EBPO_FRAGMENT_LEAF);

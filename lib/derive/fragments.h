@@ -1,5 +1,5 @@
-/* A node's cell in the model: lengths are in units of a power of two near the cell's longest side,
- * so that nothing overflows or vanishes. */
+/* Defines a node's cell in the model, with lengths in units of a power of two near the cell's
+ * longest side. */
 #ifndef EBPO_DERIVE_FRAGMENTS_H
 #define EBPO_DERIVE_FRAGMENTS_H
 
@@ -12,40 +12,40 @@
 
 typedef struct ebpo_cell_frame {
     ebpo_cell cell;
-    int exponent;                    /* the unit is 2^exponent in the model's */
-    double factor[2];                /* 2^-exponent in two steps, as one may not hold it */
-    double low[3], high[3], size[3]; /* of the cell, in the model's unit */
-    double side[3];                  /* of the cell, in ours */
-    /* what rounding of coordinates may move a point or change a distance, in ours */
+    int exponent;                    /* the unit is 2^exponent in the model's unit */
+    double factor[2];                /* 2^-exponent in two factors, as one may overflow */
+    double low[3], high[3], size[3]; /* box of the cell, in the model's unit */
+    double side[3];                  /* sides of the cell, in our unit */
+    /* bound of the rounding of points and distances, in our unit */
     double grain;
 } ebpo_cell_frame;
 
 void ebpo_cell_frame_make(ebpo_cell_frame *out, const ebpo_box *box, ebpo_cell cell);
 
-/* From cell coordinates to the model's: rounded by less than the grain. */
+/* Converts cell coordinates to the model's: rounded by less than the grain. */
 void ebpo_cell_frame_point(const ebpo_cell_frame *f, const double xi[3], double out[3]);
 
-/* A length of the model in our unit, and back (rounded up). INFINITY stays. */
+/* Convert a length of the model to our unit, and back (rounded up). INFINITY stays. */
 double ebpo_cell_frame_length(const ebpo_cell_frame *f, double length);
 double ebpo_cell_frame_model_length(const ebpo_cell_frame *f, double length);
 
-/* At least the distance of two points given in cell coordinates, in our unit. */
+/* Returns an upper bound of the distance of two points given in cell coordinates, in our unit. */
 double ebpo_cell_frame_apart(const ebpo_cell_frame *f, const double a[3], const double b[3]);
 
-/* At least the distance of every point of the cell, or of one `levels` below, to a face that it is
- * known to touch or nearly so (format-spec, section 5). */
+/* Returns an upper bound of the distance of every point of the cell, or of one `levels` below, to a
+ * face that is known to touch it or nearly so (format-spec, section 5). */
 double ebpo_cell_frame_diagonal(const ebpo_cell_frame *f, int levels);
 
-/* At least the distance of a point (cell coordinates) to a triangle of the model, in our unit. */
+/* Returns an upper bound of the distance of a point (cell coordinates) to a triangle of the model,
+ * in our unit. */
 double ebpo_cell_frame_distance(const ebpo_cell_frame *f, const double xi[3],
                                 const double triangle[3][3]);
 
 /* Pieces of an envelope: convex polytopes in the cell coordinates of the node, which together cover
- * it. Every cut leaves a little too much on both sides, so that nothing is lost between them to the
- * tolerances of ebpo_polytope_clip. */
+ * it. Every cut keeps a little too much on both sides. */
 
-/* How much: more than the clipping's tolerance, for normals of Euclidean length 1/sqrt(3) and up.
- */
+/* Amount kept: more than the clipping's tolerance, for normals of Euclidean length 1/sqrt(3) and
+ * up. */
 #define EBPO_CUT_SLACK 4e-10
 
 typedef struct ebpo_extent {
@@ -54,23 +54,23 @@ typedef struct ebpo_extent {
 
 void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out);
 
-/* A part of so little width goes with the other side; less than a quarter of the smallest piece
+/* A part of at most this width goes with the other side; less than a quarter of the smallest piece
  * that is cut. */
 #define EBPO_CUT_THIN 1.2e-7 /* ebpo_polytope_clip refuses 1e-7 */
 
-/* The trees behind the bounds: that whose envelopes are asked about, and the whole model's, which
- * tells what is solid. */
+/* The trees behind the bounds: the one whose envelopes are queried, and the whole model's, which
+ * determines the solid. */
 
-/* Reads the whole model of a file that has a mesh and is no subset, else EBPO_E_ABSENT. Freed by
- * ebpo_lod_model_free. */
+/* Reads the whole model of a file that has a mesh and is no subset, else fails with EBPO_E_ABSENT.
+ * The caller frees it by ebpo_lod_model_free. */
 EBPO_MUST_USE ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_file *file,
                                                unsigned threads, ebpo_error *error);
 
-/* The node of `cell`; false: there is no such node. */
+/* Finds the node of `cell`; returns false if there is none. */
 bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, ebpo_node *out);
 
-/* The same, with the half-spaces of its ancestors in the cell's
- * coordinates, and with `own` those that the file stores for the node. */
+/* Also returns the half-spaces of its ancestors in the cell's coordinates, and with `own` those
+ * that the file stores for the node. */
 bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool own, ebpo_node *out,
                       ebpo_half_spaces *halves);
 
@@ -79,25 +79,25 @@ EBPO_MUST_USE ebpo_status ebpo_tree_derive(const ebpo_lod_model *tree, const ebp
                                            ebpo_leaf_scratch *scratch, ebpo_half_spaces *halves,
                                            ebpo_error *error);
 
-/* --- what one thread works with while it bounds how far an envelope reaches --- */
+/* --- state of one thread that bounds the error of an envelope --- */
 
 typedef struct ebpo_fragment ebpo_fragment;
 
 typedef struct ebpo_bounder {
-    const ebpo_lod_model *whole; /* the model's tree: what is solid */
-    ebpo_context *context;       /* of the same file */
+    const ebpo_lod_model *whole; /* the model's tree, which determines the solid */
+    ebpo_context *context;       /* context of the same file */
     ebpo_leaf_scratch scratch;
-    ebpo_half_spaces halves;  /* of the envelope */
+    ebpo_half_spaces halves;  /* half-spaces of the envelope */
     ebpo_fragment *fragments; /* a stack */
     uint64_t fragment_capacity, fragment_count;
-    /* faces of pieces within leaves, in the model's unit: a stack as well */
+    /* faces of pieces within leaves, in the model's unit: also a stack */
     double (*faces)[3][3];
     uint64_t face_capacity, face_count;
-    /* The node at hand: */
+    /* The current node: */
     ebpo_cell_frame frame;
     double target, quit, ratio, lo, hi, place[3];
     double inner[3]; /* about the envelope's middle, in cell coordinates */
-    uint64_t questions;
+    uint64_t queries;
     ebpo_error *error;
 } ebpo_bounder;
 
@@ -107,8 +107,9 @@ typedef struct ebpo_bounder {
 
 typedef enum ebpo_fragment_kind {
     EBPO_FRAGMENT_GRAY, /* the part in a gray node's cell */
-    EBPO_FRAGMENT_LEAF, /* within a leaf's: its faces that may meet the piece are known */
-    /* in a white cell, or cut off from all faces, or of a surface, which has no inside */
+    EBPO_FRAGMENT_LEAF, /* within a leaf's cell: its faces that may intersect the piece are known */
+    /* in a white cell, or cut off from all faces, or in a surface's envelope, which has no inside
+     */
     EBPO_FRAGMENT_OUTSIDE
 } ebpo_fragment_kind;
 
@@ -117,16 +118,16 @@ struct ebpo_fragment {
     double upper;
     ebpo_node node; /* GRAY, LEAF */
     int levels;     /* GRAY, LEAF: of the cell below the node's */
-    /* GRAY, LEAF: every point of the piece is at most so far from that cell */
+    /* GRAY, LEAF: bound of the distance of the piece's points from that cell */
     double beyond;
     uint64_t face_first, face_count; /* LEAF */
     ebpo_polytope p;
 };
 
-/* What is known of a piece. */
+/* Measures of a piece. */
 typedef struct ebpo_fragment_measure {
-    double centre[3], reach; /* all of the piece is within reach of the centre */
-    double distance;         /* of the centre; negative inside */
+    double centre[3], reach; /* all of the piece is within `reach` of the centre */
+    double distance;         /* distance of the centre; negative inside */
     double upper;
     double face[3][3]; /* the nearest one, in the model's unit */
 } ebpo_fragment_measure;
@@ -135,15 +136,15 @@ typedef struct ebpo_fragment_measure {
 EBPO_MUST_USE ebpo_status ebpo_fragment_push(ebpo_bounder *b, ebpo_fragment_kind kind,
                                              const ebpo_fragment *parent, ebpo_fragment **out);
 
-/* A leaf's faces, as the first ones of its piece. */
+/* Adds a leaf's faces, as the first ones of its piece. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_leaf_faces(ebpo_bounder *b, ebpo_fragment *fragment,
                                                    const ebpo_node *leaf);
 
-/* Puts the parts of a piece, which is no longer on the stack, there, or decides them. */
+/* Pushes the parts of a piece, which is no longer on the stack, or decides them. */
 EBPO_MUST_USE ebpo_status ebpo_fragment_cut(ebpo_bounder *b, const ebpo_fragment *fragment,
                                             const ebpo_fragment_measure *l);
 
-/* Nothing of some piece reaches farther than `upper`. */
+/* Raises the bound to `upper`, the bound of some piece. */
 static inline void ebpo_bound_raise(ebpo_bounder *b, double upper)
 {
     b->hi = b->hi < upper ? upper : b->hi;

@@ -1,8 +1,8 @@
-/* The limit of what convex envelopes can achieve: the volume of the convex hull of the solid in
- * each cell of a level. The extreme points of a hull are mesh vertices in the cell, corners of
- * what faces leave on the cell faces, and those corners of the cell that are inside. qhull
- * computes the volumes; a build without it reports EBPO_E_ABSENT. Volumes are kept for each node
- * and added in that order. */
+/* Computes the limit of convex envelopes: the volume of the convex hull of the solid in each cell
+ * of a level. The extreme points of a hull are mesh vertices in the cell, corners where faces cut
+ * the cell faces, and those corners of the cell that are inside. qhull computes the volumes; a
+ * build without it reports EBPO_E_ABSENT. Volumes are kept for each node and added in that order.
+ */
 #include "core/strict_fp.h"
 
 #include <ebpo/limit.h>
@@ -36,7 +36,7 @@
 
 /* One for each thread. */
 typedef struct hull {
-    FILE *silence; /* qhull explains at length what is wrong with flat sets */
+    FILE *silence; /* receives qhull's long explanations of flat sets */
     qhT qhull;
 } hull;
 
@@ -67,7 +67,7 @@ static double volume_by(hull *h, double *points, int count, char *command, bool 
     volatile bool wrong = true;
     qh_zero(qh, h->silence);
     if (qh_new_qhull(qh, 3, count, points, False, command, NULL, h->silence) == 0) {
-        if (setjmp(qh->errexit) == 0) { /* qhull's errors jump */
+        if (setjmp(qh->errexit) == 0) { /* qhull's errors jump here */
             qh->NOerrexit = False;
             qh_getarea(qh, qh->facet_list);
             volume = qh->totvol;
@@ -83,7 +83,7 @@ static double volume_by(hull *h, double *points, int count, char *command, bool 
 }
 
 /* Returns the volume of the hull of `count` points [count][3], of the order of 1; 0 when they are
- * in a plane, or so nearly that rounding decides. */
+ * in a plane within rounding. */
 static double hull_volume(hull *h, double *points, uint64_t count)
 {
     static char merged[] = "qhull Qt Pp", joggled[] = "qhull QJ Pp";
@@ -91,8 +91,8 @@ static double hull_volume(hull *h, double *points, uint64_t count)
     if (count < 4 || count > INT_MAX / 3)
         return 0;
     double volume = volume_by(h, points, (int)count, merged, &failed);
-    /* Thin hulls whose facets merge into nothing: with points moved by some 1e-11 they have a
-     * volume; flat ones have next to none then. */
+    /* Thin hulls whose facets merge completely: with points moved by some 1e-11 they have a volume;
+     * flat ones then have almost none. */
     return failed ? volume_by(h, points, (int)count, joggled, &failed) : volume;
 }
 
@@ -104,8 +104,8 @@ static ebpo_status hull_new(hull **out, ebpo_error *error)
 {
     *out = NULL;
     return ebpo_fail(error, EBPO_E_ABSENT,
-                     "this library was built without qhull, so it cannot compute convex hulls; "
-                     "build it with -Dqhull=enabled");
+                     "this library was built without qhull, which computes convex hulls; build "
+                     "it with -Dqhull=enabled");
 }
 
 static void hull_free(hull *h) { (void)h; }
@@ -133,11 +133,11 @@ typedef struct job {
     ebpo_mesh mesh;
     int level;
     ebpo_level_nodes tree;
-    ebpo_node *nodes; /* whose hulls are wanted */
+    ebpo_node *nodes; /* nodes to compute hulls for */
     uint64_t node_count, node_capacity;
     double *volume; /* [node_count] in cells */
     double black;
-    bool in_root_cells; /* volumes */
+    bool in_root_cells; /* unit of the volumes */
     scratch *scratch;   /* [threads] */
 } job;
 
@@ -146,7 +146,7 @@ static double cell_volume(const job *j, int level)
     return j->in_root_cells ? ldexp(1, -3 * level) : ebpo_cell_volume(&j->model.box, level);
 }
 
-/* --- which nodes --- */
+/* --- the nodes --- */
 
 static bool list_nodes(job *j, const ebpo_node *node)
 {
@@ -226,7 +226,8 @@ static bool take_faces(const job *j, scratch *s)
 
 /* --- its corners --- */
 
-/* Winding number at a node's lowest corner: of a gray one, that of the node in that corner. */
+/* Returns the winding number at a node's lowest corner: for a gray node, that of the node in that
+ * corner. */
 static int32_t lowest_winding(const job *j, ebpo_node node)
 {
     while (node.type == EBPO_GRAY)
@@ -281,7 +282,7 @@ static ebpo_status measure_hulls(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-/* --- all of it --- */
+/* --- the call --- */
 
 static ebpo_status check_level(const ebpo_file *file, int level, ebpo_error *error)
 {
@@ -339,22 +340,22 @@ ebpo_status ebpo_limit_level(const ebpo_file *file, int level, const ebpo_limit_
                              ebpo_limit *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_limit_options asked = EBPO_LIMIT_OPTIONS_INIT;
+    ebpo_limit_options queried = EBPO_LIMIT_OPTIONS_INIT;
     job j = { 0 };
     ebpo_limit found = EBPO_LIMIT_INIT;
-    ebpo_status status = EBPO_TAKE(ebpo_limit_options, &asked, options, error);
+    ebpo_status status = EBPO_TAKE(ebpo_limit_options, &queried, options, error);
     if (status == EBPO_OK)
         status = EBPO_CHECK_SIZED(ebpo_limit, out, error);
     if (status == EBPO_OK)
         status = check_level(file, level, error);
     if (status != EBPO_OK)
         return status;
-    unsigned threads = ebpo_thread_count(asked.threads);
-    j.in_root_cells = asked.in_root_cells != 0;
+    unsigned threads = ebpo_thread_count(queried.threads);
+    j.in_root_cells = queried.in_root_cells != 0;
     status = prepare_job(&j, file, level, threads, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(threads, NULL, j.node_count, 1, measure_hulls, &j,
-                                   &asked.progress, "convex hulls", error);
+                                   &queried.progress, "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
         /* not 0 times infinity */
         double volume = j.volume[i] > 0 ? j.volume[i] * cell_volume(&j, j.nodes[i].cell.level) : 0;

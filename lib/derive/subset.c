@@ -1,11 +1,11 @@
-/* Subsets: a smaller file that contains selected levels, parts, a box, or the envelopes that are
- * close enough to the model. The parts of this file: the number of bytes that a subset needs of
- * its file, counted from heads and tables alone; resolving the options and cutting the tree,
- * whose levels, faces and volumes the other subset files cut; the search for the smallest
- * max_error whose file fits a target size; and publishing the result. The size falls as
- * max_error grows; coarse files are tried first, as they are small and quick to make, and what
- * is known of envelopes serves all trials. Trials are written beside the output, and the best
- * that fits is published, so that the published file is the one that was measured. */
+/* Makes subsets: a smaller file that contains selected levels, parts, a box, or the envelopes that
+ * are close enough to the model. This file counts the bytes that a subset needs of its file, from
+ * heads and tables alone. It resolves the options and cuts the tree, whose levels, faces and
+ * volumes the other subset files cut. It searches for the smallest max_error whose file fits a
+ * target size, and publishes the result. The size falls as max_error grows; coarse files are tried
+ * first, as they are small and quick to make, and all trials share the bounds of envelopes. Trials
+ * are written beside the output, and the best that fits is published, so that the published file is
+ * the one that was measured. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -31,9 +31,9 @@ typedef struct counting {
     const ebpo_file *file;
     const ebpo_subset_options *options;
     ebpo_box box;
-    ebpo_chunks *top;   /* what is read to find subtrees */
-    ebpo_chunks *below; /* a cache that has nothing of them: all of it counts */
-    ebpo_expected expected;
+    ebpo_chunks *top;   /* chunks that are read to find subtrees */
+    ebpo_chunks *below; /* a cache with nothing of the subtrees: everything counts */
+    ebpo_hints expected;
     uint32_t needs;
     int last_level;
     ebpo_subset_reads *out;
@@ -43,17 +43,17 @@ typedef struct counting {
 static void count_subtree(counting *c, uint64_t number)
 {
     c->out->subtrees++;
-    ebpo_subtrees_expect(c->below, &c->expected, number, 1, c->needs, c->last_level,
-                         c->needs & EBPO_NEEDS_MESH);
+    ebpo_subtrees_hint(c->below, &c->expected, number, 1, c->needs, c->last_level,
+                       c->needs & EBPO_NEEDS_MESH);
 }
 
-/* Gray nodes that meet the box, down to the subtrees' roots. */
+/* Descends gray nodes that intersect the box, down to the subtrees' roots. */
 static ebpo_status descend_to_subtrees(counting *c, const ebpo_node *gray)
 {
     const ebpo_subset_options *o = c->options;
     uint16_t types;
     uint64_t ranks[4];
-    if (o->boxed && !ebpo_cell_meets(&c->box, gray->cell, o->min, o->max))
+    if (o->boxed && !ebpo_cell_intersects(&c->box, gray->cell, o->min, o->max))
         return EBPO_OK;
     if (gray->cell.level == c->file->info.subtree_level) {
         count_subtree(c, gray->rank);
@@ -88,7 +88,7 @@ static void count_levels(counting *c, int last)
     for (int level = 0; level <= last; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             if (ebpo_schema[id].needs & c->needs)
-                ebpo_expect_array(&c->expected, &c->file->level_array[level][id]);
+                ebpo_hint_array(&c->expected, &c->file->level_array[level][id]);
 }
 
 ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_options *options,
@@ -99,7 +99,7 @@ ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_opt
     counting c = { .file = file,
                    .options = options,
                    .box = ebpo_root_box(info),
-                   .expected = EBPO_EXPECTED_INIT(file),
+                   .expected = EBPO_HINTS_INIT(file),
                    .needs = (info->parts & options->parts) | EBPO_NEEDS_ALWAYS |
                             (info->solid ? EBPO_NEEDS_SOLID : 0),
                    .last_level = options->last_level,
@@ -120,8 +120,8 @@ ebpo_status ebpo_subset_count_reads(const ebpo_file *file, const ebpo_subset_opt
     if (divided)
         status = count_subtrees(&c);
     else
-        ebpo_expect_root(&c.expected, c.needs);
-    out->bytes = ebpo_expected_bytes(&c.expected);
+        ebpo_hint_root(&c.expected, c.needs);
+    out->bytes = ebpo_hints_bytes(&c.expected);
     return status;
 }
 
@@ -138,8 +138,8 @@ uint32_t ebpo_profile_parts(ebpo_profile profile)
            EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS;
 }
 
-/* The box against the root cell and against one that was kept before: then nothing but their common
- * part is here. */
+/* Intersects the box with the root cell and with the box of an earlier subset, outside which the
+ * file has nothing. */
 static ebpo_status resolve_box(ebpo_cutting *c)
 {
     const ebpo_subset_options *o = c->options;
@@ -150,18 +150,21 @@ static ebpo_status resolve_box(ebpo_cutting *c)
     for (int k = 0; k < 3; k++) {
         if (!isfinite(o->min[k]) || !isfinite(o->max[k]) || !(o->min[k] <= o->max[k]))
             return ebpo_fail_file(c->error, EBPO_E_ARGUMENT, shown,
-                                  "a box needs finite corners, the lower one first on each axis");
-        if (ebpo_wall(&c->box, k, 0, 0) > o->max[k] || ebpo_wall(&c->box, k, 0, 1) < o->min[k])
+                                  "a box must have finite corners, the lower one first on each "
+                                  "axis");
+        if (ebpo_cell_face(&c->box, k, 0, 0) > o->max[k] ||
+            ebpo_cell_face(&c->box, k, 0, 1) < o->min[k])
             return ebpo_fail_file(c->error, EBPO_E_ARGUMENT, shown,
-                                  "the box does not meet the model, which lies within %.17g %.17g "
-                                  "%.17g and %.17g %.17g %.17g",
+                                  "the box does not intersect the model, which is within %.17g "
+                                  "%.17g %.17g and %.17g %.17g %.17g",
                                   c->box.origin[0], c->box.origin[1], c->box.origin[2],
-                                  ebpo_wall(&c->box, 0, 0, 1), ebpo_wall(&c->box, 1, 0, 1),
-                                  ebpo_wall(&c->box, 2, 0, 1));
+                                  ebpo_cell_face(&c->box, 0, 0, 1),
+                                  ebpo_cell_face(&c->box, 1, 0, 1),
+                                  ebpo_cell_face(&c->box, 2, 0, 1));
         if (c->from->boxed &&
             (c->from->kept_box[k] > o->max[k] || c->from->kept_box[3 + k] < o->min[k]))
             return ebpo_fail_file(c->error, EBPO_E_ARGUMENT, shown,
-                                  "the box does not meet the one that this file was cut to, %.17g "
+                                  "the box does not intersect the box of this subset, %.17g "
                                   "%.17g %.17g to %.17g %.17g %.17g; take the subset of the "
                                   "original",
                                   c->from->kept_box[0], c->from->kept_box[1], c->from->kept_box[2],
@@ -205,22 +208,23 @@ static ebpo_status resolve_options(ebpo_cutting *c)
     return resolve_box(c);
 }
 
-/* Without a box whole arrays will be read: a source far away then fetches them in few requests. */
-static void announce_cut(const ebpo_cutting *c)
+/* Gives prefetch hints for whole arrays, which are read without a box: a remote source then fetches
+ * them in few requests. */
+static void hint_cut(const ebpo_cutting *c)
 {
-    ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
+    ebpo_hints e = EBPO_HINTS_INIT(c->file);
     if (c->last_level > c->from->subtree_level)
-        ebpo_expect_top(c->file);
+        ebpo_hint_top(c->file);
     if (c->options->boxed || c->need || !ebpo_input_expects(&c->file->in))
         return;
     for (int level = 0; level <= c->last_level; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             if (ebpo_schema_is_held(id) &&
                 ebpo_schema[id].needs & (c->parts | EBPO_NEEDS_SOLID | EBPO_NEEDS_ALWAYS))
-                ebpo_expect_array(&e, &c->file->level_array[level][id]);
+                ebpo_hint_array(&e, &c->file->level_array[level][id]);
     if (c->last_level == c->from->level_count - 1)
-        ebpo_expect_root(&e, c->parts);
-    ebpo_expect_all(&e);
+        ebpo_hint_root(&e, c->parts);
+    ebpo_hint_all(&e);
 }
 
 static void name_mesh(ebpo_tree *out)
@@ -231,8 +235,8 @@ static void name_mesh(ebpo_tree *out)
     out->mesh.source_size = out->info.source_size;
 }
 
-/* Makes the tree of the subset. `need`: what is known of this file's envelopes, with the planes
- * that are kept; or NULL. */
+/* Makes the tree of the subset. `need`: bounds of this file's envelopes, with the kept planes; or
+ * NULL. */
 static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
                                       const ebpo_subset_options *options, ebpo_tolerance *need,
                                       ebpo_error *error)
@@ -246,7 +250,7 @@ static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
     memset(out, 0, sizeof *out);
     ebpo_status status = resolve_options(&c);
     if (status == EBPO_OK)
-        announce_cut(&c);
+        hint_cut(&c);
     if (status == EBPO_OK)
         status = ebpo_chunks_make(&c.chunks, file, CHUNK_BUDGET, error);
     if (status == EBPO_OK)
@@ -285,7 +289,7 @@ ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
     return status;
 }
 
-/* How the subset is written: all parts that its tree has. */
+/* Returns options to write the subset: all parts of its tree. */
 static ebpo_write_options subset_write_options(const ebpo_subset_options *options)
 {
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
@@ -300,21 +304,22 @@ static ebpo_write_options subset_write_options(const ebpo_subset_options *option
 
 /* --- subsets for a target size --- */
 
-/* below that share of the coarsest nothing but the whole is tried */
+/* below that share of the coarsest only the whole file is tried */
 static const double precision = 1.01, finest = 0x1p-40;
 
 typedef struct fitting {
     const ebpo_file *file;
     ebpo_subset_options *options;
-    ebpo_publish trial, best; /* best: the finest that fitted, once there is one */
+    ebpo_publish trial, best; /* best: the finest that fits so far */
     ebpo_tolerance *need;
     double fits, too_large;          /* max_error */
     uint64_t fit_bytes, large_bytes; /* and the sizes with these */
     ebpo_error *error;
 } fitting;
 
-/* Bytes of the file for a max_error, which is the best if it fits, as each is finer than those that
- * fitted before; *pruned: max_error has made a difference. */
+/* Writes a trial file for a max_error and returns its size in *bytes. It becomes the best if it
+ * fits, as each is finer than those that fitted before; *pruned: max_error has made a difference.
+ */
 static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool *pruned)
 {
     ebpo_tree tree;
@@ -330,8 +335,7 @@ static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool
         ebpo_tree_write_into(&tree, ebpo_publish_path(&f->trial), f->trial.shown, &write, f->error);
     ebpo_tree_free(&tree);
     if (status == EBPO_OK && stat(ebpo_publish_path(&f->trial), &st) != 0)
-        status =
-            ebpo_fail_errno(f->error, f->trial.shown, "the file in the making cannot be looked at");
+        status = ebpo_fail_errno(f->error, f->trial.shown, "cannot get the size of the trial file");
     if (status != EBPO_OK)
         return status;
     *bytes = (uint64_t)st.st_size;
@@ -343,20 +347,20 @@ static ebpo_status try_error(fitting *f, double max_error, uint64_t *bytes, bool
     return EBPO_OK;
 }
 
-/* From the coarsest file on, until one is too large or nothing is pruned any more (*pruned false).
- * `too_large` stays 0 when none is. */
+/* Tries files from the coarsest on, until one is too large or nothing is pruned any more (*pruned
+ * false). `too_large` stays 0 when none is. */
 static ebpo_status bracket_size(fitting *f, bool *pruned)
 {
     uint64_t bytes = 0;
     double coarsest = 0;
-    ebpo_status status = ebpo_tolerance_most(f->need, &coarsest, f->error);
+    ebpo_status status = ebpo_tolerance_max(f->need, &coarsest, f->error);
     *pruned = true;
     if (status == EBPO_OK)
         status = try_error(f, coarsest, &bytes, pruned);
     if (status == EBPO_OK && bytes > f->options->target_bytes)
         return ebpo_fail_file(f->error, EBPO_E_ARGUMENT, f->file->in.shown,
                               "no subset with these parts has at most %" PRIu64
-                              " bytes; the least has %" PRIu64,
+                              " bytes; the smallest has %" PRIu64,
                               f->options->target_bytes, bytes);
     f->fits = coarsest;
     f->fit_bytes = bytes;
@@ -371,9 +375,9 @@ static ebpo_status bracket_size(fitting *f, bool *pruned)
     return status;
 }
 
-/* Sizes go about straight from one end to the other, which are a factor of 2 apart: halfway between
- * that guess and the middle, so that neither end stays for long. No functions of libm, as the
- * result is stored. */
+/* Sizes change almost linearly from one end to the other, which are a factor of 2 apart. The guess
+ * is halfway between the linear one and the middle, so that neither end stays for long. No
+ * functions of libm, as the result is stored. */
 static double next_guess(const fitting *f)
 {
     double share = .5;
@@ -388,7 +392,7 @@ static ebpo_status find_error(fitting *f)
 {
     uint64_t bytes = 0;
     bool pruned = false;
-    /* With less than a quarter of the source wanted, it is hardly worth writing everything. */
+    /* With a target of less than a quarter of the source, writing everything is hardly useful. */
     bool may_fit =
              !f->options->choose_parts && f->options->target_bytes >= f->file->info.file_bytes / 4,
          tried = f->options->choose_parts || may_fit;
@@ -411,7 +415,7 @@ static ebpo_status find_error(fitting *f)
     return status;
 }
 
-/* The profiles of which the file has all, from the largest on. */
+/* Tries the profiles of which the file has all parts, from the largest on. */
 static ebpo_status choose_parts(fitting *f, bool *found)
 {
     static const ebpo_profile order[] = { EBPO_PROFILE_FULL, EBPO_PROFILE_COLLISION,
@@ -441,7 +445,7 @@ static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subs
     bool done = false;
     if (options->max_error != 0)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, file->in.shown,
-                              "a maximum error and a target size exclude each other");
+                              "a maximum error and a target size cannot be combined");
     ebpo_status status = ebpo_publish_begin(&f.trial, path, error);
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&f.best, path, error);
@@ -466,12 +470,12 @@ static ebpo_status subset_fit(const ebpo_file *file, const char *path, ebpo_subs
 
 uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces)
 {
-    /* bytes a face, measured: the mesh and what is known of it, and that of leaves, the more of
-     * them the smaller they are */
-    enum { OF_MESH = 130, OF_LEAVES = 1800, OF_LEAVES_MOST = 430, ANYHOW = 16 << 20 };
+    /* bytes per face, measured: the mesh and its bounds, and leaves, which take more when they are
+     * smaller */
+    enum { OF_MESH = 130, OF_LEAVES = 1800, OF_LEAVES_MAX = 430, ANYHOW = 16 << 20 };
     double leaves = OF_LEAVES / (double)leaf_faces;
     return (uint64_t)((double)face_count *
-                          (OF_MESH + (leaves < OF_LEAVES_MOST ? leaves : OF_LEAVES_MOST)) +
+                          (OF_MESH + (leaves < OF_LEAVES_MAX ? leaves : OF_LEAVES_MAX)) +
                       ANYHOW);
 }
 

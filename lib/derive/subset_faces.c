@@ -1,8 +1,8 @@
-/* The faces, vertices, maps and attributes of a subset. Depth first through the remaining
- * leaves, faces and vertices get new numbers in the order that the specification prescribes.
- * Arrays from old numbers to new ones are as long as the source's mesh, but pages that are never
- * written to take no memory, and faces that are close in space have close numbers. Source:
- * format-spec/README.md, section 5. */
+/* Cuts the faces, vertices, maps and attributes of a subset. Depth first through the remaining
+ * leaves, faces and vertices get new numbers in the order of the specification. Arrays from old
+ * numbers to new ones are as long as the source's mesh. Pages that are never written take no
+ * memory, and faces that are close in space have close numbers. Source: format-spec/README.md,
+ * section 5. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -18,7 +18,7 @@
 typedef struct numbering {
     ebpo_cutting *c;
     uint32_t *number; /* [faces of the source] new number + 1; 0: none yet */
-    uint32_t *old;    /* [count] of each new face */
+    uint32_t *old;    /* [count] old number of each new face */
     uint64_t count, capacity;
     /* references */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], read[EBPO_LEVELS_MAX],
@@ -42,7 +42,7 @@ static int compare_numbers(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* References to faces whose first leaf is gone become new, in the order of their old numbers:
+/* References to faces whose first leaf is gone become new, in the order of their old numbers,
  * before the leaf's own. The others stay, in place. */
 static ebpo_status number_leaf(numbering *n, int level)
 {
@@ -65,8 +65,8 @@ static ebpo_status number_leaf(numbering *n, int level)
         return ebpo_fail_memory(n->c->error, n->count * sizeof *n->old);
     if (!good)
         return ebpo_fail(n->c->error, EBPO_E_FORMAT,
-                         "level %d: a leaf lists a face twice or as new that an earlier leaf "
-                         "lists; run ebpo verify",
+                         "level %d: a leaf lists a face twice, or as new although an earlier "
+                         "leaf lists it; run ebpo verify",
                          level);
     if (!sorted)
         qsort(to, kept, sizeof *to, compare_numbers);
@@ -96,7 +96,7 @@ static ebpo_status number_group(numbering *n, int level)
 /* --- vertices --- */
 
 typedef struct vertices {
-    uint32_t *number, *old; /* as of faces */
+    uint32_t *number, *old; /* as for faces */
     uint64_t count, capacity;
 } vertices;
 
@@ -116,7 +116,7 @@ static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
         mesh->faces[i] = v->number[vertex] - 1;
     }
     for (uint64_t i = 0; i < c->from->vertex_count && good && !c->out->info.pruned;
-         i++) /* those that no face uses belong to the whole */
+         i++) /* vertices that no face uses belong to the whole */
         if (v->number[i] == 0) {
             good = ebpo_grow(&v->old, &v->capacity, v->count + 1, sizeof *v->old);
             if (good)
@@ -125,8 +125,8 @@ static ebpo_status number_vertices(ebpo_cutting *c, vertices *v)
     return good ? EBPO_OK : ebpo_fail_memory(c->error, c->from->vertex_count * sizeof *v->number);
 }
 
-/* Of a subset, what other elements have is left out: its numbers are of things that may be gone.
- * Textures stay. Where nothing was pruned, all is as it was. */
+/* In a subset, attributes of other elements are omitted: they may refer to removed elements.
+ * Textures stay. If nothing was pruned, everything is unchanged. */
 static ebpo_status begin_attributes(ebpo_cutting *c)
 {
     ebpo_read_options read = ebpo_read_threads(c->options->threads);
@@ -156,7 +156,7 @@ static ebpo_status take_vertices(ebpo_cutting *c)
     if (status == EBPO_OK) {
         size_t size = c->from->double_coordinates ? 3 * sizeof(double) : 3 * sizeof(float);
         void *xyz = ebpo_alloc(v.count, size);
-        ebpo_vertices_expect(c->chunks, v.old, v.count, c->parts);
+        ebpo_vertices_hint(c->chunks, v.old, v.count, c->parts);
         out->info.vertex_count = out->mesh.vertex_count = v.count;
         out->mesh.xyz32 = c->from->double_coordinates ? NULL : xyz;
         out->mesh.xyz64 = c->from->double_coordinates ? xyz : NULL;
@@ -181,7 +181,7 @@ static ebpo_status take_faces(ebpo_cutting *c, const numbering *n)
 {
     ebpo_tree *out = c->out;
     out->info.face_count = out->mesh.face_count = n->count;
-    ebpo_faces_expect(c->chunks, n->old, n->count, c->parts);
+    ebpo_faces_hint(c->chunks, n->old, n->count, c->parts);
     out->mesh.faces = ebpo_alloc(n->count, 3 * sizeof *out->mesh.faces);
     ebpo_status status = out->mesh.faces
                              ? ebpo_pick_rows(c->chunks, EBPO_A_FACES, n->old, n->count,
@@ -200,7 +200,7 @@ static ebpo_status take_faces(ebpo_cutting *c, const numbering *n)
     return status == EBPO_OK ? take_vertices(c) : status;
 }
 
-/* Face lists of nothing are no part. */
+/* Empty face lists are no part. */
 static void drop_lists(ebpo_cutting *c)
 {
     c->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);

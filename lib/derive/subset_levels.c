@@ -1,10 +1,9 @@
-/* The levels of a subset: the nodes that remain, and their volumes. Levels are cut from the root
- * downwards; the level above determines which groups are needed, so only these are read. Nodes
- * below which something is left out become pruned nodes. Arrays of remaining nodes are copied
- * node by node, all arrays that the table of arrays lists; face numbers remain those of the
- * source until subset_faces.c renumbers them. With max_error, the envelopes of a level are
- * evaluated together. Volumes are computed as ebpo_lod_level cuts envelopes: leaves by stored
- * planes or not at all. */
+/* Cuts the levels of a subset: the nodes that remain, and their volumes. Levels are cut from the
+ * root downwards; the level above determines the needed groups, so only these are read. Nodes with
+ * omitted descendants become pruned nodes. All arrays of the table of arrays are copied node by
+ * node for the remaining nodes; face numbers remain those of the source until subset_faces.c
+ * renumbers them. With max_error, the envelopes of a level are evaluated together. Volumes are
+ * computed as ebpo_lod_level cuts envelopes: leaves by stored planes or not at all. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -28,19 +27,19 @@ typedef struct kept_column {
     const uint8_t *from;
     uint8_t *to;
     uint8_t size;
-    int8_t usual; /* of nodes that are new */
+    int8_t standard; /* default for new nodes */
 } kept_column;
 
-/* So many items for each node: u8, or u32. */
+/* Counts of items for each node: u8, or u32. */
 typedef struct kept_counts {
     ebpo_per per;
     const uint8_t *counts;
     uint8_t size;
 } kept_counts;
 
-/* An array of such items; several may share their counts. */
+/* An array of counted items; several may share their counts. */
 typedef struct kept_list {
-    unsigned counts; /* which of the type's */
+    unsigned counts; /* index of the counts of the type */
     const uint8_t *from;
     uint8_t *to;
     uint8_t size;
@@ -55,8 +54,8 @@ typedef struct kept_nodes {
         kept_list list[EBPO_LEVEL_ARRAYS];
         unsigned columns, counts, lists;
     } of_type[4];
-    uint64_t next[4];           /* of each type: the next node of `from` */
-    uint64_t read[EBPO_COUNTS]; /* of each list: its next item */
+    uint64_t next[4];           /* for each type: the next node of `from` */
+    uint64_t read[EBPO_COUNTS]; /* for each list: its next item */
 } kept_nodes;
 
 static ebpo_per per_of(ebpo_node_type type)
@@ -81,10 +80,10 @@ static void note_column(kept_nodes *kept, int id, int type)
         (kept_column){ .from = ebpo_level_array(kept->from, id),
                        .to = ebpo_level_array(kept->to, id),
                        .size = ebpo_schema[id].held_size,
-                       .usual = ebpo_schema[id].usual };
+                       .standard = ebpo_schema[id].standard };
 }
 
-/* Place of the counts of a list, noted when first met. */
+/* Returns the index of the counts of a list; adds them at first use. */
 static unsigned note_counts(kept_nodes *kept, ebpo_per per, const ebpo_list_spec *list)
 {
     int type = ebpo_schema_node_type(list->of);
@@ -109,9 +108,9 @@ static void note_list(kept_nodes *kept, int id, const ebpo_list_spec *list)
                      .size = ebpo_schema[id].held_size };
 }
 
-/* Makes the arrays of `to` that are there for any of `needs`, with room for all of `from` and for
- * `more` nodes of each type (and, `more` gray ones being leaves before, for their planes). False:
- * out of memory. */
+/* Makes the arrays of `to` for any of `needs`, with space for all of `from` and for `more` nodes of
+ * each type (and, since `more` gray nodes were leaves, for their planes). Returns false without
+ * memory. */
 static bool kept_begin(kept_nodes *kept, const ebpo_level *from, ebpo_level *to, uint32_t needs,
                        const uint64_t more[4])
 {
@@ -143,13 +142,13 @@ static void copy_row(const kept_column *c, uint64_t from, uint64_t to)
     }
 }
 
-static void put_usual(const kept_column *c, uint64_t to)
+static void put_default(const kept_column *c, uint64_t to)
 {
-    int64_t value = c->usual;
+    int64_t value = c->standard;
     switch (c->size) {
-    case 1: memcpy(c->to + to, &(int8_t){ c->usual }, 1); break;
-    case 2: memcpy(c->to + 2 * to, &(int16_t){ c->usual }, 2); break;
-    case 4: memcpy(c->to + 4 * to, &(int32_t){ c->usual }, 4); break;
+    case 1: memcpy(c->to + to, &(int8_t){ c->standard }, 1); break;
+    case 2: memcpy(c->to + 2 * to, &(int16_t){ c->standard }, 2); break;
+    case 4: memcpy(c->to + 4 * to, &(int32_t){ c->standard }, 4); break;
     default: memcpy(c->to + 8 * to, &value, 8);
     }
 }
@@ -163,7 +162,7 @@ static uint64_t kept_items(const kept_counts *c, uint64_t rank)
     return count;
 }
 
-/* The place of a node that joins the level. */
+/* Returns the index of a node that joins the level. */
 static uint64_t grow_level(ebpo_level *level, ebpo_node_type type)
 {
     uint64_t place = ebpo_level_count(level, per_of(type));
@@ -171,7 +170,7 @@ static uint64_t grow_level(ebpo_level *level, ebpo_node_type type)
     return place;
 }
 
-/* The items of a node that stays, behind those that stay already. */
+/* Appends the items of a remaining node. */
 static void copy_items(const kept_nodes *kept, const kept_list *list, const kept_counts *c,
                        uint64_t count)
 {
@@ -180,7 +179,7 @@ static void copy_items(const kept_nodes *kept, const kept_list *list, const kept
            count * list->size);
 }
 
-/* The next node of a type is left out. */
+/* Omits the next node of a type. */
 static void kept_pass(kept_nodes *kept, ebpo_node_type type)
 {
     uint64_t rank = kept->next[type]++;
@@ -190,7 +189,7 @@ static void kept_pass(kept_nodes *kept, ebpo_node_type type)
     }
 }
 
-/* The next node of a type stays. */
+/* Keeps the next node of a type. */
 static void kept_take(kept_nodes *kept, ebpo_node_type type)
 {
     uint64_t place = grow_level(kept->to, type), rank = kept->next[type];
@@ -211,12 +210,12 @@ static void kept_take(kept_nodes *kept, ebpo_node_type type)
     kept_pass(kept, type);
 }
 
-/* A node that is not one of `from`: usual values, empty lists. */
+/* Adds a node that is not in `from`: default values, empty lists. */
 static void kept_add(kept_nodes *kept, ebpo_node_type type)
 {
     uint64_t place = grow_level(kept->to, type);
     for (unsigned i = 0; i < kept->of_type[type].columns; i++)
-        put_usual(&kept->of_type[type].column[i], place);
+        put_default(&kept->of_type[type].column[i], place);
 }
 
 /* --- cutting levels --- */
@@ -225,7 +224,7 @@ static const uint64_t NOTHING = UINT64_MAX;
 
 /* A gray node of the result. */
 typedef struct gray {
-    uint64_t group; /* of its children, in the source; NOTHING: they are left out */
+    uint64_t group; /* group of its children, in the source; NOTHING: they are omitted */
     ebpo_cell cell;
 } gray;
 
@@ -233,45 +232,46 @@ typedef struct descent {
     ebpo_cutting *c;
     int level;
     ebpo_level from, *to;
-    kept_nodes kept; /* of the one for the other */
+    kept_nodes kept; /* copies nodes from one to the other */
     gray *parent, *child;
-    ebpo_tolerance_node *judged; /* gray nodes and leaves as they come, with max_error; else NULL */
+    ebpo_tolerance_node *judged; /* gray nodes and leaves in order, with max_error; else NULL */
     uint64_t next_judged;
     uint64_t parent_count, child_count;
-    uint64_t group;  /* of the result, in hand: the number of its parent among gray nodes */
+    uint64_t group;  /* current group of the result: the number of its parent among gray nodes */
     uint64_t filled; /* groups of the result that are not empty */
     bool goes_on;    /* some child has children */
 } descent;
 
-static bool meets_box(const ebpo_cutting *c, ebpo_cell cell)
+static bool intersects_box(const ebpo_cutting *c, ebpo_cell cell)
 {
-    return !c->options->boxed || ebpo_cell_meets(&c->box, cell, c->options->min, c->options->max);
+    return !c->options->boxed ||
+           ebpo_cell_intersects(&c->box, cell, c->options->min, c->options->max);
 }
 
-/* Gray nodes of this level may have children in the result. */
+/* Returns true if gray nodes of this level may have children in the result. */
 static bool may_go_on(const ebpo_cutting *c, int level)
 {
     return level < c->last_level && level + 1 < c->from->level_count;
 }
 
-/* --- runs of groups that are wanted --- */
+/* --- runs of needed groups --- */
 
-/* Of a file with subtrees: where the parents are their roots, all nodes below can be announced, and
- * lists of faces. Which faces: these tell. */
+/* Gives prefetch hints in a file with subtrees: where the parents are their roots, for all nodes
+ * below and for lists of faces. The lists determine the faces. */
 static void expect_subtrees(const descent *d)
 {
     const ebpo_cutting *c = d->c;
-    ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
+    ebpo_hints e = EBPO_HINTS_INIT(c->file);
     uint64_t count = 0, *roots = ebpo_alloc(d->parent_count, sizeof *roots);
     uint32_t needs = c->parts | EBPO_NEEDS_ALWAYS | EBPO_NEEDS_SOLID;
     for (uint64_t i = 0; roots && i < d->parent_count; i++)
         if (d->parent[i].group != NOTHING)
             roots[count++] = d->parent[i].group;
     if (count)
-        ebpo_subtree_table_expect(c->chunks, roots, count);
+        ebpo_subtree_table_hint(c->chunks, roots, count);
     for (uint64_t i = 0; i < count; i++)
-        ebpo_subtrees_expect(c->chunks, &e, roots[i], 1, needs, c->last_level, false);
-    ebpo_expect_all(&e);
+        ebpo_subtrees_hint(c->chunks, &e, roots[i], 1, needs, c->last_level, false);
+    ebpo_hint_all(&e);
     free(roots);
 }
 
@@ -295,8 +295,8 @@ static ebpo_status pick_level(descent *d)
     }
     ebpo_status status =
         ebpo_pick_level(d->c->chunks, d->level, runs, count, d->c->parts, &d->from, d->c->error);
-    /* Ranks of the picked gray nodes in the source are needed for their groups: one after the other
-     * through the runs. */
+    /* The groups need the ranks of the picked gray nodes in the source: they are found one after
+     * the other through the runs. */
     uint64_t next = 0;
     if (status == EBPO_OK) {
         d->child = ebpo_alloc(d->from.gray_count + d->from.leaf_count, sizeof *d->child);
@@ -304,8 +304,8 @@ static ebpo_status pick_level(descent *d)
             status = ebpo_fail_memory(d->c->error,
                                       (d->from.gray_count + d->from.leaf_count) * sizeof *d->child);
     }
-    /* Kept at the end of the room, which leaves that become pruned fill from the front: never
-     * overtaken, as each gray node takes one place at most. */
+    /* Stored at the end of the array, which leaves that become pruned fill from the front: they
+     * never collide, as each gray node takes at most one entry. */
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
         for (uint64_t k = 0; k < runs[i].count[EBPO_GRAY]; k++)
             d->child[d->from.leaf_count + next++].group = runs[i].rank[EBPO_GRAY] + k;
@@ -313,7 +313,7 @@ static ebpo_status pick_level(descent *d)
     return status;
 }
 
-static ebpo_status make_room(descent *d)
+static ebpo_status reserve_space(descent *d)
 {
     const ebpo_level *f = &d->from;
     uint64_t whites = 8 * d->parent_count,
@@ -334,21 +334,21 @@ static void add_child(descent *d, ebpo_cell cell, uint64_t group)
     d->goes_on = d->goes_on || group != NOTHING;
 }
 
-/* Whether the envelope is close enough to the model: asked once for each gray node and leaf, in
- * their order. */
+/* Returns true if the envelope is close enough to the model: called once for each gray node and
+ * leaf, in their order. */
 static bool is_enough(descent *d) { return d->judged && d->judged[d->next_judged++].enough; }
 
 static void take_gray(descent *d, ebpo_cell cell)
 {
     uint64_t rank = d->kept.next[EBPO_GRAY], group = d->child[d->from.leaf_count + rank].group;
     bool enough = is_enough(d);
-    if (enough || !may_go_on(d->c, d->level) || !meets_box(d->c, cell))
+    if (enough || !may_go_on(d->c, d->level) || !intersects_box(d->c, cell))
         group = NOTHING;
     kept_take(&d->kept, EBPO_GRAY);
     add_child(d, cell, group);
 }
 
-/* The planes of the leaf in hand for the last gray node of the result. */
+/* Adds the planes of the current leaf to the last gray node of the result. */
 static void add_leaf_planes(descent *d)
 {
     const ebpo_level *f = &d->from;
@@ -363,7 +363,7 @@ static void add_leaf_planes(descent *d)
     t->plane_count += count;
 }
 
-/* The last gray node of the result was a leaf, which is shown in its parent's colour. */
+/* Sets the colour of the last gray node of the result, which was a leaf, to its parent's. */
 static void add_colour(descent *d)
 {
     ebpo_level *t = d->to;
@@ -372,12 +372,12 @@ static void add_colour(descent *d)
             d->level ? t[-1].gray_colours[d->group] : EBPO_COLOUR_OF_NOTHING;
 }
 
-/* Outside the box a leaf becomes a pruned node; its own planes bound what is in its cell as well as
- * a gray node's do. Where its parent's do well enough, it needs none. */
+/* Outside the box a leaf becomes a pruned node; its planes bound the cell's content as well as a
+ * gray node's do. If its parent's planes are good enough, it needs none. */
 static ebpo_node_type take_leaf(descent *d, ebpo_cell cell)
 {
     bool enough = is_enough(d);
-    if (!enough && meets_box(d->c, cell)) {
+    if (!enough && intersects_box(d->c, cell)) {
         kept_take(&d->kept, EBPO_LEAF);
         return EBPO_LEAF;
     }
@@ -401,7 +401,7 @@ static ebpo_node_type take_node(descent *d, ebpo_node_type type, ebpo_cell cell)
     return type;
 }
 
-/* Cell of an octant of a group of the result. */
+/* Returns the cell of an octant of a group of the result. */
 static ebpo_cell child_cell(const descent *d, uint64_t number, unsigned octant)
 {
     return d->level ? ebpo_cell_child(d->parent[number].cell, octant)
@@ -418,7 +418,7 @@ static void take_group(descent *d, uint64_t number, uint16_t types)
     }
 }
 
-/* --- how close envelopes are, all of a level at once --- */
+/* --- errors of all envelopes of a level --- */
 
 static ebpo_status judge_level(descent *d)
 {
@@ -439,27 +439,27 @@ static ebpo_status judge_level(descent *d)
                 continue;
             ebpo_tolerance_node *node = &d->judged[count++];
             node->cell = child_cell(d, i, octant);
-            node->asked =
-                meets_box(d->c, node->cell) && (type == EBPO_LEAF || may_go_on(d->c, d->level));
+            node->queried = intersects_box(d->c, node->cell) &&
+                            (type == EBPO_LEAF || may_go_on(d->c, d->level));
         }
     }
     return ebpo_tolerance_judge(d->c->need, d->judged, count, d->c->options->max_error,
                                 d->c->error);
 }
 
-/* The parents are done for good after this. */
+/* Cuts a level; the parents are complete after this. */
 static ebpo_status cut_level(descent *d)
 {
     ebpo_status status = pick_level(d);
     if (status == EBPO_OK)
-        status = make_room(d);
+        status = reserve_space(d);
     if (status == EBPO_OK)
         status = judge_level(d);
     uint64_t next = 0;
     d->to->group_count = d->parent_count;
     for (uint64_t i = 0; i < d->parent_count && status == EBPO_OK; i++) {
         if (d->parent[i].group == NOTHING)
-            for (int k = 0; k < 8; k++) /* the places of children that are not here */
+            for (int k = 0; k < 8; k++) /* slots of absent children */
                 kept_add(&d->kept, EBPO_WHITE);
         else
             take_group(d, i, d->from.types[next++]);
@@ -495,7 +495,7 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
         d.goes_on = false;
         status = cut_level(&d);
         if (status == EBPO_OK && d.level && d.filled == 0) {
-            ebpo_level_free(d.to); /* in a subset of a subset: nothing of this level lies in both */
+            ebpo_level_free(d.to); /* in a subset of a subset: no node of this level is in both */
             break;
         }
         if (d.level)

@@ -1,4 +1,4 @@
-/* What the files that cut subsets share. */
+/* Declarations shared by the files that cut subsets. */
 #ifndef EBPO_DERIVE_SUBSET_PARTS_H
 #define EBPO_DERIVE_SUBSET_PARTS_H
 
@@ -15,7 +15,7 @@ typedef struct ebpo_cutting {
     ebpo_chunks *chunks;
     ebpo_tolerance *need; /* with max_error */
     ebpo_box box;         /* the root cell */
-    int last_level;       /* deepest that may be kept */
+    int last_level;       /* deepest level that may be kept */
     uint32_t parts;       /* kept, and in the file */
     ebpo_tree *out;
     ebpo_error *error;
@@ -31,18 +31,20 @@ EBPO_MUST_USE ebpo_status ebpo_cut_faces(ebpo_cutting *c);
 /* Computes the volumes of the envelopes of the nodes that remain. */
 void ebpo_cut_volumes(ebpo_cutting *c);
 
-/* The tree that would be written; for tests too. */
+/* Makes the tree that would be written; for tests too. */
 EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
                                            const ebpo_subset_options *options, ebpo_error *error);
 
 /* --- the bytes that a subset needs of its file, from heads and tables, without cutting it --- */
 
 typedef struct ebpo_subset_reads {
-    uint64_t subtrees, of_subtrees; /* that meet the box, and all; 0, 0: the file has none */
-    uint64_t bytes;                 /* of the chunks that hold it, each counted once */
+    uint64_t subtrees, of_subtrees; /* subtrees that intersect the box, and all; 0, 0: the file has
+                                     * none */
+    uint64_t bytes;                 /* bytes of the chunks that contain it, each counted once */
 } ebpo_subset_reads;
 
-/* Of the options the parts, the box and last_level count. Where the mesh goes, all levels do. */
+/* Counts the reads. Of the options the parts, the box and last_level matter. With the mesh, all
+ * levels are included. */
 EBPO_MUST_USE ebpo_status ebpo_subset_count_reads(const ebpo_file *file,
                                                   const ebpo_subset_options *options,
                                                   ebpo_subset_reads *out, ebpo_error *error);

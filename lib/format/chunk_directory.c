@@ -1,10 +1,10 @@
-/* The chunk directory: the offset, the stored size and the checksum of every chunk of an open
- * file. Offsets are read from the file's list of all chunks (/subtrees/places), or from HDF5's
- * index of each array; both are read late, as they may be long or far away, and once, under the
- * file's lock. The checksums (/chunk_sums) detect a chunk that is intact but belongs to another
- * position or another version of the file. Both lists are single chunks, however long, so they
- * have a separate encoder and decoder. Sums of stored sizes are checked against the size of the
- * file before chunks are decoded. Source: format-spec/README.md, sections 9 and 20. */
+/* Manages the chunk directory: the offset, the stored size and the checksum of every chunk of an
+ * open file. Offsets are read from the file's list of all chunks (/subtrees/places), or from HDF5's
+ * index of each array. They are read only when needed, as they may be long or remote, and once,
+ * under the file's lock. The checksums (/chunk_sums) detect an intact chunk that belongs to
+ * another position or another version of the file. Each list is a single chunk, however long, so
+ * both have a separate encoder and decoder. The sum of stored sizes is checked against the size of
+ * the file before chunks are decoded. Source: format-spec/README.md, sections 9 and 20. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -19,8 +19,8 @@ enum { LEVEL_NUMBERS = 64, MESH_NUMBERS = 4096, TABLE_NUMBERS = 4112, ATTRIBUTE_
 _Static_assert(EBPO_A_TYPES == 0 && EBPO_A_PLANES == 2 && EBPO_A_LEAF_REFS == 9 &&
                    EBPO_A_LEAF_INDEX == 12 && EBPO_A_LEAF_PLANES == 14 &&
                    EBPO_A_GRAY_COLOURS == 15 && EBPO_A_FACE_SOURCE - EBPO_A_VERTICES == 4 &&
-                   EBPO_A_SUBTREE_OUTER - EBPO_A_SUBTREE_INDEX == 2,
-               "arrays in files have these numbers: a new row of array_table.inc goes behind them");
+                   EBPO_A_SUBTREE_SHARED - EBPO_A_SUBTREE_INDEX == 2,
+               "the format fixes these array numbers: append new rows of array_table.inc");
 
 uint32_t ebpo_place_number(ebpo_array_id id, int level)
 {
@@ -50,11 +50,11 @@ static ebpo_array_id place_array(uint32_t number, int *level)
     return EBPO_ARRAYS;
 }
 
-/* Its bytes are three times in memory, coded and plain. */
+/* The list is in memory three times, encoded and decoded. */
 static const uint64_t LONGEST = PTRDIFF_MAX / 8 / 3;
 
-/* The elements' size as the pipeline sees it: the coder's scratch is too small for shuffling a long
- * list, which is done here. */
+/* Returns true if the pipeline shuffles the elements. The shuffle is done here, as the coder's
+ * scratch memory is too small for a long list. */
 static bool is_shuffled(ebpo_pipeline pipeline)
 {
     return ebpo_pipeline_facts_of(pipeline)->compresses;
@@ -121,7 +121,7 @@ ebpo_status ebpo_long_chunk_decode(const uint8_t *stored, size_t stored_bytes,
     return status == EBPO_E_MEMORY ? ebpo_fail_memory(error, size * 3) : status;
 }
 
-/* EBPO_E_FORMAT: what such a list says of `path` is wrong. */
+/* Returns EBPO_E_FORMAT: the list's data about `path` are wrong. */
 static ebpo_status long_chunk_fail(const ebpo_file *file, ebpo_array_id list, const char *what,
                                    const char *path, ebpo_error *error)
 {
@@ -132,7 +132,7 @@ static ebpo_status long_chunk_fail(const ebpo_file *file, ebpo_array_id list, co
 ebpo_status ebpo_long_chunk_read(const ebpo_file *file, const ebpo_array_in *a, uint64_t **values,
                                  ebpo_error *error)
 {
-    ebpo_chunk_place chunk = a->chunks[0];
+    ebpo_chunk_location chunk = a->chunks[0];
     const char *why = "";
     *values = NULL;
     if (a->shape.rows > file->info.file_bytes)
@@ -165,13 +165,14 @@ static uint64_t level_bytes(const ebpo_file *file, int level, bool located)
     return bytes;
 }
 
-/* Another thread may be locating the chunks: until then only those count that opening tells. */
+/* Returns the bytes of a level. While another thread may be locating the chunks, only sizes known
+ * from opening count. */
 uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level)
 {
     return level_bytes(file, level, atomic_load(&file->located));
 }
 
-/* Of the arrays whose chunks are known. */
+/* Returns the sizes of the arrays whose chunks are known. */
 static ebpo_stored_sizes reader_sizes(const ebpo_file *file)
 {
     ebpo_stored_sizes sizes = { .map_bytes = 0 };
@@ -195,7 +196,7 @@ ebpo_status ebpo_stored_check(const ebpo_file *file, ebpo_error *error)
     if (stored > file->info.file_bytes)
         return ebpo_fail_file(
             error, EBPO_E_FORMAT, file->in.shown,
-            "the arrays' chunks take more room than the file has; get a fresh copy of the file");
+            "the arrays' chunks take more space than the file has; get a fresh copy of the file");
     return EBPO_OK;
 }
 
@@ -206,7 +207,7 @@ static double decoded_bytes(const ebpo_array_in *a)
 
 ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uint64_t most, ebpo_error *error)
 {
-    double bytes = 0, room = (double)file->info.file_bytes;
+    double bytes = 0, space = (double)file->info.file_bytes;
     for (int level = 0; level < file->info.level_count; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             bytes += decoded_bytes(&file->level_array[level][id]);
@@ -214,19 +215,19 @@ ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uint64_t most, eb
         bytes += decoded_bytes(&file->root_array[id]);
     for (int i = 0; i < file->attributes.arrays; i++)
         bytes += decoded_bytes(&file->attributes.array[i]);
-    most = most ? most : EBPO_EXPANSION_MOST;
-    if (most == UINT64_MAX || bytes <= (double)EBPO_EXPANSION_FREE || bytes <= (double)most * room)
+    most = most ? most : EBPO_EXPANSION_MAX;
+    if (most == UINT64_MAX || bytes <= (double)EBPO_EXPANSION_FREE || bytes <= (double)most * space)
         return EBPO_OK;
     return ebpo_fail_file(
         error, EBPO_E_LIMIT, file->in.shown,
-        "decoded, its arrays take %.0f MB, %.0f times the file and more than %llu "
-        "times: it may be made to exhaust memory; if you trust it, read it with "
-        "--most-expansion %.0f",
-        bytes / 1e6, bytes / room, (unsigned long long)most, bytes / room + 1);
+        "decoded, its arrays take %.0f MB, %.0f times the file and more than %llu times: the "
+        "file may be designed to exhaust memory; if you trust it, read it with --max-expansion "
+        "%.0f",
+        bytes / 1e6, bytes / space, (unsigned long long)most, bytes / space + 1);
 }
 
-/* Finds the rows of one array from *row on, and goes on behind them. Rows of arrays that nobody
- * here knows lie in between. */
+/* Finds the rows of one array from *row on, and moves *row past them. Rows of unknown arrays may
+ * precede them. */
 static ebpo_status find_rows(const ebpo_file *file, ebpo_array_in *a, const uint64_t *list,
                              uint64_t rows, uint64_t *row, ebpo_error *error)
 {
@@ -239,8 +240,8 @@ static ebpo_status find_rows(const ebpo_file *file, ebpo_array_in *a, const uint
         ++*row;
     return *row - a->first_sum == chunks
                ? EBPO_OK
-               : long_chunk_fail(file, EBPO_A_CHUNK_SUMS, "the list has more or fewer chunks than",
-                                 a->path, error);
+               : long_chunk_fail(file, EBPO_A_CHUNK_CHECKSUMS,
+                                 "the list has more or fewer chunks than", a->path, error);
 }
 
 static ebpo_status find_all(ebpo_file *file, const uint64_t *list, uint64_t rows, ebpo_error *error)
@@ -249,7 +250,7 @@ static ebpo_status find_all(ebpo_file *file, const uint64_t *list, uint64_t rows
     uint64_t row = 0;
     for (uint64_t i = 1; i < rows; i++)
         if (ebpo_place_number_of(list[i]) < ebpo_place_number_of(list[i - 1]))
-            return long_chunk_fail(file, EBPO_A_CHUNK_SUMS, "the list is not in the order of",
+            return long_chunk_fail(file, EBPO_A_CHUNK_CHECKSUMS, "the list is not in the order of",
                                    "arrays' numbers", error);
     for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
         if (ebpo_array_number(file, i)->present &&
@@ -258,33 +259,33 @@ static ebpo_status find_all(ebpo_file *file, const uint64_t *list, uint64_t rows
     return status;
 }
 
-static ebpo_status read_sums(ebpo_file *file, ebpo_error *error)
+static ebpo_status read_checksums(ebpo_file *file, ebpo_error *error)
 {
-    const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_SUMS];
+    const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
     uint64_t *list;
     ebpo_status status = ebpo_long_chunk_read(file, a, &list, error);
     if (status == EBPO_OK)
         status = find_all(file, list, a->shape.rows, error);
-    uint32_t *sums = status == EBPO_OK ? ebpo_alloc(a->shape.rows, sizeof *sums) : NULL;
-    if (status == EBPO_OK && !sums)
-        status = ebpo_fail_memory(error, a->shape.rows * sizeof *sums);
+    uint32_t *checksums = status == EBPO_OK ? ebpo_alloc(a->shape.rows, sizeof *checksums) : NULL;
+    if (status == EBPO_OK && !checksums)
+        status = ebpo_fail_memory(error, a->shape.rows * sizeof *checksums);
     for (uint64_t i = 0; i < a->shape.rows && status == EBPO_OK; i++)
-        sums[i] = (uint32_t)list[i];
+        checksums[i] = (uint32_t)list[i];
     free(list);
     if (status == EBPO_OK)
-        file->sums = sums;
+        file->checksums = checksums;
     return status;
 }
 
-ebpo_status ebpo_chunk_sums_read(const ebpo_file *file, ebpo_error *error)
+ebpo_status ebpo_chunk_checksums_read(const ebpo_file *file, ebpo_error *error)
 {
     ebpo_file *own = ebpo_reader_own(file);
     ebpo_status status = EBPO_OK;
-    if (!file->has_sums || atomic_load(&file->summed))
+    if (!file->has_checksums || atomic_load(&file->summed))
         return EBPO_OK;
     pthread_mutex_lock(&own->lock);
     if (!atomic_load(&own->summed)) {
-        status = read_sums(own, error);
+        status = read_checksums(own, error);
         if (status == EBPO_OK)
             atomic_store(&own->summed, true);
     }
@@ -300,7 +301,7 @@ static ebpo_status locate_array(ebpo_file *file, ebpo_head *head, ebpo_array_in 
                                 ebpo_error *error)
 {
     ebpo_shape shape;
-    ebpo_chunk_place *chunks;
+    ebpo_chunk_location *chunks;
     uint64_t stored;
     if (!a->present || a->chunks)
         return EBPO_OK;
@@ -328,7 +329,7 @@ static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
         ebpo_input_expect(&file->in, &index, 1);
     ebpo_status status = ebpo_head_open(&head, &file->in, error);
     if (status == EBPO_OK)
-        ebpo_head_expect_index(&head, index);
+        ebpo_head_hint_index(&head, index);
     for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
         status = locate_array(file, &head, ebpo_array_number(file, i), error);
     status = ebpo_head_close(&head, status, error);
@@ -337,7 +338,7 @@ static ebpo_status locate_by_index(ebpo_file *file, ebpo_error *error)
 
 /* --- by the list of all chunks (format-spec/README.md, section 9) --- */
 
-/* Chunks seen so far of each array. */
+/* Chunks of each array read so far. */
 typedef struct listing {
     ebpo_file *file;
     uint64_t seen[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS], seen_root[EBPO_ARRAYS];
@@ -357,13 +358,13 @@ static ebpo_status list_fails(const ebpo_file *file, const char *what, const cha
     return long_chunk_fail(file, EBPO_A_PLACES, what, path, error);
 }
 
-static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_place chunk,
+static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_location chunk,
                               ebpo_error *error)
 {
     int level;
     ebpo_array_id id = place_array(number, &level);
     if (id == EBPO_ARRAYS || (id == EBPO_A_ATTRIBUTE && level >= l->file->attributes.arrays))
-        return EBPO_OK; /* a gap, or of a part that is not known, or not listed */
+        return EBPO_OK; /* a gap, an unknown part, or an unlisted array */
     ebpo_array_in *a = id < EBPO_LEVEL_ARRAYS   ? &l->file->level_array[level][id]
                        : id == EBPO_A_ATTRIBUTE ? &l->file->attributes.array[level]
                                                 : &l->file->root_array[id];
@@ -371,8 +372,7 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_place chun
     if (!a->present || *seen == ebpo_shape_chunks(&a->shape))
         return list_fails(l->file, "the list has more chunks than", a->path, error);
     if (chunk.bytes == 0 || chunk.bytes > ebpo_reader_chunk_bound(a))
-        return list_fails(l->file, "the list has a chunk of a size that it cannot have of", a->path,
-                          error);
+        return list_fails(l->file, "the list has an impossible chunk size for", a->path, error);
     if (ebpo_shape_chunks(&a->shape) == 1 &&
         (a->chunks[0].address != chunk.address || a->chunks[0].bytes != chunk.bytes))
         return list_fails(l->file, "the list contradicts the header of", a->path, error);
@@ -384,7 +384,7 @@ static ebpo_status list_chunk(listing *l, uint32_t number, ebpo_chunk_place chun
     return EBPO_OK;
 }
 
-/* Tables for chunks; before that, whether the file can hold them. */
+/* Allocates the tables of chunks, after checking that the file can hold them. */
 static ebpo_status begin_array(ebpo_file *file, ebpo_array_in *a, uint64_t *chunks,
                                ebpo_error *error)
 {
@@ -419,10 +419,10 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         if (ebpo_place_bytes_of(places[i]) > file->info.file_bytes - at)
             status =
-                list_fails(file, "a chunk lies beyond the end of the file in", "the list", error);
+                list_fails(file, "a chunk is beyond the end of the file in", "the list", error);
         else
             status = list_chunk(l, ebpo_place_number_of(places[i]),
-                                (ebpo_chunk_place){ at, ebpo_place_bytes_of(places[i]) }, error);
+                                (ebpo_chunk_location){ at, ebpo_place_bytes_of(places[i]) }, error);
         at += ebpo_place_bytes_of(places[i]);
     }
     for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
@@ -431,7 +431,7 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *places, uint64_t
     return status;
 }
 
-/* A list half read is none. */
+/* Discards a list that was read in part. */
 static void forget_places(ebpo_file *file)
 {
     for (int i = 0; i < ebpo_all_arrays(file); i++) {
@@ -486,11 +486,11 @@ ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_stored_sizes *out, ebpo
 
 ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array, ebpo_error *error)
 {
-    /* A single chunk's place stands in the array's header: known since the opening. */
+    /* The header of the array has the offset of a single chunk, known since opening. */
     return ebpo_shape_chunks(&array->shape) == 1 ? EBPO_OK : ebpo_file_locate(file, NULL, error);
 }
 
-/* --- what the head states of each array --- */
+/* --- data of each array in the head --- */
 
 static const ebpo_array_in *find_present_array(const ebpo_file *file, unsigned n)
 {
@@ -507,7 +507,8 @@ static const ebpo_array_in *find_present_array(const ebpo_file *file, unsigned n
     return NULL;
 }
 
-/* Where the chunks of an array of several lie may be found by another thread just now. */
+/* Returns an array's stored size. Another thread may be locating the chunks of arrays with several
+ * chunks. */
 uint64_t ebpo_reader_stored_bytes(const ebpo_file *file, const ebpo_array_in *array)
 {
     bool known =

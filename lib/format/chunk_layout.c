@@ -1,9 +1,9 @@
-/* The layout of a file's chunks, for the writer: how many rows the chunks of each array have, in
- * which order chunks are stored, and which chunks each subtree needs. Levels near the root are
- * stored whole; deep levels are stored subtree by subtree, so that one subtree is one range of
- * bytes, except for the chunks of faces and vertices that it shares with subtrees before it.
- * These shared chunks are listed in /subtrees/outer, and the sums before each subtree in
- * /subtrees/counts. All of it is computed in integers, because the bytes of a file depend on it.
+/* Computes the layout of a file's chunks, for the writer: the number of rows in the chunks of each
+ * array, the order of chunks, and the chunks that each subtree needs. Levels near the root are
+ * stored whole. Deep levels are stored subtree by subtree, so that one subtree is one range of
+ * bytes, except for the chunks of faces and vertices that it shares with subtrees before it. These
+ * shared chunks are listed in /subtrees/outer, and the sums before each subtree in
+ * /subtrees/counts. All computations use integers, because the bytes of a file depend on them.
  * Source: format-spec/README.md, section 9. */
 #include <stdlib.h>
 #include <string.h>
@@ -19,35 +19,35 @@
 #include "geometry/level_nodes.h"
 #include "hdf5_read/chunk.h"
 
-/* --- the chunks that a subtree shares with those before it, one subtree after the other --- */
+/* --- shared chunks: those that a subtree shares with earlier subtrees, computed in order --- */
 
-/* A subtree's own: faces [face, face_end), vertices from `vertex` on. */
+/* A subtree's owned items: faces [face, face_end), vertices from `vertex` on. */
 typedef struct outer_range {
     uint64_t face, face_end, vertex;
 } outer_range;
 
-typedef struct outer_blocks {
-    /* [blocks of the mesh] the round in which a block was last listed */
+typedef struct shared_blocks {
+    /* [blocks of the mesh] last round in which a block was listed */
     uint32_t *face_round, *vertex_round;
     uint32_t round;
-    uint32_t *face_block, *vertex_block; /* [blocks of the mesh] those listed */
+    uint32_t *face_block, *vertex_block; /* [blocks of the mesh] listed blocks */
     uint64_t face_blocks, vertex_blocks;
-} outer_blocks;
+} shared_blocks;
 
 enum {
-    FIRST_LEVELS = 5,    /* these lie together, whatever the subtrees */
-    LEAVES_OF_DEEP = 64, /* a deep level has a leaf for each so many faces */
-    CHUNK_FACES = 16384, /* that a chunk of a lower level goes with */
-    CHUNK_LEAST = 256,   /* bytes */
-    CHUNK_MOST = 32768,
+    FIRST_LEVELS = 5,    /* stored together, independent of subtrees */
+    LEAVES_OF_DEEP = 64, /* a deep level has a leaf for this many faces */
+    CHUNK_FACES = 16384, /* number of faces that corresponds to a chunk of a lower level */
+    CHUNK_LEAST = 256,   /* in bytes */
+    CHUNK_MAX = 32768,
     MAP_ROWS = 2048,
     FACES_INDEX_ROWS = 512,
-    OUTER_ROWS = 4096,
+    SHARED_ROWS = 4096,
     ATTRIBUTE_ROWS = 2048
 };
 
-/* With subtrees: levels up to the first one lie as they are, from the second one on they are deep.
- */
+/* Return level limits for files with subtrees: levels up to the first are stored whole, levels from
+ * the second on are deep. */
 static int last_whole_level(const ebpo_info *info)
 {
     return info->subtree_level > FIRST_LEVELS ? info->subtree_level : FIRST_LEVELS;
@@ -62,10 +62,10 @@ static int first_deep_level(const ebpo_info *info)
     return level;
 }
 
-/* The power of two that is nearest, by its ratio, to the rows that go with CHUNK_FACES faces: the
- * first one that is not less than these over the root of 2. In integers, as bytes depend on it: of
- * rows there are at most 2^40, and both sides of the comparison below 2^64 before they are squared.
- */
+/* Returns the power of two nearest, by ratio, to the number of rows for CHUNK_FACES faces: the
+ * first that is not less than that number divided by the root of 2. Uses integers, as bytes depend
+ * on it: there are at most 2^40 rows, and both sides of the comparison are below 2^64 before
+ * squaring. */
 static uint64_t rows_for_faces(const ebpo_info *info, uint64_t rows)
 {
     uint64_t wanted = rows * CHUNK_FACES, found = 1;
@@ -87,7 +87,7 @@ static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, 
     case EBPO_A_VERTEX_SOURCE: return MAP_ROWS;
     case EBPO_A_FACES_INDEX: return FACES_INDEX_ROWS;
     case EBPO_A_SUBTREE_COUNTS: return ebpo_subtree_rows(info);
-    case EBPO_A_SUBTREE_OUTER: return OUTER_ROWS;
+    case EBPO_A_SUBTREE_SHARED: return SHARED_ROWS;
     case EBPO_A_ATTRIBUTE: return ATTRIBUTE_ROWS;
     default: break;
     }
@@ -96,7 +96,7 @@ static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, 
     uint64_t found = rows_for_faces(info, rows);
     while (found * row_bytes < CHUNK_LEAST)
         found *= 2;
-    while (found * row_bytes > CHUNK_MOST)
+    while (found * row_bytes > CHUNK_MAX)
         found /= 2;
     return found;
 }
@@ -139,11 +139,11 @@ uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, 
     return rows;
 }
 
-static ebpo_status outer_blocks_make(outer_blocks *out, const ebpo_info *info, ebpo_error *error)
+static ebpo_status shared_blocks_make(shared_blocks *out, const ebpo_info *info, ebpo_error *error)
 {
     uint64_t faces = info->face_count / EBPO_FACE_BLOCK + 1,
              vertices = info->vertex_count / EBPO_VERTEX_BLOCK + 1;
-    *out = (outer_blocks){ .round = 1 };
+    *out = (shared_blocks){ .round = 1 };
     out->face_round = ebpo_alloc_zero(faces, sizeof *out->face_round);
     out->vertex_round = ebpo_alloc_zero(vertices, sizeof *out->vertex_round);
     out->face_block = ebpo_alloc(faces, sizeof *out->face_block);
@@ -153,7 +153,7 @@ static ebpo_status outer_blocks_make(outer_blocks *out, const ebpo_info *info, e
     return EBPO_OK;
 }
 
-static void outer_blocks_free(outer_blocks *blocks)
+static void shared_blocks_free(shared_blocks *blocks)
 {
     free(blocks->face_round);
     free(blocks->vertex_round);
@@ -170,7 +170,7 @@ static void list_block(uint32_t *rounds, uint32_t round, uint64_t block, uint32_
     blocks[(*count)++] = (uint32_t)block;
 }
 
-static void use_face(outer_blocks *b, const ebpo_mesh *mesh, const outer_range *own, uint64_t face)
+static void use_face(shared_blocks *b, const ebpo_mesh *mesh, const outer_range *own, uint64_t face)
 {
     for (int k = 0; k < 3; k++) {
         uint32_t vertex = mesh->faces[3 * face + (uint64_t)k];
@@ -180,9 +180,10 @@ static void use_face(outer_blocks *b, const ebpo_mesh *mesh, const outer_range *
     }
 }
 
-/* Faces that its leaves refer to, own ones among them; and all its own faces. */
-static void outer_blocks_refer(outer_blocks *b, const ebpo_mesh *mesh, const outer_range *own,
-                               const uint32_t *refs, uint64_t count)
+/* Adds the faces that the subtree's leaves refer to, including owned ones, and all its owned faces.
+ */
+static void shared_blocks_refer(shared_blocks *b, const ebpo_mesh *mesh, const outer_range *own,
+                                const uint32_t *refs, uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++)
         if (refs[i] < own->face) {
@@ -192,7 +193,7 @@ static void outer_blocks_refer(outer_blocks *b, const ebpo_mesh *mesh, const out
         }
 }
 
-static void outer_blocks_use(outer_blocks *b, const ebpo_mesh *mesh, const outer_range *own)
+static void shared_blocks_use(shared_blocks *b, const ebpo_mesh *mesh, const outer_range *own)
 {
     for (uint64_t face = own->face; face < own->face_end; face++)
         use_face(b, mesh, own, face);
@@ -215,30 +216,30 @@ static uint64_t take_blocks(uint32_t *blocks, uint64_t count, uint64_t from, uin
     return taken;
 }
 
-/* Distances into `out`, faces first; adds how many there are to the sums before the subtree. Then
- * the lists are empty. */
-static void outer_blocks_take(outer_blocks *b, const outer_range *own, uint32_t *out,
-                              const uint64_t *before, uint64_t *after)
+/* Writes distances to `out`, faces first, and adds their counts to the sums before the subtree.
+ * Clears the lists. */
+static void shared_blocks_take(shared_blocks *b, const outer_range *own, uint32_t *out,
+                               const uint64_t *before, uint64_t *after)
 {
     uint64_t faces = take_blocks(b->face_block, b->face_blocks, own->face / EBPO_FACE_BLOCK, out);
     uint64_t vertices = take_blocks(b->vertex_block, b->vertex_blocks,
                                     own->vertex / EBPO_VERTEX_BLOCK, out + faces);
-    after[EBPO_S_OUTER_FACES] = before[EBPO_S_OUTER_FACES] + faces;
-    after[EBPO_S_OUTER_VERTICES] = before[EBPO_S_OUTER_VERTICES] + vertices;
+    after[EBPO_S_SHARED_FACES] = before[EBPO_S_SHARED_FACES] + faces;
+    after[EBPO_S_SHARED_VERTICES] = before[EBPO_S_SHARED_VERTICES] + vertices;
     b->face_blocks = b->vertex_blocks = 0;
     b->round++;
 }
 
-enum { USUAL_FACES = 1024, LEAST_FACES = 131072 };
-/* A subtree's rows in all arrays are some tens of kilobytes. */
+enum { DEFAULT_FACES = 1024, LEAST_FACES = 131072 };
+/* A subtree's rows in all arrays take tens of kilobytes. */
 enum { SUBTREES_A_TIME = 128 };
 
 int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces)
 {
-    uint64_t faces = subtree_faces ? subtree_faces : USUAL_FACES;
+    uint64_t faces = subtree_faces ? subtree_faces : DEFAULT_FACES;
     if (subtree_faces == EBPO_NO_SUBTREES || (!subtree_faces && info->face_count < LEAST_FACES))
         return 0;
-    /* at least these, where it was asked for */
+    /* at least these if requested */
     int found = subtree_faces && info->level_count > 2;
     for (int level = 1; level <= info->level_count - 2; level++) {
         uint64_t grays = info->level[level].gray_count;
@@ -248,24 +249,24 @@ int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces)
     return found;
 }
 
-void ebpo_subtree_sums_free(ebpo_subtree_sums *sums)
+void ebpo_subtree_checksums_free(ebpo_subtree_checksums *checksums)
 {
-    free(sums->before);
-    free(sums->counts);
-    free(sums->index);
-    free(sums->outer);
-    memset(sums, 0, sizeof *sums);
+    free(checksums->before);
+    free(checksums->counts);
+    free(checksums->index);
+    free(checksums->outer);
+    memset(checksums, 0, sizeof *checksums);
 }
 
 typedef struct counting {
-    ebpo_subtree_sums *sums;
+    ebpo_subtree_checksums *checksums;
     const ebpo_tree *tree;
     const ebpo_info *info;
 } counting;
 
 static uint64_t *row_of(const counting *c, uint64_t subtree)
 {
-    return c->sums->before + subtree * c->sums->cols;
+    return c->checksums->before + subtree * c->checksums->cols;
 }
 
 static uint64_t level_sum(const counting *c, uint64_t subtree, int level, unsigned what)
@@ -279,7 +280,7 @@ static uint64_t first_group(const counting *c, uint64_t subtree, int level)
                                                : level_sum(c, subtree, level - 1, EBPO_S_GRAY);
 }
 
-/* What the subtree's leaves of one level have, from rank `leaf` to `end`. */
+/* Counts the items of the subtree's leaves of one level, from rank `leaf` to `end`. */
 static void count_leaves(const counting *c, const ebpo_level *level, uint64_t leaf, uint64_t end,
                          uint64_t *sum)
 {
@@ -293,12 +294,12 @@ static void count_leaves(const counting *c, const ebpo_level *level, uint64_t le
     sum[EBPO_S_ENDS] = level->leaf_first[end - 1] + level->leaf_new[end - 1];
 }
 
-/* The columns of one level, from those of the level before. */
+/* Computes the columns of one level from those of the level before. */
 static void count_level(const counting *c, int number)
 {
     const ebpo_level *level = &c->tree->level[number];
     unsigned column = ebpo_subtree_column(c->info, number, 0);
-    EBPO_FOR_ITEMS_EVERY(level->workspace, SUBTREES_A_TIME, i, 0, c->sums->subtrees) {
+    EBPO_FOR_ITEMS_EVERY(level->workspace, SUBTREES_A_TIME, i, 0, c->checksums->subtrees) {
         const uint64_t *from = row_of(c, i) + column;
         uint64_t *sum = row_of(c, i + 1) + column, group = first_group(c, i, number), types[4];
         memcpy(sum, from, EBPO_SUBTREE_LEVEL_COLS * sizeof *sum);
@@ -313,8 +314,8 @@ static void count_level(const counting *c, int number)
     }
 }
 
-/* New faces of the subtree, in [*first, *end): the leaves' are without gaps. */
-static void own_faces(const counting *c, uint64_t subtree, uint64_t *first, uint64_t *end)
+/* Finds the subtree's new faces, [*first, *end): those of its leaves have no gaps. */
+static void owned_faces(const counting *c, uint64_t subtree, uint64_t *first, uint64_t *end)
 {
     *first = UINT64_MAX;
     *end = 0;
@@ -333,10 +334,10 @@ static void own_faces(const counting *c, uint64_t subtree, uint64_t *first, uint
 static void count_faces(const counting *c)
 {
     uint64_t at = 0, first, end;
-    for (uint64_t i = 0; i < c->sums->subtrees; i++) {
+    for (uint64_t i = 0; i < c->checksums->subtrees; i++) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
-        own_faces(c, i, &first, &end);
-        first = end < at || first == UINT64_MAX ? at : first; /* without leaves */
+        owned_faces(c, i, &first, &end);
+        first = end < at || first == UINT64_MAX ? at : first; /* no leaves */
         end = end < first ? first : end;
         to[EBPO_S_FACES_BEFORE] = from[EBPO_S_FACES_BEFORE] + first - at;
         to[EBPO_S_FACES] = from[EBPO_S_FACES] + end - first;
@@ -344,7 +345,8 @@ static void count_faces(const counting *c)
     }
 }
 
-/* First uses of vertices by faces [*face, end): *seen have been used before. */
+/* Counts first uses of vertices by faces [*face, end); *seen is the number of vertices used before.
+ */
 static void see_vertices(const ebpo_mesh *mesh, uint64_t *face, uint64_t end, uint64_t *seen)
 {
     EBPO_FOR_ITEMS(mesh->workspace, i, *face * 3, end * 3)
@@ -355,7 +357,7 @@ static void see_vertices(const ebpo_mesh *mesh, uint64_t *face, uint64_t end, ui
 static void count_vertices(const counting *c)
 {
     uint64_t face = 0, seen = 0;
-    for (uint64_t i = 0; i < c->sums->subtrees; i++) {
+    for (uint64_t i = 0; i < c->checksums->subtrees; i++) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1), begin = seen;
         see_vertices(&c->tree->mesh, &face, to[EBPO_S_FACES_BEFORE] + from[EBPO_S_FACES], &seen);
         to[EBPO_S_VERTICES_BEFORE] = from[EBPO_S_VERTICES_BEFORE] + seen - begin;
@@ -365,11 +367,11 @@ static void count_vertices(const counting *c)
     }
 }
 
-static ebpo_status list_outer(const counting *c, ebpo_error *error)
+static ebpo_status list_shared(const counting *c, ebpo_error *error)
 {
-    outer_blocks blocks;
-    ebpo_status status = outer_blocks_make(&blocks, c->info, error);
-    EBPO_FOR_ITEMS_EVERY(c->tree->mesh.workspace, SUBTREES_A_TIME, i, 0, c->sums->subtrees) {
+    shared_blocks blocks;
+    ebpo_status status = shared_blocks_make(&blocks, c->info, error);
+    EBPO_FOR_ITEMS_EVERY(c->tree->mesh.workspace, SUBTREES_A_TIME, i, 0, c->checksums->subtrees) {
         uint64_t *from = row_of(c, i), *to = row_of(c, i + 1);
         outer_range own = {
             .face = to[EBPO_S_FACES_BEFORE] + from[EBPO_S_FACES],
@@ -381,28 +383,31 @@ static ebpo_status list_outer(const counting *c, ebpo_error *error)
         for (int l = c->info->subtree_level + 1; l < c->info->level_count; l++) {
             uint64_t first = level_sum(c, i, l, EBPO_S_REFS),
                      end = level_sum(c, i + 1, l, EBPO_S_REFS);
-            if (end > first) /* a level without any has no array */
-                outer_blocks_refer(&blocks, &c->tree->mesh, &own,
-                                   c->tree->level[l].leaf_refs + first, end - first);
+            if (end > first) /* an empty level has no array */
+                shared_blocks_refer(&blocks, &c->tree->mesh, &own,
+                                    c->tree->level[l].leaf_refs + first, end - first);
         }
-        outer_blocks_use(&blocks, &c->tree->mesh, &own);
-        if (!ebpo_grow(&c->sums->outer, &c->sums->outer_capacity,
-                       c->sums->outer_count + blocks.face_blocks + blocks.vertex_blocks +
+        shared_blocks_use(&blocks, &c->tree->mesh, &own);
+        if (!ebpo_grow(&c->checksums->outer, &c->checksums->shared_capacity,
+                       c->checksums->shared_count + blocks.face_blocks + blocks.vertex_blocks +
                            1, /* never NULL */
-                       sizeof *c->sums->outer))
-            status = ebpo_fail_memory(error, c->sums->outer_count * sizeof *c->sums->outer);
+                       sizeof *c->checksums->outer))
+            status =
+                ebpo_fail_memory(error, c->checksums->shared_count * sizeof *c->checksums->outer);
         else
-            outer_blocks_take(&blocks, &own, c->sums->outer + c->sums->outer_count, from, to);
-        c->sums->outer_count = to[EBPO_S_OUTER_FACES] + to[EBPO_S_OUTER_VERTICES];
+            shared_blocks_take(&blocks, &own, c->checksums->outer + c->checksums->shared_count,
+                               from, to);
+        c->checksums->shared_count = to[EBPO_S_SHARED_FACES] + to[EBPO_S_SHARED_VERTICES];
     }
-    outer_blocks_free(&blocks);
+    shared_blocks_free(&blocks);
     return status;
 }
 
-/* Differences, and every so many-th sum. False: a subtree has more than a count holds. */
+/* Splits sums into differences and a sum for each chunk. Returns false if a count exceeds its type.
+ */
 static bool split_sums(const counting *c)
 {
-    ebpo_subtree_sums *s = c->sums;
+    ebpo_subtree_checksums *s = c->checksums;
     uint32_t rows = ebpo_subtree_rows(c->info);
     bool fits = true;
     for (uint64_t i = 0; i < s->subtrees; i++) {
@@ -417,13 +422,13 @@ static bool split_sums(const counting *c)
     return fits;
 }
 
-ebpo_status ebpo_subtree_sums_make(ebpo_subtree_sums *out, const ebpo_tree *tree,
-                                   const ebpo_info *info, ebpo_error *error)
+ebpo_status ebpo_subtree_checksums_make(ebpo_subtree_checksums *out, const ebpo_tree *tree,
+                                        const ebpo_info *info, ebpo_error *error)
 {
     counting c = { out, tree, info };
     ebpo_status status = EBPO_OK;
-    *out = (ebpo_subtree_sums){ .subtrees = info->level[info->subtree_level].gray_count,
-                                .cols = ebpo_schema_cols(info, EBPO_A_SUBTREE_COUNTS) };
+    *out = (ebpo_subtree_checksums){ .subtrees = info->level[info->subtree_level].gray_count,
+                                     .cols = ebpo_schema_cols(info, EBPO_A_SUBTREE_COUNTS) };
     out->before = ebpo_alloc_zero((out->subtrees + 1) * out->cols, sizeof *out->before);
     out->counts = ebpo_alloc(out->subtrees * out->cols, sizeof *out->counts);
     out->index =
@@ -435,7 +440,7 @@ ebpo_status ebpo_subtree_sums_make(ebpo_subtree_sums *out, const ebpo_tree *tree
     if (info->parts & EBPO_PART_MESH) {
         count_faces(&c);
         count_vertices(&c);
-        status = list_outer(&c, error);
+        status = list_shared(&c, error);
     }
     if (status == EBPO_OK && !split_sums(&c))
         status = ebpo_fail(error, EBPO_E_LIMIT,
@@ -444,12 +449,12 @@ ebpo_status ebpo_subtree_sums_make(ebpo_subtree_sums *out, const ebpo_tree *tree
     return status;
 }
 
-/* --- which subtree --- */
+/* --- subtree of a row --- */
 
-/* Rows of the array before subtree i. */
+/* Returns the rows of the array before subtree i. */
 static uint64_t rows_before(const counting *c, ebpo_array_id id, int level, uint64_t i)
 {
-    const uint64_t *row = row_of(c, i), *next = i < c->sums->subtrees ? row_of(c, i + 1) : row;
+    const uint64_t *row = row_of(c, i), *next = i < c->checksums->subtrees ? row_of(c, i + 1) : row;
     switch (ebpo_schema[id].per) {
     case EBPO_PER_GROUP: return first_group(c, i, level);
     case EBPO_PER_GRAY: return level_sum(c, i, level, EBPO_S_GRAY);
@@ -466,13 +471,13 @@ static uint64_t rows_before(const counting *c, ebpo_array_id id, int level, uint
     }
 }
 
-/* The subtree that a row of an array belongs to: arrays of levels below the roots, the mesh, the
- * maps. Rows before the first subtree belong to it. */
-static uint64_t subtree_of_row(const ebpo_subtree_sums *sums, const ebpo_info *info,
+/* Returns the subtree of a row: in arrays of levels below the roots, the mesh, the maps. Rows
+ * before the first subtree belong to it. */
+static uint64_t subtree_of_row(const ebpo_subtree_checksums *checksums, const ebpo_info *info,
                                ebpo_array_id id, int level, uint64_t row)
 {
-    counting c = { (ebpo_subtree_sums *)sums, NULL, info };
-    uint64_t low = 0, high = sums->subtrees - 1;
+    counting c = { (ebpo_subtree_checksums *)checksums, NULL, info };
+    uint64_t low = 0, high = checksums->subtrees - 1;
     while (low < high) {
         uint64_t middle = low + (high - low + 1) / 2;
         if (rows_before(&c, id, level, middle) <= row)
@@ -505,13 +510,13 @@ static int by_subtree(const void *a, const void *b)
                                 : (x->chunk > y->chunk) - (x->chunk < y->chunk);
 }
 
-/* Which arrays come next. */
+/* Selection of the next arrays. */
 typedef struct choice {
-    int first_level, last_level; /* of the arrays of levels */
+    int first_level, last_level; /* for the arrays of levels */
     enum { WHOLE, TOP_INDEXES, NODES, LISTS, MESH, MAPS, TABLE, OF_MESH, REST } kind;
 } choice;
 
-/* Else what nodes are. */
+/* Returns true for arrays that describe faces; others describe nodes. */
 static bool is_of_faces(ebpo_array_id id)
 {
     return id == EBPO_A_LEAF_SKIP || id == EBPO_A_LEAF_NEW || id == EBPO_A_LEAF_REF_COUNT ||
@@ -529,13 +534,13 @@ static bool is_chosen(const choice *c, const ebpo_array_out *a)
         return (here && index) || a->id == EBPO_A_SUBTREE_INDEX || a->id == EBPO_A_FACES_INDEX;
     case NODES: return here && !index && !is_of_faces(a->id);
     case LISTS: return here && is_of_faces(a->id);
-    /* questions tell the source's faces, and read these numbers with the faces */
+    /* query results contain source face indices, which are read together with the faces */
     case MESH:
         return a->id == EBPO_A_VERTICES || a->id == EBPO_A_FACES || a->id == EBPO_A_FACE_SOURCE;
     case MAPS: return a->id == EBPO_A_VERTEX_SOURCE;
     case OF_MESH: return a->id == EBPO_A_ATTRIBUTE && a->rows_of != EBPO_A_ATTRIBUTE;
     case REST: return a->id == EBPO_A_ATTRIBUTE && a->rows_of == EBPO_A_ATTRIBUTE;
-    case TABLE: return a->id == EBPO_A_SUBTREE_COUNTS || a->id == EBPO_A_SUBTREE_OUTER;
+    case TABLE: return a->id == EBPO_A_SUBTREE_COUNTS || a->id == EBPO_A_SUBTREE_SHARED;
     }
     return false;
 }

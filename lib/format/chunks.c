@@ -1,8 +1,8 @@
-/* Ranges of rows of a file's arrays, through a cache of decoded chunks under a budget. Each
- * chunk is decoded and checked once, when it is loaded, so that using it again costs no more
- * than finding it. Any number of threads share the cache. A counted cache belongs to one thread,
- * reads and announces only what its user requests, and refuses loads beyond a limit of bytes
- * read (EBPO_E_LIMIT). */
+/* Reads ranges of rows of a file's arrays through a cache of decoded chunks under a budget. Each
+ * chunk is decoded and checked once, when it is loaded, so using it again only requires finding it.
+ * Any number of threads share the cache. A counted cache belongs to one thread, reads and
+ * prefetches only what its user requests, and refuses loads beyond a limit of bytes read
+ * (EBPO_E_LIMIT). */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -17,8 +17,8 @@
 #include "hdf5_read/coding.h"
 
 enum { CHUNK_BITS = 48, AROUND = 4 };
-/* Announced for later: at most so much, and a share of what a limit leaves. */
-enum { AHEAD_MOST = 4 << 20, AHEAD_SHARE = 4, BATCH_SHARE = 16 };
+/* Limits for prefetch hints: a maximum, and a share of the remaining limit. */
+enum { AHEAD_MAX = 4 << 20, AHEAD_SHARE = 4, BATCH_SHARE = 16 };
 
 static uint64_t key_of(const ebpo_array_in *array, uint64_t chunk)
 {
@@ -42,7 +42,7 @@ static const ebpo_array_in *array_of(const ebpo_chunks *c, uint64_t key)
 
 static uint64_t chunk_of(uint64_t key) { return key & ((UINT64_C(1) << CHUNK_BITS) - 1); }
 
-/* Without the filling of the last chunk. */
+/* Returns the rows of a chunk without the padding of the last chunk. */
 static uint64_t chunk_rows(const ebpo_array_in *array, uint64_t chunk)
 {
     uint64_t left = array->shape.rows - chunk * array->shape.chunk_rows;
@@ -65,7 +65,7 @@ static ebpo_status decode_faces(const ebpo_chunks *c, uint64_t chunk, uint64_t r
     uint64_t vertices = c->file->info.vertex_count, seen = c->seen ? c->seen[chunk] : 0;
     if (seen > vertices || (chunk == 0 && seen))
         return ebpo_chunks_fail(c, -1, EBPO_A_FACES_INDEX,
-                                "the index names more vertices than there are", error);
+                                "the index has more vertices than the mesh", error);
     if (!ebpo_corners_decode(raw, rows, &seen, corners) || seen > vertices)
         return ebpo_chunks_fail(c, -1, EBPO_A_FACES, "a face names a vertex that does not exist",
                                 error);
@@ -99,19 +99,20 @@ static ebpo_status decode_map(const ebpo_chunks *c, ebpo_array_id id, uint64_t r
                               const uint8_t *raw, uint32_t *numbers, ebpo_error *error)
 {
     const ebpo_info *info = &c->file->info;
-    uint64_t limit = id == EBPO_A_FACE_SOURCE ? info->source_face_count + info->mend.added_faces
-                                              : info->source_vertex_count;
+    uint64_t limit = id == EBPO_A_FACE_SOURCE
+                         ? info->source_face_count + info->repair_record.added_faces
+                         : info->source_vertex_count;
     uint32_t largest = 0;
     ebpo_numbers_decode(raw, rows, numbers);
     for (uint64_t i = 0; i < rows; i++)
         largest = numbers[i] > largest ? numbers[i] : largest;
     return largest < limit
                ? EBPO_OK
-               : ebpo_chunks_fail(c, -1, id, "a source number is out of range or used twice",
-                                  error);
+               : ebpo_chunks_fail(c, -1, id, "a source index is out of range or used twice", error);
 }
 
-/* Once for each load, so that using a chunk again costs nothing but finding it. */
+/* Decodes and checks a chunk, once for each load, so that using it again only requires finding it.
+ */
 static ebpo_status decode_item(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk,
                                const uint8_t *raw, void *item, ebpo_error *error)
 {
@@ -126,19 +127,19 @@ static ebpo_status decode_item(const ebpo_chunks *c, const ebpo_array_in *array,
     }
 }
 
-static void expect_missing(ebpo_chunks *c, ebpo_expected *e, const ebpo_array_in *array,
+static void expect_missing(ebpo_chunks *c, ebpo_hints *e, const ebpo_array_in *array,
                            uint64_t begin, uint64_t end)
 {
     for (uint64_t i = begin; i < end; i++)
         if (!ebpo_cache_has(c->cache, key_of(array, i)))
-            ebpo_expect_chunks(e, array, i, i + 1);
+            ebpo_hint_chunks(e, array, i, i + 1);
 }
 
-void ebpo_chunks_expect(ebpo_chunks *c, ebpo_expected *e, ebpo_array_id id, int level, uint64_t row,
-                        uint64_t rows)
+void ebpo_chunks_hint(ebpo_chunks *c, ebpo_hints *e, ebpo_array_id id, int level, uint64_t row,
+                      uint64_t rows)
 {
     const ebpo_array_in *array = ebpo_reader_array(c->file, id, level);
-    if (!ebpo_expected_wanted(e) || !array->present || rows == 0 || row >= array->shape.rows)
+    if (!ebpo_hints_wanted(e) || !array->present || rows == 0 || row >= array->shape.rows)
         return;
     if (c->collecting)
         (void)ebpo_chunks_missing(c, id, level, row, rows, c->collecting);
@@ -148,23 +149,23 @@ void ebpo_chunks_expect(ebpo_chunks *c, ebpo_expected *e, ebpo_array_id id, int 
     expect_missing(c, e, array, row / array->shape.chunk_rows, last / array->shape.chunk_rows + 1);
 }
 
-/* A request takes about as long for a few chunks as for one, and its neighbours are likely to be
- * the next. */
+/* Prefetches adjacent chunks: a request for a few chunks takes about as long as for one, and they
+ * are likely to be next. */
 static void expect_around(ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
 {
     uint64_t begin = chunk / AROUND * AROUND, count = ebpo_shape_chunks(&array->shape);
-    ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
-    /* with subtrees its neighbours in the file are other arrays' */
+    ebpo_hints e = EBPO_HINTS_INIT(c->file);
+    /* in files with subtrees, adjacent chunks belong to other arrays */
     if (!ebpo_input_expects(&c->file->in) || c->file->info.subtree_level)
         return;
     expect_missing(c, &e, array, begin, count - begin < AROUND ? count : begin + AROUND);
-    ebpo_expect_all(&e);
+    ebpo_hint_all(&e);
 }
 
 /* --- counting --- */
 
-/* What reading a chunk takes of the file; where the places of chunks have not been read yet, these
- * as well. */
+/* Returns the bytes that must be read for a chunk, including the chunk offsets if they have not
+ * been read. */
 static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64_t chunk)
 {
     if (ebpo_shape_chunks(&array->shape) == 1 || atomic_load(&c->file->located))
@@ -172,7 +173,7 @@ static uint64_t cost_of(const ebpo_chunks *c, const ebpo_array_in *array, uint64
     const ebpo_info *info = &c->file->info;
     uint64_t prefetched = c->file->in.source.prefetched,
              index_end = info->chunk_index_offset + info->chunk_index_bytes;
-    /* libhdf5 goes through the headers once more */
+    /* libhdf5 reads the headers again */
     uint64_t again = prefetched < info->head_bytes ? info->chunk_index_offset : 0;
     uint64_t index = index_end <= prefetched                 ? 0
                      : info->chunk_index_offset < prefetched ? index_end - prefetched
@@ -190,10 +191,11 @@ static ebpo_status refuse_load(ebpo_chunks *c, const ebpo_array_in *array, ebpo_
 {
     c->refused = true;
     return ebpo_fail_at(error, EBPO_E_LIMIT, c->file->in.shown, array->path, -1,
-                        "reading on would take more than the %" PRIu64 " bytes allowed", c->limit);
+                        "further reading would take more than the %" PRIu64 " bytes allowed",
+                        c->limit);
 }
 
-/* Called before a chunk is read: what was announced has been counted then. */
+/* Checks the limit before a chunk is read; prefetched chunks were already counted. */
 static ebpo_status admit_load(ebpo_chunks *c, const ebpo_array_in *array, uint64_t key,
                               ebpo_error *error)
 {
@@ -217,43 +219,42 @@ static bool is_ahead(const ebpo_chunks *c, uint64_t key)
 
 static uint64_t smaller_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
-/* A share of what the limit leaves, less what waits to be read. What waits may wait for long, as a
- * view turns to others first: a smaller share is left for each batch, or each would be one chunk.
- */
-uint64_t ebpo_chunks_room(const ebpo_chunks *c)
+/* Returns a share of the remaining limit, minus prefetched bytes not yet read. These may wait long,
+ * as a view may turn elsewhere first; the share then shrinks with each batch, so that batches do
+ * not degenerate to single chunks. */
+uint64_t ebpo_chunks_capacity(const ebpo_chunks *c)
 {
     uint64_t taken = atomic_load(&c->file->in.bytes),
              left = c->limit > taken ? c->limit - taken : 0,
-             share = smaller_of(left / AHEAD_SHARE, AHEAD_MOST);
-    uint64_t batch = smaller_of(left / BATCH_SHARE, AHEAD_MOST / BATCH_SHARE);
+             share = smaller_of(left / AHEAD_SHARE, AHEAD_MAX);
+    uint64_t batch = smaller_of(left / BATCH_SHARE, AHEAD_MAX / BATCH_SHARE);
     return share > c->ahead_bytes + batch ? share - c->ahead_bytes : batch;
 }
 
-/* Announces chunks of counted arrays to the source, as far as the limit allows: from then on they
- * count as read. The first `now` are needed at once; the others only as far as what has been
- * announced and not been read stays small, also beside what the limit leaves, and a little more
- * each time (ebpo_chunks_room). */
-static void chunks_announce(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
+/* Sends prefetch hints for chunks of counted arrays, within the limit; they count as read from then
+ * on. The first `now` are needed at once. The others are prefetched only while the prefetched and
+ * unread bytes stay small, also relative to the remaining limit (ebpo_chunks_capacity). */
+static void chunks_hint(ebpo_chunks *c, const uint64_t *keys, unsigned now, unsigned count)
 {
-    ebpo_expected e = EBPO_EXPECTED_INIT(c->file);
-    uint64_t room = ebpo_chunks_room(c);
+    ebpo_hints e = EBPO_HINTS_INIT(c->file);
+    uint64_t space = ebpo_chunks_capacity(c);
     for (unsigned i = 0; i < count; i++) {
         const ebpo_array_in *array = array_of(c, keys[i]);
         if (ebpo_shape_chunks(&array->shape) > 1 && !atomic_load(&c->file->located))
-            continue; /* where it lies is not known yet */
+            continue; /* its offset is not known yet */
         uint64_t cost = cost_of(c, array, chunk_of(keys[i]));
-        if (is_ahead(c, keys[i]) || !fits_budget(c, cost) || (i >= now && cost > room) ||
+        if (is_ahead(c, keys[i]) || !fits_budget(c, cost) || (i >= now && cost > space) ||
             !ebpo_grow(&c->ahead, &c->ahead_capacity, c->ahead_count + 1, sizeof *c->ahead))
             continue;
-        room -= i >= now ? cost : 0;
+        space -= i >= now ? cost : 0;
         c->ahead[c->ahead_count++] = keys[i];
         c->ahead_bytes += cost;
-        ebpo_expect_chunks(&e, array, chunk_of(keys[i]), chunk_of(keys[i]) + 1);
+        ebpo_hint_chunks(&e, array, chunk_of(keys[i]), chunk_of(keys[i]) + 1);
     }
-    ebpo_expect_all(&e);
+    ebpo_hint_all(&e);
 }
 
-bool ebpo_chunks_announced(const ebpo_chunks *c, const ebpo_chunk_keys *keys)
+bool ebpo_chunks_hinted(const ebpo_chunks *c, const ebpo_chunk_keys *keys)
 {
     for (unsigned i = 0; i < keys->count; i++)
         if (!is_ahead(c, keys->key[i]))
@@ -318,8 +319,9 @@ bool ebpo_chunks_missing(ebpo_chunks *c, ebpo_array_id id, int level, uint64_t r
 
 void ebpo_chunks_collect(ebpo_chunks *c, ebpo_chunk_keys *keys) { c->collecting = keys; }
 
-/* Rows of the table, and what leads to the subtrees: only they tell what comes after them. */
-static bool tells_more(const ebpo_chunks *c, uint64_t key)
+/* Returns true for rows of the table and chunks that lead to the subtrees: further chunks depend on
+ * their content. */
+static bool reports_more(const ebpo_chunks *c, uint64_t key)
 {
     const ebpo_array_in *a = array_of(c, key);
     return a->id >= EBPO_A_SUBTREE_INDEX ||
@@ -331,10 +333,10 @@ ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsig
                               ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    chunks_announce(c, keys->key, now, keys->count);
+    chunks_hint(c, keys->key, now, keys->count);
     for (unsigned i = 0; i < keys->count && status == EBPO_OK; i++) {
         void *item;
-        if (i >= now && !(tells_more(c, keys->key[i]) && is_ahead(c, keys->key[i])))
+        if (i >= now && !(reports_more(c, keys->key[i]) && is_ahead(c, keys->key[i])))
             continue;
         status = ebpo_cache_get(c->cache, keys->key[i], &item, NULL, error);
         if (status == EBPO_OK)
@@ -343,7 +345,8 @@ ebpo_status ebpo_chunks_fetch(ebpo_chunks *c, const ebpo_chunk_keys *keys, unsig
     return status;
 }
 
-/* Vertices seen before each chunk of faces: of counted chunks only when the first is read. */
+/* Reads the counts of vertices seen before each chunk of faces; for counted chunks, only when the
+ * first one is read. */
 static ebpo_status read_seen(ebpo_chunks *c, ebpo_error *error)
 {
     const ebpo_array_in *index = ebpo_reader_array(c->file, EBPO_A_FACES_INDEX, 0);
@@ -407,7 +410,7 @@ static void release_chunk(void *user, void *item)
     free(item);
 }
 
-/* pool: NULL, or what the budget is of. */
+/* Creates a cache. pool: NULL, or the shared budget. */
 static ebpo_status make_chunks(ebpo_chunks **out, const ebpo_file *file, uint64_t budget,
                                ebpo_cache_pool *pool, bool counted, ebpo_error *error)
 {
@@ -478,7 +481,7 @@ ebpo_status ebpo_held_chunk_load(ebpo_chunks *chunks, ebpo_held_chunk *view, uin
 {
     uint64_t chunk = row / view->array->shape.chunk_rows;
     void *item;
-    ebpo_held_chunk_release(chunks, view); /* first: a tight budget may need the room */
+    ebpo_held_chunk_release(chunks, view); /* first, as a tight budget may need the space */
     uint64_t key = key_of(view->array, chunk);
     if (chunks->collecting && !ebpo_cache_has(chunks->cache, key)) {
         add_key(chunks->collecting, key, cost_of(chunks, view->array, chunk));
@@ -509,16 +512,16 @@ static ebpo_status check_rows(const ebpo_chunks *chunks, ebpo_array_id id, int l
                               uint64_t rows, size_t size, ebpo_error *error)
 {
     const char *shown = chunks->file->in.shown;
-    if ((id >= EBPO_LEVEL_ARRAYS && id != EBPO_A_SUBTREE_OUTER) || level < 0 ||
+    if ((id >= EBPO_LEVEL_ARRAYS && id != EBPO_A_SUBTREE_SHARED) || level < 0 ||
         level >= chunks->file->info.level_count)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
-                              "level %d has no array number %d of integers", level, (int)id);
+                              "level %d has no integer array number %d", level, (int)id);
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
     if (!array->present || row > array->shape.rows || rows > array->shape.rows - row ||
         size < array->shape.element_size)
         return ebpo_fail_at(error, EBPO_E_ARGUMENT, shown, array->path, -1,
                             "rows %" PRIu64 " to %" PRIu64
-                            " of %zu bytes are asked for, and the array has %" PRIu64 " of %d",
+                            " of %zu bytes were requested, but the array has %" PRIu64 " of %d",
                             row, row + rows, size, array->shape.rows, array->shape.element_size);
     return EBPO_OK;
 }
@@ -530,10 +533,10 @@ ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int leve
     if (status != EBPO_OK)
         return status;
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);
-    ebpo_expected expected = EBPO_EXPECTED_INIT(chunks->file);
+    ebpo_hints expected = EBPO_HINTS_INIT(chunks->file);
     if (!chunks->counted)
-        ebpo_chunks_expect(chunks, &expected, id, level, row, rows);
-    ebpo_expect_all(&expected);
+        ebpo_chunks_hint(chunks, &expected, id, level, row, rows);
+    ebpo_hint_all(&expected);
     ebpo_held_chunk view = { .array = array };
     uint64_t cols = array->shape.cols ? array->shape.cols : 1;
     uint8_t *out = values;
@@ -557,7 +560,7 @@ ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id, int level, u
                              uint64_t rows, size_t size, void *values_out, ebpo_error *error)
 {
     void *values = NULL;
-    /* before room is made */
+    /* before making space */
     ebpo_status status = rows ? check_rows(chunks, id, level, row, rows, size, error) : EBPO_OK;
     if (status == EBPO_OK && rows) {
         const ebpo_array_in *array = ebpo_reader_array(chunks->file, id, level);

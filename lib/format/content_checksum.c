@@ -1,9 +1,8 @@
-/* The content checksum: over all arrays of a file, sorted by path, the SHA-256 of the array as
- * stored before shuffle and compression. It does not depend on the codec, on chunks or on HDF5.
- * Where a coding depends on the chunks (vertex numbers in faces), the rows are recoded as those
- * of a file without subtrees. The part `attributes` has a separate checksum of its values, so
- * that the content checksum is the same with and without it. Source: format-spec/README.md,
- * section 8. */
+/* Computes the content checksum: over all arrays of a file, sorted by path, the SHA-256 of the
+ * array as stored before shuffle and compression. It does not depend on the codec, chunks or HDF5.
+ * Where a coding depends on the chunks (vertex indices in faces), rows are recoded as in a file
+ * without subtrees. The part `attributes` has a separate checksum of its values, so the content
+ * checksum is the same with and without it. Source: format-spec/README.md, section 8. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +15,7 @@
 #include "format/schema.h"
 #include "hdf5_read/coding.h"
 
-/* Of chunks of faces as they are without subtrees. */
+/* Chunks of faces in a file without subtrees. */
 enum { PLAIN_FACE_ROWS = 4096, SKIPPED = PLAIN_FACE_ROWS / EBPO_FACE_BLOCK };
 
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id)
@@ -39,7 +38,7 @@ static uint64_t load_integer(const uint8_t *at, unsigned size)
     return size == 4 ? ebpo_load32(at) : ebpo_load64(at);
 }
 
-/* The value of a difference, and the other way round; modulo 2 to the bits of `size`. */
+/* Converts a zigzag code to a difference and back, modulo 2 to the number of bits of `size`. */
 static uint64_t decode_zigzag(uint64_t code) { return (code >> 1) ^ (0 - (code & 1)); }
 
 static uint64_t encode_zigzag(uint64_t value, unsigned size)
@@ -48,7 +47,8 @@ static uint64_t encode_zigzag(uint64_t value, unsigned size)
                      : value << 1 ^ (0 - (value >> 63));
 }
 
-/* The first row as it is where it goes on from the chunk before; keeps the last one's values. */
+/* Recodes rows so that the first one continues from the chunk before; keeps the last row's values.
+ */
 static void join_deltas(ebpo_array_digest *digest, const ebpo_shape *shape, bool goes_on,
                         uint64_t rows, const uint8_t *bytes, uint8_t *joined)
 {
@@ -133,7 +133,7 @@ void ebpo_content_free(ebpo_content *content)
     memset(content, 0, sizeof *content);
 }
 
-/* --- the part `attributes`: its values, however they are stored --- */
+/* --- the part `attributes`: its values, independent of their storage --- */
 
 enum { PIECE = 1 << 16 };
 

@@ -1,6 +1,6 @@
-/* The content checksum: over all arrays of a file, sorted by path: path, a zero byte, SHA-256 of
- * the array as stored before shuffle and compression. It does not depend on codec, chunks or HDF5,
- * and a few lines of Python compute it. */
+/* Computes the content checksum: over all arrays of a file, sorted by path: path, a zero byte,
+ * SHA-256 of the array as stored before shuffle and compression. It does not depend on codec,
+ * chunks or HDF5, and a few lines of Python compute it. */
 #ifndef EBPO_FORMAT_CONTENT_CHECKSUM_H
 #define EBPO_FORMAT_CONTENT_CHECKSUM_H
 
@@ -16,32 +16,33 @@ typedef struct ebpo_content_entry {
     uint8_t digest[32];
 } ebpo_content_entry;
 
-/* Whether an array counts, in one of the checksums. How a file is laid out does not: tables of
- * subtrees are left out. */
+/* Returns true if a checksum includes the array. Tables of subtrees are excluded, as the layout
+ * does not count. */
 bool ebpo_content_has(const ebpo_info *info, ebpo_array_id id);
 
-/* Which checksum counts an array: a file has the same content with and without colours. */
+/* The checksum that includes an array: the content checksum is the same with and without colours.
+ */
 enum { EBPO_DIGEST_CONTENT, EBPO_DIGEST_COLOURS, EBPO_DIGESTS };
 static inline int ebpo_content_of(ebpo_array_id id)
 {
     return id == EBPO_A_GRAY_COLOURS ? EBPO_DIGEST_COLOURS : EBPO_DIGEST_CONTENT;
 }
 
-/* One array, chunk after chunk. Chunks of fewer rows than without subtrees count as if they were
- * parts of larger ones: codes that start anew with them are made to go on. */
+/* Digest of one array, chunk by chunk. Chunks with fewer rows than without subtrees are joined to
+ * larger ones: codes that restart with them are recoded. */
 typedef struct ebpo_array_digest {
     ebpo_sha256 state;
-    uint64_t last[3]; /* of the chunk before: the components' running sums */
+    uint64_t last[3]; /* running sums of the components at the end of the chunk before */
 } ebpo_array_digest;
 
 void ebpo_array_digest_begin(ebpo_array_digest *digest);
-/* The chunk that begins with `row` of an array of this shape, without its filling. */
+/* Adds the chunk that begins with `row` of an array of this shape, without padding. */
 void ebpo_array_digest_add(ebpo_array_digest *digest, const ebpo_info *info, ebpo_array_id id,
                            const ebpo_shape *shape, uint64_t row, uint64_t rows,
                            const uint8_t *bytes);
 void ebpo_array_digest_end(ebpo_array_digest *digest, uint8_t out[32]);
 
-/* Zero-initialise. Arrays come in any order. */
+/* Initialise with zeros. Arrays may come in any order. */
 typedef struct ebpo_content {
     bool short_of_memory;
     ebpo_content_entry *entries;

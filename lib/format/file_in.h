@@ -1,4 +1,4 @@
-/* An open file, and where its arrays are. */
+/* An open file and the locations of its arrays. */
 #ifndef EBPO_FORMAT_FILE_IN_H
 #define EBPO_FORMAT_FILE_IN_H
 
@@ -13,14 +13,14 @@
 #include "io/byte_source.h"
 #include "mesh/attributes.h"
 
-/* Decoding state and room for one stored chunk, of one thread. */
+/* Decoding state and buffer for one stored chunk, for one thread. */
 typedef struct ebpo_chunk_reader {
     ebpo_chunk_coder coder;
     uint8_t *stored;
     size_t capacity;
 } ebpo_chunk_reader;
 
-/* What one thread needs. */
+/* State of one thread. */
 typedef struct ebpo_idle_reader ebpo_idle_reader;
 struct ebpo_idle_reader {
     ebpo_idle_reader *next;
@@ -28,10 +28,10 @@ struct ebpo_idle_reader {
     uint8_t raw[EBPO_CHUNK_BYTES_MAX];
 };
 
-/* Readers of chunks that wait for the next thread: setting up a decoder takes longer than decoding
- * a chunk. They stay with the file, a few of them, and count to no budget. */
+/* Idle chunk readers for reuse, as creating a decoder takes longer than decoding a chunk. A few
+ * stay with the file and count toward no budget. */
 typedef struct ebpo_idle_readers {
-    pthread_mutex_t lock; /* of what follows */
+    pthread_mutex_t lock; /* protects the following fields */
     ebpo_idle_reader *first;
     unsigned count;
 } ebpo_idle_readers;
@@ -41,27 +41,27 @@ typedef struct ebpo_array_in {
     ebpo_array_id id;
     int level;
     char path[EBPO_PATH_BYTES];
-    ebpo_shape shape; /* of what ebpo_reader_chunk gives */
-    bool gates;       /* it makes that of another coding: ebpo_stored_shape */
+    ebpo_shape shape; /* of the result of ebpo_reader_chunk */
+    bool gates;       /* derives the stored shape: ebpo_stored_shape */
     uint64_t stored_bytes;
-    /* [ebpo_shape_chunks(&shape)] where each is; NULL when the array is absent. After
-     * ebpo_reader_locate, unless it has one chunk only */
-    ebpo_chunk_place *chunks;
-    uint64_t first_sum; /* of its chunks, in the file's sums */
-    const char *coding; /* of attributes; the others' stand in ebpo_schema */
+    /* [ebpo_shape_chunks(&shape)] location of each chunk; NULL when the array is absent. Valid
+     * after ebpo_reader_locate, or always for a single chunk */
+    ebpo_chunk_location *chunks;
+    uint64_t first_sum; /* index of its first chunk in the list of chunk checksums */
+    const char *coding; /* for attributes; other arrays have theirs in ebpo_schema */
 } ebpo_array_in;
 
-/* Bytes that a stored chunk of it can have at most. */
+/* Returns the maximum size of a stored chunk. */
 static inline size_t ebpo_reader_chunk_bound(const ebpo_array_in *array)
 {
     ebpo_shape stored = ebpo_stored_shape(&array->shape, array->gates);
     return ebpo_chunk_bound(stored.chunk_rows * ebpo_shape_row_bytes(&stored));
 }
 
-/* What the head says of an array of attributes. */
+/* Head of an attribute array. */
 typedef struct ebpo_attribute_in {
-    ebpo_attribute head; /* without values */
-    bool different;      /* lists of different lengths */
+    ebpo_attribute head; /* no values */
+    bool different;      /* lists have different lengths */
     bool has_range;
     double range[2];
 } ebpo_attribute_in;
@@ -78,22 +78,21 @@ struct ebpo_file {
     ebpo_input in;
     ebpo_info info;
     ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
-    ebpo_array_in root_array[EBPO_ARRAYS]; /* those from EBPO_A_VERTICES on */
+    ebpo_array_in root_array[EBPO_ARRAYS]; /* from EBPO_A_VERTICES on */
     ebpo_attributes_in attributes;
     pthread_mutex_t lock;
-    atomic_bool located; /* the chunks of all arrays are known */
-    bool has_places;     /* a list says where they are */
-    bool has_sums;       /* a list says how each chunk ends: chunk_directory.h */
-    atomic_bool summed;  /* it has been read */
-    uint32_t *sums;
+    atomic_bool located; /* the chunks of all arrays are located */
+    bool has_places;     /* the file has a list of chunk offsets */
+    bool has_checksums;  /* the file has a list of chunk checksums: chunk_directory.h */
+    atomic_bool summed;  /* the list has been read */
+    uint32_t *checksums;
     ebpo_idle_readers idle;
 };
 
-/* ebpo_open of what this process has written: however much it has decoded. */
+/* Opens a file that this process has written, without a limit on its decoded size. */
 EBPO_MUST_USE ebpo_status ebpo_open_own(const char *path, ebpo_file **out, ebpo_error *error);
 
-/* After this the chunks of an array that is present are known. Reads from a file that is far away,
- * once. Any thread. */
+/* Locates the chunks of an array that is present. Reads remote files once. Any thread. */
 EBPO_MUST_USE ebpo_status ebpo_reader_locate(const ebpo_file *file, const ebpo_array_in *array,
                                              ebpo_error *error);
 
@@ -105,20 +104,20 @@ static inline const ebpo_array_in *ebpo_reader_array(const ebpo_file *file, ebpo
                                     : &file->root_array[id];
 }
 
-/* `workspace`: what the arrays are in, or NULL. */
+/* Returns the context for checks. `workspace`: contains the arrays, or NULL. */
 static inline ebpo_check ebpo_reader_check(const ebpo_file *file, ebpo_workspace *workspace)
 {
     return (ebpo_check){ file->in.shown, EBPO_E_FORMAT, workspace };
 }
 
-/* What the file keeps for itself while it is read: counters, where chunks lie, idle readers.
- * Atomic, or under its locks. */
+/* Returns the mutable state of a file that is being read: counters, chunk offsets, idle readers.
+ * Atomic, or protected by its locks. */
 static inline ebpo_file *ebpo_reader_own(const ebpo_file *file)
 {
     return (ebpo_file *)(uintptr_t)file;
 }
 
-/* How many rows the file's chunks may have. */
+/* Returns the allowed rows of the file's chunks. */
 static inline ebpo_head_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, ebpo_array_id id)
 {
     return ebpo_schema_is_list(id)    ? EBPO_HEAD_ROWS_ALL
@@ -126,10 +125,10 @@ static inline ebpo_head_rows ebpo_reader_rows_of_chunk(const ebpo_file *file, eb
                                       : EBPO_HEAD_ROWS_FULL;
 }
 
-/* Of an array: 0 while another thread may be finding out where its chunks are. */
+/* Returns the stored size of an array; 0 while another thread may be locating its chunks. */
 uint64_t ebpo_reader_stored_bytes(const ebpo_file *file, const ebpo_array_in *array);
 
-/* Bytes of a level in the file, once it has been read. */
+/* Returns the bytes of a level in the file, once it has been read. */
 uint64_t ebpo_reader_level_bytes(const ebpo_file *file, int level);
 
 #endif

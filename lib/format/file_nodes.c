@@ -1,8 +1,8 @@
-/* Single nodes of a file, read through a cache of chunks: the children of a gray node, the
- * planes and the winding number of a node; and groups of eight siblings with all of these, which
- * is what a stream reads that does not follow the file's order. Each function reads only the
- * chunks that contain the node, and checks the values against the head and the index. For remote
- * files, a missing group and those after it are fetched together. */
+/* Reads single nodes of a file through a cache of chunks: the children of a gray node, the planes
+ * and the winding number of a node; and groups of eight siblings with all of these, for streams
+ * that do not follow the file's order. Each function reads only the chunks that contain the node
+ * and checks the values against the head and the index. For remote files, a missing group and the
+ * following ones are fetched together. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,7 +29,7 @@ ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *n
     if (node->rank >= all[node->type])
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
                               "level %d has %" PRIu64 " nodes of type %d; number %" PRIu64
-                              " was asked for",
+                              " was requested",
                               node->cell.level, all[node->type], (int)node->type, node->rank);
     return EBPO_OK;
 }
@@ -39,7 +39,7 @@ static ebpo_status check_type(const ebpo_chunks *chunks, const ebpo_node *node, 
 {
     if (node->type != type)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, chunks->file->in.shown,
-                              "%s of a node of type %d are asked for; only gray nodes have them",
+                              "%s of a node of type %d were requested; only gray nodes have them",
                               what, (int)node->type);
     return ebpo_chunks_check_node(chunks, node, error);
 }
@@ -51,7 +51,7 @@ ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray, uin
     ebpo_status status = check_type(chunks, gray, EBPO_GRAY, "children", error);
     if (status == EBPO_OK &&
         gray->cell.level + 1 ==
-            chunks->file->info.level_count) { /* pruned: the head has been checked */
+            chunks->file->info.level_count) { /* pruned: checked with the head */
         *types = 0;
         memset(ranks, 0, 4 * sizeof *ranks);
         return EBPO_OK;
@@ -67,11 +67,11 @@ ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray, uin
     return ebpo_ranks_check(chunks, gray->cell.level + 1, ranks, counts, error);
 }
 
-/* Where a node's planes stand: those that a gray node adds, or that are stored for a leaf. */
+/* Location of a node's planes: those that a gray node adds, or those stored for a leaf. */
 typedef struct plane_list {
     ebpo_array_id counts, codes;
     uint32_t part;
-    uint64_t all; /* of the level */
+    uint64_t all; /* total of the level */
 } plane_list;
 
 static plane_list planes_of(const ebpo_chunks *chunks, const ebpo_node *node)
@@ -94,8 +94,7 @@ static ebpo_status read_codes(ebpo_chunks *chunks, const plane_list *list, int l
     for (unsigned i = 0; i < count && status == EBPO_OK; i++) {
         int32_t n[3], d;
         if (!ebpo_plane_code_decode(codes[i], n, &d))
-            status =
-                ebpo_chunks_fail(chunks, level, list->codes, "a code stands for no plane", error);
+            status = ebpo_chunks_fail(chunks, level, list->codes, "invalid plane code", error);
     }
     return status;
 }
@@ -139,14 +138,14 @@ ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int3
         return status;
     if (!info->solid)
         return ebpo_fail_file(error, EBPO_E_NOT_SOLID, chunks->file->in.shown,
-                              "winding numbers are asked for, and the model is a surface; mend the "
+                              "the model is a surface and has no winding numbers; repair the "
                               "mesh and build again");
     if (node->type == EBPO_GRAY)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, chunks->file->in.shown,
-                              "the winding number of a gray node is asked for; ask its children");
+                              "a gray node has no winding number; query its children");
     ebpo_array_id id = arrays[node->type];
     if (!ebpo_reader_array(chunks->file, id, node->cell.level)->present)
-        return EBPO_OK; /* the usual one; leaves always have the array */
+        return EBPO_OK; /* the default value; leaves always have the array */
     status = ebpo_chunks_integers(chunks, id, node->cell.level, node->rank, 1, winding,
                                   sizeof *winding, error);
     if (status == EBPO_OK && node->type != EBPO_LEAF &&
@@ -156,7 +155,7 @@ ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int3
     return status;
 }
 
-/* --- for cursors --- */
+/* octants 1 to 7 do not exist */
 
 ebpo_status ebpo_chunks_root(ebpo_chunks *chunks, ebpo_node *root, ebpo_error *error)
 {
@@ -239,7 +238,7 @@ static ebpo_status take_codes(ebpo_chunks *chunks, ebpo_array_id id, int level, 
     for (uint64_t i = 0; i < sum && status == EBPO_OK; i++) {
         int32_t n[3], d;
         if (!ebpo_plane_code_decode(codes[i], n, &d))
-            status = ebpo_chunks_fail(chunks, level, id, "a code stands for no plane", error);
+            status = ebpo_chunks_fail(chunks, level, id, "invalid plane code", error);
     }
     for (unsigned octant = 0, i = 0; octant < 8 && status == EBPO_OK; octant++)
         if (ebpo_group_type(out->types, octant) == type && (level || octant == 0))
@@ -286,7 +285,7 @@ static ebpo_status read_leaf_planes(ebpo_chunks *chunks, int level, uint64_t cou
                       EBPO_LEAF, error);
 }
 
-/* Gray nodes' codes were put first, then the leaves': brings them in the order of the nodes. */
+/* Sorts codes into node order; initially, codes of gray nodes precede those of leaves. */
 static void sort_codes(ebpo_group *group, unsigned gray_codes)
 {
     uint32_t sorted[EBPO_GROUP_CODES];
@@ -354,9 +353,9 @@ ebpo_status ebpo_group_read(ebpo_chunks *chunks, int level, uint64_t group, unsi
                : status;
 }
 
-/* --- what reading would take --- */
+/* --- chunks needed for reading --- */
 
-/* Where an item's number among others is counted from, and the items themselves. */
+/* Adds the chunks of an item's index row, and of the counts and the items themselves. */
 static bool missing_counted(ebpo_chunks *chunks, ebpo_array_id index, ebpo_array_id counts,
                             int level, uint64_t item, uint64_t items, ebpo_chunk_keys *keys)
 {
@@ -389,8 +388,7 @@ static uint64_t chunks_of(const ebpo_array_in *array)
     return array->present ? ebpo_shape_chunks(&array->shape) : 0;
 }
 
-/* Of a level, the arrays of a single chunk: they will be needed, whichever group is read. Returns
- * their bytes. */
+/* Adds the single-chunk arrays of a level, which every group needs. Returns their bytes. */
 static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_chunk_keys *keys)
 {
     static const struct {
@@ -417,8 +415,8 @@ static uint64_t add_small(ebpo_chunks *chunks, int level, unsigned wanted, ebpo_
     return bytes;
 }
 
-/* Adds the chunks for which reading the group would wait next; false: for none. Reads from memory
- * only, and leaves errors to the reading. */
+/* Adds the next chunks that reading the group would wait for; returns false when there are none.
+ * Reads only memory; errors are left to the actual read. */
 static bool group_is_missing(ebpo_chunks *chunks, const ebpo_group_number *number, unsigned wanted,
                              ebpo_chunk_keys *keys)
 {
@@ -466,8 +464,8 @@ ebpo_status ebpo_group_fetch(ebpo_chunks *chunks, const ebpo_group_number *group
                              unsigned wanted, ebpo_error *error)
 {
     enum {
-        STAGES = 4 /* where its subtree begins, types, counts, planes */,
-        FIRST_BYTES = 32 << 10 /* of the first levels, which everyone needs */
+        STAGES = 4 /* start of its subtree, types, counts, planes */,
+        FIRST_BYTES = 32 << 10 /* of the first levels, which are always needed */
     };
     ebpo_status status = EBPO_OK;
     for (int stage = 0; stage < STAGES && status == EBPO_OK; stage++) {

@@ -1,9 +1,9 @@
-/* The attributes of a file's root and of its levels: ebpo_info except for what the reader
- * measures. The tables in the first part have one row for each attribute; writing and reading
- * are loops over these rows, so that both agree on names and types. A reader refuses a newer
- * version and unknown required parts before it looks at anything else. Before any memory is
- * sized by the attributes, check_ functions test whether they can be true together: ranges, and
- * sums over the levels. Source: format-spec/README.md, section 3. */
+/* Writes and reads the attributes of a file's root and of its levels: ebpo_info except for values
+ * that the reader measures. The tables in the first part have one row for each attribute; writing
+ * and reading loop over these rows, so that both agree on names and types. A reader rejects a newer
+ * version and unknown required parts before it reads anything else. Before memory is sized by the
+ * attributes, check_ functions test their consistency: ranges, and sums over the levels. Source:
+ * format-spec/README.md, section 3. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -20,20 +20,20 @@
 
 #define FORMAT_NAME "EBP-Octree in HDF5"
 
-/* How a field of ebpo_info becomes an attribute. */
+/* Conversion of a field of ebpo_info to an attribute. */
 typedef enum fact_kind {
     FACT_TEXT,    /* char[size], required */
-    FACT_NOTE,    /* char[size], left out when empty */
+    FACT_NOTE,    /* char[size], omitted when empty */
     FACT_DIGEST,  /* uint8_t[32] as hexadecimal text */
     FACT_NUMBER,  /* int as i64 */
     FACT_INTEGER, /* int64_t as i64 */
     FACT_COUNT32, /* uint32_t as u64 */
     FACT_COUNT,   /* uint64_t as u64 */
-    FACT_HINT,    /* the same, may be absent */
+    FACT_HINT,    /* the same, optional */
     FACT_YES_NO,  /* bool as u64 0 or 1 */
     FACT_REAL,    /* double */
     FACT_REAL3,   /* double[3] */
-    FACT_WORD     /* enumeration in a word, see `words` */
+    FACT_WORD     /* enumeration as a word, see `words` */
 } fact_kind;
 
 typedef struct fact {
@@ -46,27 +46,25 @@ typedef struct fact {
 #define FACT_AT(field) offsetof(ebpo_info, field), sizeof(((ebpo_info *)0)->field), NULL
 
 enum { WELD_FACTS = 3 };
-/* A reader that does not know an optional part is none the wiser, but right; without a required one
- * it would be wrong. */
+/* A reader may ignore an unknown optional part; without a required part its results would be wrong.
+ */
 typedef struct part_word {
     const char *word;
-    unsigned part; /* an ebpo_part, or: */
+    unsigned part; /* an ebpo_part, or one of: */
     bool required;
 } part_word;
 
-/* info.pruned, subtree_level and gates: words in the list of parts, but nothing that one could
- * leave out.
- */
+/* info.pruned, subtree_level and gates: words in the list of parts that cannot be omitted. */
 enum { WORD_PRUNED = 1 << 30, WORD_SUBTREES = 1 << 29, WORD_GATES = 1 << 28 };
 
-static const char *const KINDS[] = { "surface", "solid", NULL }; /* by info.solid */
+static const char *const KINDS[] = { "surface", "solid", NULL }; /* indexed by info.solid */
 static const char *const COORDINATES[] = { "float32", "float64",
-                                           NULL }; /* by info.double_coordinates */
+                                           NULL }; /* indexed by info.double_coordinates */
 static const char *const RULES[] = { "nonzero", "evenodd", "positive", NULL };
 
 #define WORDS(field, words) offsetof(ebpo_info, field), sizeof(((ebpo_info *)0)->field), words
 
-/* Attributes of the root, in every file. */
+/* Attributes of the root in every file. */
 static const fact root_facts[] = {
     { "generator", FACT_TEXT, FACT_AT(generator) },
     { "source_name", FACT_NOTE, FACT_AT(source_name) },
@@ -90,15 +88,15 @@ static const fact root_facts[] = {
     { "level_count", FACT_NUMBER, FACT_AT(level_count) },
     { "leaf_faces", FACT_COUNT32, FACT_AT(leaf_faces) },
     { "epsilon", FACT_REAL, FACT_AT(epsilon) },
-    { "mend_weld", FACT_YES_NO, FACT_AT(mend.weld) },
-    { "mend_orient", FACT_YES_NO, FACT_AT(mend.orient) },
-    { "mend_fill_holes", FACT_YES_NO, FACT_AT(mend.fill_holes) },
-    { "mend_welded_vertices", FACT_COUNT, FACT_AT(mend.welded_vertices) },
-    { "mend_flipped_faces", FACT_COUNT, FACT_AT(mend.flipped_faces) },
-    { "mend_unorientable", FACT_COUNT, FACT_AT(mend.unorientable_components) },
-    { "mend_filled_holes", FACT_COUNT, FACT_AT(mend.filled_holes) },
-    { "mend_added_faces", FACT_COUNT, FACT_AT(mend.added_faces) },
-    { "mend_unfilled_holes", FACT_COUNT, FACT_AT(mend.unfilled_holes) },
+    { "mend_weld", FACT_YES_NO, FACT_AT(repair_record.weld) },
+    { "mend_orient", FACT_YES_NO, FACT_AT(repair_record.orient) },
+    { "mend_fill_holes", FACT_YES_NO, FACT_AT(repair_record.fill_holes) },
+    { "mend_welded_vertices", FACT_COUNT, FACT_AT(repair_record.welded_vertices) },
+    { "mend_flipped_faces", FACT_COUNT, FACT_AT(repair_record.flipped_faces) },
+    { "mend_unorientable", FACT_COUNT, FACT_AT(repair_record.unorientable_components) },
+    { "mend_filled_holes", FACT_COUNT, FACT_AT(repair_record.filled_holes) },
+    { "mend_added_faces", FACT_COUNT, FACT_AT(repair_record.added_faces) },
+    { "mend_unfilled_holes", FACT_COUNT, FACT_AT(repair_record.unfilled_holes) },
     { "mesh_balanced", FACT_YES_NO, FACT_AT(report.balanced) },
     { "mesh_manifold", FACT_YES_NO, FACT_AT(report.manifold) },
     { "mesh_boundary_edges", FACT_COUNT, FACT_AT(report.boundary_edges.count) },
@@ -137,7 +135,7 @@ static const fact level_facts[] = {
     { "leaf_volume", FACT_REAL, LEVEL_AT(leaf_volume) },
 };
 static const int level_fact_count = sizeof level_facts / sizeof level_facts[0];
-/* Of a level; left out when 0. */
+/* Attribute of a level; omitted when 0. */
 static const fact pruned_fact = { "pruned", FACT_COUNT, LEVEL_AT(pruned_count) };
 
 static const part_word part_words[] = {
@@ -154,7 +152,7 @@ static const part_word part_words[] = {
 };
 static const int part_word_count = sizeof part_words / sizeof part_words[0];
 
-/* How planes were selected, where that was not the default; no reader needs these. */
+/* Non-default selection of planes; readers do not need these attributes. */
 static const char *const normals_words[] = { "spherical", "angle", NULL };
 static const fact selection_facts[] = {
     { "selection_percent", FACT_REAL, FACT_AT(percent) },
@@ -163,24 +161,23 @@ static const fact selection_facts[] = {
 };
 static const int selection_fact_count = sizeof selection_facts / sizeof selection_facts[0];
 
-/* Left out when 0. */
+/* Omitted when 0. */
 static const fact dropped_faces_fact = { "mend_dropped_faces", FACT_COUNT,
-                                         FACT_AT(mend.dropped_faces) };
+                                         FACT_AT(repair_record.dropped_faces) };
 
-/* Of files whose vertices were welded within a distance. */
+/* For files whose vertices were welded within a distance. */
 static const fact weld_facts[WELD_FACTS] = {
-    { "mend_weld_distance", FACT_REAL, FACT_AT(mend.weld_distance) },
-    { "mend_weld_moved", FACT_REAL, FACT_AT(mend.weld_moved) },
-    { "mend_collapsed_faces", FACT_COUNT, FACT_AT(mend.collapsed_faces) },
+    { "mend_weld_distance", FACT_REAL, FACT_AT(repair_record.weld_distance) },
+    { "mend_weld_moved", FACT_REAL, FACT_AT(repair_record.weld_moved) },
+    { "mend_collapsed_faces", FACT_COUNT, FACT_AT(repair_record.collapsed_faces) },
 };
 
-/* Of files with subtrees, or with colours. */
+/* For files with subtrees, or with colours. */
 static const fact subtree_level_fact = { "subtree_level", FACT_NUMBER, FACT_AT(subtree_level) },
                   colours_fact = { "colours_sha256", FACT_DIGEST, FACT_AT(colours_sha256) },
                   top_bytes_fact = { "top_bytes", FACT_HINT, FACT_AT(top_bytes) };
 
-/* --- selections of planes: their names, and which settings each takes; their functions are in
- * construct/selections.c --- */
+/* --- selections of planes: names and settings; the functions are in construct/selections.c --- */
 
 static const ebpo_selection_traits selection_traits[] = {
     [EBPO_SELECT_INHERIT] = { .name = "inherit" },
@@ -199,7 +196,7 @@ const ebpo_selection_traits *ebpo_selection_describe(ebpo_selection selection)
     return (unsigned)selection < EBPO_SELECTION_COUNT ? &selection_traits[selection] : NULL;
 }
 
-/* --- can the attributes be true together? --- */
+/* --- consistency of the attributes --- */
 
 static const uint64_t MESH_MAX = UINT32_MAX - 1, NODES_MAX = UINT64_C(1) << 40;
 
@@ -209,14 +206,14 @@ static const char *check_mesh_counts(const ebpo_info *info)
         info->vertex_count > MESH_MAX)
         return "face_count or vertex_count is 0 or beyond 2^32 - 2";
     if (info->source_vertex_count > MESH_MAX || info->source_face_count > MESH_MAX ||
-        info->mend.added_faces > MESH_MAX)
+        info->repair_record.added_faces > MESH_MAX)
         return "a count of the source is beyond 2^32 - 2";
-    if (info->mend.dropped_faces > info->source_face_count)
+    if (info->repair_record.dropped_faces > info->source_face_count)
         return "more faces were dropped than the source has";
     if (info->vertex_count > info->source_vertex_count ||
-        info->face_count >
-            info->source_face_count + info->mend.added_faces - info->mend.dropped_faces)
-        return "the mesh has more vertices or faces than its source and the mending account for";
+        info->face_count > info->source_face_count + info->repair_record.added_faces -
+                               info->repair_record.dropped_faces)
+        return "the mesh has more vertices or faces than its source and the repair record explain";
     if (info->parts & EBPO_PART_MAPS && !(info->parts & EBPO_PART_MESH))
         return "there are maps but no mesh";
     if (info->parts & EBPO_PART_ATTRIBUTES && !(info->parts & EBPO_PART_MESH))
@@ -226,11 +223,11 @@ static const char *check_mesh_counts(const ebpo_info *info)
     return NULL;
 }
 
-static const char *check_weld(const ebpo_mend_record *m)
+static const char *check_weld(const ebpo_repair_record *m)
 {
     return m->weld_distance > 0 && !(m->weld && isfinite(m->weld_distance) && m->weld_moved >= 0 &&
                                      isfinite(m->weld_moved))
-               ? "the record of welding within a distance has values that cannot be"
+               ? "the record of welding within a distance has impossible values"
                : NULL;
 }
 
@@ -268,15 +265,15 @@ static const char *check_level_counts(const ebpo_info *info, int level)
         return "the gray nodes do not end at the deepest level";
     if (info->pruned ? s->pruned_count > s->gray_count || (s->pruned_count == s->gray_count) < last
                      : s->pruned_count != 0)
-        return "a level's pruned nodes are not some of its gray ones, or not all of them at the "
-               "deepest level";
+        return "a level's pruned nodes exceed its gray nodes, or differ from them at the deepest "
+               "level";
     if (!last && info->pruned &&
         (s->pruned_count == s->gray_count ||
          info->level[level + 1].white_count / 8 < s->pruned_count))
-        return "a level has nothing but the places of pruned nodes' children, or not all of these";
+        return "a level has only the empty groups of pruned nodes, or not all of them";
     if (s->plane_count > (info->parts & EBPO_PART_PLANES ? 255 * s->gray_count : 0) ||
         s->leaf_plane_count > (info->parts & EBPO_PART_LEAF_PLANES ? 255 * s->leaf_count : 0))
-        return "a level has more planes than its nodes can";
+        return "a level has more planes than its nodes can have";
     if (!(info->parts & EBPO_PART_MESH) && (s->new_count || s->ref_count))
         return "a level counts faces, and there is no mesh";
     if (s->leaf_count == 0 && (s->new_count || s->ref_count))
@@ -284,7 +281,7 @@ static const char *check_level_counts(const ebpo_info *info, int level)
     if (s->black_count && !info->solid)
         return "a surface has black nodes";
     if (s->leaf_count && s->ref_count / s->leaf_count > info->face_count)
-        return "a level refers to more faces than there are";
+        return "a level refers to more faces than the mesh has";
     return NULL;
 }
 
@@ -293,7 +290,7 @@ ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_stat
 {
     const char *wrong = check_mesh_counts(info);
     if (!wrong)
-        wrong = check_weld(&info->mend);
+        wrong = check_weld(&info->repair_record);
     if (!wrong)
         wrong = check_box(info);
     uint64_t faces = 0;
@@ -301,7 +298,7 @@ ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_stat
     while (!wrong && ++level < info->level_count) {
         wrong = check_level_counts(info, level);
         if (info->level[level].new_count > info->face_count - faces)
-            wrong = "the levels have more new faces than there are";
+            wrong = "the levels have more new faces than the mesh";
         else
             faces += info->level[level].new_count;
     }
@@ -399,7 +396,7 @@ static ebpo_status put_subtrees(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_in
     return status == EBPO_OK ? put_fact(out, root, &top_bytes_fact, info, error) : status;
 }
 
-/* Only in subsets: other files stay as they are. */
+/* Writes the attributes of subsets; other files are unchanged. */
 static ebpo_status put_subset(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
                               ebpo_error *error)
 {
@@ -433,9 +430,10 @@ ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *i
         status = put_fact(out, root, &root_facts[i], info, error);
     if (status == EBPO_OK)
         status = put_selection(out, root, info, error);
-    if (status == EBPO_OK && info->mend.dropped_faces)
+    if (status == EBPO_OK && info->repair_record.dropped_faces)
         status = put_fact(out, root, &dropped_faces_fact, info, error);
-    for (int i = 0; i < WELD_FACTS && status == EBPO_OK && info->mend.weld_distance > 0; i++)
+    for (int i = 0; i < WELD_FACTS && status == EBPO_OK && info->repair_record.weld_distance > 0;
+         i++)
         status = put_fact(out, root, &weld_facts[i], info, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_COLOURS)
         status = put_fact(out, root, &colours_fact, info, error);
@@ -584,7 +582,7 @@ static ebpo_status get_fact(ebpo_head *in, ebpo_head_object id, const char *obje
     case FACT_INTEGER: status = ebpo_head_get_int(in, id, object, f->name, field, error); break;
     case FACT_HINT:
         if (ebpo_head_get_count(in, id, object, f->name, field, NULL) != EBPO_OK)
-            *(uint64_t *)field = 0; /* absent, or of another program's type: no hint */
+            *(uint64_t *)field = 0; /* absent, or another program's type: no hint */
         return EBPO_OK;
     case FACT_COUNT: status = ebpo_head_get_count(in, id, object, f->name, field, error); break;
     case FACT_REAL: status = ebpo_head_get_real(in, id, object, f->name, field, 0, error); break;
@@ -610,11 +608,11 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
         return status;
     if (status != EBPO_OK || strcmp(format, FORMAT_NAME) != 0)
         return ebpo_fail_file(error, EBPO_E_FORMAT, in->shown,
-                              "an HDF5 file, but not an EBP-Octree (its root attribute format does "
-                              "not say \"%s\"); %s",
+                              "an HDF5 file, but not an EBP-Octree (its root attribute format is "
+                              "not \"%s\"); %s",
                               FORMAT_NAME,
                               status == EBPO_OK && strncmp(format, "EBP-Octree paint", 16) == 0
-                                  ? "it is paint: `ebpo paint` tells of which model"
+                                  ? "it is paint: `ebpo paint` prints its model"
                                   : "make one with `ebpo convert`");
     status = get_fact(in, root, "/", &major, info, error);
     if (status == EBPO_OK)
@@ -624,19 +622,19 @@ static ebpo_status get_version(ebpo_head *in, ebpo_head_object root, ebpo_info *
             error, EBPO_E_VERSION, in->shown,
             "format version %d.%d, and this library reads version %d; use a newer one",
             info->version_major, info->version_minor, EBPO_FORMAT_MAJOR);
-    char words[32] = ""; /* for people, but files of the draft have the same numbers */
+    char words[32] = ""; /* informative, but draft files have the same version numbers */
     if (status == EBPO_OK)
         status = ebpo_head_get_text(in, root, "/", "format_version", words, sizeof words, error);
     if (status == EBPO_E_ABSENT)
         return EBPO_OK;
     if (status == EBPO_OK && strcmp(words, "1.0-draft") == 0)
         status = ebpo_fail_file(error, EBPO_E_VERSION, in->shown,
-                                "was written while the format was a draft, which is not read any "
-                                "more; convert the model again");
+                                "was written by a draft of the format, which is no longer "
+                                "supported; convert the model again");
     return status;
 }
 
-/* A part may stand in either list; one that we know counts as present. */
+/* Reads a part, which may be in either list; a known part counts as present. */
 static ebpo_status take_part(ebpo_head *in, const char *word, bool required, unsigned *seen,
                              ebpo_error *error)
 {
@@ -730,8 +728,8 @@ static ebpo_status get_subset(ebpo_head *in, ebpo_head_object root, ebpo_info *i
     return status == EBPO_E_ABSENT ? EBPO_OK : status;
 }
 
-/* Place of the attribute's word in `words`; -1: another one, of a newer library. Without the
- * attribute *out stays. */
+/* Reads the index of the attribute's word in `words`, or -1 for a word of a newer library. Without
+ * the attribute *out is unchanged. */
 static ebpo_status get_known(ebpo_head *in, ebpo_head_object root, const char *name,
                              const char *(*word_of)(int value), int *out, ebpo_error *error)
 {
@@ -765,7 +763,7 @@ static ebpo_status get_selection(ebpo_head *in, ebpo_head_object root, ebpo_info
     return status;
 }
 
-/* Dropping is known to have been asked for where it did something. */
+/* Reads the count of dropped faces. Dropping was requested if any were dropped. */
 static ebpo_status get_dropped(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                ebpo_error *error)
 {
@@ -773,12 +771,12 @@ static ebpo_status get_dropped(ebpo_head *in, ebpo_head_object root, ebpo_info *
     ebpo_status status = ebpo_head_get_count(in, root, "/", dropped_faces_fact.name, &count, error);
     if (status == EBPO_E_ABSENT)
         return EBPO_OK;
-    info->mend.dropped_faces = count;
-    info->mend.drop_duplicates = count > 0;
+    info->repair_record.dropped_faces = count;
+    info->repair_record.drop_duplicates = count > 0;
     return status;
 }
 
-/* The record of welding within a distance, which most files lack: ebpo_facts_check has the rest. */
+/* Reads the record of welding within a distance, which is rare; ebpo_facts_check checks it. */
 static ebpo_status get_weld(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                             ebpo_error *error)
 {
@@ -786,7 +784,7 @@ static ebpo_status get_weld(ebpo_head *in, ebpo_head_object root, ebpo_info *inf
     ebpo_status status = ebpo_head_get_real(in, root, "/", weld_facts[0].name, &distance, 0, error);
     if (status == EBPO_E_ABSENT)
         return EBPO_OK;
-    if (status == EBPO_OK && !(distance > 0)) /* 0 would be none */
+    if (status == EBPO_OK && !(distance > 0)) /* 0 would mean no welding */
         return wrong_value(in, "/", weld_facts[0].name, error);
     for (int i = 0; i < WELD_FACTS && status == EBPO_OK; i++)
         status = get_fact(in, root, "/", &weld_facts[i], info, error);

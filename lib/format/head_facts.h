@@ -1,5 +1,5 @@
-/* The attributes of the root and of the levels' groups: ebpo_info but for what the reader measures.
- */
+/* Attributes of the root and of the level groups: ebpo_info except for values that the reader
+ * measures. */
 #ifndef EBPO_FORMAT_HEAD_FACTS_H
 #define EBPO_FORMAT_HEAD_FACTS_H
 
@@ -10,8 +10,8 @@
 #include "hdf5_read/head.h"
 #include "hdf5_write/h5.h"
 
-/* Writes the root's attributes; checksums and chunk_index_* as they stand (put them again
- * later). */
+/* Writes the root's attributes, with current checksums and chunk_index_* (write them again later).
+ */
 EBPO_MUST_USE ebpo_status ebpo_facts_put(ebpo_h5_out *out, ebpo_h5_id root, const ebpo_info *info,
                                          ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_put_digest(ebpo_h5_out *out, ebpo_h5_id root,
@@ -26,21 +26,21 @@ EBPO_MUST_USE ebpo_status ebpo_facts_put_top(ebpo_h5_out *out, ebpo_h5_id root, 
 EBPO_MUST_USE ebpo_status ebpo_facts_put_level(ebpo_h5_out *out, ebpo_h5_id group,
                                                const ebpo_level_summary *level, ebpo_error *error);
 
-/* Reads the root's attributes: version and required parts first, so that a newer file is refused by
- * name and not for its details. */
+/* Reads the root's attributes: version and required parts first, so that the error for a newer file
+ * names its version. */
 EBPO_MUST_USE ebpo_status ebpo_facts_get(ebpo_head *in, ebpo_head_object root, ebpo_info *info,
                                          ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_facts_get_level(ebpo_head *in, ebpo_head_object group,
                                                const char *path, ebpo_level_summary *level,
                                                ebpo_error *error);
 
-/* One digest, of any object. */
+/* Reads one digest of any object. */
 EBPO_MUST_USE ebpo_status ebpo_facts_get_digest(ebpo_head *in, ebpo_head_object id,
                                                 const char *object, const char *name,
                                                 uint8_t digest[32], ebpo_error *error);
 
-/* Checks that the facts agree with each other: ranges, and sums over the levels. For files
- * (EBPO_E_FORMAT) and for callers' trees (EBPO_E_ARGUMENT). */
+/* Checks the facts for consistency: ranges, and sums over the levels. For files (EBPO_E_FORMAT) and
+ * for callers' trees (EBPO_E_ARGUMENT). */
 EBPO_MUST_USE ebpo_status ebpo_facts_check(const ebpo_info *info, const char *shown, ebpo_status as,
                                            ebpo_error *error);
 

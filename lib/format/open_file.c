@@ -1,9 +1,9 @@
-/* Opening a file: read the head, and check that every array is present in the shape that the
- * counts in the head require. Nothing is sized by a count before head_facts.c has checked it,
- * and the decoded size is limited relative to the size of the file. The second part opens files
- * that other programs have rewritten with another HDF5 layout: libhdf5 copies these, in a
- * separate process with limits of memory, time and bytes written, and the copy is opened like
- * any other file. Source: format-spec/README.md, sections 2 and 3; docs/develop/threats.md. */
+/* Opens a file: reads the head, and checks that every array is present in the shape that the counts
+ * in the head require. Nothing is sized by a count before head_facts.c has checked it, and the
+ * decoded size is limited relative to the file size. The second part opens files that other
+ * programs have rewritten with another HDF5 layout: libhdf5 copies these, in a separate process
+ * with limits of memory, time and bytes written, and the copy is opened like any other file.
+ * Source: format-spec/README.md, sections 2 and 3; docs/develop/threats.md. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -27,8 +27,8 @@
 #include "io/file_source.h"
 #include "mesh/import.h"
 
-/* The word says how the numbers are to be read: with another one they would be read wrong. In files
- * of 1.0, and in the first ones of 1.1, `delta` stands at leaf_skip, too. */
+/* Returns true if the coding's word is known: numbers would be read wrong otherwise. Files of 1.0
+ * and the first files of 1.1 also have `delta` at leaf_skip. */
 static bool coding_known(const ebpo_array_spec *spec, const char *word, bool gates)
 {
     if (gates)
@@ -37,7 +37,7 @@ static bool coding_known(const ebpo_array_spec *spec, const char *word, bool gat
            (spec == &ebpo_schema[EBPO_A_LEAF_SKIP] && strcmp(word, "delta") == 0);
 }
 
-/* Also whether it is stored as it is. */
+/* Checks the type. Sets the shape of the values, and `gates`. */
 static bool type_fits(const ebpo_info *info, ebpo_array_in *a, bool gates)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
@@ -65,7 +65,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
     ebpo_schema_path(id, level, a->path);
     if (rows == 0 || (spec->if_needed && ebpo_head_look(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
-    /* places of more are in the index, or in a list */
+    /* offsets of several chunks are in the index or in a list */
     uint64_t most = ebpo_input_is_far(&file->in) || file->has_places ? 1 : UINT64_MAX;
     char coding[EBPO_HEAD_CODING_BYTES];
     ebpo_status status =
@@ -76,7 +76,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
     ebpo_check check = ebpo_reader_check(file, NULL);
     if (!coding_known(spec, coding, gates))
         return ebpo_check_fail(&check, -1, a->path,
-                               "the array's coding is none that the format has for it", error);
+                               "the array's coding is not valid for this array", error);
     if (a->shape.rows != rows && rows != EBPO_ROWS_STATED)
         return ebpo_check_fail(&check, -1, a->path,
                                "the array's length contradicts the counts in the head", error);
@@ -89,7 +89,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
          (id == EBPO_A_VERTICES && a->shape.chunk_rows != EBPO_VERTEX_BLOCK) ||
          (id == EBPO_A_SUBTREE_COUNTS && a->shape.chunk_rows != ebpo_subtree_rows(&file->info))))
         return ebpo_check_fail(&check, -1, a->path,
-                               "the array's chunks do not have the size that the format fixes",
+                               "the array's chunks do not have the size that the format requires",
                                error);
     bool wide = file->info.double_coordinates;
     if (id == EBPO_A_VERTICES && a->shape.element_size != (wide ? 8 : 4))
@@ -129,8 +129,8 @@ static ebpo_status check_pipeline(const ebpo_file *file, const ebpo_array_in *a,
     return !a->present || a->shape.pipeline == file->level_array[0][EBPO_A_TYPES].shape.pipeline
                ? EBPO_OK
                : ebpo_fail_at(error, EBPO_E_UNSUPPORTED, file->in.shown, a->path, -1,
-                              "the array's filters are other ones than the file's first array "
-                              "has, " EBPO_HEAD_FOREIGN);
+                              "the array's filters differ from those of the file's first "
+                              "array, " EBPO_HEAD_FOREIGN);
 }
 
 static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
@@ -146,7 +146,7 @@ static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
     return status;
 }
 
-/* A list about all chunks, which holds unless another program has rewritten the file. */
+/* Opens a list about all chunks. It is valid unless another program has rewritten the file. */
 static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id list, bool *holds,
                              ebpo_error *error)
 {
@@ -176,7 +176,7 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
     if (status == EBPO_OK && info->subtree_level)
         status = open_list(file, head, EBPO_A_PLACES, &file->has_places, error);
     if (status == EBPO_OK)
-        status = open_list(file, head, EBPO_A_CHUNK_SUMS, &file->has_sums, error);
+        status = open_list(file, head, EBPO_A_CHUNK_CHECKSUMS, &file->has_checksums, error);
     if (status == EBPO_OK)
         status = open_group(head, "/mesh", info->parts & EBPO_PART_MESH, error);
     if (status == EBPO_OK)
@@ -199,13 +199,14 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
     return status == EBPO_OK ? ebpo_stored_check(file, error) : status;
 }
 
-/* Files that other programs have rewritten may state what is no longer true. */
+/* Ignores an invalid location of the chunk index, as in files that other programs have rewritten.
+ */
 static void judge_index(ebpo_info *info, uint64_t size)
 {
-    enum { INDEX_BYTES_MOST = 64 << 20 };
+    enum { INDEX_BYTES_MAX = 64 << 20 };
     if (info->chunk_index_offset > size ||
         info->chunk_index_bytes > size - info->chunk_index_offset ||
-        info->chunk_index_bytes > INDEX_BYTES_MOST)
+        info->chunk_index_bytes > INDEX_BYTES_MAX)
         info->chunk_index_offset = info->chunk_index_bytes = 0;
 }
 
@@ -216,8 +217,8 @@ static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error
     if (status == EBPO_OK)
         status = ebpo_facts_get(head, root, &file->info, error);
     judge_index(&file->info, file->in.source.size);
-    ebpo_head_expect_index(head, (ebpo_range){ file->info.chunk_index_offset,
-                                               file->info.chunk_index_bytes });
+    ebpo_head_hint_index(head, (ebpo_range){ file->info.chunk_index_offset,
+                                             file->info.chunk_index_bytes });
     if (status == EBPO_OK &&
         (file->info.level_count < 1 || file->info.level_count > EBPO_LEVELS_MAX))
         status = ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, "/", -1,
@@ -230,8 +231,8 @@ static ebpo_status read_head(ebpo_file *file, ebpo_head *head, ebpo_error *error
     return status == EBPO_OK ? open_arrays(file, head, error) : status;
 }
 
-/* Chunks without checksums, as `h5repack -f NONE` leaves them: only the sum of the content tells
- * whether one was changed, so it is compared before anything is answered. */
+/* Compares the content checksum of files without chunk checksums, as `h5repack -f NONE` writes
+ * them, before any data are returned: nothing else detects a changed chunk. */
 static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
 {
     return file->level_array[0][EBPO_A_TYPES].shape.pipeline == EBPO_PIPELINE_BARE
@@ -239,27 +240,27 @@ static ebpo_status check_bare(const ebpo_file *file, ebpo_error *error)
                : EBPO_OK;
 }
 
-/* Returns true where the head's error says what a file is: it begins as HDF5 does, or as another
- * kind that is known by its bytes. */
+/* Returns true if the head's error names the file type: the file begins like HDF5 or another known
+ * type. */
 static bool head_names_kind(const uint8_t *begin, uint64_t size)
 {
     return (size && begin[0] == 0x89) || ebpo_foreign_bytes(begin, size);
 }
 
-/* Returns the format of the mesh that begins with these bytes; NULL: it is none. */
+/* Returns the format of the mesh that begins with these bytes, or NULL. */
 static const ebpo_import_format *mesh_format(const uint8_t *begin, uint64_t size,
                                              uint64_t whole_size)
 {
     const ebpo_import_format *format = ebpo_import_recognise(begin, size, "");
     if (format && format->mark_comes_first)
         return format;
-    if (ebpo_stl_states_size(begin, size, whole_size)) /* which begins with any bytes */
+    if (ebpo_stl_states_size(begin, size, whole_size)) /* begins with any bytes */
         return &ebpo_import_stl;
     return head_names_kind(begin, size) ? NULL : format;
 }
 
-/* Returns what a file is by its first bytes that is neither a model nor a mesh but often given for
- * one, and what to do with it; NULL: it is not known, or the head's error says it. */
+/* Returns a description of a frequently confused file type, recognised by its first bytes, and
+ * advice; NULL if it is unknown or the head's error describes it. */
 static const char *other_kind(const uint8_t *begin, uint64_t size)
 {
     return size == 0                      ? "an empty file; get a fresh copy of it"
@@ -287,9 +288,9 @@ static ebpo_status name_kind(ebpo_file *file, ebpo_status status, ebpo_error *er
                 : status;
 }
 
-/* Takes the source over, whatever happens. */
+/* Opens a source and takes ownership in any case. */
 static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const char *name,
-                               uint64_t most_expansion, ebpo_error *error)
+                               uint64_t max_expansion, ebpo_error *error)
 {
     ebpo_file *file = ebpo_alloc_zero(1, sizeof *file);
     if (!file) {
@@ -312,7 +313,7 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
             status = name_kind(file, status, error);
     }
     if (status == EBPO_OK)
-        status = ebpo_stored_check_expansion(file, most_expansion, error);
+        status = ebpo_stored_check_expansion(file, max_expansion, error);
     if (status == EBPO_OK)
         status = check_bare(file, error);
     if (status == EBPO_OK)
@@ -322,17 +323,18 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     return status;
 }
 
-static ebpo_status open_bytes(const ebpo_source *source, const char *name, uint64_t most_expansion,
+static ebpo_status open_bytes(const ebpo_source *source, const char *name, uint64_t max_expansion,
                               ebpo_file **out, ebpo_error *error)
 {
     ebpo_source own = EBPO_SOURCE_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_source, &own, source, error);
-    if (status == EBPO_E_UNSUPPORTED && source->close) /* a newer caller's: what we know of it is */
+    if (status == EBPO_E_UNSUPPORTED && source->close) /* of a newer caller: only the known part is
+                                                        * used */
         source->close(source->user);
     if (status != EBPO_OK)
         return status;
     if (own.read)
-        return open_source(out, &own, name ? name : "source", most_expansion, error);
+        return open_source(out, &own, name ? name : "source", max_expansion, error);
     if (own.close)
         own.close(own.user);
     return ebpo_fail_file(error, EBPO_E_ARGUMENT, name ? name : "source",
@@ -349,13 +351,13 @@ ebpo_status ebpo_open_with(const char *path, const ebpo_open_options *options, e
     *out = NULL;
     ebpo_status status = EBPO_TAKE(ebpo_open_options, &own, options, error);
     if (status == EBPO_OK && own.source)
-        return open_bytes(own.source, path, own.most_expansion, out, error);
+        return open_bytes(own.source, path, own.max_expansion, out, error);
     if (status == EBPO_OK)
         status = ebpo_is_url(path) ? ebpo_source_of_url(path, own.http, &source, error)
                                    : ebpo_source_of_path(&source, path, error);
     const char *name =
         status == EBPO_OK && ebpo_is_url(path) ? ebpo_url_redact(path, shown, sizeof shown) : path;
-    return status == EBPO_OK ? open_source(out, &source, name, own.most_expansion, error) : status;
+    return status == EBPO_OK ? open_source(out, &source, name, own.max_expansion, error) : status;
 }
 
 ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error)
@@ -366,7 +368,7 @@ ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error)
 ebpo_status ebpo_open_own(const char *path, ebpo_file **out, ebpo_error *error)
 {
     ebpo_open_options any = EBPO_OPEN_OPTIONS_INIT;
-    any.most_expansion = UINT64_MAX;
+    any.max_expansion = UINT64_MAX;
     return ebpo_open_with(path, &any, out, error);
 }
 
@@ -411,7 +413,7 @@ void ebpo_close(ebpo_file *file)
         free(file->level_array[i / EBPO_LEVEL_ARRAYS][i % EBPO_LEVEL_ARRAYS].chunks);
     for (int i = 0; i < EBPO_ARRAYS; i++)
         free(file->root_array[i].chunks);
-    free(file->sums);
+    free(file->checksums);
     ebpo_attributes_close(file);
     ebpo_input_close(&file->in);
     ebpo_idle_readers_free(&file->idle);
@@ -430,9 +432,9 @@ ebpo_status ebpo_file_get_stats(const ebpo_file *file, ebpo_file_stats *out)
 ebpo_status ebpo_file_get_http_stats(const ebpo_file *file, ebpo_http_stats *out)
 {
     ebpo_http_stats stats = EBPO_HTTP_STATS_INIT;
-    bool told = ebpo_source_http_stats(&file->in.source, &stats);
+    bool reported = ebpo_source_http_stats(&file->in.source, &stats);
     ebpo_status status = EBPO_GIVE(ebpo_http_stats, out, &stats);
-    return status == EBPO_OK && !told ? EBPO_E_ABSENT : status;
+    return status == EBPO_OK && !reported ? EBPO_E_ABSENT : status;
 }
 
 const ebpo_info *ebpo_file_info(const ebpo_file *file) { return &file->info; }
@@ -443,7 +445,7 @@ ebpo_status ebpo_register_filters(ebpo_error *error) { return ebpo_h5_register(e
 
 enum { PIECE = 4 << 20, BYTES_A_SECOND = 4 << 20 };
 
-/* A file with a name for libhdf5, until that has opened it. */
+/* A named temporary file for libhdf5, unlinked once it is open. */
 typedef struct temporary {
     int fd;
     char name[PATH_MAX];
@@ -463,7 +465,7 @@ static void remove_temporary(temporary *t)
 {
     if (t->fd < 0)
         return;
-    unlink(t->name); /* unless that has happened */
+    unlink(t->name); /* unless already done */
     close(t->fd);
 }
 
@@ -483,7 +485,7 @@ static ebpo_status write_piece(int fd, const char *shown, uint64_t at, const uin
     return EBPO_OK;
 }
 
-/* Everything of a URL, into a file without a name. */
+/* Downloads a complete URL into an unnamed file. */
 static ebpo_status fetch_url(const char *url, const ebpo_http_options *http, const char *shown,
                              int to, ebpo_error *error)
 {
@@ -508,7 +510,7 @@ static ebpo_status fetch_url(const char *url, const ebpo_http_options *http, con
     return status;
 }
 
-/* The name under which libhdf5 finds the file, and its bytes. */
+/* Finds the name under which libhdf5 opens the file, and its size. */
 static ebpo_status find_from(const char *path, const ebpo_http_options *http, const char *shown,
                              temporary *fetched, const char **from, uint64_t *bytes,
                              ebpo_error *error)
@@ -527,7 +529,7 @@ static ebpo_status find_from(const char *path, const ebpo_http_options *http, co
     return status;
 }
 
-/* The copy by its descriptor, which stays the caller's; and whether it is what the head says. */
+/* Opens the copy by its descriptor, which the caller keeps, and checks that it matches the head. */
 static ebpo_status open_copy(int to, const char *shown, const ebpo_compat_options *o,
                              ebpo_file **out, ebpo_error *error)
 {
@@ -537,7 +539,7 @@ static ebpo_status open_copy(int to, const char *shown, const ebpo_compat_option
     ebpo_open_options open = EBPO_OPEN_OPTIONS_INIT;
     read.threads = o->threads;
     open.source = &source;
-    open.most_expansion = o->most_expansion;
+    open.max_expansion = o->max_expansion;
     snprintf(name, sizeof name, "/dev/fd/%d", to);
     ebpo_status status = ebpo_source_of_path(&source, name, error);
     if (status == EBPO_OK)
@@ -551,7 +553,7 @@ static ebpo_status open_copy(int to, const char *shown, const ebpo_compat_option
     return status;
 }
 
-/* Returns whether the copy lacks what an error is about. */
+/* Returns true if the copy lacks the object of an error. */
 static bool copy_lacks(int copy, const char *shown, const char *object)
 {
     char name[32];
@@ -575,7 +577,7 @@ static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, 
     enum { HEAD_MORE = 64 << 20 };
     char redacted[EBPO_SHOWN_BYTES];
     const char *shown = ebpo_is_url(path) ? ebpo_url_redact(path, redacted, sizeof redacted) : path;
-    ebpo_apart_limits limits = { o->memory_bytes, HEAD_MORE, o->seconds };
+    ebpo_process_limits limits = { o->memory_bytes, HEAD_MORE, o->seconds };
     temporary fetched = { .fd = -1 }, copy = { .fd = -1 };
     const char *from = NULL;
     uint64_t bytes = 0;
@@ -583,15 +585,16 @@ static ebpo_status open_foreign(const char *path, const ebpo_compat_options *o, 
     if (status == EBPO_OK)
         status = make_temporary(&copy, shown, error);
     limits.file_bytes += 2 * bytes;
-    if (!limits.seconds) /* decoding and encoding take about a twentieth of a second for a MiB */
+    if (!limits.seconds) /* decoding and encoding take about 1/20 second for a MiB */
         limits.seconds = 60 + (unsigned)(bytes / BYTES_A_SECOND);
-    ebpo_error left_out = EBPO_ERROR_INIT, why = EBPO_ERROR_INIT;
+    ebpo_error omitted = EBPO_ERROR_INIT, why = EBPO_ERROR_INIT;
     if (status == EBPO_OK)
         status = ebpo_h5_clean_copy(from, fetched.fd >= 0, copy.name, shown,
-                                    ebpo_rows_of_foreign_chunk, &limits, &left_out, error);
+                                    ebpo_rows_of_foreign_chunk, &limits, &omitted, error);
     if (status == EBPO_OK && open_copy(copy.fd, shown, o, out, &why) != EBPO_OK)
-        status = ebpo_fail_with(error, *left_out.message && copy_lacks(copy.fd, shown, why.object)
-                                           ? &left_out /* it was there, and here is what it is */
+        status = ebpo_fail_with(error, *omitted.message && copy_lacks(copy.fd, shown, why.object)
+                                           ? &omitted /* the copy omitted an existing object; this
+                                                       * error says why */
                                            : &why);
     remove_temporary(&copy);
     remove_temporary(&fetched);
@@ -610,7 +613,7 @@ ebpo_status ebpo_open_compat(const char *path, const ebpo_compat_options *option
         return status;
     own.memory_bytes = own.memory_bytes ? own.memory_bytes : UINT64_C(1) << 30;
     ebpo_open_options open = EBPO_OPEN_OPTIONS_INIT;
-    open.most_expansion = own.most_expansion;
+    open.max_expansion = own.max_expansion;
     open.http = own.http;
     status = ebpo_open_with(path, &open, out, &first);
     if (status == EBPO_E_UNSUPPORTED)

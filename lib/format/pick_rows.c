@@ -1,8 +1,8 @@
-/* Selected rows of a file's arrays. A run is a range of sibling groups of one level; reading
- * runs returns all arrays of the level for these nodes, with lists behind counts, and checks the
- * values as schema.c checks whole levels. Rows of the mesh's arrays and of attributes are read
- * in any order, chunk by chunk. Chunks are announced together first, and each is fetched once.
- * Source: format-spec/README.md, sections 4 and 5. */
+/* Reads selected rows of a file's arrays. A run is a range of sibling groups of one level. Reading
+ * runs returns all arrays of the level for these nodes, including lists that counts divide, and
+ * checks the values like schema.c checks levels. Rows of the mesh's arrays and of attributes are
+ * read in any order, chunk by chunk. Prefetch hints for all chunks are sent first, and each chunk
+ * is fetched once. Source: format-spec/README.md, sections 4 and 5. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -16,10 +16,10 @@
 #include "geometry/level_nodes.h"
 #include "geometry/polytope.h"
 
-/* A run's part of a list behind counts: rows [first, first + count) of the file. */
+/* A run's range in a list that counts divide: rows [first, first + count) of the file. */
 typedef struct span {
     uint64_t first, count;
-    uint64_t end; /* of references: where the new faces of the leaf before the run end */
+    uint64_t end; /* for references: end of the new faces of the leaf before the run */
 } span;
 
 typedef struct reading {
@@ -28,8 +28,8 @@ typedef struct reading {
     const ebpo_run *run;
     uint64_t run_count;
     uint32_t needs;
-    ebpo_room *room;
-    span *span; /* for each run, of the list in hand */
+    ebpo_quota *space;
+    span *span; /* for each run, in the current list */
     ebpo_level *out;
     ebpo_error *error;
 } reading;
@@ -45,9 +45,9 @@ static bool is_wanted_array(const reading *r, int id)
            ebpo_reader_array(r->chunks->file, (ebpo_array_id)id, r->level)->present;
 }
 
-/* --- announcing --- */
+/* --- prefetch hints --- */
 
-/* The index in which sums of this array stand, if it has one. */
+/* Returns the index array with sums for this array, if any. */
 static int index_of(int id)
 {
     switch (id) {
@@ -60,8 +60,8 @@ static int index_of(int id)
     }
 }
 
-/* Arrays with sums are read from the nearest row of their index on. */
-static void expect_column(const reading *r, ebpo_expected *e, int id, int type)
+/* Collects chunks. Arrays with sums are read from the preceding index row on. */
+static void expect_column(const reading *r, ebpo_hints *e, int id, int type)
 {
     int index = ebpo_subtree_table_has(r->chunks->file, r->level) ? -1 : index_of(id);
     for (uint64_t i = 0; i < r->run_count; i++) {
@@ -70,13 +70,13 @@ static void expect_column(const reading *r, ebpo_expected *e, int id, int type)
         if (count == 0)
             continue;
         if (index >= 0)
-            ebpo_chunks_expect(r->chunks, e, (ebpo_array_id)index, r->level, row, 1);
-        ebpo_chunks_expect(r->chunks, e, (ebpo_array_id)id, r->level, from, rank + count - from);
+            ebpo_chunks_hint(r->chunks, e, (ebpo_array_id)index, r->level, row, 1);
+        ebpo_chunks_hint(r->chunks, e, (ebpo_array_id)id, r->level, from, rank + count - from);
     }
 }
 
-void ebpo_runs_expect(ebpo_chunks *chunks, ebpo_expected *expected, int level, const ebpo_run *runs,
-                      uint64_t run_count, uint32_t needs)
+void ebpo_runs_hint(ebpo_chunks *chunks, ebpo_hints *expected, int level, const ebpo_run *runs,
+                    uint64_t run_count, uint32_t needs)
 {
     reading r = {
         .chunks = chunks, .level = level, .run = runs, .run_count = run_count, .needs = needs
@@ -93,7 +93,7 @@ void ebpo_runs_expect(ebpo_chunks *chunks, ebpo_expected *expected, int level, c
 static void *make_array(const reading *r, int id, uint64_t count, ebpo_status *status)
 {
     size_t size = ebpo_schema[id].held_size;
-    *status = ebpo_room_take(r->room, count * size, r->error);
+    *status = ebpo_quota_take(r->space, count * size, r->error);
     void *values = *status == EBPO_OK ? ebpo_alloc(count, size) : NULL;
     if (*status == EBPO_OK && !values)
         *status = ebpo_fail_memory(r->error, count * size);
@@ -118,7 +118,7 @@ static ebpo_status read_column(const reading *r, int id, int type)
     return status;
 }
 
-/* --- lists behind counts --- */
+/* --- lists that counts divide --- */
 
 static uint64_t sum_counts(const reading *r, int id, uint64_t begin, uint64_t nodes)
 {
@@ -130,7 +130,7 @@ static uint64_t sum_counts(const reading *r, int id, uint64_t begin, uint64_t no
     return sum;
 }
 
-/* Where the list of the nodes from `rank` on begins. */
+/* Finds the start of the list of the nodes from `rank` on. */
 static ebpo_status find_span(const reading *r, ebpo_per per, uint64_t rank, span *s)
 {
     switch (per) {
@@ -141,7 +141,7 @@ static ebpo_status find_span(const reading *r, ebpo_per per, uint64_t rank, span
         return ebpo_ranks_leaf(r->chunks, r->level, rank, &s->end, &s->first, r->error);
     default:
         return ebpo_fail(r->error, EBPO_E_UNSUPPORTED,
-                         "a list whose beginnings no index tells; add it to find_span");
+                         "no index locates this list; add it to find_span");
     }
 }
 
@@ -172,11 +172,11 @@ static ebpo_status find_spans(const reading *r, int id, const ebpo_list_spec *li
 
 static void expect_spans(const reading *r, int id)
 {
-    ebpo_expected e = EBPO_EXPECTED_INIT(r->chunks->file);
+    ebpo_hints e = EBPO_HINTS_INIT(r->chunks->file);
     for (uint64_t i = 0; i < r->run_count; i++)
-        ebpo_chunks_expect(r->chunks, &e, (ebpo_array_id)id, r->level, r->span[i].first,
-                           r->span[i].count);
-    ebpo_expect_all(&e);
+        ebpo_chunks_hint(r->chunks, &e, (ebpo_array_id)id, r->level, r->span[i].first,
+                         r->span[i].count);
+    ebpo_hint_all(&e);
 }
 
 static ebpo_status read_list(const reading *r, int id, const ebpo_list_spec *list)
@@ -197,7 +197,7 @@ static ebpo_status read_list(const reading *r, int id, const ebpo_list_spec *lis
     return status;
 }
 
-/* --- what must hold of the values --- */
+/* --- constraints on values --- */
 
 static ebpo_status check_codes(const reading *r, ebpo_array_id id)
 {
@@ -206,7 +206,7 @@ static ebpo_status check_codes(const reading *r, ebpo_array_id id)
     for (uint64_t i = 0; i < count; i++) {
         int32_t n[3], d;
         if (!ebpo_plane_code_decode(codes[i], n, &d))
-            return runs_wrong(r, id, "a code stands for no plane");
+            return runs_wrong(r, id, "invalid plane code");
     }
     return EBPO_OK;
 }
@@ -227,12 +227,12 @@ static ebpo_status check_windings(const reading *r, ebpo_array_id id, bool insid
     for (uint64_t i = 0; i < count; i++)
         if (ebpo_rule_inside(r->chunks->file->info.rule, winding[i]) != inside)
             return runs_wrong(r, id,
-                              inside ? "a black node lies outside by the winding rule"
-                                     : "a white node lies inside by the winding rule");
+                              inside ? "a black node is outside by the winding rule"
+                                     : "a white node is inside by the winding rule");
     return EBPO_OK;
 }
 
-/* Skips to first faces. */
+/* Converts skips to first faces. */
 static ebpo_status add_up_skips(const reading *r, uint64_t begin, uint64_t leaves, uint64_t end)
 {
     ebpo_level *out = r->out;
@@ -240,7 +240,7 @@ static ebpo_status add_up_skips(const reading *r, uint64_t begin, uint64_t leave
     for (uint64_t i = begin; i < begin + leaves; i++) {
         uint64_t skip = out->leaf_first[i];
         if (end > faces || skip > faces - end || out->leaf_new[i] > faces - end - skip)
-            return runs_wrong(r, EBPO_A_LEAF_SKIP, "a leaf's new faces lie beyond the last face");
+            return runs_wrong(r, EBPO_A_LEAF_SKIP, "a leaf's new faces are beyond the last face");
         out->leaf_first[i] = end + skip;
         end += skip + out->leaf_new[i];
         out->new_count += out->leaf_new[i];
@@ -248,7 +248,7 @@ static ebpo_status add_up_skips(const reading *r, uint64_t begin, uint64_t leave
     return EBPO_OK;
 }
 
-/* Numbers of faces; the spans are those of the references. */
+/* Decodes face indices; the spans are those of the references. */
 static ebpo_status decode_faces(const reading *r)
 {
     ebpo_level *out = r->out;
@@ -263,11 +263,11 @@ static ebpo_status decode_faces(const reading *r)
         if (out->leaf_ref_count[i] &&
             !ebpo_refs_decode(out->leaf_refs + at, out->leaf_ref_count[i], out->leaf_first[i]))
             status = runs_wrong(r, EBPO_A_LEAF_REFS,
-                                "a reference does not lead to a face before the leaf's own");
+                                "a reference is not to a face before the leaf's own");
     return status;
 }
 
-/* An array that was read is what it should be, and decoded. */
+/* Checks and decodes an array after reading. */
 static ebpo_status finish_array(const reading *r, int id)
 {
     switch (id) {
@@ -288,15 +288,15 @@ static ebpo_status read_array(const reading *r, int id)
     ebpo_status status = EBPO_OK;
     if (type >= 0 && is_wanted_array(r, id))
         status = read_column(r, id, type);
-    else if (list && ebpo_level_array(r->out, list->counts)) /* also a list of nothing */
+    else if (list && ebpo_level_array(r->out, list->counts)) /* also an empty list */
         status = read_list(r, id, list);
     return status == EBPO_OK ? finish_array(r, id) : status;
 }
 
 ebpo_status ebpo_runs_read(ebpo_chunks *chunks, int level, const ebpo_run *runs, uint64_t run_count,
-                           uint32_t needs, ebpo_room *room, ebpo_level *out, ebpo_error *error)
+                           uint32_t needs, ebpo_quota *space, ebpo_level *out, ebpo_error *error)
 {
-    reading r = { chunks, level, runs, run_count, needs, room, NULL, out, error };
+    reading r = { chunks, level, runs, run_count, needs, space, NULL, out, error };
     for (uint64_t i = 0; i < run_count; i++) {
         out->gray_count += runs[i].count[EBPO_GRAY];
         out->leaf_count += runs[i].count[EBPO_LEAF];
@@ -322,20 +322,20 @@ typedef struct picking {
 
 static void expect_types(const picking *p)
 {
-    ebpo_expected e = EBPO_EXPECTED_INIT(p->chunks->file);
+    ebpo_hints e = EBPO_HINTS_INIT(p->chunks->file);
     for (uint64_t i = 0; i < p->run_count; i++) {
         uint64_t index = p->run[i].group / EBPO_INDEX_ROWS, counted = index * EBPO_INDEX_ROWS;
         if (ebpo_subtree_table_has(p->chunks->file, p->level))
             counted = p->run[i].group;
         else
-            ebpo_chunks_expect(p->chunks, &e, EBPO_A_TYPES_INDEX, p->level, index, 1);
-        ebpo_chunks_expect(p->chunks, &e, EBPO_A_TYPES, p->level, counted,
-                           p->run[i].group + p->run[i].groups - counted);
+            ebpo_chunks_hint(p->chunks, &e, EBPO_A_TYPES_INDEX, p->level, index, 1);
+        ebpo_chunks_hint(p->chunks, &e, EBPO_A_TYPES, p->level, counted,
+                         p->run[i].group + p->run[i].groups - counted);
     }
-    ebpo_expect_all(&e);
+    ebpo_hint_all(&e);
 }
 
-/* Types, and which nodes they make each run have. */
+/* Reads types and counts the nodes of each run. */
 static ebpo_status pick_types(const picking *p)
 {
     uint64_t at = 0;
@@ -369,9 +369,9 @@ ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs, uint
     memset(out, 0, sizeof *out);
     ebpo_status status = pick_types(&p);
     if (status == EBPO_OK) {
-        ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
-        ebpo_runs_expect(chunks, &e, level, runs, run_count, needs);
-        ebpo_expect_all(&e);
+        ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
+        ebpo_runs_hint(chunks, &e, level, runs, run_count, needs);
+        ebpo_hint_all(&e);
         status = ebpo_runs_read(chunks, level, runs, run_count, needs, NULL, out, error);
     }
     if (status != EBPO_OK)
@@ -381,9 +381,10 @@ ebpo_status ebpo_pick_level(ebpo_chunks *chunks, int level, ebpo_run *runs, uint
 
 /* --- rows of the mesh's arrays, in any order --- */
 
-/* --- announcing --- */
+/* --- prefetch hints --- */
 
-/* Which chunks of the array these rows lie in; NULL: not known. The caller frees it. */
+/* Returns flags of the chunks that contain these rows, or NULL if unknown. The caller frees them.
+ */
 static bool *chunks_of(const ebpo_array_in *array, const uint32_t *rows, uint64_t count)
 {
     bool *has = ebpo_alloc_zero(ebpo_shape_chunks(&array->shape), sizeof *has);
@@ -393,19 +394,19 @@ static bool *chunks_of(const ebpo_array_in *array, const uint32_t *rows, uint64_
     return has;
 }
 
-static void expect_vertices(ebpo_chunks *chunks, ebpo_expected *e, uint64_t row, uint64_t rows,
+static void expect_vertices(ebpo_chunks *chunks, ebpo_hints *e, uint64_t row, uint64_t rows,
                             uint32_t parts)
 {
-    ebpo_chunks_expect(chunks, e, EBPO_A_VERTICES, 0, row, rows);
+    ebpo_chunks_hint(chunks, e, EBPO_A_VERTICES, 0, row, rows);
     if (parts & EBPO_PART_MAPS)
-        ebpo_chunks_expect(chunks, e, EBPO_A_VERTEX_SOURCE, 0, row, rows);
+        ebpo_chunks_hint(chunks, e, EBPO_A_VERTEX_SOURCE, 0, row, rows);
 }
 
-void ebpo_faces_expect(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count, uint32_t parts)
+void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count, uint32_t parts)
 {
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_FACES, 0);
     uint64_t number = ebpo_shape_chunks(&array->shape), rows = array->shape.chunk_rows;
-    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     bool *has = ebpo_input_expects(&chunks->file->in) ? chunks_of(array, faces, count) : NULL;
     for (uint64_t i = 0; has && i < number; i++) {
         uint64_t first = chunks->seen ? chunks->seen[i] : 0,
@@ -413,27 +414,27 @@ void ebpo_faces_expect(ebpo_chunks *chunks, const uint32_t *faces, uint64_t coun
                                                       : chunks->file->info.vertex_count;
         if (!has[i])
             continue;
-        ebpo_chunks_expect(chunks, &e, EBPO_A_FACES, 0, i * rows, rows);
+        ebpo_chunks_hint(chunks, &e, EBPO_A_FACES, 0, i * rows, rows);
         if (parts & EBPO_PART_MAPS)
-            ebpo_chunks_expect(chunks, &e, EBPO_A_FACE_SOURCE, 0, i * rows, rows);
+            ebpo_chunks_hint(chunks, &e, EBPO_A_FACE_SOURCE, 0, i * rows, rows);
         if (first < end)
             expect_vertices(chunks, &e, first, end - first, parts);
     }
-    ebpo_expect_all(&e);
+    ebpo_hint_all(&e);
     free(has);
 }
 
-void ebpo_vertices_expect(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t count,
-                          uint32_t parts)
+void ebpo_vertices_hint(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t count,
+                        uint32_t parts)
 {
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_VERTICES, 0);
     uint64_t rows = array->shape.chunk_rows;
-    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     bool *has = ebpo_input_expects(&chunks->file->in) ? chunks_of(array, vertices, count) : NULL;
     for (uint64_t i = 0; has && i < ebpo_shape_chunks(&array->shape); i++)
         if (has[i])
             expect_vertices(chunks, &e, i * rows, rows, parts);
-    ebpo_expect_all(&e);
+    ebpo_hint_all(&e);
     free(has);
 }
 
@@ -442,8 +443,8 @@ void ebpo_vertices_expect(ebpo_chunks *chunks, const uint32_t *vertices, uint64_
 typedef struct gathering {
     ebpo_chunks *chunks;
     const ebpo_array_in *array;
-    const uint32_t *rows, *order; /* order: places in `rows`, chunk after chunk */
-    const uint64_t *begin;        /* [chunks + 1] in `order` */
+    const uint32_t *rows, *order; /* order: indices into `rows`, sorted by chunk */
+    const uint64_t *begin;        /* [chunks + 1] ranges in `order` */
     size_t row_bytes;
     uint8_t *out;
 } gathering;
@@ -468,7 +469,7 @@ static ebpo_status gather_chunks(void *context, uint64_t begin, uint64_t end, un
     return status;
 }
 
-/* Counting sort by chunk. */
+/* Sorts by chunk with a counting sort. */
 static ebpo_status sort_rows(const gathering *g, uint64_t count, uint64_t *begin, uint32_t *order,
                              uint64_t chunks, ebpo_error *error)
 {
@@ -476,7 +477,7 @@ static ebpo_status sort_rows(const gathering *g, uint64_t count, uint64_t *begin
     memset(begin, 0, (chunks + 1) * sizeof *begin);
     for (uint64_t i = 0; i < count; i++) {
         if (g->rows[i] >= g->array->shape.rows)
-            return ebpo_chunks_fail(g->chunks, -1, g->array->id, "a row is named that is not there",
+            return ebpo_chunks_fail(g->chunks, -1, g->array->id, "a requested row does not exist",
                                     error);
         begin[g->rows[i] / chunk_rows]++;
     }
@@ -496,7 +497,8 @@ static ebpo_status pick_rows(ebpo_chunks *chunks, const ebpo_array_in *array, co
                              uint64_t count, unsigned threads, void *out, ebpo_error *error)
 {
     gathering g = { .chunks = chunks, .array = array, .rows = rows, .out = out };
-    g.row_bytes = ebpo_shape_row_bytes(&array->shape); /* decoding changes no array's width */
+    g.row_bytes =
+        ebpo_shape_row_bytes(&array->shape); /* decoding does not change an array's width */
     if (!array->present)
         return ebpo_fail_at(error, EBPO_E_ABSENT, chunks->file->in.shown, array->path, -1,
                             "the file does not hold this array");
@@ -506,12 +508,12 @@ static ebpo_status pick_rows(ebpo_chunks *chunks, const ebpo_array_in *array, co
     ebpo_status status = begin && order ? sort_rows(&g, count, begin, order, number, error)
                                         : ebpo_fail_memory(error, count * sizeof *order);
     if (status == EBPO_OK) {
-        ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+        ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
         for (uint64_t c = 0; c < number; c++)
             if (begin[c] < begin[c + 1])
-                ebpo_chunks_expect(chunks, &e, array->id, array->level, c * array->shape.chunk_rows,
-                                   1);
-        ebpo_expect_all(&e);
+                ebpo_chunks_hint(chunks, &e, array->id, array->level, c * array->shape.chunk_rows,
+                                 1);
+        ebpo_hint_all(&e);
         g.begin = begin;
         g.order = order;
         status = ebpo_parallel_for(threads, NULL, number, 1, gather_chunks, &g, NULL,
@@ -529,7 +531,7 @@ ebpo_status ebpo_pick_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t
                      error);
 }
 
-/* The same of an array of attributes (/attributes): values, ends or items. */
+/* Reads rows of an attribute array (/attributes): values, ends or items. */
 static ebpo_status pick_attribute_rows(ebpo_chunks *chunks, int number, const uint32_t *rows,
                                        uint64_t count, unsigned threads, void *out,
                                        ebpo_error *error)
@@ -562,7 +564,8 @@ static ebpo_status pick_columns(const attribute_picking *p, uint64_t n, ebpo_att
                      : ebpo_fail_memory(p->error, p->count * bytes);
 }
 
-/* Numbers of the items of all lists: a list begins where the one before it in the file ends. */
+/* Computes the indices of the items of all lists: a list begins at the end of the preceding one in
+ * the file. */
 static ebpo_status number_items(const attribute_picking *p, ebpo_attribute *a,
                                 const uint64_t *before, uint32_t **items)
 {
@@ -573,8 +576,8 @@ static ebpo_status number_items(const attribute_picking *p, ebpo_attribute *a,
                                     p->error);
         if (a->ends[i] > UINT32_MAX || a->ends[i] - before[i] > UINT32_MAX - sum)
             return ebpo_fail_file(p->error, EBPO_E_LIMIT, p->chunks->file->in.shown,
-                                  "the lists of an attribute have more than 2^32 - 1 items; leave "
-                                  "attributes out");
+                                  "the lists of an attribute have more than 2^32 - 1 items; omit "
+                                  "attributes");
         sum += a->ends[i] - before[i];
     }
     uint32_t *next = *items = ebpo_alloc(sum, sizeof *next);
@@ -588,7 +591,7 @@ static ebpo_status number_items(const attribute_picking *p, ebpo_attribute *a,
     return EBPO_OK;
 }
 
-/* Ends of the rows before those that are picked. */
+/* Reads the ends of the rows before the selected ones. */
 static ebpo_status pick_before(const attribute_picking *p, uint64_t n, uint64_t *before)
 {
     uint32_t *rows = ebpo_alloc(p->count, sizeof *rows);

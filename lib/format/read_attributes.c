@@ -1,7 +1,7 @@
-/* Reading attributes of vertices, faces and other elements. Opening a file finds the arrays of
- * /attributes and checks what their heads state (names, types, ranges, lists of different
- * lengths); values are read later, as whole arrays, and compared with the checksum of the part.
- * Source: format-spec/README.md, "Attributes". */
+/* Reads attributes of vertices, faces and other elements. Opening a file finds the arrays of
+ * /attributes and checks their heads (names, types, ranges, lists of different lengths). Values are
+ * read later, as whole arrays, and compared with the checksum of the part. Source:
+ * format-spec/README.md, "Attributes". */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,7 +25,7 @@ static ebpo_status attribute_head_wrong(const ebpo_file *file, const char *path,
                         "%s; get a fresh copy of the file", what);
 }
 
-/* A required attribute that is absent has no message yet. */
+/* Adds a message when a required attribute is absent. */
 static ebpo_status required_value(const ebpo_file *file, const char *path, ebpo_status status,
                                   const char *name, ebpo_error *error)
 {
@@ -44,10 +44,7 @@ static ebpo_status get_type(ebpo_file *file, ebpo_head *head, ebpo_head_object i
     if (status != EBPO_OK)
         return status;
     *type = ebpo_attribute_type_of(word);
-    return *type >= 0
-               ? EBPO_OK
-               : attribute_head_wrong(file, path, "a type of numbers is none that the format has",
-                                      error);
+    return *type >= 0 ? EBPO_OK : attribute_head_wrong(file, path, "unknown number type", error);
 }
 
 static ebpo_status get_list(ebpo_file *file, ebpo_head *head, ebpo_head_object id, const char *path,
@@ -60,7 +57,7 @@ static ebpo_status get_list(ebpo_file *file, ebpo_head *head, ebpo_head_object i
     if (status == EBPO_E_ABSENT)
         return EBPO_OK;
     if (status == EBPO_OK && a->list >= EBPO_ATTRIBUTE_FLOAT32)
-        status = attribute_head_wrong(file, path, "a list's length is no whole number", error);
+        status = attribute_head_wrong(file, path, "a list length is not an integer", error);
     if (status == EBPO_OK)
         status = required_value(file, path,
                                 ebpo_head_get_count(head, id, path, "different", &differ, error),
@@ -116,8 +113,8 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo
     if (!a->chunks)
         atomic_store(&file->located, false);
     if (strcmp(coding, a->coding) != 0)
-        return attribute_head_wrong(file, a->path,
-                                    "the array's coding is none that the format has for it", error);
+        return attribute_head_wrong(file, a->path, "the array's coding is not valid for this array",
+                                    error);
     return a->shape.is_signed
                ? attribute_head_wrong(file, a->path,
                                       "the array has the wrong type or the wrong number of columns",
@@ -125,7 +122,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, int number, ebpo
                : EBPO_OK;
 }
 
-/* Shape of an array against what its head says. */
+/* Checks the shape of an array against its head. */
 static const char *check_shape(const ebpo_file *file, const ebpo_array_in *array,
                                const ebpo_attribute_in *of)
 {
@@ -144,11 +141,11 @@ static const char *check_shape(const ebpo_file *file, const ebpo_array_in *array
         (!flat && !list && array->shape.cols != names))
         return "the array does not have a column for each name";
     if (array->shape.element_size != (of->different ? 8 : ebpo_attribute_bytes(a->type)))
-        return "the array is not as wide as its type";
+        return "the array's element size does not match its type";
     bool vertex = ebpo_attribute_is_of(a, "vertex");
     if (ebpo_attribute_is_of_mesh(a) &&
         array->shape.rows != (vertex ? file->info.vertex_count : file->info.face_count))
-        return "the array has not as many rows as the mesh";
+        return "the array's row count differs from the mesh";
     return NULL;
 }
 
@@ -158,20 +155,20 @@ static const char *check_element(const ebpo_file *file, uint64_t n)
     for (uint64_t i = 0; i < n; i++)
         if (strcmp(all[i].head.element, all[n].head.element) == 0 &&
             all[i].head.rows != all[n].head.rows)
-            return "the array has other rows than another one of its element";
+            return "the array's row count differs from another array of its element";
     return NULL;
 }
 
-/* Texts of textures are read for a look at the file, so they are small. */
+/* Checks the texts of textures, which are small, as they are read to inspect the file. */
 static const char *check_textures(const ebpo_attribute_in *of, const ebpo_array_in *items)
 {
     bool texts = strcmp(of->head.names, ebpo_texture_array_name(EBPO_TEXTURE_BYTES)) != 0;
     if (!ebpo_attribute_is_of_textures(&of->head))
         return NULL;
     if (of->head.rows > EBPO_TEXTURES)
-        return "there are more textures than a file can have";
+        return "too many textures";
     return texts && items->present && items->shape.rows > EBPO_TEXTURE_TEXTS
-               ? "the texts of textures are longer than they can be"
+               ? "the texts of textures are too long"
                : NULL;
 }
 
@@ -182,8 +179,10 @@ static ebpo_status open_items(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo
     if (status == EBPO_OK &&
         (items->shape.cols ||
          items->shape.element_size != ebpo_attribute_bytes(file->attributes.head[n].head.type)))
-        status =
-            attribute_head_wrong(file, items->path, "the array is not as wide as its type", error);
+        status = attribute_head_wrong(file, items->path,
+                                      "the array's element size does not match its "
+                                      "type",
+                                      error);
     return status;
 }
 
@@ -221,9 +220,10 @@ static ebpo_status open_header(ebpo_file *file, ebpo_head *head, ebpo_error *err
     if (status == EBPO_OK &&
         (header->shape.cols || header->shape.element_size != 1 ||
          header->coding != ebpo_coding_plain || header->shape.rows > EBPO_ATTRIBUTE_HEADER))
-        status =
-            attribute_head_wrong(file, path, "the header is not of bytes, or longer than it can be",
-                                 error);
+        status = attribute_head_wrong(file, path,
+                                      "the header does not consist of bytes, or is too "
+                                      "long",
+                                      error);
     return status;
 }
 
@@ -241,7 +241,7 @@ static ebpo_status open_group(ebpo_file *file, ebpo_head *head, ebpo_error *erro
     if (status == EBPO_OK)
         status = ebpo_facts_get_digest(head, id, path, "sha256", all->sha256, error);
     if (status == EBPO_OK && all->count > EBPO_ATTRIBUTE_ARRAYS)
-        status = attribute_head_wrong(file, path, "there are more arrays than there can be", error);
+        status = attribute_head_wrong(file, path, "too many arrays", error);
     if (status != EBPO_OK)
         return status;
     all->array = ebpo_alloc_zero(1 + 2 * all->count, sizeof *all->array);
@@ -334,7 +334,7 @@ static ebpo_status take_attribute_rows(void *context, const ebpo_array_in *array
     return EBPO_OK;
 }
 
-/* Into new memory; NULL: the array is absent. */
+/* Reads into new memory; NULL if the array is absent. */
 static ebpo_status read_array(const ebpo_file *file, int number, const ebpo_read_options *read,
                               uint8_t **values, ebpo_error *error)
 {
@@ -365,7 +365,7 @@ static ebpo_status check_ends(const ebpo_file *file, uint64_t n, const ebpo_attr
     return good && before == (items->present ? items->shape.rows : 0)
                ? EBPO_OK
                : ebpo_check_fail(&check, -1, ends->path,
-                                 "the lists do not end where their items do", error);
+                                 "the ends of the lists do not match their items", error);
 }
 
 static ebpo_status read_parts(const ebpo_file *file, uint64_t n, const ebpo_read_options *read,
@@ -444,7 +444,7 @@ ebpo_status ebpo_attributes_read(const ebpo_file *file, const ebpo_read_options 
 static ebpo_status fail_images(const ebpo_file *file, ebpo_error *error)
 {
     return ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, "/attributes", -1,
-                        "an image is not what its digest says; get a fresh copy");
+                        "an image does not match its digest; get a fresh copy");
 }
 
 ebpo_status ebpo_attributes_read_textures(const ebpo_file *file, const ebpo_read_options *read,
@@ -518,7 +518,8 @@ ebpo_status ebpo_file_attribute_ends(const ebpo_file *file, unsigned n,
     return read_public(file, n, options, true, out, error);
 }
 
-/* All of one array's values at a time would do, but whole parts are small beside the mesh. */
+/* Reads the whole part, although one array at a time would suffice: it is small compared to the
+ * mesh. */
 ebpo_status ebpo_attributes_check(const ebpo_file *file, const ebpo_read_options *read,
                                   ebpo_error *error)
 {
@@ -532,8 +533,8 @@ ebpo_status ebpo_attributes_check(const ebpo_file *file, const ebpo_read_options
     ebpo_attributes_free(all);
     if (status == EBPO_OK && ebpo_digest_differs(file->attributes.sha256, digest))
         status = ebpo_fail_at(error, EBPO_E_FORMAT, file->in.shown, "/attributes", -1,
-                              "the attributes are not what sha256 says: the file was changed; get "
-                              "a fresh copy");
+                              "the attributes do not match sha256: the file was changed; get a "
+                              "fresh copy");
     if (status == EBPO_OK && !textures)
         status = fail_images(file, error);
     return status;

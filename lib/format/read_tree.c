@@ -1,8 +1,8 @@
-/* Reading whole parts of a file into memory: a level, the mesh, the maps to the source's
- * numbers, the mesh in the source's order, and the whole tree. Levels and meshes are checked
- * while they are read, so that a caller can use every index in them. Chunks are decoded on
- * several threads directly into the result, which may be in a workspace on disk. The last part
- * recomputes a file's checksums and compares them with those stated. */
+/* Reads whole parts of a file into memory: a level, the mesh, the maps to source indices, the mesh
+ * in the source's order, and the whole tree. Levels and meshes are checked during reading, so that
+ * callers may use every index in them. Threads decode chunks directly into the result, which may be
+ * in a workspace on disk. The last part recomputes a file's checksums and compares them with the
+ * stated ones. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,7 +19,8 @@
 #include "format/write_plan.h"
 #include "hdf5_read/coding.h"
 
-/* leaf_first holds skips; each leaf's new faces end before the next one's begin. */
+/* Converts the skips in leaf_first to first faces; each leaf's new faces end before those of the
+ * next one. */
 static ebpo_status add_up_skips(const ebpo_file *file, int number, ebpo_level *level,
                                 ebpo_error *error)
 {
@@ -29,7 +30,7 @@ static ebpo_status add_up_skips(const ebpo_file *file, int number, ebpo_level *l
         uint64_t skip = level->leaf_first[i];
         if (skip > faces - end || level->leaf_new[i] > faces - end - skip)
             return ebpo_check_fail(&check, number, "leaf_skip",
-                                   "a leaf's new faces lie beyond the last face", error);
+                                   "a leaf's new faces are beyond the last face", error);
         level->leaf_first[i] = end + skip;
         end += skip + level->leaf_new[i];
     }
@@ -73,13 +74,12 @@ static ebpo_status decode_refs(void *context, uint64_t begin, uint64_t end, unsi
                               j->level->leaf_first[leaf])) {
             ebpo_check check = ebpo_reader_check(j->file, j->level->workspace);
             return ebpo_check_fail(&check, j->number, "leaf_refs",
-                                   "a reference does not lead to a face before the leaf's own",
-                                   error);
+                                   "a reference is not to a face before the leaf's own", error);
         }
     return EBPO_OK;
 }
 
-/* Of an index that is also about parts that are left out, nothing can be said. */
+/* Checks an index, except columns about parts that are omitted. */
 static ebpo_status check_index(const ebpo_file *file, ebpo_array_id id, const ebpo_level *level,
                                int number, uint64_t without, const uint64_t *right,
                                ebpo_error *error)
@@ -95,13 +95,13 @@ static ebpo_status check_index(const ebpo_file *file, ebpo_array_id id, const eb
         memcmp(stored, right, array->shape.rows * array->shape.cols * sizeof *stored) != 0) {
         ebpo_check check = ebpo_reader_check(file, level->workspace);
         status = ebpo_check_fail(&check, number, ebpo_schema[id].name,
-                                 "the index contradicts the arrays that it is about", error);
+                                 "the index contradicts the arrays that it indexes", error);
     }
     ebpo_array_free(level->workspace, stored);
     return status;
 }
 
-/* Counts of references, and skips. */
+/* Checks counts of references and converts skips. */
 static ebpo_status finish_lists(const ebpo_file *file, int number, ebpo_level *level,
                                 ebpo_error *error)
 {
@@ -117,7 +117,7 @@ static ebpo_status finish_lists(const ebpo_file *file, int number, ebpo_level *l
     return add_up_skips(file, number, level, error);
 }
 
-/* References are decoded here: leaf_index tells each block of leaves where to begin. */
+/* Decodes references; leaf_index states where each block of leaves begins. */
 static ebpo_status finish_leaves(const ebpo_file *file, int number, ebpo_level *level,
                                  const ebpo_read_options *options, ebpo_error *error)
 {
@@ -171,9 +171,9 @@ static ebpo_status read_arrays(const ebpo_file *file, int number, ebpo_level *le
 
 static void expect_arrays(const ebpo_file *file, int level, uint32_t without)
 {
-    ebpo_expected e = EBPO_EXPECTED_INIT(file);
-    ebpo_expect_level(&e, level, without);
-    ebpo_expect_all(&e);
+    ebpo_hints e = EBPO_HINTS_INIT(file);
+    ebpo_hint_level(&e, level, without);
+    ebpo_hint_all(&e);
 }
 
 ebpo_status ebpo_file_read_level(const ebpo_file *file, int level, const ebpo_read_options *options,
@@ -235,7 +235,7 @@ typedef struct mesh_job {
     const ebpo_file *file;
     ebpo_mesh *mesh;
     uint64_t *faces_index; /* NULL: a single chunk */
-    uint64_t seen;         /* by the last chunk */
+    uint64_t seen;         /* for the last chunk */
 } mesh_job;
 
 static ebpo_status take_vertices(void *context, const ebpo_array_in *array, uint64_t chunk,
@@ -262,7 +262,7 @@ static ebpo_status take_faces(void *context, const ebpo_array_in *array, uint64_
     uint64_t seen = j->faces_index ? j->faces_index[chunk] : 0;
     if (seen > j->mesh->vertex_count || (chunk == 0 && seen))
         return ebpo_check_fail(&check, -1, "/mesh/faces_index",
-                               "the index names more vertices than there are", error);
+                               "the index has more vertices than the mesh", error);
     if (!ebpo_corners_decode(bytes, rows, &seen, j->mesh->faces + 3 * row) ||
         seen > j->mesh->vertex_count)
         return ebpo_check_fail(&check, -1, "/mesh/faces",
@@ -330,14 +330,14 @@ static ebpo_status take_options(const ebpo_file *file, const ebpo_read_options *
     return status;
 }
 
-/* Announces the root's arrays that these needs name, and the attributes. */
-static void announce_root(const ebpo_file *file, uint32_t needs, bool attributes)
+/* Sends prefetch hints for the root's arrays that these needs require, and for the attributes. */
+static void hint_root(const ebpo_file *file, uint32_t needs, bool attributes)
 {
-    ebpo_expected expected = EBPO_EXPECTED_INIT(file);
-    ebpo_expect_root(&expected, needs);
+    ebpo_hints expected = EBPO_HINTS_INIT(file);
+    ebpo_hint_root(&expected, needs);
     if (attributes)
-        ebpo_expect_attributes(&expected);
-    ebpo_expect_all(&expected);
+        ebpo_hint_attributes(&expected);
+    ebpo_hint_all(&expected);
 }
 
 ebpo_status ebpo_file_read_mesh(const ebpo_file *file, const ebpo_read_options *options,
@@ -349,7 +349,7 @@ ebpo_status ebpo_file_read_mesh(const ebpo_file *file, const ebpo_read_options *
     ebpo_status status = take_options(file, options, EBPO_PART_MESH, "mesh", &read, error);
     if (status != EBPO_OK)
         return status;
-    announce_root(file, EBPO_NEEDS_MESH, read.attributes);
+    hint_root(file, EBPO_NEEDS_MESH, read.attributes);
     status = read_mesh(file, out, &read, error);
     if (status == EBPO_OK && read.attributes)
         status = ebpo_attributes_read(file, &read, &out->attributes, error);
@@ -385,7 +385,7 @@ static ebpo_status read_map(const ebpo_file *file, ebpo_array_id id, uint64_t li
 
 static uint64_t face_limit(const ebpo_info *info)
 {
-    return info->source_face_count + info->mend.added_faces;
+    return info->source_face_count + info->repair_record.added_faces;
 }
 
 void ebpo_maps_free(ebpo_maps *maps)
@@ -407,7 +407,7 @@ ebpo_status ebpo_file_read_maps(const ebpo_file *file, const ebpo_read_options *
         take_options(file, options, EBPO_PART_MAPS, "maps to the source's numbers", &read, error);
     if (status != EBPO_OK)
         return status;
-    announce_root(file, EBPO_NEEDS_MAPS, false);
+    hint_root(file, EBPO_NEEDS_MAPS, false);
     out->workspace = read.workspace;
     status = read_map(file, EBPO_A_VERTEX_SOURCE, file->info.source_vertex_count, &read,
                       &out->vertex_source, error);
@@ -449,9 +449,9 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
         return status;
     if (read.without)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, file->in.shown,
-                              "parts to be left out are asked for, and a tree is read whole; set "
-                              "read options' `without` to 0, or read levels");
-    ebpo_expect_tree(file);
+                              "a tree is always read as a whole; set `without` of the read "
+                              "options to 0, or read levels");
+    ebpo_hint_tree(file);
     out->info = file->info;
     out->workspace = read.workspace;
     read.attributes = 1;
@@ -461,10 +461,9 @@ ebpo_status ebpo_file_read_tree(const ebpo_file *file, const ebpo_read_options *
     return status;
 }
 
-/* Place of each item when they are sorted by their source number (distinct, below limit): how many
- * smaller ones there are. In *place, to be freed. Counted in a bit for each number that there may
- * be, as a head may state far more of them than the file has items: pages without items stay empty.
- */
+/* Computes the rank of each item by source index (distinct, below limit). The caller frees *place.
+ * Uses a bit for each possible index, as a head may state far more of them than the file has items:
+ * pages without items stay empty. */
 static ebpo_status sort_by_source(ebpo_workspace *workspace, const uint32_t *source, uint64_t count,
                                   uint64_t limit, uint32_t **place, ebpo_error *error)
 {
@@ -587,12 +586,12 @@ ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_op
         *source_order = false;
     if (status != EBPO_OK)
         return status;
-    announce_root(file, EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS, read.attributes);
+    hint_root(file, EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS, read.attributes);
     status = ebpo_file_read_mesh(file, &read, out, error);
     if (status == EBPO_OK && maps)
         status = to_source_order(file, out, &read, error);
-    if (status == EBPO_OK && (!maps || file->info.mend.welded_vertices))
-        ebpo_attributes_drop_others(out->attributes); /* numbers of vertices are the source's */
+    if (status == EBPO_OK && (!maps || file->info.repair_record.welded_vertices))
+        ebpo_attributes_drop_others(out->attributes); /* vertex indices are those of the source */
     if (source_order)
         *source_order = status == EBPO_OK && maps;
     if (status != EBPO_OK)
@@ -602,7 +601,7 @@ ebpo_status ebpo_file_read_source_mesh(const ebpo_file *file, const ebpo_read_op
 
 /* --- recomputing checksums --- */
 
-/* Arrays are independent, so threads take whole ones; chunks within one must come in order. */
+/* Threads take whole arrays, which are independent; chunks within an array must come in order. */
 typedef struct taking {
     const ebpo_info *info;
     ebpo_array_digest digest;
@@ -653,8 +652,8 @@ static ebpo_status compare_digest(content_job *j, int which, const uint8_t state
     ebpo_content_free(&content);
     if (status == EBPO_OK && ebpo_digest_differs(stated, digest))
         status = ebpo_fail_file(error, EBPO_E_FORMAT, j->file->in.shown,
-                                "the content is not what %s says: the file was changed; "
-                                "get a fresh copy",
+                                "the content does not match %s: the file was changed; get a "
+                                "fresh copy",
                                 name);
     return status;
 }
@@ -668,7 +667,7 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
         return status;
     content_job j = { .file = file, .alone = read };
     j.alone.threads = 1;
-    /* then in the order of the file, in which it comes; else the largest first */
+    /* remote: in file order; otherwise the largest first */
     bool far = ebpo_input_expects(&file->in);
     for (int id = EBPO_ARRAYS - 1; id >= EBPO_LEVEL_ARRAYS; id--)
         if (file->root_array[id].present && ebpo_content_has(&file->info, (ebpo_array_id)id))
@@ -682,7 +681,7 @@ ebpo_status ebpo_file_check_content(const ebpo_file *file, const ebpo_read_optio
         j.array[i] = j.array[j.count - 1 - i];
         j.array[j.count - 1 - i] = other;
     }
-    ebpo_expect_tree(file);
+    ebpo_hint_tree(file);
     status =
         ebpo_parallel_for(read.threads, NULL, j.count, 1, digest_arrays, &j, NULL, "check", error);
     if (status == EBPO_OK)

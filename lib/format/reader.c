@@ -1,9 +1,8 @@
-/* Reading chunks of an open file: fetch the stored bytes, compare their checksum, decompress and
- * unshuffle them. Chunks are independent, so several threads read at once, each with its own
- * decoding state; idle states stay with the file, because setting up a decoder takes longer than
- * decoding a chunk. Before a reading, callers collect the chunks that they will read
- * (ebpo_expected) and announce them as prefetch hints, so that a remote source fetches them in
- * few requests; a hint never fails a reading. */
+/* Reads chunks of an open file: fetches the stored bytes, compares their checksum, decompresses and
+ * unshuffles them. Several threads read independent chunks at once, each with its own decoding
+ * state. Idle states stay with the file, because creating a decoder takes longer than decoding a
+ * chunk. Before reading, callers collect the chunks (ebpo_hints) and send prefetch hints, so
+ * that a remote source fetches them in few requests. A failed hint never fails a read. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +17,7 @@
 #include "hdf5_read/coding.h"
 #include "hdf5_read/face_gates.h"
 
-/* At most so many wait, each with at most so much room for what is stored. */
+/* Maximum number of idle readers, and of bytes in each buffer for stored chunks. */
 enum { IDLE_MAX = 4, STORED_MAX = 1 << 18 };
 
 void ebpo_idle_readers_make(ebpo_idle_readers *readers)
@@ -43,7 +42,7 @@ void ebpo_idle_readers_free(ebpo_idle_readers *readers)
     pthread_mutex_destroy(&readers->lock);
 }
 
-/* Its large members need no zeros. */
+/* Creates a reader; its large members need no zeros. */
 static ebpo_idle_reader *new_reader(void)
 {
     ebpo_idle_reader *r = ebpo_alloc(1, sizeof *r);
@@ -90,28 +89,28 @@ void ebpo_idle_readers_give(ebpo_idle_readers *readers, ebpo_idle_reader *r)
 
 /* --- prefetch hints --- */
 
-static void add_range(ebpo_expected *e, uint64_t offset, uint64_t size)
+static void add_range(ebpo_hints *e, uint64_t offset, uint64_t size)
 {
     ebpo_range *last = e->count ? &e->range[e->count - 1] : NULL;
     if (last && last->offset + last->size == offset)
         last->size += size;
     else if (ebpo_grow(&e->range, &e->capacity, e->count + 1,
-                       sizeof *e->range)) /* else it is read without having been announced */
+                       sizeof *e->range)) /* otherwise it is read without a prefetch hint */
         e->range[e->count++] = (ebpo_range){ offset, size };
 }
 
-bool ebpo_expected_wanted(const ebpo_expected *e)
+bool ebpo_hints_wanted(const ebpo_hints *e)
 {
     return e->summed || ebpo_input_expects(&e->file->in) ||
            (e->near && ebpo_input_hints(&e->file->in));
 }
 
-void ebpo_expect_chunks(ebpo_expected *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
+void ebpo_hint_chunks(ebpo_hints *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
 {
-    /* A failure is the reading's to tell. */
-    if (!ebpo_expected_wanted(e) || !array->present || e->failed)
+    /* The actual read reports failures. */
+    if (!ebpo_hints_wanted(e) || !array->present || e->failed)
         return;
-    /* not again and again: each time would take all retries */
+    /* once only, as each attempt takes all retries */
     e->failed = ebpo_reader_locate(e->file, array, NULL) != EBPO_OK;
     if (e->failed)
         return;
@@ -119,31 +118,31 @@ void ebpo_expect_chunks(ebpo_expected *e, const ebpo_array_in *array, uint64_t b
         add_range(e, array->chunks[i].address, array->chunks[i].bytes);
 }
 
-void ebpo_expect_array(ebpo_expected *e, const ebpo_array_in *array)
+void ebpo_hint_array(ebpo_hints *e, const ebpo_array_in *array)
 {
-    ebpo_expect_chunks(e, array, 0, array->present ? ebpo_shape_chunks(&array->shape) : 0);
+    ebpo_hint_chunks(e, array, 0, array->present ? ebpo_shape_chunks(&array->shape) : 0);
 }
 
-void ebpo_expect_level(ebpo_expected *e, int level, uint32_t without)
+void ebpo_hint_level(ebpo_hints *e, int level, uint32_t without)
 {
     uint32_t needs = ebpo_schema_has(&e->file->info) & ~without;
     for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
         if (ebpo_schema[id].needs & needs)
-            ebpo_expect_array(e, &e->file->level_array[level][id]);
+            ebpo_hint_array(e, &e->file->level_array[level][id]);
 }
 
-void ebpo_expect_root(ebpo_expected *e, uint32_t needs)
+void ebpo_hint_root(ebpo_hints *e, uint32_t needs)
 {
-    /* the list of sums comes with whatever is read first */
-    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_CHUNK_SUMS; id++)
+    /* the list of chunk checksums is read together with the first data */
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_CHUNK_CHECKSUMS; id++)
         if (ebpo_schema[id].needs & needs)
-            ebpo_expect_array(e, &e->file->root_array[id]);
+            ebpo_hint_array(e, &e->file->root_array[id]);
 }
 
-void ebpo_expect_attributes(ebpo_expected *e)
+void ebpo_hint_attributes(ebpo_hints *e)
 {
     for (int i = 0; i < e->file->attributes.arrays; i++)
-        ebpo_expect_array(e, &e->file->attributes.array[i]);
+        ebpo_hint_array(e, &e->file->attributes.array[i]);
 }
 
 static int compare_ranges(const void *a, const void *b)
@@ -152,8 +151,8 @@ static int compare_ranges(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* By place, joined where at most so many bytes lie between them. */
-static void join_ranges(ebpo_expected *e, uint64_t between)
+/* Sorts ranges by offset, and joins them across gaps of at most `between` bytes. */
+static void join_ranges(ebpo_hints *e, uint64_t between)
 {
     uint64_t kept = 0;
     if (e->count)
@@ -169,57 +168,58 @@ static void join_ranges(ebpo_expected *e, uint64_t between)
     e->count = kept;
 }
 
-/* Each takes a call of the system. */
-static void hint_system(ebpo_expected *e)
+/* Sends hints to the operating system; each range takes a system call. */
+static void hint_system(ebpo_hints *e)
 {
     enum { BETWEEN = 16 << 10 };
     join_ranges(e, BETWEEN);
     ebpo_input_hint(&ebpo_reader_own(e->file)->in, e->range, e->count);
 }
 
-uint64_t ebpo_expected_bytes(ebpo_expected *e)
+uint64_t ebpo_hints_bytes(ebpo_hints *e)
 {
     uint64_t sum = 0;
     join_ranges(e, 0);
     for (uint64_t i = 0; i < e->count; i++)
         sum += e->range[i].size;
     free(e->range);
-    *e = (ebpo_expected)EBPO_EXPECTED_INIT(e->file);
+    *e = (ebpo_hints)EBPO_HINTS_INIT(e->file);
     return sum;
 }
 
-/* Without the list of sums nothing is read. */
-static bool wants_sums(const ebpo_file *file)
+/* Returns true if the list of chunk checksums is still to be read, which precedes all other data.
+ */
+static bool wants_checksums(const ebpo_file *file)
 {
-    return file->has_sums && !atomic_load(&file->summed);
+    return file->has_checksums && !atomic_load(&file->summed);
 }
 
-static ebpo_range where_sums(const ebpo_file *file)
+static ebpo_range where_checksums(const ebpo_file *file)
 {
-    const ebpo_chunk_place *at = file->root_array[EBPO_A_CHUNK_SUMS].chunks;
+    const ebpo_chunk_location *at = file->root_array[EBPO_A_CHUNK_CHECKSUMS].chunks;
     return (ebpo_range){ at->address, at->bytes };
 }
 
-void ebpo_expect_all(ebpo_expected *e)
+void ebpo_hint_all(ebpo_hints *e)
 {
-    if (e->count && wants_sums(e->file))
-        add_range(e, where_sums(e->file).offset, where_sums(e->file).size);
+    if (e->count && wants_checksums(e->file))
+        add_range(e, where_checksums(e->file).offset, where_checksums(e->file).size);
     if (ebpo_input_expects(&e->file->in))
         ebpo_input_expect(&ebpo_reader_own(e->file)->in, e->range, e->count);
     else
         hint_system(e);
     free(e->range);
-    *e = (ebpo_expected)EBPO_EXPECTED_INIT(e->file);
+    *e = (ebpo_hints)EBPO_HINTS_INIT(e->file);
 }
 
-/* Not of a size that no file has for its first levels. */
+/* Returns false if the stated size is implausible for the first levels. */
 static bool is_top(const ebpo_info *info)
 {
     enum { SHARE = 16, ANYWAY = 1 << 20 };
     return info->top_bytes <= info->file_bytes / SHARE + ANYWAY;
 }
 
-void ebpo_expect_top(const ebpo_file *file)
+void ebpo_hint_top(const ebpo_file *file)
 {
     const ebpo_info *info = &file->info;
     ebpo_file *own = ebpo_reader_own(file);
@@ -228,11 +228,11 @@ void ebpo_expect_top(const ebpo_file *file)
     if (!ebpo_input_expects(&file->in) || !file->has_places || atomic_load(&file->located) ||
         !is_top(info))
         return;
-    const ebpo_chunk_place *places = file->root_array[EBPO_A_PLACES].chunks;
+    const ebpo_chunk_location *places = file->root_array[EBPO_A_PLACES].chunks;
     ebpo_range range[4] = { { places->address, places->bytes } };
     size_t count = 1;
-    if (wants_sums(file))
-        range[count++] = where_sums(file);
+    if (wants_checksums(file))
+        range[count++] = where_checksums(file);
     from = file->in.source.prefetched;
     if (from < info->chunk_index_offset && info->chunk_index_offset <= top)
         range[count++] = (ebpo_range){ from, info->chunk_index_offset - from };
@@ -244,26 +244,26 @@ void ebpo_expect_top(const ebpo_file *file)
 
 void ebpo_file_prefetch_levels(const ebpo_file *file, int first, int last)
 {
-    ebpo_expected e = EBPO_EXPECTED_INIT(file);
+    ebpo_hints e = EBPO_HINTS_INIT(file);
     int end = last < file->info.level_count - 1 ? last : file->info.level_count - 1;
     for (int level = first < 0 ? 0 : first; level <= end; level++)
-        ebpo_expect_level(&e, level, 0);
-    ebpo_expect_all(&e);
+        ebpo_hint_level(&e, level, 0);
+    ebpo_hint_all(&e);
 }
 
-void ebpo_expect_tree(const ebpo_file *file)
+void ebpo_hint_tree(const ebpo_file *file)
 {
-    ebpo_expected e = EBPO_EXPECTED_INIT(file);
+    ebpo_hints e = EBPO_HINTS_INIT(file);
     for (int level = 0; level < file->info.level_count; level++)
-        ebpo_expect_level(&e, level, 0);
-    ebpo_expect_root(&e, ~0u);
-    ebpo_expect_attributes(&e);
-    ebpo_expect_all(&e);
+        ebpo_hint_level(&e, level, 0);
+    ebpo_hint_root(&e, ~0u);
+    ebpo_hint_attributes(&e);
+    ebpo_hint_all(&e);
 }
 
 enum {
     RUN_BYTES = 1 << 20, /* of one read, at most */
-    RUN_CHUNKS = 64      /* that a thread takes on at a time */
+    RUN_CHUNKS = 64      /* for a thread at a time */
 };
 
 typedef struct job {
@@ -272,11 +272,11 @@ typedef struct job {
     ebpo_rows_fn take;
     void *context;
     ebpo_workspace *workspace;
-    ebpo_idle_reader **reader; /* for each worker, taken when first needed */
+    ebpo_idle_reader **reader; /* for each worker, created when first needed */
 } job;
 
-/* Bytes [address, address + bytes) of the file to reader->stored, with room for at least
- * `capacity`. */
+/* Reads bytes [address, address + bytes) of the file to reader->stored, which has space for at
+ * least `capacity`. */
 static ebpo_status fetch_stored(const ebpo_file *file, ebpo_chunk_reader *reader, uint64_t address,
                                 size_t bytes, size_t capacity, ebpo_error *error)
 {
@@ -300,7 +300,7 @@ static ebpo_status chunk_damaged(const ebpo_file *file, const ebpo_array_in *arr
                         why);
 }
 
-/* As HDF5 would give it. */
+/* Unpacks a chunk to the bytes that HDF5 would return. */
 static ebpo_status unpack_stored(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                                  ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *raw,
                                  ebpo_error *error)
@@ -317,8 +317,8 @@ static ebpo_status unpack_stored(const ebpo_file *file, const ebpo_array_in *arr
     return status == EBPO_OK ? EBPO_OK : chunk_damaged(file, array, chunk, why, error);
 }
 
-/* From gates to codes of high-water, with filling. Single bytes are not shuffled: the coder's room
- * for that is free. */
+/* Converts gates to high-water codes, with padding. Single bytes are not shuffled, so the coder's
+ * buffer for that is free. */
 static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                                 ebpo_chunk_coder *coder, const uint8_t *stored, uint8_t *codes,
                                 ebpo_error *error)
@@ -332,7 +332,7 @@ static ebpo_status unpack_gates(const ebpo_file *file, const ebpo_array_in *arra
     memset(codes + rows * row, 0, (array->shape.chunk_rows - rows) * row);
     return ebpo_gates_decode(coder->scratch, (uint32_t)rows, codes)
                ? EBPO_OK
-               : chunk_damaged(file, array, chunk, "its streams are those of no faces", error);
+               : chunk_damaged(file, array, chunk, "its streams do not encode faces", error);
 }
 
 static ebpo_status decode_stored(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
@@ -348,10 +348,10 @@ static ebpo_status fetch_chunk(const ebpo_file *file, const ebpo_array_in *array
 {
     ebpo_status status = ebpo_reader_locate(file, array, error);
     if (status == EBPO_OK)
-        status = ebpo_chunk_sums_read(file, error);
+        status = ebpo_chunk_checksums_read(file, error);
     if (status != EBPO_OK)
         return status;
-    const ebpo_chunk_place *at = &array->chunks[chunk];
+    const ebpo_chunk_location *at = &array->chunks[chunk];
     return fetch_stored(file, reader, at->address, at->bytes, ebpo_reader_chunk_bound(array),
                         error);
 }
@@ -375,11 +375,11 @@ ebpo_status ebpo_reader_gates(const ebpo_file *file, uint64_t chunk, ebpo_chunk_
                : status;
 }
 
-/* End of the run of chunks from `begin` on (at most to `end`) that lie one behind the other in the
- * file, up to RUN_BYTES: one read brings them all. */
+/* Returns the end of the run of chunks from `begin` on (at most `end`) that are contiguous in the
+ * file, up to RUN_BYTES: one read fetches them all. */
 static uint64_t find_run(const ebpo_array_in *array, uint64_t begin, uint64_t end, size_t *bytes)
 {
-    const ebpo_chunk_place *c = array->chunks;
+    const ebpo_chunk_location *c = array->chunks;
     uint64_t next = begin + 1;
     *bytes = c[begin].bytes;
     while (next < end && c[next].address == c[begin].address + *bytes &&
@@ -434,7 +434,7 @@ ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
     uint64_t chunks = ebpo_shape_chunks(&array->shape);
     ebpo_status status = ebpo_reader_locate(file, array, error);
     if (status == EBPO_OK)
-        status = ebpo_chunk_sums_read(file, error);
+        status = ebpo_chunk_checksums_read(file, error);
     if (status != EBPO_OK)
         return status;
     unsigned threads = chunks > 2 ? ebpo_thread_count(options->threads) : 1;
@@ -446,7 +446,7 @@ ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_array_in *array,
     j.reader = ebpo_alloc_zero(threads, sizeof *j.reader);
     if (!j.reader)
         return ebpo_fail_memory(error, threads * sizeof *j.reader);
-    /* each thread gets a few turns, of runs as long as that allows */
+    /* a few turns for each thread, with the longest possible runs */
     uint64_t grain = chunks / (threads * 4) + 1;
     if (grain > RUN_CHUNKS)
         grain = RUN_CHUNKS;
@@ -475,7 +475,7 @@ static ebpo_status take_integers(void *context, const ebpo_array_in *array, uint
     return EBPO_OK;
 }
 
-/* Reads integers into `values`, of `size` bytes each. */
+/* Reads integers into `values`, `size` bytes each. */
 static ebpo_status reader_integers(const ebpo_file *file, const ebpo_array_in *array,
                                    const ebpo_read_options *options, void *values, size_t size,
                                    ebpo_error *error)

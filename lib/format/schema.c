@@ -1,10 +1,9 @@
-/* The arrays of a file, as a table in memory, and the constraints on them. array_table.inc lists
- * all arrays and counts; this file makes the tables of them, and from these the paths, shapes,
- * codings and needs that the writer, the reader and the subsets use, so that none of them names
- * an array twice. The second part checks the arrays of a tree, whether it was read from a file
- * (EBPO_E_FORMAT) or comes from a caller who writes it (EBPO_E_ARGUMENT): each check names the
- * level, the array and the constraint. Source: format-spec/README.md, "Arrays" and
- * "Constraints". */
+/* Defines the arrays of a file as a table in memory, and the constraints on them. array_table.inc
+ * lists all arrays and counts. This file derives tables from it: paths, shapes, codings and needs
+ * for the writer, the reader and subsets, so that each array is named once. The second part checks
+ * the arrays of a tree from a file (EBPO_E_FORMAT) or from a caller who writes it
+ * (EBPO_E_ARGUMENT); each check names the level, the array and the constraint. Source:
+ * format-spec/README.md, "Arrays" and "Constraints". */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -22,7 +21,7 @@
 #include "hdf5_read/face_gates.h"
 
 #define REQUIRED       .if_needed = false
-#define USUALLY(value) .if_needed = true, .usual = (value)
+#define USUALLY(value) .if_needed = true, .standard = (value)
 #define OF_LEVEL(type, field)                                                          \
     .is_signed = _Generic((type)0, int8_t : 1, int16_t : 1, int32_t : 1, default : 0), \
     .held_size = sizeof(type), .held = offsetof(ebpo_level, field)
@@ -57,16 +56,16 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
                       .bytes = offsetof(ebpo_stored_sizes, bytes_),                        \
                       .coding = coding_,                                                   \
                       .about = about_ },
-#define TABLE_ARRAY(ID, path, cols_, stored, per_, about_)                  \
-    [EBPO_A_##ID] = { .name = path,                                         \
-                      .per = EBPO_PER_##per_,                               \
-                      .needs = EBPO_NEEDS_SUBTREES,                         \
-                      .cols = cols_,                                        \
-                      .sizes = stored,                                      \
-                      .since = 1,                                           \
-                      .if_needed = EBPO_PER_##per_ == EBPO_PER_OUTER_BLOCK, \
-                      .bytes = offsetof(ebpo_stored_sizes, subtree_bytes),  \
-                      .coding = "plain",                                    \
+#define TABLE_ARRAY(ID, path, cols_, stored, per_, about_)                   \
+    [EBPO_A_##ID] = { .name = path,                                          \
+                      .per = EBPO_PER_##per_,                                \
+                      .needs = EBPO_NEEDS_SUBTREES,                          \
+                      .cols = cols_,                                         \
+                      .sizes = stored,                                       \
+                      .since = 1,                                            \
+                      .if_needed = EBPO_PER_##per_ == EBPO_PER_SHARED_BLOCK, \
+                      .bytes = offsetof(ebpo_stored_sizes, subtree_bytes),   \
+                      .coding = "plain",                                     \
                       .about = about_ },
 #define SUM_ARRAY(ID, path, stored, per_, about_)                      \
     [EBPO_A_##ID] = { .name = path,                                    \
@@ -90,7 +89,7 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
 };
 
 typedef struct count_spec {
-    const char *name; /* attribute */
+    const char *name; /* attribute name */
     uint32_t needs;
     uint16_t in_level, in_summary; /* offsets */
 } count_spec;
@@ -102,13 +101,13 @@ static const count_spec level_counts[EBPO_COUNTS] = {
 #include "format/array_table.inc"
 };
 
-/* Rows and fields cannot disagree. */
+/* Checks that rows and fields agree. */
 #define LEVEL_ARRAY(ID, name, field, type, ...)                                 \
     _Static_assert(_Generic(((ebpo_level *)0)->field, type * : 1, default : 0), \
                    "ebpo_level." #field ": another type than in its row of array_table.inc");
 #include "format/array_table.inc"
 
-/* Values are narrowed from 32 bits, or have one size; what leaf_skip holds is a difference. */
+/* Values are narrowed from 32 bits, or have one size; leaf_skip holds differences. */
 #define LEVEL_ARRAY(ID, name, field, type, stored, ...)                               \
     _Static_assert((stored) & ((stored)-1)                                            \
                        ? sizeof(type) == 4                                            \
@@ -116,7 +115,7 @@ static const count_spec level_counts[EBPO_COUNTS] = {
                    #name ": its sizes in the file do not go with its type in memory");
 #include "format/array_table.inc"
 
-/* What ebpo_level is made of: the rows' pointers and counts, and what is named here. */
+/* The contents of ebpo_level: the pointers and counts of the rows, and the fields listed here. */
 struct all_of_level {
 #define LEVEL_ARRAY(ID, name, field, type, ...) type *field;
 #define LEVEL_COUNT(ID, attribute, field, ...)  uint64_t field;
@@ -213,7 +212,7 @@ uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level)
     case EBPO_PER_FACE_CHUNK: return face_chunks(info);
     case EBPO_PER_SUBTREE_CHUNK: return subtree_chunks(info);
     case EBPO_PER_SUBTREE: return subtree_rows(info);
-    case EBPO_PER_OUTER_BLOCK:
+    case EBPO_PER_SHARED_BLOCK:
     case EBPO_PER_CHUNK: return EBPO_ROWS_STATED;
     default: return load_field(l, level_counts[per].in_summary);
     }
@@ -262,13 +261,13 @@ static bool is_value(const void *element, size_t size, int8_t value)
     }
 }
 
-bool ebpo_level_is_usual(const ebpo_level *level, int id)
+bool ebpo_level_is_default(const ebpo_level *level, int id)
 {
     const ebpo_array_spec *spec = &ebpo_schema[id];
     const char *values = ebpo_level_array(level, id);
     uint64_t count = values ? ebpo_level_rows(level, id) : 0;
     EBPO_FOR_ITEMS(level->workspace, i, 0, count)
-        if (!is_value(values + i * spec->held_size, spec->held_size, spec->usual))
+        if (!is_value(values + i * spec->held_size, spec->held_size, spec->standard))
             return false;
     return true;
 }
@@ -336,7 +335,8 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
     uint64_t groups = ebpo_schema_groups(info, level);
     if (arrays->group_count != groups || !arrays->types)
         return ebpo_check_fail(check, level, "types",
-                               "there is not one group for each gray node of the level above",
+                               "there is not exactly one group for each gray node of the level "
+                               "above",
                                error);
     if (level == 0 && arrays->types[0] > 3)
         return ebpo_check_fail(check, level, "types", "the root has siblings", error);
@@ -350,7 +350,8 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
     if (level && empty != info->level[level - 1].pruned_count)
         return ebpo_check_fail(
             check, level, "types",
-            info->pruned ? "there is not one empty group for each pruned node of the level above"
+            info->pruned ? "there is not exactly one empty group for each pruned node of the "
+                           "level above"
                          : "a group is 0: all children of a gray node are white",
             error);
     const ebpo_level_summary *s = &info->level[level];
@@ -361,7 +362,7 @@ static ebpo_status check_types(const ebpo_check *check, const ebpo_info *info, i
     return EBPO_OK;
 }
 
-/* Whether the arrays are there that must be, and none that cannot be. */
+/* Checks that all required arrays are present and no others. */
 static ebpo_status check_presence(const ebpo_check *check, const ebpo_info *info, int level,
                                   const ebpo_level *arrays, ebpo_error *error)
 {
@@ -392,7 +393,7 @@ static ebpo_status check_planes(const ebpo_check *check, int level, const char *
     EBPO_FOR_ITEMS(check->workspace, i, 0, plane_count) {
         int32_t n[3], d;
         if (!ebpo_plane_code_decode(planes[i], n, &d))
-            return ebpo_check_fail(check, level, planes_name, "a code stands for no plane", error);
+            return ebpo_check_fail(check, level, planes_name, "invalid plane code", error);
     }
     return EBPO_OK;
 }
@@ -414,12 +415,12 @@ static ebpo_status check_windings(const ebpo_check *check, const ebpo_info *info
         EBPO_FOR_ITEMS(check->workspace, i, 0, arrays->black_count)
             if (!ebpo_rule_inside(info->rule, arrays->black_winding[i]))
                 return ebpo_check_fail(check, level, "black_winding",
-                                       "a black node lies outside by the winding rule", error);
+                                       "a black node is outside by the winding rule", error);
     if (arrays->white_winding)
         EBPO_FOR_ITEMS(check->workspace, i, 0, arrays->white_count)
             if (ebpo_rule_inside(info->rule, arrays->white_winding[i]))
                 return ebpo_check_fail(check, level, "white_winding",
-                                       "a white node lies inside by the winding rule", error);
+                                       "a white node is inside by the winding rule", error);
     return EBPO_OK;
 }
 
@@ -430,8 +431,7 @@ static ebpo_status check_refs(const ebpo_check *check, int level, const uint32_t
         if (refs[k] >= first || (k && refs[k] <= refs[k - 1]))
             return ebpo_check_fail(
                 check, level, "leaf_refs",
-                "a leaf refers to faces out of order, or to one that does not come before its own",
-                error);
+                "a leaf refers to faces out of order, or to one that is not before its own", error);
     return EBPO_OK;
 }
 
@@ -446,7 +446,7 @@ static ebpo_status check_leaves(const ebpo_check *check, const ebpo_info *info, 
             arrays->leaf_new[i] > info->face_count - first)
             return ebpo_check_fail(
                 check, level, "leaf_skip",
-                "a leaf's new faces overlap another's or lie beyond the last face", error);
+                "a leaf's new faces overlap another leaf's or are beyond the last face", error);
         end = first + arrays->leaf_new[i];
         news += arrays->leaf_new[i];
         if (arrays->leaf_ref_count[i] > s->ref_count - refs)
@@ -491,7 +491,7 @@ ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info, int
 typedef struct walk {
     const ebpo_check *check;
     const ebpo_tree *tree;
-    /* next of each level: depth-first order passes them in octcode order */
+    /* next item of each level: depth-first order visits them in octcode order */
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
     uint64_t seen;
 } walk;
@@ -522,15 +522,15 @@ ebpo_status ebpo_check_order(const ebpo_check *check, const ebpo_tree *tree, ebp
     walk w = { .check = check, .tree = tree };
     ebpo_status status = walk_group(&w, 0, error);
     if (status == EBPO_OK && w.seen != tree->info.face_count)
-        return ebpo_check_fail(check, 0, "leaf_new",
-                               "the leaves do not have every face as a new one once", error);
+        return ebpo_check_fail(check, 0, "leaf_new", "not every face is new in exactly one leaf",
+                               error);
     return status;
 }
 
 ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uint32_t *map,
                            uint64_t count, uint64_t limit, ebpo_error *error)
 {
-    limit = limit <= UINT32_MAX ? limit : UINT64_C(1) << 32; /* all that 32 bits can name */
+    limit = limit <= UINT32_MAX ? limit : UINT64_C(1) << 32; /* all indices of 32 bits */
     uint64_t *seen = ebpo_alloc_zero(limit / 64 + 1, sizeof *seen);
     if (!seen)
         return ebpo_fail_memory(error, limit / 8);
@@ -539,7 +539,7 @@ ebpo_status ebpo_check_map(const ebpo_check *check, const char *array, const uin
         uint64_t bit = UINT64_C(1) << map[i] % 64;
         if (map[i] >= limit || seen[map[i] / 64] & bit) {
             status = ebpo_check_fail(check, -1, array,
-                                     "a source number is out of range or used twice", error);
+                                     "a source index is out of range or used twice", error);
             break;
         }
         seen[map[i] / 64] |= bit;

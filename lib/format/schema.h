@@ -1,5 +1,5 @@
-/* The arrays of a file, for all who carry them: the rows of array_table.inc as an enumeration and a
- * table. format-spec/README.md, "Arrays". */
+/* Arrays of a file: the rows of array_table.inc as an enumeration and a table.
+ * format-spec/README.md, "Arrays". */
 #ifndef EBPO_FORMAT_SCHEMA_H
 #define EBPO_FORMAT_SCHEMA_H
 
@@ -9,7 +9,7 @@
 
 #include "hdf5_read/chunk.h"
 
-/* In the order in which they lie in the file. Up to EBPO_LEVEL_ARRAYS once for each level. */
+/* In file order. Up to EBPO_LEVEL_ARRAYS once for each level. */
 typedef enum ebpo_array_id {
 #define LEVEL_ARRAY(ID, ...) EBPO_A_##ID,
 #define LEVEL_INDEX(ID, ...) EBPO_A_##ID,
@@ -20,31 +20,30 @@ typedef enum ebpo_array_id {
 #define TABLE_ARRAY(ID, ...) EBPO_A_##ID,
 #define SUM_ARRAY(ID, ...)   EBPO_A_##ID,
 #include "format/array_table.inc"
-    /* all arrays of /attributes, which files have as many of as they like: the `level` is then the
-     * number of the array there */
+    /* all arrays of /attributes, in any number; `level` is then the number of the array there */
     EBPO_A_ATTRIBUTE,
     EBPO_ARRAYS
 } ebpo_array_id;
 
-/* One row for each what. The first ones are counted in the attributes of a level. */
+/* The item that has one row. The first ones are counted in the attributes of a level. */
 typedef enum ebpo_per {
 #define LEVEL_COUNT(ID, ...) EBPO_PER_##ID,
 #include "format/array_table.inc"
     EBPO_COUNTS,
     EBPO_PER_GROUP = EBPO_COUNTS,
-    EBPO_PER_GROUP_BLOCK, /* of EBPO_INDEX_ROWS groups, and so on */
+    EBPO_PER_GROUP_BLOCK, /* block of EBPO_INDEX_ROWS groups, and so on */
     EBPO_PER_GRAY_BLOCK,
     EBPO_PER_LEAF_BLOCK,
     EBPO_PER_VERTEX,
     EBPO_PER_FACE,
     EBPO_PER_FACE_CHUNK,
-    EBPO_PER_SUBTREE_CHUNK, /* of the rows of subtrees */
+    EBPO_PER_SUBTREE_CHUNK, /* chunk of the rows of subtrees */
     EBPO_PER_SUBTREE,
-    EBPO_PER_OUTER_BLOCK,
+    EBPO_PER_SHARED_BLOCK,
     EBPO_PER_CHUNK
 } ebpo_per;
 
-/* What an array is there for, as bits: parts, and whether winding numbers are defined. */
+/* Conditions for the presence of an array, as bits: parts, and defined winding numbers. */
 enum {
     EBPO_NEEDS_PLANES = EBPO_PART_PLANES,
     EBPO_NEEDS_MESH = EBPO_PART_MESH,
@@ -60,25 +59,25 @@ enum {
 
 enum {
     EBPO_INDEX_ROWS = 4096,            /* items between two rows of an index array */
-    EBPO_COLOUR_OF_NOTHING = 0x808080, /* of gray nodes of which nothing is known */
+    EBPO_COLOUR_OF_NOTHING = 0x808080, /* for gray nodes without a known colour */
     EBPO_PATH_BYTES = 48,
     /* with the part `subtrees` (format-spec/README.md, section 9) */
     EBPO_FACE_BLOCK = 2048, /* rows of a chunk */
     EBPO_VERTEX_BLOCK = 1024,
     EBPO_SUBTREE_ROWS = 128,
-    EBPO_COLS_OF_SUBTREES = 255 /* ebpo_schema_cols tells */
+    EBPO_COLS_OF_SUBTREES = 255 /* see ebpo_schema_cols */
 };
 
-/* Columns of /subtrees/counts: what of a subtree, and of what lies between it and the one before
+/* Columns of /subtrees/counts: items of a subtree, and items between it and the one before
  * (`BEFORE`: of leaves down to the roots' level). */
 enum {
-    EBPO_S_FACES_BEFORE, /* new ones */
+    EBPO_S_FACES_BEFORE, /* new faces */
     EBPO_S_FACES,
-    EBPO_S_VERTICES_BEFORE, /* first used by these */
+    EBPO_S_VERTICES_BEFORE, /* first used by these faces */
     EBPO_S_VERTICES,
-    EBPO_S_OUTER_FACES, /* rows of /subtrees/outer about blocks of faces */
-    EBPO_S_OUTER_VERTICES,
-    EBPO_SUBTREE_LEVELS /* then for each level below the roots': */
+    EBPO_S_SHARED_FACES, /* rows of /subtrees/outer for blocks of faces */
+    EBPO_S_SHARED_VERTICES,
+    EBPO_SUBTREE_LEVELS /* then for each level below the roots: */
 };
 enum {
     EBPO_S_GRAY,
@@ -87,86 +86,86 @@ enum {
     EBPO_S_PLANES,
     EBPO_S_LEAF_PLANES,
     EBPO_S_REFS,
-    EBPO_S_ENDS, /* by how much the end of the level's new faces grows */
+    EBPO_S_ENDS, /* increase of the end of the level's new faces */
     EBPO_SUBTREE_LEVEL_COLS
 };
 
-/* `level`: below the roots'; `what`: one of the last. */
+/* Returns a column. `level`: below the roots; `what`: one of the last constants. */
 static inline unsigned ebpo_subtree_column(const ebpo_info *info, int level, unsigned what)
 {
     return EBPO_SUBTREE_LEVELS +
            EBPO_SUBTREE_LEVEL_COLS * (unsigned)(level - info->subtree_level - 1) + what;
 }
 
-/* Rows of a chunk of /subtrees/counts, of which there may be fewer. */
+/* Returns the rows of a chunk of /subtrees/counts; the array may have fewer. */
 uint32_t ebpo_subtree_rows(const ebpo_info *info);
 
-/* Rows of arrays whose length nothing but themselves tells. */
+/* Length of arrays that only the array itself states. */
 #define EBPO_ROWS_STATED UINT64_MAX
 
-/* The index arrays of a level, in the order of what they count. */
+/* The index arrays of a level, in the order of the items that they count. */
 enum { EBPO_INDEX_TYPES, EBPO_INDEX_GRAY, EBPO_INDEX_LEAVES, EBPO_INDEXES };
 
 typedef struct ebpo_array_spec {
-    const char *name; /* within /levels/NN, or the whole path */
+    const char *name; /* within /levels/NN, or the full path */
     ebpo_per per;
     uint32_t needs; /* any of these bits */
     uint8_t cols;   /* 0: one dimension */
-    uint8_t sizes;  /* allowed element sizes, summed: 1 + 2 + 4 + 8 */
+    uint8_t sizes;  /* sum of the allowed element sizes: 1 + 2 + 4 + 8 */
     bool is_signed;
-    bool if_needed; /* may be absent where its rows exist: then every value is the usual one */
-    int8_t usual;
+    bool if_needed; /* may be absent although its rows exist: all values are then the default */
+    int8_t standard;
     uint8_t since;      /* minor version of the format */
-    uint8_t held_size;  /* of an element in ebpo_level; 0: the array is not held there */
+    uint8_t held_size;  /* of an element in ebpo_level; 0: not stored there */
     uint16_t held;      /* offset of the pointer in ebpo_level */
-    uint16_t bytes;     /* arrays of the root: offset in ebpo_stored_sizes of their kind */
+    uint16_t bytes;     /* arrays of the root: offset of their kind in ebpo_stored_sizes */
     const char *coding; /* attribute */
     const char *about;  /* attribute */
 } ebpo_array_spec;
 
 extern const ebpo_array_spec ebpo_schema[EBPO_ARRAYS];
 
-/* How an array is stored whose values are of the shape `given`: as that, or as gates. */
+/* Returns the stored shape of an array with values of shape `given`: the same, or that of gates. */
 #define EBPO_GATES_CODING "gates"
 ebpo_shape ebpo_stored_shape(const ebpo_shape *given, bool gates);
 
-/* Absolute path of an array; `level` matters for level arrays only. */
+/* Writes the absolute path of an array; `level` matters for level arrays only. */
 void ebpo_schema_path(ebpo_array_id id, int level, char path[EBPO_PATH_BYTES]);
 
-/* Columns of an array; 0: one dimension. */
+/* Returns the columns of an array; 0: one dimension. */
 uint32_t ebpo_schema_cols(const ebpo_info *info, ebpo_array_id id);
 
-/* Rows that the head's counts and parts call for, or EBPO_ROWS_STATED; 0: the array is not in the
- * file. */
+/* Returns the rows that the head's counts and parts require, or EBPO_ROWS_STATED; 0: the array is
+ * not in the file. */
 uint64_t ebpo_schema_rows(const ebpo_info *info, ebpo_array_id id, int level);
 
-/* Rows of an index array over `count` items: one each EBPO_INDEX_ROWS, but none when one would do
- * (it is all zeros). */
+/* Returns the rows of an index array over `count` items: one for each EBPO_INDEX_ROWS, but none if
+ * one would suffice (it is all zeros). */
 uint64_t ebpo_schema_index_rows(uint64_t count);
 
-/* Groups of eight of a level, from the head's counts. */
+/* Returns the number of groups of eight in a level, from the head's counts. */
 static inline uint64_t ebpo_schema_groups(const ebpo_info *info, int level)
 {
     return level == 0 ? 1 : info->level[level - 1].gray_count;
 }
 
-/* The needs that a file, or a tree, fulfils. */
+/* Returns the needs that a file or tree fulfils. */
 static inline uint32_t ebpo_schema_has(const ebpo_info *info)
 {
     return info->parts | (info->solid ? EBPO_NEEDS_SOLID : 0) |
            (info->subtree_level ? EBPO_NEEDS_SUBTREES : 0) | EBPO_NEEDS_ALWAYS;
 }
 
-/* Lists are behind counts: of planes, leaf planes and references each node of one type has a
- * number of its own. */
+/* Lists that counts divide: planes, leaf planes and references have a count for each node of one
+ * type. */
 typedef struct ebpo_list_spec {
     ebpo_array_id counts;
     ebpo_per of;
 } ebpo_list_spec;
-/* NULL: not a list. */
+/* Returns NULL for arrays that are not lists. */
 const ebpo_list_spec *ebpo_schema_list(ebpo_per per);
 
-/* The type of the nodes that have a row each; -1: not nodes of one type. */
+/* Returns the type of the nodes with one row each, or -1. */
 int ebpo_schema_node_type(ebpo_per per);
 
 /* --- a level in memory --- */
@@ -177,10 +176,10 @@ static inline bool ebpo_schema_is_index(int id)
            ebpo_schema[id].per <= EBPO_PER_LEAF_BLOCK;
 }
 
-/* A list about all chunks: a single one itself, and not told of in any. */
+/* Returns true for a list about all chunks, which has a single chunk and is not in any list. */
 static inline bool ebpo_schema_is_list(ebpo_array_id id)
 {
-    return id == EBPO_A_PLACES || id == EBPO_A_CHUNK_SUMS;
+    return id == EBPO_A_PLACES || id == EBPO_A_CHUNK_CHECKSUMS;
 }
 
 static inline bool ebpo_schema_is_held(int id) { return ebpo_schema[id].held_size != 0; }
@@ -197,7 +196,7 @@ static inline void ebpo_level_set_array(ebpo_level *level, int id, const void *a
     memcpy((char *)level + ebpo_schema[id].held, &array, sizeof array);
 }
 
-/* Items of a level: not of index rows. */
+/* Returns the number of items of a level, except index rows. */
 uint64_t ebpo_level_count(const ebpo_level *level, ebpo_per per);
 void ebpo_level_set_count(ebpo_level *level, ebpo_per per, uint64_t count);
 
@@ -206,53 +205,53 @@ static inline uint64_t ebpo_level_rows(const ebpo_level *level, int id)
     return ebpo_level_count(level, ebpo_schema[id].per);
 }
 
-/* Whether all values are the usual one, which an array that is not there says as well. */
-bool ebpo_level_is_usual(const ebpo_level *level, int id);
+/* Returns true if all values are the default, which an absent array means as well. */
+bool ebpo_level_is_default(const ebpo_level *level, int id);
 
-/* Frees the arrays that are there for some of `needs` only. Counts stay. */
+/* Frees the arrays that only these `needs` require. Keeps counts. */
 void ebpo_level_drop(ebpo_level *level, uint32_t needs);
 
-/* Counts and volumes of a level as the head states them, of what the parts let be there; and a
- * level without arrays that is what the head states. */
+/* Return the counts and volumes of a level as stated in the head, restricted to `parts`; and a
+ * level with the head's counts and no arrays. */
 ebpo_level_summary ebpo_level_summarise(const ebpo_level *level, uint32_t parts);
 ebpo_level ebpo_level_of_summary(const ebpo_info *info, int level);
 
-/* What must hold of a tree, whether it comes from a file or from a caller about to write one:
- * format-spec/README.md, "Constraints". */
+/* Constraints on a tree from a file or from a caller who writes one: format-spec/README.md,
+ * "Constraints". */
 
-/* Who is being checked: a file (EBPO_E_FORMAT) or a caller's tree (EBPO_E_ARGUMENT). */
+/* Subject of the check: a file (EBPO_E_FORMAT) or a caller's tree (EBPO_E_ARGUMENT). */
 typedef struct ebpo_check {
     const char *shown; /* the file's name */
     ebpo_status as;
-    ebpo_workspace *workspace; /* what the arrays may be in, or NULL */
+    ebpo_workspace *workspace; /* contains the arrays, or NULL */
 } ebpo_check;
 
-/* One array of one level is wrong: "shown: /levels/03/planes: what; next". */
+/* Reports a wrong array of a level: "shown: /levels/03/planes: what; next". */
 ebpo_status ebpo_check_fail(const ebpo_check *check, int level, const char *array, const char *what,
                             ebpo_error *error);
 
-/* A level's arrays against the head's counts, and against themselves. */
+/* Checks a level's arrays against the head's counts and each other. */
 EBPO_MUST_USE ebpo_status ebpo_check_level(const ebpo_check *check, const ebpo_info *info,
                                            int level, const ebpo_level *arrays, ebpo_error *error);
 
-/* Leaves in depth-first order have faces 0 .. face_count - 1 as their new ones, in order. For trees
- * with their face lists. */
+/* Checks that leaves in depth-first order have the new faces 0 .. face_count - 1, in order. For
+ * trees with face lists. */
 EBPO_MUST_USE ebpo_status ebpo_check_order(const ebpo_check *check, const ebpo_tree *tree,
                                            ebpo_error *error);
 
-/* A map's values are distinct and below `limit`. */
+/* Checks that a map's values are distinct and below `limit`. */
 EBPO_MUST_USE ebpo_status ebpo_check_map(const ebpo_check *check, const char *array,
                                          const uint32_t *map, uint64_t count, uint64_t limit,
                                          ebpo_error *error);
 
-/* Vertices are finite and faces name vertices that exist, in first-use order. */
+/* Checks that vertices are finite and that faces refer to existing vertices, in first-use order. */
 EBPO_MUST_USE ebpo_status ebpo_check_finite(const ebpo_check *check, const ebpo_mesh *mesh,
                                             ebpo_error *error);
 
-/* The arrays of /attributes in a file: a header, then of each array of attributes its values and,
- * of lists of different lengths, their items. format-spec/README.md, "Attributes". */
+/* The arrays of /attributes in a file: a header, then for each attribute array its values and, for
+ * lists of different lengths, their items. format-spec/README.md, "Attributes". */
 
-/* Numbers of arrays, and their paths. */
+/* Convert between attribute arrays, their numbers and paths. */
 static inline int ebpo_values_number(uint64_t n) { return 1 + 2 * (int)n; }
 static inline int ebpo_items_number(uint64_t n) { return 2 + 2 * (int)n; }
 void ebpo_attribute_path(int number, char path[EBPO_PATH_BYTES]);

@@ -1,9 +1,9 @@
-/* Slices: whole subtrees as one piece, or the whole tree. A subtree is a contiguous range of the
- * nodes of every level. A slice contains these ranges, the faces that its leaves list, and their
- * vertices, with local numbers: first faces that are new in leaves before the subtree, in
- * ascending order, then its own. Numbers that are scattered over a large range become dense by a
- * hash table (ebpo_compact). A caller may limit the memory (ebpo_room), which is taken before
- * each array is made. Source: format-spec/README.md, sections 4 and 5. */
+/* Reads slices: whole subtrees as one piece, or the whole tree. A subtree is a contiguous range of
+ * the nodes of every level. A slice contains these ranges, the faces that its leaves list, and
+ * their vertices, with local indices: first faces that are new in leaves before the subtree, in
+ * ascending order, then its owned faces. A hash table (ebpo_compact) maps scattered indices to
+ * dense ones. A caller may limit the memory (ebpo_quota), which is reserved before each array is
+ * allocated. Source: format-spec/README.md, sections 4 and 5. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -54,7 +54,7 @@ ebpo_status ebpo_compact_make(ebpo_compact *out, uint64_t capacity, ebpo_error *
     return EBPO_OK;
 }
 
-/* Where a number is, or would be. */
+/* Returns the slot that holds or would hold a number. */
 static uint64_t slot_of(const ebpo_compact *c, uint32_t number)
 {
     uint64_t at;
@@ -72,7 +72,7 @@ static void compact_add(ebpo_compact *compact, uint32_t number)
     compact->sorted[compact->count++] = number;
 }
 
-/* Radix sort, byte by byte from the lowest; bytes in which all numbers agree are passed over. */
+/* Sorts by radix, byte by byte from the lowest; skips bytes in which all numbers agree. */
 static void sort_numbers(uint32_t *numbers, uint32_t *other, uint64_t count)
 {
     uint64_t begin[4][256] = { { 0 } };
@@ -99,7 +99,7 @@ static void sort_numbers(uint32_t *numbers, uint32_t *other, uint64_t count)
         memcpy(numbers, from, count * sizeof *numbers);
 }
 
-/* After the last add: sorts. */
+/* Sorts after the last addition. */
 static ebpo_status compact_sort(ebpo_compact *compact, ebpo_error *error)
 {
     if (compact->count == 0)
@@ -114,7 +114,7 @@ static ebpo_status compact_sort(ebpo_compact *compact, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Place of a number that was added. */
+/* Returns the rank of a number that was added. */
 static uint32_t compact_find(const ebpo_compact *compact, uint32_t number)
 {
     return compact->slot[slot_of(compact, number)].place;
@@ -125,24 +125,24 @@ static uint32_t compact_find(const ebpo_compact *compact, uint32_t number)
 static void expect_rows(ebpo_chunks *chunks, ebpo_array_id id, const uint32_t *single,
                         uint64_t singles, uint64_t first, uint64_t rows)
 {
-    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
-    /* rows before `next` are in */
+    ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
+    /* rows before `next` are included */
     uint64_t chunk_rows = ebpo_reader_array(chunks->file, id, 0)->shape.chunk_rows, next = 0;
     if (!ebpo_input_expects(&chunks->file->in))
         return;
     for (uint64_t i = 0; i < singles; i++)
         if (single[i] >= next) {
-            ebpo_chunks_expect(chunks, &e, id, 0, single[i], 1);
+            ebpo_chunks_hint(chunks, &e, id, 0, single[i], 1);
             next = (single[i] / chunk_rows + 1) * chunk_rows;
         }
     if (rows && first + rows > next)
-        ebpo_chunks_expect(chunks, &e, id, 0, first > next ? first : next,
-                           first + rows - (first > next ? first : next));
-    ebpo_expect_all(&e);
+        ebpo_chunks_hint(chunks, &e, id, 0, first > next ? first : next,
+                         first + rows - (first > next ? first : next));
+    ebpo_hint_all(&e);
 }
 
-/* Rows of a decoded array: those of `single` (ascending), then [first, first + rows). Chunks stay
- * pinned while rows are in them. */
+/* Reads rows of a decoded array: those of `single` (ascending), then [first, first + rows). Chunks
+ * stay pinned while their rows are read. */
 static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row_bytes,
                                const uint32_t *single, uint64_t singles, uint64_t first,
                                uint64_t rows, void *out, ebpo_error *error)
@@ -169,14 +169,14 @@ static ebpo_status gather_rows(ebpo_chunks *chunks, ebpo_array_id id, size_t row
 
 /* --- references --- */
 
-static ebpo_status collect_outer(ebpo_slice *slice, ebpo_compact *outer, ebpo_room *room,
-                                 ebpo_error *error)
+static ebpo_status collect_shared(ebpo_slice *slice, ebpo_compact *outer, ebpo_quota *space,
+                                  ebpo_error *error)
 {
     uint64_t capacity = 0;
     for (int i = 0; i < slice->level_count; i++)
         for (uint64_t k = 0; k < slice->level[i].ref_count; k++)
             capacity += slice->level[i].leaf_refs[k] < slice->first_face;
-    ebpo_status status = ebpo_room_check(room, ebpo_compact_bytes(capacity), error);
+    ebpo_status status = ebpo_quota_check(space, ebpo_compact_bytes(capacity), error);
     if (status == EBPO_OK)
         status = ebpo_compact_make(outer, capacity, error);
     if (status != EBPO_OK)
@@ -190,7 +190,7 @@ static ebpo_status collect_outer(ebpo_slice *slice, ebpo_compact *outer, ebpo_ro
 
 static void localise_faces(ebpo_slice *slice, const ebpo_compact *outer)
 {
-    /* the outer faces are some of those before the first */
+    /* the shared faces are among those before the first owned one */
     uint64_t less = slice->first_face - outer->count;
     for (int i = 0; i < slice->level_count; i++) {
         ebpo_level *level = &slice->level[i];
@@ -204,17 +204,17 @@ static void localise_faces(ebpo_slice *slice, const ebpo_compact *outer)
     }
 }
 
-/* The list of outer faces stays with the slice. */
-static ebpo_status number_faces(ebpo_slice *slice, ebpo_room *room, ebpo_error *error)
+/* Numbers the faces. The slice keeps the list of shared faces. */
+static ebpo_status number_faces(ebpo_slice *slice, ebpo_quota *space, ebpo_error *error)
 {
     ebpo_compact outer = { .slot = NULL };
-    ebpo_status status = collect_outer(slice, &outer, room, error);
+    ebpo_status status = collect_shared(slice, &outer, space, error);
     if (status == EBPO_OK)
         localise_faces(slice, &outer);
     if (status == EBPO_OK && outer.count) {
         uint32_t *fit = ebpo_realloc(outer.sorted, outer.count, sizeof *fit);
         slice->outer = fit ? fit : outer.sorted;
-        slice->outer_count = (uint32_t)outer.count;
+        slice->shared_count = (uint32_t)outer.count;
         outer.sorted = NULL;
     }
     compact_free(&outer);
@@ -223,22 +223,22 @@ static ebpo_status number_faces(ebpo_slice *slice, ebpo_room *room, ebpo_error *
 
 /* --- vertices --- */
 
-/* Vertices are numbered by first use, so those that are new in the slice's own faces are a range,
- * [*begin, *end), and all others that it uses lie before. */
+/* Finds the vertices that are new in the slice's owned faces. As vertices are numbered by first
+ * use, they are a range, [*begin, *end), and all other vertices of the slice precede it. */
 static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t *begin,
                                 uint64_t *end, ebpo_error *error)
 {
     ebpo_held_chunk view = { .array = ebpo_reader_array(chunks->file, EBPO_A_FACES, 0) };
-    *begin = *end = UINT32_MAX; /* no own faces: all vertices are older */
+    *begin = *end = UINT32_MAX; /* no owned faces: all vertices are older */
     if (slice->face_count == 0)
         return EBPO_OK;
     ebpo_status status = ebpo_held_chunk_move(chunks, &view, slice->first_face, error);
     if (status != EBPO_OK)
         return status;
     const uint32_t *corners = (const uint32_t *)(const void *)view.rows,
-                   *own = slice->mesh.faces + 3 * (uint64_t)slice->outer_count;
+                   *own = slice->mesh.faces + 3 * (uint64_t)slice->shared_count;
     uint64_t seen = chunks->seen ? chunks->seen[view.begin / view.array->shape.chunk_rows] : 0;
-    uint32_t before = 0, within = 0; /* one past the largest; vertex numbers are below 2^32 - 2 */
+    uint32_t before = 0, within = 0; /* one past the largest; vertex indices are below 2^32 - 2 */
     for (uint64_t i = 0; i < 3 * (slice->first_face - view.begin); i++)
         before = corners[i] + 1 > before ? corners[i] + 1 : before;
     for (uint64_t i = 0; i < 3 * slice->face_count; i++)
@@ -249,14 +249,14 @@ static ebpo_status new_vertices(ebpo_slice *slice, ebpo_chunks *chunks, uint64_t
     return EBPO_OK;
 }
 
-static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_room *room,
+static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_quota *space,
                                  ebpo_compact *older, uint64_t *bytes, ebpo_error *error)
 {
     uint64_t capacity = 0, corners = 3 * mesh->face_count;
     for (uint64_t i = 0; i < corners; i++)
         capacity += mesh->faces[i] < begin;
     *bytes = ebpo_compact_bytes(capacity);
-    ebpo_status status = ebpo_room_check(room, *bytes, error);
+    ebpo_status status = ebpo_quota_check(space, *bytes, error);
     if (status == EBPO_OK)
         status = ebpo_compact_make(older, capacity, error);
     for (uint64_t i = 0; i < corners && status == EBPO_OK; i++)
@@ -265,7 +265,7 @@ static ebpo_status collect_older(const ebpo_mesh *mesh, uint64_t begin, ebpo_roo
     return status == EBPO_OK ? compact_sort(older, error) : status;
 }
 
-/* Older vertices first, then the new ones: the order of the file. */
+/* Renumbers vertices: older ones first, then the new ones, in file order. */
 static void renumber_vertices(ebpo_mesh *mesh, uint64_t begin, const ebpo_compact *older)
 {
     uint32_t less = (uint32_t)(begin - older->count);
@@ -274,7 +274,7 @@ static void renumber_vertices(ebpo_mesh *mesh, uint64_t begin, const ebpo_compac
             mesh->faces[i] < begin ? compact_find(older, mesh->faces[i]) : mesh->faces[i] - less;
 }
 
-static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_room *room,
+static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_quota *space,
                                  ebpo_error *error)
 {
     ebpo_mesh *mesh = &slice->mesh;
@@ -284,13 +284,13 @@ static ebpo_status take_vertices(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_ro
     size_t row_bytes = 3 * (wide ? sizeof(double) : sizeof(float));
     ebpo_status status = new_vertices(slice, chunks, &begin, &end, error);
     if (status == EBPO_OK)
-        status = collect_older(mesh, begin, room, &older, &table, error);
+        status = collect_older(mesh, begin, space, &older, &table, error);
     if (status == EBPO_OK) {
         mesh->vertex_count = older.count + (end - begin);
-        status = ebpo_room_check(room, table + mesh->vertex_count * row_bytes, error);
+        status = ebpo_quota_check(space, table + mesh->vertex_count * row_bytes, error);
     }
     if (status == EBPO_OK)
-        status = ebpo_room_take(room, mesh->vertex_count * row_bytes, error);
+        status = ebpo_quota_take(space, mesh->vertex_count * row_bytes, error);
     if (status == EBPO_OK) {
         renumber_vertices(mesh, begin, &older);
         void *xyz = ebpo_alloc(mesh->vertex_count, row_bytes);
@@ -312,32 +312,32 @@ static ebpo_status take_source(ebpo_slice *slice, ebpo_chunks *chunks, ebpo_erro
     if (!slice->face_source)
         return ebpo_fail_memory(error, slice->mesh.face_count * sizeof *slice->face_source);
     return gather_rows(chunks, EBPO_A_FACE_SOURCE, sizeof *slice->face_source, slice->outer,
-                       slice->outer_count, slice->first_face, slice->face_count, slice->face_source,
-                       error);
+                       slice->shared_count, slice->first_face, slice->face_count,
+                       slice->face_source, error);
 }
 
-/* From levels with numbers of the file, and first_face and face_count: everything else, with `maps`
- * numbers in the source, too, and local numbers in the levels. `room`: ebpo_slice_read_within. */
+/* Completes a slice from levels with file indices, first_face and face_count. Converts the levels
+ * to local indices; with `maps`, adds source indices. `space`: see ebpo_slice_read_within. */
 static ebpo_status slice_take_faces(ebpo_slice *slice, ebpo_chunks *chunks, bool maps,
-                                    ebpo_room *room, ebpo_error *error)
+                                    ebpo_quota *space, ebpo_error *error)
 {
     enum { ROW = 3 * sizeof(uint32_t), NUMBER = sizeof(uint32_t) };
-    ebpo_status status = number_faces(slice, room, error);
-    slice->mesh.face_count = slice->outer_count + slice->face_count;
+    ebpo_status status = number_faces(slice, space, error);
+    slice->mesh.face_count = slice->shared_count + slice->face_count;
     if (status == EBPO_OK)
-        status = ebpo_room_take(room,
-                                slice->outer_count * (uint64_t)NUMBER +
-                                    slice->mesh.face_count * (maps ? ROW + NUMBER : ROW),
-                                error);
+        status = ebpo_quota_take(space,
+                                 slice->shared_count * (uint64_t)NUMBER +
+                                     slice->mesh.face_count * (maps ? ROW + NUMBER : ROW),
+                                 error);
     if (status != EBPO_OK)
         return status;
     slice->mesh.faces = ebpo_alloc(slice->mesh.face_count, ROW);
     if (!slice->mesh.faces)
         return ebpo_fail_memory(error, slice->mesh.face_count * ROW);
-    status = gather_rows(chunks, EBPO_A_FACES, ROW, slice->outer, slice->outer_count,
+    status = gather_rows(chunks, EBPO_A_FACES, ROW, slice->outer, slice->shared_count,
                          slice->first_face, slice->face_count, slice->mesh.faces, error);
     if (status == EBPO_OK)
-        status = take_vertices(slice, chunks, room, error);
+        status = take_vertices(slice, chunks, space, error);
     return status == EBPO_OK && maps ? take_source(slice, chunks, error) : status;
 }
 
@@ -366,22 +366,22 @@ static ebpo_status root_range(const ebpo_chunks *chunks, const ebpo_node *root, 
 {
     if (root->type != EBPO_GRAY && root->type != EBPO_LEAF)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, chunks->file->in.shown,
-                              "the subtree of a white or black node is asked for; it has none");
+                              "a white or black node has no subtree");
     *out = (range){ .level = root->cell.level };
     out->run.rank[root->type] = root->rank;
     out->run.count[root->type] = 1;
     return ebpo_chunks_check_node(chunks, root, error);
 }
 
-/* Which of a subtree's nodes, and what of them (EBPO_NEEDS_...). */
+/* Selected nodes of a subtree, and their data (EBPO_NEEDS_...). */
 typedef struct extent {
     uint32_t needs;
-    int end;         /* one past the deepest level */
-    bool faces;      /* that the leaves list will be read as well */
-    ebpo_room *room; /* NULL: no limit */
+    int end;           /* one past the deepest level */
+    bool faces;        /* faces listed by the leaves will also be read */
+    ebpo_quota *space; /* NULL: no limit */
 } extent;
 
-/* `levels` below the root's, or all. */
+/* Selects `levels` levels below the root, or all. */
 static extent extent_of(const ebpo_chunks *chunks, const ebpo_node *root, uint32_t needs,
                         int levels)
 {
@@ -391,13 +391,14 @@ static extent extent_of(const ebpo_chunks *chunks, const ebpo_node *root, uint32
                      NULL };
 }
 
-/* Whether the range has a next level: the gray nodes of the file's last one are pruned. */
+/* Returns true if the range has a next level; the gray nodes of the file's last level are pruned.
+ */
 static bool goes_on(const extent *e, const range *r)
 {
     return r->run.count[EBPO_GRAY] && r->level + 1 < e->end;
 }
 
-/* The next level's range. */
+/* Computes the range of the next level. */
 static ebpo_status next_range(ebpo_chunks *chunks, range *r, uint16_t **types, ebpo_error *error)
 {
     uint64_t group = r->run.rank[EBPO_GRAY], groups = r->run.count[EBPO_GRAY];
@@ -414,45 +415,46 @@ static ebpo_status next_range(ebpo_chunks *chunks, range *r, uint16_t **types, e
                              : status;
 }
 
-/* What reading a level's nodes begins with, and the next level's types; only files far away care.
- */
+/* Sends prefetch hints for the first reads of a level's nodes, and for the types of the next level;
+ * for remote files only. */
 static void expect_nodes(ebpo_chunks *chunks, const extent *x, const range *r)
 {
-    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     uint64_t gray = r->run.rank[EBPO_GRAY], index = gray / EBPO_INDEX_ROWS,
              counted = index * EBPO_INDEX_ROWS;
-    ebpo_runs_expect(chunks, &e, r->level, &r->run, 1, x->needs);
+    ebpo_runs_hint(chunks, &e, r->level, &r->run, 1, x->needs);
     if (goes_on(x, r) && ebpo_subtree_table_has(chunks->file, r->level + 1)) {
-        ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES, r->level + 1, gray, r->run.count[EBPO_GRAY]);
+        ebpo_chunks_hint(chunks, &e, EBPO_A_TYPES, r->level + 1, gray, r->run.count[EBPO_GRAY]);
     } else if (goes_on(x, r)) {
-        ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES_INDEX, r->level + 1, index, 1);
-        ebpo_chunks_expect(chunks, &e, EBPO_A_TYPES, r->level + 1, counted,
-                           gray + r->run.count[EBPO_GRAY] - counted);
+        ebpo_chunks_hint(chunks, &e, EBPO_A_TYPES_INDEX, r->level + 1, index, 1);
+        ebpo_chunks_hint(chunks, &e, EBPO_A_TYPES, r->level + 1, counted,
+                         gray + r->run.count[EBPO_GRAY] - counted);
     }
-    ebpo_expect_all(&e);
+    ebpo_hint_all(&e);
 }
 
-/* From the level of subtrees' roots on, all that is below is known. */
+/* Sends prefetch hints from the level of the subtrees' roots on, where all lower chunks are known.
+ */
 static void expect_below(ebpo_chunks *chunks, const extent *x, const range *r)
 {
     uint64_t first = r->run.rank[EBPO_GRAY], count = r->run.count[EBPO_GRAY];
-    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     e.near = true;
     if (!ebpo_subtree_table_has(chunks->file, r->level + 1) || !goes_on(x, r) ||
-        r->level != chunks->file->info.subtree_level || !ebpo_expected_wanted(&e))
+        r->level != chunks->file->info.subtree_level || !ebpo_hints_wanted(&e))
         return;
-    ebpo_subtree_table_expect_run(chunks, first, count);
-    ebpo_subtrees_expect(chunks, &e, first, count, x->needs, x->end - 1, x->faces);
-    ebpo_expect_all(&e);
+    ebpo_subtree_table_hint_run(chunks, first, count);
+    ebpo_subtrees_hint(chunks, &e, first, count, x->needs, x->end - 1, x->faces);
+    ebpo_hint_all(&e);
 }
 
-/* Everything of one level but its types. */
+/* Reads all arrays of one level except its types. */
 static ebpo_status read_nodes(ebpo_chunks *chunks, const extent *x, const range *r, ebpo_level *out,
                               ebpo_error *error)
 {
     expect_below(chunks, x, r);
     expect_nodes(chunks, x, r);
-    return ebpo_runs_read(chunks, r->level, &r->run, 1, x->needs, x->room, out, error);
+    return ebpo_runs_read(chunks, r->level, &r->run, 1, x->needs, x->space, out, error);
 }
 
 static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const extent *x,
@@ -472,7 +474,7 @@ static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const ext
     for (slice->level_count = 1; status == EBPO_OK && goes_on(x, &r); slice->level_count++) {
         ebpo_level *out = &slice->level[slice->level_count];
         out->group_count = r.run.count[EBPO_GRAY];
-        status = ebpo_room_take(x->room, out->group_count * sizeof *out->types, error);
+        status = ebpo_quota_take(x->space, out->group_count * sizeof *out->types, error);
         if (status == EBPO_OK)
             status = next_range(chunks, &r, &out->types, error);
         if (status == EBPO_OK)
@@ -484,12 +486,12 @@ static ebpo_status read_levels(ebpo_slice *slice, ebpo_chunks *chunks, const ext
 typedef struct walk {
     ebpo_chunks *chunks;
     ebpo_slice *slice;
-    uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX]; /* next of each level */
+    uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX]; /* next item of each level */
     bool begun;
 } walk;
 
-/* Leaves in depth-first order have the subtree's own faces as their new ones, without gaps: the
- * first leaf tells where they begin. */
+/* Checks that leaves in depth-first order have the subtree's owned faces as their new ones, without
+ * gaps. The first leaf determines their start. */
 static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
 {
     const ebpo_level *arrays = &w->slice->level[level];
@@ -519,14 +521,14 @@ static ebpo_status walk_group(walk *w, int level, ebpo_error *error)
 static bool is_subtree(const ebpo_chunks *chunks, const extent *x, const ebpo_node *root)
 {
     const ebpo_info *info = &chunks->file->info;
-    /* of fewer levels the table does not tell the faces */
+    /* for a subset of the levels the table does not state the faces */
     return info->subtree_level && root->cell.level == info->subtree_level &&
            root->type == EBPO_GRAY && x->end == info->level_count;
 }
 
-/* The leaves' faces are those that the table gives the subtree. */
-static ebpo_status check_own_faces(const ebpo_slice *slice, ebpo_chunks *chunks, const extent *x,
-                                   ebpo_error *error)
+/* Checks that the leaves' faces are those stated in the table for the subtree. */
+static ebpo_status check_owned_faces(const ebpo_slice *slice, ebpo_chunks *chunks, const extent *x,
+                                     ebpo_error *error)
 {
     ebpo_subtree_row row;
     if (!is_subtree(chunks, x, &slice->root))
@@ -567,7 +569,7 @@ ebpo_status ebpo_slice_read_parts(ebpo_slice *out, ebpo_chunks *chunks, const eb
 }
 
 ebpo_status ebpo_slice_read_within(ebpo_slice *out, ebpo_chunks *chunks, const ebpo_node *root,
-                                   uint32_t needs, ebpo_room *room, ebpo_error *error)
+                                   uint32_t needs, ebpo_quota *space, ebpo_error *error)
 {
     enum { ALWAYS = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH };
     extent x = extent_of(chunks, root, needs | ALWAYS, EBPO_SLICE_ALL);
@@ -577,14 +579,14 @@ ebpo_status ebpo_slice_read_within(ebpo_slice *out, ebpo_chunks *chunks, const e
                               "the file was written without its mesh; build it again with it");
     walk w = { .chunks = chunks, .slice = out };
     x.faces = true;
-    x.room = room;
+    x.space = space;
     ebpo_status status = read_extent(out, chunks, root, &x, error);
     if (status == EBPO_OK)
         status = walk_group(&w, 0, error);
     if (status == EBPO_OK)
-        status = check_own_faces(out, chunks, &x, error);
+        status = check_owned_faces(out, chunks, &x, error);
     if (status == EBPO_OK)
-        status = slice_take_faces(out, chunks, needs & EBPO_NEEDS_MAPS, room, error);
+        status = slice_take_faces(out, chunks, needs & EBPO_NEEDS_MAPS, space, error);
     if (status != EBPO_OK)
         ebpo_slice_free(out);
     return status;
@@ -639,14 +641,14 @@ static ebpo_status measure_nodes(ebpo_chunks *chunks, const extent *x, const ran
     return status;
 }
 
-/* What the table says of a subtree, but for its root. */
+/* Reads the sizes of a subtree, except its root, from the table. */
 static ebpo_status measure_subtree(ebpo_chunks *chunks, const extent *x, uint64_t subtree,
                                    ebpo_slice_size *out, ebpo_error *error)
 {
     const ebpo_info *info = &chunks->file->info;
     ebpo_subtree_row row;
-    /* what reading it will want to know of the table comes with the same request */
-    ebpo_subtree_table_expect_run(chunks, subtree, 1);
+    /* also prefetches the table rows that reading needs */
+    ebpo_subtree_table_hint_run(chunks, subtree, 1);
     ebpo_status status = ebpo_subtree_table_row(chunks, subtree, &row, error);
     for (int level = info->subtree_level + 1; level < x->end && status == EBPO_OK; level++) {
         uint64_t has[EBPO_SUBTREE_LEVEL_COLS];
@@ -697,7 +699,7 @@ ebpo_status ebpo_slice_measure(ebpo_chunks *chunks, const ebpo_node *root, ebpo_
 
 /* --- the whole tree --- */
 
-/* What a slice does not have. */
+/* Removes arrays that a slice does not have. */
 static void drop_arrays(ebpo_level *level)
 {
     ebpo_level_drop(level, EBPO_NEEDS_LEAF_PLANES);

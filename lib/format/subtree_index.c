@@ -1,10 +1,10 @@
-/* Where subtrees and nodes begin in every array. The first part reads the file's table of
- * subtrees: for each subtree the sums of all counts before it, from sums stored for some rows
- * and counts in between; rows used last are kept. The second part computes ranks: the planes,
- * faces and nodes of each type before a node. Levels below the roots of subtrees begin at the
- * subtree's row; other levels have an index row for every 4,096 items, and counting continues
- * from there. Results are checked against the counts in the head. The last part announces the
- * chunks that subtrees need. Source: format-spec/README.md, sections 4 and 9. */
+/* Locates subtrees and nodes in every array. The first part reads the file's table of subtrees: for
+ * each subtree the sums of all counts before it, from sums stored for some rows and counts in
+ * between; recently used rows are cached. The second part computes ranks: the planes, faces and
+ * nodes of each type before a node. Levels below the roots of subtrees begin at the subtree's row;
+ * other levels have an index row for every 4,096 items, from which counting continues. Results are
+ * checked against the counts in the head. The last part sends prefetch hints for subtrees. Source:
+ * format-spec/README.md, sections 4 and 9. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,7 +21,7 @@ static ebpo_status table_fails(const ebpo_chunks *chunks, ebpo_array_id id, cons
     return ebpo_chunks_fail(chunks, -1, id, what, error);
 }
 
-/* What a column adds up to at most; whether it must be all of it. */
+/* Returns the maximum sum of a column; *exact is true if it must be reached. */
 static uint64_t column_total(const ebpo_file *file, unsigned column, bool *exact)
 {
     const ebpo_info *info = &file->info;
@@ -33,7 +33,7 @@ static uint64_t column_total(const ebpo_file *file, unsigned column, bool *exact
     if (column <= EBPO_S_VERTICES)
         return mesh ? info->vertex_count : 0;
     if (column < EBPO_SUBTREE_LEVELS)
-        return file->root_array[EBPO_A_SUBTREE_OUTER].shape.rows;
+        return file->root_array[EBPO_A_SUBTREE_SHARED].shape.rows;
     unsigned k = column - EBPO_SUBTREE_LEVELS;
     const ebpo_level_summary *s =
         &info->level[info->subtree_level + 1 + (int)(k / EBPO_SUBTREE_LEVEL_COLS)];
@@ -48,23 +48,23 @@ static uint64_t column_total(const ebpo_file *file, unsigned column, bool *exact
     }
 }
 
-/* Sums before a chunk of rows; behind the last chunk, the head's counts. */
-static ebpo_status sums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t cols, uint64_t *sums,
-                               ebpo_error *error)
+/* Reads the sums before a chunk of rows; after the last chunk, the head's counts. */
+static ebpo_status checksums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t cols,
+                                    uint64_t *checksums, ebpo_error *error)
 {
     const ebpo_array_in *index = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_INDEX, 0);
     bool exact;
     ebpo_status status = EBPO_OK;
     if (chunk == index->shape.rows) {
         for (uint32_t k = 0; k < cols; k++)
-            sums[k] = column_total(chunks->file, k, &exact);
+            checksums[k] = column_total(chunks->file, k, &exact);
         return EBPO_OK;
     }
     ebpo_held_chunk view = { .array = index };
     status = ebpo_held_chunk_move(chunks, &view, chunk, error);
     for (uint32_t k = 0; k < cols && status == EBPO_OK; k++) {
-        sums[k] = ebpo_load64(view.rows + ((chunk - view.begin) * cols + k) * 8);
-        if (sums[k] > column_total(chunks->file, k, &exact) || (chunk == 0 && sums[k]))
+        checksums[k] = ebpo_load64(view.rows + ((chunk - view.begin) * cols + k) * 8);
+        if (checksums[k] > column_total(chunks->file, k, &exact) || (chunk == 0 && checksums[k]))
             status = table_fails(chunks, EBPO_A_SUBTREE_INDEX,
                                  "the sums contradict the counts in the head", error);
     }
@@ -75,7 +75,7 @@ static ebpo_status sums_before(ebpo_chunks *chunks, uint64_t chunk, uint32_t col
 typedef struct subtree_counts {
     ebpo_held_chunk view;
     uint32_t cols;
-    uint64_t begin[EBPO_SUBTREE_COLS], end[EBPO_SUBTREE_COLS]; /* before and after the chunk */
+    uint64_t begin[EBPO_SUBTREE_COLS], end[EBPO_SUBTREE_COLS]; /* sums before and after the chunk */
 } subtree_counts;
 
 static uint32_t count_at(const subtree_counts *c, uint64_t subtree, uint32_t column)
@@ -83,38 +83,39 @@ static uint32_t count_at(const subtree_counts *c, uint64_t subtree, uint32_t col
     return ebpo_load32(c->view.rows + ((subtree - c->view.begin) * c->cols + column) * 4);
 }
 
-static void add_row(const subtree_counts *c, uint64_t subtree, uint64_t *sums)
+static void add_row(const subtree_counts *c, uint64_t subtree, uint64_t *checksums)
 {
     for (uint32_t k = 0; k < c->cols; k++)
-        sums[k] += count_at(c, subtree, k);
+        checksums[k] += count_at(c, subtree, k);
 }
 
-/* The chunk of rows that holds a subtree; it adds up to what comes after it. */
+/* Opens the chunk of rows that contains a subtree, and checks that it adds up to the sums after it.
+ */
 static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_counts *c,
                                ebpo_error *error)
 {
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0);
-    uint64_t rows = array->shape.chunk_rows, chunk = subtree / rows, sums[EBPO_SUBTREE_COLS];
+    uint64_t rows = array->shape.chunk_rows, chunk = subtree / rows, checksums[EBPO_SUBTREE_COLS];
     c->view = (ebpo_held_chunk){ .array = array };
     c->cols = array->shape.cols;
-    ebpo_status status = sums_before(chunks, chunk, c->cols, c->begin, error);
+    ebpo_status status = checksums_before(chunks, chunk, c->cols, c->begin, error);
     if (status == EBPO_OK)
-        status = sums_before(chunks, chunk + 1, c->cols, c->end, error);
+        status = checksums_before(chunks, chunk + 1, c->cols, c->end, error);
     if (status == EBPO_OK)
         status = ebpo_held_chunk_move(chunks, &c->view, subtree, error);
     if (status != EBPO_OK)
         return status;
-    memcpy(sums, c->begin, sizeof sums);
+    memcpy(checksums, c->begin, sizeof checksums);
     for (uint64_t i = c->view.begin; i < c->view.end; i++)
-        add_row(c, i, sums);
+        add_row(c, i, checksums);
     bool last = c->view.end == array->shape.rows, exact;
-    if (last && sums[EBPO_S_OUTER_FACES] + sums[EBPO_S_OUTER_VERTICES] !=
-                    c->end[EBPO_S_OUTER_FACES]) /* they share its rows */
-        status = table_fails(chunks, EBPO_A_SUBTREE_OUTER,
-                             "it has not the rows that the table's counts add up to", error);
+    if (last && checksums[EBPO_S_SHARED_FACES] + checksums[EBPO_S_SHARED_VERTICES] !=
+                    c->end[EBPO_S_SHARED_FACES]) /* they share its rows */
+        status = table_fails(chunks, EBPO_A_SUBTREE_SHARED,
+                             "its rows do not match the table's counts", error);
     for (uint32_t k = 0; k < c->cols && status == EBPO_OK; k++) {
         (void)column_total(chunks->file, k, &exact);
-        if (last && !exact ? sums[k] > c->end[k] : sums[k] != c->end[k])
+        if (last && !exact ? checksums[k] > c->end[k] : checksums[k] != c->end[k])
             status = table_fails(chunks, EBPO_A_SUBTREE_COUNTS,
                                  "the rows do not add up to the sums in the index", error);
     }
@@ -135,7 +136,7 @@ static void take_row(const subtree_counts *c, uint64_t subtree, ebpo_subtree_row
     out->vertex = out->after[EBPO_S_VERTICES_BEFORE] + out->before[EBPO_S_VERTICES];
 }
 
-/* Faces and vertices of other leaves count as well. */
+/* Checks a row. Faces and vertices of other leaves count as well. */
 static ebpo_status check_row(const ebpo_chunks *chunks, const ebpo_subtree_row *row,
                              ebpo_error *error)
 {
@@ -144,13 +145,13 @@ static ebpo_status check_row(const ebpo_chunks *chunks, const ebpo_subtree_row *
         (row->after[EBPO_S_FACES_BEFORE] + row->after[EBPO_S_FACES] > info->face_count ||
          row->after[EBPO_S_VERTICES_BEFORE] + row->after[EBPO_S_VERTICES] > info->vertex_count))
         return table_fails(chunks, EBPO_A_SUBTREE_COUNTS,
-                           "a subtree's faces lie beyond the last face", error);
+                           "a subtree's faces are beyond the last face", error);
     for (int level = info->subtree_level + 1; level < info->level_count; level++)
         for (int end = 0; end < 2; end++) {
-            const uint64_t *sums = end ? row->after : row->before;
+            const uint64_t *checksums = end ? row->after : row->before;
             unsigned column = ebpo_subtree_column(info, level, 0);
-            if (sums[column + EBPO_S_GRAY] + sums[column + EBPO_S_LEAF] +
-                    sums[column + EBPO_S_BLACK] >
+            if (checksums[column + EBPO_S_GRAY] + checksums[column + EBPO_S_LEAF] +
+                    checksums[column + EBPO_S_BLACK] >
                 8 * ebpo_subtree_groups(info, row, level, end))
                 return table_fails(chunks, EBPO_A_SUBTREE_COUNTS,
                                    "a subtree has more nodes than its groups hold", error);
@@ -161,16 +162,16 @@ static ebpo_status check_row(const ebpo_chunks *chunks, const ebpo_subtree_row *
 uint64_t ebpo_subtree_groups(const ebpo_info *info, const ebpo_subtree_row *row, int level,
                              bool after)
 {
-    const uint64_t *sums = after ? row->after : row->before;
+    const uint64_t *checksums = after ? row->after : row->before;
     return level == info->subtree_level + 1
                ? row->subtree + after
-               : sums[ebpo_subtree_column(info, level - 1, EBPO_S_GRAY)];
+               : checksums[ebpo_subtree_column(info, level - 1, EBPO_S_GRAY)];
 }
 
-/* --- rows kept: one subtree is asked for again and again while it is read, and adding up a chunk
- * of rows takes longer than all else that is asked --- */
+/* --- cache of rows: one subtree is requested repeatedly while it is read, and summing a chunk of
+ * rows takes longer than the rest of a request --- */
 
-enum { KEPT = 4 /* threads that read at once, mostly two */, BY_NUMBER = EBPO_SUBTREE_COLS };
+enum { KEPT = 4 /* threads that read at once, typically two */, BY_NUMBER = EBPO_SUBTREE_COLS };
 
 struct ebpo_kept_rows {
     ebpo_subtree_row row[KEPT];
@@ -183,7 +184,7 @@ static bool row_holds(const ebpo_subtree_row *row, unsigned column, uint64_t ite
                                : row->before[column] <= item && item < row->after[column];
 }
 
-/* The row of a subtree, or (by a column) of the one that has an item, if it is kept. */
+/* Finds a cached row of a subtree, or (by a column) of the subtree that contains an item. */
 static bool find_kept(ebpo_chunks *chunks, unsigned column, uint64_t item, ebpo_subtree_row *out)
 {
     bool found = false;
@@ -196,7 +197,7 @@ static bool find_kept(ebpo_chunks *chunks, unsigned column, uint64_t item, ebpo_
     return found;
 }
 
-/* Checks a row, and keeps it; not of counted chunks, where each reading counts. */
+/* Checks a row, and caches it; not for counted chunks, where each read counts. */
 static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, ebpo_error *error)
 {
     ebpo_status status = check_row(chunks, row, error);
@@ -204,7 +205,8 @@ static ebpo_status keep_row(ebpo_chunks *chunks, const ebpo_subtree_row *row, eb
         return status;
     pthread_mutex_lock(&chunks->lock);
     if (!chunks->rows)
-        chunks->rows = ebpo_alloc_zero(1, sizeof *chunks->rows); /* without memory none is kept */
+        chunks->rows = ebpo_alloc_zero(1, sizeof *chunks->rows); /* without memory, rows are not
+                                                                  * cached */
     if (chunks->rows) {
         chunks->rows->row[chunks->rows->next] = *row;
         chunks->rows->next = (chunks->rows->next + 1) % KEPT;
@@ -228,17 +230,17 @@ ebpo_status ebpo_subtree_table_row(ebpo_chunks *chunks, uint64_t subtree, ebpo_s
     return keep_row(chunks, out, error);
 }
 
-/* The last chunk of rows before which there are at most so many items. */
+/* Finds the last chunk of rows with at most `item` items before it. */
 static ebpo_status find_chunk(ebpo_chunks *chunks, unsigned column, uint64_t item, uint64_t *out,
                               ebpo_error *error)
 {
     const ebpo_array_in *index = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_INDEX, 0);
-    uint64_t low = 0, high = index->shape.rows - 1, sums[EBPO_SUBTREE_COLS];
+    uint64_t low = 0, high = index->shape.rows - 1, checksums[EBPO_SUBTREE_COLS];
     ebpo_status status = EBPO_OK;
     while (low < high && status == EBPO_OK) {
         uint64_t middle = low + (high - low + 1) / 2;
-        status = sums_before(chunks, middle, index->shape.cols, sums, error);
-        if (status == EBPO_OK && sums[column] <= item)
+        status = checksums_before(chunks, middle, index->shape.cols, checksums, error);
+        if (status == EBPO_OK && checksums[column] <= item)
             low = middle;
         else
             high = middle - 1;
@@ -270,7 +272,7 @@ ebpo_status ebpo_subtree_table_find(ebpo_chunks *chunks, unsigned column, uint64
     return keep_row(chunks, out, error);
 }
 
-/* Groups of the first level below the roots are the subtrees themselves. */
+/* Groups of the first level below the roots correspond to subtrees. */
 static bool is_direct(const ebpo_info *info, int level, ebpo_per per)
 {
     return per == EBPO_PER_GROUP && level == info->subtree_level + 1;
@@ -309,40 +311,40 @@ bool ebpo_subtree_table_missing(ebpo_chunks *chunks, int level, ebpo_per per, ui
     return false;
 }
 
-/* A chunk of the table, and what of `outer` goes with it. */
-static void expect_rows_at(ebpo_chunks *chunks, ebpo_expected *e, uint64_t chunk)
+/* Collects a chunk of the table, and the corresponding rows of `outer`. */
+static void expect_rows_at(ebpo_chunks *chunks, ebpo_hints *e, uint64_t chunk)
 {
     const ebpo_shape *shape = &ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape;
-    uint64_t sums[EBPO_SUBTREE_COLS], outer[2];
+    uint64_t checksums[EBPO_SUBTREE_COLS], outer[2];
     for (int k = 0; k < 2; k++) {
         if (!ebpo_input_expects(&chunks->file->in) ||
-            sums_before(chunks, chunk + (uint64_t)k, shape->cols, sums, NULL) != EBPO_OK)
-            return; /* reading will tell */
-        outer[k] = sums[EBPO_S_OUTER_FACES] + sums[EBPO_S_OUTER_VERTICES];
+            checksums_before(chunks, chunk + (uint64_t)k, shape->cols, checksums, NULL) != EBPO_OK)
+            return; /* the actual read reports errors */
+        outer[k] = checksums[EBPO_S_SHARED_FACES] + checksums[EBPO_S_SHARED_VERTICES];
     }
-    ebpo_chunks_expect(chunks, e, EBPO_A_SUBTREE_COUNTS, 0, chunk * shape->chunk_rows, 1);
+    ebpo_chunks_hint(chunks, e, EBPO_A_SUBTREE_COUNTS, 0, chunk * shape->chunk_rows, 1);
     if (outer[1] > outer[0])
-        ebpo_chunks_expect(chunks, e, EBPO_A_SUBTREE_OUTER, 0, outer[0], outer[1] - outer[0]);
+        ebpo_chunks_hint(chunks, e, EBPO_A_SUBTREE_SHARED, 0, outer[0], outer[1] - outer[0]);
 }
 
-void ebpo_subtree_table_expect_run(ebpo_chunks *chunks, uint64_t first, uint64_t count)
+void ebpo_subtree_table_hint_run(ebpo_chunks *chunks, uint64_t first, uint64_t count)
 {
     uint64_t rows = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape.chunk_rows,
              all = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape.rows;
-    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     for (uint64_t at = first / rows * rows; at < first + count && at < all; at += rows)
         expect_rows_at(chunks, &e, at / rows);
-    ebpo_expect_all(&e);
+    ebpo_hint_all(&e);
 }
 
-void ebpo_subtree_table_expect(ebpo_chunks *chunks, const uint64_t *subtrees, uint64_t count)
+void ebpo_subtree_table_hint(ebpo_chunks *chunks, const uint64_t *subtrees, uint64_t count)
 {
     uint64_t rows = ebpo_reader_array(chunks->file, EBPO_A_SUBTREE_COUNTS, 0)->shape.chunk_rows;
-    ebpo_expected e = EBPO_EXPECTED_INIT(chunks->file);
+    ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     for (uint64_t i = 0; i < count; i++)
         if (i == 0 || subtrees[i] / rows != subtrees[i - 1] / rows)
             expect_rows_at(chunks, &e, subtrees[i] / rows);
-    ebpo_expect_all(&e);
+    ebpo_hint_all(&e);
 }
 
 /* --- ranks --- */
@@ -365,7 +367,7 @@ ebpo_status ebpo_ranks_count_file(ebpo_chunks *chunks, int level, uint64_t group
     return status;
 }
 
-/* Numbers of up to 32 bits cannot overflow the sum of an array; larger ones must not. */
+/* Sums numbers of up to 32 bits, which cannot overflow; checks larger ones. */
 static bool sum_rows(const uint8_t *rows, unsigned element_size, uint64_t count, uint64_t *sum)
 {
     uint64_t total = 0, all = 0;
@@ -412,7 +414,7 @@ ebpo_status ebpo_chunks_sum(ebpo_chunks *chunks, ebpo_array_id id, int level, ui
     return status;
 }
 
-/* Row of an index array for an item; row 0 is all zeros, whatever the file says there. */
+/* Reads the row of an index array for an item; row 0 is all zeros, whatever the file contains. */
 static ebpo_status index_row(ebpo_chunks *chunks, ebpo_array_id id, int level, uint64_t item,
                              unsigned cols, uint64_t *row, ebpo_error *error)
 {
@@ -422,7 +424,7 @@ static ebpo_status index_row(ebpo_chunks *chunks, ebpo_array_id id, int level, u
                                                          1, row, sizeof *row, error);
 }
 
-/* The subtree that holds an item of a level, if the table tells of it. */
+/* Finds the subtree that contains an item of a level, if the table covers it. */
 static ebpo_status find_subtree(ebpo_chunks *chunks, int level, unsigned what, uint64_t item,
                                 ebpo_subtree_row *row, ebpo_error *error)
 {
@@ -436,7 +438,7 @@ static uint64_t level_sum(const ebpo_chunks *chunks, const ebpo_subtree_row *row
     return row->before[ebpo_subtree_column(&chunks->file->info, level, what)];
 }
 
-/* What the row says that the subtree has. */
+/* Returns the row's count for the subtree. */
 static uint64_t level_has(const ebpo_chunks *chunks, const ebpo_subtree_row *row, int level,
                           unsigned what)
 {
@@ -446,7 +448,8 @@ static uint64_t level_has(const ebpo_chunks *chunks, const ebpo_subtree_row *row
 
 static const char *const contradicts = "the index contradicts the counts in the head";
 
-/* Rows that add up may still tell a subtree what is another's: its own nodes are counted. */
+/* Reports a row that assigns nodes to the wrong subtree; sums alone do not detect this, so nodes
+ * are counted. */
 static ebpo_status row_lies(const ebpo_chunks *chunks, ebpo_error *error)
 {
     return ebpo_chunks_fail(chunks, -1, EBPO_A_SUBTREE_COUNTS,
@@ -469,7 +472,7 @@ static ebpo_status check_types(ebpo_chunks *chunks, int level, const ebpo_subtre
                : row_lies(chunks, error);
 }
 
-/* A list: `id` has the counts of the nodes that `nodes` counts. */
+/* Checks a list: `id` has the counts of the nodes that `nodes` counts. */
 static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                               ebpo_array_id id, unsigned nodes, unsigned what, ebpo_error *error)
 {
@@ -481,7 +484,7 @@ static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree
                : row_lies(chunks, error);
 }
 
-/* The end of the leaves' faces, and whether these are among the subtree's. */
+/* Checks the end of the leaves' faces, and that these are within the subtree's. */
 static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                               ebpo_error *error)
 {
@@ -517,13 +520,14 @@ ebpo_status ebpo_ranks_check(const ebpo_chunks *chunks, int level, const uint64_
     return EBPO_OK;
 }
 
-/* Ranks at which a subtree's groups of a level begin, and the first of these. */
+/* Computes the ranks at which a subtree's groups of a level begin, and the first of these groups.
+ */
 static ebpo_status ranks_of_subtree(ebpo_chunks *chunks, int level, uint64_t group,
                                     uint64_t ranks[4], uint64_t *from, ebpo_error *error)
 {
     const ebpo_info *info = &chunks->file->info;
     ebpo_subtree_row row;
-    bool roots = level == info->subtree_level + 1; /* a group for each subtree */
+    bool roots = level == info->subtree_level + 1; /* one group for each subtree */
     uint64_t last = info->level[info->subtree_level].gray_count - 1;
     ebpo_status status =
         roots ? ebpo_subtree_table_row(chunks, group < last ? group : last, &row, error)
@@ -583,7 +587,8 @@ ebpo_status ebpo_ranks_planes(ebpo_chunks *chunks, int level, uint64_t gray, uin
     return status;
 }
 
-/* What leaf_index says, or the table; of the leaf `*from`. `faces`: of these, else of planes. */
+/* Reads the row of leaf_index, or of the table, for leaf `*from`. `faces`: the sums of faces,
+ * otherwise of planes. */
 static ebpo_status leaf_row(ebpo_chunks *chunks, int level, uint64_t leaf, bool faces,
                             uint64_t row[3], uint64_t *from, ebpo_error *error)
 {
@@ -626,7 +631,7 @@ ebpo_status ebpo_ranks_leaf(ebpo_chunks *chunks, int level, uint64_t leaf, uint6
     if (row[0] > info->face_count || skip > info->face_count - row[0] ||
         fresh > info->face_count - row[0] - skip)
         return ebpo_chunks_fail(chunks, level, EBPO_A_LEAF_SKIP,
-                                "a leaf's new faces lie beyond the last face", error);
+                                "a leaf's new faces are beyond the last face", error);
     if (row[1] > info->level[level].ref_count || listed > info->level[level].ref_count - row[1])
         return ebpo_chunks_fail(chunks, level, EBPO_A_LEAF_INDEX, contradicts, error);
     *end = row[0] + skip + fresh;
@@ -649,28 +654,29 @@ ebpo_status ebpo_ranks_leaf_planes(ebpo_chunks *chunks, int level, uint64_t leaf
     return status;
 }
 
-typedef struct telling {
+typedef struct reporting {
     ebpo_chunks *chunks;
-    ebpo_expected *expected;
+    ebpo_hints *expected;
     const ebpo_subtree_row *first, *last;
     uint32_t needs;
     int last_level;
-} telling;
+} reporting;
 
-static void expect_rows(const telling *t, ebpo_array_id id, int level, uint64_t begin, uint64_t end)
+static void expect_rows(const reporting *t, ebpo_array_id id, int level, uint64_t begin,
+                        uint64_t end)
 {
     if (end > begin)
-        ebpo_chunks_expect(t->chunks, t->expected, id, level, begin, end - begin);
+        ebpo_chunks_hint(t->chunks, t->expected, id, level, begin, end - begin);
 }
 
-/* The level's sums of a column before the subtrees and behind them. */
-static uint64_t subtree_sum(const telling *t, int level, unsigned what, bool after)
+/* Returns the level's sums of a column before or after the subtrees. */
+static uint64_t subtree_sum(const reporting *t, int level, unsigned what, bool after)
 {
     unsigned column = ebpo_subtree_column(&t->chunks->file->info, level, what);
     return after ? t->last->after[column] : t->first->before[column];
 }
 
-static uint64_t sum_of(const telling *t, ebpo_per per, int level, bool after)
+static uint64_t sum_of(const reporting *t, ebpo_per per, int level, bool after)
 {
     const ebpo_info *info = &t->chunks->file->info;
     uint64_t groups = ebpo_subtree_groups(info, after ? t->last : t->first, level, after);
@@ -686,11 +692,11 @@ static uint64_t sum_of(const telling *t, ebpo_per per, int level, bool after)
     case EBPO_PER_PLANE: return subtree_sum(t, level, EBPO_S_PLANES, after);
     case EBPO_PER_LEAF_PLANE: return subtree_sum(t, level, EBPO_S_LEAF_PLANES, after);
     case EBPO_PER_REF: return subtree_sum(t, level, EBPO_S_REFS, after);
-    default: return 0; /* index arrays, which the table stands for */
+    default: return 0; /* index arrays, which the table replaces */
     }
 }
 
-static void tell_nodes(const telling *t)
+static void report_nodes(const reporting *t)
 {
     const ebpo_info *info = &t->chunks->file->info;
     for (int level = info->subtree_level + 1; level < info->level_count && level <= t->last_level;
@@ -702,9 +708,9 @@ static void tell_nodes(const telling *t)
                             sum_of(t, ebpo_schema[id].per, level, true));
 }
 
-/* A chunk of faces or vertices, `distance` blocks before `from`. */
-static void tell_block(const telling *t, ebpo_array_id id, uint64_t from, uint64_t block_rows,
-                       uint32_t distance)
+/* Collects a chunk of faces or vertices, `distance` blocks before `from`. */
+static void report_block(const reporting *t, ebpo_array_id id, uint64_t from, uint64_t block_rows,
+                         uint32_t distance)
 {
     uint64_t block = from / block_rows;
     if (distance > block)
@@ -715,7 +721,7 @@ static void tell_block(const telling *t, ebpo_array_id id, uint64_t from, uint64
                     (block - distance) * block_rows + block_rows);
 }
 
-static void tell_own_faces(const telling *t)
+static void report_owned_faces(const reporting *t)
 {
     uint64_t faces = t->last->after[EBPO_S_FACES_BEFORE] + t->last->after[EBPO_S_FACES],
              vertices = t->last->after[EBPO_S_VERTICES_BEFORE] + t->last->after[EBPO_S_VERTICES];
@@ -725,48 +731,49 @@ static void tell_own_faces(const telling *t)
         expect_rows(t, EBPO_A_FACE_SOURCE, 0, t->first->face, faces);
 }
 
-/* The rows of `outer` are hints: of any value, and of any number. */
-static void tell_outer(const telling *t, const ebpo_subtree_row *row)
+/* Collects chunks from rows of `outer`. They are hints, with unchecked values and count. */
+static void report_shared(const reporting *t, const ebpo_subtree_row *row)
 {
-    enum { OUTER_MOST = 1 << 16 };
-    uint64_t first = row->before[EBPO_S_OUTER_FACES] + row->before[EBPO_S_OUTER_VERTICES],
-             faces = row->after[EBPO_S_OUTER_FACES] - row->before[EBPO_S_OUTER_FACES],
-             vertices = row->after[EBPO_S_OUTER_VERTICES] - row->before[EBPO_S_OUTER_VERTICES],
+    enum { OUTER_MAX = 1 << 16 };
+    uint64_t first = row->before[EBPO_S_SHARED_FACES] + row->before[EBPO_S_SHARED_VERTICES],
+             faces = row->after[EBPO_S_SHARED_FACES] - row->before[EBPO_S_SHARED_FACES],
+             vertices = row->after[EBPO_S_SHARED_VERTICES] - row->before[EBPO_S_SHARED_VERTICES],
              count = faces + vertices;
-    const ebpo_array_in *array = ebpo_reader_array(t->chunks->file, EBPO_A_SUBTREE_OUTER, 0);
+    const ebpo_array_in *array = ebpo_reader_array(t->chunks->file, EBPO_A_SUBTREE_SHARED, 0);
     uint32_t *outer;
-    if (!array->present || count == 0 || count > OUTER_MOST || first > array->shape.rows ||
+    if (!array->present || count == 0 || count > OUTER_MAX || first > array->shape.rows ||
         count > array->shape.rows - first ||
-        ebpo_chunks_take(t->chunks, EBPO_A_SUBTREE_OUTER, 0, first, count, sizeof *outer, &outer,
+        ebpo_chunks_take(t->chunks, EBPO_A_SUBTREE_SHARED, 0, first, count, sizeof *outer, &outer,
                          NULL) != EBPO_OK)
         return;
     for (uint64_t i = 0; i < count; i++)
-        tell_block(t, i < faces ? EBPO_A_FACES : EBPO_A_VERTICES,
-                   i < faces ? row->face : row->vertex,
-                   i < faces ? EBPO_FACE_BLOCK : EBPO_VERTEX_BLOCK, outer[i]);
+        report_block(t, i < faces ? EBPO_A_FACES : EBPO_A_VERTICES,
+                     i < faces ? row->face : row->vertex,
+                     i < faces ? EBPO_FACE_BLOCK : EBPO_VERTEX_BLOCK, outer[i]);
     free(outer);
 }
 
-void ebpo_subtrees_expect(ebpo_chunks *chunks, ebpo_expected *expected, uint64_t first,
-                          uint64_t count, uint32_t needs, int last_level, bool faces)
+void ebpo_subtrees_hint(ebpo_chunks *chunks, ebpo_hints *expected, uint64_t first, uint64_t count,
+                        uint32_t needs, int last_level, bool faces)
 {
     const ebpo_info *info = &chunks->file->info;
-    bool mesh = faces && info->parts & EBPO_PART_MESH, alone = count == 1; /* then one row is all */
+    bool mesh = faces && info->parts & EBPO_PART_MESH, alone = count == 1; /* one row is then
+                                                                            * sufficient */
     ebpo_subtree_row *row = ebpo_alloc(3, sizeof *row);
-    telling t = { chunks,  expected,
-                  &row[0], alone ? &row[0] : &row[1],
-                  needs,   faces ? EBPO_LEVELS_MAX : last_level };
-    if (row && count && ebpo_expected_wanted(expected) &&
+    reporting t = { chunks,  expected,
+                    &row[0], alone ? &row[0] : &row[1],
+                    needs,   faces ? EBPO_LEVELS_MAX : last_level };
+    if (row && count && ebpo_hints_wanted(expected) &&
         ebpo_subtree_table_row(chunks, first, &row[0], NULL) == EBPO_OK &&
         (alone || ebpo_subtree_table_row(chunks, first + count - 1, &row[1], NULL) == EBPO_OK)) {
-        tell_nodes(&t);
+        report_nodes(&t);
         if (mesh)
-            tell_own_faces(&t);
+            report_owned_faces(&t);
         if (mesh && alone)
-            tell_outer(&t, &row[0]);
+            report_shared(&t, &row[0]);
         for (uint64_t i = 0; i < count && mesh && !alone; i++)
             if (ebpo_subtree_table_row(chunks, first + i, &row[2], NULL) == EBPO_OK)
-                tell_outer(&t, &row[2]);
+                report_shared(&t, &row[2]);
     }
     free(row);
 }

@@ -1,10 +1,10 @@
-/* Writing a file: ebpo_tree_write. The headers come first (groups, arrays' headers, attributes,
- * and HDF5's indexes of chunks); their size is learned from a trial in memory. Then the chunks
- * are encoded and compressed in windows of some chunks, on several threads, and appended in the
- * order of chunk_layout.c: first those of the top levels, which looking up a subtree takes, then
- * all others. The lists of chunk offsets and chunk checksums are the last chunks. Checksums of
- * the content are computed on the way. ebpo_repack reads a file and writes it again with other
- * options. Source: format-spec/README.md, sections 2, 9 and 20. */
+/* Writes a file: ebpo_tree_write. The headers come first (groups, array headers, attributes, and
+ * HDF5's indexes of chunks); a trial in memory determines their size. Then chunks are encoded and
+ * compressed by several threads, in windows of some chunks, and appended in the order of
+ * chunk_layout.c: first those of the top levels, which looking up a subtree needs, then all others.
+ * The lists of chunk offsets and chunk checksums are the last chunks. Content checksums are
+ * computed meanwhile. ebpo_repack reads a file and writes it again with other options. Source:
+ * format-spec/README.md, sections 2, 9 and 20. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,29 +29,29 @@
 
 /* --- headers --- */
 
-/* In the order of the file. */
-typedef enum header_list { LIST_SUMS, LIST_PLACES, LISTS } header_list;
+/* In file order. */
+typedef enum header_list { LIST_CHECKSUMS, LIST_PLACES, LISTS } header_list;
 
 typedef struct file_headers {
-    ebpo_plan *plan; /* whose arrays get handles */
+    ebpo_plan *plan; /* its arrays receive handles */
     ebpo_h5_out out;
     ebpo_h5_id root;
-    /* lists about all chunks, the last chunks of the file; without rows they are not written */
+    /* lists about all chunks, the last chunks of the file; not written if they have no rows */
     ebpo_array_out list[LISTS];
-    uint64_t chunks; /* of the plan's arrays */
+    uint64_t chunks; /* number of chunks of the plan's arrays */
     int codec_level;
-    uint64_t head_bytes;  /* headers */
-    uint64_t index_bytes; /* of arrays of several chunks; 0: there are none */
+    uint64_t head_bytes;  /* size of the headers */
+    uint64_t index_bytes; /* for arrays of several chunks; 0 if there are none */
 } file_headers;
 
-/* The file's first chunk (of the root's type): it is written with the headers. */
+/* The file's first chunk (of the root's type), written with the headers. */
 typedef struct first_chunk {
     const void *data;
     size_t bytes;
 } first_chunk;
 
-/* HDF5 lets a header grow within its metadata block by a tenth of what is left there: room for that
- * where no other header follows. */
+/* HDF5 may enlarge a header within its metadata block by a tenth of the remaining space; this
+ * reserves that space where no other header follows. */
 enum { ALONE_BYTES = 4096 };
 
 static bool has_index(const ebpo_plan *plan)
@@ -74,17 +74,17 @@ static void plan_list(file_headers *h, header_list list, ebpo_array_id id, uint6
                                  .pipeline = h->plan->array[0].shape.pipeline };
 }
 
-/* The plan stays the caller's. End with headers_close, and ebpo_h5_finish or ebpo_h5_discard.
- */
+/* Prepares the headers. The caller keeps the plan. End with headers_close, and ebpo_h5_finish or
+ * ebpo_h5_discard. */
 static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
                          const ebpo_write_options *options)
 {
-    bool summed = options->chunk_sums == EBPO_SUMS_USUAL;
+    bool summed = options->chunk_checksums == EBPO_CHECKSUMS_DEFAULT;
     *h = (file_headers){
         .plan = plan, .root = -1, .chunks = chunks, .codec_level = options->codec_level
     };
     h->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
-    plan_list(h, LIST_SUMS, EBPO_A_CHUNK_SUMS, summed ? chunks : 0);
+    plan_list(h, LIST_CHECKSUMS, EBPO_A_CHUNK_CHECKSUMS, summed ? chunks : 0);
     plan_list(h, LIST_PLACES, EBPO_A_PLACES,
               plan->info.subtree_level ? chunks + has_index(plan) + summed : 0);
 }
@@ -110,7 +110,7 @@ static ebpo_status make_level_groups(file_headers *h, ebpo_error *error)
     return status;
 }
 
-/* A group of the root, if what it is there for is, with room for all arrays that it may have. */
+/* Creates a group of the root, if needed, with space for all arrays that it may have. */
 static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t need,
                                    ebpo_error *error)
 {
@@ -125,7 +125,7 @@ static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t n
     return status;
 }
 
-/* Of a list: its own place and the file's size, which tell readers whether it still holds. */
+/* Writes a list's offset and the file's size, by which readers check that it is still valid. */
 static ebpo_status headers_put_holds(file_headers *h, header_list list, uint64_t file_bytes,
                                      uint64_t offset, ebpo_error *error)
 {
@@ -152,8 +152,9 @@ static ebpo_status make_array(file_headers *h, ebpo_array_out *a, const first_ch
     return status;
 }
 
-/* Everything but the chunks, and the first of these: before the first header grows by attributes:
- * HDF5 then cannot grow the metadata block at the end of the file, but only fill it. */
+/* Writes everything except the chunks, and the first chunk. That chunk comes before attributes
+ * enlarge the first header, so that HDF5 fills the metadata block at the end of the file and cannot
+ * enlarge it. */
 static ebpo_status lay_out(file_headers *h, const char *path, const char *shown,
                            uint64_t head_bytes, first_chunk first, ebpo_error *error)
 {
@@ -161,8 +162,8 @@ static ebpo_status lay_out(file_headers *h, const char *path, const char *shown,
     h->out.codec_level = h->codec_level;
     ebpo_status status =
         ebpo_h5_create(&h->out, path, shown, head_bytes,
-                       3 + (h->list[LIST_SUMS].shape.rows != 0) + (plan->info.subtree_level != 0) +
-                           (plan->attributes != NULL),
+                       3 + (h->list[LIST_CHECKSUMS].shape.rows != 0) +
+                           (plan->info.subtree_level != 0) + (plan->attributes != NULL),
                        error);
     if (status == EBPO_OK)
         status = ebpo_h5_root(&h->out, &h->root, error);
@@ -190,7 +191,7 @@ static ebpo_status lay_out(file_headers *h, const char *path, const char *shown,
     return status;
 }
 
-/* Closes root and arrays, not the file. */
+/* Closes the root and the arrays, but not the file. */
 static void headers_close(file_headers *h)
 {
     for (unsigned i = 0; i < h->plan->count; i++) {
@@ -205,14 +206,14 @@ static void headers_close(file_headers *h)
     h->root = -1;
 }
 
-/* Then the file, which is left open. `shown`: for messages. */
+/* Lays out the file after headers_measure, and leaves it open. `shown`: name for messages. */
 static ebpo_status headers_lay_out(file_headers *h, const char *path, const char *shown,
                                    first_chunk first, ebpo_error *error)
 {
     return lay_out(h, path, shown, h->head_bytes, first, error);
 }
 
-/* Sizes of headers and indexes: the same file in memory, with chunks of one byte. */
+/* Measures headers and indexes with the same file in memory, with chunks of one byte. */
 static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_error *error)
 {
     ebpo_plan *plan = h->plan;
@@ -233,13 +234,12 @@ static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_erro
     h->head_bytes = (headers + 8 + 7) / 8 * 8; /* the last checksum may end in zero bytes */
     if (plan->count == 1)
         h->head_bytes += ALONE_BYTES;
-    /* not by the sizes, which are too small where a checksum ends in zero bytes */
+    /* not from the sizes, which are too small where a checksum ends in zero bytes */
     h->index_bytes = has_index(plan) ? (all - headers + 8 + 7) / 8 * 8 : 0;
     return status;
 }
 
-/* With index_bytes: what comes now is in a piece of its own, once the first array of several chunks
- * calls for it. */
+/* Reserves index_bytes as a separate piece when the first array of several chunks needs it. */
 static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 {
     headers_close(h);
@@ -257,7 +257,7 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
 
 /* --- chunks --- */
 
-/* Chunks that are in memory at a time: 8 MiB raw and as much encoded. */
+/* Chunks in memory at a time: 8 MiB raw and the same encoded. */
 enum { WINDOW = 128 };
 
 typedef struct slot {
@@ -274,17 +274,17 @@ typedef struct writer {
     unsigned threads;
     file_headers head;
     slot slots[WINDOW];
-    unsigned used;            /* slots */
+    unsigned used;            /* number of slots */
     ebpo_chunk_coder *coders; /* one for each thread */
     ebpo_chunk_order order;
     ebpo_array_digest *digest; /* [arrays of the plan] */
     ebpo_content content[EBPO_DIGESTS];
     uint64_t chunk_bytes, chunks_done;
-    uint64_t *sum; /* [chunks], if sums are written: of the plan's arrays one after the other */
+    uint64_t *sum;       /* [chunks], if checksums are written: for the plan's arrays in order */
     uint64_t *first_sum; /* [arrays of the plan] */
-    uint64_t *place;     /* [rows of places] */
+    uint64_t *place;     /* [rows of the list of chunk offsets] */
     uint64_t place_count, top_bytes;
-    uint64_t index_at; /* where the index begins; 0: there is none, or not yet */
+    uint64_t index_at; /* start of the index; 0: none, or not yet */
 } writer;
 
 static ebpo_status fill_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -328,7 +328,7 @@ static void digest_slots(writer *w)
     }
 }
 
-/* The filling of the last chunk is no face. */
+/* Compresses faces as gates. The padding of the last chunk is not a face. */
 static ebpo_status compress_gates(slot *s, ebpo_chunk_coder *coder, int level)
 {
     ebpo_shape stored = ebpo_stored_shape(&s->array->shape, true);
@@ -349,7 +349,7 @@ static ebpo_status compress_chunk(slot *s, ebpo_chunk_coder *coder, int level)
                                                s->raw, s->raw_bytes, s->stored, &s->stored_bytes);
 }
 
-/* Item 0 digests the whole window, the others compress one slot each. */
+/* Digests the whole window for item 0, and compresses one slot for each other item. */
 static ebpo_status compress_slot(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                  ebpo_error *error)
 {
@@ -386,7 +386,7 @@ static void note_place(writer *w, uint32_t number, uint64_t bytes)
     w->place[w->place_count++] = ebpo_place(number, bytes);
 }
 
-/* Called for each chunk, in the order of the file, before it is written. */
+/* Records each chunk, in file order, before it is written. */
 static void place_chunk(writer *w, const slot *s)
 {
     if (w->index_at == 0 && ebpo_shape_chunks(&s->array->shape) > 1) {
@@ -395,7 +395,7 @@ static void place_chunk(writer *w, const slot *s)
     }
     uint32_t number = ebpo_place_number(s->array->id, s->array->level);
     note_place(w, number, s->stored_bytes);
-    if (w->head.list[LIST_SUMS].shape.rows)
+    if (w->head.list[LIST_CHECKSUMS].shape.rows)
         w->sum[w->first_sum[s->array - w->plan.array] + s->chunk] =
             ebpo_place(number, ebpo_chunk_sum(s->stored, s->stored_bytes));
     w->chunk_bytes += s->stored_bytes;
@@ -452,21 +452,22 @@ static ebpo_status write_list(writer *w, header_list list, const uint64_t *value
     return status;
 }
 
-/* The last chunks of the file. Where libhdf5 has put something else in between, the lists say that
- * they do not hold. */
+/* Writes the last chunks of the file. If libhdf5 has placed other data in between, the lists are
+ * marked as invalid. */
 static ebpo_status write_lists(writer *w, ebpo_error *error)
 {
     size_t bytes[LISTS];
     uint64_t offset = w->head.head_bytes + w->chunk_bytes + w->head.index_bytes, size = 0;
     const uint64_t *values[LISTS] = { w->sum, w->place };
-    ebpo_status status = write_list(w, LIST_SUMS, values[LIST_SUMS], &bytes[LIST_SUMS], error);
-    if (status == EBPO_OK && bytes[LIST_SUMS])
-        note_place(w, ebpo_place_number(EBPO_A_CHUNK_SUMS, 0), bytes[LIST_SUMS]);
+    ebpo_status status =
+        write_list(w, LIST_CHECKSUMS, values[LIST_CHECKSUMS], &bytes[LIST_CHECKSUMS], error);
+    if (status == EBPO_OK && bytes[LIST_CHECKSUMS])
+        note_place(w, ebpo_place_number(EBPO_A_CHUNK_CHECKSUMS, 0), bytes[LIST_CHECKSUMS]);
     if (status == EBPO_OK)
         status = write_list(w, LIST_PLACES, values[LIST_PLACES], &bytes[LIST_PLACES], error);
     if (status == EBPO_OK)
         status = ebpo_h5_size(&w->head.out, &size, error);
-    bool holds = status == EBPO_OK && size == offset + bytes[LIST_SUMS] + bytes[LIST_PLACES];
+    bool holds = status == EBPO_OK && size == offset + bytes[LIST_CHECKSUMS] + bytes[LIST_PLACES];
     for (header_list l = 0; l < LISTS && status == EBPO_OK; l++) {
         if (w->head.list[l].shape.rows)
             status = headers_put_holds(&w->head, l, holds ? size : 0, holds ? offset : 0, error);
@@ -486,7 +487,7 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
     w->slots[0].raw = block;
     w->digest = ebpo_alloc(w->plan.count, sizeof *w->digest);
     w->place = ebpo_alloc(w->head.list[LIST_PLACES].shape.rows, sizeof *w->place);
-    w->sum = ebpo_alloc(w->head.list[LIST_SUMS].shape.rows, sizeof *w->sum);
+    w->sum = ebpo_alloc(w->head.list[LIST_CHECKSUMS].shape.rows, sizeof *w->sum);
     w->first_sum = ebpo_alloc(w->plan.count, sizeof *w->first_sum);
     if (!w->coders || !block || !w->digest || !w->place || !w->sum || !w->first_sum)
         return ebpo_fail_memory(error, wanted * slot_bytes);
@@ -494,15 +495,15 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
         w->slots[i].raw = block + i * slot_bytes;
         w->slots[i].stored = w->slots[i].raw + EBPO_CHUNK_BYTES_MAX;
     }
-    uint64_t sums = 0;
+    uint64_t checksums = 0;
     for (unsigned i = 0; i < w->plan.count; i++) {
-        w->first_sum[i] = sums;
-        sums += ebpo_shape_chunks(&w->plan.array[i].shape);
+        w->first_sum[i] = checksums;
+        checksums += ebpo_shape_chunks(&w->plan.array[i].shape);
     }
     return EBPO_OK;
 }
 
-/* The root's types, encoded ahead of its turn. */
+/* Encodes the root's types in advance. */
 static ebpo_status encode_first(writer *w, uint8_t *stored, size_t *bytes, ebpo_error *error)
 {
     slot *s = &w->slots[0];
@@ -531,7 +532,7 @@ static ebpo_status put_digests(writer *w, ebpo_error *error)
 
 static ebpo_status write_file(writer *w, const char *path, const char *shown, ebpo_error *error)
 {
-    uint8_t first[256]; /* the chunk is of two bytes */
+    uint8_t first[256]; /* the chunk has two bytes */
     size_t first_bytes = 0;
     ebpo_status status = encode_first(w, first, &first_bytes, error);
     if (status == EBPO_OK)
@@ -553,7 +554,7 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
         status = ebpo_facts_put_top(&w->head.out, w->head.root, w->top_bytes, error);
     headers_close(&w->head);
     if (status == EBPO_OK)
-        /* another libhdf5 may have placed metadata otherwise: no reader relies on it, tests do */
+        /* another libhdf5 may place metadata differently: tests rely on it, readers do not */
         status = ebpo_h5_finish(&w->head.out, error);
     return status;
 }
@@ -562,17 +563,17 @@ static ebpo_status check_options(const ebpo_write_options *options, const char *
                                  ebpo_error *error)
 {
     if ((unsigned)options->codec > EBPO_CODEC_NONE || options->codec_level < 0 ||
-        options->codec_level > ebpo_pipeline_facts_of((ebpo_pipeline)options->codec)->level_most)
+        options->codec_level > ebpo_pipeline_facts_of((ebpo_pipeline)options->codec)->level_max)
         return ebpo_fail_file(
             error, EBPO_E_ARGUMENT, path,
             "no such codec or codec level; zstd takes 1 to 22, deflate 1 to 9, none takes 0");
-    if ((unsigned)options->chunk_sums > EBPO_SUMS_NONE)
-        return ebpo_fail_file(error, EBPO_E_ARGUMENT, path, "chunk_sums: there is no choice %u",
-                              (unsigned)options->chunk_sums);
+    if ((unsigned)options->chunk_checksums > EBPO_CHECKSUMS_NONE)
+        return ebpo_fail_file(error, EBPO_E_ARGUMENT, path, "chunk_checksums: invalid value %u",
+                              (unsigned)options->chunk_checksums);
     return EBPO_OK;
 }
 
-/* Publishes the file under its name; without `publish` writes right into `path`. */
+/* Publishes the file under its name; without `publish` writes directly to `path`. */
 static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const char *shown,
                               ebpo_publish *publish, const ebpo_write_options *options,
                               ebpo_error *error)
@@ -637,7 +638,7 @@ ebpo_status ebpo_tree_write_into(const ebpo_tree *tree, const char *path, const 
 
 /* --- repacking --- */
 
-/* What is on the disk, against the content of the file that was read. */
+/* Compares the file on disk with the content of the file that was read. */
 static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
                                  const ebpo_read_options *read, ebpo_error *error)
 {
@@ -658,9 +659,9 @@ static ebpo_status check_written(const ebpo_file *from, const ebpo_publish *out,
     return status != EBPO_OK
                ? status
                : ebpo_fail_file(error, EBPO_E_UNSUPPORTED, from->in.shown,
-                                "written anew it would have another content checksum, although "
-                                "its own is right; another program has stored its arrays in ways "
-                                "that this one does not write. Nothing was written");
+                                "repacking would change the content checksum, although the "
+                                "stored one is correct; another program has stored the arrays in "
+                                "ways that this one does not write. Nothing was written");
 }
 
 ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path, const ebpo_read_options *read,
@@ -673,7 +674,7 @@ ebpo_status ebpo_file_repack(const ebpo_file *file, const char *path, const ebpo
     ebpo_status status = EBPO_TAKE(ebpo_write_options, &wanted, write, error);
     wanted.parts = ~0u;
     if (status == EBPO_OK)
-        status = ebpo_publish_begin(&out, path, error); /* before what may take long */
+        status = ebpo_publish_begin(&out, path, error); /* before operations that may take long */
     if (status == EBPO_OK) {
         ebpo_publish_expect_input(&out, &file->in);
         status = ebpo_file_read_tree(file, read, &tree, error);

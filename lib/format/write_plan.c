@@ -1,9 +1,8 @@
-/* The plan of a file to be written: the list of its arrays with their shapes and codings, and
- * the function that encodes rows of an array to bytes. The plan refers to the caller's tree,
- * which has been checked, and owns only derived arrays: prefix sums that let a reader start in
- * the middle of a level (arrays of an absent part count as zeros), sums before subtrees, and
- * codings of attributes. Encoding depends on nothing but the plan and the rows, so that threads
- * encode chunks independently. */
+/* Plans a file to write: the list of its arrays with shapes and codings, and the function that
+ * encodes rows of an array to bytes. The plan refers to the caller's checked tree, and owns only
+ * derived arrays: prefix sums that let a reader start in the middle of a level (arrays of an absent
+ * part count as zeros), sums before subtrees, and codings of attributes. Encoding depends only on
+ * the plan and the rows, so threads encode chunks independently. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -84,7 +83,7 @@ static const char *check_rows(const ebpo_info *info, const ebpo_attributes *all,
     bool vertex = ebpo_attribute_is_of(a, "vertex"), face = ebpo_attribute_is_of(a, "face");
     if (a->rows == 0 ||
         ((vertex || face) && a->rows != (vertex ? info->vertex_count : info->face_count)))
-        return "an array of attributes has not as many rows as the mesh";
+        return "an array of attributes and the mesh differ in the number of rows";
     for (uint64_t k = 0; k < i; k++)
         if (strcmp(all->array[k].element, a->element) == 0 && all->array[k].rows != a->rows)
             return "two arrays of attributes of one element have different numbers of rows";
@@ -101,11 +100,11 @@ static const char *check_names(const ebpo_attribute *a)
     if (!a->element[0] || strchr(a->element, ' ') || !a->names[0] || !ebpo_text_ok(a->element) ||
         !ebpo_text_ok(a->names) || a->columns < 1 || a->columns > EBPO_ATTRIBUTE_COLUMNS ||
         words != (a->list == EBPO_ATTRIBUTE_NO_LIST ? a->columns : 1))
-        return "an array of attributes has no name, or not one for each column";
+        return "an array of attributes does not have a name for each column";
     return NULL;
 }
 
-/* --- codings: what makes the smaller chunks of a few --- */
+/* --- codings: chosen by the size of a few chunks --- */
 
 enum { SAMPLES = 8, SAMPLE_BYTES = 16384 };
 
@@ -149,7 +148,7 @@ static void choose_codings(ebpo_attribute_plan *to, const ebpo_attribute *a,
         a->ends && count && columns_are_less(coder, a->values, bytes, floats, count, 1);
 }
 
-/* Checks what is to be written (EBPO_E_ARGUMENT), and finds out what stands in its head. */
+/* Checks attributes to write (EBPO_E_ARGUMENT), and determines their heads. */
 static ebpo_status attributes_plan(ebpo_plan *plan, const char *shown, ebpo_error *error)
 {
     const ebpo_attributes *all = plan->attributes;
@@ -183,7 +182,7 @@ static ebpo_status attributes_plan(ebpo_plan *plan, const char *shown, ebpo_erro
 
 /* --- arrays --- */
 
-/* Adds its arrays to the plan, which has room for attributes_planned of them. */
+/* Adds attribute arrays to the plan, which has space for attributes_planned of them. */
 static uint64_t attributes_planned(const ebpo_plan *plan)
 {
     return plan->attributes ? 1 + 2 * plan->attributes->count : 0;
@@ -328,7 +327,7 @@ static void encode_skips(const ebpo_level *level, const ebpo_shape *shape, uint6
     }
 }
 
-/* Last index row whose references begin at or before `ref`. */
+/* Returns the last index row whose references begin at or before `ref`. */
 static uint64_t block_of(const uint64_t *leaf_index, uint64_t leaves, uint64_t ref)
 {
     uint64_t low = 0, high = (leaves - 1) / EBPO_INDEX_ROWS;
@@ -378,7 +377,7 @@ void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64
         break;
     case EBPO_A_FACES:
         seen = plan->faces_index[row / array->shape.chunk_rows];
-        /* index_faces has checked them */
+        /* checked by index_faces */
         (void)ebpo_corners_encode(tree->mesh.faces + 3 * row, rows, &seen, file);
         break;
     case EBPO_A_VERTEX_SOURCE: ebpo_numbers_encode(tree->vertex_source + row, rows, file); break;
@@ -401,7 +400,7 @@ void ebpo_plan_free(ebpo_plan *plan)
             free(plan->index[level][i]);
     free(plan->faces_index);
     free(plan->attribute);
-    ebpo_subtree_sums_free(&plan->subtrees);
+    ebpo_subtree_checksums_free(&plan->subtrees);
     memset(plan, 0, sizeof *plan);
 }
 
@@ -432,23 +431,23 @@ static bool texts_ok(const ebpo_info *info)
     return true;
 }
 
-/* Without compression bytes of zeros count, so they are not kept there. */
+/* Returns true if faces are stored as gates: not without compression, as the gates contain many
+ * zero bytes. */
 static bool gates_wanted(const ebpo_info *info, bool had, ebpo_face_coding coding)
 {
-    bool usual = had && info->codec != EBPO_CODEC_NONE;
+    bool standard = had && info->codec != EBPO_CODEC_NONE;
     return info->parts & EBPO_PART_MESH &&
-           (coding == EBPO_FACES_USUAL ? usual : coding == EBPO_FACES_GATES);
+           (coding == EBPO_FACES_DEFAULT ? standard : coding == EBPO_FACES_GATES);
 }
 
-/* The facts as the file will state them: parts that are wanted and there, counts of what is
- * written. */
+/* Computes the facts of the file: requested and available parts, counts of written items. */
 static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *options,
                                  const ebpo_check *check, ebpo_error *error)
 {
     const ebpo_tree *tree = plan->tree;
     ebpo_info *info = &plan->info;
     if ((unsigned)options->face_coding > EBPO_FACES_HIGH_WATER)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "face_coding: there is no coding number %u",
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "face_coding: invalid value %u",
                          (unsigned)options->face_coding);
     *info = tree->info;
     info->version_major = EBPO_FORMAT_MAJOR;
@@ -470,7 +469,7 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
         if (!one || !tree->mesh.faces || tree->mesh.vertex_count != info->vertex_count ||
             tree->mesh.face_count != info->face_count)
             return ebpo_check_fail(check, -1, "/mesh",
-                                   "the mesh is missing or its counts are not those of the facts",
+                                   "the mesh is missing or its counts differ from the facts",
                                    error);
         info->double_coordinates = tree->mesh.xyz64 != NULL;
     }
@@ -479,7 +478,8 @@ static ebpo_status resolve_facts(ebpo_plan *plan, const ebpo_write_options *opti
     if (info->level_count < 1 || info->level_count > EBPO_LEVELS_MAX || info->grid_level < 0 ||
         info->max_level < 0 || (unsigned)info->rule > EBPO_RULE_POSITIVE)
         return ebpo_check_fail(check, -1, "/levels",
-                               "there are no levels, too many, or impossible facts", error);
+                               "there are no levels, too many levels, or inconsistent facts",
+                               error);
     if (!texts_ok(info))
         return ebpo_check_fail(check, -1, "/",
                                "a name, unit, CRS or date is not UTF-8 without control characters",
@@ -506,7 +506,7 @@ static ebpo_status check_tree(ebpo_plan *plan, const ebpo_check *check, ebpo_err
                                 info->vertex_count, info->source_vertex_count, error);
     if (status == EBPO_OK && info->parts & EBPO_PART_MAPS)
         status = ebpo_check_map(check, "/maps/face_source", tree->face_source, info->face_count,
-                                info->source_face_count + info->mend.added_faces, error);
+                                info->source_face_count + info->repair_record.added_faces, error);
     return status;
 }
 
@@ -514,7 +514,7 @@ static ebpo_status index_levels(ebpo_plan *plan, ebpo_error *error)
 {
     for (int i = 0; i < plan->info.level_count; i++) {
         const ebpo_level *level = &plan->tree->level[i];
-        ebpo_level stored = *level; /* without the parts that are left out */
+        ebpo_level stored = *level; /* without omitted parts */
         if (!(plan->info.parts & EBPO_PART_MESH))
             stored.leaf_first = NULL;
         if (!(plan->info.parts & EBPO_PART_LEAF_PLANES))
@@ -551,7 +551,7 @@ static ebpo_status index_faces(ebpo_plan *plan, const ebpo_check *check, ebpo_er
     return EBPO_OK;
 }
 
-/* Least of 1, 2, 4 bytes that holds all values. */
+/* Returns the least of 1, 2, 4 bytes that holds all values. */
 static uint8_t narrow_unsigned(const ebpo_level *level, const uint32_t *values, uint64_t count)
 {
     uint32_t all = 0;
@@ -570,7 +570,8 @@ static uint8_t narrow_signed(const ebpo_level *level, const int32_t *values, uin
     return low >= INT8_MIN && high <= INT8_MAX ? 1 : low >= INT16_MIN && high <= INT16_MAX ? 2 : 4;
 }
 
-/* Bytes of an element in the file. schema.c: where there is a choice, values are of 32 bits. */
+/* Returns the bytes of an element in the file. If there is a choice, values have 32 bits
+ * (schema.c). */
 static uint8_t stored_size(const ebpo_plan *plan, const ebpo_array_out *a, const void *values)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
@@ -584,7 +585,7 @@ static uint8_t stored_size(const ebpo_plan *plan, const ebpo_array_out *a, const
                            : narrow_unsigned(level, values, count);
 }
 
-/* Where the values are and how wide they get. */
+/* Finds the values and their width. */
 static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
 {
     const ebpo_array_spec *spec = &ebpo_schema[a->id];
@@ -594,7 +595,7 @@ static void find_values(const ebpo_plan *plan, ebpo_array_out *a)
         a->values = plan->subtrees.index;
     else if (a->id == EBPO_A_SUBTREE_COUNTS)
         a->values = plan->subtrees.counts;
-    else if (a->id == EBPO_A_SUBTREE_OUTER)
+    else if (a->id == EBPO_A_SUBTREE_SHARED)
         a->values = plan->subtrees.outer;
     else if (ebpo_schema_is_held(a->id))
         a->values = ebpo_level_array(&plan->tree->level[a->level], a->id);
@@ -615,11 +616,11 @@ static ebpo_pipeline pipeline_of(ebpo_codec codec)
 
 static void add_array(ebpo_plan *plan, ebpo_array_id id, int level)
 {
-    uint64_t rows = id == EBPO_A_SUBTREE_OUTER ? plan->subtrees.outer_count
-                                               : ebpo_schema_rows(&plan->info, id, level);
+    uint64_t rows = id == EBPO_A_SUBTREE_SHARED ? plan->subtrees.shared_count
+                                                : ebpo_schema_rows(&plan->info, id, level);
     if (rows == 0 || rows == EBPO_ROWS_STATED ||
         (id < EBPO_LEVEL_ARRAYS && ebpo_schema[id].if_needed &&
-         ebpo_level_is_usual(&plan->tree->level[level], id)))
+         ebpo_level_is_default(&plan->tree->level[level], id)))
         return;
     ebpo_array_out *a = &plan->array[plan->count++];
     *a = (ebpo_array_out){ .id = id, .level = level, .handle = -1 };
@@ -648,7 +649,7 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
     if (status == EBPO_OK && plan->info.parts & EBPO_PART_MESH)
         status = index_faces(plan, &check, error);
     if (status == EBPO_OK && plan->info.subtree_level)
-        status = ebpo_subtree_sums_make(&plan->subtrees, tree, &plan->info, error);
+        status = ebpo_subtree_checksums_make(&plan->subtrees, tree, &plan->info, error);
     if (status == EBPO_OK)
         status = attributes_plan(plan, shown, error);
     if (status != EBPO_OK)

@@ -1,4 +1,4 @@
-/* What is about to be written: the list of arrays, and how each one's rows become bytes. */
+/* Plan of a file to write: the list of arrays, and the encoding of their rows. */
 #ifndef EBPO_FORMAT_WRITE_PLAN_H
 #define EBPO_FORMAT_WRITE_PLAN_H
 
@@ -6,26 +6,26 @@
 
 #include "format/chunk_layout.h"
 
-/* Checks the tree (EBPO_E_ARGUMENT) and lists its arrays. The tree stays the caller's and must
+/* Checks the tree (EBPO_E_ARGUMENT) and lists its arrays. The caller keeps the tree, which must
  * outlive the plan. */
 EBPO_MUST_USE ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
                                          const ebpo_write_options *options, const char *shown,
                                          ebpo_error *error);
 void ebpo_plan_free(ebpo_plan *plan);
 
-/* Rows [row, row + rows) of an array, as stored before compression; row is a multiple of the
- * chunk's rows, rows at most that many. */
+/* Encodes rows [row, row + rows) of an array, as stored before compression. row is a multiple of
+ * the chunk's rows; rows is at most that number. */
 void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row,
                       uint64_t rows, uint8_t *file);
 
-/* Prefix sums that let a reader start in the middle of a level, which readers compare with those of
- * the file: one row for each EBPO_INDEX_ROWS items, at
- * least one; NULL when memory is short. */
+/* Return prefix sums that let a reader start in the middle of a level; readers compare them with
+ * those of the file. One row for each EBPO_INDEX_ROWS items, at least one; NULL when memory is
+ * short. */
 uint64_t *ebpo_index_types(const ebpo_level *level, bool root);
 uint64_t *ebpo_index_gray(const ebpo_level *level);
 uint64_t *ebpo_index_leaves(const ebpo_level *level);
 
-/* Writes the HDF5 attributes of /attributes, and those of an array there beside `about`. */
+/* Write the HDF5 attributes of /attributes, and those of its arrays except `about`. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_put_group(ebpo_h5_out *out, const ebpo_plan *plan,
                                                     ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_attributes_put_array(ebpo_h5_out *out, const ebpo_plan *plan,

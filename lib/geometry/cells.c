@@ -16,8 +16,8 @@
 
 enum { MANTISSA_BITS = 53, LEAST_EXPONENT = -1074, LARGEST_EXPONENT = 1000 };
 
-/* Room around the model, for each side: a part of the axis' own extent, and at least a part of the
- * largest one, so that flat models do not get cells too thin to compute with. */
+/* Margins on each side of the model: a fraction of the axis' own extent, and at least a fraction of
+ * the largest extent, so that flat models do not get cells too thin to compute with. */
 static const double own_margin = 0x1p-22, flat_margin = 0x1p-32;
 
 static bool extents_usable(const double min[3], const double max[3])
@@ -30,7 +30,7 @@ static bool extents_usable(const double min[3], const double max[3])
     return true;
 }
 
-/* The length that stands for the model's size: never 0. */
+/* Returns a length that represents the model's size: never 0. */
 static double model_size(const double min[3], const double max[3])
 {
     double extent = 0, magnitude = 0;
@@ -43,8 +43,8 @@ static double model_size(const double min[3], const double max[3])
     return magnitude > 0 ? magnitude : 1;
 }
 
-/* One axis with unit 2^e; false when the unit is too fine. [low, high] holds [min, max], with
- * margins. */
+/* Sets one axis with unit 2^e; returns false when the unit is too fine. [low, high] holds [min,
+ * max], with margins. */
 static bool axis_with_unit(ebpo_box *box, int axis, double min, double max, double low, double high,
                            int e)
 {
@@ -79,7 +79,7 @@ bool ebpo_box_make(ebpo_box *out, const double min[3], const double max[3], int 
         if (magnitude > 0)
             frexp(magnitude, &e);
         e = e - MANTISSA_BITS < LEAST_EXPONENT ? LEAST_EXPONENT : e - MANTISSA_BITS;
-        /* The finest unit may leave no room for the margins; the next ones do. */
+        /* The finest unit may be too fine for the margins; the next ones are not. */
         while (!axis_with_unit(&box, k, min[k], max[k], low, high, e))
             e++;
     }
@@ -87,7 +87,7 @@ bool ebpo_box_make(ebpo_box *out, const double min[3], const double max[3], int 
     return true;
 }
 
-/* Exponent of the lowest bit set in x, which is finite and not 0. */
+/* Returns the exponent of the lowest bit set in x, which is finite and not 0. */
 static int low_bit(double x)
 {
     int e;

@@ -12,7 +12,7 @@
 enum { EBPO_MAX_LEVEL = 20 };
 
 /* The root cell: [origin, origin + size] on each axis. origin is an integer multiple of a power of
- * two u (its own for each axis), and size an integer multiple of u * 2^grid_level, with every
+ * two u (separate for each axis), and size an integer multiple of u * 2^grid_level, with every
  * corner at levels 0 .. grid_level exactly representable. size > 0 on every axis. */
 typedef struct ebpo_box {
     double origin[3];
@@ -26,8 +26,8 @@ typedef struct ebpo_cell {
     uint32_t at[3];
 } ebpo_cell;
 
-/* 2^-n, 0 <= n <= 1000. Multiplying by it rounds as dividing by 2^n does, in a fraction of the
- * time. */
+/* Returns 2^-n, 0 <= n <= 1000. Multiplying by it rounds like dividing by 2^n, and is much faster.
+ */
 static inline double ebpo_half_power(int n)
 {
     uint64_t bits = (uint64_t)(1023 - n) << 52;
@@ -36,24 +36,25 @@ static inline double ebpo_half_power(int n)
     return out;
 }
 
-/* Coordinate of the wall with number `k` (0 .. 2^level) at `level` on `axis`; exact for level <=
+/* Returns the coordinate of cell face `k` (0 .. 2^level) at `level` on `axis`; exact for level <=
  * grid_level: origin + k * (size / 2^level). */
-static inline double ebpo_wall(const ebpo_box *box, int axis, int level, uint32_t k)
+static inline double ebpo_cell_face(const ebpo_box *box, int axis, int level, uint32_t k)
 {
     return box->origin[axis] + (double)k * (box->size[axis] * ebpo_half_power(level));
 }
 
 /* Builds the root box around [min, max] (finite, min <= max), strictly larger on every side, exact
- * down to `grid_level` (0 .. 20). False when the coordinates are too large (beyond 2^1000) for
- * that. */
+ * down to `grid_level` (0 .. 20). Returns false when the coordinates are too large (beyond 2^1000)
+ * for that. */
 bool ebpo_box_make(ebpo_box *out, const double min[3], const double max[3], int grid_level);
 
-/* True when the box is what ebpo_box_make promises: used on boxes read from files. */
+/* Returns true when the box has the properties that ebpo_box_make guarantees: used on boxes read
+ * from files. */
 bool ebpo_box_valid(const ebpo_box *box);
 
-/* Cells as an octree has them: children and parents, what lies beside them, where points are. */
+/* Cells of an octree: children and parents, neighbours, positions of points. */
 
-/* A file's root cell. */
+/* Returns a file's root cell. */
 static inline ebpo_box ebpo_root_box(const ebpo_info *info)
 {
     const double *origin = info->box_origin, *size = info->box_size;
@@ -69,7 +70,7 @@ static inline ebpo_cell ebpo_cell_child(ebpo_cell cell, unsigned octant)
                           2 * cell.at[2] + (octant >> 2 & 1) } };
 }
 
-/* The cell of a coarser level that holds it. */
+/* Returns the cell of a coarser level that contains it. */
 static inline ebpo_cell ebpo_cell_ancestor(ebpo_cell cell, int level)
 {
     int up = cell.level - level;
@@ -86,96 +87,97 @@ static inline bool ebpo_cell_equal(ebpo_cell a, ebpo_cell b)
     return a.level == b.level && a.at[0] == b.at[0] && a.at[1] == b.at[1] && a.at[2] == b.at[2];
 }
 
-/* Octant of the position's ancestor, `up` levels above it, in its own parent. */
+/* Returns the octant of the position's ancestor, `up` levels above it, in its own parent. */
 static inline unsigned ebpo_octant_at(const uint32_t at[3], int up)
 {
     return (at[0] >> up & 1) | (at[1] >> up & 1) << 1 | (at[2] >> up & 1) << 2;
 }
 
-/* On the way from a coarser level down to the cell: which child of that level's node. */
+/* Returns the octant of the cell's ancestor below `level`, a coarser level, in its parent. */
 static inline unsigned ebpo_cell_octant(ebpo_cell cell, int level)
 {
     return ebpo_octant_at(cell.at, cell.level - level - 1);
 }
 
-/* The cell of the same level one step of -1, 0 or 1 away on each axis: across a face, an edge or a
- * corner. False outside the root. */
+/* Returns the cell of the same level one step of -1, 0 or 1 away on each axis: across a face, an
+ * edge or a corner. False outside the root. */
 static inline bool ebpo_cell_neighbour(ebpo_cell cell, const int step[3], ebpo_cell *out)
 {
     *out = cell;
     for (int k = 0; k < 3; k++) {
         out->at[k] += (uint32_t)step[k];
-        if (out->at[k] >> cell.level) /* also of what wrapped around below 0 */
+        if (out->at[k] >> cell.level) /* also true for a value that wrapped around below 0 */
             return false;
     }
     return true;
 }
 
-/* Two cells, of any levels and closed, have a point in common. */
+/* Returns true if two closed cells, of any levels, have a point in common. */
 bool ebpo_cells_touch(ebpo_cell a, ebpo_cell b);
 
-/* The closed cell has a point in common with the box [min, max]. */
-static inline bool ebpo_cell_meets(const ebpo_box *box, ebpo_cell cell, const double min[3],
-                                   const double max[3])
+/* Returns true if the closed cell has a point in common with the box [min, max]. */
+static inline bool ebpo_cell_intersects(const ebpo_box *box, ebpo_cell cell, const double min[3],
+                                        const double max[3])
 {
     for (int k = 0; k < 3; k++)
-        if (ebpo_wall(box, k, cell.level, cell.at[k]) > max[k] ||
-            ebpo_wall(box, k, cell.level, cell.at[k] + 1) < min[k])
+        if (ebpo_cell_face(box, k, cell.level, cell.at[k]) > max[k] ||
+            ebpo_cell_face(box, k, cell.level, cell.at[k] + 1) < min[k])
             return false;
     return true;
 }
 
-/* Volume of each cell of a level, in the model's unit cubed. */
+/* Returns the volume of each cell of a level, in the model's unit cubed. */
 double ebpo_cell_volume(const ebpo_box *box, int level);
 
-/* The cell's walls: low and high coordinates. */
+/* Returns the cell's bounds: low and high coordinates. */
 static inline void ebpo_cell_bounds(const ebpo_box *box, ebpo_cell cell, double low[3],
                                     double high[3])
 {
     for (int k = 0; k < 3; k++) {
-        low[k] = ebpo_wall(box, k, cell.level, cell.at[k]);
-        high[k] = ebpo_wall(box, k, cell.level, cell.at[k] + 1);
+        low[k] = ebpo_cell_face(box, k, cell.level, cell.at[k]);
+        high[k] = ebpo_cell_face(box, k, cell.level, cell.at[k] + 1);
     }
 }
 
 static inline uint32_t ebpo_locate_on_axis(const ebpo_box *box, int level, int axis, double p)
 {
     double cells = (double)(1u << level), guess = (p - box->origin[axis]) / box->size[axis] * cells;
-    /* The guess is right to 2^-30 of a cell: three roundings, of at most 2^20 cells. */
+    /* The guess is accurate to 2^-30 of a cell: three roundings, of at most 2^20 cells. */
     uint32_t i = guess >= cells ? (1u << level) - 1 : (uint32_t)guess;
     double part = guess - (double)i;
     if (part > 0x1p-30 && part < 1 - 0x1p-30)
         return i;
-    while (ebpo_wall(box, axis, level, i) > p)
+    while (ebpo_cell_face(box, axis, level, i) > p)
         i--;
-    while (ebpo_wall(box, axis, level, i + 1) <= p)
+    while (ebpo_cell_face(box, axis, level, i + 1) <= p)
         i++;
     return i;
 }
 
-/* The cell of the given level that holds p (walls belong to the upper cell); false outside the root
- * cell. Exact: level <= grid_level. */
+/* Finds the cell of the given level that contains p (cell faces belong to the upper cell); false
+ * outside the root cell. Exact: level <= grid_level. */
 static inline bool ebpo_locate(const ebpo_box *box, int level, const double p[3], uint32_t at[3])
 {
     for (int k = 0; k < 3; k++) {
-        if (!(p[k] >= box->origin[k]) || !(p[k] < ebpo_wall(box, k, level, 1u << level)))
+        if (!(p[k] >= box->origin[k]) || !(p[k] < ebpo_cell_face(box, k, level, 1u << level)))
             return false;
         at[k] = ebpo_locate_on_axis(box, level, k, p[k]);
     }
     return true;
 }
 
-/* What finds the cells of one level, made once: most points need no division and no wall. */
+/* Precomputed data to find the cells of one level: most points need no division and no cell face.
+ */
 typedef struct ebpo_locator {
     ebpo_box box;
     int level;
-    double scale[3], half; /* cells in a unit; half of all cells of an axis */
+    double scale[3], half; /* cells per unit; half of all cells of an axis */
 } ebpo_locator;
 
-/* A point's place in the grid of that level. */
+/* A point's position in the grid of that level. */
 typedef struct ebpo_position {
     uint32_t at[3];  /* its cell */
-    double cells[3]; /* its coordinates in cells, right to 2^-30 */
+    double cells[3]; /* its coordinates in cells, accurate to 2^-30 */
 } ebpo_position;
 
 static inline ebpo_locator ebpo_locator_make(const ebpo_box *box, int level)
@@ -186,10 +188,10 @@ static inline ebpo_locator ebpo_locator_make(const ebpo_box *box, int level)
     return l;
 }
 
-/* Near a wall, or outside. */
+/* Decides for points near a cell face, or outside. */
 bool ebpo_locator_decide(const ebpo_locator *locator, const double p[3], ebpo_position *out);
 
-/* As ebpo_locate. */
+/* Same as ebpo_locate. */
 static inline bool ebpo_locator_find(const ebpo_locator *l, const double p[3], ebpo_position *out)
 {
     bool sure = true;
@@ -204,16 +206,17 @@ static inline bool ebpo_locator_find(const ebpo_locator *l, const double p[3], e
     return __builtin_expect(sure, 1) || ebpo_locator_decide(l, p, out);
 }
 
-/* From the cell's coordinates to the model's. A point on a wall (`sides`: ebpo_polytope_sides) gets
- * the wall's own coordinate, so that neighbouring cells agree to the last bit. */
-static inline double ebpo_wall_point(const ebpo_box *box, ebpo_cell cell, int axis, double xi,
-                                     unsigned sides)
+/* Converts the cell's coordinates to the model's. A point on a cell face (`sides`:
+ * ebpo_polytope_sides) gets the face's own coordinate, so that neighbouring cells agree to the last
+ * bit. */
+static inline double ebpo_cell_face_point(const ebpo_box *box, ebpo_cell cell, int axis, double xi,
+                                          unsigned sides)
 {
-    double low = ebpo_wall(box, axis, cell.level, cell.at[axis]);
+    double low = ebpo_cell_face(box, axis, cell.level, cell.at[axis]);
     if (xi <= 0 || sides >> 2 * axis & 1)
         return low;
     if (xi >= 1 || sides >> (2 * axis + 1) & 1)
-        return ebpo_wall(box, axis, cell.level, cell.at[axis] + 1);
+        return ebpo_cell_face(box, axis, cell.level, cell.at[axis] + 1);
     return low + xi * (box->size[axis] / (double)(1u << cell.level));
 }
 
@@ -241,13 +244,14 @@ static inline ebpo_octcode ebpo_octcode_child(ebpo_octcode code, unsigned octant
     return code << 3 | octant;
 }
 
-/* The octcodes of a node's descendants at `level` are [first, first + 8^(level - its level)). */
+/* Returns the first octcode of a node's descendants at `level`: they are [first, first + 8^(level -
+ * its level)). */
 static inline ebpo_octcode ebpo_octcode_first_descendant(ebpo_octcode code, int level)
 {
     return code << 3 * (level - ebpo_octcode_level(code));
 }
 
-/* Interleaves the cell's position; the reference implementation in the tests goes bit by bit. */
+/* Interleaves the cell's position; the reference implementation in the tests works bit by bit. */
 ebpo_octcode ebpo_octcode_of_cell(ebpo_cell cell);
 ebpo_cell ebpo_cell_of_octcode(ebpo_octcode code);
 

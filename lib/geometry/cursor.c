@@ -1,8 +1,8 @@
-/* A position in an octree that moves from node to node, whatever holds the nodes.
+/* A position in an octree that moves from node to node, for any holder of nodes.
  *
  * The cursor keeps the nodes from the root down to the current one, each with its children once
  * they have been read. Moving up therefore reads nothing, and a step to a cell nearby reads only
- * what is below the common ancestor. Nodes come from an ebpo_node_source: levels in memory, a file,
+ * nodes below the common ancestor. Nodes come from an ebpo_node_source: levels in memory, a file,
  * or the tables of a decoded tree. */
 #include "core/strict_fp.h"
 
@@ -14,7 +14,7 @@ static void arrive_at(ebpo_cursor *c, int depth, const ebpo_node *node)
 {
     c->depth = depth;
     c->at[depth].node = *node;
-    c->at[depth].asked = c->at[depth].has_children = false;
+    c->at[depth].queried = c->at[depth].has_children = false;
 }
 
 void ebpo_cursor_begin(ebpo_cursor *c, const ebpo_node_source *source, void *holder, ebpo_node root)
@@ -28,13 +28,13 @@ ebpo_status ebpo_cursor_children(ebpo_cursor *c, const ebpo_node **child, ebpo_e
 {
     ebpo_node *node = &c->at[c->depth].node;
     *child = NULL;
-    if (!c->at[c->depth].asked && node->type == EBPO_GRAY && !node->pruned) {
+    if (!c->at[c->depth].queried && node->type == EBPO_GRAY && !node->pruned) {
         ebpo_status status = c->source->children(c->holder, node, c->at[c->depth].child, error);
         if (status != EBPO_OK)
             return status;
         c->at[c->depth].has_children = !node->pruned;
     }
-    c->at[c->depth].asked = true;
+    c->at[c->depth].queried = true;
     if (c->at[c->depth].has_children)
         *child = c->at[c->depth].child;
     return EBPO_OK;

@@ -1,9 +1,9 @@
-/* Decimal text as the nearest float or double. There are three ways, each exact where it applies,
- * tried in order of cost: 1. Digits below 2^53 times or
- * over a power of ten up to 10^22: both are doubles, so one operation rounds once (Clinger, "How to
- * read floating point numbers accurately", 1990). That double also decides the float, unless it
- * lies exactly between two floats (then rounding twice may err). 2. Up to 19 digits over a power of
- * ten up to 10^27: a 128-bit quotient with its remainder, rounded by hand. 3. The C library. */
+/* Converts decimal text to the nearest float or double. There are three methods, each exact where
+ * it applies, tried in order of cost: 1. Digits below 2^53 times or over a power of ten up to
+ * 10^22: both are doubles, so one operation rounds once (Clinger, "How to read floating point
+ * numbers accurately", 1990). That double also decides the float, unless it is exactly between two
+ * floats (then rounding twice may err). 2. Up to 19 digits over a power of ten up to 10^27: a
+ * 128-bit quotient with its remainder, rounded by this code. 3. The C library. */
 #include "core/strict_fp.h"
 
 #include "geometry/decimal.h"
@@ -18,7 +18,7 @@ typedef struct decimal {
     uint64_t digits;
     int32_t exponent; /* value = digits * 10^exponent */
     bool negative;
-    bool short_form; /* no more than 19 digits: nothing was cut off */
+    bool short_form; /* at most 19 digits: none was dropped */
 } decimal;
 
 static const double tens[] = { 1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
@@ -78,7 +78,7 @@ static bool scan_number(decimal *d, const char *s, const char *end)
            scan_exponent_of(d, *s == '-', s + 2, end);
 }
 
-/* The names of infinite and undefined numbers of Microsoft's C library; precision adds zeros. */
+/* Recognises infinite and undefined numbers of Microsoft's C library; precision adds zeros. */
 static bool scan_foreign_word(double *out, const char *s, size_t n)
 {
     static const struct {
@@ -139,8 +139,8 @@ static uint64_t power_of_five(int exponent)
     return five;
 }
 
-/* digits / 10^e to `bits` bits. The quotient has at least 65 bits, so what rounding needs to know
- * is the bits below and the remainder. */
+/* Computes digits / 10^e to `bits` bits. The quotient has at least 65 bits, so the bits below and
+ * the remainder determine the rounding. */
 static bool long_quotient(double *out, const decimal *d, int bits)
 {
     if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)
@@ -162,8 +162,8 @@ static bool long_quotient(double *out, const decimal *d, int bits)
 }
 
 /* Decides exactly whether the float nearest to digits / 10^e, rounded to the last digit (ties to
- * even), gives the digits: value * 10^e is less than a half away from them. The value is of 1e-27
- * to 1e20, where floats are normal. *keeps is set where true is returned. */
+ * even), gives the digits: value * 10^e is less than a half away from them. The value is from 1e-27
+ * to 1e20, where floats are normal. *keeps is set when it returns true. */
 static bool compare_scaled(bool *keeps, float value, const decimal *d)
 {
     if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)
@@ -183,7 +183,7 @@ static bool compare_scaled(bool *keeps, float value, const decimal *d)
 }
 
 #else
-/* The C library decides. */
+/* Leaves the decision to the C library. */
 static bool long_quotient(double *out, const decimal *d, int bits)
 {
     (void)out, (void)d, (void)bits;
@@ -197,7 +197,8 @@ static bool compare_scaled(bool *keeps, float value, const decimal *d)
 }
 #endif
 
-/* Between two floats, exactly: of the 29 bits that a float lacks, only the first is set. */
+/* Returns true if the value is exactly between two floats: of the 29 bits that a float lacks, only
+ * the first is set. */
 static bool is_float_tie(double value)
 {
     uint64_t bits;
@@ -217,7 +218,7 @@ static void copy_token(char buffer[EBPO_NUMBER_LONGEST + 1], const char *s, size
     }
 }
 
-/* The longer ways. */
+/* Converts by the slower methods. */
 static float nearest_float(const decimal *d, const char *s, size_t n, locale_t c_locale)
 {
     double value;
@@ -228,7 +229,8 @@ static float nearest_float(const decimal *d, const char *s, size_t n, locale_t c
     return strtof_l(buffer, NULL, c_locale);
 }
 
-/* Prints the value with `count` digits and compares: they, and the power of ten of the first. */
+/* Prints the value with `count` digits and compares the digits, and the power of ten of the first.
+ */
 static bool prints_digits(float value, const char *digits, size_t count, int32_t first)
 {
     char printed[EBPO_NUMBER_LONGEST + 16];
@@ -236,12 +238,12 @@ static bool prints_digits(float value, const char *digits, size_t count, int32_t
     const char *exponent = strrchr(printed, 'e');
     if (printed[0] != digits[0] || !exponent || strtol(exponent + 1, NULL, 10) != first)
         return false;
-    /* the point may be of several bytes, as the locale has it */
+    /* the decimal point may have several bytes, depending on the locale */
     return count == 1 || memcmp(exponent - (count - 1), digits + 1, count - 1) == 0;
 }
 
 /* Decides by printing whether the float, rounded to the text's last digit, gives the text. A float
- * below a power of ten has a digit less before that last one than the power has. */
+ * below a power of ten has one digit fewer before that last one than the power has. */
 static bool prints_as(float value, const decimal *d, const char *s, size_t n)
 {
     char digits[EBPO_NUMBER_LONGEST];
@@ -259,8 +261,8 @@ static bool prints_as(float value, const decimal *d, const char *s, size_t n)
 }
 
 /* Decides in doubles that the float nearest to digits * 10^exponent keeps the digits: it is less
- * than half of 10^exponent away. That is so for digits below 2^23, whose last one is worth more
- * than the distance between floats. Of digits below 2^40 the double is right to 2^-12 of the half.
+ * than half of 10^exponent away. That holds for digits below 2^23, whose last one is greater than
+ * the distance between floats. For digits below 2^40 the double is accurate to 2^-12 of the half.
  */
 static inline bool surely_keeps(double nearest, float value, const decimal *d)
 {
@@ -291,7 +293,7 @@ bool ebpo_number_float_kept(float *out, bool *kept, const char *s, size_t n, loc
         *out = word ? (float)value : 0;
         return word;
     }
-    /* Both short ways stay between 1e-27 and 1e38, where floats have all their bits. */
+    /* Both fast methods stay between 1e-27 and 1e38, where floats have all their bits. */
     if (one_operation(&value, &d) && !is_float_tie(value)) {
         float nearest = (float)value;
         *out = d.negative ? -nearest : nearest;

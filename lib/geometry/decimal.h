@@ -1,22 +1,22 @@
-/* Decimal text to float and double, correctly rounded in any locale. */
+/* Converts decimal text to float and double, correctly rounded in any locale. */
 #ifndef EBPO_GEOMETRY_DECIMAL_H
 #define EBPO_GEOMETRY_DECIMAL_H
 
 #include <ebpo/base.h>
 #include <locale.h>
 
-/* s[0 .. n) must be one number and nothing else: [+-] digits [. digits] [e [+-] digits], or nan,
- * inf, infinity in any case. Also what some programs write for these: 3.1+e2, and of Microsoft's C
+/* Converts s[0 .. n), which must be exactly one number: [+-] digits [. digits] [e [+-] digits], or
+ * nan, inf, infinity in any case. Also accepts other forms of these: 3.1+e2, and from Microsoft's C
  * library 1.#INF, 1.#IND, 1.#QNAN, 1.#SNAN with zeros behind them, nan(ind) and nan(snan).
- * Hexadecimal is refused. The result is the nearest float (double), ties
- * to even; beyond the range it is infinite. False: not a number, or longer than
- * EBPO_NUMBER_LONGEST. `c_locale`: from newlocale(LC_ALL_MASK, "C", 0); used for the few numbers
- * that the exact short ways do not decide. */
+ * Hexadecimal is rejected. The result is the nearest float (double), ties to even; beyond the range
+ * it is infinite. Returns false for other text, or text longer than EBPO_NUMBER_LONGEST.
+ * `c_locale`: from newlocale(LC_ALL_MASK, "C", 0); used for the few numbers that the fast exact
+ * methods do not decide. */
 bool ebpo_number_double(double *out, const char *s, size_t n, locale_t c_locale);
 enum { EBPO_NUMBER_LONGEST = 1200 };
 
-/* Likewise; *kept: the float, rounded to the text's last digit (ties to even), gives the text, or
- * the text has no digits or is infinite for a double, too. */
+/* Same for a float. *kept is true if the float, rounded to the text's last digit (ties to even),
+ * gives the text, or if the text has no digits or is infinite even as a double. */
 bool ebpo_number_float_kept(float *out, bool *kept, const char *s, size_t n, locale_t c_locale);
 
 static inline bool ebpo_number_float(float *out, const char *s, size_t n, locale_t c_locale)
@@ -25,7 +25,7 @@ static inline bool ebpo_number_float(float *out, const char *s, size_t n, locale
     return ebpo_number_float_kept(out, &kept, s, n, c_locale);
 }
 
-/* [+-] digits, within int64. */
+/* Converts [+-] digits, within int64. */
 bool ebpo_number_integer(int64_t *out, const char *s, size_t n);
 
 #endif

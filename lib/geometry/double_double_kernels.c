@@ -3,7 +3,7 @@
  * On processors with FMA one instruction gives the rounding error of a product. Without it the
  * product is split (expansion.h). Errors of distances are relative to the distance, errors of rays
  * are bounded by the computed permanent (the sum of absolute values; as in predicates.c), so both
- * builds lead to the same decisions and results. */
+ * builds give the same decisions and results. */
 #include "core/strict_fp.h"
 
 #ifdef __FMA__
@@ -17,7 +17,7 @@
 
 /* --- distances: triangle_distance.c --- */
 
-/* To about 2^-100 of itself; x > 0. */
+/* Returns the root to a relative error of about 2^-100; x > 0. */
 static inline ebpo_pair pair_root(ebpo_pair x)
 {
     double first = sqrt(x.head);
@@ -25,9 +25,9 @@ static inline ebpo_pair pair_root(ebpo_pair x)
     return ebpo_pair_add(ebpo_pair_of(first), ebpo_pair_of(rest.head / (2 * first)));
 }
 
-/* The root of a / b to about 2^-100 of itself, from one that is right to 2^-50: one step of Newton,
- * whose own error is half of that squared. One root and two quotients less than by pair_root
- * and ebpo_pair_divide. */
+/* Returns the root of a / b to a relative error of about 2^-100, from an estimate accurate to
+ * 2^-50: one Newton step, whose own error is half of the square of that. It saves one root and two
+ * quotients compared with pair_root and ebpo_pair_divide. */
 static inline ebpo_pair root_of_quotient(ebpo_pair a, ebpo_pair b, double first)
 {
     ebpo_pair back = ebpo_pair_multiply(b, ebpo_two_product(first, first));
@@ -64,7 +64,7 @@ static inline void to_corner(const double p[3], const double corner[3], ebpo_mea
     memcpy(out->point, corner, sizeof out->point);
 }
 
-/* |corner x edge| / |edge|. */
+/* Computes |corner x edge| / |edge|. */
 static inline void to_edge(const double p[3], const double from[3], const double to[3],
                            ebpo_measured *out)
 {
@@ -80,7 +80,7 @@ static inline void to_edge(const double p[3], const double from[3], const double
         out->point[k] = t < 0.5 ? from[k] + t * e[k].head : to[k] - (1 - t) * e[k].head;
 }
 
-/* |corner . normal| / |normal|. */
+/* Computes |corner . normal| / |normal|. */
 static inline void to_plane(const double p[3], const double triangle[3][3], const pair_plane *plane,
                             ebpo_measured *out)
 {
@@ -103,7 +103,7 @@ static inline bool to_normal(const pair_plane *plane, double normal[3])
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
         double products = fabs(e[u].head * f[v].head) + fabs(e[v].head * f[u].head);
         bool nothing = (e[u].head == 0 || f[v].head == 0) && (e[v].head == 0 || f[u].head == 0);
-        /* 2^-96 of the products is the error; where a factor of each is 0, so is the component. */
+        /* 2^-96 of the products is the error; if one factor of each is 0, the component is 0. */
         sure = sure && (nothing || (fabs(n[k].head) > 0x1p-40 * products && products > 0x1p-800));
     }
     if (!sure)
@@ -141,10 +141,10 @@ const ebpo_distance_pairs EBPO_KERNEL(ebpo_distance_pairs) = { to_feature, unit_
 
 /* --- rays: ray_triangle.c --- */
 
-/* The slack covers underflow, and an overflow makes a bound infinite or not a number, so that no
+/* The slack covers underflow; an overflow makes a bound infinite or not a number, so that no
  * comparison succeeds. */
 
-/* A normal and the sum of absolute values behind each component. */
+/* A normal and the sum of absolute values for each component. */
 typedef struct plane_normal {
     ebpo_pair x[3];
     double permanent[3];
@@ -162,8 +162,8 @@ static inline plane_normal cross_bounded(const ebpo_pair f[3], const ebpo_pair g
     return n;
 }
 
-/* n . y. Errors: some 12 * 2^-106 of the permanent in n, 12 more in products and sums; 2^-97 leaves
- * a margin. */
+/* Returns n . y. Errors: some 12 * 2^-106 of the permanent in n, 12 more in products and sums;
+ * 2^-97 leaves a margin. */
 static inline ebpo_bounded dot_bounded(const plane_normal *n, const ebpo_pair y[3])
 {
     ebpo_pair first = ebpo_pair_multiply(n->x[0], y[0]), second = ebpo_pair_multiply(n->x[1], y[1]);
@@ -176,7 +176,8 @@ static inline ebpo_bounded dot_bounded(const plane_normal *n, const ebpo_pair y[
     return out;
 }
 
-static void meet_plane(const ebpo_segment *ray, const double triangle[3][3], ebpo_plane_pairs *out)
+static void intersect_plane(const ebpo_segment *ray, const double triangle[3][3],
+                            ebpo_plane_pairs *out)
 {
     ebpo_pair f[3], g[3], to_plane[3], d[3];
     for (int k = 0; k < 3; k++) {
@@ -205,4 +206,4 @@ static void edge_side(const double d[3], const ebpo_pair a[3], const double from
     *out = dot_bounded(&n, direction);
 }
 
-const ebpo_ray_pairs EBPO_KERNEL(ebpo_ray_pairs) = { meet_plane, edge_side };
+const ebpo_ray_pairs EBPO_KERNEL(ebpo_ray_pairs) = { intersect_plane, edge_side };

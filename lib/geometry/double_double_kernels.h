@@ -9,7 +9,7 @@
 #include "geometry/expansion.h"
 #include "geometry/ray.h"
 
-/* A distance (head + tail; they may overlap by some bits) with a bound on its relative error, and
+/* A distance (head + tail, which may overlap by some bits) with a bound on its relative error, and
  * the nearest point. */
 typedef struct ebpo_measured {
     ebpo_pair distance;
@@ -18,36 +18,36 @@ typedef struct ebpo_measured {
 } ebpo_measured;
 
 typedef struct ebpo_distance_pairs {
-    /* The triangle's distance when its nearest feature is known. Products of four coordinates, and
-     * their rounding errors, must stay within the doubles. `normal`: what unit_normal gives and
-     * returns, or NULL: true. */
+    /* Computes the triangle's distance when its nearest feature is known. Products of four
+     * coordinates, and their rounding errors, must stay within the doubles. Returns the result of
+     * unit_normal, and its normal in `normal`; true if `normal` is NULL. */
     bool (*measure)(const double p[3], const double triangle[3][3], ebpo_feature feature,
                     double *normal, ebpo_measured *out);
-    /* False when the arithmetic does not suffice: numbers beyond its range, or too much
+    /* Returns false when the arithmetic does not suffice: numbers beyond its range, or too much
      * cancellation. */
     bool (*unit_normal)(const double triangle[3][3], double normal[3]);
 } ebpo_distance_pairs;
 
 EBPO_KERNELS(ebpo_distance_pairs, ebpo_distance_pairs)
 
-/* A value, at most `error` off. */
+/* A value with the bound `error`. */
 typedef struct ebpo_bounded {
     ebpo_pair x;
     double error;
 } ebpo_bounded;
 
-/* Where a line meets a triangle's plane: t = numerator / denominator, which is 0 when they are
- * parallel. */
+/* Intersection of a line with a triangle's plane: t = numerator / denominator, which is 0 when they
+ * are parallel. */
 typedef struct ebpo_plane_pairs {
     ebpo_bounded numerator, denominator;
-    /* As ebpo_pair_quotient gives it, where it can. */
+    /* result of ebpo_pair_quotient, where it succeeds */
     bool has_quotient;
     double quotient[2];
 } ebpo_plane_pairs;
 
 typedef struct ebpo_ray_pairs {
     void (*plane)(const ebpo_segment *ray, const double triangle[3][3], ebpo_plane_pairs *out);
-    /* d . (a x e), e = to - from */
+    /* Computes d . (a x e), e = to - from. */
     void (*edge)(const double d[3], const ebpo_pair a[3], const double from[3], const double to[3],
                  ebpo_bounded *out);
 } ebpo_ray_pairs;

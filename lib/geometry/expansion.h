@@ -9,7 +9,7 @@
 #include <math.h>
 #include <stdbool.h>
 
-/* A double and what rounding left of it: head + tail is exact. */
+/* A double and its rounding error: head + tail is exact. */
 typedef struct ebpo_pair {
     double head, tail;
 } ebpo_pair;
@@ -23,7 +23,7 @@ static inline ebpo_pair ebpo_two_sum(double a, double b)
 
 static inline ebpo_pair ebpo_two_difference(double a, double b) { return ebpo_two_sum(a, -b); }
 
-/* Halves of at most 26 bits. */
+/* Splits into halves of at most 26 bits. */
 static inline ebpo_pair ebpo_split(double a)
 {
     double c = 0x1.0000002p27 * a;
@@ -34,7 +34,7 @@ static inline ebpo_pair ebpo_split(double a)
 static inline ebpo_pair ebpo_two_product(double a, double b)
 {
     double head = a * b;
-#ifdef EBPO_PRODUCTS_BY_FMA /* the same while nothing overflows or underflows, and faster */
+#ifdef EBPO_PRODUCTS_BY_FMA /* equal if nothing overflows or underflows, and faster */
     return (ebpo_pair){ head, __builtin_fma(a, b, -head) };
 #else
     ebpo_pair p = ebpo_split(a), q = ebpo_split(b);
@@ -55,8 +55,8 @@ static inline int ebpo_expansion_of_pair(double *out, ebpo_pair pair)
     return ebpo_expansion_push(out, ebpo_expansion_push(out, 0, pair.tail), pair.head);
 }
 
-/* out = e + f; `out` has room for n + m and is neither of them. Returns the number of components.
- */
+/* Computes out = e + f; `out` has capacity n + m and is neither of them. Returns the number of
+ * components. */
 static inline int ebpo_expansion_sum(double *out, const double *e, int n, const double *f, int m)
 {
     int i = 0, j = 0, length = 0;
@@ -70,7 +70,7 @@ static inline int ebpo_expansion_sum(double *out, const double *e, int n, const 
     return ebpo_expansion_push(out, length, carry);
 }
 
-/* out = e * factor; `out` has room for 2 n and is not e. */
+/* Computes out = e * factor; `out` has capacity 2 n and is not e. */
 static inline int ebpo_expansion_scale(double *out, const double *e, int n, double factor)
 {
     int length = 0;
@@ -97,8 +97,8 @@ static inline int ebpo_expansion_sign(const double *e, int n)
     return n == 0 ? 0 : e[n - 1] > 0 ? 1 : -1;
 }
 
-/* Fewer components, each the rounded sum of itself and all below: e shrinks in place. Shewchuk's
- * COMPRESS. */
+/* Reduces the number of components, in place: each becomes the rounded sum of itself and all below.
+ * Shewchuk's COMPRESS. */
 static inline int ebpo_expansion_compress(double *e, int n)
 {
     if (n == 0)
@@ -124,7 +124,7 @@ static inline int ebpo_expansion_compress(double *e, int n)
     return top;
 }
 
-/* out = e * f for f of at most two components, e of at most 16; room for 4 n. */
+/* Computes out = e * f for f of at most two components, e of at most 16; capacity 4 n. */
 static inline int ebpo_expansion_times(double *out, const double *e, int n, const double *f, int m)
 {
     double low[32], high[32];
@@ -150,7 +150,7 @@ static inline ebpo_difference ebpo_difference_of(ebpo_pair pair)
     return d;
 }
 
-/* out = p * q - r * s; room for 16. */
+/* Computes out = p * q - r * s; capacity 16. */
 static inline int ebpo_expansion_minor(double *out, ebpo_difference p, ebpo_difference q,
                                        ebpo_difference r, ebpo_difference s)
 {
@@ -180,7 +180,8 @@ static inline ebpo_pair ebpo_pair_subtract(ebpo_pair a, ebpo_pair b)
     return ebpo_pair_add(a, (ebpo_pair){ -b.head, -b.tail });
 }
 
-/* Head and tail may overlap by some bits: fit for further additions and products. */
+/* Returns the product; head and tail may overlap by some bits, which is suitable for further
+ * additions and products. */
 static inline ebpo_pair ebpo_pair_multiply(ebpo_pair a, ebpo_pair b)
 {
     ebpo_pair product = ebpo_two_product(a.head, b.head);
@@ -188,7 +189,7 @@ static inline ebpo_pair ebpo_pair_multiply(ebpo_pair a, ebpo_pair b)
     return product;
 }
 
-/* a / b, b not 0: to some 2^-100. */
+/* Returns a / b, b not 0, to some 2^-100. */
 static inline ebpo_pair ebpo_pair_divide(ebpo_pair a, ebpo_pair b)
 {
     double first = a.head / b.head;
@@ -196,9 +197,9 @@ static inline ebpo_pair ebpo_pair_divide(ebpo_pair a, ebpo_pair b)
     return ebpo_pair_add(ebpo_pair_of(first), ebpo_pair_of(rest.head / b.head));
 }
 
-/* a / b as two doubles that differ by one step at most, the exact quotient rounded to nearest being
- * one of them; equal, where there is no doubt. `error`: how far a and b are off together, as a part
- * of themselves. False where the quotient is so large or small that this does not hold. */
+/* Returns a / b as two doubles that differ by one step at most; one of them is the exact quotient
+ * rounded to nearest. They are equal if the rounding is certain. `error`: relative error of a and b
+ * together. Returns false where the quotient is so large or small that this does not hold. */
 static inline bool ebpo_pair_quotient(ebpo_pair a, ebpo_pair b, double error, double out[2])
 {
     double q = a.head / b.head;
@@ -229,7 +230,7 @@ static inline void ebpo_pair_cross(const ebpo_pair a[3], const ebpo_pair b[3], e
     }
 }
 
-/* b - a, exact. */
+/* Computes b - a, exactly. */
 static inline void ebpo_pair_differences(const double a[3], const double b[3], ebpo_pair out[3])
 {
     for (int k = 0; k < 3; k++)

@@ -1,6 +1,6 @@
-/* Doubles as integers in a common power of two, and the way back with one rounding. Used where the
+/* Converts doubles to integers in a common power of two, and back with one rounding. Used where
  * filters and expansions do not decide. Quotients and roots are computed with some 70 bits, and the
- * lowest bit is set when anything is below it, so that rounding to a double errs never. */
+ * lowest bit is set when the remainder is not 0, so that rounding to a double is always right. */
 #include "core/strict_fp.h"
 
 #include "geometry/integer_vectors.h"
@@ -63,8 +63,8 @@ void ebpo_set_integer(mpz_t out, double x, int unit)
         mpz_mul_2exp(out, out, (mp_bitcnt_t)(e - 53 - unit));
 }
 
-/* The double nearest to m * 2^exponent, ties to even; the lowest bit of m may stand for whatever
- * lies below it. */
+/* Returns the double nearest to m * 2^exponent, ties to even; the lowest bit of m may represent a
+ * remainder below it. */
 static double round_integer(const mpz_t m, long exponent)
 {
     if (mpz_sgn(m) == 0)

@@ -1,6 +1,6 @@
-/* Vectors of integers of any size (GMP, which ends the program when memory is out), for what
- * floating point leaves open: coordinates in units of a power of two. Pure functions, any thread.
- */
+/* Vectors of integers of any size (GMP, which ends the program when memory is short), where
+ * floating point does not decide: coordinates in units of a power of two. Pure functions, any
+ * thread. */
 #ifndef EBPO_GEOMETRY_INTEGER_VECTORS_H
 #define EBPO_GEOMETRY_INTEGER_VECTORS_H
 
@@ -14,21 +14,22 @@ void ebpo_vectorz_init(ebpo_vectorz *v);
 void ebpo_vectorz_clear(ebpo_vectorz *v);
 void ebpo_vectorz_subtract(ebpo_vectorz *out, const ebpo_vectorz *a, const ebpo_vectorz *b);
 void ebpo_vectorz_dot(mpz_t out, const ebpo_vectorz *a, const ebpo_vectorz *b);
-/* `out` is neither of them. */
+/* Computes a x b; `out` is neither of them. */
 void ebpo_vectorz_cross(ebpo_vectorz *out, const ebpo_vectorz *a, const ebpo_vectorz *b);
 
-/* The greatest e, not above `unit`, for which all are multiples of 2^e. Begin with
+/* Returns the greatest e, not above `unit`, for which all are multiples of 2^e. Begin with
  * EBPO_UNIT_OF_ZEROS. */
 enum { EBPO_UNIT_OF_ZEROS = 0x7fffffff - 64 };
 int ebpo_common_unit(const double *x, int n, int unit);
 
-/* out = x / 2^unit */
+/* Computes out = x / 2^unit. */
 void ebpo_set_integer(mpz_t out, double x, int unit);
 
-/* sqrt(square / denominator) * 2^unit, the nearest double, ties to even; INFINITY beyond. */
+/* Returns sqrt(square / denominator) * 2^unit, rounded to the nearest double, ties to even;
+ * INFINITY beyond. */
 double ebpo_round_root(const mpz_t square, const mpz_t denominator, int unit);
 
-/* (numerator / denominator) * 2^unit, the same; denominator > 0. */
+/* Returns (numerator / denominator) * 2^unit, rounded in the same way; denominator > 0. */
 double ebpo_round_quotient(const mpz_t numerator, const mpz_t denominator, int unit);
 
 #endif

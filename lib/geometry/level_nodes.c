@@ -2,7 +2,7 @@
  *
  * Levels store node types in groups of eight siblings, 16 bits each. A node is found by its rank:
  * the number of nodes of its type before it in its level. Ranks are prefix sums of the counts in
- * the groups, made once for each level; counts that contradict each other are refused.
+ * the groups, made once for each level; contradictory counts are rejected.
  *
  * The table of children stores four bytes for each node. A grid over its top levels replaces the
  * first steps from the root, with fewer cells than about twice the groups. */
@@ -18,7 +18,7 @@
 static const uint64_t EVEN = UINT64_C(0x5555555555555555), PAIRS = UINT64_C(0x3333333333333333),
                       NIBBLES = UINT64_C(0x0f0f0f0f0f0f0f0f), BYTES = UINT64_C(0x00ff00ff00ff00ff);
 
-/* Set bits of each byte; only even bits are set. */
+/* Counts set bits of each byte; only even bits are set. */
 static inline uint64_t bits_of_bytes(uint64_t x)
 {
     x = (x & PAIRS) + (x >> 2 & PAIRS);
@@ -30,7 +30,7 @@ static inline uint64_t sum_of_bytes(uint64_t x)
     return ((x & BYTES) + (x >> 8 & BYTES)) * UINT64_C(0x0001000100010001) >> 48;
 }
 
-/* Types of up to 128 groups, four in a word. Bytes of the sums stay below 256. */
+/* Counts types of up to 128 groups, four in a word. Bytes of the sums stay below 256. */
 static void count_words(const uint8_t *types, unsigned words, uint64_t counts[4])
 {
     uint64_t low = 0, high = 0, both = 0;
@@ -75,7 +75,7 @@ void ebpo_level_ranks_free(ebpo_level_ranks *ranks)
     memset(ranks, 0, sizeof *ranks);
 }
 
-/* Nodes of a type in the groups before each, and in all of them. */
+/* Counts nodes of a type in the groups before each, and in all of them. */
 static ebpo_status count_before(uint64_t **out, const ebpo_level *level, ebpo_node_type type,
                                 uint64_t *count, ebpo_error *error)
 {
@@ -114,13 +114,13 @@ static ebpo_status make_ranks(ebpo_level_ranks *out, const ebpo_level *level, in
     return EBPO_OK;
 }
 
-static ebpo_status sums_disagree(int number, const char *what, ebpo_error *error)
+static ebpo_status checksums_disagree(int number, const char *what, ebpo_error *error)
 {
     return ebpo_fail(error, EBPO_E_FORMAT,
                      "level %d: the counts of its %s do not add up; run ebpo verify", number, what);
 }
 
-/* The sums of the counts before each; `bytes`: of a count, 1 or 4. */
+/* Computes the sums of the counts before each; `bytes`: size of a count, 1 or 4. */
 static ebpo_status sum_before(uint64_t **out, const void *counts, size_t bytes, uint64_t count,
                               uint64_t total, int number, const char *what, ebpo_error *error)
 {
@@ -133,7 +133,7 @@ static ebpo_status sum_before(uint64_t **out, const void *counts, size_t bytes, 
         (*out)[i] = sum;
         sum += bytes == 1 ? narrow[i] : wide[i];
     }
-    return sum == total ? EBPO_OK : sums_disagree(number, what, error);
+    return sum == total ? EBPO_OK : checksums_disagree(number, what, error);
 }
 
 ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebpo_level *level, int number,
@@ -157,7 +157,7 @@ ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebpo_level *level
 
 /* --- nodes of levels --- */
 
-/* Node of a group of the cell's level. */
+/* Returns a node of a group of the cell's level. */
 static ebpo_node node_of(const ebpo_level_nodes *n, uint64_t group, unsigned octant, ebpo_cell cell)
 {
     uint16_t types = n->level[cell.level].types[group];
@@ -246,7 +246,7 @@ typedef struct painter {
     int bits;
 } painter;
 
-/* `cell` is counted from the table's root. */
+/* Writes an entry to the grid; `cell` is relative to the table's root. */
 static void paint_grid(painter *p, uint32_t entry, ebpo_cell cell)
 {
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY && cell.level < p->bits) {

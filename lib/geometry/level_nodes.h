@@ -7,7 +7,7 @@
 
 #include "geometry/cells.h"
 
-/* Octants that a group of this level has. */
+/* Returns the number of octants in a group of this level. */
 static inline unsigned ebpo_group_octants(int level) { return level ? 8 : 1; }
 
 static inline ebpo_node_type ebpo_group_type(uint16_t types, unsigned octant)
@@ -15,7 +15,7 @@ static inline ebpo_node_type ebpo_group_type(uint16_t types, unsigned octant)
     return (ebpo_node_type)(types >> 2 * octant & 3);
 }
 
-/* The word of a group in which only this octant is not white. */
+/* Returns the word of a group in which only this octant is not white. */
 static inline uint16_t ebpo_group_of(ebpo_node_type type, unsigned octant)
 {
     return (uint16_t)((unsigned)type << 2 * octant);
@@ -26,11 +26,11 @@ static inline uint16_t ebpo_group_set(uint16_t types, unsigned octant, ebpo_node
     return (uint16_t)((types & ~(3u << 2 * octant)) | ebpo_group_of(type, octant));
 }
 
-/* Bit 2i is set when octant i is a leaf or gray: when faces touch it. */
+/* Returns a word whose bit 2i is set when octant i is a leaf or gray: when faces touch it. */
 static inline unsigned ebpo_group_filled(uint16_t types) { return types >> 1 & 0x5555u; }
 
-/* Octants below `octants` (at most 8) that are of this type: with an octant's own number, its rank
- * among its siblings of the type. */
+/* Returns the number of octants below `octants` (at most 8) of this type: for an octant's own
+ * number, its rank among its siblings of the type. */
 static inline unsigned ebpo_group_count(uint16_t types, ebpo_node_type type, unsigned octants)
 {
     unsigned differs = types ^ 0x5555u * (unsigned)type;
@@ -40,10 +40,10 @@ static inline unsigned ebpo_group_count(uint16_t types, ebpo_node_type type, uns
     return (bits + (bits >> 8)) & 0xf;
 }
 
-/* Nodes of each type in groups of eight, 16 bits each, little-endian, in any place of memory. */
+/* Counts nodes of each type in groups of eight, 16 bits each, little-endian, at any address. */
 void ebpo_groups_count(const void *types, uint64_t groups, uint64_t counts[4]);
 
-/* The same for groups of one level; level 0 has only its root. */
+/* Same for groups of one level; level 0 has only its root. */
 static inline void ebpo_groups_count_at(int level, const uint16_t *types, uint64_t groups,
                                         uint64_t counts[4])
 {
@@ -54,29 +54,30 @@ static inline void ebpo_groups_count_at(int level, const uint16_t *types, uint64
             counts[type] = ebpo_group_count(types[0], (ebpo_node_type)type, 1);
 }
 
-/* A node of an octree, by where it stands: what every holder of nodes (levels in memory, a file,
- * the tables of a decoded tree) gives and takes. A value: copy it, keep it, put it in a queue. */
+/* A node of an octree, identified by its position; shared by all holders of nodes (levels in
+ * memory, a file, the tables of a decoded tree). It is a value and may be copied, kept and queued.
+ */
 
 typedef struct ebpo_node {
     ebpo_cell cell;
     ebpo_node_type type;
-    bool pruned; /* gray, and known to have no children in what holds it */
-    /* How its holder finds it. */
+    bool pruned; /* gray, and known to have no children in its holder */
+    /* Key by which its holder finds it. */
     union {
-        uint64_t rank;  /* in levels and files: among the nodes of its type in its level */
+        uint64_t rank;  /* in levels and files: rank among the nodes of its type in its level */
         uint32_t entry; /* in tables: see ebpo_node_table */
     };
-    /* in a model whose subtrees are loaded on demand: that in which the node stands; else NULL */
+    /* the node's subtree in a model whose subtrees are loaded on demand; else NULL */
     const struct ebpo_accel *subtree;
 } ebpo_node;
 
-/* White or black: no face touches it, and all of it is on one side. */
+/* Returns true for white or black: no face touches it, and all of it is on one side. */
 static inline bool ebpo_node_is_uniform(const ebpo_node *node)
 {
     return node->type == EBPO_WHITE || node->type == EBPO_BLACK;
 }
 
-/* A gray node's child: its types as the group of its children gives them, and the rank of the
+/* Returns a gray node's child, from the types in the group of its children, and the rank of the
  * group's first node of each type in the next level. */
 static inline ebpo_node ebpo_node_child(const ebpo_node *gray, unsigned octant, uint16_t types,
                                         const uint64_t ranks[4])
@@ -87,9 +88,9 @@ static inline ebpo_node ebpo_node_child(const ebpo_node *gray, unsigned octant, 
                         .rank = ranks[type] + ebpo_group_count(types, type, octant) };
 }
 
-/* What a winding number means. */
+/* The meaning of a winding number. */
 
-/* True where points of this winding number belong to the solid. */
+/* Returns true where points of this winding number belong to the solid. */
 static inline bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)
 {
     switch (rule) {
@@ -100,47 +101,47 @@ static inline bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)
     return winding != 0;
 }
 
-/* What a cursor asks of that which holds nodes: levels in memory, a file, the tables of a decoded
+/* The interface of a cursor to a holder of nodes: levels in memory, a file, the tables of a decoded
  * tree, a model that loads subtrees as they are needed. */
 
 enum { EBPO_NODE_PLANES = 255 }; /* counts of planes are bytes */
 
 typedef struct ebpo_node_source {
-    /* The eight children of a gray node. Where there are none in this holder, the node is marked as
-     * pruned instead. What the holder learns about the node is noted in it as well, so that it need
-     * not be found a second time. */
+    /* Returns the eight children of a gray node. If this holder has none, it marks the node as
+     * pruned instead. It also stores other findings in the node, so that they are not computed
+     * again. */
     ebpo_status (*children)(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error);
-    /* Codes of the planes that a gray node adds to its parent's envelope; other nodes have none,
-     * but leaves where levels store theirs. */
+    /* Returns the codes of the planes that a gray node adds to its parent's envelope; other nodes
+     * have none, except leaves where levels store theirs. */
     ebpo_status (*planes)(void *holder, const ebpo_node *node, uint32_t codes[EBPO_NODE_PLANES],
                           unsigned *count, ebpo_error *error);
-    /* Winding number in a white or black node of a solid. */
+    /* Returns the winding number in a white or black node of a solid. */
     ebpo_status (*winding)(void *holder, const ebpo_node *uniform, int32_t *winding,
                            ebpo_error *error);
 } ebpo_node_source;
 
-/* Ranks in one level of a tree in memory: where a group's nodes, a node's planes and a leaf's
- * references begin. Prefix sums, so that nodes can be gone to in any order. */
+/* Ranks in one level of a tree in memory: the beginnings of a group's nodes, a node's planes and a
+ * leaf's references. They are prefix sums, so that nodes can be visited in any order. */
 
 typedef struct ebpo_level_ranks {
-    /* [group_count] by type: such nodes in the groups before; of white and of black nodes only
-     * where the level has their winding numbers, else NULL */
+    /* [group_count] by type: number of such nodes in the groups before; for white and black nodes
+     * only where the level has their winding numbers, else NULL */
     uint64_t *before[4];
     uint64_t *plane_first;      /* [gray_count] */
     uint64_t *leaf_plane_first; /* [leaf_count], NULL without stored leaf planes */
     uint64_t *ref_first;        /* [leaf_count], NULL without face lists */
 } ebpo_level_ranks;
 
-/* EBPO_E_FORMAT when the level's counts contradict each other. On failure nothing is left to free.
- * `number` is for messages. */
+/* Makes ranks. EBPO_E_FORMAT when the level's counts contradict each other. On failure nothing is
+ * left to free. `number` is for messages. */
 EBPO_MUST_USE ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebpo_level *level,
                                                 int number, ebpo_error *error);
 void ebpo_level_ranks_free(ebpo_level_ranks *ranks);
 
 /* The nodes of levels in memory, from the root down to some level. */
 
-/* Lent; gray nodes without children in these levels are pruned ones, those of the last level all
- * are. */
+/* Pointers are not owned; gray nodes without children in these levels are pruned, as are all of the
+ * last level. */
 typedef struct ebpo_level_nodes {
     const ebpo_level *level;       /* [level_count] */
     const ebpo_level_ranks *ranks; /* [level_count] */
@@ -149,30 +150,31 @@ typedef struct ebpo_level_nodes {
 
 ebpo_node ebpo_level_root(const ebpo_level_nodes *nodes);
 
-/* Child of a gray node that is not pruned. Of white and black nodes the rank is known only where
- * their winding numbers are stored. */
+/* Returns a child of a gray node that is not pruned. The rank of white and black nodes is known
+ * only where their winding numbers are stored. */
 ebpo_node ebpo_level_child(const ebpo_level_nodes *nodes, const ebpo_node *gray, unsigned octant);
 
-/* Codes of the planes that a gray node adds, or that are stored for a leaf. */
+/* Returns the codes of the planes that a gray node adds, or that are stored for a leaf. */
 const uint32_t *ebpo_level_planes(const ebpo_level_nodes *nodes, const ebpo_node *node,
                                   unsigned *count);
 
-/* Winding number of a white or black node; of a leaf: that at its lowest corner. Solids only. */
+/* Returns the winding number of a white or black node; for a leaf, that at its lowest corner.
+ * Solids only. */
 int32_t ebpo_level_winding(const ebpo_level_nodes *nodes, const ebpo_node *node);
 
 /* For cursors; the holder is an ebpo_level_nodes. */
 extern const ebpo_node_source ebpo_level_source;
 
-/* A decoded tree as a table of children: four bytes a node, found by following numbers. What is
- * asked of many times in a row stands in this form; a point's way down it is a loop of one line. */
+/* A decoded tree as a table of children: four bytes a node, found by following indices. It is used
+ * for many successive queries: finding a point's node is a loop of one line. */
 
 /* An entry: two bits of kind, 30 of value. */
 typedef enum ebpo_entry_kind {
     EBPO_ENTRY_UNIFORM = 0, /* white or black; value: winding number + EBPO_ENTRY_ZERO */
-    EBPO_ENTRY_LEAF = 1,    /* value: number of the leaf */
-    EBPO_ENTRY_GRAY = 2,    /* value: number of the group of its eight children */
-    /* in the top of a tree: value: number of a subtree that is loaded on demand; in a subtree: a
-       pruned node, of which value is the number among gray nodes */
+    EBPO_ENTRY_LEAF = 1,    /* value: index of the leaf */
+    EBPO_ENTRY_GRAY = 2,    /* value: index of the group of its eight children */
+    /* in the top of a tree: value: index of a subtree that is loaded on demand; in a subtree: a
+     * pruned node, with its index among gray nodes as value */
     EBPO_ENTRY_BELOW = 3
 } ebpo_entry_kind;
 enum { EBPO_ENTRY_ZERO = 1 << 29 };
@@ -191,7 +193,8 @@ static inline int32_t ebpo_entry_winding(uint32_t entry)
     return (int32_t)ebpo_entry_value(entry) - EBPO_ENTRY_ZERO;
 }
 
-/* The entry of a white or black node; false for a winding number that it cannot hold. */
+/* Makes the entry of a white or black node; returns false for a winding number that it cannot hold.
+ */
 static inline bool ebpo_entry_uniform(int32_t winding, uint32_t *entry)
 {
     if (winding <= -EBPO_ENTRY_ZERO || winding >= EBPO_ENTRY_ZERO)
@@ -200,7 +203,7 @@ static inline bool ebpo_entry_uniform(int32_t winding, uint32_t *entry)
     return true;
 }
 
-/* The node that an entry describes. */
+/* Returns the node that an entry describes. */
 static inline ebpo_node ebpo_entry_node(uint32_t entry, ebpo_cell cell, ebpo_rule rule)
 {
     ebpo_node node = { .cell = cell, .entry = entry, .type = EBPO_GRAY };
@@ -227,10 +230,10 @@ typedef struct ebpo_node_table {
     uint8_t *grid_depth; /* and the depth of that node below the root */
 } ebpo_node_table;
 
-/* Bits of the grid of a table of so many groups; 0: none. */
+/* Returns the bits of the grid of a table of this many groups; 0: none. */
 int ebpo_node_grid_bits(uint64_t groups);
-/* Makes the grid: fewer cells than about twice the groups. Optional; without memory there is none.
- */
+/* Makes the grid: fewer cells than about twice the groups. Optional; there is none when memory is
+ * short. */
 void ebpo_node_table_make_grid(ebpo_node_table *table);
 void ebpo_node_table_free(ebpo_node_table *table);
 
@@ -240,12 +243,12 @@ static inline uint32_t ebpo_table_child(const ebpo_node_table *table, uint32_t g
     return table->group[ebpo_entry_value(gray)][octant];
 }
 
-/* --- the way down to cell `at` of `fine_level`, which the root holds --- */
+/* --- descent to cell `at` of `fine_level`, which is within the root --- */
 
-/* Where a descent has come to. */
+/* The state of a descent. */
 typedef struct ebpo_descent {
     uint32_t entry;
-    int level; /* of the entry's node */
+    int level; /* level of the entry's node */
 } ebpo_descent;
 
 static inline uint64_t ebpo_grid_cell(const ebpo_node_table *table, int fine_level,
@@ -257,7 +260,7 @@ static inline uint64_t ebpo_grid_cell(const ebpo_node_table *table, int fine_lev
     return (z << table->grid_bits | y) << table->grid_bits | x;
 }
 
-/* At the root, or at once at the node that the grid names. */
+/* Begins at the root, or directly at the node in the grid. */
 static inline ebpo_descent ebpo_descent_begin(const ebpo_node_table *table, int fine_level,
                                               const uint32_t at[3])
 {
@@ -265,13 +268,13 @@ static inline ebpo_descent ebpo_descent_begin(const ebpo_node_table *table, int 
         return (ebpo_descent){ table->root, table->root_level };
     uint64_t cell = ebpo_grid_cell(table, fine_level, at);
     uint32_t entry = table->grid[cell];
-    /* most gray ones are of the grid's own level: a cache line less */
+    /* most gray ones are of the grid's own level: this saves a cache line */
     bool deep = ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY;
     int depth = deep ? table->grid_bits : table->grid_depth[cell];
     return (ebpo_descent){ entry, table->root_level + depth };
 }
 
-/* One level down; false where there is none. */
+/* Moves one level down; returns false at the deepest node. */
 static inline bool ebpo_descent_step(ebpo_descent *d, const ebpo_node_table *table, int fine_level,
                                      const uint32_t at[3])
 {
@@ -282,8 +285,8 @@ static inline bool ebpo_descent_step(ebpo_descent *d, const ebpo_node_table *tab
     return true;
 }
 
-/* Brings the children's entries nearer to the processor, for a step to come; false at the deepest
- * node. */
+/* Prefetches the children's entries into the processor's cache for a later step; returns false at
+ * the deepest node. */
 static inline bool ebpo_descent_prefetch(const ebpo_descent *d, const ebpo_node_table *table)
 {
     if (ebpo_entry_kind_of(d->entry) != EBPO_ENTRY_GRAY)
@@ -292,14 +295,14 @@ static inline bool ebpo_descent_prefetch(const ebpo_descent *d, const ebpo_node_
     return true;
 }
 
-/* The node's cell. */
+/* Returns the node's cell. */
 static inline ebpo_cell ebpo_descent_cell(const ebpo_descent *d, int fine_level,
                                           const uint32_t at[3])
 {
     return ebpo_cell_ancestor((ebpo_cell){ fine_level, { at[0], at[1], at[2] } }, d->level);
 }
 
-/* To the deepest node. */
+/* Descends to the deepest node. */
 static inline ebpo_descent ebpo_descend(const ebpo_node_table *table, int fine_level,
                                         const uint32_t at[3])
 {

@@ -1,4 +1,4 @@
-/* Cutting polygons in space and closed chains into triangles over their own corners.
+/* Cuts polygons in space and closed chains into triangles over their own corners.
  *
  * A polygon is projected along the axis on which its normal is largest. A convex one becomes a fan;
  * any other is cut ear by ear, with exact tests, in any order of coordinates. A corner is tested
@@ -29,7 +29,7 @@ static double triangle_area(const ebpo_chain *c, uint32_t i, uint32_t j, uint32_
     return 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
 }
 
-/* More than the area of any triangulation: what an edge that exists already costs. */
+/* Returns the cost of an existing edge: more than the area of any triangulation. */
 static double chain_penalty(const ebpo_chain *c)
 {
     double length = 0;
@@ -98,7 +98,7 @@ static bool least_area(const ebpo_chain *c, uint32_t (*triangles)[3])
 typedef struct chain_ear {
     double area;
     uint32_t tip;
-    uint32_t version; /* of the tip when this was computed; an older one is stale */
+    uint32_t version; /* version of the tip at this computation; an older one is stale */
     bool reflex;
 } chain_ear;
 
@@ -209,9 +209,9 @@ bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3])
 
 #define NONE UINT32_MAX
 
-/* What blocks an ear. */
+/* The corners that block an ear. */
 typedef enum ear_rule {
-    /* Any corner in the closed triangle, unless it is at the place of one of the triangle's. */
+    /* Any corner in the closed triangle, unless it is at the position of one of the triangle's. */
     EBPO_EARS_CLOSED,
 
     /* For outlines that touch themselves (slits, bridges to holes, pinched corners): a corner
@@ -221,14 +221,14 @@ typedef enum ear_rule {
 } ear_rule;
 
 typedef enum ears_result {
-    EBPO_EARS_CUT,   /* all of it: every triangle turns counter-clockwise, or has no area */
+    EBPO_EARS_CUT,   /* all was cut: every triangle turns counter-clockwise, or has no area */
     EBPO_EARS_STUCK, /* the outline crosses itself */
-    EBPO_EARS_WORK   /* more steps than `limit` were needed */
+    EBPO_EARS_WORK   /* more steps than `limit` would be needed */
 } ears_result;
 
 enum {
     WORD = 64,
-    LEVELS = 6,  /* of bits: 2^32 corners */
+    LEVELS = 6,  /* levels of bits: 2^32 corners */
     BLOCK = 8,   /* corners of a leaf of the tree */
     SCANNED = 64 /* outlines up to this length have no tree */
 };
@@ -240,7 +240,7 @@ typedef struct box {
 typedef struct outline {
     const double (*at)[2];
     bool touching;
-    uint32_t n, left; /* corners in all, and not yet cut off */
+    uint32_t n, left; /* number of corners, and of those not yet cut off */
     uint64_t work;
 
     uint32_t *next, *previous; /* next: NONE once cut off */
@@ -259,12 +259,12 @@ typedef struct outline {
     uint32_t leaves; /* a power of two; 0: no tree */
 } outline;
 
-/* The triangle that is looked at, and what was seen at its corner b. */
+/* The tested triangle, and the state at its corner b. */
 typedef struct tested_ear {
     uint32_t corner[3];
     const double *at[3];
     double low[2], high[2];
-    bool along_a, along_c; /* other edges run from b's place towards a; towards c */
+    bool along_a, along_c; /* other edges run from b's position towards a; towards c */
 } tested_ear;
 
 static int turn_of_corners(const outline *o, uint32_t a, uint32_t b, uint32_t c)
@@ -314,7 +314,7 @@ static uint32_t find_bit(const outline *o, uint64_t i)
     return NONE;
 }
 
-/* ---- ears that wait for a corner to go ---- */
+/* ---- ears that a corner blocks ---- */
 
 static void unblock_ear(outline *o, uint32_t b)
 {
@@ -396,9 +396,9 @@ static bool may_block(const outline *o, const tested_ear *e, const box *b)
     return true;
 }
 
-/* ---- what blocks an ear ---- */
+/* ---- corners that block an ear ---- */
 
-/* Returns whether q is on the ray from b through a; b, a and q are collinear, a is elsewhere. */
+/* Returns true if q is on the ray from b through a; b, a and q are collinear, a differs from b. */
 static bool is_along(const double b[2], const double a[2], const double q[2])
 {
     int k = a[0] == b[0];
@@ -418,7 +418,7 @@ static void note_edges_along(const outline *o, tested_ear *e, uint32_t i)
     }
 }
 
-/* Returns whether the edge from a corner on the ear's border, where side[k] is 0, goes into it. */
+/* Returns true if the edge from a corner on the ear's border, where side[k] is 0, enters it. */
 static bool edge_enters(const outline *o, const tested_ear *e, const int side[3], uint32_t to)
 {
     for (int k = 0; k < 3; k++)
@@ -503,9 +503,9 @@ static tested_ear ear_at(const outline *o, uint32_t b)
     return e;
 }
 
-/* ---- which side of the outline an ear is on ---- */
+/* ---- the side of the outline that an ear is on ---- */
 
-/* Finds a point within the ear; false where rounding leaves none. */
+/* Finds a point within the ear; returns false if there is none after rounding. */
 static bool point_within(const tested_ear *e, double out[2])
 {
     for (int k = 0; k < 2; k++)
@@ -516,7 +516,7 @@ static bool point_within(const tested_ear *e, double out[2])
     return true;
 }
 
-/* Returns the winding number of what is left of the outline around q, which is not on it. */
+/* Returns the winding number of the remaining outline around q, which is not on it. */
 static int64_t winding_around(outline *o, uint32_t start, const double q[2])
 {
     int64_t winding = 0;
@@ -533,8 +533,8 @@ static int64_t winding_around(outline *o, uint32_t start, const double q[2])
     return winding;
 }
 
-/* Returns whether the ear is a bend of a passage without width, whose other side runs beside it:
- * nothing is within such an ear. */
+/* Returns true if the ear is a bend of a passage without width, whose other side runs beside it:
+ * such an ear is empty. */
 static bool is_outside(outline *o, const tested_ear *e)
 {
     double q[2];
@@ -542,7 +542,7 @@ static bool is_outside(outline *o, const tested_ear *e)
            winding_around(o, e->corner[1], q) <= 0;
 }
 
-/* Returns whether b is the tip of a spike without area, or at the place of a neighbour. */
+/* Returns true if b is the tip of a spike without area, or at the position of a neighbour. */
 static bool is_spike(const outline *o, uint32_t b)
 {
     uint32_t a = o->previous[b], c = o->next[b];
@@ -587,7 +587,7 @@ static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
         o->corners[node]--;
 }
 
-/* Returns whether the ear at b may be cut; if not, it is tested again when that may change. */
+/* Returns true if the ear at b may be cut; if not, it is tested again when that may change. */
 static bool is_ear(outline *o, uint32_t b)
 {
     tested_ear e = ear_at(o, b);
@@ -630,8 +630,8 @@ static ears_result cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
 
 /* ---- scratch ---- */
 
-/* Bytes of scratch for n corners, at any alignment that malloc gives; 0 when that does not fit 64
- * bits. */
+/* Returns the bytes of scratch for n corners, at any alignment that malloc gives; 0 when that does
+ * not fit 64 bits. */
 static uint64_t ears_scratch_bytes(uint64_t n)
 {
     /* a corner has six numbers, and at most 4 / BLOCK boxes and counts; bits take less than one
@@ -668,9 +668,9 @@ static void place_arrays(outline *o, void *scratch)
     o->corners = take_array(&at, 2 * (uint64_t)o->leaves * sizeof *o->corners);
 }
 
-/* Writes n - 2 triangles of corner numbers for the outline at[n], n >= 4, that runs
- * counter-clockwise; what is written is of use with EBPO_EARS_CUT only. The result depends on the
- * corners alone. Pure, any thread. */
+/* Writes n - 2 triangles of corner indices for the outline at[n], n >= 4, that runs
+ * counter-clockwise; the output is valid only with EBPO_EARS_CUT. The result depends only on the
+ * corners. Pure, any thread. */
 static ears_result cut_outline(uint32_t (*triangle)[3], const double (*at)[2], uint32_t n,
                                ear_rule rule, uint64_t limit, void *scratch)
 {
@@ -691,8 +691,8 @@ static ears_result cut_outline(uint32_t (*triangle)[3], const double (*at)[2], u
 
 /* ==== polygons in space ==== */
 
-/* Steps of cutting an outline that touches itself, after which it is given up as one that crosses
- * itself: thousands of corners at one place are compared with each other. */
+/* Limit of steps of cutting an outline that touches itself; beyond it, the outline is treated as
+ * one that crosses itself. Thousands of corners at one position are compared with each other. */
 #define TOUCHING_WORK (UINT64_C(1) << 28)
 
 /* A polygon and its projection. */
@@ -700,8 +700,8 @@ typedef struct polygon {
     const double (*corner)[3];
     double (*flat)[2]; /* so that it runs counter-clockwise */
     uint32_t n;
-    double
-        scale; /* a power of two that makes products of differences neither overflow nor vanish */
+    double scale; /* a power of two that prevents products of differences from overflow and
+                     underflow */
     bool projected;
 } polygon;
 
@@ -723,13 +723,13 @@ static void make_fan(uint32_t (*triangle)[3], uint32_t n)
     }
 }
 
-/* Half of what lies between the first corner and another one: that cannot overflow. */
+/* Returns half of the difference between the first corner and another one: that cannot overflow. */
 static double from_first(const polygon *p, uint32_t i, int k)
 {
     return p->scale * (0.5 * p->corner[i][k] - 0.5 * p->corner[0][k]);
 }
 
-/* False where a coordinate is not finite. */
+/* Returns false if a coordinate is not finite. */
 static bool find_scale(polygon *p)
 {
     enum { FAR = 400 };
@@ -748,7 +748,7 @@ static bool find_scale(polygon *p)
     return true;
 }
 
-/* Half of the projected areas, relative to the first corner to keep digits. */
+/* Computes half of the projected areas, relative to the first corner to keep digits. */
 static void newell_normal(const polygon *p, double normal[3])
 {
     normal[0] = normal[1] = normal[2] = 0;
@@ -764,7 +764,7 @@ static void newell_normal(const polygon *p, double normal[3])
     }
 }
 
-/* False where it has no normal. */
+/* Returns false if the polygon has no normal. */
 static bool project_polygon(polygon *p)
 {
     double normal[3];
@@ -798,8 +798,8 @@ static bool goes_up(const double a[2], const double b[2])
     return a[0] < b[0] || (a[0] == b[0] && a[1] < b[1]);
 }
 
-/* Left turns alone do not make a convex polygon (a pentagram has them too): it must also change its
- * direction only twice. */
+/* Classifies. Left turns alone do not make a polygon convex (a pentagram has them too): it must
+ * also change its direction only twice. */
 static ebpo_polygon_kind classify_polygon(const polygon *p)
 {
     bool straight = false;
@@ -824,8 +824,7 @@ static bool has_area(const polygon *p, const uint32_t t[3])
     return !ebpo_zero_area(p->corner[t[0]], p->corner[t[1]], p->corner[t[2]]);
 }
 
-/* What triangles of least area are: perhaps they cover the outline after all, or have no area at
- * all. */
+/* Classifies triangles of least area: they may cover the outline after all, or have no area. */
 static ebpo_polygon_kind kind_of_guess(const polygon *p, uint32_t (*triangle)[3])
 {
     bool turned = !p->projected, empty = true;
@@ -852,7 +851,7 @@ static ebpo_polygon_kind guess_triangles(const polygon *p, uint32_t (*triangle)[
     return done ? kind_of_guess(p, triangle) : EBPO_POLYGON_NO_MEMORY;
 }
 
-/* ---- all of it ---- */
+/* ---- cutting a polygon ---- */
 
 static ebpo_polygon_kind cut_polygon(const polygon *p, uint32_t (*triangle)[3], void *scratch)
 {

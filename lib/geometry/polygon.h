@@ -1,4 +1,4 @@
-/* Triangles over the vertices of a closed chain in space: closes a hole, or covers a polygon that
+/* Triangulates a closed chain in space over its vertices: closes a hole, or covers a polygon that
  * crosses itself. */
 #ifndef EBPO_GEOMETRY_POLYGON_H
 #define EBPO_GEOMETRY_POLYGON_H
@@ -6,7 +6,7 @@
 #include <ebpo/base.h>
 #include <ebpo/workspace.h>
 
-/* (b - a) x (c - a), rounded. */
+/* Computes (b - a) x (c - a), rounded. */
 static inline void ebpo_face_cross(const double a[3], const double b[3], const double c[3],
                                    double out[3])
 {
@@ -30,33 +30,32 @@ typedef struct ebpo_chain {
     /* NULL, or [n][n]: 1 where the mesh has an edge between two points already (a triangle there
      * would make it non-manifold); avoided where possible; only for n <= optimal */
     const uint8_t *taken;
-    ebpo_workspace *workspace; /* for long ones, or NULL */
+    ebpo_workspace *workspace; /* for long chains, or NULL */
 } ebpo_chain;
 
-/* Writes n - 2 triangles, as numbers of points, that run along the chain (point i to i + 1). The
- * result depends on the points only. False when memory is short. Source for the chain of least
- * area: Barequet and Sharir, "Filling gaps in the boundary of a polyhedron", 1995. */
+/* Writes n - 2 triangles, as indices of points, that run along the chain (point i to i + 1). The
+ * result depends only on the points. Returns false when memory is short. Source for the chain of
+ * least area: Barequet and Sharir, "Filling gaps in the boundary of a polyhedron", 1995. */
 bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3]);
 
-/* Cutting polygons in space into triangles over their own corners.
+/* Cuts polygons in space into triangles over their own corners.
  *
  * The polygon is projected along the axis on which its normal (Newell's sum) is largest. There a
  * convex polygon becomes a fan from its first corner; any other is cut ear by ear, every turn and
  * every point-in-ear test by the exact ebpo_orient2d: first as if the outline did not touch itself,
- * then, where that fails, with the rule for outlines that do. All triangles then
- * turn the polygon's way or have no area, so each point is covered as often as the outline winds
- * around it: once in a polygon with slits, with bridges to holes, or pinched at corners.
+ * then, where that fails, with the rule for outlines that do. All triangles then turn the polygon's
+ * way or have no area, so each point is covered as often as the outline winds around it: once in a
+ * polygon with slits, with bridges to holes, or pinched at corners.
  *
- * Outlines that cross themselves as projected (folded quads among them) have no such triangles.
- * They get those of least area in space, up to EBPO_POLYGON_OPTIMAL corners, else the least ears
- * first: a guess, which callers count. The result depends on nothing but the corners. Sources:
- * Meisters, "Polygons have ears", 1975; Barequet and Sharir, "Filling gaps in the boundary of a
- * polyhedron", 1995, for the least area.
- */
+ * Outlines whose projection crosses itself (including folded quads) have no such triangles. They
+ * get those of least area in space, up to EBPO_POLYGON_OPTIMAL corners, else the least ears first:
+ * a guess, which callers count. The result depends only on the corners. Sources: Meisters,
+ * "Polygons have ears", 1975; Barequet and Sharir, "Filling gaps in the boundary of a polyhedron",
+ * 1995, for the least area. */
 
 typedef enum ebpo_polygon_kind {
     EBPO_POLYGON_CONVEX, /* a fan; also every triangle */
-    /* no reflex corner but straight ones: cut by ears, so that no triangle lies on a straight side
+    /* no reflex corner, but straight ones: cut by ears, so that no triangle is on a straight side
      */
     EBPO_POLYGON_FLAT,
     EBPO_POLYGON_CONCAVE, /* cut by ears; also where the outline touches itself */
@@ -69,16 +68,16 @@ typedef enum ebpo_polygon_kind {
 } ebpo_polygon_kind;
 
 /* Limit of steps for one polygon, each a few tests of coordinates. Outlines of 100,000 corners stay
- * well below it, unless tens of thousands of them are on one line or at one place. */
+ * well below it, unless tens of thousands of them are on one line or at one position. */
 #define EBPO_POLYGON_WORK (UINT64_C(1) << 31)
 
 enum { EBPO_POLYGON_OPTIMAL = 64 };
 
-/* Bytes of scratch for n corners, at any alignment that malloc gives; 0 when that does not fit 64
- * bits. */
+/* Returns the bytes of scratch for n corners, at any alignment that malloc gives; 0 when that does
+ * not fit 64 bits. */
 uint64_t ebpo_polygon_scratch_bytes(uint64_t n);
 
-/* Writes n - 2 triangles of corner numbers (0 .. n - 1) with the polygon's orientation. n >= 3.
+/* Writes n - 2 triangles of corner indices (0 .. n - 1) with the polygon's orientation. n >= 3.
  * Pure, any thread. */
 ebpo_polygon_kind ebpo_polygon_triangulate(uint32_t (*triangle)[3], const double (*corner)[3],
                                            uint32_t n, void *scratch);

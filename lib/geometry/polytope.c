@@ -41,7 +41,7 @@ bool ebpo_plane_code_normal(const double direction[3], uint32_t *normal)
     double most = fmax(fabs(x), fmax(fabs(y), fabs(z)));
     if (!(most > 0) || !isfinite(most) || !isfinite(x + y + z))
         return false;
-    x /= most, y /= most, z /= most; /* keeps the sum below from overflow and underflow */
+    x /= most, y /= most, z /= most; /* prevents overflow and underflow of the sum below */
     double scale = EBPO_NORMAL_NORM / (fabs(x) + fabs(y) + fabs(z));
     double u = x * scale, v = y * scale;
     if (z < 0) {
@@ -126,12 +126,11 @@ double ebpo_polytope_cap_bound(double volume, double width, double height)
     return volume * (1 - left * left * left);
 }
 
-/* What lies beyond a plane, seen from its farthest vertex: faces that have this vertex add nothing,
- * the others a fan each, and the cut is a polygon whose area follows from its edges in any order.
- */
+/* The part beyond a plane, seen from its farthest vertex: faces with this vertex add nothing, each
+ * other one a fan, and the cut is a polygon whose area follows from its edges in any order. */
 typedef struct beyond {
     const ebpo_polytope *p;
-    /* area: twice the cut's, as a vector; origin: a point of the plane */
+    /* area: twice the area of the cut, as a vector; origin: a point of the plane */
     double dist[EBPO_POLYTOPE_VERTICES], fans, area[3], origin[3];
     int farthest;
     bool started;
@@ -143,13 +142,13 @@ static void point_between(const beyond *c, int out, int in, double x[3])
     interpolate_crossing(c->p->vertex[out], c->dist[out], c->p->vertex[in], c->dist[in], x);
 }
 
-/* An edge of the cut. */
+/* Adds an edge of the cut. */
 static void add_edge(beyond *c, const double from[3], const double to[3])
 {
     if (!c->started) {
         c->started = true;
         memcpy(c->origin, from, sizeof c->origin);
-        return; /* seen from its own end it spans nothing */
+        return; /* seen from its own end it has no area */
     }
     double u[3], v[3], n[3];
     ebpo_vec3_subtract(from, c->origin, u);
@@ -232,20 +231,20 @@ typedef struct cut {
     const ebpo_polytope *in;
     ebpo_polytope *out;
     double dist[EBPO_POLYTOPE_VERTICES];
-    uint16_t number[EBPO_POLYTOPE_VERTICES]; /* of kept vertices in `out` */
-    bool on[EBPO_POLYTOPE_VERTICES];         /* `out` vertex lies on the cutting plane */
+    uint16_t number[EBPO_POLYTOPE_VERTICES]; /* indices of kept vertices in `out` */
+    bool on[EBPO_POLYTOPE_VERTICES];         /* `out` vertex is on the cutting plane */
     /* cut edges and their new vertices */
     struct {
         uint16_t in, out, number;
     } edge[EBPO_POLYTOPE_FACES];
     int edges;
-    /* edges of kept loops that lie on the plane */
+    /* edges of kept loops on the plane */
     struct {
         uint16_t from, to;
     } rim[EBPO_POLYTOPE_CORNERS];
     int rims;
     bool full;
-    bool touched; /* old vertices lie on the plane: rim edges may have kept faces on both sides */
+    bool touched; /* old vertices are on the plane: rim edges may have kept faces on both sides */
 } cut;
 
 static uint16_t add_vertex(cut *c, const double x[3], bool on)
@@ -263,7 +262,7 @@ static uint16_t add_vertex(cut *c, const double x[3], bool on)
 static uint16_t crossing_vertex(cut *c, uint16_t in, uint16_t out)
 {
     if (c->dist[in] >= -tolerance)
-        return c->number[in]; /* the inner end itself lies on the plane */
+        return c->number[in]; /* the inner end itself is on the plane */
     for (int i = 0; i < c->edges; i++)
         if (c->edge[i].in == in && c->edge[i].out == out)
             return c->edge[i].number;
@@ -299,7 +298,7 @@ static void close_face(cut *c, int start, int32_t tag)
         o->corner_count--;
     if (o->corner_count - start < 3 || o->corner_count - start > 255 ||
         o->face_count == EBPO_POLYTOPE_FACES) {
-        /* users count corners in bytes */
+        /* users store corner counts in bytes */
         c->full |= o->corner_count - start > 255 || o->face_count == EBPO_POLYTOPE_FACES;
         o->corner_count = start;
         return;
@@ -338,8 +337,8 @@ static void clip_face(cut *c, int f)
     }
 }
 
-/* Rim edges used in both directions lie between two kept faces; the others, reversed, bound the
- * cap. */
+/* Closes the cap. Rim edges used in both directions are between two kept faces; the others,
+ * reversed, bound the cap. */
 static bool close_cap(cut *c, int32_t tag)
 {
     int16_t next[EBPO_POLYTOPE_VERTICES];

@@ -1,13 +1,12 @@
 /* Plane codes: a half-space in the coordinates of its node's cell, in 32 bits, decoded to integers
- * so that nobody rounds.
+ * so that no reader rounds.
  *
  * bits 0-9 u, bits 10-19 v, bits 20-31 q. With U = u - 511, V = v - 511 in [-511, 511]: the normal
  * is the point (U, V) of the octahedral map (Cigolle et al., "A Survey of Efficient Representations
  * for Independent Unit Vectors", 2014) kept as integers of 1-norm 511. With m the sum of the
  * normal's negative components (the least value of n . xi over the cell), the half-space is 4096 *
  * (n . xi) <= 4096 * m + 511 * (q + 1),   0 <= q <= 4094, so q counts 4096ths of the cell's width
- * in direction n. q = 4095 would keep the whole cell and stands for no plane.
- */
+ * in direction n. q = 4095 would keep the whole cell and means no plane. */
 #ifndef EBPO_GEOMETRY_POLYTOPE_H
 #define EBPO_GEOMETRY_POLYTOPE_H
 
@@ -20,17 +19,16 @@
 
 enum { EBPO_NORMAL_NORM = 511, EBPO_OFFSET_STEPS = 4096 };
 
-/* The same as the public ebpo_plane_decode (file.h), for the lower layers. */
+/* Same as the public ebpo_plane_decode (file.h), for the lower layers. */
 bool ebpo_plane_code_decode(uint32_t code, int32_t n[3], int32_t *d);
 
-/* Normal part (bits 0-19) of the code nearest to a direction in cell coordinates, of any length;
- * false for (0, 0, 0) or not finite. Cell coordinates scale each axis, so a face's world normal is
- * multiplied by the cell's size, axis by axis, to get this direction. */
+/* Computes the normal part (bits 0-19) of the code nearest to a direction in cell coordinates, of
+ * any length; returns false for (0, 0, 0) or not finite. Cell coordinates scale each axis, so this
+ * direction is a face's world normal multiplied by the cell's size, axis by axis. */
 bool ebpo_plane_code_normal(const double direction[3], uint32_t *normal);
 
-/* Least q whose half-space keeps every point with n . xi <= support, or -1 when only the whole cell
- * would do. `support` is in units of n . xi; the rounding of this function itself is on the safe
- * side. */
+/* Returns the least q whose half-space keeps every point with n . xi <= support, or -1 when only
+ * the whole cell does. `support` is in units of n . xi; this function rounds to the safe side. */
 int ebpo_plane_code_offset(const int32_t n[3], double support);
 
 static inline uint32_t ebpo_plane_code_make(uint32_t normal, int q)
@@ -38,7 +36,7 @@ static inline uint32_t ebpo_plane_code_make(uint32_t normal, int q)
     return normal | (uint32_t)q << 20;
 }
 
-/* The same half-space, 4096 * (n . xi) <= d, in the coordinates of child `octant`: xi_parent =
+/* Converts the half-space, 4096 * (n . xi) <= d, to the coordinates of child `octant`: xi_parent =
  * (xi_child + octant) / 2. Exact; d grows by less than one bit for each level. */
 static inline int64_t ebpo_plane_to_child(const int32_t n[3], int64_t d, unsigned octant)
 {
@@ -50,70 +48,70 @@ static inline int64_t ebpo_plane_to_child(const int32_t n[3], int64_t d, unsigne
 }
 
 /* Convex polytopes in cell coordinates, cut from the unit cube by half-spaces: for volumes, drawing
- * and choosing planes. Their vertices are rounded. Containment never depends on them; the decoded
- * half-spaces carry the guarantee. Source: BP 2008, section 3.4.3 (clipping of the box), done here
- * on vertex loops. */
+ * and choosing planes. Their vertices are rounded. Containment never depends on them, only on the
+ * decoded half-spaces. Source: BP 2008, section 3.4.3 (clipping of the box), done here on vertex
+ * loops. */
 
-/* Room for the 255 planes that a node may have, on a cube, where no more than three meet in a
- * point. */
+/* Capacity for the 255 planes that a node may have, on a cube, where no more than three intersect
+ * in a point. */
 enum { EBPO_POLYTOPE_VERTICES = 528, EBPO_POLYTOPE_FACES = 264, EBPO_POLYTOPE_CORNERS = 1584 };
 
-/* Face loops run counter-clockwise seen from outside. A face's tag names the half-space it comes
- * from: -1 - (2 * axis + side) for the walls of the first cube, then what ebpo_polytope_clip was
- * given. */
+/* Face loops run counter-clockwise seen from outside. A face's tag names its half-space: -1 - (2 *
+ * axis + side) for the faces of the first cube, else the tag given to ebpo_polytope_clip. */
 typedef struct ebpo_polytope {
     int vertex_count, face_count, corner_count;
     double vertex[EBPO_POLYTOPE_VERTICES][3];
     int32_t tag[EBPO_POLYTOPE_FACES];
     uint16_t first[EBPO_POLYTOPE_FACES + 1]; /* corners of face f: first[f] .. first[f + 1] - 1 */
-    uint16_t corner[EBPO_POLYTOPE_CORNERS];  /* vertex numbers */
+    uint16_t corner[EBPO_POLYTOPE_CORNERS];  /* vertex indices */
 } ebpo_polytope;
 
 typedef enum ebpo_clip {
     EBPO_CLIP_NONE, /* nothing was removed */
     EBPO_CLIP_CUT,
-    /* next to nothing would remain, or there is no room, or rounding spoiled the loops: left as it
-       was (too large, never too small) */
+    /* next to nothing would remain, or capacity is exceeded, or rounding spoiled the loops:
+     * unchanged (too large, never too small) */
     EBPO_CLIP_REFUSED
 } ebpo_clip;
 
-/* The unit cube. */
+/* Makes the unit cube. */
 void ebpo_polytope_cube(ebpo_polytope *p);
 
 /* Keeps n . x <= d. |n| should be about 1 (tolerance 1e-10 in cell units). */
 ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int32_t tag);
 
-/* Cuts out the octant and scales it to the unit cube; false when (numerically) nothing lies in it:
- * *out is then a box around it. `out` may not be `p`. Walls between siblings get the wall tags
- * again. */
+/* Cuts out the octant and scales it to the unit cube; returns false when it is (numerically) empty:
+ * *out is then a box around it. `out` may not be `p`. Faces between siblings get the tags of the
+ * cube again. */
 bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out);
 
-/* One half along `axis` (side 0: lower, 1: upper), scaled to the unit cube; ebpo_polytope_child is
- * z, then y, then x. False, and the whole cube, when (numerically) nothing lies in it. */
+/* Cuts out one half along `axis` (side 0: lower, 1: upper), scaled to the unit cube;
+ * ebpo_polytope_child is z, then y, then x. Returns false, and the whole cube, when it is
+ * (numerically) empty. */
 bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out);
 
-/* Copies what is in use: much less than the struct. */
+/* Copies only the used part of the struct. */
 void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from);
 
-/* Of each vertex bit 2 * axis + side for each wall of the cube that it lies on, whatever rounding
- * made of it. */
+/* Sets for each vertex bit 2 * axis + side for each face of the cube that it is on, regardless of
+ * rounding. */
 void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES]);
 
 double ebpo_polytope_volume(const ebpo_polytope *p);
 
-/* Volume that clipping by n . x <= d would remove; 0 when it is certainly below `least`, for which
- * `volume` is the polytope's own. */
+/* Returns the volume that clipping by n . x <= d would remove; 0 when it is certainly below
+ * `least`, for which `volume` is the polytope's own. */
 double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d, double volume,
                              double least);
 
-/* Upper bound of the volume beyond a plane, for a body of that volume which is so wide along the
- * plane's normal and reaches so far beyond it: among convex bodies of volume V and width H the cap
- * of height h is largest for the cone with its base on the far side, V (1 - (1 - h/H)^3). */
+/* Returns an upper bound of the volume beyond a plane, for a body of the given volume, width along
+ * the plane's normal, and height beyond the plane: among convex bodies of volume V and width H the
+ * cap of height h is largest for the cone with its base on the far side, V (1 - (1 - h/H)^3). */
 double ebpo_polytope_cap_bound(double volume, double width, double height);
 
 /* Polytopes cut by plane codes. */
 
-/* n as a direction of length about 1 and the matching offset, for ebpo_polytope_clip. */
+/* Converts n to a direction of length about 1 and the matching offset, for ebpo_polytope_clip. */
 static inline double ebpo_plane_as_double(const int32_t n[3], int64_t d, double out[3])
 {
     for (int k = 0; k < 3; k++)
@@ -121,11 +119,11 @@ static inline double ebpo_plane_as_double(const int32_t n[3], int64_t d, double 
     return (double)d * (1.0 / (511.0 * 4096));
 }
 
-/* Cuts the envelope by plane codes of its own cell; a face's tag is the place of its code. */
+/* Cuts the envelope by plane codes of its own cell; a face's tag is the index of its code. */
 void ebpo_planes_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count);
 
-/* What bounds a node's envelope beside its cell: the half-spaces of its ancestors and its own, as
- * exact integers in the coordinates of its cell. */
+/* The half-spaces that bound a node's envelope within its cell: those of its ancestors and its own,
+ * as exact integers in the coordinates of its cell. */
 
 /* 4096 (n . xi) <= d */
 typedef struct ebpo_half_space {
@@ -135,31 +133,32 @@ typedef struct ebpo_half_space {
 
 enum { EBPO_HALF_SPACES_MAX = EBPO_LEVELS_MAX * 256 }; /* plane counts are bytes */
 
-/* Half-spaces that keep the whole cell are left out. */
+/* Half-spaces that keep the whole cell are omitted. */
 typedef struct ebpo_half_spaces {
     int count;
     ebpo_half_space at[EBPO_HALF_SPACES_MAX];
 } ebpo_half_spaces;
 
-/* Adds planes of the cell at hand. */
+/* Adds planes of the current cell. */
 void ebpo_half_spaces_add(ebpo_half_spaces *spaces, const uint32_t *codes, uint64_t count);
 
-/* From the cell to its child. */
+/* Moves from the cell to its child. */
 void ebpo_half_spaces_to_child(ebpo_half_spaces *spaces, unsigned octant);
 
-/* The cell cut by the half-spaces, each moved outwards by `slack` (in the units of n / 511, about
+/* Cuts the cell by the half-spaces, each moved outwards by `slack` (in the units of n / 511, about
  * cells). */
 void ebpo_half_spaces_cut(const ebpo_half_spaces *spaces, double slack, ebpo_polytope *out);
 
-/* Envelopes along a way down the tree, as polytopes, so that neighbours share their ancestors'. */
+/* Envelopes along a path down the tree, as polytopes, so that neighbours share those of their
+ * ancestors. */
 
 /* About 170 KB; zeroed before first use. */
 typedef struct ebpo_envelope_stack {
-    ebpo_octcode octcode[EBPO_LEVELS_MAX]; /* whose envelope it is; 0: nobody's */
+    ebpo_octcode octcode[EBPO_LEVELS_MAX]; /* node of each envelope; 0: none */
     ebpo_polytope at[EBPO_LEVELS_MAX];
 } ebpo_envelope_stack;
 
-/* The node's envelope, or NULL when it is not in the stack. */
+/* Returns the node's envelope, or NULL when it is not in the stack. */
 static inline const ebpo_polytope *ebpo_envelope_held(const ebpo_envelope_stack *stack,
                                                       ebpo_octcode octcode)
 {
@@ -167,13 +166,13 @@ static inline const ebpo_polytope *ebpo_envelope_held(const ebpo_envelope_stack 
     return stack->octcode[level] == octcode ? &stack->at[level] : NULL;
 }
 
-/* Puts the envelope of a node whose parent's is held (the root's: the cube), in coordinates of its
- * cell: its parent's part in the cell, cut by its own planes. Lent until another node of its level
- * is put. */
+/* Adds the envelope of a node whose parent's is held (for the root: the cube), in coordinates of
+ * its cell: its parent's part in the cell, cut by its own planes. Valid until another node of its
+ * level is added. */
 const ebpo_polytope *ebpo_envelope_put(ebpo_envelope_stack *stack, ebpo_octcode octcode,
                                        const uint32_t *codes, uint64_t count);
 
-/* A black node's: its cell. */
+/* Adds the envelope of a black node: its cell. */
 const ebpo_polytope *ebpo_envelope_put_cube(ebpo_envelope_stack *stack, ebpo_octcode octcode);
 
 #endif

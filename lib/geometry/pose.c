@@ -68,8 +68,8 @@ ebpo_status ebpo_pose_turn(ebpo_pose *pose, const double quaternion[4], ebpo_err
 
 /* --- poses --- */
 
-static const double most_deviation = 0x1p-20, least_scale = 0x1p-300, most_scale = 0x1p300,
-                    most_coordinate = 0x1p1000;
+static const double max_error_bound = 0x1p-20, least_scale = 0x1p-300, max_scale = 0x1p300,
+                    max_coordinate = 0x1p1000;
 
 static bool all_finite(const double *x, int n)
 {
@@ -79,8 +79,8 @@ static bool all_finite(const double *x, int n)
     return finite;
 }
 
-/* The greatest |R^T R - 1|; infinite when that overflows. */
-static double deviation_of(const double r[3][3])
+/* Returns the greatest |R^T R - 1|; infinite when that overflows. */
+static double error_bound_of(const double r[3][3])
 {
     double most = 0;
     for (int i = 0; i < 3; i++)
@@ -102,29 +102,29 @@ static double determinant_3x3(const double r[3][3])
     return sum;
 }
 
-static ebpo_status check_rotation(const ebpo_pose *pose, double deviation, ebpo_error *error)
+static ebpo_status check_rotation(const ebpo_pose *pose, double error_bound, ebpo_error *error)
 {
     if (!all_finite(&pose->rotation[0][0], 9) || !all_finite(pose->translation, 3))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "pose: a number is not finite");
-    if (!(deviation <= most_deviation))
+    if (!(error_bound <= max_error_bound))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "pose: the matrix is not a rotation: its transpose times itself is off by "
                          "%.3g from the unit matrix, at most %.3g is allowed",
-                         deviation, most_deviation);
+                         error_bound, max_error_bound);
     if (determinant_3x3(pose->rotation) < 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "pose: the matrix is a mirror, not a rotation: its determinant is -1");
-    if (!(pose->scale >= least_scale && pose->scale <= most_scale))
+    if (!(pose->scale >= least_scale && pose->scale <= max_scale))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "pose: the scale is %g, not from %.3g to %.3g",
-                         pose->scale, least_scale, most_scale);
+                         pose->scale, least_scale, max_scale);
     return EBPO_OK;
 }
 
 ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose, const double reach[3],
                              ebpo_error *error)
 {
-    out->deviation = deviation_of(pose->rotation);
-    ebpo_status status = check_rotation(pose, out->deviation, error);
+    out->error_bound = error_bound_of(pose->rotation);
+    ebpo_status status = check_rotation(pose, out->error_bound, error);
     if (status != EBPO_OK)
         return status;
     out->scale = pose->scale;
@@ -135,11 +135,11 @@ ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose, const doub
             out->matrix[i][k] = pose->scale * pose->rotation[i][k];
             size += fabs(out->matrix[i][k]) * reach[k];
         }
-        if (!(size <= most_coordinate))
+        if (!(size <= max_coordinate))
             return ebpo_fail(error, EBPO_E_ARGUMENT,
                              "pose: the model would reach to %.3g on axis %d, at most %.3g is "
                              "allowed",
-                             size, i, most_coordinate);
+                             size, i, max_coordinate);
     }
     return EBPO_OK;
 }
@@ -155,6 +155,6 @@ double ebpo_posing_error(const ebpo_posing *p, double length)
     double most = 0;
     for (int i = 0; i < 3; i++)
         most = fmax(most, fabs(p->translation[i]));
-    double moved = p->scale * length * (2 * p->deviation + 6 * 0x1p-53);
+    double moved = p->scale * length * (2 * p->error_bound + 6 * 0x1p-53);
     return (moved + 1.01 * 0x1p-53 * most) * (1 + 0x1p-50) + 0x1p-1072;
 }

@@ -1,4 +1,4 @@
-/* Rotations as quaternions: x, y, z, w (the real part). Any thread. */
+/* Rotations as quaternions: x, y, z, w (the real part). Thread-safe. */
 #ifndef EBPO_GEOMETRY_POSE_H
 #define EBPO_GEOMETRY_POSE_H
 
@@ -8,32 +8,34 @@
 
 double ebpo_quaternion_length(const double q[4]);
 
-/* To length 1 but for rounding. False: its greatest part is not within 2^-500 .. 2^500. */
+/* Scales to length 1 up to rounding. Returns false if its greatest component is not within 2^-500
+ * .. 2^500. */
 bool ebpo_quaternion_normalise(double q[4]);
 
-/* Of length 1 but for rounding; m: [3][3]. */
+/* Converts a quaternion of length 1 up to rounding to a matrix; m: [3][3]. */
 void ebpo_quaternion_matrix(const double q[4], double (*m)[3]);
 
-/* Where a model is in the world, and the posed coordinates of its vertices: doubles, each operation
- * rounded once, on which all decisions about two models are exact (docs/develop/collision.md).
- * Functions are pure; any thread. */
+/* The pose of a model in the world, and the posed coordinates of its vertices: doubles, each
+ * operation rounded once. All decisions about two models are exact on these doubles
+ * (docs/develop/collision.md). Pure functions; any thread. */
 
 /* A pose that has been checked. */
 typedef struct ebpo_posing {
     double matrix[3][3]; /* rotation times scale, each rounded once */
     double translation[3];
     double scale;
-    double deviation; /* of the rotation from one: the greatest |R^T R - 1|, and rounding */
+    double error_bound; /* error bound of the rotation: the greatest |R^T R - 1|, and rounding */
 } ebpo_posing;
 
-/* For vertices whose coordinates are at most reach[axis] in size.
+/* Checks a pose, for vertices whose coordinates are at most reach[axis] in size.
  *
- * EBPO_E_ARGUMENT: a number is not finite, the matrix is no rotation (by how much is said) or a
- * mirror, the scale or a posed coordinate would leave its range. */
+ * EBPO_E_ARGUMENT: a number is not finite, the matrix is not a rotation (the message has the error)
+ * or is a mirror, the scale or a posed coordinate would leave its range. */
 EBPO_MUST_USE ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose,
                                            const double reach[3], ebpo_error *error);
 
-/* Finite, within 2^1000. Compiled where core/strict_fp.h comes first: never contracted. */
+/* Applies the pose; the result is finite, within 2^1000. Compiled where core/strict_fp.h comes
+ * first: never contracted. */
 static inline void ebpo_posing_apply(const ebpo_posing *p, const double x[3], double out[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -42,11 +44,11 @@ static inline void ebpo_posing_apply(const ebpo_posing *p, const double x[3], do
     }
 }
 
-/* Rows of the rotation, as doubles have it. */
+/* Returns the rows of the rotation, in doubles. */
 void ebpo_posing_rotation(const ebpo_posing *p, double out[3][3]);
 
-/* No posed coordinate on any axis is farther than this from that of the true motion (nearest
- * rotation, no rounding) for vertices at most `length` from the model's origin. */
+/* Bounds the distance of each posed coordinate from that of the true motion (nearest rotation, no
+ * rounding), for vertices at most `length` from the model's origin. */
 double ebpo_posing_error(const ebpo_posing *p, double length);
 
 #endif

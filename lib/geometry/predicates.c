@@ -1,9 +1,9 @@
 /* Orientation predicates and signs of sums of products, exact for every finite double.
  *
- * Each predicate goes through stages, cheapest first: signs of factors, a floating-point filter,
- * exact arithmetic on doubles (expansions) where exponents leave room for it, integers of any size.
- * Sources: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
- * Predicates", 1997; docs/develop/design.md. */
+ * Each predicate passes stages, cheapest first: signs of factors, a floating-point filter, exact
+ * arithmetic on doubles (expansions) where exponents are in range, integers of any size. Sources:
+ * Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates",
+ * 1997; docs/develop/design.md. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -21,8 +21,8 @@
 /* A finite double is an integer times a power of two. Coordinates of one axis are brought to a
  * common power, which scales the determinant by a positive factor and leaves integers. */
 
-/* Largest e such that x is an integer multiple of 2^e with a 53-bit factor; INT_MAX for 0, which is
- * a multiple of all. */
+/* Returns the largest e such that x is an integer multiple of 2^e with a 53-bit factor; INT_MAX for
+ * 0, which is a multiple of all. */
 static int unit_exponent(double x)
 {
     int e;
@@ -43,7 +43,7 @@ static int common_exponent(const double *x, int n)
     return least;
 }
 
-/* out = x / 2^unit, an integer by choice of unit. */
+/* Computes out = x / 2^unit, an integer by choice of unit. */
 static void set_integer(mpz_t out, double x, int unit)
 {
     if (x == 0) {
@@ -55,7 +55,7 @@ static void set_integer(mpz_t out, double x, int unit)
     mpz_mul_2exp(out, out, (mp_bitcnt_t)(e - 53 - unit));
 }
 
-/* out[i] = (x[i + 1] - x[0]) / a common positive power of two, i = 0 .. n-2. */
+/* Computes out[i] = (x[i + 1] - x[0]) / a common positive power of two, i = 0 .. n-2. */
 static void set_differences(mpz_t *out, const double *x, int n)
 {
     mpz_t base;
@@ -69,7 +69,7 @@ static void set_differences(mpz_t *out, const double *x, int n)
     mpz_clear(base);
 }
 
-/* out = p * q - r * s */
+/* Computes out = p * q - r * s. */
 static void minor_2x2(mpz_t out, const mpz_t p, const mpz_t q, const mpz_t r, const mpz_t s)
 {
     mpz_mul(out, p, q);
@@ -151,7 +151,7 @@ int ebpo_sign_of_products_exact(const double *factor, int n)
  * differences of such numbers and their rounding errors; products of three are multiples of 2^-900
  * and below 2^910: no operation here overflows or underflows. */
 
-/* Sum of absolute products is within this factor of the error of taking rounded differences for
+/* The sum of absolute products times this factor bounds the error of taking rounded differences for
  * exact ones: 3 eps and a margin. */
 static const double heads_error = 4 * 0x1p-53;
 
@@ -188,7 +188,7 @@ int ebpo_orient2d_expansion(const double a[2], const double b[2], const double c
 #ifdef EBPO_HAVE_INT128
 __extension__ typedef __int128 wide;
 
-/* 2^(exponent of x), x normal and positive. */
+/* Returns 2^(exponent of x), x normal and positive. */
 static double power_below(double x)
 {
     uint64_t bits;
@@ -198,7 +198,7 @@ static double power_below(double x)
     return x;
 }
 
-/* Scales a row to integers below 2^41 by a power of two; false when it has more bits. */
+/* Scales a row to integers below 2^41 by a power of two; returns false when it has more bits. */
 static bool row_to_integers(int64_t out[3], const ebpo_pair row[3])
 {
     double largest = fmax(fabs(row[0].head), fmax(fabs(row[1].head), fabs(row[2].head)));
@@ -206,17 +206,17 @@ static bool row_to_integers(int64_t out[3], const ebpo_pair row[3])
     bool exact = true;
     for (int i = 0; i < 3; i++) {
         double x = row[i].head * scale;
-        /* Adding 1.5 * 2^52 rounds to an integer. A cast forth and back is less safe: GCC 12 drops
-         * such pairs when it vectorises. */
+        /* Adding 1.5 * 2^52 rounds to an integer. A cast and back is less safe: GCC 12 drops such
+         * pairs when it vectorises. */
         exact &= (x + 0x1.8p52) - 0x1.8p52 == x;
         out[i] = (int64_t)x;
     }
     return exact;
 }
 
-/* The determinant of differences that are exact and have few bits, as those of single-precision or
- * integer input. Each is below 2^41, so that minors are below 2^83 and the determinant below 2^126.
- * False when the differences are not like that. */
+/* Computes the determinant of differences that are exact and have few bits, as those of
+ * single-precision or integer input. Each is below 2^41, so that minors are below 2^83 and the
+ * determinant below 2^126. Returns false for other differences. */
 static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 {
     int64_t z[3][3];
@@ -233,7 +233,7 @@ static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 }
 
 #else
-/* Expansions decide alone. */
+/* Without 128-bit integers, expansions decide alone. */
 static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 {
     (void)sign, (void)m;
@@ -241,7 +241,7 @@ static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 }
 #endif
 
-/* out = the determinant; room for 192. */
+/* Computes out = the determinant; capacity 192. */
 static int expand_determinant(double *out, ebpo_difference m[3][3])
 {
     double minor[16], term[3][64], two[128];
@@ -255,7 +255,7 @@ static int expand_determinant(double *out, ebpo_difference m[3][3])
     return ebpo_expansion_sum(out, two, two_n, term[2], term_n[2]);
 }
 
-/* The determinant of the heads alone is off by at most this. */
+/* Bounds the error of the determinant of the heads alone. */
 static double error_of_heads(ebpo_pair m[3][3])
 {
     double permanent = 0;
@@ -267,8 +267,8 @@ static double error_of_heads(ebpo_pair m[3][3])
     return heads_error * permanent;
 }
 
-/* A lower bound of |e| for n <= 24. Components do not overlap, so the sum of their sizes is below
- * twice the last one, and adding them up errs by less than n eps of that. */
+/* Returns a lower bound of |e| for n <= 24. Components do not overlap, so the sum of their sizes is
+ * below twice the last one, and the error of adding them is less than n eps of that. */
 static double expansion_size(const double *e, int n)
 {
     double sum = 0;
@@ -375,7 +375,7 @@ int ebpo_orient2d(const double a[2], const double b[2], const double c[2])
     return sign != EBPO_SIGN_UNKNOWN ? sign : ebpo_orient2d_exact(a, b, c);
 }
 
-/* The differences of b, c, d to a, one row for each axis. */
+/* Filters the differences of b, c, d to a, one row for each axis. */
 static int orient3d_filter(double m[3][3])
 {
     double det = 0, permanent = 0, third = 0;
@@ -405,7 +405,7 @@ int ebpo_orient3d(const double a[3], const double b[3], const double c[3], const
     int sign = orient3d_filter(m);
     if (sign != EBPO_SIGN_UNKNOWN)
         return sign;
-    /* Everything in one axis-parallel plane: the commonest zero there is. */
+    /* All points in one axis-parallel plane: the most common zero. */
     for (int k = 0; k < 3; k++)
         if (m[k][0] == 0 && m[k][1] == 0 && m[k][2] == 0)
             return 0;

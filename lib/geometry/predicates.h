@@ -1,10 +1,9 @@
 /* Exact predicates over doubles: the sign is right for every finite input, whatever the compiler
  * and its flags. A floating-point filter decides nearly always; the rest goes to exact arithmetic
  * on doubles (expansions), then to integers of any size (GMP). Overflow and underflow in the filter
- * are detected and fall back too. All functions are pure and may be called from any thread. Source:
- * Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates",
- * 1997, for the idea of filters.
- */
+ * are detected and fall back too. All functions are pure and thread-safe. Source: Shewchuk,
+ * "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997, for
+ * the idea of filters. */
 #ifndef EBPO_GEOMETRY_PREDICATES_H
 #define EBPO_GEOMETRY_PREDICATES_H
 
@@ -13,30 +12,32 @@
 
 #include "geometry/expansion.h"
 
-/* Sign (-1, 0, 1) of the determinant | b - a, c - a |: 1 when a, b, c turn counter-clockwise. */
+/* Returns the sign (-1, 0, 1) of the determinant | b - a, c - a |: 1 when a, b, c turn
+ * counter-clockwise. */
 int ebpo_orient2d(const double a[2], const double b[2], const double c[2]);
 
-/* Sign of (b - a) x (c - a) . (d - a): 1 when d lies on the side that the normal of
- * counter-clockwise a, b, c points to. */
+/* Returns the sign of (b - a) x (c - a) . (d - a): 1 when d is on the side to which the normal of
+ * counter-clockwise a, b, c points. */
 int ebpo_orient3d(const double a[3], const double b[3], const double c[3], const double d[3]);
 
-/* Sign of component `axis` of the normal (b - a) x (c - a). */
+/* Returns the sign of component `axis` of the normal (b - a) x (c - a). */
 int ebpo_normal_sign(int axis, const double a[3], const double b[3], const double c[3]);
 
-/* True when a, b, c are collinear or coincide: a face without area. */
+/* Returns true when a, b, c are collinear or coincide: a face without area. */
 bool ebpo_zero_area(const double a[3], const double b[3], const double c[3]);
 
-/* Sign of the sum of n products factor[2i] * factor[2i+1], exactly; up to 8 are fastest. */
+/* Returns the exact sign of the sum of n products factor[2i] * factor[2i+1]; up to 8 are fastest.
+ */
 int ebpo_sign_of_products(const double *factor, int n);
 
-/* Signed crossings of the face (a, b, c) with an axis-parallel segment, for winding numbers.
+/* Computes signed crossings of the face (a, b, c) with an axis-parallel segment, for winding
+ * numbers.
  *
  * The segment runs from `from` in direction +axis (0, 1, 2) to coordinate `to` >= from[axis] on
- * that axis. Both ends are understood as shifted by (d0, d1, d2), infinitely small positive numbers
- * with d0 >> d1 >> d2 (each negligible against every power of the one before): simulation of
- * simplicity, with one and the same shift for every call. So no end lies on a face, no segment
- * meets an edge or vertex, and crossing numbers are exact and consistent. A face without area
- * counts as no crossing.
+ * that axis. Both ends are shifted by (d0, d1, d2), infinitely small positive numbers with d0 >> d1
+ * >> d2 (each negligible against every power of the one before): simulation of simplicity, with the
+ * same shift for every call. So no end is on a face, no segment intersects an edge or vertex, and
+ * crossing numbers are exact and consistent. A face without area counts as no crossing.
  *
  * Returns the change of the winding number from `from` to the end: +1 when the segment enters (goes
  * against the normal of the counter-clockwise face), -1 when it leaves, 0 when there is no
@@ -44,30 +45,29 @@ int ebpo_sign_of_products(const double *factor, int n);
 int ebpo_axis_crossing(const double from[3], double to, int axis, const double a[3],
                        const double b[3], const double c[3]);
 
-/* Where a point is in relation to a triangle: true when p lies on the closed triangle (a, b, c),
- * also one without area. Exact. */
+/* Returns true when p is on the closed triangle (a, b, c), also one without area. Exact. */
 bool ebpo_point_on_triangle(const double p[3], const double a[3], const double b[3],
                             const double c[3]);
 
-/* --- the exact stages, each alone --- */
+/* --- the exact stages, separately --- */
 
 /* Returned instead of a sign when coordinates are too large or too small for this stage. */
 enum { EBPO_SIGN_UNKNOWN = 2 };
 
-/* In exact arithmetic on doubles: tens to hundreds of nanoseconds, without allocation. The same
- * meaning as the functions above without "_expansion"; -1, 0, 1 are exact. */
+/* Computes in exact arithmetic on doubles: tens to hundreds of nanoseconds, without allocation.
+ * Same results as the functions above without "_expansion"; -1, 0, 1 are exact. */
 int ebpo_orient2d_expansion(const double a[2], const double b[2], const double c[2]);
 int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c[3],
                             const double d[3]);
 int ebpo_sign_of_products_expansion(const double *factor, int n);
 
-/* Sign of the determinant of three columns of differences, m[axis][column]; coordinates as large
- * and small as those that ebpo_orient3d_expansion takes, or closer to 1. Exact. */
+/* Returns the exact sign of the determinant of three columns of differences, m[axis][column];
+ * coordinates in the range of ebpo_orient3d_expansion, or closer to 1. */
 int ebpo_determinant_expansion(ebpo_pair m[3][3]);
 
-/* In integers of any size. The same meaning and ranges as the functions above without "_exact".
- * Each call allocates through GMP, which ends the program when memory is out (a few kilobytes
- * suffice). */
+/* Computes in integers of any size. Same results and ranges as the functions above without
+ * "_exact". Each call allocates through GMP, which ends the program when memory is short (a few
+ * kilobytes suffice). */
 int ebpo_orient2d_exact(const double a[2], const double b[2], const double c[2]);
 int ebpo_orient3d_exact(const double a[3], const double b[3], const double c[3], const double d[3]);
 int ebpo_sign_of_products_exact(const double *factor, int n);

@@ -1,4 +1,4 @@
-/* A ray or segment, and where it meets a triangle. */
+/* A ray or segment, and its intersection with a triangle. */
 #ifndef EBPO_GEOMETRY_RAY_H
 #define EBPO_GEOMETRY_RAY_H
 
@@ -10,42 +10,45 @@ typedef struct ebpo_segment {
     double t_max;
 } ebpo_segment;
 
-typedef struct ebpo_ray_meeting {
+typedef struct ebpo_ray_intersection {
     bool meets; /* the closed triangle and the ray have a common point with 0 <= t <= t_max */
     /* 1: it goes against the normal through the triangle's interior (enters), -1: with it (leaves),
      * 0: an edge, a corner, within the plane, or no area */
     int side;
-    /* 1: the line goes against the normal, -1: with it, wherever it meets the triangle; 0: within
-     * the plane, or no area */
+    /* 1: the line goes against the normal, -1: with it, wherever it intersects the triangle; 0:
+     * within the plane, or no area */
     int facing;
-    double t; /* of the first common point, correctly rounded */
-} ebpo_ray_meeting;
+    double t; /* t of the first common point, correctly rounded */
+} ebpo_ray_intersection;
 
-/* Rays and boxes against triangles, exact: the decisions are those of arithmetic without rounding,
- * for every finite double. Filters in floating point first, then exact arithmetic on doubles
- * (expansions), integers of any size (GMP) where numbers are too large or too small for these. Pure
- * functions, any thread; the same results with every compiler and its flags. */
+/* Exact tests of rays and boxes against triangles: the decisions are those of arithmetic without
+ * rounding, for every finite double. Filters in floating point first, then exact arithmetic on
+ * doubles (expansions), integers of any size (GMP) where numbers are too large or too small for
+ * these. Pure functions, any thread; the same results with every compiler and its flags. */
 
-void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebpo_ray_meeting *out);
+void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3],
+                       ebpo_ray_intersection *out);
 
-/* The same where the line certainly goes through the triangle's interior, `facing` as in the answer
+/* Same where the line certainly passes through the triangle's interior, `facing` as in the result
  * (not 0). */
 void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int facing,
-                       ebpo_ray_meeting *out);
+                       ebpo_ray_intersection *out);
 
-/* Sign of t(a) - t(b), exact, for two triangles that the ray meets (first common points) as
- * ebpo_ray_triangle has said. */
-int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3], const ebpo_ray_meeting *at_a,
-                     const double b[3][3], const ebpo_ray_meeting *at_b);
+/* Returns the exact sign of t(a) - t(b), for two triangles that the ray intersects (first common
+ * points) according to ebpo_ray_triangle. */
+int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3],
+                     const ebpo_ray_intersection *at_a, const double b[3][3],
+                     const ebpo_ray_intersection *at_b);
 
-/* The same in rational numbers, for every finite double. Each call allocates through GMP, which
- * ends the program when memory is out (a few kilobytes suffice). */
+/* Same in rational numbers, for every finite double. Each call allocates through GMP, which ends
+ * the program when memory is short (a few kilobytes suffice). */
 void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3],
-                             ebpo_ray_meeting *out);
+                             ebpo_ray_intersection *out);
 int ebpo_ray_compare_exact(const ebpo_segment *ray, const double a[3][3], const double b[3][3]);
 
-/* True when the closed triangle and the closed box [min, max] have a common point (min <= max on
- * each axis; a box may be flat or a point). */
-bool ebpo_triangle_meets_box(const double triangle[3][3], const double min[3], const double max[3]);
+/* Returns true when the closed triangle and the closed box [min, max] have a common point (min <=
+ * max on each axis; a box may be flat or a point). */
+bool ebpo_triangle_intersects_box(const double triangle[3][3], const double min[3],
+                                  const double max[3]);
 
 #endif

@@ -1,12 +1,12 @@
-/* Rays against triangles in rational numbers: right for every finite double, and slow. The last
- * stage of ray_triangle.c.
+/* Intersects rays with triangles in rational numbers: right for every finite double, and slow. The
+ * last stage of ray_triangle.c.
  *
  * Corners relative to the origin become integers e_i in one unit, the direction integers d in
- * another. With s_i = d . (e_j x e_k) for the edge opposite corner i, the line meets the plane at t
- * = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2), and it meets the triangle when no two of the s_i have
- * different signs. When the denominator is 0 the line is parallel to the triangle or the triangle
- * has no area: then there is a common point only where all s_i are 0, and line and triangle lie in
- * one plane. */
+ * another. With s_i = d . (e_j x e_k) for the edge opposite corner i, the line intersects the plane
+ * at t = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2), and it intersects the triangle when no two of the
+ * s_i have different signs. When the denominator is 0 the line is parallel to the triangle or the
+ * triangle has no area: then there is a common point only where all s_i are 0, and line and
+ * triangle are in one plane. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -24,7 +24,7 @@ typedef struct integer_scene {
     int shift; /* a parameter in these units times 2^shift is t */
 } integer_scene;
 
-/* What the line and the triangle have in common, in units of the scene. */
+/* The intersection of the line and the triangle, in units of the scene. */
 typedef struct stretch {
     bool any;
     int side, facing;
@@ -44,7 +44,7 @@ static void lower_unit(int *unit, const double *x, int n)
     }
 }
 
-/* out = x / 2^unit */
+/* Computes out = x / 2^unit. */
 static void set_integer(mpz_t out, double x, int unit)
 {
     int e;
@@ -87,7 +87,7 @@ static void scene_clear(integer_scene *s)
     }
 }
 
-/* out = component k of a x b */
+/* Computes out = component k of a x b. */
 static void cross_component(mpz_t out, const mpz_t a[3], const mpz_t b[3], int k)
 {
     int u = (k + 1) % 3, v = (k + 2) % 3;
@@ -95,7 +95,7 @@ static void cross_component(mpz_t out, const mpz_t a[3], const mpz_t b[3], int k
     mpz_submul(out, a[v], b[u]);
 }
 
-/* out = a . (b x c) */
+/* Computes out = a . (b x c). */
 static void integer_determinant(mpz_t out, const mpz_t a[3], const mpz_t b[3], const mpz_t c[3])
 {
     mpz_t component;
@@ -117,8 +117,8 @@ static void set_fraction(mpq_t out, const mpz_t numerator, const mpz_t denominat
 
 /* --- the line and the triangle --- */
 
-/* Axis with the direction's largest component: there, a multiple of the direction tells the factor.
- */
+/* Returns the axis with the direction's largest component: there, a multiple of the direction
+ * determines the factor. */
 static int main_axis(const integer_scene *s)
 {
     int axis = 0;
@@ -141,8 +141,8 @@ static void stretch_add(stretch *st, const mpz_t numerator, const mpz_t denomina
     mpq_clear(t);
 }
 
-/* out[i]: signed distance of corner i from the line, up to a common factor, for corners in one
- * plane with the line. */
+/* Computes out[i]: signed distance of corner i from the line, up to a common factor, for corners in
+ * one plane with the line. */
 static void offsets_from_line(const integer_scene *s, mpz_t out[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -153,8 +153,8 @@ static void offsets_from_line(const integer_scene *s, mpz_t out[3])
     }
 }
 
-/* The edge from corner i to corner j crosses the line at (e_i w_j - e_j w_i) / (w_j - w_i) = t d, w
- * being the offsets. */
+/* Adds the crossing of the edge from corner i to corner j with the line, at (e_i w_j - e_j w_i) /
+ * (w_j - w_i) = t d, w being the offsets. */
 static void add_edge_crossing(stretch *st, const integer_scene *s, int axis, mpz_t w[3], int i,
                               int j)
 {
@@ -168,8 +168,8 @@ static void add_edge_crossing(stretch *st, const integer_scene *s, int axis, mpz
     mpz_clears(numerator, denominator, NULL);
 }
 
-/* Line and triangle lie in one plane. */
-static void meet_in_plane(stretch *st, const integer_scene *s)
+/* Intersects a line and a triangle in one plane. */
+static void intersect_in_plane(stretch *st, const integer_scene *s)
 {
     int axis = main_axis(s);
     mpz_t w[3];
@@ -185,7 +185,7 @@ static void meet_in_plane(stretch *st, const integer_scene *s)
     mpz_clears(w[0], w[1], w[2], NULL);
 }
 
-static void meet_line(stretch *st, const integer_scene *s)
+static void intersect_line(stretch *st, const integer_scene *s)
 {
     mpz_t edge[3], denominator, numerator;
     int sign[3], negative = 0, positive = 0;
@@ -199,7 +199,7 @@ static void meet_line(stretch *st, const integer_scene *s)
         positive += sign[i] > 0;
     }
     if (negative + positive == 0)
-        meet_in_plane(st, s);
+        intersect_in_plane(st, s);
     else if (negative == 0 || positive == 0) {
         integer_determinant(numerator, s->corner[0], s->corner[1], s->corner[2]);
         stretch_add(st, numerator, denominator);
@@ -238,21 +238,21 @@ static void clip_stretch(stretch *st, int shift, double t_max)
     }
 }
 
-static void meet_ray(stretch *st, const ebpo_segment *ray, const double triangle[3][3])
+static void intersect_ray(stretch *st, const ebpo_segment *ray, const double triangle[3][3])
 {
     integer_scene s;
     st->any = false;
     st->side = st->facing = 0;
     mpq_inits(st->low, st->high, NULL);
     scene_init(&s, ray, triangle);
-    meet_line(st, &s);
+    intersect_line(st, &s);
     clip_stretch(st, s.shift, ray->t_max);
     scene_clear(&s);
 }
 
 static void stretch_clear(stretch *st) { mpq_clears(st->low, st->high, NULL); }
 
-/* To the nearest double, t >= 0; mpq_get_d cuts off. */
+/* Rounds to the nearest double, t >= 0; mpq_get_d truncates. */
 static double round_fraction(const mpq_t t)
 {
     double low = mpq_get_d(t), high = nextafter(low, INFINITY);
@@ -272,10 +272,10 @@ static double round_fraction(const mpq_t t)
 }
 
 void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3],
-                             ebpo_ray_meeting *out)
+                             ebpo_ray_intersection *out)
 {
     stretch st;
-    meet_ray(&st, ray, triangle);
+    intersect_ray(&st, ray, triangle);
     out->meets = st.any;
     out->side = st.any ? st.side : 0;
     out->facing = st.any ? st.facing : 0;
@@ -286,8 +286,8 @@ void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3
 int ebpo_ray_compare_exact(const ebpo_segment *ray, const double a[3][3], const double b[3][3])
 {
     stretch first, second;
-    meet_ray(&first, ray, a);
-    meet_ray(&second, ray, b);
+    intersect_ray(&first, ray, a);
+    intersect_ray(&second, ray, b);
     int order = mpq_cmp(first.low, second.low);
     stretch_clear(&first);
     stretch_clear(&second);

@@ -1,15 +1,15 @@
-/* Where a ray meets a triangle.
+/* Intersection of a ray with a triangle.
  *
- * A ray goes through stages, cheapest first: on which side of each edge the line passes, in
- * floating point with error bounds; then numerator and denominator of t in double-double
- * arithmetic (double_double_kernels.c), which gives t to its last bits; expansions where these are
- * not certain; rational numbers where exponents leave the range of expansions (ray_exact.c).
+ * A ray passes stages, cheapest first: the side of each edge on which the line passes, in floating
+ * point with error bounds; then numerator and denominator of t in double-double arithmetic
+ * (double_double_kernels.c), which gives t to its last bits; expansions where these are not
+ * certain; rational numbers where exponents leave the range of expansions (ray_exact.c).
  *
  * With e_i = corner i - origin the line passes the edge (i, j) on the side given by the sign of d .
  * (e_i x e_j). Two edges with different signs: the line misses the triangle, also one without area
- * or seen edge-on, because all three signs are those of one planar figure, the triangle as seen
- * along d. Three equal signs: it goes through the interior. Anything else touches an edge or a
- * corner or is not certain. */
+ * or seen edge-on, because all three signs are those of one planar figure, the triangle projected
+ * along d. Three equal signs: it passes through the interior. In all other cases it touches an edge
+ * or a corner, or is not certain. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -23,26 +23,26 @@
 #include "geometry/ray.h"
 #include "geometry/double_double_kernels.h"
 
-/* Sign of the determinant of direction, corner i and corner i + 1 (relative to the origin), where
- * it is certain; else: */
+/* The sign of the determinant of direction, corner i and corner i + 1 (relative to the origin),
+ * where it is certain; otherwise: */
 enum { SIDE_OPEN = 2 };
 
-/* What is further apart than this is certainly in this order, when a and b are rounded. */
+/* Returns true if a and b, which are rounded, are so far apart that their order is certain. */
 static inline bool certainly_less(double a, double b)
 {
     return b - a > 0x1p-50 * (__builtin_fabs(a) + __builtin_fabs(b));
 }
 
-static inline void set_miss(ebpo_ray_meeting *out)
+static inline void set_miss(ebpo_ray_intersection *out)
 {
-    *out = (ebpo_ray_meeting){ false, 0, 0, INFINITY };
+    *out = (ebpo_ray_intersection){ false, 0, 0, INFINITY };
 }
 
 /* --- expansions: t as a fraction, exact without allocation --- */
 
 /* Ranges. A double x with 2^-172 <= |x| <= 2^225 is a multiple of 2^-225; products of four such
  * numbers, their differences and rounding errors are multiples of 2^-900 and below 2^910. Comparing
- * two hits takes products of six, so numbers from 2^-97 to 2^150, which are multiples of 2^-150.
+ * two hits needs products of six, so numbers from 2^-97 to 2^150, which are multiples of 2^-150.
  * Functions that return false or EBPO_SIGN_UNKNOWN got numbers outside of these ranges. */
 
 /* numerator / denominator; the denominator is not 0. */
@@ -66,7 +66,8 @@ static bool all_in_range(const ebpo_segment *ray, const double triangle[3][3], d
            in_range(ray->direction, 3, least, largest) && in_range(triangle[0], 9, least, largest);
 }
 
-/* Zero, or of a size that no product of four such numbers leaves the doubles. */
+/* Returns true for values that are zero, or of a size that no product of four of them leaves the
+ * doubles. */
 static bool ray_in_range(const ebpo_segment *ray, const double triangle[3][3])
 {
     return all_in_range(ray, triangle, 0x1p-172, 0x1p225);
@@ -79,7 +80,7 @@ static int fraction_sign(const fraction_of_expansions *f)
     return ebpo_expansion_sign(f->numerator, f->n) * ebpo_expansion_sign(f->denominator, f->m);
 }
 
-/* Sign of f - t for t >= 0. */
+/* Returns the sign of f - t for t >= 0. */
 static int fraction_beyond(const fraction_of_expansions *f, double t)
 {
     double end[192], rest[384];
@@ -93,7 +94,7 @@ static int fraction_beyond(const fraction_of_expansions *f, double t)
     return ebpo_expansion_sign(rest, n) * ebpo_expansion_sign(f->denominator, f->m);
 }
 
-/* The two leading components of what is compressed. */
+/* Returns the two leading components of a compressed expansion. */
 static ebpo_pair leading_pair(const double *e, int n)
 {
     return (ebpo_pair){ e[n - 1], n > 1 ? e[n - 2] : 0 };
@@ -105,7 +106,7 @@ static void compress_fraction(fraction_of_expansions *f)
     f->m = ebpo_expansion_compress(f->denominator, f->m);
 }
 
-/* Of two neighbours the one that the fraction is closer to, or the even one. */
+/* Returns the neighbour that the fraction is closer to, or the even one. */
 static double nearest_neighbour(const fraction_of_expansions *f, const double neighbour[2])
 {
     double low[192], high[192], middle[384], rest[576], half = (neighbour[1] - neighbour[0]) / 2;
@@ -120,7 +121,8 @@ static double nearest_neighbour(const fraction_of_expansions *f, const double ne
     return sign > 0 || (sign == 0 && bits % 2) ? neighbour[1] : neighbour[0];
 }
 
-/* *t: the fraction, positive, correctly rounded. It keeps its value, in fewer components. */
+/* Sets *t to the fraction, which is positive, correctly rounded. The fraction keeps its value, in
+ * fewer components. */
 static bool fraction_value(fraction_of_expansions *f, double *t)
 {
     double out[2];
@@ -133,8 +135,8 @@ static bool fraction_value(fraction_of_expansions *f, double *t)
     return true;
 }
 
-/* The t at which the line meets the triangle's plane: normal . (corner - origin) over normal .
- * direction, for what ray_in_range accepts. False: it is parallel. */
+/* Computes the t at which the line intersects the triangle's plane: normal . (corner - origin) over
+ * normal . direction, for input that ray_in_range accepts. Returns false if it is parallel. */
 static bool plane_fraction(const ebpo_segment *ray, const double triangle[3][3],
                            fraction_of_expansions *out)
 {
@@ -162,7 +164,7 @@ static bool plane_fraction(const ebpo_segment *ray, const double triangle[3][3],
 
 /* --- line and triangle in one plane --- */
 
-/* Places at which the line leaves or enters the triangle: at corners that it passes through, and
+/* Positions where the line leaves or enters the triangle: at corners that it passes through, and
  * where it crosses edges. */
 typedef struct crossings {
     int count;
@@ -172,7 +174,7 @@ typedef struct crossings {
 typedef struct scene {
     ebpo_difference corner[3][3]; /* relative to the origin */
     const double *direction;
-    int axis; /* of the direction's largest component */
+    int axis; /* axis of the direction's largest component */
 } scene;
 
 static void make_scene(scene *s, const ebpo_segment *ray, const double triangle[3][3])
@@ -188,13 +190,14 @@ static void make_scene(scene *s, const ebpo_segment *ray, const double triangle[
     }
 }
 
-/* A double as an expansion. */
+/* Returns a double as an expansion. */
 static ebpo_difference difference_of_double(double x)
 {
     return ebpo_difference_of((ebpo_pair){ x, 0 });
 }
 
-/* out[i] = component k of corner i x direction, n[i] components; false when all are 0. */
+/* Computes out[i] = component k of corner i x direction, n[i] components; returns false when all
+ * are 0. */
 static bool offsets_along(const scene *s, int k, double out[3][16], int n[3])
 {
     int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
@@ -215,8 +218,8 @@ static void add_corner(crossings *c, const scene *s, int i)
     f->denominator[0] = s->direction[s->axis];
 }
 
-/* The edge from corner i to j crosses the line at (e_i w_j - e_j w_i) / (w_j - w_i) = t d, w being
- * the offsets. */
+/* Adds the crossing of the edge from corner i to j with the line, at (e_i w_j - e_j w_i) / (w_j -
+ * w_i) = t d, w being the offsets. */
 static void add_crossing(crossings *c, const scene *s, double w[3][16], const int *n, int i, int j)
 {
     fraction_of_expansions *f = &c->at[c->count++];
@@ -252,10 +255,10 @@ static void find_crossings(crossings *c, const ebpo_segment *ray, const double t
     }
 }
 
-/* The meeting, for a line that lies in the triangle's plane or in one with a triangle without area,
- * for what ray_in_range accepts. */
-static bool meet_within_plane(const ebpo_segment *ray, const double triangle[3][3],
-                              ebpo_ray_meeting *out)
+/* Intersects a line that is in the triangle's plane or in one plane with a triangle without area,
+ * for input that ray_in_range accepts. */
+static bool intersect_within_plane(const ebpo_segment *ray, const double triangle[3][3],
+                                   ebpo_ray_intersection *out)
 {
     crossings c;
     bool before_end = false, after_begin = false, before_begin = false;
@@ -270,7 +273,7 @@ static bool meet_within_plane(const ebpo_segment *ray, const double triangle[3][
         before_end |= end <= 0;
         least = sign > 0 ? fmin(least, t) : least;
     }
-    *out = (ebpo_ray_meeting){ after_begin && before_end, 0, 0, INFINITY };
+    *out = (ebpo_ray_intersection){ after_begin && before_end, 0, 0, INFINITY };
     if (out->meets)
         out->t = before_begin ? 0 : least;
     return true;
@@ -278,13 +281,13 @@ static bool meet_within_plane(const ebpo_segment *ray, const double triangle[3][
 
 /* --- comparing --- */
 
-/* out = e * f; false when there is no room for it. */
+/* Computes out = e * f; returns false when `space` is too small. */
 static bool multiply_expansions(double *out, int *length, const double *e, int n, const double *f,
-                                int m, int room)
+                                int m, int space)
 {
     double sum[2][512], term[256];
     int count = 0, now = 0;
-    if (2 * n * m > room || room > 512 || 2 * n > 256)
+    if (2 * n * m > space || space > 512 || 2 * n > 256)
         return false;
     for (int i = 0; i < m; i++) {
         int term_n = ebpo_expansion_scale(term, e, n, f[i]);
@@ -311,7 +314,7 @@ static int compare_fractions(fraction_of_expansions *a, fraction_of_expansions *
            ebpo_expansion_sign(b->denominator, b->m);
 }
 
-/* The t of the first common point; false: not known. */
+/* Returns the t of the first common point; false: not known. */
 static bool first_fraction(const ebpo_segment *ray, const double triangle[3][3],
                            fraction_of_expansions *out)
 {
@@ -332,7 +335,7 @@ static bool first_fraction(const ebpo_segment *ray, const double triangle[3][3],
     return c.count > 0;
 }
 
-/* Sign of t(a) - t(b), as ebpo_ray_compare. */
+/* Returns the sign of t(a) - t(b), as ebpo_ray_compare. */
 static int compare_by_expansions(const ebpo_segment *ray, const double a[3][3],
                                  const double b[3][3])
 {
@@ -356,7 +359,7 @@ typedef struct parameter {
     const ebpo_segment *ray;
     const double (*triangle)[3];
     ebpo_plane_pairs at;
-    bool made; /* the fraction is there */
+    bool made; /* the fraction is set */
     fraction_of_expansions fraction;
 } parameter;
 
@@ -377,7 +380,7 @@ static bool make_fraction(parameter *p)
     return p->made;
 }
 
-/* Sign of t; that of the denominator is known. */
+/* Returns the sign of t; that of the denominator is known. */
 static int sign_of_t(parameter *p, int denominator)
 {
     int sign = bounded_sign(&p->at.numerator);
@@ -386,7 +389,7 @@ static int sign_of_t(parameter *p, int denominator)
     return sign * denominator;
 }
 
-/* t > 0, correctly rounded. */
+/* Computes t > 0, correctly rounded. */
 static bool value_of_t(parameter *p, double *t)
 {
     const double *out = p->at.quotient;
@@ -398,7 +401,7 @@ static bool value_of_t(parameter *p, double *t)
     return make_fraction(p) && fraction_value(&p->fraction, t);
 }
 
-/* Sign of t - t_max, which are close; that of the denominator is known. */
+/* Returns the sign of t - t_max, which are close; that of the denominator is known. */
 static int beyond_end(parameter *p, int denominator)
 {
     double end = p->ray->t_max;
@@ -413,10 +416,10 @@ static int beyond_end(parameter *p, int denominator)
     return make_fraction(p) ? fraction_beyond(&p->fraction, end) : EBPO_SIGN_UNKNOWN;
 }
 
-/* The same where the line meets the triangle: `side` as in the answer, `sign` that of normal .
+/* Same where the line intersects the triangle: `side` as in the result, `sign` that of normal .
  * direction. */
-static bool meet_plane(const ebpo_segment *ray, const double triangle[3][3], int sign, int side,
-                       ebpo_ray_meeting *out)
+static bool intersect_plane(const ebpo_segment *ray, const double triangle[3][3], int sign,
+                            int side, ebpo_ray_intersection *out)
 {
     parameter p;
     double t = 0;
@@ -434,7 +437,7 @@ static bool meet_plane(const ebpo_segment *ray, const double triangle[3][3], int
         if (from_end == EBPO_SIGN_UNKNOWN || from_end > 0)
             return from_end != EBPO_SIGN_UNKNOWN;
     }
-    *out = (ebpo_ray_meeting){ true, side, -sign, t };
+    *out = (ebpo_ray_intersection){ true, side, -sign, t };
     return true;
 }
 
@@ -443,7 +446,7 @@ static bool meet_plane(const ebpo_segment *ray, const double triangle[3][3], int
 /* Frequent cases are recognised first: a corner at the origin (t = 0), a corner on the line, an
  * edge through the origin. */
 
-/* a x b = 0, exact, for numbers in range. */
+/* Returns true if a x b = 0, exactly, for numbers in range. */
 static bool are_parallel(const double a[3], const double b[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -457,7 +460,7 @@ static bool are_parallel(const double a[3], const double b[3])
 
 /* A corner relative to the ray's origin. */
 typedef struct corner {
-    const double *at; /* in the model */
+    const double *at; /* position in the model */
     ebpo_pair x[3];
     double head[3];
     bool exact; /* no tails */
@@ -479,8 +482,8 @@ static inline bool is_origin(const corner *c)
     return c->head[0] == 0 && c->head[1] == 0 && c->head[2] == 0;
 }
 
-/* Sign of d . (a x b), exact. The same with b - a in place of b, which loses less where the edge is
- * short beside its distance from the origin. */
+/* Returns the exact sign of d . (a x b). Uses b - a in place of b, which loses less where the edge
+ * is short compared with its distance from the origin. */
 static int close_edge_side(const double d[3], const corner *a, const corner *b)
 {
     ebpo_pair m[3][3];
@@ -499,7 +502,7 @@ static int close_edge_side(const double d[3], const corner *a, const corner *b)
     return ebpo_determinant_expansion(m);
 }
 
-/* The line goes through the corner, exact. */
+/* Returns true if the line passes through the corner, exactly. */
 static inline bool on_line(const double d[3], const corner *c)
 {
     return c->exact && are_parallel(d, c->head);
@@ -517,10 +520,10 @@ static void close_sides(const double d[3], const corner e[3], int sign[3])
             sign[i] = close_edge_side(d, &e[i], &e[i == 2 ? 0 : i + 1]);
 }
 
-/* The meeting, no two of the given signs being different unless open. False: not certain; numbers
- * are too large or too small. */
-static bool meet_closely(const ebpo_segment *ray, const double triangle[3][3], int sign[3],
-                         ebpo_ray_meeting *out)
+/* Intersects; no two of the given signs differ unless unknown. Returns false if not certain:
+ * numbers are too large or too small. */
+static bool intersect_closely(const ebpo_segment *ray, const double triangle[3][3], int sign[3],
+                              ebpo_ray_intersection *out)
 {
     corner e[3];
     bool begins = false;
@@ -537,15 +540,15 @@ static bool meet_closely(const ebpo_segment *ray, const double triangle[3][3], i
     if (left && right)
         set_miss(out);
     else if (begins)
-        *out = (ebpo_ray_meeting){ true, 0, -normal, 0 };
+        *out = (ebpo_ray_intersection){ true, 0, -normal, 0 };
     else if (normal == 0)
-        return meet_within_plane(ray, triangle, out);
+        return intersect_within_plane(ray, triangle, out);
     else
-        return meet_plane(ray, triangle, normal, inner ? -normal : 0, out);
+        return intersect_plane(ray, triangle, normal, inner ? -normal : 0, out);
     return true;
 }
 
-/* --- what two triangles share --- */
+/* --- shared corners and edges of two triangles --- */
 
 static bool has_corner(const double triangle[3][3], const double p[3])
 {
@@ -555,10 +558,10 @@ static bool has_corner(const double triangle[3][3], const double p[3])
     return has;
 }
 
-/* True when the ray, which meets both triangles, certainly does so in a corner or an edge that they
- * share, and therefore at the same t. `across`: it lies in the plane of neither. */
-static bool meets_shared(const ebpo_segment *ray, const double a[3][3], const double b[3][3],
-                         bool across)
+/* Returns true when the ray, which intersects both triangles, certainly does so in a shared corner
+ * or edge, and therefore at the same t. `across`: it is in the plane of neither. */
+static bool intersects_shared(const ebpo_segment *ray, const double a[3][3], const double b[3][3],
+                              bool across)
 {
     corner shared[3];
     int count = 0;
@@ -584,7 +587,8 @@ static const double eps = 0x1p-53;
 /* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
 static const double slack = 0x1p-960;
 
-/* Sign of d . (a x b), a and b being rounded differences; weight: 1 + |d0| + |d1| + |d2|. */
+/* Returns the sign of d . (a x b), a and b being rounded differences; weight: 1 + |d0| + |d1| +
+ * |d2|. */
 static inline int filtered_edge_side(const double d[3], double weight, const double a[3],
                                      const double b[3])
 {
@@ -598,8 +602,8 @@ static inline int filtered_edge_side(const double d[3], double weight, const dou
     return det > bound ? 1 : det < -bound ? -1 : SIDE_OPEN;
 }
 
-/* True when some axis shows that ray and triangle are apart; signs of differences are always right.
- */
+/* Returns true when some axis shows that ray and triangle are disjoint; signs of differences are
+ * always right. */
 static bool apart_on_an_axis(const ebpo_segment *ray, double e[3][3])
 {
     for (int k = 0; k < 3; k++) {
@@ -611,7 +615,8 @@ static bool apart_on_an_axis(const ebpo_segment *ray, double e[3][3])
     return false;
 }
 
-void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebpo_ray_meeting *out)
+void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3],
+                       ebpo_ray_intersection *out)
 {
     const double *d = ray->direction;
     double e[3][3], weight = 1 + fabs(d[0]) + fabs(d[1]) + fabs(d[2]);
@@ -627,32 +632,33 @@ void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3], ebp
         return;
     }
     if (sign[0] == sign[1] && sign[1] == sign[2] && sign[0] != SIDE_OPEN) {
-        done = meet_plane(ray, triangle, sign[0], -sign[0], out);
+        done = intersect_plane(ray, triangle, sign[0], -sign[0], out);
     } else if (apart_on_an_axis(ray, e)) {
         set_miss(out);
         return;
     } else {
-        done = meet_closely(ray, triangle, sign, out);
+        done = intersect_closely(ray, triangle, sign, out);
     }
     if (!done)
         ebpo_ray_triangle_exact(ray, triangle, out);
 }
 
 void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int facing,
-                       ebpo_ray_meeting *out)
+                       ebpo_ray_intersection *out)
 {
-    if (!meet_plane(ray, triangle, -facing, facing, out))
+    if (!intersect_plane(ray, triangle, -facing, facing, out))
         ebpo_ray_triangle_exact(ray, triangle, out);
 }
 
-int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3], const ebpo_ray_meeting *at_a,
-                     const double b[3][3], const ebpo_ray_meeting *at_b)
+int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3],
+                     const ebpo_ray_intersection *at_a, const double b[3][3],
+                     const ebpo_ray_intersection *at_b)
 {
     if (certainly_less(at_a->t, at_b->t))
         return -1;
     if (certainly_less(at_b->t, at_a->t))
         return 1;
-    if (meets_shared(ray, a, b, at_a->facing && at_b->facing))
+    if (intersects_shared(ray, a, b, at_a->facing && at_b->facing))
         return 0;
     int order = compare_by_expansions(ray, a, b);
     return order != EBPO_SIGN_UNKNOWN ? order : ebpo_ray_compare_exact(ray, a, b);

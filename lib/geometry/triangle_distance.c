@@ -1,8 +1,7 @@
-/* Distance of a point to a triangle: bounds, values that are correctly rounded, and exact
- * comparisons.
+/* Distance of a point to a triangle: bounds, correctly rounded values, and exact comparisons.
  *
- * The stages, cheapest first: bounds in doubles; signs of products whose errors are relative to
- * themselves, for points that are far from the triangle for its size; double-double arithmetic
+ * The stages, cheapest first: bounds in doubles; signs of products with relative errors, for points
+ * that are far from the triangle compared with its size; double-double arithmetic
  * (double_double_kernels.c) while its error bound decides the rounding (Ziv, "Fast evaluation of
  * elementary mathematical functions with correctly rounded last bit", 1991); integers of any size.
  *
@@ -22,14 +21,14 @@
 #include "geometry/integer_vectors.h"
 #include "geometry/vec3.h"
 
-/* --- points that are far from the triangle for its size --- */
+/* --- points that are far from the triangle compared with its size --- */
 
-/* A number, and a bound of its error; 0 without error is exact. */
+/* A number and its error bound; 0 with error 0 is exact. */
 typedef struct near {
     double x, error;
 } near;
 
-/* Roundings of the errors themselves, and of what is below the normal doubles. */
+/* Rounding of the errors themselves, and loss below the normal doubles. */
 static const double more = 1 + 0x1p-40, rounding = 0x1p-52, lost = 0x1p-1060;
 
 static near near_multiply(near a, near b)
@@ -66,7 +65,7 @@ static void near_cross(const near a[3], const near b[3], near out[3])
 static int near_sign(near a) { return a.x > a.error ? 1 : a.x < -a.error ? -1 : 0; }
 static bool near_is_zero(near a) { return a.x == 0 && a.error == 0; }
 
-/* to - from, times 2^-exponent. */
+/* Returns to - from, times 2^-exponent. */
 static near near_difference(double to, double from, int exponent)
 {
     double d = to - from;
@@ -77,7 +76,7 @@ static near near_difference(double to, double from, int exponent)
     return out;
 }
 
-/* So that no coordinate's difference is above 2. */
+/* Returns an exponent such that no scaled coordinate difference is above 2. */
 static int exponent_of(const double (*a)[3], int count, const double b[3])
 {
     double most = 0;
@@ -92,12 +91,13 @@ static int exponent_of(const double (*a)[3], int count, const double b[3])
 }
 
 typedef struct far_triangle {
-    near corner[3][3], edge[3][3]; /* in units of their own: corners seen from p */
+    near corner[3][3], edge[3][3]; /* in separate units: corners relative to p */
     near along[3], back[3];        /* corner k . edge k; corner k + 1 . edge k */
     int exponent, edge_exponent;
 } far_triangle;
 
-/* False: two corners are equal, and which of them is nearest is not told here. */
+/* Computes the products. Returns false if two corners are equal; this stage does not decide which
+ * of them is nearest. */
 static bool relate_far(const double p[3], const double triangle[3][3], far_triangle *t)
 {
     bool apart = true;
@@ -127,7 +127,7 @@ static ebpo_feature far_feature_of(const far_triangle *t)
     near_cross(t->edge[0], t->edge[1], normal);
     for (int i = 0; i < 3; i++) {
         const near *along = &t->along[i], *before = &t->back[(i + 2) % 3];
-        /* behind the corner along both of its edges, or right beside it */
+        /* behind the corner along both of its edges, or exactly beside it */
         if ((near_sign(*along) > 0 || near_is_zero(*along)) &&
             (near_sign(*before) < 0 || near_is_zero(*before)))
             return (ebpo_feature)(EBPO_NEAR_CORNER0 + i);
@@ -145,7 +145,8 @@ static double near_length(const near a[3])
     return sqrt(a[0].x * a[0].x + a[1].x * a[1].x + a[2].x * a[2].x);
 }
 
-/* The nearest corner is at most the triangle's size farther than the nearest point. */
+/* Bounds the distance: the nearest corner is at most the triangle's size farther than the nearest
+ * point. */
 static void bound_far(const far_triangle *t, ebpo_feature feature, ebpo_distance_bounds *out)
 {
     double least = INFINITY, size = 0;
@@ -163,12 +164,12 @@ static void bound_far(const far_triangle *t, ebpo_feature feature, ebpo_distance
     out->feature = feature;
     out->lo = low > 0 ? fmax(nextafter(ldexp(low, t->exponent), -INFINITY), 0) : 0;
     out->hi = nextafter(ldexp(high, t->exponent), INFINITY);
-    /* what overflows may not have before it was rounded */
+    /* a value that overflows may have been finite before rounding */
     out->lo = fmin(out->lo, 0x1.fffffffffffffp1023);
 }
 
-/* The nearest feature, or EBPO_NEAR_UNKNOWN. `out`, unless NULL: bounds of the distance that are as
- * near as the triangle is small. */
+/* Returns the nearest feature, or EBPO_NEAR_UNKNOWN. `out`, unless NULL: bounds of the distance
+ * whose gap is about the triangle's size. */
 static ebpo_feature find_far_feature(const double p[3], const double triangle[3][3],
                                      ebpo_distance_bounds *out)
 {
@@ -181,7 +182,7 @@ static ebpo_feature find_far_feature(const double p[3], const double triangle[3]
     return feature;
 }
 
-/* |p - a|^2 - |p - b|^2 = (a - b) . ((a - p) + (b - p)) */
+/* Uses |p - a|^2 - |p - b|^2 = (a - b) . ((a - p) + (b - p)). */
 static bool compare_far_corners(const double p[3], const double a[3], const double b[3], int *sign)
 {
     const double both[2][3] = { { a[0], a[1], a[2] }, { b[0], b[1], b[2] } };
@@ -197,7 +198,7 @@ static bool compare_far_corners(const double p[3], const double a[3], const doub
     return *sign || near_is_zero(d);
 }
 
-/* The corners that a feature has; the others become copies of them. */
+/* Replaces corners that do not belong to a feature by copies of those that do. */
 static void keep_feature(double t[3][3], ebpo_feature feature)
 {
     double from[3], to[3];
@@ -212,8 +213,9 @@ static void keep_feature(double t[3][3], ebpo_feature feature)
     memcpy(t[2], to, sizeof to);
 }
 
-/* What lies in one plane across an axis is as near as it is to the foot of the point in that plane.
- * True: p has been moved there, and a and b have become no more than their features. */
+/* Reduces features in one plane across an axis: their distances compare like those from the foot of
+ * the point in that plane. Returns true if p has been moved there, and a and b have been reduced to
+ * their features. */
 static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b[3][3],
                         ebpo_feature of_b)
 {
@@ -242,8 +244,8 @@ static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b
  * plane within the triangle, and by 16 u r. Everything below doubles these at least. Numbers whose
  * fourth powers leave the doubles are scaled first. */
 static const double huge_reach = 0x1p200, tiny_reach = 0x1p-200;
-/* From so many times the triangle's size on, errors that are relative to the greatest product tell
- * little. */
+/* Above this multiple of the triangle's size, errors relative to the greatest product are too wide.
+ */
 static const double far_ratio = 0x1p20;
 
 static inline double greater_of(double a, double b) { return a > b ? a : b; }
@@ -254,7 +256,7 @@ typedef struct relation {
     double corner[3][3]; /* relative to p */
     double edge[3][3];   /* corner k to k + 1 */
     double reach, size;  /* r and l */
-    /* corner k . edge k: how far p is behind corner k along its edge, times the edge's length */
+    /* corner k . edge k: distance of p behind corner k along its edge, times the edge's length */
     double along[3];
     double back[3]; /* corner k + 1 . edge k */
     double normal[3];
@@ -287,8 +289,8 @@ static void multiply_relation(relation *r)
     }
 }
 
-/* Distance to the line through edge i, p projecting between its ends: to corner plus a share of the
- * edge. */
+/* Returns the distance to the line through edge i, where p projects between its ends: to corner
+ * plus a share of the edge. */
 static double edge_distance(const relation *r, int i)
 {
     double length2 = ebpo_vec3_dot(r->edge[i], r->edge[i]),
@@ -323,8 +325,8 @@ static double plane_distance(const relation *r, double *error)
     return fabs(ebpo_vec3_dot(r->normal, r->corner[0])) / length;
 }
 
-/* The plane is never farther than the triangle; a plane of unknown tilt says nothing, but no point
- * of the triangle is farther from its edges than its height. */
+/* Bounds the distance. The plane is never farther than the triangle; a plane of unknown tilt gives
+ * no bound, but no point of the triangle is farther from its edges than its height. */
 static void bound_by_edges(const relation *r, double plane, double error, ebpo_distance_bounds *out)
 {
     double edges = edge_distance(r, 0), length = sqrt(ebpo_vec3_dot(r->normal, r->normal));
@@ -391,7 +393,7 @@ static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_di
     relation r;
     relate_to_point(q, (const double(*)[3])t, &r);
     if (!(r.reach > tiny_reach * 0x1p-100) || !(r.size > tiny_reach || r.size == 0)) {
-        /* Next to a point: only that much is known. */
+        /* Almost a point: nothing more is known. */
         *out = (ebpo_distance_bounds){
             0, ldexp(r.reach + 0x1p-1000, exponent) * (1 + 0x1p-50) + 0x1p-1074, EBPO_NEAR_UNKNOWN
         };
@@ -400,7 +402,7 @@ static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_di
     }
     multiply_relation(&r);
     bound_relation(&r, out);
-    /* Scaling up is exact, scaling down may have lost what lies below 2^-1074. */
+    /* Scaling up is exact, scaling down may have lost parts below 2^-1074. */
     out->feature = find_far_feature(p, triangle, NULL);
     out->lo = nextafter(ldexp(out->lo - 0x1p-1000, exponent), -INFINITY);
     out->lo = out->lo > 0 ? out->lo : 0;
@@ -489,7 +491,7 @@ static bool try_interior(nearest *n)
     return true;
 }
 
-/* Takes corner or edge when it is nearer than what was found (of equal ones: the corner). */
+/* Takes corner or edge when it is nearer than the current feature (of equal ones: the corner). */
 static void offer_feature(nearest *n, bool first, const mpz_t square, const mpz_t denominator,
                           ebpo_feature feature, bool *taken)
 {
@@ -647,7 +649,7 @@ static void unit_normal_by_integers(const double triangle[3][3], double normal[3
 /* --- double-double arithmetic first, then integers --- */
 
 /* Beyond these, products of four coordinates or their rounding errors would leave the doubles. */
-static const double most_reach = 0x1p120, least_size = 0x1p-120;
+static const double max_reach = 0x1p120, least_size = 0x1p-120;
 
 static bool in_pair_range(const double p[3], const double triangle[3][3])
 {
@@ -659,10 +661,10 @@ static bool in_pair_range(const double p[3], const double triangle[3][3])
             reach = r > reach ? r : reach;
             size = l > size ? l : size;
         }
-    return reach < most_reach && size > least_size;
+    return reach < max_reach && size > least_size;
 }
 
-/* Ziv's test. */
+/* Applies Ziv's test. */
 static bool rounds_certainly(const ebpo_measured *m, double *distance)
 {
     double error = m->error * m->distance.head;
@@ -672,8 +674,8 @@ static bool rounds_certainly(const ebpo_measured *m, double *distance)
     return m->error < 0x1p-56 && least == most;
 }
 
-/* A corner of a triangle that is far away: scaled, so that nothing overflows. What gets lost of
- * small coordinates is below 2^-1000 of the distance. */
+/* Computes the distance of a corner of a triangle that is far away: scaled, so that nothing
+ * overflows. The lost parts of small coordinates are below 2^-1000 of the distance. */
 static bool corner_by_pairs(const double p[3], const double triangle[3][3],
                             const ebpo_distance_bounds *bounds, ebpo_triangle_nearest *out)
 {
@@ -693,7 +695,7 @@ static bool corner_by_pairs(const double p[3], const double triangle[3][3],
     return true;
 }
 
-/* False: the arithmetic does not decide. *known: the normal (if it is wanted) is there. */
+/* Returns false if the arithmetic does not decide. *known: the normal (if requested) is set. */
 static bool nearest_by_pairs(const double p[3], const double triangle[3][3],
                              const ebpo_distance_bounds *bounds, double *normal, bool *known,
                              ebpo_triangle_nearest *out)

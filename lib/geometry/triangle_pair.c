@@ -1,9 +1,9 @@
-/* How two faces are related: apart, touching, crossing or coplanar; exact for every finite double.
+/* The relation of two faces: apart, touching, crossing or coplanar; exact for every finite double.
  *
  * Faces whose planes intersect in a line are turned so that one corner of each is alone on its side
  * of the other plane; two orientations then compare the ends of both faces on that line (Devillers
  * and Guigue, "Faster Triangle-Triangle Intersection Tests", 2002). Faces in one plane are compared
- * as figures in that plane, seen along an axis. A face without area is the segment between its
+ * as figures in that plane, projected along an axis. A face without area is the segment between its
  * least and greatest corners. Proofs: docs/develop/collision.md, "Kinds of pairs". */
 #include "core/strict_fp.h"
 
@@ -16,43 +16,44 @@
 #include "geometry/vec3.h"
 #include "geometry/predicates.h"
 
-/* --- figures in a plane, seen along an axis --- */
+/* --- figures in a plane, projected along an axis --- */
 
-/* Points of one plane, corners in turn; two are a segment, whose both sides are outer ones. */
-typedef struct figure {
+/* Points of one plane, corners in order; two points are a segment, whose both sides are outer ones.
+ */
+typedef struct metric {
     double corner[3][2];
     int corners;
-} figure;
+} metric;
 
-static figure seen_along(int axis, const double (*corner)[3], int corners)
+static metric seen_along(int axis, const double (*corner)[3], int corners)
 {
     const int to[2] = { axis == 2 ? 0 : axis + 1, axis == 0 ? 2 : axis - 1 };
-    figure f = { .corners = corners };
+    metric f = { .corners = corners };
     for (int i = 0; i < corners; i++)
         for (int k = 0; k < 2; k++)
             f.corner[i][k] = corner[i][to[k]];
     return f;
 }
 
-static int turn_of(const figure *f)
+static int turn_of(const metric *f)
 {
     return ebpo_orient2d(f->corner[0], f->corner[1], f->corner[2]);
 }
 
-/* An axis along which the corners are seen as a triangle; -1: they have no area. */
+/* Returns an axis along which the projected corners have an area; -1: they have no area. */
 static int axis_of(const double corner[3][3])
 {
     for (int k = 0; k < 3; k++) {
-        figure f = seen_along(k, corner, 3);
+        metric f = seen_along(k, corner, 3);
         if (turn_of(&f) != 0)
             return k;
     }
     return -1;
 }
 
-/* How an edge parts two figures: 2: the other one is strictly beyond it, 1: not strictly, 0: not.
- */
-static int parted_by(const double from[2], const double to[2], int outer, const figure *other)
+/* Returns how an edge separates two figures: 2: the other one is strictly beyond it, 1: not
+ * strictly, 0: not. */
+static int parted_by(const double from[2], const double to[2], int outer, const metric *other)
 {
     int parted = 2;
     for (int i = 0; i < other->corners; i++) {
@@ -64,7 +65,7 @@ static int parted_by(const double from[2], const double to[2], int outer, const 
     return parted;
 }
 
-static int parted_by_edges(const figure *f, const figure *other)
+static int parted_by_edges(const metric *f, const metric *other)
 {
     int most = 0, edges = f->corners == 3 ? 3 : 2, inner = f->corners == 3 ? turn_of(f) : 1;
     for (int i = 0; i < edges; i++) {
@@ -74,8 +75,8 @@ static int parted_by_edges(const figure *f, const figure *other)
     return most;
 }
 
-/* 2: no common point, 1: no common inner point, 0: neither. */
-static int figures_parted(const figure *f, const figure *g)
+/* Returns 2: no common point, 1: no common inner point, 0: neither. */
+static int metrics_parted(const metric *f, const metric *g)
 {
     int by_f = parted_by_edges(f, g), by_g = parted_by_edges(g, f);
     return by_f > by_g ? by_f : by_g;
@@ -107,7 +108,7 @@ static bool point_on_segment(const double p[3], const ends *s)
     return ebpo_point_on_triangle(p, s->at[0], s->at[1], s->at[1]);
 }
 
-/* Inner points of two segments meet in one point. */
+/* Returns true if the inner points of two segments have one point in common. */
 static bool segments_cross(const ends *s, const ends *t)
 {
     double corner[3][3];
@@ -118,7 +119,7 @@ static bool segments_cross(const ends *s, const ends *t)
     int axis = axis_of((const double(*)[3])corner);
     if (axis < 0)
         return false;
-    figure f = seen_along(axis, (const double(*)[3])s->at, 2),
+    metric f = seen_along(axis, (const double(*)[3])s->at, 2),
            g = seen_along(axis, (const double(*)[3])t->at, 2);
     int side[2][2];
     for (int i = 0; i < 2; i++) {
@@ -128,7 +129,7 @@ static bool segments_cross(const ends *s, const ends *t)
     return side[0][0] * side[0][1] < 0 && side[1][0] * side[1][1] < 0;
 }
 
-static bool segments_meet(const ends *s, const ends *t)
+static bool segments_intersect(const ends *s, const ends *t)
 {
     for (int i = 0; i < 2; i++)
         if (point_on_segment(s->at[i], t) || point_on_segment(t->at[i], s))
@@ -136,8 +137,8 @@ static bool segments_meet(const ends *s, const ends *t)
     return segments_cross(s, t);
 }
 
-/* The triangle has an area. */
-static bool segment_meets_triangle(const ends *s, const double t[3][3], int axis)
+/* Returns true if they intersect; the triangle has an area. */
+static bool segment_intersects_triangle(const ends *s, const double t[3][3], int axis)
 {
     int side[2], around[3];
     for (int i = 0; i < 2; i++)
@@ -145,8 +146,8 @@ static bool segment_meets_triangle(const ends *s, const double t[3][3], int axis
     if (side[0] * side[1] > 0)
         return false;
     if (side[0] == 0 && side[1] == 0 && !s->point) {
-        figure f = seen_along(axis, t, 3), g = seen_along(axis, (const double(*)[3])s->at, 2);
-        return figures_parted(&f, &g) != 2;
+        metric f = seen_along(axis, t, 3), g = seen_along(axis, (const double(*)[3])s->at, 2);
+        return metrics_parted(&f, &g) != 2;
     }
     for (int i = 0; i < 2; i++)
         if (side[i] == 0)
@@ -157,23 +158,23 @@ static bool segment_meets_triangle(const ends *s, const double t[3][3], int axis
     return left || (around[0] <= 0 && around[1] <= 0 && around[2] <= 0);
 }
 
-/* One face has no area, or both are in one plane. */
+/* Classifies a pair where one face has no area, or both are in one plane. */
 static ebpo_pair_kind classify_flat(const double a[3][3], const double b[3][3])
 {
     int axis_a = axis_of(a), axis_b = axis_of(b);
     if (axis_a >= 0 && axis_b >= 0) {
         static const ebpo_pair_kind kinds[] = { EBPO_PAIR_COPLANAR, EBPO_PAIR_TOUCHING,
                                                 EBPO_PAIR_APART };
-        figure f = seen_along(axis_a, a, 3), g = seen_along(axis_a, b, 3);
-        return kinds[figures_parted(&f, &g)];
+        metric f = seen_along(axis_a, a, 3), g = seen_along(axis_a, b, 3);
+        return kinds[metrics_parted(&f, &g)];
     }
     ends s = ends_of(axis_a < 0 ? a : b);
     bool meet;
     if (axis_a < 0 && axis_b < 0) {
         ends t = ends_of(b);
-        meet = segments_meet(&s, &t);
+        meet = segments_intersect(&s, &t);
     } else {
-        meet = segment_meets_triangle(&s, axis_a < 0 ? b : a, axis_a < 0 ? axis_b : axis_a);
+        meet = segment_intersects_triangle(&s, axis_a < 0 ? b : a, axis_a < 0 ? axis_b : axis_a);
     }
     return meet ? EBPO_PAIR_TOUCHING : EBPO_PAIR_APART;
 }
@@ -202,15 +203,15 @@ static bool one_side(const int side[3])
 
 static bool within_plane(const int side[3]) { return !(side[0] | side[1] | side[2]); }
 
-/* Only where two corners are on one strict side and the third is not beyond: the face touches. */
+/* Returns true if corners are on both strict sides; otherwise the face at most touches. */
 static bool has_both(const int side[3])
 {
     bool above = side[0] > 0 || side[1] > 0 || side[2] > 0;
     return above && (side[0] < 0 || side[1] < 0 || side[2] < 0);
 }
 
-/* The corner that is alone on a strict side, the others being on the other one or in the plane; or
- * in the plane, while both others are on one side. Prefers the positive side. */
+/* Returns the corner that is alone on a strict side, the others being on the other side or in the
+ * plane; or alone in the plane, with both others on one side. Prefers the positive side. */
 static int corner_alone(const int side[3])
 {
     static const int order[] = { 1, -1, 0 };
@@ -223,7 +224,8 @@ static int corner_alone(const int side[3])
     return 0;
 }
 
-/* Turns the corners so that the one that is alone comes first. True: it is not above the others. */
+/* Turns the corners so that the one that is alone comes first. Returns true if it is not above the
+ * others. */
 static bool turn_corners(const int side[3], int corner[3])
 {
     corner[0] = corner_alone(side);

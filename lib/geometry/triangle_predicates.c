@@ -1,13 +1,13 @@
-/* Predicates on a triangle, made of orientation predicates alone, so that they are exact.
+/* Predicates on a triangle, built only from orientation predicates, so that they are exact.
  *
  * Crossings of a segment along an axis: both ends are shifted by infinitely small amounts, so that
  * no case is degenerate (Edelsbrunner and Muecke, "Simulation of Simplicity", 1990).
  *
- * Boxes: a triangle and a box are apart exactly when they are so along one of 13 axes: those of the
- * box, the triangle's normal, the products of an axis of the box with an edge of the triangle
- * (separating axes; Gottschalk, Lin and Manocha 1996). The last nine are tests in the plane: along
- * each axis of the box the triangle becomes a triangle and the box a rectangle, and the rectangle
- * is beyond an edge. */
+ * Boxes: a triangle and a box are disjoint exactly when they are separated along one of 13 axes:
+ * those of the box, the triangle's normal, the products of an axis of the box with an edge of the
+ * triangle (separating axes; Gottschalk, Lin and Manocha 1996). The last nine are tests in the
+ * plane: projected along each axis of the box, the triangle is a triangle and the box a rectangle,
+ * and the rectangle is beyond an edge. */
 #include "core/strict_fp.h"
 
 #include "geometry/predicates.h"
@@ -31,9 +31,9 @@ bool ebpo_zero_area(const double a[3], const double b[3], const double c[3])
            ebpo_normal_sign(1, a, b, c) == 0;
 }
 
-/* Side of the shifted point p of the line a-b, all seen along `axis`, positive to the left; 0 only
- * when a and b coincide in this view. The orientation changes by (a_v - b_v) d_u + (b_u - a_u) d_v;
- * of u and v the lower axis has the larger shift. */
+/* Returns the side of the shifted point p relative to the line a-b, all projected along `axis`,
+ * positive to the left; 0 only when a and b coincide in this projection. The orientation changes by
+ * (a_v - b_v) d_u + (b_u - a_u) d_v; of u and v the lower axis has the larger shift. */
 static int shifted_side2d(int axis, const double a[3], const double b[3], const double p[3])
 {
     int sign = ebpo_normal_sign(axis, a, b, p);
@@ -46,8 +46,8 @@ static int shifted_side2d(int axis, const double a[3], const double b[3], const 
     return by_v != 0 ? by_v : by_u;
 }
 
-/* Side of the shifted point p of the plane of a, b, c; the orientation changes by normal . (d0, d1,
- * d2). */
+/* Returns the side of the shifted point p relative to the plane of a, b, c; the orientation changes
+ * by normal . (d0, d1, d2). */
 static int shifted_side3d(const double a[3], const double b[3], const double c[3],
                           const double p[3])
 {
@@ -57,8 +57,8 @@ static int shifted_side3d(const double a[3], const double b[3], const double c[3
     return sign;
 }
 
-/* Rejects by coordinates. The shift goes up on every axis, so an end equal to the face's maximum is
- * beyond it. */
+/* Rejects by coordinates. The shift is positive on every axis, so an end equal to the face's
+ * maximum is beyond it. */
 static inline bool misses_bounds(const double from[3], double to, int axis, const double a[3],
                                  const double b[3], const double c[3])
 {
@@ -74,8 +74,8 @@ int ebpo_axis_crossing(const double from[3], double to, int axis, const double a
 {
     if (!(from[axis] < to) || misses_bounds(from, to, axis, a, b, c))
         return 0;
-    /* Against the axis the projection is inside when the face turns one way around the point:
-     * `turn` is the sign of the normal along the axis. Faces seen edge-on never turn one way. */
+    /* In the projection against the axis, the point is inside when all edges turn the same way
+     * around it: `turn` is the sign of the normal along the axis. Faces seen edge-on never do. */
     int turn = shifted_side2d(axis, a, b, from);
     if (turn == 0 || shifted_side2d(axis, b, c, from) != turn ||
         shifted_side2d(axis, c, a, from) != turn)
@@ -91,7 +91,7 @@ int ebpo_axis_crossing(const double from[3], double to, int axis, const double a
     return -turn;
 }
 
-/* True when p lies on the closed segment a-b; it may be a point. */
+/* Returns true when p is on the closed segment a-b, which may be a point. */
 static bool point_on_segment(const double p[3], const double a[3], const double b[3])
 {
     for (int k = 0; k < 3; k++)
@@ -140,8 +140,8 @@ static shadow shadow_along(int axis, const double triangle[3][3], const double m
     return s;
 }
 
-/* True when the rectangle lies wholly to the side (1: left, -1: right) of the line from a to b,
- * which it does not touch. */
+/* Returns true when the rectangle is entirely on the side (1: left, -1: right) of the line from a
+ * to b, without touching it. */
 static bool rectangle_on_side(const shadow *s, const double a[2], const double b[2], int side)
 {
     /* The corner that is farthest to the other side. */
@@ -162,7 +162,8 @@ static bool shadows_apart(const shadow *s)
     return false;
 }
 
-/* `normal`: signs of the normal's components. */
+/* Returns true if the triangle's plane separates them; `normal`: signs of the normal's components.
+ */
 static bool apart_from_plane(const double triangle[3][3], const double min[3], const double max[3],
                              const int normal[3])
 {
@@ -175,7 +176,8 @@ static bool apart_from_plane(const double triangle[3][3], const double min[3], c
            ebpo_orient3d(triangle[0], triangle[1], triangle[2], highest) < 0;
 }
 
-bool ebpo_triangle_meets_box(const double triangle[3][3], const double min[3], const double max[3])
+bool ebpo_triangle_intersects_box(const double triangle[3][3], const double min[3],
+                                  const double max[3])
 {
     int below[3] = { 0 }, above[3] = { 0 }, normal[3];
     bool corner_within[3] = { true, true, true };

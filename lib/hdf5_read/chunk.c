@@ -1,10 +1,10 @@
-/* Chunks as HDF5 stores them. A pipeline is a row of the table below: the HDF5 filters that it is
- * made of, and the functions that encode and decode. All else (shuffle before compression, the
- * fletcher32 checksum behind it, which filters of a file are which pipeline, which ones a new array
- * gets) follows from its row: a new codec is a number in chunk.h, a row, and its functions in a
- * file of its own, as zstd_codec.c. Deflate is two calls of zlib, and here. What is written is bit
- * for bit what libhdf5's own filters write. Source: docs of HDF5 ("HDF5 filters"),
- * format-spec/README.md, section 2. */
+/* Chunks as HDF5 stores them. A pipeline is a row of the table below: its HDF5 filters, and the
+ * functions that encode and decode. The row determines everything else: shuffle before compression,
+ * the fletcher32 checksum after it, the pipeline of a file's filters, the filters of a new array. A
+ * new codec needs a number in chunk.h, a row, and its functions in a separate file, as
+ * zstd_codec.c. Deflate is two calls of zlib, in this file. The output is bit for bit that of
+ * libhdf5's own filters. Source: docs of HDF5 ("HDF5 filters"), format-spec/README.md, section 2.
+ */
 #include <string.h>
 #include <zlib.h>
 
@@ -22,8 +22,8 @@ void ebpo_shuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t 
             out[k * count + i] = in[i * element_size + k];
 }
 
-/* The usual element sizes byte by byte but element after element, which compilers turn into vector
- * code. */
+/* Restores elements of common sizes, byte by byte but element after element, which compilers
+ * vectorise. */
 static void unshuffle_two(const uint8_t *in, size_t count, uint8_t *out)
 {
     for (size_t i = 0; i < count; i++) {
@@ -203,7 +203,7 @@ static ebpo_chunk_blocks blocks_of_planes(size_t raw_bytes, size_t element_size)
     return b;
 }
 
-/* Those of streams that are neither empty nor all of the chunk. */
+/* Returns the ends of streams that are neither empty nor the whole chunk. */
 static ebpo_chunk_blocks blocks_of_streams(size_t raw_bytes, const size_t *ends, int count)
 {
     ebpo_chunk_blocks b = { .count = 0 };

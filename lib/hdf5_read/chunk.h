@@ -1,6 +1,6 @@
 /* Chunks of arrays: their bytes as HDF5 stores them (shuffle, compression, checksum), bit for bit
- * what libhdf5's own filters read and write; the shape of an array, and where a chunk lies in its
- * file. */
+ * what libhdf5's own filters read and write; the shape of an array, and the offset of a chunk in
+ * its file. */
 #ifndef EBPO_HDF5_READ_CHUNK_H
 #define EBPO_HDF5_READ_CHUNK_H
 
@@ -13,16 +13,16 @@
 #include "hdf5_read/codec.h"
 
 /* Filter pipelines; the first ones are those of ebpo_codec, in its order. Shuffle comes first where
- * elements have more than one byte (but not in the last two). */
+ * elements have more than one byte (but not in the last two pipelines). */
 typedef enum ebpo_pipeline {
     EBPO_PIPELINE_ZSTD,     /* shuffle, zstd frame with content size and checksum */
     EBPO_PIPELINE_DEFLATE,  /* shuffle, zlib stream, fletcher32 */
     EBPO_PIPELINE_CHECKSUM, /* fletcher32 */
-    EBPO_PIPELINE_BARE,     /* nothing: what `h5repack -f NONE` leaves; read, never written */
+    EBPO_PIPELINE_BARE,     /* no filters, as `h5repack -f NONE` writes; read, never written */
     EBPO_PIPELINE_COUNT
 } ebpo_pipeline;
 
-/* HDF5's numbers of filters. */
+/* HDF5 filter numbers. */
 enum {
     EBPO_FILTER_DEFLATE = 1,
     EBPO_FILTER_SHUFFLE = 2,
@@ -30,51 +30,51 @@ enum {
     EBPO_FILTER_ZSTD = 32015
 };
 
-/* What a pipeline is made of: a row of the table in chunk.c. */
+/* The properties of a pipeline: a row of the table in chunk.c. */
 typedef struct ebpo_pipeline_facts {
-    unsigned filter[2]; /* in the order in which they are applied, without shuffle */
+    unsigned filter[2]; /* in the order of application, excluding shuffle */
     int filter_count;
-    int level;       /* the usual one, which headers state; 0: it has none */
-    int level_most;  /* the greatest that may be asked for */
-    bool compresses; /* and elements of several bytes are shuffled before */
-    bool fletcher;   /* a fletcher32 checksum comes last */
+    int level;       /* default level, which headers state; 0: no levels */
+    int level_max;   /* greatest allowed level */
+    bool compresses; /* true if it compresses; elements of several bytes are then shuffled first */
+    bool fletcher;   /* true if a fletcher32 checksum comes last */
 } ebpo_pipeline_facts;
 
 const ebpo_pipeline_facts *ebpo_pipeline_facts_of(ebpo_pipeline pipeline);
-/* Which pipeline these filters are, shuffle among them; false: none. Shuffled elements of one byte
- * are what they were: h5repack shuffles all arrays alike. */
+/* Finds the pipeline of these filters, which may include shuffle; returns false if there is none.
+ * Shuffle does not change elements of one byte, and h5repack shuffles all arrays. */
 bool ebpo_pipeline_of_filters(const unsigned *filters, int count, unsigned element_size,
                               ebpo_pipeline *pipeline);
 
 void ebpo_chunk_coder_clear(ebpo_chunk_coder *coder);
 
 /* Encodes raw_bytes (a multiple of element_size) into `out` of ebpo_chunk_bound(raw_bytes) bytes.
- * `level` 0: the default, which in zstd goes by the chunk's size. */
+ * `level` 0: the default, which for zstd depends on the chunk's size. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,
                                             int level, size_t element_size, const uint8_t *raw,
                                             size_t raw_bytes, uint8_t *out, size_t *out_bytes);
 
-/* The same of single bytes that are `count` streams, one behind the other up to ends[i] (ascending,
- * some may be empty), and a rest: zstd tells each by itself. */
+/* Same, for single bytes that form `count` consecutive streams, which end at ends[i] (ascending,
+ * some may be empty), and a rest: zstd compresses each separately. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_encode_streams(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,
                                                     int level, const uint8_t *raw, size_t raw_bytes,
                                                     const size_t *ends, int count, uint8_t *out,
                                                     size_t *out_bytes);
 
-/* Decodes into exactly raw_bytes. On EBPO_E_FORMAT *why is a static string that says what is wrong.
- * Safe on any bytes. */
+/* Decodes into exactly raw_bytes. On EBPO_E_FORMAT *why is a static string with the reason. Safe on
+ * any bytes. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_decode(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,
                                             size_t element_size, const uint8_t *stored,
                                             size_t stored_bytes, uint8_t *raw, size_t raw_bytes,
                                             const char **why);
 
-/* HDF5's shuffle: byte k of every element, for k = 0, 1, ...; bytes is a multiple of element_size.
- */
+/* Applies HDF5's shuffle: byte k of every element, for k = 0, 1, ...; bytes is a multiple of
+ * element_size. */
 void ebpo_shuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t *out);
 void ebpo_unshuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t *out);
 
-/* HDF5's fletcher32: over big-endian 16-bit words, both sums kept modulo 65535 (never reduced to 0
- * from a positive sum). */
+/* Returns HDF5's fletcher32: over big-endian 16-bit words, both sums kept modulo 65535 (never
+ * reduced to 0 from a positive sum). */
 uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes);
 
 /* An integer array: [rows] when cols is 0, else [rows][cols]; chunks of chunk_rows rows. */
@@ -87,14 +87,14 @@ typedef struct ebpo_shape {
     ebpo_pipeline pipeline;
 } ebpo_shape;
 
-/* Where a chunk lies in the file, as stored. */
-typedef struct ebpo_chunk_place {
+/* The offset and size of a stored chunk in the file. */
+typedef struct ebpo_chunk_location {
     uint64_t address;
     uint32_t bytes;
-} ebpo_chunk_place;
+} ebpo_chunk_location;
 
-/* Rows of a chunk: the power of two that fills up to 64 KiB, or all rows when there are fewer. rows
- * > 0. */
+/* Returns the rows of a chunk: the power of two that fills up to 64 KiB, or all rows when there are
+ * fewer. rows > 0. */
 static inline uint32_t ebpo_full_chunk_rows(uint64_t rows, uint32_t cols, uint32_t element_size)
 {
     uint32_t row = element_size * (cols ? cols : 1), full = 1;

@@ -1,38 +1,38 @@
-/* What a codec of chunks is given, and the codecs that have files of their own. The table of all is
- * in chunk.c. */
+/* The interface of chunk codecs, and the codecs in separate files. The table of all codecs is in
+ * chunk.c. */
 #ifndef EBPO_HDF5_READ_CODEC_H
 #define EBPO_HDF5_READ_CODEC_H
 
 #include <ebpo/base.h>
 
 enum {
-    EBPO_CHUNK_BYTES_MAX = 65536, /* of one chunk before compression */
-    EBPO_ZSTD_LEVEL = 3,          /* of small chunks; what headers state */
+    EBPO_CHUNK_BYTES_MAX = 65536, /* bytes of one chunk before compression */
+    EBPO_ZSTD_LEVEL = 3,          /* for small chunks; stated in headers */
     EBPO_DEFLATE_LEVEL = 6
 };
 
-/* Compression state and scratch of one thread; zero-initialise, clear when done. */
+/* Compression state and scratch of one thread; zero-initialise it, clear it when done. */
 typedef struct ebpo_chunk_coder {
     void *zstd_out, *zstd_in;
     uint8_t scratch[EBPO_CHUNK_BYTES_MAX];
 } ebpo_chunk_coder;
 
-/* Bytes that an encoded chunk of `raw_bytes` <= EBPO_CHUNK_BYTES_MAX can have at most, in any
- * pipeline: the format's number, above what zlib and zstd say of themselves (at most a 256th and 68
- * bytes more than the data), so that it does not change with them. */
+/* Returns the most bytes of an encoded chunk of `raw_bytes` <= EBPO_CHUNK_BYTES_MAX, in any
+ * pipeline. The format fixes this bound above those of zlib and zstd (at most a 256th and 68 bytes
+ * more than the data), so that it does not change with them. */
 static inline size_t ebpo_chunk_bound(size_t raw_bytes)
 {
     return raw_bytes + raw_bytes / 256 + 1024;
 }
 
-/* Where blocks end before the chunk does: at most one for each byte of the widest element. */
+/* Ends of blocks before the end of the chunk: at most one for each byte of the widest element. */
 typedef struct ebpo_chunk_blocks {
     size_t end[8];
     int count;
 } ebpo_chunk_blocks;
 
-/* As a row of the table in chunk.c has them: `level` 0 is the default, `out` has room for
- * ebpo_chunk_bound(raw_bytes); `*why` as ebpo_chunk_decode has it. */
+/* Encodes or decodes for a row of the table in chunk.c: `level` 0 is the default, `out` holds
+ * ebpo_chunk_bound(raw_bytes) bytes; `*why` as in ebpo_chunk_decode. */
 EBPO_MUST_USE ebpo_status ebpo_zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *raw,
                                            size_t raw_bytes, const ebpo_chunk_blocks *b,
                                            uint8_t *out, size_t *out_bytes);
@@ -41,14 +41,14 @@ EBPO_MUST_USE ebpo_status ebpo_zstd_decode(ebpo_chunk_coder *coder, const uint8_
                                            const char **why);
 void ebpo_zstd_coder_clear(ebpo_chunk_coder *coder);
 
-/* What is wrong, or NULL: a bit is set that RFC 8878 wants to be 0 and zstd, of most versions,
- * ignores (bit 4 of the frame's descriptor, and the two lowest of the modes of each section of
- * sequences); a block repeats its byte once, which zstd writes as it is. NULL as well where the
- * frame cannot be followed, which decoding tells. */
+/* Returns an error text, or NULL. Faults: a bit is set that RFC 8878 requires to be 0 and most
+ * versions of zstd ignore (bit 4 of the frame's descriptor, and the two lowest of the modes of each
+ * section of sequences); a block repeats its byte once, which zstd writes as a raw byte. Also
+ * returns NULL where the frame cannot be parsed; decoding reports that. */
 const char *ebpo_zstd_fault(const uint8_t *frame, size_t bytes);
 
-/* Returns true if a frame has a checksum of its content: zstd decodes frames without one as well,
- * and does not notice damage then. RFC 8878, 3.1.1. */
+/* Returns true if a frame has a checksum of its content: zstd decodes frames without one too, and
+ * does not detect damage then. RFC 8878, 3.1.1. */
 bool ebpo_zstd_has_checksum(const uint8_t *frame, size_t bytes);
 
 #endif

@@ -1,5 +1,5 @@
-/* The codings of numbers of format-spec/README.md (section "Codings"): differences to the value
- * before, wrapping, as zigzag; corners of faces by the number of vertices seen; integers of fewer
+/* Number codings of format-spec/README.md, section "Codings": wrapping differences to the value
+ * before, as zigzag; corners of faces relative to the number of vertices seen; integers of fewer
  * bytes. Encoding and decoding are exact inverses for every bit pattern; floats are coded as
  * integers of the same order. Files are little-endian. Pure functions. */
 #include "hdf5_read/coding.h"
@@ -165,7 +165,7 @@ static uint64_t sortable_bits(uint64_t bits, size_t size)
     return size == 4 ? ebpo_float_order32((uint32_t)bits) : ebpo_float_order64(bits);
 }
 
-/* The difference as a number of `size` bytes: its sign is that of its highest bit. */
+/* Returns the zigzag code of a difference of `size` bytes: its highest bit is its sign. */
 static uint64_t zigzag_of(uint64_t difference, size_t size)
 {
     unsigned unused = 64 - 8 * (unsigned)size;

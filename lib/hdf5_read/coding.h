@@ -1,6 +1,6 @@
-/* Number codings of format-spec/README.md, section "Codings": what turns arrays into small numbers
- * before compression. All are exact inverses of each other for every bit pattern. Arrays in files
- * are little-endian; `file` pointers need no alignment. Pure functions, any thread. */
+/* Number codings of format-spec/README.md, section "Codings", which turn arrays into small numbers
+ * before compression. Encoding and decoding are exact inverses for every bit pattern. Arrays in
+ * files are little-endian; `file` pointers need no alignment. Pure functions, any thread. */
 #ifndef EBPO_HDF5_READ_CODING_H
 #define EBPO_HDF5_READ_CODING_H
 
@@ -13,7 +13,7 @@ static inline uint32_t ebpo_unzigzag32(uint32_t v) { return (v >> 1) ^ (0u - (v 
 static inline uint64_t ebpo_zigzag64(uint64_t v) { return (v << 1) ^ (UINT64_C(0) - (v >> 63)); }
 static inline uint64_t ebpo_unzigzag64(uint64_t v) { return (v >> 1) ^ (UINT64_C(0) - (v & 1)); }
 
-/* Bits of a float to an integer of the same order, and back: an involution. */
+/* Converts the bits of a float to an integer of the same order, and back: an involution. */
 static inline uint32_t ebpo_float_order32(uint32_t bits)
 {
     return bits ^ ((0u - (bits >> 31)) & UINT32_C(0x7fffffff));
@@ -23,34 +23,36 @@ static inline uint64_t ebpo_float_order64(uint64_t bits)
     return bits ^ ((UINT64_C(0) - (bits >> 63)) & UINT64_C(0x7fffffffffffffff));
 }
 
-/* Points: [rows][3]; each component's difference to the row before (0 before the first), wrapping,
- * zigzag. */
+/* Encodes points: [rows][3]; each component's difference to the row before (0 before the first),
+ * wrapping, zigzag. */
 void ebpo_points32_encode(const float *xyz, uint64_t rows, uint8_t *file);
 void ebpo_points32_decode(const uint8_t *file, uint64_t rows, float *xyz);
 void ebpo_points64_encode(const double *xyz, uint64_t rows, uint8_t *file);
 void ebpo_points64_decode(const uint8_t *file, uint64_t rows, double *xyz);
 
-/* Numbers: difference to the one before (0 before the first), wrapping, zigzag. */
+/* Encodes numbers: difference to the number before (0 before the first), wrapping, zigzag. */
 void ebpo_numbers_encode(const uint32_t *numbers, uint64_t rows, uint8_t *file);
 void ebpo_numbers_decode(const uint8_t *file, uint64_t rows, uint32_t *numbers);
 
-/* Columns: [rows][cols] of unsigned integers of 1, 2, 4 or 8 bytes, in the machine's byte order; in
- * `file` column after column, of each value the difference to the one before (0 before the first),
- * wrapping, zigzag. `floats`: the values are bits of floats (4 or 8 bytes), as integers that sort
- * as these do. */
+/* Encodes columns: [rows][cols] of unsigned integers of 1, 2, 4 or 8 bytes, in the machine's byte
+ * order. `file` holds column after column; each value is the difference to the value before (0
+ * before the first), wrapping, zigzag. `floats`: the values are bits of floats (4 or 8 bytes),
+ * converted to integers of the same order. */
 void ebpo_columns_encode(const void *values, size_t size, bool floats, uint64_t rows, uint32_t cols,
                          uint8_t *file);
 void ebpo_columns_decode(const uint8_t *file, size_t size, bool floats, uint64_t rows,
                          uint32_t cols, void *values);
 
-/* Corners of faces, [rows][3], by the number `*seen` of vertices used so far: 0 stands for vertex
- * *seen (which is then seen), k > 0 for *seen - k. False (with *seen as far as it got) when a
- * corner names a vertex beyond the next new one; or, decoding, a vertex below 0. */
+/* Encodes corners of faces, [rows][3], relative to the number `*seen` of vertices used so far: 0
+ * stands for vertex *seen (which is then seen), k > 0 for *seen - k. Returns false (with *seen at
+ * that corner) when a corner names a vertex beyond the next new one; or, when decoding, a vertex
+ * below 0. */
 bool ebpo_corners_encode(const uint32_t *faces, uint64_t rows, uint64_t *seen, uint8_t *file);
 bool ebpo_corners_decode(const uint8_t *file, uint64_t rows, uint64_t *seen, uint32_t *faces);
 
-/* Little-endian integers of `file_size` bytes from and to integers of `size` bytes (1, 2, 4, 8);
- * file_size <= size, and widening is signed or not. The caller has checked that the values fit. */
+/* Converts little-endian integers of `file_size` bytes from and to integers of `size` bytes (1, 2,
+ * 4, 8); file_size <= size, and widening is signed or not. The caller has checked that the values
+ * fit. */
 void ebpo_integers_encode(const void *values, size_t size, uint64_t rows, size_t file_size,
                           uint8_t *file);
 void ebpo_integers_decode(const uint8_t *file, size_t file_size, bool is_signed, uint64_t rows,

@@ -1,8 +1,8 @@
-/* The coding "gates" of format-spec/README.md, section 7. Faces follow each other across edges: of
- * each face is written across which open edge it lies (its gate), of the newest ones, and which
- * vertex is its third. Edges that faces left open are kept in a short list, the newest last.
- * Encoder and decoder keep the same list, so the coding is an inverse for all codes; a decoder
- * takes any bytes and refuses those of no faces. Time is in proportion to the number of faces. */
+/* The coding "gates" of format-spec/README.md, section 7. Faces follow each other across edges:
+ * each face is written as its gate, which is one of the newest open edges, and its third vertex.
+ * Open edges of earlier faces are kept in a short list, the newest last. Encoder and decoder keep
+ * the same list, so the coding is invertible for all codes; the decoder accepts any bytes and
+ * rejects those that represent no faces. Time is proportional to the number of faces. */
 #include "hdf5_read/face_gates.h"
 
 #include <string.h>
@@ -10,15 +10,21 @@
 #include "core/endian.h"
 #include "hdf5_read/chunk.h"
 
-enum { OPEN_MOST = 64, NEAR = 32, ROOM = 4 * OPEN_MOST, FACE_MOST = 3 /* that a face opens */ };
-enum { IS_NEW, IS_LEFT, IS_RIGHT, BY_NUMBER, AT_OPEN }; /* corners beyond an edge */
-enum { LOW_END = 224, TWO_BYTES_END = 240 };            /* of what a byte of `low` is by itself */
-enum { AS_CODES = 1 };                                  /* first byte of a chunk without streams */
+enum {
+    OPEN_MAX = 64,
+    NEAR = 32,
+    SPACE = 4 * OPEN_MAX,
+    FACE_MAX = 3 /* edges that a face opens */
+};
+enum { IS_NEW, IS_LEFT, IS_RIGHT, BY_NUMBER, AT_OPEN }; /* kinds of corners beyond an edge */
+/* Ends of the values of a byte of `low` with one byte, and with two. */
+enum { LOW_END = 224, TWO_BYTES_END = 240 };
+enum { AS_CODES = 1 }; /* first byte of a chunk without streams */
 
 /* Open edges, newest last: (a, b) where a face on the other side would run from a to b. Vertices
- * are counted from the first one that is new in the chunk, modulo 2^32: codes say no more. */
+ * are counted from the first new one of the chunk, modulo 2^32, as in codes. */
 typedef struct open_edges {
-    uint64_t edge[ROOM];
+    uint64_t edge[SPACE];
     uint32_t begin, end;
     uint32_t seen;
 } open_edges;
@@ -29,10 +35,10 @@ static uint32_t edge_to(uint64_t e) { return (uint32_t)(e >> 32); }
 
 static void start_edges(open_edges *o) { o->begin = o->end = o->seen = 0; }
 
-/* Before each face: the list slides back to the front of its room now and then. */
-static void make_room(open_edges *o)
+/* Moves the list back to the front of its array from time to time; called before each face. */
+static void reserve_space(open_edges *o)
 {
-    if (o->end + FACE_MOST <= ROOM)
+    if (o->end + FACE_MAX <= SPACE)
         return;
     o->end -= o->begin;
     memmove(o->edge, o->edge + o->begin, o->end * sizeof *o->edge);
@@ -42,7 +48,7 @@ static void make_room(open_edges *o)
 static void push_edge(open_edges *o, uint64_t e)
 {
     o->edge[o->end++] = e;
-    o->begin += o->end - o->begin > OPEN_MOST;
+    o->begin += o->end - o->begin > OPEN_MAX;
 }
 
 static void drop_edge(open_edges *o, uint32_t at)
@@ -52,7 +58,7 @@ static void drop_edge(open_edges *o, uint32_t at)
         o->edge[at] = o->edge[at + 1];
 }
 
-/* The newest that starts or ends at v; o->end: none. */
+/* Returns the newest edge that starts or ends at v; o->end: none. */
 static uint32_t find_starting(const open_edges *o, uint32_t v)
 {
     for (uint32_t i = o->end; i > o->begin; i--)
@@ -69,7 +75,7 @@ static uint32_t find_ending(const open_edges *o, uint32_t v)
     return o->end;
 }
 
-/* Eight at a time, since as a rule none is. */
+/* Compares eight edges at a time, because usually none is equal. */
 static bool any_of_eight(const uint64_t *edges, uint64_t wanted)
 {
     bool any = false;
@@ -78,8 +84,8 @@ static bool any_of_eight(const uint64_t *edges, uint64_t wanted)
     return any;
 }
 
-/* Side from a to b of a face: closes that edge if it is among the newest, else opens the other
- * way's. */
+/* Passes the side of a face from a to b: closes that edge if it is among the newest, else opens the
+ * reverse edge. */
 static void pass_edge(open_edges *o, uint32_t a, uint32_t b)
 {
     uint64_t wanted = edge_of(a, b);
@@ -100,7 +106,7 @@ static void open_all(open_edges *o, const uint32_t *face)
         push_edge(o, edge_of(face[(k + 1) % 3], face[k]));
 }
 
-/* What is open after face (a, b, c) across (a, b), which is open no longer. */
+/* Updates the open edges after face (a, b, c) across (a, b), which is open no longer. */
 static void go_through(open_edges *o, uint32_t kind, uint32_t at, uint32_t a, uint32_t b,
                        uint32_t c)
 {
@@ -138,7 +144,7 @@ static void put_number(writing *w, uint32_t number)
     }
 }
 
-/* Which open edge is a side of the face, and from which corner on; o->end: none. */
+/* Returns the open edge that is a side of the face, and its first corner; o->end: none. */
 static uint32_t gate_of(const open_edges *o, const uint32_t *face, int *first)
 {
     uint64_t side[3];
@@ -153,7 +159,7 @@ static uint32_t gate_of(const open_edges *o, const uint32_t *face, int *first)
     return o->end;
 }
 
-/* Which corner beyond the edge c is; where its edge is in *at. */
+/* Returns the kind of corner c beyond the edge; *at is the position of its edge. */
 static uint32_t kind_of(const open_edges *o, uint32_t a, uint32_t b, uint32_t c, uint32_t *at)
 {
     if (c == o->seen)
@@ -172,7 +178,7 @@ static void write_face(writing *w, const uint32_t *code, const uint32_t *face)
 {
     open_edges *o = &w->open;
     int k = 0;
-    make_room(o);
+    reserve_space(o);
     uint32_t at = gate_of(o, face, &k);
     *w->gate++ = (uint8_t)(o->end - at);
     if (at == o->end) {
@@ -190,7 +196,7 @@ static void write_face(writing *w, const uint32_t *code, const uint32_t *face)
     go_through(o, kind, at, a, b, c);
 }
 
-/* Byte 0 of all codes, then bytes 1, ... */
+/* Writes byte 0 of all codes, then bytes 1, ... */
 static void write_codes(const uint8_t *codes, uint32_t rows, uint8_t *out,
                         size_t ends[EBPO_GATES_ENDS])
 {
@@ -201,7 +207,8 @@ static void write_codes(const uint8_t *codes, uint32_t rows, uint8_t *out,
         ends[i] = 1 + (i + 1) * plane;
 }
 
-/* `third` and what follows are built where they cannot be in each other's way, then moved up. */
+/* Moves `third` and the following streams together; they were built at positions where they cannot
+ * overlap. */
 static void join_streams(const writing *w, uint32_t rows, uint8_t *out,
                          size_t ends[EBPO_GATES_ENDS])
 {
@@ -247,7 +254,7 @@ typedef struct reading {
     open_edges open;
 } reading;
 
-/* A vertex by its number; `low` is as long as is asked of it. */
+/* Reads a vertex by its number; `low` is long enough for all reads. */
 static bool get_vertex(reading *r, uint32_t seen, uint32_t *vertex)
 {
     uint32_t number = *r->low++;
@@ -325,7 +332,7 @@ static uint32_t put_codes(const uint32_t *face, uint32_t seen, uint8_t *codes)
     return seen;
 }
 
-/* Where streams begin follows from what those before them hold. */
+/* Finds the beginnings of streams, each of which follows from the content of the streams before. */
 static void find_streams(reading *r, const uint8_t *in, uint32_t rows)
 {
     size_t alone = 0, numbers = 0, bytes = (size_t)rows * EBPO_GATES_COLS;
@@ -365,7 +372,7 @@ bool ebpo_gates_decode(const uint8_t *in, uint32_t rows, uint8_t *codes)
     find_streams(&r, in, rows);
     for (uint32_t i = 0; i < rows; i++, codes += 12) {
         uint32_t face[3], gate = *r.gate++;
-        make_room(&r.open);
+        reserve_space(&r.open);
         if (gate ? !read_across(&r, gate, face) : !read_alone(&r, face))
             return false;
         r.open.seen = put_codes(face, r.open.seen, codes);

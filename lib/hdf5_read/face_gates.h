@@ -1,5 +1,5 @@
-/* The coding `gates` of format-spec/README.md, section 7: a chunk of high-water codes of faces,
- * written as how each face lies across an edge of faces before it. Pure functions, any thread. */
+/* The coding `gates` of format-spec/README.md, section 7: represents each face of a chunk of
+ * high-water codes by its position across an edge of earlier faces. Pure functions, any thread. */
 #ifndef EBPO_HDF5_READ_FACE_GATES_H
 #define EBPO_HDF5_READ_FACE_GATES_H
 
@@ -12,14 +12,14 @@ enum {
     EBPO_GATES_ENDS = 4   /* streams of a chunk, before its zeros */
 };
 
-/* `codes`: [rows][3] high-water codes (coding.h), little-endian, of faces that need not be the
- * first ones of the mesh. Fills `out`, of EBPO_GATES_COLS bytes for each face, and tells where each
- * stream ends in it. Any codes can be written. rows > 0. Time: in proportion to rows. */
+/* Encodes `codes`: [rows][3] high-water codes (coding.h), little-endian, of faces that need not be
+ * the first ones of the mesh. Fills `out`, EBPO_GATES_COLS bytes for each face, and sets the end of
+ * each stream in it. Any codes can be written. rows > 0. Time is proportional to rows. */
 void ebpo_gates_encode(const uint8_t *codes, uint32_t rows, uint8_t *out,
                        size_t ends[EBPO_GATES_ENDS]);
 
-/* The inverse, of any bytes. False when they are those of no faces. Numbers above `seen` come out
- * as codes above it, which ebpo_corners_decode refuses. */
+/* Decodes any bytes. Returns false when they represent no faces. Numbers above `seen` become codes
+ * above it, which ebpo_corners_decode rejects. */
 bool ebpo_gates_decode(const uint8_t *in, uint32_t rows, uint8_t *codes);
 
 #endif

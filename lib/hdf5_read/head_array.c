@@ -1,7 +1,7 @@
-/* Arrays: their shape, held to what the format fixes, and where their chunks are. Three of HDF5's
- * indexes of chunks are read (a single chunk, an implicit index, a fixed array with pages); each
- * chunk has to lie within the file and below the size that its filters can give. Source: HDF5 File
- * Format Specification 3.0, sections IV.A.2.i and VII; format-spec/README.md, section 2. */
+/* Reads arrays: checks their shape against the format, and finds their chunks. Three of HDF5's
+ * chunk indexes are read (a single chunk, an implicit index, a fixed array with pages); each chunk
+ * must be within the file and below the size that its filters can give. Source: HDF5 File Format
+ * Specification 3.0, sections IV.A.2.i and VII; format-spec/README.md, section 2. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,37 +15,38 @@
 
 typedef enum ebpo_head_index {
     EBPO_INDEX_SINGLE = 1, /* one chunk */
-    EBPO_INDEX_IMPLICIT,   /* one behind the other, set aside at once, without filters */
-    EBPO_INDEX_FIXED       /* a table of as many as there are */
+    EBPO_INDEX_IMPLICIT,   /* consecutive, allocated at once, without filters */
+    EBPO_INDEX_FIXED       /* a table of fixed size */
 } ebpo_head_index;
 
 typedef struct ebpo_head_layout {
-    unsigned rank;     /* of the chunks */
+    unsigned rank;     /* number of dimensions of the chunks */
     uint64_t chunk[3]; /* their size; the last is the element's */
     ebpo_head_index index;
-    unsigned page_bits; /* FIXED: two to this many chunks are a page */
+    unsigned page_bits; /* FIXED: a page has two to this many chunks */
     bool single_filtered;
     uint64_t single_bytes; /* SINGLE with filters */
     uint32_t single_mask;
-    uint64_t
-        address; /* of the chunk, the chunks, the table; EBPO_NO_ADDRESS: nothing was written */
+    uint64_t address; /* address of the chunk, the chunks, or the table; EBPO_NO_ADDRESS: nothing
+                       * was written */
 } ebpo_head_layout;
 
-/* What to look for. */
+/* The chunks to be found. */
 typedef struct ebpo_head_chunks {
     const ebpo_head_layout *layout;
     bool filtered;
-    uint64_t count, whole, bound; /* chunks; bytes of one before its filters, and at most after */
-    ebpo_chunk_place *place;      /* out: count of them */
-    uint64_t stored;              /* out: bytes in all */
-    uint64_t at;                  /* out: the chunk that is wrong; UINT64_MAX: none in particular */
+    uint64_t count, whole, bound; /* chunks; bytes of one before its filters, and the most after
+                                   * them */
+    ebpo_chunk_location *place;   /* out: `count` offsets and sizes */
+    uint64_t stored;              /* out: bytes of all chunks */
+    uint64_t at;                  /* out: the invalid chunk; UINT64_MAX: none in particular */
 } ebpo_head_chunks;
 
 static const char missing[] = "the chunk is missing", cut[] = "its description is cut short",
                   contradicts[] = "the array's index contradicts its shape or its filters",
-                  no_index[] = "there is no chunk index where one is expected",
+                  no_index[] = "no chunk index at the expected offset",
                   damaged[] = "the array's chunk index is damaged: the checksum differs",
-                  beyond[] = "the array's chunk index lies beyond the end of the file";
+                  beyond[] = "the array's chunk index is beyond the end of the file";
 
 static const char *read_chunked(ebpo_head_cursor *c, ebpo_head_layout *l, bool *foreign)
 {
@@ -54,7 +55,7 @@ static const char *read_chunked(ebpo_head_cursor *c, ebpo_head_layout *l, bool *
     if (c->cut)
         return cut;
     if (rank < 2 || rank > 3 || bytes < 1 || bytes > 8 || flags & ~(unsigned)SINGLE_FILTERED)
-        return "the array's chunks do not have the size that the format fixes";
+        return "the array's chunks do not have the size that the format requires";
     l->rank = rank - 1;
     for (unsigned i = 0; i < rank; i++)
         l->chunk[i] = ebpo_cursor_uint(c, bytes);
@@ -75,7 +76,7 @@ static const char *read_chunked(ebpo_head_cursor *c, ebpo_head_layout *l, bool *
     return c->cut ? cut : NULL;
 }
 
-/* What is wrong, or NULL. `*foreign`: not wrong, but of a kind that only libhdf5 reads. */
+/* Returns an error text, or NULL. `*foreign`: valid, but only libhdf5 reads it. */
 static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *foreign)
 {
     enum { CHUNKED = 2, VIRTUAL = 3 };
@@ -83,9 +84,9 @@ static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *fo
     *l = (ebpo_head_layout){ .address = EBPO_NO_ADDRESS };
     *foreign = version < 3 || version > 4;
     if (version < 3 || version > 4)
-        return "the array's layout is of a version that is not known";
+        return "the array's layout has an unknown version";
     if (kind == VIRTUAL)
-        return "the array is virtual: its values lie in other arrays, which are never looked for";
+        return "the array is virtual: its values are in other arrays, which are never read";
     *foreign = kind != CHUNKED || version == 3;
     if (kind != CHUNKED)
         return "the array is not stored in chunks";
@@ -94,7 +95,7 @@ static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *fo
     return "the array's chunks are listed in a tree without checksums";
 }
 
-/* Takes the next chunk's place over. */
+/* Stores the offset of the next chunk. */
 static const char *take_place(ebpo_head_chunks *t, uint64_t i, uint64_t file_bytes,
                               uint64_t address, uint64_t bytes, uint32_t mask)
 {
@@ -104,10 +105,10 @@ static const char *take_place(ebpo_head_chunks *t, uint64_t i, uint64_t file_byt
     if (mask != 0)
         return "the chunk was stored without its filters";
     if (bytes > t->bound)
-        return "the chunk is larger than it can be";
+        return "the chunk is larger than its filters allow";
     if (address > file_bytes || bytes > file_bytes - address)
-        return "the chunk lies beyond the end of the file";
-    t->place[i] = (ebpo_chunk_place){ address, (uint32_t)bytes };
+        return "the chunk is beyond the end of the file";
+    t->place[i] = (ebpo_chunk_location){ address, (uint32_t)bytes };
     t->stored += bytes;
     t->at = UINT64_MAX;
     return t->stored > file_bytes ? "the array's chunks do not fit the file" : NULL;
@@ -133,7 +134,7 @@ static const char *read_implicit(ebpo_head_chunks *t, uint64_t file_bytes)
     const ebpo_head_layout *l = t->layout;
     const char *wrong = t->filtered ? contradicts : NULL;
     for (uint64_t i = 0; i < t->count && !wrong; i++) {
-        uint64_t begin = EBPO_NO_ADDRESS; /* as this does not fit 64 bits, it is none */
+        uint64_t begin = EBPO_NO_ADDRESS; /* the sum does not fit 64 bits, so there is no address */
         if (l->address != EBPO_NO_ADDRESS && (__builtin_mul_overflow(i, t->whole, &begin) ||
                                               __builtin_add_overflow(begin, l->address, &begin)))
             begin = EBPO_NO_ADDRESS;
@@ -144,13 +145,13 @@ static const char *read_implicit(ebpo_head_chunks *t, uint64_t file_bytes)
 
 /* A fixed array: a header, then one block of pages. */
 typedef struct fixed_array {
-    uint64_t data; /* where the block is */
+    uint64_t data; /* address of the block */
     unsigned entry, size_bytes;
 } fixed_array;
 
 static const char *read_fixed_header(ebpo_head_state *s, const ebpo_head_chunks *t, fixed_array *f)
 {
-    enum { BYTES = 28, PAGE_BITS_MOST = 16, PLAIN_ENTRY = 8, FILTERED_MORE = 12 };
+    enum { BYTES = 28, PAGE_BITS_MAX = 16, PLAIN_ENTRY = 8, FILTERED_MORE = 12 };
     const ebpo_head_layout *l = t->layout;
     const uint8_t *block = ebpo_head_bytes_at(&s->bytes, l->address, BYTES);
     if (!block)
@@ -170,13 +171,13 @@ static const char *read_fixed_header(ebpo_head_state *s, const ebpo_head_chunks 
     bool fits =
         t->filtered ? f->entry > FILTERED_MORE && f->size_bytes <= 8 : f->entry == PLAIN_ENTRY;
     return client == (unsigned)t->filtered && fits && entries == t->count &&
-                   page_bits == l->page_bits && page_bits >= 1 && page_bits <= PAGE_BITS_MOST
+                   page_bits == l->page_bits && page_bits >= 1 && page_bits <= PAGE_BITS_MAX
                ? NULL
                : contradicts;
 }
 
-/* `count` entries from chunk `first` on, with their checksum behind them; `before`: bytes that the
- * checksum counts, too. */
+/* Reads `count` entries from chunk `first` on, and the checksum after them; `before`: preceding
+ * bytes that the checksum includes. */
 static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const fixed_array *f,
                                 uint64_t at, uint64_t before, uint64_t first, uint64_t count)
 {
@@ -198,7 +199,7 @@ static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const f
     return wrong;
 }
 
-/* The bits that say which pages have been written. */
+/* Checks the bits of the written pages. */
 static const char *check_pages(ebpo_head_state *s, ebpo_head_chunks *t, const fixed_array *f,
                                uint64_t prefix, uint64_t pages)
 {
@@ -249,7 +250,7 @@ static const char *read_fixed(ebpo_head_state *s, ebpo_head_chunks *t)
     return wrong;
 }
 
-/* In one pass. What is wrong, or NULL. */
+/* Reads the table in one pass. Returns an error text, or NULL. */
 static const char *read_chunk_table(ebpo_head_state *s, ebpo_head_chunks *t)
 {
     uint64_t file_bytes = s->bytes.input->source.size;
@@ -265,9 +266,9 @@ static const char *read_chunk_table(ebpo_head_state *s, ebpo_head_chunks *t)
 
 /* --- the array --- */
 
-enum { COLS_MOST = 160 };
+enum { COLS_MAX = 160 };
 
-/* Shuffle must have been set for elements of this size. */
+/* Finds the pipeline; shuffle must be set for elements of this size. */
 static bool find_pipeline(const ebpo_head_filters *f, unsigned element_size,
                           ebpo_pipeline *pipeline)
 {
@@ -283,7 +284,7 @@ static bool find_pipeline(const ebpo_head_filters *f, unsigned element_size,
     return ebpo_pipeline_of_filters(ids, (int)f->count, element_size, pipeline);
 }
 
-/* Chunks of 4 GiB and more are none of HDF5's. */
+/* Checks the rows of a chunk; HDF5 has no chunks of 4 GiB and more. */
 static bool rows_fit(const ebpo_shape *shape, ebpo_head_rows rule, uint64_t rows)
 {
     uint64_t full = ebpo_full_chunk_rows(shape->rows, shape->cols, shape->element_size);
@@ -293,7 +294,8 @@ static bool rows_fit(const ebpo_shape *shape, ebpo_head_rows rule, uint64_t rows
     return rows == full || (rule == EBPO_HEAD_ROWS_POWER && power && rows < full);
 }
 
-/* The one message of a type; NULL, with *wrong saying why if it is not merely absent. */
+/* Returns the only message of a type, or NULL; *wrong gives the reason if it is not merely absent.
+ */
 static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type,
                                          ebpo_head_refusal *wrong)
 {
@@ -303,7 +305,7 @@ static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type
         if (h->message[i].type != type)
             continue;
         if (found)
-            *wrong = (ebpo_head_refusal){ "its description says something twice", false };
+            *wrong = (ebpo_head_refusal){ "its description has a duplicate message", false };
         if (h->message[i].flags & SHARED)
             *wrong = (ebpo_head_refusal){ "its description is shared with another object", true };
         found = &h->message[i];
@@ -313,7 +315,7 @@ static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type
 
 static ebpo_head_refusal fail_sound(const char *what) { return (ebpo_head_refusal){ what, false }; }
 
-/* Not damaged, but rewritten by another program. */
+/* Returns the refusal of an array that another program has rewritten; it is not damaged. */
 static ebpo_head_refusal fail_foreign(const char *what)
 {
     return (ebpo_head_refusal){ what, true };
@@ -336,7 +338,7 @@ static ebpo_head_refusal read_shape(const ebpo_head_header *h, ebpo_shape *shape
         (type.size != 1 && type.size != 2 && type.size != 4 && type.size != 8))
         return fail_sound("the array is not of little-endian integers");
     if (space.rank < 1 || space.rank > 2 || !space.fixed || space.size[0] == 0 ||
-        (space.rank == 2 && (space.size[1] == 0 || space.size[1] > COLS_MOST)))
+        (space.rank == 2 && (space.size[1] == 0 || space.size[1] > COLS_MAX)))
         return fail_sound("the array does not have one or two fixed dimensions");
     shape->element_size = (uint8_t)type.size;
     shape->is_signed = type.is_signed;
@@ -355,8 +357,7 @@ static ebpo_head_refusal read_storage(const ebpo_head_header *h, ebpo_head_rows 
                             *filter_message = find_one(h, EBPO_M_PIPELINE, &wrong);
     if (external)
         return fail_sound(
-            "the array's values lie in another file (external storage), which is never "
-            "looked for");
+            "the array's values are in another file (external storage), which is never read");
     if (!layout_message)
         return wrong;
     wrong.what = read_layout(ebpo_head_message_cursor(h, layout_message), layout, &wrong.foreign);
@@ -366,18 +367,18 @@ static ebpo_head_refusal read_storage(const ebpo_head_header *h, ebpo_head_rows 
                  layout->chunk[layout->rank] == shape->element_size &&
                  (!shape->cols || layout->chunk[1] == shape->cols);
     if (!whole || !rows_fit(shape, rule, layout->chunk[0]))
-        return fail_foreign("the array's chunks do not have the size that the format fixes");
+        return fail_foreign("the array's chunks do not have the size that the format requires");
     shape->chunk_rows = (uint32_t)layout->chunk[0];
     if (filter_message)
         filters = ebpo_head_read_filters(ebpo_head_message_cursor(h, filter_message));
     if (!find_pipeline(&filters, shape->element_size, &shape->pipeline))
-        return fail_foreign("the array's filters are none of the format's");
+        return fail_foreign("the array's filters are not supported by the format");
     return wrong;
 }
 
-/* A chunk takes some bytes, so a file cannot hold more of them than its size allows. */
+/* Finds the chunks. A chunk takes some bytes, so the file's size bounds their number. */
 static ebpo_status find_chunks(ebpo_head *head, const char *path, const ebpo_shape *shape,
-                               const ebpo_head_layout *layout, ebpo_chunk_place **places,
+                               const ebpo_head_layout *layout, ebpo_chunk_location **places,
                                uint64_t *stored, ebpo_error *error)
 {
     enum { CHUNK_MIN = 4 };
@@ -403,7 +404,7 @@ static ebpo_status find_chunks(ebpo_head *head, const char *path, const ebpo_sha
 }
 
 static ebpo_status read_array(ebpo_head *head, const char *path, uint64_t most, ebpo_head_rows rows,
-                              ebpo_shape *shape, char *coding, ebpo_chunk_place **chunks,
+                              ebpo_shape *shape, char *coding, ebpo_chunk_location **chunks,
                               uint64_t *stored_bytes, ebpo_error *error)
 {
     ebpo_head_object object;
@@ -437,7 +438,7 @@ static ebpo_status read_array(ebpo_head *head, const char *path, uint64_t most, 
 
 ebpo_status ebpo_head_read_array(ebpo_head *head, const char *path, uint64_t most,
                                  ebpo_head_rows rows, ebpo_shape *shape,
-                                 char coding[EBPO_HEAD_CODING_BYTES], ebpo_chunk_place **chunks,
+                                 char coding[EBPO_HEAD_CODING_BYTES], ebpo_chunk_location **chunks,
                                  uint64_t *stored_bytes, ebpo_error *error)
 {
     *chunks = NULL;

@@ -1,8 +1,7 @@
-/* The bytes of an open head, in few reads, and what went wrong with them. The first bytes hold all
- * headers and are fetched at once, the index of large arrays comes in one piece, and all else
- * through a window. Nothing beyond the end of the file is read; the first failure of the input is
- * kept, and nothing is read after it. An error says what was refused, unless the input itself
- * failed. */
+/* Reads the bytes of an open head in few reads, and keeps the first failure. The first bytes hold
+ * all headers and are fetched at once, the index of large arrays comes in one piece, and all else
+ * is read through a window. Nothing beyond the end of the file is read, and nothing after a failure
+ * of the input. An error states the refusal, unless the input itself failed. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,7 +11,7 @@
 
 enum {
     FIRST_BYTES = 131072, /* holds all headers */
-    /* of what lies behind: indexes of chunks, and headers that were added later */
+    /* for the rest: chunk indexes, and headers that were added later */
     WINDOW_BYTES = 131072
 };
 
@@ -46,7 +45,7 @@ static const uint8_t *held_within(const uint8_t *buffer, ebpo_range held, uint64
     return buffer + (at - held.offset);
 }
 
-/* Reads a range into *buffer, which has room for `capacity` bytes once there is one. */
+/* Reads a range into *buffer, which holds `capacity` bytes once allocated. */
 static bool read_into(ebpo_head_bytes *b, uint8_t **buffer, uint64_t capacity, ebpo_range range)
 {
     if (!*buffer)
@@ -63,8 +62,8 @@ static const uint8_t *read_table(ebpo_head_bytes *b, uint64_t at, uint64_t size)
                : NULL;
 }
 
-/* Windows begin at multiples of half their size, so that reading to and fro around a place does not
- * move them. They do not reach into the index, which comes as a whole. */
+/* Returns a window. Windows begin at multiples of half their size, so that reading back and forth
+ * around an offset does not move them. They end before the index, which is read in one piece. */
 static ebpo_range window_around(const ebpo_head_bytes *b, uint64_t at)
 {
     uint64_t begin = at / (WINDOW_BYTES / 2) * (WINDOW_BYTES / 2), end = b->input->source.size;
@@ -101,7 +100,7 @@ const uint8_t *ebpo_head_bytes_at(ebpo_head_bytes *b, uint64_t at, uint64_t size
     ebpo_range window = window_around(b, at);
     if (at - window.offset > window.size || size > window.size - (at - window.offset))
         return read_large(b, at, size);
-    b->window_bytes = 0; /* in case that reading fails */
+    b->window_bytes = 0; /* in case reading fails */
     if (!read_into(b, &b->window, WINDOW_BYTES, window))
         return NULL;
     b->window_at = window.offset;

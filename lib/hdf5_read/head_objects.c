@@ -1,6 +1,6 @@
-/* Headers of objects: blocks with checksums, in them messages, and what these say of types,
- * dimensions, filters and attributes. Headers read last are kept. Counts and sizes are bounded
- * before anything is allocated for them, and each checksum is compared. Source: HDF5 File Format
+/* Reads headers of objects: blocks with checksums, their messages, and the types, dimensions,
+ * filters and attributes in these. The last read headers are kept. Counts and sizes are bounded
+ * before memory is allocated for them, and each checksum is compared. Source: HDF5 File Format
  * Specification 3.0, section IV.A. */
 #include "core/strict_fp.h"
 
@@ -15,21 +15,21 @@
 #include "hdf5_read/head_parts.h"
 
 enum {
-    /* of one header: far above what is written, far below what hurts */
-    BLOCKS_MOST = 256,
-    BLOCK_BYTES_MOST = 1 << 20,
-    HEADER_BYTES_MOST = 4 << 20,
-    MESSAGES_MOST = 8192
+    /* limits of one header: far above those of written files, and low enough to be harmless */
+    BLOCKS_MAX = 256,
+    BLOCK_BYTES_MAX = 1 << 20,
+    HEADER_BYTES_MAX = 4 << 20,
+    MESSAGES_MAX = 8192
 };
 
-static const char *const damaged_block = "its header lies beyond the end of the file";
+static const char *const damaged_block = "its header is beyond the end of the file";
 
 bool ebpo_head_sound(const uint8_t *block, uint64_t size)
 {
-    /* not even computed where it would not be compared: that was most of a fuzzer's time */
+    /* not computed where it would not be compared: that took most of a fuzzer's time */
     return size >= 4 &&
-           (!EBPO_SUMS_COMPARED || !ebpo_sum_differs(ebpo_load32(block + size - 4),
-                                                     ebpo_lookup3(block, (size_t)size - 4)));
+           (!EBPO_CHECKSUMS_COMPARED || !ebpo_sum_differs(ebpo_load32(block + size - 4),
+                                                          ebpo_lookup3(block, (size_t)size - 4)));
 }
 
 static bool note_memory(ebpo_head_state *s, uint64_t bytes)
@@ -38,7 +38,8 @@ static bool note_memory(ebpo_head_state *s, uint64_t bytes)
     return false;
 }
 
-/* Whether what a group or an array lists stands in its header, not in B-trees and heaps. */
+/* Returns true if a group's links or an array's attributes are in its header, not in B-trees and
+ * heaps. */
 static bool is_compact(ebpo_head_state *s, ebpo_head_cursor c, bool links)
 {
     unsigned version = ebpo_cursor_u8(&c), flags = ebpo_cursor_u8(&c);
@@ -56,8 +57,8 @@ static bool add_message(ebpo_head_state *s, ebpo_head_header *h, const ebpo_head
 {
     enum { FAILS_IF_UNKNOWN = 0x80, LAST_KNOWN = 0x18 };
     if (m->type > LAST_KNOWN && m->flags & FAILS_IF_UNKNOWN)
-        return ebpo_refuse(s, "its header has a message that nobody knows");
-    if (h->count == MESSAGES_MOST)
+        return ebpo_refuse(s, "its header has an unknown message");
+    if (h->count == MESSAGES_MAX)
         return ebpo_refuse(s, "its header has too many messages");
     if (!ebpo_grow(&h->message, &h->capacity, h->count + 1, sizeof *h->message))
         return note_memory(s, (h->count + 1) * sizeof *h->message);
@@ -65,7 +66,8 @@ static bool add_message(ebpo_head_state *s, ebpo_head_header *h, const ebpo_head
     return true;
 }
 
-/* One block's messages, `from` its place in the header's bytes; `gap`: bytes of creation order. */
+/* Lists the messages of one block; `from`: its offset in the header's bytes; `gap`: bytes of
+ * creation order. */
 static bool list_messages(ebpo_head_state *s, ebpo_head_header *h, uint64_t from, unsigned gap)
 {
     ebpo_head_cursor c = { h->bytes + from, h->bytes + h->byte_count, false };
@@ -83,11 +85,11 @@ static bool list_messages(ebpo_head_state *s, ebpo_head_header *h, uint64_t from
     return true;
 }
 
-/* Takes a block over: `before` bytes in front of its messages, four of checksum behind. */
+/* Reads a block: `before` bytes in front of its messages, four of checksum behind. */
 static bool take_block(ebpo_head_state *s, ebpo_head_header *h, uint64_t at, uint64_t before,
                        uint64_t size, unsigned gap)
 {
-    if (size > BLOCK_BYTES_MOST || h->byte_count + size > HEADER_BYTES_MOST)
+    if (size > BLOCK_BYTES_MAX || h->byte_count + size > HEADER_BYTES_MAX)
         return ebpo_refuse(s, "its header is too large");
     const uint8_t *block = ebpo_head_bytes_at(&s->bytes, at, before + size + 4);
     if (!block)
@@ -105,9 +107,9 @@ static bool take_block(ebpo_head_state *s, ebpo_head_header *h, uint64_t at, uin
 
 static bool read_first_block(ebpo_head_state *s, ebpo_head_header *h, unsigned *gap)
 {
-    enum { PREFIX_MOST = 34 };
+    enum { PREFIX_MAX = 34 };
     uint64_t end = s->bytes.input->source.size, at = h->address;
-    uint64_t size = at < end && end - at < PREFIX_MOST ? end - at : PREFIX_MOST;
+    uint64_t size = at < end && end - at < PREFIX_MAX ? end - at : PREFIX_MAX;
     const uint8_t *prefix = ebpo_head_bytes_at(&s->bytes, at, size);
     if (!prefix)
         return ebpo_refuse(s, damaged_block);
@@ -116,7 +118,7 @@ static bool read_first_block(ebpo_head_state *s, ebpo_head_header *h, unsigned *
     ebpo_head_cursor c = { prefix, prefix + size, false };
     const uint8_t *name = ebpo_cursor_take(&c, 4);
     if (!name || memcmp(name, "OHDR", 4) != 0 || ebpo_cursor_u8(&c) != 2)
-        return ebpo_refuse(s, "there is no header where one is expected");
+        return ebpo_refuse(s, "no header at the expected offset");
     unsigned flags = ebpo_cursor_u8(&c);
     if (flags & 0xc0)
         return ebpo_refuse(s, "its header has unknown flags");
@@ -133,13 +135,13 @@ static bool read_continuation(ebpo_head_state *s, ebpo_head_header *h, uint64_t 
 {
     ebpo_head_cursor c = ebpo_head_message_cursor(h, &h->message[message]);
     uint64_t at = ebpo_cursor_u64(&c), size = ebpo_cursor_u64(&c);
-    if (c.cut || size < 8 || size > BLOCK_BYTES_MOST)
-        return ebpo_refuse(s, "its header goes on nowhere");
+    if (c.cut || size < 8 || size > BLOCK_BYTES_MAX)
+        return ebpo_refuse(s, "its header continues at an invalid address");
     const uint8_t *block = ebpo_head_bytes_at(&s->bytes, at, size);
     if (!block)
         return ebpo_refuse(s, damaged_block);
     if (memcmp(block, "OCHK", 4) != 0)
-        return ebpo_refuse(s, "its header goes on nowhere");
+        return ebpo_refuse(s, "its header continues at an invalid address");
     return take_block(s, h, at, 4, size - 8, gap);
 }
 
@@ -151,7 +153,7 @@ static bool read_blocks(ebpo_head_state *s, ebpo_head_header *h)
     for (uint64_t i = 0; i < h->count; i++) {
         if (h->message[i].type != EBPO_M_CONTINUATION)
             continue;
-        if (++blocks > BLOCKS_MOST)
+        if (++blocks > BLOCKS_MAX)
             return ebpo_refuse(s, "its header has too many pieces");
         if (!read_continuation(s, h, i, gap))
             return false;
@@ -168,7 +170,7 @@ static bool find_kind(ebpo_head_state *s, ebpo_head_header *h)
         ebpo_head_cursor c = ebpo_head_message_cursor(h, m);
         switch (m->type) {
         case EBPO_M_SYMBOL_TABLE:
-            return ebpo_refuse_foreign(s, "a group's links are stored as before HDF5 1.8");
+            return ebpo_refuse_foreign(s, "a group's links are stored in the form before HDF5 1.8");
         case EBPO_M_LINK_INFO:
         case EBPO_M_ATTRIBUTE_INFO:
             if (!is_compact(s, c, m->type == EBPO_M_LINK_INFO))
@@ -180,7 +182,7 @@ static bool find_kind(ebpo_head_state *s, ebpo_head_header *h)
         case EBPO_M_DATASPACE: array |= 1; break;
         case EBPO_M_DATATYPE: array |= 2; break;
         case EBPO_M_LAYOUT: array |= 4; break;
-        default: break; /* times, comments, counts: nothing that changes what is read */
+        default: break; /* times, comments, counts: they do not affect reading */
         }
     }
     if (h->kind == EBPO_HEAD_OTHER && array == 7)
@@ -188,7 +190,7 @@ static bool find_kind(ebpo_head_state *s, ebpo_head_header *h)
     return true;
 }
 
-/* The slot that has been idle for longest, emptied; its memory is used again. */
+/* Empties and returns the slot that has been idle for longest; its memory is reused. */
 static ebpo_head_header *free_slot(ebpo_head_state *s)
 {
     ebpo_head_header *h = &s->slot[0];
@@ -224,7 +226,7 @@ void ebpo_head_headers_free(ebpo_head_state *s)
 
 static bool is_double(ebpo_head_cursor *c, unsigned bits, uint32_t size)
 {
-    /* offset, bits, exponent's place and size, mantissa's, bias */
+    /* offset, bits, exponent's position and size, mantissa's, bias */
     static const uint8_t ieee[12] = { 0, 0, 64, 0, 52, 11, 0, 52, 255, 3, 0, 0 };
     const uint8_t *at = ebpo_cursor_take(c, sizeof ieee);
     return at && size == 8 && bits == 0x3f20 && memcmp(at, ieee, sizeof ieee) == 0;
@@ -256,25 +258,26 @@ ebpo_head_type ebpo_head_read_type(ebpo_head_cursor c)
     return type;
 }
 
-/* Version 1 is what programs write that add an attribute to a file, with HDF5 as it is set. */
+/* Reads dimensions. Programs with default settings of HDF5 that add an attribute to a file write
+ * version 1. */
 ebpo_head_space ebpo_head_read_space(ebpo_head_cursor c)
 {
-    enum { HAS_MOST = 1, PLAIN = 1, RANK_MOST = 32 };
+    enum { HAS_MAX = 1, PLAIN = 1, RANK_MAX = 32 };
     static const ebpo_head_space unread = { .rank = UINT32_MAX };
     unsigned version = ebpo_cursor_u8(&c), rank = ebpo_cursor_u8(&c), flags = ebpo_cursor_u8(&c);
     unsigned type = version == 2 ? ebpo_cursor_u8(&c) : PLAIN;
     if (version == 1)
         ebpo_cursor_take(&c, 5);
-    if (version < 1 || version > 2 || type > PLAIN || rank > RANK_MOST)
+    if (version < 1 || version > 2 || type > PLAIN || rank > RANK_MAX)
         return unread;
     ebpo_head_space space = { .rank = rank, .fixed = true, .values = 1 };
     bool fits = true;
-    uint64_t size[RANK_MOST] = { 0 };
+    uint64_t size[RANK_MAX] = { 0 };
     for (unsigned i = 0; i < rank; i++) {
         size[i] = ebpo_cursor_u64(&c);
         fits = fits && !__builtin_mul_overflow(space.values, size[i], &space.values);
     }
-    for (unsigned i = 0; i < rank && flags & HAS_MOST; i++)
+    for (unsigned i = 0; i < rank && flags & HAS_MAX; i++)
         space.fixed = space.fixed && ebpo_cursor_u64(&c) == size[i];
     memcpy(space.size, size, sizeof space.size);
     if (!fits)
@@ -291,7 +294,7 @@ ebpo_head_filters ebpo_head_read_filters(ebpo_head_cursor c)
     unsigned count = ebpo_cursor_u8(&c);
     for (unsigned i = 0; i < count && i < EBPO_HEAD_FILTERS; i++) {
         unsigned id = ebpo_cursor_u16(&c), name = id >= NAMED_FROM ? ebpo_cursor_u16(&c) : 0;
-        ebpo_cursor_u16(&c); /* optional or not: they are all needed */
+        ebpo_cursor_u16(&c); /* the flag "optional" is ignored: all filters are needed */
         unsigned values = ebpo_cursor_u16(&c);
         ebpo_cursor_take(&c, name);
         ebpo_head_cursor of = ebpo_cursor_part(&c, 4 * (size_t)values);
@@ -320,7 +323,8 @@ static ebpo_status attribute_fails(const ebpo_head *head, const char *path, cons
     return ebpo_fail_at(error, EBPO_E_FORMAT, head->shown, place, -1, "%s", what);
 }
 
-/* In messages of version 1 each part ends at a multiple of eight bytes. */
+/* Returns the next part of a message; in messages of version 1 each part ends at a multiple of
+ * eight bytes. */
 static ebpo_head_cursor part_of(ebpo_head_cursor *c, unsigned version, unsigned size)
 {
     ebpo_head_cursor part = ebpo_cursor_part(c, size);
@@ -329,7 +333,7 @@ static ebpo_head_cursor part_of(ebpo_head_cursor *c, unsigned version, unsigned 
     return part;
 }
 
-/* Whether a message is the attribute of this name; then what it says. */
+/* Returns true if a message is the attribute of this name, and reads it. */
 static bool attribute_is(ebpo_head_cursor c, const char *name, attribute *a)
 {
     unsigned version = ebpo_cursor_u8(&c), flags = ebpo_cursor_u8(&c);
@@ -346,7 +350,7 @@ static bool attribute_is(ebpo_head_cursor c, const char *name, attribute *a)
                      space = part_of(&c, version, space_size);
     uint64_t bytes;
     *a = (attribute){ ebpo_head_read_type(type), ebpo_head_read_space(space), NULL };
-    if (version > 1 && flags & 1) /* the type stands elsewhere */
+    if (version > 1 && flags & 1) /* the type is stored elsewhere */
         a->type = (ebpo_head_type){ EBPO_CLASS_OTHER, 0, false };
     if (!__builtin_mul_overflow(a->space.values, (uint64_t)a->type.size, &bytes) &&
         bytes <= ebpo_cursor_left(&c) && !c.cut)
@@ -354,7 +358,8 @@ static bool attribute_is(ebpo_head_cursor c, const char *name, attribute *a)
     return true;
 }
 
-/* EBPO_E_ABSENT when there is none of this name. `values`: how many it must have. */
+/* Finds an attribute; EBPO_E_ABSENT when there is none of this name. `values`: its required number
+ * of values. */
 static ebpo_status find_attribute(ebpo_head *head, ebpo_head_object object, const char *path,
                                   const char *name, uint64_t values, attribute *out,
                                   ebpo_error *error)
@@ -391,10 +396,10 @@ ebpo_status ebpo_head_get_text(ebpo_head *head, ebpo_head_object object, const c
         return EBPO_OK;
     memset(text, 0, size);
     return attribute_fails(head, path, name,
-                           "it is not a fixed-length UTF-8 text of a sensible length", error);
+                           "it is not a fixed-length UTF-8 text of an allowed length", error);
 }
 
-/* The eight bytes of each value. */
+/* Reads the eight bytes of each value. */
 static ebpo_status get_numbers(ebpo_head *head, ebpo_head_object object, const char *path,
                                const char *name, ebpo_head_type type, uint64_t *values,
                                unsigned count, const char *what, ebpo_error *error)
@@ -434,13 +439,13 @@ ebpo_status ebpo_head_get_count(ebpo_head *head, ebpo_head_object object, const 
 ebpo_status ebpo_head_get_real(ebpo_head *head, ebpo_head_object object, const char *path,
                                const char *name, double *values, unsigned count, ebpo_error *error)
 {
-    enum { MOST = 16 };
+    enum { LIMIT = 16 };
     static const ebpo_head_type type = { EBPO_CLASS_DOUBLE, 8, false };
-    uint64_t bits[MOST];
-    if (count > MOST)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "attributes have at most %d numbers", MOST);
+    uint64_t bits[LIMIT];
+    if (count > LIMIT)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "attributes have at most %d values", LIMIT);
     ebpo_status status =
-        get_numbers(head, object, path, name, type, bits, count, "it is not of f64 numbers", error);
+        get_numbers(head, object, path, name, type, bits, count, "its values are not f64", error);
     if (status == EBPO_OK)
         memcpy(values, bits, (count ? count : 1) * sizeof bits[0]);
     return status;

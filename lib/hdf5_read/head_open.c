@@ -1,6 +1,6 @@
-/* Opening the head of a file that nobody vouches for, and finding objects by their paths: the
- * superblock, and from the root group links, which are followed by name. What HDF5 allows and this
- * format does not is refused by name. Source: HDF5 File Format Specification 3.0, sections II.A and
+/* Opens the head of an untrusted file, and finds objects by their paths: reads the superblock, and
+ * follows links by name from the root group. Features that HDF5 allows and this format does not are
+ * rejected with a specific message. Source: HDF5 File Format Specification 3.0, sections II.A and
  * IV.A.2.g; format-spec/README.md, section 2. */
 #include <stdlib.h>
 #include <string.h>
@@ -10,11 +10,12 @@
 #include "hdf5_read/head_parts.h"
 #include "io/file_source.h"
 
-/* --- the superblock: what every file begins with --- */
+/* --- the superblock, at the beginning of every file --- */
 
 static const char signature[8] = "\211HDF\r\n\032\n";
 
-/* HDF5 allows what is not its own before the superblock, at these places. */
+/* Returns true if other data precedes the superblock, which HDF5 allows; the superblock is then at
+ * one of these offsets. */
 static bool has_user_block(ebpo_head_state *s)
 {
     for (uint64_t at = 512; at <= s->bytes.first_bytes; at *= 2) {
@@ -25,14 +26,15 @@ static bool has_user_block(ebpo_head_state *s)
     return false;
 }
 
-/* True for bytes that begin as those of any HDF5 file. */
+/* Returns true if the bytes begin as those of any HDF5 file. */
 static bool has_signature(ebpo_head_state *s)
 {
     const uint8_t *first = ebpo_head_bytes_at(&s->bytes, 0, sizeof signature);
     return first && memcmp(first, signature, sizeof signature) == 0;
 }
 
-/* Reads the superblock: where the root group is. False: the refusal says why. */
+/* Reads the superblock, which locates the root group. Returns false with the reason in the refusal.
+ */
 static bool read_superblock(ebpo_head_state *s)
 {
     enum { BYTES = EBPO_HEAD_SUPERBLOCK_BYTES, OPEN_FOR_WRITING = 1 };
@@ -41,8 +43,8 @@ static bool read_superblock(ebpo_head_state *s)
     if (!block)
         return false;
     if (!has_signature(s))
-        return has_user_block(s) ? ebpo_refuse(s, "the HDF5 file begins behind something else (a "
-                                                  "user block), which this format does not allow")
+        return has_user_block(s) ? ebpo_refuse(s, "the HDF5 file begins with other data (a user "
+                                                  "block), which this format does not allow")
                                  : false;
     ebpo_head_cursor c = { block + sizeof signature, block + BYTES, false };
     unsigned version = ebpo_cursor_u8(&c);
@@ -85,7 +87,7 @@ ebpo_status ebpo_head_open(ebpo_head *head, ebpo_input *input, ebpo_error *error
     return ebpo_head_fail(head, "", s->refusal.what ? "" : unknown, error);
 }
 
-void ebpo_head_expect_index(ebpo_head *head, ebpo_range index) { head->state->bytes.index = index; }
+void ebpo_head_hint_index(ebpo_head *head, ebpo_range index) { head->state->bytes.index = index; }
 
 ebpo_status ebpo_head_close(ebpo_head *head, ebpo_status status, ebpo_error *error)
 {
@@ -105,7 +107,7 @@ ebpo_status ebpo_head_close(ebpo_head *head, ebpo_status status, ebpo_error *err
 void ebpo_head_keep_ranges(ebpo_head *head)
 {
     head->state->keeps = true;
-    for (int i = 0; i < EBPO_HEAD_SLOTS; i++) /* those are read again */
+    for (int i = 0; i < EBPO_HEAD_SLOTS; i++) /* headers are read again */
         head->state->slot[i].used = 0;
 }
 
@@ -120,8 +122,8 @@ ebpo_status ebpo_head_take_ranges(ebpo_head *head, ebpo_range **ranges, uint64_t
     return s->kept_short ? ebpo_fail_memory(error, *count * sizeof **ranges) : EBPO_OK;
 }
 
-/* Whether a link message has this name; then where it leads, EBPO_NO_ADDRESS for soft and external
- * ones, which are not followed. */
+/* Returns true if a link message has this name. Sets *address to its target, or EBPO_NO_ADDRESS for
+ * soft and external links, which are not followed. */
 static bool link_is(ebpo_head_cursor c, const char *name, size_t length, uint64_t *address)
 {
     enum { HARD = 0 };
@@ -140,7 +142,7 @@ static bool link_is(ebpo_head_cursor c, const char *name, size_t length, uint64_
     return true;
 }
 
-/* Of a group's links the one of this name: how many there are. */
+/* Finds the links of a group with this name; returns their number. */
 static unsigned follow_name(const ebpo_head_header *group, const char *name, size_t length,
                             uint64_t *address)
 {
@@ -166,7 +168,7 @@ ebpo_head_kind ebpo_head_find(ebpo_head_state *s, const char *path, ebpo_head_ob
         if (found == 0)
             return *path ? EBPO_HEAD_OTHER : EBPO_HEAD_ABSENT;
         if (found > 1)
-            ebpo_refuse(s, "the name stands twice in its group");
+            ebpo_refuse(s, "the name occurs twice in its group");
         if (found > 1 || *object == EBPO_NO_ADDRESS)
             return EBPO_HEAD_OTHER;
         h = ebpo_head_header_at(s, *object);

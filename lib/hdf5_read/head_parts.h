@@ -1,6 +1,6 @@
-/* Inside lib/hdf5_read only: the parts of an open head, which are its bytes, in few reads; a
- * cursor in them; headers of objects; types, dimensions and filters. Our writer puts headers at
- * the start of the file, and the index of large arrays in one piece behind the first levels. */
+/* Private to lib/hdf5_read: the parts of an open head: its bytes, in few reads; a cursor in them;
+ * headers of objects; types, dimensions and filters. The library's writer puts headers at the start
+ * of the file, and the index of large arrays in one piece behind the first levels. */
 #ifndef EBPO_HDF5_READ_HEAD_PARTS_H
 #define EBPO_HDF5_READ_HEAD_PARTS_H
 
@@ -16,33 +16,33 @@
 
 typedef struct ebpo_head_bytes {
     ebpo_input *input;
-    uint8_t *first, *window; /* the first bytes, and a piece elsewhere, NULL until needed */
+    uint8_t *first, *window; /* the first bytes, and a piece at another offset, NULL until needed */
     uint8_t *table;          /* all of `index`, NULL until needed */
-    uint8_t *large;          /* what fits none of them */
+    uint8_t *large;          /* ranges that fit none of them */
     uint64_t first_bytes, window_at, window_bytes, large_capacity;
-    ebpo_range index; /* where more metadata is expected, or nothing */
-    /* of the input's first failure, after which nothing is read any more */
+    ebpo_range index; /* range of more metadata, or empty */
+    /* status of the input's first failure, after which nothing more is read */
     ebpo_status status;
     ebpo_error error;
 } ebpo_head_bytes;
 
-/* Fetches the first bytes. Close also after an error. */
+/* Fetches the first bytes. Close it also after an error. */
 EBPO_MUST_USE ebpo_status ebpo_head_bytes_open(ebpo_head_bytes *bytes, ebpo_input *input,
                                                ebpo_error *error);
 void ebpo_head_bytes_close(ebpo_head_bytes *bytes);
 
-/* Bytes [at, at + size), until the next call; the caller bounds `size`. NULL: they lie beyond the
- * end of the file, or, as `status` says then, could not be read. */
+/* Returns bytes [at, at + size), valid until the next call; the caller bounds `size`. NULL: they
+ * are beyond the end of the file, or could not be read (`status`). */
 const uint8_t *ebpo_head_bytes_at(ebpo_head_bytes *bytes, uint64_t at, uint64_t size);
 
-/* Inside lib/hdf5_read only: a reading place in bytes that nobody vouches for. Beyond the end it
- * gives zeros and notes that it did. */
+/* Private to lib/hdf5_read: a read position in untrusted bytes. Beyond the end it returns zeros and
+ * records that. */
 
 #define EBPO_NO_ADDRESS UINT64_MAX
 
 typedef struct ebpo_head_cursor {
     const uint8_t *at, *end;
-    bool cut; /* more was asked for than there is */
+    bool cut; /* a read went beyond the end */
 } ebpo_head_cursor;
 
 static inline size_t ebpo_cursor_left(const ebpo_head_cursor *c)
@@ -50,7 +50,7 @@ static inline size_t ebpo_cursor_left(const ebpo_head_cursor *c)
     return (size_t)(c->end - c->at);
 }
 
-/* Moves on; NULL when there are not so many bytes. */
+/* Advances; returns NULL when too few bytes are left. */
 static inline const uint8_t *ebpo_cursor_take(ebpo_head_cursor *c, size_t bytes)
 {
     const uint8_t *from = c->at;
@@ -63,7 +63,7 @@ static inline const uint8_t *ebpo_cursor_take(ebpo_head_cursor *c, size_t bytes)
     return from;
 }
 
-/* An unsigned integer of at most 8 bytes. */
+/* Reads an unsigned integer of at most 8 bytes. */
 static inline uint64_t ebpo_cursor_uint(ebpo_head_cursor *c, unsigned bytes)
 {
     const uint8_t *from = ebpo_cursor_take(c, bytes);
@@ -86,14 +86,14 @@ static inline uint32_t ebpo_cursor_u32(ebpo_head_cursor *c)
 }
 static inline uint64_t ebpo_cursor_u64(ebpo_head_cursor *c) { return ebpo_cursor_uint(c, 8); }
 
-/* The next `bytes` bytes as a cursor of their own. */
+/* Returns the next `bytes` bytes as a separate cursor. */
 static inline ebpo_head_cursor ebpo_cursor_part(ebpo_head_cursor *c, size_t bytes)
 {
     const uint8_t *from = ebpo_cursor_take(c, bytes);
     return (ebpo_head_cursor){ from ? from : c->end, from ? from + bytes : c->end, !from };
 }
 
-/* Inside lib/hdf5_read only: an open head, and the headers of its objects. */
+/* Private to lib/hdf5_read: an open head, and the headers of its objects. */
 
 /* Types of messages. */
 enum {
@@ -116,19 +116,19 @@ typedef struct ebpo_head_message {
     uint8_t type, flags;
 } ebpo_head_message;
 
-/* An object's header: its blocks, one behind the other, and the messages in them. */
+/* An object's header: its consecutive blocks, and the messages in them. */
 typedef struct ebpo_head_header {
-    uint64_t address, used; /* used: by the state's clock, 0: the slot is free */
+    uint64_t address, used; /* used: time of last use by the state's clock, 0: the slot is free */
     uint8_t *bytes;
     ebpo_head_message *message;
     uint64_t byte_count, byte_capacity, count, capacity;
     ebpo_head_kind kind;
 } ebpo_head_header;
 
-/* Why something was refused. */
+/* The reason of a refusal. */
 typedef struct ebpo_head_refusal {
-    const char *what; /* NULL: nothing was */
-    bool foreign;     /* it is not damaged, but of a kind that only libhdf5 reads */
+    const char *what; /* NULL: no refusal */
+    bool foreign;     /* true if it is not damaged, but only libhdf5 reads it */
 } ebpo_head_refusal;
 
 enum { EBPO_HEAD_SLOTS = 32 };
@@ -136,14 +136,14 @@ enum { EBPO_HEAD_SLOTS = 32 };
 typedef struct ebpo_head_state {
     ebpo_head_bytes bytes;
     uint64_t root, clock;
-    ebpo_head_header slot[EBPO_HEAD_SLOTS]; /* those used last */
-    ebpo_head_refusal refusal;              /* the last one */
+    ebpo_head_header slot[EBPO_HEAD_SLOTS]; /* the last used headers */
+    ebpo_head_refusal refusal;              /* the last refusal */
     ebpo_range *kept;                       /* see ebpo_head_keep_ranges */
     uint64_t kept_count, kept_capacity;
-    bool keeps, kept_short; /* short of memory */
+    bool keeps, kept_short; /* kept_short: memory was short */
 } ebpo_head_state;
 
-/* These bytes of the file are ours. */
+/* Records a range of the file that is in use. */
 static inline void ebpo_head_note_range(ebpo_head_state *s, uint64_t at, uint64_t size)
 {
     if (!s->keeps)
@@ -154,7 +154,7 @@ static inline void ebpo_head_note_range(ebpo_head_state *s, uint64_t at, uint64_
         s->kept_short = true;
 }
 
-/* Notes why; false, so that `return` reads well. */
+/* Records the reason and returns false, so that `return` reads well. */
 static inline bool ebpo_refuse(ebpo_head_state *s, const char *what)
 {
     s->refusal = (ebpo_head_refusal){ what, false };
@@ -166,10 +166,10 @@ static inline bool ebpo_refuse_foreign(ebpo_head_state *s, const char *what)
     return false;
 }
 
-/* Whether `size` bytes, the last four of which are the checksum of the others, are whole. */
+/* Returns true if `size` bytes match their checksum, which is the last four of them. */
 bool ebpo_head_sound(const uint8_t *block, uint64_t size);
 
-/* The header at an address, until the next call. NULL: the refusal says why. */
+/* Returns the header at an address, valid until the next call. NULL: see the refusal. */
 const ebpo_head_header *ebpo_head_header_at(ebpo_head_state *s, uint64_t address);
 void ebpo_head_headers_free(ebpo_head_state *s);
 
@@ -180,22 +180,22 @@ static inline ebpo_head_cursor ebpo_head_message_cursor(const ebpo_head_header *
     return (ebpo_head_cursor){ from, from + m->size, false };
 }
 
-/* What a path names, and where its header is. Without a refusal ABSENT and OTHER are what they say.
- */
+/* Returns the kind of object at a path, and the address of its header. Without a refusal, ABSENT
+ * and OTHER are reliable. */
 ebpo_head_kind ebpo_head_find(ebpo_head_state *s, const char *path, ebpo_head_object *object);
 
-/* The error that says what was refused: "`path`: `what`: the refusal". A failed input's own error
- * goes before. */
+/* Sets the error for a refusal: "`path`: `what`: the refusal". A failed input's own error takes
+ * precedence. */
 EBPO_MUST_USE ebpo_status ebpo_head_fail(const ebpo_head *head, const char *path, const char *what,
                                          ebpo_error *error);
 
-/* Inside lib/hdf5_read only: types, dimensions and filters as messages describe them. */
+/* Private to lib/hdf5_read: types, dimensions and filters as messages describe them. */
 
 typedef enum ebpo_head_class {
-    EBPO_CLASS_INTEGER,       /* little-endian, all bits of it */
+    EBPO_CLASS_INTEGER,       /* little-endian, using all bits */
     EBPO_CLASS_DOUBLE,        /* IEEE 754, little-endian, 64 bits */
-    EBPO_CLASS_TEXT,          /* of fixed length, however it is padded */
-    EBPO_CLASS_OTHER_INTEGER, /* big-endian, say */
+    EBPO_CLASS_TEXT,          /* of fixed length, with any padding */
+    EBPO_CLASS_OTHER_INTEGER, /* big-endian, for example */
     EBPO_CLASS_OTHER
 } ebpo_head_class;
 
@@ -207,21 +207,21 @@ typedef struct ebpo_head_type {
 
 ebpo_head_type ebpo_head_read_type(ebpo_head_cursor c);
 
-/* Dimensions. `values`: the product; 0 where there are none, or more than 64 bits count. */
+/* Dimensions. `values`: the product; 0 if there are no values or the product overflows 64 bits. */
 typedef struct ebpo_head_space {
-    unsigned rank; /* UINT32_MAX: nothing that can be read */
-    bool fixed;    /* they cannot grow */
+    unsigned rank; /* UINT32_MAX: not readable */
+    bool fixed;    /* the dimensions cannot grow */
     uint64_t size[2], values;
 } ebpo_head_space;
 
 ebpo_head_space ebpo_head_read_space(ebpo_head_cursor c);
 
-/* Filters in the order in which they are applied. */
+/* Filters in the order of application. */
 enum { EBPO_HEAD_FILTERS = 3 };
 typedef struct ebpo_head_filters {
-    unsigned count; /* more than EBPO_HEAD_FILTERS: nothing of this format */
+    unsigned count; /* more than EBPO_HEAD_FILTERS: not of this format */
     struct {
-        unsigned id, values, first; /* how many values, and the first one */
+        unsigned id, values, first; /* number of values, and the first one */
     } filter[EBPO_HEAD_FILTERS];
 } ebpo_head_filters;
 

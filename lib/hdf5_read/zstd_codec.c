@@ -1,20 +1,21 @@
-/* Chunks as zstd frames (RFC 8878), each with its content's size and a checksum. What a decoder of
- * zstd does not look at in a frame, and no checksum covers, is looked at here: a changed bit must
- * not go unnoticed. The blocks of a frame are the planes of shuffled elements, or the streams of a
- * coding, as each has statistics of its own. */
+/* Chunks as zstd frames (RFC 8878), each with its content's size and a checksum. Parts of a frame
+ * that neither zstd's decoder checks nor a checksum covers are checked here: a changed bit must not
+ * go unnoticed. The blocks of a frame are the planes of shuffled elements, or the streams of a
+ * coding, because each has separate statistics. */
 #include <string.h>
 #include <zstd.h>
 
 #include "core/endian.h"
 #include "hdf5_read/codec.h"
 
-/* --- what decoders do not look at: RFC 8878, 3.1.1 --- */
+/* --- parts that decoders do not check: RFC 8878, 3.1.1 --- */
 
 enum { RAW, RLE, COMPRESSED, RESERVED };
 enum { DESCRIPTOR = 4 };
 static const char unused_set[] = "an unused bit of the zstd frame is set";
 
-/* How many bytes the literals of a compressed block take, with their header; 0: it is cut short. */
+/* Returns the bytes of the literals of a compressed block, with their header; 0: it is cut short.
+ */
 static size_t literals_bytes(const uint8_t *block, size_t size)
 {
     unsigned kind = block[0] & 3, format = block[0] >> 2 & 3;
@@ -88,10 +89,10 @@ bool ebpo_zstd_has_checksum(const uint8_t *frame, size_t bytes)
 
 /* --- encoding --- */
 
-/* A shuffled chunk is planes of bytes that have little in common: the low ones are noise, the high
- * ones nearly all alike. Each in a block of its own has a table of codes of its own. Short matches
- * are left alone: in such planes they cost more than single bytes. Chunks too small to gain by any
- * of that are as HDF5's filter makes them. */
+/* Begins a frame. A shuffled chunk consists of planes of bytes that have little in common: the low
+ * ones are noise, the high ones nearly constant. Each plane is a block and has a separate table of
+ * codes. Short matches are not used: in such planes they cost more than single bytes. Chunks too
+ * small to gain by this are encoded as HDF5's filter does. */
 static bool begin_frame(ZSTD_CCtx *out, int level, size_t raw_bytes)
 {
     enum { LARGE = 4096, LEVEL_OF_LARGE = 7, MATCH_LEAST = 6 };
@@ -115,7 +116,7 @@ static size_t encode_blocks(ZSTD_CCtx *zstd, const uint8_t *raw, size_t raw_byte
         left = ZSTD_compressStream2(zstd, &to, &from, i == b->count ? ZSTD_e_end : ZSTD_e_flush);
         at = end;
     }
-    return left ? (size_t)-1 : to.pos; /* an error, as ZSTD_isError has it */
+    return left ? (size_t)-1 : to.pos; /* an error, for ZSTD_isError */
 }
 
 ebpo_status ebpo_zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *raw,
@@ -132,7 +133,7 @@ ebpo_status ebpo_zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *
                            : ZSTD_compress2(coder->zstd_out, out, ebpo_chunk_bound(raw_bytes), raw,
                                             raw_bytes);
     *out_bytes = size;
-    return ZSTD_isError(size) ? EBPO_E_MEMORY : EBPO_OK; /* the bound leaves no other cause */
+    return ZSTD_isError(size) ? EBPO_E_MEMORY : EBPO_OK; /* the bound excludes other causes */
 }
 
 /* --- decoding --- */

@@ -1,6 +1,6 @@
-/* A process of its own for what libhdf5 does with files of others: forked, with limits of memory,
- * time and bytes written, without plugins, and with a pipe for its status and error. What goes
- * wrong in it, whatever it is, ends that process and not this one. */
+/* Runs libhdf5 on untrusted files in a separate process: forked, with limits of memory, time and
+ * bytes written, without plugins, and with a pipe for its status and error. Any failure in it ends
+ * that process and not this one. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -14,13 +14,13 @@
 
 #include "core/error.h"
 
-/* What the other process says when it is done. */
+/* The result that the other process reports at its end. */
 typedef struct report {
     ebpo_status status;
     ebpo_error error;
 } report;
 
-/* Addresses that this process has; 0: not known. */
+/* Returns the address space of this process in bytes; 0: not known. */
 static uint64_t address_bytes(void)
 {
     unsigned long long pages = 0;
@@ -41,20 +41,20 @@ static void limit_resource(int what, uint64_t most)
     }
 }
 
-static void take_limits(const ebpo_apart_limits *limits, uint64_t has)
+static void take_limits(const ebpo_process_limits *limits, uint64_t has)
 {
     limit_resource(RLIMIT_CORE, 0);
     limit_resource(RLIMIT_FSIZE, limits->file_bytes);
     limit_resource(RLIMIT_CPU, limits->seconds);
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    (void)has; /* these set all addresses aside */
+    (void)has; /* sanitizers reserve all addresses */
 #else
     if (has)
         limit_resource(RLIMIT_AS, has + limits->memory_bytes);
 #endif
 }
 
-bool ebpo_apart_write(int fd, const void *data, size_t bytes)
+bool ebpo_process_write(int fd, const void *data, size_t bytes)
 {
     for (const char *at = data; bytes > 0;) {
         ssize_t done = write(fd, at, bytes);
@@ -68,7 +68,7 @@ bool ebpo_apart_write(int fd, const void *data, size_t bytes)
     return true;
 }
 
-/* 1: all of it; 0: the other end was closed before; -1: reading failed. */
+/* Returns 1: all was read; 0: the other end was closed early; -1: reading failed. */
 static int read_all(int fd, void *data, size_t bytes)
 {
     for (char *at = data; bytes > 0;) {
@@ -83,37 +83,36 @@ static int read_all(int fd, void *data, size_t bytes)
     return 1;
 }
 
-static void be_apart(ebpo_apart_fn work, void *user, const ebpo_apart_limits *limits, uint64_t has,
-                     int out)
+static void be_apart(ebpo_process_fn work, void *user, const ebpo_process_limits *limits,
+                     uint64_t has, int out)
 {
-    static const int usual[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGTERM };
+    static const int standard[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGTERM };
     report r = { EBPO_OK, EBPO_ERROR_INIT };
-    for (size_t i = 0; i < sizeof usual / sizeof usual[0]; i++)
-        signal(usual[i], SIG_DFL); /* handlers of the caller's are for its own process */
+    for (size_t i = 0; i < sizeof standard / sizeof standard[0]; i++)
+        signal(standard[i], SIG_DFL); /* the caller's handlers are for its own process */
     signal(SIGXFSZ, SIG_IGN);
     signal(SIGPIPE, SIG_IGN);
     take_limits(limits, has);
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
     H5PLset_loading_state(0);
     r.status = work(user, &r.error);
-    ebpo_apart_write(out, &r, sizeof r);
+    ebpo_process_write(out, &r, sizeof r);
     _exit(0);
 }
 
 static ebpo_status judge_death(int state, const char *shown, ebpo_error *error)
 {
-    if (!WIFSIGNALED(state)) /* it could not say what it has to say */
+    if (!WIFSIGNALED(state)) /* it could not report its result */
         return ebpo_fail_file(error, EBPO_E_IO, shown,
-                              "the process that read it through libhdf5 ended before it was done");
+                              "the process that read it through libhdf5 ended early");
     if (WTERMSIG(state) == SIGXCPU || WTERMSIG(state) == SIGKILL)
         return ebpo_fail_file(
             error, EBPO_E_FORMAT, shown,
-            "libhdf5 took longer or needed more than it may; the file is damaged, "
-            "or made to cost");
+            "libhdf5 exceeded its limits of time or memory; the file is damaged or malicious");
     return ebpo_fail_file(
         error, EBPO_E_FORMAT, shown,
-        "libhdf5 died of it, in a process of its own, by signal %d (%s); the file "
-        "is damaged, or made to harm: do not trust it",
+        "libhdf5 crashed on it, in a separate process, by signal %d (%s); the file is damaged or "
+        "malicious: do not trust it",
         WTERMSIG(state), strsignal(WTERMSIG(state)));
 }
 
@@ -127,8 +126,8 @@ static bool make_pipe(int ends[2])
 #endif
 }
 
-ebpo_status ebpo_apart(ebpo_apart_fn work, void *user, const char *shown,
-                       const ebpo_apart_limits *limits, ebpo_error *error)
+ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *shown,
+                                const ebpo_process_limits *limits, ebpo_error *error)
 {
     int ends[2], state = 0;
     ebpo_h5_scope scope;
@@ -136,7 +135,7 @@ ebpo_status ebpo_apart(ebpo_apart_fn work, void *user, const char *shown,
     if (!make_pipe(ends))
         return ebpo_fail_errno(error, shown, "no process could be started for it");
     uint64_t has = address_bytes();
-    ebpo_h5_enter(&scope); /* so that no thread is inside of libhdf5 when the process is copied */
+    ebpo_h5_enter(&scope); /* so that no thread is in libhdf5 when the process is copied */
     pid_t child = fork();
     if (child == 0) {
         ebpo_h5_leave(&scope);
@@ -146,8 +145,8 @@ ebpo_status ebpo_apart(ebpo_apart_fn work, void *user, const char *shown,
     int fault = errno;
     ebpo_h5_leave(&scope);
     close(ends[1]);
-    int told = child > 0 ? read_all(ends[0], &r, sizeof r) : 0;
-    fault = told < 0 ? errno : fault;
+    int reported = child > 0 ? read_all(ends[0], &r, sizeof r) : 0;
+    fault = reported < 0 ? errno : fault;
     close(ends[0]);
     while (child > 0 && waitpid(child, &state, 0) < 0 && errno == EINTR)
         ;
@@ -156,11 +155,11 @@ ebpo_status ebpo_apart(ebpo_apart_fn work, void *user, const char *shown,
         return ebpo_fail_errno(error, shown, "no process could be started for it");
     }
     errno = fault;
-    if (told < 0)
-        return ebpo_fail_errno(error, shown, "what the process that read it says is not known");
-    if (!told)
+    if (reported < 0)
+        return ebpo_fail_errno(error, shown, "the report of the process that read it is invalid");
+    if (!reported)
         return judge_death(state, shown, error);
-    /* whatever has become of that process, its words end */
+    /* terminates the texts, as the process may have written anything */
     r.error.message[sizeof r.error.message - 1] = r.error.file[sizeof r.error.file - 1] =
         r.error.object[sizeof r.error.object - 1] = 0;
     if (r.status != EBPO_OK && r.status != r.error.status)

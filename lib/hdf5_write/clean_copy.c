@@ -1,8 +1,8 @@
-/* Files of another program's layout, written anew in this format's, by libhdf5 in a process of its
- * own (apart.c). Chunks whose filters and rows fit are copied as they are stored; of other
- * layouts, filters and byte orders, libhdf5 decodes the values. What does not fit the format is
- * left out, and the first such array is named. Depth and number of objects are bounded, as hard
- * links may lead in circles. */
+/* Rewrites files in another program's layout in this format's layout, by libhdf5 in a separate
+ * process (apart.c). Chunks whose filters and rows fit are copied as stored; from other layouts,
+ * filters and byte orders, libhdf5 decodes the values. Arrays that do not fit the format are
+ * omitted, and the first one is reported. Depth and number of objects are bounded, because hard
+ * links may form cycles. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,10 +19,10 @@
 
 enum {
     HEAD_BYTES = 262144,
-    DEPTH_MOST = 2,      /* /levels/00 */
-    OBJECTS_MOST = 8192, /* so that hard links may lead in circles */
-    VALUE_MOST = 65536,  /* bytes of an attribute */
-    LEVEL = 1,           /* of compression: the copy does not live long */
+    DEPTH_MAX = 2,      /* /levels/00 */
+    OBJECTS_MAX = 8192, /* because hard links may form cycles */
+    VALUE_MAX = 65536,  /* bytes of an attribute */
+    LEVEL = 1,          /* compression level: the copy is short-lived */
     CACHE_BYTES = 256 << 20,
     PATH = 96
 };
@@ -33,11 +33,11 @@ typedef struct copying {
     const char *from_path, *to_path, *shown;
     bool from_goes;
     ebpo_h5_chunk_rows_fn chunk_rows;
-    bool subtrees, kept;    /* what it is asked with */
-    ebpo_pipeline pipeline; /* of all arrays of the copy */
-    hid_t access;           /* of arrays: with a cache for large chunks */
+    bool subtrees, kept;    /* arguments of chunk_rows */
+    ebpo_pipeline pipeline; /* filters of all arrays of the copy */
+    hid_t access;           /* access list of arrays: with a cache for large chunks */
     unsigned objects, depth;
-    ebpo_error left_out; /* why the first array that does not fit was */
+    ebpo_error omitted; /* reason why the first array was omitted */
     ebpo_status status;
     ebpo_error *error;
 } copying;
@@ -56,11 +56,11 @@ typedef struct attribute_copy {
     ebpo_h5_id to;
 } attribute_copy;
 
-/* Those of fixed size; the others are nothing of this format. */
+/* Copies attributes of fixed size; the format has no others. */
 static herr_t copy_attribute(hid_t object, const char *name, const H5A_info_t *info, void *user)
 {
     (void)info;
-    static uint8_t value[VALUE_MOST];
+    static uint8_t value[VALUE_MAX];
     attribute_copy *a = user;
     hid_t attribute = H5Aopen(object, name, H5P_DEFAULT);
     hid_t type = attribute >= 0 ? H5Aget_type(attribute) : -1,
@@ -70,12 +70,12 @@ static herr_t copy_attribute(hid_t object, const char *name, const H5A_info_t *i
     size_t size = type >= 0 ? H5Tget_size(type) : 0;
     bool plain = (class == H5T_INTEGER || class == H5T_FLOAT ||
                   (class == H5T_STRING && H5Tis_variable_str(type) == 0)) &&
-                 size > 0 && values > 0 && (uint64_t)values <= VALUE_MOST / size;
-    if (++a->c->objects > OBJECTS_MOST)
+                 size > 0 && values > 0 && (uint64_t)values <= VALUE_MAX / size;
+    if (++a->c->objects > OBJECTS_MAX)
         return copy_fails(a->c, ebpo_text_ok(name) ? name : "",
                           "the file has too many objects and attributes");
     if (plain && H5Aread(attribute, type, value) >= 0) {
-        hid_t own = H5Tcopy(type); /* in case that it is another object's */
+        hid_t own = H5Tcopy(type); /* in case it belongs to another object */
         ebpo_status status = ebpo_h5_put_attribute(&a->c->to, a->to, name, own, H5Scopy(space), -1,
                                                    value, a->c->error);
         a->c->status = a->c->status == EBPO_OK ? status : a->c->status;
@@ -105,23 +105,23 @@ typedef struct array_copy {
     hid_t set, plist;
     const char *path;
     ebpo_shape shape;
-    uint64_t stored_chunks; /* of the file's */
-    bool as_stored;         /* chunks are copied as they are */
-    hid_t type;             /* as which values are read */
+    uint64_t stored_chunks; /* number of chunks in the file */
+    bool as_stored;         /* chunks are copied as stored */
+    hid_t type;             /* type for reading values */
 } array_copy;
 
 static void leave_out(copying *c, const char *path, const char *what)
 {
-    if (!*c->left_out.message)
-        (void)!ebpo_fail_at(&c->left_out, EBPO_E_FORMAT, c->shown, path, -1, "%s", what);
+    if (!*c->omitted.message)
+        (void)!ebpo_fail_at(&c->omitted, EBPO_E_FORMAT, c->shown, path, -1, "%s", what);
 }
 
 static bool find_pipeline(hid_t plist, unsigned element_size, ebpo_pipeline *pipeline)
 {
-    enum { FILTERS_MOST = 3 };
+    enum { FILTERS_MAX = 3 };
     int count = H5Pget_nfilters(plist);
-    unsigned ids[FILTERS_MOST] = { 0 };
-    for (int i = 0; i < count && count <= FILTERS_MOST; i++) {
+    unsigned ids[FILTERS_MAX] = { 0 };
+    for (int i = 0; i < count && count <= FILTERS_MAX; i++) {
         unsigned flags, values[4] = { 0 };
         size_t value_count = 4;
         int id = H5Pget_filter2(plist, (unsigned)i, &flags, &value_count, values, 0, NULL, NULL);
@@ -143,7 +143,7 @@ static bool has_filter(hid_t plist, int id)
     return false;
 }
 
-/* Returns true if libhdf5 has all filters; else says which one it lacks. */
+/* Returns true if libhdf5 has all filters; else reports the missing one. */
 static bool can_decode(copying *c, const array_copy *a)
 {
     for (int i = 0; i < H5Pget_nfilters(a->plist); i++) {
@@ -158,7 +158,7 @@ static bool can_decode(copying *c, const array_copy *a)
         snprintf(
             what, sizeof what,
             "the array is compressed by HDF5's filter %d (%.40s), which is not built in; where "
-            "its plugin is, write the file anew with `h5repack -f SHUF -f GZIP=6 -f FLET`",
+            "its plugin is installed, rewrite the file with `h5repack -f SHUF -f GZIP=6 -f FLET`",
             id, *name && ebpo_text_ok(name) ? name : "no name");
         leave_out(c, a->path, what);
         return false;
@@ -166,13 +166,13 @@ static bool can_decode(copying *c, const array_copy *a)
     return true;
 }
 
-/* Finds type and size; NULL, or why it is no array of the format. */
+/* Finds type and size. Returns NULL, or the reason why it is not an array of the format. */
 static const char *find_values(array_copy *a)
 {
     hsize_t dims[2] = { 0, 0 };
     if (ebpo_h5_is_elsewhere(a->set)) /* first: H5Dget_space opens a virtual dataset's files */
-        return "the array's values are stored in another file or in other arrays, which are never "
-               "looked for";
+        return "the array's values are stored in another file or in other arrays, which are "
+               "never read";
     hid_t space = H5Dget_space(a->set), type = H5Dget_type(a->set);
     int rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;
     bool plain = (rank == 1 || rank == 2) && H5Sget_simple_extent_dims(space, dims, NULL) == rank;
@@ -195,7 +195,7 @@ static const char *find_values(array_copy *a)
     return NULL;
 }
 
-/* The chunks that the file has. */
+/* Finds the chunks in the file. */
 static void find_chunks(array_copy *a)
 {
     int rank = a->shape.cols ? 2 : 1;
@@ -210,8 +210,8 @@ static void find_chunks(array_copy *a)
         a->shape.chunk_rows = (uint32_t)chunk[0];
 }
 
-/* False: it is left out. */
-static bool look_at(copying *c, array_copy *a)
+/* Examines an array; returns false if it is omitted. */
+static bool inspect_object(copying *c, array_copy *a)
 {
     const char *wrong = a->plist >= 0 ? find_values(a) : "the array is damaged";
     if (wrong) {
@@ -230,7 +230,7 @@ static bool look_at(copying *c, array_copy *a)
     return can_decode(c, a);
 }
 
-/* HDF5 gives its fill value for what has never been stored. */
+/* Returns true if all chunks are stored; HDF5 returns its fill value for missing ones. */
 static bool all_is_there(const array_copy *a)
 {
     hsize_t chunks = 0;
@@ -243,7 +243,7 @@ static bool all_is_there(const array_copy *a)
     return there;
 }
 
-/* Takes a chunk as it is stored. False: it has to be decoded. */
+/* Reads a chunk as stored. Returns false if it must be decoded. */
 static bool take_stored(const array_copy *a, uint64_t first, void *data, size_t bound,
                         size_t *bytes)
 {
@@ -265,14 +265,14 @@ static bool read_values(const array_copy *a, uint64_t first, uint64_t rows, void
     bool good = space >= 0 && memory >= 0 &&
                 H5Sselect_hyperslab(space, H5S_SELECT_SET, from, NULL, size, NULL) >= 0 &&
                 H5Dread(a->set, a->type, memory, space, H5P_DEFAULT, values) >= 0;
-    if (good) { /* else libhdf5's reason would be wiped */
+    if (good) { /* otherwise libhdf5's reason would be erased */
         ebpo_h5_close_space(space);
         ebpo_h5_close_space(memory);
     }
     return good;
 }
 
-/* Decodes what is a chunk of the copy, and encodes it as the format has it. */
+/* Decodes a chunk of the copy, and encodes it in the format. */
 static bool make_chunk(copying *c, const array_copy *a, uint64_t first, uint8_t *data,
                        size_t *bytes)
 {
@@ -316,8 +316,8 @@ static void copy_values(copying *c, const array_copy *a)
     free(data);
 }
 
-/* Makes the list of where chunks are: it must be there, and is of the other file. One row that
- * nobody reads, as it lacks the attributes that make it true. */
+/* Makes the chunk directory: it must exist, but belongs to the original file. It gets one row,
+ * which is never read, because it lacks the attributes that make it valid. */
 static void make_places(copying *c, const char *path)
 {
     static const uint64_t none[2];
@@ -344,14 +344,15 @@ static void copy_array(copying *c, hid_t group, const char *name, const char *pa
     a.plist = a.set >= 0 ? H5Dget_create_plist(a.set) : -1;
     if (strcmp(path, "/subtrees/places") == 0)
         make_places(c, path);
-    else if (look_at(c, &a))
+    else if (inspect_object(c, &a))
         copy_values(c, &a);
     ebpo_h5_close_list(a.plist);
     if (a.set >= 0)
         H5Dclose(a.set);
 }
 
-/* Returns the rows of a chunk of an array of the file, 1 without chunks; 0 if it is not there. */
+/* Returns the rows of a chunk of an array of the file, 1 without chunks; 0 if the array is missing.
+ */
 static hsize_t rows_of(hid_t file, const char *path)
 {
     hid_t set = H5Dopen2(file, path, H5P_DEFAULT), plist = set >= 0 ? H5Dget_create_plist(set) : -1;
@@ -364,9 +365,9 @@ static hsize_t rows_of(hid_t file, const char *path)
     return chunk[0];
 }
 
-/* Chooses the filters of the copy by those of the array that every file has, and finds out whether
- * chunks are those of the format. */
-static void look_at_file(copying *c)
+/* Chooses the filters of the copy by an array that every file has, and finds out whether chunks are
+ * those of the format. */
+static void inspect_file(copying *c)
 {
     array_copy a = { .set = H5Dopen2(c->from, "/levels/00/types", H5P_DEFAULT) };
     a.plist = a.set >= 0 ? H5Dget_create_plist(a.set) : -1;
@@ -391,7 +392,7 @@ static void look_at_file(copying *c)
 
 typedef struct group_copy {
     copying *c;
-    const char *path; /* "" of the root */
+    const char *path; /* "" for the root */
 } group_copy;
 
 static void copy_group(copying *c, hid_t from, const char *path);
@@ -408,7 +409,7 @@ static herr_t copy_link(hid_t group, const char *name, const H5L_info_t *info, v
     if (!ours || info->type != H5L_TYPE_HARD || !ebpo_text_ok(name) ||
         snprintf(path, sizeof path, "%s/%s", g->path, name) >= PATH)
         return 0;
-    if (++c->objects > OBJECTS_MOST)
+    if (++c->objects > OBJECTS_MAX)
         return copy_fails(c, path, "the file has too many objects and attributes");
     hid_t object = H5Oopen(group, name, H5P_DEFAULT);
     if (object < 0)
@@ -416,7 +417,7 @@ static herr_t copy_link(hid_t group, const char *name, const H5L_info_t *info, v
     H5I_type_t type = H5Iget_type(object);
     if (type == H5I_DATASET)
         copy_array(c, group, name, path);
-    else if (type == H5I_GROUP && c->depth < DEPTH_MOST)
+    else if (type == H5I_GROUP && c->depth < DEPTH_MAX)
         copy_group(c, object, path);
     H5Oclose(object);
     return c->status == EBPO_OK ? 0 : -1;
@@ -450,7 +451,7 @@ static ebpo_status copy_all(void *user, ebpo_error *error)
         c->status = ebpo_h5_create(&c->to, c->to_path, c->shown, HEAD_BYTES, 5, error);
     unlink(c->to_path);
     if (c->status == EBPO_OK)
-        look_at_file(c);
+        inspect_file(c);
     hid_t root = c->status == EBPO_OK ? H5Gopen2(c->from, "/", H5P_DEFAULT) : -1;
     if (root >= 0)
         copy_group(c, root, "");
@@ -459,13 +460,13 @@ static ebpo_status copy_all(void *user, ebpo_error *error)
     if (c->status == EBPO_OK)
         c->status = ebpo_h5_finish(&c->to, error);
     if (c->status == EBPO_OK)
-        *error = c->left_out;
+        *error = c->omitted;
     return c->status;
 }
 
 ebpo_status ebpo_h5_clean_copy(const char *from, bool from_goes, const char *to, const char *shown,
-                               ebpo_h5_chunk_rows_fn chunk_rows, const ebpo_apart_limits *limits,
-                               ebpo_error *left_out, ebpo_error *error)
+                               ebpo_h5_chunk_rows_fn chunk_rows, const ebpo_process_limits *limits,
+                               ebpo_error *omitted, ebpo_error *error)
 {
     copying c = { .from = -1,
                   .to = EBPO_H5_OUT_INIT,
@@ -474,9 +475,9 @@ ebpo_status ebpo_h5_clean_copy(const char *from, bool from_goes, const char *to,
                   .shown = shown,
                   .from_goes = from_goes,
                   .chunk_rows = chunk_rows,
-                  .left_out = EBPO_ERROR_INIT };
-    ebpo_error said = EBPO_ERROR_INIT;
-    ebpo_status status = ebpo_apart(copy_all, &c, shown, limits, &said);
-    *left_out = said;
-    return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &said);
+                  .omitted = EBPO_ERROR_INIT };
+    ebpo_error reported = EBPO_ERROR_INIT;
+    ebpo_status status = ebpo_run_in_process(copy_all, &c, shown, limits, &reported);
+    *omitted = reported;
+    return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &reported);
 }

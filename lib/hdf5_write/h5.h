@@ -1,7 +1,6 @@
-/* Writing HDF5 files as this library does: groups, fixed-size attributes, chunked integer arrays
- * whose chunks come already encoded (lib/hdf5_read reads them). The only module that includes
- * <hdf5.h>; calls are serialised inside and any thread may make them. Errors name file and object.
- */
+/* Writes HDF5 files in this library's layout: groups, fixed-size attributes, chunked integer arrays
+ * whose chunks are already encoded (lib/hdf5_read reads them). The only module that includes
+ * <hdf5.h>; it serialises calls, and any thread may make them. Errors name file and object. */
 #ifndef EBPO_HDF5_WRITE_H5_H
 #define EBPO_HDF5_WRITE_H5_H
 
@@ -14,11 +13,12 @@ typedef int64_t ebpo_h5_id; /* an open object; negative: none */
 /* Registers filter 32015 with libhdf5 in this process. */
 EBPO_MUST_USE ebpo_status ebpo_h5_register(ebpo_error *error);
 
-/* The first failure of a write is told by the call that meets it, and by all after it. */
+/* An output file. The first failure of a write is returned by the call that detects it, and by all
+ * later calls. */
 typedef struct ebpo_h5_out {
-    const char *shown; /* for messages; the caller's */
+    const char *shown; /* for messages; owned by the caller */
     ebpo_h5_id file;
-    int codec_level; /* recorded with the filters */
+    int codec_level; /* stated with the filters */
     struct ebpo_h5_sink *sink;
 } ebpo_h5_out;
 #define EBPO_H5_OUT_INIT \
@@ -26,26 +26,26 @@ typedef struct ebpo_h5_out {
         "", -1, 0, NULL  \
     }
 
-/* Closes an object opened or created below, before the file is; a negative id is fine. A failure is
- * told by the next call, ebpo_h5_finish at the latest. */
+/* Closes an object opened or created below, before the file is closed; a negative id is allowed.
+ * The next call reports a failure, ebpo_h5_finish at the latest. */
 void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id);
 
 /* Creates a file by name, or in memory when path is NULL. The first `head_bytes` bytes are for
- * metadata. `links`: objects in the root group. */
+ * metadata. `links`: number of objects in the root group. */
 EBPO_MUST_USE ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown,
                                          uint64_t head_bytes, unsigned links, ebpo_error *error);
-/* Closes the file and opens it again, nothing else of it being open: from here on metadata that is
- * allocated takes the next `metadata_bytes` in one piece. */
+/* Closes the file and reopens it; none of its objects may be open. Metadata allocated after that
+ * takes the next `metadata_bytes` in one piece. */
 EBPO_MUST_USE ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, uint64_t metadata_bytes,
                                          ebpo_error *error);
-/* Opens the root group for its attributes, or creates a group made for `links` links. The caller
- * closes the id. */
+/* Opens the root group for its attributes, or creates a group with capacity for `links` links. The
+ * caller closes the id. */
 EBPO_MUST_USE ebpo_status ebpo_h5_root(ebpo_h5_out *out, ebpo_h5_id *id, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned links,
                                              ebpo_h5_id *id, ebpo_error *error);
 
-/* Attributes. `count` 0: a scalar; else a one-dimensional array. Putting a name again overwrites
- * the value (same type and size). */
+/* Writes attributes. `count` 0: a scalar; else a one-dimensional array. Writing a name again
+ * overwrites the value (same type and size). */
 EBPO_MUST_USE ebpo_status ebpo_h5_put_text(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
                                            const char *text, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_h5_put_int(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
@@ -55,8 +55,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_count(ebpo_h5_out *out, ebpo_h5_id id, con
 EBPO_MUST_USE ebpo_status ebpo_h5_put_real(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
                                            const double *values, unsigned count, ebpo_error *error);
 
-/* Attributes as the VTKHDF format wants them: 64-bit integers [count], count > 0, ASCII of fixed
- * length. */
+/* Writes attributes as VTKHDF requires: 64-bit integers [count], count > 0, ASCII of fixed length.
+ */
 EBPO_MUST_USE ebpo_status ebpo_h5_put_ints(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
                                            const int64_t *values, unsigned count,
                                            ebpo_error *error);
@@ -65,7 +65,7 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_ascii(ebpo_h5_out *out, ebpo_h5_id id, con
 
 EBPO_MUST_USE ebpo_status ebpo_h5_open_array(ebpo_h5_out *out, const char *path, ebpo_h5_id *id,
                                              ebpo_error *error);
-/* Creates an array; the caller closes the id. Then its chunks, encoded, by number. */
+/* Creates an array, whose id the caller closes; then writes its encoded chunks by index. */
 EBPO_MUST_USE ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path,
                                              const ebpo_shape *shape, ebpo_h5_id *id,
                                              ebpo_error *error);
@@ -73,20 +73,20 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, 
                                             const ebpo_shape *shape, uint64_t chunk,
                                             const void *data, size_t bytes, ebpo_error *error);
 
-/* Of a file in memory: bytes from the start up to the end of the last metadata so far, given that
+/* Returns, for a file in memory, the bytes from the start to the end of the last metadata so far;
  * raw data begins at first_raw. */
 EBPO_MUST_USE ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes,
                                             ebpo_error *error);
-/* Bytes that the file has so far. */
+/* Returns the current size of the file in bytes. */
 EBPO_MUST_USE ebpo_status ebpo_h5_size(ebpo_h5_out *out, uint64_t *bytes, ebpo_error *error);
-/* Flushes and closes. Harmless when already closed. Only after EBPO_OK is the file whole. */
+/* Flushes and closes. Harmless when already closed. The file is complete only after EBPO_OK. */
 EBPO_MUST_USE ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error);
-/* Closes without writing any more, also what a failing call above left. Harmless after
+/* Closes without further writing, including remains of a failed call above. Harmless after
  * ebpo_h5_finish. */
 void ebpo_h5_discard(ebpo_h5_out *out);
 
-/* HDF5 files for other programs: plain arrays of numbers that grow by rows, compressed with what
- * every HDF5 has (shuffle, deflate). Errors name file and object. */
+/* HDF5 files for other programs: plain arrays of numbers that grow by rows, with filters that every
+ * HDF5 has (shuffle, deflate). Errors name file and object. */
 
 typedef enum ebpo_h5_number {
     EBPO_H5_U8,
@@ -107,7 +107,7 @@ typedef struct ebpo_h5_table {
     char path[96];
     ebpo_h5_number number;
     uint32_t cols;
-    uint64_t rows; /* so far */
+    uint64_t rows; /* current number of rows */
 } ebpo_h5_table;
 #define EBPO_H5_TABLE_INIT       \
     {                            \
@@ -128,51 +128,50 @@ EBPO_MUST_USE ebpo_status ebpo_h5_make_table(ebpo_h5_out *out, const char *path,
 /* Appends rows, in the machine's byte order; stored little-endian. */
 EBPO_MUST_USE ebpo_status ebpo_h5_append(ebpo_h5_out *out, ebpo_h5_table *table, const void *data,
                                          uint64_t rows, ebpo_error *error);
-/* A failure, as what is still to be compressed is written now, is told by the next call. */
+/* Closes a table and writes the rest of its data; the next call reports a failure. */
 void ebpo_h5_close_table(const ebpo_h5_out *out, ebpo_h5_table *table);
 
-/* All three: an array that is written at once. */
+/* Writes an array at once: make, append and close. */
 EBPO_MUST_USE ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path,
                                             ebpo_h5_number number, uint32_t cols, const void *data,
                                             uint64_t rows, ebpo_error *error);
 
-/* HDF5 arrays of three dimensions for other programs, of float64, written layer by layer. */
+/* HDF5 arrays of three dimensions of float64 for other programs, written layer by layer. */
 
-/* [dims[0]][dims[1]][dims[2]], each at least 1. The caller closes the id. */
+/* Creates a volume of [dims[0]][dims[1]][dims[2]], each at least 1. The caller closes the id. */
 EBPO_MUST_USE ebpo_status ebpo_h5_make_volume(ebpo_h5_out *out, const char *path,
                                               const uint64_t dims[3], ebpo_h5_id *id,
                                               ebpo_error *error);
-/* Layers from `first` on; data[layers][dims[1]][dims[2]]. */
+/* Writes layers from `first` on; data[layers][dims[1]][dims[2]]. */
 EBPO_MUST_USE ebpo_status ebpo_h5_put_layers(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
                                              const uint64_t dims[3], uint64_t first,
                                              uint64_t layers, const double *data,
                                              ebpo_error *error);
 
-/* Files that other programs have laid out, through libhdf5, in a process of its own. */
+/* Files in layouts of other programs, read through libhdf5 in a separate process. */
 
-typedef struct ebpo_apart_limits {
-    uint64_t memory_bytes; /* of addresses, beyond those that this process has */
-    uint64_t file_bytes;   /* of what it writes */
-    unsigned seconds;      /* of processor time */
-} ebpo_apart_limits;
+typedef struct ebpo_process_limits {
+    uint64_t memory_bytes; /* address space beyond that of this process */
+    uint64_t file_bytes;   /* bytes that it writes */
+    unsigned seconds;      /* processor time */
+} ebpo_process_limits;
 
-/* Rows of a chunk of an array of this format. `stored`: its shape, with the chunk_rows that another
- * program has given it, 0 for none; `subtrees`: the file has that part; `kept`: the arrays whose
- * chunks the format fixes have these. */
+/* Returns the rows of a chunk of an array of this format. `stored`: its shape, with the current
+ * chunk_rows of the other program, 0 for none; `subtrees`: the file has that part; `kept`: the
+ * arrays whose chunks the format fixes have these. */
 typedef uint32_t (*ebpo_h5_chunk_rows_fn)(const char *path, const ebpo_shape *stored, bool subtrees,
                                           bool kept);
 
-/* Writes what a file has of this format anew, in the layout of this format: from the file `from` to
- * the empty file `to`, which loses its name as soon as libhdf5, which wants one, has opened it; so
- * does `from` with `from_goes`. Chunks that fit the format are copied as they are stored; of other
- * layouts, filters and byte orders, libhdf5 reads the values. What does not fit the format is left
- * out; *left_out then says what and why of the first such array (EBPO_E_FORMAT), and has no message
- * else; on failure it is the failure. EBPO_E_FORMAT, EBPO_E_IO, EBPO_E_MEMORY; EBPO_E_UNSUPPORTED
- * without libhdf5.
- */
+/* Rewrites the parts of a file that belong to this format in this format's layout: from the file
+ * `from` to the empty file `to`. libhdf5 opens files by name; `to` loses its name as soon as
+ * libhdf5 has opened it, and so does `from` with `from_goes`. Chunks that fit the format are copied
+ * as stored; from other layouts, filters and byte orders, libhdf5 reads the values. Arrays that do
+ * not fit the format are omitted; *omitted then describes the first such array and the reason
+ * (EBPO_E_FORMAT), otherwise it has no message; on failure it is the failure. EBPO_E_FORMAT,
+ * EBPO_E_IO, EBPO_E_MEMORY; EBPO_E_UNSUPPORTED without libhdf5. */
 EBPO_MUST_USE ebpo_status ebpo_h5_clean_copy(const char *from, bool from_goes, const char *to,
                                              const char *shown, ebpo_h5_chunk_rows_fn chunk_rows,
-                                             const ebpo_apart_limits *limits, ebpo_error *left_out,
+                                             const ebpo_process_limits *limits, ebpo_error *omitted,
                                              ebpo_error *error);
 
 #endif

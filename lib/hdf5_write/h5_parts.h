@@ -1,6 +1,6 @@
-/* Inside lib/hdf5_write only: the use of libhdf5. Every call happens between enter and leave.
- * Debian's serial build is not thread-safe, so one mutex of the library serialises us; HDF5's
- * printing of errors is switched off meanwhile and given back as it was. */
+/* Private to lib/hdf5_write: the use of libhdf5. Every call happens between enter and leave.
+ * Debian's serial build is not thread-safe, so one mutex of the library serialises calls; HDF5's
+ * error printing is switched off meanwhile and then restored. */
 #ifndef EBPO_HDF5_WRITE_H5_PARTS_H
 #define EBPO_HDF5_WRITE_H5_PARTS_H
 
@@ -18,79 +18,80 @@ typedef struct ebpo_h5_scope {
 void ebpo_h5_enter(ebpo_h5_scope *scope);
 void ebpo_h5_leave(ebpo_h5_scope *scope);
 
-/* "shown: object: what (libhdf5: innermost message)"; to be called inside the scope, right after
- * the failing call. `object` may be "". */
+/* Sets the error "shown: object: what (libhdf5: innermost message)". Call it inside the scope,
+ * right after the failing call. `object` may be "". */
 ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown,
                          const char *object, const char *what);
 
-/* Whether the failing call, right before, lacked memory. */
+/* Returns true if the immediately preceding, failed call lacked memory. */
 bool ebpo_h5_short_of_memory(void);
 
 /* Opens a file of another program to read. With `lock` it fails while another program has the file
- * open for writing, as what is read then may be half of two versions; a file system that has no
- * locks is no reason to fail. -1 in *file on failure. */
+ * open for writing, because the data may then be a mixture of two versions; a file system without
+ * locks is not a failure. -1 in *file on failure. */
 EBPO_MUST_USE ebpo_status ebpo_h5_open_to_read(const char *path, const char *shown, bool lock,
                                                hid_t *file, ebpo_error *error);
 
-/* Returns true if the values are stored in files that this one names. */
+/* Returns true if the values are stored in other files that this file names. */
 bool ebpo_h5_is_elsewhere(hid_t set);
 
-/* The stored type for integers of `size` bytes, little-endian; -1 for another size. */
+/* Returns the stored type for little-endian integers of `size` bytes; -1 for another size. */
 hid_t ebpo_h5_integer_type(unsigned size, bool is_signed);
 
-/* A virtual file driver, through which libhdf5 writes. libhdf5 1.10
- * does not survive a write that fails: what it cannot flush stays behind with an id that has lost
- * its file, which it trips over when it is closed or at exit. Here the first failure is kept and
- * told by everything that is called after it; to libhdf5 all writes succeed, so that it always
- * comes to an end. */
+/* A virtual file driver, through which libhdf5 writes. libhdf5 1.10 does not survive a failing
+ * write: unflushed data stays behind with an id that has lost its file, and libhdf5 fails on it
+ * when it is closed or at exit. This driver keeps the first failure and reports it in all later
+ * calls; for libhdf5 all writes succeed, so it always terminates. */
 
 typedef struct ebpo_h5_sink {
     hid_t id;        /* libhdf5's registration of the driver */
     int fd;          /* -1: bytes are kept in memory */
     uint8_t *memory; /* [capacity] */
     uint64_t capacity, size;
-    /* of the first failure */
+    /* status of the first failure */
     ebpo_status status;
     ebpo_error error;
     char shown[]; /* for messages */
 } ebpo_h5_sink;
 
-/* Opens the file, which is made empty, or memory when path is NULL. Inside the scope or not. */
+/* Opens the file and empties it, or opens memory when path is NULL. Inside or outside the scope. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_open(ebpo_h5_sink **out, const char *path, const char *shown,
                                             ebpo_error *error);
-/* Makes a file access list use it; false when libhdf5 refuses. To be called inside the scope. */
+/* Makes a file access list use the sink; returns false when libhdf5 refuses. Call it inside the
+ * scope. */
 bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl);
 /* Keeps a failure, if it is the first. */
 void ebpo_h5_sink_fail(ebpo_h5_sink *sink, const ebpo_error *error);
-/* The kept failure, or EBPO_OK. */
+/* Returns the kept failure, or EBPO_OK. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_status(const ebpo_h5_sink *sink, ebpo_error *error);
-/* After libhdf5 has closed the file, inside the scope: closes the sink's, and tells the first
- * failure, of this closing too. */
+/* Closes the sink's file after libhdf5 has closed it, inside the scope. Returns the first failure,
+ * including that of this close. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_close(ebpo_h5_sink *sink, ebpo_error *error);
-/* libhdf5 could not close its file, for want of memory, and may call the driver again whenever it
- * likes: lets go of the file, but stays. */
+/* Releases the file but keeps the sink: libhdf5 could not close its file, for lack of memory, and
+ * may call the driver again at any time. */
 void ebpo_h5_sink_abandon(ebpo_h5_sink *sink);
 
-/* Inside lib/hdf5_write, within a scope: what is written into every file, whatever its layout. What
- * is taken over is closed, also when something failed before. */
+/* Private to lib/hdf5_write, within a scope: writing common to all layouts. Objects whose ownership
+ * is transferred are closed, also after an earlier failure. */
 
-/* Properties of a file that is written through the sink; -1 when libhdf5 refuses. */
+/* Returns properties of a file that is written through the sink; -1 when libhdf5 refuses. */
 struct ebpo_h5_sink;
 hid_t ebpo_h5_write_access(struct ebpo_h5_sink *sink, H5F_libver_t version);
-/* Whether libhdf5 has created out->file. */
+/* Returns EBPO_OK if libhdf5 has created out->file. */
 ebpo_status ebpo_h5_created(const ebpo_h5_out *out, ebpo_error *error);
 
-/* EBPO_OK if it went well, and no write has failed so far: else the first such failure, or what
- * libhdf5 says. Right after the call, as others wipe libhdf5's reason. */
+/* Returns EBPO_OK if the call succeeded and no write has failed so far; otherwise the first failed
+ * write, or libhdf5's error. Call it right after the call, because others erase libhdf5's reason.
+ */
 ebpo_status ebpo_h5_written(const ebpo_h5_out *out, const char *what, bool good, ebpo_error *error);
 
-/* Takes over the list of properties; `good`: it has them all. */
+/* Creates a group; closes the property list. `good`: all properties were set. */
 ebpo_status ebpo_h5_put_group(const ebpo_h5_out *out, const char *path, hid_t gcpl, bool good,
                               ebpo_h5_id *id, ebpo_error *error);
-/* Takes over space and properties. */
+/* Creates a dataset; closes space and properties. */
 ebpo_status ebpo_h5_put_dataset(const ebpo_h5_out *out, const char *path, hid_t type, hid_t space,
                                 hid_t dcpl, bool good, ebpo_h5_id *id, ebpo_error *error);
-/* Writes an attribute, from its stored type where `memory` is -1. Takes over the space. */
+/* Writes an attribute, from its stored type where `memory` is -1. Closes the space. */
 ebpo_status ebpo_h5_put_attribute(const ebpo_h5_out *out, hid_t object, const char *name,
                                   hid_t type, hid_t space, hid_t memory, const void *value,
                                   ebpo_error *error);
@@ -98,19 +99,19 @@ ebpo_status ebpo_h5_put_attribute(const ebpo_h5_out *out, hid_t object, const ch
 void ebpo_h5_close_list(hid_t list);
 void ebpo_h5_close_space(hid_t space);
 
-/* What libhdf5 does with files of others happens in a process of its
- * own, with limits. What goes wrong there, whatever it is, ends that process and not this one. */
+/* libhdf5 handles untrusted files in a separate process, with limits. Any failure there ends that
+ * process and not this one. */
 
-/* What is done there: no other thread exists, no plugin is loaded, libhdf5 prints nothing. What it
- * leaves in memory is gone; files that it writes stay. */
-typedef ebpo_status (*ebpo_apart_fn)(void *user, ebpo_error *error);
+/* The work in that process: no other thread exists, no plugin is loaded, libhdf5 prints nothing.
+ * Its changes of memory are lost; files that it writes stay. */
+typedef ebpo_status (*ebpo_process_fn)(void *user, ebpo_error *error);
 
-/* Its status and error, of which EBPO_OK may have one, too; EBPO_E_FORMAT when it died or took more
- * than it may; `shown`: the file. */
-EBPO_MUST_USE ebpo_status ebpo_apart(ebpo_apart_fn work, void *user, const char *shown,
-                                     const ebpo_apart_limits *limits, ebpo_error *error);
+/* Returns the status and error of the work; EBPO_OK may have an error, too. EBPO_E_FORMAT when the
+ * process crashed or exceeded a limit; `shown`: the file. */
+EBPO_MUST_USE ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *shown,
+                                              const ebpo_process_limits *limits, ebpo_error *error);
 
-/* All of it, however often it is interrupted; false, with errno: it could not be written. */
-bool ebpo_apart_write(int fd, const void *data, size_t bytes);
+/* Writes all bytes, also after interruptions; returns false with errno on failure. */
+bool ebpo_process_write(int fd, const void *data, size_t bytes);
 
 #endif

@@ -1,5 +1,5 @@
-/* Rows of numbers from files of others (ebpo/rows.h). libhdf5 reads them in a process of its own,
- * which hands them over in a file without a name. */
+/* Reads rows of numbers from untrusted files (ebpo/rows.h). libhdf5 reads them in a separate
+ * process, which passes them on in an unnamed file. */
 #include <ebpo/rows.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -18,21 +18,21 @@
 #include "hdf5_write/h5.h"
 
 enum {
-    COLUMNS_MOST = 64,
+    COLUMNS_MAX = 64,
     ROWS_AT_ONCE = 16384,
-    /* Of a file's bytes, what its rows may take: as much as deflate can save, and so much anyhow. A
-     * file of a kilobyte can state any number of rows. */
-    EXPANSION_MOST = 1024,
+    /* Limits of the bytes of rows: a multiple of the file's bytes, as much as deflate can save, and
+     * a minimum. A file of a kilobyte can state any number of rows. */
+    EXPANSION_MAX = 1024,
     EXPANSION_FREE = 64 << 20
 };
 
 typedef struct dataset {
     const char *path, *name;
-    int to; /* the descriptor of where rows go */
+    int to; /* descriptor to write the rows to */
     unsigned least, most;
-    uint64_t bytes_most; /* of all rows */
+    uint64_t bytes_max; /* limit for all rows */
     double fill;
-    uint64_t first, end; /* the rows that are wanted */
+    uint64_t first, end; /* the requested rows */
     hid_t file, set, space, type;
     hsize_t size[2];
 } dataset;
@@ -59,8 +59,7 @@ static ebpo_status open_set(dataset *d, ebpo_error *error)
     d->set = H5Dopen2(d->file, d->name, access);
     H5Pclose(access);
     if (elsewhere || (d->set >= 0 && ebpo_h5_is_elsewhere(d->set)))
-        return rows_fail(d,
-                         "its values lie in another file, which is not looked for; name that one",
+        return rows_fail(d, "its values are in another file, which is not read; name that file",
                          error);
     if (d->set < 0)
         return rows_fail(d, "there is no such dataset", error);
@@ -69,16 +68,16 @@ static ebpo_status open_set(dataset *d, ebpo_error *error)
     return d->space < 0 || d->type < 0 ? rows_fail(d, "the dataset is damaged", error) : EBPO_OK;
 }
 
-/* Returns whether the file's root names this format, or that of paint files. */
+/* Returns true if the file's root names this format, or that of paint files. */
 static bool is_of_format(hid_t file)
 {
-    enum { MOST = 64 };
+    enum { LIMIT = 64 };
     static const char begin[] = "EBP-Octree";
-    char text[MOST] = "";
+    char text[LIMIT] = "";
     hid_t attribute = H5Aexists(file, "format") > 0 ? H5Aopen(file, "format", H5P_DEFAULT) : -1,
           type = attribute >= 0 ? H5Aget_type(attribute) : -1;
     bool fits = type >= 0 && H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0 &&
-                H5Tget_size(type) <= MOST && H5Aget_storage_size(attribute) <= MOST &&
+                H5Tget_size(type) <= LIMIT && H5Aget_storage_size(attribute) <= LIMIT &&
                 H5Aread(attribute, type, text) >= 0 && strncmp(text, begin, sizeof begin - 1) == 0;
     if (type >= 0)
         H5Tclose(type);
@@ -87,7 +86,7 @@ static bool is_of_format(hid_t file)
     return fits;
 }
 
-/* Returns what the values are if they are no real numbers, else NULL. */
+/* Returns a description of the values if they are not real numbers, else NULL. */
 static const char *other_values(const dataset *d, hid_t set, hid_t type)
 {
     H5T_class_t class = H5Tget_class(type);
@@ -112,7 +111,7 @@ static bool has_rows(hid_t space, unsigned least, unsigned most, hsize_t size[2]
            H5Sget_simple_extent_dims(space, size, NULL) == 2 && size[1] >= least && size[1] <= most;
 }
 
-/* Writes "rows of 3 numbers", or of "6 to 7". */
+/* Writes "rows of 3 numbers", or "rows of 6 to 7 numbers". */
 static void describe_rows(const dataset *d, char what[64])
 {
     snprintf(what, 64, "rows of %u%s%.0u numbers", d->least, d->most > d->least ? " to " : "",
@@ -140,7 +139,7 @@ static ebpo_status check_set(dataset *d, ebpo_error *error)
         return rows_fail(d, what, error);
     }
     if (has_rows(d->space, d->least, d->most, d->size))
-        return d->size[0] <= d->bytes_most / (d->most * sizeof(double))
+        return d->size[0] <= d->bytes_max / (d->most * sizeof(double))
                    ? EBPO_OK
                    : ebpo_h5_fail(error, EBPO_E_LIMIT, d->path, d->name,
                                   "has so many more rows than its file has bytes that it may be "
@@ -151,21 +150,21 @@ static ebpo_status check_set(dataset *d, ebpo_error *error)
     return rows_fail(d, what, error);
 }
 
-/* The datasets that could be meant. */
+/* The candidate datasets. */
 typedef struct candidates {
     const dataset *d;
     unsigned objects, found;
     char names[384];
 } candidates;
 
-static herr_t look_at(hid_t file, const char *name, const H5O_info_t *info, void *user)
+static herr_t inspect_object(hid_t file, const char *name, const H5O_info_t *info, void *user)
 {
-    enum { OBJECTS_MOST = 65536, SHOWN = 4 };
+    enum { OBJECTS_MAX = 65536, SHOWN = 4 };
     candidates *c = user;
     hsize_t size[2];
-    if (++c->objects > OBJECTS_MOST)
+    if (++c->objects > OBJECTS_MAX)
         return 1;
-    if (info->type != H5O_TYPE_DATASET || !ebpo_text_ok(name)) /* it is shown */
+    if (info->type != H5O_TYPE_DATASET || !ebpo_text_ok(name)) /* the name is printed */
         return 0;
     hid_t set = H5Dopen2(file, name, H5P_DEFAULT);
     /* first: H5Dget_space opens a virtual dataset's files */
@@ -188,13 +187,13 @@ static herr_t look_at(hid_t file, const char *name, const H5O_info_t *info, void
     return 0;
 }
 
-/* Fails in any case: with the datasets that could be meant, or as there is none. */
+/* Fails in any case: lists the candidate datasets, or reports that there is none. */
 static ebpo_status name_sets(dataset *d, ebpo_error *error)
 {
     candidates c = { .d = d };
     char wanted[64];
     describe_rows(d, wanted);
-    (void)H5Ovisit2(d->file, H5_INDEX_NAME, H5_ITER_INC, look_at, &c, H5O_INFO_BASIC);
+    (void)H5Ovisit2(d->file, H5_INDEX_NAME, H5_ITER_INC, inspect_object, &c, H5O_INFO_BASIC);
     H5Eclear2(H5E_DEFAULT);
     if (!c.found)
         return ebpo_fail_file(error, EBPO_E_ABSENT, d->path, "has no dataset of %s", wanted);
@@ -203,8 +202,8 @@ static ebpo_status name_sets(dataset *d, ebpo_error *error)
                           *c.names ? c.names : "FILE.h5:/path", c.found > 4 ? ", ..." : "");
 }
 
-/* Rows from `first` on, into the first columns of rows that are `most` wide. *short_of_memory: why
- * it is false. */
+/* Reads rows from `first` on, into the first columns of rows that are `most` wide.
+ * *short_of_memory: the reason of a failure. */
 static bool read_piece(const dataset *d, hsize_t first, hsize_t count, double *rows,
                        bool *short_of_memory)
 {
@@ -215,7 +214,7 @@ static bool read_piece(const dataset *d, hsize_t first, hsize_t count, double *r
                 H5Sselect_hyperslab(memory, H5S_SELECT_SET, to, NULL, size, NULL) >= 0 &&
                 H5Sselect_hyperslab(d->space, H5S_SELECT_SET, from, NULL, size, NULL) >= 0 &&
                 H5Dread(d->set, H5T_NATIVE_DOUBLE, memory, d->space, H5P_DEFAULT, rows) >= 0;
-    *short_of_memory = !good && ebpo_h5_short_of_memory(); /* closing wipes libhdf5's reason */
+    *short_of_memory = !good && ebpo_h5_short_of_memory(); /* closing erases libhdf5's reason */
     if (memory >= 0)
         H5Sclose(memory);
     return good;
@@ -223,12 +222,12 @@ static bool read_piece(const dataset *d, hsize_t first, hsize_t count, double *r
 
 static ebpo_status copy_rows(const dataset *d, ebpo_error *error)
 {
-    static double rows[ROWS_AT_ONCE * COLUMNS_MOST];
+    static double rows[ROWS_AT_ONCE * COLUMNS_MAX];
     for (hsize_t i = 0; i < ROWS_AT_ONCE * (hsize_t)d->most; i++)
         rows[i] = d->fill;
     hsize_t end = d->end < d->size[0] ? d->end : d->size[0];
     uint64_t total = d->size[0];
-    if (!ebpo_apart_write(d->to, &total, sizeof total))
+    if (!ebpo_process_write(d->to, &total, sizeof total))
         return ebpo_fail_errno(error, d->path, "its rows could not be written to TMPDIR");
     for (hsize_t first = d->first; first < end; first += ROWS_AT_ONCE) {
         hsize_t count = end - first < ROWS_AT_ONCE ? end - first : ROWS_AT_ONCE;
@@ -236,7 +235,7 @@ static ebpo_status copy_rows(const dataset *d, ebpo_error *error)
         if (!read_piece(d, first, count, rows, &short_of_memory))
             return short_of_memory ? ebpo_fail_memory(error, d->size[0] * d->size[1] * sizeof *rows)
                                    : rows_fail(d, "the dataset cannot be read", error);
-        if (!ebpo_apart_write(d->to, rows, (size_t)count * d->most * sizeof *rows))
+        if (!ebpo_process_write(d->to, rows, (size_t)count * d->most * sizeof *rows))
             return ebpo_fail_errno(error, d->path, "its rows could not be written to TMPDIR");
     }
     return EBPO_OK;
@@ -268,7 +267,7 @@ static bool take_bytes(const dataset *d, uint64_t from, void *to, uint64_t bytes
     return true;
 }
 
-/* What the other process has left: how many rows there are in all, and those that are wanted. */
+/* Reads the other process's result: the total number of rows, and the requested rows. */
 static ebpo_status take_rows(const dataset *d, double **rows, uint64_t *count, uint64_t *total,
                              ebpo_error *error)
 {
@@ -294,11 +293,11 @@ static ebpo_status make_ready(dataset *d, ebpo_error *error)
     if (!S_ISREG(facts.st_mode))
         return ebpo_fail_file(error, EBPO_E_IO, d->path, "is no regular file; name one");
     uint64_t bytes = (uint64_t)facts.st_size;
-    d->bytes_most =
-        bytes > UINT64_MAX / 2 / EXPANSION_MOST ? UINT64_MAX / 2 : bytes * EXPANSION_MOST;
-    d->bytes_most = d->bytes_most < EXPANSION_FREE ? EXPANSION_FREE : d->bytes_most;
+    d->bytes_max = bytes > UINT64_MAX / 2 / EXPANSION_MAX ? UINT64_MAX / 2 : bytes * EXPANSION_MAX;
+    d->bytes_max = d->bytes_max < EXPANSION_FREE ? EXPANSION_FREE : d->bytes_max;
     d->to = ebpo_open_unnamed(folder && *folder ? folder : "/tmp");
-    return d->to >= 0 ? EBPO_OK : ebpo_fail_errno(error, d->path, "no room for its rows in TMPDIR");
+    return d->to >= 0 ? EBPO_OK
+                      : ebpo_fail_errno(error, d->path, "not enough space for its rows in TMPDIR");
 }
 
 ebpo_status ebpo_rows_read(const char *path, const char *name, unsigned least, unsigned most,
@@ -310,24 +309,25 @@ ebpo_status ebpo_rows_read(const char *path, const char *name, unsigned least, u
 }
 
 ebpo_status ebpo_rows_read_part(const char *path, const char *name, unsigned least, unsigned most,
-                                double fill, uint64_t first, uint64_t most_rows, double **rows,
+                                double fill, uint64_t first, uint64_t max_rows, double **rows,
                                 uint64_t *count, uint64_t *total, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_apart_limits limits = { UINT64_C(1) << 30, 0, 600 };
-    uint64_t end = most_rows > UINT64_MAX - first ? UINT64_MAX : first + most_rows;
+    ebpo_process_limits limits = { UINT64_C(1) << 30, 0, 600 };
+    uint64_t end = max_rows > UINT64_MAX - first ? UINT64_MAX : first + max_rows;
     dataset d = { path, name, -1, least, most, 0, fill, first, end, -1, -1, -1, -1, { 0, 0 } };
     *rows = NULL;
     *count = *total = 0;
-    if (least < 1 || most < least || most > COLUMNS_MOST)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "rows: 1 to %d columns can be asked for",
-                         COLUMNS_MOST);
-    ebpo_status status = ebpo_h5_register(error); /* our own files have such datasets, too */
+    if (least < 1 || most < least || most > COLUMNS_MAX)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "rows: 1 to %d columns can be requested",
+                         COLUMNS_MAX);
+    ebpo_status status =
+        ebpo_h5_register(error); /* files of this library have such datasets, too */
     if (status == EBPO_OK)
         status = make_ready(&d, error);
-    limits.file_bytes = d.bytes_most + sizeof *total;
+    limits.file_bytes = d.bytes_max + sizeof *total;
     if (status == EBPO_OK)
-        status = ebpo_apart(read_apart, &d, path, &limits, error);
+        status = ebpo_run_in_process(read_apart, &d, path, &limits, error);
     if (status == EBPO_OK)
         status = take_rows(&d, rows, count, total, error);
     if (d.to >= 0)

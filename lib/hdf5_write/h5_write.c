@@ -1,8 +1,7 @@
-/* Creating files as this library lays them out: headers in one piece at the start, everything
- * compact in object headers, chunks that come already encoded. What is taken over (spaces, lists
- * of properties) is closed, also when something failed before. The first failure of a write is
- * told by all calls after it (sink.c). Attributes of all kinds, also those of tables for other
- * programs, are written here. */
+/* Creates files in this library's layout: headers in one piece at the start, everything compact in
+ * object headers, chunks that are already encoded. Spaces and property lists are closed, also after
+ * an earlier failure. All calls after a failed write return the first failure (sink.c). Attributes
+ * of all kinds, also those of tables for other programs, are written here. */
 #include <string.h>
 
 #include "core/error.h"
@@ -10,7 +9,7 @@
 #include "hdf5_write/h5_parts.h"
 #include "hdf5_write/zstd_filter.h"
 
-/* Everything stays in object headers, wherever HDF5 would otherwise switch to B-trees and heaps. */
+/* Keeps everything in object headers where HDF5 would otherwise use B-trees and heaps. */
 enum { COMPACT = 65535 };
 
 void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id)
@@ -25,8 +24,8 @@ void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id)
     ebpo_h5_leave(&scope);
 }
 
-/* No metadata is dropped to make room, so none has to be read back: reading may fail, and then
- * libhdf5 cannot close the file. */
+/* Evicts no metadata, so none must be read back: reading may fail, and then libhdf5 cannot close
+ * the file. */
 static bool keep_metadata(hid_t fapl)
 {
     H5AC_cache_config_t config = { .version = H5AC__CURR_CACHE_CONFIG_VERSION };
@@ -89,7 +88,8 @@ ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown
     return status;
 }
 
-/* libhdf5 does not try twice to close a file: it has let go of it even if it failed. */
+/* Closes the file once: libhdf5 does not try twice, and has released the file even if closing
+ * failed. */
 static ebpo_status close_file(ebpo_h5_out *out, ebpo_error *error)
 {
     bool flushed = H5Fflush(out->file, H5F_SCOPE_LOCAL) >= 0;
@@ -144,7 +144,7 @@ ebpo_status ebpo_h5_make_group(ebpo_h5_out *out, const char *path, unsigned link
 
 /* --- attributes: stored little-endian, from values in the machine's order --- */
 
-/* `count` 0: a scalar. */
+/* Writes numbers; `count` 0: a scalar. */
 static ebpo_status put_numbers(ebpo_h5_out *out, ebpo_h5_id id, const char *name, hid_t stored,
                                hid_t memory, const void *values, unsigned count, ebpo_error *error)
 {
@@ -192,7 +192,7 @@ ebpo_status ebpo_h5_put_real(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
     return status;
 }
 
-/* A text of fixed length, without a closing zero byte. */
+/* Writes a text of fixed length, without a terminating zero byte. */
 static ebpo_status put_string(ebpo_h5_out *out, ebpo_h5_id id, const char *name, const char *text,
                               size_t size, bool utf8, ebpo_error *error)
 {
@@ -289,8 +289,9 @@ ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
     return status;
 }
 
-/* Metadata blocks end with a checksum, unused space is zero: the head ends at the last byte that is
- * not zero, up to a few that happen to be. */
+/* Returns the size of the head. Metadata blocks end with a checksum, and unused space is zero: the
+ * head ends at the last byte that is not zero, or a few bytes later if a checksum ends with zeros.
+ */
 ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes,
                               ebpo_error *error)
 {
@@ -343,7 +344,7 @@ void ebpo_h5_discard(ebpo_h5_out *out)
         return;
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    /* nobody wants these bytes any more */
+    /* these bytes are not needed any more */
     (void)ebpo_fail(&unwanted, EBPO_E_CANCELLED, "given up");
     ebpo_h5_sink_fail(out->sink, &unwanted);
     if (out->file >= 0 && H5Fclose(out->file) < 0)
@@ -355,8 +356,8 @@ void ebpo_h5_discard(ebpo_h5_out *out)
     ebpo_h5_leave(&scope);
 }
 
-static ebpo_status tell_outcome(const ebpo_h5_out *out, const char *object, bool good,
-                                const char *what, ebpo_error *error)
+static ebpo_status report_outcome(const ebpo_h5_out *out, const char *object, bool good,
+                                  const char *what, ebpo_error *error)
 {
     ebpo_error cause = EBPO_ERROR_INIT;
     if (out->sink && ebpo_h5_sink_status(out->sink, error) != EBPO_OK)
@@ -372,12 +373,12 @@ static ebpo_status tell_outcome(const ebpo_h5_out *out, const char *object, bool
 
 ebpo_status ebpo_h5_created(const ebpo_h5_out *out, ebpo_error *error)
 {
-    return tell_outcome(out, "", out->file >= 0, "libhdf5 could not create the file", error);
+    return report_outcome(out, "", out->file >= 0, "libhdf5 could not create the file", error);
 }
 
 ebpo_status ebpo_h5_written(const ebpo_h5_out *out, const char *what, bool good, ebpo_error *error)
 {
-    return tell_outcome(out, what, good, "libhdf5 could not write", error);
+    return report_outcome(out, what, good, "libhdf5 could not write", error);
 }
 
 void ebpo_h5_close_list(hid_t list)

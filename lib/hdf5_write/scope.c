@@ -1,7 +1,7 @@
-/* The scope of a use of libhdf5: a mutex, since Debian's serial build is not thread-safe, and
- * HDF5's printing of errors, switched off and given back. Within it, messages that name file,
- * object and libhdf5's innermost reason, opening files of others to read, and the filter of this
- * library, which is registered once. */
+/* The scope of a use of libhdf5: a mutex, because Debian's serial build is not thread-safe, and
+ * HDF5's error printing, switched off and restored. Within it: messages that name file, object and
+ * libhdf5's innermost reason, opening untrusted files to read, and registering the library's filter
+ * once. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -31,7 +31,7 @@ void ebpo_h5_leave(ebpo_h5_scope *scope)
     pthread_mutex_unlock(&library);
 }
 
-/* libhdf5 tells the path first, the number of the error behind it */
+/* libhdf5 prints the path first, then the error number */
 enum { CAUSE_BYTES = 8192, CAUSE_SHOWN = 160 };
 
 static herr_t take_first(unsigned depth, const H5E_error2_t *entry, void *data)
@@ -56,7 +56,7 @@ bool ebpo_h5_short_of_memory(void)
     return found;
 }
 
-/* Returns the number of the system's error in libhdf5's reason, 0 if there is none. */
+/* Returns the system's error number in libhdf5's reason, 0 if there is none. */
 static int system_error(const char *cause)
 {
     const char *number = strstr(cause, "errno = ");
@@ -72,7 +72,7 @@ ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *show
     int number = system_error(cause);
     if (number > 0)
         return ebpo_fail_at(error, status, shown, object, -1, "%s: %s", what, strerror(number));
-    if (*cause && ebpo_text_ok(cause)) /* names from the file may be in it */
+    if (*cause && ebpo_text_ok(cause)) /* it may contain names from the file */
         return ebpo_fail_at(error, status, shown, object, -1, "%s (libhdf5: %.*s)", what,
                             CAUSE_SHOWN, cause);
     return ebpo_fail_at(error, status, shown, object, -1, "%s", what);
@@ -84,7 +84,8 @@ static hid_t open_with(const char *path, bool lock)
     if (!lock)
         H5Pset_file_locking(fapl, false, true);
     hid_t file = H5Fopen(path, H5F_ACC_RDONLY, fapl);
-    if (fapl >= 0 && file >= 0) /* else closing wipes libhdf5's reason, of which one list is left */
+    if (fapl >= 0 && file >= 0) /* otherwise closing erases libhdf5's reason, of which there is only
+                                 * one list */
         H5Pclose(fapl);
     return file;
 }
@@ -103,8 +104,9 @@ ebpo_status ebpo_h5_open_to_read(const char *path, const char *shown, bool lock,
                               "is open for writing in another program; close it there first");
     if (strstr(cause, "already open for write"))
         return ebpo_fail_file(error, EBPO_E_IO, shown,
-                              "is marked as open for writing; close it in the program that writes "
-                              "it, or remove the mark of one that ended early with `h5clear -s`");
+                              "is marked as open for writing; close it in the program that "
+                              "writes it, or, if that program has crashed, remove the mark with "
+                              "`h5clear -s`");
     if (number) {
         H5Eclear2(H5E_DEFAULT);
         *file = open_with(path, false);

@@ -1,8 +1,8 @@
-/* The virtual file driver through which libhdf5 writes. libhdf5 1.10 does not survive a write that
- * fails: what it cannot flush stays behind with an id that has lost its file, over which it trips
- * at exit. So the first failure is kept, and told by everything that is called after it; to
- * libhdf5 all writes succeed, and it always comes to an end. Bytes go to a file or, without one,
- * to memory. */
+/* The virtual file driver through which libhdf5 writes. libhdf5 1.10 does not survive a failing
+ * write: unflushed data stays behind with an id that has lost its file, and libhdf5 fails on it at
+ * exit. So the driver keeps the first failure and reports it in all later calls of this module; for
+ * libhdf5 all writes succeed, so it always terminates. Bytes go to a file or, without one, to
+ * memory. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -15,17 +15,17 @@
 #include "core/alloc.h"
 #include "core/error.h"
 
-/* No system writes more at once. */
+/* No system writes more in one call. */
 static const size_t PIECE_MAX = (size_t)1 << 30;
 
-/* What libhdf5 sees of an open file; it begins with libhdf5's own part. */
+/* libhdf5's view of an open file; begins with libhdf5's own part. */
 typedef struct sink_file {
     H5FD_t libhdf5;
     ebpo_h5_sink *sink;
     haddr_t end_of_addresses;
 } sink_file;
 
-/* What a file access list carries. */
+/* The content of a file access list. */
 typedef struct sink_choice {
     ebpo_h5_sink *sink;
 } sink_choice;
@@ -97,14 +97,15 @@ void ebpo_h5_sink_abandon(ebpo_h5_sink *sink)
 {
     let_go(sink);
     if (sink->status == EBPO_OK)
-        sink->status = EBPO_E_MEMORY; /* nothing is written any more */
+        sink->status = EBPO_E_MEMORY; /* nothing more is written */
 }
 
 static H5FD_t *sink_open(const char *name, unsigned flags, hid_t fapl, haddr_t address_max)
 {
     (void)name;
     (void)address_max;
-    (void)flags; /* the sink was empty when it was made; libhdf5 opens and closes as it likes */
+    (void)
+        flags; /* the sink was empty when it was made; libhdf5 may open and close it at any time */
     const sink_choice *choice = H5Pget_driver_info(fapl);
     if (!choice)
         return NULL;
@@ -124,7 +125,7 @@ static herr_t sink_close(H5FD_t *file)
     return 0;
 }
 
-/* The same as of libhdf5's own driver, on which the places of metadata depend. */
+/* Same as in libhdf5's own driver; the offsets of metadata depend on it. */
 static herr_t sink_query(const H5FD_t *file, unsigned long *flags)
 {
     (void)file;
@@ -152,7 +153,7 @@ static haddr_t sink_get_eof(const H5FD_t *file, H5FD_mem_t type)
     return ((const sink_file *)file)->sink->size;
 }
 
-/* How many bytes are there; what lies behind the end reads as zeros. */
+/* Returns the number of bytes read; bytes beyond the end are zeros. */
 static size_t read_file(ebpo_h5_sink *sink, uint64_t at, size_t size, uint8_t *to)
 {
     size_t done = 0;
@@ -213,7 +214,7 @@ static void write_memory(ebpo_h5_sink *sink, uint64_t at, size_t size, const uin
         uint8_t *more = capacity <= SIZE_MAX ? realloc(sink->memory, (size_t)capacity) : NULL;
         if (!more) {
             errno = ENOMEM;
-            fail_errno(sink, "could not be laid out in memory");
+            fail_errno(sink, "could not be written to memory");
             return;
         }
         memset(more + sink->capacity, 0, (size_t)(capacity - sink->capacity));
@@ -238,7 +239,7 @@ static herr_t sink_write(H5FD_t *file, H5FD_mem_t type, hid_t dxpl, haddr_t addr
     return 0;
 }
 
-/* Files end where their addresses do. */
+/* Makes the file end at its last address. */
 static herr_t sink_truncate(H5FD_t *file, hid_t dxpl, hbool_t closing)
 {
     (void)dxpl;
@@ -256,7 +257,7 @@ static herr_t sink_truncate(H5FD_t *file, hid_t dxpl, hbool_t closing)
 static const H5FD_class_t sink_class = {
 #ifdef H5FD_CLASS_VERSION
     .version = H5FD_CLASS_VERSION,
-    .value = (H5FD_class_value_t)400, /* of those for private use */
+    .value = (H5FD_class_value_t)400, /* from the range for private use */
 #endif
     .name = "ebpo sink",
     .maxaddr = (haddr_t)INT64_MAX,
@@ -274,9 +275,9 @@ static const H5FD_class_t sink_class = {
     .fl_map = H5FD_FLMAP_DICHOTOMY,
 };
 
-/* Registered anew for each file: the caller may have closed and reopened libhdf5 since. Held until
- * the file is closed, because libhdf5 calls the driver's `close` through the registration after
- * giving up its own hold on it. */
+/* Registers the driver for each file: the caller may have closed and reopened libhdf5 since. The
+ * registration is held until the file is closed, because libhdf5 calls the driver's `close` through
+ * it after releasing its own reference. */
 bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl)
 {
     sink_choice choice = { sink };

@@ -1,5 +1,5 @@
-/* In place of this module where the library is built without libhdf5 (-Dhdf5=disabled): it reads
- * everything, and what writes HDF5 files says that it cannot. */
+/* Replaces this module where the library is built without libhdf5 (-Dhdf5=disabled): it reads
+ * everything, and the functions that write HDF5 files fail. */
 #include <ebpo/rows.h>
 
 #include "core/error.h"
@@ -111,7 +111,7 @@ ebpo_status ebpo_h5_size(ebpo_h5_out *out, uint64_t *bytes, ebpo_error *error)
 
 ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error)
 {
-    /* nothing was begun */
+    /* nothing was started */
     (void)out, (void)error;
     return EBPO_OK;
 }
@@ -171,10 +171,10 @@ ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path, ebpo_h5_number
 }
 
 ebpo_status ebpo_h5_clean_copy(const char *from, bool from_goes, const char *to, const char *shown,
-                               ebpo_h5_chunk_rows_fn chunk_rows, const ebpo_apart_limits *limits,
-                               ebpo_error *left_out, ebpo_error *error)
+                               ebpo_h5_chunk_rows_fn chunk_rows, const ebpo_process_limits *limits,
+                               ebpo_error *omitted, ebpo_error *error)
 {
-    (void)from, (void)from_goes, (void)to, (void)chunk_rows, (void)limits, (void)left_out;
+    (void)from, (void)from_goes, (void)to, (void)chunk_rows, (void)limits, (void)omitted;
     return is_unsupported(shown, error);
 }
 
@@ -188,10 +188,10 @@ ebpo_status ebpo_rows_read(const char *path, const char *name, unsigned least, u
 }
 
 ebpo_status ebpo_rows_read_part(const char *path, const char *name, unsigned least, unsigned most,
-                                double fill, uint64_t first, uint64_t most_rows, double **rows,
+                                double fill, uint64_t first, uint64_t max_rows, double **rows,
                                 uint64_t *count, uint64_t *total, ebpo_error *error)
 {
-    (void)first, (void)most_rows;
+    (void)first, (void)max_rows;
     *total = 0;
     return ebpo_rows_read(path, name, least, most, fill, rows, count, error);
 }

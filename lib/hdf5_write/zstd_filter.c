@@ -1,7 +1,7 @@
-/* HDF5 filter 32015, a chunk as one zstd frame: for libhdf5 in this process, which it is
- * registered with, and, compiled once more with EBPO_FILTER_IN_PLUGIN, as a plugin for h5dump,
- * h5py and every other program. It uses headers of HDF5 only and links nothing of it, so that one
- * plugin serves all builds. */
+/* HDF5 filter 32015, a chunk as one zstd frame. It is registered with libhdf5 in this process and,
+ * compiled a second time with EBPO_FILTER_IN_PLUGIN, is a plugin for h5dump, h5py and all other
+ * programs. It uses only headers of HDF5 and links nothing of it, so one plugin serves all builds.
+ */
 #include "hdf5_write/zstd_filter.h"
 
 #ifdef EBPO_FILTER_IN_PLUGIN
@@ -13,11 +13,11 @@
 
 enum { DEFAULT_LEVEL = 3 };
 
-/* HDF5 keeps chunk sizes in 32 bits. */
+/* HDF5 stores chunk sizes in 32 bits. */
 static const uint64_t CHUNK_MAX = UINT32_MAX;
 
-/* HDF5 takes 0 as a sign of failure, and this as its cause. The plugin does without: programs that
- * keep libhdf5 to themselves, as h5py does, could not load it for want of these symbols. */
+/* Returns 0, HDF5's sign of failure, and sets the cause. The plugin sets no cause: programs with a
+ * private libhdf5, such as h5py, could not load it because these symbols would be missing. */
 static size_t short_of_memory(void)
 {
 #ifndef EBPO_FILTER_IN_PLUGIN
@@ -60,7 +60,7 @@ failed:
     return 0; /* HDF5's sign of failure */
 }
 
-/* A frame that states its size: one call. */
+/* Decodes a frame that states its size, in one call. */
 static size_t expand_known(uint64_t size, size_t bytes, size_t *buffer_size, void **buffer)
 {
     void *block = NULL;
@@ -76,7 +76,7 @@ static size_t expand_known(uint64_t size, size_t bytes, size_t *buffer_size, voi
     return replace_buffer(buffer, buffer_size, block, (size_t)size, used);
 }
 
-/* A frame from another writer that does not: grow as it comes. */
+/* Decodes a frame of another writer that does not state its size; the buffer grows. */
 static size_t expand_unknown(size_t bytes, size_t *buffer_size, void **buffer)
 {
     ZSTD_DCtx *context = ZSTD_createDCtx();

@@ -1,6 +1,6 @@
-/* HDF5 filter 32015: a chunk as one zstd frame. One class for our own programs (registered) and for
- * everybody else's (plugin). Links nothing of HDF5, so that one plugin serves the serial and the
- * MPI builds. */
+/* HDF5 filter 32015: a chunk as one zstd frame. One class serves the library's programs
+ * (registered) and all others (plugin). It links nothing of HDF5, so one plugin serves the serial
+ * and the MPI builds. */
 #ifndef EBPO_HDF5_WRITE_ZSTD_FILTER_H
 #define EBPO_HDF5_WRITE_ZSTD_FILTER_H
 
@@ -8,8 +8,8 @@
 
 enum { EBPO_ZSTD_FILTER_ID = 32015 };
 
-/* cd_values[0], when given, is the compression level (default 3). Frames carry their content's size
- * and checksum. Reads any single zstd frame, with or without them. */
+/* cd_values[0], when given, is the compression level (default 3). Frames have their content's size
+ * and a checksum. Reads any single zstd frame, with or without them. */
 extern const H5Z_class2_t ebpo_zstd_filter;
 
 #endif

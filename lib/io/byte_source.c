@@ -1,8 +1,8 @@
-/* Where the bytes of a file come from: a regular file by pread, memory of the caller, or a URL
- * (http_source.c), all as ebpo_source. An input is a source with a name for messages and a count
- * of what is read; it bounds each read by the source's size. Files are not mapped, as one that is
- * shortened by another program would end the process. Also what a URL is, and how it is shown
- * without passwords. */
+/* Sources of a file's bytes: a regular file by pread, memory of the caller, or a URL
+ * (http_source.c), all as ebpo_source. An input is a source with a name for messages and a count of
+ * reads; it bounds each read by the source's size. Files are not mapped, because a file shortened
+ * by another program would end the process. Also recognises URLs, and shows them without passwords.
+ */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -18,7 +18,7 @@
 #include "core/error.h"
 #include "io/byte_source.h"
 
-/* No system reads more at once. */
+/* No system reads more in one call. */
 static const uint64_t PIECE_MAX = UINT64_C(1) << 30;
 
 typedef struct path_source {
@@ -62,11 +62,11 @@ static ebpo_status fail_to_open(const char *path, ebpo_error *error)
 {
     if (errno == ENOENT && strstr(path, "://"))
         return ebpo_fail_file(error, EBPO_E_IO, path,
-                              "no such file, and of URLs only http:// and https:// are read");
+                              "no such file; the only supported URLs are http:// and https://");
     return ebpo_fail_errno(error, path, "cannot be opened");
 }
 
-/* Non-blocking: a pipe must not hang us. */
+/* Opens non-blocking: a pipe must not block. */
 static ebpo_status open_regular(const char *path, int *fd, uint64_t *size, ebpo_error *error)
 {
     struct stat facts;
@@ -77,7 +77,7 @@ static ebpo_status open_regular(const char *path, int *fd, uint64_t *size, ebpo_
     if (fstat(*fd, &facts) < 0)
         status = ebpo_fail_errno(error, path, "cannot be examined");
     else if (!S_ISREG(facts.st_mode))
-        status = ebpo_fail_file(error, EBPO_E_IO, path, "not a regular file; give the name of one");
+        status = ebpo_fail_file(error, EBPO_E_IO, path, "not a regular file");
     else
         *size = (uint64_t)facts.st_size;
     if (status != EBPO_OK)
@@ -128,7 +128,7 @@ void ebpo_input_hint(ebpo_input *input, const ebpo_range *ranges, size_t count)
     for (size_t i = 0; i < count && ebpo_input_hints(input); i++)
         if (ranges[i].size < LARGE && ranges[i].offset <= input->source.size)
             (void)posix_fadvise(s->fd, (off_t)ranges[i].offset, (off_t)ranges[i].size,
-                                POSIX_FADV_WILLNEED); /* reading tells what is wrong */
+                                POSIX_FADV_WILLNEED); /* reading reports errors */
 #else
     (void)input;
     (void)ranges;
@@ -146,14 +146,14 @@ static ebpo_status memory_read(void *user, uint64_t offset, uint64_t size, void 
 
 ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
 {
-    /* read only, whatever the type of `user` says */
+    /* only read, although `user` is not const */
     return (ebpo_source){
         sizeof(ebpo_source), (void *)(uintptr_t)data, size, memory_read, NULL, NULL, 0
     };
 }
 
-/* What the source had to fetch before it could be opened: counted once, however often it is looked
- * at. */
+/* Returns the bytes that the source fetched before it was opened; counted once, however often this
+ * is called. */
 static uint64_t bytes_prefetched(const ebpo_input *input)
 {
     return input->source.prefetched < input->source.size ? input->source.prefetched
@@ -202,7 +202,7 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
     if (status == EBPO_OK)
         return EBPO_OK;
     if (*cause.message) {
-        cause.status = status; /* a caller's own source may tell nothing but the message */
+        cause.status = status; /* a caller's own source may set only the message */
         return ebpo_fail_with(error, &cause);
     }
     return ebpo_fail_at(error, status, input->shown, "", (int64_t)offset,
@@ -217,7 +217,7 @@ void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count
         return;
     for (size_t i = 0; i < count; i++)
         if (ranges[i].offset > size || ranges[i].size > size - ranges[i].offset)
-            return; /* the reading will say so */
+            return; /* reading will report it */
     input->source.prefetch(input->source.user, ranges, count);
 }
 
@@ -242,8 +242,8 @@ char *ebpo_url_redact(const char *name, char *out, size_t capacity)
         const char *host = strstr(name, "//") + 2;
         used = append_text(out, 0, capacity, name, (size_t)(host - name));
         for (size_t i = strcspn(host, "/?#"); i > 0; i--)
-            if (host[i - 1] == '@') { /* the last one: a password with another breaks the rules, but
-                                         is a password */
+            if (host[i - 1] == '@') { /* the last @: a password that contains one is invalid in a
+                                       * URL, but is a password */
                 host += i;
                 break;
             }

@@ -1,5 +1,5 @@
-/* Where the bytes of a file come from: regular files and memory as ebpo_source, and an input, which
- * is a source with a name and a count of its use. */
+/* Sources of a file's bytes: regular files and memory as ebpo_source, and an input, which is a
+ * source with a name and a count of its use. */
 #ifndef EBPO_IO_BYTE_SOURCE_H
 #define EBPO_IO_BYTE_SOURCE_H
 
@@ -8,65 +8,65 @@
 #include <ebpo/file.h>
 #include <ebpo/http.h>
 
-/* Opens a regular file, by pread: one that is shortened while it is open gives EBPO_E_IO, where a
+/* Opens a regular file, by pread: if it is shortened while open, reads return EBPO_E_IO, where a
  * mapping would raise SIGBUS. EBPO_E_IO when it is missing, may not be read, or is a folder, pipe
- * or device. The caller (or whoever takes the source over) calls out->close. */
+ * or device. The owner of the source calls out->close. */
 EBPO_MUST_USE ebpo_status ebpo_source_of_path(ebpo_source *out, const char *path,
                                               ebpo_error *error);
 
-/* `size` bytes that stay the caller's and outlive the source. There is nothing to close. */
+/* Returns a source of `size` bytes, which stay the caller's and outlive the source. There is
+ * nothing to close. */
 ebpo_source ebpo_source_of_memory(const void *data, uint64_t size);
 
-/* A source being read. Any number of threads may read at once. */
+/* A source being read. Thread-safe for reading. */
 typedef struct ebpo_input {
     ebpo_source source;
     char *shown; /* the name for messages */
     _Atomic uint64_t bytes, reads;
 } ebpo_input;
 
-/* Takes the source over; on failure (EBPO_E_MEMORY) it is closed. `name` is copied. */
+/* Takes ownership of the source; on failure (EBPO_E_MEMORY) closes it. `name` is copied. */
 EBPO_MUST_USE ebpo_status ebpo_input_open(ebpo_input *input, const ebpo_source *source,
                                           const char *name, ebpo_error *error);
 /* Closes the source, once. Harmless on a zeroed input. */
 void ebpo_input_close(ebpo_input *input);
 
-/* Bytes [offset, offset + size) into `data`. Beyond the source's end: EBPO_E_FORMAT, because only
- * the file itself can have named such an offset. The status of the source's own `read` is passed
- * on, with a message if it gave none. */
+/* Reads bytes [offset, offset + size) into `data`. Beyond the source's end: EBPO_E_FORMAT, because
+ * only the file itself can have named such an offset. The status of the source's own `read` is
+ * passed on, with a message if it gave none. */
 EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size,
                                           void *data, ebpo_error *error);
 
-/* Returns the descriptor of the file that it reads, which stays the input's; -1: it reads none, or
- * a copy in place of the file that it is named after (open_file.c). */
+/* Returns the descriptor of the file, which stays the input's; -1: it reads none, or a copy in
+ * place of the named file (open_file.c). */
 int ebpo_input_descriptor(const ebpo_input *input);
 
-/* True when announcing is of use. */
+/* Returns true when prefetch hints are useful. */
 static inline bool ebpo_input_expects(const ebpo_input *input)
 {
     return input->source.prefetch != NULL;
 }
-/* True when opening should not read everything. */
+/* Returns true when opening should not read everything. */
 static inline bool ebpo_input_is_far(const ebpo_input *input)
 {
     return input->source.prefetch && input->source.prefetched &&
            input->source.prefetched < input->source.size;
 }
-/* Announces what will be read. Ranges beyond the source's end are let pass: reading them will fail.
- */
+/* Passes on prefetch hints. Ranges beyond the source's end are ignored: reading them will fail. */
 void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count);
 
-/* True when the system can be told what of the source will be read, which helps where it lies on a
+/* Returns true when the system accepts prefetch hints for the source, which helps where it is on a
  * disk: a file opened by its name. */
 bool ebpo_input_hints(const ebpo_input *input);
-/* Tells it; it begins to read, and nobody waits. Ranges that are large, which it reads ahead by
- * itself, are let pass. */
+/* Passes prefetch hints to the system, which starts reading without blocking. Large ranges, which
+ * it reads ahead by itself, are skipped. */
 void ebpo_input_hint(ebpo_input *input, const ebpo_range *ranges, size_t count);
 
-/* What the layers above need of sources by URL: ebpo/http.h, and the figures of such a source. */
+/* Sources by URL for the layers above: ebpo/http.h, and the statistics of such a source. */
 
-enum { EBPO_SHOWN_BYTES = 300 }; /* room for a URL in a message */
+enum { EBPO_SHOWN_BYTES = 300 }; /* size of a URL in a message */
 
-/* False when the source is not one of ebpo_source_of_url. */
+/* Returns false when the source is not from ebpo_source_of_url. */
 bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out);
 
 #endif

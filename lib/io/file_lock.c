@@ -1,7 +1,7 @@
-/* Locks for the file at a path: a lock file beside it, locked by flock, which the system releases
- * when the process ends. A lock file that has lost its name is given up and taken anew. Locks bind
- * the users of this library alone, and some file systems have none, so replacing a file also
- * compares versions (publish.c). */
+/* Locks the file at a path: a lock file beside it, locked by flock, which the system releases when
+ * the process ends. A lock file that has lost its name is released and taken anew. Locks affect
+ * only users of this library, and some file systems have none, so replacing a file also compares
+ * versions (publish.c). */
 #include "io/file_lock.h"
 
 #include <errno.h>
@@ -21,8 +21,8 @@
 #include "io/file_source.h"
 #include "io/unfinished.h"
 
-/* Opens the lock file, which is made if need be. To write, which locks over NFS need, or else to
- * read: another user's. errno EACCES: it cannot be made, or not be read. */
+/* Opens the lock file and makes it if necessary. Opens it to write, which locks over NFS need, or
+ * else to read: another user's. errno EACCES: it cannot be made or read. */
 static int open_lock_file(const char *path)
 {
     enum { HOW = O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY };
@@ -30,18 +30,19 @@ static int open_lock_file(const char *path)
     if (fd < 0 && errno == ENOENT)
         return open(path, O_RDWR | O_CREAT | O_EXCL | HOW, 0666);
     if (fd < 0 && errno == EACCES && (fd = open(path, O_RDONLY | HOW)) < 0 && errno == ENOENT)
-        errno = EEXIST; /* it was there: try again */
+        errno = EEXIST; /* it existed: try again */
     return fd;
 }
 
-/* Returns false for a file of other use that has the lock file's name: it must not be removed. */
+/* Returns false for another file with the lock file's name: it must not be removed. */
 static bool is_lock_file(int fd)
 {
     struct stat st;
     return fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && st.st_size == 0;
 }
 
-/* Returns true if the descriptor's file still has its name: who had the lock before removed it. */
+/* Returns true if the descriptor's file still has its name; the previous holder removes the name.
+ */
 static bool has_its_name(int fd, const char *path)
 {
     struct stat open_one, named;
@@ -51,13 +52,14 @@ static bool has_its_name(int fd, const char *path)
 
 typedef enum attempt { TAKEN, BUSY, NO_LOCKS } attempt;
 
-/* Tries without waiting: again where others made or removed the lock file at the same moment. */
+/* Tries without waiting, repeatedly if other processes made or removed the lock file at the same
+ * moment. */
 static attempt try_lock(ebpo_file_lock *lock)
 {
     for (int tries = 0; tries < 100; tries++) {
         int fd = open_lock_file(lock->path);
         if (fd < 0 && (errno == EEXIST || errno == EINTR))
-            continue; /* another one has made or removed it just now */
+            continue; /* another process has just made or removed it */
         if (fd < 0)
             return NO_LOCKS;
         if (!is_lock_file(fd)) {
@@ -66,7 +68,7 @@ static attempt try_lock(ebpo_file_lock *lock)
         }
         if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
             attempt why = errno == EWOULDBLOCK || errno == EINTR ? BUSY : NO_LOCKS;
-            if (why == NO_LOCKS && errno != EBADF) /* EBADF: it is another user's */
+            if (why == NO_LOCKS && errno != EBADF) /* EBADF: it belongs to another user */
                 unlink(lock->path);
             close(fd);
             return why;
@@ -120,8 +122,8 @@ ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path, double s
         if (ebpo_seconds() - begun >= seconds) {
             ebpo_file_lock_release(lock);
             return ebpo_fail_file(error, EBPO_E_IO, path,
-                                  "another program has been changing it for %.3g s; try again when "
-                                  "that has ended, or write to another file",
+                                  "another program has been changing it for %.3g s; try again "
+                                  "after that, or write to another file",
                                   seconds);
         }
         pause_between(i);
@@ -140,7 +142,7 @@ ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path, double s
 void ebpo_file_lock_release(ebpo_file_lock *lock)
 {
     if (lock->fd >= 0 && lock->process == (long)getpid()) {
-        unlink(lock->path); /* first: who gets the lock later sees that the name is gone */
+        unlink(lock->path); /* first, so that the next holder sees that the name is gone */
         flock(lock->fd, LOCK_UN);
     }
     if (lock->fd >= 0)

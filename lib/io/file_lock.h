@@ -1,18 +1,19 @@
-/* Locks for those who read, change and replace the file at a path. They bind programs that use this
- * library, and nobody else.
+/* Locks for programs that read, change and replace the file at a path. They affect only programs
+ * that use this library.
  *
  * The lock of NAME is the empty file ".NAME.lock" beside it, locked by flock and removed when it is
- * released: not NAME itself, which is replaced, and which libhdf5 locks for everybody who reads it.
- * A killed process leaves the lock file behind, unlocked; the next one uses and removes it. */
+ * released: not NAME itself, which is replaced, and which libhdf5 locks for all readers. A killed
+ * process leaves the lock file behind, unlocked; the next process uses and removes it. */
 #ifndef EBPO_IO_FILE_LOCK_H
 #define EBPO_IO_FILE_LOCK_H
 
 #include <ebpo/base.h>
 
 typedef struct ebpo_file_lock {
-    int fd; /* of the lock file; -1: not held */
+    int fd; /* descriptor of the lock file; -1: not held */
     int slot;
-    long process; /* that took it: a child inherits the descriptor, but not the lock */
+    long
+        process; /* process that took the lock: a child inherits the descriptor, but not the lock */
     char *path;
 } ebpo_file_lock;
 
@@ -21,19 +22,19 @@ typedef struct ebpo_file_lock {
         -1, -1, 0, NULL     \
     }
 
-/* Seconds for which a save waits for others that only save. */
+/* Seconds that a save waits for other saves. */
 #define EBPO_FILE_LOCK_SAVING 10.0
 
 /* Waits up to `seconds` for the lock of the file at `path`, which need not exist. Reports the stage
- * "waiting" to `progress`, which may be NULL. Also returns EBPO_OK, with fd = -1, where no lock
- * can be had: on file systems without locks, in folders that cannot be written to, or where the
- * lock file's name belongs to anything but an empty file. EBPO_E_IO: another program has the lock
- * still. EBPO_E_CANCELLED, EBPO_E_MEMORY. */
+ * "waiting" to `progress`, which may be NULL. Also returns EBPO_OK, with fd = -1, where locking is
+ * not possible: on file systems without locks, in folders without write permission, or where the
+ * lock file's name belongs to a file that is not empty. EBPO_E_IO: another program still has the
+ * lock. EBPO_E_CANCELLED, EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path,
                                               double seconds, const ebpo_progress *progress,
                                               ebpo_error *error);
 
-/* Harmless on EBPO_FILE_LOCK_INIT. */
+/* Releases the lock. Harmless on EBPO_FILE_LOCK_INIT. */
 void ebpo_file_lock_release(ebpo_file_lock *lock);
 
 #endif

@@ -1,8 +1,8 @@
-/* Whole files that are read into memory or a workspace: meshes, images, scenes. A file that
- * changes while it is read is refused, by its size, its times and, where these are in doubt, its
- * bytes. Files that another file names are opened below a folder and never outside it, in one
- * system call where there is one (openat2). What is given by mistake is recognised by its first
- * bytes, and the message says what to do about it. */
+/* Reads whole files into memory or a workspace: meshes, images, scenes. A file that changes while
+ * it is read is rejected, by its size, its times and, where these are in doubt, its bytes. Files
+ * that another file names are opened below a folder and never outside it, in one system call where
+ * available (openat2). Files of wrong kinds are recognised by their first bytes, and the message
+ * gives a remedy. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -25,7 +25,8 @@
 
 enum { PIECE = 1 << 22, FRESH_NS = 100000000 };
 
-/* Less than 0.1 s ago, or in times to come: the system's times go in steps of some milliseconds. */
+/* Returns true for a change less than 0.1 s ago, or in the future: file times have steps of some
+ * milliseconds. */
 static bool is_fresh(const struct stat *st)
 {
     struct timespec now;
@@ -39,7 +40,7 @@ static bool is_fresh(const struct stat *st)
 ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path, ebpo_error *error)
 {
     *out = (ebpo_whole_file)EBPO_WHOLE_FILE_INIT;
-    /* non-blocking: a pipe must not hang us */
+    /* non-blocking: a pipe must not block */
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (fd < 0)
         return ebpo_fail_errno(error, path, "cannot be opened for reading");
@@ -126,7 +127,7 @@ ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspac
                              "reading", error);
 }
 
-/* Whether it still says what was loaded. */
+/* Compares the file's current content with the loaded bytes. */
 static ebpo_status compare_bytes(const ebpo_whole_file *file, const char *path, bool *same,
                                  ebpo_error *error)
 {
@@ -208,7 +209,7 @@ ebpo_status ebpo_target_path(const char *path, char **out, ebpo_error *error)
 
 enum { FLAGS = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY };
 
-/* False: the system has no such call, or a filter forbids it. */
+/* Opens with openat2; returns false if the system has no such call, or a filter forbids it. */
 static bool open_at_once(int top, const char *name, int *fd)
 {
 #ifdef EBPO_HAVE_OPENAT2
@@ -221,7 +222,7 @@ static bool open_at_once(int top, const char *name, int *fd)
 #endif
 }
 
-/* Word by word, from folder to folder. */
+/* Opens part by part, from folder to folder. */
 static int open_word_by_word(int top, char *name)
 {
     char *left = NULL, *word = strtok_r(name, "/", &left), *next;
@@ -293,7 +294,7 @@ static const struct {
     { "glTF", 4, "is a glTF file; save the mesh as PLY, OBJ, STL or OFF" },
 };
 
-/* Text of two bytes a character without a mark: every other byte is zero. */
+/* Returns true for text of two bytes a character without a mark: every other byte is zero. */
 static bool is_wide(const uint8_t *data, uint64_t size)
 {
     enum { CHARACTERS = 8 };
@@ -318,7 +319,7 @@ static bool begins_with(const char *text, uint64_t size, const char *word)
     return size >= n && strncasecmp(text, word, n) == 0;
 }
 
-/* Markup may begin behind white space. */
+/* Finds markup, which may begin behind white space. */
 static const char *find_markup(const char *text, uint64_t size)
 {
     for (; size && (*text == ' ' || (*text >= '\t' && *text <= '\r')); size--)

@@ -1,9 +1,9 @@
-/* What has been fetched of a file on a server. In memory: pieces, in order and without overlaps,
- * each fetched by one request and kept as long as memory allows; those announced but not yet read
- * are kept first, then those read last. In a folder, if there is one: blocks as files, named by a
- * digest of address and version, with a SHA-256 of their own; they are written under temporary
- * names, so that any number of processes may share the folder, and the oldest go beyond its limit.
- * Nothing depends on the folder: what is missing or damaged is fetched. */
+/* Fetched parts of a file on a server. In memory: pieces, in order and without overlaps, each
+ * fetched by one request and kept while memory allows; pieces with prefetch hints that are not read
+ * yet are kept first, then the last read ones. In a folder, if there is one: blocks as files, named
+ * by a digest of address and version, each with a SHA-256. They are written under temporary names,
+ * so any number of processes may share the folder, and the oldest are removed beyond its limit.
+ * Nothing depends on the folder: missing or damaged blocks are fetched. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -28,14 +28,14 @@
 enum { MAGIC_BYTES = 8, DIGEST_AT = 24, HEAD_BYTES = 56, NAME_BYTES = 128 };
 static const char MAGIC[MAGIC_BYTES + 1] = "EBPOBLK2", SUFFIX[] = ".ebpo-block",
                                       TEMPORARY[] = ".ebpo-part-";
-static const double STALE_SECONDS = 3600; /* a temporary file that old has lost its writer */
+static const double STALE_SECONDS = 3600; /* an older temporary file has lost its writer */
 
 struct ebpo_disk {
     int folder;
     uint64_t limit;
     char key[65];
     pthread_mutex_t lock;
-    uint64_t written; /* since the folder was last scanned */
+    uint64_t written; /* bytes since the folder was last scanned */
     uint64_t number;  /* for temporary names */
     uint64_t held, others;
 };
@@ -50,7 +50,7 @@ static void digest_block(const uint8_t head[DIGEST_AT], const void *data, size_t
     ebpo_sha256_end(&sha, out);
 }
 
-/* Blocks of the usual size are named as they always were. */
+/* Makes the key; blocks of the default size keep their original names. */
 static void make_key(ebpo_disk *d, size_t block, const char *url, const ebpo_http_version *v)
 {
     uint8_t size[8], of_block[8], out[32];
@@ -68,7 +68,7 @@ static void make_key(ebpo_disk *d, size_t block, const char *url, const ebpo_htt
     ebpo_sha256_hex(out, d->key);
 }
 
-/* --- making room --- */
+/* --- removing old blocks --- */
 
 typedef struct entry {
     struct timespec used;
@@ -90,7 +90,7 @@ static int is_older(const void *a, const void *b)
     return x->tv_nsec < y->tv_nsec ? -1 : x->tv_nsec > y->tv_nsec;
 }
 
-/* Our files in the folder, and no others. */
+/* Lists the files of this library in the folder, and no others. */
 static entry *list_entries(const ebpo_disk *d, uint64_t *count, uint64_t *bytes)
 {
     entry *entries = NULL;
@@ -142,7 +142,8 @@ void ebpo_disk_held(const ebpo_disk *d, uint64_t *held, uint64_t *others)
     *others = d->others;
 }
 
-/* Done after each eighth of the limit that is written, so one process alone stays below it. */
+/* Removes the oldest blocks; called after each eighth of the limit is written, so one process alone
+ * stays below the limit. */
 static void trim_folder(ebpo_disk *d)
 {
     uint64_t count, bytes;
@@ -170,7 +171,7 @@ static bool is_writable(int folder)
     return true;
 }
 
-/* With those above it that are missing. */
+/* Makes the folder and its missing parents. */
 static bool make_folder(const char *folder)
 {
     char path[PATH_MAX];
@@ -182,7 +183,7 @@ static bool make_folder(const char *folder)
     memcpy(path, folder, length + 1);
     for (char *slash = strchr(path + 1, '/'); length && slash; slash = strchr(slash + 1, '/')) {
         *slash = 0;
-        (void)mkdir(path, 0777); /* if that does not work, the next one tells */
+        (void)mkdir(path, 0777); /* if this fails, the next call reports it */
         *slash = '/';
     }
     return mkdir(path, 0777) == 0 || errno == EEXIST;
@@ -194,7 +195,7 @@ ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, 
     *out = NULL;
     int fd = make_folder(folder) ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
     if (fd < 0 || !is_writable(fd)) {
-        /* another folder does not help a process that has too many files open */
+        /* another folder does not help a process with too many open files */
         bool folders = errno != EMFILE && errno != ENFILE && errno != ENOMEM;
         ebpo_status status = ebpo_fail_file(error, folders ? EBPO_E_ARGUMENT : EBPO_E_IO, folder,
                                             "cannot be used as a cache folder: %s%s",
@@ -266,7 +267,7 @@ static bool write_fully(int fd, const void *data, size_t size)
     return true;
 }
 
-/* `size`: a block, less at the end of the file. False: not there. */
+/* Reads a block of `size` bytes, fewer at the end of the file. Returns false if it is missing. */
 static bool get_block(ebpo_disk *d, uint64_t block, void *data, size_t size)
 {
     char name[NAME_BYTES];
@@ -283,7 +284,7 @@ static bool get_block(ebpo_disk *d, uint64_t block, void *data, size_t size)
         good = memcmp(sum, head + DIGEST_AT, sizeof sum) == 0;
     }
     if (good)
-        (void)!futimens(fd, NULL); /* used now; a folder that is read only by now does no harm */
+        (void)!futimens(fd, NULL); /* marks it as used now; may fail in a read-only folder */
     close(fd);
     if (!good)
         unlinkat(d->folder, name, 0);
@@ -325,39 +326,39 @@ static void put_block(ebpo_disk *d, uint64_t block, const void *data, size_t siz
 }
 
 enum {
-    /* between announced ranges: fetching them costs less than another request; of many, requests
-     * are what takes time */
+    /* between prefetched ranges: fetching a gap costs less than another request; with many ranges,
+     * requests dominate the time */
     GAP_BYTES = 16384,
     GAP_BYTES_OF_MANY = 32768,
     MANY = 256,
-    STALE_AFTER = 64 /* announcements: what has not been read by then will hardly be */
+    STALE_AFTER = 64 /* hints: pieces not read by then will probably not be read */
 };
 
 typedef enum piece_state {
     PIECE_NOTED,   /* nothing fetched */
-    PIECE_LOADING, /* a thread looks for it on disk */
+    PIECE_LOADING, /* a thread reads it from disk */
     PIECE_COMING,  /* requested */
     PIECE_THERE
 } piece_state;
 
 struct ebpo_cached_range {
     uint64_t begin, end;
-    uint64_t wanted; /* bytes announced and not read yet */
-    uint64_t plan;   /* last announcement that named it */
-    uint64_t used;   /* when it was last read, by p->clock */
-    bool fresh;      /* made for the announcement under way */
+    uint64_t wanted; /* hinted bytes that are not read yet */
+    uint64_t plan;   /* last prefetch hint that included it */
+    uint64_t used;   /* last read, by p->clock */
+    bool fresh;      /* made for the current prefetch hint */
     piece_state state;
-    unsigned users;                  /* threads that need it in its place */
-    bool demanded;                   /* a reader is waiting for it and gets its failure */
+    unsigned users;                  /* threads that need it to stay in the list */
+    bool demanded;                   /* a reader waits for it and gets its failure */
     bool to_store;                   /* fetched, not on disk yet */
     uint64_t fetch_begin, fetch_end; /* blocks at its ends may have come from disk */
     ebpo_request request;
     uint8_t *data; /* [end - begin] */
 };
 
-/* --- the list; lock held in all that follows but where it says otherwise --- */
+/* --- the list; lock held in the functions below, except where noted --- */
 
-/* First piece that ends behind `at`. */
+/* Returns the first piece that ends behind `at`. */
 static uint64_t find_piece(const ebpo_range_cache *p, uint64_t at)
 {
     uint64_t low = 0, high = p->count;
@@ -408,8 +409,8 @@ static bool insert_piece(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64
     return true;
 }
 
-/* [begin, end) in pieces of about equal size, at most EBPO_RANGE_BYTES, on the grid of the blocks.
- */
+/* Inserts [begin, end) in pieces of about equal size, at most EBPO_RANGE_BYTES, on the grid of the
+ * blocks. */
 static bool insert_pieces(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64_t end)
 {
     uint64_t number = (end - begin + EBPO_RANGE_BYTES - 1) / EBPO_RANGE_BYTES;
@@ -423,7 +424,7 @@ static bool insert_pieces(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint6
     return true;
 }
 
-/* Pieces for what of [begin, end) has none. With a folder, whole blocks. */
+/* Makes pieces for uncovered parts of [begin, end). With a folder, whole blocks. */
 static bool cover_range(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 {
     if (p->disk) {
@@ -445,14 +446,14 @@ static bool cover_range(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 
 /* --- fetching --- */
 
-/* Whether a piece holds the whole block at an offset, or as much of it as the file has. Only such
- * blocks are stored on disk. */
+/* Returns true if a piece holds the whole block at an offset, or as much of it as the file has.
+ * Only such blocks are stored on disk. */
 static bool has_block(const ebpo_range_cache *p, uint64_t at, uint64_t end)
 {
     return at % p->block == 0 && (end - at >= p->block || end == p->size);
 }
 
-/* Blocks from disk, from both ends inwards; the lock is released meanwhile. What is left is to be
+/* Reads blocks from disk, from both ends inwards; the lock is released meanwhile. The rest must be
  * requested. */
 static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *piece)
 {
@@ -481,15 +482,15 @@ static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *piece)
     p->disk_hits += begin == end;
 }
 
-/* Nobody needs it in its place. */
+/* Returns true if no thread needs it to stay. */
 static bool is_idle(const ebpo_cached_range *piece)
 {
     return piece->users == 0 && piece->data &&
            (piece->state == PIECE_THERE || (piece->state == PIECE_COMING && piece->request.done));
 }
 
-/* The least recently read of the pieces that were; else what was announced long ago and not wanted
- * after all. */
+/* Drops the least recently read piece; if none was read, one with an old prefetch hint that was not
+ * used. */
 static bool forget_one(ebpo_range_cache *p)
 {
     uint64_t read = p->count, stale = p->count;
@@ -510,17 +511,17 @@ static bool forget_one(ebpo_range_cache *p)
     return true;
 }
 
-static void make_room(ebpo_range_cache *p, uint64_t bytes)
+static void reserve_space(ebpo_range_cache *p, uint64_t bytes)
 {
     while (p->held + bytes > p->held_limit && forget_one(p))
         ;
 }
 
-/* A piece that is only noted. False when memory is short. */
+/* Requests a piece that is only noted. Returns false when memory is short. */
 static bool start_request(ebpo_range_cache *p, ebpo_cached_range *piece, bool urgent)
 {
-    piece->users++; /* it must not be forgotten here */
-    make_room(p, bytes_of(piece));
+    piece->users++; /* must not be dropped here */
+    reserve_space(p, bytes_of(piece));
     piece->users--;
     piece->data = ebpo_alloc(bytes_of(piece), 1);
     if (!piece->data)
@@ -548,7 +549,7 @@ static bool start_request(ebpo_range_cache *p, ebpo_cached_range *piece, bool ur
     return true;
 }
 
-/* This thread is done with a piece, having read that much of it. What was fetched stays until the
+/* Ends this thread's use of a piece, after reading `read` bytes of it. Its data stays until the
  * memory is needed. */
 static void release_piece(ebpo_range_cache *p, ebpo_cached_range *piece, uint64_t read)
 {
@@ -574,8 +575,8 @@ static void read_ahead(ebpo_range_cache *p, uint64_t from)
         from = piece->end;
         if (piece->state != PIECE_NOTED || piece->wanted == 0)
             continue;
-        piece->users++; /* it must not be forgotten here */
-        make_room(p, bytes_of(piece));
+        piece->users++; /* must not be dropped here */
+        reserve_space(p, bytes_of(piece));
         bool fits = p->held + bytes_of(piece) <= p->held_limit && start_request(p, piece, false);
         release_piece(p, piece, 0);
         if (!fits)
@@ -583,7 +584,7 @@ static void read_ahead(ebpo_range_cache *p, uint64_t from)
     }
 }
 
-/* --- announcements --- */
+/* --- prefetch hints --- */
 
 static int by_offset(const void *a, const void *b)
 {
@@ -591,7 +592,7 @@ static int by_offset(const void *a, const void *b)
     return x->offset < y->offset ? -1 : x->offset > y->offset;
 }
 
-/* Announced bytes; those of pieces that were there have been counted. */
+/* Adds hinted bytes; pieces in memory have been counted. */
 static void add_wanted(ebpo_range_cache *p, const ebpo_range *range)
 {
     uint64_t begin = range->offset, end = begin + range->size;
@@ -605,7 +606,7 @@ static void add_wanted(ebpo_range_cache *p, const ebpo_range *range)
     }
 }
 
-/* Pieces for the ranges (sorted), one for those that lie close together. */
+/* Makes pieces for the ranges (sorted), one for ranges that are close together. */
 static void note_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t count)
 {
     uint64_t before = p->count, gap = count > MANY ? GAP_BYTES_OF_MANY : GAP_BYTES;
@@ -622,14 +623,14 @@ static void note_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t co
     uint64_t first = find_piece(p, sorted[0].offset),
              end = sorted[count - 1].offset + sorted[count - 1].size;
     for (uint64_t i = first; i < p->count && p->piece[i]->begin < end; i++)
-        p->piece[i]->fresh |= p->piece[i]->wanted == 0; /* read before, and now again */
+        p->piece[i]->fresh |= p->piece[i]->wanted == 0; /* read before, and needed again */
     for (size_t i = 0; i < count; i++)
         add_wanted(p, &sorted[i]);
     for (uint64_t i = first; i < p->count && p->piece[i]->begin < end; i++)
         p->piece[i]->fresh = false;
 }
 
-void ebpo_range_cache_expect(ebpo_range_cache *p, const ebpo_range *ranges, size_t count)
+void ebpo_range_cache_hint(ebpo_range_cache *p, const ebpo_range *ranges, size_t count)
 {
     ebpo_range *sorted = ebpo_alloc(count, sizeof *sorted);
     if (!sorted || count == 0) {
@@ -647,7 +648,7 @@ void ebpo_range_cache_expect(ebpo_range_cache *p, const ebpo_range *ranges, size
 
 /* --- reading --- */
 
-/* The lock is released meanwhile. */
+/* Stores a block; the lock is released meanwhile. */
 static void store_block(ebpo_range_cache *p, ebpo_cached_range *piece)
 {
     piece->to_store = false;
@@ -669,7 +670,7 @@ static bool has_come(const ebpo_cached_range *piece)
 }
 
 /* Stores one piece that has arrived but has not been read, so that it is not lost when the process
- * ends; false when there is none. The lock is released meanwhile. */
+ * ends; returns false when there is none. The lock is released meanwhile. */
 static bool store_one(ebpo_range_cache *p)
 {
     for (uint64_t i = 0; p->disk && i < p->count; i++) {
@@ -684,7 +685,7 @@ static bool store_one(ebpo_range_cache *p)
     return false;
 }
 
-/* Waits for a piece that this thread uses. One that failed while nobody wanted it is requested
+/* Waits for a piece that this thread uses. A piece that failed while no thread waited is requested
  * again. */
 static ebpo_status await_piece(ebpo_range_cache *p, ebpo_cached_range *piece, ebpo_error *error)
 {
@@ -718,12 +719,12 @@ static ebpo_status await_piece(ebpo_range_cache *p, ebpo_cached_range *piece, eb
     return EBPO_OK;
 }
 
-/* Bytes [at, end) as far as one piece has them; *at moves on. */
+/* Reads bytes [at, end) as far as one piece has them; advances *at. */
 static ebpo_status read_piece(ebpo_range_cache *p, uint64_t *at, uint64_t end, uint8_t *data,
                               ebpo_error *error)
 {
     uint64_t i = find_piece(p, *at);
-    if (i == p->count || p->piece[i]->begin > *at) { /* gone since it was covered */
+    if (i == p->count || p->piece[i]->begin > *at) { /* dropped since it was covered */
         if (!cover_range(p, *at, end))
             return ebpo_fail_memory(error, end - *at);
         i = find_piece(p, *at);
@@ -743,7 +744,7 @@ static ebpo_status read_piece(ebpo_range_cache *p, uint64_t *at, uint64_t end, u
     return status;
 }
 
-/* All pieces of a long range come at the same time. */
+/* Requests all pieces of a long range at the same time. */
 static void begin_read(ebpo_range_cache *p, uint64_t begin, uint64_t end)
 {
     for (uint64_t i = find_piece(p, begin); i < p->count && p->piece[i]->begin < end;
@@ -751,7 +752,7 @@ static void begin_read(ebpo_range_cache *p, uint64_t begin, uint64_t end)
         ebpo_cached_range *piece = p->piece[i];
         begin = piece->end;
         piece->users++;
-        make_room(p, bytes_of(piece));
+        reserve_space(p, bytes_of(piece));
         if (piece->state == PIECE_NOTED && p->held + bytes_of(piece) <= p->held_limit)
             (void)!start_request(p, piece, true);
         piece->users--;
@@ -775,7 +776,7 @@ ebpo_status ebpo_range_cache_read(ebpo_range_cache *p, uint64_t offset, uint64_t
     }
     for (uint64_t i = find_piece(p, at);
          status != EBPO_OK && i < p->count && p->piece[i]->begin < end; i++)
-        /* what comes of these requests is not this reader's any more */
+        /* failures of these requests do not concern this reader any more */
         p->piece[i]->demanded = p->piece[i]->users > 0;
     p->wait_seconds += ebpo_seconds() - since;
     pthread_mutex_unlock(&p->lock);

@@ -1,6 +1,6 @@
-/* A source by URL: its options are checked and copied, the first request learns the file's size
- * and version and brings its head, and reads go to the cache of ranges (http_cache.c). A server
- * without ranges sends the whole file, which is then kept in memory, up to a limit. */
+/* A source by URL: its options are checked and copied, the first request returns the file's size,
+ * version and head, and reads go to the cache of ranges (http_cache.c). A server without ranges
+ * sends the whole file, which is then kept in memory, up to a limit. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,11 +15,11 @@ enum { HEAD_BYTES = EBPO_HTTP_HEAD, CONNECTIONS_MAX = 32 };
 
 typedef struct http_source {
     char *url, shown[EBPO_SHOWN_BYTES];
-    ebpo_http_options options; /* its texts are ours */
+    ebpo_http_options options; /* owns its texts */
     ebpo_range_cache pieces;   /* and the lock and the transfers */
     bool has_lock;
     ebpo_http_version version;
-    uint8_t *head; /* the first bytes, or the whole file: kept */
+    uint8_t *head; /* the first bytes, or the whole file, kept in memory */
     uint64_t head_bytes;
 } http_source;
 
@@ -54,7 +54,7 @@ static bool copy_headers(ebpo_http_options *o)
     return true;
 }
 
-/* All of them, also after a failure, so that they can be freed. */
+/* Sets all texts, also after a failure, so that they can be freed. */
 static bool copy_options(ebpo_http_options *o)
 {
     bool good = copy_text(&o->user);
@@ -75,7 +75,7 @@ static void free_options(ebpo_http_options *o)
     free((void *)(uintptr_t)o->headers);
 }
 
-/* A line that could smuggle another one in is none. */
+/* Returns true for a single header line; a line break could inject another header. */
 static bool header_ok(const char *line)
 {
     const char *colon = strchr(line, ':');
@@ -93,7 +93,7 @@ static ebpo_status check_options(const ebpo_http_options *o, const char *shown, 
         !(o->time_limit > 0 && o->time_limit <= most))
         return ebpo_fail_file(
             error, EBPO_E_ARGUMENT, shown,
-            "a time-out is not above 0 (stalls: at least 1) and at most 1000000 seconds");
+            "a time-out must be above 0 (stalls: at least 1) and at most 1000000 seconds");
     if (o->connections < 1 || o->connections > CONNECTIONS_MAX)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
                               "%u connections at a time; give 1 to %d", o->connections,
@@ -108,7 +108,7 @@ static ebpo_status check_options(const ebpo_http_options *o, const char *shown, 
     for (const char *const *h = o->headers; h && *h; h++)
         if (!header_ok(*h))
             return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
-                                  "a header to send is not 'Name: value' on one line");
+                                  "a header to send must be 'Name: value' on one line");
     return EBPO_OK;
 }
 
@@ -133,7 +133,7 @@ static void source_expect(void *user, const ebpo_range *ranges, size_t count)
 {
     http_source *s = user;
     if (s->head_bytes < s->version.size)
-        ebpo_range_cache_expect(&s->pieces, ranges, count);
+        ebpo_range_cache_hint(&s->pieces, ranges, count);
 }
 
 static void source_close(void *user)
@@ -192,7 +192,7 @@ static void pin_version(http_source *s)
     pthread_mutex_unlock(&s->pieces.lock);
 }
 
-/* Refuses a page, which servers send with a code of success where a login is wanted. */
+/* Rejects a page, which servers send with a success status where a login is required. */
 static ebpo_status check_type(const http_source *s, const ebpo_request *r, ebpo_error *error)
 {
     static const char signature[] = "\211HDF", blanks[] = " \t\r\n\357\273\277";
@@ -200,7 +200,7 @@ static ebpo_status check_type(const http_source *s, const ebpo_request *r, ebpo_
     while (at < s->head_bytes && s->head[at] && strchr(blanks, s->head[at]))
         at++;
     bool is_page = at < s->head_bytes && s->head[at] == '<';
-    if (!is_page && (!ebpo_answer_is_text(r->type) ||
+    if (!is_page && (!ebpo_http_response_is_text(r->type) ||
                      (s->head_bytes >= 4 && memcmp(s->head, signature, 4) == 0)))
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_IO, s->shown,
@@ -209,7 +209,7 @@ static ebpo_status check_type(const http_source *s, const ebpo_request *r, ebpo_
                           *r->type ? r->type : "a page of HTML or XML");
 }
 
-/* The first bytes, the size and the version; from a server without ranges, everything. */
+/* Reads the first bytes, the size and the version; from a server without ranges, everything. */
 static ebpo_status read_head(http_source *s, ebpo_error *error)
 {
     s->head = ebpo_alloc(HEAD_BYTES, 1);
@@ -231,8 +231,8 @@ static ebpo_status read_head(http_source *s, ebpo_error *error)
     return check_type(s, &r, error);
 }
 
-/* Without ETag and Last-Modified there is no telling whether two answers belong to one version; a
- * single answer does. */
+/* Reads the whole file. Without ETag and Last-Modified, two responses may belong to different
+ * versions; a single response belongs to one. */
 static ebpo_status read_whole(http_source *s, ebpo_error *error)
 {
     if (s->version.size > s->options.whole_limit)
@@ -264,8 +264,8 @@ static ebpo_status open_source(http_source *s, ebpo_error *error)
     bool versioned = *s->version.etag || *s->version.modified;
     if (status == EBPO_OK && s->head_bytes < s->version.size && !versioned && !o->unversioned)
         status = read_whole(s, error);
-    /* The folder last: it is named by the version. A broken one is said also where it is not
-     * needed. */
+    /* The folder comes last, because the version names it. An unusable folder is reported even
+     * where it is not needed. */
     s->pieces.block = o->cache_block ? o->cache_block : EBPO_DISK_BLOCK;
     if (status == EBPO_OK && o->cache_folder)
         status = ebpo_disk_open(&s->pieces.disk, o->cache_folder, o->cache_bytes, s->pieces.block,

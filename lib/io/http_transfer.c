@@ -1,9 +1,9 @@
 /* Requests for byte ranges through libcurl, which one thread drives. Requests wait in a queue,
- * urgent ones first; up to EBPO_SLOTS_MAX are under way, each in a slot with a handle that is used
- * again. An answer is judged from its head (http_answer.c), before its body is taken; what arrived
- * of a body that breaks off is kept, and the next attempt requests the rest, after growing pauses.
- * At most five redirects are followed, never from https to http, and what identifies the caller is
- * not sent to another server. The lock is the owner's. */
+ * urgent ones first; up to EBPO_SLOTS_MAX run at once, each in a slot with a reusable handle. A
+ * response is judged by its head (http_response.c), before its body is accepted. If a body breaks
+ * off, its bytes are kept, and the next attempt requests the rest, after growing pauses. At most
+ * five redirects are followed, never from https to http, and the caller's credentials are not sent
+ * to another server. The caller owns the lock. */
 #include <curl/curl.h>
 #include <inttypes.h>
 #include <pthread.h>
@@ -17,20 +17,19 @@
 #include "core/os.h"
 #include "core/parallel.h"
 #include "ebpo_config.h"
-#include "io/http_answer.h"
+#include "io/http_response.h"
 #include "io/http_transfer.h"
 
-/* --- redirects: where a request is led, and whether that is still the server it was meant for ---
- */
+/* --- redirects: the target of a request, and whether it is still the original server --- */
 
-/* One for each attempt; zeroed, nothing has been led anywhere. */
+/* Redirects of one attempt; zeroed: none so far. */
 typedef struct ebpo_redirect {
-    CURLU *at;      /* the latest address, or NULL: the first one */
-    char *target;   /* of the head that is being read, or NULL */
-    bool elsewhere; /* another scheme, host or port has been come to, or it is not known */
+    CURLU *at;      /* the latest address, or NULL: the original one */
+    char *target;   /* target in the current head, or NULL */
+    bool elsewhere; /* the scheme, host or port differs, or is not known */
 } ebpo_redirect;
 
-/* For another attempt, or for good. */
+/* Clears it, for another attempt or at the end. */
 static void clear_redirect(ebpo_redirect *r)
 {
     curl_url_cleanup(r->at);
@@ -54,7 +53,7 @@ static bool same_server(CURLU *a, CURLU *b)
            same_part(a, b, CURLUPART_PORT);
 }
 
-/* False: it is another server, or nobody can tell. */
+/* Returns false if it is another server, or not known. */
 static bool stays_on_server(ebpo_redirect *r, const char *url)
 {
     CURLU *first = curl_url();
@@ -63,7 +62,7 @@ static bool stays_on_server(ebpo_redirect *r, const char *url)
         if (r->at && curl_url_set(r->at, CURLUPART_URL, url, 0) != CURLUE_OK)
             r->elsewhere = true;
     }
-    /* the second is relative to the first, if it is no whole address */
+    /* the second is relative to the first, if it is not a complete address */
     bool stays = first && r->at && curl_url_set(first, CURLUPART_URL, url, 0) == CURLUE_OK &&
                  curl_url_set(r->at, CURLUPART_URL, r->target, CURLU_URLENCODE) == CURLUE_OK &&
                  same_server(first, r->at);
@@ -84,8 +83,8 @@ static void keep_target(ebpo_redirect *r, const char *from, size_t size)
     r->elsewhere = r->elsewhere || !r->target;
 }
 
-/* One line of a head, as it came; `code` is the answer's. True when it is the one by which the
- * request begins to go elsewhere. */
+/* Reads one unmodified line of a head; `code` is that of the response. Returns true when it first
+ * redirects the request to another server. */
 static bool take_redirect_line(ebpo_redirect *r, const char *url, int code, const char *line,
                                size_t size)
 {
@@ -103,28 +102,28 @@ static bool take_redirect_line(ebpo_redirect *r, const char *url, int code, cons
     return r->elsewhere && !before;
 }
 
-/* --- places for requests under way --- */
+/* --- slots for running requests --- */
 
 enum { EBPO_SLOTS_MAX = 32 };
 
 typedef struct ebpo_transfers ebpo_transfers;
 
-/* One of the places for requests under way, with a handle that is used again and again. */
+/* A slot for running requests, with a reusable handle. */
 typedef struct ebpo_slot {
     ebpo_transfers *owner;
     CURL *easy;
     ebpo_request *request;    /* NULL: free */
     ebpo_http_version pinned; /* a copy for this attempt */
     bool is_pinned;
-    ebpo_answer answer;
+    ebpo_http_response response;
     ebpo_redirect redirect;
-    bool judged, stopped, stalled; /* stopped, stalled: we ended the transfer ourselves */
-    bool sent;                     /* connected, and the request is out */
+    bool judged, stopped, stalled; /* stopped, stalled: this code ended the transfer */
+    bool sent;                     /* connected, and the request was sent */
     double moved;                  /* time of the last bytes */
     ebpo_verdict verdict;
     ebpo_status status;
     char why[EBPO_WHY_BYTES];
-    uint64_t begin, end;                /* requested in this attempt */
+    uint64_t begin, end;                /* range of this attempt */
     uint64_t received, taken, unwanted; /* bytes of its body */
     char trouble[CURL_ERROR_SIZE];
 } ebpo_slot;
@@ -135,7 +134,7 @@ struct ebpo_transfers {
     pthread_mutex_t *lock;
     pthread_cond_t *done;
     CURLM *multi;
-    struct curl_slist *headers, *bare_headers; /* with the caller's, and without */
+    struct curl_slist *headers, *bare_headers; /* with and without the caller's headers */
     pthread_t thread;
     bool running;
     ebpo_slot slots[EBPO_SLOTS_MAX];
@@ -146,20 +145,20 @@ struct ebpo_transfers {
     ebpo_http_version pinned;
     bool is_pinned;
     ebpo_http_stats stats;
-    /* The thread's own. */
+    /* Private to the thread. */
     uint64_t random;
 };
 
 enum {
     REDIRECTS_MAX = 5,
-    STALL_BYTES = 100, /* a second */
-    /* of a body that is not wanted: reading it to its end keeps the connection */
+    STALL_BYTES = 100, /* per second */
+    /* limit of an unwanted body: reading it to its end keeps the connection */
     DRAIN_BYTES = 65536
 };
 
-/* --- what libcurl calls --- */
+/* --- callbacks of libcurl --- */
 
-/* Some ten times a second while a request is under way. libcurl's own measure of speed is an
+/* Checks for stalls, some ten times a second during a request. libcurl's own measure of speed is an
  * average over several seconds. */
 static int check_stall(void *user, curl_off_t total, curl_off_t done, curl_off_t upload_total,
                        curl_off_t uploaded)
@@ -185,33 +184,33 @@ static size_t take_header(char *line, size_t size, size_t count, void *user)
 {
     ebpo_slot *s = user;
     s->moved = ebpo_seconds();
-    ebpo_answer_line(&s->answer, line, size * count);
-    /* what was given for one server is not for others: libcurl would send it along */
-    if (take_redirect_line(&s->redirect, s->owner->url, s->answer.code, line, size * count))
+    ebpo_http_response_line(&s->response, line, size * count);
+    /* headers for one server are not for others: libcurl would send them, too */
+    if (take_redirect_line(&s->redirect, s->owner->url, s->response.code, line, size * count))
         curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, s->owner->bare_headers);
-    if (s->answer.header_bytes <= EBPO_HTTP_HEADERS_MAX)
+    if (s->response.header_bytes <= EBPO_HTTP_HEADERS_MAX)
         return size * count;
     s->judged = true;
     s->stopped = true;
-    s->verdict = EBPO_ANSWER_REFUSED;
+    s->verdict = EBPO_HTTP_REFUSED;
     s->status = EBPO_E_IO;
-    strcpy(s->why, "the head of the server's answer is too long; this server is broken");
+    strcpy(s->why, "the head of the server's response is too long; this server is broken");
     return 0;
 }
 
-/* Decides what the answer is, from its head; once for each attempt. */
+/* Judges the response by its head; once for each attempt. */
 static void judge_slot(ebpo_slot *s)
 {
-    ebpo_asked asked = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL,
-                         s->owner->options->whole_limit, s->owner->options->unversioned };
+    ebpo_http_request queried = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL,
+                                  s->owner->options->whole_limit, s->owner->options->unversioned };
     if (!s->judged)
-        s->verdict = ebpo_answer_judge(&s->answer, &asked, &s->status, s->why);
+        s->verdict = ebpo_http_response_judge(&s->response, &queried, &s->status, s->why);
     s->judged = true;
 }
 
 static size_t refuse_body(ebpo_slot *s, ebpo_status status, const char *why)
 {
-    s->verdict = EBPO_ANSWER_REFUSED;
+    s->verdict = EBPO_HTTP_REFUSED;
     s->status = status;
     s->stopped = true;
     snprintf(s->why, sizeof s->why, "%s", why);
@@ -220,12 +219,12 @@ static size_t refuse_body(ebpo_slot *s, ebpo_status status, const char *why)
 
 static size_t take_part(ebpo_slot *s, const char *bytes, size_t size)
 {
-    uint64_t capacity = s->answer.last + 1 - s->begin - s->taken;
+    uint64_t capacity = s->response.last + 1 - s->begin - s->taken;
     if (size > capacity)
         return refuse_body(
             s, EBPO_E_IO,
-            "the server sent more bytes than it was asked for and than it said; this "
-            "server or a proxy on the way is broken");
+            "the server sent more bytes than requested and announced; this server or a proxy on "
+            "the way is broken");
     memcpy(s->request->data + (s->begin - s->request->offset) + s->taken, bytes, size);
     s->taken += size;
     return size;
@@ -253,12 +252,12 @@ static size_t take_body(char *bytes, size_t size, size_t count, void *user)
     s->moved = ebpo_seconds();
     judge_slot(s);
     s->received += size;
-    if (s->verdict == EBPO_ANSWER_PART)
+    if (s->verdict == EBPO_HTTP_PART)
         return take_part(s, bytes, size);
-    if (s->verdict == EBPO_ANSWER_WHOLE)
+    if (s->verdict == EBPO_HTTP_WHOLE)
         return take_whole(s, bytes, size);
     s->unwanted += size;
-    s->stopped = s->unwanted > DRAIN_BYTES || s->verdict == EBPO_ANSWER_REFUSED;
+    s->stopped = s->unwanted > DRAIN_BYTES || s->verdict == EBPO_HTTP_REFUSED;
     return s->stopped ? 0 : size;
 }
 
@@ -266,7 +265,8 @@ static size_t take_body(char *bytes, size_t size, size_t count, void *user)
 
 static bool is_https(const char *url) { return url[4] == 's' || url[4] == 'S'; }
 
-/* Options that stay the same for all requests. The owner's url, options and headers are set. */
+/* Sets the options that are the same for all requests. The owner's url, options and headers are
+ * set. */
 static bool set_up_slot(ebpo_slot *s)
 {
     const ebpo_transfers *t = s->owner;
@@ -319,7 +319,7 @@ enum {
     LOOK_MS = 100, /* between checks of `stop` and for stalls */
     IDLE_MS = 60000
 };
-static const double PAUSE_FIRST = 0.2, PAUSE_MOST = 8, PAUSE_ASKED_MOST = 60; /* seconds */
+static const double PAUSE_FIRST = 0.2, PAUSE_MAX = 8, PAUSE_QUERIED_MAX = 60; /* seconds */
 
 static pthread_once_t curl_once = PTHREAD_ONCE_INIT;
 static CURLcode curl_state;
@@ -385,7 +385,7 @@ ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *url, const cha
     ebpo_transfers_free(t);
     return ebpo_fail_file(
         error, EBPO_E_IO, shown,
-        "libcurl cannot be set up: no memory, no threads, or options that it does not take");
+        "libcurl cannot be set up: no memory, no threads, or unsupported options");
 }
 
 void ebpo_transfers_free(ebpo_transfers *t)
@@ -480,20 +480,20 @@ static void finish_request(ebpo_transfers *t, ebpo_request *r, ebpo_status statu
 
 /* --- attempts, by the thread --- */
 
-/* Seconds until the next attempt: doubling, and jitter so that many readers do not come back at
- * once. What the server asks for counts when it is more. */
-static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *asked_for)
+/* Returns the seconds until the next attempt: doubling, with jitter so that many readers do not
+ * return at once. A longer pause requested by the server takes precedence. */
+static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *queried_for)
 {
-    curl_off_t asked = 0;
+    curl_off_t queried = 0;
     double pause = PAUSE_FIRST;
-    for (unsigned i = 1; i < s->request->failures && pause < PAUSE_MOST; i++)
+    for (unsigned i = 1; i < s->request->failures && pause < PAUSE_MAX; i++)
         pause *= 2;
-    pause = (pause < PAUSE_MOST ? pause : PAUSE_MOST) *
+    pause = (pause < PAUSE_MAX ? pause : PAUSE_MAX) *
             (0.5 + 0.5 * ebpo_random_unit(ebpo_random_next(&t->random)));
-    if (s->judged && s->verdict == EBPO_ANSWER_LATER)
-        curl_easy_getinfo(s->easy, CURLINFO_RETRY_AFTER, &asked);
-    *asked_for = (double)asked > pause;
-    return *asked_for ? (double)asked : pause;
+    if (s->judged && s->verdict == EBPO_HTTP_LATER)
+        curl_easy_getinfo(s->easy, CURLINFO_RETRY_AFTER, &queried);
+    *queried_for = (double)queried > pause;
+    return *queried_for ? (double)queried : pause;
 }
 
 static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, double now)
@@ -503,7 +503,7 @@ static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, doub
     s->request = r;
     s->is_pinned = t->is_pinned || begun;
     s->pinned = begun ? r->version : t->pinned;
-    s->answer = (ebpo_answer){ .code = 0 };
+    s->response = (ebpo_http_response){ .code = 0 };
     s->judged = s->stopped = s->stalled = s->sent = false;
     s->status = EBPO_E_IO;
     s->why[0] = s->trouble[0] = 0;
@@ -515,7 +515,7 @@ static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, doub
     double left = (r->deadline - now) * 1000;
     snprintf(range, sizeof range, "%" PRIu64 "-%" PRIu64, s->begin, s->end - 1);
     curl_easy_setopt(s->easy, CURLOPT_RANGE, range);
-    if (s->redirect.at || s->redirect.elsewhere) /* the one before was led somewhere */
+    if (s->redirect.at || s->redirect.elsewhere) /* the previous attempt was redirected */
         curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, t->headers);
     clear_redirect(&s->redirect);
     curl_easy_setopt(s->easy, CURLOPT_TIMEOUT_MS, (long)(left > 1 ? left : 1));
@@ -524,7 +524,7 @@ static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, doub
     t->active++;
 }
 
-/* Errors after which the same request may well succeed. */
+/* Returns true for errors after which the same request may succeed. */
 static bool may_pass_by(CURLcode code)
 {
     switch (code) {
@@ -544,12 +544,12 @@ static bool may_pass_by(CURLcode code)
     }
 }
 
-/* Keeps what arrived, so that the next attempt requests only the rest. */
+/* Keeps received bytes, so that the next attempt requests only the rest. */
 static bool keep_arrived(ebpo_slot *s, CURLcode code)
 {
     ebpo_request *r = s->request;
-    memcpy(r->type, s->answer.type, sizeof r->type);
-    if (s->verdict == EBPO_ANSWER_WHOLE) {
+    memcpy(r->type, s->response.type, sizeof r->type);
+    if (s->verdict == EBPO_HTTP_WHOLE) {
         if (code == CURLE_OK) {
             r->version = (ebpo_http_version){ .size = s->taken };
             r->got = s->taken;
@@ -557,33 +557,33 @@ static bool keep_arrived(ebpo_slot *s, CURLcode code)
         return code == CURLE_OK;
     }
     if (r->first) {
-        r->version.size = s->answer.total;
-        if (s->answer.total < r->offset + r->size)
-            r->size = s->answer.total - r->offset;
-        memcpy(r->version.etag, s->answer.etag, sizeof r->version.etag);
-        memcpy(r->version.modified, s->answer.modified, sizeof r->version.modified);
+        r->version.size = s->response.total;
+        if (s->response.total < r->offset + r->size)
+            r->size = s->response.total - r->offset;
+        memcpy(r->version.etag, s->response.etag, sizeof r->version.etag);
+        memcpy(r->version.modified, s->response.modified, sizeof r->version.modified);
     }
-    free(r->whole); /* an earlier answer began to send everything */
+    free(r->whole); /* an earlier response began to send everything */
     r->whole = NULL;
     r->whole_capacity = 0;
     r->got = s->begin - r->offset + s->taken;
     return r->got == r->size;
 }
 
-/* Returns what went wrong in libcurl, which says that memory is short of lines that are too long
- * for it. */
+/* Returns the error of libcurl, which reports a lack of memory for lines that are too long for it.
+ */
 static const char *trouble_of(const ebpo_slot *s, CURLcode code)
 {
     if (code == CURLE_OUT_OF_MEMORY && !s->received)
-        return "the head of the server's answer, such as the address of a redirect, is too long "
-               "for libcurl, or memory is short; check the address";
+        return "the head of the server's response, such as the address of a redirect, is too "
+               "long for libcurl, or memory is short; check the address";
     return *s->trouble ? s->trouble : curl_easy_strerror(code);
 }
 
 static void describe_trouble(const ebpo_slot *s, CURLcode code, char *out, size_t capacity)
 {
     const char *trouble = trouble_of(s, code);
-    if (s->judged && s->verdict == EBPO_ANSWER_LATER)
+    if (s->judged && s->verdict == EBPO_HTTP_LATER)
         snprintf(out, capacity, "%s", s->why);
     else if (s->stalled)
         snprintf(out, capacity, "the server sent nothing for %g s",
@@ -595,29 +595,31 @@ static void describe_trouble(const ebpo_slot *s, CURLcode code, char *out, size_
         snprintf(out, capacity, "%s", trouble);
 }
 
-/* Whether the rest may come in another answer: not if a change of version would go unnoticed. */
+/* Returns true if the rest may come in another response: not if a change of version would be
+ * undetected. */
 static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
 {
     const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
     return *v->etag || *v->modified || t->options->unversioned;
 }
 
-/* Again later, or the end of it. */
+/* Schedules another attempt, or ends the request. */
 static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now)
 {
     ebpo_request *r = s->request;
     char what[CURL_ERROR_SIZE], why[CURL_ERROR_SIZE + 160];
-    if (code == CURLE_OK && s->judged && s->verdict == EBPO_ANSWER_PART && s->taken &&
-        s->taken == s->answer.last - s->answer.begin + 1 && may_join(t, r) && now < r->deadline) {
-        r->due = now; /* a server that answers in smaller parts: no failure */
+    if (code == CURLE_OK && s->judged && s->verdict == EBPO_HTTP_PART && s->taken &&
+        s->taken == s->response.last - s->response.begin + 1 && may_join(t, r) &&
+        now < r->deadline) {
+        r->due = now; /* a server that sends smaller parts: not a failure */
         enqueue_request(t, r);
         return;
     }
     describe_trouble(s, code, what, sizeof what);
     r->failures++;
-    bool asked_for;
-    double pause = pause_after(t, s, &asked_for);
-    if (now >= r->deadline - 0.01 || (!asked_for && now + pause >= r->deadline))
+    bool queried_for;
+    double pause = pause_after(t, s, &queried_for);
+    if (now >= r->deadline - 0.01 || (!queried_for && now + pause >= r->deadline))
         snprintf(why, sizeof why,
                  "bytes %" PRIu64 " to %" PRIu64
                  ": not read within %g s (%s); try again later, or with a longer time limit",
@@ -628,10 +630,10 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
                  ": %s; given up after %u attempt%s, try again later",
                  r->offset, r->offset + r->size - 1, what, r->failures,
                  r->failures == 1 ? "" : "s");
-    else if (pause > PAUSE_ASKED_MOST || now + pause >= r->deadline)
+    else if (pause > PAUSE_QUERIED_MAX || now + pause >= r->deadline)
         snprintf(why, sizeof why,
                  "bytes %" PRIu64 " to %" PRIu64
-                 ": %s and is to be asked again in %.0f s; try again then",
+                 ": %s and requires a pause of %.0f s; try again then",
                  r->offset, r->offset + r->size - 1, what, pause);
     else {
         if (!may_join(t, r))
@@ -658,14 +660,14 @@ static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
     t->stats.bytes += s->received;
     t->stats.connections += (uint64_t)(connections > 0 ? connections : 0);
     t->stats.requests += (uint64_t)(redirects > 0 ? redirects : 0);
-    bool usable = s->judged && !s->stopped &&
-                  (s->verdict == EBPO_ANSWER_PART || s->verdict == EBPO_ANSWER_WHOLE);
-    if (s->judged && s->verdict == EBPO_ANSWER_REFUSED)
+    bool usable =
+        s->judged && !s->stopped && (s->verdict == EBPO_HTTP_PART || s->verdict == EBPO_HTTP_WHOLE);
+    if (s->judged && s->verdict == EBPO_HTTP_REFUSED)
         finish_request(t, r, s->status, s->why);
     else if (usable && keep_arrived(s, code))
         finish_request(t, r, EBPO_OK, NULL);
     else if (code == CURLE_OK || s->stalled || may_pass_by(code) ||
-             (s->judged && s->verdict == EBPO_ANSWER_LATER))
+             (s->judged && s->verdict == EBPO_HTTP_LATER))
         try_again(t, s, code, now);
     else
         finish_request(t, r, EBPO_E_IO, trouble_of(s, code));
@@ -682,7 +684,8 @@ static void cancel_queue(ebpo_transfers *t)
     }
 }
 
-/* Of large requests fewer: together they would only share the line, and the first one come last. */
+/* Returns the number of slots, fewer for large requests: they would only share the bandwidth, and
+ * the first one would arrive last. */
 static unsigned slots_for(const ebpo_transfers *t, const ebpo_request *r)
 {
     enum { LARGE_BYTES = 1 << 20, LARGE_AT_A_TIME = 6 };
@@ -690,7 +693,7 @@ static unsigned slots_for(const ebpo_transfers *t, const ebpo_request *r)
                                                                     : t->slot_count;
 }
 
-/* Lock held. Requests that have waited too long for a slot end; *wait: seconds until something is
+/* Lock held. Ends requests that have waited too long for a slot; *wait: seconds until the next is
  * due. */
 static ebpo_request *next_due(ebpo_transfers *t, double now, double *wait)
 {
@@ -727,7 +730,7 @@ static ebpo_slot *free_slot(ebpo_transfers *t)
     return NULL;
 }
 
-/* Starts what is due. False: the end. */
+/* Starts due requests. Returns false at the end. */
 static bool start_due(ebpo_transfers *t, double *wait)
 {
     ebpo_request *r;
@@ -782,7 +785,7 @@ static void *drive_transfers(void *transfers)
             char *private = NULL;
             if (m->msg != CURLMSG_DONE)
                 continue;
-            CURLcode code = m->data.result; /* the message goes with the handle */
+            CURLcode code = m->data.result; /* the message becomes invalid with the handle */
             curl_easy_getinfo(m->easy_handle, CURLINFO_PRIVATE, &private);
             end_attempt(t, (ebpo_slot *)(void *)private, code);
             ended = true;

@@ -1,8 +1,8 @@
-/* Outputs that appear whole or not at all: a temporary file in the same folder, sync, rename, sync
- * of the folder. What is replaced may be compared with the version that was read, under the
- * target's lock; two files that belong together are exchanged, and the first is taken back when
- * the second fails. A new file takes over owner, permissions and extended attributes of the one
- * that it replaces. At the end the functions for the library's callers. */
+/* Replaces output files atomically: a temporary file in the same folder, sync, rename, sync of the
+ * folder. The replaced file may be compared with the version that was read, under the target's
+ * lock. Two files that belong together are exchanged, and the first is restored when the second
+ * fails. A new file takes over owner, permissions and extended attributes of the file that it
+ * replaces. The functions for the library's callers are at the end. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -25,24 +25,24 @@
 #include "io/publish.h"
 #include "io/unfinished.h"
 
-/* --- what a new file takes over from the one that it replaces --- */
+/* --- properties that a new file takes over from the replaced one --- */
 
 #ifdef EBPO_HAVE_XATTR
-/* No system lets a file have more of these. */
-enum { NAMES_MOST = 65536, VALUE_MOST = 65536 };
+/* No system allows a file more of these. */
+enum { NAMES_MAX = 65536, VALUE_MAX = 65536 };
 
 static void take_attribute(int from, int to, const char *name, void *value)
 {
-    ssize_t size = fgetxattr(from, name, value, VALUE_MOST);
+    ssize_t size = fgetxattr(from, name, value, VALUE_MAX);
     if (size >= 0)
         (void)!fsetxattr(to, name, value, (size_t)size, 0); /* where the system allows */
 }
 
 static void take_attributes(int from, int to)
 {
-    char *names = malloc(NAMES_MOST);
-    void *value = malloc(VALUE_MOST);
-    ssize_t size = names && value ? flistxattr(from, names, NAMES_MOST) : -1;
+    char *names = malloc(NAMES_MAX);
+    void *value = malloc(VALUE_MAX);
+    ssize_t size = names && value ? flistxattr(from, names, NAMES_MAX) : -1;
     for (ssize_t at = 0; at < size; at += (ssize_t)strlen(names + at) + 1)
         take_attribute(from, to, names + at, value);
     free(names);
@@ -53,7 +53,8 @@ static void take_attributes(int from, int to)
 static void take_attributes(int from, int to) { (void)from, (void)to; }
 #endif
 
-/* Who may not give a file away keeps it; it then does not act for another owner (set-user-ID). */
+/* Sets the owner. A process that may not give the file away keeps it; the file then does not act
+ * for another owner (set-user-ID). */
 static mode_t take_owner(int to, const struct stat *was)
 {
     struct stat is;
@@ -64,14 +65,13 @@ static mode_t take_owner(int to, const struct stat *was)
          group = is.st_gid == was->st_gid || fchown(to, (uid_t)-1, was->st_gid) == 0;
     if (user && group)
         return mode;
-    /* what the group was allowed is not for another one */
+    /* the group's permissions are not for another group */
     return group ? mode & 0777 : mode & (0707 | (mode & 007) << 3);
 }
 
-/* Gives the open file mode, owner and extended attributes (access control lists are some) of the
- * regular file at `path`; of the owner and the attributes, which not everybody may give, what the
- * system allows. Without such a file: `mode`, if it is not -1. False, with errno, when the mode
- * cannot be given. */
+/* Gives the open file mode, owner and extended attributes (including access control lists) of the
+ * regular file at `path`; owner and attributes only as far as the system allows. Without such a
+ * file: `mode`, if it is not -1. Returns false with errno when the mode cannot be set. */
 static bool take_over_facts(int fd, const char *path, int mode)
 {
     struct stat was;
@@ -80,7 +80,8 @@ static bool take_over_facts(int fd, const char *path, int mode)
     if (there && S_ISREG(was.st_mode)) {
         mode = (int)take_owner(fd, &was);
         if (from >= 0)
-            take_attributes(from, fd); /* before the mode, which a list may change */
+            take_attributes(from, fd); /* before the mode, because an access control list may change
+                                        * it */
     }
     if (from >= 0)
         close(from);
@@ -132,14 +133,15 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
         if (strlen(publish->temporary) >= PATH_MAX)
             return ebpo_fail_file(error, EBPO_E_IO, publish->shown,
                                   "the path is too long; write to a folder with a shorter one");
-        /* Known to the signal handler before it exists, so that there is no moment in which it
-         * would be left behind. */
+        /* Registered for the signal handler before it exists, so that a signal never leaves it
+         * behind. */
         ebpo_unfinished_set(publish->slot, publish->temporary);
-        /* What nobody else may read is not shown to others meanwhile. */
+        /* Content that others may not read stays private meanwhile. */
         publish->fd = open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW,
                            publish->mode < 0 ? 0666 : 0600);
         if (publish->fd >= 0) {
-            (void)flock(publish->fd, LOCK_EX | LOCK_NB); /* for who looks for stale files */
+            (void)flock(publish->fd,
+                        LOCK_EX | LOCK_NB); /* for programs that look for stale files */
             return EBPO_OK;
         }
         ebpo_unfinished_unset(publish->slot);
@@ -163,7 +165,7 @@ ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path, ebpo_error *
     if (status == EBPO_OK && (publish.slot = ebpo_unfinished_reserve()) < 0)
         status = ebpo_fail_file(error, EBPO_E_LIMIT, path,
                                 "more than %d files are being written or locked at a time",
-                                EBPO_UNFINISHED_MOST);
+                                EBPO_UNFINISHED_MAX);
     if (status == EBPO_OK) {
         ebpo_remove_stale_files(publish.folder, ebpo_path_name(publish.target));
         status = create_temporary(&publish, error);
@@ -211,7 +213,8 @@ void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input)
 
 const char *ebpo_publish_path(const ebpo_publish *publish) { return publish->temporary; }
 
-/* With a buffer of its own: want of memory for it is then told, and writes are few. */
+/* Opens the stream with an explicit buffer: a lack of memory for it is then reported, and writes
+ * are few. */
 FILE *ebpo_publish_stream(ebpo_publish *publish)
 {
     enum { BUFFER = 1 << 16 };
@@ -259,28 +262,27 @@ static bool sync_folder(const char *path)
     return fd >= 0 && sync_and_close(fd);
 }
 
-/* Closes and syncs. By name, since a library may have written through a descriptor of its own. */
+/* Closes and syncs by name, because a library may have written through its own descriptor. */
 static ebpo_status make_ready(ebpo_publish *publish, ebpo_error *error)
 {
     errno = 0;
     if (!close_writer(publish))
         return ebpo_fail_errno(error, publish->shown,
-                               errno ? "could not be written" : "could not be written whole");
+                               errno ? "could not be written" : "could not be written completely");
     int fd = open(publish->temporary, O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
     if (fd >= 0 && !take_over_facts(fd, publish->target, publish->mode)) {
         int saved = errno;
         close(fd);
         errno = saved;
         return ebpo_fail_errno(error, publish->shown,
-                               "the mode of the file that was there could "
-                               "not be given to the new one");
+                               "the mode of the replaced file could not be set on the new one");
     }
     if (fd < 0 || !sync_and_close(fd))
         return ebpo_fail_errno(error, publish->shown, "could not be synced to the disk");
     return EBPO_OK;
 }
 
-/* Where nothing is at the target, nothing can be lost. */
+/* Returns true if the target is the expected version, or missing: then nothing can be lost. */
 static bool is_expected(const ebpo_publish *publish)
 {
     struct stat st;
@@ -297,8 +299,8 @@ static ebpo_status put_in_place(ebpo_publish *publish, ebpo_error *error)
     if (!is_expected(publish))
         return ebpo_fail_file(
             error, EBPO_E_IO, publish->shown,
-            "another program has written it since it was read, and it stays as it "
-            "is; read it again and repeat the change, or write to another file");
+            "another program has changed it since it was read, and it was not replaced; read it "
+            "again and repeat the change, or write to another file");
     if (rename(publish->temporary, publish->target) != 0)
         return ebpo_fail_errno(error, publish->shown,
                                "the finished temporary file could not be renamed to it");
@@ -312,7 +314,7 @@ static ebpo_status sync_name(const ebpo_publish *publish, ebpo_error *error)
     return sync_folder(publish->folder)
                ? EBPO_OK
                : ebpo_fail_errno(error, publish->shown,
-                                 "is in place, but its folder could not be synced to the disk");
+                                 "is complete, but its folder could not be synced to the disk");
 }
 
 ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
@@ -330,27 +332,28 @@ ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
     return status;
 }
 
-/* Exchanges it for what was there, which is then the temporary file. */
+/* Exchanges it for the previous file, which then is the temporary file. */
 static bool exchange_files(const ebpo_publish *publish)
 {
 #ifdef EBPO_HAVE_RENAMEAT2
     return renameat2(AT_FDCWD, publish->temporary, AT_FDCWD, publish->target, RENAME_EXCHANGE) == 0;
 #else
     struct stat st;
-    if (lstat(publish->target, &st) == 0) /* else errno says that there is nothing to exchange */
+    if (lstat(publish->target, &st) ==
+        0) /* otherwise errno says that there is nothing to exchange */
         errno = ENOSYS;
     return false;
 #endif
 }
 
-/* The second could not be put in its place: the first gives way to what was there. */
+/* Restores the first file, because the second could not be renamed to its target. */
 static ebpo_status take_back(ebpo_publish *first, bool exchanged, bool fresh, ebpo_error *cause,
                              ebpo_error *error)
 {
     if (exchanged ? exchange_files(first) : fresh && unlink(first->target) == 0)
         return ebpo_fail_with(error, cause);
     return ebpo_fail_file(error, cause->status, cause->file,
-                          "%s; of the two files only %s is in place: write both anew",
+                          "%s; of the two files only %s was replaced: write both again",
                           strerror(errno), first->shown);
 }
 
@@ -392,7 +395,7 @@ void ebpo_publish_abort(ebpo_publish *publish)
     *publish = (ebpo_publish)EBPO_PUBLISH_INIT;
 }
 
-/* --- for the callers of the library: whole files, and giving up --- */
+/* --- for the callers of the library: whole files, and aborting --- */
 
 ebpo_status ebpo_write_file(const char *path, const void *data, size_t size, ebpo_error *error)
 {

@@ -1,8 +1,8 @@
-/* What is not finished yet, or never will be. Names of outputs and locks that go when a signal
- * ends this process: in fixed storage with lock-free states, as a signal handler reads them.
- * Temporary files and folders of processes that were killed: recognised by their names, which hold
- * the process, and removed when it is gone and nobody holds their lock. Folders that appear whole
- * or not at all: made beside their place and renamed. What cannot be looked at or removed stays. */
+/* Unfinished files. Names of outputs and locks that are removed when a signal ends this process: in
+ * fixed storage with lock-free states, because a signal handler reads them. Temporary files and
+ * folders of killed processes: recognised by their names, which contain the process, and removed
+ * when it has ended and no process holds their lock. Folders that are created atomically: made
+ * beside their target and renamed. Files that cannot be examined or removed stay. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -31,11 +31,11 @@ enum { SLOT_FREE, SLOT_TAKEN, SLOT_LIVE };
 static struct slot {
     atomic_int state;
     char path[PATH_MAX];
-} slots[EBPO_UNFINISHED_MOST];
+} slots[EBPO_UNFINISHED_MAX];
 
 int ebpo_unfinished_reserve(void)
 {
-    for (int i = 0; i < EBPO_UNFINISHED_MOST; i++) {
+    for (int i = 0; i < EBPO_UNFINISHED_MAX; i++) {
         int expected = SLOT_FREE;
         if (atomic_compare_exchange_strong(&slots[i].state, &expected, SLOT_TAKEN))
             return i;
@@ -60,13 +60,13 @@ void ebpo_unfinished_forget(int slot)
 void ebpo_unfinished_remove(void)
 {
     int saved = errno;
-    for (int i = 0; i < EBPO_UNFINISHED_MOST; i++)
+    for (int i = 0; i < EBPO_UNFINISHED_MAX; i++)
         if (atomic_load(&slots[i].state) == SLOT_LIVE)
             unlink(slots[i].path);
     errno = saved;
 }
 
-/* ".NAME.PROCESS-NUMBER.tmp": the process, or 0. */
+/* Returns the process in ".NAME.PROCESS-NUMBER.tmp", or 0. */
 static long process_of(const char *file, const char *name)
 {
     char *end;
@@ -107,8 +107,8 @@ void ebpo_remove_stale_files(const char *folder, const char *name)
 
 static const char MARK[] = ".part-", MADE[] = "XXXXXX";
 
-/* One number for all who see the same processes: since this start of the machine, in this
- * namespace. 0: not known. */
+/* Returns a number that is equal for all processes that see the same process ids: since this start
+ * of the machine, in this namespace. 0: not known. */
 static uint32_t system_number(void)
 {
     struct stat space;
@@ -123,7 +123,7 @@ static uint32_t system_number(void)
     return (uint32_t)(sum ^ sum >> 32);
 }
 
-/* Bytes of the path without slashes at its end, and where its name begins. */
+/* Returns the bytes of the path without slashes at its end, and sets the beginning of its name. */
 static size_t without_slashes(const char *folder, size_t *name)
 {
     size_t size = strlen(folder);
@@ -134,8 +134,8 @@ static size_t without_slashes(const char *folder, size_t *name)
     return size - *name > EBPO_TARGET_NAME_KEPT ? *name + EBPO_TARGET_NAME_KEPT : size;
 }
 
-/* "FOLDER.part-SYSTEM-PROCESS-XXXXXX" for mkdtemp, where SYSTEM says to whom the process's number
- * means anything; of a long name the beginning. Freed by free(); NULL: no memory. */
+/* Returns "FOLDER.part-SYSTEM-PROCESS-XXXXXX" for mkdtemp, where SYSTEM identifies the system of
+ * the process id; long names are cut. Freed by free(); NULL: no memory. */
 static char *making_name(const char *folder)
 {
     char *path;
@@ -146,8 +146,8 @@ static char *making_name(const char *folder)
     return path;
 }
 
-/* Gives the folder that was made under that name the one with its inode in place of XXXXXX: where
- * another folder is put there in exchange, it is not taken for the one that was made. */
+/* Renames the folder made under that name, with its inode in place of XXXXXX: another folder put
+ * there in exchange is then not mistaken for it. */
 static void settle_making(char **made)
 {
     char *path;
@@ -164,7 +164,8 @@ static void settle_making(char **made)
     }
 }
 
-/* What follows the process's number, or NULL: it is there, or the name is no such. */
+/* Returns the text behind the process id, or NULL if the process exists or the name has another
+ * form. */
 static const char *rest_of_dead(const char *file, const char *name, size_t kept, uint32_t system)
 {
     char *end;
@@ -181,14 +182,14 @@ static void empty_folder(int fd)
 {
     DIR *d = fdopendir(fd);
     for (struct dirent *e; d && (e = readdir(d));)
-        (void)unlinkat(dirfd(d), e->d_name, 0); /* folders are none of ours, and stay */
+        (void)unlinkat(dirfd(d), e->d_name, 0); /* folders are not this library's, and stay */
     if (d)
         closedir(d);
     else
         close(fd);
 }
 
-/* One that had not got its inode's number yet has nothing in it. */
+/* Removes one folder; a folder without its inode number yet is empty. */
 static void remove_one(int parent, const char *file, const char *rest)
 {
     struct stat facts;
@@ -206,9 +207,8 @@ static void remove_one(int parent, const char *file, const char *rest)
         (void)unlinkat(parent, file, AT_REMOVEDIR);
 }
 
-/* Removes folders in the making for `folder`, with what is in them, that nobody fills any more:
- * they are of this user and of a process of this system that is not there. What cannot be looked at
- * or removed stays. */
+/* Removes abandoned unfinished folders for `folder` with their content: they belong to this user
+ * and to a process of this system that has ended. Files that cannot be examined or removed stay. */
 static void remove_stale_folders(const char *folder)
 {
     int saved = errno;
@@ -235,7 +235,7 @@ ebpo_status ebpo_folder_begin(const char *folder, char **making, ebpo_error *err
     *making = NULL;
     if (stat(folder, &st) == 0)
         return ebpo_fail_file(error, EBPO_E_IO, folder,
-                              "is there already; what is written has to be a new folder");
+                              "exists already; the output must be a new folder");
     remove_stale_folders(folder);
     char *path = making_name(folder);
     if (!path)
@@ -254,6 +254,6 @@ ebpo_status ebpo_folder_publish(const char *making, const char *folder, ebpo_err
     mode_t mask = umask(0);
     umask(mask);
     if (chmod(making, 0777 & ~mask) != 0 || rename(making, folder) != 0)
-        return ebpo_fail_errno(error, folder, "the folder cannot be put in its place");
+        return ebpo_fail_errno(error, folder, "the folder cannot be renamed to its final name");
     return EBPO_OK;
 }

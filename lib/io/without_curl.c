@@ -1,4 +1,4 @@
-/* In place of http_cache.c, http_source.c and http_transfer.c in a library that is built without
+/* Replaces http_cache.c, http_source.c and http_transfer.c in a library that is built without
  * libcurl. */
 #include "core/error.h"
 #include "io/byte_source.h"

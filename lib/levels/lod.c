@@ -1,13 +1,13 @@
 /* Computes the polygons of a level: the envelopes of its nodes, as triangles.
  *
- * The walk goes from the root down, each envelope cut from its parent's by the node's own planes. A
+ * The walk goes from the root down; each envelope is cut from its parent's by the node's planes. A
  * leaf's planes come from the file, or from its faces (construct/leaf_planes.c), or it keeps its
- * parent's envelope. The top of the tree is walked first; the subtrees below it are independent and
- * go to all threads. Where the tree is cut depends on the tree alone, and pieces are joined in
+ * parent's envelope. The top of the tree is walked first; threads then walk the independent
+ * subtrees below it. The position of the split depends only on the tree, and pieces are joined in
  * octcode order, so the number of threads does not change the result.
  *
- * The parts: polyhedra as triangles; the model, which is what a walk reads; leaves; colours of
- * nodes; the walk. */
+ * Sections: polyhedra as triangles; the model, which a walk reads; leaves; colours of nodes; the
+ * walk. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -54,7 +54,7 @@ static void add_fan(ebpo_polyhedra *piece, const uint32_t *number, const uint16_
     }
 }
 
-/* Room for the node of a polytope, which is begun. */
+/* Begins a node and makes space for its polytope. */
 static bool begin_node(ebpo_polyhedra *piece, const ebpo_polytope *p, const ebpo_box *box,
                        ebpo_cell cell, ebpo_node_type type)
 {
@@ -77,7 +77,8 @@ static void end_polygon(ebpo_polyhedra *piece, unsigned corners)
 }
 
 ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p, const ebpo_box *box,
-                               ebpo_cell cell, ebpo_node_type type, bool walls, ebpo_error *error)
+                               ebpo_cell cell, ebpo_node_type type, bool cell_faces,
+                               ebpo_error *error)
 {
     if (piece->vertex_count + EBPO_POLYTOPE_VERTICES > count_limit)
         return ebpo_fail(error, EBPO_E_LIMIT,
@@ -95,7 +96,7 @@ ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p, co
     memset(number, 0xff, sizeof number);
     uint64_t first_vertex = piece->vertex_count;
     for (int f = 0; f < p->face_count; f++) {
-        if (p->tag[f] < 0 && !walls)
+        if (p->tag[f] < 0 && !cell_faces)
             continue;
         for (int i = p->first[f]; i < p->first[f + 1]; i++) {
             uint16_t v = p->corner[i];
@@ -103,7 +104,7 @@ ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p, co
                 continue;
             for (int k = 0; k < 3; k++)
                 piece->xyz[3 * piece->vertex_count + (uint64_t)k] =
-                    ebpo_wall_point(box, cell, k, p->vertex[v][k], sides[v]);
+                    ebpo_cell_face_point(box, cell, k, p->vertex[v][k], sides[v]);
             number[v] = (uint32_t)piece->vertex_count++;
         }
         add_fan(piece, number, p->corner + p->first[f], p->first[f + 1] - p->first[f]);
@@ -258,8 +259,8 @@ static bool take_face(const ebpo_mesh *mesh, uint64_t face, ebpo_triangle *out)
     return true;
 }
 
-/* The leaf's faces in the order in which the builder saw them: ascending numbers, so references
- * before new ones. */
+/* Collects the leaf's faces in the order of the builder: ascending indices, so referenced faces
+ * precede new ones. */
 ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
                                 ebpo_leaf_scratch *scratch, uint64_t *count, ebpo_error *error)
 {
@@ -311,8 +312,8 @@ ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, ui
                           ? ebpo_lod_inside_corners(&model->box, cell, model->info->rule,
                                                     winding[leaf], scratch->faces, count)
                           : 0;
-    /* Derived planes cost no bytes: each that removes anything is taken, as in the volumes that the
-     * file states. */
+    /* Derived planes cost no bytes: each plane that removes anything is used, as for the volumes
+     * stated in the file. */
     *plane_count =
         ebpo_leaf_planes(&model->box, cell, scratch->faces, count, inside, 0, envelope, codes);
     return EBPO_OK;
@@ -339,7 +340,8 @@ static ebpo_status cut_to_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint
 
 /* --- colours of nodes --- */
 
-/* Down from the root: of the last gray node on the way, which is the node or its parent. */
+/* Finds the colour of the last gray node on the path from the root: the node itself or its parent.
+ */
 static bool find_colour(const ebpo_lod_model *model, uint64_t octcode, uint32_t *colour)
 {
     int depth = ebpo_cell_of_octcode(octcode).level;
@@ -385,7 +387,8 @@ ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes, uint64_t vertex_count,
         sum += nodes->nodes[i].vertex_count;
     if (sum != vertex_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the nodes have %llu vertices, the mesh %llu; give both of one level",
+                         "the nodes have %llu vertices, but the mesh has %llu; pass both of one "
+                         "level",
                          (unsigned long long)sum, (unsigned long long)vertex_count);
     if (!are_coloured(nodes))
         return EBPO_OK;
@@ -407,10 +410,10 @@ ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes, uint64_t vertex_count,
 
 enum { SEEDS_WANTED = 128 };
 
-/* Halves of the envelopes on the path to a node, along z, y, x: too large for the stack. */
+/* Halves of the envelopes on the path to a node, along z, y, x; too large for the stack. */
 typedef ebpo_polytope path_halves[EBPO_LEVELS_MAX][3];
 
-/* A gray node at the split level: where a subtree's walk begins. */
+/* A gray node at the split level, where the walk of a subtree begins. */
 typedef struct seed {
     ebpo_cell cell;
     ebpo_polytope envelope;
@@ -418,14 +421,16 @@ typedef struct seed {
 
 typedef struct job {
     const ebpo_lod_model *model;
-    bool walls, polygons; /* keep wall polygons; want polygons at all, or the volume only */
-    bool nodes;           /* want to know whose polygons they are */
-    int split;            /* level at which the first walk leaves seeds */
+    bool cell_faces,
+        polygons; /* keep polygons on cell faces; compute polygons, or only the volume */
+    bool nodes;   /* record the node of each polygon */
+    int split;    /* level at which the first walk creates seeds */
     seed *seeds;
     uint64_t seed_count;
-    ebpo_polyhedra (*pieces)[EBPO_LEVELS_MAX]; /* [1 + seed_count]: of the top, then of each seed */
-    ebpo_leaf_scratch *scratch;                /* [threads] */
-    path_halves *halves;                       /* [threads] */
+    ebpo_polyhedra (
+        *pieces)[EBPO_LEVELS_MAX]; /* [1 + seed_count]: for the top, then for each seed */
+    ebpo_leaf_scratch *scratch;    /* [threads] */
+    path_halves *halves;           /* [threads] */
 } job;
 
 typedef struct walker {
@@ -433,7 +438,7 @@ typedef struct walker {
     ebpo_polyhedra *out; /* [EBPO_LEVELS_MAX] */
     ebpo_leaf_scratch *scratch;
     ebpo_polytope (*half)[3]; /* [EBPO_LEVELS_MAX] */
-    int stop;                 /* gray nodes of this level are not descended into */
+    int stop;                 /* gray nodes of this level are not entered */
     ebpo_error *error;
 } walker;
 
@@ -445,14 +450,14 @@ static ebpo_status emit_polytope(walker *w, const ebpo_polytope *p, ebpo_cell ce
     if (!w->j->polygons)
         return EBPO_OK;
     piece->wants_nodes = w->j->nodes;
-    return ebpo_polyhedra_add(piece, p, &w->j->model->box, cell, type, w->j->walls, w->error);
+    return ebpo_polyhedra_add(piece, p, &w->j->model->box, cell, type, w->j->cell_faces, w->error);
 }
 
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
                                const ebpo_polytope *parent);
 
-/* Nothing is known below it but its envelope, which therefore stands for it at all deeper levels.
- * Only asked above the target. */
+/* Returns true for a pruned node, whose envelope represents it at all deeper levels. Only called
+ * above the target. */
 static bool is_pruned(const ebpo_lod_model *model, int level, uint64_t gray)
 {
     return model->info->pruned && level < model->target && model->level[level + 1].types[gray] == 0;
@@ -477,7 +482,7 @@ static ebpo_status visit_gray(walker *w, uint64_t gray, ebpo_cell cell, ebpo_pol
     return visit_group(w, gray, cell, envelope);
 }
 
-/* One gray node or leaf; `envelope` is the parent's, cut to this cell. */
+/* Visits a gray node or leaf; `envelope` is the parent's, cut to this cell. */
 static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_cell cell,
                               ebpo_polytope *envelope)
 {
@@ -492,7 +497,7 @@ static ebpo_status visit_node(walker *w, uint64_t group, unsigned octant, ebpo_c
     return status == EBPO_OK ? emit_polytope(w, envelope, cell, EBPO_LEAF) : status;
 }
 
-/* Black nodes are their whole cell. */
+/* Adds a black node, which fills its cell. */
 static ebpo_status visit_black(walker *w, ebpo_cell cell)
 {
     ebpo_polytope cube;
@@ -512,8 +517,8 @@ static ebpo_status visit_root(walker *w)
     }
 }
 
-/* In octant order; neighbours share the halves that their envelopes are cut from, as in the
- * builder. */
+/* Visits siblings in octant order; they share the halves that their envelopes are cut from, as in
+ * the builder. */
 static ebpo_status visit_group(walker *w, uint64_t group, ebpo_cell parent_cell,
                                const ebpo_polytope *parent)
 {
@@ -544,8 +549,8 @@ static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsig
     for (uint64_t i = begin; i < end; i++) {
         walker w = { j, j->pieces[1 + i], &j->scratch[worker], j->halves[worker], -1, error };
         seed *s = &j->seeds[i];
-        /* Seeds are in octcode order, and all gray nodes of their level: the i-th has the i-th
-         * group below it. */
+        /* Seeds are all gray nodes of their level in octcode order: the i-th has the i-th group
+         * below it. */
         ebpo_status status = is_pruned(j->model, s->cell.level, i)
                                  ? emit_polytope(&w, &s->envelope, s->cell, EBPO_GRAY)
                                  : visit_group(&w, i, s->cell, &s->envelope);
@@ -555,7 +560,7 @@ static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-/* The first level with enough gray nodes to share out; the target when there is none. */
+/* Returns the first level with enough gray nodes to distribute to threads, or the target. */
 static int choose_split(const ebpo_lod_model *model)
 {
     int level = 0;
@@ -589,7 +594,8 @@ static ebpo_status job_walk(job *j, unsigned threads, const ebpo_progress *progr
                              "clipping envelopes", error);
 }
 
-/* Level after level, and within one level first the top's nodes or the seeds' in their order. */
+/* Joins pieces level by level, and within a level the nodes of the top or of the seeds, in order.
+ */
 static ebpo_status job_join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume,
                             ebpo_error *error)
 {
@@ -632,8 +638,8 @@ void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes)
     memset(nodes, 0, sizeof *nodes);
 }
 
-/* Joined nodes come level after level, each in octcode order, and every leaf and black node of a
- * level is there: so running counts are their ranks. */
+/* Adds winding numbers. Joined nodes are sorted by level, then by octcode, and include every leaf
+ * and black node of a level, so running counts are their ranks. */
 static void add_windings(ebpo_lod_nodes *nodes, const ebpo_lod_model *model)
 {
     uint64_t leaf = 0, black = 0;
@@ -673,7 +679,7 @@ ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, int level, const ebpo_lo
         return status;
     if (nodes && !out)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "a level's nodes are given only with its polygons");
+                         "nodes of a level are returned only with its polygons");
     const ebpo_info *info = ebpo_file_info(file);
     if (level < 0 || level >= info->level_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
@@ -687,9 +693,10 @@ ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, int level, const ebpo_lo
     status = ebpo_lod_model_read(&model, file, level, &read, error);
     if (status != EBPO_OK)
         return status;
-    job j = {
-        .model = &model, .walls = wanted.walls, .polygons = out != NULL, .nodes = nodes != NULL
-    };
+    job j = { .model = &model,
+              .cell_faces = wanted.cell_faces,
+              .polygons = out != NULL,
+              .nodes = nodes != NULL };
     status = job_prepare(&j, threads, error);
     if (status == EBPO_OK)
         status = job_walk(&j, threads, &wanted.progress, error);

@@ -1,5 +1,5 @@
-/* Polygons of a level (lod.c): polyhedra as triangles, the model that a walk reads, and the planes
- * of leaves. */
+/* Computes polygons of a level (lod.c): polyhedra as triangles, the model that a walk reads, and
+ * the planes of leaves. */
 #ifndef EBPO_LEVELS_LOD_H
 #define EBPO_LEVELS_LOD_H
 
@@ -13,38 +13,39 @@
 
 /* --- polyhedra as triangles, collected piece by piece and joined in a fixed order --- */
 
-/* What one walk found at one level. */
+/* Results of one walk at one level. */
 typedef struct ebpo_polyhedra {
     double *xyz;     /* [vertex_count][3] */
-    uint32_t *faces; /* [face_count][3], numbers within the piece */
+    uint32_t *faces; /* [face_count][3], indices within the piece */
     uint64_t vertex_count, vertex_capacity, face_count, face_capacity;
-    bool wants_nodes; /* keep the two arrays below */
+    bool wants_nodes; /* fill the two arrays below */
     ebpo_lod_node *nodes;
     uint8_t *corners;
     uint64_t node_count, node_capacity, polygon_count, polygon_capacity;
     double volume;
 } ebpo_polyhedra;
 
-/* Appends the polytope (cell coordinates) of a cell's node as triangle fans; with `walls` false
- * without the polygons on the cell's walls. */
+/* Appends the polytope (cell coordinates) of a cell's node as triangle fans. With `walls` false,
+ * omits the polygons on cell faces. */
 EBPO_MUST_USE ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p,
                                              const ebpo_box *box, ebpo_cell cell,
-                                             ebpo_node_type type, bool walls, ebpo_error *error);
+                                             ebpo_node_type type, bool cell_faces,
+                                             ebpo_error *error);
 
-/* Joins `count` pieces, in order, to a mesh of double vertices; pieces are freed on the way.
- * EBPO_E_LIMIT beyond 2^32 - 2 vertices or faces. `nodes` may be NULL, else all pieces have kept
- * theirs; windings are left 0. */
+/* Joins `count` pieces, in order, to a mesh of double vertices, and frees them. EBPO_E_LIMIT beyond
+ * 2^32 - 2 vertices or faces. `nodes` may be NULL; otherwise all pieces must have nodes; windings
+ * are 0. */
 EBPO_MUST_USE ebpo_status ebpo_polyhedra_join(ebpo_mesh *out, ebpo_lod_nodes *nodes,
                                               ebpo_polyhedra *const *pieces, uint64_t count,
                                               ebpo_error *error);
 
-/* --- the model: levels, ranks, and the faces from which leaves derive planes; read only while
- * walking --- */
+/* --- the model: levels, ranks, and the faces from which leaf planes are derived; read-only during
+ * a walk --- */
 
 typedef enum ebpo_leaf_source {
     EBPO_LEAF_STORED,   /* planes from the file */
     EBPO_LEAF_DERIVED,  /* planes from the leaf's faces */
-    EBPO_LEAF_INHERITED /* the file has neither: the parent's envelope in the leaf's cell */
+    EBPO_LEAF_INHERITED /* neither is in the file: the parent's envelope in the leaf's cell */
 } ebpo_leaf_source;
 
 typedef struct ebpo_lod_model {
@@ -57,35 +58,36 @@ typedef struct ebpo_lod_model {
     ebpo_mesh mesh; /* for EBPO_LEAF_DERIVED */
 } ebpo_lod_model;
 
-/* Reads levels 0 .. target. On failure nothing is left to free. */
+/* Reads levels 0 .. target. After a failure there is nothing to free. */
 EBPO_MUST_USE ebpo_status ebpo_lod_model_read(ebpo_lod_model *out, const ebpo_file *file,
                                               int target, const ebpo_read_options *read,
                                               ebpo_error *error);
 void ebpo_lod_model_free(ebpo_lod_model *model);
 
-/* Its nodes. */
+/* Returns the nodes of the model. */
 static inline ebpo_level_nodes ebpo_lod_model_nodes(const ebpo_lod_model *model)
 {
     return (ebpo_level_nodes){ model->level, model->ranks, model->target + 1 };
 }
 
-/* Room for the faces of one leaf; one for each thread, zero-initialised, freed with free(faces). */
+/* Scratch memory for the faces of one leaf; one for each thread. Initialise with zeros; free with
+ * free(faces). */
 typedef struct ebpo_leaf_scratch {
     ebpo_triangle *faces;
     uint64_t capacity;
 } ebpo_leaf_scratch;
 
-/* The triangles that a leaf lists, in scratch->faces. */
+/* Collects the triangles that a leaf lists, in scratch->faces. */
 EBPO_MUST_USE ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_cell cell,
                                               uint64_t leaf, ebpo_leaf_scratch *scratch,
                                               uint64_t *count, ebpo_error *error);
 
-/* Which corners of a solid's leaf lie inside, for ebpo_leaf_planes; `winding`: at its lowest one.
- */
+/* Returns the corners of a solid's leaf that are inside, for ebpo_leaf_planes; `winding`: at its
+ * lowest corner. */
 unsigned ebpo_lod_inside_corners(const ebpo_box *box, ebpo_cell cell, ebpo_rule rule,
                                  int32_t winding, const ebpo_triangle *faces, uint64_t count);
 
-/* The planes that a leaf derives from its faces; `envelope` as in ebpo_lod_leaf. */
+/* Derives the planes of a leaf from its faces; `envelope` as in ebpo_lod_leaf. */
 EBPO_MUST_USE ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell,
                                                uint64_t leaf, ebpo_leaf_scratch *scratch,
                                                ebpo_polytope *envelope,

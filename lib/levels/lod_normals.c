@@ -1,12 +1,13 @@
 /* Computes normals for the polygons of a level, for shading.
  *
- * A polygon on a plane is nearly parallel to the surface below it and has the plane's direction. A
- * polygon on a cell face is a step from one envelope to the next and says nothing of the surface:
- * it gets the direction of the planes around it.
+ * A polygon on a plane is nearly parallel to the surface and keeps the plane's direction. A polygon
+ * on a cell face is a step between two envelopes and does not represent the surface: it gets the
+ * direction of the planes around it.
  *
- * For each of the six sides: at every corner of a drawn cell, the mean, by area, of the plane
- * polygons of the nodes around the corner that look to that side; between corners, linear
- * interpolation. Planes of the other side of a thin part do not count. */
+ * For each of the six sides, a normal is computed at every corner of a drawn cell: the mean,
+ * weighted by area, of the plane polygons that face this side, over the nodes around the corner.
+ * Between corners, normals are interpolated linearly. Planes on the other side of a thin part do
+ * not count. */
 #include "core/strict_fp.h"
 
 #include <ebpo/lod.h>
@@ -24,27 +25,28 @@
 enum { SIDES = 6, ON_PLANE = SIDES, DEEPEST = EBPO_LEVELS_MAX - 1 };
 
 static const uint32_t none = UINT32_MAX;
-static const double least_turned = -0.3; /* cosine of the widest angle between a plane and a side */
+static const double least_turned =
+    -0.3; /* cosine of the largest angle between a plane and a side */
 
 typedef struct polygon {
-    double area[3]; /* its normal, as long as twice its area */
+    double area[3]; /* normal with a length of twice its area */
     double middle[3];
-    int side; /* 2 * axis, + 1 the upper one; or ON_PLANE */
+    int side; /* 2 * axis, plus 1 for the upper side; or ON_PLANE */
 } polygon;
 
 typedef struct lighting {
     ebpo_box box;
     const ebpo_lod_nodes *nodes;
     polygon *polygons; /* [polygon_count] */
-    uint32_t (*at)[8]; /* of each node, its corners' numbers */
-    double (*sum)[4];  /* [corner_count] of normals, and of their lengths */
-    uint64_t *keys;    /* [corner_count] where they are */
+    uint32_t (*at)[8]; /* corner indices of each node */
+    double (*sum)[4];  /* [corner_count] sums of normals and of their lengths */
+    uint64_t *keys;    /* [corner_count] positions */
     uint64_t corner_count, key_capacity;
 } lighting;
 
 /* --- polygons --- */
 
-/* Of a node's first triangle on. */
+/* Adds a triangle, beginning with a node's first one. */
 static void add_triangle(const ebpo_mesh *mesh, const uint32_t *face, double area[3])
 {
     const double *a = mesh->xyz64 + 3 * (uint64_t)face[0], *b = mesh->xyz64 + 3 * (uint64_t)face[1],
@@ -55,26 +57,26 @@ static void add_triangle(const ebpo_mesh *mesh, const uint32_t *face, double are
     }
 }
 
-/* Corner i of a fan. */
+/* Returns corner i of a fan. */
 static const double *corner_of(const ebpo_mesh *mesh, const uint32_t *face, unsigned i)
 {
     uint32_t v = i < 2 ? face[i] : face[3 * (i - 2) + 2];
     return mesh->xyz64 + 3 * (uint64_t)v;
 }
 
-/* Corners on a wall have its very coordinate. Beyond walls of the root cell there is nothing to
- * step to: what lies on them counts as a plane. */
+/* Returns the side of a polygon. Corners on a cell face have exactly its coordinate. Outside the
+ * root cell there is no neighbour, so polygons on its faces count as planes. */
 static int side_of(const ebpo_box *box, ebpo_cell cell, const ebpo_mesh *mesh, const uint32_t *face,
                    unsigned corners)
 {
-    double wall[2][3];
-    ebpo_cell_bounds(box, cell, wall[0], wall[1]);
+    double cell_face[2][3];
+    ebpo_cell_bounds(box, cell, cell_face[0], cell_face[1]);
     for (int side = 0; side < SIDES; side++) {
         int axis = side / 2;
         uint32_t outmost = side % 2 ? (1u << cell.level) - 1 : 0;
         bool on = cell.at[axis] != outmost;
         for (unsigned i = 0; i < corners && on; i++)
-            on = corner_of(mesh, face, i)[axis] == wall[side % 2][axis];
+            on = corner_of(mesh, face, i)[axis] == cell_face[side % 2][axis];
         if (on)
             return side;
     }
@@ -139,7 +141,7 @@ static bool number_corners(lighting *l)
 
 /* --- sides --- */
 
-/* What a node's planes that look to a side add up to. */
+/* Sums a node's planes that face a side. */
 static void node_sum(const polygon *p, uint32_t count, int side, double out[4])
 {
     double sign = side % 2 ? 1 : -1;
@@ -168,7 +170,7 @@ static void sum_side(lighting *l, int side)
     }
 }
 
-/* Between a cell's corners, at a place in it. */
+/* Interpolates between the corners of a cell. */
 static void direction_at(const lighting *l, ebpo_cell cell, const uint32_t at[8],
                          const double place[3], double out[3])
 {
@@ -227,13 +229,14 @@ static ebpo_status check_nodes(const ebpo_mesh *mesh, const ebpo_lod_nodes *node
     uint64_t triangles = 0;
     if (!mesh->xyz64 && mesh->face_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the mesh is of single precision; give the one that came with the nodes");
+                         "the mesh has single precision; pass the mesh that belongs to the nodes");
     for (uint64_t i = 0; i < nodes->polygon_count; i++)
         triangles += nodes->corners[i] - 2u;
     if (triangles == mesh->face_count)
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_ARGUMENT,
-                     "the nodes have %llu triangles, the mesh %llu; give both of one level",
+                     "the nodes have %llu triangles, but the mesh has %llu; pass both of one "
+                     "level",
                      (unsigned long long)triangles, (unsigned long long)mesh->face_count);
 }
 

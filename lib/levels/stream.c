@@ -1,14 +1,15 @@
-/* Delivers a file level by level, node by node in octcode order, for readers that show or process a
- * model while it arrives.
+/* Delivers a file level by level, node by node in octcode order, for programs that show or process
+ * a model while it arrives.
  *
- * Of a level that has been passed only the types stay, and with polygons the planes: enough to walk
- * down to the nodes of the next level. Within a level, the depth-first walk from the root visits
- * groups, nodes of each type and planes in the order in which they are stored; so running counts
- * find them, without tables of sums.
+ * Only the types of completed levels stay in memory, and the planes if polygons are requested:
+ * enough to walk down to the nodes of the next level. Within a level, the depth-first walk from the
+ * root visits groups, nodes of each type and planes in stored order; running counts locate them,
+ * without tables of sums.
  *
- * Half-spaces and polygons are converted from a cell's coordinates to the model's with bounded
+ * Half-spaces and polygons are converted from cell coordinates to model coordinates with bounded
  * rounding: a point of the cell that satisfies a plane's code also satisfies the delivered plane.
- * Points on cell faces get the faces' own coordinates, so that neighbours agree to the last bit. */
+ * Points on cell faces get the faces' exact coordinates, so that neighbours agree to the last bit.
+ */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -30,19 +31,19 @@
 
 /* --- from cell to model coordinates --- */
 
-/* With t the cell's shortest side and N = t n / size, the half-space is N . (p - corner) <= t d /
+/* With t the cell's shortest side and N = t n / size, the half-space is: N . (p - corner) <= t d /
  * 4096. For any normal a, any factor f > 0, and p in the cell: a . p = a . corner + f N . (p -
- * corner) + (a - f N) . (p - corner) <= a . corner + f t d / 4096 + sum |a - f N| size. Here f is 1
- * / |N| as computed and a is f N as computed, so that |a - f N| <= 4 u |a| with u = DBL_EPSILON /
- * 2, the other roundings of this function sum to less than 8 u times sum |a| (|corner| + size), and
- * evaluating a . p to another 4 u of that. 32 u covers them all; what underflows is covered by the
- * rest. */
+ * corner) + (a - f N) . (p - corner) <= a . corner + f t d / 4096 + sum |a - f N| size. Here f is
+ * the computed 1 / |N| and a is the computed f N, so that |a - f N| <= 4 u |a| with u = DBL_EPSILON
+ * / 2. The other roundings of this function sum to less than 8 u times sum |a| (|corner| + size),
+ * and evaluating a . p adds another 4 u of that. 32 u covers all of them; underflow is covered by
+ * the remaining margin. */
 void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3], int32_t d,
                          double out[4])
 {
     double corner[3], size[3], reach = 0, bulk = 0, at = 0, square = 0;
     for (int k = 0; k < 3; k++) {
-        corner[k] = ebpo_wall(box, k, cell.level, cell.at[k]);
+        corner[k] = ebpo_cell_face(box, k, cell.level, cell.at[k]);
         size[k] = box->size[k] / (double)(1u << cell.level);
     }
     double shortest = fmin(size[0], fmin(size[1], size[2]));
@@ -61,8 +62,8 @@ void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3]
              (16 * DBL_EPSILON * reach + 4 * DBL_MIN * bulk + 64 * DBL_TRUE_MIN);
 }
 
-/* Vertices of the polytope, rounded; those on the cell's walls get the walls' own coordinates, so
- * that neighbours agree to the last bit. */
+/* Converts the vertices of a polytope, rounded. Those on cell faces get the faces' exact
+ * coordinates, so that neighbours agree to the last bit. */
 static void polytope_to_world(const ebpo_polytope *p, const ebpo_box *box, ebpo_cell cell,
                               double (*out)[3])
 {
@@ -70,7 +71,7 @@ static void polytope_to_world(const ebpo_polytope *p, const ebpo_box *box, ebpo_
     ebpo_polytope_sides(p, sides);
     for (int v = 0; v < p->vertex_count; v++)
         for (int k = 0; k < 3; k++)
-            out[v][k] = ebpo_wall_point(box, cell, k, p->vertex[v][k], sides[v]);
+            out[v][k] = ebpo_cell_face_point(box, cell, k, p->vertex[v][k], sides[v]);
 }
 
 /* --- the members of an ebpo_stream_node --- */
@@ -120,19 +121,19 @@ typedef struct level_walk_node {
     ebpo_octcode octcode;
     ebpo_node_type type;
     uint64_t rank;         /* among the nodes of its type in the level */
-    const uint32_t *codes; /* its own planes */
+    const uint32_t *codes; /* the node's planes */
     unsigned code_count;
 } level_walk_node;
 
 typedef struct level_walk {
-    /* [target + 1] lent; of those above the target only types, plane counts and planes are used */
+    /* [target + 1] borrowed; levels above the target provide only types, plane counts and planes */
     const ebpo_level *level;
     int target, depth;
-    bool pruned; /* the file is a subset: empty groups hold no nodes */
+    bool pruned; /* the file is a subset: empty groups have no nodes */
     struct {
-        uint64_t group, rank[4], plane, leaf_plane; /* so many were passed in this level */
-        unsigned octant;                            /* next one of the group */
-        /* the node last passed: in levels above `depth` the ancestor */
+        uint64_t group, rank[4], plane, leaf_plane; /* numbers of visited items in this level */
+        unsigned octant;                            /* next octant of the group */
+        /* last visited node: in levels above `depth` the ancestor */
         level_walk_node node;
     } at[EBPO_LEVELS_MAX];
 } level_walk;
@@ -145,7 +146,7 @@ static void level_walk_begin(level_walk *walk, const ebpo_level *level, int targ
     walk->pruned = pruned;
 }
 
-/* The next node of the level at `depth`, of which there is one. */
+/* Visits the next node of the level at `depth`, which exists. */
 static level_walk_node *pass_node(level_walk *w, int depth)
 {
     const ebpo_level *level = &w->level[depth];
@@ -168,7 +169,7 @@ static level_walk_node *pass_node(level_walk *w, int depth)
     return node;
 }
 
-/* The next node of the target level; false after the last. */
+/* Visits the next node of the target level; returns false after the last. */
 static bool level_walk_next(level_walk *w, level_walk_node *out)
 {
     for (;;) {
@@ -196,7 +197,7 @@ static bool level_walk_next(level_walk *w, level_walk_node *out)
     }
 }
 
-/* Of the ancestor at `depth`, and those above it. */
+/* Returns the envelope of the ancestor at `depth`, and computes those above it. */
 static const ebpo_polytope *ancestor_envelope(const level_walk *w, int depth,
                                               ebpo_envelope_stack *e)
 {
@@ -209,9 +210,9 @@ static const ebpo_polytope *ancestor_envelope(const level_walk *w, int depth,
     return ebpo_envelope_put(e, node->octcode, node->codes, node->code_count);
 }
 
-/* Envelope of the node that ebpo_level_walk_next gave last, in coordinates of its cell; gray nodes
- * and leaves: from the cube down, cut by the planes of all ancestors and its own. Black nodes: the
- * cube. Lent until the next call with these envelopes. */
+/* Returns the envelope, in cell coordinates, of the last node from ebpo_level_walk_next. For gray
+ * nodes and leaves: the cube, cut by the planes of all ancestors and of the node. For black nodes:
+ * the cube. Valid until the next call with these envelopes. */
 static const ebpo_polytope *level_walk_envelope(const level_walk *w, const level_walk_node *node,
                                                 ebpo_envelope_stack *e)
 {
@@ -228,13 +229,13 @@ struct ebpo_stream {
     const ebpo_info *info;
     ebpo_stream_options options;
     ebpo_box box;
-    int level; /* last one read; -1: none */
+    int level; /* last level read; -1: none */
     ebpo_level kept[EBPO_LEVELS_MAX];
     uint64_t bytes;
     double
-        uniform_volume; /* volume of the leaves and black nodes of all levels before the next one */
+        uniform_volume; /* volume of the leaves and black nodes in all levels before the next one */
     level_walk walk;
-    ebpo_envelope_stack *envelopes; /* with polygons */
+    ebpo_envelope_stack *envelopes; /* if polygons are requested */
     ebpo_node_buffers capacity;
 };
 
@@ -289,7 +290,7 @@ static uint64_t sum_counts(const uint8_t *counts, uint64_t count)
     return sum;
 }
 
-/* What the walk relies on. */
+/* Checks the values that the walk relies on. */
 static ebpo_status check_level(const ebpo_level *level, int number, uint64_t parents,
                                ebpo_error *error)
 {
@@ -347,8 +348,8 @@ static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-/* A first walk, without envelopes, finds where each piece begins; pieces do not depend on the
- * number of threads, so neither does the sum. */
+/* Finds the start of each piece with a walk that computes no envelopes. Pieces, and therefore the
+ * sum, do not depend on the number of threads. */
 static void find_starts(job *j)
 {
     level_walk walk;
@@ -402,10 +403,10 @@ static volumes stated_volumes(const ebpo_stream *s, int level)
 
 void ebpo_stream_prefetch(const ebpo_stream *s, int last)
 {
-    ebpo_expected e = EBPO_EXPECTED_INIT(s->file);
+    ebpo_hints e = EBPO_HINTS_INIT(s->file);
     for (int level = s->level + 1; level <= last && level < s->info->level_count; level++)
-        ebpo_expect_level(&e, level, EBPO_PART_MESH);
-    ebpo_expect_all(&e);
+        ebpo_hint_level(&e, level, EBPO_PART_MESH);
+    ebpo_hint_all(&e);
 }
 
 ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool *more,
@@ -461,7 +462,7 @@ static int32_t winding_of(const ebpo_level *level, const level_walk_node *node)
     }
 }
 
-/* Of a node that is not gray: its parent's, which was passed before it. */
+/* Sets the colour of a node that is not gray: its parent's, which was visited before. */
 static void add_colour(const ebpo_stream *s, const level_walk_node *node, ebpo_stream_node *out)
 {
     bool gray = node->type == EBPO_GRAY;

@@ -1,4 +1,4 @@
-/* Nodes as a stream delivers them (stream.c): half-spaces and polygons in the model's coordinates.
+/* Nodes as delivered by a stream (stream.c): half-spaces and polygons in model coordinates.
  * lib/query's subtrees return nodes in the same form. */
 #ifndef EBPO_LEVELS_STREAM_H
 #define EBPO_LEVELS_STREAM_H
@@ -13,10 +13,10 @@
 
 /* --- half-spaces --- */
 
-/* The code's half-space 4096 (n . xi) <= d as out[0..2] . p <= out[3] with a unit normal (to 4
- * ulps): every real point p of the cell that satisfies the code satisfies this, and also when the
- * left side is evaluated in doubles in any order, for double p. The offset is larger than need be
- * by about 1e-14 of the cell's coordinates. */
+/* Converts the code's half-space 4096 (n . xi) <= d to out[0..2] . p <= out[3] with a unit normal
+ * (to 4 ulps). Every real point p of the cell that satisfies the code satisfies the result, also
+ * when the left side is evaluated in doubles in any order, for double p. The offset exceeds the
+ * necessary one by about 1e-14 of the cell's coordinates. */
 void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3], int32_t d,
                          double out[4]);
 
@@ -24,17 +24,17 @@ void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3]
 
 enum { EBPO_NODE_CODES = 255 };
 
-/* What a node lends. */
+/* Buffers that a node refers to. */
 typedef struct ebpo_node_buffers {
     double planes[EBPO_NODE_CODES][4];
     double vertices[EBPO_POLYTOPE_VERTICES][3];
     uint32_t polygon_first[EBPO_POLYTOPE_FACES + 1], corners[EBPO_POLYTOPE_CORNERS];
 } ebpo_node_buffers;
 
-/* Octcode, type, cell; a black node's volume. */
+/* Sets octcode, type, cell, and a black node's volume. */
 void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcode,
                      ebpo_node_type type);
-/* At most EBPO_NODE_CODES codes. */
+/* Adds at most EBPO_NODE_CODES codes. */
 void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes,
                           unsigned count, ebpo_node_buffers *capacity);
 void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box,

@@ -1,13 +1,12 @@
-/* The cut of a view: which nodes of the tree have been delivered, and which of them is refined
- * next.
+/* Manages the cut of a view: the delivered nodes of the tree, and the order of refinement.
  *
- * - An observer, made ready as a viewpoint, says of a cell how far it is, how large in pixels, and
- *   whether it is in the frustum. It gives each node a key: the order of priority. Comparisons
- *   allow for rounding: a cell that is hardly seen counts as seen.
- * - The partial tree holds the groups of siblings that have been delivered, each linked to its
- *   parent once it is complete.
- * - The frontier holds the gray nodes of the cut in a binary heap, the next one to be refined on
- *   top. Equal keys are ordered by octcode, so that the order is the same everywhere. */
+ * - An observer, prepared as a viewpoint, computes the distance of a cell, its size in pixels, and
+ *   its visibility in the frustum. It gives each node a key, the order of priority. Comparisons
+ *   allow for rounding: a barely visible cell counts as visible.
+ * - The partial tree holds the delivered groups of siblings, each linked to its parent once it is
+ *   complete.
+ * - The frontier holds the gray nodes of the cut in a binary heap, with the next one to refine on
+ *   top. Equal keys are ordered by octcode, so that the order is deterministic. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -23,10 +22,10 @@
 
 /* --- the observer --- */
 
-/* of a sum of three products, generously: what is hardly seen counts as seen */
+/* generous bound for a sum of three products: barely visible cells count as visible */
 static const double SLACK = 1e-12;
 
-/* To length 1, whatever its length; false for (0, 0, 0). */
+/* Scales a vector to length 1, whatever its length; returns false for (0, 0, 0). */
 static bool normalise_vector(const double v[3], double out[3])
 {
     double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
@@ -59,7 +58,8 @@ static ebpo_status check_observer(const ebpo_observer *o, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Side walls: inward normals t * forward +- right, where t is the tangent of half the angle. */
+/* Computes the side planes: inward normals t * forward +- right, where t is the tangent of half the
+ * angle. */
 static ebpo_status make_frustum(ebpo_viewpoint *s, const ebpo_observer *o, double tangent,
                                 ebpo_error *error)
 {
@@ -113,12 +113,12 @@ ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
 ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_cell cell)
 {
     ebpo_seen out = { 0, true };
-    double low[3], high[3]; /* from the eye */
+    double low[3], high[3]; /* relative to the eye */
     if (!s->given)
         return out;
     for (int k = 0; k < 3; k++) {
-        low[k] = (ebpo_wall(box, k, cell.level, cell.at[k]) - s->eye[k]) / s->unit;
-        high[k] = (ebpo_wall(box, k, cell.level, cell.at[k] + 1) - s->eye[k]) / s->unit;
+        low[k] = (ebpo_cell_face(box, k, cell.level, cell.at[k]) - s->eye[k]) / s->unit;
+        high[k] = (ebpo_cell_face(box, k, cell.level, cell.at[k] + 1) - s->eye[k]) / s->unit;
         double away = low[k] > 0 ? low[k] : high[k] < 0 ? -high[k] : 0;
         out.distance2 += away * away;
     }
@@ -148,13 +148,14 @@ unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *s, const ebpo_box *box, ebp
 {
     unsigned octant = 0;
     for (int k = 0; k < 3 && s->given; k++)
-        octant |= (unsigned)(s->eye[k] >= ebpo_wall(box, k, cell.level + 1, 2 * cell.at[k] + 1))
-                  << k;
+        octant |=
+            (unsigned)(s->eye[k] >= ebpo_cell_face(box, k, cell.level + 1, 2 * cell.at[k] + 1))
+            << k;
     return octant;
 }
 
-/* Octants from the root down, each as seen from the eye: reading them as one number gives the
- * enumeration's order. */
+/* Returns the octants from the root down, each relative to the eye; as one number they give the
+ * order of the enumeration. */
 static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_octcode octcode)
 {
     int level = ebpo_octcode_level(octcode);
@@ -170,7 +171,7 @@ static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_o
     return key;
 }
 
-/* Doubles that are not negative sort as their bits do. */
+/* Returns the bits of a nonnegative double, which have the same order. */
 static uint64_t double_bits(double v)
 {
     uint64_t out;
@@ -201,7 +202,7 @@ void ebpo_partial_free(ebpo_partial *partial)
     memset(partial, 0, sizeof *partial);
 }
 
-static ebpo_status make_room(ebpo_partial *g, unsigned codes, ebpo_error *error)
+static ebpo_status reserve_space(ebpo_partial *g, unsigned codes, ebpo_error *error)
 {
     if (g->group_count >= UINT32_MAX)
         return ebpo_fail(error, EBPO_E_LIMIT,
@@ -221,13 +222,13 @@ ebpo_status ebpo_partial_add(ebpo_partial *g, const ebpo_info *info, uint64_t pa
     int level = parent ? ebpo_octcode_level(parent) + 1 : 0;
     uint64_t grays = ebpo_group_count(read->types, EBPO_GRAY, 8);
     if (grays >
-        info->level[level].gray_count - g->grays[level]) /* else a damaged index could give one node
-                                                            to many parents, without end */
+        info->level[level].gray_count - g->grays[level]) /* otherwise a damaged index could assign
+                                                          * one node to many parents, endlessly */
         return ebpo_fail(
             error, EBPO_E_FORMAT,
             "level %d: its index gives more gray nodes than the head states; run ebpo verify",
             level);
-    ebpo_status status = make_room(g, read->code_count, error);
+    ebpo_status status = reserve_space(g, read->code_count, error);
     if (status != EBPO_OK)
         return status;
     ebpo_partial_group *out = &g->group[g->group_count];
@@ -340,7 +341,7 @@ void ebpo_frontier_sort(ebpo_frontier *f)
         sink_down(f, i);
 }
 
-/* A table of blocks by hash; those for which there is no room are left out. */
+/* Uses a hash table of blocks; blocks that do not fit are omitted. */
 unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
                               uint64_t places[EBPO_FRONTIER_BLOCKS])
 {
@@ -354,7 +355,7 @@ unsigned ebpo_frontier_blocks(const ebpo_frontier *f, uint64_t span,
         const ebpo_waiting *w = &f->at[i];
         if (w->turn == EBPO_TURN_NEVER)
             continue;
-        /* with the level; not 0 */
+        /* includes the level; not 0 */
         uint64_t block = (w->below / span) << 6 | (uint64_t)(64 - __builtin_clzll(w->octcode));
         uint64_t at;
         EBPO_HASH_FIND(at, ebpo_hash_number(block), SLOTS - 1,

@@ -1,5 +1,4 @@
-/* The cut of a view (view_cut.c): the observer, the part of the tree that has been delivered, and
- * the frontier. */
+/* Cut of a view (view_cut.c): the observer, the delivered part of the tree, and the frontier. */
 #ifndef EBPO_LEVELS_VIEW_CUT_H
 #define EBPO_LEVELS_VIEW_CUT_H
 
@@ -11,53 +10,52 @@
 #include "geometry/level_nodes.h"
 #include "levels/stream.h"
 
-/* --- the observer: distance and size of cells, whether they are seen, their order --- */
+/* --- the observer: distance, size, visibility and order of cells --- */
 
-/* Made ready. Lengths are in units of about the root cell's longest side (a power of two of the
- * model's unit), so that squares neither overflow nor vanish. */
+/* A prepared observer. The unit of length is about the root cell's longest side (a power of two of
+ * the model's unit), so that squares neither overflow nor underflow. */
 typedef struct ebpo_viewpoint {
     bool given, everywhere;
-    double eye[3]; /* the model's unit */
-    double unit;   /* of the model's units in one */
-    double focal;  /* pixels of the length 1 at the distance 1 */
-    /* normals of the frustum's walls, all through the eye, and of the plane through the eye that
-     * faces the picture */
+    double eye[3]; /* in the model's unit */
+    double unit;   /* its size in the model's unit */
+    double focal;  /* pixels of length 1 at distance 1 */
+    /* normals of the frustum's planes, all through the eye, and of the plane through the eye
+     * parallel to the picture */
     double inward[5][3];
-    double diagonal2[EBPO_LEVELS_MAX]; /* squared, of a level's cells */
+    double diagonal2[EBPO_LEVELS_MAX]; /* squared, for a level's cells */
 } ebpo_viewpoint;
 
-/* `observer` may be NULL. EBPO_E_ARGUMENT: one that makes no sense. */
+/* Prepares an observer; `observer` may be NULL. EBPO_E_ARGUMENT: invalid observer. */
 EBPO_MUST_USE ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
                                               const ebpo_observer *observer, ebpo_error *error);
 
 typedef struct ebpo_seen {
-    double distance2; /* squared, from the eye to the cell's nearest point */
+    double distance2; /* squared distance from the eye to the cell's nearest point */
     bool seen;
 } ebpo_seen;
 ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *viewpoint, const ebpo_box *box, ebpo_cell cell);
 
-/* In the model's unit; in pixels. */
+/* Returns the value in the model's unit, or in pixels. */
 double ebpo_viewpoint_distance(const ebpo_viewpoint *viewpoint, double distance2);
 double ebpo_viewpoint_pixels(const ebpo_viewpoint *viewpoint, int level, double distance2);
 
-/* The octant of the cell in which the eye is, or beyond which it is. A child o is in no ray's way
- * to a child p when o ^ this has a bit that p ^ this has not. */
+/* Returns the octant of the cell that contains the eye or is nearest to it. No ray to a child p
+ * passes through a child o if o ^ this has a bit that p ^ this lacks. */
 unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *viewpoint, const ebpo_box *box,
                                ebpo_cell cell);
 
-/* Place in the order of the priority: the least comes first. For two cells of which none contains
- * the other. */
+/* Returns the priority key: the least comes first. For cells that do not contain each other. */
 uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *viewpoint, const ebpo_box *box,
                             ebpo_priority priority, ebpo_octcode octcode, double distance2);
 
-/* --- the part of a tree that has been delivered --- */
+/* --- the delivered part of a tree --- */
 
 /* A group of siblings, linked to its parent once it is complete. */
 typedef struct ebpo_partial_group {
     uint64_t parent;     /* octcode; 0: the root's group */
     uint64_t first_gray; /* rank in its level of the group's first gray node */
-    uint64_t first_code; /* into codes */
-    uint32_t child[8];   /* number of the children's group; 0: not there */
+    uint64_t first_code; /* index into codes */
+    uint32_t child[8];   /* index of the children's group; 0: not present */
     uint16_t types;
     uint8_t plane_count[8];
 } ebpo_partial_group;
@@ -65,16 +63,16 @@ typedef struct ebpo_partial_group {
 typedef struct ebpo_partial {
     ebpo_partial_group *group; /* group 0 is the root's */
     uint32_t *codes;
-    int32_t (*winding)[8]; /* NULL: not wanted */
+    int32_t (*winding)[8]; /* NULL: not requested */
     uint64_t group_count, group_capacity, winding_capacity, code_count, code_capacity;
     bool windings;
-    /* gray nodes seen of each level; more than the head tells: the file is damaged */
+    /* gray nodes delivered of each level; more than stated in the head means a damaged file */
     uint64_t grays[EBPO_LEVELS_MAX];
 } ebpo_partial;
 
 void ebpo_partial_free(ebpo_partial *partial);
 
-/* A node by its group and octant. */
+/* A node, given by group and octant. */
 typedef struct ebpo_partial_node {
     uint32_t group;
     uint8_t octant;
@@ -91,35 +89,35 @@ static inline uint64_t ebpo_partial_octcode(const ebpo_partial *g, ebpo_partial_
     return parent ? ebpo_octcode_child(parent, node.octant) : 1;
 }
 
-/* The group in which a gray node's children stand, in the next level of the file. */
+/* Returns the group of a gray node's children in the next level of the file. */
 static inline uint64_t ebpo_partial_children(const ebpo_partial *g, ebpo_partial_node gray)
 {
     return g->group[gray.group].first_gray +
            ebpo_group_count(g->group[gray.group].types, EBPO_GRAY, gray.octant);
 }
 
-/* Adds a group behind the last one; not linked yet. */
+/* Appends a group, without linking it. */
 EBPO_MUST_USE ebpo_status ebpo_partial_add(ebpo_partial *partial, const ebpo_info *info,
                                            uint64_t parent, const ebpo_group *read,
                                            ebpo_error *error);
 
-/* A node's own plane codes. */
+/* Returns the plane codes of a node. */
 const uint32_t *ebpo_partial_codes(const ebpo_partial *partial, ebpo_partial_node node,
                                    unsigned *count);
 
-/* Its envelope in coordinates of its cell; the nodes above it are linked. Lent until the next call
- * with these envelopes. */
+/* Returns the envelope of a node in cell coordinates; its ancestors must be linked. Valid until the
+ * next call with these envelopes. */
 const ebpo_polytope *ebpo_partial_envelope(const ebpo_partial *partial, ebpo_partial_node node,
                                            ebpo_envelope_stack *envelopes);
 
-/* --- the frontier: the gray nodes of the cut in a heap, the next one to be refined on top --- */
+/* --- the frontier: the gray nodes of the cut in a heap, the next one to refine on top --- */
 
-/* Whether a node's turn comes at all. */
+/* Class of a node in the order of refinement. */
 typedef enum ebpo_turn { EBPO_TURN_SEEN, EBPO_TURN_UNSEEN, EBPO_TURN_NEVER } ebpo_turn;
 
 typedef struct ebpo_waiting {
-    uint64_t key, octcode; /* the least key first, then the least octcode */
-    uint64_t below;        /* number of its children's group in their level */
+    uint64_t key, octcode; /* sorted by key, then by octcode */
+    uint64_t below;        /* index of its children's group in their level */
     uint32_t group;
     uint8_t octant, turn;
 } ebpo_waiting;
@@ -130,17 +128,17 @@ typedef struct ebpo_frontier {
 } ebpo_frontier;
 
 void ebpo_frontier_free(ebpo_frontier *frontier);
-/* After this, so many pushes cannot fail. */
+/* Reserves space, so that this number of pushes cannot fail. */
 EBPO_MUST_USE ebpo_status ebpo_frontier_reserve(ebpo_frontier *frontier, uint64_t more,
                                                 ebpo_error *error);
 void ebpo_frontier_push(ebpo_frontier *frontier, ebpo_waiting node);
-/* Takes the top away. */
+/* Removes and returns the top. */
 ebpo_waiting ebpo_frontier_pop(ebpo_frontier *frontier);
-/* After keys or turns have been changed. */
+/* Restores the order after keys or turns have changed. */
 void ebpo_frontier_sort(ebpo_frontier *frontier);
-/* Of the nodes whose turn comes, the first one of each block of `span` children's groups of a
- * level: their places in `at`, in order. The top is the first. At most EBPO_FRONTIER_BLOCKS;
- * returns how many. */
+/* Finds the first node to be refined in each block of `span` children's groups of a level. Writes
+ * their indices in `at`, in order; the top is the first. Returns their number, at most
+ * EBPO_FRONTIER_BLOCKS. */
 enum { EBPO_FRONTIER_BLOCKS = 1024 };
 unsigned ebpo_frontier_blocks(const ebpo_frontier *frontier, uint64_t span,
                               uint64_t places[EBPO_FRONTIER_BLOCKS]);

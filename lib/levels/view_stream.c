@@ -1,13 +1,13 @@
-/* Delivers a view: one group of siblings after the other, those first that the observer's priority
- * puts first, until the view's limits are reached.
+/* Delivers a view: one group of siblings after the other, in the order of the observer's priority,
+ * until the view's limits are reached.
  *
  * Each step takes the top of the frontier (view_cut.h), reads the group of its children, with the
- * faces of leaves if they are wanted, and returns the siblings; when all are delivered they replace
- * their parent in the cut. When the observer changes, the frontier is sorted again; what has been
- * delivered stays.
+ * faces of leaves if they are requested, and returns the siblings. After the last one they replace
+ * their parent in the cut. When the observer changes, the frontier is sorted again; delivered nodes
+ * stay.
  *
- * For files behind a network, the chunks that a group needs are requested together, and with them
- * the chunks of the groups that come soon, as far as the reader's memory allows. */
+ * For remote files, the chunks that a group needs are requested together, with the chunks of the
+ * groups that follow, as far as the reader's memory allows. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -25,12 +25,12 @@
 #include "geometry/cells.h"
 #include "levels/view_cut.h"
 
-/* Of the siblings that are being delivered, and which faces have been. */
+/* Leaves among the current siblings, and flags of delivered faces. */
 typedef struct view_leaves {
     const ebpo_info *info;
-    ebpo_slice slice[8]; /* of the leaves among them */
-    uint8_t *given;      /* a bit for each face of the file */
-    /* What is lent of the leaf given last. */
+    ebpo_slice slice[8]; /* of the leaves among the siblings */
+    uint8_t *given;      /* one bit for each face of the file */
+    /* Faces of the last returned leaf, valid until the next one. */
     double (*corners)[3][3];
     uint32_t *numbers;
     uint8_t *repeated;
@@ -38,13 +38,13 @@ typedef struct view_leaves {
     ebpo_view_faces now;
 } view_leaves;
 
-/* A group of siblings; `parent` is an octcode, 0 of the root's group. */
+/* A group of siblings; `parent` is an octcode, 0 for the root's group. */
 typedef struct view_group {
     ebpo_group_number number;
     uint64_t parent;
 } view_group;
 
-/* To which level the view goes below a node, at most. */
+/* Limit for the levels that the view visits below a node. */
 typedef struct view_depth {
     int (*level)(const void *user, uint64_t octcode);
     const void *user;
@@ -59,17 +59,17 @@ struct ebpo_view_stream {
     ebpo_viewpoint viewpoint;
     ebpo_chunks *chunks;
     ebpo_partial partial;
-    ebpo_frontier frontier; /* gray nodes of the cut, but for `parent` */
-    /* Siblings that are being delivered: the last group of `grown`. */
+    ebpo_frontier frontier; /* gray nodes of the cut, except `parent` */
+    /* True while the last group of `grown` is being delivered. */
     bool delivering;
-    ebpo_waiting parent; /* not of the root's group */
-    unsigned step, flip; /* the next one is octant step ^ flip */
+    ebpo_waiting parent; /* unused for the root's group */
+    unsigned step, flip; /* the next octant is step ^ flip */
     uint64_t delivered, cut[4];
     ebpo_group read;
-    ebpo_envelope_stack *envelopes; /* with polygons */
+    ebpo_envelope_stack *envelopes; /* if polygons are requested */
     ebpo_node_buffers capacity;
-    view_leaves *leaves; /* with faces */
-    /* what is deeper, or smaller, is not announced yet */
+    view_leaves *leaves; /* if faces are requested */
+    /* deeper or smaller nodes are not prefetched yet */
     int soon_level;
     double soon_pixels;
 };
@@ -80,8 +80,8 @@ static ebpo_status view_leaves_new(view_leaves **out, const ebpo_file *file, ebp
     *out = NULL;
     if (!(info->parts & EBPO_PART_MESH))
         return ebpo_fail(error, EBPO_E_ABSENT,
-                         "view options: faces are asked for, and the file was written without its "
-                         "mesh; build it again with it");
+                         "view options: faces are requested, and the file was written without "
+                         "its mesh; build it again with it");
     view_leaves *l = ebpo_alloc_zero(1, sizeof *l);
     if (l)
         l->given = ebpo_alloc_zero(info->face_count / 8 + 1, 1);
@@ -112,7 +112,7 @@ static void view_leaves_free(view_leaves *l)
     free(l);
 }
 
-/* The node of an octant of a group that has been read, if it is a leaf. */
+/* Returns the node of an octant in a group that has been read, if it is a leaf. */
 static bool leaf_of_group(const view_group *group, const ebpo_group *read, unsigned octant,
                           ebpo_node *out)
 {
@@ -129,7 +129,7 @@ static bool leaf_of_group(const view_group *group, const ebpo_group *read, unsig
 
 /* --- faces of leaves: reading --- */
 
-static ebpo_status make_room(view_leaves *l, uint64_t faces, ebpo_error *error)
+static ebpo_status reserve_space(view_leaves *l, uint64_t faces, ebpo_error *error)
 {
     bool fine = ebpo_grow(&l->corners, &l->capacity[0], faces, sizeof *l->corners) &&
                 ebpo_grow(&l->numbers, &l->capacity[1], faces, sizeof *l->numbers) &&
@@ -138,7 +138,7 @@ static ebpo_status make_room(view_leaves *l, uint64_t faces, ebpo_error *error)
                 : ebpo_fail_memory(error, faces * (sizeof *l->corners + sizeof *l->numbers + 1));
 }
 
-/* The faces of all leaves of a group that has been read. On failure there are none. */
+/* Reads the faces of all leaves of a group. After a failure there are none. */
 static ebpo_status view_leaves_read(view_leaves *l, ebpo_chunks *chunks, const view_group *group,
                                     const ebpo_group *read, ebpo_error *error)
 {
@@ -149,7 +149,7 @@ static ebpo_status view_leaves_read(view_leaves *l, ebpo_chunks *chunks, const v
         if (leaf_of_group(group, read, octant, &leaf)) {
             status = ebpo_slice_read_parts(&l->slice[octant], chunks, &leaf, 0, error);
             if (status == EBPO_OK)
-                status = make_room(l, l->slice[octant].mesh.face_count, error);
+                status = reserve_space(l, l->slice[octant].mesh.face_count, error);
         }
     if (status != EBPO_OK)
         drop_slices(l);
@@ -158,7 +158,7 @@ static ebpo_status view_leaves_read(view_leaves *l, ebpo_chunks *chunks, const v
 
 /* --- faces of leaves: returning them --- */
 
-/* About no node. */
+/* Clears `now`: no node. */
 static void give_no_leaf(view_leaves *l) { l->now = (ebpo_view_faces)EBPO_VIEW_FACES_INIT; }
 
 static void take_face(view_leaves *l, const ebpo_slice *slice, uint32_t face)
@@ -175,7 +175,7 @@ static void take_face(view_leaves *l, const ebpo_slice *slice, uint32_t face)
     l->now.new_count += !l->repeated[face];
 }
 
-/* From now on `now` is about the node of this octant, which has been given with that. */
+/* Sets `now` to the node of this octant, which was returned with it. */
 static void give_leaf(view_leaves *l, unsigned octant)
 {
     const ebpo_slice *slice = &l->slice[octant];
@@ -199,26 +199,26 @@ typedef struct fetching {
     const view_depth *depth;
 } fetching;
 
-/* The children of a node that waits to be refined. */
+/* Returns the children of a node that waits for refinement. */
 static view_group children_of(const ebpo_waiting *w)
 {
     return (view_group){ { ebpo_octcode_level(w->octcode) + 1, w->below }, w->octcode };
 }
 
-/* What comes next, and after it what comes soon; returns how many groups. Of those that stand
- * together in blocks of so many, one. */
+/* Lists the next group and groups that follow soon, one for each block of `block` groups. Returns
+ * their number. */
 static unsigned coming_groups(const fetching *f, const view_group *first, unsigned block,
                               view_group groups[EBPO_FRONTIER_BLOCKS])
 {
     uint64_t best[EBPO_FRONTIER_BLOCKS];
     unsigned count = ebpo_frontier_blocks(f->frontier, block, best);
     groups[0] = *first;
-    for (unsigned i = 0; i < count; i++) /* the first is the one at hand */
+    for (unsigned i = 0; i < count; i++) /* the first is the current group */
         groups[i] = children_of(&f->frontier->at[best[i]]);
     return count ? count : 1;
 }
 
-/* Reads all that a group takes, for nothing but to find out what is missing. */
+/* Reads all data of a group, only to find out which chunks are missing. */
 static void try_group(const fetching *f, const view_group *group)
 {
     ebpo_group read;
@@ -240,7 +240,7 @@ static bool below_subtrees(const fetching *f, const view_group *group)
     return group->parent && ebpo_subtree_table_has(f->chunks->file, group->number.level);
 }
 
-/* The number of the subtree that a group stands in: its root's rank among gray nodes. */
+/* Returns the index of the group's subtree: its root's rank among gray nodes. */
 static uint64_t subtree_of(const fetching *f, const view_group *group)
 {
     int last = ebpo_octcode_level(group->parent), level = f->chunks->file->info.subtree_level;
@@ -251,19 +251,19 @@ static uint64_t subtree_of(const fetching *f, const view_group *group)
     return ebpo_partial_children(f->partial, node);
 }
 
-enum { SUBTREES_MOST = 4096, WITH_FACES = 64 };
+enum { SUBTREES_MAX = 4096, WITH_FACES = 64 };
 
-/* A subtree that the view goes into, by its number and its root. */
+/* A subtree that the view enters, by its index and root. */
 typedef struct entered {
     uint64_t number, octcode;
 } entered;
 
 typedef struct entering {
     unsigned count;
-    entered list[SUBTREES_MOST];
+    entered list[SUBTREES_MAX];
 } entering;
 
-/* In which subtrees these groups stand, each once; not what waits at a root. */
+/* Lists the subtrees of these groups, each once; excludes nodes that wait at a root. */
 static void enter_groups(const fetching *f, const view_group *groups, unsigned count, entering *e)
 {
     int level = f->chunks->file->info.subtree_level;
@@ -279,15 +279,15 @@ static void enter_groups(const fetching *f, const view_group *groups, unsigned c
     }
 }
 
-/* The subtrees that the view will come to from a node above them: the types of the levels in
- * between are in memory, or else are noted as missing. */
+/* Lists the subtrees that the view will enter from a node above them: the types of intermediate
+ * levels are in memory, or are noted as missing. */
 static void enter_below(const fetching *f, const view_group *children, entering *e)
 {
     int level = children->number.level;
     ebpo_group read;
     if (ebpo_group_read(f->chunks, level, children->number.group, 0, &read, NULL) != EBPO_OK)
         return;
-    for (unsigned octant = 0; octant < 8 && e->count < SUBTREES_MOST; octant++) {
+    for (unsigned octant = 0; octant < 8 && e->count < SUBTREES_MAX; octant++) {
         uint64_t octcode = ebpo_octcode_child(children->parent, octant),
                  rank = read.rank[EBPO_GRAY] + ebpo_group_count(read.types, EBPO_GRAY, octant);
         if (ebpo_group_type(read.types, octant) != EBPO_GRAY ||
@@ -300,11 +300,11 @@ static void enter_below(const fetching *f, const view_group *children, entering 
     }
 }
 
-/* What waits at the subtrees' roots and above. */
+/* Lists nodes of the frontier at the subtrees' roots and above. */
 static void enter_frontier(const fetching *f, entering *e)
 {
     int level = f->chunks->file->info.subtree_level;
-    for (uint64_t i = 0; i < f->frontier->count && e->count < SUBTREES_MOST; i++) {
+    for (uint64_t i = 0; i < f->frontier->count && e->count < SUBTREES_MAX; i++) {
         const ebpo_waiting *w = &f->frontier->at[i];
         view_group children = children_of(w);
         if (w->turn == EBPO_TURN_SEEN && children.number.level <= level)
@@ -314,9 +314,9 @@ static void enter_frontier(const fetching *f, entering *e)
     }
 }
 
-/* Of the subtrees of these groups, all that the view will come to, as far as `most` bytes go.
- * Faces: not where it goes through so many that it comes to the end of none soon; then what the
- * next groups take is enough. */
+/* Collects all chunks that the view needs from the subtrees of these groups, up to `most` bytes.
+ * With faces, returns false if the view passes through so many subtrees that none will be completed
+ * soon; the chunks of the next groups are then sufficient. */
 static bool try_subtrees(const fetching *f, const view_group *groups, unsigned count,
                          const ebpo_chunk_keys *keys, uint64_t most)
 {
@@ -332,39 +332,39 @@ static bool try_subtrees(const fetching *f, const view_group *groups, unsigned c
     if (f->faces && e.count > WITH_FACES)
         return false;
     for (unsigned i = 0; i < e.count && keys->bytes < most; i++) {
-        ebpo_expected none = EBPO_EXPECTED_INIT(f->chunks->file);
-        ebpo_subtrees_expect(f->chunks, &none, e.list[i].number, 1, needs,
-                             f->depth->level(f->depth->user, e.list[i].octcode), f->faces);
+        ebpo_hints none = EBPO_HINTS_INIT(f->chunks->file);
+        ebpo_subtrees_hint(f->chunks, &none, e.list[i].number, 1, needs,
+                           f->depth->level(f->depth->user, e.list[i].octcode), f->faces);
     }
     return e.count > 0;
 }
 
 /* --- fetching --- */
 
-/* The chunks that the group waits for next, and, unless they have been announced before, behind
- * these what the next groups take: so one batch is used up before the next one is told. How many
- * are its own. */
+/* Collects the missing chunks of the group and, unless they were prefetched before, those of the
+ * next groups: so one batch is used up before the next one is requested. Returns the number of the
+ * group's chunks. */
 static unsigned collect_chunks(const fetching *f, const view_group *group, ebpo_chunk_keys *keys)
 {
-    enum { FACES_BLOCK = 64, TRIED = 64 }; /* trying is work */
+    enum { FACES_BLOCK = 64, TRIED = 64 }; /* trying takes time */
     view_group groups[EBPO_FRONTIER_BLOCKS];
     ebpo_chunk_keys_begin(keys);
     ebpo_chunks_collect(f->chunks, keys);
     try_group(f, group);
     unsigned own = keys->count;
-    uint64_t most = keys->bytes + ebpo_chunks_room(f->chunks);
-    if (own && !ebpo_chunks_announced(f->chunks, keys)) {
+    uint64_t most = keys->bytes + ebpo_chunks_capacity(f->chunks);
+    if (own && !ebpo_chunks_hinted(f->chunks, keys)) {
         unsigned count = coming_groups(f, group, f->faces ? FACES_BLOCK : 1, groups);
-        bool told = try_subtrees(f, groups, count, keys, most);
-        for (unsigned i = 1; i < count && i < TRIED && !told && keys->bytes < most; i++)
+        bool reported = try_subtrees(f, groups, count, keys, most);
+        for (unsigned i = 1; i < count && i < TRIED && !reported && keys->bytes < most; i++)
             try_group(f, &groups[i]);
     }
     ebpo_chunks_collect(f->chunks, NULL);
     return own;
 }
 
-/* Pass by pass: lists, references, faces, vertices, with what ranks take in between. Beyond that,
- * reading goes on without having been announced. */
+/* Fetches in passes: lists, references, faces, vertices, and ranks in between. Further chunks are
+ * read without prefetching. */
 static ebpo_status fetch_tried(const fetching *f, const view_group *group, ebpo_error *error)
 {
     enum { PASSES = 12 };
@@ -379,7 +379,7 @@ static ebpo_status fetch_tried(const fetching *f, const view_group *group, ebpo_
     return status;
 }
 
-/* Nodes alone, of levels above the subtrees or of files without. */
+/* Fetches nodes only, in levels above the subtrees or in files without subtrees. */
 static ebpo_status fetch_nodes(const fetching *f, const view_group *group, ebpo_error *error)
 {
     view_group groups[EBPO_FRONTIER_BLOCKS];
@@ -387,17 +387,16 @@ static ebpo_status fetch_nodes(const fetching *f, const view_group *group, ebpo_
     if (!ebpo_group_is_far(f->chunks, &group->number, f->wanted))
         return EBPO_OK;
     if (f->chunks->limit == UINT64_MAX)
-        ebpo_expect_top(f->chunks->file); /* with it what the subtrees ask for first */
+        ebpo_hint_top(f->chunks->file); /* with the first data of the subtrees */
     unsigned count = coming_groups(f, group, EBPO_GROUP_BLOCK, groups);
     for (unsigned i = 0; i < count; i++)
         numbers[i] = groups[i].number;
     return ebpo_group_fetch(f->chunks, numbers, count, f->wanted, error);
 }
 
-/* For files far away, when not all is in memory: fetches what the group (EBPO_GROUP_...) and with
- * `faces` those of its leaves take and is not in memory, and announces with it what the next groups
- * of the frontier take: where the file has a table of subtrees, all of the subtrees in which they
- * are. Counted chunks: EBPO_E_LIMIT as ebpo_group_read. */
+/* Fetches the missing chunks of the group (EBPO_GROUP_...) of a remote file and, with `faces`, of
+ * its leaves. Also prefetches those of the next groups of the frontier; if the file has a table of
+ * subtrees, all chunks of their subtrees. Counted chunks: EBPO_E_LIMIT as in ebpo_group_read. */
 static ebpo_status fetch_group(ebpo_chunks *chunks, const ebpo_partial *partial,
                                const ebpo_frontier *frontier, const view_group *group,
                                unsigned wanted, bool faces, const view_depth *depth,
@@ -418,26 +417,24 @@ enum { MEMORY_LEAST = 1 << 20 };
 static ebpo_status check_options(const ebpo_view_options *o, ebpo_error *error)
 {
     if (o->priority < EBPO_PRIORITY_LEVEL || o->priority > EBPO_PRIORITY_FRONT_TO_BACK)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: there is no priority number %d",
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "view options: priority %d does not exist",
                          (int)o->priority);
     if (o->unseen != EBPO_UNSEEN_LAST && o->unseen != EBPO_UNSEEN_NEVER)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "view options: there is no rule number %d for what is unseen",
-                         (int)o->unseen);
+                         "view options: rule %d for unseen nodes does not exist", (int)o->unseen);
     if (!(o->pixels >= 0) || !(o->distance >= 0) || isinf(o->pixels))
         return ebpo_fail(
             error, EBPO_E_ARGUMENT,
             "view options: pixels must be a finite number and distance a number, both at least 0");
-    if (o->memory &&
-        o->memory < MEMORY_LEAST) /* less than one group's chunks and their neighbours': every group
-                                     would read all of them again */
+    if (o->memory && o->memory < MEMORY_LEAST) /* less than one group's chunks and the adjacent
+                                                * ones: every group would read all of them again */
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "view options: memory must be at least %d bytes, or 0", MEMORY_LEAST);
     if (!o->observer &&
         (o->priority != EBPO_PRIORITY_LEVEL || o->pixels > 0 || !isinf(o->distance)))
         return ebpo_fail(
             error, EBPO_E_ARGUMENT,
-            "view options: pixels, distance and all priorities but the level's need an observer");
+            "view options: pixels, distance and all priorities except by level need an observer");
     return EBPO_OK;
 }
 
@@ -504,7 +501,7 @@ void ebpo_view_stream_free(ebpo_view_stream *s)
     free(s);
 }
 
-/* --- what comes next --- */
+/* --- the next group --- */
 
 static ebpo_turn turn_of(const ebpo_view_stream *s, int level, ebpo_seen look)
 {
@@ -542,7 +539,7 @@ ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options
         wanted.faces != now->faces)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "view options: planes, polygons, windings, memory and faces cannot be "
-                         "changed; make another stream");
+                         "changed; create another stream");
     status = take_options(s, &wanted, error);
     if (status != EBPO_OK)
         return status;
@@ -562,7 +559,7 @@ static ebpo_status read_now(ebpo_view_stream *s, const view_group *group, unsign
                : status;
 }
 
-/* Of a file far away, from memory alone; false: there is more to it. */
+/* Reads a group of a remote file from memory only; returns false if chunks are missing. */
 static bool read_at_once(ebpo_view_stream *s, const view_group *group, unsigned wanted)
 {
     ebpo_chunk_keys missing;
@@ -573,8 +570,8 @@ static bool read_at_once(ebpo_view_stream *s, const view_group *group, unsigned 
     return status == EBPO_OK && missing.count == 0;
 }
 
-/* A view that ends with a number of bytes or nodes comes to an unknown depth: what is this much
- * deeper than the next node, or smaller, is not announced before its turn is near. */
+/* If a view ends at a number of bytes or nodes, its depth is unknown: nodes that are this much
+ * deeper or smaller than the next one are prefetched only when they are near in the order. */
 enum { SOON_LEVELS = 2 };
 
 static void set_soon(ebpo_view_stream *s, uint64_t next)
@@ -597,8 +594,8 @@ static bool is_late(const ebpo_view_stream *s, int level, ebpo_seen look)
             ebpo_viewpoint_pixels(&s->viewpoint, level, look.distance2) < s->soon_pixels);
 }
 
-/* The first level at which nothing below the node is refined any more, or not soon, seen from where
- * it is nearest. */
+/* Returns the first level below which no descendant of the node will be refined soon, for the
+ * nearest possible distance. */
 static int depth_below(const void *user, uint64_t octcode)
 {
     const ebpo_view_stream *s = user;
@@ -610,7 +607,7 @@ static int depth_below(const void *user, uint64_t octcode)
     return level;
 }
 
-/* Into s->read, and with faces those of its leaves. */
+/* Reads into s->read, and with faces the faces of its leaves. */
 static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo_error *error)
 {
     unsigned wanted = (s->options.planes || s->options.polygons ? EBPO_GROUP_PLANES : 0u) |
@@ -628,8 +625,8 @@ static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo
     return status == EBPO_OK ? read_now(s, group, wanted, error) : status;
 }
 
-/* Begins with the children of the top of the frontier, or with the root. Of a pruned node there are
- * none: it stays in the cut, and the call is to be made again. */
+/* Begins with the children of the top of the frontier, or with the root. A pruned node has none: it
+ * stays in the cut, and the caller calls again. */
 static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_error *error)
 {
     bool root = s->partial.group_count == 0;
@@ -678,7 +675,7 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
     return EBPO_OK;
 }
 
-/* All siblings are there: they replace their parent. */
+/* Replaces the parent by its siblings, which are complete. */
 static void end_group(ebpo_view_stream *s)
 {
     uint32_t group = (uint32_t)(s->partial.group_count - 1);
@@ -691,7 +688,7 @@ static void end_group(ebpo_view_stream *s)
         ebpo_node_type type = ebpo_partial_type(&s->partial, node);
         s->cut[type]++;
         if (type == EBPO_GRAY && ebpo_octcode_level(ebpo_partial_octcode(&s->partial, node)) + 1 <
-                                     s->info->level_count) { /* else pruned */
+                                     s->info->level_count) { /* otherwise pruned */
             ebpo_waiting w = { .octcode = ebpo_partial_octcode(&s->partial, node),
                                .below = ebpo_partial_children(&s->partial, node),
                                .group = group,
@@ -705,7 +702,7 @@ static void end_group(ebpo_view_stream *s)
 
 /* --- nodes --- */
 
-/* All about a node of `grown`; `complete` is left to the caller. */
+/* Fills in a node of `grown`; the caller sets `complete`. */
 static void fill_node(ebpo_view_stream *s, ebpo_partial_node node, ebpo_view_node *out)
 {
     ebpo_node_type type = ebpo_partial_type(&s->partial, node);
@@ -754,7 +751,7 @@ ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo
     return EBPO_OK;
 }
 
-/* --- what has been delivered: the cut, statistics, faces --- */
+/* --- delivered data: the cut, statistics, faces --- */
 
 typedef struct visitor {
     ebpo_view_stream *stream;
@@ -763,7 +760,7 @@ typedef struct visitor {
     ebpo_view_node node;
 } visitor;
 
-/* False: enough. */
+/* Returns false to stop. */
 static bool visit_node(visitor *v, ebpo_partial_node node)
 {
     const ebpo_partial *partial = &v->stream->partial;

@@ -1,5 +1,5 @@
-/* Adjacency of faces: the faces at each vertex (stars), faces with the same corners, and the faces
- * at an edge, sorted around it by exact predicates. */
+/* Computes the adjacency of faces: the faces at each vertex (stars), faces with equal corners, and
+ * the faces at an edge, sorted around it by exact predicates. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -48,7 +48,7 @@ static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* first[v] holds the row's end before, and counts down to its begin. */
+/* Stores a face. first[v] is initially the end of the row and counts down to its begin. */
 static inline void adjacency_put(ebpo_stars *stars, uint32_t v, uint64_t f)
 {
     stars->face[__atomic_fetch_sub(&stars->first[v], 1, __ATOMIC_RELAXED) - 1] = (uint32_t)f;
@@ -258,7 +258,7 @@ void ebpo_edge_faces_sort(ebpo_edge_faces *e)
         qsort(e->face, e->count, sizeof *e->face, compare_patches);
 }
 
-/* Returns the sign of the first component of the normal of v, w, p that is not 0. */
+/* Returns the sign of the first nonzero component of the normal of v, w, p. */
 static int normal_sign(const edge *e, const double p[3], int *axis)
 {
     for (*axis = 0; *axis < 3; ++*axis) {
@@ -269,7 +269,7 @@ static int normal_sign(const edge *e, const double p[3], int *axis)
     return 0;
 }
 
-/* Returns less than 0 where a comes first, and 0 where both are in one plane. */
+/* Returns less than 0 if a comes first, and 0 if both are in one plane. */
 static int compare_angles(const ebpo_edge_face *a, const ebpo_edge_face *b, const edge *e)
 {
     if (a->quarter != b->quarter)
@@ -318,8 +318,8 @@ bool ebpo_edge_faces_turn(ebpo_edge_faces *e, const ebpo_mesh *mesh, uint32_t v,
     return true;
 }
 
-/* Returns whether every layer has as many faces along the edge as its places say, of which the
- * first is along it when `first` is 1. */
+/* Returns true if every layer has as many faces along the edge as its positions require, where
+ * `first` is 1 if the first position is along it. */
 static bool alternate_from(const ebpo_edge_faces *e, unsigned first)
 {
     int64_t surplus = 0;

@@ -1,19 +1,19 @@
-/* Which faces meet at which vertex, and what that says about edges. */
+/* Adjacency of faces at vertices and edges. */
 #ifndef EBPO_MESH_ADJACENCY_H
 #define EBPO_MESH_ADJACENCY_H
 
 #include "mesh/mesh_parts.h"
 
-/* Compressed rows: the faces at vertex v are face[first[v] .. first[v + 1]), each once, in no
- * particular order. 12 bytes a face and 8 bytes a vertex. */
+/* Compressed rows: the faces at vertex v are face[first[v] .. first[v + 1]), each once, unordered.
+ * 12 bytes a face and 8 bytes a vertex. */
 typedef struct ebpo_stars {
     uint64_t *first; /* [vertex_count + 1] */
     uint32_t *face;
-    ebpo_workspace *workspace; /* the mesh's, of both */
+    ebpo_workspace *workspace; /* the mesh's; owns both arrays */
 } ebpo_stars;
 
-/* Checks every index first (EBPO_E_FORMAT naming the lowest bad face). `out` is cleared on failure.
- */
+/* Builds the stars. Checks every index first; EBPO_E_FORMAT names the lowest bad face. `out` is
+ * cleared on failure. */
 EBPO_MUST_USE ebpo_status ebpo_stars_build(ebpo_stars *out, const ebpo_mesh *mesh, unsigned threads,
                                            const ebpo_progress *progress, ebpo_error *error);
 void ebpo_stars_free(ebpo_stars *stars);
@@ -26,7 +26,7 @@ static inline uint64_t ebpo_stars_degree(const ebpo_stars *stars, uint32_t v)
 /* One use of an edge at a vertex by one face. */
 typedef struct ebpo_link {
     uint64_t key; /* neighbour << 32 | face */
-    /* number of the face within the star; EBPO_NO_INDEX for a face that names a vertex twice */
+    /* index of the face within the star; EBPO_NO_INDEX for a face that repeats a vertex */
     uint32_t entry;
     uint8_t out;    /* 1: the face runs from the vertex to the neighbour */
     uint8_t corner; /* the edge is the face's corner .. corner + 1 */
@@ -38,20 +38,20 @@ static inline uint32_t ebpo_link_neighbour(const ebpo_link *link)
 }
 static inline uint32_t ebpo_link_face(const ebpo_link *link) { return (uint32_t)link->key; }
 
-/* Scratch for one thread; zero it to begin with. */
+/* Scratch memory of one thread; initialise it with zeros. */
 typedef struct ebpo_star {
     ebpo_link *links; /* sorted by neighbour, then by face: each edge at the vertex is one run */
     uint64_t count;
-    uint64_t faces; /* entries: faces that name no vertex twice */
+    uint64_t faces; /* entries: faces that repeat no vertex */
     uint64_t capacity;
-    ebpo_workspace *workspace; /* the mesh's, since something was gathered */
+    ebpo_workspace *workspace; /* the mesh's, once something was gathered */
 } ebpo_star;
 
-/* Gathers the edge uses at vertex v. False when memory is short. */
+/* Gathers the edge uses at vertex v. Returns false when memory is short. */
 bool ebpo_star_gather(ebpo_star *star, const ebpo_stars *stars, const ebpo_mesh *mesh, uint32_t v);
 void ebpo_star_free(ebpo_star *star);
 
-/* One past the last link of the run (edge) that begins at `begin`. */
+/* Returns the index after the last link of the run (edge) that begins at `begin`. */
 static inline uint64_t ebpo_star_run_end(const ebpo_star *star, uint64_t begin)
 {
     uint32_t neighbour = ebpo_link_neighbour(&star->links[begin]);
@@ -61,71 +61,73 @@ static inline uint64_t ebpo_star_run_end(const ebpo_star *star, uint64_t begin)
     return end;
 }
 
-/* First link of the run to `neighbour`; star->count when there is none. */
+/* Returns the first link of the run to `neighbour`, or star->count when there is none. */
 uint64_t ebpo_star_find(const ebpo_star *star, uint32_t neighbour);
 
-/* Faces of the same three vertices. They meet at their lowest vertex. */
+/* A face in a search for faces with the same three vertices, which are found at their lowest
+ * vertex. */
 
 typedef struct ebpo_same_face {
-    uint64_t corners; /* the two greater ones: lesser << 32 | greater */
-    uint32_t source;  /* number in the source */
+    uint64_t corners; /* the two greater vertices: lesser << 32 | greater */
+    uint32_t source;  /* index in the source */
     uint32_t face;
 } ebpo_same_face;
 
-/* Scratch for one thread; zero it to begin with. */
+/* Scratch memory of one thread; initialise it with zeros. */
 typedef struct ebpo_same_faces {
-    ebpo_same_face *item; /* equal ones are neighbours, the first of the source first */
+    ebpo_same_face *item; /* equal faces are adjacent, in the order of the source */
     uint64_t count;
     uint64_t capacity;
-    ebpo_workspace *workspace; /* the mesh's, since something was gathered */
+    ebpo_workspace *workspace; /* the mesh's, once something was gathered */
 } ebpo_same_faces;
 
-/* The faces of three distinct vertices of which v is the lowest. False when memory is short. */
+/* Gathers the faces of three distinct vertices whose lowest is v. Returns false when memory is
+ * short. */
 bool ebpo_same_faces_gather(ebpo_same_faces *out, const ebpo_stars *stars, const ebpo_mesh *mesh,
                             uint32_t v);
 void ebpo_same_faces_free(ebpo_same_faces *faces);
 
-/* Item i is of the same vertices as the one before. */
+/* Returns true if item i has the same vertices as the previous one. */
 static inline bool ebpo_same_faces_repeats(const ebpo_same_faces *faces, uint64_t i)
 {
     return i > 0 && faces->item[i].corners == faces->item[i - 1].corners;
 }
 
-/* The faces at one edge: by their patches, or in their order around it. */
+/* The faces at one edge, sorted by patch or by angle around the edge. */
 
 typedef struct ebpo_edge_face {
-    uint64_t patch; /* shifted by 1; the lowest bit is the caller's */
+    uint64_t patch; /* shifted by 1; the lowest bit belongs to the caller */
     uint32_t face;
     uint8_t out; /* 1: the face runs from the edge's first vertex to the other one */
 
-    /* set while faces are put in order: the third corner, and the quarter of the turn from the
-     * first face: 0 beside it, 1 before the half, 2 at the half, 3 beyond */
+    /* set during sorting: the third corner, and the quarter of the turn from the first face: 0 at
+     * it, 1 before the half turn, 2 at it, 3 after it */
     uint8_t quarter;
-    bool layered;    /* it is in one plane with the face before it */
-    bool reversed;   /* of faces in one plane, those of greater numbers come first */
-    uint64_t source; /* its number in the source */
+    bool layered;    /* coplanar with the face before it */
+    bool reversed;   /* among coplanar faces, greater indices come first */
+    uint64_t source; /* index in the source */
     double at[3];
 } ebpo_edge_face;
 
-/* Zero it to begin with; `face` is freed by free(). */
+/* Initialise it with zeros; free `face` with free(). */
 typedef struct ebpo_edge_faces {
     ebpo_edge_face *face;
     uint64_t count, capacity;
 } ebpo_edge_faces;
 
-/* False when memory is short. */
+/* Adds a face. Returns false when memory is short. */
 bool ebpo_edge_faces_add(ebpo_edge_faces *e, uint32_t face, uint8_t out, uint64_t patch);
 
-/* Puts faces of one patch together. */
+/* Sorts the faces by patch. */
 void ebpo_edge_faces_sort(ebpo_edge_faces *e);
 
-/* Puts the faces in their order around the edge from vertex v to w, exactly, beginning anywhere.
- * Faces in one plane are taken for layers above each other, by their numbers in the source: in the
- * same order at every edge that they have in common. False where a face has no area. */
+/* Sorts the faces by angle around the edge from vertex v to w, exactly, beginning anywhere.
+ * Coplanar faces count as stacked layers, ordered by their source indices: they have the same order
+ * at every shared edge. Returns false if a face has no area. */
 bool ebpo_edge_faces_turn(ebpo_edge_faces *e, const ebpo_mesh *mesh, uint32_t v, uint32_t w);
 
-/* Returns whether the faces, put in that order, run along the edge and against it by turns, with
- * those in one plane in any order. */
+/* Returns true if the sorted faces alternate in direction along the edge; coplanar faces may be in
+ * any order. */
 bool ebpo_edge_faces_alternate(const ebpo_edge_faces *e);
 
 #endif

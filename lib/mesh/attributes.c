@@ -1,6 +1,5 @@
-/* Attributes of a mesh: arrays of numbers of vertices, faces and other elements. They are made,
- * named, copied and freed here; rows are picked, reordered and compared; ranges and names are read.
- */
+/* Attributes of a mesh: numeric arrays for vertices, faces and other elements. Creates, copies and
+ * frees them; selects, reorders and compares rows; reads ranges and names. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -14,7 +13,7 @@
 #include "core/error.h"
 #include "mesh/attributes.h"
 
-/* --- making and freeing --- */
+/* --- creating and freeing --- */
 
 static const char *const type_names[] = { "int8",  "uint8",  "int16",   "uint16",
                                           "int32", "uint32", "float32", "float64" };
@@ -127,7 +126,7 @@ bool ebpo_attribute_reserve(ebpo_workspace *workspace, ebpo_attribute *a, uint64
            ebpo_array_grow(workspace, &a->values, &a->item_capacity, items, bytes);
 }
 
-/* Into a text of `size` bytes, which says "and more" when it is full. */
+/* Appends to a text of `size` bytes, or "and more" when it is full. */
 static void attributes_append(char *to, size_t size, const char *format, va_list args)
     EBPO_PRINTF(3, 0);
 
@@ -231,8 +230,8 @@ ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo_attributes *f
     return make_of(out, from, workspace, copy_array, error);
 }
 
-/* Rows of attributes: others of them, in another order; lists that are columns; what values reach.
- */
+/* Row operations on attributes: selecting and reordering rows, converting lists to columns, ranges
+ * of values. */
 
 typedef struct picking {
     ebpo_workspace *workspace;
@@ -281,7 +280,7 @@ static void pick_items(picking *p)
     }
 }
 
-/* Into p->made, which the caller frees. */
+/* Writes the selected rows to p->made, which the caller frees. */
 static bool attributes_pick(picking *p)
 {
     const ebpo_attribute *from = p->from;
@@ -331,7 +330,7 @@ ebpo_status ebpo_attributes_pick(ebpo_attributes *attributes, const char *elemen
     return EBPO_OK;
 }
 
-/* Row i is moved from rows[i], which is never before it: what is written has been read. */
+/* Moves row rows[i] to row i. As rows[i] >= i, no unread row is overwritten. */
 static void keep_columns(ebpo_workspace *workspace, ebpo_attribute *a, const uint32_t *rows,
                          uint64_t count)
 {
@@ -369,7 +368,7 @@ void ebpo_attributes_keep(ebpo_attributes *attributes, const char *element, cons
     }
 }
 
-/* Items of a row, and where they begin. */
+/* Returns the number of items of a row, and sets *begin to the first. */
 static uint64_t items_of(const ebpo_attribute *a, uint64_t row, uint64_t *begin)
 {
     *begin = a->ends ? list_begin(a, row) : row * a->columns;
@@ -459,7 +458,7 @@ bool ebpo_attribute_range(const ebpo_attribute *a, ebpo_workspace *workspace, do
 
 /* --- names --- */
 
-/* Ends of names that go together. */
+/* Name endings that form a group. */
 static const char *const together[][4] = {
     { "x", "y", "z", NULL },          { "red", "green", "blue", "alpha" },
     { "red", "green", "blue", NULL }, { "r", "g", "b", "a" },
@@ -467,7 +466,7 @@ static const char *const together[][4] = {
     { "u", "v", NULL, NULL },
 };
 
-/* What stands before the end; -1: it is not its end. */
+/* Returns the length of the name before the ending, or -1 if the name has another ending. */
 static int attributes_beginning(const ebpo_attribute_name *name, const char *end)
 {
     size_t n = strlen(end);

@@ -1,8 +1,8 @@
-/* Boundary edges of a mesh, which one face uses, and the closed chains (loops) that they form: the
- * holes. Edges are collected by threads, joined and sorted by their first vertex; where several
- * loops pass one vertex, the fans of faces around it decide which edge continues which. Loops begin
- * at their least vertex and stand in the source's order, so the result does not depend on threads
- * or on the order of the faces. */
+/* Finds the boundary edges of a mesh, which only one face uses, and the closed chains (loops) that
+ * they form: the holes. Threads collect edges, which are then joined and sorted by their first
+ * vertex. Where several loops pass one vertex, the fans of faces around it decide which edge
+ * continues which. Loops begin at their least vertex and follow the source's order, so the result
+ * depends neither on threads nor on the order of the faces. */
 #include "mesh/boundary.h"
 
 #include <stdlib.h>
@@ -63,7 +63,7 @@ void ebpo_loops_free(ebpo_loops *loops)
 }
 
 typedef struct arrival {
-    uint64_t key; /* to << 32 | the source's number of from */
+    uint64_t key; /* to << 32 | the source index of from */
     uint64_t edge;
 } arrival;
 
@@ -71,13 +71,13 @@ typedef struct chaining {
     ebpo_boundary_edge *edges; /* sorted by key */
     uint64_t count;
     arrival *arrivals;  /* sorted by key */
-    uint64_t *next;     /* of each edge; NONE when nothing continues it */
-    uint8_t *continued; /* the edge is some edge's next */
+    uint64_t *next;     /* next of each edge; NONE when there is none */
+    uint8_t *continued; /* true if the edge is another edge's next */
     uint8_t *walked;
-    uint32_t *place; /* [vertex_count] place on the path, or EBPO_NO_INDEX */
+    uint32_t *place; /* [vertex_count] position on the path, or EBPO_NO_INDEX */
     uint32_t *path;
     uint64_t path_length;
-    uint64_t start; /* of the walk: for ebpo_loops.start */
+    uint64_t start; /* of the current walk: for ebpo_loops.start */
     uint64_t steps; /* of all walks */
     const ebpo_stars *stars;
     const ebpo_mesh *mesh;
@@ -97,7 +97,7 @@ static ebpo_status make_edges(void *context, uint64_t begin, uint64_t end, void 
     return EBPO_OK;
 }
 
-/* Not needed: an edge that is used once has a key of its own. */
+/* Compares edges. Not needed for the order: each edge that is used once has a unique key. */
 static int compare_edges(const void *a, const void *b)
 {
     const ebpo_boundary_edge *x = a, *y = b;
@@ -136,7 +136,7 @@ static void take_arrivals(void *context, uint64_t place, const void *records, ui
 
 static const ebpo_progress silent = { NULL, NULL };
 
-/* Where the leading bits of a vertex << 32 are. */
+/* Returns the position of the leading bits of a vertex << 32. */
 static unsigned boundary_leading(const ebpo_mesh *mesh)
 {
     unsigned shift = 32;
@@ -166,9 +166,9 @@ static ebpo_status sort_all(chaining *c, ebpo_error *error)
     return status == EBPO_OK ? ebpo_sort_run(&sort, error) : status;
 }
 
-/* --- which edge continues which --- */
+/* --- chaining of edges --- */
 
-/* Each step may touch a distant part of each of ten arrays. */
+/* Releases pages. Each step may access a distant part of each of ten arrays. */
 static void let_go(const chaining *c, uint64_t steps)
 {
     enum { OFTEN = 32 };
@@ -182,15 +182,15 @@ static void boundary_connect(chaining *c, uint64_t edge, uint64_t next)
     c->continued[next] = 1;
 }
 
-/* The neighbour to which `face` leaves the vertex at hand. */
+/* Returns the neighbour to which `face` leaves the vertex. */
 static uint32_t leaves_to(const chaining *c, uint32_t vertex, uint32_t face)
 {
     const uint32_t *v = c->mesh->faces + 3 * (uint64_t)face;
     return v[0] == vertex ? v[1] : v[1] == vertex ? v[2] : v[0];
 }
 
-/* Walks around c->star from the face of an arriving edge, over edges used twice, to the neighbour
- * at which the fan ends. */
+/* Walks around c->star from the face of an arriving edge, over edges used twice. Returns the
+ * neighbour at the end of the fan. */
 static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
 {
     for (uint64_t steps = 0; steps <= c->star.faces; steps++) {
@@ -209,8 +209,8 @@ static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
     return EBPO_NO_INDEX;
 }
 
-/* The edge that leaves for `neighbour` (the source's number) among the sorted [begin, end); NONE
- * when there is none. */
+/* Returns the edge that leaves for `neighbour` (a source index) in the sorted range [begin, end),
+ * or NONE. */
 static uint64_t boundary_departure(const chaining *c, uint64_t begin, uint64_t end,
                                    uint64_t neighbour)
 {
@@ -227,8 +227,8 @@ static uint64_t boundary_departure(const chaining *c, uint64_t begin, uint64_t e
     return NONE;
 }
 
-/* Arrivals [a, b) and departures [d, e) at one vertex: by fans first, what is left in ascending
- * order. */
+/* Connects arrivals [a, b) and departures [d, e) at one vertex: by fans first, the rest in
+ * ascending order. */
 static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b, uint64_t d,
                            uint64_t e)
 {
@@ -282,7 +282,7 @@ static bool connect_all(chaining *c)
 
 /* --- loops --- */
 
-/* Takes the path back to `place` off as a loop. */
+/* Removes the path back to `place` as a loop. */
 static void emit_loop(chaining *c, uint64_t place)
 {
     ebpo_loops *out = c->out;
@@ -304,15 +304,15 @@ static void boundary_visit(chaining *c, uint32_t vertex)
     c->path[c->path_length++] = vertex;
 }
 
-/* The edge's key, were the mesh in the source's order. */
+/* Returns the key that the edge has in the source's order. */
 static uint64_t source_key(const chaining *c, uint64_t edge)
 {
     return ebpo_mesh_source_vertex(c->mesh, c->edges[edge].from) << 32 |
            (uint32_t)c->edges[edge].key;
 }
 
-/* Chains have no edges in common, so it does not matter which is walked first; but a closed one is
- * walked from the edge that the source has first. */
+/* Chains share no edges, so their order does not matter. A closed chain is walked from its first
+ * edge in the source. */
 static uint64_t first_of_cycle(chaining *c, uint64_t edge)
 {
     uint64_t first = edge, key = source_key(c, edge);
@@ -409,7 +409,7 @@ ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *boundary, const 
     return status;
 }
 
-/* --- in the source's order --- */
+/* --- the source's order --- */
 
 typedef struct rank {
     uint64_t key;
@@ -418,7 +418,7 @@ typedef struct rank {
 
 typedef struct ranking {
     const ebpo_loops *loops;
-    uint64_t begin; /* loops from here on */
+    uint64_t begin; /* loops from this index on */
     rank *sorted;
 } ranking;
 
@@ -436,7 +436,7 @@ static ebpo_status make_ranks(void *context, uint64_t begin, uint64_t end, void 
     return EBPO_OK;
 }
 
-/* Of one walk: as they were taken off it. */
+/* Compares loops of one walk by the order of their removal. */
 static int compare_ranks(const void *a, const void *b)
 {
     const rank *x = a, *y = b;

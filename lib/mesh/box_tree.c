@@ -1,4 +1,4 @@
-/* Trees of boxes: of points, and of faces, whose tree is built on that of their middles. */
+/* Builds box trees of points, and of faces, whose tree is built from their centres. */
 #include "core/strict_fp.h"
 
 #include "core/workspace.h"
@@ -25,7 +25,7 @@ static ebpo_point_box box_of_points(const ebpo_tree_point *p, uint64_t count)
     return box;
 }
 
-/* Halves, as their difference may be beyond the doubles. */
+/* Compares half lengths, as the full difference may overflow. */
 static int longest_axis(const ebpo_point_box *box)
 {
     int best = 0;
@@ -45,7 +45,8 @@ static void swap_points(ebpo_tree_point *a, ebpo_tree_point *b)
     *b = t;
 }
 
-/* What is before p[middle] is not greater along the axis, what is behind it not less (Hoare). */
+/* Partitions the points (Hoare): coordinates before p[middle] are not greater along the axis, those
+ * after it are not less. */
 static void split_points(ebpo_tree_point *p, uint64_t count, uint64_t middle, int axis)
 {
     uint64_t low = 0, high = count - 1;

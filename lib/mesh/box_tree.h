@@ -1,15 +1,14 @@
-/* Points, or things with boxes, in a tree of boxes, so that those near something are found without
- * looking at all. */
+/* Tree of boxes over points or items with boxes, for finding neighbours without a full scan. */
 #ifndef EBPO_MESH_BOX_TREE_H
 #define EBPO_MESH_BOX_TREE_H
 
 #include <ebpo/workspace.h>
 
-enum { EBPO_BOX_TREE_LEAF = 8 }; /* at most so many points in a node without halves */
+enum { EBPO_BOX_TREE_LEAF = 8 }; /* maximum number of points in a leaf node */
 
 typedef struct ebpo_tree_point {
     double at[3];
-    uint32_t number; /* whose it is */
+    uint32_t number; /* index of the point's item */
     int32_t value;
 } ebpo_tree_point;
 
@@ -17,40 +16,43 @@ typedef struct ebpo_point_box {
     double min[3], max[3];
 } ebpo_point_box;
 
-/* Things have a point each, by which the tree divides them. Zero it to begin with, but for the
- * workspace, which owns the arrays. */
+/* Each item has a point, by which the tree divides the items. Initialise the struct with zeros,
+ * except the workspace, which owns the arrays. */
 typedef struct ebpo_box_tree {
     ebpo_workspace *workspace;
-    ebpo_tree_point *point; /* added in any order; building sorts them */
+    ebpo_tree_point *point; /* added in any order; sorted by the build */
     uint64_t count, capacity;
-    /* of points; 2 i + 1 and 2 i + 2 are the halves of i, the first of count / 2 points */
+    /* boxes of points; nodes 2 i + 1 and 2 i + 2 are the halves of i, and the first has count / 2
+     * points */
     ebpo_point_box *node;
     uint64_t node_capacity;
-    /* as node: what the boxes of a node's things fill; NULL: there are points alone */
+    /* like node, for the boxes of items; NULL: points only */
     ebpo_point_box *filled;
 } ebpo_box_tree;
 
-/* Returns room for one more; NULL when memory is short. */
+/* Returns space for one more point, or NULL when memory is short. */
 ebpo_tree_point *ebpo_box_tree_add(ebpo_box_tree *tree);
 
 typedef void (*ebpo_box_of_fn)(const void *user, const ebpo_tree_point *p, ebpo_point_box *out);
 
-/* Builds the tree when all points have been added: of points alone, which may be built again, where
- * `box_of` is NULL; else of things with these boxes, once. False when memory is short. */
+/* Builds the tree after all points are added. With `box_of` NULL, it is a tree of points and may be
+ * rebuilt; otherwise a tree of items with these boxes, built once. Returns false when memory is
+ * short. */
 bool ebpo_box_tree_build(ebpo_box_tree *tree, ebpo_box_of_fn box_of, const void *user);
 void ebpo_box_tree_free(ebpo_box_tree *tree);
 
-/* `count` things, whose points are in one box and whose boxes fill the other; of points alone these
- * are one. */
+/* A node of `count` items: the box of their points and the box of their boxes; both are equal for
+ * points. */
 typedef struct ebpo_box_node {
     const ebpo_point_box *points, *filled;
     uint64_t count;
 } ebpo_box_node;
 
-/* Nodes that are not wanted are not entered; false stops the walk. */
+/* An ebpo_box_node_fn returns false to skip a node; an ebpo_tree_points_fn returns false to stop
+ * the walk. */
 typedef bool (*ebpo_box_node_fn)(void *user, const ebpo_box_node *node);
 typedef bool (*ebpo_tree_points_fn)(void *user, ebpo_tree_point *points, uint64_t count);
-/* False when `visit` has stopped it. */
+/* Returns false if `visit` stopped the walk. */
 bool ebpo_box_tree_walk(const ebpo_box_tree *tree, ebpo_box_node_fn wanted,
                         ebpo_tree_points_fn visit, void *user);
 

@@ -1,6 +1,6 @@
-/* Colours of a mesh's vertices, corners or faces from its attributes: which properties are colours
- * (by the names that PLY files use), and their values as RGBA in bytes. Used for exports, pictures
- * and the means of gray nodes. */
+/* Reads colours of vertices, corners or faces from a mesh's attributes: finds colour properties by
+ * the names that PLY files use, and converts values to RGBA bytes. Used for exports, images and
+ * mean colours of gray nodes. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -50,7 +50,7 @@ bool ebpo_colour_columns(const ebpo_attributes *in, const char *element,
 static uint8_t byte_of(double value, double full)
 {
     double scaled = value / full * 255;
-    return scaled >= 255 ? 255 : scaled > 0 ? (uint8_t)(scaled + 0.5) : 0; /* NaN: 0 */
+    return scaled >= 255 ? 255 : scaled > 0 ? (uint8_t)(scaled + 0.5) : 0; /* NaN gives 0 */
 }
 
 #define VALUE_AS(type, full)                 \
@@ -83,7 +83,7 @@ bool ebpo_attributes_coloured(const ebpo_attributes *in)
     return ebpo_colour_columns(in, "vertex", column) || ebpo_colour_columns(in, "face", column);
 }
 
-/* Which of a mesh's attributes are colours, and these as bytes. */
+/* Colour attributes of a mesh as bytes. */
 
 enum { CHANNELS = EBPO_COLOUR_CHANNELS };
 

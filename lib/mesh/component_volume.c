@@ -1,4 +1,4 @@
-/* Which components are closed, and their volumes. */
+/* Finds closed components and computes their volumes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -19,7 +19,7 @@ enum { VERTEX_GRAIN = 1 << 13, COMPONENT_GRAIN = 64 };
 
 typedef struct measuring {
     ebpo_components *components;
-    ebpo_mesh_frame frame; /* of volumes */
+    ebpo_mesh_frame frame; /* frame for volumes */
     ebpo_stars stars;
     ebpo_star *star;         /* one for each thread */
     ebpo_edge_faces *around; /* one for each thread */
@@ -40,7 +40,7 @@ static void set_open(ebpo_components *c, uint32_t component)
     __atomic_store_n(&c->list[component].open, true, __ATOMIC_RELAXED);
 }
 
-/* The faces of an edge may be in several components. */
+/* Visits an edge, whose faces may be in several components. */
 static bool visit_edge(ebpo_components *c, const ebpo_link *links, uint64_t uses,
                        ebpo_edge_faces *e)
 {
@@ -86,7 +86,7 @@ static ebpo_status visit_vertices(void *context, uint64_t begin, uint64_t end, u
     return EBPO_OK;
 }
 
-static ebpo_status look_at_edges(measuring *m, unsigned threads, const ebpo_progress *progress,
+static ebpo_status inspect_edges(measuring *m, unsigned threads, const ebpo_progress *progress,
                                  ebpo_error *error)
 {
     const ebpo_mesh *mesh = m->components->mesh;
@@ -110,7 +110,7 @@ static ebpo_status look_at_edges(measuring *m, unsigned threads, const ebpo_prog
 
 /* ---- volumes ---- */
 
-/* Six times that of the tetrahedron from `base`, in the frame. */
+/* Returns six times the volume of the tetrahedron with apex `base`, in the frame. */
 static double term_of(const measuring *m, ebpo_found_component *c, uint64_t face,
                       const double base[3])
 {
@@ -131,7 +131,7 @@ static double term_of(const measuring *m, ebpo_found_component *c, uint64_t face
            (t[0][2] - base[2]) * cross[2];
 }
 
-/* Terms are summed exactly, so their order does not matter. */
+/* Adds up volumes. The summation is exact, so the order of the terms does not matter. */
 static ebpo_status sum_volumes(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
@@ -163,27 +163,27 @@ ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,
 {
     measuring m = { .components = c, .frame = ebpo_mesh_frame_of(c->mesh) };
     threads = ebpo_thread_count(threads);
-    ebpo_status status = look_at_edges(&m, threads, progress, error);
+    ebpo_status status = inspect_edges(&m, threads, progress, error);
     return status == EBPO_OK ? ebpo_parallel_for(threads, NULL, c->count, COMPONENT_GRAIN,
                                                  sum_volumes, &m, progress, "components", error)
                              : status;
 }
 
-/* Which closed component a cavity is in. */
+/* Finds the closed component around a cavity. */
 
-/* A closed component of negative volume, seen as the first vertex of its first face. */
+/* A closed component of negative volume, represented by the first vertex of its first face. */
 typedef struct cavity {
     double at[3];
-    int64_t winding; /* of the host that is looked at */
+    int64_t winding; /* around the current host */
     uint32_t component;
     bool placed;
 } cavity;
 
 typedef struct placing {
     const ebpo_components *components;
-    cavity *cavities; /* by at[1] */
+    cavity *cavities; /* sorted by at[1] */
     uint64_t count;
-    uint32_t *hosts; /* by volume */
+    uint32_t *hosts; /* sorted by volume */
     uint64_t host_count;
 } placing;
 
@@ -221,7 +221,7 @@ static void list_both(placing *p)
     ebpo_sort_with(p->hosts, p->host_count, sizeof *p->hosts, compare_hosts, c->list);
 }
 
-/* The first cavity at y or beyond. */
+/* Returns the first cavity with a coordinate of at least y. */
 static uint64_t from_y(const placing *p, double y)
 {
     uint64_t low = 0, high = p->count;
@@ -235,7 +235,7 @@ static uint64_t from_y(const placing *p, double y)
     return low;
 }
 
-/* What segments from the cavities along x to the host's end cross. */
+/* Counts crossings of a face with segments from the cavities along x to the host's end. */
 static void cross_face(placing *p, const ebpo_found_component *host, uint64_t face)
 {
     const ebpo_mesh *mesh = p->components->mesh;
@@ -252,7 +252,7 @@ static void cross_face(placing *p, const ebpo_found_component *host, uint64_t fa
                 ebpo_axis_crossing(p->cavities[i].at, host->max[0], 0, t[0], t[1], t[2]);
 }
 
-/* A cavity that may be in the host and is in none yet. */
+/* Returns true if a cavity without a host may be in this host. */
 static bool any_within(const placing *p, const ebpo_found_component *host)
 {
     for (uint64_t i = from_y(p, host->min[1]); i < p->count && p->cavities[i].at[1] <= host->max[1];
@@ -298,7 +298,7 @@ ebpo_status ebpo_cavities_place(const ebpo_components *c, ebpo_error *error)
         list_both(&p);
     else
         status = ebpo_workspace_fail(workspace, c->count * sizeof *p.cavities, error);
-    for (uint64_t i = 0; i < p.host_count && p.count; i++) /* the least volume first */
+    for (uint64_t i = 0; i < p.host_count && p.count; i++) /* smallest volume first */
         fill_host(&p, p.hosts[i]);
     ebpo_array_free(workspace, p.cavities);
     ebpo_array_free(workspace, p.hosts);

@@ -1,4 +1,5 @@
-/* Components of a mesh, cavities with what they are in, and each as a mesh of its own. */
+/* Finds the components of a mesh, joins cavities to the components around them, and extracts each
+ * component as a separate mesh. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -15,7 +16,7 @@
 #include "mesh/mesh_parts.h"
 #include "mesh/textures.h"
 
-/* ---- which faces share vertices ---- */
+/* ---- faces connected by vertices ---- */
 
 static uint32_t root_of(uint32_t *above, uint32_t v)
 {
@@ -51,7 +52,7 @@ ebpo_status ebpo_components_check(const ebpo_mesh *mesh, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Each vertex' root, the lowest vertex of its component. */
+/* Computes each vertex's root, the lowest vertex of its component. */
 static void join_vertices(const ebpo_mesh *mesh, const uint32_t *closed, uint32_t *above)
 {
     EBPO_FOR_ITEMS(mesh->workspace, v, 0, mesh->vertex_count)
@@ -64,7 +65,7 @@ static void join_vertices(const ebpo_mesh *mesh, const uint32_t *closed, uint32_
         components_join(above, corner[0], corner[2]);
     }
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count)
-        above[v] = above[above[v]]; /* what is lower is done already */
+        above[v] = above[above[v]]; /* lower vertices are finished */
 }
 
 static int compare_first(const void *x, const void *y)
@@ -90,8 +91,8 @@ static ebpo_status add_face(ebpo_components *c, uint64_t f, uint32_t *number, ui
     return EBPO_OK;
 }
 
-/* Where the number of the face's component is: at the lowest face of its shell, or at the root of
- * its vertices. */
+/* Returns the location of the face's component index: at the lowest face of its shell, or at the
+ * root of its vertices. */
 static uint32_t *number_at(const ebpo_components *c, const uint32_t *above, uint32_t *of_shell,
                            uint64_t f)
 {
@@ -99,7 +100,7 @@ static uint32_t *number_at(const ebpo_components *c, const uint32_t *above, uint
                                                       : &c->number[above[c->mesh->faces[3 * f]]];
 }
 
-/* Numbered by their first faces in the source. */
+/* Numbers components by their first faces in the source. */
 static ebpo_status list_components(ebpo_components *c, const uint32_t *above, uint32_t *of_shell,
                                    ebpo_error *error)
 {
@@ -125,17 +126,17 @@ static ebpo_status list_components(ebpo_components *c, const uint32_t *above, ui
 
 /* ---- groups ---- */
 
-/* The component of face or vertex i. */
+/* Returns the component of face or vertex i. */
 static uint32_t component_of(const ebpo_components *c, bool faces, uint64_t i)
 {
-    if (c->named) /* only asked of faces */
+    if (c->named) /* only for faces */
         return ebpo_mesh_group_of(c->named, ebpo_mesh_source_face(c->mesh, i));
     if (faces && c->of_face)
         return c->of_face[i];
     return c->number[faces ? c->mesh->faces[3 * i] : i];
 }
 
-/* Counted, then each in its place: ascending within a group. */
+/* Counts, then places each index: ascending within a group. */
 static void fill_groups(const ebpo_components *c, bool faces, ebpo_number_groups *g)
 {
     uint64_t items = faces ? c->mesh->face_count : c->mesh->vertex_count, sum = 0;
@@ -171,9 +172,10 @@ ebpo_status ebpo_components_group(const ebpo_components *c, bool faces, ebpo_num
     return EBPO_OK;
 }
 
-/* ---- cavities join what they are in ---- */
+/* ---- joining cavities to hosts ---- */
 
-/* By their first faces, which a cavity may hold. `moved`: what becomes of each component. */
+/* Numbers hosts by their first faces, which may belong to a cavity. `moved`: the new index of each
+ * component. */
 static void number_hosts(ebpo_components *c, uint32_t *moved)
 {
     uint64_t count = 0;
@@ -189,7 +191,7 @@ static void number_hosts(ebpo_components *c, uint32_t *moved)
         c->facts[moved[host]].cavities += host != i;
     }
     for (uint64_t i = 0; i < c->count; i++)
-        moved[i] = moved[c->list[i].host]; /* a host is its own */
+        moved[i] = moved[c->list[i].host]; /* a host maps to itself */
     c->count = count;
 }
 
@@ -211,7 +213,7 @@ static ebpo_status join_cavities(ebpo_components *c, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* ---- all of it ---- */
+/* ---- main functions ---- */
 
 static ebpo_status components_find(ebpo_components *c, ebpo_error *error)
 {
@@ -238,7 +240,7 @@ static ebpo_status components_find(ebpo_components *c, ebpo_error *error)
     return status == EBPO_OK ? ebpo_components_group(c, true, &c->faces, error) : status;
 }
 
-/* Where each vertex is among its component's. */
+/* Computes each vertex's position within its component. */
 static ebpo_status number_vertices(ebpo_components *c, ebpo_error *error)
 {
     const ebpo_mesh *mesh = c->mesh;
@@ -353,7 +355,7 @@ ebpo_status ebpo_components_get(const ebpo_components *c, uint64_t number, ebpo_
                              (unsigned long long)number);
 }
 
-/* A component as a mesh of its own, which knows the numbers of the source. */
+/* Copies a component as a separate mesh that keeps source indices. */
 
 static void copy_vertices(const ebpo_components *c, uint64_t number, ebpo_mesh *out)
 {
@@ -368,7 +370,7 @@ static void copy_vertices(const ebpo_components *c, uint64_t number, ebpo_mesh *
     }
 }
 
-/* Where vertex v is among those of the part. */
+/* Returns the position of vertex v within the part. */
 static uint32_t place_of(const ebpo_components *c, uint64_t number, uint32_t v)
 {
     if (c->place)
@@ -396,7 +398,7 @@ static void copy_faces(const ebpo_components *c, uint64_t number, ebpo_mesh *out
     }
 }
 
-/* With the source's numbers, and how many there are; in no order that could be built from. */
+/* Adds source indices and their totals; the order does not suffice for building a file. */
 static bool make_arrangement(const ebpo_mesh *whole, ebpo_mesh *out)
 {
     struct ebpo_arrangement *a = ebpo_alloc_zero(1, sizeof *a);
@@ -443,7 +445,7 @@ ebpo_status ebpo_components_mesh(const ebpo_components *c, uint64_t number, ebpo
         status = ebpo_workspace_fail(out->workspace,
                                      28 * facts.vertex_count + 16 * facts.face_count, error);
     }
-    if (status == EBPO_OK) /* by numbers of the source, as building picks them */
+    if (status == EBPO_OK) /* sorted by source indices, as building selects rows */
         status = ebpo_attributes_borrow(&out->attributes, c->mesh->attributes, error);
     if (status != EBPO_OK) {
         ebpo_mesh_free(out);
@@ -458,15 +460,15 @@ ebpo_status ebpo_components_mesh(const ebpo_components *c, uint64_t number, ebpo
     return status;
 }
 
-/* Of faces under no name, as the OBJ format has it. */
+/* Name of faces without a group, as in the OBJ format. */
 static const char unnamed[] = "default";
 
 typedef struct naming {
     const ebpo_named_run *runs;
     uint64_t count;
-    uint32_t *order;  /* by names, then as in the file */
-    uint32_t *alike;  /* the first run of the same name */
-    uint32_t *number; /* of a first run: its group */
+    uint32_t *order;  /* by name, then in file order */
+    uint32_t *alike;  /* first run of the same name */
+    uint32_t *number; /* group of a first run */
     ebpo_mesh_groups *out;
     uint64_t name_bytes;
 } naming;
@@ -506,7 +508,7 @@ static void find_alike(naming *n)
     }
 }
 
-/* A group for the run's name, unless it has one. */
+/* Creates a group for the run's name if it has none. */
 static void name_group(naming *n, uint64_t run, uint64_t first_face)
 {
     uint32_t *number = &n->number[n->alike[run]];
@@ -523,7 +525,7 @@ static void name_group(naming *n, uint64_t run, uint64_t first_face)
                                                        .first_face = first_face };
 }
 
-/* Those with faces, then the others. */
+/* Numbers groups with faces first, then the others. */
 static void name_groups(naming *n)
 {
     ebpo_mesh_groups *out = n->out;
@@ -569,7 +571,7 @@ ebpo_status ebpo_mesh_groups_new(const ebpo_named_run *runs, uint64_t count, ebp
     naming n = { .runs = runs, .count = count };
     *out = NULL;
     if (count >= EBPO_NO_INDEX)
-        return ebpo_fail(error, EBPO_E_LIMIT, "there are too many names of groups");
+        return ebpo_fail(error, EBPO_E_LIMIT, "there are too many group names");
     n.out = ebpo_alloc_zero(1, sizeof *n.out);
     ebpo_status status =
         n.out ? components_make(&n, error) : ebpo_fail_memory(error, sizeof *n.out);
@@ -626,10 +628,10 @@ uint32_t ebpo_mesh_group_of(const ebpo_mesh_groups *groups, uint64_t face)
     return low < groups->run_count ? groups->run_group[low] : EBPO_NO_INDEX;
 }
 
-/* Named groups in the form of components: a vertex may be in several. */
+/* Named groups as components; a vertex may be in several groups. */
 
-/* Each group's vertices once, as its faces name them; counted only where `of` is NULL. `seen`:
- * [vertex_count] the group that has named it last. */
+/* Lists each group's vertices once, in the order of its faces; only counts them if `of` is NULL.
+ * `seen`: [vertex_count] last group that used the vertex. */
 static void list_vertices(ebpo_components *c, uint32_t *seen)
 {
     const ebpo_mesh *mesh = c->mesh;
@@ -701,8 +703,8 @@ static ebpo_status components_check(const ebpo_mesh *mesh, const ebpo_mesh_group
     if (!groups || groups->face_count != mesh->face_count ||
         ebpo_mesh_whole_faces(mesh) != mesh->face_count)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
-                              "these are not the groups of its %llu faces; fill holes in the file "
-                              "of a group, not before",
+                              "the groups do not match the mesh's %llu faces; fill holes in the "
+                              "file of a group, not before",
                               (unsigned long long)mesh->face_count);
     return EBPO_OK;
 }

@@ -1,6 +1,6 @@
-/* Filling holes: each boundary loop becomes a fan or a triangulation of its own outline
- * (geometry/polygon.h), turned so that edges cancel. Nothing else of the mesh changes, and the
- * record of the repair says what was added. */
+/* Fills holes: each boundary loop becomes a fan or a triangulation of its outline
+ * (geometry/polygon.h), oriented so that edges cancel. The rest of the mesh does not change. The
+ * repair record counts the additions. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -15,22 +15,22 @@
 #include "mesh/mesh_parts.h"
 #include "mesh/adjacency.h"
 
-/* Vertices with more faces than this are not searched for existing edges: it keeps the work linear.
- */
+/* Vertices with more faces than this are not searched for existing edges, which keeps the work
+ * linear. */
 enum { SEARCHED_DEGREE = 4096, VERTEX_GRAIN = 1 << 13, LOOP_GRAIN = 16 };
 
 typedef struct placed {
     uint32_t vertex, place;
 } placed;
 
-/* Scratch of a thread. */
+/* Scratch memory of a thread. */
 typedef struct scratch {
     ebpo_star star;
     ebpo_boundary boundary;
     double (*point)[3];
     uint32_t (*triangles)[3];
     uint64_t point_capacity, triangle_capacity;
-    /* the loop's vertices, for looking them up */
+    /* the loop's vertices, sorted for lookup */
     placed sorted[EBPO_OPTIMAL_CHAIN];
     uint8_t taken[EBPO_OPTIMAL_CHAIN * EBPO_OPTIMAL_CHAIN];
 } scratch;
@@ -42,7 +42,7 @@ typedef struct filling {
     ebpo_stars stars;
     ebpo_boundary boundary;
     ebpo_loops loops;
-    uint64_t *before; /* [loops.count] triangles of the loops that the source has before it */
+    uint64_t *before; /* [loops.count] triangles of the loops before it in the source */
     uint64_t added;
 } filling;
 
@@ -95,7 +95,7 @@ static int by_vertex(const void *a, const void *b)
     return (x->vertex > y->vertex) - (x->vertex < y->vertex);
 }
 
-/* Marks pairs of loop vertices between which the mesh has an edge. */
+/* Marks pairs of loop vertices that are connected by a mesh edge. */
 static void mark_taken(const filling *f, scratch *s, const uint32_t *loop, uint32_t n)
 {
     memset(s->taken, 0, (size_t)n * n);
@@ -115,7 +115,7 @@ static void mark_taken(const filling *f, scratch *s, const uint32_t *loop, uint3
     }
 }
 
-/* Its triangles go where those of the loops end that the source has before it. */
+/* Fills a loop. Its triangles follow those of the loops before it in the source. */
 static bool fill_loop(filling *f, scratch *s, uint64_t number)
 {
     const uint32_t *loop = f->loops.vertex + f->loops.first[number];
@@ -137,7 +137,7 @@ static bool fill_loop(filling *f, scratch *s, uint64_t number)
     if (!ebpo_triangulate_chain(&chain, s->triangles))
         return false;
     uint32_t *face = f->mesh->faces + 3 * (f->mesh->face_count + f->before[number]);
-    /* against the chain, as the faces beside it run along it */
+    /* against the chain, as the adjacent faces follow it */
     EBPO_FOR_ITEMS_SCATTERED(workspace, t, 0, n - 2)
         for (uint64_t k = 0; k < 3; k++)
             face[3 * t + k] = loop[s->triangles[t][2 - k]];
@@ -155,10 +155,10 @@ static ebpo_status fill_loops(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-/* --- all --- */
+/* --- all loops --- */
 
-/* Room behind the mesh's faces, which stay what they are. */
-static ebpo_status make_room(filling *f, ebpo_error *error)
+/* Makes space after the mesh's faces, which do not change. */
+static ebpo_status reserve_space(filling *f, ebpo_error *error)
 {
     ebpo_mesh *mesh = f->mesh;
     struct ebpo_arrangement *order = mesh->arrangement;
@@ -199,14 +199,14 @@ static ebpo_status fill_holes_run(filling *f, ebpo_error *error)
     f->added = f->loops.first[f->loops.count] - 2 * f->loops.count;
     status = ebpo_loops_rank(&f->before, &f->loops, mesh, f->threads, error);
     if (status == EBPO_OK)
-        status = make_room(f, error);
+        status = reserve_space(f, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(f->threads, f->mesh->workspace, f->loops.count, LOOP_GRAIN,
                                    fill_loops, f, NULL, "", error);
     if (status != EBPO_OK)
         return status;
     mesh->face_count += f->added;
-    if (mesh->arrangement) { /* the new faces stand at the end */
+    if (mesh->arrangement) { /* the new faces are at the end */
         ebpo_array_free(mesh->workspace, mesh->arrangement->key);
         mesh->arrangement->key = NULL;
     }
@@ -221,7 +221,7 @@ static void free_scratch(scratch *s, ebpo_workspace *workspace)
     ebpo_array_free(workspace, s->triangles);
 }
 
-ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     filling f = { .mesh = mesh, .threads = ebpo_thread_count(0) };

@@ -1,6 +1,6 @@
-/* Reading meshes of all formats. The table below has one row for each format. A new format is a
- * file NAME.c that has its reader and its row, a declaration of the row in import_build.h, and
- * a line in the table. */
+/* Reads meshes of all formats. The table below has one row for each format. To add a format: write
+ * NAME.c with its reader and its row, declare the row in import_build.h, and add a line to the
+ * table. */
 #include "core/strict_fp.h"
 
 #include "mesh/import.h"
@@ -16,8 +16,7 @@
 #include "mesh/import_build.h"
 #include "io/file_source.h"
 
-/* In the order in which a file is tried. Messages name the formats from the last row to the first.
- */
+/* Sorted in the order of recognition. Messages list the formats from the last row to the first. */
 static const ebpo_import_format *const formats[] = {
     &ebpo_import_off,
     &ebpo_import_stl,
@@ -27,7 +26,7 @@ static const ebpo_import_format *const formats[] = {
 
 enum { FORMATS = sizeof formats / sizeof *formats, LIST_TEXT = 24 * FORMATS };
 
-/* --- a mesh of the values and faces that a reader finds --- */
+/* --- building the mesh from a reader's values and faces --- */
 
 void ebpo_import_clear(ebpo_mesh *mesh)
 {
@@ -38,7 +37,7 @@ void ebpo_import_clear(ebpo_mesh *mesh)
     *mesh = (ebpo_mesh){ 0 };
 }
 
-/* Frees attributes that would say nothing. */
+/* Frees empty attributes. */
 static void drop_empty(ebpo_mesh *mesh)
 {
     ebpo_attributes *a = mesh->attributes;
@@ -48,8 +47,8 @@ static void drop_empty(ebpo_mesh *mesh)
     mesh->attributes = NULL;
 }
 
-/* Reads the file with positions of floats or doubles; *again: floats do not keep its text. On
- * failure nothing is left but the mesh's workspace. */
+/* Reads the file with float or double positions. Sets *again if floats do not keep its text. On
+ * failure only the mesh's workspace remains. */
 static ebpo_status read_once(ebpo_mesh *mesh, const ebpo_import_format *format,
                              const ebpo_import_job *job, bool doubles, bool *again,
                              ebpo_error *error)
@@ -93,7 +92,7 @@ static ebpo_status build_mesh(ebpo_mesh *out, const ebpo_import_format *format,
     return status;
 }
 
-/* --- which format it is --- */
+/* --- recognition of the format --- */
 
 static bool name_ends(const char *name, const char *ending)
 {
@@ -113,7 +112,7 @@ const ebpo_import_format *ebpo_import_recognise(const uint8_t *data, uint64_t si
     return NULL;
 }
 
-/* True for a file that has the mark of some format, whatever other kind it looks like. */
+/* Returns true if the file has the mark of a format, whatever else it resembles. */
 static bool has_mark(const uint8_t *data, uint64_t size)
 {
     for (size_t i = 0; i < FORMATS; i++)
@@ -122,7 +121,8 @@ static bool has_mark(const uint8_t *data, uint64_t size)
     return false;
 }
 
-/* A name that ends as those of another format do hides a format that has no mark. */
+/* Checks the ending of the name. A name with another format's ending hides a format without a mark.
+ */
 static ebpo_status check_name(const ebpo_import_format *format, const ebpo_import_job *job,
                               ebpo_error *error)
 {
@@ -133,14 +133,14 @@ static ebpo_status check_name(const ebpo_import_format *format, const ebpo_impor
         const ebpo_import_format *other = formats[i];
         if (other->has_no_mark && other->recognise(job->data, job->size))
             return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_path_name(job->name),
-                                  "begins as %s file does, but its name says %s; rename it to end "
-                                  "in %s",
+                                  "begins like %s file, but its name indicates %s; rename it to "
+                                  "end in %s",
                                   other->called, ebpo_import_name(format), other->ending);
     }
     return EBPO_OK;
 }
 
-/* "PLY, OBJ, STL or OFF" */
+/* Writes "PLY, OBJ, STL or OFF". */
 static void list_names(char text[LIST_TEXT])
 {
     int at = 0;
@@ -170,7 +170,7 @@ ebpo_status ebpo_import_any(ebpo_mesh *out, const ebpo_import_job *job, ebpo_err
                *name = ebpo_path_name(job->name);
     const ebpo_import_format *format = ebpo_import_recognise(job->data, job->size, job->name);
     char list[LIST_TEXT];
-    if (foreign && has_mark(job->data, job->size)) /* a binary STL file begins with any bytes */
+    if (foreign && has_mark(job->data, job->size)) /* a binary STL file may begin with any bytes */
         foreign = NULL;
     if (!foreign && format)
         return ebpo_import_memory(out, format, job, error);

@@ -1,5 +1,5 @@
-/* Reading meshes of all formats: which one a file has, and the mesh that it holds. Safe on
- * untrusted bytes. */
+/* Reading of meshes in all formats: recognises the format and builds the mesh. Safe for untrusted
+ * bytes. */
 #ifndef EBPO_MESH_IMPORT_H
 #define EBPO_MESH_IMPORT_H
 
@@ -7,31 +7,31 @@
 
 #include "mesh/import_build.h"
 
-/* Tells the format from the first bytes, else from the ending of `name`; of OBJ, which has no mark,
- * from the first word that is in no comment. NULL when it is none of the table. */
+/* Recognises the format by the first bytes, otherwise by the ending of `name`. OBJ has no mark and
+ * is recognised by its first word outside comments. Returns NULL for an unknown format. */
 const ebpo_import_format *ebpo_import_recognise(const uint8_t *data, uint64_t size,
                                                 const char *name);
 
-/* Parses a file that is in memory, of the format that it is recognised as. EBPO_E_FORMAT: it is of
- * none; if it is known what else it is, the message says that. Otherwise as ebpo_import_memory. */
+/* Parses a file in memory with the recognised format. EBPO_E_FORMAT: unknown format; the message
+ * names the file type if it is known. Otherwise like ebpo_import_memory. */
 EBPO_MUST_USE ebpo_status ebpo_import_any(ebpo_mesh *out, const ebpo_import_job *job,
                                           ebpo_error *error);
 
-/* Parses a file of this format that is in memory. Positions are the nearest floats where each of
- * them, rounded to the last digit of its text, gives the text; else all are the nearest doubles
- * (the PLY reader has types to go by). source_size, source_name and source_format are set; if
- * attributes are wanted, the mesh's attributes too, if the file has any. What the file holds or
- * names and could not be read is noted in any case. The arrays are in the workspace.
+/* Parses a file in memory. Positions are floats if each float, rounded to the last digit of its
+ * text, gives the text; otherwise all are doubles, each the nearest value. (The PLY reader uses the
+ * declared types.) Sets source_size, source_name and source_format, and the attributes if they are
+ * requested and present. Data that could not be read are always noted. The arrays are in the
+ * workspace.
  *
- * No other file is opened (material libraries are not read). Faces keep the file's order; vertices
- * are numbered by first use, and those of one position are one (a PLY keeps its own).
+ * Opens no other file (material libraries are not read). Faces keep the file's order. Vertices are
+ * numbered by first use, and those at one position are merged; PLY vertices are unchanged.
  *
- * EBPO_E_FORMAT: no mesh, or a damaged one. EBPO_E_UNSUPPORTED: a dialect that is not read.
+ * EBPO_E_FORMAT: no mesh, or a damaged one. EBPO_E_UNSUPPORTED: an unsupported dialect.
  * EBPO_E_LIMIT, EBPO_E_MEMORY, EBPO_E_IO, EBPO_E_CANCELLED. On failure `out` is cleared. */
 EBPO_MUST_USE ebpo_status ebpo_import_memory(ebpo_mesh *out, const ebpo_import_format *format,
                                              const ebpo_import_job *job, ebpo_error *error);
 
-/* Frees what reading has made. */
+/* Frees the results of reading. */
 void ebpo_import_clear(ebpo_mesh *mesh);
 
 #endif

@@ -1,5 +1,5 @@
-/* The mesh that a reader of OBJ, OFF or STL builds: positions, polygons that are triangulated,
- * corners that become vertices, and columns of values that become attributes. */
+/* Builds the mesh for the readers of OBJ, OFF and STL: positions, triangulated polygons, vertices
+ * from corners, and attributes from columns of values. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -81,7 +81,7 @@ ebpo_status ebpo_import_position(ebpo_import_build *b, const double xyz[3])
 {
     if (b->loses_digits && !b->doubles)
         return EBPO_E_UNSUPPORTED;
-    if (b->vertices == EBPO_IMPORT_MOST)
+    if (b->vertices == EBPO_IMPORT_MAX)
         return fail_many(b);
     if (!ebpo_array_grow(b->mesh->workspace, &b->xyz, &b->vertex_capacity, b->vertices + 1,
                          b->position_size))
@@ -106,7 +106,7 @@ ebpo_status ebpo_import_row(ebpo_import_build *b, ebpo_import_sort sort, const f
 {
     ebpo_import_table *t = &b->table[sort];
     size_t bytes = ebpo_import_columns(sort) * sizeof *values;
-    if (t->rows == EBPO_IMPORT_MOST)
+    if (t->rows == EBPO_IMPORT_MAX)
         return fail_many(b);
     if (!ebpo_array_grow(b->mesh->workspace, &t->values, &t->capacity, t->rows + 1, bytes))
         return fail_memory(b, (t->rows + 1) * bytes);
@@ -143,7 +143,7 @@ static void *positions_of(const ebpo_mesh *mesh)
     return mesh->xyz32 ? (void *)mesh->xyz32 : (void *)mesh->xyz64;
 }
 
-/* The first polygon that names a vertex gives it its number. */
+/* Numbers a vertex when the first polygon uses it. */
 static void number_vertices(ebpo_import_build *b)
 {
     ebpo_mesh *mesh = b->mesh;
@@ -160,8 +160,8 @@ static void number_vertices(ebpo_import_build *b)
     }
 }
 
-/* Faces before the first row have none. */
-static bool make_room_in(ebpo_import_build *b, ebpo_import_table *t, uint64_t faces)
+/* Reserves space. Faces before the first row have no value. */
+static bool reserve_space_in(ebpo_import_build *b, ebpo_import_table *t, uint64_t faces)
 {
     ebpo_workspace *workspace = b->mesh->workspace;
     bool first = !t->index;
@@ -172,16 +172,16 @@ static bool make_room_in(ebpo_import_build *b, ebpo_import_table *t, uint64_t fa
     return true;
 }
 
-static ebpo_status make_room(ebpo_import_build *b, uint64_t more)
+static ebpo_status reserve_space(ebpo_import_build *b, uint64_t more)
 {
     ebpo_mesh *mesh = b->mesh;
     uint64_t need = mesh->face_count + more;
-    if (more > EBPO_IMPORT_MOST - mesh->face_count)
+    if (more > EBPO_IMPORT_MAX - mesh->face_count)
         return fail_many(b);
     bool fine = ebpo_array_grow(mesh->workspace, &mesh->faces, &b->face_capacity, need,
                                 3 * sizeof *mesh->faces);
     for (int i = 0; i < EBPO_IMPORT_SORTS && fine; i++)
-        fine = !b->attributes || !b->table[i].rows || make_room_in(b, &b->table[i], need);
+        fine = !b->attributes || !b->table[i].rows || reserve_space_in(b, &b->table[i], need);
     return fine ? EBPO_OK : fail_memory(b, need * 3 * sizeof *mesh->faces);
 }
 
@@ -201,8 +201,8 @@ static void put_triangle(ebpo_import_build *b, uint32_t a, uint32_t second, uint
     }
 }
 
-/* Scratch holds, one behind the other: positions of corners, triangles, and what cutting asks for.
- */
+/* Reserves scratch memory for corner positions, triangles and the workspace of the triangulation,
+ * in this order. */
 static ebpo_status reserve_scratch(ebpo_import_build *b, uint64_t n)
 {
     uint64_t bytes;
@@ -228,7 +228,7 @@ static ebpo_status build_cut(ebpo_import_build *b, uint32_t n)
         return status;
     double(*corner)[3] = b->scratch;
     uint32_t(*triangle)[3] = (uint32_t(*)[3])(corner + n);
-    void *scratch = triangle + n + (n & 1); /* stays aligned for doubles */
+    void *scratch = triangle + n + (n & 1); /* keeps doubles aligned */
     for (uint32_t i = 0; i < n; i++)
         load_position(b, b->corner[i].vertex, corner[i]);
     ebpo_polygon_kind kind =
@@ -236,11 +236,10 @@ static ebpo_status build_cut(ebpo_import_build *b, uint32_t n)
     if (kind == EBPO_POLYGON_NO_MEMORY)
         return ebpo_fail_memory(b->error, n * sizeof *corner);
     if (kind == EBPO_POLYGON_TOO_LARGE)
-        return ebpo_fail_file(
-            b->error, EBPO_E_LIMIT, b->name,
-            "a concave polygon of %" PRIu32
-            " corners is too intricate to be cut into triangles here; triangulate it in the source",
-            n);
+        return ebpo_fail_file(b->error, EBPO_E_LIMIT, b->name,
+                              "a concave polygon of %" PRIu32
+                              " corners could not be triangulated; triangulate it in the source",
+                              n);
     b->mesh->polygons_triangulated++;
     b->mesh->polygons_concave += kind == EBPO_POLYGON_CONCAVE;
     if (kind == EBPO_POLYGON_GUESSED && b->mesh->polygons_guessed++ == 0)
@@ -258,7 +257,7 @@ ebpo_status ebpo_import_polygon(ebpo_import_build *b)
         b->mesh->polygons_dropped++;
     } else {
         number_vertices(b);
-        status = make_room(b, n - 2);
+        status = reserve_space(b, n - 2);
         if (status == EBPO_OK && n == 3)
             put_triangle(b, 0, 1, 2);
         else if (status == EBPO_OK)
@@ -270,7 +269,7 @@ ebpo_status ebpo_import_polygon(ebpo_import_build *b)
 
 /* --- the end --- */
 
-/* Arrays grew by halves, and vertices may be fewer. */
+/* Frees unused capacity: arrays grow by halves, and vertices may have been merged. */
 static void build_trim(ebpo_mesh *mesh, size_t position_size)
 {
     if (mesh->workspace)
@@ -291,8 +290,8 @@ ebpo_status ebpo_import_end(ebpo_import_build *b)
     if (!mesh->face_count)
         return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
                               mesh->polygons_dropped
-                                  ? "none of its faces has three corners; there is no mesh in it"
-                                  : "has no faces; there is no mesh in this file");
+                                  ? "no face has three corners; the file contains no mesh"
+                                  : "has no faces; the file contains no mesh");
     ebpo_array_free(workspace, b->use);
     ebpo_array_free(workspace, b->xyz);
     b->use = NULL;
@@ -340,7 +339,7 @@ void ebpo_import_free(ebpo_import_build *b)
         freelocale(b->c_locale);
 }
 
-/* Values at corners become attributes of vertices, of faces, or lists. */
+/* Converts corner values to attributes of vertices, attributes of faces, or lists. */
 
 static const struct {
     const char *names, *list_name;
@@ -352,7 +351,7 @@ typedef struct placing {
     const ebpo_import_build *b;
     const ebpo_import_table *table;
     ebpo_import_sort sort;
-    size_t bytes; /* of a row, as it is kept */
+    size_t bytes; /* bytes of a row as stored */
 } placing;
 
 static ebpo_attribute head_of(const placing *p, const char *element)
@@ -378,13 +377,13 @@ static ebpo_status build_add(const placing *p, ebpo_attribute *head, ebpo_attrib
                           : ebpo_workspace_fail(mesh->workspace, head->rows * bytes, p->b->error);
 }
 
-/* Takes away the last one again. */
+/* Removes the last attribute. */
 static void build_drop(const placing *p)
 {
     ebpo_attributes_remove(p->b->mesh->attributes, p->b->mesh->attributes->count - 1);
 }
 
-/* Zeros where a corner names none. */
+/* Returns the value of a corner, or zeros if it has none. */
 static const void *value_at(const placing *p, uint64_t corner)
 {
     static const float none[3] = { 0, 0, 0 };
@@ -393,7 +392,7 @@ static const void *value_at(const placing *p, uint64_t corner)
                                    : (const char *)p->table->values + row * p->bytes;
 }
 
-/* *fits: all corners at a vertex say the same. */
+/* Sets *fits to true if all corners at each vertex have equal values. */
 static ebpo_status place_on_vertices(const placing *p, bool *fits)
 {
     const ebpo_mesh *mesh = p->b->mesh;
@@ -414,7 +413,7 @@ static ebpo_status place_on_vertices(const placing *p, bool *fits)
     return EBPO_OK;
 }
 
-/* *fits: all corners of a face say the same. */
+/* Sets *fits to true if all corners of each face have equal values. */
 static ebpo_status place_on_faces(const placing *p, bool *fits)
 {
     const ebpo_mesh *mesh = p->b->mesh;
@@ -444,7 +443,7 @@ static ebpo_status place_in_lists(const placing *p)
     return status;
 }
 
-/* In place: what is written lies below what is still to be read. */
+/* Works in place: values are written below those still to be read. */
 static void make_bytes(ebpo_import_table *t, size_t columns)
 {
     uint8_t *to = (uint8_t *)t->values;
@@ -481,7 +480,7 @@ ebpo_status ebpo_import_attributes(ebpo_import_build *b)
 
 #define EMPTY UINT32_MAX
 
-/* The bits of a coordinate of `size` bytes, those of -0 as those of 0. */
+/* Returns the bits of a coordinate of `size` bytes; -0 becomes 0. */
 static inline uint64_t bits_of(const char *at, size_t size)
 {
     uint32_t narrow;
@@ -500,7 +499,7 @@ static inline bool has_key(const char *xyz, size_t size, const uint64_t key[3])
            bits_of(xyz + 2 * size, size) == key[2];
 }
 
-/* The size is a constant where this is called, and compiled as such. */
+/* Callers pass a constant size, for which the compiler specialises this function. */
 static inline uint64_t build_weld(char *xyz, size_t size, uint64_t count, uint32_t *map,
                                   uint32_t *table, uint64_t slots)
 {
@@ -509,7 +508,7 @@ static inline uint64_t build_weld(char *xyz, size_t size, uint64_t count, uint32
         const char *own = xyz + 3 * size * i;
         const uint64_t key[3] = { bits_of(own, size), bits_of(own + size, size),
                                   bits_of(own + 2 * size, size) };
-        uint64_t at; /* of an equal vertex, or where it would go */
+        uint64_t at; /* slot of an equal vertex, or the free slot for it */
         EBPO_HASH_FIND(at, ebpo_hash_three(key), slots - 1,
                        table[at] == EMPTY || has_key(xyz + 3 * size * table[at], size, key));
         if (table[at] == EMPTY) {

@@ -1,5 +1,5 @@
-/* A mesh as a whole: what it is called in messages, the check of its shape, copying and freeing it,
- * and the frame in which its coordinates can be multiplied without overflow. */
+/* Functions for a mesh as a whole: its name in messages, the check of its shape, copying, freeing,
+ * and the frame in which coordinates can be multiplied without overflow. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -32,7 +32,7 @@ ebpo_status ebpo_mesh_check_shape(const ebpo_mesh *mesh, ebpo_error *error)
                               "xyz32 and xyz64 are both set; set exactly one");
     if ((mesh->vertex_count && !mesh->xyz32 && !mesh->xyz64) || (mesh->face_count && !mesh->faces))
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
-                              "an array that the counts promise is NULL; allocate it");
+                              "an array that the counts require is NULL; allocate it");
     return EBPO_OK;
 }
 
@@ -41,10 +41,10 @@ ebpo_status ebpo_mesh_check_whole(const ebpo_mesh *mesh, ebpo_error *error)
     if (!mesh->arrangement || !mesh->arrangement->whole_faces)
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
-                          "a component cannot be mended; mend the mesh that it comes from");
+                          "a component cannot be repaired; repair the mesh that contains it");
 }
 
-/* NULL when there is no room. */
+/* Returns NULL when there is no space. */
 static void *copy_of(ebpo_workspace *workspace, const void *from, uint64_t count, size_t size)
 {
     void *to = ebpo_array_alloc(workspace, count, size);
@@ -53,7 +53,7 @@ static void *copy_of(ebpo_workspace *workspace, const void *from, uint64_t count
     return to;
 }
 
-/* Without keys: the copy is to be mended. */
+/* Copies the order without keys, as the copy will be repaired. */
 static struct ebpo_arrangement *copy_order(const ebpo_mesh *mesh)
 {
     const struct ebpo_arrangement *from = mesh->arrangement;
@@ -115,7 +115,7 @@ const char *ebpo_mesh_attributes_lost(const ebpo_mesh *mesh)
     return mesh->attributes && mesh->attributes->lost[0] ? mesh->attributes->lost : NULL;
 }
 
-const char *ebpo_mesh_unread(const ebpo_mesh *mesh)
+const char *ebpo_mesh_ignored(const ebpo_mesh *mesh)
 {
     return mesh->attributes && mesh->attributes->unread[0] ? mesh->attributes->unread : NULL;
 }
@@ -143,12 +143,12 @@ static ebpo_mesh_frame frame_of(const double most[3])
     return frame;
 }
 
-/* Vertices are looked at first, which is quicker: few meshes are far from 1, and then some vertex
- * that no face uses may be what is. */
+/* Checks vertices first, which is faster. Coordinates are rarely far from 1, and then perhaps only
+ * at unused vertices. */
 ebpo_mesh_frame ebpo_mesh_frame_of(const ebpo_mesh *mesh)
 {
     double most[3] = { 0, 0, 0 }, used[3] = { 0, 0, 0 };
-    if (mesh->xyz32) /* whose exponents are from -148 to 128 */
+    if (mesh->xyz32) /* their exponents are from -148 to 128 */
         return (ebpo_mesh_frame){ .scaled = false };
     EBPO_FOR_ITEMS(mesh->workspace, v, 0, mesh->vertex_count)
         mesh_include(most, mesh, v);

@@ -1,5 +1,5 @@
-/* Checks a mesh: faces, edges, vertices and positions are examined in parallel, and the report says
- * whether the mesh is a closed 2-manifold, and what is wrong with it and where. */
+/* Checks a mesh. Examines faces, edges, vertices and positions in parallel, and reports whether the
+ * mesh is a closed 2-manifold, the errors and their places. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,7 +16,7 @@
 #include "mesh/mesh_parts.h"
 #include "mesh/adjacency.h"
 
-/* Places while checking, a list for each worker. */
+/* Places found during the check, a list for each worker. */
 void ebpo_found_add(const ebpo_check *check, unsigned worker, ebpo_found found)
 {
     ebpo_found_list *list = &check->found[worker];
@@ -48,8 +48,8 @@ typedef struct face_pass {
     double centre[3];
 } face_pass;
 
-/* Root of v. Paths are halved on the way; any thread may do so, as a parent only ever moves towards
- * the root. */
+/* Returns the root of v and halves the path. Any thread may do so, as parents only move towards the
+ * root. */
 static uint32_t find_root(uint32_t *parents, uint32_t v)
 {
     for (;;) {
@@ -64,8 +64,8 @@ static uint32_t find_root(uint32_t *parents, uint32_t v)
     }
 }
 
-/* The higher root goes below the lower one, so there are no cycles; the number of roots is the same
- * in any order. */
+/* Links the higher root to the lower one, which avoids cycles. The number of roots does not depend
+ * on the order. */
 static void check_join(uint32_t *parents, uint32_t a, uint32_t b)
 {
     for (;;) {
@@ -85,8 +85,8 @@ static void check_join(uint32_t *parents, uint32_t a, uint32_t b)
     }
 }
 
-/* True when rounding cannot hide a zero: |ad - bc| against its error bound (Shewchuk
- * 1997, 3.33e-16), and no underflow or overflow. */
+/* Returns true if |ad - bc| is certainly nonzero: it exceeds its error bound (Shewchuk 1997,
+ * 3.33e-16), without underflow or overflow. */
 static bool surely_nonzero(double a, double b, double c, double d)
 {
     double permanent = fabs(a * d) + fabs(b * c);
@@ -151,7 +151,7 @@ static ebpo_status check_faces(void *context, uint64_t begin, uint64_t end, unsi
         ebpo_check_position(pass->check, v[2], c);
         ebpo_face_cross(a, b, c, cross);
         check_measure(&block, &pass->check->units, pass->centre, a, cross);
-        if (pass->check->units.scaled) { /* the test is exact: on the coordinates themselves */
+        if (pass->check->units.scaled) { /* the test is exact: it uses unscaled coordinates */
             ebpo_mesh_position(mesh, v[0], a);
             ebpo_mesh_position(mesh, v[1], b);
             ebpo_mesh_position(mesh, v[2], c);
@@ -217,8 +217,8 @@ static uint32_t fan_root(uint32_t *fans, uint32_t i)
     return i;
 }
 
-/* The faces of an edge that is used twice belong to one fan; returns how many fans that joined.
- * Where more faces meet, a fan ends. */
+/* Joins the faces of an edge that is used twice into one fan; returns the number of joins. A fan
+ * ends where more faces share an edge. */
 static uint64_t join_fans(uint32_t *fans, const ebpo_link *links, uint64_t uses)
 {
     if (uses != 2 || links[0].entry == EBPO_NO_INDEX || links[1].entry == EBPO_NO_INDEX)
@@ -282,7 +282,7 @@ static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, 
         end = ebpo_star_run_end(star, begin);
         fans -= join_fans(s->fans, star->links + begin, end - begin);
         uint32_t neighbour = ebpo_link_neighbour(&star->links[begin]);
-        if (neighbour < v) /* the edge is counted at its lower end */
+        if (neighbour < v) /* the edge is counted at its lower vertex */
             continue;
         ebpo_sum_add(&block->length, edge_length(check, v, neighbour));
         if (!classify_edge(check, block, s, v, star->links + begin, end - begin))
@@ -298,7 +298,7 @@ static bool check_repeated(const ebpo_check *check, star_block *block, scratch *
 {
     if (!ebpo_same_faces_gather(&s->same, &check->stars, check->mesh, v))
         return false;
-    uint32_t first = 0; /* of the same vertices */
+    uint32_t first = 0; /* first face with these vertices */
     for (uint64_t i = 0; i < s->same.count; i++)
         if (i && ebpo_same_faces_repeats(&s->same, i))
             ebpo_check_note(check, s->worker, &block->repeated_face, EBPO_FOUND_REPEATED_FACE,
@@ -497,14 +497,14 @@ ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error)
     return status;
 }
 
-/* Vertices along the curve, at one position one behind the other. */
+/* Vertices sorted along the curve; those at one position are adjacent. */
 typedef struct curve_run {
     const ebpo_mesh *mesh;
     uint64_t at, end;
 } curve_run;
 
-/* Which one's next vertex comes first along the curve, as arranging has it: less than 0 for `a`, 0
- * when they are at one position. */
+/* Compares the next vertices of two runs along the curve, as arranging does: less than 0 for `a`, 0
+ * for equal positions. */
 static int compare_runs(const curve_run *a, const curve_run *b)
 {
     const uint64_t *key = a->mesh->arrangement->key;
@@ -527,8 +527,7 @@ static void note_repeated(const ebpo_check *check, uint32_t v)
                     ebpo_mesh_source_vertex(check->mesh, v), v, v);
 }
 
-/* Steps over the vertices of a run's next position. All but the one that the source has first
- * repeat that one. */
+/* Skips the vertices at a run's next position. All but the first in the source are repetitions. */
 static void take_position(const ebpo_check *check, curve_run *r, uint32_t *lowest)
 {
     double here[3], p[3];
@@ -547,7 +546,8 @@ static void take_position(const ebpo_check *check, curve_run *r, uint32_t *lowes
     } while (r->at < r->end && p[0] == here[0] && p[1] == here[1] && p[2] == here[2]);
 }
 
-/* Of an arranged mesh: those that faces name, and the others, are a run each, or all are one. */
+/* Compares positions in an arranged mesh: used and unused vertices are one run each, or all are one
+ * run. */
 static void compare_along_curve(const ebpo_check *check)
 {
     const ebpo_mesh *mesh = check->mesh;
@@ -566,7 +566,7 @@ static void compare_along_curve(const ebpo_check *check)
     }
 }
 
-/* Of any mesh: by a table of positions. */
+/* Compares positions in any mesh, with a hash table. */
 static ebpo_status compare_all(const ebpo_check *check, ebpo_error *error)
 {
     const ebpo_mesh *mesh = check->mesh;
@@ -576,7 +576,7 @@ static ebpo_status compare_all(const ebpo_check *check, ebpo_error *error)
         ebpo_positions_build(&positions, mesh, check->threads, &check->progress, error);
     if (status != EBPO_OK)
         return status;
-    /* of each first one's position */
+    /* first vertex of each position */
     uint32_t *lowest =
         positions.repeated ? ebpo_array_alloc(mesh->workspace, count, sizeof *lowest) : NULL;
     if (positions.repeated && !lowest)
@@ -606,7 +606,8 @@ ebpo_status ebpo_check_positions(ebpo_check *check, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Source: EBP 2017, section 3.1, for what a closed 2-manifold is; Euler's formula for the genus. */
+/* Completes the report. Source: EBP 2017, section 3.1, for the definition of a closed 2-manifold;
+ * Euler's formula for the genus. */
 static void check_conclude(ebpo_check *c)
 {
     ebpo_mesh_report *r = c->report;

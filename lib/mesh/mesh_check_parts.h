@@ -1,28 +1,28 @@
-/* The passes of ebpo_mesh_check. Each works on fixed blocks, whose results are joined in order: the
- * report does not depend on the number of threads. */
+/* The passes of ebpo_mesh_check. Each works on fixed blocks whose results are joined in order, so
+ * the report does not depend on the number of threads. */
 #ifndef EBPO_MESH_MESH_CHECK_PARTS_H
 #define EBPO_MESH_MESH_CHECK_PARTS_H
 
 #include <math.h>
 
-#include <ebpo/places.h>
+#include <ebpo/findings.h>
 
 #include "mesh/boundary.h"
 #include "mesh/adjacency.h"
 #include "mesh/sum.h"
 
-/* Along axis k, lengths are measured in units of 2^exponent[k], where squares and cubes could leave
- * a double's range otherwise; 0 else. */
+/* Along axis k, the unit of length is 2^exponent[k] if squares and cubes could otherwise leave the
+ * range of a double; otherwise 0. */
 typedef struct ebpo_units {
     bool scaled;
     int exponent[3];
-    int length, area, volume; /* exponents of what sums are kept in */
+    int length, area, volume; /* exponents of the sums */
 } ebpo_units;
 
-/* A place while checking: of edges and vertices the vertices, of a face that one (`b` of a repeated
- * one: the first of its vertices), as the mesh has them now. */
+/* A place during the check, with indices in the current mesh: the vertices of an edge or a vertex;
+ * of a face its index (`b` of a repeated one: the first of its vertices). */
 typedef struct ebpo_found {
-    uint32_t kind, place; /* as ebpo_finding has it */
+    uint32_t kind, place; /* as in ebpo_finding */
     uint32_t a, b;
 } ebpo_found;
 
@@ -36,18 +36,18 @@ typedef struct ebpo_found_list {
 
 typedef struct ebpo_check {
     const ebpo_mesh *mesh;
-    unsigned threads; /* resolved */
+    unsigned threads; /* resolved count */
     ebpo_progress progress;
     ebpo_mesh_report *report;
     uint32_t *parents; /* [vertex_count] union-find forest over vertices */
     ebpo_stars stars;
-    ebpo_boundary boundary; /* all boundary edges, in no order */
+    ebpo_boundary boundary; /* all boundary edges, unordered */
     uint64_t referenced;    /* vertices that faces use */
     ebpo_units units;
-    ebpo_found_list *found; /* [threads]; NULL: places are not wanted */
+    ebpo_found_list *found; /* [threads]; NULL: places are not requested */
 } ebpo_check;
 
-/* For measuring: the position in the units. */
+/* Returns the position in the units of measurement. */
 static inline void ebpo_check_position(const ebpo_check *check, uint64_t vertex, double out[3])
 {
     ebpo_mesh_position(check->mesh, vertex, out);
@@ -56,7 +56,7 @@ static inline void ebpo_check_position(const ebpo_check *check, uint64_t vertex,
             out[k] = ldexp(out[k], -check->units.exponent[k]);
 }
 
-/* Length of a vector whose component k is d[k] 2^exponent[k], in units of 2^unit. */
+/* Returns the length of a vector whose component k is d[k] 2^exponent[k], in units of 2^unit. */
 static inline double ebpo_scaled_length(const double d[3], const int exponent[3], int unit)
 {
     double x[3], most = 0, sum = 0;
@@ -69,14 +69,15 @@ static inline double ebpo_scaled_length(const double d[3], const int exponent[3]
     return most * sqrt(sum);
 }
 
-/* Counts `place`, and keeps it if it is among the lowest. */
+/* Counts `place`, and stores it if it is among the lowest. */
 static inline void ebpo_finding_add(ebpo_finding *finding, uint64_t place)
 {
-    int kept = finding->count < EBPO_FINDING_PLACES ? (int)finding->count : EBPO_FINDING_PLACES;
+    int kept =
+        finding->count < EBPO_FINDING_LOCATIONS ? (int)finding->count : EBPO_FINDING_LOCATIONS;
     finding->count++;
-    if (kept == EBPO_FINDING_PLACES && finding->place[kept - 1] <= place)
+    if (kept == EBPO_FINDING_LOCATIONS && finding->place[kept - 1] <= place)
         return;
-    int i = kept < EBPO_FINDING_PLACES ? kept : kept - 1;
+    int i = kept < EBPO_FINDING_LOCATIONS ? kept : kept - 1;
     for (; i > 0 && finding->place[i - 1] > place; i--)
         finding->place[i] = finding->place[i - 1];
     finding->place[i] = place;
@@ -84,16 +85,16 @@ static inline void ebpo_finding_add(ebpo_finding *finding, uint64_t place)
 
 static inline void ebpo_finding_merge(ebpo_finding *finding, const ebpo_finding *other)
 {
-    uint64_t kept = other->count < EBPO_FINDING_PLACES ? other->count : EBPO_FINDING_PLACES;
+    uint64_t kept = other->count < EBPO_FINDING_LOCATIONS ? other->count : EBPO_FINDING_LOCATIONS;
     for (uint64_t i = 0; i < kept; i++)
         ebpo_finding_add(finding, other->place[i]);
     finding->count += other->count - kept;
 }
 
-/* Adds to the worker's list. */
+/* Adds a place to the worker's list. */
 void ebpo_found_add(const ebpo_check *check, unsigned worker, ebpo_found found);
 
-/* Counts a place, and keeps it where all are wanted. */
+/* Counts a place, and stores it if all places are requested. */
 static inline void ebpo_check_note(const ebpo_check *check, unsigned worker, ebpo_finding *finding,
                                    ebpo_finding_kind kind, uint64_t place, uint32_t a, uint32_t b)
 {
@@ -102,19 +103,21 @@ static inline void ebpo_check_note(const ebpo_check *check, unsigned worker, ebp
         ebpo_found_add(check, worker, (ebpo_found){ (uint32_t)kind, (uint32_t)place, a, b });
 }
 
-/* ebpo_mesh_check: fills in the report of a check that has its mesh, threads and report. */
+/* Fills in the report of a check that has its mesh, threads and report: the body of
+ * ebpo_mesh_check. */
 EBPO_MUST_USE ebpo_status ebpo_check_run(ebpo_check *check, ebpo_error *error);
 
-/* Every coordinate finite. */
+/* Checks that every coordinate is finite. */
 EBPO_MUST_USE ebpo_status ebpo_check_coordinates(ebpo_check *check, ebpo_error *error);
-/* Bounding box, unit for measuring, unreferenced vertices; needs stars. */
+/* Computes the bounding box, the unit of measurement and unreferenced vertices; needs stars. */
 EBPO_MUST_USE ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error);
-/* Area, volume (about the box's centre), zero areas, repeated indices; joins components. Needs the
- * bounding box. */
+/* Computes area, volume (relative to the box's centre), faces of zero area and repeated indices;
+ * joins components. Needs the bounding box. */
 EBPO_MUST_USE ebpo_status ebpo_check_faces(ebpo_check *check, ebpo_error *error);
-/* Edges, bow-ties, repeated faces, mean edge, number of components; needs the faces' pass. */
+/* Computes edges, bow-ties, repeated faces, the mean edge and the number of components; needs the
+ * pass over faces. */
 EBPO_MUST_USE ebpo_status ebpo_check_stars(ebpo_check *check, ebpo_error *error);
-/* Repeated positions. */
+/* Finds repeated positions. */
 EBPO_MUST_USE ebpo_status ebpo_check_positions(ebpo_check *check, ebpo_error *error);
 
 #endif

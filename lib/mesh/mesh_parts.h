@@ -1,5 +1,4 @@
-/* Internals shared by the parts of the mesh module. Other modules take ebpo_mesh_position from
- * here. */
+/* Internals shared by the parts of the mesh module. Other modules use ebpo_mesh_position. */
 #ifndef EBPO_MESH_MESH_PARTS_H
 #define EBPO_MESH_MESH_PARTS_H
 
@@ -12,35 +11,36 @@
 
 #define EBPO_NO_INDEX UINT32_MAX
 
-/* Of a mesh whose vertices and faces are in the order of a Morton curve (ebpo_mesh_arrange), or of
- * which faces were dropped. */
+/* The order of a mesh whose vertices and faces are sorted along a Morton curve (ebpo_mesh_arrange),
+ * or whose faces were partly dropped. */
 struct ebpo_arrangement {
-    /* around the referenced vertices, with exact walls down to box.grid_level */
+    /* around the referenced vertices, with exact cell faces down to box.grid_level */
     ebpo_box box;
-    /* vertices that faces name come first, along the curve; the others after them, likewise */
+    /* referenced vertices come first, along the curve; the others follow, also along the curve */
     uint64_t referenced;
     /* [vertex_count] octcode of the vertex's cell at box.grid_level, ascending among the referenced
-     * and among the others. NULL: arranged for mending, or mended since; neighbours in space are
-     * still neighbours in memory, but what builds has to arrange again */
+     * and among the other vertices. NULL: arranged for repair, or repaired since; neighbours in
+     * space are still close in memory, but building must arrange the mesh again */
     uint64_t *key;
-    int level;                 /* that was asked for: -1: as deep as is sensible */
-    bool grouped;              /* vertices at one position are one run */
-    uint32_t *vertex_source;   /* [vertex_count] numbers in the source */
+    int level;                 /* requested level; -1: as deep as useful */
+    bool grouped;              /* vertices at one position are adjacent */
+    uint32_t *vertex_source;   /* [vertex_count] source indices */
     uint32_t *face_source;     /* [face_count] */
-    ebpo_workspace *workspace; /* the mesh's, of all arrays */
-    /* of a component: what the mesh has of which it is one, mended; else 0 */
+    ebpo_workspace *workspace; /* the mesh's; owns all arrays */
+    /* for a component: counts of the repaired whole mesh; otherwise 0 */
     uint64_t whole_vertices, whole_faces;
-    uint64_t dropped_faces; /* of the source, since: their numbers are nobody's */
+    uint64_t
+        dropped_faces; /* faces of the source that were dropped later; their indices are unused */
 };
 
-/* Its geometry and order, without attributes, in its workspace; freed by ebpo_mesh_free. On failure
- * cleared. */
+/* Copies geometry and order, without attributes, into the same workspace; free with ebpo_mesh_free.
+ * Cleared on failure. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_copy(const ebpo_mesh *mesh, ebpo_mesh *out, ebpo_error *error);
 
-/* NULL: nothing. */
+/* Accepts NULL. */
 void ebpo_arrangement_free(struct ebpo_arrangement *arrangement);
 
-/* Numbers for messages and reports. */
+/* Returns the source index, for messages and reports. */
 static inline uint64_t ebpo_mesh_source_vertex(const ebpo_mesh *mesh, uint64_t v)
 {
     return mesh->arrangement ? mesh->arrangement->vertex_source[v] : v;
@@ -50,7 +50,7 @@ static inline uint64_t ebpo_mesh_source_face(const ebpo_mesh *mesh, uint64_t f)
     return mesh->arrangement ? mesh->arrangement->face_source[f] : f;
 }
 
-/* How many there are of them; of a component, in the whole mesh. */
+/* Returns the number of source indices; for a component, that of the whole mesh. */
 static inline uint64_t ebpo_mesh_whole_vertices(const ebpo_mesh *mesh)
 {
     return mesh->arrangement && mesh->arrangement->whole_vertices
@@ -62,10 +62,11 @@ static inline uint64_t ebpo_mesh_whole_faces(const ebpo_mesh *mesh)
     return mesh->arrangement && mesh->arrangement->whole_faces ? mesh->arrangement->whole_faces
                                                                : mesh->face_count;
 }
-/* EBPO_E_ARGUMENT for a component: mending gives numbers anew, but its own are another mesh's. */
+/* Returns EBPO_E_ARGUMENT for a component: repair renumbers the source indices, which a component
+ * shares with its whole mesh. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_check_whole(const ebpo_mesh *mesh, ebpo_error *error);
 
-/* Position of vertex i (< vertex_count) as doubles; exact for both kinds of coordinates. */
+/* Returns the position of vertex i (< vertex_count) as doubles; exact for both coordinate types. */
 static inline void ebpo_mesh_position(const ebpo_mesh *mesh, uint64_t i, double out[3])
 {
     if (mesh->xyz32) {
@@ -77,20 +78,20 @@ static inline void ebpo_mesh_position(const ebpo_mesh *mesh, uint64_t i, double 
     }
 }
 
-/* True when the face names a vertex twice. */
+/* Returns true if the face repeats a vertex. */
 static inline bool ebpo_face_repeats_index(const uint32_t face[3])
 {
     return face[0] == face[1] || face[1] == face[2] || face[2] == face[0];
 }
 
-/* Returns whether a sum of `count` rounded terms of a volume, the largest of which is `most`, may
- * be rounding alone: sheets with two sides have no volume and no outside. */
+/* Returns true if a sum of `count` rounded volume terms, the largest of which is `most`, may be
+ * rounding noise: two-sided sheets have no volume and no outside. */
 static inline bool ebpo_volume_is_noise(double sum, uint64_t count, double most)
 {
     return (sum < 0 ? -sum : sum) <= 1e-12 * (double)count * most;
 }
 
-/* Makes the face look the other way. */
+/* Reverses the orientation of the face. */
 static inline void ebpo_face_turn(uint32_t face[3])
 {
     uint32_t v = face[1];
@@ -98,56 +99,56 @@ static inline void ebpo_face_turn(uint32_t face[3])
     face[2] = v;
 }
 
-/* Steps of mending. EARLIER: orienting as earlier builds did it, which left consistent components
- * as they were. */
+/* Repair steps. EARLIER: orientation as in earlier builds, which left consistent components
+ * unchanged. */
 enum {
-    EBPO_MEND_WELD = 1,
-    EBPO_MEND_ORIENT = 2,
-    EBPO_MEND_FILL = 4,
-    EBPO_MEND_FLIP = 8,
-    EBPO_MEND_EARLIER = 16,
-    EBPO_MEND_DROP = 32
+    EBPO_REPAIR_WELD = 1,
+    EBPO_REPAIR_ORIENT = 2,
+    EBPO_REPAIR_FILL = 4,
+    EBPO_REPAIR_FLIP = 8,
+    EBPO_REPAIR_EARLIER = 16,
+    EBPO_REPAIR_DROP = 32
 };
 
-/* Merges (within a distance, if it is above 0), drops, orients, flips, fills holes, and turns what
- * these closed: as asked for. */
-EBPO_MUST_USE ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance,
-                                         ebpo_mend_record *record, ebpo_error *error);
+/* Performs the requested steps: merges vertices (within a distance if it is above 0), drops faces,
+ * orients, flips, fills holes, and orients the components that this closed. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, double weld_distance,
+                                           ebpo_repair_record *record, ebpo_error *error);
 
-/* The first part of ebpo_mesh_orient: neighbouring faces agree. `closed`: NULL, or as for
- * ebpo_mesh_find_shells. */
-EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record,
+/* Makes neighbouring faces consistent: the first part of ebpo_mesh_orient. `closed`: NULL, or as
+ * for ebpo_mesh_find_shells. */
+EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_repair_record *record,
                                                     uint32_t **closed, ebpo_error *error);
 
-/* The second part: shells look outwards, or inwards where they are within an odd number of others.
- * `closed`: of ebpo_mesh_find_shells; it is changed. */
+/* Turns shells outwards, or inwards if they are within an odd number of others: the second part.
+ * `closed`: result of ebpo_mesh_find_shells; modified. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed,
-                                                ebpo_mend_record *record, ebpo_error *error);
+                                                ebpo_repair_record *record, ebpo_error *error);
 
-/* Finds the shell of each face, closed [face_count]: a number that its faces alone have, or
- * EBPO_NO_INDEX for a face that is in none. A shell is closed by itself: faces connected by edges
- * with two faces, or around edges with more. The mesh's workspace owns it. */
+/* Finds the shell of each face, closed [face_count]: a number unique to the shell, or
+ * EBPO_NO_INDEX. A shell is closed by itself: its faces are connected by edges with two faces, or
+ * around edges with more. Owned by the mesh's workspace. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_find_shells(const ebpo_mesh *mesh, unsigned threads,
                                                 uint32_t **closed, ebpo_error *error);
 
-/* Decides which vertices stay and which they become, by the rule of ebpo_mesh_weld_within, in a
- * mesh without vertices at one position. map [vertex_count]: the new number of each; from
- * [vertex_count]: the *kept vertices that stay, ascending; *moved: the largest distance. */
+/* Decides which vertices are merged, by the rule of ebpo_mesh_weld_within, in a mesh without
+ * repeated positions. map [vertex_count]: new index of each vertex; from [vertex_count]: the *kept
+ * remaining vertices, ascending; *moved: the largest distance. */
 EBPO_MUST_USE ebpo_status ebpo_weld_group_within(const ebpo_mesh *mesh, double distance,
                                                  uint32_t *map, uint32_t *from, uint64_t *kept,
                                                  double *moved, ebpo_error *error);
 
-/* What messages call the mesh: its source's name, or "mesh". */
+/* Returns the name of the mesh in messages: its source's name, or "mesh". */
 const char *ebpo_mesh_label(const ebpo_mesh *mesh);
 
-/* EBPO_E_ARGUMENT unless the arrays that the counts promise are there, EBPO_E_LIMIT when a count is
- * beyond 2^32 - 2. */
+/* Returns EBPO_E_ARGUMENT if an array that the counts require is missing, EBPO_E_LIMIT if a count
+ * exceeds 2^32 - 2. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_check_shape(const ebpo_mesh *mesh, ebpo_error *error);
 
 /* Coordinates in units of powers of two, one for each axis, in which volumes of meshes far from 1
- * neither overflow nor vanish: their signs and order are the same. */
+ * neither overflow nor underflow; signs and order are unchanged. */
 
-/* Squares and cubes of what lies between 2^-256 and 2^256 are far from overflow and underflow. */
+/* Squares and cubes of values between 2^-256 and 2^256 are far from overflow and underflow. */
 enum { EBPO_EXPONENT_MAX = 256 };
 
 static inline bool ebpo_exponent_is_far(int exponent)
@@ -156,11 +157,11 @@ static inline bool ebpo_exponent_is_far(int exponent)
 }
 
 typedef struct ebpo_mesh_frame {
-    bool scaled; /* else coordinates are as they are */
+    bool scaled; /* otherwise coordinates are unchanged */
     int exponent[3];
 } ebpo_mesh_frame;
 
-/* By the corners of all faces. */
+/* Computes the frame from the corners of all faces. */
 ebpo_mesh_frame ebpo_mesh_frame_of(const ebpo_mesh *mesh);
 
 static inline void ebpo_frame_position(const ebpo_mesh_frame *frame, const ebpo_mesh *mesh,
@@ -172,26 +173,26 @@ static inline void ebpo_frame_position(const ebpo_mesh_frame *frame, const ebpo_
             out[k] = ldexp(out[k], -frame->exponent[k]);
 }
 
-/* Vertices with one and the same position. */
+/* Vertices with identical positions. */
 
-/* A hash table of all positions; each keeps the lowest vertex number that has it. 5.3 to 10.7 bytes
- * a vertex. */
+/* A hash table of all positions; each entry is the lowest vertex index at its position. 5.3 to 10.7
+ * bytes a vertex. */
 typedef struct ebpo_positions {
     const ebpo_mesh *mesh; /* borrowed */
     uint32_t *slots;
     uint64_t mask;
     ebpo_workspace *workspace; /* the mesh's */
-    uint64_t repeated;         /* vertices whose position an earlier vertex has */
+    uint64_t repeated;         /* vertices that repeat the position of an earlier vertex */
 } ebpo_positions;
 
-/* -0 equals 0; NaNs are compared by their bits. `out` is cleared on failure. The result is the same
- * for any thread count. */
+/* Builds the table. -0 equals 0; NaNs are compared by their bits. `out` is cleared on failure. The
+ * result does not depend on the number of threads. */
 EBPO_MUST_USE ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh,
                                                unsigned threads, const ebpo_progress *progress,
                                                ebpo_error *error);
 void ebpo_positions_free(ebpo_positions *positions);
 
-/* The lowest vertex number with the position of v. */
+/* Returns the lowest vertex index at the position of v. */
 uint32_t ebpo_positions_first(const ebpo_positions *positions, uint32_t v);
 
 #endif

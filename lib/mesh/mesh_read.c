@@ -1,4 +1,4 @@
-/* ebpo_mesh_read: one file of any known format; with its groups. */
+/* Implements ebpo_mesh_read: reads one file of any known format, optionally with its groups. */
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,7 +36,7 @@ static void *hash_file(void *argument)
     return NULL;
 }
 
-/* Hashing runs beside parsing: it takes about as long, and both read the same pages. */
+/* Hashes in a thread parallel to parsing: both take about equally long and read the same pages. */
 static void hash_begin(hashing *h)
 {
     h->threaded = ebpo_thread_start(&h->thread, hash_file, h) == 0;
@@ -50,7 +50,7 @@ static void hash_end(hashing *h)
         pthread_join(h->thread, NULL);
 }
 
-/* With its groups, if these are asked for and it names any. */
+/* Parses the file, with its groups if they are requested and present. */
 static ebpo_status read_parse(ebpo_mesh *out, const ebpo_whole_file *file, const char *path,
                               const ebpo_mesh_read_options *wanted, ebpo_mesh_groups **groups,
                               ebpo_error *error)
@@ -71,9 +71,9 @@ static ebpo_status read_parse(ebpo_mesh *out, const ebpo_whole_file *file, const
     return status;
 }
 
-/* A file that is changed while it is read may be of no form at all: then that is what is told. */
-static ebpo_status tell_change(const ebpo_whole_file *file, const char *path, ebpo_status status,
-                               ebpo_error *error)
+/* Reports a change of the file during reading in place of the format error that it may cause. */
+static ebpo_status report_change(const ebpo_whole_file *file, const char *path, ebpo_status status,
+                                 ebpo_error *error)
 {
     ebpo_error changed = EBPO_ERROR_INIT;
     ebpo_status unchanged = ebpo_whole_file_unchanged(file, path, &changed);
@@ -111,7 +111,7 @@ static ebpo_status read_mesh(const char *path, const ebpo_mesh_read_options *opt
         status =
             ebpo_textures_find(out, path, file.data, file.size, wanted.embed_textures != 0, error);
     if (status == EBPO_OK || status == EBPO_E_FORMAT)
-        status = tell_change(&file, path, status, error);
+        status = report_change(&file, path, status, error);
     if (status == EBPO_OK)
         memcpy(out->source_sha256, hash.digest, sizeof hash.digest);
     else

@@ -1,5 +1,5 @@
 /* Welds vertices: those at one position, or within a distance of each other (weld_within.c), become
- * the one that the source has first. Attributes follow. */
+ * the first of them in the source. Attributes follow. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -36,8 +36,8 @@ static inline bool same_key(const key *a, const key *b)
     return a->bits[0] == b->bits[0] && a->bits[1] == b->bits[1] && a->bits[2] == b->bits[2];
 }
 
-/* True when the position was there already. Whoever comes first, the slot ends up with the lowest
- * number. */
+/* Returns true if the position was already present. In any order of insertion, the slot ends with
+ * the lowest index. */
 static bool weld_insert(ebpo_positions *t, uint32_t v)
 {
     key k = key_of(t->mesh, v);
@@ -112,18 +112,18 @@ enum { GRAIN = 1 << 15, WORD = 64 };
 
 typedef struct welding {
     ebpo_mesh *mesh;
-    double distance; /* 0: vertices at one position are merged */
+    double distance; /* 0: merge vertices at equal positions */
     double moved;
-    uint64_t collapsed; /* faces that name a vertex twice, and did not before */
+    uint64_t collapsed; /* faces that repeat a vertex only after welding */
     uint64_t kept;
-    uint32_t *map;  /* [vertex_count] new number of each vertex */
-    uint32_t *from; /* [kept] the vertex that stays, of those at one position */
-    /* of an arranged mesh: [blocks of GRAIN vertices + 1] positions that begin there; then before
-     * it */
+    uint32_t *map;  /* [vertex_count] new index of each vertex */
+    uint32_t *from; /* [kept] vertex that stays, of those at one position */
+    /* arranged mesh: [blocks of GRAIN vertices + 1] positions that begin in the block; later the
+     * sum before it */
     uint64_t *heads;
-    uint64_t *stays;  /* of an arranged mesh: bit s: vertex s of the source stays */
+    uint64_t *stays;  /* arranged mesh: bit s: vertex s of the source stays */
     uint64_t *before; /* [words of `stays`] bits set before it */
-    uint32_t *rows;   /* of an arranged mesh with attributes: [kept] rows of these that stay */
+    uint32_t *rows;   /* arranged mesh with attributes: [kept] attribute rows that stay */
 } welding;
 
 static ebpo_status check_indices(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -142,7 +142,7 @@ static ebpo_status check_indices(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-/* --- groups, of a mesh in any order: by a table of positions --- */
+/* --- groups in a mesh of any order: hash table of positions --- */
 
 static ebpo_status group_by_table(welding *w, ebpo_error *error)
 {
@@ -159,7 +159,7 @@ static ebpo_status group_by_table(welding *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* --- of an arranged one: neighbours are compared --- */
+/* --- groups in an arranged mesh: comparison of neighbours --- */
 
 static bool begins_group(const ebpo_mesh *mesh, uint64_t v)
 {
@@ -226,21 +226,21 @@ static ebpo_status group_within(welding *w, ebpo_error *error)
                : ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * sizeof *w->from, error);
 }
 
-/* --- what stays --- */
+/* --- remaining vertices --- */
 
-/* Of each group the vertex that the source has first. Groups are numbered by their first vertices,
- * so a new number is met first as the next one. */
+/* Chooses the first vertex in the source of each group. Groups are numbered by their first
+ * vertices, so a new index is first seen as the next one. */
 static ebpo_status weld_choose(welding *w, ebpo_error *error)
 {
     const ebpo_mesh *mesh = w->mesh;
-    uint64_t met = 0;
+    uint64_t intersected = 0;
     w->from = ebpo_array_alloc(mesh->workspace, w->kept, sizeof *w->from);
     if (!w->from)
         return ebpo_workspace_fail(mesh->workspace, w->kept * sizeof *w->from, error);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count) {
         uint32_t group = w->map[v];
-        if (group == met)
-            w->from[met++] = (uint32_t)v;
+        if (group == intersected)
+            w->from[intersected++] = (uint32_t)v;
         else if (ebpo_mesh_source_vertex(mesh, v) < ebpo_mesh_source_vertex(mesh, w->from[group]))
             w->from[group] = (uint32_t)v;
     }
@@ -259,7 +259,7 @@ static ebpo_status mark_sources(void *context, uint64_t begin, uint64_t end, uns
     return EBPO_OK;
 }
 
-/* The source's numbers, as if it had been welded in its own order. */
+/* Assigns source indices as if the source had been welded. */
 static ebpo_status number_sources(welding *w, ebpo_error *error)
 {
     ebpo_workspace *workspace = w->mesh->workspace;
@@ -277,7 +277,7 @@ static ebpo_status number_sources(welding *w, ebpo_error *error)
     return status;
 }
 
-/* Tells how many of the vertices that go have other values than the one that stays. */
+/* Notes how many removed vertices have other attribute values than the remaining one. */
 static void note_differences(const welding *w)
 {
     const ebpo_mesh *mesh = w->mesh;
@@ -290,11 +290,12 @@ static void note_differences(const welding *w)
     }
     if (differ)
         ebpo_attributes_lose(mesh->attributes,
-                             "what %llu joined vertices have that differs from the one that stays",
+                             "attribute values of %llu joined vertices that differ from the "
+                             "remaining one",
                              (unsigned long long)differ);
 }
 
-/* Attributes are in the order of the source: these vertices stay, in that order. */
+/* Lists the remaining attribute rows; attributes are in the order of the source. */
 static ebpo_status list_rows(welding *w, ebpo_error *error)
 {
     ebpo_mesh *mesh = w->mesh;
@@ -310,7 +311,7 @@ static ebpo_status list_rows(welding *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* --- writing the result: nothing can fail from here on --- */
+/* --- writing the result: cannot fail from here on --- */
 
 static ebpo_status rename_corners(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
@@ -338,8 +339,8 @@ static void move_attributes(const welding *w)
     ebpo_attributes_keep(attributes, "vertex", w->rows ? w->rows : w->from, w->kept);
 }
 
-/* A group's new index is never greater than that of any of its vertices, so moving in ascending
- * order overwrites nothing that is still needed. */
+/* Moves vertices to their new indices. As an index never exceeds those of the group's vertices,
+ * moving in ascending order overwrites no needed vertex. */
 static void move_vertices(welding *w)
 {
     ebpo_mesh *mesh = w->mesh;
@@ -406,8 +407,8 @@ static ebpo_status weld_run(welding *w, ebpo_error *error)
     return status;
 }
 
-/* Distance 0: by equal positions. */
-static ebpo_status mesh_weld_weld(ebpo_mesh *mesh, double distance, ebpo_mend_record *record,
+/* Welds the mesh. Distance 0 means equal positions. */
+static ebpo_status mesh_weld_weld(ebpo_mesh *mesh, double distance, ebpo_repair_record *record,
                                   ebpo_error *error)
 {
     welding w = { .mesh = mesh, .distance = distance };
@@ -434,19 +435,19 @@ static ebpo_status mesh_weld_weld(ebpo_mesh *mesh, double distance, ebpo_mend_re
     return status;
 }
 
-ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     return mesh_weld_weld(mesh, 0, record, error);
 }
 
-ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double distance, ebpo_mend_record *record,
+ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double distance, ebpo_repair_record *record,
                                   ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     if (!(distance > 0))
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
-                              "the distance to weld within has to be above 0, not %g", distance);
+                              "the weld distance must be above 0, not %g", distance);
     ebpo_status status = mesh_weld_weld(mesh, 0, record, error);
     return status == EBPO_OK ? mesh_weld_weld(mesh, distance, record, error) : status;
 }

@@ -1,7 +1,7 @@
-/* Reading OBJ files in two passes: the first counts vertices, normals, texture coordinates and
- * corners; the second fills the mesh. A corner names its values by numbers, which may be negative
- * (counted from the end) and must exist. Materials and groups become attributes or runs of faces;
- * what a mesh cannot hold (curves, lines, points) is counted and reported.
+/* Reads OBJ files in two passes. The first counts vertices, normals, texture coordinates and
+ * corners; the second fills the mesh. A corner names its values by indices, which may be negative
+ * (counted from the end) and must exist. Materials and groups become attributes or runs of faces.
+ * Curves, lines and points are counted and reported.
  *
  * Source: "Object Files (.obj)", appendix B1 of Wavefront's Advanced Visualizer manual, 3.0. */
 #include "core/strict_fp.h"
@@ -22,12 +22,13 @@
 #include "mesh/import_build.h"
 #include "mesh/obj.h"
 
-/* What the file says and the mesh does not have. */
+/* Counts of data in the file that the mesh cannot hold. */
 typedef struct obj_losses {
-    uint64_t weights, surplus;              /* vertices divided by w; with values beyond */
-    uint64_t curves, unknown, unknown_line; /* statements; where the first unknown one is */
-    uint64_t absent[EBPO_IMPORT_SORTS];     /* corners that name values that are not there */
-    uint64_t uncoloured, alpha, no_numbers; /* vertices, vertices, normals and coordinates */
+    uint64_t weights, surplus;              /* vertices divided by w; vertices with extra values */
+    uint64_t curves, unknown, unknown_line; /* statements; line of the first unknown one */
+    uint64_t absent[EBPO_IMPORT_SORTS];     /* corners that refer to missing values */
+    uint64_t uncoloured, alpha, no_numbers; /* counts for vertices, vertices, and normals and
+                                             * coordinates */
     bool third, smoothing, library, groups;
 } obj_losses;
 
@@ -36,11 +37,11 @@ typedef struct obj_reading {
     const uint8_t *data;
     uint64_t size;
     ebpo_obj_text text;
-    uint64_t next_release;            /* byte */
-    uint64_t line;                    /* where the statement began */
-    uint64_t rows[EBPO_IMPORT_SORTS]; /* of the file's vertices, normals, texture coordinates; in
-                                    the second pass of those so far */
-    ebpo_import_runs *runs;           /* NULL: not asked for */
+    uint64_t next_release;            /* byte offset */
+    uint64_t line;                    /* line where the statement begins */
+    uint64_t rows[EBPO_IMPORT_SORTS]; /* rows of vertices, normals and texture coordinates: totals,
+                                       * or those so far in the second pass */
+    ebpo_import_runs *runs;           /* NULL if not requested */
     obj_losses losses;
     ebpo_obj_names names;
 } obj_reading;
@@ -59,7 +60,7 @@ ebpo_obj_text ebpo_obj_text_begin(const uint8_t *data, uint64_t size)
 static const bool may_end[256] = { [' '] = true,  ['\t'] = true, ['\v'] = true, ['\f'] = true,
                                    ['\n'] = true, ['\r'] = true, ['\\'] = true };
 
-/* Past the end of a line. */
+/* Returns the position after the end of a line. */
 static const char *past_end(const char *at, const char *end)
 {
     if (end - at > 1 && at[0] == '\r' && at[1] == '\n')
@@ -67,7 +68,7 @@ static const char *past_end(const char *at, const char *end)
     return at < end ? at + 1 : at;
 }
 
-/* The end of the line where a backslash joins it to the next; NULL: it does not. */
+/* Returns the end of the line if a backslash joins it to the next, otherwise NULL. */
 static const char *joined_end(const char *at, const char *end)
 {
     if (*at != '\\')
@@ -146,14 +147,14 @@ bool ebpo_obj_word_is(ebpo_obj_word word, const char *text)
     return word.n == strlen(text) && memcmp(word.s, text, word.n) == 0;
 }
 
-enum { RUNS_MOST = 100000000, MATERIALS_MOST = 10000000 };
+enum { RUNS_MAX = 100000000, MATERIALS_MAX = 10000000 };
 
 ebpo_status ebpo_obj_runs_add(ebpo_import_runs *runs, ebpo_obj_word run, const char *name,
                               ebpo_error *error)
 {
-    if (runs->count == RUNS_MOST)
+    if (runs->count == RUNS_MAX)
         return ebpo_fail_file(error, EBPO_E_LIMIT, name,
-                              "has more than %d lines that name groups; leave some out", RUNS_MOST);
+                              "has more than %d group statements; remove some", RUNS_MAX);
     if (!ebpo_grow(&runs->of, &runs->capacity, runs->count + 1, sizeof *runs->of))
         return ebpo_fail_memory(error, (runs->count + 1) * sizeof *runs->of);
     runs->of[runs->count++] = (ebpo_named_run){ .name = run.s, .size = run.n };
@@ -175,8 +176,8 @@ static bool obj_names_same(ebpo_obj_word a, ebpo_obj_word b)
     return a.n == b.n && memcmp(a.s, b.s, a.n) == 0;
 }
 
-/* Place of the name in the table: where its number is, or would go. 0 is a free slot, as the number
- * 0 has no name. */
+/* Returns the slot that holds the name's index or would hold it. 0 marks a free slot, as index 0
+ * has no name. */
 static uint64_t obj_names_find(const ebpo_obj_names *names, ebpo_obj_word word)
 {
     uint64_t at;
@@ -201,9 +202,9 @@ static bool grow_table(ebpo_obj_names *names)
 
 ebpo_status ebpo_obj_use_material(ebpo_obj_names *names, ebpo_obj_word material, ebpo_error *error)
 {
-    if (names->count >= MATERIALS_MOST)
-        return ebpo_fail(error, EBPO_E_LIMIT, "there are more than %d names of materials",
-                         MATERIALS_MOST);
+    if (names->count >= MATERIALS_MAX)
+        return ebpo_fail(error, EBPO_E_LIMIT, "there are more than %d material names",
+                         MATERIALS_MAX);
     uint64_t need = names->count ? names->count + 1 : 2;
     if (!ebpo_grow(&names->material, &names->capacity, need, sizeof *names->material) ||
         (2 * need > names->slots && !grow_table(names)))
@@ -258,7 +259,7 @@ static void print_properties(FILE *out, const ebpo_attributes *attributes, const
     }
 }
 
-/* A header of PLY, as such files are written again. */
+/* Creates a PLY header, as the mesh is exported as PLY. */
 static ebpo_status make_header(const ebpo_mesh *mesh, const ebpo_obj_names *names,
                                ebpo_error *error)
 {
@@ -280,7 +281,7 @@ static ebpo_status make_header(const ebpo_mesh *mesh, const ebpo_obj_names *name
         return ebpo_fail_memory(error, text.bytes);
     if (text.bytes > EBPO_ATTRIBUTE_HEADER) {
         free(text.text);
-        ebpo_attributes_lose(attributes, "names of materials (more than 1 MiB)");
+        ebpo_attributes_lose(attributes, "material names (more than 1 MiB)");
         return EBPO_OK;
     }
     attributes->header = text.text;
@@ -317,7 +318,7 @@ void ebpo_obj_names_free(ebpo_obj_names *names, ebpo_workspace *workspace)
 
 enum { RELEASE = 1 << 22 };
 
-/* EBPO_E_FORMAT, with the statement's line. */
+/* Returns EBPO_E_FORMAT with the line of the statement. */
 EBPO_PRINTF(2, 3)
 static ebpo_status fail_statement(const obj_reading *r, const char *format, ...)
 {
@@ -330,7 +331,7 @@ static ebpo_status fail_statement(const obj_reading *r, const char *format, ...)
                           r->line, text);
 }
 
-/* The next statement's first word; lets pages go now and then. */
+/* Reads the first word of the next statement. Releases pages now and then. */
 static bool ebpo_obj_step(obj_reading *r, ebpo_obj_word *word)
 {
     uint64_t at = (uint64_t)(r->text.at - (const char *)r->data);
@@ -343,22 +344,20 @@ static bool ebpo_obj_step(obj_reading *r, ebpo_obj_word *word)
     return more;
 }
 
-/* The second pass: faces, and under which names they stand. */
+/* The second pass: faces, and their materials and groups. */
 
-/* What the parts of a corner, v/vt/vn, behind the first are numbers of. */
+/* Index kinds of the second and third part of a corner, v/vt/vn. */
 static const ebpo_import_sort sort_of[2] = { EBPO_IMPORT_TEXTURE, EBPO_IMPORT_NORMALS };
 
 static ebpo_status fail_corner(const obj_reading *r, ebpo_obj_word word)
 {
     char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
-    return fail_statement(r,
-                          "a face has the corner '%s', but it takes v, v/vt, v//vn or v/vt/vn; "
-                          "repair the file",
+    return fail_statement(r, "invalid corner '%s' in a face; expected v, v/vt, v//vn or v/vt/vn",
                           text);
 }
 
-/* [+-] digits, up to `end` or a slash. */
+/* Reads [+-] digits, up to `end` or a slash. */
 static bool read_number(const char **at, const char *end, int64_t *number)
 {
     bool negative = *at < end && **at == '-';
@@ -372,7 +371,7 @@ static bool read_number(const char **at, const char *end, int64_t *number)
     return *at > first && (*at == end || **at == '/');
 }
 
-/* Numbers count from 1, or back from what stands before the face. */
+/* Converts an index that counts from 1, or back from the current position, to a row. */
 static bool obj_faces_resolve(const obj_reading *r, ebpo_import_sort sort, uint64_t total,
                               int64_t number, uint32_t *row)
 {
@@ -390,9 +389,9 @@ static ebpo_status obj_faces_fail_vertex(const obj_reading *r, int64_t number)
                               number, r->build->vertices);
     return number ? fail_statement(r,
                                    "a face names vertex %" PRId64 ", but only %" PRIu64
-                                   " stand before it; repair the file or drop the face",
+                                   " precede it; repair the file or drop the face",
                                    number, r->rows[EBPO_IMPORT_COLOURS])
-                  : fail_statement(r, "a face names vertex 0, but they count from 1; repair the "
+                  : fail_statement(r, "a face names vertex 0, but indices begin at 1; repair the "
                                       "file");
 }
 
@@ -413,7 +412,7 @@ static ebpo_status add_corner(obj_reading *r, const uint64_t total[EBPO_IMPORT_S
     for (int i = 0; i < 2 && at < end; i++) {
         ebpo_import_sort sort = sort_of[i];
         at++;
-        if (at == end || *at == '/') /* not given */
+        if (at == end || *at == '/') /* not present */
             continue;
         if (!read_number(&at, end, &number))
             return fail_corner(r, word);
@@ -441,7 +440,7 @@ static ebpo_status read_face(obj_reading *r, const uint64_t total[EBPO_IMPORT_SO
     return status;
 }
 
-/* Faces so far have the material so far. */
+/* Gives the current material to all faces so far that have none. */
 static ebpo_status use_material(obj_reading *r)
 {
     ebpo_import_build *b = r->build;
@@ -459,7 +458,8 @@ static ebpo_status begin_run(obj_reading *r)
     return r->runs ? ebpo_obj_runs_add(r->runs, name, r->build->name, r->build->error) : EBPO_OK;
 }
 
-/* Free-form geometry, points and lines; and what says how these are drawn, which no mesh needs. */
+/* Returns true for free-form geometry, points, lines and their display attributes, which a mesh
+ * cannot hold. */
 static bool is_curve(ebpo_obj_word word)
 {
     static const char *const words[] = { "p",    "l",    "vp",    "cstype", "deg",  "bmat",
@@ -520,7 +520,7 @@ static ebpo_status read_statement(obj_reading *r, const uint64_t total[EBPO_IMPO
     return EBPO_OK;
 }
 
-/* The faces, with what is said on the way. Errors are those of ebpo_import_memory. */
+/* Reads the faces and their statements. Returns the errors of ebpo_import_memory. */
 static ebpo_status ebpo_obj_read_faces(obj_reading *r)
 {
     ebpo_import_build *b = r->build;
@@ -539,23 +539,22 @@ static ebpo_status ebpo_obj_read_faces(obj_reading *r)
                : status;
 }
 
-/* The first pass: what faces name. Faces may name what comes later, so they are a pass of their
- * own.
- */
+/* The first pass: vertices, normals and texture coordinates. Faces may refer to later values and
+ * need a second pass. */
 
-enum { MOST_WORDS = 8 };
+enum { MAX_WORDS = 8 };
 
-static int read_words(obj_reading *r, ebpo_obj_word word[MOST_WORDS])
+static int read_words(obj_reading *r, ebpo_obj_word word[MAX_WORDS])
 {
     int n = 0;
-    while (n < MOST_WORDS && ebpo_obj_next_word(&r->text, &word[n]))
+    while (n < MAX_WORDS && ebpo_obj_next_word(&r->text, &word[n]))
         n++;
     return n;
 }
 
 /* --- vertices --- */
 
-/* Numbers of as many words; false: *bad is none. */
+/* Parses n numbers. On failure returns false and sets *bad to the invalid word. */
 static bool read_floats(const obj_reading *r, const ebpo_obj_word *word, int n, float *value,
                         int *bad)
 {
@@ -577,11 +576,11 @@ static ebpo_status obj_fail_vertex(const obj_reading *r, ebpo_obj_word word)
 {
     char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
-    return fail_statement(r, "no number: '%s' in vertex %" PRIu64 "; repair the file", text,
+    return fail_statement(r, "invalid number '%s' in vertex %" PRIu64 "; repair the file", text,
                           r->build->vertices + 1);
 }
 
-/* Homogeneous coordinates, as w is where it is no 1. */
+/* Divides homogeneous coordinates by w. */
 static ebpo_status obj_divide(obj_reading *r, const ebpo_obj_word word[4], double xyz[3])
 {
     double w;
@@ -593,7 +592,7 @@ static ebpo_status obj_divide(obj_reading *r, const ebpo_obj_word word[4], doubl
     return EBPO_OK;
 }
 
-/* A vertex has the row of its own number. */
+/* Adds the colour of a vertex, in the row of the vertex. */
 static ebpo_status add_colour(obj_reading *r, const ebpo_obj_word word[3], bool coloured)
 {
     static const float none[3] = { 0, 0, 0 };
@@ -617,16 +616,16 @@ static ebpo_status add_colour(obj_reading *r, const ebpo_obj_word word[3], bool 
                              : status;
 }
 
-/* x y z, x y z w, x y z red green blue, or these with an alpha. */
+/* Reads x y z, x y z w, x y z red green blue, or these with an alpha. */
 static ebpo_status read_vertex(obj_reading *r)
 {
-    ebpo_obj_word word[MOST_WORDS];
+    ebpo_obj_word word[MAX_WORDS];
     double xyz[3];
     int n = read_words(r, word), bad;
     if (n < 3)
         return fail_statement(r,
-                              "vertex %" PRIu64 " has %d coordinates, not three; write z as well "
-                              "(0 in a plane), or repair the file",
+                              "vertex %" PRIu64 " has %d coordinates, expected 3; add z (0 in a "
+                              "plane), or repair the file",
                               r->build->vertices + 1, n);
     if (!read_position(r, word, xyz, &bad))
         return obj_fail_vertex(r, word[bad]);
@@ -642,7 +641,7 @@ static ebpo_status read_vertex(obj_reading *r)
 
 static ebpo_status read_row(obj_reading *r, ebpo_import_sort sort)
 {
-    ebpo_obj_word word[MOST_WORDS];
+    ebpo_obj_word word[MAX_WORDS];
     float value[3] = { 0, 0, 0 };
     int bad, n, wanted = sort == EBPO_IMPORT_NORMALS ? 3 : 1;
     r->rows[sort]++;
@@ -673,22 +672,20 @@ static ebpo_status read_values(obj_reading *r)
     return status;
 }
 
-/* --- what is left out --- */
+/* --- omitted data --- */
 
-/* What concerns those who read the mesh alone, too. */
+/* Notes data that also matter to callers that read only the mesh. */
 static void note_unread(const obj_reading *r, ebpo_attributes *to)
 {
     const obj_losses *l = &r->losses;
-    ebpo_attributes_count_unread(
-        to, "texture coordinates that corners of faces name and that are not in the file",
-        l->absent[EBPO_IMPORT_TEXTURE]);
-    ebpo_attributes_count_unread(to,
-                                 "normals that corners of faces name and that are not in the file",
+    ebpo_attributes_count_unread(to, "texture coordinates that faces refer to but the file lacks",
+                                 l->absent[EBPO_IMPORT_TEXTURE]);
+    ebpo_attributes_count_unread(to, "normals that faces refer to but the file lacks",
                                  l->absent[EBPO_IMPORT_NORMALS]);
-    ebpo_attributes_count_unread(to, "weights of vertices, by which coordinates were divided",
+    ebpo_attributes_count_unread(to, "weights of vertices (coordinates are divided by them)",
                                  l->weights);
-    ebpo_attributes_count_unread(to, "vertices' values beyond coordinates and colours", l->surplus);
-    ebpo_attributes_count_unread(to, "points, lines, curves and surfaces, which are no faces",
+    ebpo_attributes_count_unread(to, "vertex values beyond coordinates and colours", l->surplus);
+    ebpo_attributes_count_unread(to, "points, lines, curves and surfaces, which are not faces",
                                  l->curves);
     if (l->unknown)
         ebpo_attributes_note_unread(to,
@@ -699,21 +696,21 @@ static void note_unread(const obj_reading *r, ebpo_attributes *to)
 static void note_losses(const obj_reading *r, ebpo_attributes *to)
 {
     const obj_losses *l = &r->losses;
-    if (l->third) /* only two have names */
+    if (l->third) /* only two components have names */
         ebpo_attributes_lose(to, "the third texture coordinate");
     if (l->uncoloured)
         ebpo_attributes_lose(to, "that %" PRIu64 " vertices have no colours", l->uncoloured);
     if (l->alpha)
-        ebpo_attributes_lose(to, "how opaque vertices are");
+        ebpo_attributes_lose(to, "opacity of vertices");
     if (l->no_numbers)
         ebpo_attributes_lose(to,
-                             "%" PRIu64 " colours, normals or texture coordinates that are no "
+                             "%" PRIu64 " colours, normals or texture coordinates that are not "
                              "numbers",
                              l->no_numbers);
     if (l->smoothing)
         ebpo_attributes_lose(to, "smoothing groups");
     if (l->library)
-        ebpo_attributes_lose(to, "what the material library says (colours and the like)");
+        ebpo_attributes_lose(to, "material properties in the library (colours and the like)");
 }
 
 static bool any_unread(const obj_losses *l)
@@ -765,7 +762,7 @@ static ebpo_status build_obj(ebpo_import_build *b, const ebpo_import_job *job)
     return status;
 }
 
-/* An OBJ file has no mark: its first word is one of those that such files begin with. */
+/* Returns true if the first word begins an OBJ statement. OBJ files have no magic number. */
 static bool begins_as_obj(const uint8_t *data, uint64_t size)
 {
     static const char *const words[] = { "v", "vt", "vn", "vp",     "f",

@@ -1,6 +1,6 @@
-/* Reading OFF files, by words: rows may go over lines, and lines hold several rows. Sources: the
- * manual of Geomview 1.9.4, "OFF Files"; CGAL and MeshLab, whose colours are of three or four
- * values. */
+/* Reads OFF files by words: rows may span lines, and a line may hold several rows. Sources: the
+ * manual of Geomview 1.9.4, "OFF Files"; CGAL and MeshLab, whose colours have three or four values.
+ */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -22,7 +22,7 @@
 
 typedef struct off_text {
     const char *at, *end;
-    uint64_t line; /* of `at`, from 1 */
+    uint64_t line; /* line of `at`, from 1 */
 } off_text;
 
 typedef struct off_word {
@@ -34,15 +34,15 @@ static bool ends_line(char c) { return c == '\n' || c == '\r'; }
 
 static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 
-/* A comment may follow a word without a blank; in 1.#INF and 1.#IND, as older programs write what
- * is not finite, no comment begins. */
+/* Returns true if a comment begins. A comment may follow a word without a blank, but not in 1.#INF
+ * and 1.#IND, which older programs write for non-finite values. */
 static bool begins_comment(const char *word, const char *at, const char *end)
 {
     return *at == '#' && !(at - word >= 2 && at[-2] == '1' && at[-1] == '.' && end - at > 1 &&
                            at[1] && strchr("IQS", at[1]));
 }
 
-/* The next word of this line; false at its end. */
+/* Reads the next word of this line. Returns false at its end. */
 static bool next_word_here(off_text *t, off_word *word)
 {
     while (t->at < t->end && is_blank(*t->at))
@@ -58,7 +58,7 @@ static bool next_word_here(off_text *t, off_word *word)
     return word->n > 0;
 }
 
-/* False at the end of the file. */
+/* Moves to the next line. Returns false at the end of the file. */
 static bool next_line(off_text *t)
 {
     if (t->at == t->end)
@@ -68,7 +68,7 @@ static bool next_line(off_text *t)
     return true;
 }
 
-/* The next word, past comments and ends of lines; false at the end of the file. */
+/* Reads the next word, past comments and line ends. Returns false at the end of the file. */
 static bool next_word(off_text *t, off_word *word)
 {
     while (!next_word_here(t, word))
@@ -77,7 +77,7 @@ static bool next_word(off_text *t, off_word *word)
     return true;
 }
 
-/* Lines that have words, from the next line on. */
+/* Counts non-empty lines, from the next line on. */
 static uint64_t count_lines(const off_text *t)
 {
     off_text ahead = *t;
@@ -93,24 +93,24 @@ static uint64_t count_lines(const off_text *t)
     } while (true);
 }
 
-enum { MOST_REST = 16, RELEASE = 1 << 22 };
+enum { MAX_REST = 16, RELEASE = 1 << 22 };
 
-/* How rows lie in lines, told from how many of each there are. */
+/* How rows are arranged in lines, derived from the two counts. */
 typedef enum rows_in { ROW_A_LINE, ROWS_OVER_LINES, ROWS_ANYHOW } rows_in;
 
 typedef struct off_reading {
     ebpo_import_build *build;
     const char *begin;
     off_text text;
-    uint64_t next_release; /* byte */
+    uint64_t next_release; /* byte offset */
     uint64_t size, vertices, faces;
-    bool normals, colours, texture, weights; /* what vertices have */
+    bool normals, colours, texture, weights; /* values that vertices have */
     rows_in rows;
-    off_word rest[MOST_REST]; /* of the row, beyond what it has to have */
+    off_word rest[MAX_REST]; /* extra words of the row */
     int rest_count;
-    bool broken;                                       /* colours are no whole numbers */
-    float most;                                        /* of colours */
-    uint64_t surplus_vertices, surplus_faces, indexed; /* rows with values that are not kept */
+    bool broken;                                       /* a colour is not an integer */
+    float most;                                        /* greatest colour value */
+    uint64_t surplus_vertices, surplus_faces, indexed; /* rows with omitted values */
     uint64_t divided;
     bool alpha, both, more;
 } off_reading;
@@ -130,8 +130,8 @@ static ebpo_status off_fail(const off_reading *r, const char *format, ...)
 
 /* --- head --- */
 
-/* Reads ST, C, N, 4 and n in this order, then OFF, and returns their length; 0: they are not there.
- * ModelNet's files have the first count behind them, without a blank: OFF8. */
+/* Reads ST, C, N, 4 and n in this order, then OFF. Returns their length, or 0 when they are
+ * missing. In ModelNet's files the first count follows without a blank: OFF8. */
 static size_t read_kind(off_word word, off_reading *r, bool *dimension)
 {
     const char *s = word.s, *end = s + word.n;
@@ -157,8 +157,8 @@ static size_t read_kind(off_word word, off_reading *r, bool *dimension)
     return named ? (size_t)(s + 3 - word.s) : 0;
 }
 
-/* True where a file begins with the word OFF, with letters before it that say what vertices have.
- */
+/* Returns true if the file begins with the word OFF, optionally prefixed by letters that declare
+ * the vertex values. */
 static bool has_off_word(const uint8_t *data, uint64_t size)
 {
     off_text t = { (const char *)data + ebpo_text_mark(data, size), (const char *)data + size, 1 };
@@ -182,10 +182,11 @@ static bool read_count(off_word word, uint64_t *value)
 static ebpo_status fail_counts(const off_reading *r)
 {
     return off_fail(r,
-                    "no counts of vertices, faces and edges follow the word OFF; repair the file");
+                    "counts of vertices, faces and edges expected after the word OFF; repair the "
+                    "file");
 }
 
-/* Edges: on the line of the faces, or alone on the next one; some programs leave their count out.
+/* Reads the edge count: on the line of the faces, or alone on the next one. Some programs omit it.
  */
 static void read_edges(off_reading *r)
 {
@@ -198,8 +199,8 @@ static void read_edges(off_reading *r)
         r->text = ahead;
 }
 
-/* Where there are as many lines as rows, a row has a line; where there are more, rows go over
- * lines; where there are fewer, a line has several rows. */
+/* Determines the arrangement: as many lines as rows means one row per line; more lines mean that
+ * rows span lines; fewer lines mean several rows per line. */
 static ebpo_status find_rows(off_reading *r)
 {
     off_text here = r->text;
@@ -216,7 +217,7 @@ static ebpo_status read_head(off_reading *r)
     off_word word;
     bool dimension = false;
     if (!next_word(&r->text, &word))
-        return off_fail(r, "the file is empty; there is no mesh in it");
+        return off_fail(r, "the file is empty and contains no mesh");
     off_text behind = r->text;
     size_t named = read_kind(word, r, &dimension);
     if (named) {
@@ -228,18 +229,18 @@ static ebpo_status read_head(off_reading *r)
                                   "is a binary OFF file; save it as text, or as PLY");
         if (dimension)
             return ebpo_fail_file(r->build->error, EBPO_E_UNSUPPORTED, r->build->name,
-                                  "line %" PRIu64 ": its points have a number of dimensions of "
-                                  "their own (nOFF); save it with three",
+                                  "line %" PRIu64 ": its points have their own number of "
+                                  "dimensions (nOFF); save it with three "
+                                  "dimensions",
                                   behind.line);
         word = next;
         if (!more)
             return fail_counts(r);
     }
     if (!read_count(word, &r->vertices))
-        return named
-                   ? fail_counts(r)
-                   : off_fail(r, "neither the word OFF nor counts stand there; this is not an OFF "
-                                 "file that can be read");
+        return named ? fail_counts(r)
+                     : off_fail(r, "expected the word OFF or counts; this is not a readable OFF "
+                                   "file");
     if (!next_word(&r->text, &word) || !read_count(word, &r->faces))
         return fail_counts(r);
     read_edges(r);
@@ -262,24 +263,24 @@ static void let_go(off_reading *r)
     r->next_release = at + RELEASE;
 }
 
-/* A word that the row has to have. `first`: it may stand on a line of its own. */
+/* Reads a required word of the row. `first`: it may be on a new line. */
 static bool next_needed(off_reading *r, bool first, off_word *word)
 {
     return first || r->rows != ROW_A_LINE ? next_word(&r->text, word)
                                           : next_word_here(&r->text, word);
 }
 
-/* What else the line has; where lines have several rows, that is the next ones. */
+/* Reads the rest of the line. With several rows per line, the rest belongs to the next rows. */
 static void take_rest(off_reading *r)
 {
     off_word word;
     r->rest_count = 0;
     while (r->rows != ROWS_ANYHOW && next_word_here(&r->text, &word))
-        if (r->rest_count < MOST_REST)
+        if (r->rest_count < MAX_REST)
             r->rest[r->rest_count++] = word;
 }
 
-/* Numbers of the rest from `first` on, into a row of a table. */
+/* Stores the numbers of the rest, from `first` on, in a row of a table. */
 static ebpo_status off_keep(off_reading *r, ebpo_import_sort sort, int first, bool *good)
 {
     float value[3] = { 0, 0, 0 };
@@ -290,7 +291,7 @@ static ebpo_status off_keep(off_reading *r, ebpo_import_sort sort, int first, bo
         *good = ebpo_import_value(r->build, &value[k], word.s, word.n);
         if (sort != EBPO_IMPORT_COLOURS)
             continue;
-        /* the range first, in this way: what is not a number has no int */
+        /* checks the range first: converting NaN to int is undefined */
         bool byte = value[k] >= 0 && value[k] <= 255;
         r->broken |= memchr(word.s, '.', word.n) || !byte || value[k] != (float)(int)value[k];
         r->most = value[k] > r->most ? value[k] : r->most;
@@ -298,7 +299,7 @@ static ebpo_status off_keep(off_reading *r, ebpo_import_sort sort, int first, bo
     return r->build->attributes ? ebpo_import_row(r->build, sort, value) : EBPO_OK;
 }
 
-/* Normals, then colours of three or four values, then texture coordinates. */
+/* Stores normals, then colours of three or four values, then texture coordinates. */
 static ebpo_status keep_rest(off_reading *r)
 {
     int at = r->normals ? 3 : 0, left = r->rest_count - at - (r->texture ? 2 : 0);
@@ -331,7 +332,7 @@ static ebpo_status fail_end(const off_reading *r, const char *what, uint64_t row
                           what, row);
 }
 
-/* Where rows are anyhow in lines, what vertices have must follow from the first word. */
+/* Reads the vertex values declared by the first word when rows and lines do not correspond. */
 static ebpo_status take_rest_anyhow(off_reading *r, uint64_t row)
 {
     int wanted = (r->normals ? 3 : 0) + (r->colours ? 4 : 0) + (r->texture ? 2 : 0);
@@ -349,7 +350,7 @@ static ebpo_status fail_number(const off_reading *r, off_word word, uint64_t row
 {
     char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
-    return off_fail(r, "no number: '%s' in vertex %" PRIu64 "; repair the file", text, row);
+    return off_fail(r, "invalid number '%s' in vertex %" PRIu64 "; repair the file", text, row);
 }
 
 static ebpo_status read_vertex(off_reading *r, uint64_t row)
@@ -378,7 +379,8 @@ static ebpo_status read_vertex(off_reading *r, uint64_t row)
     return status == EBPO_OK ? keep_rest(r) : status;
 }
 
-/* One value is a place in a table of colours that no file has. */
+/* Stores the colours of a face. A single value is an index into a colour table that no file
+ * contains. */
 static ebpo_status keep_face(off_reading *r, uint32_t *row)
 {
     ebpo_import_table *t = &r->build->table[EBPO_IMPORT_COLOURS];
@@ -434,10 +436,10 @@ static ebpo_status read_face(off_reading *r, uint64_t row)
     if (!next_needed(r, true, &word))
         return fail_end(r, "face", row);
     if (!read_count(word, &corners) || !corners)
-        return off_fail(r, "face %" PRIu64 " has no number of corners; repair the file", row);
+        return off_fail(r, "face %" PRIu64 " has no corner count; repair the file", row);
     if (corners > r->size / 2)
         return off_fail(r,
-                        "face %" PRIu64 " has %" PRIu64 " corners, more than fit into the file; "
+                        "face %" PRIu64 " has %" PRIu64 " corners, more than the file can hold; "
                         "repair it",
                         row, corners);
     ebpo_status status = EBPO_OK;
@@ -452,7 +454,7 @@ static ebpo_status read_face(off_reading *r, uint64_t row)
     return status == EBPO_OK ? ebpo_import_polygon(b) : status;
 }
 
-/* --- all of it --- */
+/* --- the file --- */
 
 static ebpo_status note_unread(off_reading *r)
 {
@@ -462,26 +464,26 @@ static ebpo_status note_unread(off_reading *r)
     if (!any || status != EBPO_OK)
         return status;
     ebpo_attributes_count_unread(mesh->attributes,
-                                 "weights of vertices, by which coordinates were divided",
+                                 "weights of vertices (coordinates are divided by them)",
                                  r->divided);
     ebpo_attributes_count_unread(mesh->attributes,
-                                 "vertices' values that the file's first word does not say",
+                                 "vertex values that the file's first word does not declare",
                                  r->surplus_vertices);
-    ebpo_attributes_count_unread(mesh->attributes, "faces' values that are no colours",
+    ebpo_attributes_count_unread(mesh->attributes, "face values that are not colours",
                                  r->surplus_faces);
     if (r->more)
-        ebpo_attributes_note_unread(mesh->attributes, "what follows the last face");
+        ebpo_attributes_note_unread(mesh->attributes, "text after the last face");
     return EBPO_OK;
 }
 
 static void note_losses(const off_reading *r, ebpo_attributes *to)
 {
     if (r->alpha)
-        ebpo_attributes_lose(to, "how opaque colours are");
+        ebpo_attributes_lose(to, "opacity of colours");
     if (r->both)
-        ebpo_attributes_lose(to, "colours of faces (vertices have some too)");
+        ebpo_attributes_lose(to, "colours of faces (vertices also have colours)");
     if (r->indexed)
-        ebpo_attributes_lose(to, "colours of faces that are numbers in a table");
+        ebpo_attributes_lose(to, "colours of faces that are indices into a table");
 }
 
 static ebpo_status read_rows(off_reading *r)
@@ -497,7 +499,7 @@ static ebpo_status read_rows(off_reading *r)
     if (status == EBPO_OK)
         r->more = next_word(&r->text, &word);
     if (status == EBPO_OK && r->more && r->rows == ROWS_ANYHOW)
-        status = off_fail(r, "there is more behind the last face, though lines have several rows; "
+        status = off_fail(r, "there is text after the last face, though lines hold several rows; "
                              "repair the counts");
     return status;
 }

@@ -1,7 +1,7 @@
-/* Turning faces so that neighbours agree. Faces joined by edges with two faces form patches, of
- * which one decides the direction of all; edges with more than two faces are paired by the angle
- * around them. Each closed patch is then turned outwards, or inwards where it bounds a cavity
- * (shell_nesting.c). Decisions are exact, and do not depend on threads. */
+/* Makes neighbouring faces consistent. Faces joined by edges with two faces form patches; one face
+ * decides the direction of its patch. Edges with more than two faces are paired by the angle around
+ * them. Each closed patch is then turned outwards, or inwards if it bounds a cavity
+ * (shell_nesting.c). Decisions are exact and do not depend on threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,10 +18,10 @@
 
 enum { FACE_GRAIN = 1 << 14, VERTEX_GRAIN = 1 << 13 };
 
-/* What is found at faces, and in the end of their patch. OPEN: edges with more than two faces do
- * not balance within it; BOUNDARY: it has an edge with one face. The others are of patches that
- * are joined around edges with more than two faces: ROOT: was a patch before; CONTRADICTED: faces
- * around its edges cannot alternate; SEPARATE: is to be a patch again. */
+/* Flags of faces, collected at the root of their patch. OPEN: edges with more than two faces do not
+ * balance within the patch; BOUNDARY: it has an edge with one face. The others are for patches
+ * joined around edges with more than two faces: ROOT: was a patch before; CONTRADICTED: faces
+ * around its edges cannot alternate; SEPARATE: becomes a separate patch again. */
 enum {
     OPEN = 1,
     INCONSISTENT = 2,
@@ -33,17 +33,17 @@ enum {
     SEPARATE = 128
 };
 
-/* A patch that is to be made consistent: faces connected by edges that are used exactly twice, or
- * around edges that are used oftener, where that closes it (join_crowded). */
+/* A patch to make consistent: faces connected by edges that are used exactly twice, or around edges
+ * that are used more often if that closes the patch (join_crowded). */
 typedef struct patch {
     uint32_t root;
     uint32_t seed;          /* its first face in the source, which decides when nothing else does */
     bool closed;            /* every edge has a face on its other side */
     bool seed_turned;       /* it runs against the root */
-    bool turn_others;       /* the faces that run as the seed does are the ones to turn */
-    uint64_t count, turned; /* faces; those that run against the root */
-    ebpo_sum volume;        /* six times, with all faces running as the root does */
-    double most;            /* of its terms */
+    bool turn_others;       /* turn the faces that run as the seed does */
+    uint64_t count, turned; /* faces; faces that run against the root */
+    ebpo_sum volume;        /* six times the volume, with all faces oriented like the root */
+    double most;            /* largest of its terms */
 } patch;
 
 typedef struct orienting orienting;
@@ -51,28 +51,28 @@ typedef ebpo_status (*edge_fn)(orienting *o, const ebpo_link *links, uint64_t us
                                unsigned worker, ebpo_error *error);
 
 struct orienting {
-    const ebpo_mesh *mesh; /* whose faces are turned in the end */
+    const ebpo_mesh *mesh; /* the mesh whose faces are turned */
     unsigned threads;
-    edge_fn visit; /* what is done at edges, or at those with more than two faces only */
+    edge_fn visit; /* called at edges, or only at those with more than two faces */
     bool crowded_only;
-    ebpo_mesh_frame frame; /* of volumes, of which signs count */
+    ebpo_mesh_frame frame; /* frame for volumes, whose signs are used */
     ebpo_stars stars;
     ebpo_star *star;         /* one for each thread */
     ebpo_edge_faces *around; /* one for each thread */
-    bool crowded;            /* edges with more than two faces were met */
-    /* [face_count] a lower face of the patch, or itself: number << 1 | 1 when the two run against
+    bool crowded;            /* there are edges with more than two faces */
+    /* [face_count] a lower face of the patch, or itself: index << 1 | 1 when the two run against
      * each other */
     uint64_t *above;
     uint8_t *flags; /* [face_count] */
-    patch *patches; /* by root */
+    patch *patches; /* sorted by root */
     uint64_t patch_count, patch_capacity;
     uint64_t flipped, unorientable;
-    pthread_mutex_t lock; /* of the patches' volumes */
+    pthread_mutex_t lock; /* for the volumes of the patches */
 };
 
 /* --- joining faces to patches --- */
 
-/* Root of f << 1 | 1 when f runs against it. Paths are halved on the way; any thread may do so. */
+/* Returns the root of f << 1 | 1 when f runs against it. Halves the path; any thread may do so. */
 static uint64_t find_root(uint64_t *above, uint32_t f)
 {
     for (uint64_t turned = 0;;) {
@@ -88,8 +88,8 @@ static uint64_t find_root(uint64_t *above, uint32_t f)
     }
 }
 
-/* The higher root goes below the lower one, so that the roots are the same in any order. False when
- * the faces are in one patch already, the other way round. */
+/* Links the higher root to the lower one, so the roots do not depend on the order. Returns false if
+ * the faces are already in one patch with the opposite orientation. */
 static bool orient_join(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned)
 {
     for (;;) {
@@ -109,7 +109,7 @@ static void orient_flag(orienting *o, uint32_t face, uint8_t flags)
     __atomic_fetch_or(&o->flags[face], flags, __ATOMIC_RELAXED);
 }
 
-/* The uses of one edge. */
+/* Visits the uses of one edge. */
 static void visit_edge(orienting *o, const ebpo_link *links, uint64_t uses)
 {
     uint32_t a = ebpo_link_face(&links[0]), b = ebpo_link_face(&links[uses - 1]);
@@ -196,8 +196,7 @@ static void free_stars(orienting *o)
     ebpo_stars_free(&o->stars);
 }
 
-/* Each face is put below its root directly, which learns what was found at it. Roots come before
- * what is below them. */
+/* Links each face directly to its root, which collects the flags. Roots precede their faces. */
 static void gather_flags(orienting *o)
 {
     EBPO_FOR_ITEMS_SCATTERED(o->mesh->workspace, f, 0, o->mesh->face_count) {
@@ -209,7 +208,7 @@ static void gather_flags(orienting *o)
 
 /* --- edges with more than two faces --- */
 
-/* Returns the patch of a face, shifted, and 1 when it runs against it. */
+/* Returns the patch of a face, shifted by 1, plus 1 when it runs against the patch. */
 static uint64_t patch_at(const orienting *o, uint32_t face)
 {
     return __atomic_load_n(&o->flags[face], __ATOMIC_RELAXED) & ROOT
@@ -217,7 +216,7 @@ static uint64_t patch_at(const orienting *o, uint32_t face)
                : __atomic_load_n(&o->above[face], __ATOMIC_RELAXED);
 }
 
-/* Lists the faces at an edge that may be used: `joined`: with the patch that theirs is in now. */
+/* Lists the usable faces at an edge. `joined`: with their current patch. */
 static bool list_around(orienting *o, const ebpo_link *links, uint64_t uses, bool joined,
                         ebpo_edge_faces *e)
 {
@@ -267,8 +266,8 @@ static ebpo_status find_unbalanced(orienting *o, const ebpo_link *links, uint64_
     return EBPO_OK;
 }
 
-/* Faces of patches that are not closed by themselves alternate around the edge, as the boundary of
- * a solid does: what is within and what is outside take turns. */
+/* Joins faces of patches that are not closed by themselves, so that they alternate around the edge
+ * like the boundary of a solid: inside and outside take turns. */
 static ebpo_status join_around(orienting *o, const ebpo_link *links, uint64_t uses, uint32_t v,
                                unsigned worker, ebpo_error *error)
 {
@@ -296,8 +295,8 @@ static ebpo_status join_around(orienting *o, const ebpo_link *links, uint64_t us
     return EBPO_OK;
 }
 
-/* Patches whose joining did not close them are patches by themselves again. Those that alternate
- * around every edge as they are stay joined, whatever order layers in one plane were given. */
+/* Separates patches that joining did not close. Patches that already alternate around every edge
+ * stay joined, whatever the order of coplanar layers. */
 static void separate_patches(orienting *o)
 {
     const uint8_t bad = CONTRADICTED | UNBALANCED;
@@ -322,8 +321,8 @@ static void separate_patches(orienting *o)
     }
 }
 
-/* Joins patches around edges with more than two faces, where that closes them. A patch that is
- * closed by itself, such as a cube that shares an edge with another one, stays alone. */
+/* Joins patches around edges with more than two faces if that closes them. A patch that is closed
+ * by itself, such as a cube that shares an edge with another one, stays separate. */
 static ebpo_status join_crowded(orienting *o, ebpo_error *error)
 {
     EBPO_FOR_ITEMS(o->mesh->workspace, f, 0, o->mesh->face_count)
@@ -370,7 +369,8 @@ static bool list_patches(orienting *o)
     return true;
 }
 
-/* NULL for a face that stays as it is. `last`: the one found before, which is often the one. */
+/* Returns the patch to turn that contains the face, or NULL. `last`: the previous result, which is
+ * often the same. */
 static patch *patch_of(orienting *o, uint64_t f, patch *last)
 {
     uint32_t root = (uint32_t)(o->above[f] >> 1);
@@ -413,7 +413,7 @@ static void add_volume(orienting *o, patch *p, const ebpo_sum *sum, double most)
     pthread_mutex_unlock(&o->lock);
 }
 
-/* The sum is exact, so it does not matter which thread adds what. */
+/* Measures the patches. The sum is exact, so the order of additions by threads does not matter. */
 static ebpo_status orient_measure(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
@@ -478,7 +478,7 @@ static ebpo_status orient_flip(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Finds the patches: `above` and `flags` say of each face what its patch is. */
+/* Finds the patches; `above` and `flags` then describe each face's patch. */
 static ebpo_status find_patches(orienting *o, ebpo_error *error)
 {
     const ebpo_mesh *mesh = o->mesh;
@@ -515,7 +515,7 @@ static ebpo_status turn_patches(orienting *o, ebpo_error *error)
                : status;
 }
 
-/* Writes each face's patch if that is closed, else EBPO_NO_INDEX. */
+/* Writes each face's patch if it is closed, otherwise EBPO_NO_INDEX. */
 static ebpo_status list_closed(const orienting *o, uint32_t **closed, ebpo_error *error)
 {
     const ebpo_mesh *mesh = o->mesh;
@@ -550,8 +550,8 @@ ebpo_status ebpo_mesh_find_shells(const ebpo_mesh *mesh, unsigned threads, uint3
     return status;
 }
 
-ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_mend_record *record, uint32_t **closed,
-                                      ebpo_error *error)
+ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_repair_record *record,
+                                      uint32_t **closed, ebpo_error *error)
 {
     orienting o = { .mesh = mesh, .lock = PTHREAD_MUTEX_INITIALIZER };
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);

@@ -1,6 +1,6 @@
-/* The body of an ascii PLY file. Values are separated by white space, so a long list may span
- * several lines. Each row ends its line: what a line has beyond that, as MeshLab has written, is
- * left out and counted, or it would shift all that follows. */
+/* Reads the body of an ascii PLY file. White space separates values, so a long list may span
+ * several lines. A row ends with its line. Extra values on a line, as MeshLab has written, are
+ * counted and skipped; otherwise they would shift all following rows. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -14,15 +14,16 @@ typedef struct rows {
     ebpo_ply_parser *p;
     const ebpo_ply_element *element;
     uint64_t row;
-    uint64_t to; /* of attributes: of a face that of its first triangle */
+    uint64_t to; /* row of the attributes; for a face, the row of its first triangle */
     bool store;
-    bool once;     /* elements before the vertices are read twice: what is counted, is once */
-    uint64_t line; /* where the row began */
+    bool once;     /* false in the first pass over elements before the vertices, so that nothing is
+                    * counted twice */
+    uint64_t line; /* line where the row begins */
 } rows;
 
 static bool is_blank(uint8_t c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
-/* False at the end of the file. */
+/* Reads the next token. Returns false at the end of the file. */
 static bool next_token(ebpo_ply_parser *p, ebpo_ply_word *token)
 {
     const uint8_t *at = p->data + p->at, *end = p->data + p->size;
@@ -50,12 +51,12 @@ static ebpo_status next_integer(rows *r, int64_t *value)
     if (!next_token(r->p, &token))
         return ebpo_ply_fail_end(r->p, r->element, r->row);
     if (!ebpo_number_integer(value, token.s, token.n))
-        return fail_token(r, "no whole number:", token);
+        return fail_token(r, "invalid integer", token);
     return EBPO_OK;
 }
 
-/* Reads a coordinate that the header declares as a float. Where a float does not keep its text, a
- * mesh notes by how much it is rounded; points, of which nothing can be noted, get the double. */
+/* Reads a coordinate that the header declares as float. If float cannot hold the text exactly,
+ * notes the rounding error; points, which cannot carry a note, get the double. */
 static bool parse_float(ebpo_ply_parser *p, ebpo_ply_word token, double *value)
 {
     float narrow;
@@ -66,7 +67,7 @@ static bool parse_float(ebpo_ply_parser *p, ebpo_ply_word token, double *value)
     *value = (double)narrow;
     if (kept || !ebpo_number_double(&wide, token.s, token.n, p->c_locale))
         return true;
-    p->most_rounded = fmax(p->most_rounded, fabs(wide - *value));
+    p->max_rounded = fmax(p->max_rounded, fabs(wide - *value));
     if (p->strict)
         *value = wide;
     return true;
@@ -148,7 +149,7 @@ static ebpo_status read_list(rows *r, const ebpo_ply_property *property)
     if (count < 0)
         return ebpo_ply_fail(p, "%s %" PRIu64 " has a list of %" PRId64 " items; repair the file",
                              ebpo_ply_row_name(r->element), r->row, count);
-    if ((uint64_t)count > (p->size - p->at) / 2) { /* a blank and a digit each */
+    if ((uint64_t)count > (p->size - p->at) / 2) { /* a blank and a digit for each */
         return ebpo_ply_fail(
             p,
             "%s %" PRIu64 " has a list of %" PRId64
@@ -170,7 +171,8 @@ static ebpo_status read_property(rows *r, const ebpo_ply_property *property)
     if (!next_token(r->p, &token))
         return ebpo_ply_fail_end(r->p, r->element, r->row);
     if (r->store && property->role != EBPO_PLY_ROLE_NONE && !parse_coordinate(r, property, token))
-        return fail_token(r, property->type < EBPO_PLY_FLOAT32 ? "no whole number:" : "no number:",
+        return fail_token(r,
+                          property->type < EBPO_PLY_FLOAT32 ? "invalid integer" : "invalid number",
                           token);
     if (r->store && ebpo_ply_is_attribute(property))
         ebpo_ply_put_value(r->p, property, r->to,
@@ -180,7 +182,7 @@ static ebpo_status read_property(rows *r, const ebpo_ply_property *property)
 
 static bool ends_line(uint8_t c) { return c == '\n' || c == '\r'; }
 
-/* Whether the line goes on. */
+/* Returns true if the line has more text. */
 static bool more_here(ebpo_ply_parser *p)
 {
     while (p->at < p->size && is_blank(p->data[p->at]) && !ends_line(p->data[p->at]))
@@ -188,7 +190,8 @@ static bool more_here(ebpo_ply_parser *p)
     return p->at < p->size && !ends_line(p->data[p->at]);
 }
 
-/* A row that has gone on to another line has no values too many: an earlier one has too few. */
+/* Counts extra values at the end of a row. If the row spans lines, an earlier row has too few
+ * values: that is an error. */
 static ebpo_status end_row(rows *r)
 {
     ebpo_ply_parser *p = r->p;
@@ -197,12 +200,13 @@ static ebpo_status end_row(rows *r)
     while (more_here(p)) {
         next_token(p, &token);
         if (p->strict)
-            return fail_token(r, "a value more than the header describes:", token);
+            return fail_token(r, "more values than the header describes:", token);
         if (p->line != r->line)
             return ebpo_ply_fail(p,
-                                 "%s %" PRIu64 " began in line %" PRIu64 " and ends within this "
-                                 "one: a row has fewer values than the header describes, or more; "
-                                 "repair the file",
+                                 "%s %" PRIu64 " began in line %" PRIu64
+                                 " and ends within this line: a row has "
+                                 "too few or too many values; repair the "
+                                 "file",
                                  ebpo_ply_row_name(r->element), r->row, r->line);
         p->surplus_values += r->once;
     }
@@ -249,8 +253,7 @@ ebpo_status ebpo_ply_ascii_element(ebpo_ply_parser *p, const ebpo_ply_element *e
                .once = store,
                .store = store && (element->kind != EBPO_PLY_KIND_OTHER || p->lost) };
     ebpo_status status = EBPO_OK;
-    if (!element->properties) /* rows without values: nothing is written for them that we need to
-                                 see */
+    if (!element->properties) /* rows without values take no text */
         return EBPO_OK;
     for (; r.row < element->count && status == EBPO_OK; r.row++) {
         status = read_row(&r);

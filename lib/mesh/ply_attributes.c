@@ -1,5 +1,5 @@
-/* Properties of a PLY file's elements that are neither positions nor corners become arrays of
- * attributes: numbers and lists, each in the type that the file gives it (ply_parts.h). */
+/* Converts properties of PLY elements other than positions and corners to attribute arrays: numbers
+ * and lists, each in the type that the file declares (ply_parts.h). */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -24,7 +24,7 @@ static ebpo_status fail_rows(const ebpo_ply_parser *p, uint64_t bytes)
 
 /* --- which arrays --- */
 
-/* Words of a header as text of a file; false: too long, or no text. */
+/* Copies a word of the header. Returns false when it is too long or not valid text. */
 static bool take_word(char *to, size_t capacity, ebpo_ply_word word)
 {
     if (word.n == 0 || word.n >= capacity)
@@ -49,7 +49,7 @@ static bool take_names(char *to, size_t capacity, const ebpo_ply_property *prope
     return true;
 }
 
-/* Neighbours of one type whose names go together. */
+/* Returns the number of adjacent properties of one type whose names form a group. */
 static unsigned find_together(const ebpo_ply_property *property, uint64_t left)
 {
     ebpo_attribute_name names[4];
@@ -71,7 +71,8 @@ static void ply_attributes_lose(const ebpo_ply_parser *p, const ebpo_ply_element
     ebpo_attributes_lose(p->mesh->attributes, "property '%s' of '%s' (%s)", name, of, why);
 }
 
-/* Another element of its name has other rows: arrays are found by names. */
+/* Returns true if an element of the same name has another number of rows; arrays are found by name.
+ */
 static bool is_second(const ebpo_attributes *to, const ebpo_attribute *a, uint64_t rows)
 {
     for (uint64_t i = 0; i < to->count; i++)
@@ -92,14 +93,15 @@ static ebpo_status plan_array(ebpo_ply_parser *p, const ebpo_ply_element *elemen
         !take_names(a.names, sizeof a.names, property, columns) ||
         to->count == EBPO_ATTRIBUTE_ARRAYS) {
         ply_attributes_lose(p, element, property,
-                            "its name is too long or no text, or there are too many");
+                            "the name is too long or not valid text, or there are too many "
+                            "attributes");
         return EBPO_OK;
     }
     bool face = element->kind == EBPO_PLY_KIND_FACE;
     a.rows = face ? 0 : element->count;
     if (is_second(to, &a, a.rows)) {
         ply_attributes_lose(p, element, property,
-                            "a second element of this name, of another length");
+                            "another element has the same name and a different row count");
         return EBPO_OK;
     }
     ebpo_attribute *made = ebpo_attributes_add(to, &a);
@@ -121,7 +123,7 @@ static ebpo_status plan_element(ebpo_ply_parser *p, const ebpo_ply_element *elem
     for (uint64_t i = 0; i < element->properties && status == EBPO_OK;) {
         unsigned columns = 1;
         if (property[i].role == EBPO_PLY_ROLE_NONE && element->kind == EBPO_PLY_KIND_STRIPS) {
-            ply_attributes_lose(p, element, &property[i], "of strips");
+            ply_attributes_lose(p, element, &property[i], "not supported for triangle strips");
         } else if (property[i].role == EBPO_PLY_ROLE_NONE && element->count) {
             columns = find_together(property + i, element->properties - i);
             status = plan_array(p, element, property + i, columns);
@@ -190,7 +192,7 @@ ebpo_status ebpo_ply_put_list(ebpo_ply_parser *p, const ebpo_ply_property *prope
     if (!ebpo_attribute_reserve(p->mesh->workspace, a, row + 1, begin + count))
         return fail_rows(p, (begin + count) * bytes);
     a->ends[row] = begin + count;
-    *items = a->values ? a->values + begin * bytes : NULL; /* none as long as all rows are empty */
+    *items = a->values ? a->values + begin * bytes : NULL; /* NULL while all rows are empty */
     return EBPO_OK;
 }
 
@@ -241,8 +243,8 @@ uint64_t ebpo_ply_text_bits(ebpo_ply_parser *p, const ebpo_ply_property *propert
     ebpo_import_word_text(name, property->name.s, property->name.n);
     const ebpo_attribute *a = &p->mesh->attributes->array[property->attribute];
     ebpo_attributes_lose(p->mesh->attributes,
-                         "property '%s' of '%s' (row %" PRIu64 " has '%s', which is none of its "
-                         "type)",
+                         "property '%s' of '%s' (row %" PRIu64
+                         " has '%s', which does not fit its type)",
                          name, a->element, row, text);
     p->lost[property->attribute] = true;
     return 0;
@@ -307,7 +309,7 @@ void ebpo_ply_blank_faces(ebpo_ply_parser *p, uint64_t first)
 
 /* --- the end --- */
 
-/* The header says no more than the mesh. */
+/* Returns true if the header has no information beyond the mesh. */
 static bool is_plain(const ebpo_ply_header *h)
 {
     static const char *const names[] = { "x", "y", "z", "vertex_indices" };
@@ -325,7 +327,8 @@ static bool is_plain(const ebpo_ply_header *h)
     return true;
 }
 
-/* Lines as they are, each ended by one line feed; the first is "ply" and no more. */
+/* Copies the header lines unchanged, each ended by one line feed. The first line is exactly "ply".
+ */
 static ebpo_status take_header(ebpo_ply_parser *p)
 {
     ebpo_attributes *to = p->mesh->attributes;
@@ -353,7 +356,7 @@ ebpo_status ebpo_ply_attributes_end(ebpo_ply_parser *p)
         return EBPO_OK;
     ebpo_status status = is_plain(&p->header) ? EBPO_OK : take_header(p);
     if (p->header.encoding != EBPO_PLY_ASCII && p->at < p->size)
-        ebpo_attributes_lose(to, "%" PRIu64 " bytes behind the last element", p->size - p->at);
+        ebpo_attributes_lose(to, "%" PRIu64 " bytes after the last element", p->size - p->at);
     if (p->rounded)
         ebpo_attributes_lose(to, "digits of %" PRIu64 " values that the header declares as float",
                              p->rounded);

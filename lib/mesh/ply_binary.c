@@ -1,6 +1,6 @@
-/* The body of a binary PLY file, of either byte order. Rows of one size are read on all cores; the
- * others row by row, which also says what is wrong with a row. Positions become those of the mesh,
- * faces are divided into triangles, other properties go to the attributes.
+/* Reads the body of a binary PLY file, of either byte order. All cores read rows of equal size.
+ * Other rows are read one by one, which also locates errors. Positions go to the mesh, faces are
+ * divided into triangles, and other properties go to the attributes.
  *
  * Source: Greg Turk, "The PLY Polygon File Format", 1994. */
 #include "core/strict_fp.h"
@@ -62,7 +62,7 @@ static double load_number(const uint8_t *at, ebpo_ply_type type, bool swap)
     return value;
 }
 
-/* Floats go through as bits: not even the payload of a NaN changes. */
+/* Copies floats as bits, so the payload of a NaN does not change. */
 static void store_coordinate(ebpo_mesh *mesh, uint64_t row, const ebpo_ply_property *property,
                              const uint8_t *at, bool swap)
 {
@@ -85,8 +85,8 @@ typedef struct rows {
     ebpo_ply_parser *p;
     const ebpo_ply_element *element;
     uint64_t row;
-    uint64_t to; /* of attributes: of a face that of its first triangle */
-    bool swap;   /* the file's byte order is not the machine's */
+    uint64_t to; /* row of the attributes; for a face, the row of its first triangle */
+    bool swap;   /* the file's byte order differs from the machine's */
     bool store;
 } rows;
 
@@ -152,7 +152,7 @@ static ebpo_status read_list(rows *r, const ebpo_ply_property *property)
     return status;
 }
 
-/* The row's number among attributes, with room for it. */
+/* Sets the row's attribute index and reserves space for it. */
 static ebpo_status begin_row(rows *r)
 {
     bool face = r->element->kind == EBPO_PLY_KIND_FACE;
@@ -190,7 +190,7 @@ static ebpo_status read_row(rows *r)
     return EBPO_OK;
 }
 
-/* Rows of one size need no reading to be stepped over. */
+/* Skips rows of equal size without reading them. */
 static ebpo_status step_over(rows *r)
 {
     ebpo_ply_parser *p = r->p;
@@ -229,23 +229,23 @@ ebpo_status ebpo_ply_binary_element(ebpo_ply_parser *p, const ebpo_ply_element *
     return status;
 }
 
-/* Rows of one size, on all cores: vertices without lists, and faces as long as each is a triangle.
- */
+/* Reads rows of equal size on all cores: vertices without lists, and faces while each is a
+ * triangle. */
 
 enum { GRAIN = 1 << 14 };
 
 typedef struct plain {
     ebpo_ply_parser *p;
     const ebpo_ply_element *element;
-    const ebpo_ply_property *corners; /* faces */
-    uint64_t row_bytes, corners_at;   /* in a row */
-    uint64_t first;                   /* face of the mesh that row 0 becomes */
-    uint64_t deviates;                /* the first row that is no triangle of vertices that exist */
+    const ebpo_ply_property *corners; /* for faces */
+    uint64_t row_bytes, corners_at;   /* of a row */
+    uint64_t first;                   /* mesh face for row 0 */
+    uint64_t deviates;                /* first row that is not a triangle of existing vertices */
     ebpo_progress progress;
     bool swap;
 } plain;
 
-/* Reports rows as bytes of the file, as the row-by-row reader does. */
+/* Reports rows as bytes of the file, like the row-by-row reader. */
 static bool ply_binary_report(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     const plain *t = user;
@@ -289,7 +289,7 @@ static ebpo_status ply_binary_deviate(plain *t, uint64_t row)
     return EBPO_E_FORMAT;
 }
 
-/* The other properties of a row of a triangle. */
+/* Stores the other properties of a triangle's row. */
 static void put_face(const plain *t, uint64_t row, const uint8_t *at)
 {
     const ebpo_ply_property *property = t->p->header.property + t->element->first;
@@ -301,7 +301,8 @@ static void put_face(const plain *t, uint64_t row, const uint8_t *at)
     }
 }
 
-/* After a row that deviates nothing is where it was expected; those rows are read again. */
+/* Reads faces. After a row that deviates, offsets are wrong; the row-by-row reader reads those rows
+ * again. */
 static ebpo_status ply_binary_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                     ebpo_error *error)
 {
@@ -328,7 +329,7 @@ static ebpo_status ply_binary_faces(void *context, uint64_t begin, uint64_t end,
     return EBPO_OK;
 }
 
-/* Fills in what is known of rows of triangles; false when rows have another list, or would not fit.
+/* Fills in the layout of triangle rows. Returns false when rows have another list or would not fit.
  */
 static bool describe_triangles(plain *t)
 {
@@ -361,9 +362,9 @@ static ebpo_status ply_binary_run(plain *t, ebpo_task_fn task)
     return status == EBPO_E_CANCELLED ? ebpo_ply_fail_stopped(p) : status;
 }
 
-/* Reads the rows from p->at on as far as all have one size, and says how many these were: all
- * vertices or none; the faces before the first that is no triangle, or names a vertex that is not
- * there. The others, and what is wrong with them, are the row by row reader's. */
+/* Reads rows from p->at while all have one size, and sets *done to their number: all vertices or
+ * none; the faces before the first that is not a triangle or has an invalid vertex index. The
+ * row-by-row reader reads the others and reports their errors. */
 static ebpo_status read_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_element *element,
                                        bool swap, uint64_t *done)
 {

@@ -1,4 +1,4 @@
-/* Faces and strips of a PLY file become triangles. */
+/* Converts faces and strips of a PLY file to triangles. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -13,7 +13,7 @@
 #include "geometry/polygon.h"
 #include "mesh/ply_parts.h"
 
-#define MOST_FACES (UINT64_C(0xfffffffe))
+#define MAX_FACES (UINT64_C(0xfffffffe))
 
 ebpo_status ebpo_ply_reserve_corners(ebpo_ply_parser *p, uint64_t count)
 {
@@ -36,7 +36,7 @@ ebpo_status ebpo_ply_fail_index(const ebpo_ply_parser *p, const ebpo_ply_element
 static ebpo_status face_capacity(ebpo_ply_parser *p, uint64_t more)
 {
     ebpo_mesh *mesh = p->mesh;
-    if (more > MOST_FACES - mesh->face_count)
+    if (more > MAX_FACES - mesh->face_count)
         return ebpo_fail_file(p->error, EBPO_E_LIMIT, p->name,
                               "more than 2^32 - 2 triangles; split the model");
     if (!ebpo_array_grow(mesh->workspace, &mesh->faces, &p->face_capacity, mesh->face_count + more,
@@ -54,8 +54,8 @@ static void add_triangle(ebpo_mesh *mesh, uint32_t a, uint32_t b, uint32_t c)
     face[2] = c;
 }
 
-/* Scratch holds, one behind the other: corner positions, triangles, and what the triangulation asks
- * for. */
+/* Reserves scratch memory for corner positions, triangles and the workspace of the triangulation,
+ * in this order. */
 static ebpo_status scratch_capacity(ebpo_ply_parser *p, uint64_t n)
 {
     uint64_t each = 3 * sizeof(double) + 3 * sizeof(uint32_t) + sizeof(uint32_t), bytes;
@@ -83,7 +83,7 @@ static ebpo_status ply_faces_triangulate(ebpo_ply_parser *p, uint32_t n, uint64_
         return status;
     double(*position)[3] = p->scratch;
     uint32_t(*triangle)[3] = (uint32_t(*)[3])(position + n);
-    void *scratch = triangle + n + (n & 1); /* stays aligned for doubles */
+    void *scratch = triangle + n + (n & 1); /* keeps doubles aligned */
     for (uint32_t i = 0; i < n; i++)
         corner_position(p->mesh, p->corners[i], position[i]);
     ebpo_polygon_kind kind =
@@ -94,7 +94,7 @@ static ebpo_status ply_faces_triangulate(ebpo_ply_parser *p, uint32_t n, uint64_
         return ebpo_fail_file(
             p->error, EBPO_E_LIMIT, p->name,
             "face %" PRIu64 " is a concave polygon of %" PRIu32
-            " corners, too intricate to be cut into triangles here; triangulate it in the source",
+            " corners that could not be triangulated; triangulate it in the source",
             row, n);
     p->mesh->polygons_triangulated++;
     p->mesh->polygons_concave += kind == EBPO_POLYGON_CONCAVE;
@@ -114,7 +114,7 @@ ebpo_status ebpo_ply_add_polygon(ebpo_ply_parser *p, uint64_t row)
         return EBPO_OK;
     }
     if (p->corner_count > 3)
-        return p->corner_count > MOST_FACES
+        return p->corner_count > MAX_FACES
                    ? ebpo_fail_file(p->error, EBPO_E_LIMIT, p->name,
                                     "face %" PRIu64 " has more than 2^32 - 2 corners", row)
                    : ply_faces_triangulate(p, (uint32_t)p->corner_count, row);
@@ -124,8 +124,8 @@ ebpo_status ebpo_ply_add_polygon(ebpo_ply_parser *p, uint64_t row)
     return status;
 }
 
-/* Every second triangle of a strip runs the other way. Triangles that repeat a vertex are the glue
- * between parts of a strip, not faces. */
+/* Adds the triangles of a strip. Every second one has the opposite orientation. Triangles that
+ * repeat a vertex join parts of a strip and are skipped. */
 static void ply_faces_unroll(ebpo_mesh *mesh, const uint32_t *v, uint64_t n)
 {
     mesh->strips++;
@@ -159,18 +159,19 @@ ebpo_status ebpo_ply_add_strip(ebpo_ply_parser *p, uint64_t row)
     return status;
 }
 
-/* Vertices that no face names and whose coordinates are not finite, as scanners write them for what
- * they have not seen: they are left out, as OBJ and OFF leave out all that no face names. */
+/* Removes vertices that no face uses and whose coordinates are not finite. Scanners write such
+ * vertices for points that they did not see. The OBJ and OFF readers omit all unused vertices. */
 
 enum { GRAIN = 1 << 15, WORD = 64 };
 
 typedef struct leaving {
     ebpo_ply_parser *p;
-    bool found;   /* some coordinate is not finite */
-    bool refused; /* such a vertex is used: the check will refuse the mesh, by the file's numbers */
-    uint64_t *used; /* bit v: a face names vertex v */
-    uint32_t *from; /* [kept] the vertices that stay */
-    uint32_t *to;   /* [vertices] their new numbers */
+    bool found; /* a coordinate is not finite */
+    bool
+        refused; /* such a vertex is used: the mesh check will reject it, with the file's indices */
+    uint64_t *used; /* bit v: a face uses vertex v */
+    uint32_t *from; /* [kept] old indices of the kept vertices */
+    uint32_t *to;   /* [vertices] new indices */
     uint64_t kept;
 } leaving;
 
@@ -235,7 +236,7 @@ static void ply_faces_move(const leaving *l)
     }
 }
 
-/* Elements of other names may name vertices by numbers, which have changed. */
+/* Elements of other names may refer to vertices by index; the indices have changed. */
 static void move_attributes(const leaving *l)
 {
     ebpo_attributes *attributes = l->p->mesh->attributes;
@@ -247,17 +248,17 @@ static void move_attributes(const leaving *l)
     if (renumbered)
         ebpo_attributes_drop_others(attributes);
     if (attributes->count < count)
-        ebpo_attributes_lose(attributes, "elements but vertices and faces, which may name vertices "
-                                         "by numbers that have changed");
+        ebpo_attributes_lose(attributes, "elements other than vertices and faces, which may use "
+                                         "vertex indices that have changed");
 }
 
 static ebpo_status ply_faces_note(const leaving *l, uint64_t left)
 {
     ebpo_status status = ebpo_mesh_need_attributes(l->p->mesh, l->p->error);
     if (status == EBPO_OK)
-        ebpo_attributes_count_unread(
-            l->p->mesh->attributes,
-            "vertices whose coordinates are not finite, and that no face names", left);
+        ebpo_attributes_count_unread(l->p->mesh->attributes,
+                                     "vertices with non-finite coordinates that no face uses",
+                                     left);
     return status;
 }
 

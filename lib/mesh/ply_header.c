@@ -1,4 +1,5 @@
-/* The header of a PLY file, and the messages and progress that the parts of its reader share. */
+/* Parses the header of a PLY file. Also contains the messages and progress shared by the parts of
+ * the PLY reader. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -14,7 +15,10 @@
 #include "io/file_source.h"
 #include "mesh/ply_parts.h"
 
-enum { MAX_WORDS = 6 }; /* no statement has more than five; a sixth shows that there are too many */
+enum {
+    MAX_WORDS = 6
+}; /* no statement has more than five; a sixth word shows that there are too
+    * many */
 
 typedef struct reader {
     ebpo_ply_header *header;
@@ -55,13 +59,12 @@ static ebpo_status ply_header_fail(const reader *r, const char *what, ebpo_ply_w
     char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
     return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
-                          "line %" PRIu64
-                          ": %s '%s'; this is not a PLY header as the format describes it",
-                          r->line, what, text);
+                          "line %" PRIu64 ": %s '%s'; this is not a valid PLY header", r->line,
+                          what, text);
 }
 
-/* The next line without its end, and without the '\r' of a DOS file. False at the end of the data.
- */
+/* Returns the next line without its line end and without the '\r' of a DOS file. Returns false at
+ * the end of the data. */
 static bool next_line(reader *r, ebpo_ply_word *line)
 {
     if (r->at == r->end)
@@ -117,7 +120,7 @@ static bool parse_count(ebpo_ply_word word, uint64_t *count)
     return word.n > 0;
 }
 
-/* "format ascii 1.0" */
+/* Parses "format ascii 1.0". */
 static ebpo_status format_statement(reader *r, const ebpo_ply_word *words, int n)
 {
     if (n != 3 || r->format_seen)
@@ -153,18 +156,18 @@ static ebpo_status note_kind(reader *r, ebpo_ply_element *element)
         return EBPO_OK;
     }
     if (*place >= 0)
-        return ply_header_fail(r, "a second element", element->name);
+        return ply_header_fail(r, "duplicate element", element->name);
     *place = (int64_t)h->elements;
     return EBPO_OK;
 }
 
-/* "element vertex 8" */
+/* Parses "element vertex 8". */
 static ebpo_status element_statement(reader *r, const ebpo_ply_word *words, int n)
 {
     ebpo_ply_header *h = r->header;
     ebpo_ply_element element = { .line = r->line, .first = h->properties };
     if (n != 3)
-        return ply_header_fail(r, "a name and a count should follow", words[0]);
+        return ply_header_fail(r, "expected a name and a count after", words[0]);
     if (!parse_count(words[2], &element.count))
         return ply_header_fail(r, "not a count:", words[2]);
     element.name = words[1];
@@ -203,28 +206,28 @@ static bool role_taken(const ebpo_ply_header *h, const ebpo_ply_element *element
     return false;
 }
 
-/* "property float x" or "property list uchar int vertex_indices" */
+/* Parses "property float x" or "property list uchar int vertex_indices". */
 static ebpo_status property_statement(reader *r, const ebpo_ply_word *words, int n)
 {
     ebpo_ply_header *h = r->header;
     if (!h->elements)
-        return ply_header_fail(r, "no element stands before", words[0]);
+        return ply_header_fail(r, "no element before", words[0]);
     ebpo_ply_property property = { .list = n > 1 && ply_header_is(words[1], "list"),
                                    .attribute = -1 };
     if (n != (property.list ? 5 : 3))
-        return ply_header_fail(r, "too few or too many words in", words[0]);
+        return ply_header_fail(r, "wrong number of words in", words[0]);
     if (!parse_type(words[n - 2], &property.type))
         return ply_header_fail(r, "unknown type", words[n - 2]);
     if (property.list &&
         (!parse_type(words[2], &property.count_type) || property.count_type >= EBPO_PLY_FLOAT32))
-        return ply_header_fail(r, "no type for a list's length:", words[2]);
+        return ply_header_fail(r, "invalid type for a list length:", words[2]);
     property.name = words[n - 1];
     ebpo_ply_element *element = &h->element[h->elements - 1];
     property.role = role_of(element, &property);
     if (property.role == EBPO_PLY_ROLE_CORNERS && property.type >= EBPO_PLY_FLOAT32)
-        return ply_header_fail(r, "no type for vertex numbers:", words[n - 2]);
+        return ply_header_fail(r, "invalid type for vertex indices:", words[n - 2]);
     if (role_taken(h, element, property.role))
-        return ply_header_fail(r, "a second property", property.name);
+        return ply_header_fail(r, "duplicate property", property.name);
     if (!ebpo_grow(&h->property, &h->property_capacity, h->properties + 1, sizeof *h->property))
         return ebpo_fail_memory(r->error, sizeof property);
     h->property[h->properties++] = property;
@@ -252,8 +255,8 @@ static ebpo_status ply_header_statement(reader *r, ebpo_ply_word line, bool *end
         *ended = true;
         return EBPO_OK;
     }
-    /* Blender 2.47 left the word "comment" out of its first line. Later on, a line that is not
-     * understood could change what the body means. */
+    /* Blender 2.47 omitted the word "comment" in its first line. After the first element, an
+     * unknown statement is an error, as it could change the meaning of the body. */
     r->header->notes++;
     return r->header->elements ? ply_header_fail(r, "unknown statement", words[0]) : EBPO_OK;
 }
@@ -280,7 +283,7 @@ static ebpo_status check_magic(reader *r, uint64_t size)
     r->at = end ? end : r->at;
     if (!end || !next_line(r, &line))
         return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
-                              "line 1: no PLY file, it does not begin with a line 'ply'");
+                              "line 1: not a PLY file: it does not begin with a line 'ply'");
     return EBPO_OK;
 }
 
@@ -292,14 +295,16 @@ static ebpo_status ply_header_statements(reader *r, bool whole)
         if (!next_line(r, &line))
             return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
                                   "line %" PRIu64
-                                  ": %s before 'end_header'; the file is cut short or no PLY file",
-                                  r->line + 1, whole ? "the file ends" : "a megabyte of header");
+                                  ": %s before 'end_header'; the file is cut short or not a PLY "
+                                  "file",
+                                  r->line + 1,
+                                  whole ? "the file ends" : "the header exceeds 1 MiB");
         ebpo_status status = ply_header_statement(r, line, &ended);
         if (status != EBPO_OK)
             return status;
     }
     if (!r->format_seen)
-        return ply_header_fail(r, "no format was named before", line);
+        return ply_header_fail(r, "no format statement before", line);
     return EBPO_OK;
 }
 
@@ -315,10 +320,10 @@ static ebpo_status check_roles(const reader *r)
 {
     const ebpo_ply_header *h = r->header;
     if (h->vertex < 0)
-        return ebpo_fail_file(
-            r->error, EBPO_E_FORMAT, r->name,
-            "line %" PRIu64 ": the header names no element 'vertex'; there is no mesh in this file",
-            r->line);
+        return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
+                              "line %" PRIu64
+                              ": the header has no element 'vertex'; the file contains no mesh",
+                              r->line);
     for (uint64_t i = 0; i < h->elements; i++) {
         const ebpo_ply_element *e = &h->element[i];
         static const char *const missing[] = { "", "x", "y", "z", "vertex_indices" };
@@ -328,11 +333,11 @@ static ebpo_status check_roles(const reader *r)
             e->kind == EBPO_PLY_KIND_VERTEX ? EBPO_PLY_ROLE_Z : EBPO_PLY_ROLE_CORNERS;
         for (int role = (int)from; role <= (int)to && e->kind != EBPO_PLY_KIND_OTHER; role++)
             if (!has_role(h, e, (ebpo_ply_role)role))
-                return ebpo_fail_file(
-                    r->error, EBPO_E_FORMAT, r->name,
-                    "line %" PRIu64
-                    ": this element has no %s '%s'; the mesh cannot be read without",
-                    e->line, role == EBPO_PLY_ROLE_CORNERS ? "list" : "property", missing[role]);
+                return ebpo_fail_file(r->error, EBPO_E_FORMAT, r->name,
+                                      "line %" PRIu64
+                                      ": this element has no %s '%s'; it is required",
+                                      e->line, role == EBPO_PLY_ROLE_CORNERS ? "list" : "property",
+                                      missing[role]);
     }
     return EBPO_OK;
 }

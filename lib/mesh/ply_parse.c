@@ -1,4 +1,4 @@
-/* Reading a whole PLY file: its header, the body by elements, what is left out. */
+/* Reads a PLY file: the header, the body by elements, and notes about omitted data. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -15,7 +15,7 @@
 #include "mesh/ply.h"
 #include "mesh/ply_parts.h"
 
-#define MOST_VERTICES (UINT64_C(0xfffffffe))
+#define MAX_VERTICES (UINT64_C(0xfffffffe))
 
 bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
 {
@@ -23,17 +23,18 @@ bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
     return ebpo_ply_first_line(data, size, &line_end) != NULL;
 }
 
-/* Least bytes of all rows; false when they exceed any file. */
+/* Computes the least number of bytes of all rows. Returns false when it exceeds any file. */
 static bool least_bytes(const ebpo_ply_parser *p, const ebpo_ply_element *element, uint64_t *bytes)
 {
     uint64_t row = element->row_bytes;
     if (p->header.encoding == EBPO_PLY_ASCII &&
-        !ebpo_mul_ok(element->properties, 2, &row)) /* a digit and a blank */
+        !ebpo_mul_ok(element->properties, 2, &row)) /* a digit and a blank for each */
         return false;
     return ebpo_mul_ok(element->count, row, bytes);
 }
 
-/* Before anything is allocated: can the file hold what its header claims? */
+/* Checks, before anything is allocated, that the file can hold the rows that its header declares.
+ */
 static ebpo_status check_counts(ebpo_ply_parser *p)
 {
     uint64_t left = p->size - p->header.body;
@@ -65,22 +66,22 @@ static ebpo_status check_parts(const ebpo_ply_parser *p)
     const ebpo_ply_header *h = &p->header;
     uint64_t vertices = h->element[h->vertex].count,
              faces = h->face >= 0 ? h->element[h->face].count : 0;
-    if (vertices > MOST_VERTICES || faces > MOST_VERTICES)
-        return ebpo_fail_file(
-            p->error, EBPO_E_LIMIT, p->name,
-            "%" PRIu64 " vertices and %" PRIu64
-            " faces, but no more than 2^32 - 2 of each can be read; split the model",
-            vertices, faces);
+    if (vertices > MAX_VERTICES || faces > MAX_VERTICES)
+        return ebpo_fail_file(p->error, EBPO_E_LIMIT, p->name,
+                              "%" PRIu64 " vertices and %" PRIu64
+                              " faces, but the limit is 2^32 - 2 of each; split the model",
+                              vertices, faces);
     if (!faces && (h->strips < 0 || !h->element[h->strips].count))
         return ebpo_fail_file(p->error, EBPO_E_FORMAT, p->name,
                               "has %" PRIu64
-                              " vertices but no faces: a point cloud; make a surface of it first",
+                              " vertices but no faces (a point cloud); reconstruct a surface "
+                              "first",
                               vertices);
     return EBPO_OK;
 }
 
-/* Floats stay floats when all three coordinates are; doubles hold every other type exactly. Points
- * are doubles. */
+/* Returns true if all three coordinates are floats; then the mesh stores floats. Otherwise it
+ * stores doubles, which hold every other type exactly. Points are doubles. */
 static bool all_float(const ebpo_ply_parser *p)
 {
     const ebpo_ply_header *h = &p->header;
@@ -129,7 +130,7 @@ static ebpo_status read_element(ebpo_ply_parser *p, const ebpo_ply_element *elem
                                                 : ebpo_ply_binary_element(p, element, store);
 }
 
-/* Faces that come before the vertices are skipped and read afterwards: cutting a polygon takes its
+/* Skips faces that come before the vertices and reads them afterwards: triangulation needs
  * positions. */
 static ebpo_status read_early_faces(ebpo_ply_parser *p)
 {
@@ -156,13 +157,12 @@ static ebpo_status read_body(ebpo_ply_parser *p)
             status = read_early_faces(p);
     }
     if (status == EBPO_OK && p->mesh->face_count == 0)
-        status =
-            ebpo_fail_file(p->error, EBPO_E_FORMAT, p->name,
-                           "none of its faces has three corners; there is no mesh in this file");
+        status = ebpo_fail_file(p->error, EBPO_E_FORMAT, p->name,
+                                "no face has three corners; the file contains no mesh");
     return status;
 }
 
-/* The face array grew by halves; give back what is left over. */
+/* Returns the unused capacity of the face array, which grows by halves. */
 static void ply_parse_trim(ebpo_ply_parser *p)
 {
     if (p->face_capacity == p->mesh->face_count || p->mesh->workspace)
@@ -184,29 +184,29 @@ static void ply_parse_describe(ebpo_ply_parser *p)
 static ebpo_status note_unread(ebpo_ply_parser *p)
 {
     bool more = p->header.encoding == EBPO_PLY_ASCII && ebpo_ply_ascii_more(p);
-    ebpo_status status = p->surplus_values || more || p->most_rounded > 0
+    ebpo_status status = p->surplus_values || more || p->max_rounded > 0
                              ? ebpo_mesh_need_attributes(p->mesh, p->error)
                              : EBPO_OK;
     if (status != EBPO_OK)
         return status;
     if (more)
         ebpo_attributes_note_unread(p->mesh->attributes,
-                                    "what follows the last element, from line %" PRIu64 " on",
+                                    "text after the last element, from line %" PRIu64 " on",
                                     p->line);
     if (p->surplus_values)
         ebpo_attributes_note_unread(p->mesh->attributes,
                                     "values that the header does not describe: %" PRIu64
                                     ", at the ends of %" PRIu64 " rows",
                                     p->surplus_values, p->surplus_rows);
-    if (p->most_rounded > 0)
+    if (p->max_rounded > 0)
         ebpo_attributes_note_unread(p->mesh->attributes,
                                     "digits of coordinates that the header declares as float: "
                                     "rounded by up to %.3g; declare them as double",
-                                    p->most_rounded);
+                                    p->max_rounded);
     return EBPO_OK;
 }
 
-/* All but the mesh. */
+/* Releases everything except the mesh. */
 static void ply_parse_release(ebpo_ply_parser *p)
 {
     if (p->c_locale)
@@ -281,7 +281,7 @@ ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *n
     ebpo_ply_parser p = {
         .data = data, .size = size, .name = ebpo_path_name(name), .mesh = &mesh, .error = error
     };
-    p.strict = true; /* nobody could be told of what is left out */
+    p.strict = true; /* points cannot carry notes about omitted values */
     *xyz = NULL;
     *count = 0;
     ebpo_status status = ebpo_ply_header_parse(&p.header, p.data, size, p.name, error);
@@ -292,7 +292,7 @@ ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *n
     p.at = p.header.body;
     p.line = p.header.body_line;
     for (int64_t i = 0; status == EBPO_OK && i <= p.header.vertex;
-         i++) /* what follows the vertices is not read */
+         i++) /* data after the vertices are not read */
         status = read_element(&p, &p.header.element[i], i == p.header.vertex);
     if (status == EBPO_OK) {
         *xyz = mesh.xyz64;

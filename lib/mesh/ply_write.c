@@ -1,5 +1,5 @@
-/* Writes a mesh and its attributes as PLY. The header is the source's where it fits, else one of
- * our own; properties keep the source's types where these hold every value. */
+/* Writes a mesh and its attributes as PLY. Uses the header of the source where it fits, otherwise a
+ * new one. Properties keep the source's types where these hold every value. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -20,19 +20,19 @@
 
 /* --- the layout --- */
 
-/* What a PLY file to be written is made of: the properties of a mesh and of its attributes, in the
- * order of the header that they were read with, or in their own. */
+/* Elements and properties of the PLY file to write: those of the mesh and its attributes, in the
+ * order of the source header if there is one. */
 
 typedef struct ply_out_property {
-    ebpo_ply_role role; /* of positions and corners; else an attribute's: */
-    uint32_t attribute; /* which array */
+    ebpo_ply_role role; /* role of positions and corners; an attribute has: */
+    uint32_t attribute; /* array index */
     uint32_t column;
-    ebpo_ply_type type, count_type; /* of positions: as they are written */
+    ebpo_ply_type type, count_type; /* types as written, for positions and corners */
 } ply_out_property;
 
 typedef struct ply_out_element {
     ebpo_ply_kind kind;
-    uint64_t rows, first, properties; /* in ply_layout.property */
+    uint64_t rows, first, properties; /* range in ply_layout.property */
 } ply_out_element;
 
 typedef struct ply_layout {
@@ -40,7 +40,7 @@ typedef struct ply_layout {
     uint64_t elements, element_capacity;
     ply_out_property *property;
     uint64_t properties, property_capacity;
-    char *header; /* malloc's, `header_bytes` of it */
+    char *header; /* from malloc, `header_bytes` bytes */
     size_t header_bytes;
 } ply_layout;
 
@@ -49,10 +49,10 @@ static void free_layout(ply_layout *layout);
 typedef struct making {
     ply_layout *out;
     const ebpo_mesh *mesh;
-    FILE *text;  /* the header */
-    bool *taken; /* [arrays * EBPO_ATTRIBUTE_COLUMNS] columns that stand in the header */
+    FILE *text;  /* header text */
+    bool *taken; /* [arrays * EBPO_ATTRIBUTE_COLUMNS] columns that the header already has */
     ebpo_ply_type index_type;
-    bool faces; /* the element of faces stands in the header */
+    bool faces; /* the header has the face element */
     bool no_memory;
 } making;
 
@@ -94,7 +94,7 @@ static ebpo_ply_type position_type(const ebpo_mesh *mesh)
     return mesh->xyz64 ? EBPO_PLY_FLOAT64 : EBPO_PLY_FLOAT32;
 }
 
-/* Whether a coordinate is a value of the type, bit for bit. */
+/* Returns true if the type holds the coordinate exactly, bit for bit. */
 static bool ply_write_holds(ebpo_ply_type type, double v)
 {
     static const double least[] = { INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0 }, most[] = {
@@ -112,7 +112,7 @@ static bool ply_write_holds(ebpo_ply_type type, double v)
     return bits == back;
 }
 
-/* The type of the header, if all coordinates of the axis are values of it. */
+/* Returns the header's type if it holds all coordinates of the axis. */
 static ebpo_ply_type axis_type(const making *m, ebpo_ply_role role, ebpo_ply_type wanted)
 {
     const ebpo_mesh *mesh = m->mesh;
@@ -125,13 +125,14 @@ static ebpo_ply_type axis_type(const making *m, ebpo_ply_role role, ebpo_ply_typ
     return wanted;
 }
 
-/* A line of the header that is followed, as it is: types have several names. */
+/* Copies a line of the source header unchanged, since types have several names. */
 static void put_line(making *m, ebpo_ply_word line)
 {
     fprintf(m->text, "%.*s\n", (int)line.n, line.s);
 }
 
-/* `line`: of the header, which names the type that is wanted; or of no length. */
+/* Adds a position or corner property. `line`: the header line with the wanted type, or an empty
+ * line. */
 static void add_position(making *m, ebpo_ply_role role, ebpo_ply_type wanted, ebpo_ply_word line)
 {
     ebpo_ply_type type = axis_type(m, role, wanted);
@@ -164,7 +165,7 @@ static bool is_word(const char *s, size_t n, ebpo_ply_word word)
     return n == word.n && memcmp(s, word.s, n) == 0;
 }
 
-/* The column of that name, or -1. */
+/* Returns the column of that name, or -1. */
 static int find_column(const ebpo_attribute *a, const bool *taken, ebpo_ply_word name)
 {
     const char *s = a->names;
@@ -188,7 +189,7 @@ static void add_column(making *m, uint64_t array, uint32_t column)
                                         .count_type = (ebpo_ply_type)a->list });
 }
 
-/* A property of the header becomes the column that it was read into; false: there is none. */
+/* Adds the column that a header property was read into. Returns false when there is none. */
 static bool add_named(making *m, ebpo_ply_word element, const ebpo_ply_property *property)
 {
     for (uint64_t i = 0; i < array_count(m); i++) {
@@ -206,7 +207,7 @@ static bool add_named(making *m, ebpo_ply_word element, const ebpo_ply_property 
     return false;
 }
 
-/* Columns of an element that no header names, in their own order. */
+/* Adds the columns of an element that are not in the header, in their order. */
 static void add_rest(making *m, const char *element)
 {
     for (uint64_t i = 0; i < array_count(m); i++) {
@@ -238,7 +239,7 @@ static uint64_t rows_of(const making *m, ebpo_ply_word element)
     return 0;
 }
 
-/* --- a header of our own --- */
+/* --- a new header --- */
 
 static void begin_faces(making *m)
 {
@@ -255,7 +256,7 @@ static void end_element(making *m, ebpo_ply_kind kind)
         add_rest(m, "face");
 }
 
-static const ebpo_ply_word usual_corners = { "vertex_indices", 14 };
+static const ebpo_ply_word default_corners = { "vertex_indices", 14 };
 
 static void make_plain(making *m)
 {
@@ -267,20 +268,20 @@ static void make_plain(making *m)
                      (ebpo_ply_word){ "", 0 });
     end_element(m, EBPO_PLY_KIND_VERTEX);
     begin_faces(m);
-    add_corners(m, EBPO_PLY_UINT8, m->index_type, usual_corners, (ebpo_ply_word){ "", 0 });
+    add_corners(m, EBPO_PLY_UINT8, m->index_type, default_corners, (ebpo_ply_word){ "", 0 });
     end_element(m, EBPO_PLY_KIND_FACE);
     fputs("end_header\n", m->text);
 }
 
-/* --- the source's header --- */
+/* --- the source header --- */
 
 typedef struct following {
     making *m;
     ebpo_ply_header header;
-    uint64_t element, property; /* statements met so far */
-    ebpo_ply_kind kind;         /* of the element that is open, as it is written */
-    uint64_t rows;              /* of that element */
-    bool skipped;               /* it is left out */
+    uint64_t element, property; /* statements so far */
+    ebpo_ply_kind kind;         /* kind of the current element, as written */
+    uint64_t rows;              /* rows of that element */
+    bool skipped;               /* the element is omitted */
 } following;
 
 static void close_element(following *f)
@@ -311,7 +312,7 @@ static void follow_element(following *f)
     add_element(m, f->kind, f->rows);
 }
 
-/* An element without rows has its properties all the same. */
+/* Adds a property. Elements without rows keep their properties. */
 static void follow_property(following *f, ebpo_ply_word line)
 {
     making *m = f->m;
@@ -364,7 +365,7 @@ static void ply_write_follow(following *f, const char *at, const char *end)
     }
 }
 
-/* False: there is none that can be followed. */
+/* Returns false when there is no usable source header. */
 static bool make_as_source(making *m)
 {
     const ebpo_attributes *all = m->mesh->attributes;
@@ -381,9 +382,9 @@ static bool make_as_source(making *m)
     return usable;
 }
 
-/* --- either --- */
+/* --- either header --- */
 
-/* `mesh` has been checked. */
+/* Creates the layout. `mesh` has been checked. */
 static ebpo_status make_layout(ply_layout *out, const ebpo_mesh *mesh, ebpo_error *error)
 {
     ebpo_text_stream header;
@@ -419,7 +420,7 @@ static void free_layout(ply_layout *layout)
     *layout = (ply_layout){ .element = NULL };
 }
 
-/* Writing a mesh as a binary little-endian PLY file. */
+/* Writing of a mesh as a binary little-endian PLY file. */
 
 enum { BUFFER = 1 << 16 };
 
@@ -427,12 +428,12 @@ static ebpo_status ply_write_check(const ebpo_mesh *mesh, ebpo_error *error)
 {
     if (mesh->vertex_count > UINT32_MAX - 1 || mesh->face_count > UINT32_MAX - 1)
         return ebpo_fail(error, EBPO_E_LIMIT,
-                         "the mesh to write has %" PRIu64 " vertices and %" PRIu64
+                         "the mesh has %" PRIu64 " vertices and %" PRIu64
                          " faces, but 2^32 - 2 of each is the limit; split it",
                          mesh->vertex_count, mesh->face_count);
     if ((mesh->vertex_count && !mesh->xyz32 == !mesh->xyz64) || (mesh->face_count && !mesh->faces))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the mesh to write has counts without arrays, or positions of both kinds");
+                         "the mesh has counts without arrays, or positions of both types");
     EBPO_FOR_ITEMS(mesh->workspace, i, 0, 3 * mesh->face_count)
         if (mesh->faces[i] >= mesh->vertex_count)
             return ebpo_fail(error, EBPO_E_ARGUMENT,
@@ -458,7 +459,7 @@ static void ply_write_flush(writing *w)
     w->used = 0;
 }
 
-/* The low bytes of a number, little-endian. */
+/* Writes the low bytes of a number, little-endian. */
 static void ply_write_put(writing *w, unsigned bytes, uint64_t bits)
 {
     uint8_t *at = w->buffer + w->used;
@@ -485,7 +486,7 @@ static void put_position(writing *w, const ply_out_property *p, uint64_t row)
     } else if (p->type == EBPO_PLY_FLOAT64) {
         memcpy(&bits, &w->mesh->xyz64[at], sizeof bits);
     } else {
-        bits = (uint64_t)(int64_t)w->mesh->xyz64[at]; /* the layout has seen that it is one */
+        bits = (uint64_t)(int64_t)w->mesh->xyz64[at]; /* the layout guarantees an integer */
     }
     ply_write_put(w, ebpo_ply_type_bytes(p->type), bits);
 }

@@ -1,5 +1,5 @@
-/* Repairs of a mesh: faces that repeat another one are removed, or counted by the positions of
- * their corners; then the repairs that the caller asked for are made, always in one order. */
+/* Repairs a mesh. Removes repeated faces, or counts them by the positions of their corners; then
+ * makes the requested repairs in a fixed order. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -24,13 +24,13 @@ typedef struct dropping {
     ebpo_stars stars;
     ebpo_same_faces *scratch; /* one for each worker */
     unsigned threads;
-    uint64_t *gone; /* bit f: face f goes */
+    uint64_t *gone; /* bit f: remove face f */
     uint64_t count, opposite;
 } dropping;
 
 static bool repair_goes(const dropping *d, uint64_t f) { return d->gone[f / WORD] >> f % WORD & 1; }
 
-/* From its lowest vertex the face runs to the lesser of the two others. */
+/* Returns true if the face runs from its lowest vertex to the lesser of the other two. */
 static bool runs_up(const uint32_t face[3])
 {
     int low = face[0] < face[1] ? (face[0] < face[2] ? 0 : 2) : (face[1] < face[2] ? 1 : 2);
@@ -70,7 +70,7 @@ static ebpo_status find_repeated(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-/* A mesh in the source's order: its numbers, to be kept from now on. */
+/* Adds source indices to a mesh in the source's order. */
 static ebpo_status keep_numbers(ebpo_mesh *mesh, ebpo_error *error)
 {
     if (mesh->arrangement)
@@ -95,7 +95,7 @@ static ebpo_status keep_numbers(ebpo_mesh *mesh, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* In the order in which they are: what is sorted stays so, and every vertex keeps a face. */
+/* Removes the faces in place: sorted faces stay sorted, and every vertex keeps a face. */
 static void close_ranks(const dropping *d)
 {
     ebpo_mesh *mesh = d->mesh;
@@ -153,7 +153,8 @@ static void free_dropping(dropping *d)
     free(d->scratch);
 }
 
-ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh, ebpo_repair_record *record,
+                                      ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     dropping d = { .mesh = mesh, .threads = ebpo_thread_count(0) };
@@ -210,7 +211,7 @@ ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mesh, unsigned threads, eb
     return status;
 }
 
-/* --- all repairs, in their order --- */
+/* --- all repairs, in order --- */
 
 enum { TURN_GRAIN = 1 << 14 };
 
@@ -224,7 +225,7 @@ static ebpo_status turn_faces(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-ebpo_status ebpo_mesh_flip(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+ebpo_status ebpo_mesh_flip(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_error *error)
 {
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status == EBPO_OK)
@@ -235,7 +236,7 @@ ebpo_status ebpo_mesh_flip(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error
     return status;
 }
 
-ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     uint32_t *closed = NULL;
@@ -246,32 +247,32 @@ ebpo_status ebpo_mesh_orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_err
     return status;
 }
 
-static ebpo_status orient_mesh(ebpo_mesh *mesh, unsigned steps, ebpo_mend_record *record,
+static ebpo_status orient_mesh(ebpo_mesh *mesh, unsigned steps, ebpo_repair_record *record,
                                ebpo_error *error)
 {
-    return steps & EBPO_MEND_EARLIER ? ebpo_mesh_make_consistent(mesh, record, NULL, error)
-                                     : ebpo_mesh_orient(mesh, record, error);
+    return steps & EBPO_REPAIR_EARLIER ? ebpo_mesh_make_consistent(mesh, record, NULL, error)
+                                       : ebpo_mesh_orient(mesh, record, error);
 }
 
-ebpo_status ebpo_mesh_mend(ebpo_mesh *mesh, unsigned steps, double weld_distance,
-                           ebpo_mend_record *record, ebpo_error *error)
+ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, double weld_distance,
+                             ebpo_repair_record *record, ebpo_error *error)
 {
     uint64_t filled = record->filled_holes, unorientable = record->unorientable_components;
     ebpo_status status = EBPO_OK;
     if (weld_distance > 0)
         status = ebpo_mesh_weld_within(mesh, weld_distance, record, error);
-    else if (steps & EBPO_MEND_WELD)
+    else if (steps & EBPO_REPAIR_WELD)
         status = ebpo_mesh_weld(mesh, record, error);
-    if (status == EBPO_OK && steps & EBPO_MEND_DROP)
+    if (status == EBPO_OK && steps & EBPO_REPAIR_DROP)
         status = ebpo_mesh_drop_duplicates(mesh, record, error);
-    if (status == EBPO_OK && steps & EBPO_MEND_ORIENT)
+    if (status == EBPO_OK && steps & EBPO_REPAIR_ORIENT)
         status = orient_mesh(mesh, steps, record, error);
-    if (status == EBPO_OK && steps & EBPO_MEND_FLIP)
+    if (status == EBPO_OK && steps & EBPO_REPAIR_FLIP)
         status = ebpo_mesh_flip(mesh, record, error);
-    if (status == EBPO_OK && steps & EBPO_MEND_FILL)
+    if (status == EBPO_OK && steps & EBPO_REPAIR_FILL)
         status = ebpo_mesh_fill_holes(mesh, record, error);
-    /* what was open has an outside now */
-    if (status == EBPO_OK && steps & EBPO_MEND_ORIENT && !(steps & EBPO_MEND_EARLIER) &&
+    /* open components may now be closed and have an outside */
+    if (status == EBPO_OK && steps & EBPO_REPAIR_ORIENT && !(steps & EBPO_REPAIR_EARLIER) &&
         record->filled_holes > filled) {
         record->unorientable_components = unorientable;
         status = ebpo_mesh_orient(mesh, record, error);

@@ -1,7 +1,7 @@
-/* Nesting of closed shells: which shell lies within which, and turning each so that it points
- * outwards, or inwards where it bounds a cavity. Samples of all shells stand in a tree of boxes.
- * Near the faces of a host each sample is decided by probes; in crowded hosts by rays. Decisions
- * are exact (geometry/predicates.h), so the result does not depend on threads. */
+/* Computes the nesting of closed shells and turns each outwards, or inwards if it bounds a cavity.
+ * A tree of boxes holds sample points of all shells. Probes classify the samples near the faces of
+ * a host; rays do so in crowded hosts. Decisions are exact (geometry/predicates.h), so the result
+ * does not depend on threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,9 +17,9 @@
 #include "geometry/predicates.h"
 #include "mesh/shell_nesting.h"
 
-/* Of one thread: what may be within the host that it looks at. */
+/* State of one thread: shells that may be within the current host. */
 typedef struct seeker {
-    ebpo_box_tree probes; /* the samples of each of these shells; values are winding numbers */
+    ebpo_box_tree probes; /* samples of these shells; values are winding numbers */
     struct probing *all;
     const ebpo_shell *host;
     const double (*face)[3];
@@ -60,9 +60,8 @@ static bool list_inner(void *user, ebpo_tree_point *points, uint64_t count)
     return true;
 }
 
-/* Whether a line along the edge from t[0] to t[1], in the plane of y and z, separates the box from
- * the triangle. Certain: errors of rounding are bounded, and what is not a number separates
- * nothing. */
+/* Returns true if a line along the edge from t[0] to t[1], in the y-z plane, separates the box from
+ * the triangle. Safe: rounding errors are bounded, and NaN separates nothing. */
 static bool shell_probes_separates(const double *const t[3], const ebpo_point_box *box)
 {
     static const double ROUNDING = 0x1p-49, TINY = 0x1p-1000;
@@ -84,8 +83,8 @@ static bool shell_probes_separates(const double *const t[3], const ebpo_point_bo
     return low > most + error || high < least - error;
 }
 
-/* False only if no line along x from somewhere in the box meets the triangle. */
-static bool ebpo_face_may_meet_lines(const double t[3][3], const ebpo_point_box *box)
+/* Returns false only if no line along x from a point of the box intersects the triangle. */
+static bool ebpo_face_may_intersect_lines(const double t[3][3], const ebpo_point_box *box)
 {
     bool before = false;
     for (int i = 0; i < 3; i++)
@@ -108,10 +107,10 @@ static bool ebpo_face_may_meet_lines(const double t[3][3], const ebpo_point_box 
 
 static bool near_face(void *user, const ebpo_box_node *node)
 {
-    return ebpo_face_may_meet_lines(((const seeker *)user)->face, node->points);
+    return ebpo_face_may_intersect_lines(((const seeker *)user)->face, node->points);
 }
 
-/* What segments from the probes along x to the host's end cross. */
+/* Counts crossings of a face with segments from the probes along x to the host's end. */
 static bool cross_face(void *user, ebpo_tree_point *points, uint64_t count)
 {
     seeker *w = user;
@@ -179,7 +178,7 @@ static ebpo_status find_inner(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-/* Each face is shown to the samples that are near it; adds to the depths. */
+/* Tests each face against nearby samples; adds to the depths. */
 static ebpo_status ebpo_nesting_probe(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->components->mesh->workspace;
@@ -196,34 +195,34 @@ static ebpo_status ebpo_nesting_probe(ebpo_nesting *n, ebpo_error *error)
     return status;
 }
 
-/* Rays along x from the samples of all shells through one tree of the crowded hosts' faces: of each
- * host what a ray crosses of it is its winding number at the sample. */
+/* Casts rays along x from the samples of all shells through one tree of the crowded hosts' faces.
+ * The signed crossings of a host are its winding number at the sample. */
 
 enum { SHELL_RAYS_GRAIN = 16 };
 
-/* What the rays of the shell that is looked at cross of one host. */
+/* Crossings of one host by the rays of the current shell. */
 typedef struct tally {
     int32_t winding[EBPO_SHELL_SAMPLES];
-    uint32_t shell; /* whose rays these are, and one more */
+    uint32_t shell; /* shell of these rays, plus one */
 } tally;
 
 typedef struct casting {
     ebpo_nesting *n;
-    uint32_t *host; /* the crowded ones, numbers of shells */
+    uint32_t *host; /* indices of the crowded shells */
     uint64_t host_count;
-    ebpo_box_tree faces; /* number: the face; value: its place in `host` */
+    ebpo_box_tree faces; /* number: the face; value: its index in `host` */
     struct caster *caster;
 } casting;
 
-/* Of one thread. */
+/* State of one thread. */
 typedef struct caster {
     const casting *all;
     tally *of;     /* [host_count] */
-    int32_t *seen; /* [host_count] which of these the shell's rays have met */
+    int32_t *seen; /* [host_count] hosts that the shell's rays cross */
     uint64_t seen_count;
     uint32_t shell;
     int sample;
-    ebpo_point_box at; /* that sample: a box without extent */
+    ebpo_point_box at; /* the current sample, as a box of zero extent */
 } caster;
 
 static bool on_ray(void *user, const ebpo_box_node *node)
@@ -254,7 +253,7 @@ static bool cross_faces(void *user, ebpo_tree_point *points, uint64_t count)
         if (w->all->host[points[i].value] == w->shell)
             continue;
         ebpo_face_corners(n->components->mesh, points[i].number, t);
-        if (!ebpo_face_may_meet_lines((const double(*)[3])t, &w->at))
+        if (!ebpo_face_may_intersect_lines((const double(*)[3])t, &w->at))
             continue;
         int crossing = ebpo_axis_crossing(w->at.min, INFINITY, 0, t[0], t[1], t[2]);
         if (crossing != 0)
@@ -263,7 +262,7 @@ static bool cross_faces(void *user, ebpo_tree_point *points, uint64_t count)
     return true;
 }
 
-/* Counts the hosts that all samples up to now are within, and adds up their winding numbers. */
+/* Counts the hosts that contain all samples so far, and sums their winding numbers. */
 static uint32_t count_hosts(const caster *w, int32_t *around)
 {
     uint32_t count = 0;
@@ -278,8 +277,8 @@ static uint32_t count_hosts(const caster *w, int32_t *around)
     return count;
 }
 
-/* The samples are the ends of the shell's box: where all are within a host, so is the box within
- * the host's. */
+/* Tests all samples. They are the extreme points of the shell: if a host contains them all, the
+ * shell's box is within the host's. */
 static ebpo_status cast_rays(void *context, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
 {
@@ -359,7 +358,8 @@ static void free_casting(casting *all)
     ebpo_array_free(workspace, all->host);
 }
 
-/* A ray from each sample goes through a tree of all of their faces; adds to the depths. */
+/* Casts a ray from each sample through a tree of the faces of all crowded hosts; adds to the
+ * depths. */
 static ebpo_status ebpo_nesting_cast(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->components->mesh->workspace;
@@ -383,15 +383,15 @@ static ebpo_status ebpo_nesting_cast(ebpo_nesting *n, ebpo_error *error)
     return status;
 }
 
-/* Closed components, what is known of each, and how many each is within. */
+/* Closed components and the number of hosts that contain each. */
 
-/* A host is crowded with more than so many samples for each of its faces. */
+/* A host is crowded if it has more than this number of samples for each of its faces. */
 enum { CROWD = 8, SHELL_NESTING_GRAIN = 64 };
 
-/* ---- what is known of each ---- */
+/* ---- extreme points of each shell ---- */
 
-/* Whether a comes before b along direction d: by that coordinate, then by all of them, so that only
- * vertices at one position are equal. */
+/* Returns true if a comes before b along direction d: by that coordinate, then by all, so that only
+ * equal positions are equal. */
 static bool shell_nesting_before(const double a[3], const double b[3], int d)
 {
     int axis = d / 2;
@@ -430,15 +430,15 @@ static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-/* ---- which may be within which ---- */
+/* ---- candidates for nesting ---- */
 
 typedef struct crowd {
     const ebpo_nesting *n;
     const ebpo_shell *host;
-    uint64_t inner; /* shells with a box within the host's, and the host */
+    uint64_t inner; /* shells with a box within the host's, including the host */
 } crowd;
 
-/* What is within as a whole is counted, and not entered. */
+/* Counts nodes that are completely within the host, without entering them. */
 static bool count_node(void *user, const ebpo_box_node *node)
 {
     crowd *c = user;
@@ -476,7 +476,7 @@ static ebpo_status find_crowded(void *context, uint64_t begin, uint64_t end, uns
     return EBPO_OK;
 }
 
-/* ---- all of it ---- */
+/* ---- main functions ---- */
 
 static ebpo_status list_shells(ebpo_nesting *n, ebpo_error *error)
 {
@@ -546,7 +546,7 @@ void ebpo_nesting_free(ebpo_nesting *n, const ebpo_mesh *mesh)
     ebpo_components_free(n->components);
 }
 
-/* Shells look outwards, or inwards where they bound a cavity. */
+/* Turns shells outwards, or inwards if they bound a cavity. */
 
 static uint64_t turn_shell(const ebpo_components *c, uint32_t component)
 {
@@ -556,7 +556,7 @@ static uint64_t turn_shell(const ebpo_components *c, uint32_t component)
     return end - begin;
 }
 
-ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed, ebpo_mend_record *record,
+ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed, ebpo_repair_record *record,
                                   ebpo_error *error)
 {
     ebpo_nesting n = { .components = NULL };

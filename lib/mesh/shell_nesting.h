@@ -1,4 +1,4 @@
-/* Which closed components of a mesh are within which, while it is found out. */
+/* State of the search for the nesting of closed components. */
 #ifndef EBPO_MESH_SHELL_NESTING_H
 #define EBPO_MESH_SHELL_NESTING_H
 
@@ -7,24 +7,24 @@
 #include "mesh/box_tree.h"
 #include "mesh/component_parts.h"
 
-/* A component is within another one, its host, if these vertices are: the least and the greatest
- * along each axis. */
+/* A component is within another one, its host, if its least and greatest vertices along each axis
+ * are. */
 enum { EBPO_SHELL_SAMPLES = 6 };
 
 typedef struct ebpo_shell {
     double sample[EBPO_SHELL_SAMPLES][3];
     double min[3], max[3];
     uint32_t component;
-    uint32_t depth; /* closed components that it is within */
-    int32_t around; /* the sum of their winding numbers there */
-    bool crowded;   /* a host to many for the faces that it has: rays lead to it */
+    uint32_t depth; /* number of closed components that contain it */
+    int32_t around; /* sum of their winding numbers there */
+    bool crowded;   /* too many samples for its number of faces: uses rays */
 } ebpo_shell;
 
 typedef struct ebpo_nesting {
     ebpo_components *components;
     ebpo_shell *shells; /* closed, with a volume */
     uint64_t count;
-    ebpo_box_tree tree; /* of shells' boxes; the points are sample[0] */
+    ebpo_box_tree tree; /* boxes of the shells; the points are sample[0] */
     unsigned threads;
 } ebpo_nesting;
 
@@ -41,7 +41,7 @@ static inline void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, doubl
         ebpo_mesh_position(mesh, mesh->faces[3 * face + k], t[k]);
 }
 
-/* Gives the box of a face to a box tree over faces of the mesh `user`. */
+/* Computes the box of a face for a box tree over faces of the mesh `user`. */
 static inline void ebpo_face_box(const void *user, const ebpo_tree_point *p, ebpo_point_box *out)
 {
     double t[3][3];
@@ -52,7 +52,7 @@ static inline void ebpo_face_box(const void *user, const ebpo_tree_point *p, ebp
     }
 }
 
-/* Adds a face to such a tree. False when memory is short. */
+/* Adds a face to such a tree. Returns false when memory is short. */
 static inline bool ebpo_face_add(ebpo_box_tree *tree, const ebpo_mesh *mesh, uint32_t face,
                                  int32_t value)
 {
@@ -75,7 +75,7 @@ static inline bool ebpo_shell_box_within(const ebpo_shell *inner, const ebpo_she
     return true;
 }
 
-/* Whether shells of the node may be within the host: their first samples near it. */
+/* Returns true if shells of the node may be within the host: their first samples are near it. */
 static inline bool ebpo_shell_may_hold(const ebpo_shell *host, const ebpo_box_node *node)
 {
     for (int k = 0; k < 3; k++)
@@ -84,10 +84,10 @@ static inline bool ebpo_shell_may_hold(const ebpo_shell *host, const ebpo_box_no
     return true;
 }
 
-/* How many closed components each is within. */
+/* The number of closed components that contain each component. */
 
-/* Zeroed to begin with; to be freed on failure as well. `closed`: of ebpo_mesh_find_shells,
- * borrowed until then, and changed. */
+/* Finds the nesting. Initialise with zeros; free on failure as well. `closed`: result of
+ * ebpo_mesh_find_shells, borrowed until then and modified. */
 EBPO_MUST_USE ebpo_status ebpo_nesting_find(ebpo_nesting *n, const ebpo_mesh *mesh,
                                             uint32_t *closed, unsigned threads,
                                             const ebpo_progress *progress, ebpo_error *error);

@@ -1,7 +1,7 @@
-/* Reading STL files, in text and binary. Source: "StereoLithography Interface Specification", 3D
- * Systems, 1989. Binary ones have a head of 80 bytes, a count, facets of 50 bytes. The last two
- * bytes of a facet are, by the format, the number of bytes that follow it; most programs keep a
- * colour there. */
+/* Reads STL files, text and binary. Source: "StereoLithography Interface Specification", 3D
+ * Systems, 1989. A binary file has an 80-byte header, a count and facets of 50 bytes. By the
+ * format, the last two bytes of a facet are the number of bytes that follow it; most programs store
+ * a colour there. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -20,16 +20,16 @@
 #include "mesh/attributes.h"
 #include "mesh/import_build.h"
 
-/* The two bytes behind each face of a binary STL file. assimp takes them for colours where programs
- * that follow Magics mean that there is none, so they are read here. */
+/* Attribute bytes of the faces of a binary STL file. They are read here because assimp takes them
+ * for colours even where Magics means "no colour". */
 
 enum { COUNT = 80, STL_BINARY_HEAD = 84, RECORD = 50, STL_BINARY_WORD = 48 };
 
-/* What the bytes of a file are. */
+/* Classification of the bytes of a file. */
 typedef struct stl_bytes {
-    uint64_t models;  /* one behind the other */
-    uint64_t payload; /* bytes that follow facets, as their last two bytes state */
-    uint64_t behind;  /* bytes behind the last facet */
+    uint64_t models;  /* concatenated models */
+    uint64_t payload; /* bytes after facets, as their last two bytes declare */
+    uint64_t behind;  /* bytes after the last facet */
 } stl_bytes;
 
 static uint64_t stated_faces(const uint8_t *head) { return ebpo_load32(head + COUNT); }
@@ -39,7 +39,7 @@ static uint64_t stated_size(const uint8_t *head)
     return STL_BINARY_HEAD + RECORD * stated_faces(head);
 }
 
-/* Counts the models that take all bytes, one behind the other; 0: there are other bytes. */
+/* Counts the concatenated models that fill the file. Returns 0 when other bytes are present. */
 static uint64_t count_models(const uint8_t *data, uint64_t size)
 {
     uint64_t models = 0, bytes;
@@ -51,8 +51,8 @@ static uint64_t count_models(const uint8_t *data, uint64_t size)
     return models;
 }
 
-/* Returns where the last facet ends if bytes follow each as its last two state; UINT64_MAX: beyond
- * the file. */
+/* Returns the end of the last facet if each facet is followed by the bytes that its last two bytes
+ * declare. Returns UINT64_MAX when it is beyond the file. */
 static uint64_t end_with_payload(ebpo_workspace *workspace, const uint8_t *data, uint64_t size)
 {
     uint64_t at = STL_BINARY_HEAD;
@@ -71,8 +71,8 @@ bool ebpo_stl_states_size(const uint8_t *data, uint64_t known, uint64_t size)
     return known >= STL_BINARY_HEAD && size > STL_BINARY_HEAD && stated_size(data) == size;
 }
 
-/* True where all bytes are those of binary models: of one, also with the bytes that its facets'
- * attribute byte counts state, or of several, one behind the other. */
+/* Returns true if the file consists of binary models: one model, with or without the bytes declared
+ * by attribute byte counts, or several concatenated models. */
 static bool fits_binary(const uint8_t *data, uint64_t size)
 {
     return size >= STL_BINARY_HEAD &&
@@ -85,13 +85,13 @@ static ebpo_status fail_ambiguous(const ebpo_import_build *b, const uint8_t *dat
 {
     return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
                           "states %" PRIu64 " faces, which take %" PRIu64 " of its %" PRIu64
-                          " bytes, and the others may belong to faces (their attribute byte "
-                          "counts) or follow them; save it as STL without attributes, or as PLY",
+                          " bytes; the others may belong to faces (attribute byte counts) or "
+                          "follow them; save it as STL without attributes, or as PLY",
                           stated_faces(data), stated_size(data), size);
 }
 
-/* Finds out what the bytes behind the stated facets are; EBPO_E_FORMAT where that is not certain.
- */
+/* Determines the meaning of the bytes beyond the declared facets. Returns EBPO_E_FORMAT when it is
+ * ambiguous. */
 static ebpo_status stl_binary_explain(const ebpo_import_build *b, const uint8_t *data,
                                       uint64_t size, stl_bytes *is)
 {
@@ -156,16 +156,15 @@ static ebpo_status stl_binary_note(ebpo_import_build *b, const stl_bytes *is, ui
     if (status != EBPO_OK || !b->mesh->attributes)
         return status;
     ebpo_attributes *to = b->mesh->attributes;
-    ebpo_attributes_count_unread(to, "bytes that follow facets, by their attribute byte counts",
-                                 is->payload);
-    ebpo_attributes_count_unread(to, "bytes behind the last facet", is->behind);
+    ebpo_attributes_count_unread(to, "bytes after facets (attribute byte counts)", is->payload);
+    ebpo_attributes_count_unread(to, "bytes after the last facet", is->behind);
     if (words)
         ebpo_attributes_lose(to,
-                             "the two bytes behind %" PRIu64
-                             " facets (colours, perhaps), as the file holds several models",
+                             "the attribute bytes of %" PRIu64
+                             " facets (possibly colours), as the file holds several models",
                              words);
     if (is->models > 1 && b->attributes)
-        ebpo_attributes_lose(to, "where each of %" PRIu64 " models begins", is->models);
+        ebpo_attributes_lose(to, "the start of each of %" PRIu64 " models", is->models);
     return EBPO_OK;
 }
 
@@ -175,22 +174,22 @@ static ebpo_status fail_head(const ebpo_import_build *b, const uint8_t *data, ui
     uint64_t at = 0, end;
     if (!ebpo_bytes_are_text(data, size))
         return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
-                              "is no STL file: neither the word solid stands first, nor are there "
-                              "the 84 bytes that binary ones begin with");
+                              "is not an STL file: it neither begins with the word solid nor has "
+                              "the 84 bytes of a binary header");
     while (at < size && (data[at] == ' ' || (data[at] >= '\t' && data[at] <= '\r')))
         at++;
     for (end = at; end < size && data[end] > ' ';)
         end++;
     ebpo_import_word_text(word, (const char *)data + at, end - at);
     return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
-                          "is no STL file, but text that begins with '%s'; an STL file in text "
-                          "begins with the word solid: remove what is before it, or rename the "
-                          "file",
+                          "is not an STL file: it is text that begins with '%s'; an STL text "
+                          "file begins with the word solid: remove the text before it, or rename "
+                          "the file",
                           word);
 }
 
-/* Reads the facets as vertices, three each, and notes bytes that are not read. *plain: the size of
- * the one model whose facets have their two bytes of attributes; 0: it is another file. */
+/* Reads the facets as vertices, three each, and notes unread bytes. Sets *plain to the size of the
+ * single model whose facets have attribute bytes, or to 0 for other files. */
 static ebpo_status read_binary(ebpo_import_build *b, const uint8_t *data, uint64_t size,
                                uint64_t *plain)
 {
@@ -201,9 +200,9 @@ static ebpo_status read_binary(ebpo_import_build *b, const uint8_t *data, uint64
     if (stated_size(data) > size)
         return ebpo_fail_file(b->error, EBPO_E_FORMAT, b->name,
                               "states %" PRIu64 " faces, but its %" PRIu64 " bytes hold %" PRIu64
-                              "; it is cut short or no STL file",
+                              "; it is cut short or not an STL file",
                               faces, size, (size - STL_BINARY_HEAD) / RECORD);
-    if (3 * faces > EBPO_IMPORT_MOST)
+    if (3 * faces > EBPO_IMPORT_MAX)
         return ebpo_fail_file(b->error, EBPO_E_LIMIT, b->name,
                               "states %" PRIu64 " faces of three corners each, more than 2^32 - 2 "
                               "corners; split the model",
@@ -224,8 +223,8 @@ enum { HEADER = 80, FIRST = 84, FACE = 50, STL_COLOURS_WORD = 48, OWN = 0x8000 }
 typedef struct stl_colours {
     const uint8_t *data;
     uint64_t faces;
-    bool magics, words, coloured; /* some word is not 0; some face has a colour */
-    uint8_t others[3];            /* of faces without one */
+    bool magics, words, coloured; /* a word is not 0; a face has a colour */
+    uint8_t others[3];            /* colour of faces without one */
 } stl_colours;
 
 static uint16_t word_of(const stl_colours *s, uint64_t face)
@@ -261,7 +260,7 @@ static void stl_colours_look(stl_colours *s)
     }
 }
 
-/* Five bits as eight: 0 to 255 with equal steps, as far as there are. */
+/* Scales a five-bit value to 0..255 with steps as equal as possible. */
 static uint8_t stl_colours_widen(unsigned five) { return (uint8_t)((five * 255 + 15) / 31); }
 
 static void colour_of(const stl_colours *s, uint16_t word, uint8_t rgb[3])
@@ -308,10 +307,10 @@ static ebpo_status add_words(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *
     return status;
 }
 
-/* Adds to the mesh's attributes, if any of them says something: `attribute`, as they are, and `red
- * green blue`, five bits each: of files with COLOR= in the first 80 bytes (Magics) red first, where
- * bit 15 is 0, else the colour that stands there; of others (VisCAM) blue first, where bit 15 is 1,
- * else white. Nothing of a file in text. The mesh's faces are those of the file. EBPO_E_MEMORY,
+/* Adds the face attributes `attribute` (unchanged) and `red green blue` (five bits each) unless all
+ * are empty. Files with COLOR= in the first 80 bytes (Magics): red first, valid where bit 15 is 0,
+ * otherwise the colour stated there. Other files (VisCAM): blue first, valid where bit 15 is 1,
+ * otherwise white. Text files have none. The mesh's faces are those of the file. EBPO_E_MEMORY,
  * EBPO_E_IO. */
 static ebpo_status keep_stl_colours(ebpo_mesh *mesh, const uint8_t *data, uint64_t size,
                                     ebpo_error *error)
@@ -341,8 +340,8 @@ static bool begins_solid(const uint8_t *data, uint64_t size)
            (size == 5 || is_blank((char)data[5]));
 }
 
-/* True for the bytes of an STL file: binary if all of them are those of the faces that it states,
- * whatever it begins with; else text that begins with the word solid. */
+/* Returns true for the bytes of an STL file: binary if the declared faces fill the file, regardless
+ * of its first bytes; otherwise text that begins with the word solid. */
 static bool has_stl_mark(const uint8_t *data, uint64_t size)
 {
     return begins_solid(data, size) || fits_binary(data, size);
@@ -354,11 +353,11 @@ typedef struct stl_text {
     ebpo_import_build *build;
     const char *begin, *at, *end;
     uint64_t line;
-    uint64_t loops, corners; /* so far; of this loop */
-    uint64_t next_release;   /* byte */
-    uint64_t solids;         /* that have facets */
+    uint64_t loops, corners; /* loops so far; corners of this loop */
+    uint64_t next_release;   /* byte offset */
+    uint64_t solids;         /* solids that have facets */
     bool begun;              /* a solid without facets so far */
-    uint64_t odd, odd_line;  /* words that mean nothing behind others; where the first one is */
+    uint64_t odd, odd_line;  /* unexpected words after others; line of the first one */
 } stl_text;
 
 typedef struct stl_word {
@@ -387,7 +386,7 @@ static ebpo_status fail_word(const stl_text *t, const char *wanted, stl_word wor
     char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
     return ebpo_fail_file(t->build->error, EBPO_E_FORMAT, t->build->name,
-                          "line %" PRIu64 ": '%s' where %s should stand, in facet %" PRIu64
+                          "line %" PRIu64 ": '%s' instead of %s, in facet %" PRIu64
                           "; repair the file",
                           t->line, text, wanted, t->loops + 1);
 }
@@ -415,7 +414,7 @@ static ebpo_status read_vertex(stl_text *t)
 
 static void note_odd(stl_text *t) { t->odd_line = t->odd++ ? t->odd_line : t->line; }
 
-/* Passes words behind one that takes none, and counts them. */
+/* Skips and counts extra words. */
 static void pass_odd(stl_text *t)
 {
     static const char *const words[] = {
@@ -432,7 +431,7 @@ static void pass_odd(stl_text *t)
     }
 }
 
-/* Reads outer loop, vertices, endloop; passes the word normal and its three values before. */
+/* Reads outer loop, vertices and endloop. Skips a preceding word normal and its three values. */
 static ebpo_status read_loop(stl_text *t)
 {
     stl_word word;
@@ -461,14 +460,15 @@ static ebpo_status read_loop(stl_text *t)
     if (status == EBPO_OK && t->corners != 3)
         status = ebpo_fail_file(t->build->error, EBPO_E_FORMAT, t->build->name,
                                 "line %" PRIu64 ": facet %" PRIu64 " has %" PRIu64
-                                " vertices, not three; repair the file",
+                                " vertices, expected 3; repair the file",
                                 t->line, t->loops + 1, t->corners);
     t->loops++;
     pass_odd(t);
     return status;
 }
 
-/* True where a facet follows `t` that cannot be words of a name: up to its first coordinate. */
+/* Returns true if a facet, up to its first coordinate, follows `t`, and cannot be part of a name.
+ */
 static bool holds_facet(const stl_text *t)
 {
     stl_text ahead = *t;
@@ -482,7 +482,8 @@ static bool holds_facet(const stl_text *t)
            ebpo_number_float(&x, word.s, word.n, t->build->c_locale);
 }
 
-/* Passes the rest of a line that names a solid: any words, but files of one line exist. */
+/* Skips the rest of a line that names a solid. Names may contain any words, but files of one line
+ * exist. */
 static void pass_name(stl_text *t)
 {
     stl_text ahead = *t;
@@ -502,7 +503,7 @@ static bool begins_facet(stl_text *t, stl_word word)
 
 static ebpo_status read_text(stl_text *t)
 {
-    bool between = true; /* solids: words may be of any kind */
+    bool between = true; /* outside a solid any words are allowed */
     stl_word word;
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK && next_word(t, &word)) {
@@ -530,7 +531,7 @@ static ebpo_status read_text(stl_text *t)
     return status;
 }
 
-/* --- both --- */
+/* --- text and binary --- */
 
 static ebpo_status make_faces(ebpo_import_build *b)
 {
@@ -562,8 +563,8 @@ static bool is_text(const uint8_t *data, uint64_t size)
     return memchr(data, 0, look) == NULL;
 }
 
-/* Makes the mesh. A file that is called STL is text if it says so and has the word facet. Normals
- * are not read: they follow from corners. */
+/* Builds the mesh. A file named .stl is text if it begins with the word solid and contains the word
+ * facet. Normals are not read: they follow from the corners. */
 static ebpo_status build_stl(ebpo_import_build *b, const ebpo_import_job *job)
 {
     const uint8_t *data = job->data;
@@ -580,9 +581,8 @@ static ebpo_status build_stl(ebpo_import_build *b, const ebpo_import_job *job)
         status = ebpo_mesh_need_attributes(b->mesh, b->error);
     if (status == EBPO_OK && t.odd)
         ebpo_attributes_note_unread(b->mesh->attributes,
-                                    "words that STL does not have: %" PRIu64
-                                    ", the first in line %" PRIu64,
-                                    t.odd, t.odd_line);
+                                    "unknown words: %" PRIu64 ", the first in line %" PRIu64, t.odd,
+                                    t.odd_line);
     if (status == EBPO_OK && b->attributes && plain)
         status = keep_stl_colours(b->mesh, data, plain, b->error);
     if (status == EBPO_OK && b->attributes && t.solids > 1)

@@ -1,5 +1,5 @@
-/* Exact summation of doubles: the sum of millions of terms, rounded once, in whatever order they
- * come. A fixed-point number wide enough for all doubles, in limbs of 32 bits that carry late
+/* Sums doubles exactly: a sum of millions of terms, rounded once, independent of their order. Uses
+ * a fixed-point number wide enough for all doubles, in limbs of 32 bits with delayed carries
  * (Kulisch's long accumulator). */
 #ifndef EBPO_MESH_SUM_H
 #define EBPO_MESH_SUM_H
@@ -11,16 +11,16 @@
 
 #include "core/wide.h"
 
-/* From 2^-1074 to 2^1024, and 2^62 terms. */
+/* Range from 2^-1074 to 2^1024, for 2^62 terms. */
 enum { EBPO_SUM_LIMBS = (1074 + 1024 + 63) / 32 + 2, EBPO_SUM_CARRY = 1 << 29 };
 
 typedef struct ebpo_sum {
     int64_t limb[EBPO_SUM_LIMBS]; /* [i] counts 2^(32 i - 1074) */
-    uint32_t adds;                /* since the carries were propagated */
-    double beyond;                /* sum of what is infinite or NaN */
+    uint32_t adds;                /* additions since carries were propagated */
+    double beyond;                /* sum of infinite or NaN terms */
 } ebpo_sum;
 
-/* Leaves 0 .. 2^32 - 1 in all limbs but the last, which has the sign. */
+/* Leaves 0 .. 2^32 - 1 in all limbs except the last, which has the sign. */
 static inline void ebpo_sum_carry(ebpo_sum *s)
 {
     for (int i = 0; i + 1 < EBPO_SUM_LIMBS; i++) {
@@ -41,7 +41,7 @@ static inline void ebpo_sum_add(ebpo_sum *s, double x)
         return;
     }
     uint64_t mantissa = (bits & ((UINT64_C(1) << 52) - 1)) | (uint64_t)(exponent > 0) << 52;
-    unsigned place = exponent ? exponent - 1 : 0; /* of the lowest bit, above 2^-1074 */
+    unsigned place = exponent ? exponent - 1 : 0; /* position of the lowest bit, above 2^-1074 */
     int64_t *limb = s->limb + place / 32, sign = bits >> 63 ? -1 : 1;
     uint64_t low = mantissa << place % 32, high = place % 32 ? mantissa >> (64 - place % 32) : 0;
     limb[0] += sign * (int64_t)(low & 0xffffffff);
@@ -62,7 +62,7 @@ static inline void ebpo_sum_merge(ebpo_sum *s, const ebpo_sum *other)
     s->beyond += o.beyond;
 }
 
-/* To nearest, ties to even. */
+/* Returns the sum, rounded to nearest, ties to even. */
 static inline double ebpo_sum_value(const ebpo_sum *sum)
 {
     ebpo_sum s = *sum;
@@ -76,7 +76,7 @@ static inline double ebpo_sum_value(const ebpo_sum *sum)
     int top = EBPO_SUM_LIMBS - 1;
     while (top > 0 && s.limb[top] == 0)
         top--;
-    /* The leading 64 bits and more, then whether anything follows. */
+    /* The leading 64 bits or more, then a sticky bit for the rest. */
     ebpo_wide head = { (uint64_t)s.limb[top], top > 0 ? (uint64_t)s.limb[top - 1] << 32 : 0 };
     head.low |= top > 1 ? (uint64_t)s.limb[top - 2] : 0;
     bool rest = false;
@@ -90,7 +90,7 @@ static inline double ebpo_sum_value(const ebpo_sum *sum)
     if (unit + drop < -1074)
         drop = -1074 - unit; /* a denormal result */
     if (drop > 0) {
-        /* what is dropped, its first bit at the top: half of a unit */
+        /* dropped bits, the first at the top: half of a unit */
         ebpo_wide below = ebpo_wide_left(head, 128 - drop), half = { UINT64_C(1) << 63, 0 };
         head = ebpo_wide_right(head, drop);
         unit += drop;

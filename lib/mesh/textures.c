@@ -1,7 +1,8 @@
-/* Image files that a source names, kept in the file: a row of the element `ebpo:texture` for each,
- * with its name and its bytes (format-spec/README.md, "Attributes"). Names come from comments of a
- * PLY file and from the material libraries of an OBJ file; files are looked for beside the source
- * only, and one that is missing, too large or no image is reported and left out. */
+/* Finds image files that a source names and stores them: a row of the element `ebpo:texture` for
+ * each, with its name and bytes (format-spec/README.md, "Attributes"). Names come from comments of
+ * a PLY file and from the material libraries of an OBJ file. Files are searched only in the
+ * source's folder and below. Files that are missing, too large or not images are reported and
+ * omitted. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -116,15 +117,15 @@ bool ebpo_textures_good(const ebpo_attributes *all)
     return true;
 }
 
-/* Text that does not end with a zero. */
+/* Text without a terminating zero. */
 typedef struct words {
     const char *s;
     size_t n;
 } words;
 
-/* What faces have numbers of: names, in the order of the header's comments. */
+/* Names that face attributes refer to by index, in the order of the header's comments. */
 typedef struct numbered {
-    const ebpo_attribute *of_faces; /* NULL: faces have none */
+    const ebpo_attribute *of_faces; /* NULL: faces have no such attribute */
     words *name;
     bool *used;
     uint64_t count, capacity;
@@ -145,7 +146,7 @@ static words textures_trimmed(words t)
     return t;
 }
 
-/* Takes the first word off. */
+/* Removes and returns the first word. */
 static words first_word(words *rest)
 {
     words t = textures_trimmed(*rest), word = { t.s, 0 };
@@ -155,7 +156,7 @@ static words first_word(words *rest)
     return word;
 }
 
-/* Takes the first line off; false: there is none. */
+/* Removes the first line. Returns false when there is none. */
 static bool first_line(words *text, words *line)
 {
     const char *stop = text->n ? memchr(text->s, '\n', text->n) : NULL;
@@ -192,7 +193,7 @@ static bool add_name(numbered *to, words name)
     return true;
 }
 
-/* "comment material 1 red", "comment TextureFile red.png". */
+/* Parses "comment material 1 red", "comment TextureFile red.png". */
 static bool read_header(naming *n)
 {
     words text = { n->all->header, n->all->header_bytes }, line;
@@ -221,7 +222,7 @@ static bool textures_mark(numbered *to, const uint32_t *faces, uint64_t count,
     EBPO_FOR_ITEMS_SCATTERED(workspace, i, 0, a && to->used ? count : 0) {
         double v = faces[i] < a->rows
                        ? ebpo_attribute_number(a->values + faces[i] * (uint64_t)bytes, a->type)
-                       : 0; /* as faces that mending has added have it */
+                       : 0; /* value of faces added by repair */
         if (v >= 0 && v < (double)to->count)
             to->used[(uint64_t)v] = true;
     }
@@ -235,7 +236,7 @@ static int compare_words(const void *x, const void *y)
     return order ? order : (a->n > b->n) - (a->n < b->n);
 }
 
-/* Of the names only those that are used, in the order of their bytes. */
+/* Keeps only used names, sorted by their bytes. */
 static void sort_used(numbered *n)
 {
     uint64_t used = 0;
@@ -252,7 +253,7 @@ static bool textures_has(const numbered *n, words name)
     return n->count && bsearch(&name, n->name, n->count, sizeof *n->name, compare_words);
 }
 
-/* One line of what an image is for. */
+/* Parses one line of an image's uses. */
 static bool is_named(const naming *n, words file, words use)
 {
     words word = first_word(&use);
@@ -273,7 +274,7 @@ static bool textures_keeps(const naming *n, uint64_t row)
     return named;
 }
 
-/* The array anew, of the lists that are kept; all others are empty. */
+/* Rebuilds the array with the kept lists; all others become empty. */
 static ebpo_status textures_cut(naming *n, ebpo_attribute *a, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->all->workspace;
@@ -347,7 +348,7 @@ ebpo_status ebpo_textures_keep_named(ebpo_attributes *of, const uint32_t *faces,
     return status;
 }
 
-/* Text that does not end with a zero. */
+/* Text without a terminating zero. */
 typedef struct span {
     const char *s;
     size_t n;
@@ -364,7 +365,7 @@ static span texture_names_trimmed(span t)
     return t;
 }
 
-/* Takes the first word off. */
+/* Removes and returns the first word. */
 static span take_word(span *rest)
 {
     span t = texture_names_trimmed(*rest), word = { t.s, 0 };
@@ -384,14 +385,14 @@ static bool texture_names_begins(span word, const char *text)
     return word.n >= strlen(text) && memcmp(word.s, text, strlen(text)) == 0;
 }
 
-/* Text behind its mark of the order of bytes, if it has one. */
+/* Returns the text after an optional byte order mark. */
 static span whole_text(const uint8_t *text, uint64_t bytes)
 {
     uint64_t mark = ebpo_text_mark(text, bytes);
     return (span){ (const char *)text + mark, bytes - mark };
 }
 
-/* The next line; false: there is none. */
+/* Reads the next line. Returns false when there is none. */
 static bool next_line(span *text, span *line)
 {
     if (!text->n)
@@ -429,7 +430,7 @@ static ebpo_texture_name *place_of(ebpo_texture_names *names, span name)
     if (names->slot[at])
         return &names->of[names->slot[at] - 1];
     if (!is_name(name) || names->count == EBPO_TEXTURES) {
-        names->left_out++;
+        names->omitted++;
         return NULL;
     }
     char *copy = strndup(name.s, name.n);
@@ -443,7 +444,7 @@ static ebpo_texture_name *place_of(ebpo_texture_names *names, span name)
     return &names->of[names->count++];
 }
 
-/* Control characters become question marks: lines end lines. */
+/* Appends text. Control characters become question marks, since line feeds separate lines. */
 static void texture_names_append(ebpo_texture_name *to, span text)
 {
     for (size_t i = 0; i < text.n; i++)
@@ -451,14 +452,14 @@ static void texture_names_append(ebpo_texture_name *to, span text)
             (unsigned char)text.s[i] < ' ' || text.s[i] == 127 ? '?' : text.s[i];
 }
 
-/* What for: a word, and the name of what has it. */
+/* Adds a use: a word, and the name of the user. */
 static void texture_names_add(ebpo_texture_names *names, span name, span word, span owner)
 {
     ebpo_texture_name *to = place_of(names, name);
     if (!to)
         return;
     if (to->use_bytes + word.n + owner.n + 2 > EBPO_TEXTURE_USE_BYTES) {
-        names->left_out++;
+        names->omitted++;
         return;
     }
     if (!ebpo_grow(&to->use, &to->use_capacity, to->use_bytes + word.n + owner.n + 2, 1)) {
@@ -519,7 +520,7 @@ static bool is_number(span word)
     return digits;
 }
 
-/* Behind a map's options stands its file's name, to the end of the line. */
+/* Skips a map's options; the file's name follows to the end of the line. */
 static span skip_options(span rest)
 {
     while (rest.n > 1 && rest.s[0] == '-') {
@@ -563,7 +564,7 @@ void ebpo_obj_libraries(const uint8_t *text, uint64_t bytes,
     }
 }
 
-/* Of material libraries: bytes of all, and names that are tried. */
+/* Limits for material libraries: total bytes, and number of names that are tried. */
 enum {
     LIBRARY_BYTES = 1 << 25,
     LIBRARIES = 100,
@@ -573,18 +574,18 @@ enum {
 #define IMAGE_BYTES ((uint64_t)1 << 30)
 
 typedef struct finding {
-    const char *path; /* of the source */
+    const char *path; /* path of the source */
     ebpo_texture_names names;
-    uint64_t absent, outside, large; /* not found; forbidden; too large */
-    uint64_t tried, libraries;       /* names of libraries; not read */
-    uint64_t library_bytes;          /* read */
+    uint64_t absent, outside, large; /* not found; outside the folder; too large */
+    uint64_t tried, libraries;       /* library names; libraries that could not be read */
+    uint64_t library_bytes;          /* bytes read */
     bool keep, no_memory;
     ebpo_error *error;
 } finding;
 
-/* --- files beside the source --- */
+/* --- files near the source --- */
 
-/* Below the folder, by its words: no root, no drive, nothing upwards. */
+/* Returns true if the path stays below the folder: no root, no drive, no "..". */
 static bool stays_below(const char *name)
 {
     if (*name == '/' || (*name && name[1] == ':'))
@@ -600,7 +601,7 @@ static bool stays_below(const char *name)
 
 typedef enum found { FOUND, ABSENT, OUTSIDE, NO_MEMORY } found;
 
-/* Other systems' names have backslashes. */
+/* Converts backslashes, which other systems use. */
 static char *path_of(const char *name)
 {
     char *path = strdup(name);
@@ -646,7 +647,7 @@ static bool read_library(finding *f, const char *name)
     return good;
 }
 
-/* A library's name with spaces, or several names. */
+/* Reads a library whose name has spaces, or several libraries. */
 static void read_libraries(void *context, const char *rest, size_t size)
 {
     finding *f = context;
@@ -674,7 +675,7 @@ static void find_names(finding *f, const ebpo_mesh *mesh, const uint8_t *data, u
 
 /* --- images --- */
 
-/* Piece by piece: where the bytes are not kept they need not be in memory all at once. */
+/* Works in pieces, so that bytes that are not kept need not fit in memory. */
 static ebpo_status make_digest(const ebpo_whole_file *file, const char *name,
                                uint8_t digest[TEXTURE_FILES_DIGEST], ebpo_error *error)
 {
@@ -697,7 +698,7 @@ static ebpo_status make_digest(const ebpo_whole_file *file, const char *name,
     return status;
 }
 
-/* Bytes that are kept, and the digest. */
+/* Reads the bytes to keep, and their digest. */
 static ebpo_status read_image(const finding *f, ebpo_whole_file *file, const char *name,
                               uint8_t digest[TEXTURE_FILES_DIGEST])
 {
@@ -750,19 +751,15 @@ static void texture_files_lose(ebpo_attributes *to, uint64_t count, const char *
 static void note_losses(const finding *f, ebpo_attributes *to)
 {
     uint64_t known = f->names.count - f->absent - f->outside - f->large;
-    texture_files_lose(to, f->names.left_out,
-                       "a name or a use of an image (there is no room for more)",
-                       "%" PRIu64 " names and uses of images (there is no room for more)");
+    texture_files_lose(to, f->names.omitted, "a name or a use of an image (too many)",
+                       "%" PRIu64 " names and uses of images (too many)");
     texture_files_lose(to, f->libraries, "names of images (a material library cannot be read)",
                        "names of images (%" PRIu64 " material libraries cannot be read)");
-    texture_files_lose(to, f->absent,
-                       "the digest of an image (there is no such file beside the source)",
-                       "the digests of %" PRIu64
-                       " images (there are no such files beside the source)");
+    texture_files_lose(to, f->absent, "the digest of an image (file not found beside the source)",
+                       "the digests of %" PRIu64 " images (files not found beside the source)");
     texture_files_lose(to, f->outside,
-                       "the digest of an image (its name leads out of the source's folder)",
-                       "the digests of %" PRIu64
-                       " images (their names lead out of the source's folder)");
+                       "the digest of an image (its path leaves the source's folder)",
+                       "the digests of %" PRIu64 " images (their paths leave the source's folder)");
     texture_files_lose(to, f->large, "an image of more than 1 GiB",
                        "%" PRIu64 " images of more than 1 GiB");
     texture_files_lose(to, f->keep ? 0 : known,
@@ -770,7 +767,7 @@ static void note_losses(const finding *f, ebpo_attributes *to)
                        "the bytes of %" PRIu64 " images (--embed-textures keeps them)");
 }
 
-/* The element is ours, whatever a PLY says of one of that name. */
+/* Removes an element of this reserved name that comes from a PLY. */
 static void drop_own(ebpo_attributes *from)
 {
     bool any = false;
@@ -788,7 +785,7 @@ static ebpo_status add_images(finding *f, ebpo_mesh *mesh)
     ebpo_status status = EBPO_OK;
     if (f->no_memory)
         return ebpo_fail_memory(f->error, sizeof *f->names.of);
-    if (!f->names.count && !f->names.left_out && !f->libraries)
+    if (!f->names.count && !f->names.omitted && !f->libraries)
         return EBPO_OK;
     status = ebpo_mesh_need_attributes(mesh, f->error);
     if (status != EBPO_OK)

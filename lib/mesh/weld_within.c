@@ -1,4 +1,4 @@
-/* Which vertices are joined that are within a distance of each other. */
+/* Decides which vertices within a distance of each other are joined. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -14,12 +14,13 @@
 
 enum { GRAIN = 1 << 12, KEY_SHIFT = 20 };
 
-/* Cells of the grid have an edge of twice the distance and numbers below 2^49, so that rounding
- * moves a vertex by an eighth of a cell at most: what is within the distance of it is within
- * REACH cells along each axis. */
-static const double REACH = 0.75, MOST_CELLS = 0x1p49, LEAST_DISTANCE = 0x1p-1000;
+/* Grid cells have an edge of twice the distance and indices below 2^49, so that rounding moves a
+ * vertex by at most an eighth of a cell. Vertices within the distance are within REACH cells along
+ * each axis. */
+static const double REACH = 0.75, MAX_CELLS = 0x1p49, LEAST_DISTANCE = 0x1p-1000;
 
-/* A squared distance is decided by rounded arithmetic where it differs by more than this share. */
+/* A squared distance is decided by rounded arithmetic if the relative difference exceeds this
+ * value. */
 static const double DOUBT = 1e-14;
 
 typedef struct grouping {
@@ -27,17 +28,17 @@ typedef struct grouping {
     double distance, min[3];
     double extent;   /* half of the longest side of the box around all vertices */
     uint32_t *order; /* [vertex_count] vertices, ascending by x, then y, then z */
-    uint32_t *map;   /* [vertex_count] the vertex that it becomes */
-    uint32_t *slots; /* [mask + 1] of a cell's hash, the last vertex there that stays */
-    uint32_t *chain; /* [vertex_count] of one that stays, the one before it in the slot */
+    uint32_t *map;   /* [vertex_count] vertex that replaces it */
+    uint32_t *slots; /* [mask + 1] by cell hash: the last remaining vertex there */
+    uint32_t *chain; /* [vertex_count] previous remaining vertex in the slot */
     uint64_t mask;
-    double *moved; /* [threads] the largest distance, squared */
+    double *moved; /* [threads] largest squared distance */
 } grouping;
 
 /* ---- positions, ascending ---- */
 
 typedef struct position {
-    uint64_t key; /* ascends with x */
+    uint64_t key; /* ascending with x */
     double at[3];
     uint32_t vertex;
 } position;
@@ -104,7 +105,7 @@ static bool is_certain(double a, double b)
            fabs(a - b) > DOUBT * (a + b);
 }
 
-/* Appends the products that |p - q|^2 is the sum of, with a sign. */
+/* Appends signed products whose sum is |p - q|^2. */
 static int put_distance(double (*factor)[2], double sign, const double p[3], const double q[3])
 {
     int n = 0;
@@ -139,7 +140,7 @@ static bool is_nearer(const double p[3], const double a[3], const double b[3])
     int n = put_distance(factor, 1, p, a);
     n += put_distance(factor + n, -1, p, b);
     int sign = ebpo_sign_of_products(factor[0], n);
-    for (int k = 0; k < 3 && sign == 0; k++) /* of two at one distance, the first */
+    for (int k = 0; k < 3 && sign == 0; k++) /* the first of two at equal distance */
         sign = a[k] < b[k] ? -1 : a[k] > b[k];
     return sign < 0;
 }
@@ -168,7 +169,7 @@ static void weld_within_stay(grouping *g, uint32_t v, const double p[3])
     g->slots[slot] = v;
 }
 
-/* Returns a vertex that stays and is within the distance from p: the nearest one, or any. */
+/* Returns a remaining vertex within the distance from p: the nearest one, or any. */
 static uint32_t find_staying(const grouping *g, const double p[3], bool nearest)
 {
     int64_t low[3], high[3], c[3];
@@ -212,7 +213,7 @@ static ebpo_status choose_nearest(void *context, uint64_t begin, uint64_t end, u
     return EBPO_OK;
 }
 
-/* ---- all of it ---- */
+/* ---- main functions ---- */
 
 static ebpo_status check_distance(grouping *g, ebpo_error *error)
 {
@@ -220,14 +221,13 @@ static ebpo_status check_distance(grouping *g, ebpo_error *error)
     double max[3] = { 0 }, p[3];
     if (!(g->distance > 0) || !isfinite(g->distance))
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
-                              "the distance to weld within has to be above 0 and finite, not %g",
-                              g->distance);
+                              "the weld distance must be above 0 and finite, not %g", g->distance);
     EBPO_FOR_ITEMS(mesh->workspace, v, 0, mesh->vertex_count) {
         ebpo_mesh_position(mesh, v, p);
         for (int k = 0; k < 3; k++) {
             if (!isfinite(p[k]))
                 return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_mesh_label(mesh),
-                                      "vertex %llu has a coordinate that is not finite; repair it",
+                                      "vertex %llu has a non-finite coordinate; repair it",
                                       (unsigned long long)ebpo_mesh_source_vertex(mesh, v));
             g->min[k] = v == 0 || p[k] < g->min[k] ? p[k] : g->min[k];
             max[k] = v == 0 || p[k] > max[k] ? p[k] : max[k];
@@ -237,18 +237,18 @@ static ebpo_status check_distance(grouping *g, ebpo_error *error)
         g->extent = fmax(g->extent, 0.5 * max[k] - 0.5 * g->min[k]);
     if (0.5 * g->distance >= g->extent)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
-                              "a distance of %g to weld within is not less than the model's "
-                              "longest side, %g; give a smaller one, in the model's unit",
+                              "a weld distance of %g is not less than the model's longest side, "
+                              "%g; give a smaller one, in the model's unit",
                               g->distance, 2 * g->extent);
-    if (g->distance < LEAST_DISTANCE || g->extent / g->distance > MOST_CELLS)
+    if (g->distance < LEAST_DISTANCE || g->extent / g->distance > MAX_CELLS)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
-                              "a distance of %g to weld within is less than coordinates up to %g "
-                              "differ by; weld vertices of equal positions only",
+                              "a weld distance of %g is less than the spacing of coordinates up "
+                              "to %g; weld vertices of equal positions only",
                               g->distance, 2 * g->extent);
     return EBPO_OK;
 }
 
-/* Numbers those that stay in ascending order. */
+/* Numbers the remaining vertices in ascending order. */
 static uint64_t number_staying(grouping *g, uint32_t *from)
 {
     ebpo_workspace *workspace = g->mesh->workspace;

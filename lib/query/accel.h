@@ -1,7 +1,6 @@
-/* Acceleration structures: a subtree (or a whole tree) decoded into the form that questions are
- * asked of: child tables, leaves with blocks of faces, and a bounding hierarchy. Immutable once
- * made, but for what makes leaves easy, which is found out when it is first asked for; any thread.
- */
+/* Acceleration structures: a subtree (or a whole tree) decoded for queries: child tables, leaves
+ * with blocks of faces, and a bounding hierarchy. Immutable once made, except leaf kinds, which are
+ * found at the first queries. Any thread may use them. */
 #ifndef EBPO_QUERY_ACCEL_H
 #define EBPO_QUERY_ACCEL_H
 
@@ -16,27 +15,29 @@
 /* --- leaves --- */
 
 /* Kinds of leaves: extended octree (Brunet and Navazo 1990: face, edge nodes), SP-octree (Cano and
- * Torres 2002: convex, concave). In all but general ones the planes' signs answer. */
+ * Torres 2002: convex, concave). In all kinds but the general one the planes' signs decide. */
 typedef enum ebpo_leaf_kind {
     EBPO_LEAF_GENERAL = 0,
     EBPO_LEAF_ONE_PLANE = 1,
     EBPO_LEAF_TWO_PLANES = 2,
     EBPO_LEAF_CONVEX = 3,
     EBPO_LEAF_CONCAVE = 4,
-    EBPO_LEAF_UNKNOWN = 5, /* few have asked: as a general one without a wall */
-    EBPO_LEAF_IN_HAND = 6, /* a thread is finding its wall and the boxes of its list */
-    EBPO_LEAF_WALLED = 7,  /* these are known: to be asked as a general one */
+    EBPO_LEAF_UNKNOWN =
+        5, /* few queries so far: treated as a general leaf without a free cell face */
+    EBPO_LEAF_CLAIMED = 6, /* a thread is finding its free cell face and the boxes of its list */
+    EBPO_LEAF_BOUNDED = 7, /* these are known: treated as a general leaf */
     EBPO_LEAF_SORTED = 8   /* as before, and a thread is finding the kind */
 } ebpo_leaf_kind;
-/* Finding a wall takes as long as an answer, finding the kind as dozens of them: they are done when
- * so many questions have come. */
-enum { EBPO_LEAF_WALL_ASKED = 1, EBPO_LEAF_KIND_ASKED = 128 };
-enum { EBPO_NO_WALL = 6, EBPO_KIND_PLANES_MAX = 16 };
+/* Finding a free cell face takes as long as one query, finding the kind as long as dozens. Each is
+ * done after this number of queries. */
+enum { EBPO_LEAF_CELL_FACE_QUERIED = 1, EBPO_LEAF_KIND_QUERIED = 128 };
+enum { EBPO_NO_CELL_FACE = 6, EBPO_KIND_PLANES_MAX = 16 };
 
-/* A block in a leaf's list: bits 0 to 28 its number; 29 set in the last one of the leaf; 32 to 39
- * the lanes that are the leaf's own, as other faces may share the block; 40 to 63 a box around what
- * these may have in the cell, once the leaf has been walled: for each axis four bits of the lower
- * side and four of 15 less the upper one, in sixteenths of the cell, rounded outward. */
+/* A block in a leaf's list: bits 0 to 28 are its number; bit 29 is set in the last entry of the
+ * leaf; bits 32 to 39 are the lanes listed by the leaf, as other faces may share the block. Bits 40
+ * to 63 are a box around these faces in the cell, set in state EBPO_LEAF_BOUNDED: for each axis
+ * four bits of the lower side and four of 15 less the upper one, in sixteenths of the cell, rounded
+ * outward. */
 typedef _Atomic uint64_t ebpo_listed_block;
 enum { EBPO_LISTED_CELLS = 16, EBPO_LISTED_BOX = 40, EBPO_LISTED_LANES = 32 };
 #define EBPO_LISTED_LAST (UINT64_C(1) << 29)
@@ -52,48 +53,50 @@ static inline void ebpo_list(ebpo_listed_block *b, uint64_t listed)
 static inline uint32_t ebpo_listed_number(uint64_t b) { return b & (EBPO_LISTED_LAST - 1); }
 static inline unsigned ebpo_listed_lanes(uint64_t b) { return b >> EBPO_LISTED_LANES & 255; }
 
-/* What ebpo_leaf_ask finds is there once `kind` says so, and does not change then. */
+/* The results of ebpo_leaf_query are valid once `kind` says so, and do not change then. */
 typedef struct ebpo_accel_leaf {
-    uint32_t list;         /* its blocks begin at list[list] of the subtree */
-    int32_t winding;       /* at the lowest corner, shifted (format-spec, section 5) */
-    uint32_t rows;         /* of kinds other than general: EBPO_KIND_ROW */
-    _Atomic uint8_t kind;  /* ebpo_leaf_kind; of surfaces always EBPO_LEAF_GENERAL */
-    _Atomic uint8_t asked; /* about how many questions came, until the kind is known */
-    /* 2 axis + side (1: upper) of a wall that no face meets, or EBPO_NO_WALL */
-    uint8_t wall;
-    int8_t wall_step; /* winding number on that wall less the one at the corner */
+    uint32_t list;           /* its blocks begin at list[list] of the subtree */
+    int32_t winding;         /* at the lowest corner, shifted (format-spec, section 5) */
+    uint32_t rows;           /* for kinds other than general: EBPO_KIND_ROW */
+    _Atomic uint8_t kind;    /* ebpo_leaf_kind; for surfaces always EBPO_LEAF_GENERAL */
+    _Atomic uint8_t queried; /* approximate number of queries until the kind is known */
+    /* 2 axis + side (1: upper) of a cell face that no face intersects, or EBPO_NO_CELL_FACE */
+    uint8_t cell_face;
+    int8_t cell_face_step; /* winding number on that cell face less the one at the corner */
 } ebpo_accel_leaf;
 
-/* False: a general one, of which neither the wall nor the boxes of the list are to be read yet. */
-static inline bool ebpo_leaf_is_walled(ebpo_leaf_kind kind)
+/* Returns true if the free cell face and the boxes of the list may be read. False: treat the leaf
+ * as a general one. */
+static inline bool ebpo_leaf_is_bounded(ebpo_leaf_kind kind)
 {
-    return kind != EBPO_LEAF_UNKNOWN && kind != EBPO_LEAF_IN_HAND;
+    return kind != EBPO_LEAF_UNKNOWN && kind != EBPO_LEAF_CLAIMED;
 }
 
-/* What planes say of a leaf: a row of winding numbers, then four rows for each four planes
- * n . xi - d in the cell's coordinates (0 .. 1 on each axis): n0 of all four, n1, n2, d.
+/* A row of a leaf's planes: a row of winding numbers, then four rows for each four planes n . xi -
+ * d in the cell's coordinates (0 .. 1 on each axis): n0 of all four, n1, n2, d.
  * |n0| + |n1| + |n2| = 1; beyond EBPO_PLANE_ERROR the sign is certain. */
 typedef union ebpo_kind_row {
     float of_four[4];
     struct {
-        int32_t inner, outer; /* where all planes say "below"; elsewhere in the cell */
-        uint32_t fours;       /* the last one filled up */
+        int32_t inner, outer; /* below all planes; elsewhere in the cell */
+        uint32_t fours;       /* number of groups of four planes; the last is padded */
     } says;
 } ebpo_kind_row;
 #define EBPO_PLANE_ERROR 0x1p-19f
 
-/* What has been found out about a subtree's leaves. Rows lie in pages: a row's number is that of
- * the page, then that within it. */
+/* Kinds found so far for a subtree's leaves. Rows are stored in pages: a row's number is the page's
+ * number, then the number within it. */
 enum { EBPO_KIND_PAGES = 23, EBPO_KIND_PAGE_BITS = 27 };
 #define EBPO_NO_ROWS UINT32_MAX
 typedef struct ebpo_leaf_kinds {
-    pthread_mutex_t lock; /* of what follows, but for reading rows of a leaf that is known */
+    pthread_mutex_t lock; /* protects the following fields; reading rows of a known leaf needs no
+                           * lock */
     ebpo_kind_row *page[EBPO_KIND_PAGES];
     uint32_t pages;
-    uint64_t used, room;                   /* rows of the last page */
-    _Atomic uint64_t rows;                 /* in all pages */
-    uint64_t rows_most;                    /* leaves beyond it stay general ones */
-    _Atomic uint64_t of_kind[5], one_wall; /* leaves known so far */
+    uint64_t used, space;                       /* rows of the last page */
+    _Atomic uint64_t rows;                      /* in all pages */
+    uint64_t rows_max;                          /* leaves beyond this limit stay general */
+    _Atomic uint64_t of_kind[5], one_cell_face; /* leaves whose kind is known */
 } ebpo_leaf_kinds;
 #define EBPO_KIND_ROW(kinds, number)                  \
     ((kinds)->page[(number) >> EBPO_KIND_PAGE_BITS] + \
@@ -111,7 +114,7 @@ static inline bool ebpo_leaf_has_planes(ebpo_leaf_kind kind)
 
 /* --- faces --- */
 
-/* A block of at most eight faces, the head of a record of its own size: after it x of all its
+/* A block of at most eight faces, the head of a record of variable size. After it follow x of all
  * vertices, then y, then z, in the model's unit: floats, or doubles (from EBPO_MESHLET_WIDE on).
  * Corner i of lane l is vertex (corner[i] >> 4 * l) % 16. A block of more than 16 vertices has 24,
  * and corner i of lane l is vertex 8 * i + l. Lanes without a face repeat the first one. Kernels
@@ -124,26 +127,27 @@ typedef struct ebpo_meshlet {
 } ebpo_meshlet;
 enum { EBPO_BLOCK = 8, EBPO_NO_SLOT = 0x7fffffff };
 enum { EBPO_MESHLET_SHARED = 16, EBPO_MESHLET_VERTICES = 24, EBPO_MESHLET_WIDE = 24 };
-/* A record begins at a multiple of so many bytes; the multiple is the block's number. */
+/* A record begins at a multiple of this number of bytes; the multiple is the block's number. */
 enum { EBPO_MESHLET_UNIT = 64 };
-/* Units at most: slots (block * EBPO_BLOCK + lane) have 32 bits. */
-enum { EBPO_BLOCKS_MOST = 1 << 29 };
+/* Maximum number of units: slots (block * EBPO_BLOCK + lane) have 32 bits. */
+enum { EBPO_BLOCKS_MAX = 1 << 29 };
 
 /* --- bounding hierarchy over the blocks --- */
 
 /* Eight children, their boxes in steps of 8 bits: axis k from origin + step * low to origin + step
- * * high, in the subtree's own frame: (x - centre) * scale, about -1 .. 1 (farther where listed
- * faces reach beyond the cell). The boxes are wider than the faces by what
- * single precision can lose: docs/develop/bounds.md. */
+ * * high, in the subtree's frame: (x - centre) * scale, about -1 .. 1 (farther where listed faces
+ * extend beyond the cell). The boxes are enlarged by the rounding errors of single precision:
+ * docs/develop/bounds.md. */
 typedef struct ebpo_bound {
     _Alignas(64) float origin[3];
     float step[3];
     uint8_t low[3][8], high[3][8];
     uint32_t child[8]; /* number of a node, or of a block with EBPO_IS_BLOCK */
-    /* Slabs pay above this squared limit of a search: for nodes that are not large beside it. */
+    /* Bounding cylinders are worth testing above this squared limit of a search, where the node is
+     * not large compared with the search. */
     float slab_limit2;
-    uint32_t parent; /* number of a node; of the top: 0 */
-    uint8_t count;   /* of children; they have the first lanes */
+    uint32_t parent; /* number of a node; 0 for the top */
+    uint8_t count;   /* number of children; they have the first lanes */
     uint8_t spare[15];
 } ebpo_bound;
 #define EBPO_IS_BLOCK UINT32_C(0x80000000)
@@ -160,10 +164,11 @@ static inline ebpo_bound_sides ebpo_bound_side(const ebpo_bound *b, int lane, in
                                origin + step * b->high[axis][lane] };
 }
 
-/* What a curved sheet needs for its distance to be told apart from its neighbours': with x the
- * place of a point of the child seen from the middle of its box as decoded, and a = axis / 2^15,
+/* Bounding cylinder of a curved sheet, which separates its distance from that of its neighbours.
+ * With x a point of the child relative to the middle of its decoded box, and a = axis / 2^15,
  *   along_step * from <= x . a <= along_step * to,   x . x - (x . a)^2 <= (aside_step * radius)^2.
- * 16 bits: with 8 the axis is off by what curved sheets are thick, a fifth more blocks are met. */
+ *   16 bits: with 8 the error of the axis is as large as the thickness of curved sheets, and a
+ *   fifth more blocks are visited. */
 typedef struct ebpo_bound_slab {
     _Alignas(64) int16_t axis[3][8];
     int16_t from[8], to[8], radius[8];
@@ -171,7 +176,7 @@ typedef struct ebpo_bound_slab {
     uint8_t spare[24];
 } ebpo_bound_slab;
 
-/* A child's slab, decoded. */
+/* A child's bounding cylinder, decoded. */
 typedef struct ebpo_child_slab {
     double axis[3], from, to, radius;
 } ebpo_child_slab;
@@ -187,89 +192,92 @@ static inline ebpo_child_slab ebpo_bound_slab_of(const ebpo_bound_slab *b, int l
 
 typedef struct ebpo_accel {
     ebpo_node root;
-    ebpo_box box; /* of the whole model */
+    ebpo_box box; /* box of the whole model */
     int deepest;  /* level of its deepest nodes */
     bool solid, has_planes;
     uint8_t rule; /* ebpo_rule */
     ebpo_node_table nodes;
     ebpo_accel_leaf *leaf;
     uint32_t leaf_count;
-    ebpo_listed_block *list; /* blocks of leaves */
+    ebpo_listed_block *list; /* blocks of all leaves */
     uint64_t list_count;
-    uint32_t list_longest;  /* blocks of one leaf */
-    ebpo_leaf_kinds *kinds; /* of solids, or NULL */
+    uint32_t list_longest;  /* number of blocks in the longest list */
+    ebpo_leaf_kinds *kinds; /* for solids, or NULL */
     bool wide;              /* blocks hold doubles */
     char *meshlets;         /* [units][EBPO_MESHLET_UNIT]: ebpo_meshlet's records */
     uint64_t units;
     uint32_t face_count;
     double centre[3], scale;
-    float turn_error; /* query/inside_kernels.c, of blocks of floats */
-    double reach;     /* no coordinate of a decoded box is greater, in the frame; 1 at least */
+    float turn_error; /* for blocks of floats; see query/inside_kernels.c */
+    double reach; /* upper bound of the coordinates of decoded boxes, in the frame; at least 1 */
     ebpo_bound *bound;
     ebpo_bound_slab *slab; /* [bound_count] */
     uint32_t bound_count;
     uint32_t top; /* the root of the hierarchy */
-    uint32_t outer_count;
-    uint32_t *outer;       /* numbers in the file of faces that are new elsewhere */
-    uint64_t first_face;   /* the others: first_face + local - outer_count */
+    uint32_t shared_count;
+    uint32_t *outer;       /* file indices of shared faces, which are new elsewhere */
+    uint64_t first_face;   /* index of the owned faces: first_face + local - shared_count */
     uint32_t *face_source; /* [local] or NULL */
-    /* codes of gray nodes' planes, group numbers' order; only for subtrees loaded on demand */
+    /* codes of gray nodes' planes, in the order of group numbers; only for subtrees loaded on
+     * demand */
     uint32_t *gray_planes;
     /* [group_count + 1]: planes of the gray node whose children are group g */
     uint32_t *gray_first;
     uint64_t gray_count;
-    /* of memory, all in all; without planes of kinds for a whole model, with all that there may be
+    /* total bytes of memory; without the planes of leaf kinds for a whole model, with their maximum
      * for a subtree */
     uint64_t bytes;
 } ebpo_accel;
 
-/* Sets the boxes of a leaf's list; returns the walls of the cell that its faces come to, a bit for
- * each: 2 axis + side (1: upper). ebpo_inside_kernels has it. */
-typedef unsigned ebpo_walls_fn(const ebpo_accel *subtree, ebpo_listed_block *list, ebpo_cell cell);
+/* Sets the boxes of a leaf's list. Returns the cell faces that its faces reach, a bit for each: 2
+ * axis + side (1: upper). A function of ebpo_inside_kernels. */
+typedef unsigned ebpo_cell_faces_fn(const ebpo_accel *subtree, ebpo_listed_block *list,
+                                    ebpo_cell cell);
 
-/* A question has come to a leaf of a solid whose kind is not known. Number EBPO_LEAF_WALL_ASKED
- * finds its wall and the boxes of its list, number EBPO_LEAF_KIND_ASKED its kind; true when that
- * was this one. Without memory the leaf stays a general one. */
-bool ebpo_leaf_ask(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell cell,
-                   ebpo_walls_fn *walls);
+/* Counts a query in a leaf of a solid whose kind is not known. Query EBPO_LEAF_CELL_FACE_QUERIED
+ * finds the free cell face and the boxes of its list, query * EBPO_LEAF_KIND_QUERIED the kind.
+ * Returns true when this query found the kind. Without memory the leaf stays general. */
+bool ebpo_leaf_query(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell cell,
+                     ebpo_cell_faces_fn *cell_faces);
 
-/* Makes it from a slice, which is consumed (freed, also on failure). `with_planes`: keep gray
+/* Makes an accel from a slice, which is consumed (freed, also on failure). `with_planes`: keep gray
  * nodes' planes. `threads` 0: all cores. */
 EBPO_MUST_USE ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice,
                                           const ebpo_info *info, bool with_planes, unsigned threads,
                                           ebpo_error *error);
-/* The same; EBPO_E_LIMIT if that took more, the slice included, than the room's most bytes (NULL:
- * no limit); ordinary subtrees and models are refused before they have taken more. */
+/* Does the same within a quota. Returns EBPO_E_LIMIT if that took more than the quota, slice
+ * included (NULL: no limit). Ordinary subtrees and models are refused before they exceed it. */
 EBPO_MUST_USE ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice,
-                                                 const ebpo_info *info, ebpo_room *room,
+                                                 const ebpo_info *info, ebpo_quota *space,
                                                  bool with_planes, unsigned threads,
                                                  ebpo_error *error);
 void ebpo_accel_free(ebpo_accel *subtree);
 
-/* Of memory, now, of a whole model. */
+/* Returns the bytes of memory of a whole model now. */
 static inline uint64_t ebpo_accel_bytes(const ebpo_accel *whole)
 {
     return whole->bytes + (whole->kinds ? whole->kinds->rows * sizeof(ebpo_kind_row) : 0);
 }
 
-/* Bytes that the subtree will take, and that making it will take at most (the slice included).
- * Bounds from counts. */
+/* Sets the bytes that the subtree will take and the maximum while it is made (slice included).
+ * Upper bounds from counts. */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak);
-/* The same, nearer, of ordinary models: of a whole one, of a subtree (its planes counted, or none
- * kept). What has more is refused by ebpo_slice_read_within and ebpo_accel_make_within. */
+/* Does the same with closer estimates for ordinary models: for a whole model, or for a subtree (its
+ * planes counted, or none kept). ebpo_slice_read_within and ebpo_accel_make_within refuse larger
+ * ones. */
 void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *peak);
 void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                                  uint64_t *peak);
-/* What ordinary subtrees take on average when there are so many, which have `all` together: nearer
- * still, and little more. */
+/* Returns the average bytes of ordinary subtrees, given their number and the counts `all` of all
+ * together: closer still, and only slightly above. */
 uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info,
                                uint64_t subtrees);
 
-/* --- its nodes (query_node.c); `entry` is what finds them --- */
+/* --- its nodes (query_node.c), found by `entry` --- */
 
 ebpo_node ebpo_accel_root(const ebpo_accel *subtree);
-/* Child of a gray node that is not pruned. */
+/* Returns the child of a gray node that is not pruned. */
 ebpo_node ebpo_accel_child(const ebpo_accel *subtree, const ebpo_node *gray, unsigned octant);
 /* For cursors (geometry/cursor.h); the holder is an ebpo_accel. */
 extern const ebpo_node_source ebpo_accel_source;
@@ -279,7 +287,7 @@ static inline const ebpo_meshlet *ebpo_accel_meshlet(const ebpo_accel *s, uint32
     return (const void *)(s->meshlets + (uint64_t)block * EBPO_MESHLET_UNIT);
 }
 
-/* Its vertices' coordinates, [3][vertices]. */
+/* Returns the coordinates of its vertices, [3][vertices]. */
 static inline const float *ebpo_meshlet_floats(const ebpo_meshlet *m)
 {
     return (const void *)(m + 1);
@@ -295,14 +303,14 @@ static inline unsigned ebpo_meshlet_vertex(const ebpo_meshlet *m, unsigned lane,
                                              : m->corner[corner] >> 4 * lane & 15;
 }
 
-/* Local number of a slot's face; EBPO_NO_SLOT: the slot is empty. */
+/* Returns the local number of a slot's face; EBPO_NO_SLOT: the slot is empty. */
 static inline uint32_t ebpo_accel_slot_face(const ebpo_accel *s, uint32_t slot)
 {
     const ebpo_meshlet *m = ebpo_accel_meshlet(s, slot / EBPO_BLOCK);
     return slot % EBPO_BLOCK < m->faces ? m->face + slot % EBPO_BLOCK : EBPO_NO_SLOT;
 }
 
-/* A face's corners. */
+/* Reads a face's corners. */
 static inline void ebpo_accel_triangle(const ebpo_accel *s, uint32_t slot, double out[3][3])
 {
     const ebpo_meshlet *m = ebpo_accel_meshlet(s, slot / EBPO_BLOCK);
@@ -315,17 +323,17 @@ static inline void ebpo_accel_triangle(const ebpo_accel *s, uint32_t slot, doubl
 
 static inline uint64_t ebpo_accel_file_face(const ebpo_accel *s, uint32_t local)
 {
-    return local < s->outer_count ? s->outer[local] : s->first_face + (local - s->outer_count);
+    return local < s->shared_count ? s->outer[local] : s->first_face + (local - s->shared_count);
 }
 
-/* What the next function will read. */
+/* Prefetches the data that ebpo_accel_triangle will read. */
 static inline void ebpo_accel_fetch_face(const ebpo_accel *s, uint32_t local)
 {
     if (s->face_source)
         __builtin_prefetch(&s->face_source[local]);
 }
 
-/* Number that callers are told. */
+/* Returns the face number that callers get. */
 static inline uint64_t ebpo_accel_source_face(const ebpo_accel *s, uint32_t local)
 {
     return s->face_source ? s->face_source[local] : ebpo_accel_file_face(s, local);

@@ -1,13 +1,13 @@
 /* Makes an accel, the acceleration structure of a subtree (accel.h), from the subtree's slice of
- * the file, and says how much memory that takes.
+ * the file, and estimates its memory.
  *
- * The stages, each in a file: which faces share a block and how blocks hang together (blocks.c),
- * the blocks' bounds (block_bounds.c), child tables and leaf records (here); what leaves are like
- * is found out later (leaf_kinds.c).
+ * The stages: grouping of faces into blocks and blocks into a hierarchy (blocks.c), bounds of
+ * blocks (block_bounds.c), child tables and leaf records (here). Leaf kinds are found later
+ * (leaf_kinds.c).
  *
  * Memory is estimated from counts, before anything is read. Only blocks, the hierarchy over them
- * and what lies across a subtree's border are bounded by what ordinary models have;
- * ebpo_accel_make_within and ebpo_slice_read_within refuse what has more. */
+ * and faces across a subtree's border use the bounds of ordinary models; ebpo_accel_make_within and
+ * ebpo_slice_read_within refuse models that exceed these. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -26,15 +26,15 @@
 
 /* --- memory --- */
 
-/* Entries of leaves' lists at most: each reference is one, and more than eight new faces of a leaf
- * are in 2 n / 9 blocks at most, fewer in one. */
-static inline uint64_t list_most(uint64_t refs, uint64_t leaves, uint64_t faces)
+/* Returns the maximum number of entries of leaves' lists: each reference is one entry, and more
+ * than eight new faces of a leaf are in at most 2 n / 9 blocks, fewer faces in one. */
+static inline uint64_t list_max(uint64_t refs, uint64_t leaves, uint64_t faces)
 {
     return refs + leaves + faces / 9 * 2 + 2;
 }
 
-/* Single precision does for blocks while its squares and cubes stay far from its ends; coordinates
- * beyond that, and doubles, take doubles. */
+/* Returns true if blocks need doubles. Single precision suffices for float coordinates whose
+ * squares and cubes stay far from overflow and underflow. */
 static bool accel_needs_doubles(const ebpo_info *info)
 {
     double most = 0;
@@ -48,22 +48,23 @@ static bool accel_needs_doubles(const ebpo_info *info)
 static uint64_t greater_of(uint64_t a, uint64_t b) { return a > b ? a : b; }
 static uint64_t lesser_of(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
-/* --- what counts tell --- */
+/* --- sizes from counts --- */
 
 typedef struct counts {
     uint64_t groups, leaves, refs, uniform, planes, leaf_planes;
-    uint64_t faces, outer, vertices; /* the outer ones are among the faces */
-    bool below;                      /* a subtree, not the whole model */
+    uint64_t faces, outer, vertices; /* faces include the shared ones */
+    bool below;                      /* true for a subtree, false for the whole model */
     bool keeps_planes;
 } counts;
 
-/* In bytes. */
-typedef struct told {
-    uint64_t levels, mesh, maps, outer; /* of the slice */
-    uint64_t only_read;                 /* what a slice does not have */
+/* Sizes in bytes. */
+typedef struct reported {
+    uint64_t levels, mesh, maps, outer; /* parts of the slice */
+    uint64_t only_read;                 /* memory needed only while reading, not for a slice in
+                                         * memory */
     uint64_t nodes, list, planes, rows, slots;
     uint64_t beside;
-} told;
+} reported;
 
 static uint64_t grid_bytes(uint64_t groups)
 {
@@ -71,14 +72,15 @@ static uint64_t grid_bytes(uint64_t groups)
     return bits ? (UINT64_C(1) << 3 * bits) * 5 : 0;
 }
 
-/* Corners that lead to vertices before the subtree: of the outer faces, and of their neighbours. */
+/* Returns the bytes of corner references to vertices before the subtree, from shared faces and
+ * their neighbours. */
 static uint64_t border_bytes(const counts *c) { return ebpo_compact_bytes(6 * c->outer); }
 
-static told told_by(const counts *c, const ebpo_info *info)
+static reported reported_by(const counts *c, const ebpo_info *info)
 {
     uint64_t coordinate = info->double_coordinates ? sizeof(double) : sizeof(float),
              maps = info->parts & EBPO_PART_MAPS ? 4 : 0;
-    return (told){
+    return (reported){
         .levels = 3 * c->groups + 20 * c->leaves + 4 * (c->uniform + c->refs + c->planes),
         .mesh = 12 * c->faces + 3 * coordinate * c->vertices,
         .maps = maps * c->faces,
@@ -87,7 +89,7 @@ static told told_by(const counts *c, const ebpo_info *info)
             c->below ? border_bytes(c) : maps * c->vertices + c->leaves + 4 * c->leaf_planes,
         .nodes = c->groups * 32 + (c->below ? 0 : grid_bytes(c->groups)) +
                  c->leaves * sizeof(ebpo_accel_leaf),
-        .list = list_most(c->refs, c->leaves, c->faces) * sizeof(ebpo_listed_block),
+        .list = list_max(c->refs, c->leaves, c->faces) * sizeof(ebpo_listed_block),
         .planes = c->keeps_planes ? 4 * (c->groups + 1 + c->planes) : 0,
         .rows = c->below && info->solid ? c->leaves * sizeof(ebpo_kind_row) : 0,
         .slots = 4 * c->faces,
@@ -115,7 +117,7 @@ static counts counts_of_all(const ebpo_info *info)
 static counts counts_of_slice(const ebpo_slice *slice, bool with_planes)
 {
     counts c = { .faces = slice->mesh.face_count,
-                 .outer = slice->outer_count,
+                 .outer = slice->shared_count,
                  .vertices = slice->mesh.vertex_count,
                  .below = slice->root.cell.level > 0,
                  .keeps_planes = with_planes };
@@ -130,14 +132,14 @@ static counts counts_of_slice(const ebpo_slice *slice, bool with_planes)
     return c;
 }
 
-/* Faces across a subtree's border are as many as its patch of surface is round: about three times
- * the root of their number; `most` times here, and no more than are listed. */
+/* Estimates counts. The number of faces across a subtree's border is about three times the square
+ * root of its number of faces; here `most` times, and at most the listed ones. */
 static counts counts_of_size(const ebpo_slice_size *size, const ebpo_info *info, double roots,
                              uint64_t more)
 {
     uint64_t own = size->new_faces, nodes = 8 * size->groups,
              outer = lesser_of(size->refs, (uint64_t)(roots * sqrt((double)own)) + more),
-             faces = own + outer, usual = faces / 4 * 3 + 64;
+             faces = own + outer, standard = faces / 4 * 3 + 64;
     double of_face = info->face_count ? (double)info->vertex_count / (double)info->face_count : 0;
     return (counts){ .groups = size->groups,
                      .leaves = size->leaves,
@@ -146,18 +148,18 @@ static counts counts_of_size(const ebpo_slice_size *size, const ebpo_info *info,
                      .planes = size->planes,
                      .faces = faces,
                      .outer = outer,
-                     .vertices = greater_of(usual, (uint64_t)(1.25 * of_face * (double)faces)),
+                     .vertices = greater_of(standard, (uint64_t)(1.25 * of_face * (double)faces)),
                      .below = true,
                      .keeps_planes = size->planes > 0 };
 }
 
-/* --- what making finds out, in numbers --- */
+/* --- sizes found while making --- */
 
 typedef struct found {
     uint64_t blocks, bounds, units;
 } found;
 
-static found usual_model(const counts *c, const ebpo_info *info)
+static found default_model(const counts *c, const ebpo_info *info)
 {
     uint64_t bytes = c->faces * (accel_needs_doubles(info) ? 56 : 32);
     return (found){ .blocks = c->faces / 4 + 16,
@@ -165,20 +167,21 @@ static found usual_model(const counts *c, const ebpo_info *info)
                     .units = bytes / EBPO_MESHLET_UNIT + 64 };
 }
 
-static uint64_t kept_bytes(const told *t, const found *f)
+static uint64_t kept_bytes(const reported *t, const found *f)
 {
     return sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + t->maps + t->outer + t->nodes + t->list +
            t->planes + t->rows + (f->units + 1) * EBPO_MESHLET_UNIT +
            (f->bounds + 1) * (sizeof(ebpo_bound) + sizeof(ebpo_bound_slab));
 }
 
-/* Arrays of a layout have grown by half. Side by side with all that is kept later are first the
- * mesh and what is found of blocks, then extents, then the nodes. A layout that is refused fits
- * too: 12 bytes a block, 60 a bound, no more blocks than faces, 7 bounds for 13 blocks (the first
- * run that is wrapped in a join has five members at least, the others four, three, two, two ..),
- * and 8 bytes a face to number them are below the 56 bytes a face of usual records, bounds and
- * layout. Beside it all is what one thread decodes a whole model with. */
-static uint64_t peak_bytes(const told *t, const found *f)
+/* Arrays of a layout have grown by half. Beside all memory that is kept later there are first the
+ * mesh and the data of blocks, then extents, then the nodes. A refused layout fits too. It takes 12
+ * bytes a block and 60 a bound; there are no more blocks than faces, and 7 bounds for 13 blocks.
+ * (The first run that is wrapped in a join has at least five members, the others four, three, two,
+ * two ..) With 8 bytes a face to number them, this is below the 56 bytes a face of ordinary
+ * records, bounds and layout. Added to it all is the memory for decoding a whole model with one
+ * thread. */
+static uint64_t peak_bytes(const reported *t, const found *f)
 {
     enum { LAYOUT_BLOCK = 16, LAYOUT_BOUND = 60, FOUND = 25, EXTENT = 72 };
     uint64_t layout = f->blocks * LAYOUT_BLOCK + f->bounds * LAYOUT_BOUND,
@@ -191,13 +194,13 @@ static uint64_t peak_bytes(const told *t, const found *f)
     return greater_of(greater_of(read, made), t->levels + kept + after) + t->beside;
 }
 
-/* --- foretold --- */
+/* --- estimates --- */
 
 void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *peak)
 {
     counts c = counts_of_all(info);
-    told t = told_by(&c, info);
-    found f = usual_model(&c, info);
+    reported t = reported_by(&c, info);
+    found f = default_model(&c, info);
     *keep = kept_bytes(&t, &f);
     *peak = peak_bytes(&t, &f);
 }
@@ -206,14 +209,14 @@ void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *i
                                  uint64_t *peak)
 {
     counts c = counts_of_size(size, info, 8, 64);
-    told t = told_by(&c, info);
-    found f = usual_model(&c, info);
+    reported t = reported_by(&c, info);
+    found f = default_model(&c, info);
     *keep = kept_bytes(&t, &f);
     *peak = peak_bytes(&t, &f);
 }
 
-/* Blocks and the hierarchy are fuller than is certain, and a leaf's list names a block once for
- * several faces. */
+/* Blocks and the hierarchy are fuller than the proven minimum, and a leaf's list names a block once
+ * for several faces. */
 uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info, uint64_t subtrees)
 {
     uint64_t n = subtrees ? subtrees : 1;
@@ -223,17 +226,17 @@ uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info
                              .new_faces = all->new_faces / n + 1,
                              .planes = all->planes / n + 1 };
     counts c = counts_of_size(&mean, info, 3.5, 2);
-    told t = told_by(&c, info);
+    reported t = reported_by(&c, info);
     uint64_t bytes = c.faces * (accel_needs_doubles(info) ? 48 : 27);
     found f = { .units = bytes / EBPO_MESHLET_UNIT + 4, .bounds = c.faces / 24 + 1 };
     t.list = ((c.refs + c.leaves) / 2 + c.faces / 16 + 4) * sizeof(ebpo_listed_block);
     return kept_bytes(&t, &f);
 }
 
-/* Blocks are half full but for the one that a leaf of few faces has alone, where its neighbours'
- * fill theirs: what that takes beyond its faces' share is in the 64 bytes of each leaf, as what its
- * planes may take in a subtree. Lists name at most one block for each listed face. Of a face a
- * record has three vertices at most, or four where it has room for more than 16. */
+/* Blocks are at least half full, except the only block of a leaf with few faces whose neighbours
+ * fill theirs. The 64 bytes of each leaf cover the excess of such blocks and the planes in a
+ * subtree. Lists name at most one block for each listed face. A record has at most three vertices a
+ * face, or four if it has space for more than 16. */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak)
 {
@@ -248,25 +251,25 @@ void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uin
             (blocks + bounds) * 72 + 65536;
 }
 
-/* --- and refused --- */
+/* --- limits --- */
 
-/* EBPO_E_LIMIT if making it with these blocks (the usual ones without a layout) takes more than the
- * room (NULL: no limit) has, the slice included. */
-static ebpo_status accel_fits(ebpo_room *room, const ebpo_accel_plan *plan, uint64_t units,
+/* Returns EBPO_E_LIMIT if making it with these blocks (ordinary ones without a layout) takes more
+ * memory, slice included, than the quota (NULL: no limit). */
+static ebpo_status accel_fits(ebpo_quota *space, const ebpo_accel_plan *plan, uint64_t units,
                               ebpo_error *error)
 {
-    if (!room)
+    if (!space)
         return EBPO_OK;
     const ebpo_layout *layout = plan->layout;
     counts c = counts_of_slice(plan->slice, plan->with_planes);
-    told t = told_by(&c, plan->info);
-    t.only_read = 0; /* it has been read */
+    reported t = reported_by(&c, plan->info);
+    t.only_read = 0; /* the slice has been read */
     found f = layout ? (found){ layout->block_count, layout->bound_count, units }
-                     : usual_model(&c, plan->info);
+                     : default_model(&c, plan->info);
     uint64_t peak = peak_bytes(&t, &f);
-    ebpo_room all = { .most = room->most };
-    ebpo_status status = ebpo_room_check(&all, peak, error);
-    room->needed = all.needed;
+    ebpo_quota all = { .most = space->most };
+    ebpo_status status = ebpo_quota_check(&all, peak, error);
+    space->needed = all.needed;
     return status;
 }
 
@@ -276,7 +279,7 @@ typedef struct walk {
     ebpo_accel *s;
     const ebpo_slice *slice;
     const uint32_t *slot_of;           /* [local face] */
-    uint64_t rank[EBPO_LEVELS_MAX][4]; /* nodes of each type of each level, seen so far */
+    uint64_t rank[EBPO_LEVELS_MAX][4]; /* nodes of each type of each level, visited so far */
     uint64_t refs[EBPO_LEVELS_MAX];
     uint64_t group_begin[EBPO_LEVELS_MAX]; /* number of the first group of each level */
     uint64_t leaf_begin[EBPO_LEVELS_MAX];
@@ -285,29 +288,29 @@ typedef struct walk {
     ebpo_error *error;
 } walk;
 
-/* For a leaf's entries, at most. What all leaves need was made at once, and is given back at the
- * end. */
-static bool make_list_room(walk *w, uint64_t more)
+/* Reserves list entries for one leaf (upper bound). The minimum for all leaves was reserved at
+ * once; the excess is freed at the end. */
+static bool reserve_list(walk *w, uint64_t more)
 {
     ebpo_accel *s = w->s;
     if (!ebpo_grow(&s->list, &w->list_capacity, s->list_count + more, sizeof *s->list))
         w->status = ebpo_fail_memory(w->error, (s->list_count + more) * sizeof *s->list);
     else if (s->list_count + more > UINT32_MAX)
-        w->status =
-            ebpo_fail(w->error, EBPO_E_LIMIT,
-                      "the leaves list too many faces to be held at once; give a memory budget");
+        w->status = ebpo_fail(w->error, EBPO_E_LIMIT,
+                              "the leaves list too many faces to be held in memory at once; give a "
+                              "memory budget");
     return w->status == EBPO_OK;
 }
 
 /* A leaf's entries so far. */
 typedef struct listing {
     ebpo_listed_block *list;
-    uint32_t count, block; /* that the last entry is of; none: no block's number */
+    uint32_t count, block; /* block of the last entry; with no entry: not a valid block number */
     uint64_t last;
 } listing;
 
-/* Faces come in ascending order, and so do blocks: those of one block become one entry. Whether a
- * face begins one is a toss: without a branch. */
+/* Faces and blocks come in ascending order: faces of one block become one entry. Branch-free,
+ * because a branch on a new entry is unpredictable. */
 static inline void list_face(const walk *w, uint64_t face, listing *l)
 {
     uint32_t slot = w->slot_of[face], block = slot / EBPO_BLOCK;
@@ -319,12 +322,12 @@ static inline void list_face(const walk *w, uint64_t face, listing *l)
     ebpo_list(&l->list[l->count - 1], l->last);
 }
 
-/* References, which lie before the leaf's own faces, then these. */
+/* Fills a leaf record: first references, which come before the leaf's new faces, then these. */
 static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t number)
 {
     ebpo_accel_leaf *leaf = &w->s->leaf[number];
     uint64_t refs = level->leaf_ref_count[rank], fresh = level->leaf_new[rank];
-    if (!make_list_room(w, refs + (fresh > EBPO_BLOCK ? 2 * fresh / 9 : 1)))
+    if (!reserve_list(w, refs + (fresh > EBPO_BLOCK ? 2 * fresh / 9 : 1)))
         return;
     listing l = { .list = w->s->list + w->s->list_count, .block = UINT32_MAX };
     const uint32_t *ref = refs ? level->leaf_refs + w->refs[depth] : NULL;
@@ -344,13 +347,13 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
     leaf->winding = level->leaf_winding ? level->leaf_winding[rank] : 0;
 }
 
-static uint32_t uniform_entry(walk *w, const int32_t *windings, uint64_t rank, int32_t usual)
+static uint32_t uniform_entry(walk *w, const int32_t *windings, uint64_t rank, int32_t standard)
 {
     uint32_t entry = 0;
-    if (!ebpo_entry_uniform(windings ? windings[rank] : usual, &entry))
+    if (!ebpo_entry_uniform(windings ? windings[rank] : standard, &entry))
         w->status =
             ebpo_fail(w->error, EBPO_E_LIMIT,
-                      "a node's winding number is beyond 2^29: the solid has too many shells");
+                      "the winding number of a node is beyond 2^29: the solid has too many shells");
     return entry;
 }
 
@@ -373,7 +376,7 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
     if (w->slice->pruned &&
         (depth + 1 == w->slice->level_count || w->slice->level[depth + 1].types[rank] == 0)) {
         if (depth + 1 < w->slice->level_count) {
-            w->rank[depth + 1][EBPO_WHITE] += 8; /* where its children would be */
+            w->rank[depth + 1][EBPO_WHITE] += 8; /* position of its children */
             memset(w->s->nodes.group[group], 0xff, sizeof w->s->nodes.group[group]);
         }
         return ebpo_entry(EBPO_ENTRY_BELOW, (uint32_t)group);
@@ -384,7 +387,7 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
     return ebpo_entry(EBPO_ENTRY_GRAY, (uint32_t)group);
 }
 
-static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot_of)
+static ebpo_status reserve_space(walk *w, const ebpo_layout *layout, uint32_t **slot_of)
 {
     const ebpo_slice *slice = w->slice;
     ebpo_accel *s = w->s;
@@ -397,18 +400,19 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
         refs += slice->level[depth].ref_count;
     }
     if (slice->level_count < EBPO_LEVELS_MAX)
-        /* gray nodes are numbered on where they have no groups */
+        /* the numbering of gray nodes continues where they have no groups */
         w->group_begin[slice->level_count] = groups;
     if (groups >= EBPO_ENTRY_ZERO || leaves >= EBPO_ENTRY_ZERO)
         return ebpo_fail(w->error, EBPO_E_LIMIT,
-                         "the tree has too many nodes to be held at once; give a memory budget");
+                         "the tree has too many nodes to be held in memory at once; give a "
+                         "memory budget");
     s->nodes.group = ebpo_alloc(groups, sizeof *s->nodes.group);
     s->nodes.group_count = (uint32_t)groups;
     s->leaf = ebpo_alloc_zero(leaves, sizeof *s->leaf);
     s->leaf_count = (uint32_t)leaves;
     uint64_t faces = layout->block_count ? layout->block_end[layout->block_count - 1] : 0;
     uint32_t *map = *slot_of = ebpo_alloc(faces, sizeof *map);
-    bool list = ebpo_grow(&s->list, &w->list_capacity, list_most(refs, leaves, slice->face_count),
+    bool list = ebpo_grow(&s->list, &w->list_capacity, list_max(refs, leaves, slice->face_count),
                           sizeof *s->list);
     if (!s->nodes.group || !s->leaf || !map || !list)
         return ebpo_fail_memory(w->error, groups * 32 + leaves * sizeof *s->leaf + faces * 4);
@@ -421,20 +425,20 @@ static ebpo_status make_room(walk *w, const ebpo_layout *layout, uint32_t **slot
     return EBPO_OK;
 }
 
-/* What has been counted is what is held. */
+/* Trims the list to its used entries. */
 static void trim_list(ebpo_accel *s)
 {
     ebpo_listed_block *less = ebpo_realloc(s->list, s->list_count, sizeof *s->list);
     s->list = less ? less : s->list;
 }
 
-/* Child tables and leaf records with their lists of blocks (one walk). */
+/* Fills child tables and leaf records with their lists of blocks (one walk). */
 static ebpo_status accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
                                     const ebpo_layout *layout, ebpo_error *error)
 {
     walk w = { .s = s, .slice = slice, .status = EBPO_OK, .error = error };
     uint32_t *slot_of = NULL;
-    ebpo_status status = make_room(&w, layout, &slot_of);
+    ebpo_status status = reserve_space(&w, layout, &slot_of);
     if (status == EBPO_OK) {
         w.slot_of = slot_of;
         s->nodes.root_level = slice->root.cell.level;
@@ -449,7 +453,8 @@ static ebpo_status accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
 
 /* --- the stages --- */
 
-/* What floats lose of a cross product of differences of coordinates, with room to spare. */
+/* Returns the rounding error of floats in a cross product of differences of coordinates, with a
+ * margin. */
 static double turn_error(const ebpo_box *box)
 {
     double reach = 0, size = 0;
@@ -481,9 +486,10 @@ static ebpo_status copy_planes(ebpo_accel *s, const ebpo_slice *slice, ebpo_erro
         grays += slice->level[i].gray_count;
         planes += slice->level[i].plane_count;
     }
-    if (planes > UINT32_MAX) /* what gray_first holds */
+    if (planes > UINT32_MAX) /* range of gray_first */
         return ebpo_fail(error, EBPO_E_LIMIT,
-                         "the tree has too many planes to be held at once; give a memory budget");
+                         "the tree has too many planes to be held in memory at once; give a "
+                         "memory budget");
     s->gray_planes = ebpo_alloc(planes, sizeof *s->gray_planes);
     s->gray_first = ebpo_alloc(grays + 1, sizeof *s->gray_first);
     if (!s->gray_planes || !s->gray_first)
@@ -505,9 +511,9 @@ static ebpo_status copy_planes(ebpo_accel *s, const ebpo_slice *slice, ebpo_erro
     return EBPO_OK;
 }
 
-/* Of planes that make leaves easy. Few leaves of one subtree are asked about; what they may take
- * counts from the beginning. */
-static uint64_t rows_most(const ebpo_accel *s)
+/* Returns the maximum number of rows of leaf planes. Few leaves of one subtree are queried; the
+ * maximum counts from the beginning. */
+static uint64_t rows_max(const ebpo_accel *s)
 {
     return s->root.cell.level ? s->leaf_count : 5 * (uint64_t)s->leaf_count;
 }
@@ -518,29 +524,29 @@ static uint64_t count_bytes(const ebpo_accel *s)
     return sizeof *s + s->nodes.group_count * sizeof *s->nodes.group + cells * 5 +
            s->leaf_count * sizeof *s->leaf + s->list_count * sizeof *s->list +
            (s->kinds ? sizeof *s->kinds : 0) +
-           (s->kinds && s->root.cell.level ? rows_most(s) * sizeof(ebpo_kind_row) : 0) +
+           (s->kinds && s->root.cell.level ? rows_max(s) * sizeof(ebpo_kind_row) : 0) +
            (s->units + 1) * EBPO_MESHLET_UNIT +
-           s->bound_count * (sizeof *s->bound + sizeof *s->slab) + (uint64_t)s->outer_count * 4 +
+           s->bound_count * (sizeof *s->bound + sizeof *s->slab) + (uint64_t)s->shared_count * 4 +
            (s->face_source ? (uint64_t)s->face_count * 4 : 0) +
            (s->gray_first ? (s->gray_count + s->gray_first[s->gray_count]) * 4 : 0);
 }
 
 static ebpo_status make_stages(ebpo_accel *s, ebpo_slice *slice, const ebpo_info *info,
-                               ebpo_room *room, unsigned threads, ebpo_error *error)
+                               ebpo_quota *space, unsigned threads, ebpo_error *error)
 {
     ebpo_layout layout;
     ebpo_accel_plan plan = { info, slice, s->has_planes, NULL };
-    ebpo_status status = accel_fits(room, &plan, 0, error);
+    ebpo_status status = accel_fits(space, &plan, 0, error);
     if (status == EBPO_OK)
-        status = ebpo_layout_make(&layout, slice, EBPO_BLOCKS_MOST, error);
+        status = ebpo_layout_make(&layout, slice, EBPO_BLOCKS_MAX, error);
     if (status != EBPO_OK)
         return status;
     plan.layout = &layout;
-    status = accel_fits(room, &plan, layout.block_count, error);
+    status = accel_fits(space, &plan, layout.block_count, error);
     if (status == EBPO_OK)
         status = ebpo_accel_number_blocks(s, &plan, threads, error);
     if (status == EBPO_OK)
-        status = accel_fits(room, &plan, s->units, error);
+        status = accel_fits(space, &plan, s->units, error);
     if (status == EBPO_OK)
         status = ebpo_accel_fill_blocks(s, &plan, threads, error);
     ebpo_mesh_free(&slice->mesh);
@@ -550,7 +556,7 @@ static ebpo_status make_stages(ebpo_accel *s, ebpo_slice *slice, const ebpo_info
         status = accel_fill_nodes(s, slice, &layout, error);
     ebpo_layout_free(&layout);
     if (status == EBPO_OK && s->solid) {
-        s->kinds = ebpo_leaf_kinds_make(rows_most(s));
+        s->kinds = ebpo_leaf_kinds_make(rows_max(s));
         status = s->kinds ? EBPO_OK : ebpo_fail_memory(error, sizeof *s->kinds);
     }
     if (status == EBPO_OK && s->has_planes)
@@ -565,7 +571,7 @@ ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice, const ebpo_info
 }
 
 ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice, const ebpo_info *info,
-                                   ebpo_room *room, bool with_planes, unsigned threads,
+                                   ebpo_quota *space, bool with_planes, unsigned threads,
                                    ebpo_error *error)
 {
     *out = NULL;
@@ -582,14 +588,15 @@ ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice, const eb
     s->has_planes = with_planes;
     s->wide = accel_needs_doubles(info);
     s->face_count = (uint32_t)slice->mesh.face_count;
-    s->outer_count = slice->outer_count;
+    s->shared_count = slice->shared_count;
     s->first_face = slice->first_face;
     make_frame(s);
     ebpo_status status =
         slice->mesh.face_count >= EBPO_IS_BLOCK
             ? ebpo_fail(error, EBPO_E_LIMIT,
-                        "the model has too many faces to be held at once; give a memory budget")
-            : make_stages(s, slice, info, room, threads, error);
+                        "the model has too many faces to be held in memory at once; give a "
+                        "memory budget")
+            : make_stages(s, slice, info, space, threads, error);
     s->outer = slice->outer;
     s->face_source = slice->face_source;
     slice->outer = slice->face_source = NULL;

@@ -1,20 +1,20 @@
-/* The stages of making a subtree. */
+/* Stages of making an acceleration structure. */
 #ifndef EBPO_QUERY_ACCEL_PARTS_H
 #define EBPO_QUERY_ACCEL_PARTS_H
 
 #include "core/cpu.h"
 #include "query/accel.h"
 
-/* Faces to blocks and blocks to a hierarchy: only which goes where; nothing is computed from
- * coordinates. One walk through the tree. */
+/* Layout: assigns faces to blocks and blocks to a hierarchy in one walk through the tree; computes
+ * nothing from coordinates. */
 typedef struct ebpo_layout {
     /* [block_count] first local face of each block, and one past the last; all faces, in order */
     uint32_t *block_begin;
     uint32_t *block_end;
     uint64_t block_count, block_capacity;
-    /* [block_count] by what the accel knows each block: ebpo_meshlet; made with the blocks */
+    /* [block_count] number of each block in the accel (ebpo_meshlet); set with the blocks */
     uint32_t *block_number;
-    struct ebpo_block_corners *corners; /* [block_count] until they are filled */
+    struct ebpo_block_corners *corners; /* [block_count] valid until the blocks are filled */
     uint32_t (*child)[8];               /* [bound_count] as in ebpo_bound */
     /* [bound_count] blocks below a node are contiguous: first, and one past the last */
     uint32_t *first_block;
@@ -23,12 +23,12 @@ typedef struct ebpo_layout {
     uint32_t top;
 } ebpo_layout;
 
-/* EBPO_E_LIMIT for more than `most` blocks, which is EBPO_BLOCKS_MOST but in tests. */
+/* Returns EBPO_E_LIMIT for more than `most` blocks; `most` is EBPO_BLOCKS_MAX except in tests. */
 EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t most,
                                            ebpo_error *error);
 void ebpo_layout_free(ebpo_layout *layout);
 
-/* What is made, and of what. */
+/* Input of the making of an accel. */
 typedef struct ebpo_accel_plan {
     const ebpo_info *info;
     const ebpo_slice *slice;
@@ -36,33 +36,33 @@ typedef struct ebpo_accel_plan {
     ebpo_layout *layout; /* NULL: not known yet */
 } ebpo_accel_plan;
 
-/* Finds out what blocks take, gives them their numbers, and sets s->units (parallel); then fills
- * them (parallel). */
+/* Computes the sizes of blocks, numbers them and sets s->units (parallel); then fills them
+ * (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_accel_number_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
                                                    unsigned threads, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
                                                  unsigned threads, ebpo_error *error);
-/* Bounds of the hierarchy, from the blocks (parallel). */
+/* Computes the bounds of the hierarchy from the blocks (parallel). */
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
                                                  unsigned threads, ebpo_error *error);
-/* Room for at most so many rows; NULL: no memory. */
-ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_most);
+/* Allocates storage for at most `rows_max` rows. Returns NULL without memory. */
+ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_max);
 void ebpo_leaf_kinds_free(ebpo_leaf_kinds *kinds);
 
 /* --- kernels (block_measure_kernels.c) ---
  *
- * What is measured of blocks of floats, eight vertices at a time: compiled for any processor and
- * for those with AVX2, the same operations in the same order. How far off it may be:
- * docs/develop/bounds.md, "How slabs are measured". */
+ * Measures of blocks of floats, eight vertices at a time: compiled for any processor and for those
+ * with AVX2, the same operations in the same order. Error bounds: docs/develop/bounds.md, "How
+ * bounding cylinders are measured". */
 
 typedef struct ebpo_block_extent {
-    float low[3], high[3]; /* of its vertices, in the model's unit */
-    /* The sum of its faces' normals, as long as twice their areas. Where the axis of a slab points
-     * is only a matter of how tight it is. */
+    float low[3], high[3]; /* extent of its vertices, in the model's unit */
+    /* The sum of its faces' normals, as long as twice their areas. The direction of a cylinder's
+     * axis affects only the tightness. */
     float normal[3];
 } ebpo_block_extent;
 
-/* Where slabs are seen from: a place, in two parts, in the model's unit; the frame's scale; the
+/* Frame of a bounding cylinder: an origin in two parts, in the model's unit; the frame's scale; the
  * axis, and 1 less its square. */
 typedef struct ebpo_slab_view {
     float high[3], low[3], scale, axis[3], rest;
@@ -74,7 +74,7 @@ typedef struct ebpo_slab_extent {
 
 typedef struct ebpo_block_measures {
     void (*extent)(const ebpo_accel *s, uint32_t block, ebpo_block_extent *out);
-    /* Of all vertices of `count` blocks, of these numbers. */
+    /* Measures all vertices of `count` blocks, given by their numbers. */
     void (*slab)(const ebpo_accel *s, const uint32_t *block, uint32_t count,
                  const ebpo_slab_view *view, ebpo_slab_extent *out);
 } ebpo_block_measures;

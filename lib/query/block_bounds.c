@@ -1,9 +1,9 @@
-/* Bounds of the hierarchy over faces: boxes and bounding cylinders around the blocks below each
- * child.
+/* Computes the bounds of the hierarchy over faces: boxes and bounding cylinders around the blocks
+ * below each child.
  *
  * All bounds are computed in doubles, in the subtree's frame, then rounded outward to 8 and 16
  * bits. Blocks of floats are measured by kernels (block_measure_kernels.c). docs/develop/bounds.md
- * proves that what kernels read from these bounds in single precision still bounds. */
+ * proves that the bounds still hold when kernels read them in single precision. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -20,17 +20,19 @@
 #include "core/parallel.h"
 #include "query/accel_parts.h"
 
-/* Above so many blocks the slab is left away: such patches curve too much for one. */
+/* Above this number of blocks the bounding cylinder is omitted: such patches are too curved. */
 enum { SLAB_BLOCKS_MAX = 1024 };
-/* Boxes are wider than their faces by this, relative to the farthest of their coordinates. */
+/* Enlargement of boxes, relative to the largest coordinate of their faces. */
 static const double box_slack = 0x1p-19;
-/* Slabs by that, relative to the node's own size: patches are thinner than it is far away. */
+/* Enlargement of bounding cylinders, relative to the node's size: patches are thinner than their
+ * distance from the origin. */
 static const double slab_slack = 0x1p-19;
-/* Of a node's size, squared: slabs of nodes that are large beside a search drop hardly a child. */
+/* Share of a node's size, squared: cylinders of nodes that are large compared with a search exclude
+ * hardly any child. */
 static const double slab_share = 0.01;
-/* Of a model without any extent. */
+/* Enlargement for a model without extent. */
 static const double least_slack = 0x1p-60;
-enum { AXIS_UNIT = 1 << 15, SHORT_MOST = 32766 };
+enum { AXIS_UNIT = 1 << 15, SHORT_MAX = 32766 };
 
 typedef struct extent {
     double low[3], high[3], normal[3];
@@ -43,7 +45,7 @@ typedef struct job {
     extent *of_block, *of_node;
 } job;
 
-/* Two lanes at a time. */
+/* Two lanes. */
 typedef double pair __attribute__((vector_size(16)));
 
 #if defined(__SSE2__)
@@ -60,13 +62,13 @@ static inline pair greater_pair(pair a, pair b) { return pick_pair(a > b, a, b);
 #endif
 
 static double least_of(pair x) { return x[0] < x[1] ? x[0] : x[1]; }
-static double most_of(pair x) { return x[0] > x[1] ? x[0] : x[1]; }
+static double max_of(pair x) { return x[0] > x[1] ? x[0] : x[1]; }
 
 /* Vertices of a block of doubles, in the frame. */
 enum { PAIRS = EBPO_MESHLET_VERTICES / 2 };
 typedef struct vertices {
     pair x[3][PAIRS];
-    unsigned pairs; /* the last vertex may be there twice */
+    unsigned pairs; /* the last vertex may occur twice */
 } vertices;
 
 static void load_vertices(const ebpo_accel *s, uint32_t block, vertices *out)
@@ -96,7 +98,7 @@ static void add_vertices(const vertices *v, extent *e)
             high = greater_pair(v->x[k][i], high);
         }
         e->low[k] = least_of(low);
-        e->high[k] = most_of(high);
+        e->high[k] = max_of(high);
     }
 }
 
@@ -164,7 +166,7 @@ static const extent *extent_of(const job *j, uint32_t child)
     return child & EBPO_IS_BLOCK ? &j->of_block[child & ~EBPO_IS_BLOCK] : &j->of_node[child];
 }
 
-/* Nodes come after their children. */
+/* Extends nodes; they come after their children. */
 static void extend_nodes(job *j)
 {
     for (uint64_t n = 0; n < j->layout->bound_count; n++) {
@@ -176,10 +178,10 @@ static void extend_nodes(job *j)
 
 /* --- boxes --- */
 
-/* fmax of what are numbers: without calls. */
+/* Returns fmax of values that are not NaN, without a call. */
 static double larger_of(double a, double b) { return a > b ? a : b; }
 
-/* Origin and step of one axis: so that 255 steps hold what must be held. */
+/* Chooses origin and step of one axis so that 255 steps cover the range. */
 static double choose_grid(double low, double high, float *origin, float *step)
 {
     double slack = larger_of(fabs(low), fabs(high)) * box_slack + least_slack;
@@ -190,7 +192,7 @@ static double choose_grid(double low, double high, float *origin, float *step)
     return slack;
 }
 
-/* floor and ceil of what an int holds; without calls. */
+/* Return floor and ceil of values that fit an int, without a call. */
 static int round_down(double x)
 {
     int whole = (int)x;
@@ -221,7 +223,7 @@ static void set_boxes(ebpo_bound *b, const extent *all, const extent child[8])
     b->slab_limit2 = (float)(size * size * slab_share);
 }
 
-/* The greatest coordinate of any of its boxes. */
+/* Returns the largest coordinate of its boxes. */
 static double reach_of(const ebpo_bound *b)
 {
     double reach = 0;
@@ -231,14 +233,15 @@ static double reach_of(const ebpo_bound *b)
     return reach;
 }
 
-/* --- slabs --- */
+/* --- bounding cylinders --- */
 
 typedef struct slab {
     double middle[3], axis[3];
     double from, to, radius2;
 } slab;
 
-/* Rounded towards zero: the decoded axis is never longer than 1, which the bound rests upon. */
+/* Chooses the axis, rounded towards zero: the decoded axis is never longer than 1, which the bound
+ * needs. */
 static void choose_axis(const extent *e, ebpo_bound_slab *b, int lane, slab *out)
 {
     double length = sqrt(e->normal[0] * e->normal[0] + e->normal[1] * e->normal[1] +
@@ -269,8 +272,8 @@ static inline void add_to_slab(const vertices *v, slab_pairs *p)
     }
 }
 
-/* Of all vertices of a run of blocks. The middle of the box need not be between them: of a tilted
- * patch it is off its plane. */
+/* Adds all vertices of a run of blocks. The middle of the box need not be between them: for a
+ * tilted patch it is off its plane. */
 static void add_run_wide(const job *j, uint32_t begin, uint32_t end, slab *out)
 {
     slab_pairs p = { .from = { INFINITY, INFINITY }, .to = { -INFINITY, -INFINITY } };
@@ -284,12 +287,12 @@ static void add_run_wide(const job *j, uint32_t begin, uint32_t end, slab *out)
         add_to_slab(&v, &p);
     }
     out->from = least_of(p.from);
-    out->to = most_of(p.to);
-    out->radius2 = most_of(p.most);
+    out->to = max_of(p.to);
+    out->radius2 = max_of(p.most);
 }
 
-/* The same in single precision, seen from two floats near the middle: what they are off it comes on
- * top. */
+/* Does the same in single precision, relative to two floats near the middle; adds their distance
+ * from the middle. */
 static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, slab *out)
 {
     const ebpo_accel *s = j->s;
@@ -315,7 +318,7 @@ static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, slab *out
     out->radius2 = aside * aside;
 }
 
-/* Without an axis and as wide as the box is: says nothing that the box does not say. */
+/* Sets a cylinder without axis, as wide as the box: it adds nothing to the box. */
 static void no_slab(ebpo_bound_slab *b, int lane, const double half[3], slab *out)
 {
     for (int k = 0; k < 3; k++) {
@@ -351,14 +354,14 @@ static slab measure_slab(const job *j, uint64_t n, int lane, const extent *e)
     return out;
 }
 
-/* The longest side of the box that all children are in, at least 2^-18 of its reach. */
+/* Returns the longest side of the box of all children, at least 2^-18 of its largest coordinate. */
 static double size_of(const ebpo_bound *b)
 {
     return 255 * (double)fmaxf(b->step[0], fmaxf(b->step[1], b->step[2]));
 }
 
-/* Not so of faces that are so far from their leaf that squares overflow (in files of others): such
- * slabs say nothing, as a step that is infinite or NaN has no multiples. */
+/* Returns false for faces so far from their leaf that squares overflow (possible in untrusted
+ * files). Such cylinders exclude nothing, as no multiples of an infinite or NaN step exist. */
 static bool is_known(int count, const slab child[8], const double radius[8])
 {
     for (int lane = 0; lane < count; lane++)
@@ -373,17 +376,17 @@ static void set_slabs(ebpo_bound_slab *b, int count, double size, const slab chi
     double slack = size * slab_slack, along = 0, aside = 0, radius[8];
     for (int lane = 0; lane < count; lane++) {
         along = larger_of(along, larger_of(child[lane].to, -child[lane].from) + slack);
-        /* the square is off by less than 2^-49 of size * size */
+        /* the error of the square is less than 2^-49 of size * size */
         radius[lane] = sqrt(larger_of(child[lane].radius2, 0) + size * size * 0x1p-46) + slack;
         aside = larger_of(aside, radius[lane]);
     }
     bool known = is_known(count, child, radius);
-    b->along_step = (float)((known ? along : FLT_MAX / 4) / SHORT_MOST);
-    b->aside_step = (float)((known ? aside : FLT_MAX / 4) / SHORT_MOST);
+    b->along_step = (float)((known ? along : FLT_MAX / 4) / SHORT_MAX);
+    b->aside_step = (float)((known ? aside : FLT_MAX / 4) / SHORT_MAX);
     for (int lane = 0; lane < count; lane++) {
         if (!known) {
-            b->from[lane] = -SHORT_MOST;
-            b->to[lane] = b->radius[lane] = SHORT_MOST;
+            b->from[lane] = -SHORT_MAX;
+            b->to[lane] = b->radius[lane] = SHORT_MAX;
             continue;
         }
         b->from[lane] = (int16_t)round_down((child[lane].from - slack) / (double)b->along_step);
@@ -392,9 +395,9 @@ static void set_slabs(ebpo_bound_slab *b, int count, double size, const slab chi
     }
 }
 
-/* --- all of them --- */
+/* --- all nodes --- */
 
-/* As the accel has it. */
+/* Returns the number that the accel uses. */
 static uint32_t child_number(const job *j, uint32_t child)
 {
     return child == EBPO_NO_CHILD || !(child & EBPO_IS_BLOCK)
@@ -430,7 +433,7 @@ static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-static ebpo_status make_room(job *j, ebpo_error *error)
+static ebpo_status reserve_space(job *j, ebpo_error *error)
 {
     uint64_t count = j->layout->bound_count;
     ebpo_accel *s = j->s;
@@ -478,7 +481,7 @@ ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, uns
     s->bound_count = (uint32_t)layout->bound_count;
     s->top = layout->top;
     s->reach = 1;
-    ebpo_status status = make_room(&j, error);
+    ebpo_status status = reserve_space(&j, error);
     if (status == EBPO_OK)
         status = fill_levels(&j, threads, error);
     if (status == EBPO_OK && s->bound_count)

@@ -2,7 +2,7 @@
  * a block, and its extent along an axis and around it.
  *
  * Compiled for several instruction sets (core/cpu.h), with the same operations in the same order.
- * Error bounds: docs/develop/bounds.md, "How slabs are measured". */
+ * Error bounds: docs/develop/bounds.md, "How bounding cylinders are measured". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -12,9 +12,9 @@
 
 static const float lane_number[8] = { 0, 1, 2, 3, 4, 5, 6, 7 };
 
-EBPO_EIGHT float most_of(f8 x) { return -f8_least(f8_sub(f8_all(0), x)); }
+EBPO_EIGHT float max_of(f8 x) { return -f8_least(f8_sub(f8_all(0), x)); }
 
-/* Vertices at .. at + 7 on an axis; where there are fewer the first one again. */
+/* Loads vertices at .. at + 7 on an axis; repeats the first one where there are fewer. */
 EBPO_EIGHT f8 load_vertices(const float *x, unsigned at, unsigned count)
 {
     f8 there = f8_less(f8_load(lane_number), f8_all((float)count - (float)at));
@@ -51,7 +51,7 @@ static void measure_extent(const ebpo_accel *s, uint32_t block, ebpo_block_exten
             high = f8_max(here, high);
         }
         out->low[k] = f8_least(low);
-        out->high[k] = most_of(high);
+        out->high[k] = max_of(high);
     }
     measure_normals(&b, out->normal);
 }
@@ -93,8 +93,8 @@ static void measure_slab(const ebpo_accel *s, const uint32_t *block, uint32_t co
         }
     }
     out->from = f8_least(sum.from);
-    out->to = most_of(sum.to);
-    out->aside2 = most_of(sum.aside2);
+    out->to = max_of(sum.to);
+    out->aside2 = max_of(sum.aside2);
 }
 
 const ebpo_block_measures EBPO_KERNEL(ebpo_block_measures) = { measure_extent, measure_slab };

@@ -1,11 +1,11 @@
-/* Blocks: at most eight faces, with the vertices that they share.
+/* Makes blocks: at most eight faces, with the vertices that they share.
  *
- * The layout decides which faces share a block and how the blocks hang together; it computes
+ * The layout decides which faces share a block and builds the hierarchy of blocks; it computes
  * nothing from coordinates. The octree is the skeleton of the hierarchy: a node's new faces are one
  * range of numbers, so neighbouring children with few faces share a block, and nodes with few
  * blocks are passed up until eight come together. The blocks are then measured, numbered and filled
- * in parallel; their bounds are made in block_bounds.c. The encoding is that of ebpo_meshlet
- * (accel.h). */
+ * in parallel; block_bounds.c makes their bounds. The encoding is that of ebpo_meshlet (accel.h).
+ */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -18,8 +18,8 @@
 #include "geometry/level_nodes.h"
 #include "query/accel_parts.h"
 
-/* What a walk brings up from a node: either up to eight faces that are no block yet, or up to eight
- * members of the hierarchy. */
+/* Result of a walk below a node: either up to eight faces without a block, or up to eight members
+ * of the hierarchy. */
 typedef struct bundle {
     uint32_t begin, end; /* faces */
     int members;         /* 0: no block yet */
@@ -29,8 +29,8 @@ typedef struct bundle {
 typedef struct walk {
     ebpo_layout *out;
     const ebpo_slice *slice;
-    uint64_t gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX]; /* of each level, seen so far */
-    uint64_t most;                                         /* blocks */
+    uint64_t gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX]; /* nodes of each level, visited so far */
+    uint64_t most;                                         /* maximum number of blocks */
     bool failed;
 } walk;
 
@@ -49,7 +49,7 @@ static uint32_t add_block(walk *w, uint32_t begin, uint32_t end)
     return (uint32_t)o->block_count++ | EBPO_IS_BLOCK;
 }
 
-/* first_block and last_block hold faces until all blocks are known. */
+/* Adds a node. first_block and last_block hold faces until all blocks are known. */
 static uint32_t add_bound(walk *w, const bundle *b)
 {
     ebpo_layout *o = w->out;
@@ -75,8 +75,8 @@ static void close_bundle(walk *w, bundle *b)
     }
 }
 
-/* Neighbours that together fill a node best; of those not wrapped yet, or the hierarchy would get
- * deep. */
+/* Neighbours that together fill a node best, among those not wrapped yet; otherwise the hierarchy
+ * would get deep. */
 typedef struct run {
     int begin, end, members;
 } run;
@@ -105,8 +105,7 @@ static bundle gather_parts(const bundle *part, int parts)
     return out;
 }
 
-/* Wraps neighbours in nodes, as full ones as there are, until all members together are at most
- * eight. */
+/* Wraps neighbours in nodes, as full as possible, until at most eight members remain. */
 static bundle join_parts(walk *w, bundle *part, int parts)
 {
     bool wrapped[8] = { false };
@@ -131,7 +130,7 @@ static bundle join_parts(walk *w, bundle *part, int parts)
                      : gather_parts(part, parts);
 }
 
-/* A range in its own order: blocks of equal size, eight by eight under nodes. */
+/* Splits a range in its order: blocks of equal size, eight under each node. */
 static bundle split_range(walk *w, uint32_t begin, uint32_t end)
 {
     uint64_t count = end - begin;
@@ -175,15 +174,15 @@ static bundle walk_gray(walk *w, int depth, uint32_t begin)
 
 static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
 {
-    if (type == EBPO_GRAY && depth + 1 < w->slice->level_count) /* pruned otherwise */
+    if (type == EBPO_GRAY && depth + 1 < w->slice->level_count) /* otherwise pruned */
         return walk_gray(w, depth, begin);
     if (type == EBPO_LEAF)
         return split_range(w, begin, begin + w->slice->level[depth].leaf_new[w->leaf[depth]++]);
     return (bundle){ begin, begin, 0, { 0 } };
 }
 
-/* Blocks are found in the order in which they are filled; numbers them by their faces instead, so
- * that what lies below a node is one range of blocks. */
+/* Renumbers blocks, which are found in the order in which they are filled, by their faces, so that
+ * the blocks below a node are one range. */
 static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
 {
     uint32_t *at_face = ebpo_alloc(faces + 1, sizeof *at_face),
@@ -199,7 +198,7 @@ static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
     for (uint64_t face = 0; face < faces; number++) {
         uint32_t old = at_face[face];
         end[number] = o->block_end[old];
-        o->block_end[old] = number; /* from now on: the new number of an old one */
+        o->block_end[old] = number; /* from here on: the new number of an old one */
         at_face[face] = number;
         face = end[number];
     }
@@ -226,10 +225,10 @@ ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t
     walk w = { .out = out, .slice = slice, .most = most };
     bundle part[2];
     int parts = 0;
-    if (slice->outer_count)
-        part[parts++] = split_range(&w, 0, slice->outer_count);
+    if (slice->shared_count)
+        part[parts++] = split_range(&w, 0, slice->shared_count);
     part[parts] =
-        walk_node(&w, 0, ebpo_group_type(slice->level[0].types[0], 0), slice->outer_count);
+        walk_node(&w, 0, ebpo_group_type(slice->level[0].types[0], 0), slice->shared_count);
     if (part[parts].end > part[parts].begin)
         parts++;
     if (parts) {
@@ -243,7 +242,8 @@ ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t
     bool full = out->block_count >= most;
     ebpo_layout_free(out);
     return full ? ebpo_fail(error, EBPO_E_LIMIT,
-                            "the model has too many faces to be held at once; give a memory budget")
+                            "the model has too many faces to be held in memory at once; give a "
+                            "memory budget")
                 : ebpo_fail_memory(error, slice->mesh.face_count * 8);
 }
 
@@ -261,7 +261,7 @@ void ebpo_layout_free(ebpo_layout *layout)
 
 /* --- blocks --- */
 
-/* Which of a block's vertices, in the order in which its faces have them: [face][corner]. */
+/* Indices into a block's vertices, in the order in which its faces have them: [face][corner]. */
 struct ebpo_block_corners {
     uint8_t at[EBPO_MESHLET_VERTICES], count;
 };
@@ -275,11 +275,11 @@ typedef struct job {
 /* A block's vertices. */
 typedef struct shared {
     uint32_t vertex[EBPO_MESHLET_VERTICES];
-    const uint8_t *at; /* [face][corner]: which of them */
+    const uint8_t *at; /* [face][corner]: index of the vertex */
     unsigned faces, count;
 } shared;
 
-/* Open addressing: one more than the number of a vertex among the block's, 0: free. */
+/* Open addressing: one more than the index of a vertex among the block's, 0: free. */
 enum { TABLE_BITS = 6, TABLE = 1 << TABLE_BITS };
 
 static const uint32_t *corners_of(const job *j, uint64_t block, unsigned *count)
@@ -293,11 +293,11 @@ static void find_shared(const job *j, uint64_t block)
 {
     unsigned corners, count = 0;
     const uint32_t *corner = corners_of(j, block, &corners);
-    uint32_t vertex[EBPO_MESHLET_VERTICES + 1]; /* and one that is looked for */
+    uint32_t vertex[EBPO_MESHLET_VERTICES + 1]; /* and the searched one */
     uint8_t table[TABLE] = { 0 };
     for (unsigned i = 0; i < corners; i++) {
         unsigned slot = corner[i] * UINT32_C(0x9e3779b1) >> (32 - TABLE_BITS), at;
-        /* whether a corner is new is a toss: without a branch; vertices at one slot are rare */
+        /* branch-free, because a branch on a new corner is unpredictable; collisions are rare */
         vertex[count] = corner[i];
         for (;; slot = (slot + 1) % TABLE) {
             at = table[slot] ? table[slot] - 1u : count;
@@ -322,7 +322,7 @@ static void take_shared(const job *j, uint64_t block, shared *out)
         out->vertex[out->at[i]] = corner[i];
 }
 
-/* Of the record, in units. */
+/* Returns the size of the record, in units. */
 static uint32_t size_of(const ebpo_accel *s, unsigned vertices)
 {
     if (vertices > EBPO_MESHLET_SHARED)
@@ -345,7 +345,7 @@ static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, u
     return EBPO_OK;
 }
 
-/* From sizes to numbers. False: too many. */
+/* Turns sizes into numbers. Returns false when there are too many. */
 static bool number_blocks(ebpo_accel *s, ebpo_layout *layout)
 {
     for (uint64_t b = 0; b < layout->block_count; b++) {
@@ -353,12 +353,12 @@ static bool number_blocks(ebpo_accel *s, ebpo_layout *layout)
         layout->block_number[b] = (uint32_t)s->units;
         s->units += size;
     }
-    return s->units <= EBPO_BLOCKS_MOST;
+    return s->units <= EBPO_BLOCKS_MAX;
 }
 
 /* --- filling --- */
 
-/* What is not shared enough: each corner of each lane is a vertex of its own. */
+/* Makes each corner of each lane a separate vertex, for blocks that share too few. */
 static void spread_corners(shared *v)
 {
     uint32_t corner[EBPO_MESHLET_VERTICES];
@@ -416,8 +416,9 @@ static ebpo_status fill_blocks(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Kernels read a table of 16 where it begins: what lies behind the last record is theirs too. */
-static ebpo_status make_room(ebpo_accel *s, ebpo_error *error)
+/* Allocates records. Kernels read tables of 16 entries, so memory behind the last record is
+ * allocated too. */
+static ebpo_status reserve_space(ebpo_accel *s, ebpo_error *error)
 {
     uint64_t bytes = s->units * EBPO_MESHLET_UNIT;
     if (bytes > PTRDIFF_MAX - EBPO_MESHLET_UNIT)
@@ -443,7 +444,8 @@ ebpo_status ebpo_accel_number_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
                                            &j, NULL, "open", error);
     if (status == EBPO_OK && !number_blocks(s, layout))
         status = ebpo_fail(error, EBPO_E_LIMIT,
-                           "the model has too many faces to be held at once; give a memory budget");
+                           "the model has too many faces to be held in memory at once; give a "
+                           "memory budget");
     return status;
 }
 
@@ -452,7 +454,7 @@ ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan, u
 {
     ebpo_layout *layout = plan->layout;
     job j = { s, &plan->slice->mesh, layout };
-    ebpo_status status = make_room(s, error);
+    ebpo_status status = reserve_space(s, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(threads, NULL, layout->block_count, 1024, fill_blocks, &j, NULL,
                                    "open", error);

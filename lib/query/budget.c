@@ -1,11 +1,11 @@
-/* Budgets: how much memory a model may take, and for what.
+/* Budgets: the memory limit of a model and its division.
  *
  * A model is held in memory as a whole if the budget allows it. Otherwise the budget is shared by
  * the top of the tree (query_top.c), a cache of decoded chunks, skeletons (skeleton.c) and a cache
- * of subtrees, and the cut level is chosen so that subtrees are small enough. All of this is
- * planned from the counts in the file's head, before anything is read.
+ * of subtrees. The cut level is chosen so that subtrees are small enough. The plan uses only the
+ * counts in the file header; no chunks are read.
  *
- * Several models may share a budget: what each takes for good is taken from it, and their caches
+ * Several models may share a budget: the permanent parts of each are subtracted, and their caches
  * share the rest. A shared budget may be used by any thread. */
 #include "core/strict_fp.h"
 
@@ -20,19 +20,19 @@
 #include "query/accel.h"
 #include "query/model_parts.h"
 
-/* Decoded chunks: an eighth of the budget, within these. */
-enum { CHUNKS_MOST = 128 << 20 };
+/* Cache of decoded chunks: an eighth of the budget, within these limits. */
+enum { CHUNKS_MAX = 128 << 20 };
 
 uint64_t ebpo_chunk_budget(uint64_t budget)
 {
     return budget / 8 < EBPO_CHUNKS_LEAST ? EBPO_CHUNKS_LEAST
-           : budget / 8 > CHUNKS_MOST     ? CHUNKS_MOST
+           : budget / 8 > CHUNKS_MAX      ? CHUNKS_MAX
                                           : budget / 8;
 }
 
-/* Skeletons of subtrees, at most: searches that go everywhere gain more by them than by a few more
- * subtrees. Of what is beyond the least, so that small budgets do for what they would do for
- * without them. */
+/* Returns the maximum bytes of skeletons of subtrees: searches over the whole model gain more by
+ * them than by a few more subtrees. Taken from the part above the minimum, so that the minimum
+ * budget does not grow. */
 uint64_t ebpo_skeleton_budget(const ebpo_model_options *o, uint64_t budget)
 {
     const uint64_t least = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
@@ -47,17 +47,17 @@ uint64_t ebpo_beside_subtrees(const ebpo_model_options *o, uint64_t budget)
 struct ebpo_budget {
     uint64_t bytes;
     ebpo_cache_pool *subtrees, *chunks;
-    pthread_mutex_t lock;      /* of what follows */
-    uint64_t whole, skeletons; /* that may still be taken */
+    pthread_mutex_t lock;      /* protects the following fields */
+    uint64_t whole, skeletons; /* bytes still available */
 };
 
 ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget **out, ebpo_error *error)
 {
     *out = NULL;
-    ebpo_model_options usual = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_options standard = EBPO_MODEL_OPTIONS_INIT;
     uint64_t chunks = ebpo_chunk_budget(bytes), least = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
     if (bytes == 0)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "a budget of 0 bytes");
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the budget is 0 bytes");
     if (bytes < least)
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "a budget of %" PRIu64 " bytes is too small for any model; give %" PRIu64
@@ -69,7 +69,7 @@ ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget **out, ebpo_error *error
     (void)pthread_mutex_init(&b->lock, NULL);
     b->bytes = bytes;
     b->whole = bytes / 2;
-    b->skeletons = ebpo_skeleton_budget(&usual, bytes);
+    b->skeletons = ebpo_skeleton_budget(&standard, bytes);
     ebpo_status status = ebpo_cache_pool_make(&b->subtrees, bytes - chunks, error);
     if (status == EBPO_OK)
         status = ebpo_cache_pool_make(&b->chunks, chunks, error);
@@ -108,7 +108,7 @@ ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *b) { return b->chunks; }
 
 uint64_t ebpo_budget_bytes(const ebpo_budget *b) { return b->bytes; }
 
-/* What is not taken for good. */
+/* Returns the bytes that are not taken permanently. */
 static uint64_t budget_left(const ebpo_budget *b)
 {
     uint64_t now, peak, taken;
@@ -156,8 +156,8 @@ void ebpo_budget_give_back_skeletons(ebpo_budget *b, uint64_t bytes)
 
 /* --- the plan of a model --- */
 
-/* Of a cache: a path needs the subtree where it is, those around, and room to load the next. More
- * of them, smaller ones, are faster to load. */
+/* Minimum number of subtrees in a cache: a path needs the current subtree, its neighbours, and
+ * memory to load the next. More and smaller ones load faster. */
 enum { SUBTREES_NEEDED = 64, SUBTREES_WANTED = 320 };
 
 static ebpo_slice_size whole_size(const ebpo_info *info)
@@ -172,8 +172,8 @@ static ebpo_slice_size whole_size(const ebpo_info *info)
     return size;
 }
 
-/* Half the budget for subtrees must hold so many of the average size; the top may take a quarter.
- */
+/* Chooses the cut level: half the budget for subtrees must hold this number of subtrees of average
+ * size; the top may take a quarter. */
 static int cut_for(const ebpo_info *info, const ebpo_model_options *o, uint64_t budget,
                    uint64_t subtrees)
 {
@@ -198,7 +198,7 @@ static int choose_cut(const ebpo_info *info, const ebpo_model_options *o, uint64
     return cut < 0 ? cut_for(info, o, budget, SUBTREES_NEEDED) : cut;
 }
 
-/* A budget that choose_cut accepts, not much more than the least. */
+/* Returns a budget that choose_cut accepts, slightly above the minimum. */
 static uint64_t least_budget(const ebpo_info *info, const ebpo_model_options *o)
 {
     uint64_t budget = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
@@ -207,7 +207,7 @@ static uint64_t least_budget(const ebpo_info *info, const ebpo_model_options *o)
     return budget;
 }
 
-/* Files far away are read in parts, unless they are small: nobody asked for all of them. */
+/* Remote files are read in parts, unless they are small, as queries rarely need the whole file. */
 enum { FAR_MEMORY = 256 << 20, FAR_WHOLE_BYTES = 2 << 20 };
 
 static bool reads_parts(const ebpo_file *file, bool default_memory)
@@ -217,17 +217,17 @@ static bool reads_parts(const ebpo_file *file, bool default_memory)
     return ebpo_input_is_far(&file->in) && !small && (info->subtree_level || default_memory);
 }
 
-bool ebpo_usual_memory(const ebpo_file *file, ebpo_model_options *o)
+bool ebpo_default_memory(const ebpo_file *file, ebpo_model_options *o)
 {
     if (o->budget)
         o->memory = budget_left(o->budget);
-    bool usual = !o->memory && ebpo_input_is_far(&file->in);
-    if (usual && o->cut_level < 0)
+    bool standard = !o->memory && ebpo_input_is_far(&file->in);
+    if (standard && o->cut_level < 0)
         o->memory = FAR_MEMORY;
-    return usual;
+    return standard;
 }
 
-/* The roots of the file's subtrees, which are read as one, if the budget allows them. */
+/* Prefers the roots of the file's subtrees, which are read as one, if the budget allows them. */
 static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, int cut)
 {
     int level = info->subtree_level;
@@ -238,7 +238,7 @@ static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, i
                : cut;
 }
 
-/* --- what comes of it --- */
+/* --- applying the plan --- */
 
 static ebpo_status choose_parts(const ebpo_info *info, const ebpo_model_options *o,
                                 ebpo_model_plan *out, ebpo_error *error)
@@ -258,7 +258,7 @@ static ebpo_status choose_plan(const ebpo_file *file, const ebpo_model_options *
 {
     const ebpo_info *info = ebpo_file_info(file);
     int deepest = info->level_count - 1;
-    if (!(info->parts & EBPO_PART_MESH)) /* nothing could be loaded from below a cut level */
+    if (!(info->parts & EBPO_PART_MESH)) /* nothing could be loaded below a cut level */
         out->cut_level = deepest;
     else if (o->cut_level >= 0)
         out->cut_level = o->cut_level < deepest ? o->cut_level : deepest;
@@ -269,7 +269,7 @@ static ebpo_status choose_plan(const ebpo_file *file, const ebpo_model_options *
     return EBPO_OK;
 }
 
-/* By counts. */
+/* Shares the budget, based on counts. */
 static void share_budget(const ebpo_info *info, const ebpo_model_options *o, ebpo_model_plan *out)
 {
     ebpo_slice_size size = whole_size(info);
@@ -281,13 +281,13 @@ static void share_budget(const ebpo_info *info, const ebpo_model_options *o, ebp
     out->top = ebpo_top_estimate(info, out->cut_level);
     out->chunks = o->memory ? ebpo_chunk_budget(o->memory) : 0;
     out->skeletons =
-        ebpo_skeletons_room(out->subtrees,
-                            ebpo_skeleton_budget(o, o->memory ? o->memory : UINT64_MAX));
+        ebpo_skeletons_capacity(out->subtrees,
+                                ebpo_skeleton_budget(o, o->memory ? o->memory : UINT64_MAX));
     taken = out->top + out->chunks + out->skeletons;
     out->subtrees_held = out->subtrees;
     if (o->memory && out->subtree_bytes) {
-        uint64_t room = o->memory > taken ? (o->memory - taken) / out->subtree_bytes : 0;
-        out->subtrees_held = room < out->subtrees ? room : out->subtrees;
+        uint64_t space = o->memory > taken ? (o->memory - taken) / out->subtree_bytes : 0;
+        out->subtrees_held = space < out->subtrees ? space : out->subtrees;
     }
 }
 
@@ -298,12 +298,12 @@ ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *o, 
     uint64_t keep, least;
     *out = (ebpo_model_plan)EBPO_MODEL_PLAN_INIT;
     if (o->loading > EBPO_LOAD_NODES)
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "model options: there is no way of loading number %d", (int)o->loading);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "model options: unknown load mode %d",
+                         (int)o->loading);
     if (o->budget && o->loading != EBPO_LOAD_CACHE)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "model options: models that share a budget keep what they load "
-                         "(EBPO_LOAD_CACHE)");
+                         "model options: models that share a budget need load mode "
+                         "EBPO_LOAD_CACHE");
     ebpo_accel_estimate_whole(info, &keep, &out->whole);
     least = least_budget(info, o);
     out->least = least < out->whole ? least : out->whole;
@@ -334,7 +334,7 @@ ebpo_status ebpo_model_memory(const ebpo_file *file, const ebpo_model_options *o
         status = EBPO_CHECK_SIZED(ebpo_model_plan, out, error);
     if (status != EBPO_OK)
         return status;
-    bool default_memory = ebpo_usual_memory(file, &wanted);
+    bool default_memory = ebpo_default_memory(file, &wanted);
     status = ebpo_plan_model(file, &wanted, default_memory, &plan, error);
     return status == EBPO_OK ? EBPO_GIVE(ebpo_model_plan, out, &plan) : status;
 }

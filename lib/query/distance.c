@@ -1,11 +1,11 @@
 /* Distance to the surface, nearest point and normal: EBP 2017, 4.4.
  *
  * The exact minimum comes from nearest_subtrees.c. The modes of the thesis, which are not always
- * the minimum, look at the leaf around the point, at all leaves below the deepest gray node around
- * it, or at the envelope of a node. With a level a query returns an interval that the envelopes of
- * that level's nodes prove; when a deadline passes, one that follows from what was searched by
- * then. In a subset a query fails with EBPO_E_ABSENT when an omitted face might be nearer than what
- * was found. */
+ * the minimum, search the leaf around the point, all leaves below the deepest gray node around it,
+ * or the envelope of a node. With a level, a query returns an interval that the envelopes of that
+ * level's nodes prove; when a deadline passes, an interval from the nodes searched by then. In a
+ * subset a query fails with EBPO_E_ABSENT when an omitted face might be nearer than the found one.
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -47,8 +47,8 @@ static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_node node, 
     return status;
 }
 
-/* Of the leaf around p; where there is none: nothing (LEAVES), or of all leaves below the deepest
- * gray node around p (RECURSIVE). */
+/* Searches the leaf around p. Where there is none, finds nothing (LEAVES), or searches all leaves
+ * below the deepest gray node around p (RECURSIVE). */
 static ebpo_status distance_around(ebpo_context *c, const double p[3],
                                    const ebpo_distance_options *o, ebpo_distance_result *out,
                                    ebpo_error *error)
@@ -84,7 +84,7 @@ static ebpo_status distance_around(ebpo_context *c, const double p[3],
 static void corner_of(const ebpo_box *box, ebpo_cell cell, const double xi[3], double out[3])
 {
     for (int k = 0; k < 3; k++) {
-        double low = ebpo_wall(box, k, cell.level, cell.at[k]);
+        double low = ebpo_cell_face(box, k, cell.level, cell.at[k]);
         out[k] = low + xi[k] * (box->size[k] / (double)(1u << cell.level));
     }
 }
@@ -120,7 +120,7 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, ebpo_ce
 typedef struct node_chain {
     ebpo_node node[EBPO_LEVELS_MAX];
     int count;
-    const ebpo_node *pruned; /* behind the last one, or NULL */
+    const ebpo_node *pruned; /* after the last one, or NULL */
     ebpo_node child;
 } node_chain;
 
@@ -153,14 +153,14 @@ static ebpo_status follow_cells(ebpo_context *c, const uint32_t at[3], int level
     }
 }
 
-/* The octant of a node in the one above. */
+/* Returns the octant of a node in its parent. */
 static unsigned octant_of(ebpo_cell cell)
 {
     return (cell.at[0] & 1) | (cell.at[1] & 1) << 1 | (cell.at[2] & 1) << 2;
 }
 
-/* Leaves the envelope of the last node that has any in cutting[0]; returns its number in the chain.
- * What a node's is cut from is the one above, so that one that is kept stands for all above it. */
+/* Leaves the envelope of the last node that has one in cutting[0]; returns its number in the chain.
+ * A node's envelope is cut from its parent's, so one stored envelope replaces all above it. */
 static int cut_envelope(ebpo_context *c, const node_chain *chain)
 {
     ebpo_polytope *out = &c->cutting[0], *above = &c->cutting[1];
@@ -186,7 +186,8 @@ static int cut_envelope(ebpo_context *c, const node_chain *chain)
     return at - 1;
 }
 
-/* To the polygons of the envelope of the deepest gray node around p, at most at options->level. */
+/* Computes the distance to the polygons of the envelope of the deepest gray node around p, at most
+ * at options->level. */
 static ebpo_status distance_to_envelope(ebpo_context *c, const double p[3],
                                         const ebpo_distance_options *o, ebpo_distance_result *out,
                                         ebpo_error *error)
@@ -211,7 +212,7 @@ static ebpo_status distance_to_envelope(ebpo_context *c, const double p[3],
     return EBPO_OK;
 }
 
-/* --- subsets: when a face that was left out may be nearer than what was found --- */
+/* --- subsets: an omitted face may be nearer than the found one --- */
 
 static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n,
                                  const ebpo_ranking *ranking, ebpo_node node, double lower,
@@ -237,9 +238,8 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n,
     return status;
 }
 
-/* Fails when what was left out may matter; with a deadline that has passed it only widens what is
- * certain. */
-static ebpo_status look_at_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
+/* Fails when an omitted part may matter; after the deadline it only widens the interval. */
+static ebpo_status inspect_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
     ebpo_ranking ranking = ebpo_ranking_of(c->model, n->p, &n->far);
     double nearest = INFINITY;
@@ -273,11 +273,12 @@ static ebpo_status exact_distance(ebpo_context *c, const double p[3],
                                 c->warm_source_face);
     ebpo_status status = ebpo_nearest_first(c, &n, error);
     if (status == EBPO_OK)
-        status = look_at_pruned(c, &n, error);
+        status = inspect_pruned(c, &n, error);
     if (status != EBPO_OK)
         return status;
     if (n.late && n.passed_over <= n.limit) {
-        /* With hardly any time nothing may have been found; but some face is in the root cell. */
+        /* With a very short deadline nothing may have been found; but some face is in the root
+         * cell. */
         ebpo_box box = ebpo_model_box(c->model);
         double hi = fmin(n.upper, ebpo_cell_far(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, p)),
                lo = fmin(fmin(n.passed_over, n.found ? n.bounds.lo : n.upper), hi);
@@ -298,7 +299,7 @@ static ebpo_status exact_distance(ebpo_context *c, const double p[3],
     return ebpo_give_sign(c, p, o, out, error);
 }
 
-/* --- the interval that the nodes of a level give --- */
+/* --- the interval from the nodes of a level --- */
 
 typedef struct interval {
     ebpo_context *c;
@@ -376,11 +377,11 @@ static ebpo_status distance_of_point(ebpo_context *c, const double p[3],
                          : exact_distance(c, p, o, out, error);
 }
 
-/* Modes that cannot keep to a level or a deadline say so. */
+/* Reports modes that support no level or deadline. */
 static ebpo_status check_values(const ebpo_distance_options *o, ebpo_error *error)
 {
     if (!(o->max_distance >= 0))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "maximum distance %g: give 0 or more",
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "maximum distance %g is invalid; give 0 or more",
                          o->max_distance);
     return o->mode <= EBPO_DISTANCE_ENVELOPE ? EBPO_OK : ebpo_fail_value(error);
 }
@@ -390,19 +391,20 @@ static ebpo_status check_mode(const ebpo_distance_options *o, ebpo_error *error)
     bool around = o->mode == EBPO_DISTANCE_RECURSIVE || o->mode == EBPO_DISTANCE_LEAVES;
     if (around && (o->level >= 0 || o->deadline_ns))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the recursive and leaves modes of distance have neither level nor "
-                         "deadline; leave these out, or use the exact mode");
+                         "the recursive and leaves modes of distance support neither level nor "
+                         "deadline; omit these, or use the exact mode");
     if (o->mode == EBPO_DISTANCE_ENVELOPE && o->deadline_ns)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the envelope mode of distance has no deadline; give a level instead");
+                         "the envelope mode of distance supports no deadline; give a level "
+                         "instead");
     return EBPO_OK;
 }
 
-static void count_work(ebpo_context *c, uint64_t questions, uint64_t searched, uint64_t loaded)
+static void count_work(ebpo_context *c, uint64_t queries, uint64_t searched, uint64_t loaded)
 {
     if (c->model->whole)
         return;
-    c->model->distances += questions;
+    c->model->distances += queries;
     c->model->distance_subtrees += c->searched - searched;
     c->model->distance_loads += c->loaded - loaded;
 }
@@ -425,7 +427,7 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
         status = ebpo_check_points(points, count, error);
     if (status == EBPO_OK && o->level < 0 && o->mode != EBPO_DISTANCE_ENVELOPE)
         status = ebpo_check_mesh(context->model, error);
-    /* of a subset, bounds decide whether what is missing matters */
+    /* in a subset, bounds decide if omitted parts matter */
     context->planes = o->level >= 0 || o->deadline_ns || o->mode != EBPO_DISTANCE_EXACT ||
                       context->model->info->pruned;
     ebpo_batch batch = { .count = 0 };

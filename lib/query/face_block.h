@@ -1,6 +1,6 @@
-/* How kernels read a block's faces: eight lanes at a time, one axis after the other. Lanes from
- * `count` on repeat one of its faces: bounds need no mask, counting does. Included by what is
- * compiled for several processors. */
+/* Reads a block's faces for kernels: eight lanes at a time, one axis after the other. Lanes from
+ * `count` on repeat one of its faces: bounds need no mask, counting does. Included by files that
+ * are compiled for several processors. */
 #ifndef EBPO_QUERY_FACE_BLOCK_H
 #define EBPO_QUERY_FACE_BLOCK_H
 
@@ -9,7 +9,7 @@
 
 typedef struct ebpo_face_block {
     const ebpo_meshlet *m;
-    n8 corner[3]; /* which vertices, where they are shared */
+    n8 corner[3]; /* vertex indices, where vertices are shared */
 } ebpo_face_block;
 
 EBPO_EIGHT ebpo_face_block ebpo_face_block_open(const ebpo_accel *s, uint32_t block)
@@ -20,13 +20,13 @@ EBPO_EIGHT ebpo_face_block ebpo_face_block_open(const ebpo_accel *s, uint32_t bl
     return b;
 }
 
-/* A bit for each lane that holds a face. */
+/* Returns a bit for each lane that holds a face. */
 EBPO_EIGHT unsigned ebpo_face_block_lanes(const ebpo_face_block *b)
 {
     return (1u << b->m->faces) - 1;
 }
 
-/* The three corners' coordinates on an axis, in the model's unit; of an accel of floats. */
+/* Reads the three corners' coordinates on an axis, in the model's unit; for an accel of floats. */
 EBPO_EIGHT void ebpo_face_block_floats(const ebpo_face_block *b, int axis, f8 corner[3])
 {
     const float *x = ebpo_meshlet_floats(b->m) + (unsigned)axis * b->m->vertices;
@@ -35,12 +35,12 @@ EBPO_EIGHT void ebpo_face_block_floats(const ebpo_face_block *b, int axis, f8 co
             corner[i] = f8_load(x + i * EBPO_BLOCK);
         return;
     }
-    f8_table table = f8_table_load(x); /* beyond its vertices: what lies behind, never picked */
+    f8_table table = f8_table_load(x); /* beyond its vertices: following memory, never picked */
     for (int i = 0; i < 3; i++)
         corner[i] = f8_look_up(table, b->corner[i]);
 }
 
-/* The same of an accel of doubles. */
+/* Does the same for an accel of doubles. */
 EBPO_EIGHT void ebpo_face_block_doubles(const ebpo_face_block *b, int axis,
                                         double corner[3][EBPO_BLOCK])
 {

@@ -1,10 +1,10 @@
-/* The faces that meet a box: their numbers, or their triangles block by block.
+/* Finds the faces that intersect a box: their numbers, or their triangles block by block.
  *
- * The walk goes through the tree depth first, from accel to accel; in each it tests the
- * boxes of children, in a way that drops only what is certainly outside, then triangles exactly. Of
- * files far away the walk announces the subtrees that it will enter. A face that several subtrees
- * list is reported once, for the first of them. In a subset the query fails when an omitted node
- * meets the box. */
+ * The walk goes through the tree depth first, from accel to accel. In each it tests the boxes of
+ * children, dropping only those certainly outside, then triangles exactly. In remote files the walk
+ * sends prefetch hints for the subtrees that it will enter. A face that several subtrees list is
+ * reported once, for the first of them. In a subset the query fails when an omitted node intersects
+ * the box. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -23,20 +23,20 @@ typedef struct box_walk box_walk;
 struct box_walk {
     ebpo_context *context;
     const double *min, *max;
-    /* In the accel at hand, the faces that meet the box: their slots, ascending, which is the order
+    /* Slots of the faces of the current accel that intersect the box, ascending, which is the order
      * of the file. */
     uint32_t *slot;
     uint64_t count, capacity;
-    ebpo_node below; /* in whose place it stands, when it is not the whole tree */
+    ebpo_node below; /* the node that the accel represents, when it is not the whole tree */
     bool no_memory, enough;
-    /* Of a file far away: what the walk will enter, in its order, and how many it has. */
+    /* For a remote file: the subtrees that the walk will enter, in order, and their number. */
     uint32_t *ahead;
     uint64_t ahead_count, ahead_capacity, entered;
-    /* Called for each accel that the box meets, depth first; *enough ends the walk. */
+    /* Called for each accel that the box intersects, depth first; *enough ends the walk. */
     ebpo_status (*take)(box_walk *walk, const ebpo_accel *s, ebpo_error *error);
 };
 
-/* EBPO_E_ARGUMENT: no box. */
+/* Returns EBPO_E_ARGUMENT for an invalid box. */
 static ebpo_status check_box(const double min[3], const double max[3], ebpo_error *error)
 {
     for (int k = 0; k < 3; k++)
@@ -56,7 +56,7 @@ static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
         if (ebpo_accel_slot_face(s, slot) == EBPO_NO_SLOT)
             return;
         ebpo_accel_triangle(s, slot, t);
-        if (!ebpo_triangle_meets_box((const double(*)[3])t, w->min, w->max))
+        if (!ebpo_triangle_intersects_box((const double(*)[3])t, w->min, w->max))
             continue;
         w->no_memory = !ebpo_grow(&w->slot, &w->capacity, w->count + 1, sizeof *w->slot);
         if (!w->no_memory)
@@ -64,8 +64,8 @@ static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
     }
 }
 
-/* low, high: the box in the frame. Boxes of the hierarchy are wider than their faces by more than
- * what floats lose here. */
+/* Gathers faces. low, high: the box in the frame. Boxes of the hierarchy are enlarged by more than
+ * the rounding error of floats here. */
 static void gather_bound(box_walk *w, const ebpo_accel *s, const float low[3], const float high[3],
                          uint32_t child)
 {
@@ -110,15 +110,15 @@ static ebpo_status gather_blocks(box_walk *w, const ebpo_accel *s, ebpo_error *e
     return w->take(w, s, error);
 }
 
-/* --- in all of them --- */
+/* --- in all accels --- */
 
 static bool box_matters(void *user, const ebpo_box *box, const ebpo_node *node)
 {
     const box_walk *w = user;
-    return ebpo_cell_meets(box, node->cell, w->min, w->max);
+    return ebpo_cell_intersects(box, node->cell, w->min, w->max);
 }
 
-/* Without memory for it, subtrees are announced as they are entered. */
+/* Lists subtrees ahead. Without memory, each prefetch hint is sent when its subtree is entered. */
 static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
 {
     if (ebpo_node_is_uniform(&node) || !box_matters(w, box, &node) || w->no_memory)
@@ -134,13 +134,14 @@ static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
         list_ahead(w, box, ebpo_model_child(w->context->model, &node, octant));
 }
 
-/* Before a subtree is entered: with the first of each window those behind it. */
-static void announce_window(box_walk *w)
+/* Sends prefetch hints before a subtree is entered: at the first of each window, for the whole
+ * window. */
+static void hint_window(box_walk *w)
 {
     uint64_t at = w->entered++, left = at < w->ahead_count ? w->ahead_count - at : 0;
-    if (at % EBPO_ANNOUNCED_MOST == 0 && left)
-        ebpo_context_announce(w->context, w->ahead + at,
-                              left < EBPO_ANNOUNCED_MOST ? left : EBPO_ANNOUNCED_MOST);
+    if (at % EBPO_HINTED_MAX == 0 && left)
+        ebpo_context_hint(w->context, w->ahead + at,
+                          left < EBPO_HINTED_MAX ? left : EBPO_HINTED_MAX);
 }
 
 static ebpo_status gather_node(box_walk *w, const ebpo_box *box, ebpo_node node, ebpo_error *error)
@@ -150,7 +151,7 @@ static ebpo_status gather_node(box_walk *w, const ebpo_box *box, ebpo_node node,
     ebpo_status status = EBPO_OK;
     if (ebpo_node_is_below(&node)) {
         w->below = node;
-        announce_window(w);
+        hint_window(w);
         status = ebpo_model_enter(w->context, &node, error);
         return status == EBPO_OK ? gather_blocks(w, node.subtree, error) : status;
     }
@@ -159,13 +160,13 @@ static ebpo_status gather_node(box_walk *w, const ebpo_box *box, ebpo_node node,
     return status;
 }
 
-/* EBPO_E_ABSENT: what a subset has left out meets the box. */
+/* Returns EBPO_E_ABSENT if an omitted part of a subset intersects the box. */
 static ebpo_status box_walk_check(box_walk *w, ebpo_error *error)
 {
     return ebpo_check_pruned(w->context, box_matters, w, error);
 }
 
-/* The whole walk. The list of slots is freed. */
+/* Runs the whole walk and frees the list of slots. */
 static ebpo_status box_walk_run(box_walk *w, ebpo_error *error)
 {
     const ebpo_model *m = w->context->model;
@@ -187,16 +188,16 @@ static bool touches_cell(const ebpo_box *box, const ebpo_node *node, const doubl
 {
     double low[3], high[3];
     ebpo_cell_bounds(box, node->cell, low, high);
-    return ebpo_triangle_meets_box(triangle, low, high);
+    return ebpo_triangle_intersects_box(triangle, low, high);
 }
 
-/* Accels list the faces that touch the cells in whose place they stand, and some that only pass by
- * (format-spec, section 5). So of those whose cell the face touches, one is the first, depth first:
- * no list of what has been seen is needed, however much that is. */
+/* Accels list the faces that touch their cells, and some that only pass by (format-spec, section
+ * 5). So among the accels whose cell the face touches, one is the first, depth first: no list of
+ * visited faces is needed. */
 static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)
 {
-    if (ebpo_node_is_uniform(&node) || !ebpo_cell_meets(box, node.cell, w->min, w->max) ||
+    if (ebpo_node_is_uniform(&node) || !ebpo_cell_intersects(box, node.cell, w->min, w->max) ||
         !touches_cell(box, &node, triangle))
         return false;
     *entry = node.entry;
@@ -207,8 +208,8 @@ static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
     return found;
 }
 
-/* The triangle, which meets the box, is to be taken in the accel at hand and in no other, so that a
- * walk that takes it where this is true takes each once. `own`: the accel has it as its own. */
+/* Returns true if the triangle, which intersects the box, is to be taken in the current accel; this
+ * is true in exactly one accel. `own`: the accel owns it. */
 static bool box_walk_is_first(const box_walk *w, bool own, const double triangle[3][3])
 {
     const ebpo_model *m = w->context->model;
@@ -223,7 +224,7 @@ static bool box_walk_is_first(const box_walk *w, bool own, const double triangle
 
 /* --- numbers of faces --- */
 
-/* Number in the file, and the one that is told. */
+/* Number in the file, and the reported number. */
 typedef struct pair {
     uint64_t file_face, source_face;
 } pair;
@@ -292,8 +293,8 @@ ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const 
 /* --- triangles, block by block --- */
 
 typedef struct block {
-    double corners[EBPO_TRIANGLES_MOST][3][3];
-    uint64_t faces[EBPO_TRIANGLES_MOST], file_faces[EBPO_TRIANGLES_MOST];
+    double corners[EBPO_TRIANGLES_MAX][3][3];
+    uint64_t faces[EBPO_TRIANGLES_MAX], file_faces[EBPO_TRIANGLES_MAX];
 } block;
 
 typedef struct delivery {
@@ -323,11 +324,11 @@ static ebpo_status take_triangle(box_walk *walk, const ebpo_accel *s, ebpo_error
         uint32_t local = ebpo_accel_slot_face(s, walk->slot[i]);
         double(*corners)[3] = d->block->corners[d->count];
         ebpo_accel_triangle(s, walk->slot[i], corners);
-        if (!box_walk_is_first(walk, local >= s->outer_count, (const double(*)[3])corners))
+        if (!box_walk_is_first(walk, local >= s->shared_count, (const double(*)[3])corners))
             continue;
         d->block->faces[d->count] = ebpo_accel_source_face(s, local);
         d->block->file_faces[d->count++] = ebpo_accel_file_face(s, local);
-        if (d->count == EBPO_TRIANGLES_MOST)
+        if (d->count == EBPO_TRIANGLES_MAX)
             hand_over(d);
     }
     return EBPO_OK;

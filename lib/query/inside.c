@@ -1,13 +1,13 @@
 /* Point in solid, exact.
  *
- * A leaf answers by the signs of its faces' planes, where these decide (leaf_kinds.c), else by
- * counting the faces that axis-parallel segments cross, from a wall of its cell that no face meets
- * or from its lowest corner: a filter in single precision (inside_kernels.c), then exact
- * predicates. Many points in a model that is all in memory go down the tree several at a time.
+ * In a leaf the signs of its faces' planes decide where possible (leaf_kinds.c). Otherwise the
+ * faces that axis-parallel segments cross are counted, from a cell face that no face intersects or
+ * from the lowest corner: a filter in single precision (inside_kernels.c), then exact predicates.
+ * Many points in a model that is all in memory go down the tree several at a time.
  *
- * A query that may use envelopes, stops at a level or has a deadline goes from node to node,
- * through subtrees that it loads on the way; with EBPO_LOAD_NODES it reads only the nodes on the
- * way. Pruned nodes are decided by envelopes, or the query fails with EBPO_E_ABSENT.
+ * A query that may use envelopes, stops at a level or has a deadline goes from node to node and
+ * loads subtrees on the way; with EBPO_LOAD_NODES it reads only the nodes on the way. Pruned nodes
+ * are decided by envelopes, or the query fails with EBPO_E_ABSENT.
  *
  * Sources: EBP 2017, 4.2; format-spec, section 5. */
 #include "core/strict_fp.h"
@@ -27,13 +27,14 @@
 #include "query/query_model.h"
 #include "query/query_node.h"
 
-/* Recursion: a subtree may end in a pruned node, above which envelopes decide. */
+/* Recursive: a subtree may end in a pruned node, above which envelopes decide. */
 static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out,
                                  ebpo_error *error);
 
 /* --- one leaf --- */
 
-/* Adds the crossings that the filter left open; true when the point lies on one of these faces. */
+/* Adds the crossings that the filter left open; returns true when the point is on one of these
+ * faces. */
 static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t count,
                         const ebpo_axis_segment *g, const double *point, int32_t *sum)
 {
@@ -47,8 +48,8 @@ static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t coun
     return false;
 }
 
-/* Crossings along a segment; `point` (its end) is looked for on the faces, NULL: is not. False when
- * it lies on one. */
+/* Counts crossings along a segment. Tests if `point` (its end) is on the faces; NULL: no test.
+ * Returns false when it is on one. */
 static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
                        const ebpo_accel_leaf *leaf, const ebpo_axis_segment *g, const double *point,
                        uint32_t *open, int32_t *sum)
@@ -61,8 +62,8 @@ static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
 /* A point in a leaf's cell. */
 typedef struct in_leaf {
     ebpo_cell leaf;
-    double xi[3];       /* the point in it, 0 .. 1, right to 2^-30 */
-    uint32_t sixteenth; /* and in the unit of ebpo_listed_block, eight bits an axis */
+    double xi[3];       /* the point in the cell, 0 .. 1, error at most 2^-30 */
+    uint32_t sixteenth; /* the point in the unit of ebpo_listed_block, eight bits an axis */
 } in_leaf;
 
 static inline void find_in_leaf(int fine, int level, const ebpo_position *place, in_leaf *out)
@@ -74,50 +75,51 @@ static inline void find_in_leaf(int fine, int level, const ebpo_position *place,
     for (int k = 0; k < 3; k++) {
         out->leaf.at[k] = place->at[k] >> up;
         out->xi[k] = (place->cells[k] - (double)(out->leaf.at[k] << up)) * size;
-        int at = (int)(out->xi[k] * EBPO_LISTED_CELLS); /* rounding may say 16 */
+        int at = (int)(out->xi[k] * EBPO_LISTED_CELLS); /* rounding may give 16 */
         out->sixteenth |= (uint32_t)(at < 15 ? at : 15) << 8 * k;
     }
 }
 
-/* ebpo_axis_segment.reach of the point alone, and of what goes on from it to a wall. */
+/* Returns ebpo_axis_segment.reach of the point alone; a segment from it to a cell face extends
+ * this. */
 static inline uint32_t reach_of(const in_leaf *i)
 {
     return i->sixteenth | (UINT32_C(0x0f0f0f) - i->sixteenth) << 4;
 }
 
-/* From the leaf's free wall to the point. */
-static ebpo_axis_segment wall_segment(const ebpo_box *box, uint8_t wall, const in_leaf *i,
-                                      const double p[3])
+/* Returns the segment from the leaf's free cell face to the point. */
+static ebpo_axis_segment cell_face_segment(const ebpo_box *box, uint8_t cell_face, const in_leaf *i,
+                                           const double p[3])
 {
-    int axis = wall / 2;
+    int axis = cell_face / 2;
     ebpo_axis_segment g = { { p[0], p[1], p[2] },
                             p[axis],
                             axis,
-                            /* the wall: 15 above, or 15 less 0 */
-                            reach_of(i) | (wall % 2 ? 0x0fu : 0xf0u) << 8 * axis };
-    double end = ebpo_wall(box, axis, i->leaf.level, i->leaf.at[axis] + wall % 2);
-    if (wall % 2)
+                            /* the cell face: 15 above, or 15 less 0 */
+                            reach_of(i) | (cell_face % 2 ? 0x0fu : 0xf0u) << 8 * axis };
+    double end = ebpo_cell_face(box, axis, i->leaf.level, i->leaf.at[axis] + cell_face % 2);
+    if (cell_face % 2)
         g.to = end;
     else
         g.from[axis] = end;
     return g;
 }
 
-/* One segment from a wall that no face meets. */
-static bool from_wall(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
-                      const ebpo_accel_leaf *leaf, const in_leaf *i, const double p[3],
-                      uint32_t *open, int32_t *winding)
+/* Uses one segment from a cell face that no face intersects. */
+static bool from_cell_face(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
+                           const ebpo_accel_leaf *leaf, const in_leaf *i, const double p[3],
+                           uint32_t *open, int32_t *winding)
 {
-    ebpo_axis_segment g = wall_segment(&s->box, leaf->wall, i, p);
+    ebpo_axis_segment g = cell_face_segment(&s->box, leaf->cell_face, i, p);
     int32_t sum;
     if (!cross_leaf(kernels, s, leaf, &g, p, open, &sum))
         return false;
-    *winding = leaf->winding + leaf->wall_step + (leaf->wall % 2 ? -sum : sum);
+    *winding = leaf->winding + leaf->cell_face_step + (leaf->cell_face % 2 ? -sum : sum);
     return true;
 }
 
-/* Three segments from the lowest corner: format-spec, section 5. Faces that the point lies on come
- * up in the last one. `boxed`: the boxes of the leaf's list are known. */
+/* Uses three segments from the lowest corner: format-spec, section 5. Faces that contain the point
+ * are found in the last one. `boxed`: the boxes of the leaf's list are known. */
 static bool from_corner(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
                         const ebpo_accel_leaf *leaf, bool boxed, const in_leaf *i,
                         const double p[3], uint32_t *open, int32_t *winding)
@@ -154,7 +156,8 @@ static inline bool any_sign(four_signs mask)
     return half[0] | half[1];
 }
 
-/* Signs of the planes alone; false when one is too close to tell. */
+/* Classifies the point by the signs of the leaf's planes. Returns false when a value is within the
+ * rounding error. */
 static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const in_leaf *in,
                         int32_t *winding)
 {
@@ -177,12 +180,12 @@ static bool from_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const 
     return !any_sign(near);
 }
 
-/* What a leaf is like is found out when questions come to it. */
-static __attribute__((noinline)) ebpo_leaf_kind ask_kind(const ebpo_context *context,
-                                                         const ebpo_accel *s, ebpo_accel_leaf *leaf,
-                                                         const in_leaf *i)
+/* Finds the leaf's kind during queries. */
+static __attribute__((noinline)) ebpo_leaf_kind query_kind(const ebpo_context *context,
+                                                           const ebpo_accel *s,
+                                                           ebpo_accel_leaf *leaf, const in_leaf *i)
 {
-    if (ebpo_leaf_ask(s, leaf, i->leaf, context->model->kernels.inside->walls))
+    if (ebpo_leaf_query(s, leaf, i->leaf, context->model->kernels.inside->cell_faces))
         ebpo_model_count_kind(context->model, leaf);
     return ebpo_leaf_kind_of(leaf);
 }
@@ -191,7 +194,7 @@ static inline ebpo_leaf_kind kind_of(const ebpo_context *context, const ebpo_acc
                                      ebpo_accel_leaf *leaf, const in_leaf *i)
 {
     ebpo_leaf_kind kind = ebpo_leaf_kind_of(leaf);
-    return kind <= EBPO_LEAF_CONCAVE ? kind : ask_kind(context, s, leaf, i);
+    return kind <= EBPO_LEAF_CONCAVE ? kind : query_kind(context, s, leaf, i);
 }
 
 static inline void give_winding(const ebpo_context *context, int32_t winding,
@@ -207,9 +210,9 @@ static inline void give_out(ebpo_inside_result *out)
     *out = (ebpo_inside_result){ EBPO_OUT, 0, 0 };
 }
 
-/* By crossing faces. */
-static ebpo_status answer_by_faces(ebpo_context *context, const ebpo_accel *s,
-                                   const ebpo_accel_leaf *leaf, bool walled, const in_leaf *i,
+/* Counts crossings of faces. */
+static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
+                                   const ebpo_accel_leaf *leaf, bool bounded, const in_leaf *i,
                                    const double p[3], ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_inside_kernels *kernels = context->model->kernels.inside;
@@ -218,9 +221,9 @@ static ebpo_status answer_by_faces(ebpo_context *context, const ebpo_accel *s,
     if (most > context->open_capacity &&
         !ebpo_grow(&context->open, &context->open_capacity, most, sizeof *context->open))
         return ebpo_fail_memory(error, most * sizeof *context->open);
-    bool off = walled && leaf->wall != EBPO_NO_WALL
-                   ? from_wall(kernels, s, leaf, i, p, context->open, &winding)
-                   : from_corner(kernels, s, leaf, walled, i, p, context->open, &winding);
+    bool off = bounded && leaf->cell_face != EBPO_NO_CELL_FACE
+                   ? from_cell_face(kernels, s, leaf, i, p, context->open, &winding)
+                   : from_corner(kernels, s, leaf, bounded, i, p, context->open, &winding);
     if (off)
         give_winding(context, winding, out);
     else
@@ -228,35 +231,36 @@ static ebpo_status answer_by_faces(ebpo_context *context, const ebpo_accel *s,
     return EBPO_OK;
 }
 
-static ebpo_status answer_in_leaf(ebpo_context *context, const ebpo_accel *s, ebpo_accel_leaf *leaf,
+static ebpo_status result_in_leaf(ebpo_context *context, const ebpo_accel *s, ebpo_accel_leaf *leaf,
                                   const in_leaf *i, const double p[3], ebpo_inside_result *out,
                                   ebpo_error *error)
 {
     int32_t winding;
     ebpo_leaf_kind kind = kind_of(context, s, leaf, i);
     if (!ebpo_leaf_has_planes(kind) || !from_planes(s, leaf, i, &winding))
-        return answer_by_faces(context, s, leaf, ebpo_leaf_is_walled(kind), i, p, out, error);
+        return result_by_faces(context, s, leaf, ebpo_leaf_is_bounded(kind), i, p, out, error);
     give_winding(context, winding, out);
     return EBPO_OK;
 }
 
-/* In a leaf of a subtree and of this level, whose cell holds p, which is at `place`. */
+/* Classifies p in a leaf of a subtree at this level; the cell holds p, whose shifted position is
+ * `place`. */
 static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t number,
                                int level, const ebpo_position *place, const double p[3],
                                ebpo_inside_result *out, ebpo_error *error)
 {
     in_leaf i;
     find_in_leaf(context->model->locator.level, level, place, &i);
-    return answer_in_leaf(context, s, &s->leaf[number], &i, p, out, error);
+    return result_in_leaf(context, s, &s->leaf[number], &i, p, out, error);
 }
 
-/* In a white or black node. */
+/* Classifies a point in a white or black node. */
 static void inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_inside_result *out)
 {
     give_winding(context, ebpo_entry_winding(entry), out);
 }
 
-/* In a subtree whose root holds p, which is at `place`. */
+/* Classifies p in a subtree whose root holds p, whose shifted position is `place`. */
 static ebpo_status inside_subtree(ebpo_context *context, const ebpo_accel *s,
                                   const ebpo_position *place, const double p[3],
                                   ebpo_inside_result *out, ebpo_error *error)
@@ -271,8 +275,8 @@ static ebpo_status inside_subtree(ebpo_context *context, const ebpo_accel *s,
     return inside_leaf(context, s, ebpo_entry_value(d.entry), d.level, place, p, out, error);
 }
 
-/* Several points at a time, stage by stage, so that the memory that one stage needs is on its way
- * while others are dealt with. */
+/* Several points at a time, stage by stage, so that memory for one stage is fetched while other
+ * points are processed. */
 enum { TOGETHER = 16 };
 
 typedef struct lane {
@@ -316,7 +320,7 @@ static void descend_together(const ebpo_accel *s, int fine, unsigned count, lane
     }
 }
 
-/* The cache lines of the blocks that the point's segment may meet. */
+/* Prefetches the cache lines of the blocks that the point's segment may intersect. */
 static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double p[3])
 {
     const ebpo_accel_leaf *leaf = w->leaf;
@@ -324,12 +328,12 @@ static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double 
     ebpo_axis_segment g = { .reach = EBPO_REACH_ALL };
     if (ebpo_leaf_has_planes(kind))
         return;
-    if (ebpo_leaf_is_walled(kind) && leaf->wall != EBPO_NO_WALL)
-        g = wall_segment(&s->box, leaf->wall, &w->in, p);
+    if (ebpo_leaf_is_bounded(kind) && leaf->cell_face != EBPO_NO_CELL_FACE)
+        g = cell_face_segment(&s->box, leaf->cell_face, &w->in, p);
     const ebpo_listed_block *list = s->list + leaf->list;
     for (int b = 0; b < 8; b++) {
         uint64_t listed = ebpo_listed(list + b);
-        if (ebpo_axis_segment_meets(&g, listed))
+        if (ebpo_axis_segment_intersects(&g, listed))
             for (int line = 0; line < (s->wide ? 4 : 2); line++)
                 __builtin_prefetch((const char *)ebpo_accel_meshlet(s, ebpo_listed_number(listed)) +
                                    64 * line);
@@ -338,7 +342,7 @@ static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double 
     }
 }
 
-static ebpo_status answer_waiting(ebpo_context *context, const ebpo_accel *s, const waiting *w,
+static ebpo_status result_waiting(ebpo_context *context, const ebpo_accel *s, const waiting *w,
                                   unsigned count, const double *points, ebpo_inside_result *out,
                                   ebpo_error *error)
 {
@@ -351,7 +355,7 @@ static ebpo_status answer_waiting(ebpo_context *context, const ebpo_accel *s, co
         prefetch_blocks(s, &w[i], points + 3 * w[i].point);
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < count && status == EBPO_OK; i++)
-        status = answer_in_leaf(context, s, w[i].leaf, &w[i].in, points + 3 * w[i].point,
+        status = result_in_leaf(context, s, w[i].leaf, &w[i].in, points + 3 * w[i].point,
                                 &out[w[i].point], error);
     return status;
 }
@@ -382,10 +386,10 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
             leaves++;
         }
     }
-    return answer_waiting(context, s, w, leaves, points, out, error);
+    return result_waiting(context, s, w, leaves, points, out, error);
 }
 
-/* With the whole tree in memory. */
+/* Classifies points with the whole tree in memory. */
 static ebpo_status inside_whole(ebpo_context *context, const double *points, uint64_t count,
                                 ebpo_inside_result *out, ebpo_error *error)
 {
@@ -409,17 +413,17 @@ static ebpo_status inside_whole(ebpo_context *context, const double *points, uin
 
 static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)
 {
-    /* An envelope tells that a point is outside, not its winding number: with rules other than
-     * nonzero that is no whole answer. */
-    bool whole_answer =
+    /* An envelope proves that a point is outside, but not its winding number: with rules other than
+     * nonzero the result would be incomplete. */
+    bool whole_result =
         c->model->info->rule == EBPO_RULE_NONZERO || o->level >= 0 || o->deadline_ns;
-    if (o->envelopes == EBPO_ENVELOPES_SKIP || !whole_answer)
+    if (o->envelopes == EBPO_ENVELOPES_SKIP || !whole_result)
         return false;
     return o->envelopes == EBPO_ENVELOPES_USE || !c->model->whole || o->level >= 0 ||
            o->deadline_ns;
 }
 
-typedef struct asking {
+typedef struct querying {
     ebpo_context *context;
     const ebpo_inside_options *options;
     ebpo_box box;
@@ -427,14 +431,14 @@ typedef struct asking {
     uint64_t deadline; /* 0: none */
     const double *p;
     ebpo_position place;
-} asking;
+} querying;
 
-static void give_maybe(const asking *a, ebpo_cell cell, ebpo_inside_result *out)
+static void give_maybe(const querying *a, ebpo_cell cell, ebpo_inside_result *out)
 {
     *out = (ebpo_inside_result){ EBPO_MAYBE, 0, ebpo_cell_diagonal(&a->box, cell) };
 }
 
-static bool outside_envelope(const asking *a, const ebpo_node *node)
+static bool outside_envelope(const querying *a, const ebpo_node *node)
 {
     uint32_t count;
     const uint32_t *codes =
@@ -442,9 +446,9 @@ static bool outside_envelope(const asking *a, const ebpo_node *node)
     return codes && ebpo_outside_planes(&a->box, node->cell, codes, count, a->p);
 }
 
-static bool is_late(const asking *a) { return a->deadline && ebpo_clock() > a->deadline; }
+static bool is_late(const querying *a) { return a->deadline && ebpo_clock() > a->deadline; }
 
-static bool stops_here(const asking *a, const ebpo_node *node)
+static bool stops_here(const querying *a, const ebpo_node *node)
 {
     if (a->options->level >= 0 &&
         (node->cell.level >= a->options->level || node->type != EBPO_GRAY || node->pruned))
@@ -452,8 +456,9 @@ static bool stops_here(const asking *a, const ebpo_node *node)
     return is_late(a);
 }
 
-/* Decides at a node of the top or of a subtree, without looking below it; false: it does not. */
-static inline bool decide_at(const asking *a, const ebpo_node *node, ebpo_inside_result *out)
+/* Decides at a node of the top or of a subtree, without visiting its children. Returns false if it
+ * cannot. */
+static inline bool decide_at(const querying *a, const ebpo_node *node, ebpo_inside_result *out)
 {
     if (ebpo_node_is_uniform(node))
         inside_uniform(a->context, node->entry, out);
@@ -466,7 +471,7 @@ static inline bool decide_at(const asking *a, const ebpo_node *node, ebpo_inside
     return true;
 }
 
-static ebpo_status walk_down(asking *a, ebpo_inside_result *out, ebpo_error *error)
+static ebpo_status walk_down(querying *a, ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
     int fine = m->info->level_count - 1;
@@ -488,16 +493,16 @@ static ebpo_status walk_down(asking *a, ebpo_inside_result *out, ebpo_error *err
     }
 }
 
-/* --- node by node from the file: only what lies on the way is read, nothing is kept but decoded
- * chunks --- */
+/* --- node by node from the file: only nodes on the way are read; only decoded chunks are kept ---
+ */
 
-static ebpo_status leaf_from_file(asking *a, const ebpo_node *leaf, ebpo_inside_result *out,
+static ebpo_status leaf_from_file(querying *a, const ebpo_node *leaf, ebpo_inside_result *out,
                                   ebpo_error *error)
 {
     ebpo_model *m = a->context->model;
     ebpo_slice slice;
     ebpo_accel *subtree;
-    ebpo_status status = ebpo_model_has_room(m, leaf, error);
+    ebpo_status status = ebpo_model_has_capacity(m, leaf, error);
     if (status == EBPO_OK)
         status = ebpo_slice_read(&slice, m->chunks, leaf, error);
     if (status == EBPO_OK)
@@ -512,7 +517,7 @@ static ebpo_status leaf_from_file(asking *a, const ebpo_node *leaf, ebpo_inside_
     return status;
 }
 
-static ebpo_status uniform_from_file(asking *a, const ebpo_node *node, ebpo_inside_result *out,
+static ebpo_status uniform_from_file(querying *a, const ebpo_node *node, ebpo_inside_result *out,
                                      ebpo_error *error)
 {
     int32_t winding;
@@ -522,9 +527,9 @@ static ebpo_status uniform_from_file(asking *a, const ebpo_node *node, ebpo_insi
     return status;
 }
 
-/* A gray node on the way; *done when it answers. Whether it is pruned is known once its
- * children have been asked for. */
-static ebpo_status pass_gray(asking *a, ebpo_cursor *c, bool *done, ebpo_inside_result *out,
+/* Handles a gray node on the way; sets *done when it decides. A node is known to be pruned once its
+ * children have been requested. */
+static ebpo_status pass_gray(querying *a, ebpo_cursor *c, bool *done, ebpo_inside_result *out,
                              ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
@@ -560,8 +565,8 @@ static ebpo_status pass_gray(asking *a, ebpo_cursor *c, bool *done, ebpo_inside_
     return status;
 }
 
-/* From a node BELOW on. */
-static ebpo_status walk_file(asking *a, const ebpo_node *below, ebpo_inside_result *out,
+/* Walks down from a node BELOW. */
+static ebpo_status walk_file(querying *a, const ebpo_node *below, ebpo_inside_result *out,
                              ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
@@ -583,7 +588,7 @@ static ebpo_status walk_file(asking *a, const ebpo_node *below, ebpo_inside_resu
                                    : uniform_from_file(a, node, out, error);
 }
 
-static ebpo_status walk_nodes(asking *a, ebpo_inside_result *out, ebpo_error *error)
+static ebpo_status walk_nodes(querying *a, ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
     int fine = m->info->level_count - 1;
@@ -596,9 +601,9 @@ static ebpo_status walk_nodes(asking *a, ebpo_inside_result *out, ebpo_error *er
     return walk_file(a, &node, out, error);
 }
 
-/* The subtree that is in the context's hands and holds p, or NULL; *entry: what the levels above
- * say, when they decide it. */
-static const ebpo_accel *held_around(const asking *a, uint32_t *entry)
+/* Returns the subtree that the context holds and that contains p, or NULL. *entry: the result of
+ * the levels above, when they decide. */
+static const ebpo_accel *held_around(const querying *a, uint32_t *entry)
 {
     const ebpo_context *c = a->context;
     *entry = ebpo_entry(EBPO_ENTRY_BELOW, 0);
@@ -610,9 +615,9 @@ static const ebpo_accel *held_around(const asking *a, uint32_t *entry)
     return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
 }
 
-/* True when everything that p needs is in the context's hands: then envelopes save nothing, and
+/* Returns true when the context holds everything that p needs: then envelopes save nothing, and
  * only the faces of a leaf take time. */
-static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *status,
+static bool result_at_hand(querying *a, ebpo_inside_result *out, ebpo_status *status,
                            ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
@@ -632,7 +637,7 @@ static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *stat
     int fine = m->info->level_count - 1;
     ebpo_descent d = ebpo_descend(&held->nodes, fine, a->place.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_BELOW)
-        return false; /* pruned: envelopes may tell */
+        return false; /* pruned: envelopes may decide */
     ebpo_cell cell = ebpo_descent_cell(&d, fine, a->place.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM)
         inside_uniform(a->context, d.entry, out);
@@ -644,13 +649,14 @@ static bool answer_at_hand(asking *a, ebpo_inside_result *out, ebpo_status *stat
     return true;
 }
 
-/* Below a pruned node of the whole tree or of a subtree: an envelope decides, or EBPO_E_ABSENT. */
+/* Decides below a pruned node of the whole tree or of a subtree by an envelope, or returns
+ * EBPO_E_ABSENT. */
 static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out,
                                  ebpo_error *error)
 {
     const ebpo_model *m = context->model;
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
-    asking a = {
+    querying a = {
         .context = context, .options = &options, .box = ebpo_model_box(m), .envelopes = true, .p = p
     };
     if (!ebpo_locator_find(&m->locator, p, &a.place))
@@ -662,18 +668,18 @@ static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_
     return status;
 }
 
-/* Point in solid from node to node: with envelopes, to a level, against the clock, or because not
- * everything is in memory. */
+/* Classifies a point from node to node: with envelopes, to a level, with a deadline, or with a
+ * model that is not all in memory. */
 static ebpo_status inside_walk(ebpo_context *context, const double p[3],
                                const ebpo_inside_options *options, ebpo_inside_result *out,
                                ebpo_error *error)
 {
     const ebpo_model *m = context->model;
-    asking a = { .context = context,
-                 .options = options,
-                 .box = ebpo_model_box(m),
-                 .envelopes = uses_envelopes(context, options),
-                 .p = p };
+    querying a = { .context = context,
+                   .options = options,
+                   .box = ebpo_model_box(m),
+                   .envelopes = uses_envelopes(context, options),
+                   .p = p };
     if (options->deadline_ns)
         a.deadline = ebpo_clock() + options->deadline_ns;
     if (!ebpo_locator_find(&m->locator, p, &a.place)) {
@@ -683,7 +689,7 @@ static ebpo_status inside_walk(ebpo_context *context, const double p[3],
     ebpo_status status;
     bool plain = options->envelopes != EBPO_ENVELOPES_USE && options->level < 0;
     if (plain && (m->whole || m->options.loading != EBPO_LOAD_NODES) &&
-        answer_at_hand(&a, out, &status, error))
+        result_at_hand(&a, out, &status, error))
         return status;
     return !m->whole && m->options.loading == EBPO_LOAD_NODES ? walk_nodes(&a, out, error)
                                                               : walk_down(&a, out, error);
@@ -728,10 +734,10 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
     return status;
 }
 
-/* Nothing to be checked but the point, and all in memory. */
+/* Returns true if only the point must be checked and everything is in memory. */
 static inline bool is_plain(const ebpo_context *context, const ebpo_inside_options *o)
 {
-    return context->model->answers_inside &&
+    return context->model->results_inside &&
            (!o || (o->struct_size == sizeof *o && o->level == EBPO_LEVEL_ALL &&
                    o->envelopes == EBPO_ENVELOPES_AUTO && !o->deadline_ns));
 }

@@ -1,9 +1,9 @@
-/* Kernels of point in solid: the faces that a leaf lists, eight at a time.
+/* Kernels of point in solid: process the faces that a leaf lists, eight at a time.
  *
  * `crossings` counts the faces that a segment along an axis crosses, as far as single precision (in
- * accels of doubles: double precision) is certain. The faces that remain open are decided exactly
- * by inside.c. `walls` finds the walls of a leaf's cell that no face comes to, and the boxes of the
- * leaf's list, when the first queries come to the leaf; its comparisons are exact.
+ * accels of doubles: double precision) is certain. The other faces are decided exactly by inside.c.
+ * `walls` finds the cell faces that no face reaches, and the boxes of the leaf's list, at the first
+ * queries in the leaf; its comparisons are exact.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md; crossings: EBP 2017, 4.2. */
@@ -20,13 +20,13 @@
 
 /* --- crossings --- */
 
-/* How eight faces lie around the segment's line: a bit for each that turns left around it, right,
- * or perhaps either. The others pass it by. */
+/* Positions of eight faces around the segment's line: a bit for each that turns left around it,
+ * right, or perhaps either. The others do not contain it. */
 typedef struct turns {
     unsigned left, right, open;
 } turns;
 
-/* What the turns at the three corners say. */
+/* Combines the turns at the three corners. */
 EBPO_EIGHT turns judge_turns(unsigned some_left, unsigned some_right, unsigned all_left,
                              unsigned all_right, unsigned lanes)
 {
@@ -34,10 +34,10 @@ EBPO_EIGHT turns judge_turns(unsigned some_left, unsigned some_right, unsigned a
                     lanes & ~(all_left | all_right | (some_left & some_right)) };
 }
 
-/* Rounding: with R the greatest coordinate of the model's box and M its greatest size, a difference
- * q is right to 2^-23 of itself and 2^-47 R (two floats are `from` to 2^-48 R); so a cross product
- * is to 2^-21 of the sum of its products' sizes and 2^-45 R M, as no |q| is above M. Underflow
- * loses far less than that, R being above 2^-41 and M above 2^-40. */
+/* Rounding: let R be the largest coordinate of the model's box and M its largest size. The error of
+ * a difference q is 2^-23 of itself and 2^-47 R (two floats represent `from` to 2^-48 R). So the
+ * error of a cross product is 2^-21 of the sum of its products' sizes and 2^-45 R M, as no |q| is
+ * above M. Underflow loses far less, R being above 2^-41 and M above 2^-40. */
 #define TURN_ERROR 0x1p-20f
 
 EBPO_EIGHT void see_axis(const ebpo_face_block *b, int axis, double from, f8 out[3])
@@ -68,14 +68,15 @@ EBPO_EIGHT turns turns_of_floats(const ebpo_face_block *b, unsigned lanes, int u
                        f8_bits(f8_and(right[0], f8_and(right[1], right[2]))), lanes);
 }
 
-/* Rounding: a difference of two doubles is right to 2^-53 of itself; a cross product of two
- * differences to 2^-50 of the sum of its products' sizes; underflow is covered by the last term,
- * overflow makes bounds infinite or no numbers, and nothing is certain then. */
+/* Rounding: the error of a difference of two doubles is 2^-53 of itself; of a cross product of two
+ * differences 2^-50 of the sum of its products' sizes. The last term covers underflow; overflow
+ * makes bounds infinite or NaN, and then nothing is certain. */
 #define CROSS_ERROR     0x1p-50
 #define HEIGHT_ERROR    0x1p-47
 #define UNDERFLOW_ERROR 0x1p-960
 
-/* The cross product of corners seen from the line; *size: the sum of its products' sizes. */
+/* Returns the cross product of corners relative to the line; *size: the sum of its products' sizes.
+ */
 EBPO_EIGHT double cross_product(double au, double av, double bu, double bv, double *size)
 {
     double p = au * bv, q = av * bu;
@@ -109,8 +110,8 @@ static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, i
     return judge_turns(some[0], some[1], all[0], all[1], lanes);
 }
 
-/* Where a plane is, seen along the segment from coordinate `at`: 1 above, -1 below, 0 not certain.
- * `turn` 1 of a face that turns left around the line. */
+/* Returns the side of a plane along the segment, relative to coordinate `at`: 1 above, -1 below, 0
+ * not certain. `turn` is 1 for a face that turns left around the line. */
 static int side_of_plane(const double weight[3], const double size[3], const double k[3], double at,
                          int turn)
 {
@@ -121,9 +122,9 @@ static int side_of_plane(const double weight[3], const double size[3], const dou
     return height > error ? 1 : height < -error ? -1 : 0;
 }
 
-/* Whether a face that turns around the line meets it between the segment's ends: 1 yes, 0 no, -1
- * not certain. */
-static int met_between(const double t[3][3], int u, int v, const ebpo_axis_segment *g, int turn)
+/* Tests if a face that turns around the line intersects it between the segment's ends: 1 yes, 0 no,
+ * -1 not certain. */
+static int found_between(const double t[3][3], int u, int v, const ebpo_axis_segment *g, int turn)
 {
     double from = g->from[g->axis], weight[3], size[3], x[3], y[3],
            k[3] = { t[0][g->axis], t[1][g->axis], t[2][g->axis] };
@@ -147,7 +148,7 @@ static int met_between(const double t[3][3], int u, int v, const ebpo_axis_segme
     return at_from < 0 || at_to > 0 ? 0 : at_from > 0 && at_to < 0 ? 1 : -1;
 }
 
-/* The certain crossings of a block's faces; others are appended to `open`. */
+/* Returns the certain crossings of a block's faces; appends the others to `open`. */
 EBPO_EIGHT int32_t cross_block(const ebpo_accel *s, uint64_t listed, int u, int v,
                                const ebpo_axis_segment *segment, uint32_t *open,
                                uint32_t *open_count)
@@ -161,16 +162,16 @@ EBPO_EIGHT int32_t cross_block(const ebpo_accel *s, uint64_t listed, int u, int 
     for (unsigned lanes = t.left | t.right | t.open; lanes; lanes &= lanes - 1) {
         unsigned lane = (unsigned)__builtin_ctz(lanes);
         uint32_t slot = block * EBPO_BLOCK + lane;
-        int met = -1, turn = t.left >> lane & 1 ? 1 : -1;
+        int intersected = -1, turn = t.left >> lane & 1 ? 1 : -1;
         if (!(t.open >> lane & 1)) {
             double corners[3][3];
             ebpo_accel_triangle(s, slot, corners);
-            met = met_between((const double(*)[3])corners, u, v, segment, turn);
+            intersected = found_between((const double(*)[3])corners, u, v, segment, turn);
         }
-        if (met < 0)
+        if (intersected < 0)
             open[(*open_count)++] = slot;
         else
-            sum -= met * turn;
+            sum -= intersected * turn;
     }
     return sum;
 }
@@ -182,25 +183,25 @@ static int32_t sum_crossings(const ebpo_accel *s, const ebpo_listed_block *list,
     int32_t sum = 0;
     for (;; list++) {
         uint64_t listed = ebpo_listed(list);
-        if (ebpo_axis_segment_meets(segment, listed))
+        if (ebpo_axis_segment_intersects(segment, listed))
             sum += cross_block(s, listed, u, v, segment, open, open_count);
         if (listed & EBPO_LISTED_LAST)
             return sum;
     }
 }
 
-/* --- walls --- */
+/* --- cell faces --- */
 
-/* A cell's walls, and the floats next to them: nothing that is a float lies between. */
-typedef struct cell_walls {
+/* A cell's faces, and the floats next to them: no float is between. */
+typedef struct faces_of_cell {
     double low[3], high[3];
-    double inverse[3]; /* of its size */
+    double inverse[3]; /* inverse of its size */
     float low_down[3], low_up[3], high_down[3], high_up[3];
-    bool fine; /* in cells too small for the boxes these stay as they are: all of the cell */
-} cell_walls;
+    bool fine; /* false in cells too small for boxes; a box is then the whole cell */
+} faces_of_cell;
 
-/* The float that is `steps` (-1, 0, 1) from this one, in their order; the zeros count as two, of
- * which rounding gives the one on the number's own side. */
+/* Returns the float `steps` (-1, 0, 1) away, in the order of floats; the zeros count as two, and
+ * rounding gives the one with the number's sign. */
 static inline float step_float(float f, int32_t steps)
 {
     uint32_t bits;
@@ -211,7 +212,8 @@ static inline float step_float(float f, int32_t steps)
     return f;
 }
 
-/* Which way a number is rounded is anyone's guess: without branches. */
+/* Returns the greatest float that is at most x; branch-free, because the direction of rounding is
+ * unpredictable. */
 static inline float float_below(double x)
 {
     float f = (float)x;
@@ -224,7 +226,7 @@ static inline float float_above(double x)
     return step_float(f, (double)f < x);
 }
 
-static void find_walls(const ebpo_accel *s, ebpo_cell cell, cell_walls *out)
+static void find_cell_faces(const ebpo_accel *s, ebpo_cell cell, faces_of_cell *out)
 {
     ebpo_cell_bounds(&s->box, cell, out->low, out->high);
     out->fine = true;
@@ -239,14 +241,14 @@ static void find_walls(const ebpo_accel *s, ebpo_cell cell, cell_walls *out)
     }
 }
 
-/* What a block's faces have on an axis; a bit for each lane. */
+/* Extents of a block's faces on an axis; a bit for each lane. */
 typedef struct spans {
     f8 least, most;      /* rounded outward */
-    unsigned away;       /* from the cell */
-    unsigned touches[2]; /* its lower wall, its upper one */
+    unsigned away;       /* faces that are away from the cell */
+    unsigned touches[2]; /* faces that reach its lower cell face, its upper one */
 } spans;
 
-static inline spans span_floats(const ebpo_face_block *b, const cell_walls *w, int k)
+static inline spans span_floats(const ebpo_face_block *b, const faces_of_cell *w, int k)
 {
     f8 x[3];
     spans out;
@@ -260,7 +262,7 @@ static inline spans span_floats(const ebpo_face_block *b, const cell_walls *w, i
     return out;
 }
 
-static spans span_doubles(const ebpo_face_block *b, const cell_walls *w, int k)
+static spans span_doubles(const ebpo_face_block *b, const faces_of_cell *w, int k)
 {
     double x[3][EBPO_BLOCK];
     float lows[EBPO_BLOCK], highs[EBPO_BLOCK];
@@ -280,18 +282,18 @@ static spans span_doubles(const ebpo_face_block *b, const cell_walls *w, int k)
     return out;
 }
 
-/* On each axis a lower side in sixteenths of the cell, and 15 less the upper one; 0 to 15. Widened
- * by far more than the rounding here and in those that ask (2^-20 of a sixteenth). */
+/* Returns on each axis the lower side in sixteenths of the cell, and 15 less the upper one; 0 to
+ * 15. Widened by far more than the rounding error here and in queries (2^-20 of a sixteenth). */
 static inline uint64_t find_sixteenth(float x, double low, double inverse, double direction)
 {
     double cells = ((double)x - low) * inverse * EBPO_LISTED_CELLS + direction * 0x1p-8;
     cells = direction < 0 ? cells : 16 - cells;
-    cells = cells > 0 ? cells : 0; /* one after the other: without branches */
+    cells = cells > 0 ? cells : 0; /* one after the other: branch-free */
     return (uint64_t)(int32_t)(cells < 15 ? cells : 15);
 }
 
-/* A box around those of the listed faces whose boxes meet the cell. */
-static uint64_t box_of(const spans span[3], unsigned near, const cell_walls *w)
+/* Returns a box around the listed faces whose boxes intersect the cell. */
+static uint64_t box_of(const spans span[3], unsigned near, const faces_of_cell *w)
 {
     f8 none = f8_all(INFINITY), mask = f8_mask(near), zero = f8_all(0);
     uint64_t box = 0;
@@ -304,9 +306,9 @@ static uint64_t box_of(const spans span[3], unsigned near, const cell_walls *w)
     return box << EBPO_LISTED_BOX;
 }
 
-/* Sets the block's box; returns the walls that its listed faces come to, if their boxes meet the
- * cell (bit 2 axis + side). Exact comparisons. */
-static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const cell_walls *w)
+/* Sets the block's box. Returns the cell faces that its listed faces reach, if their boxes
+ * intersect the cell (bit 2 axis + side). Exact comparisons. */
+static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const faces_of_cell *w)
 {
     uint64_t listed = ebpo_listed(at);
     ebpo_face_block b = ebpo_face_block_open(s, ebpo_listed_number(listed));
@@ -323,7 +325,7 @@ static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const ce
     return come_to;
 }
 
-/* They are on their way while the cell is looked at; of long lists the first ones. */
+/* Prefetches blocks while the cell is read; of long lists the first ones. */
 static void fetch_blocks(const ebpo_accel *s, const ebpo_listed_block *list)
 {
     for (int i = 0; i < 8; i++) {
@@ -336,12 +338,12 @@ static void fetch_blocks(const ebpo_accel *s, const ebpo_listed_block *list)
     }
 }
 
-static unsigned find_free_walls(const ebpo_accel *s, ebpo_listed_block *list, ebpo_cell cell)
+static unsigned find_free_cell_faces(const ebpo_accel *s, ebpo_listed_block *list, ebpo_cell cell)
 {
-    cell_walls w;
+    faces_of_cell w;
     unsigned out = 0;
     fetch_blocks(s, list);
-    find_walls(s, cell, &w);
+    find_cell_faces(s, cell, &w);
     for (;; list++) {
         out |= bound_block(s, list, &w);
         if (ebpo_listed(list) & EBPO_LISTED_LAST)
@@ -349,4 +351,5 @@ static unsigned find_free_walls(const ebpo_accel *s, ebpo_listed_block *list, eb
     }
 }
 
-const ebpo_inside_kernels EBPO_KERNEL(ebpo_inside_kernels) = { sum_crossings, find_free_walls };
+const ebpo_inside_kernels EBPO_KERNEL(ebpo_inside_kernels) = { sum_crossings,
+                                                               find_free_cell_faces };

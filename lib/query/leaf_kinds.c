@@ -1,18 +1,18 @@
-/* Kinds of leaves: what is found out about a leaf once queries come to it, and where it is kept.
+/* Kinds of leaves: finds and stores the kind of a leaf during queries.
  *
- * The first query finds a wall that no face meets and the boxes of the leaf's list; after many
- * queries the leaf is classified: one plane, two planes, convex or concave (then the signs of
- * planes decide), or general (accel.h). Any thread may do that; one does, and the others meanwhile
- * treat the leaf as a general one. Kinds never change results.
+ * The first queries find a cell face that no face intersects and the boxes of the leaf's list;
+ * after many queries the leaf is classified: one plane, two planes, convex or concave (then the
+ * signs of planes decide), or general (accel.h). One thread does that, while the others treat the
+ * leaf as a general one. Kinds never change results.
  *
- * Leaves whose faces' planes alone decide:
- * Let P be the set of points of the cell below all planes of the leaf's faces. If every face
- * lies in P (all its corners below all planes), then each face lies on the boundary of P, so the
- * winding number is constant within P's interior; and it is constant in each component of the rest
- * of the cell. Every such component contains a corner of the cell: a point above plane i can move
- * to the corner that is farthest along that plane's normal and stays above. So when all corners of
- * the cell that do not lie in P's closure have the same winding number, and one point of P's
- * interior is known, the planes decide. The same holds with "above" for "below" (concave). */
+ * Leaves whose faces' planes alone decide: Let P be the set of points of the cell below all planes
+ * of the leaf's faces. If every face is in P (all its corners below all planes), then each face is
+ * on the boundary of P, so the winding number is constant within P's interior; and it is constant
+ * in each component of the rest of the cell. Every such component contains a corner of the cell: a
+ * point above plane i can move to the corner that is farthest along that plane's normal and stays
+ * above. So when all corners of the cell outside P's closure have the same winding number, and one
+ * point of P's interior is known, the planes decide. The same holds with "above" for "below"
+ * (concave). */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -31,7 +31,7 @@ typedef struct leaf_plane {
     double n[3], d;
 } leaf_plane;
 
-/* Of a convex leaf (`flip` 1), or of a concave one (-1: with the planes turned): the winding number
+/* Planes of a convex leaf (`flip` 1), or of a concave one (-1: planes turned): the winding number
  * below all planes, and elsewhere in the cell. */
 typedef struct deciding_planes {
     int count, flip;
@@ -41,8 +41,8 @@ typedef struct deciding_planes {
 
 enum { FACES_MAX = 64 };
 
-/* The leaf in its cell's coordinates (0 .. 1), rounded: corners of faces whose box meets the cell.
- */
+/* The leaf in its cell's coordinates (0 .. 1), rounded: corners of faces whose boxes intersect the
+ * cell. */
 typedef struct leaf_faces {
     int count;
     double p[FACES_MAX][3][3];
@@ -50,7 +50,7 @@ typedef struct leaf_faces {
     double low[3], size[3], inverse[3];
 } leaf_faces;
 
-static bool meets_cell(const double t[3][3], const double low[3], const double high[3])
+static bool intersects_cell(const double t[3][3], const double low[3], const double high[3])
 {
     for (int k = 0; k < 3; k++)
         if (ebpo_min3(t[0][k], t[1][k], t[2][k]) > high[k] ||
@@ -66,8 +66,8 @@ static void add_face(uint32_t slot, const double t[3][3], leaf_faces *f)
     f->slot[f->count++] = slot;
 }
 
-/* Gathers the faces whose boxes meet the cell. False when they are not to be had: too many, or a
- * cell too small for what follows. */
+/* Gathers the faces whose boxes intersect the cell. Returns false when there are too many, or when
+ * the cell is too small for the next steps. */
 static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell,
                          leaf_faces *f)
 {
@@ -88,7 +88,7 @@ static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_
                 ebpo_listed_number(listed) * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes);
             double t[3][3];
             ebpo_accel_triangle(s, slot, t);
-            if (!meets_cell((const double(*)[3])t, low, high))
+            if (!intersects_cell((const double(*)[3])t, low, high))
                 continue;
             if (f->count == FACES_MAX)
                 return false;
@@ -99,8 +99,8 @@ static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_
     }
 }
 
-/* Crossings of the leaf's faces with a segment along an axis. Passed over are blocks of whose box
- * any bit of `beside` is set: lower sides that are not the cell's, where the segment is. */
+/* Counts crossings of the leaf's faces with a segment along an axis. Skips blocks whose box has any
+ * bit of `beside`: their lower side is not the cell's, where the segment is. */
 static int32_t leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf,
                               const double from[3], double to, int axis, uint64_t beside)
 {
@@ -119,7 +119,8 @@ static int32_t leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf,
     }
 }
 
-/* At any shifted point of the cell: from the lowest corner, axis by axis. */
+/* Returns the winding number at a shifted point of the cell: from the lowest corner, axis by axis.
+ */
 static int32_t winding_at(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const double low[3],
                           const double p[3])
 {
@@ -133,15 +134,15 @@ static int32_t winding_at(const ebpo_accel *s, const ebpo_accel_leaf *leaf, cons
     return winding;
 }
 
-/* The plane of a face in the cell's coordinates, 1-norm 1. False when rounding could have touched
- * it: a sliver, or corners far outside the cell. */
+/* Computes the plane of a face in the cell's coordinates, 1-norm 1. Returns false when rounding may
+ * matter: a sliver, or corners far outside the cell. */
 static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, leaf_plane *out)
 {
     const double(*p)[3] = (const double(*)[3])f->p[face];
     double t[3][3], e[3], g[3], norm = 0, products = 0, reach = 0;
     ebpo_accel_triangle(s, f->slot[face], t);
-    for (int k = 0; k < 3; k++) { /* of the corners as they are: those in the cell's coordinates are
-                                     rounded, which short edges do not stand */
+    for (int k = 0; k < 3; k++) { /* from the exact corners: those in the cell's coordinates are
+                                   * rounded, which is too inexact for short edges */
         e[k] = (t[1][k] - t[0][k]) * f->inverse[k];
         g[k] = (t[2][k] - t[0][k]) * f->inverse[k];
     }
@@ -153,8 +154,8 @@ static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, leaf_
         products += fabs(a) + fabs(b);
         reach = ebpo_max3(reach, ebpo_max3(fabs(p[0][k]), fabs(p[1][k]), fabs(p[2][k])), 0);
     }
-    /* n is right to 2^-50 of the products, so to 2^-40 of its norm, and n . xi to 2^-33 for every
-     * corner: less than what sides_of calls certain. */
+    /* The error of n is 2^-50 of the products, so 2^-40 of its norm, and of n . xi 2^-33 for every
+     * corner: less than the margin of sides_of. */
     if (!(norm > products * 0x1p-10) || !(products > 0x1p-900) || !(reach < 64))
         return false;
     out->d = 0;
@@ -165,7 +166,8 @@ static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, leaf_
     return true;
 }
 
-/* Exact side of a corner of face j with regard to the plane of face i: -1 below, 1 above. */
+/* Returns the exact side of a corner of face j relative to the plane of face i: -1 below, 1 above.
+ */
 static int exact_side(const ebpo_accel *s, uint32_t plane_slot, uint32_t point_slot, int corner)
 {
     double a[3][3], b[3][3];
@@ -177,8 +179,8 @@ static int exact_side(const ebpo_accel *s, uint32_t plane_slot, uint32_t point_s
     return ebpo_orient3d(a[0], a[1], a[2], b[corner]);
 }
 
-/* Adds up on which sides of plane i the faces lie: bit 0 some corner above, bit 1 some corner
- * below. */
+/* Collects the sides of plane i that have faces: bit 0 some corner above, bit 1 some corner below.
+ */
 static unsigned sides_of(const ebpo_accel *s, const leaf_faces *f, int i, const leaf_plane *q,
                          unsigned wanted)
 {
@@ -205,15 +207,15 @@ static bool same_plane(const ebpo_accel *s, const leaf_faces *f, int i, int j)
     return true;
 }
 
-/* Whether they may be one plane, seen from one side. */
+/* Returns true if they may be one plane with the same orientation. */
 static bool turned_alike(const leaf_plane *a, const leaf_plane *b)
 {
     return fabs(a->d - b->d) < 0x1p-20 &&
            a->n[0] * b->n[0] + a->n[1] * b->n[1] + a->n[2] * b->n[2] > 0;
 }
 
-/* All distinct planes of the leaf when it is convex (`flip` 1) or concave (-1, planes turned).
- * False when it is neither, or they are too many. */
+/* Collects all distinct planes of the leaf when it is convex (`flip` 1) or concave (-1, planes
+ * turned). Returns false when it is neither, or when there are too many. */
 static bool collect_planes(const ebpo_accel *s, const leaf_faces *f, deciding_planes *out)
 {
     int of_face[EBPO_KIND_PLANES_MAX];
@@ -257,8 +259,9 @@ static bool below_all(const deciding_planes *planes, const double xi[3], bool *c
 
 static double within_cell(double x) { return x < 0 ? 0 : x > 1 ? 1 : x; }
 
-/* Winding numbers in P and in the rest of the cell, from the cell's corners and, if none of them is
- * in P, from a point near the middle of the faces. False when that does not decide it. */
+/* Finds the winding numbers in P and in the rest of the cell. Uses the cell's corners and, if none
+ * of them is in P, a point near the middle of the faces. Returns false when that does not decide.
+ */
 static bool find_windings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const leaf_faces *f,
                           deciding_planes *out)
 {
@@ -296,7 +299,7 @@ static bool find_windings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, cons
     return have_outer;
 }
 
-/* False when the planes of its faces do not decide. */
+/* Returns false when the planes of its faces do not decide. */
 static bool leaf_find_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell,
                              deciding_planes *out)
 {
@@ -307,17 +310,17 @@ static bool leaf_find_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, e
 
 /* --- kinds of leaves --- */
 
-/* --- rows of all leaves: pages, each twice as large as the one before, so that what has been
- * found stays where it is --- */
+/* --- rows of all leaves: pages, each twice as large as the one before, so that stored rows do not
+ * move --- */
 
-/* What one leaf may take at most fits: 1 + 4 * 4. */
+/* The maximum for one leaf fits: 1 + 4 * 4. */
 enum { FIRST_PAGE = 32, PAGE_BYTES = 64 };
 
-ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_most)
+ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_max)
 {
     ebpo_leaf_kinds *k = ebpo_alloc_zero(1, sizeof *k);
     if (k)
-        k->rows_most = rows_most;
+        k->rows_max = rows_max;
     if (k)
         pthread_mutex_init(&k->lock, NULL);
     return k;
@@ -333,10 +336,10 @@ void ebpo_leaf_kinds_free(ebpo_leaf_kinds *k)
     free(k);
 }
 
-/* A page for at least so many rows; false when there is none. */
+/* Adds a page for at least `least` rows. Returns false when there is none. */
 static bool add_page(ebpo_leaf_kinds *k, uint64_t least)
 {
-    uint64_t size = (uint64_t)FIRST_PAGE << k->pages, left = k->rows_most - k->rows;
+    uint64_t size = (uint64_t)FIRST_PAGE << k->pages, left = k->rows_max - k->rows;
     size = size < left ? size : left;
     if (size < least || k->pages == EBPO_KIND_PAGES ||
         size > (PTRDIFF_MAX - PAGE_BYTES) / sizeof **k->page)
@@ -348,16 +351,16 @@ static bool add_page(ebpo_leaf_kinds *k, uint64_t least)
     k->pages++;
     k->rows += size;
     k->used = 0;
-    k->room = size;
+    k->space = size;
     return true;
 }
 
-/* The number of the first of so many rows, which lie in one page, or EBPO_NO_ROWS. */
+/* Returns the number of the first of `rows` rows, which are in one page, or EBPO_NO_ROWS. */
 static uint32_t take_rows(ebpo_leaf_kinds *k, uint64_t rows)
 {
     uint32_t number = EBPO_NO_ROWS;
     pthread_mutex_lock(&k->lock);
-    if (k->used + rows <= k->room || add_page(k, rows)) {
+    if (k->used + rows <= k->space || add_page(k, rows)) {
         number = (k->pages - 1) << EBPO_KIND_PAGE_BITS | (uint32_t)k->used;
         k->used += rows;
     }
@@ -365,7 +368,7 @@ static uint32_t take_rows(ebpo_leaf_kinds *k, uint64_t rows)
     return number;
 }
 
-/* The kind of a leaf with these planes; without memory for them it stays a general one. */
+/* Returns the kind of a leaf with these planes; without memory it stays general. */
 static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
                                   const deciding_planes *planes)
 {
@@ -389,13 +392,13 @@ static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
 
 /* --- a leaf --- */
 
-/* A lower wall if there is one: its winding number is the corner's. */
-static uint8_t choose_wall(unsigned walls)
+/* Returns a lower cell face if there is one: its winding number is the corner's. */
+static uint8_t choose_cell_face(unsigned cell_faces)
 {
-    unsigned open = ~walls & 63;
+    unsigned open = ~cell_faces & 63;
     if (open & 21)
         return (uint8_t)__builtin_ctz(open & 21);
-    return open ? (uint8_t)__builtin_ctz(open) : EBPO_NO_WALL;
+    return open ? (uint8_t)__builtin_ctz(open) : EBPO_NO_CELL_FACE;
 }
 
 static ebpo_leaf_kind classify_leaf(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
@@ -405,21 +408,22 @@ static ebpo_leaf_kind classify_leaf(const ebpo_accel *s, ebpo_accel_leaf *leaf, 
                                                     : EBPO_LEAF_GENERAL;
 }
 
-/* Its wall, the winding number there, and the boxes of its list. */
+/* Finds the free cell face, the winding number there, and the boxes of its list. */
 static void bound_leaf(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
-                       ebpo_walls_fn *walls)
+                       ebpo_cell_faces_fn *cell_faces)
 {
-    uint8_t wall = choose_wall(walls(s, s->list + leaf->list, cell));
+    uint8_t cell_face = choose_cell_face(cell_faces(s, s->list + leaf->list, cell));
     int32_t step = 0;
-    if (wall != EBPO_NO_WALL && wall % 2) {
+    if (cell_face != EBPO_NO_CELL_FACE && cell_face % 2) {
         double low[3], high[3];
-        uint64_t at_corner = UINT64_C(0x0f0f0f) & ~(UINT64_C(255) << 8 * (wall / 2));
+        uint64_t at_corner = UINT64_C(0x0f0f0f) & ~(UINT64_C(255) << 8 * (cell_face / 2));
         ebpo_cell_bounds(&s->box, cell, low, high);
-        step = leaf_crossings(s, leaf, low, high[wall / 2], wall / 2, at_corner << EBPO_LISTED_BOX);
+        step = leaf_crossings(s, leaf, low, high[cell_face / 2], cell_face / 2,
+                              at_corner << EBPO_LISTED_BOX);
     }
     bool small = step >= INT8_MIN && step <= INT8_MAX;
-    leaf->wall = small ? wall : EBPO_NO_WALL;
-    leaf->wall_step = (int8_t)(small ? step : 0);
+    leaf->cell_face = small ? cell_face : EBPO_NO_CELL_FACE;
+    leaf->cell_face_step = (int8_t)(small ? step : 0);
 }
 
 static bool begin_kind(ebpo_accel_leaf *leaf, ebpo_leaf_kind from, ebpo_leaf_kind to)
@@ -433,39 +437,40 @@ static void end_kind(ebpo_accel_leaf *leaf, ebpo_leaf_kind kind)
     atomic_store_explicit(&leaf->kind, (uint8_t)kind, memory_order_release);
 }
 
-static void find_wall(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
-                      ebpo_walls_fn *walls)
+static void find_cell_face(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
+                           ebpo_cell_faces_fn *cell_faces)
 {
-    /* looked at first: a look is all that later questions take */
+    /* test first: later queries only need this read */
     if (ebpo_leaf_kind_of(leaf) == EBPO_LEAF_UNKNOWN &&
-        begin_kind(leaf, EBPO_LEAF_UNKNOWN, EBPO_LEAF_IN_HAND)) {
-        bound_leaf(s, leaf, cell, walls);
-        end_kind(leaf, EBPO_LEAF_WALLED);
+        begin_kind(leaf, EBPO_LEAF_UNKNOWN, EBPO_LEAF_CLAIMED)) {
+        bound_leaf(s, leaf, cell, cell_faces);
+        end_kind(leaf, EBPO_LEAF_BOUNDED);
     }
 }
 
 static bool find_kind(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell)
 {
-    if (!begin_kind(leaf, EBPO_LEAF_WALLED, EBPO_LEAF_SORTED))
+    if (!begin_kind(leaf, EBPO_LEAF_BOUNDED, EBPO_LEAF_SORTED))
         return false;
     ebpo_leaf_kind kind = classify_leaf(s, leaf, cell);
     atomic_fetch_add(&s->kinds->of_kind[kind], 1);
-    if (kind == EBPO_LEAF_GENERAL && leaf->wall != EBPO_NO_WALL)
-        atomic_fetch_add(&s->kinds->one_wall, 1);
+    if (kind == EBPO_LEAF_GENERAL && leaf->cell_face != EBPO_NO_CELL_FACE)
+        atomic_fetch_add(&s->kinds->one_cell_face, 1);
     end_kind(leaf, kind);
     return true;
 }
 
-bool ebpo_leaf_ask(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell, ebpo_walls_fn *walls)
+bool ebpo_leaf_query(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
+                     ebpo_cell_faces_fn *cell_faces)
 {
-    /* threads may count over each other: things are found a little later then */
-    int asked = atomic_load_explicit(&leaf->asked, memory_order_relaxed) + 1;
+    /* threads may overwrite counts; the kind is then found slightly later */
+    int queried = atomic_load_explicit(&leaf->queried, memory_order_relaxed) + 1;
     bool found = false;
-    if (asked >= EBPO_LEAF_WALL_ASKED)
-        find_wall(s, leaf, cell, walls);
-    if (asked >= EBPO_LEAF_KIND_ASKED)
+    if (queried >= EBPO_LEAF_CELL_FACE_QUERIED)
+        find_cell_face(s, leaf, cell, cell_faces);
+    if (queried >= EBPO_LEAF_KIND_QUERIED)
         found = find_kind(s, leaf, cell);
     else
-        atomic_store_explicit(&leaf->asked, (uint8_t)asked, memory_order_relaxed);
+        atomic_store_explicit(&leaf->queried, (uint8_t)queried, memory_order_relaxed);
     return found;
 }

@@ -1,12 +1,13 @@
-/* Loading ahead: subtrees are loaded, or announced to a source far away, before queries need them.
+/* Loading ahead: subtrees are loaded, or prefetch hints for a remote file are sent, before queries
+ * need them.
  *
- * Prefetching asks for the subtrees that queries near the last one may need, in the order of their
+ * Prefetching requests the subtrees that queries near the last one may need, in the order of their
  * distance. EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that holds the position
  * instead.
  *
  * A batch evaluates many points sorted along the Morton curve, so that subtrees are loaded few
- * times, and returns results in the order of the points; what the next points need is announced in
- * windows. A batch belongs to one thread. */
+ * times, and returns results in the order of the points; prefetch hints for the next points are
+ * sent in windows. A batch belongs to one thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -23,10 +24,10 @@
 
 typedef struct wanted {
     uint64_t key;
-    double lower; /* bound of the distance */
+    double lower; /* lower bound of the distance */
 } wanted;
 
-/* The nearest subtrees within `limit` of p. */
+/* Search for the nearest subtrees within `limit` of p. */
 typedef struct looking {
     ebpo_ranking ranking;
     double limit;
@@ -89,9 +90,9 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double reach)
     c->has_prefetched = true;
     c->prefetched_reach = fabs(reach);
     memcpy(c->prefetched_from, p, sizeof c->prefetched_from);
-    /* Over a way w distances and their bounds change by at most w each: what is needed until then
-     * is within the reach and 2 w. A cell's diagonal is 1.73 sides: where envelopes do not decide
-     * (other rules than nonzero), the cell that holds the place is needed. */
+    /* When p moves by w, distances and their bounds change by at most w each: the subtrees needed
+     * until then are within `reach` and 2 w. A cell's diagonal is 1.73 sides: where envelopes do
+     * not decide (rules other than nonzero), the cell that holds the point is needed. */
     uint64_t keys[EBPO_CACHE_AHEAD];
     unsigned count = ebpo_subtrees_near(m, p, fabs(reach) + 2.25 * side, keys);
     for (unsigned i = 0; i < count; i++)
@@ -99,7 +100,7 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double reach)
     ebpo_cache_prefetch(m->cache, keys, count);
 }
 
-/* The number in the file's table of the subtree that this one is or lies in, when it is to be
+/* Returns the number in the file's table of the subtree that contains this one, when it is to be
  * loaded; UINT64_MAX: none. */
 static uint64_t table_number(const ebpo_context *c, uint32_t below)
 {
@@ -125,7 +126,7 @@ static int compare_numbers(const void *x, const void *y)
     return (a > b) - (a < b);
 }
 
-/* Ascending, each once; returns how many. */
+/* Sorts numbers in ascending order and removes duplicates; returns their count. */
 static uint64_t sort_numbers(uint64_t *numbers, uint64_t count)
 {
     uint64_t kept = 0;
@@ -137,10 +138,10 @@ static uint64_t sort_numbers(uint64_t *numbers, uint64_t count)
     return kept;
 }
 
-void ebpo_context_announce(const ebpo_context *c, const uint32_t *below, uint64_t count)
+void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t count)
 {
     const ebpo_model *m = c->model;
-    ebpo_expected expected = EBPO_EXPECTED_INIT(m->file);
+    ebpo_hints expected = EBPO_HINTS_INIT(m->file);
     if (m->info->subtree_level == 0 || !ebpo_input_expects(&m->file->in) || count == 0)
         return;
     uint64_t found = 0, *numbers = ebpo_alloc(count, sizeof *numbers);
@@ -150,18 +151,18 @@ void ebpo_context_announce(const ebpo_context *c, const uint32_t *below, uint64_
             numbers[found++] = number;
     }
     found = sort_numbers(numbers, found);
-    ebpo_subtree_table_expect(m->chunks, numbers, found);
+    ebpo_subtree_table_hint(m->chunks, numbers, found);
     for (uint64_t i = 0; i < found; i++)
-        ebpo_subtrees_expect(m->chunks, &expected, numbers[i], 1, ebpo_subtree_needs(c->planes),
-                             EBPO_LEVELS_MAX, true);
-    ebpo_expect_all(&expected);
+        ebpo_subtrees_hint(m->chunks, &expected, numbers[i], 1, ebpo_subtree_needs(c->planes),
+                           EBPO_LEVELS_MAX, true);
+    ebpo_hint_all(&expected);
     free(numbers);
 }
 
 /* --- batches --- */
 
-/* Subtrees announced at a time, and points that they are gathered from: some megabytes, of which
- * two are under way. */
+/* Subtrees in one prefetch hint, and points that they are gathered from: some megabytes, of which
+ * two are in flight. */
 enum { SUBTREES_A_TIME = 128, POINTS_A_TIME = 4096 };
 
 typedef struct placed {
@@ -176,7 +177,7 @@ static int compare_placed(const void *x, const void *y)
     return (a->point > b->point) - (a->point < b->point);
 }
 
-/* Of the nearest cell, for points outside the box. */
+/* Returns the key of the nearest cell, for points outside the box. */
 static uint64_t curve_key(const ebpo_box *box, const double p[3])
 {
     ebpo_cell cell = { .level = EBPO_MAX_LEVEL };
@@ -205,8 +206,9 @@ uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t c
     return order;
 }
 
-/* Points in no order are asked about along the curve also where everything is in memory: what one
- * reads the next one finds in the caches, and its answer is close. A path is in order already. */
+/* Returns true for points in no order. They are evaluated along the curve also when everything is
+ * in memory: the next point finds the data in the caches, and its result is close. A path is in
+ * order already. */
 static bool are_scattered(const ebpo_box *box, const double *points, uint64_t count)
 {
     const double far = 0x1p-5;
@@ -242,9 +244,9 @@ void ebpo_batch_end(ebpo_batch *b)
     free(b->below);
 }
 
-/* --- announcing --- */
+/* --- prefetch hints --- */
 
-/* The subtree where the search for a point begins; EBPO_NO_SUBTREE: the top decides. */
+/* Returns the subtree where the search for a point begins; EBPO_NO_SUBTREE: the top decides. */
 #define EBPO_NO_SUBTREE UINT64_MAX
 static uint64_t home_of(const ebpo_batch *b, const double p[3])
 {
@@ -270,9 +272,9 @@ static void collect_subtree(ebpo_batch *b, uint64_t below)
         b->below[b->below_count++] = (uint32_t)below;
 }
 
-static void announce_collected(ebpo_batch *b)
+static void hint_collected(ebpo_batch *b)
 {
-    ebpo_context_announce(b->context, b->below, b->below_count);
+    ebpo_context_hint(b->context, b->below, b->below_count);
     b->below_count = 0;
 }
 
@@ -281,22 +283,22 @@ static const double *ordered_point(const ebpo_batch *b, uint64_t i)
     return b->points + 3 * (b->order ? b->order[i] : i);
 }
 
-/* Subtrees that the next points begin with. */
-static void tell_next(ebpo_batch *b)
+/* Sends hints for the subtrees where the next points begin. */
+static void report_next(ebpo_batch *b)
 {
-    uint64_t begin = b->told;
-    while (b->told < b->count && b->told - begin < POINTS_A_TIME &&
+    uint64_t begin = b->reported;
+    while (b->reported < b->count && b->reported - begin < POINTS_A_TIME &&
            b->below_count < SUBTREES_A_TIME) {
-        uint64_t before = b->below_count, home = home_of(b, ordered_point(b, b->told++));
+        uint64_t before = b->below_count, home = home_of(b, ordered_point(b, b->reported++));
         if (before == 0 || b->below[before - 1] != home)
             collect_subtree(b, home);
     }
-    announce_collected(b);
+    hint_collected(b);
 }
 
-/* What else is near, as far as where a point begins tells: with these, nothing is left that would
- * be asked for alone. A subtree that cannot be loaded ends it: the question will tell, and each
- * further try may wait as long as the first. */
+/* Adds other near subtrees, as far as the starting subtrees show; after that no subtree is
+ * requested separately. A subtree that cannot be loaded ends the search: the query will report it,
+ * and each further try may wait as long as the first. */
 static void search_around(ebpo_batch *b, uint64_t end)
 {
     ebpo_context *c = b->context;
@@ -316,17 +318,18 @@ static void search_around(ebpo_batch *b, uint64_t end)
         for (unsigned k = 0; k < count; k++)
             collect_subtree(b, keys[k]);
     }
-    announce_collected(b);
+    hint_collected(b);
 }
 
 uint64_t ebpo_batch_next(ebpo_batch *b, uint64_t i)
 {
     if (b->far && i == 0)
-        tell_next(b);
-    if (b->far && i >= (b->reach ? b->searched : b->told - (b->told != 0)) && i < b->count) {
-        uint64_t end = b->told;
-        if (b->told < b->count)
-            tell_next(b);
+        report_next(b);
+    if (b->far && i >= (b->reach ? b->searched : b->reported - (b->reported != 0)) &&
+        i < b->count) {
+        uint64_t end = b->reported;
+        if (b->reported < b->count)
+            report_next(b);
         if (b->reach)
             search_around(b, end);
     }

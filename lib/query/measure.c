@@ -1,11 +1,12 @@
 /* Area, volume, centroid and inertia as integrals over the faces (divergence theorem): each face
  * and the middle of the model span a tetrahedron, whose moments are polynomials in its corners.
  * With det = a . (b x c), s = a + b + c for corners a, b, c relative to the middle: volume det / 6,
- * first moments det s / 24,   second moments det (s s' + a a' + b b' + c c') / 120. All of it in
- * double-double arithmetic, on coordinates scaled by a power of two to about 1, in blocks of faces
- * that do not depend on threads. A face counts as often as its component bounds the solid, where
- * that is known (construct/solid_shells.h), else once. Source of the moments: Tonon 2004, "Explicit
- * exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex coordinates". */
+ * first moments det s / 24,   second moments det (s s' + a a' + b b' + c c') / 120. All values are
+ * in double-double arithmetic, on coordinates scaled by a power of two to about 1, in blocks of
+ * faces that do not depend on threads. A face counts as often as its component bounds the solid,
+ * where that is known (construct/solid_shells.h), else once. Source of the moments: Tonon 2004,
+ * "Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex
+ * coordinates". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -26,10 +27,10 @@
 
 enum { BLOCK_FACES = 16384 };
 
-/* A volume below this share of the sum of absolute values is rounding: 0. */
+/* A volume below this share of the sum of absolute values is a rounding error: 0. */
 static const double nothing = 0x1p-85;
 
-/* Scaled coordinates are p / 2^exponent; `middle` is given in these. */
+/* Scaled coordinates are p / 2^exponent; `middle` is scaled. */
 typedef struct frame {
     int exponent;
     double factor[2]; /* 2^-exponent in two steps, as it may not fit into one */
@@ -39,14 +40,14 @@ typedef struct frame {
 typedef struct moments {
     ebpo_pair area2, volume6, first24[3], second120[6]; /* second: xx, yy, zz, yz, zx, xy */
     ebpo_pair integral6;                                /* with each face counted once */
-    /* the sum of absolute values behind volume6 */
+    /* the sum of absolute values of the terms of volume6 */
     double absolute6;
 } moments;
 
 typedef struct pass {
     const ebpo_mesh *mesh;
     const uint32_t *component; /* [faces]; NULL: all faces count once */
-    int8_t *times;             /* [components] how often its faces count */
+    int8_t *times;             /* [components] multiplicity of its faces */
     frame frame;
     moments *blocks;
 } pass;
@@ -68,7 +69,7 @@ static void frame_of(frame *f, const ebpo_mesh *mesh)
     for (int k = 0; k < 3; k++)
         half = fmax(half, mesh->face_count ? .5 * high[k] - .5 * low[k] : 0);
     frexp(half, &f->exponent);
-    /* A model that is flat far away and tiny otherwise must not overflow. */
+    /* A flat model far from the origin with a tiny extent must not overflow. */
     int top;
     frexp(largest, &top);
     f->exponent = f->exponent > top - 900 ? f->exponent : top - 900;
@@ -114,7 +115,7 @@ static double pair_length(const ebpo_pair n[3])
     return largest * sqrt(x * x + y * y + z * z);
 }
 
-/* n = (b - a) x (c - a) */
+/* Computes n = (b - a) x (c - a). */
 static void normal_of(const double corner[3][3], ebpo_pair n[3])
 {
     ebpo_pair f[3], g[3];
@@ -128,7 +129,7 @@ static void normal_of(const double corner[3][3], ebpo_pair n[3])
     }
 }
 
-/* The products of corners that the second moment in (u, v) takes. */
+/* Returns the products of corners for the second moment in (u, v). */
 static ebpo_pair mixed_product(ebpo_pair r[3][3], const ebpo_pair s[3], int u, int v)
 {
     ebpo_pair sum = ebpo_pair_multiply(s[u], s[v]);
@@ -188,7 +189,7 @@ static ebpo_status measure_blocks(void *context, uint64_t begin, uint64_t end, u
 
 /* --- from moments to mass --- */
 
-/* Inertia from central second moments: the trace less the matrix. */
+/* Computes the inertia from central second moments: the trace less the matrix. */
 static void inertia_of(ebpo_mass *out, const ebpo_pair central[6], int exponent)
 {
     for (int k = 0; k < 3; k++) {
@@ -229,7 +230,7 @@ static void mass_of(ebpo_mass *out, const moments *m, const frame *f, bool solid
     inertia_of(out, central, f->exponent);
 }
 
-/* --- which faces count --- */
+/* --- counted faces --- */
 
 static ebpo_status count_components(pass *p, const ebpo_solid_shells *s, ebpo_rule rule,
                                     ebpo_error *error)
@@ -244,7 +245,7 @@ static ebpo_status count_components(pass *p, const ebpo_solid_shells *s, ebpo_ru
     return EBPO_OK;
 }
 
-/* Finds out whether the volume is known; then sets how often faces count. */
+/* Finds out if the volume is known; then sets the multiplicity of faces. */
 static ebpo_status decide_volume(pass *p, const ebpo_info *info, unsigned threads,
                                  ebpo_solid_shells *s, ebpo_solid_volume *volume, ebpo_error *error)
 {
@@ -262,7 +263,7 @@ static ebpo_status decide_volume(pass *p, const ebpo_info *info, unsigned thread
     return status;
 }
 
-/* Faces of a single component that look inwards count -1 times, or do not count. */
+/* Faces of a single component that face inwards count -1 times, or do not count. */
 static void count_inwards(moments *m, ebpo_rule rule)
 {
     int times = ebpo_rule_inside(rule, -1) ? -1 : 0;
@@ -301,7 +302,7 @@ ebpo_status ebpo_measure(const ebpo_file *file, unsigned threads, ebpo_mass *out
         return status;
     if (info->pruned)
         return ebpo_fail_file(error, EBPO_E_ABSENT, file->in.shown,
-                              "the file is a subset, of whose mesh a part was left out: it cannot "
+                              "the file is a subset with an omitted part of the mesh: it cannot "
                               "be measured; measure the original");
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     read.threads = threads;
@@ -336,12 +337,12 @@ done:
     return status;
 }
 
-/* --- the volume of a solid, from the file's head --- */
+/* --- the volume of a solid, from the file header --- */
 
-/* What rounding may do to sums of envelopes: of the sum, and of the root cell's volume. */
+/* Rounding errors of sums of envelopes: relative to the sum, and to the root cell's volume. */
 static const double OF_SUM = 1e-9, OF_ROOT = 1e-12;
 
-/* Sets out->lo and hi to what black cells fill and envelopes hold. */
+/* Sets out->lo and hi to the volumes of black cells and envelopes. */
 static void bound_by_cells(const ebpo_info *info, ebpo_solid_volume *out)
 {
     double root = info->box_size[0] * info->box_size[1] * info->box_size[2], lo = 0, hi = 0;
@@ -356,8 +357,8 @@ static void bound_by_cells(const ebpo_info *info, ebpo_solid_volume *out)
     out->hi = hi * (1 + OF_SUM) + root * OF_ROOT;
 }
 
-/* Returns the volume of components that do not meet; NAN: it is not known. Shells that were not
- * counted are not apart. */
+/* Returns the volume of components that do not intersect; NAN: it is not known. Uncounted shells
+ * may intersect. */
 static double known_volume(const ebpo_mesh_report *report, ebpo_rule rule,
                            const ebpo_shells *shells)
 {

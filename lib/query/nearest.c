@@ -1,12 +1,11 @@
-/* The nearest face: the search in one accel, and the decision which of two faces is nearer.
+/* Finds the nearest face: the search in one accel, and the comparison of two faces.
  *
- * Depth first, nearest child first; what is certainly farther than something already seen is
- * pruned. Bounds and triangles are in single precision with bounded errors (nearest_kernels.c).
- * Faces that pass are judged with certain bounds in double precision, and exactly where these
- * cannot tell two faces apart; of equally near faces the one with the least number in the file is
- * returned. Points too far for single precision search by boxes in doubles, points too far for
- * doubles by keys (point_bounds.h). An ebpo_nearest may search several accels one after the other.
- */
+ * Depth first, nearest child first; prunes nodes that are certainly farther than the best face.
+ * Bounds and triangles are in single precision with bounded errors (nearest_kernels.c). The
+ * remaining faces are compared by certain bounds in double precision, and exactly where these
+ * cannot separate two faces; of equally near faces the one with the least number in the file is
+ * returned. Points too far for single precision use boxes in doubles, points too far for doubles
+ * use keys (point_bounds.h). An ebpo_nearest may search several accels one after the other. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -30,7 +29,7 @@ static bool is_edge(ebpo_feature feature)
     return feature >= EBPO_NEAR_EDGE0 && feature <= EBPO_NEAR_EDGE2;
 }
 
-/* Faces around one vertex or edge are the usual tie. */
+/* Faces around one vertex or edge are the most frequent tie. */
 static bool same_feature(const double a[3][3], ebpo_feature of_a, const double b[3][3],
                          ebpo_feature of_b)
 {
@@ -58,7 +57,7 @@ int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distan
 
 /* --- the search --- */
 
-/* Beyond so many halves of the subtree's size, single precision tells nothing apart. */
+/* Beyond this multiple of half the subtree's size, single precision cannot separate distances. */
 #define FAR 32.0
 
 void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p[3],
@@ -95,7 +94,7 @@ static ebpo_far_keys keys_of(const ebpo_nearest *n, const double triangle[3][3])
     return n->far.far ? ebpo_far_face(&n->far, triangle) : (ebpo_far_keys){ -INFINITY, INFINITY };
 }
 
-/* Sign of what the face is farther than the nearest one so far; exact. */
+/* Returns the exact sign of the face's distance less the one of the nearest face so far. */
 static int compare_with_nearest(const ebpo_nearest *n, const double triangle[3][3],
                                 const ebpo_distance_bounds *b, const ebpo_far_keys *keys)
 {
@@ -116,7 +115,7 @@ void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint6
         take_face(n, triangle, &b, &keys, file_face, source_face);
 }
 
-/* True: it is the nearest so far. */
+/* Returns true if it is the nearest so far. */
 static bool try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
 {
     uint32_t local = ebpo_accel_slot_face(s, slot);
@@ -173,12 +172,13 @@ static bool make_probe(const ebpo_accel *s, const double p[3], ebpo_probe *out)
     }
     out->scale = (float)s->scale;
     out->scale64 = s->scale;
-    /* `local` is off by 2^-24 of `most` on each axis: docs/develop/bounds.md, "Limits of points" */
+    /* the error of `local` is 2^-24 of `most` on each axis: docs/develop/bounds.md, "Limits of
+     * points" */
     out->error = (float)most * 0x1p-22f;
     return true;
 }
 
-/* The limit in the frame, rounded up. */
+/* Returns the limit in the frame, rounded up. */
 static float frame_limit(const ebpo_near_search *g)
 {
     const ebpo_nearest *n = g->user;
@@ -186,7 +186,7 @@ static float frame_limit(const ebpo_near_search *g)
     return limit < 0x1p60 ? (float)limit * (1 + 0x1p-20f) + FLT_MIN : 0x1p60f;
 }
 
-/* Judges the candidates, the most promising first. */
+/* Compares the candidates, the most promising first. */
 static void judge_waiting(ebpo_near_search *g)
 {
     ebpo_nearest *n = g->user;
@@ -212,7 +212,7 @@ static void judge_waiting(ebpo_near_search *g)
     }
 }
 
-/* Out of time: what is left on the stack bounds what was passed over. */
+/* Stops at the deadline: the nodes on the stack bound the unvisited part. */
 static void give_up(const ebpo_near_search *g)
 {
     ebpo_nearest *n = g->user;
@@ -273,7 +273,8 @@ typedef struct far_search {
     ebpo_far_frame frame;
 } far_search;
 
-/* The same with slabs, which cost more: only of those that boxes leave. */
+/* Does the same with bounding cylinders, which cost more: only for children that pass the test of
+ * boxes. */
 static unsigned far_children(const far_search *g, uint32_t node, double lower[8])
 {
     const ebpo_nearest *n = g->n;
@@ -310,7 +311,7 @@ static void search_by_keys(const far_search *g, uint32_t child)
 
 /* --- far from a subtree: double precision, boxes only --- */
 
-/* Lower bound of the distance to a child's box, in the model's unit. */
+/* Returns a lower bound of the distance to a child's box, in the model's unit. */
 static double box_distance(const ebpo_accel *s, const ebpo_bound *b, int lane, const double p[3])
 {
     double most = 0, sum = 0, d[3];
@@ -325,8 +326,8 @@ static double box_distance(const ebpo_accel *s, const ebpo_bound *b, int lane, c
         return most;
     for (int k = 0; k < 3; k++)
         sum += d[k] / most * (d[k] / most);
-    /* p[k] is FAR away on the axis that matters, so the rounding of the walls is far below 2^-40 of
-     * it. */
+    /* p[k] is FAR away on the axis that matters, so the rounding error of the box sides is far
+     * below 2^-40 of it. */
     return most * sqrt(sum) * (1 - 0x1p-40);
 }
 

@@ -1,8 +1,8 @@
 /* Kernel of the nearest face: the walk from node to node of one accel's hierarchy over faces, eight
  * children or eight faces at a time, in single precision.
  *
- * The walk drops only what is certainly farther than the best upper bound. The faces that may be
- * nearest are collected as candidates and decided by nearest.c.
+ * The walk drops only nodes and faces certainly farther than the best upper bound. It collects the
+ * other faces as candidates, which nearest.c compares.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md. */
@@ -13,9 +13,9 @@
 #include "query/face_block.h"
 #include "query/query_kernels.h"
 
-/* --- boxes and slabs --- */
+/* --- boxes and bounding cylinders --- */
 
-/* The children's boxes as seen from the point: nearer sides, and farther ones negated. */
+/* The children's boxes relative to the point: nearer sides, and farther ones negated. */
 typedef struct near_boxes {
     f8 low[3], minus_high[3];
 } near_boxes;
@@ -25,7 +25,7 @@ EBPO_EIGHT f8 near_square_sum(const f8 x[3])
     return f8_add(f8_add(f8_mul(x[0], x[0]), f8_mul(x[1], x[1])), f8_mul(x[2], x[2]));
 }
 
-/* Squared lower bounds of the distances, by boxes. */
+/* Returns squared lower bounds of the distances, from boxes. */
 EBPO_EIGHT f8 near_by_boxes(const ebpo_bound *b, const ebpo_probe *probe, near_boxes *out)
 {
     f8 d[3];
@@ -39,7 +39,7 @@ EBPO_EIGHT f8 near_by_boxes(const ebpo_bound *b, const ebpo_probe *probe, near_b
     return near_square_sum(d);
 }
 
-/* The same by slabs. */
+/* Does the same from bounding cylinders. */
 EBPO_EIGHT f8 near_by_slabs(const ebpo_bound_slab *slab, const near_boxes *boxes)
 {
     f8 zero = f8_all(0), twice[3], part[3];
@@ -47,20 +47,20 @@ EBPO_EIGHT f8 near_by_slabs(const ebpo_bound_slab *slab, const near_boxes *boxes
         twice[k] = f8_sub(boxes->low[k], boxes->minus_high[k]);
         part[k] = f8_mul(twice[k], f8_mul(f8_from_shorts(slab->axis[k]), f8_all(0x1p-16f)));
     }
-    /* of the middle as seen from the point */
+    /* position of the middle relative to the point */
     f8 along = f8_add(f8_add(part[0], part[1]), part[2]), step = f8_all(slab->along_step),
        from = f8_mul(f8_from_shorts(slab->from), step), to = f8_mul(f8_from_shorts(slab->to), step),
        radius = f8_mul(f8_from_shorts(slab->radius), f8_all(slab->aside_step));
     f8 over = f8_max3(f8_add(along, from), f8_sub(f8_sub(zero, along), to), zero);
-    /* Less than the true one by enough, so that the root of a small difference of large squares
-     * does no harm. */
+    /* Below the true value by a margin, so that the root of a small difference of large squares
+     * stays a lower bound. */
     f8 away = f8_mul(near_square_sum(twice), f8_all(0.25f * (1 - 0x1p-19f))),
        aside2 = f8_max(f8_sub(away, f8_mul(along, along)), zero),
        aside = f8_max(f8_sub(f8_sqrt(aside2), radius), zero);
     return f8_add(f8_mul(aside, aside), f8_mul(over, over));
 }
 
-/* A bit for each child whose bound is at most the limit. */
+/* Returns a bit for each child whose bound is at most the limit. */
 EBPO_EIGHT unsigned near_children(const ebpo_near_search *g, uint32_t node, float lower2[8])
 {
     const ebpo_bound *b = &g->s->bound[node];
@@ -88,10 +88,10 @@ EBPO_EIGHT three three_cross(three a, three b)
     return (three){ minor_of_four(a.y, a.z, b.y, b.z), minor_of_four(a.z, a.x, b.z, b.x),
                     minor_of_four(a.x, a.y, b.x, b.y) };
 }
-/* At least the length. */
+/* Returns an upper bound of the length. */
 EBPO_EIGHT f8 three_size(three a) { return f8_add(f8_add(f8_abs(a.x), f8_abs(a.y)), f8_abs(a.z)); }
 
-/* Squared distance of the origin to the segment from a along e. */
+/* Returns the squared distance of the origin to the segment from a along e. */
 EBPO_EIGHT f8 edge_distance2(three a, three e, f8 ee)
 {
     f8 t = f8_sub(f8_all(0), f8_mul(three_dot(a, e), f8_inverse(ee)));
@@ -101,8 +101,8 @@ EBPO_EIGHT f8 edge_distance2(three a, three e, f8 ee)
     return three_dot(q, q);
 }
 
-/* Corners relative to the point, and edges, in the frame. Edges come from the corners themselves:
- * they must not suffer from a point far away. */
+/* Corners relative to the point, and edges, in the frame. Edges are computed from the corners
+ * themselves: a far point must not increase their error. */
 typedef struct near_faces {
     three corner[3], edge[3];
 } near_faces;
@@ -158,11 +158,11 @@ EBPO_EIGHT near_faces near_load(const ebpo_near_search *g, const ebpo_face_block
     return out;
 }
 
-/* Distances of eight faces, 2^-16 of r less and more, where r is the sum of all coordinates' sizes
- * of a corner and two edges. Faces whose height is at least an eighth of their longest edge are
- * sturdy: their planes count. Others are judged by their edges, from which no point of theirs is
- * farther than their height. What underflow does to squares the last term covers. Why that is
- * enough: docs/develop/bounds.md, "Points against eight faces". */
+/* Computes distances of eight faces, 2^-16 of r less and more, where r is the sum of all
+ * coordinates' sizes of a corner and two edges. Faces whose height is at least an eighth of their
+ * longest edge use their planes. Others use their edges, from which no point of the face is farther
+ * than its height. The last term covers underflow of squares. Proof: docs/develop/bounds.md,
+ * "Points against eight faces". */
 EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 {
     f8 zero = f8_all(0), length[3], longest2;
@@ -175,8 +175,8 @@ EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
         edges = f8_min(edge_distance2(f->corner[i], f->edge[i], length[i]), edges);
         out = f8_or(out, f8_less(three_dot(three_cross(f->edge[i], n), f->corner[i]), zero));
     }
-    /* its square would underflow for a small triangle close to the point, the quotient below does
-     * not */
+    /* its square would underflow for a small triangle close to the point, but not the quotient
+     * below */
     f8 an = three_dot(f->corner[0], n);
     f8 sturdy = f8_and(f8_at_most(f8_mul(f8_mul(longest2, longest2), f8_all(0x1p-6f)), nn),
                        f8_less(f8_all(0x1p-54f), longest2));
@@ -197,7 +197,7 @@ EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 
 /* --- the walk --- */
 
-/* The least upper bound first: most of the eight are then known to be farther. */
+/* Visits a block. The least upper bound first: then most of the eight are known to be farther. */
 EBPO_EIGHT void near_block(ebpo_near_search *g, uint32_t block, uint32_t node, bool wide)
 {
     ebpo_face_block faces = ebpo_face_block_open(g->s, block);
@@ -228,15 +228,16 @@ EBPO_EIGHT void near_fetch(const ebpo_accel *s, uint32_t child)
         ebpo_visit_fetch_slab(s, child);
 }
 
-/* What comes after this one, while this one is looked at: far from the surface that is two misses
- * of the caches at a time. */
+/* Prefetches the next visit during the current one: far from the surface it costs two cache misses
+ * at a time. */
 EBPO_EIGHT void near_fetch_next(const ebpo_near_search *g, uint32_t top)
 {
     if (top)
         near_fetch(g->s, (uint32_t)g->stack[top - 1]);
 }
 
-/* Beside nodes that are so much larger, squared, than what makes slabs pay a search is small. */
+/* The search is small compared with nodes this many times larger (squared) than the size from which
+ * cylinders are worth testing. */
 #define NEAR_SMALL 25.0f
 
 /* Pushes a node's children, farthest first; returns the new top. */
@@ -249,7 +250,8 @@ EBPO_EIGHT uint32_t near_push(ebpo_near_search *g, uint32_t top, uint32_t node, 
     return above;
 }
 
-/* From a node down to a block of `node`, always to the nearest child; false: no child matters. */
+/* Descends from a node to a block of `node`, always to the nearest child. Returns false if no child
+ * matters. */
 EBPO_EIGHT bool near_descend(ebpo_near_search *g, uint32_t *top, uint32_t *child, uint32_t *node)
 {
     while (!(*child & EBPO_IS_BLOCK)) {
@@ -271,9 +273,9 @@ EBPO_EIGHT bool near_descend(ebpo_near_search *g, uint32_t *top, uint32_t *child
     return true;
 }
 
-/* Looks at the first block; where to go on: at the least node above it beside which the search is
- * small. From there up, nodes are hardly ever left by another child than the one that was come
- * from, and none has to wait for what the one before it says. */
+/* Visits the first block and chooses the next node: the least ancestor compared with which the
+ * search is small. Above that node, the search hardly ever leaves through another child, and no
+ * visit depends on the result of the previous one. */
 EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g, bool wide)
 {
     const ebpo_bound *bound = g->s->bound;
@@ -281,14 +283,14 @@ EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g, bool wide)
     if (g->first_block == EBPO_NO_BLOCK)
         return g->s->top;
     near_block(g, g->first_block, node, wide);
-    if (g->late) /* what is left must be on the stack */
+    if (g->late) /* the rest must be on the stack */
         return g->s->top;
     while (node != g->s->top && g->limit2 > bound[node].slab_limit2 * NEAR_SMALL)
         node = bound[node].parent;
     return node;
 }
 
-/* Pushes the children of a node but for one. */
+/* Pushes all children of a node but one. */
 EBPO_EIGHT uint32_t near_beside(ebpo_near_search *g, uint32_t node, uint32_t child)
 {
     float lower2[8];
@@ -299,7 +301,7 @@ EBPO_EIGHT uint32_t near_beside(ebpo_near_search *g, uint32_t node, uint32_t chi
     return lanes ? near_push(g, 0, node, lanes, lower2) : 0;
 }
 
-/* All that is on the stack; false: late. */
+/* Visits everything on the stack. Returns false at the deadline. */
 EBPO_EIGHT bool near_walk_down(ebpo_near_search *g, uint32_t top, bool wide)
 {
     uint32_t steps = 0;

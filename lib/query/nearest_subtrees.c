@@ -1,11 +1,11 @@
-/* The nearest face of a model: under a budget, subtrees are searched, and loaded, in the order in
- * which they may matter.
+/* Finds the nearest face of a model: under a budget, subtrees are searched, and loaded, in the
+ * order in which they may matter.
  *
  * Nodes of the top and subtrees wait in a queue, ordered by certain lower bounds of their distance;
  * the search ends when the next is beyond the best face. A subtree is loaded only if its bound is
- * at most the answer, whatever else is in memory. Bounds come from a subtree's skeleton, if it has
- * ever been loaded (skeleton.c), else from the envelopes of the levels right below the cut (deep
- * bounds), which are read once queries have loaded enough for nothing. */
+ * at most the result, independent of the data in memory. Bounds come from a subtree's skeleton, if
+ * it has ever been loaded (skeleton.c), else from the envelopes of the levels right below the cut
+ * (deep bounds). Deep bounds are read once queries have loaded enough subtrees without need. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,7 +18,7 @@
 #include "geometry/cells.h"
 #include "query/nearest.h"
 
-/* A heap. */
+/* Returns the order of the heap. */
 static bool comes_out_before(const ebpo_ranked *a, const ebpo_ranked *b)
 {
     return a->lower != b->lower ? a->lower < b->lower : a->node.entry < b->node.entry;
@@ -51,12 +51,12 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *c)
     return first;
 }
 
-/* Each level takes four times the one above it; the third would save a tenth of the loads that two
- * leave: docs/develop/design.md. */
+/* Each level takes four times the one above it; the third would save a tenth of the loads that
+ * remain with two: docs/develop/design.md. */
 enum { DEEP_LEVELS = 2 };
-/* On a path a question comes to a few subtrees that are new. What is more is for nothing; reading
- * two levels takes about as long as so many loads. */
-enum { NEW_AS_USUAL = 4, LOADS_TO_READ = 64 };
+/* On a path, a query visits few new subtrees. Further ones were loaded without need; reading two
+ * levels takes about as long as this number of loads. */
+enum { NEW_AS_DEFAULT = 4, LOADS_TO_READ = 64 };
 
 /* --- deep bounds --- */
 
@@ -84,11 +84,11 @@ void ebpo_deep_bounds_make(ebpo_model *m)
         level--;
 }
 
-void ebpo_deep_bounds_tell(ebpo_model *m, unsigned loaded)
+void ebpo_deep_bounds_report(ebpo_model *m, unsigned loaded)
 {
-    if (loaded <= NEW_AS_USUAL || m->deep_begun || ebpo_input_expects(&m->file->in))
+    if (loaded <= NEW_AS_DEFAULT || m->deep_begun || ebpo_input_expects(&m->file->in))
         return;
-    uint64_t more = loaded - NEW_AS_USUAL;
+    uint64_t more = loaded - NEW_AS_DEFAULT;
     if (atomic_fetch_add(&m->new_loads, more) + more >= LOADS_TO_READ)
         ebpo_deep_bounds_make(m);
 }
@@ -96,7 +96,7 @@ void ebpo_deep_bounds_tell(ebpo_model *m, unsigned loaded)
 typedef struct deep_search {
     const ebpo_top *top;
     const ebpo_ranking *ranking;
-    double best; /* so far */
+    double best; /* best distance so far */
 } deep_search;
 
 typedef struct deep_child {
@@ -111,7 +111,7 @@ static ebpo_top_planes planes_of(const ebpo_top *t, uint32_t entry)
     return ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW ? t->below_planes[value] : t->gray[value];
 }
 
-/* Those that may be nearer than the best, the nearest first. */
+/* Ranks the children that may be nearer than the best, the nearest first. */
 static int rank_deep_children(const deep_search *g, uint32_t gray, ebpo_cell cell, double parent,
                               deep_child out[8])
 {
@@ -145,8 +145,8 @@ static void search_deep(deep_search *g, uint32_t gray, ebpo_cell cell, double pa
             g->best = child[i].lower;
 }
 
-/* A certain lower bound, not less than `lower`, for what is of the solid's surface in the cell of a
- * node of the cut level; what is beyond `limit` is not told apart. Any thread. */
+/* Returns a certain lower bound, at least `lower`, for the solid's surface in the cell of a node of
+ * the cut level; bounds beyond `limit` are not refined. Any thread. */
 static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
                               double limit)
 {
@@ -167,7 +167,7 @@ static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node
 
 /* --- the search --- */
 
-/* What of a subtree waits: the node, of which nothing else is known; its own faces; its outer ones.
+/* Parts of a subtree in the queue: the node without other data; its owned faces; its shared ones.
  */
 enum { NODE = 0, OWN, OUTER };
 
@@ -175,17 +175,17 @@ typedef struct searching {
     ebpo_context *c;
     ebpo_nearest *n;
     ebpo_ranking ranking;
-    unsigned new_loads; /* of subtrees of which nothing was known */
+    unsigned new_loads; /* loaded subtrees without bounds */
 } searching;
 
 static ebpo_status add_node(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_nearest *n = g->n;
     if (r->lower > ebpo_nearest_limit(n) || ebpo_node_is_uniform(&r->node) ||
-        r->node.pruned) /* pruned: see look_at_pruned */
+        r->node.pruned) /* pruned: see inspect_pruned */
         return EBPO_OK;
     if (ebpo_node_is_below(&r->node)) {
-        /* it holds some face */
+        /* it contains some face */
         double end = ebpo_rank_cell_end(&g->ranking, r->node.cell);
         n->upper = fmin(n->upper, n->far.far ? ebpo_far_upper(&n->far, end) : end);
         n->limit = fmin(n->limit, n->upper);
@@ -205,21 +205,21 @@ static ebpo_status add_children(searching *g, const ebpo_ranked *r, ebpo_error *
     return status;
 }
 
-/* --- subtrees, once each: by numbers that are twice the question's, or one more --- */
+/* --- subtrees, once each: marked by twice the query's number, or one more --- */
 
 static bool is_searched(const ebpo_context *c, uint32_t below)
 {
-    return c->seen[below] == 2 * c->question + 1;
+    return c->seen[below] == 2 * c->current_query + 1;
 }
 
-static ebpo_status begin_question(ebpo_context *c, ebpo_error *error)
+static ebpo_status begin_query(ebpo_context *c, ebpo_error *error)
 {
     uint64_t count = c->model->top->below_count;
     c->queue_count = 0;
-    if (c->seen && ++c->question < UINT32_MAX / 2)
+    if (c->seen && ++c->current_query < UINT32_MAX / 2)
         return EBPO_OK;
     free(c->seen);
-    c->question = 1;
+    c->current_query = 1;
     c->seen = ebpo_alloc_zero(count, sizeof *c->seen);
     return c->seen ? EBPO_OK : ebpo_fail_memory(error, count * sizeof *c->seen);
 }
@@ -235,7 +235,7 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
     uint32_t below = ebpo_entry_value(node.entry);
     if (is_searched(g->c, below))
         return EBPO_OK;
-    g->c->seen[below] = 2 * g->c->question + 1;
+    g->c->seen[below] = 2 * g->c->current_query + 1;
     g->c->searched++;
     const ebpo_skeletons *skeletons = g->c->model->skeletons;
     bool is_new = !ebpo_skeletons_find(skeletons, below);
@@ -246,7 +246,7 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
         return status;
     ebpo_nearest_search(g->n, g->c, node.subtree);
     g->new_loads += g->c->loaded > loaded && is_new;
-    /* for nothing, or as one of many that are about as far away */
+    /* without need, or as one of many at about the same distance */
     bool again =
         g->n->limit == limit || g->n->limit > ebpo_cell_diagonal(&g->ranking.box, node.cell);
     if (g->c->loaded > loaded && again)
@@ -254,16 +254,16 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* --- what skeletons tell ---
+/* --- bounds from skeletons ---
  *
- * A face is listed by every subtree whose cell it meets, and is the own of one of them: else one
- * across a wall would be looked for on both sides. A subtree is come to by its cell, for what its
- * faces have within it. For its own faces it is searched. For outer ones that may matter, the
- * subtrees whose own they may be are, by bounds that hold wherever their faces are; unless one of
- * those is not known: then it is searched itself. So the nearest face is found: its nearest point
- * is in a cell that is come to, and that subtree is searched, or the one whose own the face is. No
- * bound on the way there is greater than the face's distance. Which of these two the order of the
- * queue brings first does not matter. */
+ * A face is listed by every subtree whose cell it intersects, and owned by one of them: otherwise a
+ * face across a cell face would be searched on both sides. A subtree is visited by its cell, for
+ * the parts of its faces within it. For its owned faces it is searched. For shared faces that may
+ * matter, the subtrees that may own them are searched, by bounds that hold wherever their faces
+ * are; if one of those has no skeleton, the subtree itself is searched. So the nearest face is
+ * found: its nearest point is in a visited cell, and that subtree or the face's owner is searched.
+ * No bound on the way there is greater than the face's distance. The queue may return these two in
+ * any order. */
 
 static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skeleton *k)
 {
@@ -278,33 +278,35 @@ static ebpo_node node_below(const ebpo_model *m, uint32_t below)
     return node;
 }
 
-/* `lower`: of what it is considered for. These only rise, so that once is enough. */
+/* Considers a subtree for its owned faces. `lower`: bound for which it is considered. Bounds only
+ * rise, so once is enough. */
 static ebpo_status consider_own(searching *g, uint32_t below, double lower, ebpo_error *error)
 {
     ebpo_context *c = g->c;
-    if (c->seen[below] >= 2 * c->question)
+    if (c->seen[below] >= 2 * c->current_query)
         return EBPO_OK;
-    c->seen[below] = 2 * c->question;
+    c->seen[below] = 2 * c->current_query;
     const ebpo_skeleton *k = ebpo_skeletons_find(c->model->skeletons, below);
     double own = skeleton_bounds(g, k).own;
     ebpo_ranked r = { node_below(c->model, below), fmax(lower, own), OWN };
     return r.lower <= ebpo_nearest_limit(g->n) ? ebpo_queue_push(c, &r, error) : EBPO_OK;
 }
 
-/* A walk to the subtrees that may have outer faces of another one as their own: whose cells meet
- * the faces' box, and come before it, depth first. */
+/* Walk to the subtrees that may own shared faces of another one: their cells intersect the faces'
+ * box and come before it, depth first. */
 typedef struct owners {
     searching *g;
-    uint64_t code; /* of the other one */
+    uint64_t code; /* octcode of the other one */
     int level;
     double lower;
-    const ebpo_outer_box *outer;
+    const ebpo_shared_box *outer;
     bool (*visit)(struct owners *o, uint32_t below, ebpo_error *error);
     ebpo_status status;
 } owners;
 
-/* A cell lists what comes near it, too: point_bounds.c. */
-static bool cell_meets(const owners *o, ebpo_cell cell)
+/* Returns true if the box reaches the cell, which also lists faces that come near it:
+ * point_bounds.c. */
+static bool cell_intersects(const owners *o, ebpo_cell cell)
 {
     double low[3], high[3];
     ebpo_cell_bounds(&o->g->ranking.box, cell, low, high);
@@ -335,12 +337,12 @@ static bool consider_owner(owners *o, uint32_t below, ebpo_error *error)
     return o->status == EBPO_OK;
 }
 
-/* False as soon as a visit is. */
+/* Returns false as soon as a visit does. */
 static bool visit_owners(owners *o, uint32_t entry, ebpo_cell cell, ebpo_error *error)
 {
     const ebpo_node_table *nodes = &o->g->c->model->top->nodes;
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM || !comes_before(o, cell) ||
-        !cell_meets(o, cell))
+        !cell_intersects(o, cell))
         return true;
     if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW)
         return ebpo_octcode_of_cell(cell) == o->code || o->visit(o, ebpo_entry_value(entry), error);
@@ -351,7 +353,7 @@ static bool visit_owners(owners *o, uint32_t entry, ebpo_cell cell, ebpo_error *
     return true;
 }
 
-static bool visit_all(owners *o, const ebpo_outer_box *boxes, unsigned count, ebpo_error *error)
+static bool visit_all(owners *o, const ebpo_shared_box *boxes, unsigned count, ebpo_error *error)
 {
     for (unsigned i = 0; i < count; i++) {
         o->outer = &boxes[i];
@@ -361,12 +363,12 @@ static bool visit_all(owners *o, const ebpo_outer_box *boxes, unsigned count, eb
     return true;
 }
 
-/* False: some owner is not known, and nothing has been done. */
+/* Returns false if some owner has no skeleton; nothing has been done then. */
 static bool consider_owners(searching *g, const ebpo_skeleton *k, const ebpo_ranked *r,
                             ebpo_status *status, ebpo_error *error)
 {
-    ebpo_outer_box box[EBPO_OUTER_BOXES];
-    unsigned count = ebpo_skeleton_outer_boxes(k, g->n->p, g->n->limit, box);
+    ebpo_shared_box box[EBPO_SHARED_BOXES];
+    unsigned count = ebpo_skeleton_shared_boxes(k, g->n->p, g->n->limit, box);
     owners o = { .g = g,
                  .code = ebpo_octcode_of_cell(r->node.cell),
                  .level = r->node.cell.level,
@@ -386,8 +388,8 @@ static double deep_bound(const searching *g, const ebpo_ranked *r)
     return bound_below_cut(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n));
 }
 
-/* Nothing has been kept of it: it is searched, but after what is nearer than it can be. */
-static ebpo_status look_at_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
+/* Handles a subtree without skeleton: searches it after everything nearer than its bound. */
+static ebpo_status inspect_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_ranked all = { r->node, deep_bound(g, r), OWN };
     if (all.lower > ebpo_nearest_limit(g->n))
@@ -396,14 +398,14 @@ static ebpo_status look_at_new(searching *g, const ebpo_ranked *r, ebpo_error *e
                                 : search_below(g, r->node, error);
 }
 
-static ebpo_status look_at_subtree(searching *g, const ebpo_ranked *r, ebpo_error *error)
+static ebpo_status inspect_subtree(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     uint32_t below = ebpo_entry_value(r->node.entry);
     const ebpo_skeleton *k = ebpo_skeletons_find(g->c->model->skeletons, below);
     if (ebpo_context_has_pinned(g->c, below))
         return search_below(g, r->node, error);
     if (!k)
-        return look_at_new(g, r, error);
+        return inspect_new(g, r, error);
     ebpo_skeleton_bounds bounds = skeleton_bounds(g, k);
     double least = fmax(r->lower, fmin(bounds.own, bounds.outer));
     if (least > ebpo_nearest_limit(g->n))
@@ -419,7 +421,7 @@ static ebpo_status look_at_subtree(searching *g, const ebpo_ranked *r, ebpo_erro
     return status;
 }
 
-static ebpo_status look_at_outer(searching *g, const ebpo_ranked *r, ebpo_error *error)
+static ebpo_status inspect_shared(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     uint32_t below = ebpo_entry_value(r->node.entry);
     const ebpo_skeleton *k = ebpo_skeletons_find(g->c->model->skeletons, below);
@@ -435,7 +437,7 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
     ebpo_nearest *n = g->n;
     const ebpo_model *m = g->c->model;
     ebpo_ranked root = { ebpo_model_root(m), n->far.far ? -INFINITY : 0, NODE };
-    ebpo_status status = begin_question(g->c, error);
+    ebpo_status status = begin_query(g->c, error);
     if (status == EBPO_OK)
         status = add_node(g, &root, error);
     while (status == EBPO_OK && g->c->queue_count) {
@@ -448,10 +450,10 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
         }
         status = !ebpo_node_is_below(&next.node) ? add_children(g, &next, error)
                  : next.what == OWN              ? search_below(g, next.node, error)
-                 : next.what == OUTER            ? look_at_outer(g, &next, error)
-                                                 : look_at_subtree(g, &next, error);
+                 : next.what == OUTER            ? inspect_shared(g, &next, error)
+                                                 : inspect_subtree(g, &next, error);
     }
-    ebpo_deep_bounds_tell(g->c->model, g->new_loads);
+    ebpo_deep_bounds_report(g->c->model, g->new_loads);
     return status;
 }
 

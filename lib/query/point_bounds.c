@@ -1,10 +1,10 @@
 /* Certain bounds of the distance of a point to a cell, to the half-spaces of an envelope, and to
  * the hierarchy over faces.
  *
- * From 16 sizes of the model's box on doubles hardly tell distances apart; there the bounds are
- * those of keys, which grow with the distance (point_bounds.h). Upper bounds allow for what a node
- * may list without containing it: faces within 1/256 of the cell's size (format-spec, section 5).
- * Rounding: docs/develop/bounds.md, "Points far away". */
+ * From a distance of 16 sizes of the model's box, doubles hardly separate distances; there the
+ * bounds are those of keys, which grow with the distance (point_bounds.h). Upper bounds include
+ * faces that a node may list without containing them: within 1/256 of the cell's size (format-spec,
+ * section 5). Rounding: docs/develop/bounds.md, "Points far away". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -14,18 +14,18 @@
 #include "query/point_bounds.h"
 
 /* A node may list a face that only comes near, within 1/256 of the cell's size on each axis
- * (format-spec, section 5); and some room for rounding. */
+ * (format-spec, section 5); plus a margin for rounding. */
 static const double near_share = 0x1.1p-8;
 
 static void cell_size(const ebpo_box *box, ebpo_cell cell, double low[3], double size[3])
 {
     for (int k = 0; k < 3; k++) {
-        low[k] = ebpo_wall(box, k, cell.level, cell.at[k]);
+        low[k] = ebpo_cell_face(box, k, cell.level, cell.at[k]);
         size[k] = box->size[k] / (double)(1u << cell.level);
     }
 }
 
-/* sqrt(x0^2 + x1^2 + x2^2) without overflow, right to a few ulp. */
+/* Returns sqrt(x0^2 + x1^2 + x2^2) without overflow; the error is a few ulp. */
 static double scaled_length(const double x[3])
 {
     double most = fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
@@ -42,7 +42,7 @@ double ebpo_cell_diagonal(const ebpo_box *box, ebpo_cell cell)
     return scaled_length(size) * (1 + near_share);
 }
 
-/* Value of a half-space at p, 4096 n . xi - d, and a bound on its error. */
+/* Returns the value of a half-space at p, 4096 n . xi - d, and a bound on its error. */
 static double plane_value(const double xi[3], uint32_t code, int32_t n[3], double *error)
 {
     int32_t d;
@@ -107,9 +107,9 @@ double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3])
     return scaled_length(d) * (1 + 0x1p-40) + scaled_length(size) * near_share;
 }
 
-/* In sizes of the model's box. */
+/* Limit in sizes of the model's box. */
 static const double far_away = 16;
-/* What keys lose, of the greatest coordinate: docs/develop/bounds.md. */
+/* Error of keys, relative to the largest coordinate: docs/develop/bounds.md. */
 static const double loss = 0x1p-46;
 
 void ebpo_far_make(ebpo_far *f, const ebpo_box *box, const double p[3])
@@ -162,31 +162,31 @@ static double distance_of(const ebpo_far *f, double key, double share)
     return square > 0 ? f->distance * sqrt(square) * (1 + share) : 0;
 }
 
-/* What is too small for a normal double has lost more. */
+/* Below the normal doubles the error is larger. */
 static const double tiny = 0x1p-1070;
 
 double ebpo_far_lower(const ebpo_far *f, double key)
 {
-    /* the distance itself may be finite where what doubles make of it is not */
+    /* the distance may be finite where its computation in doubles overflows */
     double distance = distance_of(f, key, -0x1p-40) - tiny;
     return key == INFINITY ? INFINITY : fmin(fmax(distance, 0), 0x1p1023);
 }
 double ebpo_far_upper(const ebpo_far *f, double key) { return distance_of(f, key, 0x1p-40) + tiny; }
 
-/* --- places --- */
+/* --- positions --- */
 
 static double place_on_axis(const ebpo_far *f, double x, int axis)
 {
     return (x - f->centre[axis]) * f->unit[0] * f->unit[1];
 }
 
-/* Where h y^2 - u y is least. */
+/* Returns the minimum position of h y^2 - u y. */
 static double apex_of_square(double half, double toward)
 {
     return half > 0 ? toward / (2 * half) : toward > 0 ? INFINITY : -INFINITY;
 }
 
-/* Its least from `low` to `high`. */
+/* Returns its minimum from `low` to `high`. */
 static inline double least_between(double half, double toward, double at, double low, double high)
 {
     double y = at < low ? low : at > high ? high : at;
@@ -216,7 +216,7 @@ static placed_cell cell_place(const ebpo_far *f, const ebpo_box *box, ebpo_cell 
 {
     placed_cell out = { .most = 0 };
     for (int k = 0; k < 3; k++) {
-        out.low[k] = place_on_axis(f, ebpo_wall(box, k, cell.level, cell.at[k]), k);
+        out.low[k] = place_on_axis(f, ebpo_cell_face(box, k, cell.level, cell.at[k]), k);
         out.size[k] = box->size[k] * f->unit[0] * f->unit[1] / (double)(1u << cell.level);
         out.most = fmax(out.most, fabs(out.low[k]) + out.size[k]);
     }
@@ -235,7 +235,7 @@ double ebpo_far_cell_end(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell)
     return sum + margin_of(f, 2 * c.most);
 }
 
-/* By Lagrange: where n . xi <= d, adding share (n . xi - d) makes nothing greater, so the least
+/* By Lagrange: where n . xi <= d, adding share (n . xi - d) makes nothing greater, so the minimum
  * over the whole cell is a lower bound, for every share of 0 or more. */
 static double cut_bound(const ebpo_far *f, const placed_cell *c, const double gradient[3],
                         double beyond, double share)
@@ -268,7 +268,7 @@ double ebpo_far_envelope(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell,
             gradient[k] = c.size[k] > 0 ? n[k] / c.size[k] : 0;
             beyond += gradient[k] * c.low[k];
         }
-        /* as a function of the share the bound is concave, and bends only here */
+        /* as a function of the share the bound is concave, and its slope changes only here */
         for (int k = 0; k < 3; k++) {
             double share = f->toward[k] / gradient[k];
             if (c.size[k] > 0 && share > 0 && isfinite(share))

@@ -1,6 +1,6 @@
-/* The kernels of queries, and what they work on: inner loops over blocks of faces and bounds of
- * eight. They are filters, whose "certain" holds in exact arithmetic. Compiled for several
- * instruction sets with the same results (core/cpu.h). */
+/* The kernels of queries and their data: inner loops over blocks of faces and bounds of eight. They
+ * are filters, whose "certain" holds in exact arithmetic. Compiled for several instruction sets
+ * with the same results (core/cpu.h). */
 #ifndef EBPO_QUERY_QUERY_KERNELS_H
 #define EBPO_QUERY_QUERY_KERNELS_H
 
@@ -11,14 +11,13 @@
 #include "geometry/ray.h"
 #include "query/accel.h"
 
-/* --- children that a search has still to visit, on a stack: the nearest one on top --- */
+/* --- stack of children still to visit, the nearest on top --- */
 
-/* The bits of a key that is not negative (so of the same order as integers), then the child's
- * number. */
+/* The bits of a nonnegative key (so with the order of integers), then the child's number. */
 typedef uint64_t ebpo_visit;
 
 /* An octree level adds at most one level to the hierarchy, a long list of one leaf eleven. */
-enum { EBPO_VISITS_MOST = 64 * 8 };
+enum { EBPO_VISITS_MAX = 64 * 8 };
 
 static inline ebpo_visit ebpo_visit_make(float key, uint32_t child)
 {
@@ -35,7 +34,7 @@ static inline float ebpo_visit_key(ebpo_visit v)
     return key;
 }
 
-/* The first cache lines of what will be read. */
+/* Prefetches the first cache lines of the child. */
 static inline void ebpo_visit_fetch(const ebpo_accel *s, uint32_t child)
 {
     const char *at = (const char *)&s->bound[child & ~EBPO_IS_BLOCK];
@@ -73,21 +72,21 @@ static inline uint32_t ebpo_visit_push(ebpo_visit *stack, uint32_t top, const eb
 
 /* --- a search for the nearest face of one accel --- */
 
-/* A point as the kernels want it. */
+/* A point in the form for kernels. */
 typedef struct ebpo_probe {
     double p[3];
-    float high[3], low[3]; /* p = high + low up to 2^-48 of |p| (blocks of floats) */
-    float local[3];        /* in the subtree's frame */
-    float scale;           /* of the frame */
+    float high[3], low[3]; /* p = high + low with an error of 2^-48 of |p| (blocks of floats) */
+    float local[3];        /* position in the subtree's frame */
+    float scale;           /* scale of the frame */
     double scale64;
-    /* bound on what it does to a distance that `local` is rounded, in the frame */
+    /* bound of the error of distances from the rounding of `local`, in the frame */
     float error;
 } ebpo_probe;
 
 /* Faces that may be nearest wait until the end: by then nearly all are known to be farther. */
 typedef struct ebpo_near_candidate {
     float low;
-    uint32_t slot, node; /* that has its block as a child */
+    uint32_t slot, node; /* the node has the face's block as a child */
 } ebpo_near_candidate;
 enum { EBPO_NEAR_CANDIDATES = 64 };
 #define EBPO_NO_BLOCK UINT32_MAX
@@ -97,20 +96,21 @@ struct ebpo_near_search {
     const ebpo_accel *s;
     ebpo_probe probe;
     void *user;
-    void (*judge)(ebpo_near_search *search); /* decides about all that waits */
-    bool (*late)(ebpo_near_search *search);  /* NULL: there is time */
-    /* looked at before all others, and the node above it; EBPO_NO_BLOCK: none */
+    void (*judge)(ebpo_near_search *search); /* compares all waiting candidates */
+    bool (*late)(ebpo_near_search *search);  /* NULL: no deadline */
+    /* visited before all others, and the node above it; EBPO_NO_BLOCK: none */
     uint32_t first_block, first_node;
-    float best;   /* some face is certainly not farther, or what is does not matter: in the frame */
-    float limit2; /* what squared lower bounds are compared with */
+    float best;   /* upper bound in the frame: some face is certainly not farther, or farther faces
+                   * are irrelevant */
+    float limit2; /* limit for squared lower bounds */
     int count;
     ebpo_near_candidate waiting[EBPO_NEAR_CANDIDATES];
-    uint32_t top; /* visits that were left when it was late */
-    ebpo_visit stack[EBPO_VISITS_MOST];
-    uint32_t from[EBPO_VISITS_MOST]; /* the nodes that have the stack's visits as children */
+    uint32_t top; /* number of visits left at the deadline */
+    ebpo_visit stack[EBPO_VISITS_MAX];
+    uint32_t from[EBPO_VISITS_MAX]; /* parents of the stack's visits */
 };
 
-/* What underflow of squares does to a distance is far less: sqrt(2^-149) and some. */
+/* The error of a distance from underflow of squares is far less: about sqrt(2^-149). */
 #define EBPO_NEAR_UNDERFLOW 0x1p-56f
 
 static inline void ebpo_near_set_best(ebpo_near_search *g, float best)
@@ -129,14 +129,14 @@ static inline void ebpo_near_drop_far(ebpo_near_search *g)
     g->count = kept;
 }
 
-/* --- a ray on its way through one accel --- */
+/* --- a ray through one accel --- */
 
 typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL } ebpo_ray_wants;
 
 typedef struct ebpo_ray_search ebpo_ray_search;
 
-/* A face that may be met: not before `low`, a t of the frame. `facing`: of ebpo_ray_meeting, where
- * the line certainly goes through its interior; else 0. */
+/* A face that the ray may hit, not before `low`, a t of the frame. `facing`: of
+ * ebpo_ray_intersection, where the line certainly goes through its interior; else 0. */
 typedef struct ebpo_ray_candidate {
     float low;
     uint32_t slot;
@@ -148,34 +148,34 @@ struct ebpo_ray_search {
     /* Set by the caller. */
     const ebpo_segment *ray;
     ebpo_ray_wants wants;
-    int facing;   /* 1, -1: only faces seen from the front, the back; 0: all */
-    double limit; /* t beyond which nothing matters, certain; falls */
-    /* Decides exactly about a face (`facing`: as of a candidate), keeps it if it counts, and lowers
-     * search->limit and sets search->done accordingly. */
+    int facing;   /* 1, -1: only front faces, back faces; 0: all */
+    double limit; /* t beyond which hits are irrelevant, certain; decreases */
+    /* Tests a face exactly (`facing`: as in a candidate), keeps it if it counts, and updates
+     * search->limit and search->done. */
     void (*decide)(ebpo_ray_search *search, uint32_t slot, int facing);
     void *user;
 
-    /* All that follows is made by ebpo_ray_search_accel. */
-    bool done; /* nothing more is to be looked at */
-    bool met;  /* any wanted: some face is certainly met (`decide` was not told) */
-    void (*judge)(ebpo_ray_search *search); /* decides about all that waits */
+    /* ebpo_ray_search_accel sets the following fields. */
+    bool done;        /* the search is complete */
+    bool intersected; /* any wanted: some face is certainly hit (`decide` was not called) */
+    void (*judge)(ebpo_ray_search *search); /* tests all waiting candidates */
     const ebpo_accel *s;
     /* In the frame: the direction with a longest coordinate of 2^-12 to 2^12, and the origin, moved
-     * along the ray to `moved`; how far off it may be, for boxes. */
+     * along the ray to `moved`; the origin's error, for boxes. */
     double direction[3], origin[3], error;
-    /* Made of these by the kernels. What distances to the sides of boxes start from, the nearer
-     * ones and the farther ones; four floats, of which three count. */
+    /* Set by the kernels from these: start values of distances to the nearer and farther sides of
+     * boxes; four floats, of which three are used. */
     float near_from[4], far_from[4], inverse[4];
-    float step_inverse[4];    /* any number, then `inverse` */
-    double inverse_double[4]; /* of the direction, small coordinates replaced */
-    /* bytes in ebpo_bound where those sides are: nearer ones, farther ones */
+    float step_inverse[4];    /* unused value, then `inverse` */
+    double inverse_double[4]; /* inverse of the direction, small coordinates replaced */
+    /* byte offsets of those sides in ebpo_bound: nearer ones, farther ones */
     const uint8_t (*side_at)[3];
-    int axis[3];    /* z: where the direction is longest */
+    int axis[3];    /* z: the axis with the longest coordinate of the direction */
     float shear[3]; /* x and y for a step of 1 along z; t for such a step */
     /* The origin in the model's unit, in two parts for blocks of floats. */
     double from[3];
     float from_high[4], from_low[4];
-    float blur; /* distance at which rounding would be as bad as the origin's own */
+    float blur; /* distance at which rounding errors equal the origin's error */
     double moved, limit_scale;
     float bound, surely; /* limit, rounded up; t_max, rounded down */
     int count;
@@ -190,15 +190,15 @@ typedef struct ebpo_axis_segment {
     double from[3];
     double to;
     int axis;
-    /* As an ebpo_listed_block has boxes, but for each axis the upper side and 15 less the lower
-     * one, rounded down; all ones: meets everything. */
+    /* In the encoding of an ebpo_listed_block, but for each axis the upper side and 15 less the
+     * lower one, rounded down; all ones: intersects everything. */
     uint32_t reach;
 } ebpo_axis_segment;
 #define EBPO_REACH_ALL UINT32_C(0xffffff)
 
-/* False when nothing that the block has in the cell can meet the segment: a side of the box, four
- * bits each, is above the segment's. */
-static inline bool ebpo_axis_segment_meets(const ebpo_axis_segment *g, uint64_t listed)
+/* Returns false when the block's faces in the cell cannot intersect the segment: a side of the box,
+ * four bits each, is above the segment's. */
+static inline bool ebpo_axis_segment_intersects(const ebpo_axis_segment *g, uint64_t listed)
 {
     const uint32_t digits = 0x0f0f0f, carry = 0x101010;
     uint32_t box = (uint32_t)(listed >> EBPO_LISTED_BOX);
@@ -211,17 +211,17 @@ static inline bool ebpo_axis_segment_meets(const ebpo_axis_segment *g, uint64_t 
 
 /* Pure functions. */
 typedef struct ebpo_inside_kernels {
-    /* Sum of the certain crossings of a leaf's listed faces, in the part of them that is in the
-     * leaf's cell (as ebpo_axis_crossing gives them) with the segment; lanes that are not certain
-     * are appended to `open` as slots (room for 8 a block), their number to *open_count. Every face
-     * on which the segment's end at `to` or `from` lies is among them. */
+    /* Returns the sum of the certain crossings of the segment with a leaf's listed faces, in the
+     * part of them within the leaf's cell (as ebpo_axis_crossing gives them). Appends lanes that
+     * are not certain to `open` as slots (capacity 8 a block), their number to *open_count. These
+     * include every face that contains the segment's end at `to` or `from`. */
     int32_t (*crossings)(const ebpo_accel *s, const ebpo_listed_block *list,
                          const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count);
-    ebpo_walls_fn *walls;
+    ebpo_cell_faces_fn *cell_faces;
 } ebpo_inside_kernels;
 
-/* Not pure: they call search->judge when many faces wait. They walk through search->s: what then
- * waits may be nearest, or met, and best, or the limit, has fallen. */
+/* Not pure: they call search->judge when many faces wait. They walk through search->s. Afterwards
+ * the waiting faces may be nearest, or hit, and best, or the limit, has decreased. */
 typedef struct ebpo_nearest_kernels {
     void (*walk)(ebpo_near_search *search);
 } ebpo_nearest_kernels;
@@ -233,7 +233,7 @@ EBPO_KERNELS(ebpo_inside_kernels, ebpo_inside_kernels)
 EBPO_KERNELS(ebpo_nearest_kernels, ebpo_nearest_kernels)
 EBPO_KERNELS(ebpo_ray_kernels, ebpo_ray_kernels)
 
-/* Those that a model uses. */
+/* Kernels that a model uses. */
 typedef struct ebpo_query_kernels {
     const ebpo_inside_kernels *inside;
     const ebpo_nearest_kernels *nearest;

@@ -1,9 +1,9 @@
-/* Models and contexts: opening a file for queries, loading subtrees, and the checks that all
- * queries begin with.
+/* Models and contexts: opens a file for queries, loads subtrees, and checks the arguments of all
+ * queries.
  *
  * A model holds everything if that fits into its budget, else the top of the tree and a cache of
  * subtrees (budget.c plans this). Models may be used by any thread; a context, with the buffers of
- * queries and the subtree that it has pinned, by one. */
+ * queries and its pinned subtree, by one. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -19,20 +19,21 @@
 #include "query/model_parts.h"
 #include "query/query_model.h"
 
-/* --- checks that all queries begin with --- */
+/* --- common checks of all queries --- */
 
 ebpo_status ebpo_check_query_level(int level, ebpo_error *error)
 {
     if (level < -1 || level >= EBPO_LEVELS_MAX)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "level %d: give 0 to %d, or -1 for all", level,
-                         EBPO_LEVELS_MAX - 1);
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "level %d is out of range; give 0 to %d, or -1 "
+                         "for all",
+                         level, EBPO_LEVELS_MAX - 1);
     return EBPO_OK;
 }
 
 ebpo_status ebpo_fail_value(ebpo_error *error)
 {
-    return ebpo_fail(error, EBPO_E_ARGUMENT,
-                     "the query options contain a value that is not one of its kind");
+    return ebpo_fail(error, EBPO_E_ARGUMENT, "invalid enum value in the query options");
 }
 
 ebpo_status ebpo_check_points(const double *points, uint64_t count, ebpo_error *error)
@@ -49,11 +50,12 @@ ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error)
 {
     if (model->info->parts & EBPO_PART_MESH)
         return EBPO_OK;
-    return ebpo_fail_file(
-        error, EBPO_E_ABSENT, model->file->in.shown,
-        "the file was written without its mesh: exact answers need it; ask with a "
-        "level, or use a file that has it (`ebpo subset`, `ebpo fetch` or "
-        "`ebpo convert` with --profile collision or full)");
+    return ebpo_fail_file(error, EBPO_E_ABSENT, model->file->in.shown,
+                          "the file was written without its mesh, which exact results need; query "
+                          "with a level, or use "
+                          "a file that has it (`ebpo subset`, `ebpo fetch` or `ebpo convert` with "
+                          "--profile collision "
+                          "or full)");
 }
 
 ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
@@ -61,16 +63,17 @@ ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
     if (model->info->solid)
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_NOT_SOLID,
-                     "the model is a surface: it has no inside; 'ebpo check' on its source tells "
-                     "which repairs leave a solid, and 'ebpo convert --repair' does them");
+                     "the model is a surface: it has no inside; run 'ebpo check' on its source "
+                     "to see the repairs that make a solid, and 'ebpo convert --repair' to apply "
+                     "them");
 }
 
 /* --- envelopes that a context keeps --- */
 
-/* Most have 1 to 3 KB. */
+/* Most take 1 to 3 KB. */
 enum { SLOTS = 256 };
 
-/* Behind it what is in use of the arrays, in the order of ebpo_polytope. */
+/* Followed by the used parts of the arrays, in the order of ebpo_polytope. */
 typedef struct kept {
     ebpo_cell cell;
     int vertices, faces, corners;
@@ -172,7 +175,7 @@ void ebpo_model_count_leaves(ebpo_model *m, const ebpo_accel *s, int sign)
     m->leaves += (uint64_t)sign * s->leaf_count;
     if (!s->kinds)
         return;
-    m->leaves_one_wall += (uint64_t)sign * s->kinds->one_wall;
+    m->leaves_one_cell_face += (uint64_t)sign * s->kinds->one_cell_face;
     for (int k = 0; k < 5; k++)
         m->leaves_of_kind[k] += (uint64_t)sign * s->kinds->of_kind[k];
 }
@@ -180,27 +183,27 @@ void ebpo_model_count_leaves(ebpo_model *m, const ebpo_accel *s, int sign)
 void ebpo_model_count_kind(ebpo_model *m, const ebpo_accel_leaf *leaf)
 {
     m->leaves_of_kind[ebpo_leaf_kind_of(leaf)]++;
-    m->leaves_one_wall +=
-        ebpo_leaf_kind_of(leaf) == EBPO_LEAF_GENERAL && leaf->wall != EBPO_NO_WALL;
+    m->leaves_one_cell_face +=
+        ebpo_leaf_kind_of(leaf) == EBPO_LEAF_GENERAL && leaf->cell_face != EBPO_NO_CELL_FACE;
 }
 
 static ebpo_status load_subtree(void *user, uint64_t key, uint64_t most, void **item,
                                 uint64_t *bytes, ebpo_error *error)
 {
     ebpo_model *m = user;
-    ebpo_room room = { .most = most };
+    ebpo_quota space = { .most = most };
     ebpo_slice slice;
     ebpo_accel *subtree = NULL;
     ebpo_status status = ebpo_slice_read_within(&slice, m->chunks, &m->top->below[key >> 1],
-                                                ebpo_subtree_needs(key & 1), &room, error);
+                                                ebpo_subtree_needs(key & 1), &space, error);
     if (status == EBPO_OK)
-        status = ebpo_accel_make_within(&subtree, &slice, m->info, &room, key & 1, 1, error);
+        status = ebpo_accel_make_within(&subtree, &slice, m->info, &space, key & 1, 1, error);
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
         ebpo_skeletons_keep(m->skeletons, key >> 1, subtree);
     }
     *item = subtree;
-    *bytes = status == EBPO_OK ? subtree->bytes : room.needed;
+    *bytes = status == EBPO_OK ? subtree->bytes : space.needed;
     return status;
 }
 
@@ -213,7 +216,7 @@ static void release_subtree(void *user, void *item)
 
 /* --- opening --- */
 
-ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_node *leaf, ebpo_error *error)
+ebpo_status ebpo_model_has_capacity(const ebpo_model *m, const ebpo_node *leaf, ebpo_error *error)
 {
     ebpo_slice_size size;
     uint64_t keep, peak;
@@ -235,17 +238,17 @@ ebpo_status ebpo_model_has_room(const ebpo_model *m, const ebpo_node *leaf, ebpo
 static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
 {
     ebpo_slice slice;
-    ebpo_room room = { .most = m->options.memory };
+    ebpo_quota space = { .most = m->options.memory };
     ebpo_status status = ebpo_slice_read_all(&slice, m->file, m->options.threads, error);
     if (status == EBPO_OK)
-        status = ebpo_accel_make_within(&m->whole, &slice, m->info, room.most ? &room : NULL, true,
-                                        m->options.threads, error);
+        status = ebpo_accel_make_within(&m->whole, &slice, m->info, space.most ? &space : NULL,
+                                        true, m->options.threads, error);
     if (m->whole)
         ebpo_model_count_leaves(m, m->whole, 1);
     return status;
 }
 
-/* Caches under the model's own budget; 0: none. */
+/* Makes caches under the model's separate budget; 0: none. */
 static ebpo_status make_own(ebpo_model *m, const ebpo_cache_source *source, ebpo_error *error)
 {
     uint64_t budget = m->options.memory, chunks = budget ? ebpo_chunk_budget(budget) : 0;
@@ -262,7 +265,7 @@ static ebpo_status make_own(ebpo_model *m, const ebpo_cache_source *source, ebpo
                            budget ? budget - m->top->bytes - chunks : 0, error);
 }
 
-/* Caches under the budget of several models. */
+/* Makes caches under a budget that several models share. */
 static ebpo_status make_shared(ebpo_model *m, const ebpo_cache_source *source, ebpo_error *error)
 {
     ebpo_budget *shared = m->options.budget;
@@ -276,17 +279,17 @@ static ebpo_status make_shared(ebpo_model *m, const ebpo_cache_source *source, e
     return ebpo_cache_make_in(&m->cache, source, "subtree", ebpo_budget_subtrees(shared), error);
 }
 
-static uint64_t skeleton_room(ebpo_model *m)
+static uint64_t skeleton_capacity(ebpo_model *m)
 {
     uint64_t budget = m->options.memory;
     if (!budget || m->options.loading != EBPO_LOAD_CACHE)
         return budget ? 0 : UINT64_MAX;
-    uint64_t room =
-        ebpo_skeletons_room(m->top->below_count, ebpo_skeleton_budget(&m->options, budget));
+    uint64_t space =
+        ebpo_skeletons_capacity(m->top->below_count, ebpo_skeleton_budget(&m->options, budget));
     if (!m->options.budget)
-        return room;
-    m->shared_skeletons = ebpo_budget_take_skeletons(m->options.budget, room);
-    return ebpo_skeletons_room(m->top->below_count, m->shared_skeletons);
+        return space;
+    m->shared_skeletons = ebpo_budget_take_skeletons(m->options.budget, space);
+    return ebpo_skeletons_capacity(m->top->below_count, m->shared_skeletons);
 }
 
 static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
@@ -295,18 +298,19 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
     ebpo_status status = ebpo_top_read(&m->top, m->file, cut_level, m->options.threads, error);
     if (status == EBPO_OK)
         status = m->options.budget ? make_shared(m, &source, error) : make_own(m, &source, error);
-    uint64_t skeletons = status == EBPO_OK ? skeleton_room(m) : 0;
+    uint64_t skeletons = status == EBPO_OK ? skeleton_capacity(m) : 0;
     if (status == EBPO_OK && m->options.loading == EBPO_LOAD_CACHE && skeletons) {
         m->skeletons = ebpo_skeletons_make(m->top->below_count, skeletons, m->cache);
         if (!m->skeletons && m->options.budget)
-            ebpo_cache_set_aside(m->cache, 0); /* others use it all just now */
+            ebpo_cache_set_aside(m->cache, 0); /* others use all of it now */
         else if (!m->skeletons)
             return ebpo_fail_memory(error, m->top->below_count * sizeof(void *));
     }
     return status;
 }
 
-/* All in memory, under a budget that is shared. EBPO_E_LIMIT: that has no room for it. */
+/* Opens a model all in memory, under a shared budget. Returns EBPO_E_LIMIT if the budget is too
+ * small. */
 static ebpo_status open_shared_whole(ebpo_model *m, uint64_t peak, ebpo_error *error)
 {
     ebpo_budget *shared = m->options.budget;
@@ -328,7 +332,7 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
         uint64_t memory = m->options.memory;
         status = m->options.budget ? open_shared_whole(m, plan.whole, error) : open_whole(m, error);
         m->options.memory = memory;
-        /* more than ordinary models of its counts take */
+        /* more than ordinary models with its counts take */
         if (status != EBPO_E_LIMIT || !m->options.memory)
             return status;
         status = ebpo_plan_parts(m->file, &m->options, &plan, error);
@@ -355,13 +359,13 @@ ebpo_status ebpo_model_new(const ebpo_file *file, const ebpo_model_options *opti
     m->locator = ebpo_locator_make(&box, m->info->level_count - 1);
     m->options = wanted;
     m->kernels = ebpo_query_kernels_best();
-    m->default_memory = ebpo_usual_memory(file, &m->options);
+    m->default_memory = ebpo_default_memory(file, &m->options);
     status = open_parts(m, error);
     if (status != EBPO_OK) {
         ebpo_model_free(m);
         return status;
     }
-    m->answers_inside = m->whole && m->info->solid && m->info->parts & EBPO_PART_MESH;
+    m->results_inside = m->whole && m->info->solid && m->info->parts & EBPO_PART_MESH;
     m->open_seconds = (double)(ebpo_clock() - begin) * 1e-9;
     *out = m;
     return EBPO_OK;
@@ -404,7 +408,7 @@ static void gather_stats(const ebpo_model *m, ebpo_model_stats *out)
     out->bytes_read = file.bytes_read;
     out->reads = file.reads;
     out->leaves = m->leaves;
-    out->leaves_one_wall = m->leaves_one_wall;
+    out->leaves_one_cell_face = m->leaves_one_cell_face;
     for (int k = 0; k < 5; k++)
         out->leaves_of_kind[k] = m->leaves_of_kind[k];
     if (m->whole) {
@@ -462,7 +466,7 @@ void ebpo_context_free(ebpo_context *c)
     free(c->open);
     free(c->hits);
     free(c->hit_begin);
-    free(c->met);
+    free(c->intersected);
     free(c->queue);
     free(c->seen);
     free(c->faces);
@@ -471,7 +475,7 @@ void ebpo_context_free(ebpo_context *c)
     free(c);
 }
 
-/* Says what --memory would do instead of what the cache lacks. */
+/* Reports the value of --memory that would suffice. */
 static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *error)
 {
     uint64_t peak, keep, least;
@@ -483,8 +487,8 @@ static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *e
         least += least / 8 + 1;
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the memory budget of %" PRIu64
-                     " bytes does not hold one subtree below level %d and what else is in use; a "
-                     "budget of %" PRIu64 " would, or a higher cut level",
+                     " bytes does not hold one subtree below level %d and the memory in use; a "
+                     "budget of %" PRIu64 " does, or a higher cut level",
                      m->options.memory, m->top->cut_level, least);
 }
 

@@ -1,11 +1,11 @@
-/* Nodes of a model: going from a node to its children, in the top of the tree and in subtrees
- * alike, with the bounds that envelopes give on the way.
+/* Nodes of a model: goes from a node to its children, in the top of the tree and in subtrees alike,
+ * with bounds from envelopes.
  *
  * Accels (nodes of one subtree) and contexts (nodes of the model; they load subtrees on demand) are
  * also sources for cursors. Nodes of a subtree are valid until the context enters another one.
  *
- * In a subset nodes may be pruned: a query that needs what was omitted below one fails with
- * EBPO_E_ABSENT, and the message says where and what the file was cut to. */
+ * In a subset nodes may be pruned: a query that needs a part omitted below one fails with
+ * EBPO_E_ABSENT, and the message gives the position and the cut of the file. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -35,7 +35,7 @@ ebpo_node ebpo_accel_child(const ebpo_accel *s, const ebpo_node *gray, unsigned 
                          ebpo_cell_child(gray->cell, octant));
 }
 
-/* Codes of a gray node's planes, where the subtree has kept them. */
+/* Returns the codes of a gray node's planes, where the subtree has kept them. */
 static const uint32_t *accel_planes(const ebpo_accel *s, const ebpo_node *node, unsigned *count)
 {
     uint32_t number = ebpo_entry_value(node->entry);
@@ -79,7 +79,7 @@ static ebpo_status uniform_winding(void *holder, const ebpo_node *uniform, int32
 
 const ebpo_node_source ebpo_accel_source = { accel_children, copy_accel_planes, uniform_winding };
 
-/* A node of the top. */
+/* Returns a node of the top. */
 static ebpo_node top_node_of(const ebpo_model *model, uint32_t entry, ebpo_cell cell)
 {
     ebpo_node node = ebpo_entry_node(entry, cell, model->info->rule);
@@ -116,7 +116,7 @@ ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error 
         return status;
     node->subtree = subtree;
     node->entry = subtree->nodes.root;
-    if (ebpo_node_is_below(node)) /* a file whose counts do not tell of it */
+    if (ebpo_node_is_below(node)) /* a file whose counts do not include it */
         return ebpo_fail_pruned(context->model, node->cell, error);
     return EBPO_OK;
 }
@@ -173,7 +173,7 @@ int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, doubl
     const ebpo_node_table *table = gray->subtree ? &gray->subtree->nodes : &m->top->nodes;
     int count = 0;
     for (unsigned octant = 0; octant < 8; octant++) {
-        /* most are uniform: nothing is made of them */
+        /* most are uniform: no node is made for them */
         if (ebpo_entry_kind_of(ebpo_table_child(table, gray->entry, octant)) == EBPO_ENTRY_UNIFORM)
             continue;
         ebpo_ranked r = { ebpo_model_child(m, gray, octant), 0, 0 };
@@ -197,7 +197,7 @@ static ebpo_status model_children(void *holder, ebpo_node *gray, ebpo_node child
     ebpo_status status = EBPO_OK;
     if (gray->pruned)
         return EBPO_OK;
-    context->planes = true; /* cursors may ask for them */
+    context->planes = true; /* cursors may request them */
     if (ebpo_node_is_below(gray))
         status = ebpo_model_enter(context, gray, error);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
@@ -219,7 +219,7 @@ static ebpo_status copy_model_planes(void *holder, const ebpo_node *node,
 
 const ebpo_node_source ebpo_context_source = { model_children, copy_model_planes, uniform_winding };
 
-/* What the file was cut to, in words. */
+/* Describes the cut of the file in words. */
 static void describe_cut(const ebpo_info *info, char *out, size_t capacity)
 {
     const double *b = info->kept_box;
@@ -246,12 +246,13 @@ ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error
     ebpo_box box = ebpo_model_box(model);
     describe_cut(model->info, cut, sizeof cut);
     return ebpo_fail(error, EBPO_E_ABSENT,
-                     "%.120s: this needs nodes left out below level %d at %.6g %.6g %.6g (%s); ask "
-                     "with a level, or make a larger part of the original with "
-                     "`ebpo subset` or `ebpo fetch`",
-                     model->file->in.shown, cell.level, ebpo_wall(&box, 0, cell.level, cell.at[0]),
-                     ebpo_wall(&box, 1, cell.level, cell.at[1]),
-                     ebpo_wall(&box, 2, cell.level, cell.at[2]), cut);
+                     "%.120s: the query needs nodes omitted below level %d at %.6g %.6g %.6g "
+                     "(%s); query with a level, or make a larger part of the original with `ebpo "
+                     "subset` or `ebpo fetch`",
+                     model->file->in.shown, cell.level,
+                     ebpo_cell_face(&box, 0, cell.level, cell.at[0]),
+                     ebpo_cell_face(&box, 1, cell.level, cell.at[1]),
+                     ebpo_cell_face(&box, 2, cell.level, cell.at[2]), cut);
 }
 
 typedef struct checking {

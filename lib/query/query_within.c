@@ -1,9 +1,9 @@
-/* The faces within a distance of a point, one after the other, the nearest first.
+/* Returns the faces within a distance of a point, one after the other, the nearest first.
  *
  * Faces come in bands: those after a given one, up to a number of them. Bands follow each other, so
- * that a stream of any length needs little memory; the first is small, for callers who soon have
- * enough. A band is searched depth first, nearest child first; what is certainly beyond its limit,
- * or certainly was in an earlier band, is passed over. The order is exact: by distance, then by
+ * that a stream of any length needs little memory; the first is small, for callers that need few
+ * faces. A band is searched depth first, nearest child first; nodes and faces certainly beyond its
+ * limit, or certainly in an earlier band, are skipped. The order is exact: by distance, then by
  * number in the file. Subtrees that are not in memory are loaded in the order of certain lower
  * bounds, until the next is beyond the band. */
 #include "core/strict_fp.h"
@@ -32,9 +32,9 @@ typedef struct near_face {
 
 typedef struct near_band {
     double p[3];
-    double radius;  /* what is farther is in no band: exact */
-    double limit;   /* what is farther is not in this one: certain */
-    uint64_t most;  /* faces in it, at least 1 */
+    double radius;  /* exact radius: farther faces are in no band */
+    double limit;   /* certain limit: farther faces are not in this band */
+    uint64_t most;  /* maximum number of faces in it, at least 1 */
     bool has_after; /* faces up to `after` were in bands before */
     near_face after;
     near_face *near;
@@ -43,13 +43,13 @@ typedef struct near_band {
     bool no_memory;
 } near_band;
 
-/* Everything that has a distance of at most `far` was in bands before. */
+/* Returns true if everything with a distance of at most `far` was in bands before. */
 static inline bool near_band_is_past(const near_band *band, double far)
 {
     return band->has_after && far < band->after.bounds.lo;
 }
 
-/* Before the search for a band; `after` and what memory there is are kept. */
+/* Prepares the search for a band; keeps `after` and the allocated memory. */
 static void near_band_begin(near_band *band, uint64_t most)
 {
     band->limit = band->radius;
@@ -70,8 +70,8 @@ static int compare_faces(const void *x, const void *y)
     return sign ? sign : a->file_face < b->file_face ? -1 : 1;
 }
 
-/* In order: by exact distance, then by number in the file, each once, at most `most`. The limit
- * falls to what may still come in between. */
+/* Sorts by exact distance, then by number in the file, removes duplicates, and keeps at most
+ * `most`. Lowers the limit accordingly. */
 static void near_band_settle(near_band *band)
 {
     uint64_t kept = 0;
@@ -89,7 +89,7 @@ static void near_band_settle(near_band *band)
 
 /* --- faces --- */
 
-/* Sorting is put off until there are about twice as many as wanted. */
+/* Adds a face. Sorting waits until there are about twice as many as wanted. */
 static void add_face(near_band *band, const near_face *face)
 {
     enum { SPARE_LEAST = 64 };
@@ -129,10 +129,10 @@ static void try_face(near_band *band, const ebpo_accel *s, uint32_t slot)
 typedef struct searching {
     near_band *band;
     const ebpo_accel *s;
-    double error; /* bound on what rounding does to distances of the hierarchy's boxes */
+    double error; /* bound of the rounding error of distances to the hierarchy's boxes */
 } searching;
 
-/* Where exact arithmetic might be finite, this is. */
+/* Returns a length that is finite where exact arithmetic might be finite. */
 static double length_of_positive(const double x[3])
 {
     double most = fmax(x[0], fmax(x[1], x[2]));
@@ -142,7 +142,7 @@ static double length_of_positive(const double x[3])
     return most * sqrt(a * a + b * b + c * c);
 }
 
-/* Certain bounds of the distances of all points of a child's box. */
+/* Computes certain bounds of the distances of all points of a child's box. */
 static void box_bounds(const searching *g, const ebpo_bound *b, int lane, double *lower,
                        double *upper)
 {
@@ -184,12 +184,12 @@ static void search_child(const searching *g, uint32_t child)
         search_child(g, b->child[order[i]]);
 }
 
-/* Adds what the subtree has of it. Faces may come again in another subtree. */
+/* Adds the subtree's faces in the band. Faces may be repeated in another subtree. */
 static void near_band_search(near_band *band, const ebpo_accel *s)
 {
     searching g = { band, s, 0 };
     double size = s->reach / s->scale * 0x1p-46;
-    for (int k = 0; k < 3; k++) /* each side takes part with a few roundings of such numbers */
+    for (int k = 0; k < 3; k++) /* each side contributes a few rounding errors of such numbers */
         size += fabs(band->p[k]) * 0x1p-46 + fabs(s->centre[k]) * 0x1p-46;
     g.error = size;
     if (s->bound_count)
@@ -198,25 +198,26 @@ static void near_band_search(near_band *band, const ebpo_accel *s)
 
 /* --- the stream --- */
 
-/* The first band is small, for those who soon have enough; each one is some times larger, so that
- * beginning anew costs little. */
-enum { FIRST_BAND = 256, BAND_GROWTH = 8, BAND_MOST = 1 << 16 };
+/* The first band is small, for callers that need few faces; each next one is several times larger,
+ * so that starting again costs little. */
+enum { FIRST_BAND = 256, BAND_GROWTH = 8, BAND_MAX = 1 << 16 };
 
 typedef struct within {
     ebpo_context *context;
     const ebpo_within_options *options;
     near_band band;
     uint64_t given;
-    bool ahead;         /* lists_ahead */
-    uint64_t announced; /* subtrees that were, and were not entered since */
+    bool ahead;      /* result of lists_ahead */
+    uint64_t hinted; /* subtrees with a prefetch hint that have not been entered */
     ebpo_near_fn take;
     void *user;
 } within;
 
-/* --- not everything in memory: the nearest of what is left, until it is beyond the limit --- */
+/* --- not everything in memory: the nearest of the rest, until it is beyond the limit --- */
 
-/* Of a file far away: all subtrees within a radius will be entered, so they are listed at once, and
- * asked for together. Of the nearest so many faces nobody knows. */
+/* Returns true for a remote file with a radius: all subtrees within it will be entered, so they are
+ * listed at once and requested together. For a number of nearest faces the subtrees are not known
+ * in advance. */
 static bool lists_ahead(const within *w)
 {
     const ebpo_model *m = w->context->model;
@@ -227,7 +228,7 @@ static bool lists_ahead(const within *w)
 static ebpo_status put_children(within *w, const ebpo_box *box, const ebpo_ranked *r,
                                 ebpo_error *error);
 
-/* Of what a subtree lists: by what was kept of it, if it has been loaded before. */
+/* Returns a bound for a subtree's faces from its skeleton, if it has been loaded before. */
 static double known_bound(const within *w, uint32_t below)
 {
     const ebpo_skeleton *k = ebpo_skeletons_find(w->context->model->skeletons, below);
@@ -237,7 +238,7 @@ static double known_bound(const within *w, uint32_t below)
     return fmin(b.own, b.outer);
 }
 
-/* What a subset has left out is looked at when the band is known. */
+/* Queues a node. Omitted parts of a subset are checked when the band is known. */
 static ebpo_status put_node(within *w, const ebpo_box *box, const ebpo_ranked *r, ebpo_error *error)
 {
     if (ebpo_node_is_uniform(&r->node) || r->node.pruned || r->lower > w->band.limit ||
@@ -250,22 +251,23 @@ static ebpo_status put_node(within *w, const ebpo_box *box, const ebpo_ranked *r
     return below.lower > w->band.limit ? EBPO_OK : ebpo_queue_push(w->context, &below, error);
 }
 
-/* Before a subtree is entered: with the first of each window some of those behind it. */
-static void announce_window(within *w, const ebpo_ranked *next)
+/* Sends prefetch hints before a subtree is entered: at the first of each window, for some of the
+ * next ones. */
+static void hint_window(within *w, const ebpo_ranked *next)
 {
     const ebpo_context *c = w->context;
-    uint32_t below[EBPO_ANNOUNCED_MOST];
+    uint32_t below[EBPO_HINTED_MAX];
     uint64_t count = 0;
-    if (!w->ahead || w->announced) {
-        w->announced -= w->announced > 0;
+    if (!w->ahead || w->hinted) {
+        w->hinted -= w->hinted > 0;
         return;
     }
     below[count++] = ebpo_entry_value(next->node.entry);
-    for (uint64_t i = 0; i < c->queue_count && count < EBPO_ANNOUNCED_MOST; i++)
+    for (uint64_t i = 0; i < c->queue_count && count < EBPO_HINTED_MAX; i++)
         if (c->queue[i].lower <= w->band.limit)
             below[count++] = ebpo_entry_value(c->queue[i].node.entry);
-    ebpo_context_announce(c, below, count);
-    w->announced = count - 1;
+    ebpo_context_hint(c, below, count);
+    w->hinted = count - 1;
 }
 
 static ebpo_status search_below(within *w, ebpo_ranked *r, ebpo_error *error)
@@ -274,7 +276,7 @@ static ebpo_status search_below(within *w, ebpo_ranked *r, ebpo_error *error)
         near_band_settle(&w->band);
     if (r->lower > w->band.limit)
         return EBPO_OK;
-    announce_window(w, r);
+    hint_window(w, r);
     ebpo_status status = ebpo_model_enter(w->context, &r->node, error);
     if (status == EBPO_OK)
         near_band_search(&w->band, r->node.subtree);
@@ -337,7 +339,7 @@ static ebpo_status search_band(within *w, uint64_t most, ebpo_error *error)
     return ebpo_check_pruned(w->context, node_matters, w, error);
 }
 
-/* False: enough. */
+/* Returns false when the caller has enough. */
 static bool give_face(within *w, const near_face *n)
 {
     ebpo_triangle_nearest exact;
@@ -367,14 +369,14 @@ static bool give_band(within *w)
 static ebpo_status stream_faces(within *w, ebpo_error *error)
 {
     uint64_t wanted = w->options->most ? w->options->most : UINT64_MAX,
-             most = w->options->most ? BAND_MOST : FIRST_BAND;
+             most = w->options->most ? BAND_MAX : FIRST_BAND;
     bool more = true;
     ebpo_status status = EBPO_OK;
     while (more && w->given < wanted && status == EBPO_OK) {
         uint64_t left = wanted - w->given;
         status = search_band(w, left < most ? left : most, error);
         more = status == EBPO_OK && give_band(w);
-        most = most < BAND_MOST / BAND_GROWTH ? most * BAND_GROWTH : BAND_MOST;
+        most = most < BAND_MAX / BAND_GROWTH ? most * BAND_GROWTH : BAND_MAX;
     }
     return status;
 }
@@ -388,7 +390,8 @@ ebpo_status ebpo_distance_within(ebpo_context *context, const double point[3],
     within w = { .context = context, .options = &wanted, .take = take, .user = user };
     ebpo_status status = EBPO_TAKE(ebpo_within_options, &wanted, options, error);
     if (status == EBPO_OK && !(wanted.radius >= 0))
-        status = ebpo_fail(error, EBPO_E_ARGUMENT, "radius %g: give 0 or more", wanted.radius);
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "radius %g is invalid; give 0 or more",
+                           wanted.radius);
     if (status == EBPO_OK)
         status = ebpo_check_points(point, 1, error);
     if (status == EBPO_OK)

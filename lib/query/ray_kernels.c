@@ -1,8 +1,9 @@
 /* Kernel of rays: the walk of a ray through one accel's hierarchy over faces, and the filter for
  * eight faces, in single precision.
  *
- * The kernel decides no result: it drops what the ray certainly does not meet, or meets beyond the
- * limit; what it calls certain is certain. The faces that remain are decided exactly by rays.c.
+ * The kernel decides no result: it drops only faces that the ray certainly misses, or hits beyond
+ * the limit. Certain hits are certain in exact arithmetic. The other faces are tested exactly by
+ * rays.c.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md. */
@@ -17,9 +18,8 @@
 
 /* --- the ray --- */
 
-/* By the signs of the direction: a bit for each axis. No branch: half of them would be
- * mispredicted.
- */
+/* Sides by the signs of the direction: a bit for each axis. Branch-free: half of the branches would
+ * be mispredicted. */
 #define LOW(k)  (offsetof(ebpo_bound, low) + 8 * (k))
 #define HIGH(k) (offsetof(ebpo_bound, high) + 8 * (k))
 static const uint8_t ray_side_at[8][2][3] = {
@@ -72,9 +72,9 @@ EBPO_EIGHT f8 side_at(const ebpo_bound *b, unsigned at, f8 step, f8 from)
     return f8_add(f8_mul(f8_from_bytes((const uint8_t *)b + at), step), from);
 }
 
-/* Children whose boxes the ray may meet between 0 and the limit, and where it comes to each. The
- * three axes' sides are prepared together: lanes 0 to 2, of steps 1 to 3 (origin and step are
- * neighbours, and each load of four floats has numbers only). */
+/* Returns the children whose boxes the ray may intersect between 0 and the limit, and the entry of
+ * each. The three axes' sides are prepared together: lanes 0 to 2, of steps 1 to 3 (origin and step
+ * are adjacent, and each load of four floats reads only numbers). */
 EBPO_EIGHT unsigned ray_children(const ebpo_ray_search *r, const ebpo_bound *b, f8 *enter)
 {
     f8 origin = f8_load_twice(b->origin), inverse = f8_load_twice(r->inverse),
@@ -94,12 +94,12 @@ EBPO_EIGHT unsigned ray_children(const ebpo_ray_search *r, const ebpo_bound *b, 
 
 /* --- faces --- */
 
-/* Eight faces seen along the ray: x and y where the ray is the origin, z along it. */
+/* Eight faces in the ray's coordinates: x and y with the ray as the origin, z along it. */
 typedef struct seen {
     f8 x[3], y[3], z[3];
 } seen;
 
-/* The corners on one axis, seen from the origin. */
+/* Reads the corners on one axis, relative to the origin. */
 EBPO_EIGHT void ray_axis(const ebpo_ray_search *r, const ebpo_face_block *b, int axis, bool wide,
                          f8 corner[3])
 {
@@ -134,8 +134,8 @@ EBPO_EIGHT seen ray_view(const ebpo_ray_search *r, const ebpo_face_block *b, boo
     return out;
 }
 
-/* Twice the signed areas of the triangles that the ray makes with each edge, and a bound on what
- * rounding does to each of them. */
+/* Twice the signed areas of the triangles that the ray forms with each edge, and a bound of the
+ * rounding error of each. */
 typedef struct edges {
     f8 u, v, w, least, most, error;
 } edges;
@@ -161,22 +161,21 @@ EBPO_EIGHT edges ray_edges(const seen *a, f8 size_z)
     return e;
 }
 
-/* Of a block's faces: those that may be met from 0 to the limit, bounds of the t at which, those
- * that certainly are, those whose interior the line certainly goes through from the front, the
- * back. */
+/* Lanes of a block's faces: possible hits from 0 to the limit, bounds of their t, certain hits, and
+ * faces through whose interior the line certainly goes from the front, from the back. */
 typedef struct ray_lanes {
     float low[8], high[8];
     unsigned alive, sure, front, back;
 } ray_lanes;
 
-/* Comparisons are such that what is no number stays and is not sure. */
+/* Comparisons are such that NaN stays and is not certain. */
 EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, ray_lanes *out, bool wide)
 {
     ebpo_face_block faces = ebpo_face_block_open(r->s, block);
     seen a = ray_view(r, &faces, wide);
     f8 zero = f8_all(0), least_z = f8_min3(a.z[0], a.z[1], a.z[2]),
-       most_z = f8_max3(a.z[0], a.z[1], a.z[2]);
-    f8 size_z = f8_add(f8_max(f8_abs(least_z), f8_abs(most_z)), f8_all(r->blur));
+       max_z = f8_max3(a.z[0], a.z[1], a.z[2]);
+    f8 size_z = f8_add(f8_max(f8_abs(least_z), f8_abs(max_z)), f8_all(r->blur));
     edges e = ray_edges(&a, size_z);
     f8 below = f8_sub(zero, e.error);
     unsigned alive = ~f8_bits(f8_and(f8_less(e.least, below), f8_less(e.error, e.most))) &
@@ -194,8 +193,8 @@ EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, ray_lanes *o
     f8 sum = f8_add(f8_mul(e.u, a.z[0]), f8_add(f8_mul(e.v, a.z[1]), f8_mul(e.w, a.z[2])));
     f8 t = f8_mul(f8_mul(sum, inverse), per_step);
     f8 share = f8_min(f8_abs(f8_mul(f8_mul(e.error, f8_all(6)), inverse)), f8_all(1));
-    f8 error = f8_add(f8_mul(f8_mul(f8_sub(most_z, least_z), share), f8_abs(per_step)), size);
-    f8 one = f8_mul(least_z, per_step), other = f8_mul(most_z, per_step);
+    f8 error = f8_add(f8_mul(f8_mul(f8_sub(max_z, least_z), share), f8_abs(per_step)), size);
+    f8 one = f8_mul(least_z, per_step), other = f8_mul(max_z, per_step);
     f8 from = f8_pick(in, f8_sub(t, error), f8_sub(f8_min(one, other), size)),
        to = f8_pick(in, f8_add(t, error), f8_add(f8_max(one, other), size));
     alive &= ~f8_bits(f8_or(f8_less(f8_all(r->bound), from), f8_less(to, zero)));
@@ -224,7 +223,7 @@ EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, bool wide)
     if (!found.alive)
         return;
     if (r->wants == EBPO_WANTS_ANY && found.sure) {
-        r->met = r->done = true;
+        r->intersected = r->done = true;
         return;
     }
     for (unsigned lanes = found.alive; lanes; lanes &= lanes - 1) {
@@ -243,7 +242,7 @@ EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, bool wide)
         r->judge(r);
 }
 
-/* Cache lines of what will be visited later, without a branch that would often be mispredicted. */
+/* Prefetches cache lines of a later visit, without a branch that would often be mispredicted. */
 EBPO_EIGHT void ray_fetch(const ebpo_accel *s, uint32_t child, bool wide)
 {
     uint32_t number = child & ~EBPO_IS_BLOCK;
@@ -254,7 +253,7 @@ EBPO_EIGHT void ray_fetch(const ebpo_accel *s, uint32_t child, bool wide)
         __builtin_prefetch(at + 64 * i);
 }
 
-/* Pushes the children of two or more lanes but the nearest, which is returned. */
+/* Pushes the children of two or more lanes except the nearest, which is returned. */
 EBPO_EIGHT uint32_t ray_nearest(const ebpo_accel *s, ebpo_visit *stack, uint32_t *top,
                                 const ebpo_bound *b, unsigned lanes, f8 enter, bool wide)
 {
@@ -276,7 +275,7 @@ EBPO_EIGHT uint32_t ray_nearest(const ebpo_accel *s, ebpo_visit *stack, uint32_t
     return (uint32_t)stack[*top];
 }
 
-/* Pushes the children of two or more lanes but one, which is returned, in any order. */
+/* Pushes the children of two or more lanes except one, which is returned, in any order. */
 EBPO_EIGHT uint32_t ray_next(const ebpo_accel *s, ebpo_visit *stack, uint32_t *top,
                              const ebpo_bound *b, unsigned lanes, bool wide)
 {
@@ -289,11 +288,12 @@ EBPO_EIGHT uint32_t ray_next(const ebpo_accel *s, ebpo_visit *stack, uint32_t *t
     return b->child[__builtin_ctz(lanes)];
 }
 
-/* `sorted`: nearer children first, which falling limits gain from. */
+/* Walks through the accel. `sorted`: nearer children first, which is faster when the limit
+ * decreases. */
 EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, bool wide, bool sorted)
 {
     const ebpo_accel *s = r->s;
-    ebpo_visit stack[EBPO_VISITS_MOST];
+    ebpo_visit stack[EBPO_VISITS_MAX];
     uint32_t top = 1;
     ray_set_boxes(r);
     ray_set_faces(r);

@@ -1,11 +1,10 @@
-/* Rays: the first face that a ray meets, whether it meets any, all that it meets; and many rays on
- * all cores.
+/* Rays: the first face that a ray hits, a test for any hit, all hits; and many rays on all cores.
  *
- * On the way down the tree tests are conservative: a node is passed over only if the ray certainly
- * misses its cell or what it holds is beyond the limit. In an accel a filter in single precision
- * (ray_kernels.c) leaves a few faces, about which exact predicates decide, the most promising
+ * On the way down the tree tests are conservative: a node is skipped only if the ray certainly
+ * misses its cell, or its contents are beyond the limit. In an accel a filter in single precision
+ * (ray_kernels.c) leaves a few faces, which are tested by exact predicates, the most promising
  * first. Hits are ordered by t, then by the number in the file. Results do not depend on threads:
- * of many rays each thread takes some at a time, with a context of its own. Error bounds:
+ * of many rays each thread takes some at a time, with a separate context. Error bounds:
  * docs/develop/bounds.md. */
 #include "core/strict_fp.h"
 
@@ -26,23 +25,24 @@
 #include "query/query_model.h"
 #include "query/query_node.h"
 
-/* A face that the ray meets, with what exact comparison needs. */
-struct ebpo_met {
+/* A face that the ray hits, with the data for exact comparison. */
+struct ebpo_ray_found {
     double triangle[3][3];
     uint64_t file_face, source_face;
-    ebpo_ray_meeting meeting;
+    ebpo_ray_intersection clash;
 };
 
 typedef struct casting {
-    ebpo_context *context; /* its list of faces takes all hits */
+    ebpo_context *context; /* its list of faces holds all hits */
     ebpo_segment ray;
     ebpo_ray_wants wants;
     ebpo_ray_sides sides; /* only such faces count */
-    double limit;         /* t beyond which nothing matters, certain; falls while searching */
-    bool done;            /* nothing more is to be looked at */
+    double limit;         /* t beyond which hits are irrelevant, certain; decreases during the
+                           * search */
+    bool done;            /* the search is complete */
     bool no_memory;
     uint64_t count;
-    ebpo_met first; /* if count > 0, unless all are wanted */
+    ebpo_ray_found first; /* valid if count > 0, unless all hits are wanted */
 } casting;
 
 static inline void casting_begin(casting *c, ebpo_context *context, const double origin[3],
@@ -59,21 +59,22 @@ static inline void casting_begin(casting *c, ebpo_context *context, const double
     c->count = 0;
 }
 
-static inline ebpo_ray_hit hit_of(const ebpo_met *m)
+static inline ebpo_ray_hit hit_of(const ebpo_ray_found *m)
 {
-    return (ebpo_ray_hit){ m->meeting.t, m->source_face, m->meeting.side };
+    return (ebpo_ray_hit){ m->clash.t, m->source_face, m->clash.side };
 }
 
 /* --- one ray through one accel --- */
 
-/* Origins farther from the box than this many times its reach are moved towards it. */
+/* Origins farther from the box than this multiple of its half size are moved towards it. */
 static const double near_enough = 4;
-/* Stands for infinity: finite, so that products with 0 are numbers. */
+/* Replaces infinity: finite, so that products with 0 are not NaN. */
 #define BEYOND 0x1p100f
 
 /* --- limits --- */
 
-/* t in the frame, from the moved origin; `sign` 1: not less than the true one, -1: not greater. */
+/* Returns t in the frame, from the moved origin; `sign` 1: not less than the true one, -1: not
+ * greater. */
 static float frame_t(const ebpo_ray_search *r, double t, int sign)
 {
     double scaled = t * r->limit_scale;
@@ -91,12 +92,11 @@ static void lower_bound(ebpo_ray_search *r)
 
 /* --- the ray in the frame --- */
 
-/* Not fmax, which is a call. */
+/* Returns the maximum without a call of fmax. */
 static inline double greater_of(double a, double b) { return a > b ? a : b; }
 
-/* A direction whose longest coordinate is out of the ordinary is scaled by a power of two. That
- * takes the processor a while before anything else can begin: most directions are left as they are.
- */
+/* Scales a direction with an extreme longest coordinate by a power of two. As this delays all later
+ * steps, most directions are left as they are. */
 static void scale_direction(ebpo_ray_search *r, double longest)
 {
     int exponent;
@@ -106,7 +106,7 @@ static void scale_direction(ebpo_ray_search *r, double longest)
     r->limit_scale = ldexp(r->s->scale, exponent);
 }
 
-/* Returns the greatest size of a coordinate of the origin. */
+/* Returns the largest absolute coordinate of the origin. */
 static double to_frame(ebpo_ray_search *r)
 {
     const ebpo_accel *s = r->s;
@@ -125,27 +125,27 @@ static double to_frame(ebpo_ray_search *r)
     return most;
 }
 
-/* Where the ray comes to the cube of `reach` around all faces, somewhat before; false: nowhere.
- * Rounding is far below what the cube is widened by as long as the origin is not so far away that
- * the ray is blurred to the cube's size; then it stays where it is. */
+/* Computes a point shortly before the ray enters the cube of `reach` around all faces; false: it
+ * misses. The rounding error is far below the enlargement of the cube, unless the origin is so far
+ * away that its error is as large as the cube; then it is not moved. */
 static bool enters_cube(const ebpo_ray_search *r, double reach, double *t)
 {
     double from = 0, to = INFINITY;
     for (int k = 0; k < 3; k++) {
-        double wall = 2 * reach * (r->direction[k] < 0 ? -1 : 1);
+        double cell_face = 2 * reach * (r->direction[k] < 0 ? -1 : 1);
         if (r->direction[k] == 0) {
             if (fabs(r->origin[k]) > 2 * reach)
                 return false;
             continue;
         }
-        from = fmax(from, (-wall - r->origin[k]) / r->direction[k]);
-        to = fmin(to, (wall - r->origin[k]) / r->direction[k]);
+        from = fmax(from, (-cell_face - r->origin[k]) / r->direction[k]);
+        to = fmin(to, (cell_face - r->origin[k]) / r->direction[k]);
     }
     *t = from;
     return from <= to;
 }
 
-/* The origin goes along in double-double arithmetic: where the ray comes from hardly matters. */
+/* Moves the origin in double-double arithmetic, so that its distance hardly matters. */
 static bool move_origin(ebpo_ray_search *r, double *most)
 {
     const ebpo_accel *s = r->s;
@@ -165,8 +165,8 @@ static bool move_origin(ebpo_ray_search *r, double *most)
     return true;
 }
 
-/* How far off the origin may be, in the frame: moved, brought into the frame, back into the model's
- * unit, and split into floats there; and what replacing a small direction does.
+/* Sets the error of the origin in the frame: moving it, transforming it to the frame and back to
+ * the model's unit, splitting it into floats, and replacing a small direction.
  * docs/develop/bounds.md, "A ray against boxes". */
 static void set_error(ebpo_ray_search *r, double most)
 {
@@ -182,7 +182,7 @@ static void set_error(ebpo_ray_search *r, double most)
 
 /* --- candidates --- */
 
-/* The nearest first, where that may spare others. */
+/* Tests the nearest candidate first, where that may exclude others. */
 static void judge_waiting(ebpo_ray_search *r)
 {
     while (r->count && !r->done) {
@@ -201,14 +201,14 @@ static void judge_waiting(ebpo_ray_search *r)
     r->count = 0;
 }
 
-/* Shows `decide` every face that may matter, the most promising first. */
+/* Calls `decide` for every face that may matter, the most promising first. */
 static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels,
                              const ebpo_accel *s)
 {
     r->s = s;
     r->judge = judge_waiting;
     r->count = 0;
-    r->done = r->met = false;
+    r->done = r->intersected = false;
     if (s->bound_count == 0)
         return;
     double most = to_frame(r);
@@ -223,40 +223,40 @@ static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels
         judge_waiting(r);
 }
 
-/* Whether the ray meets m->triangle, and from a side that counts; then m->meeting says where.
- * `facing`: where that is certain already, because the line goes through its interior; else 0. */
-static bool casting_meets(const casting *c, int facing, ebpo_met *m)
+/* Returns true if the ray hits m->triangle from a side that counts; sets m->meeting. `facing`: its
+ * side where that is already certain, because the line goes through its interior; else 0. */
+static bool casting_intersects(const casting *c, int facing, ebpo_ray_found *m)
 {
     const double(*triangle)[3] = (const double(*)[3])m->triangle;
     if (facing)
-        ebpo_ray_interior(&c->ray, triangle, facing, &m->meeting);
+        ebpo_ray_interior(&c->ray, triangle, facing, &m->clash);
     else
-        ebpo_ray_triangle(&c->ray, triangle, &m->meeting);
-    return m->meeting.meets && (c->sides == EBPO_RAY_BOTH ||
-                                m->meeting.facing == (c->sides == EBPO_RAY_FRONT ? 1 : -1));
+        ebpo_ray_triangle(&c->ray, triangle, &m->clash);
+    return m->clash.meets &&
+           (c->sides == EBPO_RAY_BOTH || m->clash.facing == (c->sides == EBPO_RAY_FRONT ? 1 : -1));
 }
 
-/* By t, then in the order of the file. */
-static int compare_met(const void *a, const void *b, void *ray)
+/* Orders by t, then by the order of the file. */
+static int compare_found(const void *a, const void *b, void *ray)
 {
-    const ebpo_met *x = a, *y = b;
-    int sign = ebpo_ray_compare(ray, (const double(*)[3])x->triangle, &x->meeting,
-                                (const double(*)[3])y->triangle, &y->meeting);
+    const ebpo_ray_found *x = a, *y = b;
+    int sign = ebpo_ray_compare(ray, (const double(*)[3])x->triangle, &x->clash,
+                                (const double(*)[3])y->triangle, &y->clash);
     return sign ? sign : (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-static void keep_first(casting *c, const ebpo_met *m)
+static void keep_first(casting *c, const ebpo_ray_found *m)
 {
-    if (c->count && compare_met(m, &c->first, &c->ray) >= 0)
+    if (c->count && compare_found(m, &c->first, &c->ray) >= 0)
         return;
     c->first = *m;
     c->count = 1;
-    double limit = m->meeting.t * (1 + 0x1p-48) + DBL_MIN;
+    double limit = m->clash.t * (1 + 0x1p-48) + DBL_MIN;
     c->limit = limit < c->limit ? limit : c->limit;
 }
 
-/* A face that is met, with its numbers. */
-static void casting_keep(casting *c, const ebpo_met *m)
+/* Keeps a hit face, with its numbers. */
+static void casting_keep(casting *c, const ebpo_ray_found *m)
 {
     ebpo_context *k = c->context;
     if (c->wants == EBPO_WANTS_FIRST) {
@@ -264,40 +264,42 @@ static void casting_keep(casting *c, const ebpo_met *m)
     } else if (c->wants == EBPO_WANTS_ANY) {
         c->count = 1;
         c->done = true;
-    } else if (ebpo_grow(&k->met, &k->met_capacity, c->count + 1, sizeof *k->met)) {
-        k->met[c->count++] = *m;
+    } else if (ebpo_grow(&k->intersected, &k->found_capacity, c->count + 1,
+                         sizeof *k->intersected)) {
+        k->intersected[c->count++] = *m;
     } else {
         c->done = c->no_memory = true;
     }
 }
 
-/* Mostly few, and in order but for some: what is met is found from the nearest box on. */
-static void sort_met(ebpo_met *met, uint64_t count, ebpo_segment *ray)
+/* Sorts hits. Mostly few, and nearly in order, because boxes are visited from the nearest on. */
+static void sort_found(ebpo_ray_found *intersected, uint64_t count, ebpo_segment *ray)
 {
     if (count > 16) {
-        ebpo_sort_with(met, count, sizeof *met, compare_met, ray);
+        ebpo_sort_with(intersected, count, sizeof *intersected, compare_found, ray);
         return;
     }
     for (uint64_t i = 1; i < count; i++) {
         uint64_t at = i;
-        ebpo_met m = met[i];
-        for (; at > 0 && compare_met(&met[at - 1], &m, ray) > 0; at--)
-            met[at] = met[at - 1];
-        met[at] = m;
+        ebpo_ray_found m = intersected[i];
+        for (; at > 0 && compare_found(&intersected[at - 1], &m, ray) > 0; at--)
+            intersected[at] = intersected[at - 1];
+        intersected[at] = m;
     }
 }
 
-/* All hits in order, each once, into context->hits from `begin` on, up to *end. */
+/* Writes all hits in order, without duplicates, to context->hits from `begin` to *end. */
 static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_error *error)
 {
     ebpo_context *k = c->context;
     *end = begin;
     if (!ebpo_grow(&k->hits, &k->hit_capacity, begin + c->count, sizeof *k->hits))
         return ebpo_fail_memory(error, (begin + c->count) * sizeof *k->hits);
-    sort_met(k->met, c->count, &c->ray);
+    sort_found(k->intersected, c->count, &c->ray);
     for (uint64_t i = 0; i < c->count; i++)
-        if (i == 0 || k->met[i].file_face != k->met[i - 1].file_face) /* subtrees share faces */
-            k->hits[(*end)++] = hit_of(&k->met[i]);
+        if (i == 0 || k->intersected[i].file_face !=
+                          k->intersected[i - 1].file_face) /* subtrees share faces */
+            k->hits[(*end)++] = hit_of(&k->intersected[i]);
     return EBPO_OK;
 }
 
@@ -308,14 +310,14 @@ static const char *ray_fault_of(const ebpo_segment *ray)
         nothing += ray->origin[k] * 0 + ray->direction[k] * 0;
         longest = fabs(ray->direction[k]) > longest ? fabs(ray->direction[k]) : longest;
     }
-    if (nothing != 0) /* no number: a coordinate is not a finite one */
+    if (nothing != 0) /* NaN: a coordinate is not finite */
         return "has a coordinate that is not a finite number";
     if (longest == 0)
         return "needs a direction other than (0, 0, 0)";
     return ray->t_max >= 0 ? NULL : "needs a t_max of 0 or more";
 }
 
-/* What is wrong with a ray, as the end of a sentence; NULL: nothing. */
+/* Returns the error of a ray as the end of a sentence; NULL: none. */
 static inline const char *ray_fault(const ebpo_segment *ray)
 {
     const double *o = ray->origin, *d = ray->direction;
@@ -325,10 +327,10 @@ static inline const char *ray_fault(const ebpo_segment *ray)
     return ray_fault_of(ray);
 }
 
-/* Interval of t in which the ray is within [low, high] widened by `slack`, cut to 0 .. limit; false
- * when it is empty. */
-static bool meets_slabs(const double origin[3], const double direction[3], double limit,
-                        const double low[3], const double high[3], double slack, double *enter)
+/* Computes the interval of t in which the ray is within [low, high] enlarged by `slack`, cut to 0
+ * .. limit; false when it is empty. */
+static bool intersects_slabs(const double origin[3], const double direction[3], double limit,
+                             const double low[3], const double high[3], double slack, double *enter)
 {
     double from = 0, to = limit;
     for (int k = 0; k < 3; k++) {
@@ -349,11 +351,11 @@ static bool meets_slabs(const double origin[3], const double direction[3], doubl
 static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
 {
     casting *c = r->user;
-    ebpo_met m;
+    ebpo_ray_found m;
     uint32_t local = ebpo_accel_slot_face(r->s, slot);
     ebpo_accel_fetch_face(r->s, local);
     ebpo_accel_triangle(r->s, slot, m.triangle);
-    if (!casting_meets(c, facing, &m))
+    if (!casting_intersects(c, facing, &m))
         return;
     m.file_face = ebpo_accel_file_face(r->s, local);
     m.source_face = ebpo_accel_source_face(r->s, local);
@@ -372,31 +374,31 @@ static void cast_subtree(casting *c, const ebpo_accel *s)
     r.decide = decide_face;
     r.user = c;
     ray_search_accel(&r, c->context->model->kernels.ray, s);
-    if (r.met) { /* only where any hit was wanted */
+    if (r.intersected) { /* only where any hit was wanted */
         c->count = 1;
         c->done = true;
     }
 }
 
-/* Whether the ray comes to the node's cell before its limit; rather yes than no. */
-static bool meets_cell(const casting *c, const ebpo_box *box, const ebpo_node *node)
+/* Returns true if the ray may enter the node's cell before its limit (conservative). */
+static bool intersects_cell(const casting *c, const ebpo_box *box, const ebpo_node *node)
 {
     double low[3], high[3], slack = 0, enter;
     ebpo_cell_bounds(box, node->cell, low, high);
     for (int k = 0; k < 3; k++)
         slack = fmax(slack, (fabs(low[k]) + fabs(high[k]) + fabs(c->ray.origin[k])) * 0x1p-48);
-    return meets_slabs(c->ray.origin, c->ray.direction, c->limit, low, high, slack, &enter);
+    return intersects_slabs(c->ray.origin, c->ray.direction, c->limit, low, high, slack, &enter);
 }
 
 static bool ray_matters(void *user, const ebpo_box *box, const ebpo_node *node)
 {
-    return meets_cell(user, box, node);
+    return intersects_cell(user, box, node);
 }
 
 static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, ebpo_error *error)
 {
     const ebpo_model *m = c->context->model;
-    if (c->done || ebpo_node_is_uniform(&node) || !meets_cell(c, box, &node) ||
+    if (c->done || ebpo_node_is_uniform(&node) || !intersects_cell(c, box, &node) ||
         node.pruned) /* pruned: see ray_walk */
         return EBPO_OK;
     if (ebpo_node_is_below(&node)) {
@@ -405,7 +407,7 @@ static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, eb
             cast_subtree(c, node.subtree);
         return status;
     }
-    /* Children in the order in which the ray meets their cells. */
+    /* Children in the order in which the ray enters their cells. */
     unsigned turn = 0;
     for (int k = 0; k < 3; k++)
         turn |= (unsigned)(c->ray.direction[k] < 0) << k;
@@ -415,7 +417,7 @@ static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, eb
     return status;
 }
 
-/* Shows the casting every face that may matter to it. The ray is one that makes sense. */
+/* Passes every face that may matter to the casting. The ray is valid. */
 static ebpo_status ray_walk(casting *c, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -428,7 +430,7 @@ static ebpo_status ray_walk(casting *c, ebpo_error *error)
     if (status == EBPO_OK && !c->done && c->context->model->info->pruned)
         status = ebpo_check_pruned(c->context, ray_matters, c, error);
     if (status == EBPO_OK && c->no_memory)
-        status = ebpo_fail_memory(error, c->count * sizeof(ebpo_met));
+        status = ebpo_fail_memory(error, c->count * sizeof(ebpo_ray_found));
     return status;
 }
 
@@ -489,11 +491,11 @@ ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const do
 
 /* --- many rays --- */
 
-/* Rays that a thread takes at a time; of a model that is not all in memory more, which are
- * neighbours on the curve. */
+/* Rays that a thread takes at a time; more for a model that is not all in memory: neighbours on the
+ * curve. */
 enum { PIECE = 128, PIECE_ALONG_CURVE = 1024 };
 
-/* Where the hits of a ray are, before they are put together. */
+/* Position of the hits of a ray, before they are gathered. */
 typedef struct found {
     unsigned worker;
     uint64_t begin, end;
@@ -506,10 +508,10 @@ typedef struct batch {
     ebpo_ray_wants wants;
     unsigned threads;
     ebpo_context **context; /* [threads] the first one is the caller's */
-    uint64_t *held;         /* [threads] hits in these, if all are wanted */
+    uint64_t *held;         /* [threads] number of hits in these, if all are wanted */
     double *entry;          /* [count][3] in the order of work; NULL: the rays' own order */
     uint64_t *order;        /* [count] */
-    /* [count] each: one of these */
+    /* results, [count] each: one of these three is used */
     ebpo_ray_hit *first;
     bool *any;
     found *all;
@@ -517,7 +519,7 @@ typedef struct batch {
 
 /* --- a ray of many --- */
 
-static ebpo_status answer_ray(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
+static ebpo_status result_ray(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
 {
     casting c;
     const ebpo_ray *r = &b->rays[i];
@@ -539,7 +541,7 @@ static ebpo_status answer_ray(batch *b, uint64_t i, unsigned worker, ebpo_error 
     return status;
 }
 
-static ebpo_status answer_piece(void *user, uint64_t begin, uint64_t end, unsigned worker,
+static ebpo_status result_piece(void *user, uint64_t begin, uint64_t end, unsigned worker,
                                 ebpo_error *error)
 {
     batch *b = user;
@@ -549,7 +551,7 @@ static ebpo_status answer_piece(void *user, uint64_t begin, uint64_t end, unsign
         ebpo_batch_begin(&along, b->context[worker], b->entry + 3 * begin, end - begin, false);
     for (uint64_t i = 0; i < end - begin && status == EBPO_OK; i++) {
         uint64_t k = begin + (b->order ? ebpo_batch_next(&along, i) : i);
-        status = answer_ray(b, b->order ? b->order[k] : k, worker, error);
+        status = result_ray(b, b->order ? b->order[k] : k, worker, error);
     }
     ebpo_batch_end(&along);
     return status;
@@ -557,7 +559,8 @@ static ebpo_status answer_piece(void *user, uint64_t begin, uint64_t end, unsign
 
 /* --- the order of work --- */
 
-/* About where the ray comes to the box; its own beginning where that is inside, or it misses. */
+/* Sets the approximate point where the ray enters the box; the ray's origin where that is inside,
+ * or the ray misses. */
 static void entry_of(const ebpo_box *box, const ebpo_ray *ray, double out[3])
 {
     double from = 0;
@@ -572,7 +575,7 @@ static void entry_of(const ebpo_box *box, const ebpo_ray *ray, double out[3])
     }
 }
 
-/* Where there is no room for an order, rays are followed as they come. */
+/* Orders the rays. Without memory for an order, they are followed in the given order. */
 static void put_in_order(batch *b, const ebpo_model *m)
 {
     ebpo_box box = ebpo_model_box(m);
@@ -632,7 +635,7 @@ static void clear_batch(batch *b)
     free(b->all);
 }
 
-static ebpo_status answer_all(batch *b, ebpo_context *context, const ebpo_ray_options *options,
+static ebpo_status result_all(batch *b, ebpo_context *context, const ebpo_ray_options *options,
                               ebpo_error *error)
 {
     const ebpo_model *m = context->model;
@@ -655,7 +658,7 @@ static ebpo_status answer_all(batch *b, ebpo_context *context, const ebpo_ray_op
         b->threads = (unsigned)pieces;
     status = make_contexts(b, context, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, NULL, b->count, piece, answer_piece, b, NULL, NULL,
+        status = ebpo_parallel_for(b->threads, NULL, b->count, piece, result_piece, b, NULL, NULL,
                                    error);
     return status;
 }
@@ -666,7 +669,7 @@ ebpo_status ebpo_ray_first_many(ebpo_context *context, const ebpo_ray *rays, uin
 {
     EBPO_DEFAULT_FP;
     batch b = { .rays = rays, .count = count, .wants = EBPO_WANTS_FIRST, .first = out };
-    ebpo_status status = answer_all(&b, context, options, error);
+    ebpo_status status = result_all(&b, context, options, error);
     clear_batch(&b);
     return status;
 }
@@ -676,12 +679,12 @@ ebpo_status ebpo_ray_any_many(ebpo_context *context, const ebpo_ray *rays, uint6
 {
     EBPO_DEFAULT_FP;
     batch b = { .rays = rays, .count = count, .wants = EBPO_WANTS_ANY, .any = any };
-    ebpo_status status = answer_all(&b, context, options, error);
+    ebpo_status status = result_all(&b, context, options, error);
     clear_batch(&b);
     return status;
 }
 
-/* Puts the hits together in the order of the rays, in the caller's context. */
+/* Gathers the hits in the order of the rays, in the caller's context. */
 static ebpo_status gather_hits(const batch *b, ebpo_context *context, ebpo_error *error)
 {
     uint64_t total = 0;
@@ -717,7 +720,7 @@ ebpo_status ebpo_ray_all_many(ebpo_context *context, const ebpo_ray *rays, uint6
     *hits = NULL;
     *begin = NULL;
     b.all = ebpo_alloc(count, sizeof *b.all);
-    ebpo_status status = b.all ? answer_all(&b, context, options, error)
+    ebpo_status status = b.all ? result_all(&b, context, options, error)
                                : ebpo_fail_memory(error, count * sizeof *b.all);
     if (status == EBPO_OK)
         status = gather_hits(&b, context, error);

@@ -1,8 +1,8 @@
-/* Attributes at points on faces: those of vertices weighed by where the point is on its face, those
- * of faces as they are.
+/* Samples attributes at points on faces: those of vertices are interpolated at the point's position
+ * on its face, those of faces are returned as stored.
  *
- * A sampler reads the columns that were asked for once, and then serves any number of points. How
- * exact results are is documented in ebpo/query.h. */
+ * A sampler reads the requested columns once, and then serves any number of points. ebpo/query.h
+ * documents the exactness of results. */
 #include "core/strict_fp.h"
 
 #include <ebpo/query.h>
@@ -20,29 +20,30 @@
 
 /* A column of an array. */
 typedef struct sampled {
-    const ebpo_attribute *head; /* the file's */
+    const ebpo_attribute *head; /* attribute of the file */
     unsigned array, column;
-    bool of_vertices, owner; /* owner: the first one with these values */
+    bool of_vertices, owner; /* owner: the first column with these values */
     ebpo_attribute_values values;
 } sampled;
 
 struct ebpo_sampler {
     const ebpo_file *file;
-    ebpo_mesh mesh;      /* if an attribute is one of vertices; else empty */
-    uint32_t *file_face; /* [numbers] of a face of the source, UINT32_MAX: none; NULL: the same */
+    ebpo_mesh mesh; /* read if an attribute belongs to vertices; else empty */
+    uint32_t
+        *file_face; /* [numbers] file index of a source face, UINT32_MAX: none; NULL: the same */
     uint64_t numbers;
     unsigned count;
-    sampled item[EBPO_SAMPLER_MOST];
+    sampled item[EBPO_SAMPLER_MAX];
 };
 
-/* --- which attributes --- */
+/* --- choice of attributes --- */
 
 typedef struct wanted {
     const char *text, *element, *name;
     size_t bytes, element_bytes, name_bytes;
 } wanted;
 
-/* The text up to the next comma: a name, or `element:name`. */
+/* Returns the text up to the next comma: a name, or `element:name`. */
 static wanted next_wanted(const char *text)
 {
     wanted w = { .text = text, .bytes = strcspn(text, ",") };
@@ -54,7 +55,7 @@ static wanted next_wanted(const char *text)
     return w;
 }
 
-/* The column of this name, or -1. */
+/* Returns the column of this name, or -1. */
 static int column_named(const char *names, const wanted *w)
 {
     for (int column = 0; *names; column++) {
@@ -96,12 +97,12 @@ static ebpo_status choose_columns(ebpo_sampler *s, const char *names, ebpo_error
         if (!find_column(s->file, &w, "vertex", &item) && !find_column(s->file, &w, "face", &item))
             return ebpo_fail_file(error, EBPO_E_ABSENT, shown,
                                   "vertices and faces have no attribute '%.*s', or it is a list; "
-                                  "'ebpo info' tells what the file has",
+                                  "'ebpo info' lists the attributes of the file",
                                   (int)(w.bytes < 100 ? w.bytes : 100), w.text);
-        if (s->count == EBPO_SAMPLER_MOST)
+        if (s->count == EBPO_SAMPLER_MAX)
             return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
-                                  "at most %d attributes can be asked for at a time",
-                                  EBPO_SAMPLER_MOST);
+                                  "too many attributes; give at most %d at a time",
+                                  EBPO_SAMPLER_MAX);
         s->item[s->count++] = item;
         more = at[w.bytes] == ',';
         at += w.bytes + 1;
@@ -109,7 +110,7 @@ static ebpo_status choose_columns(ebpo_sampler *s, const char *names, ebpo_error
     return EBPO_OK;
 }
 
-/* --- what is read --- */
+/* --- reading --- */
 
 static ebpo_status read_values(ebpo_sampler *s, const ebpo_read_options *read, ebpo_error *error)
 {
@@ -138,7 +139,7 @@ static ebpo_status read_mesh(ebpo_sampler *s, const ebpo_read_options *read, ebp
     return needed ? ebpo_file_read_mesh(s->file, read, &s->mesh, error) : EBPO_OK;
 }
 
-/* Callers are told the source's numbers of faces. */
+/* Inverts the map: callers use face numbers of the source. */
 static ebpo_status invert_map(ebpo_sampler *s, const ebpo_read_options *read, ebpo_error *error)
 {
     uint64_t faces = s->file->info.face_count;
@@ -209,7 +210,7 @@ static double clamp_to(double v, double least, double most)
     return v < least ? least : v > most ? most : v;
 }
 
-/* Exponent of the greatest of `count` numbers, by their absolute values; 0 if all are 0. */
+/* Returns the exponent of the largest absolute value of `count` numbers; 0 if all are 0. */
 static int greatest_exponent(const double *v, int count)
 {
     double most = 0;
@@ -224,8 +225,8 @@ static void scale_by_power(double *v, int count, int by)
         v[i] = scalbn(v[i], by);
 }
 
-/* e[0]: b - a, e[1]: c - a, e[2]: p - a, at a scale where the greatest of the first two is 1 to 2.
- */
+/* Computes e[0]: b - a, e[1]: c - a, e[2]: p - a, scaled so that the larger of the first two is 1
+ * to 2. */
 static void edges_of(const double corner[3][3], const double p[3], double e[3][3])
 {
     double at[4][3];
@@ -238,7 +239,7 @@ static void edges_of(const double corner[3][3], const double p[3], double e[3][3
     scale_by_power(e[0], 9, -greatest_exponent(e[0], 6));
 }
 
-/* Where a face has no area: along its longest edge. */
+/* Weighs along the longest edge, for a face without area. */
 static void weigh_edge(const double e[3][3], double weight[3])
 {
     static const int from[3] = { 0, 0, 1 }, to[3] = { 1, 2, 2 };
@@ -279,7 +280,7 @@ static void weigh_corners(const double corner[3][3], const double p[3], double w
     weight[2] = c / sum;
 }
 
-/* Between the values that take part, also when it is rounded. */
+/* Blends values; the result is between them, also after rounding. */
 static double blend_values(const double weight[3], const double value[3])
 {
     double sum = 0, least = INFINITY, most = -INFINITY;
@@ -293,7 +294,7 @@ static double blend_values(const double weight[3], const double value[3])
     return clamp_to(sum, least, most);
 }
 
-/* --- answers --- */
+/* --- results --- */
 
 static void corners_of(const ebpo_mesh *mesh, const uint32_t *face, double corner[3][3])
 {
@@ -329,7 +330,7 @@ static void sample_face(const ebpo_sampler *s, uint64_t f, const double point[3]
     }
 }
 
-/* The file's number of a face; UINT64_MAX: it has no such face. */
+/* Returns the file's index of a face; UINT64_MAX: it has no such face. */
 static uint64_t face_in_file(const ebpo_sampler *s, uint64_t number)
 {
     if (number >= s->numbers)

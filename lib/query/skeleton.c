@@ -1,9 +1,9 @@
 /* Skeletons: bounds of the distance to the faces of subtrees that are not in memory.
  *
- * Of each subtree that has ever been loaded the upper nodes of its hierarchy over faces are kept,
- * eight at first; searches load it again only if it may matter. Whenever a search has loaded it for
- * nothing, nodes are added where it looked. All skeletons together stay within their share of the
- * budget. They give lower bounds only (model_parts.h says why); any thread may use them, also while
+ * For each subtree that has been loaded the upper nodes of its hierarchy over faces are kept, eight
+ * at first; searches load it again only if it may matter. When a search has loaded it without need,
+ * nodes are added near the query point. All skeletons together stay within their share of the
+ * budget. They give lower bounds only (reason: model_parts.h); any thread may use them, also while
  * one grows. */
 #include "core/strict_fp.h"
 
@@ -19,19 +19,19 @@
 #include "core/alloc.h"
 
 typedef struct kept_node {
-    /* `child`: EBPO_IS_BLOCK; or kept, with the number here; or a number in the subtree's
-     * hierarchy, which becomes a kept one when the skeleton grows */
+    /* `child`: EBPO_IS_BLOCK; or the number of a node kept here; or a number in the subtree's
+     * hierarchy, which is replaced when the skeleton grows */
     ebpo_bound bound;
     ebpo_bound_slab slab;
 } kept_node;
 
-/* Nodes of a part, and parts: a power of two each. */
+/* Nodes of a part, and parts: powers of two. */
 enum { PART_NODES = 8, PARTS = EBPO_SKELETON_NODES / PART_NODES, GROWN_AT_ONCE = 8 };
 #define IS_KEPT UINT32_C(0x40000000)
 
 struct ebpo_skeleton {
-    double centre[3], scale; /* the subtree's frame */
-    unsigned count, first;   /* nodes; those of the first part at most */
+    double centre[3], scale; /* frame of the subtree */
+    unsigned count, first;   /* number of nodes; the maximum in the first part */
     uint8_t own, outer;      /* a bit for each child of node 0 that has such faces: never both */
     kept_node *_Atomic part[PARTS];
 };
@@ -42,21 +42,21 @@ static kept_node *node_at(const ebpo_skeleton *k, uint32_t number)
            number % PART_NODES;
 }
 
-/* A node below becomes known while others look. */
+/* Returns a child; a node below may be added while other threads read. */
 static uint32_t child_of(const kept_node *n, int lane)
 {
     return __atomic_load_n(&n->bound.child[lane], __ATOMIC_ACQUIRE);
 }
 static bool is_kept(uint32_t child) { return (child & (IS_KEPT | EBPO_IS_BLOCK)) == IS_KEPT; }
 
-/* Squares of numbers in such frames, and what comes back from them, are far from the ends of
+/* Squares of numbers in such frames, and the results, are far from overflow and underflow of
  * doubles. */
-static const double scale_most = 0x1p500, place_most = 0x1p200;
+static const double scale_max = 0x1p500, place_max = 0x1p200;
 
 static uint64_t part_bytes(unsigned nodes) { return nodes * (uint64_t)sizeof(kept_node); }
 uint64_t ebpo_skeleton_bytes(unsigned nodes) { return sizeof(ebpo_skeleton) + part_bytes(nodes); }
 
-/* Below this child of a node of the skeleton. */
+/* Keeps the node below this child of a node of the skeleton. */
 static void keep_child(ebpo_skeleton *k, const ebpo_accel *s, uint32_t *place)
 {
     uint32_t number = k->count++;
@@ -76,16 +76,16 @@ static double squared_diagonal(const ebpo_bound *b, int lane)
     return sum;
 }
 
-/* Blocks, and so children of the topmost node, hold outer faces or own ones: see blocks.c.
- */
+/* Returns true for shared faces. Blocks, and so children of the topmost node, hold either shared
+ * faces or owned ones: see blocks.c. */
 static bool is_outer(const ebpo_accel *s, uint32_t child)
 {
     while (!(child & EBPO_IS_BLOCK))
         child = s->bound[child].child[0];
-    return ebpo_accel_slot_face(s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK) < s->outer_count;
+    return ebpo_accel_slot_face(s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK) < s->shared_count;
 }
 
-static void tell_kinds(ebpo_skeleton *k, const ebpo_accel *s)
+static void report_kinds(ebpo_skeleton *k, const ebpo_accel *s)
 {
     const ebpo_bound *top = &s->bound[s->top];
     for (int lane = 0; lane < top->count; lane++)
@@ -95,9 +95,9 @@ static void tell_kinds(ebpo_skeleton *k, const ebpo_accel *s)
             k->own |= (uint8_t)(1u << lane);
 }
 
-/* Of outer faces the one or two nodes below the topmost one, which hold them all: they are looked
- * for in the subtrees whose own they are, and small boxes tell in which. */
-static void keep_outer(ebpo_skeleton *k, const ebpo_accel *s)
+/* Keeps for shared faces the one or two nodes below the topmost one, which hold them all: such
+ * faces are searched in the subtrees that own them, and small boxes identify these. */
+static void keep_shared(ebpo_skeleton *k, const ebpo_accel *s)
 {
     kept_node *top = node_at(k, 0);
     for (int lane = 0; lane < top->bound.count && k->count < k->first; lane++)
@@ -105,7 +105,8 @@ static void keep_outer(ebpo_skeleton *k, const ebpo_accel *s)
             keep_child(k, s, &top->bound.child[lane]);
 }
 
-/* Of own ones the node below the largest child that is not kept yet: its box is the loosest. */
+/* Keeps for owned faces the node below the largest child that is not kept yet: its box is the
+ * loosest. */
 static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t outer_end)
 {
     double most = -1;
@@ -129,7 +130,7 @@ static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t outer_e
 
 ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *s, unsigned nodes)
 {
-    if (s->bound_count == 0 || !(s->scale <= scale_most && s->scale >= 1 / scale_most))
+    if (s->bound_count == 0 || !(s->scale <= scale_max && s->scale >= 1 / scale_max))
         return NULL;
     ebpo_skeleton *k = ebpo_alloc_zero(1, sizeof *k);
     unsigned most = s->bound_count < nodes ? s->bound_count : nodes;
@@ -144,8 +145,8 @@ ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *s, unsigned nodes)
     k->first = most;
     uint32_t top = s->top;
     keep_child(k, s, &top);
-    tell_kinds(k, s);
-    keep_outer(k, s);
+    report_kinds(k, s);
+    keep_shared(k, s);
     for (uint32_t outer_end = k->count; k->count < most && keep_largest(k, s, outer_end);)
         ;
     return k;
@@ -160,13 +161,13 @@ void ebpo_skeleton_free(ebpo_skeleton *k)
 
 /* --- bounds --- */
 
-/* What doubles lose is covered by what boxes and slabs are wider than their faces where the point
- * is near, and below 2^-45 of the distance where it is not: the factor below is for that
+/* Near the point, the enlargement of boxes and cylinders covers the rounding errors of doubles.
+ * Elsewhere these are below 2^-45 of the distance, which the factor below covers
  * (docs/develop/bounds.md, "Points against skeletons"). */
 static const double certainly = 1 - 0x1p-40;
 
-/* By |p - x|^2 >= (N(p) - radius)^2 + (along - [from, to])^2, as in the kernels: `to` is the place
- * of p from the middle of the box. */
+/* Uses |p - x|^2 >= (N(p) - radius)^2 + (along - [from, to])^2, as in the kernels: `to` is the
+ * position of p relative to the middle of the box. */
 static double by_slab(const ebpo_child_slab *slab, const double to[3])
 {
     double along = 0, square = 0;
@@ -175,15 +176,15 @@ static double by_slab(const ebpo_child_slab *slab, const double to[3])
         square += to[k] * to[k];
     }
     double over = fmax(fmax(slab->from - along, along - slab->to), 0);
-    /* less than the true one, so that the root of a small difference of large squares is not more
-     */
+    /* below the true value, so that the root of a small difference of large squares stays a lower
+     * bound */
     double aside2 = fmax(square * (1 - 0x1p-48) - along * along, 0);
     double aside = fmax(sqrt(aside2) - slab->radius, 0);
     return aside * aside + over * over;
 }
 
-/* Squared lower bounds of the distances to the children, in the frame, before `certainly`: by
- * boxes. */
+/* Computes squared lower bounds of the distances to the children, in the frame, before `certainly`:
+ * by boxes. */
 static void by_boxes(const ebpo_bound *b, const double p[3], double lower2[8])
 {
     for (int lane = 0; lane < 8; lane++)
@@ -209,20 +210,20 @@ static double by_child_slab(const kept_node *n, int lane, const double p[3])
     return by_slab(&slab, to);
 }
 
-/* The nearest of what has not been opened. */
+/* The nearest child that has not been opened. */
 typedef struct nearest_place {
     double lower2;
     uint32_t *place;
 } nearest_place;
 
-/* Of what is below these children of a node, where it is nearer than `best`. Slabs are asked only
- * where boxes do not tell enough. */
+/* Searches below these children of a node, where it is nearer than `best`. Bounding cylinders are
+ * tested only where boxes do not decide. */
 static void look_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes, const double p[3],
                        double parent, nearest_place *best)
 {
     kept_node *n = node_at(k, number);
     double lower2[8];
-    unsigned told = 0;
+    unsigned reported = 0;
     by_boxes(&n->bound, p, lower2);
     lanes &= (1u << n->bound.count) - 1;
     while (lanes) {
@@ -232,8 +233,8 @@ static void look_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes, 
                 lane = other;
         if (lower2[lane] >= best->lower2)
             break;
-        if (!(told >> lane & 1)) {
-            told |= 1u << lane;
+        if (!(reported >> lane & 1)) {
+            reported |= 1u << lane;
             lower2[lane] = fmax(fmax(lower2[lane], parent), by_child_slab(n, lane, p));
             continue;
         }
@@ -246,24 +247,24 @@ static void look_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes, 
     }
 }
 
-/* False, and somewhere: too far. */
+/* Returns false, with an unspecified point, if it is too far. */
 static bool to_frame(const ebpo_skeleton *k, const double point[3], double p[3])
 {
     bool near = true;
     for (int i = 0; i < 3; i++) {
         p[i] = (point[i] - k->centre[i]) * k->scale;
-        near = near && fabs(p[i]) < place_most;
+        near = near && fabs(p[i]) < place_max;
     }
     for (int i = 0; i < 3 && !near; i++)
         p[i] = 0;
     return near;
 }
 
-/* Its square in the frame, rounded up. */
+/* Returns the square of the limit in the frame, rounded up. */
 static double frame_limit2(const ebpo_skeleton *k, double limit)
 {
     double most = limit * k->scale * (1 + 0x1p-38);
-    return most < place_most ? most * most * (1 + 0x1p-38) + DBL_MIN : INFINITY;
+    return most < place_max ? most * most * (1 + 0x1p-38) + DBL_MIN : INFINITY;
 }
 
 static double lower_bound(const ebpo_skeleton *k, unsigned lanes, const double p[3], double limit2)
@@ -326,7 +327,8 @@ ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *k, const ebpo
     return (ebpo_skeleton_bounds){ k->own ? own.best : INFINITY, k->outer ? outer.best : INFINITY };
 }
 
-/* Where its nodes are asked for; NULL: it is as large as it may be, or no memory. */
+/* Allocates the next part of nodes. Returns false if the skeleton has its maximum size, or without
+ * memory. */
 static bool has_place(ebpo_skeleton *k, bool (*take)(void *user, uint64_t bytes), void *user)
 {
     unsigned part = k->count / PART_NODES;
@@ -356,9 +358,9 @@ void ebpo_skeleton_grow(ebpo_skeleton *k, const ebpo_accel *s, const double poin
     }
 }
 
-static ebpo_outer_box box_of(const ebpo_skeleton *k, const ebpo_bound *b, int lane)
+static ebpo_shared_box box_of(const ebpo_skeleton *k, const ebpo_bound *b, int lane)
 {
-    ebpo_outer_box out;
+    ebpo_shared_box out;
     for (int i = 0; i < 3; i++) {
         ebpo_bound_sides side = ebpo_bound_side(b, lane, i);
         double low = k->centre[i] + side.low / k->scale, high = k->centre[i] + side.high / k->scale;
@@ -369,9 +371,9 @@ static ebpo_outer_box box_of(const ebpo_skeleton *k, const ebpo_bound *b, int la
     return out;
 }
 
-/* Those of a node's children, and of the nodes right below it. */
+/* Writes the boxes of a node's children, and of the nodes right below it. */
 static unsigned boxes_of(const ebpo_skeleton *k, uint32_t number, unsigned lanes, const double p[3],
-                         double limit2, ebpo_outer_box out[])
+                         double limit2, ebpo_shared_box out[])
 {
     unsigned count = 0;
     double lower2[8];
@@ -389,25 +391,25 @@ static unsigned boxes_of(const ebpo_skeleton *k, uint32_t number, unsigned lanes
     return count;
 }
 
-unsigned ebpo_skeleton_outer_boxes(const ebpo_skeleton *k, const double point[3], double limit,
-                                   ebpo_outer_box out[EBPO_OUTER_BOXES])
+unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *k, const double point[3], double limit,
+                                    ebpo_shared_box out[EBPO_SHARED_BOXES])
 {
     double p[3];
     bool near = to_frame(k, point, p);
     return boxes_of(k, 0, k->outer, p, near ? frame_limit2(k, limit) : INFINITY, out);
 }
 
-/* --- those of a model --- */
+/* --- the skeletons of a model --- */
 
-/* With so many nodes each begins, if there is room for all. */
+/* Initial number of nodes of each, if the quota allows it for all. */
 enum { BEGIN_NODES = PART_NODES };
 
 struct ebpo_skeletons {
-    uint64_t count, room;
-    ebpo_cache *cache;    /* of which it is, or NULL */
-    unsigned nodes;       /* of each, at first */
-    pthread_mutex_t lock; /* of what changes: searches do not wait for it */
-    uint64_t left;        /* that are not kept yet */
+    uint64_t count, space;
+    ebpo_cache *cache;    /* the cache whose budget is used, or NULL */
+    unsigned nodes;       /* initial number of nodes of each */
+    pthread_mutex_t lock; /* protects the changing fields; searches do not wait for it */
+    uint64_t left;        /* number of skeletons not kept yet */
     _Atomic uint64_t bytes;
     _Atomic(ebpo_skeleton *) of[];
 };
@@ -417,51 +419,51 @@ static uint64_t frame_bytes(uint64_t count)
     return sizeof(ebpo_skeletons) + count * sizeof(ebpo_skeleton *);
 }
 
-/* So many that all have them, one at least. */
-static unsigned nodes_each(uint64_t count, uint64_t room)
+/* Returns a number of nodes that all can have, at least one. */
+static unsigned nodes_each(uint64_t count, uint64_t space)
 {
     unsigned nodes = BEGIN_NODES;
-    while (nodes > 1 && frame_bytes(count) + count * ebpo_skeleton_bytes(nodes) > room)
+    while (nodes > 1 && frame_bytes(count) + count * ebpo_skeleton_bytes(nodes) > space)
         nodes--;
     return nodes;
 }
 
-uint64_t ebpo_skeletons_room(uint64_t count, uint64_t room)
+uint64_t ebpo_skeletons_capacity(uint64_t count, uint64_t space)
 {
     uint64_t most = frame_bytes(count) + count * ebpo_skeleton_bytes(EBPO_SKELETON_NODES);
-    return room < frame_bytes(count) + ebpo_skeleton_bytes(1) ? 0 : room < most ? room : most;
+    return space < frame_bytes(count) + ebpo_skeleton_bytes(1) ? 0 : space < most ? space : most;
 }
 
-/* `later`: what must be left. */
-static bool take_room(ebpo_skeletons *all, uint64_t bytes, uint64_t later)
+/* Takes bytes of the quota. `later`: bytes that must remain. */
+static bool take_capacity(ebpo_skeletons *all, uint64_t bytes, uint64_t later)
 {
-    if (all->bytes + bytes > all->room || all->room - all->bytes - bytes < later ||
+    if (all->bytes + bytes > all->space || all->space - all->bytes - bytes < later ||
         (all->cache && !ebpo_cache_take_aside(all->cache, bytes)))
         return false;
     all->bytes += bytes;
     return true;
 }
 
-/* For growing: what all others begin with is left. */
+/* Takes bytes for growing; reserves the initial nodes of all others. */
 static bool take_more(void *user, uint64_t bytes)
 {
     ebpo_skeletons *all = user;
-    return take_room(all, bytes, all->left * ebpo_skeleton_bytes(all->nodes));
+    return take_capacity(all, bytes, all->left * ebpo_skeleton_bytes(all->nodes));
 }
 
-ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t room, ebpo_cache *cache)
+ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t space, ebpo_cache *cache)
 {
     ebpo_skeletons *all = ebpo_alloc_zero(1, frame_bytes(count));
     if (!all)
         return NULL;
     all->count = all->left = count;
-    all->room = room;
+    all->space = space;
     all->cache = cache;
-    all->nodes = nodes_each(count, room);
+    all->nodes = nodes_each(count, space);
     pthread_mutex_init(&all->lock, NULL);
     if (cache)
-        ebpo_cache_set_aside(cache, room);
-    if (take_room(all, frame_bytes(count), 0))
+        ebpo_cache_set_aside(cache, space);
+    if (take_capacity(all, frame_bytes(count), 0))
         return all;
     ebpo_skeletons_free(all);
     return NULL;
@@ -480,7 +482,7 @@ void ebpo_skeletons_free(ebpo_skeletons *all)
 bool ebpo_skeletons_take(ebpo_skeletons *all, uint64_t bytes)
 {
     pthread_mutex_lock(&all->lock);
-    bool taken = take_room(all, bytes, 0);
+    bool taken = take_capacity(all, bytes, 0);
     pthread_mutex_unlock(&all->lock);
     return taken;
 }
@@ -503,7 +505,7 @@ void ebpo_skeletons_keep(ebpo_skeletons *all, uint64_t number, const ebpo_accel 
     ebpo_skeleton *made = ebpo_skeleton_make(subtree, all->nodes);
     pthread_mutex_lock(&all->lock);
     /* another thread may have loaded it, too: with planes */
-    if (made && !all->of[number] && take_room(all, ebpo_skeleton_bytes(made->first), 0)) {
+    if (made && !all->of[number] && take_capacity(all, ebpo_skeleton_bytes(made->first), 0)) {
         atomic_store_explicit(&all->of[number], made, memory_order_release);
         all->left--;
         made = NULL;

@@ -1,10 +1,10 @@
-/* A subtree as plain arrays: what ebpo/subtree.h returns.
+/* A subtree as plain arrays, for ebpo/subtree.h.
  *
- * A node is found by its octcode; what is below it is read as a slice, if a bound of its memory,
- * from counts, is within the caller's limit. The slice has an array for each type of node; this
- * file makes arrays with a row for each node, faces with corners and numbers, and lists of leaves.
- * A single node can then be described in the model's coordinates: half-spaces inherited on the way
- * from the root, and the polygons of its envelope. */
+ * A node is found by its octcode; the part below it is read as a slice, if an upper bound of its
+ * memory, from counts, is within the caller's limit. The slice has an array for each type of node;
+ * this file makes arrays with a row for each node, faces with corners and numbers, and lists of
+ * leaves. A single node can then be described in the model's coordinates: half-spaces inherited on
+ * the way from the root, and the polygons of its envelope. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -25,7 +25,7 @@
 #include "levels/stream.h"
 #include "levels/lod.h"
 
-typedef struct subtree_scratch subtree_scratch; /* what describing a node takes */
+typedef struct subtree_scratch subtree_scratch; /* memory for describing a node */
 
 struct ebpo_subtree {
     ebpo_box box;
@@ -39,26 +39,26 @@ struct ebpo_subtree {
     uint8_t *types;
     int32_t *windings;
     uint32_t *children;
-    bool has_planes;       /* any were read: the three below are there */
-    bool has_leaf_planes;  /* stored ones */
+    bool has_planes;       /* any were read: the next three arrays exist */
+    bool has_leaf_planes;  /* stored planes */
     uint32_t *plane_first; /* [node_count + 1] */
     uint32_t *planes;
     uint32_t above_first[EBPO_LEVELS_MAX + 1];
     uint32_t *above_planes;
-    /* Faces; without: why. */
+    /* Faces; without them: the reason. */
     const char *no_faces;
-    uint32_t outer_count;
+    uint32_t shared_count;
     ebpo_mesh mesh;
     float *corners32;
     double *corners64;
     uint32_t *numbers, *source, *list_first, *list;
     uint64_t memory;
-    subtree_scratch *scratch; /* with the first node that is asked for */
+    subtree_scratch *scratch; /* made for the first described node */
 };
 
-/* --- room --- */
+/* --- capacity --- */
 
-/* The group of a pruned node, which stands in subsets for eight nodes that are not there. */
+/* Returns true for the group of a pruned node, which in subsets replaces eight missing nodes. */
 static bool is_pruned_group(const ebpo_slice *slice, int level, uint64_t group)
 {
     return level && slice->pruned && slice->level[level].types[group] == 0;
@@ -70,7 +70,7 @@ static ebpo_status too_many(const char *what, ebpo_error *error)
                      "the subtree has more than 2^32 - 2 %s; open the subtrees below it", what);
 }
 
-/* Nodes by level; planes in all. */
+/* Counts nodes by level, and all planes. */
 static ebpo_status count_nodes(ebpo_subtree *s, const ebpo_slice *slice, uint64_t *planes,
                                ebpo_error *error)
 {
@@ -93,7 +93,7 @@ static ebpo_status count_nodes(ebpo_subtree *s, const ebpo_slice *slice, uint64_
                                        : EBPO_OK;
 }
 
-static ebpo_status make_room(ebpo_subtree *s, uint64_t planes, ebpo_error *error)
+static ebpo_status reserve_space(ebpo_subtree *s, uint64_t planes, ebpo_error *error)
 {
     uint64_t nodes = s->node_count, bytes;
     s->octcodes = ebpo_alloc(nodes, sizeof *s->octcodes);
@@ -164,8 +164,8 @@ static void take_node(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type t
     at->rank[type]++;
 }
 
-/* The nodes of a level below the root: the children of the gray nodes of the level before, which
- * are linked to them. */
+/* Takes the nodes of a level below the root: the children of the gray nodes of the level before,
+ * and links them. */
 static void take_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
 {
     const ebpo_level *level = &slice->level[i];
@@ -185,14 +185,14 @@ static void take_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
     }
 }
 
-/* From the slice, whose arrays it takes where it can: nodes, windings, planes. */
+/* Takes nodes, windings and planes from the slice; reuses its arrays where possible. */
 static ebpo_status subtree_take_nodes(ebpo_subtree *s, const ebpo_slice *slice, ebpo_error *error)
 {
     uint64_t planes;
     place at = { .plane = 0 };
     ebpo_status status = count_nodes(s, slice, &planes, error);
     if (status == EBPO_OK)
-        status = make_room(s, planes, error);
+        status = reserve_space(s, planes, error);
     if (status != EBPO_OK)
         return status;
     if (s->has_planes)
@@ -206,7 +206,7 @@ static ebpo_status subtree_take_nodes(ebpo_subtree *s, const ebpo_slice *slice, 
 
 /* --- faces --- */
 
-/* A leaf's list: what it refers to, then its new ones, which have higher numbers. */
+/* Takes a leaf's list: its references, then its new faces, which have higher numbers. */
 static void take_list(ebpo_subtree *s, const ebpo_level *level, uint64_t leaf, uint64_t *ref,
                       uint64_t *next)
 {
@@ -269,13 +269,13 @@ static ebpo_status take_corners(ebpo_subtree *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Then faces and lists. */
+/* Takes faces and lists. */
 static ebpo_status subtree_take_faces(ebpo_subtree *s, ebpo_slice *slice,
                                       const ebpo_subtree_options *options, ebpo_error *error)
 {
     s->mesh = slice->mesh;
     memset(&slice->mesh, 0, sizeof slice->mesh);
-    s->outer_count = slice->outer_count;
+    s->shared_count = slice->shared_count;
     s->source = slice->face_source;
     slice->face_source = NULL;
     s->memory += s->mesh.face_count * 3 * sizeof(uint32_t) +
@@ -317,7 +317,7 @@ ebpo_status ebpo_subtree_get_faces(const ebpo_subtree *s, ebpo_subtree_faces *ou
     if (s->no_faces)
         return ebpo_fail(error, EBPO_E_ABSENT, "%s", s->no_faces);
     faces.face_count = s->mesh.face_count;
-    faces.outer_count = s->outer_count;
+    faces.shared_count = s->shared_count;
     faces.vertex_count = s->mesh.vertex_count;
     faces.xyz32 = s->mesh.xyz32;
     faces.xyz64 = s->mesh.xyz64;
@@ -338,7 +338,7 @@ struct subtree_scratch {
     ebpo_polytope leaf;
     ebpo_node_buffers lent;
     double inherited[EBPO_HALF_SPACES_MAX][4];
-    ebpo_triangle *faces; /* of a leaf */
+    ebpo_triangle *faces; /* faces of a leaf */
     uint64_t face_capacity;
 };
 
@@ -351,8 +351,8 @@ static void subtree_free_scratch(subtree_scratch *scratch)
 
 /* --- the way from the tree's root down to a node --- */
 
-/* Planes that the node of this level has on the way to `octcode`; `node` is that node's number, and
- * becomes the next one's, where the level is the subtree's. */
+/* Returns the planes of the node of this level on the way to `octcode`; `node` is that node's
+ * number, and becomes the next one's, where the level is the subtree's. */
 static const uint32_t *planes_on_way(const ebpo_subtree *s, uint64_t octcode, int level,
                                      uint64_t *node, uint32_t *count)
 {
@@ -390,7 +390,7 @@ static void add_inherited(ebpo_subtree *s, uint64_t octcode, ebpo_subtree_node *
     out->inherited = (const double(*)[4])s->scratch->inherited;
 }
 
-/* The node's envelope, but for planes that a leaf derives. */
+/* Returns the node's envelope without planes that a leaf derives. */
 static const ebpo_polytope *stored_envelope(ebpo_subtree *s, uint64_t octcode, ebpo_node_type type)
 {
     ebpo_envelope_stack *stack = &s->scratch->envelopes;
@@ -429,7 +429,7 @@ static ebpo_status gather_faces(ebpo_subtree *s, uint64_t leaf, uint64_t *count,
     return EBPO_OK;
 }
 
-/* Cuts the scratch's envelope of a leaf by planes that follow from its faces. */
+/* Cuts the scratch's envelope of a leaf by planes derived from its faces. */
 static ebpo_status derive_planes(ebpo_subtree *s, uint64_t leaf, uint32_t codes[EBPO_PLANES_MAX],
                                  unsigned *code_count, ebpo_error *error)
 {
@@ -447,7 +447,7 @@ static ebpo_status derive_planes(ebpo_subtree *s, uint64_t leaf, uint32_t codes[
     return EBPO_OK;
 }
 
-/* --- all of a node --- */
+/* --- description of a node --- */
 
 static ebpo_status describe_node(ebpo_subtree *s, uint64_t number, bool polygons,
                                  ebpo_subtree_node *out, ebpo_error *error)
@@ -489,7 +489,7 @@ ebpo_status ebpo_subtree_get_node(ebpo_subtree *s, uint64_t number, bool polygon
         return status;
     if (number >= s->node_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "there is no node number %" PRIu64 "; the subtree has %" PRIu64 " nodes",
+                         "no node has number %" PRIu64 "; the subtree has %" PRIu64 " nodes",
                          number, s->node_count);
     if (!s->scratch && !(s->scratch = ebpo_alloc_zero(1, sizeof *s->scratch)))
         return ebpo_fail_memory(error, sizeof *s->scratch);
@@ -509,37 +509,37 @@ static ebpo_status fail_uniform(const ebpo_chunks *chunks, uint64_t octcode, ebp
     ebpo_octcode found = ebpo_cursor_octcode(c);
     if (found == octcode)
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
-                              "node %" PRIu64 " is %s: no face touches it, so nothing is below it; "
-                              "ask for gray nodes and leaves",
+                              "node %" PRIu64 " is %s: no face touches it, so nothing is below "
+                              "it; give a gray node or a leaf",
                               octcode, type);
     return ebpo_fail_file(error, EBPO_E_ARGUMENT, shown,
-                          "there is no node %" PRIu64 ": it would lie in node %" PRIu64
+                          "there is no node %" PRIu64 ": it would be in node %" PRIu64
                           ", which is %s, and no face touches it",
                           octcode, found, type);
 }
 
-/* Whether what the cursor has come to will do. */
+/* Checks that the cursor's node can be opened. */
 static ebpo_status check_found(const ebpo_chunks *chunks, uint64_t octcode, bool or_leaf_above,
                                ebpo_cursor *c, ebpo_error *error)
 {
     const ebpo_node *child = NULL, *node = ebpo_cursor_node(c);
     ebpo_octcode found = ebpo_cursor_octcode(c);
-    ebpo_status status = ebpo_cursor_children(c, &child, error); /* tells whether it is pruned */
+    ebpo_status status = ebpo_cursor_children(c, &child, error); /* finds out if it is pruned */
     if (status != EBPO_OK)
         return status;
     if (ebpo_node_is_uniform(node))
         return fail_uniform(chunks, octcode, c, error);
     if (node->pruned)
         return ebpo_fail_file(error, EBPO_E_ABSENT, chunks->file->in.shown,
-                              "what is below node %" PRIu64
-                              " has been left out of this file, which is a subset; open the file "
-                              "that it was taken from",
+                              "the part below node %" PRIu64
+                              " is omitted from this file, which is a subset; open the original "
+                              "file",
                               found);
     if (found == octcode || or_leaf_above)
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_ARGUMENT, chunks->file->in.shown,
                           "there is no node %" PRIu64 ": the tree ends above it, with leaf %" PRIu64
-                          "; open that (or_leaf_above does)",
+                          "; open that leaf (or_leaf_above does)",
                           octcode, found);
 }
 
@@ -550,7 +550,7 @@ static ebpo_status find_node(ebpo_chunks *chunks, uint64_t octcode, bool or_leaf
     if (!ebpo_octcode_valid(octcode))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "%" PRIu64 " is not an octcode, which is a leading 1 and three bits for "
-                         "each of at most %d levels; 1 is the root's",
+                         "each of at most %d levels; the root is 1",
                          octcode, EBPO_LEVELS_MAX - 1);
     ebpo_status status = ebpo_chunks_root(chunks, &root, error);
     if (status != EBPO_OK)
@@ -560,7 +560,7 @@ static ebpo_status find_node(ebpo_chunks *chunks, uint64_t octcode, bool or_leaf
     return status == EBPO_OK ? check_found(chunks, octcode, or_leaf_above, c, error) : status;
 }
 
-/* Planes of the nodes on the way to the subtree's root. */
+/* Takes the planes of the nodes on the way to the subtree's root. */
 static ebpo_status take_above(ebpo_subtree *s, ebpo_cursor *c, ebpo_error *error)
 {
     uint32_t codes[EBPO_NODE_PLANES];
@@ -580,38 +580,39 @@ static ebpo_status take_above(ebpo_subtree *s, ebpo_cursor *c, ebpo_error *error
     return EBPO_OK;
 }
 
-/* --- how much memory --- */
+/* --- memory --- */
 
-/* Decoded chunks while reading: a quarter of what is allowed, within these. */
-enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MOST = 32 << 20 };
+/* Decoded chunks while reading: a quarter of the limit, within these values. */
+enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MAX = 32 << 20 };
 
 static uint64_t chunk_budget(uint64_t memory)
 {
-    return memory == 0 || memory / 4 > CHUNKS_MOST ? CHUNKS_MOST
-           : memory / 4 < CHUNKS_LEAST             ? CHUNKS_LEAST
-                                                   : memory / 4;
+    return memory == 0 || memory / 4 > CHUNKS_MAX ? CHUNKS_MAX
+           : memory / 4 < CHUNKS_LEAST            ? CHUNKS_LEAST
+                                                  : memory / 4;
 }
 
-/* The least that holds so much beside the chunks. */
+/* Returns the smallest limit that holds `bytes` beside the chunks. */
 static uint64_t least_memory(uint64_t bytes)
 {
     if (bytes <= 3 * (uint64_t)CHUNKS_LEAST)
         return bytes + CHUNKS_LEAST;
-    return bytes <= 3 * (uint64_t)CHUNKS_MOST ? bytes + bytes / 3 + 4 : bytes + CHUNKS_MOST;
+    return bytes <= 3 * (uint64_t)CHUNKS_MAX ? bytes + bytes / 3 + 4 : bytes + CHUNKS_MAX;
 }
 
-/* Of a slice, what is made of it, and what is needed on the way: a bound, from counts. */
+/* Returns an upper bound, from counts, of the bytes of a slice, the arrays made from it, and
+ * temporary memory. */
 static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, bool whole,
                             bool corners)
 {
     enum {
         NODE = 32,      /* octcode, type, winding, children, planes, list; winding in the slice */
         GROUP = 4,      /* types, plane counts */
-        LEAF = 24,      /* what a level has for each */
+        LEAF = 24,      /* data of a level for each leaf */
         PLANE = 8,      /* in the slice and in the subtree */
-        REFERENCE = 52, /* in slice, list, and the table that numbers the outer ones */
+        REFERENCE = 52, /* in slice, list, and the table that numbers the shared faces */
         FACE = 24,      /* corners, number, number in the source, list */
-        OLDER = 36,     /* for each corner: the table that numbers vertices of faces before */
+        OLDER = 36,     /* for each corner: the table that numbers vertices of earlier faces */
         ALWAYS = 1 << 20
     };
     uint64_t number = info->double_coordinates ? sizeof(double) : sizeof(float),
@@ -622,10 +623,10 @@ static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, 
            (whole ? 0 : 3 * faces * OLDER) + vertices * 3 * number;
 }
 
-/* References to faces that are new before the subtree: that many outer faces at most. Reads the
- * lists, of which most are references within the subtree. */
-static ebpo_status count_outer(const ebpo_subtree *s, ebpo_chunks *chunks, uint64_t *outer,
-                               ebpo_error *error)
+/* Counts references to faces that are new before the subtree: an upper bound of the shared faces.
+ * Reads the lists, of which most are references within the subtree. */
+static ebpo_status count_shared(const ebpo_subtree *s, ebpo_chunks *chunks, uint64_t *outer,
+                                ebpo_error *error)
 {
     ebpo_slice lists;
     uint64_t first = UINT64_MAX;
@@ -661,30 +662,30 @@ static ebpo_status check_memory(const ebpo_subtree *s, ebpo_chunks *chunks, uint
     uint64_t least = least_memory(bound_bytes(&size, info, whole, corners));
     if (least > o->memory && size.outer &&
         least_memory(bound_bytes(&lists, info, whole, corners)) <= o->memory) {
-        status = count_outer(s, chunks, &size.outer, error);
+        status = count_shared(s, chunks, &size.outer, error);
         least = least_memory(bound_bytes(&size, info, whole, corners));
     }
     if (status != EBPO_OK || least <= o->memory)
         return status;
     return ebpo_fail_file(error, EBPO_E_LIMIT, chunks->file->in.shown,
                           "the subtree of node %" PRIu64 " may take more than the %" PRIu64
-                          " bytes allowed; %" PRIu64 " are enough, or open the subtrees below it",
+                          " bytes allowed; give %" PRIu64 ", or open the subtrees below it",
                           ebpo_octcode_of_cell(s->root.cell), o->memory, least);
 }
 
 /* --- reading --- */
 
-/* What of the arrays is wanted; sets `no_faces`. */
+/* Returns the wanted parts of the arrays; sets `no_faces`. */
 static uint32_t choose_needs(ebpo_subtree *s, const ebpo_subtree_options *o, uint32_t parts)
 {
     uint32_t most = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES,
              has = parts & o->parts & most;
     s->no_faces = !(parts & EBPO_PART_MESH)
-                      ? "the file was written without its mesh; build it again with it"
+                      ? "the file was written without its mesh; build it again with the mesh"
                   : !(has & EBPO_PART_MESH)
-                      ? "the subtree was opened without its faces; ask for EBPO_PART_MESH"
-                  : o->levels >= 0 ? "the subtree was opened for some levels only, which have no "
-                                     "faces; open all, with levels = -1"
+                      ? "the subtree was opened without its faces; open it with EBPO_PART_MESH"
+                  : o->levels >= 0 ? "the subtree was opened for some levels only, without "
+                                     "faces; open all levels with levels = -1"
                                    : NULL;
     has &= s->no_faces ? ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS) : ~0u;
     s->has_leaf_planes = has & EBPO_PART_LEAF_PLANES;
@@ -730,8 +731,8 @@ static ebpo_status open_below(ebpo_subtree *s, ebpo_chunks *chunks, uint64_t oct
 static ebpo_status check_options(const ebpo_subtree_options *o, ebpo_error *error)
 {
     return o->levels < -1 ? ebpo_fail(error, EBPO_E_ARGUMENT,
-                                      "subtree options: levels are at least 0, or -1 for all; %d "
-                                      "are asked for",
+                                      "subtree options: level number %d is invalid; give 0 or "
+                                      "more, or -1 for all",
                                       o->levels)
                           : EBPO_OK;
 }

@@ -1,8 +1,8 @@
 /* Counts checks and violations of the verifier, and keeps the first violation of each kind.
  *
- * Each thread counts into its own tally; tallies are merged. "First" is by place in the file:
- * level, octcode, face, plane, then by the text. So the report is the same whichever thread finds a
- * violation, and in whatever order tallies are merged. */
+ * Each thread counts in a separate tally; tallies are merged. "First" is by position in the file:
+ * level, octcode, face, plane, then by the text. So the report does not depend on which thread
+ * finds a violation, or on the order of merging. */
 #include "verify/tally.h"
 
 #include <inttypes.h>
@@ -22,7 +22,7 @@ static int compare_places(const ebpo_verify_place *a, const ebpo_verify_place *b
     return order != 0 ? order : compare_u64(a->plane, b->plane);
 }
 
-/* "level 5, octcode 0o1234567, face 17, plane 2: ", as far as the place has these. */
+/* Prints "level 5, octcode 0o1234567, face 17, plane 2: ", as far as the place has these. */
 static int print_place(char *out, size_t size, const ebpo_verify_place *place)
 {
     int length = 0;
@@ -45,8 +45,7 @@ static int print_place(char *out, size_t size, const ebpo_verify_place *place)
     return length;
 }
 
-/* Equal places (two findings about one node) are told apart by their text, so that merging does not
- * depend on order. */
+/* Findings at one place are ordered by their text, so that merging does not depend on order. */
 static void record_violation(ebpo_tally *tally, ebpo_verify_kind kind,
                              const ebpo_verify_place *place, const char *text)
 {
@@ -71,7 +70,7 @@ void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_v
                           const char *format, ...)
 {
     if (tally->violations[kind] && compare_places(place, &tally->place[kind]) > 0) {
-        /* damaged files have millions of these: no text for what is not kept */
+        /* damaged files have millions of these: print only a text that is kept */
         tally->violations[kind]++;
         return;
     }

@@ -1,5 +1,5 @@
-/* Counts of checks and violations, and the first violation of each kind in file order, whichever
- * thread finds it (tally.c). */
+/* Counts of checks and violations, and the first violation of each kind in file order, independent
+ * of threads (tally.c). */
 #ifndef EBPO_VERIFY_TALLY_H
 #define EBPO_VERIFY_TALLY_H
 
@@ -19,7 +19,7 @@ typedef enum ebpo_verify_kind {
 #define EBPO_NO_FACE  UINT64_MAX
 #define EBPO_NO_PLANE UINT32_MAX
 
-/* Where a violation is. Octcode 0: the file as a whole. File order is the order of these fields
+/* Position of a violation. Octcode 0: the file as a whole. File order is the order of these fields
  * (octcodes order nodes breadth-first). */
 typedef struct ebpo_verify_place {
     uint64_t octcode;
@@ -30,19 +30,20 @@ typedef struct ebpo_verify_place {
 /* One worker's counts. Zeroed is empty. */
 typedef struct ebpo_tally {
     uint64_t checks[EBPO_VERIFY_KINDS], violations[EBPO_VERIFY_KINDS];
-    ebpo_verify_place place[EBPO_VERIFY_KINDS]; /* of `first` */
+    ebpo_verify_place place[EBPO_VERIFY_KINDS]; /* places of `first` */
     char first[EBPO_VERIFY_KINDS][240];
-    /* listed faces that do not touch their leaf: allowed, since lists may be generous */
+    /* listed faces that do not touch their leaf: allowed, since lists may contain more than
+     * necessary */
     uint64_t spare_entries;
-    uint64_t exact_touches, exact_half_spaces; /* questions that went to rationals */
+    uint64_t exact_touches, exact_half_spaces; /* number of tests in rationals */
 } ebpo_tally;
 
 /* Counts one violation; keeps "place: text" when it comes before the first one so far. */
 void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
                           const char *format, ...) EBPO_PRINTF(4, 5);
 
-/* Counts one check, and a violation unless `holds`; true when it holds. For places outside the
- * tree. */
+/* Counts one check, and a violation unless `holds`; returns `holds`. For places outside the tree.
+ */
 bool ebpo_tally_check(ebpo_tally *tally, ebpo_verify_kind kind, bool holds, const char *format, ...)
     EBPO_PRINTF(4, 5);
 

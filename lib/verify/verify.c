@@ -1,15 +1,15 @@
-/* Verifies a file: runs all checks in order and makes the report. This folder is the judge of the
- * others: it uses nothing of construct, of the writer or of query, and keeps its own vector
- * functions. Cells, half-spaces and clipping are computed here in another way than in the builder;
- * only the exact predicates are shared (tests/lint/test_layers.py checks the folders).
+/* Verifies a file: runs all checks in order and makes the report. This folder checks the others: it
+ * uses nothing of construct, of the writer or of query, and has separate vector functions. Cells,
+ * half-spaces and clipping are computed in another way than in the builder; only the exact
+ * predicates are shared (tests/lint/test_layers.py checks the folders).
  *
- * The order: chunk directory and chunk checksums (verify_chunks.c), the content's checksum, whether
- * the arrays fit together; only then structure, nesting, colours, the walk (containment, lists,
+ * The order: chunk directory and chunk checksums (verify_chunks.c), the content's checksum, the
+ * consistency of the arrays; only then structure, nesting, colours, the walk (containment, lists,
  * labels), subtrees, and chunks of faces; last the source mesh and unused bytes. Damage that
  * reading reports is a violation, not an error of the call.
  *
- * Colours of gray nodes are checked here, from the root down. No byte is computed: two products say
- * whether it is the nearest to the mean. */
+ * Colours of gray nodes are checked here, from the root down. No byte is computed: two products
+ * decide if it is the nearest to the mean. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -32,12 +32,12 @@
 enum { NODES_A_TIME = 128 };
 
 typedef struct totals {
-    ebpo_wide of[4]; /* weights times colours, and weights; all three times */
+    ebpo_wide of[4]; /* sums of weights times colours, and of weights; all three times */
 } totals;
 
 typedef struct judging {
     ebpo_tally *tally;
-    const ebpo_twin_tree *view;
+    const ebpo_reference_tree *view;
     ebpo_colours colours;
     bool by_face;
     double longest; /* side of the root cell */
@@ -68,7 +68,7 @@ static void add_listed(const judging *j, uint64_t face, totals *sum)
     }
     double squares = across[0] * across[0] + across[1] * across[1];
     double area = ldexp(sqrt(squares + across[2] * across[2]), 32);
-    /* faces beyond the root cell are found elsewhere */
+    /* faces beyond the root cell are reported elsewhere */
     uint64_t weight = area < 0x1p40 ? (uint64_t)area + 1 : 1;
     for (uint64_t i = 0; i < 3; i++)
         add_corner(weight,
@@ -77,11 +77,11 @@ static void add_listed(const judging *j, uint64_t face, totals *sum)
                    sum);
 }
 
-static void add_list(judging *j, const ebpo_twin_node *leaf, totals *sum)
+static void add_list(judging *j, const ebpo_reference_node *leaf, totals *sum)
 {
     const ebpo_level *level = &j->view->tree->level[leaf->cell.level];
     uint32_t count;
-    const uint32_t *refs = ebpo_twin_refs(j->view, leaf, &count);
+    const uint32_t *refs = ebpo_reference_refs(j->view, leaf, &count);
     for (uint32_t i = 0; i < count; i++)
         add_listed(j, refs[i], sum);
     for (uint64_t i = 0; i < level->leaf_new[leaf->rank]; i++)
@@ -90,7 +90,7 @@ static void add_list(judging *j, const ebpo_twin_node *leaf, totals *sum)
         ebpo_release_pages(j->view->workspace);
 }
 
-/* byte - 1/2 <= mean < byte + 1/2 */
+/* Returns true if byte - 1/2 <= mean < byte + 1/2. */
 static bool is_nearest(const totals *sum, int channel, uint32_t byte)
 {
     ebpo_wide one = sum->of[3], above = ebpo_wide_plus(ebpo_wide_left(sum->of[channel], 1), one);
@@ -98,7 +98,7 @@ static bool is_nearest(const totals *sum, int channel, uint32_t byte)
            ebpo_wide_less(above, ebpo_wide_times(one, 2 * (uint64_t)byte + 2));
 }
 
-static void check_node(const judging *j, const ebpo_twin_node *node, const totals *sum)
+static void check_node(const judging *j, const ebpo_reference_node *node, const totals *sum)
 {
     uint32_t colour = j->view->tree->level[node->cell.level].gray_colours[node->rank];
     bool right = true;
@@ -111,13 +111,13 @@ static void check_node(const judging *j, const ebpo_twin_node *node, const total
                              "its colour %06" PRIx32 " is not the mean of the faces below", colour);
 }
 
-static void judge_node(judging *j, const ebpo_twin_node *node, totals *above)
+static void judge_node(judging *j, const ebpo_reference_node *node, totals *above)
 {
     totals sum = { { { 0, 0 } } };
     if (node->type == EBPO_LEAF)
         add_list(j, node, &sum);
     for (unsigned octant = 0; octant < 8 && node->type == EBPO_GRAY; octant++) {
-        ebpo_twin_node child = ebpo_twin_child(j->view, node, octant);
+        ebpo_reference_node child = ebpo_reference_child(j->view, node, octant);
         judge_node(j, &child, &sum);
     }
     if (node->type == EBPO_GRAY)
@@ -135,9 +135,10 @@ static bool vertices_differ(const judging *j)
     return false;
 }
 
-/* Of a tree with colours whose shape was checked; where it has no mesh, its mesh has no colours, or
- * it is a subset, nothing can be said. EBPO_E_MEMORY. */
-static ebpo_status check_colours(ebpo_tally *tally, const ebpo_twin_tree *view, ebpo_error *error)
+/* Checks the colours of a tree whose shape was checked. Does nothing if it has no mesh, its mesh
+ * has no colours, or it is a subset. Fails with EBPO_E_MEMORY. */
+static ebpo_status check_colours(ebpo_tally *tally, const ebpo_reference_tree *view,
+                                 ebpo_error *error)
 {
     const ebpo_tree *tree = view->tree;
     judging j = { .tally = tally, .view = view };
@@ -150,7 +151,7 @@ static ebpo_status check_colours(ebpo_tally *tally, const ebpo_twin_tree *view, 
     for (int k = 0; k < 3; k++)
         j.longest = fmax(j.longest, view->box.size[k]);
     totals all = { { { 0, 0 } } };
-    ebpo_twin_node root = ebpo_twin_root(view);
+    ebpo_reference_node root = ebpo_reference_root(view);
     judge_node(&j, &root, &all);
     ebpo_colours_free(&j.colours);
     return EBPO_OK;
@@ -158,14 +159,14 @@ static ebpo_status check_colours(ebpo_tally *tally, const ebpo_twin_tree *view, 
 
 /* --- the checks in order --- */
 
-/* `file`: where the tree is from, or NULL. */
+/* `file`: the file of the tree, or NULL. */
 static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, const ebpo_tree *tree,
                                   const ebpo_verify_options *options, ebpo_error *error)
 {
     if (!ebpo_check_shape(tally, tree))
         return EBPO_OK;
-    ebpo_twin_tree view;
-    ebpo_status status = ebpo_twin_make(&view, tree, options->workspace, error);
+    ebpo_reference_tree view;
+    ebpo_status status = ebpo_reference_make(&view, tree, options->workspace, error);
     if (status != EBPO_OK)
         return status;
     ebpo_check_structure(tally, &view);
@@ -177,7 +178,7 @@ static ebpo_status verify_tree_of(ebpo_tally *tally, const ebpo_file *file, cons
         status = ebpo_check_subtrees(tally, file, &view, options, error);
     if (status == EBPO_OK && file)
         status = ebpo_check_gates(tally, file, tree, error);
-    ebpo_twin_free(&view);
+    ebpo_reference_free(&view);
     return status;
 }
 
@@ -187,7 +188,7 @@ ebpo_status ebpo_verify_tree(ebpo_tally *tally, const ebpo_tree *tree,
     return verify_tree_of(tally, NULL, tree, options, error);
 }
 
-/* A failure that says something about the file and not about this machine or call. */
+/* Returns true for a failure that is due to the file, not to this machine or call. */
 static bool is_finding(ebpo_status status)
 {
     return status == EBPO_E_FORMAT || status == EBPO_E_VERSION || status == EBPO_E_LIMIT;
@@ -267,7 +268,7 @@ ebpo_status ebpo_verify(const ebpo_file *file, const ebpo_verify_options *option
     EBPO_GIVE(ebpo_verify_report, report, &found);
     options = &wanted;
     if (!file)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "verify: no file; open one with ebpo_open");
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "verify: no file; open a file with ebpo_open");
     if (options->source) {
         ebpo_status shape = ebpo_mesh_check_shape(options->source, error);
         if (shape != EBPO_OK)
@@ -275,13 +276,13 @@ ebpo_status ebpo_verify(const ebpo_file *file, const ebpo_verify_options *option
         if (options->source->arrangement)
             return ebpo_fail(
                 error, EBPO_E_ARGUMENT,
-                "verify: the source has been arranged (ebpo_mesh_arrange); give it as it was read");
+                "verify: the source has been arranged (ebpo_mesh_arrange); pass it as it was read");
     }
     ebpo_tally tally = { 0 };
     status = ebpo_check_places(&tally, file, options, error);
-    /* where chunks lie elsewhere than the list says, sums tell nothing more */
+    /* if chunks are not at the listed offsets, checksums add no information */
     if (status == EBPO_OK && tally.violations[EBPO_VERIFY_STRUCTURE] == 0)
-        status = ebpo_check_sums(&tally, file, error);
+        status = ebpo_check_checksums(&tally, file, error);
     if (status == EBPO_OK)
         status = check_content(file, options, &tally, error);
     if (status == EBPO_OK)

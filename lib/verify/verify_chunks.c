@@ -1,10 +1,10 @@
 /* Verifies how the file stores its chunks (format-spec/README.md, sections 7 and 20).
  *
  * - Chunks of faces with the coding `gates` are decoded by a second reader, which follows the
- *   specification line by line without regard to speed, and compared with what the library decoded.
+ *   specification line by line without regard to speed, and compared with the library's result.
  * - The directory of all chunks is compared with HDF5's own index.
- * - Bytes of the file that belong to nothing are counted. They change no answer, but a change of
- *   them must not go unseen.
+ * - Unused bytes of the file are counted. They change no result, but a change of them must be
+ *   detectable.
  * - Chunk checksums are compared with the chunks, which are read without the reader's check. */
 #include <inttypes.h>
 #include <stdlib.h>
@@ -22,7 +22,7 @@
 
 /* --- a second reader of the coding gates --- */
 
-enum { OPEN_MOST = 64, NEAR = 32 };
+enum { OPEN_MAX = 64, NEAR = 32 };
 
 typedef struct pair {
     uint64_t a, b;
@@ -30,7 +30,7 @@ typedef struct pair {
 
 typedef struct gates_reader {
     const uint8_t *low, *more, *end;
-    pair open[OPEN_MOST + 1]; /* newest last */
+    pair open[OPEN_MAX + 1]; /* newest last */
     size_t count;
     uint64_t seen;
 } gates_reader;
@@ -38,7 +38,7 @@ typedef struct gates_reader {
 static void open_edge(gates_reader *t, uint64_t a, uint64_t b)
 {
     t->open[t->count++] = (pair){ a, b };
-    if (t->count > OPEN_MOST)
+    if (t->count > OPEN_MAX)
         memmove(t->open, t->open + 1, --t->count * sizeof *t->open);
 }
 
@@ -79,7 +79,7 @@ static bool read_vertex(gates_reader *t, uint64_t *vertex)
     return true;
 }
 
-/* Place of the newest open edge with that end; count: none. */
+/* Returns the index of the newest open edge with that end, or count if there is none. */
 static size_t newest_edge(const gates_reader *t, bool first, uint64_t vertex)
 {
     for (size_t i = t->count; i > 0; i--)
@@ -180,9 +180,9 @@ bool ebpo_plain_gates_read(const uint8_t *in, uint32_t rows, uint64_t *seen, uin
     return true;
 }
 
-/* --- gates against the reader --- */
+/* --- comparison of gates with the reader --- */
 
-enum { CORNERS_MOST = EBPO_CHUNK_BYTES_MAX / 4 };
+enum { CORNERS_MAX = EBPO_CHUNK_BYTES_MAX / 4 };
 
 static void compare_gates_chunk(ebpo_tally *tally, const uint8_t *streams, uint32_t *faces,
                                 const ebpo_tree *tree, uint64_t row, uint64_t rows, uint64_t *seen)
@@ -193,7 +193,7 @@ static void compare_gates_chunk(ebpo_tally *tally, const uint8_t *streams, uint3
         same = faces[i] == corners[i];
     (void)ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, same,
                            "/mesh/faces, from face %" PRIu64
-                           " on: the streams are read in two ways, with different corners",
+                           " on: the two decoders give different corners",
                            row);
 }
 
@@ -218,9 +218,9 @@ ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file, const ebp
     if (!ebpo_reader_array(file, EBPO_A_FACES, 0)->gates)
         return EBPO_OK;
     ebpo_idle_reader *r = ebpo_idle_readers_take(&ebpo_reader_own(file)->idle);
-    uint32_t *faces = ebpo_alloc(CORNERS_MOST, sizeof *faces);
+    uint32_t *faces = ebpo_alloc(CORNERS_MAX, sizeof *faces);
     ebpo_status status = r && faces ? compare_gates(tally, file, tree, r, faces, error)
-                                    : ebpo_fail_memory(error, CORNERS_MOST * sizeof *faces);
+                                    : ebpo_fail_memory(error, CORNERS_MAX * sizeof *faces);
     free(faces);
     ebpo_idle_readers_give(&ebpo_reader_own(file)->idle, r);
     return status;
@@ -230,27 +230,27 @@ ebpo_status ebpo_check_gates(ebpo_tally *tally, const ebpo_file *file, const ebp
 
 #define CHECK(condition, ...) ebpo_tally_check(tally, EBPO_VERIFY_STRUCTURE, condition, __VA_ARGS__)
 
-/* An array as HDF5 tells it, and how many of its chunks the list has had. */
+/* An array as HDF5 reports it, and the number of its chunks listed so far. */
 typedef struct indexed {
     const ebpo_array_in *array;
     uint32_t number;
-    ebpo_chunk_place *chunks;
+    ebpo_chunk_location *chunks;
     uint64_t count, listed;
 } indexed;
 
-enum { MOST = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS };
+enum { LIMIT = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS + EBPO_ARRAYS };
 
 typedef struct places_comparison {
     ebpo_tally *tally;
     const ebpo_file *file;
     ebpo_head head;
-    indexed array[MOST];
+    indexed array[LIMIT];
     unsigned arrays;
     uint64_t *list, rows;
-    uint64_t top; /* end of what looking up a subtree takes */
+    uint64_t top; /* end of the bytes that a subtree look-up reads */
 } places_comparison;
 
-/* Numbers as the specification gives them: 64 a level; then the mesh, the maps, the table. */
+/* Numbers arrays as the specification does: 64 a level; then the mesh, the maps, the table. */
 static ebpo_status index_array(places_comparison *c, const ebpo_array_in *array, uint32_t number,
                                ebpo_error *error)
 {
@@ -275,7 +275,7 @@ static ebpo_status index_all(places_comparison *c, ebpo_error *error)
     } roots[] = { { EBPO_A_VERTICES, 4096 },       { EBPO_A_FACES, 4097 },
                   { EBPO_A_FACES_INDEX, 4098 },    { EBPO_A_VERTEX_SOURCE, 4099 },
                   { EBPO_A_FACE_SOURCE, 4100 },    { EBPO_A_SUBTREE_INDEX, 4112 },
-                  { EBPO_A_SUBTREE_COUNTS, 4113 }, { EBPO_A_SUBTREE_OUTER, 4114 } };
+                  { EBPO_A_SUBTREE_COUNTS, 4113 }, { EBPO_A_SUBTREE_SHARED, 4114 } };
     ebpo_status status = EBPO_OK;
     for (int level = 0; level < c->file->info.level_count && status == EBPO_OK; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++)
@@ -335,7 +335,7 @@ static void compare_row(places_comparison *c, uint64_t row, uint64_t at, uint32_
                "/subtrees/places, row %" PRIu64 ": %s has only %" PRIu64 " chunks", row,
                of->array->path, of->count))
         return;
-    const ebpo_chunk_place *chunk = &of->chunks[of->listed++];
+    const ebpo_chunk_location *chunk = &of->chunks[of->listed++];
     CHECK(chunk->address == at && chunk->bytes == bytes,
           "/subtrees/places, row %" PRIu64 ": %" PRIu32 " bytes at %" PRIu64 " as chunk %" PRIu64
           " of %s, but HDF5 has %" PRIu32 " at %" PRIu64,
@@ -359,8 +359,7 @@ static void compare_directory(places_comparison *c)
               c->array[i].listed, c->array[i].count, c->array[i].array->path);
     uint64_t top = c->file->info.top_bytes;
     CHECK(top == 0 || (top >= c->top && top <= c->file->info.file_bytes),
-          "top_bytes states %" PRIu64 ", but what looking up a subtree takes ends at %" PRIu64, top,
-          c->top);
+          "top_bytes states %" PRIu64 ", but a subtree look-up reads up to %" PRIu64, top, c->top);
 }
 
 ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
@@ -394,13 +393,13 @@ ebpo_status ebpo_check_places(ebpo_tally *tally, const ebpo_file *file,
     return EBPO_OK;
 }
 
-/* --- bytes that belong to nothing --- */
+/* --- unused bytes --- */
 
 typedef struct survey {
     const ebpo_file *file;
     const ebpo_progress *progress;
     ebpo_head head;
-    ebpo_range *range; /* what belongs to something */
+    ebpo_range *range; /* used bytes */
     uint64_t count, capacity;
 } survey;
 
@@ -416,7 +415,7 @@ static ebpo_status add_array(survey *s, const ebpo_array_in *a, ebpo_head_rows r
                              ebpo_error *error)
 {
     ebpo_shape shape;
-    ebpo_chunk_place *chunks = NULL;
+    ebpo_chunk_location *chunks = NULL;
     uint64_t stored;
     if (!a->present)
         return EBPO_OK;
@@ -465,8 +464,8 @@ static int by_offset(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Counts the bytes of a gap that are not zero. It may be nearly all of a large file. */
-static ebpo_status look_at_gap(const survey *s, ebpo_range gap, uint64_t *filled, ebpo_error *error)
+/* Counts the bytes of a gap that are not zero. The gap may be nearly all of a large file. */
+static ebpo_status inspect_gap(const survey *s, ebpo_range gap, uint64_t *filled, ebpo_error *error)
 {
     enum { PIECE = 1 << 14 };
     uint8_t piece[PIECE];
@@ -485,7 +484,7 @@ static ebpo_status look_at_gap(const survey *s, ebpo_range gap, uint64_t *filled
     return status;
 }
 
-static ebpo_status look_at_gaps(survey *s, uint64_t *spare, uint64_t *filled, ebpo_error *error)
+static ebpo_status inspect_gaps(survey *s, uint64_t *spare, uint64_t *filled, ebpo_error *error)
 {
     uint64_t file_end = ebpo_reader_own(s->file)->in.source.size;
     ebpo_status status = add_range(s, (ebpo_range){ file_end, 0 }, error);
@@ -496,7 +495,7 @@ static ebpo_status look_at_gaps(survey *s, uint64_t *spare, uint64_t *filled, eb
         ebpo_range r = s->range[i];
         if (r.offset > end) {
             *spare += r.offset - end;
-            status = look_at_gap(s, (ebpo_range){ end, r.offset - end }, filled, error);
+            status = inspect_gap(s, (ebpo_range){ end, r.offset - end }, filled, error);
         }
         if (r.offset + r.size > end)
             end = r.offset + r.size;
@@ -522,9 +521,9 @@ ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progres
         status = add_metadata(&s, &own);
     status = ebpo_head_close(&s.head, status, &own);
     if (status == EBPO_OK)
-        status = look_at_gaps(&s, spare, filled, &own);
+        status = inspect_gaps(&s, spare, filled, &own);
     free(s.range);
-    /* what is damaged is told by those who read it */
+    /* damage is reported by the checks that read the data */
     return status == EBPO_OK || status == EBPO_E_FORMAT ? EBPO_OK : ebpo_fail_with(error, &own);
 }
 
@@ -532,14 +531,14 @@ ebpo_status ebpo_count_spare(const ebpo_file *file, const ebpo_progress *progres
 
 enum { SUM_BYTES = 4, UNKNOWN = 20000 };
 
-typedef struct sums_comparison {
+typedef struct checksum_comparison {
     ebpo_tally *tally;
     const ebpo_file *file;
     const uint64_t *list;
     uint64_t rows;
-} sums_comparison;
+} checksum_comparison;
 
-/* Each array's number as the specification gives it. */
+/* Returns an array's number as the specification defines it. */
 static uint32_t number_of(const ebpo_array_in *a)
 {
     switch (a->id) {
@@ -550,17 +549,17 @@ static uint32_t number_of(const ebpo_array_in *a)
     case EBPO_A_FACE_SOURCE: return 4100;
     case EBPO_A_SUBTREE_INDEX: return 4112;
     case EBPO_A_SUBTREE_COUNTS: return 4113;
-    case EBPO_A_SUBTREE_OUTER: return 4114;
+    case EBPO_A_SUBTREE_SHARED: return 4114;
     case EBPO_A_ATTRIBUTE: return 8191 + (uint32_t)a->level;
     default: return a->id < EBPO_LEVEL_ARRAYS ? 64 * (uint32_t)a->level + (uint32_t)a->id : UNKNOWN;
     }
 }
 
-static ebpo_status compare_sum(sums_comparison *c, const ebpo_array_in *a, uint64_t chunk,
+static ebpo_status compare_sum(checksum_comparison *c, const ebpo_array_in *a, uint64_t chunk,
                                uint64_t row, ebpo_error *error)
 {
     ebpo_tally *tally = c->tally;
-    ebpo_chunk_place at = a->chunks[chunk];
+    ebpo_chunk_location at = a->chunks[chunk];
     uint8_t end[SUM_BYTES] = { 0 };
     if (!CHECK(at.bytes >= SUM_BYTES, "%s, chunk %" PRIu64 ": less than four bytes", a->path,
                chunk))
@@ -575,7 +574,7 @@ static ebpo_status compare_sum(sums_comparison *c, const ebpo_array_in *a, uint6
     return status;
 }
 
-static ebpo_status compare_array(sums_comparison *c, const ebpo_array_in *a, ebpo_error *error)
+static ebpo_status compare_array(checksum_comparison *c, const ebpo_array_in *a, ebpo_error *error)
 {
     ebpo_tally *tally = c->tally;
     ebpo_status status = EBPO_OK;
@@ -591,7 +590,7 @@ static ebpo_status compare_array(sums_comparison *c, const ebpo_array_in *a, ebp
     return status;
 }
 
-static ebpo_status compare_sums(sums_comparison *c, ebpo_error *error)
+static ebpo_status compare_checksums(checksum_comparison *c, ebpo_error *error)
 {
     const ebpo_file *file = c->file;
     ebpo_status status = EBPO_OK;
@@ -605,20 +604,20 @@ static ebpo_status compare_sums(sums_comparison *c, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_check_sums(ebpo_tally *tally, const ebpo_file *file, ebpo_error *error)
+ebpo_status ebpo_check_checksums(ebpo_tally *tally, const ebpo_file *file, ebpo_error *error)
 {
-    const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_SUMS];
+    const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
     ebpo_error own = EBPO_ERROR_INIT;
     uint64_t *list = NULL;
-    /* far away each chunk would take a request: there the reader's own check has to do */
-    if (!file->has_sums || ebpo_input_expects(&ebpo_reader_own(file)->in))
+    /* in a remote file each chunk would take a request: the reader's check must be enough there */
+    if (!file->has_checksums || ebpo_input_expects(&ebpo_reader_own(file)->in))
         return EBPO_OK;
     ebpo_status status = ebpo_file_locate(file, NULL, &own);
     if (status == EBPO_OK)
         status = ebpo_long_chunk_read(file, a, &list, &own);
-    sums_comparison c = { tally, file, list, a->shape.rows };
+    checksum_comparison c = { tally, file, list, a->shape.rows };
     if (status == EBPO_OK)
-        status = compare_sums(&c, &own);
+        status = compare_checksums(&c, &own);
     free(list);
     if (status != EBPO_E_FORMAT)
         return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &own);

@@ -1,7 +1,6 @@
-/* Decides whether a face touches a cell, whether a face's part in a cell keeps to the node's
- * planes, and how often a ray meets a face. Floating point with error bounds decides most cases;
- * the rest goes to rationals (GMP), so every answer is exact. Nothing is shared with the builder
- * but the exact predicates.
+/* Decides if a face touches a cell, if a face's part in a cell respects the node's planes, and how
+ * often a ray crosses a face. Floating point with error bounds decides most cases; the rest uses
+ * rationals (GMP), so every result is exact. Only the exact predicates are shared with the builder.
  *
  * The parts, each with its method: clipping in rationals (Sutherland and Hodgman, "Reentrant
  * polygon clipping", 1974), separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996), winding
@@ -15,7 +14,7 @@
 #include "mesh/mesh_parts.h"
 #include "verify/verify_geometry.h"
 
-enum { CORNERS = 9 }; /* three, and at most one more for each wall */
+enum { CORNERS = 9 }; /* three, and at most one more for each cell face */
 
 typedef struct polygon {
     int count;
@@ -56,18 +55,18 @@ static void set_triangle(polygon *g, const double low[3], const double high[3],
     mpq_clears(first, size, NULL);
 }
 
-/* Whether a corner keeps to its side of a wall: at least 0, or at most 1. */
-static bool exact_within(const mpq_t x, int wall)
+/* Returns true if a corner is on the inner side of a cell face: at least 0, or at most 1. */
+static bool exact_within(const mpq_t x, int cell_face)
 {
-    return wall == 0 ? mpq_sgn(x) >= 0 : mpq_cmp_ui(x, 1, 1) <= 0;
+    return cell_face == 0 ? mpq_sgn(x) >= 0 : mpq_cmp_ui(x, 1, 1) <= 0;
 }
 
-/* Appends the point where a-b meets the wall; exactly one of the two is within. */
-static void append_crossing(polygon *out, mpq_t a[3], mpq_t b[3], int axis, int wall)
+/* Appends the point where a-b crosses the cell face; exactly one of the two is within. */
+static void append_crossing(polygon *out, mpq_t a[3], mpq_t b[3], int axis, int cell_face)
 {
     mpq_t t, part;
     mpq_inits(t, part, NULL);
-    mpq_set_si(t, wall, 1);
+    mpq_set_si(t, cell_face, 1);
     mpq_sub(t, t, a[axis]);
     mpq_sub(part, b[axis], a[axis]);
     mpq_div(t, t, part);
@@ -76,29 +75,29 @@ static void append_crossing(polygon *out, mpq_t a[3], mpq_t b[3], int axis, int 
         mpq_mul(part, part, t);
         mpq_add(out->at[out->count][k], a[k], part);
     }
-    mpq_set_si(out->at[out->count][axis], wall, 1);
+    mpq_set_si(out->at[out->count][axis], cell_face, 1);
     out->count++;
     mpq_clears(t, part, NULL);
 }
 
-static void exact_clip(polygon *out, polygon *in, int axis, int wall)
+static void exact_clip(polygon *out, polygon *in, int axis, int cell_face)
 {
     out->count = 0;
     for (int i = 0; i < in->count; i++) {
         int j = i + 1 < in->count ? i + 1 : 0;
-        bool here = exact_within(in->at[i][axis], wall),
-             there = exact_within(in->at[j][axis], wall);
+        bool here = exact_within(in->at[i][axis], cell_face),
+             there = exact_within(in->at[j][axis], cell_face);
         if (here) {
             for (int k = 0; k < 3; k++)
                 mpq_set(out->at[out->count][k], in->at[i][k]);
             out->count++;
         }
         if (here != there)
-            append_crossing(out, in->at[i], in->at[j], axis, wall);
+            append_crossing(out, in->at[i], in->at[j], axis, cell_face);
     }
 }
 
-/* Leaves the intersection in *g. */
+/* Stores the intersection in *g. */
 static void clip_to_box(polygon *g, const double low[3], const double high[3],
                         const ebpo_corners *face)
 {
@@ -149,29 +148,29 @@ bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo
     return holds;
 }
 
-/* Separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996): the box' normals, the face's
- * normal, and the products of their edges; for a box and a triangle, also one without area, these
- * are all that is needed. */
+/* Separating axes (Gottschalk, Lin and Manocha, "OBBTree", 1996): the box's normals, the face's
+ * normal, and the products of their edges. These suffice for a box and a triangle, also one without
+ * area. */
 
 static const double eps = 0x1p-53;
 static const double slack = 0x1p-900; /* covers underflow */
 
-/* Corners of a face in cell coordinates. Each coordinate is off by at most 4 * 2^-53 of its
- * absolute value (and 2^-1000). */
+/* Corners of a face in cell coordinates. The error of each coordinate is at most 4 * 2^-53 of its
+ * absolute value (plus 2^-1000). */
 typedef struct local_face {
     double at[3][3];
     double reach[3];    /* largest absolute coordinate on each axis, at least 1 */
-    unsigned contained; /* bit i: corner i lies in the closed cell; exact */
+    unsigned contained; /* bit i: corner i is in the closed cell; exact */
 } local_face;
 
-typedef enum verdict { APART, MEET, UNSURE } verdict;
+typedef enum verdict { APART, INTERSECT, UNSURE } verdict;
 
 ebpo_frame ebpo_frame_make(const ebpo_box *box, ebpo_cell cell)
 {
     ebpo_frame frame;
     for (int k = 0; k < 3; k++) {
-        frame.low[k] = ebpo_wall(box, k, cell.level, cell.at[k]);
-        frame.high[k] = ebpo_wall(box, k, cell.level, cell.at[k] + 1);
+        frame.low[k] = ebpo_cell_face(box, k, cell.level, cell.at[k]);
+        frame.high[k] = ebpo_cell_face(box, k, cell.level, cell.at[k] + 1);
         frame.inverse[k] = 1 / (frame.high[k] - frame.low[k]);
     }
     return frame;
@@ -192,32 +191,33 @@ static void local_make(local_face *out, const ebpo_frame *frame, const ebpo_corn
     }
 }
 
-/* Intervals [a, b] of the face and [low, high] of the box on an axis; each end is off by at most
- * `error`. Not-a-number compares false: unsure. */
+/* Compares the intervals [a, b] of the face and [low, high] of the box on an axis; the error of
+ * each end is at most `error`. NaN compares false: unsure. */
 static verdict compare_intervals(double a, double b, double low, double high, double error)
 {
     if (a > high + error || b < low - error)
         return APART;
     if (a <= high - error && b >= low + error)
-        return MEET;
+        return INTERSECT;
     return UNSURE;
 }
 
-/* (b - a) * inverse, 0 only when a and b are equal; not a number (and so never sure) where it is
- * too small to compute with. */
+/* Returns (b - a) * inverse, 0 only when a and b are equal; NaN (so never sure) where it is too
+ * small to compute with. */
 static double scaled_difference(double a, double b, double inverse)
 {
     double x = (b - a) * inverse;
     return a != b && fabs(x) < 0x1p-400 ? NAN : x;
 }
 
-/* The axis edge x (unit vector k), edge from corner i to j, l being the third corner. */
+/* Compares on the axis edge x (unit vector k), edge from corner i to j, l being the third corner.
+ */
 static verdict edge_axis(const local_face *p, const double edge[3], int i, int l, int k)
 {
     int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
     double eu = edge[u], ev = edge[v];
     if (eu == 0 && ev == 0)
-        return MEET; /* the edge runs along k: no axis */
+        return INTERSECT; /* the edge runs along k: no axis */
     double a = ev * p->at[i][u] - eu * p->at[i][v];
     double b = ev * p->at[l][u] - eu * p->at[l][v];
     double low = (ev < 0 ? ev : 0) - (eu > 0 ? eu : 0),
@@ -241,7 +241,7 @@ static verdict normal_axis(const local_face *p, double edge[3][3])
     return compare_intervals(value, value, low, high, error);
 }
 
-/* The axes but the box' own, which the caller decided exactly. */
+/* Compares on the axes other than the box's normals, which the caller decided exactly. */
 static verdict separating_axes(const ebpo_frame *frame, const ebpo_corners *face)
 {
     local_face p;
@@ -255,7 +255,7 @@ static verdict separating_axes(const ebpo_frame *frame, const ebpo_corners *face
     for (int i = 0; i < 3 && all != APART; i++)
         for (int k = 0; k < 3 && all != APART; k++) {
             verdict one = edge_axis(&p, edge[i], i, (i + 2) % 3, k);
-            all = one == APART || all == MEET ? one : all;
+            all = one == APART || all == INTERSECT ? one : all;
         }
     return all;
 }
@@ -271,17 +271,17 @@ bool ebpo_face_touches(const ebpo_frame *frame, const ebpo_corners *face, ebpo_t
     for (int i = 0; i < 3; i++)
         if (ebpo_corner_in_cell(frame, face->at[i]))
             return true;
-    verdict answer = separating_axes(frame, face);
-    if (answer != UNSURE)
-        return answer == MEET;
+    verdict result = separating_axes(frame, face);
+    if (result != UNSURE)
+        return result == INTERSECT;
     tally->exact_touches++;
     return ebpo_exact_touches(frame->low, frame->high, face);
 }
 
 /* Seen along the axis, a face winds around the ray once or not at all: the edges that cross a
- * half-line beside the point are counted. The half-line runs along the axis of the larger shift, so
- * that the smaller shift decides which end of an edge lies where, and the larger one every tie that
- * is left. */
+ * half-line beside the point are counted. The half-line is along the axis of the larger shift. So
+ * the smaller shift decides on which side the ends of an edge are, and the larger one all remaining
+ * ties. */
 
 void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out)
 {
@@ -295,7 +295,7 @@ static int orient_in(int u, int v, const double a[3], const double b[3], const d
                          (double[2]){ c[u], c[v] });
 }
 
-/* Turns of the face around p seen in the plane (u, v), counter-clockwise positive. */
+/* Returns the turns of the face around p seen in the plane (u, v), counter-clockwise positive. */
 static int turns_around(const double p[3], int u, int v, const ebpo_corners *face)
 {
     int sum = 0;
@@ -313,8 +313,8 @@ static int turns_around(const double p[3], int u, int v, const ebpo_corners *fac
     return sum;
 }
 
-/* Side of the shifted p of the face's plane: a tie goes to the first component of the normal that
- * is not 0. */
+/* Returns the side of the face's plane of the shifted p: a tie is decided by the first nonzero
+ * component of the normal. */
 static int shifted_side(const double p[3], const ebpo_corners *face)
 {
     const double *a = face->at[0], *b = face->at[1], *c = face->at[2];
@@ -348,17 +348,17 @@ int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face)
     return shifted_side(p, face) == -turn ? turn : 0;
 }
 
-/* How far the part of a face in its cell reaches in direction n is a linear program; by weak
- * duality, for any vector m n . x <= max over the face's corners of (n - m) . v  +  max over the
- * unit cube of m . x, and some m makes it an equality: 0, or one that levels n on an edge of the
- * face by one wall, or on the face by two walls. So rounded m still give certain bounds, and
- * nothing has to be clipped. What stays undecided is clipped in rationals. */
+/* The extent in direction n of a face's part in its cell is a linear program. By weak duality, for
+ * any vector m, n . x <= max over the face's corners of (n - m) . v  +  max over the unit cube of m
+ * . x. Some m makes it an equality: 0, or one that levels n on an edge of the face by one cell
+ * face, or on the face by two. So rounded m still give certain bounds, and nothing has to be
+ * clipped. Undecided cases are clipped in rationals. */
 
-void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_twin_tree *view,
-                         const ebpo_twin_node *node)
+void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_reference_tree *view,
+                         const ebpo_reference_node *node)
 {
     uint32_t count;
-    const uint32_t *codes = ebpo_twin_planes(view, node, &count);
+    const uint32_t *codes = ebpo_reference_planes(view, node, &count);
     out->count = 0;
     for (uint32_t i = 0; i < count; i++) {
         int at = out->count;
@@ -384,7 +384,7 @@ static double highest_corner(const local_face *face, const double n[3])
     return fmax(a, fmax(b, c));
 }
 
-/* The bound above for one m, rounding included. */
+/* Checks the bound above for one m, rounding included. */
 static bool is_certified(const local_face *face, const double n[3], const double m[3], double bound)
 {
     double rest[3], cube = 0, size = 0;
@@ -396,8 +396,8 @@ static bool is_certified(const local_face *face, const double n[3], const double
     return highest_corner(face, rest) + cube + 16 * eps * size <= bound;
 }
 
-/* m along one axis, so that n - m is level along an edge. */
-static bool certified_by_wall(const local_face *face, const double n[3], double bound)
+/* Tries m along one axis, so that n - m is level along an edge. */
+static bool certified_by_cell_face(const local_face *face, const double n[3], double bound)
 {
     for (int i = 0; i < 3; i++) {
         const double *a = face->at[i], *b = face->at[(i + 1) % 3];
@@ -413,8 +413,8 @@ static bool certified_by_wall(const local_face *face, const double n[3], double 
     return false;
 }
 
-/* m along two axes, so that n - m is normal to the face. */
-static bool certified_by_two_walls(const local_face *face, const double n[3], double bound)
+/* Tries m along two axes, so that n - m is normal to the face. */
+static bool certified_by_two_cell_faces(const local_face *face, const double n[3], double bound)
 {
     double p[3], q[3], normal[3];
     for (int k = 0; k < 3; k++) {
@@ -433,7 +433,8 @@ static bool certified_by_two_walls(const local_face *face, const double n[3], do
     return false;
 }
 
-/* A corner of the face in the cell and surely beyond the plane: no need for rationals. */
+/* Returns true if a corner of the face is in the cell and surely beyond the plane: no rationals are
+ * needed. */
 static bool corner_beyond(const local_face *face, const double n[3], double bound, double error)
 {
     for (int i = 0; i < 3; i++)
@@ -452,14 +453,14 @@ static bool face_keeps(ebpo_tally *tally, const ebpo_node_planes *planes, int i,
         return true;
     if (corner_beyond(local, n, bound, error))
         return false;
-    if (certified_by_wall(local, n, bound) || certified_by_two_walls(local, n, bound))
+    if (certified_by_cell_face(local, n, bound) || certified_by_two_cell_faces(local, n, bound))
         return true;
     tally->exact_half_spaces++;
     return ebpo_exact_half_space(frame->low, frame->high, face, planes->normal[i], planes->d[i]);
 }
 
 void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
-                               const ebpo_twin_node *node, const ebpo_frame *frame,
+                               const ebpo_reference_node *node, const ebpo_frame *frame,
                                const ebpo_corners *face, uint64_t number)
 {
     local_face local;
@@ -473,7 +474,7 @@ void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_node_planes *planes
 }
 
 void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
-                                  const ebpo_twin_node *node, unsigned corners)
+                                  const ebpo_reference_node *node, unsigned corners)
 {
     for (int i = 0; i < planes->count; i++)
         for (unsigned corner = 0; corner < 8; corner++) {
@@ -488,6 +489,6 @@ void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_node_planes *pla
                 ebpo_tally_violation(
                     tally, EBPO_VERIFY_CONTAINMENT,
                     &(ebpo_verify_place){ node->code, EBPO_NO_FACE, planes->number[i] },
-                    "the plane cuts off corner %u of the cell, which lies in the solid", corner);
+                    "the plane cuts off corner %u of the cell, which is in the solid", corner);
         }
 }

@@ -19,17 +19,17 @@ typedef struct ebpo_corners {
     double at[3][3];
 } ebpo_corners;
 
-/* True when the closed face meets the closed box [low, high]. */
+/* Returns true when the closed face intersects the closed box [low, high]. */
 bool ebpo_exact_touches(const double low[3], const double high[3], const ebpo_corners *face);
 
-/* True when every point of the face in the closed box satisfies 4096 * (n . xi) <= d, xi = (point -
- * low) / (high - low). */
+/* Returns true when every point of the face in the closed box satisfies 4096 * (n . xi) <= d, xi =
+ * (point - low) / (high - low). */
 bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo_corners *face,
                            const int32_t n[3], int32_t d);
 
 /* --- floating point with error bounds, rationals when in doubt --- */
 
-/* A cell: its walls (exact) and the reciprocals of its sizes (rounded). */
+/* A cell: its faces (exact) and the reciprocals of its sizes (rounded). */
 typedef struct ebpo_frame {
     double low[3], high[3], inverse[3];
 } ebpo_frame;
@@ -42,47 +42,46 @@ static inline bool ebpo_corner_in_cell(const ebpo_frame *frame, const double p[3
            p[1] <= frame->high[1] && p[2] >= frame->low[2] && p[2] <= frame->high[2];
 }
 
-/* Exact: the closed triangle and the closed cell have a point in common. Counts questions that went
- * to rationals. */
+/* Returns, exactly, true if the closed triangle and the closed cell have a common point. Counts the
+ * tests in rationals. */
 bool ebpo_face_touches(const ebpo_frame *frame, const ebpo_corners *face, ebpo_tally *tally);
 
-/* Winding numbers by rays, made of orientation signs only.
+/* Winding numbers by rays, from orientation signs only.
  *
- * A point stands for itself shifted by (d0, d1, d2), infinitely small and positive, d0 >> d1 >> d2:
- * what the format says about the corners of cells. The ray runs in direction +axis; far out the
- * winding number is 0, so a point's is the sum over the faces that its ray meets, each +1 when the
- * ray leaves through it (along its normal) and -1 when it enters. */
+ * A point is shifted by (d0, d1, d2), infinitely small and positive, d0 >> d1 >> d2, as the format
+ * defines for the corners of cells. The ray has direction +axis; far out the winding number is 0.
+ * So a point's number is the sum over the faces that its ray crosses: +1 when the ray leaves
+ * through the face (along its normal), -1 when it enters. */
 
-/* The face's share in the winding number of p: -1, 0 or 1. Exact. */
+/* Returns the face's exact contribution to the winding number of p: -1, 0 or 1. */
 int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face);
 
-/* Corners of a face of a mesh. */
+/* Returns the corners of a face of a mesh. */
 void ebpo_face_corners(const ebpo_mesh *mesh, uint64_t face, ebpo_corners *out);
 
-/* --- containment: no point of a face in the cell, and no inside corner, is cut off by the node's
- * planes --- */
+/* --- containment: the node's planes cut off no point of a face in the cell, and no inside corner
+ * --- */
 
 enum { EBPO_NODE_PLANES_MAX = 255 }; /* counts are bytes */
 
-/* A node's own planes, decoded. Codes that stand for no plane are left out (they are violations
- * elsewhere). */
+/* A node's own planes, decoded. Invalid codes are omitted (they are violations elsewhere). */
 typedef struct ebpo_node_planes {
     int count;
     double n[EBPO_NODE_PLANES_MAX][3], bound[EBPO_NODE_PLANES_MAX]; /* n . xi <= bound; exact */
     int32_t normal[EBPO_NODE_PLANES_MAX][3], d[EBPO_NODE_PLANES_MAX];
-    uint32_t number[EBPO_NODE_PLANES_MAX]; /* place among the node's codes */
+    uint32_t number[EBPO_NODE_PLANES_MAX]; /* index among the node's codes */
 } ebpo_node_planes;
 
-void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_twin_tree *view,
-                         const ebpo_twin_node *node);
+void ebpo_node_planes_of(ebpo_node_planes *out, const ebpo_reference_tree *view,
+                         const ebpo_reference_node *node);
 
-/* A face that touches the cell. */
+/* Checks a face that touches the cell. */
 void ebpo_check_face_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
-                               const ebpo_twin_node *node, const ebpo_frame *frame,
+                               const ebpo_reference_node *node, const ebpo_frame *frame,
                                const ebpo_corners *face, uint64_t number);
 
-/* Cell corners, bit i for corner i (bit 0 x, bit 1 y, bit 2 z). */
+/* Checks cell corners, bit i for corner i (bit 0 x, bit 1 y, bit 2 z). */
 void ebpo_check_corners_contained(ebpo_tally *tally, const ebpo_node_planes *planes,
-                                  const ebpo_twin_node *node, unsigned corners);
+                                  const ebpo_reference_node *node, unsigned corners);
 
 #endif

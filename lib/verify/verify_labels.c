@@ -1,14 +1,14 @@
 /* Verifies labels: the winding numbers of cells. Two proofs:
  *
- * - By links, for all cells: equal points must have equal winding numbers, whichever cell gives
- *   them. A cell without faces has one number for all its corners; a leaf gives one for its lowest
+ * - By links, for all cells: equal points must have equal winding numbers in all cells.
+ *   A cell without faces has one number for all its corners; a leaf gives one for its lowest
  *   corner, and the others follow by signed crossings along its edges; the 64 corners of a gray
- *   node's children are 27 points. The root's corners are outside. Every cell is linked to the root
- *   that way, so all numbers are right when all links hold and the lists are complete
+ *   node's children are 27 points. The root's corners are outside. This links every cell to the
+ *   root, so all numbers are right when all links hold and the lists are complete
  *   (verify_lists.c).
- * - By rays through the whole mesh, for all cells or an even sample, without any of that. The
- *   points are sorted into columns along x, and each face looks for those that it is in front of;
- *   so the faces are gone through once, in their order, and only the points are held in memory. */
+ * - By rays through the whole mesh, for all cells or an even sample, without the links. The
+ *   points are sorted into columns along x, and each face visits the points that it is in front of;
+ *   so faces are visited once, in their order, and only the points are in memory. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -32,7 +32,7 @@ typedef struct columns {
     const ebpo_mesh *mesh;
     double low[2], scale[2];
     uint64_t side;
-    uint64_t *first;       /* [side * side + 1] of the column's points */
+    uint64_t *first;       /* [side * side + 1] start of each column's points */
     ebpo_ray_point *point; /* column after column */
 } columns;
 
@@ -57,7 +57,7 @@ static columns grid_for(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t cou
     return c;
 }
 
-/* Monotone, so that a point in a face's range of coordinates falls into its range of columns. */
+/* Monotone, so that a point in a face's range of coordinates is in its range of columns. */
 static uint64_t column_of(const columns *c, int i, double x)
 {
     double at = (x - c->low[i]) * c->scale[i] * (double)c->side;
@@ -89,7 +89,7 @@ static column_range columns_of_face(const columns *c, const ebpo_corners *face)
     return range;
 }
 
-/* Sorts the points by column; those of a column keep their order, which nothing depends on. */
+/* Sorts the points by column; points of a column keep their order, which does not matter. */
 static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *error)
 {
     uint64_t cells = c->side * c->side;
@@ -108,7 +108,7 @@ static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *
     }
     EBPO_FOR_ITEMS_SCATTERED(points->workspace, i, 0, points->count)
         sorted[c->first[column_of_point(c, &points->point[i])]++] = points->point[i];
-    /* each had moved on to the next one's beginning */
+    /* each was advanced to the beginning of the next one */
     memmove(c->first + 1, c->first, cells * sizeof *c->first);
     c->first[0] = 0;
     ebpo_array_free(points->workspace, points->point);
@@ -117,7 +117,7 @@ static ebpo_status sort_points(columns *c, ebpo_ray_points *points, ebpo_error *
     return EBPO_OK;
 }
 
-/* Several threads may meet at one point. */
+/* Several threads may update one point. */
 static void count_hits(const columns *c, const ebpo_corners *face, uint64_t begin, uint64_t end)
 {
     for (uint64_t i = begin; i < end; i++) {
@@ -133,12 +133,12 @@ static ebpo_status follow_faces(void *context, uint64_t begin, uint64_t end, uns
     const columns *c = context;
     (void)worker;
     (void)error;
-    uint64_t rows = 0; /* jumps */
+    uint64_t rows = 0; /* jumps between rows */
     for (uint64_t f = begin; f < end; f++) {
         ebpo_corners face;
         ebpo_face_corners(c->mesh, f, &face);
         column_range r = columns_of_face(c, &face);
-        /* the columns of a row stand side by side */
+        /* the columns of a row are adjacent */
         for (uint64_t z = r.from[1]; z <= r.to[1]; z++) {
             count_hits(c, &face, c->first[z * c->side + r.from[0]],
                        c->first[z * c->side + r.to[0] + 1]);
@@ -163,12 +163,12 @@ ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_mesh *mesh, con
     return status;
 }
 
-/* About how many points a face would look at in all, were `count` points spread evenly over the
+/* Estimates how many points all faces would visit if `count` points were spread evenly over the
  * box. */
 static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t count)
 {
     columns c = grid_for(mesh, box, count);
-    uint64_t covered = 0; /* columns, over all faces */
+    uint64_t covered = 0; /* number of columns, over all faces */
     EBPO_FOR_ITEMS(mesh->workspace, f, 0, mesh->face_count) {
         ebpo_corners face;
         ebpo_face_corners(mesh, f, &face);
@@ -181,17 +181,17 @@ static double rays_work(const ebpo_mesh *mesh, const ebpo_box *box, uint64_t cou
 /* --- which cells are checked by rays --- */
 
 enum { SAMPLES_LEAST = 4096, SAMPLES_MANY = 1 << 20, CELLS_ALL = 1 << 22 };
-/* Points looked at by faces, in all: some seconds. */
+/* Most points that all faces visit: some seconds. */
 static const double ray_work_affordable = 4e8;
 
-static uint64_t usual_samples(const ebpo_twin_tree *view, uint64_t cells)
+static uint64_t default_samples(const ebpo_reference_tree *view, uint64_t cells)
 {
     uint64_t samples = cells <= CELLS_ALL ? cells : SAMPLES_MANY;
     return rays_work(&view->tree->mesh, &view->box, samples) <= ray_work_affordable ? samples
                                                                                     : SAMPLES_LEAST;
 }
 
-void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_twin_tree *view, uint64_t samples)
+void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_reference_tree *view, uint64_t samples)
 {
     uint64_t all = 0, classes = 0;
     for (int l = 0; l < view->tree->info.level_count; l++) {
@@ -206,9 +206,9 @@ void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_twin_tree *view, uin
         }
     }
     if (samples == 0)
-        samples = usual_samples(view, all);
-    /* Half of the samples go to the classes evenly, so that small levels are seen too; half by
-     * size. */
+        samples = default_samples(view, all);
+    /* Half of the samples are distributed to the classes evenly, so that small levels are included;
+     * half by size. */
     for (int l = 0; l < view->tree->info.level_count; l++)
         for (int type = 0; type <= EBPO_GRAY; type++) {
             uint64_t cells = plan->cells[l][type];
@@ -221,8 +221,8 @@ void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_twin_tree *view, uin
         }
 }
 
-/* True for `take` of the `cells` ranks, evenly spread. */
-static bool is_planned(const ebpo_label_plan *plan, const ebpo_twin_node *node)
+/* Returns true for `take` of the `cells` ranks, evenly spread. */
+static bool is_planned(const ebpo_label_plan *plan, const ebpo_reference_node *node)
 {
     uint64_t cells = plan->cells[node->cell.level][node->type],
              take = plan->take[node->cell.level][node->type];
@@ -240,7 +240,7 @@ static void corner_position(const ebpo_frame *frame, unsigned corner, double out
         out[k] = corner >> k & 1 ? frame->high[k] : frame->low[k];
 }
 
-/* Changes of the winding number that one face makes along seven cell edges: a tree that reaches all
+/* Changes of the winding number due to one face along seven cell edges: a tree that reaches all
  * corners from corner 0. */
 static const struct {
     unsigned char from, to, axis;
@@ -258,11 +258,11 @@ static void add_crossings(int64_t change[7], const ebpo_frame *frame, const ebpo
     }
 }
 
-void ebpo_terminal_windings(ebpo_node_windings *out, const ebpo_twin_tree *view,
-                            const ebpo_twin_node *node, const ebpo_frame *frame,
+void ebpo_terminal_windings(ebpo_node_windings *out, const ebpo_reference_tree *view,
+                            const ebpo_reference_node *node, const ebpo_frame *frame,
                             const uint32_t *faces, uint64_t count)
 {
-    int64_t first = ebpo_twin_winding(view, node), change[7] = { 0 };
+    int64_t first = ebpo_reference_winding(view, node), change[7] = { 0 };
     for (int i = 0; i < 8; i++)
         out->at[i] = first;
     out->known = node->type == EBPO_LEAF && !view->has_mesh ? 1 : 255;
@@ -277,30 +277,30 @@ void ebpo_terminal_windings(ebpo_node_windings *out, const ebpo_twin_tree *view,
         out->at[edge_tree[e].to] = out->at[edge_tree[e].from] + change[e];
 }
 
-void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_twin_tree *view,
-                               const ebpo_twin_node *node)
+void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_reference_tree *view,
+                               const ebpo_reference_node *node)
 {
     if (node->type == EBPO_LEAF)
         return;
-    int64_t stored = ebpo_twin_winding(view, node);
+    int64_t stored = ebpo_reference_winding(view, node);
     tally->checks[EBPO_VERIFY_LABELS]++;
-    if (ebpo_twin_inside(view, stored) != (node->type == EBPO_BLACK))
+    if (ebpo_reference_inside(view, stored) != (node->type == EBPO_BLACK))
         ebpo_tally_violation(tally, EBPO_VERIFY_LABELS,
                              &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE },
-                             "%s, but winding number %" PRId64 " lies %s by the file's rule",
+                             "%s, but winding number %" PRId64 " is %s by the file's rule",
                              node->type == EBPO_BLACK ? "black" : "white", stored,
                              node->type == EBPO_BLACK ? "outside" : "inside");
 }
 
-bool ebpo_label_note(ebpo_ray_points *points, const ebpo_twin_tree *view,
-                     const ebpo_twin_node *node, const ebpo_frame *frame,
+bool ebpo_label_note(ebpo_ray_points *points, const ebpo_reference_tree *view,
+                     const ebpo_reference_node *node, const ebpo_frame *frame,
                      const ebpo_label_plan *plan)
 {
     if (!is_planned(plan, node))
         return true;
     ebpo_ray_point p = { { frame->low[0], frame->low[1], frame->low[2] },
                          node->code,
-                         ebpo_twin_winding(view, node),
+                         ebpo_reference_winding(view, node),
                          0 };
     return ebpo_rays_add(points, &p);
 }
@@ -319,7 +319,7 @@ void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points)
     }
 }
 
-/* Number of the point, 0 .. 26, that a child's corner is. */
+/* Returns the number, 0 .. 26, of the point at a child's corner. */
 static int shared_point(unsigned octant, unsigned corner)
 {
     int point = 0, step = 1;
@@ -328,7 +328,7 @@ static int shared_point(unsigned octant, unsigned corner)
     return point;
 }
 
-void ebpo_check_links(ebpo_tally *tally, const ebpo_twin_node *node,
+void ebpo_check_links(ebpo_tally *tally, const ebpo_reference_node *node,
                       const ebpo_node_windings children[8], ebpo_node_windings *out)
 {
     int64_t value[27];
@@ -371,16 +371,17 @@ void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_node_windings *root)
             ebpo_tally_violation(tally, EBPO_VERIFY_LABELS,
                                  &(ebpo_verify_place){ 1, EBPO_NO_FACE, EBPO_NO_PLANE },
                                  "corner %u of the root cell has winding number %" PRId64
-                                 ", but lies outside",
+                                 ", but is outside",
                                  i, root->at[i]);
     }
 }
 
-unsigned ebpo_windings_inside(const ebpo_twin_tree *view, const ebpo_node_windings *corners)
+unsigned ebpo_windings_inside(const ebpo_reference_tree *view, const ebpo_node_windings *corners)
 {
     unsigned inside = 0;
     for (unsigned i = 0; i < 8; i++)
-        inside |= (unsigned)((corners->known >> i & 1) && ebpo_twin_inside(view, corners->at[i]))
-                  << i;
+        inside |=
+            (unsigned)((corners->known >> i & 1) && ebpo_reference_inside(view, corners->at[i]))
+            << i;
     return inside;
 }

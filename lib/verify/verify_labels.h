@@ -12,27 +12,27 @@
 
 /* --- rays: winding numbers of many points --- */
 
-/* A point, and what the file says about it. */
+/* A point with its winding numbers. */
 typedef struct ebpo_ray_point {
     double at[3];
-    uint64_t octcode; /* of the cell whose lowest corner it is */
-    int64_t stored;   /* its winding number by the file */
-    int64_t found;    /* by ebpo_rays_follow */
+    uint64_t octcode; /* code of the cell whose lowest corner it is */
+    int64_t stored;   /* its winding number in the file */
+    int64_t found;    /* set by ebpo_rays_follow */
 } ebpo_ray_point;
 
-/* Points as they come up. Zeroed is empty; free `point` with ebpo_array_free. */
+/* Points in order of appearance. Zeroed is empty; free `point` with ebpo_array_free. */
 typedef struct ebpo_ray_points {
-    ebpo_workspace *workspace; /* what the list keeps to, or NULL */
+    ebpo_workspace *workspace; /* quota of the list, or NULL */
     ebpo_ray_point *point;
     uint64_t count, capacity;
 } ebpo_ray_points;
 
-/* False when memory is short. */
+/* Returns false without memory. */
 EBPO_MUST_USE bool ebpo_rays_add(ebpo_ray_points *points, const ebpo_ray_point *point);
 
-/* Sets `found` of all points: their winding numbers, shifted, over the whole mesh. Exact. The
- * points lie in the box; the mesh is not empty, its coordinates finite and indices in range. Sorts
- * the points into columns. */
+/* Sets `found` of all points: their exact winding numbers, shifted, over the whole mesh. The points
+ * must be in the box; the mesh must not be empty, with finite coordinates and indices in range.
+ * Sorts the points into columns. */
 EBPO_MUST_USE ebpo_status ebpo_rays_follow(ebpo_ray_points *points, const ebpo_mesh *mesh,
                                            const ebpo_box *box, unsigned threads,
                                            const ebpo_progress *progress, ebpo_error *error);
@@ -45,39 +45,40 @@ typedef struct ebpo_node_windings {
     unsigned known; /* bit i: at[i] is set; not all are in a file without mesh */
 } ebpo_node_windings;
 
-/* Which cells are checked by rays: of each level and type, every n-th or so. */
+/* The cells that are checked by rays: of each level and type, about every n-th. */
 typedef struct ebpo_label_plan {
     uint64_t cells[EBPO_LEVELS_MAX][4], take[EBPO_LEVELS_MAX][4];
 } ebpo_label_plan;
 
-/* samples 0: as many as ebpo_verify_options says. */
-void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_twin_tree *view, uint64_t samples);
+/* samples 0: the default of ebpo_verify_options. */
+void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_reference_tree *view, uint64_t samples);
 
-/* Corner windings of a leaf, white or black node; `faces`: the `count` faces that touch it. */
-void ebpo_terminal_windings(ebpo_node_windings *out, const ebpo_twin_tree *view,
-                            const ebpo_twin_node *node, const ebpo_frame *frame,
+/* Computes corner windings of a leaf, white or black node; `faces`: the `count` faces that touch
+ * it. */
+void ebpo_terminal_windings(ebpo_node_windings *out, const ebpo_reference_tree *view,
+                            const ebpo_reference_node *node, const ebpo_frame *frame,
                             const uint32_t *faces, uint64_t count);
 
-/* White outside, black inside. */
-void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_twin_tree *view,
-                               const ebpo_twin_node *node);
+/* Checks that white is outside and black inside. */
+void ebpo_check_terminal_label(ebpo_tally *tally, const ebpo_reference_tree *view,
+                               const ebpo_reference_node *node);
 
-/* Where the plan says so, puts the cell's lowest corner on the list of points to be checked by
- * rays. False when memory is short. */
-EBPO_MUST_USE bool ebpo_label_note(ebpo_ray_points *points, const ebpo_twin_tree *view,
-                                   const ebpo_twin_node *node, const ebpo_frame *frame,
+/* Adds the cell's lowest corner, if planned, to the points that are checked by rays. Returns false
+ * without memory. */
+EBPO_MUST_USE bool ebpo_label_note(ebpo_ray_points *points, const ebpo_reference_tree *view,
+                                   const ebpo_reference_node *node, const ebpo_frame *frame,
                                    const ebpo_label_plan *plan);
-/* Compares what rays found with what the file says. */
+/* Compares the rays' results with the file. */
 void ebpo_check_rays(ebpo_tally *tally, const ebpo_ray_points *points);
 
-/* Compares the children of a gray node with each other and gives the node's own corners. */
-void ebpo_check_links(ebpo_tally *tally, const ebpo_twin_node *node,
+/* Compares the children of a gray node with each other and returns the node's corners. */
+void ebpo_check_links(ebpo_tally *tally, const ebpo_reference_node *node,
                       const ebpo_node_windings children[8], ebpo_node_windings *out);
 
-/* The root's corners are outside. */
+/* Checks that the root's corners are outside. */
 void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_node_windings *root);
 
-/* Bit i: corner i lies in the solid. */
-unsigned ebpo_windings_inside(const ebpo_twin_tree *view, const ebpo_node_windings *corners);
+/* Returns bit i if corner i is in the solid. */
+unsigned ebpo_windings_inside(const ebpo_reference_tree *view, const ebpo_node_windings *corners);
 
 #endif

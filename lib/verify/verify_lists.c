@@ -2,9 +2,9 @@
  *
  * A leaf must list every face that touches its closed cell; a white or black cell has none. A
  * listed face that does not touch the leaf must touch the cell widened by 1/256, because the
- * builder's test errs on the safe side; such entries are counted, not reported. For gray nodes that
- * ought to be leaves, the different faces below are counted up to the limit. When memory is short
- * the count proves nothing, and the node passes. */
+ * builder's test includes faces in doubt; such entries are only counted. For gray nodes that should
+ * be leaves, the different faces below are counted up to the limit. When memory is short the count
+ * proves nothing, and the node passes. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -14,7 +14,7 @@
 #include "verify/verify_geometry.h"
 #include "verify/verify_parts.h"
 
-static void report_unlisted(ebpo_tally *tally, const ebpo_twin_node *node, uint32_t face,
+static void report_unlisted(ebpo_tally *tally, const ebpo_reference_node *node, uint32_t face,
                             const char *text)
 {
     ebpo_tally_violation(tally, EBPO_VERIFY_LISTS,
@@ -28,16 +28,16 @@ typedef struct face_list {
     uint64_t first;
 } face_list;
 
-static face_list list_of(const ebpo_twin_tree *view, const ebpo_twin_node *leaf)
+static face_list list_of(const ebpo_reference_tree *view, const ebpo_reference_node *leaf)
 {
     const ebpo_level *level = &view->tree->level[leaf->cell.level];
     face_list list = { .first = level->leaf_first[leaf->rank],
                        .new_count = level->leaf_new[leaf->rank] };
-    list.refs = ebpo_twin_refs(view, leaf, &list.ref_count);
+    list.refs = ebpo_reference_refs(view, leaf, &list.ref_count);
     return list;
 }
 
-/* Faces that touch a node ascend, as those of its parent do. */
+/* Faces that touch a node are ascending, like those of its parent. */
 static bool is_among(const uint32_t *faces, uint64_t count, uint32_t face)
 {
     uint64_t low = 0, high = count;
@@ -51,10 +51,10 @@ static bool is_among(const uint32_t *faces, uint64_t count, uint32_t face)
     return low < count && faces[low] == face;
 }
 
-/* A listed face that does not touch the leaf must touch it widened by 1/256: level-limited
- * distances rest on that. */
-static void check_near(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
-                       uint32_t face)
+/* Checks that a listed face that does not touch the leaf touches it widened by 1/256: level-limited
+ * distances depend on that. */
+static void check_near(ebpo_tally *tally, const ebpo_reference_tree *view,
+                       const ebpo_reference_node *leaf, uint32_t face)
 {
     ebpo_frame frame = ebpo_frame_make(&view->box, leaf->cell);
     ebpo_corners corners;
@@ -66,11 +66,12 @@ static void check_near(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo
     }
     ebpo_face_corners(&view->tree->mesh, face, &corners);
     if (!ebpo_face_touches(&frame, &corners, tally))
-        report_unlisted(tally, leaf, face, "the leaf lists a face that does not come near it");
+        report_unlisted(tally, leaf, face, "the leaf lists a face that is not near it");
 }
 
-static void check_spare(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
-                        const face_list *list, const uint32_t *faces, uint64_t count)
+static void check_spare(ebpo_tally *tally, const ebpo_reference_tree *view,
+                        const ebpo_reference_node *leaf, const face_list *list,
+                        const uint32_t *faces, uint64_t count)
 {
     EBPO_FOR_ITEMS_SCATTERED(view->workspace, i, 0, list->ref_count)
         if (!is_among(faces, count, list->refs[i]))
@@ -80,8 +81,8 @@ static void check_spare(ebpo_tally *tally, const ebpo_twin_tree *view, const ebp
             check_near(tally, view, leaf, (uint32_t)(list->first + i));
 }
 
-static void check_leaf(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
-                       const uint32_t *faces, uint64_t count)
+static void check_leaf(ebpo_tally *tally, const ebpo_reference_tree *view,
+                       const ebpo_reference_node *leaf, const uint32_t *faces, uint64_t count)
 {
     face_list list = list_of(view, leaf);
     uint64_t found = 0;
@@ -110,8 +111,9 @@ static void check_leaf(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo
         check_spare(tally, view, leaf, &list, faces, count);
 }
 
-void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_twin_tree *view,
-                               const ebpo_twin_node *node, const uint32_t *faces, uint64_t count)
+void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_reference_tree *view,
+                               const ebpo_reference_node *node, const uint32_t *faces,
+                               uint64_t count)
 {
     if (node->type == EBPO_LEAF) {
         check_leaf(tally, view, node, faces, count);
@@ -126,13 +128,13 @@ void ebpo_check_terminal_lists(ebpo_tally *tally, const ebpo_twin_tree *view,
 
 enum { LIMIT_OF_LISTS = 1 << 16 };
 
-/* Different faces listed below a node, as long as they are no more than `limit`: twice as many are
- * held, however many there are, or where that were many a bit for each of the mesh. */
+/* Different faces listed below a node, while there are at most `limit`. Holds twice that many in a
+ * list or, where that would be large, a bit for each face of the mesh. */
 typedef struct gathering {
     uint32_t *faces;
-    uint8_t *seen; /* NULL where `faces` are held */
+    uint8_t *seen; /* NULL if `faces` is used */
     uint64_t count, capacity, limit;
-    bool more; /* than the limit */
+    bool more; /* more than the limit */
     bool short_of_memory;
 } gathering;
 
@@ -170,7 +172,7 @@ static void see_list(gathering *g, const face_list *list)
         see_face(g, list->first + i);
 }
 
-/* A list names no face twice, so that one longer than the limit decides. */
+/* A list contains no face twice, so a list longer than the limit decides. */
 static void gather_list(gathering *g, const face_list *list)
 {
     uint64_t more = (uint64_t)list->ref_count + list->new_count;
@@ -194,7 +196,8 @@ static void gather_list(gathering *g, const face_list *list)
         g->faces[g->count++] = (uint32_t)(list->first + i);
 }
 
-static void gather_below(gathering *g, const ebpo_twin_tree *view, const ebpo_twin_node *node)
+static void gather_below(gathering *g, const ebpo_reference_tree *view,
+                         const ebpo_reference_node *node)
 {
     if (g->more || g->short_of_memory)
         return;
@@ -203,12 +206,13 @@ static void gather_below(gathering *g, const ebpo_twin_tree *view, const ebpo_tw
         gather_list(g, &list);
     }
     for (unsigned octant = 0; node->type == EBPO_GRAY && octant < 8; octant++) {
-        ebpo_twin_node child = ebpo_twin_child(view, node, octant);
+        ebpo_reference_node child = ebpo_reference_child(view, node, octant);
         gather_below(g, view, &child);
     }
 }
 
-bool ebpo_lists_more_faces(const ebpo_twin_tree *view, const ebpo_twin_node *node, uint64_t limit)
+bool ebpo_lists_more_faces(const ebpo_reference_tree *view, const ebpo_reference_node *node,
+                           uint64_t limit)
 {
     gathering g = { .limit = limit };
     uint64_t faces = view->tree->mesh.face_count;
@@ -223,6 +227,6 @@ bool ebpo_lists_more_faces(const ebpo_twin_tree *view, const ebpo_twin_node *nod
         keep_different(&g);
     free(g.faces);
     ebpo_array_free(view->workspace, g.seen);
-    /* memory that is short proves nothing against the file */
+    /* a lack of memory proves nothing about the file */
     return g.more || g.short_of_memory;
 }

@@ -1,11 +1,10 @@
-/* Compares the mesh in a file with the mesh that it was made from.
+/* Compares the mesh in a file with its source mesh.
  *
- * The recorded repairs are done again on a copy of the source, which must then be bit for bit the
- * file's mesh. In the source's order vertices and faces are compared one by one, otherwise as
- * multisets. Of a subset, and of a component's file, the faces and vertices are compared with those
- * of their numbers in the source. Attributes must be the source's, in its order, but for elements
- * that were left out. Of a file whose coordinates an earlier version rounded, that is the only
- * violation. */
+ * The recorded repairs are repeated on a copy of the source, which must then equal the file's mesh
+ * bit for bit. In the source's order vertices and faces are compared one by one, otherwise as
+ * multisets. For a subset, or a component's file, faces and vertices are compared by their numbers
+ * in the source. Attributes must be the source's, in its order, except for omitted elements. If an
+ * earlier version rounded the coordinates, that is the only violation. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -64,54 +63,54 @@ static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_workspa
     return status;
 }
 
-/* As it was prepared. Faces that were turned without having been asked to agree were all flipped.
- */
-static unsigned steps_of(const ebpo_mend_record *asked)
+/* Returns the repair steps of the record. Faces that were flipped without a request for consistency
+ * were all flipped. */
+static unsigned steps_of(const ebpo_repair_record *queried)
 {
-    return (asked->weld ? EBPO_MEND_WELD : 0) | (asked->orient ? EBPO_MEND_ORIENT : 0) |
-           (asked->dropped_faces ? EBPO_MEND_DROP : 0) |
-           (!asked->orient && asked->flipped_faces ? EBPO_MEND_FLIP : 0) |
-           (asked->fill_holes ? EBPO_MEND_FILL : 0);
+    return (queried->weld ? EBPO_REPAIR_WELD : 0) | (queried->orient ? EBPO_REPAIR_ORIENT : 0) |
+           (queried->dropped_faces ? EBPO_REPAIR_DROP : 0) |
+           (!queried->orient && queried->flipped_faces ? EBPO_REPAIR_FLIP : 0) |
+           (queried->fill_holes ? EBPO_REPAIR_FILL : 0);
 }
 
-/* Earlier builds turned less, which their record tells. */
-static ebpo_status mend_again(ebpo_mesh *mesh, const ebpo_mesh *source,
-                              const ebpo_mend_record *asked, ebpo_mend_record *did,
-                              ebpo_workspace *workspace, ebpo_error *error)
+/* Earlier builds flipped fewer faces, as their record shows. */
+static ebpo_status repair_again(ebpo_mesh *mesh, const ebpo_mesh *source,
+                                const ebpo_repair_record *queried, ebpo_repair_record *did,
+                                ebpo_workspace *workspace, ebpo_error *error)
 {
-    const ebpo_mend_record fresh = *did;
+    const ebpo_repair_record fresh = *did;
     ebpo_status status = copy_mesh(mesh, source, workspace, error);
     if (status == EBPO_OK)
-        status = ebpo_mesh_mend(mesh, steps_of(asked), asked->weld_distance, did, error);
-    if (status != EBPO_OK || !asked->orient || did->flipped_faces == asked->flipped_faces)
+        status = ebpo_mesh_repair(mesh, steps_of(queried), queried->weld_distance, did, error);
+    if (status != EBPO_OK || !queried->orient || did->flipped_faces == queried->flipped_faces)
         return status;
     *did = fresh;
     ebpo_mesh_free(mesh);
     status = copy_mesh(mesh, source, workspace, error);
-    return status == EBPO_OK ? ebpo_mesh_mend(mesh, steps_of(asked) | EBPO_MEND_EARLIER,
-                                              asked->weld_distance, did, error)
+    return status == EBPO_OK ? ebpo_mesh_repair(mesh, steps_of(queried) | EBPO_REPAIR_EARLIER,
+                                                queried->weld_distance, did, error)
                              : status;
 }
 
-static void check_record(ebpo_tally *tally, const ebpo_mend_record *stored,
-                         const ebpo_mend_record *did)
+static void check_record(ebpo_tally *tally, const ebpo_repair_record *stored,
+                         const ebpo_repair_record *did)
 {
     CHECK(stored->welded_vertices == did->welded_vertices,
-          "%" PRIu64 " welded vertices are recorded, doing it again welds %" PRIu64,
+          "%" PRIu64 " welded vertices are recorded, repeating it welds %" PRIu64,
           stored->welded_vertices, did->welded_vertices);
     CHECK(stored->weld_moved == did->weld_moved && stored->collapsed_faces == did->collapsed_faces,
-          "welding by up to %g is recorded, doing it again moves vertices by up to %g",
+          "welding by up to %g is recorded, repeating it moves vertices by up to %g",
           stored->weld_moved, did->weld_moved);
     CHECK(stored->dropped_faces == did->dropped_faces,
-          "%" PRIu64 " dropped faces are recorded, doing it again drops %" PRIu64,
+          "%" PRIu64 " dropped faces are recorded, repeating it drops %" PRIu64,
           stored->dropped_faces, did->dropped_faces);
     CHECK(stored->flipped_faces == did->flipped_faces &&
               stored->unorientable_components == did->unorientable_components,
-          "%" PRIu64 " flipped faces are recorded, doing it again flips %" PRIu64,
+          "%" PRIu64 " flipped faces are recorded, repeating it flips %" PRIu64,
           stored->flipped_faces, did->flipped_faces);
     CHECK(stored->filled_holes == did->filled_holes && stored->added_faces == did->added_faces &&
               stored->unfilled_holes == did->unfilled_holes,
-          "%" PRIu64 " faces filling holes are recorded, doing it again adds %" PRIu64,
+          "%" PRIu64 " faces filling holes are recorded, repeating it adds %" PRIu64,
           stored->added_faces, did->added_faces);
 }
 
@@ -139,15 +138,15 @@ static bool same_head(const ebpo_attribute *a, const ebpo_attribute *b)
            a->type == b->type && a->list == b->list;
 }
 
-/* The digest and the bytes of an image that was not there are no claim. */
+/* Returns true for a missing image: its digest and bytes state nothing. */
 static bool image_unknown(const ebpo_attribute *source, uint64_t at, const ebpo_attribute *stored,
                           uint64_t i)
 {
     return !ebpo_texture_list(source, at).count || !ebpo_texture_list(stored, i).count;
 }
 
-/* Row i of the file's array is that of number `number[i]`, or i without numbers; numbers from
- * `rows` on are of faces that mending has added. */
+/* Compares row i of the file's array with row `number[i]` of the source, or i without numbers;
+ * numbers from `rows` on are of faces that repairs have added. */
 static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
                          const ebpo_attribute *stored, const uint32_t *number,
                          ebpo_workspace *workspace)
@@ -164,7 +163,7 @@ static void compare_rows(ebpo_tally *tally, const ebpo_attribute *source,
           differ, stored->names, stored->element);
 }
 
-/* Elements that are neither vertices nor faces are in each part as a whole. */
+/* Elements other than vertices and faces are complete in each part. */
 static const uint32_t *source_numbers(const ebpo_attribute *array, const ebpo_maps *maps)
 {
     if (maps && ebpo_attribute_is_of(array, "vertex"))
@@ -172,8 +171,8 @@ static const uint32_t *source_numbers(const ebpo_attribute *array, const ebpo_ma
     return maps && ebpo_attribute_is_of(array, "face") ? maps->face_source : NULL;
 }
 
-/* The file's arrays are the source's, in their order, but for those of elements that were left
- * out. */
+/* Checks that the file's arrays are the source's, in their order, except for arrays of omitted
+ * elements. */
 static void compare_attributes(ebpo_tally *tally, const ebpo_mesh *source, const ebpo_mesh *stored,
                                const ebpo_maps *maps)
 {
@@ -185,7 +184,7 @@ static void compare_attributes(ebpo_tally *tally, const ebpo_mesh *source, const
             compare_rows(tally, &a->array[i], &b->array[k++], source_numbers(&a->array[i], maps),
                          stored->workspace);
         else if (ebpo_attribute_is_of_mesh(&a->array[i]))
-            CHECK(false, "the attribute %s of %s is not where the source has it", a->array[i].names,
+            CHECK(false, "the attribute %s of %s is not in the source's order", a->array[i].names,
                   a->array[i].element);
     }
 }
@@ -210,7 +209,7 @@ static int compare_faces(const void *a, const void *b, void *mesh)
     return face_order(mesh, *(const uint32_t *)a, mesh, *(const uint32_t *)b);
 }
 
-/* 0 .. count - 1, sorted; NULL when memory is short. */
+/* Returns 0 .. count - 1, sorted; NULL without memory. */
 static uint32_t *sorted_order(const ebpo_mesh *mesh, uint64_t count,
                               int (*compare)(const void *, const void *, void *))
 {
@@ -243,8 +242,8 @@ static ebpo_status compare_as_sets(ebpo_tally *tally, const ebpo_mesh *a, const 
     return EBPO_OK;
 }
 
-/* Of each number in the source the face that has it now, or EBPO_NO_INDEX; NULL in *out: its own.
- */
+/* Lists for each number in the source the face that has it now, or EBPO_NO_INDEX; NULL in *out: the
+ * same numbers. */
 static ebpo_status list_places(const ebpo_mesh *whole, uint32_t **out, uint64_t *numbers,
                                ebpo_error *error)
 {
@@ -274,8 +273,8 @@ static bool same_corners(const ebpo_mesh *whole, const uint32_t *places, uint64_
     return true;
 }
 
-/* A subset's mesh, or one from which faces were dropped: each of its faces and vertices at its
- * number in the source. */
+/* Compares the mesh of a subset, or one with dropped faces: each face and vertex by its number in
+ * the source. */
 static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const ebpo_mesh *whole,
                                 const ebpo_read_options *read, ebpo_error *error)
 {
@@ -289,7 +288,7 @@ static ebpo_status compare_some(ebpo_tally *tally, const ebpo_file *file, const 
     if (status == EBPO_OK)
         status = list_places(whole, &places, &numbers, error);
     if (status == EBPO_OK && CHECK(!whole->xyz32 == !part.xyz32,
-                                   "the source and the file hold different kinds of coordinates")) {
+                                   "the source and the file have different kinds of coordinates")) {
         tally->checks[EBPO_VERIFY_SOURCE] += part.vertex_count + part.face_count;
         EBPO_FOR_ITEMS_SCATTERED(part.workspace, i, 0, part.vertex_count)
             if (maps.vertex_source[i] >= whole->vertex_count ||
@@ -323,7 +322,7 @@ static bool check_digest(ebpo_tally *tally, const ebpo_info *info, const ebpo_me
                  "the source file's digest or size is not the recorded one");
 }
 
-/* Returns whether an earlier version has made the file: it rounded the coordinates of OBJ, OFF and
+/* Returns true if an earlier version has made the file: it rounded the coordinates of OBJ, OFF and
  * text STL to floats, although the text has more digits. */
 static bool was_rounded(const ebpo_info *info, const ebpo_mesh *source)
 {
@@ -331,33 +330,34 @@ static bool was_rounded(const ebpo_info *info, const ebpo_mesh *source)
            strncmp(source->source_format, "ply", 3) != 0;
 }
 
-static ebpo_status compare_meshes(ebpo_tally *tally, const ebpo_mesh *mended,
+static ebpo_status compare_meshes(ebpo_tally *tally, const ebpo_mesh *was_repaired,
                                   const ebpo_mesh *stored, bool ordered, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    bool comparable =
-        CHECK(!mended->xyz32 == !stored->xyz32,
-              "the source and the file hold different kinds of coordinates") &&
-        CHECK(mended->vertex_count == stored->vertex_count &&
-                  mended->face_count == stored->face_count,
-              "the mended source has %" PRIu64 " vertices and %" PRIu64 " faces, the file %" PRIu64
-              " and %" PRIu64,
-              mended->vertex_count, mended->face_count, stored->vertex_count, stored->face_count);
+    bool comparable = CHECK(!was_repaired->xyz32 == !stored->xyz32,
+                            "the source and the file have different kinds of coordinates") &&
+                      CHECK(was_repaired->vertex_count == stored->vertex_count &&
+                                was_repaired->face_count == stored->face_count,
+                            "the repaired source has %" PRIu64 " vertices and %" PRIu64
+                            " faces, the file %" PRIu64 " and %" PRIu64,
+                            was_repaired->vertex_count, was_repaired->face_count,
+                            stored->vertex_count, stored->face_count);
     if (comparable && ordered)
-        compare_in_order(tally, mended, stored);
+        compare_in_order(tally, was_repaired, stored);
     if (comparable && ordered)
-        compare_attributes(tally, mended, stored, NULL);
+        compare_attributes(tally, was_repaired, stored, NULL);
     if (comparable && !ordered)
-        status = compare_as_sets(tally, mended, stored, false, error);
+        status = compare_as_sets(tally, was_repaired, stored, false, error);
     if (comparable && !ordered && status == EBPO_OK)
-        status = compare_as_sets(tally, mended, stored, true, error);
+        status = compare_as_sets(tally, was_repaired, stored, true, error);
     return status;
 }
 
-/* A component: its file says itself that there is more in the source. */
+/* A component: its file records that the source has more. */
 static bool is_part(const ebpo_info *info)
 {
-    return info->source_face_count + info->mend.added_faces - info->mend.dropped_faces >
+    return info->source_face_count + info->repair_record.added_faces -
+               info->repair_record.dropped_faces >
            info->face_count;
 }
 
@@ -367,47 +367,48 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
 {
     const ebpo_info *info = ebpo_file_info(file);
     if (check_digest(tally, info, source) && was_rounded(info, source)) {
-        /* vertices may have fallen together, and polygons have been cut in other ways */
+        /* vertices may have become equal, and polygons may have been cut in other ways */
         CHECK(false, "coordinates were rounded to single precision by an earlier version; convert "
                      "again");
         return EBPO_OK;
     }
     CHECK(info->source_vertex_count == source->vertex_count &&
               info->source_face_count == source->face_count,
-          "the source has %" PRIu64 " vertices and %" PRIu64 " faces, recorded are %" PRIu64
+          "the source has %" PRIu64 " vertices and %" PRIu64 " faces, but recorded are %" PRIu64
           " and %" PRIu64,
           source->vertex_count, source->face_count, info->source_vertex_count,
           info->source_face_count);
-    ebpo_mesh mended = { 0 };
-    const ebpo_mend_record *asked = &info->mend;
-    bool as_it_is = steps_of(asked) == 0;
-    ebpo_mend_record did = { .weld = info->mend.weld,
-                             .orient = info->mend.orient,
-                             .fill_holes = info->mend.fill_holes };
+    ebpo_mesh was_repaired = { 0 };
+    const ebpo_repair_record *queried = &info->repair_record;
+    bool as_it_is = steps_of(queried) == 0;
+    ebpo_repair_record did = { .weld = info->repair_record.weld,
+                               .orient = info->repair_record.orient,
+                               .fill_holes = info->repair_record.fill_holes };
     ebpo_status status =
-        as_it_is ? EBPO_OK : mend_again(&mended, source, asked, &did, read->workspace, error);
-    if (status == EBPO_E_ARGUMENT) { /* the record's, not the caller's */
-        CHECK(false, "welding within %g is recorded, and the source cannot be welded within it",
-              asked->weld_distance);
-        ebpo_mesh_free(&mended);
+        as_it_is ? EBPO_OK
+                 : repair_again(&was_repaired, source, queried, &did, read->workspace, error);
+    if (status == EBPO_E_ARGUMENT) { /* due to the record, not the caller */
+        CHECK(false, "welding within %g is recorded, but the source cannot be welded within it",
+              queried->weld_distance);
+        ebpo_mesh_free(&was_repaired);
         return EBPO_OK;
     }
-    const ebpo_mesh *made = as_it_is ? source : &mended;
+    const ebpo_mesh *made = as_it_is ? source : &was_repaired;
     if (status == EBPO_OK)
-        check_record(tally, &info->mend, &did);
-    bool mapped = info->parts & EBPO_PART_MAPS; /* else nothing says which faces these are */
-    bool by_number = is_part(info) || (info->mend.dropped_faces && mapped);
-    if (status == EBPO_OK && stored && info->mend.dropped_faces && !is_part(info))
+        check_record(tally, &info->repair_record, &did);
+    bool mapped = info->parts & EBPO_PART_MAPS; /* else the faces are unknown */
+    bool by_number = is_part(info) || (info->repair_record.dropped_faces && mapped);
+    if (status == EBPO_OK && stored && info->repair_record.dropped_faces && !is_part(info))
         CHECK(made->vertex_count == stored->vertex_count && made->face_count == stored->face_count,
-              "the mended source has %" PRIu64 " vertices and %" PRIu64 " faces, the file %" PRIu64
-              " and %" PRIu64,
+              "the repaired source has %" PRIu64 " vertices and %" PRIu64
+              " faces, the file %" PRIu64 " and %" PRIu64,
               made->vertex_count, made->face_count, stored->vertex_count, stored->face_count);
     if (status == EBPO_OK && stored && !by_number)
         status = compare_meshes(tally, made, stored, ordered, error);
     else if (status == EBPO_OK && mapped)
         status = compare_some(tally, file, made, read, error);
     else if (status == EBPO_OK && stored)
-        CHECK(mapped, "the file has a part of the source, and no maps that say which");
-    ebpo_mesh_free(&mended);
+        CHECK(mapped, "the file has a part of the source, and no maps that identify it");
+    ebpo_mesh_free(&was_repaired);
     return status;
 }

@@ -1,9 +1,9 @@
-/* Verifies the table of subtrees (format-spec/README.md, section 9) by counting it anew: one visit
- * of the whole tree, leaf by leaf in the order of the faces.
+/* Verifies the table of subtrees (format-spec/README.md, section 9) by recounting it: one visit of
+ * the whole tree, leaf by leaf in the order of the faces.
  *
  * Every column of every row is recomputed: ranks, faces, vertices, and the blocks of shared faces
- * and vertices that are stored with other subtrees, each listed that is needed, and no other.
- * Writer and reader go level by level; nothing of theirs is used but the reading of arrays. */
+ * and vertices that are stored with other subtrees, where exactly the needed ones must be listed.
+ * Writer and reader proceed level by level; only the reading of arrays is shared with them. */
 #include "verify/verify_parts.h"
 
 #include <inttypes.h>
@@ -23,8 +23,8 @@ enum {
     FACES,
     VERTICES_BETWEEN,
     VERTICES,
-    OUTER_FACES,
-    OUTER_VERTICES,
+    SHARED_FACES,
+    SHARED_VERTICES,
     FIRST_LEVEL,
     GRAY = 0,
     LEAF,
@@ -34,7 +34,7 @@ enum {
     REFERENCES,
     END,
     OF_A_LEVEL,
-    MOST_COLS = FIRST_LEVEL + OF_A_LEVEL * EBPO_LEVELS_MAX
+    MAX_COLS = FIRST_LEVEL + OF_A_LEVEL * EBPO_LEVELS_MAX
 };
 enum { ROWS_OF_FACES = 2048, ROWS_OF_VERTICES = 1024, SUBTREES_A_TIME = 128 };
 static const char *const names[] = { "faces before", "faces",           "vertices before",
@@ -42,26 +42,26 @@ static const char *const names[] = { "faces before", "faces",           "vertice
 static const char *const level_names[] = { "gray nodes",  "leaves",     "black nodes",   "planes",
                                            "leaf planes", "references", "the faces' end" };
 
-/* Numbers as they come up. */
+/* Numbers in order of appearance. */
 typedef struct numbers {
     uint32_t *at;
     uint64_t count, capacity;
-    uint64_t different; /* when they were last sorted */
+    uint64_t different; /* count at the last sort */
 } numbers;
 
 typedef struct recount {
     ebpo_tally *tally;
-    const ebpo_twin_tree *view;
-    int level; /* of the subtrees' roots */
+    const ebpo_reference_tree *view;
+    int level; /* level of the subtrees' roots */
     unsigned cols, rows_of_chunk;
     const uint32_t *counts, *outer;
     const uint64_t *index;
-    uint64_t subtrees, outer_rows;
-    /* so far */
+    uint64_t subtrees, shared_rows;
+    /* counts so far */
     uint64_t subtree, faces, vertices, outer_done, end[EBPO_LEVELS_MAX];
-    uint64_t sum[MOST_COLS], row[MOST_COLS];
-    bool within; /* a subtree */
-    numbers outer_faces;
+    uint64_t sum[MAX_COLS], row[MAX_COLS];
+    bool within; /* within a subtree */
+    numbers shared_faces;
     bool no_memory;
 } recount;
 
@@ -93,7 +93,7 @@ static void sort_once(numbers *list)
     list->count = kept;
 }
 
-/* Of numbers that come again and again, without keeping each time. */
+/* Adds numbers that recur often, without keeping each occurrence. */
 static bool add_block(numbers *list, uint32_t block)
 {
     if (list->count >= 2 * list->different + 4096) {
@@ -113,20 +113,20 @@ static const char *column_name(const recount *c, unsigned column, int *level)
 
 /* --- comparing a complete subtree with its row --- */
 
-/* The distances that must be listed, against those that are. */
-static void compare_outer(recount *c, const char *what, uint64_t from, const numbers *needed,
-                          unsigned column)
+/* Compares the distances that must be listed with the stored ones. */
+static void compare_shared(recount *c, const char *what, uint64_t from, const numbers *needed,
+                           unsigned column)
 {
     ebpo_tally *tally = c->tally;
     uint64_t first = c->outer_done, i = 0;
     for (; i < needed->count; i++)
-        if (first + i >= c->outer_rows || c->outer[first + i] > from ||
+        if (first + i >= c->shared_rows || c->outer[first + i] > from ||
             from - c->outer[first + i] != needed->at[needed->count - 1 - i])
             break;
     if (i < needed->count)
         CHECK(false,
               "/subtrees/outer, subtree %" PRIu64 ": needs block %" PRIu32
-              " of %s, which is not the next in the list",
+              " of %s, which is not the next entry of the list",
               c->subtree, needed->at[needed->count - 1 - i], what);
     else
         CHECK(true, "%s", "");
@@ -143,25 +143,26 @@ static void note_vertices(recount *c, numbers *blocks, uint64_t face, uint64_t f
     }
 }
 
-static void check_outer(recount *c)
+static void check_shared(recount *c)
 {
     numbers faces = { 0 }, vertices = { 0 };
     uint64_t first_face = c->faces - c->row[FACES], first_vertex = c->vertices - c->row[VERTICES];
-    EBPO_FOR_ITEMS_SCATTERED(c->view->workspace, i, 0, c->outer_faces.count)
-        if (c->outer_faces.at[i] < first_face) {
-            if (!add_block(&faces, c->outer_faces.at[i] / ROWS_OF_FACES))
+    EBPO_FOR_ITEMS_SCATTERED(c->view->workspace, i, 0, c->shared_faces.count)
+        if (c->shared_faces.at[i] < first_face) {
+            if (!add_block(&faces, c->shared_faces.at[i] / ROWS_OF_FACES))
                 c->no_memory = true;
-            note_vertices(c, &vertices, c->outer_faces.at[i], first_vertex);
+            note_vertices(c, &vertices, c->shared_faces.at[i], first_vertex);
         }
     EBPO_FOR_ITEMS(c->view->workspace, face, first_face, c->faces)
         note_vertices(c, &vertices, face, first_vertex);
     sort_once(&faces);
     sort_once(&vertices);
-    compare_outer(c, "/mesh/faces", first_face / ROWS_OF_FACES, &faces, OUTER_FACES);
-    compare_outer(c, "/mesh/vertices", first_vertex / ROWS_OF_VERTICES, &vertices, OUTER_VERTICES);
+    compare_shared(c, "/mesh/faces", first_face / ROWS_OF_FACES, &faces, SHARED_FACES);
+    compare_shared(c, "/mesh/vertices", first_vertex / ROWS_OF_VERTICES, &vertices,
+                   SHARED_VERTICES);
     free(faces.at);
     free(vertices.at);
-    c->outer_faces.count = 0;
+    c->shared_faces.count = 0;
 }
 
 static void check_row(recount *c)
@@ -170,7 +171,7 @@ static void check_row(recount *c)
     const uint32_t *stated = c->counts + c->subtree * c->cols;
     int level;
     if (c->view->has_mesh)
-        check_outer(c);
+        check_shared(c);
     for (unsigned k = 0; k < c->cols; k++) {
         const char *name = column_name(c, k, &level);
         if (c->subtree % c->rows_of_chunk == 0)
@@ -190,7 +191,7 @@ static void check_row(recount *c)
 
 /* --- visiting the tree --- */
 
-/* Faces that are new in a leaf, and vertices that are new in these. */
+/* Counts faces that are new in a leaf, and vertices that are new in these faces. */
 static void see_faces(recount *c, uint64_t count)
 {
     const ebpo_mesh *mesh = &c->view->tree->mesh;
@@ -203,44 +204,44 @@ static void see_faces(recount *c, uint64_t count)
     c->vertices = seen;
 }
 
-static void see_leaf(recount *c, const ebpo_twin_node *leaf, uint64_t *row)
+static void see_leaf(recount *c, const ebpo_reference_node *leaf, uint64_t *row)
 {
     const ebpo_level *level = &c->view->tree->level[leaf->cell.level];
     uint32_t planes, references;
     if (c->within) {
-        (void)ebpo_twin_planes(c->view, leaf, &planes);
+        (void)ebpo_reference_planes(c->view, leaf, &planes);
         row[LEAF]++;
         row[LEAF_PLANES] += planes;
     }
     if (!c->view->has_mesh)
         return;
     if (c->within) {
-        const uint32_t *face = ebpo_twin_refs(c->view, leaf, &references);
+        const uint32_t *face = ebpo_reference_refs(c->view, leaf, &references);
         uint64_t end = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
         EBPO_FOR_ITEMS(c->view->workspace, i, 0, references)
-            if (!add_number(c->view->workspace, &c->outer_faces, face[i]))
+            if (!add_number(c->view->workspace, &c->shared_faces, face[i]))
                 c->no_memory = true;
         row[REFERENCES] += references;
         row[END] += end - c->end[leaf->cell.level];
         c->end[leaf->cell.level] = end;
     }
-    /* the leaves' faces follow one another, which is checked elsewhere */
+    /* the leaves' faces are consecutive, which is checked elsewhere */
     if (c->faces + level->leaf_new[leaf->rank] <= c->view->tree->mesh.face_count)
         see_faces(c, level->leaf_new[leaf->rank]);
 }
 
-static void see_node(recount *c, const ebpo_twin_node *node);
+static void see_node(recount *c, const ebpo_reference_node *node);
 
-static void see_children(recount *c, const ebpo_twin_node *node)
+static void see_children(recount *c, const ebpo_reference_node *node)
 {
-    if (!ebpo_twin_is_pruned(c->view, node))
+    if (!ebpo_reference_is_pruned(c->view, node))
         for (unsigned octant = 0; octant < 8; octant++) {
-            ebpo_twin_node child = ebpo_twin_child(c->view, node, octant);
+            ebpo_reference_node child = ebpo_reference_child(c->view, node, octant);
             see_node(c, &child);
         }
 }
 
-static void see_node(recount *c, const ebpo_twin_node *node)
+static void see_node(recount *c, const ebpo_reference_node *node)
 {
     uint64_t *row =
         c->within ? c->row + FIRST_LEVEL + OF_A_LEVEL * (unsigned)(node->cell.level - c->level - 1)
@@ -251,7 +252,7 @@ static void see_node(recount *c, const ebpo_twin_node *node)
     else if (node->type == EBPO_BLACK && c->within)
         row[BLACK]++;
     else if (node->type == EBPO_GRAY && c->within) {
-        (void)ebpo_twin_planes(c->view, node, &planes);
+        (void)ebpo_reference_planes(c->view, node, &planes);
         row[GRAY]++;
         row[PLANES] += planes;
         see_children(c, node);
@@ -269,22 +270,22 @@ static void see_node(recount *c, const ebpo_twin_node *node)
 static ebpo_status recount_table(recount *c, ebpo_error *error)
 {
     ebpo_tally *tally = c->tally;
-    ebpo_twin_node root = ebpo_twin_root(c->view);
+    ebpo_reference_node root = ebpo_reference_root(c->view);
     see_node(c, &root);
-    CHECK(c->outer_done == c->outer_rows,
-          "/subtrees/outer has %" PRIu64 " rows, but %" PRIu64 " blocks are needed", c->outer_rows,
+    CHECK(c->outer_done == c->shared_rows,
+          "/subtrees/outer has %" PRIu64 " rows, but %" PRIu64 " blocks are needed", c->shared_rows,
           c->outer_done);
-    ebpo_array_free(c->view->workspace, c->outer_faces.at);
+    ebpo_array_free(c->view->workspace, c->shared_faces.at);
     return c->no_memory ? ebpo_workspace_fail_while(c->view->workspace, "counting subtrees", error)
                         : EBPO_OK;
 }
 
 ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
-                                const ebpo_twin_tree *view, const ebpo_verify_options *options,
+                                const ebpo_reference_tree *view, const ebpo_verify_options *options,
                                 ebpo_error *error)
 {
     const ebpo_array_in *counts = ebpo_reader_array(file, EBPO_A_SUBTREE_COUNTS, 0),
-                        *outer = ebpo_reader_array(file, EBPO_A_SUBTREE_OUTER, 0);
+                        *outer = ebpo_reader_array(file, EBPO_A_SUBTREE_SHARED, 0);
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     ebpo_error own = EBPO_ERROR_INIT;
     recount c = { .tally = tally, .view = view, .level = file->info.subtree_level };
@@ -294,14 +295,14 @@ ebpo_status ebpo_check_subtrees(ebpo_tally *tally, const ebpo_file *file,
         return EBPO_OK;
     c.cols = counts->shape.cols;
     c.rows_of_chunk = counts->shape.chunk_rows;
-    c.outer_rows = outer->present ? outer->shape.rows : 0;
+    c.shared_rows = outer->present ? outer->shape.rows : 0;
     ebpo_status status = ebpo_reader_make(file, EBPO_A_SUBTREE_COUNTS, 0, &read, sizeof *c.counts,
                                           (void *)&c.counts, &own);
     if (status == EBPO_OK)
         status = ebpo_reader_make(file, EBPO_A_SUBTREE_INDEX, 0, &read, sizeof *c.index,
                                   (void *)&c.index, &own);
     if (status == EBPO_OK)
-        status = ebpo_reader_make(file, EBPO_A_SUBTREE_OUTER, 0, &read, sizeof *c.outer,
+        status = ebpo_reader_make(file, EBPO_A_SUBTREE_SHARED, 0, &read, sizeof *c.outer,
                                   (void *)&c.outer, &own);
     if (status == EBPO_OK)
         status = recount_table(&c, &own);

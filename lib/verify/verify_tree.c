@@ -1,15 +1,15 @@
 /* A tree in memory as the verifier sees it, and the checks that need no face: nesting and
  * structure.
  *
- * - Nodes are found by rank: counts before each group of siblings give the place of a node's
+ * - Nodes are found by rank: counts before each group of siblings give the positions of a node's
  *   children, planes, lists and winding number.
  * - Structure: the arrays fit together (ebpo_check_shape; nothing else is checked before), and the
- *   tree is one that the format allows: summaries, leaf sizes, the order of faces, the root box,
+ *   format allows the tree: summaries, leaf sizes, the order of faces, the root box,
  *   balanced edges of a solid.
  * - Nesting: a node's envelope is its own planes and all its ancestors', so it is within its
- *   parent's by definition, as long as a plane means the same in every cell's coordinates. That is
- *   checked in integers on points of sampled cells: each plane is taken down to the cell, and the
- *   point is taken up to the plane. */
+ *   parent's by definition, if a plane means the same in every cell's coordinates. That is
+ *   checked in integers on points of sampled cells: each plane is transformed down to the cell,
+ *   and the point up to the plane. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -26,12 +26,12 @@
 
 /* --- finding nodes --- */
 
-/* Adds what a group holds to the running counts. */
-static void add_group(ebpo_twin_group *sum, const ebpo_twin_tree *view, const ebpo_level *level,
-                      uint64_t group, unsigned octants)
+/* Adds a group's contents to the running counts. */
+static void add_group(ebpo_reference_group *sum, const ebpo_reference_tree *view,
+                      const ebpo_level *level, uint64_t group, unsigned octants)
 {
     for (unsigned octant = 0; octant < octants; octant++) {
-        ebpo_node_type type = ebpo_twin_type(level, group, octant);
+        ebpo_node_type type = ebpo_reference_type(level, group, octant);
         uint64_t rank = sum->of_type[type]++;
         if (type == EBPO_GRAY && view->has_planes)
             sum->planes += level->plane_counts[rank];
@@ -44,12 +44,12 @@ static void add_group(ebpo_twin_group *sum, const ebpo_twin_tree *view, const eb
 
 static unsigned octants_at(int level) { return level == 0 ? 1 : 8; }
 
-ebpo_status ebpo_twin_make(ebpo_twin_tree *out, const ebpo_tree *tree, ebpo_workspace *workspace,
-                           ebpo_error *error)
+ebpo_status ebpo_reference_make(ebpo_reference_tree *out, const ebpo_tree *tree,
+                                ebpo_workspace *workspace, ebpo_error *error)
 {
-    *out = (ebpo_twin_tree){ .tree = tree,
-                             .workspace = workspace,
-                             .box.grid_level = tree->info.grid_level };
+    *out = (ebpo_reference_tree){ .tree = tree,
+                                  .workspace = workspace,
+                                  .box.grid_level = tree->info.grid_level };
     for (int k = 0; k < 3; k++) {
         out->box.origin[k] = tree->info.box_origin[k];
         out->box.size[k] = tree->info.box_size[k];
@@ -61,11 +61,11 @@ ebpo_status ebpo_twin_make(ebpo_twin_tree *out, const ebpo_tree *tree, ebpo_work
         const ebpo_level *level = &tree->level[l];
         out->groups[l] = ebpo_array_alloc(workspace, level->group_count, sizeof *out->groups[l]);
         if (!out->groups[l]) {
-            ebpo_twin_free(out);
+            ebpo_reference_free(out);
             return ebpo_workspace_fail(workspace, level->group_count * sizeof *out->groups[l],
                                        error);
         }
-        ebpo_twin_group sum = { 0 };
+        ebpo_reference_group sum = { 0 };
         EBPO_FOR_ITEMS(workspace, group, 0, level->group_count) {
             out->groups[l][group] = sum;
             add_group(&sum, out, level, group, octants_at(l));
@@ -74,31 +74,33 @@ ebpo_status ebpo_twin_make(ebpo_twin_tree *out, const ebpo_tree *tree, ebpo_work
     return EBPO_OK;
 }
 
-void ebpo_twin_free(ebpo_twin_tree *view)
+void ebpo_reference_free(ebpo_reference_tree *view)
 {
     for (int l = 0; l < EBPO_LEVELS_MAX; l++)
         ebpo_array_free(view->workspace, view->groups[l]);
-    *view = (ebpo_twin_tree){ 0 };
+    *view = (ebpo_reference_tree){ 0 };
 }
 
 /* Fills in type and rank. */
-static ebpo_twin_node node_in_group(const ebpo_twin_tree *view, ebpo_octcode code, ebpo_cell cell,
-                                    uint64_t group, unsigned octant)
+static ebpo_reference_node node_in_group(const ebpo_reference_tree *view, ebpo_octcode code,
+                                         ebpo_cell cell, uint64_t group, unsigned octant)
 {
     const ebpo_level *level = &view->tree->level[cell.level];
-    ebpo_twin_node node = { code, cell, group, octant, ebpo_twin_type(level, group, octant), 0 };
+    ebpo_reference_node node = {
+        code, cell, group, octant, ebpo_reference_type(level, group, octant), 0
+    };
     node.rank = view->groups[cell.level][group].of_type[node.type];
     for (unsigned i = 0; i < octant; i++)
-        node.rank += ebpo_twin_type(level, group, i) == node.type;
+        node.rank += ebpo_reference_type(level, group, i) == node.type;
     return node;
 }
 
-ebpo_twin_node ebpo_twin_root(const ebpo_twin_tree *view)
+ebpo_reference_node ebpo_reference_root(const ebpo_reference_tree *view)
 {
     return node_in_group(view, 1, (ebpo_cell){ 0, { 0, 0, 0 } }, 0, 0);
 }
 
-bool ebpo_twin_is_pruned(const ebpo_twin_tree *view, const ebpo_twin_node *node)
+bool ebpo_reference_is_pruned(const ebpo_reference_tree *view, const ebpo_reference_node *node)
 {
     const ebpo_tree *tree = view->tree;
     if (!tree->info.pruned || node->type != EBPO_GRAY)
@@ -107,8 +109,8 @@ bool ebpo_twin_is_pruned(const ebpo_twin_tree *view, const ebpo_twin_node *node)
            tree->level[node->cell.level + 1].types[node->rank] == 0;
 }
 
-ebpo_twin_node ebpo_twin_child(const ebpo_twin_tree *view, const ebpo_twin_node *node,
-                               unsigned octant)
+ebpo_reference_node ebpo_reference_child(const ebpo_reference_tree *view,
+                                         const ebpo_reference_node *node, unsigned octant)
 {
     ebpo_cell cell = { node->cell.level + 1, { 0 } };
     for (int k = 0; k < 3; k++)
@@ -116,8 +118,8 @@ ebpo_twin_node ebpo_twin_child(const ebpo_twin_tree *view, const ebpo_twin_node 
     return node_in_group(view, ebpo_octcode_child(node->code, octant), cell, node->rank, octant);
 }
 
-/* Group of `level` that holds the gray node of this rank. */
-static uint64_t group_of_gray(const ebpo_twin_tree *view, int level, uint64_t rank)
+/* Returns the group of `level` that contains the gray node of this rank. */
+static uint64_t group_of_gray(const ebpo_reference_tree *view, int level, uint64_t rank)
 {
     uint64_t low = 0, high = view->tree->level[level].group_count;
     while (high - low > 1) {
@@ -130,9 +132,9 @@ static uint64_t group_of_gray(const ebpo_twin_tree *view, int level, uint64_t ra
     return low;
 }
 
-/* The node at a place of a level; climbs to the root to find its cell. */
-static ebpo_twin_node twin_at(const ebpo_twin_tree *view, int level, uint64_t group,
-                              unsigned octant)
+/* Returns the node at a position of a level; climbs to the root to find its cell. */
+static ebpo_reference_node reference_at(const ebpo_reference_tree *view, int level, uint64_t group,
+                                        unsigned octant)
 {
     unsigned path[EBPO_LEVELS_MAX];
     path[level] = octant;
@@ -141,22 +143,22 @@ static ebpo_twin_node twin_at(const ebpo_twin_tree *view, int level, uint64_t gr
         group = group_of_gray(view, l, rank);
         uint64_t before = view->groups[l][group].of_type[EBPO_GRAY];
         unsigned i = 0;
-        while (i < 7 &&
-               !(ebpo_twin_type(&view->tree->level[l], group, i) == EBPO_GRAY && before++ == rank))
+        while (i < 7 && !(ebpo_reference_type(&view->tree->level[l], group, i) == EBPO_GRAY &&
+                          before++ == rank))
             i++;
         path[l] = i;
     }
-    ebpo_twin_node node = ebpo_twin_root(view);
+    ebpo_reference_node node = ebpo_reference_root(view);
     for (int l = 1; l <= level; l++)
-        node = ebpo_twin_child(view, &node, path[l]);
+        node = ebpo_reference_child(view, &node, path[l]);
     return node;
 }
 
-const uint32_t *ebpo_twin_planes(const ebpo_twin_tree *view, const ebpo_twin_node *node,
-                                 uint32_t *count)
+const uint32_t *ebpo_reference_planes(const ebpo_reference_tree *view,
+                                      const ebpo_reference_node *node, uint32_t *count)
 {
     const ebpo_level *level = &view->tree->level[node->cell.level];
-    const ebpo_twin_group *group = &view->groups[node->cell.level][node->group];
+    const ebpo_reference_group *group = &view->groups[node->cell.level][node->group];
     bool gray = node->type == EBPO_GRAY;
     *count = 0;
     if (gray ? !view->has_planes : node->type != EBPO_LEAF || !view->has_leaf_planes)
@@ -169,11 +171,11 @@ const uint32_t *ebpo_twin_planes(const ebpo_twin_tree *view, const ebpo_twin_nod
     return *count ? (gray ? level->planes : level->leaf_planes) + first : NULL;
 }
 
-const uint32_t *ebpo_twin_refs(const ebpo_twin_tree *view, const ebpo_twin_node *leaf,
-                               uint32_t *count)
+const uint32_t *ebpo_reference_refs(const ebpo_reference_tree *view,
+                                    const ebpo_reference_node *leaf, uint32_t *count)
 {
     const ebpo_level *level = &view->tree->level[leaf->cell.level];
-    const ebpo_twin_group *group = &view->groups[leaf->cell.level][leaf->group];
+    const ebpo_reference_group *group = &view->groups[leaf->cell.level][leaf->group];
     uint64_t first = group->refs;
     for (uint64_t rank = group->of_type[EBPO_LEAF]; rank < leaf->rank; rank++)
         first += level->leaf_ref_count[rank];
@@ -181,7 +183,7 @@ const uint32_t *ebpo_twin_refs(const ebpo_twin_tree *view, const ebpo_twin_node 
     return *count ? level->leaf_refs + first : NULL;
 }
 
-int64_t ebpo_twin_winding(const ebpo_twin_tree *view, const ebpo_twin_node *node)
+int64_t ebpo_reference_winding(const ebpo_reference_tree *view, const ebpo_reference_node *node)
 {
     const ebpo_level *level = &view->tree->level[node->cell.level];
     switch (node->type) {
@@ -196,30 +198,32 @@ int64_t ebpo_twin_winding(const ebpo_twin_tree *view, const ebpo_twin_node *node
 
 enum { NODES_PER_LEVEL = 256, POINTS_PER_NODE = 8, POINT_BITS = 16 };
 
-static void check_codes(ebpo_tally *tally, const ebpo_twin_tree *view, int l, ebpo_node_type type,
-                        const uint8_t *counts)
+static void check_codes(ebpo_tally *tally, const ebpo_reference_tree *view, int l,
+                        ebpo_node_type type, const uint8_t *counts)
 {
     const ebpo_level *level = &view->tree->level[l];
     EBPO_FOR_ITEMS(level->workspace, group, 0, level->group_count)
         for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++) {
-            if (ebpo_twin_type(level, group, octant) != type)
+            if (ebpo_reference_type(level, group, octant) != type)
                 continue;
             uint64_t rank = view->groups[l][group].of_type[type];
             for (unsigned i = 0; i < octant; i++)
-                rank += ebpo_twin_type(level, group, i) == type;
-            ebpo_twin_node node = {
+                rank += ebpo_reference_type(level, group, i) == type;
+            ebpo_reference_node node = {
                 .group = group, .octant = octant, .type = type, .rank = rank, .cell.level = l
             };
             uint32_t count;
-            const uint32_t *codes = counts[rank] ? ebpo_twin_planes(view, &node, &count) : NULL;
+            const uint32_t *codes =
+                counts[rank] ? ebpo_reference_planes(view, &node, &count) : NULL;
             for (uint32_t i = 0; i < counts[rank]; i++) {
                 int32_t n[3], d;
                 tally->checks[EBPO_VERIFY_NESTING]++;
                 if (!ebpo_plane_decode(codes[i], n, &d))
                     ebpo_tally_violation(tally, EBPO_VERIFY_NESTING,
-                                         &(ebpo_verify_place){ twin_at(view, l, group, octant).code,
-                                                               EBPO_NO_FACE, i },
-                                         "the code %08x stands for no plane", (unsigned)codes[i]);
+                                         &(ebpo_verify_place){
+                                             reference_at(view, l, group, octant).code,
+                                             EBPO_NO_FACE, i },
+                                         "the code %08x is no plane", (unsigned)codes[i]);
             }
         }
 }
@@ -227,20 +231,20 @@ static void check_codes(ebpo_tally *tally, const ebpo_twin_tree *view, int l, eb
 /* A chain of nodes from the root down. */
 typedef struct chain {
     int depth;
-    ebpo_twin_node node[EBPO_LEVELS_MAX];
+    ebpo_reference_node node[EBPO_LEVELS_MAX];
 } chain;
 
-static void chain_to(chain *out, const ebpo_twin_tree *view, const ebpo_twin_node *end)
+static void chain_to(chain *out, const ebpo_reference_tree *view, const ebpo_reference_node *end)
 {
     out->depth = end->cell.level;
-    out->node[0] = ebpo_twin_root(view);
+    out->node[0] = ebpo_reference_root(view);
     for (int l = 1; l <= out->depth; l++)
-        out->node[l] = ebpo_twin_child(view, &out->node[l - 1],
-                                       (unsigned)(end->code >> 3 * (out->depth - l) & 7));
+        out->node[l] = ebpo_reference_child(view, &out->node[l - 1],
+                                            (unsigned)(end->code >> 3 * (out->depth - l) & 7));
 }
 
-/* The point (in 2^-16 of the cell `at`) against a plane of the cell `above`, in the coordinates of
- * `above`. */
+/* Compares the point (in 2^-16 of the cell `at`) with a plane of the cell `above`, in the
+ * coordinates of `above`. */
 static bool keeps_above(const ebpo_cell *above, const ebpo_cell *at, const int64_t point[3],
                         const int32_t n[3], int64_t d)
 {
@@ -255,7 +259,7 @@ static bool keeps_above(const ebpo_cell *above, const ebpo_cell *at, const int64
                                     ebpo_wide_signed_product(d, INT64_C(1) << (POINT_BITS + down)));
 }
 
-/* The same, with the plane taken down level by level as readers do. */
+/* Makes the same comparison with the plane transformed down level by level as readers do. */
 static bool keeps_below(const chain *c, int from, int to, const int64_t point[3],
                         const int32_t n[3], int64_t d)
 {
@@ -268,13 +272,13 @@ static bool keeps_below(const chain *c, int from, int to, const int64_t point[3]
                                     ebpo_wide_signed_product(d, 1 << POINT_BITS));
 }
 
-static void check_point(ebpo_tally *tally, const ebpo_twin_tree *view, const chain *c,
+static void check_point(ebpo_tally *tally, const ebpo_reference_tree *view, const chain *c,
                         const int64_t point[3])
 {
     const ebpo_cell *at = &c->node[c->depth].cell;
     for (int l = 0; l < c->depth; l++) {
         uint32_t count;
-        const uint32_t *codes = ebpo_twin_planes(view, &c->node[l], &count);
+        const uint32_t *codes = ebpo_reference_planes(view, &c->node[l], &count);
         for (uint32_t i = 0; i < count; i++) {
             int32_t n[3], d;
             if (!ebpo_plane_decode(codes[i], n, &d))
@@ -293,25 +297,27 @@ static void check_point(ebpo_tally *tally, const ebpo_twin_tree *view, const cha
     }
 }
 
-/* Walls of a cell are walls or the middle of its parent, as doubles too. */
-static void check_walls(ebpo_tally *tally, const ebpo_twin_tree *view, const ebpo_twin_node *node)
+/* Checks that cell faces are cell faces or the middle of the parent, as doubles too. */
+static void check_cell_faces(ebpo_tally *tally, const ebpo_reference_tree *view,
+                             const ebpo_reference_node *node)
 {
     int level = node->cell.level;
     bool same = true;
     for (int k = 0; k < 3; k++) {
         uint32_t even = node->cell.at[k] & ~1u, at = node->cell.at[k];
-        same &= ebpo_wall(&view->box, k, level, even) ==
-                    ebpo_wall(&view->box, k, level - 1, even / 2) &&
-                ebpo_wall(&view->box, k, level, even + 2) ==
-                    ebpo_wall(&view->box, k, level - 1, even / 2 + 1) &&
-                ebpo_wall(&view->box, k, level, at + 1) - ebpo_wall(&view->box, k, level, at) ==
+        same &= ebpo_cell_face(&view->box, k, level, even) ==
+                    ebpo_cell_face(&view->box, k, level - 1, even / 2) &&
+                ebpo_cell_face(&view->box, k, level, even + 2) ==
+                    ebpo_cell_face(&view->box, k, level - 1, even / 2 + 1) &&
+                ebpo_cell_face(&view->box, k, level, at + 1) -
+                        ebpo_cell_face(&view->box, k, level, at) ==
                     view->box.size[k] / (double)(1u << level);
     }
     tally->checks[EBPO_VERIFY_NESTING]++;
     if (!same)
         ebpo_tally_violation(tally, EBPO_VERIFY_NESTING,
                              &(ebpo_verify_place){ node->code, EBPO_NO_FACE, EBPO_NO_PLANE },
-                             "the walls of the cell are not walls of its parent's grid");
+                             "the cell's faces are not on its parent's grid");
 }
 
 static uint64_t next_random(uint64_t *state)
@@ -322,13 +328,13 @@ static uint64_t next_random(uint64_t *state)
     return *state;
 }
 
-/* Random points of the cell, and its corners. */
-static void check_nesting_at(ebpo_tally *tally, const ebpo_twin_tree *view,
-                             const ebpo_twin_node *node)
+/* Checks random points of the cell, and its corners. */
+static void check_nesting_at(ebpo_tally *tally, const ebpo_reference_tree *view,
+                             const ebpo_reference_node *node)
 {
     chain c;
     chain_to(&c, view, node);
-    check_walls(tally, view, node);
+    check_cell_faces(tally, view, node);
     uint64_t state = node->code * 0x9e3779b97f4a7c15 | 1;
     for (unsigned i = 0; i < POINTS_PER_NODE; i++) {
         int64_t corner[3], inner[3];
@@ -341,7 +347,7 @@ static void check_nesting_at(ebpo_tally *tally, const ebpo_twin_tree *view,
     }
 }
 
-void ebpo_check_nesting(ebpo_tally *tally, const ebpo_twin_tree *view)
+void ebpo_check_nesting(ebpo_tally *tally, const ebpo_reference_tree *view)
 {
     for (int l = 0; l < view->tree->info.level_count; l++) {
         const ebpo_level *level = &view->tree->level[l];
@@ -355,7 +361,8 @@ void ebpo_check_nesting(ebpo_tally *tally, const ebpo_twin_tree *view)
                                 ? i
                                 : cells / NODES_PER_LEVEL * i +
                                       cells % NODES_PER_LEVEL * i / NODES_PER_LEVEL + i % 8;
-            ebpo_twin_node node = twin_at(view, l, (cell % cells) / 8, (unsigned)(cell % 8));
+            ebpo_reference_node node =
+                reference_at(view, l, (cell % cells) / 8, (unsigned)(cell % 8));
             check_nesting_at(tally, view, &node);
         }
     }
@@ -378,7 +385,7 @@ static bool head_shape(ebpo_tally *tally, const ebpo_info *info)
     return CHECK(ebpo_box_valid(&box), "the root box is not on a dyadic grid down to level %d",
                  info->grid_level) &&
            CHECK(info->level_count - 1 <= info->grid_level,
-                 "level %d lies below the grid level %d, where cells are not exact",
+                 "level %d is below the grid level %d, where cells are not exact",
                  info->level_count - 1, info->grid_level) &&
            CHECK((unsigned)info->rule <= EBPO_RULE_POSITIVE, "unknown rule %d", (int)info->rule);
 }
@@ -395,7 +402,7 @@ static bool types_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
     uint64_t count[4] = { 0 };
     EBPO_FOR_ITEMS(level->workspace, group, 0, groups)
         for (unsigned octant = 0; octant < (l == 0 ? 1u : 8u); octant++)
-            count[ebpo_twin_type(level, group, octant)]++;
+            count[ebpo_reference_type(level, group, octant)]++;
     return CHECK(count[EBPO_GRAY] == level->gray_count && count[EBPO_LEAF] == level->leaf_count &&
                      count[EBPO_WHITE] == level->white_count &&
                      count[EBPO_BLACK] == level->black_count,
@@ -404,7 +411,7 @@ static bool types_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
                  "level %d, the last one, has gray nodes", l);
 }
 
-/* Per-node counts and the array they share out. */
+/* Checks per-node counts and the array that they divide. */
 static bool counted_shape(ebpo_tally *tally, const ebpo_level *level, int l, const char *what,
                           uint64_t nodes, const uint8_t *counts, uint64_t total,
                           const uint32_t *items)
@@ -467,7 +474,8 @@ static bool lists_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
         ok &= CHECK(
             leaf_faces_in_range(level, leaf, refs, tree->mesh.face_count),
             "level %d, leaf %" PRIu64
-            ": its list leaves the faces, or its references do not ascend below its first new face",
+            ": its list exceeds the faces, or its references are not ascending below its first "
+            "new face",
             l, leaf);
         refs += level->leaf_ref_count[leaf];
     }
@@ -487,7 +495,7 @@ static bool mesh_shape(ebpo_tally *tally, const ebpo_tree *tree)
                    mesh->face_count < UINT32_MAX,
                "the mesh has no vertices or no faces") ||
         !CHECK(!!mesh->xyz64 == tree->info.double_coordinates,
-               "the head and the mesh differ about the kind of coordinates"))
+               "the head and the mesh have different kinds of coordinates"))
         return false;
     uint64_t outside = 0, infinite = 0;
     EBPO_FOR_ITEMS(mesh->workspace, i, 0, 3 * mesh->face_count)
@@ -511,7 +519,7 @@ static bool colours_shape(ebpo_tally *tally, const ebpo_level *level, int l)
     return CHECK(all < 1 << 24, "level %d: a colour is above 2^24 - 1", l);
 }
 
-/* What the checks above do not look for by name. Counted only when it fails. */
+/* Checks the arrays that the checks above do not name. Counted only when it fails. */
 static bool arrays_shape(ebpo_tally *tally, const ebpo_tree *tree, int l)
 {
     const ebpo_level *level = &tree->level[l];
@@ -551,9 +559,9 @@ bool ebpo_check_shape(ebpo_tally *tally, const ebpo_tree *tree)
 
 /* --- structure: the tree --- */
 
-/* A volume cannot be more than that of the cells it lies in; the slack is for the rounding of sums.
- * Coordinates beyond about 1e102 or below 1e-102 have volumes that no double holds: the format
- * leaves those unspecified. */
+/* A volume is at most that of its cells, plus slack for the rounding of sums. Volumes for
+ * coordinates beyond about 1e102 or below 1e-102 exceed the range of double: the format leaves
+ * those unspecified. */
 static bool volume_possible(double volume, uint64_t cells, int l, const ebpo_info *info)
 {
     double cell =
@@ -586,13 +594,13 @@ static void check_summary(ebpo_tally *tally, const ebpo_tree *tree, int l)
 
 typedef struct descent {
     ebpo_tally *tally;
-    const ebpo_twin_tree *view;
-    uint64_t next_face; /* first face that no leaf before has listed */
+    const ebpo_reference_tree *view;
+    uint64_t next_face; /* first face that no leaf has listed yet */
     uint64_t grays;
     uint64_t pruned[EBPO_LEVELS_MAX];
 } descent;
 
-static void record_check(descent *d, const ebpo_twin_node *node, bool holds, const char *text)
+static void record_check(descent *d, const ebpo_reference_node *node, bool holds, const char *text)
 {
     d->tally->checks[EBPO_VERIFY_STRUCTURE]++;
     if (!holds)
@@ -601,7 +609,7 @@ static void record_check(descent *d, const ebpo_twin_node *node, bool holds, con
                              text);
 }
 
-static void check_leaf(descent *d, const ebpo_twin_node *leaf)
+static void check_leaf(descent *d, const ebpo_reference_node *leaf)
 {
     const ebpo_info *info = &d->view->tree->info;
     const ebpo_level *level = &d->view->tree->level[leaf->cell.level];
@@ -613,13 +621,13 @@ static void check_leaf(descent *d, const ebpo_twin_node *leaf)
         "the leaf's new faces do not follow those of the leaf before it in depth-first order");
     record_check(d, leaf, listed > 0, "the leaf lists no face");
     record_check(d, leaf, leaf->cell.level >= info->max_level || listed <= info->leaf_faces,
-                 "the leaf lists more faces than a leaf above the maximum level may");
+                 "the leaf lists more faces than allowed for a leaf above the maximum level");
     d->next_face = level->leaf_first[leaf->rank] + level->leaf_new[leaf->rank];
 }
 
-static void check_gray(descent *d, const ebpo_twin_node *node);
+static void check_gray(descent *d, const ebpo_reference_node *node);
 
-static void check_node(descent *d, const ebpo_twin_node *node)
+static void check_node(descent *d, const ebpo_reference_node *node)
 {
     if (node->type == EBPO_LEAF)
         check_leaf(d, node);
@@ -630,9 +638,9 @@ static void check_node(descent *d, const ebpo_twin_node *node)
                      "a surface has no inside, but the node is black");
 }
 
-static void check_gray(descent *d, const ebpo_twin_node *node)
+static void check_gray(descent *d, const ebpo_reference_node *node)
 {
-    if (ebpo_twin_is_pruned(d->view, node)) { /* may have been a leaf */
+    if (ebpo_reference_is_pruned(d->view, node)) { /* may have been a leaf */
         d->pruned[node->cell.level]++;
         return;
     }
@@ -642,14 +650,14 @@ static void check_gray(descent *d, const ebpo_twin_node *node)
     if (d->grays++ % EBPO_ITEMS_IN_ORDER == 0)
         ebpo_release_pages(d->view->workspace);
     for (unsigned octant = 0; octant < 8; octant++) {
-        ebpo_twin_node child = ebpo_twin_child(d->view, node, octant);
+        ebpo_reference_node child = ebpo_reference_child(d->view, node, octant);
         touched |= child.type >= EBPO_LEAF;
         check_node(d, &child);
     }
-    record_check(d, node, touched, "the node is gray, but no child of it is gray or a leaf");
+    record_check(d, node, touched, "the node is gray, but none of its children is gray or a leaf");
 }
 
-static void check_vertices(ebpo_tally *tally, const ebpo_twin_tree *view)
+static void check_vertices(ebpo_tally *tally, const ebpo_reference_tree *view)
 {
     const ebpo_mesh *mesh = &view->tree->mesh;
     uint64_t outside = 0, first = 0;
@@ -668,8 +676,8 @@ static void check_vertices(ebpo_tally *tally, const ebpo_twin_tree *view)
           outside, first / 3);
 }
 
-/* A sum of signed random values, one for each undirected edge: it vanishes when directions cancel,
- * and else but for one case in 2^64. */
+/* Returns true if a sum of signed random values, one for each undirected edge, is zero: it is when
+ * directions cancel, and otherwise only in one case in 2^64. */
 static bool edges_balance(const ebpo_mesh *mesh)
 {
     uint64_t sum = 0;
@@ -683,13 +691,13 @@ static bool edges_balance(const ebpo_mesh *mesh)
     return sum == 0;
 }
 
-void ebpo_check_structure(ebpo_tally *tally, const ebpo_twin_tree *view)
+void ebpo_check_structure(ebpo_tally *tally, const ebpo_reference_tree *view)
 {
     const ebpo_tree *tree = view->tree;
     for (int l = 0; l < tree->info.level_count; l++)
         check_summary(tally, tree, l);
     descent d = { .tally = tally, .view = view };
-    ebpo_twin_node root = ebpo_twin_root(view);
+    ebpo_reference_node root = ebpo_reference_root(view);
     check_node(&d, &root);
     for (int l = 0; l < tree->info.level_count; l++)
         CHECK(d.pruned[l] == tree->info.level[l].pruned_count,
@@ -700,7 +708,7 @@ void ebpo_check_structure(ebpo_tally *tally, const ebpo_twin_tree *view)
     CHECK(d.next_face == tree->mesh.face_count, "leaves list %" PRIu64 " of %" PRIu64 " faces",
           d.next_face, tree->mesh.face_count);
     check_vertices(tally, view);
-    if (tree->info.solid && !tree->info.pruned) /* a part of a mesh need not balance */
+    if (tree->info.solid && !tree->info.pruned) /* a part of a mesh may be unbalanced */
         CHECK(edges_balance(&tree->mesh),
               "the file says solid, but the directions of the mesh's edges do not cancel");
 }

@@ -1,11 +1,11 @@
 /* Walks down the tree with the faces that touch each node, and checks containment, lists and labels
  * there.
  *
- * Nodes with many faces come first, one after the other, with their faces shared out to all
- * threads. The smaller subtrees below are each walked depth first by one thread. Every face is
- * tested exactly against every cell that it comes near. Points whose winding number is to be
- * checked by rays are collected on the way and followed through the mesh at the end. The tally does
- * not depend on the number of threads. */
+ * Nodes with many faces come first, one after the other, with their faces distributed to all
+ * threads. One thread walks each of the smaller subtrees below, depth first. Every face is tested
+ * exactly against every cell that it comes near. Points whose winding number is checked by rays are
+ * collected on the way and traced through the mesh at the end. The tally does not depend on the
+ * number of threads. */
 #include "core/strict_fp.h"
 
 #include "verify/verify_parts.h"
@@ -20,15 +20,10 @@
 #include "verify/verify_geometry.h"
 #include "verify/verify_labels.h"
 
-enum {
-    FACE_GRAIN = 4096,
-    SUBTREE_FACES = 1024,
-    SUBTREE_FACES_MOST = 1 << 18,
-    SUBTREES_WANTED = 64
-};
+enum { FACE_GRAIN = 4096, SUBTREE_FACES = 1024, SUBTREE_FACES_MAX = 1 << 18, SUBTREES_WANTED = 64 };
 
-/* Face numbers on a stack: a node's faces, then its child's, and so on down; and for each which
- * children it touches. */
+/* A stack of face numbers: a node's faces, then its child's, and so on down; and for each face the
+ * children that it touches. */
 typedef struct face_stack {
     uint32_t *faces;
     uint8_t *octants;
@@ -43,9 +38,9 @@ typedef struct worker {
     uint64_t visited; /* faces */
 } worker;
 
-/* A node of the upper part. `children` 0: the root of a subtree that is walked by one thread. */
+/* A node of the upper part. `children` 0: the root of a subtree for one thread. */
 typedef struct upper_node {
-    ebpo_twin_node node;
+    ebpo_reference_node node;
     uint32_t *faces;
     uint64_t face_count;
     uint64_t children; /* the first of eight, in the same array */
@@ -53,7 +48,7 @@ typedef struct upper_node {
 } upper_node;
 
 typedef struct walk {
-    const ebpo_twin_tree *view;
+    const ebpo_reference_tree *view;
     const ebpo_verify_options *options;
     unsigned threads;
     ebpo_label_plan plan;
@@ -61,10 +56,10 @@ typedef struct walk {
     worker *workers;
     upper_node *upper;
     uint64_t upper_count, upper_capacity;
-    uint64_t *subtrees; /* places in `upper` */
+    uint64_t *subtrees; /* indices in `upper` */
     uint64_t subtree_count;
     uint64_t subtree_limit;
-    /* The node that is being shared out. */
+    /* The node whose faces are distributed. */
     const upper_node *shared;
     uint8_t *shared_octants;
 } walk;
@@ -75,11 +70,11 @@ typedef struct family {
     double middle[3];
 } family;
 
-static void family_make(family *out, const ebpo_box *box, const ebpo_twin_node *node)
+static void family_make(family *out, const ebpo_box *box, const ebpo_reference_node *node)
 {
     out->self = ebpo_frame_make(box, node->cell);
     for (int k = 0; k < 3; k++)
-        out->middle[k] = ebpo_wall(box, k, node->cell.level + 1, 2 * node->cell.at[k] + 1);
+        out->middle[k] = ebpo_cell_face(box, k, node->cell.level + 1, 2 * node->cell.at[k] + 1);
     for (unsigned octant = 0; octant < 8; octant++)
         for (int k = 0; k < 3; k++) {
             bool upper = octant >> k & 1;
@@ -89,7 +84,8 @@ static void family_make(family *out, const ebpo_box *box, const ebpo_twin_node *
         }
 }
 
-/* Octants that the face's bounding box meets, of those the half-spaces at the middle walls make. */
+/* Returns the octants, bounded by the half-spaces at the middle planes, that the face's bounding
+ * box intersects. */
 static unsigned near_octants(const family *f, const ebpo_corners *face)
 {
     static const uint8_t upper[3] = { 0xaa, 0xcc, 0xf0 };
@@ -104,42 +100,42 @@ static unsigned near_octants(const family *f, const ebpo_corners *face)
     return octants & 255;
 }
 
-static unsigned touched_octants(const family *f, const ebpo_corners *face, ebpo_tally *tally)
+static unsigned visited_octants(const family *f, const ebpo_corners *face, ebpo_tally *tally)
 {
     unsigned near = near_octants(f, face), touched = 0;
     if ((near & (near - 1)) == 0)
-        return near; /* it touches the node, so it touches its only choice */
+        return near; /* the face touches the node, so it touches the only octant */
     for (unsigned octant = 0; octant < 8; octant++)
         if (near >> octant & 1)
             touched |= (unsigned)ebpo_face_touches(&f->child[octant], face, tally) << octant;
     return touched;
 }
 
-/* What is done for each face at a gray node. */
-static void visit_faces(const walk *w, worker *self, const ebpo_twin_node *node, const family *f,
-                        const uint32_t *faces, uint8_t *octants, uint64_t count)
+/* Work for each face at a gray node. */
+static void visit_faces(const walk *w, worker *self, const ebpo_reference_node *node,
+                        const family *f, const uint32_t *faces, uint8_t *octants, uint64_t count)
 {
     for (uint64_t i = 0; i < count; i++) {
         ebpo_corners face;
         ebpo_face_corners(&w->view->tree->mesh, faces[i], &face);
         if (self->planes.count)
             ebpo_check_face_contained(&self->tally, &self->planes, node, &f->self, &face, faces[i]);
-        octants[i] = (uint8_t)touched_octants(f, &face, &self->tally);
+        octants[i] = (uint8_t)visited_octants(f, &face, &self->tally);
     }
-    /* Pages come in by faces looked at, but here and there a few for a node. */
+    /* Pages are read in for visited faces, plus a few for each node. */
     if ((self->visited += count + 64) >= 1 << 15) {
         self->visited = 0;
         ebpo_release_pages(w->options->workspace);
     }
 }
 
-/* A gray node with so few faces that it ought to be a leaf. */
-static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_twin_node *node,
+/* Checks that a gray node has too many faces for a leaf. */
+static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_reference_node *node,
                         uint64_t touching)
 {
     uint64_t limit = w->view->tree->info.leaf_faces;
     if (limit == 0 || !w->view->has_mesh ||
-        w->view->tree->info.pruned) /* of a subset not all leaves are there */
+        w->view->tree->info.pruned) /* a subset may lack leaves */
         return;
     tally->checks[EBPO_VERIFY_STRUCTURE]++;
     if (touching <= limit && !ebpo_lists_more_faces(w->view, node, limit))
@@ -149,8 +145,8 @@ static void check_worth(const walk *w, ebpo_tally *tally, const ebpo_twin_node *
             "the node is gray, but its leaves list no more faces than one leaf may");
 }
 
-/* What is left to do at a gray node when its children are done. */
-static void finish_gray(const walk *w, worker *self, const ebpo_twin_node *node,
+/* Completes a gray node after its children. */
+static void finish_gray(const walk *w, worker *self, const ebpo_reference_node *node,
                         const ebpo_node_windings children[8], ebpo_node_windings *corners)
 {
     if (!w->view->tree->info.solid)
@@ -163,17 +159,17 @@ static void finish_gray(const walk *w, worker *self, const ebpo_twin_node *node,
     ebpo_check_corners_contained(&self->tally, &self->planes, node, inside);
 }
 
-static bool is_terminal(const walk *w, const ebpo_twin_node *node)
+static bool is_terminal(const walk *w, const ebpo_reference_node *node)
 {
-    return node->type != EBPO_GRAY || ebpo_twin_is_pruned(w->view, node);
+    return node->type != EBPO_GRAY || ebpo_reference_is_pruned(w->view, node);
 }
 
 /* The faces may be all of the mesh. */
-static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_twin_node *node,
+static ebpo_status walk_terminal(const walk *w, worker *self, const ebpo_reference_node *node,
                                  const uint32_t *faces, uint64_t count, ebpo_node_windings *corners,
                                  ebpo_error *error)
 {
-    const ebpo_twin_tree *view = w->view;
+    const ebpo_reference_tree *view = w->view;
     ebpo_frame frame = ebpo_frame_make(&view->box, node->cell);
     if (view->has_mesh && node->type != EBPO_GRAY) /* pruned */
         ebpo_check_terminal_lists(&self->tally, view, node, faces, count);
@@ -214,7 +210,7 @@ static bool stack_reserve(face_stack *s, uint64_t need)
 }
 
 /* The node's faces are [first, first + count) on the stack. */
-static ebpo_status walk_down(const walk *w, worker *self, const ebpo_twin_node *node,
+static ebpo_status walk_down(const walk *w, worker *self, const ebpo_reference_node *node,
                              uint64_t first, uint64_t count, ebpo_node_windings *corners,
                              ebpo_error *error)
 {
@@ -234,7 +230,7 @@ static ebpo_status walk_down(const walk *w, worker *self, const ebpo_twin_node *
         for (uint64_t i = 0; i < count; i++)
             if (s->octants[first + i] >> octant & 1)
                 s->faces[first + count + own++] = s->faces[first + i];
-        ebpo_twin_node child = ebpo_twin_child(w->view, node, octant);
+        ebpo_reference_node child = ebpo_reference_child(w->view, node, octant);
         ebpo_status status =
             walk_down(w, self, &child, first + count, own, &children[octant], error);
         if (status != EBPO_OK)
@@ -258,12 +254,12 @@ static ebpo_status shared_task(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Appends a child with its share of the parent's faces. */
+/* Appends a child with its part of the parent's faces. */
 static ebpo_status add_child(walk *w, uint64_t parent, unsigned octant, ebpo_error *error)
 {
     const upper_node *from = &w->upper[parent];
     upper_node *to = &w->upper[w->upper_count];
-    *to = (upper_node){ .node = ebpo_twin_child(w->view, &from->node, octant) };
+    *to = (upper_node){ .node = ebpo_reference_child(w->view, &from->node, octant) };
     EBPO_FOR_ITEMS(w->options->workspace, i, 0, from->face_count)
         to->face_count += w->shared_octants[i] >> octant & 1;
     to->faces = ebpo_array_alloc(w->options->workspace, to->face_count, sizeof *to->faces);
@@ -278,7 +274,7 @@ static ebpo_status add_child(walk *w, uint64_t parent, unsigned octant, ebpo_err
     return EBPO_OK;
 }
 
-/* Opens the upper node `at`: its faces are looked at by all threads, its children appended. */
+/* Opens the upper node `at`: all threads visit its faces, and its children are appended. */
 static ebpo_status open_node(walk *w, uint64_t at, ebpo_error *error)
 {
     if (!ebpo_grow(&w->upper, &w->upper_capacity, w->upper_count + 8, sizeof *w->upper))
@@ -307,7 +303,7 @@ static ebpo_status add_root(walk *w, ebpo_error *error)
     uint64_t count = w->view->has_mesh ? w->view->tree->mesh.face_count : 0;
     if (!ebpo_grow(&w->upper, &w->upper_capacity, 1, sizeof *w->upper))
         return ebpo_fail_memory(error, sizeof *w->upper);
-    upper_node root = { .node = ebpo_twin_root(w->view),
+    upper_node root = { .node = ebpo_reference_root(w->view),
                         .face_count = count,
                         .faces =
                             ebpo_array_alloc(w->options->workspace, count, sizeof *root.faces) };
@@ -320,7 +316,7 @@ static ebpo_status add_root(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Breadth-first, from the root down to nodes with few faces. */
+/* Walks breadth-first, from the root down to nodes with few faces. */
 static ebpo_status walk_upper(walk *w, ebpo_error *error)
 {
     ebpo_status status = add_root(w, error);
@@ -338,7 +334,7 @@ static ebpo_status walk_upper(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* A leaf may have more faces than a stack should take: they stay where they are. */
+/* A leaf may have more faces than a stack should hold: they stay in place. */
 static ebpo_status walk_subtree(const walk *w, worker *self, upper_node *n, ebpo_error *error)
 {
     if (is_terminal(w, &n->node))
@@ -366,7 +362,7 @@ static ebpo_status subtree_task(void *context, uint64_t begin, uint64_t end, uns
     return EBPO_OK;
 }
 
-/* Children stand behind their parents, so going backwards finds them done. */
+/* Children come after their parents, so in reverse order they are done first. */
 static void finish_upper(walk *w)
 {
     for (uint64_t at = w->upper_count; at-- > 0;) {
@@ -388,11 +384,11 @@ static ebpo_status walk_prepare(walk *w, ebpo_error *error)
     if (!w->workers)
         return ebpo_fail_memory(error, w->threads * sizeof *w->workers);
     uint64_t faces = w->view->has_mesh ? w->view->tree->mesh.face_count : 0;
-    /* each thread holds the faces on the way down: 15 B for each of a subtree */
+    /* each thread holds the faces on its path: 15 B for each of a subtree */
     uint64_t share = faces / SUBTREES_WANTED;
-    w->subtree_limit = share < SUBTREE_FACES        ? SUBTREE_FACES
-                       : share > SUBTREE_FACES_MOST ? SUBTREE_FACES_MOST
-                                                    : share;
+    w->subtree_limit = share < SUBTREE_FACES       ? SUBTREE_FACES
+                       : share > SUBTREE_FACES_MAX ? SUBTREE_FACES_MAX
+                                                   : share;
     /* rays need all faces */
     w->rays = faces > 0 && w->view->tree->info.solid && !w->view->tree->info.pruned;
     for (unsigned i = 0; i < w->threads; i++)
@@ -402,7 +398,7 @@ static ebpo_status walk_prepare(walk *w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* All workers' points become the first one's. */
+/* Moves all workers' points to the first one. */
 static ebpo_status follow_rays(walk *w, ebpo_error *error)
 {
     ebpo_ray_points *all = &w->workers[0].points;
@@ -436,7 +432,7 @@ static void walk_release(walk *w)
     ebpo_array_free(w->options->workspace, w->shared_octants);
 }
 
-ebpo_status ebpo_verify_walk(ebpo_tally *tally, const ebpo_twin_tree *view,
+ebpo_status ebpo_verify_walk(ebpo_tally *tally, const ebpo_reference_tree *view,
                              const ebpo_verify_options *options, ebpo_error *error)
 {
     walk w = { .view = view, .options = options, .threads = ebpo_thread_count(options->threads) };

@@ -1,5 +1,5 @@
-/* ebpo-generate: closed, scan-like models of any size for trials and benchmarks. One set of
- * arguments gives one file, byte for byte. */
+/* ebpo-generate: makes closed, scan-like models of any size for trials and benchmarks. Equal
+ * arguments give equal files, byte for byte. */
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>
@@ -21,27 +21,26 @@ typedef struct settings {
 static const char usage[] =
     "usage: ebpo-generate [options] OUTPUT.ply\n"
     "Writes a closed scan-like triangle mesh as a binary PLY.\n"
-    "  --base sphere|torus|FILE  what to begin with; a file must hold a closed mesh (default "
-    "sphere)\n"
-    "  --subdivide N             cut every face into four, N times\n"
+    "  --base sphere|torus|FILE  base shape; a file must contain a closed mesh (default sphere)\n"
+    "  --subdivide N             split every face into four, N times\n"
     "  --faces N                 instead: at least N faces (sphere, file: the next power of four; "
     "torus: about N)\n"
-    "  --seed S                  another surface (default 1)\n"
+    "  --seed S                  random seed of the surface (default 1)\n"
     "  --roughness R             height of the fine relief in local edge lengths, 0 to 0.5 "
     "(default 0.15)\n"
     "  --relief H                height of the broad relief of sphere (radius 1) and torus (tube "
     "0.4), 0 to 0.2 (default 0.08)\n"
-    "The output is a closed manifold where the base is one. Sphere and torus never meet "
-    "themselves: that is proved for each file\n"
-    "before it is written. A file's shape may, where the base does or where its walls are closer "
-    "than the roughness; tests/integration/crossing_faces looks.\n";
+    "The output is a closed manifold if the base is one. Sphere and torus never intersect "
+    "themselves: this is proved for each file\n"
+    "before it is written. The shape of a file may, if the base does or if parts of it are closer "
+    "than the roughness; tests/integration/crossing_faces checks it.\n";
 
 static bool parse_count(const char *name, const char *text, uint64_t most, uint64_t *out)
 {
     char *end;
     unsigned long long value = strtoull(text, &end, 10);
     if (text[0] < '0' || text[0] > '9' || *end || value > most) {
-        fprintf(stderr, "ebpo-generate: --%s wants a whole number from 0 to %llu, not \"%s\"\n",
+        fprintf(stderr, "ebpo-generate: --%s: expected a whole number from 0 to %llu, got \"%s\"\n",
                 name, (unsigned long long)most, text);
         return false;
     }
@@ -54,15 +53,15 @@ static bool parse_height(const char *name, const char *text, double most, double
     char *end;
     double value = strtod(text, &end);
     if (end == text || *end || !(value >= 0 && value <= most)) {
-        fprintf(stderr, "ebpo-generate: --%s wants a number from 0 to %g, not \"%s\"\n", name, most,
-                text);
+        fprintf(stderr, "ebpo-generate: --%s: expected a number from 0 to %g, got \"%s\"\n", name,
+                most, text);
         return false;
     }
     *out = value;
     return true;
 }
 
-/* 0: go on, 1: stop with success, 2: wrong usage. */
+/* Returns 0: go on, 1: stop with success, 2: wrong usage. */
 static int parse(int argc, char **argv, settings *s)
 {
     static const struct option options[] = { { "base", required_argument, NULL, 'b' },
@@ -103,7 +102,7 @@ static int parse(int argc, char **argv, settings *s)
 static bool out_of_reach(void)
 {
     fprintf(stderr,
-            "ebpo-generate: not enough memory, or more than 2^32 - 2 faces; ask for fewer\n");
+            "ebpo-generate: not enough memory, or more than 2^32 - 2 faces; request fewer faces\n");
     return false;
 }
 
@@ -125,7 +124,7 @@ static bool make_torus(ebpo_mesh *mesh, const settings *s)
         m = ceil(sqrt((double)s->faces / 5));
         m = m < 3 ? 3 : m;
         n = ceil((double)s->faces / 2 / m);
-        n = n < 8 ? 8 : n; /* fewer, and the hole is too narrow for the proof */
+        n = n < 8 ? 8 : n; /* with fewer the hole is too narrow for the proof */
     }
     return ebpo_make_torus(mesh, (uint32_t)n, (uint32_t)m) || out_of_reach();
 }
@@ -150,7 +149,7 @@ static bool read_base(ebpo_mesh *mesh, const settings *s)
     ebpo_mesh_report report;
     if (s->relief_given) {
         fprintf(stderr,
-                "ebpo-generate: --relief is for the bases sphere and torus; leave it out\n");
+                "ebpo-generate: --relief is only for the bases sphere and torus; omit it\n");
         return false;
     }
     if (ebpo_mesh_read(s->base, NULL, mesh, &error) != EBPO_OK ||
@@ -159,7 +158,8 @@ static bool read_base(ebpo_mesh *mesh, const settings *s)
         return false;
     }
     if (!report.balanced || report.index_repeated_faces.count) {
-        fprintf(stderr, "ebpo-generate: %s is not closed; give a closed mesh\n", s->base);
+        fprintf(stderr, "ebpo-generate: the mesh of %s is not closed; use a closed mesh\n",
+                s->base);
         return false;
     }
     return to_float(mesh);
@@ -168,8 +168,8 @@ static bool read_base(ebpo_mesh *mesh, const settings *s)
 static bool keeps_clear(bool proved)
 {
     if (!proved)
-        fprintf(stderr, "ebpo-generate: so few faces may meet each other with so high a relief; "
-                        "ask for more faces, or for less --relief or --roughness\n");
+        fprintf(stderr, "ebpo-generate: the faces may intersect with so few faces and so high a "
+                        "relief; request more faces, or less --relief or --roughness\n");
     return proved;
 }
 

@@ -2,8 +2,8 @@
 
 #include <math.h>
 
-/* Far more than what a dozen roundings of products of such coordinates add up to, far less than
- * what a face of a billion measures. */
+/* Much larger than the sum of a dozen rounding errors of products of these coordinates, and much
+ * smaller than the value for a face of a mesh of a billion faces. */
 static const double slack = 1e-14;
 
 typedef struct corners {
@@ -38,8 +38,8 @@ static double volume(const double *a, const double *b, const double *c)
     return dot(n, c);
 }
 
-/* How a face stands to a ray from `origin`: 1 crossed, 0 passed by, -1 too close to an edge to
- * tell. Faces that the line crosses behind the origin are passed by. */
+/* Tests a face against a ray from `origin`. Returns 1: crossed, 0: not crossed, -1: too close to an
+ * edge to decide. Faces that the line crosses behind the origin are not crossed. */
 static int crossed(const corners *c, const double origin[3], const double direction[3])
 {
     double q[3][3], sides[3];
@@ -54,14 +54,14 @@ static int crossed(const corners *c, const double origin[3], const double direct
     }
     if (left && right)
         return 0;
-    /* where along the ray: ahead / sum */
+    /* position along the ray: ahead / sum */
     double ahead = volume(q[0], q[1], q[2]), sum = sides[0] + sides[1] + sides[2];
     if (left == 3 || right == 3)
         return fabs(ahead) <= slack ? -1 : (ahead > 0) == (sum > 0);
     return -1;
 }
 
-/* One face only meets the ray. */
+/* Returns true if the ray intersects exactly one face. */
 static bool leaves_once(const ebpo_mesh *mesh, const double origin[3], const double direction[3])
 {
     uint64_t times = 0;
@@ -86,10 +86,9 @@ bool ebpo_embedded_sphere(const ebpo_mesh *mesh)
     return leaves_once(mesh, centre, oblique);
 }
 
-/* The points of the circle that are nearest to the face's points lie on an arc between those
- * nearest to two of its corners; c^2 / 7 bounds how high an arc of chord c <= 1 stands above the
- * chord. So the support of the arc in the direction of the normal is known, and the plane must lie
- * beyond that. */
+/* The points of the circle nearest to the face's points are on an arc between those nearest to two
+ * of its corners. c^2 / 7 bounds the height of an arc of chord c <= 1 above the chord. This gives
+ * the support of the arc in the direction of the normal, and the plane must be beyond it. */
 static bool faces_outwards(const corners *c)
 {
     double centre[3][3], e[2][3], n[3], support = -INFINITY, longest = 0;
@@ -115,8 +114,8 @@ static bool faces_outwards(const corners *c)
 
 bool ebpo_embedded_torus(const ebpo_mesh *mesh)
 {
-    /* From the circle outwards and up, in the half plane through the axis, so that the ray stays
-     * there. */
+    /* Outwards and up from the circle, in the half plane through the axis, so that the ray stays in
+     * it. */
     const double x = 0.7431, y = sqrt(1 - x * x), origin[3] = { x, y, 0 },
                  oblique[3] = { 0.8 * x, 0.8 * y, 0.6 };
     for (uint64_t f = 0; f < mesh->face_count; f++) {

@@ -9,8 +9,8 @@ static uint64_t mix(uint64_t z)
     return z ^ z >> 31;
 }
 
-/* Dot product of the lattice point's gradient (one of 12 edge directions) with the offset from it.
- */
+/* Returns the dot product of the lattice point's gradient (one of 12 edge directions) with the
+ * offset from it. */
 static double gradient(int64_t x, int64_t y, int64_t z, uint64_t seed, double dx, double dy,
                        double dz)
 {
@@ -59,7 +59,7 @@ double ebpo_noise_octaves(const double p[3], double longest, double shortest, ui
     return weight > 0 ? sum / weight : 0;
 }
 
-/* Taylor series on an eighth of a turn, where 11 terms leave nothing. */
+/* Evaluates Taylor series on an eighth of a turn; 11 terms are exact to rounding. */
 static void small_angle(double a, double *cosine, double *sine)
 {
     double term = 1, c = 0, s = 0;

@@ -112,10 +112,10 @@ bool ebpo_subdivide(ebpo_mesh *mesh)
 {
     ebpo_mesh out;
     midpoints t = { .mask = 15 };
-    uint64_t most_edges = 3 * mesh->face_count / 2; /* as each is used twice at least */
-    while (t.mask * 3 / 4 < most_edges)
+    uint64_t max_edges = 3 * mesh->face_count / 2; /* each edge is used at least twice */
+    while (t.mask * 3 / 4 < max_edges)
         t.mask = 2 * t.mask + 1;
-    if (!allocate(&out, mesh->vertex_count + most_edges, 4 * mesh->face_count))
+    if (!allocate(&out, mesh->vertex_count + max_edges, 4 * mesh->face_count))
         return false;
     out.vertex_count = mesh->vertex_count;
     memcpy(out.xyz32, mesh->xyz32, mesh->vertex_count * 3 * sizeof *out.xyz32);
@@ -145,7 +145,7 @@ void ebpo_to_unit_sphere(ebpo_mesh *mesh)
     }
 }
 
-/* What the faces around a vertex say about it. */
+/* Sums over the faces around a vertex. */
 typedef struct around {
     float normal[3]; /* sum of unit normals */
     float length;    /* sum over the faces of two edges each */
@@ -193,7 +193,7 @@ static double extent(const ebpo_mesh *mesh)
     return longest;
 }
 
-/* The shortest wave that a model of this mean edge length can carry smoothly. */
+/* Returns the shortest wavelength that a model of this mean edge length can represent smoothly. */
 static double fine_wave(const around *all, uint64_t count)
 {
     double sum = 0;

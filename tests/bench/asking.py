@@ -1,16 +1,15 @@
 #!/usr/bin/env python3
-"""What the command adds to the library: asking many questions by `ebpo inside` and `ebpo distance`.
+"""Measures the overhead of `ebpo inside` and `ebpo distance` over the library, for many queries.
 
     tests/bench/asking.py EBPO MODEL.ebpo.h5 [--count N] [--turns T] [--before EBPO]
                           [--large LARGE.ebpo.h5]
 
-Points are uniform in the model's box (`ebpo bench --save-points`). In turns: the library alone
-(`ebpo bench`, all questions at once on one thread; on two: two of them at once, each with half of
-the points to answer), then the command with raw and with text input, with one and with two threads,
-each time with as much memory as it wants (--memory 64GiB). Times of the command are without those
-of one question, in ns a point: the least of the turns. The library's are those of the clock, so the
-machine should do nothing else; where it does, processor times say more than the clock's. With
---large, one point of that model is asked, in a process of its own, with what memory is chosen.
+Points are uniform in the model's box (`ebpo bench --save-points`). In turns it runs the library alone
+(`ebpo bench` on one thread; for two threads, two processes with all points at the same time), then
+the command with raw and with text input, with one and with two threads and --memory 64GiB. Times of
+the command exclude those of one query and are the minimum of the turns, in ns per point. Wall-clock
+times need an idle machine; on a busy one, compare the processor times. --large queries one point of
+that model in a new process with the default memory.
 """
 import argparse
 import array
@@ -33,7 +32,7 @@ def run(command, out):
 
 
 def library(ebpo, model, query, raw):
-    """The library's ns a point on one thread, and on two."""
+    """Returns the library's ns per point on one thread, and on two."""
     command = [ebpo, "bench", "--json", "--query", query, "--points", raw, "--raw", model]
 
     def of(processes):
@@ -46,14 +45,14 @@ def library(ebpo, model, query, raw):
 
 
 def ask_large(ebpo, model, folder, turns):
-    """One point after the other, each in a process of its own."""
+    """Queries one point after the other, each in a new process."""
     raw, out = f"{folder}/large.raw", f"{folder}/out"
     subprocess.run([ebpo, "bench", "--count", "20", "--save-points", raw, model],
                    stdout=subprocess.DEVNULL, check=True)
     xyz = array.array("d", pathlib.Path(raw).read_bytes())
     print(f"\nOne point of {pathlib.Path(model).name} "
           f"({pathlib.Path(model).stat().st_size / 1e6:.0f} MB), in ms:\n\n"
-          "| question | least of the clock | median of the clock | median of the processors |\n"
+          "| query | minimum, wall-clock | median, wall-clock | median, CPU |\n"
           "|---|---|---|---|")
     for query in "inside", "distance":
         times = []
@@ -74,7 +73,7 @@ def main():
     parser.add_argument("--count", type=int, default=1000000)
     parser.add_argument("--turns", type=int, default=9)
     parser.add_argument("--before", help="an older ebpo, for comparison")
-    parser.add_argument("--large", help="a large model, of which one point is asked")
+    parser.add_argument("--large", help="a large model; queries one point of it")
     a = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         raw, text, one = (str(pathlib.Path(folder, n)) for n in ("p.raw", "p.txt", "one.txt"))
@@ -100,8 +99,8 @@ def main():
                             run(command, f"{folder}/out"))
                 found.setdefault((query, "library"), []).append(
                     library(a.ebpo, a.model, query, raw))
-        print("| question | program | how | processors, ns a point | clock, ns a point | "
-              "processors / library on one thread | clock / library on as many |\n"
+        print("| query | program | input | CPU, ns per point | wall-clock, ns per point | "
+              "CPU / library on one thread | wall-clock / library on as many |\n"
               "|---|---|---|---|---|---|---|")
         for key, values in found.items():
             if len(key) == 2 or key[2] == "one question":
@@ -115,7 +114,7 @@ def main():
                   f"{wall / alone['2' in key[2]]:.2f} |")
         for query in "inside", "distance":
             one, two = (min(v[i] for v in found[query, "library"]) for i in (0, 1))
-            print(f"\n{query}, the library alone: {one:.0f} ns a point on one thread, {two:.0f} on two")
+            print(f"\n{query}, the library alone: {one:.0f} ns per point on one thread, {two:.0f} on two")
         if a.large:
             ask_large(a.ebpo, a.large, folder, a.turns)
 

@@ -1,16 +1,15 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/attributes.md: whether every PLY of a folder comes back property for property, also of subsets
-and over HTTP, and what its attributes take.
+"""Remakes docs/measured/attributes.md: compares every PLY of a folder with its copy from a file, a subset and HTTP, and
+measures the size of attributes.
 
     tests/bench/attributes.py EBPO MODELS_DIR... > docs/measured/attributes.md
 
-EBPO: the tool; MODELS_DIR: folders of PLY files. tests/cli/same_ply.py compares: it reads PLY
-with code of its own. Ends with 1 if anything differs.
+EBPO: the tool; MODELS_DIR: folders of PLY files. tests/cli/same_ply.py compares; it has a separate PLY reader. Exit code
+1: something differs.
 """
 import functools
 import http.server
 import json
-import os
 import pathlib
 import re
 import subprocess
@@ -20,6 +19,7 @@ import threading
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "cli"))
 import same_ply  # noqa: E402
+from query_page import reflow  # noqa: E402
 
 EBPO, FOLDERS = sys.argv[1], sys.argv[2:]
 WIDTHS = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "float32": 4, "float64": 8}
@@ -75,7 +75,7 @@ def half(info):
 
 
 def raw_bytes(info, file):
-    """What the values are of without coding: bytes of the PLY's rows."""
+    """Returns the bytes of the values in a binary PLY."""
     total = 0
     for a in info.get("attributes", []):
         total += WIDTHS[a["type"]] * a["columns"] * a["rows"]
@@ -86,7 +86,7 @@ def check_model(path, folder, url):
     name = path.stem
     full, bare = folder / "m.ebpo.h5", folder / "bare.ebpo.h5"
     ebpo("convert", "-q", path, full)
-    ebpo("convert", "-q", "--without", "attributes", path, bare)
+    ebpo("convert", "-q", "--parts", "-attributes", path, bare)
     info, plain = (json.loads(ebpo("info", "--json", f)) for f in (full, bare))
     source = same_ply.Ply(path)
     whole = verdict(name, "whole", same_ply.compare, source, back(full, folder))
@@ -106,23 +106,48 @@ def check_model(path, folder, url):
             info["bytes"]["file"], raw, more, f"{more / raw:.2f}" if raw else "-", whole, part, fetched, far)
 
 
+HEAD = """# Attributes
+
+- {equal} of {count} PLY models come back identical: elements, comments, properties, types and all values, in
+  source order.
+- The same holds for a subset of a box and for files fetched over HTTP.
+- Attributes take {low:.2f} to {high:.2f} times the bytes that their values take in a binary PLY (models of
+  more than 1000 faces). Models without attributes take at most {extra} bytes more.
+
+Made by `tests/bench/attributes.py EBPO {names} > docs/measured/attributes.md`; the results do not depend on
+the machine. `tests/cli/same_ply.py`, a separate PLY reader, compares four copies of each model: the whole
+file, a subset, the file by `ebpo fetch`, and the subset by `ebpo fetch`. The subset is one of the eight parts
+of the box. Every vertex and face of it must be in the source with its values and in the same order. Models
+whose subset is empty: {empty}. Polygons and strips become triangles with the corners and values of their
+source.
+"""
+MORE = """
+*raw*: bytes of the values in a binary PLY. *more*: bytes that attributes add to the file: values,
+description, source header and colours of envelopes.
+"""
+
+
+def write(names, rows):
+    """Prints the page: the result, models without attributes as a list, the others as a table."""
+    shares = [float(r[9]) for r in rows if r[7] and r[2] > 1000]
+    equal = sum("**differs**" not in r for r in rows)
+    print(reflow(HEAD.format(equal=equal, count=len(rows), low=min(shares), high=max(shares), names=names,
+                      extra=max((r[8] for r in rows if not r[7]), default=0), empty=sum("empty" in r for r in rows))))
+    for r in rows:
+        if "**differs**" in r:
+            print(f"- differs: {r[0]}, {dict(zip(('whole', 'subset', 'fetch', 'fetch, box'), r[10:]))}")
+    print(reflow("Models without attributes: " + ", ".join(r[0] for r in rows if not r[7]) + "."))
+    print(reflow(MORE))
+    cells = ("model", "vertices", "faces", "attributes", "PLY", "file without", "with", "raw", "more", "more / raw")
+    print("| " + " | ".join(cells) + " |\n" + "|---" * len(cells) + "|")
+    for r in rows:
+        if r[7]:
+            print("| " + " | ".join(map(str, r[:10])) + " |")
+
+
 def main():
     names = " ".join(pathlib.Path(f).name for f in FOLDERS)
-    print(f"""# Attributes: every PLY comes back
-
-Made by `tests/bench/attributes.py EBPO {names} > docs/measured/attributes.md`; nothing here was typed in by hand.
-
-*Same*: elements, comments, properties, their order and types, and all values bit for bit and in the source's order, as
-`tests/cli/same_ply.py` finds, which reads PLY by code of its own; of polygons and strips, each triangle has the corners
-and values of what it was cut from. *Subset*: of the box from the least corner of the model's box to its centre, each
-vertex and face is one of the source, with its values, in the source's order. *Fetch*: the same over HTTP, of the whole
-file and of that box; *empty*: no face is in it. *Raw*: the values as a binary PLY has them; *more*: what the file is
-larger by with attributes: values, their description, the source's header, and the colours of envelopes.
-""")
-    cells = ("model", "vertices", "faces", "attributes", "PLY", "without", "with", "raw", "more", "of raw", "whole",
-             "subset", "fetch", "fetch, box")
-    print("| " + " | ".join(cells) + " |\n" + "|---" * len(cells) + "|")
-    refused = []
+    refused, rows = [], []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Ranges, directory=name))
@@ -133,8 +158,9 @@ larger by with attributes: values, their description, the source's header, and t
             except RuntimeError as e:
                 refused.append(f"{path.stem}: {str(e).replace(str(path), path.name)}")
                 continue
-            print("| " + " | ".join(map(str, row)) + " |", flush=True)
+            rows.append(row)
         server.shutdown()
+    write(names, rows)
     for line in refused:
         print(f"\nRefused: `{line}`")
     for line in wrong:

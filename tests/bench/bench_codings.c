@@ -1,6 +1,7 @@
-/* Bytes a face that other codings of a file's arrays would take, chunk by chunk: bench_codings
- * FILE.ebpo.h5. A table, for docs/develop/codings.md. Speeds are 10^6 bytes of the array a second
- * of one core, zstd included, the best of three turns of each chunk. Float coordinates only. */
+/* Measures bytes per face of other codings of the arrays of a file, chunk by chunk: bench_codings
+ * FILE.ebpo.h5. Prints a table for docs/develop/codings.md. Speeds are 10^6 bytes of the array a
+ * second on one core, zstd included, the best of three rounds for each chunk. Float coordinates
+ * only. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,16 +15,16 @@
 #include "hdf5_read/coding.h"
 #include "hdf5_read/face_gates.h"
 
-enum { ROOM = 1 << 20, STREAMS_MOST = 32, TURNS = 3, DICTIONARY = 16384 };
+enum { SPACE = 1 << 20, STREAMS_MAX = 32, TURNS = 3, DICTIONARY = 16384 };
 
-/* What a chunk is before zstd: runs of bytes that have something in common. */
+/* Contents of a chunk before zstd: runs of similar bytes. */
 typedef struct streams {
-    const uint8_t *bytes[STREAMS_MOST];
-    size_t size[STREAMS_MOST];
+    const uint8_t *bytes[STREAMS_MAX];
+    size_t size[STREAMS_MAX];
     int count;
 } streams;
 
-/* How zstd is used. `blocks`: one for each stream. */
+/* Use of zstd. `blocks`: one for each stream. */
 typedef struct effort {
     int level, match_least;
     bool blocks;
@@ -37,7 +38,7 @@ static ebpo_tree tree;
 static uint32_t faces_rows, vertices_rows, list_rows; /* of chunks */
 static ZSTD_CCtx *writer;
 static ZSTD_DCtx *reader;
-static uint8_t stored[ROOM], room[ROOM];
+static uint8_t stored[SPACE], space[SPACE];
 
 static void check(bool fine, const char *what)
 {
@@ -56,7 +57,7 @@ static double now(void)
 
 static void begin_frame(const effort *e, size_t size)
 {
-    bool small = e->blocks && size < 4096; /* as lib/hdf5_read/chunk.c has it */
+    bool small = e->blocks && size < 4096; /* as in lib/hdf5_read/chunk.c */
     ZSTD_CCtx_reset(writer, ZSTD_reset_session_and_parameters);
     ZSTD_CCtx_setParameter(writer, ZSTD_c_compressionLevel, small ? 3 : e->level);
     ZSTD_CCtx_setParameter(writer, ZSTD_c_checksumFlag, 1);
@@ -67,7 +68,7 @@ static void begin_frame(const effort *e, size_t size)
     ZSTD_CCtx_setPledgedSrcSize(writer, size);
 }
 
-/* One frame with all streams, into `stored`. */
+/* Writes one frame with all streams to `stored`. */
 static size_t frame(const streams *s, const effort *e)
 {
     size_t size = 0;
@@ -87,7 +88,7 @@ static size_t frame(const streams *s, const effort *e)
     return out.pos;
 }
 
-static void say(const char *array, const char *coding, uint64_t bytes, double speed)
+static void report(const char *array, const char *coding, uint64_t bytes, double speed)
 {
     printf("| %s | %s | %.3f |", array, coding, (double)bytes / (double)tree.mesh.face_count);
     if (speed > 0)
@@ -95,7 +96,7 @@ static void say(const char *array, const char *coding, uint64_t bytes, double sp
     printf(" |\n");
 }
 
-/* Bytes k of values[0], values[stride], ... for k = 0 .. 3, as four streams at *at. */
+/* Adds bytes k of values[0], values[stride], ... for k = 0 .. 3, as four streams at *at. */
 static void add_planes(streams *s, uint8_t **at, const uint32_t *values, size_t count,
                        size_t stride)
 {
@@ -109,7 +110,7 @@ static void add_planes(streams *s, uint8_t **at, const uint32_t *values, size_t 
 
 static size_t planes(const uint32_t *values, size_t count, int columns, const effort *e)
 {
-    uint8_t *at = room;
+    uint8_t *at = space;
     streams s = { .count = 0 };
     for (int c = 0; c < columns; c++)
         add_planes(&s, &at, values + c, count / (size_t)columns, (size_t)columns);
@@ -120,38 +121,39 @@ static size_t bit_planes(const uint32_t *values, size_t count)
 {
     size_t bytes = (count + 7) / 8;
     streams s = { .count = 32 };
-    memset(room, 0, 32 * bytes);
+    memset(space, 0, 32 * bytes);
     for (int k = 0; k < 32; k++) {
-        s.bytes[k] = room + bytes * (size_t)k;
+        s.bytes[k] = space + bytes * (size_t)k;
         s.size[k] = bytes;
         for (size_t i = 0; i < count; i++)
-            room[bytes * (size_t)k + i / 8] |= (uint8_t)((values[i] >> k & 1) << i % 8);
+            space[bytes * (size_t)k + i / 8] |= (uint8_t)((values[i] >> k & 1) << i % 8);
     }
     return frame(&s, &today);
 }
 
-/* The number of bits and the two after the first in a byte, the others packed. */
+/* Writes the number of bits and the two bits after the first in a byte, and packs the others. */
 static size_t bit_counts(const uint32_t *values, size_t count)
 {
     size_t bits = 0;
-    uint8_t *packed = room + count;
+    uint8_t *packed = space + count;
     memset(packed, 0, 4 * count);
     for (size_t i = 0; i < count; i++) {
         uint64_t value = (uint64_t)values[i] + 4;
         int length = 2;
         while (value >> (length + 1))
             length++;
-        room[i] = (uint8_t)(length << 2 | (value >> (length - 2) & 3));
+        space[i] = (uint8_t)(length << 2 | (value >> (length - 2) & 3));
         for (int k = 0; k < length - 2; k++, bits++)
             packed[bits / 8] |= (uint8_t)((value >> k & 1) << bits % 8);
     }
-    streams s = { { room, packed }, { count, (bits + 7) / 8 }, 2 };
+    streams s = { { space, packed }, { count, (bits + 7) / 8 }, 2 };
     return frame(&s, &today);
 }
 
-/* Columns of codes by zstd: once, as it is today, as rows of columns, with a dictionary. */
-static void usual(const char *array, const uint32_t *codes, uint64_t rows, int columns,
-                  uint32_t chunk)
+/* Compresses columns of codes by zstd: in the current way, as rows of columns, and with a
+ * dictionary. */
+static void standard(const char *array, const uint32_t *codes, uint64_t rows, int columns,
+                     uint32_t chunk)
 {
     uint64_t sum[4] = { 0 };
     size_t sizes[1024], samples = 0, used = 0;
@@ -162,15 +164,15 @@ static void usual(const char *array, const uint32_t *codes, uint64_t rows, int c
         sum[0] += planes(part, n, 1, &one_block);
         sum[1] += planes(part, n, 1, &today);
         if (samples < 1024 && used + 4 * n <= sizeof sample) {
-            memcpy(sample + used, room, 4 * n);
+            memcpy(sample + used, space, 4 * n);
             used += sizes[samples++] = 4 * n;
         }
         sum[2] += planes(part, n, columns, &today);
     }
-    say(array, "one block, level 3", sum[0], 0);
-    say(array, "**today**: a block for each plane of bytes", sum[1], 0);
+    report(array, "one block, level 3", sum[0], 0);
+    report(array, "**today**: a block for each plane of bytes", sum[1], 0);
     if (columns > 1)
-        say(array, "the same, columns apart", sum[2], 0);
+        report(array, "the same, columns apart", sum[2], 0);
     size_t trained =
         ZDICT_trainFromBuffer(dictionary, DICTIONARY, sample, sizes, (unsigned)samples);
     effort with = { 7, 6, true, dictionary, trained };
@@ -180,7 +182,7 @@ static void usual(const char *array, const uint32_t *codes, uint64_t rows, int c
         uint64_t n = (rows - r < chunk ? rows - r : chunk) * (uint64_t)columns;
         sum[3] += planes(codes + r * (uint64_t)columns, n, 1, &with);
     }
-    say(array, "with a dictionary", sum[3] + trained, 0);
+    report(array, "with a dictionary", sum[3] + trained, 0);
 }
 
 static uint32_t ordered(float value)
@@ -190,10 +192,10 @@ static uint32_t ordered(float value)
     return ebpo_float_order32(bits);
 }
 
-/* ---- which vertices a vertex may be predicted from ---- */
+/* ---- vertices for the prediction of a vertex ---- */
 
-/* For each vertex, from the face that has it first: the two others of that face, and the corner
- * across these in an earlier face; ~0: there is none, or it is in a chunk before. */
+/* For each vertex, in the first face with it: the two other vertices of that face, and the corner
+ * across these in an earlier face; ~0: there is none, or it is in an earlier chunk. */
 typedef struct origin {
     uint32_t a, b, across;
 } origin;
@@ -273,16 +275,16 @@ static void vertices(const origin *origins)
         codes[i] = ebpo_zigzag32(value - before);
         across[i] = ebpo_zigzag32(value - predicted(&origins[i / 3], i / 3, (int)(i % 3)));
     }
-    usual("vertices", codes, rows, 3, vertices_rows);
+    standard("vertices", codes, rows, 3, vertices_rows);
     for (uint64_t r = 0; r < rows; r += vertices_rows) {
         uint64_t n = 3 * (rows - r < vertices_rows ? rows - r : vertices_rows);
         bits += bit_planes(codes + 3 * r, n);
         counts += bit_counts(codes + 3 * r, n);
         near += planes(across + 3 * r, n, 1, &today);
     }
-    say("vertices", "planes of bits", bits, 0);
-    say("vertices", "counts of bits, bits packed", counts, 0);
-    say("vertices", "across an edge (parallelogram)", near, 0);
+    report("vertices", "planes of bits", bits, 0);
+    report("vertices", "counts of bits, bits packed", counts, 0);
+    report("vertices", "across an edge (parallelogram)", near, 0);
     free(codes);
     free(across);
 }
@@ -291,7 +293,7 @@ static void vertices(const origin *origins)
 
 enum { GATES_BYTES = 4096 * EBPO_GATES_COLS };
 
-/* Seconds for a chunk back from `stored`. */
+/* Returns the seconds to decode a chunk from `stored`. */
 static double gates_back(size_t bytes, uint32_t rows, uint64_t seen, const uint32_t *expected)
 {
     static uint32_t back[3 * 4096];
@@ -300,10 +302,10 @@ static double gates_back(size_t bytes, uint32_t rows, uint64_t seen, const uint3
     for (int turn = 0; turn < TURNS; turn++) {
         uint64_t then = seen;
         double begin = now();
-        size_t size = ZSTD_decompressDCtx(reader, room, sizeof room, stored, bytes);
+        size_t size = ZSTD_decompressDCtx(reader, space, sizeof space, stored, bytes);
         check(!ZSTD_isError(size), "zstd");
         bool fine =
-            ebpo_gates_decode(room, rows, codes) && ebpo_corners_decode(codes, rows, &then, back);
+            ebpo_gates_decode(space, rows, codes) && ebpo_corners_decode(codes, rows, &then, back);
         double took = now() - begin;
         check(fine && memcmp(back, expected, 12 * (size_t)rows) == 0, "faces came back otherwise");
         best = took < best ? took : best;
@@ -335,7 +337,7 @@ static void faces_by_gates(const uint32_t *codes)
         for (uint32_t i = 0; i < 3 * n; i++)
             seen += codes[3 * r + i] == 0;
     }
-    say("faces", "across edges (`gates`)", sum, 12.0 * (double)rows / seconds);
+    report("faces", "across edges (`gates`)", sum, 12.0 * (double)rows / seconds);
 }
 
 static void faces(void)
@@ -347,7 +349,7 @@ static void faces(void)
         codes[i] = (uint32_t)(seen - tree.mesh.faces[i]);
         seen += codes[i] == 0;
     }
-    usual("faces", codes, rows, 3, faces_rows);
+    standard("faces", codes, rows, 3, faces_rows);
     faces_by_gates(codes);
     free(codes);
 }
@@ -379,7 +381,7 @@ static size_t first_apart(const uint32_t *gaps, const uint8_t *first, size_t cou
     for (size_t i = 0; i < count; i++)
         part[first[i]][n[first[i]]++] = gaps[i];
     streams s = { .count = 0 };
-    uint8_t *at = room;
+    uint8_t *at = space;
     add_planes(&s, &at, part[1], n[1], 1);
     add_planes(&s, &at, part[0], n[0], 1);
     return frame(&s, &today);
@@ -403,9 +405,9 @@ static void lists(void)
         free(gaps);
         free(first);
     }
-    say("leaf_refs", "one block, level 3", sum[0], 0);
-    say("leaf_refs", "**today**: a block for each plane of bytes", sum[1], 0);
-    say("leaf_refs", "the first of each leaf apart", sum[2], 0);
+    report("leaf_refs", "one block, level 3", sum[0], 0);
+    report("leaf_refs", "**today**: a block for each plane of bytes", sum[1], 0);
+    report("leaf_refs", "the first of each leaf apart", sum[2], 0);
 }
 
 static void map(const char *name, const uint32_t *numbers, uint64_t rows)
@@ -414,11 +416,11 @@ static void map(const char *name, const uint32_t *numbers, uint64_t rows)
     check(codes, "no memory");
     for (uint64_t i = 0; i < rows; i++)
         codes[i] = ebpo_zigzag32(numbers[i] - (i % list_rows ? numbers[i - 1] : 0));
-    usual(name, codes, rows, 1, list_rows);
+    standard(name, codes, rows, 1, list_rows);
     free(codes);
 }
 
-/* Of a vertex, from another corner of the face that has it first. */
+/* Predicts a vertex from another corner of its first face. */
 static void map_across(const origin *origins)
 {
     uint64_t rows = tree.mesh.vertex_count, sum = 0;
@@ -433,7 +435,7 @@ static void map_across(const origin *origins)
     }
     for (uint64_t r = 0; r < rows; r += list_rows)
         sum += planes(codes + r, rows - r < list_rows ? rows - r : list_rows, 1, &today);
-    say("vertex_source", "from a neighbour", sum, 0);
+    report("vertex_source", "from a neighbour", sum, 0);
     free(codes);
 }
 

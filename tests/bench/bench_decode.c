@@ -1,8 +1,8 @@
-/* How fast a file decodes: bench_decode FILE.ebpo.h5 [--threads N] [--rounds R]. Reads all of it,
- * checks included, as any reader does: the levels, the mesh, the maps, each freed before the next.
- * The file is in the system's memory (a first round is not counted). One line of JSON: medians of R
- * rounds (default 3), and the decoded bytes: those of the arrays that a reader gets (file.h:
- * ebpo_level, ebpo_mesh, maps). */
+/* Measures how fast a file is decoded: bench_decode FILE.ebpo.h5 [--threads N] [--rounds R]. Reads
+ * all of it, including checks, as any reader does: the levels, the mesh, the maps, each freed
+ * before the next. The file is in the page cache (a first round is not counted). One line of JSON:
+ * medians of R rounds (default 3), and the decoded bytes: those of the arrays returned to a reader
+ * (file.h: ebpo_level, ebpo_mesh, maps). */
 #include <inttypes.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -12,7 +12,7 @@
 
 #include <ebpo/file.h>
 
-enum { LEVELS, MESH, MAPS, PARTS, ROUNDS_MOST = 99 };
+enum { LEVELS, MESH, MAPS, PARTS, ROUNDS_MAX = 99 };
 
 static const char *const names[PARTS] = { "levels", "mesh", "maps" };
 
@@ -22,11 +22,11 @@ typedef struct settings {
     int rounds;
 } settings;
 
-/* Bytes decoded, seconds wall and processor. */
-typedef struct round_figures {
+/* Decoded bytes, wall-clock and processor seconds. */
+typedef struct round_metrics {
     uint64_t bytes[PARTS];
     double seconds[PARTS], cpu;
-} round_figures;
+} round_metrics;
 
 static double now(clockid_t clock)
 {
@@ -87,7 +87,7 @@ static bool read_maps(ebpo_file *file, const ebpo_read_options *read, uint64_t *
     return true;
 }
 
-static bool read_all(ebpo_file *file, const ebpo_read_options *read, round_figures *f,
+static bool read_all(ebpo_file *file, const ebpo_read_options *read, round_metrics *f,
                      ebpo_error *error)
 {
     static bool (*const readers[PARTS])(ebpo_file *, const ebpo_read_options *, uint64_t *,
@@ -106,7 +106,7 @@ static bool read_all(ebpo_file *file, const ebpo_read_options *read, round_figur
     return true;
 }
 
-static double total(const round_figures *f)
+static double total(const round_metrics *f)
 {
     return f->seconds[LEVELS] + f->seconds[MESH] + f->seconds[MAPS];
 }
@@ -117,7 +117,7 @@ static int by_seconds(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static void print(const settings *s, const round_figures *f, uint64_t file_bytes)
+static void print(const settings *s, const round_metrics *f, uint64_t file_bytes)
 {
     printf("{\"threads\": %u, \"rounds\": %d, \"file_bytes\": %" PRIu64 ", \"parts\": [",
            s->threads, s->rounds, file_bytes);
@@ -139,7 +139,7 @@ static bool parse(int argc, char **argv, settings *s)
         bool number = end && end != argv[i + 1] && !*end;
         if (strcmp(argv[i], "--threads") == 0 && number && value <= 1024)
             s->threads = (unsigned)value, i++;
-        else if (strcmp(argv[i], "--rounds") == 0 && number && value >= 1 && value <= ROUNDS_MOST)
+        else if (strcmp(argv[i], "--rounds") == 0 && number && value >= 1 && value <= ROUNDS_MAX)
             s->rounds = (int)value, i++;
         else if (argv[i][0] != '-' && !s->path)
             s->path = argv[i];
@@ -152,12 +152,12 @@ static bool parse(int argc, char **argv, settings *s)
 int main(int argc, char **argv)
 {
     settings s;
-    round_figures f[ROUNDS_MOST], first;
+    round_metrics f[ROUNDS_MAX], first;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file;
     if (!parse(argc, argv, &s)) {
         fprintf(stderr, "usage: bench_decode FILE.ebpo.h5 [--threads N] [--rounds 1..%d]\n",
-                ROUNDS_MOST);
+                ROUNDS_MAX);
         return 2;
     }
     if (ebpo_open(s.path, &file, &error) != EBPO_OK) {

@@ -1,5 +1,5 @@
-/* What putting the floating-point environment aside costs a call: ns, in the default environment
- * and in another one. */
+/* Measures the cost of saving the floating-point environment for a call: ns, in the default
+ * environment and in another one. */
 #include <fenv.h>
 #include <stdio.h>
 #include <time.h>
@@ -36,10 +36,10 @@ static double cost(void)
 
 int main(void)
 {
-    double usual = cost();
+    double standard = cost();
     fesetround(FE_UPWARD);
     double other = cost();
     fesetround(FE_TONEAREST);
-    printf("default environment %.1f ns, another %.1f ns a call\n", usual, other);
+    printf("default environment %.1f ns, another %.1f ns a call\n", standard, other);
     return 0;
 }

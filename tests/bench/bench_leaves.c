@@ -1,7 +1,7 @@
-/* What the kinds of leaves gain: bench_leaves FILE.ebpo.h5 [--points N] [--json]. Uniform points of
- * the model's box that fall into leaves, by the leaf's kind: nanoseconds for one, with the kind's
- * planes and with the same leaf taken as a general one. Both the best of seven passes, in turns, in
- * one run. */
+/* Measures the gain by kinds of leaves: bench_leaves FILE.ebpo.h5 [--points N] [--json]. For
+ * uniform points of the model's box that are in leaves, by the kind of the leaf: nanoseconds per
+ * point, with the planes of the kind and with the same leaf treated as a general one. Both are the
+ * best of seven passes, in turn, in one run. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,13 +10,13 @@
 
 #include "query/query_model.h"
 
-enum { KINDS = 5, MOST = 20000, PASSES = 7 };
+enum { KINDS = 5, LIMIT = 20000, PASSES = 7 };
 
 static const char *const names[KINDS] = { "general", "one plane", "two planes", "convex set",
                                           "concave set" };
 
 typedef struct bucket {
-    double points[MOST][3];
+    double points[LIMIT][3];
     uint64_t count, seen;
     double ns, ns_as_general;
 } bucket;
@@ -40,13 +40,13 @@ static void fail(const ebpo_error *error)
     exit(EXIT_FAILURE);
 }
 
-/* Of all leaves, as if each had been asked about often. */
+/* Prepares all leaves as after many queries. */
 static void know_below(const ebpo_accel *s, const ebpo_node *node)
 {
-    for (int i = 0; i < EBPO_LEAF_KIND_ASKED && ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_LEAF;
-         i++)
-        (void)ebpo_leaf_ask(s, &s->leaf[ebpo_entry_value(node->entry)], node->cell,
-                            ebpo_inside_kernels_best()->walls);
+    for (int i = 0;
+         i < EBPO_LEAF_KIND_QUERIED && ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_LEAF; i++)
+        (void)ebpo_leaf_query(s, &s->leaf[ebpo_entry_value(node->entry)], node->cell,
+                              ebpo_inside_kernels_best()->cell_faces);
     for (unsigned octant = 0; octant < 8 && node->type == EBPO_GRAY && !node->pruned; octant++) {
         ebpo_node child = ebpo_accel_child(s, node, octant);
         know_below(s, &child);
@@ -71,7 +71,7 @@ static void sort_points(const ebpo_model *m, uint64_t points, bucket *buckets)
             continue;
         bucket *b = &buckets[ebpo_leaf_kind_of(&s->leaf[ebpo_entry_value(entry)])];
         b->seen++;
-        if (b->count < MOST)
+        if (b->count < LIMIT)
             memcpy(b->points[b->count++], p, sizeof p);
     }
 }
@@ -88,7 +88,7 @@ static double pass(ebpo_context *c, const bucket *b, ebpo_inside_result *out)
 
 static void measure(ebpo_context *c, bucket *b)
 {
-    static ebpo_inside_result with[MOST], without[MOST];
+    static ebpo_inside_result with[LIMIT], without[LIMIT];
     ebpo_accel *s = c->model->whole;
     uint8_t *kinds = malloc(s->leaf_count);
     if (!kinds)
@@ -155,7 +155,8 @@ int main(int argc, char **argv)
                b->seen, b->ns, b->ns_as_general);
     }
     if (json)
-        printf(", {\"one_wall\": %" PRIu64 "}]\n", atomic_load(&model->whole->kinds->one_wall));
+        printf(", {\"one_cell_face\": %" PRIu64 "}]\n",
+               atomic_load(&model->whole->kinds->one_cell_face));
     free(buckets);
     ebpo_context_free(context);
     ebpo_model_free(model);

@@ -1,6 +1,6 @@
-/* What loading costs, stage by stage: bench_load FILE.ebpo.h5 [--memory BYTES] [--count N]
- * [--planes] [--whole]. Without --whole N subtrees below the cut level, one after another from the
- * middle of the file on, as questions under a budget load them; with it the whole model, N times,
+/* Measures the cost of loading, stage by stage: bench_load FILE.ebpo.h5 [--memory BYTES] [--count
+ * N] [--planes] [--whole]. Without --whole N subtrees below the cut level, one after another from
+ * the middle of the file on, as queries under a budget load them; with it the whole model, N times,
  * on one thread. CPU time of this thread. */
 #include <inttypes.h>
 #include <stdio.h>

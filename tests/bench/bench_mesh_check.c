@@ -1,4 +1,4 @@
-/* Speed of ebpo_mesh_check: bench_mesh_check FILE [THREADS]. */
+/* Measures the speed of ebpo_mesh_check: bench_mesh_check FILE [THREADS]. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/resource.h>

@@ -1,15 +1,15 @@
-/* Nanoseconds for each pair of faces: the filter of eight, the exact test, contacts, distances; by
- * kind of input; and for pairs of blocks. Not a test: prints a table. */
+/* Measures nanoseconds for each pair of faces: the filter of eight, the exact test, contacts,
+ * distances; by kind of input; and for pairs of blocks. Not a test: prints a table. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
 
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "extras/collide/face_pairs.h"
 #include "extras/collide/posed_frames.h"
 #include "geometry/triangle_pair.h"
-#include "pair_twin.h"
+#include "pair_reference.h"
 
 enum { PAIRS = 4096, ROUNDS = 40 };
 
@@ -34,7 +34,7 @@ static void fill(int kind, uint64_t *state)
     double most = 0;
     crossings = 0;
     for (int i = 0; i < PAIRS; i++) {
-        twin_pair_case(first[i], second[i], kind, state);
+        reference_pair_case(first[i], second[i], kind, state);
         if (ebpo_triangle_pair(CORNERS(first[i]), CORNERS(second[i])) == EBPO_PAIR_CROSSING) {
             memcpy(crossing[crossings][0], first[i], sizeof(face));
             memcpy(crossing[crossings++][1], second[i], sizeof(face));
@@ -95,7 +95,7 @@ static double exact_distance(int i)
     return ebpo_triangles_distance(CORNERS(first[i]), CORNERS(second[i]));
 }
 
-/* The least of some runs, by the thread's own time. */
+/* Returns the minimum of some runs, in thread time. */
 static double ns_per_pair(work *f, int pairs, int rounds)
 {
     double least = INFINITY;
@@ -119,7 +119,7 @@ static double share_open(void)
     return 100 - 100.0 * decided / PAIRS;
 }
 
-/* --- blocks of a surface against blocks of another one that goes through it --- */
+/* --- blocks of a surface against blocks of an intersecting one --- */
 
 enum { BLOCKS = 512, VERTICES = 10 };
 static float vertex[2][BLOCKS][3][VERTICES], placed[2][BLOCKS][72], placed_error[BLOCKS];
@@ -131,7 +131,7 @@ static ebpo_block_pairs found;
 static void fill_patch(float out[3][VERTICES], uint64_t *state)
 {
     for (int i = 0; i < VERTICES; i++) {
-        double height = 0.3 * twin_uniform(state);
+        double height = 0.3 * reference_uniform(state);
         out[0][i] = (float)(i % 5 + 0.1 * height);
         out[1][i] = (float)(i / 5);
         out[2][i] = (float)height;
@@ -217,9 +217,9 @@ int main(void)
     uint64_t state = 1;
     printf("%-34s %8s %8s %8s %8s %8s %8s %8s %8s\n", "ns for each pair", "base", "best", "one",
            "open %", "exact", "contact", "bounds", "distance");
-    for (int kind = 0; kind < TWIN_PAIR_KINDS; kind++) {
+    for (int kind = 0; kind < REFERENCE_PAIR_KINDS; kind++) {
         fill(kind, &state);
-        printf("%-34s %8.2f %8.2f %8.2f %8.2f %8.1f %8.0f %8.0f %8.0f\n", twin_pair_name(kind),
+        printf("%-34s %8.2f %8.2f %8.2f %8.2f %8.1f %8.0f %8.0f %8.0f\n", reference_pair_name(kind),
                ns_per_pair(filter_base, PAIRS, ROUNDS), ns_per_pair(filter_best, PAIRS, ROUNDS),
                ns_per_pair(filter_one, PAIRS, ROUNDS), share_open(),
                ns_per_pair(exact_kind, PAIRS, ROUNDS), ns_per_pair(contact, PAIRS, 4),

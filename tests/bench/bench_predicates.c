@@ -1,8 +1,8 @@
-/* Nanoseconds for each orient3d call, by kind of input. Not a test: prints a table. */
+/* Measures nanoseconds for each orient3d call, by kind of input. Not a test: prints a table. */
 #include <stdio.h>
 #include <time.h>
 
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "geometry/predicates.h"
 
 enum { SETS = 4096, ROUNDS = 50 };
@@ -29,7 +29,7 @@ static double ns_per_call(orient3d_function *orient3d, int rounds, int *zeros)
     for (int round = 0; round < rounds; round++)
         for (int i = 0; i < SETS; i++)
             sink += orient3d(p[i], p[i] + 3, p[i] + 6, p[i] + 9);
-    (void)sink; /* clang: set and not used, which it is for */
+    (void)sink; /* avoids the clang warning about a variable that is set and not used */
     return (now_ns() - start) / ((double)rounds * SETS);
 }
 
@@ -42,13 +42,13 @@ static void report(const char *name)
            100.0 * zeros / SETS, fast, exact);
 }
 
-/* Single-precision points of one slanted plane, and of one axis-parallel plane. */
+/* Fills single-precision points of a slanted plane, or of an axis-parallel plane. */
 static void fill_plane(int slanted, uint64_t *state)
 {
     for (int i = 0; i < SETS; i++)
         for (int k = 0; k < 4; k++) {
-            double x = (double)twin_integer(state, -(1 << 23), 1 << 23) * 0x1p-24;
-            double y = (double)twin_integer(state, -(1 << 23), 1 << 23) * 0x1p-24;
+            double x = (double)reference_integer(state, -(1 << 23), 1 << 23) * 0x1p-24;
+            double y = (double)reference_integer(state, -(1 << 23), 1 << 23) * 0x1p-24;
             p[i][3 * k] = x;
             p[i][3 * k + 1] = y;
             p[i][3 * k + 2] = slanted ? x * 0.5 + y * 2 + 1 : 0.75;
@@ -58,10 +58,10 @@ static void fill_plane(int slanted, uint64_t *state)
 int main(void)
 {
     uint64_t state = 1;
-    for (int kind = 0; kind < TWIN_KINDS; kind++) {
+    for (int kind = 0; kind < REFERENCE_KINDS; kind++) {
         for (int i = 0; i < SETS; i++)
-            twin_points(p[i], 3, kind, &state);
-        report(twin_kind_name(kind));
+            reference_points(p[i], 3, kind, &state);
+        report(reference_kind_name(kind));
     }
     fill_plane(0, &state);
     report("coplanar, axis-parallel, single precision");

@@ -1,10 +1,11 @@
-/* Processor time for one ray or box against one triangle, the best of many rounds: bench_ray. */
+/* Measures processor time for one ray or box against one triangle, the best of many rounds:
+ * bench_ray. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
 
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "geometry/ray.h"
 
 enum { COUNT = 4096, ROUNDS = 30 };
@@ -23,7 +24,7 @@ static double now(void)
 typedef enum aim {
     AT_RANDOM,
     AT_THE_MIDDLE,
-    AT_A_CORNER, /* as near as the direction's rounding lets it */
+    AT_A_CORNER, /* as close as the rounding of the direction allows */
     AT_A_CORNER_EXACTLY,
     AT_AN_EDGE_EXACTLY,
     FROM_A_CORNER,
@@ -38,7 +39,7 @@ typedef enum aim {
 /* Points with few bits, so that differences are exact. */
 static double coarse(uint64_t *state)
 {
-    return (double)(float)(0x1p-20 * (double)twin_integer(state, -(1 << 20), 1 << 20));
+    return (double)(float)(0x1p-20 * (double)reference_integer(state, -(1 << 20), 1 << 20));
 }
 
 static void make_triangles(int n, aim a, uint64_t *state)
@@ -60,11 +61,11 @@ static void make_ray(int n, aim a, uint64_t *state)
     bool exact = a == AT_A_CORNER_EXACTLY || a == AT_AN_EDGE_EXACTLY || a == TO_A_CORNER;
     for (int k = 0; k < 3; k++) {
         double middle = (t[0][k] + t[1][k] + t[2][k]) / 3, edge = (t[0][k] + t[1][k]) / 2,
-               from = exact ? 4 * coarse(state) : 3 * twin_uniform(state),
+               from = exact ? 4 * coarse(state) : 3 * reference_uniform(state),
                to = a == AT_THE_MIDDLE || a == TO_THE_FACE ? middle
                     : a == AT_AN_EDGE_EXACTLY              ? edge
                     : a == AT_RANDOM || (a >= FROM_A_CORNER && a <= FROM_THE_FACE)
-                        ? 9 * twin_uniform(state)
+                        ? 9 * reference_uniform(state)
                         : t[0][k];
         from = a == FROM_A_CORNER ? t[0][k] : a == FROM_AN_EDGE ? edge : from;
         from = a == FROM_THE_FACE ? middle : from;
@@ -86,16 +87,17 @@ static void prepare(aim a, uint64_t *state)
         make_triangles(n, a, state);
         make_ray(n, a, state);
         for (int k = 0; k < 3; k++) {
-            box_min[n][k] = triangles[n][0][k] + .4 * twin_uniform(state);
+            box_min[n][k] = triangles[n][0][k] + .4 * reference_uniform(state);
             box_max[n][k] = box_min[n][k] + .1;
         }
     }
 }
 
-/* One ray against a triangle; and which of two neighbours it meets first, where it meets both. */
+/* Measures one ray against a triangle; and the order of the hits of two neighbours, when it hits
+ * both. */
 static void time_rays(const char *name, aim a, uint64_t *state)
 {
-    static ebpo_ray_meeting met[2][COUNT];
+    static ebpo_ray_intersection intersected[2][COUNT];
     long hits = 0, both = 0, ties = 0;
     double best = 1e30, best_order = 1e30;
     prepare(a, state);
@@ -103,19 +105,19 @@ static void time_rays(const char *name, aim a, uint64_t *state)
         double begin = now();
         hits = both = ties = 0;
         for (int n = 0; n < COUNT; n++) {
-            ebpo_ray_triangle(&rays[n], (const double(*)[3])triangles[n], &met[0][n]);
-            hits += met[0][n].meets;
+            ebpo_ray_triangle(&rays[n], (const double(*)[3])triangles[n], &intersected[0][n]);
+            hits += intersected[0][n].meets;
         }
         best = fmin(best, (now() - begin) / COUNT);
         for (int n = 0; n < COUNT; n++)
-            ebpo_ray_triangle(&rays[n], (const double(*)[3])others[n], &met[1][n]);
+            ebpo_ray_triangle(&rays[n], (const double(*)[3])others[n], &intersected[1][n]);
         begin = now();
         for (int n = 0; n < COUNT; n++) {
-            if (!met[0][n].meets || !met[1][n].meets)
+            if (!intersected[0][n].meets || !intersected[1][n].meets)
                 continue;
             both++;
-            ties += ebpo_ray_compare(&rays[n], (const double(*)[3])triangles[n], &met[0][n],
-                                     (const double(*)[3])others[n], &met[1][n]) == 0;
+            ties += ebpo_ray_compare(&rays[n], (const double(*)[3])triangles[n], &intersected[0][n],
+                                     (const double(*)[3])others[n], &intersected[1][n]) == 0;
         }
         best_order = fmin(best_order, (now() - begin) / (double)(both ? both : 1));
     }
@@ -132,8 +134,8 @@ static void time_boxes(uint64_t *state)
         double begin = now();
         hits = 0;
         for (int n = 0; n < COUNT; n++)
-            hits +=
-                ebpo_triangle_meets_box((const double(*)[3])triangles[n], box_min[n], box_max[n]);
+            hits += ebpo_triangle_intersects_box((const double(*)[3])triangles[n], box_min[n],
+                                                 box_max[n]);
         best = fmin(best, (now() - begin) / COUNT);
     }
     printf("%-22s %8.1f ns  %5.1f %% meet\n", "box", best, 100.0 * (double)hits / COUNT);

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""What coarse levels look like for their bytes: docs/measured/coarse-looks.md.
+"""Compares pictures of coarse levels with those of the model, for docs/measured/coarse-looks.md.
 
     /usr/bin/python3 tests/bench/coarse_looks.py BUILD_DIR FILE.ebpo.h5 [--levels 3-7]
     [--directions 5]
 
-Draws the model and its levels from 20 directions, or some of these, and compares the pictures: levels as they lie;
-with walls lit as the planes around them; with normals that a file might store; and covered with
-pictures taken around the model (BP-Octree thesis, 4.4). No figure depends on the machine.
+Draws the model and its levels from up to 20 directions and prints the SSIM and the difference of the
+pictures, for each way of shading: polygon normals; cell faces with the normals of the planes around
+them; normals that a file could store; and pictures taken around the model (BP-Octree thesis, 4.4).
+No result depends on the machine.
 
 Needs numpy, and ninja -C BUILD_DIR tests/bench/looks_samples tests/bench/jpeg_pictures.
 """
@@ -451,12 +452,12 @@ def compare(model, level, pictures, stored):
             values = model.references[i].likeness(picture(hit, light), covered(hit))
             found.setdefault(name, (extra, []))[1].append(values)
         for name, extra, n in (
-                ("as they lie", 0, flat), ("walls lit", 0, s.lent[which]),
-                ("walls lit, planes half", 0,
+                ("polygon normals", 0, flat), ("cell faces lit", 0, s.lent[which]),
+                ("cell faces lit, planes half", 0,
                  numpy.where(wall, s.lent[which], unit(flat + by_field))),
                 ("field", 0, by_field),
                 ("node normals", node_bytes, by_nodes),
-                ("walls by node normals", node_bytes, numpy.where(wall, by_nodes, flat))):
+                ("cell faces by node normals", node_bytes, numpy.where(wall, by_nodes, flat))):
             note(name, extra, lit(towards(n, view), colour))
         for p in pictures:
             shown, taken = p.on(view[2], places)
@@ -468,7 +469,7 @@ def compare(model, level, pictures, stored):
             if p.pixels > SMALL or len(p.directions) < 66:
                 continue
             faces = (s.lent[which] @ taken > .3)[:, None]
-            note(p.name + ", node normals where it looks away", p.bytes + node_bytes,
+            note(p.name + ", node normals where the surface faces away", p.bytes + node_bytes,
                  numpy.where(faces, light, lit(towards(by_nodes, view), colour)))
     return {name: (extra, *numpy.mean(values, axis=0)) for name, (extra, values) in found.items()}
 

@@ -1,11 +1,11 @@
-/* What pairs of faces and distances of two models are worth: beside brute force in rational
- * arithmetic (tests/support/models_twin.h), which takes seconds a pose from 30,000 faces on.
+/* Compares pairs of faces and distances of two models with brute force in rational arithmetic
+ * (tests/support/models_reference.h), which takes seconds a pose from 30,000 faces on.
  *
  *     collide_exact POSES A.ply|A.obj|... [...]
  *
- * Each model with itself and with the next one, at poses of sixteen kinds in turns: identical,
- * quarter turns, halves, boxes that touch, 1e-9 apart, slight and deep ones, one within the other,
- * apart. Prints a row of a table for each two models; fails if anything differs. */
+ * Each model with itself and with the next one, at poses of sixteen kinds in turn: identical,
+ * quarter turns, halves, boxes in contact, 1e-9 apart, slight and deep penetration, one within the
+ * other, apart. Prints a row of a table for each two models; fails if anything differs. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,12 +14,12 @@
 #include <ebpo/collide.h>
 
 #include "model_file.h"
-#include "models_twin.h"
+#include "models_reference.h"
 
-typedef struct told {
-    twin_met *met;
+typedef struct reported {
+    reference_found *intersected;
     uint64_t count, capacity;
-} told;
+} reported;
 
 typedef struct counts {
     uint64_t pairs, missed, extra, apart, far_off;
@@ -27,34 +27,37 @@ typedef struct counts {
 
 static bool keep(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
-    told *t = user;
+    reported *t = user;
     if (t->count + count > t->capacity) {
         t->capacity = 2 * (t->count + count);
-        t->met = realloc(t->met, t->capacity * sizeof *t->met);
-        if (!t->met)
+        t->intersected = realloc(t->intersected, t->capacity * sizeof *t->intersected);
+        if (!t->intersected)
             abort();
     }
     for (uint64_t i = 0; i < count; i++)
-        t->met[t->count++] =
-            (twin_met){ pairs[i].file_face_a, pairs[i].file_face_b, (int)pairs[i].kind };
+        t->intersected[t->count++] =
+            (reference_found){ pairs[i].file_face_a, pairs[i].file_face_b, (int)pairs[i].kind };
     return true;
 }
 
 static int order(const void *x, const void *y)
 {
-    const twin_met *p = x, *q = y;
+    const reference_found *p = x, *q = y;
     return p->a != q->a   ? (p->a > q->a) - (p->a < q->a)
            : p->b != q->b ? (p->b > q->b) - (p->b < q->b)
                           : (p->kind > q->kind) - (p->kind < q->kind);
 }
 
-/* Pairs of another kind are missed, and extra. */
-static void compare(const told *got, const twin_met *met, uint64_t count, counts *out)
+/* Pairs of another kind count as missed, and as extra. */
+static void compare(const reported *got, const reference_found *intersected, uint64_t count,
+                    counts *out)
 {
     uint64_t i = 0, n = 0;
     out->pairs += count;
     while (i < got->count || n < count) {
-        int by = i == got->count ? 1 : n == count ? -1 : order(&got->met[i], &met[n]);
+        int by = i == got->count ? 1
+                 : n == count    ? -1
+                                 : order(&got->intersected[i], &intersected[n]);
         out->extra += by < 0;
         out->missed += by > 0;
         i += by <= 0;
@@ -62,8 +65,8 @@ static void compare(const told *got, const twin_met *met, uint64_t count, counts
     }
 }
 
-static void look_at_distance(ebpo_collider *collider, const ebpo_collide_options *how,
-                             const twin_faces f[2], bool meet, counts *out)
+static void inspect_distance(ebpo_collider *collider, const ebpo_collide_options *how,
+                             const reference_faces f[2], bool meet, counts *out)
 {
     ebpo_clearance far;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -71,8 +74,9 @@ static void look_at_distance(ebpo_collider *collider, const ebpo_collide_options
     if ((far.distance.hi == 0) != meet || far.distance.lo != far.distance.hi)
         out->far_off++;
     else if (!meet)
-        out->far_off += twin_models_distance(&f[0], &f[1], far.distance.hi, far.pair.file_face_a,
-                                             far.pair.file_face_b) != NULL;
+        out->far_off +=
+            reference_models_distance(&f[0], &f[1], far.distance.hi, far.pair.file_face_a,
+                                      far.pair.file_face_b) != NULL;
     out->apart += !meet;
 }
 
@@ -81,22 +85,22 @@ static void look(const query_model m[2], ebpo_collider *collider, int kind, uint
 {
     ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
-    twin_faces f[2];
-    twin_met *met;
-    told got = { 0 };
-    twin_pose(kind, m[0].size, state, &how.pose_a, &how.pose_b);
-    twin_faces_make(&f[0], &m[0], &how.pose_a);
-    twin_faces_make(&f[1], &m[1], &how.pose_b);
-    uint64_t count = twin_pairs(&f[0], &f[1], &met);
+    reference_faces f[2];
+    reference_found *intersected;
+    reported got = { 0 };
+    reference_pose(kind, m[0].size, state, &how.pose_a, &how.pose_b);
+    reference_faces_make(&f[0], &m[0], &how.pose_a);
+    reference_faces_make(&f[1], &m[1], &how.pose_b);
+    uint64_t count = reference_pairs(&f[0], &f[1], &intersected);
     model_must(ebpo_collide_all(collider, &how, keep, &got, &error), "all pairs", &error);
     if (got.count)
-        qsort(got.met, got.count, sizeof *got.met, order);
-    compare(&got, met, count, out);
-    look_at_distance(collider, &how, f, count > 0, out);
+        qsort(got.intersected, got.count, sizeof *got.intersected, order);
+    compare(&got, intersected, count, out);
+    inspect_distance(collider, &how, f, count > 0, out);
     for (int i = 0; i < 2; i++)
-        twin_faces_free(&f[i]);
-    free(got.met);
-    free(met);
+        reference_faces_free(&f[i]);
+    free(got.intersected);
+    free(intersected);
 }
 
 static void read_model(const char *path, query_model *out)
@@ -108,7 +112,7 @@ static void read_model(const char *path, query_model *out)
     model_must(query_model_try(out, name, mesh, &query_variants[0], &error), path, &error);
 }
 
-static bool look_at_poses(const query_model m[2], int poses)
+static bool inspect_poses(const query_model m[2], int poses)
 {
     ebpo_collider *collider;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -117,7 +121,7 @@ static bool look_at_poses(const query_model m[2], int poses)
     model_must(ebpo_collider_new(m[0].model, m[1].model, NULL, &collider, &error), "collider",
                &error);
     for (int i = 0; i < poses; i++)
-        look(m, collider, i % TWIN_POSES, &state, &c);
+        look(m, collider, i % REFERENCE_POSES, &state, &c);
     ebpo_collider_free(collider);
     printf("| %s, %s | %" PRIu64 ", %" PRIu64 " | %d | %" PRIu64 " | %" PRIu64 " | %" PRIu64
            " | %" PRIu64 " | %" PRIu64 " |\n",
@@ -141,11 +145,11 @@ int main(int argc, char **argv)
         query_model m[3];
         read_model(argv[i], &m[0]);
         read_model(argv[i], &m[1]);
-        fine = look_at_poses(m, poses) && fine;
+        fine = inspect_poses(m, poses) && fine;
         query_model_free(&m[1]);
         if (i + 1 < argc) {
             read_model(argv[i + 1], &m[1]);
-            fine = look_at_poses(m, poses) && fine;
+            fine = inspect_poses(m, poses) && fine;
             query_model_free(&m[1]);
         }
         query_model_free(&m[0]);

@@ -1,17 +1,17 @@
-/* What answers are worth: questions that are hard to decide, and answers to any beside those of
- * rational arithmetic (tests/support/oracle.h, brute force), so of models that are not large.
+/* Measures the accuracy of results: makes queries that are hard to decide, and compares results
+ * with rational arithmetic (tests/support/oracle.h, brute force), for models that are not large.
  *
  *     exact_judge ask FILE.ebpo.h5 points|rays COUNT OUT.raw
  *     exact_judge judge FILE.ebpo.h5 QUERY POINTS.raw TMAX TOLERANCE ANSWERS...
  *
- * Points lie in turns on a vertex, on an edge and on a face as well as doubles can, in a face's
- * plane, above a vertex, next to one, between two, and in a plane of the octree. Rays go to a
- * vertex, to the middle of an edge, from a vertex, along an axis through a vertex, along an edge,
- * in a face's plane, from the middle of an edge, from vertex to vertex. Answers: as peer.hpp writes
- * them. Printed for each file of answers, as JSON: `decisions`: inside or not (not of points on the
- * surface, unless it says which these are), hit or none, how many hits; `values`: distances or
- * places that differ by more than TOLERANCE, in the model's unit; `bits`: whatever is not the
- * correctly rounded value, the first face or the sign. */
+ * Points are in turn on a vertex, on an edge and on a face, as exactly as doubles allow, in the
+ * plane of a face, above a vertex, next to one, between two, and in a plane of the octree. Rays go
+ * to a vertex, to the middle of an edge, from a vertex, along an axis through a vertex, along an
+ * edge, in the plane of a face, from the middle of an edge, from vertex to vertex. Results: as
+ * peer.hpp writes them. Prints JSON for each file of results: `decisions`: inside or not (excluding
+ * points on the surface, unless it reports which these are), hit or none, number of hits; `values`:
+ * distances or positions that differ by more than TOLERANCE, in the unit of the model; `bits`:
+ * values that are not correctly rounded, the first face or the sign. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -34,12 +34,12 @@ typedef struct subject {
     oracle *truth;
 } subject;
 
-typedef struct answer {
+typedef struct result {
     double value;
     int64_t face;
-} answer;
+} result;
 
-/* Where an answer differs from the truth. */
+/* Differences between a result and the truth. */
 typedef struct verdict {
     uint64_t decisions, values, bits;
 } verdict;
@@ -67,7 +67,7 @@ static void read_subject(subject *s, const char *path)
     ebpo_close(file);
 }
 
-/* --- hard questions --- */
+/* --- hard queries --- */
 
 static uint64_t random_state = 1;
 
@@ -152,7 +152,7 @@ static void hard_ray(const subject *s, uint64_t turn, double r[6])
     }
 }
 
-static void ask(const subject *s, bool rays, uint64_t count, const char *path)
+static void run_query(const subject *s, bool rays, uint64_t count, const char *path)
 {
     FILE *f = fopen(path, "wb");
     for (uint64_t i = 0; f && i < count; i++) {
@@ -166,7 +166,7 @@ static void ask(const subject *s, bool rays, uint64_t count, const char *path)
         fail("the questions cannot be written");
 }
 
-/* --- the truth --- */
+/* --- reference --- */
 
 static void *read_file(const char *path, size_t *bytes)
 {
@@ -182,13 +182,13 @@ static void *read_file(const char *path, size_t *bytes)
     return out;
 }
 
-static int64_t told_face(const subject *s, uint32_t face)
+static int64_t reported_face(const subject *s, uint32_t face)
 {
     return s->has_maps ? s->maps.face_source[face] : face;
 }
 
 /* inside: the value is an ebpo_where. */
-static answer truth_of(const subject *s, query what, const double *q, double tmax)
+static result truth_of(const subject *s, query what, const double *q, double tmax)
 {
     oracle_nearest near;
     const oracle_hit *hits;
@@ -196,38 +196,38 @@ static answer truth_of(const subject *s, query what, const double *q, double tma
     if (what >= RAY) {
         oracle_ray(s->truth, q, q + 3, tmax, &hits, &count);
         if (count == 0)
-            return (answer){ INFINITY, -1 };
+            return (result){ INFINITY, -1 };
         if (what == RAY_ANY)
-            return (answer){ 0, 0 };
-        return (answer){ what == RAY ? hits[0].t : count, told_face(s, hits[0].face) };
+            return (result){ 0, 0 };
+        return (result){ what == RAY ? hits[0].t : count, reported_face(s, hits[0].face) };
     }
     oracle_find_nearest(s->truth, q, &near);
     bool in = s->solid && !near.on && oracle_winding(s->truth, q) != 0;
     if (what == INSIDE)
-        return (answer){ near.on ? EBPO_ON : in ? EBPO_IN : EBPO_OUT, -1 };
-    return (answer){ in ? -near.distance : near.distance, told_face(s, near.faces[0]) };
+        return (result){ near.on ? EBPO_ON : in ? EBPO_IN : EBPO_OUT, -1 };
+    return (result){ in ? -near.distance : near.distance, reported_face(s, near.faces[0]) };
 }
 
-static answer given(query what, const void *answers, uint64_t i)
+static result given(query what, const void *results, uint64_t i)
 {
     if (what != INSIDE)
-        return ((const answer *)answers)[i];
-    return (answer){ ((const uint8_t *)answers)[i], -1 };
+        return ((const result *)results)[i];
+    return (result){ ((const uint8_t *)results)[i], -1 };
 }
 
-static void judge_one(query what, const answer *truth, const answer *told, double tolerance,
+static void judge_one(query what, const result *truth, const result *reported, double tolerance,
                       verdict *v)
 {
     bool on = what == INSIDE && truth->value == EBPO_ON;
-    bool other = what == INSIDE || what == RAY_ALL ? truth->value != told->value
-                                                   : (truth->face < 0) != (told->face < 0);
-    v->bits +=
-        memcmp(&truth->value, &told->value, sizeof told->value) != 0 || truth->face != told->face;
-    if (on && told->value != EBPO_ON)
+    bool other = what == INSIDE || what == RAY_ALL ? truth->value != reported->value
+                                                   : (truth->face < 0) != (reported->face < 0);
+    v->bits += memcmp(&truth->value, &reported->value, sizeof reported->value) != 0 ||
+               truth->face != reported->face;
+    if (on && reported->value != EBPO_ON)
         return;
     v->decisions += other;
     if ((what == DISTANCE || what == RAY) && !other && truth->face >= 0)
-        v->values += !(fabs(fabs(truth->value) - fabs(told->value)) <= tolerance);
+        v->values += !(fabs(fabs(truth->value) - fabs(reported->value)) <= tolerance);
 }
 
 static double length(const double d[3]) { return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]); }
@@ -235,30 +235,30 @@ static double length(const double d[3]) { return sqrt(d[0] * d[0] + d[1] * d[1] 
 static void judge(const subject *s, query what, const double *points, uint64_t count, double tmax,
                   double tolerance, char **paths, int files)
 {
-    void *answers[16];
+    void *results[16];
     verdict verdicts[16] = { { 0 } };
-    size_t bytes, each = what == INSIDE ? 1 : sizeof(answer);
+    size_t bytes, each = what == INSIDE ? 1 : sizeof(result);
     uint64_t on = 0;
     for (int k = 0; k < files; k++) {
-        answers[k] = read_file(paths[k], &bytes);
+        results[k] = read_file(paths[k], &bytes);
         if (bytes != count * each)
             fail("not as many answers as questions");
     }
     for (uint64_t i = 0; i < count; i++) {
         const double *q = points + i * (what >= RAY ? 6 : 3);
-        answer truth = truth_of(s, what, q, tmax);
+        result truth = truth_of(s, what, q, tmax);
         double unit = what == RAY ? tolerance / length(q + 3) : tolerance;
         on += what == INSIDE ? truth.value == EBPO_ON : truth.value == 0;
         for (int k = 0; k < files; k++) {
-            answer told = given(what, answers[k], i);
-            judge_one(what, &truth, &told, unit, &verdicts[k]);
+            result reported = given(what, results[k], i);
+            judge_one(what, &truth, &reported, unit, &verdicts[k]);
         }
     }
     printf("{\"count\": %" PRIu64 ", \"on\": %" PRIu64 ", \"answers\": [", count, on);
     for (int k = 0; k < files; k++) {
         printf("%s{\"decisions\": %" PRIu64 ", \"values\": %" PRIu64 ", \"bits\": %" PRIu64 "}",
                k ? ", " : "", verdicts[k].decisions, verdicts[k].values, verdicts[k].bits);
-        free(answers[k]);
+        free(results[k]);
     }
     printf("]}\n");
 }
@@ -285,7 +285,7 @@ int main(int argc, char **argv)
     }
     read_subject(&s, argv[2]);
     if (asks)
-        ask(&s, strcmp(argv[3], "rays") == 0, strtoull(argv[4], NULL, 10), argv[5]);
+        run_query(&s, strcmp(argv[3], "rays") == 0, strtoull(argv[4], NULL, 10), argv[5]);
     else {
         query what = query_of(argv[3]);
         size_t bytes;

@@ -1,8 +1,8 @@
-/* What pictures take as JPEG, and how they then look.
+/* Measures the size of pictures as JPEG, and returns the decoded pictures.
  *
  *     jpeg_pictures WIDTH HEIGHT QUALITY COUNT < RGB > RGB
  *
- * Tells the bytes of all, with Huffman tables of their own, on standard error. */
+ * Prints the bytes of all, with optimized Huffman tables, on standard error. */
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -1,13 +1,13 @@
-/* What coarse_looks.py draws with: which triangle each sample of some pictures shows, and where on
- * it.
+/* Computes samples for the pictures of coarse_looks.py: the triangle of each sample, and the
+ * position on it.
  *
  *     looks_samples FILE LEVEL|mesh SAMPLES OUT < CAMERAS
  *     looks_samples FILE --planes-to LEVEL OUT.ebpo.h5
  *
- * Cameras are orthographic: how many, then of each right, up and back, the middle, and half the
- * side of the picture, 13 numbers. OUT, in the machine's byte order: eight counts, the box,
- * positions, triangles, colours, nodes, corners of polygons, normals of polygons
- * (ebpo_lod_normals), samples. The second form copies a file without the planes below a level. */
+ * Cameras are orthographic: their number, then for each right, up and back, the middle, and half
+ * the side of the picture, 13 numbers. OUT, in native byte order: eight counts, the box, positions,
+ * triangles, colours, nodes, corners of polygons, normals of polygons (ebpo_lod_normals), samples.
+ * The second form copies a file without the planes below a level. */
 #include <ebpo/ebpo.h>
 #include <math.h>
 #include <stdio.h>
@@ -19,7 +19,7 @@ enum { NUMBERS = 13 };
 typedef struct sample {
     float depth;
     uint32_t triangle; /* UINT32_MAX: none */
-    float share[2];    /* of its second and third corner */
+    float share[2];    /* weights of its second and third corner */
 } sample;
 
 typedef struct shown {
@@ -36,7 +36,7 @@ static void fail(const char *what)
     exit(1);
 }
 
-static void *room(size_t bytes)
+static void *space(size_t bytes)
 {
     void *p = malloc(bytes + 1);
     if (!p)
@@ -60,7 +60,7 @@ static void project(const shown *s, const double camera[NUMBERS], int side, doub
     }
 }
 
-/* Of pixels whose middles may lie between. */
+/* Computes the range of pixels whose middles may be between. */
 static void range(double a, double b, double c, int side, int out[2])
 {
     out[0] = (int)ceil(fmax(0, fmin(a, fmin(b, c)) - 0.5));
@@ -85,7 +85,8 @@ static void fill(sample *to, int side, uint32_t triangle, const double *a, const
         }
 }
 
-/* Backs of envelopes are never seen; rows run down, so that fronts turn the other way. */
+/* Backs of envelopes are never visible; rows run down, so that fronts have the other orientation.
+ */
 static void draw(const shown *s, const double *at, int side, sample *to)
 {
     for (int i = 0; i < side * side; i++)
@@ -138,7 +139,7 @@ static ebpo_status load(const ebpo_file *file, const char *level, shown *out, eb
     status = ebpo_lod_level_nodes(file, atoi(level), NULL, &out->mesh, &out->nodes, NULL, error);
     if (status == EBPO_OK)
         status = ebpo_lod_colours(&out->nodes, out->mesh.vertex_count, &out->colours, error);
-    out->normals = room(out->nodes.polygon_count * 12);
+    out->normals = space(out->nodes.polygon_count * 12);
     return status == EBPO_OK ? ebpo_lod_normals(ebpo_file_info(file), &out->mesh, &out->nodes,
                                                 out->normals, error)
                              : status;
@@ -155,8 +156,8 @@ static ebpo_status draw_all(const ebpo_file *file, char **argv, ebpo_error *erro
     if (!out || side < 1 || scanf("%d", &cameras) != 1)
         fail("no cameras, or nowhere to write");
     write_shown(&s, ebpo_file_info(file), side, cameras, out);
-    double *at = room(s.mesh.vertex_count * 24);
-    sample *samples = room((size_t)side * (size_t)side * sizeof *samples);
+    double *at = space(s.mesh.vertex_count * 24);
+    sample *samples = space((size_t)side * (size_t)side * sizeof *samples);
     for (int i = 0; i < cameras; i++) {
         double camera[NUMBERS];
         for (int k = 0; k < NUMBERS; k++)

@@ -1,5 +1,7 @@
-"""many_shells.py N M OUT.ply [lean]: N small octahedra in a cylinder of about M faces, as long as 20
-radii; with `lean` across the axes."""
+"""Makes a model for `ebpo check`: N small octahedra in a cylinder of about M faces, which is 20 radii long.
+
+    many_shells.py N M OUT.ply [lean]        lean: tilts the cylinder to the axes
+"""
 import sys
 
 import numpy as np

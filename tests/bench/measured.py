@@ -16,7 +16,7 @@ class Failed(RuntimeError):
 
 def drop_from_memory(path):
     """Asks the system to forget a file, so that the next read goes to the disk. Returns the share
-    in percent that it still holds, or None where that cannot be told."""
+    in percent that is still cached, or None when the share is unknown."""
     with open(path, "rb") as f:
         os.fsync(f.fileno())
         os.posix_fadvise(f.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)

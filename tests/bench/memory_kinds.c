@@ -1,17 +1,17 @@
-/* What a whole model's memory is made of: memory_kinds FILE.ebpo.h5. Bytes by kind as JSON, before
- * any question. */
+/* Measures the memory of a whole model by kind: memory_kinds FILE.ebpo.h5. Prints bytes by kind as
+ * JSON, before any query. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "query/query_model.h"
 
-static uint64_t told;
+static uint64_t reported;
 
-static void tell(const char *kind, uint64_t bytes)
+static void report(const char *kind, uint64_t bytes)
 {
-    printf("%s\"%s\": %" PRIu64, told ? ", " : "{", kind, bytes);
-    told += bytes;
+    printf("%s\"%s\": %" PRIu64, reported ? ", " : "{", kind, bytes);
+    reported += bytes;
 }
 
 static void fail(const ebpo_error *error)
@@ -35,13 +35,13 @@ int main(int argc, char **argv)
         ebpo_model_get_stats(model, &stats) != EBPO_OK)
         fail(&error);
     const ebpo_accel *s = model->whole;
-    tell("faces", s->units * EBPO_MESHLET_UNIT);
-    tell("boxes", s->bound_count * sizeof *s->bound);
-    tell("slabs", s->bound_count * sizeof *s->slab);
-    tell("leaves", s->leaf_count * sizeof *s->leaf);
-    tell("leaves' blocks", s->list_count * sizeof *s->list);
-    tell("numbers in the source", s->face_source ? s->face_count * sizeof *s->face_source : 0);
-    tell("nodes and the rest", stats.memory - told);
+    report("faces", s->units * EBPO_MESHLET_UNIT);
+    report("boxes", s->bound_count * sizeof *s->bound);
+    report("slabs", s->bound_count * sizeof *s->slab);
+    report("leaves", s->leaf_count * sizeof *s->leaf);
+    report("leaves' blocks", s->list_count * sizeof *s->list);
+    report("numbers in the source", s->face_source ? s->face_count * sizeof *s->face_source : 0);
+    report("nodes and the rest", stats.memory - reported);
     printf("}\n");
     ebpo_model_free(model);
     ebpo_close(file);

@@ -6,7 +6,7 @@
 # BUILD_DIR: a release build with symbols and frame pointers; made, if it is not there. perf samples
 # 199 times a second of processor time, the threads and the kernel included (the kernel: as root).
 # Where perf may not (its test fails, or PROFILER=callgrind): valgrind counts instructions, fifty
-# times slower and on one thread, which tells nothing about waiting for memory. perf.data or
+# times slower and on one thread, without information about waiting for memory. perf.data or
 # callgrind.out stays in BUILD_DIR. Needs what `tools/install-deps.sh --bench` installs.
 set -eu
 [ $# -ge 2 ] || { sed -n '2,8s/^# \{0,1\}//p' "$0" >&2; exit 2; }

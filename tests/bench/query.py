@@ -1,16 +1,17 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/queries.md: questions to real models, beside Embree, CGAL and the figures
-of the two theses, and what became of the goals.
+"""Remakes docs/measured/queries.md: query times on real models, compared with Embree, CGAL and the
+results of the two theses; and the goals.
 
     tests/bench/query.py BUILD_DIR MODEL.ply... [--grow BASE.ply:FACES]... [--count N]
     -o docs/measured/queries.md
 
 BUILD_DIR: a release build configured with -Dpeers=enabled (tools/install-deps.sh --bench installs
-what that needs). Each model is converted once (kept in --work, as are the questions); the programs
-hold a model while they are asked in turns, one thread each, on one core; figures are medians of
---rounds turns (half of that above two million faces) of processor time. Another core meanwhile
-judges answers by rational arithmetic and counts cache misses (valgrind). Questions under a budget
-are asked of the largest model, after that.
+what that needs). Each model is converted once; --work keeps models and queries. The programs hold a
+model and take turns, one thread each, on one core. The results are medians of --rounds turns (half
+of that above two million faces) of processor time. Meanwhile another core judges results by rational
+arithmetic and counts cache misses (valgrind). The largest model is then queried under a budget. The
+sections `leaves` (kinds of leaves) and `misses` are not printed by default. The handwritten end of
+an existing page is kept.
 """
 import argparse
 import concurrent.futures
@@ -20,21 +21,21 @@ import shlex
 import statistics
 import sys
 
-from query_goals import goals_table
-from query_page import Page, figure, quotient, ratio, us
-from query_programs import Bench, Model, NAMES, Server, differences, grown, lengths_of, middle
+from query_goals import goals_table, summary
+from query_page import Page, figure, handwritten, ratio, reflow, us
+from query_programs import Bench, Model, Server, differences, grown, lengths_of, middle
 import query_checks
 import query_thesis
 
 SECTIONS = ["rays", "distance", "inside", "memory", "budget", "modes", "distance-modes", "opening",
-            "leaves", "answers", "misses"]
+            "answers"]
+MORE = ["leaves", "misses"]  # only where --sections names them
 RAYS = ["uniform", "camera", "segments", "degenerate"]
 QUESTIONS = {"ray": "first hit", "ray-any": "any hit", "ray-all": "all hits"}
 CUT = 4 # level, of the second way of opening
 SHARE = {("distance", "uniform"): 20} # of --count
 BUDGET = 256 << 20
-TAILS = [("ray", "uniform"), ("distance", "uniform"), ("distance", "path"), ("inside", "uniform"),
-         ("inside", "path")]
+TAILS = [("ray", "uniform"), ("distance", "uniform"), ("distance", "path"), ("inside", "path")]
 
 
 # ---- asking in turns ----
@@ -57,7 +58,7 @@ def ways_of(peer, points, query):
         return {"embree": [], **({"embree warm": warm} if warm and points == "path" else {})}
     ways = {"ebpo": warm, "base": warm + ["--base"], "batch": warm + ["--batch"]}
     if warm and points == "path":
-        ways |= {"cold": [], "unsigned": ["--warm", "--unsigned"]}
+        ways |= {"cold": []}
     return ways
 
 
@@ -125,62 +126,61 @@ def building(peer, model):
 
 def section_rays(page, results):
     page.text("## Rays", "",
-              "*uniform*: from points in the box, directions uniform. *camera*: one eye, through "
-              "the pixels of a picture. *segments*: uniform, a twentieth of the diagonal long. "
-              "*degenerate*: in turns to a vertex, to the middle of an edge, from a vertex, along "
-              "an axis through a vertex. Embree: robust scene of high quality, in single "
-              "precision; all hits by a filter function, sorted and each face once, as ours. "
-              "*base*: our kernels for any x86-64 (SSE2). *batch*: all in one call, one thread. "
-              "*differs*: the first hit by more than a millionth of the box's diagonal, only one "
-              "hits, or another number of hits. Ours are exact: a ray through a vertex meets all "
-              "faces around it, which single precision seldom says of degenerate rays. us a ray.")
+              "*uniform*: from points in the box, in uniform directions. *camera*: from one eye "
+              "through the pixels of a picture. *segments*: uniform, 1/20 of the diagonal long. "
+              "*degenerate*: to a vertex, to the middle of an edge, from a vertex, along an axis "
+              "through a vertex. The table has the times and their ratio to Embree (robust "
+              "scene, high quality, single precision). *Embree differs*: number of first hits "
+              "that differ by more than 1e-6 of the box diagonal or exist in one program only, "
+              "and of rays with another number of hits: a degenerate ray hits all faces around "
+              "its vertex, which single precision rarely finds.")
     rows = []
     for model, cells in results.items():
         for points in RAYS:
-            for query, question in QUESTIONS.items():
-                cell = cells.get((points, query))
-                if cell:
-                    rows.append([model.name, f"{model.faces:,}", points, question] + times(
-                        cell, ["ebpo", "base", "batch", "embree", "cgal"],
-                        [("ebpo", "embree"), ("base", "embree"), ("batch", "embree"),
-                         ("ebpo", "cgal")]))
-    page.table(["model", "faces", "rays", "question", "ours", "ours, base", "ours, batch", "Embree",
-                "CGAL", "ours / Embree", "base / Embree", "batch / Embree", "ours / CGAL",
-                "Embree differs", "CGAL differs"], rows)
+            found = [cells[points, query] for query in ("ray", "ray-all")
+                     if (points, query) in cells]
+            if len(found) == 2:
+                rows.append([model.name, points]
+                            + [text for cell in found
+                               for text in (us(cell["ns"].get("ebpo")),
+                                            ratio(cell["ns"].get("ebpo"), cell["ns"].get("embree")))]
+                            + [figure(cell["wrong"].get("embree")) for cell in found])
+    page.table(["model", "rays", "first hit", "/ Embree", "all hits", "/ Embree",
+                "Embree differs: first", "all"], rows)
 
 
 def times(cell, ways, ratios):
     ns = cell["ns"]
     return ([us(ns.get(w)) for w in ways] + [ratio(ns.get(a), ns.get(b)) for a, b in ratios]
-            + [figure(cell["wrong"].get(p)) for p in ("embree", "cgal")])
+            + [figure(cell["wrong"].get("embree"))])
 
 
 def section_points(page, results, query, title, note):
     page.text(f"## {title}", "", note)
     distance = query == "distance"
-    ways = ["ebpo", "base", "batch"] + (["cold", "unsigned"] if distance else []) + ["embree"]
+    ways = ["ebpo", "batch"] + (["cold"] if distance else []) + ["embree"]
     ways += (["embree warm"] if distance else []) + ["cgal"]
-    ratios = [("ebpo", "embree"), ("base", "embree"), ("batch", "embree")]
-    ratios += ([("ebpo", "embree warm")] if distance else []) + [("ebpo", "cgal")]
-    names = {"ebpo": "ours", "base": "ours, base", "batch": "ours, batch", "cold": "ours, not warm",
-             "unsigned": "ours, no sign", "embree": "Embree", "embree warm": "Embree, warm",
-             "cgal": "CGAL"}
-    rows = [[model.name, f"{model.faces:,}", points] + times(cells[points, query], ways, ratios)
+    ratios = [("ebpo", "embree"), ("ebpo", "cgal")]
+    names = {"ebpo": "ours", "batch": "ours, batch", "cold": "ours, not warm",
+             "embree": "Embree", "embree warm": "Embree, warm", "cgal": "CGAL"}
+    rows = [[model.name, points] + times(cells[points, query], ways, ratios)
             for points in ("uniform", "path") for model, cells in results.items()
             if (points, query) in cells]
-    page.table(["model", "faces", "points"] + [names[w] for w in ways]
-               + [f"{names[a].replace('ours, ', '')} / {names[b]}" for a, b in ratios]
-               + ["Embree differs", "CGAL differs"], rows)
+    page.table(["model", "points"] + [names[w] for w in ways]
+               + [f"{names[a]} / {names[b]}" for a, b in ratios] + ["Embree differs"], rows)
 
 
 def section_tails(page, results):
-    page.text("How long single questions take, us by the clock, its own cost taken off.")
-    page.table(["model", "question", "points", "program", "p50", "p99", "p99.9", "max"],
-               [[model.name, query, points, NAMES[way]]
-                + [us(report[n]) for n in ("p50_ns", "p99_ns", "p999_ns", "max_ns")]
-                for query, points in TAILS for model, cells in results.items()
-                for way, report in cells.get((points, query), {"tails": {}})["tails"].items()
-                if report])
+    page.text("### Tails", "",
+              "The table has wall-clock times of single queries, without the cost of the clock, "
+              "for the smallest and the largest model.")
+    models = list(results)
+    page.table(["model", "query", "points", "p50", "p99", "p99.9", "max", "Embree p99.9"],
+               [[model.name, query, points]
+                + [us(tails["ebpo"][n]) for n in ("p50_ns", "p99_ns", "p999_ns", "max_ns")]
+                + [us((tails.get("embree") or {}).get("p999_ns"))]
+                for query, points in TAILS for model in dict.fromkeys(models[:1] + models[-1:])
+                if (tails := results[model].get((points, query), {"tails": {}})["tails"]).get("ebpo")])
 
 
 # ---- memory and loading ----
@@ -195,24 +195,23 @@ def measure_memory(bench, model):
             runs.append(query_checks.loads(bench.run(
                 bench.program(peer), source, "build", "--threads", threads,
                 core=None if threads else False)))
-    kinds = query_checks.loads(bench.run(bench.build / "tests" / "bench" / "memory_kinds",
-                                         model.file))
     return {"ours": middle(reports["ebpo", 1], "load_cpu_s"),
             "embree": middle(reports["embree", 1], "build_cpu_s"),
             "ours all": middle(reports["ebpo", 0], "load_s"),
             "embree all": middle(reports["embree", 0], "build_s"),
             "bytes": reports["ebpo", 1][0]["bytes"] / model.faces,
             "embree bytes": reports["embree", 1][0]["bytes"] / model.faces,
-            "mesh": 12 * (1 + model.info["vertices"] / model.faces), "kinds": kinds}
+            "mesh": 12 * (1 + model.info["vertices"] / model.faces)}
 
 
 def section_memory(page, memory):
     page.text("## Memory and loading", "",
-              "Everything in memory. *Loading*: from the file, in the system's memory, to the "
-              "first question; Embree: only the build of a robust scene, from a mesh that is in "
-              "memory. Processor seconds on one thread, wall seconds on all cores. Embree's mesh "
-              "(single precision) counts as its memory, too: point queries need it.")
-    page.table(["model", "faces", "ours, B a face", "Embree's tree", "with its mesh", "ours / Embree",
+              "The whole model is in memory. *Loading* ends when the first query can begin; the "
+              "file is in the page cache. For Embree it is the build of a robust scene from a mesh "
+              "in memory. *CPU s*: processor seconds on one thread; *all cores*: wall-clock "
+              "seconds. Embree's memory includes its single-precision mesh, which point queries "
+              "need.")
+    page.table(["model", "faces", "ours, B per face", "Embree tree", "with mesh", "ours / Embree",
                 "ours, CPU s", "Embree, CPU s", "ours / Embree", "ours, all cores, s",
                 "Embree, all cores, s", "ours / Embree"],
                [[model.name, f"{model.faces:,}", figure(m["bytes"]), figure(m["embree bytes"]),
@@ -221,11 +220,6 @@ def section_memory(page, memory):
                  figure(m["embree"]), ratio(m["ours"], m["embree"]), figure(m["ours all"]),
                  figure(m["embree all"]), ratio(m["ours all"], m["embree all"])]
                 for model, m in memory.items()])
-    names = list(dict.fromkeys(k for m in memory.values() for k in m["kinds"]))
-    page.text("Ours by kind, B a face (`tests/bench/memory_kinds FILE`, before any question).")
-    page.table(["model"] + names, [[model.name] + [figure(m["kinds"].get(n, 0) / model.faces)
-                                                   for n in names]
-                                   for model, m in memory.items()])
 
 
 # ---- under a budget ----
@@ -248,12 +242,12 @@ def measure_budget(bench, model):
 
 
 def section_budget(page, model, rows):
-    page.text("## Under a budget", "",
-              f"{model.name}, {model.faces:,} faces, {BUDGET >> 20} MiB, each on a model that has "
-              "just been opened: nothing but its upper levels is in memory, the file is in the "
-              "system's. *touched*: subtrees a question has looked into, found in memory or "
-              "loaded. us by the clock; what works beside the questions may use all cores.")
-    page.table(["question", "points", "questions", "touched", "loaded", "KiB read", "mean", "p50",
+    page.text("## Memory budget", "",
+              f"{model.name}, {model.faces:,} faces, budget {BUDGET >> 20} MiB. Each row begins "
+              "with a model that has just been opened: only its upper levels are in memory, and "
+              "the file is in the page cache. *visited*, *loaded*, *KiB read* are per query. "
+              "Times are wall-clock times; background threads may use all cores.")
+    page.table(["query", "points", "queries", "visited", "loaded", "KiB read", "mean", "p50",
                 "p99", "p99.9", "max", "peak MiB"],
                [[query, points, f"{r['count']:,}", figure((r["hits"] + r["loads"]) / r["count"]),
                  figure(r["loads"] / r["count"]), figure(r["bytes_read"] / r["count"] / 1024)]
@@ -265,11 +259,10 @@ def section_budget(page, model, rows):
 
 def section_opening(bench, page, models):
     page.text("## Opening", "",
-              "From a cold file to the first answer: the system is asked to forget the file "
-              "(posix_fadvise) before each run. Peers load "
-              "the PLY and build their tree. Ours either decodes everything first (on one core "
-              "here), or keeps the levels down to the cut level and loads what the answer needs. "
-              "Seconds; peak memory in MB.")
+              "The table has the seconds from a cold file to the first result. The page cache is "
+              "dropped before each run (`posix_fadvise`). Embree and CGAL load the PLY and build "
+              "a tree. Ours decodes the whole file on one core (*all*), or only levels 0 to "
+              f"{CUT} and the subtrees that the query needs (*cut*).")
     rows = []
     for query in ["inside", "distance"]:
         for model in models:
@@ -281,29 +274,25 @@ def section_opening(bench, page, models):
                 for peer in bench.peers(model)[1:]:
                     runs[peer].append(query_checks.loads(bench.run(
                         bench.program(peer), model.ply, query, raw, "--cold", "--count", 1)))
-            first = {who: middle(r, "cold_first_answer_seconds" if who in ("ebpo", "cut")
+            first = {who: middle(r, "cold_first_result_seconds" if who in ("ebpo", "cut")
                                  else "first_answer_s") for who, r in runs.items()}
-            rows.append([model.name, f"{model.faces:,}", query]
+            rows.append([model.name, query]
                         + [figure(size / 2**20) for size in
                            (model.ply.stat().st_size, model.file.stat().st_size,
                             middle(runs["ebpo"], "cold_bytes_read"),
                             middle(runs["cut"], "cold_bytes_read"))]
                         + [figure(first.get(who)) for who in ("ebpo", "cut", "embree", "cgal")]
-                        + [ratio(first[who], first.get("embree")) for who in ("ebpo", "cut")]
-                        + [" / ".join(map(figure, [middle(runs["ebpo"], "peak_memory_bytes") / 2**20,
-                                                   middle(runs["embree"], "peak_mb")]))])
-    page.table(["model", "faces", "question", "PLY MB", "file MB", "MB read, all",
-                f"MB read, cut level {CUT}", "ours, all in memory", f"ours, cut level {CUT}",
-                "Embree", "CGAL", "all / Embree", "cut / Embree", "peak MB: all / Embree"], rows)
+                        + [ratio(first[who], first.get("embree")) for who in ("ebpo", "cut")])
+    page.table(["model", "query", "PLY MB", "file MB", "MB read, all", "MB read, cut", "ours, all",
+                "ours, cut", "Embree", "CGAL", "all / Embree", "cut / Embree"], rows)
 
 
 def section_leaves(bench, page, models):
     page.text("## Leaves by kind", "",
-              "Percent of the leaves. All kinds but *general* answer by the signs of planes; a "
-              "general leaf with "
-              "a wall that no face meets by one segment. *Gain*: uniform points that fall into "
-              "leaves of the kind, ns for one, as the same leaves "
-              "taken as general ones and by the planes (`tests/bench/bench_leaves MODEL.ebpo.h5`).")
+              "Percent of the leaves. Leaves of all kinds except *general* classify a point by the "
+              "signs of planes; a general leaf with a cell face that no face intersects uses one "
+              "segment. *Gain*: time per uniform point in leaves of the kind, evaluated as general "
+              "leaves and by planes (`tests/bench/bench_leaves MODEL.ebpo.h5`).")
     rows, gains = [], []
     for model in models:
         *kinds, last = query_checks.loads(bench.run(
@@ -318,7 +307,7 @@ def section_leaves(bench, page, models):
                               figure(kind["ns_as_general"]), figure(kind["ns"]),
                               figure(kind["ns_as_general"] / kind["ns"])])
     page.table(["model", "faces", "leaves", "general", "one plane", "two planes", "convex set",
-                "concave set", "general, one wall free"], rows)
+                "concave set", "general, one cell face free"], rows)
     page.table(["model", "kind", "points of 2,000,000", "as general, ns", "by planes, ns", "gain"],
                gains)
 
@@ -361,7 +350,7 @@ def parse():
     parser.add_argument("--work",
                         help="where models and questions are kept (default BUILD_DIR/bench-query)")
     parser.add_argument("--sections", default=",".join(SECTIONS),
-                        help="comma list of " + ", ".join(SECTIONS))
+                        help="comma list of " + ", ".join(SECTIONS + MORE))
     parser.add_argument("-v", "--verbose", action="store_true", help="print the commands")
     parser.add_argument("-o", "--output", required=True)
     return parser.parse_args()
@@ -392,19 +381,20 @@ class Made:
         page.lines += self.more.lines
         query_checks.write(page, self.found)
         write(self.bench.options, self.bench, page,
-              goals_table(self.results, self.memory, self.budget, self.tables, self.found))
+              goals_table(self.results, self.memory, self.budget, self.tables, self.found),
+              summary(self.results, self.memory, self.budget, self.found))
 
 
 POINTS = {
     "distance": ("Nearest point",
-                 "Ours is exact, signed (*no sign*: unsigned), in double, and begins with the last "
-                 "answer; Embree's point query is in single precision; *warm*: it searches no "
-                 "farther than the last answer allows. fcpw could not be had here. *differs*: by "
-                 "more than a millionth of the box's diagonal. us a point."),
+                 "Ours is exact, signed and in double precision; each search begins "
+                 "with the previous result. *not warm*: without the previous result. "
+                 "Embree's point query is in single precision; *Embree, warm*: its search "
+                 "radius comes from the previous result."),
     "inside": ("Point in solid",
-               "Ours is exact in double; Embree counts the hits of a ray in single precision "
-               "(robust scene); CGAL's `Side_of_triangle_mesh` is exact. *differs*: answers that "
-               "are not ours, of the points that are not on the surface. us a point."),
+               "Ours is exact in double precision. Embree counts the hits of a ray "
+               "in single precision (robust scene). CGAL's `Side_of_triangle_mesh` is exact. "
+               "*differs*: results that differ from ours, points on the surface excluded."),
 }
 
 
@@ -435,10 +425,10 @@ def ask_models(bench, models, made, wanted):
 def main():
     options = parse()
     wanted = options.sections.split(",")
-    unknown = set(wanted) - set(SECTIONS)
+    unknown = set(wanted) - set(SECTIONS + MORE)
     if unknown:
         sys.exit(f"query.py: no section is called {', '.join(sorted(unknown))}; there are "
-                 f"{', '.join(SECTIONS)}")
+                 f"{', '.join(SECTIONS + MORE)}")
     bench = Bench(options)
     models = sorted((Model(bench, ply) for ply in
                      list(options.models) + [grown(bench, what) for what in options.grow]),
@@ -455,17 +445,18 @@ def main():
     made.publish(models[-1])
 
 
-def write(options, bench, page, goals):
-    head = Page()
-    head.text("# Queries", "",
-              f"Made by `{command_line(options)}`; nothing here was typed in but the theses' "
-              f"figures and fcpw's shares, which the scripts name. {processor()}, "
-              f"one thread on one core, medians of {options.rounds} turns (half of that above two "
-              f"million faces), processor time where nothing else is said; load average of the "
-              f"machine meanwhile {statistics.median(bench.load):.1f} (median), "
-              f"{max(bench.load):.1f} (most). Compare within a row.")
-    text = "\n".join(head.lines + goals.lines + page.lines).rstrip("\n") + "\n"
-    pathlib.Path(options.output).write_text(text)
+def write(options, bench, page, goals, short):
+    head, made = Page(), Page()
+    head.text("# Query times", "", *short)
+    made.text("## Measurement", "",
+              f"Made by `{command_line(options)}` on {processor()}. One thread on one core; "
+              f"medians of {options.rounds} turns (half of that above two million faces) of "
+              "processor time in us per query, unless a section says otherwise. *batch*: one "
+              f"call for all points. Load average {statistics.median(bench.load):.1f} (median), "
+              f"{max(bench.load):.1f} (maximum). Compare values within a row only. The results of "
+              "the theses are of other machines.")
+    text = "\n".join(head.lines + goals.lines + made.lines + page.lines).rstrip("\n") + "\n"
+    pathlib.Path(options.output).write_text(reflow(text + handwritten(options.output)))
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
-"""What tests/bench/query.py finds out beside the clock: answers judged by rational arithmetic, and
-cache misses counted by valgrind."""
+"""Checks of tests/bench/query.py that do not depend on time: results judged by rational arithmetic,
+and cache misses counted by valgrind."""
 import json
 import re
 import subprocess
@@ -41,19 +41,22 @@ def judge_answers(bench, model):
 
 
 def write_answers(page, model, rows):
-    page.text("## Answers", "",
-              f"{model.name}, beside rational arithmetic over all faces (`tests/bench/exact_judge`, "
-              "which names the hard questions: on, at and through vertices, edges and planes). "
-              "*wrong*: inside, hit or number of hits; a distance or place off by more than a "
-              "millionth of the diagonal. *bits*: of ours, whatever is not the correctly rounded "
-              "value, the first face and the sign. Single precision moves the question, too: "
-              "Embree's answers are right for a point or ray nearby. Points on the surface count "
-              "only for who tells them from inside.")
-    page.table(["question", "which", "asked", "ours, wrong", "ours, bits", "Embree, wrong",
+    shown = [r for r in rows if r["which"] == "hard" or any(map(wrong, r["peers"].values()))]
+    page.text("## Correctness", "",
+              f"{model.name}, compared with rational arithmetic over all faces "
+              "(`tests/bench/exact_judge`). *hard*: queries on, at and through vertices, edges and "
+              "planes. *wrong*: another classification, hit or number of hits, or a distance or "
+              "position that differs by more than 1e-6 of the diagonal. *not rounded*: results of "
+              "ours that are not the correctly rounded value with the first face and the sign. "
+              "Embree rounds the query itself to single precision: its result is right for a nearby "
+              "point or ray. Programs that do not report points on the surface are not judged for "
+              f"them. Not shown: {len(rows) - len(shown)} rows of uniform points, paths and cameras "
+              "in which no program is wrong.")
+    page.table(["query", "points", "count", "ours, wrong", "ours, not rounded", "Embree, wrong",
                 "CGAL, wrong"],
                [[r["query"], r["which"], f"{r['count']:,}"]
                 + [figure(wrong(r["peers"].get("ebpo"))), figure(r["peers"]["ebpo"]["bits"])]
-                + [figure(wrong(r["peers"].get(p))) for p in ("embree", "cgal")] for r in rows])
+                + [figure(wrong(r["peers"].get(p))) for p in ("embree", "cgal")] for r in shown])
 
 
 def wrong(verdict):
@@ -91,10 +94,9 @@ def count_misses(bench, models):
 
 def write_misses(page, rows):
     page.text("## Cache misses", "",
-              "Counted by valgrind's cachegrind: a data cache of 48 KiB and one of 2 MiB behind it; "
-              "a run with many questions less one with a single one, so without loading. A "
-              "question.")
-    page.table(["model", "question", "points", "program", "instructions", "misses of 48 KiB",
+              "Per query, counted by valgrind's cachegrind with data caches of 48 KiB and 2 MiB. "
+              "Loading is excluded: a run with one query is subtracted.")
+    page.table(["model", "query", "points", "program", "instructions", "misses of 48 KiB",
                 "misses of 2 MiB"], [row[:4] + [figure(v) for v in row[4:]] for row in rows])
 
 

@@ -1,4 +1,4 @@
-"""What became of the goals: the table at the head of docs/measured/queries.md."""
+"""The head of docs/measured/queries.md: the result in short, and the goals."""
 import query_thesis
 from query_page import Page, figure, quotient
 
@@ -16,7 +16,7 @@ class Goals:
         self.rows = []
 
     def add(self, what, goal, values, limits, digits=3):
-        """`values` against `limits` that they must not exceed, one by one."""
+        """Adds a row that compares each value with its upper limit."""
         known = [(v, l) for v, l in zip(values, limits) if v is not None]
         if not known:
             return
@@ -32,14 +32,13 @@ def column(results, points, query, ours, theirs="embree"):
 
 def ray_goals(goals, results):
     for query, name, goal in RAYS:
-        for points in ORDINARY:
-            values = column(results, points, query, "ebpo")
-            goals.add(f"{name} / Embree robust, {points}", goal, values, [goal] * 4)
+        values = [max(v) for v in zip(*(column(results, p, query, "ebpo") for p in ORDINARY))]
+        goals.add(f"{name} / Embree, worst of {', '.join(ORDINARY)}", goal, values, [goal] * 4)
     for query, name, goal in RAYS:
         values = [max(v) for v in zip(*(column(results, p, query, "base") for p in ORDINARY))]
-        goals.add(f"{name}, SSE2, the worst of the three", 2 * goal, values, [2 * goal] * 4)
+        goals.add(f"{name} / Embree, SSE2, same rays", 2 * goal, values, [2 * goal] * 4)
     for query, name, _ in RAYS:
-        goals.add(f"degenerate rays / uniform ones, {name}", 5,
+        goals.add(f"degenerate / uniform rays, {name}", 5,
                   [quotient(cells["degenerate", query]["ns"]["ebpo"],
                             cells["uniform", query]["ns"]["ebpo"])
                    for cells in results.values() if ("degenerate", query) in cells], [5] * 4)
@@ -49,10 +48,9 @@ def point_goals(goals, results):
     for points, limits in NEAREST.items():
         values = [None if v is None else v / share for v, share in
                   zip(column(results, points, "distance", "ebpo"), FCPW[points])]
-        goals.add(f"nearest, {points} / fcpw (Embree's point query x "
-                  f"{', '.join(map(str, FCPW[points]))})", ", ".join(map(str, limits)), values,
+        goals.add(f"nearest point / estimate for fcpw, {points}", ", ".join(map(str, limits)), values,
                   limits)
-    goals.add("inside, path / Embree, single calls", ", ".join(map(str, INSIDE)),
+    goals.add("inside / Embree, path, single calls", ", ".join(map(str, INSIDE)),
               column(results, "path", "inside", "ebpo"), INSIDE)
 
 
@@ -60,30 +58,68 @@ def goals_table(results, memory, budget, tables, found):
     goals, page = Goals(), Page()
     ray_goals(goals, results)
     point_goals(goals, results)
-    goals.add("memory, all in memory, B a face", 75, [m["bytes"] for m in memory.values()],
+    goals.add("memory, B per face", 75, [m["bytes"] for m in memory.values()],
               [75] * 4)
-    goals.add("loading / Embree's build, CPU", 0.65,
+    goals.add("loading / Embree build, CPU", 0.65,
               [quotient(m["ours"], m["embree"]) for m in memory.values()], [0.65] * 4)
     for query, points, r in budget:
         if r and (query, points) == ("distance", "uniform"):
-            goals.add("subtrees touched by a uniform distance, 256 MiB", 2.5,
+            goals.add("subtrees visited by a uniform distance query, 256 MiB", 2.5,
                       [(r["hits"] + r["loads"]) / r["count"]], [2.5])
-            goals.add("ms a uniform distance, 256 MiB", 1, [r["clocked_mean_ns"] / 1e6], [1])
+            goals.add("uniform distance query, 256 MiB, ms", 1, [r["clocked_mean_ns"] / 1e6], [1])
         if r and points == "path":
-            goals.add(f"continuous path at once, 256 MiB, {query}: p99.9 ms", 1,
+            goals.add(f"{query} along a path, 256 MiB, p99.9, ms", 1,
                       [r["p999_ns"] / 1e6], [1])
     thesis = list(query_thesis.cells(tables))
     if thesis:
         slower = [what for what, ours, theirs in thesis if ours > theirs]
-        goals.rows.append(["the thesis' own modes, its memory, cells slower than its figures", 0,
+        goals.rows.append(["modes of the EBP thesis: table cells slower than the thesis", 0,
                            f"{len(slower)} of {len(thesis)}", "missed" if slower else "met"])
     if found["answers"]:
         bad = sum(r["peers"]["ebpo"]["bits"] for r in found["answers"][1])
         asked = sum(r["count"] for r in found["answers"][1])
-        goals.rows.append(["answers that rational arithmetic contradicts", 0,
+        goals.rows.append(["results that rational arithmetic contradicts", 0,
                            f"{bad} of {asked:,}", "missed" if bad else "met"])
     page.text("## Goals", "",
-              f"Largest values that are wanted, for models of {', '.join(SIZES)} faces, and what "
-              "was measured in this run.")
-    page.table(["what", "goal", "measured", ""], goals.rows)
+              "The table begins with missed goals. A goal is an upper limit; the values are "
+              "those of models of "
+              f"{', '.join(SIZES)} faces. The estimate for fcpw, a nearest-point library, is the "
+              "time of Embree's point query "
+              f"times {', '.join(map(str, FCPW['path']))} (path) or "
+              f"{', '.join(map(str, FCPW['uniform']))} (uniform).")
+    page.table(["what", "goal", "measured", ""],
+               sorted(goals.rows, key=lambda row: row[3] == "met"))
     return page
+
+
+def span(values, digits=2):
+    known = [v for v in values if v is not None]
+    if not known:
+        return "-"
+    return f"{figure(min(known), digits)} to {figure(max(known), digits)}"
+
+
+def summary(results, memory, budget, found):
+    """Returns the result of the page in at most three sentences."""
+    lines = []
+    if results:
+        rays = [v for query, _, _ in RAYS for p in ORDINARY
+                for v in column(results, p, query, "ebpo")]
+        near, inside = ([v for p in ("path", "uniform")
+                         for v in column(results, p, query, "ebpo")]
+                        for query in ("distance", "inside"))
+        lines.append(f"- With the model in memory, a ray query takes {span(rays)} times as long as "
+                     f"Embree's in single precision, a nearest-point query {span(near)} times, a "
+                     f"point-in-solid query {span(inside)} times.")
+    if found["answers"]:
+        bad = sum(r["peers"]["ebpo"]["bits"] for r in found["answers"][1])
+        asked = sum(r["count"] for r in found["answers"][1])
+        lines.append(f"- Results are exact: rational arithmetic contradicts {bad} of {asked:,} "
+                     "results.")
+    means = [f"{figure(r['clocked_mean_ns'] / 1000)} us ({query})"
+             for query, points, r in budget if r and points == "path"]
+    if memory and means:
+        lines.append(f"- A model takes {span([m['bytes'] for m in memory.values()], 3)} B per face "
+                     f"in memory. With a budget of 256 MiB for the largest model, a query along a "
+                     f"path takes {' or '.join(means)} on average.")
+    return lines

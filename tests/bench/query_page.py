@@ -1,4 +1,9 @@
-"""Tables of the pages in docs/measured, and their figures."""
+"""Tables and values of the pages in docs/measured."""
+import pathlib
+import textwrap
+
+COLUMNS = 110
+HANDWRITTEN = "<!-- Written by hand; the script keeps what follows. -->"
 
 
 class Page:
@@ -14,8 +19,37 @@ class Page:
         self.lines += ["| " + " | ".join(str(c) for c in row) + " |" for row in rows] + [""]
 
 
+def handwritten(path):
+    """Returns the handwritten end of an existing page, or an empty string."""
+    page = pathlib.Path(path)
+    text = page.read_text(encoding="utf-8") if page.exists() else ""
+    at = text.find(HANDWRITTEN)
+    return "\n" + text[at:] if at >= 0 else ""
+
+
+def reflow(text):
+    """Breaks the paragraphs and list items of a Markdown text into lines of at most COLUMNS."""
+    out, words = [], []
+
+    def flush():
+        if words:
+            out.extend(textwrap.wrap(" ".join(words), COLUMNS, break_long_words=False, break_on_hyphens=False,
+                                     subsequent_indent="  " if words[0].startswith("- ") else ""))
+            words.clear()
+    for line in text.split("\n"):
+        if not line.strip() or line.startswith(("|", "#", "!", "<", "    ")):
+            flush()
+            out.append(line)
+        else:
+            if line.startswith("- "):
+                flush()
+            words.append(line.strip())
+    flush()
+    return "\n".join(out)
+
+
 def figure(value, digits=3):
-    """About three digits; a dash where there is none."""
+    """Formats a value with about three digits; a dash for a missing value."""
     if value is None:
         return "-"
     if isinstance(value, str):

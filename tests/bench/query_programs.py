@@ -107,7 +107,7 @@ class Model:
         the first levels."""
         raw = self.bench.work / f"{self.name}.{points}{'.rays' if rays else ''}.{count}.raw"
         if not raw.exists():
-            self.bench.ours(self, *(["ray-any", "--tmax", 0] if rays else ["inside", "--level", 1]),
+            self.bench.ours(self, *(["ray-any", "--tmax", 0] if rays else ["inside", "--max-level", 1]),
                             "--count", count, "--memory", "256MiB", "--save-points", raw,
                             points=points, core=False)
         return raw

@@ -1,15 +1,16 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/remote.md: requests, bytes, waves and times of questions by URL, before and
-after a change of library or file, and beside HDF5's ros3 driver and h5wasm.
+"""Remakes docs/measured/remote.md: requests, bytes, round trips and times of queries by URL, compared
+with HDF5's ros3 driver and h5wasm.
 
     tests/bench/remote.py BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5
         --before BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5 --ply SMALL.ply -o docs/measured/remote.md
         [--json FILE [--only PATTERN]]
 
-BUILD_DIR: release builds inside their checkouts, whose viewers are measured, too. The files hold
-the same two models, each written by its build; a third side asks the new build about the old files.
-nginx serves them; its log says what was asked for. Before it stands a line with latency (and for
-the viewer a rate). With --json measurements are kept; --only then repeats those whose name matches.
+BUILD_DIR: a release build inside its checkout, whose viewer is measured, too. --before measures an
+older build and its files as well, and the new build with the old files; only --json keeps these.
+nginx serves the files; its log has the requests. A proxy before it adds latency (and a rate for the
+viewer). --only repeats the measurements in --json whose name matches. The handwritten end of an
+existing page is kept.
 Needs nginx, chromium, python3-h5py, npm (h5wasm is installed below BUILD_DIR) and
 `sh tools/install-deps.sh --tests`.
 """
@@ -30,6 +31,7 @@ import asked
 import drivers
 import measured
 import remote_page
+from query_page import handwritten, reflow
 from served import Line, Server, free_port, wait_for
 
 SINGLES, VIEWS, OPENINGS, PATH, EQUAL, ROUNDS = 11, 5, 5, 200000, 10000, 2
@@ -196,7 +198,7 @@ def main():
     if options.ply and options.before:
         results.take("build", lambda: build_in_turns([sides[0], sides[-1]], options.ply, work))
     page = remote_page.made(results.found, command_of(options), programs, options.note)
-    pathlib.Path(options.output).write_text(page)
+    pathlib.Path(options.output).write_text(reflow(page + handwritten(options.output)))
 
 
 main()

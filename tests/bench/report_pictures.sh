@@ -48,7 +48,7 @@ page() { # NAME PICTURE
         --screenshot="$root/docs/pictures/$2" "file://$(realpath "$folder/$1/report.html")"
 }
 
-"$build/tools/ebpo" report --select $methods --need -o "$folder/dragon" "$models/dragon100k.ply"
+"$build/tools/ebpo" report --select $methods --targets -o "$folder/dragon" "$models/dragon100k.ply"
 "$build/tools/ebpo" report --select $methods --points 2000 --view 30,35 -o "$folder/stiff" \
     "$folder/thin_shell.ply"
 page dragon report-dragon.png

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/scale.md: generated scan-like models of growing size, built, verified,
-decoded, opened and asked within a budget of memory, beside Embree and CGAL.
+"""Remakes docs/measured/scale.md: generated models of growing size, built, verified, decoded, opened
+and queried within a memory budget, compared with Embree and CGAL.
 
     tests/bench/scale.py BUILD_DIR [--sizes 0.1,1,8,28] [--memory 1GiB] [--rounds N] -o
     docs/measured/scale.md [--json FILE]
@@ -8,8 +8,8 @@ decoded, opened and asked within a budget of memory, beside Embree and CGAL.
 BUILD_DIR: a release build configured with -Dtests=enabled -Dpeers=enabled (tools/install-deps.sh
 --tests --bench installs what that needs). Models are made by ebpo-generate and kept in --work (28
 million faces: 1 GB with all that is made of it, and as much for temporary files meanwhile). Run it
-on a machine that does nothing else; figures are medians of the rounds, in which the programs take
-turns.
+on a machine that does nothing else; the results are medians of the rounds, in which the programs
+take turns. The handwritten end of an existing page is kept.
 """
 import argparse
 import json
@@ -22,7 +22,7 @@ import sys
 
 import measured
 from measured import MIB, Failed
-from query_page import Page, figure, ratio
+from query_page import Page, figure, handwritten, ratio, reflow
 
 BUDGET_OF_QUESTIONS = 256 * MIB
 OPENINGS = 5
@@ -135,9 +135,9 @@ def study(scale, millions):
     result["decode"] = scale.run(scale.build / "tests" / "bench" / "bench_decode", file, "--rounds",
                                  scale.options.rounds)
     verified = [scale.run(scale.ebpo, "verify", "--json", *scale.verify_options, file, cold=file,
-                          accept=(0, 1)) for _ in range(scale.rounds(faces))]  # 1: with violations, which are told
+                          accept=(0, 1)) for _ in range(scale.rounds(faces))]  # 1: violations, which are reported
     result["verify"] = [v for v in verified if v]
-    result["questions"] = questions_of(scale, file)
+    result["queries"] = questions_of(scale, file)
     for path in others:
         path.unlink(missing_ok=True)
     return result
@@ -183,149 +183,56 @@ def growth(results):
 
 # ---- the page ----
 
-def section_models(page, results):
-    page.text("## Models", "",
-              "Closed manifolds; that they meet themselves nowhere is proved for each before it "
-              "is written ([how](../../samples/generate/embedded.h)). *Plain PLY*: 12 B a vertex "
-              "and 13 B a "
-              "face, binary, without its head of some 200 B.")
-    page.table(["model", "faces", "vertices", "plain PLY MiB", "genus", "made by"],
-               [[f"{r['millions']:g} M", f"{faces_of(r):,}", f"{r['sizes']['info']['vertices']:,}",
-                 mib(r["sizes"]["plain_ply"]), r["sizes"]["info"]["report"]["genus"],
-                 f"`{shlex.join(r['command'])}`"]
-                for r in results])
-
-
-def section_build(page, results, memory):
+def section_build(page, scale, results):
     page.text("## Building", "",
-              f"`ebpo convert --memory {memory}`, the whole command from outside: reading the "
-              f"PLY, which the system has forgotten before, checking, building, compressing, "
-              f"fsync; on all "
-              "cores. *Peak*: the most that was resident (ru_maxrss), pages of mapped files "
-              "included. *Read*, *written*: bytes from and to storage, as /proc/PID/io counts "
-              "them for the process: the PLY, the "
-              "file, and temporary files both ways; what was written to temporary files and "
-              "dropped before it reached the storage is in *dirtied* only.")
+              f"`ebpo convert --memory {scale.options.memory}` of closed tori (`ebpo-generate "
+              "--base torus --faces N`), which have no self-intersections: the whole command "
+              "with a cold PLY, all cores. *Peak*: maximum resident memory, mapped files "
+              "included. *Written*: bytes written to storage, with temporary files. *Verify*: "
+              f"`ebpo verify {shlex.join(map(str, scale.verify_options[:2]))}`, cold file.")
     rows = []
     for r in results:
         ours, faces = r["builds"]["ebpo"], faces_of(r)
-        rows.append([f"{r['millions']:g} M", figure(built(r)), figure(middle(ours, "cpu")),
-                     f"{faces / built(r):,.0f}", figure(1e6 * built(r) / faces),
-                     mib(middle(ours, "peak")),
-                     figure(middle(ours, "peak") / faces), mib(middle(ours, "storage_read")),
-                     mib(middle(ours, "storage_written")), mib(middle(ours, "storage_dirtied")),
-                     len(ours)])
-    page.table(["model", "s", "CPU s", "faces/s", "us a face", "peak MiB", "peak B/face",
-                "read MiB", "written MiB", "dirtied MiB", "rounds"], rows)
-    ends, worst = growth(results)
-    if ends is not None:
-        page.text(f"Growth from a million faces on, in seconds a face: the largest model costs "
-                  f"{ends:.2f} times what the smallest does; the worst of all pairs is "
-                  f"{worst:.2f} (the goal: {GOALS['growth']}).")
-
-
-def section_stages(page, results):
-    page.text("### By stage", "",
-              "Seconds, of the median run; stages under 1 % of every model are summed up as "
-              "*others*.")
-    seconds = []
-    for r in results:
-        runs = sorted(r["builds"]["ebpo"], key=lambda run: run["wall"])
-        seconds.append({s["stage"]: s["seconds"] for s in runs[len(runs) // 2]["report"]["stages"]})
-    names = list(dict.fromkeys(name for found in seconds for name in found))
-    kept = [n for n in names if any(found.get(n, 0) >= sum(found.values()) / 100
-                                    for found in seconds)]
-    for found in seconds:
-        found.update({"others": sum(t for n, t in found.items() if n not in kept),
-                      "all": sum(found.values())})
-    page.table(["stage"] + [f"{r['millions']:g} M"
-                            for r in results] + [f"% of {results[-1]['millions']:g} M"],
-               [[n] + [figure(found.get(n))
-                       for found in seconds] + [figure(100 * seconds[-1].get(n, 0) / seconds[-1]["all"], 2)]
-                for n in kept + ["others", "all"]])
+        rows.append([f"{r['millions']:g} M", f"{faces:,}", figure(built(r)),
+                     figure(middle(ours, "cpu")), figure(1e6 * built(r) / faces),
+                     mib(middle(ours, "peak")), mib(middle(ours, "storage_written")),
+                     figure(middle(r["verify"], "wall")),
+                     mib(middle(r["verify"], "peak"))])
+    page.table(["model", "faces", "s", "CPU s", "us per face", "peak MiB", "written MiB",
+                "verify s", "peak MiB"], rows)
 
 
 def section_peers(page, results):
-    page.text("### Beside trees in memory", "",
-              "In the same run, in turns: Embree 3's BVH (medium quality, robust, single "
-              "precision, all cores) and CGAL's AABB tree (doubles, one core: it has no other "
-              "way). *Load*: reading "
-              "the PLY, which the system has forgotten before; then the build alone. They answer "
-              "from memory and store nothing; ours is a file, with levels of detail, verified "
-              "structure and source numbers.")
+    page.text("### Trees in memory", "",
+              "Embree 3's BVH (medium quality, robust, single precision, "
+              "all cores) and CGAL's AABB tree (double, one core). The ratios include reading the "
+              "cold PLY. These trees stay in memory; ours is a file with levels of detail.")
     rows = []
     for r in results:
-        row = [f"{r['millions']:g} M", figure(built(r)), mib(middle(r["builds"]["ebpo"], "peak"))]
+        row = [f"{r['millions']:g} M"]
         for peer in "embree", "cgal":
             runs = r["builds"][peer]
-            took = [middle(runs, "report", key) for key in ("load_s", "build_s")]
-            row += [figure(took[0]), figure(took[1]), mib(middle(runs, "peak")),
+            row += [figure(middle(runs, "report", "build_s")), mib(middle(runs, "peak")),
                     ratio(built(r), middle(runs, "wall"))]
         rows.append(row)
-    page.table(["model", "ours s", "peak MiB", "Embree load s", "build s", "peak MiB",
-                "ours / Embree, whole", "CGAL load s", "build s", "peak MiB",
-                "ours / CGAL, whole"], rows)
+    page.table(["model", "Embree build s", "peak MiB", "ours / Embree, whole",
+                "CGAL build s", "peak MiB", "ours / CGAL, whole"], rows)
 
 
 def section_size(page, results):
     page.text("## Size", "",
-              "Files as they are on the disk. *Without maps*: `ebpo subset --parts -maps`. "
-              "*Levels 0 to 5*: the file's first bytes up to the end of level 5; and as a file of "
-              "their own "
-              "(`ebpo subset --levels 0-5`).")
+              "*Without maps*: `ebpo subset --parts -maps`. *Levels 0 to 5*: the first bytes of "
+              "the file, up to the end of level 5. *Plain PLY*: 12 B per vertex and 13 B per "
+              "face.")
     rows = []
     for r in results:
         s, faces = r["sizes"], faces_of(r)
-        b = s["info"]["bytes"]
         rows.append([f"{r['millions']:g} M", mib(s["file"]), f"{s['file'] / faces:.3f}",
                      f"{s['file'] / s['plain_ply']:.3f}", mib(s["without_maps"]),
-                     figure(divided(s["without_maps"], s["plain_ply"]))]
-                    + [f"{b[part] / faces:.2f}"
-                       for part in ("vertices", "faces", "levels",
-                                    "maps")] + [f"{s['first_levels']:,}",
-                                                f"{s['first_levels_file']:,}"
-                                                if s["first_levels_file"] else "-"])
+                     figure(divided(s["without_maps"], s["plain_ply"])),
+                     f"{s['first_levels']:,}"])
     page.table(["model", "file MiB", "B/face", "of plain PLY", "without maps MiB", "of plain PLY",
-                "vertices B/face", "faces", "lists, tree, planes", "maps", "levels 0 to 5, bytes",
-                "as a file"], rows)
-
-
-def section_decode(page, results):
-    page.text("### Decoding", "",
-              "All of a file, checks included, on one core, from the system's memory: "
-              "`tests/bench/bench_decode FILE` of BUILD_DIR. Bytes are those of the arrays that a "
-              "reader gets.")
-    rows = []
-    for r in results:
-        if r["decode"]:
-            report = r["decode"]["report"]
-            rows.append([f"{r['millions']:g} M", mib(report["decoded_bytes"]),
-                         figure(report["seconds"]),
-                         figure(report["decoded_bytes_per_second"] / 1e6)]
-                        + [figure(p["decoded_bytes"] / p["seconds"] / 1e6) if p["seconds"] > 1e-5
-                           else "-" for p in report["parts"]])
-    page.table(["model", "decoded MiB", "s", "10^6 B/s", "of it levels", "mesh", "maps"], rows)
-
-
-def section_verify(page, scale, results):
-    options = shlex.join(str(o) for o in scale.verify_options[:2])
-    page.text("## Verifying", "", f"`ebpo verify {options}`".replace(" `", "`")
-              + ", the whole command from outside, the file forgotten by the system before; all "
-                "cores."
-              + ("" if scale.verify_options
-                 else " This version of `verify` takes no budget of memory."))
-    rows = []
-    for r in results:
-        runs = r["verify"]
-        if runs:
-            report = runs[0]["report"]
-            rows.append([f"{r['millions']:g} M", figure(middle(runs, "wall")),
-                         figure(middle(runs, "cpu")), ratio(middle(runs, "wall"), built(r)),
-                         mib(middle(runs, "peak")),
-                         mib(middle(runs, "storage_read")), mib(middle(runs, "storage_dirtied")),
-                         f"{report['checks']:,}", report["violations"]])
-    page.table(["model", "s", "CPU s", "times the build", "peak MiB", "read MiB", "dirtied MiB",
-                "checks", "violations"], rows)
+                "levels 0 to 5, bytes"], rows)
 
 
 def with_longest(seconds):
@@ -339,47 +246,37 @@ def warm_answer(report):
 
 
 def opening_row(r, query):
-    runs = r["questions"][query]["open"]
+    runs = r["queries"][query]["open"]
     reports = [run["report"] for run in runs if run]
-    held = middle(runs, "report", "cold_share_still_held")
-    return [f"{r['millions']:g} M", query,
-            with_longest([warm_answer(f)
-                          for f in reports])] + [with_longest([f[key] for f in reports])
-                                                 for key in ("cold_open_seconds",
-                                                             "cold_first_answer_seconds")] \
-        + [mib(middle(runs, "report", "cold_bytes_read"), 3),
-           figure(None if held is None else 100 * held),
-           mib(middle(runs, "report", "model", "memory"), 3)]
+    return [f"{r['millions']:g} M", query, with_longest([warm_answer(f) for f in reports]),
+            with_longest([f["cold_first_result_seconds"] for f in reports])]
 
 
 def section_questions(page, results, options):
-    page.text("## Opening and asking", "",
-              f"With a budget of {BUDGET_OF_QUESTIONS // MIB} MiB for the model, its levels down "
-              f"to the cut level in memory (`ebpo bench --memory {BUDGET_OF_QUESTIONS}`). From "
-              f"opening to the first exact answer, "
-              f"about a point near the surface, ms: median of {OPENINGS} points, and the longest; "
-              f"*cold*: the system was asked to forget the file, and still held so much of it. On "
-              f"all cores.")
-    page.table(["model", "question", "warm: first answer", "cold: open", "cold: first answer",
-                "cold: MiB read", "still held %", "model MiB"],
+    page.text("## Opening and queries", "",
+              f"The budget is {BUDGET_OF_QUESTIONS // MIB} MiB (`ebpo bench --memory "
+              f"{BUDGET_OF_QUESTIONS}`), all cores. The table has the ms from opening to the "
+              f"first exact result near the surface, as median and maximum of {OPENINGS} points; "
+              "*warm*, *cold*: the file is or is not in the page cache.")
+    page.table(["model", "query", "warm", "cold"],
                [opening_row(r, query) for r in results for query in ("inside", "distance")])
-    page.text(f"A continuous path along the surface, prefetching, us for one question: "
-              f"{options.count:,} as fast as the answers come, and {options.rate_count:,} at "
-              f"1,000 a second, as a haptic device asks.")
+    page.text("The table has the us per query along a path on the surface of the largest model, "
+              "with prefetch hints: "
+              f"{options.count:,} queries at once, and {options.rate_count:,} at 1,000 Hz, the "
+              "haptic rate.")
     rows = []
-    for r in results:
+    for r in results[-1:]:
         for query in "inside", "distance":
             for kind, words in [("path", "at once"), ("rate", "1,000 Hz")]:
-                run = r["questions"][query][kind]
+                run = r["queries"][query][kind]
                 if run:
                     ns, model = run["report"]["ns"], run["report"]["model"]
-                    rows.append([f"{r['millions']:g} M", query,
-                                 words] + [figure(ns[q] / 1000)
+                    rows.append([query, words] + [figure(ns[q] / 1000)
                                            for q in ("mean", "p50", "p99", "p999",
                                                      "max")] + [f"{model['loads']:,}",
                                                                 mib(model["memory_peak"], 3)])
-    page.table(["model", "question", "asked", "mean", "p50", "p99", "p99.9", "max",
-                "subtrees loaded", "peak of the model MiB"], rows)
+    page.table(["query", "rate", "mean", "p50", "p99", "p99.9", "max", "subtrees loaded",
+                "model peak MiB"], rows)
 
 
 def bytes_of(size):
@@ -391,7 +288,7 @@ def bytes_of(size):
 def section_goals(page, scale, results):
     """The largest model beside what was aimed at."""
     r = results[-1]
-    s, questions = r["sizes"], r["questions"]
+    s, questions = r["sizes"], r["queries"]
     first = [run["report"] for query in questions.values() for run in query["open"] if run]
     tails = {kind: max((query[kind]["report"]["ns"]["p999"] for query in questions.values()
                         if query[kind]), default=None) for kind in ("path", "rate")}
@@ -415,10 +312,10 @@ def section_goals(page, scale, results):
                "most"),
               ("violations", r["verify"][0]["report"]["violations"] if r["verify"] else None, 0,
                "most"),
-              ("first answer warm, ms", max((warm_answer(f) for f in first), default=None),
+              ("first result warm, ms", max((warm_answer(f) for f in first), default=None),
                GOALS["first_answer"], "most"),
-              ("first answer cold, ms",
-               max((f["cold_first_answer_seconds"] for f in first), default=None),
+              ("first result cold, ms",
+               max((f["cold_first_result_seconds"] for f in first), default=None),
                GOALS["first_answer"], "most"),
               ("p99.9 of a path at once, us", tails["path"], GOALS["p999"], "most"),
               ("p99.9 of a path at 1,000 Hz, us", tails["rate"], GOALS["p999"], "most")]
@@ -429,10 +326,20 @@ def section_goals(page, scale, results):
                if (value <= goal if side == "most" else value >= goal) else "no")
         rows.append([name, figure(value if value is None else value * unit),
                      f"at {side} {figure(goal * unit)}", met])
-    page.text(f"## {r['millions']:g} million faces and the goals", "",
-              "First answers, tails and peaks: the worst of all; the rest as in the tables below. "
-              "All are of the largest model, but for the growth.")
-    page.table(["what", "measured", "goal", "met"], rows)
+    page.text("# Scale", "",
+              f"- A model of {r['millions']:g} million faces is built in {figure(built(r))} s and "
+              f"{figure(checks[1][1])} MiB; the file has {s['file'] / faces_of(r):.3f} B per face.",
+              f"- With a budget of {BUDGET_OF_QUESTIONS // MIB} MiB its first exact result comes "
+              "at "
+              f"most {figure(1e3 * checks[11][1])} ms after opening the cold file." if checks[11][1]
+              else "- The first result of a cold file is not measured.",
+              f"- Verifying it takes {figure(checks[7][1])} times as long as the build.")
+    page.text("## Goals", "",
+              f"Missed goals first. All but the growth are of the model of {r['millions']:g} "
+              "million faces; first results, tails and peaks are the worst values. Growth "
+              "compares the seconds per face of a larger and a smaller model, from a million "
+              "faces on.")
+    page.table(["what", "measured", "goal", "met"], sorted(rows, key=lambda row: row[3] != "no"))
 
 
 def command_line(options):
@@ -445,27 +352,24 @@ def command_line(options):
 def write(scale, results):
     options, page = scale.options, Page()
     results = [r for r in results if "sizes" in r]
-    page.text("# Scale", "",
-              f"Made by `{command_line(options)}`; nothing here was typed in but the goals, which "
-              f"the script names. {measured.machine()}. Medians of {options.rounds} rounds (a "
-              f"third of that from {LARGE:,} faces on) in "
-              f"which the programs take turns; load average of the machine meanwhile "
-              f"{statistics.median(scale.load):.1f} (median), {max(scale.load):.1f} (most).")
     if results:
         section_goals(page, scale, results)
-        section_models(page, results)
-        section_build(page, results, options.memory)
-        section_stages(page, results)
+    page.text("## Measurement", "",
+              f"Made by `{command_line(options)}` on {measured.machine()}. Medians of "
+              f"{options.rounds} rounds (a third of that from {LARGE:,} faces on); "
+              f"load average {statistics.median(scale.load):.1f} (median), "
+              f"{max(scale.load):.1f} (maximum).")
+    if results:
+        section_build(page, scale, results)
         section_peers(page, results)
         section_size(page, results)
-        section_decode(page, results)
-        section_verify(page, scale, results)
         section_questions(page, results, options)
     if scale.problems:
-        page.text("## What failed", "",
+        page.text("## Failures", "",
                   *[f"- {p.replace(str(scale.work), 'WORK')}"
                     for p in dict.fromkeys(scale.problems)])
-    pathlib.Path(options.output).write_text("\n".join(page.lines).rstrip("\n") + "\n")
+    pathlib.Path(options.output).write_text(reflow(
+        "\n".join(page.lines).rstrip("\n") + "\n" + handwritten(options.output)))
 
 
 # ---- the command ----

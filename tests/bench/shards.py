@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
-"""shards.py EBPO MODEL [--rows N] [--folder F] [--rounds N] [--memory SIZE]: one process and two.
+"""shards.py EBPO MODEL [--rows N] [--folder F] [--rounds N] [--memory SIZE]: compares one process with two.
 
-Makes N uniform points in the model's box as raw doubles (24 bytes each; kept in F/uniform-N.raw for
-another run), and asks whether they are inside: by one process, then by two at a time with half of them
-each, of one thread each; both on the same points in turns, so that what else the machine does meets both.
-Prints a line of JSON: points a second, the efficiency (time of one / (2 * time of two), with the opening
-of the model, and without it), and what each process read by all its calls (rchar of /proc) and from the
-disk. Compares the answers byte for byte. Needs numpy.
+Makes N uniform points in the model's box as raw doubles (24 bytes each; F/uniform-N.raw is kept), and
+classifies them as inside or outside: by one process, then by two at the same time with half of them each,
+of one thread each, in turns. Prints a line of JSON: points per second, the parallel efficiency (time of
+one / (2 * time of two), with and without opening the model), and the bytes that each process reads in all
+calls (rchar of /proc) and from the disk. Compares the results byte for byte. Needs numpy.
 """
 import argparse
 import json

@@ -1,5 +1,5 @@
-/* What the machine alone makes of a tick: the same sums each time, some 20 us of them, and nothing
- * of the library, at 1 kHz with the policy SCHED_FIFO and locked memory, as `ebpo touch` plays.
+/* Measures the delays of the machine: a loop at 1 kHz does the same 20 us of arithmetic in each
+ * step, without the library, with SCHED_FIFO and locked memory as in `ebpo haptic`.
  *
  *     gcc -O2 tests/bench/tick_alone.c -o tick_alone -lm && ./tick_alone SECONDS
  */
@@ -48,8 +48,8 @@ int main(int argc, char **argv)
     }
     qsort(took, count, sizeof *took, compare);
     qsort(cpu, count, sizeof *cpu, compare);
-    printf("%zu ticks: %zu over 1 ms; p50 %.3g us, p99.9 %.3g us, most %.0f us; of the processor's "
-           "time p99.9 %.3g us, most %.0f us\n",
+    printf("%zu steps: %zu over 1 ms; p50 %.3g us, p99.9 %.3g us, max %.0f us; CPU time p99.9 "
+           "%.3g us, max %.0f us\n",
            count, over, took[count / 2], took[count - 1 - count / 1000], took[count - 1],
            cpu[count - 1 - count / 1000], cpu[count - 1]);
     return 0;

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/transmission.md: bytes to fetch until a level is good enough, against the
-compressed PLY whole, and beside the BP-Octree thesis.
+"""Remakes docs/measured/transmission.md: bytes to fetch for a level, compared with the compressed PLY
+and the BP-Octree thesis.
 
     /usr/bin/python3 tests/bench/transmission.py BUILD_DIR MODEL.ply... -o
     docs/measured/transmission.md
 
-Needs h5py and the zstd command. No figure depends on the machine.
+Needs h5py and the zstd command. No result depends on the machine.
 """
 import argparse
 import itertools
@@ -17,6 +17,8 @@ import tempfile
 
 import h5py
 import numpy
+
+from query_page import reflow
 
 GOALS = [10, 3, 1]  # percent of excess
 # Melero 2008, tables 4.4 and 4.6 ("Transm. at Level") and the volumes of figure 4.17 by level,
@@ -92,9 +94,9 @@ def study(tool, model, folder, leaf_planes):
     file = folder / (model.stem + ".ebpo.h5")
     # the same tree, as a reader without the mesh has it
     bare = folder / (model.stem + ".bare.ebpo.h5")
-    extra = ["--with", "leaf-planes"] if leaf_planes else []
+    extra = ["--profile", "full"] if leaf_planes else []
     run(tool, "convert", "-q", *extra, model, file)
-    run(tool, "convert", "-q", *extra, "--without", "mesh", model, bare)
+    run(tool, "convert", "-q", *extra, "--parts", "-mesh", model, bare)
     info = json.loads(run(tool, "info", "--json", file))
     levels = json.loads(run(tool, "levels", "--json", file))["levels"]
     derived = [v["derived_volume"]
@@ -128,87 +130,86 @@ def goal_table(models):
     for m in models:
         row = [m["name"] + (", leaf planes" if m["leaf_planes"] else ""), f"{m['info']['faces']:,}",
                f"{m['packed']:,}", f"{m['info']['bytes']['file']:,}"]
-        for goal in GOALS:
-            r = next((r for r in m["rows"] if r["excess"] <= goal), None)
-            row.append(f"{r['bytes']:,} ({100 * r['bytes'] / m['packed']:.1f} % of the PLY's; "
-                       f"level {r['level']}, {r['excess']:.2f} %; reaches {r['seen']:.2f} %, "
-                       f"certainly at most {r['certain']:.1f} %)" if r else "not by a level")
+        for r in firsts(m):
+            row.append(f"{r['bytes']:,} ({100 * r['bytes'] / m['packed']:.1f} %, level {r['level']})"
+                       if r else "-")
         rows.append(row)
     return table(*rows)
 
 
-def level_table(m):
-    rows = [["level", "bytes so far", "% of PLY, zstd -19", "excess of volume, %",
-             "leaves derived, %", "reaches, % of diagonal", "certainly at most, %"]]
-    for r in m["rows"]:
-        far = [f"{r['seen']:.3f}", f"{r['certain']:.2f}"] if "seen" in r else ["", ""]
-        rows.append([r["level"], f"{r['bytes']:,}", f"{100 * r['bytes'] / m['packed']:.1f}",
-                     f"{r['excess']:.2f}", f"{r['derived']:.2f}", *far])
-    rows.append(["file", f"{m['info']['bytes']['file']:,}",
-                 f"{100 * m['info']['bytes']['file'] / m['packed']:.1f}", "", "", "", ""])
-    return (f"**{m['name']}{', with leaf planes' if m['leaf_planes'] else ''}**, "
-            f"{m['info']['faces']:,} faces; PLY {m['ply']:,} bytes, with zstd -19 "
-            f"{m['packed']:,}\n\n" + table(*rows))
+def firsts(m):
+    """Returns the first level within each goal, or None."""
+    return [next((r for r in m["rows"] if r["excess"] <= goal), None) for goal in GOALS]
 
 
-def thesis_table(plain, planes):
-    title, sent, volume = THESIS[plain["name"]]
+def level_cells(m, i):
+    if i >= len(m["rows"]):
+        return [""] * 4
+    r = m["rows"][i]
+    far = [f"{r['seen']:.3f}", f"{r['certain']:.2f}"] if "seen" in r else ["", ""]
+    return [f"{r['bytes']:,}", f"{r['excess']:.2f}", *far]
+
+
+def level_table(plain, planes):
+    columns = ["bytes", "excess, %", "vertex distance, %", "error bound, %"]
+    _, sent, volume = THESIS.get(plain["name"], ("", [], []))
     total = list(itertools.accumulate(sent))
-    rows = [["level", f"BP-Octree ({title}): bytes so far", "excess, %",
-             f"here ({plain['info']['faces']:,} faces): bytes so far", "excess, %",
-             "with leaf planes: bytes so far",
-             "excess, %"]]
+    rows = [["level", *columns, *(f"leaf planes: {c}" if c == "bytes" else c for c in columns),
+             *(["BP-Octree: bytes", "excess, %"] if sent else [])]]
     for i in range(max(len(total), len(plain["rows"]))):
-        row = [i, f"{total[i]:,}" if i < len(total) else "",
-               f"{volume[i] - 100:.2f}" if i < len(volume) else ""]
-        for m in (plain, planes):
-            row += [f"{m['rows'][i]['bytes']:,}",
-                    f"{m['rows'][i]['excess']:.2f}"] if i < len(m["rows"]) else ["", ""]
+        row = [i, *level_cells(plain, i), *level_cells(planes, i)]
+        if sent:
+            row += [f"{total[i]:,}" if i < len(total) else "",
+                    f"{volume[i] - 100:.2f}" if i < len(volume) else ""]
         rows.append(row)
-    whole = [f"{m['rows'][-1]['bytes'] + m['info']['bytes']['vertices'] + m['info']['bytes']['faces']:,}" for m in (plain, planes)]
-    rows.append(["mesh", "in the levels above", "", whole[0], "", whole[1], ""])
-    return table(*rows)
+    sizes = [f"{m['info']['bytes']['file']:,}" for m in (plain, planes)]
+    rows.append(["file", sizes[0], "", "", "", sizes[1], "", "", ""] + ["", ""] * bool(sent))
+    return f"**{plain['name']}**\n\n" + table(*rows)
+
+
+def result(models):
+    """Returns the result of the page."""
+    shares = [[100 * f["bytes"] / m["packed"] for m in models if (f := firsts(m)[i])]
+              for i in range(len(GOALS))]
+    whole = [100 * m["info"]["bytes"]["file"] / m["packed"] for m in models]
+    reached = sum(firsts(m)[-1] is not None for m in models)
+    return (f"- {min(shares[0]):.1f} to {max(shares[0]):.1f} % of the bytes of the compressed PLY give "
+            f"envelopes with an excess volume of at most {GOALS[0]} %.\n"
+            f"- {reached} of {len(models)} files reach an excess of {GOALS[-1]} % without the mesh; leaf "
+            f"planes (`convert --profile full`) help.\n"
+            f"- The whole file takes {min(whole):.1f} to {max(whole):.1f} % of the bytes of the "
+            "compressed PLY.")
 
 
 HEAD = """# Bytes to fetch for a level
-Made by `tests/bench/transmission.py BUILD_DIR bunny_closed.ply armadillo.ply igea.ply
--o docs/measured/transmission.md`; no figure depends on the machine.
 
-Until a level of detail is good enough, against fetching the model's binary PLY, compressed with
-`zstd -19`, whole. Nothing is interpolated: the first level that reaches the goal counts, with
-all bytes of the file up to its end, head included (`ebpo levels`).
+{RESULT}
 
-- *Excess*: (volume of the level's envelopes - volume of the solid) / volume of the solid. The solid
-is inside, always.
-- *Reaches*: the largest distance from the solid of any vertex of the envelopes (`ebpo distance`,
-exact), in percent of the box's diagonal. The one-sided Hausdorff distance from the envelopes to the
-solid is at least
-  this; a point between the vertices may be farther away.
-- *Certainly at most*: a bound on that Hausdorff distance: the largest diameter of an envelope in
-whose cell a face lies, which then lies in the envelope too, and the cell's diagonal and 1/256 for
-envelopes
-  of nodes that a face only comes near. The other way round the distance is 0: the envelopes contain
-  the solid.
+The page compares the bytes of the levels of a file with the binary PLY of the model, compressed by `zstd -19`. Made by
+`tests/bench/transmission.py BUILD_DIR bunny_closed.ply armadillo.ply igea.ply -o docs/measured/transmission.md`; the
+results do not depend on the machine.
 
-Where *reaches* stands still from level to level, it is that of a leaf whose convex hull spans a
-hollow: a node with few faces is not refined, so deeper levels do not change it.
+- *Bytes*: all bytes of the file up to the end of the level, header included (`ebpo levels`).
+- *Excess*: volume of the envelopes minus volume of the solid, in percent of the solid. The envelopes contain the solid.
+- *Vertex distance*: maximum distance of an envelope vertex from the solid (`ebpo distance`), in percent of the box
+  diagonal. The one-sided Hausdorff distance is at least this value.
+- *Error bound*: an upper bound of that Hausdorff distance. It is the maximum diameter of an envelope in whose cell a
+  face is; for nodes that a face is only near, it is the cell diagonal times 257/256.
+
+These values are those of a reader without the mesh: a leaf has its parent's envelope in its own cell, or its own with
+`convert --profile full`. With the mesh, `ebpo measure --derived` derives tighter leaf planes. The vertex distance
+can stay constant from level to level: a leaf with a concave surface is not refined.
+
+## First level within an excess
+
+The cells have the bytes, their share of the compressed PLY, and the level.
 """
 
 LEVELS = """## By level
-Excess, reach and bound are those of what has been fetched, without the mesh: a leaf has its
-parent's envelope in its own cell, or with `convert --with leaf-planes` its own. *Leaves derived*:
-the excess once the mesh
-is there too, and leaves' planes are derived from their faces (where they are stored: those), as
-`ebpo measure --derived` tells it. *File*: with the mesh, its order in the source, checksums.
-Distances only down to the level that reaches the last goal.
-"""
 
-BESIDE = """## Beside the BP-Octree
-Melero 2008, tables 4.4 and 4.6, summed up: what its levels would take to send by the model of
-section 4.2, uncompressed, with the faces and vertices of each level's leaves in them. Models differ
-in their number of
-faces. Ours: bytes of the file, compressed, with the leaves' face numbers, but their faces and
-vertices after the last level.
+*file*: the whole file with the mesh, its source order and checksums. Distances end at the level that reaches the last
+goal. The columns *BP-Octree* are sums of tables 4.4 and 4.6 of Melero 2008: uncompressed, with the faces and vertices
+of each level's leaves, for a bunny of 71,040 and an armadillo of 150,000 faces.
 """
 
 
@@ -221,11 +222,9 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         models = [study(arguments.build / "tools" / "ebpo", model, pathlib.Path(folder),
                         leaf_planes) for model in arguments.models for leaf_planes in (False, True)]
-    parts = [HEAD, goal_table(models), LEVELS, *(level_table(m) for m in models)]
-    beside = [thesis_table(plain, planes) for plain, planes in zip(models[::2], models[1::2])
-              if plain["name"] in THESIS]
-    parts += [BESIDE, *beside] if beside else []
-    arguments.output.write_text("\n".join(parts), encoding="utf-8")
+    parts = [HEAD.replace("{RESULT}", result(models)), goal_table(models), LEVELS,
+             *(level_table(*pair) for pair in zip(models[::2], models[1::2]))]
+    arguments.output.write_text(reflow("\n".join(parts)), encoding="utf-8")
 
 
 main()

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/versions.md: whether files of format 1.0 still open, and what a reader of 1.0 says of files of
-1.1.
+"""Compares this tool with the tool of format 1.0: reads files of 1.0 with both, and files of 1.1 with both.
 
-    tests/bench/versions.py OLD EBPO OLD_VECTORS MODELS_DIR > docs/measured/versions.md
+    tests/bench/versions.py OLD EBPO OLD_VECTORS MODELS_DIR
 
-OLD: the tool of format 1.0, OLD_VECTORS: format-spec/vectors of then; the page says how to make both. EBPO: this tool.
-MODELS_DIR: a folder of PLY files with the names used below, and `wild`. Ends with 1 if files of 1.0 are not read as
-the old tool reads them, or if the old tool takes a file of 1.1 for anything but what it is.
+OLD: the tool of format 1.0, from the last commit that writes it: `git worktree add old ef94608 && cd old && meson setup
+build && ninja -C build tools/ebpo`. OLD_VECTORS: its format-spec/vectors. EBPO: this tool. MODELS_DIR: a folder of PLY
+files with the names used below, and `wild`. Prints two tables. Exit code 1: this tool does not read a file of 1.0 as the
+old tool does, or the old tool does not refuse a file of 1.1 that it cannot read.
 """
 import pathlib
 import subprocess
@@ -44,7 +44,7 @@ def expect(good, what):
 
 
 def answers(tool, file, points, folder):
-    """What a tool makes of a file: answers bit for bit, and the mesh."""
+    """Returns the raw query results and the mesh that a tool reads from a file."""
     back = folder / "back.ply"
     solid = run(tool, "inside", "--raw", file, points, text=False)
     near = run(tool, "distance", "--raw", file, points, text=False)
@@ -53,8 +53,8 @@ def answers(tool, file, points, folder):
 
 
 def old_files(folder):
-    print("## Files of 1.0, made by the old tool, read by this one\n")
-    head("model", "codec", "opens", "verify", "inside, distance and mesh as by the old tool")
+    print("Files of format 1.0, written by the old tool and read by this tool\n")
+    head("model", "codec", "opens", "verify", "inside, distance and mesh equal")
     for name in PLAIN:
         for codec in ("zstd", "deflate", "none"):
             file, points = folder / "old.ebpo.h5", folder / "points.raw"
@@ -67,18 +67,18 @@ def old_files(folder):
     passed, failed = sorted(VECTORS.glob("passed/*.h5")), sorted(VECTORS.glob("failed/*.h5"))
     taken = [v.name for v in passed if run(NEW, "info", v).returncode == 0]
     refused = [v.name for v in failed if run(NEW, "verify", "-q", v).returncode != 0]
-    print(f"\nOf the {len(passed)} passed vectors of then this tool opens {len(taken)}; of the {len(failed)} failed ones "
-          f"it refuses {len(refused)}.")
+    print(f"\nVectors of format 1.0: this tool opens {len(taken)} of {len(passed)} passed ones and refuses "
+          f"{len(refused)} of {len(failed)} failed ones.")
     for name in {v.name for v in passed} - set(taken):
         expect(False, name)
         print(f"Not opened: {name}: {said(run(NEW, 'info', VECTORS / 'passed' / name))}")
     for name in sorted({v.name for v in failed} - set(refused)):
-        print(f"Taken now: {name}")
+        print(f"Accepted: {name}")
 
 
 def new_files(folder):
-    print("\n## Files of 1.1, made by this tool, read by the old one\n")
-    head("model", "written with", "opens", "verify", "inside and distance as by this tool", "says")
+    print("\nFiles of format 1.1, written by this tool and read by the old tool\n")
+    head("model", "options", "opens", "verify", "inside and distance equal", "message")
     whole, points = folder / "new.ebpo.h5", folder / "points.raw"
     for name in [*PLAIN, *(f"wild/{n}" for n in COLOURED)]:
         for options in ([], ["--face-coding", "gates"], ["--subtree-faces", "64"]):
@@ -89,18 +89,11 @@ def new_files(folder):
             same = opens and answers(OLD, whole, points, folder)[:2] == answers(NEW, whole, points, folder)[:2]
             refused = 'needs part "subtrees"' in done.stderr or 'needs part "gates"' in done.stderr
             expect(verified and same if opens else refused and not verified, f"{name} {options}")
-            row(name.removeprefix("wild/"), " ".join(options) or "usual options", "yes" if opens else "no",
+            row(name.removeprefix("wild/"), " ".join(options) or "default", "yes" if opens else "no",
                 "yes" if verified else "no", "yes" if same else "-", f"`{said(done)}`" if not opens else "")
 
 
 def main():
-    print("""# Versions of the format
-
-Made by `tests/bench/versions.py OLD EBPO OLD_VECTORS MODELS_DIR > docs/measured/versions.md`; nothing here was typed in
-by hand. OLD is the tool as it was before format 1.1, of the commit that describes subtrees and the last one that writes
-1.0: `git worktree add old ef94608 && cd old && meson setup build && ninja -C build tools/ebpo`, and OLD_VECTORS is
-`old/format-spec/vectors`.
-""")
     with tempfile.TemporaryDirectory() as name:
         old_files(pathlib.Path(name))
         new_files(pathlib.Path(name))

@@ -1,4 +1,4 @@
-"""Meshes that are awkward in one way each, small, and what is known of them.
+"""Makes small degenerate meshes, one kind of defect each, with their expected results.
 
 awkward.py FOLDER [NAME...]: writes these, or all, as ASCII PLY with doubles; NAME.obj and NAME.stl
 as those.

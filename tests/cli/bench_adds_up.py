@@ -27,7 +27,7 @@ check("quantiles ascend", 0 <= ns["p50"] <= ns["p99"] <= ns["p999"] <= ns["max"]
 check("as many points as counted", len(points) == wide * bench["count"])
 check("as many answers as points", sum(bench["answers"].values()) == bench["count"])
 check("opening comes before the first answer",
-      0 < bench["cold_open_seconds"] <= bench["cold_first_answer_seconds"])
+      0 < bench["cold_open_seconds"] <= bench["cold_first_result_seconds"])
 check("bytes were read", 0 < bench["cold_bytes_read"]
       and 0 < bench["bytes_read"] == bench["model"]["bytes_read"])
 check("batch", bench["batch_ns"] > 0)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A small file that states very many faces, as one made to exhaust memory would: bomb.py IN OUT FACES
+"""Makes a small file that claims very many faces, like an attack on memory: bomb.py IN OUT FACES
 
 IN has one leaf, zstd and no maps' worth keeping. All blocks of its faces become the same few bytes."""
 import ctypes

@@ -2,7 +2,7 @@
 """Checks in rational arithmetic that no digit of text is lost.
 
 digits_kept.py: writes numbers of all forms into OBJ, OFF and text STL files, of which `ebpo check`
-tells the kind and the value of a coordinate. They are floats if the nearest float, rounded to the
+prints the kind and the value of a coordinate. They are floats if the nearest float, rounded to the
 text's last digit (ties to even), gives the text; else the nearest doubles. Then larger files are
 converted, and what `ebpo extract` gives back is compared with the text."""
 import json

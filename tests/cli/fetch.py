@@ -130,7 +130,7 @@ def refusals(tool, folder, path, url):
     Handler.reset()
     Handler.damage = True
     done = run(tool, "fetch", url, out)
-    expect("a transfer that was damaged", done.returncode == 1 and "starts again" in done.stderr
+    expect("a transfer that was damaged", done.returncode == 1 and "start again" in done.stderr
            and not os.path.exists(part) and not os.path.exists(out), done.stderr)
     done = run(tool, "fetch", url, out)
     expect("and the next one", done.returncode == 0 and content(out) == content(path), done.stderr)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""json_outputs.py TOOL INPUTS FEATURES SCHEMAS: every command's JSON is as its schema says.
+"""json_outputs.py TOOL INPUTS FEATURES SCHEMAS: checks the JSON of every command against its schema.
 
 json.tests names commands and their schemas. Each is run over real files; what it prints is
 validated, and a member that the schema does not know is a failure. Every command that has --json

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""man.py TOOL PAGES COMMANDS: what tools/cli/options makes, and the tool itself, say the same.
+"""man.py TOOL PAGES COMMANDS: checks that the pages made by tools/cli/options match the tool.
 
 COMMANDS is tools/cli/options, PAGES where the build has put what is made of it. The options of --help,
 of the manual and of bash's completion are the same; so are the words that options take and those
@@ -70,6 +70,7 @@ def bash_offers(tool, script, commands):
     for command in commands:
         offered = completed(script, command.name, "--")
         told = options_in_help(help_of(tool, command.name, "--help"))
+        told |= {o.name for o in command.options() if o.page}
         if sorted(offered) != sorted("--" + name for name in told):
             yield f"{command.name}: bash offers {offered}"
         for option in command.options():
@@ -77,6 +78,14 @@ def bash_offers(tool, script, commands):
                 for words in ([f"--{option.name}", ""], [f"--{option.name}", "=", ""]):
                     if completed(script, command.name, *words) != option.words:
                         yield f"{command.name} --{option.name}: other words"
+
+
+def check_remote(tool, page):
+    """`ebpo help remote` and ebpo-remote(7) have the same options."""
+    told = help_of(tool, "help", "remote")
+    if not told or options_in_help(told) != set(items_in_page(page)):
+        yield f"remote: options of help and manual: {options_in_help(told) ^ set(items_in_page(page))}"
+    yield from (f"wider than 80 columns: {line}" for line in told.splitlines()[1:] if len(line) > 80)
 
 
 def check_command(tool, command, page):
@@ -122,6 +131,8 @@ def main():
         with open(os.path.join(made, pages[-1]), encoding="utf-8") as file:
             wrong += [f"{command.name}: {what}" for what in check_command(tool, command,
                                                                           file.read())]
+    with open(os.path.join(made, "ebpo-remote.7"), encoding="utf-8") as file:
+        wrong += check_remote(tool, file.read())
     wrong += lint("mandoc", ["-Tlint", "-Wwarning"], [os.path.join(made, p) for p in pages])
     if shutil.which("bash"):
         wrong += bash_offers(tool, os.path.join(made, "ebpo.bash"), commands)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Reads what `ebpo map` wrote, by h5py and by hand.
+"""Reads the output of `ebpo map` with h5py and with separate code.
 
 map_reads.py IMAGE.vtkhdf VOLUME.nrrd         prints the points, x y z, in the files' order
 map_reads.py IMAGE.vtkhdf VOLUME.nrrd ASKED   "fine" if both hold the distances in ASKED, the first

@@ -32,7 +32,7 @@ REFUSED = {
     "holds numbers of type '<i8'; give float64 or float32 (astype)": array(head("'<i8'")),
     "holds numbers of type '<f2'; give": array(head("'<f2'")),
     "holds numbers of type '|O'; give": array(head("'|O'")),
-    "holds numbers with names; save numpy.lib.recfunctions.structured_to_unstructured of it":
+    "holds named fields; save numpy.lib.recfunctions.structured_to_unstructured of it":
         array(head("[('x', '<f8'), ('y', '<f8'), ('z', '<f8')]", shape="(2,)")),
     "has the shape (6,); points are rows of three": array(head(shape="(6,)")),
     "has the shape (); points are rows of three": array(head(shape="()")),
@@ -41,8 +41,8 @@ REFUSED = {
     **{f"has the shape {shape}; points are rows of three": array(head(shape=shape)) for shape in (
         "(-1, 3)", "(-2, 3)", "(2, -3)", "(-3,)", "(+2, 3)", "(2, 4294967299)", "(4294967299,)", "(2, 3, -1)",
         "(18446744073709551617, 3)", "(18446744073709551615, 3)", "(99999999999999999999999, 3)", "(2 3)")},
-    "is a NumPy array of version 4.0; 1.0 to 3.0 are known": array(head(), version=4),
-    "has a head that is no NumPy array's": array("{'descr': '<f8'}\n")}
+    "is a NumPy array of version 4.0; supported: 1.0 to 3.0": array(head(), version=4),
+    "has no valid NumPy header": array("{'descr': '<f8'}\n")}
 
 
 def ask(data):

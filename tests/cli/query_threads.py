@@ -35,7 +35,7 @@ def make_inputs(ebpo, generate):
 
     run(generate, "--base", "torus", "--faces", "10000", "torus.ply")
     # so many nodes that the command does not bring in all of it at once
-    run(ebpo, "convert", "-q", "--leaf-faces", "1", "--max-level", "8", "--without", "planes", "torus.ply", FINE)
+    run(ebpo, "convert", "-q", "--leaf-faces", "1", "--max-level", "8", "--parts", "-envelopes", "torus.ply", FINE)
     os.mkdir("models")
     run(ebpo, "convert", "-q", "torus.ply", COARSE)
     run(generate, "--base", "sphere", "--faces", "4000", "sphere.ply")

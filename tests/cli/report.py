@@ -169,11 +169,11 @@ def questions(told, folder):
         file = folder / f"{m['name']}.ebpo.h5"
         for l in m["levels"]:
             if told["model"]["kind"] == "solid":
-                answers = run("inside", "--level", l["level"], file, data=text).decode()
+                answers = run("inside", "--max-level", l["level"], file, data=text).decode()
                 assert l["maybe_uniform"] == sum(line.startswith("MAYBE")
                                                  for line in answers.splitlines()) / POINTS
                 assert 0 <= l["maybe_near"] <= 1
-            told_widths = run("distance", "--json", "--level", l["level"], file, data=text).decode()
+            told_widths = run("distance", "--json", "--max-level", l["level"], file, data=text).decode()
             widths = [a["hi"] - a["lo"] for a in map(json.loads, told_widths.splitlines())]
             assert (l["width_median"] == quantile(widths, 0.5)
                     and l["width_p99"] == quantile(widths, 0.99))
@@ -308,7 +308,7 @@ def folder_of(inputs, name):
 
 def usual(inputs):
     folder = folder_of(inputs, "r")
-    arguments = ("--select", "inherit,kmedoids,offset,random", "--keep", "--no-pictures", "--need",
+    arguments = ("--select", "inherit,kmedoids,offset,random", "--keep", "--no-pictures", "--targets",
                  "--max-level", "3", folder_of(inputs, "torus.ply"))
     rows, told = report(folder, *arguments)
     of = agree(rows, told)
@@ -344,7 +344,7 @@ def thesis_is_at_least(told):
 def files(inputs):
     a, b = folder_of(inputs, "a.ebpo.h5"), folder_of(inputs, "b.ebpo.h5")
     run("convert", "-q", "--max-level", "2", folder_of(inputs, "sphere.ply"), a)
-    run("convert", "-q", "--max-level", "3", "--with", "leaf-planes",
+    run("convert", "-q", "--max-level", "3", "--profile", "full",
         folder_of(inputs, "sphere.ply"), b)
     rows, told = report(folder_of(inputs, "files"), "--name", "short", "--name", "<long> & 'odd'",
                         a, b)
@@ -354,8 +354,8 @@ def files(inputs):
             and told["methods"][0]["build_seconds"] is None)
     for l in told["methods"][0]["levels"]:
         assert l["levels_volume"] >= l["envelope_volume"] * (1 - 1e-9)
-    _, whole = report(folder_of(inputs, "all"), "--need", "--no-pictures", b)
-    rows, told = report(folder_of(inputs, "some"), "--need", "--levels", "1-2", b)
+    _, whole = report(folder_of(inputs, "all"), "--targets", "--no-pictures", b)
+    rows, told = report(folder_of(inputs, "some"), "--targets", "--levels", "1-2", b)
     assert [l["level"] for l in told["methods"][0]["levels"]] == [1, 2]
     page_holds(folder_of(inputs, "some"), told, 2)
     # What the whole file reaches is that of its last level, measured or not.
@@ -408,7 +408,7 @@ def no_volume(inputs):
 
 def without_mesh(inputs):
     file = folder_of(inputs, "bare.ebpo.h5")
-    run("convert", "-q", "--max-level", "2", "--without", "mesh", folder_of(inputs, "torus.ply"),
+    run("convert", "-q", "--max-level", "2", "--parts", "-mesh", folder_of(inputs, "torus.ply"),
         file)
     rows, told = report(folder_of(inputs, "bare"), file)
     agree(rows, told)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs command-line tests that are data.
+"""Runs command-line tests from data files.
 
 run.py TOOL INPUTS FEATURES FILE.tests
 
@@ -27,8 +27,8 @@ import sys
 import tempfile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-# What a build with -Dextras=disabled lacks.
-EXTRAS = re.compile(r"\bebpo (?:help )?(?:boolean|collide|map|paint|scene|touch)\b|--crossings|components_agree")
+# Commands that a build with -Dextras=disabled lacks.
+EXTRAS = re.compile(r"\bebpo (?:help )?(?:boolean|collide|haptic|map|paint|scene)\b|--crossings|components_agree")
 
 NEEDS_TERMINAL = re.compile(r"\bscript -|shows_progress\.py")
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What zsh and fish themselves make of our completions: shells_complete.py FOLDER
+"""Checks the completions with zsh and fish: shells_complete.py FOLDER
 
 Each shell that is installed is asked what follows some beginnings of a line. bash is asked by
 whole_lines of cli_man. Exit code 77: neither is installed."""
@@ -18,10 +18,10 @@ from run import has_terminal
 
 folder = pathlib.Path(sys.argv[1]).resolve()
 ASKED = {  # what is typed: what has to be offered
-    "ebpo rep": ["repack", "repair", "report"],
+    "ebpo rep": ["repack", "report"],
     "ebpo convert --codec ": ["deflate", "none", "zstd"],
-    "ebpo check --pla": ["--places"],
-    "ebpo inside --most-e": ["--most-expansion"],
+    "ebpo check --fin": ["--findings"],
+    "ebpo inside --max-e": ["--max-expansion"],
 }
 
 

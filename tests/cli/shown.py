@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""shown.py COMMANDS [--update]: which tests show what of each command.
+"""shown.py COMMANDS [--update]: checks that tests cover each behaviour of each command.
 
-COMMANDS is tools/cli/options. Lines of *.tests are sorted by what they run and expect into a table,
-command by behaviour, which docs/develop/command-line.md has; a cell without a test is a failure, and
-so is a page that is not this table (--update writes it).
+COMMANDS is tools/cli/options. The script makes a table of the lines of *.tests, command by behaviour,
+and compares it with docs/develop/command-line.md (--update writes the page). It fails for a cell
+without a test and for an outdated page.
 """
 import os
 import re
@@ -15,25 +15,25 @@ sys.path.insert(0, HERE)
 import run
 
 PAGE = os.path.join(HERE, "../../docs/develop/command-line.md")
-COLUMNS = ("people", "--json", "errors", "progress", "pipes")
-# What has no cell, and why.
+COLUMNS = ("text", "--json", "errors", "progress", "pipes")
+# Cells that need no test, with the reason.
 NONE = {
-    "people": {}, "--json": {}, "errors": {}, "pipes": {},
-    "progress": {command: "none: it takes no time or as much as was asked for, or its answers "
-                 "are the progress" for command in ("info", "levels", "view", "bench", "touch")},
+    "text": {}, "--json": {}, "errors": {}, "pipes": {},
+    "progress": {command: "no progress line: the command is short, has a given duration, or "
+                 "prints results continuously" for command in ("info", "levels", "view", "bench", "haptic")},
 }
-TEXT = """# What is shown of each command
+TEXT = """# Test coverage of each command
 
-Made by `python3 tests/cli/shown.py tools/cli/options --update` of the tests; the test `cli_shown` holds it
-to them, and fails where a cell has none. A cell names the files with tests of it:
+This page lists the files of `tests/cli` that test each command. `python3 tests/cli/shown.py tools/cli/options
+--update` generates it; the test `cli_shown` fails for an outdated page or an empty cell.
 
 | column | a test |
 |---|---|
-| people | runs the command and compares the words that it prints |
-| `--json` | compares its JSON, or holds it against the schema |
+| text | runs the command and compares its text |
+| `--json` | compares its JSON, or checks it against the schema |
 | errors | expects a message and an exit code other than 0 |
-| progress | looks at the line on a terminal |
-| pipes | output that cannot be written, or is read to a part only, or input from standard input |
+| progress | checks the progress line on a terminal |
+| pipes | output that cannot be written or is only partly read, or standard input |
 
 """
 
@@ -53,13 +53,13 @@ def tests():
 
 
 def column(name, code, out, error, command, ran):
-    """The behaviours that a line shows of the command."""
+    """Yields the behaviours that a line tests for the command."""
     fails = code.rpartition(":")[2] != "0"
     mine = re.search(rf"ebpo {ran}\b[^|;&]*", command).group()
     if "--json" in mine and not fails and (out or name == "json.tests"):
         yield "--json"
     elif out not in ("", "*") and not fails:
-        yield "people"
+        yield "text"
     if fails and error not in ("", "*"):
         yield "errors"
     if re.search(r"/dev/full|[|] head|whole_lines|asks_and_waits", command) or re.search(
@@ -107,7 +107,7 @@ def main():
     else:
         with open(PAGE, encoding="utf-8") as file:
             if file.read() != text:
-                bad.append("docs/develop/command-line.md is of other tests; run with --update")
+                bad.append("docs/develop/command-line.md is outdated; run with --update")
     print("\n".join(bad + [f"{len(commands) * len(COLUMNS)} cells, {len(bad)} wrong"]))
     return 1 if bad or len(commands) < 20 else 0
 

@@ -6,7 +6,7 @@ import sys
 
 NAMES = ["leaf creation", "corner labels", "leaf planes", "tree paths", "leaf clipping",
          "storing and propagating", "total"]
-ROWS = ["reading", "mending", "ordering", "checking", "cutting", "corners", "cells", "choosing",
+ROWS = ["reading", "repairing", "ordering", "checking", "cutting", "corners", "cells", "choosing",
         "top", "envelopes", "joining", "numbering", "writing", "judging"]
 
 

@@ -1,6 +1,6 @@
-"""volumes_agree.py JSON <output of ebpo extract --level 0, 1, ...: the volumes are those that ebpo
-info tells; smaller where
-leaves are cut by planes that are derived from their faces, which the file does not count."""
+"""volumes_agree.py JSON <output of ebpo extract --level 0, 1, ...: checks that the volumes are those
+of ebpo info. They are smaller where planes derived from faces cut the leaves; the file does not
+count these planes."""
 import json
 import math
 import re

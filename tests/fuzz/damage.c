@@ -1,27 +1,28 @@
 /* SPDX-License-Identifier: MIT
- * Damages files in every way that storage and transport do, and asks everything of them:
+ * Damages files in every way of storage and transport, and runs every query:
  *
  *     damage [-e EVERY] [-v] [-w FOLDER] [-o OTHER] FILE...
  *
- * Each byte is flipped in one bit (in each bit with EVERY 0, every EVERY-th byte else), set to zero
- * and to 255; the file is cut off at each byte; chunks that take as many bytes change places; and
- * with -o a chunk of another version of the model stands where that of the same path and number
- * stood. After each, every kind of answer must be the good file's, or an error. -v: verifies as
- * well, and names what verifying does not see. -w: keeps files that answered wrongly.
+ * Each byte is flipped in one bit (in each bit with EVERY 0, else every EVERY-th byte), set to zero
+ * and to 255; the file is truncated at each byte; chunks of equal size are exchanged; and with -o a
+ * chunk is replaced by the chunk of the same path and number in another version of the model. After
+ * each change, every kind of query must return the result of the good file, or an error. -v: also
+ * verifies, and names damage that verifying does not detect. -w: keeps files that gave wrong
+ * results.
  *
- * A chunk's own checksum does not tell its place: in files without /chunk_sums, chunks that have
- * changed places, or come from another file, are noticed by content_sha256 at the latest, that is
- * by verifying. In files that have it every question must notice them.
+ * The checksum of a chunk does not cover its offset: in files without /chunk_sums, chunks that
+ * were exchanged, or come from another file, are detected at the latest by content_sha256, when
+ * verifying. In files with it every query must detect them.
  *
- * Exit code 1: some answer was wrong, and neither was anything said nor, of whole chunks, does
- * verifying see it. */
+ * Exit code 1: a result was wrong without an error, and, for whole chunks, verifying does not
+ * detect it either. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "ask_all.h"
+#include "query_all.h"
 #include "core/checksum.h"
 #include "format/file_in.h"
 #include "known_leaks.h"
@@ -39,29 +40,29 @@ typedef struct damage {
     unsigned every;
     bool verify;
     bytes good, now;
-    asked right;
-    ebpo_file *file; /* the good one */
+    queried right;
+    ebpo_file *file; /* the good file */
     how way;
     uint64_t tried[WAYS], refused[WAYS], noticed[WAYS], harmless[WAYS], wrong[WAYS], unseen[WAYS];
-    uint64_t silent; /* wrong, and what should have told of it did not */
+    uint64_t silent; /* wrong, and not detected by the check that should detect it */
     uint64_t shown, unseen_shown;
 } damage;
 
 static bytes slurp(const char *path)
 {
-    enum { MOST = 1 << 24 };
+    enum { LIMIT = 1 << 24 };
     FILE *f = fopen(path, "rb");
-    bytes b = { malloc(MOST), 0 };
+    bytes b = { malloc(LIMIT), 0 };
     if (!f || !b.at) {
         perror(path);
         exit(2);
     }
-    b.size = fread(b.at, 1, MOST, f);
+    b.size = fread(b.at, 1, LIMIT, f);
     fclose(f);
     return b;
 }
 
-/* --- where a byte lies --- */
+/* --- position of a byte --- */
 
 static const ebpo_array_in *array_number(const ebpo_file *f, int n)
 {
@@ -81,7 +82,7 @@ static uint64_t chunk_count(const ebpo_array_in *a)
                : 0;
 }
 
-static void say_place(const damage *d, uint64_t at)
+static void report_place(const damage *d, uint64_t at)
 {
     const ebpo_array_in *a;
     for (int n = 0; (a = array_number(d->file, n)); n++)
@@ -94,7 +95,7 @@ static void say_place(const damage *d, uint64_t at)
     printf(at < d->file->info.head_bytes ? "in the head" : "between chunks");
 }
 
-/* --- judging --- */
+/* --- checks --- */
 
 static void keep(const damage *d, uint64_t number)
 {
@@ -105,71 +106,72 @@ static void keep(const damage *d, uint64_t number)
         perror(path);
 }
 
-static bool differs(const damage *d, const asked *a, int kind)
+static bool differs(const damage *d, const queried *a, int kind)
 {
     return d->right.status[kind] != a->status[kind] || d->right.hash[kind] != a->hash[kind];
 }
 
-static void say_wrong(damage *d, const asked *a, uint64_t at)
+static void report_wrong(damage *d, const queried *a, uint64_t at)
 {
     if (d->keep)
         keep(d, at);
     if (d->shown++ >= 20)
         return;
     printf("%s: %s, byte %" PRIu64 " (", d->name, ways[d->way], at);
-    say_place(d, at);
+    report_place(d, at);
     printf("):");
-    for (int i = 0; i < ASKED_KINDS; i++)
+    for (int i = 0; i < QUERIED_KINDS; i++)
         if (differs(d, a, i) && a->status[i] == EBPO_OK)
-            printf(" %s", asked_names[i]);
+            printf(" %s", queried_names[i]);
     printf(": wrong, and nothing is said\n");
 }
 
-static void say_unseen(damage *d, uint64_t at)
+static void report_unseen(damage *d, uint64_t at)
 {
     if (d->unseen_shown++ >= 100)
         return;
     printf("%s: %s, byte %" PRIu64 " (", d->name, ways[d->way], at);
-    say_place(d, at);
+    report_place(d, at);
     printf("): answers are right, and verifying does not see it\n");
 }
 
 static void judge(damage *d, uint64_t at)
 {
-    asked a;
+    queried a;
     bool wrong = false, noticed = false;
-    uint8_t *exact = malloc(d->now.size ? d->now.size : 1); /* so that a read behind it is seen */
+    uint8_t *exact = malloc(d->now.size ? d->now.size : 1); /* so that a read after its end is
+                                                             * detected */
     if (!exact)
         exit(2);
     memcpy(exact, d->now.at, d->now.size);
     bool whole_chunks = d->way == SWAP || d->way == OTHER;
-    ask_all(exact, d->now.size, d->verify || whole_chunks, &a);
+    query_all(exact, d->now.size, d->verify || whole_chunks, &a);
     free(exact);
     d->tried[d->way]++;
     if (a.open != EBPO_OK) {
         d->refused[d->way]++;
         return;
     }
-    for (int i = 0; i < ASKED_KINDS; i++)
+    for (int i = 0; i < QUERIED_KINDS; i++)
         if (differs(d, &a, i)) {
             wrong |= a.status[i] == EBPO_OK;
             noticed |= a.status[i] != EBPO_OK;
         }
     bool seen = a.verify != EBPO_OK || a.violations || a.spare_filled != d->right.spare_filled;
     d->wrong[d->way] += wrong;
-    bool told = whole_chunks && seen && !d->file->has_sums;
-    d->silent += wrong && !told;
+    bool reported = whole_chunks && seen && !d->file->has_checksums;
+    d->silent += wrong && !reported;
     d->noticed[d->way] += noticed && !wrong;
     d->harmless[d->way] += !noticed && !wrong;
-    if (wrong && !told)
-        say_wrong(d, &a, at);
+    if (wrong && !reported)
+        report_wrong(d, &a, at);
     if ((d->verify || whole_chunks) && !seen) {
         d->unseen[d->way]++;
-        say_unseen(d, at);
+        report_unseen(d, at);
     }
 }
 
-/* --- ways --- */
+/* --- kinds of damage --- */
 
 static void begin(damage *d, how way)
 {
@@ -221,7 +223,7 @@ static void swap(uint8_t *a, uint8_t *b, uint64_t size)
     }
 }
 
-/* Chunks of all arrays, as a misdirected write or a sorted copy of blocks would. */
+/* Exchanges chunks of all arrays, as a misdirected write or a sorted copy of blocks does. */
 static void swap_chunks(damage *d)
 {
     const ebpo_array_in *a, *b;
@@ -235,7 +237,7 @@ static void swap_chunks(damage *d)
                             *y = d->now.at + b->chunks[k].address;
                     if (a->chunks[i].bytes != b->chunks[k].bytes ||
                         memcmp(x, y, a->chunks[i].bytes) == 0 ||
-                        (d->every && !d->file->has_sums && turn++ % d->every))
+                        (d->every && !d->file->has_checksums && turn++ % d->every))
                         continue;
                     swap(x, y, a->chunks[i].bytes);
                     judge(d, a->chunks[i].address);
@@ -243,7 +245,7 @@ static void swap_chunks(damage *d)
                 }
 }
 
-/* As where writing over an older file stopped. */
+/* As when writing over an older file stopped early. */
 static void take_of_other(damage *d, const bytes *other)
 {
     const ebpo_array_in *a, *b;
@@ -267,7 +269,7 @@ static void take_of_other(damage *d, const bytes *other)
     ebpo_close(file);
 }
 
-static void tell(const damage *d)
+static void report(const damage *d)
 {
     for (int i = 0; i < WAYS; i++) {
         if (!d->tried[i])
@@ -294,7 +296,7 @@ static uint64_t damage_file(damage *d, const char *path, const char *other)
         fprintf(stderr, "%s: cannot be opened\n", path);
         exit(2);
     }
-    ask_all(d->good.at, d->good.size, d->verify, &d->right);
+    query_all(d->good.at, d->good.size, d->verify, &d->right);
     if (d->right.verify != EBPO_OK || d->right.violations) {
         fprintf(stderr, "%s: is not valid before it is damaged\n", path);
         exit(2);
@@ -307,7 +309,7 @@ static uint64_t damage_file(damage *d, const char *path, const char *other)
         take_of_other(d, &o);
         free(o.at);
     }
-    tell(d);
+    report(d);
     fflush(stdout);
     ebpo_close(d->file);
     free(d->good.at);
@@ -321,7 +323,7 @@ int main(int argc, char **argv)
     const char *other = NULL;
     uint64_t wrong = 0;
     int option;
-    if (!EBPO_SUMS_COMPARED) {
+    if (!EBPO_CHECKSUMS_COMPARED) {
         fprintf(stderr, "damage: a fuzzing build notices nothing; use another\n");
         return 77;
     }

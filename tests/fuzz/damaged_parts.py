@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""One bit of a file flipped, again and again: does `ebpo verify` name the part, is what `ebpo repair` makes right?
+"""Flips single bits of a file; checks that `ebpo verify` names the damaged part and `ebpo recover` restores it.
 
 damaged_parts.py EBPO FILE.ebpo.h5 [--count N] [--seed S]: four of five flips are in chunks, the others
 anywhere. Prints how often which came of it; exit code 1 where verifying failed without the damaged array's
@@ -47,7 +47,7 @@ def judge(ebpo, right, name, counts):
     counts[where, "verify", "not seen" if verified.returncode == 0 else "named" if named else "told"] += 1
     if verified.returncode not in (0, 1) or (name and verified.returncode == 1 and not named):
         wrong.append(f"verify: {verified.returncode} {verified.stderr}")
-    repaired = run(ebpo, "repair", "-o", "r.ebpo.h5", "d.ebpo.h5")
+    repaired = run(ebpo, "recover", "-o", "r.ebpo.h5", "d.ebpo.h5")
     if not os.path.exists("r.ebpo.h5"):
         counts[where, "repair", "refused"] += 1
         return wrong if repaired.returncode == 1 else wrong + [f"repair: {repaired.returncode}"]

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT
- * Any bytes as a command line, for each command's table; and as what options take: sizes, levels,
- * times, poses, expressions, numbers.
+ * Any bytes as a command line, for the table of each command; and as values of options: sizes,
+ * levels, times, poses, expressions, numbers.
  *
- * Input: a byte for what it is (64 and above: a value), the text; arguments end with line feeds. */
-#include "fuzz_kit.h"
+ * Input: a byte for the kind (64 and above: a value), the text; arguments end with line feeds. */
+#include "fuzz_support.h"
 #include "fuzz_quiet.h"
 
 #include <math.h>
@@ -27,26 +27,26 @@ static const command *const commands[] = {
     &command_convert, &command_check,   &command_info,    &command_levels, &command_view,
     &command_extract, &command_export,  &command_subset,  &command_repack, &command_fetch,
     &command_measure, &command_render,  &command_verify,  &command_inside, &command_distance,
-    &command_ray,     &command_box,     &command_bench,   &command_report, &command_repair,
+    &command_ray,     &command_box,     &command_bench,   &command_report, &command_recover,
 #if EBPO_HAVE_EXTRAS
-    &command_scene,   &command_boolean, &command_collide, &command_map,    &command_touch,
+    &command_scene,   &command_boolean, &command_collide, &command_map,    &command_haptic,
     &command_paint,
 #endif
 };
-enum { COMMANDS = sizeof commands / sizeof *commands, WORDS_MOST = 40, VALUES = 64 };
+enum { COMMANDS = sizeof commands / sizeof *commands, WORDS_MAX = 40, VALUES = 64 };
 
 static void command_line(const command *c, char *text)
 {
-    char name[] = "fuzz", *argv[WORDS_MOST + 1] = { name };
+    char name[] = "fuzz", *argv[WORDS_MAX + 1] = { name };
     const char *operand[ARGS_OPERANDS_MAX];
     int argc = 1;
-    for (char *at = text; *at && argc < WORDS_MOST; argc++) {
+    for (char *at = text; *at && argc < WORDS_MAX; argc++) {
         argv[argc] = at;
         at += strcspn(at, "\n");
         if (*at)
             *at++ = 0;
     }
-    void *values = fuzz_copy(c->usual, c->size);
+    void *values = fuzz_copy(c->standard, c->size);
     if (args_parse(c->spec, argc, argv, values, operand) == ARGS_RUN)
         for (int i = 0; i < c->spec->least; i++)
             fuzz_must(operand[i] != NULL);
@@ -55,7 +55,7 @@ static void command_line(const command *c, char *text)
 
 static void number(const char *text)
 {
-    char printed[NUMBER_ROOM + 1], *end;
+    char printed[NUMBER_CAPACITY + 1], *end;
     const char *after;
     double v = number_read(text, text + strlen(text), &after), expected = strtod(text, &end);
     if (after == text)

@@ -1,6 +1,6 @@
-/* Fuzz target: any bytes as a catalogue's file. A catalogue that comes out must be whole: entries
- * with paths and boxes, of which another catalogue can be made. No model is opened. */
-#include "fuzz_kit.h"
+/* Fuzz target: any bytes as a catalogue file. A resulting catalogue must be valid: entries with
+ * paths and boxes, from which another catalogue can be made. No model is opened. */
+#include "fuzz_support.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -8,7 +8,7 @@
 
 #include <ebpo/catalogue.h>
 
-/* One file, which is written anew for each input. */
+/* Uses one file, which is written again for each input. */
 static const char *written(const uint8_t *data, size_t size)
 {
     static char path[64];

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT
- * Any bytes as coded numbers: each coding is undone, and making it again gives the same bytes, as
+ * Any bytes as coded numbers: each coding is decoded, and encoding again gives the same bytes, as
  * section 7 of format-spec/README.md says.
  *
  * Input: a byte for the coding, a byte for its kinds, the numbers. */
-#include "fuzz_kit.h"
+#include "fuzz_support.h"
 
 #include <ebpo/file.h>
 
@@ -14,8 +14,8 @@
 static void points(const uint8_t *data, uint64_t rows, bool doubles)
 {
     size_t bytes = (doubles ? 24 : 12) * (size_t)rows;
-    uint8_t *in = fuzz_copy(data, bytes), *again = fuzz_room(bytes);
-    void *values = fuzz_room(bytes);
+    uint8_t *in = fuzz_copy(data, bytes), *again = fuzz_capacity(bytes);
+    void *values = fuzz_capacity(bytes);
     if (doubles) {
         ebpo_points64_decode(in, rows, values);
         ebpo_points64_encode(values, rows, again);
@@ -31,8 +31,8 @@ static void points(const uint8_t *data, uint64_t rows, bool doubles)
 
 static void numbers(const uint8_t *data, uint64_t rows)
 {
-    uint8_t *in = fuzz_copy(data, 4 * (size_t)rows), *again = fuzz_room(4 * (size_t)rows);
-    uint32_t *values = fuzz_room(4 * (size_t)rows);
+    uint8_t *in = fuzz_copy(data, 4 * (size_t)rows), *again = fuzz_capacity(4 * (size_t)rows);
+    uint32_t *values = fuzz_capacity(4 * (size_t)rows);
     ebpo_numbers_decode(in, rows, values);
     ebpo_numbers_encode(values, rows, again);
     fuzz_must(memcmp(in, again, 4 * (size_t)rows) == 0);
@@ -48,8 +48,8 @@ static void columns(const uint8_t *data, size_t size, uint8_t kind)
     bool floats = kind & 4 && width >= 4;
     uint64_t rows = size / (width * cols);
     size_t bytes = width * cols * (size_t)rows;
-    uint8_t *in = fuzz_copy(data, bytes), *again = fuzz_room(bytes);
-    void *values = fuzz_room(bytes);
+    uint8_t *in = fuzz_copy(data, bytes), *again = fuzz_capacity(bytes);
+    void *values = fuzz_capacity(bytes);
     ebpo_columns_decode(in, width, floats, rows, cols, values);
     ebpo_columns_encode(values, width, floats, rows, cols, again);
     fuzz_must(memcmp(in, again, bytes) == 0);
@@ -64,8 +64,9 @@ static void integers(const uint8_t *data, size_t size, uint8_t kind)
     uint64_t rows = size / stored;
     if (width < stored)
         return;
-    uint8_t *in = fuzz_copy(data, stored * (size_t)rows), *again = fuzz_room(stored * (size_t)rows);
-    void *values = fuzz_room(width * (size_t)rows);
+    uint8_t *in = fuzz_copy(data, stored * (size_t)rows),
+            *again = fuzz_capacity(stored * (size_t)rows);
+    void *values = fuzz_capacity(width * (size_t)rows);
     ebpo_integers_decode(in, stored, kind & 16, rows, values, width);
     ebpo_integers_encode(values, width, rows, stored, again);
     fuzz_must(memcmp(in, again, stored * (size_t)rows) == 0);
@@ -74,13 +75,13 @@ static void integers(const uint8_t *data, size_t size, uint8_t kind)
     free(values);
 }
 
-/* No corner names a vertex beyond those seen. */
+/* Checks that no corner names a vertex beyond those seen. */
 static void corners(const uint8_t *data, uint64_t rows, uint8_t kind)
 {
     size_t bytes = 12 * (size_t)rows;
     uint64_t before = (uint64_t)kind * kind * 3, seen = before, seen_again = before;
-    uint8_t *in = fuzz_copy(data, bytes), *again = fuzz_room(bytes);
-    uint32_t *faces = fuzz_room(bytes);
+    uint8_t *in = fuzz_copy(data, bytes), *again = fuzz_capacity(bytes);
+    uint32_t *faces = fuzz_capacity(bytes);
     if (ebpo_corners_decode(in, rows, &seen, faces)) {
         for (uint64_t i = 0; i < 3 * rows; i++)
             fuzz_must(faces[i] < seen);
@@ -92,14 +93,15 @@ static void corners(const uint8_t *data, uint64_t rows, uint8_t kind)
     free(faces);
 }
 
-/* Any codes can be written as gates, and come back: by both readers. */
+/* Checks that any codes can be written as gates, and are read back by both readers. */
 static void gates(const uint8_t *data, uint32_t rows, uint8_t kind)
 {
     size_t corners = 12 * (size_t)rows, bytes = EBPO_GATES_COLS * (size_t)rows,
            ends[EBPO_GATES_ENDS];
     uint64_t seen = (uint64_t)kind * kind * 3, plainly_seen = seen;
-    uint8_t *in = fuzz_copy(data, corners), *out = fuzz_room(bytes), *again = fuzz_room(corners);
-    uint32_t *faces = fuzz_room(corners), *plainly = fuzz_room(corners);
+    uint8_t *in = fuzz_copy(data, corners), *out = fuzz_capacity(bytes),
+            *again = fuzz_capacity(corners);
+    uint32_t *faces = fuzz_capacity(corners), *plainly = fuzz_capacity(corners);
     ebpo_gates_encode(in, rows, out, ends);
     for (int i = 0; i < EBPO_GATES_ENDS; i++)
         fuzz_must(ends[i] <= bytes && (i == 0 || ends[i] >= ends[i - 1]));

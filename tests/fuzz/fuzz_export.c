@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * Any bytes as a file that is written anew: in other programs' formats, repacked, as a subset.
- * The last byte says in which way. */
-#include "fuzz_kit.h"
+ * Any bytes as a file that is written again: in formats of other programs, repacked, as a subset.
+ * The last byte selects the way. */
+#include "fuzz_support.h"
 
 #include <ebpo/export.h>
 #include <ebpo/subset.h>

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * Any bytes as a file: opening and reading all of it, or the part in a box, ends in a status.
- * What is asked of a file beyond that is in fuzz_questions.c, fuzz_levels.c, fuzz_pair.c,
- * fuzz_verify.c and fuzz_export.c. */
-#include "fuzz_kit.h"
+ * Further queries are in fuzz_queries.c, fuzz_levels.c, fuzz_pair.c, fuzz_verify.c and
+ * fuzz_export.c. */
+#include "fuzz_support.h"
 
 #include <ebpo/file.h>
 

@@ -1,12 +1,12 @@
-/* Any bytes as the head of a file: every object, attribute and array that the format has is asked
- * for. Refused or read, and what is read keeps its promises. Tests build it twice: as it is, and
+/* Any bytes as the header of a file: every object, attribute and array of the format is read. It is
+ * refused or read, and data that is read keeps its guarantees. Tests build it twice: normally, and
  * with a reader that does not compare checksums (core/checksum.h). */
-#include "fuzz_kit.h"
+#include "fuzz_support.h"
 
 #include "format/schema.h"
 #include "hdf5_read/head.h"
 
-static void ask_attributes(ebpo_head *head, ebpo_head_object object)
+static void query_attributes(ebpo_head *head, ebpo_head_object object)
 {
     static const char *const names[] = { "format", "level_count", "box_min",   "coding",
                                          "unit",   "epsilon",     "file_bytes" };
@@ -24,10 +24,10 @@ static void ask_attributes(ebpo_head *head, ebpo_head_object object)
     }
 }
 
-static void ask_array(ebpo_head *head, const char *path, ebpo_head_rows rows)
+static void query_array(ebpo_head *head, const char *path, ebpo_head_rows rows)
 {
     ebpo_shape shape;
-    ebpo_chunk_place *places;
+    ebpo_chunk_location *places;
     uint64_t stored, sum = 0;
     char coding[EBPO_HEAD_CODING_BYTES];
     if (ebpo_head_read_array(head, path, UINT64_MAX, rows, &shape, coding, &places, &stored,
@@ -42,7 +42,7 @@ static void ask_array(ebpo_head *head, const char *path, ebpo_head_rows rows)
     free(places);
 }
 
-static void ask_all(ebpo_head *head)
+static void query_all(ebpo_head *head)
 {
     char path[EBPO_PATH_BYTES];
     static const char *const groups[] = { "/",     "/levels", "/levels/00", "/levels/01",
@@ -50,14 +50,14 @@ static void ask_all(ebpo_head *head)
     ebpo_head_object object;
     for (size_t i = 0; i < sizeof groups / sizeof groups[0]; i++)
         if (ebpo_head_open_group(head, groups[i], &object, NULL) == EBPO_OK)
-            ask_attributes(head, object);
+            query_attributes(head, object);
     for (int level = 0; level < 3; level++)
         for (int id = level ? 0 : EBPO_LEVEL_ARRAYS; id < (level ? EBPO_LEVEL_ARRAYS : EBPO_ARRAYS);
              id++) {
             ebpo_schema_path((ebpo_array_id)id, level ? level - 1 : 0, path);
-            ask_array(head, path, (ebpo_head_rows)(id % 3));
+            query_array(head, path, (ebpo_head_rows)(id % 3));
             if (ebpo_head_open_array(head, path, &object, NULL) == EBPO_OK)
-                ask_attributes(head, object);
+                query_attributes(head, object);
         }
 }
 
@@ -71,11 +71,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         exit(2);
     ebpo_status status = ebpo_head_open(&head, &input, NULL);
     if (status == EBPO_OK && size % 2) /* the second half of it is read in one go */
-        ebpo_head_expect_index(&head, (ebpo_range){ size / 2, size - size / 2 });
+        ebpo_head_hint_index(&head, (ebpo_range){ size / 2, size - size / 2 });
     if (status == EBPO_OK)
-        ask_all(&head);
-    fuzz_must(ebpo_head_close(&head, EBPO_OK, NULL) ==
-              EBPO_OK); /* memory does not fail to be read */
+        query_all(&head);
+    fuzz_must(ebpo_head_close(&head, EBPO_OK, NULL) == EBPO_OK); /* reading memory never fails */
     ebpo_input_close(&input);
     free(own);
     return 0;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * Any bytes as an OBJ, STL or OFF file, and as a material library. A mesh that comes out is whole.
+ * Any bytes as an OBJ, STL or OFF file, and as a material library. A resulting mesh is valid.
  *
  * Input: a byte for the format, the file. */
-#include "fuzz_kit.h"
+#include "fuzz_support.h"
 
 #include <ebpo/mesh.h>
 

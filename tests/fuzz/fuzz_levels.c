@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * Any bytes as a file whose levels are looked at: as they arrive, by an observer in two orders, and
- * as polygons of one level. */
-#include "fuzz_kit.h"
+ * Any bytes as a file whose levels are read: in order, by an observer in two orders, and as
+ * polygons of one level. */
+#include "fuzz_support.h"
 
 #include <ebpo/lod.h>
 #include <ebpo/stream.h>

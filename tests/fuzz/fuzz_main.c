@@ -1,12 +1,12 @@
-/* Drives a fuzz target without libFuzzer: replays files, then mutates each of them, always in the
+/* Runs a fuzz target without libFuzzer: replays files, then mutates each of them, always in the
  * same way.
  *
  *     fuzz_x [-n MUTATIONS] [-s SEED] FILE_OR_FOLDER...
  *
  * A file NAME.pack is a corpus (corpus.py): its inputs are replayed and not mutated.
  *
- * When the target crashes, its last words name the file, the seed and the number of the mutation;
- * -1 is the file as it is. */
+ * When the target crashes, the last message names the file, the seed and the number of the
+ * mutation; -1 is the unchanged file. */
 #include <dirent.h>
 #include <inttypes.h>
 #include <signal.h>
@@ -20,7 +20,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-/* Of a target that has one; it may call the other, which an engine would have. */
+/* Defined by some targets; it may call the other function, which an engine would provide. */
 size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned seed)
     __attribute__((weak));
 size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t most);
@@ -51,12 +51,12 @@ static void on_crash(int number)
     raise(number);
 }
 
-/* Sanitizers do not raise a signal; they call this when they are about to give up. */
+/* Sanitizers do not raise a signal; they call this before they abort. */
 void __sanitizer_set_death_callback(void (*callback)(void)) __attribute__((weak));
 
 static void run(const uint8_t *data, size_t size)
 {
-    /* of this very size, so that a read behind its end is seen */
+    /* of exactly this size, so that a read after its end is detected */
     uint8_t *exact = malloc(size ? size : 1);
     if (!exact)
         exit(2);
@@ -66,7 +66,8 @@ static void run(const uint8_t *data, size_t size)
     now.runs++;
 }
 
-/* Damage is likelier to be interesting in the first kilobyte, where formats keep their counts. */
+/* Damage is more likely to be interesting in the first kilobyte, where formats keep their counts.
+ */
 static size_t place(uint64_t *state, size_t size)
 {
     size_t within = fuzz_next(state) % 2 && size > 1024 ? 1024 : size;
@@ -93,12 +94,12 @@ static size_t mutate_once(uint8_t *data, size_t size, uint64_t *state)
     case 1: data[at] = (uint8_t)fuzz_next(state); return size;
     case 2: data[at] = (uint8_t)letters[fuzz_next(state) % (sizeof letters - 1)]; return size;
     case 3: overwrite(data, size, at, &value, 4); return size;
-    case 4: return at; /* cut */
+    case 4: return at; /* truncate */
     case 5:            /* drop some bytes */
         n = size - at < n ? size - at : n;
         memmove(data + at, data + at + n, size - at - n);
         return size - n;
-    default: /* double some bytes from elsewhere */
+    default: /* repeat some bytes from elsewhere */
         n = size - from < n ? size - from : n;
         n = size - at < n ? size - at : n;
         memmove(data + at, data + from, n);
@@ -123,7 +124,7 @@ static size_t mutate(uint8_t *data, size_t size, uint64_t *state)
     return size;
 }
 
-/* Lengths of four bytes, little-endian, each with so many bytes behind it. */
+/* Reads lengths of four bytes, little-endian, each followed by so many bytes. */
 static int run_pack(const char *path)
 {
     FILE *f = fopen(path, "rb");

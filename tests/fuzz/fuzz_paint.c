@@ -1,7 +1,6 @@
-/* Fuzz target: any bytes as a paint file. What comes out keeps every limit that
- * format-spec/paint.md states, and can be changed and taken apart. Tests build it twice, as
- * fuzz_head.c. */
-#include "fuzz_kit.h"
+/* Fuzz target: any bytes as a paint file. A resulting paint keeps every limit of
+ * format-spec/paint.md, and can be changed and emptied. Tests build it twice, as fuzz_head.c. */
+#include "fuzz_support.h"
 
 #include <math.h>
 

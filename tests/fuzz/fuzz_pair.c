@@ -1,29 +1,29 @@
 /* SPDX-License-Identifier: MIT
- * Any bytes as a file whose model is held against itself at poses, touched by a hand, and of which
- * a map of distance is made. */
-#include "fuzz_kit.h"
+ * Any bytes as a file whose model is collided with itself at poses, used with a haptic device, and
+ * mapped by distance. */
+#include "fuzz_support.h"
 
 #include <ebpo/collide.h>
 #include <ebpo/map.h>
-#include <ebpo/touch.h>
+#include <ebpo/haptic.h>
 
 #include "known_leaks.h"
 
-enum { PAIRS_MOST = 2000, DEADLINE_NS = 20000000 };
+enum { PAIRS_MAX = 2000, DEADLINE_NS = 20000000 };
 
 static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     (void)pairs;
-    return (*(uint64_t *)user += count) < PAIRS_MOST;
+    return (*(uint64_t *)user += count) < PAIRS_MAX;
 }
 
 static bool take_line(void *user, const ebpo_polyline *line)
 {
     (void)line;
-    return ++*(uint64_t *)user < PAIRS_MOST;
+    return ++*(uint64_t *)user < PAIRS_MAX;
 }
 
-/* The model and itself: as it is, beside itself, turned and half as large. */
+/* Poses of the model against itself: identity, beside itself, rotated and half as large. */
 static ebpo_pose pose_of(int which, const ebpo_info *info)
 {
     ebpo_pose pose = EBPO_POSE_INIT;
@@ -38,7 +38,7 @@ static ebpo_pose pose_of(int which, const ebpo_info *info)
     return pose;
 }
 
-static void ask_pair(ebpo_collider *collider, const ebpo_collide_options *options)
+static void query_pair(ebpo_collider *collider, const ebpo_collide_options *options)
 {
     static const double direction[3] = { 1, 0.5, 0 };
     uint64_t taken = 0;
@@ -46,7 +46,7 @@ static void ask_pair(ebpo_collider *collider, const ebpo_collide_options *option
     ebpo_relation_result relation;
     ebpo_clearance clearance;
     ebpo_certain a_in_b, b_in_a;
-    ebpo_way_out out;
+    ebpo_separation out;
     ebpo_level_result levels;
     int32_t found;
     (void)!ebpo_collide_first(collider, options, &pair, &found, NULL);
@@ -55,7 +55,7 @@ static void ask_pair(ebpo_collider *collider, const ebpo_collide_options *option
     (void)!ebpo_collide_polylines(collider, options, take_line, &taken, NULL);
     (void)!ebpo_collide_distance(collider, options, NULL, &clearance, NULL);
     (void)!ebpo_collide_depth(collider, options, 0.1, &a_in_b, &b_in_a, NULL);
-    (void)!ebpo_collide_way_out(collider, options, direction, &out, NULL);
+    (void)!ebpo_collide_separation(collider, options, direction, &out, NULL);
     (void)!ebpo_collide_levels(collider, options, &levels, NULL);
 }
 
@@ -71,31 +71,31 @@ static void collide(ebpo_model *model, const ebpo_info *info)
         ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
         options.pose_b = pose_of(which, info);
         options.deadline_ns = DEADLINE_NS;
-        ask_pair(collider, &options);
+        query_pair(collider, &options);
     }
     ebpo_collider_free(collider);
 }
 
 static void touch(ebpo_model *model, const ebpo_info *info)
 {
-    ebpo_touch *hand;
-    ebpo_touch_options options = EBPO_TOUCH_OPTIONS_INIT;
-    ebpo_touch_result result;
-    double way[EBPO_TOUCH_WAY_MOST][3], at[3];
+    ebpo_haptic *hand;
+    ebpo_haptic_options options = EBPO_HAPTIC_OPTIONS_INIT;
+    ebpo_haptic_ball_result result;
+    double way[EBPO_HAPTIC_PATH_MAX][3], at[3];
     options.faces = 64;
     for (int k = 0; k < 3; k++)
         at[k] = info->box_origin[k] - 0.01 * info->box_size[k];
-    if (ebpo_touch_new(model, &options, at, &hand, NULL) != EBPO_OK)
+    if (ebpo_haptic_new(model, &options, at, &hand, NULL) != EBPO_OK)
         return;
     for (int tick = 0; tick < 20; tick++) {
         for (int k = 0; k < 3; k++)
             at[k] += 0.05 * (1 + k) / 3 * info->box_size[k];
-        ebpo_touch_move(hand, at, &result);
-        uint32_t points = ebpo_touch_way(hand, way);
-        fuzz_must(points >= 1 && points <= EBPO_TOUCH_WAY_MOST);
+        ebpo_haptic_step_ball(hand, at, &result);
+        uint32_t points = ebpo_haptic_ball_path(hand, way);
+        fuzz_must(points >= 1 && points <= EBPO_HAPTIC_PATH_MAX);
     }
-    (void)!ebpo_touch_check(hand, NULL);
-    ebpo_touch_free(hand);
+    (void)!ebpo_haptic_check(hand, NULL);
+    ebpo_haptic_free(hand);
 }
 
 static void map(ebpo_model *model, const ebpo_info *info)

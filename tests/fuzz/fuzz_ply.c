@@ -1,6 +1,6 @@
-/* Fuzz target: any bytes as a PLY file. A mesh that comes out must be whole: counts, arrays and
- * indices that agree. */
-#include "fuzz_kit.h"
+/* Fuzz target: any bytes as a PLY file. A resulting mesh must be valid: consistent counts, arrays
+ * and indices. */
+#include "fuzz_support.h"
 
 #include <ebpo/mesh.h>
 #include <math.h>
@@ -17,23 +17,23 @@ static bool is_vertex(const ebpo_mesh *mesh, uint64_t v, const double p[3])
     return same;
 }
 
-/* The vertices alone: there whenever the mesh is, and the same numbers; but rows of more values
- * than the header has, of which a mesh tells that they were left out, are refused. */
+/* Reads only the vertices: they exist whenever the mesh does, with the same numbers; but rows with
+ * more values than the header states, which a mesh reports as not read, are refused. */
 static void read_points(const ebpo_mesh *mesh, const uint8_t *data, size_t size)
 {
     double *xyz;
     uint64_t count;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status = ebpo_points_parse_ply(data, size, "fuzz.ply", &xyz, &count, &error);
-    if (status != EBPO_OK && ((mesh->face_count && !ebpo_mesh_unread(mesh)) || xyz || count ||
+    if (status != EBPO_OK && ((mesh->face_count && !ebpo_mesh_ignored(mesh)) || xyz || count ||
                               error.status != status || !error.message[0]))
         abort();
     uint64_t kept = 0;
-    for (uint64_t i = 0; mesh->face_count && i < count; i++) { /* none where it was refused */
+    for (uint64_t i = 0; mesh->face_count && i < count; i++) { /* none when it was refused */
         if (is_vertex(mesh, kept, xyz + 3 * i))
             kept++;
         else if (isfinite(xyz[3 * i]) && isfinite(xyz[3 * i + 1]) && isfinite(xyz[3 * i + 2]))
-            abort(); /* only others are left out */
+            abort(); /* only others are omitted */
     }
     if (status == EBPO_OK && mesh->face_count && kept != mesh->vertex_count)
         abort();

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * Any bytes as points, rays or boxes on standard input: text, a PLY, a NumPy array, raw doubles.
  *
- * Input: a byte of flags, then what is read. */
-#include "fuzz_kit.h"
+ * Input: a byte of flags, then the points. */
+#include "fuzz_support.h"
 #include "fuzz_quiet.h"
 
 #include <math.h>
@@ -39,7 +39,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         while ((count = points_next(&p, rows)) > 0) {
             fuzz_must(count <= POINTS_BATCH);
             for (uint64_t i = 0; i < count * (uint64_t)points_width(kind); i++)
-                total += rows[i] < 0; /* all of them are there */
+                total += rows[i] < 0; /* reads all of them */
         }
     }
     fuzz_must(total <= size);

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * For targets of what speaks to people: their words go nowhere, those of sanitizers are still
- * heard. */
+ * For targets that print messages: discards their output, but not the output of sanitizers. */
 #ifndef FUZZ_QUIET_H
 #define FUZZ_QUIET_H
 

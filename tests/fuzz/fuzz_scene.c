@@ -1,20 +1,20 @@
-/* Fuzz target: any bytes as a scene file. A scene that comes out must be whole: names, numbers that
- * exist, cameras, and at any time poses that are rotations. */
-#include "fuzz_kit.h"
+/* Fuzz target: any bytes as a scene file. A resulting scene must be valid: names, existing numbers,
+ * cameras, and at any time poses that are rotations. */
+#include "fuzz_support.h"
 
 #include <float.h>
 #include <math.h>
 
 #include <ebpo/scene.h>
 
-/* Of the scene's bytes alone: the limits are what a small machine would set. */
+/* Uses only the bytes of the scene, with the limits of a small machine. */
 static ebpo_scene *parse(const uint8_t *data, size_t size)
 {
     ebpo_scene *scene = NULL;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_scene_options options = EBPO_SCENE_OPTIONS_INIT;
-    options.most_values = 100000;
-    options.most_pose_bytes = 1 << 20;
+    options.max_values = 100000;
+    options.max_pose_bytes = 1 << 20;
     ebpo_status status = ebpo_scene_parse((const char *)data, size, "fuzz.scene.json",
                                           "/nonexistent", &options, &scene, &error);
     fuzz_must((status == EBPO_OK) == (scene != NULL));

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT
  * Any bytes as a file that is verified. */
-#include "fuzz_kit.h"
+#include "fuzz_support.h"
 
 #include <ebpo/verify.h>
 
 #include "known_leaks.h"
 
-/* Whatever it finds; it must not do more than the file's size calls for. */
+/* Any result is allowed; the work must be limited by the size of the file. */
 static void verify(ebpo_file *file)
 {
     ebpo_workspace_options limited = EBPO_WORKSPACE_OPTIONS_INIT;

@@ -73,9 +73,9 @@ lines = {
     "url": b"https://user:pass@word@example.org/a/b?key=1#x",
 }
 for name, text in lines.items():
-    put("answer", name, bytes([0, 0, 0]) + text)
-    put("answer", name + "_pinned", bytes([1, 0, 0]) + text)
-    put("answer", name + "_many", bytes([255, 0, 0]) + text)
+    put("response", name, bytes([0, 0, 0]) + text)
+    put("response", name + "_pinned", bytes([1, 0, 0]) + text)
+    put("response", name + "_many", bytes([255, 0, 0]) + text)
 
 # --- points: kind and flags; the file ---
 doubles = struct.pack("<14d", 0, 1, 2, .5, -1, 1e300, 3, 4, 5, 6, 7, 8, 9, 10)
@@ -101,9 +101,9 @@ for name, data in files.items():
 # --- arguments: command or value; the text ---
 command_lines = [
     b"in.ply\nout.ebpo.h5\n--max-level\n9\n--selection\nkmedoids\n-q", b"a.ply\n--json", b"a.h5\n--json\n-h",
-    b"a.h5", b"a.h5\nview.json\n--camera=1,2,3", b"a.h5\no.ply\n--level=3\n--no-walls",
+    b"a.h5", b"a.h5\nview.json\n--camera=1,2,3", b"a.h5\no.ply\n--level=3\n--no-cell-faces",
     b"a.h5\no.vtkhdf\n--levels\n0-3", b"a.h5\nb.h5\n--box\n0,0,0,1,1,1\n--levels\n0-3",
-    b"a.h5\nb.h5\n--codec\ndeflate", b"http://x/a.h5\nb.h5\n--box=0,0,0,1,1,1", b"a.h5\n--level\n2",
+    b"a.h5\nb.h5\n--codec\ndeflate", b"http://x/a.h5\nb.h5\n--box=0,0,0,1,1,1", b"a.h5\n--max-level\n2",
     b"a.h5\no.png\n--width\n640", b"a.h5\n--source\na.ply\n--memory\n64M",
     b"a.h5\n-\n--mode\nnodes-plain\n--deadline=5us", b"a.h5\np.npy\n--unsigned\n--nearest\n3",
     b"a.h5\n--any\n--raw", b"a.h5\n--csv\n--header", b"a.h5\n--points\n1000", b"a.ply\no.html",

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * For builds with MemorySanitizer: what libraries that it has not compiled write is told to it, by
+ * For builds with MemorySanitizer: reports memory written by libraries that it has not compiled, by
  * wrapping the functions that write (`-Wl,--wrap`, tests/fuzz/meson.build). Without that each byte
- * that comes out of a decompressor would count as never written. */
+ * of a decompressor would count as never written. */
 #include <gmp.h>
 #include <jansson.h>
 #include <nettle/sha2.h>
@@ -27,12 +27,12 @@
     }
 
 ZSTD_OUT(ZSTD_decompressDCtx,
-         (ZSTD_DCtx * of, void *out, size_t room, const void *in, size_t bytes),
-         (of, out, room, in, bytes))
-ZSTD_OUT(ZSTD_decompress, (void *out, size_t room, const void *in, size_t bytes),
-         (out, room, in, bytes))
-ZSTD_OUT(ZSTD_compress2, (ZSTD_CCtx * of, void *out, size_t room, const void *in, size_t bytes),
-         (of, out, room, in, bytes))
+         (ZSTD_DCtx * of, void *out, size_t space, const void *in, size_t bytes),
+         (of, out, space, in, bytes))
+ZSTD_OUT(ZSTD_decompress, (void *out, size_t space, const void *in, size_t bytes),
+         (out, space, in, bytes))
+ZSTD_OUT(ZSTD_compress2, (ZSTD_CCtx * of, void *out, size_t space, const void *in, size_t bytes),
+         (of, out, space, in, bytes))
 
 size_t __real_ZSTD_compressStream2(ZSTD_CCtx *of, ZSTD_outBuffer *out, ZSTD_inBuffer *in,
                                    ZSTD_EndDirective end);
@@ -48,22 +48,22 @@ size_t __wrap_ZSTD_compressStream2(ZSTD_CCtx *of, ZSTD_outBuffer *out, ZSTD_inBu
 
 /* --- zlib --- */
 
-int __real_uncompress2(Bytef *out, uLongf *room, const Bytef *in, uLong *bytes);
-int __wrap_uncompress2(Bytef *out, uLongf *room, const Bytef *in, uLong *bytes);
-int __wrap_uncompress2(Bytef *out, uLongf *room, const Bytef *in, uLong *bytes)
+int __real_uncompress2(Bytef *out, uLongf *space, const Bytef *in, uLong *bytes);
+int __wrap_uncompress2(Bytef *out, uLongf *space, const Bytef *in, uLong *bytes);
+int __wrap_uncompress2(Bytef *out, uLongf *space, const Bytef *in, uLong *bytes)
 {
-    int status = __real_uncompress2(out, room, in, bytes);
-    __msan_unpoison(out, *room);
+    int status = __real_uncompress2(out, space, in, bytes);
+    __msan_unpoison(out, *space);
     return status;
 }
 
-int __real_compress2(Bytef *out, uLongf *room, const Bytef *in, uLong bytes, int level);
-int __wrap_compress2(Bytef *out, uLongf *room, const Bytef *in, uLong bytes, int level);
-int __wrap_compress2(Bytef *out, uLongf *room, const Bytef *in, uLong bytes, int level)
+int __real_compress2(Bytef *out, uLongf *space, const Bytef *in, uLong bytes, int level);
+int __wrap_compress2(Bytef *out, uLongf *space, const Bytef *in, uLong bytes, int level);
+int __wrap_compress2(Bytef *out, uLongf *space, const Bytef *in, uLong bytes, int level)
 {
-    int status = __real_compress2(out, room, in, bytes, level);
+    int status = __real_compress2(out, space, in, bytes, level);
     if (status == Z_OK)
-        __msan_unpoison(out, *room);
+        __msan_unpoison(out, *space);
     return status;
 }
 
@@ -85,7 +85,7 @@ void __wrap_nettle_sha256_digest(struct sha256_ctx *of, size_t bytes, uint8_t *o
     __msan_unpoison(out, bytes);
 }
 
-/* --- GMP: a number is written from when it has begun, and its limbs are always --- */
+/* --- GMP: a number counts as written once it is initialised, and its limbs always --- */
 
 #define GMP_INIT(type, name)                                                                 \
     void __real___gmp##name##_init(type of);                                                 \
@@ -148,7 +148,7 @@ json_t *__wrap_json_loadb(const char *text, size_t bytes, size_t flags, json_err
     return __real_json_loadb(text, bytes, flags, error);
 }
 
-/* --- what clang 14 does not know of this C library --- */
+/* --- functions of this C library unknown to clang 14 --- */
 
 #define STAT_OUT(name, first)                     \
     int __real_##name(first, struct stat *out);   \

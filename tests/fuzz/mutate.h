@@ -14,7 +14,7 @@ static inline uint64_t fuzz_next(uint64_t *state)
     return z ^ (z >> 31);
 }
 
-/* 0 .. below - 1; 0 when there is none. */
+/* Returns 0 .. below - 1; 0 when there is none. */
 static inline uint32_t fuzz_below(uint64_t *state, uint32_t below)
 {
     uint64_t n = fuzz_next(state);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * The mutator of targets whose input is a whole file: numbers in an array's chunk, which is encoded
- * again; or the tree, which is read, changed and written anew, in another layout
- * perhaps. What random bytes would only damage reaches the code behind the checks that way. */
-#include "fuzz_kit.h"
+ * The mutator of targets whose input is a whole file: changes numbers in the chunk of an array, and
+ * encodes it again; or reads the tree, changes it and writes it again, perhaps in another layout.
+ * This reaches the code behind the checks, which random bytes would not. */
+#include "fuzz_support.h"
 #include "mutate.h"
 
 #include <ebpo/file.h>
@@ -29,7 +29,7 @@ static ebpo_file *open_bytes(const uint8_t *data, size_t size)
     return NULL;
 }
 
-/* --- a chunk's numbers --- */
+/* --- numbers of a chunk --- */
 
 static const ebpo_array_in *some_array(const ebpo_file *file, uint64_t *state)
 {
@@ -68,15 +68,15 @@ static void change_number(uint8_t *raw, size_t count, size_t width, uint64_t *st
     memcpy(at, &value, width);
 }
 
-/* A chunk that has become of another size goes behind the file's end. The entry of its index is
- * known by the address: before it stand the size and a filter mask (an array of one chunk), or
- * the size stands behind it. Headers' checksums are wrong then: for builds that compare none. 0: it
- * did not fit, or the entry was not found. */
-static size_t put_elsewhere(uint8_t *data, size_t size, size_t most, ebpo_chunk_place old,
+/* Puts a chunk whose size has changed behind the end of the file. The entry of its index is found
+ * by the address: before it are the size and a filter mask (an array of one chunk), or the size is
+ * after it. The checksums of headers are wrong then: for builds that compare none. Returns 0 when
+ * it did not fit, or the entry was not found. */
+static size_t put_elsewhere(uint8_t *data, size_t size, size_t most, ebpo_chunk_location old,
                             const uint8_t *chunk, size_t stored)
 {
     enum { END_OF_FILE = 28, ONE_BEFORE = 12 };
-    if (EBPO_SUMS_COMPARED || most < size || most - size < stored || stored > UINT16_MAX)
+    if (EBPO_CHECKSUMS_COMPARED || most < size || most - size < stored || stored > UINT16_MAX)
         return 0;
     for (size_t i = END_OF_FILE + 8; i + 10 <= size; i++) {
         if (ebpo_load64(data + i) != old.address)
@@ -95,8 +95,8 @@ static size_t put_elsewhere(uint8_t *data, size_t size, size_t most, ebpo_chunk_
     return 0;
 }
 
-/* What a chunk holds when it is decoded; the last one is as long as the others. */
-static size_t plain_bytes(const ebpo_array_in *a, ebpo_chunk_place place)
+/* Returns the decoded size of a chunk; the last one is as long as the others. */
+static size_t plain_bytes(const ebpo_array_in *a, ebpo_chunk_location place)
 {
     if (a->shape.pipeline == EBPO_PIPELINE_CHECKSUM)
         return place.bytes > 4 ? place.bytes - 4 : 0;
@@ -105,8 +105,8 @@ static size_t plain_bytes(const ebpo_array_in *a, ebpo_chunk_place place)
                : a->shape.chunk_rows * ebpo_shape_row_bytes(&a->shape);
 }
 
-/* Decodes a chunk, changes some numbers, and encodes it again. The file's new size; 0: as it was.
- */
+/* Decodes a chunk, changes some numbers, and encodes it again. Returns the new size of the file; 0:
+ * unchanged. */
 static size_t change_numbers(uint8_t *data, size_t size, size_t most, const ebpo_array_in *a,
                              uint64_t *state)
 {
@@ -114,7 +114,8 @@ static size_t change_numbers(uint8_t *data, size_t size, size_t most, const ebpo
     static uint8_t raw[EBPO_CHUNK_BYTES_MAX], again[2 * EBPO_CHUNK_BYTES_MAX];
     const char *why;
     size_t stored;
-    ebpo_chunk_place place = a->chunks[fuzz_below(state, (uint32_t)ebpo_shape_chunks(&a->shape))];
+    ebpo_chunk_location place =
+        a->chunks[fuzz_below(state, (uint32_t)ebpo_shape_chunks(&a->shape))];
     size_t width = a->shape.element_size, plain = plain_bytes(a, place);
     if (plain > sizeof raw || plain < width || plain % width ||
         ebpo_chunk_decode(&coder, a->shape.pipeline, width, data + place.address, place.bytes, raw,
@@ -267,7 +268,7 @@ static size_t write_tree(const ebpo_tree *tree, uint8_t *data, size_t most, uint
     return size;
 }
 
-/* 0: what came of it is no tree that can be written. */
+/* Returns 0 when the result is no tree that can be written. */
 static size_t change_tree(uint8_t *data, size_t size, size_t most, uint64_t *state)
 {
     ebpo_tree tree;

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: MIT
- * Files that are made to harm who reads them: each is refused with a message, and nothing of
- * libhdf5 is entered for it.
+ * Malicious files: each is refused with a message, and libhdf5 is not called for it.
  *
  *     test_hostile FOLDER
  *
- * Linked with H5open and what opens objects wrapped. Prints how long the slowest took: of the
- * processor's time, as others may use the machine. */
+ * Linked with H5open and the functions that open objects wrapped. Prints the time of the slowest
+ * file: processor time, as others may use the machine. */
 #include <dirent.h>
 #include <hdf5.h>
 #include <stdio.h>

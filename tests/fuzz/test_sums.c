@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * That checksums are compared: a build with -Dfuzzing=true, which does not, must not come to be
- * used by mistake, and would fail here.
+ * Checks that checksums are compared: a build with -Dfuzzing=true, which does not compare them,
+ * must not be used by mistake, and fails here.
  *
  *     test_sums FILE...    each of a pipeline with checksums */
 #include <stdio.h>
@@ -16,7 +16,7 @@ static int wrong;
 
 static void expect(bool refused, const char *what)
 {
-    if (refused == (EBPO_SUMS_COMPARED != 0))
+    if (refused == (EBPO_CHECKSUMS_COMPARED != 0))
         return;
     fprintf(stderr, "%s: damage is %s\n", what, refused ? "refused" : "not noticed");
     wrong = 1;
@@ -42,12 +42,12 @@ static void chunk(ebpo_pipeline pipeline, const char *name)
 
 static uint8_t *slurp(const char *path, size_t *size)
 {
-    enum { MOST = 1 << 20 };
-    uint8_t *data = malloc(MOST);
+    enum { LIMIT = 1 << 20 };
+    uint8_t *data = malloc(LIMIT);
     FILE *f = fopen(path, "rb");
     if (!f || !data)
         exit(2);
-    *size = fread(data, 1, MOST, f);
+    *size = fread(data, 1, LIMIT, f);
     fclose(f);
     return data;
 }
@@ -62,8 +62,8 @@ static ebpo_status open_and_check(const uint8_t *data, size_t size)
     return status;
 }
 
-/* One bit of the digest that the head states, with the head's own checksum as it was: either tells
- * of it. */
+/* Changes one bit of the digest in the header, with the old checksum of the header: either check
+ * detects it. */
 static void content(const char *path)
 {
     size_t size;
@@ -74,7 +74,7 @@ static void content(const char *path)
     if (!name)
         exit(2);
     for (uint8_t *at = name + 15; at < data + size; at++)
-        if (*at >= '0' && *at <= '8') { /* of 64 hexadecimal digits */
+        if (*at >= '0' && *at <= '8') { /* one of 64 hexadecimal digits */
             ++*at;
             break;
         }
@@ -89,6 +89,7 @@ int main(int argc, char **argv)
     chunk(EBPO_PIPELINE_CHECKSUM, "fletcher32");
     for (int i = 1; i < argc; i++)
         content(argv[i]);
-    printf("checksums are %s\n", EBPO_SUMS_COMPARED ? "compared" : "not compared: a fuzzing build");
+    printf("checksums are %s\n",
+           EBPO_CHECKSUMS_COMPARED ? "compared" : "not compared: a fuzzing build");
     return wrong;
 }

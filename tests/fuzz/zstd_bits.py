@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Which bits of stored zstd chunks may be another one, and libzstd decodes the very same values without an error?
+"""Finds bits of stored zstd chunks that can be flipped while libzstd still decodes the same values without an error.
 
 zstd_bits.py FILE.ebpo.h5 ...: flips each bit of each chunk, one at a time, and prints what the bits stand for
 (RFC 8878), how many there are of each, and of how many bits. Needs h5py and libzstd.so.1."""

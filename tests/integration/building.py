@@ -230,7 +230,7 @@ def one_cell(root, model):
     place = Place(root, "one cell")
     code, said, _, _ = run(place.command(model, "-q", "--memory", "128MiB",
                                          options=["--max-level", "0"]), place.temp_dir)
-    check(code == 1 and "a cell of level 0, the deepest that was allowed, lists " in said
+    check(code == 1 and "a cell of level 0, the deepest allowed level, lists " in said
           and "allow more levels or more memory" in said and not place.left(),
           f"one cell: {said.strip()} ({code}, {place.left()})")
 
@@ -307,7 +307,7 @@ def files_with_names(root, model):
 
 
 def full_disk(root, model):
-    """Room runs out at each power of two of the files, until there are not so many."""
+    """Limits the disk space at each power of two of the file size, until the command succeeds."""
     n = failed = 0
     while n < 1 << 16:
         place = Place(root, f"full {n}")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Files that change while they are open: changing.py TOOL GENERATE FEATURES
+"""Tests files that change while they are open: changing.py TOOL GENERATE FEATURES
 
 Questions are asked one by one; in between the file is replaced, shortened, grown, damaged, or
 written over by another model, on disk and on a server. Then commands read a file that another

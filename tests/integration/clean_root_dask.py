@@ -12,14 +12,14 @@ def main(path, folder, scheduler):
     with Client(scheduler) as client:
         client.wait_for_workers(2, timeout=60)
         points = ebpo.dask.points(os.path.join(folder, "points.npy"))
-        asked = ebpo.dask.inside(path, points, chunk=50_000)
-        ebpo.dask.to_file(asked, os.path.join(folder, "dask.npy"))
-        for worker, did in ebpo.dask.counts(client).items():
+        query = ebpo.dask.inside(path, points, chunk=50_000)
+        ebpo.dask.to_file(query, os.path.join(folder, "dask.npy"))
+        for worker, did in ebpo.dask.stats(client).items():
             print(worker, did)
-    told = np.load(os.path.join(folder, "dask.npy"))
-    assert (told == np.load(os.path.join(folder, "inside.npy"))).all()
+    results = np.load(os.path.join(folder, "dask.npy"))
+    assert (results == np.load(os.path.join(folder, "inside.npy"))).all()
     os.remove(os.path.join(folder, "dask.npy"))
-    print(len(told), "answers of two workers, as of one process")
+    print(len(results), "answers of two workers, as of one process")
 
 
 main(*sys.argv[1:])

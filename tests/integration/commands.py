@@ -83,7 +83,7 @@ COMMANDS = {
                                   ("OUT/",)),
     "convert groups": Command("convert -q --threads 1 --split-groups groups.obj OUT", ("OUT/",)),
     "check": Command("check -q --threads 1 --crossings -o OUT.ply model.ply", ("OUT.ply",)),
-    "check places": Command("check -q --threads 1 --places OUT.ply model.ply", ("OUT.ply",)),
+    "check places": Command("check -q --threads 1 --findings OUT.ply model.ply", ("OUT.ply",)),
     "verify": Command("verify -q model.ebpo.h5"),
     "info": Command("info model.ebpo.h5"),
     "levels": Command("levels --threads 1 model.ebpo.h5", times_printed=True),
@@ -91,7 +91,7 @@ COMMANDS = {
     "measure": Command("measure --threads 1 model.ebpo.h5"),
     "subset": Command("subset --levels 0-3 model.ebpo.h5 OUT", ("OUT",), times_printed=True),
     "repack": Command("repack model.ebpo.h5 OUT", ("OUT",), times_printed=True),
-    "repair": Command("repair -q --threads 1 -o OUT damaged.ebpo.h5", ("OUT",)),
+    "recover": Command("recover -q --threads 1 -o OUT damaged.ebpo.h5", ("OUT",)),
     "fetch": Command("fetch -q URL OUT", ("OUT",), need="http"),
     "export xdmf": Command("export -q --levels 0-2 model.ebpo.h5 OUT.xdmf",
                            ("OUT.xdmf", "OUT.xdmf.h5")),
@@ -122,8 +122,8 @@ COMMANDS = {
     "distance": Command("distance --threads 1 model.ebpo.h5 points.txt"),
     "ray": Command("ray --all --threads 1 model.ebpo.h5 rays.txt"),
     "box": Command("box --threads 1 model.ebpo.h5 boxes.txt"),
-    "touch": Command("touch --path hand.txt model.ebpo.h5", times_printed=True),
-    "bench": Command("bench --count 5 --save-answers OUT.a model.ebpo.h5", ("OUT.a",),
+    "haptic": Command("haptic --path hand.txt model.ebpo.h5", times_printed=True),
+    "bench": Command("bench --count 5 --save-results OUT.a model.ebpo.h5", ("OUT.a",),
                      times_printed=True),
     "bench points": Command("bench --count 5 --save-points OUT.p model.ebpo.h5", ("OUT.p",),
                             times_printed=True),
@@ -134,9 +134,9 @@ COMMANDS = {
     "boolean": Command("boolean 'A - B' model.ebpo.h5 model.ebpo.h5 --pose 'B 0.5 0 0' --inside "
                        "points.txt"),
     "boolean cells": Command("boolean 'A - B' image.ebpo.h5 image.ebpo.h5 --pose 'B 0.5 0 0' "
-                             "--level 3 -o OUT.ebpo.h5", ("OUT.ebpo.h5",)),
+                             "--max-level 3 -o OUT.ebpo.h5", ("OUT.ebpo.h5",)),
     "boolean ply": Command("boolean 'A - B' image.ebpo.h5 image.ebpo.h5 --pose 'B 0.5 0 0' "
-                           "--level 3 -o OUT.ply", ("OUT.ply",)),
+                           "--max-level 3 -o OUT.ply", ("OUT.ply",)),
     "scene check": Command("scene check --threads 1 a.scene.json"),
     "scene pairs": Command("scene pairs --threads 1 a.scene.json"),
     "scene plan": Command("scene plan --threads 1 a.scene.json"),
@@ -211,7 +211,7 @@ def damaged(tool, folder, content):
         write(folder, "damaged.ebpo.h5", bytes(changed))
         path = os.path.join(folder, "damaged.ebpo.h5")
         if (subprocess.run([tool, "verify", "-q", path], capture_output=True).returncode == 1 and
-                subprocess.run([tool, "repair", "-q", "-o", path + ".new", path],
+                subprocess.run([tool, "recover", "-q", "-o", path + ".new", path],
                                capture_output=True).returncode == 0):
             os.unlink(path + ".new")
             return

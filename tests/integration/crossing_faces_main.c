@@ -56,7 +56,7 @@ static bool read_model(const char *path, model *m)
 static bool check(const char *path)
 {
     model m;
-    uint64_t first[2] = { 0, 0 }, meetings = 0;
+    uint64_t first[2] = { 0, 0 }, clashes = 0;
     bool ok = read_model(path, &m);
     if (!ok) {
         printf("%s: no PLY as ebpo-generate writes it\n", path);
@@ -68,13 +68,13 @@ static bool check(const char *path)
         printf("%s: %" PRIu64 " faces, %s, %" PRIu64 " without area", path, m.faces,
                manifold ? "a closed manifold" : "not a closed manifold", flat);
         if (flat == 0) {
-            meetings = crossing_faces(&faces, first);
-            printf(", %" PRIu64 " pairs meet", meetings);
+            clashes = crossing_faces(&faces, first);
+            printf(", %" PRIu64 " pairs meet", clashes);
         }
-        if (meetings)
+        if (clashes)
             printf(", the first %" PRIu64 " and %" PRIu64, first[0], first[1]);
         printf("\n");
-        ok = manifold && flat == 0 && meetings == 0;
+        ok = manifold && flat == 0 && clashes == 0;
     }
     free(m.xyz);
     free(m.corners);

@@ -30,7 +30,7 @@ done
 echo "-1 -1 -1 1 1 1" >boxes
 r convert "$models/bunny.ply" bunny.ebpo.h5
 r convert "$models/office_chair.ply" chair.ebpo.h5
-r convert --face-coding gates --with leaf-planes --subtree-faces 512 "$models/cad_adis16480.ply" cad.ebpo.h5
+r convert --face-coding gates --profile full --subtree-faces 512 "$models/cad_adis16480.ply" cad.ebpo.h5
 r convert --repair "$models/blade.ply" blade.ebpo.h5
 r convert --codec deflate --weld --orient --fill-holes "$models/motorbike.ply" motorbike.ebpo.h5
 r check --crossings "$models/selfint_A.ply"
@@ -42,7 +42,7 @@ for file in "$vectors"/failed/*.h5; do
 done
 for file in "$vectors"/passed/*.h5 bunny.ebpo.h5 chair.ebpo.h5 cad.ebpo.h5; do
     for command in info verify levels 'measure --derived' 'view --eye 5,5,5' 'collide --self' \
-        'touch --seconds 0.05' 'map --grid 5,5,5 -o grid.nrrd'; do
+        'haptic --seconds 0.05' 'map --grid 5,5,5 -o grid.nrrd'; do
         # shellcheck disable=SC2086
         r $command "$file"
     done
@@ -55,7 +55,7 @@ for file in "$vectors"/passed/*.h5 bunny.ebpo.h5 chair.ebpo.h5 cad.ebpo.h5; do
     r extract --level 1 "$file" level.ply
     r subset --levels 0-1 "$file" subset.ebpo.h5
     r repack "$file" repacked.ebpo.h5
-    r repair -o repaired.ebpo.h5 "$file"
+    r recover -o repaired.ebpo.h5 "$file"
     r export --mesh "$file" mesh.glb
     r export --levels 0-1 "$file" levels.xdmf
     r render --size 64x64 "$file" picture.png

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Calls of the system that fail.
+"""Tests failing system calls.
 
 faults.py TOOL GENERATE FAULTS FEATURES [--foreign] [--table] [--every=N] [CASE...]
 
@@ -9,7 +9,7 @@ other file is left, and the message says what was wrong. CASE: names of commands
 else. EBPO_TEST_SCALE from 1 on: all calls, or, with --every, N apart; less: of each command that
 share of the kinds, one call of each. --foreign: allocations by libhdf5 and other libraries instead
 of our own, counted apart. --table prints counts in Markdown. FAULTS may name more that is
-preloaded, after a colon: liblsan.so.0, which finds what is not freed on the way out.
+preloaded, after a colon: liblsan.so.0, which finds memory that is not freed on exit.
 """
 import collections
 import concurrent.futures
@@ -28,7 +28,7 @@ sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."
 import ranges_server
 from commands import COMMANDS, is_new, make_inputs, old, put_old, read
 
-# What each kind fails with. Interrupted and short calls are no failures: all goes on.
+# The error of each kind. Interrupted and short calls are no failures: the command continues.
 KINDS = {"malloc": ["ENOMEM"], "read": ["EIO", "EINTR"], "short-read": [""],
          "write": ["EIO", "ENOSPC", "EINTR"], "short-write": [""], "fsync": ["EIO"],
          "rename": ["EIO"], "truncate": ["EIO"], "close": ["EIO"], "mmap": ["ENOMEM"],

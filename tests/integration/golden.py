@@ -21,7 +21,7 @@ GENERATED = {
     "sphere": ["--base", "sphere", "--subdivide", "5", "--seed", "3"],
 }
 REAL = ["bunny_closed", "office_chair", "twin7081_left", "blade"]
-VARIANTS = {"default": [], "leaf-planes": ["--with", "leaf-planes", "--leaf-faces", "8"],
+VARIANTS = {"default": [], "leaf-planes": ["--profile", "full", "--leaf-faces", "8"],
             "fine": ["--leaf-faces", "0", "--rule", "positive"]}
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Commands on URLs do what they do on files: http_files.py SERVER TOOL GENERATE [POINTS]
+"""Checks that commands give the same results on URLs as on files: http_files.py SERVER TOOL GENERATE [POINTS]
 
 Makes a model, serves it with SERVER (kit/faulty_server.py), well and badly, and compares what the
 commands print, byte by byte. POINTS (default 2000) are asked about; 100000 is the full number.
@@ -84,7 +84,7 @@ def check(tool, folder, path, ply, asked, rays, site):
     equal(tool, "measure", path, good, "measure")
     equal(tool, "info", path, good, "info")
     equal(tool, "info --json", path, good, "info", "--json")
-    near, far = (json.loads(run(tool, "levels", source, "--json", "--nodes", "--to",
+    near, far = (json.loads(run(tool, "levels", source, "--json", "--nodes", "--max-level",
                                 "3").stdout)["levels"] for source in (path, good))
     for level in near + far:
         del level["ms"]
@@ -108,7 +108,7 @@ def check(tool, folder, path, ply, asked, rays, site):
 
     # Requests and bytes.
     size = os.path.getsize(path)
-    t = traffic(tool, "levels", good, "--to", "4")
+    t = traffic(tool, "levels", good, "--max-level", "4")
     expect("levels 0 to 4 take two requests and 150 kB",
            t["requests"] <= 2 and t["bytes"] <= 150000, t)
     t = traffic(tool, "levels", good)

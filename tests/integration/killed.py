@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Programs that are killed at any moment: killed.py TOOL GENERATE FEATURES [--kills=N] [NAME...]
+"""Tests programs that are killed at any moment: killed.py TOOL GENERATE FEATURES [--kills=N] [NAME...]
 
 Every command of commands.py that writes is killed (SIGKILL) after times that are drawn between none
 and somewhat more than a run takes. Afterwards each output is the old one or the new one, whole;

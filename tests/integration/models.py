@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Real models, end to end: convert, verify against the source, extract the mesh and compare it bit
-for bit.
+"""Tests real models end to end: converts each, verifies it against the source, extracts the mesh and
+compares it bit for bit.
 
     models.py EBPO FOLDER [MOST_BYTES]
 
-FOLDER holds PLY files and wild/ with odd dialects. Which ones are solids is written down here, from
-the folder's own index; what is not must become a surface with a warning, or a solid by mending.
-Files above MOST_BYTES are left out.
+FOLDER holds PLY files and wild/ with unusual dialects. This script lists the solids, from the
+folder's index. Other files must become a surface with a warning, or a solid by repair.
+Files above MOST_BYTES are omitted.
 """
 import json
 import pathlib

@@ -40,10 +40,10 @@ def main():
         with open("nan.raw", "wb") as file:  # found when answers are written already
             file.write(some * (ROWS // 5000) + struct.pack("<3d", 0, 0, float("nan")))
         for arguments, message in ((("no.ebpo.h5", "p.raw", "a.raw"), "no.ebpo.h5: "),
-                                   (("m.ebpo.h5", "cut.raw", "a.raw"), "no rows of three doubles"),
+                                   (("m.ebpo.h5", "cut.raw", "a.raw"), "does not contain rows of three doubles"),
                                    (("m.ebpo.h5", "no.raw", "a.raw"), "no.raw: "),
                                    (("m.ebpo.h5", "nan.raw", "a.raw"),
-                                    f"points from number {2 << 18} on: point {ROWS - 1 - (2 << 18)} has"),
+                                    f"points from index {2 << 18} on: point {ROWS - 1 - (2 << 18)} has"),
                                    (("m.ebpo.h5", "p.raw", "a.raw", "2x"), "usage: ")):
             done = run(2, *arguments)
             if not done.returncode or message not in done.stderr or os.path.exists("a.raw"):

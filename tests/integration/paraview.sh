@@ -1,6 +1,6 @@
 #!/bin/sh
-# paraview.sh EBPO CLI_INPUTS SOURCE_ROOT: ParaView opens what ebpo export writes, counts what it
-# tells, and draws it. Skips (77) without pvpython, or without a display and xvfb-run;
+# paraview.sh EBPO CLI_INPUTS SOURCE_ROOT: checks that ParaView opens the files of ebpo export,
+# counts the same cells as ebpo, and draws them. Skips (77) without pvpython, or without a display and xvfb-run;
 # tools/install-deps.sh --paraview installs all of it.
 set -eu
 tests=$(cd "$(dirname "$0")" && pwd)

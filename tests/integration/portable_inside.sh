@@ -98,7 +98,7 @@ for selection in greedy leaf-planes; do
     bin/ebpo-generate --base torus --faces 30000 --seed 7 torus.ply
     case $selection in
     greedy) set -- ;;
-    *) set -- --with leaf-planes ;;
+    *) set -- --profile full ;;
     esac
     check "convert-$selection" bin/ebpo convert -q "$@" torus.ply "$selection.ebpo.h5"
     check "verify-$selection" bin/ebpo verify -q "$selection.ebpo.h5"

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""reading.py TOOL LIBRARY INPUTS VECTORS FEATURES: the library without libhdf5.
+"""reading.py TOOL LIBRARY INPUTS VECTORS FEATURES: tests the library without libhdf5.
 
-The command is run with LIBRARY in place of the usual one. It reads, verifies and asks as that does,
-without libhdf5 in the process; what writes HDF5 files says that it cannot, and leaves none.
+Runs the command with LIBRARY in place of the default library. Reading, verifying and queries give
+the same results, without libhdf5 in the process. Commands that write HDF5 files fail with a message
+and leave no file.
 """
 import os
 import subprocess
@@ -67,7 +68,7 @@ def vectors():
 def writing(model):
     """Each command that would write HDF5, and what it would write."""
     for words in (["convert", "sphere.ply", "OUT"], ["subset", "--levels", "0-1", model, "OUT"],
-                  ["repack", model, "OUT"], ["repair", "-o", "OUT", model],
+                  ["repack", model, "OUT"], ["recover", "-o", "OUT", model],
                   ["export", "--levels", "0", "--format", "xdmf", model, "OUT.xdmf"],
                   ["export", "--levels", "0", "--format", "vtkhdf", model, "OUT.vtkhdf"],
                   ["info", "--compat", "quads.ply"]):

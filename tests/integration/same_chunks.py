@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Files that compressors of two machines made have the same content, chunk by chunk.
+"""Checks that files compressed on two machines have the same content, chunk by chunk.
 
     same_chunks.py FOLDER OTHER [--differs NUMBER...]
 
-Every .ebpo.h5 of FOLDER has its like in OTHER. Of both all that is not a chunk is compared as it
-is (attributes, types, filters, shapes), and each chunk after zstd was undone. Files whose names
-begin with a NUMBER have to differ in a chunk: one that does not is told, too.
+Every .ebpo.h5 of FOLDER has a counterpart in OTHER. Attributes, types, filters and shapes are
+compared directly, chunks after decompression. Files whose names begin with a NUMBER must differ
+in a chunk; a file without a difference is reported too.
 """
 import ctypes
 import pathlib

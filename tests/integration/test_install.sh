@@ -76,7 +76,7 @@ print(ebpo.library(), ebpo.open("s.ebpo.h5").inside([0, 0, 0]))') >"$work/out" 2
     break
 done
 
-# An older copy in the loader's way is told by name, and a newer program told apart from it.
+# The message names an older copy that the loader finds first, and reports a newer program separately.
 mkdir "$work/old" && cp "$library" "$work/old/$(basename "$(ls -d "${library%.so.*}".so.?)")" || exit 1
 LD_LIBRARY_PATH="$work/old" "$ebpo" --version --verbose >"$work/out" 2>&1 &&
     fail "an older copy is not noticed"

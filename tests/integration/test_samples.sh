@@ -67,21 +67,21 @@ echo 1 2 3 | "$query" "$work/cube.ebpo.h5" >/dev/full 2>"$work/out" &&
 grep -q 'No space left' "$work/out" || fail "query says that the disk is full"
 
 # A file's components, and its named groups where it can be read, as instances.
-python3 "$samples/furnished_room.py" "$work/room" >"$work/out" 2>&1 || fail furnished_room.py
-"$ebpo" convert -q --split-components "$work/room/room.ply" "$work/bodies" >"$work/out" 2>&1 ||
+python3 "$samples/furniture.py" "$work/furniture" >"$work/out" 2>&1 || fail furniture.py
+"$ebpo" convert -q --split-components "$work/furniture/furniture.ply" "$work/bodies" >"$work/out" 2>&1 ||
     fail "split components"
 "$ebpo" scene report -q "$work/bodies/components.scene.json" >"$work/out" 2>&1 || fail bodies
 [ "$(cut -f 2-4 "$work/out")" = "crossing	component-0	component-5
 crossing	component-0	component-7" ] || fail "bodies meet"
-if "$ebpo" check -q "$work/room/room.obj" >/dev/null 2>&1; then
-    "$ebpo" convert -q --split-groups "$work/room/room.obj" "$work/pieces" >"$work/out" 2>&1 ||
+if "$ebpo" check -q "$work/furniture/furniture.obj" >/dev/null 2>&1; then
+    "$ebpo" convert -q --split-groups "$work/furniture/furniture.obj" "$work/pieces" >"$work/out" 2>&1 ||
         fail "split groups"
     "$ebpo" scene report -q "$work/pieces/groups.scene.json" >"$work/out" 2>&1 || fail pieces
     [ "$(cut -f 2-4 "$work/out")" = "crossing	table/top	lamp
 crossing	table/top	chair back" ] || fail "pieces meet"
 fi
 
-# What is not in PATH is named, in a line.
+# The message names the programs that are not in PATH, in one line.
 python=$(python3 -c 'import sys; print(sys.executable)')
 mkdir "$work/few"
 for sample in many_parts robot_among_scans; do
@@ -123,7 +123,7 @@ ring=$(wc -c <"$work/robot/ring.ebpo.h5") part=$(wc -c <"$work/packed/model-1.eb
 # A device by UDP: on top of the cube it feels a force, and what it did is recorded. Whichever port
 # is free; the address is this machine's.
 shift 9
-"$ebpo" touch --device udp:0 --seconds 30 --rate 500 --stiffness 100 --record "$work/hand.txt" \
+"$ebpo" haptic --device udp:0 --seconds 30 --rate 500 --stiffness 100 --record "$work/hand.txt" \
     "$work/cube.ebpo.h5" >"$work/touched" 2>"$work/out" &
 touching=$!
 for i in $(seq 60); do
@@ -132,10 +132,10 @@ for i in $(seq 60); do
     sleep 0.5
 done
 "$1" "$port" 0.3 0.4 1.5 0.8 >"$work/felt" 2>&1 || { cat "$work/felt"; fail "touch_device is answered"; }
-wait $touching || fail "ebpo touch ends with its device"
+wait $touching || fail "ebpo haptic ends with its device"
 [ "$(cat "$work/felt")" = "some answers, a force up, proxy at 0.30 0.40 1.00" ] ||
     { cat "$work/felt"; fail "touch_device feels the cube"; }
-[ "$(wc -l <"$work/hand.txt")" -gt 50 ] && "$ebpo" touch --path "$work/hand.txt" \
+[ "$(wc -l <"$work/hand.txt")" -gt 50 ] && "$ebpo" haptic --path "$work/hand.txt" \
     "$work/cube.ebpo.h5" >"$work/out" 2>&1 || fail "a recorded hand is played"
 
 command -v h5dump >/dev/null && command -v h5ls >/dev/null || exit 77

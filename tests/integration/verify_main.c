@@ -1,5 +1,5 @@
 /* verify_main FILE...: every file keeps what it promises. Needs the reading library alone, so that
- * it tells of a system for which the command cannot be linked (docs/develop/portability.md). */
+ * it shows a system for which the command cannot be linked (docs/develop/portability.md). */
 #include <ebpo/ebpo.h>
 #include <stdio.h>
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Whatever `convert`, `subset`, `repack`, `repair` and `fetch` write is opened, and is fine: each option that
+"""Whatever `convert`, `subset`, `repack`, `recover` and `fetch` write is opened, and is fine: each option that
 changes a file.
 
 written.py EBPO SERVER [PLY ...] [--few] [--generate EBPO-GENERATE]: SERVER is tests/support/faulty_server.py, or
@@ -39,18 +39,18 @@ CONVERT = """
 --select random --seed 3 --percent 80
 --select kmedoids --k-root 24
 --select offset --k-root 1%
---with leaf-planes
---with leaf-planes --subtree-faces 64
---without planes
---without planes --subtree-faces 64
---without mesh
---without mesh --with leaf-planes --codec none
---without maps
---without maps --face-coding gates
---without attributes
---without colours
---without attributes,colours,maps
---without attributes,colours,maps,planes --codec deflate
+--profile full
+--profile full --subtree-faces 64
+--parts -envelopes
+--parts -envelopes --subtree-faces 64
+--parts -mesh
+--parts envelopes,leaf-planes --codec none
+--parts -maps
+--parts -maps --face-coding gates
+--parts -attributes
+--parts -colours
+--parts -attributes,-colours,-maps
+--parts -attributes,-colours,-maps,-envelopes --codec deflate
 --embed-textures
 --profile full
 --profile lod
@@ -125,7 +125,7 @@ class Tried:
 
     def made(self, command, way, source, target):
         """Whether there is a file now; it is looked at."""
-        names = ("-o", target, source) if command == "repair" else (source, target)
+        names = ("-o", target, source) if command == "recover" else (source, target)
         done = self.run(command, *way.split(), *names)
         what = f"{command} {way} {source}"
         if done.returncode != 0:
@@ -150,14 +150,14 @@ def lower_half(facts):
 
 
 def copies(tried, path, server):
-    """What subset, repair and fetch make of a file of all parts."""
+    """What subset, recover and fetch make of a file of all parts."""
     box = lower_half(json.loads(tried.run("info", "--json", path).stdout))
     for way in tried.ways(SUBSET):
         if tried.made("subset", way.replace("{box}", box), path, "s.ebpo.h5"):
             if tried.made("repack", "--codec none --subtree-faces 64", "s.ebpo.h5", "t.ebpo.h5"):
                 os.unlink("t.ebpo.h5")
             os.unlink("s.ebpo.h5")
-    if not tried.few and tried.made("repair", "", path, "r.ebpo.h5"):
+    if not tried.few and tried.made("recover", "", path, "r.ebpo.h5"):
         os.unlink("r.ebpo.h5")
     if server:
         with subprocess.Popen([sys.executable, server, path], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
@@ -169,7 +169,7 @@ def copies(tried, path, server):
 
 def model(tried, path, server):
     tried.made("convert", "", path, "usual.ebpo.h5")
-    tried.made("convert", "--subtree-faces 64 --with leaf-planes", path, "parts.ebpo.h5")
+    tried.made("convert", "--subtree-faces 64 --profile full", path, "parts.ebpo.h5")
     for way in tried.ways(CONVERT):
         if not tried.made("convert", way, path, "c.ebpo.h5"):
             continue

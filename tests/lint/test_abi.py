@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The public interface against its stored description: test_abi.py CC... -- SOURCE_ROOT [--update]
+"""Compares the public interface with its stored description: test_abi.py CC... -- SOURCE_ROOT [--update]
 
 What the headers declare is compiled into a library of empty functions, described by abidw and
 compared by abidiff with tests/lint/libebpo.abi. The core alone must be the same without the extras'

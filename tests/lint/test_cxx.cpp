@@ -10,7 +10,7 @@
 #include <ebpo/map.h>
 #include <ebpo/paint.h>
 #include <ebpo/scene.h>
-#include <ebpo/touch.h>
+#include <ebpo/haptic.h>
 
 int main()
 {

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every function that the headers declare is called by tests/unit/every_call_*.c: test_every_function.py SOURCE_ROOT"""
+"""Checks that tests/unit/every_call_*.c calls every function of the headers: test_every_function.py SOURCE_ROOT"""
 import pathlib
 import re
 import sys

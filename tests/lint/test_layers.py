@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""test_layers.py SOURCE NM LIBRARY OBJECTS: the house has floors, and nothing goes in a circle.
+"""test_layers.py SOURCE NM LIBRARY OBJECTS: checks the layers of modules, without cycles.
 
-lib/layers.txt and tools/layers.txt say which module stands on which floor. A file uses another when
-it includes its header, or when its object file asks for a symbol that the other's defines (a
-declaration written by hand needs no header); X.c, X.h and X.inc count as one. Held to:
-- a file uses files of its own module and of lower floors only, not of siblings;
-- verify, the judge, uses nothing of what it judges: no file of construct, of the writer or of query;
-- no circles of files, neither within a module nor across;
+lib/layers.txt and tools/layers.txt list the layer of each module. A file uses another file when it
+includes its header, or when its object file needs a symbol that the other object file defines (a
+handwritten declaration needs no header). X.c, X.h and X.inc count as one file. The rules:
+- a file uses only files of its own module and of lower layers, not of siblings;
+- verify uses no code that it checks: no file of construct, of the writer or of query;
+- files have no cycles, neither within a module nor across modules;
 - only lib/hdf5_write includes <hdf5.h>, and only lib/io <curl/curl.h>;
 - every symbol of lib that other files can see begins with ebpo_.
 LIBRARY is the static library of lib/, OBJECTS the folder of those of tools/."""

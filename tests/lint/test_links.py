@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Links in Markdown lead somewhere: test_links.py ROOT."""
+"""Checks that links in Markdown have targets: test_links.py ROOT."""
 import pathlib
 import re
 import sys

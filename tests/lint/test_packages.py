@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The packages agree with the project: test_packages.py SOURCE_ROOT BUILD_ROOT MESON...
+"""Checks that the packages agree with the project: test_packages.py SOURCE_ROOT BUILD_ROOT MESON...
 
 Debian: what is installed is in one package, and each line of a package's list takes something; the symbols
 file has each public function. Conda's recipe, Homebrew's formula and debian/control have the version and the

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Conda's recipe and Homebrew's formula, as far as that goes without either: test_recipes.py SOURCE_ROOT EBPO
+"""Checks the recipe of Conda and the formula of Homebrew without either program: test_recipes.py SOURCE_ROOT EBPO
 
 Both are evaluated: the recipe as YAML, once its templates are filled in, the formula in ruby with the words
 of Homebrew that it uses (formula.rb), which also runs its test with the command that was built. What they

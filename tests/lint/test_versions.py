@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""test_versions.py SOURCE_ROOT: meson.build says the version, and whatever must repeat it agrees.
+"""test_versions.py SOURCE_ROOT: checks that all files have the version of meson.build.
 
 Headers, packages and prose are read without Meson, so they cannot ask it."""
 import json

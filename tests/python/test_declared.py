@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""ctypes as the compiler has it: test_declared.py INCLUDE_FOLDER PACKAGE_FOLDER CC...
+"""Compares ctypes declarations with the compiler: test_declared.py INCLUDE_FOLDER PACKAGE_FOLDER CC...
 
 What tools/python/declare.py has made of the public headers, against a C program that includes them:
 sizes, offsets of members, constants, and each member of each initial value.
@@ -21,11 +21,11 @@ structs = [kind for kind in vars(declared).values()
 constants = [name for name, value in vars(declared).items() if name.startswith("EBPO_") and isinstance(value, int)]
 
 
-def told_by_c():
+def printed_by_c():
     """Lines of a C program about all of it."""
     lines = [f"#include <ebpo/{header.name}>" for header in sorted((pathlib.Path(include) / "ebpo").glob("*.h"))]
     lines += ["#include <stdio.h>",
-              "static void told(const char *name, const void *data, size_t size) {",
+              "static void print_bytes(const char *name, const void *data, size_t size) {",
               '    printf("%s ", name);',
               '    for (size_t i = 0; i < size; i++) printf("%02x", ((const unsigned char *)data)[i]);',
               '    puts("");', "}", "int main(void) {"]
@@ -38,18 +38,18 @@ def told_by_c():
             lines.append(f'printf("{name}.{field} %zu %zu\\n", offsetof({name}, {field}), '
                          f'sizeof((({name} *)0)->{field}));')
             if kind in declared.INIT:
-                lines.append(f'told("init {name}.{field}", &made_{name}.{field}, sizeof(made_{name}.{field}));')
+                lines.append(f'print_bytes("init {name}.{field}", &made_{name}.{field}, sizeof(made_{name}.{field}));')
     for name in constants:
         lines.append(f'printf("{name} %lld\\n", (long long){name});')
     lines += ["return 0;", "}"]
     with tempfile.TemporaryDirectory() as folder:
-        source, program = pathlib.Path(folder) / "told.c", pathlib.Path(folder) / "told"
+        source, program = pathlib.Path(folder) / "printed.c", pathlib.Path(folder) / "printed"
         source.write_text("\n".join(lines) + "\n")
         subprocess.run([*compiler, f"-I{include}", source, "-o", program], check=True)
         return subprocess.run([program], check=True, capture_output=True, text=True).stdout.splitlines()
 
 
-def told_by_python():
+def printed_by_python():
     for kind in structs:
         name = kind.__name__
         yield f"size {name} {ctypes.sizeof(kind)}"
@@ -64,7 +64,7 @@ def told_by_python():
 
 
 def main():
-    c, python = told_by_c(), list(told_by_python())
+    c, python = printed_by_c(), list(printed_by_python())
     differ = [pair for pair in zip(c, python) if pair[0] != pair[1]]
     for here, there in differ[:20]:
         print(f"C: {here}   Python: {there}")

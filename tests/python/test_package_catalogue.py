@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Catalogues from Python: many models against each of them by itself, the parts of one against the whole."""
+"""Tests catalogues in Python: compares many models with each single model, and parts with the whole."""
 import json
 import os
 import pathlib
@@ -8,12 +8,12 @@ import signal
 import threading
 import time
 
-from package_kit import Case, answers, model, np, points, run
+from package_support import Case, command_results, model, np, points, run
 
 import ebpo
-from catalogue_kit import by_command, caps_of, cut_by_sample, on_triangles, same
+from catalogue_support import by_command, caps_of, cut_by_sample, on_triangles, same
 from ebpo.catalogue import Catalogue, Where
-from ebpo.holding import ours
+from ebpo.open_models import process_models
 
 P = points(6000, seed=5, reach=3)
 
@@ -36,10 +36,10 @@ class Many(Case):
         self.catalogue = Catalogue.of(self.names)
 
     def test_inside_is_the_sum(self):
-        told = [m.locate(P) for m in self.models]
+        results = [m.locate(P) for m in self.models]
         located = self.catalogue.locate(P)
-        inner = np.any([t.where == Where.IN for t in told], axis=0)
-        np.testing.assert_array_equal(located["winding"], np.sum([t.winding for t in told], axis=0))
+        inner = np.any([t.where == Where.IN for t in results], axis=0)
+        np.testing.assert_array_equal(located["winding"], np.sum([t.winding for t in results], axis=0))
         np.testing.assert_array_equal(located["where"] == Where.IN, inner)
         self.assertGreater(located["winding"].max(), 1)
         on = self.models[3].mesh().vertices[:200].astype(float)
@@ -48,27 +48,27 @@ class Many(Case):
         np.testing.assert_array_equal(where, np.where(buried, Where.IN, Where.ON))
         np.testing.assert_array_equal(self.catalogue.inside(on, boundary=False), buried)
 
-    def test_the_command_answers_the_same(self):
+    def test_results_of_the_command(self):
         rays = np.concatenate([P[:3000], P[3000:] - P[:3000]], axis=1)
         rays[:500, 3:] = 1e-320, 0, 0  # hits are farther away than a t can tell: it is inf
         expected = self.catalogue.locate(P), self.catalogue.distance(P), self.catalogue.ray(rays[:, :3], rays[:, 3:])
         self.assertTrue((np.isinf(expected[2]["t"]) & (expected[2]["face"] >= 0)).any())
         for options in ([], ["--memory", "8M", "--threads", "4"], ["--memory", "0", "--threads", "1"]):
-            for command, rows, told in zip(("inside", "distance", "ray"), (P, P, rays), expected):
-                same(by_command(command, self.catalogue, rows, *options), told)
+            for command, rows, results in zip(("inside", "distance", "ray"), (P, P, rays), expected):
+                same(by_command(command, self.catalogue, rows, *options), results)
         near = by_command("distance", self.catalogue, P, "--max-distance", ".1")
         same(near, self.catalogue.distance(P, max_distance=.1))
         self.assertTrue(np.isposinf(near["distance"][near["face"] < 0]).all())
 
     def test_distance_is_the_least(self):
-        told = [m.distance(P, signed=False) for m in self.models]
-        every = np.array([t.distance for t in told])
+        results = [m.distance(P, signed=False) for m in self.models]
+        every = np.array([t.distance for t in results])
         nearest, row = every.argmin(axis=0), np.arange(len(P))
         d = self.catalogue.distance(P)
         np.testing.assert_array_equal(abs(d["distance"]), every.min(axis=0))
         np.testing.assert_array_equal(d["model"], nearest)
-        np.testing.assert_array_equal(d["face"], np.array([t.face for t in told])[nearest, row])
-        np.testing.assert_array_equal(d["point"], np.array([t.point for t in told])[nearest, row])
+        np.testing.assert_array_equal(d["face"], np.array([t.face for t in results])[nearest, row])
+        np.testing.assert_array_equal(d["point"], np.array([t.point for t in results])[nearest, row])
         np.testing.assert_array_equal(d["distance"] < 0, self.catalogue.inside(P, boundary=False))
         near = self.catalogue.distance(P, max_distance=.3)
         np.testing.assert_array_equal(near["face"] == -1, every.min(axis=0) > .3)
@@ -108,24 +108,24 @@ class Many(Case):
             hits = ebpo.open("box3.ebpo.h5").ray_all(o, d)
             self.assertEqual((len(hits.t), hits.side.tolist()), (2, [1, -1]))
 
-    def test_few_models_are_asked(self):
+    def test_few_models_are_queried(self):
         p = points(50, seed=3, reach=.01) + (self.catalogue.entries[4].low + np.array(self.catalogue.entries[4].high)) / 2
-        for ask, most in ((self.catalogue.inside, 6), (self.catalogue.distance, 20)):
-            ours().clear()
-            before = ours().counts()["opened"]
-            ask(p)
-            self.assertLess(ours().counts()["opened"] - before, most)
+        for query, limit in ((self.catalogue.inside, 6), (self.catalogue.distance, 20)):
+            process_models().clear()
+            before = process_models().stats()["opened"]
+            query(p)
+            self.assertLess(process_models().stats()["opened"] - before, limit)
 
     def test_files(self):
         self.catalogue.save("moved/catalogue.json")
-        told = json.loads(pathlib.Path("moved/catalogue.json").read_text())
-        self.assertEqual(told["models"][3]["path"], "03.ebpo.h5")
+        stated = json.loads(pathlib.Path("moved/catalogue.json").read_text())
+        self.assertEqual(stated["models"][3]["path"], "03.ebpo.h5")
         again = Catalogue.open("moved/catalogue.json")
         self.assertEqual(again.entries, self.catalogue.entries)
-        told["of later"] = told["models"][0]["of later"] = 1
+        stated["of later"] = stated["models"][0]["of later"] = 1
 
         def damaged(**members):
-            return {"models": [{**told["models"][0], **members}]}
+            return {"models": [{**stated["models"][0], **members}]}
 
         for change, kind, message in (({}, None, ""), ({"version": 2}, ebpo.VersionError, "version 2"),
                                       ({"version": True}, ebpo.VersionError, "version 0"),
@@ -133,12 +133,12 @@ class Many(Case):
                                       ({"models": [{"path": "a"}]}, ebpo.FormatError, "content_sha256"),
                                       ({"models": []}, ebpo.FormatError, "one model"),
                                       ({"models": 5}, ebpo.FormatError, "catalogue"),
-                                      ({"parts": "false"}, ebpo.FormatError, "parts is true or false"),
+                                      ({"parts": "false"}, ebpo.FormatError, "parts is not true or false"),
                                       (damaged(box_min=[9, 9, 9]), ebpo.FormatError, "box_min is above box_max"),
                                       (damaged(box_max=[10**400, 1, 1]), ebpo.FormatError, "real number overflow"),
-                                      (damaged(solid="no"), ebpo.FormatError, "solid is true or false"),
+                                      (damaged(solid="no"), ebpo.FormatError, "solid is not true or false"),
                                       (damaged(path="a\0b"), ebpo.FormatError, "u0000")):
-            pathlib.Path("moved/changed.json").write_text(json.dumps({**told, **change}))
+            pathlib.Path("moved/changed.json").write_text(json.dumps({**stated, **change}))
             if kind is None:
                 self.assertEqual(len(Catalogue.open("moved/changed.json")), 27)
                 continue
@@ -148,7 +148,7 @@ class Many(Case):
         with self.assertRaisesRegex(ebpo.FormatError, "depth"):
             Catalogue.open("moved/changed.json")
         os.mkfifo("moved/pipe")
-        with self.assertRaisesRegex(ebpo.FormatError, "is no file"):
+        with self.assertRaisesRegex(ebpo.FormatError, "not a regular file"):
             Catalogue.open("moved/pipe")
 
     def test_errors(self):
@@ -167,31 +167,31 @@ class Many(Case):
         one = Catalogue.of(["other.ebpo.h5"])
         one.inside(P[:9])
         ebpo.convert("open_box.ply", "other.ebpo.h5")
-        ours().clear()
+        process_models().clear()
         with self.assertRaisesRegex(ebpo.FormatError, "has changed"):
             one.inside(P)
 
 
 class Holdings(Case):
     def setUp(self):
-        self.addCleanup(ours, "1GiB")
+        self.addCleanup(process_models, "1GiB")
 
-    def test_the_least_recently_asked_goes(self):
+    def test_least_recently_queried_is_closed(self):
         catalogue = Catalogue.of(spheres())
-        ours().clear()
-        before = ours().counts()
+        process_models().clear()
+        before = process_models().stats()
         for _ in range(2):
             for entry in catalogue.entries:
                 catalogue.inside(np.array(entry.low) / 2 + np.array(entry.high) / 2, memory="8M")  # eight shares
-                self.assertLessEqual(ours().counts()["memory"], 8_000_000)
-        counts = ours().counts()
-        self.assertEqual(counts["opened"], counts["closed"] + counts["models"])
-        self.assertGreater(counts["closed"] - before["closed"], 2)
-        self.assertGreater(counts["bytes_read"], before["bytes_read"])
+                self.assertLessEqual(process_models().stats()["memory"], 8_000_000)
+        stats = process_models().stats()
+        self.assertEqual(stats["opened"], stats["closed"] + stats["open"])
+        self.assertGreater(stats["closed"] - before["closed"], 2)
+        self.assertGreater(stats["bytes_read"], before["bytes_read"])
         catalogue.inside(np.array(entry.low) / 2 + np.array(entry.high) / 2)
-        self.assertEqual(ours().counts()["opened"], counts["opened"], "it was held")
-        ours().clear()
-        self.assertEqual(ours().counts()["models"], 0)
+        self.assertEqual(process_models().stats()["opened"], stats["opened"], "it was held")
+        process_models().clear()
+        self.assertEqual(process_models().stats()["open"], 0)
 
     def test_threads_and_refusals(self):
         catalogue, found = Catalogue.of(spheres()[:6]), []
@@ -206,11 +206,11 @@ class Holdings(Case):
         for thread in threads:
             thread.join(60)
         self.assertEqual(found, [True] * 6)
-        ours().clear()
+        process_models().clear()
         for _ in range(2):
             with self.assertRaises(ebpo.LimitError):
                 catalogue.inside(P, memory=1000)
-        self.assertEqual(ours().counts()["models"], 0)
+        self.assertEqual(process_models().stats()["open"], 0)
 
     def test_what_opening_raises(self):
         """A failure of what opens files comes out of the question as it is."""
@@ -226,7 +226,7 @@ class Holdings(Case):
 
 
 class Interrupts(Case):
-    def test_long_questions_end_at_once(self):
+    def test_long_queries_end_at_once(self):
         catalogue, p = Catalogue.of(spheres()), points(3_000_000, seed=1, reach=2)
         before, began = len(os.listdir("/proc/self/task")), time.monotonic()
         timer = threading.Timer(.5, os.kill, (os.getpid(), signal.SIGINT))
@@ -244,17 +244,17 @@ class Hostile(Case):
 
     def setUp(self):
         model("cube")
-        Catalogue.of(["cube.ebpo.h5"]).save("told.json")
-        self.told = json.loads(pathlib.Path("told.json").read_bytes())
+        Catalogue.of(["cube.ebpo.h5"]).save("stated.json")
+        self.stated = json.loads(pathlib.Path("stated.json").read_bytes())
 
-    def ask(self, told):
-        pathlib.Path("hostile.json").write_text(told if isinstance(told, str) else json.dumps(told))
+    def query(self, stated):
+        pathlib.Path("hostile.json").write_text(stated if isinstance(stated, str) else json.dumps(stated))
         catalogue = Catalogue.open("hostile.json")
         catalogue.inside([[.5, .5, .5]])
         return catalogue.distance([[.5, .5, .5]])
 
     def test_what_is_refused(self):
-        row = self.told["models"][0]
+        row = self.stated["models"][0]
         np.save("few.npy", np.arange(3))
         np.save("halves.npy", np.arange(12) + .5)
         for wrong in (dict(box_min=row["box_max"], box_max=row["box_min"]), dict(box_min=[10**400, 0, 0]),
@@ -264,21 +264,21 @@ class Hostile(Case):
                       dict(path="\ud800"), dict(solid="false"), dict(surface="cube.ebpo.h5"),
                       dict(numbers="few.npy"), dict(numbers="halves.npy"), dict(numbers="nowhere.npy")):
             with self.subTest(wrong), self.assertRaises(ebpo.FormatError):
-                self.ask(dict(self.told, models=[dict(row, **wrong)]))
-        for wrong in ("[" * 100000, dict(self.told, parts="false"), dict(self.told, models=["a"]),
-                      dict(self.told, models={"a": 1})):
+                self.query(dict(self.stated, models=[dict(row, **wrong)]))
+        for wrong in ("[" * 100000, dict(self.stated, parts="false"), dict(self.stated, models=["a"]),
+                      dict(self.stated, models={"a": 1})):
             with self.subTest(str(wrong)[:40]), self.assertRaises(ebpo.FormatError):
-                self.ask(wrong)
-        self.assertLess(self.ask(self.told)["distance"][0], 0)
+                self.query(wrong)
+        self.assertLess(self.query(self.stated)["distance"][0], 0)
 
-    def test_questions_are_checked_wherever_boxes_are(self):
-        c, p = Catalogue.open("told.json"), [9.0, 9, 9]
-        for asked in (lambda: c.distance(p, max_distance=-1), lambda: c.distance(p, max_distance=float("nan")),
+    def test_queries_are_checked_wherever_boxes_are(self):
+        c, p = Catalogue.open("stated.json"), [9.0, 9, 9]
+        for query in (lambda: c.distance(p, max_distance=-1), lambda: c.distance(p, max_distance=float("nan")),
                       lambda: c.ray(p, [0, 0, 0]), lambda: c.ray(p, [1, float("nan"), 0]),
                       lambda: c.ray([float("inf"), 0, 0], [1, 0, 0]), lambda: c.ray(p, [1, 0, 0], t_max=-1),
                       lambda: c.ray(p, [1, 0, 0], t_max=float("nan"))):
             with self.assertRaises(ebpo.ArgumentError):
-                asked()
+                query()
         self.assertEqual(len(c.ray(np.zeros((0, 3)), [1, 0, 0])), 0)
 
 
@@ -290,10 +290,10 @@ class Sizes(Case):
             names, p = [f"sized{i}.ebpo.h5" for i in range(9)], points(200, seed=3, reach=3) * size
             for name, at in zip(names, points(9, seed=4, reach=2)):
                 ebpo.convert(((vertices * .3 + at) * size, faces), name)
-            told = [ebpo.open(name).distance(p, signed=False).distance for name in names]
+            results = [ebpo.open(name).distance(p, signed=False).distance for name in names]
             found = Catalogue.of(names).distance(p)
-            np.testing.assert_array_equal(np.abs(found["distance"]), np.min(told, axis=0))
-            np.testing.assert_array_equal(found["model"], np.argmin(told, axis=0))
+            np.testing.assert_array_equal(np.abs(found["distance"]), np.min(results, axis=0))
+            np.testing.assert_array_equal(found["model"], np.argmin(results, axis=0))
 
 
 class Parts(Case):
@@ -353,8 +353,8 @@ class Parts(Case):
         numbers = np.concatenate([np.load(entry.numbers) for entry in self.catalogue.entries])
         np.testing.assert_array_equal(np.sort(numbers), np.arange(self.whole.info.face_count))
         self.assertGreater(len(self.caps), 100)
-        told = [int(line.split()[-2]) for line in self.printed.splitlines() if line.endswith("caps")]
-        self.assertEqual(sum(told), len(self.caps))
+        counts = [int(line.split()[-2]) for line in self.printed.splitlines() if line.endswith("caps")]
+        self.assertEqual(sum(counts), len(self.caps))
         balance = {}
         for face in self.caps:
             key = tuple(sorted(map(tuple, face)))
@@ -371,32 +371,32 @@ class Parts(Case):
 
     def test_inside_and_winding(self):
         for p, least in zip(self.points(), (1, 1, 100)):
-            told, expected = self.catalogue.locate(p), self.whole.locate(p)
-            np.testing.assert_array_equal(told["where"], expected.where)
-            np.testing.assert_array_equal(told["winding"], expected.winding)
+            results, expected = self.catalogue.locate(p), self.whole.locate(p)
+            np.testing.assert_array_equal(results["where"], expected.where)
+            np.testing.assert_array_equal(results["winding"], expected.winding)
             on_parts = np.zeros(len(p), bool)
             for entry in self.catalogue.entries:
                 on_parts |= ebpo.open(entry.path).locate(p).where == Where.ON
             np.testing.assert_array_equal(self.catalogue.inside(p), self.whole.inside(p))
-            same(by_command("inside", self.catalogue, p), told)
-            self.caps_met = (on_parts & (expected.where != Where.ON)).sum()
-        self.assertGreater(self.caps_met, least, "points on caps, which are no faces of the whole")
+            same(by_command("inside", self.catalogue, p), results)
+            self.points_on_caps = (on_parts & (expected.where != Where.ON)).sum()
+        self.assertGreater(self.points_on_caps, least, "points on caps, which are no faces of the whole")
 
     def test_distance_and_rays_do_not_see_caps(self):
         for p in self.points():
-            told, expected = self.catalogue.distance(p), self.whole.distance(p)
-            same(by_command("distance", self.catalogue, p), told)
-            np.testing.assert_array_equal(told["distance"], expected.distance)
-            np.testing.assert_allclose(told["point"], expected.point, rtol=0, atol=1e-14)
-            only = told["face"] == expected.face
-            corners = self.corners[told["face"][~only]]  # another one as near: they share the point
+            results, expected = self.catalogue.distance(p), self.whole.distance(p)
+            same(by_command("distance", self.catalogue, p), results)
+            np.testing.assert_array_equal(results["distance"], expected.distance)
+            np.testing.assert_allclose(results["point"], expected.point, rtol=0, atol=1e-14)
+            only = results["face"] == expected.face
+            corners = self.corners[results["face"][~only]]  # another one as near: they share the point
             shared = np.abs(self.corners[expected.face[~only]][:, :, None] - corners[:, None]).max(axis=3) == 0
             self.assertTrue(shared.any(axis=(1, 2)).all())
         o, d = 2 * points(4000, seed=2), points(4000, seed=3)
-        told, expected = self.catalogue.ray(o, d), self.whole.ray(o, d)
+        results, expected = self.catalogue.ray(o, d), self.whole.ray(o, d)
         for name in ("t", "face", "side"):
-            np.testing.assert_array_equal(told[name], getattr(expected, name))
-        np.testing.assert_array_equal(answers("inside", "scan", o)["where"], self.catalogue.locate(o)["where"])
+            np.testing.assert_array_equal(results[name], getattr(expected, name))
+        np.testing.assert_array_equal(command_results("inside", "scan", o)["where"], self.catalogue.locate(o)["where"])
 
     def test_what_is_not_closed_is_refused(self):
         faces = np.arange(9).reshape(3, 3)
@@ -408,12 +408,12 @@ class Parts(Case):
         two = np.concatenate([vertices, vertices * .5 + .3]), np.concatenate([faces, faces + len(vertices)])
         for rule, inner in (("evenodd", 0), ("nonzero", 1)):
             ebpo.convert(two, f"{rule}.ebpo.h5", rule=rule)
-            told = cut_by_sample(f"{rule}.ebpo.h5", f"cut_{rule}")[1].locate(P)
-            same(by_command("inside", Catalogue.open(f"cut_{rule}/catalogue.json"), P), told)
+            results = cut_by_sample(f"{rule}.ebpo.h5", f"cut_{rule}")[1].locate(P)
+            same(by_command("inside", Catalogue.open(f"cut_{rule}/catalogue.json"), P), results)
             expected = ebpo.open(f"{rule}.ebpo.h5").locate(P)
-            np.testing.assert_array_equal(told["where"], expected.where)
-            np.testing.assert_array_equal(told["winding"], expected.winding)
-            self.assertEqual(set(told["where"][told["winding"] == 2].tolist()), {inner})
+            np.testing.assert_array_equal(results["where"], expected.where)
+            np.testing.assert_array_equal(results["winding"], expected.winding)
+            self.assertEqual(set(results["where"][results["winding"] == 2].tolist()), {inner})
 
     def test_chains(self):
         for count in range(3, 40):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What Python hands to C: every integer, text and array is what it was, or is refused.
+"""Checks that every integer, text and array reaches C unchanged, or is rejected.
 
 All declared functions and all members of structs are tried one after the other, as the headers have them; then
 the package itself, function by function.
@@ -9,7 +9,7 @@ import os
 import pathlib
 import unittest.mock
 
-from package_kit import Case, model, np, points, run
+from package_support import Case, model, np, points, run
 
 import ebpo
 import ebpo.collide
@@ -98,7 +98,7 @@ class Declared(Case):
             options.level = value
             self.assertEqual(options.level, 3)
         for value in (True, np.True_, 1):
-            self.assertEqual(made(declared.ebpo_lod_options, walls=value).walls, True)
+            self.assertEqual(made(declared.ebpo_lod_options, cell_faces=value).cell_faces, True)
             options.level = value
             self.assertEqual(options.level, 1)
         for value in (1, np.float32(1), np.int64(1), True):
@@ -106,7 +106,7 @@ class Declared(Case):
         layer = made(declared.ebpo_paint_layer, title="Ä", author=b"x", date=None, description=pathlib.Path("y"))
         self.assertEqual((layer.title, layer.author, layer.date, layer.description), ("Ä".encode(), b"x", None, b"y"))
         with self.assertRaises(TypeError):
-            of_members(declared.ebpo_touch_options, {"points": 1})
+            of_members(declared.ebpo_haptic_options, {"points": 1})
         with self.assertRaises(TypeError):
             of_members(declared.ebpo_paint_pen, {"progress": 1})
 
@@ -149,8 +149,8 @@ class Package(Case):
         for number in (-1, 2**64 + 1, 2**64):
             for function in (m.subtree, lambda n: m.subtree(memory=n), paint.remove_layer,
                              paint.remove_note, paint.remove_stroke, lambda n: paint.cover(m, n),
-                             lambda n: ebpo.open("cube.ebpo.h5", memory=n), lambda n: m.near(p[0], most=n),
-                             lambda n: ebpo.open("cube.ebpo.h5", most_expansion=n), lambda n: paint.add_layer(colour=n),
+                             lambda n: ebpo.open("cube.ebpo.h5", memory=n), lambda n: m.near(p[0], count=n),
+                             lambda n: ebpo.open("cube.ebpo.h5", max_expansion=n), lambda n: paint.add_layer(colour=n),
                              lambda n: paint.measure(m, fineness=n), lambda n: ebpo.convert(mesh, "o.ebpo.h5", seed=n),
                              lambda n: ebpo.convert(mesh, "o.ebpo.h5", memory=n), lambda n: ebpo.Collider(m, m, memory=n)):
                 self.refused(ValueError, function, number)
@@ -178,7 +178,7 @@ class Package(Case):
         self.refused(ValueError, ebpo.convert, mesh, "o.ebpo.h5", fill_holes=2)
         self.refused(TypeError, ebpo.convert, mesh, "o.ebpo.h5", fill_holes="no")
         self.refused(TypeError, ebpo.open, "cube.ebpo.h5", memory=1e9)
-        self.refused(TypeError, ebpo.Touch, m, [0, 0, 2], radiuss=1.)
+        self.refused(TypeError, ebpo.Haptic, m, [0, 0, 2], radiuss=1.)
         for seconds in (-1, float("inf"), float("nan"), 1e300, "1"):
             self.refused((ValueError, TypeError), m.locate, p, deadline=seconds)
             self.refused((ValueError, TypeError), ebpo.Collider(m, m).relation, deadline=seconds)
@@ -189,9 +189,9 @@ class Package(Case):
         m = model("cube")
         paint = ebpo.Paint(m)
         layer = paint.add_layer(title="x")
-        paint.lay(m, [[.2, .5, 1, 1], [.8, .5, 1, 1]], layer=layer, radius=.1)
+        paint.draw(m, [[.2, .5, 1, 1], [.8, .5, 1, 1]], layer=layer, radius=.1)
         collider, beside = ebpo.Collider(m, m), ebpo.pose(translation=[.5, .25, .25])
-        for module, name, ask in ((ebpo.model, "copied", lambda: m.triangles_in_box([0, 0, 0], [1, 1, 1])),
+        for module, name, query in ((ebpo.model, "copied", lambda: m.triangles_in_box([0, 0, 0], [1, 1, 1])),
                                   (ebpo.collide, "copied", lambda: collider.pairs(pose_b=beside)),
                                   (ebpo.collide, "copied", lambda: collider.contacts(pose_b=beside)),
                                   (ebpo.collide, "copied", lambda: collider.polylines(pose_b=beside)),
@@ -199,8 +199,8 @@ class Package(Case):
                                   (ctypes, "string_at", lambda: paint.cover(m, 0))):
             with unittest.mock.patch.object(module, name, side_effect=KeyboardInterrupt):
                 with self.assertRaises(KeyboardInterrupt):
-                    ask()
-            ask()
+                    query()
+            query()
 
     def test_arrays(self):
         m = model("cube")
@@ -221,7 +221,7 @@ class Package(Case):
             for function in (m.inside, m.distance, lambda p: m.ray(p, [0, 0, 1.]), lambda p: m.ray([0, 0, 1.], p),
                              lambda p: m.near(np.asarray(p)[0]), lambda p: m.faces_in_box(np.asarray(p)[0], [1., 1, 1]),
                              lambda p: m.octcode(np.asarray(p)[0], 1), lambda p: ebpo.pose(translation=p),
-                             lambda p: ebpo.Touch(m, np.asarray(p)[0]), lambda p: ebpo.Paint(m).add_note(m, np.asarray(p)[0]),
+                             lambda p: ebpo.Haptic(m, np.asarray(p)[0]), lambda p: ebpo.Paint(m).add_note(m, np.asarray(p)[0]),
                              lambda p: ebpo.convert((np.repeat(p, 3, axis=0), [[0, 1, 2]]), "o.ebpo.h5")):
                 self.refused(error, function, bad)
         self.assertEqual(m.inside([[2**53, 0, 0], [0, 0, 0]]).tolist(), m.inside([[2.**53, 0, 0], [0, 0, 0]]).tolist())

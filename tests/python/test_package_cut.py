@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A real model cut into eight files answers as the whole does: at random, on its faces, and on caps.
+"""Checks that a model cut into eight files returns the results of the whole: at random points, on faces, on caps.
 
     test_package_cut.py EBPO EBPO_INPUTS EBPO_GENERATE SOURCES MODELS
 """
@@ -7,10 +7,10 @@ import os
 import subprocess
 import sys
 
-from package_kit import COMMAND, Case, np, run
+from package_support import COMMAND, Case, np, run
 
 import ebpo
-from catalogue_kit import by_command, caps_of, cut_by_sample, on_triangles, same
+from catalogue_support import by_command, caps_of, cut_by_sample, on_triangles, same
 from ebpo.catalogue import Where
 
 MODEL = os.path.join(sys.argv[5], "bunny_closed.ply")
@@ -41,21 +41,21 @@ class RealParts(Case):
 
     def test_inside(self):
         for kind, p in self.points.items():
-            told, expected = self.catalogue.locate(p), self.whole.locate(p)
-            np.testing.assert_array_equal(told["where"], expected.where, kind)
-            np.testing.assert_array_equal(told["winding"], expected.winding, kind)
-            same(by_command("inside", self.catalogue, p), told)
+            results, expected = self.catalogue.locate(p), self.whole.locate(p)
+            np.testing.assert_array_equal(results["where"], expected.where, kind)
+            np.testing.assert_array_equal(results["winding"], expected.winding, kind)
+            same(by_command("inside", self.catalogue, p), results)
             for where in {"faces": [Where.ON], "caps": [Where.ON, Where.IN], "random": [Where.IN, Where.OUT]}[kind]:
-                self.assertGreater((told["where"] == where).sum(), 100, (kind, where))
+                self.assertGreater((results["where"] == where).sum(), 100, (kind, where))
 
     def test_distance(self):
         for kind, p in self.points.items():
-            told, expected = self.catalogue.distance(p), self.whole.distance(p)
-            np.testing.assert_array_equal(told["distance"], expected.distance, kind)
-            np.testing.assert_allclose(told["point"], expected.point, rtol=0, atol=1e-14 * self.length)
-            same(by_command("distance", self.catalogue, p, "--memory", "16M"), told)
-            other = told["face"] != expected.face  # one as near, with a common corner
-            a, b = self.corners[told["face"][other]], self.corners[expected.face[other]]
+            results, expected = self.catalogue.distance(p), self.whole.distance(p)
+            np.testing.assert_array_equal(results["distance"], expected.distance, kind)
+            np.testing.assert_allclose(results["point"], expected.point, rtol=0, atol=1e-14 * self.length)
+            same(by_command("distance", self.catalogue, p, "--memory", "16M"), results)
+            other = results["face"] != expected.face  # one as near, with a common corner
+            a, b = self.corners[results["face"][other]], self.corners[expected.face[other]]
             shared = (a[:, :, None] == b[:, None]).all(axis=3).any(axis=(1, 2))
             self.assertTrue(shared.all(), kind)
 
@@ -64,11 +64,11 @@ class RealParts(Case):
         for kind, o in self.points.items():
             d = np.random.default_rng(12).permutation(self.points["faces"])[:len(o)] - o[:AT_MOST]
             o, d = o[d.any(axis=1)], d[d.any(axis=1)]
-            told, expected = self.catalogue.ray(o, d), self.whole.ray(o, d)
-            same(by_command("ray", self.catalogue, np.concatenate([o, d], axis=1)), told)
-            np.testing.assert_array_equal(told["t"], expected.t, kind)
-            np.testing.assert_array_equal(told["side"] == 0, expected.side == 0, kind)
-            self.assertGreater((told["face"] == expected.face).mean(), .8, kind)
+            results, expected = self.catalogue.ray(o, d), self.whole.ray(o, d)
+            same(by_command("ray", self.catalogue, np.concatenate([o, d], axis=1)), results)
+            np.testing.assert_array_equal(results["t"], expected.t, kind)
+            np.testing.assert_array_equal(results["side"] == 0, expected.side == 0, kind)
+            self.assertGreater((results["face"] == expected.face).mean(), .8, kind)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""ebpo.dask: the same bytes with every scheduler, chunk and worker; workers and clients that die.
+"""Tests ebpo.dask: equal bytes with every scheduler, chunk and worker; killed workers and clients.
 
 Exit code 77: dask or distributed is missing.
 """
@@ -24,7 +24,7 @@ except ImportError as error:
     print(f"skipped: {error} (tools/install-deps.sh --tests)")
     sys.exit(77)
 
-from package_kit import Case, model, np, points, run
+from package_support import Case, model, np, points, run
 
 import ebpo
 import ebpo.dask as ed
@@ -49,7 +49,7 @@ def setUpModule():
     P.tofile("points.raw")
 
 
-class Answers(Case):
+class Results(Case):
     """With schedulers in this process."""
 
     def test_the_models_own(self):
@@ -76,8 +76,8 @@ class Answers(Case):
                 file["a/P"].attrs["coding"] = "of another format"
             given += [("points.h5", "a/P"), ("points.h5", None)]
         for source, dataset in given:
-            told = ed.winding("scan.ebpo.h5", source, dataset=dataset, chunk=3333)
-            np.testing.assert_array_equal(told.compute(), expected[:told.shape[0]])
+            found = ed.winding("scan.ebpo.h5", source, dataset=dataset, chunk=3333)
+            np.testing.assert_array_equal(found.compute(), expected[:found.shape[0]])
         some = dask.array.from_array(P, chunks=(1000, 3))
         some = some[some[:, 0] > 0]  # chunks of unknown sizes
         np.testing.assert_array_equal(ed.inside("scan.ebpo.h5", some).compute(), m.inside(P[P[:, 0] > 0]))
@@ -119,7 +119,7 @@ class Answers(Case):
                 ed.points("points.h5")
         self.assertIn({"locking": False}, tried)
 
-    def test_what_cannot_be_asked(self):
+    def test_invalid_queries(self):
         pathlib.Path("odd.raw").write_bytes(b"x" * 100)
         np.save("wide.npy", np.zeros((5, 4)))
         np.save("complex.npy", np.zeros((5, 3), complex))
@@ -129,8 +129,8 @@ class Answers(Case):
                 ed.points(wrong)
         with self.assertRaisesRegex(ValueError, "shape"):
             ed.inside("scan.ebpo.h5", np.zeros((5, 2)))
-        with self.assertRaisesRegex(ValueError, "asked for"):
-            ed.ask("beauty", "scan.ebpo.h5", P)
+        with self.assertRaisesRegex(ValueError, "can be queried"):
+            ed.query("beauty", "scan.ebpo.h5", P)
         with self.assertRaisesRegex(TypeError, "Catalogue"):
             ed.inside(model("scan"), P)
         with self.assertRaises(ebpo.NotSolidError):
@@ -143,37 +143,37 @@ class Answers(Case):
         with self.assertRaisesRegex(ebpo.ArgumentError, "point 12345 "):
             ed.inside("scan.ebpo.h5", bad, chunk=1000).compute(scheduler="sync")
         with self.assertRaisesRegex(ebpo.ArgumentError, "ray 7777 "):
-            ed.ask("ray", "scan.ebpo.h5", rays, chunk=1000).compute(scheduler="sync")
+            ed.query("ray", "scan.ebpo.h5", rays, chunk=1000).compute(scheduler="sync")
         with self.assertRaisesRegex(ebpo.ArgumentError, "ray 0 needs a t_max"):
-            ed.ask("ray", "scan.ebpo.h5", rays, chunk=1000, t_max=-1).compute(scheduler="sync")
+            ed.query("ray", "scan.ebpo.h5", rays, chunk=1000, t_max=-1).compute(scheduler="sync")
         some = dask.array.from_array(bad, chunks=(1000, 3))
         with self.assertRaisesRegex(ebpo.ArgumentError, "point 345 "):
             ed.inside("scan.ebpo.h5", some[some[:, 0] != 9]).compute(scheduler="sync")
 
     def test_files_that_change(self):
         shutil.copy(INPUT, "changing.npy")
-        asked = ed.inside("scan.ebpo.h5", "changing.npy")
+        query = ed.inside("scan.ebpo.h5", "changing.npy")
         np.save("changing.npy", P[::-1])
         with self.assertRaisesRegex(ebpo.IOFailure, "changed"):
-            asked.compute()
+            query.compute()
         shutil.copy("scan.ebpo.h5", "changing.ebpo.h5")
-        asked = ed.inside("changing.ebpo.h5", P)
+        query = ed.inside("changing.ebpo.h5", P)
         model("open_box")
         shutil.copy("open_box.ebpo.h5", "changing.ebpo.h5")
         with self.assertRaisesRegex(ebpo.FormatError, "has changed"):
-            asked.compute()
+            query.compute()
 
     def test_one_budget(self):
         for i in range(6):
             shutil.copy("scan.ebpo.h5", f"copy{i}.ebpo.h5")
-        before = ed.counts()
-        told = ed.winding([f"copy{i}.ebpo.h5" for i in range(6)], P, memory="9M", chunk=2000)
-        np.testing.assert_array_equal(told.compute(), 6 * model("scan").winding(P))
-        after = ed.counts()
+        before = ed.stats()
+        results = ed.winding([f"copy{i}.ebpo.h5" for i in range(6)], P, memory="9M", chunk=2000)
+        np.testing.assert_array_equal(results.compute(), 6 * model("scan").winding(P))
+        after = ed.stats()
         self.assertGreaterEqual(after["opened"] - before["opened"], 6)
         self.assertGreater(after["bytes_read"], before["bytes_read"])
         self.assertLessEqual(after["memory"], 9_000_000)
-        ebpo.holding.ours("1GiB").clear()
+        ebpo.open_models.process_models("1GiB").clear()
 
 
 class Files(Case):
@@ -181,7 +181,7 @@ class Files(Case):
         inside = ed.inside("scan.ebpo.h5", INPUT, chunk=3000)
         ed.to_file(inside, "inside.npy")
         np.testing.assert_array_equal(np.load("inside.npy"), model("scan").inside(P))
-        rows = ed.ask("distance", "scan.ebpo.h5", P[:4000], chunk=1500)
+        rows = ed.query("distance", "scan.ebpo.h5", P[:4000], chunk=1500)
         ed.to_file(rows, "nearest.npy", scheduler="sync")
         np.testing.assert_array_equal(np.load("nearest.npy"), rows.compute())
         ed.to_file(inside, "folder")
@@ -197,36 +197,36 @@ class Files(Case):
         self.assertEqual([str(p) for p in pathlib.Path(".").glob(".*")], [], "no temporary files stay")
 
     def test_few_chunks_are_mapped_at_a_time(self):
-        opened, load, most = [], np.load, [0]
+        opened, load, limit = [], np.load, [0]
 
         def counted(*arguments, **options):
             opened[:] = [part for part in opened if part() is not None]
             part = load(*arguments, **options)
             opened.append(weakref.ref(part))
-            most[0] = max(most[0], len(opened))
+            limit[0] = max(limit[0], len(opened))
             return part
 
         self.addCleanup(setattr, np, "load", load)
         np.load = counted
         ed.to_file(ed.inside("scan.ebpo.h5", P[:1000], chunk=4), "many.npy", scheduler="sync")
         np.testing.assert_array_equal(load("many.npy"), model("scan").inside(P[:1000]))
-        self.assertTrue(1 <= most[0] <= 3, most)
+        self.assertTrue(1 <= limit[0] <= 3, limit)
 
     def test_two_that_begin_one_folder(self):
         """The question of the one that comes later is compared with the other's, and does not replace it."""
-        from ebpo.stretches import published
+        from ebpo.point_files import published
         inside, other = (ed.inside("scan.ebpo.h5", P[:n], chunk=100) for n in (300, 200))
         folder = pathlib.Path("begun.npy.parts")
         self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
         ed.begin_parts(folder, inside)
-        before = (folder / "question.json").read_bytes()
-        with self.assertRaises(FileExistsError), published(folder / "question.json", new=True) as file:
+        before = (folder / "query.json").read_bytes()
+        with self.assertRaises(FileExistsError), published(folder / "query.json", new=True) as file:
             file.write(b"{}")
         with unittest.mock.patch.object(pathlib.Path, "exists", side_effect=[False]), \
                 unittest.mock.patch.object(pathlib.Path, "iterdir", return_value=[]):
-            with self.assertRaisesRegex(ValueError, "another question"):
+            with self.assertRaisesRegex(ValueError, "another query"):
                 ed.begin_parts(folder, other)
-        self.assertEqual((folder / "question.json").read_bytes(), before)
+        self.assertEqual((folder / "query.json").read_bytes(), before)
         self.assertEqual(len([*folder.iterdir()]), 1)
 
     def test_what_is_no_chunk_is_not_joined(self):
@@ -274,7 +274,7 @@ class Files(Case):
         self.assertFalse(os.path.exists("killed.npy"))
         done = {part.name: part.stat().st_mtime_ns for part in folder.glob("0*.npy")}
         self.assertTrue(5 <= len(done) < 40)
-        with self.assertRaisesRegex(ValueError, "another question"):
+        with self.assertRaisesRegex(ValueError, "another query"):
             ed.to_file(ed.winding("scan.ebpo.h5", INPUT, chunk=500), "killed.npy")
         kept = {}
         joined = ed.join_parts
@@ -347,12 +347,12 @@ class Cluster(Case):
     def test_a_worker_dies_and_one_is_slow(self):
         pids = self.client.run(os.getpid)
         self.assertEqual(len(pids), 2)
-        rows = ed.ask("distance", os.path.abspath("scan.ebpo.h5"), INPUT, chunk=500, memory="64M")
+        rows = ed.query("distance", os.path.abspath("scan.ebpo.h5"), INPUT, chunk=500, memory="64M")
         expected = Catalogue.of(["scan.ebpo.h5"]).distance(P)
         self.client.run(take_time)
         future = self.client.compute(rows)
         deadline = time.monotonic() + 30
-        while time.monotonic() < deadline and not all(c["hits"] + c["models"] for c in ed.counts(self.client).values()):
+        while time.monotonic() < deadline and not all(c["hits"] + c["open"] for c in ed.stats(self.client).values()):
             time.sleep(.05)
         self.assertFalse(future.done())
         first, second = pids.values()
@@ -367,9 +367,9 @@ class Cluster(Case):
         name = os.path.abspath("scan.ebpo.h5")
         inside = ed.inside(name, P, chunk=1000)
         np.testing.assert_array_equal(inside.compute(), model("scan").inside(P))
-        before = ed.counts(self.client)
+        before = ed.stats(self.client)
         np.testing.assert_array_equal(ed.inside(name, P[::-1], chunk=700).compute(), model("scan").inside(P[::-1]))
-        after = ed.counts(self.client)
+        after = ed.stats(self.client)
         self.assertEqual(sum(c["opened"] for c in after.values()), sum(max(1, c["opened"]) for c in before.values()))
 
     def test_a_server_is_away(self):
@@ -377,10 +377,10 @@ class Cluster(Case):
         threading.Thread(target=server.serve_forever, daemon=True).start()
         self.addCleanup(server.server_close)
         self.addCleanup(server.shutdown)
-        asked = Catalogue.of([f"http://127.0.0.1:{server.server_port}/scan.ebpo.h5"])
+        catalogue = Catalogue.of([f"http://127.0.0.1:{server.server_port}/scan.ebpo.h5"])
         Away.until = None  # from now on might be over before a busy machine asks
-        told = ed.inside(asked, P, chunk=5000).compute()
-        np.testing.assert_array_equal(told, model("scan").inside(P))
+        results = ed.inside(catalogue, P, chunk=5000).compute()
+        np.testing.assert_array_equal(results, model("scan").inside(P))
         self.assertGreater(Away.refused, 0)
 
     def test_to_file(self):

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Paint from Python is the command's paint, and comes back from its file."""
+"""Checks that paint from Python equals the command's paint and is read back from its file."""
 import json
 import pathlib
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 
-from package_kit import COMMAND, Case, model, np, run
+from package_support import COMMAND, Case, model, np, run
 
 import ebpo
 
@@ -18,8 +18,8 @@ class Painting(Case):
         paint = ebpo.Paint(m)
         for title in ("First", "Zweite \u00fc"):
             layer = paint.add_layer(title=title, opacity=200)
-        laid = paint.lay(m, WAY, layer=layer, radius=.05, colour=0x112233ff)
-        self.assertEqual(laid["strokes"], 1)
+        drawn = paint.draw(m, WAY, layer=layer, radius=.05, colour=0x112233ff)
+        self.assertEqual(drawn["strokes"], 1)
         paint.add_note(m, [0, 0, 3], layer=0, title="Top", body="here")
         return m, paint
 
@@ -36,9 +36,9 @@ class Painting(Case):
             note = again.notes[0]
             self.assertEqual((note["title"], note["body"], note["layer"]), ("Top", "here", 0))
             np.testing.assert_allclose(note["at"]["place"], m.distance([0, 0, 3]).point)
-        told = json.loads(subprocess.run([COMMAND, "paint", "--json", "scan.paint.h5"], check=True,
+        printed = json.loads(subprocess.run([COMMAND, "paint", "--json", "scan.paint.h5"], check=True,
                                          capture_output=True).stdout)
-        self.assertIn('"First"', json.dumps(told))
+        self.assertIn('"First"', json.dumps(printed))
         with self.assertRaises(ebpo.FormatError):
             ebpo.Paint.open(b"no such file" * 50)
 
@@ -51,7 +51,7 @@ class Painting(Case):
         other.add_layer(title="Other")
         one.save("two.paint.h5")
         for late in other, paint:
-            with self.assertRaisesRegex(ebpo.IOFailure, "another program has written it since it was read"):
+            with self.assertRaisesRegex(ebpo.IOFailure, "another program has changed it since it was read"):
                 late.save("two.paint.h5")
         other.save("copy.paint.h5")
         self.assertEqual([layer["title"] for layer in ebpo.Paint.open("two.paint.h5").layers][2:], ["One"])
@@ -79,7 +79,7 @@ class Painting(Case):
         self.assertEqual(len(ebpo.Paint.open("turns.paint.h5").layers), 13)
         self.assertEqual([*pathlib.Path().glob(".*.lock")], [])
 
-    def test_answers(self):
+    def test_results(self):
         m, paint = self.painted()
         faces = paint.cover(m, 0)
         self.assertGreater(len(faces), 10)
@@ -98,14 +98,14 @@ class Painting(Case):
         paint.remove_stroke(0)
         self.assertEqual(paint.strokes, [])
         paint.remove_layer(0)
-        paint.lay(m, WAY, layer=0, radius=.05)
+        paint.draw(m, WAY, layer=0, radius=.05)
         self.assertEqual((len(paint.layers), len(paint.notes), len(paint.strokes)), (1, 0, 1))
         with self.assertRaisesRegex(TypeError, "radii"):
-            paint.lay(m, WAY, radii=2)
+            paint.draw(m, WAY, radii=2)
         with self.assertRaisesRegex(ValueError, "shape"):
-            paint.lay(m, WAY[:, :3], radius=1)
+            paint.draw(m, WAY[:, :3], radius=1)
         with self.assertRaises(ebpo.ArgumentError):
-            paint.lay(m, WAY, layer=5, radius=.1)
+            paint.draw(m, WAY, layer=5, radius=.1)
         with self.assertRaises(ebpo.ArgumentError):
             paint.check(model("coloured"))
         with self.assertRaises(ZeroDivisionError):

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import types
 
-from package_kit import COMMAND, EXTRAS, Case, model, np, points, run
+from package_support import COMMAND, EXTRAS, Case, model, np, points, run
 
 import ebpo
 
@@ -39,11 +39,11 @@ class Parts(Case):
         self.assertAlmostEqual(mass.integral, 2)
 
     def test_info(self):
-        told = json.loads(subprocess.run([COMMAND, "info", "--json", "scan.ebpo.h5"], check=True,
+        printed = json.loads(subprocess.run([COMMAND, "info", "--json", "scan.ebpo.h5"], check=True,
                                          capture_output=True).stdout) if model("scan") else {}
         info = model("scan").info
-        self.assertIn(str(info.face_count), json.dumps(told))
-        self.assertIn(info.content_sha256, json.dumps(told))
+        self.assertIn(str(info.face_count), json.dumps(printed))
+        self.assertIn(info.content_sha256, json.dumps(printed))
         self.assertTrue(info.solid and info.rule is ebpo.Rule.NONZERO)
         self.assertEqual(info.parts, {"planes", "mesh", "maps"})
         self.assertEqual(len(info.levels), info.level_count)
@@ -146,7 +146,11 @@ class Parts(Case):
             model("scan").subtree(5)
 
     def test_converting(self):
-        for name, options, switches in (("scan", {}, []), ("open_box", {"fill_holes": True}, ["--fill-holes"]),
+        for name, options, switches in (("scan", {}, []), ("scan", {"parts": "-maps"}, ["--parts", "-maps"]),
+                                        ("coloured", {"parts": ["-mesh"]}, ["--parts", "-mesh"]),
+                                        ("coloured", {"parts": "mesh,attributes,colours,leaf-planes"},
+                                         ["--parts", "mesh,attributes,colours,leaf-planes"]),
+                                        ("open_box", {"fill_holes": True}, ["--fill-holes"]),
                                         ("coloured", {"unit": "mm", "codec": "deflate"},
                                          ["--unit", "mm", "--codec", "deflate"])):
             subprocess.run([COMMAND, "convert", "-q", *switches, f"{name}.ply", "by_command.ebpo.h5"], check=True)
@@ -159,16 +163,16 @@ class Parts(Case):
             ebpo.convert(mesh, "never.ebpo.h5", date="2026-02-30")
         made = ebpo.convert(mesh, "arrays.ebpo.h5")
         self.same(made.mesh(), model("scan").mesh())
-        double = ebpo.convert((mesh.vertices.astype(float), mesh.faces.tolist()), "doubles.ebpo.h5", without="maps")
+        double = ebpo.convert((mesh.vertices.astype(float), mesh.faces.tolist()), "doubles.ebpo.h5", parts="-maps")
         self.assertEqual(double.mesh().vertices.dtype, np.float64)
         text = "v 691234.567 5334567.891 0\nv 691235.567 5334567.891 0\nv 691234.567 5334568.902 1\nf 1 2 3\n"
         pathlib.Path("utm.obj").write_text(text + "l 1 2\n")
-        with self.assertWarnsRegex(UserWarning, "^utm.obj: left out in reading: points, lines"):
+        with self.assertWarnsRegex(UserWarning, "^utm.obj: ignored in reading: points, lines"):
             utm = ebpo.convert("utm.obj", "utm.ebpo.h5")
         self.assertEqual(sorted(utm.mesh().vertices.tolist()),
                          sorted([float(x) for x in line.split()[1:]] for line in text.splitlines()[:3]))
         stages = []
-        ebpo.convert("scan.ply", "told.ebpo.h5", progress=lambda stage, *_: stages.append(stage))
+        ebpo.convert("scan.ply", "stages.ebpo.h5", progress=lambda stage, *_: stages.append(stage))
         self.assertGreater(len(set(stages)), 2)
         with self.assertRaises(ebpo.Cancelled):
             ebpo.convert("scan.ply", "never.ebpo.h5", progress=lambda *_: False)
@@ -178,7 +182,8 @@ class Parts(Case):
             ebpo.convert("scan.ply", "never.ebpo.h5", nonsense=1)
         with self.assertRaises(TypeError):  # of the theses' selections, which there are none of here
             ebpo.convert("scan.ply", "never.ebpo.h5", percent=5)
-        for wrong in ({"rule": "none"}, {"codec": "none at all"}, {"without": "mess"}, {"without": ["maps", "mess"]}):
+        for wrong in ({"rule": "none"}, {"codec": "none at all"}, {"parts": "mess"}, {"parts": ["-maps", "-mess"]},
+                      {"parts": "-maps,mesh"}, {"parts": "maps,envelopes"}, {"parts": "mesh,colours"}, {"parts": ""}):
             with self.assertRaisesRegex(ValueError, "not '"):
                 ebpo.convert("scan.ply", "never.ebpo.h5", **wrong)
         self.assertEqual(ebpo.convert("scan.ply", "dated.ebpo.h5", date="2026-03-01").info.date, "2026-03-01")
@@ -211,7 +216,7 @@ class Parts(Case):
         gap = c.distance(pose_b=away)
         self.assertEqual(gap.lo, gap.hi)
         self.assertAlmostEqual(np.linalg.norm(gap.point_a - gap.point_b), gap.hi, places=12)
-        out = c.way_out([-1, 0, 0], pose_b=partly)
+        out = c.separation([-1, 0, 0], pose_b=partly)
         self.assertTrue(out.lo == out.hi > 0)
         moved = ebpo.pose(translation=[-out.hi * 1.001, 0, 0])
         self.assertIn(c.relation(pose_a=moved, pose_b=partly), (ebpo.Relation.DISJOINT, ebpo.Relation.TOUCHING))
@@ -232,11 +237,11 @@ class Parts(Case):
                           {"name": "far", "model": "ball", "pose": {"translation": [9, 0, 0]}}]}))
         scene = ebpo.open_scene("two.scene.json", memory="64M")
         self.assertEqual((scene.models, scene.instances), (["ball"], ["here", "there", "far"]))
-        met = scene.meet(count=True, relate=True)
-        self.assertEqual([(row["a"], row["b"]) for row in met], [(0, 1)])
-        self.assertEqual(met[0]["kind"], ebpo.MeetingKind.PROTRUDING)
+        clashes = scene.clashes(count=True, relate=True)
+        self.assertEqual([(row["a"], row["b"]) for row in clashes], [(0, 1)])
+        self.assertEqual(clashes[0]["kind"], ebpo.ClashKind.PROTRUDING)
         pairs = scene.collide("here", "there")
-        self.assertEqual(met[0]["crossing"], (pairs.kind == ebpo.PairKind.CROSSING).sum())
+        self.assertEqual(clashes[0]["crossing"], (pairs.kind == ebpo.PairKind.CROSSING).sum())
         self.assertEqual(scene.pose("there")[0, 3], 1)
         self.assertTrue(scene.box()[1, 0] > 9)
         self.assertEqual(len(scene.pairs()), 1)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Files from everywhere: paths, bytes, file objects, objects with ranges, fsspec, a web server."""
+"""Tests all sources of bytes: paths, bytes, file objects, objects with ranges, fsspec, a web server."""
 import contextlib
 import http.server
 import io
@@ -13,7 +13,7 @@ import threading
 import time
 import unittest.mock
 
-from package_kit import COMMAND, GENERATE, Case, model, np, points, run
+from package_support import COMMAND, GENERATE, Case, model, np, points, run
 
 import ebpo
 from ebpo import automatic, sources
@@ -25,10 +25,10 @@ P = points(500)
 
 class Ranges:
     def __init__(self, data):
-        self.data, self.size, self.asked = data, len(data), 0
+        self.data, self.size, self.requested = data, len(data), 0
 
     def read_range(self, offset, size):
-        self.asked += size
+        self.requested += size
         return self.data[offset:offset + size]
 
 
@@ -41,7 +41,7 @@ class Server(http.server.BaseHTTPRequestHandler):
     cut = 0  # answers that end before their time
     cap = 1 << 30  # bytes of an answer
     plain = False  # no ranges
-    count, most_at_once, now = 0, 0, 0  # requests
+    count, max_at_once, now = 0, 0, 0  # requests
     pause = .005  # seconds that each takes
     lock = threading.Lock()
     connections, kind = 0, "application/octet-stream"
@@ -68,7 +68,7 @@ class Server(http.server.BaseHTTPRequestHandler):
             return
         with Server.lock:
             Server.count, Server.now = Server.count + 1, Server.now + 1
-            Server.most_at_once = max(Server.most_at_once, Server.now)
+            Server.max_at_once = max(Server.max_at_once, Server.now)
         time.sleep(Server.pause)
         with Server.lock:
             Server.now -= 1
@@ -112,12 +112,12 @@ class Sources(Case):
         with open("scan.ebpo.h5", "rb", buffering=0) as raw:
             for given in (io.BytesIO(self.data), open("scan.ebpo.h5", "rb"), raw, ranges):
                 self.same(ebpo.open(given).distance(P), self.expected)
-        self.assertGreater(ranges.asked, 0)
+        self.assertGreater(ranges.requested, 0)
 
     def test_sources_that_fail(self):
         class Failing(Ranges):
             def read_range(self, offset, size):
-                if self.asked > 0:
+                if self.requested > 0:
                     raise KeyError("no such part")
                 return super().read_range(offset, size)
 
@@ -126,7 +126,7 @@ class Sources(Case):
         with self.assertRaisesRegex(ebpo.IOFailure, "a name with"):
             class Unencodable(Ranges):
                 def read_range(self, offset, size):
-                    if self.asked:
+                    if self.requested:
                         raise OSError("a name with \udcff and \0")
                     return super().read_range(offset, size)
             ebpo.open(Unencodable(large())).mesh()
@@ -150,7 +150,7 @@ class Sources(Case):
         with self.assertRaisesRegex(TypeError, "nonsense"):
             ebpo.open("http://127.0.0.1:1/", nonsense=3)
 
-    def test_damage_is_told(self):
+    def test_damage(self):
         damaged = bytearray(self.data)
         for at in range(len(damaged) // 2, len(damaged), 997):
             damaged[at] ^= 0x55
@@ -262,18 +262,18 @@ class Sources(Case):
     def test_web_reads_parts(self):
         """Only what a question needs is read, joined and several ranges at a time, as by the library."""
         url = f"{self.serve(large())}/large.ebpo.h5"
-        self.changed(count=0, most_at_once=0, pause=.1)  # long enough for a busy machine to send several
+        self.changed(count=0, max_at_once=0, pause=.1)  # long enough for a busy machine to send several
         library = ebpo.open(url)
         expected = library.distance(P), library.inside(P[0])
         counts = []
         for open_it in (ebpo.open, self.by_web):
-            Server.count, Server.most_at_once = 0, 0
+            Server.count, Server.max_at_once = 0, 0
             m = open_it(url)
             self.same((m.inside(P[0]),), expected[1:])
             counts.append(Server.count)
             self.assertEqual((m.stats["budget"], m.stats["resident"]), (256 << 20, False))
             self.same(m.distance(P), expected[0])
-            self.assertGreater(Server.most_at_once, 3)
+            self.assertGreater(Server.max_at_once, 3)
         self.assertLessEqual(counts[1], counts[0])
         self.assertLess(counts[1], 10)
 
@@ -333,12 +333,12 @@ class Sources(Case):
                  "a chunk": (good + b"Transfer-Encoding: chunked\r\n\r\n-5\r\n", b"x" * 1000, 0),
                  "chunks": (good + b"Transfer-Encoding: chunked\r\n\r\n", b"1;x=y\r\nx\r\n", .4),
                  "a longer body": (good + b"Content-Length: 10\r\n\r\n", b"0123456789", 0)}
-        def ask(name, begin, rest, pause):
+        def query(name, begin, rest, pause):
             listening = socket.create_server(("127.0.0.1", 0), backlog=50)
             self.addCleanup(listening.close)
 
             def serve(listening=listening, begin=begin, rest=rest, pause=pause):
-                def answer(connection):
+                def respond(connection):
                     with contextlib.suppress(OSError), connection:
                         connection.recv(65536)
                         connection.sendall(begin)
@@ -347,7 +347,7 @@ class Sources(Case):
                             time.sleep(pause)
                 with contextlib.suppress(OSError):
                     while True:
-                        threading.Thread(target=answer, args=(listening.accept()[0],), daemon=True).start()
+                        threading.Thread(target=respond, args=(listening.accept()[0],), daemon=True).start()
 
             threading.Thread(target=serve, daemon=True).start()
             began = time.monotonic()
@@ -360,7 +360,7 @@ class Sources(Case):
             took[name] = time.monotonic() - began
 
         took: dict = {}
-        threads = [threading.Thread(target=ask, args=(name, *case)) for name, case in cases.items()]
+        threads = [threading.Thread(target=query, args=(name, *case)) for name, case in cases.items()]
         for thread in threads:
             thread.start()
         for thread in threads:
@@ -371,8 +371,8 @@ class Sources(Case):
     def test_npy_shapes(self):
         """A .npy whose shape is negative, huge or overflows is refused, as points and as numbers of faces."""
         from ebpo.catalogue import Catalogue
-        from ebpo.holding import ours
-        from ebpo.stretches import PointFile
+        from ebpo.open_models import process_models
+        from ebpo.point_files import PointFile
 
         def save(shape, descr="<f8", body=bytes(48)):
             head = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
@@ -390,7 +390,7 @@ class Sources(Case):
         numbered = Catalogue([entry._replace(numbers=os.path.abspath("x.npy"))])
         save("(12,)", "<i8", np.arange(12).tobytes())
         self.assertLess(numbered.distance([.5, .5, .5])["face"], 12)
-        ours().clear()
+        process_models().clear()
         for shape in ("(-1,)", "(-6,)", "(7,)", "(2, 3)", "(4611686018427387910,)", "(99999999999999999999999,)"):
             save(shape, "<i8")
             with self.assertRaisesRegex(ebpo.FormatError, "x.npy", msg=shape):
@@ -402,26 +402,26 @@ class Sources(Case):
     def test_ranges_ahead(self):
         """Announced ranges are joined, fetched several at a time, and held within the memory."""
         data = np.random.default_rng(1).bytes(3 << 20)
-        asked, gate = [], threading.Event()
+        requested, gate = [], threading.Event()
 
         class Slow:
             def read_range(self, offset, size):
-                asked.append((offset, size))
+                requested.append((offset, size))
                 if offset:
                     gate.wait(10)
                 return data[offset:offset + size]
 
         far = Far(Slow(), len(data), memory=1 << 20)
-        self.assertEqual(asked, [(0, 1 << 17)])
+        self.assertEqual(requested, [(0, 1 << 17)])
         far.prefetch([(1 << 18, 1000), (300_000, 2000), ((1 << 18) + 2000, 1000), (1 << 20, 5000), (100, 200)])
         for _ in range(500):
-            if len(asked) == 4:
+            if len(requested) == 4:
                 break
             time.sleep(.01)
-        self.assertEqual(sorted(asked[1:]), [(1 << 18, 3000), (300_000, 2000), (1 << 20, 5000)], "three at a time, joined")
+        self.assertEqual(sorted(requested[1:]), [(1 << 18, 3000), (300_000, 2000), (1 << 20, 5000)], "three at a time, joined")
         gate.set()
         self.assertEqual(far.read_range(300_500, 100), data[300_500:300_600])
-        self.assertEqual(len(asked), 4, "what has come is not asked for again")
+        self.assertEqual(len(requested), 4, "what has come is not asked for again")
         far.prefetch([(begin, 100_000) for begin in range(1 << 18, 2 << 20, 120_000)])
         for begin in range(1 << 18, 2 << 20, 120_000):
             self.assertEqual(far.read_range(begin, 100_000), data[begin:begin + 100_000])
@@ -512,11 +512,11 @@ class Sources(Case):
         self.same(m.distance(q)[:3], whole.distance(q)[:3])
         self.assertTrue(m.stats["resident"], "so many that they need all of it")
         q = q[:2000]
-        for ask in (lambda m: m.ray(q, q + .1), lambda m: m.ray_all(q, q + .1), lambda m: m.locate(q),
+        for query in (lambda m: m.ray(q, q + .1), lambda m: m.ray_all(q, q + .1), lambda m: m.locate(q),
                     lambda m: m.faces_in_box([0, 0, 0], [.2, .2, 1])):
             m = ebpo.open("large.ebpo.h5")
-            for a, b in zip(np.atleast_2d(ask(m)) if isinstance(ask(m), np.ndarray) else ask(m),
-                            np.atleast_2d(ask(whole)) if isinstance(ask(whole), np.ndarray) else ask(whole)):
+            for a, b in zip(np.atleast_2d(query(m)) if isinstance(query(m), np.ndarray) else query(m),
+                            np.atleast_2d(query(whole)) if isinstance(query(whole), np.ndarray) else query(whole)):
                 np.testing.assert_array_equal(a, b)
         m = ebpo.open("large.ebpo.h5")
         ebpo.Collider(m, m)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The wheel, in an environment with numpy and nothing else: test_wheel.py SOURCE_ROOT BUILD EBPO EBPO_INPUTS
+"""Tests the wheel in an environment with numpy only: test_wheel.py SOURCE_ROOT BUILD EBPO EBPO_INPUTS
 
 It is packed from the library of this build. Of what that library needs, only what the reading library of
 the real wheel needs goes in; the rest is the system's here. Exit code 77: pip, patchelf or binutils is missing.
@@ -62,28 +62,28 @@ def check_record(path):
         assert [row[0] for row in rows] == names, "RECORD names what is there"
         for name, digest, size in rows:
             data = archive.read(name)
-            told = "sha256=" + base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
-            assert name == record or (digest, int(size)) == (told, len(data)), name
+            expected = "sha256=" + base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
+            assert name == record or (digest, int(size)) == (expected, len(data)), name
         assert {"ebpo/__init__.py", "ebpo/_declared.py", "ebpo/py.typed", "ebpo/libebpo.so.0"} <= set(names)
         licences = [name for name in names if "/licenses/" in name]
         assert len(licences) >= 1 + (len([n for n in names if ".so" in n]) - 1) * bool(shutil.which("dpkg-query"))
 
 
-def check_platform(path, left_out):
+def check_platform(path, omitted):
     """The tag names the newest glibc that a library in the wheel asks for; all else they need is in it."""
     with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(path) as archive:
         libraries = [name for name in archive.namelist() if ".so" in name]
         names = {os.path.basename(name) for name in libraries}
         newest = (2, 17)
         for name in libraries:
-            told = run("objdump", "-p", archive.extract(name, folder), env=dict(os.environ, LC_ALL="C"))
-            needed = set(re.findall(r"^ +NEEDED +(\S+)", told, re.M))
+            printed = run("objdump", "-p", archive.extract(name, folder), env=dict(os.environ, LC_ALL="C"))
+            needed = set(re.findall(r"^ +NEEDED +(\S+)", printed, re.M))
             others = needed - names - ALLOWED
-            assert not [other for other in others if not left_out.match(other)], (name, others)
-            assert re.findall(r"^ +R(?:UN)?PATH +(\S+)", told, re.M) == ["$ORIGIN"], (name, "looks elsewhere")
-            for version in re.findall(r"^ +0x\w+ 0x\w+ \d+ GLIBC_(\d+\.\d+)", told, re.M):
+            assert not [other for other in others if not omitted.match(other)], (name, others)
+            assert re.findall(r"^ +R(?:UN)?PATH +(\S+)", printed, re.M) == ["$ORIGIN"], (name, "looks elsewhere")
+            for version in re.findall(r"^ +0x\w+ 0x\w+ \d+ GLIBC_(\d+\.\d+)", printed, re.M):
                 newest = max(newest, tuple(map(int, version.split("."))))
-            if " GLIBC_ABI_DT_RELR" in told:
+            if " GLIBC_ABI_DT_RELR" in printed:
                 newest = max(newest, (2, 36))
         found = re.search(r"-manylinux_(\d+)_(\d+)_", os.path.basename(path))
         assert not found or tuple(map(int, found.groups())) == newest, (path, newest)

@@ -1,9 +1,9 @@
-/* The kernels' filters for eight faces, for any processor or for those with AVX2. */
+/* The filters of the kernels for eight faces, for any processor or for processors with AVX2. */
 #include "core/strict_fp.h"
 
 #include "filter_faces.h"
 
-/* The kernels' tables, under this set's name (EBPO_KERNEL_SUFFIX). */
+/* The tables of the kernels, under the name of this set (EBPO_KERNEL_SUFFIX). */
 extern const ebpo_inside_kernels EBPO_KERNEL(ebpo_inside_kernels);
 extern const ebpo_nearest_kernels EBPO_KERNEL(ebpo_nearest_kernels);
 
@@ -35,5 +35,5 @@ static void turns_of(const ebpo_accel *s, uint32_t block, const ebpo_axis_segmen
     *open = t.open;
 }
 
-/* face_filters_base or face_filters_avx2. */
+/* Becomes face_filters_base or face_filters_avx2. */
 const face_filters EBPO_KERNEL(face) = { near_faces_of, turns_of };

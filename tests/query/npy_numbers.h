@@ -1,4 +1,4 @@
-/* A .npy of integers, as a catalogue names it for the faces of a part. */
+/* Writes a .npy of integers, which a catalogue names for the faces of a part. */
 #ifndef EBPO_TESTS_NPY_NUMBERS_H
 #define EBPO_TESTS_NPY_NUMBERS_H
 

@@ -1,10 +1,10 @@
-/* Which subtrees are loaded ahead: what queries about places nearby need is among them. */
+/* Prefetching of subtrees: the subtrees needed by queries nearby are among the prefetched ones. */
 #include <math.h>
 #include <stdlib.h>
 
 #include "check_main.h"
 #include "query/load_ahead.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 static const struct {
     const char *name;
@@ -33,7 +33,8 @@ static double distance_and_sign(ebpo_model *model, const double p[3])
     ebpo_inside_result inside;
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     ASSERT_OK(ebpo_context_new(model, &context, error));
-    /* envelopes do not decide then: the cell that holds p is needed, however far its envelope is */
+    /* envelopes do not decide then: the cell that contains p is needed at any distance of its
+     * envelope */
     options.unsigned_distance = model->info->rule != EBPO_RULE_NONZERO;
     ASSERT_OK(ebpo_distance(context, p, &options, &distance, error));
     if (!options.unsigned_distance)
@@ -42,7 +43,7 @@ static double distance_and_sign(ebpo_model *model, const double p[3])
     return fabs(distance.distance);
 }
 
-/* A query about a place `away` from p, when only what is said to be near p is there. */
+/* Runs a query about a point `away` from p, when only the subtrees listed for p are loaded. */
 static bool loads_nothing_more(ebpo_model *model, const double p[3], const double away[3])
 {
     double way = sqrt(away[0] * away[0] + away[1] * away[1] + away[2] * away[2]) * (1 + 0x1p-40),
@@ -61,11 +62,11 @@ static bool loads_nothing_more(ebpo_model *model, const double p[3], const doubl
     return count > 0;
 }
 
-START_TEST(what_is_near_is_all_that_queries_nearby_need)
+START_TEST(test_prefetch_covers_nearby_queries)
 {
     query_model m;
     uint64_t count = query_scaled(200), looked = 0;
-    double *points = query_room(2 * count, 3 * sizeof *points);
+    double *points = query_capacity(2 * count, 3 * sizeof *points);
     query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name),
                      &query_variants[cases[_i].variant]);
     query_make_points(&m, 2 * count, (uint64_t)_i + 77, points);
@@ -90,11 +91,11 @@ START_TEST(what_is_near_is_all_that_queries_nearby_need)
 }
 END_TEST
 
-START_TEST(the_nearest_come_first_and_a_larger_reach_only_adds)
+START_TEST(test_prefetch_orders_nearest_first)
 {
     query_model m;
     uint64_t count = query_scaled(100);
-    double *points = query_room(count, 3 * sizeof *points);
+    double *points = query_capacity(count, 3 * sizeof *points);
     query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name),
                      &query_variants[cases[_i].variant]);
     query_make_points(&m, count, (uint64_t)_i + 78, points);
@@ -126,8 +127,8 @@ TEST_SUITE(ahead)
     Suite *suite = suite_create("ahead");
     TCase *tests = tcase_create("ahead");
     tcase_set_timeout(tests, 1000);
-    tcase_add_loop_test(tests, what_is_near_is_all_that_queries_nearby_need, 0, CASES);
-    tcase_add_loop_test(tests, the_nearest_come_first_and_a_larger_reach_only_adds, 0, CASES);
+    tcase_add_loop_test(tests, test_prefetch_covers_nearby_queries, 0, CASES);
+    tcase_add_loop_test(tests, test_prefetch_orders_nearest_first, 0, CASES);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,5 +1,5 @@
-/* Booleans by query against rational arithmetic: meshes are posed by the definition, and winding
- * numbers found by brute force. */
+/* Boolean queries against rational arithmetic: meshes are posed by the definition, and winding
+ * numbers are computed by brute force. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -9,11 +9,11 @@
 #include <ebpo/boolean.h>
 
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 enum { OPERANDS = 3, NEAR = 24 };
 
-/* --- operands: a model, its pose, and the posed mesh's judge --- */
+/* --- operands: a model, its pose, and the reference of the posed mesh --- */
 
 typedef struct operand {
     query_model model;
@@ -22,7 +22,7 @@ typedef struct operand {
     oracle *judge;
 } operand;
 
-/* The definition of docs/develop/collision.md, without the library. */
+/* Implements the definition of docs/develop/collision.md without the library. */
 static void pose_vertex(const ebpo_pose *p, const double x[3], double out[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -43,8 +43,8 @@ static void operand_make(operand *o, const char *solid, int variant, const ebpo_
     o->pose = *pose;
     const ebpo_mesh *from = &o->model.mesh;
     o->posed = (ebpo_mesh){ .vertex_count = from->vertex_count, .face_count = from->face_count };
-    o->posed.xyz64 = query_room(from->vertex_count, sizeof(double[3]));
-    o->posed.faces = query_room(from->face_count, sizeof(uint32_t[3]));
+    o->posed.xyz64 = query_capacity(from->vertex_count, sizeof(double[3]));
+    o->posed.faces = query_capacity(from->face_count, sizeof(uint32_t[3]));
     memcpy(o->posed.faces, from->faces, from->face_count * sizeof(uint32_t[3]));
     for (uint64_t v = 0; v < from->vertex_count; v++) {
         double x[3];
@@ -78,7 +78,7 @@ static ebpo_pose shifted(double x, double y, double z)
     return pose;
 }
 
-/* About z, and moved. */
+/* About z, and translated. */
 static ebpo_pose quarter_turn(double x, double y, double z)
 {
     ebpo_pose pose = shifted(x, y, z);
@@ -87,7 +87,7 @@ static ebpo_pose quarter_turn(double x, double y, double z)
     return pose;
 }
 
-/* --- expressions, and what they mean --- */
+/* --- expressions and their meaning --- */
 
 #define LEAF(i)                         \
     {                                   \
@@ -141,7 +141,7 @@ static bool rule_in(ebpo_rule rule, int32_t winding)
                                         : winding != 0;
 }
 
-/* Of each operand IN, OUT or ON. */
+/* Classifies p as IN, OUT or ON each operand. */
 static bool find_truths(operand *o, const double p[3], int32_t where[OPERANDS])
 {
     bool on = false;
@@ -156,7 +156,7 @@ static bool find_truths(operand *o, const double p[3], int32_t where[OPERANDS])
     return on;
 }
 
-/* No face that p is not on is as near as this to it. */
+/* Returns true when no face except those with p on them is this near to p. */
 static bool nothing_else_near(operand *o, const double p[3], double distance)
 {
     uint32_t count;
@@ -166,8 +166,8 @@ static bool nothing_else_near(operand *o, const double p[3], double distance)
     return none;
 }
 
-/* Of the points very close to p, which is on operands: which kinds there are, as bits; 0: faces
- * that it is not on are close as well. */
+/* Returns the kinds of the points very close to p, which is on operands, as bits; 0: other faces
+ * are close as well. */
 static unsigned kinds_near(const formula *f, operand *o, const double p[3],
                            const int32_t where[OPERANDS], uint64_t *state)
 {
@@ -220,7 +220,7 @@ static void judge(const formula *f, operand *o, const double p[3], const ebpo_bo
 
 /* --- points --- */
 
-/* On, or as near as rounding allows to, vertices, edges and faces of an operand; or anywhere. */
+/* On vertices, edges and faces of an operand, exactly or within rounding; or anywhere. */
 static void make_point(const operand *o, uint64_t *state, double p[3])
 {
     const operand *of = &o[ebpo_test_random(state) % OPERANDS];
@@ -238,12 +238,12 @@ static void make_point(const operand *o, uint64_t *state, double p[3])
         p[ebpo_test_random(state) % 3] *= 1 + 0x1p-52;
 }
 
-static void ask(operand *o, const formula *f, uint64_t count, uint64_t seed, uint64_t seen[4])
+static void run_query(operand *o, const formula *f, uint64_t count, uint64_t seed, uint64_t seen[4])
 {
     ebpo_boolean_operand operands[OPERANDS];
     ebpo_boolean *boolean;
-    double *points = query_room(count, sizeof(double[3]));
-    ebpo_boolean_result *got = query_room(count, sizeof *got);
+    double *points = query_capacity(count, sizeof(double[3]));
+    ebpo_boolean_result *got = query_capacity(count, sizeof *got);
     uint64_t state = seed;
     for (int i = 0; i < OPERANDS; i++)
         operands[i] = (ebpo_boolean_operand){ o[i].model.model, o[i].pose };
@@ -258,66 +258,66 @@ static void ask(operand *o, const formula *f, uint64_t count, uint64_t seed, uin
     free(points);
 }
 
-/* told: how often IN, OUT, ON for certain and ON were answered, in the order of ebpo_where. */
-static void ask_all(const char *const solids[OPERANDS], const ebpo_pose poses[OPERANDS],
-                    uint64_t told[4])
+/* reported: counts of the results IN, OUT, certain ON, and ON, in the order of ebpo_where. */
+static void query_all(const char *const solids[OPERANDS], const ebpo_pose poses[OPERANDS],
+                      uint64_t reported[4])
 {
     operand o[OPERANDS];
     uint64_t seen[4] = { 0 };
     for (int i = 0; i < OPERANDS; i++)
         operand_make(&o[i], solids[i], i, &poses[i]);
     for (int f = 0; f < FORMULAS; f++)
-        ask(o, &formulas[f], 100 + query_scaled(300), 77 + (uint64_t)f, seen);
+        run_query(o, &formulas[f], 100 + query_scaled(300), 77 + (uint64_t)f, seen);
     for (int i = 0; i < OPERANDS; i++)
         operand_free(&o[i]);
     ck_assert(seen[EBPO_IN] && seen[EBPO_OUT]);
-    memcpy(told, seen, sizeof seen);
+    memcpy(reported, seen, sizeof seen);
 }
 
-START_TEST(any_poses)
+START_TEST(test_boolean_with_any_pose)
 {
     static const char *const solids[OPERANDS] = { "sphere", "touching_shells", "nested_windings" };
     ebpo_pose poses[OPERANDS] = { pose_of(0.3, 1, 0.1, 0.2, 0.3), pose_of(1.1, 0.7, 0.3, 0, -0.2),
                                   pose_of(-2, 0.2, -0.5, -0.5, -0.5) };
-    uint64_t told[4];
-    ask_all(solids, poses, told);
+    uint64_t reported[4];
+    query_all(solids, poses, reported);
 }
 END_TEST
 
-START_TEST(boxes_with_sides_in_common)
+START_TEST(test_boolean_of_boxes_sharing_sides)
 {
     static const char *const solids[OPERANDS] = { "touching_shells", "touching_shells",
                                                   "boxes_in_walls" };
     ebpo_pose poses[OPERANDS] = { shifted(0, 0, 0), quarter_turn(1, 0, 0), shifted(1, 0, 0.5) };
-    uint64_t told[4];
-    ask_all(solids, poses, told);
-    ck_assert(told[EBPO_ON] && told[3]); /* on sides; on edges */
+    uint64_t reported[4];
+    query_all(solids, poses, reported);
+    ck_assert(reported[EBPO_ON] && reported[3]); /* on sides; on edges */
 }
 END_TEST
 
-START_TEST(equal_and_almost_equal)
+START_TEST(test_boolean_of_equal_and_nearly_equal)
 {
     static const char *const solids[OPERANDS] = { "torus", "torus", "torus" };
     ebpo_pose poses[OPERANDS] = { pose_of(0.5, 1, 0, 0, 0), pose_of(0.5, 1, 0, 0, 0),
                                   pose_of(0.5, 1, 1e-9, 0, 0) };
-    uint64_t told[4];
-    ask_all(solids, poses, told);
+    uint64_t reported[4];
+    query_all(solids, poses, reported);
 }
 END_TEST
 
-/* Rounding moves faces by 2^-26 of their size: the place in the model is in doubt for many points.
- */
-START_TEST(far_from_the_origin)
+/* Rounding moves faces by 2^-26 of their size: the position in the model is uncertain for many
+ * points. */
+START_TEST(test_boolean_far_from_origin)
 {
     static const char *const solids[OPERANDS] = { "sphere", "tetrahedron", "touching_shells" };
     ebpo_pose poses[OPERANDS] = { pose_of(0.3, 1, 1e8, 2e8, -3e7), pose_of(0.7, 1, 1e8, 2e8, -3e7),
                                   pose_of(0.9, 1, 1e8, 2e8, -3e7) };
-    uint64_t told[4];
-    ask_all(solids, poses, told);
+    uint64_t reported[4];
+    query_all(solids, poses, reported);
 }
 END_TEST
 
-/* --- what is refused --- */
+/* --- errors --- */
 
 static ebpo_status try_nodes(const operand *o, const ebpo_boolean_node *nodes, uint32_t count,
                              ebpo_error *error)
@@ -330,7 +330,7 @@ static ebpo_status try_nodes(const operand *o, const ebpo_boolean_node *nodes, u
     return status;
 }
 
-START_TEST(what_is_no_expression_is_refused)
+START_TEST(test_boolean_invalid_expression_is_refused)
 {
     operand o;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -357,11 +357,11 @@ TEST_SUITE(boolean)
     Suite *s = suite_create("boolean");
     TCase *c = tcase_create("boolean");
     tcase_set_timeout(c, 1200);
-    tcase_add_test(c, any_poses);
-    tcase_add_test(c, boxes_with_sides_in_common);
-    tcase_add_test(c, equal_and_almost_equal);
-    tcase_add_test(c, far_from_the_origin);
-    tcase_add_test(c, what_is_no_expression_is_refused);
+    tcase_add_test(c, test_boolean_with_any_pose);
+    tcase_add_test(c, test_boolean_of_boxes_sharing_sides);
+    tcase_add_test(c, test_boolean_of_equal_and_nearly_equal);
+    tcase_add_test(c, test_boolean_far_from_origin);
+    tcase_add_test(c, test_boolean_invalid_expression_is_refused);
     suite_add_tcase(s, c);
     return s;
 }

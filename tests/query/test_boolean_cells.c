@@ -1,5 +1,5 @@
-/* Cells of Booleans: volumes that are known lie within, cells hold the result or are in it, and
- * what should not matter does not. */
+/* Cells of Booleans: known volumes are in the interval, outer cells contain the result and inner
+ * cells are in it, and results do not depend on threads or loading. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +7,7 @@
 #include <ebpo/boolean.h>
 
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 enum { FINEST = 6 };
 
@@ -70,7 +70,7 @@ static ebpo_boolean_volume volume_of(ebpo_boolean *boolean, int level)
     return v;
 }
 
-/* The truth within `slack` lies within at every level, and levels never widen the interval. */
+/* The truth within `slack` is in the interval at every level, and levels never widen it. */
 static void check_volume(ebpo_boolean *boolean, double truth, double slack)
 {
     double lo = 0, hi = INFINITY, first = 0;
@@ -107,7 +107,7 @@ static void check_operations(query_model *a, ebpo_pose pose_a, query_model *b, e
     }
 }
 
-START_TEST(volumes_of_cubes)
+START_TEST(test_cell_volumes_of_cubes)
 {
     query_model cube = make_cube();
     ebpo_pose turned = pose_of(0.4, 1, 3, 2, 1), small = turned;
@@ -126,9 +126,9 @@ START_TEST(volumes_of_cubes)
 }
 END_TEST
 
-/* Two unit balls a distance of 1 apart have a lens of 5/12 pi in common; 5,120 faces lack less than
- * a hundredth of it. */
-START_TEST(volumes_of_spheres)
+/* Two unit balls at a distance of 1 share a lens of 5/12 pi; 5,120 faces lack less than a hundredth
+ * of it. */
+START_TEST(test_cell_volumes_of_spheres)
 {
     query_model sphere = make_sphere();
     const double ball = 4 * pi / 3, volumes[3] = { ball, ball, 5 * pi / 12 };
@@ -151,7 +151,7 @@ static void check_closed(const ebpo_mesh *mesh)
                       0);
 }
 
-/* Points of the result are in the outer cells, points of the inner cells in the result. */
+/* Points of the result are in the outer cells, points of the inner cells are in the result. */
 static void check_points(ebpo_boolean *boolean, oracle *outer, oracle *inner)
 {
     uint64_t state = 5, in = 0, sure = 0;
@@ -171,7 +171,7 @@ static void check_points(ebpo_boolean *boolean, oracle *outer, oracle *inner)
     ck_assert(sure > 0 && in > sure);
 }
 
-START_TEST(surfaces_of_cells_hold_and_are_held)
+START_TEST(test_inner_and_outer_surfaces_enclose_result)
 {
     query_model sphere = make_sphere(), cube = make_cube();
     for (int op = EBPO_BOOLEAN_UNION; op <= EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE; op++) {
@@ -201,7 +201,7 @@ START_TEST(surfaces_of_cells_hold_and_are_held)
 }
 END_TEST
 
-/* --- what does not matter --- */
+/* --- independence --- */
 
 static void check_equal(ebpo_boolean *a, ebpo_boolean *b, bool same_work)
 {
@@ -226,7 +226,7 @@ static void check_equal(ebpo_boolean *a, ebpo_boolean *b, bool same_work)
     ebpo_boolean_free(b);
 }
 
-START_TEST(swapping_and_threads_change_nothing)
+START_TEST(test_cells_ignore_order_and_threads)
 {
     query_model sphere = make_sphere(), cube = make_cube();
     const int same[] = { EBPO_BOOLEAN_UNION, EBPO_BOOLEAN_INTERSECTION,
@@ -243,7 +243,7 @@ START_TEST(swapping_and_threads_change_nothing)
 END_TEST
 
 /* A model whose subtrees are loaded on demand. */
-START_TEST(loading_changes_nothing)
+START_TEST(test_cells_same_with_loading_on_demand)
 {
     query_model sphere = make_sphere();
     ebpo_model *parts;
@@ -258,7 +258,7 @@ START_TEST(loading_changes_nothing)
 }
 END_TEST
 
-START_TEST(nodes_decide_most)
+START_TEST(test_nodes_classify_most_cells)
 {
     query_model sphere = make_sphere();
     ebpo_boolean *boolean = make_pair(sphere.model, pose_of(0.3, 1, 0, 0, 0), sphere.model,
@@ -316,7 +316,7 @@ static void check_distances(ebpo_boolean *boolean, const ebpo_pose *pose, const 
     }
 }
 
-START_TEST(distances_to_rows_of_boxes)
+START_TEST(test_boundary_distance_to_box_row)
 {
     static const row_of_boxes rows[] = {
         { EBPO_BOOLEAN_UNION, 1, { 0, 0 }, { 1.5, 0 } },
@@ -338,8 +338,8 @@ START_TEST(distances_to_rows_of_boxes)
 }
 END_TEST
 
-/* Of nothing there is no boundary: beyond the boxes for certain, between them perhaps. */
-START_TEST(distances_to_nothing)
+/* The boundary of an empty result is empty: certainly beyond the boxes, possibly between them. */
+START_TEST(test_boundary_distance_of_empty_result)
 {
     query_model cube = make_cube();
     ebpo_pose at = pose_of(0.3, 1, 0, 0, 0), away = pose_of(0.3, 1, 9, 0, 0);
@@ -360,9 +360,9 @@ START_TEST(distances_to_nothing)
 }
 END_TEST
 
-/* --- nothing, and too much --- */
+/* --- empty results, and limits --- */
 
-START_TEST(boxes_apart_have_nothing_in_common)
+START_TEST(test_disjoint_boxes_have_empty_intersection)
 {
     query_model cube = make_cube();
     ebpo_boolean *boolean = make_pair(cube.model, pose_of(0.3, 1, 0, 0, 0), cube.model,
@@ -392,7 +392,7 @@ static ebpo_status try_cells(ebpo_boolean *boolean, int level, uint64_t most)
     return status;
 }
 
-START_TEST(what_cannot_be_is_refused)
+START_TEST(test_invalid_cell_levels_are_refused)
 {
     query_model cube = make_cube();
     ebpo_pose far = pose_of(0.3, 1, 1e14, 0, 0);
@@ -416,16 +416,16 @@ TEST_SUITE(boolean_cells)
     TCase *c = tcase_create("boolean_cells"), *threads = tcase_create("threads");
     tcase_set_timeout(c, 1200);
     tcase_set_timeout(threads, 1200);
-    tcase_add_test(threads, swapping_and_threads_change_nothing);
-    tcase_add_test(c, volumes_of_cubes);
-    tcase_add_test(c, volumes_of_spheres);
-    tcase_add_test(c, surfaces_of_cells_hold_and_are_held);
-    tcase_add_test(c, loading_changes_nothing);
-    tcase_add_test(c, nodes_decide_most);
-    tcase_add_test(c, distances_to_rows_of_boxes);
-    tcase_add_test(c, distances_to_nothing);
-    tcase_add_test(c, boxes_apart_have_nothing_in_common);
-    tcase_add_test(c, what_cannot_be_is_refused);
+    tcase_add_test(threads, test_cells_ignore_order_and_threads);
+    tcase_add_test(c, test_cell_volumes_of_cubes);
+    tcase_add_test(c, test_cell_volumes_of_spheres);
+    tcase_add_test(c, test_inner_and_outer_surfaces_enclose_result);
+    tcase_add_test(c, test_cells_same_with_loading_on_demand);
+    tcase_add_test(c, test_nodes_classify_most_cells);
+    tcase_add_test(c, test_boundary_distance_to_box_row);
+    tcase_add_test(c, test_boundary_distance_of_empty_result);
+    tcase_add_test(c, test_disjoint_boxes_have_empty_intersection);
+    tcase_add_test(c, test_invalid_cell_levels_are_refused);
     suite_add_tcase(s, c);
     suite_add_tcase(s, threads);
     return s;

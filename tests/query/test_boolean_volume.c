@@ -1,5 +1,5 @@
-/* Exact volumes of Booleans. Boxes on a grid are counted cell by cell, with winding numbers summed
- * box by box; other meshes are measured in rational arithmetic. */
+/* Exact volumes of Booleans. Boxes on a grid are counted cell by cell, with sums of winding numbers
+ * of boxes; other meshes are measured in rational arithmetic. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -10,7 +10,7 @@
 #include <ebpo/boolean.h>
 
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 enum { OPERANDS = 3, BOXES = 40, WORLD = 24, NODES = 9 };
 
@@ -54,7 +54,7 @@ static ebpo_exact_volume measure_pair(ebpo_model *a, ebpo_pose pose_a, ebpo_mode
 static void check_exact(const ebpo_exact_volume *v, double truth)
 {
     ck_assert_int_eq(v->doubt, EBPO_VOLUME_CERTAIN);
-    ck_assert_int_eq(v->volume.figure, EBPO_FIGURE_EXACT);
+    ck_assert_int_eq(v->volume.metric, EBPO_VALUE_EXACT);
     ck_assert_msg(v->volume.lo == truth && v->volume.hi == truth, "%.17g .. %.17g, not %.17g",
                   v->volume.lo, v->volume.hi, truth);
 }
@@ -67,7 +67,7 @@ typedef struct box {
 } box;
 
 typedef struct scene {
-    box of[BOXES]; /* in the world */
+    box of[BOXES]; /* in world coordinates */
     int count;
     ebpo_boolean_node node[NODES];
     ebpo_rule rule[OPERANDS];
@@ -85,7 +85,7 @@ static void add_box(scene *s, uint64_t *state, const int low[3], const int high[
     s->count++;
 }
 
-/* Boxes in the inner of a region: next to each other and in each other, never in contact. */
+/* Fills the inner part of a region with boxes: side by side and nested, never in contact. */
 static void fill_region(scene *s, uint64_t *state, const int low[3], const int high[3])
 {
     int a[3], b[3], axis = (int)below(state, 3);
@@ -119,7 +119,7 @@ static void add_any_box(scene *s, uint64_t *state)
     add_box(s, state, low, high);
 }
 
-static bool surfaces_meet(const box *a, const box *b)
+static bool surfaces_intersect(const box *a, const box *b)
 {
     bool apart = false, in_a = true, in_b = true;
     for (int k = 0; k < 3; k++) {
@@ -137,7 +137,7 @@ static ebpo_pose random_pose(uint64_t *state)
     ebpo_pose pose = EBPO_POSE_INIT;
     int first = (int)below(state, 3);
     memset(pose.rotation, 0, sizeof pose.rotation);
-    for (int i = 0; i < 3; i++) /* a cyclic exchange of axes, and half a turn about one */
+    for (int i = 0; i < 3; i++) /* a cyclic exchange of axes, and a half turn about one */
         pose.rotation[i][(i + first) % 3] = 1;
     int kept = (int)below(state, 4);
     for (int i = 0; i < 3 && kept < 3; i++)
@@ -193,7 +193,7 @@ static void make_models(scene *s)
     }
 }
 
-/* --- the truth --- */
+/* --- reference --- */
 
 static bool by_rule(ebpo_rule rule, int winding)
 {
@@ -254,15 +254,15 @@ static unsigned used_operands(const scene *s)
     return operands;
 }
 
-/* Of operands in use, two or one: surfaces that meet. */
-static bool some_meet(const scene *s, bool two)
+/* Returns true when surfaces of used operands (two or one) intersect. */
+static bool some_intersect(const scene *s, bool two)
 {
     unsigned used = used_operands(s);
     for (int i = 0; i < s->count; i++)
         for (int k = 0; k < i; k++) {
             const box *a = &s->of[i], *b = &s->of[k];
             if ((used >> a->operand & used >> b->operand & 1) &&
-                (a->operand != b->operand) == two && surfaces_meet(a, b))
+                (a->operand != b->operand) == two && surfaces_intersect(a, b))
                 return true;
         }
     return false;
@@ -270,7 +270,7 @@ static bool some_meet(const scene *s, bool two)
 
 /* --- random scenes --- */
 
-static void random_scene(scene *s, uint64_t seed, bool meeting)
+static void random_scene(scene *s, uint64_t seed, bool clash)
 {
     uint64_t state = seed;
     const int low[3] = { 0, 0, 0 }, high[3] = { WORLD, WORLD, WORLD };
@@ -279,7 +279,7 @@ static void random_scene(scene *s, uint64_t seed, bool meeting)
         s->count = 0;
         fill_region(s, &state, low, high);
     }
-    if (meeting)
+    if (clash)
         add_any_box(s, &state);
     for (uint32_t i = 0; i < NODES; i++) {
         bool leaf = i < OPERANDS;
@@ -312,8 +312,8 @@ static void free_scene(scene *s)
         query_model_free(&s->model[i]);
 }
 
-/* What is said to be exact is; what could be is said to be. */
-START_TEST(boxes_that_are_counted)
+/* Results reported as exact are exact, and possible exact results are reported as exact. */
+START_TEST(test_volume_of_boxes_matches_cell_count)
 {
     int positive = 0;
     for (uint64_t seed = 1; seed <= query_scaled(50); seed++) {
@@ -321,7 +321,7 @@ START_TEST(boxes_that_are_counted)
         random_scene(&s, seed, false);
         ebpo_exact_volume v = measure_scene(&s, 1 + seed % 2);
         double truth = count_cells(&s);
-        ck_assert(!some_meet(&s, true) && !some_meet(&s, false));
+        ck_assert(!some_intersect(&s, true) && !some_intersect(&s, false));
         check_exact(&v, truth);
         positive += truth > 0;
         free_scene(&s);
@@ -330,22 +330,22 @@ START_TEST(boxes_that_are_counted)
 }
 END_TEST
 
-START_TEST(boxes_that_may_meet)
+START_TEST(test_volume_of_possibly_intersecting_boxes)
 {
     for (uint64_t seed = 1; seed <= query_scaled(50); seed++) {
         scene s;
         random_scene(&s, seed, true);
         ebpo_exact_volume v = measure_scene(&s, 1);
         double truth = count_cells(&s);
-        bool two = some_meet(&s, true), one = some_meet(&s, false);
+        bool two = some_intersect(&s, true), one = some_intersect(&s, false);
         ck_assert(v.volume.lo <= truth && truth <= v.volume.hi);
         if (v.doubt == EBPO_VOLUME_CERTAIN || (!two && !one))
             check_exact(&v, truth);
         else
-            ck_assert_int_eq(v.volume.figure, EBPO_FIGURE_BOUND);
-        ck_assert(v.doubt != EBPO_VOLUME_OPERANDS_MEET || two);
-        ck_assert(v.doubt != EBPO_VOLUME_FACES_MEET || (one && !two));
-        ck_assert(!two || truth == 0 || v.doubt == EBPO_VOLUME_OPERANDS_MEET);
+            ck_assert_int_eq(v.volume.metric, EBPO_VALUE_BOUND);
+        ck_assert(v.doubt != EBPO_VOLUME_OPERANDS_INTERSECT || two);
+        ck_assert(v.doubt != EBPO_VOLUME_FACES_INTERSECT || (one && !two));
+        ck_assert(!two || truth == 0 || v.doubt == EBPO_VOLUME_OPERANDS_INTERSECT);
         free_scene(&s);
     }
 }
@@ -361,7 +361,7 @@ static ebpo_pose pose_of(double angle, double scale, double x, double y, double 
                         scale };
 }
 
-/* The definition of docs/develop/collision.md, without the library. */
+/* Implements the definition of docs/develop/collision.md without the library. */
 static void pose_vertex(const ebpo_pose *p, const double x[3], mpq_t out[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -423,7 +423,7 @@ static void distance_to(mpq_t out, const mpq_t truth, double x)
     mpq_abs(out, out);
 }
 
-/* No other double is nearer to the truth, in units of 2^exponent. */
+/* Checks that no other double is nearer to the truth, in units of 2^exponent. */
 static void check_nearest_double(double x, const mpq_t truth, int64_t exponent)
 {
     mpq_t units, here, other;
@@ -443,7 +443,7 @@ static void check_nearest_double(double x, const mpq_t truth, int64_t exponent)
 static void check_nearest(const ebpo_exact_volume *v, const mpq_t truth)
 {
     ck_assert_int_eq(v->doubt, EBPO_VOLUME_CERTAIN);
-    ck_assert(v->volume.figure == EBPO_FIGURE_EXACT && v->volume.lo == v->volume.hi);
+    ck_assert(v->volume.metric == EBPO_VALUE_EXACT && v->volume.lo == v->volume.hi);
     ck_assert(v->scaled == 0 || (fabs(v->scaled) > 0x1p-5 && fabs(v->scaled) < 0x1p5));
     check_nearest_double(v->scaled, truth, v->exponent);
     if (isfinite(v->volume.lo))
@@ -452,7 +452,7 @@ static void check_nearest(const ebpo_exact_volume *v, const mpq_t truth)
         ck_assert(v->exponent > 1000);
 }
 
-/* Of a ball and a smaller one in it. */
+/* A ball and a smaller one in it. */
 static void check_nested(const query_model *outer, ebpo_pose pose, const query_model *inner,
                          ebpo_pose within)
 {
@@ -480,7 +480,7 @@ static query_model make_ball(double radius)
     return m;
 }
 
-START_TEST(balls_in_balls)
+START_TEST(test_volume_of_nested_balls)
 {
     query_model ball = make_ball(1), small = make_ball(0.3);
     uint64_t state = 5;
@@ -495,8 +495,8 @@ START_TEST(balls_in_balls)
 }
 END_TEST
 
-/* Products of coordinates that doubles do not hold, and volumes that they barely do. */
-START_TEST(very_large_and_very_small)
+/* Products of coordinates beyond doubles, and volumes at the limit of doubles. */
+START_TEST(test_volume_of_huge_and_tiny_models)
 {
     query_model ball = make_ball(1), small = make_ball(0.3);
     const double scales[] = { 0x1p-290, 0x1p-251, 0x1p-249, 0x1p249, 0x1p251, 0x1p290 };
@@ -508,8 +508,8 @@ START_TEST(very_large_and_very_small)
 }
 END_TEST
 
-/* Volumes that doubles do not hold. */
-START_TEST(volumes_beyond_the_range_of_doubles)
+/* Volumes beyond doubles. */
+START_TEST(test_volume_beyond_double_range)
 {
     const double sizes[] = { 1e-150, 1e-110, 1e110, 1e150, 1e290 };
     for (int i = 0; i < 5; i++) {
@@ -521,8 +521,8 @@ START_TEST(volumes_beyond_the_range_of_doubles)
 }
 END_TEST
 
-/* Products of what has fewer than 53 bits. */
-START_TEST(coordinates_that_are_subnormal)
+/* Products of numbers with fewer than 53 bits. */
+START_TEST(test_volume_with_subnormal_coordinates)
 {
     const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 }, least[] = { 0x1p-1074, 0x1.8p-1030 };
     query_model cube;
@@ -537,8 +537,8 @@ START_TEST(coordinates_that_are_subnormal)
 }
 END_TEST
 
-/* Nearly touching, then touching: one unit in the last place decides. */
-START_TEST(contact_ends_exactness)
+/* Nearly in contact, then in contact: one unit in the last place decides. */
+START_TEST(test_volume_contact_is_not_exact)
 {
     const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
     query_model cube;
@@ -553,8 +553,8 @@ START_TEST(contact_ends_exactness)
     check_nearest(&v, truth);
     beside.translation[0] = 1;
     v = measure_pair(cube.model, at, cube.model, beside, EBPO_BOOLEAN_UNION, 1);
-    ck_assert_int_eq(v.doubt, EBPO_VOLUME_OPERANDS_MEET);
-    ck_assert_int_eq(v.volume.figure, EBPO_FIGURE_BOUND);
+    ck_assert_int_eq(v.doubt, EBPO_VOLUME_OPERANDS_INTERSECT);
+    ck_assert_int_eq(v.volume.metric, EBPO_VALUE_BOUND);
     ck_assert(v.operand[0] == 0 && v.operand[1] == 1 && v.volume.lo == 0 && v.volume.hi >= 2);
     ck_assert(v.file_face[0] < cube.mesh.face_count && v.file_face[1] < cube.mesh.face_count);
     mpq_clear(truth);
@@ -562,9 +562,9 @@ START_TEST(contact_ends_exactness)
 }
 END_TEST
 
-/* --- operands that are equal, not used, or not all there --- */
+/* --- operands that are equal, unused, or incomplete --- */
 
-START_TEST(equal_operands_are_one)
+START_TEST(test_volume_of_equal_operands)
 {
     query_model ball = make_ball(1), again = make_ball(1);
     ebpo_pose at = pose_of(0.5, 1, 1, 2, 3);
@@ -586,8 +586,8 @@ START_TEST(equal_operands_are_one)
 }
 END_TEST
 
-/* (A & A) - B with B in A: both count as in around B. */
-START_TEST(equal_operands_are_in_together)
+/* (A & A) - B with B in A: both operands are in around B. */
+START_TEST(test_volume_of_equal_operands_inside_third)
 {
     query_model ball = make_ball(1), small = make_ball(0.3);
     ebpo_pose at = pose_of(0.5, 1, 1, 2, 3);
@@ -614,7 +614,7 @@ START_TEST(equal_operands_are_in_together)
 }
 END_TEST
 
-START_TEST(operands_that_are_not_used_do_not_matter)
+START_TEST(test_volume_ignores_unused_operands)
 {
     query_model ball = make_ball(1);
     ebpo_pose at = EBPO_POSE_INIT, through = pose_of(0.5, 1, 1, 0, 0);
@@ -647,8 +647,8 @@ static ebpo_mesh tetrahedron_on_edge(int size)
     return m;
 }
 
-/* One in the other, with an edge in common, at which four faces meet: they are of two patches. */
-START_TEST(patches_end_at_edges_of_four)
+/* One in the other, with a common edge of four faces: they belong to two patches. */
+START_TEST(test_volume_patches_at_four_face_edges)
 {
     static const ebpo_rule rules[] = { EBPO_RULE_NONZERO, EBPO_RULE_EVENODD, EBPO_RULE_POSITIVE };
     const ebpo_pose at = EBPO_POSE_INIT, away = pose_of(0, 1, 99, 0, 0);
@@ -677,8 +677,8 @@ START_TEST(patches_end_at_edges_of_four)
 }
 END_TEST
 
-/* Two cubes that overlap in one model: winding numbers vary along a face. */
-START_TEST(faces_that_cross_end_exactness)
+/* Two overlapping cubes in one model: winding numbers vary along a face. */
+START_TEST(test_volume_self_intersection_is_not_exact)
 {
     const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 }, above[3] = { 0.5, 0.5, 0.5 },
                  top[3] = { 2, 2, 2 };
@@ -689,7 +689,7 @@ START_TEST(faces_that_cross_end_exactness)
     query_model_make(&m, "overlapping", mesh, &query_variants[0]);
     ebpo_pose at = EBPO_POSE_INIT, away = pose_of(0, 1, 9, 0, 0);
     ebpo_exact_volume v = measure_pair(m.model, at, m.model, away, EBPO_BOOLEAN_UNION, 1);
-    ck_assert_int_eq(v.doubt, EBPO_VOLUME_FACES_MEET);
+    ck_assert_int_eq(v.doubt, EBPO_VOLUME_FACES_INTERSECT);
     ck_assert(v.operand[0] == 0 && v.operand[1] == 0 && v.file_face[0] != v.file_face[1]);
     v = measure_pair(m.model, at, m.model, away, EBPO_BOOLEAN_INTERSECTION, 1);
     check_exact(&v, 0); /* boxes are apart */
@@ -697,7 +697,7 @@ START_TEST(faces_that_cross_end_exactness)
 }
 END_TEST
 
-START_TEST(models_in_parts_are_not_measured)
+START_TEST(test_volume_of_partly_loaded_is_refused)
 {
     query_model ball = make_ball(1);
     ebpo_model *parts;
@@ -707,13 +707,13 @@ START_TEST(models_in_parts_are_not_measured)
     ebpo_pose at = EBPO_POSE_INIT, away = pose_of(0, 1, 9, 0, 0);
     ebpo_exact_volume v = measure_pair(ball.model, at, parts, away, EBPO_BOOLEAN_UNION, 1);
     ck_assert_int_eq(v.doubt, EBPO_VOLUME_IN_PARTS);
-    ck_assert(v.operand[0] == 1 && v.volume.figure == EBPO_FIGURE_BOUND);
+    ck_assert(v.operand[0] == 1 && v.volume.metric == EBPO_VALUE_BOUND);
     ebpo_model_free(parts);
     query_model_free(&ball);
 }
 END_TEST
 
-/* --- what is refused --- */
+/* --- errors --- */
 
 static bool stop(void *user, const char *stage, uint64_t done, uint64_t total)
 {
@@ -721,7 +721,7 @@ static bool stop(void *user, const char *stage, uint64_t done, uint64_t total)
     return false;
 }
 
-START_TEST(it_can_be_cancelled)
+START_TEST(test_volume_can_be_cancelled)
 {
     query_model ball = make_ball(1);
     const ebpo_boolean_operand operand = { ball.model, EBPO_POSE_INIT };
@@ -743,20 +743,20 @@ TEST_SUITE(boolean_volume)
     Suite *s = suite_create("boolean_volume");
     TCase *c = tcase_create("boolean_volume");
     tcase_set_timeout(c, 1200);
-    tcase_add_test(c, boxes_that_are_counted);
-    tcase_add_test(c, boxes_that_may_meet);
-    tcase_add_test(c, balls_in_balls);
-    tcase_add_test(c, very_large_and_very_small);
-    tcase_add_test(c, coordinates_that_are_subnormal);
-    tcase_add_test(c, contact_ends_exactness);
-    tcase_add_test(c, equal_operands_are_one);
-    tcase_add_test(c, equal_operands_are_in_together);
-    tcase_add_test(c, patches_end_at_edges_of_four);
-    tcase_add_test(c, operands_that_are_not_used_do_not_matter);
-    tcase_add_test(c, faces_that_cross_end_exactness);
-    tcase_add_test(c, models_in_parts_are_not_measured);
-    tcase_add_test(c, it_can_be_cancelled);
-    tcase_add_test(c, volumes_beyond_the_range_of_doubles);
+    tcase_add_test(c, test_volume_of_boxes_matches_cell_count);
+    tcase_add_test(c, test_volume_of_possibly_intersecting_boxes);
+    tcase_add_test(c, test_volume_of_nested_balls);
+    tcase_add_test(c, test_volume_of_huge_and_tiny_models);
+    tcase_add_test(c, test_volume_with_subnormal_coordinates);
+    tcase_add_test(c, test_volume_contact_is_not_exact);
+    tcase_add_test(c, test_volume_of_equal_operands);
+    tcase_add_test(c, test_volume_of_equal_operands_inside_third);
+    tcase_add_test(c, test_volume_patches_at_four_face_edges);
+    tcase_add_test(c, test_volume_ignores_unused_operands);
+    tcase_add_test(c, test_volume_self_intersection_is_not_exact);
+    tcase_add_test(c, test_volume_of_partly_loaded_is_refused);
+    tcase_add_test(c, test_volume_can_be_cancelled);
+    tcase_add_test(c, test_volume_beyond_double_range);
     suite_add_tcase(s, c);
     return s;
 }

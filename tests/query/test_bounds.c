@@ -1,6 +1,6 @@
-/* The hierarchy over blocks of faces: what its bytes say of the faces below each child holds in
- * rational arithmetic, with the room that docs/develop/bounds.md counts on and hardly more; and the
- * kernels for any processor answer as those for this one. */
+/* Checks the hierarchy over blocks of faces in rational arithmetic: the stored bounds contain the
+ * faces below each child, with the margin of docs/develop/bounds.md and hardly more; and the
+ * kernels for any processor return the same results as the kernels for this one. */
 #include <gmp.h>
 #include <inttypes.h>
 #include <math.h>
@@ -10,13 +10,13 @@
 #include "query/accel_parts.h"
 #include "check_main.h"
 #include "query/query_model.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 /* --- bounds --- */
 
 typedef struct exact {
     mpq_t x[3], middle[3], along, square, bound, part;
-    double least, most, aside2; /* of a child's faces along its axis, and off it */
+    double least, most, aside2; /* bounds of the faces of a child along its axis, and off it */
     uint64_t wrong;
 } exact;
 
@@ -50,15 +50,15 @@ static void set_sum(mpq_t out, double a, double b, double c, double d)
     mpq_clears(p, q, NULL);
 }
 
-/* A corner in the subtree's frame, without rounding. */
+/* Sets a corner in the frame of the subtree, without rounding. */
 static void set_corner(exact *e, const ebpo_accel *s, const double corner[3])
 {
     for (int k = 0; k < 3; k++)
         set_sum(e->x[k], corner[k], s->scale, -s->centre[k], s->scale);
 }
 
-/* What single precision may lose of a side: docs/develop/bounds.md, "Boxes". */
-static double room(const ebpo_bound *b, int k)
+/* Returns the rounding margin of a side in single precision: docs/develop/bounds.md, "Boxes". */
+static double space(const ebpo_bound *b, int k)
 {
     return 0x1p-22 * 1.25 * (fabs((double)b->origin[k]) + 255 * (double)b->step[k]);
 }
@@ -68,7 +68,7 @@ static bool in_box(exact *e, const ebpo_bound *b, int lane)
     bool in = true;
     for (int k = 0; k < 3; k++) {
         set_sum(e->bound, b->origin[k], 1, b->step[k], b->low[k][lane]);
-        mpq_set_d(e->part, room(b, k));
+        mpq_set_d(e->part, space(b, k));
         mpq_add(e->bound, e->bound, e->part);
         in = in && mpq_cmp(e->bound, e->x[k]) <= 0;
         set_sum(e->bound, b->origin[k], 1, b->step[k], b->high[k][lane]);
@@ -78,14 +78,14 @@ static bool in_box(exact *e, const ebpo_bound *b, int lane)
     return in;
 }
 
-/* The longest side of a node. */
+/* Returns the longest side of a node. */
 static double size_of(const ebpo_bound *b)
 {
     return 255 * fmax((double)b->step[0], fmax((double)b->step[1], (double)b->step[2]));
 }
 
-/* Where the corner is, seen from the middle of the child's box: along the axis, and the square of
- * how far off it. */
+/* Computes the corner relative to the middle of the child's box: the coordinate along the axis, and
+ * the squared distance from it. */
 static void seen_from_middle(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
 {
     mpq_set_ui(e->along, 0, 1);
@@ -104,7 +104,7 @@ static void seen_from_middle(exact *e, const ebpo_bound *b, const ebpo_bound_sla
     mpq_sub(e->square, e->square, e->part);
 }
 
-/* With the room that single precision needs, 15 u of the node's size: docs/develop/bounds.md,
+/* Includes the margin for single precision, 15 u of the size of the node: docs/develop/bounds.md,
  * "Points against slabs". */
 static bool in_slab(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
 {
@@ -123,7 +123,8 @@ static bool in_slab(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, 
     return in && mpq_cmp(e->square, e->bound) <= 0;
 }
 
-/* After all corners of the child: a slab wider than what rounding asks for drops too little. */
+/* Called after all corners of the child: a bounding cylinder wider than rounding requires excludes
+ * too little. */
 static bool is_tight(const exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
 {
     bool has_axis = slab->axis[0][lane] || slab->axis[1][lane] || slab->axis[2][lane];
@@ -135,7 +136,7 @@ static bool is_tight(const exact *e, const ebpo_bound *b, const ebpo_bound_slab 
             aside_step * slab->radius[lane] <= sqrt(fmax(e->aside2, 0)) + loose + 2 * aside_step);
 }
 
-/* Every face below `child` against what node `n` says of its child `lane`. */
+/* Checks every face below `child` against the bounds of child `lane` in node `n`. */
 static void check_below(exact *e, const ebpo_accel *s, uint32_t n, int lane, uint32_t child)
 {
     if (!(child & EBPO_IS_BLOCK)) {
@@ -157,7 +158,7 @@ static void check_below(exact *e, const ebpo_accel *s, uint32_t n, int lane, uin
     }
 }
 
-/* The square of no axis is greater than 1: the proof for slabs rests on it. */
+/* The square of no axis is greater than 1: the proof for bounding cylinders depends on it. */
 static bool axis_is_short(const ebpo_bound_slab *slab, int lane)
 {
     int64_t square = 0;
@@ -166,7 +167,7 @@ static bool axis_is_short(const ebpo_bound_slab *slab, int lane)
     return square <= INT64_C(1) << 30;
 }
 
-START_TEST(boxes_and_slabs_contain_their_faces)
+START_TEST(test_boxes_and_cylinders_contain_faces)
 {
     query_model m;
     exact e;
@@ -190,7 +191,7 @@ START_TEST(boxes_and_slabs_contain_their_faces)
 }
 END_TEST
 
-/* --- what slabs are made of --- */
+/* --- inputs of bounding cylinders --- */
 
 static void same_measures(const ebpo_accel *s, uint32_t block, const ebpo_slab_view *view)
 {
@@ -205,7 +206,7 @@ static void same_measures(const ebpo_accel *s, uint32_t block, const ebpo_slab_v
     ck_assert_mem_eq(&one_slab, &other_slab, sizeof one_slab);
 }
 
-START_TEST(blocks_are_measured_the_same_on_any_processor)
+START_TEST(test_block_bounds_same_on_any_cpu)
 {
     query_model m;
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
@@ -227,14 +228,14 @@ END_TEST
 
 enum { KEPT = 64 };
 
-typedef struct answers {
+typedef struct results {
     ebpo_ray_hit first, all[KEPT];
     ebpo_distance_result nearest;
     uint64_t count;
     bool hit, any;
-} answers;
+} results;
 
-static void ask_all(query_model *m, const query_ray *r, answers *out)
+static void query_all(query_model *m, const query_ray *r, results *out)
 {
     const ebpo_ray_hit *hits;
     memset(out, 0, sizeof *out);
@@ -253,8 +254,8 @@ static bool same_hit(const ebpo_ray_hit *a, const ebpo_ray_hit *b)
     return memcmp(&a->t, &b->t, sizeof a->t) == 0 && a->face == b->face && a->side == b->side;
 }
 
-/* Bit for bit. */
-static bool same_answers(const answers *a, const answers *b)
+/* Compares all bits. */
+static bool same_results(const results *a, const results *b)
 {
     bool same = a->hit == b->hit && a->any == b->any && a->count == b->count &&
                 memcmp(&a->nearest, &b->nearest, sizeof a->nearest) == 0 &&
@@ -264,25 +265,25 @@ static bool same_answers(const answers *a, const answers *b)
     return same;
 }
 
-START_TEST(kernels_for_any_processor_answer_the_same)
+START_TEST(test_bounds_kernels_agree)
 {
     query_model m;
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
                      &query_variants[_i % query_variant_count]);
-    const ebpo_query_kernels usual = m.model->kernels;
+    const ebpo_query_kernels standard = m.model->kernels;
     uint64_t state = (uint64_t)_i, count = query_scaled(m.mesh.face_count > 500 ? 200 : 600);
     if (strcmp(m.name, "all_scales") == 0)
         count = query_scaled(100);
     for (uint64_t i = 0; i < count; i++) {
         query_ray r;
-        answers one, other;
+        results one, other;
         query_make_ray(&m, &state, r.origin, r.direction, &r.t_max);
         m.model->kernels = ebpo_query_kernels_base();
-        ask_all(&m, &r, &one);
-        ck_assert(query_ask_ray(&m, m.context, &r)); /* against rational arithmetic */
-        m.model->kernels = usual;
-        ask_all(&m, &r, &other);
-        ck_assert_msg(same_answers(&one, &other), "%s: ray %" PRIu64, m.name, i);
+        query_all(&m, &r, &one);
+        ck_assert(query_query_ray(&m, m.context, &r)); /* against rational arithmetic */
+        m.model->kernels = standard;
+        query_all(&m, &r, &other);
+        ck_assert_msg(same_results(&one, &other), "%s: ray %" PRIu64, m.name, i);
         ck_assert(one.any == one.hit);
     }
     query_model_free(&m);
@@ -294,10 +295,9 @@ TEST_SUITE(bounds)
     Suite *suite = suite_create("bounds");
     TCase *bounds = tcase_create("bounds");
     tcase_set_timeout(bounds, 600);
-    tcase_add_loop_test(bounds, boxes_and_slabs_contain_their_faces, 0, query_solid_count());
-    tcase_add_loop_test(bounds, blocks_are_measured_the_same_on_any_processor, 0,
-                        query_solid_count());
-    tcase_add_loop_test(bounds, kernels_for_any_processor_answer_the_same, 0, query_solid_count());
+    tcase_add_loop_test(bounds, test_boxes_and_cylinders_contain_faces, 0, query_solid_count());
+    tcase_add_loop_test(bounds, test_block_bounds_same_on_any_cpu, 0, query_solid_count());
+    tcase_add_loop_test(bounds, test_bounds_kernels_agree, 0, query_solid_count());
     suite_add_tcase(suite, bounds);
     return suite;
 }

@@ -1,5 +1,5 @@
-/* Catalogues: what many models say as one, beside each of them by itself; parts with caps beside
- * the whole; budgets that hold few of the models; and functions of the caller. */
+/* Catalogues: combined results against separate results of each model; parts with caps against the
+ * whole; budgets that hold few of the models; and callbacks. */
 #include <math.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -10,7 +10,7 @@
 
 #include "check_main.h"
 #include "npy_numbers.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 enum { MODELS = 32, POINTS = 1440, RAYS = 800 };
 
@@ -25,7 +25,7 @@ static ebpo_mesh box_mesh(double x, double y, double z, double size)
     return ebpo_test_box(low, high, 16);
 }
 
-/* Some overlap, some touch, one is there twice; all have about as many faces. */
+/* Some overlap, some are in contact, one occurs twice; all have about as many faces. */
 static ebpo_mesh mesh_of(int i)
 {
     const double centre[3] = { 0.25 * i, 0.25 * (i % 3), 0.125 * (i % 5) };
@@ -43,8 +43,8 @@ static void make_models(void)
         query_model_make(&model[i], "catalogue", mesh_of(i), &query_variants[0]);
         ebpo_catalogue_entry_of(model[i].file, model[i].path, &entry[i]);
     }
-    points = query_room(POINTS, 3 * sizeof *points);
-    rays = query_room(RAYS, sizeof *rays);
+    points = query_capacity(POINTS, 3 * sizeof *points);
+    rays = query_capacity(RAYS, sizeof *rays);
     for (int i = 0; i < MODELS; i++)
         query_make_points(&model[i], POINTS / MODELS, seed + (uint64_t)i,
                           points + 3 * (POINTS / MODELS) * i);
@@ -65,16 +65,16 @@ static void free_models(void)
     free(rays);
 }
 
-/* --- what is asked, and what each model says --- */
+/* --- queries, and results of each model --- */
 
-typedef struct asked {
+typedef struct queried {
     ebpo_catalogue *catalogue;
     ebpo_catalogue_models *models;
-} asked;
+} queried;
 
-static asked ask_entries(const ebpo_catalogue_entry *entries, uint64_t count, uint64_t memory)
+static queried query_entries(const ebpo_catalogue_entry *entries, uint64_t count, uint64_t memory)
 {
-    asked a = { NULL, NULL };
+    queried a = { NULL, NULL };
     ebpo_catalogue_models_options o = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
     o.memory = memory;
     o.threads = 1;
@@ -83,15 +83,15 @@ static asked ask_entries(const ebpo_catalogue_entry *entries, uint64_t count, ui
     return a;
 }
 
-static void end_asking(asked *a)
+static void end_querying(queried *a)
 {
     ebpo_catalogue_models_free(a->models);
     ebpo_catalogue_free(a->catalogue);
 }
 
-static ebpo_catalogue_ask_options on_threads(unsigned threads)
+static ebpo_catalogue_query_options on_threads(unsigned threads)
 {
-    ebpo_catalogue_ask_options o = EBPO_CATALOGUE_ASK_OPTIONS_INIT;
+    ebpo_catalogue_query_options o = EBPO_CATALOGUE_QUERY_OPTIONS_INIT;
     o.threads = threads;
     return o;
 }
@@ -102,11 +102,11 @@ static void judge_inside(const ebpo_inside_result *got)
         int32_t winding = 0;
         bool in = false, on = false;
         for (int i = 0; i < MODELS; i++) {
-            ebpo_inside_result told;
-            ASSERT_OK(ebpo_inside(model[i].context, points + 3 * p, NULL, &told, error));
-            winding += told.winding;
-            in |= told.where == EBPO_IN;
-            on |= told.where == EBPO_ON;
+            ebpo_inside_result reported;
+            ASSERT_OK(ebpo_inside(model[i].context, points + 3 * p, NULL, &reported, error));
+            winding += reported.winding;
+            in |= reported.where == EBPO_IN;
+            on |= reported.where == EBPO_ON;
         }
         ck_assert_int_eq(got[p].winding, winding);
         ck_assert_int_eq(got[p].where, in ? EBPO_IN : on ? EBPO_ON : EBPO_OUT);
@@ -122,10 +122,10 @@ static void judge_distance(const ebpo_distance_result *got, const uint64_t *near
         ebpo_distance_result best = { .distance = INFINITY, .face = EBPO_NO_FACE };
         uint64_t first = EBPO_CATALOGUE_NO_MODEL;
         for (int i = 0; i < MODELS; i++) {
-            ebpo_distance_result told;
-            ASSERT_OK(ebpo_distance(model[i].context, points + 3 * p, &o, &told, error));
-            if (told.distance < best.distance && told.distance <= max_distance) {
-                best = told;
+            ebpo_distance_result reported;
+            ASSERT_OK(ebpo_distance(model[i].context, points + 3 * p, &o, &reported, error));
+            if (reported.distance < best.distance && reported.distance <= max_distance) {
+                best = reported;
                 first = (uint64_t)i;
             }
         }
@@ -138,18 +138,18 @@ static void judge_distance(const ebpo_distance_result *got, const uint64_t *near
     }
 }
 
-static void judge_rays(const ebpo_ray_hit *got, const uint64_t *met)
+static void judge_rays(const ebpo_ray_hit *got, const uint64_t *intersected)
 {
     for (int r = 0; r < RAYS; r++) {
         ebpo_ray_hit best = { INFINITY, EBPO_NO_FACE, 0 };
         uint64_t first = EBPO_CATALOGUE_NO_MODEL;
         for (int i = 0; i < MODELS; i++) {
-            ebpo_ray_hit told;
+            ebpo_ray_hit reported;
             bool hit;
             ASSERT_OK(ebpo_ray_first(model[i].context, rays[r].origin, rays[r].direction,
-                                     rays[r].t_max, &told, &hit, error));
-            if (hit && (told.t < best.t || best.face == EBPO_NO_FACE)) {
-                best = told;
+                                     rays[r].t_max, &reported, &hit, error));
+            if (hit && (reported.t < best.t || best.face == EBPO_NO_FACE)) {
+                best = reported;
                 first = (uint64_t)i;
             }
         }
@@ -158,17 +158,17 @@ static void judge_rays(const ebpo_ray_hit *got, const uint64_t *met)
         ck_assert_double_eq(got[r].t, best.t);
         ck_assert_uint_eq(got[r].face, best.face);
         ck_assert_int_eq(got[r].side, best.side);
-        ck_assert_uint_eq(met[r], first);
+        ck_assert_uint_eq(intersected[r], first);
     }
 }
 
-static void ask_everything(asked *a, unsigned threads)
+static void query_everything(queried *a, unsigned threads)
 {
-    ebpo_catalogue_ask_options o = on_threads(threads);
-    ebpo_inside_result *inside = query_room(POINTS, sizeof *inside);
-    ebpo_distance_result *distance = query_room(POINTS, sizeof *distance);
-    ebpo_ray_hit *hits = query_room(RAYS, sizeof *hits);
-    uint64_t *number = query_room(POINTS, sizeof *number);
+    ebpo_catalogue_query_options o = on_threads(threads);
+    ebpo_inside_result *inside = query_capacity(POINTS, sizeof *inside);
+    ebpo_distance_result *distance = query_capacity(POINTS, sizeof *distance);
+    ebpo_ray_hit *hits = query_capacity(RAYS, sizeof *hits);
+    uint64_t *number = query_capacity(POINTS, sizeof *number);
     ASSERT_OK(ebpo_catalogue_inside(a->catalogue, a->models, points, POINTS, &o, inside, error));
     judge_inside(inside);
     ASSERT_OK(ebpo_catalogue_distance(a->catalogue, a->models, points, POINTS, &o, distance, number,
@@ -187,16 +187,16 @@ static void ask_everything(asked *a, unsigned threads)
     free(number);
 }
 
-START_TEST(models_are_asked_as_one)
+START_TEST(test_catalogue_queries_many_models)
 {
-    asked a = ask_entries(entry, MODELS, 0);
-    ask_everything(&a, 1);
-    ask_everything(&a, 3);
-    end_asking(&a);
+    queried a = query_entries(entry, MODELS, 0);
+    query_everything(&a, 1);
+    query_everything(&a, 3);
+    end_querying(&a);
 }
 END_TEST
 
-/* So much that eight models are asked at a time, and not all of them stay. */
+/* Memory for querying eight models at a time; not all of them stay in memory. */
 static uint64_t little_memory(void)
 {
     uint64_t most = 0;
@@ -208,7 +208,7 @@ static uint64_t little_memory(void)
     return 8 * most;
 }
 
-static ebpo_catalogue_models_stats stats_of(const asked *a, ebpo_model_stats *sums)
+static ebpo_catalogue_models_stats stats_of(const queried *a, ebpo_model_stats *sums)
 {
     ebpo_catalogue_models_stats stats = EBPO_CATALOGUE_MODELS_STATS_INIT;
     *sums = (ebpo_model_stats)EBPO_MODEL_STATS_INIT;
@@ -216,44 +216,44 @@ static ebpo_catalogue_models_stats stats_of(const asked *a, ebpo_model_stats *su
     return stats;
 }
 
-START_TEST(models_are_closed_and_opened_again)
+START_TEST(test_catalogue_closes_and_reopens_models)
 {
     ebpo_model_stats sums;
     uint64_t memory = little_memory();
-    asked a = ask_entries(entry, MODELS, memory);
-    ask_everything(&a, 1);
+    queried a = query_entries(entry, MODELS, memory);
+    query_everything(&a, 1);
     ebpo_catalogue_models_stats stats = stats_of(&a, &sums);
     ck_assert_uint_gt(stats.closed, 0);
     ck_assert_uint_gt(stats.opened, MODELS);
     ck_assert_uint_eq(stats.opened, stats.closed + stats.open);
     ck_assert_uint_le(sums.memory, memory);
     ck_assert_uint_eq(sums.budget, memory);
-    ask_everything(&a, 4);
+    query_everything(&a, 4);
     ebpo_catalogue_models_set_memory(a.models, 0);
-    ask_everything(&a, 2);
+    query_everything(&a, 2);
     ebpo_catalogue_models_close_idle(a.models);
     ck_assert_uint_eq(stats_of(&a, &sums).open, 0);
     ck_assert_uint_eq(sums.memory, 0);
-    end_asking(&a);
+    end_querying(&a);
 }
 END_TEST
 
-START_TEST(a_budget_may_be_too_small)
+START_TEST(test_catalogue_budget_too_small_is_refused)
 {
-    ebpo_error said = EBPO_ERROR_INIT;
+    ebpo_error reported = EBPO_ERROR_INIT;
     ebpo_inside_result out[1];
     const double middle[3] = { 0.5, 0.5, 0.5 };
-    asked a = ask_entries(entry, MODELS, 1000);
-    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, middle, 1, NULL, out, &said),
+    queried a = query_entries(entry, MODELS, 1000);
+    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, middle, 1, NULL, out, &reported),
                      EBPO_E_LIMIT);
-    ck_assert_ptr_nonnull(strstr(said.message, "one part in 8"));
-    end_asking(&a);
+    ck_assert_ptr_nonnull(strstr(reported.message, "one part in 8"));
+    end_querying(&a);
 }
 END_TEST
 
 /* --- parts --- */
 
-/* The box of one side, 0 to 1 or 1 to 2 along x, as it is between caps at x = 1. */
+/* The box of one side, 0 to 1 or 1 to 2 along x, between caps at x = 1. */
 static ebpo_mesh half_box(int side, bool capped)
 {
     const double low[3] = { side, 0, 0 }, high[3] = { side + 1, 1, 1 };
@@ -273,7 +273,7 @@ static ebpo_mesh half_box(int side, bool capped)
 typedef struct halves {
     query_model closed[2], open[2], whole;
     ebpo_catalogue_entry entry[2];
-    asked a;
+    queried a;
 } halves;
 
 static void make_halves(halves *h)
@@ -299,7 +299,7 @@ static void make_halves(halves *h)
 
 static void free_halves(halves *h)
 {
-    end_asking(&h->a);
+    end_querying(&h->a);
     for (int i = 0; i < 2; i++) {
         query_model_free(&h->closed[i]);
         query_model_free(&h->open[i]);
@@ -307,7 +307,7 @@ static void free_halves(halves *h)
     query_model_free(&h->whole);
 }
 
-/* A grid that has points on faces, on the cap, on its border, and elsewhere. */
+/* A grid with points on faces, on the cap, on its border, and elsewhere. */
 static uint64_t grid_points(double *out)
 {
     uint64_t count = 0;
@@ -321,7 +321,7 @@ static uint64_t grid_points(double *out)
     return count;
 }
 
-START_TEST(parts_answer_as_the_whole)
+START_TEST(test_catalogue_parts_match_whole_model)
 {
     halves h;
     double at[3 * 11 * 7 * 7];
@@ -347,7 +347,7 @@ START_TEST(parts_answer_as_the_whole)
     ASSERT_OK(
         ebpo_catalogue_ray(h.a.catalogue, h.a.models, &through, 1, NULL, &hit, number, error));
     ck_assert(hit.t == 1 && hit.face / 1000 == 1 && number[0] == 0 && hit.side == 1);
-    through.origin[0] = 0.5; /* no cap is in the way */
+    through.origin[0] = 0.5; /* no cap intersects it */
     ASSERT_OK(
         ebpo_catalogue_ray(h.a.catalogue, h.a.models, &through, 1, NULL, &hit, number, error));
     ck_assert(hit.t == 1.5 && hit.face / 1000 == 2 && number[0] == 1 && hit.side == -1);
@@ -357,30 +357,30 @@ START_TEST(parts_answer_as_the_whole)
 }
 END_TEST
 
-START_TEST(caps_alone_are_no_surface)
+START_TEST(test_catalogue_of_caps_has_no_surface)
 {
-    ebpo_error said = EBPO_ERROR_INIT;
+    ebpo_error reported = EBPO_ERROR_INIT;
     ebpo_catalogue_entry caps = entry[0];
     ebpo_inside_result where;
     ebpo_distance_result distance;
     uint64_t number;
     const double middle[3] = { 0.5, 0.5, 0.5 };
     caps.unseen = true;
-    asked a = ask_entries(&caps, 1, 0);
+    queried a = query_entries(&caps, 1, 0);
     ASSERT_OK(ebpo_catalogue_inside(a.catalogue, a.models, middle, 1, NULL, &where, error));
     ck_assert_int_eq(where.where, EBPO_IN);
     ck_assert_int_eq(ebpo_catalogue_distance(a.catalogue, a.models, middle, 1, NULL, &distance,
-                                             &number, &said),
+                                             &number, &reported),
                      EBPO_E_ABSENT);
-    end_asking(&a);
+    end_querying(&a);
 }
 END_TEST
 
-/* --- functions of the caller --- */
+/* --- callbacks --- */
 
 typedef struct opener {
     atomic_int opened, closed;
-    int fails; /* which opening; 0: none */
+    int fails; /* index of the failing opening; 0: none */
 } opener;
 
 static ebpo_status open_counted(void *user, const char *path, ebpo_file **out, ebpo_error *error)
@@ -401,27 +401,28 @@ static void close_counted(void *user, ebpo_file *file)
     ebpo_close(file);
 }
 
-START_TEST(files_are_opened_by_the_caller)
+START_TEST(test_catalogue_uses_callers_open_function)
 {
-    ebpo_error said = EBPO_ERROR_INIT;
+    ebpo_error reported = EBPO_ERROR_INIT;
     opener o = { .fails = 3 };
     ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
     ebpo_catalogue_models_options few = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
-    ebpo_inside_result *out = query_room(POINTS, sizeof *out);
-    asked a;
+    ebpo_inside_result *out = query_capacity(POINTS, sizeof *out);
+    queried a;
     how.open_file = open_counted;
     how.close_file = close_counted;
     how.user = &o;
     few.memory = little_memory();
     ASSERT_OK(ebpo_catalogue_new(entry, MODELS, &how, &a.catalogue, error));
     ASSERT_OK(ebpo_catalogue_models_new(&few, &a.models, error));
-    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, points, POINTS, NULL, out, &said),
+    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, points, POINTS, NULL, out,
+                                           &reported),
                      EBPO_E_IO);
-    ck_assert_str_eq(said.message, "the tape is torn");
+    ck_assert_str_eq(reported.message, "the tape is torn");
     o.fails = 0;
-    ask_everything(&a, 2);
+    query_everything(&a, 2);
     ck_assert_int_gt(o.closed, 0);
-    end_asking(&a);
+    end_querying(&a);
     ck_assert_int_eq(o.opened, o.closed);
     free(out);
 }
@@ -436,37 +437,39 @@ static bool stop_at_once(void *user, const char *stage, uint64_t done, uint64_t 
     return false;
 }
 
-START_TEST(questions_are_checked_and_may_be_stopped)
+START_TEST(test_catalogue_query_validation_and_cancel)
 {
-    ebpo_error said = EBPO_ERROR_INIT;
-    ebpo_catalogue_ask_options o = on_threads(1);
-    ebpo_inside_result *out = query_room(POINTS, sizeof *out);
+    ebpo_error reported = EBPO_ERROR_INIT;
+    ebpo_catalogue_query_options o = on_threads(1);
+    ebpo_inside_result *out = query_capacity(POINTS, sizeof *out);
     ebpo_distance_result distance;
     ebpo_ray ray = { { 9, 9, 9 }, { 0, 0, 0 }, 1 };
     ebpo_ray_hit hit;
     uint64_t number;
     int calls = 0;
-    asked a = ask_entries(entry, MODELS, 0);
+    queried a = query_entries(entry, MODELS, 0);
     ebpo_model_stats sums;
     double far[6] = { 99, 99, 99, 99, NAN, 99 };
-    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, far, 2, &o, out, &said),
+    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, far, 2, &o, out, &reported),
                      EBPO_E_ARGUMENT);
-    ck_assert_ptr_nonnull(strstr(said.message, "point 1 "));
-    ck_assert_int_eq(ebpo_catalogue_ray(a.catalogue, a.models, &ray, 1, &o, &hit, &number, &said),
+    ck_assert_ptr_nonnull(strstr(reported.message, "point 1 "));
+    ck_assert_int_eq(ebpo_catalogue_ray(a.catalogue, a.models, &ray, 1, &o, &hit, &number,
+                                        &reported),
                      EBPO_E_ARGUMENT);
     o.max_distance = -1;
     ck_assert_int_eq(ebpo_catalogue_distance(a.catalogue, a.models, far, 1, &o, &distance, &number,
-                                             &said),
+                                             &reported),
                      EBPO_E_ARGUMENT);
     o.max_distance = INFINITY;
     ASSERT_OK(ebpo_catalogue_inside(a.catalogue, a.models, far, 1, &o, out, error));
     ck_assert_int_eq(out[0].where, EBPO_OUT);
     ck_assert_uint_eq(stats_of(&a, &sums).opened, 0);
     o.progress = (ebpo_progress){ stop_at_once, &calls };
-    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, points, POINTS, &o, out, &said),
+    ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, points, POINTS, &o, out,
+                                           &reported),
                      EBPO_E_CANCELLED);
     ck_assert_int_eq(calls, 1);
-    end_asking(&a);
+    end_querying(&a);
     free(out);
 }
 END_TEST
@@ -486,12 +489,12 @@ TEST_SUITE(catalogue)
     Suite *suite = suite_create("catalogue");
     TCase *alone = case_with_models(suite, "catalogue"),
           *threads = case_with_models(suite, "threads");
-    tcase_add_test(alone, models_are_asked_as_one);
-    tcase_add_test(alone, a_budget_may_be_too_small);
-    tcase_add_test(alone, parts_answer_as_the_whole);
-    tcase_add_test(alone, caps_alone_are_no_surface);
-    tcase_add_test(alone, questions_are_checked_and_may_be_stopped);
-    tcase_add_test(threads, models_are_closed_and_opened_again);
-    tcase_add_test(threads, files_are_opened_by_the_caller);
+    tcase_add_test(alone, test_catalogue_queries_many_models);
+    tcase_add_test(alone, test_catalogue_budget_too_small_is_refused);
+    tcase_add_test(alone, test_catalogue_parts_match_whole_model);
+    tcase_add_test(alone, test_catalogue_of_caps_has_no_surface);
+    tcase_add_test(alone, test_catalogue_query_validation_and_cancel);
+    tcase_add_test(threads, test_catalogue_closes_and_reopens_models);
+    tcase_add_test(threads, test_catalogue_uses_callers_open_function);
     return suite;
 }

@@ -1,5 +1,5 @@
-/* Catalogues as files: what was written is read again; what a file or an entry says wrongly is
- * noticed; and the tree of boxes beside all boxes. */
+/* Catalogue files: written files are read again; errors in a file or an entry are detected; and the
+ * tree of boxes against all boxes. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,9 +10,9 @@
 #include "catalogue/catalogue_boxes.h"
 #include "check_main.h"
 #include "npy_numbers.h"
-#include "query_kit.h"
+#include "query_support.h"
 
-/* Of a box from 0 to 1, on each axis. */
+/* A box from 0 to 1 on each axis. */
 static query_model model;
 static ebpo_catalogue_entry entry;
 
@@ -29,14 +29,14 @@ static char *text_of(const char *path)
 {
     FILE *in = fopen(path, "rb");
     ck_assert_ptr_nonnull(in);
-    char *text = query_room(1 << 16, 1);
+    char *text = query_capacity(1 << 16, 1);
     size_t size = fread(text, 1, (1 << 16) - 1, in);
     text[size] = 0;
     fclose(in);
     return text;
 }
 
-START_TEST(files_are_read_as_they_were_written)
+START_TEST(test_catalogue_file_round_trip)
 {
     ebpo_catalogue_entry some[3] = { entry, entry, entry };
     ebpo_catalogue_options o = EBPO_CATALOGUE_OPTIONS_INIT;
@@ -86,29 +86,29 @@ START_TEST(files_are_read_as_they_were_written)
 }
 END_TEST
 
-START_TEST(entries_that_are_none_are_refused)
+START_TEST(test_catalogue_invalid_entries_are_refused)
 {
-    ebpo_error said = EBPO_ERROR_INIT;
+    ebpo_error reported = EBPO_ERROR_INIT;
     ebpo_catalogue *made;
-    ck_assert_int_eq(ebpo_catalogue_new(&entry, 0, NULL, &made, &said), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_catalogue_new(&entry, 0, NULL, &made, &reported), EBPO_E_ARGUMENT);
     for (int i = 0; i < 5; i++) {
         ebpo_catalogue_entry e = entry;
         e.path = i == 0 ? NULL : i == 1 ? "" : e.path;
         e.min[1] = i == 2 ? NAN : i == 3 ? 1e9 : e.min[1];
         e.surface = i == 4 ? "" : NULL;
-        ck_assert_int_eq(ebpo_catalogue_new(&e, 1, NULL, &made, &said), EBPO_E_ARGUMENT);
+        ck_assert_int_eq(ebpo_catalogue_new(&e, 1, NULL, &made, &reported), EBPO_E_ARGUMENT);
     }
     ebpo_catalogue_entry e = entry;
     e.path = "\xff.h5";
     ASSERT_OK(ebpo_catalogue_new(&e, 1, NULL, &made, error));
-    ck_assert_int_eq(ebpo_catalogue_save(made, scratch("no.json"), &said), EBPO_E_ARGUMENT);
+    ck_assert_int_eq(ebpo_catalogue_save(made, scratch("no.json"), &reported), EBPO_E_ARGUMENT);
     ebpo_catalogue_free(made);
 }
 END_TEST
 
-/* Opens a catalogue whose text has `from` replaced by `to`, and asks it about the middle. */
-static ebpo_status ask_changed(const char *text, const char *from, const char *to,
-                               ebpo_error *error)
+/* Opens a catalogue whose text has `from` replaced by `to`, and queries its middle. */
+static ebpo_status query_changed(const char *text, const char *from, const char *to,
+                                 ebpo_error *error)
 {
     const char *path = scratch("changed.json"), *at = strstr(text, from);
     const double middle[3] = { 0.5, 0.5, 0.5 };
@@ -136,20 +136,21 @@ static const struct {
     const char *says;
 } hostile[] = {
     { "ebpo-catalogue", "ebpo-catalogue", EBPO_OK, "" },
-    { "ebpo-catalogue", "catalogue", EBPO_E_FORMAT, "there is no \"format\"" },
+    { "ebpo-catalogue", "catalogue", EBPO_E_FORMAT, "\"ebpo-catalogue\" is missing" },
     { "\"version\": 1", "\"version\": 2", EBPO_E_VERSION, "version 2" },
     { "\"version\": 1", "\"version\": true", EBPO_E_VERSION, "version 0" },
-    { "\"version\": 1", "\"version\": 1, \"parts\": 1", EBPO_E_FORMAT, "parts is true or false" },
+    { "\"version\": 1", "\"version\": 1, \"parts\": 1", EBPO_E_FORMAT,
+      "parts is not true or false" },
     { "\"version\": 1", "\"version\": 1, \"rule\": \"no\"", EBPO_E_FORMAT, "rule is" },
     { "\"version\": 1", "\"version\": 1, \"more\": [{}]", EBPO_OK, "" },
-    { "\"models\"", "\"others\"", EBPO_E_FORMAT, "one model at least" },
+    { "\"models\"", "\"others\"", EBPO_E_FORMAT, "at least one model" },
     { "\"path\"", "\"paths\"", EBPO_E_FORMAT, "models[0]: has no path" },
     { "\"path\": \"", "\"path\": \"\\ud800", EBPO_E_FORMAT, "line 6" },
     { "\"path\": \"", "\"path\": \"\\u0000", EBPO_E_FORMAT, "line 6" },
     { "\"path\": \"", "\"path\": \"nowhere", EBPO_E_IO, "nowhere" },
-    { "\"path\": \"", "\"path\": 1, \"was\": \"", EBPO_E_FORMAT, "path is no text" },
-    { "\"content_sha256\": \"", "\"content_sha256\": \"X", EBPO_E_FORMAT, "no digest" },
-    { "\"solid\": true", "\"solid\": 1", EBPO_E_FORMAT, "solid is true or false" },
+    { "\"path\": \"", "\"path\": 1, \"was\": \"", EBPO_E_FORMAT, "path is not a text" },
+    { "\"content_sha256\": \"", "\"content_sha256\": \"X", EBPO_E_FORMAT, "is not a digest" },
+    { "\"solid\": true", "\"solid\": 1", EBPO_E_FORMAT, "solid is not true or false" },
     { "\"box_min\": [0,", "\"box_min\": [false,", EBPO_E_FORMAT, "two corners" },
     { "\"box_min\": [0,", "\"box_min\": [0, 0,", EBPO_E_FORMAT, "two corners" },
     { "\"box_min\": [0,", "\"box_min\": [NaN,", EBPO_E_FORMAT, "line" },
@@ -159,14 +160,14 @@ static const struct {
     { "\"pruned\": false", "\"numbers\": \"none.npy\"", EBPO_E_FORMAT, "none.npy" },
     { "\"pruned\": false", "\"numbers\": \"few.npy\"", EBPO_E_FORMAT, "3 numbers of 300 faces" },
     { "\"pruned\": false", "\"numbers\": \"low.npy\"", EBPO_E_FORMAT, "negative" },
-    { "\"pruned\": false", "\"surface\": \"x\"", EBPO_E_FORMAT, "surface_sha256 is no digest" },
-    { "\"pruned\": false", "\"surface\": null", EBPO_E_ABSENT, "caps alone" },
+    { "\"pruned\": false", "\"surface\": \"x\"", EBPO_E_FORMAT, "surface_sha256 is not a digest" },
+    { "\"pruned\": false", "\"surface\": null", EBPO_E_ABSENT, "caps only" },
 };
 
-START_TEST(what_a_file_says_wrongly_is_noticed)
+START_TEST(test_catalogue_wrong_metadata_is_detected)
 {
-    ebpo_error said = EBPO_ERROR_INIT;
-    const char *path = scratch("told.json");
+    ebpo_error reported = EBPO_ERROR_INIT;
+    const char *path = scratch("stored.json");
     ebpo_catalogue *made;
     ASSERT_OK(ebpo_catalogue_new(&entry, 1, NULL, &made, error));
     ASSERT_OK(ebpo_catalogue_save(made, path, error));
@@ -175,20 +176,21 @@ START_TEST(what_a_file_says_wrongly_is_noticed)
     write_numbers(scratch("low.npy"), model.mesh.face_count, -99999);
     char *text = text_of(path);
     for (size_t i = 0; i < sizeof hostile / sizeof hostile[0]; i++) {
-        ebpo_status status = ask_changed(text, hostile[i].from, hostile[i].to, &said);
-        ck_assert_msg(status == hostile[i].status && strstr(said.message, hostile[i].says),
-                      "%s: %d, %s", hostile[i].to, (int)status, said.message);
-        said = (ebpo_error)EBPO_ERROR_INIT;
+        ebpo_status status = query_changed(text, hostile[i].from, hostile[i].to, &reported);
+        ck_assert_msg(status == hostile[i].status && strstr(reported.message, hostile[i].says),
+                      "%s: %d, %s", hostile[i].to, (int)status, reported.message);
+        reported = (ebpo_error)EBPO_ERROR_INIT;
     }
     /* another digest, of the right form */
     char *digest = strstr(text, "sha256\": \"") + 10;
     *digest = *digest == '0' ? '1' : '0';
-    ck_assert_int_eq(ask_changed(text, "\"version\": 1", "\"version\": 1", &said), EBPO_E_FORMAT);
-    ck_assert_ptr_nonnull(strstr(said.message, "is not the file that"));
+    ck_assert_int_eq(query_changed(text, "\"version\": 1", "\"version\": 1", &reported),
+                     EBPO_E_FORMAT);
+    ck_assert_ptr_nonnull(strstr(reported.message, "does not match the content_sha256"));
     char deep[5000];
     memset(deep, '[', sizeof deep - 1);
     deep[sizeof deep - 1] = 0;
-    ck_assert_int_eq(ask_changed(deep, "[", "[", &said), EBPO_E_FORMAT);
+    ck_assert_int_eq(query_changed(deep, "[", "[", &reported), EBPO_E_FORMAT);
     free(text);
 }
 END_TEST
@@ -207,7 +209,7 @@ static double least_distance(const ebpo_catalogue_box *b, const double p[3])
     return sqrt(sum);
 }
 
-static double most_distance(const ebpo_catalogue_box *b, const double p[3])
+static double max_distance(const ebpo_catalogue_box *b, const double p[3])
 {
     double sum = 0;
     for (int k = 0; k < 3; k++) {
@@ -225,7 +227,7 @@ static bool is_named(const ebpo_catalogue_pairs *pairs, uint32_t box)
     return false;
 }
 
-START_TEST(boxes_that_are_left_out_do_not_matter)
+START_TEST(test_catalogue_box_search_omits_no_box)
 {
     ebpo_catalogue_box boxes[BOXES];
     uint32_t number[BOXES];
@@ -249,7 +251,7 @@ START_TEST(boxes_that_are_left_out_do_not_matter)
         ck_assert(ebpo_catalogue_boxes_holding(&tree, p, 0, &pairs));
         for (uint32_t i = 0; i < BOXES; i++) {
             ck_assert_int_eq(is_named(&pairs, i), least_distance(&boxes[i], p) == 0);
-            reach = fmin(reach, most_distance(&boxes[i], p));
+            reach = fmin(reach, max_distance(&boxes[i], p));
         }
         pairs.count = 0;
         ck_assert(ebpo_catalogue_boxes_near(&tree, p, INFINITY, 0, &pairs));
@@ -273,10 +275,10 @@ TEST_SUITE(catalogue_file)
     tcase_set_timeout(all, 600);
     tcase_add_unchecked_fixture(all, make_model, free_model);
     tcase_add_checked_fixture(all, scratch_enter, scratch_leave);
-    tcase_add_test(all, files_are_read_as_they_were_written);
-    tcase_add_test(all, entries_that_are_none_are_refused);
-    tcase_add_test(all, what_a_file_says_wrongly_is_noticed);
-    tcase_add_test(all, boxes_that_are_left_out_do_not_matter);
+    tcase_add_test(all, test_catalogue_file_round_trip);
+    tcase_add_test(all, test_catalogue_invalid_entries_are_refused);
+    tcase_add_test(all, test_catalogue_wrong_metadata_is_detected);
+    tcase_add_test(all, test_catalogue_box_search_omits_no_box);
     suite_add_tcase(suite, all);
     return suite;
 }

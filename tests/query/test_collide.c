@@ -1,5 +1,5 @@
 /* Two small models at poses of all kinds: all pairs of faces against brute force with the exact
- * test of two faces; the same swapped, with other threads and hardly any memory. */
+ * test of two faces; also swapped, with other threads, and with little memory. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,13 +9,13 @@
 
 #include "check_main.h"
 #include "geometry/triangle_pair.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 enum { POSES = 12 };
 
 /* --- poses --- */
 
-/* Of a unit quaternion. */
+/* Poses by a unit quaternion. */
 static void turn_by(ebpo_pose *pose, const double q[4])
 {
     double n = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
@@ -29,8 +29,8 @@ static void turn_by(ebpo_pose *pose, const double q[4])
 
 static double signed_unit(uint64_t *state) { return 2 * ebpo_test_random_unit(state) - 1; }
 
-/* Kinds: identical; quarter turns; shifts by halves and by next to nothing; turned about; anything,
- * also scaled, and far from the origin. */
+/* Kinds: identical; quarter turns; shifts by halves and by tiny amounts; rotations; random, also
+ * scaled, and far from the origin. */
 static ebpo_pose make_pose(int kind, double size, uint64_t *state)
 {
     ebpo_pose pose = EBPO_POSE_INIT;
@@ -100,7 +100,7 @@ static pair_list brute_force(const query_model *a, const ebpo_pose *pa, const qu
                              const ebpo_pose *pb)
 {
     pair_list out = { 0 };
-    double(*faces)[3][3] = query_room(b->mesh.face_count, sizeof *faces);
+    double(*faces)[3][3] = query_capacity(b->mesh.face_count, sizeof *faces);
     for (uint64_t j = 0; j < b->mesh.face_count; j++)
         posed_face(b, pb, j, faces[j]);
     for (uint64_t i = 0; i < a->mesh.face_count; i++) {
@@ -111,16 +111,16 @@ static pair_list brute_force(const query_model *a, const ebpo_pose *pa, const qu
             const double(*g)[3] = (const double(*)[3])faces[j];
             ebpo_pair_kind kind = boxes_apart(f, g) ? EBPO_PAIR_APART : ebpo_triangle_pair(f, g);
             if (kind != EBPO_PAIR_APART)
-                add_pair(&out,
-                         (ebpo_face_pair){ query_told(a, (uint32_t)i), query_told(b, (uint32_t)j),
-                                           i, j, (int32_t)kind, 0 });
+                add_pair(&out, (ebpo_face_pair){ query_reported(a, (uint32_t)i),
+                                                 query_reported(b, (uint32_t)j), i, j,
+                                                 (int32_t)kind, 0 });
         }
     }
     free(faces);
     return out;
 }
 
-/* --- asking --- */
+/* --- queries --- */
 
 static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
@@ -129,8 +129,8 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return true;
 }
 
-static pair_list ask_all(ebpo_model *a, const ebpo_pose *pa, ebpo_model *b, const ebpo_pose *pb,
-                         unsigned threads, uint64_t memory)
+static pair_list query_all(ebpo_model *a, const ebpo_pose *pa, ebpo_model *b, const ebpo_pose *pb,
+                           unsigned threads, uint64_t memory)
 {
     pair_list out = { 0 };
     ebpo_collider_options with = EBPO_COLLIDER_OPTIONS_INIT;
@@ -146,8 +146,8 @@ static pair_list ask_all(ebpo_model *a, const ebpo_pose *pa, ebpo_model *b, cons
     return out;
 }
 
-static int32_t ask_first(ebpo_model *a, const ebpo_pose *pa, ebpo_model *b, const ebpo_pose *pb,
-                         ebpo_face_pair *pair)
+static int32_t query_first(ebpo_model *a, const ebpo_pose *pa, ebpo_model *b, const ebpo_pose *pb,
+                           ebpo_face_pair *pair)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider;
@@ -186,15 +186,15 @@ static ebpo_face_pair turned(ebpo_face_pair p)
     return (ebpo_face_pair){ p.face_b, p.face_a, p.file_face_b, p.file_face_a, p.kind, 0 };
 }
 
-/* --- the checks of one case --- */
+/* --- checks of a case --- */
 
 static void check_first(const pair_list *want, const query_model *a, const ebpo_pose *pa,
                         const query_model *b, const ebpo_pose *pb, const char *what)
 {
     ebpo_face_pair pair, other;
-    int32_t found = ask_first(a->model, pa, b->model, pb, &pair);
+    int32_t found = query_first(a->model, pa, b->model, pb, &pair);
     ck_assert_msg(found == (want->count > 0), "%s: first contact", what);
-    ck_assert_int_eq(ask_first(b->model, pb, a->model, pa, &other), found);
+    ck_assert_int_eq(query_first(b->model, pb, a->model, pa, &other), found);
     if (!found)
         return;
     other = turned(other);
@@ -205,7 +205,7 @@ static void check_first(const pair_list *want, const query_model *a, const ebpo_
 
 /* --- in parts --- */
 
-/* The same file, cut at a level, or under the least budget that does (level -1). */
+/* The same file, cut at a level, or under the minimum budget (level -1). */
 static ebpo_model *in_parts(const query_model *m, int cut_level)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
@@ -224,9 +224,9 @@ static void check_first_of_parts(const pair_list *want, ebpo_model *a, const ebp
                                  ebpo_model *b, const ebpo_pose *pb, const char *what)
 {
     ebpo_face_pair pair, other;
-    int32_t found = ask_first(a, pa, b, pb, &pair);
+    int32_t found = query_first(a, pa, b, pb, &pair);
     ck_assert_msg(found == (want->count > 0), "%s: first contact", what);
-    ck_assert_int_eq(ask_first(b, pb, a, pa, &other), found);
+    ck_assert_int_eq(query_first(b, pb, a, pa, &other), found);
     bool is = !found;
     for (uint64_t i = 0; i < want->count && !is; i++)
         is = memcmp(&want->pair[i], &pair, sizeof pair) == 0;
@@ -235,15 +235,15 @@ static void check_first_of_parts(const pair_list *want, ebpo_model *a, const ebp
     ck_assert_msg(!found || memcmp(&pair, &other, sizeof pair) == 0, "%s: swapped", what);
 }
 
-/* In one order and byte for byte what whole models give: of both in parts, of one, swapped, with
- * threads, and with hardly any memory for pairs. */
+/* Partly loaded models give the same pairs as whole models, in the same order and byte for byte:
+ * with both in parts, one in parts, swapped, with threads, and with little memory for pairs. */
 static void check_parts(const pair_list *want, const query_model *a, const ebpo_pose *pa,
                         const query_model *b, const ebpo_pose *pb, int level, const char *what)
 {
     ebpo_model *part_a = in_parts(a, level), *part_b = in_parts(b, level < 0 ? 1 : level + 1);
-    pair_list both = ask_all(part_a, pa, part_b, pb, 3, 0),
-              one = ask_all(part_a, pa, b->model, pb, 1, 3000),
-              swapped = ask_all(part_b, pb, part_a, pa, 2, 2000);
+    pair_list both = query_all(part_a, pa, part_b, pb, 3, 0),
+              one = query_all(part_a, pa, b->model, pb, 1, 3000),
+              swapped = query_all(part_b, pb, part_a, pa, 2, 2000);
     check_same(want, &both, what);
     check_same(want, &one, what);
     for (uint64_t i = 0; i < swapped.count; i++)
@@ -259,8 +259,8 @@ static void check_parts(const pair_list *want, const query_model *a, const ebpo_
 
 /* --- by levels --- */
 
-static ebpo_level_result ask_levels(ebpo_model *a, const ebpo_pose *pa, ebpo_model *b,
-                                    const ebpo_pose *pb, int level, uint64_t deadline)
+static ebpo_level_result query_levels(ebpo_model *a, const ebpo_pose *pa, ebpo_model *b,
+                                      const ebpo_pose *pb, int level, uint64_t deadline)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider;
@@ -311,7 +311,7 @@ static void check_level(const ebpo_level_result *r, bool meet, double distance, 
     ck_assert_msg(!(r->common == 1 && apart), "%s: boxes are apart", what);
 }
 
-/* Whole, in parts and late, with the true distance in between; swapped. */
+/* Whole, in parts and after the deadline, with the true distance in the interval; swapped. */
 static void check_levels(bool meet, const query_model *a, const ebpo_pose *pa, const query_model *b,
                          const ebpo_pose *pb, const char *what)
 {
@@ -326,10 +326,10 @@ static void check_levels(bool meet, const query_model *a, const ebpo_pose *pa, c
     ebpo_collider_free(collider);
     bool apart = posed_boxes_apart(a, pa, b, pb);
     for (int level = 0; level < 4; level++) {
-        ebpo_level_result whole = ask_levels(a->model, pa, b->model, pb, level, 0),
-                          parts = ask_levels(a->model, pa, part, pb, level, 0),
-                          late = ask_levels(a->model, pa, b->model, pb, level, 1),
-                          swapped = ask_levels(b->model, pb, a->model, pa, level, 0);
+        ebpo_level_result whole = query_levels(a->model, pa, b->model, pb, level, 0),
+                          parts = query_levels(a->model, pa, part, pb, level, 0),
+                          late = query_levels(a->model, pa, b->model, pb, level, 1),
+                          swapped = query_levels(b->model, pb, a->model, pa, level, 0);
         check_level(&whole, meet, truth.distance.lo, apart, what);
         check_level(&parts, meet, truth.distance.lo, apart, what);
         check_level(&late, meet, truth.distance.lo, apart, what);
@@ -341,15 +341,15 @@ static void check_levels(bool meet, const query_model *a, const ebpo_pose *pa, c
     ebpo_model_free(part);
 }
 
-/* --- all of a case --- */
+/* --- a complete case --- */
 
 static void check_case(const query_model *a, const ebpo_pose *pa, const query_model *b,
                        const ebpo_pose *pb, int kind, const char *what)
 {
     pair_list want = brute_force(a, pa, b, pb),
-              in_order = ask_all(a->model, pa, b->model, pb, 1, 0),
-              swapped = ask_all(b->model, pb, a->model, pa, 1, 0),
-              others = ask_all(a->model, pa, b->model, pb, 3, 2000);
+              in_order = query_all(a->model, pa, b->model, pb, 1, 0),
+              swapped = query_all(b->model, pb, a->model, pa, 1, 0),
+              others = query_all(a->model, pa, b->model, pb, 3, 2000);
     check_same(&in_order, &others, what);
     for (uint64_t i = 0; i < swapped.count; i++)
         swapped.pair[i] = turned(swapped.pair[i]);
@@ -373,11 +373,11 @@ static const char *const names[] = {
     "cube_twice",     "nested_windings", "sphere_float", "giant_and_dust",  "far_away_float",
     "zero_area_face", "thin_hollow",     "cone_slivers"
 };
-/* Of larger products fewer poses are tried. */
+/* Larger products are tried at fewer poses. */
 enum { FEW_PAIRS = 300000 };
 enum { NAMES = sizeof names / sizeof *names };
 
-/* Solids of other sizes are brought to about one. */
+/* Scales solids of other sizes to about one. */
 static void check_two(const char *name_a, const char *name_b, int variant)
 {
     query_model a, b;
@@ -400,21 +400,21 @@ static void check_two(const char *name_a, const char *name_b, int variant)
     query_model_free(&b);
 }
 
-START_TEST(all_pairs_are_those_of_brute_force)
+START_TEST(test_collide_pairs_match_brute_force)
 {
     if (ebpo_test_wanted(_i))
         check_two(names[_i / NAMES], names[_i % NAMES], _i % query_variant_count);
 }
 END_TEST
 
-/* At one place each face meets its neighbours: pairs enough for every thread. */
-START_TEST(threads_find_the_same)
+/* At one pose each face intersects its neighbours: enough pairs for every thread. */
+START_TEST(test_collide_pairs_same_for_any_threads)
 {
     query_model m;
     ebpo_pose here = EBPO_POSE_INIT;
     query_model_make(&m, "torus", query_solid_by_name("torus"), &query_variants[0]);
-    pair_list one = ask_all(m.model, &here, m.model, &here, 1, 0),
-              four = ask_all(m.model, &here, m.model, &here, 4, 0);
+    pair_list one = query_all(m.model, &here, m.model, &here, 1, 0),
+              four = query_all(m.model, &here, m.model, &here, 4, 0);
     ck_assert_uint_gt(one.count, 1000);
     check_same(&one, &four, "four threads");
     free(one.pair);
@@ -430,8 +430,8 @@ static bool same_point(const double p[3], const double q[3])
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* The edge against the corner that both have meets the other face. */
-static bool meets_beyond(const double a[3][3], const double b[3][3])
+/* Returns true when the edge opposite the common corner intersects the other face. */
+static bool intersects_beyond(const double a[3][3], const double b[3][3])
 {
     for (int i = 0; i < 9; i++)
         if (same_point(a[i / 3], b[i % 3])) {
@@ -443,8 +443,8 @@ static bool meets_beyond(const double a[3][3], const double b[3][3])
     return false;
 }
 
-/* Whether a pair counts. */
-static bool meet_as_strangers(const query_model *m, const ebpo_face_pair *p)
+/* Returns true when a pair counts. */
+static bool intersect_unrelated(const query_model *m, const ebpo_face_pair *p)
 {
     ebpo_pose here = EBPO_POSE_INIT;
     double x[3][3], y[3][3];
@@ -456,10 +456,11 @@ static bool meet_as_strangers(const query_model *m, const ebpo_face_pair *p)
         shared += same_point(a[i / 3], b[i % 3]);
     if (shared > 1)
         return p->kind == EBPO_PAIR_COPLANAR;
-    return shared == 0 || p->kind != EBPO_PAIR_TOUCHING || meets_beyond(a, b) || meets_beyond(b, a);
+    return shared == 0 || p->kind != EBPO_PAIR_TOUCHING || intersects_beyond(a, b) ||
+           intersects_beyond(b, a);
 }
 
-START_TEST(faces_that_cross_within_a_model_are_found)
+START_TEST(test_collide_finds_self_intersections)
 {
     query_model m;
     ebpo_pose here = EBPO_POSE_INIT;
@@ -473,7 +474,7 @@ START_TEST(faces_that_cross_within_a_model_are_found)
     uint64_t at = 0;
     for (uint64_t i = 0; i < all.count; i++) {
         const ebpo_face_pair *p = &all.pair[i];
-        if (p->file_face_a >= p->file_face_b || !meet_as_strangers(&m, p))
+        if (p->file_face_a >= p->file_face_b || !intersect_unrelated(&m, p))
             continue;
         ck_assert_msg(at < got.count && memcmp(p, &got.pair[at], sizeof *p) == 0,
                       "%s: %llu %llu kind %d is missing", name, (unsigned long long)p->file_face_a,
@@ -503,7 +504,7 @@ START_TEST(faces_that_cross_within_a_model_are_found)
 }
 END_TEST
 
-/* --- what is refused, what ends early --- */
+/* --- errors, and early ends --- */
 
 static bool take_one(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
@@ -512,7 +513,7 @@ static bool take_one(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return false;
 }
 
-START_TEST(levels_tell_what_is_apart_and_what_meets)
+START_TEST(test_collide_levels_bound_result)
 {
     query_model m;
     ebpo_pose here = EBPO_POSE_INIT, beside = EBPO_POSE_INIT, within = EBPO_POSE_INIT;
@@ -520,17 +521,17 @@ START_TEST(levels_tell_what_is_apart_and_what_meets)
     query_model_make(&m, "blob", query_solid_by_name("blob"), &fine);
     beside.translation[0] = 1.5 * m.size;
     within.translation[1] = 0.05 * m.size;
-    ebpo_level_result r = ask_levels(m.model, &here, m.model, &beside, -1, 0);
+    ebpo_level_result r = query_levels(m.model, &here, m.model, &beside, -1, 0);
     ck_assert(r.common == 0 && r.contact == 0 && r.distance.lo > 0.2 * m.size);
-    r = ask_levels(m.model, &here, m.model, &within, -1, 0);
+    r = query_levels(m.model, &here, m.model, &within, -1, 0);
     ck_assert(r.common == 1 && r.distance.lo == 0);
     query_model_free(&m);
 }
 END_TEST
 
-/* A small box within a large one: their boxes meet, and of what was found nothing is put together.
- * Clang's sanitizer sees what is sorted where nothing was allocated. */
-START_TEST(faces_need_not_meet_where_boxes_do)
+/* A small box within a large one: their boxes intersect, and nothing is found to be merged. Clang's
+ * sanitizer detects a sort of memory that was not allocated. */
+START_TEST(test_collide_boxes_overlap_without_contact)
 {
     static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
     query_model large, small;
@@ -541,7 +542,7 @@ START_TEST(faces_need_not_meet_where_boxes_do)
     for (int k = 0; k < 3; k++)
         within.translation[k] = 0.25;
     for (uint64_t memory = 0; memory < 2; memory++) {
-        pair_list none = ask_all(large.model, &here, small.model, &within, 1, memory << 20);
+        pair_list none = query_all(large.model, &here, small.model, &within, 1, memory << 20);
         ck_assert_uint_eq(none.count, 0);
         free(none.pair);
     }
@@ -550,7 +551,7 @@ START_TEST(faces_need_not_meet_where_boxes_do)
 }
 END_TEST
 
-START_TEST(poses_are_refused_and_questions_end_early)
+START_TEST(test_collide_bad_pose_and_cancel)
 {
     query_model m;
     ebpo_collider *collider;
@@ -585,12 +586,12 @@ TEST_SUITE(collide)
     tcase_set_timeout(tests, 900);
     tcase_set_timeout(threads, 900);
     tcase_set_timeout(nested, 900);
-    tcase_add_test(threads, threads_find_the_same);
-    tcase_add_loop_test(tests, all_pairs_are_those_of_brute_force, 0, NAMES * NAMES);
-    tcase_add_loop_test(tests, faces_that_cross_within_a_model_are_found, 0, NAMES);
-    tcase_add_test(nested, faces_need_not_meet_where_boxes_do);
-    tcase_add_test(tests, levels_tell_what_is_apart_and_what_meets);
-    tcase_add_test(tests, poses_are_refused_and_questions_end_early);
+    tcase_add_test(threads, test_collide_pairs_same_for_any_threads);
+    tcase_add_loop_test(tests, test_collide_pairs_match_brute_force, 0, NAMES * NAMES);
+    tcase_add_loop_test(tests, test_collide_finds_self_intersections, 0, NAMES);
+    tcase_add_test(nested, test_collide_boxes_overlap_without_contact);
+    tcase_add_test(tests, test_collide_levels_bound_result);
+    tcase_add_test(tests, test_collide_bad_pose_and_cancel);
     Suite *suite = suite_create("collide");
     suite_add_tcase(suite, tests);
     suite_add_tcase(suite, threads);

@@ -1,5 +1,5 @@
-/* How deep models are in each other: against dense points on faces, by distances to every face and
- * winding numbers as sums of solid angles; and boxes, of which it is known. */
+/* Penetration depth of models: against dense points on faces, by distances to every face and
+ * winding numbers as sums of solid angles; and against known depths of boxes. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -8,15 +8,15 @@
 
 #include "check_main.h"
 #include "geometry/distance.h"
-#include "models_twin.h"
+#include "models_reference.h"
 #include "solids.h"
 
 static const char *const names[] = { "cube", "torus", "sphere", "nested_windings" };
 enum { NAMES = sizeof names / sizeof *names };
-/* On an edge of a face. */
+/* Samples per edge of a face. */
 enum { STEPS = 4 };
-/* Faces of both: of more only a few kinds of poses are looked at. */
-enum { MOST_PAIRS = 100000 };
+/* Faces of both: larger pairs are tested at a few kinds of poses. */
+enum { MAX_PAIRS = 100000 };
 
 typedef struct two_models {
     query_model model[2];
@@ -40,8 +40,8 @@ static void free_two(two_models *t)
     query_model_free(&t->model[1]);
 }
 
-static void ask(ebpo_collider *c, const ebpo_pose *a, const ebpo_pose *b, double tolerance,
-                uint64_t deadline, ebpo_certain out[2])
+static void run_query(ebpo_collider *c, const ebpo_pose *a, const ebpo_pose *b, double tolerance,
+                      uint64_t deadline, ebpo_certain out[2])
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     options.pose_a = *a;
@@ -50,14 +50,15 @@ static void ask(ebpo_collider *c, const ebpo_pose *a, const ebpo_pose *b, double
     ASSERT_OK(ebpo_collide_depth(c, &options, tolerance, &out[0], &out[1], error));
 }
 
-/* --- the twin --- */
+/* --- the reference implementation --- */
 
 static double dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Of a face, seen from the origin of r, by the formula of Van Oosterom and Strackee. */
+/* Returns the solid angle of a face, seen from the origin of r, by the formula of Van Oosterom and
+ * Strackee. */
 static double solid_angle(const double r[3][3])
 {
     double n[3],
@@ -69,8 +70,8 @@ static double solid_angle(const double r[3][3])
                                        dot(r[0], r[2]) * n[1] + dot(r[1], r[2]) * n[0]);
 }
 
-/* How deep w is among the faces; 0 outside. */
-static double depth_at(const twin_faces *f, const double w[3])
+/* Returns the depth of w inside the faces; 0 outside. */
+static double depth_at(const reference_faces *f, const double w[3])
 {
     double nearest = INFINITY, angle = 0;
     for (uint64_t i = 0; i < f->count; i++) {
@@ -85,8 +86,9 @@ static double depth_at(const twin_faces *f, const double w[3])
     return fabs(angle) > 6 ? nearest : 0;
 }
 
-/* At least *lo and at most *hi, by points on all faces. */
-static void depth_of_points(const twin_faces *a, const twin_faces *b, double *lo, double *hi)
+/* Computes bounds of the depth from points on all faces: at least *lo and at most *hi. */
+static void depth_of_points(const reference_faces *a, const reference_faces *b, double *lo,
+                            double *hi)
 {
     double longest = 0;
     *lo = 0;
@@ -117,53 +119,53 @@ static void check_one(const ebpo_certain *got, double lo, double hi, double tole
                   "%s: %.17g .. %.17g, by points %.17g .. %.17g", what, got->lo, got->hi, lo, hi);
     ck_assert_msg(got->lo >= 0 && got->hi - got->lo <= tolerance + 1e-11 * size,
                   "%s: %.17g .. %.17g is too wide", what, got->lo, got->hi);
-    ck_assert_int_eq(got->figure == EBPO_FIGURE_EXACT, got->lo == got->hi);
+    ck_assert_int_eq(got->metric == EBPO_VALUE_EXACT, got->lo == got->hi);
 }
 
 static void check_case(two_models *t, int kind, uint64_t *state)
 {
     ebpo_pose a, b;
-    twin_faces f[2];
+    reference_faces f[2];
     ebpo_certain got[2], other[2], late[2];
     char what[128];
     double lo, hi, size = t->model[0].size, tolerance = 0.003 * size;
     snprintf(what, sizeof what, "%s, %s, %s", t->model[0].name, t->model[1].name,
-             twin_pose_name(kind));
-    twin_pose(kind, size, state, &a, &b);
-    ask(t->collider, &a, &b, tolerance, 0, got);
-    ask(t->swapped, &b, &a, tolerance, 0, other);
-    ask(t->collider, &a, &b, tolerance, 1, late);
+             reference_pose_name(kind));
+    reference_pose(kind, size, state, &a, &b);
+    run_query(t->collider, &a, &b, tolerance, 0, got);
+    run_query(t->swapped, &b, &a, tolerance, 0, other);
+    run_query(t->collider, &a, &b, tolerance, 1, late);
     for (int i = 0; i < 2; i++) {
         ck_assert_msg(memcmp(&got[i], &other[!i], sizeof *got) == 0, "%s: swapped", what);
         ck_assert_msg(late[i].lo <= got[i].hi && got[i].lo <= late[i].hi, "%s: late", what);
     }
-    twin_faces_make(&f[0], &t->model[0], &a);
-    twin_faces_make(&f[1], &t->model[1], &b);
+    reference_faces_make(&f[0], &t->model[0], &a);
+    reference_faces_make(&f[1], &t->model[1], &b);
     for (int i = 0; i < 2; i++) {
         depth_of_points(&f[i], &f[!i], &lo, &hi);
         check_one(&got[i], lo, hi, tolerance, size, what);
     }
-    twin_faces_free(&f[0]);
-    twin_faces_free(&f[1]);
+    reference_faces_free(&f[0]);
+    reference_faces_free(&f[1]);
 }
 
-START_TEST(depths_hold_what_points_show)
+START_TEST(test_depth_bounds_match_points)
 {
     two_models t;
     uint64_t state = (uint64_t)_i + 5;
     if (!ebpo_test_wanted(_i))
         return;
     make_two(&t, names[_i / NAMES], names[_i % NAMES]);
-    bool few = t.model[0].mesh.face_count * t.model[1].mesh.face_count > MOST_PAIRS;
-    for (int kind = _i % 2; kind < TWIN_POSES; kind += 2)
+    bool few = t.model[0].mesh.face_count * t.model[1].mesh.face_count > MAX_PAIRS;
+    for (int kind = _i % 2; kind < REFERENCE_POSES; kind += 2)
         if (!few || kind % 8 == _i % 8)
             check_case(&t, kind, &state);
     free_two(&t);
 }
 END_TEST
 
-/* All of the inner one's surface is equally deep; a fine tolerance costs hardly more. */
-START_TEST(boxes_are_as_deep_as_is_known)
+/* The whole surface of the inner box is equally deep; a fine tolerance costs hardly more. */
+START_TEST(test_depth_of_boxes_matches_formula)
 {
     two_models t;
     ebpo_pose a = EBPO_POSE_INIT, b = EBPO_POSE_INIT;
@@ -186,15 +188,15 @@ START_TEST(boxes_are_as_deep_as_is_known)
         a.translation[k] = middle - 0.25 * middle;
     }
     double depth = 0.375 * (high[0] - low[0]);
-    ask(t.collider, &a, &b, 1e-9, 0, got);
+    run_query(t.collider, &a, &b, 1e-9, 0, got);
     ck_assert_msg(got[0].lo <= depth && depth <= got[0].hi && got[0].hi - got[0].lo <= 2e-9,
                   "%.17g is not in %.17g .. %.17g", depth, got[0].lo, got[0].hi);
-    ck_assert(got[1].lo == 0 && got[1].hi == 0 && got[1].figure == EBPO_FIGURE_EXACT);
+    ck_assert(got[1].lo == 0 && got[1].hi == 0 && got[1].metric == EBPO_VALUE_EXACT);
     free_two(&t);
 }
 END_TEST
 
-START_TEST(what_has_no_depth_is_refused)
+START_TEST(test_depth_of_non_solid_is_refused)
 {
     two_models t;
     ebpo_certain out;
@@ -215,9 +217,9 @@ TEST_SUITE(collide_depth)
 {
     TCase *tests = tcase_create("collide_depth");
     tcase_set_timeout(tests, 900);
-    tcase_add_loop_test(tests, depths_hold_what_points_show, 0, NAMES * NAMES);
-    tcase_add_test(tests, boxes_are_as_deep_as_is_known);
-    tcase_add_test(tests, what_has_no_depth_is_refused);
+    tcase_add_loop_test(tests, test_depth_bounds_match_points, 0, NAMES * NAMES);
+    tcase_add_test(tests, test_depth_of_boxes_matches_formula);
+    tcase_add_test(tests, test_depth_of_non_solid_is_refused);
     Suite *suite = suite_create("collide_depth");
     suite_add_tcase(suite, tests);
     return suite;

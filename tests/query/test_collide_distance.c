@@ -1,5 +1,5 @@
 /* Two models at poses: contacts and distance against brute force in rational arithmetic
- * (tests/support/models_twin.h). */
+ * (tests/support/models_reference.h). */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,7 +8,7 @@
 #include <ebpo/collide.h>
 
 #include "check_main.h"
-#include "models_twin.h"
+#include "models_reference.h"
 #include "extras/collide/face_pairs.h"
 #include "solids.h"
 
@@ -16,16 +16,16 @@ static const char *const names[] = { "cube",           "torus",      "touching_s
                                      "sheet",          "cube_twice", "zero_area_face",
                                      "far_away_float", "blob",       "nested_windings" };
 enum { NAMES = sizeof names / sizeof *names };
-/* Faces of both: a twin takes seconds for more. */
-enum { MOST_PAIRS = 100000 };
+/* Faces of both: the reference implementation takes seconds for more. */
+enum { MAX_PAIRS = 100000 };
 
 typedef struct two_models {
     query_model model[2];
     ebpo_collider *collider, *swapped;
 } two_models;
 
-static ebpo_clearance ask(ebpo_collider *c, const ebpo_pose *a, const ebpo_pose *b,
-                          double tolerance, double at_least, bool warm)
+static ebpo_clearance run_query(ebpo_collider *c, const ebpo_pose *a, const ebpo_pose *b,
+                                double tolerance, double at_least, bool warm)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
@@ -39,24 +39,25 @@ static ebpo_clearance ask(ebpo_collider *c, const ebpo_pose *a, const ebpo_pose 
     return out;
 }
 
-/* --- what is told --- */
+/* --- results --- */
 
-static void check_pair(const twin_faces *f, const ebpo_clearance *got, const char *what)
+static void check_pair(const reference_faces *f, const ebpo_clearance *got, const char *what)
 {
-    twin_met *met;
-    uint64_t count = twin_pairs(&f[0], &f[1], &met), i = 0;
+    reference_found *intersected;
+    uint64_t count = reference_pairs(&f[0], &f[1], &intersected), i = 0;
     ck_assert_msg((got->pair.kind != EBPO_PAIR_APART) == (count > 0), "%s: kind %d of %llu pairs",
                   what, got->pair.kind, (unsigned long long)count);
-    while (i < count && !(met[i].a == got->pair.file_face_a && met[i].b == got->pair.file_face_b &&
-                          met[i].kind == got->pair.kind))
+    while (i < count &&
+           !(intersected[i].a == got->pair.file_face_a &&
+             intersected[i].b == got->pair.file_face_b && intersected[i].kind == got->pair.kind))
         i++;
     ck_assert_msg(count == 0 || i < count, "%s: a pair that does not meet so", what);
     ck_assert_msg((got->distance.hi == 0) == (count > 0), "%s: %g", what, got->distance.hi);
-    free(met);
+    free(intersected);
     if (count)
         return;
-    const char *wrong = twin_models_distance(&f[0], &f[1], got->distance.hi, got->pair.file_face_a,
-                                             got->pair.file_face_b);
+    const char *wrong = reference_models_distance(&f[0], &f[1], got->distance.hi,
+                                                  got->pair.file_face_a, got->pair.file_face_b);
     ck_assert_msg(!wrong, "%s: %.17g: %s", what, got->distance.hi, wrong);
 }
 
@@ -81,14 +82,14 @@ static ebpo_clearance turned(ebpo_clearance c)
     return out;
 }
 
-/* --- what else may be asked --- */
+/* --- other options --- */
 
 static void check_intervals(const two_models *t, const ebpo_pose *a, const ebpo_pose *b,
                             double distance, double size, const char *what)
 {
     const double tolerance[] = { 1e-12, 1e-3, 0.5 };
     for (int i = 0; i < 3; i++) {
-        ebpo_certain d = ask(t->collider, a, b, tolerance[i] * size, -1, i == 1).distance;
+        ebpo_certain d = run_query(t->collider, a, b, tolerance[i] * size, -1, i == 1).distance;
         ck_assert_msg(d.lo <= distance && distance <= d.hi, "%s: %.17g is not in %.17g .. %.17g",
                       what, distance, d.lo, d.hi);
         ck_assert_msg(d.hi - d.lo <= (tolerance[i] + 1e-12) * size + 1e-9 * distance,
@@ -99,15 +100,15 @@ static void check_intervals(const two_models *t, const ebpo_pose *a, const ebpo_
 static void check_at_least(const two_models *t, const ebpo_pose *a, const ebpo_pose *b,
                            double distance, const char *what)
 {
-    const double asked[] = { 0, distance / 2, nextafter(distance, 0), nextafter(distance, INFINITY),
-                             2 * distance + 1 };
+    const double queried[] = { 0, distance / 2, nextafter(distance, 0),
+                               nextafter(distance, INFINITY), 2 * distance + 1 };
     for (int i = 0; i < 5; i++) {
-        ebpo_clearance c = ask(t->collider, a, b, 0, asked[i], false);
-        int want = asked[i] <= distance;
-        ck_assert_msg(c.at_least == want, "%s: at least %.17g: %d", what, asked[i], c.at_least);
+        ebpo_clearance c = run_query(t->collider, a, b, 0, queried[i], false);
+        int want = queried[i] <= distance;
+        ck_assert_msg(c.at_least == want, "%s: at least %.17g: %d", what, queried[i], c.at_least);
         ck_assert(c.distance.lo <= distance && distance <= c.distance.hi);
         if (!want)
-            ck_assert(c.pair.face_a != EBPO_NO_FACE && c.distance.lo <= asked[i]);
+            ck_assert(c.pair.face_a != EBPO_NO_FACE && c.distance.lo <= queried[i]);
     }
 }
 
@@ -128,28 +129,28 @@ static void check_late(const two_models *t, const ebpo_pose *a, const ebpo_pose 
 static void check_case(two_models *t, int kind, uint64_t *state)
 {
     ebpo_pose a, b;
-    twin_faces f[2];
+    reference_faces f[2];
     char what[128];
     double size = t->model[0].size > 0 ? t->model[0].size : 1;
     snprintf(what, sizeof what, "%s, %s, %s", t->model[0].name, t->model[1].name,
-             twin_pose_name(kind));
-    twin_pose(kind, size, state, &a, &b);
-    twin_faces_make(&f[0], &t->model[0], &a);
-    twin_faces_make(&f[1], &t->model[1], &b);
-    ebpo_clearance got = ask(t->collider, &a, &b, 0, -1, false),
-                   other = turned(ask(t->swapped, &b, &a, 0, -1, false)),
-                   warm = ask(t->collider, &a, &b, 0, -1, true);
+             reference_pose_name(kind));
+    reference_pose(kind, size, state, &a, &b);
+    reference_faces_make(&f[0], &t->model[0], &a);
+    reference_faces_make(&f[1], &t->model[1], &b);
+    ebpo_clearance got = run_query(t->collider, &a, &b, 0, -1, false),
+                   other = turned(run_query(t->swapped, &b, &a, 0, -1, false)),
+                   warm = run_query(t->collider, &a, &b, 0, -1, true);
     ck_assert_msg(memcmp(&got, &other, sizeof got) == 0, "%s: swapped", what);
     ck_assert_msg(memcmp(&got.distance, &warm.distance, sizeof got.distance) == 0, "%s: warm",
                   what);
-    ck_assert_int_eq(got.distance.figure, EBPO_FIGURE_EXACT);
+    ck_assert_int_eq(got.distance.metric, EBPO_VALUE_EXACT);
     check_pair(f, &got, what);
     check_points(&got, size, what);
     check_intervals(t, &a, &b, got.distance.hi, size, what);
     check_at_least(t, &a, &b, got.distance.hi, what);
     check_late(t, &a, &b, got.distance.hi, what);
-    twin_faces_free(&f[0]);
-    twin_faces_free(&f[1]);
+    reference_faces_free(&f[0]);
+    reference_faces_free(&f[1]);
 }
 
 static void make_two(two_models *t, const char *name_a, const char *name_b, int variant)
@@ -169,15 +170,15 @@ static void free_two(two_models *t)
     query_model_free(&t->model[1]);
 }
 
-START_TEST(distances_are_those_of_brute_force)
+START_TEST(test_collide_distance_matches_brute_force)
 {
     two_models t;
     uint64_t state = (uint64_t)_i + 1;
     if (!ebpo_test_wanted(_i))
         return;
     make_two(&t, names[_i / NAMES], names[_i % NAMES], _i % query_variant_count);
-    bool few = t.model[0].mesh.face_count * t.model[1].mesh.face_count > MOST_PAIRS;
-    for (int kind = 0; kind < TWIN_POSES; kind++)
+    bool few = t.model[0].mesh.face_count * t.model[1].mesh.face_count > MAX_PAIRS;
+    for (int kind = 0; kind < REFERENCE_POSES; kind++)
         if (!few || kind % 5 == _i % 5)
             check_case(&t, kind, &state);
     free_two(&t);
@@ -199,7 +200,8 @@ static double box_gap(const double a[3][3], const double b[3][3])
 }
 
 /* The least bounds of all pairs of faces: the distance is in *lo .. *hi. */
-static void distance_of_all(const twin_faces *a, const twin_faces *b, double *lo, double *hi)
+static void distance_of_all(const reference_faces *a, const reference_faces *b, double *lo,
+                            double *hi)
 {
     *lo = *hi = INFINITY;
     for (uint64_t i = 0; i < a->count; i++)
@@ -215,60 +217,59 @@ static void distance_of_all(const twin_faces *a, const twin_faces *b, double *lo
         }
 }
 
-/* Moves b until it is nearly at a. */
+/* Moves b until it is close to a. */
 static void approach(two_models *t, const ebpo_pose *a, ebpo_pose *b, double left)
 {
     for (int i = 0; i < 3; i++) {
-        ebpo_clearance c = ask(t->collider, a, b, 0, -1, false);
+        ebpo_clearance c = run_query(t->collider, a, b, 0, -1, false);
         for (int k = 0; k < 3; k++)
             b->translation[k] += (1 - left) * (c.point_a[k] - c.point_b[k]);
     }
 }
 
-/* Turned about: what decides there are bounds that small models at straight poses hardly ask for.
- */
-START_TEST(bounds_of_deep_hierarchies_hold)
+/* Rotated models use bounds that small models at axis-aligned poses hardly need. */
+START_TEST(test_collide_distance_in_deep_hierarchies)
 {
     two_models t;
     uint64_t state = (uint64_t)_i + 77;
     if (!ebpo_test_wanted(_i))
         return;
     ebpo_pose a, b;
-    twin_faces f[2];
+    reference_faces f[2];
     double lo, hi;
     for (int i = 0; i < 2; i++)
         query_model_make(&t.model[i], "fine torus", ebpo_test_torus(2, 0.7, 64, 32),
                          &query_variants[0]);
     ASSERT_OK(ebpo_collider_new(t.model[0].model, t.model[1].model, NULL, &t.collider, error));
     ASSERT_OK(ebpo_collider_new(t.model[1].model, t.model[0].model, NULL, &t.swapped, error));
-    twin_pose(TWIN_TURNED_APART, t.model[0].size, &state, &a, &b);
+    reference_pose(REFERENCE_TURNED_APART, t.model[0].size, &state, &a, &b);
     approach(&t, &a, &b, 0.1 * (1 + _i));
-    twin_faces_make(&f[0], &t.model[0], &a);
-    twin_faces_make(&f[1], &t.model[1], &b);
+    reference_faces_make(&f[0], &t.model[0], &a);
+    reference_faces_make(&f[1], &t.model[1], &b);
     distance_of_all(&f[0], &f[1], &lo, &hi);
-    double got = ask(t.collider, &a, &b, 0, -1, false).distance.hi;
+    double got = run_query(t.collider, &a, &b, 0, -1, false).distance.hi;
     ck_assert_msg(lo > 0 && lo <= got && got <= hi, "%d: %.17g is not in %.17g .. %.17g", _i, got,
                   lo, hi);
     for (int i = 0; i < 2; i++)
-        twin_faces_free(&f[i]);
+        reference_faces_free(&f[i]);
     free_two(&t);
 }
 END_TEST
 
 /* A translation that rounds nothing changes nothing. */
-START_TEST(moving_both_alike_changes_nothing)
+START_TEST(test_collide_distance_common_translation)
 {
     two_models t;
     ebpo_pose a = EBPO_POSE_INIT, b = EBPO_POSE_INIT;
     make_two(&t, "cube", "cube", 0);
     double size = t.model[0].size;
     b.translation[0] = 1.25 * size;
-    ebpo_clearance here = ask(t.collider, &a, &b, 0, -1, false);
+    ebpo_clearance here = run_query(t.collider, &a, &b, 0, -1, false);
     for (int k = 0; k < 3; k++) {
         a.translation[k] += 64 * size;
         b.translation[k] += 64 * size;
     }
-    ebpo_clearance there = ask(t.collider, &a, &b, 0, -1, false);
+    ebpo_clearance there = run_query(t.collider, &a, &b, 0, -1, false);
     ck_assert_double_eq(here.distance.hi, 0.25 * size);
     ck_assert_double_eq(there.distance.hi, here.distance.hi);
     ck_assert(there.pair.file_face_a == here.pair.file_face_a &&
@@ -277,7 +278,7 @@ START_TEST(moving_both_alike_changes_nothing)
 }
 END_TEST
 
-START_TEST(what_is_no_number_is_refused)
+START_TEST(test_collide_distance_bad_options_are_refused)
 {
     two_models t;
     ebpo_clearance out;
@@ -299,10 +300,10 @@ TEST_SUITE(collide_distance)
 {
     TCase *tests = tcase_create("collide_distance");
     tcase_set_timeout(tests, 900);
-    tcase_add_loop_test(tests, distances_are_those_of_brute_force, 0, NAMES * NAMES);
-    tcase_add_loop_test(tests, bounds_of_deep_hierarchies_hold, 0, 6);
-    tcase_add_test(tests, moving_both_alike_changes_nothing);
-    tcase_add_test(tests, what_is_no_number_is_refused);
+    tcase_add_loop_test(tests, test_collide_distance_matches_brute_force, 0, NAMES * NAMES);
+    tcase_add_loop_test(tests, test_collide_distance_in_deep_hierarchies, 0, 6);
+    tcase_add_test(tests, test_collide_distance_common_translation);
+    tcase_add_test(tests, test_collide_distance_bad_options_are_refused);
     Suite *suite = suite_create("collide_distance");
     suite_add_tcase(suite, tests);
     return suite;

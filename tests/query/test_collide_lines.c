@@ -1,5 +1,5 @@
 /* Contact segments against the exact contact of each crossing pair; lines of contact: each segment
- * once, joined end to end, closed where both models are. */
+ * once, joined end to end, closed where both models are closed. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,18 +8,18 @@
 
 #include "check_main.h"
 #include "extras/collide/face_pairs.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 typedef struct gathered {
     ebpo_face_pair *pair; /* crossing ones */
     ebpo_contact_segment *segment;
     uint64_t pairs, segments;
-    /* of lines: */
+    /* counts of lines: */
     uint64_t lines, open, parts;
     double length;
-    const struct gathered *all; /* whose segments they are made of */
+    const struct gathered *all; /* source of their segments */
     const ebpo_collide_options *how;
-    double *points; /* of all lines, for comparisons */
+    double *points; /* points of all lines, for comparisons */
     uint64_t point_count;
 } gathered;
 
@@ -65,7 +65,7 @@ static void posed_face(const query_model *m, const ebpo_pose *p, uint64_t f, dou
     }
 }
 
-/* Of points and features. */
+/* Checks points and features. */
 static void check_segment(const query_model *a, const query_model *b,
                           const ebpo_collide_options *how, const ebpo_face_pair *pair,
                           const ebpo_contact_segment *s)
@@ -128,7 +128,8 @@ static bool take_line(void *user, const ebpo_polyline *line)
     return true;
 }
 
-static gathered ask(ebpo_model *a, ebpo_model *b, const ebpo_collide_options *how, unsigned threads)
+static gathered run_query(ebpo_model *a, ebpo_model *b, const ebpo_collide_options *how,
+                          unsigned threads)
 {
     gathered g = { .how = how };
     ebpo_collider_options with = EBPO_COLLIDER_OPTIONS_INIT;
@@ -160,12 +161,12 @@ static ebpo_collide_options swapped(const ebpo_collide_options *how)
     return out;
 }
 
-/* The same lines from the other model's side: each runs the other way. */
+/* Compares with the lines of swapped models: each runs the other way. */
 static void check_swap(const query_model *a, const query_model *b, const ebpo_collide_options *how,
                        const gathered *g)
 {
     ebpo_collide_options other = swapped(how);
-    gathered s = ask(b->model, a->model, &other, 3);
+    gathered s = run_query(b->model, a->model, &other, 3);
     ck_assert_uint_eq(s.segments, g->segments);
     ck_assert_uint_eq(s.lines, g->lines);
     ck_assert_uint_eq(s.open, g->open);
@@ -179,7 +180,7 @@ static void check_swap(const query_model *a, const query_model *b, const ebpo_co
 static gathered check_two(const query_model *a, const query_model *b,
                           const ebpo_collide_options *how)
 {
-    gathered g = ask(a->model, b->model, how, 1);
+    gathered g = run_query(a->model, b->model, how, 1);
     for (uint64_t i = 0; i < g.pairs; i++)
         check_segment(a, b, how, &g.pair[i], &g.segment[i]);
     check_swap(a, b, how, &g);
@@ -193,8 +194,8 @@ static query_model model_of(const char *name, int variant)
     return m;
 }
 
-/* Two boxes, one of their corners in each other: six edges of the box that they have in common. */
-START_TEST(two_cubes_cross_along_six_edges)
+/* Two boxes with one corner in each other: six edges of their common box. */
+START_TEST(test_intersection_lines_of_two_cubes)
 {
     query_model m = model_of("cube", 0);
     ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
@@ -210,8 +211,8 @@ START_TEST(two_cubes_cross_along_six_edges)
 }
 END_TEST
 
-/* A manifold solid's boundary and another's, in general position: closed lines only. */
-START_TEST(lines_of_closed_models_are_closed)
+/* Boundaries of two manifold solids in general position: only closed lines. */
+START_TEST(test_intersection_lines_of_solids_are_closed)
 {
     static const char *const names[] = { "torus", "sphere_float", "cube" };
     query_model a = model_of(names[_i / 3], 0), b = model_of(names[_i % 3], 1);
@@ -238,8 +239,8 @@ START_TEST(lines_of_closed_models_are_closed)
 }
 END_TEST
 
-/* A surface ends: its lines do where its border is. */
-START_TEST(lines_with_a_surface)
+/* Lines end at the border of a surface. */
+START_TEST(test_intersection_lines_end_at_borders)
 {
     query_model a = model_of("sheet", 0), b = model_of("torus", 1);
     ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
@@ -260,7 +261,7 @@ static bool take_none(void *user, const ebpo_polyline *line)
     return false;
 }
 
-START_TEST(lines_need_memory_and_end_early)
+START_TEST(test_intersection_lines_memory_and_cancel)
 {
     query_model m = model_of("torus", 0);
     ebpo_collide_options how = EBPO_COLLIDE_OPTIONS_INIT;
@@ -287,10 +288,10 @@ TEST_SUITE(collide_lines)
 {
     TCase *tests = tcase_create("collide_lines");
     tcase_set_timeout(tests, 900);
-    tcase_add_test(tests, two_cubes_cross_along_six_edges);
-    tcase_add_loop_test(tests, lines_of_closed_models_are_closed, 0, 9);
-    tcase_add_test(tests, lines_with_a_surface);
-    tcase_add_test(tests, lines_need_memory_and_end_early);
+    tcase_add_test(tests, test_intersection_lines_of_two_cubes);
+    tcase_add_loop_test(tests, test_intersection_lines_of_solids_are_closed, 0, 9);
+    tcase_add_test(tests, test_intersection_lines_end_at_borders);
+    tcase_add_test(tests, test_intersection_lines_memory_and_cancel);
     Suite *suite = suite_create("collide_lines");
     suite_add_tcase(suite, tests);
     return suite;

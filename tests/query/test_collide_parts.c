@@ -1,5 +1,5 @@
-/* Models that are loaded in parts give what whole models do: distances, contacts, lines and files,
- * at several cuts, of both in parts, of one, swapped, and under one budget that both share. */
+/* Partly loaded models give the results of whole models: distances, contacts, lines and files, at
+ * several cuts, with both in parts, one in parts, swapped, and under a shared budget. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,9 +8,9 @@
 #include <ebpo/collide.h>
 
 #include "check_main.h"
-#include "models_twin.h"
+#include "models_reference.h"
 #include "geometry/triangle_pair.h"
-#include "query_kit.h"
+#include "query_support.h"
 #include "solids.h"
 
 static const char *const names[] = { "torus", "blob",        "touching_shells", "sheet",
@@ -81,8 +81,8 @@ static void free_two(two_models *t)
 
 /* --- distances --- */
 
-static ebpo_clearance ask(ebpo_collider *c, const ebpo_pose pose[2], double tolerance,
-                          double at_least, bool warm)
+static ebpo_clearance run_query(ebpo_collider *c, const ebpo_pose pose[2], double tolerance,
+                                double at_least, bool warm)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
@@ -111,7 +111,7 @@ typedef struct looked_for {
     bool found;
 } looked_for;
 
-static bool look_for(void *user, const ebpo_face_pair *pairs, uint64_t count)
+static bool find(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     looked_for *l = user;
     for (uint64_t i = 0; i < count && !l->found; i++)
@@ -119,7 +119,7 @@ static bool look_for(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return !l->found;
 }
 
-/* Of faces that meet which pair is told depends on the parts. */
+/* For intersecting faces, the reported pair depends on the parts. */
 static void check_distance(const two_models *t, const ebpo_pose pose[2], const ebpo_clearance *want,
                            const ebpo_clearance *got, const char *what)
 {
@@ -134,36 +134,37 @@ static void check_distance(const two_models *t, const ebpo_pose pose[2], const e
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     options.pose_a = pose[0];
     options.pose_b = pose[1];
-    ASSERT_OK(ebpo_collide_all(t->whole, &options, look_for, &l, error));
+    ASSERT_OK(ebpo_collide_all(t->whole, &options, find, &l, error));
     ck_assert_msg(l.found, "%s: a pair that does not meet so", what);
 }
 
 static void check_distances(const two_models *t, const ebpo_pose pose[2], const char *what)
 {
     const ebpo_pose back[2] = { pose[1], pose[0] };
-    ebpo_clearance want = ask(t->whole, pose, 0, -1, false),
-                   both = ask(t->parts, pose, 0, -1, true), one = ask(t->one, pose, 0, -1, false),
-                   swapped = turned(ask(t->swapped, back, 0, -1, false));
+    ebpo_clearance want = run_query(t->whole, pose, 0, -1, false),
+                   both = run_query(t->parts, pose, 0, -1, true),
+                   one = run_query(t->one, pose, 0, -1, false),
+                   swapped = turned(run_query(t->swapped, back, 0, -1, false));
     check_distance(t, pose, &want, &both, what);
     check_distance(t, pose, &want, &one, what);
     check_distance(t, pose, &want, &swapped, what);
-    both = ask(t->parts, pose, 0, -1, true);
+    both = run_query(t->parts, pose, 0, -1, true);
     ck_assert_msg(memcmp(&want.distance, &both.distance, sizeof both.distance) == 0, "%s: warm",
                   what);
 }
 
-/* What is asked otherwise has to fit the exact distance. */
+/* Other queries must agree with the exact distance. */
 static void check_others(const two_models *t, const ebpo_pose pose[2], const char *what)
 {
-    double d = ask(t->whole, pose, 0, -1, false).distance.hi, size = t->model[0].size;
-    const double asked[] = { d / 2, nextafter(d, 0), nextafter(d, INFINITY), 2 * d + 1 };
+    double d = run_query(t->whole, pose, 0, -1, false).distance.hi, size = t->model[0].size;
+    const double queried[] = { d / 2, nextafter(d, 0), nextafter(d, INFINITY), 2 * d + 1 };
     for (int i = 0; i < 4; i++) {
-        ebpo_clearance c = ask(i % 2 ? t->one : t->parts, pose, 0, asked[i], i > 1);
-        ck_assert_msg(c.at_least == (asked[i] <= d), "%s: at least %.17g", what, asked[i]);
+        ebpo_clearance c = run_query(i % 2 ? t->one : t->parts, pose, 0, queried[i], i > 1);
+        ck_assert_msg(c.at_least == (queried[i] <= d), "%s: at least %.17g", what, queried[i]);
         ck_assert_msg(c.distance.lo <= d && d <= c.distance.hi, "%s: %.17g not in %.17g .. %.17g",
                       what, d, c.distance.lo, c.distance.hi);
     }
-    ebpo_certain about = ask(t->parts, pose, 0.01 * size, -1, false).distance;
+    ebpo_certain about = run_query(t->parts, pose, 0.01 * size, -1, false).distance;
     ck_assert_msg(about.lo <= d && d <= about.hi, "%s: tolerance", what);
     ck_assert_double_le(about.hi - about.lo, 0.011 * size + 1e-9 * d);
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
@@ -175,14 +176,14 @@ static void check_others(const two_models *t, const ebpo_pose pose[2], const cha
     ck_assert_msg(late.distance.lo <= d && d <= late.distance.hi, "%s: late", what);
 }
 
-/* --- where they meet --- */
+/* --- contacts --- */
 
-typedef struct told {
+typedef struct reported {
     char *bytes;
     size_t count, capacity;
-} told;
+} reported;
 
-static void add(told *t, const void *bytes, size_t count)
+static void add(reported *t, const void *bytes, size_t count)
 {
     while (t->count + count > t->capacity) {
         t->capacity = t->capacity ? 2 * t->capacity : 4096;
@@ -209,7 +210,7 @@ static bool take_line(void *user, const ebpo_polyline *l)
     return true;
 }
 
-static void add_file(told *t, const char *path)
+static void add_file(reported *t, const char *path)
 {
     char buffer[4096];
     FILE *f = fopen(path, "rb");
@@ -219,10 +220,11 @@ static void add_file(told *t, const char *path)
     ck_assert_int_eq(fclose(f), 0);
 }
 
-/* Everything that tells where they meet, one after the other. */
-static told tell_all(ebpo_collider *c, const ebpo_pose pose[2], const char *folder, bool files)
+/* Runs every query for contacts. */
+static reported report_all(ebpo_collider *c, const ebpo_pose pose[2], const char *folder,
+                           bool files)
 {
-    told out = { 0 };
+    reported out = { 0 };
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     options.pose_a = pose[0];
     options.pose_b = pose[1];
@@ -243,9 +245,9 @@ static void check_contacts(const two_models *t, const ebpo_pose pose[2], bool fi
                            const char *what)
 {
     ebpo_collider *other[2] = { t->parts, t->one };
-    told want = tell_all(t->whole, pose, t->model[0].folder, files);
+    reported want = report_all(t->whole, pose, t->model[0].folder, files);
     for (int i = 0; i < 2; i++) {
-        told got = tell_all(other[i], pose, t->model[0].folder, files);
+        reported got = report_all(other[i], pose, t->model[0].folder, files);
         ck_assert_msg(got.count == want.count &&
                           (want.count == 0 || memcmp(got.bytes, want.bytes, want.count) == 0),
                       "%s: contacts of parts differ", what);
@@ -254,7 +256,7 @@ static void check_contacts(const two_models *t, const ebpo_pose pose[2], bool fi
     free(want.bytes);
 }
 
-/* --- how they lie to each other --- */
+/* --- relations --- */
 
 static ebpo_relation_result relate(ebpo_collider *c, const ebpo_pose pose[2])
 {
@@ -284,30 +286,30 @@ static void check_relation(const two_models *t, const ebpo_pose pose[2], const c
                   both.contact, one.contact, swapped.contact);
 }
 
-/* --- the way out --- */
+/* --- separation distance along a direction --- */
 
-static ebpo_way_out way_out(ebpo_collider *c, const ebpo_pose pose[2], const double d[3],
-                            uint64_t deadline)
+static ebpo_separation separation(ebpo_collider *c, const ebpo_pose pose[2], const double d[3],
+                                  uint64_t deadline)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
-    ebpo_way_out out;
+    ebpo_separation out;
     options.pose_a = pose[0];
     options.pose_b = pose[1];
     options.deadline_ns = deadline;
-    ASSERT_OK(ebpo_collide_way_out(c, &options, d, &out, error));
+    ASSERT_OK(ebpo_collide_separation(c, &options, d, &out, error));
     return out;
 }
 
-static ebpo_way_out turned_way(ebpo_way_out w)
+static ebpo_separation turned_way(ebpo_separation w)
 {
     const ebpo_face_pair p = w.pair;
     w.pair = (ebpo_face_pair){ p.face_b, p.face_a, p.file_face_b, p.file_face_a, p.kind, 0 };
     return w;
 }
 
-/* Along an axis many faces part at the same time. */
-static void check_way_out(const two_models *t, const ebpo_pose pose[2], uint64_t *state,
-                          const char *what)
+/* Along an axis many faces separate at the same time. */
+static void check_separation(const two_models *t, const ebpo_pose pose[2], uint64_t *state,
+                             const char *what)
 {
     const ebpo_pose back[2] = { pose[1], pose[0] };
     double d[3], against[3];
@@ -316,20 +318,21 @@ static void check_way_out(const two_models *t, const ebpo_pose pose[2], uint64_t
         d[k] = axis < 3 ? (double)(axis == k) : ebpo_test_random_unit(state) - 0.5;
         against[k] = -d[k];
     }
-    ebpo_way_out want = way_out(t->whole, pose, d, 0), both = way_out(t->parts, pose, d, 0),
-                 one = way_out(t->one, pose, d, 0), late = way_out(t->parts, pose, d, 1),
-                 swapped = turned_way(way_out(t->swapped, back, against, 0));
-    ck_assert_int_eq(want.t.figure, EBPO_FIGURE_EXACT);
+    ebpo_separation want = separation(t->whole, pose, d, 0),
+                    both = separation(t->parts, pose, d, 0), one = separation(t->one, pose, d, 0),
+                    late = separation(t->parts, pose, d, 1),
+                    swapped = turned_way(separation(t->swapped, back, against, 0));
+    ck_assert_int_eq(want.t.metric, EBPO_VALUE_EXACT);
     ck_assert_msg(memcmp(&want, &both, sizeof want) == 0 && memcmp(&want, &one, sizeof want) == 0 &&
                       memcmp(&want, &swapped, sizeof want) == 0,
                   "%s: out by %.17g, of parts %.17g, %.17g, %.17g", what, want.t.lo, both.t.lo,
                   one.t.lo, swapped.t.lo);
-    ck_assert_msg(late.t.lo <= want.t.lo && want.t.lo <= late.t.hi, "%s: late way out", what);
+    ck_assert_msg(late.t.lo <= want.t.lo && want.t.lo <= late.t.hi, "%s: late separation", what);
 }
 
-/* --- how deep --- */
+/* --- depths --- */
 
-/* Of surfaces none is told: bytes 0. */
+/* Surfaces have no depth: bytes 0. */
 static void depths(ebpo_collider *c, const two_models *t, const ebpo_pose pose[2], bool back,
                    uint64_t deadline, ebpo_certain out[2])
 {
@@ -364,7 +367,7 @@ static void check_depths(const two_models *t, const ebpo_pose pose[2], const cha
     }
 }
 
-START_TEST(parts_give_what_whole_models_do)
+START_TEST(test_partly_loaded_collision_matches_whole)
 {
     two_models t;
     uint64_t state = (uint64_t)_i + 5;
@@ -372,23 +375,23 @@ START_TEST(parts_give_what_whole_models_do)
     if (!ebpo_test_wanted(_i))
         return;
     make_two(&t, name_a, name_b, _i % query_variant_count);
-    for (int kind = _i % 3; kind < TWIN_POSES; kind += 3) {
+    for (int kind = _i % 3; kind < REFERENCE_POSES; kind += 3) {
         char what[128];
         ebpo_pose pose[2];
-        snprintf(what, sizeof what, "%s, %s, %s", name_a, name_b, twin_pose_name(kind));
-        twin_pose(kind, t.model[0].size > 0 ? t.model[0].size : 1, &state, &pose[0], &pose[1]);
+        snprintf(what, sizeof what, "%s, %s, %s", name_a, name_b, reference_pose_name(kind));
+        reference_pose(kind, t.model[0].size > 0 ? t.model[0].size : 1, &state, &pose[0], &pose[1]);
         check_distances(&t, pose, what);
         check_others(&t, pose, what);
         check_contacts(&t, pose, kind % 2 == 0, what);
         check_relation(&t, pose, what);
-        check_way_out(&t, pose, &state, what);
+        check_separation(&t, pose, &state, what);
         check_depths(&t, pose, what);
     }
     free_two(&t);
 }
 END_TEST
 
-/* --- more than the budget holds --- */
+/* --- small budgets --- */
 
 static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
@@ -396,9 +399,9 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return true;
 }
 
-static told ask_pairs(ebpo_collider *c, const ebpo_pose *pose_b)
+static reported query_pairs(ebpo_collider *c, const ebpo_pose *pose_b)
 {
-    told out = { 0 };
+    reported out = { 0 };
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     options.pose_b = *pose_b;
     ASSERT_OK(ebpo_collide_all(c, &options, take_pairs, &out, error));
@@ -420,7 +423,7 @@ static ebpo_collider_stats stats_of(const ebpo_collider *c)
     return out;
 }
 
-/* What is read is told. */
+/* Reads are counted. */
 static void check_far_relation(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pose pose[2],
                                int32_t expected)
 {
@@ -431,11 +434,12 @@ static void check_far_relation(ebpo_collider *whole, ebpo_collider *parts, const
     ck_assert_uint_gt(stats_of(parts).bytes_read, before.bytes_read);
 }
 
-static void check_far_way_out(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pose pose[2])
+static void check_far_separation(ebpo_collider *whole, ebpo_collider *parts,
+                                 const ebpo_pose pose[2])
 {
     const double d[3] = { 1, 0.25, 0.5 };
     ebpo_collider_stats before = stats_of(parts);
-    ebpo_way_out want = way_out(whole, pose, d, 0), got = way_out(parts, pose, d, 0);
+    ebpo_separation want = separation(whole, pose, d, 0), got = separation(parts, pose, d, 0);
     ck_assert_double_gt(want.t.lo, 0);
     ck_assert(memcmp(&want, &got, sizeof want) == 0);
     ck_assert_uint_gt(stats_of(parts).loads, before.loads);
@@ -460,12 +464,12 @@ static void check_far(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pos
 {
     const ebpo_pose pose[2] = { EBPO_POSE_INIT, *b };
     check_far_relation(whole, parts, pose, relation);
-    check_far_way_out(whole, parts, pose);
+    check_far_separation(whole, parts, pose);
     check_far_depth(whole, parts, pose);
 }
 
-/* Two models, each of which would take more than all of it. */
-START_TEST(one_budget_holds_for_both)
+/* Two models, each larger than the whole budget. */
+START_TEST(test_collision_shares_one_budget)
 {
     query_model m[2];
     ebpo_budget *budget;
@@ -484,12 +488,13 @@ START_TEST(one_budget_holds_for_both)
     for (int i = 0; i < 2; i++)
         part[i] = open_part(&m[i], -1, budget);
     ebpo_collider *whole = meet(m[0].model, m[1].model), *parts = meet(part[0], part[1]);
-    told want = ask_pairs(whole, &pose), got = ask_pairs(parts, &pose);
+    reported want = query_pairs(whole, &pose), got = query_pairs(parts, &pose);
     ck_assert_uint_gt(want.count, 0);
     ck_assert_uint_eq(want.count, got.count);
     ck_assert(memcmp(want.bytes, got.bytes, want.count) == 0);
     const ebpo_pose poses[2] = { EBPO_POSE_INIT, away };
-    ebpo_clearance far = ask(whole, poses, 0, -1, false), same = ask(parts, poses, 0, -1, false);
+    ebpo_clearance far = run_query(whole, poses, 0, -1, false),
+                   same = run_query(parts, poses, 0, -1, false);
     ck_assert_double_gt(far.distance.hi, 0);
     ck_assert(memcmp(&far, &same, sizeof far) == 0);
     ck_assert_uint_gt(evicted(part[0]) + evicted(part[1]), 0);
@@ -512,8 +517,8 @@ START_TEST(one_budget_holds_for_both)
 }
 END_TEST
 
-/* A model that takes up to half is all in memory; what it took comes back. */
-START_TEST(small_models_are_whole_and_too_small_budgets_refused)
+/* A model that takes up to half is loaded completely; its memory is returned. */
+START_TEST(test_small_models_load_whole)
 {
     query_model m;
     ebpo_budget *budget;
@@ -541,9 +546,9 @@ TEST_SUITE(collide_parts)
 {
     TCase *tests = tcase_create("collide_parts");
     tcase_set_timeout(tests, 900);
-    tcase_add_loop_test(tests, parts_give_what_whole_models_do, 0, NAMES * NAMES);
-    tcase_add_test(tests, one_budget_holds_for_both);
-    tcase_add_test(tests, small_models_are_whole_and_too_small_budgets_refused);
+    tcase_add_loop_test(tests, test_partly_loaded_collision_matches_whole, 0, NAMES * NAMES);
+    tcase_add_test(tests, test_collision_shares_one_budget);
+    tcase_add_test(tests, test_small_models_load_whole);
     Suite *suite = suite_create("collide_parts");
     suite_add_tcase(suite, tests);
     return suite;

@@ -1,6 +1,5 @@
-/* Faces of one mesh that meet otherwise than as neighbours: against the tests' own judge, which
- * shares no code with the library; under budgets, with threads, with and without shared vertices.
- */
+/* Intersecting faces of one mesh, except neighbours: against an independent reference of the tests;
+ * under budgets, with threads, with and without shared vertices. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +9,7 @@
 #include "core/workspace.h"
 #include "check_main.h"
 #include "crossing_faces.h"
-#include "query_kit.h"
+#include "query_support.h"
 #include "solids.h"
 
 typedef struct found {
@@ -68,7 +67,7 @@ static found look(const ebpo_mesh *mesh, unsigned threads, uint64_t memory)
     return out;
 }
 
-/* A place is in the boxes of both faces. */
+/* A reported position is in the boxes of both faces. */
 static void check_places(const ebpo_mesh *mesh, const found *f)
 {
     for (uint64_t i = 0; i < f->count; i++)
@@ -90,20 +89,20 @@ static void check_places(const ebpo_mesh *mesh, const found *f)
 static void check_sum(const found *f, uint64_t faces)
 {
     uint64_t of_kind[4] = { 0 }, in_pairs = 0;
-    bool *met = calloc(faces, 1);
+    bool *intersected = calloc(faces, 1);
     for (uint64_t i = 0; i < f->count; i++) {
         of_kind[f->at[i].kind]++;
         ck_assert_uint_lt(f->at[i].face[0], f->at[i].face[1]);
         ck_assert_uint_lt(f->at[i].face[1], faces);
-        met[f->at[i].face[0]] = met[f->at[i].face[1]] = true;
+        intersected[f->at[i].face[0]] = intersected[f->at[i].face[1]] = true;
     }
     for (uint64_t i = 0; i < faces; i++)
-        in_pairs += met[i];
+        in_pairs += intersected[i];
     ck_assert_uint_eq(f->sum.faces, in_pairs);
     for (int k = 0; k < 4; k++)
         ck_assert_uint_eq(f->sum.pairs[k], of_kind[k]);
     ck_assert_uint_eq(of_kind[0], 0);
-    free(met);
+    free(intersected);
 }
 
 static void check_equal(const found *f, const found *g)
@@ -114,7 +113,7 @@ static void check_equal(const found *f, const found *g)
                       (unsigned long long)i);
 }
 
-/* Returns how many there are. The mesh has floats, and no vertex twice. */
+/* Returns the number of pairs. The mesh has floats, and no repeated vertex. */
 static uint64_t check_mesh(ebpo_mesh *mesh)
 {
     face_model m = { (const float(*)[3])mesh->xyz32, (const uint32_t(*)[3])mesh->faces,
@@ -150,7 +149,7 @@ static bool on_a_line(const float *a, const float *b, const float *c)
     return u[1] * v[2] == u[2] * v[1] && u[2] * v[0] == u[0] * v[2] && u[0] * v[1] == u[1] * v[0];
 }
 
-/* Faces between points of a grid, whose numbers are small: much is flush, much shared. */
+/* Faces between points of a small integer grid: many are coplanar, many share vertices. */
 static ebpo_mesh make_soup(uint32_t n, uint32_t faces, uint64_t seed)
 {
     ebpo_mesh mesh = { 0 };
@@ -173,7 +172,7 @@ static ebpo_mesh make_soup(uint32_t n, uint32_t faces, uint64_t seed)
     return mesh;
 }
 
-START_TEST(soups_on_a_grid)
+START_TEST(test_crossings_of_grid_soups)
 {
     for (uint64_t i = 0; i < ebpo_test_scaled(60); i++) {
         ebpo_mesh mesh = make_soup(2 + (uint32_t)(i % 4), 6 + 3 * (uint32_t)i, 77 + i);
@@ -184,7 +183,7 @@ END_TEST
 
 /* --- solids --- */
 
-/* Two of them a little apart from each other, or in each other. */
+/* Two copies a little apart from each other, or overlapping. */
 static ebpo_mesh make_two(uint32_t cut, double apart)
 {
     const double here[3] = { 0, 0, 0 }, there[3] = { apart, 0.1, 0.2 };
@@ -196,7 +195,7 @@ static ebpo_mesh make_two(uint32_t cut, double apart)
     return mesh;
 }
 
-START_TEST(spheres_in_each_other)
+START_TEST(test_crossings_of_nested_spheres)
 {
     ebpo_mesh apart = make_two(2, 3), near = make_two(2, 1.1),
               many = make_two(ebpo_test_scale() < 1 ? 3 : 4, 1.2);
@@ -206,8 +205,8 @@ START_TEST(spheres_in_each_other)
 }
 END_TEST
 
-/* A face that is there twice, turned over; and a fold. */
-START_TEST(faces_on_each_other)
+/* A face that occurs twice, reversed; and a fold. */
+START_TEST(test_crossings_of_coincident_faces)
 {
     ebpo_mesh mesh = make_soup(2, 1, 3);
     uint32_t faces[4][3] = { { 0, 1, 2 }, { 2, 1, 0 }, { 1, 2, 3 }, { 0, 1, 3 } };
@@ -215,7 +214,7 @@ START_TEST(faces_on_each_other)
     memcpy(mesh.faces, faces, sizeof faces);
     mesh.face_count = 4;
     found f = look(&mesh, 1, 0);
-    /* 0 and 1 are one face, 3 lies on both and on 2 in a part */
+    /* 0 and 1 are one face, 3 overlaps both, and 2 partly */
     ck_assert_uint_eq(f.count, 4);
     ck_assert_uint_eq(f.sum.pairs[EBPO_PAIR_COPLANAR], 4);
     ck_assert_uint_eq(f.sum.faces, 4);
@@ -231,7 +230,7 @@ static bool take_one(void *user, const ebpo_crossing *crossings, uint64_t count)
     return false;
 }
 
-START_TEST(enough_ends_it)
+START_TEST(test_crossings_stop_on_request)
 {
     ebpo_mesh mesh = make_two(3, 1.1);
     ebpo_mesh_report report;
@@ -247,10 +246,10 @@ TEST_SUITE(crossings)
     Suite *suite = suite_create("crossings");
     TCase *tests = tcase_create("meshes");
     tcase_set_timeout(tests, 600);
-    tcase_add_test(tests, soups_on_a_grid);
-    tcase_add_test(tests, spheres_in_each_other);
-    tcase_add_test(tests, faces_on_each_other);
-    tcase_add_test(tests, enough_ends_it);
+    tcase_add_test(tests, test_crossings_of_grid_soups);
+    tcase_add_test(tests, test_crossings_of_nested_spheres);
+    tcase_add_test(tests, test_crossings_of_coincident_faces);
+    tcase_add_test(tests, test_crossings_stop_on_request);
     suite_add_tcase(suite, tests);
     return suite;
 }

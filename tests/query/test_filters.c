@@ -1,15 +1,14 @@
-/* Filters in single precision say nothing of a face that rational arithmetic contradicts: bounds of
- * a point's distance, and the turns of a face around a line along an axis. docs/develop/bounds.md
- * has the proofs. */
+/* Rational arithmetic never contradicts single-precision filters: bounds of a point's distance, and
+ * the turns of a face around a line along an axis. docs/develop/bounds.md has the proofs. */
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
 
 #include "check_main.h"
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "filter_faces.h"
 #include "oracle.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 #if !defined(HAVE_AVX2)
 #define face_filters_avx2 face_filters_base
@@ -25,7 +24,7 @@ typedef struct block {
         char bytes[EBPO_MESHLET_WIDE + CORNERS * 3 * sizeof(double)];
     } record;
     double corner[CORNERS][3];
-    double unit; /* of the frame, in that of the model: a power of two */
+    double unit; /* unit of the frame in model coordinates: a power of two */
     double centre[3];
 } block;
 
@@ -48,24 +47,24 @@ static void close_block(block *b)
 
 static double power(uint64_t *state, int least, int most)
 {
-    return ldexp(1, (int)twin_integer(state, least, most));
+    return ldexp(1, (int)reference_integer(state, least, most));
 }
 
 /* Faces of all sizes and shapes: slivers, needles, without area, on a grid. */
 static void make_faces(block *b, uint64_t *state)
 {
     memset(b, 0, sizeof *b);
-    b->s.wide = twin_integer(state, 0, 3) == 0;
+    b->s.wide = reference_integer(state, 0, 3) == 0;
     b->unit = power(state, -20, 20);
-    double far = twin_integer(state, 0, 1) ? 0 : power(state, 0, 12);
+    double far = reference_integer(state, 0, 1) ? 0 : power(state, 0, 12);
     for (int k = 0; k < 3; k++)
-        b->centre[k] = b->unit * far * twin_uniform(state);
+        b->centre[k] = b->unit * far * reference_uniform(state);
     for (int lane = 0; lane < EBPO_BLOCK; lane++) {
         double size = power(state, -24, 0), thin = power(state, -24, 0);
-        int kind = (int)twin_integer(state, 0, 4);
+        int kind = (int)reference_integer(state, 0, 4);
         for (int k = 0; k < 3; k++) {
-            double a = twin_uniform(state), e = size * twin_uniform(state),
-                   f = size * twin_uniform(state), share = kind == 1 ? 0.5 : 1.5;
+            double a = reference_uniform(state), e = size * reference_uniform(state),
+                   f = size * reference_uniform(state), share = kind == 1 ? 0.5 : 1.5;
             double other = kind == 0 ? f : share * e + thin * f;
             other = kind == 2 ? 0 : other;
             double x[3] = { a, a + e, a + other };
@@ -79,20 +78,21 @@ static void make_faces(block *b, uint64_t *state)
     close_block(b);
 }
 
-/* Near a face, or anywhere that the search in single precision is for; most at and above faces. */
+/* Near a face, or anywhere in the range of the single-precision search; most at and above faces. */
 static void make_point(const block *b, uint64_t *state, double p[3])
 {
-    unsigned lane = (unsigned)twin_integer(state, 0, EBPO_BLOCK - 1);
-    double u = twin_integer(state, 0, 2) / 2.0, v = twin_integer(state, 0, 1) ? (1 - u) / 2 : 0,
-           away = twin_integer(state, 0, 3) ? power(state, -30, 4) : 0;
+    unsigned lane = (unsigned)reference_integer(state, 0, EBPO_BLOCK - 1);
+    double u = reference_integer(state, 0, 2) / 2.0,
+           v = reference_integer(state, 0, 1) ? (1 - u) / 2 : 0,
+           away = reference_integer(state, 0, 3) ? power(state, -30, 4) : 0;
     for (int k = 0; k < 3; k++) {
         double a = b->corner[lane][k], e = b->corner[EBPO_BLOCK + lane][k] - a,
                f = b->corner[2 * EBPO_BLOCK + lane][k] - a;
-        p[k] = a + u * e + v * f + b->unit * away * twin_uniform(state);
+        p[k] = a + u * e + v * f + b->unit * away * reference_uniform(state);
     }
 }
 
-/* As the search makes it. */
+/* As in the search. */
 static ebpo_probe probe_of(const block *b, const double p[3])
 {
     ebpo_probe probe = { .scale = (float)b->s.scale, .scale64 = b->s.scale };
@@ -133,7 +133,7 @@ static void check_point(const block *b, oracle *o, const face_filters *filters, 
     }
 }
 
-START_TEST(distances_are_within_their_bounds)
+START_TEST(test_filter_distances_are_within_bounds)
 {
     uint64_t state = 15;
     for (uint64_t i = 0; i < query_scaled(20000); i++) {
@@ -153,8 +153,8 @@ END_TEST
 
 /* --- turns --- */
 
-/* Faces within a box as a model's, whose reach and size the allowed error is made of, and a line
- * through a corner, close to an edge, or anywhere. */
+/* Faces within the box of a model, whose extent determines the allowed error, and a line through a
+ * corner, close to an edge, or anywhere. */
 static void make_line(block *b, ebpo_axis_segment *g, uint64_t *state)
 {
     double p[3], reach = 0, low[3], high[3], size = 0;
@@ -172,7 +172,8 @@ static void make_line(block *b, ebpo_axis_segment *g, uint64_t *state)
         size = fmax(size, high[k] - low[k]);
     }
     b->s.turn_error = (float)(0x1p-43 * reach * size);
-    *g = (ebpo_axis_segment){ .axis = (int)twin_integer(state, 0, 2), .reach = EBPO_REACH_ALL };
+    *g =
+        (ebpo_axis_segment){ .axis = (int)reference_integer(state, 0, 2), .reach = EBPO_REACH_ALL };
     memcpy(g->from, p, sizeof p);
     g->to = high[g->axis];
 }
@@ -186,7 +187,7 @@ static unsigned exact_turns(const block *b, const ebpo_axis_segment *g, unsigned
         const double *x = b->corner[EBPO_BLOCK * i + lane],
                      *y = b->corner[EBPO_BLOCK * ((i + 1) % 3) + lane];
         double at[6] = { g->from[u], g->from[v], x[u], x[v], y[u], y[v] };
-        int sign = twin_orient2d(at);
+        int sign = reference_orient2d(at);
         bits |= sign > 0 ? 1 : sign < 0 ? 2 : 4;
     }
     return bits;
@@ -209,7 +210,7 @@ static void check_turns(const block *b, const ebpo_axis_segment *g, const face_f
     }
 }
 
-START_TEST(turns_are_as_they_are_called)
+START_TEST(test_filter_orientations_are_correct)
 {
     uint64_t state = 16, count = query_scaled(40000);
     unsigned certain = 0;
@@ -220,7 +221,7 @@ START_TEST(turns_are_as_they_are_called)
         check_turns(&b, &g, &face_filters_base, &certain);
         check_turns(&b, &g, &face_filters_avx2, &certain);
     }
-    ck_assert_uint_gt(certain, count); /* of 16 each: a filter that says nothing is none */
+    ck_assert_uint_gt(certain, count); /* of 16 each: a filter that decides nothing is useless */
 }
 END_TEST
 
@@ -229,8 +230,8 @@ Suite *test_suite(void)
     Suite *suite = suite_create("filters");
     TCase *filters = tcase_create("filters");
     tcase_set_timeout(filters, 600);
-    tcase_add_test(filters, distances_are_within_their_bounds);
-    tcase_add_test(filters, turns_are_as_they_are_called);
+    tcase_add_test(filters, test_filter_distances_are_within_bounds);
+    tcase_add_test(filters, test_filter_orientations_are_correct);
     suite_add_tcase(suite, filters);
     return suite;
 }

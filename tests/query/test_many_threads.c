@@ -1,10 +1,10 @@
-/* 64 threads on one handle under a small budget that two models share, with loading ahead, contexts
- * that come and go, hands beside them and sources that fail in between: every answer is that of one
- * thread that has everything in memory, and an error reaches the caller whose read failed, nobody
- * else. From a file, a source and a server; test_many_threads [FAULTY_SERVER]
+/* 64 threads share one handle under a small budget for two models, with prefetching, contexts that
+ * come and go, haptic devices, and fault injection. Every result equals that of one thread with
+ * everything in memory, and an error reaches only the caller whose read failed. Reads a file, a
+ * source and a server; test_many_threads [FAULTY_SERVER]
  *
- * EBPO_TEST_SECONDS=600 goes on for so long from each of them, on larger models. Without it each
- * thread asks some questions. Meant for ThreadSanitizer and AddressSanitizer. */
+ * EBPO_TEST_SECONDS=600 runs for so long with each of them, on larger models. Without it each
+ * thread runs some queries. For ThreadSanitizer and AddressSanitizer. */
 #include <inttypes.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -17,7 +17,7 @@
 #include "core/os.h"
 #include "check_main.h"
 #include "model_file.h"
-#include "question_mix.h"
+#include "query_mix.h"
 #include "scratch.h"
 #include "solids.h"
 #include "web.h"
@@ -41,7 +41,7 @@ static void must(ebpo_status status, const char *what, const ebpo_error *error)
         ck_abort_msg("%s: %s", what, error->message);
 }
 
-/* --- a source that fails when the thread that reads wants it to --- */
+/* --- a source that fails when the reading thread requests it --- */
 
 typedef struct bytes {
     uint8_t *data;
@@ -50,7 +50,7 @@ typedef struct bytes {
 
 static bytes content[MODELS];
 static __thread unsigned own_number; /* 0: a thread of the library */
-static __thread unsigned fail_in;    /* the read after so many fails; 0: none does */
+static __thread unsigned fail_in;    /* the read after so many fails; 0: none */
 static _Atomic uint64_t background;  /* reads in threads of the library */
 static _Atomic bool background_fails;
 
@@ -92,11 +92,11 @@ static void write_model(const char *name, ebpo_mesh mesh)
 
 static void slurp(const char *name, bytes *out)
 {
-    enum { MOST = 64 << 20 };
+    enum { LIMIT = 64 << 20 };
     FILE *f = fopen(scratch(name), "rb");
-    out->data = malloc(MOST);
+    out->data = malloc(LIMIT);
     ck_assert(f && out->data);
-    out->size = fread(out->data, 1, MOST, f);
+    out->size = fread(out->data, 1, LIMIT, f);
     fclose(f);
 }
 
@@ -122,17 +122,17 @@ static ebpo_file *open_from(int place, int which)
     return file;
 }
 
-/* --- the answers of one thread --- */
+/* --- results of one thread --- */
 
-static void ask_alone(int which)
+static void query_alone(int which)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    mix_asker a = { .file = model_open(scratch(names[which])) };
+    mix_querier a = { .file = model_open(scratch(names[which])) };
     must(ebpo_model_new(a.file, NULL, &a.model, &error), "model", &error);
     must(ebpo_context_new(a.model, &a.context, &error), "context", &error);
     for (int kind = 0; kind < MIX_KINDS; kind++)
         for (uint64_t n = 0; n < NUMBERS; n++)
-            must(mix_ask(&a, kind, n, &right[which][kind][n], &error), mix_names[kind], &error);
+            must(mix_query(&a, kind, n, &right[which][kind][n], &error), mix_names[kind], &error);
     ebpo_context_free(a.context);
     ebpo_model_free(a.model);
     ebpo_close((ebpo_file *)a.file);
@@ -146,7 +146,7 @@ static void begin(void)
     write_model(names[1], ebpo_test_torus(2, 1.5, n, 2 * n));
     for (int which = 0; which < MODELS; which++) {
         slurp(names[which], &content[which]);
-        ask_alone(which);
+        query_alone(which);
     }
     served = test_arguments[0] && web_start(test_arguments[0], content[0].data, content[0].size);
 }
@@ -166,18 +166,18 @@ typedef struct shared {
     ebpo_file *file[MODELS];
     ebpo_budget *budget;
     ebpo_model *model[MODELS];
-    double until; /* seconds; 0: count says when it is enough */
+    double until; /* seconds; 0: limited by count */
     uint64_t count;
     _Atomic bool enough;
-    _Atomic uint64_t asked[MIX_KINDS], refused, wrong;
-    _Atomic unsigned told;
+    _Atomic uint64_t queried[MIX_KINDS], refused, wrong;
+    _Atomic unsigned reported;
 } shared;
 
 typedef struct worker {
     shared *s;
     unsigned number;
     uint64_t state;
-    mix_asker asker;
+    mix_querier querier;
     int which;
 } worker;
 
@@ -187,16 +187,17 @@ static uint64_t draw(worker *w, uint64_t below)
     return (w->state >> 33) % below;
 }
 
-static void tell(worker *w, int kind, uint64_t number, const char *what)
+static void report(worker *w, int kind, uint64_t number, const char *what)
 {
     w->s->wrong++;
     w->s->enough = true;
-    if (w->s->told++ < 10)
+    if (w->s->reported++ < 10)
         fprintf(stderr, "thread %u, %s %" PRIu64 " of %s: %s\n", w->number, mix_names[kind], number,
                 names[w->which], what);
 }
 
-/* Whether it may fail so: for its own read, or one in a thread of the library on its behalf. */
+/* Returns true for an expected failure: of its own read, or of a read by a library thread on its
+ * behalf. */
 static bool is_own(const worker *w, int kind, bool wanted, const ebpo_error *error)
 {
     char own[64];
@@ -206,39 +207,39 @@ static bool is_own(const worker *w, int kind, bool wanted, const ebpo_error *err
     return mix_has_workers(kind) && strstr(error->message, "refused by background");
 }
 
-/* The first one of each thread meets refusals, so that there are some however few are asked: not
- * everything is in memory yet. */
-static void ask_one(worker *w, bool first)
+/* The first query of each thread meets injected faults, so that there are some for any number of
+ * queries: not everything is in memory yet. */
+static void query_one(worker *w, bool first)
 {
     int kind = (int)draw(w, MIX_KINDS);
     bool wanted = w->s->place != FROM_FILE && (draw(w, 8) == 0 || first);
     uint64_t number = draw(w, NUMBERS), hash = 0;
     ebpo_error error = EBPO_ERROR_INIT;
     fail_in = first && wanted ? 1 : wanted ? 1 + (unsigned)draw(w, 4) : 0;
-    ebpo_status status = mix_ask(&w->asker, kind, number, &hash, &error);
+    ebpo_status status = mix_query(&w->querier, kind, number, &hash, &error);
     fail_in = 0;
-    w->s->asked[kind]++;
+    w->s->queried[kind]++;
     if (status != EBPO_OK) {
         w->s->refused++;
         if (status != EBPO_E_IO || !is_own(w, kind, wanted, &error))
-            tell(w, kind, number, error.message[0] ? error.message : "fails without a message");
+            report(w, kind, number, error.message[0] ? error.message : "fails without a message");
     } else if (hash != right[w->which][kind][number]) {
-        tell(w, kind, number, "another answer than that of one thread");
+        report(w, kind, number, "another answer than that of one thread");
     }
 }
 
-/* Contexts come and go: of either model, one at a time. */
+/* Replaces the context by one of either model, one at a time. */
 static bool change_context(worker *w)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_context_free(w->asker.context);
-    w->asker.context = NULL;
+    ebpo_context_free(w->querier.context);
+    w->querier.context = NULL;
     w->which = (int)draw(w, MODELS);
-    w->asker.file = w->s->file[w->which];
-    w->asker.model = w->s->model[w->which];
-    if (ebpo_context_new(w->asker.model, &w->asker.context, &error) == EBPO_OK)
+    w->querier.file = w->s->file[w->which];
+    w->querier.model = w->s->model[w->which];
+    if (ebpo_context_new(w->querier.model, &w->querier.context, &error) == EBPO_OK)
         return true;
-    tell(w, 0, 0, error.message);
+    report(w, 0, 0, error.message);
     return false;
 }
 
@@ -253,20 +254,20 @@ static void *work(void *user)
             break;
         if (i % 20 == 0 && !change_context(w))
             break;
-        ask_one(w, i == 0);
+        query_one(w, i == 0);
         if (ebpo_budget_get_stats(s->budget, &stats) != EBPO_OK || stats.memory > stats.budget)
-            tell(w, 0, 0, "more is taken than the budget");
+            report(w, 0, 0, "more is taken than the budget");
     }
-    ebpo_context_free(w->asker.context);
+    ebpo_context_free(w->querier.context);
     return NULL;
 }
 
-/* What 64 contexts hold, each its subtree, and as much again for what is loaded. */
+/* Memory of 64 contexts with a subtree each, and as much again for loading. */
 static uint64_t budget_for(const shared *s)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
-    enum { LEAST = 3 << 20 }; /* of any shared budget */
+    enum { LEAST = 3 << 20 }; /* minimum of a shared budget */
     uint64_t most = 0;
     for (int which = 0; which < MODELS; which++) {
         ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
@@ -312,12 +313,12 @@ static void free_models(shared *s)
         ebpo_close(s->file[which]);
 }
 
-START_TEST(many_threads_get_the_answers_of_one)
+START_TEST(test_many_threads_match_single_thread)
 {
     static worker w[THREADS];
     pthread_t thread[THREADS];
     shared s = { .place = _i, .count = ebpo_test_scaled(60) };
-    uint64_t asked = 0;
+    uint64_t queried = 0;
     if (s.place == FROM_SERVER && !served)
         return;
     background_fails = false;
@@ -331,8 +332,8 @@ START_TEST(many_threads_get_the_answers_of_one)
     for (int i = 0; i < THREADS; i++)
         pthread_join(thread[i], NULL);
     for (int kind = 0; kind < MIX_KINDS; kind++)
-        asked += s.asked[kind];
-    printf("%" PRIu64 " questions, %" PRIu64 " refused, %" PRIu64 " wrong\n", asked, s.refused,
+        queried += s.queried[kind];
+    printf("%" PRIu64 " questions, %" PRIu64 " refused, %" PRIu64 " wrong\n", queried, s.refused,
            s.wrong);
     free_models(&s);
     ck_assert_uint_eq(s.wrong, 0);
@@ -346,7 +347,7 @@ Suite *test_suite(void)
     TCase *tests = tcase_create("threads");
     tcase_set_timeout(tests, 1000 + 2 * seconds());
     tcase_add_unchecked_fixture(tests, begin, end);
-    tcase_add_loop_test(tests, many_threads_get_the_answers_of_one, 0, PLACES);
+    tcase_add_loop_test(tests, test_many_threads_match_single_thread, 0, PLACES);
     suite_add_tcase(suite, tests);
     return suite;
 }

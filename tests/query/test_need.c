@@ -1,19 +1,19 @@
-/* Choosing by need: subsets keep to the error or the size that was asked for. */
+/* Subsets by need: they meet the requested error or size. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include <ebpo/deviation.h>
+#include <ebpo/error_bound.h>
 #include <ebpo/subset.h>
 #include <ebpo/verify.h>
 
 #include "check_main.h"
 #include "read_by.h"
-#include "query_kit.h"
+#include "query_support.h"
 #include "derive/subset_parts.h"
-#include "twin_reach.h"
+#include "reference_error_bound.h"
 
 static const query_variant stored = { "stored", 4, 6, EBPO_RULE_NONZERO,
                                       EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS |
@@ -48,10 +48,10 @@ static void result_free(result *r)
 static double reach(query_model *m, ebpo_file *file, int level)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_deviation_options o = EBPO_DEVIATION_OPTIONS_INIT;
-    ebpo_deviation d = EBPO_DEVIATION_INIT;
+    ebpo_error_bound_options o = EBPO_ERROR_BOUND_OPTIONS_INIT;
+    ebpo_error_bound d = EBPO_ERROR_BOUND_INIT;
     o.samples = 0;
-    fine(ebpo_deviation_level(m->model, file, level, &o, &d, &error), &error);
+    fine(ebpo_level_error_bound(m->model, file, level, &o, &d, &error), &error);
     return d.hi;
 }
 
@@ -76,13 +76,14 @@ static uint64_t missing(ebpo_file *coarse, ebpo_file *fine_file, uint64_t *nodes
     fine(ebpo_file_read_tree(fine_file, READ_BY(1), &b, &error), &error);
     struct pair {
         uint64_t a, b;
-    } *now = query_room(1, sizeof *now), *next;
+    } *now = query_capacity(1, sizeof *now), *next;
     uint64_t count = 1;
     *now = (struct pair){ 0, 0 };
     for (int level = 0; level < a.info.level_count && count; level++) {
         const ebpo_level *x = &a.level[level], *y = &b.level[level];
-        uint64_t *rank[2] = { query_room(x->group_count + 1, 8),
-                              query_room(level < b.info.level_count ? y->group_count + 1 : 1, 8) };
+        uint64_t *rank[2] = { query_capacity(x->group_count + 1, 8),
+                              query_capacity(level < b.info.level_count ? y->group_count + 1 : 1,
+                                             8) };
         const ebpo_level *of[2] = { x, y };
         for (int f = 0; f < 2; f++) {
             uint64_t sum = 0;
@@ -93,7 +94,7 @@ static uint64_t missing(ebpo_file *coarse, ebpo_file *fine_file, uint64_t *nodes
                     sum += (of[f]->types[i] >> 2 * k & 3) == EBPO_GRAY;
             }
         }
-        next = query_room(8 * count, sizeof *next);
+        next = query_capacity(8 * count, sizeof *next);
         uint64_t kept = 0;
         for (uint64_t i = 0; i < count; i++) {
             bool there = level < b.info.level_count && y->types[now[i].b] != 0;
@@ -124,7 +125,7 @@ static uint64_t missing(ebpo_file *coarse, ebpo_file *fine_file, uint64_t *nodes
     return out;
 }
 
-/* What no limit can make better: the leaves. */
+/* Leaves cannot be refined by any limit. */
 static void keeps_its_word(query_model *m, uint32_t parts)
 {
     ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT;
@@ -140,11 +141,12 @@ static void keeps_its_word(query_model *m, uint32_t parts)
         result_make(&r, m, first ? "a" : e < coarsest / 4 ? "c" : "b", &o);
         verify(&r);
         double hi = reach(m, r.file, r.info->level_count - 1),
-               twin = twin_reach(r.file, r.info->level_count - 1, &m->mesh, m->info.solid, 300, 1);
+               reference = reference_reach(r.file, r.info->level_count - 1, &m->mesh, m->info.solid,
+                                           300, 1);
         ck_assert_msg(hi <= e * 1.06 + 1e-5 * m->size, "%s: asked for %g, and it may reach %g",
                       m->name, e, hi);
-        ck_assert_msg(twin <= e + 1e-9 * m->size, "%s: asked for %g, and it reaches %g", m->name, e,
-                      twin);
+        ck_assert_msg(reference <= e + 1e-9 * m->size, "%s: asked for %g, and it reaches %g",
+                      m->name, e, reference);
         ck_assert(r.info->pruned ? r.info->kept_error == e : r.info->kept_error == 0);
         if (!first) {
             uint64_t nodes = 0;
@@ -169,7 +171,7 @@ static void keeps_its_word(query_model *m, uint32_t parts)
     }
 }
 
-START_TEST(no_envelope_reaches_farther_than_asked_for)
+START_TEST(test_subset_keeps_error_limit)
 {
     for (int i = query_scaled(4) < 4 ? 3 : 0; i < 5;
          i++) { /* other compilers and sanitizers: the small ones */
@@ -196,7 +198,7 @@ START_TEST(no_envelope_reaches_farther_than_asked_for)
 }
 END_TEST
 
-START_TEST(a_large_error_leaves_the_root_and_a_tiny_one_everything)
+START_TEST(test_subset_error_limit_extremes)
 {
     query_model m;
     result r;
@@ -216,7 +218,7 @@ START_TEST(a_large_error_leaves_the_root_and_a_tiny_one_everything)
 }
 END_TEST
 
-START_TEST(a_size_is_kept_to_with_the_least_error)
+START_TEST(test_subset_size_limit_minimizes_error)
 {
     query_model m;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -240,7 +242,7 @@ START_TEST(a_size_is_kept_to_with_the_least_error)
         result_free(&finer);
         e.max_error = r.info->kept_error / 1.02;
         result_make(&finer, &m, "finer", &e);
-        /* Sizes of nearly the same content go up and down a little, as compression does. */
+        /* Sizes of nearly the same content vary slightly, because of compression. */
         ck_assert_msg(finer.info->file_bytes > o.target_bytes * 99 / 100,
                       "a smaller error would have fitted: %llu of %llu bytes",
                       (unsigned long long)finer.info->file_bytes,
@@ -257,9 +259,9 @@ START_TEST(a_size_is_kept_to_with_the_least_error)
     char path[120];
     snprintf(path, sizeof path, "%s/no.ebpo.h5", m.folder);
     ck_assert_int_eq(ebpo_subset(m.file, path, &o, &error), EBPO_E_ARGUMENT);
-    const char *least = strstr(error.message, "the least has ");
+    const char *least = strstr(error.message, "the smallest has ");
     ck_assert_msg(least != NULL && access(path, F_OK) != 0, "%s", error.message);
-    o.target_bytes = strtoull(least + 14, NULL, 10);
+    o.target_bytes = strtoull(least + 17, NULL, 10);
     result_make(&r, &m, "fit", &o);
     ck_assert(r.info->file_bytes == o.target_bytes);
     result_free(&r);
@@ -267,9 +269,9 @@ START_TEST(a_size_is_kept_to_with_the_least_error)
 }
 END_TEST
 
-/* Envelopes of boxes on the lattice coincide with the solid: nodes are pruned however small the
- * error is, and no error gives the whole. */
-START_TEST(no_file_is_larger_than_asked_for)
+/* Envelopes of boxes on the lattice coincide with the solid: nodes are pruned at any error, and no
+ * error keeps the whole file. */
+START_TEST(test_subset_never_exceeds_size_limit)
 {
     for (int i = 0; i < 3; i++) {
         query_model m;
@@ -309,7 +311,7 @@ START_TEST(no_file_is_larger_than_asked_for)
 }
 END_TEST
 
-START_TEST(parts_are_chosen_from_full_to_lod)
+START_TEST(test_subset_chooses_parts_by_size)
 {
     query_model m;
     result r;
@@ -340,7 +342,7 @@ START_TEST(parts_are_chosen_from_full_to_lod)
 }
 END_TEST
 
-START_TEST(threads_and_a_detour_by_a_tree_do_not_change_the_bytes)
+START_TEST(test_subset_bytes_same_for_any_method)
 {
     query_model m;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -385,7 +387,7 @@ static void refused(ebpo_file *file, const char *folder, const ebpo_subset_optio
                   error.message);
 }
 
-START_TEST(what_cannot_be_kept_to_is_refused)
+START_TEST(test_subset_impossible_limits_are_refused)
 {
     query_model m;
     result r;
@@ -397,7 +399,7 @@ START_TEST(what_cannot_be_kept_to_is_refused)
     refused(m.file, m.folder, &o, EBPO_E_ARGUMENT, "maximum error");
     o.max_error = 1;
     o.target_bytes = 10000;
-    refused(m.file, m.folder, &o, EBPO_E_ARGUMENT, "exclude each other");
+    refused(m.file, m.folder, &o, EBPO_E_ARGUMENT, "cannot be combined");
     o.max_error = 0.1;
     o.target_bytes = 0;
     result_make(&r, &m, "small", &o);
@@ -407,7 +409,7 @@ START_TEST(what_cannot_be_kept_to_is_refused)
     o.last_level = 2;
     snprintf(again.path, sizeof again.path, "%s/again.ebpo.h5", m.folder);
     ebpo_error error = EBPO_ERROR_INIT;
-    fine(ebpo_subset(r.file, again.path, &o, &error), &error); /* a subset of it still knows */
+    fine(ebpo_subset(r.file, again.path, &o, &error), &error); /* a subset of it keeps the value */
     fine(ebpo_open(again.path, &again.file, &error), &error);
     ck_assert(ebpo_file_info(again.file)->kept_error == 0.1);
     result_free(&again);
@@ -427,13 +429,13 @@ TEST_SUITE(need)
     Suite *suite = suite_create("need");
     TCase *tests = tcase_create("need");
     tcase_set_timeout(tests, 900);
-    tcase_add_test(tests, no_envelope_reaches_farther_than_asked_for);
-    tcase_add_test(tests, a_large_error_leaves_the_root_and_a_tiny_one_everything);
-    tcase_add_test(tests, a_size_is_kept_to_with_the_least_error);
-    tcase_add_test(tests, no_file_is_larger_than_asked_for);
-    tcase_add_test(tests, parts_are_chosen_from_full_to_lod);
-    tcase_add_test(tests, threads_and_a_detour_by_a_tree_do_not_change_the_bytes);
-    tcase_add_test(tests, what_cannot_be_kept_to_is_refused);
+    tcase_add_test(tests, test_subset_keeps_error_limit);
+    tcase_add_test(tests, test_subset_error_limit_extremes);
+    tcase_add_test(tests, test_subset_size_limit_minimizes_error);
+    tcase_add_test(tests, test_subset_never_exceeds_size_limit);
+    tcase_add_test(tests, test_subset_chooses_parts_by_size);
+    tcase_add_test(tests, test_subset_bytes_same_for_any_method);
+    tcase_add_test(tests, test_subset_impossible_limits_are_refused);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,5 +1,5 @@
-/* The judge judged: the oracle against closed forms, against itself without its shortcuts, and
- * against the library's exact predicates. */
+/* Tests the reference of the tests: against closed forms, against itself without its shortcuts, and
+ * against the exact predicates of the library. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -44,7 +44,7 @@ static double rounded(uint64_t num, uint64_t shift, uint64_t plus, uint64_t den,
     return x;
 }
 
-START_TEST(rounding_is_to_nearest_and_ties_go_to_even)
+START_TEST(test_oracle_rounds_ties_to_even)
 {
     const double ulp = 0x1p-52;
     ck_assert_double_eq(rounded(1, 53, 1, 1, -53, false), 1); /* 1 + half an ulp */
@@ -59,14 +59,15 @@ START_TEST(rounding_is_to_nearest_and_ties_go_to_even)
 }
 END_TEST
 
-START_TEST(rounding_holds_at_the_ends_of_the_range)
+START_TEST(test_oracle_rounds_at_range_limits)
 {
     ck_assert_double_eq(rounded(1, 0, 0, 1, -2148, true), 0x1p-1074);
-    /* half of the least one: ties to even */
+    /* half of the smallest double: ties to even */
     ck_assert_double_eq(rounded(1, 0, 0, 1, -2150, true), 0);
     /* a little more than half */
     ck_assert_double_eq(rounded(1, 200, 1, 1, -2350, true), 0x1p-1074);
-    ck_assert_double_eq(rounded(9, 0, 0, 1, -2150, true), 0x1p-1073); /* 1.5 of it: to 2 */
+    ck_assert_double_eq(rounded(9, 0, 0, 1, -2150, true), 0x1p-1073); /* 1.5 times the smallest: to
+                                                                       * 2 */
     ck_assert_double_eq(rounded(1, 0, 0, 1, -3000, true), 0);
     ck_assert_double_eq(rounded(1, 0, 0, 1, 2046, true), 0x1p1023);
     ck_assert(isinf(rounded(1, 0, 0, 1, 2048, true)));
@@ -76,7 +77,7 @@ START_TEST(rounding_holds_at_the_ends_of_the_range)
 }
 END_TEST
 
-START_TEST(roots_of_rounded_squares_agree_with_the_processor)
+START_TEST(test_oracle_square_roots_match_hardware)
 {
     uint64_t state = 1;
     for (int i = 0; i < 100000; i++) {
@@ -102,7 +103,7 @@ static double cube_distance(const double p[3], double low, double high)
     return out > 0 ? sqrt(out) : in;
 }
 
-START_TEST(distance_to_a_cube_is_that_of_the_formula)
+START_TEST(test_oracle_cube_distance_matches_formula)
 {
     uint64_t state = 2;
     for (uint32_t n = 1; n <= 4; n++) {
@@ -132,8 +133,8 @@ START_TEST(distance_to_a_cube_is_that_of_the_formula)
 }
 END_TEST
 
-/* All faces, one by one, without leaving out any. */
-START_TEST(faces_left_out_are_never_the_nearest)
+/* All faces, one by one, without skipping any. */
+START_TEST(test_oracle_omitted_faces_are_never_nearest)
 {
     const char *names[] = { "sphere",    "cone_slivers",   "needle", "giant_and_dust",
                             "thin_wall", "zero_area_face", "blob" };
@@ -168,7 +169,7 @@ START_TEST(faces_left_out_are_never_the_nearest)
 }
 END_TEST
 
-START_TEST(scaled_models_have_scaled_distances)
+START_TEST(test_oracle_distance_scales_with_model)
 {
     static const int exponents[] = { -1040, -1000, -300, 300, 990 };
     uint64_t state = 4;
@@ -200,7 +201,7 @@ START_TEST(scaled_models_have_scaled_distances)
 }
 END_TEST
 
-/* --- winding numbers, and being on a face: against the predicates of the library --- */
+/* --- winding numbers, and points on faces: against the predicates of the library --- */
 
 static int32_t winding_by_axis(const ebpo_mesh *mesh, const double p[3])
 {
@@ -226,7 +227,7 @@ static bool is_on(const ebpo_mesh *mesh, const double p[3])
     return false;
 }
 
-START_TEST(winding_numbers_agree_with_the_librarys_predicates)
+START_TEST(test_oracle_winding_matches_predicates)
 {
     const ebpo_test_solid *solid = &ebpo_test_solids[_i];
     uint64_t state = (uint64_t)_i;
@@ -259,7 +260,7 @@ END_TEST
 
 /* --- rays --- */
 
-START_TEST(hits_of_a_ray_from_inside_sum_up_to_the_winding_number)
+START_TEST(test_oracle_ray_hits_sum_to_winding)
 {
     const char *names[] = {
         "sphere",          "torus", "cavity", "nested_same_direction", "overlapping_cubes",
@@ -293,19 +294,19 @@ START_TEST(hits_of_a_ray_from_inside_sum_up_to_the_winding_number)
 }
 END_TEST
 
-/* The cube 0 .. 4 of two faces a side. */
-START_TEST(rays_along_edges_and_through_vertices_meet_what_they_must)
+/* The cube 0 .. 4 with two faces a side. */
+START_TEST(test_oracle_rays_along_edges_and_vertices)
 {
     static const struct {
         double origin[3], direction[3], t_max;
         uint32_t count;
         double first, last;
-        int side; /* of the first */
+        int side; /* side of the first hit */
     } rows[] = {
         { { -1, 1, 2 }, { 1, 0, 0 }, INFINITY, 2, 1, 5, 1 }, /* through two faces */
-        { { -1, 1, 2 }, { 1, 0, 0 }, 1, 1, 1, 1, 1 },        /* up to the wall */
+        { { -1, 1, 2 }, { 1, 0, 0 }, 1, 1, 1, 1, 1 },        /* up to the side */
         { { -1, 1, 2 }, { 1, 0, 0 }, 0.999, 0, 0, 0, 0 },
-        /* from inside; t counts directions */
+        /* from inside; t counts lengths of the direction */
         { { 1, 3, 2 }, { 0.5, 0, 0 }, INFINITY, 1, 6, 6, -1 },
         /* within the side y = 0: its two faces, and the edges of the two ends */
         { { -1, 0, 1 }, { 1, 0, 0 }, INFINITY, 4, 1, 5, 0 },
@@ -334,13 +335,13 @@ START_TEST(rays_along_edges_and_through_vertices_meet_what_they_must)
 }
 END_TEST
 
-/* What a ray meets is at distance 0 of where it meets, when that is a double. */
-START_TEST(points_of_hits_are_on_their_faces)
+/* The point of a hit is at distance 0 when it is a double. */
+START_TEST(test_oracle_hit_points_are_on_faces)
 {
     uint64_t state = 6;
     ebpo_mesh mesh = ebpo_test_make("staircase");
     oracle *o = oracle_make(&mesh);
-    int met = 0;
+    int intersected = 0;
     for (int i = 0; i < 3000; i++) {
         double p[3], d[3];
         const oracle_hit *hits;
@@ -352,14 +353,14 @@ START_TEST(points_of_hits_are_on_their_faces)
         if (d[0] == 0 && d[1] == 0 && d[2] == 0)
             continue;
         oracle_ray(o, p, d, INFINITY, &hits, &count);
-        for (uint32_t h = 0; h < count; h++, met++) {
+        for (uint32_t h = 0; h < count; h++, intersected++) {
             double q[3];
             for (int k = 0; k < 3; k++)
                 q[k] = p[k] + hits[h].t * d[k];
             ck_assert_double_eq(oracle_face_distance(o, q, hits[h].face), 0);
         }
     }
-    ck_assert_int_gt(met, 300);
+    ck_assert_int_gt(intersected, 300);
     oracle_free(o);
     ebpo_mesh_free(&mesh);
 }
@@ -367,11 +368,11 @@ END_TEST
 
 /* --- boxes --- */
 
-START_TEST(boxes_agree_with_the_verifiers_clipping)
+START_TEST(test_oracle_boxes_match_verifier_clipping)
 {
     const char *names[] = { "staircase", "torus", "zero_area_face", "index_repeated_face" };
     uint64_t state = 7;
-    int met = 0;
+    int intersected = 0;
     for (size_t m = 0; m < sizeof names / sizeof *names; m++) {
         ebpo_mesh mesh = ebpo_test_make(names[m]);
         oracle *o = oracle_make(&mesh);
@@ -392,17 +393,17 @@ START_TEST(boxes_agree_with_the_verifiers_clipping)
                      listed = at < count && faces[at] == f;
                 ck_assert_int_eq(meets, listed);
                 at += listed;
-                met += meets;
+                intersected += meets;
             }
         }
         oracle_free(o);
         ebpo_mesh_free(&mesh);
     }
-    ck_assert_int_gt(met, 1000);
+    ck_assert_int_gt(intersected, 1000);
 }
 END_TEST
 
-START_TEST(flat_boxes_and_points_meet_what_they_touch)
+START_TEST(test_oracle_flat_boxes_and_points)
 {
     ebpo_mesh mesh = box_mesh(0, 4, 1);
     oracle *o = oracle_make(&mesh);
@@ -431,19 +432,18 @@ TEST_SUITE(oracle)
     Suite *suite = suite_create("oracle");
     TCase *tests = tcase_create("oracle");
     tcase_set_timeout(tests, 600);
-    tcase_add_test(tests, rounding_is_to_nearest_and_ties_go_to_even);
-    tcase_add_test(tests, rounding_holds_at_the_ends_of_the_range);
-    tcase_add_test(tests, roots_of_rounded_squares_agree_with_the_processor);
-    tcase_add_test(tests, distance_to_a_cube_is_that_of_the_formula);
-    tcase_add_test(tests, faces_left_out_are_never_the_nearest);
-    tcase_add_test(tests, scaled_models_have_scaled_distances);
-    tcase_add_loop_test(tests, winding_numbers_agree_with_the_librarys_predicates, 0,
-                        ebpo_test_solid_count);
-    tcase_add_test(tests, hits_of_a_ray_from_inside_sum_up_to_the_winding_number);
-    tcase_add_test(tests, rays_along_edges_and_through_vertices_meet_what_they_must);
-    tcase_add_test(tests, points_of_hits_are_on_their_faces);
-    tcase_add_test(tests, boxes_agree_with_the_verifiers_clipping);
-    tcase_add_test(tests, flat_boxes_and_points_meet_what_they_touch);
+    tcase_add_test(tests, test_oracle_rounds_ties_to_even);
+    tcase_add_test(tests, test_oracle_rounds_at_range_limits);
+    tcase_add_test(tests, test_oracle_square_roots_match_hardware);
+    tcase_add_test(tests, test_oracle_cube_distance_matches_formula);
+    tcase_add_test(tests, test_oracle_omitted_faces_are_never_nearest);
+    tcase_add_test(tests, test_oracle_distance_scales_with_model);
+    tcase_add_loop_test(tests, test_oracle_winding_matches_predicates, 0, ebpo_test_solid_count);
+    tcase_add_test(tests, test_oracle_ray_hits_sum_to_winding);
+    tcase_add_test(tests, test_oracle_rays_along_edges_and_vertices);
+    tcase_add_test(tests, test_oracle_hit_points_are_on_faces);
+    tcase_add_test(tests, test_oracle_boxes_match_verifier_clipping);
+    tcase_add_test(tests, test_oracle_flat_boxes_and_points);
     suite_add_tcase(suite, tests);
     return suite;
 }

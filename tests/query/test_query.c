@@ -1,13 +1,13 @@
-/* Questions to small models of every kind, a million awkward points against the oracle.
+/* Queries to small models of every kind, with a million difficult points, against the oracle.
  * EBPO_TEST_SCALE scales their number. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
-/* Brute force takes a while over many faces, and with coordinates of two thousand bits. */
+/* Brute force is slow with many faces, and with coordinates of two thousand bits. */
 static uint64_t points_for(const char *name, uint64_t faces)
 {
     uint64_t n = UINT64_C(1200000) / (faces + 40);
@@ -16,18 +16,18 @@ static uint64_t points_for(const char *name, uint64_t faces)
     return n > 7000 ? 7000 : n;
 }
 
-START_TEST(answers_to_awkward_points_are_those_of_brute_force)
+START_TEST(test_difficult_points_match_brute_force)
 {
     int solid = _i / query_variant_count, variant = _i % query_variant_count;
     query_model m;
     query_model_make(&m, query_solid_name(solid), query_solid_make(solid),
                      &query_variants[variant]);
-    query_ask(&m, query_scaled(points_for(m.name, m.mesh.face_count)), (uint64_t)_i);
+    query_query(&m, query_scaled(points_for(m.name, m.mesh.face_count)), (uint64_t)_i);
     query_model_free(&m);
 }
 END_TEST
 
-START_TEST(a_million_points_are_asked_about)
+START_TEST(test_query_million_points)
 {
     uint64_t sum = 0;
     for (int i = 0; i < query_solid_count(); i++) {
@@ -39,9 +39,9 @@ START_TEST(a_million_points_are_asked_about)
 }
 END_TEST
 
-/* --- refusals --- */
+/* --- errors --- */
 
-START_TEST(points_that_are_not_finite_are_refused_by_their_number)
+START_TEST(test_non_finite_points_refused_by_index)
 {
     static const double odd[] = { NAN, INFINITY, -INFINITY };
     query_model m;
@@ -67,7 +67,7 @@ START_TEST(points_that_are_not_finite_are_refused_by_their_number)
 }
 END_TEST
 
-START_TEST(no_points_are_no_failure)
+START_TEST(test_zero_points_are_accepted)
 {
     query_model m;
     query_model_make(&m, "cube", query_solid_by_name("cube"), &query_variants[0]);
@@ -77,7 +77,7 @@ START_TEST(no_points_are_no_failure)
 }
 END_TEST
 
-START_TEST(surfaces_have_distances_but_no_inside)
+START_TEST(test_surface_has_distance_but_no_inside)
 {
     static const char *const names[] = { "open_box", "flipped_face_cube", "mobius", "band",
                                          "sheet" };
@@ -86,9 +86,9 @@ START_TEST(surfaces_have_distances_but_no_inside)
     query_model_make(&m, name, query_solid_by_name(name), &query_variants[0]);
     ck_assert(!m.info.solid);
     uint64_t count = query_scaled(3000);
-    double *points = query_room(count, 3 * sizeof *points);
-    query_truth *truth = query_room(count, sizeof *truth);
-    ebpo_distance_result *distance = query_room(count, sizeof *distance);
+    double *points = query_capacity(count, 3 * sizeof *points);
+    query_truth *truth = query_capacity(count, sizeof *truth);
+    ebpo_distance_result *distance = query_capacity(count, sizeof *distance);
     ebpo_inside_result inside;
     ebpo_error error = EBPO_ERROR_INIT;
     query_make_points(&m, count, 3, points);
@@ -115,12 +115,12 @@ TEST_SUITE(query)
     TCase *points = tcase_create("points"), *refusals = tcase_create("refusals");
     tcase_set_timeout(points, 600);
     tcase_set_timeout(refusals, 600);
-    tcase_add_loop_test(points, answers_to_awkward_points_are_those_of_brute_force, 0,
+    tcase_add_loop_test(points, test_difficult_points_match_brute_force, 0,
                         query_solid_count() * query_variant_count);
-    tcase_add_test(points, a_million_points_are_asked_about);
-    tcase_add_test(refusals, points_that_are_not_finite_are_refused_by_their_number);
-    tcase_add_test(refusals, no_points_are_no_failure);
-    tcase_add_loop_test(refusals, surfaces_have_distances_but_no_inside, 0, 5);
+    tcase_add_test(points, test_query_million_points);
+    tcase_add_test(refusals, test_non_finite_points_refused_by_index);
+    tcase_add_test(refusals, test_zero_points_are_accepted);
+    tcase_add_loop_test(refusals, test_surface_has_distance_but_no_inside, 0, 5);
     suite_add_tcase(suite, points);
     suite_add_tcase(suite, refusals);
     return suite;

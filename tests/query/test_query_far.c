@@ -1,14 +1,14 @@
-/* Points far from a model, in all directions and as far as doubles go, against brute force in
- * rational arithmetic: the same exact answers, wherever the model is held. */
+/* Points far from a model, in all directions and up to the range of doubles, against brute force in
+ * rational arithmetic: the same exact results, however the model is held. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
-/* Curved ones; flat sides that face far points, of many faces; faces that are there twice; models
- * of the least and of the greatest doubles. */
+/* Curved models; flat sides of many faces towards far points; repeated faces; models of the
+ * smallest and of the greatest doubles. */
 static const struct {
     const char *name;
     int variant;
@@ -29,7 +29,7 @@ static const struct {
 };
 enum { CASES = sizeof cases / sizeof *cases, KINDS = 7, POINTS = 200 };
 
-/* From 1.6 box sizes away, where the other search still answers, to the greatest doubles. */
+/* From 1.6 box sizes away, which the other search still handles, to the greatest doubles. */
 static double magnitude(const query_model *m, uint64_t *state)
 {
     double least = log2(m->size) + 1, most = 1022;
@@ -54,7 +54,7 @@ static void far_point(const query_model *m, uint64_t *state, double p[3])
     int axis = (int)(ebpo_test_random(state) % 3);
     middle_of(m, p);
     switch (ebpo_test_random(state) % KINDS) {
-    case 0: /* along an axis, above some place of the box */
+    case 0: /* along an axis, above some point of the box */
         to[axis] = either(state) < 0 ? -1 : 1;
         for (int k = 0; k < 3; k++)
             p[k] += k == axis ? 0 : m->info.box_size[k] * either(state) / 2;
@@ -85,29 +85,29 @@ static void far_point(const query_model *m, uint64_t *state, double p[3])
     }
 }
 
-typedef struct asked {
+typedef struct queried {
     query_model m;
     uint64_t count;
     double *points;
     query_truth *truth;
     ebpo_distance_result *got;
-} asked;
+} queried;
 
-static void begin(asked *a, int i)
+static void begin(queried *a, int i)
 {
     uint64_t state = (uint64_t)i + 7;
     query_model_make(&a->m, cases[i].name, query_solid_by_name(cases[i].name),
                      &query_variants[cases[i].variant]);
     a->count = query_scaled(POINTS);
-    a->points = query_room(a->count, 3 * sizeof *a->points);
-    a->truth = query_room(a->count, sizeof *a->truth);
-    a->got = query_room(a->count, sizeof *a->got);
+    a->points = query_capacity(a->count, 3 * sizeof *a->points);
+    a->truth = query_capacity(a->count, sizeof *a->truth);
+    a->got = query_capacity(a->count, sizeof *a->got);
     for (uint64_t k = 0; k < a->count; k++)
         far_point(&a->m, &state, a->points + 3 * k);
     query_find_truths(&a->m, a->points, a->count, a->truth);
 }
 
-static void end(asked *a)
+static void end(queried *a)
 {
     query_model_free(&a->m);
     free(a->points);
@@ -115,18 +115,18 @@ static void end(asked *a)
     free(a->got);
 }
 
-static void ask(asked *a, ebpo_context *c, const char *how)
+static void run_query(queried *a, ebpo_context *c, const char *how)
 {
     ASSERT_OK(ebpo_distance_many(c, a->points, a->count, NULL, a->got, error));
     ck_assert_msg(query_wrong_distance(&a->m, a->points, a->truth, a->count, false, a->got) == 0,
                   "%s, %s", a->m.name, how);
 }
 
-START_TEST(far_points_have_the_same_exact_answers_however_a_model_is_held)
+START_TEST(test_distant_points_ignore_load_mode)
 {
-    asked a;
+    queried a;
     begin(&a, _i);
-    ask(&a, a.m.context, "whole");
+    run_query(&a, a.m.context, "whole");
     for (int cut = 0; cut < 3 && cut < a.m.info.level_count; cut++) {
         ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
         ebpo_model *model = NULL;
@@ -135,8 +135,8 @@ START_TEST(far_points_have_the_same_exact_answers_however_a_model_is_held)
         how.cut_level = cut;
         ASSERT_OK(ebpo_model_new(a.m.file, &how, &model, error));
         ASSERT_OK(ebpo_context_new(model, &context, error));
-        ask(&a, context, "in parts");
-        ask(&a, context, "in parts, once more"); /* with what was kept of subtrees */
+        run_query(&a, context, "in parts");
+        run_query(&a, context, "in parts, once more"); /* with the kept data of subtrees */
         ebpo_context_free(context);
         ebpo_model_free(model);
     }
@@ -144,9 +144,9 @@ START_TEST(far_points_have_the_same_exact_answers_however_a_model_is_held)
 }
 END_TEST
 
-START_TEST(limits_of_far_points_are_exact)
+START_TEST(test_distant_point_limits_are_exact)
 {
-    asked a;
+    queried a;
     begin(&a, _i);
     for (uint64_t k = 0; k < a.count; k++) {
         const double *p = a.points + 3 * k;
@@ -167,9 +167,9 @@ START_TEST(limits_of_far_points_are_exact)
 }
 END_TEST
 
-START_TEST(levels_and_deadlines_bound_far_points)
+START_TEST(test_distant_point_levels_and_deadlines)
 {
-    asked a;
+    queried a;
     begin(&a, _i);
     for (int level = -1; level < a.m.info.level_count; level += 2) {
         ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
@@ -188,10 +188,9 @@ TEST_SUITE(query_far)
     Suite *suite = suite_create("query_far");
     TCase *tests = tcase_create("far");
     tcase_set_timeout(tests, 600);
-    tcase_add_loop_test(tests, far_points_have_the_same_exact_answers_however_a_model_is_held, 0,
-                        CASES);
-    tcase_add_loop_test(tests, limits_of_far_points_are_exact, 0, CASES);
-    tcase_add_loop_test(tests, levels_and_deadlines_bound_far_points, 0, CASES);
+    tcase_add_loop_test(tests, test_distant_points_ignore_load_mode, 0, CASES);
+    tcase_add_loop_test(tests, test_distant_point_limits_are_exact, 0, CASES);
+    tcase_add_loop_test(tests, test_distant_point_levels_and_deadlines, 0, CASES);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,13 +1,13 @@
-/* Real models, in the folder that EBPO_MODELS names: awkward points against brute force. */
+/* Real models in the folder EBPO_MODELS: difficult points against brute force. */
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 static const char *const names[] = { "cheese_g133", "fertility", "selfint_A", "cad_adis16480" };
 
-START_TEST(real_models_answer_like_brute_force)
+START_TEST(test_real_models_match_brute_force)
 {
     const char *folder = getenv("EBPO_MODELS");
     char path[1024];
@@ -19,7 +19,7 @@ START_TEST(real_models_answer_like_brute_force)
     ck_assert_msg(ebpo_mesh_read(path, NULL, &mesh, &error) == EBPO_OK, "%s", error.message);
     query_model m;
     query_model_make(&m, names[_i], mesh, &query_variants[0]);
-    query_ask(&m, query_scaled(2000), (uint64_t)_i + 31);
+    query_query(&m, query_scaled(2000), (uint64_t)_i + 31);
     query_model_free(&m);
 }
 END_TEST
@@ -29,8 +29,7 @@ TEST_SUITE(query_models)
     Suite *suite = suite_create("query_models");
     TCase *tests = tcase_create("models");
     tcase_set_timeout(tests, 1000);
-    tcase_add_loop_test(tests, real_models_answer_like_brute_force, 0,
-                        sizeof names / sizeof *names);
+    tcase_add_loop_test(tests, test_real_models_match_brute_force, 0, sizeof names / sizeof *names);
     suite_add_tcase(suite, tests);
     return suite;
 }

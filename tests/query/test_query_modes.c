@@ -1,5 +1,5 @@
-/* Questions in all modes: however a file is loaded, whatever the budget, the order, the threads:
- * the answers are the same; with limits they are certain. */
+/* Queries in all modes: results are the same for all loading modes, budgets, orders and threads;
+ * with limits they are certain. */
 #include <inttypes.h>
 #include <math.h>
 #include <pthread.h>
@@ -7,9 +7,9 @@
 #include <string.h>
 
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
-/* Deep trees with all kinds of leaves; (solid, variant). */
+/* Deep trees with all kinds of leaves (solid, variant). */
 static const struct {
     const char *name;
     int variant;
@@ -21,35 +21,35 @@ static const struct {
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
-/* A model, points, and the truth about them. */
-typedef struct asked {
+/* A model, points, and the exact results for them. */
+typedef struct queried {
     query_model m;
     uint64_t count;
     double *points;
     query_truth *truth;
     ebpo_inside_result *inside;
     ebpo_distance_result *distance;
-} asked;
+} queried;
 
-static void make_room(asked *a, uint64_t count)
+static void reserve_space(queried *a, uint64_t count)
 {
     a->count = count;
-    a->points = query_room(count, 3 * sizeof *a->points);
-    a->truth = query_room(count, sizeof *a->truth);
-    a->inside = query_room(count, sizeof *a->inside);
-    a->distance = query_room(count, sizeof *a->distance);
+    a->points = query_capacity(count, 3 * sizeof *a->points);
+    a->truth = query_capacity(count, sizeof *a->truth);
+    a->inside = query_capacity(count, sizeof *a->inside);
+    a->distance = query_capacity(count, sizeof *a->distance);
 }
 
-static void begin(asked *a, int i, uint64_t count)
+static void begin(queried *a, int i, uint64_t count)
 {
     query_model_make(&a->m, cases[i].name, query_solid_by_name(cases[i].name),
                      &query_variants[cases[i].variant]);
-    make_room(a, query_scaled(count / 3));
+    reserve_space(a, query_scaled(count / 3));
     query_make_points(&a->m, a->count, (uint64_t)i + 1000, a->points);
     query_find_truths(&a->m, a->points, a->count, a->truth);
 }
 
-static void end(asked *a)
+static void end(queried *a)
 {
     query_model_free(&a->m);
     free(a->points);
@@ -58,8 +58,8 @@ static void end(asked *a)
     free(a->distance);
 }
 
-static void ask_exactly(asked *a, ebpo_context *context, const ebpo_inside_options *inside,
-                        const ebpo_distance_options *options)
+static void query_exactly(queried *a, ebpo_context *context, const ebpo_inside_options *inside,
+                          const ebpo_distance_options *options)
 {
     ASSERT_OK(ebpo_inside_many(context, a->points, a->count, inside, a->inside, error));
     ck_assert_uint_eq(query_wrong_inside(&a->m, a->points, a->truth, a->count, a->inside), 0);
@@ -71,7 +71,7 @@ static void ask_exactly(asked *a, ebpo_context *context, const ebpo_inside_optio
 
 /* --- loading and memory --- */
 
-static void ask_loaded(asked *a, const ebpo_model_options *how)
+static void query_loaded(queried *a, const ebpo_model_options *how)
 {
     ebpo_model *model;
     ebpo_context *context;
@@ -80,20 +80,20 @@ static void ask_loaded(asked *a, const ebpo_model_options *how)
     for (int envelopes = 0; envelopes < 3; envelopes++) {
         ebpo_inside_options inside = EBPO_INSIDE_OPTIONS_INIT;
         inside.envelopes = (ebpo_envelopes)envelopes;
-        ask_exactly(a, context, &inside, NULL);
+        query_exactly(a, context, &inside, NULL);
     }
     ebpo_context_free(context);
     ebpo_model_free(model);
 }
 
-/* With EBPO_TEST_SCALE below 1 each test takes other cases than the one before it, so that all have
- * their turn. */
+/* With EBPO_TEST_SCALE below 1 each test takes other cases than the previous one, so that all cases
+ * are run. */
 
-START_TEST(every_way_of_loading_gives_the_same_answers)
+START_TEST(test_results_same_in_all_load_modes)
 {
     if (!ebpo_test_wanted(_i + 1))
         return;
-    asked a;
+    queried a;
     begin(&a, _i, 300);
     for (int loading = 0; loading < 3; loading++)
         for (int cut = -1; cut < 5; cut++) {
@@ -102,14 +102,14 @@ START_TEST(every_way_of_loading_gives_the_same_answers)
             how.cut_level = cut;
             how.prefetch = loading == EBPO_LOAD_CACHE && cut % 2 == 0;
             if (cut < a.m.info.level_count)
-                ask_loaded(&a, &how);
+                query_loaded(&a, &how);
         }
     end(&a);
 }
 END_TEST
 
-/* True when the budget allowed a model and a context. */
-static bool ask_within(asked *a, uint64_t budget, bool *resident)
+/* Returns true when the budget allowed a model and a context. */
+static bool query_within(queried *a, uint64_t budget, bool *resident)
 {
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model *model = NULL;
@@ -124,7 +124,7 @@ static bool ask_within(asked *a, uint64_t budget, bool *resident)
     if (status == EBPO_E_LIMIT)
         ck_assert_int_ne(error.message[0], 0);
     else
-        ask_exactly(a, context, NULL, NULL);
+        query_exactly(a, context, NULL, NULL);
     if (model) {
         ebpo_model_get_stats(model, &stats);
         ck_assert_uint_eq(stats.budget, budget);
@@ -137,16 +137,16 @@ static bool ask_within(asked *a, uint64_t budget, bool *resident)
     return status == EBPO_OK;
 }
 
-START_TEST(budgets_are_kept_and_do_not_change_answers)
+START_TEST(test_results_same_for_any_budget)
 {
     if (!ebpo_test_wanted(_i + 2))
         return;
-    asked a;
+    queried a;
     begin(&a, _i, 300);
     bool resident = false, fits = false;
-    ck_assert(!ask_within(&a, 1, &resident));
+    ck_assert(!query_within(&a, 1, &resident));
     for (uint64_t budget = 4096; !resident; budget += budget / 2) {
-        bool fitted = ask_within(&a, budget, &resident);
+        bool fitted = query_within(&a, budget, &resident);
         ck_assert(fitted || !fits); /* more memory is never worse */
         fits = fitted;
         ck_assert_uint_lt(budget, UINT64_C(1) << 32);
@@ -155,15 +155,15 @@ START_TEST(budgets_are_kept_and_do_not_change_answers)
 }
 END_TEST
 
-/* --- how questions are put --- */
+/* --- forms of queries --- */
 
-START_TEST(batches_give_what_single_questions_give)
+START_TEST(test_batches_match_single_queries)
 {
     if (!ebpo_test_wanted(_i + 3))
         return;
-    asked a;
+    queried a;
     begin(&a, _i, 1000);
-    ask_exactly(&a, a.m.context, NULL, NULL);
+    query_exactly(&a, a.m.context, NULL, NULL);
     for (uint64_t i = 0; i < a.count; i++) {
         ebpo_inside_result inside;
         ebpo_distance_result distance;
@@ -176,19 +176,19 @@ START_TEST(batches_give_what_single_questions_give)
 }
 END_TEST
 
-START_TEST(warm_starts_and_signs_do_not_change_answers)
+START_TEST(test_results_ignore_warm_start_and_sign)
 {
     if (!ebpo_test_wanted(_i + 4))
         return;
-    asked a;
+    queried a;
     begin(&a, _i, 600);
     for (int form = 0; form < 4; form++) {
         ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
         options.warm = form & 1;
         options.unsigned_distance = form & 2;
-        ask_exactly(&a, a.m.context, NULL, &options);
+        query_exactly(&a, a.m.context, NULL, &options);
     }
-    /* along a path, where the last answer is close */
+    /* along a path, where the previous result is close */
     for (uint64_t i = 1; i < a.count; i++)
         for (uint64_t k = 0; k < 3; k++)
             a.points[3 * i + k] =
@@ -197,17 +197,17 @@ START_TEST(warm_starts_and_signs_do_not_change_answers)
     for (int warm = 0; warm < 2; warm++) {
         ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
         options.warm = warm;
-        ask_exactly(&a, a.m.context, NULL, &options);
+        query_exactly(&a, a.m.context, NULL, &options);
     }
     end(&a);
 }
 END_TEST
 
-START_TEST(what_is_beyond_max_distance_is_left_out)
+START_TEST(test_results_beyond_max_distance_are_omitted)
 {
     if (!ebpo_test_wanted(_i + 5))
         return;
-    asked a;
+    queried a;
     begin(&a, _i, 500);
     for (uint64_t i = 0; i < a.count; i++) {
         double d = a.truth[i].distance;
@@ -242,8 +242,8 @@ END_TEST
 
 /* --- limits --- */
 
-static void ask_limited(asked *a, ebpo_context *context, ebpo_envelopes envelopes,
-                        const ebpo_distance_options *options)
+static void query_limited(queried *a, ebpo_context *context, ebpo_envelopes envelopes,
+                          const ebpo_distance_options *options)
 {
     ebpo_inside_options inside = query_inside_like(options);
     inside.envelopes = envelopes;
@@ -256,34 +256,34 @@ static void ask_limited(asked *a, ebpo_context *context, ebpo_envelopes envelope
                       0);
 }
 
-START_TEST(answers_limited_to_a_level_are_certain)
+START_TEST(test_level_limited_results_are_certain)
 {
     if (!ebpo_test_wanted(_i + 6))
         return;
-    asked a;
+    queried a;
     begin(&a, _i, 600);
     for (int level = 0; level < a.m.info.level_count; level++)
         for (int envelopes = 0; envelopes < 3; envelopes++) {
             ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
             options.level = level;
-            ask_limited(&a, a.m.context, (ebpo_envelopes)envelopes, &options);
+            query_limited(&a, a.m.context, (ebpo_envelopes)envelopes, &options);
         }
     end(&a);
 }
 END_TEST
 
-START_TEST(answers_limited_to_a_level_do_not_depend_on_what_is_in_memory)
+START_TEST(test_level_limited_results_ignore_loaded_data)
 {
     if (!ebpo_test_wanted(_i + 7))
         return;
-    asked a;
+    queried a;
     begin(&a, _i, 300);
-    ebpo_distance_result *first = query_room(a.count, sizeof *first);
-    ebpo_inside_result *where = query_room(a.count, sizeof *where);
+    ebpo_distance_result *first = query_capacity(a.count, sizeof *first);
+    ebpo_inside_result *where = query_capacity(a.count, sizeof *where);
     for (int level = 0; level < a.m.info.level_count; level += 2) {
         ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
         options.level = level;
-        ask_limited(&a, a.m.context, EBPO_ENVELOPES_AUTO, &options);
+        query_limited(&a, a.m.context, EBPO_ENVELOPES_AUTO, &options);
         memcpy(first, a.distance, a.count * sizeof *first);
         memcpy(where, a.inside, a.count * sizeof *where);
         for (int cut = 0; cut < 4 && cut < a.m.info.level_count; cut++) {
@@ -293,7 +293,7 @@ START_TEST(answers_limited_to_a_level_do_not_depend_on_what_is_in_memory)
             how.cut_level = cut;
             ASSERT_OK(ebpo_model_new(a.m.file, &how, &model, error));
             ASSERT_OK(ebpo_context_new(model, &context, error));
-            ask_limited(&a, context, EBPO_ENVELOPES_AUTO, &options);
+            query_limited(&a, context, EBPO_ENVELOPES_AUTO, &options);
             ebpo_context_free(context);
             ebpo_model_free(model);
         }
@@ -304,12 +304,12 @@ START_TEST(answers_limited_to_a_level_do_not_depend_on_what_is_in_memory)
 }
 END_TEST
 
-START_TEST(answers_limited_by_a_deadline_are_certain)
+START_TEST(test_deadline_limited_results_are_certain)
 {
     if (!ebpo_test_wanted(_i + 8))
         return;
     static const uint64_t deadlines[] = { 1, 100, 1000, 10000, 100000, 1000000 };
-    asked a;
+    queried a;
     begin(&a, _i, 300);
     for (size_t d = 0; d < sizeof deadlines / sizeof *deadlines; d++)
         for (int cut = -1; cut < 2 && cut < a.m.info.level_count; cut++) {
@@ -321,10 +321,10 @@ START_TEST(answers_limited_by_a_deadline_are_certain)
             options.deadline_ns = deadlines[d];
             ASSERT_OK(ebpo_model_new(a.m.file, &how, &model, error));
             ASSERT_OK(ebpo_context_new(model, &context, error));
-            ask_limited(&a, context, EBPO_ENVELOPES_AUTO, &options);
+            query_limited(&a, context, EBPO_ENVELOPES_AUTO, &options);
             for (uint64_t i = 0; i < a.count;
-                 i++) /* however short it is, some face is in the root cell; beyond the largest
-                         double nobody can tell */
+                 i++) /* even after the shortest time, some face is in the root cell; beyond the
+                       * largest double nothing is known */
                 ck_assert(isfinite(a.distance[i].hi) || isinf(a.truth[i].distance) ||
                           fabs(a.points[3 * i]) + fabs(a.points[3 * i + 1]) +
                                   fabs(a.points[3 * i + 2]) >
@@ -336,11 +336,11 @@ START_TEST(answers_limited_by_a_deadline_are_certain)
 }
 END_TEST
 
-START_TEST(the_theses_modes_never_claim_too_much)
+START_TEST(test_thesis_mode_bounds_hold)
 {
     if (!ebpo_test_wanted(_i + 9))
         return;
-    asked a;
+    queried a;
     begin(&a, _i, 600);
     for (int mode = EBPO_DISTANCE_RECURSIVE; mode <= EBPO_DISTANCE_ENVELOPE; mode++) {
         ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
@@ -363,12 +363,12 @@ START_TEST(the_theses_modes_never_claim_too_much)
 }
 END_TEST
 
-/* A context keeps envelopes for its next questions; one that has just been made has none. */
-START_TEST(kept_envelopes_are_those_that_would_be_cut)
+/* A context keeps envelopes for its next queries; a new one has none. */
+START_TEST(test_cached_envelopes_match_fresh_ones)
 {
     if (!ebpo_test_wanted(_i + 11))
         return;
-    asked a;
+    queried a;
     begin(&a, _i, 300);
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.mode = EBPO_DISTANCE_ENVELOPE;
@@ -390,12 +390,12 @@ START_TEST(kept_envelopes_are_those_that_would_be_cut)
 }
 END_TEST
 
-/* What a leaf or a node has is told by the file, not by what lies beside it in memory. */
-START_TEST(the_theses_modes_do_not_depend_on_what_is_in_memory)
+/* The data of a leaf or a node depends on the file, not on neighbours in memory. */
+START_TEST(test_thesis_modes_ignore_loaded_data)
 {
     if (!ebpo_test_wanted(_i + 10))
         return;
-    asked a;
+    queried a;
     begin(&a, _i, 300);
     ebpo_distance_result *resident = calloc(a.count, sizeof *resident);
     for (int mode = EBPO_DISTANCE_RECURSIVE; mode <= EBPO_DISTANCE_ENVELOPE; mode++) {
@@ -430,12 +430,12 @@ END_TEST
 
 /* --- a file without mesh --- */
 
-START_TEST(a_file_without_mesh_answers_by_levels_only)
+START_TEST(test_file_without_mesh_allows_level_queries)
 {
     if (!ebpo_test_wanted(_i + 11))
         return;
     static const query_variant bare = { "planes only", 4, -1, EBPO_RULE_NONZERO, EBPO_PART_PLANES };
-    asked a;
+    queried a;
     begin(&a, _i, 500);
     query_model m;
     query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name), &bare);
@@ -462,7 +462,7 @@ START_TEST(a_file_without_mesh_answers_by_levels_only)
         for (int level = 0; level < m.info.level_count; level++) {
             ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
             options.level = level;
-            ask_limited(&a, m.context, EBPO_ENVELOPES_AUTO, &options);
+            query_limited(&a, m.context, EBPO_ENVELOPES_AUTO, &options);
         }
     query_model_free(&m);
     end(&a);
@@ -472,18 +472,18 @@ END_TEST
 /* --- threads --- */
 
 typedef struct thread_job {
-    asked *a;
+    queried *a;
     ebpo_model *model;
     unsigned number;
     ebpo_status status;
     uint64_t different;
 } thread_job;
 
-/* Starts at another point each; answers must be those of one thread, bit for bit. */
-static void *ask_in_thread(void *user)
+/* Each thread starts at another point; results must equal those of one thread, bit for bit. */
+static void *query_in_thread(void *user)
 {
     thread_job *job = user;
-    asked *a = job->a;
+    queried *a = job->a;
     ebpo_context *context;
     job->status = ebpo_context_new(job->model, &context, NULL);
     for (uint64_t i = 0; i < a->count && job->status == EBPO_OK; i++) {
@@ -501,7 +501,7 @@ static void *ask_in_thread(void *user)
     return NULL;
 }
 
-static void in_threads(asked *a, const ebpo_model_options *how, void *(*ask)(void *job),
+static void in_threads(queried *a, const ebpo_model_options *how, void *(*run_query)(void *job),
                        ebpo_model_stats *stats)
 {
     enum { THREADS = 4 };
@@ -511,7 +511,7 @@ static void in_threads(asked *a, const ebpo_model_options *how, void *(*ask)(voi
     ASSERT_OK(ebpo_model_new(a->m.file, how, &model, error));
     for (unsigned i = 0; i < THREADS; i++) {
         job[i] = (thread_job){ .a = a, .model = model, .number = i };
-        ck_assert_int_eq(pthread_create(&thread[i], NULL, ask, &job[i]), 0);
+        ck_assert_int_eq(pthread_create(&thread[i], NULL, run_query, &job[i]), 0);
     }
     for (int i = 0; i < THREADS; i++)
         ck_assert_int_eq(pthread_join(thread[i], NULL), 0);
@@ -523,21 +523,21 @@ static void in_threads(asked *a, const ebpo_model_options *how, void *(*ask)(voi
     ebpo_model_free(model);
 }
 
-static void ask_in_threads(asked *a, const ebpo_model_options *how)
+static void query_in_threads(queried *a, const ebpo_model_options *how)
 {
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
-    in_threads(a, how, ask_in_thread, &stats);
+    in_threads(a, how, query_in_thread, &stats);
 }
 
 /* With ThreadSanitizer (meson setup build-tsan -Db_sanitize=thread; CK_RUN_CASE=threads
  * build-tsan/tests/query/test_query_modes) these look for races. */
-START_TEST(four_threads_get_the_answers_of_one)
+START_TEST(test_four_threads_match_single_thread)
 {
     if (!ebpo_test_wanted(_i + 12))
         return;
-    asked a;
+    queried a;
     begin(&a, _i, 400);
-    ask_exactly(&a, a.m.context, NULL, NULL);
+    query_exactly(&a, a.m.context, NULL, NULL);
     for (int loading = 0; loading < 3; loading++)
         for (int cut = -1; cut < 3 && cut < a.m.info.level_count; cut++)
             for (int prefetch = 0; prefetch < 2; prefetch++) {
@@ -545,20 +545,20 @@ START_TEST(four_threads_get_the_answers_of_one)
                 how.loading = (ebpo_loading)loading;
                 how.cut_level = cut;
                 how.prefetch = prefetch;
-                ask_in_threads(&a, &how);
+                query_in_threads(&a, &how);
             }
     end(&a);
 }
 END_TEST
 
-/* The smallest budgets that four contexts fit into, where subtrees come and go all the time. */
-START_TEST(four_threads_share_a_small_budget)
+/* The smallest budgets for four contexts, where subtrees are loaded and evicted all the time. */
+START_TEST(test_four_threads_share_small_budget)
 {
     if (!ebpo_test_wanted(_i + 13))
         return;
-    asked a;
+    queried a;
     begin(&a, _i, 400);
-    ask_exactly(&a, a.m.context, NULL, NULL);
+    query_exactly(&a, a.m.context, NULL, NULL);
     int runs = 0;
     for (uint64_t budget = 16384; runs < 4; budget += budget / 3) {
         ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
@@ -573,7 +573,7 @@ START_TEST(four_threads_share_a_small_budget)
             ebpo_context_free(context[i]);
         ebpo_model_free(model);
         if (status == EBPO_OK) {
-            ask_in_threads(&a, &how);
+            query_in_threads(&a, &how);
             runs++;
         }
     }
@@ -581,13 +581,14 @@ START_TEST(four_threads_share_a_small_budget)
 }
 END_TEST
 
-/* A leaf's wall is found by its first question, its planes by the 128th, while others ask. */
-enum { POINTS_ASKED_OFTEN = 12, OFTEN = 200 };
+/* The cell faces of a leaf are computed by its first query, its planes by the 128th, during other
+ * queries. */
+enum { POINTS_QUERIED_OFTEN = 12, OFTEN = 200 };
 
-static void *ask_often(void *user)
+static void *query_often(void *user)
 {
     thread_job *job = user;
-    asked *a = job->a;
+    queried *a = job->a;
     ebpo_context *context;
     job->status = ebpo_context_new(job->model, &context, NULL);
     for (uint64_t i = 0; i < OFTEN * a->count && job->status == EBPO_OK; i++) {
@@ -600,12 +601,12 @@ static void *ask_often(void *user)
     return NULL;
 }
 
-/* Of points close to faces, on either side: in leaves. */
-static void begin_in_leaves(asked *a, int number)
+/* Points close to faces, on either side: in leaves. */
+static void begin_in_leaves(queried *a, int number)
 {
     query_model_make(&a->m, cases[number].name, query_solid_by_name(cases[number].name),
                      &query_variants[cases[number].variant]);
-    make_room(a, POINTS_ASKED_OFTEN);
+    reserve_space(a, POINTS_QUERIED_OFTEN);
     const ebpo_mesh *mesh = &a->m.mesh;
     for (uint64_t i = 0; i < a->count; i++) {
         const uint32_t *corner = mesh->faces + 3 * (i * mesh->face_count / a->count);
@@ -620,16 +621,16 @@ static void begin_in_leaves(asked *a, int number)
     query_find_truths(&a->m, a->points, a->count, a->truth);
 }
 
-START_TEST(leaves_that_are_found_out_meanwhile_give_the_same_answers)
+START_TEST(test_leaves_classified_concurrently)
 {
-    asked a;
+    queried a;
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     uint64_t found = 0;
     begin_in_leaves(&a, _i);
-    ask_exactly(&a, a.m.context, NULL, NULL);
+    query_exactly(&a, a.m.context, NULL, NULL);
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = _i % 2 ? 1 : -1;
-    in_threads(&a, &how, ask_often, &stats);
+    in_threads(&a, &how, query_often, &stats);
     for (int k = 0; k < 5; k++)
         found += stats.leaves_of_kind[k];
     ck_assert_uint_ge(found, 1);
@@ -643,23 +644,21 @@ TEST_SUITE(query_modes)
     TCase *tests = tcase_create("modes"), *threads = tcase_create("threads");
     tcase_set_timeout(tests, 1000);
     tcase_set_timeout(threads, 1000);
-    tcase_add_loop_test(tests, every_way_of_loading_gives_the_same_answers, 0, CASES);
-    tcase_add_loop_test(tests, budgets_are_kept_and_do_not_change_answers, 0, CASES);
-    tcase_add_loop_test(tests, batches_give_what_single_questions_give, 0, CASES);
-    tcase_add_loop_test(tests, warm_starts_and_signs_do_not_change_answers, 0, CASES);
-    tcase_add_loop_test(tests, what_is_beyond_max_distance_is_left_out, 0, CASES);
-    tcase_add_loop_test(tests, answers_limited_to_a_level_are_certain, 0, CASES);
-    tcase_add_loop_test(tests, answers_limited_to_a_level_do_not_depend_on_what_is_in_memory, 0,
-                        CASES);
-    tcase_add_loop_test(tests, answers_limited_by_a_deadline_are_certain, 0, CASES);
-    tcase_add_loop_test(tests, the_theses_modes_never_claim_too_much, 0, CASES);
-    tcase_add_loop_test(tests, kept_envelopes_are_those_that_would_be_cut, 0, CASES);
-    tcase_add_loop_test(tests, the_theses_modes_do_not_depend_on_what_is_in_memory, 0, CASES);
-    tcase_add_loop_test(tests, a_file_without_mesh_answers_by_levels_only, 0, CASES);
-    tcase_add_loop_test(threads, four_threads_get_the_answers_of_one, 0, CASES);
-    tcase_add_loop_test(threads, four_threads_share_a_small_budget, 0, CASES);
-    tcase_add_loop_test(threads, leaves_that_are_found_out_meanwhile_give_the_same_answers, 0,
-                        CASES);
+    tcase_add_loop_test(tests, test_results_same_in_all_load_modes, 0, CASES);
+    tcase_add_loop_test(tests, test_results_same_for_any_budget, 0, CASES);
+    tcase_add_loop_test(tests, test_batches_match_single_queries, 0, CASES);
+    tcase_add_loop_test(tests, test_results_ignore_warm_start_and_sign, 0, CASES);
+    tcase_add_loop_test(tests, test_results_beyond_max_distance_are_omitted, 0, CASES);
+    tcase_add_loop_test(tests, test_level_limited_results_are_certain, 0, CASES);
+    tcase_add_loop_test(tests, test_level_limited_results_ignore_loaded_data, 0, CASES);
+    tcase_add_loop_test(tests, test_deadline_limited_results_are_certain, 0, CASES);
+    tcase_add_loop_test(tests, test_thesis_mode_bounds_hold, 0, CASES);
+    tcase_add_loop_test(tests, test_cached_envelopes_match_fresh_ones, 0, CASES);
+    tcase_add_loop_test(tests, test_thesis_modes_ignore_loaded_data, 0, CASES);
+    tcase_add_loop_test(tests, test_file_without_mesh_allows_level_queries, 0, CASES);
+    tcase_add_loop_test(threads, test_four_threads_match_single_thread, 0, CASES);
+    tcase_add_loop_test(threads, test_four_threads_share_small_budget, 0, CASES);
+    tcase_add_loop_test(threads, test_leaves_classified_concurrently, 0, CASES);
     suite_add_tcase(suite, tests);
     suite_add_tcase(suite, threads);
     return suite;

@@ -1,16 +1,16 @@
-/* Questions to small random solids against brute force: boxes and tetrahedra that touch, nest,
- * overlap and repeat. A failure prints the solid's seed; EBPO_TEST_SEED=<seed> asks that one only,
- * EBPO_TEST_SCALE scales their number. */
+/* Queries to small random solids against brute force: boxes and tetrahedra in contact, nested,
+ * overlapping and repeated. A failure prints the seed of the solid; EBPO_TEST_SEED=<seed> tests
+ * only that one, EBPO_TEST_SCALE scales their number. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 enum { POINTS = 400, RAYS = 60, BOXES = 20 };
 
-static void ask_rays(query_model *m, uint64_t *state)
+static void query_rays(query_model *m, uint64_t *state)
 {
     for (int i = 0; i < RAYS; i++) {
         double origin[3], direction[3], t_max;
@@ -35,7 +35,7 @@ static void ask_rays(query_model *m, uint64_t *state)
     }
 }
 
-static void ask_boxes(query_model *m, uint64_t *state)
+static void query_boxes(query_model *m, uint64_t *state)
 {
     double corner[2 * BOXES][3];
     query_make_points(m, 2 * BOXES, ebpo_test_random(state), corner[0]);
@@ -61,7 +61,7 @@ static void ask_boxes(query_model *m, uint64_t *state)
     }
 }
 
-static void ask_solid(uint64_t seed)
+static void query_solid(uint64_t seed)
 {
     query_model m;
     char name[64];
@@ -69,23 +69,23 @@ static void ask_solid(uint64_t seed)
     snprintf(name, sizeof name, "EBPO_TEST_SEED=%llu", (unsigned long long)seed);
     query_model_make(&m, name, query_random_solid(seed, seed % 4 != 3),
                      &query_variants[seed % (uint64_t)query_variant_count]);
-    query_ask(&m, POINTS, seed);
-    ask_rays(&m, &state);
-    ask_boxes(&m, &state);
+    query_query(&m, POINTS, seed);
+    query_rays(&m, &state);
+    query_boxes(&m, &state);
     query_model_free(&m);
 }
 
-START_TEST(random_solids_answer_like_brute_force)
+START_TEST(test_random_solids_match_brute_force)
 {
     const char *seed = getenv("EBPO_TEST_SEED");
     uint64_t count = query_scaled(80);
     if (seed) {
         if (_i == 0)
-            ask_solid(strtoull(seed, NULL, 0));
+            query_solid(strtoull(seed, NULL, 0));
         return;
     }
     for (uint64_t i = 0; i < count; i++)
-        ask_solid((uint64_t)_i * 1000000 + i);
+        query_solid((uint64_t)_i * 1000000 + i);
 }
 END_TEST
 
@@ -94,7 +94,7 @@ TEST_SUITE(query_random)
     Suite *suite = suite_create("query_random");
     TCase *tests = tcase_create("random");
     tcase_set_timeout(tests, 1000);
-    tcase_add_loop_test(tests, random_solids_answer_like_brute_force, 0, 8);
+    tcase_add_loop_test(tests, test_random_solids_match_brute_force, 0, 8);
     suite_add_tcase(suite, tests);
     return suite;
 }

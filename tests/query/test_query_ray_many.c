@@ -1,5 +1,5 @@
-/* Many rays at once: answers are those of single ones, in their order, whatever the threads and
- * whatever is in memory; and what a closed solid promises to every ray. */
+/* Batches of rays: results equal those of single rays, in their order, for any number of threads
+ * and any part in memory; and properties of closed solids. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -7,16 +7,16 @@
 #include <string.h>
 
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
-typedef struct answers {
+typedef struct results {
     ebpo_ray_hit *first;
     bool *any;
-} answers;
+} results;
 
 static ebpo_ray *make_rays(query_model *m, uint64_t count, uint64_t seed)
 {
-    ebpo_ray *rays = query_room(count, sizeof *rays);
+    ebpo_ray *rays = query_capacity(count, sizeof *rays);
     for (uint64_t i = 0; i < count; i++) {
         ebpo_ray *r = &rays[i];
         query_make_ray(m, &seed, r->origin, r->direction, &r->t_max);
@@ -32,8 +32,8 @@ static bool same_hit(const ebpo_ray_hit *a, const ebpo_ray_hit *b)
     return memcmp(&a->t, &b->t, sizeof a->t) == 0 && a->face == b->face && a->side == b->side;
 }
 
-/* The hits of one ray at a time, from all sides. */
-static void ask_singly(ebpo_context *context, const ebpo_ray *rays, uint64_t count, answers *out)
+/* Finds the hits of one ray at a time, for all sides. */
+static void query_singly(ebpo_context *context, const ebpo_ray *rays, uint64_t count, results *out)
 {
     for (uint64_t i = 0; i < count; i++) {
         bool hit;
@@ -46,14 +46,15 @@ static void ask_singly(ebpo_context *context, const ebpo_ray *rays, uint64_t cou
     }
 }
 
-static void ask_together(ebpo_context *context, ebpo_context *other, const ebpo_ray *rays,
-                         uint64_t count, unsigned threads, const answers *expected)
+static void query_together(ebpo_context *context, ebpo_context *other, const ebpo_ray *rays,
+                           uint64_t count, unsigned threads, const results *expected)
 {
     ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
     const ebpo_ray_hit *hits, *single;
     const uint64_t *begin;
     uint64_t n;
-    answers got = { query_room(count, sizeof *got.first), query_room(count, sizeof *got.any) };
+    results got = { query_capacity(count, sizeof *got.first),
+                    query_capacity(count, sizeof *got.any) };
     options.threads = threads;
     ASSERT_OK(ebpo_ray_first_many(context, rays, count, &options, got.first, error));
     ASSERT_OK(ebpo_ray_any_many(context, rays, count, &options, got.any, error));
@@ -72,15 +73,15 @@ static void ask_together(ebpo_context *context, ebpo_context *other, const ebpo_
     free(got.any);
 }
 
-START_TEST(many_rays_are_answered_as_single_ones)
+START_TEST(test_ray_batch_matches_single_rays)
 {
     query_model m;
     query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
-    uint64_t count = _i == 2 ? 100 : 1100; /* enough for pieces that several threads take */
+    uint64_t count = _i == 2 ? 100 : 1100; /* enough pieces for several threads */
     ebpo_ray *rays = make_rays(&m, count, 7);
-    answers expected = { query_room(count, sizeof *expected.first),
-                         query_room(count, sizeof *expected.any) };
-    ask_singly(m.context, rays, count, &expected);
+    results expected = { query_capacity(count, sizeof *expected.first),
+                         query_capacity(count, sizeof *expected.any) };
+    query_singly(m.context, rays, count, &expected);
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = _i ? 2 : -1;
     how.loading = _i == 2 ? EBPO_LOAD_SUBTREE : EBPO_LOAD_CACHE;
@@ -89,7 +90,7 @@ START_TEST(many_rays_are_answered_as_single_ones)
     ASSERT_OK(ebpo_model_new(m.file, &how, &model, error));
     ASSERT_OK(ebpo_context_new(model, &context, error));
     for (unsigned threads = 1; threads < 4; threads += 2)
-        ask_together(context, m.context, rays, count, threads, &expected);
+        query_together(context, m.context, rays, count, threads, &expected);
     ebpo_context_free(context);
     ebpo_model_free(model);
     free(expected.first);
@@ -99,7 +100,7 @@ START_TEST(many_rays_are_answered_as_single_ones)
 }
 END_TEST
 
-START_TEST(rays_that_make_no_sense_are_named)
+START_TEST(test_ray_batch_names_invalid_ray)
 {
     query_model m;
     query_model_make(&m, "cube", query_solid_by_name("cube"), &query_variants[0]);
@@ -134,7 +135,8 @@ END_TEST
 
 /* --- closed solids --- */
 
-/* From p towards about a vertex, a point of an edge or of a face; false: there is no direction. */
+/* Aims from p about towards a vertex, a point of an edge or of a face; false: there is no
+ * direction. */
 static bool aim(const query_model *m, const double p[3], uint64_t *state, ebpo_ray *out)
 {
     static const double weights[][3] = {
@@ -154,8 +156,8 @@ static bool aim(const query_model *m, const double p[3], uint64_t *state, ebpo_r
            (out->direction[0] != 0 || out->direction[1] != 0 || out->direction[2] != 0);
 }
 
-/* What leaves a convex solid meets no front, and its back where it meets anything; what comes from
- * outside meets the front first, and something of the back behind it or at the same place. */
+/* A ray from inside a convex solid hits no front, and hits the back if it hits anything; a ray from
+ * outside hits the front first, and a back behind it or at the same point. */
 static bool convex_keeps_its_word(ebpo_context *context, const ebpo_ray *ray, bool from_inside)
 {
     static const ebpo_ray_sides sides[3] = { EBPO_RAY_BOTH, EBPO_RAY_FRONT, EBPO_RAY_BACK };
@@ -168,19 +170,19 @@ static bool convex_keeps_its_word(ebpo_context *context, const ebpo_ray *ray, bo
     if (from_inside)
         return hit[0].face != EBPO_NO_FACE && hit[1].face == EBPO_NO_FACE &&
                same_hit(&hit[2], &hit[0]);
-    /* what runs within a face may be told of that face: then t is the same but for rounding */
+    /* a ray within a face may hit that face: then t is equal up to rounding */
     return hit[0].face == EBPO_NO_FACE ||
            (fabs(hit[0].t - hit[1].t) <= 4 * DBL_EPSILON * hit[0].t &&
             hit[2].face != EBPO_NO_FACE && hit[2].t >= hit[1].t);
 }
 
-START_TEST(convex_solids_are_tight)
+START_TEST(test_rays_detect_inside_of_convex_solids)
 {
     static const char *const names[] = { "sphere", "cube" };
     query_model m;
     query_model_make(&m, names[_i], query_solid_by_name(names[_i]), &query_variants[5]);
     uint64_t state = 5, count = query_scaled(3000), wrong = 0;
-    double *points = query_room(count, 3 * sizeof *points);
+    double *points = query_capacity(count, 3 * sizeof *points);
     query_make_points(&m, count, 9, points);
     for (uint64_t i = 0; i < count; i++) {
         ebpo_inside_result where;
@@ -196,15 +198,15 @@ START_TEST(convex_solids_are_tight)
 }
 END_TEST
 
-/* No ray leaves a solid unseen; one that meets no edge goes in as often as out, but for its
- * beginning. */
-START_TEST(solids_are_tight)
+/* No ray leaves a solid without a hit; a ray that hits no edge enters as often as it leaves, except
+ * for its beginning. */
+START_TEST(test_rays_detect_inside_of_solids)
 {
     query_model m;
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
                      &query_variants[_i % query_variant_count]);
     uint64_t state = 5, count = query_scaled(m.mesh.face_count > 500 ? 500 : 2000), wrong = 0;
-    double *points = query_room(count, 3 * sizeof *points);
+    double *points = query_capacity(count, 3 * sizeof *points);
     query_make_points(&m, count, 9, points);
     for (uint64_t i = 0; i < count && m.info.solid; i++) {
         ebpo_inside_result where;
@@ -236,10 +238,10 @@ TEST_SUITE(query_ray_many)
     TCase *many = tcase_create("many"), *tight = tcase_create("tight");
     tcase_set_timeout(many, 600);
     tcase_set_timeout(tight, 600);
-    tcase_add_loop_test(many, many_rays_are_answered_as_single_ones, 0, 3);
-    tcase_add_loop_test(many, rays_that_make_no_sense_are_named, 0, 4);
-    tcase_add_loop_test(tight, convex_solids_are_tight, 0, 2);
-    tcase_add_loop_test(tight, solids_are_tight, 0, query_solid_count());
+    tcase_add_loop_test(many, test_ray_batch_matches_single_rays, 0, 3);
+    tcase_add_loop_test(many, test_ray_batch_names_invalid_ray, 0, 4);
+    tcase_add_loop_test(tight, test_rays_detect_inside_of_convex_solids, 0, 2);
+    tcase_add_loop_test(tight, test_rays_detect_inside_of_solids, 0, query_solid_count());
     suite_add_tcase(suite, many);
     suite_add_tcase(suite, tight);
     return suite;

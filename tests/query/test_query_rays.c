@@ -1,5 +1,5 @@
-/* Rays and boxes against the oracle: through vertices, along edges, within faces, from everywhere
- * to everywhere. */
+/* Rays and boxes against the oracle: through vertices, along edges, within faces, between any
+ * points. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,7 +7,7 @@
 
 #include "check_main.h"
 #include "counted_source.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 static void some_ray(query_model *m, uint64_t *state, query_ray *r)
 {
@@ -28,8 +28,8 @@ static void some_ray(query_model *m, uint64_t *state, query_ray *r)
             r->direction[k] = copysign(1e308, r->direction[k]);
 }
 
-/* The ray once more, ending where it meets a face, or a step before or after that. */
-static bool ask_ends(query_model *m, ebpo_context *context, const query_ray *r)
+/* Repeats the ray, ending at a hit, or one floating-point step before or after it. */
+static bool query_ends(query_model *m, ebpo_context *context, const query_ray *r)
 {
     const oracle_hit *expected;
     uint32_t n;
@@ -39,12 +39,12 @@ static bool ask_ends(query_model *m, ebpo_context *context, const query_ray *r)
     for (int i = -1; i <= 1 && isfinite(t); i++) {
         query_ray cut = *r;
         cut.t_max = i < 0 ? fmax(0, nextafter(t, -INFINITY)) : i > 0 ? nextafter(t, INFINITY) : t;
-        good &= query_ask_ray(m, context, &cut);
+        good &= query_query_ray(m, context, &cut);
     }
     return good;
 }
 
-START_TEST(rays_meet_what_brute_force_says)
+START_TEST(test_rays_match_brute_force)
 {
     int variant = _i % query_variant_count;
     query_model m;
@@ -56,16 +56,16 @@ START_TEST(rays_meet_what_brute_force_says)
     for (uint64_t i = 0; i < count && wrong < 3; i++) {
         query_ray r;
         some_ray(&m, &state, &r);
-        wrong += !query_ask_ray(&m, m.context, &r);
+        wrong += !query_query_ray(&m, m.context, &r);
         if (i % 8 == 0)
-            wrong += !ask_ends(&m, m.context, &r);
+            wrong += !query_ends(&m, m.context, &r);
     }
     ck_assert_uint_eq(wrong, 0);
     query_model_free(&m);
 }
 END_TEST
 
-START_TEST(rays_do_not_depend_on_what_is_in_memory)
+START_TEST(test_rays_same_in_all_load_modes)
 {
     static const char *const names[] = { "sphere", "boxes_in_walls", "blob" };
     query_model m;
@@ -86,7 +86,7 @@ START_TEST(rays_do_not_depend_on_what_is_in_memory)
             for (uint64_t i = 0; i < query_scaled(60) && wrong == 0; i++) {
                 query_ray r;
                 some_ray(&m, &state, &r);
-                wrong += !query_ask_ray(&m, context, &r);
+                wrong += !query_query_ray(&m, context, &r);
             }
             ck_assert_uint_eq(wrong, 0);
             ebpo_context_free(context);
@@ -96,7 +96,7 @@ START_TEST(rays_do_not_depend_on_what_is_in_memory)
 }
 END_TEST
 
-START_TEST(rays_that_make_no_sense_are_refused)
+START_TEST(test_invalid_rays_are_refused)
 {
     static const query_ray rays[] = {
         { { 0, 0, 0 }, { 0, 0, 0 }, 1 },        { { NAN, 0, 0 }, { 1, 0, 0 }, 1 },
@@ -126,7 +126,7 @@ END_TEST
 
 /* --- boxes --- */
 
-static bool ask_box(query_model *m, const double low[3], const double high[3])
+static bool query_box(query_model *m, const double low[3], const double high[3])
 {
     const uint32_t *expected;
     const uint64_t *faces;
@@ -138,7 +138,7 @@ static bool ask_box(query_model *m, const double low[3], const double high[3])
                   error.message);
     bool same = count == n;
     for (uint32_t i = 0; i < n && same; i++)
-        same = faces[i] == query_told(m, expected[i]);
+        same = faces[i] == query_reported(m, expected[i]);
     if (!same)
         fprintf(stderr,
                 "%s, %s: box (%a, %a, %a) .. (%a, %a, %a): %llu faces, %u expected, or others\n",
@@ -147,14 +147,14 @@ static bool ask_box(query_model *m, const double low[3], const double high[3])
     return same;
 }
 
-START_TEST(boxes_hold_what_brute_force_says)
+START_TEST(test_box_queries_match_brute_force)
 {
     query_model m;
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
                      &query_variants[(_i + 1) % query_variant_count]);
     uint64_t count = query_scaled(m.mesh.face_count > 500 ? 200 : 1500), wrong = 0,
              state = (uint64_t)_i;
-    double(*p)[3] = query_room(2 * count, sizeof *p);
+    double(*p)[3] = query_capacity(2 * count, sizeof *p);
     if (strcmp(m.name, "all_scales") == 0)
         count = query_scaled(100);
     query_make_points(&m, 2 * count, (uint64_t)_i + 77, p[0]);
@@ -165,8 +165,8 @@ START_TEST(boxes_hold_what_brute_force_says)
             low[k] = fmin(p[2 * i][k], p[2 * i + 1][k]);
             high[k] = flat ? low[k] : fmax(p[2 * i][k], p[2 * i + 1][k]);
         }
-        wrong += !ask_box(&m, low, high);
-        wrong += !ask_box(&m, p[2 * i], p[2 * i]);
+        wrong += !query_box(&m, low, high);
+        wrong += !query_box(&m, p[2 * i], p[2 * i]);
     }
     ck_assert_uint_eq(wrong, 0);
     free(p);
@@ -174,7 +174,7 @@ START_TEST(boxes_hold_what_brute_force_says)
 }
 END_TEST
 
-START_TEST(boxes_that_make_no_sense_are_refused)
+START_TEST(test_invalid_boxes_are_refused)
 {
     static const double boxes[][6] = {
         { 1, 0, 0, 0, 1, 1 }, { NAN, 0, 0, 1, 1, 1 }, { 0, 0, 0, 1, NAN, 1 }, { 0, 0, 1, 1, 1, 0.5 }
@@ -198,11 +198,11 @@ END_TEST
 
 /* --- triangles --- */
 
-enum { CUTS = 4 }; /* ways of holding a model */
+enum { CUTS = 4 }; /* modes of holding a model */
 
 typedef struct gathered {
     const query_model *m;
-    uint32_t *face; /* numbers in the file */
+    uint32_t *face; /* indices in the file */
     uint64_t count, blocks, most;
     bool fine, ascending;
 } gathered;
@@ -216,11 +216,11 @@ static int compare_numbers(const void *a, const void *b)
 static bool keep_triangles(void *user, const ebpo_triangles *t)
 {
     gathered *g = user;
-    g->fine &= t->count >= 1 && t->count <= EBPO_TRIANGLES_MOST;
+    g->fine &= t->count >= 1 && t->count <= EBPO_TRIANGLES_MAX;
     for (uint64_t i = 0; i < t->count && g->fine; i++) {
         uint64_t face = t->file_faces[i];
         g->fine = g->count < g->m->mesh.face_count && face < g->m->mesh.face_count &&
-                  t->faces[i] == query_told(g->m, (uint32_t)face);
+                  t->faces[i] == query_reported(g->m, (uint32_t)face);
         for (int k = 0; k < 3 && g->fine; k++) {
             double corner[3];
             ebpo_test_point(&g->m->mesh, g->m->mesh.faces[3 * face + (uint64_t)k], corner);
@@ -234,15 +234,15 @@ static bool keep_triangles(void *user, const ebpo_triangles *t)
     return ++g->blocks < g->most;
 }
 
-/* The triangles are those that the judge names, each once. */
-static bool ask_triangles(query_model *m, ebpo_context *context, bool resident, const double low[3],
-                          const double high[3])
+/* Checks that the triangles are those of the reference, each once. */
+static bool query_triangles(query_model *m, ebpo_context *context, bool resident,
+                            const double low[3], const double high[3])
 {
     const uint32_t *expected;
     uint32_t n;
     ebpo_error error = EBPO_ERROR_INIT;
     gathered g = { .m = m, .most = UINT64_MAX, .fine = true, .ascending = true };
-    g.face = query_room(m->mesh.face_count + 1, sizeof *g.face);
+    g.face = query_capacity(m->mesh.face_count + 1, sizeof *g.face);
     oracle_box(m->judge, low, high, &expected, &n);
     ck_assert_msg(ebpo_triangles_in_box(context, low, high, keep_triangles, &g, &error) == EBPO_OK,
                   "%s", error.message);
@@ -265,13 +265,13 @@ static void hold(query_model *m, int way, ebpo_model **model, ebpo_context **con
     ASSERT_OK(ebpo_context_new(*model, context, error));
 }
 
-START_TEST(triangles_of_boxes_come_once_each)
+START_TEST(test_box_query_returns_each_triangle_once)
 {
     query_model m;
     ebpo_model *model[CUTS];
     ebpo_context *context[CUTS];
     uint64_t count = query_scaled(100), wrong = 0;
-    double(*p)[3] = query_room(2 * count, sizeof *p);
+    double(*p)[3] = query_capacity(2 * count, sizeof *p);
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
                      &query_variants[(_i + 2) % query_variant_count]);
     for (int way = 0; way < CUTS; way++)
@@ -284,7 +284,7 @@ START_TEST(triangles_of_boxes_come_once_each)
             high[k] = fmax(p[2 * i][k], p[2 * i + 1][k]);
         }
         for (int way = 0; way < CUTS; way++)
-            wrong += !ask_triangles(&m, context[way], way == 0, low, high);
+            wrong += !query_triangles(&m, context[way], way == 0, low, high);
     }
     ck_assert_uint_eq(wrong, 0);
     for (int way = 0; way < CUTS; way++) {
@@ -296,8 +296,8 @@ START_TEST(triangles_of_boxes_come_once_each)
 }
 END_TEST
 
-/* A tetrahedron above an edge of eight cells, upwards in x and y: its slanting face passes by the
- * edge so closely that the cell below it lists it, too, and has it as new. */
+/* A tetrahedron above an edge of eight cells, upwards in x and y: its slanting face is so close to
+ * the edge that the cell below also lists it, as a new face. */
 static void add_passing(ebpo_mesh *mesh, const double at[3], double a)
 {
     static const uint32_t face[4][3] = { { 0, 2, 1 }, { 0, 1, 3 }, { 0, 3, 2 }, { 1, 2, 3 } };
@@ -310,7 +310,8 @@ static void add_passing(ebpo_mesh *mesh, const double at[3], double a)
         ebpo_test_append_face(mesh, first + face[i][0], first + face[i][1], first + face[i][2]);
 }
 
-/* The corners of the box belong to whole cubes, so that it is the same whatever lies between. */
+/* The corners of the box belong to complete cubes, so that the box does not depend on the contents.
+ */
 static ebpo_mesh passing_by(const ebpo_info *box)
 {
     static const double low[2][3] = { { 0, 0, 0 }, { 1 - 0x1p-8, 1 - 0x1p-8, 1 - 0x1p-8 } },
@@ -319,16 +320,16 @@ static ebpo_mesh passing_by(const ebpo_info *box)
     ebpo_test_append(&mesh, &other);
     ebpo_mesh_free(&other);
     for (int i = 0; box && i < 7 * 7; i++) {
-        const int wall[3] = { 1 + i % 7, 1 + i / 7, 1 + i % 5 };
+        const int cell_face[3] = { 1 + i % 7, 1 + i / 7, 1 + i % 5 };
         double at[3];
         for (int k = 0; k < 3; k++)
-            at[k] = box->box_origin[k] + box->box_size[k] / 8 * wall[k];
+            at[k] = box->box_origin[k] + box->box_size[k] / 8 * cell_face[k];
         add_passing(&mesh, at, box->box_size[0] / 32);
     }
     return mesh;
 }
 
-START_TEST(triangles_that_pass_by_a_cell_come_once)
+START_TEST(test_triangle_beside_cell_is_returned_once)
 {
     static const query_variant variant = { "passing", 1, 6, EBPO_RULE_NONZERO, 0 };
     static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
@@ -340,7 +341,7 @@ START_TEST(triangles_that_pass_by_a_cell_come_once)
         ebpo_model *model;
         ebpo_context *context;
         hold(&m, way, &model, &context);
-        ck_assert_msg(ask_triangles(&m, context, way == 0, low, high), "way %d", way);
+        ck_assert_msg(query_triangles(&m, context, way == 0, low, high), "way %d", way);
         ebpo_context_free(context);
         ebpo_model_free(model);
     }
@@ -348,16 +349,16 @@ START_TEST(triangles_that_pass_by_a_cell_come_once)
 }
 END_TEST
 
-/* All triangles, and those of some blocks: each once. */
+/* All triangles, and triangles of some blocks: each once. */
 static void take_all(const query_model *m, ebpo_context *context)
 {
     for (int turn = 0; turn < 2; turn++) {
         static const double low[3] = { -9, -9, -9 }, high[3] = { 9, 9, 9 };
         gathered g = { .m = m, .most = turn ? 3 : UINT64_MAX, .fine = true };
-        g.face = query_room(m->mesh.face_count + 1, sizeof *g.face);
+        g.face = query_capacity(m->mesh.face_count + 1, sizeof *g.face);
         ASSERT_OK(ebpo_triangles_in_box(context, low, high, keep_triangles, &g, error));
         ck_assert(g.fine);
-        ck_assert_uint_eq(g.count, turn ? 3 * EBPO_TRIANGLES_MOST : m->mesh.face_count);
+        ck_assert_uint_eq(g.count, turn ? 3 * EBPO_TRIANGLES_MAX : m->mesh.face_count);
         qsort(g.face, g.count, sizeof *g.face, compare_numbers);
         for (uint64_t i = 1; i < g.count; i++)
             if (g.face[i] == g.face[i - 1])
@@ -366,9 +367,9 @@ static void take_all(const query_model *m, ebpo_context *context)
     }
 }
 
-/* More than the budget holds at once; and whoever has enough says so. The file is large enough for
- * subtrees of its own: far away, many are asked for at a time. */
-START_TEST(triangles_of_all_of_a_model_keep_to_its_budget)
+/* More than the budget holds at once; and the callback ends the query. The file is large enough for
+ * separate subtrees: for a remote file, many are requested at a time. */
+START_TEST(test_triangles_of_whole_model_keep_budget)
 {
     query_model m;
     counted_source c;
@@ -405,14 +406,14 @@ TEST_SUITE(query_rays)
     TCase *rays = tcase_create("rays"), *boxes = tcase_create("boxes");
     tcase_set_timeout(rays, 600);
     tcase_set_timeout(boxes, 600);
-    tcase_add_loop_test(rays, rays_meet_what_brute_force_says, 0, query_solid_count());
-    tcase_add_loop_test(rays, rays_do_not_depend_on_what_is_in_memory, 0, 3);
-    tcase_add_test(rays, rays_that_make_no_sense_are_refused);
-    tcase_add_loop_test(boxes, boxes_hold_what_brute_force_says, 0, query_solid_count());
-    tcase_add_test(boxes, boxes_that_make_no_sense_are_refused);
-    tcase_add_loop_test(boxes, triangles_of_boxes_come_once_each, 0, query_solid_count());
-    tcase_add_test(boxes, triangles_that_pass_by_a_cell_come_once);
-    tcase_add_loop_test(boxes, triangles_of_all_of_a_model_keep_to_its_budget, 0, 3);
+    tcase_add_loop_test(rays, test_rays_match_brute_force, 0, query_solid_count());
+    tcase_add_loop_test(rays, test_rays_same_in_all_load_modes, 0, 3);
+    tcase_add_test(rays, test_invalid_rays_are_refused);
+    tcase_add_loop_test(boxes, test_box_queries_match_brute_force, 0, query_solid_count());
+    tcase_add_test(boxes, test_invalid_boxes_are_refused);
+    tcase_add_loop_test(boxes, test_box_query_returns_each_triangle_once, 0, query_solid_count());
+    tcase_add_test(boxes, test_triangle_beside_cell_is_returned_once);
+    tcase_add_loop_test(boxes, test_triangles_of_whole_model_keep_budget, 0, 3);
     suite_add_tcase(suite, rays);
     suite_add_tcase(suite, boxes);
     return suite;

@@ -1,4 +1,4 @@
-/* Attributes at points on faces, beside long doubles and beside what must hold exactly. */
+/* Attributes at points on faces, against long doubles and exact conditions. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -16,7 +16,7 @@ static ebpo_error error = EBPO_ERROR_INIT;
 
 static void fine(ebpo_status status) { ck_assert_msg(status == EBPO_OK, "%s", error.message); }
 
-/* --- a torus whose attributes are functions of where a vertex is --- */
+/* --- a torus whose attributes are functions of the vertex position --- */
 
 static double linear(const double p[3]) { return 3 * p[0] - 2 * p[1] + p[2] + 5; }
 
@@ -59,16 +59,16 @@ static void convert(const char *ply, const char *path, uint32_t without)
     ebpo_tree_free(&tree);
 }
 
-typedef struct asked {
+typedef struct queried {
     ebpo_file *file;
     ebpo_model *model;
     ebpo_context *context;
     ebpo_sampler *sampler;
-} asked;
+} queried;
 
-static asked ask(const char *path, const char *names)
+static queried run_query(const char *path, const char *names)
 {
-    asked a = { .file = NULL };
+    queried a = { .file = NULL };
     fine(ebpo_open(path, &a.file, &error));
     fine(ebpo_model_new(a.file, NULL, &a.model, &error));
     fine(ebpo_context_new(a.model, &a.context, &error));
@@ -76,7 +76,7 @@ static asked ask(const char *path, const char *names)
     return a;
 }
 
-static void answered(asked *a)
+static void answered(queried *a)
 {
     ebpo_sampler_free(a->sampler);
     ebpo_context_free(a->context);
@@ -97,7 +97,7 @@ static void random_point(uint64_t *state, double point[3])
         point[k] = (double)(ebpo_test_random(state) >> 11) * 0x1p-53 * 3 - 1.5;
 }
 
-/* Of a file with maps `face` is the source's number, which is what `red` of faces says. */
+/* In a file with maps `face` is the source index, which is the attribute `red` of faces. */
 static void expect_values(const double values[3], uint64_t face, const double point[3], bool maps)
 {
     ck_assert_double_eq_tol(values[0], linear(point), 1e-13);
@@ -106,25 +106,25 @@ static void expect_values(const double values[3], uint64_t face, const double po
         ck_assert_double_eq(values[2], (double)face);
 }
 
-static void ask_points(bool maps)
+static void query_points(bool maps)
 {
     uint64_t state = 7;
-    asked a = ask(scratch("a.ebpo.h5"), "linear,same,face:red");
+    queried a = run_query(scratch("a.ebpo.h5"), "linear,same,face:red");
     ck_assert_uint_eq(ebpo_sampler_columns(a.sampler), 3);
     for (uint64_t i = 0; i < ebpo_test_scaled(400); i++) {
         double point[3], towards[3], values[3];
         ebpo_distance_result near;
         ebpo_ray_hit hit;
-        bool met;
+        bool intersected;
         random_point(&state, point);
         random_point(&state, towards);
         fine(ebpo_distance(a.context, point, NULL, &near, &error));
         fine(ebpo_sample(a.sampler, near.point, &near.face, 1, values, &error));
         expect_values(values, near.face, near.point, maps);
-        fine(ebpo_ray_first(a.context, point, towards, INFINITY, &hit, &met, &error));
+        fine(ebpo_ray_first(a.context, point, towards, INFINITY, &hit, &intersected, &error));
         for (int k = 0; k < 3; k++)
             point[k] += hit.t * towards[k];
-        if (met) {
+        if (intersected) {
             fine(ebpo_sample(a.sampler, point, &hit.face, 1, values, &error));
             expect_values(values, hit.face, point, maps);
         }
@@ -132,22 +132,22 @@ static void ask_points(bool maps)
     answered(&a);
 }
 
-START_TEST(what_is_linear_stays_linear)
+START_TEST(test_sample_of_linear_values_is_linear)
 {
     ebpo_mesh mesh = torus(scratch("a.ply"));
     convert(scratch("a.ply"), scratch("a.ebpo.h5"), 0);
-    ask_points(true);
+    query_points(true);
     convert(scratch("a.ply"), scratch("a.ebpo.h5"), EBPO_PART_MAPS);
-    ask_points(false);
+    query_points(false);
     ebpo_mesh_free(&mesh);
 }
 END_TEST
 
-START_TEST(corners_have_their_own_values)
+START_TEST(test_sample_at_vertex_is_vertex_value)
 {
     ebpo_mesh mesh = torus(scratch("a.ply"));
     convert(scratch("a.ply"), scratch("a.ebpo.h5"), 0);
-    asked a = ask(scratch("a.ebpo.h5"), "red,linear");
+    queried a = run_query(scratch("a.ebpo.h5"), "red,linear");
     for (uint64_t f = 0; f < mesh.face_count; f++)
         for (int i = 0; i < 3; i++) {
             uint32_t v = mesh.faces[3 * f + (uint64_t)i];
@@ -161,18 +161,18 @@ START_TEST(corners_have_their_own_values)
 }
 END_TEST
 
-START_TEST(a_subset_says_the_same)
+START_TEST(test_sample_of_subset_matches_whole)
 {
     ebpo_mesh mesh = torus(scratch("a.ply"));
     ebpo_subset_options cut = EBPO_SUBSET_OPTIONS_INIT;
     uint64_t state = 3, count = 0;
     convert(scratch("a.ply"), scratch("a.ebpo.h5"), 0);
-    asked whole = ask(scratch("a.ebpo.h5"), "red,face:red");
+    queried whole = run_query(scratch("a.ebpo.h5"), "red,face:red");
     cut.boxed = true;
     for (int k = 0; k < 3; k++)
         cut.min[k] = 0, cut.max[k] = 1;
     fine(ebpo_subset(whole.file, scratch("b.ebpo.h5"), &cut, &error));
-    asked part = ask(scratch("b.ebpo.h5"), "red,face:red");
+    queried part = run_query(scratch("b.ebpo.h5"), "red,face:red");
     for (uint64_t f = 0; f < mesh.face_count; f++) {
         double point[3], one[2], other[2];
         random_point(&state, point);
@@ -187,10 +187,10 @@ START_TEST(a_subset_says_the_same)
 }
 END_TEST
 
-/* --- faces that are hard to weigh --- */
+/* --- degenerate faces --- */
 
-/* A tetrahedron at a scale, and two faces without area or nearly so; its vertices have 1, 2, 4,
- * 8, and the one far along an edge NaN. */
+/* Writes a tetrahedron at a scale, and two faces without area or nearly so; its vertices have 1, 2,
+ * 4, 8, and the one far along an edge NaN. */
 static void write_hard(double size)
 {
     FILE *out = fopen(scratch("h.ply"), "w");
@@ -203,21 +203,21 @@ static void write_hard(double size)
     fclose(out);
 }
 
-static double at(const asked *a, uint64_t face, double x, double y, double z)
+static double at(const queried *a, uint64_t face, double x, double y, double z)
 {
     double value, point[3] = { x, y, z };
     fine(ebpo_sample(a->sampler, point, &face, 1, &value, &error));
     return value;
 }
 
-START_TEST(size_and_slivers_do_not_matter)
+START_TEST(test_sample_of_slivers_at_any_scale)
 {
     static const double sizes[] = { 1, 0x1p-1000, 0x1p1000 };
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         double s = sizes[i];
         write_hard(s);
         convert(scratch("h.ply"), scratch("h.ebpo.h5"), 0);
-        asked a = ask(scratch("h.ebpo.h5"), "q");
+        queried a = run_query(scratch("h.ebpo.h5"), "q");
         ck_assert_double_eq(at(&a, 0, s / 4, s / 2, 0), 0.25 * 1 + 0.5 * 4 + 0.25 * 2);
         ck_assert_double_eq(at(&a, 0, s / 2, 0, 0), 1.5);  /* 2: of weight 0 */
         ck_assert_double_eq(at(&a, 0, -s, s / 2, 0), 2.5); /* beside it: nearest by weights */
@@ -229,7 +229,7 @@ START_TEST(size_and_slivers_do_not_matter)
 }
 END_TEST
 
-/* --- refusals --- */
+/* --- errors --- */
 
 static void expect_refused(const ebpo_file *file, const char *names, ebpo_status expected)
 {
@@ -238,13 +238,13 @@ static void expect_refused(const ebpo_file *file, const char *names, ebpo_status
     ck_assert(!sampler && strstr(error.message, expected == EBPO_E_ABSENT ? "'" : "at most 16"));
 }
 
-START_TEST(what_is_not_there_is_said)
+START_TEST(test_sample_of_missing_attribute_is_refused)
 {
     ebpo_mesh mesh = torus(scratch("a.ply"));
     const uint64_t beyond = mesh.face_count, none = EBPO_NO_FACE, first = 0;
     double value, point[3] = { 1, 0, NAN };
     convert(scratch("a.ply"), scratch("a.ebpo.h5"), 0);
-    asked a = ask(scratch("a.ebpo.h5"), "vertex:red");
+    queried a = run_query(scratch("a.ebpo.h5"), "vertex:red");
     expect_refused(a.file, "blue", EBPO_E_ABSENT);
     expect_refused(a.file, "", EBPO_E_ABSENT);
     expect_refused(a.file, "red,", EBPO_E_ABSENT);
@@ -274,11 +274,11 @@ TEST_SUITE(query_sample)
     TCase *tests = tcase_create("sample");
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_set_timeout(tests, 300);
-    tcase_add_test(tests, what_is_linear_stays_linear);
-    tcase_add_test(tests, corners_have_their_own_values);
-    tcase_add_test(tests, a_subset_says_the_same);
-    tcase_add_test(tests, size_and_slivers_do_not_matter);
-    tcase_add_test(tests, what_is_not_there_is_said);
+    tcase_add_test(tests, test_sample_of_linear_values_is_linear);
+    tcase_add_test(tests, test_sample_at_vertex_is_vertex_value);
+    tcase_add_test(tests, test_sample_of_subset_matches_whole);
+    tcase_add_test(tests, test_sample_of_slivers_at_any_scale);
+    tcase_add_test(tests, test_sample_of_missing_attribute_is_refused);
     suite_add_tcase(suite, tests);
     return suite;
 }

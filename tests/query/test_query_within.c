@@ -1,5 +1,5 @@
-/* The nearest faces in order: against all faces, ordered by arithmetic that does not round;
- * whatever the radius, the number, the way of loading and the budget. */
+/* The nearest faces in order: against all faces, ordered by exact arithmetic; for any radius,
+ * number, loading mode and budget. */
 #include <ebpo/subset.h>
 #include <math.h>
 #include <stdio.h>
@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 static const struct {
     const char *name;
@@ -24,34 +24,34 @@ static const struct {
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
-/* What was given, of at most `stop` faces. */
+/* Faces received, at most `stop`. */
 typedef struct stream {
     ebpo_near_face *face;
-    uint64_t count, room, stop;
+    uint64_t count, space, stop;
 } stream;
 
 static bool keep(void *user, const ebpo_near_face *face)
 {
     stream *s = user;
     ck_assert_uint_lt(s->count, s->stop);
-    if (s->count == s->room) {
-        s->room = 2 * s->room + 64;
-        s->face = realloc(s->face, s->room * sizeof *s->face);
+    if (s->count == s->space) {
+        s->space = 2 * s->space + 64;
+        s->face = realloc(s->face, s->space * sizeof *s->face);
         ck_assert_ptr_nonnull(s->face);
     }
     s->face[s->count++] = *face;
     return s->count < s->stop;
 }
 
-typedef struct question {
+typedef struct current_query {
     const query_model *m;
     ebpo_context *context;
     const double *p;
     double radius;
     uint64_t most, stop;
-} question;
+} current_query;
 
-static stream ask(const question *q, ebpo_status *status, ebpo_error *error)
+static stream run_query(const current_query *q, ebpo_status *status, ebpo_error *error)
 {
     stream s = { .stop = q->stop };
     ebpo_within_options o = EBPO_WITHIN_OPTIONS_INIT;
@@ -61,7 +61,7 @@ static stream ask(const question *q, ebpo_status *status, ebpo_error *error)
     return s;
 }
 
-static void judge(const question *q, const stream *s, const oracle_near *truth)
+static void judge(const current_query *q, const stream *s, const oracle_near *truth)
 {
     for (uint64_t i = 0; i < s->count; i++) {
         const ebpo_near_face *f = &s->face[i];
@@ -71,18 +71,18 @@ static void judge(const question *q, const stream *s, const oracle_near *truth)
                       "%d at %a",
                       q->m->name, q->p[0], q->p[1], q->p[2], q->radius, (int)q->most, (int)i,
                       (int)f->file_face, f->distance, (int)truth[i].face, truth[i].distance);
-        ck_assert_uint_eq(f->face, query_told(q->m, truth[i].face));
+        ck_assert_uint_eq(f->face, query_reported(q->m, truth[i].face));
         for (int k = 0; k < 3; k++)
             ck_assert_double_le(fabs(f->normal[k] - normal[k]), 1e-15);
     }
 }
 
 /* `truth`: all faces within the radius. */
-static void check_with(const question *q, const oracle_near *truth, uint64_t count)
+static void check_with(const current_query *q, const oracle_near *truth, uint64_t count)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
-    stream s = ask(q, &status, &error);
+    stream s = run_query(q, &status, &error);
     ck_assert_msg(status == EBPO_OK, "%s", error.message);
     count = q->most && q->most < count ? q->most : count;
     count = q->stop < count ? q->stop : count;
@@ -92,7 +92,7 @@ static void check_with(const question *q, const oracle_near *truth, uint64_t cou
     free(s.face);
 }
 
-static void check(const question *q)
+static void check(const current_query *q)
 {
     uint32_t count;
     oracle_near *truth = oracle_order(q->m->judge, q->p, q->radius, &count);
@@ -101,18 +101,18 @@ static void check(const question *q)
 }
 
 /* The first face is the nearest one, to the last bit of its point. */
-static void compare_first(const question *q)
+static void compare_first(const current_query *q)
 {
     ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
     ebpo_distance_result nearest;
     ebpo_error why = EBPO_ERROR_INIT;
     ebpo_status status;
-    question first = *q;
+    current_query first = *q;
     o.unsigned_distance = true;
     first.most = 1;
     first.radius = INFINITY;
     ASSERT_OK(ebpo_distance(q->context, q->p, &o, &nearest, error));
-    stream s = ask(&first, &status, &why);
+    stream s = run_query(&first, &status, &why);
     ck_assert_int_eq(status, EBPO_OK);
     ck_assert_uint_eq(s.count, 1);
     ck_assert_uint_eq(s.face->face, nearest.face);
@@ -122,7 +122,7 @@ static void compare_first(const question *q)
     free(s.face);
 }
 
-/* Radii at which a face just is within, or just is not; numbers about that of all. */
+/* Radii at which a face is just within, or just not; counts near the number of all faces. */
 static void check_point(const query_model *m, ebpo_context *context, const double *p,
                         uint64_t *state)
 {
@@ -132,9 +132,9 @@ static void check_point(const query_model *m, ebpo_context *context, const doubl
     const double radii[] = { d, isinf(d) ? d : nextafter(d, INFINITY), d > 0 ? nextafter(d, 0) : 0,
                              0, d / 2 };
     const uint64_t most[] = { 0, 1, 7, count, count + (uint64_t)10 };
-    question q = { m, context, p, INFINITY, 0, UINT64_MAX };
+    current_query q = { m, context, p, INFINITY, 0, UINT64_MAX };
     compare_first(&q);
-    /* of large models one question each: far away all is decided by arithmetic that takes long */
+    /* one query for large models: far away everything needs slow exact arithmetic */
     for (uint64_t i = 0; i < (m->mesh.face_count > 500 ? 1 : 3); i++) {
         uint64_t kind = ebpo_test_random(state) % 4;
         q.radius = kind < 2 ? radii[ebpo_test_random(state) % 5] : INFINITY;
@@ -150,21 +150,21 @@ static void check_point(const query_model *m, ebpo_context *context, const doubl
 
 static void check_points(const query_model *m, ebpo_context *context, uint64_t count, uint64_t seed)
 {
-    double *points = query_room(count, 3 * sizeof *points);
+    double *points = query_capacity(count, 3 * sizeof *points);
     query_make_points(m, count, seed, points);
     for (uint64_t i = 0; i < count; i++)
         check_point(m, context, points + 3 * i, &seed);
-    /* the middle of what is symmetric, and a vertex */
+    /* the middle of symmetric models, and a vertex */
     for (int k = 0; k < 3; k++)
         points[k] = m->info.box_origin[k] + m->info.box_size[k] / 2;
     check_point(m, context, points, &seed);
     ebpo_test_point(&m->mesh, m->mesh.faces[0], points);
-    question q = { m, context, points, 0, 0, UINT64_MAX };
+    current_query q = { m, context, points, 0, 0, UINT64_MAX };
     check(&q);
     free(points);
 }
 
-START_TEST(streams_are_in_exact_order)
+START_TEST(test_within_stream_is_sorted_exactly)
 {
     query_model m;
     query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name),
@@ -175,15 +175,15 @@ START_TEST(streams_are_in_exact_order)
 }
 END_TEST
 
-/* --- not everything in memory --- */
+/* --- partly loaded --- */
 
-START_TEST(every_way_of_loading_gives_the_same_streams)
+START_TEST(test_within_stream_ignores_load_mode)
 {
     query_model m;
     query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name),
                      &query_variants[cases[_i].variant]);
     for (int loading = 0; loading < 3; loading++)
-        /* what keeps nothing loads much for a list of all faces */
+        /* modes that keep nothing load much for a list of all faces */
         for (int cut = 0; cut < (loading ? 2 : 4) && cut < m.info.level_count; cut++) {
             ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
             ebpo_model *model;
@@ -201,7 +201,7 @@ START_TEST(every_way_of_loading_gives_the_same_streams)
 }
 END_TEST
 
-START_TEST(the_least_budget_is_kept)
+START_TEST(test_within_minimum_budget_is_kept)
 {
     query_model m;
     ebpo_model *model = NULL;
@@ -223,7 +223,7 @@ START_TEST(the_least_budget_is_kept)
 }
 END_TEST
 
-/* Loads that a question takes of a model that keeps one subtree, or all. */
+/* Returns the loads of a query with a model that keeps one subtree, or all. */
 static uint64_t loads_for(const query_model *m, ebpo_loading loading, double radius, uint64_t most)
 {
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
@@ -236,7 +236,7 @@ static uint64_t loads_for(const query_model *m, ebpo_loading loading, double rad
     ASSERT_OK(ebpo_model_new(m->file, &how, &model, error));
     ASSERT_OK(ebpo_context_new(model, &context, error));
     ebpo_test_point(&m->mesh, 5, p);
-    question q = { m, context, p, radius, most, UINT64_MAX };
+    current_query q = { m, context, p, radius, most, UINT64_MAX };
     check(&q);
     ebpo_model_get_stats(model, &stats);
     ebpo_context_free(context);
@@ -244,7 +244,7 @@ static uint64_t loads_for(const query_model *m, ebpo_loading loading, double rad
     return stats.loads;
 }
 
-START_TEST(subtrees_are_loaded_once_and_only_where_they_matter)
+START_TEST(test_within_loads_needed_subtrees_once)
 {
     query_model m;
     query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[0]);
@@ -262,18 +262,18 @@ END_TEST
 
 /* --- subsets --- */
 
-/* Right faces in any case; all of them where nothing that was left out matters. */
-static bool ask_part(const question *q)
+/* Checks that faces are correct in any case, and complete when no omitted part matters. */
+static bool query_part(const current_query *q)
 {
     uint32_t count;
     oracle_near *truth = oracle_order(q->m->judge, q->p, q->radius, &count);
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
-    stream s = ask(q, &status, &error);
+    stream s = run_query(q, &status, &error);
     ck_assert_msg(status == EBPO_OK || status == EBPO_E_ABSENT, "%s", error.message);
     ck_assert_uint_le(s.count, count);
     for (uint64_t i = 0; i < s.count; i++) {
-        ck_assert_uint_eq(s.face[i].face, query_told(q->m, truth[i].face));
+        ck_assert_uint_eq(s.face[i].face, query_reported(q->m, truth[i].face));
         ck_assert(s.face[i].distance == truth[i].distance);
     }
     if (status == EBPO_OK)
@@ -283,7 +283,7 @@ static bool ask_part(const question *q)
     return status == EBPO_OK;
 }
 
-START_TEST(subsets_do_not_pretend)
+START_TEST(test_within_subset_refuses_missing_region)
 {
     query_model m;
     ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT;
@@ -308,13 +308,13 @@ START_TEST(subsets_do_not_pretend)
     for (uint64_t i = 0; i < query_scaled(100); i++) {
         double p[3];
         ebpo_test_point(&m.mesh, ebpo_test_random(&state) % m.mesh.vertex_count, p);
-        question q = { &m,
-                       context,
-                       p,
-                       i % 3 ? m.size / (double)(i % 16 + 2) : INFINITY,
-                       i % 3 == 2 ? 0 : i,
-                       UINT64_MAX };
-        bool fine = ask_part(&q);
+        current_query q = { &m,
+                            context,
+                            p,
+                            i % 3 ? m.size / (double)(i % 16 + 2) : INFINITY,
+                            i % 3 == 2 ? 0 : i,
+                            UINT64_MAX };
+        bool fine = query_part(&q);
         answered += fine;
         refused += !fine;
     }
@@ -328,7 +328,7 @@ START_TEST(subsets_do_not_pretend)
 }
 END_TEST
 
-/* --- what makes no sense --- */
+/* --- invalid arguments --- */
 
 static bool never(void *user, const ebpo_near_face *face)
 {
@@ -337,7 +337,7 @@ static bool never(void *user, const ebpo_near_face *face)
     return false;
 }
 
-START_TEST(questions_that_make_no_sense_are_refused)
+START_TEST(test_within_invalid_query_is_refused)
 {
     static const double bad_radius[] = { -1, NAN, -INFINITY };
     query_model m;
@@ -366,7 +366,7 @@ static bool has_no_normal(void *user, const ebpo_near_face *face)
     return true;
 }
 
-START_TEST(normals_may_be_left_out)
+START_TEST(test_within_normals_can_be_omitted)
 {
     query_model m;
     ebpo_within_options o = EBPO_WITHIN_OPTIONS_INIT;
@@ -385,13 +385,13 @@ TEST_SUITE(query_within)
     Suite *s = suite_create("query_within");
     TCase *t = tcase_create("within");
     tcase_set_timeout(t, 1200);
-    tcase_add_loop_test(t, streams_are_in_exact_order, 0, CASES);
-    tcase_add_loop_test(t, every_way_of_loading_gives_the_same_streams, 0, CASES);
-    tcase_add_test(t, the_least_budget_is_kept);
-    tcase_add_test(t, subtrees_are_loaded_once_and_only_where_they_matter);
-    tcase_add_loop_test(t, subsets_do_not_pretend, 0, 2);
-    tcase_add_test(t, questions_that_make_no_sense_are_refused);
-    tcase_add_test(t, normals_may_be_left_out);
+    tcase_add_loop_test(t, test_within_stream_is_sorted_exactly, 0, CASES);
+    tcase_add_loop_test(t, test_within_stream_ignores_load_mode, 0, CASES);
+    tcase_add_test(t, test_within_minimum_budget_is_kept);
+    tcase_add_test(t, test_within_loads_needed_subtrees_once);
+    tcase_add_loop_test(t, test_within_subset_refuses_missing_region, 0, 2);
+    tcase_add_test(t, test_within_invalid_query_is_refused);
+    tcase_add_test(t, test_within_normals_can_be_omitted);
     suite_add_tcase(s, t);
     return s;
 }

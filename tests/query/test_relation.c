@@ -1,6 +1,6 @@
-/* How two models lie to each other, against a twin that fills the cells of a grid: solids of boxes
- * and surfaces of rectangles on that grid, at quarter turns and half steps; and against points of
- * solids of all kinds, judged in rational arithmetic. */
+/* Relations of two models, against a reference implementation that fills the cells of a grid:
+ * solids of boxes and surfaces of rectangles on that grid, at quarter turns and half steps; and
+ * against points of solids of all kinds, in rational arithmetic. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,7 +9,7 @@
 #include <ebpo/collide.h>
 
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 /* --- models on a grid --- */
 
@@ -26,7 +26,7 @@ typedef struct grid_model {
     bool solid;
 } grid_model;
 
-/* Parts share their vertices: else nobody sees that they are closed. */
+/* Parts share their vertices: otherwise they would not be closed. */
 static uint32_t vertex(ebpo_mesh *m, const double x[3])
 {
     for (uint64_t i = 0; i < m->vertex_count; i++) {
@@ -91,8 +91,7 @@ static ebpo_mesh mesh_of(const grid_model *g, uint64_t seed)
 
 /* --- poses that keep the grid --- */
 
-/* Coordinates of the world, in half steps: x of the model's axis[k] times twice the scale, turned.
- */
+/* World coordinates in half steps: x of the model's axis[k] times twice the scale, rotated. */
 typedef struct grid_pose {
     int axis[3], sign[3], twice_scale, shift[3];
 } grid_pose;
@@ -141,7 +140,7 @@ static part posed_part(const part *p, const grid_pose *g)
     return out;
 }
 
-/* --- the twin: cells of the world --- */
+/* --- the reference implementation: cells of the world --- */
 
 typedef struct cells {
     int8_t *winding; /* [z][y][x], of solids */
@@ -199,7 +198,7 @@ static int32_t relation_of(const facts *f)
         for (int y = 1 - MIDDLE; y < MIDDLE - 1; y++) \
             for (int x = 1 - MIDDLE; x < MIDDLE - 1; x++)
 
-static int32_t twin_of_solids(const cells *a, const cells *b)
+static int32_t reference_of_solids(const cells *a, const cells *b)
 {
     facts f = { 0 };
     EACH_CELL
@@ -214,8 +213,8 @@ static int32_t twin_of_solids(const cells *a, const cells *b)
     return relation_of(&f);
 }
 
-/* A surface's squares beside a solid. */
-static void look_at_square(const cells *solid, int axis, const int at[3], facts *f)
+/* Classifies squares of a surface beside a solid. */
+static void inspect_square(const cells *solid, int axis, const int at[3], facts *f)
 {
     int below[3] = { at[0], at[1], at[2] };
     below[axis]--;
@@ -230,8 +229,8 @@ static void look_at_square(const cells *solid, int axis, const int at[3], facts 
     }
 }
 
-/* Of the surface to the solid. */
-static int32_t twin_of_surface(const cells *surface, const cells *solid)
+/* Returns the relation of the surface to the solid. */
+static int32_t reference_of_surface(const cells *surface, const cells *solid)
 {
     facts f = { 0 };
     for (int i = 0; i < surface->parts; i++) {
@@ -241,7 +240,7 @@ static int32_t twin_of_surface(const cells *surface, const cells *solid)
         at[axis] = p->low[axis];
         for (at[u] = p->low[u]; at[u] < p->high[u]; at[u]++)
             for (at[v] = p->low[v]; at[v] < p->high[v]; at[v]++)
-                look_at_square(solid, axis, at, &f);
+                inspect_square(solid, axis, at, &f);
     }
     if (!f.only[0] && f.touch)
         return EBPO_A_INSIDE_B;
@@ -261,7 +260,7 @@ static void mark_squares(const cells *s, int8_t *mark)
     }
 }
 
-/* Whether inner points of two rectangles meet, in a segment or an area. */
+/* Returns true when inner points of two rectangles intersect, in a segment or an area. */
 static bool cross(const part *p, const part *q)
 {
     for (int k = 0; k < 3; k++) {
@@ -286,7 +285,7 @@ static bool meet(const part *p, const part *q)
     return true;
 }
 
-static int32_t twin_of_surfaces(const cells *a, const cells *b)
+static int32_t reference_of_surfaces(const cells *a, const cells *b)
 {
     bool inner = false, touch = false;
     for (int i = 0; i < a->parts; i++)
@@ -306,18 +305,18 @@ static int32_t turned(int32_t r)
     return r == EBPO_A_INSIDE_B ? EBPO_B_INSIDE_A : r == EBPO_B_INSIDE_A ? EBPO_A_INSIDE_B : r;
 }
 
-static int32_t twin(const cells *a, const cells *b)
+static int32_t reference(const cells *a, const cells *b)
 {
     if (a->solid && b->solid)
-        return twin_of_solids(a, b);
+        return reference_of_solids(a, b);
     if (a->solid)
-        return turned(twin_of_surface(b, a));
-    return b->solid ? twin_of_surface(a, b) : twin_of_surfaces(a, b);
+        return turned(reference_of_surface(b, a));
+    return b->solid ? reference_of_surface(a, b) : reference_of_surfaces(a, b);
 }
 
-/* --- asking --- */
+/* --- queries --- */
 
-static int32_t ask(ebpo_model *a, const ebpo_pose *pa, ebpo_model *b, const ebpo_pose *pb)
+static int32_t run_query(ebpo_model *a, const ebpo_pose *pa, ebpo_model *b, const ebpo_pose *pb)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider_options with = EBPO_COLLIDER_OPTIONS_INIT;
@@ -346,13 +345,13 @@ static ebpo_model *in_parts(const query_model *m, int cut_level)
 }
 
 /* Swapped, and in parts. */
-static int32_t ask_both_ways(const query_model *a, const ebpo_pose *pa, const query_model *b,
-                             const ebpo_pose *pb)
+static int32_t query_both_ways(const query_model *a, const ebpo_pose *pa, const query_model *b,
+                               const ebpo_pose *pb)
 {
-    int32_t r = ask(a->model, pa, b->model, pb);
+    int32_t r = run_query(a->model, pa, b->model, pb);
     ebpo_model *parts[2] = { in_parts(a, 1), in_parts(b, 2) };
-    ck_assert_int_eq(ask(b->model, pb, a->model, pa), turned(r));
-    ck_assert_int_eq(ask(parts[0], pa, parts[1], pb), r);
+    ck_assert_int_eq(run_query(b->model, pb, a->model, pa), turned(r));
+    ck_assert_int_eq(run_query(parts[0], pa, parts[1], pb), r);
     ebpo_model_free(parts[0]);
     ebpo_model_free(parts[1]);
     return r;
@@ -368,7 +367,7 @@ static query_model make(const grid_model *g, uint64_t seed, int variant)
     return m;
 }
 
-/* At some poses of both. */
+/* At some poses of both models. */
 static void check_models(const grid_model *a, const grid_model *b, uint64_t seed, int poses)
 {
     int variant[2] = { (int)(seed % 4), (int)(seed / 4 % 4) };
@@ -379,7 +378,7 @@ static void check_models(const grid_model *a, const grid_model *b, uint64_t seed
                   gb = i ? random_pose(&state, i % 3 == 2) : still();
         ebpo_pose pa = pose_of(&ga), pb = pose_of(&gb);
         cells ca = fill(a, &ga, ma.info.rule), cb = fill(b, &gb, mb.info.rule);
-        int32_t want = twin(&ca, &cb), got = ask_both_ways(&ma, &pa, &mb, &pb);
+        int32_t want = reference(&ca, &cb), got = query_both_ways(&ma, &pa, &mb, &pb);
         ck_assert_msg(want == got, "seed %llu, pose %d: %s, not %s", (unsigned long long)seed, i,
                       names[got], names[want]);
         free(ca.winding);
@@ -408,7 +407,7 @@ static grid_model random_model(uint64_t *state, bool solid)
     return g;
 }
 
-/* Half of the time of the same parts, triangulated another way. */
+/* In half of the cases both models have the same parts, triangulated in different ways. */
 static void check_random(uint64_t seed, bool solid_a, bool solid_b)
 {
     uint64_t state = seed * 7919 + solid_a + 2 * solid_b;
@@ -420,21 +419,21 @@ static void check_random(uint64_t seed, bool solid_a, bool solid_b)
 
 enum { RANDOM = 40 };
 
-START_TEST(solids_on_a_grid)
+START_TEST(test_relation_of_grid_solids)
 {
     if (ebpo_test_wanted(_i))
         check_random((uint64_t)_i, true, true);
 }
 END_TEST
 
-START_TEST(surfaces_on_a_grid)
+START_TEST(test_relation_of_grid_surfaces)
 {
     if (ebpo_test_wanted(_i))
         check_random((uint64_t)_i, false, _i % 3 != 0);
 }
 END_TEST
 
-/* --- what the issue is about, each by name --- */
+/* --- named cases --- */
 
 #define BOX(x, y, z, X, Y, Z, sign)    \
     {                                  \
@@ -490,7 +489,7 @@ static const struct {
 };
 enum { KNOWN = sizeof known / sizeof *known };
 
-START_TEST(known_relations)
+START_TEST(test_relation_known_cases)
 {
     ebpo_pose here = EBPO_POSE_INIT, turned_pose = EBPO_POSE_INIT;
     turned_pose.rotation[0][0] = turned_pose.rotation[1][1] = 0.6;
@@ -498,11 +497,11 @@ START_TEST(known_relations)
     turned_pose.rotation[1][0] = 0.8;
     query_model a = make(known[_i].a, 1, 0), b = make(known[_i].b, 4, 0);
     ck_assert_int_eq(a.info.solid, known[_i].a->solid);
-    int32_t got = ask_both_ways(&a, &here, &b, &here);
+    int32_t got = query_both_ways(&a, &here, &b, &here);
     ck_assert_msg(got == known[_i].relation, "%d: %s, not %s", _i, names[got],
                   names[known[_i].relation]);
     if (known[_i].relation == EBPO_EQUAL || known[_i].relation == EBPO_DISJOINT) {
-        got = ask_both_ways(&a, &turned_pose, &b, &turned_pose);
+        got = query_both_ways(&a, &turned_pose, &b, &turned_pose);
         ck_assert_msg(got == known[_i].relation || known[_i].relation == EBPO_EQUAL,
                       "%d, turned: %s", _i, names[got]);
     }
@@ -511,14 +510,14 @@ START_TEST(known_relations)
 }
 END_TEST
 
-/* --- any solids: points that are in both, or in one, must not be denied --- */
+/* --- any solids: points in both, or in one, must agree --- */
 
 static void check_points(query_model *a, query_model *b, const double shift[3], uint64_t seed)
 {
     ebpo_pose pa = EBPO_POSE_INIT, pb = EBPO_POSE_INIT;
     facts f = { 0 };
     memcpy(pb.translation, shift, sizeof pb.translation);
-    int32_t got = ask_both_ways(a, &pa, b, &pb);
+    int32_t got = query_both_ways(a, &pa, b, &pb);
     for (uint64_t i = 0; i < query_scaled(200); i++) {
         double x[2][3];
         query_truth truth[2];
@@ -539,7 +538,7 @@ static void check_points(query_model *a, query_model *b, const double shift[3], 
     ck_assert_msg(!f.only[1] || (got != EBPO_B_INSIDE_A && got != EBPO_EQUAL), "%s", names[got]);
 }
 
-START_TEST(solids_of_all_kinds)
+START_TEST(test_relation_of_all_solid_kinds)
 {
     uint64_t state = (uint64_t)_i;
     if (!ebpo_test_wanted(_i))
@@ -559,7 +558,7 @@ START_TEST(solids_of_all_kinds)
 }
 END_TEST
 
-START_TEST(a_deadline_leaves_it_open)
+START_TEST(test_relation_is_open_after_deadline)
 {
     query_model a = make(&cube, 1, 0), b = make(&beside, 2, 0);
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
@@ -583,11 +582,11 @@ TEST_SUITE(relation)
 {
     TCase *tests = tcase_create("relation");
     tcase_set_timeout(tests, 900);
-    tcase_add_loop_test(tests, known_relations, 0, KNOWN);
-    tcase_add_loop_test(tests, solids_on_a_grid, 0, RANDOM);
-    tcase_add_loop_test(tests, surfaces_on_a_grid, 0, RANDOM);
-    tcase_add_loop_test(tests, solids_of_all_kinds, 0, 24);
-    tcase_add_test(tests, a_deadline_leaves_it_open);
+    tcase_add_loop_test(tests, test_relation_known_cases, 0, KNOWN);
+    tcase_add_loop_test(tests, test_relation_of_grid_solids, 0, RANDOM);
+    tcase_add_loop_test(tests, test_relation_of_grid_surfaces, 0, RANDOM);
+    tcase_add_loop_test(tests, test_relation_of_all_solid_kinds, 0, 24);
+    tcase_add_test(tests, test_relation_is_open_after_deadline);
     Suite *suite = suite_create("relation");
     suite_add_tcase(suite, tests);
     return suite;

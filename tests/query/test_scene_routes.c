@@ -1,4 +1,4 @@
-/* Scenes on their way against looking at many times; packed ones against what they come from. */
+/* Animated scenes against queries at many times; packed scenes against their originals. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,16 +9,16 @@
 #include <ebpo/scene.h>
 
 #include "check_main.h"
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "model_file.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 enum { PARTS = 5, LAST = 3, TIMES = 7 };
 static const double clearance = 0.15, tolerance = 0.01;
 
 static double some(uint64_t *state, double size)
 {
-    return (double)twin_integer(state, -1000000, 1000000) * size / 1000000;
+    return (double)reference_integer(state, -1000000, 1000000) * size / 1000000;
 }
 
 /* --- scenes --- */
@@ -48,7 +48,7 @@ static void put_pose(FILE *f, uint64_t *state, double far)
     fprintf(f, ", \"scale\": %.9g}", 0.75 + some(state, 0.25));
 }
 
-/* Two routes, of which one may jump; plates that are fixed, and what moves between them. */
+/* Two routes, one with possible jumps; fixed plates, and instances that move between them. */
 static ebpo_scene *some_scene(uint64_t seed)
 {
     uint64_t state = 977 * seed + 5;
@@ -106,48 +106,48 @@ static int cut_models(const ebpo_scene *scene)
     return cut;
 }
 
-/* --- who meets --- */
+/* --- contacts --- */
 
-typedef struct met {
-    ebpo_scene_meeting list[PARTS * PARTS];
+typedef struct intersected {
+    ebpo_scene_clash list[PARTS * PARTS];
     uint64_t count;
-} met;
+} intersected;
 
-static bool keep_meetings(void *user, const ebpo_scene_meeting *meetings, uint64_t count)
+static bool keep_clashes(void *user, const ebpo_scene_clash *clashes, uint64_t count)
 {
-    met *m = user;
-    memcpy(m->list, meetings, count * sizeof *meetings);
+    intersected *m = user;
+    memcpy(m->list, clashes, count * sizeof *clashes);
     m->count = count;
     return true;
 }
 
-static ebpo_status meet_by(ebpo_scene *scene, double time, unsigned threads, met *out,
-                           ebpo_error *error)
+static ebpo_status intersect_by(ebpo_scene *scene, double time, unsigned threads, intersected *out,
+                                ebpo_error *error)
 {
-    ebpo_scene_ask_options how = EBPO_SCENE_ASK_OPTIONS_INIT;
+    ebpo_scene_clash_options how = EBPO_SCENE_CLASH_OPTIONS_INIT;
     how.count = true;
     how.threads = threads;
     memset(out, 0, sizeof *out);
-    return ebpo_scene_meet(scene, time, &how, keep_meetings, out, NULL, error);
+    return ebpo_scene_find_clashes(scene, time, &how, keep_clashes, out, NULL, error);
 }
 
-static ebpo_status meet(ebpo_scene *scene, double time, met *out, ebpo_error *error)
+static ebpo_status meet(ebpo_scene *scene, double time, intersected *out, ebpo_error *error)
 {
-    return meet_by(scene, time, 0, out, error);
+    return intersect_by(scene, time, 0, out, error);
 }
 
-START_TEST(packed_scenes_answer_the_same)
+START_TEST(test_packed_scene_gives_same_results)
 {
-    uint64_t rounds = query_scaled(60), meetings = 0, cut = 0;
+    uint64_t rounds = query_scaled(60), clashes = 0, cut = 0;
     for (uint64_t n = 0; n < rounds + 3; n++) {
         uint64_t state = n;
         ebpo_scene *whole = some_scene(n), *part = packed_scene(whole, 0, LAST, n % 2 ? 1e-6 : 0);
         for (int i = 0; i < TIMES; i++) {
             double time = i < 2 ? (i ? LAST + 1 : -1) : 1.5 + some(&state, 1.5);
-            met a, b;
+            intersected a, b;
             ASSERT_OK(meet(whole, time, &a, error));
             ASSERT_OK(meet(part, time, &b, error));
-            meetings += a.count;
+            clashes += a.count;
             ck_assert_msg(memcmp(&a, &b, sizeof a) == 0, "seed %d, time %.17g: %d and %d", (int)n,
                           time, (int)a.count, (int)b.count);
         }
@@ -155,19 +155,19 @@ START_TEST(packed_scenes_answer_the_same)
         ebpo_scene_free(part);
         ebpo_scene_free(whole);
     }
-    ck_assert_uint_gt(meetings, 2 * rounds);
+    ck_assert_uint_gt(clashes, 2 * rounds);
     ck_assert_uint_gt(cut, 0);
 }
 END_TEST
 
-/* Of one time only: another one is answered as before, or not at all. */
-START_TEST(what_was_left_out_is_refused)
+/* For one time only: another time gives the same result as before, or an error. */
+START_TEST(test_packed_scene_refuses_omitted_time)
 {
     uint64_t refused = 0, rounds = query_scaled(60) + 3;
     for (uint64_t n = 0; n < rounds; n++) {
         ebpo_scene *whole = some_scene(n), *part = packed_scene(whole, 0, 0, 0);
         for (double time = 0.25; time <= LAST; time += 0.25) {
-            met a, b;
+            intersected a, b;
             ebpo_error why = EBPO_ERROR_INIT;
             ebpo_status status = meet(part, time, &b, &why);
             if (status == EBPO_E_ABSENT) {
@@ -186,14 +186,14 @@ START_TEST(what_was_left_out_is_refused)
 }
 END_TEST
 
-/* --- on the way --- */
+/* --- approaches --- */
 
 typedef struct ways {
-    ebpo_scene_way list[PARTS * PARTS];
+    ebpo_scene_approach_result list[PARTS * PARTS];
     uint64_t count;
 } ways;
 
-static bool keep_ways(void *user, const ebpo_scene_way *list, uint64_t count)
+static bool keep_ways(void *user, const ebpo_scene_approach_result *list, uint64_t count)
 {
     ways *w = user;
     memcpy(w->list, list, count * sizeof *list);
@@ -201,7 +201,7 @@ static bool keep_ways(void *user, const ebpo_scene_way *list, uint64_t count)
     return true;
 }
 
-/* Of two instances in the whole scene, exact. */
+/* Returns the exact distance of two instances in the whole scene. */
 static double distance_at(ebpo_scene *scene, uint64_t a, uint64_t b, double time)
 {
     ebpo_scene_instance at = EBPO_SCENE_INSTANCE_INIT;
@@ -221,7 +221,7 @@ static double distance_at(ebpo_scene *scene, uint64_t a, uint64_t b, double time
     return found.distance.hi;
 }
 
-static void check_way(ebpo_scene *whole, const ebpo_scene_way *w)
+static void check_way(ebpo_scene *whole, const ebpo_scene_approach_result *w)
 {
     double at = distance_at(whole, w->a, w->b, w->time);
     ck_assert_int_ge(w->reached, 0);
@@ -237,11 +237,11 @@ static void check_way(ebpo_scene *whole, const ebpo_scene_way *w)
     }
 }
 
-START_TEST(approach_misses_nothing)
+START_TEST(test_approach_finds_every_pair)
 {
     uint64_t rounds = query_scaled(40) + 3, reached = 0, apart = 0;
     for (uint64_t n = 0; n < rounds; n++) {
-        ebpo_scene_way_options how = EBPO_SCENE_WAY_OPTIONS_INIT;
+        ebpo_scene_approach_options how = EBPO_SCENE_APPROACH_OPTIONS_INIT;
         ways list[2] = { { .count = 0 }, { .count = 0 } };
         ebpo_scene *whole = some_scene(n), *part = packed_scene(whole, 0, LAST, 0);
         how.tolerance = tolerance;
@@ -249,7 +249,7 @@ START_TEST(approach_misses_nothing)
         ASSERT_OK(ebpo_scene_approach(part, 0, LAST, &how, keep_ways, &list[1], error));
         ck_assert_uint_eq(list[0].count, list[1].count);
         for (uint64_t i = 0; i < 2 * list[0].count; i++) {
-            const ebpo_scene_way *w = &list[i % 2].list[i / 2];
+            const ebpo_scene_approach_result *w = &list[i % 2].list[i / 2];
             check_way(whole, w);
             reached += w->reached == 1 && w->time > 0;
             apart += w->reached == 0;
@@ -287,16 +287,16 @@ static void check_least(ebpo_scene *whole, const ebpo_scene_least *l)
     }
 }
 
-START_TEST(least_distances_hold)
+START_TEST(test_approach_distance_bounds_hold)
 {
     uint64_t rounds = query_scaled(40) + 3, apart = 0, closed = 0;
     for (uint64_t n = 0; n < rounds; n++) {
-        ebpo_scene_way_options how = EBPO_SCENE_WAY_OPTIONS_INIT;
+        ebpo_scene_approach_options how = EBPO_SCENE_APPROACH_OPTIONS_INIT;
         leasts list[2] = { { .count = 0 }, { .count = 0 } };
         ebpo_scene *whole = some_scene(n), *part = packed_scene(whole, 0, LAST, 0);
         how.tolerance = tolerance;
         ASSERT_OK(ebpo_scene_least_distances(whole, 0, LAST, &how, keep_leasts, &list[0], error));
-        how.most_looks = 200;
+        how.max_evaluations = 200;
         ASSERT_OK(ebpo_scene_least_distances(part, 0, LAST, &how, keep_leasts, &list[1], error));
         ck_assert_uint_eq(list[0].count, list[1].count);
         for (uint64_t i = 0; i < list[0].count; i++) {
@@ -317,33 +317,33 @@ END_TEST
 
 /* --- threads --- */
 
-/* All that a scene is asked, by so many threads; models are made anew. */
-typedef struct all_answers {
-    met met;
+/* Runs all queries of a scene with so many threads; loads the models again. */
+typedef struct all_results {
+    intersected intersected;
     ways ways;
     leasts leasts;
-} all_answers;
+} all_results;
 
-static void ask_by(uint64_t seed, unsigned threads, all_answers *out)
+static void query_by(uint64_t seed, unsigned threads, all_results *out)
 {
-    ebpo_scene_way_options how = EBPO_SCENE_WAY_OPTIONS_INIT;
+    ebpo_scene_approach_options how = EBPO_SCENE_APPROACH_OPTIONS_INIT;
     ebpo_scene *scene = some_scene(seed);
     how.threads = threads;
     how.tolerance = tolerance;
-    how.most_looks = 100;
+    how.max_evaluations = 100;
     memset(out, 0, sizeof *out);
-    ASSERT_OK(meet_by(scene, 0.5, threads, &out->met, error));
+    ASSERT_OK(intersect_by(scene, 0.5, threads, &out->intersected, error));
     ASSERT_OK(ebpo_scene_approach(scene, 0, LAST, &how, keep_ways, &out->ways, error));
     ASSERT_OK(ebpo_scene_least_distances(scene, 0, LAST, &how, keep_leasts, &out->leasts, error));
     ebpo_scene_free(scene);
 }
 
-START_TEST(threads_change_nothing)
+START_TEST(test_scene_results_same_for_any_threads)
 {
     for (uint64_t n = 0; n < 3; n++) {
-        static all_answers one, many;
-        ask_by(n, 1, &one);
-        ask_by(n, 4, &many);
+        static all_results one, many;
+        query_by(n, 1, &one);
+        query_by(n, 4, &many);
         ck_assert(memcmp(&one, &many, sizeof one) == 0);
         ck_assert_uint_gt(one.ways.count, 0);
     }
@@ -356,14 +356,14 @@ TEST_SUITE(scene_routes)
     TCase *tests = tcase_create("scene_routes"), *threads = tcase_create("threads");
     tcase_add_checked_fixture(tests, begin, scratch_leave);
     tcase_set_timeout(tests, 900);
-    tcase_add_test(tests, packed_scenes_answer_the_same);
-    tcase_add_test(tests, what_was_left_out_is_refused);
-    tcase_add_test(tests, approach_misses_nothing);
-    tcase_add_test(tests, least_distances_hold);
+    tcase_add_test(tests, test_packed_scene_gives_same_results);
+    tcase_add_test(tests, test_packed_scene_refuses_omitted_time);
+    tcase_add_test(tests, test_approach_finds_every_pair);
+    tcase_add_test(tests, test_approach_distance_bounds_hold);
     suite_add_tcase(suite, tests);
     tcase_add_checked_fixture(threads, begin, scratch_leave);
     tcase_set_timeout(threads, 900);
-    tcase_add_test(threads, threads_change_nothing);
+    tcase_add_test(threads, test_scene_results_same_for_any_threads);
     suite_add_tcase(suite, threads);
     return suite;
 }

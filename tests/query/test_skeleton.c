@@ -1,5 +1,5 @@
-/* What is kept of subtrees that are not in memory: its bounds hold for every face, exactly; it
- * takes the room that it was given; and it saves loading without changing an answer. */
+/* Data kept of subtrees that are not in memory: its bounds hold exactly for every face; it takes
+ * the given memory; and it saves loading without changing a result. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,11 +8,11 @@
 #include "geometry/distance.h"
 #include "query/nearest.h"
 #include "query/query_model.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 /* --- bounds --- */
 
-/* Of all faces of a subtree. */
+/* Data of all faces of a subtree. */
 typedef struct slots {
     uint64_t count;
     uint32_t *list;
@@ -40,14 +40,14 @@ static slots slots_of(const ebpo_accel *s)
     return all;
 }
 
-/* Faces that are nearer to p than the bounds say. */
+/* Counts faces that are nearer to p than the bounds. */
 static uint64_t count_nearer(const ebpo_accel *s, const slots *all, const double p[3],
                              ebpo_skeleton_bounds bounds)
 {
     uint64_t nearer = 0;
     for (uint64_t i = 0; i < all->count; i++) {
         uint32_t slot = all->list[i], local = ebpo_accel_slot_face(s, slot);
-        double t[3][3], lower = local < s->outer_count ? bounds.outer : bounds.own;
+        double t[3][3], lower = local < s->shared_count ? bounds.outer : bounds.own;
         ebpo_distance_bounds b;
         ebpo_accel_triangle(s, slot, t);
         ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
@@ -57,7 +57,7 @@ static uint64_t count_nearer(const ebpo_accel *s, const slots *all, const double
     return nearer;
 }
 
-/* What is beyond a limit may be said to be nowhere. */
+/* Distances beyond a limit may be infinite. */
 static void check_limit(const ebpo_skeleton *k, const double p[3], ebpo_skeleton_bounds all)
 {
     double limit[] = { all.own * (1 - 0x1p-30), all.own, all.outer, all.own / 2 + all.outer / 2 };
@@ -79,17 +79,17 @@ static bool take(void *user, uint64_t bytes)
     return true;
 }
 
-/* With more nodes bounds are better; until there is no room for more. */
+/* More nodes improve the bounds, as far as memory allows. */
 static void check_bounds(const ebpo_accel *s, const double *points, uint64_t count)
 {
-    uint64_t room = 3 * (ebpo_skeleton_bytes(8) - ebpo_skeleton_bytes(0));
+    uint64_t space = 3 * (ebpo_skeleton_bytes(8) - ebpo_skeleton_bytes(0));
     ebpo_skeleton *few[] = { ebpo_skeleton_make(s, 1), ebpo_skeleton_make(s, 4),
                              ebpo_skeleton_make(s, 8), ebpo_skeleton_make(s, 8) };
     slots all = slots_of(s);
     for (uint64_t i = 0; i < count && few[3]; i++) {
         const double *p = points + 3 * i;
         ebpo_skeleton_bounds b[4];
-        ebpo_skeleton_grow(few[3], s, p, INFINITY, take, &room);
+        ebpo_skeleton_grow(few[3], s, p, INFINITY, take, &space);
         for (int n = 0; n < 4; n++) {
             b[n] = ebpo_skeleton_lower_bounds(few[n], p, INFINITY);
             ck_assert_double_ge(b[n].own, n ? b[n - 1].own : 0);
@@ -104,7 +104,7 @@ static void check_bounds(const ebpo_accel *s, const double *points, uint64_t cou
         ebpo_skeleton_free(few[i]);
 }
 
-static bool holds(const ebpo_outer_box *box, const double t[3][3])
+static bool holds(const ebpo_shared_box *box, const double t[3][3])
 {
     bool in = true;
     for (int i = 0; i < 9; i++)
@@ -112,17 +112,17 @@ static bool holds(const ebpo_outer_box *box, const double t[3][3])
     return in;
 }
 
-/* Every outer face that is within the limit, exactly, is in some box. */
+/* Checks exactly that every shared face within the limit is in some box. */
 static void check_outer_boxes(const ebpo_accel *s, const double p[3], double limit)
 {
-    ebpo_outer_box box[EBPO_OUTER_BOXES];
-    ebpo_skeleton *k = s->outer_count ? ebpo_skeleton_make(s, 8) : NULL;
-    unsigned count = k ? ebpo_skeleton_outer_boxes(k, p, limit, box) : 0;
+    ebpo_shared_box box[EBPO_SHARED_BOXES];
+    ebpo_skeleton *k = s->shared_count ? ebpo_skeleton_make(s, 8) : NULL;
+    unsigned count = k ? ebpo_skeleton_shared_boxes(k, p, limit, box) : 0;
     slots all = slots_of(s);
     for (uint64_t n = 0; k && n < all.count; n++) {
         uint32_t slot = all.list[n];
         double t[3][3];
-        if (ebpo_accel_slot_face(s, slot) >= s->outer_count)
+        if (ebpo_accel_slot_face(s, slot) >= s->shared_count)
             continue;
         ebpo_accel_triangle(s, slot, t);
         bool found = ebpo_triangle_distance_compare_to(p, (const double(*)[3])t, limit) > 0;
@@ -134,13 +134,13 @@ static void check_outer_boxes(const ebpo_accel *s, const double p[3], double lim
     ebpo_skeleton_free(k);
 }
 
-START_TEST(no_face_is_nearer_than_its_subtrees_bound)
+START_TEST(test_skeleton_bound_is_below_face_distance)
 {
     query_model m;
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
                      &query_variants[_i % query_variant_count]);
     uint64_t count = query_scaled(40 + 20000 / m.mesh.face_count);
-    double *points = query_room(count, 3 * sizeof *points);
+    double *points = query_capacity(count, 3 * sizeof *points);
     query_make_points(&m, count, (uint64_t)_i, points);
     check_bounds(m.model->whole, points, count);
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
@@ -164,9 +164,9 @@ START_TEST(no_face_is_nearer_than_its_subtrees_bound)
 }
 END_TEST
 
-/* --- what they are for --- */
+/* --- use --- */
 
-typedef struct asked {
+typedef struct queried {
     query_model m;
     ebpo_model *model;
     ebpo_context *context;
@@ -174,23 +174,23 @@ typedef struct asked {
     double *points;
     query_truth *truth;
     ebpo_distance_result *got;
-} asked;
+} queried;
 
-static void begin(asked *s, int solid, int variant, const ebpo_model_options *how, uint64_t count)
+static void begin(queried *s, int solid, int variant, const ebpo_model_options *how, uint64_t count)
 {
     query_model_make(&s->m, query_solid_name(solid), query_solid_make(solid),
                      &query_variants[variant]);
     ASSERT_OK(ebpo_model_new(s->m.file, how, &s->model, error));
     ASSERT_OK(ebpo_context_new(s->model, &s->context, error));
     s->count = count ? count : query_scaled(100 + 100000 / s->m.mesh.face_count);
-    s->points = query_room(s->count, 3 * sizeof *s->points);
-    s->truth = query_room(s->count, sizeof *s->truth);
-    s->got = query_room(s->count, sizeof *s->got);
+    s->points = query_capacity(s->count, 3 * sizeof *s->points);
+    s->truth = query_capacity(s->count, sizeof *s->truth);
+    s->got = query_capacity(s->count, sizeof *s->got);
     query_make_points(&s->m, s->count, 7, s->points);
     query_find_truths(&s->m, s->points, s->count, s->truth);
 }
 
-static void end(asked *s)
+static void end(queried *s)
 {
     ebpo_context_free(s->context);
     ebpo_model_free(s->model);
@@ -200,8 +200,8 @@ static void end(asked *s)
     free(s->got);
 }
 
-/* Subtrees searched, with none in memory at the beginning. */
-static uint64_t subtrees_searched(asked *s)
+/* Returns subtrees searched, with none in memory at the beginning. */
+static uint64_t subtrees_searched(queried *s)
 {
     ebpo_model_stats before = EBPO_MODEL_STATS_INIT, after = EBPO_MODEL_STATS_INIT;
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
@@ -216,11 +216,11 @@ static uint64_t subtrees_searched(asked *s)
     return after.distance_subtrees - before.distance_subtrees;
 }
 
-/* Nothing known, some subtrees, nearly all; or those that a small budget has room for; with levels
- * below the cut, if there is room, or without. */
-START_TEST(answers_do_not_depend_on_what_is_known)
+/* With no subtree known, some, or nearly all; or those that fit a small budget; with levels below
+ * the cut, if there is memory, or without. */
+START_TEST(test_results_do_not_depend_on_skeletons)
 {
-    asked s;
+    queried s;
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     how.cut_level = 1 + _i % 3;
@@ -250,9 +250,9 @@ static int find_solid(const char *name)
     return i;
 }
 
-START_TEST(a_subtree_once_seen_is_not_searched_for_nothing)
+START_TEST(test_skeleton_avoids_subtree_searches)
 {
-    asked s;
+    queried s;
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = 2;
     begin(&s, find_solid("sphere"), 5, &how, 300);
@@ -268,10 +268,10 @@ START_TEST(a_subtree_once_seen_is_not_searched_for_nothing)
 }
 END_TEST
 
-/* Of the first points, asked of a model of which nothing is known yet. */
+/* Counts for the first points, with a model of which nothing is known yet. */
 static uint64_t searched_at_first(int solid, int cut_level, bool deep)
 {
-    asked s;
+    queried s;
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = cut_level;
     begin(&s, solid, 5, &how, 20);
@@ -288,7 +288,7 @@ static uint64_t searched_at_first(int solid, int cut_level, bool deep)
     return searched;
 }
 
-START_TEST(levels_below_the_cut_tell_of_subtrees_never_seen)
+START_TEST(test_levels_below_cut_bound_unvisited)
 {
     int sphere = find_solid("sphere");
     uint64_t with = searched_at_first(sphere, 3, true),
@@ -297,18 +297,18 @@ START_TEST(levels_below_the_cut_tell_of_subtrees_never_seen)
 }
 END_TEST
 
-/* Questions that come to many new subtrees each have them read; few new ones do not. */
-START_TEST(levels_below_the_cut_are_read_when_loads_were_for_nothing)
+/* Queries that visit many new subtrees have them read; few new ones do not. */
+START_TEST(test_levels_below_cut_load_on_demand)
 {
-    asked s;
+    queried s;
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = 2;
     begin(&s, find_solid("sphere"), 5, &how, 1);
     for (int i = 0; i < 1000; i++)
-        ebpo_deep_bounds_tell(s.model, 4);
+        ebpo_deep_bounds_report(s.model, 4);
     ck_assert_ptr_null(s.model->deep);
     for (int i = 0; i < 1000; i++)
-        ebpo_deep_bounds_tell(s.model, 5);
+        ebpo_deep_bounds_report(s.model, 5);
     ck_assert_ptr_nonnull(s.model->deep);
     end(&s);
 }
@@ -320,9 +320,9 @@ static bool add_distance(void *user, const ebpo_near_face *face)
     return true;
 }
 
-/* Subtrees loaded for all faces within a radius, none in memory at the beginning; *sum: of their
- * distances, in order. */
-static uint64_t loaded_within(asked *s, double *sum)
+/* Returns subtrees loaded for all faces within a radius, none in memory at the beginning; *sum: of
+ * their distances, in order. */
+static uint64_t loaded_within(queried *s, double *sum)
 {
     ebpo_within_options how = EBPO_WITHIN_OPTIONS_INIT;
     uint64_t loads = s->context->loaded;
@@ -336,9 +336,9 @@ static uint64_t loaded_within(asked *s, double *sum)
     return s->context->loaded - loads;
 }
 
-START_TEST(faces_within_a_radius_are_looked_for_where_they_may_be)
+START_TEST(test_skeleton_limits_radius_search)
 {
-    asked s;
+    queried s;
     double sums[3];
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = 3;
@@ -355,20 +355,20 @@ START_TEST(faces_within_a_radius_are_looked_for_where_they_may_be)
 }
 END_TEST
 
-/* --- room --- */
+/* --- memory --- */
 
-START_TEST(room_is_kept_to)
+START_TEST(test_skeleton_memory_limit_is_kept)
 {
-    asked s;
+    queried s;
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = 2;
     begin(&s, find_solid("sphere"), 5, &how, 300);
-    uint64_t most = ebpo_skeletons_room(8, UINT64_MAX), one = ebpo_skeleton_bytes(1);
-    ck_assert_uint_eq(ebpo_skeletons_room(8, one), 0);
-    for (uint64_t room = most; room > one + 500; room -= 1 + room / 16) {
-        if (!ebpo_skeletons_room(8, room))
+    uint64_t most = ebpo_skeletons_capacity(8, UINT64_MAX), one = ebpo_skeleton_bytes(1);
+    ck_assert_uint_eq(ebpo_skeletons_capacity(8, one), 0);
+    for (uint64_t space = most; space > one + 500; space -= 1 + space / 16) {
+        if (!ebpo_skeletons_capacity(8, space))
             continue;
-        ebpo_skeletons *all = ebpo_skeletons_make(8, room, NULL);
+        ebpo_skeletons *all = ebpo_skeletons_make(8, space, NULL);
         uint64_t empty = ebpo_skeletons_bytes(all), known = 0;
         ck_assert_ptr_null(ebpo_skeletons_find(all, 3));
         for (int twice = 0; twice < 2; twice++)
@@ -376,8 +376,8 @@ START_TEST(room_is_kept_to)
                 ebpo_skeletons_keep(all, i, s.m.model->whole);
         for (uint64_t i = 0; i < 8; i++)
             known += ebpo_skeletons_find(all, i) != NULL;
-        ck_assert_uint_ge(known, room == most ? 8 : 1);
-        ck_assert_uint_le(ebpo_skeletons_bytes(all), room);
+        ck_assert_uint_ge(known, space == most ? 8 : 1);
+        ck_assert_uint_le(ebpo_skeletons_bytes(all), space);
         ck_assert_uint_ge(ebpo_skeletons_bytes(all),
                           empty + known * (one - ebpo_skeleton_bytes(0)));
         ebpo_skeletons_free(all);
@@ -386,18 +386,18 @@ START_TEST(room_is_kept_to)
 }
 END_TEST
 
-/* True when there is a model. */
+/* Returns true when there is a model. */
 static bool check_plan(const query_model *m, uint64_t budget, uint64_t *least)
 {
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
-    ebpo_error told = EBPO_ERROR_INIT, error = EBPO_ERROR_INIT;
+    ebpo_error reported = EBPO_ERROR_INIT, error = EBPO_ERROR_INIT;
     ebpo_model *model;
     how.memory = budget;
-    ebpo_status status = ebpo_model_memory(m->file, &how, &plan, &told);
+    ebpo_status status = ebpo_model_memory(m->file, &how, &plan, &reported);
     ck_assert_int_eq(ebpo_model_new(m->file, &how, &model, &error), status);
-    ck_assert_str_eq(told.message, error.message);
+    ck_assert_str_eq(reported.message, error.message);
     if (status != EBPO_OK)
         return false;
     ebpo_model_get_stats(model, &stats);
@@ -411,7 +411,7 @@ static bool check_plan(const query_model *m, uint64_t budget, uint64_t *least)
     return true;
 }
 
-/* With a cut level that is given, by counts. */
+/* With a given cut level, by counts. */
 static void check_cut_plan(const query_model *m, int cut_level)
 {
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
@@ -432,7 +432,7 @@ static void check_cut_plan(const query_model *m, int cut_level)
     ebpo_model_free(model);
 }
 
-START_TEST(a_budget_buys_what_was_told)
+START_TEST(test_budget_plan_matches_estimate)
 {
     query_model m;
     uint64_t least = 0, parts = 0;
@@ -454,14 +454,14 @@ TEST_SUITE(skeleton)
     Suite *suite = suite_create("skeleton");
     TCase *tests = tcase_create("skeleton");
     tcase_set_timeout(tests, 600);
-    tcase_add_loop_test(tests, no_face_is_nearer_than_its_subtrees_bound, 0, query_solid_count());
-    tcase_add_loop_test(tests, answers_do_not_depend_on_what_is_known, 0, 2 * query_solid_count());
-    tcase_add_test(tests, a_subtree_once_seen_is_not_searched_for_nothing);
-    tcase_add_test(tests, levels_below_the_cut_tell_of_subtrees_never_seen);
-    tcase_add_test(tests, levels_below_the_cut_are_read_when_loads_were_for_nothing);
-    tcase_add_test(tests, faces_within_a_radius_are_looked_for_where_they_may_be);
-    tcase_add_test(tests, room_is_kept_to);
-    tcase_add_loop_test(tests, a_budget_buys_what_was_told, 0, query_solid_count());
+    tcase_add_loop_test(tests, test_skeleton_bound_is_below_face_distance, 0, query_solid_count());
+    tcase_add_loop_test(tests, test_results_do_not_depend_on_skeletons, 0, 2 * query_solid_count());
+    tcase_add_test(tests, test_skeleton_avoids_subtree_searches);
+    tcase_add_test(tests, test_levels_below_cut_bound_unvisited);
+    tcase_add_test(tests, test_levels_below_cut_load_on_demand);
+    tcase_add_test(tests, test_skeleton_limits_radius_search);
+    tcase_add_test(tests, test_skeleton_memory_limit_is_kept);
+    tcase_add_loop_test(tests, test_budget_plan_matches_estimate, 0, query_solid_count());
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,6 +1,6 @@
 /* Queries need little stack: threads of a program that links the library may have 64 KiB each. Each
  * kind of query runs on a stack whose unused part is counted afterwards, with the model in memory
- * and in parts that are loaded meanwhile. Without sanitizers, which take more. */
+ * and in parts that are loaded meanwhile. Not with sanitizers, which need more. */
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,11 +10,11 @@
 
 #include "check_main.h"
 #include "model_file.h"
-#include "question_mix.h"
+#include "query_mix.h"
 #include "scratch.h"
 #include "solids.h"
 
-/* What ebpo/base.h promises, without what the C library keeps there. */
+/* Limit stated in ebpo/base.h, without the part used by the C library. */
 enum {
     STACK = 1 << 20,
     PROMISED = 64 << 10,
@@ -26,12 +26,12 @@ enum {
 
 static const char *model_path(void) { return scratch("torus.ebpo.h5"); }
 
-/* --- queries that the mix has not --- */
+/* --- queries not in the mix --- */
 
 enum { ENVELOPE = MIX_KINDS, LEVEL, DEADLINE, KINDS };
 static const char *const more_names[] = { "envelope", "to a level", "within a time" };
 
-static ebpo_status ask_limited(const mix_asker *a, int kind, uint64_t number, ebpo_error *error)
+static ebpo_status query_limited(const mix_querier *a, int kind, uint64_t number, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(a->file);
     ebpo_inside_options inside = EBPO_INSIDE_OPTIONS_INIT;
@@ -54,19 +54,19 @@ static ebpo_status ask_limited(const mix_asker *a, int kind, uint64_t number, eb
 /* --- on a painted stack --- */
 
 typedef struct run {
-    const mix_asker *asker;
+    const mix_querier *querier;
     int kind;
     ebpo_status status;
     ebpo_error error;
 } run;
 
-static void *ask_some(void *user)
+static void *query_some(void *user)
 {
     run *r = user;
     uint64_t hash;
     for (uint64_t i = 0; i < NUMBERS && r->status == EBPO_OK; i++)
-        r->status = r->kind < MIX_KINDS ? mix_ask(r->asker, r->kind, i, &hash, &r->error)
-                                        : ask_limited(r->asker, r->kind, i, &r->error);
+        r->status = r->kind < MIX_KINDS ? mix_query(r->querier, r->kind, i, &hash, &r->error)
+                                        : query_limited(r->querier, r->kind, i, &r->error);
     return NULL;
 }
 
@@ -89,7 +89,7 @@ static size_t stack_of(void *(*body)(void *), void *user)
     return STACK - unused;
 }
 
-/* Touch has its thread; a view is asked of rarely. */
+/* Haptic devices have their own thread; views are queried rarely. */
 static bool is_query(int kind)
 {
     static const char *const others[] = { "stream", "view", "subtree", "level", "touch" };
@@ -103,25 +103,25 @@ static void check_stacks(uint64_t memory)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
-    mix_asker asker = { .file = model_open(model_path()) };
+    mix_querier querier = { .file = model_open(model_path()) };
     options.memory = memory;
-    model_must(ebpo_model_new(asker.file, &options, &asker.model, &error), "a model", &error);
+    model_must(ebpo_model_new(querier.file, &options, &querier.model, &error), "a model", &error);
     for (int kind = 0; kind < KINDS; kind++) {
-        model_must(ebpo_context_new(asker.model, &asker.context, &error), "a context", &error);
-        run r = { .asker = &asker, .kind = kind, .error = EBPO_ERROR_INIT };
-        size_t bytes = stack_of(ask_some, &r);
+        model_must(ebpo_context_new(querier.model, &querier.context, &error), "a context", &error);
+        run r = { .querier = &querier, .kind = kind, .error = EBPO_ERROR_INIT };
+        size_t bytes = stack_of(query_some, &r);
         model_must(r.status, "asking", &r.error);
         const char *name = kind < MIX_KINDS ? mix_names[kind] : more_names[kind - MIX_KINDS];
         printf("%s: %zu bytes of stack\n", name, bytes);
         if (is_query(kind))
             ck_assert_msg(bytes <= PROMISED - BESIDE, "%s: %zu bytes of stack", name, bytes);
-        ebpo_context_free(asker.context);
+        ebpo_context_free(querier.context);
     }
-    ebpo_model_free(asker.model);
-    ebpo_close((ebpo_file *)asker.file);
+    ebpo_model_free(querier.model);
+    ebpo_close((ebpo_file *)querier.file);
 }
 
-START_TEST(stack_of_queries)
+START_TEST(test_query_stack_size)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
@@ -159,7 +159,7 @@ static void *build(void *user)
     return NULL;
 }
 
-START_TEST(stack_of_building)
+START_TEST(test_build_stack_size)
 {
     size_t bytes = stack_of(build, NULL);
     printf("building: %zu bytes of stack\n", bytes);
@@ -169,7 +169,7 @@ END_TEST
 
 static void *nothing(void *user) { return user; }
 
-START_TEST(small_stacks)
+START_TEST(test_small_thread_stacks_can_be_created)
 {
     for (size_t kib = 32; kib <= 256; kib *= 2) {
         pthread_attr_t attributes;
@@ -188,9 +188,9 @@ Suite *test_suite(void)
 {
     Suite *suite = suite_create("stacks");
     TCase *stacks = tcase_create("stacks");
-    tcase_add_test(stacks, small_stacks);
-    tcase_add_test(stacks, stack_of_queries);
-    tcase_add_test(stacks, stack_of_building);
+    tcase_add_test(stacks, test_small_thread_stacks_can_be_created);
+    tcase_add_test(stacks, test_query_stack_size);
+    tcase_add_test(stacks, test_build_stack_size);
     tcase_set_timeout(stacks, 300);
     suite_add_tcase(suite, stacks);
     return suite;

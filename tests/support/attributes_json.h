@@ -1,5 +1,5 @@
-/* Attributes as JSON: what the vectors' .attributes.json hold. Values by their bits, as integers.
- */
+/* Writes attributes as JSON: the content of the vectors' .attributes.json. Values are written as
+ * the integers of their bits. */
 #ifndef ATTRIBUTES_JSON_H
 #define ATTRIBUTES_JSON_H
 

@@ -20,7 +20,7 @@ void changeable_load(changeable *c, const char *path)
     if (!c->data || fread(c->data, 1, c->size, f) != c->size || fclose(f) != 0 ||
         ebpo_open(path, &c->file, NULL) != EBPO_OK ||
         ebpo_file_locate(c->file, NULL, NULL) != EBPO_OK ||
-        ebpo_chunk_sums_read(c->file, NULL) != EBPO_OK)
+        ebpo_chunk_checksums_read(c->file, NULL) != EBPO_OK)
         abort();
 }
 
@@ -44,7 +44,7 @@ uint64_t changeable_count(const changeable *c, ebpo_array_id id)
 }
 
 static uint8_t *item_at(const changeable *c, const ebpo_array_in *a, uint64_t item,
-                        const ebpo_chunk_place **chunk)
+                        const ebpo_chunk_location **chunk)
 {
     uint64_t of_chunk = (uint64_t)a->shape.chunk_rows * columns(a);
     *chunk = &a->chunks[item / of_chunk];
@@ -53,25 +53,25 @@ static uint8_t *item_at(const changeable *c, const ebpo_array_in *a, uint64_t it
 
 uint64_t changeable_get(const changeable *c, ebpo_array_id id, uint64_t item)
 {
-    const ebpo_chunk_place *chunk;
+    const ebpo_chunk_location *chunk;
     uint64_t value = 0;
     memcpy(&value, item_at(c, array_of(c, id), item, &chunk), array_of(c, id)->shape.element_size);
     return value;
 }
 
-/* Makes the checksum behind a chunk's bytes fit; returns it. */
-static uint32_t seal(changeable *c, ebpo_chunk_place chunk)
+/* Updates the checksum after the bytes of a chunk; returns it. */
+static uint32_t seal(changeable *c, ebpo_chunk_location chunk)
 {
     uint8_t *end = c->data + chunk.address + chunk.bytes - 4;
     ebpo_store32(end, ebpo_fletcher32(c->data + chunk.address, chunk.bytes - 4));
     return ebpo_load32(end);
 }
 
-/* So that the list of sums does not tell either. */
+/* Updates the list of chunk checksums, too. */
 static void seal_sum(changeable *c, const ebpo_array_in *a, uint64_t chunk, uint32_t sum)
 {
-    const ebpo_array_in *list = array_of(c, EBPO_A_CHUNK_SUMS);
-    if (!c->file->has_sums || ebpo_schema_is_list(a->id))
+    const ebpo_array_in *list = array_of(c, EBPO_A_CHUNK_CHECKSUMS);
+    if (!c->file->has_checksums || ebpo_schema_is_list(a->id))
         return;
     ebpo_store32(c->data + list->chunks[0].address + 8 * (a->first_sum + chunk), sum);
     (void)seal(c, list->chunks[0]);
@@ -80,7 +80,7 @@ static void seal_sum(changeable *c, const ebpo_array_in *a, uint64_t chunk, uint
 uint64_t changeable_put(changeable *c, ebpo_array_id id, uint64_t item, uint64_t value)
 {
     const ebpo_array_in *a = array_of(c, id);
-    const ebpo_chunk_place *chunk;
+    const ebpo_chunk_location *chunk;
     uint8_t *at = item_at(c, a, item, &chunk);
     uint64_t before = changeable_get(c, id, item);
     memcpy(at, &value, a->shape.element_size);

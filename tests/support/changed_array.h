@@ -1,5 +1,5 @@
-/* Files without compression, in memory, of which one number is changed: its chunk's checksum is
- * made to fit, and what the file says of how it ends, so that nothing but the number tells. */
+/* Uncompressed files in memory with one changed value. The chunk checksum and the stored chunk
+ * checksums are adjusted, so that only the value reveals the change. */
 #ifndef EBPO_TESTS_CHANGED_ARRAY_H
 #define EBPO_TESTS_CHANGED_ARRAY_H
 
@@ -10,16 +10,16 @@
 typedef struct changeable {
     uint8_t *data;
     uint64_t size;
-    ebpo_file *file; /* as it was: where its arrays are */
+    ebpo_file *file; /* the original file, for the chunk offsets */
 } changeable;
 
-/* Of a file that was written with EBPO_CODEC_NONE. Aborts when it cannot be opened. */
+/* Loads a file written with EBPO_CODEC_NONE. Aborts if it cannot be opened. */
 void changeable_load(changeable *c, const char *path);
 void changeable_free(changeable *c);
 
-/* Numbers of an array of the root; 0: it is not there. */
+/* Returns the number of values of an array of the root; 0: not present. */
 uint64_t changeable_count(const changeable *c, ebpo_array_id id);
-/* A number, counted row by row; puts another in its place and returns what it was. */
+/* Gets a value, counted row by row; and sets a value and returns the original one. */
 uint64_t changeable_get(const changeable *c, ebpo_array_id id, uint64_t item);
 uint64_t changeable_put(changeable *c, ebpo_array_id id, uint64_t item, uint64_t value);
 

@@ -6,12 +6,12 @@
 
 static bool touch(counted_source *c, uint64_t offset, uint64_t size)
 {
-    uint64_t before = c->asked;
+    uint64_t before = c->queried;
     for (uint64_t i = offset; i < offset + size; i++) {
-        c->asked += !c->touched[i];
+        c->queried += !c->touched[i];
         c->touched[i] = 1;
     }
-    return c->asked > before;
+    return c->queried > before;
 }
 
 static ebpo_status read_counted(void *user, uint64_t offset, uint64_t size, void *data,

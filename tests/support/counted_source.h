@@ -1,4 +1,4 @@
-/* A file behind a source that counts each byte once that is read or announced, and can fail. */
+/* A file with a source that counts once each byte that is read or prefetched, and that can fail. */
 #ifndef EBPO_TESTS_COUNTED_SOURCE_H
 #define EBPO_TESTS_COUNTED_SOURCE_H
 
@@ -6,14 +6,15 @@
 
 typedef struct counted_source {
     uint8_t *data, *touched;
-    uint64_t size, asked; /* bytes of the file; of them touched */
-    uint64_t batches;     /* announcements */
-    uint64_t alone;       /* reads of what had not been touched before */
-    uint64_t failed;      /* reads while it failed */
+    uint64_t size, queried; /* bytes of the file; bytes requested */
+    uint64_t batches;       /* prefetch hints */
+    uint64_t alone;         /* reads of bytes not requested before */
+    uint64_t failed;        /* reads during the failure */
     bool failing;
 } counted_source;
 
-/* `far`: it wants to know what will be read. For one thread. Aborts when it cannot be opened. */
+/* Opens a file; `far`: the source takes prefetch hints. For one thread. Aborts if the file cannot
+ * be opened. */
 ebpo_file *counted_open(counted_source *c, const char *path, bool far);
 void counted_close(counted_source *c, ebpo_file *file);
 

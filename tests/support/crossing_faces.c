@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Orientations in doubles where a bound on their rounding allows it, else in GMP's integers, and a
- * uniform grid that brings together the faces that may meet. */
+/* Finds intersecting faces: orientations in doubles where a bound on their rounding allows it, else
+ * in integers of GMP, and a uniform grid for the candidates. */
 
 static void *make(uint64_t count, size_t size)
 {
@@ -23,7 +23,7 @@ static void *make(uint64_t count, size_t size)
 
 static int sign_of(double x) { return (x > 0) - (x < 0); }
 
-/* Floats are whole multiples of 2^-149. */
+/* Floats are integer multiples of 2^-149. */
 static void set_whole(mpz_t z, float x)
 {
     int exponent;
@@ -33,7 +33,7 @@ static void set_whole(mpz_t z, float x)
     if (exponent >= 0)
         mpz_mul_2exp(z, z, (unsigned)exponent);
     else
-        mpz_tdiv_q_2exp(z, z, (unsigned)-exponent); /* exact: only zeros go */
+        mpz_tdiv_q_2exp(z, z, (unsigned)-exponent); /* exact: drops only zeros */
 }
 
 static int exact_orient3(const float *const p[4])
@@ -60,7 +60,7 @@ static int exact_orient3(const float *const p[4])
     return sign;
 }
 
-/* Sign of the volume of the tetrahedron a, b, c, d. */
+/* Returns the sign of the volume of the tetrahedron a, b, c, d. */
 static int orient3(const float *a, const float *b, const float *c, const float *d)
 {
     double e[3][3], sum = 0, size = 0;
@@ -74,12 +74,12 @@ static int orient3(const float *a, const float *b, const float *c, const float *
         sum += e[0][k] * (s - t);
         size += fabs(e[0][k]) * (fabs(s) + fabs(t));
     }
-    /* Eight roundings at most in each summand; the last term is for what is too small to be rounded
-     * relatively. */
+    /* Eight roundings at most in each summand; the last term covers values too small for relative
+     * rounding. */
     return fabs(sum) > 1e-14 * size + 1e-300 ? sign_of(sum) : exact_orient3(p);
 }
 
-/* The same of a triangle in the plane of axes k and l. */
+/* Returns the same for a triangle in the plane of axes k and l. */
 static int orient2(const float *a, const float *b, const float *c, int k, int l)
 {
     float flat[4][3] = {
@@ -88,11 +88,11 @@ static int orient2(const float *a, const float *b, const float *c, int k, int l)
     return -orient3(flat[0], flat[1], flat[2], flat[3]);
 }
 
-/* --- faces that meet --- */
+/* --- intersecting faces --- */
 
 typedef const float *triangle[3];
 
-/* An axis along which the triangle may be looked at; -1: it has no area. */
+/* Returns an axis for the projection of the triangle; -1: it has no area. */
 static int view_of(const triangle t)
 {
     for (int k = 0; k < 3; k++)
@@ -101,8 +101,8 @@ static int view_of(const triangle t)
     return -1;
 }
 
-static bool flat_segments_meet(const float *p, const float *q, const float *r, const float *s,
-                               int k, int l)
+static bool flat_segments_intersect(const float *p, const float *q, const float *r, const float *s,
+                                    int k, int l)
 {
     int a = orient2(p, q, r, k, l), b = orient2(p, q, s, k, l), c = orient2(r, s, p, k, l),
         d = orient2(r, s, q, k, l);
@@ -117,26 +117,26 @@ static bool flat_segments_meet(const float *p, const float *q, const float *r, c
     return true;
 }
 
-/* A segment in the triangle's plane. */
-static bool flat_segment_meets(const float *p, const float *q, const triangle t)
+/* Tests a segment in the plane of the triangle. */
+static bool flat_segment_intersects(const float *p, const float *q, const triangle t)
 {
     int view = view_of(t), k = (view + 1) % 3, l = (view + 2) % 3;
     int turn = orient2(t[0], t[1], t[2], k, l);
     bool within = true;
     for (int i = 0; i < 3; i++) {
-        if (flat_segments_meet(p, q, t[i], t[(i + 1) % 3], k, l))
+        if (flat_segments_intersect(p, q, t[i], t[(i + 1) % 3], k, l))
             return true;
         within = within && orient2(t[i], t[(i + 1) % 3], p, k, l) == turn;
     }
     return within;
 }
 
-/* A closed segment and a closed triangle. */
-static bool segment_meets(const float *p, const float *q, const triangle t)
+/* Tests a closed segment and a closed triangle. */
+static bool segment_intersects(const float *p, const float *q, const triangle t)
 {
     int above = orient3(t[0], t[1], t[2], p), below = orient3(t[0], t[1], t[2], q);
     if (above == 0 && below == 0)
-        return flat_segment_meets(p, q, t);
+        return flat_segment_intersects(p, q, t);
     if (above * below > 0)
         return false;
     int some = 0;
@@ -149,7 +149,7 @@ static bool segment_meets(const float *p, const float *q, const triangle t)
     return true;
 }
 
-/* Have faces f and g a point in common besides what they share? */
+/* Returns true when faces f and g have a common point besides shared corners and edges. */
 static bool meet(const face_model *m, uint64_t f, uint64_t g)
 {
     triangle a, b;
@@ -166,19 +166,20 @@ static bool meet(const face_model *m, uint64_t f, uint64_t g)
             }
     if (shared == 0) {
         for (int i = 0; i < 3; i++)
-            if (segment_meets(a[i], a[(i + 1) % 3], b) || segment_meets(b[i], b[(i + 1) % 3], a))
+            if (segment_intersects(a[i], a[(i + 1) % 3], b) ||
+                segment_intersects(b[i], b[(i + 1) % 3], a))
                 return true;
         return false;
     }
-    if (shared == 1) { /* what they have in common is convex and holds the shared corner, so it
-                          reaches an edge opposite to that */
+    if (shared == 1) { /* the intersection is convex and contains the shared corner, so it reaches
+                        * an edge opposite to that corner */
         int i = at_a[0], j = at_b[0];
-        return segment_meets(a[(i + 1) % 3], a[(i + 2) % 3], b) ||
-               segment_meets(b[(j + 1) % 3], b[(j + 2) % 3], a);
+        return segment_intersects(a[(i + 1) % 3], a[(i + 2) % 3], b) ||
+               segment_intersects(b[(j + 1) % 3], b[(j + 2) % 3], a);
     }
     if (shared > 2)
         return true;
-    /* They share an edge: then they overlap if they lie in one plane, on the same side of it. */
+    /* They share an edge: then they overlap if they are in one plane, on the same side of it. */
     const float *p = a[at_a[0]], *q = a[at_a[1]], *r = a[3 - at_a[0] - at_a[1]],
                 *s = b[3 - at_b[0] - at_b[1]];
     if (orient3(p, q, r, s) != 0)
@@ -243,7 +244,7 @@ static grid make_grid(const face_model *m)
     return g;
 }
 
-/* Writes the entries of a face, if there is room; returns how many there are. */
+/* Writes the entries of a face, if there is space; returns how many there are. */
 static uint64_t enter(const face_model *m, const grid *g, uint64_t f, entry *to)
 {
     float low[3], high[3];
@@ -270,7 +271,7 @@ static int by_cell(const void *x, const void *y)
     return (a->face > b->face) - (a->face < b->face);
 }
 
-/* Boxes that meet; each pair counts in one of the cells that it shares only. */
+/* Tests whether boxes intersect; each pair counts only in one of its common cells. */
 static bool near(const face_model *m, const grid *g, uint64_t cell, uint64_t f, uint64_t h)
 {
     float a[2][3], b[2][3];

@@ -1,5 +1,5 @@
-/* Do faces of a mesh meet? Shares no code with the library, whose predicates and readers are among
- * what the answers test. */
+/* Finds intersecting faces of a mesh. Shares no code with the library, whose predicates and readers
+ * the results test. */
 #ifndef EBPO_TESTS_CROSSING_FACES_H
 #define EBPO_TESTS_CROSSING_FACES_H
 
@@ -13,12 +13,13 @@ typedef struct face_model {
     uint64_t vertices, faces;
 } face_model;
 
-/* Every edge is used once in each direction, and the faces around each vertex are one ring. */
+/* Returns true if every edge is used once in each direction, and the faces around each vertex form
+ * one ring. */
 bool crossing_closed_manifold(const face_model *m);
-/* Faces whose corners are on one line, exactly. */
+/* Counts faces whose corners are exactly collinear. */
 uint64_t crossing_flat_faces(const face_model *m);
-/* Pairs of faces that have a point in common besides the corner or edge that they share, exactly;
- * one of them in `first`. Precondition: no face is flat. */
+/* Counts pairs of faces that have a common point besides the corner or edge that they share,
+ * exactly; stores one pair in `first`. Precondition: no face is flat. */
 uint64_t crossing_faces(const face_model *m, uint64_t first[2]);
 
 #endif

@@ -1,5 +1,5 @@
 /* Preloaded: see faults.h. */
-#undef _FILE_OFFSET_BITS /* both names of each call are made here */
+#undef _FILE_OFFSET_BITS /* defines both names of each call */
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
 #endif
@@ -25,7 +25,7 @@ static const char *const names[FAULT_KINDS] = { "malloc",      "read",  "short-r
                                                 "close",       "mmap",  "open",       "allocate",
                                                 "thread" };
 
-/* --- the calls as they are --- */
+/* --- the original calls --- */
 
 static struct {
     void *(*malloc)(size_t);
@@ -51,7 +51,7 @@ static struct {
     FILE *(*fdopen)(int, const char *);
 } real;
 
-/* A pointer to a function cannot be had from one to an object but by its bytes. */
+/* Standard C converts a pointer to an object into one to a function only by its bytes. */
 static void find(const char *name, void *call)
 {
     void *found = dlsym(RTLD_NEXT, name);
@@ -63,7 +63,7 @@ static void find(const char *name, void *call)
             find(#name, &real.name); \
     } while (0)
 
-/* --- who calls --- */
+/* --- callers --- */
 
 enum { MODULES = 64 };
 typedef enum module_kind { FOREIGN, OURS, NEUTRAL } module_kind;
@@ -73,7 +73,7 @@ static struct {
 } modules[MODULES];
 static int module_count;
 
-/* Of the C library it is not known for whom it asks; nor of C++'s, and of sanitizers. */
+/* For the C library the caller is not known; nor for C++ and sanitizers. */
 static module_kind kind_of(const char *path)
 {
     static const char *const neutral[] = { "/libc.so",   "/libstdc++",  "/libasan",
@@ -110,7 +110,7 @@ static module_kind who(const void *address)
     return FOREIGN;
 }
 
-/* --- which call fails --- */
+/* --- selection of the failing call --- */
 
 static atomic_bool armed, paused;
 static unsigned wanted;
@@ -121,7 +121,7 @@ static uint64_t own_counts[2];
 static _Atomic uint64_t *counts = (_Atomic uint64_t *)own_counts; /* calls, failed */
 static __thread bool busy;
 
-/* For whom the C library asks. */
+/* Returns the module for which the C library makes the call. */
 static module_kind behind(void)
 {
     enum { DEPTH = 64 };
@@ -154,7 +154,7 @@ static bool fails(unsigned kind, const void *caller)
 }
 #define CALLER __builtin_return_address(0)
 
-/* --- orders --- */
+/* --- control --- */
 
 #pragma GCC visibility push(default) /* the project's own symbols are hidden */
 
@@ -178,7 +178,7 @@ uint64_t faults_end(void)
 void faults_pause(void) { paused = true; }
 void faults_resume(void) { paused = false; }
 
-/* Processes that are made of this one count on. */
+/* Child processes continue the counts. */
 static void share_counts(void)
 {
     REAL(mmap64);
@@ -207,7 +207,7 @@ static void map_counts(const char *path)
 __attribute__((constructor)) static void begin(void)
 {
     void *frame[2];
-    (void)backtrace(frame, 2); /* which allocates, once */
+    (void)backtrace(frame, 2); /* which allocates once */
     dl_iterate_phdr(note_module, NULL);
     const char *order = getenv("EBPO_TEST_FAULT"), *path = getenv("EBPO_TEST_FAULT_COUNT");
     if (path)
@@ -232,7 +232,7 @@ __attribute__((constructor)) static void begin(void)
     faults_begin(kind, n, all_after, atoi(end + all_after + 1));
 }
 
-/* What is given back at exit is nobody's to fail any more. */
+/* Calls at exit never fail. */
 __attribute__((destructor)) static void end(void) { armed = false; }
 
 /* --- memory --- */
@@ -293,7 +293,7 @@ int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*
                                        : real.pthread_create(thread, attributes, run, argument);
 }
 
-/* --- reading and writing; what is told on standard error is not a file --- */
+/* --- reading and writing; output on standard error is not a file --- */
 
 static bool shortened(unsigned kind, size_t size, const void *caller)
 {
@@ -456,11 +456,11 @@ int unlink(const char *path)
     return real.unlink(path);
 }
 
-/* --- streams: the C library reads and writes theirs without asking anybody, but not of cookies ---
- */
+/* --- streams: the C library reads and writes its own streams by internal calls, but not cookies
+ * --- */
 
-/* The C library's own streams go on after a short write, but not after a cookie's. Interrupted are
- * neither, on disks. */
+/* The C library's own streams continue after a short write, but not after a short write of a
+ * cookie. Interrupted calls do not occur on disks. */
 static ssize_t cookie_read(void *cookie, char *data, size_t size)
 {
     ssize_t got;
@@ -478,7 +478,7 @@ static ssize_t cookie_write(void *cookie, const char *data, size_t size)
         if (put < 0 && errno == EINTR)
             continue;
         if (put <= 0)
-            return 0; /* how cookies tell of a failure */
+            return 0; /* how cookies report a failure */
         done += (size_t)put;
     }
     return (ssize_t)done;

@@ -165,7 +165,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
         self.first(times, fault)
 
     def fault_bare_replaced(self):
-        """No version is told, and the file becomes another one while it is read."""
+        """Sends no version, and replaces the file while it is read."""
         if self.number <= 2:
             self.part(version=[], cut=0 if self.number == 1 else len(self.data) // 2)
         else:
@@ -344,8 +344,8 @@ class Handler(http.server.BaseHTTPRequestHandler):
         """To this machine by another name; to another port; to this server, and from there away;
         away, and from there back; to this server alone, by a whole address and by a part of one."""
         rest = "/".join(self.path.split("/")[2:])
-        self.redirect([f"http://localhost:{self.here()}/stranger/{rest}",
-                       f"http://127.0.0.1:{Handler.other_port}/stranger/{rest}",
+        self.redirect([f"http://localhost:{self.here()}/other/{rest}",
+                       f"http://127.0.0.1:{Handler.other_port}/other/{rest}",
                        f"/away-0/{rest}",
                        f"http://localhost:{self.here()}/back/{rest}",
                        f"http://127.0.0.1:{self.here()}/private/{rest}",
@@ -353,10 +353,10 @@ class Handler(http.server.BaseHTTPRequestHandler):
 
     def fault_back(self):
         rest = "/".join(self.path.split("/")[2:])
-        self.redirect(f"http://127.0.0.1:{self.here()}/stranger/{rest}")
+        self.redirect(f"http://127.0.0.1:{self.here()}/other/{rest}")
 
-    def fault_stranger(self):
-        """Fails where it is told a secret."""
+    def fault_other(self):
+        """Fails when the request contains a secret."""
         if self.headers.get("X-Key") or self.headers.get("Authorization"):
             self.fail(403)
         else:
@@ -396,7 +396,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
             self.part(data=self.data[:1000])
 
     def fault_change_bare(self, good=1):
-        """Neither ETag nor Last-Modified: nothing but the bytes tells."""
+        """Sends neither ETag nor Last-Modified: only the bytes show a change."""
         self.part(data=self.data if self.number <= good else self.data[::-1], version=[])
 
     def fault_change_between(self):

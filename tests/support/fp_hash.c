@@ -1,4 +1,4 @@
-/* Calls the library from the environment that is asked for, and hashes what comes back. */
+/* Calls the library in the requested environment, and hashes the results. */
 #include "fp_hash.h"
 #include "core/endian.h"
 #include "scratch.h"
@@ -10,7 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include <ebpo/deviation.h>
+#include <ebpo/error_bound.h>
 #include <ebpo/lod.h>
 #include <ebpo/stream.h>
 #include <ebpo/subset.h>
@@ -73,7 +73,7 @@ static void bytes(hashing *h, const void *data, size_t size)
         *h->hash = (*h->hash ^ p[i]) * 0x100000001b3;
 }
 
-/* As little-endian machines have it. */
+/* In little-endian order. */
 static void number(hashing *h, uint64_t x)
 {
     x = ebpo_little64(x);
@@ -88,7 +88,7 @@ static void words(hashing *h, const uint32_t *x, uint64_t count)
     }
 }
 
-/* All NaNs are one: their bits are the compiler's. */
+/* All NaNs are equal: their bits depend on the compiler. */
 static void real(hashing *h, double x)
 {
     if (isnan(x))
@@ -106,7 +106,7 @@ static void reals(hashing *h, const double *x, int count)
         real(h, x[i]);
 }
 
-static void fail(const stiff_case *c, const char *what, const ebpo_error *error)
+static void fail(const degenerate_case *c, const char *what, const ebpo_error *error)
 {
     fprintf(stderr, "%s: %s: %s\n", c->name, what, error->message);
     exit(1);
@@ -138,9 +138,9 @@ static void hash_info(hashing *h, const ebpo_info *info)
     hash_report(h, &info->report);
 }
 
-/* --- answers --- */
+/* --- results --- */
 
-static void hash_levels(hashing *h, const stiff_case *c, ebpo_file *file)
+static void hash_levels(hashing *h, const degenerate_case *c, ebpo_file *file)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
@@ -159,7 +159,7 @@ static void hash_levels(hashing *h, const stiff_case *c, ebpo_file *file)
     }
 }
 
-static void hash_measures(hashing *h, const stiff_case *c, ebpo_file *file)
+static void hash_measures(hashing *h, const degenerate_case *c, ebpo_file *file)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
@@ -179,7 +179,7 @@ static void hash_measures(hashing *h, const stiff_case *c, ebpo_file *file)
     number(h, report.violations);
 }
 
-static void hash_point(hashing *h, const stiff_case *c, ebpo_context *context, bool solid,
+static void hash_point(hashing *h, const degenerate_case *c, ebpo_context *context, bool solid,
                        const double p[3])
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -210,7 +210,8 @@ static void hash_point(hashing *h, const stiff_case *c, ebpo_context *context, b
     }
 }
 
-static void hash_ray(hashing *h, const stiff_case *c, ebpo_context *context, const query_ray *r)
+static void hash_ray(hashing *h, const degenerate_case *c, ebpo_context *context,
+                     const query_ray *r)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
@@ -238,27 +239,27 @@ static void hash_ray(hashing *h, const stiff_case *c, ebpo_context *context, con
         number(h, faces[i]);
 }
 
-/* How far levels reach, and a subset by need. */
-static void hash_reach(hashing *h, const stiff_case *c, query_model *m)
+/* Hashes error bounds of levels, and a subset by need. */
+static void hash_reach(hashing *h, const degenerate_case *c, query_model *m)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status = EBPO_OK;
-    ebpo_deviation d = EBPO_DEVIATION_INIT;
+    ebpo_error_bound d = EBPO_ERROR_BOUND_INIT;
     if (m->mesh.face_count > FEW_FACES)
         return;
     for (int level = 0; level < m->info.level_count && level < 4 && status == EBPO_OK; level++) {
-        ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+        ebpo_error_bound_options options = EBPO_ERROR_BOUND_OPTIONS_INIT;
         options.tolerance = 0.5;
         options.samples = 20;
-        options.questions = 60;
+        options.queries = 60;
         options.threads = 2;
-        CALL(status, ebpo_deviation_level(m->model, m->file, level, &options, &d, &error));
+        CALL(status, ebpo_level_error_bound(m->model, m->file, level, &options, &d, &error));
         number(h, (uint64_t)status);
         real(h, d.lo);
         real(h, d.hi);
         real(h, d.mean);
         real(h, d.rms);
-        number(h, d.questions);
+        number(h, d.queries);
     }
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
     char path[128];
@@ -277,7 +278,7 @@ static void hash_reach(hashing *h, const stiff_case *c, query_model *m)
     unlink(path);
 }
 
-static void hash_questions(hashing *h, const stiff_case *c, query_model *m, uint64_t questions)
+static void hash_queries(hashing *h, const degenerate_case *c, query_model *m, uint64_t queries)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status;
@@ -287,13 +288,13 @@ static void hash_questions(hashing *h, const stiff_case *c, query_model *m, uint
         CALL(status, ebpo_context_new(m->model, &m->context, &error));
     if (status != EBPO_OK)
         fail(c, "open", &error);
-    double *points = query_room(questions, 3 * sizeof *points);
-    query_make_points(m, questions, 9, points);
-    for (uint64_t i = 0; i < questions; i++)
+    double *points = query_capacity(queries, 3 * sizeof *points);
+    query_make_points(m, queries, 9, points);
+    for (uint64_t i = 0; i < queries; i++)
         if (isfinite(points[3 * i]) && isfinite(points[3 * i + 1]) && isfinite(points[3 * i + 2]))
             hash_point(h, c, m->context, m->info.solid, points + 3 * i);
     uint64_t state = 9;
-    for (uint64_t i = 0; i < questions / 4; i++) {
+    for (uint64_t i = 0; i < queries / 4; i++) {
         query_ray r;
         bool fine = true;
         query_make_ray(m, &state, r.origin, r.direction, &r.t_max);
@@ -311,7 +312,7 @@ static void hash_questions(hashing *h, const stiff_case *c, query_model *m, uint
 
 /* --- a case --- */
 
-static ebpo_status check_mesh(hashing *h, const stiff_case *c, ebpo_mesh *mesh,
+static ebpo_status check_mesh(hashing *h, const degenerate_case *c, ebpo_mesh *mesh,
                               ebpo_mesh_report *report, ebpo_build_options *options)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -328,8 +329,8 @@ static ebpo_status check_mesh(hashing *h, const stiff_case *c, ebpo_mesh *mesh,
     return status;
 }
 
-/* The other selections, leaf planes too. */
-static void hash_selections(hashing *h, const stiff_case *c)
+/* Hashes the other selections, also with leaf planes. */
+static void hash_selections(hashing *h, const degenerate_case *c)
 {
     for (int way = 0; way < 5; way++) {
         static const ebpo_selection selections[] = { EBPO_SELECT_KMEDOIDS, EBPO_SELECT_KMEDOIDS,
@@ -363,7 +364,7 @@ static void hash_selections(hashing *h, const stiff_case *c)
     }
 }
 
-static ebpo_status make_tree(hashing *h, const stiff_case *c, ebpo_tree *tree)
+static ebpo_status make_tree(hashing *h, const degenerate_case *c, ebpo_tree *tree)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh mesh;
@@ -391,7 +392,7 @@ static void measure_mesh(query_model *m)
     }
 }
 
-void fp_hash_case(const stiff_case *c, const fp_setting *setting, uint64_t questions,
+void fp_hash_case(const degenerate_case *c, const fp_setting *setting, uint64_t queries,
                   fp_hashes *out)
 {
     hashing hashing_now = { setting, true, &out->content }, *h = &hashing_now;
@@ -415,19 +416,19 @@ void fp_hash_case(const stiff_case *c, const fp_setting *setting, uint64_t quest
     m.info = *ebpo_file_info(m.file);
     hash_info(h, &m.info);
     hash_selections(h, c);
-    h->hash = &out->answers;
+    h->hash = &out->results;
     m.mesh = tree.mesh;
     measure_mesh(&m);
     hash_levels(h, c, m.file);
     hash_measures(h, c, m.file);
-    hash_questions(h, c, &m, questions);
+    hash_queries(h, c, &m, queries);
     ebpo_close(m.file);
     ebpo_tree_free(&tree);
     scratch_remove(m.folder);
     out->kept = h->kept;
 }
 
-bool fp_hash_takes(const stiff_case *c)
+bool fp_hash_takes(const degenerate_case *c)
 {
     ebpo_mesh mesh = c->make(c);
     uint64_t count = mesh.face_count;

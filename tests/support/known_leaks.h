@@ -1,5 +1,5 @@
-/* For the one file of a program that is built with LeakSanitizer: libhdf5 1.10 itself leaks when it
- * gives up on a damaged object header; that is not what we look for. */
+/* For one file of each program that is built with LeakSanitizer: suppresses leaks of libhdf5 1.10
+ * after a damaged object header. */
 #ifndef EBPO_TESTS_KNOWN_LEAKS_H
 #define EBPO_TESTS_KNOWN_LEAKS_H
 

@@ -1,5 +1,5 @@
-/* Preloaded: a machine that lacks something, as the environment says: EBPO_TEST_FREE, bytes of
- * memory that are left; EBPO_TEST_LOCK, the number of the error with which locking a file fails. */
+/* Preloaded: simulates a machine by environment variables: EBPO_TEST_FREE, bytes of free memory;
+ * EBPO_TEST_LOCK, the error number with which locking a file fails. */
 #include <errno.h>
 #include <stdint.h>
 #include <stdlib.h>

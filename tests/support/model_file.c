@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Not ck_assert: programs without Check use this as well. */
+/* Not ck_assert: programs without Check use this, too. */
 void model_must(ebpo_status status, const char *what, const ebpo_error *error)
 {
     if (status == EBPO_OK)
@@ -16,11 +16,12 @@ ebpo_tree model_build(ebpo_mesh mesh, const ebpo_build_options *options)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh_report report;
-    ebpo_mend_record mend = { 0 };
-    ebpo_build_options usual = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_repair_record repair_record = { 0 };
+    ebpo_build_options standard = EBPO_BUILD_OPTIONS_INIT;
     ebpo_tree tree;
-    model_must(ebpo_mesh_check(&mesh, 1, usual.progress, &report, &error), "checking", &error);
-    model_must(ebpo_build(&mesh, &report, &mend, options ? options : &usual, &tree, &error),
+    model_must(ebpo_mesh_check(&mesh, 1, standard.progress, &report, &error), "checking", &error);
+    model_must(ebpo_build(&mesh, &report, &repair_record, options ? options : &standard, &tree,
+                          &error),
                "building", &error);
     return tree;
 }

@@ -1,4 +1,4 @@
-/* The oracle's mesh, its integers, rounding. */
+/* The oracle: its mesh, its integers, rounding. */
 #include "oracle_parts.h"
 
 #include <limits.h>
@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void *room(size_t count, size_t size)
+static void *space(size_t count, size_t size)
 {
     void *block = calloc(count + 1, size);
     if (!block) {
@@ -96,8 +96,8 @@ void oracle_fraction_swap(oracle_fraction *a, oracle_fraction *b)
 
 /* --- rounding --- */
 
-/* m * 2^e, a little more when `sticky`, to the nearest double, ties to even. m has more than 60
- * bits. */
+/* Rounds m * 2^e, slightly more when `sticky`, to the nearest double, ties to even. m has more than
+ * 60 bits. */
 static double round_integer(const mpz_t m, int e, bool sticky)
 {
     int top = (int)mpz_sizeinbase(m, 2) + e, low = top - 53 < -1074 ? -1074 : top - 53;
@@ -137,8 +137,8 @@ double oracle_round(const mpz_t num, const mpz_t den, int exponent, bool root)
         sticky |= mpz_sgn(r) != 0;
         e /= 2;
     }
-    /* Far below the least double there may be too few bits to drop: 2^-1074 has its own rounding.
-     */
+    /* Far below the smallest double there may be too few bits to drop: 2^-1074 has its own
+     * rounding. */
     if ((int)mpz_sizeinbase(q, 2) + e < -1074) {
         mpz_clears(q, r, NULL);
         return 0;
@@ -174,9 +174,9 @@ static void copy_mesh(oracle *o, const ebpo_mesh *mesh)
 {
     o->vertex_count = (uint32_t)mesh->vertex_count;
     o->face_count = (uint32_t)mesh->face_count;
-    o->xyz = room(mesh->vertex_count, 3 * sizeof *o->xyz);
-    o->faces = room(mesh->face_count, 3 * sizeof *o->faces);
-    if (mesh->face_count) /* there may be no array */
+    o->xyz = space(mesh->vertex_count, 3 * sizeof *o->xyz);
+    o->faces = space(mesh->face_count, 3 * sizeof *o->faces);
+    if (mesh->face_count) /* the array may be missing */
         memcpy(o->faces, mesh->faces, mesh->face_count * 3 * sizeof *o->faces);
     for (size_t i = 0; i < 3 * mesh->vertex_count; i++)
         o->xyz[i] = mesh->xyz32 ? (double)mesh->xyz32[i] : mesh->xyz64[i];
@@ -223,26 +223,26 @@ static void init_scratch(oracle *o)
     for (int i = 0; i < 12; i++)
         mpz_init(o->s[i]);
     mpz_inits(o->best.num, o->best.den, o->one.num, o->one.den, o->other.num, o->other.den, NULL);
-    o->found = room(o->face_count, sizeof *o->found);
-    o->low = room(o->face_count, sizeof *o->low);
-    o->hits = room(o->face_count, sizeof *o->hits);
-    o->items = room(o->face_count, sizeof *o->items);
+    o->found = space(o->face_count, sizeof *o->found);
+    o->low = space(o->face_count, sizeof *o->low);
+    o->hits = space(o->face_count, sizeof *o->hits);
+    o->items = space(o->face_count, sizeof *o->items);
 }
 
 oracle *oracle_make(const ebpo_mesh *mesh)
 {
-    oracle *o = room(1, sizeof *o);
+    oracle *o = space(1, sizeof *o);
     copy_mesh(o, mesh);
-    o->corner = room(o->face_count, sizeof *o->corner);
-    o->box = room(o->face_count, sizeof *o->box);
+    o->corner = space(o->face_count, sizeof *o->corner);
+    o->box = space(o->face_count, sizeof *o->box);
     measure(o);
-    o->integer = room(3 * (size_t)o->vertex_count, sizeof *o->integer);
+    o->integer = space(3 * (size_t)o->vertex_count, sizeof *o->integer);
     for (size_t i = 0; i < 3 * (size_t)o->vertex_count; i++) {
         mpz_init(o->integer[i]);
         oracle_set(o->integer[i], o->xyz[i], o->exponent);
     }
     init_scratch(o);
-    o->flat = room(o->face_count, sizeof *o->flat);
+    o->flat = space(o->face_count, sizeof *o->flat);
     o->e = o->exponent;
     for (uint32_t f = 0; f < o->face_count; f++) {
         oracle_load(o, f);

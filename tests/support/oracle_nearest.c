@@ -28,7 +28,7 @@ static void segment_distance(oracle *o, int i, oracle_fraction *out)
     }
 }
 
-/* True when the origin, dropped on the face's plane, is in the face. */
+/* Returns true when the projection of the origin on the plane of the face is in the face. */
 static bool above_face(oracle *o)
 {
     for (int i = 0; i < 3; i++) {
@@ -40,7 +40,7 @@ static bool above_face(oracle *o)
     return true;
 }
 
-/* Squared distance of o->p to the face, in the unit squared. */
+/* Computes the squared distance of o->p to the face, in the unit squared. */
 static void face_distance(oracle *o, uint32_t face, oracle_fraction *out)
 {
     oracle_load(o, face);
@@ -102,10 +102,10 @@ static int compare_ranked(const void *x, const void *y)
 
 static void *some(size_t count, size_t size)
 {
-    void *room = malloc((count ? count : 1) * size);
-    if (!room)
+    void *space = malloc((count ? count : 1) * size);
+    if (!space)
         abort();
-    return room;
+    return space;
 }
 
 oracle_near *oracle_order(oracle *o, const double p[3], double radius, uint32_t *count)
@@ -133,15 +133,15 @@ oracle_near *oracle_order(oracle *o, const double p[3], double radius, uint32_t 
     return out;
 }
 
-/* --- leaving out what is certainly farther; lengths in units of 2^scale --- */
+/* --- excluding faces that are certainly farther; lengths in units of 2^scale --- */
 
 static double dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Weights of a point of the triangle near the origin's nearest one. Their precision does not matter
- * for the bounds' truth. Ericson 2005, 5.1.5. */
+/* Computes weights of a point of the triangle near the nearest point to the origin. The validity of
+ * the bounds does not depend on their precision. Ericson 2005, 5.1.5. */
 static void near_weights(double a[3][3], double w[3])
 {
     double ab[3], ac[3];
@@ -174,8 +174,8 @@ static void near_weights(double a[3][3], double w[3])
         w[0] = 1 - w[1] - w[2];
 }
 
-/* low <= distance <= high for the origin, whatever the rounding: high is the distance of a point of
- * the triangle, low that of a plane before it. */
+/* Computes low <= distance <= high for the origin, for any rounding: high is the distance of a
+ * point of the triangle, low that of a plane before it. */
 static void face_bounds(const double corner[9], const double p[3], double *low, double *high)
 {
     double a[3][3], w[3], q[3], reach = 0;
@@ -218,7 +218,7 @@ static double box_squared(const double corner[9], const double p[3])
     return sum;
 }
 
-/* Candidates into found, `*count` of them: every face that is at the least distance is among them.
+/* Writes candidates to found, `*count` of them: every face at the minimum distance is among them.
  */
 static uint32_t candidates(oracle *o, const double p[3])
 {
@@ -265,7 +265,7 @@ void oracle_find_nearest(oracle *o, const double p[3], oracle_nearest *out)
 
 /* --- winding numbers --- */
 
-/* Sign of direction . (b x c) and whether it is certain, in floating point: 2 when not. */
+/* Returns the sign of direction . (b x c) in floating point; 2 when it is not certain. */
 static int fast_sign(const double d[3], const double b[3], const double c[3])
 {
     double rb = fabs(b[0]) + fabs(b[1]) + fabs(b[2]), rc = fabs(c[0]) + fabs(c[1]) + fabs(c[2]);
@@ -277,7 +277,7 @@ static int fast_sign(const double d[3], const double b[3], const double c[3])
     return v > bound ? 1 : v < -bound ? -1 : 2;
 }
 
-/* Signs of direction . (a[i] x a[i + 1]) exactly; with the face loaded. */
+/* Computes the signs of direction . (a[i] x a[i + 1]) exactly; with the face loaded. */
 static void exact_signs(oracle *o, int sign[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -287,8 +287,8 @@ static void exact_signs(oracle *o, int sign[3])
     }
 }
 
-/* 1: leaves through the face, -1: enters, 0: neither, 2: the ray meets an edge or a vertex, or is
- * in the plane. */
+/* Returns 1: leaves through the face, -1: enters, 0: neither, 2: the ray intersects an edge or a
+ * vertex, or is in the plane. */
 static int crossing(oracle *o, uint32_t face, const double p[3], const double d[3])
 {
     double a[3][3];
@@ -306,13 +306,14 @@ static int crossing(oracle *o, uint32_t face, const double p[3], const double d[
     bool negative = sign[0] < 0 || sign[1] < 0 || sign[2]<0, positive = sign[0]> 0 || sign[1] > 0 ||
                     sign[2] > 0;
     if (negative && positive)
-        return 0; /* the line passes by */
+        return 0; /* the line misses the face */
     if (!negative && !positive)
         return 2; /* within the plane */
     oracle_dot(o->s[0], o->normal, o->a[0]);
     int ahead = mpz_sgn(o->s[0]) * (positive ? 1 : -1);
     if (ahead <= 0)
-        /* the face is behind; not 0 where the line meets the face, as the point is not on it */
+        /* the face is behind; not 0 where the line intersects the face, as the point is not on it
+         */
         return 0;
     if (sign[0] == 0 || sign[1] == 0 || sign[2] == 0)
         return 2;
@@ -352,12 +353,12 @@ int32_t oracle_winding(oracle *o, const double p[3])
     int32_t sum = 0;
     for (int k = 0; k < 3; k++)
         if (p[k] < o->min[k] || p[k] > o->max[k])
-            return 0; /* a ray away from the mesh meets nothing */
+            return 0; /* a ray away from the mesh hits nothing */
     set_point(o, p);
     for (;;) {
         double d[3];
         for (int k = 0; k < 3;
-             k++) { /* towards the nearer side of the mesh's box: fewer faces to look at */
+             k++) { /* towards the nearer side of the mesh's box: fewer faces to test */
             state = state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
             d[k] =
                 (double)(1 + (state >> 40) % 1000) * (p[k] - o->min[k] > o->max[k] - p[k] ? 1 : -1);

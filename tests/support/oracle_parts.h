@@ -1,4 +1,4 @@
-/* Inside the oracle. */
+/* Internal parts of the oracle. */
 #ifndef EBPO_TESTS_ORACLE_PARTS_H
 #define EBPO_TESTS_ORACLE_PARTS_H
 
@@ -28,14 +28,14 @@ struct oracle {
     double *xyz;     /* [vertex_count][3] */
     /* [face_count] coordinates times 2^-scale, so that the largest is about 1 */
     double (*corner)[9];
-    double (*box)[6]; /* [face_count] min, max of the coordinates as they are */
+    double (*box)[6]; /* [face_count] min, max of the original coordinates */
     double min[3], max[3];
     int scale;
     int exponent;   /* coordinates are integers times 2^exponent */
     mpz_t *integer; /* [vertex_count][3] these integers */
     bool *flat;     /* [face_count] without area, exactly */
     /* scratch */
-    int e; /* the unit of what follows is 2^e */
+    int e; /* the unit of the following values is 2^e */
     oracle_vector p, a[3], edge[3], normal, direction, v[6];
     mpz_t s[12];
     oracle_fraction best, one, other;
@@ -43,26 +43,26 @@ struct oracle {
     double *low;      /* [face_count] */
     oracle_hit *hits; /* [face_count] */
     oracle_ray_item *items;
-    uint32_t item_capacity; /* of items, how many are initialised */
+    uint32_t item_capacity; /* number of initialised items */
 };
 
-/* Exponent of the lowest bit of x; INT_MAX for 0. */
+/* Returns the exponent of the lowest bit of x; INT_MAX for 0. */
 int oracle_low_bit(double x);
-/* z = x / 2^e, which is an integer. */
+/* Sets z = x / 2^e, which is an integer. */
 void oracle_set(mpz_t z, double x, int e);
-/* Chooses the unit for points `p`, `count` numbers in all, together with the mesh. */
+/* Chooses the unit for the mesh and the points `p` of `count` numbers in total. */
 void oracle_choose_unit(oracle *o, const double *p, int count);
-/* a[i] = corner i of the face - p, edge[i] = a[i + 1] - a[i], normal = edge[0] x edge[1]; in the
- * unit. */
+/* Loads a face in the unit: a[i] = corner i of the face - p, edge[i] = a[i + 1] - a[i], normal =
+ * edge[0] x edge[1]. */
 void oracle_load(oracle *o, uint32_t face);
 /* Vectors are three numbers. */
 void oracle_cross(mpz_t *out, mpz_t *a, mpz_t *b);
 void oracle_dot(mpz_t out, mpz_t *a, mpz_t *b);
-/* Sign of a - b; uses s[10], s[11]. */
+/* Returns the sign of a - b; uses s[10], s[11]. */
 int oracle_fraction_compare(oracle *o, const oracle_fraction *a, const oracle_fraction *b);
 void oracle_fraction_swap(oracle_fraction *a, oracle_fraction *b);
-/* The double nearest to num / den * 2^exponent, or to the root of that when `root` (exponent even);
- * num >= 0, den > 0. */
+/* Returns the double nearest to num / den * 2^exponent, or with `root` to its square root (exponent
+ * even); num >= 0, den > 0. */
 double oracle_round(const mpz_t num, const mpz_t den, int exponent, bool root);
 
 #endif

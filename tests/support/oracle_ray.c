@@ -19,8 +19,8 @@ static bool is_zero(mpz_t *a)
     return mpz_sgn(a[0]) == 0 && mpz_sgn(a[1]) == 0 && mpz_sgn(a[2]) == 0;
 }
 
-/* A segment along the ray's line: t of both ends, cut at 0. */
-static void meet_along(oracle *o, int i, bool *any, oracle_fraction *best)
+/* Intersects with a segment along the line of the ray: t of both ends, cut at 0. */
+static void intersect_along(oracle *o, int i, bool *any, oracle_fraction *best)
 {
     oracle_cross(o->v[2], o->a[i], o->direction);
     if (!is_zero(o->v[2]))
@@ -36,13 +36,13 @@ static void meet_along(oracle *o, int i, bool *any, oracle_fraction *best)
     keep_least(o, any, best, &o->one);
 }
 
-/* Edge i against the ray, both in space: t = (a x u) . c / c^2, place on the edge s = (a x d) . c /
- * c^2, c = d x u. */
-static void meet_edge(oracle *o, int i, bool *any, oracle_fraction *best)
+/* Intersects edge i with the ray, both in space: t = (a x u) . c / c^2, position on the edge s = (a
+ * x d) . c / c^2, c = d x u. */
+static void intersect_edge(oracle *o, int i, bool *any, oracle_fraction *best)
 {
     oracle_cross(o->v[0], o->direction, o->edge[i]);
     if (is_zero(o->v[0])) {
-        meet_along(o, i, any, best);
+        intersect_along(o, i, any, best);
         return;
     }
     oracle_dot(o->s[0], o->v[0], o->a[i]);
@@ -57,7 +57,7 @@ static void meet_edge(oracle *o, int i, bool *any, oracle_fraction *best)
         keep_least(o, any, best, &o->one);
 }
 
-/* The origin is in the face, whose plane contains it. */
+/* Returns true when the origin is in the face, whose plane contains it. */
 static bool origin_in_face(oracle *o)
 {
     for (int i = 0; i < 3; i++) {
@@ -69,8 +69,8 @@ static bool origin_in_face(oracle *o)
     return true;
 }
 
-/* A face without area, or one that is parallel to the ray. */
-static bool meet_within_plane(oracle *o, uint32_t face, oracle_fraction *t)
+/* Handles a face without area, or parallel to the ray. */
+static bool intersect_within_plane(oracle *o, uint32_t face, oracle_fraction *t)
 {
     bool any = false;
     if (!o->flat[face]) {
@@ -84,18 +84,18 @@ static bool meet_within_plane(oracle *o, uint32_t face, oracle_fraction *t)
         }
     }
     for (int i = 0; i < 3; i++)
-        meet_edge(o, i, &any, t);
+        intersect_edge(o, i, &any, t);
     return any;
 }
 
-static bool meet_face(oracle *o, uint32_t face, oracle_fraction *t, int *side, int *facing)
+static bool intersect_face(oracle *o, uint32_t face, oracle_fraction *t, int *side, int *facing)
 {
     oracle_load(o, face);
     oracle_dot(t->den, o->normal, o->direction);
     *side = 0;
     *facing = -mpz_sgn(t->den);
     if (mpz_sgn(t->den) == 0)
-        return meet_within_plane(o, face, t);
+        return intersect_within_plane(o, face, t);
     int towards = mpz_sgn(t->den);
     bool inner = true;
     for (int i = 0; i < 3; i++) {
@@ -118,7 +118,7 @@ static bool meet_face(oracle *o, uint32_t face, oracle_fraction *t, int *side, i
     return true;
 }
 
-/* Sign of t 2^e - t_max. */
+/* Returns the sign of t 2^e - t_max. */
 static int compare_to_end(oracle *o, const oracle_fraction *t, int e, double t_max)
 {
     if (isinf(t_max))
@@ -173,7 +173,7 @@ void oracle_ray(oracle *o, const double origin[3], const double direction[3], do
     for (uint32_t f = 0; f < o->face_count; f++) {
         oracle_ray_item *at = item(o, n);
         if (passes_by(o->box[f], origin, direction) ||
-            !meet_face(o, f, &at->t, &at->side, &at->facing))
+            !intersect_face(o, f, &at->t, &at->side, &at->facing))
             continue;
         if (compare_to_end(o, &at->t, o->e - unit, t_max) > 0)
             continue;
@@ -193,7 +193,7 @@ void oracle_ray(oracle *o, const double origin[3], const double direction[3], do
 
 /* --- boxes; corners are relative to o->p = min, o->direction = max - min --- */
 
-/* The projections on the axis have a gap. */
+/* Returns true when the projections on the axis have a gap. */
 static bool separates(oracle *o, mpz_t *axis)
 {
     mpz_t *low = &o->s[2], *high = &o->s[3];
@@ -214,9 +214,9 @@ static bool separates(oracle *o, mpz_t *axis)
     return above == 3 || below == 3;
 }
 
-/* Separating axes of two convex polytopes; flat ones are limits of thick ones, so the same axes do.
- */
-static bool meets_box(oracle *o, uint32_t face)
+/* Tests separating axes of two convex polytopes; flat ones are limits of thick ones, so the same
+ * axes are sufficient. */
+static bool intersects_box(oracle *o, uint32_t face)
 {
     oracle_load(o, face);
     if (separates(o, o->normal))
@@ -252,7 +252,7 @@ void oracle_box(oracle *o, const double min[3], const double max[3], const uint3
         bool apart = false;
         for (int k = 0; k < 3; k++)
             apart |= box[k] > max[k] || box[3 + k] < min[k];
-        if (!apart && meets_box(o, f))
+        if (!apart && intersects_box(o, f))
             o->found[(*count)++] = f;
     }
     *faces = o->found;

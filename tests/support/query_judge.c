@@ -1,6 +1,6 @@
-/* Models made for the tests of questions, and what the oracle says to the answers. */
+/* Makes models for tests of queries, and compares results with the oracle. */
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 #include "scratch.h"
 
 #include <float.h>
@@ -23,7 +23,7 @@
 
 enum { SHOWN = 3 };
 
-void *query_room(uint64_t count, size_t size)
+void *query_capacity(uint64_t count, size_t size)
 {
     void *block = calloc(count + 1, size);
     if (!block)
@@ -93,7 +93,7 @@ static void measure(query_model *m)
             m->largest = fmax(m->largest, fabs(p[k]));
         }
     }
-    m->normal = query_room(m->mesh.face_count, sizeof *m->normal);
+    m->normal = query_capacity(m->mesh.face_count, sizeof *m->normal);
     for (uint32_t f = 0; f < m->mesh.face_count; f++)
         oracle_normal(m->judge, f, m->normal[f]);
 }
@@ -142,7 +142,7 @@ void query_model_free(query_model *m)
     scratch_remove(m->folder);
 }
 
-/* --- the truth --- */
+/* --- reference --- */
 
 static bool inside_by(ebpo_rule rule, int32_t winding)
 {
@@ -170,7 +170,7 @@ void query_find_truths(query_model *m, const double *points, uint64_t count, que
     }
 }
 
-/* --- verdicts --- */
+/* --- comparisons --- */
 
 static bool show(const query_model *m, const double *p, uint64_t *wrong)
 {
@@ -195,8 +195,8 @@ uint64_t query_wrong_inside(const query_model *m, const double *points, const qu
     return wrong;
 }
 
-/* The nearest point is about at the distance from the point: within some ulps of the largest
- * coordinate. */
+/* Returns true when the nearest point is at about the distance from the point: within some ulps of
+ * the largest coordinate. */
 static bool point_fits(const query_model *m, const double *p, const query_truth *t,
                        const ebpo_distance_result *got)
 {
@@ -267,7 +267,7 @@ uint64_t query_wrong_limited_inside(const query_model *m, const double *points,
         const query_truth *t = truth + i;
         bool maybe =
             got[i].where == EBPO_MAYBE && got[i].winding == 0 && got[i].doubt >= t->distance;
-        /* an envelope does not tell more */
+        /* an envelope gives no more information */
         bool winding =
             got[i].winding == t->winding || (t->where == EBPO_OUT && got[i].winding == 0);
         bool certain = got[i].where == t->where && winding && got[i].doubt == 0;
@@ -308,14 +308,14 @@ uint64_t query_wrong_limited_distance(const query_model *m, const double *points
 
 /* --- rays --- */
 
-uint64_t query_told(const query_model *m, uint32_t face)
+uint64_t query_reported(const query_model *m, uint32_t face)
 {
     return m->face_source ? m->face_source[face] : face;
 }
 
 static bool hit_fits(const query_model *m, const oracle_hit *expected, const ebpo_ray_hit *got)
 {
-    return got->face == query_told(m, expected->face) && got->side == expected->side &&
+    return got->face == query_reported(m, expected->face) && got->side == expected->side &&
            got->t == expected->t;
 }
 
@@ -335,7 +335,7 @@ static bool hits_fit(const query_model *m, const query_ray *r, const oracle_hit 
             fprintf(stderr,
                     "hit %u says t %a, face %llu, side %d; it is t %a, face %llu, side %d\n", i,
                     got[i].t, (unsigned long long)got[i].face, got[i].side, expected[i].t,
-                    (unsigned long long)query_told(m, expected[i].face), expected[i].side);
+                    (unsigned long long)query_reported(m, expected[i].face), expected[i].side);
             return false;
         }
     if (count != n) {
@@ -345,9 +345,9 @@ static bool hits_fit(const query_model *m, const query_ray *r, const oracle_hit 
     return count == n;
 }
 
-/* Whether anything is met, and the first face from each side. */
-static bool ask_sides(query_model *m, ebpo_context *context, const query_ray *r,
-                      const oracle_hit *expected, uint32_t n)
+/* Checks any hit, and the first face from each side. */
+static bool query_sides(query_model *m, ebpo_context *context, const query_ray *r,
+                        const oracle_hit *expected, uint32_t n)
 {
     ebpo_ray ray = { .t_max = r->t_max };
     memcpy(ray.origin, r->origin, sizeof ray.origin);
@@ -375,7 +375,7 @@ static bool ask_sides(query_model *m, ebpo_context *context, const query_ray *r,
            any == (n > 0);
 }
 
-bool query_ask_ray(query_model *m, ebpo_context *context, const query_ray *r)
+bool query_query_ray(query_model *m, ebpo_context *context, const query_ray *r)
 {
     const oracle_hit *expected;
     const ebpo_ray_hit *hits;
@@ -399,16 +399,16 @@ bool query_ask_ray(query_model *m, ebpo_context *context, const query_ray *r)
                 (unsigned long long)first.face, first.side);
         return false;
     }
-    return hits_fit(m, r, expected, n, hits, count) && ask_sides(m, context, r, expected, n);
+    return hits_fit(m, r, expected, n, hits, count) && query_sides(m, context, r, expected, n);
 }
 
-void query_ask(query_model *m, uint64_t count, uint64_t seed)
+void query_query(query_model *m, uint64_t count, uint64_t seed)
 {
     enum { BATCH = 512 };
-    double *points = query_room(count, 3 * sizeof *points);
-    query_truth *truth = query_room(BATCH, sizeof *truth);
-    ebpo_inside_result *inside = query_room(BATCH, sizeof *inside);
-    ebpo_distance_result *distance = query_room(BATCH, sizeof *distance);
+    double *points = query_capacity(count, 3 * sizeof *points);
+    query_truth *truth = query_capacity(BATCH, sizeof *truth);
+    ebpo_inside_result *inside = query_capacity(BATCH, sizeof *inside);
+    ebpo_distance_result *distance = query_capacity(BATCH, sizeof *distance);
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t wrong = 0;
     query_make_points(m, count, seed, points);

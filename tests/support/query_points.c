@@ -1,5 +1,5 @@
-/* Awkward points and rays. */
-#include "query_kit.h"
+/* Generates difficult points and rays. */
+#include "query_support.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -18,7 +18,7 @@ static void random_vertex(const query_model *m, uint64_t *state, double out[3])
     vertex_of_face(m, face, pick(state, 3), out);
 }
 
-/* Multiples of 1/8 of the way: doubles for grids, close to the edge or face else. */
+/* Uses multiples of 1/8 along the edge: exact for grids, else close to the edge or face. */
 static void edge_point(const query_model *m, uint64_t *state, double out[3])
 {
     double a[3], b[3];
@@ -43,13 +43,13 @@ static void face_point(const query_model *m, uint64_t *state, double out[3])
         out[k] = a[k] + (b[k] - a[k]) * s + (c[k] - a[k]) * t;
 }
 
-static double wall(const query_model *m, uint64_t *state, int k, int level)
+static double cell_face(const query_model *m, uint64_t *state, int k, int level)
 {
     return m->info.box_origin[k] + (double)pick(state, (UINT64_C(1) << level) + 1) *
                                        (m->info.box_size[k] / (double)(1u << level));
 }
 
-/* All coordinates on walls of one level, or some. */
+/* All coordinates on cell faces of one level, or some. */
 static void cell_point(const query_model *m, uint64_t *state, bool corner, double out[3])
 {
     int top =
@@ -58,11 +58,11 @@ static void cell_point(const query_model *m, uint64_t *state, bool corner, doubl
     face_point(m, state, out);
     for (int k = 0; k < 3; k++)
         if (corner || pick(state, 2))
-            out[k] = wall(m, state, k, level);
+            out[k] = cell_face(m, state, k, level);
 }
 
-/* The wall next to a point of the surface: where cells are deep. */
-static void wall_near_surface(const query_model *m, uint64_t *state, double out[3])
+/* The cell face next to a point of the surface: where cells are deep. */
+static void cell_face_near_surface(const query_model *m, uint64_t *state, double out[3])
 {
     int level = m->info.level_count - 1 - (int)pick(state, 2), axis = (int)pick(state, 3);
     level = level < 0 ? 0 : level;
@@ -127,7 +127,7 @@ static void one_point(const query_model *m, uint64_t *state, double out[3])
     case 4: face_point(m, state, out); break;
     case 5: cell_point(m, state, true, out); break;
     case 6: cell_point(m, state, false, out); break;
-    case 7: wall_near_surface(m, state, out); break;
+    case 7: cell_face_near_surface(m, state, out); break;
     case 8: mixed(m, state, out); break;
     case 9: middle(m, state, out); break;
     case 10:

@@ -1,5 +1,5 @@
-/* Solids for questions: the balanced ones of solids.h, and others that are made to be mistaken. */
-#include "query_kit.h"
+/* Solids for queries: the balanced ones of solids.h, and others that are difficult. */
+#include "query_support.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -56,7 +56,7 @@ static ebpo_mesh make_touching_shells(void)
     add(&m, box(1, 0.25, 0.25, 2, 0.75, 0.75), false); /* part of a side */
     add(&m, box(1, 1, 0, 2, 2, 1), false);             /* an edge */
     add(&m, cube(-1, 0, 1), false);                    /* a vertex */
-    add(&m, box(0.25, 0.5, 1, 0.75, 1, 1.5), false);   /* a side, and in one line with another */
+    add(&m, box(0.25, 0.5, 1, 0.75, 1, 1.5), false);   /* a side, and aligned with another */
     return m;
 }
 
@@ -124,7 +124,7 @@ static ebpo_mesh make_sliver(void)
     return m;
 }
 
-/* A flat box (winding number 0 everywhere, all of it coplanar) and a tetrahedron collapsed to a
+/* A flat box (winding number 0 everywhere, completely coplanar) and a tetrahedron collapsed to a
  * line. */
 static ebpo_mesh make_flat(void)
 {
@@ -135,9 +135,9 @@ static ebpo_mesh make_flat(void)
     return m;
 }
 
-/* Its sides lie in cell walls: the root box is that of two tetrahedra in opposite corners, and what
- * is between does not change it. */
-static ebpo_mesh make_boxes_in_walls(void)
+/* Its sides are in cell faces: the root box is that of two tetrahedra in opposite corners, and does
+ * not depend on the boxes between. */
+static ebpo_mesh make_boxes_in_cell_faces(void)
 {
     ebpo_mesh m = ebpo_test_tetrahedron(0.5), frame, other = ebpo_test_tetrahedron(0.5);
     const double offset[3] = { 10, 7, 5 }, unit[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
@@ -172,7 +172,7 @@ static ebpo_mesh make_far_away(void)
     return m;
 }
 
-/* Rounded to floats a quarter apart: many faces coincide, cross or lose their area. */
+/* Rounded to floats with a spacing of a quarter: many faces coincide, cross or lose their area. */
 static ebpo_mesh make_far_away_float(void)
 {
     ebpo_mesh m = ebpo_test_torus(6, 2, 16, 8);
@@ -203,7 +203,7 @@ static ebpo_mesh make_denormal(void) { return scaled_shells(0x1p-1060); }
 static ebpo_mesh make_least(void)
 {
     return scaled_shells(0x1p-1072);
-} /* its quarters are the least doubles */
+} /* a quarter of the scale is the smallest double */
 
 static ebpo_mesh make_all_scales(void)
 {
@@ -256,7 +256,7 @@ static const struct {
     { "thin_hollow", make_thin_hollow },
     { "sliver", make_sliver },
     { "flat", make_flat },
-    { "boxes_in_walls", make_boxes_in_walls },
+    { "boxes_in_walls", make_boxes_in_cell_faces },
     { "far_away", make_far_away },
     { "far_away_float", make_far_away_float },
     { "turned_boxes", make_turned_boxes },
@@ -328,7 +328,7 @@ static ebpo_mesh random_box(uint64_t *state, bool on_grid)
             low[k] = high[k], high[k] = t;
         }
         switch (ebpo_test_random(state) % 8) {
-        case 0: high[k] = low[k] + 1e-9; break; /* a thin wall */
+        case 0: high[k] = low[k] + 1e-9; break; /* a thin plate */
         case 1: high[k] = nextafter(low[k], INFINITY); break;
         default: high[k] += high[k] == low[k]; break;
         }

@@ -1,5 +1,5 @@
-/* Trees that are valid as files go (counts, orders, ranges) but describe no shape: what the
- * container must carry. */
+/* Trees that are valid as files (counts, orders, ranges) but describe no shape, for tests of the
+ * container. */
 #ifndef RANDOM_TREE_H
 #define RANDOM_TREE_H
 
@@ -16,9 +16,9 @@
 
 typedef struct random_tree_options {
     uint64_t seed;
-    int levels;          /* exactly so many */
+    int levels;          /* exact number */
     unsigned gray_share; /* of 16 children above the deepest level */
-    unsigned new_faces;  /* of a leaf, at most */
+    unsigned new_faces;  /* of a leaf, maximum */
     bool solid, doubles, windings, leaf_planes;
 } random_tree_options;
 
@@ -154,7 +154,7 @@ static void rt_mesh(random_tree_maker *m)
             fresh ? (uint32_t)seen++
                   : (uint32_t)(seen - 1 - rt_random(m, seen < 500 ? (uint32_t)seen : 500));
     }
-    mesh->vertex_count = seen + 2; /* two that no face uses */
+    mesh->vertex_count = seen + 2; /* two unreferenced ones */
     mesh->xyz32 = m->options->doubles ? NULL : ebpo_alloc(mesh->vertex_count, 3 * sizeof(float));
     mesh->xyz64 = m->options->doubles ? ebpo_alloc(mesh->vertex_count, 3 * sizeof(double)) : NULL;
     for (uint64_t i = 0; i < 3 * mesh->vertex_count; i++)

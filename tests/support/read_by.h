@@ -1,4 +1,4 @@
-/* Reading with a number of threads. */
+/* Options for reading with a number of threads. */
 #ifndef EBPO_TESTS_READ_BY_H
 #define EBPO_TESTS_READ_BY_H
 

@@ -22,7 +22,7 @@ void scratch_make(char folder[SCRATCH_LENGTH])
         die(folder);
 }
 
-/* Tests take permissions away; nftw cannot enter such folders. */
+/* Tests remove permissions; nftw cannot enter such folders. */
 static int open_folder(const char *path, const struct stat *st, int type, struct FTW *at)
 {
     (void)st, (void)at;
@@ -54,7 +54,7 @@ void scratch_remove(const char *folder)
         die(folder);
 }
 
-/* ---- the program's own ---- */
+/* ---- folder of the program ---- */
 
 static char own[SCRATCH_LENGTH];
 

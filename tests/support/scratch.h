@@ -1,22 +1,23 @@
-/* Folders for what tests write: below $TMPDIR or /tmp, empty when made, gone with all in them. */
+/* Folders for files of tests: below $TMPDIR or /tmp, empty when made, removed with their contents.
+ */
 #ifndef EBPO_TESTS_SCRATCH_H
 #define EBPO_TESTS_SCRATCH_H
 
 enum { SCRATCH_LENGTH = 96 };
 
-/* A new folder; ends the program when there can be none. */
+/* Makes a folder; ends the program on failure. */
 void scratch_make(char folder[SCRATCH_LENGTH]);
-/* With all in it, whatever its permissions. An empty name is no folder. */
+/* Removes a folder with its contents, independent of permissions. An empty name is no folder. */
 void scratch_remove(const char *folder);
 
-/* The program's own folder, which check_main.c removes at the end, also when a test dies: fixtures
- * that empty it before a test and after it. */
+/* Fixtures that empty the program's folder before and after a test. check_main.c removes it at the
+ * end, also when a test crashes. */
 void scratch_enter(void);
 void scratch_leave(void);
-void scratch_end(void); /* check_main.c's */
-/* What stands in it; a test that leaves nothing behind says so. */
+void scratch_end(void); /* for check_main.c */
+/* Returns the number of entries, for tests that must leave no files. */
 int scratch_entries(void);
-/* A path in it: the same string for the same name, as long as the program runs. NULL: the folder
+/* Returns a path in it: the same string for the same name while the program runs. NULL: the folder
  * itself. */
 const char *scratch(const char *name);
 

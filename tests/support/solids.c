@@ -86,7 +86,7 @@ double ebpo_test_random_unit(uint64_t *state)
 
 void ebpo_test_circle(uint32_t i, uint32_t n, double *cosine, double *sine)
 {
-    /* the turn lies between eighth / 8 and that + 1/8; of odd ones the end is taken */
+    /* the turn is between eighth / 8 and that + 1/8; odd ones use the end */
     uint64_t eighth = 8 * (uint64_t)(i % n) / n, odd = eighth % 2;
     double part = odd ? (double)((eighth + 1) * n - 8 * (uint64_t)(i % n))
                       : (double)(8 * (uint64_t)(i % n) - eighth * n);
@@ -110,7 +110,7 @@ void ebpo_test_point(const ebpo_mesh *m, uint64_t v, double out[3])
         out[k] = m->xyz32 ? (double)m->xyz32[3 * v + (unsigned)k] : m->xyz64[3 * v + (unsigned)k];
 }
 
-/* Room for exactly what is there: the growth above goes by the count alone. */
+/* Allocates exactly the used size: the growth above depends only on the count. */
 static void regrow(ebpo_mesh *m, uint64_t vertices, uint64_t faces)
 {
     uint64_t v = 1, f = 1;
@@ -271,7 +271,7 @@ static uint32_t lattice_vertex(lattice *l, const uint32_t at[3])
     return *slot - 1;
 }
 
-/* The lattice square at `at` across `axis`, facing up or down that axis. */
+/* Adds the lattice square at `at` across `axis`, facing up or down that axis. */
 static void lattice_square(lattice *l, const uint32_t at[3], int axis, bool up)
 {
     int u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -348,8 +348,8 @@ ebpo_mesh ebpo_test_voxels(const uint8_t *filled, uint32_t n, double cell)
     return m;
 }
 
-/* 1 to 4, with midpoints found by plain search among the edges of the lower end: small meshes only.
- */
+/* Splits 1 into 4, with midpoints found by linear search among the edges of the lower end: small
+ * meshes only. */
 static ebpo_mesh subdivide(const ebpo_mesh *m)
 {
     ebpo_mesh out = empty();

@@ -1,5 +1,5 @@
-/* A tree as JSON: what the vectors' .json files hold and what every reader must get out of a file.
- * Arrays as ebpo_tree has them; coordinates with as many digits as bring every bit back. */
+/* Writes a tree as JSON: the content of the vectors' .json files, which every reader must get from
+ * a file. Arrays as in ebpo_tree; coordinates with enough digits to restore every bit. */
 #ifndef TREE_JSON_H
 #define TREE_JSON_H
 
@@ -10,7 +10,8 @@
 
 #include "core/checksum.h"
 
-/* Long arrays by their SHA-256, as little-endian integers and floats of the widths in ebpo_tree. */
+/* Writes long arrays as their SHA-256, as little-endian integers and floats of the widths in
+ * ebpo_tree. */
 static void tj_digest(FILE *out, const void *values, uint64_t count, size_t size)
 {
     const uint8_t *from = values;

@@ -68,7 +68,7 @@ static uint64_t faces_sum(uint64_t sum, const ebpo_subtree_faces *f, uint64_t no
     sum = add(sum, f->source, f->source ? f->face_count * 4 : 0);
     sum = add(sum, f->corners32, f->corners32 ? f->face_count * 36 : 0);
     sum = add(sum, f->corners64, f->corners64 ? f->face_count * 72 : 0);
-    return add(sum, &f->outer_count, sizeof f->outer_count);
+    return add(sum, &f->shared_count, sizeof f->shared_count);
 }
 
 uint64_t subtree_sum(const ebpo_file *file, uint64_t octcode, ebpo_status *status)

@@ -1,5 +1,5 @@
-/* Reading a vector file whole, and its outcome as two lines: status, message. The folder is left
- * out. */
+/* Reads a whole vector file and gives the result as two lines: status, message. The folder is
+ * omitted. */
 #ifndef VECTOR_READ_H
 #define VECTOR_READ_H
 #include "read_by.h"

@@ -37,18 +37,18 @@ bool web_start(const char *script, const void *data, size_t size)
     }
     close(in[0]);
     close(out[1]);
-    server_input = in[1]; /* closes on exec, and with this process */
-    FILE *told = fdopen(out[0], "r");
-    bool good = server > 0 && told && fscanf(told, "%d", &port) == 1;
-    if (told)
-        fclose(told);
+    server_input = in[1]; /* closes on exec, and when this process ends */
+    FILE *reported = fdopen(out[0], "r");
+    bool good = server > 0 && reported && fscanf(reported, "%d", &port) == 1;
+    if (reported)
+        fclose(reported);
     atexit(web_stop);
     return good;
 }
 
 void web_stop(void)
 {
-    if (server <= 0 || getpid() != owner) /* Check's children come here too */
+    if (server <= 0 || getpid() != owner) /* child processes of Check run this, too */
         return;
     close(server_input);
     waitpid(server, NULL, 0);

@@ -1,16 +1,17 @@
 /* A faulty web server for a test program: tests/support/faulty_server.py, started once, ended with
- * the program whatever happens. */
+ * the program in all cases. */
 #ifndef EBPO_TESTS_WEB_H
 #define EBPO_TESTS_WEB_H
 
-/* Serves these bytes as a file; false when Python is not to be had. The server reads from a pipe
- * that the system closes with this process. */
+/* Serves these bytes as a file; returns false if Python is not available. The server reads from a
+ * pipe that the system closes with this process. */
 #include <stdbool.h>
 #include <stddef.h>
 
 bool web_start(const char *script, const void *data, size_t size);
 void web_stop(void);
-/* "http://127.0.0.1:PORT/FAULT/N", of another N for each call. Static room for the last one. */
+/* Returns "http://127.0.0.1:PORT/FAULT/N", with another N for each call. Static memory, valid until
+ * the next call. */
 const char *web_url(const char *fault);
 
 #endif

@@ -1,13 +1,13 @@
-/* Each public function, called with real models: every_call_*.c hold the calls, test_every_call.c
- * makes them with and without a workspace, and with allocations failing. */
+/* Calls of each public function with real models: every_call_*.c contain the calls,
+ * test_every_call.c runs them with and without a workspace, and with failing allocations. */
 #ifndef EBPO_TESTS_EVERY_CALL_H
 #define EBPO_TESTS_EVERY_CALL_H
 
 #include <ebpo/ebpo.h>
 
 typedef struct every_call_env {
-    ebpo_workspace *workspace; /* NULL: malloc's memory */
-    ebpo_file *file; /* open before and after the call: a call that failed leaves it fit */
+    ebpo_workspace *workspace; /* NULL: memory of malloc */
+    ebpo_file *file;           /* open before and after the call: a failed call leaves it usable */
     ebpo_error *error;
 } every_call_env;
 
@@ -17,37 +17,37 @@ typedef struct every_call {
     ebpo_status (*call)(every_call_env *e);
 } every_call;
 
-/* Ends with a line without a name. */
-extern const every_call every_call_meshes[], every_call_files[], every_call_answers[],
+/* The last entry has no name. */
+extern const every_call every_call_meshes[], every_call_files[], every_call_results[],
     every_call_extras[];
 
 /* Points in and around the model. */
 enum { EVERY_CALL_POINTS = 40 };
 void every_call_points(double (*points)[3]);
 
-/* A mesh of the scratch folder, and what makes a solid of it. */
+/* Reads a mesh of the scratch folder, and repairs it to a solid. */
 ebpo_status every_call_read(every_call_env *e, const char *name, ebpo_mesh *mesh);
 ebpo_status every_call_prepare(ebpo_mesh *mesh, ebpo_prepared *out, ebpo_error *error);
 
-/* Of every_call_extras.c, for a call of every_call_answers.c. */
+/* In every_call_extras.c, for a call of every_call_results.c. */
 ebpo_status every_call_two_models(ebpo_model *model, bool whole, ebpo_error *error);
 
-/* What the calls read, below the scratch folder. */
+/* Inputs of the calls, below the scratch folder. */
 #define EVERY_CALL_MODEL     "model.ebpo.h5"
 #define EVERY_CALL_ROWS      "rows.h5" /* of coordinates, at EVERY_CALL_ROWS_PATH */
 #define EVERY_CALL_ROWS_PATH "/VTKHDF/Points"
 #define EVERY_CALL_PLY       "torus.ply"
 #define EVERY_CALL_SPLIT     "split.ply"    /* without shared vertices */
-#define EVERY_CALL_TURNED    "turned.ply"   /* some faces point the other way */
-#define EVERY_CALL_DOUBLE    "double.ply"   /* some faces are there twice */
+#define EVERY_CALL_TURNED    "turned.ply"   /* some faces are reversed */
+#define EVERY_CALL_DOUBLE    "double.ply"   /* some faces occur twice */
 #define EVERY_CALL_HOLED     "holed.ply"    /* some faces are missing */
-#define EVERY_CALL_CROSSING  "crossing.ply" /* faces pierce each other */
+#define EVERY_CALL_CROSSING  "crossing.ply" /* faces intersect */
 #define EVERY_CALL_OBJ       "torus.obj"
 
-/* A URL of the model; NULL: no server. */
+/* Returns a URL of the model; NULL: no server. */
 const char *every_call_url(void);
 
-/* All allocations succeed from here on to every_call_resume: for what tests need themselves. */
+/* Lets all allocations succeed until every_call_resume: for allocations of the tests themselves. */
 void every_call_pause(void);
 void every_call_resume(void);
 

@@ -1,4 +1,4 @@
-/* Calls of what is built on queries: two models, Booleans, maps, haptics, paint, scenes. */
+/* Calls of modules built on queries: two models, Booleans, maps, haptics, paint, scenes. */
 #include <math.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -8,12 +8,12 @@
 #include <ebpo/map.h>
 #include <ebpo/paint.h>
 #include <ebpo/scene.h>
-#include <ebpo/touch.h>
+#include <ebpo/haptic.h>
 
 #include "every_call.h"
 #include "scratch.h"
 
-static bool count_met(void *user, const ebpo_face_pair *pairs, uint64_t count)
+static bool count_found(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     (void)pairs;
     *(uint64_t *)user += count;
@@ -33,8 +33,8 @@ static bool count_lines(void *user, const ebpo_polyline *line)
     return true;
 }
 
-static ebpo_status write_met(ebpo_collider *collider, const ebpo_collide_options *options,
-                             ebpo_error *error)
+static ebpo_status write_found(ebpo_collider *collider, const ebpo_collide_options *options,
+                               ebpo_error *error)
 {
     ebpo_status status =
         ebpo_collide_write(collider, options, EBPO_PAIRS_HDF5, scratch("pairs.h5"), error);
@@ -45,13 +45,13 @@ static ebpo_status write_met(ebpo_collider *collider, const ebpo_collide_options
     return status;
 }
 
-static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *options,
-                           ebpo_error *error)
+static ebpo_status query_two(ebpo_collider *collider, const ebpo_collide_options *options,
+                             ebpo_error *error)
 {
     ebpo_face_pair pair;
     ebpo_collider_stats stats = EBPO_COLLIDER_STATS_INIT;
     const double up[3] = { 0, 0, 1 };
-    ebpo_way_out way;
+    ebpo_separation way;
     ebpo_clearance clearance;
     ebpo_certain depth[2];
     ebpo_relation_result relation;
@@ -60,9 +60,9 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
     uint64_t count = 0;
     ebpo_status status = ebpo_collide_first(collider, options, &pair, &found, error);
     if (status == EBPO_OK)
-        status = ebpo_collide_all(collider, options, count_met, &count, error);
+        status = ebpo_collide_all(collider, options, count_found, &count, error);
     if (status == EBPO_OK)
-        status = ebpo_collide_self(collider, options, count_met, &count, error);
+        status = ebpo_collide_self(collider, options, count_found, &count, error);
     if (status == EBPO_OK)
         status = ebpo_collide_contacts(collider, options, count_segments, &count, error);
     if (status == EBPO_OK)
@@ -72,11 +72,11 @@ static ebpo_status ask_two(ebpo_collider *collider, const ebpo_collide_options *
     if (status == EBPO_OK)
         status = ebpo_collide_depth(collider, options, 0.5, &depth[0], &depth[1], error);
     if (status == EBPO_OK)
-        status = ebpo_collide_way_out(collider, options, up, &way, error);
+        status = ebpo_collide_separation(collider, options, up, &way, error);
     if (status == EBPO_OK)
         status = ebpo_collide_relation(collider, options, &relation, error);
     if (status == EBPO_OK)
-        status = write_met(collider, options, error);
+        status = write_found(collider, options, error);
     if (status == EBPO_OK)
         status = ebpo_collide_levels(collider, options, &levels, error);
     if (status == EBPO_OK)
@@ -91,8 +91,8 @@ static bool take_segments(void *user, const ebpo_contact_segment *segments, uint
     return true;
 }
 
-/* What models in parts may be asked as well. */
-static ebpo_status ask_parts(ebpo_collider *c, const ebpo_collide_options *o, ebpo_error *error)
+/* Runs queries for partly loaded models. */
+static ebpo_status query_parts(ebpo_collider *c, const ebpo_collide_options *o, ebpo_error *error)
 {
     ebpo_clearance clearance;
     uint64_t segments = 0;
@@ -113,12 +113,13 @@ static ebpo_status collide(ebpo_model *model, bool whole, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_collider_new(model, model, NULL, &collider, error);
     if (status == EBPO_OK)
-        status = whole ? ask_two(collider, &options, error) : ask_parts(collider, &options, error);
+        status =
+            whole ? query_two(collider, &options, error) : query_parts(collider, &options, error);
     ebpo_collider_free(collider);
     return status;
 }
 
-static ebpo_status ask_boolean_cells(ebpo_boolean *boolean, ebpo_error *error)
+static ebpo_status query_boolean_cells(ebpo_boolean *boolean, ebpo_error *error)
 {
     ebpo_cells_options options = EBPO_CELLS_OPTIONS_INIT;
     ebpo_boolean_cells *cells = NULL;
@@ -135,7 +136,7 @@ static ebpo_status ask_boolean_cells(ebpo_boolean *boolean, ebpo_error *error)
     return status;
 }
 
-static ebpo_status ask_boolean(ebpo_model *model, ebpo_error *error)
+static ebpo_status query_boolean(ebpo_model *model, ebpo_error *error)
 {
     const ebpo_boolean_operand operands[2] = { { model, EBPO_POSE_INIT },
                                                { model, EBPO_POSE_INIT } };
@@ -160,15 +161,15 @@ static ebpo_status ask_boolean(ebpo_model *model, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_boolean_exact_volume(boolean, NULL, &exact, error);
     if (status == EBPO_OK)
-        status = ask_boolean_cells(boolean, error);
+        status = query_boolean_cells(boolean, error);
     ebpo_boolean_free(boolean);
     return status;
 }
 
-/* Two models, and Booleans of one. `whole`: all of the model is in memory. */
+/* Calls for two models, and Booleans of one. `whole`: the whole model is in memory. */
 ebpo_status every_call_two_models(ebpo_model *model, bool whole, ebpo_error *error)
 {
-    ebpo_status status = ask_boolean(model, error);
+    ebpo_status status = query_boolean(model, error);
     return status == EBPO_OK ? collide(model, whole, error) : status;
 }
 
@@ -210,8 +211,8 @@ static ebpo_status map_mesh(ebpo_model *model, ebpo_error *error)
     ebpo_mesh mesh = { .vertex_count = 3, .face_count = 1 };
     ebpo_map_options options = EBPO_MAP_OPTIONS_INIT;
     ebpo_map_stats stats = EBPO_MAP_STATS_INIT;
-    ebpo_map_reach reach = EBPO_MAP_REACH_INIT;
-    ebpo_map_reach_options reaching = EBPO_MAP_REACH_OPTIONS_INIT;
+    ebpo_map_range reach = EBPO_MAP_RANGE_INIT;
+    ebpo_map_range_options reaching = EBPO_MAP_RANGE_OPTIONS_INIT;
     options.threads = reaching.threads = 1;
     ebpo_status status = ebpo_map_points(model, xyz, 3, &options, away, error);
     if (status == EBPO_OK)
@@ -219,8 +220,8 @@ static ebpo_status map_mesh(ebpo_model *model, ebpo_error *error)
     mesh.xyz64 = xyz;
     mesh.faces = face;
     if (status == EBPO_OK)
-        status = ebpo_map_find_reach(model, &mesh, away, &reaching, &reach, error);
-    mesh.xyz64 = NULL; /* what painting adds is the mesh's */
+        status = ebpo_map_find_range(model, &mesh, away, &reaching, &reach, error);
+    mesh.xyz64 = NULL; /* painting adds data to the mesh */
     mesh.faces = NULL;
     if (status == EBPO_OK)
         status = ebpo_map_paint(&mesh, away, EBPO_MAP_THESIS, 1, error);
@@ -249,30 +250,30 @@ static ebpo_status call_map(every_call_env *e)
 static ebpo_status touch(ebpo_model *model, ebpo_error *error)
 {
     static const double away[3] = { 9, 0, 0 }, closer[3] = { 6, 0, 0 };
-    ebpo_touch *touch;
-    ebpo_touch_result answer;
-    ebpo_touch_stats stats = EBPO_TOUCH_STATS_INIT;
-    double way[EBPO_TOUCH_WAY_MOST][3];
-    ebpo_touch_options options = EBPO_TOUCH_OPTIONS_INIT;
+    ebpo_haptic *touch;
+    ebpo_haptic_ball_result result;
+    ebpo_haptic_stats stats = EBPO_HAPTIC_STATS_INIT;
+    double way[EBPO_HAPTIC_PATH_MAX][3];
+    ebpo_haptic_options options = EBPO_HAPTIC_OPTIONS_INIT;
     options.faces = 1 << 12;
-    ebpo_status status = ebpo_touch_new(model, &options, away, &touch, error);
+    ebpo_status status = ebpo_haptic_new(model, &options, away, &touch, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_touch_sensed sensed;
-    ebpo_touch_turned turned;
-    double poses[EBPO_TOUCH_WAY_MOST][7];
+    ebpo_haptic_probe_result sensed;
+    ebpo_haptic_tool_result turned;
+    double poses[EBPO_HAPTIC_PATH_MAX][7];
     static const double turn[4] = { 0, 0, 0, 1 };
-    ebpo_touch_move(touch, away, &answer);
-    (void)ebpo_touch_way(touch, way);
-    ebpo_touch_sense(touch, away, &sensed); /* not of its kind: answers so */
-    ebpo_touch_turn(touch, away, turn, &turned);
-    (void)ebpo_touch_poses(touch, poses);
-    status = ebpo_touch_place(touch, closer, error);
+    ebpo_haptic_step_ball(touch, away, &result);
+    (void)ebpo_haptic_ball_path(touch, way);
+    ebpo_haptic_step_probe(touch, away, &sensed); /* wrong kind: reports it */
+    ebpo_haptic_step_tool(touch, away, turn, &turned);
+    (void)ebpo_haptic_tool_path(touch, poses);
+    status = ebpo_haptic_reset(touch, closer, error);
     if (status == EBPO_OK)
-        status = ebpo_touch_check(touch, error);
+        status = ebpo_haptic_check(touch, error);
     if (status == EBPO_OK)
-        status = ebpo_touch_get_stats(touch, &stats);
-    ebpo_touch_free(touch);
+        status = ebpo_haptic_get_stats(touch, &stats);
+    ebpo_haptic_free(touch);
     return status;
 }
 
@@ -282,12 +283,12 @@ static bool take_painted(void *user, const ebpo_paint_face *face)
     return face->file_face != 1;
 }
 
-/* A paint's strokes on the model, asked about. */
-static ebpo_status ask_paint(ebpo_paint *paint, ebpo_context *context, ebpo_error *error)
+/* Queries strokes of a paint on the model. */
+static ebpo_status query_paint(ebpo_paint *paint, ebpo_context *context, ebpo_error *error)
 {
-    const ebpo_paint_hand hand[2] = { { { 3, 0, 1 }, 1, 0 }, { { 3, 0.5, 1 }, 0.5, 10 } };
+    const ebpo_paint_input hand[2] = { { { 3, 0, 1 }, 1, 0 }, { { 3, 0.5, 1 }, 0.5, 10 } };
     ebpo_paint_pen pen = EBPO_PAINT_PEN_INIT;
-    ebpo_paint_laid laid = EBPO_PAINT_LAID_INIT;
+    ebpo_paint_drawn laid = EBPO_PAINT_DRAWN_INIT;
     ebpo_paint_areas areas = EBPO_PAINT_AREAS_INIT;
     ebpo_paint_options options = EBPO_PAINT_OPTIONS_INIT;
     ebpo_paint_note note = EBPO_PAINT_NOTE_INIT;
@@ -297,7 +298,7 @@ static ebpo_status ask_paint(ebpo_paint *paint, ebpo_context *context, ebpo_erro
     pen.density = 3;
     options.fineness = 8;
     options.threads = 1;
-    ebpo_status status = ebpo_paint_lay(paint, context, hand, 2, &pen, &laid, error);
+    ebpo_status status = ebpo_paint_draw(paint, context, hand, 2, &pen, &laid, error);
     if (status == EBPO_OK)
         status = ebpo_paint_cover(paint, context, 0, take_painted, NULL, &elsewhere, error);
     if (status == EBPO_OK)
@@ -305,7 +306,7 @@ static ebpo_status ask_paint(ebpo_paint *paint, ebpo_context *context, ebpo_erro
     if (status == EBPO_OK)
         ebpo_paint_areas_free(&areas);
     if (status == EBPO_OK)
-        status = ebpo_paint_place(paint, context, hand[0].place, &note.at, error);
+        status = ebpo_paint_locate(paint, context, hand[0].place, &note.at, error);
     note.body = "here";
     return status == EBPO_OK ? ebpo_paint_add_note(paint, &note, error) : status;
 }
@@ -322,7 +323,7 @@ static ebpo_status bake_paint(const ebpo_paint *paint, const ebpo_file *file, eb
     if (rgba)
         status = ebpo_paint_bake(paint, context, &mesh, NULL, rgba, &baked, error);
     if (rgba && status == EBPO_OK)
-        status = ebpo_paint_dye_mesh(&mesh, rgba, error);
+        status = ebpo_paint_colour_mesh(&mesh, rgba, error);
     if (!rgba)
         *error = (ebpo_error){ .status = status = EBPO_E_MEMORY, .message = "colours" };
     free(rgba);
@@ -330,7 +331,7 @@ static ebpo_status bake_paint(const ebpo_paint *paint, const ebpo_file *file, eb
     return status;
 }
 
-/* Written, read, and taken apart. */
+/* Writes, reads and removes a paint. */
 static ebpo_status keep_paint(ebpo_paint *paint, ebpo_error *error)
 {
     ebpo_paint *read = NULL;
@@ -384,7 +385,7 @@ static ebpo_status call_paint(every_call_env *e)
     if (status == EBPO_OK)
         status = ebpo_paint_add_layer(paint, NULL, NULL, e->error);
     if (status == EBPO_OK)
-        status = ask_paint(paint, context, e->error);
+        status = query_paint(paint, context, e->error);
     if (status == EBPO_OK)
         status = ebpo_paint_check_points(paint, context, NULL, e->error);
     if (status == EBPO_OK)
@@ -400,7 +401,7 @@ static ebpo_status call_paint(every_call_env *e)
     return status;
 }
 
-static ebpo_status call_touch(every_call_env *e)
+static ebpo_status call_haptic(every_call_env *e)
 {
     ebpo_model *model;
     ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
@@ -419,7 +420,7 @@ static bool count_crossings(void *user, const ebpo_crossing *crossings, uint64_t
     return true;
 }
 
-/* It takes the mesh, too. */
+/* It consumes the mesh. */
 static ebpo_status call_crossings(every_call_env *e)
 {
     ebpo_mesh mesh;
@@ -445,7 +446,7 @@ static bool count_pairs(void *user, const ebpo_scene_pair *pairs, uint64_t count
     return true;
 }
 
-static ebpo_status look_at_scene(const ebpo_scene *scene)
+static ebpo_status inspect_scene(const ebpo_scene *scene)
 {
     ebpo_scene_counts counts = EBPO_SCENE_COUNTS_INIT;
     ebpo_scene_model_facts model = EBPO_SCENE_MODEL_FACTS_INIT;
@@ -463,13 +464,13 @@ static ebpo_status look_at_scene(const ebpo_scene *scene)
     return fine ? EBPO_OK : EBPO_E_ARGUMENT;
 }
 
-static bool count_meetings(void *user, const ebpo_scene_meeting *meetings, uint64_t count)
+static bool count_clashes(void *user, const ebpo_scene_clash *clashes, uint64_t count)
 {
-    *(uint64_t *)user += count + (meetings[0].kind == EBPO_MEETING_NONE);
+    *(uint64_t *)user += count + (clashes[0].kind == EBPO_CLASH_NONE);
     return true;
 }
 
-static bool count_ways(void *user, const ebpo_scene_way *ways, uint64_t count)
+static bool count_ways(void *user, const ebpo_scene_approach_result *ways, uint64_t count)
 {
     *(uint64_t *)user += count + (ways[0].reached != 1);
     return true;
@@ -483,7 +484,7 @@ static bool count_needs(void *user, const ebpo_scene_need *needs, uint64_t count
 
 static bool count_packed(void *user, const ebpo_scene_packed *models, uint64_t count)
 {
-    *(uint64_t *)user += count + !models[0].answers;
+    *(uint64_t *)user += count + !models[0].complete;
     return true;
 }
 
@@ -510,17 +511,17 @@ static bool count_leasts(void *user, const ebpo_scene_least *list, uint64_t coun
     return true;
 }
 
-static ebpo_status record_scene(const ebpo_scene *scene, const ebpo_scene_meeting *meeting,
+static ebpo_status record_scene(const ebpo_scene *scene, const ebpo_scene_clash *clash,
                                 ebpo_error *error)
 {
-    ebpo_scene_record *record;
-    ebpo_scene_frame frame = { .time = 1, .asked = 1 };
-    ebpo_status status = ebpo_scene_record_new(scene, scratch("report.h5"), &record, error);
+    ebpo_scene_report *record;
+    ebpo_scene_frame frame = { .time = 1, .queried = 1 };
+    ebpo_status status = ebpo_scene_report_new(scene, scratch("report.h5"), &record, error);
     if (status == EBPO_OK)
-        status = ebpo_scene_record_add(record, &frame, meeting, 1, error);
+        status = ebpo_scene_report_add(record, &frame, clash, 1, error);
     if (status == EBPO_OK)
-        status = ebpo_scene_record_finish(record, error);
-    ebpo_scene_record_free(record);
+        status = ebpo_scene_report_finish(record, error);
+    ebpo_scene_report_free(record);
     unlink(scratch("report.h5"));
     return status;
 }
@@ -531,15 +532,15 @@ static bool count_face_pairs(void *user, const ebpo_face_pair *pairs, uint64_t c
     return true;
 }
 
-/* Of the two that meet. */
-static ebpo_status look_at_meeting(ebpo_scene *scene, ebpo_error *error)
+/* Queries the two intersecting instances. */
+static ebpo_status inspect_clash(ebpo_scene *scene, ebpo_error *error)
 {
     uint64_t pairs = 0;
     ebpo_scene_stats stats = EBPO_SCENE_STATS_INIT;
-    ebpo_scene_meeting meeting = { .b = 1, .face_a = EBPO_NO_FACE };
+    ebpo_scene_clash clash = { .b = 1, .face_a = EBPO_NO_FACE };
     ebpo_status status = ebpo_scene_collide(scene, 0, 1, 1, 1, count_face_pairs, &pairs, error);
     if (status == EBPO_OK)
-        status = record_scene(scene, &meeting, error);
+        status = record_scene(scene, &clash, error);
     if (status == EBPO_OK)
         status = ebpo_scene_get_stats(scene, &stats);
     return status == EBPO_OK && (pairs == 0 || stats.files != 1 || stats.models != 1)
@@ -547,29 +548,30 @@ static ebpo_status look_at_meeting(ebpo_scene *scene, ebpo_error *error)
                : status;
 }
 
-static ebpo_status meet_in_scene(ebpo_scene *scene, ebpo_error *error)
+static ebpo_status intersect_in_scene(ebpo_scene *scene, ebpo_error *error)
 {
-    uint64_t meetings = 0, asked = 0;
-    ebpo_scene_ask_options how = EBPO_SCENE_ASK_OPTIONS_INIT;
+    uint64_t clashes = 0, queried = 0;
+    ebpo_scene_clash_options how = EBPO_SCENE_CLASH_OPTIONS_INIT;
     how.threads = 1;
     how.count = how.places = how.relate = true;
     how.depth = 0.1;
-    ebpo_status status = ebpo_scene_meet(scene, 1, &how, count_meetings, &meetings, &asked, error);
-    ebpo_scene_way_options along = EBPO_SCENE_WAY_OPTIONS_INIT;
+    ebpo_status status =
+        ebpo_scene_find_clashes(scene, 1, &how, count_clashes, &clashes, &queried, error);
+    ebpo_scene_approach_options along = EBPO_SCENE_APPROACH_OPTIONS_INIT;
     uint64_t ways = 0;
     if (status == EBPO_OK)
-        status = look_at_meeting(scene, error);
+        status = inspect_clash(scene, error);
     along.threads = 1;
     along.tolerance = 0.01;
     if (status == EBPO_OK)
         status = ebpo_scene_approach(scene, 0, 1, &along, count_ways, &ways, error);
     if (status == EBPO_OK)
         status = ebpo_scene_least_distances(scene, 0, 1, &along, count_leasts, &ways, error);
-    return status == EBPO_OK && (meetings != 1 || asked != 1 || ways != 2) ? EBPO_E_ARGUMENT
-                                                                           : status;
+    return status == EBPO_OK && (clashes != 1 || queried != 1 || ways != 2) ? EBPO_E_ARGUMENT
+                                                                            : status;
 }
 
-static ebpo_status ask_scene(ebpo_scene *scene, ebpo_error *error)
+static ebpo_status query_scene(ebpo_scene *scene, ebpo_error *error)
 {
     double min[3], max[3], length;
     uint64_t pairs = 0;
@@ -577,7 +579,7 @@ static ebpo_status ask_scene(ebpo_scene *scene, ebpo_error *error)
     ebpo_model *model;
     ebpo_status status = ebpo_scene_load(scene, NULL, error);
     if (status == EBPO_OK)
-        status = look_at_scene(scene);
+        status = inspect_scene(scene);
     if (status == EBPO_OK)
         status = ebpo_scene_pose(scene, 1, 0.5, &pose, error);
     if (status == EBPO_OK)
@@ -591,7 +593,7 @@ static ebpo_status ask_scene(ebpo_scene *scene, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_scene_model(scene, 0, &model, error);
     if (status == EBPO_OK)
-        status = meet_in_scene(scene, error);
+        status = intersect_in_scene(scene, error);
     return status == EBPO_OK && pairs != 1 ? EBPO_E_ARGUMENT : status;
 }
 
@@ -611,7 +613,7 @@ static ebpo_status call_scene(every_call_env *e)
     if (status == EBPO_OK)
         status = ebpo_scene_add_instance(scene, &second, NULL, e->error);
     if (status == EBPO_OK)
-        status = ask_scene(scene, e->error);
+        status = query_scene(scene, e->error);
     ebpo_scene_free(scene);
     return status;
 }
@@ -645,7 +647,7 @@ static ebpo_status call_scene_new(every_call_env *e)
 }
 
 const every_call every_call_extras[] = {
-    { "crossings", call_crossings }, { "map", call_map },     { "touch", call_touch },
+    { "crossings", call_crossings }, { "map", call_map },     { "touch", call_haptic },
     { "paint", call_paint },         { "scene", call_scene }, { "scene_file", call_scene_file },
     { "scene_new", call_scene_new }, { NULL, NULL },
 };

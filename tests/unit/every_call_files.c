@@ -103,7 +103,7 @@ static ebpo_status call_open_with(every_call_env *e)
 {
     ebpo_file *file;
     ebpo_open_options options = EBPO_OPEN_OPTIONS_INIT;
-    options.most_expansion = 1;
+    options.max_expansion = 1;
     ebpo_status status = ebpo_open_with(scratch(EVERY_CALL_MODEL), &options, &file, e->error);
     return end_open(file, status, e->error);
 }
@@ -116,7 +116,7 @@ static ebpo_status call_open_compat(every_call_env *e)
     return end_open(file, status, e->error);
 }
 
-/* A model in memory, which is the test's own. */
+/* A model in memory, owned by the test. */
 typedef struct bytes {
     char *data;
     uint64_t size;
@@ -124,11 +124,11 @@ typedef struct bytes {
 
 static bytes load(void)
 {
-    enum { MOST = 8 << 20 };
+    enum { LIMIT = 8 << 20 };
     every_call_pause();
     FILE *f = fopen(scratch(EVERY_CALL_MODEL), "rb");
-    bytes b = { malloc(MOST), 0 };
-    b.size = f && b.data ? fread(b.data, 1, MOST, f) : 0;
+    bytes b = { malloc(LIMIT), 0 };
+    b.size = f && b.data ? fread(b.data, 1, LIMIT, f) : 0;
     if (f)
         fclose(f);
     every_call_resume();

@@ -1,4 +1,4 @@
-/* Calls that take meshes: reading, checking, mending, building. */
+/* Calls for meshes: reading, checking, repairing, building. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,7 +19,7 @@ static ebpo_status call_read(every_call_env *e)
     ebpo_mesh mesh;
     ebpo_status status = every_call_read(e, EVERY_CALL_PLY, &mesh);
     (void)ebpo_mesh_attributes_lost(&mesh);
-    (void)ebpo_mesh_unread(&mesh);
+    (void)ebpo_mesh_ignored(&mesh);
     (void)ebpo_mesh_has_attributes(&mesh);
     ebpo_mesh_free(&mesh);
     return status;
@@ -98,7 +98,7 @@ static ebpo_status call_check(every_call_env *e)
     return status;
 }
 
-static bool take_place(void *user, const ebpo_mesh_place *place)
+static bool take_place(void *user, const ebpo_mesh_finding *place)
 {
     uint8_t rgb[3];
     (void)user;
@@ -109,12 +109,12 @@ static bool take_place(void *user, const ebpo_mesh_place *place)
 static ebpo_status call_places(every_call_env *e)
 {
     ebpo_mesh mesh;
-    ebpo_places_options options = EBPO_PLACES_OPTIONS_INIT;
+    ebpo_findings_options options = EBPO_FINDINGS_OPTIONS_INIT;
     ebpo_status status = every_call_read(e, EVERY_CALL_HOLED, &mesh);
     options.threads = 1;
     options.ply = scratch("places.ply");
     if (status == EBPO_OK)
-        status = ebpo_mesh_places(&mesh, &options, take_place, NULL, NULL, e->error);
+        status = ebpo_mesh_findings(&mesh, &options, take_place, NULL, NULL, e->error);
     ebpo_mesh_free(&mesh);
     return status;
 }
@@ -129,11 +129,12 @@ static ebpo_status call_arrange(every_call_env *e)
     return status;
 }
 
-static ebpo_status mend(every_call_env *e, const char *name,
-                        ebpo_status (*how)(ebpo_mesh *, ebpo_mend_record *, ebpo_error *))
+static ebpo_status repair_record(every_call_env *e, const char *name,
+                                 ebpo_status (*how)(ebpo_mesh *, ebpo_repair_record *,
+                                                    ebpo_error *))
 {
     ebpo_mesh mesh;
-    ebpo_mend_record record;
+    ebpo_repair_record record;
     memset(&record, 0, sizeof record);
     ebpo_status status = every_call_read(e, name, &mesh);
     if (status == EBPO_OK)
@@ -142,47 +143,59 @@ static ebpo_status mend(every_call_env *e, const char *name,
     return status;
 }
 
-static ebpo_status weld(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+static ebpo_status weld(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_error *error)
 {
     return ebpo_mesh_weld(mesh, record, error);
 }
 
-static ebpo_status weld_within(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+static ebpo_status weld_within(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_error *error)
 {
     return ebpo_mesh_weld_within(mesh, 1e-6, record, error);
 }
 
-static ebpo_status orient(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+static ebpo_status orient(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_error *error)
 {
     return ebpo_mesh_orient(mesh, record, error);
 }
 
-static ebpo_status fill(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+static ebpo_status fill(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_error *error)
 {
     return ebpo_mesh_fill_holes(mesh, record, error);
 }
 
-static ebpo_status drop(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+static ebpo_status drop(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_error *error)
 {
     return ebpo_mesh_drop_duplicates(mesh, record, error);
 }
 
-static ebpo_status flip(ebpo_mesh *mesh, ebpo_mend_record *record, ebpo_error *error)
+static ebpo_status flip(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_error *error)
 {
     return ebpo_mesh_flip(mesh, record, error);
 }
 
-static ebpo_status call_weld(every_call_env *e) { return mend(e, EVERY_CALL_SPLIT, weld); }
+static ebpo_status call_weld(every_call_env *e) { return repair_record(e, EVERY_CALL_SPLIT, weld); }
 static ebpo_status call_weld_within(every_call_env *e)
 {
-    return mend(e, EVERY_CALL_SPLIT, weld_within);
+    return repair_record(e, EVERY_CALL_SPLIT, weld_within);
 }
-static ebpo_status call_orient(every_call_env *e) { return mend(e, EVERY_CALL_TURNED, orient); }
-static ebpo_status call_fill_holes(every_call_env *e) { return mend(e, EVERY_CALL_HOLED, fill); }
+static ebpo_status call_orient(every_call_env *e)
+{
+    return repair_record(e, EVERY_CALL_TURNED, orient);
+}
+static ebpo_status call_fill_holes(every_call_env *e)
+{
+    return repair_record(e, EVERY_CALL_HOLED, fill);
+}
 
-static ebpo_status call_drop(every_call_env *e) { return mend(e, EVERY_CALL_DOUBLE, drop); }
+static ebpo_status call_drop(every_call_env *e)
+{
+    return repair_record(e, EVERY_CALL_DOUBLE, drop);
+}
 
-static ebpo_status call_flip(every_call_env *e) { return mend(e, EVERY_CALL_TURNED, flip); }
+static ebpo_status call_flip(every_call_env *e)
+{
+    return repair_record(e, EVERY_CALL_TURNED, flip);
+}
 
 static ebpo_status call_shells(every_call_env *e)
 {
@@ -207,7 +220,7 @@ static ebpo_status call_repeated(every_call_env *e)
     return status;
 }
 
-/* Of a file that has no names. */
+/* With a file without names. */
 static ebpo_status call_groups(every_call_env *e)
 {
     ebpo_mesh mesh;
@@ -287,7 +300,7 @@ static ebpo_status call_repairs(every_call_env *e)
     return status;
 }
 
-/* ebpo_build takes the mesh, whether it succeeds or not. */
+/* ebpo_build consumes the mesh, also on failure. */
 static ebpo_status build(every_call_env *e, const char *name, ebpo_selection selection,
                          unsigned threads)
 {

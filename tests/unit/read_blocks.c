@@ -1,4 +1,4 @@
-/* lib/query/face_block.h as any processor reads with it, or as those with AVX2 do: READ_BLOCK names
+/* lib/query/face_block.h compiled for any processor, or for processors with AVX2: READ_BLOCK names
  * the function. */
 #include "query/face_block.h"
 #include "read_blocks.h"

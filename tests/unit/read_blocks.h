@@ -1,4 +1,4 @@
-/* A block as kernels read it: [axis][corner][lane]; returns a bit for each lane with a face. */
+/* Reads a block as kernels do: [axis][corner][lane]; returns a bit for each lane with a face. */
 #ifndef EBPO_TESTS_READ_BLOCKS_H
 #define EBPO_TESTS_READ_BLOCKS_H
 

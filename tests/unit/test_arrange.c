@@ -1,4 +1,5 @@
-/* The order of a mesh along the Morton curve, and sorting by groups, against plain twins. */
+/* The order of a mesh along the Morton curve, and sorting by groups, against reference
+ * implementations. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -59,7 +60,7 @@ static uint64_t key_of_kind(int kind, uint64_t i, uint64_t *state)
 {
     uint64_t r = ebpo_test_random(state);
     switch (kind) {
-    case 0: return r & ((UINT64_C(1) << 63) - 1); /* all over */
+    case 0: return r & ((UINT64_C(1) << 63) - 1); /* uniform */
     case 1: return 12345;                         /* all equal */
     case 2: return r % 7 << 50;                   /* few, far from each other */
     case 3: return (UINT64_C(1) << 60) + r % 100; /* all in one bin */
@@ -67,7 +68,7 @@ static uint64_t key_of_kind(int kind, uint64_t i, uint64_t *state)
     }
 }
 
-START_TEST(groups_sort_as_qsort_does)
+START_TEST(test_group_sort_matches_qsort)
 {
     uint64_t state = 1 + (uint64_t)_i, count = _i % 5 == 1 ? 30000 : 400000;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -112,15 +113,16 @@ static ebpo_mesh some_mesh(int i)
     return m;
 }
 
-/* Bit by bit: is the vertex in the cell, whose upper walls belong to the next ones? */
+/* Returns bit by bit whether the vertex is in the cell, whose upper faces belong to the next cells.
+ */
 static bool lies_in(const ebpo_box *box, const ebpo_mesh *m, uint64_t v, ebpo_cell cell)
 {
     double p[3];
     uint32_t last = (uint32_t)((UINT64_C(1) << cell.level) - 1);
     ebpo_mesh_position(m, v, p);
     for (int k = 0; k < 3; k++)
-        if ((cell.at[k] > 0 && p[k] < ebpo_wall(box, k, cell.level, cell.at[k])) ||
-            (cell.at[k] < last && p[k] >= ebpo_wall(box, k, cell.level, cell.at[k] + 1)))
+        if ((cell.at[k] > 0 && p[k] < ebpo_cell_face(box, k, cell.level, cell.at[k])) ||
+            (cell.at[k] < last && p[k] >= ebpo_cell_face(box, k, cell.level, cell.at[k] + 1)))
             return false;
     return true;
 }
@@ -163,7 +165,7 @@ static void expect_arranged(const ebpo_mesh *m, const ebpo_mesh *source)
     free(named);
 }
 
-START_TEST(meshes_are_the_same_in_another_order)
+START_TEST(test_arranged_mesh_has_same_faces)
 {
     ebpo_mesh source = some_mesh(_i), m = some_mesh(_i), again = some_mesh(_i);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -175,7 +177,7 @@ START_TEST(meshes_are_the_same_in_another_order)
         expect_arranged(&m, &source);
         ck_assert(ebpo_mesh_check(&m, 2, silent, &after, &error) == EBPO_OK);
         ck_assert_msg(memcmp(&before, &after, sizeof before) == 0, "mesh %d: another report", _i);
-        /* From any order, with other threads, and once more. */
+        /* From any order, with other threads, and repeated. */
         ck_assert(ebpo_arrange(&again, 3, 4, &silent, &error) == EBPO_OK &&
                   again.arrangement->box.grid_level == 3);
         expect_arranged(&again, &source);
@@ -190,7 +192,7 @@ START_TEST(meshes_are_the_same_in_another_order)
 }
 END_TEST
 
-START_TEST(memory_does_not_change_the_order)
+START_TEST(test_arrange_order_ignores_memory_budget)
 {
     ebpo_mesh m = ebpo_test_torus(2, 0.7, 600, 400), small = ebpo_test_torus(2, 0.7, 600, 400);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -215,7 +217,7 @@ START_TEST(memory_does_not_change_the_order)
 }
 END_TEST
 
-START_TEST(what_cannot_be_arranged_is_refused_and_stays)
+START_TEST(test_arrange_refusal_keeps_mesh)
 {
     ebpo_mesh m = ebpo_test_torus(2, 0.7, 20, 10);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -238,10 +240,10 @@ TEST_SUITE(arrange)
     Suite *suite = suite_create("arrange");
     TCase *tests = tcase_create("all");
     tcase_set_timeout(tests, 300);
-    tcase_add_loop_test(tests, groups_sort_as_qsort_does, 0, 10);
-    tcase_add_loop_test(tests, meshes_are_the_same_in_another_order, 0, ebpo_test_solid_count + 4);
-    tcase_add_test(tests, memory_does_not_change_the_order);
-    tcase_add_test(tests, what_cannot_be_arranged_is_refused_and_stays);
+    tcase_add_loop_test(tests, test_group_sort_matches_qsort, 0, 10);
+    tcase_add_loop_test(tests, test_arranged_mesh_has_same_faces, 0, ebpo_test_solid_count + 4);
+    tcase_add_test(tests, test_arrange_order_ignores_memory_budget);
+    tcase_add_test(tests, test_arrange_refusal_keeps_mesh);
     suite_add_tcase(suite, tests);
     return suite;
 }

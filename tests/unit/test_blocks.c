@@ -1,5 +1,5 @@
-/* Blocks hold the faces of the mesh they were made from, bit for bit, however they are read: one by
- * one and as kernels do on any processor. An accel takes no more memory than was said before. */
+/* Blocks contain the faces of their mesh, bit for bit, read one by one and by kernels on any
+ * processor. An accel takes no more memory than stated before. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 #include "format/chunks.h"
 #include "format/slice.h"
 #include "query/query_model.h"
-#include "query_kit.h"
+#include "query_support.h"
 #include "read_blocks.h"
 
 /* --- an accel against its mesh --- */
@@ -47,7 +47,7 @@ static void check_lane(reading *r, uint32_t block, unsigned lane, double base[3]
         }
 }
 
-/* Empty lanes repeat a face: what bounds all lanes bounds the faces and no more. */
+/* Empty lanes repeat a face: bounds of all lanes bound only the faces. */
 static void check_idle(const ebpo_accel *s, uint32_t block, unsigned lane,
                        double read[3][3][EBPO_BLOCK])
 {
@@ -116,7 +116,7 @@ static void check_estimate(const ebpo_accel *s, const ebpo_slice_size *size, con
 
 enum { FACES = 500 };
 
-/* Corners from a pool of vertices that moves on: the larger, the fewer of them are shared. */
+/* Corners from a moving pool of vertices: the larger it is, the fewer are shared. */
 static ebpo_mesh random_mesh(uint64_t *state, uint32_t pool, bool doubles)
 {
     ebpo_mesh mesh = { .vertex_count = FACES / 8 * (pool / 4) + 2 * pool, .face_count = FACES };
@@ -162,7 +162,7 @@ static ebpo_slice one_leaf(const ebpo_mesh *mesh)
 static const uint32_t pools[] = { 4, 6, 8, 9, 12, 17, 24, 1000 };
 enum { POOLS = sizeof pools / sizeof pools[0] };
 
-START_TEST(blocks_hold_the_faces_of_random_meshes)
+START_TEST(test_blocks_contain_faces_of_random_meshes)
 {
     uint64_t state = 77 + (uint64_t)_i;
     bool doubles = _i >= POOLS;
@@ -184,9 +184,9 @@ START_TEST(blocks_hold_the_faces_of_random_meshes)
 }
 END_TEST
 
-/* --- faces that are so far from their leaf that their squares overflow --- */
+/* --- faces so far from their leaf that their squares overflow --- */
 
-/* Each vertex of a child is in its slab, as accel.h says what that is. */
+/* Checks that each vertex of a child is in its bounding cylinder, as defined in accel.h. */
 static void check_slab(const ebpo_accel *s, const ebpo_bound *b, const ebpo_bound_slab *slab,
                        int lane, uint32_t child)
 {
@@ -224,9 +224,9 @@ static void check_slabs(const ebpo_accel *s)
     }
 }
 
-/* In files of others: the leaf is 1 wide, its faces are up to 10^25 away, and single precision
- * holds squares up to 10^38. */
-START_TEST(slabs_hold_faces_whose_squares_overflow)
+/* For files of other programs: the leaf is 1 wide, its faces are up to 10^25 away, and single
+ * precision holds squares up to 10^38. */
+START_TEST(test_cylinders_contain_faces_with_overflow)
 {
     static const double far[] = { 1, 1e15, 1e25 };
     enum { FARS = sizeof far / sizeof far[0] };
@@ -251,7 +251,7 @@ START_TEST(slabs_hold_faces_whose_squares_overflow)
 }
 END_TEST
 
-/* --- 512 leaves of one face and of nine in turns: hardly any two share a block --- */
+/* --- 512 leaves with one face and with nine in turn: hardly any two share a block --- */
 
 enum { LEVELS = 4, LEAVES = 512, NINES = LEAVES / 2 * 10 };
 
@@ -295,7 +295,7 @@ static ebpo_slice spread_leaves(bool doubles)
     return slice;
 }
 
-START_TEST(an_accel_takes_no_more_than_was_said)
+START_TEST(test_block_memory_stays_below_estimate)
 {
     ebpo_info *info = calloc(1, sizeof *info);
     info->box_size[0] = info->box_size[1] = info->box_size[2] = 1;
@@ -331,7 +331,7 @@ static void check_subtree(const query_model *m, const ebpo_node *root)
     ebpo_chunks_free(chunks);
 }
 
-START_TEST(blocks_hold_the_faces_of_files)
+START_TEST(test_blocks_contain_faces_of_files)
 {
     query_model m;
     query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
@@ -350,10 +350,10 @@ Suite *test_suite(void)
     Suite *suite = suite_create("blocks");
     TCase *blocks = tcase_create("blocks");
     tcase_set_timeout(blocks, 600);
-    tcase_add_loop_test(blocks, blocks_hold_the_faces_of_random_meshes, 0, 2 * POOLS);
-    tcase_add_loop_test(blocks, slabs_hold_faces_whose_squares_overflow, 0, 6);
-    tcase_add_loop_test(blocks, an_accel_takes_no_more_than_was_said, 0, 2);
-    tcase_add_loop_test(blocks, blocks_hold_the_faces_of_files, 0, query_solid_count());
+    tcase_add_loop_test(blocks, test_blocks_contain_faces_of_random_meshes, 0, 2 * POOLS);
+    tcase_add_loop_test(blocks, test_cylinders_contain_faces_with_overflow, 0, 6);
+    tcase_add_loop_test(blocks, test_block_memory_stays_below_estimate, 0, 2);
+    tcase_add_loop_test(blocks, test_blocks_contain_faces_of_files, 0, query_solid_count());
     suite_add_tcase(suite, blocks);
     return suite;
 }

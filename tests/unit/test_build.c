@@ -1,5 +1,5 @@
-/* The builder: trees keep their promises to the reader, on solids of every kind. Envelopes and
- * labels are proved by test_verify. */
+/* The builder: trees keep the guarantees for readers, on solids of every kind. test_verify checks
+ * envelopes and labels. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,7 +46,7 @@ static void assert_counts(const ebpo_tree *tree)
     ck_assert_uint_eq(tree->level[tree->info.level_count - 1].gray_count, 0);
 }
 
-/* Every face is new once, in the first leaf that lists it, and lists name no face twice. */
+/* Checks that every face is new once, in the first leaf that lists it, and lists repeat no face. */
 static void assert_lists(const ebpo_tree *tree)
 {
     uint8_t *seen = calloc(tree->mesh.face_count + 1, 1);
@@ -73,7 +73,7 @@ static void assert_lists(const ebpo_tree *tree)
     free(seen);
 }
 
-/* The mesh of the tree is the source, renumbered. */
+/* Checks that the mesh of the tree is the source, renumbered. */
 static void assert_same_mesh(const ebpo_tree *tree, const ebpo_mesh *source)
 {
     ck_assert_uint_eq(tree->mesh.vertex_count, source->vertex_count);
@@ -95,7 +95,8 @@ static double level_volume(const ebpo_tree *tree, int level)
     return sum + tree->level[level].gray_volume;
 }
 
-/* Where windings stay below 2 the integral of the winding number is the solid's volume. */
+/* Where winding numbers stay below 2 the integral of the winding number is the volume of the solid.
+ */
 static bool single_shell_everywhere(const ebpo_tree *tree)
 {
     for (int i = 0; i < tree->info.level_count; i++) {
@@ -109,7 +110,7 @@ static bool single_shell_everywhere(const ebpo_tree *tree)
     return true;
 }
 
-START_TEST(tree_of_every_solid_is_consistent)
+START_TEST(test_trees_of_all_solids_are_consistent)
 {
     const ebpo_test_solid *solid = &ebpo_test_solids[_i];
     for (uint32_t leaf_faces = 0; leaf_faces <= 16; leaf_faces += 8) {
@@ -154,7 +155,7 @@ static void assert_equal_trees(const ebpo_tree *a, const ebpo_tree *b)
     ck_assert_mem_eq(a->face_source, b->face_source, a->mesh.face_count * 4);
 }
 
-START_TEST(result_does_not_depend_on_threads)
+START_TEST(test_build_same_for_any_threads)
 {
     double centre[3] = { 0, 0, 0 };
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
@@ -168,7 +169,7 @@ START_TEST(result_does_not_depend_on_threads)
 }
 END_TEST
 
-START_TEST(maximum_level_follows_equation_3)
+START_TEST(test_maximum_level_follows_equation_3)
 {
     /* A cube of side 1 cut into n x n squares: edges 1/n and the diagonals; L / 2^i falls below
      * their mean. */
@@ -188,7 +189,7 @@ START_TEST(maximum_level_follows_equation_3)
 }
 END_TEST
 
-START_TEST(levels_zero_and_twenty_work)
+START_TEST(test_build_levels_zero_and_twenty)
 {
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     options.max_level = 0;
@@ -197,7 +198,8 @@ START_TEST(levels_zero_and_twenty_work)
     ck_assert_uint_eq(tree.level[0].leaf_count, 1);
     ebpo_tree_free(&tree);
     options.max_level = 20;
-    options.leaf_faces = 2; /* three faces meet at a corner: the tree goes down there to the end */
+    options.leaf_faces = 2; /* three faces meet at a corner: the tree reaches its maximum depth
+                             * there */
     tree = build(ebpo_test_make("tetrahedron"), &options);
     ck_assert_int_eq(tree.info.level_count, 21);
     assert_counts(&tree);
@@ -206,7 +208,7 @@ START_TEST(levels_zero_and_twenty_work)
 }
 END_TEST
 
-START_TEST(too_many_cells_are_refused)
+START_TEST(test_build_refuses_too_many_cells)
 {
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     options.max_level = 20;
@@ -216,7 +218,7 @@ START_TEST(too_many_cells_are_refused)
 }
 END_TEST
 
-START_TEST(require_solid_refuses_a_surface)
+START_TEST(test_require_solid_refuses_surface)
 {
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     options.require_solid = true;
@@ -248,10 +250,10 @@ static double black_volume(const ebpo_tree *tree)
     return sum;
 }
 
-START_TEST(gray_nodes_are_worth_it_when_faces_pass_cells_by_a_rounding_error)
+START_TEST(test_gray_nodes_near_cell_corners)
 {
-    /* Found by trial: faces of this tetrahedron pass cell corners so closely that they are listed
-     * at a node and, below it, no more. */
+    /* Found by trial: faces of this tetrahedron are so close to cell corners that they are listed
+     * at a node but not below it. */
     static const double corners[4][3] = {
         { 0x1.67aea7c6db494p-2, 0x1.32011afef3792p-1, 0x1.919bdc2a4022fp-1 },
         { 0x1.f842fe606bc34p-2, -0x1.856424e430e74p-2, 0x1.b45abf9f65a79p-1 },
@@ -282,7 +284,7 @@ START_TEST(gray_nodes_are_worth_it_when_faces_pass_cells_by_a_rounding_error)
 }
 END_TEST
 
-START_TEST(rules_differ_where_shells_overlap)
+START_TEST(test_build_rules_differ_in_overlapping_shells)
 {
     double volume[3];
     for (int rule = 0; rule < 3; rule++) {
@@ -298,7 +300,7 @@ START_TEST(rules_differ_where_shells_overlap)
 }
 END_TEST
 
-START_TEST(bad_options_leave_nothing_behind)
+START_TEST(test_build_bad_options_leave_nothing)
 {
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     options.max_level = 21;
@@ -313,15 +315,15 @@ TEST_SUITE(build)
     Suite *suite = suite_create("build");
     TCase *tests = tcase_create("build");
     tcase_set_timeout(tests, 600);
-    tcase_add_loop_test(tests, tree_of_every_solid_is_consistent, 0, ebpo_test_solid_count);
-    tcase_add_test(tests, result_does_not_depend_on_threads);
-    tcase_add_test(tests, maximum_level_follows_equation_3);
-    tcase_add_test(tests, levels_zero_and_twenty_work);
-    tcase_add_test(tests, too_many_cells_are_refused);
-    tcase_add_test(tests, require_solid_refuses_a_surface);
-    tcase_add_test(tests, gray_nodes_are_worth_it_when_faces_pass_cells_by_a_rounding_error);
-    tcase_add_test(tests, rules_differ_where_shells_overlap);
-    tcase_add_test(tests, bad_options_leave_nothing_behind);
+    tcase_add_loop_test(tests, test_trees_of_all_solids_are_consistent, 0, ebpo_test_solid_count);
+    tcase_add_test(tests, test_build_same_for_any_threads);
+    tcase_add_test(tests, test_maximum_level_follows_equation_3);
+    tcase_add_test(tests, test_build_levels_zero_and_twenty);
+    tcase_add_test(tests, test_build_refuses_too_many_cells);
+    tcase_add_test(tests, test_require_solid_refuses_surface);
+    tcase_add_test(tests, test_gray_nodes_near_cell_corners);
+    tcase_add_test(tests, test_build_rules_differ_in_overlapping_shells);
+    tcase_add_test(tests, test_build_bad_options_leave_nothing);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,5 +1,5 @@
-/* The cache against a plain model of itself, and under threads: the source counts what is loading
- * and what lives, and the budget holds at every moment. */
+/* The cache against a reference implementation, and with threads: the source counts loading and
+ * existing items, and the budget holds at all times. */
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -20,8 +20,8 @@ typedef struct source {
     uint64_t budget, bytes, size[KEYS], peak[KEYS];
     int live[KEYS], loading[KEYS], loads[KEYS];
     bool failing[KEYS], gated[KEYS]; /* a gated load waits until the gate opens */
-    int order[4 * KEYS], ordered;    /* loads as they began */
-    int faults;                      /* what must never happen */
+    int order[4 * KEYS], ordered;    /* loads in order of their start */
+    int faults;                      /* number of violations */
     bool jitter;
 } source;
 
@@ -74,7 +74,8 @@ static ebpo_status load(void *user, uint64_t key, uint64_t limit, void **out, ui
     s->loading[key]--;
     account(s, (int64_t)(fails ? 0 : s->size[key]) - (int64_t)s->peak[key]);
     if (!fails)
-        s->faults += s->live[key]++ > 1; /* the one before may be on its way out */
+        s->faults +=
+            s->live[key]++ > 1; /* the previous item may still be in the process of removal */
     *bytes = s->size[key];
     pthread_mutex_unlock(&s->lock);
     if (fails)
@@ -179,13 +180,13 @@ static void await_prefetched(uint64_t count)
 
 /* --- one thread --- */
 
-/* The plain model: keys from the least to the most recently used. */
-typedef struct twin {
+/* The reference implementation: keys from the least to the most recently used. */
+typedef struct reference {
     int key[KEYS], count, pins[KEYS];
     uint64_t bytes, pinned;
-} twin;
+} reference;
 
-static int twin_at(const twin *t, int key)
+static int reference_at(const reference *t, int key)
 {
     for (int i = 0; i < t->count; i++)
         if (t->key[i] == key)
@@ -193,28 +194,28 @@ static int twin_at(const twin *t, int key)
     return -1;
 }
 
-static void twin_remove(twin *t, int at)
+static void reference_remove(reference *t, int at)
 {
     t->bytes -= src->size[t->key[at]];
     memmove(t->key + at, t->key + at + 1, (size_t)(t->count - at - 1) * sizeof *t->key);
     t->count--;
 }
 
-static void twin_append(twin *t, int key)
+static void reference_append(reference *t, int key)
 {
     t->key[t->count++] = key;
     t->bytes += src->size[key];
 }
 
-static void twin_pin(twin *t, int key)
+static void reference_pin(reference *t, int key)
 {
     if (t->pins[key]++ == 0)
         t->pinned += src->size[key];
 }
 
-static bool twin_get(twin *t, int key)
+static bool reference_get(reference *t, int key)
 {
-    if (twin_at(t, key) < 0) {
+    if (reference_at(t, key) < 0) {
         uint64_t peak = src->peak[key];
         if (t->pinned + peak > src->budget)
             return false;
@@ -222,23 +223,23 @@ static bool twin_get(twin *t, int key)
             if (t->pins[t->key[i]])
                 i++;
             else
-                twin_remove(t, i);
-        twin_append(t, key);
+                reference_remove(t, i);
+        reference_append(t, key);
     }
-    twin_pin(t, key);
+    reference_pin(t, key);
     return true;
 }
 
-static void twin_unpin(twin *t, int key)
+static void reference_unpin(reference *t, int key)
 {
     if (--t->pins[key])
         return;
     t->pinned -= src->size[key];
-    twin_remove(t, twin_at(t, key)); /* the end of use is the last use */
-    twin_append(t, key);
+    reference_remove(t, reference_at(t, key)); /* the end of use is the last use */
+    reference_append(t, key);
 }
 
-static void step(twin *t, uint64_t *random)
+static void step(reference *t, uint64_t *random)
 {
     int key = (int)(ebpo_test_random(random) % 40);
     void *it;
@@ -247,17 +248,17 @@ static void step(twin *t, uint64_t *random)
     case 1:
     case 2: {
         ebpo_error error = EBPO_ERROR_INIT;
-        bool there = twin_at(t, key) >= 0, hit, fits = twin_get(t, key);
+        bool there = reference_at(t, key) >= 0, hit, fits = reference_get(t, key);
         ck_assert_int_eq(ebpo_cache_get(cache, (uint64_t)key, &it, &hit, &error),
                          fits ? EBPO_OK : EBPO_E_LIMIT);
         ck_assert(hit == there);
         break;
     }
     case 3: {
-        bool there = twin_at(t, key) >= 0;
+        bool there = reference_at(t, key) >= 0;
         ck_assert(ebpo_cache_try(cache, (uint64_t)key, &it) == there);
         if (there)
-            twin_pin(t, key);
+            reference_pin(t, key);
         break;
     }
     case 4:
@@ -266,19 +267,19 @@ static void step(twin *t, uint64_t *random)
         ebpo_cache_clear(cache);
         for (int i = t->count; i-- > 0;)
             if (!t->pins[t->key[i]])
-                twin_remove(t, i);
+                reference_remove(t, i);
         break;
     default:
         for (int i = 0; i < 40 && !t->pins[key]; i++)
             key = (key + 1) % 40;
         if (t->pins[key]) {
             ebpo_cache_unpin(cache, (uint64_t)key);
-            twin_unpin(t, key);
+            reference_unpin(t, key);
         }
     }
 }
 
-START_TEST(random_operations_agree_with_a_plain_model)
+START_TEST(test_cache_random_operations_match_model)
 {
     uint64_t random = (uint64_t)_i;
     begin_with(1000, 0, 0);
@@ -286,12 +287,12 @@ START_TEST(random_operations_agree_with_a_plain_model)
         src->size[i] = 10 + ebpo_test_random(&random) % 150;
         src->peak[i] = src->size[i] + ebpo_test_random(&random) % 100;
     }
-    twin t = { .count = 0 };
+    reference t = { .count = 0 };
     for (int i = 0; i < 20000; i++) {
         step(&t, &random);
         int differ = -1;
         for (int key = 0; key < 40; key++)
-            differ = src->live[key] == (twin_at(&t, key) >= 0) ? differ : key;
+            differ = src->live[key] == (reference_at(&t, key) >= 0) ? differ : key;
         ck_assert_msg(differ < 0, "step %d, key %d", i, differ);
         ck_assert_uint_eq(stats().bytes, t.bytes);
     }
@@ -304,7 +305,7 @@ START_TEST(random_operations_agree_with_a_plain_model)
 }
 END_TEST
 
-START_TEST(pinned_items_stay_and_the_message_says_what_would_do)
+START_TEST(test_cache_pinned_items_stay)
 {
     begin_with(300, 100, 120);
     get(1);
@@ -328,15 +329,16 @@ START_TEST(pinned_items_stay_and_the_message_says_what_would_do)
 }
 END_TEST
 
-/* Items go for it, those in use do not; a load that would need it is refused before it is taken. */
-START_TEST(what_is_set_aside_is_taken_from_the_items_as_it_is_needed)
+/* Items are evicted for it, items in use are not; a load that would need the memory is refused
+ * before it is taken. */
+START_TEST(test_cache_reserve_evicts_items_when_needed)
 {
     begin_with(400, 100, 100);
     ebpo_cache_set_aside(cache, 150);
     for (uint64_t key = 0; key < 4; key++)
         ck_assert(!use(key));
     ebpo_cache_stats stats;
-    ck_assert(ebpo_cache_take_aside(cache, 60)); /* the oldest goes */
+    ck_assert(ebpo_cache_take_aside(cache, 60)); /* evicts the oldest */
     ck_assert_int_eq(src->live[0] + src->live[1], 1);
     ck_assert(!ebpo_cache_take_aside(cache, 91));
     get(2);
@@ -359,7 +361,7 @@ END_TEST
 
 /* --- shared --- */
 
-/* Both of one source, of keys that differ. */
+/* Both of one source, with different keys. */
 static ebpo_cache_pool *pool;
 static ebpo_cache *other;
 
@@ -391,7 +393,7 @@ static void use_other(uint64_t key)
     ebpo_cache_unpin(other, key);
 }
 
-START_TEST(of_caches_that_share_a_budget_the_least_recently_used_goes_whoever_it_is)
+START_TEST(test_shared_budget_evicts_least_recently_used)
 {
     begin_two(400, 100, 100);
     use(1);
@@ -410,7 +412,7 @@ START_TEST(of_caches_that_share_a_budget_the_least_recently_used_goes_whoever_it
 }
 END_TEST
 
-START_TEST(what_is_taken_for_good_of_a_shared_budget_is_dropped_for)
+START_TEST(test_shared_budget_permanent_use_evicts_items)
 {
     uint64_t now, peak, taken;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -453,8 +455,8 @@ static void *use_either(void *context)
     return NULL;
 }
 
-/* The source counts all bytes of both, at every moment. */
-START_TEST(a_shared_budget_holds_under_four_threads)
+/* The source counts all bytes of both, at all times. */
+START_TEST(test_shared_budget_holds_with_four_threads)
 {
     pthread_t thread[4];
     uint64_t seed[4] = { 1, 2, 3, 4 };
@@ -467,7 +469,7 @@ START_TEST(a_shared_budget_holds_under_four_threads)
 }
 END_TEST
 
-START_TEST(a_failed_load_tells_why_and_leaves_nothing)
+START_TEST(test_failed_load_reports_error)
 {
     begin_with(300, 100, 120);
     src->failing[5] = true;
@@ -485,19 +487,19 @@ START_TEST(a_failed_load_tells_why_and_leaves_nothing)
 }
 END_TEST
 
-static ebpo_status say_little(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
-                              ebpo_error *error)
+static ebpo_status report_little(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
+                                 ebpo_error *error)
 {
     ebpo_status status = estimate(user, key, peak, keep, error);
     *peak = *keep = 10;
     return status;
 }
 
-START_TEST(an_item_beyond_its_estimate_does_not_break_the_budget)
+START_TEST(test_item_beyond_estimate_keeps_budget)
 {
     begin_with(300, 100, 100);
     ebpo_cache_free(cache);
-    ebpo_cache_source from = { src, say_little, load, release };
+    ebpo_cache_source from = { src, report_little, load, release };
     ck_assert_int_eq(ebpo_cache_make(&cache, &from, "thing", 300, NULL), EBPO_OK);
     void *it;
     ck_assert_int_eq(ebpo_cache_get(cache, 1, &it, NULL, NULL), EBPO_E_LIMIT);
@@ -506,7 +508,7 @@ START_TEST(an_item_beyond_its_estimate_does_not_break_the_budget)
 }
 END_TEST
 
-/* Finds out while loading that it needs more than was said. */
+/* Finds while loading that it needs more memory than stated. */
 static ebpo_status load_more(void *user, uint64_t key, uint64_t limit, void **out, uint64_t *bytes,
                              ebpo_error *error)
 {
@@ -517,11 +519,11 @@ static ebpo_status load_more(void *user, uint64_t key, uint64_t limit, void **ou
     return ebpo_fail(error, EBPO_E_LIMIT, "%d bytes do not do", (int)limit);
 }
 
-START_TEST(a_load_that_needs_more_room_gets_it_or_is_refused)
+START_TEST(test_load_can_request_more_memory)
 {
     begin_with(300, 50, 150);
     ebpo_cache_free(cache);
-    ebpo_cache_source from = { src, say_little, load_more, release };
+    ebpo_cache_source from = { src, report_little, load_more, release };
     ck_assert_int_eq(ebpo_cache_make(&cache, &from, "thing", 300, NULL), EBPO_OK);
     void *it;
     for (uint64_t key = 0; key < 5; key++) {
@@ -539,7 +541,7 @@ START_TEST(a_load_that_needs_more_room_gets_it_or_is_refused)
 }
 END_TEST
 
-START_TEST(without_a_budget_everything_stays)
+START_TEST(test_cache_without_budget_keeps_all_items)
 {
     begin_with(0, 1 << 20, 1 << 20);
     for (int round = 0; round < 2; round++)
@@ -579,7 +581,7 @@ static void start(getter *g, uint64_t key)
     pthread_create(&g->thread, NULL, run_getter, g);
 }
 
-START_TEST(many_who_want_the_same_key_load_it_once)
+START_TEST(test_concurrent_gets_load_key_once)
 {
     getter g[8];
     begin_with(1000, 100, 100);
@@ -603,7 +605,7 @@ START_TEST(many_who_want_the_same_key_load_it_once)
 }
 END_TEST
 
-START_TEST(those_who_wait_for_a_load_that_fails_get_their_own_answer)
+START_TEST(test_waiters_of_failed_load_get_error)
 {
     getter g[4];
     begin_with(1000, 100, 100);
@@ -624,7 +626,7 @@ START_TEST(those_who_wait_for_a_load_that_fails_get_their_own_answer)
 }
 END_TEST
 
-START_TEST(a_get_waits_for_the_room_that_another_load_holds)
+START_TEST(test_get_waits_for_memory_of_load)
 {
     getter a, b;
     begin_with(150, 100, 100);
@@ -644,7 +646,7 @@ START_TEST(a_get_waits_for_the_room_that_another_load_holds)
 }
 END_TEST
 
-/* Small loads, one after the other on several threads, never leave room for a large one by chance.
+/* Small loads, one after the other on several threads, never leave space for a large one by chance.
  */
 static void *run_small(void *context)
 {
@@ -658,13 +660,13 @@ static void *run_small(void *context)
     return NULL;
 }
 
-START_TEST(a_large_load_is_not_starved_by_small_ones)
+START_TEST(test_large_load_is_not_starved)
 {
     pthread_t small[3];
     atomic_bool stop = false;
     begin_with(400, 100, 100);
     src->jitter = true;
-    /* a small one in use leaves no room: that is a refusal; beside loads it waits */
+    /* a small one in use leaves no space: that is a refusal; beside loads it waits */
     src->size[200] = src->peak[200] = 290;
     for (int i = 0; i < 3; i++)
         pthread_create(&small[i], NULL, run_small, &stop);
@@ -672,7 +674,7 @@ START_TEST(a_large_load_is_not_starved_by_small_ones)
     for (int i = 0; i < 20000 && done < 20; i++) {
         void *it;
         if (ebpo_cache_get(cache, 200, &it, NULL, NULL) != EBPO_OK) {
-            usleep(100); /* a thread that lost its turn while it uses an item gets one */
+            usleep(100); /* a thread that lost its turn while it uses an item gets a new one */
             continue;
         }
         ebpo_cache_unpin(cache, 200);
@@ -687,9 +689,9 @@ START_TEST(a_large_load_is_not_starved_by_small_ones)
 }
 END_TEST
 
-/* --- ahead --- */
+/* --- prefetching --- */
 
-START_TEST(what_is_asked_for_ahead_is_loaded_in_order)
+START_TEST(test_prefetch_loads_in_order)
 {
     begin_with(1000, 100, 100);
     uint64_t keys[] = { 9, 3, 9, 5, 200 };
@@ -704,7 +706,7 @@ START_TEST(what_is_asked_for_ahead_is_loaded_in_order)
 }
 END_TEST
 
-START_TEST(loading_ahead_drops_neither_what_is_in_use_nor_what_was_asked_for)
+START_TEST(test_prefetch_keeps_used_and_hinted_items)
 {
     begin_with(500, 100, 100);
     for (uint64_t key = 1; key <= 5; key++)
@@ -721,7 +723,7 @@ START_TEST(loading_ahead_drops_neither_what_is_in_use_nor_what_was_asked_for)
 }
 END_TEST
 
-START_TEST(asking_again_forgets_what_was_asked_before)
+START_TEST(test_new_prefetch_hint_replaces_old_one)
 {
     begin_with(5000, 100, 100);
     set_gate(1, true);
@@ -740,7 +742,7 @@ START_TEST(asking_again_forgets_what_was_asked_before)
 }
 END_TEST
 
-START_TEST(a_get_waits_for_the_background_and_does_not_load_again)
+START_TEST(test_get_waits_for_prefetch)
 {
     getter g;
     begin_with(100, 100, 100);
@@ -749,7 +751,7 @@ START_TEST(a_get_waits_for_the_background_and_does_not_load_again)
     ebpo_cache_prefetch(cache, &key, 1);
     await_loading(1);
     start(&g, 1);
-    usleep(200000); /* on a busy machine it is a while until the other thread waits */
+    usleep(200000); /* on a busy machine it takes some time until the other thread waits */
     set_gate(1, false);
     pthread_join(g.thread, NULL);
     ck_assert_int_eq(g.status, EBPO_OK);
@@ -761,7 +763,7 @@ START_TEST(a_get_waits_for_the_background_and_does_not_load_again)
 }
 END_TEST
 
-START_TEST(a_get_waits_for_the_room_of_a_background_load)
+START_TEST(test_get_waits_for_memory_of_prefetch)
 {
     getter g;
     begin_with(150, 100, 100);
@@ -779,7 +781,7 @@ START_TEST(a_get_waits_for_the_room_of_a_background_load)
 }
 END_TEST
 
-START_TEST(failures_ahead_are_silent)
+START_TEST(test_prefetch_failures_are_silent)
 {
     begin_with(1000, 100, 100);
     src->failing[1] = true;
@@ -803,7 +805,7 @@ static void *open_gate_soon(void *context)
     return NULL;
 }
 
-START_TEST(freeing_ends_the_background_after_its_current_load)
+START_TEST(test_cache_free_stops_prefetch)
 {
     begin_with(0, 100, 100);
     uint64_t keys[64];
@@ -870,7 +872,7 @@ static void *run_hammer(void *context)
     return NULL;
 }
 
-START_TEST(the_budget_holds_under_four_threads_and_the_background)
+START_TEST(test_budget_holds_with_threads_and_prefetch)
 {
     hammer h[4];
     uint64_t random = 1 + (uint64_t)_i;
@@ -902,28 +904,28 @@ TEST_SUITE(cache)
     Suite *suite = suite_create("cache");
     TCase *tests = tcase_create("cache");
     tcase_set_timeout(tests, 300);
-    tcase_add_loop_test(tests, random_operations_agree_with_a_plain_model, 1, 6);
-    tcase_add_test(tests, what_is_set_aside_is_taken_from_the_items_as_it_is_needed);
-    tcase_add_test(tests, of_caches_that_share_a_budget_the_least_recently_used_goes_whoever_it_is);
-    tcase_add_test(tests, what_is_taken_for_good_of_a_shared_budget_is_dropped_for);
-    tcase_add_test(tests, a_shared_budget_holds_under_four_threads);
-    tcase_add_test(tests, pinned_items_stay_and_the_message_says_what_would_do);
-    tcase_add_test(tests, a_failed_load_tells_why_and_leaves_nothing);
-    tcase_add_test(tests, an_item_beyond_its_estimate_does_not_break_the_budget);
-    tcase_add_test(tests, a_load_that_needs_more_room_gets_it_or_is_refused);
-    tcase_add_test(tests, without_a_budget_everything_stays);
-    tcase_add_test(tests, many_who_want_the_same_key_load_it_once);
-    tcase_add_test(tests, those_who_wait_for_a_load_that_fails_get_their_own_answer);
-    tcase_add_test(tests, a_get_waits_for_the_room_that_another_load_holds);
-    tcase_add_test(tests, a_large_load_is_not_starved_by_small_ones);
-    tcase_add_test(tests, what_is_asked_for_ahead_is_loaded_in_order);
-    tcase_add_test(tests, loading_ahead_drops_neither_what_is_in_use_nor_what_was_asked_for);
-    tcase_add_test(tests, asking_again_forgets_what_was_asked_before);
-    tcase_add_test(tests, a_get_waits_for_the_background_and_does_not_load_again);
-    tcase_add_test(tests, a_get_waits_for_the_room_of_a_background_load);
-    tcase_add_test(tests, failures_ahead_are_silent);
-    tcase_add_test(tests, freeing_ends_the_background_after_its_current_load);
-    tcase_add_loop_test(tests, the_budget_holds_under_four_threads_and_the_background, 0, 3);
+    tcase_add_loop_test(tests, test_cache_random_operations_match_model, 1, 6);
+    tcase_add_test(tests, test_cache_reserve_evicts_items_when_needed);
+    tcase_add_test(tests, test_shared_budget_evicts_least_recently_used);
+    tcase_add_test(tests, test_shared_budget_permanent_use_evicts_items);
+    tcase_add_test(tests, test_shared_budget_holds_with_four_threads);
+    tcase_add_test(tests, test_cache_pinned_items_stay);
+    tcase_add_test(tests, test_failed_load_reports_error);
+    tcase_add_test(tests, test_item_beyond_estimate_keeps_budget);
+    tcase_add_test(tests, test_load_can_request_more_memory);
+    tcase_add_test(tests, test_cache_without_budget_keeps_all_items);
+    tcase_add_test(tests, test_concurrent_gets_load_key_once);
+    tcase_add_test(tests, test_waiters_of_failed_load_get_error);
+    tcase_add_test(tests, test_get_waits_for_memory_of_load);
+    tcase_add_test(tests, test_large_load_is_not_starved);
+    tcase_add_test(tests, test_prefetch_loads_in_order);
+    tcase_add_test(tests, test_prefetch_keeps_used_and_hinted_items);
+    tcase_add_test(tests, test_new_prefetch_hint_replaces_old_one);
+    tcase_add_test(tests, test_get_waits_for_prefetch);
+    tcase_add_test(tests, test_get_waits_for_memory_of_prefetch);
+    tcase_add_test(tests, test_prefetch_failures_are_silent);
+    tcase_add_test(tests, test_cache_free_stops_prefetch);
+    tcase_add_loop_test(tests, test_budget_holds_with_threads_and_prefetch, 0, 3);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,17 +1,17 @@
-/* Root boxes whose walls are exact doubles, and octcodes. */
+/* Root boxes whose cell faces are exact doubles, and octcodes. */
 #include <math.h>
 #include <stdlib.h>
 
 #include <gmp.h>
 
 #include "check_main.h"
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "geometry/cells.h"
 
 /* --- boxes --- */
 
-/* True when ebpo_wall gives origin + k size / 2^level without rounding. */
-static bool wall_is_exact(const ebpo_box *box, int axis, int level, uint32_t k)
+/* Returns true when ebpo_cell_face gives origin + k size / 2^level without rounding. */
+static bool cell_face_is_exact(const ebpo_box *box, int axis, int level, uint32_t k)
 {
     mpq_t expected, origin, found;
     mpq_inits(expected, origin, found, NULL);
@@ -21,21 +21,22 @@ static bool wall_is_exact(const ebpo_box *box, int axis, int level, uint32_t k)
     mpq_div_2exp(expected, expected, (mp_bitcnt_t)level);
     mpq_set_d(origin, box->origin[axis]);
     mpq_add(expected, expected, origin);
-    mpq_set_d(found, ebpo_wall(box, axis, level, k));
+    mpq_set_d(found, ebpo_cell_face(box, axis, level, k));
     bool exact = mpq_equal(expected, found);
     mpq_clears(expected, origin, found, NULL);
     return exact;
 }
 
-static void check_walls(const ebpo_box *box, uint64_t *state)
+static void check_cell_faces(const ebpo_box *box, uint64_t *state)
 {
     for (int axis = 0; axis < 3; axis++)
         for (int level = 0; level <= box->grid_level; level++) {
             uint32_t last = (uint32_t)1 << level;
-            const uint32_t k[5] = { 0, 1, last - 1, last, (uint32_t)twin_integer(state, 0, last) };
+            const uint32_t k[5] = { 0, 1, last - 1, last,
+                                    (uint32_t)reference_integer(state, 0, last) };
             for (int i = 0; i < 5; i++)
-                ck_assert_msg(wall_is_exact(box, axis, level, k[i]), "axis %d level %d wall %u",
-                              axis, level, k[i]);
+                ck_assert_msg(cell_face_is_exact(box, axis, level, k[i]),
+                              "axis %d level %d wall %u", axis, level, k[i]);
         }
 }
 
@@ -48,58 +49,59 @@ static void check_box(const double min[3], const double max[3], int grid_level, 
     for (int k = 0; k < 3; k++) {
         ck_assert(box.size[k] > 0);
         ck_assert(box.origin[k] < min[k]);
-        ck_assert(max[k] < ebpo_wall(&box, k, 0, 1));
+        ck_assert(max[k] < ebpo_cell_face(&box, k, 0, 1));
     }
-    check_walls(&box, state);
+    check_cell_faces(&box, state);
 }
 
-/* One coordinate of the kinds that files hold, by scale. */
+/* Generates a coordinate of the kinds in files, by scale. */
 static double hard_coordinate(int kind, uint64_t *state)
 {
-    double x = twin_uniform(state);
+    double x = reference_uniform(state);
     switch (kind) {
     case 0: return x;
     case 1: return 1e7 + 1e-3 * x;
     case 2: return (double)(float)(1e7 + x);
     case 3: return (double)(float)(1e-38 * x);
-    case 4: return 0x1p-1074 * (double)twin_integer(state, -3, 3);
+    case 4: return 0x1p-1074 * (double)reference_integer(state, -3, 3);
     case 5: return 1e-300 * x;
     case 6: return 1e300 * x;
     case 7: return 0x1p1000 * (x < 0 ? -1 : 1);
-    case 8: return (double)twin_integer(state, -1, 1);
-    case 9: return -0x1p53 + (double)twin_integer(state, 0, 3);
-    default: return ldexp(x, (int)twin_integer(state, -1074, 1000));
+    case 8: return (double)reference_integer(state, -1, 1);
+    case 9: return -0x1p53 + (double)reference_integer(state, 0, 3);
+    default: return ldexp(x, (int)reference_integer(state, -1074, 1000));
     }
 }
 
-START_TEST(box_walls_are_exact_and_outside_the_model)
+START_TEST(test_box_faces_are_exact_outside_model)
 {
     uint64_t state = (uint64_t)_i + 1;
     for (int i = 0; i < 400; i++) {
         double min[3], max[3];
         for (int k = 0; k < 3; k++) {
-            int kind = i % 4 == 3 ? (int)twin_integer(&state, 0, 10) : _i;
+            int kind = i % 4 == 3 ? (int)reference_integer(&state, 0, 10) : _i;
             double a = hard_coordinate(kind, &state), b = hard_coordinate(kind, &state);
-            if (twin_random(&state) % 4 == 0)
+            if (reference_random(&state) % 4 == 0)
                 b = a;
             min[k] = fmin(a, b);
             max[k] = fmax(a, b);
         }
-        check_box(min, max, i % 3 ? EBPO_MAX_LEVEL : (int)twin_integer(&state, 0, EBPO_MAX_LEVEL),
+        check_box(min, max,
+                  i % 3 ? EBPO_MAX_LEVEL : (int)reference_integer(&state, 0, EBPO_MAX_LEVEL),
                   &state);
     }
 }
 END_TEST
 
-START_TEST(box_of_ordinary_model_grows_by_a_millionth_at_most)
+START_TEST(test_box_grows_at_most_one_millionth)
 {
     uint64_t state = 4;
     for (int i = 0; i < 10000; i++) {
-        double min[3], max[3], scale = ldexp(1, (int)twin_integer(&state, -900, 900));
+        double min[3], max[3], scale = ldexp(1, (int)reference_integer(&state, -900, 900));
         ebpo_box box;
         for (int k = 0; k < 3; k++) {
-            min[k] = scale * 2 * twin_uniform(&state);
-            max[k] = min[k] + scale * (1.25 + twin_uniform(&state));
+            min[k] = scale * 2 * reference_uniform(&state);
+            max[k] = min[k] + scale * (1.25 + reference_uniform(&state));
         }
         ck_assert(ebpo_box_make(&box, min, max, EBPO_MAX_LEVEL));
         for (int k = 0; k < 3; k++)
@@ -109,7 +111,7 @@ START_TEST(box_of_ordinary_model_grows_by_a_millionth_at_most)
 END_TEST
 
 /* The finest step that 53 bits allow 1e7 from 0 is 2^-29: 2^20 cells of it make 2^-9. */
-START_TEST(box_of_translated_model_is_as_tight_as_doubles_allow)
+START_TEST(test_box_of_translated_model_is_tight)
 {
     const double min[3] = { 1e7, 1e7, 1e7 }, max[3] = { 1e7 + 1e-3, 1e7 + 1e-3, 1e7 + 1e-3 };
     ebpo_box box;
@@ -120,7 +122,7 @@ START_TEST(box_of_translated_model_is_as_tight_as_doubles_allow)
 }
 END_TEST
 
-START_TEST(box_of_single_point_has_volume)
+START_TEST(test_box_of_single_point_has_volume)
 {
     const double zero[3] = { 0, 0, 0 }, point[3] = { 3, -4, 0 };
     uint64_t state = 1;
@@ -129,7 +131,7 @@ START_TEST(box_of_single_point_has_volume)
 }
 END_TEST
 
-START_TEST(box_make_refuses_bounds_out_of_range)
+START_TEST(test_box_make_refuses_bad_bounds)
 {
     const double good[3] = { 0, 0, 0 }, bad[][3] = {
         { 0, NAN, 0 }, { INFINITY, 0, 0 }, { 0, 0, 0x1.1p1000 }, { 0, -INFINITY, 0 }, { -1, 1, 1 }
@@ -143,7 +145,7 @@ START_TEST(box_make_refuses_bounds_out_of_range)
 }
 END_TEST
 
-START_TEST(box_valid_refuses_hostile_boxes)
+START_TEST(test_box_valid_refuses_hostile_boxes)
 {
     const ebpo_box good = { { -1, 0, 0x1p30 }, { 2, 3, 1 }, 20 };
     const double bad_size[] = { NAN,  INFINITY,  -INFINITY,  -1,  0,
@@ -171,24 +173,25 @@ START_TEST(box_valid_refuses_hostile_boxes)
 }
 END_TEST
 
-/* Whatever bits a file holds: what is called valid has exact walls. */
-START_TEST(box_valid_accepts_only_boxes_with_exact_walls)
+/* For any bits in a file: a valid box has exact cell faces. */
+START_TEST(test_box_valid_requires_exact_cell_faces)
 {
     uint64_t state = 6;
     int valid = 0;
     for (int i = 0; i < 3000; i++) {
-        ebpo_box box = { .grid_level = (int)twin_integer(&state, -1, 21) };
-        int e = (int)twin_integer(&state, -1074, 1000), bits = (int)twin_integer(&state, 30, 53);
+        ebpo_box box = { .grid_level = (int)reference_integer(&state, -1, 21) };
+        int e = (int)reference_integer(&state, -1074, 1000),
+            bits = (int)reference_integer(&state, 30, 53);
         for (int k = 0; k < 3; k++) {
             int64_t limit = (int64_t)1 << bits;
-            box.origin[k] = ldexp((double)twin_integer(&state, -limit, limit), e - bits);
-            box.size[k] = ldexp((double)twin_integer(&state, 1, limit),
-                                e - bits + (int)twin_integer(&state, 0, 20));
+            box.origin[k] = ldexp((double)reference_integer(&state, -limit, limit), e - bits);
+            box.size[k] = ldexp((double)reference_integer(&state, 1, limit),
+                                e - bits + (int)reference_integer(&state, 0, 20));
         }
         if (!ebpo_box_valid(&box))
             continue;
         valid++;
-        check_walls(&box, &state);
+        check_cell_faces(&box, &state);
     }
     ck_assert_int_gt(valid, 100);
 }
@@ -206,14 +209,14 @@ static ebpo_octcode plain_octcode(ebpo_cell cell)
     return code;
 }
 
-START_TEST(octcode_equals_plain_twin_and_comes_back)
+START_TEST(test_octcode_matches_reference_and_inverts)
 {
     uint64_t state = (uint64_t)_i + 50;
     int64_t last = ((int64_t)1 << _i) - 1;
     for (int i = 0; i < 20000; i++) {
         ebpo_cell cell = { _i, { 0, 0, 0 } };
         for (int k = 0; k < 3; k++)
-            cell.at[k] = (uint32_t)(i == 0 ? last : twin_integer(&state, 0, last));
+            cell.at[k] = (uint32_t)(i == 0 ? last : reference_integer(&state, 0, last));
         ebpo_octcode code = ebpo_octcode_of_cell(cell);
         ck_assert(code == plain_octcode(cell));
         ck_assert(ebpo_octcode_valid(code));
@@ -230,7 +233,7 @@ START_TEST(octcode_equals_plain_twin_and_comes_back)
 }
 END_TEST
 
-START_TEST(octcode_valid_refuses_codes_without_leading_one)
+START_TEST(test_octcode_valid_requires_leading_one)
 {
     ck_assert(!ebpo_octcode_valid(0));
     ck_assert(ebpo_octcode_valid(1));
@@ -247,15 +250,15 @@ TEST_SUITE(cell)
 {
     TCase *tests = tcase_create("cell");
     tcase_set_timeout(tests, 120);
-    tcase_add_loop_test(tests, box_walls_are_exact_and_outside_the_model, 0, 11);
-    tcase_add_test(tests, box_of_ordinary_model_grows_by_a_millionth_at_most);
-    tcase_add_test(tests, box_of_translated_model_is_as_tight_as_doubles_allow);
-    tcase_add_test(tests, box_of_single_point_has_volume);
-    tcase_add_test(tests, box_make_refuses_bounds_out_of_range);
-    tcase_add_test(tests, box_valid_refuses_hostile_boxes);
-    tcase_add_test(tests, box_valid_accepts_only_boxes_with_exact_walls);
-    tcase_add_loop_test(tests, octcode_equals_plain_twin_and_comes_back, 0, EBPO_MAX_LEVEL + 1);
-    tcase_add_test(tests, octcode_valid_refuses_codes_without_leading_one);
+    tcase_add_loop_test(tests, test_box_faces_are_exact_outside_model, 0, 11);
+    tcase_add_test(tests, test_box_grows_at_most_one_millionth);
+    tcase_add_test(tests, test_box_of_translated_model_is_tight);
+    tcase_add_test(tests, test_box_of_single_point_has_volume);
+    tcase_add_test(tests, test_box_make_refuses_bad_bounds);
+    tcase_add_test(tests, test_box_valid_refuses_hostile_boxes);
+    tcase_add_test(tests, test_box_valid_requires_exact_cell_faces);
+    tcase_add_loop_test(tests, test_octcode_matches_reference_and_inverts, 0, EBPO_MAX_LEVEL + 1);
+    tcase_add_test(tests, test_octcode_valid_requires_leading_one);
     Suite *suite = suite_create("cell");
     suite_add_tcase(suite, tests);
     return suite;

@@ -1,4 +1,4 @@
-/* Files that other programs change while they are read: an error that says so, or the answers of
+/* Files that other programs change while they are read: an error that reports it, or the data of
  * one version. */
 #include <math.h>
 #include <stdio.h>
@@ -26,7 +26,7 @@ static void enter(void)
 
 /* --- meshes --- */
 
-enum { VERTICES = 20000 }; /* of a fan around an axis: 240 kB and more */
+enum { VERTICES = 20000 }; /* vertices of a fan around an axis: 240 kB and more */
 
 static void write_obj(const char *name, double height)
 {
@@ -64,7 +64,7 @@ static void write_mesh(const char *name, double height, bool ply)
 
 typedef enum change { SHORTENED, EMPTIED, LONGER, REWRITTEN, REPLACED, CHANGES } change;
 
-/* What another program does when reading has come to its `when`-th step. */
+/* Changes by another program at the `when`-th step of reading. */
 typedef struct meddler {
     change what;
     int when, step;
@@ -108,7 +108,7 @@ static ebpo_status read_meddled(meddler *m, ebpo_mesh *mesh, ebpo_error *error)
     return ebpo_mesh_read(path, &options, mesh, error);
 }
 
-/* The one that was opened, whole. */
+/* Expects the complete version that was opened. */
 static void expect_old(const ebpo_mesh *mesh)
 {
     ck_assert_uint_eq(mesh->face_count, VERTICES - 2);
@@ -116,14 +116,14 @@ static void expect_old(const ebpo_mesh *mesh)
         ck_assert(mesh->xyz32 ? mesh->xyz32[3 * i + 1] == 1 : mesh->xyz64[3 * i + 1] == 1);
 }
 
-static void expect_told(const meddler *m, ebpo_status status, const char *message)
+static void expect_reported(const meddler *m, ebpo_status status, const char *message)
 {
-    bool said = strstr(message, "while it was read") != NULL;
-    ck_assert_msg(status == EBPO_E_IO && said, "change %d at step %d: %s", m->what, m->when,
+    bool reported = strstr(message, "while it was read") != NULL;
+    ck_assert_msg(status == EBPO_E_IO && reported, "change %d at step %d: %s", m->what, m->when,
                   message);
 }
 
-START_TEST(a_mesh_that_changes_while_it_is_read_is_told)
+START_TEST(test_mesh_changed_while_reading_is_reported)
 {
     for (int ply = 0; ply < 2; ply++)
         for (change what = 0; what < CHANGES; what++)
@@ -133,7 +133,7 @@ START_TEST(a_mesh_that_changes_while_it_is_read_is_told)
                 ebpo_error error = EBPO_ERROR_INIT;
                 ebpo_status status = read_meddled(&m, &mesh, &error);
                 if (status != EBPO_OK)
-                    expect_told(&m, status, error.message);
+                    expect_reported(&m, status, error.message);
                 else
                     expect_old(&mesh);
                 ck_assert_int_eq(status == EBPO_OK, !m.done || what == REPLACED);
@@ -158,8 +158,8 @@ static void make_file(const char *name, double size)
         else
             mesh.xyz64[i] *= size;
     ck_assert_int_eq(ebpo_mesh_check(&mesh, 1, (ebpo_progress){ 0 }, &found, &error), EBPO_OK);
-    ebpo_mend_record mend = { 0 };
-    ck_assert_int_eq(ebpo_build(&mesh, &found, &mend, NULL, &tree, &error), EBPO_OK);
+    ebpo_repair_record repair_record = { 0 };
+    ck_assert_int_eq(ebpo_build(&mesh, &found, &repair_record, NULL, &tree, &error), EBPO_OK);
     ck_assert_msg(ebpo_tree_write(&tree, name, NULL, &error) == EBPO_OK, "%s", error.message);
     ebpo_tree_free(&tree);
 }
@@ -179,7 +179,7 @@ static double first_x(const ebpo_mesh *mesh)
     return mesh->xyz32 ? (double)mesh->xyz32[0] : mesh->xyz64[0];
 }
 
-/* Opened, and then another version comes to its name or into it. */
+/* Opens it, then another version replaces or overwrites it. */
 static ebpo_status read_after(bool renamed, double *expected, double *x, ebpo_error *error)
 {
     ebpo_file *file;
@@ -203,7 +203,7 @@ static ebpo_status read_after(bool renamed, double *expected, double *x, ebpo_er
     return status;
 }
 
-START_TEST(a_file_that_is_replaced_goes_on_being_the_old_one)
+START_TEST(test_replaced_file_keeps_old_content)
 {
     double expected, x;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -212,7 +212,7 @@ START_TEST(a_file_that_is_replaced_goes_on_being_the_old_one)
 }
 END_TEST
 
-START_TEST(a_file_that_is_written_over_in_place_is_noticed)
+START_TEST(test_file_overwritten_in_place_is_detected)
 {
     double expected, x;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -227,9 +227,9 @@ TEST_SUITE(changes)
     TCase *tests = tcase_create("changes");
     tcase_add_checked_fixture(tests, enter, scratch_leave);
     tcase_set_timeout(tests, 120);
-    tcase_add_test(tests, a_mesh_that_changes_while_it_is_read_is_told);
-    tcase_add_test(tests, a_file_that_is_replaced_goes_on_being_the_old_one);
-    tcase_add_test(tests, a_file_that_is_written_over_in_place_is_noticed);
+    tcase_add_test(tests, test_mesh_changed_while_reading_is_reported);
+    tcase_add_test(tests, test_replaced_file_keeps_old_content);
+    tcase_add_test(tests, test_file_overwritten_in_place_is_detected);
     suite_add_tcase(suite, tests);
     return suite;
 }

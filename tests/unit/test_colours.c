@@ -1,4 +1,4 @@
-/* Colours among a mesh's attributes: of every type, by their names, of vertices and of faces. */
+/* Colours in the attributes of a mesh: of every type, by their names, of vertices and of faces. */
 #include <stdio.h>
 #include <string.h>
 
@@ -7,8 +7,8 @@
 #include "check_main.h"
 #include "scratch.h"
 
-/* A triangle whose vertices have this, and its face that; both are lines of a PLY's header with the
- * values of the first row behind a "|". */
+/* Reads a triangle with attributes of vertices and of the face; each is lines of a PLY header with
+ * the values of the first row after a "|". */
 static ebpo_colours colours_of(const char *vertex, const char *face, ebpo_error *error)
 {
     ebpo_mesh mesh;
@@ -38,7 +38,7 @@ static ebpo_colours colours_of(const char *vertex, const char *face, ebpo_error 
     "property " type " " before "red\nproperty " type " " before "green\nproperty " type \
     " " before "blue\n"
 
-START_TEST(every_type_becomes_bytes)
+START_TEST(test_colours_convert_to_bytes)
 {
     static const struct {
         const char *vertex;
@@ -69,7 +69,7 @@ START_TEST(every_type_becomes_bytes)
 }
 END_TEST
 
-START_TEST(what_is_no_colour_is_none)
+START_TEST(test_colours_invalid_values_are_ignored)
 {
     static const char *const rows[] = {
         "",
@@ -86,8 +86,8 @@ START_TEST(what_is_no_colour_is_none)
 }
 END_TEST
 
-/* Programs write white for all vertices where only faces have colours. */
-START_TEST(faces_come_first_when_vertices_are_all_the_same)
+/* Some programs write white for all vertices when only faces have colours. */
+START_TEST(test_colours_prefer_faces_over_equal_vertices)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_colours c = colours_of(RGB("uchar", "") "|255 255 255", RGB("float", "") "|1 0 0", &error);
@@ -106,9 +106,9 @@ TEST_SUITE(colours)
     Suite *suite = suite_create("colours");
     TCase *tests = tcase_create("colours");
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
-    tcase_add_test(tests, every_type_becomes_bytes);
-    tcase_add_test(tests, what_is_no_colour_is_none);
-    tcase_add_test(tests, faces_come_first_when_vertices_are_all_the_same);
+    tcase_add_test(tests, test_colours_convert_to_bytes);
+    tcase_add_test(tests, test_colours_invalid_values_are_ignored);
+    tcase_add_test(tests, test_colours_prefer_faces_over_equal_vertices);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,4 +1,5 @@
-/* Components of a mesh against plain twins: neighbours step by step, cavities by all faces. */
+/* Components of a mesh against reference implementations: neighbours step by step, cavities by all
+ * faces. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,7 +27,8 @@ static void add_box(ebpo_mesh *m, double x, double half, bool reversed)
     ebpo_mesh_free(&box);
 }
 
-/* Boxes in boxes: solids, cavities, islands in cavities, cavities in those, and two beside. */
+/* Boxes in boxes: solids, cavities, islands in cavities, cavities in those, and two separate ones.
+ */
 static ebpo_mesh nested(uint64_t *state)
 {
     double low[3] = { -40, -40, -40 }, high[3] = { 40, 40, 40 };
@@ -36,13 +38,14 @@ static ebpo_mesh nested(uint64_t *state)
         add_box(&m, x, 0.5 + (double)(ebpo_test_random(state) % 12),
                 ebpo_test_random(state) % 2 == 0);
     }
-    add_box(&m, 100, 4, true);  /* in nothing */
-    add_box(&m, 80, 40, false); /* touches the first along a side */
-    add_box(&m, 44, 3, true);   /* the wall between the two goes through its middle */
+    add_box(&m, 100, 4, true);  /* in no other box */
+    add_box(&m, 80, 40, false); /* in contact with the first one along a side */
+    add_box(&m, 44, 3, true);   /* the face between the two passes through its middle */
     return m;
 }
 
-/* An open one, one in it, one that is not oriented, faces with a vertex twice, lone vertices. */
+/* An open component, one in it, one that is not oriented, faces with a repeated vertex, unused
+ * vertices. */
 static ebpo_mesh awkward(uint64_t *state)
 {
     ebpo_mesh m = nested(state), sheet = ebpo_test_sheet(30, 3), band = ebpo_test_band(9, true);
@@ -70,15 +73,15 @@ static ebpo_mesh some_mesh(int kind, uint64_t seed)
     return m;
 }
 
-/* ---- the twin: of a mesh in the source's order ---- */
+/* ---- the reference implementation: for a mesh in source order ---- */
 
-typedef struct twin {
+typedef struct reference {
     uint64_t count;
     uint32_t *of; /* [face_count] */
     bool *open;
     double *volume;
     uint32_t *host, *first;
-} twin;
+} reference;
 
 static bool share(const ebpo_mesh *m, uint64_t f, uint64_t g)
 {
@@ -88,7 +91,7 @@ static bool share(const ebpo_mesh *m, uint64_t f, uint64_t g)
     return false;
 }
 
-static void flood(const ebpo_mesh *m, twin *t, uint64_t first)
+static void flood(const ebpo_mesh *m, reference *t, uint64_t first)
 {
     uint64_t *queue = malloc(m->face_count * sizeof *queue), begin = 0, end = 1;
     queue[0] = first;
@@ -104,8 +107,8 @@ static void flood(const ebpo_mesh *m, twin *t, uint64_t first)
     free(queue);
 }
 
-/* How often faces of the component run from a to b, less how often from b to a. */
-static int balance(const ebpo_mesh *m, const twin *t, uint32_t c, uint32_t a, uint32_t b)
+/* Returns how often faces of the component run from a to b, minus how often from b to a. */
+static int balance(const ebpo_mesh *m, const reference *t, uint32_t c, uint32_t a, uint32_t b)
 {
     int sum = 0;
     for (uint64_t f = 0; f < m->face_count; f++)
@@ -116,7 +119,7 @@ static int balance(const ebpo_mesh *m, const twin *t, uint32_t c, uint32_t a, ui
     return sum;
 }
 
-static void measure(const ebpo_mesh *m, twin *t)
+static void measure(const ebpo_mesh *m, reference *t)
 {
     for (uint64_t f = 0; f < m->face_count; f++) {
         double p[3][3], cross[3];
@@ -131,20 +134,20 @@ static void measure(const ebpo_mesh *m, twin *t)
     }
 }
 
-static int winding(const ebpo_mesh *m, const twin *t, uint32_t c, const double at[3])
+static int winding(const ebpo_mesh *m, const reference *t, uint32_t c, const double at[3])
 {
     int sum = 0;
     for (uint64_t f = 0; f < m->face_count; f++) {
         double p[3][3];
         for (uint64_t k = 0; k < 3; k++)
             ebpo_mesh_position(m, m->faces[3 * f + k], p[k]);
-        if (t->of[f] == c) /* another way than the library's; the same shift of the point */
+        if (t->of[f] == c) /* another method than in the library; the same shift of the point */
             sum += ebpo_axis_crossing(at, 1e6, 2, p[0], p[1], p[2]);
     }
     return sum;
 }
 
-static void place(const ebpo_mesh *m, twin *t)
+static void place(const ebpo_mesh *m, reference *t)
 {
     for (uint32_t c = 0; c < t->count; c++) {
         double at[3];
@@ -157,15 +160,15 @@ static void place(const ebpo_mesh *m, twin *t)
     }
 }
 
-static twin make_twin(const ebpo_mesh *m)
+static reference make_reference(const ebpo_mesh *m)
 {
     uint64_t n = m->face_count;
-    twin t = { 0,
-               malloc(n * sizeof(uint32_t)),
-               calloc(n, sizeof(bool)),
-               calloc(n, sizeof(double)),
-               calloc(n, sizeof(uint32_t)),
-               calloc(n, sizeof(uint32_t)) };
+    reference t = { 0,
+                    malloc(n * sizeof(uint32_t)),
+                    calloc(n, sizeof(bool)),
+                    calloc(n, sizeof(double)),
+                    calloc(n, sizeof(uint32_t)),
+                    calloc(n, sizeof(uint32_t)) };
     memset(t.of, 0xff, n * sizeof *t.of);
     for (uint64_t f = 0; f < n; f++)
         if (t.of[f] == UINT32_MAX) {
@@ -177,7 +180,7 @@ static twin make_twin(const ebpo_mesh *m)
     return t;
 }
 
-static void free_twin(twin *t)
+static void free_reference(reference *t)
 {
     free(t->of);
     free(t->open);
@@ -188,7 +191,7 @@ static void free_twin(twin *t)
 
 /* ---- what is expected ---- */
 
-static uint64_t cavities_of(const twin *t, uint32_t host)
+static uint64_t cavities_of(const reference *t, uint32_t host)
 {
     uint64_t count = 0;
     for (uint32_t c = 0; c < t->count; c++)
@@ -196,8 +199,9 @@ static uint64_t cavities_of(const twin *t, uint32_t host)
     return count;
 }
 
-/* Faces and vertices are the source's, bit by bit, at the numbers that the part says. */
-static void expect_faces(const ebpo_mesh *part, const ebpo_mesh *source, const twin *t,
+/* Checks that faces and vertices equal the source, bit by bit, at the indices stated by the part.
+ */
+static void expect_faces(const ebpo_mesh *part, const ebpo_mesh *source, const reference *t,
                          uint32_t host, uint8_t *seen)
 {
     for (uint64_t f = 0; f < part->face_count; f++) {
@@ -217,7 +221,7 @@ static void expect_faces(const ebpo_mesh *part, const ebpo_mesh *source, const t
 }
 
 static void expect_part(const ebpo_components *c, uint64_t i, const ebpo_mesh *source,
-                        const twin *t, uint8_t *seen)
+                        const reference *t, uint8_t *seen)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_component facts = EBPO_COMPONENT_INIT;
@@ -243,7 +247,8 @@ static void expect_part(const ebpo_components *c, uint64_t i, const ebpo_mesh *s
     ebpo_mesh_free(&part);
 }
 
-static void expect_all(const ebpo_mesh *m, const ebpo_mesh *source, const twin *t, unsigned threads)
+static void expect_all(const ebpo_mesh *m, const ebpo_mesh *source, const reference *t,
+                       unsigned threads)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_components *c = NULL;
@@ -271,27 +276,27 @@ static void expect_all(const ebpo_mesh *m, const ebpo_mesh *source, const twin *
     free(seen);
 }
 
-START_TEST(components_are_the_twins)
+START_TEST(test_components_match_reference)
 {
     for (uint64_t round = 0; round < ebpo_test_scaled(3); round++) {
         uint64_t seed = 100 * (uint64_t)_i + round;
         ebpo_mesh source = some_mesh(_i, seed), m = some_mesh(_i, seed);
         ebpo_error error = EBPO_ERROR_INIT;
-        twin t = make_twin(&source);
+        reference t = make_reference(&source);
         expect_all(&m, &source, &t, 1);
         ck_assert(ebpo_mesh_arrange(&m, 2, silent, &error) == EBPO_OK);
         expect_all(&m, &source, &t, 2);
-        free_twin(&t);
+        free_reference(&t);
         ebpo_mesh_free(&source);
         ebpo_mesh_free(&m);
     }
 }
 END_TEST
 
-/* ---- what is told of them ---- */
+/* ---- results ---- */
 
-/* The file says how many faces the whole has, and takes their numbers. */
-START_TEST(a_file_of_one_has_the_numbers_of_the_whole)
+/* The file states the face count of the whole mesh, and uses its indices. */
+START_TEST(test_component_file_keeps_source_indices)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
@@ -317,8 +322,8 @@ START_TEST(a_file_of_one_has_the_numbers_of_the_whole)
 }
 END_TEST
 
-/* Source numbers are the whole's: there is nothing that mending could call what it adds. */
-START_TEST(one_is_not_mended)
+/* Source indices belong to the whole mesh: faces added by repairs would have none. */
+START_TEST(test_component_repair_is_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_components *c = NULL;
@@ -337,7 +342,7 @@ START_TEST(one_is_not_mended)
 }
 END_TEST
 
-START_TEST(bad_meshes_are_refused)
+START_TEST(test_components_of_bad_meshes_are_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_components *c = NULL;
@@ -357,10 +362,10 @@ TEST_SUITE(components)
     Suite *suite = suite_create("components");
     TCase *tests = tcase_create("components");
     tcase_set_timeout(tests, 600);
-    tcase_add_loop_test(tests, components_are_the_twins, 0, KINDS);
-    tcase_add_test(tests, a_file_of_one_has_the_numbers_of_the_whole);
-    tcase_add_test(tests, one_is_not_mended);
-    tcase_add_test(tests, bad_meshes_are_refused);
+    tcase_add_loop_test(tests, test_components_match_reference, 0, KINDS);
+    tcase_add_test(tests, test_component_file_keeps_source_indices);
+    tcase_add_test(tests, test_component_repair_is_refused);
+    tcase_add_test(tests, test_components_of_bad_meshes_are_refused);
     suite_add_tcase(suite, tests);
     return suite;
 }

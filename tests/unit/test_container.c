@@ -1,5 +1,5 @@
-/* The container: trees come back bit for bit, equal trees give equal files, and damage is noticed.
- */
+/* The container: trees are read back bit for bit, equal trees give equal files, and damage is
+ * detected. */
 #include <fcntl.h>
 #include <hdf5.h>
 #include <sys/stat.h>
@@ -119,7 +119,7 @@ static const random_tree_options shapes[] = {
 };
 enum { SHAPES = sizeof shapes / sizeof shapes[0] };
 
-START_TEST(trees_come_back_bit_for_bit)
+START_TEST(test_tree_round_trip_is_bit_exact)
 {
     ebpo_tree tree, back;
     random_tree_options options = shapes[_i];
@@ -146,7 +146,7 @@ START_TEST(trees_come_back_bit_for_bit)
 }
 END_TEST
 
-START_TEST(equal_trees_give_equal_bytes_for_any_thread_count)
+START_TEST(test_file_bytes_same_for_any_threads)
 {
     ebpo_tree tree;
     random_tree_make(&tree, &shapes[5]);
@@ -165,7 +165,7 @@ START_TEST(equal_trees_give_equal_bytes_for_any_thread_count)
 }
 END_TEST
 
-START_TEST(content_checksum_does_not_depend_on_the_codec)
+START_TEST(test_content_checksum_ignores_codec)
 {
     ebpo_tree tree;
     uint8_t digest[32];
@@ -202,7 +202,7 @@ static herr_t check_chunks(hid_t group, const char *name, const H5L_info_t *info
             ck_assert_int_ge(H5Dget_chunk_info(object, space, i, at, &mask, &address, &size), 0);
             ck_assert_uint_ge(address, m->head);
             ck_assert(address + size <= m->index || address >= m->index + m->index_bytes);
-            /* what one needs to find them comes before them */
+            /* metadata needed to find them comes before them */
             ck_assert(count == 1 || address >= m->index + m->index_bytes);
             m->chunk_bytes += size;
         }
@@ -212,8 +212,8 @@ static herr_t check_chunks(hid_t group, const char *name, const H5L_info_t *info
     return 0;
 }
 
-/* Headers, the first levels, the index of large arrays, all else; no gaps. */
-START_TEST(all_metadata_is_in_two_pieces)
+/* Headers, the first levels, the index of large arrays, all other data; no gaps. */
+START_TEST(test_metadata_is_in_two_blocks)
 {
     ebpo_tree tree;
     random_tree_make(&tree, &shapes[4]);
@@ -240,9 +240,9 @@ START_TEST(all_metadata_is_in_two_pieces)
 }
 END_TEST
 
-/* Checksums at the end of headers that end in zero bytes, and files of one array: sizes of metadata
- * are right for all of them. */
-START_TEST(files_of_all_sizes_have_no_gaps)
+/* Checksums at the end of headers that end in zero bytes, and files with one array: sizes of
+ * metadata are correct in all cases. */
+START_TEST(test_files_have_no_gaps)
 {
     static const uint32_t parts[] = { ~0u, EBPO_PART_PLANES, 0, EBPO_PART_MESH };
     for (unsigned seed = 1; seed <= 100; seed++) {
@@ -272,7 +272,7 @@ START_TEST(files_of_all_sizes_have_no_gaps)
 }
 END_TEST
 
-START_TEST(libhdf5_reads_what_we_compress)
+START_TEST(test_libhdf5_reads_compressed_chunks)
 {
     ebpo_tree tree;
     random_tree_make(&tree, &shapes[5]);
@@ -301,7 +301,7 @@ START_TEST(libhdf5_reads_what_we_compress)
 }
 END_TEST
 
-START_TEST(parts_that_are_left_out_are_absent)
+START_TEST(test_omitted_parts_are_absent)
 {
     ebpo_tree tree, back;
     ebpo_mesh mesh;
@@ -335,13 +335,13 @@ START_TEST(parts_that_are_left_out_are_absent)
 }
 END_TEST
 
-START_TEST(source_order_undoes_the_maps)
+START_TEST(test_source_order_inverts_maps)
 {
     ebpo_tree tree;
     ebpo_mesh mesh;
     bool ordered;
     random_tree_make(&tree, &shapes[_i]);
-    /* as after welding: every second number is gone */
+    /* as after welding: every second index is missing */
     tree.info.source_vertex_count = tree.mesh.vertex_count * 2;
     for (uint64_t i = 0; i < tree.mesh.vertex_count; i++)
         tree.vertex_source[i] *= 2;
@@ -365,7 +365,7 @@ START_TEST(source_order_undoes_the_maps)
 }
 END_TEST
 
-START_TEST(read_only_folders_will_do)
+START_TEST(test_read_only_folder_is_sufficient)
 {
     ebpo_tree tree;
     random_tree_make(&tree, &shapes[1]);
@@ -379,7 +379,7 @@ START_TEST(read_only_folders_will_do)
 }
 END_TEST
 
-/* Opens and reads everything; true when that, and the checksum, found nothing wrong. */
+/* Opens and reads everything; returns true when no error was found, including the checksum. */
 static bool reads_well(const char *path, ebpo_error *error)
 {
     ebpo_file *file;
@@ -394,7 +394,7 @@ static bool reads_well(const char *path, ebpo_error *error)
     return ok;
 }
 
-START_TEST(every_cut_off_file_is_refused)
+START_TEST(test_truncated_files_are_refused)
 {
     ebpo_tree tree;
     size_t size;
@@ -412,9 +412,9 @@ START_TEST(every_cut_off_file_is_refused)
 }
 END_TEST
 
-/* zstd frames have a few bits without meaning; reads_well has compared the content, so a flip that
- * it passes changed nothing. */
-START_TEST(every_flipped_bit_behind_the_head_is_noticed)
+/* zstd frames have a few unused bits; reads_well has compared the content, so an accepted flip
+ * changed nothing. */
+START_TEST(test_bit_flips_after_header_are_detected)
 {
     ebpo_tree tree;
     size_t size;
@@ -440,9 +440,9 @@ START_TEST(every_flipped_bit_behind_the_head_is_noticed)
 }
 END_TEST
 
-/* Flips in the head: refused, or without effect (bytes that HDF5 leaves unused); never a crash,
+/* Flips in the header: refused, or without effect (bytes that HDF5 leaves unused); never a crash,
  * never other content. */
-START_TEST(flipped_bits_in_the_head_do_no_harm)
+START_TEST(test_bit_flips_in_header_are_harmless)
 {
     ebpo_tree tree, back;
     size_t size;
@@ -496,7 +496,7 @@ static const spoil_fn spoils[] = { spoil_refs,   spoil_types, spoil_root,  spoil
                                    spoil_box,    spoil_order, spoil_black, spoil_mesh,
                                    spoil_levels };
 
-START_TEST(writer_refuses_a_tree_that_readers_would_refuse)
+START_TEST(test_writer_refuses_invalid_tree)
 {
     ebpo_tree tree;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -509,7 +509,7 @@ START_TEST(writer_refuses_a_tree_that_readers_would_refuse)
 }
 END_TEST
 
-START_TEST(an_index_that_contradicts_its_arrays_is_refused)
+START_TEST(test_index_contradicting_arrays_is_refused)
 {
     static const char *const names[] = { "types_index", "gray_index", "leaf_index" };
     ebpo_tree tree;
@@ -542,7 +542,7 @@ START_TEST(an_index_that_contradicts_its_arrays_is_refused)
 }
 END_TEST
 
-/* When something was written already. */
+/* Stops after something was written. */
 static bool stop_soon(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     (void)user;
@@ -551,7 +551,7 @@ static bool stop_soon(void *user, const char *stage, uint64_t done, uint64_t tot
     return done == 0;
 }
 
-START_TEST(a_stopped_writer_leaves_the_old_file)
+START_TEST(test_cancelled_writer_keeps_old_file)
 {
     ebpo_tree tree;
     size_t size, again;
@@ -570,7 +570,7 @@ START_TEST(a_stopped_writer_leaves_the_old_file)
 }
 END_TEST
 
-START_TEST(codec_and_level_are_checked)
+START_TEST(test_invalid_codec_and_level_are_refused)
 {
     ebpo_tree tree;
     random_tree_make(&tree, &shapes[0]);
@@ -597,7 +597,7 @@ START_TEST(codec_and_level_are_checked)
 }
 END_TEST
 
-START_TEST(what_is_no_file_of_ours_is_named)
+START_TEST(test_foreign_files_are_identified)
 {
     ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -617,7 +617,7 @@ START_TEST(what_is_no_file_of_ours_is_named)
 }
 END_TEST
 
-START_TEST(callers_error_printing_is_given_back)
+START_TEST(test_hdf5_error_handler_is_restored)
 {
     H5E_auto2_t before, after;
     void *data;
@@ -630,7 +630,7 @@ START_TEST(callers_error_printing_is_given_back)
 }
 END_TEST
 
-START_TEST(chunks_come_back_from_every_pipeline)
+START_TEST(test_chunk_round_trip_in_all_pipelines)
 {
     static ebpo_chunk_coder coder;
     static uint8_t raw[EBPO_CHUNK_BYTES_MAX], back[EBPO_CHUNK_BYTES_MAX];
@@ -659,8 +659,8 @@ START_TEST(chunks_come_back_from_every_pipeline)
 }
 END_TEST
 
-/* The two lowest bits of the modes of sequences, which zstd ignores, and no checksum covers. */
-START_TEST(unused_bits_of_a_frame_are_refused)
+/* The two lowest bits of the modes of sequences, which zstd ignores and no checksum covers. */
+START_TEST(test_unused_frame_bits_are_refused)
 {
     static const struct {
         size_t bytes, raw_bytes, modes;
@@ -692,9 +692,9 @@ START_TEST(unused_bits_of_a_frame_are_refused)
 }
 END_TEST
 
-/* 4,096 numbers of ten bits of noise are 5,120 bytes; with one table of codes for all planes they
- * would be some 5,700 at the default. */
-START_TEST(planes_of_bytes_are_compressed_each_by_itself)
+/* 4,096 numbers of ten random bits are 5,120 bytes; with one code table for all planes they would
+ * be some 5,700 at the default. */
+START_TEST(test_byte_planes_are_compressed_separately)
 {
     static ebpo_chunk_coder coder;
     enum { COUNT = 4096, BYTES = COUNT * 4 };
@@ -720,21 +720,21 @@ START_TEST(planes_of_bytes_are_compressed_each_by_itself)
 }
 END_TEST
 
-/* Where nothing was allocated, nothing is sorted: of that sanitizers tell. */
-START_TEST(nothing_can_be_summed_up)
+/* Empty data: nothing is allocated and sorted, which sanitizers check. */
+START_TEST(test_checksum_of_empty_content)
 {
     static const uint8_t of_nothing[4] = { 0xe3, 0xb0, 0xc4, 0x42 }; /* SHA-256 begins with it */
     ebpo_content content = { 0 };
-    ebpo_expected expected = EBPO_EXPECTED_INIT(NULL);
+    ebpo_hints expected = EBPO_HINTS_INIT(NULL);
     uint8_t digest[32];
     ck_assert_int_eq(ebpo_content_end(&content, digest, NULL), EBPO_OK);
     ck_assert_mem_eq(digest, of_nothing, sizeof of_nothing);
     ebpo_content_free(&content);
-    ck_assert_uint_eq(ebpo_expected_bytes(&expected), 0);
+    ck_assert_uint_eq(ebpo_hints_bytes(&expected), 0);
 }
 END_TEST
 
-START_TEST(codings_return_every_bit_pattern)
+START_TEST(test_encodings_keep_every_bit_pattern)
 {
     uint32_t bits[12] = { 0,           1,           0x80000000u, 0x7fffffffu,
                           0xffffffffu, 0x7f800000u, 0xff800000u, 0x3f800000u,
@@ -759,30 +759,30 @@ TEST_SUITE(container)
     TCase *tests = tcase_create("container"), *empty = tcase_create("empty");
     tcase_set_timeout(tests, 300);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
-    tcase_add_loop_test(tests, trees_come_back_bit_for_bit, 0, SHAPES);
-    tcase_add_test(tests, equal_trees_give_equal_bytes_for_any_thread_count);
-    tcase_add_test(tests, content_checksum_does_not_depend_on_the_codec);
-    tcase_add_test(tests, all_metadata_is_in_two_pieces);
-    tcase_add_test(tests, files_of_all_sizes_have_no_gaps);
-    tcase_add_test(tests, libhdf5_reads_what_we_compress);
-    tcase_add_test(tests, parts_that_are_left_out_are_absent);
-    tcase_add_loop_test(tests, source_order_undoes_the_maps, 1, 4);
-    tcase_add_test(tests, read_only_folders_will_do);
-    tcase_add_test(tests, every_cut_off_file_is_refused);
-    tcase_add_loop_test(tests, every_flipped_bit_behind_the_head_is_noticed, 0, 3);
-    tcase_add_test(tests, flipped_bits_in_the_head_do_no_harm);
-    tcase_add_loop_test(tests, writer_refuses_a_tree_that_readers_would_refuse, 0,
+    tcase_add_loop_test(tests, test_tree_round_trip_is_bit_exact, 0, SHAPES);
+    tcase_add_test(tests, test_file_bytes_same_for_any_threads);
+    tcase_add_test(tests, test_content_checksum_ignores_codec);
+    tcase_add_test(tests, test_metadata_is_in_two_blocks);
+    tcase_add_test(tests, test_files_have_no_gaps);
+    tcase_add_test(tests, test_libhdf5_reads_compressed_chunks);
+    tcase_add_test(tests, test_omitted_parts_are_absent);
+    tcase_add_loop_test(tests, test_source_order_inverts_maps, 1, 4);
+    tcase_add_test(tests, test_read_only_folder_is_sufficient);
+    tcase_add_test(tests, test_truncated_files_are_refused);
+    tcase_add_loop_test(tests, test_bit_flips_after_header_are_detected, 0, 3);
+    tcase_add_test(tests, test_bit_flips_in_header_are_harmless);
+    tcase_add_loop_test(tests, test_writer_refuses_invalid_tree, 0,
                         sizeof spoils / sizeof spoils[0]);
-    tcase_add_loop_test(tests, an_index_that_contradicts_its_arrays_is_refused, 0, 3);
-    tcase_add_test(tests, a_stopped_writer_leaves_the_old_file);
-    tcase_add_test(tests, codec_and_level_are_checked);
-    tcase_add_test(tests, what_is_no_file_of_ours_is_named);
-    tcase_add_test(tests, callers_error_printing_is_given_back);
-    tcase_add_loop_test(tests, unused_bits_of_a_frame_are_refused, 0, 2);
-    tcase_add_test(tests, planes_of_bytes_are_compressed_each_by_itself);
-    tcase_add_test(tests, chunks_come_back_from_every_pipeline);
-    tcase_add_test(empty, nothing_can_be_summed_up);
-    tcase_add_test(tests, codings_return_every_bit_pattern);
+    tcase_add_loop_test(tests, test_index_contradicting_arrays_is_refused, 0, 3);
+    tcase_add_test(tests, test_cancelled_writer_keeps_old_file);
+    tcase_add_test(tests, test_invalid_codec_and_level_are_refused);
+    tcase_add_test(tests, test_foreign_files_are_identified);
+    tcase_add_test(tests, test_hdf5_error_handler_is_restored);
+    tcase_add_loop_test(tests, test_unused_frame_bits_are_refused, 0, 2);
+    tcase_add_test(tests, test_byte_planes_are_compressed_separately);
+    tcase_add_test(tests, test_chunk_round_trip_in_all_pipelines);
+    tcase_add_test(empty, test_checksum_of_empty_content);
+    tcase_add_test(tests, test_encodings_keep_every_bit_pattern);
     suite_add_tcase(suite, tests);
     suite_add_tcase(suite, empty);
     return suite;

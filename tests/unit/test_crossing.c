@@ -1,14 +1,14 @@
-/* Crossings of faces by axis-parallel segments: against a twin that really shifts the segment, and
- * on closed meshes. */
+/* Crossings of faces by axis-parallel segments: against a reference implementation that shifts the
+ * segment, and on closed meshes. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "check_main.h"
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "geometry/predicates.h"
 
-/* --- the twin: a naive segment-face intersection in rationals --- */
+/* --- the reference implementation: a naive segment-face intersection in rationals --- */
 
 typedef mpq_t vector[3];
 
@@ -75,7 +75,7 @@ static void height(mpq_t out, vector normal, vector p, vector a)
     mpq_clear(t);
 }
 
-/* True when x, in the plane, is strictly inside the face. */
+/* Returns true when x, in the plane, is strictly inside the face. */
 static bool inside_face(vector x, vector corner[3], vector normal)
 {
     bool inside = true;
@@ -108,7 +108,8 @@ static void set_shifted(vector out, const double p[3], unsigned s)
     mpq_clear(d);
 }
 
-static int twin_crossing(const double from[3], double to, int axis, const double *face, unsigned s)
+static int reference_crossing(const double from[3], double to, int axis, const double *face,
+                              unsigned s)
 {
     vector p, q, x, normal, corner[3];
     mpq_t hp, hq, t;
@@ -153,19 +154,19 @@ static int twin_crossing(const double from[3], double to, int axis, const double
 
 /* --- single faces --- */
 
-START_TEST(crossing_equals_rational_twin_on_small_integers)
+START_TEST(test_crossing_matches_rational_on_integers)
 {
     uint64_t state = (uint64_t)_i + 3;
     int crossed = 0;
     for (int i = 0; i < 12000; i++) {
         double face[9], from[3];
-        int axis = (int)twin_integer(&state, 0, 2);
+        int axis = (int)reference_integer(&state, 0, 2);
         for (int k = 0; k < 9; k++)
-            face[k] = (double)twin_integer(&state, -2, 2);
+            face[k] = (double)reference_integer(&state, -2, 2);
         for (int k = 0; k < 3; k++)
-            from[k] = (double)twin_integer(&state, -4, 4) / 2;
-        double to = from[axis] + (double)twin_integer(&state, 0, 8) / 2;
-        int expected = twin_crossing(from, to, axis, face, 80);
+            from[k] = (double)reference_integer(&state, -4, 4) / 2;
+        double to = from[axis] + (double)reference_integer(&state, 0, 8) / 2;
+        int expected = reference_crossing(from, to, axis, face, 80);
         ck_assert_int_eq(ebpo_axis_crossing(from, to, axis, face, face + 3, face + 6), expected);
         ck_assert_int_eq(ebpo_axis_crossing(from, to, axis, face + 3, face + 6, face), expected);
         ck_assert_int_eq(ebpo_axis_crossing(from, to, axis, face + 3, face, face + 6), -expected);
@@ -175,41 +176,42 @@ START_TEST(crossing_equals_rational_twin_on_small_integers)
 }
 END_TEST
 
-/* The segment starts or ends on a corner, an edge's middle or the middle of the face, rounded. */
-START_TEST(crossing_equals_rational_twin_on_single_precision)
+/* The segment starts or ends on a corner, the middle of an edge or the middle of the face, rounded.
+ */
+START_TEST(test_crossing_matches_rational_on_floats)
 {
     uint64_t state = (uint64_t)_i + 30;
     for (int i = 0; i < 2500; i++) {
         double face[9], from[3];
-        int axis = (int)twin_integer(&state, 0, 2), weight[3], sum = 0;
+        int axis = (int)reference_integer(&state, 0, 2), weight[3], sum = 0;
         for (int k = 0; k < 9; k++)
-            face[k] =
-                (double)twin_integer(&state, 1 << 10, 1 << 24) * 0x1p-24 + (_i == 1 ? 65536 : 0);
+            face[k] = (double)reference_integer(&state, 1 << 10, 1 << 24) * 0x1p-24 +
+                      (_i == 1 ? 65536 : 0);
         for (int k = 0; k < 3; k++)
-            sum += weight[k] = (int)twin_integer(&state, k == 0, 1);
+            sum += weight[k] = (int)reference_integer(&state, k == 0, 1);
         for (int k = 0; k < 3; k++)
             from[k] =
                 (face[k] * weight[0] + face[3 + k] * weight[1] + face[6 + k] * weight[2]) / sum;
-        double to = from[axis] + 0.5 * (double)twin_integer(&state, 0, 2);
-        if (twin_random(&state) % 2) {
+        double to = from[axis] + 0.5 * (double)reference_integer(&state, 0, 2);
+        if (reference_random(&state) % 2) {
             to = from[axis];
             from[axis] -= 0.25;
         }
-        int expected = twin_crossing(from, to, axis, face, 400);
+        int expected = reference_crossing(from, to, axis, face, 400);
         ck_assert_int_eq(ebpo_axis_crossing(from, to, axis, face, face + 3, face + 6), expected);
     }
 }
 END_TEST
 
-START_TEST(segment_without_length_never_crosses)
+START_TEST(test_zero_length_segment_never_crosses)
 {
     uint64_t state = 8;
     for (int i = 0; i < 100000; i++) {
         double face[9], from[3];
         for (int k = 0; k < 9; k++)
-            face[k] = (double)twin_integer(&state, -1, 1);
+            face[k] = (double)reference_integer(&state, -1, 1);
         for (int k = 0; k < 3; k++)
-            from[k] = (double)twin_integer(&state, -1, 1);
+            from[k] = (double)reference_integer(&state, -1, 1);
         ck_assert_int_eq(ebpo_axis_crossing(from, from[i % 3], i % 3, face, face + 3, face + 6), 0);
     }
 }
@@ -232,7 +234,7 @@ static void add_face(soup *mesh, const double *a, const double *b, const double 
     memcpy(face + 6, c, 3 * sizeof *c);
 }
 
-/* Winding number of p by the faces between it and a point far below it on `axis`. */
+/* Returns the winding number of p by the faces between it and a point far below it on `axis`. */
 static int winding(const soup *mesh, const double p[3], int axis)
 {
     double from[3] = { p[0], p[1], p[2] };
@@ -252,12 +254,12 @@ static bool filled(const bool *voxel, int x, int y, int z)
     return in && voxel[(x * GRID + y) * GRID + z];
 }
 
-/* The two faces of the voxel's wall on `side` (0 low, 1 high) of `axis`, outward, over a random
+/* Adds the two faces of the voxel's side `side` (0 low, 1 high) of `axis`, outward, over a random
  * diagonal. */
-static void add_wall(soup *mesh, const int at[3], int axis, int side, uint64_t *state)
+static void add_cell_face(soup *mesh, const int at[3], int axis, int side, uint64_t *state)
 {
     double q[4][3];
-    int u = (axis + 1) % 3, v = (axis + 2) % 3, turn = (int)twin_integer(state, 0, 3);
+    int u = (axis + 1) % 3, v = (axis + 2) % 3, turn = (int)reference_integer(state, 0, 3);
     for (int i = 0; i < 4; i++) {
         q[i][axis] = at[axis] + side;
         q[i][u] = at[u] + (i == 1 || i == 2);
@@ -278,18 +280,18 @@ static void add_voxels(soup *mesh, const bool *voxel, uint64_t *state)
                     int at[3] = { x, y, z }, next[3] = { x, y, z };
                     next[w / 2] += w % 2 ? 1 : -1;
                     if (filled(voxel, x, y, z) && !filled(voxel, next[0], next[1], next[2]))
-                        add_wall(mesh, at, w / 2, w % 2, state);
+                        add_cell_face(mesh, at, w / 2, w % 2, state);
                 }
 }
 
-/* Voxels touch at edges and corners here; the shift makes each of them own its low walls. */
-START_TEST(winding_of_voxel_solids_is_right_at_every_vertex_edge_and_face)
+/* Voxels share edges and corners here; by the shift, each of them owns its low sides. */
+START_TEST(test_winding_of_voxel_solids)
 {
     static soup mesh;
     uint64_t state = (uint64_t)_i + 100;
     bool voxel[GRID * GRID * GRID];
     for (int i = 0; i < GRID * GRID * GRID; i++)
-        voxel[i] = twin_random(&state) % 2;
+        voxel[i] = reference_random(&state) % 2;
     mesh.count = 0;
     add_voxels(&mesh, voxel, &state);
     for (int x = -1; x <= 2 * GRID + 1; x++)
@@ -303,8 +305,8 @@ START_TEST(winding_of_voxel_solids_is_right_at_every_vertex_edge_and_face)
 }
 END_TEST
 
-/* Overlapping, touching and flat tetrahedra, either way around. */
-START_TEST(winding_of_tetrahedra_does_not_depend_on_the_path)
+/* Overlapping tetrahedra, in contact, and flat, in either orientation. */
+START_TEST(test_winding_of_tetrahedra_ignores_path)
 {
     static soup mesh;
     uint64_t state = (uint64_t)_i + 200;
@@ -312,7 +314,7 @@ START_TEST(winding_of_tetrahedra_does_not_depend_on_the_path)
     for (int i = 0; i < 6; i++) {
         double v[4][3];
         for (int k = 0; k < 12; k++)
-            v[k / 3][k % 3] = (double)twin_integer(&state, 0, 3);
+            v[k / 3][k % 3] = (double)reference_integer(&state, 0, 3);
         add_face(&mesh, v[0], v[1], v[2]);
         add_face(&mesh, v[0], v[3], v[1]);
         add_face(&mesh, v[1], v[3], v[2]);
@@ -333,8 +335,8 @@ START_TEST(winding_of_tetrahedra_does_not_depend_on_the_path)
 }
 END_TEST
 
-/* Solid angles count a point well inside once: fixes the sign. */
-START_TEST(winding_inside_an_outward_tetrahedron_is_one)
+/* Solid angles count a point well inside once: determines the sign. */
+START_TEST(test_winding_inside_tetrahedron_is_one)
 {
     static soup mesh;
     const double v[4][3] = { { 0, 0, 0 }, { 8, 0, 0 }, { 0, 8, 0 }, { 0, 0, 8 } },
@@ -351,8 +353,8 @@ END_TEST
 
 /* --- points on faces --- */
 
-/* True when p = sum w_i corner_i for weights i/n with n = 0 .. 60: complete for lattice points of
- * faces this small. */
+/* Returns true when p = sum w_i corner_i for weights i/n with n = 0 .. 60: complete for lattice
+ * points of faces this small. */
 static bool plain_point_on_triangle(const double p[3], const double *f)
 {
     for (int n = 1; n <= 48; n++)
@@ -367,16 +369,16 @@ static bool plain_point_on_triangle(const double p[3], const double *f)
     return false;
 }
 
-START_TEST(point_on_triangle_includes_edges_corners_and_flat_faces)
+START_TEST(test_point_on_triangle_edges_and_corners)
 {
     uint64_t state = 12;
     int on = 0;
     for (int i = 0; i < 6000; i++) {
         double f[9], p[3];
         for (int k = 0; k < 9; k++)
-            f[k] = (double)twin_integer(&state, -1, 1);
+            f[k] = (double)reference_integer(&state, -1, 1);
         for (int k = 0; k < 3; k++)
-            p[k] = (double)twin_integer(&state, -1, 1) / (i % 2 + 1);
+            p[k] = (double)reference_integer(&state, -1, 1) / (i % 2 + 1);
         bool expected = plain_point_on_triangle(p, f);
         on += expected;
         ck_assert_int_eq(ebpo_point_on_triangle(p, f, f + 3, f + 6), expected);
@@ -389,14 +391,13 @@ TEST_SUITE(crossing)
 {
     TCase *tests = tcase_create("crossing");
     tcase_set_timeout(tests, 300);
-    tcase_add_loop_test(tests, crossing_equals_rational_twin_on_small_integers, 0, 4);
-    tcase_add_loop_test(tests, crossing_equals_rational_twin_on_single_precision, 0, 2);
-    tcase_add_test(tests, segment_without_length_never_crosses);
-    tcase_add_loop_test(tests, winding_of_voxel_solids_is_right_at_every_vertex_edge_and_face, 0,
-                        20);
-    tcase_add_loop_test(tests, winding_of_tetrahedra_does_not_depend_on_the_path, 0, 60);
-    tcase_add_test(tests, winding_inside_an_outward_tetrahedron_is_one);
-    tcase_add_test(tests, point_on_triangle_includes_edges_corners_and_flat_faces);
+    tcase_add_loop_test(tests, test_crossing_matches_rational_on_integers, 0, 4);
+    tcase_add_loop_test(tests, test_crossing_matches_rational_on_floats, 0, 2);
+    tcase_add_test(tests, test_zero_length_segment_never_crosses);
+    tcase_add_loop_test(tests, test_winding_of_voxel_solids, 0, 20);
+    tcase_add_loop_test(tests, test_winding_of_tetrahedra_ignores_path, 0, 60);
+    tcase_add_test(tests, test_winding_inside_tetrahedron_is_one);
+    tcase_add_test(tests, test_point_on_triangle_edges_and_corners);
     Suite *suite = suite_create("crossing");
     suite_add_tcase(suite, tests);
     return suite;

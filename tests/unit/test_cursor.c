@@ -1,4 +1,4 @@
-/* Cursors: the same nodes whatever holds them, those that a plain walk through the levels lists. */
+/* Cursors: the same nodes in every representation, as listed by a plain traversal of the levels. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -38,9 +38,9 @@ static void fine(ebpo_status status, const ebpo_error *error)
     ck_assert_msg(status == EBPO_OK, "%s: %s", ebpo_status_name(status), error->message);
 }
 
-/* --- the plain twin: all nodes, depth first, counted as they come --- */
+/* --- the reference implementation: all nodes, depth first, counted in order --- */
 
-typedef struct twin_node {
+typedef struct reference_node {
     ebpo_octcode octcode;
     ebpo_node_type type;
     bool pruned;
@@ -48,21 +48,21 @@ typedef struct twin_node {
     uint64_t rank;
     const uint32_t *codes;
     unsigned count;
-} twin_node;
+} reference_node;
 
-typedef struct twin {
+typedef struct reference {
     const ebpo_tree *tree;
     uint64_t group[EBPO_LEVELS_MAX], seen[EBPO_LEVELS_MAX][4], plane[EBPO_LEVELS_MAX],
         leaf_plane[EBPO_LEVELS_MAX];
-    twin_node *node;
+    reference_node *node;
     uint64_t count, capacity;
-} twin;
+} reference;
 
-static void twin_add(twin *t, int level, ebpo_octcode code, unsigned type)
+static void reference_add(reference *t, int level, ebpo_octcode code, unsigned type)
 {
     const ebpo_level *l = &t->tree->level[level];
     uint64_t rank = t->seen[level][type]++;
-    twin_node n = { .octcode = code, .type = (ebpo_node_type)type, .rank = rank };
+    reference_node n = { .octcode = code, .type = (ebpo_node_type)type, .rank = rank };
     if (type == EBPO_GRAY && l->plane_counts) {
         n.count = l->plane_counts[rank];
         n.codes = l->planes ? l->planes + t->plane[level] : NULL;
@@ -91,13 +91,13 @@ static void twin_add(twin *t, int level, ebpo_octcode code, unsigned type)
         return;
     }
     for (unsigned octant = 0; octant < 8; octant++)
-        twin_add(t, level + 1, code * 8 + octant, types / (1u << 2 * octant) % 4);
+        reference_add(t, level + 1, code * 8 + octant, types / (1u << 2 * octant) % 4);
 }
 
-/* Where the node of a cell stands in the list, or the deepest one around it. */
-static const twin_node *twin_find(const twin *t, ebpo_octcode code)
+/* Returns the node of a cell in the list, or the deepest one around it. */
+static const reference_node *reference_find(const reference *t, ebpo_octcode code)
 {
-    const twin_node *found = NULL;
+    const reference_node *found = NULL;
     for (uint64_t i = 0; i < t->count; i++) {
         int up = ebpo_octcode_level(code) - ebpo_octcode_level(t->node[i].octcode);
         if (up >= 0 && code >> 3 * up == t->node[i].octcode &&
@@ -107,7 +107,7 @@ static const twin_node *twin_find(const twin *t, ebpo_octcode code)
     return found;
 }
 
-/* --- what holds them --- */
+/* --- representations --- */
 
 typedef enum holder { LEVELS, CHUNKS, SUBTREE, MODEL, HOLDERS } holder;
 
@@ -120,10 +120,10 @@ typedef struct whole {
     ebpo_accel *subtree;
     ebpo_model *model;
     ebpo_context *context;
-    twin twin;
+    reference reference;
 } whole;
 
-/* `shape` false: the faces are none, so that subtrees cannot be made. */
+/* `shape` false: the faces form no surface, so that subtrees cannot be made. */
 static void whole_open(whole *w, const char *name, int cut_level, bool shape)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -136,8 +136,8 @@ static void whole_open(whole *w, const char *name, int cut_level, bool shape)
         fine(ebpo_level_ranks_make(&w->ranks[i], &w->tree.level[i], i, &error), &error);
     w->nodes = (ebpo_level_nodes){ w->tree.level, w->ranks, w->tree.info.level_count };
     fine(ebpo_chunks_make(&w->chunks, w->file, 0, &error), &error);
-    w->twin.tree = &w->tree;
-    twin_add(&w->twin, 0, 1, w->tree.level[0].types[0]);
+    w->reference.tree = &w->tree;
+    reference_add(&w->reference, 0, 1, w->tree.level[0].types[0]);
     if (!shape)
         return;
     if (ebpo_file_info(w->file)->parts & EBPO_PART_MESH) {
@@ -161,7 +161,7 @@ static void whole_close(whole *w)
         ebpo_level_ranks_free(&w->ranks[i]);
     ebpo_tree_free(&w->tree);
     ebpo_close(w->file);
-    free(w->twin.node);
+    free(w->reference.node);
 }
 
 static bool has(const whole *w, holder which)
@@ -190,9 +190,9 @@ static void begin(whole *w, holder which, ebpo_cursor *c)
     }
 }
 
-/* --- the node at hand against the twin's --- */
+/* --- the current node against the reference --- */
 
-static void same_node(const whole *w, holder which, ebpo_cursor *c, const twin_node *t)
+static void same_node(const whole *w, holder which, ebpo_cursor *c, const reference_node *t)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const ebpo_node *child;
@@ -227,13 +227,13 @@ static void walk_all(whole *w, holder which)
     uint64_t i = 0;
     begin(w, which, &c);
     for (; more; i++) {
-        ck_assert_uint_lt(i, w->twin.count);
-        same_node(w, which, &c, &w->twin.node[i]);
+        ck_assert_uint_lt(i, w->reference.count);
+        same_node(w, which, &c, &w->reference.node[i]);
         fine(ebpo_cursor_next(&c, false, &more, &error), &error);
     }
-    ck_assert_uint_eq(i, w->twin.count);
+    ck_assert_uint_eq(i, w->reference.count);
     ck_assert_uint_eq(ebpo_cursor_octcode(&c), 1);
-    /* over: of the root's children only */
+    /* over: only for children of the root */
     fine(ebpo_cursor_next(&c, false, &more, &error), &error);
     for (ebpo_octcode code = 8; more; code++) {
         ck_assert_uint_eq(ebpo_cursor_octcode(&c), code);
@@ -242,7 +242,7 @@ static void walk_all(whole *w, holder which)
     }
 }
 
-/* Here and there: cells of any level, points, back up; each time the deepest node around. */
+/* Random jumps: cells of any level, points, back up; each time the deepest node around. */
 static void jump_about(whole *w, holder which, uint64_t seed, uint64_t jumps)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -252,8 +252,8 @@ static void jump_about(whole *w, holder which, uint64_t seed, uint64_t jumps)
     memcpy(box.size, w->tree.info.box_size, sizeof box.size);
     begin(w, which, &c);
     for (uint64_t i = 0; i < jumps; i++) {
-        /* near nodes that are there, and some level above or below them */
-        ebpo_octcode code = w->twin.node[ebpo_test_random(&seed) % w->twin.count].octcode;
+        /* near existing nodes, and some levels above or below them */
+        ebpo_octcode code = w->reference.node[ebpo_test_random(&seed) % w->reference.count].octcode;
         int deepest = w->tree.info.level_count, level = (int)(ebpo_test_random(&seed) % 3);
         while (level-- > 0 && ebpo_octcode_level(code) < deepest)
             code = code << 3 | ebpo_test_random(&seed) % 8;
@@ -262,18 +262,18 @@ static void jump_about(whole *w, holder which, uint64_t seed, uint64_t jumps)
             double p[3];
             bool within;
             for (int k = 0; k < 3; k++)
-                p[k] = ebpo_wall(&box, k, cell.level, cell.at[k]); /* belongs to the cell */
+                p[k] = ebpo_cell_face(&box, k, cell.level, cell.at[k]); /* belongs to the cell */
             fine(ebpo_cursor_to_point(&c, &box, p, cell.level, &within, &error), &error);
             ck_assert(within);
         } else {
             fine(ebpo_cursor_to_cell(&c, cell, &error), &error);
         }
-        same_node(w, which, &c, twin_find(&w->twin, code));
+        same_node(w, which, &c, reference_find(&w->reference, code));
         for (uint64_t up = ebpo_test_random(&seed) % 3; up > 0; up--) {
             ebpo_octcode parent = ebpo_octcode_parent(ebpo_cursor_octcode(&c));
             ck_assert_int_eq(ebpo_cursor_up(&c), parent != 0);
             if (parent)
-                same_node(w, which, &c, twin_find(&w->twin, parent));
+                same_node(w, which, &c, reference_find(&w->reference, parent));
         }
     }
     const double outside[3] = { INFINITY, 0, 0 };
@@ -292,14 +292,14 @@ static void compare_all(whole *w, uint64_t seed)
         }
 }
 
-/* --- half-spaces and envelopes: from anywhere, those of the way straight down --- */
+/* --- half-spaces and envelopes: from any start as by the direct path down --- */
 
-/* All planes above and at the node, in its cell's coordinates. */
-static void plain_half_spaces(const twin *t, ebpo_octcode code, ebpo_half_spaces *out)
+/* Collects all planes above and at the node, in coordinates of its cell. */
+static void plain_half_spaces(const reference *t, ebpo_octcode code, ebpo_half_spaces *out)
 {
     out->count = 0;
     for (int up = ebpo_octcode_level(code); up >= 0; up--) {
-        const twin_node *n = twin_find(t, code >> 3 * up);
+        const reference_node *n = reference_find(t, code >> 3 * up);
         for (unsigned i = 0; i < n->count; i++) {
             ebpo_half_space h;
             int32_t d;
@@ -332,12 +332,12 @@ static void compare_envelopes(whole *w, holder which, uint64_t seed, uint64_t ju
     memset(&kept, 0, sizeof kept);
     begin(w, which, &c);
     for (uint64_t i = 0; i < jumps; i++) {
-        const twin_node *n = &w->twin.node[ebpo_test_random(&seed) % w->twin.count];
+        const reference_node *n = &w->reference.node[ebpo_test_random(&seed) % w->reference.count];
         const ebpo_polytope *a, *b;
         if (n->type == EBPO_LEAF && which > CHUNKS)
             continue;
         fine(ebpo_cursor_to_cell(&c, ebpo_cell_of_octcode(n->octcode), &error), &error);
-        plain_half_spaces(&w->twin, n->octcode, &expected);
+        plain_half_spaces(&w->reference, n->octcode, &expected);
         fine(ebpo_cursor_half_spaces(&c, true, &found, &error), &error);
         ck_assert_int_eq(found.count, expected.count);
         for (int k = 0; k < found.count; k++)
@@ -350,7 +350,7 @@ static void compare_envelopes(whole *w, holder which, uint64_t seed, uint64_t ju
         ck_assert_mem_eq(a->vertex, b->vertex, (size_t)a->vertex_count * sizeof a->vertex[0]);
         if (n->type == EBPO_BLACK) {
             ck_assert_double_eq(ebpo_polytope_volume(a), 1);
-        } else if (w->model && n->type != EBPO_WHITE) { /* of a shape: it does not become empty */
+        } else if (w->model && n->type != EBPO_WHITE) { /* of a shape: it never becomes empty */
             ebpo_half_spaces_cut(&expected, 0, &cut);
             ck_assert_double_eq_tol(ebpo_polytope_volume(a), ebpo_polytope_volume(&cut), 1e-6);
         }
@@ -359,7 +359,7 @@ static void compare_envelopes(whole *w, holder which, uint64_t seed, uint64_t ju
 
 /* --- trees --- */
 
-START_TEST(nodes_of_random_trees_are_those_of_a_plain_walk)
+START_TEST(test_cursor_nodes_match_plain_traversal)
 {
     bool solid = _i % 4 != 3;
     random_tree_options options = { (uint64_t)_i + 1,     2 + _i % 6, 6, 4, solid, false,
@@ -415,7 +415,7 @@ static void compare_file(const char *name, uint64_t seed, bool pruned)
     }
 }
 
-enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
+enum { DEFAULT = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
 
 static void compare_model(ebpo_mesh mesh, uint32_t leaf_faces, uint32_t parts, uint64_t seed)
 {
@@ -428,25 +428,25 @@ static void compare_model(ebpo_mesh mesh, uint32_t leaf_faces, uint32_t parts, u
     compare_file(part_path, seed, true);
 }
 
-START_TEST(nodes_are_the_same_whatever_holds_them)
+START_TEST(test_cursor_nodes_same_in_all_layouts)
 {
     switch (_i) {
-    case 0: compare_model(ebpo_test_torus(3, 1, 40, 30), 6, USUAL, 1); break;
-    case 1: compare_model(ebpo_test_blob(9, 40, 3), 4, USUAL | EBPO_PART_LEAF_PLANES, 2); break;
-    case 2: compare_model(ebpo_test_sheet(2, 24), 5, USUAL, 3); break;
+    case 0: compare_model(ebpo_test_torus(3, 1, 40, 30), 6, DEFAULT, 1); break;
+    case 1: compare_model(ebpo_test_blob(9, 40, 3), 4, DEFAULT | EBPO_PART_LEAF_PLANES, 2); break;
+    case 2: compare_model(ebpo_test_sheet(2, 24), 5, DEFAULT, 3); break;
     default: compare_model(ebpo_test_blob(8, 30, 5), 3, EBPO_PART_MESH, 4); break;
     }
 }
 END_TEST
 
-START_TEST(nodes_of_a_real_model_are_the_same_whatever_holds_them)
+START_TEST(test_cursor_nodes_of_real_model)
 {
     const char *models = getenv("EBPO_MODELS");
     char name[4096];
     ebpo_mesh mesh;
     snprintf(name, sizeof name, "%s/conrod.ply", models ? models : "");
     if (models && ebpo_mesh_read(name, NULL, &mesh, NULL) == EBPO_OK)
-        compare_model(mesh, 16, USUAL, 5);
+        compare_model(mesh, 16, DEFAULT, 5);
 }
 END_TEST
 
@@ -455,9 +455,9 @@ TEST_SUITE(cursor)
     TCase *tests = tcase_create("cursor");
     tcase_set_timeout(tests, 600);
     tcase_add_checked_fixture(tests, make_folder, remove_folder);
-    tcase_add_loop_test(tests, nodes_of_random_trees_are_those_of_a_plain_walk, 0, 24);
-    tcase_add_loop_test(tests, nodes_are_the_same_whatever_holds_them, 0, 4);
-    tcase_add_test(tests, nodes_of_a_real_model_are_the_same_whatever_holds_them);
+    tcase_add_loop_test(tests, test_cursor_nodes_match_plain_traversal, 0, 24);
+    tcase_add_loop_test(tests, test_cursor_nodes_same_in_all_layouts, 0, 4);
+    tcase_add_test(tests, test_cursor_nodes_of_real_model);
     Suite *suite = suite_create("cursor");
     suite_add_tcase(suite, tests);
     return suite;

@@ -1,5 +1,5 @@
-/* Small files as other programs write them: what is read, with which warning, and what is refused
- * with which sentence. docs/guide/formats.md says the same in words. */
+/* Small files as other programs write them: which are read, with which warning, and which are
+ * refused with which message. docs/guide/formats.md describes the same. */
 #include <stdio.h>
 #include <string.h>
 
@@ -12,7 +12,7 @@ typedef struct dialect {
     const char *name, *text;
     size_t bytes;
     uint64_t vertices, faces; /* 0: it is refused */
-    const char *words;        /* of the error, or of the warning; NULL: there is no warning */
+    const char *words;        /* text of the error, or of the warning; NULL: there is no warning */
 } dialect;
 
 #define FILE_OF(text) text, sizeof(text) - 1
@@ -38,7 +38,7 @@ typedef struct dialect {
     FACET("0 0 0", "1 0 0", "0 0 1") \
     FACET("0 0 0", "0 0 1", "0 1 0") FACET("1 0 0", "0 1 0", "0 0 1")
 
-/* Binary STL: four facets of a tetrahedron, and what is behind each. */
+/* Binary STL: four facets of a tetrahedron, and the data behind each. */
 #define HEAD69         "a head of 80 bytes, which are of any kind                            "
 #define HEAD75         HEAD69 "      "
 #define HEAD80         HEAD75 "     "
@@ -63,49 +63,49 @@ static const dialect dialects[] = {
     { "utf16.obj", FILE_OF("\xff\xfev\0 \0"), 0, 0, "(UTF-16); save it as UTF-8" },
     { "joined.obj", FILE_OF("v 0 \\\n0 0\nv 1 0 0\nv 0 1 0\nf 1 \\\r\n 2 \\ \n3\n"), 3, 1, NULL },
     { "comments.obj", FILE_OF("# C:\\a\\\nv 0 0 0 # here\nv 1 0 0\nv 0 1 0#\nf 1 2 3 # f 1 2 3\n"),
-      0, 0, "line 4: no number: '0#'" },
+      0, 0, "line 4: invalid number '0#'" },
     { "comment.obj", FILE_OF("# C:\\a\\\nv 0 0 0 # here\nv 1 0 0\nv 0 1 0\nf 1 2 3 # f 1 2 3\n"), 3,
       1, NULL },
     { "relative.obj", FILE_OF("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 1\nf -4 -1 -3\n"), 4, 2,
       NULL },
     { "later.obj", FILE_OF("f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"), 3, 1, NULL },
     { "back.obj", FILE_OF("v 0 0 0\nf -1 -2 -3\nv 1 0 0\nv 0 1 0\n"), 0, 0,
-      "line 2: a face names vertex -2, but only 1 stand before it" },
+      "line 2: a face names vertex -2, but only 1 precede it" },
     { "zero.obj", FILE_OF(V4 "f 0 1 2\n"), 0, 0, "line 5: a face names vertex 0" },
     { "beyond.obj", FILE_OF(V4 "f 1 2 5\n"), 0, 0,
       "line 5: a face names vertex 5, but there are 4 vertices" },
     { "far.obj", FILE_OF(V4 "f 1 2 99999999999999999999\n"), 0, 0, "line 5: a face names vertex" },
-    { "word.obj", FILE_OF(V4 "f 1 2 three\n"), 0, 0, "line 5: a face has the corner 'three'" },
-    { "decimal.obj", FILE_OF(V4 "f 1 2 3.0\n"), 0, 0, "line 5: a face has the corner '3.0'" },
-    { "four.obj", FILE_OF(V4 "f 1/1/1/1 2 3\n"), 0, 0, "line 5: a face has the corner '1/1/1/1'" },
+    { "word.obj", FILE_OF(V4 "f 1 2 three\n"), 0, 0, "line 5: invalid corner 'three'" },
+    { "decimal.obj", FILE_OF(V4 "f 1 2 3.0\n"), 0, 0, "line 5: invalid corner '3.0'" },
+    { "four.obj", FILE_OF(V4 "f 1/1/1/1 2 3\n"), 0, 0, "line 5: invalid corner '1/1/1/1'" },
     { "slashes.obj", FILE_OF(V4 "vt 0 0\nvn 0 0 1\nf 1/1/1 2//1 3/1\nf 1/ 2// 4/1/\n"), 4, 2,
       NULL },
     { "no_vt.obj", FILE_OF(V4 "f 1/1 2/2 3/3\n"), 3, 1,
-      "texture coordinates that corners of faces name and that are not in the file: 3" },
+      "texture coordinates that faces refer to but the file lacks: 3" },
     { "no_vn.obj", FILE_OF(V4 "f 1//1 2//-1 3//3\n"), 3, 1,
-      "normals that corners of faces name and that are not in the file: 3" },
+      "normals that faces refer to but the file lacks: 3" },
     { "quad.obj", FILE_OF(V4 "f 1 2 3 4\n"), 4, 2, NULL },
     { "concave.obj", FILE_OF("v 0 0 0\nv 2 0 0\nv 0.5 0.5 0\nv 0 2 0\nf 1 2 3 4\n"), 4, 2, NULL },
     { "two.obj", FILE_OF(V4 "f 1 2\nf 1 2 3\nf 4\n"), 3, 1, NULL },
     { "old.obj", FILE_OF(V4 "fo 1 2 3\n"), 3, 1, NULL },
     { "w.obj", FILE_OF("v 0 0 0 1\nv 2 0 0 2.0\nv 0 1 0 1.0\nf 1 2 3\n"), 3, 1,
-      "weights of vertices, by which coordinates were divided: 1" },
+      "weights of vertices (coordinates are divided by them): 1" },
     { "w0.obj", FILE_OF("v 0 0 0 0\nv 2 0 0 2.0\nv 0 1 0 1.0\nf 1 2 3\n"), 0, 0,
-      "line 1: no number: '0' in vertex 1" },
+      "line 1: invalid number '0' in vertex 1" },
     { "five.obj", FILE_OF("v 0 0 0 9 9\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 3, 1,
-      "vertices' values beyond coordinates and colours: 1" },
+      "vertex values beyond coordinates and colours: 1" },
     { "alpha.obj", FILE_OF("v 0 0 0 1 1 1 1\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 3, 1, NULL },
     { "xy.obj", FILE_OF("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n"), 0, 0,
-      "line 1: vertex 1 has 2 coordinates, not three; write z as well (0 in a plane)" },
+      "line 1: vertex 1 has 2 coordinates, expected 3; add z (0 in a plane)" },
     { "comma.obj", FILE_OF("v 0,5 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 0, 0,
-      "line 1: no number: '0,5' in vertex 1" },
+      "line 1: invalid number '0,5' in vertex 1" },
     { "nan.obj", FILE_OF("v nan 0 -inf\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 3, 1, NULL },
     { "ind.obj", FILE_OF("v -1.#IND 1.#QNAN 1.#INF00\nv 1 nan(ind) -nan(snan)\nv 0 1 0\nf 1 2 3\n"),
       3, 1, NULL },
     { "ind_0.obj", FILE_OF("v -1.#INDEX 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 0, 0,
-      "line 1: no number: '-1.#INDEX' in vertex 1" },
+      "line 1: invalid number '-1.#INDEX' in vertex 1" },
     { "sign.obj", FILE_OF("v 3.1+e2 0 0\nv 310 0 0\nv 31-E-1 1 0\nv 0 1 0\nf 1 3 4\n"), 0, 0,
-      "line 3: no number: '31-E-1' in vertex 3" },
+      "line 3: invalid number '31-E-1' in vertex 3" },
     { "signs.obj", FILE_OF("v 3.1+e2 0 0\nv 310 0 0\nv 3100-E1 1 0\nv 0 1 0\nf 1 3 4\nf 2 4 3\n"),
       3, 2, NULL },
     { "vn_ind.obj", FILE_OF(V4 "vn -nan(ind) 0 0\nvn 0\nf 1//1 2//1 3//2\n"), 3, 1, NULL },
@@ -119,7 +119,7 @@ static const dialect dialects[] = {
       FILE_OF("mtllib gone.mtl \xc3\xa9.mtl\ng \xe4\xb8\x89\xe8\xa7\x92 \\\no \nusemtl\n" V4 F4), 4,
       4, NULL },
     { "one_line_more.obj", FILE_OF("s off\ns 1\ng a b c\n" V4 "l 1 2\np 1 2 3\n" F4), 4, 4,
-      "points, lines, curves and surfaces, which are no faces: 2" },
+      "points, lines, curves and surfaces, which are not faces: 2" },
     { "curves.obj", FILE_OF(V4 "vp 1 2\ncstype bezier\ndeg 3\ncurv 0 1 1 2 3 4\nend\n"), 0, 0,
       "has no faces" },
     { "unknown.obj", FILE_OF(V4 F4 "made by hand\n\x01\x02\n"), 4, 4,
@@ -129,10 +129,10 @@ static const dialect dialects[] = {
     { "unused.obj", FILE_OF("v 9 9 9\n" V4 "f -1 -2 -3\n"), 3, 1, NULL },
     { "empty.obj", FILE_OF(""), 0, 0, "has no faces" },
     { "points.obj", FILE_OF(V4), 0, 0, "has no faces" },
-    { "pairs.obj", FILE_OF(V4 "f 1 2\n"), 0, 0, "none of its faces has three corners" },
+    { "pairs.obj", FILE_OF(V4 "f 1 2\n"), 0, 0, "no face has three corners" },
     { "by_its_words", FILE_OF("# of a pipe\n\n" V4 F4), 4, 4, NULL },
     { "by_its_size", FILE_OF(HEAD80 "\4\0\0\0" BINARY("\3\0abc")), 4, 4,
-      "bytes that follow facets, by their attribute byte counts: 12" },
+      "bytes after facets (attribute byte counts): 12" },
     { "html", FILE_OF("\n <!DOCTYPE html>\n<html>"), 0, 0, "is an HTML page" },
     { "zip", FILE_OF("PK\3\4"), 0, 0, "is a ZIP archive, as 3MF and NPZ files are" },
     { "xml", FILE_OF("<?xml version='1.0'?>"), 0, 0, "is an XML file" },
@@ -143,8 +143,7 @@ static const dialect dialects[] = {
     { "glued.off", FILE_OF("OFF4 4 6\n" OFF4 OFFF), 4, 4, NULL },
     { "glued_alone.off", FILE_OF("OFF4\n4\n6\n" OFF4 OFFF), 4, 4, NULL },
     { "glued_by_its_bytes", FILE_OF("OFF4 4 6\n" OFF4 OFFF), 4, 4, NULL },
-    { "glued_word.off", FILE_OF("OFF4x 4 6\n" OFF4 OFFF), 0, 0,
-      "neither the word OFF nor counts stand there" },
+    { "glued_word.off", FILE_OF("OFF4x 4 6\n" OFF4 OFFF), 0, 0, "expected the word OFF or counts" },
     { "whitespace.off", FILE_OF("\t\t    \n  \f OFF4 4\v12 # or nah\n" OFF4 OFFF), 4, 4, NULL },
     { "white.off",
       FILE_OF("\f\n\r\n OFF\t4\f4\v6\t\n\t0\t0\v0\r\r\n1 0  0\f\r0 1 0\n\f\n 0 0 1 \n" OFFF "\f\n"),
@@ -153,9 +152,9 @@ static const dialect dialects[] = {
     { "hash.off", FILE_OF("OFF\n3 1 0\n0 0 0#a\n1. 0 0.#IND\n0 1 0\n3 0 1 2\n"), 3, 1, NULL },
     { "ind.off", FILE_OF("OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n1.#IND 0 0\n3 0 1 3\n"), 3, 1, NULL },
     { "not_a_number.off", FILE_OF("OFF\n3 1 0\n0 0 0\n1 0,5 0\n0 1 0\n3 0 1 2\n"), 0, 0,
-      "line 4: no number: '0,5' in vertex 1" },
+      "line 4: invalid number '0,5' in vertex 1" },
     { "obj.off", FILE_OF("# a cube\n" V4 F4), 0, 0,
-      "begins as an OBJ file does, but its name says OFF; rename it to end in .obj" },
+      "begins like an OBJ file, but its name indicates OFF; rename it to end in .obj" },
     { "lines.off", FILE_OF("OFF\n4\n4\n6\n" OFF4 OFFF), 4, 4, NULL },
     { "no_edges.off", FILE_OF("OFF\n4 4\n" OFF4 OFFF), 4, 4, NULL },
     { "no_word.off", FILE_OF("4 4 0\n" OFF4 OFFF), 4, 4, NULL },
@@ -181,22 +180,22 @@ static const dialect dialects[] = {
     { "st.off", FILE_OF("STOFF\n3 1 0\n0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n"), 3, 1, NULL },
     { "four.off", FILE_OF("4OFF\n3 1 0\n0 0 0 1\n2 0 0 2\n0 1 0 1\n3 0 1 2\n"), 3, 1,
       "weights of vertices" },
-    { "n.off", FILE_OF("nOFF\n5\n3 1 0\n"), 0, 0, "dimensions of their own (nOFF)" },
+    { "n.off", FILE_OF("nOFF\n5\n3 1 0\n"), 0, 0, "dimensions (nOFF)" },
     { "binary.off", FILE_OF("OFF BINARY\n\0\0\0\3"), 0, 0,
       "is a binary OFF file; save it as text" },
     { "faces.off", FILE_OF("OFF\n4 2 0\n" OFF4 "3 0 2 1 255 0 0\n3 0 1 3 0.5 0 0 1\n"), 4, 2,
       NULL },
     { "table.off", FILE_OF("OFF\n4 2 0\n" OFF4 "3 0 2 1 7\n3 0 1 3\n"), 4, 2, NULL },
     { "odd.off", FILE_OF("OFF\n3 1 0\n0 0 0 9\n1 0 0 9\n0 1 0 9\n3 0 1 2 8 8\n"), 3, 1,
-      "vertices' values that the file's first word does not say: 3; faces' values that are no "
+      "vertex values that the file's first word does not declare: 3; face values that are not "
       "colours: 1" },
     { "polygon.off", FILE_OF("OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"), 4, 2, NULL },
     { "long.off", FILE_OF("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n10 0 1 2 0 1 2 0 1 2 0\n"), 3, 8,
       NULL },
     { "more.off", FILE_OF("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 2\n"), 3, 1,
-      "what follows the last face" },
+      "text after the last face" },
     { "too_many.off", FILE_OF("OFF 3 1 0 0 0 0 1 0 0 0 1 0 3 0 1 2 3 0 1 2"), 0, 0,
-      "there is more behind the last face" },
+      "there is text after the last face" },
     { "fewer.off", FILE_OF("OFF\n3 1 0\n0 0 0\n1 0\n0 1 0\n3 0 1 2\n"), 0, 0,
       "line 4: vertex 1 has no three coordinates" },
     { "short.off", FILE_OF("OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), 0, 0,
@@ -207,7 +206,7 @@ static const dialect dialects[] = {
       "line 6: face 0 names fewer than its 3 vertices" },
     { "huge.off", FILE_OF("OFF\n4000000000 1 0\n0 0 0\n"), 0, 0,
       "do not fit into a file of 25 bytes" },
-    { "not.off", FILE_OF("hello\n"), 0, 0, "neither the word OFF nor counts stand there" },
+    { "not.off", FILE_OF("hello\n"), 0, 0, "expected the word OFF or counts" },
     /* STL */
     { "a.stl", FILE_OF("solid a\n" STL4 "endsolid a\n"), 4, 4, NULL },
     { "crlf.stl",
@@ -255,12 +254,12 @@ static const dialect dialects[] = {
     { "behind.stl",
       FILE_OF("solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
               "endloop of 1\nendfacet 1 red\ncolor 1 0 0\nendsolid a\n"),
-      3, 1, "words that STL does not have: 7, the first in line 7" },
+      3, 1, "unknown words: 7, the first in line 7" },
     { "between.stl",
       FILE_OF(
           "solid a\nmade by hand\nfacet normal 0 0 0 1 2\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
           "vertex 0 1 0\nendloop\nendfacet\nendsolid a\nvertex\n"),
-      3, 1, "words that STL does not have: 6, the first in line 2" },
+      3, 1, "unknown words: 6, the first in line 2" },
     { "ind.stl",
       FILE_OF(
           "solid a\nfacet normal -1.#IND -1.#IND -1.#IND\nouter loop\nvertex 3.1+e2 0 0\nvertex "
@@ -269,20 +268,20 @@ static const dialect dialects[] = {
     { "binary.stl", FILE_OF(MODEL), 4, 4, NULL },
     { "two_binary.stl", FILE_OF(MODEL MODEL), 4, 8, NULL },
     { "payload.stl", FILE_OF(HEAD80 "\4\0\0\0" BINARY("\4\0abcd")), 4, 4,
-      "bytes that follow facets, by their attribute byte counts: 16" },
+      "bytes after facets (attribute byte counts): 16" },
     { "solid_payload.stl", FILE_OF("solid" HEAD75 "\4\0\0\0" BINARY("\4\0abcd")), 4, 4,
-      "bytes that follow facets, by their attribute byte counts: 16" },
+      "bytes after facets (attribute byte counts): 16" },
     { "some_payload.stl",
       FILE_OF(HEAD80 "\4\0\0\0" P0 P0 PY PX "\1\0a" P0 P0 PX PZ "\0\0" P0 P0 PZ PY
                      "\2\0ab" P0 PX PY PZ "\0\0"),
-      4, 4, "bytes that follow facets, by their attribute byte counts: 3" },
+      4, 4, "bytes after facets (attribute byte counts): 3" },
     { "less_payload.stl", FILE_OF(HEAD80 "\4\0\0\0" BINARY("\2\0ab") "c"), 0, 0,
       "states 4 faces, which take 284 of its 293 bytes" },
-    { "spare.stl", FILE_OF(MODEL "0123456789abc"), 4, 4, "bytes behind the last facet: 13" },
+    { "spare.stl", FILE_OF(MODEL "0123456789abc"), 4, 4, "bytes after the last facet: 13" },
     { "solid_spare.stl", FILE_OF("solid facet" HEAD69 "\4\0\0\0" BINARY("\0\0") "?"), 4, 4,
-      "bytes behind the last facet: 1" },
+      "bytes after the last facet: 1" },
     { "colours_and_spare.stl", FILE_OF(HEAD80 "\4\0\0\0" BINARY("\xff\xff") "\n"), 4, 4,
-      "bytes behind the last facet: 1" },
+      "bytes after the last facet: 1" },
     { "count_zero.stl", FILE_OF(HEAD80 ZERO BINARY("\0\0")), 0, 0,
       "states 0 faces, but its 284 bytes hold 4; correct the count (bytes 80 to 83)" },
     { "count_two.stl", FILE_OF(HEAD80 "\2\0\0\0" BINARY("\0\0")), 0, 0,
@@ -295,26 +294,26 @@ static const dialect dialects[] = {
       FILE_OF(HEAD80 "\1\0\0\0" P0 P0 PX PY "\206\0" HEAD80 "\1\0\0\0" P0 P0 PX PY "\0\0"), 0, 0,
       "states 1 faces, which take 134 of its 268 bytes" },
     { "obj.stl", FILE_OF(V4 F4), 0, 0,
-      "begins as an OBJ file does, but its name says STL; rename it to end in .obj" },
+      "begins like an OBJ file, but its name indicates STL; rename it to end in .obj" },
     { "lfs.stl", FILE_OF(LFS), 0, 0, "is a Git LFS pointer" },
     { "utf16.stl", FILE_OF("\xff\xfes\0o\0l\0i\0d\0"), 0, 0, "(UTF-16); save it as UTF-8" },
     { "utf32.stl", FILE_OF("\xff\xfe\0\0s\0\0\0"), 0, 0, "(UTF-32); save it as UTF-8" },
     { "gzip.stl", FILE_OF("\x1f\x8b\10\0" HEAD80 HEAD80), 0, 0, "is compressed by gzip" },
     { "html.stl", FILE_OF("<html><head><title>404" HEAD80), 0, 0, "is an HTML page" },
     { "comment.stl", FILE_OF("# made by x\nsolid x\n" STL4 "endsolid\n"), 0, 0,
-      "is no STL file, but text that begins with '#'; an STL file in text begins with the word "
+      "is not an STL file: it is text that begins with '#'; an STL text file begins with the word "
       "solid" },
     { "quad.stl",
       FILE_OF("solid a\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex "
               "1 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n"),
-      0, 0, "facet 1 has 4 vertices, not three" },
+      0, 0, "facet 1 has 4 vertices, expected 3" },
     { "comma.stl", FILE_OF("solid a\n" FACET("0 0 0", "1,5 0 0", "0 1 0") "endsolid\n"), 0, 0,
-      "line 5: '1,5' where a coordinate should stand, in facet 1" },
+      "line 5: '1,5' instead of a coordinate, in facet 1" },
     { "word.stl", FILE_OF("solid a\n" STL4 "nonsense\nendsolid\n"), 0, 0,
-      "line 30: 'nonsense' where facet or endsolid should stand" },
+      "line 30: 'nonsense' instead of facet or endsolid" },
     { "empty.stl", FILE_OF("solid a\nendsolid a\n"), 0, 0, "has no faces" },
     { "solid.stl", FILE_OF(" solid"), 0, 0, "has no faces" },
-    { "not.stl", FILE_OF("not an stl file at all"), 0, 0, "is no STL file" },
+    { "not.stl", FILE_OF("not an stl file at all"), 0, 0, "is not an STL file" },
     /* PLY in text */
     { "a.ply", FILE_OF(PLY4 OFF4 OFFF), 4, 4, NULL },
     { "mark.ply", FILE_OF("\xef\xbb\xbf" PLY4 OFF4 OFFF), 4, 4, NULL },
@@ -324,27 +323,27 @@ static const dialect dialects[] = {
     { "lfs.ply", FILE_OF(LFS), 0, 0, "is a Git LFS pointer" },
     { "float_count.ply",
       FILE_OF("ply\nformat ascii 1.0\nelement face 4\nproperty list float int vertex_indices\n"), 0,
-      0, "line 4: no type for a list's length: 'float'" },
+      0, "line 4: invalid type for a list length: 'float'" },
     { "ind.ply", FILE_OF(PLY4 "3.1+e2 0 0\n1 0 1.#INF\n0 1 0\n0 0 -1.#IND\n" OFFF), 4, 4, NULL },
     { "unused.ply", FILE_OF(PLY5 OFF4 "nan 0 0\n" OFFF), 4, 4,
-      "vertices whose coordinates are not finite, and that no face names: 1" },
+      "vertices with non-finite coordinates that no face uses: 1" },
     { "unused_first.ply", FILE_OF(PLY5 "0 0 -inf\n" OFF4 "3 1 3 2\n3 1 2 4\n3 1 4 3\n3 2 3 4\n"), 4,
-      4, "vertices whose coordinates are not finite, and that no face names: 1" },
+      4, "vertices with non-finite coordinates that no face uses: 1" },
     { "follows.ply", FILE_OF(PLY4 OFF4 OFFF "\n 3 0 1 2\n"), 4, 4,
-      "what follows the last element, from line 19 on" },
+      "text after the last element, from line 19 on" },
     { "unused_finite.ply", FILE_OF(PLY5 OFF4 "9 9 9\n" OFFF), 5, 4, NULL },
     { "more.ply",
       FILE_OF(PLY4 "0 0 0 9\n1 0 0 9 \n0 1 0 9\n0 0 1 9\n3 0 2 1 8 8\n3 0 1 3\n3 0 3 2\n3 "
                    "1 2 3\n"),
       4, 4, "values that the header does not describe: 6, at the ends of 5 rows" },
     { "fewer.ply", FILE_OF(PLY4 "0 0 0\n1 0\n0 1 0\n0 0 1\n" OFFF), 0, 0,
-      "line 12: vertex 1 began in line 11 and ends within this one" },
+      "line 12: vertex 1 began in line 11 and ends within this line" },
     { "joined.ply",
       FILE_OF(PLY4 "0\n0 0\n1 0 0\n0 1 0\n0 0 1\n3 0\n2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"), 4, 4,
       NULL },
 };
 
-START_TEST(dialects_are_read_or_refused_with_a_sentence)
+START_TEST(test_ply_dialects_are_read_or_refused)
 {
     const dialect *d = &dialects[_i];
     const char *path = scratch(d->name);
@@ -361,21 +360,21 @@ START_TEST(dialects_are_read_or_refused_with_a_sentence)
             ck_assert_msg(strstr(error.message, d->words), "%s", error.message);
             continue;
         }
-        const char *unread = ebpo_mesh_unread(&mesh);
+        const char *unread = ebpo_mesh_ignored(&mesh);
         ck_assert_msg(status == EBPO_OK, "%s", error.message);
         ck_assert_msg(mesh.vertex_count == d->vertices && mesh.face_count == d->faces,
                       "%s: %d vertices, %d faces", d->name, (int)mesh.vertex_count,
                       (int)mesh.face_count);
-        bool told = !unread == !d->words && (!unread || strstr(unread, d->words));
-        ck_assert_msg(told, "%s: '%s'", d->name, unread ? unread : "no warning");
+        bool reported = !unread == !d->words && (!unread || strstr(unread, d->words));
+        ck_assert_msg(reported, "%s: '%s'", d->name, unread ? unread : "no warning");
         ebpo_mesh_free(&mesh);
     }
     remove(path);
 }
 END_TEST
 
-/* With every byte changed, and every length cut: an error or a mesh that is whole. */
-START_TEST(damaged_dialects_are_whole_or_refused)
+/* With every byte changed, and cut at every length: an error or a complete mesh. */
+START_TEST(test_damaged_ply_dialects)
 {
     const dialect *d = &dialects[_i];
     const char *path = scratch(d->name);
@@ -406,9 +405,9 @@ TEST_SUITE(dialects)
 {
     TCase *tests = tcase_create("dialects");
     tcase_set_timeout(tests, 60);
-    tcase_add_loop_test(tests, dialects_are_read_or_refused_with_a_sentence, 0,
+    tcase_add_loop_test(tests, test_ply_dialects_are_read_or_refused, 0,
                         (int)(sizeof dialects / sizeof *dialects));
-    tcase_add_loop_test(tests, damaged_dialects_are_whole_or_refused, 0,
+    tcase_add_loop_test(tests, test_damaged_ply_dialects, 0,
                         (int)(sizeof dialects / sizeof *dialects));
     Suite *suite = suite_create("dialects");
     suite_add_tcase(suite, tests);

@@ -1,5 +1,5 @@
-/* Point and triangle, against rationals: the definition (the least of the plane's distance, if the
- * point projects inside, and the three edges'), written down with mpq. */
+/* Point and triangle, against rationals: the definition (the minimum of the distance from the
+ * plane, if the point projects inside, and from the three edges), computed with mpq. */
 #include <float.h>
 #include <gmp.h>
 #include <math.h>
@@ -138,7 +138,7 @@ static void exact_square(mpq_t out, const double p[3], const double t[3][3])
     clear(&w);
 }
 
-/* Sign of d^2 - square, d a double or the middle between two neighbours. */
+/* Returns the sign of d^2 - square, d a double or the middle between two neighbours. */
 static int compare_square(double d, double next, const mpq_t square)
 {
     mpq_t x, y;
@@ -161,7 +161,8 @@ static bool rounded_correctly(double d, const mpq_t square)
            compare_square(d, nextafter(d, INFINITY), square) >= 0;
 }
 
-/* Far away on some axes, as far as doubles go, and among the triangle's coordinates on others. */
+/* Far away on some axes, up to the range of doubles, and among the coordinates of the triangle on
+ * others. */
 static void make_far_case(int kind, double p[3], double t[3][3])
 {
     double scale = kind == 13 ? 0x1p-1070 : 1;
@@ -172,11 +173,11 @@ static void make_far_case(int kind, double p[3], double t[3][3])
         if (random_unit() < 0.6)
             p[k] = ldexp(random_unit() - 0.5, (int)(random_unit() * 1020));
     }
-    if (random_unit() < 0.3) /* all of it across an axis */
+    if (random_unit() < 0.3) /* in a plane across an axis */
         t[0][1] = t[1][1] = t[2][1] = scale;
 }
 
-/* Fifteen kinds of trouble. */
+/* Fifteen kinds of difficult cases. */
 enum { KINDS = 15 };
 static void make_case(int kind, double p[3], double t[3][3])
 {
@@ -209,7 +210,7 @@ static void make_case(int kind, double p[3], double t[3][3])
 
 enum { CASES = 24000 };
 
-START_TEST(distances_are_rounded_correctly_and_lie_within_their_bounds)
+START_TEST(test_distance_rounding_and_bounds)
 {
     mpq_t square;
     mpq_init(square);
@@ -240,7 +241,7 @@ START_TEST(distances_are_rounded_correctly_and_lie_within_their_bounds)
 }
 END_TEST
 
-START_TEST(comparisons_are_exact_also_of_equal_distances)
+START_TEST(test_distance_comparisons_are_exact)
 {
     mpq_t x, y;
     mpq_inits(x, y, NULL);
@@ -267,7 +268,7 @@ START_TEST(comparisons_are_exact_also_of_equal_distances)
 END_TEST
 
 /* |normal component| squared within 3 ulp of n_k^2 / n . n, and its sign. */
-START_TEST(unit_normals_are_right_also_of_slivers)
+START_TEST(test_unit_normals_of_slivers)
 {
     mpq_t nn, y;
     mpq_inits(nn, y, NULL);
@@ -307,7 +308,8 @@ START_TEST(unit_normals_are_right_also_of_slivers)
 END_TEST
 
 #if defined(__x86_64__)
-/* What the callers see to: no product of four differences of coordinates leaves the doubles. */
+/* Precondition ensured by callers: no product of four differences of coordinates exceeds doubles.
+ */
 static bool in_range(const double *x, int n)
 {
     for (int i = 0; i < n; i++)
@@ -316,7 +318,7 @@ static bool in_range(const double *x, int n)
     return true;
 }
 
-START_TEST(processors_with_fma_give_the_same_bits)
+START_TEST(test_distance_same_with_fma)
 {
     if (!__builtin_cpu_supports("fma"))
         return;
@@ -351,11 +353,11 @@ TEST_SUITE(distance)
     Suite *suite = suite_create("distance");
     TCase *exact = tcase_create("exact");
     tcase_set_timeout(exact, 600);
-    tcase_add_test(exact, distances_are_rounded_correctly_and_lie_within_their_bounds);
-    tcase_add_test(exact, comparisons_are_exact_also_of_equal_distances);
-    tcase_add_test(exact, unit_normals_are_right_also_of_slivers);
+    tcase_add_test(exact, test_distance_rounding_and_bounds);
+    tcase_add_test(exact, test_distance_comparisons_are_exact);
+    tcase_add_test(exact, test_unit_normals_of_slivers);
 #if defined(__x86_64__)
-    tcase_add_test(exact, processors_with_fma_give_the_same_bits);
+    tcase_add_test(exact, test_distance_same_with_fma);
 #endif
     suite_add_tcase(suite, exact);
     return suite;

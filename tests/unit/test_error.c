@@ -1,4 +1,4 @@
-/* What an error tells beside its message. */
+/* Members of an error besides its message. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,7 +6,7 @@
 #include <ebpo/ebpo.h>
 
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
 static void assert_begins(const ebpo_error *error)
 {
@@ -17,7 +17,7 @@ static void assert_begins(const ebpo_error *error)
                   error->message, begin);
 }
 
-START_TEST(a_file_that_is_not_there)
+START_TEST(test_error_of_missing_file)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file;
@@ -30,7 +30,7 @@ START_TEST(a_file_that_is_not_there)
 }
 END_TEST
 
-START_TEST(a_byte_of_a_ply)
+START_TEST(test_error_of_ply_has_byte_offset)
 {
     static const char text[] = "ply\nformat binary_little_endian 1.0\nelement vertex 2\n"
                                "property float x\nproperty float y\nproperty float z\n"
@@ -47,13 +47,13 @@ START_TEST(a_byte_of_a_ply)
 }
 END_TEST
 
-/* Bits of the arrays: the head is libhdf5's to judge. */
-START_TEST(an_array_of_a_damaged_file)
+/* Bits of the arrays: libhdf5 checks the header. */
+START_TEST(test_error_of_damaged_array)
 {
-    static const query_variant usual = { "usual", 4, 4, EBPO_RULE_NONZERO, 0 };
+    static const query_variant standard = { "default", 4, 4, EBPO_RULE_NONZERO, 0 };
     static uint8_t bytes[1 << 20];
     query_model m;
-    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 1), &usual);
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 1), &standard);
     FILE *f = fopen(m.path, "rb");
     size_t size = fread(bytes, 1, sizeof bytes, f);
     fclose(f);
@@ -77,13 +77,13 @@ START_TEST(an_array_of_a_damaged_file)
 }
 END_TEST
 
-/* What an earlier error said does not stay. */
-START_TEST(nothing_is_left_of_an_earlier_error)
+/* Data of an earlier error is removed. */
+START_TEST(test_error_replaces_earlier_error)
 {
-    static const query_variant usual = { "usual", 4, 4, EBPO_RULE_NONZERO, 0 };
+    static const query_variant standard = { "default", 4, 4, EBPO_RULE_NONZERO, 0 };
     query_model m;
     ebpo_error error = { EBPO_E_IO, "old", "old", "old", 5, { 0 } };
-    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 1), &usual);
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 1), &standard);
     ck_assert_int_eq(ebpo_lod_level(m.file, 99, NULL, NULL, NULL, &error), EBPO_E_ARGUMENT);
     ck_assert_str_eq(error.file, "");
     ck_assert_str_eq(error.object, "");
@@ -97,10 +97,10 @@ TEST_SUITE(error)
     Suite *suite = suite_create("error");
     TCase *tests = tcase_create("error");
     tcase_set_timeout(tests, 120);
-    tcase_add_test(tests, a_file_that_is_not_there);
-    tcase_add_test(tests, a_byte_of_a_ply);
-    tcase_add_test(tests, an_array_of_a_damaged_file);
-    tcase_add_test(tests, nothing_is_left_of_an_earlier_error);
+    tcase_add_test(tests, test_error_of_missing_file);
+    tcase_add_test(tests, test_error_of_ply_has_byte_offset);
+    tcase_add_test(tests, test_error_of_damaged_array);
+    tcase_add_test(tests, test_error_replaces_earlier_error);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,8 +1,7 @@
-/* Every public function, with and without a small workspace, and with each allocation and each call
- * of the file system failing once: a call ends with a status, holds nothing after it, leaves no
- * file behind and succeeds when it is made again. Meant for AddressSanitizer and LeakSanitizer,
- * which see each call by itself: Check forks. test_every_call [FAULTY_SERVER], with faults.so
- * preloaded */
+/* Every public function, with and without a small workspace, and with each allocation and each file
+ * system call failing once: a call returns a status, holds nothing afterwards, leaves no file
+ * behind and succeeds when it is repeated. For AddressSanitizer and LeakSanitizer, which see each
+ * call separately: Check forks. test_every_call [FAULTY_SERVER], with faults.so preloaded */
 #include <errno.h>
 #include <dirent.h>
 #include <stdio.h>
@@ -35,9 +34,9 @@ const char *every_call_url(void)
 void every_call_pause(void) { faults_pause(); }
 void every_call_resume(void) { faults_resume(); }
 
-/* --- what is read --- */
+/* --- inputs --- */
 
-/* Vertices get a colour, faces lists of 0 to 2 items. */
+/* Gives vertices a colour, and faces lists of 0 to 2 items. */
 static void colour(ebpo_mesh *mesh)
 {
     ebpo_attribute red = { .element = "vertex", .names = "red", .columns = 1 },
@@ -126,17 +125,17 @@ static void write_model(uint32_t n)
 
 static void serve(void)
 {
-    enum { MOST = 8 << 20 };
+    enum { LIMIT = 8 << 20 };
     FILE *f = test_arguments[0] ? fopen(scratch(EVERY_CALL_MODEL), "rb") : NULL;
-    char *data = f ? malloc(MOST) : NULL;
-    size_t size = data ? fread(data, 1, MOST, f) : 0;
+    char *data = f ? malloc(LIMIT) : NULL;
+    size_t size = data ? fread(data, 1, LIMIT, f) : 0;
     served = size && web_start(test_arguments[0], data, size);
     if (f)
         fclose(f);
     free(data);
 }
 
-/* Once for all calls, which are made in children of this process. */
+/* Runs once for all calls, which run in child processes. */
 static void write_all(uint32_t n)
 {
     scratch_enter();
@@ -163,7 +162,7 @@ static void begin(every_call_env *e, bool in_files)
         fine(ebpo_workspace_make_any(&e->workspace, 1 << 16, scratch(NULL), &error));
 }
 
-/* --- what is left --- */
+/* --- leaks --- */
 
 static int open_files(void)
 {
@@ -197,7 +196,7 @@ static const every_call *call_number(int i)
     static const every_call *const tables[] = {
         every_call_meshes,
         every_call_files,
-        every_call_answers,
+        every_call_results,
 #if EBPO_HAVE_EXTRAS
         every_call_extras
 #endif
@@ -217,9 +216,9 @@ static int call_count(void)
     return count;
 }
 
-/* --- the tests: one turn for each call, without a workspace and with one --- */
+/* --- the tests: each call without a workspace and with one --- */
 
-START_TEST(a_call_leaves_nothing)
+START_TEST(test_call_releases_workspace)
 {
     const every_call *c = call_number(_i / 2);
     every_call_env e;
@@ -235,10 +234,10 @@ END_TEST
 
 enum {
     MEMORY = FAULT_MALLOC | FAULT_MMAP | FAULT_THREAD,
-    IN_PART = FAULT_SHORT_READ | FAULT_SHORT_WRITE /* no failures: all goes on */
+    IN_PART = FAULT_SHORT_READ | FAULT_SHORT_WRITE /* no failures: the call continues */
 };
 
-/* What fails: the n-th call of these kinds, or all from it on. True: there are more than that. */
+/* Fails the n-th call of these kinds, or all from it on. Returns true when there are more calls. */
 static bool call_with_failure(const every_call *c, every_call_env *e, unsigned kinds, uint64_t n,
                               bool onward)
 {
@@ -278,10 +277,10 @@ static void survive(int call, bool with_workspace, unsigned kinds)
     finish(&e);
 }
 
-START_TEST(a_call_survives_any_allocation_that_fails) { survive(_i / 2, _i % 2, MEMORY); }
+START_TEST(test_call_survives_allocation_failure) { survive(_i / 2, _i % 2, MEMORY); }
 END_TEST
 
-START_TEST(a_call_survives_any_file_that_fails)
+START_TEST(test_call_survives_file_failure)
 {
     static const unsigned kinds[] = { FAULT_READ,   FAULT_WRITE,    FAULT_SYNC,
                                       FAULT_RENAME, FAULT_TRUNCATE, FAULT_OPEN };
@@ -290,8 +289,8 @@ START_TEST(a_call_survives_any_file_that_fails)
 }
 END_TEST
 
-/* All that is read or written comes and goes in halves. */
-START_TEST(a_call_goes_on_with_what_comes_in_part)
+/* All reads and writes are split into halves. */
+START_TEST(test_call_handles_partial_reads_and_writes)
 {
     every_call_env e;
     begin(&e, false);
@@ -303,7 +302,7 @@ START_TEST(a_call_goes_on_with_what_comes_in_part)
 }
 END_TEST
 
-/* --- welding with attributes: all of it, or nothing --- */
+/* --- welding with attributes: complete, or unchanged --- */
 
 static const char split_ply[] =
     "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\n"
@@ -325,7 +324,7 @@ static ebpo_mesh read_split(bool arranged, ebpo_workspace *workspace)
     return mesh;
 }
 
-/* Rows of the three arrays, which have these bytes and ends. */
+/* Expects rows of the three arrays with these bytes and ends. */
 static void expect_rows(const ebpo_mesh *mesh, uint64_t rows, const uint8_t *red,
                         const uint64_t *ends, const int16_t *words)
 {
@@ -343,7 +342,7 @@ static void expect_rows(const ebpo_mesh *mesh, uint64_t rows, const uint8_t *red
     }
 }
 
-START_TEST(a_weld_that_fails_changes_nothing)
+START_TEST(test_failed_weld_changes_nothing)
 {
     static const uint64_t ends[] = { 0, 2, 3, 6, 8, 8 }, kept[] = { 0, 2, 3, 5 };
     static const int16_t words[] = { 21, 22, 31, 41, 42, 43, 51, 52 },
@@ -378,17 +377,17 @@ Suite *test_suite(void)
           *in_part = tcase_create("in_part");
     tcase_set_timeout(all, SECONDS);
     tcase_add_unchecked_fixture(all, write_large, remove_all);
-    tcase_add_loop_test(all, a_call_leaves_nothing, 0, 2 * call_count());
+    tcase_add_loop_test(all, test_call_releases_workspace, 0, 2 * call_count());
     suite_add_tcase(suite, all);
     tcase_set_timeout(failing, SECONDS);
     tcase_add_unchecked_fixture(failing, write_small, remove_all);
-    tcase_add_loop_test(failing, a_call_survives_any_allocation_that_fails, 0, 2 * call_count());
-    tcase_add_loop_test(failing, a_call_survives_any_file_that_fails, 0, call_count());
+    tcase_add_loop_test(failing, test_call_survives_allocation_failure, 0, 2 * call_count());
+    tcase_add_loop_test(failing, test_call_survives_file_failure, 0, call_count());
     tcase_set_timeout(in_part, SECONDS);
     tcase_add_unchecked_fixture(in_part, write_small, remove_all);
-    tcase_add_loop_test(in_part, a_call_goes_on_with_what_comes_in_part, 0, call_count());
+    tcase_add_loop_test(in_part, test_call_handles_partial_reads_and_writes, 0, call_count());
     suite_add_tcase(suite, in_part);
-    tcase_add_loop_test(failing, a_weld_that_fails_changes_nothing, 0, 4);
+    tcase_add_loop_test(failing, test_failed_weld_changes_nothing, 0, 4);
     suite_add_tcase(suite, failing);
     return suite;
 }

@@ -1,4 +1,4 @@
-/* The coding of faces across edges against the verifier's plain reader. */
+/* The coding of faces across edges against the simple reader of the verifier. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +17,7 @@ enum { ROWS = 4096, BYTES = ROWS * EBPO_GATES_COLS };
 
 static uint64_t pick(uint64_t *state, uint64_t below) { return ebpo_random_next(state) % below; }
 
-/* A strip, row after row of it, of a grid: what scans look like. */
+/* A strip, row after row, of a grid, as in scans. */
 static void grid_face(uint64_t i, uint32_t width, uint32_t *face)
 {
     uint32_t square = (uint32_t)(i / 2), x = square % width, y = square / width,
@@ -44,8 +44,8 @@ static void any_face(int kind, uint64_t i, uint64_t *state, uint32_t *face)
     memcpy(face, turned, sizeof turned);
 }
 
-/* Codes of high-water: of faces whose vertices are numbered by first use, `before` of which were
- * seen before. Returns how many are seen then. */
+/* Makes high-water codes: of faces whose vertices are numbered by first use, of which `before` were
+ * seen before. Returns how many are seen afterwards. */
 static uint64_t number_by_use(uint32_t *faces, uint32_t rows, uint64_t before, uint64_t *state)
 {
     static uint32_t number[400000];
@@ -61,7 +61,7 @@ static uint64_t number_by_use(uint32_t *faces, uint32_t rows, uint64_t before, u
     return seen;
 }
 
-static uint32_t faces_made[3 * ROWS], faces_back[3 * ROWS], faces_twin[3 * ROWS];
+static uint32_t faces_made[3 * ROWS], faces_back[3 * ROWS], faces_reference[3 * ROWS];
 static uint8_t codes_made[12 * ROWS], codes_back[12 * ROWS], chunk[BYTES];
 
 static bool decode(uint32_t rows, uint64_t before, uint32_t *faces)
@@ -72,7 +72,7 @@ static bool decode(uint32_t rows, uint64_t before, uint32_t *faces)
 
 static bool read_plainly(uint32_t rows, uint64_t before)
 {
-    return ebpo_plain_gates_read(chunk, rows, &before, faces_twin);
+    return ebpo_plain_gates_read(chunk, rows, &before, faces_reference);
 }
 
 static void make(int kind, uint32_t rows, uint64_t before, uint64_t *state,
@@ -87,7 +87,7 @@ static void make(int kind, uint32_t rows, uint64_t before, uint64_t *state,
     ebpo_gates_encode(codes_made, rows, chunk, ends);
 }
 
-START_TEST(faces_come_back_and_the_twin_reads_the_same)
+START_TEST(test_face_encoding_round_trip)
 {
     static const uint64_t befores[] = { 0, 5, 300, 70000, UINT32_MAX - 60000 };
     uint64_t state = (uint64_t)_i + 1;
@@ -104,13 +104,13 @@ START_TEST(faces_come_back_and_the_twin_reads_the_same)
         ck_assert_int_eq(memcmp(codes_back, codes_made, 12 * (size_t)rows), 0);
         ck_assert_int_eq(memcmp(faces_back, faces_made, 12 * (size_t)rows), 0);
         ck_assert(read_plainly(rows, before));
-        ck_assert_int_eq(memcmp(faces_twin, faces_made, 12 * (size_t)rows), 0);
+        ck_assert_int_eq(memcmp(faces_reference, faces_made, 12 * (size_t)rows), 0);
     }
 }
 END_TEST
 
-/* Changed bytes are read as the twin reads them, or refused by both. */
-START_TEST(whatever_is_there_is_read_as_the_twin_reads_it)
+/* Changed bytes are read as by the reference implementation, or refused by both. */
+START_TEST(test_changed_face_bytes_match_reference)
 {
     uint64_t state = (uint64_t)_i + 100, taken = 0, refused = 0;
     for (uint64_t turn = 0; turn < ebpo_test_scaled(2000); turn++) {
@@ -127,13 +127,13 @@ START_TEST(whatever_is_there_is_read_as_the_twin_reads_it)
         taken += fine;
         refused += !fine;
         if (fine)
-            ck_assert_int_eq(memcmp(faces_twin, faces_back, 12 * (size_t)rows), 0);
+            ck_assert_int_eq(memcmp(faces_reference, faces_back, 12 * (size_t)rows), 0);
     }
     ck_assert(refused > 0 && (taken > 0 || ebpo_test_scale() < 0.3));
 }
 END_TEST
 
-START_TEST(noise_is_read_as_the_twin_reads_it)
+START_TEST(test_noise_face_bytes_match_reference)
 {
     uint64_t state = 7;
     for (uint64_t turn = 0; turn < ebpo_test_scaled(4000); turn++) {
@@ -145,13 +145,13 @@ START_TEST(noise_is_read_as_the_twin_reads_it)
         bool fine = decode(rows, 1000000, faces_back);
         ck_assert(fine == read_plainly(rows, 1000000));
         if (fine)
-            ck_assert_int_eq(memcmp(faces_twin, faces_back, 12 * (size_t)rows), 0);
+            ck_assert_int_eq(memcmp(faces_reference, faces_back, 12 * (size_t)rows), 0);
     }
 }
 END_TEST
 
-/* A grid takes two bytes a face and hardly any number; what has no room comes as codes. */
-START_TEST(streams_are_as_long_as_they_should_be)
+/* A grid takes two bytes a face and hardly any index; the others are stored as codes. */
+START_TEST(test_face_stream_lengths)
 {
     uint64_t state = 3;
     size_t ends[EBPO_GATES_ENDS];
@@ -176,10 +176,10 @@ TEST_SUITE(face_gates)
     Suite *s = suite_create("face_gates");
     TCase *tests = tcase_create("face_gates");
     tcase_set_timeout(tests, 600);
-    tcase_add_loop_test(tests, faces_come_back_and_the_twin_reads_the_same, 0, KINDS);
-    tcase_add_loop_test(tests, whatever_is_there_is_read_as_the_twin_reads_it, 0, KINDS);
-    tcase_add_test(tests, noise_is_read_as_the_twin_reads_it);
-    tcase_add_test(tests, streams_are_as_long_as_they_should_be);
+    tcase_add_loop_test(tests, test_face_encoding_round_trip, 0, KINDS);
+    tcase_add_loop_test(tests, test_changed_face_bytes_match_reference, 0, KINDS);
+    tcase_add_test(tests, test_noise_face_bytes_match_reference);
+    tcase_add_test(tests, test_face_stream_lengths);
     suite_add_tcase(s, tests);
     return s;
 }

@@ -1,5 +1,5 @@
-/* Bytes, rows and elements beyond 2^32, without the data: sparse files and mappings, of which only
- * what is looked at takes room. */
+/* Bytes, rows and elements beyond 2^32, without the data: sparse files and mappings, which take
+ * memory only for visited parts. */
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,8 +27,8 @@
 static const uint64_t FAR = UINT64_C(1) << 32;
 static const char *path;
 
-/* Zeros that take no room until they are written to. NULL where the system does not lend what it
- * may not have, or addresses have 32 bits. */
+/* Maps zeros that take no memory until they are written to. Returns NULL when the system refuses to
+ * overcommit, or addresses have 32 bits. */
 static uint8_t *lend(uint64_t bytes)
 {
     if (bytes > PTRDIFF_MAX)
@@ -40,7 +40,7 @@ static uint8_t *lend(uint64_t bytes)
 
 /* --- PLY --- */
 
-/* A tetrahedron whose elements stand behind `bytes` of something else. */
+/* Writes a tetrahedron whose elements follow `bytes` of other data. */
 static uint64_t far_tetrahedron(uint8_t *data, uint64_t bytes, const char *encoding)
 {
     static const uint32_t faces[4][3] = { { 0, 2, 1 }, { 0, 1, 3 }, { 0, 3, 2 }, { 1, 2, 3 } };
@@ -65,7 +65,7 @@ static uint64_t far_tetrahedron(uint8_t *data, uint64_t bytes, const char *encod
     return (uint64_t)(at - data);
 }
 
-START_TEST(ply_elements_behind_4_gib_are_read)
+START_TEST(test_ply_elements_beyond_4_gib)
 {
     uint64_t skipped = FAR + 12345;
     uint8_t *data = lend(skipped + 4096);
@@ -103,11 +103,11 @@ START_TEST(ply_elements_behind_4_gib_are_read)
 }
 END_TEST
 
-/* What a header claims, in a file that is as long as that takes, or a few bytes only. */
+/* Reads a file with such a header, that is as long as stated, or a few bytes only. */
 static ebpo_status claims(const char *vertices, const char *faces, uint64_t size, ebpo_error *error)
 {
-    uint64_t room = size < 4096 ? 4096 : size;
-    uint8_t *data = lend(room);
+    uint64_t space = size < 4096 ? 4096 : size;
+    uint8_t *data = lend(space);
     ebpo_mesh mesh;
     if (!data)
         return EBPO_E_UNSUPPORTED;
@@ -119,11 +119,11 @@ static ebpo_status claims(const char *vertices, const char *faces, uint64_t size
     ebpo_status status = ebpo_ply_parse_memory(&mesh, data, size ? size : (uint64_t)header + 40,
                                                "huge.ply", NULL, 0, NULL, error);
     ck_assert_ptr_null(mesh.faces);
-    munmap(data, (size_t)(room));
+    munmap(data, (size_t)(space));
     return status;
 }
 
-START_TEST(ply_counts_that_a_short_file_cannot_hold_are_damage)
+START_TEST(test_ply_counts_beyond_file_size)
 {
     static const char *const counts[] = { "4294967294",          "4294967295",
                                           "4294967296",          "1099511627776",
@@ -141,7 +141,7 @@ START_TEST(ply_counts_that_a_short_file_cannot_hold_are_damage)
 }
 END_TEST
 
-START_TEST(ply_counts_beyond_the_limit_are_refused_before_anything_is_allocated)
+START_TEST(test_ply_counts_beyond_limit_are_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status = claims("4294967295", "4", 3 * FAR + 4096, &error);
@@ -156,8 +156,8 @@ START_TEST(ply_counts_beyond_the_limit_are_refused_before_anything_is_allocated)
 }
 END_TEST
 
-/* Three times its faces is 2 in 32 bits. */
-START_TEST(stl_corners_beyond_the_limit_are_refused_before_anything_is_allocated)
+/* Three times the face count is 2 in 32 bits. */
+START_TEST(test_stl_corners_beyond_limit_are_refused)
 {
     const uint32_t faces = 1431655766;
     const uint64_t size = 84 + 50 * (uint64_t)faces;
@@ -174,13 +174,14 @@ START_TEST(stl_corners_beyond_the_limit_are_refused_before_anything_is_allocated
 }
 END_TEST
 
-START_TEST(whole_files_beyond_4_gib_are_read)
+START_TEST(test_whole_files_beyond_4_gib)
 {
     char end[3];
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
     int fd = open(path, O_CREAT | O_RDWR | O_TRUNC, 0600);
-    if (pwrite(fd, "end", 3, (off_t)(FAR + 77)) == 3) { /* else the file system has no such files */
+    if (pwrite(fd, "end", 3, (off_t)(FAR + 77)) == 3) { /* else the file system does not support
+                                                         * such files */
         ck_assert_msg(ebpo_whole_file_open(&file, path, &error) == EBPO_OK, "%s", error.message);
         ck_assert_uint_eq(file.size, FAR + 80);
         ck_assert_int_eq(ebpo_whole_file_read(&file, FAR + 77, end, 3, path, &error), EBPO_OK);
@@ -193,7 +194,7 @@ START_TEST(whole_files_beyond_4_gib_are_read)
 }
 END_TEST
 
-START_TEST(files_longer_than_arrays_may_be_are_refused_before_anything_is_read)
+START_TEST(test_files_beyond_array_limit_are_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_whole_file file = EBPO_WHOLE_FILE_INIT;
@@ -207,8 +208,8 @@ END_TEST
 
 /* --- containers --- */
 
-/* Bytes of 8 * count that a machine of 32 bits would take for few. */
-START_TEST(lists_longer_than_arrays_may_be_are_refused)
+/* Bytes of 8 * count that would be few with 32-bit arithmetic. */
+START_TEST(test_lists_beyond_array_limit_are_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const uint64_t counts[] = { UINT64_C(1) << 61, (uint64_t)PTRDIFF_MAX / 8 + 1 };
@@ -229,12 +230,12 @@ START_TEST(lists_longer_than_arrays_may_be_are_refused)
 }
 END_TEST
 
-/* A container whose arrays stand behind 8 GiB of nothing: its metadata is where it was and names
- * places so much farther on. */
+/* A container whose arrays follow 8 GiB of zeros: its metadata is unchanged except for offsets
+ * greater by that amount. */
 typedef struct shifted {
     uint8_t *bytes;
-    uint64_t size, from, by;    /* bytes at `from` and behind are `by` farther on */
-    uint64_t beyond, announced; /* reads, and announced ranges, beyond 2^32 */
+    uint64_t size, from, by; /* bytes from `from` on are `by` farther */
+    uint64_t beyond, hinted; /* reads, and ranges of prefetch hints, beyond 2^32 */
 } shifted;
 
 static void expect_shifted(void *user, const ebpo_range *ranges, size_t count)
@@ -242,7 +243,7 @@ static void expect_shifted(void *user, const ebpo_range *ranges, size_t count)
     shifted *s = user;
     for (size_t i = 0; i < count; i++) {
         ck_assert_uint_le(ranges[i].offset + ranges[i].size, s->by + s->size);
-        s->announced += ranges[i].offset > FAR;
+        s->hinted += ranges[i].offset > FAR;
     }
 }
 
@@ -263,13 +264,14 @@ static ebpo_status read_shifted(void *user, uint64_t offset, uint64_t size, void
     return EBPO_OK;
 }
 
-/* The sum of metadata follows it. */
+/* The checksum of metadata follows it. */
 static void sum_again(uint8_t *at, uint64_t bytes)
 {
     ebpo_store32(at + bytes, ebpo_lookup3(at, bytes));
 }
 
-/* A further piece of an object header, which a message with its place and length leads to. */
+/* A continuation block of an object header, which a message with its offset and length refers to.
+ */
 static void sum_piece_again(shifted *s, uint64_t place)
 {
     for (uint64_t i = 48; i + 16 < s->from; i++)
@@ -280,7 +282,7 @@ static void sum_piece_again(shifted *s, uint64_t place)
     ck_abort_msg("nothing leads to the piece at %llu", (unsigned long long)place);
 }
 
-/* Superblock and object headers, as the HDF5 file format specification has them. */
+/* Superblock and object headers, as in the HDF5 file format specification. */
 static void sum_metadata_again(shifted *s)
 {
     uint8_t *b = s->bytes;
@@ -309,7 +311,7 @@ static void move_address(shifted *s, uint64_t address)
     ck_assert_int_eq(found, 1);
 }
 
-/* Makes places of all chunks so much greater; the file was opened from the bytes as they were. */
+/* Increases all chunk offsets by this amount; the file was opened from the original bytes. */
 static void shift(shifted *s, const ebpo_file *file)
 {
     uint64_t places[256];
@@ -373,12 +375,12 @@ static char *text_of(ebpo_file *file)
     return text;
 }
 
-START_TEST(containers_are_read_from_beyond_8_gib)
+START_TEST(test_container_in_memory_beyond_8_gib)
 {
     static const char *const names[] = { "01_one_leaf_unfiltered", "06_four_levels_leaf_planes" };
     for (size_t i = 0; i < 2 * sizeof names / sizeof *names;
-         i++) { /* then all again, from far away: places of chunks are read later, and what will be
-                   read is announced */
+         i++) { /* then all again as a remote file: chunk offsets are read later, with prefetch
+                 * hints */
         bool away = i >= sizeof names / sizeof *names;
         shifted s = vector_of(names[i % (sizeof names / sizeof *names)]);
         ebpo_error error = EBPO_ERROR_INIT;
@@ -398,7 +400,7 @@ START_TEST(containers_are_read_from_beyond_8_gib)
         char *here = text_of(near), *there = text_of(far);
         ck_assert_str_eq(here, there);
         ck_assert_uint_gt(s.beyond, 0);
-        ck_assert(!away || s.announced > 0);
+        ck_assert(!away || s.hinted > 0);
         ck_assert_msg(ebpo_file_check_content(far, READ_BY(1), &error) == EBPO_OK, "%s",
                       error.message);
         free(here);
@@ -411,7 +413,7 @@ START_TEST(containers_are_read_from_beyond_8_gib)
 }
 END_TEST
 
-START_TEST(container_files_on_disk_are_read_from_beyond_8_gib)
+START_TEST(test_container_on_disk_beyond_8_gib)
 {
     shifted s = vector_of("06_four_levels_leaf_planes");
     ebpo_error error = EBPO_ERROR_INIT;
@@ -440,7 +442,7 @@ START_TEST(container_files_on_disk_are_read_from_beyond_8_gib)
 }
 END_TEST
 
-START_TEST(containers_have_addresses_and_lengths_of_8_bytes)
+START_TEST(test_container_uses_8_byte_addresses)
 {
     shifted s = vector_of("03_one_leaf");
     ck_assert_mem_eq(s.bytes + 1, "HDF", 3);
@@ -450,9 +452,9 @@ START_TEST(containers_have_addresses_and_lengths_of_8_bytes)
 }
 END_TEST
 
-/* A leaf whose references begin at row 2^32 + 65536, behind a row of the index that says so: what
- * the writer makes of it. */
-START_TEST(references_beyond_2_to_the_32_are_encoded_where_they_are)
+/* A leaf whose references begin at row 2^32 + 65536, behind a row of the index that states it:
+ * encoded by the writer. */
+START_TEST(test_references_beyond_32_bits)
 {
     enum { ROWS = 16384, LEAVES = EBPO_INDEX_ROWS + 1 };
     uint64_t before = FAR + 65536, *first = calloc(LEAVES, sizeof *first);
@@ -502,8 +504,8 @@ END_TEST
 
 /* --- workspace --- */
 
-/* False where addresses have 32 bits, and there is no such array. */
-static bool touch_ends(ebpo_workspace *w)
+/* Returns false when addresses have 32 bits, and there is no such array. */
+static bool haptic_ends(ebpo_workspace *w)
 {
     uint64_t count = FAR / 8 + 1000;
     uint64_t *array = ebpo_array_alloc(w, count, sizeof *array);
@@ -523,14 +525,14 @@ static bool touch_ends(ebpo_workspace *w)
     return true;
 }
 
-START_TEST(workspaces_hold_arrays_beyond_4_gib_in_memory)
+START_TEST(test_workspace_memory_beyond_4_gib)
 {
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
     ck_assert_msg(ebpo_workspace_make_any(&w, 64 * FAR, scratch(NULL), &error) == EBPO_OK, "%s",
                   error.message);
-    bool had = touch_ends(w);
+    bool had = haptic_ends(w);
     ebpo_workspace_get_stats(w, &f);
     ck_assert(!had || f.held_peak > FAR);
     ck_assert_uint_eq(f.filed_peak, 0);
@@ -538,20 +540,19 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_memory)
 }
 END_TEST
 
-/* A file's blocks are taken from the disk at once, which takes no time where the file system can.
- */
+/* Allocates the blocks of a file at once, which is fast when the file system supports it. */
 static bool disk_lends(const char *where)
 {
     enum { EXT = 0xef53, XFS = 0x58465342 };
     static const long BTRFS = 0x9123683e;
     struct statfs kind;
-    struct statvfs room;
-    return statfs(where, &kind) == 0 && statvfs(where, &room) == 0 &&
+    struct statvfs space;
+    return statfs(where, &kind) == 0 && statvfs(where, &space) == 0 &&
            (kind.f_type == EXT || kind.f_type == XFS || kind.f_type == BTRFS) &&
-           (uint64_t)room.f_bavail * room.f_frsize > 4 * FAR;
+           (uint64_t)space.f_bavail * space.f_frsize > 4 * FAR;
 }
 
-START_TEST(workspaces_hold_arrays_beyond_4_gib_in_files)
+START_TEST(test_workspace_files_beyond_4_gib)
 {
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -560,14 +561,14 @@ START_TEST(workspaces_hold_arrays_beyond_4_gib_in_files)
         return;
     ck_assert_msg(ebpo_workspace_make_any(&w, 1 << 20, scratch(NULL), &error) == EBPO_OK, "%s",
                   error.message);
-    bool had = touch_ends(w);
+    bool had = haptic_ends(w);
     ebpo_workspace_get_stats(w, &f);
     ck_assert(!had || f.filed_peak > FAR);
     ebpo_workspace_free(w);
 }
 END_TEST
 
-START_TEST(workspaces_refuse_what_overflows)
+START_TEST(test_workspace_size_overflow_is_refused)
 {
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -592,20 +593,20 @@ TEST_SUITE(far_offsets)
     TCase *tests = tcase_create("far offsets");
     tcase_set_timeout(tests, 120);
     tcase_add_checked_fixture(tests, enter, scratch_leave);
-    tcase_add_test(tests, ply_elements_behind_4_gib_are_read);
-    tcase_add_test(tests, ply_counts_that_a_short_file_cannot_hold_are_damage);
-    tcase_add_test(tests, ply_counts_beyond_the_limit_are_refused_before_anything_is_allocated);
-    tcase_add_test(tests, stl_corners_beyond_the_limit_are_refused_before_anything_is_allocated);
-    tcase_add_test(tests, whole_files_beyond_4_gib_are_read);
-    tcase_add_test(tests, files_longer_than_arrays_may_be_are_refused_before_anything_is_read);
-    tcase_add_test(tests, lists_longer_than_arrays_may_be_are_refused);
-    tcase_add_test(tests, containers_are_read_from_beyond_8_gib);
-    tcase_add_test(tests, container_files_on_disk_are_read_from_beyond_8_gib);
-    tcase_add_test(tests, containers_have_addresses_and_lengths_of_8_bytes);
-    tcase_add_test(tests, references_beyond_2_to_the_32_are_encoded_where_they_are);
-    tcase_add_test(tests, workspaces_hold_arrays_beyond_4_gib_in_memory);
-    tcase_add_test(tests, workspaces_hold_arrays_beyond_4_gib_in_files);
-    tcase_add_test(tests, workspaces_refuse_what_overflows);
+    tcase_add_test(tests, test_ply_elements_beyond_4_gib);
+    tcase_add_test(tests, test_ply_counts_beyond_file_size);
+    tcase_add_test(tests, test_ply_counts_beyond_limit_are_refused);
+    tcase_add_test(tests, test_stl_corners_beyond_limit_are_refused);
+    tcase_add_test(tests, test_whole_files_beyond_4_gib);
+    tcase_add_test(tests, test_files_beyond_array_limit_are_refused);
+    tcase_add_test(tests, test_lists_beyond_array_limit_are_refused);
+    tcase_add_test(tests, test_container_in_memory_beyond_8_gib);
+    tcase_add_test(tests, test_container_on_disk_beyond_8_gib);
+    tcase_add_test(tests, test_container_uses_8_byte_addresses);
+    tcase_add_test(tests, test_references_beyond_32_bits);
+    tcase_add_test(tests, test_workspace_memory_beyond_4_gib);
+    tcase_add_test(tests, test_workspace_files_beyond_4_gib);
+    tcase_add_test(tests, test_workspace_size_overflow_is_refused);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,4 +1,5 @@
-/* The models that ebpo-generate makes meet themselves nowhere, and its proof of that is right. */
+/* Models of ebpo-generate have no intersections with themselves, and its proof of that is correct.
+ */
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,7 +15,7 @@ static face_model model_of(const ebpo_mesh *mesh)
                          mesh->vertex_count, mesh->face_count };
 }
 
-static uint64_t meetings(const ebpo_mesh *mesh)
+static uint64_t clashes(const ebpo_mesh *mesh)
 {
     face_model m = model_of(mesh);
     uint64_t first[2];
@@ -40,44 +41,45 @@ static ebpo_mesh make_torus(uint32_t n, uint32_t m)
     return mesh;
 }
 
-/* --- the judge --- */
+/* --- the reference --- */
 
-static uint64_t pairs_that_meet(const float (*xyz)[3], const uint32_t (*corners)[3], uint64_t faces)
+static uint64_t pairs_that_intersect(const float (*xyz)[3], const uint32_t (*corners)[3],
+                                     uint64_t faces)
 {
     face_model m = { xyz, corners, 9, faces };
     uint64_t first[2];
     return crossing_faces(&m, first);
 }
 
-START_TEST(two_faces_meet_that_share_no_corner)
+START_TEST(test_faces_without_shared_corner_intersect)
 {
     static const uint32_t two[2][3] = { { 0, 1, 2 }, { 3, 4, 5 } };
     static const struct {
         float other[3][3];
         uint64_t meets;
-    } cases[] = { { { { 1, 1, -1 }, { 1, 1, 1 }, { 5, 5, 0 } }, 1 }, /* goes through */
-                  { { { 1, 1, 0 }, { 1, 1, 1 }, { 2, 1, 1 } }, 1 }, /* stands on it with a corner */
-                  /* hovers over it by the least float */
+    } cases[] = { { { { 1, 1, -1 }, { 1, 1, 1 }, { 5, 5, 0 } }, 1 }, /* passes through */
+                  { { { 1, 1, 0 }, { 1, 1, 1 }, { 2, 1, 1 } }, 1 },  /* touches it with a corner */
+                  /* is above it by the smallest float */
                   { { { 1, 1, 0x1p-149f }, { 1, 1, 1 }, { 2, 1, 1 } }, 0 },
-                  { { { 1, 0, 0 }, { 2, 0, 0 }, { 1, 0, 1 } }, 1 }, /* stands on its edge */
-                  /* touches a corner, of another number */
+                  { { { 1, 0, 0 }, { 2, 0, 0 }, { 1, 0, 1 } }, 1 }, /* touches its edge */
+                  /* touches a corner, with another index */
                   { { { 0, 0, 0 }, { -1, 0, 0 }, { 0, -1, 0 } }, 1 },
-                  { { { 1, 1, 0 }, { 2, 1, 0 }, { 1, 2, 0 } }, 1 },       /* lies within it */
-                  { { { -9, -9, 0 }, { 30, -9, 0 }, { -9, 30, 0 } }, 1 }, /* lies around it */
-                  { { { 5, 5, 0 }, { 9, 5, 0 }, { 5, 9, 0 } }, 0 },       /* lies beside it */
-                  { { { 1, 1, 1 }, { 2, 1, 1 }, { 1, 2, 1 } }, 0 },       /* lies above it */
-                  /* goes through its plane elsewhere */
+                  { { { 1, 1, 0 }, { 2, 1, 0 }, { 1, 2, 0 } }, 1 },       /* is within it */
+                  { { { -9, -9, 0 }, { 30, -9, 0 }, { -9, 30, 0 } }, 1 }, /* is around it */
+                  { { { 5, 5, 0 }, { 9, 5, 0 }, { 5, 9, 0 } }, 0 },       /* is beside it */
+                  { { { 1, 1, 1 }, { 2, 1, 1 }, { 1, 2, 1 } }, 0 },       /* is above it */
+                  /* passes through its plane elsewhere */
                   { { { -1, -1, -1 }, { 9, -1, 1 }, { -1, -2, 1 } }, 0 } };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         float xyz[9][3] = { { 0, 0, 0 }, { 4, 0, 0 }, { 0, 4, 0 } };
         memcpy(xyz[3], cases[i].other, sizeof cases[i].other);
-        ck_assert_msg(pairs_that_meet((const float(*)[3])xyz, two, 2) == cases[i].meets, "case %zu",
-                      i);
+        ck_assert_msg(pairs_that_intersect((const float(*)[3])xyz, two, 2) == cases[i].meets,
+                      "case %zu", i);
     }
 }
 END_TEST
 
-START_TEST(neighbours_meet_where_they_fold_or_run_through_each_other)
+START_TEST(test_folded_neighbours_intersect)
 {
     static const float xyz[9][3] = { { 0, 0, 0 },  { 4, 0, 0 },  { 0, 4, 0 },
                                      { 4, 4, 0 },  { 1, 1, 0 },  { 1, 1, 1 },
@@ -88,19 +90,19 @@ START_TEST(neighbours_meet_where_they_fold_or_run_through_each_other)
     } cases[] = { { { { 0, 1, 2 }, { 2, 1, 3 } }, 0 }, /* a flat square */
                   { { { 0, 1, 2 }, { 1, 0, 4 } }, 1 }, /* folded flat over an edge */
                   { { { 0, 1, 2 }, { 1, 0, 5 } }, 0 }, /* at an angle */
-                  { { { 0, 1, 2 }, { 0, 5, 6 } }, 1 }, /* one corner in common, and through it */
-                  { { { 0, 1, 2 }, { 0, 7, 8 } }, 0 }, /* one corner in common */
+                  { { { 0, 1, 2 }, { 0, 5, 6 } }, 1 }, /* one common corner, and through it */
+                  { { { 0, 1, 2 }, { 0, 7, 8 } }, 0 }, /* one common corner */
                   { { { 0, 1, 2 }, { 0, 3, 5 } },
-                    1 }, /* one corner in common, and an edge that lies in it */
-                  { { { 0, 1, 2 }, { 1, 2, 0 } }, 1 } }; /* twice the same */
+                    1 }, /* one common corner, and an edge within it */
+                  { { { 0, 1, 2 }, { 1, 2, 0 } }, 1 } }; /* the same face twice */
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-        ck_assert_msg(pairs_that_meet(xyz, (const uint32_t(*)[3])cases[i].faces, 2) ==
+        ck_assert_msg(pairs_that_intersect(xyz, (const uint32_t(*)[3])cases[i].faces, 2) ==
                           cases[i].meets,
                       "case %zu", i);
 }
 END_TEST
 
-START_TEST(the_judge_knows_closed_manifolds)
+START_TEST(test_reference_detects_closed_manifolds)
 {
     ebpo_mesh sphere = make_sphere(2);
     face_model m = model_of(&sphere);
@@ -127,12 +129,12 @@ static void check_model(ebpo_mesh *mesh, bool (*embedded)(const ebpo_mesh *), do
     ck_assert(ebpo_displace(mesh, relief, roughness, seed));
     face_model m = model_of(mesh);
     ck_assert(crossing_closed_manifold(&m));
-    ck_assert_int_eq(meetings(mesh), 0);
+    ck_assert_int_eq(clashes(mesh), 0);
     ck_assert(embedded(mesh));
     ebpo_mesh_free(mesh);
 }
 
-START_TEST(spheres_and_tori_meet_themselves_nowhere_whatever_their_relief)
+START_TEST(test_displaced_shapes_do_not_self_intersect)
 {
     static const double reliefs[][2] = { { 0.08, 0.15 }, { 0.2, 0.5 }, { 0, 0 } };
     for (uint64_t seed = 1; seed <= 2; seed++)
@@ -147,9 +149,9 @@ END_TEST
 
 /* --- the proof --- */
 
-START_TEST(what_is_proved_is_true_up_to_reliefs_that_cannot_be)
+START_TEST(test_embedding_proof_is_correct)
 {
-    int proved = 0, met = 0;
+    int proved = 0, intersected = 0;
     for (int i = 1; i <= 40; i++) {
         ebpo_mesh shapes[2] = { make_sphere(3), make_torus(40, 16) };
         bool (*const embedded[2])(const ebpo_mesh *) = { ebpo_embedded_sphere,
@@ -157,19 +159,19 @@ START_TEST(what_is_proved_is_true_up_to_reliefs_that_cannot_be)
         for (int k = 0; k < 2; k++) {
             ck_assert(ebpo_displace(&shapes[k], 0.1 * i, 0.05 * i, (uint64_t)i));
             bool proof = embedded[k](&shapes[k]);
-            uint64_t pairs = meetings(&shapes[k]);
+            uint64_t pairs = clashes(&shapes[k]);
             ck_assert(!proof || pairs == 0);
             proved += proof;
-            met += pairs > 0;
+            intersected += pairs > 0;
             ebpo_mesh_free(&shapes[k]);
         }
     }
     ck_assert_int_gt(proved, 10);
-    ck_assert_int_gt(met, 10);
+    ck_assert_int_gt(intersected, 10);
 }
 END_TEST
 
-START_TEST(no_proof_for_what_is_inside_out_double_or_pulled_through_itself)
+START_TEST(test_embedding_proof_refuses_bad_surfaces)
 {
     ebpo_mesh sphere = make_sphere(2), torus = make_torus(40, 16);
     ck_assert(ebpo_embedded_sphere(&sphere));
@@ -194,8 +196,8 @@ START_TEST(no_proof_for_what_is_inside_out_double_or_pulled_through_itself)
 }
 END_TEST
 
-/* Every face looks outwards, but each ray leaves twice. */
-START_TEST(no_proof_for_what_goes_round_twice)
+/* Every face is oriented outwards, but each ray leaves twice. */
+START_TEST(test_embedding_proof_refuses_double_winding)
 {
     ebpo_mesh torus = make_torus(40, 16);
     uint64_t n = torus.face_count;
@@ -223,13 +225,13 @@ Suite *test_suite(void)
     Suite *suite = suite_create("generate");
     TCase *cases = tcase_create("generate");
     tcase_set_timeout(cases, 600);
-    tcase_add_test(cases, two_faces_meet_that_share_no_corner);
-    tcase_add_test(cases, neighbours_meet_where_they_fold_or_run_through_each_other);
-    tcase_add_test(cases, the_judge_knows_closed_manifolds);
-    tcase_add_test(cases, spheres_and_tori_meet_themselves_nowhere_whatever_their_relief);
-    tcase_add_test(cases, what_is_proved_is_true_up_to_reliefs_that_cannot_be);
-    tcase_add_test(cases, no_proof_for_what_is_inside_out_double_or_pulled_through_itself);
-    tcase_add_test(cases, no_proof_for_what_goes_round_twice);
+    tcase_add_test(cases, test_faces_without_shared_corner_intersect);
+    tcase_add_test(cases, test_folded_neighbours_intersect);
+    tcase_add_test(cases, test_reference_detects_closed_manifolds);
+    tcase_add_test(cases, test_displaced_shapes_do_not_self_intersect);
+    tcase_add_test(cases, test_embedding_proof_is_correct);
+    tcase_add_test(cases, test_embedding_proof_refuses_bad_surfaces);
+    tcase_add_test(cases, test_embedding_proof_refuses_double_winding);
     suite_add_tcase(suite, cases);
     return suite;
 }

@@ -1,5 +1,5 @@
-/* Colours of envelopes: whoever builds, the judge finds the same; subsets keep them; levels and
- * streams show them. */
+/* Colours of envelopes: every builder and the verifier compute the same; subsets keep them; levels
+ * and streams return them. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -16,7 +16,7 @@
 #include "solids.h"
 #include "verify/verify_parts.h"
 
-/* Random bytes; of `columns` "red green blue" and the like. */
+/* Fills random bytes; `columns`: "red green blue" and the like. */
 static void paint(ebpo_mesh *mesh, const char *element, uint64_t rows, uint64_t seed, bool flat)
 {
     ebpo_attribute like = { .type = EBPO_ATTRIBUTE_UINT8,
@@ -80,7 +80,7 @@ static uint64_t violations(const ebpo_tree *tree)
     return tally.violations[EBPO_VERIFY_STRUCTURE];
 }
 
-START_TEST(the_judge_finds_the_same)
+START_TEST(test_gray_colours_pass_verification)
 {
     ebpo_tree tree;
     build(&tree, painted("torus", (what)_i, NULL), 2);
@@ -99,7 +99,7 @@ START_TEST(the_judge_finds_the_same)
 }
 END_TEST
 
-START_TEST(without_colours_there_is_no_such_part)
+START_TEST(test_gray_colours_absent_without_colours)
 {
     ebpo_tree tree;
     build(&tree, painted("torus", NEITHER, NULL), 1);
@@ -108,13 +108,13 @@ START_TEST(without_colours_there_is_no_such_part)
 }
 END_TEST
 
-START_TEST(neither_threads_nor_a_workspace_change_them)
+START_TEST(test_gray_colours_ignore_threads_and_memory)
 {
     ebpo_tree one, other;
     ebpo_workspace *workspace = NULL;
-    ebpo_workspace_options room = EBPO_WORKSPACE_OPTIONS_INIT;
+    ebpo_workspace_options space = EBPO_WORKSPACE_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
-    ck_assert_msg(ebpo_workspace_new(&room, &workspace, &error) == EBPO_OK, "%s", error.message);
+    ck_assert_msg(ebpo_workspace_new(&space, &workspace, &error) == EBPO_OK, "%s", error.message);
     build(&one, painted("torus", BOTH, NULL), 1);
     build(&other, painted("torus", BOTH, workspace), 3);
     for (int level = 0; level < one.info.level_count; level++)
@@ -139,7 +139,7 @@ static ebpo_file *write_and_open(const ebpo_tree *tree, uint64_t subtree_faces)
     return file;
 }
 
-/* The colour of a node of a tree, or of its parent if it is not gray. */
+/* Returns the colour of a node of a tree, or of its parent if it is not gray. */
 static uint32_t colour_of(const ebpo_tree *tree, uint64_t octcode)
 {
     int depth = 0;
@@ -162,7 +162,7 @@ static uint32_t colour_of(const ebpo_tree *tree, uint64_t octcode)
     return colour;
 }
 
-START_TEST(levels_and_streams_show_them)
+START_TEST(test_gray_colours_in_levels_and_streams)
 {
     ebpo_tree tree;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -208,8 +208,8 @@ START_TEST(levels_and_streams_show_them)
 }
 END_TEST
 
-/* Rows stay; what was a leaf has its parent's. */
-START_TEST(subsets_keep_them)
+/* Rows stay; a former leaf has the colour of its parent. */
+START_TEST(test_gray_colours_in_subsets)
 {
     ebpo_tree tree, part;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -253,11 +253,11 @@ TEST_SUITE(gray_colours)
     TCase *tests = tcase_create("gray_colours");
     tcase_set_timeout(tests, 120);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
-    tcase_add_loop_test(tests, the_judge_finds_the_same, 0, WHATS);
-    tcase_add_test(tests, without_colours_there_is_no_such_part);
-    tcase_add_test(tests, neither_threads_nor_a_workspace_change_them);
-    tcase_add_loop_test(tests, levels_and_streams_show_them, 0, 2);
-    tcase_add_loop_test(tests, subsets_keep_them, 0, 2);
+    tcase_add_loop_test(tests, test_gray_colours_pass_verification, 0, WHATS);
+    tcase_add_test(tests, test_gray_colours_absent_without_colours);
+    tcase_add_test(tests, test_gray_colours_ignore_threads_and_memory);
+    tcase_add_loop_test(tests, test_gray_colours_in_levels_and_streams, 0, 2);
+    tcase_add_loop_test(tests, test_gray_colours_in_subsets, 0, 2);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,4 +1,4 @@
-/* The hash table and the random numbers that all modules share. */
+/* The hash table and the random numbers shared by all modules. */
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +13,7 @@ typedef struct table {
     bool used[SLOTS];
 } table;
 
-/* The slot of a key, counting the slots that were looked at. */
+/* Finds the slot of a key, counting the visited slots. */
 static uint64_t find(table *t, uint64_t hash, const uint64_t key[3])
 {
     uint64_t at;
@@ -22,7 +22,7 @@ static uint64_t find(table *t, uint64_t hash, const uint64_t key[3])
     return at;
 }
 
-/* Numbers that come in practice: one after the other, in steps, with their digits at the top. */
+/* Typical numbers: consecutive, in steps, with their digits at the top. */
 static uint64_t number_of(int kind, uint64_t i)
 {
     switch (kind) {
@@ -46,8 +46,8 @@ static void key_of(int kind, uint64_t i, uint64_t key[3])
     key[1] = key[2] = 0;
 }
 
-/* Each key is found again where it was put, no other is found, and the way is short. */
-START_TEST(keys_are_found_at_once)
+/* Each key is found where it was put, no other is found, and few slots are visited. */
+START_TEST(test_hash_lookup_finds_keys)
 {
     table *t = calloc(1, sizeof *t);
     for (uint64_t i = 0; i < 2 * KEYS; i++) {
@@ -60,13 +60,13 @@ START_TEST(keys_are_found_at_once)
     }
     uint64_t missing[3] = { UINT64_MAX, 1, 2 };
     ck_assert(!t->used[find(t, ebpo_hash_three(missing), missing)]);
-    /* at random two and a half when it is full, and fewer while it is not */
+    /* for random keys two and a half in a full table, fewer before */
     ck_assert_uint_lt(t->probes, 2 * KEYS * 3);
     free(t);
 }
 END_TEST
 
-START_TEST(search_goes_on_at_the_first_slot_behind_the_last)
+START_TEST(test_hash_probe_wraps_to_first_slot)
 {
     const uint32_t slot[4] = { 7, 0, 0, 9 };
     uint64_t at;
@@ -77,7 +77,7 @@ START_TEST(search_goes_on_at_the_first_slot_behind_the_last)
 }
 END_TEST
 
-START_TEST(slots_are_the_next_power_of_two)
+START_TEST(test_hash_slots_are_power_of_two)
 {
     ck_assert_uint_eq(ebpo_hash_slots(0), 16);
     ck_assert_uint_eq(ebpo_hash_slots(16), 16);
@@ -86,8 +86,8 @@ START_TEST(slots_are_the_next_power_of_two)
 }
 END_TEST
 
-/* The first numbers of SplitMix64 from 0, as its authors' program gives them. */
-START_TEST(random_numbers_are_those_of_splitmix64)
+/* The first numbers of SplitMix64 from 0, from the program of its authors. */
+START_TEST(test_random_matches_splitmix64)
 {
     uint64_t state = 0;
     ck_assert_uint_eq(ebpo_random_next(&state), UINT64_C(0xe220a8397b1dcdaf));
@@ -101,10 +101,10 @@ END_TEST
 TEST_SUITE(hash)
 {
     TCase *tests = tcase_create("tests");
-    tcase_add_loop_test(tests, keys_are_found_at_once, 0, 7);
-    tcase_add_test(tests, search_goes_on_at_the_first_slot_behind_the_last);
-    tcase_add_test(tests, slots_are_the_next_power_of_two);
-    tcase_add_test(tests, random_numbers_are_those_of_splitmix64);
+    tcase_add_loop_test(tests, test_hash_lookup_finds_keys, 0, 7);
+    tcase_add_test(tests, test_hash_probe_wraps_to_first_slot);
+    tcase_add_test(tests, test_hash_slots_are_power_of_two);
+    tcase_add_test(tests, test_random_matches_splitmix64);
     Suite *suite = suite_create("hash");
     suite_add_tcase(suite, tests);
     return suite;

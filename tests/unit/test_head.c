@@ -1,5 +1,5 @@
-/* Heads of files, read without libhdf5: what libhdf5 says of the same files, object by object; and
- * what is damaged, cut off or laid out otherwise is refused. */
+/* Headers of files, read without libhdf5, against the data of libhdf5 for the same files, object by
+ * object; damaged, truncated and other layouts are refused. */
 #include <dirent.h>
 #include <hdf5.h>
 #include <stdlib.h>
@@ -46,7 +46,7 @@ static ebpo_status close_bytes(subject *s, ebpo_status status)
     return status;
 }
 
-/* --- the twin --- */
+/* --- the reference implementation --- */
 
 static void compare_numbers(subject *s, hid_t attribute, hid_t type, ebpo_head_object object,
                             const char *name, unsigned values)
@@ -111,7 +111,7 @@ static herr_t compare_attribute(hid_t id, const char *name, const H5A_info_t *in
     return 0;
 }
 
-static void compare_chunks(hid_t set, const ebpo_shape *shape, const ebpo_chunk_place *places)
+static void compare_chunks(hid_t set, const ebpo_shape *shape, const ebpo_chunk_location *places)
 {
     hsize_t dims[2] = { 0, 0 };
     hid_t space = H5Dget_space(set);
@@ -133,13 +133,13 @@ static void compare_array(subject *s, hid_t set, const char *path)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_status status = EBPO_E_FORMAT;
-    ebpo_chunk_place *places;
+    ebpo_chunk_location *places;
     ebpo_shape shape;
     uint64_t stored;
     for (int rows = EBPO_HEAD_ROWS_POWER; rows <= EBPO_HEAD_ROWS_ALL && status != EBPO_OK; rows++)
         status = ebpo_head_read_array(&s->head, path, UINT64_MAX, (ebpo_head_rows)rows, &shape,
                                       NULL, &places, &stored, &error);
-    /* what is not called for may be anything */
+    /* unused objects may have any content */
     if (status != EBPO_OK && (strstr(s->path, "/33_") || strstr(s->path, "/35_")))
         return;
     ck_assert_msg(status == EBPO_OK, "%s: %s", s->path, error.message);
@@ -148,7 +148,7 @@ static void compare_array(subject *s, hid_t set, const char *path)
     free(places);
 }
 
-/* Names that begin with x- and what stands below `extra` are other people's (vector 19). */
+/* Names that begin with x- and objects below `extra` belong to others (vector 19). */
 static herr_t compare_object(hid_t file, const char *name, const H5O_info_t *info, void *user)
 {
     char path[256];
@@ -189,7 +189,7 @@ static void compare_file(subject *s)
     H5Fclose(file);
 }
 
-/* --- the same on every vector --- */
+/* --- every vector --- */
 
 static unsigned each_vector(void (*check)(subject *s))
 {
@@ -213,30 +213,32 @@ static unsigned each_vector(void (*check)(subject *s))
     return count;
 }
 
-START_TEST(vectors_are_what_libhdf5_says)
+START_TEST(test_header_vectors_match_libhdf5)
 {
     ck_assert_int_eq(ebpo_register_filters(NULL), EBPO_OK);
     ck_assert_uint_ge(each_vector(compare_file), 32);
 }
 END_TEST
 
-static const char *const asked[] = { "/levels/00/types", "/levels/00/planes", "/mesh/vertices",
-                                     "/mesh/faces",      "/maps/face_source", "/subtrees/counts" };
+static const char *const queried[] = {
+    "/levels/00/types", "/levels/00/planes", "/mesh/vertices",
+    "/mesh/faces",      "/maps/face_source", "/subtrees/counts"
+};
 
-enum { ASKED = sizeof asked / sizeof asked[0] };
+enum { QUERIED = sizeof queried / sizeof queried[0] };
 
-/* What is said of each array, as one number: 0 when it is refused. */
-static void answers(subject *s, const uint8_t *data, size_t size, uint32_t sum[ASKED])
+/* Combines the data of each array into one number: 0 when it is refused. */
+static void results(subject *s, const uint8_t *data, size_t size, uint32_t sum[QUERIED])
 {
     ebpo_status status = open_bytes(s, data, size, NULL);
-    for (int i = 0; i < ASKED; i++) {
+    for (int i = 0; i < QUERIED; i++) {
         ebpo_shape shape = { .rows = 0 };
-        ebpo_chunk_place *places;
+        ebpo_chunk_location *places;
         uint64_t stored;
         sum[i] = 0;
         if (status != EBPO_OK ||
-            ebpo_head_read_array(&s->head, asked[i], UINT64_MAX, EBPO_HEAD_ROWS_POWER, &shape, NULL,
-                                 &places, &stored, NULL) != EBPO_OK)
+            ebpo_head_read_array(&s->head, queried[i], UINT64_MAX, EBPO_HEAD_ROWS_POWER, &shape,
+                                 NULL, &places, &stored, NULL) != EBPO_OK)
             continue;
         for (uint64_t k = 0; k < ebpo_shape_chunks(&shape); k++)
             sum[i] = sum[i] * 31 + (uint32_t)places[k].address * 7 + places[k].bytes;
@@ -246,28 +248,28 @@ static void answers(subject *s, const uint8_t *data, size_t size, uint32_t sum[A
     close_bytes(s, status);
 }
 
-/* A flipped bit of what is read changes no answer: the array is refused, or the bit is read by
- * nobody. So there are only answers of a part of the arrays. */
+/* A flipped bit never changes data: the array is refused, or the bit is unused. So only some arrays
+ * give data. */
 static void flip_bits(subject *s)
 {
-    uint32_t whole[ASKED];
-    answers(s, s->data, s->size, whole);
+    uint32_t whole[QUERIED];
+    results(s, s->data, s->size, whole);
     size_t head = s->size < 6000 ? s->size : 6000;
     for (size_t i = 0; i < head * 8; i += 61) {
-        uint32_t now[ASKED];
+        uint32_t now[QUERIED];
         s->data[i / 8] ^= (uint8_t)(1 << i % 8);
-        answers(s, s->data, s->size, now);
+        results(s, s->data, s->size, now);
         s->data[i / 8] ^= (uint8_t)(1 << i % 8);
-        for (int k = 0; k < ASKED; k++)
+        for (int k = 0; k < QUERIED; k++)
             ck_assert_msg(now[k] == 0 || now[k] == whole[k], "%s: bit %zu: %s", s->path, i,
-                          asked[k]);
+                          queried[k]);
     }
 }
 
 static void cut_off(subject *s)
 {
     for (size_t size = 0; size < s->size; size += size < 64 ? 1 : s->size / 50 + 1) {
-        uint8_t *bytes = malloc(size ? size : 1); /* of its very size */
+        uint8_t *bytes = malloc(size ? size : 1); /* of exactly its size */
         ebpo_error error = EBPO_ERROR_INIT;
         memcpy(bytes, s->data, size);
         ebpo_status status = open_bytes(s, bytes, size, &error);
@@ -278,14 +280,14 @@ static void cut_off(subject *s)
     }
 }
 
-START_TEST(flipped_bits_do_no_harm) { ck_assert_uint_ge(each_vector(flip_bits), 32); }
+START_TEST(test_header_bit_flips_are_harmless) { ck_assert_uint_ge(each_vector(flip_bits), 32); }
 END_TEST
 
-START_TEST(files_cut_off_are_refused) { ck_assert_uint_ge(each_vector(cut_off), 32); }
+START_TEST(test_header_truncation_is_refused) { ck_assert_uint_ge(each_vector(cut_off), 32); }
 END_TEST
 
-/* Values of Jenkins' own driver, for seeds of 0. */
-START_TEST(checksums_are_those_of_lookup3)
+/* Values of Jenkins' driver program, for seeds of 0. */
+START_TEST(test_header_checksums_match_lookup3)
 {
     const uint8_t *text = (const uint8_t *)"Four score and seven years ago";
     ck_assert_uint_eq(ebpo_lookup3(text, 0), 0xdeadbeef);
@@ -293,7 +295,7 @@ START_TEST(checksums_are_those_of_lookup3)
 }
 END_TEST
 
-START_TEST(other_layouts_are_refused_by_name)
+START_TEST(test_header_other_layouts_are_refused)
 {
     static const struct {
         H5F_libver_t low;
@@ -332,11 +334,11 @@ TEST_SUITE(head)
     Suite *suite = suite_create("head");
     TCase *tests = tcase_create("head");
     tcase_set_timeout(tests, 300);
-    tcase_add_test(tests, vectors_are_what_libhdf5_says);
-    tcase_add_test(tests, flipped_bits_do_no_harm);
-    tcase_add_test(tests, files_cut_off_are_refused);
-    tcase_add_test(tests, checksums_are_those_of_lookup3);
-    tcase_add_test(tests, other_layouts_are_refused_by_name);
+    tcase_add_test(tests, test_header_vectors_match_libhdf5);
+    tcase_add_test(tests, test_header_bit_flips_are_harmless);
+    tcase_add_test(tests, test_header_truncation_is_refused);
+    tcase_add_test(tests, test_header_checksums_match_lookup3);
+    tcase_add_test(tests, test_header_other_layouts_are_refused);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,6 +1,6 @@
-/* Files on web servers, good ones and bad ones: the right bytes or a clear error, and never a hang
- * (each test has a time limit). test_http FAULTY_SERVER. EBPO_TEST_SCALE scales the number of
- * random schedules of faults. */
+/* Files on correct and misbehaving web servers: the correct bytes or a clear error, and never a
+ * hang (each test has a time limit). test_http FAULTY_SERVER. EBPO_TEST_SCALE scales the number of
+ * random fault schedules. */
 #include <dirent.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -15,7 +15,7 @@
 #include <ebpo/ebpo.h>
 
 #include "check_main.h"
-#include "io/http_answer.h"
+#include "io/http_response.h"
 #include "io/byte_source.h"
 #include "scratch.h"
 #include "solids.h"
@@ -61,7 +61,7 @@ static ebpo_status read_one(const ebpo_source *s, uint64_t offset, uint64_t size
     return status;
 }
 
-/* Some places, then everything, announced in pieces. */
+/* Reads some ranges, then everything, with prefetch hints in pieces. */
 static ebpo_status read_all(const ebpo_source *s, ebpo_error *error)
 {
     static const ebpo_range places[] = { { 0, 100 },
@@ -69,16 +69,16 @@ static ebpo_status read_all(const ebpo_source *s, ebpo_error *error)
                                          { 1000000, 1 },
                                          { DATA_BYTES - 10, 10 },
                                          { 500000, 1200000 } };
-    ebpo_range announced[10];
+    ebpo_range hinted[10];
     ebpo_status status = EBPO_OK;
     for (size_t i = 0; i < sizeof places / sizeof *places && status == EBPO_OK; i++)
         status = read_one(s, places[i].offset, places[i].size, error);
     for (uint64_t i = 0; i < 10; i++)
-        announced[i] = (ebpo_range){ (9 - i) * 300000, i == 0 ? DATA_BYTES - 2700000 : 300000 };
+        hinted[i] = (ebpo_range){ (9 - i) * 300000, i == 0 ? DATA_BYTES - 2700000 : 300000 };
     if (status == EBPO_OK)
-        s->prefetch(s->user, announced, 10);
+        s->prefetch(s->user, hinted, 10);
     for (int i = 9; i >= 0 && status == EBPO_OK; i--)
-        status = read_one(s, announced[i].offset, announced[i].size, error);
+        status = read_one(s, hinted[i].offset, hinted[i].size, error);
     return status;
 }
 
@@ -97,7 +97,7 @@ static ebpo_status visit(const char *fault, const ebpo_http_options *options,
     return status;
 }
 
-/* --- servers that one can read from --- */
+/* --- usable servers --- */
 
 static const struct {
     const char *fault;
@@ -130,7 +130,7 @@ static const struct {
     { "weak_sometimes", 0 },
 };
 
-START_TEST(what_passes_or_does_no_harm_gives_the_same_bytes)
+START_TEST(test_http_harmless_faults_give_same_bytes)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
@@ -143,8 +143,8 @@ START_TEST(what_passes_or_does_no_harm_gives_the_same_bytes)
 }
 END_TEST
 
-/* Where no version is told, one answer has it all: two could be of different files. */
-START_TEST(answers_without_a_version_are_not_joined)
+/* Without a version, one response must hold all data: two could be of different files. */
+START_TEST(test_http_unversioned_parts_are_not_joined)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
@@ -162,7 +162,7 @@ START_TEST(answers_without_a_version_are_not_joined)
 }
 END_TEST
 
-START_TEST(a_server_that_sends_less_each_time_is_asked_for_the_rest)
+START_TEST(test_http_short_responses_are_continued)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
@@ -175,43 +175,43 @@ START_TEST(a_server_that_sends_less_each_time_is_asked_for_the_rest)
 }
 END_TEST
 
-/* --- servers that one cannot read from --- */
+/* --- unusable servers --- */
 
 static const struct {
     const char *fault;
     ebpo_status status;
     const char *words;
 } unreadable[] = {
-    { "whole_open", EBPO_E_UNSUPPORTED, "does not tell where the file ends" },
-    { "whole_later", EBPO_E_IO, "the whole file when asked for a part" },
+    { "whole_open", EBPO_E_UNSUPPORTED, "does not report the size of the file" },
+    { "whole_later", EBPO_E_IO, "the whole file instead of a part" },
     { "short-99", EBPO_E_IO, "given up after" },
     { "empty-99", EBPO_E_IO, "given up after 4 attempts" },
     { "lying_length", EBPO_E_IO, "given up after" },
-    { "wrong_range", EBPO_E_IO, "the server sent bytes 1 to 131072 when asked for 0 to 131071" },
-    { "wrong_range_later", EBPO_E_IO, "when asked for" },
+    { "wrong_range", EBPO_E_IO, "the server sent bytes 1 to 131072 for a request of 0 to 131071" },
+    { "wrong_range_later", EBPO_E_IO, "for a request of" },
     { "bad_range", EBPO_E_IO, "Content-Range" },
     { "no_range", EBPO_E_IO, "Content-Range" },
-    { "star", EBPO_E_IO, "does not tell the file's size" },
+    { "star", EBPO_E_IO, "does not report the file's size" },
     { "two_ranges", EBPO_E_IO, "Content-Range" },
-    { "wide", EBPO_E_IO, "when asked for 0 to 131071" },
-    { "longer", EBPO_E_IO, "more bytes than it was asked for" },
+    { "wide", EBPO_E_IO, "for a request of 0 to 131071" },
+    { "longer", EBPO_E_IO, "more bytes than requested" },
     { "multipart", EBPO_E_IO, "Content-Range" },
     { "gzip", EBPO_E_IO, "Content-Encoding" },
     { "gzip_whole", EBPO_E_IO, "Content-Encoding" },
     { "stall_head-99", EBPO_E_IO, "; " },
     { "stall_body-99", EBPO_E_IO, "; " },
     { "drip", EBPO_E_IO, "not read within 4 s" },
-    { "code-503", EBPO_E_IO, "answered 503; given up after 4 attempts" },
-    { "code-500", EBPO_E_IO, "answered 500; given up" },
-    { "code-404", EBPO_E_IO, "answered 404: there is no such file" },
-    { "code-403", EBPO_E_IO, "answered 403: not allowed" },
-    { "code-401", EBPO_E_IO, "answered 401: not allowed" },
-    { "code-501", EBPO_E_IO, "answered 501" },
-    { "code-304", EBPO_E_IO, "answered 304" },
-    { "code_later-404-1", EBPO_E_IO, "answered 404" },
-    { "wait-503-3600-99", EBPO_E_IO, "asked again in 3600 s" },
-    { "wait-429-30-99", EBPO_E_IO, "asked again in 30 s" },
-    { "redirect_wrong", EBPO_E_IO, "when asked for" },
+    { "code-503", EBPO_E_IO, "returned status 503; given up after 4 attempts" },
+    { "code-500", EBPO_E_IO, "returned status 500; given up" },
+    { "code-404", EBPO_E_IO, "returned status 404: there is no such file" },
+    { "code-403", EBPO_E_IO, "returned status 403: not allowed" },
+    { "code-401", EBPO_E_IO, "returned status 401: not allowed" },
+    { "code-501", EBPO_E_IO, "returned status 501" },
+    { "code-304", EBPO_E_IO, "returned status 304" },
+    { "code_later-404-1", EBPO_E_IO, "returned status 404" },
+    { "wait-503-3600-99", EBPO_E_IO, "requires a pause of 3600 s" },
+    { "wait-429-30-99", EBPO_E_IO, "requires a pause of 30 s" },
+    { "redirect_wrong", EBPO_E_IO, "for a request of" },
     { "redirect_loop", EBPO_E_IO, "redirects" },
     { "redirect_file", EBPO_E_IO, "rotocol" },
     { "change_etag", EBPO_E_IO, "another ETag" },
@@ -220,18 +220,18 @@ static const struct {
     { "change_size", EBPO_E_IO, "another size" },
     { "change_shorter", EBPO_E_IO, "has changed" },
     { "change_between", EBPO_E_IO, "another ETag" },
-    { "headers", EBPO_E_IO, "head of the server's answer is too long" },
+    { "headers", EBPO_E_IO, "head of the server's response is too long" },
     { "garbage", EBPO_E_IO, "" },
     { "not_satisfiable", EBPO_E_IO, "416" },
-    { "private", EBPO_E_IO, "answered 401" },
+    { "private", EBPO_E_IO, "returned status 401" },
     { "etag_by_server", EBPO_E_IO, "another ETag); open it again, or with --http-unversioned" },
     { "html", EBPO_E_IO, "the server returned text/html, not a model" },
     { "html_bare", EBPO_E_IO, "the server returned a page of HTML" },
-    { "html_later", EBPO_E_IO, "the server returned text/html when asked for a part" },
+    { "html_later", EBPO_E_IO, "the server returned text/html instead of a part" },
     { "redirect_long-150000", EBPO_E_IO, "address of a redirect, is too long" },
 };
 
-START_TEST(what_is_wrong_is_a_clear_error_that_names_the_file)
+START_TEST(test_http_errors_name_file)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
@@ -246,7 +246,7 @@ START_TEST(what_is_wrong_is_a_clear_error_that_names_the_file)
 }
 END_TEST
 
-START_TEST(final_codes_are_asked_for_once)
+START_TEST(test_http_final_status_is_not_retried)
 {
     static const char *const faults[] = { "code-404", "code-403", "code-401" };
     ebpo_error error = EBPO_ERROR_INIT;
@@ -256,14 +256,14 @@ START_TEST(final_codes_are_asked_for_once)
     ck_assert_int_eq(read_one(&s, 200000, 10, &error), EBPO_E_IO);
     ck_assert_uint_eq(stats_of(&s).requests, 2);
     ck_assert_uint_eq(stats_of(&s).retries, 0);
-    ck_assert_int_eq(read_one(&s, 200000, 10, &error), EBPO_OK); /* a failure is not for ever */
+    ck_assert_int_eq(read_one(&s, 200000, 10, &error), EBPO_OK); /* a failure is not permanent */
     s.close(s.user);
     for (int i = 0; i < 3; i++)
         ck_assert_int_eq(ebpo_source_of_url(web_url(faults[i]), &o, &s, &error), EBPO_E_IO);
 }
 END_TEST
 
-START_TEST(a_model_may_be_sent_as_text)
+START_TEST(test_http_text_content_type_is_accepted)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
@@ -274,8 +274,8 @@ START_TEST(a_model_may_be_sent_as_text)
 }
 END_TEST
 
-/* Where several servers answer for one address, each with its tag or its time. */
-START_TEST(versions_are_left_aside_on_demand)
+/* Several servers respond for one address, each with its tag or its time. */
+START_TEST(test_http_versions_can_be_ignored)
 {
     static const char *const faults[] = { "etag_by_server", "modified_by_server" };
     ebpo_error error = EBPO_ERROR_INIT;
@@ -291,7 +291,7 @@ START_TEST(versions_are_left_aside_on_demand)
 }
 END_TEST
 
-START_TEST(without_ranges_or_version_only_small_files_are_read)
+START_TEST(test_http_without_ranges_limits_file_size)
 {
     static const char *const faults[] = { "whole", "whole_chunked", "whole_bare", "bare" };
     ebpo_error error = EBPO_ERROR_INIT;
@@ -308,7 +308,7 @@ START_TEST(without_ranges_or_version_only_small_files_are_read)
 }
 END_TEST
 
-START_TEST(a_file_without_a_version_is_one_answer_or_none)
+START_TEST(test_http_unversioned_file_is_one_response)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
@@ -323,9 +323,9 @@ START_TEST(a_file_without_a_version_is_one_answer_or_none)
 }
 END_TEST
 
-/* --- what it costs --- */
+/* --- costs --- */
 
-START_TEST(opening_is_one_request_and_what_was_announced_comes_in_few)
+START_TEST(test_http_prefetch_uses_few_requests)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
@@ -347,7 +347,7 @@ START_TEST(opening_is_one_request_and_what_was_announced_comes_in_few)
 }
 END_TEST
 
-START_TEST(what_was_announced_and_not_read_does_no_harm)
+START_TEST(test_http_unused_prefetch_hint_is_harmless)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
@@ -366,7 +366,7 @@ START_TEST(what_was_announced_and_not_read_does_no_harm)
 }
 END_TEST
 
-/* --- threads, luck and interruption --- */
+/* --- threads, random faults and interruption --- */
 
 typedef struct reader {
     const ebpo_source *source;
@@ -408,7 +408,7 @@ static int read_by_threads(const ebpo_source *source, uint64_t seed)
     return failures;
 }
 
-START_TEST(threads_read_at_once)
+START_TEST(test_http_concurrent_reads)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
@@ -425,7 +425,7 @@ static int schedules(void)
     return count < 2 ? 2 : count;
 }
 
-START_TEST(whatever_happens_the_bytes_are_right_or_there_is_an_error)
+START_TEST(test_http_faults_never_give_wrong_bytes)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
@@ -463,7 +463,7 @@ static void *stop_soon(void *argument)
     return NULL;
 }
 
-START_TEST(a_read_is_stopped_on_request)
+START_TEST(test_http_read_can_be_cancelled)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = EBPO_HTTP_OPTIONS_INIT;
@@ -478,7 +478,7 @@ START_TEST(a_read_is_stopped_on_request)
 }
 END_TEST
 
-START_TEST(a_source_is_closed_while_it_reads_ahead)
+START_TEST(test_http_close_during_prefetch)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
@@ -491,7 +491,7 @@ END_TEST
 
 /* --- options --- */
 
-START_TEST(name_password_and_headers_are_sent_and_not_shown)
+START_TEST(test_http_credentials_are_never_shown)
 {
     static const char *const headers[] = { "X-Key: 7", NULL };
     ebpo_error error = EBPO_ERROR_INIT;
@@ -514,8 +514,8 @@ START_TEST(name_password_and_headers_are_sent_and_not_shown)
 }
 END_TEST
 
-/* Also when it is led back: whoever leads it says where to. */
-START_TEST(headers_stay_with_the_server_that_they_were_given_for)
+/* Also when redirected back: a redirect chooses its target. */
+START_TEST(test_http_headers_stay_with_their_server)
 {
     static const char *const headers[] = { "X-Key: 7", NULL };
     for (int i = 0; i < 6; i++) {
@@ -530,7 +530,7 @@ START_TEST(headers_stay_with_the_server_that_they_were_given_for)
 }
 END_TEST
 
-START_TEST(options_out_of_range_are_refused)
+START_TEST(test_http_invalid_options_are_refused)
 {
     static const char *const smuggled[] = { "X: 1\r\nY: 2", NULL };
     ebpo_error error = EBPO_ERROR_INIT;
@@ -556,7 +556,7 @@ START_TEST(options_out_of_range_are_refused)
 }
 END_TEST
 
-START_TEST(a_server_that_is_not_there_is_an_error)
+START_TEST(test_http_unreachable_server_is_an_error)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_http_options o = quick();
@@ -567,7 +567,7 @@ START_TEST(a_server_that_is_not_there_is_an_error)
 }
 END_TEST
 
-/* --- the folder --- */
+/* --- the cache folder --- */
 
 static const char *cache;
 
@@ -605,7 +605,7 @@ static void set_up_cache(void)
 {
     static char folder[300];
     scratch_enter();
-    snprintf(folder, sizeof folder, "%s", scratch("made/on/the/way")); /* not there yet */
+    snprintf(folder, sizeof folder, "%s", scratch("made/on/the/way")); /* does not exist yet */
     cache = folder;
 }
 
@@ -623,7 +623,7 @@ static ebpo_http_stats visit_cached(const char *url, uint64_t bytes)
     return stats;
 }
 
-START_TEST(the_next_session_reads_from_the_folder_and_checks_it)
+START_TEST(test_http_cache_is_reused_and_checked)
 {
     char url[300];
     snprintf(url, sizeof url, "%s", web_url("good"));
@@ -640,8 +640,8 @@ START_TEST(the_next_session_reads_from_the_folder_and_checks_it)
 }
 END_TEST
 
-/* Whatever was read, what comes from the folder is what stands there in the file. */
-START_TEST(the_folder_serves_other_ranges_than_those_it_was_filled_with)
+/* Data from the cache folder equals the file, for any ranges read before. */
+START_TEST(test_http_cache_serves_other_ranges)
 {
     char url[300];
     uint64_t random = 77;
@@ -670,7 +670,7 @@ START_TEST(the_folder_serves_other_ranges_than_those_it_was_filled_with)
 }
 END_TEST
 
-START_TEST(the_folder_stays_below_its_limit)
+START_TEST(test_http_cache_keeps_size_limit)
 {
     enum { LIMIT = 1000000 };
     for (int i = 0; i < 3; i++)
@@ -682,7 +682,7 @@ START_TEST(the_folder_stays_below_its_limit)
 }
 END_TEST
 
-START_TEST(another_version_is_not_taken_from_the_folder)
+START_TEST(test_http_cache_rejects_other_version)
 {
     char url[300];
     ebpo_error error = EBPO_ERROR_INIT;
@@ -703,7 +703,7 @@ START_TEST(another_version_is_not_taken_from_the_folder)
 }
 END_TEST
 
-START_TEST(processes_share_the_folder)
+START_TEST(test_http_cache_is_shared_by_processes)
 {
     char url[300];
     snprintf(url, sizeof url, "%s", web_url("good"));
@@ -731,36 +731,36 @@ START_TEST(processes_share_the_folder)
 }
 END_TEST
 
-/* --- heads of answers --- */
+/* --- response headers --- */
 
 static ebpo_verdict judged(const char *const *lines, const ebpo_http_version *pinned,
                            char why[EBPO_WHY_BYTES])
 {
-    ebpo_answer answer = { .code = 0 };
-    ebpo_asked asked = { 100, 200, pinned, 1000, false };
+    ebpo_http_response result = { .code = 0 };
+    ebpo_http_request queried = { 100, 200, pinned, 1000, false };
     ebpo_status status;
     for (; *lines; lines++)
-        ebpo_answer_line(&answer, *lines, strlen(*lines));
+        ebpo_http_response_line(&result, *lines, strlen(*lines));
     *why = 0;
-    return ebpo_answer_judge(&answer, &asked, &status, why);
+    return ebpo_http_response_judge(&result, &queried, &status, why);
 }
 
 #define JUDGED(...) judged((const char *const[]){ __VA_ARGS__, NULL }, &pinned, why)
 
-START_TEST(heads_are_judged_by_the_letter)
+START_TEST(test_http_header_parsing_is_strict)
 {
     ebpo_http_version pinned = { 5000, "\"a\"", "" };
     char why[EBPO_WHY_BYTES];
     ck_assert_int_eq(JUDGED("HTTP/1.1 206 Partial\r\n", "content-range:bytes 100-199/5000\r\n",
                             "ETag: \"a\"\r\n"),
-                     EBPO_ANSWER_PART);
+                     EBPO_HTTP_PART);
     ck_assert_int_eq(JUDGED("HTTP/2 206\r\n", "Content-Range: BYTES 100-150/5000 \r\n",
                             "etag:\"a\"\r\n"),
-                     EBPO_ANSWER_PART);
+                     EBPO_HTTP_PART);
     ck_assert_int_eq(JUDGED("HTTP/1.1 302 Found\r\n", "Content-Encoding: gzip\r\n",
                             "HTTP/1.1 206 x\r\n", "Content-Range: bytes 100-199/5000",
                             "ETag: \"a\""),
-                     EBPO_ANSWER_PART);
+                     EBPO_HTTP_PART);
     static const char *const wrong[] = {
         "bytes 100-200/5000",  "bytes 99-199/5000",
         "bytes 150-120/5000",  "bytes 100-199/150",
@@ -775,28 +775,28 @@ START_TEST(heads_are_judged_by_the_letter)
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         char line[100];
         snprintf(line, sizeof line, "Content-Range: %s\r\n", wrong[i]);
-        ck_assert_msg(JUDGED("HTTP/1.1 206 x\r\n", line, "ETag: \"a\"\r\n") == EBPO_ANSWER_REFUSED,
+        ck_assert_msg(JUDGED("HTTP/1.1 206 x\r\n", line, "ETag: \"a\"\r\n") == EBPO_HTTP_REFUSED,
                       "%s", wrong[i]);
         ck_assert_uint_gt(strlen(why), 20);
     }
     ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000"),
-                     EBPO_ANSWER_REFUSED); /* the tag has gone */
+                     EBPO_HTTP_REFUSED); /* the tag is missing */
     ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000", "ETag: W/\"a\""),
-                     EBPO_ANSWER_PART);
+                     EBPO_HTTP_PART);
     ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000", "ETag: W/\"b\""),
-                     EBPO_ANSWER_REFUSED);
+                     EBPO_HTTP_REFUSED);
     ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000", "ETag: \"a\"",
                             "Content-Encoding: br"),
-                     EBPO_ANSWER_REFUSED);
+                     EBPO_HTTP_REFUSED);
     ck_assert_int_eq(JUDGED("HTTP/1.1 206 x", "Content-Range: bytes 100-199/5000", "ETag: \"a\"",
                             "Content-Encoding: identity"),
-                     EBPO_ANSWER_PART);
-    ck_assert_int_eq(JUDGED("nonsense"), EBPO_ANSWER_REFUSED);
-    ck_assert_int_eq(JUDGED("HTTP/1.1 503 x"), EBPO_ANSWER_LATER);
+                     EBPO_HTTP_PART);
+    ck_assert_int_eq(JUDGED("nonsense"), EBPO_HTTP_REFUSED);
+    ck_assert_int_eq(JUDGED("HTTP/1.1 503 x"), EBPO_HTTP_LATER);
 }
 END_TEST
 
-START_TEST(ranges_beyond_4_gib_are_judged_by_all_their_digits)
+START_TEST(test_http_ranges_beyond_4_gib)
 {
     ebpo_http_version pinned = { UINT64_C(900000000000), "\"a\"", "" };
     char why[EBPO_WHY_BYTES];
@@ -804,52 +804,53 @@ START_TEST(ranges_beyond_4_gib_are_judged_by_all_their_digits)
         const char *line;
         uint64_t last;
         ebpo_verdict verdict;
-    } answers[] = {
+    } results[] = {
         { "Content-Range: bytes 8589934592-8589934691/900000000000", UINT64_C(8589934691),
-          EBPO_ANSWER_PART },
+          EBPO_HTTP_PART },
         { "Content-Range: bytes 4294967296-4294967395/900000000000", 0,
-          EBPO_ANSWER_REFUSED }, /* 2^32 less */
+          EBPO_HTTP_REFUSED }, /* 2^32 less */
         { "Content-Range: bytes 8589934592-12884901887/900000000000", 0,
-          EBPO_ANSWER_REFUSED }, /* 2^32 more than was asked for */
-        { "Content-Range: bytes 8589934592-8589934691/2349901312", 0, EBPO_ANSWER_REFUSED },
-        { "Content-Range: bytes 8589934592-8589934691/18446744073709551616", 0,
-          EBPO_ANSWER_REFUSED },
+          EBPO_HTTP_REFUSED }, /* 2^32 more than requested */
+        { "Content-Range: bytes 8589934592-8589934691/2349901312", 0, EBPO_HTTP_REFUSED },
+        { "Content-Range: bytes 8589934592-8589934691/18446744073709551616", 0, EBPO_HTTP_REFUSED },
     };
-    for (size_t i = 0; i < sizeof answers / sizeof *answers; i++) {
-        ebpo_answer answer = { .code = 0 };
-        ebpo_asked asked = { UINT64_C(8589934592), UINT64_C(8589934692), &pinned, 1000, false };
+    for (size_t i = 0; i < sizeof results / sizeof *results; i++) {
+        ebpo_http_response result = { .code = 0 };
+        ebpo_http_request queried = { UINT64_C(8589934592), UINT64_C(8589934692), &pinned, 1000,
+                                      false };
         ebpo_status status;
-        const char *const lines[] = { "HTTP/1.1 206 Partial", "ETag: \"a\"", answers[i].line };
+        const char *const lines[] = { "HTTP/1.1 206 Partial", "ETag: \"a\"", results[i].line };
         for (int k = 0; k < 3; k++)
-            ebpo_answer_line(&answer, lines[k], strlen(lines[k]));
-        ck_assert_msg(ebpo_answer_judge(&answer, &asked, &status, why) == answers[i].verdict, "%s",
-                      answers[i].line);
-        if (answers[i].verdict == EBPO_ANSWER_PART)
-            ck_assert_uint_eq(answer.last, answers[i].last);
+            ebpo_http_response_line(&result, lines[k], strlen(lines[k]));
+        ck_assert_msg(ebpo_http_response_judge(&result, &queried, &status, why) ==
+                          results[i].verdict,
+                      "%s", results[i].line);
+        if (results[i].verdict == EBPO_HTTP_PART)
+            ck_assert_uint_eq(result.last, results[i].last);
     }
 }
 END_TEST
 
-START_TEST(long_tags_are_told_apart_to_their_end)
+START_TEST(test_http_long_etags_compare_fully)
 {
     char line[2000], other[2000], why[EBPO_WHY_BYTES];
-    ebpo_answer answer = { .code = 0 };
+    ebpo_http_response result = { .code = 0 };
     memset(line, 'x', sizeof line);
     memcpy(line, "ETag: ", 6);
     memcpy(other, line, sizeof line);
     other[1999] = 'y';
-    ebpo_answer_line(&answer, line, sizeof line);
+    ebpo_http_response_line(&result, line, sizeof line);
     ebpo_http_version pinned = { 5000, "", "" };
-    strcpy(pinned.etag, answer.etag);
-    ebpo_answer second = {
+    strcpy(pinned.etag, result.etag);
+    ebpo_http_response second = {
         .code = 206, .has_range = true, .has_total = true, .begin = 100, .last = 199, .total = 5000
     };
-    ebpo_asked asked = { 100, 200, &pinned, 1000, false };
+    ebpo_http_request queried = { 100, 200, &pinned, 1000, false };
     ebpo_status status;
-    ebpo_answer_line(&second, line, sizeof line);
-    ck_assert_int_eq(ebpo_answer_judge(&second, &asked, &status, why), EBPO_ANSWER_PART);
-    ebpo_answer_line(&second, other, sizeof other);
-    ck_assert_int_eq(ebpo_answer_judge(&second, &asked, &status, why), EBPO_ANSWER_REFUSED);
+    ebpo_http_response_line(&second, line, sizeof line);
+    ck_assert_int_eq(ebpo_http_response_judge(&second, &queried, &status, why), EBPO_HTTP_PART);
+    ebpo_http_response_line(&second, other, sizeof other);
+    ck_assert_int_eq(ebpo_http_response_judge(&second, &queried, &status, why), EBPO_HTTP_REFUSED);
 }
 END_TEST
 
@@ -873,35 +874,35 @@ TEST_SUITE(http)
     tcase_set_timeout(tests, 120);
     tcase_set_timeout(folder, 120);
     tcase_add_checked_fixture(folder, set_up_cache, scratch_leave);
-    tcase_add_loop_test(tests, what_passes_or_does_no_harm_gives_the_same_bytes, 0,
+    tcase_add_loop_test(tests, test_http_harmless_faults_give_same_bytes, 0,
                         sizeof readable / sizeof *readable);
-    tcase_add_test(tests, a_server_that_sends_less_each_time_is_asked_for_the_rest);
-    tcase_add_test(tests, answers_without_a_version_are_not_joined);
-    tcase_add_loop_test(tests, what_is_wrong_is_a_clear_error_that_names_the_file, 0,
+    tcase_add_test(tests, test_http_short_responses_are_continued);
+    tcase_add_test(tests, test_http_unversioned_parts_are_not_joined);
+    tcase_add_loop_test(tests, test_http_errors_name_file, 0,
                         sizeof unreadable / sizeof *unreadable);
-    tcase_add_test(tests, final_codes_are_asked_for_once);
-    tcase_add_test(tests, a_model_may_be_sent_as_text);
-    tcase_add_test(tests, versions_are_left_aside_on_demand);
-    tcase_add_test(tests, without_ranges_or_version_only_small_files_are_read);
-    tcase_add_test(tests, a_file_without_a_version_is_one_answer_or_none);
-    tcase_add_test(tests, opening_is_one_request_and_what_was_announced_comes_in_few);
-    tcase_add_test(tests, what_was_announced_and_not_read_does_no_harm);
-    tcase_add_test(tests, threads_read_at_once);
-    tcase_add_test(tests, whatever_happens_the_bytes_are_right_or_there_is_an_error);
-    tcase_add_test(tests, a_read_is_stopped_on_request);
-    tcase_add_test(tests, a_source_is_closed_while_it_reads_ahead);
-    tcase_add_test(tests, name_password_and_headers_are_sent_and_not_shown);
-    tcase_add_test(tests, headers_stay_with_the_server_that_they_were_given_for);
-    tcase_add_test(tests, options_out_of_range_are_refused);
-    tcase_add_test(tests, a_server_that_is_not_there_is_an_error);
-    tcase_add_test(tests, heads_are_judged_by_the_letter);
-    tcase_add_test(tests, ranges_beyond_4_gib_are_judged_by_all_their_digits);
-    tcase_add_test(tests, long_tags_are_told_apart_to_their_end);
-    tcase_add_test(folder, the_next_session_reads_from_the_folder_and_checks_it);
-    tcase_add_test(folder, the_folder_serves_other_ranges_than_those_it_was_filled_with);
-    tcase_add_test(folder, the_folder_stays_below_its_limit);
-    tcase_add_test(folder, another_version_is_not_taken_from_the_folder);
-    tcase_add_test(folder, processes_share_the_folder);
+    tcase_add_test(tests, test_http_final_status_is_not_retried);
+    tcase_add_test(tests, test_http_text_content_type_is_accepted);
+    tcase_add_test(tests, test_http_versions_can_be_ignored);
+    tcase_add_test(tests, test_http_without_ranges_limits_file_size);
+    tcase_add_test(tests, test_http_unversioned_file_is_one_response);
+    tcase_add_test(tests, test_http_prefetch_uses_few_requests);
+    tcase_add_test(tests, test_http_unused_prefetch_hint_is_harmless);
+    tcase_add_test(tests, test_http_concurrent_reads);
+    tcase_add_test(tests, test_http_faults_never_give_wrong_bytes);
+    tcase_add_test(tests, test_http_read_can_be_cancelled);
+    tcase_add_test(tests, test_http_close_during_prefetch);
+    tcase_add_test(tests, test_http_credentials_are_never_shown);
+    tcase_add_test(tests, test_http_headers_stay_with_their_server);
+    tcase_add_test(tests, test_http_invalid_options_are_refused);
+    tcase_add_test(tests, test_http_unreachable_server_is_an_error);
+    tcase_add_test(tests, test_http_header_parsing_is_strict);
+    tcase_add_test(tests, test_http_ranges_beyond_4_gib);
+    tcase_add_test(tests, test_http_long_etags_compare_fully);
+    tcase_add_test(folder, test_http_cache_is_reused_and_checked);
+    tcase_add_test(folder, test_http_cache_serves_other_ranges);
+    tcase_add_test(folder, test_http_cache_keeps_size_limit);
+    tcase_add_test(folder, test_http_cache_rejects_other_version);
+    tcase_add_test(folder, test_http_cache_is_shared_by_processes);
     suite_add_tcase(suite, tests);
     suite_add_tcase(suite, folder);
     return suite;

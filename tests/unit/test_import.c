@@ -32,7 +32,7 @@ static const ebpo_import_format *recognise_text(const char *text, const char *na
     return ebpo_import_recognise((const uint8_t *)text, strlen(text), name);
 }
 
-START_TEST(formats_are_told_by_bytes_then_by_name)
+START_TEST(test_import_format_by_content_then_name)
 {
     uint8_t stl[134] = { 0 };
     stl[80] = 1;
@@ -49,7 +49,7 @@ START_TEST(formats_are_told_by_bytes_then_by_name)
 }
 END_TEST
 
-START_TEST(weld_keeps_the_first_of_each_position)
+START_TEST(test_import_weld_keeps_first_position)
 {
     float xyz[] = { 0, 1, 2, -0.0f, 1, 2, 3, 4, 5, 0, 1, 2, 6, 7, 8 };
     uint32_t map[5];
@@ -66,7 +66,7 @@ static const float corner[4][3] = {
 };
 static const uint32_t face[4][3] = { { 0, 1, 2 }, { 0, 3, 1 }, { 1, 3, 2 }, { 2, 3, 0 } };
 
-/* The four faces in their order, each with its corners in their order. */
+/* Checks the four faces in their order, each with its corners in their order. */
 static void check_tetrahedron(const ebpo_mesh *mesh, const char *format)
 {
     ck_assert(mesh->vertex_count == 4 && mesh->face_count == 4 && mesh->xyz32 && !mesh->xyz64);
@@ -76,7 +76,7 @@ static void check_tetrahedron(const ebpo_mesh *mesh, const char *format)
                          sizeof corner[0]) == 0);
 }
 
-START_TEST(obj_keeps_faces_in_order_and_welds_corners)
+START_TEST(test_import_obj_keeps_faces_and_welds)
 {
     static const char obj[] = "mtllib /etc/passwd\no a\nv 0.5 0.25 0.125\nv 2 0.25 0.125\nv 0.5 3 "
                               "0.125\nv 0.5 0.25 -4\nvn 0 0 1\n"
@@ -90,7 +90,7 @@ START_TEST(obj_keeps_faces_in_order_and_welds_corners)
 }
 END_TEST
 
-START_TEST(off_keeps_faces_in_order)
+START_TEST(test_import_off_keeps_face_order)
 {
     static const char off[] = "OFF\n# made here\n4 4 6\n0.5 0.25 0.125\n2 0.25 0.125\n0.5 3 "
                               "0.125\n0.5 0.25 -4\n3 0 1 2\n3 0 3 1\n3 1 3 2\n3 2 3 0\n";
@@ -103,7 +103,7 @@ START_TEST(off_keeps_faces_in_order)
 }
 END_TEST
 
-START_TEST(stl_of_both_kinds_is_welded)
+START_TEST(test_import_stl_is_welded)
 {
     uint8_t binary[84 + 4 * 50] = "solid, although binary";
     char ascii[4096] = "solid t\n";
@@ -136,7 +136,7 @@ START_TEST(stl_of_both_kinds_is_welded)
 }
 END_TEST
 
-START_TEST(polygons_of_obj_are_cut_by_ears)
+START_TEST(test_import_obj_polygons_are_triangulated)
 {
     static const char obj[] = "v 0 0 0\nv 1 0 0\nv 0.25 0.25 0\nv 0 1 0\nf 1 2 3 4\n";
     ebpo_mesh mesh;
@@ -153,8 +153,8 @@ static const struct {
     { "t.obj", "", "t.obj: " },
     { "t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "t.obj: " },
     { "t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "t.obj: " },
-    { "t.off", "OFF\n", "no counts" },
-    { "t.off", "OFF\n#x", "no counts" },
+    { "t.off", "OFF\n", "counts of vertices" },
+    { "t.off", "OFF\n#x", "counts of vertices" },
     { "t.off", "OFF\n4000000000 1 0\n0 0 0\n",
       "4000000000 vertices and 1 faces do not fit into a file of 25 bytes" },
     { "t.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n",
@@ -164,13 +164,13 @@ static const struct {
     { "t.off", "OFF\n3 1 0\n0 0 0\n1 0\n0 1 0\n3 0 1 2\n",
       "line 4: vertex 1 has no three coordinates" },
     { "t.off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "the file ends before face 1" },
-    { "t.off", "OFF\n3 1 0 2.5\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "line 2: no counts" },
+    { "t.off", "OFF\n3 1 0 2.5\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "line 2: counts of vertices" },
     { "t.stl", "not an stl file at all", "t.stl: " },
     { "t.stl", "solid x\nendsolid x\n", "t.stl: " },
 };
 
-/* A strip of so many squares, one after the other, each vertex with a colour; the last one ends
- * with these digits. */
+/* Makes a strip of so many squares, each vertex with a colour; the last one ends with these digits.
+ */
 static char *long_strip(unsigned squares, const char *digits)
 {
     char *text = malloc(squares * 120 + 100), *at = text;
@@ -182,9 +182,9 @@ static char *long_strip(unsigned squares, const char *digits)
     return text;
 }
 
-/* Arrays that do not fit the budget go to files, and the mesh is the same: of floats, and of
+/* Arrays that exceed the budget go to files, and the mesh is the same: with floats, and with
  * doubles, which the file needs at its last vertex. */
-START_TEST(a_budget_does_not_change_the_mesh)
+START_TEST(test_import_result_ignores_memory_budget)
 {
     ebpo_mesh mesh, within;
     ebpo_workspace *w;
@@ -213,8 +213,8 @@ START_TEST(a_budget_does_not_change_the_mesh)
 }
 END_TEST
 
-/* Decimals become the nearest floats: these are where others end up beside them. */
-START_TEST(numbers_are_rounded_correctly)
+/* Decimals become the nearest floats: other readers get the neighbouring floats for these. */
+START_TEST(test_import_numbers_are_rounded_correctly)
 {
     static const char obj[] = "v 2.96501994e-01 5.3e-31 16777216.0000000000\n"
                               "v 0.296502 1e-45 3.4028235e38\nv .5 -5. +1E2\nf 1 2 3\n";
@@ -233,9 +233,9 @@ END_TEST
 #define UTM_C              "691246.912 5334567.892 519.25"
 #define UTM_D              "1.1 -0.000 1e39"
 
-/* One coordinate that floats do not keep, wherever it is, makes all of them the nearest doubles,
- * and vertices are one where these are equal. B and C are one float. */
-START_TEST(positions_are_doubles_where_floats_lose_digits)
+/* One coordinate that floats cannot represent turns all of them into the nearest doubles, and
+ * vertices with equal doubles are merged. B and C are one float. */
+START_TEST(test_import_doubles_when_floats_lose_digits)
 {
     static const struct {
         const char *name, *text;
@@ -263,8 +263,8 @@ START_TEST(positions_are_doubles_where_floats_lose_digits)
 }
 END_TEST
 
-/* Coordinates that were divided by a weight have no text: floats are kept where they are exact. */
-START_TEST(quotients_are_floats_where_these_are_exact)
+/* Coordinates divided by a weight have no text: floats are used where they are exact. */
+START_TEST(test_import_floats_for_exact_quotients)
 {
     static const char exact[] = "v 0 0 0 1\nv 2 0 0 2.0\nv 0 0.1 0 1\nf 1 2 3\n",
                       inexact[] = "v 0 0 0 1\nv 2 0 0 3\nv 0 0.1 0 1\nf 1 2 3\n",
@@ -282,7 +282,7 @@ START_TEST(quotients_are_floats_where_these_are_exact)
 }
 END_TEST
 
-START_TEST(damaged_files_are_refused_by_name)
+START_TEST(test_import_damaged_files_are_refused)
 {
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -293,7 +293,7 @@ START_TEST(damaged_files_are_refused_by_name)
 }
 END_TEST
 
-START_TEST(bunny_of_glmark2_is_closed_when_it_is_there)
+START_TEST(test_import_glmark2_bunny_is_closed)
 {
     static const char path[] = "/usr/share/glmark2/models/bunny.obj";
     static const ebpo_progress silent = { NULL, NULL };
@@ -314,19 +314,19 @@ TEST_SUITE(import)
 {
     TCase *tests = tcase_create("import");
     tcase_set_timeout(tests, 60);
-    tcase_add_test(tests, formats_are_told_by_bytes_then_by_name);
-    tcase_add_test(tests, weld_keeps_the_first_of_each_position);
-    tcase_add_test(tests, obj_keeps_faces_in_order_and_welds_corners);
-    tcase_add_test(tests, off_keeps_faces_in_order);
-    tcase_add_test(tests, stl_of_both_kinds_is_welded);
-    tcase_add_test(tests, polygons_of_obj_are_cut_by_ears);
-    tcase_add_loop_test(tests, a_budget_does_not_change_the_mesh, 0, 2);
-    tcase_add_test(tests, numbers_are_rounded_correctly);
-    tcase_add_loop_test(tests, positions_are_doubles_where_floats_lose_digits, 0, 3);
-    tcase_add_test(tests, quotients_are_floats_where_these_are_exact);
-    tcase_add_loop_test(tests, damaged_files_are_refused_by_name, 0,
+    tcase_add_test(tests, test_import_format_by_content_then_name);
+    tcase_add_test(tests, test_import_weld_keeps_first_position);
+    tcase_add_test(tests, test_import_obj_keeps_faces_and_welds);
+    tcase_add_test(tests, test_import_off_keeps_face_order);
+    tcase_add_test(tests, test_import_stl_is_welded);
+    tcase_add_test(tests, test_import_obj_polygons_are_triangulated);
+    tcase_add_loop_test(tests, test_import_result_ignores_memory_budget, 0, 2);
+    tcase_add_test(tests, test_import_numbers_are_rounded_correctly);
+    tcase_add_loop_test(tests, test_import_doubles_when_floats_lose_digits, 0, 3);
+    tcase_add_test(tests, test_import_floats_for_exact_quotients);
+    tcase_add_loop_test(tests, test_import_damaged_files_are_refused, 0,
                         (int)(sizeof bad / sizeof *bad));
-    tcase_add_test(tests, bunny_of_glmark2_is_closed_when_it_is_there);
+    tcase_add_test(tests, test_import_glmark2_bunny_is_closed);
     Suite *suite = suite_create("import");
     suite_add_tcase(suite, tests);
     return suite;

@@ -1,4 +1,4 @@
-/* What OBJ, STL and OFF files say beyond positions and corners, as attributes of the mesh. */
+/* Data of OBJ, STL and OFF files besides positions and corners, as attributes of the mesh. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,7 +30,7 @@ static void import_text(const ebpo_import_format *format, const char *text)
     import(format, text, strlen(text));
 }
 
-/* The array of these names; its rows are those of the element. */
+/* Finds the array of these names; its rows are those of the element. */
 static const ebpo_attribute *find(const char *element, const char *names)
 {
     for (uint64_t i = 0; mesh.attributes && i < mesh.attributes->count; i++) {
@@ -56,7 +56,7 @@ static void expect_floats(const ebpo_attribute *a, bool list, const float *value
 #define POSITIONS "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
 #define FACES     "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
-START_TEST(what_agrees_at_a_vertex_is_the_vertex_s)
+START_TEST(test_import_vertex_values_when_unique)
 {
     static const float colours[] = { 1, 0, 0, 0, 0, 1, 0, 1, 0, 0.5f, 0.25f, 0 };
     static const float normals[] = { 0, 0, -1, 0, 1, 0, 1, 0, 0, 0, 0, 1 };
@@ -75,7 +75,7 @@ START_TEST(what_agrees_at_a_vertex_is_the_vertex_s)
 }
 END_TEST
 
-START_TEST(what_agrees_on_a_face_is_the_face_s_and_else_in_lists)
+START_TEST(test_import_face_values_and_corner_lists)
 {
     static const float normals[] = { 0, 0, -1, 0, -1, 0, -1, 0, 0, 1, 1, 1 };
     static const float texture[] = { 0, 0, 0, 0.5f, 0.5f, 0,    0.5f, 0, 0,    0, 0, 0.5f,
@@ -92,8 +92,8 @@ START_TEST(what_agrees_on_a_face_is_the_face_s_and_else_in_lists)
 }
 END_TEST
 
-/* A quadrilateral that is cut into triangles: each corner keeps what is its own. */
-START_TEST(corners_of_polygons_keep_their_values)
+/* A quadrilateral is cut into triangles: each corner keeps its values. */
+START_TEST(test_import_polygon_corners_keep_values)
 {
     import_text(&ebpo_import_obj,
                 "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
@@ -108,7 +108,7 @@ START_TEST(corners_of_polygons_keep_their_values)
 }
 END_TEST
 
-START_TEST(materials_are_numbers_of_faces_and_names_in_the_header)
+START_TEST(test_import_materials_are_indexed)
 {
     static const uint32_t numbers[] = { 1, 1, 1, 2 };
     import_text(&ebpo_import_obj, "mtllib a.mtl\ns 1\nusemtl red paint\n" POSITIONS
@@ -121,13 +121,13 @@ START_TEST(materials_are_numbers_of_faces_and_names_in_the_header)
     ck_assert_ptr_nonnull(strstr(header, "comment material 1 red paint\ncomment material 2 b\n"));
     ck_assert_str_eq(
         mesh.attributes->lost,
-        "smoothing groups; what the material library says (colours and the like); names "
+        "smoothing groups; material properties in the library (colours and the like); names "
         "of groups and objects");
     ebpo_mesh_free(&mesh);
 }
 END_TEST
 
-START_TEST(faces_before_the_first_material_have_none)
+START_TEST(test_import_faces_before_first_material)
 {
     static const uint32_t numbers[] = { 0, 1 };
     import_text(&ebpo_import_obj, POSITIONS "f 1 3 2\nusemtl a\nf 1 2 4\n");
@@ -139,7 +139,7 @@ START_TEST(faces_before_the_first_material_have_none)
 }
 END_TEST
 
-START_TEST(nothing_is_made_of_nothing)
+START_TEST(test_import_without_attributes_adds_none)
 {
     import_text(&ebpo_import_obj, "# only a mesh\ns off\n" POSITIONS FACES);
     ck_assert(!mesh.attributes && !ebpo_mesh_has_attributes(&mesh));
@@ -168,7 +168,7 @@ static void expect_bytes(const ebpo_attribute *a, const uint8_t *values, uint64_
     ck_assert_mem_eq(a->values, values, count);
 }
 
-START_TEST(what_vertices_of_off_have_is_kept)
+START_TEST(test_import_off_vertex_values)
 {
     static const uint8_t bytes[] = { 255, 0, 7, 255, 0, 7, 255, 0, 7, 255, 0, 7 };
     static const float normal[] = { 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1 };
@@ -185,46 +185,46 @@ START_TEST(what_vertices_of_off_have_is_kept)
     expect_floats(find("vertex", "red green blue"), false, part, 12);
     expect_floats(find("vertex", "nx ny nz"), false, normal, 12);
     expect_floats(find("vertex", "s t"), false, st, 8);
-    ck_assert_str_eq(mesh.attributes->lost, "how opaque colours are");
+    ck_assert_str_eq(mesh.attributes->lost, "opacity of colours");
     ebpo_mesh_free(&mesh);
     import_off("N", "0 0 1 5", "");
     expect_floats(find("vertex", "nx ny nz"), false, normal, 12);
-    ck_assert_str_eq(ebpo_mesh_unread(&mesh),
-                     "vertices' values that the file's first word does not say: 4");
+    ck_assert_str_eq(ebpo_mesh_ignored(&mesh),
+                     "vertex values that the file's first word does not declare: 4");
     ebpo_mesh_free(&mesh);
 }
 END_TEST
 
-START_TEST(colours_of_faces_of_off_are_kept)
+START_TEST(test_import_off_face_colours)
 {
     static const uint8_t bytes[] = { 0, 0, 0, 0, 0, 0, 0, 0, 0, 255, 0, 9 };
     import_off("", "", "255 0 9");
     expect_bytes(find("face", "red green blue"), bytes, 12);
     ebpo_mesh_free(&mesh);
     import_off("", "", "7");
-    ck_assert_str_eq(mesh.attributes->lost, "colours of faces that are numbers in a table");
+    ck_assert_str_eq(mesh.attributes->lost, "colours of faces that are indices into a table");
     ck_assert_uint_eq(mesh.attributes->count, 0);
     ebpo_mesh_free(&mesh);
     import_off("C", "1 0 0", "255 0 9");
-    ck_assert_str_eq(mesh.attributes->lost, "colours of faces (vertices have some too)");
+    ck_assert_str_eq(mesh.attributes->lost, "colours of faces (vertices also have colours)");
     ebpo_mesh_free(&mesh);
 }
 END_TEST
 
-/* Faces without them have zeros; what is named and not there is told. */
-START_TEST(what_faces_name_and_is_not_there_is_told)
+/* Faces without them have zeros; named but missing values are reported. */
+START_TEST(test_import_reports_missing_references)
 {
     static const float texture[] = { 0.5f, 0.25f, 0, 0, 0, 0, 0, 0, 0, 0, 0.5f, 0.25f };
     import_text(&ebpo_import_obj, POSITIONS "vt 0.5 0.25\nf 1/1 3/2 2/7\nf 1//1 2 4/1\n");
     expect_floats(find("face", "texcoord"), true, texture, 12);
-    ck_assert_str_eq(ebpo_mesh_unread(&mesh),
-                     "texture coordinates that corners of faces name and that are not in the "
-                     "file: 2; normals that corners of faces name and that are not in the file: 1");
+    ck_assert_str_eq(ebpo_mesh_ignored(&mesh),
+                     "texture coordinates that faces refer to but the file lacks: 2; "
+                     "normals that faces refer to but the file lacks: 1");
     ebpo_mesh_free(&mesh);
 }
 END_TEST
 
-START_TEST(a_third_texture_coordinate_is_noted)
+START_TEST(test_import_reports_third_texture_coordinate)
 {
     import_text(&ebpo_import_obj, POSITIONS "vt 0 0 0.5\nf 1/1 3/1 2/1\nf 1/1 2/1 4/1\n");
     ck_assert_str_eq(mesh.attributes->lost, "the third texture coordinate");
@@ -263,7 +263,7 @@ static void expect_stl(const uint16_t words[STL_FACES], const uint8_t rgb[3 * ST
     ebpo_mesh_free(&mesh);
 }
 
-START_TEST(colours_of_stl_are_read_as_their_header_says)
+START_TEST(test_import_stl_colours_follow_header)
 {
     static const uint16_t words[STL_FACES] = { 0x801f, 0xfc00, 0x03e0, 0x8210 };
     static const uint8_t viscam[] = { 0, 0, 255, 255, 0, 0, 255, 255, 255, 0, 132, 132 };
@@ -275,7 +275,7 @@ START_TEST(colours_of_stl_are_read_as_their_header_says)
 }
 END_TEST
 
-START_TEST(words_of_stl_that_are_no_colours_are_kept)
+START_TEST(test_import_stl_attribute_words_are_kept)
 {
     static const uint16_t words[STL_FACES] = { 0, 0x7fff, 3, 0 }, zeros[STL_FACES] = { 0 };
     import_stl("by a scanner", words);
@@ -289,18 +289,18 @@ END_TEST
 TEST_SUITE(import_attributes)
 {
     TCase *tests = tcase_create("import attributes");
-    tcase_add_test(tests, what_agrees_at_a_vertex_is_the_vertex_s);
-    tcase_add_test(tests, what_agrees_on_a_face_is_the_face_s_and_else_in_lists);
-    tcase_add_test(tests, corners_of_polygons_keep_their_values);
-    tcase_add_test(tests, materials_are_numbers_of_faces_and_names_in_the_header);
-    tcase_add_test(tests, faces_before_the_first_material_have_none);
-    tcase_add_test(tests, nothing_is_made_of_nothing);
-    tcase_add_test(tests, what_vertices_of_off_have_is_kept);
-    tcase_add_test(tests, colours_of_faces_of_off_are_kept);
-    tcase_add_test(tests, what_faces_name_and_is_not_there_is_told);
-    tcase_add_test(tests, a_third_texture_coordinate_is_noted);
-    tcase_add_test(tests, colours_of_stl_are_read_as_their_header_says);
-    tcase_add_test(tests, words_of_stl_that_are_no_colours_are_kept);
+    tcase_add_test(tests, test_import_vertex_values_when_unique);
+    tcase_add_test(tests, test_import_face_values_and_corner_lists);
+    tcase_add_test(tests, test_import_polygon_corners_keep_values);
+    tcase_add_test(tests, test_import_materials_are_indexed);
+    tcase_add_test(tests, test_import_faces_before_first_material);
+    tcase_add_test(tests, test_import_without_attributes_adds_none);
+    tcase_add_test(tests, test_import_off_vertex_values);
+    tcase_add_test(tests, test_import_off_face_colours);
+    tcase_add_test(tests, test_import_reports_missing_references);
+    tcase_add_test(tests, test_import_reports_third_texture_coordinate);
+    tcase_add_test(tests, test_import_stl_colours_follow_header);
+    tcase_add_test(tests, test_import_stl_attribute_words_are_kept);
     Suite *suite = suite_create("import attributes");
     suite_add_tcase(suite, tests);
     return suite;

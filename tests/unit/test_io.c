@@ -1,4 +1,4 @@
-/* Files: whole reading, and outputs that appear whole or not at all. */
+/* Files: complete reading, and atomic outputs. */
 #include <dirent.h>
 #include <signal.h>
 #include <stdio.h>
@@ -48,7 +48,7 @@ static void check_content(const char *path, const char *content)
     ebpo_whole_file_close(&file);
 }
 
-START_TEST(stream_output_appears_on_commit_only)
+START_TEST(test_output_appears_on_commit_only)
 {
     ebpo_publish out;
     mode_t mask = umask(027);
@@ -67,7 +67,7 @@ START_TEST(stream_output_appears_on_commit_only)
 }
 END_TEST
 
-START_TEST(output_written_by_name_is_published)
+START_TEST(test_output_by_name_is_published)
 {
     ebpo_publish out;
     ck_assert(ebpo_publish_begin(&out, target, NULL) == EBPO_OK);
@@ -77,7 +77,7 @@ START_TEST(output_written_by_name_is_published)
 }
 END_TEST
 
-START_TEST(aborted_output_leaves_nothing_behind)
+START_TEST(test_aborted_output_leaves_nothing)
 {
     ebpo_publish out;
     write_file(target, "old");
@@ -90,7 +90,7 @@ START_TEST(aborted_output_leaves_nothing_behind)
 }
 END_TEST
 
-START_TEST(commit_fails_when_the_temporary_file_is_gone)
+START_TEST(test_commit_without_temporary_file_fails)
 {
     ebpo_publish out;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -110,7 +110,7 @@ static void refused(const char *path, const char *message)
                   error.message);
 }
 
-START_TEST(targets_that_cannot_be_replaced_are_refused)
+START_TEST(test_irreplaceable_targets_are_refused)
 {
     char path[128], file[64];
     refused(folder, "is a folder");
@@ -123,7 +123,7 @@ START_TEST(targets_that_cannot_be_replaced_are_refused)
     ck_assert(symlink(target, file) == 0);
     refused(file, "is a symbolic link");
     unlink(file);
-    if (geteuid() != 0) { /* root may write anywhere */
+    if (geteuid() != 0) { /* root may write to all files */
         chmod(folder, 0500);
         refused(target, "Permission denied");
         chmod(folder, 0700);
@@ -132,13 +132,13 @@ START_TEST(targets_that_cannot_be_replaced_are_refused)
 }
 END_TEST
 
-START_TEST(more_outputs_than_slots_are_refused_and_slots_come_back)
+START_TEST(test_output_slots_are_limited_and_reused)
 {
     ebpo_file_lock lock;
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_publish out[EBPO_UNFINISHED_MOST], last;
+    ebpo_publish out[EBPO_UNFINISHED_MAX], last;
     for (int round = 0; round < 2; round++) {
-        for (int i = 0; i < EBPO_UNFINISHED_MOST; i++)
+        for (int i = 0; i < EBPO_UNFINISHED_MAX; i++)
             ck_assert(ebpo_publish_begin(&out[i], target, NULL) == EBPO_OK);
         ck_assert(ebpo_publish_begin(&last, target, NULL) == EBPO_E_LIMIT);
         ebpo_publish_abort(&out[0]);
@@ -146,7 +146,7 @@ START_TEST(more_outputs_than_slots_are_refused_and_slots_come_back)
         ck_assert(ebpo_publish_begin(&last, target, &error) == EBPO_E_LIMIT);
         ck_assert(strstr(error.message, "32 files are being written or locked") != NULL);
         ebpo_file_lock_release(&lock);
-        for (int i = 1; i < EBPO_UNFINISHED_MOST; i++)
+        for (int i = 1; i < EBPO_UNFINISHED_MAX; i++)
             ebpo_publish_abort(&out[i]);
     }
     ck_assert(scratch_entries() == 0);
@@ -160,7 +160,7 @@ static void on_signal(int number)
     _exit(3);
 }
 
-START_TEST(signal_handler_removes_what_is_unfinished)
+START_TEST(test_signal_handler_removes_unfinished_output)
 {
     pid_t child = fork();
     if (child == 0) {
@@ -178,9 +178,9 @@ START_TEST(signal_handler_removes_what_is_unfinished)
 }
 END_TEST
 
-/* --- locks, and outputs made from what they replace --- */
+/* --- locks, and outputs made from the files that they replace --- */
 
-START_TEST(a_lock_is_waited_for_and_leaves_no_file)
+START_TEST(test_lock_waits_and_leaves_no_file)
 {
     ebpo_file_lock lock, other;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -201,7 +201,7 @@ static bool stop(void *user, const char *stage, uint64_t done, uint64_t total)
     return strcmp(stage, "waiting") != 0;
 }
 
-START_TEST(waiting_for_a_lock_can_be_cancelled)
+START_TEST(test_lock_wait_can_be_cancelled)
 {
     ebpo_file_lock lock, other;
     int calls = 0;
@@ -213,7 +213,7 @@ START_TEST(waiting_for_a_lock_can_be_cancelled)
 }
 END_TEST
 
-/* Gives up root, who may write anywhere. */
+/* Drops the privileges of root, who may write to all files. */
 static int lock_as_nobody(void)
 {
     enum { NOBODY = 65534 };
@@ -227,7 +227,7 @@ static int lock_as_nobody(void)
     return 0;
 }
 
-START_TEST(nobody_waits_in_a_folder_that_cannot_be_written_to)
+START_TEST(test_lock_skips_read_only_folder)
 {
     int status;
     ck_assert(chmod(folder, 0555) == 0);
@@ -239,7 +239,7 @@ START_TEST(nobody_waits_in_a_folder_that_cannot_be_written_to)
 }
 END_TEST
 
-START_TEST(a_file_of_other_use_is_no_lock_and_stays)
+START_TEST(test_lock_keeps_unrelated_file)
 {
     ebpo_file_lock lock;
     const char *named = scratch(".out.bin.lock");
@@ -258,7 +258,7 @@ START_TEST(a_file_of_other_use_is_no_lock_and_stays)
 }
 END_TEST
 
-/* The number in the file, one more by each of many: all of them are there in the end. */
+/* Many processes increase the number in the file by one: no increase is lost. */
 static int count_up(void)
 {
     for (int i = 0; i < 25; i++) {
@@ -277,7 +277,7 @@ static int count_up(void)
     return 0;
 }
 
-START_TEST(processes_with_a_lock_take_turns)
+START_TEST(test_lock_serializes_processes)
 {
     enum { PROCESSES = 4 };
     pid_t child[PROCESSES];
@@ -293,7 +293,7 @@ START_TEST(processes_with_a_lock_take_turns)
 }
 END_TEST
 
-START_TEST(an_output_replaces_only_what_it_was_made_from)
+START_TEST(test_output_replaces_only_its_source_version)
 {
     ebpo_publish out;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -311,7 +311,7 @@ START_TEST(an_output_replaces_only_what_it_was_made_from)
             ck_assert(ebpo_publish_commit(&out, NULL) == EBPO_OK);
     }
     ck_assert(ebpo_publish_commit(&out, &error) == EBPO_E_IO);
-    ck_assert(strstr(error.message, "another program has written it since it was read") != NULL);
+    ck_assert(strstr(error.message, "another program has changed it since it was read") != NULL);
     check_content(target, "her");
     ck_assert(scratch_entries() == 1);
     ebpo_whole_file_close(&read);
@@ -328,9 +328,9 @@ static int write_pair(const char *second_path)
     return ebpo_publish_commit_pair(&first, &second, NULL) != EBPO_OK;
 }
 
-/* Of two programs that write the same two files at once, one waits: no file of one stays beside one
+/* When two programs write the same two files at once, one waits: no file of one stays beside a file
  * of the other. */
-START_TEST(pairs_of_outputs_are_put_in_place_in_turn)
+START_TEST(test_output_pairs_are_published_in_turn)
 {
     ebpo_file_lock lock;
     const char *other = scratch("other.bin");
@@ -353,14 +353,14 @@ START_TEST(pairs_of_outputs_are_put_in_place_in_turn)
 }
 END_TEST
 
-START_TEST(empty_file_is_read_as_no_bytes)
+START_TEST(test_empty_file_has_no_bytes)
 {
     write_file(target, "");
     check_content(target, "");
 }
 END_TEST
 
-START_TEST(replaced_output_keeps_extended_attributes_and_mode)
+START_TEST(test_output_keeps_mode_and_attributes)
 {
     ebpo_publish out;
     struct stat st;
@@ -368,7 +368,7 @@ START_TEST(replaced_output_keeps_extended_attributes_and_mode)
     write_file(target, "old");
     ck_assert(chmod(target, 0604) == 0);
     bool has =
-        setxattr(target, "user.ebpo", "kept", 4, 0) == 0; /* not all file systems have them */
+        setxattr(target, "user.ebpo", "kept", 4, 0) == 0; /* not all file systems support them */
     ck_assert(ebpo_publish_begin(&out, target, NULL) == EBPO_OK);
     fputs("new", ebpo_publish_stream(&out));
     ck_assert(ebpo_publish_commit(&out, NULL) == EBPO_OK);
@@ -382,7 +382,7 @@ START_TEST(replaced_output_keeps_extended_attributes_and_mode)
 }
 END_TEST
 
-START_TEST(change_while_reading_is_noticed)
+START_TEST(test_change_while_reading_is_detected)
 {
     ebpo_whole_file file;
     write_file(target, "one");
@@ -394,14 +394,14 @@ START_TEST(change_while_reading_is_noticed)
 }
 END_TEST
 
-/* The old times again, as copying with times or unpacking an archive would do it. */
+/* Restores the old times, as copying with times or unpacking an archive does. */
 static void set_back(const char *path, const struct stat *old)
 {
     struct timespec times[2] = { old->st_atim, old->st_mtim };
     ck_assert(utimensat(AT_FDCWD, path, times, 0) == 0);
 }
 
-START_TEST(change_whose_time_is_set_back_is_noticed)
+START_TEST(test_change_with_reset_time_is_detected)
 {
     ebpo_whole_file file;
     struct stat old;
@@ -418,7 +418,7 @@ START_TEST(change_whose_time_is_set_back_is_noticed)
 }
 END_TEST
 
-START_TEST(a_file_that_becomes_shorter_is_an_error)
+START_TEST(test_shrinking_file_is_an_error)
 {
     ebpo_whole_file file;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -433,7 +433,7 @@ START_TEST(a_file_that_becomes_shorter_is_an_error)
 }
 END_TEST
 
-START_TEST(pipes_and_folders_are_refused_without_hanging)
+START_TEST(test_pipes_and_folders_are_refused)
 {
     ebpo_whole_file file;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -450,26 +450,26 @@ TEST_SUITE(io)
 {
     TCase *tests = tcase_create("io");
     tcase_add_checked_fixture(tests, enter, leave);
-    tcase_add_test(tests, stream_output_appears_on_commit_only);
-    tcase_add_test(tests, output_written_by_name_is_published);
-    tcase_add_test(tests, aborted_output_leaves_nothing_behind);
-    tcase_add_test(tests, commit_fails_when_the_temporary_file_is_gone);
-    tcase_add_test(tests, targets_that_cannot_be_replaced_are_refused);
-    tcase_add_test(tests, more_outputs_than_slots_are_refused_and_slots_come_back);
-    tcase_add_test(tests, signal_handler_removes_what_is_unfinished);
-    tcase_add_test(tests, a_lock_is_waited_for_and_leaves_no_file);
-    tcase_add_test(tests, waiting_for_a_lock_can_be_cancelled);
-    tcase_add_test(tests, nobody_waits_in_a_folder_that_cannot_be_written_to);
-    tcase_add_test(tests, a_file_of_other_use_is_no_lock_and_stays);
-    tcase_add_test(tests, processes_with_a_lock_take_turns);
-    tcase_add_test(tests, an_output_replaces_only_what_it_was_made_from);
-    tcase_add_test(tests, pairs_of_outputs_are_put_in_place_in_turn);
-    tcase_add_test(tests, empty_file_is_read_as_no_bytes);
-    tcase_add_test(tests, replaced_output_keeps_extended_attributes_and_mode);
-    tcase_add_test(tests, change_while_reading_is_noticed);
-    tcase_add_test(tests, change_whose_time_is_set_back_is_noticed);
-    tcase_add_test(tests, a_file_that_becomes_shorter_is_an_error);
-    tcase_add_test(tests, pipes_and_folders_are_refused_without_hanging);
+    tcase_add_test(tests, test_output_appears_on_commit_only);
+    tcase_add_test(tests, test_output_by_name_is_published);
+    tcase_add_test(tests, test_aborted_output_leaves_nothing);
+    tcase_add_test(tests, test_commit_without_temporary_file_fails);
+    tcase_add_test(tests, test_irreplaceable_targets_are_refused);
+    tcase_add_test(tests, test_output_slots_are_limited_and_reused);
+    tcase_add_test(tests, test_signal_handler_removes_unfinished_output);
+    tcase_add_test(tests, test_lock_waits_and_leaves_no_file);
+    tcase_add_test(tests, test_lock_wait_can_be_cancelled);
+    tcase_add_test(tests, test_lock_skips_read_only_folder);
+    tcase_add_test(tests, test_lock_keeps_unrelated_file);
+    tcase_add_test(tests, test_lock_serializes_processes);
+    tcase_add_test(tests, test_output_replaces_only_its_source_version);
+    tcase_add_test(tests, test_output_pairs_are_published_in_turn);
+    tcase_add_test(tests, test_empty_file_has_no_bytes);
+    tcase_add_test(tests, test_output_keeps_mode_and_attributes);
+    tcase_add_test(tests, test_change_while_reading_is_detected);
+    tcase_add_test(tests, test_change_with_reset_time_is_detected);
+    tcase_add_test(tests, test_shrinking_file_is_an_error);
+    tcase_add_test(tests, test_pipes_and_folders_are_refused);
     Suite *suite = suite_create("io");
     suite_add_tcase(suite, tests);
     return suite;

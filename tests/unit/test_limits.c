@@ -1,5 +1,5 @@
-/* Counts near and beyond what 32 bits hold, faked: right arithmetic where they are allowed,
- * EBPO_E_LIMIT before anything is touched where not. */
+/* Faked counts near and beyond 32 bits: correct arithmetic when they are allowed, else EBPO_E_LIMIT
+ * before any access. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,7 +29,7 @@ static const char *path;
 
 /* --- meshes --- */
 
-START_TEST(meshes_beyond_the_limit_are_refused_before_they_are_looked_at)
+START_TEST(test_mesh_size_limit_is_checked_first)
 {
     static const ebpo_progress silent = { NULL, NULL };
     uint32_t face[3] = { 0, 1, 2 };
@@ -53,7 +53,7 @@ START_TEST(meshes_beyond_the_limit_are_refused_before_they_are_looked_at)
 }
 END_TEST
 
-START_TEST(octcodes_reach_level_20_and_no_further)
+START_TEST(test_octcodes_are_limited_to_level_20)
 {
     uint32_t last = (1u << EBPO_MAX_LEVEL) - 1;
     ck_assert_int_eq(EBPO_MAX_LEVEL, 20);
@@ -75,7 +75,7 @@ START_TEST(octcodes_reach_level_20_and_no_further)
 }
 END_TEST
 
-START_TEST(lists_of_a_build_have_a_limit_that_does_not_wrap)
+START_TEST(test_build_list_limit_does_not_wrap)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t faces = TWO32 - 2, leaves = (UINT64_C(1) << 22) + 64 * faces,
@@ -96,7 +96,7 @@ END_TEST
 
 /* --- the container's arithmetic --- */
 
-START_TEST(chunks_are_counted_beyond_2_to_the_32_rows)
+START_TEST(test_chunk_count_beyond_32_bit_rows)
 {
     static const uint64_t counts[] = { (UINT64_C(1) << 32) - 1, UINT64_C(1) << 32,
                                        (UINT64_C(1) << 32) + 1, (UINT64_C(1) << 33) + 5,
@@ -115,7 +115,7 @@ START_TEST(chunks_are_counted_beyond_2_to_the_32_rows)
 }
 END_TEST
 
-/* The head of a solid of so many faces, in a root with one leaf. */
+/* Makes the header of a solid with so many faces, in a root with one leaf. */
 static ebpo_info *head_of(uint64_t vertices, uint64_t faces)
 {
     ebpo_info *info = calloc(1, sizeof *info);
@@ -134,7 +134,7 @@ static ebpo_status check_head(const ebpo_info *info, ebpo_error *error)
     return ebpo_facts_check(info, "head", EBPO_E_FORMAT, error);
 }
 
-START_TEST(heads_state_at_most_what_32_bits_number)
+START_TEST(test_header_counts_limited_to_32_bits)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_info *info = head_of(TWO32 - 2, TWO32 - 2);
@@ -143,7 +143,7 @@ START_TEST(heads_state_at_most_what_32_bits_number)
     ck_assert_uint_eq(ebpo_schema_rows(info, EBPO_A_FACES_INDEX, 0), TWO32 / 4096);
     ck_assert_uint_eq(ebpo_schema_rows(info, EBPO_A_VERTEX_SOURCE, 0), TWO32 - 2);
     uint64_t *const limited[] = { &info->vertex_count, &info->source_vertex_count,
-                                  &info->source_face_count, &info->mend.added_faces,
+                                  &info->source_face_count, &info->repair_record.added_faces,
                                   &info->face_count };
     for (size_t i = 0; i < sizeof limited / sizeof *limited; i++) {
         uint64_t right = *limited[i];
@@ -158,12 +158,11 @@ START_TEST(heads_state_at_most_what_32_bits_number)
 }
 END_TEST
 
-START_TEST(levels_of_a_head_are_counted_in_64_bits)
+START_TEST(test_header_level_counts_use_64_bits)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_info *info = head_of(TWO32 - 2, TWO32 - 2);
-    /* Beyond 2^33 leaves and 2^35 references below 2^31 gray nodes: more than any count of 32 bits,
-     * and all right. */
+    /* Beyond 2^33 leaves and 2^35 references below 2^31 gray nodes: valid counts beyond 32 bits. */
     info->max_level = info->grid_level = 20;
     info->level_count = 13;
     info->level[0] = (ebpo_level_summary){ .gray_count = 1 };
@@ -189,7 +188,7 @@ START_TEST(levels_of_a_head_are_counted_in_64_bits)
 }
 END_TEST
 
-START_TEST(index_rows_add_up_beyond_2_to_the_32)
+START_TEST(test_index_rows_sum_beyond_32_bits)
 {
     enum { LEAVES = 2 * EBPO_INDEX_ROWS + 1, EACH = 1 << 20 };
     uint64_t *first = calloc(LEAVES, sizeof *first);
@@ -213,7 +212,7 @@ START_TEST(index_rows_add_up_beyond_2_to_the_32)
 }
 END_TEST
 
-START_TEST(corners_and_numbers_near_2_to_the_32_come_back)
+START_TEST(test_index_encodings_near_32_bit_limit)
 {
     uint32_t faces[6] = { UINT32_MAX - 3, 0, UINT32_MAX - 2, 1u << 31, 7, UINT32_MAX - 4 }, back[6];
     uint64_t seen = TWO32 - 4;
@@ -235,9 +234,9 @@ START_TEST(corners_and_numbers_near_2_to_the_32_come_back)
 }
 END_TEST
 
-/* A head that states 2^32 - 2 source vertices and faces for a mesh of a few must not make a reader
- * take room for them. */
-START_TEST(sources_of_billions_take_no_memory)
+/* A header that states 2^32 - 2 source vertices and faces for a small mesh must not make a reader
+ * allocate memory for them. */
+START_TEST(test_huge_source_counts_take_no_memory)
 {
     random_tree_options options = { 5, 5, 8, 9, true, false, false, false };
     ebpo_error error = EBPO_ERROR_INIT;
@@ -256,7 +255,7 @@ START_TEST(sources_of_billions_take_no_memory)
                   "%s", error.message);
     getrusage(RUSAGE_SELF, &after);
     ck_assert(ordered);
-    /* KiB; a number for each would be 16 GiB, and sanitizers take their own */
+    /* KiB; a number for each would take 16 GiB, and sanitizers need memory, too */
     ck_assert_int_lt(after.ru_maxrss - before.ru_maxrss, 1 << 20);
     uint64_t last = mesh.vertex_count - 1;
     size_t size = tree.mesh.xyz32 ? 3 * sizeof(float) : 3 * sizeof(double);
@@ -271,7 +270,7 @@ START_TEST(sources_of_billions_take_no_memory)
 }
 END_TEST
 
-START_TEST(slices_refuse_more_references_than_can_be_numbered)
+START_TEST(test_slice_reference_limit)
 {
     ebpo_compact compact;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -297,7 +296,7 @@ static ebpo_slice leaf_slice(uint16_t *types, uint64_t *first, uint32_t *news, u
     return slice;
 }
 
-START_TEST(subtrees_refuse_more_blocks_than_slots_can_number)
+START_TEST(test_subtree_block_limit)
 {
     uint16_t types;
     uint64_t first = 0;
@@ -305,7 +304,7 @@ START_TEST(subtrees_refuse_more_blocks_than_slots_can_number)
     ebpo_layout layout;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_slice slice = leaf_slice(&types, &first, &news, &refs);
-    ck_assert_uint_eq((uint64_t)EBPO_BLOCKS_MOST * EBPO_BLOCK, TWO32);
+    ck_assert_uint_eq((uint64_t)EBPO_BLOCKS_MAX * EBPO_BLOCK, TWO32);
     ck_assert_int_eq(ebpo_layout_make(&layout, &slice, 512, &error), EBPO_OK);
     ck_assert_uint_eq(layout.block_count, 512);
     ebpo_layout_free(&layout);
@@ -314,7 +313,7 @@ START_TEST(subtrees_refuse_more_blocks_than_slots_can_number)
 }
 END_TEST
 
-/* In memory of their own, as they are freed. */
+/* Separately allocated, as they are freed. */
 static ebpo_slice fake_slice(void)
 {
     uint16_t *types = malloc(sizeof *types);
@@ -329,7 +328,7 @@ static ebpo_slice fake_slice(void)
     return slice;
 }
 
-START_TEST(subtrees_refuse_what_they_cannot_number)
+START_TEST(test_subtree_count_limit)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_accel *subtree;
@@ -355,7 +354,7 @@ START_TEST(subtrees_refuse_what_they_cannot_number)
 }
 END_TEST
 
-START_TEST(estimates_of_billions_do_not_wrap)
+START_TEST(test_huge_memory_estimates_do_not_wrap)
 {
     uint64_t keep, peak;
     ebpo_info *info = head_of(TWO32 - 2, TWO32 - 2);
@@ -373,7 +372,7 @@ END_TEST
 
 /* --- levels and views --- */
 
-START_TEST(levels_of_too_many_vertices_are_refused_before_they_are_joined)
+START_TEST(test_lod_vertex_limit_is_checked_first)
 {
     ebpo_polyhedra half = { .vertex_count = UINT64_C(1) << 31, .face_count = 5 },
                    faces = { .face_count = UINT64_C(1) << 31 };
@@ -392,7 +391,7 @@ START_TEST(levels_of_too_many_vertices_are_refused_before_they_are_joined)
 }
 END_TEST
 
-START_TEST(views_tell_groups_beyond_2_to_the_32_apart)
+START_TEST(test_view_groups_beyond_32_bits)
 {
     enum { NODES = 4 };
     ebpo_frontier frontier = { .at = NULL };
@@ -420,7 +419,7 @@ END_TEST
 
 /* --- export --- */
 
-START_TEST(exports_that_a_format_cannot_count_are_refused)
+START_TEST(test_export_count_limits)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert_int_eq(ebpo_export_check_glb("a.glb", 1000, TWO32 - 1 - EBPO_GLB_HEADS - 1000,
@@ -453,22 +452,22 @@ TEST_SUITE(limits)
     TCase *tests = tcase_create("limits");
     tcase_set_timeout(tests, 120);
     tcase_add_checked_fixture(tests, enter, scratch_leave);
-    tcase_add_test(tests, meshes_beyond_the_limit_are_refused_before_they_are_looked_at);
-    tcase_add_test(tests, octcodes_reach_level_20_and_no_further);
-    tcase_add_test(tests, lists_of_a_build_have_a_limit_that_does_not_wrap);
-    tcase_add_test(tests, chunks_are_counted_beyond_2_to_the_32_rows);
-    tcase_add_test(tests, heads_state_at_most_what_32_bits_number);
-    tcase_add_test(tests, levels_of_a_head_are_counted_in_64_bits);
-    tcase_add_test(tests, index_rows_add_up_beyond_2_to_the_32);
-    tcase_add_test(tests, corners_and_numbers_near_2_to_the_32_come_back);
-    tcase_add_test(tests, sources_of_billions_take_no_memory);
-    tcase_add_test(tests, slices_refuse_more_references_than_can_be_numbered);
-    tcase_add_test(tests, subtrees_refuse_more_blocks_than_slots_can_number);
-    tcase_add_test(tests, subtrees_refuse_what_they_cannot_number);
-    tcase_add_test(tests, estimates_of_billions_do_not_wrap);
-    tcase_add_test(tests, levels_of_too_many_vertices_are_refused_before_they_are_joined);
-    tcase_add_test(tests, views_tell_groups_beyond_2_to_the_32_apart);
-    tcase_add_test(tests, exports_that_a_format_cannot_count_are_refused);
+    tcase_add_test(tests, test_mesh_size_limit_is_checked_first);
+    tcase_add_test(tests, test_octcodes_are_limited_to_level_20);
+    tcase_add_test(tests, test_build_list_limit_does_not_wrap);
+    tcase_add_test(tests, test_chunk_count_beyond_32_bit_rows);
+    tcase_add_test(tests, test_header_counts_limited_to_32_bits);
+    tcase_add_test(tests, test_header_level_counts_use_64_bits);
+    tcase_add_test(tests, test_index_rows_sum_beyond_32_bits);
+    tcase_add_test(tests, test_index_encodings_near_32_bit_limit);
+    tcase_add_test(tests, test_huge_source_counts_take_no_memory);
+    tcase_add_test(tests, test_slice_reference_limit);
+    tcase_add_test(tests, test_subtree_block_limit);
+    tcase_add_test(tests, test_subtree_count_limit);
+    tcase_add_test(tests, test_huge_memory_estimates_do_not_wrap);
+    tcase_add_test(tests, test_lod_vertex_limit_is_checked_first);
+    tcase_add_test(tests, test_view_groups_beyond_32_bits);
+    tcase_add_test(tests, test_export_count_limits);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -27,7 +27,7 @@ static ebpo_file *build(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
     return model_open(path);
 }
 
-enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
+enum { DEFAULT = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
 
 static double stored_volume(const ebpo_info *info, int level)
 {
@@ -39,12 +39,12 @@ static double stored_volume(const ebpo_info *info, int level)
     return sum;
 }
 
-static double take(ebpo_file *file, int level, bool walls, unsigned threads, ebpo_mesh *out)
+static double take(ebpo_file *file, int level, bool cell_faces, unsigned threads, ebpo_mesh *out)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
     double volume = -1;
-    options.walls = walls;
+    options.cell_faces = cell_faces;
     options.threads = threads;
     ck_assert_msg(ebpo_lod_level(file, level, &options, out, &volume, &error) == EBPO_OK, "%s",
                   error.message);
@@ -70,14 +70,15 @@ static double largest_volume(const ebpo_info *info)
     return info->box_size[0] * info->box_size[1] * info->box_size[2];
 }
 
-/* The file states leaves by stored planes or as inherited; derived planes cut off more. */
-START_TEST(level_volumes_equal_those_stored_in_the_file)
+/* The file states volumes of leaves by stored planes or as inherited; derived planes cut off more.
+ */
+START_TEST(test_lod_volumes_match_stored_volumes)
 {
     if (!ebpo_test_wanted(_i))
         return;
     for (int variant = 0; variant < 2; variant++) {
-        ebpo_file *file =
-            build(ebpo_test_solids[_i].make(), variant ? USUAL | EBPO_PART_LEAF_PLANES : USUAL, 4);
+        ebpo_file *file = build(ebpo_test_solids[_i].make(),
+                                variant ? DEFAULT | EBPO_PART_LEAF_PLANES : DEFAULT, 4);
         const ebpo_info *info = ebpo_file_info(file);
         for (int level = 0; level < info->level_count; level++) {
             double volume = take(file, level, true, 0, NULL), stored = stored_volume(info, level);
@@ -92,7 +93,7 @@ START_TEST(level_volumes_equal_those_stored_in_the_file)
 }
 END_TEST
 
-START_TEST(volumes_of_a_real_model_agree_too)
+START_TEST(test_lod_volumes_of_real_model)
 {
     const char *models = getenv("EBPO_MODELS");
     ebpo_mesh mesh;
@@ -100,7 +101,7 @@ START_TEST(volumes_of_a_real_model_agree_too)
     snprintf(name, sizeof name, "%s/armadillo.ply", models ? models : "");
     if (!models || ebpo_mesh_read(name, NULL, &mesh, NULL) != EBPO_OK)
         return;
-    ebpo_file *file = build(mesh, USUAL | EBPO_PART_LEAF_PLANES, 16);
+    ebpo_file *file = build(mesh, DEFAULT | EBPO_PART_LEAF_PLANES, 16);
     const ebpo_info *info = ebpo_file_info(file);
     for (int level = 0; level < info->level_count; level++) {
         double volume = take(file, level, true, 0, NULL), stored = stored_volume(info, level);
@@ -111,11 +112,11 @@ START_TEST(volumes_of_a_real_model_agree_too)
 }
 END_TEST
 
-START_TEST(envelopes_are_closed_and_fill_the_stated_volume)
+START_TEST(test_lod_envelopes_are_closed)
 {
     if (!ebpo_test_wanted(_i))
         return;
-    ebpo_file *file = build(ebpo_test_solids[_i].make(), USUAL, 4);
+    ebpo_file *file = build(ebpo_test_solids[_i].make(), DEFAULT, 4);
     const ebpo_info *info = ebpo_file_info(file);
     for (int level = 0; level < info->level_count; level++) {
         ebpo_mesh mesh;
@@ -127,7 +128,7 @@ START_TEST(envelopes_are_closed_and_fill_the_stated_volume)
         ck_assert_msg(report.balanced && report.unreferenced_vertices.count == 0, "%s level %d",
                       ebpo_test_solids[_i].name, level);
         double own = mesh_volume(&mesh), offset = 1e-9 * largest_volume(info);
-        for (int k = 0; k < 3; k++) /* far from the origin, rounding eats into the sum */
+        for (int k = 0; k < 3; k++) /* far from the origin, rounding affects the sum */
             offset *= 1 + fabs(info->box_origin[k]) / info->box_size[k];
         ck_assert_msg(fabs(own - volume) <= 1e-7 * volume + offset, "%s level %d: %.17g, %.17g",
                       ebpo_test_solids[_i].name, level, own, volume);
@@ -137,11 +138,11 @@ START_TEST(envelopes_are_closed_and_fill_the_stated_volume)
 }
 END_TEST
 
-START_TEST(deeper_levels_are_never_larger)
+START_TEST(test_lod_volume_decreases_with_level)
 {
     if (!ebpo_test_wanted(_i))
         return;
-    ebpo_file *file = build(ebpo_test_solids[_i].make(), USUAL, 0);
+    ebpo_file *file = build(ebpo_test_solids[_i].make(), DEFAULT, 0);
     double before = INFINITY;
     for (int level = 0; level < ebpo_file_info(file)->level_count; level++) {
         double volume = take(file, level, true, 0, NULL);
@@ -160,9 +161,9 @@ static bool same_mesh(const ebpo_mesh *a, const ebpo_mesh *b)
            memcmp(a->faces, b->faces, a->face_count * 12) == 0;
 }
 
-START_TEST(result_does_not_depend_on_the_number_of_threads)
+START_TEST(test_lod_same_for_any_threads)
 {
-    ebpo_file *file = build(ebpo_test_torus(2, 0.7, 60, 40), USUAL, 2);
+    ebpo_file *file = build(ebpo_test_torus(2, 0.7, 60, 40), DEFAULT, 2);
     int last = ebpo_file_info(file)->level_count - 1;
     ck_assert_int_ge(last, 4);
     for (int level = 0; level <= last; level++) {
@@ -176,8 +177,8 @@ START_TEST(result_does_not_depend_on_the_number_of_threads)
 }
 END_TEST
 
-/* On a wall of some level-`level` cell, all three corners in one plane x, y or z = constant. */
-static bool on_wall(const ebpo_info *info, const ebpo_mesh *mesh, uint64_t face, int level)
+/* Returns true when all three corners are in one face x, y or z = constant of a cell of `level`. */
+static bool on_cell_face(const ebpo_info *info, const ebpo_mesh *mesh, uint64_t face, int level)
 {
     for (int k = 0; k < 3; k++) {
         const double *x = mesh->xyz64 + k;
@@ -190,20 +191,20 @@ static bool on_wall(const ebpo_info *info, const ebpo_mesh *mesh, uint64_t face,
     return false;
 }
 
-START_TEST(walls_are_left_out_on_request)
+START_TEST(test_cell_faces_are_omitted)
 {
-    ebpo_file *file = build(ebpo_test_make("sphere"), USUAL, 4);
+    ebpo_file *file = build(ebpo_test_make("sphere"), DEFAULT, 4);
     const ebpo_info *info = ebpo_file_info(file);
     for (int level = 0; level < info->level_count; level++) {
         ebpo_mesh with, without;
         double a = take(file, level, true, 0, &with), b = take(file, level, false, 0, &without);
-        uint64_t walls = 0;
+        uint64_t cell_faces = 0;
         for (uint64_t f = 0; f < with.face_count; f++)
-            walls += on_wall(info, &with, f, level);
+            cell_faces += on_cell_face(info, &with, f, level);
         ck_assert(a == b);
-        ck_assert_uint_eq(with.face_count, without.face_count + walls);
+        ck_assert_uint_eq(with.face_count, without.face_count + cell_faces);
         for (uint64_t f = 0; f < without.face_count; f++)
-            ck_assert(!on_wall(info, &without, f, level));
+            ck_assert(!on_cell_face(info, &without, f, level));
         ebpo_mesh_free(&with);
         ebpo_mesh_free(&without);
     }
@@ -211,10 +212,10 @@ START_TEST(walls_are_left_out_on_request)
 }
 END_TEST
 
-START_TEST(envelopes_come_level_by_level_in_octcode_order)
+START_TEST(test_lod_envelopes_are_in_octcode_order)
 {
-    /* Without planes and mesh each envelope is its cell: twelve triangles, whose middle tells the
-     * cell. */
+    /* Without planes and mesh each envelope is its cell: twelve triangles, whose middle identifies
+     * the cell. */
     ebpo_file *file = build(ebpo_test_make("blob"), 0, 4);
     const ebpo_info *info = ebpo_file_info(file);
     ebpo_mesh mesh;
@@ -244,7 +245,7 @@ START_TEST(envelopes_come_level_by_level_in_octcode_order)
 }
 END_TEST
 
-START_TEST(without_faces_leaves_have_what_they_inherit)
+START_TEST(test_lod_leaves_without_faces_inherit_planes)
 {
     ebpo_file *file = build(ebpo_test_make("torus"), EBPO_PART_PLANES, 4);
     int last = ebpo_file_info(file)->level_count - 1;
@@ -252,15 +253,15 @@ START_TEST(without_faces_leaves_have_what_they_inherit)
     ck_assert_double_eq_tol(bare, stored_volume(ebpo_file_info(file), last), 1e-6 * bare);
     ck_assert(bare <= take(file, last - 1, true, 0, NULL) * (1 + 1e-9));
     ebpo_close(file);
-    ebpo_file *full = build(ebpo_test_make("torus"), USUAL, 4);
+    ebpo_file *full = build(ebpo_test_make("torus"), DEFAULT, 4);
     ck_assert(bare > take(full, last, true, 0, NULL));
     ebpo_close(full);
 }
 END_TEST
 
-START_TEST(a_level_that_is_not_there_is_refused)
+START_TEST(test_lod_missing_level_is_refused)
 {
-    ebpo_file *file = build(ebpo_test_make("cube"), USUAL, 4);
+    ebpo_file *file = build(ebpo_test_make("cube"), DEFAULT, 4);
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh mesh;
     int count = ebpo_file_info(file)->level_count;
@@ -280,9 +281,9 @@ static bool stop_at_once(void *user, const char *stage, uint64_t done, uint64_t 
     return *(bool *)user;
 }
 
-START_TEST(a_cancelled_run_leaves_nothing)
+START_TEST(test_lod_cancel_leaves_nothing)
 {
-    ebpo_file *file = build(ebpo_test_torus(2, 0.7, 300, 150), USUAL, 0);
+    ebpo_file *file = build(ebpo_test_torus(2, 0.7, 300, 150), DEFAULT, 0);
     bool go_on = false;
     ebpo_lod_options options = EBPO_LOD_OPTIONS_INIT;
     options.threads = 1;
@@ -290,7 +291,7 @@ START_TEST(a_cancelled_run_leaves_nothing)
     ebpo_mesh mesh;
     ebpo_status status =
         ebpo_lod_level(file, ebpo_file_info(file)->level_count - 1, &options, &mesh, NULL, NULL);
-    /* A machine that is done before the first report is fine too. */
+    /* Finishing before the first report is OK, too. */
     ck_assert(status == EBPO_E_CANCELLED || status == EBPO_OK);
     ck_assert(status == EBPO_OK || mesh.xyz64 == NULL);
     ebpo_mesh_free(&mesh);
@@ -304,18 +305,16 @@ TEST_SUITE(lod)
     TCase *cases = tcase_create("lod");
     tcase_set_timeout(cases, 120);
     tcase_add_checked_fixture(cases, make_folder, scratch_leave);
-    tcase_add_loop_test(cases, level_volumes_equal_those_stored_in_the_file, 0,
-                        ebpo_test_solid_count);
-    tcase_add_loop_test(cases, envelopes_are_closed_and_fill_the_stated_volume, 0,
-                        ebpo_test_solid_count);
-    tcase_add_loop_test(cases, deeper_levels_are_never_larger, 0, ebpo_test_solid_count);
-    tcase_add_test(cases, volumes_of_a_real_model_agree_too);
-    tcase_add_test(cases, result_does_not_depend_on_the_number_of_threads);
-    tcase_add_test(cases, walls_are_left_out_on_request);
-    tcase_add_test(cases, envelopes_come_level_by_level_in_octcode_order);
-    tcase_add_test(cases, without_faces_leaves_have_what_they_inherit);
-    tcase_add_test(cases, a_level_that_is_not_there_is_refused);
-    tcase_add_test(cases, a_cancelled_run_leaves_nothing);
+    tcase_add_loop_test(cases, test_lod_volumes_match_stored_volumes, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(cases, test_lod_envelopes_are_closed, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(cases, test_lod_volume_decreases_with_level, 0, ebpo_test_solid_count);
+    tcase_add_test(cases, test_lod_volumes_of_real_model);
+    tcase_add_test(cases, test_lod_same_for_any_threads);
+    tcase_add_test(cases, test_cell_faces_are_omitted);
+    tcase_add_test(cases, test_lod_envelopes_are_in_octcode_order);
+    tcase_add_test(cases, test_lod_leaves_without_faces_inherit_planes);
+    tcase_add_test(cases, test_lod_missing_level_is_refused);
+    tcase_add_test(cases, test_lod_cancel_leaves_nothing);
     suite_add_tcase(suite, cases);
     return suite;
 }

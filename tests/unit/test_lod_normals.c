@@ -1,5 +1,5 @@
-/* Which way a level's polygons are lit: against the definition, node by node and without tables;
- * and against spheres, whose normals are known. */
+/* Normals for the lighting of polygons of a level: against the definition, node by node and without
+ * tables; and against spheres, whose normals are known. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,8 +11,8 @@
 #include "scratch.h"
 #include "solids.h"
 
-/* A level, and of each polygon its node, where its triangles begin, and its normal times twice its
- * area. */
+/* A level, and for each polygon its node, its first triangle, and its normal times twice its area.
+ */
 typedef struct level {
     ebpo_file *file;
     const ebpo_info *info;
@@ -25,7 +25,7 @@ typedef struct level {
 
 static void make_folder(void) { scratch_enter(); }
 
-static void *room(uint64_t count, size_t size)
+static void *space(uint64_t count, size_t size)
 {
     void *p = calloc(count + 1, size);
     ck_assert_ptr_nonnull(p);
@@ -70,10 +70,10 @@ static level take(ebpo_mesh mesh, uint32_t leaf_faces, int number)
     ck_assert_int_eq(ebpo_lod_level_nodes(l.file, number, NULL, &l.mesh, &l.nodes, NULL, &error),
                      EBPO_OK);
     uint64_t count = l.nodes.polygon_count;
-    l.normals = room(count, 3 * sizeof *l.normals);
-    l.node = room(count, sizeof *l.node);
-    l.first = room(count, sizeof *l.first);
-    l.area = room(count, sizeof *l.area);
+    l.normals = space(count, 3 * sizeof *l.normals);
+    l.node = space(count, sizeof *l.node);
+    l.first = space(count, sizeof *l.first);
+    l.area = space(count, sizeof *l.area);
     ck_assert_int_eq(ebpo_lod_normals(l.info, &l.mesh, &l.nodes, l.normals, &error), EBPO_OK);
     find_polygons(&l);
     return l;
@@ -94,7 +94,7 @@ static void release(level *l)
 
 static double length_of(const double v[3]) { return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
-/* Low and high corner of a node's cell, in units of which the root cell has 1 a side. */
+/* Computes the low corner of a node's cell and its side, in units of the side of the root cell. */
 static void cell_of(uint64_t octcode, double low[3], double *side)
 {
     int bits = 0;
@@ -114,17 +114,17 @@ static void in_box(const level *l, const double at[3], double out[3])
         out[k] = (at[k] - l->info->box_origin[k]) / l->info->box_size[k];
 }
 
-/* 2 * axis, + 1 of the upper one; 6: on a plane, or a wall of the root cell. */
+/* Returns 2 * axis, + 1 for the upper side; 6: on a plane, or a side of the root cell. */
 static int side_of(const level *l, uint64_t polygon)
 {
     double low[3], side, at[3];
     cell_of(l->nodes.nodes[l->node[polygon]].octcode, low, &side);
     for (int s = 0; s < 6; s++) {
-        double wall = low[s / 2] + s % 2 * side;
-        bool on = wall > 0 && wall < 1;
+        double cell_face = low[s / 2] + s % 2 * side;
+        bool on = cell_face > 0 && cell_face < 1;
         for (unsigned c = 0; c < l->nodes.corners[polygon]; c++) {
             in_box(l, corner_of(l, polygon, c), at);
-            on = on && fabs(at[s / 2] - wall) < 1e-13;
+            on = on && fabs(at[s / 2] - cell_face) < 1e-13;
         }
         if (on)
             return s;
@@ -142,7 +142,7 @@ static bool is_corner(const level *l, uint64_t node, const double at[3])
     return true;
 }
 
-/* The mean, by area, of planes of nodes with this corner. */
+/* Computes the mean, by area, of planes of nodes with this corner. */
 static void mean_at(const level *l, const int *sides, int side, const double at[3], double out[3])
 {
     double all = 0;
@@ -188,35 +188,35 @@ static void expect(const level *l, const int *sides, uint64_t polygon, double ou
         out[k] /= length;
 }
 
-START_TEST(normals_are_those_of_the_definition)
+START_TEST(test_lod_normals_match_definition)
 {
     static const char *const solids[] = { "torus", "blob", "cube" };
     level l = take(ebpo_test_make(solids[_i]), 4, _i == 2 ? 1 : 3);
-    int *sides = room(l.nodes.polygon_count, sizeof *sides);
-    uint64_t walls = 0, lent = 0;
+    int *sides = space(l.nodes.polygon_count, sizeof *sides);
+    uint64_t cell_faces = 0, lent = 0;
     for (uint64_t i = 0; i < l.nodes.polygon_count; i++)
         sides[i] = side_of(&l, i);
     for (uint64_t i = 0; i < l.nodes.polygon_count; i++) {
         double n[3],
             scale = fmax(fmax(l.info->box_size[0], l.info->box_size[1]), l.info->box_size[2]);
         if ((sides[i] < 6 && i % 3) || length_of(l.area[i]) < 1e-7 * scale * scale)
-            continue; /* the definition is slow; of a sliver, which way it lies is rounding */
+            continue; /* the definition is slow; the normal of a sliver is only rounding */
         expect(&l, sides, i, n);
         for (int k = 0; k < 3; k++)
             ck_assert_msg(fabs((double)l.normals[3 * i + (uint64_t)k] - n[k]) < 1e-4,
                           "%s, polygon %d of side %d: %g, expected %g", solids[_i], (int)i,
                           sides[i], (double)l.normals[3 * i + (uint64_t)k], n[k]);
-        walls += sides[i] < 6;
+        cell_faces += sides[i] < 6;
         lent += sides[i] < 6 && fabs(n[sides[i] / 2]) < 0.99;
     }
-    ck_assert(_i == 2 ? walls > 0 : walls > 8 && lent > walls / 4);
+    ck_assert(_i == 2 ? cell_faces > 0 : cell_faces > 8 && lent > cell_faces / 4);
     free(sides);
     release(&l);
 }
 END_TEST
 
-/* Of walls that look outwards, seen ones and hidden ones, by area. */
-START_TEST(on_a_sphere_walls_are_lit_as_the_sphere)
+/* Cell faces with outward normals, visible and hidden ones, by area. */
+START_TEST(test_lod_normals_of_sphere_cell_faces)
 {
     level l = take(ebpo_test_make("sphere"), 4, 3);
     double right = 0, all = 0;
@@ -238,14 +238,14 @@ START_TEST(on_a_sphere_walls_are_lit_as_the_sphere)
 }
 END_TEST
 
-START_TEST(nodes_of_another_level_are_refused)
+START_TEST(test_lod_normals_refuse_other_level)
 {
     level l = take(ebpo_test_make("sphere"), 4, 2);
     ebpo_error error = EBPO_ERROR_INIT;
     l.mesh.face_count--;
     ck_assert_int_eq(ebpo_lod_normals(l.info, &l.mesh, &l.nodes, l.normals, &error),
                      EBPO_E_ARGUMENT);
-    ck_assert_ptr_nonnull(strstr(error.message, "give both of one level"));
+    ck_assert_ptr_nonnull(strstr(error.message, "pass both of one level"));
     l.mesh.face_count++;
     double *corners = l.mesh.xyz64;
     l.mesh.xyz64 = NULL;
@@ -263,9 +263,9 @@ TEST_SUITE(lod_normals)
     TCase *cases = tcase_create("lod_normals");
     tcase_set_timeout(cases, 120);
     tcase_add_checked_fixture(cases, make_folder, scratch_leave);
-    tcase_add_loop_test(cases, normals_are_those_of_the_definition, 0, 3);
-    tcase_add_test(cases, on_a_sphere_walls_are_lit_as_the_sphere);
-    tcase_add_test(cases, nodes_of_another_level_are_refused);
+    tcase_add_loop_test(cases, test_lod_normals_match_definition, 0, 3);
+    tcase_add_test(cases, test_lod_normals_of_sphere_cell_faces);
+    tcase_add_test(cases, test_lod_normals_refuse_other_level);
     suite_add_tcase(suite, cases);
     return suite;
 }

@@ -1,4 +1,4 @@
-/* Maps of distance: against closed forms, single questions, plain sums and dense samples. */
+/* Maps of distance: against closed forms, single queries, plain sums and dense samples. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +18,7 @@ typedef struct opened {
     ebpo_model *model;
 } opened;
 
-/* cut_level -1: all of it in memory. */
+/* cut_level -1: the whole model is in memory. */
 static opened open_model(ebpo_mesh mesh, int cut_level)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -67,7 +67,7 @@ static double *map_of(ebpo_model *model, const ebpo_lattice *l, const ebpo_map_o
     return k.values;
 }
 
-/* Of a box: the closed form. */
+/* Returns the distance of a box by the closed form. */
 static double box_distance(const double low[3], const double high[3], const double p[3])
 {
     double outside[3], inside = -INFINITY;
@@ -79,11 +79,11 @@ static double box_distance(const double low[3], const double high[3], const doub
     return inside > 0 ? hypot(hypot(outside[0], outside[1]), outside[2]) : inside;
 }
 
-START_TEST(a_box_has_the_distances_of_a_box)
+START_TEST(test_map_of_box_matches_formula)
 {
     const double low[3] = { -1, 0, 2 }, high[3] = { 1, 3, 2.5 };
     const double around[2][3] = { { -2.1, -1.3, 1.1 }, { 2.3, 4.2, 3.3 } };
-    const uint64_t count[3] = { 37, 21, 50 }; /* bricks that are not full, on all axes */
+    const uint64_t count[3] = { 37, 21, 50 }; /* incomplete bricks on all axes */
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_lattice l;
     opened o = open_model(ebpo_test_box(low, high, 3), -1);
@@ -102,8 +102,8 @@ START_TEST(a_box_has_the_distances_of_a_box)
 }
 END_TEST
 
-/* Skewed, in two ways of loading, on one thread and many: each value is what one question says. */
-START_TEST(values_are_those_of_single_questions)
+/* Skewed, in two loading modes, on one thread and many: each value equals a single query. */
+START_TEST(test_map_values_match_single_queries)
 {
     const ebpo_lattice l = { { -3, -3, -1.5 },
                              { { 0.31, 0.05, 0 }, { 0, 0.41, 0.02 }, { 0.01, 0, 0.19 } },
@@ -141,7 +141,7 @@ START_TEST(values_are_those_of_single_questions)
 }
 END_TEST
 
-START_TEST(points_in_any_order_get_their_own_distances)
+START_TEST(test_map_points_in_any_order)
 {
     enum { COUNT = 10000 };
     static double points[COUNT][3], all[COUNT], none[COUNT];
@@ -167,7 +167,7 @@ START_TEST(points_in_any_order_get_their_own_distances)
 }
 END_TEST
 
-START_TEST(what_cannot_be_mapped_is_refused)
+START_TEST(test_map_invalid_input_is_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_lattice l = { { 0, 0, 0 }, { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, { 1, 1, 1 } };
@@ -188,7 +188,7 @@ START_TEST(what_cannot_be_mapped_is_refused)
     ck_assert_int_eq(ebpo_map_lattice(o.model, &l, NULL, keep, &k, &error), EBPO_E_ARGUMENT);
     l = (ebpo_lattice){ { 0, 0, 0 }, { { 0 } }, { UINT64_MAX, UINT64_MAX, 2 } };
     ck_assert_int_eq(ebpo_map_lattice(o.model, &l, NULL, keep, &k, &error), EBPO_E_ARGUMENT);
-    /* not at right angles: NRRD alone holds it; nothing is left of the attempt */
+    /* not at right angles: only NRRD supports it; the failed attempt leaves no file */
     l = (ebpo_lattice){ { 0, 0, 0 }, { { 1, 0, 0 }, { 1, 1, 0 }, { 0, 0, 1 } }, { 2, 2, 2 } };
     int before = scratch_entries();
     ck_assert_int_eq(ebpo_map_write(o.model, &l, scratch("f"), EBPO_MAP_VTKHDF, NULL, &stats,
@@ -230,10 +230,10 @@ static void check_stats(const double *values, int count, double scale)
     ck_assert_double_eq_tol(s.mean / scale, (double)(sum / count), 1e-15);
     ck_assert_double_eq_tol(s.mean_unsigned / scale, (double)(size / count), 1e-15);
     ck_assert_double_eq_tol(s.rms / scale, (double)sqrtl(square / count), 1e-15);
-    ck_assert_double_eq_tol(s.deviation / scale,
+    ck_assert_double_eq_tol(s.error_bound / scale,
                             (double)sqrtl(square / count - sum / count * (sum / count)), 1e-14);
     for (int i = 0; i < EBPO_MAP_PERCENTILES; i++) {
-        int below = 0; /* the least value that so many percent do not exceed */
+        int below = 0; /* the least value that this percentage does not exceed */
         while ((below + 1) * 100 < ebpo_map_percent(i) * count)
             below++;
         ck_assert(s.percentile[i] == sorted[below]);
@@ -241,7 +241,7 @@ static void check_stats(const double *values, int count, double scale)
     free(sorted);
 }
 
-START_TEST(statistics_are_those_of_plain_sums)
+START_TEST(test_map_statistics_match_reference)
 {
     enum { COUNT = 999 };
     double values[COUNT];
@@ -255,12 +255,12 @@ START_TEST(statistics_are_those_of_plain_sums)
         check_stats(values, 1, scales[k]);
     }
     for (int i = 0; i < COUNT; i++)
-        values[i] = 1e308; /* whose sum is no double */
+        values[i] = 1e308; /* whose sum exceeds doubles */
     check_stats(values, COUNT, 1e308);
 }
 END_TEST
 
-START_TEST(what_is_beyond_is_counted_apart)
+START_TEST(test_map_counts_values_beyond_limit)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_map_stats s = EBPO_MAP_STATS_INIT;
@@ -296,13 +296,13 @@ static double reach_of_samples(ebpo_model *model, const ebpo_mesh *m, int steps)
     return s.farthest;
 }
 
-/* A triangle whose corners are close to the model and whose middle is not; and a turned torus. */
-START_TEST(reaches_hold_between_vertices)
+/* A triangle whose corners are close to the model and whose middle is not; and a rotated torus. */
+START_TEST(test_map_error_bounds_hold_between_vertices)
 {
     for (int which = 0; which < 2; which++) {
         ebpo_error error = EBPO_ERROR_INIT;
-        ebpo_map_reach one = EBPO_MAP_REACH_INIT, many = EBPO_MAP_REACH_INIT;
-        ebpo_map_reach_options options = EBPO_MAP_REACH_OPTIONS_INIT;
+        ebpo_map_range one = EBPO_MAP_RANGE_INIT, many = EBPO_MAP_RANGE_INIT;
+        ebpo_map_range_options options = EBPO_MAP_RANGE_OPTIONS_INIT;
         const double turned[3][3] = { { 0.8, -0.6, 0 }, { 0.6, 0.8, 0 }, { 0, 0, 1 } },
                      moved[3] = { 0.01, 0.02, 0.03 };
         double away[2000];
@@ -312,27 +312,27 @@ START_TEST(reaches_hold_between_vertices)
         model_must(ebpo_map_points(o.model, m.xyz64, m.vertex_count, NULL, away, &error), "map",
                    &error);
         options.tolerance = 0.02;
-        options.questions = 2000000;
+        options.queries = 2000000;
         options.threads = 1;
-        model_must(ebpo_map_find_reach(o.model, &m, away, &options, &one, &error), "reach", &error);
+        model_must(ebpo_map_find_range(o.model, &m, away, &options, &one, &error), "reach", &error);
         options.threads = 4;
-        model_must(ebpo_map_find_reach(o.model, &m, away, &options, &many, &error), "reach",
+        model_must(ebpo_map_find_range(o.model, &m, away, &options, &many, &error), "reach",
                    &error);
         ck_assert_mem_eq(&one, &many, sizeof one);
         double sampled = reach_of_samples(o.model, &m, which ? 24 : 300);
         ck_assert_msg(one.lo <= one.hi && sampled <= one.hi && sampled >= one.lo / 1.03,
                       "%.9g to %.9g, sampled %.9g", one.lo, one.hi, sampled);
         ck_assert_msg(one.hi <= one.lo * 1.0201, "%.9g to %.9g", one.lo, one.hi);
-        ck_assert_uint_gt(one.questions, 0);
-        options.questions = 1; /* not enough: wider, and still certain */
-        model_must(ebpo_map_find_reach(o.model, &m, away, &options, &many, &error), "reach",
+        ck_assert_uint_gt(one.queries, 0);
+        options.queries = 1; /* too few: wider, and still certain */
+        model_must(ebpo_map_find_range(o.model, &m, away, &options, &many, &error), "reach",
                    &error);
         ck_assert(sampled <= many.hi && many.hi >= one.hi && many.lo <= one.lo);
         double widest = many.hi;
-        options.questions = 300; /* spent where the bounds are widest, and no more */
-        model_must(ebpo_map_find_reach(o.model, &m, away, &options, &many, &error), "reach",
+        options.queries = 300; /* used where the bounds are widest, and no more */
+        model_must(ebpo_map_find_range(o.model, &m, away, &options, &many, &error), "reach",
                    &error);
-        ck_assert(sampled <= many.hi && many.hi < widest && many.questions <= 303);
+        ck_assert(sampled <= many.hi && many.hi < widest && many.queries <= 303);
         ebpo_mesh_free(&m);
         close_model(&o);
     }
@@ -341,7 +341,7 @@ END_TEST
 
 /* --- colours --- */
 
-START_TEST(palettes_begin_and_end_as_they_say)
+START_TEST(test_map_palette_end_colours)
 {
     uint8_t c[3], d[3];
     ebpo_map_colour(EBPO_MAP_THESIS, 0, 2, c);
@@ -357,7 +357,7 @@ START_TEST(palettes_begin_and_end_as_they_say)
     ebpo_map_colour(EBPO_MAP_DIVERGING, 0, 2, c);
     ck_assert(abs(c[0] - c[1]) <= 1 && abs(c[1] - c[2]) <= 1);
     double last[2] = { 1e9, 1e9 };
-    for (int i = 0; i <= 64; i++) /* darker from step to step, and alike on both sides */
+    for (int i = 0; i <= 64; i++) /* darker from step to step, and equal on both sides */
         for (int side = 0; side < 2; side++) {
             ebpo_map_colour(EBPO_MAP_DIVERGING, (side ? 2.0 : -2.0) * i / 64, 2, d);
             double luma = 0.2126 * d[0] + 0.7152 * d[1] + 0.0722 * d[2];
@@ -370,7 +370,7 @@ START_TEST(palettes_begin_and_end_as_they_say)
 }
 END_TEST
 
-START_TEST(painted_meshes_come_back_from_ply)
+START_TEST(test_map_painted_mesh_ply_round_trip)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh m = ebpo_test_torus(2, 1, 12, 8), back;
@@ -404,15 +404,15 @@ TEST_SUITE(map)
     TCase *tests = tcase_create("map");
     tcase_set_timeout(tests, 300);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
-    tcase_add_test(tests, a_box_has_the_distances_of_a_box);
-    tcase_add_test(tests, values_are_those_of_single_questions);
-    tcase_add_test(tests, points_in_any_order_get_their_own_distances);
-    tcase_add_test(tests, what_cannot_be_mapped_is_refused);
-    tcase_add_test(tests, statistics_are_those_of_plain_sums);
-    tcase_add_test(tests, what_is_beyond_is_counted_apart);
-    tcase_add_test(tests, reaches_hold_between_vertices);
-    tcase_add_test(tests, palettes_begin_and_end_as_they_say);
-    tcase_add_test(tests, painted_meshes_come_back_from_ply);
+    tcase_add_test(tests, test_map_of_box_matches_formula);
+    tcase_add_test(tests, test_map_values_match_single_queries);
+    tcase_add_test(tests, test_map_points_in_any_order);
+    tcase_add_test(tests, test_map_invalid_input_is_refused);
+    tcase_add_test(tests, test_map_statistics_match_reference);
+    tcase_add_test(tests, test_map_counts_values_beyond_limit);
+    tcase_add_test(tests, test_map_error_bounds_hold_between_vertices);
+    tcase_add_test(tests, test_map_palette_end_colours);
+    tcase_add_test(tests, test_map_painted_mesh_ply_round_trip);
     suite_add_tcase(suite, tests);
     return suite;
 }

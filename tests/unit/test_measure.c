@@ -1,5 +1,5 @@
-/* Area, volume, centroid and inertia, held against closed forms and against the mesh's own
- * integrals in rational numbers. */
+/* Area, volume, centroid and inertia, against closed forms and integrals of the mesh in rational
+ * numbers. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -36,14 +36,14 @@ static ebpo_mesh copy_of(const ebpo_mesh *mesh)
     return copy;
 }
 
-/* A file made of the mesh, which stays the caller's. */
+/* Makes a file of the mesh, which the caller keeps. */
 static ebpo_rule file_rule;
 
 static ebpo_file *file_of(const ebpo_mesh *mesh, uint32_t parts)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh_report report;
-    ebpo_mend_record mend = { 0 };
+    ebpo_repair_record repair_record = { 0 };
     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_tree tree;
@@ -53,8 +53,8 @@ static ebpo_file *file_of(const ebpo_mesh *mesh, uint32_t parts)
     options.rule = file_rule;
     ck_assert_msg(ebpo_mesh_check(mesh, 0, options.progress, &report, &error) == EBPO_OK, "%s",
                   error.message);
-    ck_assert_msg(ebpo_build(&copy, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
-                  error.message);
+    ck_assert_msg(ebpo_build(&copy, &report, &repair_record, &options, &tree, &error) == EBPO_OK,
+                  "%s", error.message);
     ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
     ebpo_tree_free(&tree);
     ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s", error.message);
@@ -91,7 +91,7 @@ static void assert_near(double value, double expected, double size, const char *
                   expected);
 }
 
-/* `reach`: the model's size, for centroids near 0. */
+/* `reach`: size of the model, for centroids near 0. */
 static void assert_masses_near(const ebpo_mass *m, const ebpo_mass *expected, double reach)
 {
     double trace = fabs(expected->inertia[0][0]) + fabs(expected->inertia[1][1]) +
@@ -106,7 +106,8 @@ static void assert_masses_near(const ebpo_mass *m, const ebpo_mass *expected, do
     }
 }
 
-/* --- the twin: moments about the origin, exactly, then moved to the centroid --- */
+/* --- the reference implementation: exact moments about the origin, then moved to the centroid ---
+ */
 
 typedef struct exact_moments {
     mpq_t volume, first[3], second[3][3];
@@ -183,9 +184,9 @@ static void add_area(exact_moments *m, mpq_t p[3][3])
     mpf_clear(root);
 }
 
-/* The tetrahedron of the origin and a face: over its affine parameters the integral of x y is det /
- * 120 times the sum of a_x b_y over all pairs of corners, equal ones twice; written out as such a
- * sum. */
+/* Adds the tetrahedron of the origin and a face: over its affine parameters the integral of x y is
+ * det / 120 times the sum of a_x b_y over all pairs of corners, equal ones twice; computed as such
+ * a sum. */
 static void add_tetrahedron(exact_moments *m, mpq_t p[3][3])
 {
     mpq_t n[3], det, term, share;
@@ -241,7 +242,7 @@ static void move_to_centroid(exact_moments *m, ebpo_mass *out)
     mpq_clear(trace);
 }
 
-static ebpo_mass twin_of(const ebpo_mesh *mesh)
+static ebpo_mass reference_of(const ebpo_mesh *mesh)
 {
     exact_moments m;
     ebpo_mass out = EBPO_MASS_INIT;
@@ -300,7 +301,7 @@ static void move_mesh(ebpo_mesh *mesh, double by)
 
 /* --- tests --- */
 
-START_TEST(boxes_have_the_mass_of_boxes)
+START_TEST(test_mass_of_boxes)
 {
     static const double corners[][2][3] = { { { 0, 0, 0 }, { 1, 1, 1 } },
                                             { { -1, 2, 3 }, { 4, 2.5, 11 } },
@@ -316,7 +317,7 @@ END_TEST
 
 /* Corners 0, (3, 0, 0), (0, 3, 0), (0, 0, 3): volume 27 / 6, second moments s^5 / 60 and s^5 / 120
  * about the corner. */
-START_TEST(a_tetrahedron_has_the_mass_of_a_tetrahedron)
+START_TEST(test_mass_of_tetrahedron)
 {
     ebpo_mesh mesh = { .xyz64 = calloc(1, 1), .faces = calloc(1, 1) };
     ebpo_test_append_vertex(&mesh, 0, 0, 0);
@@ -341,16 +342,16 @@ START_TEST(a_tetrahedron_has_the_mass_of_a_tetrahedron)
 }
 END_TEST
 
-START_TEST(masses_are_the_exact_integrals_of_the_mesh)
+START_TEST(test_mass_matches_exact_integrals)
 {
     for (int i = 0; i < ebpo_test_solid_count; i++) {
         if (!ebpo_test_solids[i].balanced)
             continue;
         ebpo_mesh mesh = ebpo_test_solids[i].make();
         if (mesh.face_count && mesh.face_count <= 6000) {
-            ebpo_mass m = mass_of(&mesh), expected = twin_of(&mesh);
+            ebpo_mass m = mass_of(&mesh), expected = reference_of(&mesh);
             assert_near(m.integral, expected.volume, fabs(expected.volume), "integral");
-            if (isnan(m.volume)) /* the rest is of the winding number as a density */
+            if (isnan(m.volume)) /* the rest uses the winding number as a density */
                 m.volume = m.integral;
             if (same(m.volume, m.integral) && m.volume != 0)
                 assert_masses_near(&m, &expected, 1);
@@ -363,35 +364,35 @@ START_TEST(masses_are_the_exact_integrals_of_the_mesh)
 }
 END_TEST
 
-START_TEST(spheres_far_away_keep_their_mass)
+START_TEST(test_mass_of_distant_spheres)
 {
     const double centre[3] = { .125, -.5, 3 };
     ebpo_mesh mesh = ebpo_test_sphere(centre, 1, 3);
     for (int far = 0; far < 2; far++) {
         move_mesh(&mesh, far ? 1e7 : 0);
-        ebpo_mass m = mass_of(&mesh), expected = twin_of(&mesh);
+        ebpo_mass m = mass_of(&mesh), expected = reference_of(&mesh);
         assert_masses_near(&m, &expected, 1);
     }
     ebpo_mesh_free(&mesh);
 }
 END_TEST
 
-/* A thin plate across the space that it fills hardly: volumes cancel nearly wholly when measured
- * from afar. */
-START_TEST(thin_plates_keep_their_mass)
+/* A thin plate across the space that it hardly fills: volumes cancel almost completely when
+ * measured from far away. */
+START_TEST(test_mass_of_thin_plates)
 {
     const double low[3] = { 0, 0, 0 }, high[3] = { 1000, 1000, 0x1p-30 };
     const double turn[3][3] = { { .8, -.36, .48 }, { .6, .48, -.64 }, { 0, .8, .6 } },
                  offset[3] = { 3, 4, 5 };
     ebpo_mesh mesh = ebpo_test_box(low, high, 4);
     ebpo_test_transform(&mesh, turn, offset);
-    ebpo_mass m = mass_of(&mesh), expected = twin_of(&mesh);
+    ebpo_mass m = mass_of(&mesh), expected = reference_of(&mesh);
     assert_masses_near(&m, &expected, 1);
     ebpo_mesh_free(&mesh);
 }
 END_TEST
 
-START_TEST(powers_of_two_scale_masses_exactly)
+START_TEST(test_mass_scales_by_powers_of_two)
 {
     ebpo_mesh mesh = ebpo_test_torus(2, .75, 31, 17);
     ebpo_mass m = mass_of(&mesh);
@@ -412,7 +413,7 @@ START_TEST(powers_of_two_scale_masses_exactly)
 }
 END_TEST
 
-START_TEST(what_does_not_fit_becomes_infinite_or_zero)
+START_TEST(test_mass_overflow_and_underflow)
 {
     static const double sizes[] = { 1e100, 1e-100, 1e120, 1e-120, 1e160, 1e-160 };
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
@@ -437,14 +438,14 @@ START_TEST(what_does_not_fit_becomes_infinite_or_zero)
 }
 END_TEST
 
-START_TEST(shells_within_shells_add_up)
+START_TEST(test_mass_of_nested_shells)
 {
     const double low[3] = { 0, 0, 0 }, high[3] = { 8, 8, 8 }, low_hole[3] = { 1, 2, 3 },
                  high_hole[3] = { 4, 6, 5 };
     ebpo_mesh mesh = ebpo_test_box(low, high, 2), hole = ebpo_test_box(low_hole, high_hole, 1);
     ebpo_test_reverse(&hole);
     ebpo_test_append(&mesh, &hole);
-    ebpo_mass m = mass_of(&mesh), expected = twin_of(&mesh), outer = box_mass(low, high),
+    ebpo_mass m = mass_of(&mesh), expected = reference_of(&mesh), outer = box_mass(low, high),
               inner = box_mass(low_hole, high_hole);
     assert_masses_near(&m, &expected, 8);
     assert_near(m.volume, outer.volume - inner.volume, outer.volume, "volume");
@@ -459,8 +460,7 @@ START_TEST(shells_within_shells_add_up)
 }
 END_TEST
 
-/* Returns the mass of the cube from 0 to 4 in which there is one from 1 to 2, each turned or not.
- */
+/* Returns the mass of the cube from 0 to 4 that contains one from 1 to 2, each reversed or not. */
 static ebpo_mass mass_of_two(bool turn_outer, bool turn_inner, ebpo_rule rule)
 {
     static const double low[3] = { 0, 0, 0 }, high[3] = { 4, 4, 4 }, low_in[3] = { 1, 1, 1 },
@@ -479,9 +479,9 @@ static ebpo_mass mass_of_two(bool turn_outer, bool turn_inner, ebpo_rule rule)
     return m;
 }
 
-/* By outer and inner as they are or turned, and by rule: winding numbers are 1, 2; 1, 0; -1, 0;
- * -1, -2. */
-START_TEST(masses_are_those_of_the_points_that_the_rule_puts_inside)
+/* By outer and inner cube, original or reversed, and by rule: winding numbers are 1, 2; 1, 0; -1,
+ * 0; -1, -2. */
+START_TEST(test_mass_follows_inside_rule)
 {
     static const double volumes[4][3] = {
         { 64, 63, 64 }, { 63, 63, 63 }, { 63, 63, 0 }, { 64, 63, 0 }
@@ -504,7 +504,7 @@ START_TEST(masses_are_those_of_the_points_that_the_rule_puts_inside)
 }
 END_TEST
 
-START_TEST(solids_inside_out_have_the_volume_of_what_is_inside)
+START_TEST(test_volume_of_inverted_solids)
 {
     ebpo_mesh mesh = ebpo_test_make("inside_out_cube");
     ebpo_mass m = mass_of(&mesh);
@@ -514,7 +514,7 @@ START_TEST(solids_inside_out_have_the_volume_of_what_is_inside)
 }
 END_TEST
 
-START_TEST(surfaces_have_an_area_only)
+START_TEST(test_surface_mass_has_area_only)
 {
     ebpo_mesh mesh = ebpo_test_sheet(3, 4);
     ebpo_mass m = mass_of(&mesh), none = EBPO_MASS_INIT;
@@ -527,8 +527,8 @@ START_TEST(surfaces_have_an_area_only)
 }
 END_TEST
 
-/* Two sides of one sheet: a solid of volume 0, also where rounding would leave something. */
-START_TEST(solids_without_volume_have_no_centroid)
+/* Two sides of one sheet: a solid of volume 0, also when rounding would leave something. */
+START_TEST(test_zero_volume_solid_has_no_centroid)
 {
     ebpo_mesh mesh = ebpo_test_sheet(.7, 5), back = ebpo_test_sheet(.7, 5);
     const double turn[3][3] = { { .3, -.7, .2 }, { .1, .45, -.64 }, { .9, .8, .6 } },
@@ -543,7 +543,7 @@ START_TEST(solids_without_volume_have_no_centroid)
 }
 END_TEST
 
-START_TEST(volumes_by_unknown_rules_are_refused)
+START_TEST(test_volume_with_unknown_rule_is_refused)
 {
     static const int rules[] = { 3, 1 << 20, -1 };
     ebpo_mesh_report report = { .balanced = true, .manifold = true, .components = 2, .volume = 1 };
@@ -562,7 +562,7 @@ START_TEST(volumes_by_unknown_rules_are_refused)
 }
 END_TEST
 
-START_TEST(masses_do_not_depend_on_threads)
+START_TEST(test_mass_same_for_any_threads)
 {
     ebpo_mesh mesh = ebpo_test_torus(2, 1, 300, 100);
     ebpo_mass one = mass_on(&mesh, 1), many = mass_on(&mesh, 7);
@@ -571,7 +571,7 @@ START_TEST(masses_do_not_depend_on_threads)
 }
 END_TEST
 
-START_TEST(files_without_mesh_cannot_be_measured)
+START_TEST(test_mass_without_mesh_is_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mass m = EBPO_MASS_INIT;
@@ -590,21 +590,21 @@ TEST_SUITE(measure)
     TCase *tests = tcase_create("mass");
     tcase_set_timeout(tests, 300);
     tcase_add_checked_fixture(tests, make_folder, scratch_leave);
-    tcase_add_test(tests, boxes_have_the_mass_of_boxes);
-    tcase_add_test(tests, a_tetrahedron_has_the_mass_of_a_tetrahedron);
-    tcase_add_test(tests, masses_are_the_exact_integrals_of_the_mesh);
-    tcase_add_test(tests, spheres_far_away_keep_their_mass);
-    tcase_add_test(tests, thin_plates_keep_their_mass);
-    tcase_add_test(tests, powers_of_two_scale_masses_exactly);
-    tcase_add_test(tests, what_does_not_fit_becomes_infinite_or_zero);
-    tcase_add_test(tests, shells_within_shells_add_up);
-    tcase_add_test(tests, solids_inside_out_have_the_volume_of_what_is_inside);
-    tcase_add_test(tests, masses_are_those_of_the_points_that_the_rule_puts_inside);
-    tcase_add_test(tests, surfaces_have_an_area_only);
-    tcase_add_test(tests, solids_without_volume_have_no_centroid);
-    tcase_add_test(tests, masses_do_not_depend_on_threads);
-    tcase_add_test(tests, volumes_by_unknown_rules_are_refused);
-    tcase_add_test(tests, files_without_mesh_cannot_be_measured);
+    tcase_add_test(tests, test_mass_of_boxes);
+    tcase_add_test(tests, test_mass_of_tetrahedron);
+    tcase_add_test(tests, test_mass_matches_exact_integrals);
+    tcase_add_test(tests, test_mass_of_distant_spheres);
+    tcase_add_test(tests, test_mass_of_thin_plates);
+    tcase_add_test(tests, test_mass_scales_by_powers_of_two);
+    tcase_add_test(tests, test_mass_overflow_and_underflow);
+    tcase_add_test(tests, test_mass_of_nested_shells);
+    tcase_add_test(tests, test_volume_of_inverted_solids);
+    tcase_add_test(tests, test_mass_follows_inside_rule);
+    tcase_add_test(tests, test_surface_mass_has_area_only);
+    tcase_add_test(tests, test_zero_volume_solid_has_no_centroid);
+    tcase_add_test(tests, test_mass_same_for_any_threads);
+    tcase_add_test(tests, test_volume_with_unknown_rule_is_refused);
+    tcase_add_test(tests, test_mass_without_mesh_is_refused);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,4 +1,4 @@
-/* Checking and mending meshes. */
+/* Checking and repairing meshes. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -31,10 +31,11 @@ static ebpo_mesh_report check_named(const char *name)
     return report;
 }
 
-static ebpo_mend_record mend(ebpo_mesh *mesh,
-                             ebpo_status (*how)(ebpo_mesh *, ebpo_mend_record *, ebpo_error *))
+static ebpo_repair_record repair_record(ebpo_mesh *mesh,
+                                        ebpo_status (*how)(ebpo_mesh *, ebpo_repair_record *,
+                                                           ebpo_error *))
 {
-    ebpo_mend_record record;
+    ebpo_repair_record record;
     ebpo_error error = EBPO_ERROR_INIT;
     memset(&record, 0, sizeof record);
     ebpo_status status = how(mesh, &record, &error);
@@ -48,7 +49,7 @@ static bool same_report(const ebpo_mesh_report *a, const ebpo_mesh_report *b)
     return memcmp(a, b, sizeof *a) == 0;
 }
 
-START_TEST(every_solid_has_the_stated_properties)
+START_TEST(test_solids_have_expected_properties)
 {
     const ebpo_test_solid *solid = &ebpo_test_solids[_i];
     ebpo_mesh mesh = solid->make();
@@ -64,7 +65,7 @@ START_TEST(every_solid_has_the_stated_properties)
 }
 END_TEST
 
-START_TEST(report_does_not_depend_on_threads)
+START_TEST(test_mesh_report_same_for_any_threads)
 {
     ebpo_mesh mesh = ebpo_test_torus(2, 0.7, 300, 200);
     ebpo_mesh sheet = ebpo_test_sheet(1, 150);
@@ -80,7 +81,7 @@ START_TEST(report_does_not_depend_on_threads)
 }
 END_TEST
 
-START_TEST(cube_is_measured_exactly)
+START_TEST(test_mesh_cube_is_measured_exactly)
 {
     ebpo_mesh_report r = check_named("cube_in_cell_walls");
     ck_assert_uint_eq(r.edges, 3 * 768 / 2);
@@ -94,7 +95,7 @@ START_TEST(cube_is_measured_exactly)
 }
 END_TEST
 
-START_TEST(genus_is_summed_over_components)
+START_TEST(test_genus_is_summed_over_components)
 {
     ebpo_mesh mesh = ebpo_test_torus(2, 0.5, 12, 8), other = ebpo_test_torus(2, 0.5, 9, 7);
     ebpo_mesh ball = ebpo_test_sphere((double[3]){ 9, 0, 0 }, 1, 1);
@@ -110,7 +111,7 @@ START_TEST(genus_is_summed_over_components)
 }
 END_TEST
 
-START_TEST(edges_of_four_faces_are_found)
+START_TEST(test_edges_of_four_faces_are_reported)
 {
     ebpo_mesh_report r = check_named("touching_at_edge");
     ck_assert_uint_eq(r.nonmanifold_edges.count, 1);
@@ -121,7 +122,7 @@ START_TEST(edges_of_four_faces_are_found)
 }
 END_TEST
 
-START_TEST(bowtie_vertex_is_found)
+START_TEST(test_bowtie_vertex_is_reported)
 {
     ebpo_mesh_report r = check_named("touching_at_vertex");
     ck_assert_uint_eq(r.bowtie_vertices.count, 1);
@@ -130,7 +131,7 @@ START_TEST(bowtie_vertex_is_found)
 }
 END_TEST
 
-START_TEST(repeated_faces_are_counted_in_any_rotation_and_orientation)
+START_TEST(test_repeated_faces_in_any_rotation)
 {
     ebpo_mesh_report r = check_named("repeated_faces");
     ck_assert_uint_eq(r.repeated_faces.count, 2);
@@ -141,7 +142,7 @@ START_TEST(repeated_faces_are_counted_in_any_rotation_and_orientation)
 }
 END_TEST
 
-START_TEST(coincident_opposite_faces_are_repeated)
+START_TEST(test_coincident_opposite_faces_are_repeated)
 {
     ebpo_mesh_report r = check_named("coincident_opposite_faces");
     ck_assert_uint_eq(r.repeated_faces.count + r.nonmanifold_edges.count > 0, 1);
@@ -151,7 +152,7 @@ START_TEST(coincident_opposite_faces_are_repeated)
 }
 END_TEST
 
-START_TEST(faces_without_area_are_found_exactly)
+START_TEST(test_zero_area_faces_are_found_exactly)
 {
     ebpo_mesh_report r = check_named("zero_area_face");
     ck_assert_uint_eq(r.zero_area_faces.count, 1);
@@ -172,7 +173,7 @@ START_TEST(faces_without_area_are_found_exactly)
 }
 END_TEST
 
-START_TEST(open_box_has_one_hole)
+START_TEST(test_open_box_has_one_hole)
 {
     ebpo_mesh_report r = check_named("open_box");
     ck_assert_uint_eq(r.boundary_edges.count, 4);
@@ -183,7 +184,7 @@ START_TEST(open_box_has_one_hole)
 }
 END_TEST
 
-START_TEST(flipped_face_gives_misoriented_edges)
+START_TEST(test_flipped_face_gives_misoriented_edges)
 {
     ebpo_mesh_report r = check_named("flipped_face_cube");
     ck_assert_uint_eq(r.misoriented_edges.count, 3);
@@ -192,22 +193,22 @@ START_TEST(flipped_face_gives_misoriented_edges)
 }
 END_TEST
 
-START_TEST(places_are_the_first_ones_ascending)
+START_TEST(test_finding_indices_are_first_ascending)
 {
     ebpo_mesh mesh = ebpo_test_tetrahedra(9);
-    for (int i = 0; i < 6; i++) /* from the top, so that order is not given by luck */
+    for (int i = 0; i < 6; i++) /* from the top, so that the order is not correct by chance */
         ebpo_test_turn_face(&mesh, (uint64_t)(34 - 5 * i));
     ebpo_mesh_report r = check(&mesh);
     ck_assert_uint_eq(r.misoriented_edges.count, 18);
-    for (int i = 1; i < EBPO_FINDING_PLACES; i++)
+    for (int i = 1; i < EBPO_FINDING_LOCATIONS; i++)
         ck_assert(r.misoriented_edges.place[i - 1] <= r.misoriented_edges.place[i]);
-    /* face 9 is turned; 8 shares an edge with it */
+    /* face 9 is reversed; 8 shares an edge with it */
     ck_assert_uint_eq(r.misoriented_edges.place[0], 8);
     ebpo_mesh_free(&mesh);
 }
 END_TEST
 
-START_TEST(unreferenced_vertices_do_not_stretch_the_box)
+START_TEST(test_unreferenced_vertices_do_not_extend_box)
 {
     ebpo_mesh mesh = ebpo_test_tetrahedron(1);
     ebpo_test_append_vertex(&mesh, 100, 0, 0);
@@ -228,7 +229,7 @@ static void expect_error(const ebpo_mesh *mesh, ebpo_status expected, const char
     ck_assert_msg(strstr(error.message, part) != NULL, "%s", error.message);
 }
 
-START_TEST(check_rejects_coordinates_that_are_not_finite)
+START_TEST(test_check_refuses_non_finite_coordinates)
 {
     ebpo_mesh mesh = ebpo_test_tetrahedron(1);
     mesh.xyz64[3 * 2 + 1] = NAN;
@@ -239,7 +240,7 @@ START_TEST(check_rejects_coordinates_that_are_not_finite)
 }
 END_TEST
 
-START_TEST(check_and_mending_reject_index_out_of_range)
+START_TEST(test_check_and_repair_refuse_bad_index)
 {
     ebpo_mesh mesh = ebpo_test_tetrahedron(1);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -252,7 +253,7 @@ START_TEST(check_and_mending_reject_index_out_of_range)
 }
 END_TEST
 
-START_TEST(check_rejects_a_mesh_without_faces)
+START_TEST(test_check_refuses_mesh_without_faces)
 {
     ebpo_mesh mesh = ebpo_test_tetrahedron(1);
     mesh.face_count = 0;
@@ -261,7 +262,7 @@ START_TEST(check_rejects_a_mesh_without_faces)
 }
 END_TEST
 
-START_TEST(weld_undoes_split_vertices)
+START_TEST(test_weld_joins_split_vertices)
 {
     ebpo_mesh mesh = ebpo_test_make("torus");
     uint64_t vertices = mesh.vertex_count;
@@ -270,7 +271,7 @@ START_TEST(weld_undoes_split_vertices)
     ck_assert_uint_eq(r.components, mesh.face_count);
     ck_assert_uint_eq(r.boundary_loops, mesh.face_count);
     uint64_t split = mesh.vertex_count;
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_weld);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_weld);
     ck_assert(record.weld);
     ck_assert_uint_eq(record.welded_vertices, split - vertices);
     ck_assert_uint_eq(mesh.vertex_count, vertices);
@@ -280,7 +281,7 @@ START_TEST(weld_undoes_split_vertices)
 }
 END_TEST
 
-START_TEST(weld_keeps_the_first_and_takes_minus_zero_for_zero)
+START_TEST(test_weld_joins_zero_and_minus_zero)
 {
     ebpo_mesh mesh = ebpo_test_tetrahedron(1);
     ebpo_test_append_vertex(&mesh, -0.0, 0, 0);
@@ -288,7 +289,7 @@ START_TEST(weld_keeps_the_first_and_takes_minus_zero_for_zero)
     ebpo_test_append_vertex(&mesh, 1, -0.0, 0);
     mesh.faces[0] = 4; /* was 0 */
     ebpo_test_append_face(&mesh, 1, 6, 2);
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_weld);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_weld);
     ck_assert_uint_eq(record.welded_vertices, 2);
     ck_assert_uint_eq(mesh.vertex_count, 5);
     ck_assert_uint_eq(mesh.faces[0], 0);
@@ -301,7 +302,7 @@ START_TEST(weld_keeps_the_first_and_takes_minus_zero_for_zero)
 }
 END_TEST
 
-START_TEST(orient_turns_flipped_faces_back)
+START_TEST(test_orient_restores_flipped_faces)
 {
     ebpo_mesh mesh = ebpo_test_make("torus");
     ebpo_mesh_report before = check(&mesh);
@@ -310,7 +311,7 @@ START_TEST(orient_turns_flipped_faces_back)
         if (ebpo_test_random(&state) & 1)
             ebpo_test_turn_face(&mesh, f);
     ck_assert(!check(&mesh).balanced);
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_orient);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_orient);
     ck_assert(record.orient && record.flipped_faces > 0 && record.unorientable_components == 0);
     ebpo_mesh_report r = check(&mesh);
     ck_assert(r.manifold);
@@ -319,33 +320,33 @@ START_TEST(orient_turns_flipped_faces_back)
 }
 END_TEST
 
-START_TEST(orient_gives_a_closed_component_positive_volume_against_the_majority)
+START_TEST(test_orient_closed_component_by_volume)
 {
     ebpo_mesh mesh = ebpo_test_make("inside_out_cube");
     ebpo_test_turn_face(&mesh, 4);
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_orient);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_orient);
     ck_assert_uint_eq(record.flipped_faces, 11);
     ck_assert_double_eq_tol(check(&mesh).volume, 1, 1e-15);
     ebpo_mesh_free(&mesh);
 }
 END_TEST
 
-START_TEST(orient_turns_a_consistent_component_that_is_inside_out)
+START_TEST(test_orient_flips_inverted_component)
 {
     ebpo_mesh mesh = ebpo_test_make("inside_out_cube");
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_orient);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_orient);
     ck_assert_uint_eq(record.flipped_faces, mesh.face_count);
     ck_assert_double_eq_tol(check(&mesh).volume, 1, 1e-15);
-    record = mend(&mesh, ebpo_mesh_flip);
+    record = repair_record(&mesh, ebpo_mesh_flip);
     ck_assert(!record.orient && record.flipped_faces == mesh.face_count);
     ck_assert_double_eq_tol(check(&mesh).volume, -1, 1e-15);
     ebpo_mesh_free(&mesh);
 }
 END_TEST
 
-/* Boxes in boxes, two side by side in the second, in any order and each turned or not; and one that
- * reaches through the outermost, which is in none. */
-START_TEST(orient_turns_outermost_shells_outwards_and_cavities_inwards)
+/* Boxes in boxes, two side by side in the second, in any order and each reversed or not; and one
+ * that extends through the outermost, which is in none. */
+START_TEST(test_orient_outer_shells_and_cavities)
 {
     static const double low[6][3] = { { 0, 0, 0 }, { 1, 1, 1 }, { 2, 2, 2 },
                                       { 6, 2, 2 }, { 3, 3, 3 }, { 9, 4.5, 4.5 } };
@@ -368,15 +369,15 @@ START_TEST(orient_turns_outermost_shells_outwards_and_cavities_inwards)
         }
         if (round % 3)
             ebpo_test_shuffle(&mesh, ebpo_test_random(&state));
-        mend(&mesh, ebpo_mesh_orient);
+        repair_record(&mesh, ebpo_mesh_orient);
         ck_assert_double_eq_tol(check(&mesh).volume, right, 1e-9);
-        ck_assert_uint_eq(mend(&mesh, ebpo_mesh_orient).flipped_faces, 0);
+        ck_assert_uint_eq(repair_record(&mesh, ebpo_mesh_orient).flipped_faces, 0);
         ebpo_shells s = EBPO_SHELLS_INIT;
         ebpo_error error = EBPO_ERROR_INIT;
         ck_assert(ebpo_mesh_count_shells(&mesh, 2, (ebpo_progress){ NULL, NULL }, &s, &error) ==
                   EBPO_OK);
         ck_assert(s.closed == 6 && s.cavities == 2 && s.inside_out == 0 && s.nested == 0);
-        mend(&mesh, ebpo_mesh_flip);
+        repair_record(&mesh, ebpo_mesh_flip);
         ck_assert(ebpo_mesh_count_shells(&mesh, 0, (ebpo_progress){ NULL, NULL }, &s, &error) ==
                   EBPO_OK);
         ck_assert(s.closed == 6 && s.cavities == 0 && s.inside_out == 4 && s.nested == 2);
@@ -385,11 +386,11 @@ START_TEST(orient_turns_outermost_shells_outwards_and_cavities_inwards)
 }
 END_TEST
 
-START_TEST(orient_leaves_consistent_components_alone)
+START_TEST(test_orient_keeps_consistent_components)
 {
     ebpo_mesh mesh = ebpo_test_make("cavity");
     ebpo_mesh_report before = check(&mesh);
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_orient);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_orient);
     ck_assert_uint_eq(record.flipped_faces, 0);
     ebpo_mesh_report after = check(&mesh);
     ck_assert(same_report(&before, &after));
@@ -397,19 +398,19 @@ START_TEST(orient_leaves_consistent_components_alone)
 }
 END_TEST
 
-START_TEST(orient_lets_the_majority_of_an_open_surface_win)
+START_TEST(test_orient_open_surface_by_majority)
 {
     ebpo_mesh mesh = ebpo_test_sheet(1, 4);
-    ebpo_test_turn_face(&mesh, 0); /* the seed of the walk is in the minority */
+    ebpo_test_turn_face(&mesh, 0); /* the first face of the traversal is in the minority */
     ebpo_test_turn_face(&mesh, 9);
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_orient);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_orient);
     ck_assert_uint_eq(record.flipped_faces, 2);
     ck_assert_uint_eq(check(&mesh).misoriented_edges.count, 0);
     ebpo_mesh_free(&mesh);
 }
 END_TEST
 
-START_TEST(orient_leaves_a_mobius_strip_untouched)
+START_TEST(test_orient_keeps_mobius_strip)
 {
     ebpo_mesh mesh = ebpo_test_make("mobius");
     ck_assert_uint_gt(check(&mesh).misoriented_edges.count, 0);
@@ -417,7 +418,7 @@ START_TEST(orient_leaves_a_mobius_strip_untouched)
     uint32_t *faces = malloc(size);
     ck_assert_ptr_nonnull(faces);
     memcpy(faces, mesh.faces, size);
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_orient);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_orient);
     ck_assert_uint_eq(record.unorientable_components, 1);
     ck_assert_uint_eq(record.flipped_faces, 0);
     ck_assert(memcmp(faces, mesh.faces, size) == 0);
@@ -426,10 +427,10 @@ START_TEST(orient_leaves_a_mobius_strip_untouched)
 }
 END_TEST
 
-START_TEST(fill_closes_the_open_box)
+START_TEST(test_fill_closes_open_box)
 {
     ebpo_mesh mesh = ebpo_test_make("open_box");
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_fill_holes);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_fill_holes);
     ck_assert(record.fill_holes);
     ck_assert_uint_eq(record.filled_holes, 1);
     ck_assert_uint_eq(record.added_faces, 2);
@@ -441,16 +442,16 @@ START_TEST(fill_closes_the_open_box)
 }
 END_TEST
 
-/* A cylinder without lids whose rim has n edges: lids by least area up to 256 edges, by ears
- * beyond. */
-START_TEST(fill_closes_both_ends_of_a_tube)
+/* A cylinder without lids whose rim has n edges: lids by least area up to 256 edges, by ears above.
+ */
+START_TEST(test_fill_closes_both_tube_ends)
 {
     static const uint32_t sizes[] = { 3, 4, 20, 256, 257, 3000 };
     uint32_t n = sizes[_i];
     ebpo_mesh mesh = ebpo_test_band(n, false);
-    /* of the polygon of radius 2; the tube is 1 high */
+    /* area of the polygon of radius 2; the tube is 1 high */
     double area = n / 2.0 * sin(2 * acos(-1) / n) * 4;
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_fill_holes);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_fill_holes);
     ck_assert_uint_eq(record.filled_holes, 2);
     ck_assert_uint_eq(record.added_faces, 2 * (n - 2));
     ebpo_mesh_report r = check(&mesh);
@@ -460,13 +461,13 @@ START_TEST(fill_closes_both_ends_of_a_tube)
 }
 END_TEST
 
-START_TEST(fill_closes_holes_that_share_a_vertex)
+START_TEST(test_fill_closes_holes_sharing_vertex)
 {
     ebpo_mesh mesh = ebpo_test_box((double[3]){ 0, 0, 0 }, (double[3]){ 1, 1, 1 }, 4);
     ebpo_mesh_report whole = check(&mesh);
     uint64_t kept = 0;
     for (uint64_t f = 0; f < mesh.face_count;
-         f++) { /* two squares of one side that meet at a corner */
+         f++) { /* two squares on one side with a common corner */
         uint64_t pair = f / 2;
         if (pair != 10 && pair != 20)
             memcpy(mesh.faces + 3 * kept++, mesh.faces + 3 * f, 3 * sizeof *mesh.faces);
@@ -475,7 +476,7 @@ START_TEST(fill_closes_holes_that_share_a_vertex)
     ebpo_mesh_report open = check(&mesh);
     ck_assert_uint_eq(open.boundary_edges.count, 8);
     ck_assert_uint_eq(open.boundary_loops, 2);
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_fill_holes);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_fill_holes);
     ck_assert_uint_eq(record.filled_holes, 2);
     ebpo_mesh_report r = check(&mesh);
     ck_assert(r.manifold);
@@ -484,7 +485,7 @@ START_TEST(fill_closes_holes_that_share_a_vertex)
 }
 END_TEST
 
-START_TEST(fill_balances_random_holes)
+START_TEST(test_fill_balances_random_holes)
 {
     uint64_t state = 11;
     for (int round = 0; round < 50; round++) {
@@ -492,7 +493,7 @@ START_TEST(fill_balances_random_holes)
         ebpo_test_shuffle(&mesh, ebpo_test_random(&state));
         mesh.face_count -= 1 + ebpo_test_random(&state) % 250;
         ebpo_mesh_report open = check(&mesh);
-        ebpo_mend_record record = mend(&mesh, ebpo_mesh_fill_holes);
+        ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_fill_holes);
         ck_assert_uint_eq(record.filled_holes, open.boundary_loops);
         ck_assert_uint_eq(record.unfilled_holes, 0);
         ck_assert(check(&mesh).balanced);
@@ -501,23 +502,23 @@ START_TEST(fill_balances_random_holes)
 }
 END_TEST
 
-START_TEST(fill_counts_chains_that_do_not_close)
+START_TEST(test_fill_counts_open_chains)
 {
     ebpo_mesh mesh = ebpo_test_sheet(1, 2);
     ebpo_test_turn_face(&mesh, 0);
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_fill_holes);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_fill_holes);
     ck_assert_uint_gt(record.unfilled_holes, 0);
     ebpo_mesh_free(&mesh);
 }
 END_TEST
 
-START_TEST(vertex_of_many_faces_takes_no_quadratic_time)
+START_TEST(test_high_valence_vertex_is_not_quadratic)
 {
     ebpo_mesh mesh = ebpo_test_cone(1, 1, 300000);
     ebpo_test_turn_face(&mesh, 77);
     mesh.face_count -= 100;
-    mend(&mesh, ebpo_mesh_orient);
-    mend(&mesh, ebpo_mesh_fill_holes);
+    repair_record(&mesh, ebpo_mesh_orient);
+    repair_record(&mesh, ebpo_mesh_fill_holes);
     ck_assert(check(&mesh).balanced);
     ebpo_mesh_free(&mesh);
 }
@@ -530,7 +531,7 @@ typedef struct model {
     uint64_t boundary, nonmanifold, misoriented, bowties, shells, zero_area, repeated, unused,
         positions;
     int64_t genus; /* -1: not a closed 2-manifold */
-    double volume; /* NAN: does not balance */
+    double volume; /* NAN: not balanced */
 } model;
 
 static const model models[] = {
@@ -580,7 +581,7 @@ static ebpo_mesh read_model(const char *name)
         }                                                                       \
     } while (0)
 
-START_TEST(real_models_have_the_known_counts)
+START_TEST(test_real_models_have_known_counts)
 {
     const model *m = &models[_i];
     int bad = 0;
@@ -605,7 +606,7 @@ START_TEST(real_models_have_the_known_counts)
 }
 END_TEST
 
-START_TEST(filled_scans_are_balanced)
+START_TEST(test_filled_scans_are_balanced)
 {
     static const struct {
         const char *name;
@@ -615,7 +616,7 @@ START_TEST(filled_scans_are_balanced)
     ebpo_mesh_report open = check(&mesh);
     if (scans[_i].holes)
         ck_assert_uint_eq(open.boundary_loops, scans[_i].holes);
-    ebpo_mend_record record = mend(&mesh, ebpo_mesh_fill_holes);
+    ebpo_repair_record record = repair_record(&mesh, ebpo_mesh_fill_holes);
     ck_assert_uint_eq(record.filled_holes, open.boundary_loops);
     ck_assert_uint_eq(record.unfilled_holes, 0);
     ebpo_mesh_report r = check(&mesh);
@@ -628,47 +629,47 @@ END_TEST
 TEST_SUITE(mesh)
 {
     Suite *suite = suite_create("mesh");
-    TCase *checking = tcase_create("checking"), *mending = tcase_create("mending");
+    TCase *checking = tcase_create("checking"), *repairing = tcase_create("repairing");
     tcase_set_timeout(checking, 60);
-    tcase_set_timeout(mending, 120);
-    tcase_add_loop_test(checking, every_solid_has_the_stated_properties, 0, ebpo_test_solid_count);
-    tcase_add_test(checking, report_does_not_depend_on_threads);
-    tcase_add_test(checking, cube_is_measured_exactly);
-    tcase_add_test(checking, genus_is_summed_over_components);
-    tcase_add_test(checking, edges_of_four_faces_are_found);
-    tcase_add_test(checking, bowtie_vertex_is_found);
-    tcase_add_test(checking, repeated_faces_are_counted_in_any_rotation_and_orientation);
-    tcase_add_test(checking, coincident_opposite_faces_are_repeated);
-    tcase_add_test(checking, faces_without_area_are_found_exactly);
-    tcase_add_test(checking, open_box_has_one_hole);
-    tcase_add_test(checking, flipped_face_gives_misoriented_edges);
-    tcase_add_test(checking, places_are_the_first_ones_ascending);
-    tcase_add_test(checking, unreferenced_vertices_do_not_stretch_the_box);
-    tcase_add_test(checking, check_rejects_coordinates_that_are_not_finite);
-    tcase_add_test(checking, check_and_mending_reject_index_out_of_range);
-    tcase_add_test(checking, check_rejects_a_mesh_without_faces);
-    tcase_add_test(mending, weld_undoes_split_vertices);
-    tcase_add_test(mending, weld_keeps_the_first_and_takes_minus_zero_for_zero);
-    tcase_add_test(mending, orient_turns_flipped_faces_back);
-    tcase_add_test(mending, orient_gives_a_closed_component_positive_volume_against_the_majority);
-    tcase_add_test(mending, orient_turns_a_consistent_component_that_is_inside_out);
-    tcase_add_test(mending, orient_turns_outermost_shells_outwards_and_cavities_inwards);
-    tcase_add_test(mending, orient_leaves_consistent_components_alone);
-    tcase_add_test(mending, orient_lets_the_majority_of_an_open_surface_win);
-    tcase_add_test(mending, orient_leaves_a_mobius_strip_untouched);
-    tcase_add_test(mending, fill_closes_the_open_box);
-    tcase_add_loop_test(mending, fill_closes_both_ends_of_a_tube, 0, 6);
-    tcase_add_test(mending, fill_closes_holes_that_share_a_vertex);
-    tcase_add_test(mending, fill_balances_random_holes);
-    tcase_add_test(mending, fill_counts_chains_that_do_not_close);
-    tcase_add_test(mending, vertex_of_many_faces_takes_no_quadratic_time);
+    tcase_set_timeout(repairing, 120);
+    tcase_add_loop_test(checking, test_solids_have_expected_properties, 0, ebpo_test_solid_count);
+    tcase_add_test(checking, test_mesh_report_same_for_any_threads);
+    tcase_add_test(checking, test_mesh_cube_is_measured_exactly);
+    tcase_add_test(checking, test_genus_is_summed_over_components);
+    tcase_add_test(checking, test_edges_of_four_faces_are_reported);
+    tcase_add_test(checking, test_bowtie_vertex_is_reported);
+    tcase_add_test(checking, test_repeated_faces_in_any_rotation);
+    tcase_add_test(checking, test_coincident_opposite_faces_are_repeated);
+    tcase_add_test(checking, test_zero_area_faces_are_found_exactly);
+    tcase_add_test(checking, test_open_box_has_one_hole);
+    tcase_add_test(checking, test_flipped_face_gives_misoriented_edges);
+    tcase_add_test(checking, test_finding_indices_are_first_ascending);
+    tcase_add_test(checking, test_unreferenced_vertices_do_not_extend_box);
+    tcase_add_test(checking, test_check_refuses_non_finite_coordinates);
+    tcase_add_test(checking, test_check_and_repair_refuse_bad_index);
+    tcase_add_test(checking, test_check_refuses_mesh_without_faces);
+    tcase_add_test(repairing, test_weld_joins_split_vertices);
+    tcase_add_test(repairing, test_weld_joins_zero_and_minus_zero);
+    tcase_add_test(repairing, test_orient_restores_flipped_faces);
+    tcase_add_test(repairing, test_orient_closed_component_by_volume);
+    tcase_add_test(repairing, test_orient_flips_inverted_component);
+    tcase_add_test(repairing, test_orient_outer_shells_and_cavities);
+    tcase_add_test(repairing, test_orient_keeps_consistent_components);
+    tcase_add_test(repairing, test_orient_open_surface_by_majority);
+    tcase_add_test(repairing, test_orient_keeps_mobius_strip);
+    tcase_add_test(repairing, test_fill_closes_open_box);
+    tcase_add_loop_test(repairing, test_fill_closes_both_tube_ends, 0, 6);
+    tcase_add_test(repairing, test_fill_closes_holes_sharing_vertex);
+    tcase_add_test(repairing, test_fill_balances_random_holes);
+    tcase_add_test(repairing, test_fill_counts_open_chains);
+    tcase_add_test(repairing, test_high_valence_vertex_is_not_quadratic);
     suite_add_tcase(suite, checking);
-    suite_add_tcase(suite, mending);
+    suite_add_tcase(suite, repairing);
     if (getenv("EBPO_MODELS")) {
         TCase *real = tcase_create("real models");
         tcase_set_timeout(real, 300);
-        tcase_add_loop_test(real, real_models_have_the_known_counts, 0, MODEL_COUNT);
-        tcase_add_loop_test(real, filled_scans_are_balanced, 0, 3);
+        tcase_add_loop_test(real, test_real_models_have_known_counts, 0, MODEL_COUNT);
+        tcase_add_loop_test(real, test_filled_scans_are_balanced, 0, 3);
         suite_add_tcase(suite, real);
     }
     return suite;

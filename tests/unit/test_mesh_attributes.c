@@ -1,5 +1,5 @@
-/* What a PLY says beyond positions and corners: read in each encoding, carried through building,
- * writing and reading, cut and joined with the mesh, and written again as it came. */
+/* Data of a PLY besides positions and corners: read in each encoding, kept by building, writing and
+ * reading, split and merged with the mesh, and written unchanged. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,10 +21,10 @@ static ebpo_error error = EBPO_ERROR_INIT;
 
 static void fine(ebpo_status status) { ck_assert_msg(status == EBPO_OK, "%s", error.message); }
 
-/* --- PLY files with properties at random: the same seed says the same in each encoding --- */
+/* --- PLY files with random properties: the same seed gives the same data in each encoding --- */
 
 enum { ASCII, LITTLE, BIG, ENCODINGS };
-enum { MOST_PROPERTIES = 12 };
+enum { MAX_PROPERTIES = 12 };
 
 typedef struct random_property {
     char name[24];
@@ -35,7 +35,7 @@ typedef struct random_property {
 
 typedef struct random_element {
     const char *name;
-    random_property property[MOST_PROPERTIES];
+    random_property property[MAX_PROPERTIES];
     int properties;
     uint64_t rows;
 } random_element;
@@ -88,7 +88,7 @@ static void put_value(ply_text *p, int type, uint64_t bits)
     }
 }
 
-/* Numbers of floats are finite: text has one NaN only. */
+/* Floats are finite: text has only one NaN. */
 static uint64_t random_bits(ply_text *p, int type)
 {
     float narrow = (float)draw(p, 1000000) / 1000 - 500;
@@ -264,7 +264,7 @@ static ebpo_mesh small_mesh(void)
     return mesh;
 }
 
-START_TEST(each_encoding_says_the_same)
+START_TEST(test_attributes_same_in_all_encodings)
 {
     ebpo_mesh solid = small_mesh();
     for (uint64_t seed = 1; seed <= 12; seed++) {
@@ -311,7 +311,7 @@ static ebpo_mesh read_back(const char *path)
     return mesh;
 }
 
-START_TEST(a_file_gives_everything_back)
+START_TEST(test_attributes_file_round_trip)
 {
     ebpo_mesh solid = small_mesh();
     for (uint64_t seed = 1; seed <= 8; seed++) {
@@ -329,7 +329,7 @@ START_TEST(a_file_gives_everything_back)
 }
 END_TEST
 
-START_TEST(a_written_ply_is_read_as_what_it_was)
+START_TEST(test_attributes_ply_round_trip)
 {
     ebpo_mesh solid = small_mesh(), again;
     ebpo_mesh_read_options how = EBPO_MESH_READ_OPTIONS_INIT;
@@ -372,7 +372,7 @@ static void same_rows(const ebpo_attributes *whole, const ebpo_attributes *part,
     }
 }
 
-START_TEST(a_subset_has_the_rows_of_its_mesh)
+START_TEST(test_attributes_of_subset_follow_mesh)
 {
     ebpo_mesh solid = small_mesh(), mesh;
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
@@ -406,7 +406,7 @@ START_TEST(a_subset_has_the_rows_of_its_mesh)
 }
 END_TEST
 
-/* How many lists of different lengths there are. */
+/* Returns the number of lists with different lengths. */
 static uint64_t pick_none(const ebpo_mesh *solid, uint64_t seed)
 {
     static const char *const elements[] = { "vertex", "face" };
@@ -435,7 +435,7 @@ static uint64_t pick_none(const ebpo_mesh *solid, uint64_t seed)
     return lists;
 }
 
-START_TEST(no_rows_are_picked_as_none)
+START_TEST(test_attributes_pick_of_no_rows)
 {
     ebpo_mesh solid = small_mesh();
     uint64_t lists = 0;
@@ -446,7 +446,7 @@ START_TEST(no_rows_are_picked_as_none)
 }
 END_TEST
 
-/* --- what happens on the way --- */
+/* --- changes on the way --- */
 
 static ebpo_mesh parse_text(const char *text) { return parse((const uint8_t *)text, strlen(text)); }
 
@@ -468,18 +468,18 @@ static void weld_two(bool arranged)
     ck_assert_uint_eq(red->rows, 4);
     ck_assert(memcmp(red->values, (uint8_t[]){ 1, 2, 3, 5 }, 4) == 0);
     ck_assert_str_eq(ebpo_mesh_attributes_lost(&mesh),
-                     "what 1 joined vertices have that differs from the one that stays");
+                     "attribute values of 1 joined vertices that differ from the remaining one");
     ebpo_mesh_free(&mesh);
 }
 
-START_TEST(joined_vertices_keep_what_the_first_has)
+START_TEST(test_attributes_of_joined_vertices_keep_first)
 {
     weld_two(false);
     weld_two(true);
 }
 END_TEST
 
-START_TEST(triangles_have_what_their_polygon_has)
+START_TEST(test_attributes_of_triangles_follow_polygon)
 {
     ebpo_mesh mesh = parse_text(
         "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
@@ -515,7 +515,7 @@ static ebpo_mesh parse_strips(bool first)
     return parse_text(text);
 }
 
-START_TEST(triangles_of_strips_have_zeros_and_empty_lists)
+START_TEST(test_attributes_of_strips_are_empty)
 {
     ebpo_mesh mesh = parse_strips(false);
     const ebpo_attribute *label = &mesh.attributes->array[0], *words = &mesh.attributes->array[1];
@@ -533,8 +533,8 @@ START_TEST(triangles_of_strips_have_zeros_and_empty_lists)
 }
 END_TEST
 
-/* An element of faces without rows says what its rows would have; the triangles are strips'. */
-START_TEST(a_written_ply_has_a_value_for_each_property_it_names)
+/* An element of faces without rows states its properties; the triangles belong to strips. */
+START_TEST(test_attributes_ply_writes_every_property)
 {
     ebpo_mesh back,
         mesh = parse_text(
@@ -551,7 +551,7 @@ START_TEST(a_written_ply_has_a_value_for_each_property_it_names)
 }
 END_TEST
 
-START_TEST(what_cannot_be_kept_is_said)
+START_TEST(test_attributes_report_lost_properties)
 {
     ebpo_mesh mesh =
         parse_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
@@ -561,7 +561,7 @@ START_TEST(what_cannot_be_kept_is_said)
     ck_assert_uint_eq(mesh.attributes->count, 1);
     ck_assert_str_eq(mesh.attributes->array[0].names, "q");
     ck_assert_str_eq(ebpo_mesh_attributes_lost(&mesh),
-                     "property 'red' of 'vertex' (row 1 has '256', which is none of its type)");
+                     "property 'red' of 'vertex' (row 1 has '256', which does not fit its type)");
     ebpo_mesh_free(&mesh);
     mesh = parse_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
                       "property float y\nproperty float z\nelement face 1\n"
@@ -572,7 +572,7 @@ START_TEST(what_cannot_be_kept_is_said)
 }
 END_TEST
 
-START_TEST(of_elements_of_one_name_those_of_one_length_are_kept)
+START_TEST(test_attributes_of_elements_with_equal_name)
 {
     ebpo_mesh mesh =
         parse_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
@@ -582,14 +582,15 @@ START_TEST(of_elements_of_one_name_those_of_one_length_are_kept)
                    "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n1\n2\n3\n4\n5\n6\n7\n");
     ck_assert_uint_eq(mesh.attributes->count, 2);
     ck_assert_str_eq(mesh.attributes->array[1].names, "c");
-    ck_assert_str_eq(ebpo_mesh_attributes_lost(&mesh),
-                     "property 'b' of 'note' (a second element of this name, of another length)");
+    ck_assert_str_eq(
+        ebpo_mesh_attributes_lost(&mesh),
+        "property 'b' of 'note' (another element has the same name and a different row count)");
     write_file(&mesh, scratch("a.ebpo.h5"), 0);
 }
 END_TEST
 
-/* Colours of 28 vertices a byte each, what else they are called, and other files' values. */
-START_TEST(a_file_tells_its_attributes)
+/* Colours of 28 vertices with one byte each, their other names, and values of other files. */
+START_TEST(test_attributes_are_listed_by_file)
 {
     ebpo_mesh mesh = parse_text(
         "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
@@ -626,18 +627,18 @@ TEST_SUITE(mesh_attributes)
     TCase *tests = tcase_create("attributes");
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_set_timeout(tests, 300);
-    tcase_add_test(tests, each_encoding_says_the_same);
-    tcase_add_test(tests, a_file_gives_everything_back);
-    tcase_add_test(tests, a_written_ply_is_read_as_what_it_was);
-    tcase_add_test(tests, a_subset_has_the_rows_of_its_mesh);
-    tcase_add_test(tests, no_rows_are_picked_as_none);
-    tcase_add_test(tests, joined_vertices_keep_what_the_first_has);
-    tcase_add_test(tests, triangles_have_what_their_polygon_has);
-    tcase_add_test(tests, triangles_of_strips_have_zeros_and_empty_lists);
-    tcase_add_test(tests, a_written_ply_has_a_value_for_each_property_it_names);
-    tcase_add_test(tests, what_cannot_be_kept_is_said);
-    tcase_add_test(tests, of_elements_of_one_name_those_of_one_length_are_kept);
-    tcase_add_test(tests, a_file_tells_its_attributes);
+    tcase_add_test(tests, test_attributes_same_in_all_encodings);
+    tcase_add_test(tests, test_attributes_file_round_trip);
+    tcase_add_test(tests, test_attributes_ply_round_trip);
+    tcase_add_test(tests, test_attributes_of_subset_follow_mesh);
+    tcase_add_test(tests, test_attributes_pick_of_no_rows);
+    tcase_add_test(tests, test_attributes_of_joined_vertices_keep_first);
+    tcase_add_test(tests, test_attributes_of_triangles_follow_polygon);
+    tcase_add_test(tests, test_attributes_of_strips_are_empty);
+    tcase_add_test(tests, test_attributes_ply_writes_every_property);
+    tcase_add_test(tests, test_attributes_report_lost_properties);
+    tcase_add_test(tests, test_attributes_of_elements_with_equal_name);
+    tcase_add_test(tests, test_attributes_are_listed_by_file);
     suite_add_tcase(suite, tests);
     return suite;
 }

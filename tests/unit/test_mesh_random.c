@@ -1,5 +1,5 @@
-/* The mesh check against a plain twin, on small meshes made at random: every kind of defect, many
- * at once. */
+/* The mesh check against a reference implementation, on small random meshes: every kind of defect,
+ * many at once. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,14 +8,14 @@
 #include "check_main.h"
 #include "solids.h"
 
-enum { MOST_VERTICES = 9, MOST_FACES = 24, ROUNDS = 20000 };
+enum { MAX_VERTICES = 9, MAX_FACES = 24, ROUNDS = 20000 };
 
 static ebpo_mesh random_mesh(uint64_t *state)
 {
     ebpo_mesh mesh;
     memset(&mesh, 0, sizeof mesh);
-    uint32_t vertices = 1 + (uint32_t)(ebpo_test_random(state) % MOST_VERTICES);
-    uint32_t faces = 1 + (uint32_t)(ebpo_test_random(state) % MOST_FACES);
+    uint32_t vertices = 1 + (uint32_t)(ebpo_test_random(state) % MAX_VERTICES);
+    uint32_t faces = 1 + (uint32_t)(ebpo_test_random(state) % MAX_FACES);
     for (uint32_t v = 0; v < vertices;
          v++) /* few positions, so that some repeat and many faces have no area */
         ebpo_test_append_vertex(&mesh, (double)(ebpo_test_random(state) % 3),
@@ -27,21 +27,21 @@ static ebpo_mesh random_mesh(uint64_t *state)
     return mesh;
 }
 
-/* ---- the twin: tables over all pairs ---- */
+/* ---- the reference implementation: tables over all pairs ---- */
 
-typedef struct twin {
-    uint64_t uses[MOST_VERTICES][MOST_VERTICES]; /* directed */
+typedef struct reference {
+    uint64_t uses[MAX_VERTICES][MAX_VERTICES]; /* directed */
     uint64_t edges, boundary, nonmanifold, misoriented, unbalanced, bowties, repeated,
         index_repeated, zero_area;
     uint64_t unreferenced, positions, components;
     uint64_t first_boundary; /* lowest face with a boundary edge */
-} twin;
+} reference;
 
 static bool names(const uint32_t *f, uint32_t v) { return f[0] == v || f[1] == v || f[2] == v; }
 
 static bool degenerate(const uint32_t *f) { return f[0] == f[1] || f[1] == f[2] || f[0] == f[2]; }
 
-static void twin_edges(twin *t, const ebpo_mesh *m)
+static void reference_edges(reference *t, const ebpo_mesh *m)
 {
     for (uint64_t i = 0; i < 3 * m->face_count; i++) {
         uint32_t a = m->faces[i], b = m->faces[i % 3 == 2 ? i - 2 : i + 1];
@@ -64,7 +64,7 @@ static void twin_edges(twin *t, const ebpo_mesh *m)
     }
 }
 
-static bool share_twofold_edge(const twin *t, const uint32_t *f, const uint32_t *g, uint32_t v)
+static bool share_twofold_edge(const reference *t, const uint32_t *f, const uint32_t *g, uint32_t v)
 {
     for (int k = 0; k < 3; k++)
         if (f[k] != v && names(g, f[k]) && t->uses[v][f[k]] + t->uses[f[k]][v] == 2)
@@ -72,9 +72,10 @@ static bool share_twofold_edge(const twin *t, const uint32_t *f, const uint32_t 
     return false;
 }
 
-/* Spreads labels until nothing changes; returns how many labels stay among the faces with label >
+/* Spreads labels until nothing changes; returns how many labels remain among the faces with label >
  * 0. */
-static uint64_t spread(const twin *t, const ebpo_mesh *m, uint64_t *label, uint32_t v, bool fans)
+static uint64_t spread(const reference *t, const ebpo_mesh *m, uint64_t *label, uint32_t v,
+                       bool fans)
 {
     for (bool changed = true; changed;) {
         changed = false;
@@ -95,9 +96,9 @@ static uint64_t spread(const twin *t, const ebpo_mesh *m, uint64_t *label, uint3
     return count;
 }
 
-static void twin_fans(twin *t, const ebpo_mesh *m)
+static void reference_fans(reference *t, const ebpo_mesh *m)
 {
-    uint64_t label[MOST_FACES];
+    uint64_t label[MAX_FACES];
     for (uint32_t v = 0; v < m->vertex_count; v++) {
         for (uint64_t f = 0; f < m->face_count; f++)
             label[f] = names(m->faces + 3 * f, v) && !degenerate(m->faces + 3 * f) ? f + 1 : 0;
@@ -115,7 +116,7 @@ static bool flat(const ebpo_mesh *m, const uint32_t *f)
     return (b[0] - a[0]) * (c[1] - a[1]) == (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-static void twin_faces(twin *t, const ebpo_mesh *m)
+static void reference_faces(reference *t, const ebpo_mesh *m)
 {
     for (uint64_t f = 0; f < m->face_count; f++) {
         const uint32_t *a = m->faces + 3 * f;
@@ -149,17 +150,17 @@ static ebpo_mesh_report check(const ebpo_mesh *mesh)
     return report;
 }
 
-START_TEST(check_agrees_with_its_plain_twin)
+START_TEST(test_mesh_check_matches_reference)
 {
-    static twin t;
+    static reference t;
     uint64_t state = 2017;
     for (int round = 0; round < ROUNDS; round++) {
         ebpo_mesh mesh = random_mesh(&state);
         ebpo_mesh_report r = check(&mesh);
         memset(&t, 0, sizeof t);
-        twin_edges(&t, &mesh);
-        twin_fans(&t, &mesh);
-        twin_faces(&t, &mesh);
+        reference_edges(&t, &mesh);
+        reference_fans(&t, &mesh);
+        reference_faces(&t, &mesh);
         ck_assert_uint_eq(r.edges, t.edges);
         ck_assert_uint_eq(r.boundary_edges.count, t.boundary);
         ck_assert_uint_eq(r.nonmanifold_edges.count, t.nonmanifold);
@@ -179,13 +180,13 @@ START_TEST(check_agrees_with_its_plain_twin)
 }
 END_TEST
 
-START_TEST(mending_random_meshes_keeps_its_promises)
+START_TEST(test_repair_random_meshes)
 {
     uint64_t state = 90;
     for (int round = 0; round < ROUNDS; round++) {
         ebpo_mesh mesh = random_mesh(&state);
         ebpo_mesh_report before = check(&mesh);
-        ebpo_mend_record record;
+        ebpo_repair_record record;
         ebpo_error error = EBPO_ERROR_INIT;
         memset(&record, 0, sizeof record);
         ck_assert_int_eq(ebpo_mesh_fill_holes(&mesh, &record, &error), EBPO_OK);
@@ -211,8 +212,8 @@ TEST_SUITE(mesh_random)
     Suite *suite = suite_create("mesh, random");
     TCase *all = tcase_create("all");
     tcase_set_timeout(all, 120);
-    tcase_add_test(all, check_agrees_with_its_plain_twin);
-    tcase_add_test(all, mending_random_meshes_keeps_its_promises);
+    tcase_add_test(all, test_mesh_check_matches_reference);
+    tcase_add_test(all, test_repair_random_meshes);
     suite_add_tcase(suite, all);
     return suite;
 }

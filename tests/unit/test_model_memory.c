@@ -1,4 +1,4 @@
-/* What whole models and subtrees take, counted at every allocation, against what was foretold. */
+/* Memory of whole models and subtrees, counted at every allocation, against the estimates. */
 #include <malloc.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -6,9 +6,9 @@
 #include "query/accel.h"
 #include "check_main.h"
 #include "query/query_model.h"
-#include "query_kit.h"
+#include "query_support.h"
 
-/* --- what the linker calls in place of the allocator --- */
+/* --- replacements of the allocator, by the linker --- */
 
 static _Atomic int64_t held, most;
 
@@ -58,7 +58,7 @@ void __wrap_free(void *block)
 /* --- models --- */
 
 typedef struct taken {
-    uint64_t keep, whole; /* foretold */
+    uint64_t keep, whole; /* estimated */
     uint64_t kept, peak;  /* counted */
     bool resident;
 } taken;
@@ -84,7 +84,7 @@ static taken open_within(const query_model *m, uint64_t memory)
 }
 
 static void check_model(const char *name, ebpo_mesh mesh, const query_variant *variant,
-                        double times_most)
+                        double times_max)
 {
     query_model m;
     query_model_make(&m, name, mesh, variant);
@@ -97,14 +97,14 @@ static void check_model(const char *name, ebpo_mesh mesh, const query_variant *v
                   "%s %s: %llu of %llu kept, %llu of %llu taken", name, variant->name,
                   (unsigned long long)t.kept, (unsigned long long)t.keep,
                   (unsigned long long)t.peak, (unsigned long long)t.whole);
-    ck_assert_msg((double)t.whole <= times_most * (double)t.kept, "%s: %llu for %llu", name,
+    ck_assert_msg((double)t.whole <= times_max * (double)t.kept, "%s: %llu for %llu", name,
                   (unsigned long long)t.whole, (unsigned long long)t.kept);
     t = open_within(&m, t.whole);
     ck_assert(t.resident);
     query_model_free(&m);
 }
 
-static const query_variant usual = { "usual", 16, 8, EBPO_RULE_NONZERO, 0 };
+static const query_variant standard = { "default", 16, 8, EBPO_RULE_NONZERO, 0 };
 
 static ebpo_mesh in_floats(ebpo_mesh mesh)
 {
@@ -116,7 +116,7 @@ static ebpo_mesh in_floats(ebpo_mesh mesh)
     return mesh;
 }
 
-START_TEST(estimates_of_ordinary_models_are_near)
+START_TEST(test_model_memory_estimate_is_close)
 {
     ebpo_mesh sphere = ebpo_test_sphere((double[3]){ 0.1, 0.2, 0.3 }, 1, 6),
               torus = ebpo_test_torus(2, 0.5, 300, 150);
@@ -124,19 +124,19 @@ START_TEST(estimates_of_ordinary_models_are_near)
         sphere = in_floats(sphere);
         torus = in_floats(torus);
     }
-    check_model("sphere", sphere, &usual, 2.5);
-    check_model("torus", torus, &usual, 2.5);
+    check_model("sphere", sphere, &standard, 2.5);
+    check_model("torus", torus, &standard, 2.5);
 }
 END_TEST
 
-START_TEST(models_take_at_most_what_was_foretold)
+START_TEST(test_model_memory_stays_below_estimate)
 {
     for (int v = 0; v < query_variant_count; v++)
         check_model(query_solid_name(_i), query_solid_make(_i), &query_variants[v], 1e9);
 }
 END_TEST
 
-START_TEST(random_models_take_at_most_what_was_foretold)
+START_TEST(test_random_model_memory_stays_below_estimate)
 {
     for (uint64_t i = 0; i < query_scaled(100); i++)
         check_model("random", query_random_solid(7 * i + 1, i % 2),
@@ -144,7 +144,7 @@ START_TEST(random_models_take_at_most_what_was_foretold)
 }
 END_TEST
 
-/* Triangles that share nothing, of doubles: six of them take as much as eight. */
+/* Triangles without shared vertices, of doubles: six of them take as much as eight. */
 static ebpo_mesh soup(uint32_t faces, double size)
 {
     uint64_t state = 5;
@@ -161,7 +161,7 @@ static ebpo_mesh soup(uint32_t faces, double size)
     return mesh;
 }
 
-START_TEST(models_that_take_more_than_was_foretold_are_read_in_parts)
+START_TEST(test_models_beyond_estimate_load_in_parts)
 {
     static const query_variant coarse = { "coarse", 36, 12, EBPO_RULE_NONZERO, 0 };
     query_model m;
@@ -176,7 +176,7 @@ END_TEST
 
 /* --- subtrees --- */
 
-/* What the allocator rounds up, array by array. */
+/* Rounding by the allocator, array by array. */
 enum { ROUNDING = 1 << 14 };
 
 typedef struct reading {
@@ -186,42 +186,42 @@ typedef struct reading {
     uint64_t kept, refused, beyond;
 } reading;
 
-static ebpo_accel *read_within(const reading *r, const ebpo_node *node, ebpo_room *room)
+static ebpo_accel *read_within(const reading *r, const ebpo_node *node, ebpo_quota *space)
 {
     ebpo_slice slice;
     ebpo_accel *subtree = NULL;
     ebpo_status status =
-        ebpo_slice_read_within(&slice, r->chunks, node, ebpo_subtree_needs(true), room, NULL);
+        ebpo_slice_read_within(&slice, r->chunks, node, ebpo_subtree_needs(true), space, NULL);
     if (status == EBPO_OK)
-        status = ebpo_accel_make_within(&subtree, &slice, &r->m->info, room, true, 1, NULL);
-    ck_assert(status == EBPO_OK || (status == EBPO_E_LIMIT && room->needed > room->most));
+        status = ebpo_accel_make_within(&subtree, &slice, &r->m->info, space, true, 1, NULL);
+    ck_assert(status == EBPO_OK || (status == EBPO_E_LIMIT && space->needed > space->most));
     return subtree;
 }
 
-/* Decoded chunks are in memory already. */
+/* Decoded chunks are already in memory. */
 static void check_subtree(reading *r, const ebpo_node *node)
 {
     ebpo_slice_size size;
-    ebpo_room room = { .most = UINT64_MAX };
-    ebpo_accel *subtree = read_within(r, node, &room);
+    ebpo_quota space = { .most = UINT64_MAX };
+    ebpo_accel *subtree = read_within(r, node, &space);
     ebpo_accel_free(subtree);
     uint64_t keep, needs = ebpo_subtree_needs(true);
     ASSERT_OK(
         ebpo_slice_measure_nodes(r->chunks, node, (uint32_t)needs, EBPO_SLICE_ALL, &size, error));
-    room = (ebpo_room){ 0 };
-    ebpo_accel_estimate_subtree(&size, &r->m->info, &keep, &room.most);
+    space = (ebpo_quota){ 0 };
+    ebpo_accel_estimate_subtree(&size, &r->m->info, &keep, &space.most);
     for (bool done = false; !done; r->refused += !done) {
         int64_t before = held;
         most = before;
-        subtree = read_within(r, node, &room);
-        ck_assert_msg((uint64_t)(most - before) <= room.most + ROUNDING,
+        subtree = read_within(r, node, &space);
+        ck_assert_msg((uint64_t)(most - before) <= space.most + ROUNDING,
                       "%s %s: %lld taken, %llu allowed", r->m->name, r->m->variant,
-                      (long long)(most - before), (unsigned long long)room.most);
+                      (long long)(most - before), (unsigned long long)space.most);
         done = subtree != NULL;
         if (!done)
-            room = (ebpo_room){ .most = room.needed };
+            space = (ebpo_quota){ .most = space.needed };
     }
-    ck_assert_uint_le(subtree->bytes, room.most);
+    ck_assert_uint_le(subtree->bytes, space.most);
     r->kept += subtree->bytes;
     r->beyond += subtree->bytes > keep;
     ebpo_accel_free(subtree);
@@ -239,7 +239,7 @@ static reading check_subtrees(const query_model *m, int cut_level)
     return r;
 }
 
-START_TEST(subtrees_take_at_most_the_room_they_have)
+START_TEST(test_subtree_memory_stays_below_quota)
 {
     for (int v = 0; v < query_variant_count; v++) {
         query_model m;
@@ -254,7 +254,7 @@ END_TEST
 static void check_near(const char *name, ebpo_mesh mesh)
 {
     query_model m;
-    query_model_make(&m, name, mesh, &usual);
+    query_model_make(&m, name, mesh, &standard);
     for (int cut_level = 1; cut_level < 5; cut_level++) {
         ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
         ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
@@ -277,7 +277,7 @@ static void check_near(const char *name, ebpo_mesh mesh)
     query_model_free(&m);
 }
 
-START_TEST(estimates_of_ordinary_subtrees_are_near)
+START_TEST(test_subtree_memory_estimate_is_close)
 {
     ebpo_mesh sphere = ebpo_test_sphere((double[3]){ 0.1, 0.2, 0.3 }, 1, 6),
               torus = ebpo_test_torus(2, 0.5, 300, 150);
@@ -286,18 +286,18 @@ START_TEST(estimates_of_ordinary_subtrees_are_near)
 }
 END_TEST
 
-/* Beside the budget: what decodes chunks, a context, tables of the caches. */
+/* Memory outside the budget: decoding of chunks, a context, tables of the caches. */
 enum { BESIDE = 768 << 10 };
 
-/* Returns how many answers there were. */
-static int check_answers(const query_model *m, uint64_t memory)
+/* Returns the number of results. */
+static int check_results(const query_model *m, uint64_t memory)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     ebpo_model *model;
     ebpo_context *context;
     uint64_t state = 3;
-    int answers = 0;
+    int results = 0;
     options.memory = memory;
     options.threads = 1;
     int64_t before = held;
@@ -312,7 +312,7 @@ static int check_answers(const query_model *m, uint64_t memory)
         ASSERT_OK(ebpo_distance(m->context, p, NULL, &whole, error));
         ebpo_status status = ebpo_distance(context, p, NULL, &parts, NULL);
         ck_assert(status == EBPO_OK || status == EBPO_E_LIMIT);
-        answers += status == EBPO_OK;
+        results += status == EBPO_OK;
         if (status == EBPO_OK)
             ck_assert(parts.lo == whole.lo && parts.hi == whole.hi);
     }
@@ -322,16 +322,16 @@ static int check_answers(const query_model *m, uint64_t memory)
                   (long long)(most - before), (unsigned long long)memory);
     ebpo_context_free(context);
     ebpo_model_free(model);
-    return answers;
+    return results;
 }
 
-/* Large triangles, each in many subtrees, and more across borders than ordinary ones have. */
-START_TEST(budgets_hold_for_extraordinary_subtrees)
+/* Large triangles, each in many subtrees, and many across borders. */
+START_TEST(test_budget_holds_for_unusual_subtrees)
 {
     static const query_variant fine = { "fine", 16, 6, EBPO_RULE_NONZERO, 0 };
     query_model m;
     query_model_make(&m, "soup", soup(_i ? 6000 : 3000, _i ? 0.2 : 1), &fine);
-    uint64_t refused = 0, answers = 0;
+    uint64_t refused = 0, results = 0;
     for (int cut_level = 1; cut_level < 4; cut_level++) {
         reading r = check_subtrees(&m, cut_level);
         refused += r.refused;
@@ -341,13 +341,13 @@ START_TEST(budgets_hold_for_extraordinary_subtrees)
     ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
     ASSERT_OK(ebpo_model_memory(m.file, &options, &plan, error));
     for (uint64_t memory = plan.least; memory < plan.whole; memory += memory / 2)
-        answers += (uint64_t)check_answers(&m, memory);
+        results += (uint64_t)check_results(&m, memory);
     ck_assert_uint_gt(refused, 0);
     if (getenv("EBPO_TEST_SHOW"))
         printf("soup: least %llu, whole %llu, %d refused, %d answers\n",
                (unsigned long long)plan.least, (unsigned long long)plan.whole, (int)refused,
-               (int)answers);
-    ck_assert(answers > 0 || plan.least == plan.whole);
+               (int)results);
+    ck_assert(results > 0 || plan.least == plan.whole);
     query_model_free(&m);
 }
 END_TEST
@@ -357,13 +357,13 @@ Suite *test_suite(void)
     Suite *suite = suite_create("model_memory");
     TCase *models = tcase_create("models");
     tcase_set_timeout(models, 600);
-    tcase_add_loop_test(models, estimates_of_ordinary_models_are_near, 0, 2);
-    tcase_add_loop_test(models, models_take_at_most_what_was_foretold, 0, query_solid_count());
-    tcase_add_test(models, random_models_take_at_most_what_was_foretold);
-    tcase_add_test(models, models_that_take_more_than_was_foretold_are_read_in_parts);
-    tcase_add_loop_test(models, subtrees_take_at_most_the_room_they_have, 0, query_solid_count());
-    tcase_add_loop_test(models, estimates_of_ordinary_subtrees_are_near, 0, 2);
-    tcase_add_loop_test(models, budgets_hold_for_extraordinary_subtrees, 0, 2);
+    tcase_add_loop_test(models, test_model_memory_estimate_is_close, 0, 2);
+    tcase_add_loop_test(models, test_model_memory_stays_below_estimate, 0, query_solid_count());
+    tcase_add_test(models, test_random_model_memory_stays_below_estimate);
+    tcase_add_test(models, test_models_beyond_estimate_load_in_parts);
+    tcase_add_loop_test(models, test_subtree_memory_stays_below_quota, 0, query_solid_count());
+    tcase_add_loop_test(models, test_subtree_memory_estimate_is_close, 0, 2);
+    tcase_add_loop_test(models, test_budget_holds_for_unusual_subtrees, 0, 2);
     suite_add_tcase(suite, models);
     return suite;
 }

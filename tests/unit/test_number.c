@@ -27,7 +27,7 @@ static void compare(const char *s, locale_t c)
                   expected_d);
 }
 
-/* Of every length of digits, exponent and place of the point. */
+/* Generates any number of digits, exponent and position of the point. */
 static void random_decimal(char *out, uint64_t *state)
 {
     int digits = 1 + (int)(next(state) % 24), point = (int)(next(state) % (uint64_t)(digits + 1));
@@ -43,7 +43,7 @@ static void random_decimal(char *out, uint64_t *state)
         sprintf(out, "e%d", (int)(next(state) % 90) - 50);
 }
 
-START_TEST(random_decimals_are_rounded_as_by_the_c_library)
+START_TEST(test_random_decimals_round_like_c_library)
 {
     locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     uint64_t state = 88172645463325252u + (uint64_t)_i;
@@ -56,8 +56,8 @@ START_TEST(random_decimals_are_rounded_as_by_the_c_library)
 }
 END_TEST
 
-/* Midpoints of neighbouring floats, a hair above and below: where rounding twice goes wrong. */
-START_TEST(midpoints_between_floats_are_rounded_once)
+/* Midpoints of neighbouring floats, and slightly above and below: where double rounding fails. */
+START_TEST(test_float_midpoints_are_rounded_once)
 {
     locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     uint64_t state = 12345;
@@ -82,7 +82,7 @@ START_TEST(midpoints_between_floats_are_rounded_once)
 }
 END_TEST
 
-/* Printed with as many digits behind the point as the text has: what the declaration says. */
+/* Prints as many digits after the point as the text has, as the declaration says. */
 static bool prints_again(const char *s, float value)
 {
     char text[400];
@@ -100,7 +100,7 @@ static void check_kept(const char *s, locale_t c)
                   kept ? "kept" : "not kept");
 }
 
-START_TEST(digits_are_kept_where_printing_gives_them_again)
+START_TEST(test_decimal_digits_survive_printing)
 {
     locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     uint64_t state = 88172645463325252u + (uint64_t)_i;
@@ -115,7 +115,8 @@ START_TEST(digits_are_kept_where_printing_gives_them_again)
             *at++ = (char)('0' + next(&state) % 10);
         *at = 0;
         check_kept(s, c);
-        float f = strtof(s, NULL); /* as programs print floats: with digits enough, and too many */
+        float f = strtof(s, NULL); /* as programs print floats: with enough digits, and with too
+                                    * many */
         for (int k = 5; k < 40; k += 1 + (int)(next(&state) % 5)) {
             snprintf(s, sizeof s, "%.*f", k, (double)f);
             check_kept(s, c);
@@ -128,8 +129,8 @@ START_TEST(digits_are_kept_where_printing_gives_them_again)
 }
 END_TEST
 
-/* What printing with a point does not show: exponents, signs, zeros, ends of the range. */
-START_TEST(digits_with_exponents_are_kept_or_not)
+/* Cases not covered by printing with a point: exponents, signs, zeros, ends of the range. */
+START_TEST(test_exponent_digits_are_kept_or_rejected)
 {
     static const struct {
         const char *text;
@@ -182,7 +183,7 @@ START_TEST(digits_with_exponents_are_kept_or_not)
 }
 END_TEST
 
-START_TEST(edges_of_the_range_are_read)
+START_TEST(test_numbers_at_range_limits_are_read)
 {
     static const char *const cases[] = { "0",
                                          "-0",
@@ -248,7 +249,7 @@ static const struct {
     { "nan(ind)0", NULL },
 };
 
-START_TEST(numbers_of_other_programs_are_read_as_standard_ones)
+START_TEST(test_foreign_number_formats_are_read)
 {
     locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     const char *s = foreign[_i].text, *standard = foreign[_i].standard;
@@ -265,7 +266,7 @@ START_TEST(numbers_of_other_programs_are_read_as_standard_ones)
 }
 END_TEST
 
-START_TEST(what_is_no_number_is_refused)
+START_TEST(test_malformed_numbers_are_refused)
 {
     static const char *const cases[] = { "",     "-",     "+",   ".",    "e5",   "1e",
                                          "1e+",  "1.2.3", "1,5", "0x10", "1f",   "--1",
@@ -286,7 +287,7 @@ START_TEST(what_is_no_number_is_refused)
 }
 END_TEST
 
-START_TEST(integers_are_read_whole_or_not_at_all)
+START_TEST(test_integers_are_read_completely_or_refused)
 {
     int64_t value;
     ck_assert(ebpo_number_integer(&value, "-12", 3) && value == -12);
@@ -302,15 +303,15 @@ TEST_SUITE(number)
 {
     TCase *tests = tcase_create("number");
     tcase_set_timeout(tests, 120);
-    tcase_add_loop_test(tests, random_decimals_are_rounded_as_by_the_c_library, 0, 3);
-    tcase_add_test(tests, midpoints_between_floats_are_rounded_once);
-    tcase_add_loop_test(tests, digits_are_kept_where_printing_gives_them_again, 0, 3);
-    tcase_add_test(tests, digits_with_exponents_are_kept_or_not);
-    tcase_add_test(tests, edges_of_the_range_are_read);
-    tcase_add_loop_test(tests, numbers_of_other_programs_are_read_as_standard_ones, 0,
+    tcase_add_loop_test(tests, test_random_decimals_round_like_c_library, 0, 3);
+    tcase_add_test(tests, test_float_midpoints_are_rounded_once);
+    tcase_add_loop_test(tests, test_decimal_digits_survive_printing, 0, 3);
+    tcase_add_test(tests, test_exponent_digits_are_kept_or_rejected);
+    tcase_add_test(tests, test_numbers_at_range_limits_are_read);
+    tcase_add_loop_test(tests, test_foreign_number_formats_are_read, 0,
                         (int)(sizeof foreign / sizeof *foreign));
-    tcase_add_test(tests, what_is_no_number_is_refused);
-    tcase_add_test(tests, integers_are_read_whole_or_not_at_all);
+    tcase_add_test(tests, test_malformed_numbers_are_refused);
+    tcase_add_test(tests, test_integers_are_read_completely_or_refused);
     Suite *suite = suite_create("number");
     suite_add_tcase(suite, tests);
     return suite;

@@ -1,5 +1,6 @@
-/* Numbers of the tool's text against the C library: read alike, and printed so that they read back
- * as the same double, in the layout of %.17g, with no more digits than printf would need. */
+/* Numbers in the text of the tool against the C library: read equally, and printed so that they
+ * read back as the same double, in the layout of %.17g, with no more digits than printf would need.
+ */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,15 +29,15 @@ static bool same(double a, double b) { return memcmp(&a, &b, sizeof a) == 0; }
 
 static const char *written(double v)
 {
-    static char text[NUMBER_ROOM + 1];
+    static char text[NUMBER_CAPACITY + 1];
     *number_write(text, v) = 0;
     return text;
 }
 
-/* Digits alone: without sign, point, exponent and the zeros around them. */
+/* Counts digits, without sign, point, exponent and the zeros around them. */
 static size_t digits_in(const char *text)
 {
-    char digits[NUMBER_ROOM];
+    char digits[NUMBER_CAPACITY];
     size_t count = 0, first = 0;
     for (const char *c = text; *c && *c != 'e'; c++)
         if (*c >= '0' && *c <= '9')
@@ -50,7 +51,7 @@ static size_t digits_in(const char *text)
 
 static size_t digits_needed(double v)
 {
-    char text[NUMBER_ROOM];
+    char text[NUMBER_CAPACITY];
     for (int count = 1; count < 17; count++) {
         snprintf(text, sizeof text, "%.*e", count - 1, v);
         if (same(strtod(text, NULL), v))
@@ -61,7 +62,7 @@ static size_t digits_needed(double v)
 
 static void check_written(double v)
 {
-    char plain[NUMBER_ROOM];
+    char plain[NUMBER_CAPACITY];
     const char *text = written(v);
     ck_assert_msg(same(strtod(text, NULL), v), "%a is written %s", v, text);
     ck_assert_msg(digits_in(text) <= digits_needed(v), "%a is written %s", v, text);
@@ -72,7 +73,7 @@ static void check_written(double v)
                   "%s is not laid out as %s", text, plain);
 }
 
-START_TEST(what_is_written_reads_back_and_is_short)
+START_TEST(test_number_text_round_trip_is_short)
 {
     static const double some[] = { 1,        0.1,
                                    0.5,      -0.125,
@@ -106,11 +107,11 @@ START_TEST(what_is_written_reads_back_and_is_short)
 }
 END_TEST
 
-START_TEST(whole_numbers_are_written_as_by_the_c_library)
+START_TEST(test_integers_print_like_c_library)
 {
     static const int64_t some[] = { 0, 1, -1, 9, 10, -10, INT64_MAX, INT64_MIN };
     for (size_t i = 0; i < sizeof some / sizeof *some; i++) {
-        char text[NUMBER_ROOM + 1], plain[NUMBER_ROOM];
+        char text[NUMBER_CAPACITY + 1], plain[NUMBER_CAPACITY];
         *number_write_int(text, some[i]) = 0;
         snprintf(plain, sizeof plain, "%lld", (long long)some[i]);
         ck_assert_str_eq(text, plain);
@@ -121,7 +122,7 @@ START_TEST(whole_numbers_are_written_as_by_the_c_library)
 }
 END_TEST
 
-/* As strtod: the same number, which ends at the same place. */
+/* Checks against strtod: the same number with the same end. */
 static void check_read(const char *text)
 {
     char *stop;
@@ -132,7 +133,7 @@ static void check_read(const char *text)
                   v);
 }
 
-START_TEST(what_strtod_reads_is_read_alike)
+START_TEST(test_numbers_read_like_strtod)
 {
     static const char *const some[] = {
         "1",
@@ -204,9 +205,9 @@ Suite *test_suite(void)
 {
     TCase *tests = tcase_create("number_text");
     tcase_set_timeout(tests, 120);
-    tcase_add_test(tests, what_is_written_reads_back_and_is_short);
-    tcase_add_test(tests, whole_numbers_are_written_as_by_the_c_library);
-    tcase_add_test(tests, what_strtod_reads_is_read_alike);
+    tcase_add_test(tests, test_number_text_round_trip_is_short);
+    tcase_add_test(tests, test_integers_print_like_c_library);
+    tcase_add_test(tests, test_numbers_read_like_strtod);
     Suite *suite = suite_create("number_text");
     suite_add_tcase(suite, tests);
     return suite;

@@ -1,4 +1,4 @@
-/* Types in group words, cells and what lies beside them, against plain twins. */
+/* Types in group words, cells and their neighbours, against reference implementations. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +15,7 @@ static uint32_t random_below(uint64_t *state, uint32_t below)
 
 /* --- types --- */
 
-START_TEST(types_of_every_group_word_count_as_octant_by_octant)
+START_TEST(test_group_word_types_match_octants)
 {
     for (unsigned word = 0; word <= UINT16_MAX; word++) {
         unsigned seen[4] = { 0 }, filled = 0;
@@ -39,14 +39,14 @@ START_TEST(types_of_every_group_word_count_as_octant_by_octant)
 }
 END_TEST
 
-START_TEST(types_of_many_groups_count_as_one_by_one)
+START_TEST(test_group_type_counts_match_plain_count)
 {
     uint64_t state = (uint64_t)_i + 1, groups = random_below(&state, 700), counts[4],
              sum[4] = { 0 };
     uint16_t *types = malloc((groups + 1) * sizeof *types);
     ck_assert_ptr_nonnull(types);
     for (uint64_t i = 0; i < groups; i++) {
-        /* all of one type now and then: the sums of bytes are largest then */
+        /* sometimes all of one type: then the sums of bytes are largest */
         types[i] =
             _i % 5 < 4 ? (uint16_t)(0x5555 * (_i % 5)) : (uint16_t)random_below(&state, 65536);
         for (unsigned octant = 0; octant < 8; octant++)
@@ -76,7 +76,7 @@ static ebpo_cell random_cell(uint64_t *state, int level)
     return cell;
 }
 
-START_TEST(cells_and_octcodes_go_up_and_down_together)
+START_TEST(test_cells_and_octcodes_stay_consistent)
 {
     uint64_t state = (uint64_t)_i + 1;
     for (int i = 0; i < 2000; i++) {
@@ -108,7 +108,7 @@ static bool plainly_touch(ebpo_cell a, ebpo_cell b)
     return true;
 }
 
-START_TEST(neighbours_are_those_that_a_search_through_all_cells_finds)
+START_TEST(test_neighbours_match_exhaustive_search)
 {
     int level = _i;
     uint32_t last = 1u << level;
@@ -135,7 +135,7 @@ START_TEST(neighbours_are_those_that_a_search_through_all_cells_finds)
 }
 END_TEST
 
-START_TEST(cells_of_any_levels_touch_as_their_walls_tell)
+START_TEST(test_cells_of_any_level_touch)
 {
     uint64_t state = 5;
     unsigned touching = 0;
@@ -152,7 +152,7 @@ START_TEST(cells_of_any_levels_touch_as_their_walls_tell)
 }
 END_TEST
 
-START_TEST(points_lie_between_the_walls_of_the_cells_that_are_found)
+START_TEST(test_found_cell_contains_point)
 {
     const double min[3] = { -1, 2, 1e3 }, max[3] = { 3, 2.5, 1e3 + 1e-3 };
     uint64_t state = (uint64_t)_i + 1;
@@ -163,14 +163,15 @@ START_TEST(points_lie_between_the_walls_of_the_cells_that_are_found)
         double p[3], low[3], high[3];
         ebpo_cell cell = { level, { 0, 0, 0 } };
         bool inside = true;
-        for (int k = 0; k < 3; k++) { /* a random place, often a wall or next to one */
-            uint32_t wall = random_below(&state, (1u << level) + 1);
-            p[k] = ebpo_wall(&box, k, level, wall);
+        for (int k = 0; k < 3; k++) { /* a random position, often on a cell face or next to one */
+            uint32_t cell_face = random_below(&state, (1u << level) + 1);
+            p[k] = ebpo_cell_face(&box, k, level, cell_face);
             if (i % 3 == 1)
                 p[k] = nextafter(p[k], random_below(&state, 2) ? INFINITY : -INFINITY);
             if (i % 3 == 2)
                 p[k] += box.size[k] * (random_below(&state, 4000) / 2000.0 - 1);
-            inside = inside && p[k] >= ebpo_wall(&box, k, 0, 0) && p[k] < ebpo_wall(&box, k, 0, 1);
+            inside = inside && p[k] >= ebpo_cell_face(&box, k, 0, 0) &&
+                     p[k] < ebpo_cell_face(&box, k, 0, 1);
         }
         ck_assert_int_eq(ebpo_locate(&box, level, p, cell.at), inside);
         if (!inside)
@@ -190,12 +191,12 @@ TEST_SUITE(octree)
 {
     TCase *tests = tcase_create("octree");
     tcase_set_timeout(tests, 120);
-    tcase_add_test(tests, types_of_every_group_word_count_as_octant_by_octant);
-    tcase_add_loop_test(tests, types_of_many_groups_count_as_one_by_one, 0, 60);
-    tcase_add_loop_test(tests, cells_and_octcodes_go_up_and_down_together, 0, 4);
-    tcase_add_loop_test(tests, neighbours_are_those_that_a_search_through_all_cells_finds, 0, 4);
-    tcase_add_test(tests, cells_of_any_levels_touch_as_their_walls_tell);
-    tcase_add_loop_test(tests, points_lie_between_the_walls_of_the_cells_that_are_found, 0, 42);
+    tcase_add_test(tests, test_group_word_types_match_octants);
+    tcase_add_loop_test(tests, test_group_type_counts_match_plain_count, 0, 60);
+    tcase_add_loop_test(tests, test_cells_and_octcodes_stay_consistent, 0, 4);
+    tcase_add_loop_test(tests, test_neighbours_match_exhaustive_search, 0, 4);
+    tcase_add_test(tests, test_cells_of_any_level_touch);
+    tcase_add_loop_test(tests, test_found_cell_contains_point, 0, 42);
     Suite *suite = suite_create("octree");
     suite_add_tcase(suite, tests);
     return suite;

@@ -1,4 +1,5 @@
-/* Orienting cubes that share edges, vertices and faces, against winding numbers in every cell. */
+/* Orientation of cubes that share edges, vertices and faces, against winding numbers in every cell.
+ */
 #include <string.h>
 
 #include <ebpo/ebpo.h>
@@ -15,8 +16,8 @@ static uint64_t state;
 
 static uint32_t below(uint32_t n) { return (uint32_t)(ebpo_test_random(&state) % n); }
 
-/* Twelve faces for each cell, over the vertices of a lattice: where cells touch, they share
- * vertices and edges, and have a face each in one place. */
+/* Twelve faces for each cell, over the vertices of a lattice: adjacent cells share vertices and
+ * edges, and have coincident faces. */
 static ebpo_mesh mesh_of(const bool filled[CELLS])
 {
     static const uint32_t quad[6][4] = { { 0, 2, 3, 1 }, { 4, 5, 7, 6 }, { 0, 1, 5, 4 },
@@ -70,9 +71,9 @@ static void expect_cells(const ebpo_mesh *m, const bool filled[CELLS])
     }
 }
 
-static ebpo_mend_record orient(ebpo_mesh *m)
+static ebpo_repair_record orient(ebpo_mesh *m)
 {
-    ebpo_mend_record record;
+    ebpo_repair_record record;
     ebpo_error error = EBPO_ERROR_INIT;
     memset(&record, 0, sizeof record);
     ck_assert_msg(ebpo_mesh_orient(m, &record, &error) == EBPO_OK, "%s", error.message);
@@ -90,12 +91,12 @@ static void check_cells(const bool filled[CELLS], uint32_t of_eight)
         ebpo_mesh_free(&m);
         return;
     }
-    ck_assert_uint_eq(orient(&right).flipped_faces, 0); /* what is right stays as it is */
+    ck_assert_uint_eq(orient(&right).flipped_faces, 0); /* correct faces are not changed */
     ebpo_mesh_free(&right);
     turn_some(&m, of_eight);
     ebpo_mesh copy;
     ck_assert(ebpo_mesh_copy(&m, &copy, &error) == EBPO_OK);
-    ebpo_mend_record record = orient(&m);
+    ebpo_repair_record record = orient(&m);
     ck_assert_uint_eq(record.unorientable_components, 0);
     expect_cells(&m, filled);
     ck_assert_uint_eq(orient(&m).flipped_faces, 0);
@@ -107,9 +108,8 @@ static void check_cells(const bool filled[CELLS], uint32_t of_eight)
     ebpo_mesh_free(&m);
 }
 
-/* Two cubes that share an edge, a vertex, a face, and as many around an edge as there is room for.
- */
-START_TEST(neighbours_look_outwards_whatever_was_turned)
+/* Two cubes that share an edge, a vertex, a face, and the maximum around an edge. */
+START_TEST(test_orient_neighbours_point_outwards)
 {
     static const int with_first[][3] = {
         { 4, -1, -1 }, { 13, -1, -1 }, { 1, -1, -1 }, { 1, 3, 4 }
@@ -124,7 +124,7 @@ START_TEST(neighbours_look_outwards_whatever_was_turned)
 }
 END_TEST
 
-START_TEST(random_cells_look_outwards_whatever_was_turned)
+START_TEST(test_orient_random_cells_point_outwards)
 {
     state = 100 + (uint64_t)_i;
     for (int round = 0; round < 60; round++) {
@@ -137,8 +137,8 @@ START_TEST(random_cells_look_outwards_whatever_was_turned)
 }
 END_TEST
 
-/* Seen as a whole, such cubes have no volume: each is counted. */
-START_TEST(shells_that_share_a_vertex_or_an_edge_are_counted_one_by_one)
+/* Together such cubes have no volume: each is counted. */
+START_TEST(test_orient_shells_sharing_vertex_or_edge)
 {
     for (int other = 4; other <= 13; other += 9) {
         bool filled[CELLS] = { true };
@@ -160,9 +160,9 @@ TEST_SUITE(orient)
     Suite *suite = suite_create("orient");
     TCase *tests = tcase_create("all");
     tcase_set_timeout(tests, 300);
-    tcase_add_loop_test(tests, neighbours_look_outwards_whatever_was_turned, 0, 4);
-    tcase_add_loop_test(tests, random_cells_look_outwards_whatever_was_turned, 0, 4);
-    tcase_add_test(tests, shells_that_share_a_vertex_or_an_edge_are_counted_one_by_one);
+    tcase_add_loop_test(tests, test_orient_neighbours_point_outwards, 0, 4);
+    tcase_add_loop_test(tests, test_orient_random_cells_point_outwards, 0, 4);
+    tcase_add_test(tests, test_orient_shells_sharing_vertex_or_edge);
     suite_add_tcase(suite, tests);
     return suite;
 }

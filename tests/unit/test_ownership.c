@@ -1,5 +1,5 @@
-/* Who owns what: arrays in a workspace and others of one file side by side, and an open file that
- * threads share. Meant for AddressSanitizer, LeakSanitizer and ThreadSanitizer. */
+/* Ownership: arrays in a workspace beside other arrays of one file, and an open file shared by
+ * threads. For AddressSanitizer, LeakSanitizer and ThreadSanitizer. */
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -54,17 +54,17 @@ static void stream_all(const ebpo_file *file)
     ebpo_stream_free(stream);
 }
 
-static void ask_model(const ebpo_file *file)
+static void query_model(const ebpo_file *file)
 {
     static const double point[3] = { 3, 0, 0 };
     ebpo_model *model;
     ebpo_context *context;
-    ebpo_inside_result answer;
+    ebpo_inside_result result;
     ebpo_error own = EBPO_ERROR_INIT;
     ck_assert_int_eq(ebpo_model_new(file, NULL, &model, &own), EBPO_OK);
     ck_assert_int_eq(ebpo_context_new(model, &context, &own), EBPO_OK);
-    ck_assert_int_eq(ebpo_inside(context, point, NULL, &answer, &own), EBPO_OK);
-    ck_assert_int_eq(answer.where, EBPO_IN);
+    ck_assert_int_eq(ebpo_inside(context, point, NULL, &result, &own), EBPO_OK);
+    ck_assert_int_eq(result.where, EBPO_IN);
     ebpo_context_free(context);
     ebpo_model_free(model);
 }
@@ -82,7 +82,7 @@ static ebpo_workspace *small_workspace(void)
     return w;
 }
 
-/* Nothing of it is left in use. */
+/* Checks that nothing of it is in use. */
 static void end_workspace(ebpo_workspace *w)
 {
     ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
@@ -92,7 +92,7 @@ static void end_workspace(ebpo_workspace *w)
     ebpo_workspace_free(w);
 }
 
-START_TEST(what_is_read_into_a_workspace_leaves_the_file_as_it_was)
+START_TEST(test_workspace_read_leaves_file_unchanged)
 {
     ebpo_file *file;
     ebpo_tree tree;
@@ -109,7 +109,7 @@ START_TEST(what_is_read_into_a_workspace_leaves_the_file_as_it_was)
     fine(ebpo_file_read_source_mesh(file, &read, &mesh, NULL, &error));
     export_all(file);
     fine(ebpo_file_read_maps(file, &read, &maps, &error));
-    ask_model(file);
+    query_model(file);
     fine(ebpo_file_read_level(file, last, &read, &level, &error));
     fine(ebpo_file_check_content(file, &read, &error));
     ebpo_tree_free(&tree);
@@ -123,7 +123,7 @@ START_TEST(what_is_read_into_a_workspace_leaves_the_file_as_it_was)
 }
 END_TEST
 
-START_TEST(verifying_leaves_nothing_behind)
+START_TEST(test_verify_leaves_no_memory)
 {
     ebpo_file *file;
     ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
@@ -134,7 +134,7 @@ START_TEST(verifying_leaves_nothing_behind)
     fine(ebpo_verify(file, &options, &report, &error));
     ck_assert_uint_eq(report.violations, 0);
     end_workspace(options.workspace);
-    ask_model(file);
+    query_model(file);
     stream_all(file);
     export_all(file);
     ebpo_close(file);
@@ -180,7 +180,7 @@ static void *use_file(void *argument)
     unsigned own = turn++;
     for (unsigned i = 0; i < 3; i++)
         switch ((own + i) % 3) {
-        case 0: ask_model(file); break;
+        case 0: query_model(file); break;
         case 1: stream_all(file); break;
         default: locate(file); break;
         }
@@ -200,8 +200,8 @@ static memory load(void)
     return m;
 }
 
-/* A file far away, whose chunks are located while others read. */
-START_TEST(threads_share_an_open_file)
+/* A remote file whose chunks are located while other threads read. */
+START_TEST(test_threads_share_remote_file)
 {
     enum { THREADS = 6 };
     pthread_t thread[THREADS];
@@ -232,9 +232,9 @@ TEST_SUITE(ownership)
     Suite *suite = suite_create("ownership");
     TCase *tests = tcase_create("ownership");
     tcase_set_timeout(tests, 600);
-    tcase_add_loop_test(tests, what_is_read_into_a_workspace_leaves_the_file_as_it_was, 0, 2);
-    tcase_add_test(tests, verifying_leaves_nothing_behind);
-    tcase_add_test(tests, threads_share_an_open_file);
+    tcase_add_loop_test(tests, test_workspace_read_leaves_file_unchanged, 0, 2);
+    tcase_add_test(tests, test_verify_leaves_no_memory);
+    tcase_add_test(tests, test_threads_share_remote_file);
     suite_add_tcase(suite, tests);
     return suite;
 }

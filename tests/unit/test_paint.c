@@ -1,5 +1,6 @@
-/* Paint: what a file keeps, what a ball reaches, areas against closed forms, strokes from a hand's
- * way. How vertices are coloured is compared with a twin in Python by tests/cli/paint.tests. */
+/* Paint: contents of files, range of a ball, areas against closed forms, strokes from the path of a
+ * device. tests/cli/paint.tests compares the colouring of vertices with a reference implementation
+ * in Python. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,7 +25,7 @@ typedef struct opened {
     ebpo_paint *paint; /* with one layer */
 } opened;
 
-/* cut_level -1: all of it in memory. */
+/* cut_level -1: the whole model is in memory. */
 static opened open_model(ebpo_mesh mesh, int cut_level)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -54,7 +55,7 @@ static ebpo_paint_point point_at(const opened *o, double x, double y, double z)
     const double place[3] = { x, y, z };
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_paint_point out;
-    model_must(ebpo_paint_place(o->paint, o->context, place, &out, &error), "a point", &error);
+    model_must(ebpo_paint_locate(o->paint, o->context, place, &out, &error), "a point", &error);
     return out;
 }
 
@@ -86,7 +87,7 @@ static ebpo_paint_areas measured(const opened *o, unsigned fineness, unsigned th
     return areas;
 }
 
-/* Between its bounds, which are not far apart, and well met. */
+/* Expects an area within its bounds, which are close to each other, and near the value. */
 static void expect_area(const ebpo_paint_area *a, double area, double apart, double off)
 {
     ck_assert_msg(a->lo <= area * (1 + 1e-12) && area <= a->hi * (1 + 1e-12),
@@ -160,7 +161,7 @@ static void fill(opened *o)
                 i);
 }
 
-START_TEST(files_give_back_what_they_hold)
+START_TEST(test_paint_file_round_trip)
 {
     opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3), -1);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -170,7 +171,7 @@ START_TEST(files_give_back_what_they_hold)
     model_must(ebpo_paint_open(scratch("p.paint.h5"), &read, &error), "reading", &error);
     same_paint(o.paint, read);
     same_paint(read, o.paint);
-    /* in its own place, and from there once more */
+    /* in its own place, and saved there again */
     model_must(ebpo_paint_save(read, scratch("p.paint.h5"), &error), "saving", &error);
     ebpo_paint_free(read);
     model_must(ebpo_paint_open(scratch("p.paint.h5"), &read, &error), "reading", &error);
@@ -180,7 +181,7 @@ START_TEST(files_give_back_what_they_hold)
 }
 END_TEST
 
-/* --- two that have the same file open --- */
+/* --- two handles of the same file --- */
 
 static ebpo_paint *opened_paint(void)
 {
@@ -197,7 +198,7 @@ static uint64_t layers_of(const ebpo_paint *p)
     return info.layer_count;
 }
 
-START_TEST(the_second_of_two_that_save_one_file_is_refused)
+START_TEST(test_paint_second_save_is_refused)
 {
     opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -205,11 +206,11 @@ START_TEST(the_second_of_two_that_save_one_file_is_refused)
     ebpo_paint *one = opened_paint(), *other = opened_paint();
     ck_assert(ebpo_paint_add_layer(one, NULL, NULL, NULL) == EBPO_OK);
     model_must(ebpo_paint_save(one, scratch("p.paint.h5"), &error), "saving", &error);
-    /* so is the one that made the file, which has not read it again either */
+    /* so is the handle that made the file, which has not read it again either */
     ck_assert(ebpo_paint_save(other, scratch("p.paint.h5"), &error) == EBPO_E_IO);
-    ck_assert(strstr(error.message, "another program has written it") != NULL);
+    ck_assert(strstr(error.message, "another program has changed it") != NULL);
     ck_assert(ebpo_paint_save(o.paint, scratch("p.paint.h5"), NULL) == EBPO_E_IO);
-    /* who has saved it may save it again, and copies go everywhere */
+    /* the last saver may save again, and copies may be saved anywhere */
     model_must(ebpo_paint_save(one, scratch("p.paint.h5"), &error), "saving", &error);
     model_must(ebpo_paint_save(other, scratch("q.paint.h5"), &error), "saving", &error);
     model_must(ebpo_paint_save(other, scratch("q.paint.h5"), &error), "saving", &error);
@@ -218,7 +219,7 @@ START_TEST(the_second_of_two_that_save_one_file_is_refused)
     ebpo_paint_free(other);
     one = opened_paint();
     ck_assert(layers_of(one) == 2);
-    /* a file that is gone is made anew */
+    /* a missing file is created again */
     ck_assert(unlink(scratch("p.paint.h5")) == 0);
     model_must(ebpo_paint_save(one, scratch("p.paint.h5"), &error), "saving", &error);
     ebpo_paint_free(one);
@@ -226,7 +227,7 @@ START_TEST(the_second_of_two_that_save_one_file_is_refused)
 }
 END_TEST
 
-START_TEST(a_file_that_is_changed_in_its_place_is_not_replaced)
+START_TEST(test_paint_keeps_file_modified_in_place)
 {
     opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -240,7 +241,7 @@ START_TEST(a_file_that_is_changed_in_its_place_is_not_replaced)
 }
 END_TEST
 
-START_TEST(one_at_a_time_has_a_file_open_to_change)
+START_TEST(test_paint_file_is_locked_for_changes)
 {
     opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -252,14 +253,14 @@ START_TEST(one_at_a_time_has_a_file_open_to_change)
     model_must(ebpo_paint_open_to_change(path, o.file, 0, NULL, &one, &error), "new", &error);
     ck_assert(ebpo_paint_open_to_change(path, o.file, 0.05, NULL, &other, &error) == EBPO_E_IO);
     ck_assert(strstr(error.message, "another program has been changing it") && !other);
-    /* a save to another path, even one that fails, is no end of it */
+    /* a save to another path, even a failed one, does not release it */
     ck_assert(ebpo_paint_save(one, scratch("absent/q.paint.h5"), NULL) == EBPO_E_IO);
     ck_assert(ebpo_paint_save(one, scratch(NULL), NULL) == EBPO_E_IO);
     model_must(ebpo_paint_save(one, scratch("q.paint.h5"), &error), "saving", &error);
     ck_assert(ebpo_paint_open_to_change(path, o.file, 0.05, NULL, &other, &error) == EBPO_E_IO);
     ck_assert(ebpo_paint_add_layer(one, NULL, NULL, NULL) == EBPO_OK);
     model_must(ebpo_paint_save(one, path, &error), "saving", &error);
-    /* saved: the next one has its turn, and reads what was saved */
+    /* saved: the next one gets the lock, and reads the saved file */
     model_must(ebpo_paint_open_to_change(path, o.file, 0, NULL, &other, &error), "next", &error);
     ck_assert(layers_of(other) == 1 && ebpo_paint_add_layer(other, NULL, NULL, NULL) == EBPO_OK);
     ebpo_paint_free(other); /* without saving */
@@ -272,14 +273,14 @@ START_TEST(one_at_a_time_has_a_file_open_to_change)
 }
 END_TEST
 
-START_TEST(a_new_paint_does_not_replace_one_that_was_made_meanwhile)
+START_TEST(test_new_paint_keeps_file_made_meanwhile)
 {
     opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_paint *p = NULL;
     model_must(ebpo_paint_open_to_change(scratch("p.paint.h5"), o.file, 0, NULL, &p, &error), "new",
                &error);
-    /* by a program that knows of no locks */
+    /* by a program that ignores locks */
     ck_assert(ebpo_write_file(scratch("p.paint.h5"), "x", 1, NULL) == EBPO_OK);
     ck_assert(ebpo_paint_save(p, scratch("p.paint.h5"), &error) == EBPO_E_IO);
     ebpo_paint_free(p);
@@ -287,7 +288,7 @@ START_TEST(a_new_paint_does_not_replace_one_that_was_made_meanwhile)
 }
 END_TEST
 
-START_TEST(a_new_paint_makes_no_file_before_it_is_saved)
+START_TEST(test_new_paint_writes_file_on_save)
 {
     opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -308,7 +309,7 @@ START_TEST(a_new_paint_makes_no_file_before_it_is_saved)
 }
 END_TEST
 
-START_TEST(points_are_checked_against_the_model)
+START_TEST(test_paint_points_are_checked_against_model)
 {
     opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -325,7 +326,7 @@ START_TEST(points_are_checked_against_the_model)
     ck_assert(strstr(error.message, "stroke 12 of the paint is not on face") != NULL);
     ck_assert(ebpo_paint_remove_stroke(o.paint, 12, NULL) == EBPO_OK);
     n.at = q;
-    n.at.face = 1 << 20; /* which there is not */
+    n.at.face = 1 << 20; /* which does not exist */
     ck_assert(ebpo_paint_add_note(o.paint, &n, NULL) == EBPO_OK);
     ck_assert(ebpo_paint_check_points(o.paint, o.context, NULL, &error) == EBPO_E_FORMAT);
     ck_assert(strstr(error.message, "note 3 of the paint is not on face 1048576") != NULL);
@@ -333,7 +334,7 @@ START_TEST(points_are_checked_against_the_model)
 }
 END_TEST
 
-START_TEST(what_is_removed_is_gone)
+START_TEST(test_paint_removed_layers_are_absent)
 {
     opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
     ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
@@ -344,7 +345,7 @@ START_TEST(what_is_removed_is_gone)
     ck_assert(ebpo_paint_get_info(o.paint, &info) == EBPO_OK);
     ck_assert(info.layer_count == 3 && info.stroke_count == 9 && info.point_count == 9 &&
               info.note_count == 2);
-    /* strokes were of layers 0 1 2 3 0 1 ..., their radii tell which they are */
+    /* strokes were in layers 0 1 2 3 0 1 ..., their radii identify them */
     static const double radius[] = { 0.1, 2.1, 3.1, 4.1, 6.1, 7.1, 8.1, 10.1, 11.1 };
     for (uint64_t i = 0; i < 9; i++) {
         ck_assert(ebpo_paint_get_stroke(o.paint, i, &s) == EBPO_OK);
@@ -362,7 +363,7 @@ START_TEST(what_is_removed_is_gone)
 }
 END_TEST
 
-START_TEST(what_is_wrong_is_refused)
+START_TEST(test_paint_invalid_input_is_refused)
 {
     opened o = open_model(ebpo_test_tetrahedron(1), -1);
     ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
@@ -405,7 +406,7 @@ START_TEST(what_is_wrong_is_refused)
 }
 END_TEST
 
-START_TEST(a_paint_of_another_model_is_refused)
+START_TEST(test_paint_of_other_model_is_refused)
 {
     opened o = open_model(ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), -1);
     ebpo_paint *mine = o.paint;
@@ -422,7 +423,7 @@ START_TEST(a_paint_of_another_model_is_refused)
 }
 END_TEST
 
-/* --- reach --- */
+/* --- range of a ball --- */
 
 typedef struct sides {
     uint64_t faces, above, below, covered;
@@ -452,8 +453,8 @@ static sides sides_of(const opened *o, uint64_t stroke)
     return s;
 }
 
-/* A plate of 2 x 2 x 0.1: a ball that goes through it paints one side; at its rim both. */
-START_TEST(the_other_side_of_a_thin_wall_stays_clean)
+/* A plate of 2 x 2 x 0.1: a ball through it paints one side; at its rim both. */
+START_TEST(test_paint_spares_back_of_thin_plate)
 {
     for (int cut = -1; cut <= 1; cut += 2) {
         opened o =
@@ -474,8 +475,8 @@ START_TEST(the_other_side_of_a_thin_wall_stays_clean)
 }
 END_TEST
 
-/* Two faces of one large square, and a ball that meets neither of its other edges. */
-START_TEST(faces_are_joined_across_edges_whose_ends_are_far)
+/* Two faces of one large square, and a ball that touches none of its other edges. */
+START_TEST(test_paint_joins_faces_across_long_edges)
 {
     opened o = open_model(ebpo_test_sheet(8, 1), -1);
     add_dab(&o, 0, 0xff0000ff, 1, 4.1, 3.9, 0);
@@ -490,15 +491,15 @@ END_TEST
 
 /* --- areas --- */
 
-/* The part of two discs of radius r, d apart, that both have. */
+/* Returns the common area of two discs of radius r at distance d. */
 static double lens(double r, double d)
 {
     return 2 * r * r * acos(d / (2 * r)) - d / 2 * sqrt(4 * r * r - d * d);
 }
 
-/* On a square of 8: a disc, a second one that takes a part of it, one that erases a part of both,
- * and a disc in a layer above. */
-START_TEST(areas_are_those_of_discs)
+/* On a square of 8: a disc, a second one that overlaps it, one that erases a part of both, and a
+ * disc in a layer above. */
+START_TEST(test_paint_areas_match_discs)
 {
     for (int cut = -1; cut <= 1; cut += 2) {
         opened o = open_model(ebpo_test_sheet(8, 37), cut);
@@ -508,7 +509,7 @@ START_TEST(areas_are_those_of_discs)
         add_dab(&o, 0, 0xff0000ff, 0.9, 2, 2, 0);
         add_dab(&o, 1, 0xff0000ff, 0.9, 6, 6, 0);
         add_dab(&o, 0, 0x00ff00ff, 0.9, 3, 2, 0);
-        add_dab(&o, 0, 0, 0.9, 4.2, 2, 0); /* erases of the second one alone */
+        add_dab(&o, 0, 0, 0.9, 4.2, 2, 0); /* erases only the second one */
         add_dab(&o, 1, 0x00ff00ff, 0.9, 2.5, 2, 0);
         ebpo_paint_areas a = measured(&o, 256, 1), b = measured(&o, 256, 3);
         double second = disc - lens(0.9, 1.2), first = disc - lens(0.9, 1);
@@ -533,8 +534,8 @@ START_TEST(areas_are_those_of_discs)
 }
 END_TEST
 
-/* Balls that are smaller than what doubles can tell apart there; large ones beside them. */
-START_TEST(the_smallest_balls_come_to_an_end)
+/* Balls below the resolution of doubles there; large ones beside them. */
+START_TEST(test_paint_smallest_balls_terminate)
 {
     opened o = open_model(ebpo_test_sheet(8, 3), -1);
     for (int i = 0; i < 20; i++)
@@ -549,8 +550,8 @@ START_TEST(the_smallest_balls_come_to_an_end)
 }
 END_TEST
 
-/* All of a sphere, and a cap of it: the area of a cap within a chord r is pi r^2. */
-START_TEST(areas_follow_the_surface)
+/* A complete sphere, and a cap of it: the area of a cap within a chord r is pi r^2. */
+START_TEST(test_paint_areas_follow_surface)
 {
     opened o = open_model(ebpo_test_sphere((double[3]){ 1, 2, 3 }, 2, 4), -1);
     ebpo_mass mass = EBPO_MASS_INIT;
@@ -568,23 +569,24 @@ START_TEST(areas_follow_the_surface)
 }
 END_TEST
 
-/* --- a hand --- */
+/* --- a device --- */
 
 enum { HAND = 40 };
 
-static ebpo_paint_laid laid_by(opened *o, const ebpo_paint_pen *pen, double pressure, double height)
+static ebpo_paint_drawn laid_by(opened *o, const ebpo_paint_pen *pen, double pressure,
+                                double height)
 {
-    ebpo_paint_hand hand[HAND];
+    ebpo_paint_input hand[HAND];
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_paint_laid laid = EBPO_PAINT_LAID_INIT;
+    ebpo_paint_drawn laid = EBPO_PAINT_DRAWN_INIT;
     for (int i = 0; i < HAND; i++)
-        hand[i] = (ebpo_paint_hand){ { 1 + 0.15 * i, 4, i == 20 ? 3 : height }, pressure, 5. * i };
-    model_must(ebpo_paint_lay(o->paint, o->context, hand, HAND, pen, &laid, &error), "laying",
+        hand[i] = (ebpo_paint_input){ { 1 + 0.15 * i, 4, i == 20 ? 3 : height }, pressure, 5. * i };
+    model_must(ebpo_paint_draw(o->paint, o->context, hand, HAND, pen, &laid, &error), "laying",
                &error);
     return laid;
 }
 
-/* Points are on their faces, where their weights say, and within the spread. */
+/* Checks that points are on their faces, at their weights, and within the spread. */
 static void check_points(const ebpo_paint *paint, const ebpo_mesh *mesh)
 {
     ebpo_paint_stroke s = EBPO_PAINT_STROKE_INIT;
@@ -603,7 +605,7 @@ static void check_points(const ebpo_paint *paint, const ebpo_mesh *mesh)
         }
 }
 
-START_TEST(the_more_pressure_the_more_points)
+START_TEST(test_paint_pressure_adds_points)
 {
     opened o = open_model(ebpo_test_sheet(8, 16), -1);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -615,11 +617,11 @@ START_TEST(the_more_pressure_the_more_points)
     pen.density = 20;
     pen.size_least = 0.25;
     pen.within = 1;
-    ebpo_paint_laid soft = laid_by(&o, &pen, 0.1, 0.5), hard = laid_by(&o, &pen, 1, 0.5),
-                    again = laid_by(&o, &pen, 1, 0.5);
+    ebpo_paint_drawn soft = laid_by(&o, &pen, 0.1, 0.5), hard = laid_by(&o, &pen, 1, 0.5),
+                     again = laid_by(&o, &pen, 1, 0.5);
     pen.seed = 2;
     laid_by(&o, &pen, 1, 0.5);
-    /* the hand goes up at one place, where the pen is lifted */
+    /* the device moves up at one position, where the pen is lifted */
     ck_assert(soft.strokes == 2 && hard.strokes == 2 && soft.lifted == hard.lifted);
     ck_assert(soft.steps == hard.steps && soft.lifted > 0 && hard.strayed == 0);
     ck_assert(soft.points == 2 * soft.steps && hard.points == 20 * hard.steps);
@@ -641,21 +643,21 @@ START_TEST(the_more_pressure_the_more_points)
 }
 END_TEST
 
-START_TEST(a_pen_that_makes_no_sense_lays_nothing)
+START_TEST(test_paint_invalid_pen_adds_nothing)
 {
     opened o = open_model(ebpo_test_sheet(8, 2), -1);
-    const ebpo_paint_hand hand[2] = { { { 1, 1, 1 }, 1, 0 }, { { 1e9, 1, 1 }, 1, 0 } };
+    const ebpo_paint_input hand[2] = { { { 1, 1, 1 }, 1, 0 }, { { 1e9, 1, 1 }, 1, 0 } };
     ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
     ebpo_paint_pen pen = EBPO_PAINT_PEN_INIT;
-    ck_assert(ebpo_paint_lay(o.paint, o.context, hand, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
+    ck_assert(ebpo_paint_draw(o.paint, o.context, hand, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
     pen.radius = 0.1;
-    ck_assert(ebpo_paint_lay(o.paint, o.context, hand, 0, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
-    ck_assert(ebpo_paint_lay(o.paint, o.context, hand, 2, &pen, NULL, NULL) == EBPO_E_LIMIT);
+    ck_assert(ebpo_paint_draw(o.paint, o.context, hand, 0, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
+    ck_assert(ebpo_paint_draw(o.paint, o.context, hand, 2, &pen, NULL, NULL) == EBPO_E_LIMIT);
     pen.density = 2;
-    ck_assert(ebpo_paint_lay(o.paint, o.context, hand, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
+    ck_assert(ebpo_paint_draw(o.paint, o.context, hand, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
     pen.density = 1;
     pen.layer = 1;
-    ck_assert(ebpo_paint_lay(o.paint, o.context, hand, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
+    ck_assert(ebpo_paint_draw(o.paint, o.context, hand, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
     ck_assert(ebpo_paint_get_info(o.paint, &info) == EBPO_OK && info.stroke_count == 0);
     close_model(&o);
 }
@@ -663,8 +665,8 @@ END_TEST
 
 /* --- baking --- */
 
-/* Only what is covered changes, whatever the type of the colours. */
-START_TEST(baked_colours_keep_their_types)
+/* Changes only covered vertices, for all types of colours. */
+START_TEST(test_paint_baked_colours_keep_type)
 {
     opened o = open_model(ebpo_test_sheet(8, 8), -1);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -683,7 +685,7 @@ START_TEST(baked_colours_keep_their_types)
         ck_assert(rgba[4 * i] == (near ? 0x40 : 0) && rgba[4 * i + 2] == (near ? 0xc0 : 0));
     }
     ebpo_colours own;
-    model_must(ebpo_paint_dye_mesh(&mesh, rgba, &error), "dyeing", &error);
+    model_must(ebpo_paint_colour_mesh(&mesh, rgba, &error), "dyeing", &error);
     model_must(ebpo_mesh_colours(&mesh, &own, &error), "colours", &error);
     for (uint64_t i = 0; i < mesh.vertex_count; i++)
         ck_assert(memcmp(own.vertex + 4 * i, rgba + 4 * i, 3) == 0);
@@ -700,24 +702,24 @@ TEST_SUITE(paint)
     TCase *c = tcase_create("paint");
     tcase_set_timeout(c, 600);
     tcase_add_checked_fixture(c, scratch_enter, scratch_leave);
-    tcase_add_test(c, files_give_back_what_they_hold);
-    tcase_add_test(c, the_second_of_two_that_save_one_file_is_refused);
-    tcase_add_test(c, a_file_that_is_changed_in_its_place_is_not_replaced);
-    tcase_add_test(c, one_at_a_time_has_a_file_open_to_change);
-    tcase_add_test(c, a_new_paint_does_not_replace_one_that_was_made_meanwhile);
-    tcase_add_test(c, a_new_paint_makes_no_file_before_it_is_saved);
-    tcase_add_test(c, points_are_checked_against_the_model);
-    tcase_add_test(c, what_is_removed_is_gone);
-    tcase_add_test(c, what_is_wrong_is_refused);
-    tcase_add_test(c, a_paint_of_another_model_is_refused);
-    tcase_add_test(c, the_other_side_of_a_thin_wall_stays_clean);
-    tcase_add_test(c, faces_are_joined_across_edges_whose_ends_are_far);
-    tcase_add_test(c, areas_are_those_of_discs);
-    tcase_add_test(c, the_smallest_balls_come_to_an_end);
-    tcase_add_test(c, areas_follow_the_surface);
-    tcase_add_test(c, the_more_pressure_the_more_points);
-    tcase_add_test(c, a_pen_that_makes_no_sense_lays_nothing);
-    tcase_add_test(c, baked_colours_keep_their_types);
+    tcase_add_test(c, test_paint_file_round_trip);
+    tcase_add_test(c, test_paint_second_save_is_refused);
+    tcase_add_test(c, test_paint_keeps_file_modified_in_place);
+    tcase_add_test(c, test_paint_file_is_locked_for_changes);
+    tcase_add_test(c, test_new_paint_keeps_file_made_meanwhile);
+    tcase_add_test(c, test_new_paint_writes_file_on_save);
+    tcase_add_test(c, test_paint_points_are_checked_against_model);
+    tcase_add_test(c, test_paint_removed_layers_are_absent);
+    tcase_add_test(c, test_paint_invalid_input_is_refused);
+    tcase_add_test(c, test_paint_of_other_model_is_refused);
+    tcase_add_test(c, test_paint_spares_back_of_thin_plate);
+    tcase_add_test(c, test_paint_joins_faces_across_long_edges);
+    tcase_add_test(c, test_paint_areas_match_discs);
+    tcase_add_test(c, test_paint_smallest_balls_terminate);
+    tcase_add_test(c, test_paint_areas_follow_surface);
+    tcase_add_test(c, test_paint_pressure_adds_points);
+    tcase_add_test(c, test_paint_invalid_pen_adds_nothing);
+    tcase_add_test(c, test_paint_baked_colours_keep_type);
     suite_add_tcase(s, c);
     return s;
 }

@@ -6,11 +6,11 @@
 #include <string.h>
 
 #include "check_main.h"
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "extras/collide/face_pairs.h"
 #include "extras/collide/posed_frames.h"
 #include "geometry/triangle_pair.h"
-#include "pair_twin.h"
+#include "pair_reference.h"
 #include "solids.h"
 
 enum { CASES = 80000, FILTERED = 8000, CONTACTS = 20000 };
@@ -42,31 +42,31 @@ static ebpo_pair_kind kind_of(const faces *f)
     return ebpo_triangle_pair(CORNERS(f->a), CORNERS(f->b));
 }
 
-START_TEST(kinds_equal_brute_force)
+START_TEST(test_pair_kinds_match_brute_force)
 {
     uint64_t state = (uint64_t)_i + 1;
     int found[4] = { 0 };
     for (int i = 0; i < (int)ebpo_test_scaled(CASES); i++) {
         faces f;
-        twin_pair_case(f.a, f.b, _i, &state);
-        int expected = twin_pair_kind(CORNERS(f.a), CORNERS(f.b));
+        reference_pair_case(f.a, f.b, _i, &state);
+        int expected = reference_pair_kind(CORNERS(f.a), CORNERS(f.b));
         found[expected]++;
         ck_assert_msg((int)kind_of(&f) == expected, "%s, case %d: %d, expected %d",
-                      twin_pair_name(_i), i, kind_of(&f), expected);
+                      reference_pair_name(_i), i, kind_of(&f), expected);
     }
     ck_assert_int_gt(found[EBPO_PAIR_APART] + found[EBPO_PAIR_TOUCHING], 0);
     if (getenv("EBPO_TEST_TELL"))
-        printf("%-40s %8d apart %8d touching %8d crossing %8d coplanar\n", twin_pair_name(_i),
+        printf("%-40s %8d apart %8d touching %8d crossing %8d coplanar\n", reference_pair_name(_i),
                found[0], found[1], found[2], found[3]);
 }
 END_TEST
 
-START_TEST(kinds_do_not_depend_on_order)
+START_TEST(test_pair_kinds_ignore_order)
 {
     uint64_t state = (uint64_t)_i + 31;
     for (int i = 0; i < (int)ebpo_test_scaled(CASES); i++) {
         faces f;
-        twin_pair_case(f.a, f.b, _i, &state);
+        reference_pair_case(f.a, f.b, _i, &state);
         ebpo_pair_kind kind = kind_of(&f);
         ck_assert_int_eq(ebpo_triangle_pair(CORNERS(f.b), CORNERS(f.a)), kind);
         turn_around(i & 1 ? f.a : f.b);
@@ -79,7 +79,7 @@ START_TEST(kinds_do_not_depend_on_order)
 }
 END_TEST
 
-START_TEST(kinds_are_as_documented)
+START_TEST(test_pair_kinds_match_documentation)
 {
     static const double face[3][3] = { { 0, 0, 0 }, { 4, 0, 0 }, { 0, 4, 0 } };
     static const struct {
@@ -112,7 +112,8 @@ typedef struct batch {
     float a[72], b[72], error;
 } batch;
 
-/* Floats as a caller makes them: less a point, and off by up to `blur` of their size. */
+/* Converts to floats as a caller does: relative to a point, with an error of up to `blur` of their
+ * size. */
 static void to_floats(batch *g, double blur, uint64_t *state)
 {
     double most = 0;
@@ -127,7 +128,7 @@ static void to_floats(batch *g, double blur, uint64_t *state)
     for (int lane = 0; lane < 8; lane++)
         for (int i = 0; i < 9; i++) {
             const double *o = g->f[lane].a[0];
-            double by_a = off * twin_uniform(state), by_b = off * twin_uniform(state);
+            double by_a = off * reference_uniform(state), by_b = off * reference_uniform(state);
             g->a[i * 8 + lane] = (float)(g->f[lane].a[i / 3][i % 3] - o[i % 3] + by_a);
             g->b[i * 8 + lane] = (float)(g->f[lane].b[i / 3][i % 3] - o[i % 3] + by_b);
         }
@@ -167,7 +168,7 @@ static void check_builds(const batch *g, ebpo_pair_masks masks)
 /* Kinds of numbers that floats can hold. */
 static bool fit_for_floats(int kind) { return kind != 12 && kind != 13; }
 
-START_TEST(filter_says_what_is_exact)
+START_TEST(test_pair_filter_matches_exact_result)
 {
     static const double blurs[] = { 0, 0x1p-22, 0x1p-14, 0x1p-6 };
     uint64_t state = (uint64_t)_i + 91;
@@ -177,18 +178,18 @@ START_TEST(filter_says_what_is_exact)
     for (int i = 0; i < count; i++) {
         batch g;
         for (int lane = 0; lane < 8; lane++)
-            twin_pair_case(g.f[lane].a, g.f[lane].b, _i, &state);
+            reference_pair_case(g.f[lane].a, g.f[lane].b, _i, &state);
         to_floats(&g, blurs[i & 3], &state);
         ebpo_pair_masks masks = ebpo_pair_kernels_base.eight(g.a, g.b, g.error);
         check_masks(&g, masks, &open[i & 3]);
         check_builds(&g, masks);
     }
-    if (_i == 0) /* ordinary faces are for the filter */
+    if (_i == 0) /* the filter is meant for ordinary faces */
         ck_assert_int_le(open[0] + open[1], count / 2 * 8 / 100 + 4);
 }
 END_TEST
 
-/* All pairs of two blocks are told as by one face at a time. */
+/* Checks that all pairs of two blocks give the results of single faces. */
 static void check_blocks(const batch *g, unsigned lanes_a, unsigned lanes_b)
 {
     ebpo_block_pairs found, other;
@@ -213,7 +214,7 @@ static void check_blocks(const batch *g, unsigned lanes_a, unsigned lanes_b)
     ck_assert_uint_eq(at, found.count);
 }
 
-START_TEST(blocks_are_told_as_single_faces)
+START_TEST(test_pair_blocks_match_single_faces)
 {
     uint64_t state = (uint64_t)_i + 131;
     if (!fit_for_floats(_i))
@@ -221,15 +222,15 @@ START_TEST(blocks_are_told_as_single_faces)
     for (int i = 0; i < (int)ebpo_test_scaled(FILTERED); i++) {
         batch g;
         for (int lane = 0; lane < 8; lane++)
-            twin_pair_case(g.f[lane].a, g.f[lane].b, _i, &state);
+            reference_pair_case(g.f[lane].a, g.f[lane].b, _i, &state);
         to_floats(&g, 0, &state);
-        uint64_t lanes = twin_random(&state);
+        uint64_t lanes = reference_random(&state);
         check_blocks(&g, i & 1 ? 255 : lanes & 255, i & 1 ? 255 : lanes >> 8 & 255);
     }
 }
 END_TEST
 
-/* --- from blocks in files to pairs in the world --- */
+/* --- from blocks in files to pairs in world coordinates --- */
 
 typedef struct posed_model {
     float block[72];
@@ -238,7 +239,7 @@ typedef struct posed_model {
     ebpo_posed_block posed;
 } posed_model;
 
-/* Equal poses keep what is degenerate nearly so; `turn`: none, a quarter, or neither. */
+/* Equal poses keep degenerate cases nearly degenerate; `turn`: none, a quarter, or neither. */
 static ebpo_pose pose_by(int turn)
 {
     static const double rotations[3][3][3] = {
@@ -286,7 +287,7 @@ static void fill_models(posed_model *a, posed_model *b, int kind, uint64_t *stat
 {
     for (int lane = 0; lane < 8; lane++) {
         faces f;
-        twin_pair_case(f.a, f.b, kind, state);
+        reference_pair_case(f.a, f.b, kind, state);
         for (int k = 0; k < 9; k++) {
             a->block[8 * k + lane] = (float)f.a[k / 3][k % 3];
             b->block[8 * k + lane] = (float)f.b[k / 3][k % 3];
@@ -316,7 +317,7 @@ static void check_posed(const posed_model *a, const posed_model *b)
     ck_assert_uint_eq(at, found.count);
 }
 
-START_TEST(posed_blocks_lose_no_pair)
+START_TEST(test_posed_blocks_lose_no_pair)
 {
     uint64_t state = (uint64_t)_i + 151;
     if (!fit_for_floats(_i))
@@ -334,9 +335,9 @@ START_TEST(posed_blocks_lose_no_pair)
 }
 END_TEST
 
-/* --- the filter where its bounds matter --- */
+/* --- the filter near its bounds --- */
 
-/* Twice three corners by number, and the determinant of four of them. */
+/* Two triples of corners by index, and the determinant of four of them. */
 static double determinant(double *const corner[6], const int of[4])
 {
     double d[3][3];
@@ -351,7 +352,7 @@ static double determinant(double *const corner[6], const int of[4])
     return sum;
 }
 
-/* Of the 15 determinants that the filter may look at, the one that is nearest to 0. */
+/* Finds, among the 15 determinants that the filter may use, the one nearest to 0. */
 static void find_critical(double *const corner[6], int out[4])
 {
     double least = INFINITY;
@@ -368,7 +369,7 @@ static void find_critical(double *const corner[6], int out[4])
     }
 }
 
-/* Each coordinate moved by `off`, so that this determinant changes as far as it can. */
+/* Moves each coordinate by `off`, so that this determinant changes as much as possible. */
 static void move_worst(double *const corner[6], double off)
 {
     int of[4];
@@ -392,8 +393,8 @@ static void make_worst(batch *g, double off, uint64_t *state)
     static const int kinds[] = { 4, 5, 6, 9, 10, 14, 14, 14 };
     for (int lane = 0; lane < 8; lane++) {
         faces *f = &g->f[lane], moved;
-        twin_pair_case(f->a, f->b, kinds[twin_random(state) & 7], state);
-        double sign = twin_random(state) & 1 ? off : -off;
+        reference_pair_case(f->a, f->b, kinds[reference_random(state) & 7], state);
+        double sign = reference_random(state) & 1 ? off : -off;
         for (int i = 0; i < 9 && off == 0; i++) {
             f->a[i / 3][i % 3] = (double)(float)f->a[i / 3][i % 3];
             f->b[i / 3][i % 3] = (double)(float)f->b[i / 3][i % 3];
@@ -412,7 +413,7 @@ static void make_worst(batch *g, double off, uint64_t *state)
     g->error = (float)(off == 0 ? 0 : off + 0x1p-22);
 }
 
-START_TEST(filter_holds_where_its_bounds_matter)
+START_TEST(test_pair_filter_holds_at_its_bounds)
 {
     static const double offs[] = { 0, 0x1p-20, 0x1p-12, 0x1p-6 };
     uint64_t state = (uint64_t)_i + 191;
@@ -427,9 +428,9 @@ END_TEST
 
 /* --- contacts --- */
 
-static twin_end end_for_twin(const ebpo_contact_end *end)
+static reference_end end_for_reference(const ebpo_contact_end *end)
 {
-    return (twin_end){ end->point, (int)end->on_a, (int)end->on_b };
+    return (reference_end){ end->point, (int)end->on_a, (int)end->on_b };
 }
 
 static void greatest(const faces *f, double most[3])
@@ -446,9 +447,9 @@ static void check_contact(const faces *f, const char *name)
     ebpo_contact_end end[2], back[2];
     double most[3];
     ebpo_triangle_contact(CORNERS(f->a), CORNERS(f->b), end);
-    const twin_end both[] = { end_for_twin(&end[0]), end_for_twin(&end[1]) };
+    const reference_end both[] = { end_for_reference(&end[0]), end_for_reference(&end[1]) };
     greatest(f, most);
-    const char *wrong = twin_pair_contact(CORNERS(f->a), CORNERS(f->b), both, most);
+    const char *wrong = reference_pair_contact(CORNERS(f->a), CORNERS(f->b), both, most);
     ck_assert_msg(!wrong, "%s: %s", name, wrong);
     ebpo_triangle_contact(CORNERS(f->b), CORNERS(f->a), back);
     for (int i = 0; i < 2; i++) {
@@ -463,17 +464,17 @@ static void check_contact(const faces *f, const char *name)
         ck_assert_mem_eq(end[i].point, back[1 - i].point, sizeof end[i].point);
 }
 
-START_TEST(contacts_are_where_faces_meet)
+START_TEST(test_pair_contacts_are_on_both_faces)
 {
     uint64_t state = (uint64_t)_i + 171;
     int found = 0;
     for (int i = 0; i < (int)ebpo_test_scaled(CONTACTS); i++) {
         faces f;
-        twin_pair_case(f.a, f.b, _i, &state);
+        reference_pair_case(f.a, f.b, _i, &state);
         if (kind_of(&f) != EBPO_PAIR_CROSSING)
             continue;
         found++;
-        check_contact(&f, twin_pair_name(_i));
+        check_contact(&f, reference_pair_name(_i));
     }
     ck_assert(_i != 0 || found > 0);
 }
@@ -483,14 +484,14 @@ TEST_SUITE(pair)
 {
     TCase *tests = tcase_create("pair");
     tcase_set_timeout(tests, 1000);
-    tcase_add_test(tests, kinds_are_as_documented);
-    tcase_add_loop_test(tests, kinds_equal_brute_force, 0, TWIN_PAIR_KINDS);
-    tcase_add_loop_test(tests, kinds_do_not_depend_on_order, 0, TWIN_PAIR_KINDS);
-    tcase_add_loop_test(tests, filter_says_what_is_exact, 0, TWIN_PAIR_KINDS);
-    tcase_add_loop_test(tests, blocks_are_told_as_single_faces, 0, TWIN_PAIR_KINDS);
-    tcase_add_loop_test(tests, posed_blocks_lose_no_pair, 0, TWIN_PAIR_KINDS);
-    tcase_add_loop_test(tests, filter_holds_where_its_bounds_matter, 0, 4);
-    tcase_add_loop_test(tests, contacts_are_where_faces_meet, 0, TWIN_PAIR_KINDS);
+    tcase_add_test(tests, test_pair_kinds_match_documentation);
+    tcase_add_loop_test(tests, test_pair_kinds_match_brute_force, 0, REFERENCE_PAIR_KINDS);
+    tcase_add_loop_test(tests, test_pair_kinds_ignore_order, 0, REFERENCE_PAIR_KINDS);
+    tcase_add_loop_test(tests, test_pair_filter_matches_exact_result, 0, REFERENCE_PAIR_KINDS);
+    tcase_add_loop_test(tests, test_pair_blocks_match_single_faces, 0, REFERENCE_PAIR_KINDS);
+    tcase_add_loop_test(tests, test_posed_blocks_lose_no_pair, 0, REFERENCE_PAIR_KINDS);
+    tcase_add_loop_test(tests, test_pair_filter_holds_at_its_bounds, 0, 4);
+    tcase_add_loop_test(tests, test_pair_contacts_are_on_both_faces, 0, REFERENCE_PAIR_KINDS);
     Suite *suite = suite_create("pair");
     suite_add_tcase(suite, tests);
     return suite;

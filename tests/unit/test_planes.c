@@ -1,5 +1,5 @@
-/* Faces against cells, corner windings and selections, against plain twins that sample or
- * enumerate. */
+/* Faces against cells, corner windings and selections, against reference implementations that
+ * sample or enumerate. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -14,8 +14,8 @@ static const double shapes[][6] = { { 0, 0, 0, 1, 1, 1 },
                                     { 1e7, -1e7, 3, 4, 8, 16 },
                                     { 1e-30, 0, 0, 1e-30, 1e-30, 1e-30 } };
 
-/* Corners on a coarse grid around the box, so that touching walls, edges and corners exactly is
- * common. */
+/* Corners on a coarse grid around the box, so that exact contact with cell faces, edges and corners
+ * is common. */
 static ebpo_triangle random_face(const ebpo_box *box, uint64_t *seed, bool on_grid)
 {
     ebpo_triangle t;
@@ -49,12 +49,13 @@ static ebpo_box box_of(int i, int grid_level)
     return box;
 }
 
-/* Relative position in the cell, and whether rounding of the sampled point could matter. */
+/* Checks the relative position in the cell, and whether rounding of the sampled point could matter.
+ */
 static bool clearly_in(const ebpo_box *box, ebpo_cell cell, const double p[3])
 {
     for (int k = 0; k < 3; k++) {
-        double low = ebpo_wall(box, k, cell.level, cell.at[k]),
-               high = ebpo_wall(box, k, cell.level, cell.at[k] + 1);
+        double low = ebpo_cell_face(box, k, cell.level, cell.at[k]),
+               high = ebpo_cell_face(box, k, cell.level, cell.at[k] + 1);
         double margin = 1e-12 * (fabs(low) + fabs(high) + (high - low));
         if (p[k] < low + margin || p[k] > high - margin)
             return false;
@@ -62,7 +63,7 @@ static bool clearly_in(const ebpo_box *box, ebpo_cell cell, const double p[3])
     return true;
 }
 
-START_TEST(no_octant_that_a_face_reaches_is_missed)
+START_TEST(test_octants_intersected_by_face_are_found)
 {
     uint64_t seed = 1;
     for (int s = 0; s < 4; s++) {
@@ -71,7 +72,7 @@ START_TEST(no_octant_that_a_face_reaches_is_missed)
             ebpo_triangle t = random_face(&box, &seed, i % 2);
             ebpo_cell cell = { 0, { 0, 0, 0 } };
             for (int depth = 0; depth < 6; depth++) {
-                unsigned mask = ebpo_octants_touched(&box, cell, &t);
+                unsigned mask = ebpo_octants_visited(&box, cell, &t);
                 for (int j = 0; j < 8; j++) {
                     double p[3];
                     point_of(&t, &seed, p);
@@ -98,19 +99,20 @@ START_TEST(no_octant_that_a_face_reaches_is_missed)
 }
 END_TEST
 
-START_TEST(octants_far_from_a_face_are_left_out)
+START_TEST(test_octants_far_from_face_are_omitted)
 {
     ebpo_box box = box_of(0, 10);
     ebpo_triangle t = { { { 0.1, 0.1, 0.1 }, { 0.2, 0.1, 0.1 }, { 0.1, 0.2, 0.1 } } };
-    ck_assert_uint_eq(ebpo_octants_touched(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, &t), 1);
-    /* A slanted face whose box reaches all octants, and which cuts off one corner of the cube. */
+    ck_assert_uint_eq(ebpo_octants_visited(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, &t), 1);
+    /* A slanted face whose box intersects all octants, and which cuts off one corner of the cube.
+     */
     ebpo_triangle slanted = { { { 0.9, 0, 0 }, { 0, 0.9, 0 }, { 0, 0, 0.9 } } };
-    unsigned mask = ebpo_octants_touched(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, &slanted);
+    unsigned mask = ebpo_octants_visited(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, &slanted);
     ck_assert_uint_eq(mask, 0x17);
 }
 END_TEST
 
-START_TEST(clipped_face_bounds_every_point_of_it_in_the_cell)
+START_TEST(test_clipped_face_bounds_points_in_cell)
 {
     uint64_t seed = 2;
     for (int s = 0; s < 4; s++) {
@@ -137,7 +139,7 @@ START_TEST(clipped_face_bounds_every_point_of_it_in_the_cell)
                     best =
                         fmax(best, n[0] * points[q][0] + n[1] * points[q][1] + n[2] * points[q][2]);
                 for (int k = 0; k < 3; k++) {
-                    double low = ebpo_wall(&box, k, level, cell.at[k]);
+                    double low = ebpo_cell_face(&box, k, level, cell.at[k]);
                     value += n[k] * ((p[k] - low) / (box.size[k] / (1 << level)));
                 }
                 ck_assert_double_le(value, best + 3 * slack + 1e-8);
@@ -147,7 +149,7 @@ START_TEST(clipped_face_bounds_every_point_of_it_in_the_cell)
 }
 END_TEST
 
-START_TEST(corner_windings_of_a_cube_in_a_cell_are_zero_and_inside_ones_are_one)
+START_TEST(test_corner_windings_of_cube_in_cell)
 {
     ebpo_box box = box_of(0, 4);
     double low[3] = { 0.1, 0.1, 0.1 }, high[3] = { 0.9, 0.9, 0.9 };
@@ -171,7 +173,8 @@ START_TEST(corner_windings_of_a_cube_in_a_cell_are_zero_and_inside_ones_are_one)
 }
 END_TEST
 
-/* The slow twin: always the greatest removal, everything evaluated in every round. */
+/* The reference implementation: always the greatest removal, with all planes evaluated in every
+ * round. */
 static int plain_greedy(ebpo_polytope *envelope, const ebpo_candidate *c, int count, double epsilon,
                         int most, uint32_t *codes)
 {
@@ -208,7 +211,7 @@ static int plain_greedy(ebpo_polytope *envelope, const ebpo_candidate *c, int co
     return taken;
 }
 
-START_TEST(lazy_greedy_takes_what_plain_greedy_takes)
+START_TEST(test_lazy_greedy_matches_plain_greedy)
 {
     uint64_t seed = 3;
     for (int round = 0; round < 400; round++) {
@@ -246,11 +249,11 @@ TEST_SUITE(planes)
     Suite *suite = suite_create("planes");
     TCase *tests = tcase_create("planes");
     tcase_set_timeout(tests, 300);
-    tcase_add_test(tests, no_octant_that_a_face_reaches_is_missed);
-    tcase_add_test(tests, octants_far_from_a_face_are_left_out);
-    tcase_add_test(tests, clipped_face_bounds_every_point_of_it_in_the_cell);
-    tcase_add_test(tests, corner_windings_of_a_cube_in_a_cell_are_zero_and_inside_ones_are_one);
-    tcase_add_test(tests, lazy_greedy_takes_what_plain_greedy_takes);
+    tcase_add_test(tests, test_octants_intersected_by_face_are_found);
+    tcase_add_test(tests, test_octants_far_from_face_are_omitted);
+    tcase_add_test(tests, test_clipped_face_bounds_points_in_cell);
+    tcase_add_test(tests, test_corner_windings_of_cube_in_cell);
+    tcase_add_test(tests, test_lazy_greedy_matches_plain_greedy);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,4 +1,4 @@
-/* Reading and writing PLY: dialects, messages, damage. */
+/* Reading and writing PLY: dialects, messages, damaged files. */
 #include <fcntl.h>
 #include <inttypes.h>
 #include <stdarg.h>
@@ -150,7 +150,7 @@ static void make_cube(bytes *b, enum encoding e, bool faces_first, int width, co
 
 static ebpo_status parse(ebpo_mesh *mesh, const bytes *b, ebpo_error *error)
 {
-    /* A block of just this size, so that the sanitizer sees a read behind its end. */
+    /* A block of exactly this size, so that the sanitizer detects a read after its end. */
     uint8_t *copy = malloc(b->size ? b->size : 1);
     memcpy(copy, b->data, b->size);
     ebpo_status status =
@@ -188,7 +188,7 @@ static void check_cube(const ebpo_mesh *mesh, int width)
 
 /* --- dialects --- */
 
-START_TEST(every_encoding_order_width_and_line_end_gives_the_same_cube)
+START_TEST(test_ply_variants_give_same_cube)
 {
     static bytes b;
     static const char *const line_ends[] = { "\n", "\r\n", "\r" };
@@ -207,7 +207,7 @@ START_TEST(every_encoding_order_width_and_line_end_gives_the_same_cube)
 }
 END_TEST
 
-START_TEST(reader_allows_bytes_behind_the_last_element)
+START_TEST(test_ply_trailing_bytes_are_accepted)
 {
     static bytes b;
     for (int e = 0; e < 3; e++) {
@@ -221,7 +221,7 @@ START_TEST(reader_allows_bytes_behind_the_last_element)
 }
 END_TEST
 
-START_TEST(integer_coordinates_are_read_as_doubles)
+START_TEST(test_ply_integer_coordinates_become_doubles)
 {
     static const char *const types[] = { "char", "uchar", "short", "ushort", "int", "uint" };
     static const int widths[] = { 1, 1, 2, 2, 4, 4 };
@@ -258,7 +258,7 @@ END_TEST
 #define FACES(n) "element face " #n "\nproperty list uchar int vertex_indices\nend_header\n"
 #define TRIANGLE POINTS(3) FACES(1) "0 0 0\n1 0 0\n0 1 0\n"
 
-START_TEST(reader_passes_nan_and_infinity_through)
+START_TEST(test_ply_nan_and_infinity_are_kept)
 {
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -269,7 +269,7 @@ START_TEST(reader_passes_nan_and_infinity_through)
 }
 END_TEST
 
-START_TEST(rows_may_be_broken_into_lines_and_short_faces_are_counted)
+START_TEST(test_ply_broken_rows_and_short_faces)
 {
     ebpo_mesh mesh;
     ck_assert(parse_text(&mesh,
@@ -280,7 +280,7 @@ START_TEST(rows_may_be_broken_into_lines_and_short_faces_are_counted)
 }
 END_TEST
 
-START_TEST(a_comment_without_its_word_is_allowed_before_the_first_element)
+START_TEST(test_ply_comment_without_keyword_is_accepted)
 {
     ebpo_mesh mesh;
     ck_assert(
@@ -295,14 +295,14 @@ END_TEST
 
 /* --- polygons and strips --- */
 
-START_TEST(concave_faces_are_cut_by_ears)
+START_TEST(test_ply_concave_faces_are_triangulated)
 {
     ebpo_mesh mesh;
     ck_assert(parse_text(&mesh, POINTS(4) FACES(1) "0 0 0\n1 0 0\n0.2 0.2 0\n0 1 0\n4 0 1 2 3\n",
                          NULL) == EBPO_OK);
     ck_assert(mesh.face_count == 2 && mesh.polygons_triangulated == 1 &&
               mesh.polygons_concave == 1);
-    for (int i = 0; i < 2; i++) { /* only the diagonal 0-2 lies inside */
+    for (int i = 0; i < 2; i++) { /* only the diagonal 0-2 is inside */
         const uint32_t *f = mesh.faces + 3 * i;
         ck_assert((f[0] == 0 || f[1] == 0 || f[2] == 0) && (f[0] == 2 || f[1] == 2 || f[2] == 2));
     }
@@ -313,12 +313,12 @@ END_TEST
 #define STRIPS(n)   "element tristrips " #n "\nproperty list int int vertex_indices\nend_header\n"
 #define FIVE_POINTS "0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 0\n"
 
-START_TEST(strips_alternate_restart_and_lose_their_glue)
+START_TEST(test_ply_strips_restart_and_drop_degenerates)
 {
     ebpo_mesh mesh;
     const uint32_t expected[] = { 0, 1, 2, 2, 1, 3, 2, 3, 4, 1, 4, 3, 0, 3, 1 };
     ebpo_error error = EBPO_ERROR_INIT;
-    /* In the second strip a repeated vertex turns the parity: 1 4 3 3, then (3 3 0) and (3 0 1)
+    /* In the second strip a repeated vertex changes the parity: 1 4 3 3, then (3 3 0) and (3 0 1)
      * follow. */
     ck_assert_msg(parse_text(&mesh,
                              POINTS(5) STRIPS(2) FIVE_POINTS
@@ -338,42 +338,41 @@ static const struct {
     ebpo_status status;
     const char *message;
 } bad[] = {
-    { "", EBPO_E_FORMAT, "line 1: no PLY file" },
-    { "plyx\n", EBPO_E_FORMAT, "line 1: no PLY file" },
+    { "", EBPO_E_FORMAT, "line 1: not a PLY file" },
+    { "plyx\n", EBPO_E_FORMAT, "line 1: not a PLY file" },
     { "ply\nformat ascii 1.0\n", EBPO_E_FORMAT, "line 3: the file ends before 'end_header'" },
     { "ply\nformat ascii 2.0\n", EBPO_E_FORMAT, "line 2: unknown format version '2.0'" },
     { "ply\nformat text 1.0\n", EBPO_E_FORMAT, "line 2: unknown format 'text'" },
     { "ply\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
-      EBPO_E_FORMAT, "no format was named" },
+      EBPO_E_FORMAT, "no format statement" },
     { "ply\nformat ascii 1.0\nelement vertex three\n", EBPO_E_FORMAT,
       "line 3: not a count: 'three'" },
     { "ply\nformat ascii 1.0\nelement vertex 99999999999999999999\n", EBPO_E_FORMAT,
       "line 3: not a count" },
     { "ply\nformat ascii 1.0\nelement vertex -3\n", EBPO_E_FORMAT, "line 3: not a count: '-3'" },
-    { "ply\nformat ascii 1.0\nproperty float x\n", EBPO_E_FORMAT,
-      "line 3: no element stands before" },
+    { "ply\nformat ascii 1.0\nproperty float x\n", EBPO_E_FORMAT, "line 3: no element before" },
     { "ply\nformat ascii 1.0\nelement vertex 3\nproperty real x\n", EBPO_E_FORMAT,
       "line 4: unknown type 'real'" },
     { "ply\nformat ascii 1.0\nelement vertex 3\nproperty list float int x\n", EBPO_E_FORMAT,
-      "line 4: no type for a list's length: 'float'" },
+      "line 4: invalid type for a list length: 'float'" },
     { "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float x\n",
-      EBPO_E_FORMAT, "line 5: a second property 'x'" },
+      EBPO_E_FORMAT, "line 5: duplicate property 'x'" },
     { "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nelement vertex 3\n",
-      EBPO_E_FORMAT, "line 5: a second element 'vertex'" },
+      EBPO_E_FORMAT, "line 5: duplicate element 'vertex'" },
     { "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nend_header\n",
       EBPO_E_FORMAT, "line 3: this element has no property 'z'" },
     { "ply\nformat ascii 1.0\nelement vertex 3\npropertie float x\n", EBPO_E_FORMAT,
       "line 4: unknown statement 'propertie'" },
     { POINTS(3) "element face 1\nproperty list uchar float vertex_indices\n", EBPO_E_FORMAT,
-      "line 8: no type for vertex numbers: 'float'" },
+      "line 8: invalid type for vertex indices: 'float'" },
     { POINTS(3) "element face 1\nproperty list uchar int corners\nend_header\n", EBPO_E_FORMAT,
       "line 7: this element has no list 'vertex_indices'" },
     { "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n",
       EBPO_E_FORMAT, "no element 'vertex'" },
     { POINTS(3) "end_header\n0 0 0\n1 0 0\n0 1 0\n", EBPO_E_FORMAT,
-      "3 vertices but no faces: a point cloud" },
+      "3 vertices but no faces (a point cloud" },
     { POINTS(3) FACES(0) "0 0 0\n1 0 0\n0 1 0\n", EBPO_E_FORMAT,
-      "3 vertices but no faces: a point cloud" },
+      "3 vertices but no faces (a point cloud" },
     { POINTS(1000000000000) FACES(1) "0 0 0\n", EBPO_E_FORMAT,
       "line 3: 1000000000000 rows of element 'vertex' do not fit into the rest of the file" },
     { POINTS(10000000000000000000) FACES(1) "0 0 0\n", EBPO_E_FORMAT,
@@ -385,29 +384,29 @@ static const struct {
       "the face" },
     { TRIANGLE "3 0 -1 2\n", EBPO_E_FORMAT, "line 13: face 0 names vertex -1" },
     { TRIANGLE "3 0 1 9999999999999999999\n", EBPO_E_FORMAT,
-      "line 13: no whole number: '9999999999999999999' in face 0" },
-    { TRIANGLE "3 0 1 2.0\n", EBPO_E_FORMAT, "line 13: no whole number: '2.0' in face 0" },
+      "line 13: invalid integer '9999999999999999999' in face 0" },
+    { TRIANGLE "3 0 1 2.0\n", EBPO_E_FORMAT, "line 13: invalid integer '2.0' in face 0" },
     { TRIANGLE "3 0 1", EBPO_E_FORMAT,
       "line 13: face 0 has a list of 3 items, more than the rest" },
     { TRIANGLE "-3 0 1 2\n", EBPO_E_FORMAT, "line 13: face 0 has a list of -3 items" },
     { TRIANGLE "200000000 0 1 2\n", EBPO_E_FORMAT,
       "line 13: face 0 has a list of 200000000 items, more than the rest" },
-    { TRIANGLE "2 0 1 \n", EBPO_E_FORMAT, "none of its faces has three corners" },
+    { TRIANGLE "2 0 1 \n", EBPO_E_FORMAT, "no face has three corners" },
     { POINTS(3) FACES(1) "0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n", EBPO_E_FORMAT,
-      "line 11: no number: 'zero' in vertex 1" },
+      "line 11: invalid number 'zero' in vertex 1" },
     { POINTS(3) FACES(1) "0 0 0\n1 0x1p3 0\n0 1 0\n3 0 1 2\n", EBPO_E_FORMAT,
-      "line 11: no number: '0x1p3' in vertex 1" },
+      "line 11: invalid number '0x1p3' in vertex 1" },
     { POINTS(3) FACES(1) "0 0 0\n1 0,5 0\n0 1 0\n3 0 1 2\n", EBPO_E_FORMAT,
-      "line 11: no number: '0,5' in vertex 1" },
+      "line 11: invalid number '0,5' in vertex 1" },
     { POINTS(3) FACES(1) "0 0 0\n1 0\n0 1 0\n3 0 1 2\n", EBPO_E_FORMAT,
-      "line 12: vertex 1 began in line 11 and ends within this one" },
+      "line 12: vertex 1 began in line 11 and ends within this line" },
     { POINTS(3) FACES(1) "0.00000 0.0000 0.0000\n1.000000 0\n", EBPO_E_FORMAT,
       "line 12: the file ends after 187 bytes within row 1 of the 3 of element 'vertex'" },
     { POINTS(5) STRIPS(1) FIVE_POINTS "4 0 1 2 5\n", EBPO_E_FORMAT,
       "line 15: strip 0 names vertex 5" },
 };
 
-START_TEST(reader_says_what_is_wrong_and_where)
+START_TEST(test_ply_errors_report_cause_and_position)
 {
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -419,13 +418,13 @@ START_TEST(reader_says_what_is_wrong_and_where)
 }
 END_TEST
 
-START_TEST(binary_index_out_of_range_is_named_with_face_and_byte)
+START_TEST(test_ply_bad_index_reports_position)
 {
     static bytes b;
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
     make_cube(&b, LITTLE, false, 4, "\n");
-    size_t row = 4 + 1 + 4 * 2, begin = b.size - 6 * row; /* of the faces */
+    size_t row = 4 + 1 + 4 * 2, begin = b.size - 6 * row; /* rows of the faces */
     b.data[begin + 2 * row + 4 + 1 + 2 * 3] = 8;          /* last corner of face 2 */
     char expected[100];
     snprintf(expected, sizeof expected,
@@ -437,7 +436,7 @@ START_TEST(binary_index_out_of_range_is_named_with_face_and_byte)
 }
 END_TEST
 
-START_TEST(a_header_longer_than_a_megabyte_is_refused)
+START_TEST(test_ply_header_size_limit)
 {
     size_t size = (1u << 20) + 1000;
     uint8_t *data = malloc(size);
@@ -447,12 +446,12 @@ START_TEST(a_header_longer_than_a_megabyte_is_refused)
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert(ebpo_ply_parse_memory(&mesh, data, size, "x", NULL, 0, NULL, &error) ==
               EBPO_E_FORMAT);
-    ck_assert(strstr(error.message, "a megabyte of header") != NULL);
+    ck_assert(strstr(error.message, "the header exceeds 1 MiB") != NULL);
     free(data);
 }
 END_TEST
 
-START_TEST(a_file_cut_at_any_byte_is_refused)
+START_TEST(test_ply_truncation_is_refused)
 {
     static bytes b;
     make_cube(&b, (enum encoding)(_i % 3), _i / 3 % 2, 4, "\n");
@@ -472,7 +471,7 @@ START_TEST(a_file_cut_at_any_byte_is_refused)
 }
 END_TEST
 
-/* --- vertices alone --- */
+/* --- vertices only --- */
 
 static ebpo_status parse_points(double **xyz, uint64_t *count, const bytes *b, ebpo_error *error)
 {
@@ -484,7 +483,7 @@ static ebpo_status parse_points(double **xyz, uint64_t *count, const bytes *b, e
     return status;
 }
 
-START_TEST(points_are_the_vertices_of_any_dialect_widened)
+START_TEST(test_points_of_any_dialect_are_vertices)
 {
     static bytes b;
     int width = _i / 3 % 2 ? 8 : 4;
@@ -501,7 +500,7 @@ START_TEST(points_are_the_vertices_of_any_dialect_widened)
 }
 END_TEST
 
-START_TEST(points_need_no_faces_and_faces_behind_them_are_not_looked_at)
+START_TEST(test_points_need_no_faces)
 {
     static const char *const sources[] = { POINTS(2) "end_header\n0 0 0\n1 2.5 nan\n",
                                            POINTS(2) FACES(1) "0 0 0\n1 2.5 inf\n3 0 1 99\n" };
@@ -518,7 +517,7 @@ START_TEST(points_need_no_faces_and_faces_behind_them_are_not_looked_at)
 }
 END_TEST
 
-START_TEST(points_that_are_damaged_are_refused_with_their_place)
+START_TEST(test_damaged_points_report_position)
 {
     static bytes b;
     double *xyz;
@@ -527,7 +526,8 @@ START_TEST(points_that_are_damaged_are_refused_with_their_place)
     b.size = 0;
     text(&b, POINTS(2) "end_header\n0 0 0\n1 x 0\n");
     ck_assert(parse_points(&xyz, &count, &b, &error) == EBPO_E_FORMAT && !xyz && !count);
-    ck_assert_msg(strstr(error.message, "points.ply: line 9: no number: 'x' in vertex 1") != NULL,
+    ck_assert_msg(strstr(error.message, "points.ply: line 9: invalid number 'x' in vertex 1") !=
+                      NULL,
                   "%s", error.message);
     make_cube(&b, LITTLE, true, 4, "\n");
     for (size_t whole = b.size, n = 0; n < whole; n++) {
@@ -544,7 +544,7 @@ static bool refuse(void *user, const char *stage, uint64_t done, uint64_t total)
     return false;
 }
 
-START_TEST(reader_stops_on_request)
+START_TEST(test_ply_reader_can_be_cancelled)
 {
     static bytes b;
     ebpo_mesh mesh;
@@ -558,8 +558,8 @@ END_TEST
 
 /* --- rows on all cores --- */
 
-/* What one row of many does otherwise. */
-enum deviation {
+/* Change in one row of many. */
+enum error_bound {
     TRIANGLES,
     QUAD,
     TWO_CORNERS,
@@ -569,12 +569,12 @@ enum deviation {
     LONG_LIST,
     CUT,
     FEW_VERTICES,
-    DEVIATIONS
+    ERROR_BOUNDS
 };
 
 enum { MANY_VERTICES = 40000, MANY_FACES = 90000 };
 
-/* Without Check's bookkeeping for every value, of which there are a million. */
+/* Without Check's overhead for every value, of which there are a million. */
 static uint8_t *put_raw(uint8_t *to, enum encoding e, uint64_t raw, int width)
 {
     for (int i = 0; i < width; i++)
@@ -582,8 +582,8 @@ static uint8_t *put_raw(uint8_t *to, enum encoding e, uint64_t raw, int width)
     return to;
 }
 
-/* `second_list`: faces have another list, empty, which makes the reader go row by row. */
-static uint8_t *make_many(size_t *size, enum encoding e, enum deviation what, uint64_t at,
+/* `second_list`: faces have another, empty list, which makes the reader process single rows. */
+static uint8_t *make_many(size_t *size, enum encoding e, enum error_bound what, uint64_t at,
                           bool second_list)
 {
     static bytes b;
@@ -634,45 +634,45 @@ static uint8_t *make_many(size_t *size, enum encoding e, enum deviation what, ui
     return file;
 }
 
-/* What a message says before it names a byte, and what it says after. */
-static void expect_message(const ebpo_error *error, const ebpo_error *twin)
+/* Compares the message before and after the byte offset. */
+static void expect_message(const ebpo_error *error, const ebpo_error *reference)
 {
-    const char *a = strstr(error->message, ": "), *b = strstr(twin->message, ": ");
+    const char *a = strstr(error->message, ": "), *b = strstr(reference->message, ": ");
     ck_assert(a && b && (a = strstr(a + 2, ": ")) && (b = strstr(b + 2, ": ")));
     if (!strstr(a, "bytes")) /* the files differ in size */
         ck_assert_str_eq(a, b);
 }
 
-START_TEST(rows_on_all_cores_read_as_row_by_row)
+START_TEST(test_ply_parallel_rows_match_serial)
 {
     static const uint64_t places[] = { 0, 16383, 16384, 50000, MANY_FACES - 1 };
-    enum deviation what = (enum deviation)(_i / 5);
+    enum error_bound what = (enum error_bound)(_i / 5);
     for (enum encoding e = LITTLE; e <= BIG; e = (enum encoding)(e + 1)) {
-        size_t size, twin_size;
+        size_t size, reference_size;
         uint8_t *file = make_many(&size, e, what, places[_i % 5], false),
-                *twin_file = make_many(&twin_size, e, what, places[_i % 5], true);
-        ebpo_mesh m, twin;
-        ebpo_error error = EBPO_ERROR_INIT, twin_error = EBPO_ERROR_INIT;
+                *reference_file = make_many(&reference_size, e, what, places[_i % 5], true);
+        ebpo_mesh m, reference;
+        ebpo_error error = EBPO_ERROR_INIT, reference_error = EBPO_ERROR_INIT;
         ebpo_status status = ebpo_ply_parse_memory(&m, file, size, "x", NULL, 3, NULL, &error),
-                    wanted = ebpo_ply_parse_memory(&twin, twin_file, twin_size, "x", NULL, 1, NULL,
-                                                   &twin_error);
+                    wanted = ebpo_ply_parse_memory(&reference, reference_file, reference_size, "x",
+                                                   NULL, 1, NULL, &reference_error);
         ck_assert_int_eq(status, wanted);
-        ck_assert_uint_eq(m.vertex_count, twin.vertex_count);
-        ck_assert_uint_eq(m.face_count, twin.face_count);
+        ck_assert_uint_eq(m.vertex_count, reference.vertex_count);
+        ck_assert_uint_eq(m.face_count, reference.face_count);
         if (status == EBPO_OK) {
-            ck_assert(m.polygons_dropped == twin.polygons_dropped &&
-                      m.polygons_triangulated == twin.polygons_triangulated);
-            ck_assert(memcmp(m.xyz32, twin.xyz32, (size_t)m.vertex_count * 12) == 0);
-            ck_assert(memcmp(m.faces, twin.faces, (size_t)m.face_count * 12) == 0);
+            ck_assert(m.polygons_dropped == reference.polygons_dropped &&
+                      m.polygons_triangulated == reference.polygons_triangulated);
+            ck_assert(memcmp(m.xyz32, reference.xyz32, (size_t)m.vertex_count * 12) == 0);
+            ck_assert(memcmp(m.faces, reference.faces, (size_t)m.face_count * 12) == 0);
         } else {
             ck_assert(what >= BAD_INDEX);
-            if (what != LONG_LIST) /* whose items are whatever stands behind */
-                expect_message(&error, &twin_error);
+            if (what != LONG_LIST) /* whose items are the bytes that follow */
+                expect_message(&error, &reference_error);
         }
         ebpo_mesh_free(&m);
-        ebpo_mesh_free(&twin);
+        ebpo_mesh_free(&reference);
         free(file);
-        free(twin_file);
+        free(reference_file);
     }
 }
 END_TEST
@@ -687,7 +687,7 @@ static void fill_bits(void *to, size_t size, uint64_t *state)
     }
 }
 
-START_TEST(what_is_written_reads_back_with_the_same_bits)
+START_TEST(test_ply_round_trip_is_bit_exact)
 {
     scratch_enter();
     const char *name = scratch("out.ply");
@@ -712,11 +712,11 @@ START_TEST(what_is_written_reads_back_with_the_same_bits)
     ebpo_mesh_free(&mesh);
     ebpo_mesh_free(&back);
     unlink(name);
-    ck_assert_int_eq(scratch_entries(), 0); /* nothing else was left */
+    ck_assert_int_eq(scratch_entries(), 0); /* no other files remain */
 }
 END_TEST
 
-START_TEST(writer_refuses_a_mesh_that_contradicts_itself)
+START_TEST(test_ply_writer_refuses_inconsistent_mesh)
 {
     float xyz[3] = { 0, 0, 0 };
     uint32_t faces[3] = { 0, 0, 1 };
@@ -729,7 +729,7 @@ START_TEST(writer_refuses_a_mesh_that_contradicts_itself)
 }
 END_TEST
 
-START_TEST(read_file_records_its_digest)
+START_TEST(test_read_file_records_digest)
 {
     const char *path = scratch("triangle.ply");
     int fd = open(path, O_CREAT | O_WRONLY, 0600);
@@ -748,7 +748,7 @@ START_TEST(read_file_records_its_digest)
 }
 END_TEST
 
-START_TEST(reading_what_is_no_model_file_says_so)
+START_TEST(test_unknown_file_format_is_reported)
 {
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -792,7 +792,7 @@ static bool read_model(ebpo_mesh *mesh, const char *name, ebpo_status expected, 
     return true;
 }
 
-START_TEST(wild_files_are_read_whole)
+START_TEST(test_files_from_other_programs_are_read)
 {
     char name[100];
     ebpo_mesh mesh;
@@ -807,7 +807,7 @@ START_TEST(wild_files_are_read_whole)
 }
 END_TEST
 
-START_TEST(truncated_point_cloud_is_refused_with_its_place)
+START_TEST(test_truncated_point_cloud_reports_position)
 {
     ebpo_mesh mesh;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -817,7 +817,7 @@ START_TEST(truncated_point_cloud_is_refused_with_its_place)
 }
 END_TEST
 
-START_TEST(igea_in_strips_is_igea_in_triangles)
+START_TEST(test_igea_strips_match_triangles)
 {
     ebpo_mesh strips, triangles;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -842,31 +842,32 @@ TEST_SUITE(ply)
 {
     TCase *tests = tcase_create("ply");
     tcase_set_timeout(tests, 120);
-    tcase_add_loop_test(tests, every_encoding_order_width_and_line_end_gives_the_same_cube, 0, 36);
-    tcase_add_loop_test(tests, points_are_the_vertices_of_any_dialect_widened, 0, 12);
-    tcase_add_test(tests, points_need_no_faces_and_faces_behind_them_are_not_looked_at);
-    tcase_add_test(tests, points_that_are_damaged_are_refused_with_their_place);
-    tcase_add_test(tests, reader_allows_bytes_behind_the_last_element);
-    tcase_add_loop_test(tests, integer_coordinates_are_read_as_doubles, 0, 6);
-    tcase_add_test(tests, reader_passes_nan_and_infinity_through);
-    tcase_add_test(tests, rows_may_be_broken_into_lines_and_short_faces_are_counted);
-    tcase_add_test(tests, a_comment_without_its_word_is_allowed_before_the_first_element);
-    tcase_add_test(tests, concave_faces_are_cut_by_ears);
-    tcase_add_test(tests, strips_alternate_restart_and_lose_their_glue);
-    tcase_add_loop_test(tests, reader_says_what_is_wrong_and_where, 0,
+    tcase_add_loop_test(tests, test_ply_variants_give_same_cube, 0, 36);
+    tcase_add_loop_test(tests, test_points_of_any_dialect_are_vertices, 0, 12);
+    tcase_add_test(tests, test_points_need_no_faces);
+    tcase_add_test(tests, test_damaged_points_report_position);
+    tcase_add_test(tests, test_ply_trailing_bytes_are_accepted);
+    tcase_add_loop_test(tests, test_ply_integer_coordinates_become_doubles, 0, 6);
+    tcase_add_test(tests, test_ply_nan_and_infinity_are_kept);
+    tcase_add_test(tests, test_ply_broken_rows_and_short_faces);
+    tcase_add_test(tests, test_ply_comment_without_keyword_is_accepted);
+    tcase_add_test(tests, test_ply_concave_faces_are_triangulated);
+    tcase_add_test(tests, test_ply_strips_restart_and_drop_degenerates);
+    tcase_add_loop_test(tests, test_ply_errors_report_cause_and_position, 0,
                         (int)(sizeof bad / sizeof *bad));
-    tcase_add_test(tests, binary_index_out_of_range_is_named_with_face_and_byte);
-    tcase_add_test(tests, a_header_longer_than_a_megabyte_is_refused);
-    tcase_add_loop_test(tests, a_file_cut_at_any_byte_is_refused, 0, 6);
-    tcase_add_test(tests, reader_stops_on_request);
-    tcase_add_loop_test(tests, what_is_written_reads_back_with_the_same_bits, 0, 2);
-    tcase_add_test(tests, writer_refuses_a_mesh_that_contradicts_itself);
-    tcase_add_test(tests, read_file_records_its_digest);
-    tcase_add_loop_test(tests, rows_on_all_cores_read_as_row_by_row, 0, 5 * DEVIATIONS);
-    tcase_add_test(tests, reading_what_is_no_model_file_says_so);
-    tcase_add_loop_test(tests, wild_files_are_read_whole, 0, (int)(sizeof wild / sizeof *wild));
-    tcase_add_test(tests, truncated_point_cloud_is_refused_with_its_place);
-    tcase_add_test(tests, igea_in_strips_is_igea_in_triangles);
+    tcase_add_test(tests, test_ply_bad_index_reports_position);
+    tcase_add_test(tests, test_ply_header_size_limit);
+    tcase_add_loop_test(tests, test_ply_truncation_is_refused, 0, 6);
+    tcase_add_test(tests, test_ply_reader_can_be_cancelled);
+    tcase_add_loop_test(tests, test_ply_round_trip_is_bit_exact, 0, 2);
+    tcase_add_test(tests, test_ply_writer_refuses_inconsistent_mesh);
+    tcase_add_test(tests, test_read_file_records_digest);
+    tcase_add_loop_test(tests, test_ply_parallel_rows_match_serial, 0, 5 * ERROR_BOUNDS);
+    tcase_add_test(tests, test_unknown_file_format_is_reported);
+    tcase_add_loop_test(tests, test_files_from_other_programs_are_read, 0,
+                        (int)(sizeof wild / sizeof *wild));
+    tcase_add_test(tests, test_truncated_point_cloud_reports_position);
+    tcase_add_test(tests, test_igea_strips_match_triangles);
     Suite *suite = suite_create("ply");
     suite_add_tcase(suite, tests);
     return suite;

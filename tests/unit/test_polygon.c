@@ -1,4 +1,5 @@
-/* Polygons become triangles that cover them: same area, all turning the polygon's way. */
+/* Polygons are cut into triangles that cover them: same area, all in the orientation of the
+ * polygon. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,12 +9,12 @@
 #include "geometry/predicates.h"
 #include "solids.h"
 
-enum { MOST = 4000 };
+enum { LIMIT = 4000 };
 
 typedef struct shape {
     uint32_t n;
-    double at[MOST][2];
-    uint32_t triangle[MOST][3];
+    double at[LIMIT][2];
+    uint32_t triangle[LIMIT][3];
 } shape;
 static shape s;
 
@@ -31,10 +32,10 @@ static double twice_area(const double a[2], const double b[2], const double c[2]
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-/* Placed in the plane across `axis`, from behind when `mirrored`. */
+/* Places it in the plane across `axis`, from behind when `mirrored`. */
 static ebpo_polygon_kind cut(int axis, bool mirrored)
 {
-    static double corner[MOST][3];
+    static double corner[LIMIT][3];
     for (uint32_t i = 0; i < s.n; i++) {
         uint32_t from = mirrored ? s.n - 1 - i : i;
         corner[i][axis] = 0.25 * s.at[from][0] + 7;
@@ -46,7 +47,7 @@ static ebpo_polygon_kind cut(int axis, bool mirrored)
         ebpo_polygon_triangulate(s.triangle, (const double(*)[3])corner, s.n, scratch);
     free(scratch);
     for (uint32_t i = 0; mirrored && i + 2 < s.n;
-         i++) /* back to the numbers of the shape, as it turns */
+         i++) /* back to the indices of the shape, in its orientation */
         for (int k = 0; k < 3; k++)
             s.triangle[i][k] = s.n - 1 - s.triangle[i][k];
     return kind;
@@ -76,7 +77,7 @@ static void check_shape(ebpo_polygon_kind kind)
         }
 }
 
-START_TEST(convex_polygon_becomes_a_fan)
+START_TEST(test_convex_polygon_becomes_fan)
 {
     s.n = 11;
     for (uint32_t i = 0; i < s.n; i++) {
@@ -90,7 +91,7 @@ START_TEST(convex_polygon_becomes_a_fan)
 }
 END_TEST
 
-START_TEST(straight_corners_make_no_triangle_without_area)
+START_TEST(test_collinear_corners_make_no_empty_triangle)
 {
     static const double at[][2] = { { 0, 0 }, { 1, 0 }, { 2, 0 }, { 3, 0 },
                                     { 3, 1 }, { 3, 2 }, { 0, 2 }, { 0, 1 } };
@@ -99,7 +100,7 @@ START_TEST(straight_corners_make_no_triangle_without_area)
 }
 END_TEST
 
-START_TEST(concave_shapes_are_covered)
+START_TEST(test_concave_polygons_are_covered)
 {
     static const double arrow[][2] = { { 0, 0 }, { 2, 0 }, { 0.5, 0.5 }, { 0, 2 } };
     static const double comb[][2] = { { 0, 0 }, { 7, 0 }, { 7, 3 }, { 6, 3 }, { 6, 1 }, { 5, 1 },
@@ -117,7 +118,7 @@ START_TEST(concave_shapes_are_covered)
 }
 END_TEST
 
-START_TEST(random_star_shapes_are_covered)
+START_TEST(test_random_star_polygons_are_covered)
 {
     uint64_t state = 99 + (uint64_t)_i;
     s.n = 4 + (uint32_t)(_i * _i);
@@ -141,7 +142,7 @@ static void check_fan(const double (*at)[2], uint32_t n)
         ck_assert(s.triangle[i][0] == 0 && s.triangle[i][1] == i + 1 && s.triangle[i][2] == i + 2);
 }
 
-START_TEST(polygons_on_a_line_or_not_finite_become_fans)
+START_TEST(test_degenerate_polygons_become_fans)
 {
     static const double line[][2] = { { 0, 0 }, { 1, 1 }, { 2, 2 }, { 3, 3 } },
                         point[][2] = { { 1, 1 }, { 1, 1 }, { 1, 1 }, { 1, 1 } };
@@ -152,7 +153,7 @@ START_TEST(polygons_on_a_line_or_not_finite_become_fans)
 }
 END_TEST
 
-/* ---- whole coordinates in space, for which areas are exact ---- */
+/* ---- integer coordinates in space, for which areas are exact ---- */
 
 enum { LARGEST = 120000 };
 
@@ -194,8 +195,8 @@ static void add_area(const int64_t *a, const int64_t *b, const int64_t *c, int64
     }
 }
 
-/* The vector areas add up to the outline's, exactly. Of a planar outline no triangle is turned
- * against it: then each of its points is covered once. Returns how many have no area. */
+/* Checks that the vector areas add up to the area of the outline, exactly. For a planar outline no
+ * triangle is reversed: then each of its points is covered once. Returns how many have no area. */
 static uint32_t check_exactly(bool planar)
 {
     int64_t outline[3] = { 0 }, sum[3] = { 0 };
@@ -225,8 +226,8 @@ static void insert_corner(uint32_t before, const int64_t p[2])
     memcpy(w.at[before], p, 2 * sizeof *p);
 }
 
-/* Half squares of a grid, glued along the edges of a tree: an outline that touches itself in slits
- * and corners, which these half squares cover. Squares are cut by the diagonal from low to high. */
+/* Half squares of a grid, glued along the edges of a tree: an outline with coincident edges and
+ * corners, covered by these half squares. The diagonal of a square runs from low to high. */
 static void grow_glued(uint32_t side, uint32_t corners)
 {
     static bool used[400 * 400 * 2];
@@ -282,7 +283,7 @@ static void add_spikes(uint32_t count)
     }
 }
 
-/* Into the plane z = x + 2 y, begun at another corner, or seen from behind. */
+/* Places it in the plane z = x + 2 y, with another first corner, or seen from behind. */
 static void place_in_space(uint32_t begin, bool behind)
 {
     static int64_t copy[LARGEST][3];
@@ -295,7 +296,7 @@ static void place_in_space(uint32_t begin, bool behind)
         w.at[i][2] = w.at[i][0] + 2 * w.at[i][1];
 }
 
-START_TEST(outlines_that_touch_themselves_are_covered)
+START_TEST(test_self_touching_outlines_are_covered)
 {
     state = 1 + (uint64_t)_i;
     for (int round = 0; round < (_i < 30 ? 40 : 4); round++) {
@@ -309,7 +310,7 @@ START_TEST(outlines_that_touch_themselves_are_covered)
 }
 END_TEST
 
-START_TEST(spikes_are_covered)
+START_TEST(test_polygon_spikes_are_covered)
 {
     state = 1 + (uint64_t)_i;
     for (int round = 0; round < 40; round++) {
@@ -322,8 +323,8 @@ START_TEST(spikes_are_covered)
 }
 END_TEST
 
-/* A plate with a slit of no width: no triangle is without area. */
-START_TEST(slits_need_no_empty_triangle)
+/* A plate with a slit of no width: every triangle has an area. */
+START_TEST(test_polygon_slits_need_no_empty_triangle)
 {
     static const int64_t slit[][2] = { { 0, 0 }, { 10, 0 }, { 10, 10 }, { 5, 10 },
                                        { 5, 5 }, { 5, 10 }, { 0, 10 } };
@@ -339,9 +340,9 @@ START_TEST(slits_need_no_empty_triangle)
 }
 END_TEST
 
-/* ---- the plain way of cutting ears, which gives the same triangles where it gives any ---- */
+/* ---- the simple way of cutting ears, which gives the same triangles if it gives any ---- */
 
-static uint32_t after[MOST], before[MOST];
+static uint32_t after[LIMIT], before[LIMIT];
 
 static int plain_turn(uint32_t a, uint32_t b, uint32_t c)
 {
@@ -364,7 +365,7 @@ static bool plain_ear(uint32_t a, uint32_t b, uint32_t c)
     return true;
 }
 
-/* False where it finds no ear. */
+/* Returns false when it finds no ear. */
 static bool plain_cut(uint32_t (*triangle)[3])
 {
     uint32_t left = s.n, done = 0, idle = 0, b = 0;
@@ -391,7 +392,7 @@ static bool plain_cut(uint32_t (*triangle)[3])
 
 static void compare_with_plain(uint32_t *cut_by_both)
 {
-    static uint32_t plain[MOST][3];
+    static uint32_t plain[LIMIT][3];
     ebpo_polygon_kind kind = cut(2, false);
     if ((kind != EBPO_POLYGON_CONCAVE && kind != EBPO_POLYGON_FLAT) || !plain_cut(plain))
         return;
@@ -399,13 +400,13 @@ static void compare_with_plain(uint32_t *cut_by_both)
     ck_assert(memcmp(s.triangle, plain, (s.n - 2) * sizeof *plain) == 0);
 }
 
-START_TEST(ears_are_cut_in_the_plain_order)
+START_TEST(test_polygon_ears_match_reference_order)
 {
     uint32_t both = 0;
     state = 7 + (uint64_t)_i;
     for (int round = 0; round < 60; round++) {
         s.n = 4 + below(round < 50 ? 100 : 3000);
-        for (uint32_t i = 0; i < s.n; i++) { /* a star, in coordinates of which many are equal */
+        for (uint32_t i = 0; i < s.n; i++) { /* a star with many equal coordinates */
             double r = 20 + below(200), angle = 2 * M_PI * i / s.n;
             s.at[i][0] = floor(r * cos(angle));
             s.at[i][1] = floor(r * sin(angle));
@@ -433,7 +434,7 @@ static double area_of(uint32_t a, uint32_t b, uint32_t c)
            2;
 }
 
-/* Over all triangulations of the corners from i to j. */
+/* Returns the minimum over all triangulations of the corners from i to j. */
 static double least_area(uint32_t i, uint32_t j)
 {
     double best = j - i < 2 ? 0 : INFINITY;
@@ -450,7 +451,7 @@ static double cut_area(void)
     return sum;
 }
 
-START_TEST(guesses_have_the_least_area)
+START_TEST(test_guessed_triangulation_has_least_area)
 {
     int guessed = 0;
     state = 3;
@@ -469,7 +470,7 @@ START_TEST(guesses_have_the_least_area)
 }
 END_TEST
 
-START_TEST(folded_quads_and_stars_are_guesses)
+START_TEST(test_folded_quads_and_stars_are_guessed)
 {
     static const int64_t fold[][3] = {
         { -12, -27, 17 }, { -16, 9, -1 }, { 43, 9, -13 }, { -16, 9, -2 }
@@ -518,7 +519,7 @@ static void make_spiral(void)
         }
 }
 
-/* Triangles that have one corner in common. */
+/* Triangles with one common corner. */
 static void make_petals(void)
 {
     w.n = 0;
@@ -533,7 +534,7 @@ static void make_petals(void)
     }
 }
 
-START_TEST(large_outlines_take_bounded_time)
+START_TEST(test_large_outlines_take_bounded_time)
 {
     void (*make[])(void) = { make_comb, make_spiral, make_petals };
     if (_i < 3)
@@ -557,18 +558,18 @@ TEST_SUITE(polygon)
 {
     TCase *tests = tcase_create("polygon");
     tcase_set_timeout(tests, 120);
-    tcase_add_test(tests, convex_polygon_becomes_a_fan);
-    tcase_add_test(tests, straight_corners_make_no_triangle_without_area);
-    tcase_add_test(tests, concave_shapes_are_covered);
-    tcase_add_loop_test(tests, random_star_shapes_are_covered, 0, 60);
-    tcase_add_test(tests, polygons_on_a_line_or_not_finite_become_fans);
-    tcase_add_loop_test(tests, outlines_that_touch_themselves_are_covered, 0, 60);
-    tcase_add_loop_test(tests, spikes_are_covered, 0, 60);
-    tcase_add_test(tests, slits_need_no_empty_triangle);
-    tcase_add_loop_test(tests, ears_are_cut_in_the_plain_order, 0, 20);
-    tcase_add_test(tests, guesses_have_the_least_area);
-    tcase_add_test(tests, folded_quads_and_stars_are_guesses);
-    tcase_add_loop_test(tests, large_outlines_take_bounded_time, 0, 4);
+    tcase_add_test(tests, test_convex_polygon_becomes_fan);
+    tcase_add_test(tests, test_collinear_corners_make_no_empty_triangle);
+    tcase_add_test(tests, test_concave_polygons_are_covered);
+    tcase_add_loop_test(tests, test_random_star_polygons_are_covered, 0, 60);
+    tcase_add_test(tests, test_degenerate_polygons_become_fans);
+    tcase_add_loop_test(tests, test_self_touching_outlines_are_covered, 0, 60);
+    tcase_add_loop_test(tests, test_polygon_spikes_are_covered, 0, 60);
+    tcase_add_test(tests, test_polygon_slits_need_no_empty_triangle);
+    tcase_add_loop_test(tests, test_polygon_ears_match_reference_order, 0, 20);
+    tcase_add_test(tests, test_guessed_triangulation_has_least_area);
+    tcase_add_test(tests, test_folded_quads_and_stars_are_guessed);
+    tcase_add_loop_test(tests, test_large_outlines_take_bounded_time, 0, 4);
     Suite *suite = suite_create("polygon");
     suite_add_tcase(suite, tests);
     return suite;

@@ -1,4 +1,4 @@
-/* Polytopes and plane codes: volumes add up, codes decode to what was encoded, and never to less
+/* Polytopes and plane codes: volumes add up, codes decode to the encoded values, and never to less
  * than the support. */
 #include <math.h>
 #include <stdlib.h>
@@ -20,7 +20,7 @@ static void random_direction(uint64_t *seed, double n[3])
         n[k] /= length;
 }
 
-/* Every edge of a closed polyhedron is used once in each direction. */
+/* Checks that every edge of a closed polyhedron is used once in each direction. */
 static void assert_closed(const ebpo_polytope *p)
 {
     static int uses[EBPO_POLYTOPE_VERTICES][EBPO_POLYTOPE_VERTICES];
@@ -39,7 +39,7 @@ static void assert_closed(const ebpo_polytope *p)
             uses[p->corner[i]][p->corner[i + 1 < p->first[f + 1] ? i + 1 : p->first[f]]] = 0;
 }
 
-START_TEST(cube_has_volume_one)
+START_TEST(test_polytope_cube_has_volume_one)
 {
     ebpo_polytope p;
     ebpo_polytope_cube(&p);
@@ -48,7 +48,7 @@ START_TEST(cube_has_volume_one)
 }
 END_TEST
 
-START_TEST(removed_volume_is_what_clipping_removes)
+START_TEST(test_polytope_removed_volume_matches_clipping)
 {
     uint64_t seed = 1;
     for (int round = 0; round < 3000; round++) {
@@ -57,7 +57,7 @@ START_TEST(removed_volume_is_what_clipping_removes)
         for (int cut = 0; cut < 24; cut++) {
             double n[3], before = ebpo_polytope_volume(&p);
             random_direction(&seed, n);
-            /* Near the middle first, then closer to the faces, so that something is left. */
+            /* Near the middle first, then closer to the faces, so that some volume remains. */
             double d = 0.5 * (n[0] + n[1] + n[2]) + 0.2 + 0.5 * ebpo_test_random_unit(&seed);
             double removed = ebpo_polytope_removed(&p, n, d, 0, 0);
             ebpo_clip result = ebpo_polytope_clip(&p, n, d, cut);
@@ -74,7 +74,7 @@ START_TEST(removed_volume_is_what_clipping_removes)
 }
 END_TEST
 
-START_TEST(planes_through_vertices_and_edges_keep_the_polytope_closed)
+START_TEST(test_polytope_planes_through_vertices)
 {
     uint64_t seed = 2;
     for (int round = 0; round < 3000; round++) {
@@ -102,7 +102,7 @@ START_TEST(planes_through_vertices_and_edges_keep_the_polytope_closed)
 }
 END_TEST
 
-START_TEST(two_thousand_nearly_parallel_planes_do_no_harm)
+START_TEST(test_polytope_with_nearly_parallel_planes)
 {
     ebpo_polytope p;
     ebpo_polytope_cube(&p);
@@ -117,7 +117,7 @@ START_TEST(two_thousand_nearly_parallel_planes_do_no_harm)
 }
 END_TEST
 
-START_TEST(children_have_eight_times_the_volume_together)
+START_TEST(test_polytope_children_volume)
 {
     uint64_t seed = 4;
     for (int round = 0; round < 1000; round++) {
@@ -141,7 +141,7 @@ START_TEST(children_have_eight_times_the_volume_together)
 }
 END_TEST
 
-START_TEST(every_code_decodes_to_norm_511_or_is_refused)
+START_TEST(test_plane_code_decodes_or_is_refused)
 {
     /* odd, to meet all columns of the map */
     uint32_t step = (uint32_t)(16 / ebpo_test_scaled(16)) | 1;
@@ -164,7 +164,7 @@ START_TEST(every_code_decodes_to_norm_511_or_is_refused)
 }
 END_TEST
 
-START_TEST(offset_is_the_least_that_keeps_the_support)
+START_TEST(test_plane_offset_is_least_for_support)
 {
     uint64_t seed = 5;
     for (uint64_t i = 0; i < ebpo_test_scaled(1000000); i++) {
@@ -192,7 +192,7 @@ START_TEST(offset_is_the_least_that_keeps_the_support)
 }
 END_TEST
 
-START_TEST(planes_keep_their_meaning_in_child_cells)
+START_TEST(test_plane_is_same_in_child_cell)
 {
     /* Points on a fine dyadic grid: all exact in integers. */
     uint64_t seed = 6;
@@ -218,14 +218,14 @@ TEST_SUITE(polytope)
     Suite *suite = suite_create("polytope");
     TCase *tests = tcase_create("polytope");
     tcase_set_timeout(tests, 300);
-    tcase_add_test(tests, cube_has_volume_one);
-    tcase_add_test(tests, removed_volume_is_what_clipping_removes);
-    tcase_add_test(tests, planes_through_vertices_and_edges_keep_the_polytope_closed);
-    tcase_add_test(tests, two_thousand_nearly_parallel_planes_do_no_harm);
-    tcase_add_test(tests, children_have_eight_times_the_volume_together);
-    tcase_add_test(tests, every_code_decodes_to_norm_511_or_is_refused);
-    tcase_add_test(tests, offset_is_the_least_that_keeps_the_support);
-    tcase_add_test(tests, planes_keep_their_meaning_in_child_cells);
+    tcase_add_test(tests, test_polytope_cube_has_volume_one);
+    tcase_add_test(tests, test_polytope_removed_volume_matches_clipping);
+    tcase_add_test(tests, test_polytope_planes_through_vertices);
+    tcase_add_test(tests, test_polytope_with_nearly_parallel_planes);
+    tcase_add_test(tests, test_polytope_children_volume);
+    tcase_add_test(tests, test_plane_code_decodes_or_is_refused);
+    tcase_add_test(tests, test_plane_offset_is_least_for_support);
+    tcase_add_test(tests, test_plane_is_same_in_child_cell);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,11 +1,11 @@
-/* Posed coordinates: their definition, what is refused, and how far they are from true motions. */
+/* Posed coordinates: their definition, refused poses, and their error against exact motions. */
 #include <math.h>
 #include <string.h>
 
 #include <gmp.h>
 
 #include "check_main.h"
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "extras/collide/posed_frames.h"
 #include "solids.h"
 
@@ -25,7 +25,7 @@ static int64_t exact_rotation(int64_t m[3][3], uint64_t *state)
     do {
         n = 0;
         for (int i = 0; i < 4; i++) {
-            q[i] = twin_integer(state, -1000, 1000);
+            q[i] = reference_integer(state, -1000, 1000);
             n += q[i] * q[i];
         }
     } while (n == 0);
@@ -64,15 +64,15 @@ static bool within_bound(double given, const int64_t row[3], int64_t n, const eb
     return within;
 }
 
-/* The exact rotation, rounded, stretched by a symmetric matrix of up to `stretch`: it stays the
- * nearest one. */
+/* The exact rotation, rounded, stretched by a symmetric matrix of up to `stretch`: the nearest
+ * rotation is unchanged. */
 static void stretched(const int64_t m[3][3], int64_t n, double stretch, double out[3][3],
                       uint64_t *state)
 {
     double s[3][3];
     for (int i = 0; i < 3; i++)
         for (int k = 0; k <= i; k++)
-            s[i][k] = s[k][i] = (i == k) + stretch * twin_uniform(state);
+            s[i][k] = s[k][i] = (i == k) + stretch * reference_uniform(state);
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++) {
             out[i][k] = (double)m[i][k] / (double)n;
@@ -84,7 +84,7 @@ static void stretched(const int64_t m[3][3], int64_t n, double stretch, double o
         }
 }
 
-START_TEST(posed_points_are_as_close_as_stated)
+START_TEST(test_posed_points_are_within_error_bound)
 {
     uint64_t state = 3;
     for (int i = 0; i < (int)ebpo_test_scaled(CASES); i++) {
@@ -94,12 +94,13 @@ START_TEST(posed_points_are_as_close_as_stated)
         double x[3], out[3];
         stretched((const int64_t(*)[3])m, n, i & 1 ? 0x1p-24 : 0, pose.rotation, &state);
         for (int k = 0; k < 3; k++) {
-            x[k] = twin_uniform(&state);
-            pose.translation[k] = ldexp(twin_uniform(&state), (int)twin_integer(&state, -30, 30));
+            x[k] = reference_uniform(&state);
+            pose.translation[k] =
+                ldexp(reference_uniform(&state), (int)reference_integer(&state, -30, 30));
         }
-        pose.scale = 1 + 0.5 * twin_uniform(&state);
+        pose.scale = 1 + 0.5 * reference_uniform(&state);
         ck_assert_int_eq(ebpo_posing_make(&posing, &pose, unit_reach, NULL), EBPO_OK);
-        ck_assert(posing.deviation < (i & 1 ? 0x1p-21 : 0x1p-49));
+        ck_assert(posing.error_bound < (i & 1 ? 0x1p-21 : 0x1p-49));
         ebpo_posing_apply(&posing, x, out);
         double length = sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]) * (1 + 0x1p-50);
         for (int k = 0; k < 3; k++)
@@ -110,7 +111,7 @@ START_TEST(posed_points_are_as_close_as_stated)
 END_TEST
 
 /* One rounding for each operation, in the stated order. */
-START_TEST(posed_points_are_as_defined)
+START_TEST(test_posed_points_match_definition)
 {
     uint64_t state = 5;
     for (int i = 0; i < 1000; i++) {
@@ -121,8 +122,8 @@ START_TEST(posed_points_are_as_defined)
             pose.rotation[k / 3][k % 3] = (double)m[k / 3][k % 3] / (double)n;
         pose.scale = 3;
         for (int k = 0; k < 3; k++)
-            pose.translation[k] = twin_uniform(&state);
-        double x[3] = { twin_uniform(&state), twin_uniform(&state), 1 }, out[3];
+            pose.translation[k] = reference_uniform(&state);
+        double x[3] = { reference_uniform(&state), reference_uniform(&state), 1 }, out[3];
         ck_assert_int_eq(ebpo_posing_make(&posing, &pose, unit_reach, NULL), EBPO_OK);
         ebpo_posing_apply(&posing, x, out);
         for (int k = 0; k < 3; k++) {
@@ -148,7 +149,7 @@ static void refused(ebpo_pose pose, const double reach[3], const char *word)
     ck_assert_msg(strstr(error.message, word) != NULL, "%s: not about \"%s\"", error.message, word);
 }
 
-START_TEST(what_is_no_pose_is_refused)
+START_TEST(test_invalid_pose_is_refused)
 {
     const double far[3] = { 0x1p900, 0, 0 };
     const double numbers[] = { NAN, INFINITY, -INFINITY };
@@ -194,22 +195,23 @@ static void random_pose(ebpo_pose *pose, double far, uint64_t *state)
     for (int k = 0; k < 9; k++)
         pose->rotation[k / 3][k % 3] = (double)m[k / 3][k % 3] / (double)n;
     for (int k = 0; k < 3; k++)
-        pose->translation[k] = far * twin_uniform(state);
-    pose->scale = ldexp(1.5 + 0.4 * twin_uniform(state), (int)twin_integer(state, -20, 20));
+        pose->translation[k] = far * reference_uniform(state);
+    pose->scale =
+        ldexp(1.5 + 0.4 * reference_uniform(state), (int)reference_integer(state, -20, 20));
 }
 
 /* Vertices within about `size`, `far` from the model's origin. */
 static void random_block(double wide[72], float block[72], double far, double size, int vertices,
                          uint64_t *state)
 {
-    double centre[3] = { far * twin_uniform(state), far * twin_uniform(state), far };
+    double centre[3] = { far * reference_uniform(state), far * reference_uniform(state), far };
     for (int i = 0; i < 3 * vertices; i++) {
-        block[i] = (float)(centre[i / vertices] + size * twin_uniform(state));
+        block[i] = (float)(centre[i / vertices] + size * reference_uniform(state));
         wide[i] = (double)block[i];
     }
 }
 
-/* As the block is, beside its base; then as it is placed. */
+/* Checks the block relative to its base; then its position. */
 static void check_vertex(const ebpo_block_posing *p, const ebpo_posed_block *posed,
                          const double world[3], int i)
 {
@@ -239,14 +241,14 @@ static void check_block(const ebpo_block_posing *p, const ebpo_posed_block *pose
     }
 }
 
-START_TEST(posed_blocks_are_within_their_errors)
+START_TEST(test_posed_blocks_are_within_error_bound)
 {
     uint64_t state = 17;
     for (int i = 0; i < (int)ebpo_test_scaled(CASES); i++) {
-        double far = ldexp(1, (int)twin_integer(&state, -30, 20)), origin[3];
-        double size = far * ldexp(1, -(int)twin_integer(&state, 0, 20));
+        double far = ldexp(1, (int)reference_integer(&state, -30, 20)), origin[3];
+        double size = far * ldexp(1, -(int)reference_integer(&state, 0, 20));
         const double reach[3] = { 3 * far, 3 * far, 3 * far };
-        int vertices = (int)twin_integer(&state, 1, EBPO_POSED_VERTICES);
+        int vertices = (int)reference_integer(&state, 1, EBPO_POSED_VERTICES);
         ebpo_pose pose;
         ebpo_posing posing;
         ebpo_block_posing p;
@@ -261,9 +263,9 @@ START_TEST(posed_blocks_are_within_their_errors)
         ebpo_posed_block_make(&posed, &p, block32, (unsigned)vertices);
         ebpo_posed_block_make_wide(&wide, &p, block, (unsigned)vertices);
         ck_assert_mem_eq(posed.base, wide.base, sizeof posed.base);
-        double away = pose.scale * size * ldexp(1, (int)twin_integer(&state, -2, 8));
+        double away = pose.scale * size * ldexp(1, (int)reference_integer(&state, -2, 8));
         for (int k = 0; k < 3; k++)
-            origin[k] = posed.base[k] + away * twin_uniform(&state);
+            origin[k] = posed.base[k] + away * reference_uniform(&state);
         check_block(&p, &posed, block, origin, vertices);
         check_block(&p, &wide, block, origin, vertices);
         ck_assert((double)posed.error <= 0x1p-18 * pose.scale * p.unit * size + (double)p.doubt);
@@ -275,10 +277,10 @@ TEST_SUITE(pose)
 {
     TCase *tests = tcase_create("pose");
     tcase_set_timeout(tests, 300);
-    tcase_add_test(tests, posed_points_are_as_close_as_stated);
-    tcase_add_test(tests, posed_points_are_as_defined);
-    tcase_add_test(tests, posed_blocks_are_within_their_errors);
-    tcase_add_test(tests, what_is_no_pose_is_refused);
+    tcase_add_test(tests, test_posed_points_are_within_error_bound);
+    tcase_add_test(tests, test_posed_points_match_definition);
+    tcase_add_test(tests, test_posed_blocks_are_within_error_bound);
+    tcase_add_test(tests, test_invalid_pose_is_refused);
     Suite *suite = suite_create("pose");
     suite_add_tcase(suite, tests);
     return suite;

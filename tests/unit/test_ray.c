@@ -1,6 +1,6 @@
-/* Rays and boxes against triangles, held against twins in rational numbers that share no method
- * with the library: a ray is clipped by linear conditions on t, a triangle is clipped as a polygon
- * by the box's half-spaces. */
+/* Rays and boxes against triangles, compared with reference implementations in rational numbers
+ * that share no method with the library: a ray is clipped by linear conditions on t, a triangle is
+ * clipped as a polygon by the half-spaces of the box. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +8,7 @@
 #include <gmp.h>
 
 #include "check_main.h"
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "geometry/ray.h"
 #include "solids.h"
 
@@ -76,7 +76,7 @@ static bool zero3(const rational3 *a)
     return mpq_sgn(a->x[0]) == 0 && mpq_sgn(a->x[1]) == 0 && mpq_sgn(a->x[2]) == 0;
 }
 
-/* --- the ray's twin: what remains of [0, t_max] --- */
+/* --- the reference for rays: the remaining part of [0, t_max] --- */
 
 typedef struct interval {
     bool any, endless;
@@ -134,7 +134,7 @@ static void keep_plane(interval *r, const rational3 *normal, const rational3 *or
     clear3(&from);
 }
 
-/* At r->low, is normal . (point - at) > 0? */
+/* Returns true when normal . (point - at) > 0 at r->low. */
 static bool strictly_within(const interval *r, const rational3 *normal, const rational3 *origin,
                             const rational3 *direction, const rational3 *at)
 {
@@ -173,7 +173,7 @@ static void keep_area(interval *r, const rational3 p[3], const rational3 *normal
         }
 }
 
-/* The corners lie on one line: between the two that are farthest apart. */
+/* The corners are on one line: uses the segment between the two that are farthest apart. */
 static void keep_segment(interval *r, const rational3 p[3], const rational3 *origin,
                          const rational3 *direction)
 {
@@ -213,9 +213,10 @@ static void keep_segment(interval *r, const rational3 p[3], const rational3 *ori
     mpq_clears(length, longest, NULL);
 }
 
-/* r->low: the first common point; returns the side, and from which one the line comes. r is
+/* r->low: the first common point; returns the side, and the side of origin of the line. r is
  * initialised here. */
-static int twin_ray(const ebpo_segment *ray, const double triangle[3][3], interval *r, int *facing)
+static int reference_ray(const ebpo_segment *ray, const double triangle[3][3], interval *r,
+                         int *facing)
 {
     rational3 p[3], f, g, normal, origin, direction;
     mpq_t slope;
@@ -266,7 +267,7 @@ static void set_middle(mpq_t out, double a, double b)
     mpq_clear(other);
 }
 
-/* No double is closer: exact lies between the middles to both neighbours. */
+/* Returns true when no double is closer: exact is between the middles to both neighbours. */
 static bool is_rounded(double t, const mpq_t exact)
 {
     mpq_t end;
@@ -290,23 +291,23 @@ static bool is_rounded(double t, const mpq_t exact)
 
 static double small(uint64_t *state, int64_t size)
 {
-    return (double)twin_integer(state, -size, size);
+    return (double)reference_integer(state, -size, size);
 }
 
 static double nudged(double x, uint64_t *state)
 {
-    for (int64_t ulps = twin_integer(state, 0, 1); ulps > 0; ulps--)
-        x = nextafter(x, twin_random(state) & 1 ? INFINITY : -INFINITY);
+    for (int64_t ulps = reference_integer(state, 0, 1); ulps > 0; ulps--)
+        x = nextafter(x, reference_random(state) & 1 ? INFINITY : -INFINITY);
     return x;
 }
 
-/* A point of the triangle: inside, on an edge or a corner. */
+/* Returns a point of the triangle: inside, on an edge or a corner. */
 static void point_of(const double triangle[3][3], double out[3], uint64_t *state)
 {
     static const double weights[][3] = { { 1, 0, 0 },      { 0, 1, 0 },      { 0, 0, 1 },
                                          { .5, .5, 0 },    { 0, .25, .75 },  { .25, .25, .5 },
                                          { .5, .25, .25 }, { .375, 0, .625 } };
-    const double *w = weights[twin_integer(state, 0, 7)];
+    const double *w = weights[reference_integer(state, 0, 7)];
     for (int k = 0; k < 3; k++)
         out[k] = w[0] * triangle[0][k] + w[1] * triangle[1][k] + w[2] * triangle[2][k];
 }
@@ -322,7 +323,7 @@ static void direction_to(ebpo_segment *ray, const double target[3])
         ray->direction[0] = 1;
 }
 
-/* Powers of two, apart for lengths and directions. */
+/* Scales by powers of two, separately for lengths and directions. */
 static void scale_all(ebpo_segment *ray, double triangle[3][3], int lengths, int directions)
 {
     for (int k = 0; k < 3; k++) {
@@ -335,10 +336,10 @@ static void scale_all(ebpo_segment *ray, double triangle[3][3], int lengths, int
 
 static void flatten(double triangle[3][3], uint64_t *state)
 {
-    int64_t s = twin_integer(state, -2, 2);
+    int64_t s = reference_integer(state, -2, 2);
     for (int k = 0; k < 3; k++)
         triangle[2][k] = triangle[0][k] + (double)s * (triangle[1][k] - triangle[0][k]);
-    if (twin_random(state) % 4 == 0)
+    if (reference_random(state) % 4 == 0)
         memcpy(triangle[1], triangle[0], sizeof triangle[0]);
 }
 
@@ -349,45 +350,47 @@ static void ray_case(int kind, ebpo_segment *ray, double triangle[3][3], uint64_
     for (int k = 0; k < 3; k++) {
         for (int i = 0; i < 3; i++)
             triangle[i][k] = whole       ? small(state, kind == 0 ? 2 : 8) * 8
-                             : kind == 7 ? 1e7 + twin_uniform(state)
-                                         : twin_uniform(state);
+                             : kind == 7 ? 1e7 + reference_uniform(state)
+                                         : reference_uniform(state);
         ray->origin[k] = whole       ? small(state, kind == 0 ? 2 : 8) * 8
-                         : kind == 7 ? 1e7 + twin_uniform(state)
-                                     : twin_uniform(state);
-        ray->direction[k] = whole ? small(state, 2) : twin_uniform(state);
+                         : kind == 7 ? 1e7 + reference_uniform(state)
+                                     : reference_uniform(state);
+        ray->direction[k] = whole ? small(state, 2) : reference_uniform(state);
     }
     if (kind == 2 || kind == 3) /* in one plane, or without area */
         for (int i = 0; i < 3 && kind == 2; i++)
-            triangle[i][2] = ray->origin[2] + (double)i * (double)(twin_random(state) % 8 == 0);
+            triangle[i][2] =
+                ray->origin[2] + (double)i * (double)(reference_random(state) % 8 == 0);
     if (kind == 2)
         ray->direction[2] = 0;
-    if (kind == 3 || (kind == 5 && twin_random(state) % 4 == 0))
+    if (kind == 3 || (kind == 5 && reference_random(state) % 4 == 0))
         flatten(triangle, state);
     if (kind == 6) /* a sliver */
         for (int k = 0; k < 3; k++)
             triangle[2][k] = nudged(.5 * (triangle[0][k] + triangle[1][k]), state);
     if (ray->direction[0] == 0 && ray->direction[1] == 0 && ray->direction[2] == 0)
-        ray->direction[twin_integer(state, 0, 2)] = 1;
-    if (kind == 8 || kind == 9) /* along an axis, through the triangle when it can */
-        for (int k = 0, axis = (int)twin_integer(state, 0, 2); k < 3; k++)
-            ray->direction[k] = k == axis ? (twin_random(state) & 1 ? 1 : -1) : 0;
+        ray->direction[reference_integer(state, 0, 2)] = 1;
+    if (kind == 8 || kind == 9) /* along an axis, through the triangle when possible */
+        for (int k = 0, axis = (int)reference_integer(state, 0, 2); k < 3; k++)
+            ray->direction[k] = k == axis ? (reference_random(state) & 1 ? 1 : -1) : 0;
     point_of((const double(*)[3])triangle, target, state);
     if (kind == 9)
         for (int k = 0; k < 3; k++)
             ray->origin[k] = ray->direction[k] == 0 ? nudged(target[k], state) : ray->origin[k];
-    else if (kind != 8 && twin_random(state) % 2)
+    else if (kind != 8 && reference_random(state) % 2)
         direction_to(ray, target);
-    if (kind == 10 && twin_random(state) % 2) /* begins on the triangle */
+    if (kind == 10 && reference_random(state) % 2) /* begins on the triangle */
         memcpy(ray->origin, target, sizeof target);
     ray->t_max = INFINITY;
-    uint64_t choice = twin_random(state) % 4;
+    uint64_t choice = reference_random(state) % 4;
     if (choice == 0)
-        ray->t_max = (double)twin_integer(state, 0, 4) / 2;
+        ray->t_max = (double)reference_integer(state, 0, 4) / 2;
     if (choice == 1)
         ray->t_max = nudged(1, state);
     if (kind == 5 || kind == 11) {
-        int range = kind == 11 ? 1000 : 300, lengths = (int)twin_integer(state, -range, range - 1),
-            directions = (int)twin_integer(state, -range, range - 1);
+        int range = kind == 11 ? 1000 : 300,
+            lengths = (int)reference_integer(state, -range, range - 1),
+            directions = (int)reference_integer(state, -range, range - 1);
         scale_all(ray, triangle, lengths, directions);
         ray->t_max = ldexp(ray->t_max, lengths - directions);
     }
@@ -402,8 +405,8 @@ typedef struct tally {
 static void check_ray(const ebpo_segment *ray, const double triangle[3][3], int kind, tally *count)
 {
     interval r;
-    ebpo_ray_meeting m;
-    int facing, side = twin_ray(ray, triangle, &r, &facing);
+    ebpo_ray_intersection m;
+    int facing, side = reference_ray(ray, triangle, &r, &facing);
     ebpo_ray_triangle(ray, triangle, &m);
     ck_assert_msg(m.meets == r.any, "kind %d, case %ld: meets %d, twin %d", kind, count->cases,
                   m.meets, r.any);
@@ -423,10 +426,10 @@ static void check_ray(const ebpo_segment *ray, const double triangle[3][3], int 
     interval_clear(&r);
 }
 
-/* The limit exactly at the hit, and next to it, where the hit's t is a double. */
+/* The limit exactly at the hit, and next to it, when the t of the hit is a double. */
 static void check_limits(ebpo_segment *ray, const double triangle[3][3], int kind, tally *count)
 {
-    ebpo_ray_meeting m;
+    ebpo_ray_intersection m;
     ebpo_ray_triangle(ray, triangle, &m);
     if (!m.meets || m.t == INFINITY)
         return;
@@ -437,7 +440,7 @@ static void check_limits(ebpo_segment *ray, const double triangle[3][3], int kin
     }
 }
 
-START_TEST(rays_meet_triangles_as_rational_clipping_says)
+START_TEST(test_ray_triangle_matches_rational_clipping)
 {
     tally count = { 0 };
     uint64_t state = 11 + (uint64_t)_i;
@@ -457,16 +460,16 @@ START_TEST(rays_meet_triangles_as_rational_clipping_says)
 }
 END_TEST
 
-START_TEST(rays_meet_triangles_of_hard_coordinates)
+START_TEST(test_ray_triangle_difficult_coordinates)
 {
     tally count = { 0 };
     uint64_t state = 99;
     const int rounds = scaled_rounds(1500);
     for (int i = 0; i < rounds; i++)
-        for (int kind = 0; kind < TWIN_KINDS; kind++) {
+        for (int kind = 0; kind < REFERENCE_KINDS; kind++) {
             double p[12], triangle[3][3];
             ebpo_segment ray = { .t_max = INFINITY };
-            twin_points(p, 3, kind, &state);
+            reference_points(p, 3, kind, &state);
             memcpy(triangle, p, sizeof triangle);
             memcpy(ray.origin, p + 9, sizeof ray.origin);
             for (int k = 0; k < 3; k++) {
@@ -485,8 +488,8 @@ START_TEST(rays_meet_triangles_of_hard_coordinates)
 }
 END_TEST
 
-/* Fans around a common corner or edge give ties; others differ by little. */
-START_TEST(hits_are_ordered_as_rationals_are)
+/* Fans around a common corner or edge give equal t; others differ slightly. */
+START_TEST(test_ray_hits_are_ordered_exactly)
 {
     uint64_t state = 5;
     long ties = 0, other = 0;
@@ -502,20 +505,20 @@ START_TEST(hits_are_ordered_as_rationals_are)
         ray_case(i % RAY_KINDS, &unused, other_case, &state);
         memcpy(b, a, sizeof a);
         memcpy(b[2], other_case[2], sizeof b[2]);
-        if (twin_random(&state) % 4 == 0)
+        if (reference_random(&state) % 4 == 0)
             b[1][0] = nudged(b[1][0], &state);
-        if (twin_random(&state) % 8 == 0)
+        if (reference_random(&state) % 8 == 0)
             memcpy(b, other_case, sizeof b);
-        if (twin_random(&state) % 8 == 0) /* the same corners, some of them twice */
+        if (reference_random(&state) % 8 == 0) /* the same corners, some of them twice */
             for (int k = 0; k < 3; k++)
-                memcpy(b[k], a[twin_random(&state) % 3], sizeof b[k]);
-        twin_ray(&ray, (const double(*)[3])a, &ra, &facing);
-        twin_ray(&ray, (const double(*)[3])b, &rb, &facing);
+                memcpy(b[k], a[reference_random(&state) % 3], sizeof b[k]);
+        reference_ray(&ray, (const double(*)[3])a, &ra, &facing);
+        reference_ray(&ray, (const double(*)[3])b, &rb, &facing);
         if (ra.any && rb.any) {
             int order = mpq_cmp(ra.low, rb.low);
             order = (order > 0) - (order < 0);
             const double(*first)[3] = (const double(*)[3])a, (*second)[3] = (const double(*)[3])b;
-            ebpo_ray_meeting at_a, at_b;
+            ebpo_ray_intersection at_a, at_b;
             ebpo_ray_triangle(&ray, first, &at_a);
             ebpo_ray_triangle(&ray, second, &at_b);
             ck_assert_int_eq(ebpo_ray_compare(&ray, first, &at_a, second, &at_b), order);
@@ -530,7 +533,7 @@ START_TEST(hits_are_ordered_as_rationals_are)
 }
 END_TEST
 
-START_TEST(simple_rays_are_answered_by_hand)
+START_TEST(test_ray_triangle_known_cases)
 {
     const double t[3][3] = { { 0, 0, 1 }, { 2, 0, 1 }, { 0, 2, 1 } }; /* normal +z */
     const double flat[3][3] = { { 1, 0, 0 }, { 3, 0, 0 }, { 2, 0, 0 } },
@@ -538,7 +541,7 @@ START_TEST(simple_rays_are_answered_by_hand)
     const struct {
         ebpo_segment ray;
         const double (*triangle)[3];
-        ebpo_ray_meeting expected;
+        ebpo_ray_intersection expected;
     } cases[] = {
         { { { .5, .5, 0 }, { 0, 0, 2 }, INFINITY }, t, { true, -1, -1, .5 } },
         { { { .5, .5, 2 }, { 0, 0, -1 }, INFINITY }, t, { true, 1, 1, 1 } },
@@ -558,7 +561,7 @@ START_TEST(simple_rays_are_answered_by_hand)
         { { { 0, 0, 0 }, { 1, 1, 2 }, INFINITY }, point, { false, 0, 0, 0 } },
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        ebpo_ray_meeting m;
+        ebpo_ray_intersection m;
         ebpo_ray_triangle(&cases[i].ray, cases[i].triangle, &m);
         ck_assert_msg(m.meets == cases[i].expected.meets && m.side == cases[i].expected.side &&
                           m.facing == cases[i].expected.facing,
@@ -570,16 +573,16 @@ END_TEST
 
 /* --- boxes --- */
 
-enum { CLIPPED_MOST = 16 };
+enum { CLIPPED_MAX = 16 };
 
 typedef struct rational_polygon {
-    rational3 p[CLIPPED_MOST];
+    rational3 p[CLIPPED_MAX];
     int n;
 } rational_polygon;
 
 static void polygon_push(rational_polygon *poly, const rational3 *p)
 {
-    ck_assert_int_lt(poly->n, CLIPPED_MOST);
+    ck_assert_int_lt(poly->n, CLIPPED_MAX);
     init3(&poly->p[poly->n]);
     for (int k = 0; k < 3; k++)
         mpq_set(poly->p[poly->n].x[k], p->x[k]);
@@ -592,7 +595,7 @@ static void polygon_clear(rational_polygon *poly)
         clear3(&poly->p[--poly->n]);
 }
 
-/* Where the segment from p to q meets x[axis] = at. */
+/* Adds the intersection of the segment from p to q with x[axis] = at. */
 static void push_cut(rational_polygon *out, const rational3 *p, const rational3 *q, int axis,
                      const mpq_t at)
 {
@@ -633,7 +636,7 @@ static void cut_polygon(rational_polygon *poly, int axis, int side, double at)
     *poly = out;
 }
 
-static bool twin_box(const double triangle[3][3], const double min[3], const double max[3])
+static bool reference_box(const double triangle[3][3], const double min[3], const double max[3])
 {
     rational_polygon poly = { .n = 0 };
     for (int i = 0; i < 3; i++) {
@@ -653,38 +656,38 @@ static bool twin_box(const double triangle[3][3], const double min[3], const dou
 
 static void box_case(int kind, double triangle[3][3], double min[3], double max[3], uint64_t *state)
 {
-    double centre[3], half = kind == 0 ? 1 : .25 * fabs(twin_uniform(state));
+    double centre[3], half = kind == 0 ? 1 : .25 * fabs(reference_uniform(state));
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < 3; i++)
             triangle[i][k] = kind == 0   ? small(state, 3)
                              : kind == 1 ? small(state, 20)
-                                         : twin_uniform(state);
+                                         : reference_uniform(state);
     point_of((const double(*)[3])triangle, centre, state);
     if (kind == 3)
         for (int k = 0; k < 3; k++)
             triangle[2][k] = nudged(.5 * (triangle[0][k] + triangle[1][k]), state);
-    if (kind == 4 || (kind <= 1 && twin_random(state) % 4 == 0))
+    if (kind == 4 || (kind <= 1 && reference_random(state) % 4 == 0))
         flatten(triangle, state);
     for (int k = 0; k < 3; k++) {
         double a = kind == 0   ? small(state, 3)
                    : kind == 1 ? small(state, 20)
-                               : centre[k] - 2 * half * twin_uniform(state);
+                               : centre[k] - 2 * half * reference_uniform(state);
         double b = kind == 0 ? small(state, 3) : kind == 1 ? a + 16 : a + half;
         /* A corner of the box on the triangle, or one step off; flat boxes and points. */
         if (kind == 2 || kind == 5) {
             a = nudged(centre[k], state);
             b = a + half;
         }
-        if (kind == 5 && twin_random(state) % 2) {
+        if (kind == 5 && reference_random(state) % 2) {
             b = a;
             a = b - half;
         }
-        if (twin_random(state) % (kind == 2 ? 2 : 8) == 0)
+        if (reference_random(state) % (kind == 2 ? 2 : 8) == 0)
             b = a;
         min[k] = fmin(a, b);
         max[k] = fmax(a, b);
     }
-    int shift = kind == 6 ? (int)twin_integer(state, -1000, 1000) : 0;
+    int shift = kind == 6 ? (int)reference_integer(state, -1000, 1000) : 0;
     for (int k = 0; k < 3; k++) {
         for (int i = 0; i < 3; i++)
             triangle[i][k] = ldexp(triangle[i][k], shift);
@@ -693,7 +696,7 @@ static void box_case(int kind, double triangle[3][3], double min[3], double max[
     }
 }
 
-START_TEST(boxes_meet_triangles_as_rational_clipping_says)
+START_TEST(test_box_triangle_matches_rational_clipping)
 {
     long meets = 0, apart = 0;
     uint64_t state = 21 + (uint64_t)_i;
@@ -702,8 +705,9 @@ START_TEST(boxes_meet_triangles_as_rational_clipping_says)
     for (int i = 0; i < rounds; i++) {
         double triangle[3][3], min[3], max[3];
         box_case(_i, triangle, min, max, &state);
-        bool expected = twin_box((const double(*)[3])triangle, min, max);
-        ck_assert_msg(ebpo_triangle_meets_box((const double(*)[3])triangle, min, max) == expected,
+        bool expected = reference_box((const double(*)[3])triangle, min, max);
+        ck_assert_msg(ebpo_triangle_intersects_box((const double(*)[3])triangle, min, max) ==
+                          expected,
                       "kind %d, case %d: twin says %d", _i, i, expected);
         meets += expected;
         apart += !expected;
@@ -712,17 +716,17 @@ START_TEST(boxes_meet_triangles_as_rational_clipping_says)
 }
 END_TEST
 
-START_TEST(boxes_of_points_meet_what_they_lie_on)
+START_TEST(test_point_boxes_intersect_their_triangle)
 {
     const double t[3][3] = { { 0, 0, 0 }, { 4, 0, 0 }, { 0, 4, 4 } }, on[3] = { 1, 1, 1 },
                  off[3] = { 1, 1, 0x1.0000000000001p0 };
     const double far[3] = { 3, 3, 3 }, low[3] = { 2, 2, 2 }, edge[3] = { 2, 2, 2 },
                  high[3] = { 9, 9, 9 };
-    ck_assert(ebpo_triangle_meets_box(t, on, on));
-    ck_assert(!ebpo_triangle_meets_box(t, off, off));
-    ck_assert(!ebpo_triangle_meets_box(t, far, far));
-    ck_assert(ebpo_triangle_meets_box(t, low, high));
-    ck_assert(ebpo_triangle_meets_box(t, edge, edge));
+    ck_assert(ebpo_triangle_intersects_box(t, on, on));
+    ck_assert(!ebpo_triangle_intersects_box(t, off, off));
+    ck_assert(!ebpo_triangle_intersects_box(t, far, far));
+    ck_assert(ebpo_triangle_intersects_box(t, low, high));
+    ck_assert(ebpo_triangle_intersects_box(t, edge, edge));
 }
 END_TEST
 
@@ -732,12 +736,12 @@ TEST_SUITE(ray)
     TCase *rays = tcase_create("rays"), *boxes = tcase_create("boxes");
     tcase_set_timeout(rays, 600);
     tcase_set_timeout(boxes, 600);
-    tcase_add_test(rays, simple_rays_are_answered_by_hand);
-    tcase_add_loop_test(rays, rays_meet_triangles_as_rational_clipping_says, 0, RAY_KINDS);
-    tcase_add_test(rays, rays_meet_triangles_of_hard_coordinates);
-    tcase_add_test(rays, hits_are_ordered_as_rationals_are);
-    tcase_add_test(boxes, boxes_of_points_meet_what_they_lie_on);
-    tcase_add_loop_test(boxes, boxes_meet_triangles_as_rational_clipping_says, 0, BOX_KINDS);
+    tcase_add_test(rays, test_ray_triangle_known_cases);
+    tcase_add_loop_test(rays, test_ray_triangle_matches_rational_clipping, 0, RAY_KINDS);
+    tcase_add_test(rays, test_ray_triangle_difficult_coordinates);
+    tcase_add_test(rays, test_ray_hits_are_ordered_exactly);
+    tcase_add_test(boxes, test_point_boxes_intersect_their_triangle);
+    tcase_add_loop_test(boxes, test_box_triangle_matches_rational_clipping, 0, BOX_KINDS);
     suite_add_tcase(suite, rays);
     suite_add_tcase(suite, boxes);
     return suite;

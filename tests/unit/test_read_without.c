@@ -1,4 +1,4 @@
-/* Levels read without some of their parts: the others are what they are in the whole level. */
+/* Levels read without some of their parts: the other parts equal those of the complete level. */
 #include <string.h>
 
 #include "check_main.h"
@@ -9,7 +9,7 @@
 
 enum { PARTS = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES };
 
-/* So large that the lists of planes and of leaves have index arrays. */
+/* Large enough that the lists of planes and of leaves have index arrays. */
 static two_layouts make_files(void)
 {
     two_layouts l;
@@ -69,13 +69,13 @@ static void trees_are_whole(const ebpo_file *file)
     ck_assert_int_eq(scratch_entries(), 2); /* the two files */
 }
 
-START_TEST(test_read_without)
+START_TEST(test_reading_with_omitted_parts)
 {
     two_layouts l = make_files();
     trees_are_whole(l.with);
     for (uint64_t without = 1; without <= PARTS + 1; without++)
         for (int level = 0; level < l.with->info.level_count; level++) {
-            /* bits that are no part mean nothing */
+            /* undefined bits are ignored */
             compare(l.with, level, without > PARTS ? UINT64_MAX : without);
             compare(l.without, level, without > PARTS ? UINT64_MAX : without);
         }
@@ -89,7 +89,7 @@ TEST_SUITE(read_without)
     TCase *tc = tcase_create("levels");
     tcase_set_timeout(tc, 600);
     tcase_add_checked_fixture(tc, scratch_enter, scratch_leave);
-    tcase_add_test(tc, test_read_without);
+    tcase_add_test(tc, test_reading_with_omitted_parts);
     suite_add_tcase(s, tc);
     return s;
 }

@@ -1,4 +1,4 @@
-/* Repairs that are tried, against all sequences of steps on copies of the mesh. */
+/* Repairs tried, against all sequences of steps on copies of the mesh. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,11 +21,11 @@ static ebpo_mesh_report check(const ebpo_mesh *mesh)
     return report;
 }
 
-/* The doubts that are left after steps on a copy. */
+/* Returns the doubts after steps on a copy. */
 static uint32_t left_after(const ebpo_mesh *mesh, int steps, ebpo_mesh_report *after)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mend_record record;
+    ebpo_repair_record record;
     ebpo_mesh copy;
     double area = check(mesh).area;
     memset(&record, 0, sizeof record);
@@ -45,7 +45,7 @@ static uint32_t left_after(const ebpo_mesh *mesh, int steps, ebpo_mesh_report *a
     return ebpo_mesh_doubts(area, after, &record);
 }
 
-/* The least number of steps that leaves no doubt; -1: none does. */
+/* Returns the minimum number of steps without doubts; -1: none. */
 static int fewest(const ebpo_mesh *mesh)
 {
     int best = -1;
@@ -69,12 +69,13 @@ static ebpo_repairs tried(const ebpo_mesh *mesh)
     return repairs;
 }
 
-/* Of what is chosen there is none shorter, and what is told of each is what it leaves. */
+/* Checks that no sequence is shorter than the chosen one, and that the reported results are
+ * correct. */
 static void expect_best(const ebpo_mesh *mesh)
 {
     ebpo_repairs r = tried(mesh);
     int best = fewest(mesh);
-    if (best == 0) /* nothing is to be done, and what dropping would leave is told */
+    if (best == 0) /* nothing to repair, and the result of dropping is reported */
         ck_assert(r.chosen < 0 && r.count == (check(mesh).repeated_faces.count > 0));
     else if (best < 0)
         ck_assert_int_eq(r.chosen, -1);
@@ -117,7 +118,7 @@ static ebpo_mesh damaged(int solid, int damage)
     return mesh;
 }
 
-START_TEST(the_fewest_steps_are_chosen)
+START_TEST(test_repair_chooses_fewest_steps)
 {
     for (int i = 0; i < 32; i++) {
         int damage = i < 16 ? i : (16 + 16 * (i % 3)) | ((i - 16) & 13);
@@ -133,7 +134,7 @@ START_TEST(the_fewest_steps_are_chosen)
 }
 END_TEST
 
-START_TEST(trying_leaves_the_mesh_alone)
+START_TEST(test_repair_trial_keeps_mesh_unchanged)
 {
     ebpo_mesh mesh = damaged(1, 5);
     size_t size = (size_t)mesh.face_count * 3 * sizeof *mesh.faces;
@@ -149,7 +150,7 @@ START_TEST(trying_leaves_the_mesh_alone)
 }
 END_TEST
 
-START_TEST(filling_before_merging_is_doubted)
+START_TEST(test_repair_doubts_filling_before_welding)
 {
     ebpo_mesh mesh = ebpo_test_make("cube");
     ebpo_mesh_report after;
@@ -163,7 +164,7 @@ START_TEST(filling_before_merging_is_doubted)
 }
 END_TEST
 
-START_TEST(sheets_and_what_is_inside_out_are_doubted)
+START_TEST(test_repair_doubts_sheets_and_inverted_solids)
 {
     ebpo_mesh sheet = ebpo_test_sheet(4, 4), cube = ebpo_test_make("cube");
     ebpo_mesh_report after;
@@ -184,10 +185,10 @@ TEST_SUITE(repairs)
     Suite *suite = suite_create("repairs");
     TCase *tests = tcase_create("all");
     tcase_set_timeout(tests, 600);
-    tcase_add_loop_test(tests, the_fewest_steps_are_chosen, 0, ebpo_test_solid_count);
-    tcase_add_test(tests, trying_leaves_the_mesh_alone);
-    tcase_add_test(tests, filling_before_merging_is_doubted);
-    tcase_add_test(tests, sheets_and_what_is_inside_out_are_doubted);
+    tcase_add_loop_test(tests, test_repair_chooses_fewest_steps, 0, ebpo_test_solid_count);
+    tcase_add_test(tests, test_repair_trial_keeps_mesh_unchanged);
+    tcase_add_test(tests, test_repair_doubts_filling_before_welding);
+    tcase_add_test(tests, test_repair_doubts_sheets_and_inverted_solids);
     suite_add_tcase(suite, tests);
     return suite;
 }

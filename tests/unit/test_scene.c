@@ -1,4 +1,5 @@
-/* Scenes: files good and bad, poses in time, boxes and pairs against plain twins. */
+/* Scenes: valid and invalid files, poses in time, boxes and pairs against reference
+ * implementations. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -7,7 +8,7 @@
 #include <string.h>
 
 #include "check_main.h"
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "geometry/pose.h"
 #include "extras/scene/scene_parts.h"
 #include "scratch.h"
@@ -42,7 +43,7 @@ static const struct {
     { "{}", "line 1: has no member ebpo_scene" },
     { "{\"ebpo_scene\": \"2.0\"}", "version 2.0" },
     { "{\"ebpo_scene\": \"1.0\",\n\"instances\": 3}", "line 2: instances: is not an array" },
-    { HEAD "\"colour\": 1}", "line 3: colour: is not a member" },
+    { HEAD "\"colour\": 1}", "line 3: colour: is not a known member" },
     { HEAD "\"title\": 1}", "line 3: title: is not a text" },
     { HEAD "\"title\": \"a\", \"title\": \"b\"}", "line 3: is not JSON: duplicate" },
     { HEAD "\"instances\": [\n{\"model\": \"m\"}]}", "line 4: instances[0]: has no member name" },
@@ -65,7 +66,7 @@ static const struct {
     { HEAD "\"instances\": [{\"name\": \"*\", \"model\": \"m\"}]}", "cannot be a name" },
     { HEAD "\"instances\": [{\"name\": \"a\\nb\", \"model\": \"m\"}]}", "control characters" },
     { HEAD "\"routes\": {\"r\": {\"keys\": []}}}", "routes.r: has no poses" },
-    { HEAD "\"routes\": {\"r\": {}}}", "routes.r: has not one of keys" },
+    { HEAD "\"routes\": {\"r\": {}}}", "routes.r: must have exactly one of keys" },
     { HEAD "\"routes\": {\"r\": {\"keys\": [{\"time\": 1, \"pose\": {}},\n{\"time\": 1, \"pose\": "
            "{}}]}}}",
       "line 4: routes.r.keys[1]: time 1 is not above" },
@@ -74,7 +75,7 @@ static const struct {
     { HEAD "\"routes\": {\"r\": {\"keys\": [{\"time\": 1}]}}}", "keys[0].pose: is not an object" },
     { HEAD "\"routes\": {\"r\": {\"csv\": \"../p.csv\"}}}", "routes.r.csv: is outside" },
     { HEAD "\"ignore\": [[\"a\"]]}", "ignore[0]: is not an array of two names" },
-    { HEAD "\"ignore\": [[\"*\",\n\"layer:x\"]]}", "line 4: ignore[0][1]: is no instance" },
+    { HEAD "\"ignore\": [[\"*\",\n\"layer:x\"]]}", "line 4: ignore[0][1]: is not an instance" },
     { HEAD "\"clearance\": [{\"between\": [\"*\", \"*\"], \"distance\": -1}]}",
       "clearance[0].distance: is below 0" },
     { HEAD "\"cameras\": [{\"name\": \"c\", \"eye\": [0,0,1], \"target\": [0,0,2]}]}",
@@ -90,7 +91,7 @@ static const struct {
     { "{\"ebpo_scene\": 1e999}", "is not JSON" },
 };
 
-START_TEST(bad_files)
+START_TEST(test_scene_invalid_files_are_refused)
 {
     ebpo_scene *scene = NULL;
     ebpo_status status =
@@ -110,8 +111,8 @@ static const char whole[] = HEAD
     "0], \"fov\": 50, \"pixels\": [10, 10]}], \"ignore\": [[\"*\", \"group:g\"]],\n"
     "\"clearance\": [{\"between\": [\"a\", \"layer:l\"], \"distance\": 1}], \"x-y\": [{}]}";
 
-/* Whatever the bytes are: a scene, or a message that names the file. */
-START_TEST(any_bytes)
+/* Any bytes give a scene, or a message that names the file. */
+START_TEST(test_scene_arbitrary_bytes)
 {
     uint64_t state = 6;
     int scenes = 0;
@@ -120,13 +121,13 @@ START_TEST(any_bytes)
         char *text = malloc(size);
         ebpo_scene *scene = NULL;
         memcpy(text, whole, size);
-        for (int64_t k = twin_integer(&state, 0, 3); k > 0; k--) {
-            size_t at = (size_t)twin_integer(&state, 0, (int64_t)size - 1);
-            size_t from = (size_t)twin_integer(&state, 0, (int64_t)size - 1);
-            text[at] = n % 3 ? text[from] : (char)twin_integer(&state, 0, 255);
+        for (int64_t k = reference_integer(&state, 0, 3); k > 0; k--) {
+            size_t at = (size_t)reference_integer(&state, 0, (int64_t)size - 1);
+            size_t from = (size_t)reference_integer(&state, 0, (int64_t)size - 1);
+            text[at] = n % 3 ? text[from] : (char)reference_integer(&state, 0, 255);
         }
-        size -= n % 5 ? 0 : (size_t)twin_integer(&state, 0, (int64_t)size);
-        text = realloc(text, size + !size); /* so that reading on is noticed */
+        size -= n % 5 ? 0 : (size_t)reference_integer(&state, 0, (int64_t)size);
+        text = realloc(text, size + !size); /* so that reading beyond the end is detected */
         ebpo_status status = ebpo_scene_parse(text, size, "s.json", NULL, NULL, &scene, &error);
         scenes += status == EBPO_OK;
         ck_assert(status == EBPO_OK ? scene != NULL : strstr(error.message, "s.json") != NULL);
@@ -137,25 +138,25 @@ START_TEST(any_bytes)
 }
 END_TEST
 
-START_TEST(limits)
+START_TEST(test_scene_size_limits)
 {
     static const char text[] = HEAD "\"x-a\": [1, 2, 3, \"[[[[,,,,\\\"\", 4]}";
     ebpo_scene_options options = EBPO_SCENE_OPTIONS_INIT;
     ebpo_scene *scene = NULL;
-    options.most_values = 16;
+    options.max_values = 16;
     fine(ebpo_scene_parse(text, strlen(text), "s.json", NULL, &options, &scene, &error));
     ebpo_scene_free(scene);
-    options.most_values = 15;
+    options.max_values = 15;
     ck_assert_int_eq(ebpo_scene_parse(text, strlen(text), "s.json", NULL, &options, &scene, &error),
                      EBPO_E_LIMIT);
-    options.most_values = 0;
-    options.most_bytes = strlen(text) - 1;
+    options.max_values = 0;
+    options.max_bytes = strlen(text) - 1;
     ck_assert_int_eq(ebpo_scene_parse(text, strlen(text), "s.json", NULL, &options, &scene, &error),
                      EBPO_E_LIMIT);
 }
 END_TEST
 
-START_TEST(rules)
+START_TEST(test_scene_ignore_and_clearance_rules)
 {
     ebpo_scene *s = parsed(
         HEAD "\"layers\": [\"l\"], \"groups\": [\"g\", \"h\"], \"instances\": [" ONE ","
@@ -171,8 +172,8 @@ START_TEST(rules)
     for (uint64_t a = 0; a < 4; a++)
         for (uint64_t b = 0; b < 4; b++) {
             double clearance;
-            bool asked = ebpo_scene_pair_rule(s, a, b, &clearance);
-            ck_assert_msg((asked ? clearance : -1) == want[a][b], "%d %d", (int)a, (int)b);
+            bool queried = ebpo_scene_pair_rule(s, a, b, &clearance);
+            ck_assert_msg((queried ? clearance : -1) == want[a][b], "%d %d", (int)a, (int)b);
         }
     ck_assert_str_eq(ebpo_scene_get_layer(s, 0), "l");
     ck_assert_ptr_null(ebpo_scene_get_layer(s, 1));
@@ -191,7 +192,7 @@ START_TEST(rules)
 }
 END_TEST
 
-START_TEST(csv)
+START_TEST(test_scene_csv_routes)
 {
     static const struct {
         const char *text, *says;
@@ -201,11 +202,11 @@ START_TEST(csv)
         { "\xff\xfet\0i\0", "two bytes a character (UTF-16)" },
         { "\xef\xbb\xbf", "there are no poses" }, /* and nothing behind it */
         { "scale, qw ,qz,qy,qx,z,y,x,time\n 1 , 1,0,0,0,4,3,2,1\n1,1,0,0,0,5,3,2,2", NULL },
-        { "time,x,y,z\n", "line 1: the first line names" },
-        { "time,x,y,z,qx,qy,qz,qw,qw\n", "line 1: each column is one of" },
+        { "time,x,y,z\n", "line 1: the first line must name" },
+        { "time,x,y,z,qx,qy,qz,qw,qw\n", "line 1: each column must be one of" },
         { "time,x,y,z,qx,qy,qz,qw\n", "there are no poses" },
-        { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0\n", "line 2: there are not as many" },
-        { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,a\n", "line 2: this is not a number" },
+        { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0\n", "line 2: the numbers are not as many" },
+        { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,a\n", "line 2: expected a number" },
         { "time,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n\n1,2,3,4,0,0,0,1\n", "line 4: time 1 is" },
         { "time,x,y,z,qx,qy,qz,qw\n1,2,3,nan,0,0,0,1\n", "line 2: a number is not finite" },
     };
@@ -233,7 +234,7 @@ END_TEST
 
 static double some(uint64_t *state, double size)
 {
-    return (double)twin_integer(state, -1000000, 1000000) * size / 1000000;
+    return (double)reference_integer(state, -1000000, 1000000) * size / 1000000;
 }
 
 static void some_route(ebpo_scene_route *route, uint64_t *state, int keys)
@@ -248,8 +249,8 @@ static void some_route(ebpo_scene_route *route, uint64_t *state, int keys)
     }
 }
 
-/* By sines, as the books have it. */
-static void sine_twin(const double a[4], const double b[4], double u, double q[4])
+/* By sines, as in textbooks. */
+static void sine_reference(const double a[4], const double b[4], double u, double q[4])
 {
     double dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
     double sign = dot < 0 ? -1 : 1, angle = acos(fmin(fabs(dot), 1)), s = sin(angle);
@@ -257,7 +258,7 @@ static void sine_twin(const double a[4], const double b[4], double u, double q[4
         q[k] = s < 1e-9 ? a[k] : (sin((1 - u) * angle) * a[k] + sin(u * angle) * sign * b[k]) / s;
 }
 
-START_TEST(turns_evenly)
+START_TEST(test_scene_route_turns_evenly)
 {
     uint64_t state = 7;
     ebpo_scene_route route = { 0 };
@@ -268,8 +269,8 @@ START_TEST(turns_evenly)
         if (u >= 1)
             continue;
         ebpo_scene_route_at(&route, i + u, &p);
-        sine_twin(route.keys[i].turn, route.keys[i + 1].turn, (i + u) - i, q);
-        double twin[3][3] = {
+        sine_reference(route.keys[i].turn, route.keys[i + 1].turn, (i + u) - i, q);
+        double reference[3][3] = {
             { 1 - 2 * (q[1] * q[1] + q[2] * q[2]), 2 * (q[0] * q[1] - q[2] * q[3]),
               2 * (q[0] * q[2] + q[1] * q[3]) },
             { 2 * (q[0] * q[1] + q[2] * q[3]), 1 - 2 * (q[0] * q[0] + q[2] * q[2]),
@@ -278,13 +279,13 @@ START_TEST(turns_evenly)
               1 - 2 * (q[0] * q[0] + q[1] * q[1]) },
         };
         for (int k = 0; k < 9; k++)
-            ck_assert_double_eq_tol((&p.rotation[0][0])[k], (&twin[0][0])[k], 1e-11);
+            ck_assert_double_eq_tol((&p.rotation[0][0])[k], (&reference[0][0])[k], 1e-11);
     }
     free(route.keys);
 }
 END_TEST
 
-START_TEST(matrices_become_turns)
+START_TEST(test_scene_matrix_to_quaternion)
 {
     uint64_t state = 8;
     ebpo_scene_route route = { 0 };
@@ -307,7 +308,7 @@ END_TEST
 
 /* --- boxes, motions, pairs --- */
 
-/* As if a file with this box had been opened. */
+/* Makes a scene as if a file with this box had been opened. */
 static ebpo_scene *some_scene(uint64_t *state, int routes, int instances)
 {
     ebpo_scene *s = NULL;
@@ -344,7 +345,7 @@ static void some_vertex(const ebpo_scene *s, uint64_t *state, double x[3])
 {
     for (int k = 0; k < 3; k++) {
         const ebpo_scene_model_entry *m = &s->models[0];
-        double u = (double)twin_integer(state, 0, 4) / 4;
+        double u = (double)reference_integer(state, 0, 4) / 4;
         x[k] = fmin(fmax(m->min[k] + u * (m->max[k] - m->min[k]), m->min[k]), m->max[k]);
     }
 }
@@ -359,12 +360,12 @@ static void posed(const ebpo_scene *s, uint64_t i, double time, const double x[3
     ebpo_posing_apply(&posing, x, out);
 }
 
-START_TEST(boxes_and_motions_hold)
+START_TEST(test_scene_motion_bounds_hold)
 {
     uint64_t state = 9;
     ebpo_scene *s = some_scene(&state, 12, 60);
     for (int n = 0; n < 3000; n++) {
-        uint64_t i = (uint64_t)twin_integer(&state, 0, 59);
+        uint64_t i = (uint64_t)reference_integer(&state, 0, 59);
         double from = some(&state, 4), to = from + fabs(some(&state, n % 3 ? 3 : 0.01)), box[2][3];
         double x[3], at[2][3], length, gone = 0;
         if (n % 7 == 0)
@@ -386,10 +387,10 @@ START_TEST(boxes_and_motions_hold)
 }
 END_TEST
 
-/* Bounds are of use: a quarter turn at arm's length, a straight way. */
-/* An arm that turns by a right angle, its tip on the x axis halfway, and goes as far as it is long:
+/* Tests that bounds are tight: a quarter turn at arm's length, a straight path. */
+/* An arm that turns by a right angle, its tip on the x axis halfway, and translates by its length:
  * squares of these lengths are no doubles. */
-START_TEST(boxes_of_any_size_hold)
+START_TEST(test_scene_motion_bounds_of_any_size)
 {
     static const int exponents[] = { -560, 0, 530 };
     for (int e = 0; e < 3; e++) {
@@ -416,7 +417,7 @@ START_TEST(boxes_of_any_size_hold)
 }
 END_TEST
 
-START_TEST(bounds_are_close)
+START_TEST(test_scene_motion_bounds_are_tight)
 {
     ebpo_scene *s =
         parsed(HEAD "\"routes\": {\"turn\": {\"keys\": [{\"time\": 0, \"pose\": {}}, {\"time\": 1, "
@@ -439,7 +440,7 @@ START_TEST(bounds_are_close)
 }
 END_TEST
 
-START_TEST(box_grows_with_instances)
+START_TEST(test_scene_box_grows_with_instances)
 {
     uint64_t state = 10;
     ebpo_scene *s = some_scene(&state, 0, 0);
@@ -472,7 +473,7 @@ static bool keep(void *user, const ebpo_scene_pair *pairs, uint64_t count)
     return true;
 }
 
-/* Every pair of boxes, in order. */
+/* Finds every pair of boxes, in order. */
 static void all_pairs(const ebpo_scene *s, double from, double to, found *f)
 {
     ebpo_scene_pair p;
@@ -489,15 +490,15 @@ static void all_pairs(const ebpo_scene *s, double from, double to, found *f)
         }
 }
 
-/* Few lines and many, of instances with few groups and many: each line looked at, in its order. */
-START_TEST(rules_as_twin)
+/* Few lines and many, of instances with few groups and many: each line is evaluated in order. */
+START_TEST(test_scene_rules_match_reference)
 {
-    enum { INSTANCES = 8, MOST = 60 };
+    enum { INSTANCES = 8, LIMIT = 60 };
     uint64_t state = 40 + (uint64_t)_i;
-    int groups = _i % 2 ? 12 : 1, lines = _i / 2 ? MOST : 4;
+    int groups = _i % 2 ? 12 : 1, lines = _i / 2 ? LIMIT : 4;
     ebpo_scene *s = some_scene(&state, 0, 0);
     bool in[INSTANCES][200] = { { false } };
-    ebpo_scene_rule_entry line[MOST];
+    ebpo_scene_rule_entry line[LIMIT];
     char name[20];
     for (int g = 0; g < groups; g++) {
         snprintf(name, sizeof name, "g%d", g);
@@ -510,15 +511,15 @@ START_TEST(rules_as_twin)
         fine(ebpo_scene_add_instance(s, &at, NULL, &error));
         in[i][EBPO_SCENE_ALL_SET] = in[i][s->sets_count - 1] = true;
         for (int g = 0; g < groups; g++) {
-            uint64_t set = (uint64_t)twin_integer(&state, 1, groups);
+            uint64_t set = (uint64_t)reference_integer(&state, 1, groups);
             fine(ebpo_scene_join_set(s, set, &error));
             in[i][set] = true;
         }
     }
     for (int i = 0; i < lines; i++) {
-        line[i].a = (uint64_t)twin_integer(&state, 1, (int)s->sets_count - 1);
-        line[i].b = (uint64_t)twin_integer(&state, i ? 1 : 0, (int)s->sets_count - 1);
-        line[i].clearance = i % 5 == 4 ? -1 : twin_integer(&state, 0, 9);
+        line[i].a = (uint64_t)reference_integer(&state, 1, (int)s->sets_count - 1);
+        line[i].b = (uint64_t)reference_integer(&state, i ? 1 : 0, (int)s->sets_count - 1);
+        line[i].clearance = i % 5 == 4 ? -1 : reference_integer(&state, 0, 9);
         fine(ebpo_scene_add_rule(s, line[i].a, line[i].b, line[i].clearance, &error));
     }
     ebpo_scene_sort_rules(s);
@@ -529,14 +530,14 @@ START_TEST(rules_as_twin)
                 if ((in[a][line[i].a] && in[b][line[i].b]) ||
                     (in[a][line[i].b] && in[b][line[i].a]))
                     want = line[i].clearance < 0 ? -1 : fmax(want, line[i].clearance);
-            bool asked = ebpo_scene_pair_rule(s, a, b, &got);
-            ck_assert(a == b ? !asked : asked ? got == want : want < 0);
+            bool queried = ebpo_scene_pair_rule(s, a, b, &got);
+            ck_assert(a == b ? !queried : queried ? got == want : want < 0);
         }
     ebpo_scene_free(s);
 }
 END_TEST
 
-START_TEST(pairs_as_twin)
+START_TEST(test_scene_pairs_match_reference)
 {
     static found fast, slow;
     uint64_t state = 11 + (uint64_t)_i;
@@ -563,19 +564,19 @@ TEST_SUITE(scene)
     TCase *c = tcase_create("scene");
     tcase_add_checked_fixture(c, scratch_enter, scratch_leave);
     tcase_set_timeout(c, 300);
-    tcase_add_loop_test(c, bad_files, 0, sizeof bad / sizeof *bad);
-    tcase_add_test(c, any_bytes);
-    tcase_add_test(c, limits);
-    tcase_add_test(c, rules);
-    tcase_add_test(c, csv);
-    tcase_add_test(c, turns_evenly);
-    tcase_add_test(c, matrices_become_turns);
-    tcase_add_test(c, boxes_and_motions_hold);
-    tcase_add_test(c, boxes_of_any_size_hold);
-    tcase_add_test(c, bounds_are_close);
-    tcase_add_test(c, box_grows_with_instances);
-    tcase_add_loop_test(c, rules_as_twin, 0, 4);
-    tcase_add_loop_test(c, pairs_as_twin, 0, 4);
+    tcase_add_loop_test(c, test_scene_invalid_files_are_refused, 0, sizeof bad / sizeof *bad);
+    tcase_add_test(c, test_scene_arbitrary_bytes);
+    tcase_add_test(c, test_scene_size_limits);
+    tcase_add_test(c, test_scene_ignore_and_clearance_rules);
+    tcase_add_test(c, test_scene_csv_routes);
+    tcase_add_test(c, test_scene_route_turns_evenly);
+    tcase_add_test(c, test_scene_matrix_to_quaternion);
+    tcase_add_test(c, test_scene_motion_bounds_hold);
+    tcase_add_test(c, test_scene_motion_bounds_of_any_size);
+    tcase_add_test(c, test_scene_motion_bounds_are_tight);
+    tcase_add_test(c, test_scene_box_grows_with_instances);
+    tcase_add_loop_test(c, test_scene_rules_match_reference, 0, 4);
+    tcase_add_loop_test(c, test_scene_pairs_match_reference, 0, 4);
     suite_add_tcase(suite, c);
     return suite;
 }

@@ -1,5 +1,6 @@
-/* Selections: the theses' against plain twins; the hull that proposes directions; files of every
- * selection keep the promises; and what no envelope can be better than. */
+/* Selections: selections of the theses against reference implementations; the hull for candidate
+ * directions; files of every selection keep the guarantees; and the lower limit of all envelopes.
+ */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,11 +19,11 @@
 #include "scratch.h"
 #include "solids.h"
 
-enum { MOST = 48 };
+enum { LIMIT = 48 };
 static const double unit_cell[3] = { 1, 1, 1 };
 
-/* --- candidates on a sphere inside of the cell: each plane cuts something, so that codes tell
- * which were chosen --- */
+/* --- candidates on a sphere inside the cell: each plane cuts something, so that codes identify the
+ * chosen ones --- */
 
 static int make_candidates(ebpo_candidate *c, int count, uint64_t *seed)
 {
@@ -101,12 +102,12 @@ static double cost(const ebpo_choice *choice, const bool *chosen)
     return sum;
 }
 
-START_TEST(no_swap_of_a_medoid_makes_kmedoids_cheaper)
+START_TEST(test_kmedoids_swap_is_not_cheaper)
 {
     uint64_t seed = 11;
     for (int round = 0; round < 60; round++) {
-        ebpo_candidate c[MOST];
-        bool chosen[MOST];
+        ebpo_candidate c[LIMIT];
+        bool chosen[LIMIT];
         int count = 3 + (int)(ebpo_test_random(&seed) % 30);
         ebpo_choice choice = { .candidates = c,
                                .count = make_candidates(c, count, &seed),
@@ -129,41 +130,41 @@ START_TEST(no_swap_of_a_medoid_makes_kmedoids_cheaper)
 }
 END_TEST
 
-START_TEST(least_offset_takes_those_that_moved_least)
+START_TEST(test_least_offset_selects_least_moved)
 {
     uint64_t seed = 12;
     for (int round = 0; round < 50; round++) {
-        ebpo_candidate c[MOST];
-        bool chosen[MOST];
+        ebpo_candidate c[LIMIT];
+        bool chosen[LIMIT];
         ebpo_choice choice = { .candidates = c,
                                .count = make_candidates(c, 25, &seed),
                                .most = EBPO_PLANES_STORED,
                                .cell_size = unit_cell,
                                .wanted = 1 + round % 25 };
         ck_assert_int_eq(choose(EBPO_SELECT_OFFSET, &choice, chosen), choice.wanted);
-        double most_taken = 0, least_left = INFINITY;
+        double max_taken = 0, least_left = INFINITY;
         for (int i = 0; i < choice.count; i++)
             if (chosen[i])
-                most_taken = fmax(most_taken, c[i].moved);
+                max_taken = fmax(max_taken, c[i].moved);
             else
                 least_left = fmin(least_left, c[i].moved);
-        ck_assert_double_le(most_taken, least_left);
+        ck_assert_double_le(max_taken, least_left);
     }
 }
 END_TEST
 
-START_TEST(random_takes_consecutive_candidates_from_a_place_that_the_seed_tells)
+START_TEST(test_random_selection_starts_at_seed_position)
 {
     uint64_t seed = 13;
     uint32_t starts = 0;
-    ebpo_candidate c[MOST];
+    ebpo_candidate c[LIMIT];
     ebpo_choice choice = { .candidates = c,
                            .count = make_candidates(c, 20, &seed),
                            .most = EBPO_PLANES_STORED,
                            .cell_size = unit_cell,
                            .wanted = 7 };
     for (int round = 0; round < 200; round++) {
-        bool chosen[MOST], again[MOST];
+        bool chosen[LIMIT], again[LIMIT];
         choice.seed = ebpo_test_random(&seed);
         ck_assert_int_eq(choose(EBPO_SELECT_RANDOM, &choice, chosen), 7);
         ck_assert_int_eq(choose(EBPO_SELECT_RANDOM, &choice, again), 7);
@@ -180,7 +181,7 @@ START_TEST(random_takes_consecutive_candidates_from_a_place_that_the_seed_tells)
 }
 END_TEST
 
-START_TEST(counts_wanted_are_those_of_the_theses)
+START_TEST(test_plane_counts_match_theses)
 {
     ck_assert_int_eq(ebpo_selection_wanted(10, 3, 40, 0), 4);
     ck_assert_int_eq(ebpo_selection_wanted(11, 3, 40, 0), 5); /* rounded up */
@@ -191,7 +192,7 @@ START_TEST(counts_wanted_are_those_of_the_theses)
     ck_assert_int_eq(ebpo_selection_wanted(100, 1, 40, 694), 86);   /* 347, 173.5, 86.75 */
     ck_assert_int_eq(ebpo_selection_wanted(100, 10, 40, 694), 100); /* K below 1: all of them */
     ck_assert_int_eq(ebpo_selection_wanted(1, 0, 40, 694), 1);
-    /* never more than a file stores: what is chosen is kept */
+    /* never more than a file stores: chosen planes are kept */
     ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 694), EBPO_PLANES_STORED);
     ck_assert_int_eq(ebpo_selection_wanted(1000, 0, 40, 0), EBPO_PLANES_STORED);
     ck_assert_int_eq(ebpo_selection_wanted(1000, 30, 40, 694), EBPO_PLANES_STORED);
@@ -200,7 +201,7 @@ END_TEST
 
 /* --- the hull --- */
 
-/* A triple is a facet when all points lie on one side of it. */
+/* Returns true when all points are on one side of the triple, which is then a facet. */
 static bool is_facet(const double (*p)[3], int count, int a, int b, int c)
 {
     double u[3], v[3];
@@ -220,7 +221,7 @@ static bool is_facet(const double (*p)[3], int count, int a, int b, int c)
     return true;
 }
 
-START_TEST(hull_has_the_facets_that_trying_all_triples_finds)
+START_TEST(test_hull_facets_match_triple_search)
 {
     uint64_t seed = 14;
     static ebpo_hull_facet facets[EBPO_HULL_FACETS];
@@ -244,29 +245,29 @@ START_TEST(hull_has_the_facets_that_trying_all_triples_finds)
 }
 END_TEST
 
-START_TEST(hull_of_nearly_flat_points_stays_within_its_room)
+START_TEST(test_hull_of_nearly_flat_points)
 {
     uint64_t seed = 15;
     for (int round = 0; round < 2000; round++) {
         ebpo_hull_facet facets[2 * 40 + 1];
         double p[40][3], thin = ldexp(1, -(round % 60));
-        int room = 4 + round % 77;
-        memset(&facets[room], 0x5a, sizeof *facets);
+        int space = 4 + round % 77;
+        memset(&facets[space], 0x5a, sizeof *facets);
         for (int i = 0; i < 40;
-             i++) { /* on a cylinder, a grid, a plane: whatever makes signs waver */
+             i++) { /* on a cylinder, a grid, a plane: inputs with unstable signs */
             double a = 0.1 * (double)(ebpo_test_random(&seed) % 63);
             p[i][0] = round % 3 ? cos(a) : ebpo_test_random_unit(&seed),
             p[i][1] = round % 3 ? sin(a) : ebpo_test_random_unit(&seed),
             p[i][2] = thin * ebpo_test_random_unit(&seed);
         }
-        ck_assert_int_le(ebpo_hull_facets((const double(*)[3])p, 40, 1e-9, facets, room), room);
+        ck_assert_int_le(ebpo_hull_facets((const double(*)[3])p, 40, 1e-9, facets, space), space);
         for (size_t i = 0; i < sizeof *facets; i++)
-            ck_assert_int_eq(((const unsigned char *)&facets[room])[i], 0x5a);
+            ck_assert_int_eq(((const unsigned char *)&facets[space])[i], 0x5a);
     }
 }
 END_TEST
 
-START_TEST(hull_of_flat_or_repeated_points_is_nothing_and_of_a_grid_its_box)
+START_TEST(test_hull_of_flat_points_and_grid)
 {
     static ebpo_hull_facet facets[EBPO_HULL_FACETS];
     static double p[EBPO_HULL_POINTS][3];
@@ -331,17 +332,17 @@ static ebpo_file *open_file(void)
     return file;
 }
 
-/* With EBPO_TEST_SCALE below 1 every fourth solid does: other compilers and sanitizers look for
- * other things. */
-static bool left_out(int solid) { return ebpo_test_scale() < 1 && solid % 4; }
+/* With EBPO_TEST_SCALE below 1 only every fourth solid is tested: other compilers and sanitizers
+ * check other properties. */
+static bool omitted(int solid) { return ebpo_test_scale() < 1 && solid % 4; }
 
-START_TEST(every_selection_makes_files_without_violations)
+START_TEST(test_selections_make_valid_files)
 {
     const ebpo_test_solid *solid = &ebpo_test_solids[_i];
-    if (left_out(_i))
+    if (omitted(_i))
         return;
     for (int s = _i % 2; s < 2 * EBPO_SELECTION_COUNT;
-         s += 2) { /* each solid with every second way, so that it takes half the time */
+         s += 2) { /* each solid with every second selection, which halves the time */
         ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
         ebpo_error error = EBPO_ERROR_INIT;
         ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
@@ -383,7 +384,7 @@ static void digest_of(ebpo_selection select, uint64_t seed, unsigned threads,
     ebpo_close(file);
 }
 
-START_TEST(equal_seeds_give_equal_files_for_any_number_of_threads)
+START_TEST(test_equal_seeds_give_equal_files)
 {
     for (int s = 0; s < EBPO_SELECTION_COUNT; s++) {
         uint8_t a[32], b[32], c[32];
@@ -396,7 +397,7 @@ START_TEST(equal_seeds_give_equal_files_for_any_number_of_threads)
 }
 END_TEST
 
-START_TEST(memory_does_not_change_what_is_selected)
+START_TEST(test_selection_result_ignores_memory_budget)
 {
     for (int s = 0; s < EBPO_SELECTION_COUNT; s++) {
         uint8_t a[32], b[32];
@@ -415,7 +416,7 @@ START_TEST(memory_does_not_change_what_is_selected)
 }
 END_TEST
 
-START_TEST(selections_and_their_numbers_that_make_no_sense_are_refused)
+START_TEST(test_invalid_selection_options_are_refused)
 {
     struct {
         ebpo_selection select;
@@ -443,7 +444,7 @@ END_TEST
 
 /* --- more planes --- */
 
-/* Volume beyond the solid's at the root, in parts of the solid's. */
+/* Returns the excess volume at the root, relative to the volume of the solid. */
 static double root_excess(const ebpo_build_options *options)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -457,7 +458,7 @@ static double root_excess(const ebpo_build_options *options)
     return volume / solid - 1;
 }
 
-/* Clusters of normals are not nested: a step may lose so much of the excess, no more. */
+/* Clusters of normals are not nested: a step may lose at most so much of the excess. */
 static const double step_may_lose = 0.02;
 
 static void falls(ebpo_build_options *o, double *option, const double *value, int count)
@@ -476,9 +477,9 @@ static void falls(ebpo_build_options *o, double *option, const double *value, in
                   ebpo_selection_describe(o->select)->name, first, now);
 }
 
-/* As in the theses (BP 2008, tables 3.6 to 3.8; EBP 2017, table 20). The last ones ask for more
+/* As in the theses (BP 2008, tables 3.6 to 3.8; EBP 2017, table 20). The last settings request more
  * planes than a node stores. */
-START_TEST(more_planes_make_the_root_tighter)
+START_TEST(test_more_planes_tighten_root)
 {
     static const double percent[] = { 5, 10, 20, 40, 80 }, k_root[] = { 20, 60, 200, 400, 1200 };
     for (int s = 0; s < EBPO_SELECTION_COUNT; s++) {
@@ -513,7 +514,7 @@ static bool has_hulls(ebpo_file *file)
     return status == EBPO_OK;
 }
 
-START_TEST(hulls_of_a_convex_solid_fill_it_at_every_level)
+START_TEST(test_hull_of_convex_solid_fills_levels)
 {
     ebpo_mesh meshes[] = { ebpo_test_tetrahedron(2),
                            ebpo_test_sphere((double[3]){ 3, -1, 1e3 }, 0.5, 3),
@@ -540,10 +541,10 @@ START_TEST(hulls_of_a_convex_solid_fill_it_at_every_level)
 }
 END_TEST
 
-START_TEST(no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close)
+START_TEST(test_envelope_sizes_are_close_to_limit)
 {
     const ebpo_test_solid *solid = &ebpo_test_solids[_i];
-    if (!solid->balanced || left_out(_i))
+    if (!solid->balanced || omitted(_i))
         return;
     for (int s = 0; s < EBPO_SELECTION_COUNT; s += 1 + _i % 3) {
         ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
@@ -572,7 +573,7 @@ START_TEST(no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close)
                           "%s, level %d: %g below the limit %g", solid->name, level, volume,
                           limit.volume);
             ck_assert_double_le(volume, before * (1 + 1e-9) + 1e-12 * root);
-            if (s == 0 && level <= 3) /* offsets in 4096ths of a cell alone cost some */
+            if (s == 0 && level <= 3) /* rounding of offsets to 4096ths of a cell costs some */
                 ck_assert_msg(volume - limit.volume <= 0.03 * root,
                               "%s, level %d: %g where %g is possible", solid->name, level, volume,
                               limit.volume);
@@ -589,28 +590,26 @@ TEST_SUITE(selections)
     TCase *tests = tcase_create("choosing"), *files = tcase_create("files"),
           *more = tcase_create("more planes");
     tcase_set_timeout(tests, 300);
-    tcase_add_test(tests, no_swap_of_a_medoid_makes_kmedoids_cheaper);
-    tcase_add_test(tests, least_offset_takes_those_that_moved_least);
-    tcase_add_test(tests, random_takes_consecutive_candidates_from_a_place_that_the_seed_tells);
-    tcase_add_test(tests, counts_wanted_are_those_of_the_theses);
-    tcase_add_test(tests, hull_has_the_facets_that_trying_all_triples_finds);
-    tcase_add_test(tests, hull_of_nearly_flat_points_stays_within_its_room);
-    tcase_add_test(tests, hull_of_flat_or_repeated_points_is_nothing_and_of_a_grid_its_box);
-    tcase_add_test(tests, selections_and_their_numbers_that_make_no_sense_are_refused);
+    tcase_add_test(tests, test_kmedoids_swap_is_not_cheaper);
+    tcase_add_test(tests, test_least_offset_selects_least_moved);
+    tcase_add_test(tests, test_random_selection_starts_at_seed_position);
+    tcase_add_test(tests, test_plane_counts_match_theses);
+    tcase_add_test(tests, test_hull_facets_match_triple_search);
+    tcase_add_test(tests, test_hull_of_nearly_flat_points);
+    tcase_add_test(tests, test_hull_of_flat_points_and_grid);
+    tcase_add_test(tests, test_invalid_selection_options_are_refused);
     suite_add_tcase(suite, tests);
     tcase_set_timeout(files, 600);
     tcase_add_checked_fixture(files, enter, leave);
-    tcase_add_loop_test(files, every_selection_makes_files_without_violations, 0,
-                        ebpo_test_solid_count);
-    tcase_add_test(files, equal_seeds_give_equal_files_for_any_number_of_threads);
-    tcase_add_test(files, memory_does_not_change_what_is_selected);
-    tcase_add_test(files, hulls_of_a_convex_solid_fill_it_at_every_level);
-    tcase_add_loop_test(files, no_envelope_is_smaller_than_the_limit_and_inherited_ones_come_close,
-                        0, ebpo_test_solid_count);
+    tcase_add_loop_test(files, test_selections_make_valid_files, 0, ebpo_test_solid_count);
+    tcase_add_test(files, test_equal_seeds_give_equal_files);
+    tcase_add_test(files, test_selection_result_ignores_memory_budget);
+    tcase_add_test(files, test_hull_of_convex_solid_fills_levels);
+    tcase_add_loop_test(files, test_envelope_sizes_are_close_to_limit, 0, ebpo_test_solid_count);
     suite_add_tcase(suite, files);
     tcase_set_timeout(more, 600);
     tcase_add_checked_fixture(more, enter, leave);
-    tcase_add_test(more, more_planes_make_the_root_tighter);
+    tcase_add_test(more, test_more_planes_tighten_root);
     suite_add_tcase(suite, more);
     return suite;
 }

@@ -1,5 +1,5 @@
-/* Which closed components are within which, found by trees, against a plain twin that compares all
- * with all. */
+/* Nesting of closed components, found by trees, against a reference implementation that compares
+ * all pairs. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,12 +11,12 @@
 #include "geometry/triangle_pair.h"
 #include "solids.h"
 
-enum { MOST = 60 };
+enum { LIMIT = 60 };
 
-/* The faces of each component, which are neighbours in the list; its volume's sign. */
+/* The faces of each component, which are adjacent in the list; the sign of its volume. */
 typedef struct parts {
-    uint64_t begin[MOST + 1];
-    bool inwards[MOST];
+    uint64_t begin[LIMIT + 1];
+    bool inwards[LIMIT];
     int count;
 } parts;
 
@@ -25,7 +25,7 @@ static void position(const ebpo_mesh *m, uint64_t corner, double out[3])
     ebpo_mesh_position(m, m->faces[corner], out);
 }
 
-/* Tells also apart what has one coordinate. */
+/* Also distinguishes points with one equal coordinate. */
 static bool before(const double a[3], const double b[3], int d)
 {
     int axis = d / 2;
@@ -37,7 +37,7 @@ static bool before(const double a[3], const double b[3], int d)
     return false;
 }
 
-/* Winding number of the component at a point, by all of its faces. */
+/* Returns the winding number of the component at a point, by all of its faces. */
 static int winding(const ebpo_mesh *m, const parts *p, int part, const double at[3])
 {
     int sum = 0;
@@ -66,7 +66,7 @@ static bool within(const ebpo_mesh *m, const parts *p, int inner, int outer)
     return true;
 }
 
-/* No faces of two components have a common point: all pairs are compared. */
+/* Checks that no faces of two components have a common point: compares all pairs. */
 static bool apart(const ebpo_mesh *m, const parts *p)
 {
     double a[3][3], b[3][3];
@@ -84,7 +84,7 @@ static bool apart(const ebpo_mesh *m, const parts *p)
     return true;
 }
 
-static ebpo_shells twin(const ebpo_mesh *m, const parts *p)
+static ebpo_shells reference(const ebpo_mesh *m, const parts *p)
 {
     ebpo_shells s = EBPO_SHELLS_INIT;
     s.closed = (uint64_t)p->count;
@@ -100,7 +100,7 @@ static ebpo_shells twin(const ebpo_mesh *m, const parts *p)
     return s;
 }
 
-/* Turned about x, so that long faces lie across the axes; by thirds, exactly as they come. */
+/* Rotates about x, so that long faces are across the axes; by thirds, as rounded. */
 static void lean(ebpo_mesh *m)
 {
     for (uint64_t v = 0; v < m->vertex_count; v++) {
@@ -129,11 +129,12 @@ static double whole(uint64_t *state, uint64_t most)
     return (double)(ebpo_test_random(state) % most);
 }
 
-/* Boxes at whole coordinates, so that they touch and share walls; tetrahedra, tori with holes. */
+/* Boxes at integer coordinates, so that they share faces and are in contact; tetrahedra, tori with
+ * holes. */
 static ebpo_mesh many(uint64_t *state, parts *p)
 {
     ebpo_mesh m = { 0 };
-    uint64_t most = ebpo_test_random(state) % 2 ? MOST : 6;
+    uint64_t most = ebpo_test_random(state) % 2 ? LIMIT : 6;
     int count = 2 + (int)(ebpo_test_random(state) % (most - 2));
     uint64_t range = 4 + ebpo_test_random(state) % 30;
     memset(p, 0, sizeof *p);
@@ -153,13 +154,13 @@ static ebpo_mesh many(uint64_t *state, parts *p)
     return m;
 }
 
-START_TEST(shells_are_nested_as_the_plain_twin_has_it)
+START_TEST(test_shell_nesting_matches_reference)
 {
     uint64_t state = 4711, rounds = 24 + ebpo_test_scaled(96), known = 0;
     for (uint64_t i = 0; i < rounds; i++) {
         parts p;
         ebpo_mesh m = many(&state, &p);
-        ebpo_shells plain = twin(&m, &p), s = EBPO_SHELLS_INIT;
+        ebpo_shells plain = reference(&m, &p), s = EBPO_SHELLS_INIT;
         ebpo_error error = EBPO_ERROR_INIT;
         ck_assert_msg(ebpo_mesh_count_shells(&m, 1 + (unsigned)(i % 3),
                                              (ebpo_progress){ NULL, NULL }, &s, &error) == EBPO_OK,
@@ -176,8 +177,9 @@ START_TEST(shells_are_nested_as_the_plain_twin_has_it)
 }
 END_TEST
 
-/* So many in each other that every host is crowded; each with a small one beside its inner ones. */
-START_TEST(chains_are_as_deep_as_they_were_made)
+/* So many nested components that every host is crowded; each with a small one beside its inner
+ * ones. */
+START_TEST(test_shell_chain_depth)
 {
     enum { CHAIN = 150 };
     uint64_t state = 99;
@@ -221,8 +223,8 @@ TEST_SUITE(shells)
     Suite *suite = suite_create("shells");
     TCase *tests = tcase_create("all");
     tcase_set_timeout(tests, 300);
-    tcase_add_test(tests, shells_are_nested_as_the_plain_twin_has_it);
-    tcase_add_test(tests, chains_are_as_deep_as_they_were_made);
+    tcase_add_test(tests, test_shell_nesting_matches_reference);
+    tcase_add_test(tests, test_shell_chain_depth);
     suite_add_tcase(suite, tests);
     return suite;
 }

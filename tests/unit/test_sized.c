@@ -1,4 +1,4 @@
-/* Structs that begin with their size: callers of other versions, and callers who forgot it. */
+/* Structs that begin with their size: callers of other versions, and callers who did not set it. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -6,9 +6,9 @@
 
 #include "core/error.h"
 #include "check_main.h"
-#include "query_kit.h"
+#include "query_support.h"
 
-/* What a caller of a later version would hand over. */
+/* The struct of a caller of a later version. */
 typedef struct later_options {
     ebpo_workspace_options now;
     uint64_t later;
@@ -38,8 +38,8 @@ static ebpo_status no_bytes(void *user, uint64_t offset, uint64_t size, void *da
 
 static void count_closes(void *user) { ++*(int *)user; }
 
-/* Whose source it is, once it has been handed over: ours, also when we refuse it. */
-START_TEST(a_source_of_a_later_version_is_closed)
+/* The library owns a source once it is passed, also when it is refused. */
+START_TEST(test_source_of_later_version_is_closed)
 {
     int closes = 0;
     struct {
@@ -58,7 +58,7 @@ START_TEST(a_source_of_a_later_version_is_closed)
 }
 END_TEST
 
-START_TEST(options_of_other_versions)
+START_TEST(test_options_of_other_versions)
 {
     later_options later = { EBPO_WORKSPACE_OPTIONS_INIT, 0 };
     ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
@@ -77,7 +77,7 @@ START_TEST(options_of_other_versions)
 }
 END_TEST
 
-START_TEST(sizes_that_no_version_has)
+START_TEST(test_invalid_struct_sizes_are_refused)
 {
     static const size_t sizes[] = { 0, 1, sizeof(size_t), 17, 8200, SIZE_MAX };
     ebpo_workspace_options options = EBPO_WORKSPACE_OPTIONS_INIT;
@@ -86,7 +86,7 @@ START_TEST(sizes_that_no_version_has)
 }
 END_TEST
 
-START_TEST(what_is_filled_in)
+START_TEST(test_output_structs_are_filled_by_size)
 {
     later_stats stats;
     ebpo_workspace *workspace = made_with(NULL, EBPO_OK);
@@ -108,16 +108,16 @@ START_TEST(what_is_filled_in)
 }
 END_TEST
 
-/* Each public call with a struct that nobody has begun: refused by its name, nothing made. */
-#define REFUSED(type, call)                                                               \
-    do {                                                                                  \
-        ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;                            \
-        ck_assert_int_eq((call), EBPO_E_ARGUMENT);                                        \
-        ck_assert_msg(strstr(error_.message, #type ": its struct_size"), "%s: %s", #call, \
-                      error_.message);                                                    \
+/* Each public call with an uninitialized struct: refused with its name, nothing is made. */
+#define REFUSED(type, call)                                                                   \
+    do {                                                                                      \
+        ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;                                \
+        ck_assert_int_eq((call), EBPO_E_ARGUMENT);                                            \
+        ck_assert_msg(strstr(error_.message, #type ": invalid struct_size"), "%s: %s", #call, \
+                      error_.message);                                                        \
     } while (0)
 
-/* Zeros of any type. */
+/* Returns zeros of any type. */
 static void *zeros(void)
 {
     static uint64_t block[4096];
@@ -125,11 +125,11 @@ static void *zeros(void)
     return block;
 }
 
-START_TEST(structs_that_were_not_begun)
+START_TEST(test_uninitialized_structs_are_refused)
 {
-    static const query_variant usual = { "usual", 4, 4, EBPO_RULE_NONZERO, 0 };
+    static const query_variant standard = { "default", 4, 4, EBPO_RULE_NONZERO, 0 };
     query_model m;
-    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 1), &usual);
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 1), &standard);
     const char *path = "/no/such/folder/file";
     static const double p[3];
     void *made = NULL;
@@ -172,10 +172,10 @@ START_TEST(structs_that_were_not_begun)
     REFUSED(ebpo_shells,
             ebpo_solid_volume_of(&ebpo_file_info(m.file)->report, EBPO_RULE_NONZERO, zeros(), NULL,
                                  &(ebpo_solid_volume)EBPO_SOLID_VOLUME_INIT, error));
-    REFUSED(ebpo_deviation, ebpo_deviation_level(m.model, m.file, 0, NULL, zeros(), error));
-    REFUSED(ebpo_deviation_options,
-            ebpo_deviation_level(m.model, m.file, 0, zeros(), &(ebpo_deviation)EBPO_DEVIATION_INIT,
-                                 error));
+    REFUSED(ebpo_error_bound, ebpo_level_error_bound(m.model, m.file, 0, NULL, zeros(), error));
+    REFUSED(ebpo_error_bound_options,
+            ebpo_level_error_bound(m.model, m.file, 0, zeros(),
+                                   &(ebpo_error_bound)EBPO_ERROR_BOUND_INIT, error));
     REFUSED(ebpo_model_options, ebpo_model_new(m.file, zeros(), (ebpo_model **)&made, error));
     REFUSED(ebpo_inside_options, ebpo_inside(m.context, p, zeros(), &inside, error));
     REFUSED(ebpo_distance_options, ebpo_distance(m.context, p, zeros(), &distance, error));
@@ -197,11 +197,11 @@ TEST_SUITE(sized)
     Suite *suite = suite_create("sized");
     TCase *tests = tcase_create("sized");
     tcase_set_timeout(tests, 120);
-    tcase_add_test(tests, options_of_other_versions);
-    tcase_add_test(tests, a_source_of_a_later_version_is_closed);
-    tcase_add_loop_test(tests, sizes_that_no_version_has, 0, 6);
-    tcase_add_test(tests, what_is_filled_in);
-    tcase_add_test(tests, structs_that_were_not_begun);
+    tcase_add_test(tests, test_options_of_other_versions);
+    tcase_add_test(tests, test_source_of_later_version_is_closed);
+    tcase_add_loop_test(tests, test_invalid_struct_sizes_are_refused, 0, 6);
+    tcase_add_test(tests, test_output_structs_are_filled_by_size);
+    tcase_add_test(tests, test_uninitialized_structs_are_refused);
     suite_add_tcase(suite, tests);
     return suite;
 }

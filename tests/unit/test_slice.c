@@ -1,4 +1,4 @@
-/* Parts of a file against the whole file: ranges, nodes, subtrees as one piece. */
+/* Parts of a file against the whole file: ranges, nodes, subtrees in one piece. */
 #include <dirent.h>
 #include <pthread.h>
 #include <stdint.h>
@@ -25,7 +25,7 @@ static void make_folder(void)
     path = scratch("x.ebpo.h5");
 }
 
-/* A file, all of it in memory, and the number of nodes of each type before each group, counted one
+/* A file, completely in memory, and the number of nodes of each type before each group, counted one
  * by one. */
 typedef struct whole {
     ebpo_file *file;
@@ -89,7 +89,7 @@ static void write_tree(ebpo_tree *tree, uint32_t parts)
     model_write(tree, path, &options);
 }
 
-enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
+enum { DEFAULT = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
 
 static void build(ebpo_mesh mesh, uint32_t leaf_faces, int max_level, uint32_t parts)
 {
@@ -106,7 +106,7 @@ static void build(ebpo_mesh mesh, uint32_t leaf_faces, int max_level, uint32_t p
 typedef struct compare {
     const whole *w;
     const ebpo_slice *slice;
-    /* of the slice */
+    /* counts in the slice */
     uint64_t next[EBPO_LEVELS_MAX][4], group[EBPO_LEVELS_MAX], plane[EBPO_LEVELS_MAX],
         ref[EBPO_LEVELS_MAX];
     uint8_t *listed; /* local faces */
@@ -117,13 +117,13 @@ static void compare_leaf(compare *c, int i, uint64_t at, int level, uint64_t ran
     const ebpo_level *a = &c->slice->level[i], *b = &c->w->tree.level[level];
     ck_assert_uint_eq(a->leaf_new[at], b->leaf_new[rank]);
     ck_assert_uint_eq(a->leaf_ref_count[at], b->leaf_ref_count[rank]);
-    ck_assert_uint_ge(a->leaf_first[at], c->slice->outer_count);
+    ck_assert_uint_ge(a->leaf_first[at], c->slice->shared_count);
     for (uint64_t k = 0; k < a->leaf_new[at]; k++) {
         ck_assert_uint_lt(a->leaf_first[at] + k, c->slice->mesh.face_count);
         ck_assert_uint_eq(ebpo_slice_file_face(c->slice, (uint32_t)(a->leaf_first[at] + k)),
                           b->leaf_first[rank] + k);
     }
-    ck_assert_uint_eq(c->slice->first_face + (a->leaf_first[at] - c->slice->outer_count),
+    ck_assert_uint_eq(c->slice->first_face + (a->leaf_first[at] - c->slice->shared_count),
                       b->leaf_first[rank]);
     for (uint64_t k = 0; k < a->leaf_ref_count[at]; k++) {
         uint32_t local = a->leaf_refs[c->ref[i]++];
@@ -166,11 +166,12 @@ static void compare_node(compare *c, int i, unsigned type, uint64_t rank)
     }
 }
 
-/* Local faces have the file's corners, bit by bit, and every vertex is there for one of them. */
+/* Checks that local faces have the corners of the file, bit by bit, and every vertex is used by one
+ * of them. */
 static void compare_faces(const ebpo_slice *s, const ebpo_tree *tree)
 {
     uint8_t *used = calloc(s->mesh.vertex_count + 1, 1);
-    ck_assert_uint_eq(s->mesh.face_count, s->outer_count + s->face_count);
+    ck_assert_uint_eq(s->mesh.face_count, s->shared_count + s->face_count);
     ck_assert(!s->mesh.xyz32 == !tree->mesh.xyz32 && !s->mesh.xyz64 == !tree->mesh.xyz64);
     for (uint64_t f = 0; f < s->mesh.face_count; f++) {
         uint64_t in_file = ebpo_slice_file_face(s, (uint32_t)f);
@@ -213,7 +214,7 @@ static void compare_counts(const compare *c, const ebpo_slice_size *size)
         sum.new_faces += l->new_count;
     }
     sum.outer = c->slice->root.cell.level == 0 ? 0 : sum.refs;
-    ck_assert_uint_le(c->slice->outer_count, sum.outer);
+    ck_assert_uint_le(c->slice->shared_count, sum.outer);
     ck_assert_uint_eq(sum.new_faces, c->slice->face_count);
     ck_assert_mem_eq(&sum, size, sizeof sum);
 }
@@ -225,7 +226,7 @@ static void compare_slice(const whole *w, const ebpo_slice *slice, const ebpo_sl
     ck_assert_uint_eq(slice->level[0].types[0], slice->root.type);
     compare_node(&c, 0, slice->root.type, slice->root.rank);
     compare_counts(&c, size);
-    for (uint32_t k = 0; k < slice->outer_count; k++) {
+    for (uint32_t k = 0; k < slice->shared_count; k++) {
         ck_assert(c.listed[k] && slice->outer[k] < slice->first_face);
         ck_assert(k == 0 || slice->outer[k] > slice->outer[k - 1]);
     }
@@ -279,7 +280,7 @@ static void check_node(const whole *w, const ebpo_node *node)
     }
 }
 
-/* Every node; the subtrees of each `step`th of them. */
+/* Checks every node; the subtrees of each `step`th of them. */
 static void check_all(const whole *w, uint64_t step)
 {
     uint64_t turn = 0;
@@ -299,7 +300,7 @@ static void check_all(const whole *w, uint64_t step)
     }
 }
 
-START_TEST(slices_of_random_trees_are_what_the_whole_file_says)
+START_TEST(test_slices_of_random_trees_match_file)
 {
     if (!ebpo_test_wanted(_i))
         return;
@@ -316,22 +317,22 @@ START_TEST(slices_of_random_trees_are_what_the_whole_file_says)
 }
 END_TEST
 
-START_TEST(slices_of_solids_are_what_the_whole_file_says)
+START_TEST(test_slices_of_solids_match_file)
 {
     if (!ebpo_test_wanted(_i))
         return;
     whole w;
     build(ebpo_test_solids[_i].make(), 1, -1,
-          _i % 2 ? USUAL : EBPO_PART_MESH | EBPO_PART_LEAF_PLANES);
+          _i % 2 ? DEFAULT : EBPO_PART_MESH | EBPO_PART_LEAF_PLANES);
     whole_open(&w, path, 0);
     check_all(&w, 7);
     whole_close(&w);
 }
 END_TEST
 
-/* More than 4,096 groups, gray nodes and leaves in a level, so that index arrays are there and tell
- * where to begin; chunks by the dozen. */
-START_TEST(slices_are_found_by_index_arrays_and_with_little_room)
+/* More than 4,096 groups, gray nodes and leaves in a level, so that index arrays exist and give the
+ * beginning; dozens of chunks. */
+START_TEST(test_slices_by_index_with_little_memory)
 {
     random_tree_options options = { 5, 7, 13, 2, true, _i == 1, true, _i == 1 };
     ebpo_tree tree;
@@ -349,13 +350,13 @@ START_TEST(slices_are_found_by_index_arrays_and_with_little_room)
 }
 END_TEST
 
-START_TEST(slices_of_a_mesh_of_many_chunks_agree)
+START_TEST(test_slices_of_multi_chunk_mesh)
 {
     whole w;
     ebpo_mesh mesh = ebpo_test_torus(2, 0.7, 160, 100);
     if (_i)
         ebpo_test_to_float(&mesh);
-    build(mesh, 4, _i ? 4 : -1, USUAL);
+    build(mesh, 4, _i ? 4 : -1, DEFAULT);
     whole_open(&w, path, _i ? 500000 : 0);
     check_all(&w, 53);
     whole_close(&w);
@@ -384,7 +385,7 @@ static void same_level(const ebpo_level *a, const ebpo_level *b)
     same(a->leaf_refs, b->leaf_refs, a->ref_count * 4);
 }
 
-START_TEST(the_slice_of_the_root_is_the_whole_tree)
+START_TEST(test_root_slice_is_whole_tree)
 {
     random_tree_options options = {
         3 + (uint64_t)_i, 1 + _i, 6, 5, true, false, _i % 2 == 0, true
@@ -414,7 +415,7 @@ START_TEST(the_slice_of_the_root_is_the_whole_tree)
 }
 END_TEST
 
-START_TEST(files_without_mesh_have_places_but_no_slices)
+START_TEST(test_slice_without_mesh_is_refused)
 {
     random_tree_options options = { 8, 5, 6, 4, true, false, true, false };
     ebpo_tree tree;
@@ -439,7 +440,7 @@ START_TEST(files_without_mesh_have_places_but_no_slices)
 }
 END_TEST
 
-START_TEST(nodes_that_the_file_does_not_have_are_refused)
+START_TEST(test_slice_of_missing_node_is_refused)
 {
     random_tree_options options = { 9, 3, 6, 4, true, false, true, false };
     ebpo_tree tree;
@@ -473,7 +474,7 @@ START_TEST(nodes_that_the_file_does_not_have_are_refused)
 }
 END_TEST
 
-START_TEST(ranges_of_integers_are_widened_and_checked)
+START_TEST(test_slice_integer_ranges_are_checked)
 {
     random_tree_options options = { 21, 7, 13, 1, true, false, true, false };
     ebpo_tree tree;
@@ -510,9 +511,9 @@ START_TEST(ranges_of_integers_are_widened_and_checked)
 }
 END_TEST
 
-/* --- hostile files --- */
+/* --- untrusted files --- */
 
-/* Whatever is in a slice that was read leads nowhere outside of it. */
+/* Checks that all references in a slice are within it. */
 static void check_bounds(const ebpo_slice *s)
 {
     uint64_t faces = s->mesh.face_count;
@@ -530,13 +531,13 @@ static void check_bounds(const ebpo_slice *s)
         ck_assert_uint_lt(s->mesh.faces[i], s->mesh.vertex_count);
 }
 
-/* Reads some of everything; true when all went well. */
+/* Reads some of everything; returns true when there was no error. */
 static bool try_all(const ebpo_file *file, ebpo_chunks *chunks, uint64_t *state)
 {
     const ebpo_info *info = ebpo_file_info(file);
     bool well = true;
     for (int n = 0; n < 12; n++) {
-        /* of large trees, small parts */
+        /* small parts of large trees */
         int level = info->level_count > 5 ? 2 + n % (info->level_count - 2) : n % info->level_count;
         ebpo_node node = { .cell.level = level,
                            .type = info->level[level].gray_count && n % 3 ? EBPO_GRAY : EBPO_LEAF };
@@ -574,7 +575,7 @@ static bool try_all(const ebpo_file *file, ebpo_chunks *chunks, uint64_t *state)
     return well;
 }
 
-/* Numbers of a chunk are changed where it lies in the cache: as if the file had them. */
+/* Changes numbers of a chunk in the cache: as if the file had them. */
 static bool try_changed(whole *w, ebpo_array_id id, int level, uint64_t *state)
 {
     ebpo_held_chunk view = { .array = ebpo_reader_array(w->file, id, level) };
@@ -594,7 +595,7 @@ static bool try_changed(whole *w, ebpo_array_id id, int level, uint64_t *state)
     return well;
 }
 
-START_TEST(changed_numbers_never_lead_outside)
+START_TEST(test_slice_bad_values_stay_in_bounds)
 {
     random_tree_options options = {
         31 + (uint64_t)_i, _i ? 7 : 4, _i ? 9 : 7, 4, true, false, true, true
@@ -618,7 +619,7 @@ START_TEST(changed_numbers_never_lead_outside)
 }
 END_TEST
 
-START_TEST(counts_that_do_not_fit_the_types_are_refused)
+START_TEST(test_slice_counts_beyond_types_are_refused)
 {
     random_tree_options options = { 31, 4, 7, 4, true, false, true, false };
     ebpo_tree tree;
@@ -641,9 +642,9 @@ START_TEST(counts_that_do_not_fit_the_types_are_refused)
 }
 END_TEST
 
-/* What is wrong with these is seen in parts, too; others are refused at opening, or only when the
- * whole is checked. */
-START_TEST(failed_vectors_give_errors_here_too)
+/* Errors in these are also detected in parts; others are refused at opening, or only when the whole
+ * file is checked. */
+START_TEST(test_slice_of_invalid_vectors_fails)
 {
     static const char *const sure[] = { "vertex_nan",
                                         "face_vertex_below_zero",
@@ -691,7 +692,7 @@ END_TEST
 
 static uint64_t slice_hash(const ebpo_slice *s)
 {
-    uint64_t hash = s->first_face * 31 + s->outer_count;
+    uint64_t hash = s->first_face * 31 + s->shared_count;
     for (int i = 0; i < s->level_count; i++)
         for (uint64_t k = 0; k < s->level[i].ref_count; k++)
             hash = hash * 1099511628211u + s->level[i].leaf_refs[k];
@@ -707,7 +708,7 @@ static uint64_t slice_hash(const ebpo_slice *s)
 
 typedef struct reader {
     whole *w;
-    uint64_t state, *hash; /* of each gray node of the level; filled by the first reader */
+    uint64_t state, *hash; /* hash of each gray node of the level; set by the first reader */
     int level;
     bool fill;
     unsigned wrong;
@@ -735,13 +736,13 @@ static void *read_random(void *context)
     return NULL;
 }
 
-START_TEST(threads_share_one_cache)
+START_TEST(test_slice_threads_share_cache)
 {
     whole w;
     enum { THREADS = 4 };
     pthread_t threads[THREADS];
     reader readers[THREADS];
-    build(ebpo_test_torus(2, 0.7, 120, 80), 4, -1, USUAL);
+    build(ebpo_test_torus(2, 0.7, 120, 80), 4, -1, DEFAULT);
     whole_open(&w, path, 1200000);
     reader first = { .w = &w, .level = 2, .fill = true };
     first.hash = calloc(w.tree.level[2].gray_count, sizeof *first.hash);
@@ -762,7 +763,7 @@ END_TEST
 
 /* --- a real model --- */
 
-START_TEST(subtrees_of_a_real_model_add_up)
+START_TEST(test_slices_of_real_model_are_complete)
 {
     const char *models = getenv("EBPO_MODELS");
     char name[4096];
@@ -773,7 +774,7 @@ START_TEST(subtrees_of_a_real_model_add_up)
     snprintf(name, sizeof name, "%s/dragon100k.ply", models ? models : "");
     if (!models || ebpo_mesh_read(name, NULL, &mesh, NULL) != EBPO_OK)
         return;
-    build(mesh, 16, -1, USUAL);
+    build(mesh, 16, -1, DEFAULT);
     whole_open(&w, path, 3 << 20);
     for (int level = 0; level <= CUT; level++)
         for (int type = EBPO_LEAF; type <= (level == CUT ? EBPO_GRAY : EBPO_LEAF); type++)
@@ -803,24 +804,23 @@ TEST_SUITE(slice)
     TCase *cases = tcase_create("slice");
     tcase_set_timeout(cases, 300);
     tcase_add_checked_fixture(cases, make_folder, scratch_leave);
-    tcase_add_loop_test(cases, slices_of_random_trees_are_what_the_whole_file_says, 0, 20);
-    tcase_add_loop_test(cases, slices_of_solids_are_what_the_whole_file_says, 0,
-                        ebpo_test_solid_count);
-    tcase_add_loop_test(cases, slices_are_found_by_index_arrays_and_with_little_room, 0, 2);
-    tcase_add_loop_test(cases, slices_of_a_mesh_of_many_chunks_agree, 0, 2);
-    tcase_add_loop_test(cases, the_slice_of_the_root_is_the_whole_tree, 0, 5);
-    tcase_add_test(cases, files_without_mesh_have_places_but_no_slices);
-    tcase_add_test(cases, nodes_that_the_file_does_not_have_are_refused);
-    tcase_add_test(cases, ranges_of_integers_are_widened_and_checked);
-    tcase_add_loop_test(cases, changed_numbers_never_lead_outside, 0, 2);
-    tcase_add_test(cases, counts_that_do_not_fit_the_types_are_refused);
-    tcase_add_test(cases, failed_vectors_give_errors_here_too);
-    tcase_add_test(cases, subtrees_of_a_real_model_add_up);
+    tcase_add_loop_test(cases, test_slices_of_random_trees_match_file, 0, 20);
+    tcase_add_loop_test(cases, test_slices_of_solids_match_file, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(cases, test_slices_by_index_with_little_memory, 0, 2);
+    tcase_add_loop_test(cases, test_slices_of_multi_chunk_mesh, 0, 2);
+    tcase_add_loop_test(cases, test_root_slice_is_whole_tree, 0, 5);
+    tcase_add_test(cases, test_slice_without_mesh_is_refused);
+    tcase_add_test(cases, test_slice_of_missing_node_is_refused);
+    tcase_add_test(cases, test_slice_integer_ranges_are_checked);
+    tcase_add_loop_test(cases, test_slice_bad_values_stay_in_bounds, 0, 2);
+    tcase_add_test(cases, test_slice_counts_beyond_types_are_refused);
+    tcase_add_test(cases, test_slice_of_invalid_vectors_fails);
+    tcase_add_test(cases, test_slices_of_real_model_are_complete);
     suite_add_tcase(suite, cases);
-    cases = tcase_create("threads"); /* apart: CK_RUN_CASE=threads under a thread sanitizer */
+    cases = tcase_create("threads"); /* separate: CK_RUN_CASE=threads under a thread sanitizer */
     tcase_set_timeout(cases, 300);
     tcase_add_checked_fixture(cases, make_folder, scratch_leave);
-    tcase_add_test(cases, threads_share_one_cache);
+    tcase_add_test(cases, test_slice_threads_share_cache);
     suite_add_tcase(suite, cases);
     return suite;
 }

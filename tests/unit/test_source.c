@@ -1,5 +1,5 @@
-/* Files from memory, from paths and from a caller's own source: the same trees, few reads, and
- * every failure of a read told as what it is. */
+/* Files from memory, from paths and from a source of the caller: the same trees, few reads, and
+ * correct reports of failed reads. */
 #include <limits.h>
 #include <hdf5.h>
 #include <pthread.h>
@@ -137,9 +137,8 @@ static ebpo_status open_probe(ebpo_file **file, probe *p, ebpo_error *error)
     return ebpo_open_source(&source, "afar", file, error);
 }
 
-/* The same content as libhdf5 arranges it by itself: metadata here and there. As it does by
- * default, there are chunks in B-trees and no checksums; `kept`: with what files of this format
- * have. */
+/* The same content as arranged by libhdf5: distributed metadata. By default there are chunks in
+ * B-trees and no checksums; `kept`: with the layout of this format. */
 static void rewrite(bool kept)
 {
     static const char *const groups[] = { "levels", "mesh", "maps", "subtrees" };
@@ -173,7 +172,7 @@ static void rewrite(bool kept)
     H5Fclose(out);
 }
 
-/* The attribute that says how an array's numbers are to be read. */
+/* Copies the attribute that gives the coding of an array. */
 static void copy_coding(hid_t from, hid_t to)
 {
     char text[16] = "";
@@ -189,8 +188,8 @@ static void copy_coding(hid_t from, hid_t to)
     H5Aclose(old);
 }
 
-/* One array again without filters, all chunks set aside at once: libhdf5 then computes their places
- * and stores no table. */
+/* Writes one array again without filters, with all chunks allocated at once: libhdf5 then computes
+ * their offsets and stores no table. */
 static void strip(hid_t file, const char *name)
 {
     hid_t old = H5Dopen2(file, name, H5P_DEFAULT), type = H5Dget_type(old),
@@ -244,7 +243,7 @@ static void rewrite_without_filters(void)
     H5Fclose(file);
 }
 
-START_TEST(memory_paths_and_sources_give_equal_trees)
+START_TEST(test_memory_path_and_source_trees_match)
 {
     for (int codec = EBPO_CODEC_ZSTD; codec <= EBPO_CODEC_NONE; codec++) {
         probe p = { .fail_at = UINT32_MAX };
@@ -264,7 +263,7 @@ START_TEST(memory_paths_and_sources_give_equal_trees)
 }
 END_TEST
 
-START_TEST(one_read_opens_a_file_and_each_byte_of_an_array_is_read_once)
+START_TEST(test_open_and_array_read_counts)
 {
     uint64_t bytes, reads, later, later_reads;
     ebpo_file *file;
@@ -281,7 +280,7 @@ START_TEST(one_read_opens_a_file_and_each_byte_of_an_array_is_read_once)
     later = after.bytes_read;
     later_reads = after.reads;
     reads = stats.reads;
-    /* of the table of subtrees only the list of places was needed */
+    /* of the table of subtrees only the list of chunk offsets was needed */
     ebpo_stored_sizes sizes = EBPO_STORED_SIZES_INIT;
     ck_assert_int_eq(ebpo_file_locate(file, &sizes, NULL), EBPO_OK);
     ck_assert_uint_eq(later - bytes, size - info->head_bytes - info->chunk_index_bytes -
@@ -296,7 +295,7 @@ START_TEST(one_read_opens_a_file_and_each_byte_of_an_array_is_read_once)
     }
     ck_assert_uint_gt(chunks, arrays + 20);
     ck_assert_uint_ge(later_reads - reads, arrays);
-    /* neighbours come together */
+    /* neighbours are read together */
     ck_assert_uint_lt(later_reads - reads, arrays + (chunks - arrays) / 2);
     ebpo_tree_free(&tree);
     ebpo_close(file);
@@ -310,9 +309,9 @@ static void probe_expect(void *user, const ebpo_range *ranges, size_t count)
         ck_assert(ranges[i].offset <= size && ranges[i].size <= size - ranges[i].offset);
 }
 
-/* Of files far away the index is read when it is needed, from where the head says; other programs
- * may have moved it. */
-START_TEST(the_index_is_found_whatever_the_head_says_of_its_place)
+/* For remote files the index is read on demand, at the offset in the header; other programs may
+ * have moved it. */
+START_TEST(test_chunk_index_found_at_any_offset)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     make_file(&large, EBPO_CODEC_ZSTD);
@@ -339,7 +338,7 @@ START_TEST(the_index_is_found_whatever_the_head_says_of_its_place)
         }
         unsigned before = p.reads;
         ck_assert_msg(ebpo_file_locate(file, NULL, &error) == EBPO_OK, "%s", error.message);
-        ck_assert_uint_le(p.reads - before, lie ? 20 : 2); /* the head once more, and the index */
+        ck_assert_uint_le(p.reads - before, lie ? 20 : 2); /* the header again, and the index */
         expect_tree(file, 1);
         ebpo_close(file);
     }
@@ -375,7 +374,7 @@ static unsigned fail_everywhere(ebpo_status status, bool silent)
     }
 }
 
-START_TEST(every_failing_read_is_told_as_such)
+START_TEST(test_failing_reads_are_reported)
 {
     make_file(&small, EBPO_CODEC_ZSTD);
     ck_assert_uint_gt(fail_everywhere(EBPO_E_IO, false), 10);
@@ -383,7 +382,7 @@ START_TEST(every_failing_read_is_told_as_such)
 }
 END_TEST
 
-START_TEST(every_failing_read_is_told_as_such_where_metadata_is_scattered)
+START_TEST(test_failing_reads_with_scattered_metadata)
 {
     probe p = { .fail_at = UINT32_MAX };
     ebpo_file *file;
@@ -393,13 +392,13 @@ START_TEST(every_failing_read_is_told_as_such_where_metadata_is_scattered)
     data = slurp(rewritten, &size);
     ck_assert_uint_gt(size, 1 << 20);
     ck_assert_int_eq(open_probe(&file, &p, NULL), EBPO_OK);
-    ck_assert_uint_gt(p.reads, 3); /* so that there is something to fail behind the head */
+    ck_assert_uint_gt(p.reads, 3); /* so that some reads after the header can fail */
     ebpo_close(file);
     fail_everywhere(EBPO_E_IO, false);
 }
 END_TEST
 
-START_TEST(files_that_libhdf5_rearranged_give_equal_trees)
+START_TEST(test_files_repacked_by_libhdf5_are_equal)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file;
@@ -414,7 +413,7 @@ START_TEST(files_that_libhdf5_rearranged_give_equal_trees)
 }
 END_TEST
 
-START_TEST(files_without_checksums_are_refused_and_the_way_on_told)
+START_TEST(test_files_without_checksums_are_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file;
@@ -426,13 +425,13 @@ START_TEST(files_without_checksums_are_refused_and_the_way_on_told)
     ck_assert_msg(ebpo_open_compat(rewritten, NULL, &file, &error) == EBPO_OK, "%s", error.message);
     expect_tree(file, 2);
     ebpo_close(file);
-    ck_assert_int_eq(ebpo_open_compat(path, NULL, &file, &error), EBPO_OK); /* as every other */
+    ck_assert_int_eq(ebpo_open_compat(path, NULL, &file, &error), EBPO_OK); /* as all other files */
     ebpo_close(file);
 }
 END_TEST
 
-/* Whatever libhdf5 makes of them, in its own process: an error, or the same content. */
-START_TEST(damage_of_files_without_checksums_harms_nobody)
+/* libhdf5 runs in a separate process: an error, or the same content. */
+START_TEST(test_damage_without_checksums_is_harmless)
 {
     make_file(&small, EBPO_CODEC_ZSTD);
     rewrite(false);
@@ -474,7 +473,7 @@ static void compare_table(hid_t fid, const ebpo_array_in *array, uint64_t *chunk
     H5Dclose(id);
 }
 
-START_TEST(chunk_tables_are_what_libhdf5_says)
+START_TEST(test_chunk_tables_match_libhdf5)
 {
     ebpo_file *file;
     uint64_t chunks = 0, arrays = 0;
@@ -502,23 +501,23 @@ START_TEST(chunk_tables_are_what_libhdf5_says)
 }
 END_TEST
 
-START_TEST(nothing_of_libhdf5_is_open_once_a_file_is)
+START_TEST(test_open_file_keeps_no_hdf5_objects)
 {
     ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
     make_file(&small, EBPO_CODEC_ZSTD);
     ck_assert_int_eq(ebpo_open(path, &file, NULL), EBPO_OK);
     ck_assert_int_eq(H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL), 0);
-    ck_assert_int_eq(H5close(), 0); /* not even the library is needed any more */
+    ck_assert_int_eq(H5close(), 0); /* the library is not needed any more */
     expect_tree(file, 2);
     ebpo_close(file);
     ck_assert_msg(ebpo_open(path, &file, &error) == EBPO_OK, "%s",
-                  error.message); /* and it comes back */
+                  error.message); /* and it is initialised again */
     ebpo_close(file);
 }
 END_TEST
 
-START_TEST(no_read_goes_beyond_bytes_in_memory)
+START_TEST(test_reads_stay_inside_memory_buffer)
 {
     ebpo_tree tree;
     make_file(&small, EBPO_CODEC_DEFLATE);
@@ -540,7 +539,7 @@ START_TEST(no_read_goes_beyond_bytes_in_memory)
 }
 END_TEST
 
-START_TEST(a_file_cut_short_while_it_is_open_fails_as_input)
+START_TEST(test_file_truncated_while_open_fails)
 {
     ebpo_file *file;
     ebpo_tree tree;
@@ -555,7 +554,7 @@ START_TEST(a_file_cut_short_while_it_is_open_fails_as_input)
 }
 END_TEST
 
-START_TEST(what_is_no_regular_file_fails_at_once)
+START_TEST(test_non_regular_file_is_refused)
 {
     ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -568,7 +567,7 @@ START_TEST(what_is_no_regular_file_fails_at_once)
 }
 END_TEST
 
-START_TEST(missing_arguments_are_refused_and_the_source_closed)
+START_TEST(test_missing_arguments_close_source)
 {
     probe p = { .fail_at = 0 };
     ebpo_source source = { sizeof(ebpo_source), &p, 5, NULL, probe_close, NULL, 0 };
@@ -591,7 +590,7 @@ END_TEST
 
 static void *read_in_thread(void *user) { return read_text(user, 2); }
 
-START_TEST(threads_read_one_file_at_once)
+START_TEST(test_threads_read_one_file)
 {
     ebpo_file *file;
     pthread_t thread[4];
@@ -620,7 +619,7 @@ static void *open_in_thread(void *user)
     return NULL;
 }
 
-START_TEST(threads_open_one_file_at_once)
+START_TEST(test_threads_open_one_file)
 {
     pthread_t thread[4];
     void *failed;
@@ -640,22 +639,22 @@ TEST_SUITE(source)
     TCase *tests = tcase_create("source");
     tcase_set_timeout(tests, 300);
     tcase_add_checked_fixture(tests, set_up, tear_down);
-    tcase_add_loop_test(tests, memory_paths_and_sources_give_equal_trees, 0, 2);
-    tcase_add_test(tests, one_read_opens_a_file_and_each_byte_of_an_array_is_read_once);
-    tcase_add_test(tests, the_index_is_found_whatever_the_head_says_of_its_place);
-    tcase_add_test(tests, every_failing_read_is_told_as_such);
-    tcase_add_test(tests, every_failing_read_is_told_as_such_where_metadata_is_scattered);
-    tcase_add_loop_test(tests, files_that_libhdf5_rearranged_give_equal_trees, 0, 4);
-    tcase_add_test(tests, files_without_checksums_are_refused_and_the_way_on_told);
-    tcase_add_test(tests, damage_of_files_without_checksums_harms_nobody);
-    tcase_add_loop_test(tests, chunk_tables_are_what_libhdf5_says, 0, 3);
-    tcase_add_test(tests, nothing_of_libhdf5_is_open_once_a_file_is);
-    tcase_add_test(tests, no_read_goes_beyond_bytes_in_memory);
-    tcase_add_test(tests, a_file_cut_short_while_it_is_open_fails_as_input);
-    tcase_add_test(tests, what_is_no_regular_file_fails_at_once);
-    tcase_add_test(tests, missing_arguments_are_refused_and_the_source_closed);
-    tcase_add_test(tests, threads_read_one_file_at_once);
-    tcase_add_test(tests, threads_open_one_file_at_once);
+    tcase_add_loop_test(tests, test_memory_path_and_source_trees_match, 0, 2);
+    tcase_add_test(tests, test_open_and_array_read_counts);
+    tcase_add_test(tests, test_chunk_index_found_at_any_offset);
+    tcase_add_test(tests, test_failing_reads_are_reported);
+    tcase_add_test(tests, test_failing_reads_with_scattered_metadata);
+    tcase_add_loop_test(tests, test_files_repacked_by_libhdf5_are_equal, 0, 4);
+    tcase_add_test(tests, test_files_without_checksums_are_refused);
+    tcase_add_test(tests, test_damage_without_checksums_is_harmless);
+    tcase_add_loop_test(tests, test_chunk_tables_match_libhdf5, 0, 3);
+    tcase_add_test(tests, test_open_file_keeps_no_hdf5_objects);
+    tcase_add_test(tests, test_reads_stay_inside_memory_buffer);
+    tcase_add_test(tests, test_file_truncated_while_open_fails);
+    tcase_add_test(tests, test_non_regular_file_is_refused);
+    tcase_add_test(tests, test_missing_arguments_close_source);
+    tcase_add_test(tests, test_threads_read_one_file);
+    tcase_add_test(tests, test_threads_open_one_file);
     suite_add_tcase(suite, tests);
     return suite;
 }

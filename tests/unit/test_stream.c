@@ -1,5 +1,5 @@
-/* Levels one after the other: the same nodes as in the tree read at once, planes that contain what
- * the codes contain (proved with rationals), closed polygons, volumes. */
+/* Levels in order: the same nodes as in the tree read at once, planes that contain the half-spaces
+ * of their codes (proved with rationals), closed polygons, volumes. */
 #include <gmp.h>
 #include <math.h>
 #include <stdio.h>
@@ -27,7 +27,7 @@ static void make_folder(void)
     path = scratch("x.ebpo.h5");
 }
 
-enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
+enum { DEFAULT = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
 
 static void write_file(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_faces)
 {
@@ -76,7 +76,7 @@ static ebpo_box box_of(const ebpo_info *info)
     return box;
 }
 
-/* --- the same as the tree --- */
+/* --- equal to the tree --- */
 
 static int32_t winding_in(const ebpo_level *level, ebpo_node_type type, uint64_t rank)
 {
@@ -95,8 +95,8 @@ static uint64_t planes_in(const ebpo_level *level, ebpo_node_type type, uint64_t
     return type == EBPO_LEAF && level->leaf_plane_counts ? level->leaf_plane_counts[rank] : 0;
 }
 
-/* One level against the tree's; `parents`: octcodes of the level before's gray nodes, replaced by
- * this level's. */
+/* Compares one level with the tree; `parents`: octcodes of the gray nodes of the previous level,
+ * replaced by those of this level. */
 static void expect_level(ebpo_stream *stream, const ebpo_tree *tree, int number, uint64_t **parents,
                          uint64_t *parent_count, bool planes)
 {
@@ -115,8 +115,8 @@ static void expect_level(ebpo_stream *stream, const ebpo_tree *tree, int number,
             ck_assert_int_eq(node.winding, winding_in(level, type, rank[type]));
             ck_assert_uint_eq(node.plane_count, planes ? planes_in(level, type, rank[type]) : 0);
             for (int i = 0; i < 3; i++)
-                ck_assert(node.min[i] == ebpo_wall(&box, i, number, cell.at[i]) &&
-                          node.max[i] == ebpo_wall(&box, i, number, cell.at[i] + 1));
+                ck_assert(node.min[i] == ebpo_cell_face(&box, i, number, cell.at[i]) &&
+                          node.max[i] == ebpo_cell_face(&box, i, number, cell.at[i] + 1));
             if (type == EBPO_GRAY)
                 grays[rank[type]] = octcode;
             rank[type]++;
@@ -154,14 +154,14 @@ static void expect_tree(ebpo_file *file, bool planes, bool polygons)
     ebpo_tree_free(&tree);
 }
 
-START_TEST(levels_and_nodes_equal_the_tree_read_at_once)
+START_TEST(test_streamed_levels_match_whole_tree)
 {
     if (!ebpo_test_wanted(_i))
         return;
     for (int variant = 0; variant < 3; variant++) {
         ebpo_file *file = build(ebpo_test_solids[_i].make(),
-                                variant == 0   ? USUAL
-                                : variant == 1 ? USUAL | EBPO_PART_LEAF_PLANES
+                                variant == 0   ? DEFAULT
+                                : variant == 1 ? DEFAULT | EBPO_PART_LEAF_PLANES
                                                : EBPO_PART_MESH,
                                 4);
         expect_tree(file, variant == 0, variant == 1);
@@ -171,9 +171,9 @@ START_TEST(levels_and_nodes_equal_the_tree_read_at_once)
 }
 END_TEST
 
-START_TEST(one_may_stop_within_a_level_and_go_on_with_the_next)
+START_TEST(test_stream_resumes_at_next_level)
 {
-    ebpo_file *file = build(ebpo_test_make("torus"), USUAL | EBPO_PART_LEAF_PLANES, 2);
+    ebpo_file *file = build(ebpo_test_make("torus"), DEFAULT | EBPO_PART_LEAF_PLANES, 2);
     ebpo_stream *whole = new_stream(file, true, true, 1), *some = new_stream(file, true, true, 3);
     ebpo_stream_level a, b;
     ebpo_stream_node p, q;
@@ -183,7 +183,7 @@ START_TEST(one_may_stop_within_a_level_and_go_on_with_the_next)
     ck_assert(!more && strstr(error.message, "ebpo_stream_next_level"));
     while (next_level(whole, &a)) {
         ck_assert(next_level(some, &b));
-        /* whatever the number of threads */
+        /* for any number of threads */
         ck_assert(a.volume == b.volume && a.node_count == b.node_count);
         for (uint64_t i = 0; next_node(whole, &p); i++)
             if (i < a.node_count / 2) {
@@ -204,7 +204,7 @@ START_TEST(one_may_stop_within_a_level_and_go_on_with_the_next)
 }
 END_TEST
 
-/* --- what is read --- */
+/* --- reads --- */
 
 typedef struct memory {
     uint8_t *data;
@@ -243,10 +243,10 @@ static ebpo_file *open_memory(memory *m)
     return file;
 }
 
-START_TEST(only_the_level_asked_for_is_read)
+START_TEST(test_stream_reads_only_requested_level)
 {
     memory m = { NULL, false };
-    write_file(ebpo_test_make("torus"), USUAL, 2);
+    write_file(ebpo_test_make("torus"), DEFAULT, 2);
     ebpo_file *file = open_memory(&m);
     ebpo_stream *stream = new_stream(file, true, true, 1);
     const ebpo_info *info = ebpo_file_info(file);
@@ -261,7 +261,7 @@ START_TEST(only_the_level_asked_for_is_read)
         while (next_node(stream, &node))
             ;
         after = ebpo_test_file_stats(file).bytes_read;
-        /* the list of sums comes with the first chunk */
+        /* the list of chunk checksums comes with the first chunk */
         ck_assert_uint_le(after - before, stored.level_bytes[i] + (i ? 0 : stored.sum_bytes));
     }
     ebpo_stream_free(stream);
@@ -270,10 +270,10 @@ START_TEST(only_the_level_asked_for_is_read)
 }
 END_TEST
 
-START_TEST(a_level_that_could_not_be_read_can_be_asked_for_again)
+START_TEST(test_stream_retries_failed_level)
 {
     memory m = { NULL, false };
-    write_file(ebpo_test_make("torus"), USUAL, 2);
+    write_file(ebpo_test_make("torus"), DEFAULT, 2);
     ebpo_file *file = open_memory(&m);
     ebpo_stream *stream = new_stream(file, true, true, 1);
     ebpo_stream_level level;
@@ -320,7 +320,7 @@ static void expect_closed(const ebpo_stream_node *node)
     ck_assert(closed && within);
 }
 
-/* From the cell's lowest corner, so that little cancels. */
+/* Relative to the lowest corner of the cell, so that little cancels. */
 static double polygon_volume(const ebpo_stream_node *node)
 {
     double sum = 0;
@@ -344,11 +344,11 @@ static void expect_volumes(ebpo_file *file, bool stored_leaves)
     const ebpo_info *info = ebpo_file_info(file);
     ebpo_stream *stream = new_stream(file, true, true, 0),
                 *plain = new_stream(file, false, false, 0);
-    ebpo_stream_level level, told;
+    ebpo_stream_level level, reported;
     ebpo_stream_node node;
-    double settled = 0, room = info->box_size[0] * info->box_size[1] * info->box_size[2];
+    double settled = 0, space = info->box_size[0] * info->box_size[1] * info->box_size[2];
     while (next_level(stream, &level)) {
-        double gray = 0, lod = -1, cell = ldexp(room, -3 * level.level);
+        double gray = 0, lod = -1, cell = ldexp(space, -3 * level.level);
         ebpo_error error = EBPO_ERROR_INIT;
         while (next_node(stream, &node)) {
             *(node.type == EBPO_GRAY ? &gray : &settled) += node.volume;
@@ -363,27 +363,27 @@ static void expect_volumes(ebpo_file *file, bool stored_leaves)
             ck_assert_double_eq_tol(polygon_volume(&node) / cell, node.volume / cell, away);
         }
         double stated = info->level[level.level].gray_volume;
-        ck_assert_msg(fabs(gray - stated) <= 1e-7 * stated + 1e-12 * room,
+        ck_assert_msg(fabs(gray - stated) <= 1e-7 * stated + 1e-12 * space,
                       "level %d: %.17g, stated %.17g", level.level, gray, stated);
-        ck_assert_double_eq_tol(level.volume / room, (gray + settled) / room, 1e-12);
-        ck_assert(next_level(plain, &told));
-        ck_assert_double_eq_tol(level.volume / room, told.volume / room, 1e-6);
+        ck_assert_double_eq_tol(level.volume / space, (gray + settled) / space, 1e-12);
+        ck_assert(next_level(plain, &reported));
+        ck_assert_double_eq_tol(level.volume / space, reported.volume / space, 1e-6);
         ck_assert(ebpo_lod_level(file, level.level, NULL, NULL, &lod, &error) == EBPO_OK);
-        ck_assert_double_le(lod / room, told.volume / room + 1e-6);
+        ck_assert_double_le(lod / space, reported.volume / space + 1e-6);
         if (stored_leaves)
-            ck_assert_double_eq_tol(level.volume / room, lod / room, 1e-12);
+            ck_assert_double_eq_tol(level.volume / space, lod / space, 1e-12);
     }
     ebpo_stream_free(stream);
     ebpo_stream_free(plain);
 }
 
-START_TEST(volumes_and_polygons_agree_with_the_file_and_with_levels_read_at_once)
+START_TEST(test_streamed_volumes_and_polygons_match_file)
 {
     if (!ebpo_test_wanted(_i))
         return;
     for (int variant = 0; variant < 2; variant++) {
-        ebpo_file *file =
-            build(ebpo_test_solids[_i].make(), variant ? USUAL | EBPO_PART_LEAF_PLANES : USUAL, 4);
+        ebpo_file *file = build(ebpo_test_solids[_i].make(),
+                                variant ? DEFAULT | EBPO_PART_LEAF_PLANES : DEFAULT, 4);
         expect_volumes(file, variant == 1);
         ebpo_close(file);
     }
@@ -428,12 +428,12 @@ typedef struct exact {
     int checked;
 } exact;
 
-/* The point xi of the cell must satisfy the plane. */
+/* Checks that the point xi of the cell satisfies the plane. */
 static void check_point(exact *e)
 {
     for (int k = 0; k < 3; k++) {
-        mpq_set_d(e->side, ebpo_wall(e->box, k, e->cell.level, e->cell.at[k] + 1));
-        mpq_set_d(e->value, ebpo_wall(e->box, k, e->cell.level, e->cell.at[k]));
+        mpq_set_d(e->side, ebpo_cell_face(e->box, k, e->cell.level, e->cell.at[k] + 1));
+        mpq_set_d(e->value, ebpo_cell_face(e->box, k, e->cell.level, e->cell.at[k]));
         mpq_sub(e->side, e->side, e->value);
         mpq_mul(e->p[k], e->side, e->xi[k]);
         mpq_add(e->p[k], e->p[k], e->value);
@@ -445,8 +445,8 @@ static void check_point(exact *e)
         mpq_set(e->most, e->value);
 }
 
-/* Extreme points of the cell within the code's half-space: its corners that are in it, and where
- * its edges cross the plane. */
+/* Checks the extreme points of the cell within the half-space of the code: its corners inside, and
+ * the intersections of its edges with the plane. */
 static void check_code(exact *e, const int32_t n[3], int32_t d)
 {
     mpq_t at_low, at_high;
@@ -489,7 +489,7 @@ static ebpo_box random_box(uint64_t *random)
     return box;
 }
 
-START_TEST(planes_contain_exactly_what_their_codes_contain)
+START_TEST(test_streamed_planes_match_their_codes)
 {
     uint64_t random = 7 + (uint64_t)_i;
     exact e;
@@ -513,7 +513,7 @@ START_TEST(planes_contain_exactly_what_their_codes_contain)
                reach = 0;
         ck_assert_double_eq_tol(length, 1, 1e-15);
         for (int k = 0; k < 3; k++)
-            reach += fabs(e.plane[k]) * (fabs(ebpo_wall(&box, k, level, e.cell.at[k])) +
+            reach += fabs(e.plane[k]) * (fabs(ebpo_cell_face(&box, k, level, e.cell.at[k])) +
                                          box.size[k] / (double)(1u << level));
         mpq_sub(e.value, e.limit, e.most);
         ck_assert_msg(mpq_get_d(e.value) <= 1e-14 * reach + 1e-300, "%g of %g too wide",
@@ -524,9 +524,9 @@ START_TEST(planes_contain_exactly_what_their_codes_contain)
 }
 END_TEST
 
-/* --- the solid lies within --- */
+/* --- the solid is within --- */
 
-/* Vertices that no face uses stand last and need not lie within anything. */
+/* Vertices that no face uses come last and need not be within anything. */
 static uint64_t used_vertices(const ebpo_mesh *mesh)
 {
     uint64_t used = 0;
@@ -560,11 +560,11 @@ static bool in_cell(const ebpo_stream_node *node, const double p[3])
     return in;
 }
 
-START_TEST(all_vertices_in_a_closed_cell_satisfy_its_planes)
+START_TEST(test_closed_cell_vertices_satisfy_planes)
 {
     if (!ebpo_test_wanted(_i))
         return;
-    ebpo_file *file = build(ebpo_test_solids[_i].make(), USUAL | EBPO_PART_LEAF_PLANES, 4);
+    ebpo_file *file = build(ebpo_test_solids[_i].make(), DEFAULT | EBPO_PART_LEAF_PLANES, 4);
     ebpo_stream *stream = new_stream(file, true, false, 1);
     ebpo_stream_level level;
     ebpo_stream_node node;
@@ -594,7 +594,7 @@ static int by_octcode(const void *a, const void *b)
     return (p->octcode > q->octcode) - (p->octcode < q->octcode);
 }
 
-/* The vertices by the cell of `level` that they lie in (lower walls belong to it). */
+/* Sorts the vertices by their cell of `level` (lower cell faces belong to it). */
 static void place(placed *list, const ebpo_mesh *mesh, uint64_t count, const ebpo_box *box,
                   int level)
 {
@@ -604,7 +604,7 @@ static void place(placed *list, const ebpo_mesh *mesh, uint64_t count, const ebp
         vertex(mesh, v, p);
         for (int k = 0; k < 3; k++)
             for (uint32_t bit = 1u << level >> 1; bit; bit >>= 1)
-                cell.at[k] |= p[k] >= ebpo_wall(box, k, level, cell.at[k] | bit) ? bit : 0;
+                cell.at[k] |= p[k] >= ebpo_cell_face(box, k, level, cell.at[k] | bit) ? bit : 0;
         list[v] = (placed){ ebpo_octcode_of_cell(cell), v };
     }
     qsort(list, count, sizeof *list, by_octcode);
@@ -645,7 +645,7 @@ static void expect_vertices_within(ebpo_file *file)
     ebpo_stream_free(stream);
 }
 
-START_TEST(real_models_lie_within_their_streamed_planes)
+START_TEST(test_real_models_are_inside_streamed_planes)
 {
     static const char *const names[] = { "armadillo.ply", "bunny.ply" };
     const char *models = getenv("EBPO_MODELS");
@@ -654,7 +654,7 @@ START_TEST(real_models_lie_within_their_streamed_planes)
     snprintf(name, sizeof name, "%s/%s", models ? models : "", names[_i]);
     if (!models || ebpo_mesh_read(name, NULL, &mesh, NULL) != EBPO_OK)
         return;
-    ebpo_file *file = build(mesh, USUAL | EBPO_PART_LEAF_PLANES, 16);
+    ebpo_file *file = build(mesh, DEFAULT | EBPO_PART_LEAF_PLANES, 16);
     expect_vertices_within(file);
     expect_volumes(file, true);
     ebpo_close(file);
@@ -667,18 +667,15 @@ TEST_SUITE(stream)
     TCase *tests = tcase_create("stream");
     tcase_set_timeout(tests, 900);
     tcase_add_checked_fixture(tests, make_folder, scratch_leave);
-    tcase_add_loop_test(tests, levels_and_nodes_equal_the_tree_read_at_once, 0,
+    tcase_add_loop_test(tests, test_streamed_levels_match_whole_tree, 0, ebpo_test_solid_count);
+    tcase_add_test(tests, test_stream_resumes_at_next_level);
+    tcase_add_test(tests, test_stream_reads_only_requested_level);
+    tcase_add_test(tests, test_stream_retries_failed_level);
+    tcase_add_loop_test(tests, test_streamed_volumes_and_polygons_match_file, 0,
                         ebpo_test_solid_count);
-    tcase_add_test(tests, one_may_stop_within_a_level_and_go_on_with_the_next);
-    tcase_add_test(tests, only_the_level_asked_for_is_read);
-    tcase_add_test(tests, a_level_that_could_not_be_read_can_be_asked_for_again);
-    tcase_add_loop_test(tests,
-                        volumes_and_polygons_agree_with_the_file_and_with_levels_read_at_once, 0,
-                        ebpo_test_solid_count);
-    tcase_add_loop_test(tests, planes_contain_exactly_what_their_codes_contain, 0, 4);
-    tcase_add_loop_test(tests, all_vertices_in_a_closed_cell_satisfy_its_planes, 0,
-                        ebpo_test_solid_count);
-    tcase_add_loop_test(tests, real_models_lie_within_their_streamed_planes, 0, 2);
+    tcase_add_loop_test(tests, test_streamed_planes_match_their_codes, 0, 4);
+    tcase_add_loop_test(tests, test_closed_cell_vertices_satisfy_planes, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(tests, test_real_models_are_inside_streamed_planes, 0, 2);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,4 +1,4 @@
-/* Subsets: every answer that they give is the whole file's, and what they cannot know they say. */
+/* Subsets: all their results equal those of the whole file, and missing data is reported. */
 #include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
@@ -15,19 +15,19 @@
 #include "check_main.h"
 #include "read_by.h"
 #include "format/reader.h"
-#include "query_kit.h"
+#include "query_support.h"
 #include "derive/subset_parts.h"
 
-static const query_variant usual = { "usual", 4, 6, EBPO_RULE_NONZERO,
-                                     EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS |
-                                         EBPO_PART_LEAF_PLANES };
+static const query_variant standard = { "default", 4, 6, EBPO_RULE_NONZERO,
+                                        EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS |
+                                            EBPO_PART_LEAF_PLANES };
 
 static void fine(ebpo_status status, const ebpo_error *error)
 {
     ck_assert_msg(status == EBPO_OK, "%s: %s", ebpo_status_name(status), error->message);
 }
 
-/* --- a subset, open in three ways --- */
+/* --- a subset, opened in three ways --- */
 
 enum { WAYS = 3 };
 typedef struct part {
@@ -79,7 +79,7 @@ static void part_verify(part *p)
                   report.labels.first, report.lists.first);
 }
 
-/* --- one question to the whole and to the part --- */
+/* --- one query to the whole and to the part --- */
 
 typedef struct tally {
     uint64_t given, refused;
@@ -88,7 +88,7 @@ typedef struct tally {
 static bool answered(tally *t, ebpo_status status, const ebpo_error *error)
 {
     ck_assert_msg(status == EBPO_OK ||
-                      (status == EBPO_E_ABSENT && strstr(error->message, "left out")) ||
+                      (status == EBPO_E_ABSENT && strstr(error->message, "omitted")) ||
                       (status == EBPO_E_ABSENT && strstr(error->message, "mesh")),
                   "%s: %s", ebpo_status_name(status), error->message);
     t->given += status == EBPO_OK;
@@ -102,8 +102,8 @@ static bool within(const double p[3], const ebpo_subset_options *o)
                          p[1] <= o->max[1] && p[2] >= o->min[2] && p[2] <= o->max[2]);
 }
 
-static void ask_exact(tally *t, query_model *m, part *p, int way, const double point[3],
-                      const ebpo_subset_options *cut, const query_truth *truth)
+static void query_exact(tally *t, query_model *m, part *p, int way, const double point[3],
+                        const ebpo_subset_options *cut, const query_truth *truth)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_inside_result whole, some;
@@ -129,8 +129,8 @@ static void ask_exact(tally *t, query_model *m, part *p, int way, const double p
                       far.distance, (long long)far.face);
 }
 
-static void ask_limited(query_model *m, part *p, int way, const double point[3],
-                        const ebpo_subset_options *cut, const query_truth *truth)
+static void query_limited(query_model *m, part *p, int way, const double point[3],
+                          const ebpo_subset_options *cut, const query_truth *truth)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
@@ -168,7 +168,7 @@ static void ask_limited(query_model *m, part *p, int way, const double point[3],
     }
 }
 
-static void ask_rays(tally *t, query_model *m, part *p, int way, uint64_t seed)
+static void query_rays(tally *t, query_model *m, part *p, int way, uint64_t seed)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     for (int i = 0; i < 20; i++) {
@@ -182,7 +182,7 @@ static void ask_rays(tally *t, query_model *m, part *p, int way, uint64_t seed)
         if (answered(t,
                      ebpo_ray_first(p->context[way], origin, direction, t_max, &near, &too, &error),
                      &error))
-            /* of faces at one t the first in its own file is told, which may be another one */
+            /* among faces at one t the first in its file is returned, which may be another one */
             ck_assert(hit == too && (!hit || far.t == near.t));
         fine(ebpo_ray_all(m->context, origin, direction, t_max, &all, &count, &error), &error);
         if (answered(t,
@@ -198,8 +198,8 @@ static int compare_faces(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static void ask_box(tally *t, query_model *m, part *p, int way, const double min[3],
-                    const double max[3], bool must)
+static void query_box(tally *t, query_model *m, part *p, int way, const double min[3],
+                      const double max[3], bool must)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const uint64_t *all, *some;
@@ -223,7 +223,7 @@ static void ask_box(tally *t, query_model *m, part *p, int way, const double min
     }
 }
 
-/* Levels are read by the ways that draw them. */
+/* Reads levels in the ways used for drawing. */
 static void stream_levels(part *p)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -255,7 +255,7 @@ static void random_box(query_model *m, uint64_t *state, ebpo_subset_options *o)
         double a = ebpo_test_random_unit(state), b = a + ebpo_test_random_unit(state) * 0.5;
         o->min[k] = m->info.box_origin[k] + a * m->info.box_size[k];
         o->max[k] = m->info.box_origin[k] + b * m->info.box_size[k];
-        if (ebpo_test_random(state) % 4 == 0) { /* a wall */
+        if (ebpo_test_random(state) % 4 == 0) { /* a cell face */
             double step = m->info.box_size[k] / 4;
             o->min[k] = m->info.box_origin[k] + step * (double)(ebpo_test_random(state) % 4);
             o->max[k] = ebpo_test_random(state) % 2 ? o->min[k] : o->min[k] + step;
@@ -300,28 +300,28 @@ static void compare_one(query_model *m, uint64_t seed, tally *t)
     query_find_truths(m, points, POINTS, truth);
     for (int way = 0; way < WAYS; way++) {
         for (int i = 0; i < POINTS; i++) {
-            ask_limited(m, &p, way, points + 3 * i, &o, &truth[i]);
-            ask_exact(t, m, &p, way, points + 3 * i, &o, &truth[i]);
+            query_limited(m, &p, way, points + 3 * i, &o, &truth[i]);
+            query_exact(t, m, &p, way, points + 3 * i, &o, &truth[i]);
         }
-        ask_rays(t, m, &p, way, seed + (uint64_t)way);
+        query_rays(t, m, &p, way, seed + (uint64_t)way);
         bool all = o.last_level < 0 && p.info->parts & EBPO_PART_MESH;
         if (o.boxed)
-            ask_box(t, m, &p, way, o.min, o.max, all);
+            query_box(t, m, &p, way, o.min, o.max, all);
         ebpo_subset_options other = o;
         random_box(m, &seed, &other);
-        ask_box(t, m, &p, way, other.min, other.max, all && !o.boxed);
+        query_box(t, m, &p, way, other.min, other.max, all && !o.boxed);
     }
     part_close(&p);
 }
 
-START_TEST(answers_of_a_subset_are_those_of_the_whole)
+START_TEST(test_subset_results_match_whole)
 {
     tally t = { 0, 0 };
     uint64_t scaled = query_scaled(6);
     uint64_t models = query_scaled(24) < 6 ? 6 : query_scaled(24);
     for (uint64_t i = 0; i < models; i++) {
         query_model m;
-        query_variant v = usual;
+        query_variant v = standard;
         v.rule = (ebpo_rule)(i % 3);
         v.leaf_faces = i % 2 ? 2 : 8;
         if (i % 4 == 3)
@@ -339,17 +339,17 @@ START_TEST(answers_of_a_subset_are_those_of_the_whole)
 }
 END_TEST
 
-START_TEST(everything_kept_is_the_same_content)
+START_TEST(test_full_subset_has_same_content)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     query_model m;
-    query_model_make(&m, "torus", ebpo_test_torus(3, 1, 60, 30), &usual);
+    query_model_make(&m, "torus", ebpo_test_torus(3, 1, 60, 30), &standard);
     char path[120];
     snprintf(path, sizeof path, "%s/all.ebpo.h5", m.folder);
     ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT;
     for (int i = 0; i < 2; i++) {
         ebpo_file *file;
-        o.boxed = i; /* around everything */
+        o.boxed = i; /* around the whole model */
         for (int k = 0; k < 3; k++) {
             o.min[k] = -100;
             o.max[k] = 100;
@@ -369,8 +369,8 @@ START_TEST(everything_kept_is_the_same_content)
 }
 END_TEST
 
-/* Nodes, planes and source faces; numbers of faces may differ, as they come from the file that the
- * subset is taken of. */
+/* Compares nodes, planes and source faces; face indices may differ, as they come from the file of
+ * origin. */
 static void same_parts(const char *a, const char *b)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -405,12 +405,12 @@ static void same_parts(const char *a, const char *b)
     ck_assert_uint_eq(sum[0], sum[1]);
 }
 
-START_TEST(a_subset_of_a_subset_is_the_subset)
+START_TEST(test_subset_of_subset_is_subset)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t state = 7;
     query_model m;
-    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 1, 2, 3 }, 2, 4), &usual);
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 1, 2, 3 }, 2, 4), &standard);
     for (int i = 0; i < 12; i++) {
         char first[120], second[120], direct[120];
         ebpo_file *file;
@@ -448,11 +448,11 @@ static ebpo_subset_options box_of(int last_level, const double min[3], const dou
     return o;
 }
 
-START_TEST(threads_do_not_change_the_bytes)
+START_TEST(test_subset_bytes_same_for_any_threads)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     query_model m;
-    query_model_make(&m, "torus", ebpo_test_torus(3, 1, 200, 80), &usual);
+    query_model_make(&m, "torus", ebpo_test_torus(3, 1, 200, 80), &standard);
     char one[120], four[120], command[400];
     snprintf(one, sizeof one, "%s/one.ebpo.h5", m.folder);
     snprintf(four, sizeof four, "%s/four.ebpo.h5", m.folder);
@@ -469,14 +469,14 @@ START_TEST(threads_do_not_change_the_bytes)
 }
 END_TEST
 
-/* What another program has put in the place of a file that is open is not replaced by what is made
- * of the old one. */
-START_TEST(files_made_in_place_of_another_are_refused)
+/* A file that another program has put in the place of an open file is not replaced by one made from
+ * the old file. */
+START_TEST(test_subset_of_replaced_file_is_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT, fit = EBPO_SUBSET_OPTIONS_INIT;
     query_model m;
-    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &usual);
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &standard);
     char path[120], link[120];
     snprintf(path, sizeof path, "%s/a.ebpo.h5", m.folder);
     snprintf(link, sizeof link, "%s/link.ebpo.h5", m.folder);
@@ -486,12 +486,13 @@ START_TEST(files_made_in_place_of_another_are_refused)
         ebpo_file *file;
         fine(ebpo_file_repack(m.file, path, NULL, NULL, &error), &error);
         fine(ebpo_open(i == 3 ? link : path, &file, &error), &error);
-        fine(ebpo_file_repack(file, path, NULL, NULL, &error), &error); /* from here on it is old */
+        fine(ebpo_file_repack(file, path, NULL, NULL, &error), &error); /* from here on it is
+                                                                         * outdated */
         ebpo_status status = i == 1   ? ebpo_subset(file, path, &o, &error)
                              : i == 2 ? ebpo_subset(file, path, &fit, &error)
                                       : ebpo_file_repack(file, path, NULL, NULL, &error);
         ck_assert_int_eq(status, EBPO_E_IO);
-        ck_assert(strstr(error.message, "another program has written it since it was read") !=
+        ck_assert(strstr(error.message, "another program has changed it since it was read") !=
                   NULL);
         ebpo_close(file);
         fine(ebpo_open(path, &file, &error), &error);
@@ -502,11 +503,11 @@ START_TEST(files_made_in_place_of_another_are_refused)
 }
 END_TEST
 
-START_TEST(boxes_that_keep_nothing_are_refused)
+START_TEST(test_subset_of_empty_box_is_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     query_model m;
-    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &usual);
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &standard);
     char path[120];
     snprintf(path, sizeof path, "%s/never.ebpo.h5", m.folder);
     ebpo_subset_options o = box_of(-1, (double[3]){ 5, 5, 5 }, (double[3]){ 6, 6, 6 });
@@ -523,11 +524,11 @@ START_TEST(boxes_that_keep_nothing_are_refused)
 }
 END_TEST
 
-START_TEST(a_subset_cannot_be_measured)
+START_TEST(test_subset_measure_is_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     query_model m;
-    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3), &usual);
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3), &standard);
     char path[120];
     snprintf(path, sizeof path, "%s/part.ebpo.h5", m.folder);
     ebpo_subset_options o = box_of(-1, (double[3]){ 0.5, 0.5, 0.5 }, (double[3]){ 1, 1, 1 });
@@ -542,13 +543,13 @@ START_TEST(a_subset_cannot_be_measured)
 }
 END_TEST
 
-/* Bytes of the head changed one by one, with HDF5's checksums in the way most of the time; and the
- * library itself with a file whose counts lie. */
-START_TEST(damaged_subsets_do_no_harm)
+/* Bytes of the header changed one by one, mostly detected by checksums of HDF5; and the library
+ * itself with a file of wrong counts. */
+START_TEST(test_damaged_subsets_are_harmless)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     query_model m;
-    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3), &usual);
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3), &standard);
     char path[120];
     snprintf(path, sizeof path, "%s/part.ebpo.h5", m.folder);
     ebpo_subset_options o = box_of(3, (double[3]){ 0.2, 0.2, 0.2 }, (double[3]){ 1, 1, 1 });
@@ -579,8 +580,8 @@ START_TEST(damaged_subsets_do_no_harm)
 }
 END_TEST
 
-/* Changes numbers in one chunk of an unfiltered file, and its checksum with them: what is inside
- * must be checked for itself. */
+/* Changes numbers in one chunk of an unfiltered file, and its checksum: the contents must be
+ * checked separately. */
 static void lie(ebpo_file *file, uint8_t *bytes, uint64_t *state)
 {
     static uint8_t raw[EBPO_CHUNK_BYTES_MAX], stored[2 * EBPO_CHUNK_BYTES_MAX];
@@ -605,7 +606,7 @@ static void lie(ebpo_file *file, uint8_t *bytes, uint64_t *state)
     ebpo_chunk_coder_clear(&coder);
 }
 
-/* Everything that goes down a tree; whatever comes of it. */
+/* Runs everything that traverses a tree, and ignores errors. */
 static void use_all(ebpo_file *file, const ebpo_subset_options *o)
 {
     ebpo_tree tree;
@@ -666,12 +667,12 @@ static void use_all(ebpo_file *file, const ebpo_subset_options *o)
     }
 }
 
-START_TEST(subsets_that_lie_do_no_harm)
+START_TEST(test_inconsistent_subsets_are_harmless)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     query_model m;
     uint64_t state = 5;
-    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &usual);
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 2), &standard);
     static uint8_t bytes[1 << 20], lying[1 << 20];
     for (int kind = 0; kind < 3; kind++) {
         ebpo_subset_options o =
@@ -710,15 +711,15 @@ TEST_SUITE(subset)
     Suite *suite = suite_create("subset");
     TCase *tests = tcase_create("subset");
     tcase_set_timeout(tests, 600);
-    tcase_add_test(tests, answers_of_a_subset_are_those_of_the_whole);
-    tcase_add_test(tests, everything_kept_is_the_same_content);
-    tcase_add_test(tests, a_subset_of_a_subset_is_the_subset);
-    tcase_add_test(tests, threads_do_not_change_the_bytes);
-    tcase_add_test(tests, files_made_in_place_of_another_are_refused);
-    tcase_add_test(tests, boxes_that_keep_nothing_are_refused);
-    tcase_add_test(tests, a_subset_cannot_be_measured);
-    tcase_add_test(tests, damaged_subsets_do_no_harm);
-    tcase_add_test(tests, subsets_that_lie_do_no_harm);
+    tcase_add_test(tests, test_subset_results_match_whole);
+    tcase_add_test(tests, test_full_subset_has_same_content);
+    tcase_add_test(tests, test_subset_of_subset_is_subset);
+    tcase_add_test(tests, test_subset_bytes_same_for_any_threads);
+    tcase_add_test(tests, test_subset_of_replaced_file_is_refused);
+    tcase_add_test(tests, test_subset_of_empty_box_is_refused);
+    tcase_add_test(tests, test_subset_measure_is_refused);
+    tcase_add_test(tests, test_damaged_subsets_are_harmless);
+    tcase_add_test(tests, test_inconsistent_subsets_are_harmless);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,4 +1,5 @@
-/* Subtrees as plain arrays, against a twin that reads the whole file and picks by hand. */
+/* Subtrees as plain arrays, against a reference implementation that reads the whole file and
+ * selects nodes. */
 #include <limits.h>
 #include <math.h>
 #include <pthread.h>
@@ -26,11 +27,11 @@ static void make_folder(void)
     path = scratch("x.ebpo.h5");
 }
 
-enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS, FEW = 6 };
+enum { DEFAULT = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS, FEW = 6 };
 
 /* --- files --- */
 
-/* Files of an even number of levels have subtrees of their own, where there are as many faces. */
+/* Files of an even number of levels have separate subtrees, if there are enough faces. */
 static ebpo_file *write_tree(ebpo_tree *tree, uint32_t parts, ebpo_codec codec)
 {
     ebpo_write_options options = EBPO_WRITE_OPTIONS_INIT;
@@ -58,21 +59,22 @@ static ebpo_file *write_solid(ebpo_mesh mesh, uint32_t parts, uint32_t leaf_face
     return write_tree(&tree, parts, codec);
 }
 
-/* --- the twin: every node of the file, level after level --- */
+/* --- the reference implementation: every node of the file, level after level --- */
 
-typedef struct twin_node {
-    uint64_t octcode, rank[4], refs; /* such nodes of the level before it, and their references */
-    uint64_t plane;                  /* of its own, where they begin in the level */
+typedef struct reference_node {
+    uint64_t octcode, rank[4], refs; /* such nodes before it in the level, and their references */
+    uint64_t plane;                  /* own planes: their beginning in the level */
     ebpo_node_type type;
-} twin_node;
+} reference_node;
 
-typedef struct twin {
+typedef struct reference {
     ebpo_tree tree;
-    twin_node *node[EBPO_LEVELS_MAX];
+    reference_node *node[EBPO_LEVELS_MAX];
     uint64_t count[EBPO_LEVELS_MAX];
-} twin;
+} reference;
 
-static void count_on(twin_node *at, const ebpo_level *l, twin_node *out, uint64_t planes[2])
+static void count_on(reference_node *at, const ebpo_level *l, reference_node *out,
+                     uint64_t planes[2])
 {
     *out = *at;
     out->plane = at->type == EBPO_LEAF ? planes[1] : planes[0];
@@ -85,11 +87,11 @@ static void count_on(twin_node *at, const ebpo_level *l, twin_node *out, uint64_
     at->rank[at->type]++;
 }
 
-static void list_level(twin *t, int i)
+static void list_level(reference *t, int i)
 {
     const ebpo_level *l = &t->tree.level[i];
     uint64_t group = 0, planes[2] = { 0, 0 }, parents = i ? t->count[i - 1] : 1;
-    twin_node at = { .octcode = 1 };
+    reference_node at = { .octcode = 1 };
     t->node[i] = calloc(8 * l->group_count + 1, sizeof *t->node[i]);
     for (uint64_t p = 0; p < parents; p++) {
         if (i && t->node[i - 1][p].type != EBPO_GRAY)
@@ -107,7 +109,7 @@ static void list_level(twin *t, int i)
     }
 }
 
-static void twin_make(twin *t, const ebpo_file *file)
+static void reference_make(reference *t, const ebpo_file *file)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     memset(t, 0, sizeof *t);
@@ -117,7 +119,7 @@ static void twin_make(twin *t, const ebpo_file *file)
         list_level(t, i);
 }
 
-static void twin_free(twin *t)
+static void reference_free(reference *t)
 {
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
         free(t->node[i]);
@@ -127,22 +129,23 @@ static void twin_free(twin *t)
 /* --- comparing --- */
 
 typedef struct pair {
-    const twin *t;
+    const reference *t;
     ebpo_subtree *subtree;
     ebpo_subtree_nodes nodes;
     ebpo_subtree_faces faces;
     uint64_t octcode;
     int level;
-    uint8_t *listed; /* by number in the file; 2: new in this subtree */
+    uint8_t *listed; /* by index in the file; 2: new in this subtree */
 } pair;
 
-static int32_t winding_of(const ebpo_level *l, const twin_node *n)
+static int32_t winding_of(const ebpo_level *l, const reference_node *n)
 {
     const int32_t *of_type[4] = { l->white_winding, l->black_winding, l->leaf_winding, NULL };
     return of_type[n->type] ? of_type[n->type][n->rank[n->type]] : n->type == EBPO_BLACK;
 }
 
-static void compare_planes(const pair *p, const ebpo_level *l, const twin_node *n, uint64_t number)
+static void compare_planes(const pair *p, const ebpo_level *l, const reference_node *n,
+                           uint64_t number)
 {
     uint64_t count = 0;
     const uint32_t *codes = n->type == EBPO_LEAF ? l->leaf_planes : l->planes;
@@ -159,7 +162,7 @@ static void compare_planes(const pair *p, const ebpo_level *l, const twin_node *
     ck_assert(count == 0 || memcmp(p->nodes.planes + first, codes + n->plane, count * 4) == 0);
 }
 
-static void compare_list(pair *p, const ebpo_level *l, const twin_node *n, uint64_t number)
+static void compare_list(pair *p, const ebpo_level *l, const reference_node *n, uint64_t number)
 {
     uint32_t first = p->faces.list_first[number];
     uint64_t rank = n->rank[EBPO_LEAF];
@@ -175,14 +178,15 @@ static void compare_list(pair *p, const ebpo_level *l, const twin_node *n, uint6
     }
 }
 
-/* Nodes of level `level` of the tree; `links` counts the gray nodes of the level before. */
+/* Compares nodes of level `level` of the tree; `links` counts the gray nodes of the previous level.
+ */
 static void compare_level(pair *p, int i, bool has_faces)
 {
     int level = p->level + i;
     const ebpo_level *l = &p->t->tree.level[level];
     uint64_t number = p->nodes.level_first[i];
     for (uint64_t k = 0; k < p->t->count[level]; k++) {
-        const twin_node *n = &p->t->node[level][k];
+        const reference_node *n = &p->t->node[level][k];
         if (n->octcode >> 3 * i != p->octcode)
             continue;
         ck_assert(number < p->nodes.level_first[i + 1]);
@@ -199,7 +203,7 @@ static void compare_level(pair *p, int i, bool has_faces)
     ck_assert(number == p->nodes.level_first[i + 1]);
 }
 
-/* Children are where the next level has their octcodes, or nowhere. */
+/* Checks that children are where the next level has their octcodes, or nowhere. */
 static void compare_children(const pair *p)
 {
     uint64_t linked = 1;
@@ -241,10 +245,10 @@ static void compare_faces(const pair *p)
         listed += p->listed[i] > 0;
         fresh += p->listed[i] == 2;
     }
-    ck_assert(p->faces.face_count == listed && p->faces.outer_count == listed - fresh);
+    ck_assert(p->faces.face_count == listed && p->faces.shared_count == listed - fresh);
     for (uint64_t i = 0; i < listed; i++) {
         ck_assert(i == 0 || p->faces.numbers[i] > p->faces.numbers[i - 1]);
-        ck_assert(p->listed[p->faces.numbers[i]] == (i < p->faces.outer_count ? 1 : 2));
+        ck_assert(p->listed[p->faces.numbers[i]] == (i < p->faces.shared_count ? 1 : 2));
         ck_assert(!p->faces.source == !p->t->tree.face_source);
         if (p->faces.source)
             ck_assert(p->faces.source[i] == p->t->tree.face_source[p->faces.numbers[i]]);
@@ -260,7 +264,7 @@ static void compare_above(const pair *p)
         const ebpo_level *l = &p->t->tree.level[level];
         while (p->t->node[level][k].octcode != code)
             k++;
-        const twin_node *n = &p->t->node[level][k];
+        const reference_node *n = &p->t->node[level][k];
         uint64_t count = l->plane_counts ? l->plane_counts[n->rank[EBPO_GRAY]] : 0;
         ck_assert(p->nodes.above_first[level + 1] - p->nodes.above_first[level] == count);
         ck_assert(count == 0 || memcmp(p->nodes.above_planes + p->nodes.above_first[level],
@@ -268,7 +272,7 @@ static void compare_above(const pair *p)
     }
 }
 
-static void check_subtree(const twin *t, const ebpo_file *file, const twin_node *root,
+static void check_subtree(const reference *t, const ebpo_file *file, const reference_node *root,
                           const ebpo_subtree_options *options)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -302,7 +306,7 @@ static ebpo_subtree_options with_corners(void)
     return options;
 }
 
-static bool is_pruned(const twin *t, const twin_node *n)
+static bool is_pruned(const reference *t, const reference_node *n)
 {
     int level = ebpo_octcode_level(n->octcode) + 1;
     return t->tree.info.pruned && n->type == EBPO_GRAY &&
@@ -320,16 +324,16 @@ static void check_refused(const ebpo_file *file, uint64_t octcode, ebpo_status s
     ck_assert_msg(strstr(error.message, word), "%s", error.message);
 }
 
-/* Every `step`th gray node and leaf; all others are refused. */
+/* Checks every `step`th gray node and leaf; all others are refused. */
 static void check_all(const ebpo_file *file, uint64_t step)
 {
-    twin t;
+    reference t;
     uint64_t turn = 0;
     ebpo_subtree_options options = with_corners();
-    twin_make(&t, file);
+    reference_make(&t, file);
     for (int level = 0; level < t.tree.info.level_count; level++)
         for (uint64_t k = 0; k < t.count[level]; k++) {
-            const twin_node *n = &t.node[level][k];
+            const reference_node *n = &t.node[level][k];
             if (turn++ % step && level)
                 continue;
             options.levels = turn % 4 == 3 ? (int)turn / 4 % 3 : -1;
@@ -341,10 +345,10 @@ static void check_all(const ebpo_file *file, uint64_t step)
             else
                 check_subtree(&t, file, n, &options);
         }
-    twin_free(&t);
+    reference_free(&t);
 }
 
-START_TEST(subtrees_of_random_trees_are_what_the_whole_file_says)
+START_TEST(test_subtrees_of_random_trees_match_file)
 {
     if (!ebpo_test_wanted(_i))
         return;
@@ -354,37 +358,37 @@ START_TEST(subtrees_of_random_trees_are_what_the_whole_file_says)
 }
 END_TEST
 
-START_TEST(subtrees_of_solids_are_what_the_whole_file_says)
+START_TEST(test_subtrees_of_solids_match_file)
 {
     if (!ebpo_test_wanted(_i))
         return;
     ebpo_file *file =
         write_solid(ebpo_test_solids[_i].make(),
-                    _i % 2 ? USUAL : EBPO_PART_MESH | EBPO_PART_LEAF_PLANES, 2, EBPO_CODEC_ZSTD);
+                    _i % 2 ? DEFAULT : EBPO_PART_MESH | EBPO_PART_LEAF_PLANES, 2, EBPO_CODEC_ZSTD);
     check_all(file, 3);
     ebpo_close(file);
 }
 END_TEST
 
-/* Index arrays, chunks by the dozen. */
-START_TEST(subtrees_of_larger_trees_agree)
+/* Index arrays, dozens of chunks. */
+START_TEST(test_subtrees_of_larger_trees_match_file)
 {
     ebpo_file *file =
         _i ? write_random(5, 7, 12, true)
-           : write_solid(ebpo_test_torus(2, 0.7, 160, 100), USUAL, 4, EBPO_CODEC_ZSTD);
+           : write_solid(ebpo_test_torus(2, 0.7, 160, 100), DEFAULT, 4, EBPO_CODEC_ZSTD);
     check_all(file, _i ? 9973 : 211);
     ebpo_close(file);
 }
 END_TEST
 
-/* Of a solid, or of a tree in which white nodes have winding numbers. */
+/* A subset of a solid, or of a tree whose white nodes have winding numbers. */
 static ebpo_file *write_subset(bool windings)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
     ebpo_file *small = NULL, *file = windings ? write_random(7, 6, 8, false)
-                                              : write_solid(ebpo_test_torus(2, 0.7, 40, 30), USUAL,
-                                                            4, EBPO_CODEC_ZSTD);
+                                              : write_solid(ebpo_test_torus(2, 0.7, 40, 30),
+                                                            DEFAULT, 4, EBPO_CODEC_ZSTD);
     const ebpo_info *info = ebpo_file_info(file);
     const char *name = scratch("small.ebpo.h5");
     options.last_level = 4;
@@ -400,7 +404,7 @@ static ebpo_file *write_subset(bool windings)
     return small;
 }
 
-START_TEST(subtrees_of_subsets_end_where_these_do)
+START_TEST(test_subtrees_of_subsets_match_file)
 {
     ebpo_file *file = write_subset(_i);
     check_all(file, 1);
@@ -408,7 +412,7 @@ START_TEST(subtrees_of_subsets_end_where_these_do)
 }
 END_TEST
 
-/* --- nodes in the model's coordinates --- */
+/* --- nodes in model coordinates --- */
 
 static void same_node(const ebpo_stream_node *a, const ebpo_stream_node *b)
 {
@@ -427,7 +431,7 @@ static void same_node(const ebpo_stream_node *a, const ebpo_stream_node *b)
         ck_assert(a->corners[i] == b->corners[i]);
 }
 
-/* Subtrees below these nodes of a level, by octcode. */
+/* Opens subtrees below these nodes of a level, by octcode. */
 static ebpo_subtree *open_around(const ebpo_file *file, uint64_t octcode, int level, uint32_t parts,
                                  uint64_t *number)
 {
@@ -445,12 +449,13 @@ static ebpo_subtree *open_around(const ebpo_file *file, uint64_t octcode, int le
     return subtree;
 }
 
-/* Without faces the nodes are those of streams, to the last bit. */
-START_TEST(nodes_are_those_of_streams)
+/* Without faces the nodes equal those of streams, to the last bit. */
+START_TEST(test_subtree_nodes_match_streams)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20),
-                                  USUAL | (_i % 2 ? EBPO_PART_LEAF_PLANES : 0), 6, EBPO_CODEC_ZSTD);
+    ebpo_file *file =
+        write_solid(ebpo_test_torus(2, 0.7, 30, 20), DEFAULT | (_i % 2 ? EBPO_PART_LEAF_PLANES : 0),
+                    6, EBPO_CODEC_ZSTD);
     ebpo_stream *stream = NULL;
     ebpo_stream_options options = EBPO_STREAM_OPTIONS_INIT;
     ebpo_stream_level level;
@@ -479,11 +484,11 @@ START_TEST(nodes_are_those_of_streams)
 }
 END_TEST
 
-/* With faces, leaves are cut by planes that follow from them, as in whole levels. */
-START_TEST(leaves_are_those_of_whole_levels)
+/* With faces, leaves are cut by derived planes, as in whole levels. */
+START_TEST(test_subtree_leaves_match_whole_levels)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_file *file = write_solid(ebpo_test_solids[_i].make(), USUAL, 3, EBPO_CODEC_ZSTD);
+    ebpo_file *file = write_solid(ebpo_test_solids[_i].make(), DEFAULT, 3, EBPO_CODEC_ZSTD);
     const ebpo_info *info = ebpo_file_info(file);
     ebpo_mesh mesh;
     ebpo_lod_nodes nodes;
@@ -509,7 +514,7 @@ START_TEST(leaves_are_those_of_whole_levels)
 }
 END_TEST
 
-/* Planes of all that is above a node. */
+/* Counts all planes above a node. */
 static uint64_t planes_above(const ebpo_subtree_nodes *nodes, uint64_t number)
 {
     uint64_t planes = nodes->above_first[nodes->level], code = nodes->octcodes[number] >> 3;
@@ -522,11 +527,11 @@ static uint64_t planes_above(const ebpo_subtree_nodes *nodes, uint64_t number)
     return planes;
 }
 
-/* What a node inherits, its own planes and its cell bound the envelope's corners. */
-START_TEST(inherited_half_spaces_bound_the_envelope)
+/* The inherited planes, its own planes and its cell bound the corners of an envelope. */
+START_TEST(test_subtree_inherited_planes_bound_envelope)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), USUAL, 6, EBPO_CODEC_ZSTD);
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), DEFAULT, 6, EBPO_CODEC_ZSTD);
     ebpo_subtree *subtree = NULL;
     ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
     uint64_t inherited = 0;
@@ -552,22 +557,22 @@ START_TEST(inherited_half_spaces_bound_the_envelope)
 }
 END_TEST
 
-/* --- files far away --- */
+/* --- remote files --- */
 
-/* Of a file with subtrees, one is asked for in few batches, whatever its size. */
-START_TEST(subtrees_of_files_far_away_come_in_few_batches)
+/* In a file with subtrees, one takes few round trips, for any size. */
+START_TEST(test_remote_subtree_needs_few_batches)
 {
-    twin t;
+    reference t;
     counted_source c;
     uint64_t most = 0;
     ebpo_subtree_options options = with_corners();
     ebpo_mesh mesh = ebpo_test_torus(2, 0.7, 160, 100);
-    ebpo_close(write_solid(mesh, USUAL, 4, EBPO_CODEC_ZSTD));
+    ebpo_close(write_solid(mesh, DEFAULT, 4, EBPO_CODEC_ZSTD));
     ebpo_file *near = NULL, *far = NULL;
     ck_assert(ebpo_open(path, &near, NULL) == EBPO_OK);
     int level = ebpo_file_info(near)->subtree_level;
     ck_assert_int_gt(level, 0);
-    twin_make(&t, near);
+    reference_make(&t, near);
     for (uint64_t k = 0; k < t.count[level]; k += 7) {
         if (t.node[level][k].type != EBPO_GRAY)
             continue;
@@ -577,7 +582,7 @@ START_TEST(subtrees_of_files_far_away_come_in_few_batches)
         counted_close(&c, far);
     }
     ck_assert_msg(most <= FEW, "%llu", (unsigned long long)most);
-    twin_free(&t);
+    reference_free(&t);
     ebpo_close(near);
 }
 END_TEST
@@ -585,7 +590,7 @@ END_TEST
 /* --- threads --- */
 
 typedef struct opening {
-    const twin *t;
+    const reference *t;
     const ebpo_file *file;
     uint64_t first;
 } opening;
@@ -601,45 +606,45 @@ static void *open_some(void *user)
     return NULL;
 }
 
-START_TEST(threads_share_a_file)
+START_TEST(test_subtree_threads_share_file)
 {
     enum { THREADS = 4 };
     pthread_t thread[THREADS];
     opening o[THREADS];
-    twin t;
-    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 40, 30), USUAL, 4, EBPO_CODEC_ZSTD);
-    twin_make(&t, file);
+    reference t;
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 40, 30), DEFAULT, 4, EBPO_CODEC_ZSTD);
+    reference_make(&t, file);
     for (unsigned i = 0; i < THREADS; i++) {
         o[i] = (opening){ &t, file, i };
         ck_assert_int_eq(pthread_create(&thread[i], NULL, open_some, &o[i]), 0);
     }
     for (unsigned i = 0; i < THREADS; i++)
         ck_assert_int_eq(pthread_join(thread[i], NULL), 0);
-    twin_free(&t);
+    reference_free(&t);
     ebpo_close(file);
 }
 END_TEST
 
-/* --- what is refused --- */
+/* --- errors --- */
 
-START_TEST(octcodes_that_are_none_are_refused)
+START_TEST(test_subtree_invalid_octcodes_are_refused)
 {
     static const uint64_t none[] = { 0, 2, 7, 16, 50, UINT64_C(1) << 63, UINT64_MAX };
-    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), USUAL, 6, EBPO_CODEC_ZSTD);
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), DEFAULT, 6, EBPO_CODEC_ZSTD);
     for (size_t i = 0; i < sizeof none / sizeof *none; i++)
         check_refused(file, none[i], EBPO_E_ARGUMENT, "is not an octcode");
     ebpo_close(file);
 }
 END_TEST
 
-START_TEST(where_the_tree_ends_the_leaf_above_is_named_and_opened)
+START_TEST(test_subtree_error_names_enclosing_leaf)
 {
-    twin t;
-    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), USUAL, 6, EBPO_CODEC_ZSTD);
-    twin_make(&t, file);
+    reference t;
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), DEFAULT, 6, EBPO_CODEC_ZSTD);
+    reference_make(&t, file);
     for (int level = 1; level < t.tree.info.level_count; level++)
         for (uint64_t k = 0; k < t.count[level]; k += 1 + k / 4) {
-            const twin_node *n = &t.node[level][k];
+            const reference_node *n = &t.node[level][k];
             ebpo_subtree_options options = EBPO_SUBTREE_OPTIONS_INIT;
             ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
             ebpo_subtree *subtree = NULL;
@@ -647,7 +652,7 @@ START_TEST(where_the_tree_ends_the_leaf_above_is_named_and_opened)
             if (n->type == EBPO_GRAY)
                 continue;
             check_refused(file, below, EBPO_E_ARGUMENT,
-                          n->type == EBPO_LEAF ? "tree ends above it" : "would lie in");
+                          n->type == EBPO_LEAF ? "tree ends above it" : "would be in");
             options.or_leaf_above = true;
             ck_assert_int_eq(ebpo_subtree_open(file, below, &options, &subtree, NULL),
                              n->type == EBPO_LEAF ? EBPO_OK : EBPO_E_ARGUMENT);
@@ -657,14 +662,14 @@ START_TEST(where_the_tree_ends_the_leaf_above_is_named_and_opened)
             }
             ebpo_subtree_close(subtree);
         }
-    twin_free(&t);
+    reference_free(&t);
     ebpo_close(file);
 }
 END_TEST
 
-START_TEST(octcodes_of_points_are_those_of_the_cells_around_them)
+START_TEST(test_subtree_octcodes_of_points)
 {
-    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), USUAL, 6, EBPO_CODEC_ZSTD);
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), DEFAULT, 6, EBPO_CODEC_ZSTD);
     const ebpo_info *info = ebpo_file_info(file);
     double outside[3] = { info->box_origin[0] - 1, 0, 0 };
     uint64_t state = 7;
@@ -693,10 +698,10 @@ START_TEST(octcodes_of_points_are_those_of_the_cells_around_them)
 }
 END_TEST
 
-/* As many levels as one may name are all. */
-START_TEST(more_levels_than_there_are_is_all)
+/* The maximum number of levels means all. */
+START_TEST(test_subtree_level_count_is_clamped)
 {
-    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), USUAL, 6, EBPO_CODEC_ZSTD);
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20), DEFAULT, 6, EBPO_CODEC_ZSTD);
     ebpo_subtree_options options = EBPO_SUBTREE_OPTIONS_INIT;
     static const int levels[] = { -1, EBPO_LEVELS_MAX, INT_MAX };
     uint64_t nodes[3];
@@ -716,14 +721,14 @@ START_TEST(more_levels_than_there_are_is_all)
 }
 END_TEST
 
-START_TEST(without_faces_there_are_nodes_and_a_reason)
+START_TEST(test_subtree_without_faces_gives_reason)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_subtree *subtree = NULL;
     ebpo_subtree_options options = EBPO_SUBTREE_OPTIONS_INIT;
     ebpo_subtree_faces faces = EBPO_SUBTREE_FACES_INIT;
     ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 30, 20),
-                                  _i == 0 ? EBPO_PART_PLANES : USUAL, 6, EBPO_CODEC_ZSTD);
+                                  _i == 0 ? EBPO_PART_PLANES : DEFAULT, 6, EBPO_CODEC_ZSTD);
     static const char *const why[] = { "without its mesh", "EBPO_PART_MESH", "levels = -1" };
     if (_i == 1)
         options.parts = EBPO_PART_PLANES | EBPO_PART_MAPS;
@@ -741,7 +746,7 @@ START_TEST(without_faces_there_are_nodes_and_a_reason)
 }
 END_TEST
 
-/* The limit that a refusal names; 0: it is enough. */
+/* Returns the limit named by a refusal; 0: it is enough. */
 static uint64_t named_limit(const ebpo_file *file, uint64_t octcode, uint64_t memory)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -752,20 +757,20 @@ static uint64_t named_limit(const ebpo_file *file, uint64_t octcode, uint64_t me
     ebpo_subtree_close(subtree);
     if (status == EBPO_OK)
         return 0;
-    const char *named = strstr(error.message, "allowed; ");
+    const char *named = strstr(error.message, "allowed; give ");
     ck_assert_msg(status == EBPO_E_LIMIT && named, "%s", error.message);
-    return strtoull(named + strlen("allowed; "), NULL, 10);
+    return strtoull(named + strlen("allowed; give "), NULL, 10);
 }
 
-/* The message of too small a limit names one that does. With less, lists are looked at for how many
- * faces are not the subtree's own: the limit named then is exact. */
-START_TEST(a_limit_of_memory_is_named_and_kept)
+/* The message about a limit that is too small names a sufficient one. With less, the lists are read
+ * for the number of shared faces: then the named limit is exact. */
+START_TEST(test_subtree_memory_limit_is_kept)
 {
-    twin t;
+    reference t;
     unsigned exact = 0;
     ebpo_subtree_options options = with_corners();
-    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 120, 80), USUAL, 6, EBPO_CODEC_ZSTD);
-    twin_make(&t, file);
+    ebpo_file *file = write_solid(ebpo_test_torus(2, 0.7, 120, 80), DEFAULT, 6, EBPO_CODEC_ZSTD);
+    reference_make(&t, file);
     for (int level = 0; level < 3; level++)
         for (uint64_t k = 0; k < t.count[level]; k++) {
             if (t.node[level][k].type != EBPO_GRAY)
@@ -781,12 +786,12 @@ START_TEST(a_limit_of_memory_is_named_and_kept)
             exact += less < named;
         }
     ck_assert_uint_gt(exact, 3);
-    twin_free(&t);
+    reference_free(&t);
     ebpo_close(file);
 }
 END_TEST
 
-/* --- hostile files --- */
+/* --- untrusted files --- */
 
 static void check_bounds(const ebpo_subtree_nodes *n, const ebpo_subtree_faces *f, bool has_faces)
 {
@@ -825,12 +830,12 @@ static bool try_changed(const uint8_t *data, uint64_t size, uint64_t octcode)
     return status == EBPO_OK;
 }
 
-/* Files without checksums, so that what is changed is read. */
-START_TEST(changed_bytes_never_lead_outside)
+/* Files without checksums, so that changed data is read. */
+START_TEST(test_subtree_changed_bytes_stay_in_bounds)
 {
     FILE *f;
     uint64_t state = 99 + (uint64_t)_i, turns = ebpo_test_scaled(400), refused = 0;
-    ebpo_close(write_solid(ebpo_test_torus(2, 0.7, 30, 20), USUAL, 6, EBPO_CODEC_NONE));
+    ebpo_close(write_solid(ebpo_test_torus(2, 0.7, 30, 20), DEFAULT, 6, EBPO_CODEC_NONE));
     ck_assert_ptr_nonnull(f = fopen(path, "rb"));
     ck_assert_int_eq(fseek(f, 0, SEEK_END), 0);
     uint64_t size = (uint64_t)ftell(f);
@@ -856,23 +861,22 @@ TEST_SUITE(subtree)
     TCase *tests = tcase_create("subtree");
     tcase_set_timeout(tests, 600);
     tcase_add_checked_fixture(tests, make_folder, scratch_leave);
-    tcase_add_loop_test(tests, subtrees_of_random_trees_are_what_the_whole_file_says, 0, 40);
-    tcase_add_loop_test(tests, subtrees_of_solids_are_what_the_whole_file_says, 0,
-                        ebpo_test_solid_count);
-    tcase_add_loop_test(tests, subtrees_of_larger_trees_agree, 0, 2);
-    tcase_add_loop_test(tests, subtrees_of_subsets_end_where_these_do, 0, 2);
-    tcase_add_loop_test(tests, nodes_are_those_of_streams, 0, 3);
-    tcase_add_loop_test(tests, leaves_are_those_of_whole_levels, 0, ebpo_test_solid_count);
-    tcase_add_test(tests, inherited_half_spaces_bound_the_envelope);
-    tcase_add_test(tests, subtrees_of_files_far_away_come_in_few_batches);
-    tcase_add_test(tests, threads_share_a_file);
-    tcase_add_test(tests, octcodes_that_are_none_are_refused);
-    tcase_add_test(tests, where_the_tree_ends_the_leaf_above_is_named_and_opened);
-    tcase_add_test(tests, octcodes_of_points_are_those_of_the_cells_around_them);
-    tcase_add_loop_test(tests, without_faces_there_are_nodes_and_a_reason, 0, 3);
-    tcase_add_test(tests, more_levels_than_there_are_is_all);
-    tcase_add_test(tests, a_limit_of_memory_is_named_and_kept);
-    tcase_add_loop_test(tests, changed_bytes_never_lead_outside, 0, 3);
+    tcase_add_loop_test(tests, test_subtrees_of_random_trees_match_file, 0, 40);
+    tcase_add_loop_test(tests, test_subtrees_of_solids_match_file, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(tests, test_subtrees_of_larger_trees_match_file, 0, 2);
+    tcase_add_loop_test(tests, test_subtrees_of_subsets_match_file, 0, 2);
+    tcase_add_loop_test(tests, test_subtree_nodes_match_streams, 0, 3);
+    tcase_add_loop_test(tests, test_subtree_leaves_match_whole_levels, 0, ebpo_test_solid_count);
+    tcase_add_test(tests, test_subtree_inherited_planes_bound_envelope);
+    tcase_add_test(tests, test_remote_subtree_needs_few_batches);
+    tcase_add_test(tests, test_subtree_threads_share_file);
+    tcase_add_test(tests, test_subtree_invalid_octcodes_are_refused);
+    tcase_add_test(tests, test_subtree_error_names_enclosing_leaf);
+    tcase_add_test(tests, test_subtree_octcodes_of_points);
+    tcase_add_loop_test(tests, test_subtree_without_faces_gives_reason, 0, 3);
+    tcase_add_test(tests, test_subtree_level_count_is_clamped);
+    tcase_add_test(tests, test_subtree_memory_limit_is_kept);
+    tcase_add_loop_test(tests, test_subtree_changed_bytes_stay_in_bounds, 0, 3);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,6 +1,5 @@
-/* Tables of subtrees that lie: every number of them is changed, in files whose checksums fit all
- * the same. What is told must be what the file says that has no table, or be refused; what is
- * announced lies within the file. */
+/* Wrong tables of subtrees: every number is changed, in files with valid checksums. Results must
+ * equal those of a file without a table, or be refused; prefetch hints are within the file. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +16,7 @@ static const double points[POINTS][3] = { { 2.7, 0.1, 0.2 },
                                           { -1.9, 0.3, 0.69 },
                                           { 0, 2.1, -0.5 } };
 
-/* What the file without a table says. */
+/* Results of the file without a table. */
 typedef struct truth {
     two_layouts files;
     changeable c;
@@ -26,7 +25,7 @@ typedef struct truth {
     bool inside[POINTS];
 } truth;
 
-/* --- a file far away: bytes in memory --- */
+/* --- a remote file: bytes in memory --- */
 
 typedef struct far_bytes {
     const uint8_t *data;
@@ -50,7 +49,7 @@ static void foresee(void *user, const ebpo_range *ranges, size_t count)
         ck_assert(ranges[i].offset <= b->size && ranges[i].size <= b->size - ranges[i].offset);
 }
 
-/* NULL: it is refused. */
+/* Returns NULL when it is refused. */
 static ebpo_file *open_bytes(far_bytes *b, bool far)
 {
     ebpo_file *file = NULL;
@@ -65,10 +64,10 @@ static ebpo_file *open_bytes(far_bytes *b, bool far)
     return ebpo_open_source(&source, "x", &file, NULL) == EBPO_OK ? file : NULL;
 }
 
-/* --- asking --- */
+/* --- queries --- */
 
-/* False: something is refused, which is fine. */
-static bool ask(const ebpo_file *file, double distance[POINTS], bool inside[POINTS])
+/* Returns false when something is refused, which is OK. */
+static bool run_query(const ebpo_file *file, double distance[POINTS], bool inside[POINTS])
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model *model = NULL;
@@ -121,7 +120,7 @@ static void truth_make(truth *t, uint32_t parts, uint64_t subtree_faces)
     truth_add(t, level + 1);
     ck_assert(t->roots > 20);
     if (parts & EBPO_PART_MESH)
-        ck_assert(ask(t->files.without, t->distance, t->inside));
+        ck_assert(run_query(t->files.without, t->distance, t->inside));
 }
 
 static void truth_free(truth *t)
@@ -132,8 +131,8 @@ static void truth_free(truth *t)
     free(t->sum);
 }
 
-/* Subtrees around one and some others: each is what it was, or refused. */
-static void check_answers(const truth *t, uint64_t around, bool far, uint64_t *refused)
+/* Checks subtrees around one and some others: each is unchanged, or refused. */
+static void check_results(const truth *t, uint64_t around, bool far, uint64_t *refused)
 {
     far_bytes b = { t->c.data, t->c.size };
     ebpo_file *file = open_bytes(&b, far);
@@ -153,7 +152,7 @@ static void check_answers(const truth *t, uint64_t around, bool far, uint64_t *r
         ck_assert(status != EBPO_OK || sum == t->sum[i]);
     }
     if (around % 4 == 0 && ebpo_file_info(file)->parts & EBPO_PART_MESH &&
-        ask(file, distance, inside)) {
+        run_query(file, distance, inside)) {
         ck_assert(memcmp(distance, t->distance, sizeof distance) == 0);
         ck_assert(memcmp(inside, t->inside, sizeof inside) == 0);
     }
@@ -184,14 +183,14 @@ static void change_all(truth *t, ebpo_array_id id, uint64_t step, uint64_t *refu
             if (changed(before, how) == before)
                 continue;
             changeable_put(&t->c, id, i, changed(before, how));
-            check_answers(t, i * t->roots / count, (turn + (uint64_t)how) % 2, refused);
+            check_results(t, i * t->roots / count, (turn + (uint64_t)how) % 2, refused);
             changeable_put(&t->c, id, i, before);
         }
 }
 
 static uint64_t steps(uint64_t count) { return (uint64_t)((double)count / ebpo_test_scale()); }
 
-START_TEST(numbers_that_lie_are_noticed_or_do_no_harm)
+START_TEST(test_wrong_subtree_counts_are_harmless)
 {
     static const struct {
         uint32_t parts;
@@ -202,21 +201,21 @@ START_TEST(numbers_that_lie_are_noticed_or_do_no_harm)
     truth t;
     uint64_t refused = 0;
     truth_make(&t, files[_i].parts, files[_i].faces);
-    check_answers(&t, 0, false, &refused);
-    check_answers(&t, 1, true, &refused);
+    check_results(&t, 0, false, &refused);
+    check_results(&t, 1, true, &refused);
     ck_assert(refused == 0);
     change_all(&t, EBPO_A_SUBTREE_INDEX, steps(1), &refused);
     change_all(&t, EBPO_A_SUBTREE_COUNTS, steps(7), &refused);
     ck_assert(refused > 0);
     if (files[_i].parts & EBPO_PART_MESH)
-        change_all(&t, EBPO_A_SUBTREE_OUTER, steps(3), &refused);
+        change_all(&t, EBPO_A_SUBTREE_SHARED, steps(3), &refused);
     change_all(&t, EBPO_A_PLACES, steps(3), &refused);
     truth_free(&t);
 }
 END_TEST
 
-/* Two numbers of a column, so that the sums agree. */
-START_TEST(rows_that_lie_together_are_noticed_or_do_no_harm)
+/* Changes two numbers of a column, so that the sums agree. */
+START_TEST(test_wrong_subtree_row_pairs_are_harmless)
 {
     truth t;
     uint64_t refused = 0, wrong = 0;
@@ -232,7 +231,7 @@ START_TEST(rows_that_lie_together_are_noticed_or_do_no_harm)
             continue;
         changeable_put(&t.c, EBPO_A_SUBTREE_COUNTS, i, a + by);
         changeable_put(&t.c, EBPO_A_SUBTREE_COUNTS, i + cols, b - by);
-        check_answers(&t, i * t.roots / count, wrong % 2, &refused);
+        check_results(&t, i * t.roots / count, wrong % 2, &refused);
         changeable_put(&t.c, EBPO_A_SUBTREE_COUNTS, i, a);
         changeable_put(&t.c, EBPO_A_SUBTREE_COUNTS, i + cols, b);
     }
@@ -247,8 +246,8 @@ TEST_SUITE(subtree_hostile)
     TCase *tests = tcase_create("subtree_hostile");
     tcase_set_timeout(tests, 900);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
-    tcase_add_loop_test(tests, numbers_that_lie_are_noticed_or_do_no_harm, 0, 3);
-    tcase_add_test(tests, rows_that_lie_together_are_noticed_or_do_no_harm);
+    tcase_add_loop_test(tests, test_wrong_subtree_counts_are_harmless, 0, 3);
+    tcase_add_test(tests, test_wrong_subtree_row_pairs_are_harmless);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -31,7 +31,7 @@ typedef struct plain_table {
     uint64_t (*sum)[EBPO_SUBTREE_COLS]; /* [subtrees + 1] before each */
 } plain_table;
 
-/* Which subtree each group of a level belongs to; the level's gray nodes give the next one's. */
+/* Returns the subtree of each group of a level; the gray nodes of the level give the next one. */
 static uint64_t *owners_below(const plain_table *t, int level, const uint64_t *group_owner)
 {
     const ebpo_level *l = &t->tree.level[level];
@@ -105,7 +105,7 @@ static void plain_free(plain_table *t)
     free(t->sum);
 }
 
-/* Faces and vertices: the verifier's business; here that they follow one another. */
+/* Faces and vertices are checked by the verifier; here only that they are consecutive. */
 static void check_faces(const plain_table *t, const ebpo_subtree_row *row, uint64_t *face,
                         uint64_t *vertex)
 {
@@ -180,7 +180,7 @@ static void check_same(const two_layouts *l, uint64_t step)
 
 static const uint64_t sizes[] = { 1, 8, 100 };
 
-START_TEST(random_trees_are_the_same_in_both_layouts)
+START_TEST(test_random_trees_same_in_both_layouts)
 {
     bool solid = _i % 3 != 0;
     if (!ebpo_test_wanted(_i))
@@ -203,7 +203,7 @@ END_TEST
 static const uint32_t parts[] = { ALL, EBPO_PART_MESH, EBPO_PART_PLANES, EBPO_PART_LEAF_PLANES,
                                   EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS };
 
-START_TEST(models_are_the_same_in_both_layouts)
+START_TEST(test_models_same_in_both_layouts)
 {
     two_layouts l;
     if (!ebpo_test_wanted(_i))
@@ -218,8 +218,8 @@ START_TEST(models_are_the_same_in_both_layouts)
 }
 END_TEST
 
-/* Pruned nodes have rows; those above the subtrees' roots have none. */
-START_TEST(subsets_are_the_same_in_both_layouts)
+/* Pruned nodes have rows; nodes above the roots of subtrees have none. */
+START_TEST(test_subsets_same_in_both_layouts)
 {
     two_layouts l;
     ebpo_subset_options subset = EBPO_SUBSET_OPTIONS_INIT;
@@ -274,7 +274,8 @@ static uint64_t list_chunks(const ebpo_file *file, placed *out)
     return count;
 }
 
-/* Where the specification's list has it: the step, and within it the level or nothing. */
+/* Returns the position in the list of the specification: the step, and within it the level or
+ * nothing. */
 static unsigned step_of(const ebpo_info *info, const placed *p)
 {
     int whole = info->subtree_level > 5 ? info->subtree_level : 5, deep = whole + 1;
@@ -288,16 +289,16 @@ static unsigned step_of(const ebpo_info *info, const placed *p)
     if ((of_level && ebpo_schema_is_index(p->id)) || p->id == EBPO_A_SUBTREE_INDEX ||
         p->id == EBPO_A_FACES_INDEX)
         return 1;
-    if (p->id == EBPO_A_SUBTREE_COUNTS || p->id == EBPO_A_SUBTREE_OUTER)
+    if (p->id == EBPO_A_SUBTREE_COUNTS || p->id == EBPO_A_SUBTREE_SHARED)
         return 2;
     if (of_level && middle)
         return list ? 200 : 100 + (unsigned)p->level;
     if (of_level)
         return list ? 400 : 300;
-    return p->id == EBPO_A_PLACES          ? 700
-           : p->id == EBPO_A_CHUNK_SUMS    ? 650
-           : p->id == EBPO_A_VERTEX_SOURCE ? 600
-                                           : 500;
+    return p->id == EBPO_A_PLACES            ? 700
+           : p->id == EBPO_A_CHUNK_CHECKSUMS ? 650
+           : p->id == EBPO_A_VERTEX_SOURCE   ? 600
+                                             : 500;
 }
 
 static unsigned column_of(const ebpo_info *info, const placed *p)
@@ -307,7 +308,7 @@ static unsigned column_of(const ebpo_info *info, const placed *p)
     return ebpo_subtree_column(info, p->level, what[ebpo_schema[p->id].per]);
 }
 
-/* The subtree that a chunk's first row belongs to; -1: not told here. */
+/* Returns the subtree of the first row of a chunk; -1: not known here. */
 static int64_t subtree_of(ebpo_chunks *chunks, const placed *p)
 {
     const ebpo_info *info = &chunks->file->info;
@@ -322,7 +323,7 @@ static int64_t subtree_of(ebpo_chunks *chunks, const placed *p)
     return (int64_t)row.subtree;
 }
 
-START_TEST(chunks_lie_in_the_order_of_the_specification)
+START_TEST(test_chunk_order_follows_specification)
 {
     two_layouts l;
     ebpo_tree tree;
@@ -360,10 +361,10 @@ START_TEST(chunks_lie_in_the_order_of_the_specification)
 }
 END_TEST
 
-/* --- refused --- */
+/* --- refused files --- */
 
-/* What the last columns count stands in a list of its own. */
-START_TEST(a_list_that_is_not_what_the_table_counts_is_refused)
+/* The items counted by the last columns are in a separate list. */
+START_TEST(test_list_not_matching_table_is_refused)
 {
     two_layouts l;
     ebpo_file *file;
@@ -386,11 +387,11 @@ START_TEST(a_list_that_is_not_what_the_table_counts_is_refused)
 }
 END_TEST
 
-/* --- far away --- */
+/* --- remote files --- */
 
-/* What is down makes each try wait: of many points the first that needs it ends the search for what
- * others need, and the question tells. */
-START_TEST(a_line_that_is_down_is_not_tried_for_each_point)
+/* With a failed connection each attempt waits: among many points the first failure ends the
+ * prefetching for the others, and the query reports it. */
+START_TEST(test_failed_connection_ends_batch)
 {
     enum { POINTS = 200 };
     two_layouts l;
@@ -428,12 +429,12 @@ TEST_SUITE(subtree_table)
     TCase *tests = tcase_create("subtree_table");
     tcase_set_timeout(tests, 900);
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
-    tcase_add_loop_test(tests, random_trees_are_the_same_in_both_layouts, 0, 30);
-    tcase_add_loop_test(tests, models_are_the_same_in_both_layouts, 0, 15);
-    tcase_add_loop_test(tests, subsets_are_the_same_in_both_layouts, 0, 3);
-    tcase_add_loop_test(tests, chunks_lie_in_the_order_of_the_specification, 0, 2);
-    tcase_add_test(tests, a_list_that_is_not_what_the_table_counts_is_refused);
-    tcase_add_test(tests, a_line_that_is_down_is_not_tried_for_each_point);
+    tcase_add_loop_test(tests, test_random_trees_same_in_both_layouts, 0, 30);
+    tcase_add_loop_test(tests, test_models_same_in_both_layouts, 0, 15);
+    tcase_add_loop_test(tests, test_subsets_same_in_both_layouts, 0, 3);
+    tcase_add_loop_test(tests, test_chunk_order_follows_specification, 0, 2);
+    tcase_add_test(tests, test_list_not_matching_table_is_refused);
+    tcase_add_test(tests, test_failed_connection_ends_batch);
     suite_add_tcase(suite, tests);
     return suite;
 }

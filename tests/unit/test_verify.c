@@ -1,5 +1,5 @@
-/* The verifier on trees that are right, and on trees with one thing wrong in each: caught, and in
- * the right kind. */
+/* The verifier on correct trees, and on trees with one error each: detected, and in the correct
+ * kind. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,10 +11,11 @@
 #include "solids.h"
 #include "verify/verify_parts.h"
 
-static ebpo_tree tree; /* of the running test */
+static ebpo_tree tree; /* tree of the running test */
 static ebpo_tally tally;
 
-static void build_mesh(ebpo_mesh *mesh, uint32_t leaf_faces, ebpo_rule rule, ebpo_mend_record mend)
+static void build_mesh(ebpo_mesh *mesh, uint32_t leaf_faces, ebpo_rule rule,
+                       ebpo_repair_record repair_record)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_mesh_report report;
@@ -25,14 +26,14 @@ static void build_mesh(ebpo_mesh *mesh, uint32_t leaf_faces, ebpo_rule rule, ebp
     options.rule = rule;
     options.threads = 1;
     options.parts |= EBPO_PART_LEAF_PLANES;
-    ck_assert_msg(ebpo_build(mesh, &report, &mend, &options, &tree, &error) == EBPO_OK, "%s",
-                  error.message);
+    ck_assert_msg(ebpo_build(mesh, &report, &repair_record, &options, &tree, &error) == EBPO_OK,
+                  "%s", error.message);
 }
 
 static void build(const char *name, uint32_t leaf_faces, ebpo_rule rule)
 {
     ebpo_mesh mesh = ebpo_test_make(name);
-    build_mesh(&mesh, leaf_faces, rule, (ebpo_mend_record){ 0 });
+    build_mesh(&mesh, leaf_faces, rule, (ebpo_repair_record){ 0 });
 }
 
 static void verify_with(unsigned threads)
@@ -53,8 +54,8 @@ static void expect_fine(const char *what)
                       kind, (unsigned long long)tally.violations[kind], tally.first[kind]);
 }
 
-/* After a mutation: caught in this kind, at the same place whatever the number of threads, and the
- * tree is gone. */
+/* Expects that a mutation is detected in this kind, at the same position for any number of threads,
+ * and frees the tree. */
 static void expect_caught(ebpo_verify_kind kind, const char *text)
 {
     static ebpo_verify_report one = EBPO_VERIFY_REPORT_INIT, three = EBPO_VERIFY_REPORT_INIT;
@@ -81,7 +82,7 @@ static void set_type(int l, uint64_t group, unsigned octant, int type)
     *types = (uint16_t)((*types & ~(3u << 2 * octant)) | (unsigned)type << 2 * octant);
 }
 
-/* A level with a node of this type, its place, and its rank. */
+/* A level with a node of this type, its index, and its rank. */
 typedef struct spot {
     int level;
     uint64_t group, rank;
@@ -111,7 +112,7 @@ static void recount(int l)
     ck_assert_uint_eq(count[EBPO_GRAY], tree.level[l].gray_count);
 }
 
-START_TEST(built_solids_keep_their_promises)
+START_TEST(test_verify_built_solids)
 {
     static const uint32_t limits[] = { 0, 1, 16, 1000000 };
     for (int i = 0; i < ebpo_test_solid_count; i++)
@@ -123,7 +124,7 @@ START_TEST(built_solids_keep_their_promises)
 }
 END_TEST
 
-START_TEST(every_kind_of_check_is_made)
+START_TEST(test_verify_runs_every_check)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     expect_fine("sphere");
@@ -143,7 +144,7 @@ static void shrink(uint32_t *code, uint32_t steps)
     *code = (*code & 0xfffff) | (q > steps ? q - steps : 0) << 20;
 }
 
-START_TEST(gray_plane_that_cuts_faces_is_caught)
+START_TEST(test_verify_detects_gray_plane_cutting_faces)
 {
     for (int l = 0; l < 3; l++) {
         build("sphere", 8, EBPO_RULE_NONZERO);
@@ -156,7 +157,7 @@ START_TEST(gray_plane_that_cuts_faces_is_caught)
 }
 END_TEST
 
-START_TEST(leaf_plane_that_cuts_faces_is_caught)
+START_TEST(test_verify_detects_leaf_plane_cutting_faces)
 {
     build("torus", 8, EBPO_RULE_NONZERO);
     int l = 0;
@@ -178,9 +179,9 @@ static void add_plane(int l, uint32_t code)
     tree.info.level[l].plane_count = ++level->plane_count;
 }
 
-START_TEST(plane_that_cuts_an_inside_corner_only_is_caught)
+START_TEST(test_verify_detects_plane_cutting_corner)
 {
-    /* The middle of the box lies inside and far from faces; it is corner 7 of the lowest cell of
+    /* The middle of the box is inside and far from faces; it is corner 7 of the lowest cell of
      * level 1. The normal is (170, 170, 171). */
     build("box_subdivided", 8, EBPO_RULE_NONZERO);
     ck_assert_int_eq(type_of(1, 0, 0), EBPO_GRAY);
@@ -192,7 +193,7 @@ START_TEST(plane_that_cuts_an_inside_corner_only_is_caught)
 }
 END_TEST
 
-START_TEST(code_that_stands_for_no_plane_is_caught)
+START_TEST(test_verify_detects_code_without_plane)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     tree.level[1].planes[0] |= 4095u << 20;
@@ -203,7 +204,7 @@ START_TEST(code_that_stands_for_no_plane_is_caught)
 }
 END_TEST
 
-START_TEST(white_made_black_and_black_made_white_are_caught)
+START_TEST(test_verify_detects_swapped_black_and_white)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     spot white = find_from(1, EBPO_WHITE);
@@ -218,7 +219,7 @@ START_TEST(white_made_black_and_black_made_white_are_caught)
 }
 END_TEST
 
-START_TEST(wrong_winding_numbers_are_caught)
+START_TEST(test_verify_detects_wrong_winding_numbers)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     spot leaf = find_from(0, EBPO_LEAF);
@@ -241,19 +242,19 @@ START_TEST(wrong_winding_numbers_are_caught)
 }
 END_TEST
 
-START_TEST(another_rule_makes_black_cells_wrong)
+START_TEST(test_verify_detects_wrong_inside_rule)
 {
     ebpo_mesh mesh = ebpo_test_sphere((double[3]){ 0, 0, 0 }, 2, 3),
               inner = ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 3);
     ebpo_test_append(&mesh, &inner);
     ebpo_mesh_free(&inner);
-    build_mesh(&mesh, 8, EBPO_RULE_NONZERO, (ebpo_mend_record){ 0 });
+    build_mesh(&mesh, 8, EBPO_RULE_NONZERO, (ebpo_repair_record){ 0 });
     tree.info.rule = EBPO_RULE_EVENODD;
     expect_caught(EBPO_VERIFY_LABELS, "outside by the file's rule");
 }
 END_TEST
 
-/* Takes the last reference away from the first leaf that has one. */
+/* Removes the last reference from the first leaf that has one. */
 static void drop_reference(void)
 {
     for (int l = 0; l < tree.info.level_count; l++) {
@@ -272,7 +273,7 @@ static void drop_reference(void)
     }
 }
 
-START_TEST(face_missing_from_a_list_is_caught)
+START_TEST(test_verify_detects_missing_list_face)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     drop_reference();
@@ -280,7 +281,7 @@ START_TEST(face_missing_from_a_list_is_caught)
 }
 END_TEST
 
-START_TEST(leaf_and_white_exchanged_are_caught)
+START_TEST(test_verify_detects_swapped_leaf_and_white)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     for (int l = 1; l < tree.info.level_count; l++)
@@ -297,7 +298,7 @@ START_TEST(leaf_and_white_exchanged_are_caught)
 }
 END_TEST
 
-START_TEST(subtrees_in_the_wrong_place_are_caught)
+START_TEST(test_verify_detects_misplaced_subtrees)
 {
     build("torus", 8, EBPO_RULE_NONZERO);
     ebpo_level *level = &tree.level[tree.info.level_count - 1];
@@ -311,22 +312,22 @@ START_TEST(subtrees_in_the_wrong_place_are_caught)
 }
 END_TEST
 
-START_TEST(references_out_of_order_are_caught)
+START_TEST(test_verify_detects_unsorted_references)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     for (int l = 0; l < tree.info.level_count; l++)
         if (tree.level[l].ref_count && tree.level[l].leaf_ref_count[0] >= 2) {
             tree.level[l].leaf_refs[1] = tree.level[l].leaf_refs[0];
-            expect_caught(EBPO_VERIFY_STRUCTURE, "do not ascend");
+            expect_caught(EBPO_VERIFY_STRUCTURE, "are not ascending");
             return;
         }
     spot leaf = find_from(0, EBPO_LEAF);
     tree.level[leaf.level].leaf_refs[0] = UINT32_MAX;
-    expect_caught(EBPO_VERIFY_STRUCTURE, "do not ascend");
+    expect_caught(EBPO_VERIFY_STRUCTURE, "are not ascending");
 }
 END_TEST
 
-START_TEST(new_faces_in_the_wrong_leaf_are_caught)
+START_TEST(test_verify_detects_new_faces_in_wrong_leaf)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     for (int l = 0; l < tree.info.level_count; l++)
@@ -343,7 +344,7 @@ START_TEST(new_faces_in_the_wrong_leaf_are_caught)
 }
 END_TEST
 
-START_TEST(shifted_box_is_caught)
+START_TEST(test_verify_detects_shifted_box)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     tree.info.box_origin[1] += tree.info.box_size[1] / 16;
@@ -367,12 +368,12 @@ static void move_vertex(uint64_t i, double by)
     }
 }
 
-START_TEST(moved_vertex_is_caught)
+START_TEST(test_verify_detects_moved_vertex)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     move_vertex(7, 0.5);
     expect_caught(EBPO_VERIFY_LISTS, "face");
-    build("sphere", 1000000, EBPO_RULE_NONZERO); /* one leaf: only its planes can tell */
+    build("sphere", 1000000, EBPO_RULE_NONZERO); /* one leaf: only its planes are affected */
     shrink(&tree.level[0].leaf_planes[0], 2);
     expect_caught(EBPO_VERIFY_CONTAINMENT, "level 0");
     build("sphere", 8, EBPO_RULE_NONZERO);
@@ -381,7 +382,7 @@ START_TEST(moved_vertex_is_caught)
 }
 END_TEST
 
-START_TEST(turned_face_is_caught)
+START_TEST(test_verify_detects_flipped_face)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     ebpo_test_turn_face(&tree.mesh, 3);
@@ -394,7 +395,7 @@ START_TEST(turned_face_is_caught)
 }
 END_TEST
 
-START_TEST(head_that_contradicts_the_tree_is_caught)
+START_TEST(test_verify_detects_contradicting_header)
 {
     static const struct {
         size_t offset;
@@ -419,11 +420,12 @@ START_TEST(head_that_contradicts_the_tree_is_caught)
 }
 END_TEST
 
-START_TEST(leaves_and_gray_nodes_of_the_wrong_size_are_caught)
+START_TEST(test_verify_detects_wrong_node_sizes)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     tree.info.leaf_faces = 2;
-    expect_caught(EBPO_VERIFY_STRUCTURE, "more faces than a leaf above the maximum level may");
+    expect_caught(EBPO_VERIFY_STRUCTURE,
+                  "more faces than allowed for a leaf above the maximum level");
     build("sphere", 8, EBPO_RULE_NONZERO);
     tree.info.leaf_faces = 64;
     expect_caught(EBPO_VERIFY_STRUCTURE, "the node is gray");
@@ -433,7 +435,7 @@ START_TEST(leaves_and_gray_nodes_of_the_wrong_size_are_caught)
 }
 END_TEST
 
-START_TEST(surface_with_an_inside_is_caught)
+START_TEST(test_verify_detects_surface_with_inside)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     tree.info.solid = false;
@@ -446,7 +448,7 @@ START_TEST(surface_with_an_inside_is_caught)
 }
 END_TEST
 
-START_TEST(arrays_that_do_not_fit_together_are_caught)
+START_TEST(test_verify_detects_inconsistent_arrays)
 {
     build("sphere", 8, EBPO_RULE_NONZERO);
     tree.info.level_count--;
@@ -460,7 +462,7 @@ START_TEST(arrays_that_do_not_fit_together_are_caught)
     build("sphere", 8, EBPO_RULE_NONZERO);
     spot leaf = find_from(0, EBPO_LEAF);
     tree.level[leaf.level].leaf_first[0] = UINT64_MAX - 1;
-    expect_caught(EBPO_VERIFY_STRUCTURE, "its list leaves the faces");
+    expect_caught(EBPO_VERIFY_STRUCTURE, "its list exceeds the faces");
     build("sphere", 8, EBPO_RULE_NONZERO);
     spot gray = find_from(1, EBPO_GRAY);
     set_type(gray.level, gray.group, gray.octant, EBPO_WHITE);
@@ -468,7 +470,7 @@ START_TEST(arrays_that_do_not_fit_together_are_caught)
 }
 END_TEST
 
-START_TEST(sampled_labels_cover_every_level)
+START_TEST(test_verify_sampled_labels_cover_all_levels)
 {
     build("sphere", 1, EBPO_RULE_NONZERO);
     verify_with(1);
@@ -483,7 +485,7 @@ START_TEST(sampled_labels_cover_every_level)
 }
 END_TEST
 
-START_TEST(real_models_keep_their_promises)
+START_TEST(test_verify_real_models)
 {
     const char *folder = getenv("EBPO_MODELS");
     static const char *names[] = { "fertility",     "selfint_A",   "twin7081_right",
@@ -493,8 +495,8 @@ START_TEST(real_models_keep_their_promises)
         snprintf(path, sizeof path, "%s/%s.ply", folder, names[i]);
         ebpo_mesh mesh;
         if (ebpo_mesh_read(path, NULL, &mesh, NULL) != EBPO_OK)
-            continue; /* the folder may hold only some of them */
-        build_mesh(&mesh, 16, EBPO_RULE_NONZERO, (ebpo_mend_record){ 0 });
+            continue; /* the folder may contain only some of them */
+        build_mesh(&mesh, 16, EBPO_RULE_NONZERO, (ebpo_repair_record){ 0 });
         expect_fine(names[i]);
         ebpo_tree_free(&tree);
     }
@@ -505,29 +507,29 @@ TEST_SUITE(verify)
 {
     TCase *tests = tcase_create("verify");
     tcase_set_timeout(tests, 300);
-    tcase_add_test(tests, built_solids_keep_their_promises);
-    tcase_add_test(tests, every_kind_of_check_is_made);
-    tcase_add_test(tests, gray_plane_that_cuts_faces_is_caught);
-    tcase_add_test(tests, leaf_plane_that_cuts_faces_is_caught);
-    tcase_add_test(tests, plane_that_cuts_an_inside_corner_only_is_caught);
-    tcase_add_test(tests, code_that_stands_for_no_plane_is_caught);
-    tcase_add_test(tests, white_made_black_and_black_made_white_are_caught);
-    tcase_add_test(tests, wrong_winding_numbers_are_caught);
-    tcase_add_test(tests, another_rule_makes_black_cells_wrong);
-    tcase_add_test(tests, face_missing_from_a_list_is_caught);
-    tcase_add_test(tests, leaf_and_white_exchanged_are_caught);
-    tcase_add_test(tests, subtrees_in_the_wrong_place_are_caught);
-    tcase_add_test(tests, references_out_of_order_are_caught);
-    tcase_add_test(tests, new_faces_in_the_wrong_leaf_are_caught);
-    tcase_add_test(tests, shifted_box_is_caught);
-    tcase_add_test(tests, moved_vertex_is_caught);
-    tcase_add_test(tests, turned_face_is_caught);
-    tcase_add_test(tests, head_that_contradicts_the_tree_is_caught);
-    tcase_add_test(tests, leaves_and_gray_nodes_of_the_wrong_size_are_caught);
-    tcase_add_test(tests, surface_with_an_inside_is_caught);
-    tcase_add_test(tests, arrays_that_do_not_fit_together_are_caught);
-    tcase_add_test(tests, sampled_labels_cover_every_level);
-    tcase_add_test(tests, real_models_keep_their_promises);
+    tcase_add_test(tests, test_verify_built_solids);
+    tcase_add_test(tests, test_verify_runs_every_check);
+    tcase_add_test(tests, test_verify_detects_gray_plane_cutting_faces);
+    tcase_add_test(tests, test_verify_detects_leaf_plane_cutting_faces);
+    tcase_add_test(tests, test_verify_detects_plane_cutting_corner);
+    tcase_add_test(tests, test_verify_detects_code_without_plane);
+    tcase_add_test(tests, test_verify_detects_swapped_black_and_white);
+    tcase_add_test(tests, test_verify_detects_wrong_winding_numbers);
+    tcase_add_test(tests, test_verify_detects_wrong_inside_rule);
+    tcase_add_test(tests, test_verify_detects_missing_list_face);
+    tcase_add_test(tests, test_verify_detects_swapped_leaf_and_white);
+    tcase_add_test(tests, test_verify_detects_misplaced_subtrees);
+    tcase_add_test(tests, test_verify_detects_unsorted_references);
+    tcase_add_test(tests, test_verify_detects_new_faces_in_wrong_leaf);
+    tcase_add_test(tests, test_verify_detects_shifted_box);
+    tcase_add_test(tests, test_verify_detects_moved_vertex);
+    tcase_add_test(tests, test_verify_detects_flipped_face);
+    tcase_add_test(tests, test_verify_detects_contradicting_header);
+    tcase_add_test(tests, test_verify_detects_wrong_node_sizes);
+    tcase_add_test(tests, test_verify_detects_surface_with_inside);
+    tcase_add_test(tests, test_verify_detects_inconsistent_arrays);
+    tcase_add_test(tests, test_verify_sampled_labels_cover_all_levels);
+    tcase_add_test(tests, test_verify_real_models);
     Suite *suite = suite_create("verify");
     suite_add_tcase(suite, tests);
     return suite;

@@ -1,5 +1,5 @@
 /* The verifier on files: with and without their parts, against their source and against another
- * one, whole and damaged. */
+ * one, intact and damaged. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,7 +29,7 @@ static void leave(void)
     scratch_leave();
 }
 
-/* A mesh whose vertices repeat, with a hole and turned faces: all mending has something to do. */
+/* A mesh with repeated vertices, a hole and reversed faces: every repair changes something. */
 static ebpo_mesh worn_mesh(void)
 {
     ebpo_mesh mesh = ebpo_test_make("sphere");
@@ -40,17 +40,17 @@ static ebpo_mesh worn_mesh(void)
     return mesh;
 }
 
-/* Builds and writes a file of a copy-like second mesh (makers are deterministic), mended as asked.
+/* Builds and writes a file of an equal second mesh (makers are deterministic), repaired on request.
  */
-static void write_file(ebpo_mesh mesh, bool mended, uint32_t parts)
+static void write_file(ebpo_mesh mesh, bool was_repaired, uint32_t parts)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mend_record mend = { 0 };
-    if (mended) {
-        mend.weld = mend.orient = mend.fill_holes = true;
-        ck_assert(ebpo_mesh_weld(&mesh, &mend, &error) == EBPO_OK);
-        ck_assert(ebpo_mesh_orient(&mesh, &mend, &error) == EBPO_OK);
-        ck_assert(ebpo_mesh_fill_holes(&mesh, &mend, &error) == EBPO_OK);
+    ebpo_repair_record repair_record = { 0 };
+    if (was_repaired) {
+        repair_record.weld = repair_record.orient = repair_record.fill_holes = true;
+        ck_assert(ebpo_mesh_weld(&mesh, &repair_record, &error) == EBPO_OK);
+        ck_assert(ebpo_mesh_orient(&mesh, &repair_record, &error) == EBPO_OK);
+        ck_assert(ebpo_mesh_fill_holes(&mesh, &repair_record, &error) == EBPO_OK);
     }
     ebpo_mesh_report facts;
     ck_assert(ebpo_mesh_check(&mesh, 1, (ebpo_progress){ 0 }, &facts, &error) == EBPO_OK);
@@ -59,15 +59,15 @@ static void write_file(ebpo_mesh mesh, bool mended, uint32_t parts)
     options.threads = 1;
     options.parts |= EBPO_PART_LEAF_PLANES;
     ebpo_tree tree;
-    ck_assert_msg(ebpo_build(&mesh, &facts, &mend, &options, &tree, &error) == EBPO_OK, "%s",
-                  error.message);
+    ck_assert_msg(ebpo_build(&mesh, &facts, &repair_record, &options, &tree, &error) == EBPO_OK,
+                  "%s", error.message);
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     write.parts = parts;
     ck_assert_msg(ebpo_tree_write(&tree, path, &write, &error) == EBPO_OK, "%s", error.message);
     ebpo_tree_free(&tree);
 }
 
-/* False when the file cannot even be opened. */
+/* Returns false when the file cannot even be opened. */
 static bool verify_against(const ebpo_mesh *source)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -91,7 +91,7 @@ static void expect_fine(const ebpo_mesh *source)
     ck_assert_uint_gt(report.content.checks, 0);
 }
 
-START_TEST(file_equals_its_source_after_mending)
+START_TEST(test_verify_file_against_repaired_source)
 {
     ebpo_mesh source = worn_mesh();
     write_file(worn_mesh(), true, ~0u);
@@ -101,7 +101,7 @@ START_TEST(file_equals_its_source_after_mending)
 }
 END_TEST
 
-START_TEST(file_without_maps_equals_its_source_as_a_set)
+START_TEST(test_verify_file_without_maps_as_set)
 {
     ebpo_mesh source = worn_mesh();
     write_file(worn_mesh(), true, EBPO_PART_MESH | EBPO_PART_PLANES);
@@ -111,7 +111,7 @@ START_TEST(file_without_maps_equals_its_source_as_a_set)
 }
 END_TEST
 
-START_TEST(files_without_parts_keep_what_they_promise)
+START_TEST(test_verify_files_without_parts)
 {
     static const uint32_t parts[] = { EBPO_PART_PLANES, EBPO_PART_MESH,
                                       EBPO_PART_MESH | EBPO_PART_LEAF_PLANES, 0 };
@@ -122,7 +122,7 @@ START_TEST(files_without_parts_keep_what_they_promise)
 }
 END_TEST
 
-START_TEST(another_source_is_noticed_down_to_the_sign_of_zero)
+START_TEST(test_verify_detects_other_source)
 {
     static const uint32_t parts[] = { ~0u, EBPO_PART_MESH | EBPO_PART_PLANES };
     for (int i = 0; i < 2; i++) {
@@ -160,7 +160,7 @@ START_TEST(another_source_is_noticed_down_to_the_sign_of_zero)
 END_TEST
 
 /* A file whose coordinates an earlier version rounded, which is no damage. */
-START_TEST(rounded_coordinates_of_an_earlier_version_are_named)
+START_TEST(test_verify_names_coordinates_of_old_version)
 {
     ebpo_mesh source = ebpo_test_make("box_subdivided"), rounded = ebpo_test_make("box_subdivided");
     rounded.xyz32 = malloc(rounded.vertex_count * 3 * sizeof *rounded.xyz32);
@@ -174,16 +174,16 @@ START_TEST(rounded_coordinates_of_an_earlier_version_are_named)
     ck_assert(report.source.violations == 1 && report.violations == 1);
     ck_assert_str_eq(report.source.first, "coordinates were rounded to single precision by an "
                                           "earlier version; convert again");
-    strcpy(source.source_format, "ply-ascii"); /* these kept what their header says */
+    strcpy(source.source_format, "ply-ascii"); /* these kept the text of their header */
     ck_assert(verify_against(&source));
     ck_assert(strstr(report.source.first, "different kinds of coordinates") != NULL);
     ebpo_mesh_free(&source);
 }
 END_TEST
 
-/* Flips a bit of the arrays here and there (libhdf5 leaks memory of its own when its head is
- * damaged): a finding, or a byte that means nothing, but never a crash and never a failed call. */
-START_TEST(damaged_files_are_findings_and_not_failures)
+/* Flips bits of the arrays (libhdf5 leaks memory when its header is damaged): a finding, or an
+ * unused byte, but never a crash and never a failed call. */
+START_TEST(test_verify_reports_damage_as_findings)
 {
     write_file(ebpo_test_make("sphere"), false, ~0u);
     ebpo_file *file;
@@ -219,7 +219,7 @@ static bool stop_at_once(void *user, const char *stage, uint64_t done, uint64_t 
     return false;
 }
 
-START_TEST(verifying_needs_a_file_and_may_be_stopped)
+START_TEST(test_verify_validation_and_cancel)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert(ebpo_verify(NULL, NULL, &report, &error) == EBPO_E_ARGUMENT);
@@ -243,8 +243,8 @@ static bool stop_at_unused(void *user, const char *stage, uint64_t done, uint64_
     return strcmp(stage, "looking at unused bytes") != 0;
 }
 
-/* As sparse files may have without taking space. */
-START_TEST(looking_at_unused_bytes_may_be_stopped)
+/* As in sparse files, which take no space. */
+START_TEST(test_verify_unused_bytes_and_cancel)
 {
     enum { UNUSED = 1 << 20 };
     ebpo_error error = EBPO_ERROR_INIT;
@@ -268,14 +268,14 @@ TEST_SUITE(verify_file)
     TCase *tests = tcase_create("verify file");
     tcase_set_timeout(tests, 300);
     tcase_add_checked_fixture(tests, enter, leave);
-    tcase_add_test(tests, file_equals_its_source_after_mending);
-    tcase_add_test(tests, file_without_maps_equals_its_source_as_a_set);
-    tcase_add_test(tests, files_without_parts_keep_what_they_promise);
-    tcase_add_test(tests, another_source_is_noticed_down_to_the_sign_of_zero);
-    tcase_add_test(tests, rounded_coordinates_of_an_earlier_version_are_named);
-    tcase_add_test(tests, damaged_files_are_findings_and_not_failures);
-    tcase_add_test(tests, verifying_needs_a_file_and_may_be_stopped);
-    tcase_add_test(tests, looking_at_unused_bytes_may_be_stopped);
+    tcase_add_test(tests, test_verify_file_against_repaired_source);
+    tcase_add_test(tests, test_verify_file_without_maps_as_set);
+    tcase_add_test(tests, test_verify_files_without_parts);
+    tcase_add_test(tests, test_verify_detects_other_source);
+    tcase_add_test(tests, test_verify_names_coordinates_of_old_version);
+    tcase_add_test(tests, test_verify_reports_damage_as_findings);
+    tcase_add_test(tests, test_verify_validation_and_cancel);
+    tcase_add_test(tests, test_verify_unused_bytes_and_cancel);
     Suite *suite = suite_create("verify file");
     suite_add_tcase(suite, tests);
     return suite;

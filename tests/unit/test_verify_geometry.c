@@ -1,5 +1,5 @@
-/* The verifier's own geometry: floating-point answers against rationals, rays against the library's
- * crossings, the certificates against clipping. */
+/* The geometry of the verifier: floating-point results against rationals, rays against the
+ * crossings of the library, the certificates against clipping. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -23,8 +23,8 @@ static ebpo_cell some_cell(uint64_t *state)
     return cell;
 }
 
-/* Coordinates near the cell; often exactly on its walls, corners and middle, so that every kind of
- * contact comes up. */
+/* Coordinates near the cell; often exactly on its faces, corners and middle, so that every kind of
+ * contact occurs. */
 static double some_coordinate(const ebpo_frame *frame, int k, uint64_t *state)
 {
     double size = frame->high[k] - frame->low[k];
@@ -48,7 +48,7 @@ static ebpo_corners some_face(const ebpo_frame *frame, uint64_t *state)
     return face;
 }
 
-START_TEST(touching_agrees_with_rationals)
+START_TEST(test_face_cell_contact_matches_rational)
 {
     uint64_t state = 1;
     int touching = 0;
@@ -66,12 +66,12 @@ START_TEST(touching_agrees_with_rationals)
 }
 END_TEST
 
-START_TEST(contact_in_one_point_is_touching_and_next_to_it_is_not)
+START_TEST(test_single_point_contact_is_contact)
 {
     const ebpo_box unit = { { 0, 0, 0 }, { 1, 1, 1 }, 20 };
     ebpo_frame frame = ebpo_frame_make(&unit, (ebpo_cell){ 0, { 0, 0, 0 } });
     ebpo_tally tally = { 0 };
-    /* An edge through the cell's upper corner, the rest outside. */
+    /* An edge through the upper corner of the cell, the rest outside. */
     ebpo_corners face = { { { 0.5, 1.5, 1 }, { 1.5, 0.5, 1 }, { 1.5, 1.5, 1.75 } } };
     ck_assert(ebpo_face_touches(&frame, &face, &tally));
     face.at[0][0] += 0x1p-50;
@@ -81,8 +81,8 @@ START_TEST(contact_in_one_point_is_touching_and_next_to_it_is_not)
 }
 END_TEST
 
-/* Counts through the checking function, against clipping in rationals. */
-START_TEST(half_space_certificates_agree_with_rationals)
+/* Counts through the checking function, compared with clipping in rationals. */
+START_TEST(test_half_space_certificates_match_rational)
 {
     uint64_t state = 2;
     int kept = 0, all = 0;
@@ -101,8 +101,8 @@ START_TEST(half_space_certificates_agree_with_rationals)
             planes.n[0][k] = planes.normal[0][k];
         planes.bound[0] = planes.d[0] / 4096.0;
         uint64_t before = tally.violations[EBPO_VERIFY_CONTAINMENT];
-        ebpo_check_face_contained(&tally, &planes, &(ebpo_twin_node){ .code = 1 }, &frame, &face,
-                                  0);
+        ebpo_check_face_contained(&tally, &planes, &(ebpo_reference_node){ .code = 1 }, &frame,
+                                  &face, 0);
         bool exact =
             ebpo_exact_half_space(frame.low, frame.high, &face, planes.normal[0], planes.d[0]);
         ck_assert_int_eq(tally.violations[EBPO_VERIFY_CONTAINMENT] == before, exact);
@@ -114,7 +114,7 @@ START_TEST(half_space_certificates_agree_with_rationals)
 }
 END_TEST
 
-START_TEST(plane_through_the_highest_point_keeps_it_and_one_step_less_does_not)
+START_TEST(test_plane_through_highest_point_keeps_it)
 {
     const ebpo_box unit = { { 0, 0, 0 }, { 1, 1, 1 }, 20 };
     ebpo_frame frame = ebpo_frame_make(&unit, (ebpo_cell){ 0, { 0, 0, 0 } });
@@ -170,7 +170,7 @@ static void check_rays(const char *name)
     ebpo_mesh_free(&mesh);
 }
 
-START_TEST(rays_along_all_axes_agree_also_through_vertices_and_edges)
+START_TEST(test_axis_rays_agree_at_vertices)
 {
     for (int i = 0; i < ebpo_test_solid_count; i++)
         if (ebpo_test_solids[i].balanced)
@@ -182,11 +182,11 @@ TEST_SUITE(verify_geometry)
 {
     TCase *tests = tcase_create("verify geometry");
     tcase_set_timeout(tests, 300);
-    tcase_add_test(tests, touching_agrees_with_rationals);
-    tcase_add_test(tests, contact_in_one_point_is_touching_and_next_to_it_is_not);
-    tcase_add_test(tests, half_space_certificates_agree_with_rationals);
-    tcase_add_test(tests, plane_through_the_highest_point_keeps_it_and_one_step_less_does_not);
-    tcase_add_test(tests, rays_along_all_axes_agree_also_through_vertices_and_edges);
+    tcase_add_test(tests, test_face_cell_contact_matches_rational);
+    tcase_add_test(tests, test_single_point_contact_is_contact);
+    tcase_add_test(tests, test_half_space_certificates_match_rational);
+    tcase_add_test(tests, test_plane_through_highest_point_keeps_it);
+    tcase_add_test(tests, test_axis_rays_agree_at_vertices);
     Suite *suite = suite_create("verify geometry");
     suite_add_tcase(suite, tests);
     return suite;

@@ -1,4 +1,4 @@
-/* The verifier on the part `subtrees`: every number of it is changed, and named. */
+/* The verifier on the part `subtrees`: every number is changed, and the change is reported. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,7 +36,7 @@ static void write_model(ebpo_mesh mesh, uint32_t parts, uint64_t subtree_faces)
     model_write(&tree, path, &write);
 }
 
-/* False when the file cannot be opened. */
+/* Returns false when the file cannot be opened. */
 static bool verify_memory(const changeable *c)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -68,7 +68,7 @@ static void expect_named(changeable *c, ebpo_array_id id, uint64_t item, uint64_
     changeable_put(c, id, item, before);
 }
 
-/* Of arrays with many numbers, some of each column. */
+/* For arrays with many numbers, some of each column. */
 static void change_array(changeable *c, ebpo_array_id id, uint64_t step)
 {
     uint64_t count = changeable_count(c, id);
@@ -83,7 +83,7 @@ static void change_array(changeable *c, ebpo_array_id id, uint64_t step)
 
 static uint64_t steps(uint64_t count) { return (uint64_t)((double)count / ebpo_test_scale()); }
 
-START_TEST(every_number_of_the_table_is_counted_anew)
+START_TEST(test_verify_recounts_subtree_table)
 {
     changeable c;
     write_model(ebpo_test_torus(2, 0.7, 60, 40), ~0u, _i ? 8 : 200);
@@ -91,13 +91,13 @@ START_TEST(every_number_of_the_table_is_counted_anew)
     expect_fine(&c);
     change_array(&c, EBPO_A_SUBTREE_INDEX, steps(1));
     change_array(&c, EBPO_A_SUBTREE_COUNTS, steps(53));
-    change_array(&c, EBPO_A_SUBTREE_OUTER, steps(31));
+    change_array(&c, EBPO_A_SUBTREE_SHARED, steps(31));
     changeable_free(&c);
 }
 END_TEST
 
-/* The reader refuses some of them by itself. */
-START_TEST(every_place_is_compared_with_the_index)
+/* The reader itself refuses some of them. */
+START_TEST(test_verify_subtree_offsets_against_index)
 {
     changeable c;
     write_model(ebpo_test_torus(2, 0.7, 60, 40), ~0u, 8);
@@ -113,25 +113,25 @@ START_TEST(every_place_is_compared_with_the_index)
 }
 END_TEST
 
-START_TEST(every_sum_is_compared_with_its_chunk)
+START_TEST(test_verify_chunk_checksums)
 {
     changeable c;
     write_model(ebpo_test_torus(2, 0.7, 60, 40), ~0u, 8);
     changeable_load(&c, path);
     expect_fine(&c);
-    uint64_t count = changeable_count(&c, EBPO_A_CHUNK_SUMS);
+    uint64_t count = changeable_count(&c, EBPO_A_CHUNK_CHECKSUMS);
     for (uint64_t i = 0; i < count; i += steps(23)) {
-        uint64_t sum = changeable_get(&c, EBPO_A_CHUNK_SUMS, i);
-        expect_named(&c, EBPO_A_CHUNK_SUMS, i, sum + 1);
-        expect_named(&c, EBPO_A_CHUNK_SUMS, i, sum ^ UINT64_C(1) << 32);
-        expect_named(&c, EBPO_A_CHUNK_SUMS, i, UINT64_C(63) << 32);
+        uint64_t sum = changeable_get(&c, EBPO_A_CHUNK_CHECKSUMS, i);
+        expect_named(&c, EBPO_A_CHUNK_CHECKSUMS, i, sum + 1);
+        expect_named(&c, EBPO_A_CHUNK_CHECKSUMS, i, sum ^ UINT64_C(1) << 32);
+        expect_named(&c, EBPO_A_CHUNK_CHECKSUMS, i, UINT64_C(63) << 32);
     }
     changeable_free(&c);
 }
 END_TEST
 
-/* Rows of the list in another order, whose sizes agree. */
-START_TEST(chunks_that_have_changed_places_are_noticed)
+/* Rows of the list in another order, with equal sizes. */
+START_TEST(test_verify_detects_swapped_chunks)
 {
     changeable c;
     unsigned found = 0;
@@ -153,7 +153,7 @@ START_TEST(chunks_that_have_changed_places_are_noticed)
 }
 END_TEST
 
-START_TEST(without_parts_the_table_holds_too)
+START_TEST(test_verify_subtree_table_without_parts)
 {
     static const uint32_t parts[] = { EBPO_PART_PLANES, EBPO_PART_MESH,
                                       EBPO_PART_MESH | EBPO_PART_LEAF_PLANES,
@@ -167,7 +167,7 @@ START_TEST(without_parts_the_table_holds_too)
 }
 END_TEST
 
-START_TEST(subsets_have_rows_for_pruned_nodes)
+START_TEST(test_verify_subset_rows_of_pruned_nodes)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_subset_options subset = EBPO_SUBSET_OPTIONS_INIT;
@@ -198,12 +198,12 @@ TEST_SUITE(verify_subtrees)
     TCase *tests = tcase_create("verify_subtrees");
     tcase_set_timeout(tests, 600);
     tcase_add_checked_fixture(tests, enter, scratch_leave);
-    tcase_add_loop_test(tests, every_number_of_the_table_is_counted_anew, 0, 2);
-    tcase_add_test(tests, every_place_is_compared_with_the_index);
-    tcase_add_test(tests, every_sum_is_compared_with_its_chunk);
-    tcase_add_test(tests, chunks_that_have_changed_places_are_noticed);
-    tcase_add_loop_test(tests, without_parts_the_table_holds_too, 0, 4);
-    tcase_add_loop_test(tests, subsets_have_rows_for_pruned_nodes, 0, 2);
+    tcase_add_loop_test(tests, test_verify_recounts_subtree_table, 0, 2);
+    tcase_add_test(tests, test_verify_subtree_offsets_against_index);
+    tcase_add_test(tests, test_verify_chunk_checksums);
+    tcase_add_test(tests, test_verify_detects_swapped_chunks);
+    tcase_add_loop_test(tests, test_verify_subtree_table_without_parts, 0, 4);
+    tcase_add_loop_test(tests, test_verify_subset_rows_of_pruned_nodes, 0, 2);
     suite_add_tcase(suite, tests);
     return suite;
 }

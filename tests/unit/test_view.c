@@ -1,5 +1,5 @@
-/* Nodes in the order of an observer: against the ordinary stream, and against plain twins of every
- * key. */
+/* Nodes in the order of an observer: against the ordinary stream, and against reference
+ * implementations of every key. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,7 +23,7 @@ static void make_folder(void)
     path = scratch("x.ebpo.h5");
 }
 
-enum { USUAL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS, PRIORITIES = 4 };
+enum { DEFAULT = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS, PRIORITIES = 4 };
 
 /* --- files --- */
 
@@ -43,11 +43,12 @@ static void write_random(int levels, unsigned gray_share, bool windings, bool le
 
 static ebpo_file *open_solid(const char *name, uint32_t leaf_faces)
 {
-    write_solid(ebpo_test_make(name), USUAL | EBPO_PART_LEAF_PLANES, leaf_faces);
+    write_solid(ebpo_test_make(name), DEFAULT | EBPO_PART_LEAF_PLANES, leaf_faces);
     return model_open(path);
 }
 
-/* --- the twin: all nodes by the ordinary stream, and keys computed plainly --- */
+/* --- the reference implementation: all nodes by the ordinary stream, and simple computation of
+ * keys --- */
 
 typedef struct record {
     uint64_t octcode;
@@ -159,8 +160,8 @@ static double plain_dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Of the walls of the view, how far the cell reaches into the one beyond which it lies most:
- * negative means unseen. Relative to the distances. */
+/* Returns how far the cell extends into the half-space of the view in which it is least: negative
+ * means invisible. Relative to the distances. */
 static double plain_reach(const ebpo_observer *o, const record *r)
 {
     double right[3], up[3], least = INFINITY, length = sqrt(plain_dot(o->direction, o->direction));
@@ -170,7 +171,7 @@ static double plain_reach(const ebpo_observer *o, const record *r)
     plain_cross(right, o->direction, up);
     double right_length = sqrt(plain_dot(right, right)), up_length = sqrt(plain_dot(up, up)),
            tangent = tan(o->fov * M_PI / 360);
-    for (int wall = 0; wall < 5; wall++) {
+    for (int cell_face = 0; cell_face < 5; cell_face++) {
         double most = -INFINITY, away = 0;
         for (int corner = 0; corner < 8; corner++) {
             double p[3];
@@ -180,7 +181,7 @@ static double plain_reach(const ebpo_observer *o, const record *r)
                    x = plain_dot(p, right) / right_length, y = plain_dot(p, up) / up_length;
             double wide = depth * tangent * o->width / o->height, high = depth * tangent;
             const double reach[5] = { wide - x, wide + x, high - y, high + y, depth };
-            most = fmax(most, reach[wall]);
+            most = fmax(most, reach[cell_face]);
             away = fmax(away, sqrt(plain_dot(p, p)));
         }
         least = fmin(least, most / away);
@@ -188,11 +189,11 @@ static double plain_reach(const ebpo_observer *o, const record *r)
     return least;
 }
 
-/* Of two cells that do not meet inside: does a ray from the eye pass a and then b? Cells are boxes,
- * so one coordinate at which they are apart decides against it, and if the nearer side is b's on no
- * axis, a is never behind. Sampled with rays: */
-static bool ray_meets(const double eye[3], const double direction[3], const record *r, double *in,
-                      double *out)
+/* Decides for two cells with disjoint interiors whether a ray from the eye passes a and then b.
+ * Cells are boxes, so one separating coordinate decides against it, and if the nearer side belongs
+ * to b on no axis, a is never behind. Sampled with rays: */
+static bool ray_intersects(const double eye[3], const double direction[3], const record *r,
+                           double *in, double *out)
 {
     *in = 0;
     *out = INFINITY;
@@ -253,7 +254,7 @@ static ebpo_view_end next(ebpo_view_stream *stream, ebpo_view_node *node)
     return end;
 }
 
-/* What a viewer keeps: which nodes have come, and which stand for the model. */
+/* State of a viewer: received nodes, and nodes that represent the model. */
 typedef struct viewer {
     const records *all;
     const ebpo_observer *observer;
@@ -292,7 +293,7 @@ static bool wanted(const viewer *v, uint64_t i)
            (o->unseen == EBPO_UNSEEN_LAST || v->seen[i]);
 }
 
-/* The least is to come first; those that are equal but for rounding may come in any order. */
+/* The minimum must come first; keys that are equal up to rounding may come in any order. */
 static double plain_key(const viewer *v, uint64_t i)
 {
     const record *r = &v->all->at[i];
@@ -304,7 +305,7 @@ static double plain_key(const viewer *v, uint64_t i)
     }
 }
 
-/* `parent` is about to be refined: none that should come before it may be waiting. */
+/* `parent` is about to be refined: no earlier one may be pending. */
 static void expect_first(const viewer *v, uint64_t parent)
 {
     double key = plain_key(v, parent);
@@ -362,9 +363,9 @@ static void take(viewer *v, const ebpo_view_node *n, bool check_order)
 
 typedef struct cutter {
     const viewer *v;
-    uint8_t *met;
+    uint8_t *intersected;
     uint64_t count, types[4];
-    double share; /* of the root cell; exact */
+    double share; /* share of the root cell; exact */
     const double *ray;
     double last_in;
     uint64_t stop;
@@ -376,11 +377,11 @@ static bool visit(void *user, const ebpo_view_node *n)
     uint64_t i = find(c->v->all, n->node.octcode);
     record r = record_of(&n->node);
     double in, out;
-    ck_assert(same(&r, &c->v->all->at[i]) && n->complete && c->v->in_cut[i] && !c->met[i]);
-    c->met[i] = 1;
+    ck_assert(same(&r, &c->v->all->at[i]) && n->complete && c->v->in_cut[i] && !c->intersected[i]);
+    c->intersected[i] = 1;
     c->types[n->node.type]++;
     c->share += ldexp(1, -3 * n->level);
-    if (c->ray && ray_meets(c->v->observer->eye, c->ray, &r, &in, &out)) {
+    if (c->ray && ray_intersects(c->v->observer->eye, c->ray, &r, &in, &out)) {
         ck_assert_msg(in >= c->last_in, "the cut is not front to back");
         c->last_in = out - 1e-9 * (1 + out);
     }
@@ -393,20 +394,21 @@ static void random_ray(uint64_t *random, double out[3])
         out[k] = ebpo_test_random_unit(random) - 0.5 + 1e-6;
 }
 
-/* Covers the root cell once, and is what a viewer keeps who does as the header says. */
+/* Checks that it covers the root cell once, and equals the cut of a viewer that follows the header.
+ */
 static void expect_cut(const viewer *v, ebpo_view_stream *stream, uint64_t *random)
 {
     double ray[3];
     random_ray(random, ray);
-    cutter c = { .v = v, .met = calloc(v->all->count, 1), .ray = v->observer ? ray : NULL };
+    cutter c = { .v = v, .intersected = calloc(v->all->count, 1), .ray = v->observer ? ray : NULL };
     uint64_t kept = 0;
     ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
     ebpo_view_stream_cut(stream, visit, &c);
     for (uint64_t i = 0; i < v->all->count; i++)
         kept += v->in_cut[i];
     ck_assert_uint_eq(c.count, kept);
-    /* different cells that cover as much as the root, none within another as all are in the
-     * viewer's cut: */
+    /* different cells that cover as much as the root, none within another as all are in the cut of
+     * the viewer: */
     ck_assert(c.share == (v->count ? 1 : 0));
     ebpo_view_stream_get_stats(stream, &stats);
     uint64_t waiting = 0;
@@ -425,13 +427,13 @@ static void expect_cut(const viewer *v, ebpo_view_stream *stream, uint64_t *rand
     ck_assert_uint_eq(stats.waiting, waiting);
     ck_assert(v->observer ? stats.pixels == pixels || fabs(stats.pixels - pixels) < 1e-9 * pixels
                           : isnan(stats.pixels));
-    if (c.count > 2) { /* one may stop */
-        cutter some = { .v = v, .met = calloc(v->all->count, 1), .stop = c.count / 2 };
+    if (c.count > 2) { /* early stop is allowed */
+        cutter some = { .v = v, .intersected = calloc(v->all->count, 1), .stop = c.count / 2 };
         ebpo_view_stream_cut(stream, visit, &some);
         ck_assert_uint_eq(some.count, c.count / 2);
-        free(some.met);
+        free(some.intersected);
     }
-    free(c.met);
+    free(c.intersected);
 }
 
 /* --- tests --- */
@@ -459,14 +461,14 @@ static void expect_whole(ebpo_file *file, ebpo_priority priority, const ebpo_obs
     ebpo_view_stream_free(stream);
 }
 
-START_TEST(an_exhausted_stream_has_all_nodes_in_order_and_a_cut_at_any_time)
+START_TEST(test_view_stream_visits_all_nodes)
 {
     if (!ebpo_test_wanted(_i))
         return;
     uint64_t random = 11 + (uint64_t)_i;
     for (int variant = 0; variant < 2; variant++) {
-        write_solid(ebpo_test_solids[_i].make(), variant ? USUAL | EBPO_PART_LEAF_PLANES : USUAL,
-                    4);
+        write_solid(ebpo_test_solids[_i].make(),
+                    variant ? DEFAULT | EBPO_PART_LEAF_PLANES : DEFAULT, 4);
         ebpo_file *file = model_open(path);
         for (int priority = 0; priority < PRIORITIES; priority++) {
             ebpo_observer observer = observer_of(file, &random);
@@ -479,7 +481,7 @@ START_TEST(an_exhausted_stream_has_all_nodes_in_order_and_a_cut_at_any_time)
 }
 END_TEST
 
-START_TEST(trees_of_several_chunks_come_whole_too)
+START_TEST(test_view_of_multi_chunk_trees)
 {
     uint64_t random = 5 + (uint64_t)_i;
     write_random(_i == 0 ? 8 : 5, 13, _i != 0, true); /* 8 levels: several chunks in most arrays */
@@ -499,7 +501,7 @@ static bool add_share(void *user, const ebpo_view_node *n)
 }
 
 /* Nothing is known below a pruned node: it stays, as nothing else covers its cell. */
-START_TEST(pruned_nodes_of_subsets_stay_in_the_cut)
+START_TEST(test_view_cut_keeps_pruned_subset_nodes)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t random = 3, pruned = 0;
@@ -545,9 +547,9 @@ START_TEST(pruned_nodes_of_subsets_stay_in_the_cut)
 }
 END_TEST
 
-/* For any ray from the eye: cells that it passes are refined in the order in which it meets them,
- * each with all that is below it. */
-START_TEST(refining_front_to_back_follows_every_ray)
+/* For any ray from the eye: cells on the ray are refined in the order of the ray, each with all
+ * nodes below it. */
+START_TEST(test_view_front_to_back_follows_rays)
 {
     uint64_t random = 77 + (uint64_t)_i;
     ebpo_file *file = open_solid(_i % 2 ? "torus" : "blob", 2);
@@ -563,17 +565,17 @@ START_TEST(refining_front_to_back_follows_every_ray)
     uint64_t pairs = 0;
     for (int ray = 0; ray < 200; ray++) {
         double direction[3], in[2], out[2];
-        for (int k = 0; k < 3; k++) /* through a random place in the root cell */
+        for (int k = 0; k < 3; k++) /* through a random point in the root cell */
             direction[k] = all.at[0].min[k] +
                            ebpo_test_random_unit(&random) * (all.at[0].max[k] - all.at[0].min[k]) -
                            observer.eye[k];
         for (uint64_t a = 0; a < v.refined; a++) {
-            if (!ray_meets(observer.eye, direction, &all.at[find(&all, v.order[a])], &in[0],
-                           &out[0]))
+            if (!ray_intersects(observer.eye, direction, &all.at[find(&all, v.order[a])], &in[0],
+                                &out[0]))
                 continue;
             for (uint64_t b = a + 1; b < v.refined; b++) /* later, so not before a */
-                if (ray_meets(observer.eye, direction, &all.at[find(&all, v.order[b])], &in[1],
-                              &out[1])) {
+                if (ray_intersects(observer.eye, direction, &all.at[find(&all, v.order[b])], &in[1],
+                                   &out[1])) {
                     ck_assert_msg(out[1] > in[0] + 1e-9 * (1 + in[0]),
                                   "%llu is in front of %llu, and comes later",
                                   (unsigned long long)v.order[b], (unsigned long long)v.order[a]);
@@ -589,8 +591,8 @@ START_TEST(refining_front_to_back_follows_every_ray)
 }
 END_TEST
 
-/* What thresholds leave out, computed from all nodes. */
-START_TEST(what_is_small_far_deep_or_unseen_is_not_refined)
+/* Nodes excluded by thresholds, computed from all nodes. */
+START_TEST(test_view_thresholds_stop_refinement)
 {
     uint64_t random = 300 + (uint64_t)_i;
     ebpo_file *file = open_solid("torus", 2);
@@ -623,7 +625,7 @@ START_TEST(what_is_small_far_deep_or_unseen_is_not_refined)
 }
 END_TEST
 
-START_TEST(an_observer_who_moves_changes_what_comes_next)
+START_TEST(test_view_moving_observer_changes_order)
 {
     uint64_t random = 900 + (uint64_t)_i;
     ebpo_file *file = open_solid(_i % 2 ? "cavity" : "torus", 2);
@@ -636,7 +638,7 @@ START_TEST(an_observer_who_moves_changes_what_comes_next)
     while (next(stream, &node) == EBPO_VIEW_NODE) {
         take(&v, &node, true);
         if (ebpo_test_random(&random) % 60 ||
-            v.siblings) /* a change within a group is looked at below */
+            v.siblings) /* a change within a group is tested below */
             continue;
         observer = observer_of(file, &random);
         options.priority = (ebpo_priority)(ebpo_test_random(&random) % PRIORITIES);
@@ -667,19 +669,19 @@ START_TEST(an_observer_who_moves_changes_what_comes_next)
 }
 END_TEST
 
-/* The octcodes of a stream to its end. */
+/* Returns the octcodes of a stream to its end. */
 static uint64_t *sequence(ebpo_view_stream *stream, uint64_t *count, ebpo_view_end *end)
 {
-    uint64_t room = 1024, *out = malloc(room * sizeof *out);
+    uint64_t space = 1024, *out = malloc(space * sizeof *out);
     ebpo_view_node node;
     for (*count = 0; (*end = next(stream, &node)) == EBPO_VIEW_NODE;
          out[(*count)++] = node.node.octcode)
-        if (*count == room)
-            out = realloc(out, (room *= 2) * sizeof *out);
+        if (*count == space)
+            out = realloc(out, (space *= 2) * sizeof *out);
     return out;
 }
 
-START_TEST(budgets_of_bytes_are_kept_and_only_cut_the_sequence_short)
+START_TEST(test_view_byte_budget_truncates_sequence)
 {
     uint64_t random = 40 + (uint64_t)_i, all_count, count = 0, bytes;
     write_random(7, 13, true, true);
@@ -699,7 +701,7 @@ START_TEST(budgets_of_bytes_are_kept_and_only_cut_the_sequence_short)
         file = counted_open(&c, path, far);
         bytes = ebpo_test_file_stats(file).bytes_read;
         options.bytes = bytes / 2;
-        uint64_t opening = bytes; /* which does not know of the budget */
+        uint64_t opening = bytes; /* which is not limited by the budget */
         stream = new_view(file, &options);
         for (count = 0;;) {
             uint64_t some_count, *some = sequence(stream, &some_count, &end);
@@ -709,9 +711,9 @@ START_TEST(budgets_of_bytes_are_kept_and_only_cut_the_sequence_short)
             free(some);
             bytes = ebpo_test_file_stats(file).bytes_read;
             uint64_t allowed = options.bytes < opening ? opening : options.bytes;
-            ck_assert_msg(bytes <= allowed && c.asked <= allowed,
+            ck_assert_msg(bytes <= allowed && c.queried <= allowed,
                           "%llu read, %llu asked for, %llu allowed", (unsigned long long)bytes,
-                          (unsigned long long)c.asked, (unsigned long long)allowed);
+                          (unsigned long long)c.queried, (unsigned long long)allowed);
             if (end == EBPO_VIEW_DONE)
                 break;
             ck_assert_int_eq(end, EBPO_VIEW_BYTES);
@@ -728,7 +730,7 @@ START_TEST(budgets_of_bytes_are_kept_and_only_cut_the_sequence_short)
 }
 END_TEST
 
-START_TEST(budgets_of_nodes_memory_and_planes_left_away_do_not_change_the_sequence)
+START_TEST(test_view_budgets_do_not_change_sequence)
 {
     uint64_t random = 60, all_count, count, bytes[3] = { 0 };
     write_random(8, 13, false, true);
@@ -768,7 +770,7 @@ START_TEST(budgets_of_nodes_memory_and_planes_left_away_do_not_change_the_sequen
 }
 END_TEST
 
-START_TEST(one_may_try_again_after_a_failure_and_streams_do_not_disturb_each_other)
+START_TEST(test_view_retry_and_independent_streams)
 {
     uint64_t random = 70, all_count, count = 0;
     write_random(7, 13, false, true);
@@ -809,11 +811,11 @@ START_TEST(one_may_try_again_after_a_failure_and_streams_do_not_disturb_each_oth
 }
 END_TEST
 
-START_TEST(options_that_make_no_sense_are_refused)
+START_TEST(test_view_invalid_options_are_refused)
 {
     ebpo_file *file = open_solid("cube", 4);
     ebpo_observer good = EBPO_OBSERVER_INIT, bad[9];
-    ebpo_view_options usual = EBPO_VIEW_OPTIONS_INIT, o[9];
+    ebpo_view_options standard = EBPO_VIEW_OPTIONS_INIT, o[9];
     ebpo_view_stream *stream = NULL;
     for (int i = 0; i < 9; i++)
         bad[i] = good;
@@ -823,14 +825,14 @@ START_TEST(options_that_make_no_sense_are_refused)
     bad[7].direction[0] = 1, bad[7].up[1] = 0;
     bad[8].up[2] = NAN;
     for (int i = 0; i < 9; i++) {
-        usual.observer = &bad[i];
-        ck_assert_msg(ebpo_view_stream_new(file, &usual, &stream, NULL) == EBPO_E_ARGUMENT &&
+        standard.observer = &bad[i];
+        ck_assert_msg(ebpo_view_stream_new(file, &standard, &stream, NULL) == EBPO_E_ARGUMENT &&
                           !stream,
                       "observer %d", i);
     }
-    usual.observer = &good;
+    standard.observer = &good;
     for (int i = 0; i < 9; i++)
-        o[i] = usual;
+        o[i] = standard;
     o[0].priority = (ebpo_priority)4, o[1].pixels = -1, o[2].pixels = INFINITY, o[3].distance = NAN,
     o[4].unseen = (ebpo_unseen)2;
     o[5].observer = NULL, o[5].priority = EBPO_PRIORITY_DISTANCE;
@@ -846,8 +848,8 @@ START_TEST(options_that_make_no_sense_are_refused)
     ck_assert_int_eq(next(stream, &node), EBPO_VIEW_NODE);
     for (int i = 0; i < 9; i++)
         ck_assert_int_eq(ebpo_view_stream_change(stream, &o[i], NULL), EBPO_E_ARGUMENT);
-    usual.planes = !usual.planes;
-    ck_assert_int_eq(ebpo_view_stream_change(stream, &usual, NULL), EBPO_E_ARGUMENT);
+    standard.planes = !standard.planes;
+    ck_assert_int_eq(ebpo_view_stream_change(stream, &standard, NULL), EBPO_E_ARGUMENT);
     (void)next(stream, &again);
     ck_assert_uint_ne(node.node.octcode, again.node.octcode);
     ebpo_view_stream_free(stream);
@@ -861,19 +863,16 @@ TEST_SUITE(view)
     TCase *tests = tcase_create("view");
     tcase_set_timeout(tests, 900);
     tcase_add_checked_fixture(tests, make_folder, scratch_leave);
-    tcase_add_loop_test(tests, an_exhausted_stream_has_all_nodes_in_order_and_a_cut_at_any_time, 0,
-                        ebpo_test_solid_count);
-    tcase_add_loop_test(tests, trees_of_several_chunks_come_whole_too, 0, 4);
-    tcase_add_loop_test(tests, pruned_nodes_of_subsets_stay_in_the_cut, 0, 4);
-    tcase_add_loop_test(tests, refining_front_to_back_follows_every_ray, 0, 6);
-    tcase_add_loop_test(tests, what_is_small_far_deep_or_unseen_is_not_refined, 0, 4);
-    tcase_add_loop_test(tests, an_observer_who_moves_changes_what_comes_next, 0, 6);
-    tcase_add_loop_test(tests, budgets_of_bytes_are_kept_and_only_cut_the_sequence_short, 0, 4);
-    tcase_add_test(tests, budgets_of_nodes_memory_and_planes_left_away_do_not_change_the_sequence);
-    tcase_add_loop_test(tests,
-                        one_may_try_again_after_a_failure_and_streams_do_not_disturb_each_other, 0,
-                        2);
-    tcase_add_test(tests, options_that_make_no_sense_are_refused);
+    tcase_add_loop_test(tests, test_view_stream_visits_all_nodes, 0, ebpo_test_solid_count);
+    tcase_add_loop_test(tests, test_view_of_multi_chunk_trees, 0, 4);
+    tcase_add_loop_test(tests, test_view_cut_keeps_pruned_subset_nodes, 0, 4);
+    tcase_add_loop_test(tests, test_view_front_to_back_follows_rays, 0, 6);
+    tcase_add_loop_test(tests, test_view_thresholds_stop_refinement, 0, 4);
+    tcase_add_loop_test(tests, test_view_moving_observer_changes_order, 0, 6);
+    tcase_add_loop_test(tests, test_view_byte_budget_truncates_sequence, 0, 4);
+    tcase_add_test(tests, test_view_budgets_do_not_change_sequence);
+    tcase_add_loop_test(tests, test_view_retry_and_independent_streams, 0, 2);
+    tcase_add_test(tests, test_view_invalid_options_are_refused);
     suite_add_tcase(suite, tests);
     return suite;
 }

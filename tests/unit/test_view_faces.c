@@ -1,4 +1,4 @@
-/* The faces that come with the leaves of a view, against the leaves' lists in the whole file. */
+/* Faces that come with the leaves of a view, against the lists of the leaves in the whole file. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,7 +35,7 @@ static void write_solid(ebpo_mesh mesh, uint32_t parts, uint64_t subtree_faces)
     write_tree(&tree, subtree_faces);
 }
 
-/* Even ones: a solid with floats; odd ones: a tree of any nodes. From 2 on with subtrees. */
+/* Even numbers: a solid with floats; odd ones: a tree of any nodes. From 2 on with subtrees. */
 static void write_model(int i)
 {
     uint64_t subtree_faces = i < 2 ? EBPO_NO_SUBTREES : 100;
@@ -65,15 +65,15 @@ static ebpo_view_options viewing(const ebpo_info *info, int priority, ebpo_obser
     return options;
 }
 
-/* --- the twin --- */
+/* --- the reference implementation --- */
 
-typedef struct twin {
+typedef struct reference {
     ebpo_mesh mesh;
     uint8_t *given;
     uint64_t leaves, repeated, fresh;
-} twin;
+} reference;
 
-static void check_corners(const twin *t, const ebpo_view_faces *f)
+static void check_corners(const reference *t, const ebpo_view_faces *f)
 {
     for (uint64_t i = 0; i < f->face_count; i++)
         for (int k = 0; k < 3; k++) {
@@ -84,8 +84,9 @@ static void check_corners(const twin *t, const ebpo_view_faces *f)
         }
 }
 
-/* The list is that which the subtree of this leaf has. */
-static void check_leaf(twin *t, const ebpo_file *file, uint64_t octcode, const ebpo_view_faces *f)
+/* Checks that the list equals the list in the subtree of this leaf. */
+static void check_leaf(reference *t, const ebpo_file *file, uint64_t octcode,
+                       const ebpo_view_faces *f)
 {
     ebpo_subtree *subtree = NULL;
     ebpo_subtree_faces own = EBPO_SUBTREE_FACES_INIT;
@@ -110,8 +111,8 @@ static void check_leaf(twin *t, const ebpo_file *file, uint64_t octcode, const e
     check_corners(t, f);
 }
 
-/* Takes the stream to its end, or to that of a budget. */
-static ebpo_view_end take_all(ebpo_view_stream *stream, const ebpo_file *whole, twin *t)
+/* Reads the stream to its end, or to the end of a budget. */
+static ebpo_view_end take_all(ebpo_view_stream *stream, const ebpo_file *whole, reference *t)
 {
     ebpo_view_node node;
     ebpo_view_end end;
@@ -130,16 +131,16 @@ static ebpo_view_end take_all(ebpo_view_stream *stream, const ebpo_file *whole, 
     }
 }
 
-static twin twin_make(ebpo_file **whole)
+static reference reference_make(ebpo_file **whole)
 {
-    twin t = { .leaves = 0 };
+    reference t = { .leaves = 0 };
     ck_assert(ebpo_open(path, whole, NULL) == EBPO_OK);
     ck_assert(ebpo_file_read_mesh(*whole, NULL, &t.mesh, NULL) == EBPO_OK);
     t.given = calloc(t.mesh.face_count, 1);
     return t;
 }
 
-static void twin_free(twin *t, ebpo_file *whole)
+static void reference_free(reference *t, ebpo_file *whole)
 {
     free(t->given);
     ebpo_mesh_free(&t->mesh);
@@ -148,7 +149,7 @@ static void twin_free(twin *t, ebpo_file *whole)
 
 /* --- tests --- */
 
-START_TEST(every_face_comes_with_its_leaves_and_once_new)
+START_TEST(test_view_faces_are_new_once)
 {
     ebpo_file *whole = NULL;
     ebpo_observer observer;
@@ -156,7 +157,7 @@ START_TEST(every_face_comes_with_its_leaves_and_once_new)
     for (int far = 0; far < 2; far++) {
         counted_source c;
         ebpo_file *file = counted_open(&c, path, far);
-        twin t = twin_make(&whole);
+        reference t = reference_make(&whole);
         ebpo_view_options options = viewing(ebpo_file_info(file), (_i + far) % 4, &observer);
         ebpo_view_stream *stream = NULL;
         options.memory = far ? 0 : 2 << 20;
@@ -164,24 +165,24 @@ START_TEST(every_face_comes_with_its_leaves_and_once_new)
         ck_assert_int_eq(take_all(stream, whole, &t), EBPO_VIEW_DONE);
         ck_assert_uint_eq(t.fresh, t.mesh.face_count);
         ck_assert_uint_gt(t.repeated, 0);
-        if (far) /* nearly nothing is waited for by itself */
+        if (far) /* hardly any wait is for a single item */
             ck_assert_msg(c.alone < 16 && c.batches > 0, "%llu reads, %llu batches",
                           (unsigned long long)c.alone, (unsigned long long)c.batches);
         ebpo_view_stream_free(stream);
         counted_close(&c, file);
-        twin_free(&t, whole);
+        reference_free(&t, whole);
     }
 }
 END_TEST
 
-START_TEST(faces_count_in_the_budget_of_bytes)
+START_TEST(test_view_faces_count_in_byte_budget)
 {
     ebpo_file *whole = NULL;
     ebpo_observer observer;
     write_model(_i);
     counted_source c;
     ebpo_file *file = counted_open(&c, path, _i > 0);
-    twin t = twin_make(&whole);
+    reference t = reference_make(&whole);
     ebpo_view_options options = viewing(ebpo_file_info(file), _i % 4, &observer);
     ebpo_view_stream *stream = NULL;
     ebpo_view_end end = EBPO_VIEW_BYTES;
@@ -190,9 +191,9 @@ START_TEST(faces_count_in_the_budget_of_bytes)
     ck_assert(ebpo_view_stream_new(file, &options, &stream, NULL) == EBPO_OK);
     while ((end = take_all(stream, whole, &t)) == EBPO_VIEW_BYTES) {
         uint64_t bytes = ebpo_test_file_stats(file).bytes_read;
-        ck_assert_msg(bytes <= options.bytes && c.asked <= options.bytes,
+        ck_assert_msg(bytes <= options.bytes && c.queried <= options.bytes,
                       "%llu read, %llu asked for, %llu allowed", (unsigned long long)bytes,
-                      (unsigned long long)c.asked, (unsigned long long)options.bytes);
+                      (unsigned long long)c.queried, (unsigned long long)options.bytes);
         options.bytes += c.size / 24;
         ck_assert(ebpo_view_stream_change(stream, &options, NULL) == EBPO_OK);
         ck_assert_uint_lt(stops++, 500);
@@ -202,18 +203,18 @@ START_TEST(faces_count_in_the_budget_of_bytes)
     ck_assert_uint_eq(t.fresh, t.mesh.face_count);
     ebpo_view_stream_free(stream);
     counted_close(&c, file);
-    twin_free(&t, whole);
+    reference_free(&t, whole);
 }
 END_TEST
 
-START_TEST(one_may_try_again_after_a_failure)
+START_TEST(test_view_faces_retry_after_failure)
 {
     ebpo_file *whole = NULL;
     ebpo_observer observer;
     write_model(_i & 2);
     counted_source c;
     ebpo_file *file = counted_open(&c, path, _i % 2);
-    twin t = twin_make(&whole);
+    reference t = reference_make(&whole);
     ebpo_view_options options = viewing(ebpo_file_info(file), 1, &observer);
     ebpo_view_stream *stream = NULL;
     uint64_t state = 5, failed = 0;
@@ -239,11 +240,11 @@ START_TEST(one_may_try_again_after_a_failure)
     ck_assert_uint_eq(t.fresh, t.mesh.face_count);
     ebpo_view_stream_free(stream);
     counted_close(&c, file);
-    twin_free(&t, whole);
+    reference_free(&t, whole);
 }
 END_TEST
 
-START_TEST(without_the_option_or_a_mesh_there_are_none)
+START_TEST(test_view_faces_need_option_and_mesh)
 {
     ebpo_file *file = NULL;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -274,10 +275,10 @@ TEST_SUITE(view_faces)
     TCase *tests = tcase_create("view_faces");
     tcase_set_timeout(tests, 600);
     tcase_add_checked_fixture(tests, make_folder, scratch_leave);
-    tcase_add_loop_test(tests, every_face_comes_with_its_leaves_and_once_new, 0, 4);
-    tcase_add_loop_test(tests, faces_count_in_the_budget_of_bytes, 0, 4);
-    tcase_add_loop_test(tests, one_may_try_again_after_a_failure, 0, 4);
-    tcase_add_test(tests, without_the_option_or_a_mesh_there_are_none);
+    tcase_add_loop_test(tests, test_view_faces_are_new_once, 0, 4);
+    tcase_add_loop_test(tests, test_view_faces_count_in_byte_budget, 0, 4);
+    tcase_add_loop_test(tests, test_view_faces_retry_after_failure, 0, 4);
+    tcase_add_test(tests, test_view_faces_need_option_and_mesh);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,4 +1,4 @@
-/* Welding within a distance, against comparing all pairs in whole numbers. */
+/* Welding within a distance, against comparison of all pairs in integers. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +10,7 @@
 #include "mesh/mesh_parts.h"
 #include "solids.h"
 
-enum { MOST = 400, FACES = 300 };
+enum { LIMIT = 400, FACES = 300 };
 
 static const ebpo_progress silent = { NULL, NULL };
 
@@ -20,9 +20,9 @@ typedef struct point {
 
 typedef struct soup {
     uint32_t vertices;
-    point vertex[MOST];
+    point vertex[LIMIT];
     uint32_t face[FACES][3];
-    int64_t offset; /* of coordinates, in units of 1/8 */
+    int64_t offset; /* offset of coordinates, in units of 1/8 */
 } soup;
 
 static uint64_t state;
@@ -31,7 +31,7 @@ static uint32_t below(uint32_t n) { return (uint32_t)(ebpo_test_random(&state) %
 
 static void make_soup(soup *s, uint32_t side, int64_t offset)
 {
-    s->vertices = 3 + below(MOST - 3);
+    s->vertices = 3 + below(LIMIT - 3);
     s->offset = offset;
     for (uint32_t i = 0; i < s->vertices; i++)
         for (int k = 0; k < 3; k++)
@@ -79,13 +79,13 @@ static int64_t squared(const point *a, const point *b)
 
 typedef struct expected {
     uint32_t count;
-    point stays[MOST], becomes[MOST];
+    point stays[LIMIT], becomes[LIMIT];
     int64_t moved;
 } expected;
 
 static void weld_plainly(const soup *s, int64_t distance, expected *e)
 {
-    point sorted[MOST];
+    point sorted[LIMIT];
     e->count = 0;
     e->moved = 0;
     memcpy(sorted, s->vertex, sizeof sorted);
@@ -110,7 +110,7 @@ static void weld_plainly(const soup *s, int64_t distance, expected *e)
 
 static void compare(const soup *s, const expected *e, ebpo_mesh *m, double distance)
 {
-    ebpo_mend_record record;
+    ebpo_repair_record record;
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t collapsed = 0, repeated = 0;
     memset(&record, 0, sizeof record);
@@ -131,7 +131,7 @@ static void compare(const soup *s, const expected *e, ebpo_mesh *m, double dista
             ck_assert(p[1] == (double)(to[1] - s->offset) / 8);
             ck_assert(p[2] == (double)to[2] / 8);
         }
-        /* vertices at one position are one before: those faces have not lost an area */
+        /* vertices at one position are already merged: those faces have not lost an area */
         bool before = compare_points(&s->vertex[was[0]], &s->vertex[was[1]]) == 0 ||
                       compare_points(&s->vertex[was[1]], &s->vertex[was[2]]) == 0 ||
                       compare_points(&s->vertex[was[2]], &s->vertex[was[0]]) == 0;
@@ -143,7 +143,7 @@ static void compare(const soup *s, const expected *e, ebpo_mesh *m, double dista
     ebpo_mesh_free(m);
 }
 
-START_TEST(vertices_are_joined_as_all_pairs_say)
+START_TEST(test_weld_within_matches_all_pairs)
 {
     static soup s;
     static expected e;
@@ -157,18 +157,18 @@ START_TEST(vertices_are_joined_as_all_pairs_say)
         ebpo_mesh m = mesh_of(&s, single), arranged = mesh_of(&s, single);
         ebpo_error error = EBPO_ERROR_INIT;
         compare(&s, &e, &m, (double)distance / 8);
-        ck_assert(ebpo_arrange_to_mend(&arranged, 0, &silent, &error) == EBPO_OK);
+        ck_assert(ebpo_arrange_to_repair(&arranged, 0, &silent, &error) == EBPO_OK);
         compare(&s, &e, &arranged, (double)distance / 8);
     }
 }
 END_TEST
 
-/* A soup of a sphere's triangles whose corners are off by up to a tenth of the distance. */
-START_TEST(a_soup_with_noise_becomes_a_solid_in_any_order)
+/* A soup of triangles of a sphere whose corners have an error of up to a tenth of the distance. */
+START_TEST(test_weld_within_noisy_soup)
 {
     ebpo_mesh mesh = ebpo_test_make("torus");
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_mend_record record;
+    ebpo_repair_record record;
     ebpo_mesh_report report;
     uint64_t vertices = mesh.vertex_count;
     double distance = 0.001;
@@ -185,7 +185,7 @@ START_TEST(a_soup_with_noise_becomes_a_solid_in_any_order)
 }
 END_TEST
 
-START_TEST(distances_that_make_no_sense_are_refused)
+START_TEST(test_weld_within_bad_distance_is_refused)
 {
     static const double bad[] = { 0, -1, NAN, INFINITY, 1, 2, 1e-17, 1e-310 };
     ebpo_mesh mesh = ebpo_test_make("cube");
@@ -193,7 +193,7 @@ START_TEST(distances_that_make_no_sense_are_refused)
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         ebpo_error error = EBPO_ERROR_INIT;
         ck_assert_int_eq(ebpo_mesh_weld_within(&mesh, bad[i], NULL, &error), EBPO_E_ARGUMENT);
-        ck_assert_ptr_nonnull(strstr(error.message, "weld within"));
+        ck_assert_ptr_nonnull(strstr(error.message, "weld distance"));
         ck_assert_uint_eq(mesh.vertex_count, vertices);
     }
     ebpo_mesh_free(&mesh);
@@ -205,9 +205,9 @@ TEST_SUITE(weld_within)
     Suite *suite = suite_create("weld_within");
     TCase *tests = tcase_create("all");
     tcase_set_timeout(tests, 120);
-    tcase_add_loop_test(tests, vertices_are_joined_as_all_pairs_say, 0, 10);
-    tcase_add_test(tests, a_soup_with_noise_becomes_a_solid_in_any_order);
-    tcase_add_test(tests, distances_that_make_no_sense_are_refused);
+    tcase_add_loop_test(tests, test_weld_within_matches_all_pairs, 0, 10);
+    tcase_add_test(tests, test_weld_within_noisy_soup);
+    tcase_add_test(tests, test_weld_within_bad_distance_is_refused);
     suite_add_tcase(suite, tests);
     return suite;
 }

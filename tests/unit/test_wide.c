@@ -1,4 +1,4 @@
-/* Integers of 128 bits, against GMP's. */
+/* Integers of 128 bits, against GMP. */
 #include <gmp.h>
 
 #include "core/hash.h"
@@ -38,7 +38,7 @@ static void expect(ebpo_wide found, mpz_t wanted)
     mpz_clear(value);
 }
 
-/* Of any length, and often at its ends. */
+/* Returns a number of any length, often near its limits. */
 static uint64_t number(uint64_t *r)
 {
     uint64_t v = ebpo_random_next(r) >> ebpo_random_next(r) % 64;
@@ -72,7 +72,7 @@ static void check_arithmetic(ebpo_wide a, ebpo_wide b, int n)
     mpz_clears(x, y, z, NULL);
 }
 
-START_TEST(arithmetic_is_that_of_gmp)
+START_TEST(test_wide_arithmetic_matches_gmp)
 {
     uint64_t r = 128;
     for (int i = 0; i < ROUNDS; i++) {
@@ -84,7 +84,7 @@ START_TEST(arithmetic_is_that_of_gmp)
 }
 END_TEST
 
-START_TEST(products_are_those_of_gmp)
+START_TEST(test_wide_products_match_gmp)
 {
     uint64_t r = 64;
     mpz_t x, y, z;
@@ -109,8 +109,8 @@ TEST_SUITE(wide)
 {
     Suite *suite = suite_create("wide");
     TCase *tests = tcase_create("wide");
-    tcase_add_test(tests, arithmetic_is_that_of_gmp);
-    tcase_add_test(tests, products_are_those_of_gmp);
+    tcase_add_test(tests, test_wide_arithmetic_matches_gmp);
+    tcase_add_test(tests, test_wide_products_match_gmp);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -1,4 +1,4 @@
-/* Arrays in memory or in files, and what stays resident. */
+/* Arrays in memory or in files, and the resident memory. */
 #include <dirent.h>
 #include <signal.h>
 #include <stdio.h>
@@ -31,7 +31,7 @@ static ebpo_workspace *make(uint64_t memory)
     return w;
 }
 
-START_TEST(what_does_not_fit_goes_to_files_without_names)
+START_TEST(test_workspace_spills_to_unnamed_files)
 {
     enum { MIB = 1 << 20 };
     ebpo_workspace *w = make(8 * MIB);
@@ -49,13 +49,13 @@ START_TEST(what_does_not_fit_goes_to_files_without_names)
     memset(filed, 7, 5 * MIB);
     ebpo_array_free(w, held);
     ebpo_array_free(w, small);
-    ebpo_workspace_free(w); /* blocks outlive it */
+    ebpo_workspace_free(w); /* blocks outlive the workspace */
     ck_assert(filed[0] == 7 && filed[5 * MIB - 1] == 7);
     ebpo_array_free(w, filed);
 }
 END_TEST
 
-START_TEST(growing_keeps_what_was_there)
+START_TEST(test_workspace_growth_keeps_content)
 {
     ebpo_workspace *w = make(4 << 20);
     uint32_t *a = NULL;
@@ -75,13 +75,13 @@ START_TEST(growing_keeps_what_was_there)
 }
 END_TEST
 
-START_TEST(pages_of_files_are_let_go_of)
+START_TEST(test_workspace_releases_file_pages)
 {
 #ifdef __SANITIZE_ADDRESS__
-    return; /* whose own memory is resident too */
+    return; /* whose own memory is resident, too */
 #endif
     uint64_t before = resident(), budget = before + (32 << 20), most = 0;
-    /* a quarter is left for what happens between two looks */
+    /* a quarter is reserved for changes between two checks */
     ebpo_workspace *w = make(budget / 3 * 4);
     enum { BYTES = 256 << 20 };
     unsigned char *a = ebpo_array_alloc(w, BYTES, 1);
@@ -118,8 +118,8 @@ static void touch(touching *t, uint64_t byte)
         t->most = resident() > t->most ? resident() : t->most;
 }
 
-static ebpo_status touch_pages(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                               ebpo_error *error)
+static ebpo_status haptic_pages(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
 {
     (void)worker, (void)error;
     for (uint64_t page = begin; page < end; page++)
@@ -127,7 +127,7 @@ static ebpo_status touch_pages(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-static void touch_all(int way, ebpo_workspace *w, touching *t)
+static void haptic_all(int way, ebpo_workspace *w, touching *t)
 {
     if (way == 0)
         EBPO_FOR_ITEMS(w, i, 0, (uint64_t)PAGES * PAGE / LINE)
@@ -135,25 +135,25 @@ static void touch_all(int way, ebpo_workspace *w, touching *t)
     if (way == 1)
         EBPO_FOR_ITEMS_SCATTERED(w, page, 0, PAGES) {
             touch(t, page * PAGE);
-            continue; /* which lets pages go too */
+            continue; /* which also releases pages */
         }
     if (way == 2)
         EBPO_FOR_PIECES(w, page, PAGES, 256)
-            touch_pages(t, page, page + 256, 0, NULL);
+            haptic_pages(t, page, page + 256, 0, NULL);
     if (way == 3)
-        ck_assert_int_eq(ebpo_parallel_for(1, w, PAGES, 256, touch_pages, t, NULL, "", NULL), 0);
+        ck_assert_int_eq(ebpo_parallel_for(1, w, PAGES, 256, haptic_pages, t, NULL, "", NULL), 0);
 }
 
-START_TEST(loops_and_runs_let_go_of_pages)
+START_TEST(test_workspace_loops_release_pages)
 {
 #ifdef __SANITIZE_ADDRESS__
-    return; /* whose own memory is resident too */
+    return; /* whose own memory is resident, too */
 #endif
     uint64_t budget = (resident() + (32 << 20)) / 3 * 4;
     ebpo_workspace *w = make(budget);
     touching t = { ebpo_array_alloc(w, (uint64_t)PAGES * PAGE, 1), 0 };
     ck_assert_ptr_nonnull(t.array);
-    touch_all(_i, w, &t);
+    haptic_all(_i, w, &t);
     ck_assert_msg(t.most <= budget, "%llu MiB of %llu", (unsigned long long)t.most >> 20,
                   (unsigned long long)budget >> 20);
     ebpo_array_free(w, t.array);
@@ -161,7 +161,7 @@ START_TEST(loops_and_runs_let_go_of_pages)
 }
 END_TEST
 
-START_TEST(without_a_workspace_it_is_malloc)
+START_TEST(test_workspace_null_uses_malloc)
 {
     char *a = ebpo_array_alloc(NULL, 10 << 20, 1);
     uint64_t capacity = 10 << 20;
@@ -174,7 +174,7 @@ START_TEST(without_a_workspace_it_is_malloc)
 }
 END_TEST
 
-START_TEST(bad_wishes_are_refused)
+START_TEST(test_workspace_invalid_options_are_refused)
 {
     ebpo_workspace *w;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -191,7 +191,7 @@ START_TEST(bad_wishes_are_refused)
 }
 END_TEST
 
-START_TEST(a_file_that_may_not_grow_is_an_error_that_names_the_folder)
+START_TEST(test_workspace_write_failure_names_folder)
 {
     ebpo_workspace *w = make(4 << 20);
     ebpo_error error = EBPO_ERROR_INIT;
@@ -209,7 +209,7 @@ START_TEST(a_file_that_may_not_grow_is_an_error_that_names_the_folder)
 }
 END_TEST
 
-/* Else pages are the system's affair. */
+/* Otherwise pages are controlled by the system. */
 #ifdef EBPO_HAVE_MADVISE
 enum { LETS_GO = 1 };
 #else
@@ -221,15 +221,15 @@ TEST_SUITE(workspace)
     Suite *suite = suite_create("workspace");
     TCase *tests = tcase_create("arrays");
     tcase_set_timeout(tests, 120);
-    tcase_add_test(tests, what_does_not_fit_goes_to_files_without_names);
-    tcase_add_test(tests, growing_keeps_what_was_there);
+    tcase_add_test(tests, test_workspace_spills_to_unnamed_files);
+    tcase_add_test(tests, test_workspace_growth_keeps_content);
     if (LETS_GO) {
-        tcase_add_test(tests, pages_of_files_are_let_go_of);
-        tcase_add_loop_test(tests, loops_and_runs_let_go_of_pages, 0, 4);
+        tcase_add_test(tests, test_workspace_releases_file_pages);
+        tcase_add_loop_test(tests, test_workspace_loops_release_pages, 0, 4);
     }
-    tcase_add_test(tests, without_a_workspace_it_is_malloc);
-    tcase_add_test(tests, bad_wishes_are_refused);
-    tcase_add_test(tests, a_file_that_may_not_grow_is_an_error_that_names_the_folder);
+    tcase_add_test(tests, test_workspace_null_uses_malloc);
+    tcase_add_test(tests, test_workspace_invalid_options_are_refused);
+    tcase_add_test(tests, test_workspace_write_failure_names_folder);
     suite_add_tcase(suite, tests);
     return suite;
 }

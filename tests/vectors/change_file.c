@@ -1,4 +1,4 @@
-/* Changing a file through libhdf5, for vectors that the library does not write; see change_file.h.
+/* Changes a file through libhdf5, for vectors that the library does not write; see change_file.h.
  */
 #include "change_file.h"
 
@@ -23,7 +23,7 @@ void need(bool ok, const char *what)
         die("libhdf5", what);
 }
 
-/* In place of what was there: another length is another type. */
+/* Replaces the old one: another length is another type. */
 static void put_anew(const char *object, const char *name, hid_t type, hid_t space, hid_t memory,
                      const void *value)
 {
@@ -113,7 +113,7 @@ void drop_attribute(const char *object, const char *name)
 }
 void drop(const char *path) { need(H5Ldelete(changed, path, H5P_DEFAULT) >= 0, path); }
 
-/* One value of an array, counted row by row. */
+/* Sets one value of an array, counted row by row. */
 void poke(const char *path, unsigned at, int64_t value)
 {
     int64_t *values = calloc(1 << 20, sizeof *values);
@@ -125,7 +125,7 @@ void poke(const char *path, unsigned at, int64_t value)
     free(values);
 }
 
-/* A copy of a text attribute of one array for another. */
+/* Copies a text attribute of one array to another. */
 static void copy_text(hid_t from, hid_t to, const char *name)
 {
     char text[256] = "";
@@ -220,7 +220,7 @@ haddr_t chunk_address(const char *path, hsize_t *size)
     return address;
 }
 
-/* --- the checksums, of the arrays as they now are --- */
+/* --- checksums of the current arrays --- */
 
 typedef struct paths {
     bool of_colours;
@@ -250,14 +250,14 @@ static int in_order(const void *a, const void *b)
     return strcmp(*(char *const *)a, *(char *const *)b);
 }
 
-/* Of the values as little-endian machines have them. */
+/* Digests the values in little-endian order. */
 static void digest_of_array(const char *path, uint8_t digest[32])
 {
     hid_t id = H5Dopen2(changed, path, H5P_DEFAULT), stored = H5Dget_type(id),
           type = H5Tget_native_type(stored, H5T_DIR_ASCEND), space = H5Dget_space(id);
     size_t bytes = (size_t)H5Sget_simple_extent_npoints(space) * H5Tget_size(type);
     need(H5Tset_order(type, H5T_ORDER_LE) >= 0, path);
-    void *values = calloc(bytes, 1); /* what is in a file that is not there counts as zeros */
+    void *values = calloc(bytes, 1); /* data in a missing external file counts as zeros */
     hid_t plan = H5Dget_create_plist(id);
     need(H5Pget_external_count(plan) > 0 ||
              H5Dread(id, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0,
@@ -297,7 +297,7 @@ static void state_checksum(const char *name, bool of_colours)
     set_text("/", name, hex);
 }
 
-/* Section 8 of the specification. Of files with subtrees nothing that counts is changed. */
+/* Section 8 of the specification. In files with subtrees no counted data is changed. */
 void state_content(void)
 {
     if (H5Lexists(changed, "subtrees", H5P_DEFAULT) > 0)

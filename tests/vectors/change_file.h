@@ -1,4 +1,4 @@
-/* Changing a file through libhdf5, for vectors that the library does not write. What fails ends the
+/* Changes a file through libhdf5, for vectors that the library does not write. A failure ends the
  * program. */
 #ifndef CHANGE_FILE_H
 #define CHANGE_FILE_H
@@ -26,17 +26,17 @@ void set_text_as(const char *object, const char *name, const char *text, size_t 
 void set_int(const char *object, const char *name, int64_t value);
 void set_count(const char *object, const char *name, int64_t value);
 void set_reals(const char *name, double a, double b, double c);
-/* One dimension of one value, in place of a scalar or of another type. */
+/* Sets one dimension of one value, in place of a scalar or of another type. */
 void set_row(const char *object, const char *name, hid_t type, int64_t value);
 uint64_t count_of(const char *object, const char *name);
 void add_count(const char *object, const char *name, uint64_t value);
 void drop_attribute(const char *object, const char *name);
 void drop(const char *path);
 
-/* One value of an array, counted row by row. */
+/* Sets one value of an array, counted row by row. */
 void poke(const char *path, unsigned at, int64_t value);
 
-/* An array in place of another, whose coding and about it keeps. */
+/* An array that replaces another, whose coding and about it keeps. */
 typedef struct new_array {
     hid_t type;
     hsize_t rows, cols, chunk; /* cols 0: one dimension; chunk 0: contiguous */
@@ -45,16 +45,16 @@ typedef struct new_array {
     const int64_t *values; /* NULL: zeros, at most 4096 */
 } new_array;
 void replace(const char *path, new_array a);
-/* One where there was none, without attributes. */
+/* Adds an array at a new path, without attributes. */
 void add_array(const char *path, new_array a);
-/* The same values, filtered otherwise: of at most 64 elements. */
+/* Writes the same values with other filters: of at most 64 elements. */
 void refilter(const char *path, void (*filters)(hid_t));
 void checksum(hid_t dcpl); /* filters: fletcher32 */
 void scale_offset(hid_t dcpl);
 
 haddr_t chunk_address(const char *path, hsize_t *size);
 
-/* content_sha256 of what the arrays now hold. */
+/* Updates content_sha256 for the current arrays. */
 void state_content(void);
 
 #endif

@@ -1,5 +1,5 @@
-/* The failed vectors: each is a passed one that violates one sentence of the specification, which
- * its .txt names. */
+/* Makes the failed vectors: each is a passed one that violates one sentence of the specification,
+ * which its .txt names. */
 #include "make_parts.h"
 
 #include <math.h>
@@ -88,11 +88,11 @@ static void v_dropped(void) { set_count("/", "mend_dropped_faces", 7); }
 static void v_dropped_kept(void) { set_count("/", "mend_dropped_faces", 4); }
 static void v_weld_none(void) { set_reals("mend_weld_distance", 0, 0, 0); }
 static void v_weld_infinite(void) { set_reals("mend_weld_distance", INFINITY, 0, 0); }
-static void v_weld_not_asked(void) { set_count("/", "mend_weld", 0); }
+static void v_weld_not_queried(void) { set_count("/", "mend_weld", 0); }
 static void v_weld_moved(void) { set_reals("mend_weld_moved", -1, 0, 0); }
 static void v_weld_moved_missing(void) { drop_attribute("/", "mend_weld_moved"); }
 static void v_source_less(void) { set_count("/", "source_vertex_count", 3); }
-/* In place of a leaf, so that there are eight nodes still. */
+/* Replaces a leaf, so that there are still eight nodes. */
 static void v_gray_deep(void)
 {
     set_count("/levels/01", "gray", 1);
@@ -114,7 +114,7 @@ static void v_group_for_array(void)
 }
 static void v_subtree_level(void) { set_int("/", "subtree_level", 0); }
 static void v_subtree_table(void) { drop("/subtrees/counts"); }
-/* Its bytes stay, so that it still holds for a reader. */
+/* Its bytes stay, so that the list is still valid for a reader. */
 static void v_places_array(void) { poke("/subtrees/places", 1, INT64_C(4097) << 32 | 8); }
 static void v_places_end(void) { poke("/subtrees/places", 1, 1 << 30); }
 static void v_places_bytes(void) { poke("/subtrees/places", 0, 1027); } /* of two, unfiltered */
@@ -165,7 +165,7 @@ static void v_contiguous(void)
 {
     replace("/mesh/faces", (new_array){ H5T_STD_U32LE, 4, 3, 0, false, false, NULL, NULL });
 }
-/* Bytes, and rows, of other files. */
+/* Bytes, and rows, in other files. */
 static void external_storage(hid_t dcpl)
 {
     need(H5Pset_external(dcpl, "elsewhere.bin", 0, H5F_UNLIMITED) >= 0, "external storage");
@@ -186,7 +186,7 @@ static void v_virtual(void)
 {
     replace("/mesh/faces", (new_array){ H5T_STD_U32LE, 4, 3, 0, false, true, virtual_rows, NULL });
 }
-/* A number that nobody has registered: libhdf5 would look for a plugin of that name. */
+/* An unregistered number: libhdf5 would search a plugin with it. */
 static void unknown_filter(hid_t dcpl)
 {
     need(H5Pset_filter(dcpl, 65000, H5Z_FLAG_OPTIONAL, 0, NULL) >= 0, "unknown filter");
@@ -204,7 +204,7 @@ static void v_filter(void)
 {
     replace("/mesh/faces", (new_array){ H5T_STD_U32LE, 4, 3, 4, false, false, scale_offset, NULL });
 }
-/* Its values, with another pipeline than the file's. */
+/* The same values, with a pipeline other than that of the file. */
 static void v_two_pipelines(void)
 {
     static const int64_t values[] = { 0, 4, 1, 4 };
@@ -228,7 +228,7 @@ static void v_filter_mask(void)
     need(H5Dwrite_chunk(id, H5P_DEFAULT, 2, at, sizeof shuffled, shuffled) >= 0, "chunk");
     H5Dclose(id);
 }
-/* The chunk's bytes as they were, in a frame that does not notice damage. */
+/* The unchanged bytes of the chunk, in a frame without a checksum. */
 static void v_no_checksum(void)
 {
     static const char path[] = "/mesh/faces";
@@ -245,8 +245,8 @@ static void v_no_checksum(void)
     need(H5Dwrite_chunk(id, H5P_DEFAULT, 0, at, bytes, frame) >= 0, "chunk");
     H5Dclose(id);
 }
-/* Turns a bit of the array's first frame which zstd does not notice: the first such, from that byte
- * on. */
+/* Flips a bit of the array's first frame that zstd does not detect: the first such bit from that
+ * byte on. */
 static void turn_unseen(const char *path, size_t from, uint8_t bit)
 {
     uint8_t stored[4096], raw[4096], other[4096];
@@ -267,10 +267,10 @@ static void turn_unseen(const char *path, size_t from, uint8_t bit)
     need(H5Dwrite_chunk(id, H5P_DEFAULT, 0, at, (size_t)size, stored) >= 0, "chunk");
     H5Dclose(id);
 }
-enum { FRAME_HEADER = 6, BLOCK_HEADER = 3 }; /* of frames below 256 bytes */
+enum { FRAME_HEADER = 6, BLOCK_HEADER = 3 }; /* sizes in frames below 256 bytes */
 static void v_unused_bit(void) { turn_unseen("/mesh/faces", FRAME_HEADER + BLOCK_HEADER, 1); }
 static void v_repeated_once(void) { turn_unseen("/levels/00/plane_counts", FRAME_HEADER, 2); }
-/* One frame, which is right, with hundreds of empty blocks before the others. RFC 8878, 3.1.1. */
+/* One valid frame, with hundreds of empty blocks before the others. RFC 8878, 3.1.1. */
 static void v_long_chunk(void)
 {
     static const char path[] = "/mesh/faces";
@@ -297,7 +297,7 @@ static void v_types_index(void) { poke("/levels/07/types_index", 5, 1); }
 static void v_gray_index(void) { poke("/levels/06/gray_index", 1, 3); }
 static void v_leaf_index(void) { poke("/levels/06/leaf_index", 4, 7); }
 
-/* A group whose leaves become white: all else is as if they had been. */
+/* A group whose leaves become white: all other data is adapted. */
 static void v_zero_group(void)
 {
     int64_t types[64], winding[512], leaves = 0, white = 0, rank = 0;
@@ -338,7 +338,7 @@ static void v_skip_far(void) { poke("/levels/01/leaf_skip", 0, 0xffffffff); }
 static void v_leaf_new(void) { poke("/levels/01/leaf_new", 0, 200); }
 static void v_ref_counts(void) { poke("/levels/01/leaf_ref_count", 0, 200); }
 static void v_refs(void) { poke("/levels/01/leaf_refs", 0, 4); }
-/* One leaf's new faces begin one later; those after it are where they were. */
+/* The new faces of one leaf begin one later; those after it are unchanged. */
 static void v_order(void)
 {
     poke("/levels/03/leaf_skip", 12, 1);
@@ -378,7 +378,7 @@ static void v_attributes_no_mesh(void)
     set_text("/", "optional_parts", "planes attributes");
 }
 
-/* Of four faces, the first of them alone: gates from 0 on, three bytes that tell third corners,
+/* Four faces, of which only the first is new: gates from 0 on, three bytes for third corners,
  * numbers from 7 on, zeros from 10 on. */
 static void v_gates_alone(void) { set_text("/", "required_parts", "levels gates"); }
 static void v_gates_unsaid(void) { set_text("/", "required_parts", "levels mesh"); }
@@ -388,7 +388,7 @@ static void v_third(void) { poke("/mesh/faces", 4, 3 * (4 + 2)); }
 static void v_gate_number(void) { poke("/mesh/faces", 7, 1); }
 static void v_gate_low(void) { poke("/mesh/faces", 7, 241); }
 static void v_gates_behind(void) { poke("/mesh/faces", 51, 1); }
-/* All alone, in numbers of five bytes: 64 in place of 52. */
+/* All separate, in numbers of five bytes: 64 instead of 52. */
 static void v_gates_long(void)
 {
     for (unsigned i = 0; i < 4; i++)
@@ -399,10 +399,10 @@ static void v_gates_long(void)
         poke("/mesh/faces", 16 + 4 * i, 1 + i % 3);
 }
 static void v_attributes_image(void) { set_text("/attributes/001", "names", "sha256"); }
-/* The row of the root's colour becomes one of an array that is not there; the first one's number is
- * beyond those behind it. */
-static void v_sums_fewer(void) { poke("/chunk_sums", 3, INT64_C(14) << 32); }
-static void v_sums_order(void) { poke("/chunk_sums", 0, INT64_C(70) << 32); }
+/* The row of the colour of the root becomes a row of a missing array; the number of the first one
+ * is beyond those after it. */
+static void v_checksums_fewer(void) { poke("/chunk_sums", 3, INT64_C(14) << 32); }
+static void v_checksums_order(void) { poke("/chunk_sums", 0, INT64_C(70) << 32); }
 static void v_content(void) { poke("/mesh/vertices", 0, 2); }
 
 typedef enum late_change {
@@ -419,8 +419,8 @@ typedef enum late_change {
 typedef struct failed_vector {
     const char *name, *base;
     void (*change)(void);
-    late_change late;    /* to the bytes, when the file is closed */
-    const char *section; /* of the specification, and what it says there */
+    late_change late;    /* changes bytes after the file is closed */
+    const char *section; /* section of the specification, and its sentence */
     const char *sentence;
 } failed_vector;
 
@@ -498,7 +498,7 @@ static const failed_vector failed[] = {
       "more `mend_dropped_faces`" },
     { "weld_distance_0", WELDED, v_weld_none, NONE, "3", "not finite and above 0" },
     { "weld_distance_infinite", WELDED, v_weld_infinite, NONE, "3", "not finite and above 0" },
-    { "weld_distance_without_welding", WELDED, v_weld_not_asked, NONE, "3",
+    { "weld_distance_without_welding", WELDED, v_weld_not_queried, NONE, "3",
       "`mend_weld` is 0 beside it" },
     { "weld_moved_negative", WELDED, v_weld_moved, NONE, "3",
       "beside it only: negative or not finite" },
@@ -627,9 +627,9 @@ static const failed_vector failed[] = {
     { "attributes_without_mesh", COLOURED, v_attributes_no_mesh, NONE, "18", "only with `mesh`" },
     { "chunk_in_place_of_another", SUMMED, NULL, MOVE_CHUNKS, "20",
       "a chunk whose last four bytes are not what its row says" },
-    { "chunk_sums_of_fewer_chunks", SUMMED, v_sums_fewer, NONE, "20",
+    { "chunk_sums_of_fewer_chunks", SUMMED, v_checksums_fewer, NONE, "20",
       "more or fewer rows than it has chunks" },
-    { "chunk_sums_out_of_order", SUMMED, v_sums_order, NONE, "20",
+    { "chunk_sums_out_of_order", SUMMED, v_checksums_order, NONE, "20",
       "a number that is less than the one before" },
     { "attributes_image_of_another_digest", TEXTURED, v_attributes_image, NONE, "18",
       "are not those whose SHA-256 stands there" },
@@ -637,7 +637,7 @@ static const failed_vector failed[] = {
 
 enum { USER_BLOCK_BYTES = 512 };
 
-/* Exchanges two chunks that take as many bytes, each with the checksum of its own. */
+/* Exchanges two chunks of equal size, each with its own checksum. */
 static void move_chunks(const char *path, uint8_t *data)
 {
     hsize_t bytes = 0, other_bytes = 0;

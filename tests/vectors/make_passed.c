@@ -1,4 +1,4 @@
-/* The passed vectors, in an order in which each needs only what those before it have shown. */
+/* Makes the passed vectors, in an order in which each needs only features of earlier ones. */
 #include "make_parts.h"
 
 #include <math.h>
@@ -43,7 +43,7 @@ static ebpo_mesh make_mesh(uint64_t faces, bool doubles)
     return mesh;
 }
 
-/* What differs from vector to vector. */
+/* Differences between vectors. */
 typedef struct how {
     int max_level;
     uint32_t leaf_faces, more_parts;
@@ -85,8 +85,8 @@ static void build_float(ebpo_tree *tree, ebpo_mesh mesh, how h)
     build_mesh(tree, mesh, h);
 }
 
-/* A tetrahedron of size 1, `outer` times, wound inwards if that is negative; and `inner` times a
- * box that holds a cell of level 4 beside an edge. */
+/* Makes a tetrahedron of size 1, `outer` times, wound inwards if negative; and `inner` times a box
+ * that contains a cell of level 4 beside an edge. */
 static ebpo_mesh nested(int outer, int inner)
 {
     static const double low[3] = { 0.05, 0.05, 0.24 }, high[3] = { 0.13, 0.13, 0.33 };
@@ -152,7 +152,7 @@ static ebpo_write_options laid_out(ebpo_codec codec, uint32_t parts, uint64_t su
     options.parts = parts;
     options.subtree_faces = subtree_faces;
     options.face_coding = EBPO_FACES_HIGH_WATER;
-    options.chunk_sums = EBPO_SUMS_NONE; /* those that have them are about them */
+    options.chunk_checksums = EBPO_CHECKSUMS_NONE; /* only vectors about them have them */
     return options;
 }
 
@@ -168,8 +168,8 @@ static void write_vector(const char *name, ebpo_tree *tree, ebpo_codec codec, ui
     write_laid_out(name, tree, codec, parts, 0);
 }
 
-/* A passed vector as another program may have left it, or a later version; `behind`: bytes that
- * follow the HDF5 file. */
+/* Makes a passed vector as left by another program, or a later version; `behind`: bytes after the
+ * HDF5 file. */
 static void derive_longer(const char *name, const char *base, void (*change)(void), size_t behind)
 {
     char path[512];
@@ -267,7 +267,7 @@ static void make_subtrees(void)
                    EBPO_PART_PLANES | EBPO_PART_MESH, 10);
 }
 
-/* --- what other programs and other versions write --- */
+/* --- files of other programs and other versions --- */
 
 static void without_filters(void)
 {
@@ -301,7 +301,7 @@ static void of_version_1_0(void)
     set_text("/levels/01/leaf_skip", "coding", "delta");
 }
 
-/* The arrays stay where they are, and do not count. */
+/* The arrays stay in the file, and do not count. */
 static void without_the_word_maps(void)
 {
     set_text("/", "optional_parts", "planes");
@@ -311,7 +311,7 @@ static void without_the_word_maps(void)
 }
 
 /* Texts that end in zeros or in none, of ASCII; rows of one value; hints of other types; and the
- * name that leaf_skip's coding had. */
+ * former name of the coding of leaf_skip. */
 static void with_attributes_of_others(void)
 {
     set_text_as("/", "format", "EBP-Octree in HDF5", 40, H5T_STR_NULLTERM);
@@ -327,7 +327,7 @@ static void with_attributes_of_others(void)
     set_text("/levels/01/leaf_skip", "coding", "delta");
 }
 
-/* On paths of this page, of parts that are listed; the first two where the head counts no rows. */
+/* At paths of the specification, of listed parts; the first two where the header counts no rows. */
 static void with_arrays_not_called_for(void)
 {
     add_array("/levels/00/leaf_skip",
@@ -350,7 +350,7 @@ static void shuffle_and_deflate(hid_t dcpl)
     H5Pset_fletcher32(dcpl);
 }
 
-/* As `h5repack -f SHUF -f GZIP=1 -f FLET` leaves arrays of one byte. */
+/* As `h5repack -f SHUF -f GZIP=1 -f FLET` writes arrays of one byte. */
 static void shuffle_bytes(void)
 {
     refilter("/levels/00/leaf_winding", shuffle_and_deflate);
@@ -358,7 +358,7 @@ static void shuffle_bytes(void)
     refilter("/levels/00/leaf_ref_count", shuffle_and_deflate);
 }
 
-/* The list is false, and nobody may look at it. */
+/* The list is wrong, and readers must ignore it. */
 static void without_offset_of_places(void)
 {
     drop_attribute("/subtrees/places", "offset");
@@ -381,16 +381,16 @@ static void make_derived(void)
                   16);
 }
 
-/* --- what meshes may be like --- */
+/* --- kinds of meshes --- */
 
-/* The unit square's triangle in z = 0, and one so low under the wall between the root's lower and
- * upper children that it comes near the upper ones, and does not touch them. */
+/* The triangle of the unit square in z = 0, and one so close below the face between the lower and
+ * upper children of the root that it comes near the upper ones, without contact. */
 static void build_near(ebpo_tree *tree)
 {
     ebpo_mesh mesh = ebpo_test_tetrahedron(1);
     build_mesh(tree, mesh, (how){ 1, 0, 0, 0, 0, 0, 0 });
-    double wall = tree->info.box_origin[2] + tree->info.box_size[2] / 2,
-           z = wall - tree->info.box_size[2] / 2 / 1024;
+    double cell_face = tree->info.box_origin[2] + tree->info.box_size[2] / 2,
+           z = cell_face - tree->info.box_size[2] / 2 / 1024;
     ebpo_tree_free(tree);
     mesh = ebpo_test_tetrahedron(1);
     uint32_t a = ebpo_test_append_vertex(&mesh, 0.0625, 0.0625, z),
@@ -402,7 +402,7 @@ static void build_near(ebpo_tree *tree)
     ebpo_test_append_face(&mesh, a, d, b);
     ebpo_test_append_face(&mesh, b, d, c);
     build_mesh(tree, mesh, (how){ 1, 0, 0, 0, 0, 0, 0 });
-    if (tree->info.box_origin[2] + tree->info.box_size[2] / 2 != wall)
+    if (tree->info.box_origin[2] + tree->info.box_size[2] / 2 != cell_face)
         die("near", "the root cell depends on more than the outer faces");
     ebpo_level *l = &tree->level[1];
     uint64_t at = 0, leaf = 0; /* the leaf of octant 4, and its references */
@@ -470,8 +470,8 @@ static void make_large(void)
 
 /* --- attributes --- */
 
-/* Of every kind: colours and normals, also one that is none, lists of one length and of different
- * ones, another element, comments, one of them in Latin 1. */
+/* Attributes of every kind: colours and normals, also an array that is none, lists of one length
+ * and of different ones, another element, comments, one of them in Latin 1. */
 static const char coloured[] =
     "ply\nformat ascii 1.0\ncomment a tetrahedron, f\xfcr Leser\nobj_info made by hand\n"
     "element vertex 4\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
@@ -519,8 +519,8 @@ static void make_attributes(void)
 
 /* --- colours of envelopes --- */
 
-/* Faces' colours of 16 bits under other names, beside vertices that have all the same red, green
- * and blue, and not the same alpha; one of a face is NaN. */
+/* Colours of faces with 16 bits under other names, beside vertices that all have the same red,
+ * green and blue, and different alpha; one of a face is NaN. */
 static const char faces_coloured[] =
     "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
     "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
@@ -553,7 +553,7 @@ static void make_colours(void)
 
 /* --- faces across edges --- */
 
-/* The same four faces as 47, as a chunk without streams. */
+/* The same four faces as in vector 47, as a chunk without streams. */
 static void as_codes(void)
 {
     enum { FACES = 4 };
@@ -610,7 +610,7 @@ static void add_texture(ebpo_attributes *to, const char *name, const char *use, 
         die(name, error.message);
 }
 
-/* One in a folder, one that was not there; and one whose name leads out of any folder. */
+/* One in a folder, one that was not found; and one whose path leaves any folder. */
 static void make_textures(void)
 {
     ebpo_tree tree;
@@ -628,8 +628,8 @@ static void make_textures(void)
     }
 }
 
-/* Of a tetrahedron without its last side, one face is there three times: the second copy looks the
- * other way. The hole is filled, with a number behind the source's six. */
+/* In a tetrahedron without its last side, one face occurs three times: the second copy has the
+ * opposite orientation. The hole is filled, with an index after the six of the source. */
 static void make_dropped(void)
 {
     ebpo_tree tree;
@@ -643,7 +643,7 @@ static void make_dropped(void)
     write_vector("53_dropped_faces", &tree, EBPO_CODEC_ZSTD, ~0u);
 }
 
-/* The tetrahedron with a fifth vertex near the last one, which half of the faces there name; and a
+/* The tetrahedron with a fifth vertex near the last one, which half of the faces there use; and a
  * face between these two, which keeps two vertices. */
 static void make_welded(void)
 {
@@ -662,17 +662,17 @@ static void make_welded(void)
     write_vector("58_welded_within_a_distance", &tree, EBPO_CODEC_ZSTD, ~0u);
 }
 
-/* --- sums of chunks --- */
+/* --- chunk checksums --- */
 
-/* Not what is there: but the list says that it does not hold. */
-static void stale_sums(void)
+/* The list is outdated, but states that it is not valid. */
+static void stale_checksums(void)
 {
     poke("/chunk_sums", 0, 1);
     poke("/chunk_sums", 2, 12345);
     drop_attribute("/chunk_sums", "offset");
 }
 
-/* Their rows stay in the list, as those of arrays that a later version adds. */
+/* Their rows stay in the list, as those of arrays added by a later version. */
 static void without_the_word_colours(void)
 {
     set_text("/", "optional_parts", "planes maps leaf-planes attributes");
@@ -682,16 +682,16 @@ static void make_sums(void)
 {
     ebpo_tree tree;
     ebpo_write_options options = laid_out(EBPO_CODEC_ZSTD, ~0u, 0);
-    options.chunk_sums = EBPO_SUMS_USUAL;
+    options.chunk_checksums = EBPO_CHECKSUMS_DEFAULT;
     build(&tree, 4, false, 2, 1, EBPO_PART_LEAF_PLANES);
     write_file("54_chunk_sums", &tree, &options);
     options = laid_out(EBPO_CODEC_NONE, ~0u, 1);
-    options.chunk_sums = EBPO_SUMS_USUAL;
+    options.chunk_checksums = EBPO_CHECKSUMS_DEFAULT;
     build_mesh(&tree, read_coloured(), (how){ 3, 1, EBPO_PART_LEAF_PLANES, 0, 0, 0, 0 });
     write_file("55_chunk_sums_of_subtrees", &tree, &options);
     derive("56_chunk_sums_of_a_part_not_listed", "55_chunk_sums_of_subtrees",
            without_the_word_colours);
-    derive("57_chunk_sums_without_offset", "55_chunk_sums_of_subtrees", stale_sums);
+    derive("57_chunk_sums_without_offset", "55_chunk_sums_of_subtrees", stale_checksums);
 }
 
 void make_passed(const char *to)

@@ -1,6 +1,7 @@
-/* Makes the files of format-spec/vectors: make_vectors FOLDER. passed/ with what must be read,
- * failed/ with what must be refused and why; each failed file is a passed one with a single named
- * change. Run it when the format changes, look at the difference, and commit both. */
+/* Makes the files of format-spec/vectors: make_vectors FOLDER. passed/ with files that must be
+ * read, failed/ with files that must be refused and the reasons; each failed file is a passed one
+ * with a single named change. Run it when the format changes, check the difference, and commit
+ * both. */
 #include <hdf5.h>
 #include <stdio.h>
 #include <sys/stat.h>

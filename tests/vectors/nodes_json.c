@@ -1,4 +1,4 @@
-/* The .nodes.json beside a passed vector; see nodes_json.h. */
+/* Writes the .nodes.json of a passed vector; see nodes_json.h. */
 #include "nodes_json.h"
 
 #include <hdf5.h>
@@ -12,7 +12,7 @@
 #include "change_file.h"
 #include "geometry/cells.h"
 
-enum { NODES_MOST = 600 };
+enum { NODES_MAX = 600 };
 
 bool nodes_json_fits(const ebpo_tree *tree)
 {
@@ -21,7 +21,7 @@ bool nodes_json_fits(const ebpo_tree *tree)
         nodes += 8 * tree->level[l].group_count;
         planes += tree->level[l].plane_count + tree->level[l].leaf_plane_count;
     }
-    return nodes <= NODES_MOST && planes <= NODES_MOST;
+    return nodes <= NODES_MAX && planes <= NODES_MAX;
 }
 
 /* --- attributes --- */
@@ -93,7 +93,7 @@ static cell_box box_of(const ebpo_info *info, ebpo_octcode code)
     return box;
 }
 
-/* In the cell's coordinates, n . xi <= d / 4096; and in the model's, A x + B y + C z <= D. */
+/* Writes n . xi <= d / 4096 in cell coordinates; and A x + B y + C z <= D in model coordinates. */
 static void put_plane(FILE *out, const cell_box *box, uint32_t code, bool first)
 {
     int32_t n[3], d;
@@ -109,7 +109,7 @@ static void put_plane(FILE *out, const cell_box *box, uint32_t code, bool first)
 }
 
 typedef struct at_level {
-    uint64_t rank[4], plane, leaf_plane; /* next of the level */
+    uint64_t rank[4], plane, leaf_plane; /* next index in the level */
 } at_level;
 
 static void put_node(FILE *out, const ebpo_tree *tree, int level, ebpo_octcode code, unsigned type,
@@ -133,10 +133,10 @@ static void put_node(FILE *out, const ebpo_tree *tree, int level, ebpo_octcode c
     fprintf(out, "]}");
 }
 
-/* Level by level: the gray nodes of one are the parents in the next, in the same order. */
+/* Writes level by level: the gray nodes of one are the parents in the next, in the same order. */
 static void put_nodes(FILE *out, const ebpo_tree *tree)
 {
-    ebpo_octcode parents[NODES_MOST] = { 0 }, next[NODES_MOST];
+    ebpo_octcode parents[NODES_MAX] = { 0 }, next[NODES_MAX];
     fprintf(out, " \"nodes\": [");
     for (int level = 0; level < tree->info.level_count; level++) {
         const ebpo_level *l = &tree->level[level];
@@ -149,7 +149,7 @@ static void put_nodes(FILE *out, const ebpo_tree *tree)
                 if (type == EBPO_GRAY)
                     next[count++] = code;
                 if (level && l->types[group] == 0)
-                    at.rank[0]++; /* a place below a pruned node */
+                    at.rank[0]++; /* a child position below a pruned node */
                 else
                     put_node(out, tree, level, code, type, &at);
             }

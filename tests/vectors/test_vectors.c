@@ -1,5 +1,5 @@
-/* The files of format-spec/vectors: argument 1 is that folder, argument 2 the program make_vectors.
- */
+/* Tests the files of format-spec/vectors: argument 1 is that folder, argument 2 the program
+ * make_vectors. */
 #include <dirent.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -100,20 +100,20 @@ static void check_failed(const char *path, const char *expected_path)
     free(expected);
 }
 
-START_TEST(passed_vectors_are_read_as_their_json_says)
+START_TEST(test_valid_vectors_match_json)
 {
     ck_assert_uint_ge(each("passed", ".json", check_passed), 32);
 }
 END_TEST
 
-START_TEST(failed_vectors_are_refused_with_their_text)
+START_TEST(test_invalid_vectors_are_refused)
 {
     ck_assert_uint_ge(each("failed", ".txt", check_failed), 80);
 }
 END_TEST
 
-/* What compressors may choose to do elsewhere: the texts are the same, and the files made are read
- * as those texts say. */
+/* Compressors may give other bytes elsewhere: the texts are equal, and the files made are read as
+ * the texts say. */
 static void check_made(const char *folder)
 {
     const char *committed = vectors;
@@ -123,10 +123,10 @@ static void check_made(const char *folder)
     vectors = committed;
 }
 
-/* Compressors may change their output from version to version, and zstd has another one where bytes
- * stand the other way round or addresses have 32 bits: bytes are compared only where the vectors
- * were made. */
-START_TEST(vectors_are_what_make_vectors_makes)
+/* Compressors may change their output from version to version, and the output of zstd differs on
+ * big-endian machines or with 32-bit addresses: bytes are compared only where the vectors were
+ * made. */
+START_TEST(test_vectors_match_generator_output)
 {
     unsigned major, minor, release;
     H5get_libversion(&major, &minor, &release);
@@ -153,9 +153,9 @@ Suite *test_suite(void)
     Suite *suite = suite_create("vectors");
     TCase *tests = tcase_create("vectors");
     tcase_set_timeout(tests, 300);
-    tcase_add_test(tests, passed_vectors_are_read_as_their_json_says);
-    tcase_add_test(tests, failed_vectors_are_refused_with_their_text);
-    tcase_add_test(tests, vectors_are_what_make_vectors_makes);
+    tcase_add_test(tests, test_valid_vectors_match_json);
+    tcase_add_test(tests, test_invalid_vectors_are_refused);
+    tcase_add_test(tests, test_vectors_match_generator_output);
     suite_add_tcase(suite, tests);
     return suite;
 }

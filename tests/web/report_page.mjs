@@ -277,12 +277,12 @@ async function check(browser, name, { plots, pictures }, ...args) {
 async function checkAll(browser) {
   const a = input('a.ebpo.h5'), b = input('b.ebpo.h5'), bare = input('bare.ebpo.h5');
   run(ebpo, ['convert', '-q', '--max-level', '2', input('sphere.ply'), a]);
-  run(ebpo, ['convert', '-q', '--max-level', '3', '--with', 'leaf-planes', input('sphere.ply'), b]);
-  run(ebpo, ['convert', '-q', '--max-level', '2', '--without', 'mesh', input('torus.ply'), bare]);
+  run(ebpo, ['convert', '-q', '--max-level', '3', '--profile', 'full', input('sphere.ply'), b]);
+  run(ebpo, ['convert', '-q', '--max-level', '2', '--parts', '-mesh', input('torus.ply'), bare]);
   await check(browser, 'usual', { plots: 10, pictures: 0 }, '--select', 'inherit,kmedoids,offset', '--percent', '10,40', '--no-pictures', '--max-level', '3', input('torus.ply'));
   const odd = await check(browser, 'files', { plots: 10, pictures: 8 }, '--name', 'short', '--name', ODD, a, b);
   assert.ok(odd.text.split(ODD).length > 5);
-  await check(browser, 'some', { plots: 8, pictures: 3 }, '--need', '--levels', '1-2', b);
+  await check(browser, 'some', { plots: 8, pictures: 3 }, '--targets', '--levels', '1-2', b);
   await check(browser, 'surface', { plots: 4, pictures: 0 }, '--no-pictures', '--max-level', '2', input('open_box.ply'));
   await check(browser, 'leaf', { plots: 1, pictures: 2 }, '--max-level', '0', input('tetrahedron.ply'));
   writeFileSync(input('flat.ply'), FLAT);

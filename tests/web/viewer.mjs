@@ -31,7 +31,7 @@ const cleanup = [() => rmSync(work, { recursive: true, force: true })];
 function makeModels() {
   mkdirSync(models);
   run(generate, ['--base', 'torus', '--faces', '40000', join(work, 'ring.ply')]);
-  run(ebpo, ['convert', '-q', '--with', 'leaf-planes', join(work, 'ring.ply'), model]);
+  run(ebpo, ['convert', '-q', '--profile', 'full', join(work, 'ring.ply'), model]);
   run(generate, ['--base', 'torus', '--faces', '10000', join(work, 'other.ply')]);
   copyFileSync(model, join(models, 'small.ebpo.h5'));
   const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((v) => `${v & 1} ${v >> 1 & 1} ${v >> 2}`), sides = ['0 2 3 1', '4 5 7 6', '0 1 5 4', '2 6 7 3', '0 4 6 2', '1 3 7 5'];
@@ -185,7 +185,7 @@ async function levelFive(page) {
   assert.ok(state.depth >= 5);
   assert.ok(requests().length <= 2);
   assert.equal(state.stats.nodes, table[5].gray + sum(table, (l) => l.leaf));
-  const planes = triangles(5, '--no-walls'), all = triangles(5);
+  const planes = triangles(5, '--no-cell-faces'), all = triangles(5);
   assert.equal(state.stats.triangles - state.stats.wallTriangles, planes);
   const { wallTriangles } = state.stats, walls = all - 12 * black - planes;
   assert.ok(wallTriangles > 0 && wallTriangles < 0.4 * walls, `walls that nobody sees are not drawn: ${wallTriangles} of ${walls}`);

@@ -8,11 +8,13 @@
 #include <strings.h>
 
 #include "cli/command.h"
+#include "cli/renamed.h"
 
-static const arg_option help_option = { "help", 'h', ARG_FLAG, 0, NULL, "print this help and exit",
-                                        0,      0,   NULL };
+static const arg_option help_option = {
+    "help", 'h', ARG_FLAG, 0, NULL, "print this help and exit", 0, 0, NULL, NULL
+};
 
-/* Says what is wrong; the result to return. */
+/* Reports the error and evaluates to the result to return. */
 #define wrong(spec, ...) (command_usage((spec)->command, __VA_ARGS__), ARGS_WRONG)
 
 /* --- values --- */
@@ -56,6 +58,9 @@ static arg_result find_word(const arg_spec *spec, const arg_option *o, const cha
             *out = i;
             return ARGS_RUN;
         }
+    const char *now = renamed_word(o->name, text, length);
+    if (now)
+        return wrong(spec, "--%s: '%.*s' is now '%s'", o->name, (int)length, text, now);
     char all[200];
     join_words(o->words, all, sizeof all);
     return wrong(spec, "--%s: '%.*s' is not one of: %s", o->name, (int)length, text, all);
@@ -97,6 +102,7 @@ static arg_result set_value(const arg_spec *spec, const arg_option *o, const cha
     case ARG_WORD: return find_word(spec, o, text, strlen(text), field);
     case ARG_SET: return set_bits(spec, o, text, field);
     case ARG_LIST:
+    case ARG_OPERAND:
     case ARG_TEXT: break;
     }
     if (!*text)
@@ -125,7 +131,7 @@ static const arg_option *find_letter(const arg_spec *spec, char letter)
     return letter == 'h' ? &help_option : NULL;
 }
 
-/* An option that shares a beginning of at least three letters, for "did you mean". */
+/* Returns an option that shares a beginning of at least three letters, for "did you mean". */
 static const char *find_resembling(const arg_spec *spec, const char *name)
 {
     const char *best = NULL;
@@ -144,6 +150,10 @@ static const char *find_resembling(const arg_spec *spec, const char *name)
 
 static arg_result fail_unknown(const arg_spec *spec, const char *shown, const char *name)
 {
+    size_t length = strcspn(name, "=");
+    const char *now = renamed_option(spec->command, name, length);
+    if (now)
+        return wrong(spec, "--%.*s is now %s", (int)length, name, now);
     const char *near = find_resembling(spec, name);
     if (near)
         return wrong(spec, "unknown option '%s'; did you mean '--%s'?", shown, near);
@@ -157,6 +167,8 @@ typedef struct parser {
     int argc, at; /* at: the argument under the cursor */
     char **argv;
     void *values;
+    const char *output; /* given as an option in place of an operand, or NULL */
+    size_t output_at;   /* index of that operand */
 } parser;
 
 static arg_result take_option(parser *p, const arg_option *o, const char *joined)
@@ -172,6 +184,11 @@ static arg_result take_option(parser *p, const arg_option *o, const char *joined
         joined = p->argv[++p->at];
     if (!joined)
         return wrong(p->spec, "--%s needs a value, %s", o->name, o->value);
+    if (o->kind == ARG_OPERAND && *joined) {
+        p->output = joined;
+        p->output_at = o->offset;
+        return ARGS_RUN;
+    }
     return set_value(p->spec, o, joined, p->values);
 }
 
@@ -185,7 +202,7 @@ static arg_result take_long(parser *p)
     return take_option(p, o, name[length] ? name + length + 1 : NULL);
 }
 
-/* -qh is -q -h; the rest after a letter with a value is the value. */
+/* -qh is -q -h; behind a letter with a value, the rest is the value. */
 static arg_result take_letters(parser *p)
 {
     const char *shown = p->argv[p->at];
@@ -218,7 +235,7 @@ static bool is_among(const char *words, const char *word)
     return false;
 }
 
-/* A name that ends as another format's files do would mislead whoever gets the file. */
+/* Refuses a name with the ending of another format, which would mislead users of the file. */
 static arg_result check_ending(const arg_spec *spec, const char *path)
 {
     static const char known[] = "ply obj stl off glb gltf vtk vtkhdf xdmf png jpg jpeg gif svg pdf "
@@ -226,7 +243,7 @@ static arg_result check_ending(const arg_spec *spec, const char *path)
     const char *name = strrchr(path, '/'), *dot = strrchr(name ? name : path, '.');
     if (!spec->writes || !dot || !is_among(known, dot + 1) || is_among(spec->writes, dot + 1))
         return ARGS_RUN;
-    return wrong(spec, "'%s': the name ends as another format's do; what is written is %s", path,
+    return wrong(spec, "'%s': the ending belongs to another format; the output is %s", path,
                  spec->operands + strcspn(spec->operands, " ") + 1);
 }
 
@@ -235,15 +252,29 @@ static arg_result check_operand(const arg_spec *spec, const char *text, int i)
     if (strcmp(text, "-") == 0)
         return args_dash(spec, i) != ' '
                    ? ARGS_RUN
-                   : wrong(spec, "'-': a file's name is needed here, as it is "
-                                 "not read or written from end to end");
+                   : wrong(spec, "'-': a file name is needed here, as the file is not read or "
+                                 "written sequentially");
     return i == 1 ? check_ending(spec, text) : ARGS_RUN;
+}
+
+/* Adds the operand that --output gives. */
+static arg_result add_output(const parser *p, const char **operands, int *count)
+{
+    int at = (int)p->output_at;
+    if (!p->output || *count < at)
+        return ARGS_RUN;
+    if (*count > at)
+        return wrong(p->spec, "'%s' and --output '%s': give the output once", operands[at],
+                     p->output);
+    arg_result result = check_operand(p->spec, p->output, at);
+    operands[(*count)++] = p->output;
+    return result;
 }
 
 arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
                       const char *operands[ARGS_OPERANDS_MAX])
 {
-    parser p = { spec, argc, 1, argv, values };
+    parser p = { .spec = spec, .argc = argc, .at = 1, .argv = argv, .values = values };
     int count = 0;
     bool options = true;
     memset(operands, 0, ARGS_OPERANDS_MAX * sizeof *operands);
@@ -263,6 +294,9 @@ arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
         if (result != ARGS_RUN)
             return result;
     }
+    arg_result added = add_output(&p, operands, &count);
+    if (added != ARGS_RUN)
+        return added;
     if (count < spec->least)
         return wrong(spec, "missing operand%s; expected: %s", count ? "" : "s", spec->operands);
     return ARGS_RUN;
@@ -272,7 +306,7 @@ arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
 
 enum { HELP_WIDTH = 80, HELP_INDENT = 25 };
 
-/* Words in lines of HELP_WIDTH, those after the first one begun at `indent`. */
+/* Prints words in lines of HELP_WIDTH; lines after the first one begin at `indent`. */
 static void print_wrapped(const char *text, int indent)
 {
     int column = indent;
@@ -312,7 +346,20 @@ void args_help(const arg_spec *spec)
     if (spec->text)
         print_wrapped(spec->text, 0);
     printf("\noptions:\n");
+    const char *page = NULL;
     for (const arg_option *o = spec->options; o->name; o++)
-        help_one(o);
+        if (o->page)
+            page = o->page;
+        else
+            help_one(o);
     help_one(&help_option);
+    if (page)
+        printf("\nOptions for URLs: see 'ebpo help %s'.\n", page);
+}
+
+void args_help_page(const arg_spec *spec, const char *page)
+{
+    for (const arg_option *o = spec->options; o->name; o++)
+        if (o->page && strcmp(o->page, page) == 0)
+            help_one(o);
 }

@@ -5,7 +5,7 @@
 #include "cli/command.h"
 #include "cli/pose_args.h"
 
-enum { DEEPEST = 64 }; /* parentheses */
+enum { DEEPEST = 64 }; /* nested parentheses */
 
 typedef struct parsing {
     const char *name, *text, *at;
@@ -39,7 +39,7 @@ static bool read_atom(parsing *p, uint32_t *number)
     skip_blanks(p);
     if (*p->at == '(') {
         if (++p->depth > DEEPEST)
-            return fail_here(p, "too many parentheses in each other");
+            return fail_here(p, "too many nested parentheses");
         p->at++;
         if (!read_sum(p, number))
             return false;
@@ -50,7 +50,7 @@ static bool read_atom(parsing *p, uint32_t *number)
     } else if (*p->at >= 'A' && *p->at <= 'Z') {
         uint32_t operand = (uint32_t)(*p->at - 'A');
         if (operand >= p->operands)
-            return fail_here(p, "there is no such model");
+            return fail_here(p, "no such model");
         p->at++;
         if (!add_node(p, EBPO_BOOLEAN_OPERAND, operand, 0, number))
             return false;

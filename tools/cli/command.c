@@ -80,7 +80,7 @@ bool command_overwrites(const char *name, const char *in, const char *out)
     return true;
 }
 
-/* Of a regular file: nobody waits for what may come through a pipe. */
+/* Opens a regular file; never waits for data of a pipe. */
 static int open_regular(const char *name, const char *path)
 {
     struct stat st;
@@ -108,7 +108,7 @@ int command_is_hdf5(const char *name, const char *path)
     size_t size = 0;
     ssize_t got = 1;
     if (ebpo_is_url(path))
-        return 1; /* opening it will tell */
+        return 1; /* opening it reports the error */
     int fd = open_regular(name, path);
     if (fd < 0)
         return errno == ENOENT ? 1 : -1; /* likewise */
@@ -131,7 +131,8 @@ bool command_wants_hdf5(const char *name, const char *path)
     ebpo_error error = EBPO_ERROR_INIT;
     if (is_hdf5 != 0)
         return is_hdf5 > 0;
-    bool fine = ebpo_open(path, &file, &error) == EBPO_OK; /* else the library says what it is */
+    bool fine = ebpo_open(path, &file, &error) == EBPO_OK; /* otherwise the library reports the kind
+                                                            * of file */
     if (!fine)
         fprintf(stderr, "ebpo %s: %s\n", name, error.message);
     ebpo_close(file);
@@ -149,11 +150,11 @@ bool command_has_level(const char *name, const ebpo_info *info, int64_t level)
 
 static bool not_written(const char *name, int number)
 {
-    static bool said;
-    if (!said)
+    static bool reported;
+    if (!reported)
         fprintf(stderr, "ebpo%s%s: standard output: %s\n", name ? " " : "", name ? name : "",
                 number ? strerror(number) : "could not be written");
-    said = true;
+    reported = true;
     return false;
 }
 

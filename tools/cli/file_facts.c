@@ -81,7 +81,7 @@ static void print_model(FILE *out, const ebpo_info *info)
             info->max_level, info->leaf_faces);
     const ebpo_selection_traits *traits = ebpo_selection_describe((ebpo_selection)info->selection);
     if (!traits)
-        fputs("planes chosen in a way that this version does not know\n", out);
+        fputs("unknown selection of planes\n", out);
     else if (!traits->from_leaves && info->selection != EBPO_SELECT_INHERIT)
         fprintf(out, "selection %s, epsilon %g\n", traits->name, info->epsilon);
     else if (!traits->from_leaves)
@@ -117,7 +117,7 @@ static void print_subset(FILE *out, const ebpo_info *info)
         fprintf(out, "%s what meets %.9g,%.9g,%.9g,%.9g,%.9g,%.9g", info->cut_levels ? "," : "",
                 b[0], b[1], b[2], b[3], b[4], b[5]);
     if (info->kept_error > 0)
-        fprintf(out, "%s pruned where envelopes reach at most %.9g beyond the model",
+        fprintf(out, "%s pruned where envelopes extend at most %.9g beyond the model",
                 info->cut_levels || info->boxed ? "," : "", info->kept_error);
     fprintf(out, "; nothing below %llu pruned nodes\n            of the file with content %s\n",
             (unsigned long long)pruned_nodes(info), hex);
@@ -131,7 +131,7 @@ static uint64_t level_bytes(const ebpo_info *info, const ebpo_stored_sizes *stor
     return sum;
 }
 
-/* What the file holds besides: nothing, unless another program wrote it. */
+/* Returns the bytes of other data in the file: 0 unless another program wrote it. */
 static uint64_t other_bytes(const ebpo_info *info, const ebpo_stored_sizes *stored)
 {
     uint64_t sum = info->head_bytes + info->chunk_index_bytes + level_bytes(info, stored) +
@@ -163,7 +163,7 @@ void facts_print(FILE *out, const char *path, const ebpo_info *info,
     print_source(out, info);
     if (info->pruned)
         print_subset(out, info);
-    findings_print_mending(out, &info->mend);
+    findings_print_repair(out, &info->repair_record);
     print_model(out, info);
     fprintf(out, "  holds     %s; codec %s%s\n", words_parts(parts, sizeof parts, info->parts),
             words_codec(info->codec), info->gates ? "; faces across edges (gates)" : "");
@@ -391,7 +391,7 @@ static void json_storage(json *j, const ebpo_info *info, const ebpo_stored_sizes
     json_uint(j, "maps", stored->map_bytes);
     json_uint(j, "subtrees", stored->subtree_bytes);
     json_uint(j, "attributes", stored->attribute_bytes);
-    json_uint(j, "chunk_sums", stored->sum_bytes);
+    json_uint(j, "chunk_checksums", stored->sum_bytes);
     json_uint(j, "other", other_bytes(info, stored));
     json_end(j);
     if (!info->subtree_level)
@@ -414,7 +414,7 @@ void facts_json(json *j, const char *path, const ebpo_info *info, const ebpo_sto
     json_text(j, "generator", info->generator);
     json_source(j, info);
     json_model(j, info);
-    findings_json_mending(j, "mend", &info->mend);
+    findings_json_repair(j, "repair", &info->repair_record);
     findings_json(j, "report", &info->report, &solid);
     json_storage(j, info, stored);
     json_array(j, "levels");

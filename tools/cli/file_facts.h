@@ -1,4 +1,4 @@
-/* The facts of a file's head: tables and JSON. */
+/* Prints the facts of a file header as tables and JSON. */
 #ifndef EBPO_TOOLS_FILE_FACTS_H
 #define EBPO_TOOLS_FILE_FACTS_H
 
@@ -8,14 +8,14 @@
 #include "cli/json.h"
 #include "cli/solid_facts.h"
 
-/* Returns what it means that the integral of the winding number is negative; NULL: it is not. */
+/* Returns an explanation of a negative integral of the winding number; NULL: it is not negative. */
 const char *facts_inside_out(const ebpo_info *info);
-/* White nodes of a level without the places of pruned nodes' children. */
+/* Returns the number of white nodes of a level, without the child positions of pruned nodes. */
 uint64_t facts_white(const ebpo_info *info, int level);
-/* Bytes of the head and of levels 0 .. level. */
+/* Returns the bytes of the header and of levels 0 .. level. */
 uint64_t facts_cumulative(const ebpo_info *info, const ebpo_stored_sizes *stored, int level);
 
-/* `stored`: by ebpo_file_locate. */
+/* `stored`: from ebpo_file_locate. */
 void facts_print(FILE *out, const char *path, const ebpo_info *info,
                  const ebpo_stored_sizes *stored);
 void facts_table(FILE *out, const ebpo_info *info, const ebpo_stored_sizes *stored);
@@ -23,11 +23,11 @@ void facts_table(FILE *out, const ebpo_info *info, const ebpo_stored_sizes *stor
 void facts_json(json *j, const char *path, const ebpo_info *info, const ebpo_stored_sizes *stored,
                 const ebpo_shells *shells);
 
-/* The arrays of a file, in the order of their bytes. */
+/* Prints the arrays of a file by byte count. */
 void facts_arrays(FILE *out, const ebpo_file *file);
 void facts_arrays_json(json *j, const ebpo_file *file);
 
-/* The attributes of a file, with what their values reach. */
+/* Prints the attributes of a file with the ranges of their values. */
 void facts_attributes(FILE *out, const ebpo_file *file);
 void facts_attributes_json(json *j, const ebpo_file *file);
 

@@ -49,7 +49,7 @@ static void print_quoted(json *j, const char *text)
     fputc('"', j->out);
 }
 
-/* Comma, new line and key before a value. */
+/* Writes the comma, the line break and the key before a value. */
 static void begin_value(json *j, const char *key)
 {
     if (j->depth) {

@@ -24,8 +24,7 @@ bool memory_good(const char *command, const memory_values *v)
     return bytes >= EBPO_WORKSPACE_MIN;
 }
 
-/* Memory that is free again goes back to the system instead of waiting in each thread's heap: it
- * would count as resident. */
+/* Returns freed memory to the system; in the heaps of threads it would count as resident. */
 static void return_memory(void)
 {
 #ifdef __GLIBC__
@@ -40,6 +39,6 @@ ebpo_status memory_make(ebpo_workspace **out, const memory_values *v, ebpo_error
     return_memory();
     o.temp_dir = v->temp_dir;
     if (v->memory)
-        (void)words_read_size(v->memory, &o.memory); /* memory_good saw to it */
+        (void)words_read_size(v->memory, &o.memory); /* memory_good has checked it */
     return ebpo_workspace_new(&o, out, error);
 }

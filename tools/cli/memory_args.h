@@ -1,4 +1,4 @@
-/* --memory and --temp-dir, as commands that build or prove have them. */
+/* Options --memory and --temp-dir of commands that build or verify. */
 #ifndef EBPO_TOOLS_MEMORY_ARGS_H
 #define EBPO_TOOLS_MEMORY_ARGS_H
 
@@ -10,10 +10,10 @@ typedef struct memory_values {
     const char *memory, *temp_dir;
 } memory_values;
 
-/* False, with the usage message printed, when the values are none. */
+/* Returns false for invalid values, and prints the usage message. */
 bool memory_good(const char *command, const memory_values *v);
 
-/* The workspace that they ask for; they are without fault. */
+/* Creates the workspace of these values, which must be valid. */
 EBPO_MUST_USE ebpo_status memory_make(ebpo_workspace **out, const memory_values *v,
                                       ebpo_error *error);
 

@@ -1,4 +1,4 @@
-/* What a memory budget buys of a file, before anything is loaded. */
+/* Estimates memory use for a budget; loads nothing. */
 #ifndef EBPO_TOOLS_MEMORY_FACTS_H
 #define EBPO_TOOLS_MEMORY_FACTS_H
 

@@ -34,7 +34,7 @@ const char *advice_doubts(char *out, size_t size, const mesh_input *p)
     return out;
 }
 
-static const char *steps_text(char *out, size_t size, const ebpo_mend_record *r)
+static const char *steps_text(char *out, size_t size, const ebpo_repair_record *r)
 {
     snprintf(out, size, "%s%s%s%s", r->weld ? " --weld" : "",
              r->drop_duplicates ? " --drop-duplicates" : "", r->orient ? " --orient" : "",
@@ -68,7 +68,7 @@ static const char *volume_text(char text[FINDINGS_VOLUME], const ebpo_repair_try
     return findings_volume(text, &solid, &t->report, "");
 }
 
-/* Writes what solid a repair leaves. */
+/* Writes the solid that results from a repair. */
 static const char *left_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *t, ebpo_rule rule)
 {
     char volume[FINDINGS_VOLUME];
@@ -77,8 +77,8 @@ static const char *left_text(char text[FINDINGS_VOLUME], const ebpo_repair_try *
     return text;
 }
 
-/* What was tried; else where that is done. */
-static void say_remedy(FILE *out, const mesh_input *p)
+/* Prints the repair that was tried, or how to try repairs. */
+static void report_remedy(FILE *out, const mesh_input *p)
 {
     char steps[64], left[FINDINGS_VOLUME];
     if (p->tried && p->repairs.chosen >= 0) {
@@ -90,9 +90,9 @@ static void say_remedy(FILE *out, const mesh_input *p)
               "corners nearly coincide, or use a mesh editor",
               out);
     else
-        fputs(
-            "; 'ebpo check' without options tries which repairs leave a solid, --repair does them",
-            out);
+        fputs("; 'ebpo check' without options reports which repairs give a solid, --repair applies "
+              "them",
+              out);
 }
 
 static void warn_of_inside_out(FILE *out, const char *command, const char *path,
@@ -132,11 +132,11 @@ static void warn_of_repeated_positions(FILE *out, const char *command, const cha
             (unsigned long long)p->repeated.place[0], p->repeated.count > 1 ? ", ..." : "");
 }
 
-/* What dropping them was found to leave, if it was tried. */
+/* Returns the result of dropping them, if it was tried. */
 static const ebpo_repair_try *dropping_alone(const mesh_input *p)
 {
     for (uint64_t i = 0; p->tried && i < p->repairs.count; i++) {
-        const ebpo_mend_record *r = &p->repairs.tries[i].record;
+        const ebpo_repair_record *r = &p->repairs.tries[i].record;
         if (r->drop_duplicates && !r->orient && !r->fill_holes)
             return &p->repairs.tries[i];
     }
@@ -154,7 +154,7 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
     fputs(f->count > 1 ? ", ...): " : "): ", out);
     if (!t) {
         fprintf(out, "--drop-duplicates drops such%s\n",
-                p->tried ? "" : "; 'ebpo check' without options tells what that leaves");
+                p->tried ? "" : "; 'ebpo check' without options reports the result");
         return;
     }
     if (t->record.dropped_opposite)
@@ -172,12 +172,12 @@ static void warn_of_repeated(FILE *out, const char *command, const char *path, c
 }
 
 static void warn_of_opened(FILE *out, const char *command, const char *path,
-                           const ebpo_mend_record *r)
+                           const ebpo_repair_record *r)
 {
     fprintf(
         out,
         "ebpo %s: %s: WARNING: it was a solid before repeated faces were dropped, %llu of which "
-        "looked the other way than the one that stays; leave --drop-duplicates out\n",
+        "looked the other way than the one that stays; omit --drop-duplicates\n",
         command, path, (unsigned long long)r->dropped_opposite);
 }
 
@@ -201,14 +201,14 @@ void advice_warn(FILE *out, const char *command, const char *path, const mesh_in
     if (p->doubts & EBPO_DOUBT_OPEN)
         warn_of_surface(out, &p->prepared.report);
     else
-        fprintf(out, "WARNING: probably not the solid that was meant: %s",
+        fprintf(out, "WARNING: probably not the intended solid: %s",
                 advice_doubts(text, sizeof text, p));
     if (p->doubts != EBPO_DOUBT_INSIDE_OUT || p->tried)
-        say_remedy(out, p);
+        report_remedy(out, p);
     fputc('\n', out);
 }
 
-/* ---- what was tried ---- */
+/* ---- repairs tried ---- */
 
 static void print_try(FILE *out, const ebpo_repair_try *t, ebpo_rule rule)
 {
@@ -261,7 +261,7 @@ void advice_print(FILE *out, const mesh_input *p)
 {
     if (!p->tried)
         return;
-    fputs("  repairs tried, of each what it would leave:\n", out);
+    fputs("  repairs tried, with their results:\n", out);
     for (uint64_t i = 0; i < p->repairs.count; i++)
         print_try(out, &p->repairs.tries[i], p->rule);
 }
@@ -302,7 +302,7 @@ static void json_try(json *j, const ebpo_repair_try *t, ebpo_rule rule)
     json_end(j);
 }
 
-/* Writes null where no vertices are at one position: the report has all repeated faces then. */
+/* Writes null when no vertices coincide: then the report has all repeated faces. */
 static void json_repeated(json *j, const mesh_input *p)
 {
     if (!p->prepared.report.repeated_positions.count) {

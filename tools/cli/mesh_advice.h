@@ -1,4 +1,4 @@
-/* Whether a mesh is the solid that was meant, and which repairs would make it one. */
+/* Reports doubts about a mesh as a solid, and repairs that may help. */
 #ifndef EBPO_TOOLS_MESH_ADVICE_H
 #define EBPO_TOOLS_MESH_ADVICE_H
 
@@ -7,19 +7,20 @@
 #include "cli/json.h"
 #include "cli/mesh_input.h"
 
-/* A warning for a surface, and for a solid that is doubtful; nothing for another one. */
+/* Prints a warning for a surface and for a doubtful solid; otherwise nothing. */
 void advice_warn(FILE *out, const char *command, const char *path, const mesh_input *p);
 
-/* What each sequence of repairs would leave; nothing when none were tried. */
+/* Prints the result of each sequence of repairs; nothing when none was tried. */
 void advice_print(FILE *out, const mesh_input *p);
 
-/* Closed components that are cavities, inside out or in others, as mended; nothing without such. */
+/* Prints the closed components that are cavities, inside out or nested, after repairs; nothing when
+ * there are none. */
 void advice_print_shells(FILE *out, const mesh_input *p);
 
-/* Members "doubts" and "repairs". */
+/* Writes members "doubts" and "repairs". */
 void advice_json(json *j, const mesh_input *p);
 
-/* The doubts in words, with "; " between; for messages. */
+/* Writes the doubts in words, separated by "; ", for messages. */
 const char *advice_doubts(char *out, size_t size, const mesh_input *p);
 
 #endif

@@ -9,7 +9,7 @@
 #include "cli/tables.h"
 #include "cli/words.h"
 
-/* Findings in the order in which people want to read them. */
+/* Findings in the order of printing. */
 static const struct finding_text {
     size_t offset;
     const char *key, *one, *many, *place;
@@ -55,7 +55,7 @@ static const ebpo_finding *finding_of(const ebpo_mesh_report *report, int i)
 
 static int places_of(const ebpo_finding *f)
 {
-    return f->count < EBPO_FINDING_PLACES ? (int)f->count : EBPO_FINDING_PLACES;
+    return f->count < EBPO_FINDING_LOCATIONS ? (int)f->count : EBPO_FINDING_LOCATIONS;
 }
 
 static void print_places(FILE *out, const ebpo_finding *f, const char *place)
@@ -105,7 +105,7 @@ static void print_reading(FILE *out, const ebpo_mesh *mesh)
         fprintf(out, "  %s unrolled\n",
                 words_plural(text, sizeof text, mesh->strips, "triangle strip", "triangle strips"));
     if (mesh->polygons_dropped)
-        fprintf(out, "  %s with fewer than three corners left out\n",
+        fprintf(out, "  %s with fewer than three corners omitted\n",
                 words_plural(text, sizeof text, mesh->polygons_dropped, "polygon", "polygons"));
 }
 
@@ -137,13 +137,13 @@ ebpo_solid_volume findings_solid(const ebpo_mesh_report *report, ebpo_rule rule,
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_solid_volume solid = EBPO_SOLID_VOLUME_INIT;
-    /* which fails for another size of the struct only */
+    /* which fails only when the struct has another size */
     if (ebpo_solid_volume_of(report, rule, shells, info, &solid, &error) != EBPO_OK)
         solid.hi = INFINITY;
     return solid;
 }
 
-/* Writes a bound with six digits, rounded away from what it bounds. */
+/* Writes a bound with six digits, rounded outward. */
 static const char *bound_text(char text[40], double x, bool up)
 {
     double step = x > 0 ? pow(10, floor(log10(x)) - 5) : 0;
@@ -175,7 +175,7 @@ const char *findings_volume(char text[FINDINGS_VOLUME], const ebpo_solid_volume 
     return text;
 }
 
-/* Returns what to print behind a measure that is beyond the range of doubles. */
+/* Returns a note for a measure beyond the range of doubles. */
 static const char *beyond_text(double x, const char *text)
 {
     bool printed = (isfinite(x) && fabs(x) >= DBL_MIN) || text[0] == '0';
@@ -213,10 +213,10 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
     print_reading(out, mesh);
     print_findings(out, report);
     if (!crossings_follow)
-        fputs("  not looked for: faces that cross one another (ebpo check --crossings)\n", out);
+        fputs("  not checked: intersecting faces (ebpo check --crossings)\n", out);
 }
 
-void findings_print_mending(FILE *out, const ebpo_mend_record *r)
+void findings_print_repair(FILE *out, const ebpo_repair_record *r)
 {
     char text[80];
     if (r->weld) {
@@ -267,7 +267,7 @@ static void json_finding(json *j, const char *key, const ebpo_finding *f)
 {
     json_object(j, key);
     json_uint(j, "count", f->count);
-    json_array(j, "places");
+    json_array(j, "locations");
     for (int i = 0; i < places_of(f); i++)
         json_uint(j, NULL, f->place[i]);
     json_end(j);
@@ -305,7 +305,7 @@ void findings_json(json *j, const char *key, const ebpo_mesh_report *report,
     json_end(j);
 }
 
-void findings_json_mending(json *j, const char *key, const ebpo_mend_record *r)
+void findings_json_repair(json *j, const char *key, const ebpo_repair_record *r)
 {
     json_object(j, key);
     json_bool(j, "weld", r->weld);
@@ -343,8 +343,8 @@ void findings_json_source(json *j, const char *key, const ebpo_mesh *mesh, const
     json_uint(j, "polygons_dropped", mesh->polygons_dropped);
     json_uint(j, "strips", mesh->strips);
     if (unread[0])
-        json_text(j, "left_out", unread);
+        json_text(j, "omitted", unread);
     else
-        json_null(j, "left_out");
+        json_null(j, "omitted");
     json_end(j);
 }

@@ -7,30 +7,31 @@
 #include "cli/command.h"
 #include "cli/mesh_findings.h"
 
-static bool steps_given(mending asked)
+static bool steps_given(repairing queried)
 {
-    return asked.weld || asked.drop_duplicates || asked.orient || asked.flip || asked.fill_holes;
+    return queried.weld || queried.drop_duplicates || queried.orient || queried.flip ||
+           queried.fill_holes;
 }
 
-int mending_check(const char *command, mending asked)
+int repair_check(const char *command, repairing queried)
 {
-    if (asked.repair && steps_given(asked))
+    if (queried.repair && steps_given(queried))
         return command_usage(command,
                              "--repair chooses from --weld, --drop-duplicates, --orient and "
-                             "--fill-holes; leave these and --flip out");
-    if (asked.weld && asked.weld_distance > 0)
-        return command_usage(command, "--weld-distance merges what --weld does, too; choose one");
-    if (asked.orient && asked.flip)
-        return command_usage(command, "--orient says which way faces look; leave out --flip");
+                             "--fill-holes; omit these and --flip");
+    if (queried.weld && queried.weld_distance > 0)
+        return command_usage(command, "--weld-distance includes --weld; choose one");
+    if (queried.orient && queried.flip)
+        return command_usage(command, "--orient sets the orientation of faces; omit --flip");
     return EXIT_FINE;
 }
 
-/* What the first of two preparations did has been done as well. */
+/* Adds the effects of the first of two preparations. */
 static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
 {
-    ebpo_mend_record *a = &first->record;
-    const ebpo_mend_record *b = &second->record;
-    first->mended = true;
+    ebpo_repair_record *a = &first->record;
+    const ebpo_repair_record *b = &second->record;
+    first->was_repaired = true;
     first->report = second->report;
     a->weld |= b->weld;
     a->drop_duplicates |= b->drop_duplicates;
@@ -51,7 +52,7 @@ static void join_preparations(ebpo_prepared *first, const ebpo_prepared *second)
 
 static ebpo_status do_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_error *error)
 {
-    const ebpo_mend_record *steps = &p->repairs.tries[p->repairs.chosen].record;
+    const ebpo_repair_record *steps = &p->repairs.tries[p->repairs.chosen].record;
     ebpo_prepared again = EBPO_PREPARED_INIT;
     how->weld = steps->weld;
     how->weld_distance = 0;
@@ -64,18 +65,18 @@ static ebpo_status do_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_erro
     return status;
 }
 
-static ebpo_status try_and_repair(mesh_input *p, mending asked, ebpo_prepare_options *how,
+static ebpo_status try_and_repair(mesh_input *p, repairing queried, ebpo_prepare_options *how,
                                   ebpo_error *error)
 {
-    if (steps_given(asked) || !(asked.repair || asked.advise))
+    if (steps_given(queried) || !(queried.repair || queried.advise))
         return EBPO_OK;
     ebpo_status status = ebpo_mesh_try_repairs(&p->mesh, &p->prepared.report, how->threads,
                                                how->progress, &p->repairs, error);
     p->tried = status == EBPO_OK && p->repairs.count > 0;
-    return p->tried && asked.repair && p->repairs.chosen >= 0 ? do_chosen(p, how, error) : status;
+    return p->tried && queried.repair && p->repairs.chosen >= 0 ? do_chosen(p, how, error) : status;
 }
 
-/* Where no vertices are at one position, the check has counted them. */
+/* When no vertices coincide, the check has counted them. */
 static ebpo_status count_repeated(mesh_input *p, unsigned threads, ebpo_error *error)
 {
     p->repeated = p->prepared.report.repeated_faces;
@@ -87,7 +88,7 @@ static ebpo_status count_repeated(mesh_input *p, unsigned threads, ebpo_error *e
     return status;
 }
 
-/* Counts shells. Of one that is a 2-manifold the volume's sign says which way it looks. */
+/* Counts shells. The sign of the volume of a 2-manifold shell gives its orientation. */
 static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *how, ebpo_error *error)
 {
     const ebpo_mesh_report *r = &p->prepared.report;
@@ -100,11 +101,11 @@ static ebpo_status count_shells(mesh_input *p, const ebpo_prepare_options *how, 
 
 ebpo_solid_volume mesh_input_solid(const mesh_input *p, bool after)
 {
-    bool same_mesh = after || !p->prepared.mended;
+    bool same_mesh = after || !p->prepared.was_repaired;
     ebpo_solid_volume solid =
         findings_solid(after ? &p->prepared.report : &p->prepared.before, p->rule,
                        same_mesh && p->counted ? &p->shells : NULL, NULL);
-    /* a component that runs along itself counts twice there */
+    /* a component that coincides with itself counts twice there */
     if (same_mesh && p->repeated_same) {
         solid.lo = 0;
         solid.hi = INFINITY;
@@ -112,7 +113,7 @@ ebpo_solid_volume mesh_input_solid(const mesh_input *p, bool after)
     return solid;
 }
 
-ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending asked,
+ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repairing queried,
                                    mesh_reading more, ebpo_mesh_groups **groups,
                                    ebpo_workspace *workspace, unsigned threads,
                                    ebpo_progress progress, ebpo_error *error)
@@ -124,12 +125,12 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
     how.workspace = workspace;
     how.attributes = more != READ_MESH;
     how.embed_textures = more == READ_TEXTURES;
-    wanted.weld = asked.weld;
-    wanted.weld_distance = asked.weld_distance;
-    wanted.drop_duplicates = asked.drop_duplicates;
-    wanted.orient = asked.orient;
-    wanted.flip = asked.flip;
-    wanted.fill_holes = asked.fill_holes;
+    wanted.weld = queried.weld;
+    wanted.weld_distance = queried.weld_distance;
+    wanted.drop_duplicates = queried.drop_duplicates;
+    wanted.orient = queried.orient;
+    wanted.flip = queried.flip;
+    wanted.fill_holes = queried.fill_holes;
     memset(out, 0, sizeof *out);
     out->prepared = (ebpo_prepared)EBPO_PREPARED_INIT;
     out->repairs = (ebpo_repairs)EBPO_REPAIRS_INIT;
@@ -137,14 +138,14 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
                                 : ebpo_mesh_read(path, &how, &out->mesh, error);
     if (status != EBPO_OK)
         return status;
-    const char *unread = ebpo_mesh_unread(&out->mesh);
+    const char *unread = ebpo_mesh_ignored(&out->mesh);
     snprintf(out->unread, sizeof out->unread, "%s", unread ? unread : "");
     out->as_read = out->mesh;
     out->as_read.faces = NULL;
     out->as_read.attributes = NULL;
     status = ebpo_mesh_prepare(&out->mesh, &wanted, &out->prepared, error);
     if (status == EBPO_OK)
-        status = try_and_repair(out, asked, &wanted, error);
+        status = try_and_repair(out, queried, &wanted, error);
     if (status == EBPO_OK)
         status = count_repeated(out, threads, error);
     if (status == EBPO_OK)
@@ -161,19 +162,18 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending as
     return status;
 }
 
-ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked, mesh_reading more,
+ebpo_status mesh_input_read(mesh_input *out, const char *path, repairing queried, mesh_reading more,
                             ebpo_workspace *workspace, unsigned threads, ebpo_progress progress,
                             ebpo_error *error)
 {
-    return mesh_input_read_groups(out, path, asked, more, NULL, workspace, threads, progress,
+    return mesh_input_read_groups(out, path, queried, more, NULL, workspace, threads, progress,
                                   error);
 }
 
 void mesh_input_warn(const char *command, const char *path, const mesh_input *input)
 {
     if (input->unread[0])
-        fprintf(stderr, "ebpo %s: %s: warning: left out in reading: %s\n", command, path,
-                input->unread);
+        fprintf(stderr, "ebpo %s: %s: warning: not read: %s\n", command, path, input->unread);
     const ebpo_mesh *m = &input->as_read;
     if (m->polygons_guessed)
         fprintf(stderr,

@@ -1,4 +1,4 @@
-/* The mesh that a command is given: read, mended as asked, checked; and the options for that. */
+/* Reads, repairs and checks the input mesh of a command, and defines the options. */
 #ifndef EBPO_TOOLS_MESH_INPUT_H
 #define EBPO_TOOLS_MESH_INPUT_H
 
@@ -8,57 +8,59 @@
 
 #include "cli/args.h"
 
-typedef struct mending {
+typedef struct repairing {
     bool weld, drop_duplicates, orient, flip, fill_holes;
-    bool repair;          /* the shortest sequence of these that leaves a plausible solid */
-    double weld_distance; /* above 0: vertices are merged within it, before repairs are tried */
-    bool advise;          /* no option: without any of these, find out which one that is */
-} mending;
+    bool repair;          /* apply the shortest sequence of these that gives a plausible solid */
+    double weld_distance; /* above 0: merges vertices within it before repairs are tried */
+    bool advise;          /* no option: without any of these, search the repairs that `repair` would
+                           * apply */
+} repairing;
 
 typedef struct mesh_input {
-    ebpo_mesh mesh;         /* as mended */
-    ebpo_mesh as_read;      /* facts only; its array pointers tell which there were, no more */
-    char unread[512];       /* ebpo_mesh_unread; empty: nothing was left out */
-    ebpo_prepared prepared; /* what was found and mended */
-    bool tried;             /* repairs, which `repairs` tells of */
+    ebpo_mesh mesh;         /* after repairs */
+    ebpo_mesh as_read;      /* facts only; its array pointers only show which arrays existed */
+    char unread[512];       /* result of ebpo_mesh_ignored; empty: everything was read */
+    ebpo_prepared prepared; /* findings and repairs made */
+    bool tried;             /* repairs were tried; their results are in `repairs` */
     ebpo_repairs repairs;
-    /* faces at the positions of an earlier one, of the mesh as mended; of these, where vertices are
-     * at one position, those that look the other way and those that look the same way */
+    /* faces at the positions of an earlier face, in the repaired mesh; when vertices coincide, also
+     * the counts with the opposite and with the same orientation */
     ebpo_finding repeated;
     uint64_t repeated_opposite, repeated_same;
-    bool counted; /* closed components, which `shells` tells of */
+    bool counted; /* closed components were counted in `shells` */
     ebpo_shells shells;
-    uint32_t doubts; /* ebpo_doubt, of the mesh as mended */
-    ebpo_rule rule;  /* of the solid; set by the caller, else nonzero */
+    uint32_t doubts; /* ebpo_doubt, of the repaired mesh */
+    ebpo_rule rule;  /* rule of the solid; set by the caller, default nonzero */
 } mesh_input;
 
-/* EXIT_USAGE with a message when --repair is given with what it chooses from. */
-int mending_check(const char *command, mending asked);
+/* Returns EXIT_USAGE with a message when --repair is combined with options that it chooses itself.
+ */
+int repair_check(const char *command, repairing queried);
 
-/* What is read beside positions and corners. */
+/* Data that is read beside positions and corners. */
 typedef enum mesh_reading {
     READ_MESH,
     READ_ATTRIBUTES,
-    READ_TEXTURES /* and the bytes of images that it names */
+    READ_TEXTURES /* and the bytes of the named images */
 } mesh_reading;
 
-/* On failure nothing is left to free; else ebpo_mesh_free(&out->mesh). */
-EBPO_MUST_USE ebpo_status mesh_input_read(mesh_input *out, const char *path, mending asked,
+/* On failure nothing is left to free; otherwise call ebpo_mesh_free(&out->mesh). */
+EBPO_MUST_USE ebpo_status mesh_input_read(mesh_input *out, const char *path, repairing queried,
                                           mesh_reading more, ebpo_workspace *workspace,
                                           unsigned threads, ebpo_progress progress,
                                           ebpo_error *error);
 
-/* With the file's groups: see ebpo_mesh_read_groups. */
-EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, mending asked,
-                                                 mesh_reading more, ebpo_mesh_groups **groups,
+/* Also reads the groups of the file: see ebpo_mesh_read_groups. */
+EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *path,
+                                                 repairing queried, mesh_reading more,
+                                                 ebpo_mesh_groups **groups,
                                                  ebpo_workspace *workspace, unsigned threads,
                                                  ebpo_progress progress, ebpo_error *error);
 
-/* Returns what is known of the solid's volume, before or after mending. */
+/* Returns the bounds of the volume of the solid, before or after repairs. */
 ebpo_solid_volume mesh_input_solid(const mesh_input *input, bool after);
 
-/* Warns where the file holds or names what reading it left out, and of triangles that are a guess.
- */
+/* Warns of file contents that were not read, and of ambiguous triangulations. */
 void mesh_input_warn(const char *command, const char *path, const mesh_input *input);
 
 #endif

@@ -1,16 +1,17 @@
-/* How much of a model is held where --memory does not say it. */
+/* Sets the default memory budget of a model. */
 #ifndef EBPO_TOOLS_MODEL_MEMORY_H
 #define EBPO_TOOLS_MODEL_MEMORY_H
 
 #include <ebpo/query.h>
 
-/* Sets `options->memory`: all of the model where it takes at most half of what is free, else half
- * of it, else the least that will do, of which standard error is told. A file on a server keeps the
- * library's usual budget. */
-void model_memory_usual(const char *command, const ebpo_file *file, const char *path,
-                        ebpo_model_options *options);
+/* Sets `options->memory`: the whole model when it takes at most half of the free memory, else half
+ * of it, else the minimum, with a note on standard error. Remote files keep the default budget of
+ * the library. */
+void model_memory_default(const char *command, const ebpo_file *file, const char *path,
+                          ebpo_model_options *options);
 
-/* The note, where `least` bytes are more than `half` of what is free. */
-void model_memory_tell_least(const char *command, const char *what, uint64_t least, uint64_t half);
+/* Prints the note, when `least` bytes are more than `half` of the free memory. */
+void model_memory_report_least(const char *command, const char *what, uint64_t least,
+                               uint64_t half);
 
 #endif

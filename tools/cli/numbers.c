@@ -7,14 +7,14 @@
 
 /* --- reading --- */
 
-/* What may stand behind a number: then the fast reader and strtod saw the same one. */
+/* Characters that may follow a number: then the fast reader and strtod read the same number. */
 static bool ends_number(char c)
 {
     return c == 0 || c == ' ' || c == '\t' || c == ',' || c == '\r' || c == '\v' || c == '\f' ||
            c == '#' || c == '\n';
 }
 
-/* Microsoft's C library writes 1.#INF, 1.#IND, 1.#QNAN and 1.#SNAN for what is not finite: the
+/* Microsoft's C library writes 1.#INF, 1.#IND, 1.#QNAN and 1.#SNAN for non-finite numbers: the
  * number does not end before the '#'. */
 static double pass_names(double v, const char **after)
 {
@@ -27,7 +27,7 @@ static double pass_names(double v, const char **after)
     return NAN;
 }
 
-/* Hexadecimal numbers, those beyond the range and all that is wrong are strtod's. */
+/* strtod reads hexadecimal numbers, numbers beyond the range and invalid text. */
 double number_read(const char *text, const char *end, const char **after)
 {
     double v = 0;
@@ -56,7 +56,7 @@ static char *digits_of(char *out, double v)
 {
     int length = 0;
     for (int more = 0; more <= 16; more++) {
-        length = snprintf(out, NUMBER_ROOM, "%.*e", more, v);
+        length = snprintf(out, NUMBER_CAPACITY, "%.*e", more, v);
         if (strtod(out, NULL) == v)
             break;
     }
@@ -73,7 +73,7 @@ static char *put_zeros(char *out, int count)
     return count > 0 ? out + count : out;
 }
 
-/* Digits "123" of 1.23e`exponent` without an exponent, which is -4 to 16. */
+/* Writes digits "123" of 1.23e`exponent` without an exponent, which is -4 to 16. */
 static char *write_fixed(char *out, const char *digits, int count, int exponent)
 {
     int whole = exponent < 0 ? 0 : exponent + 1 < count ? exponent + 1 : count;
@@ -90,9 +90,9 @@ static char *write_fixed(char *out, const char *digits, int count, int exponent)
 
 char *number_write(char *out, double v)
 {
-    char text[NUMBER_ROOM + 1], digits[NUMBER_ROOM];
+    char text[NUMBER_CAPACITY + 1], digits[NUMBER_CAPACITY];
     if (!isfinite(v))
-        return out + snprintf(out, NUMBER_ROOM, "%g", v);
+        return out + snprintf(out, NUMBER_CAPACITY, "%g", v);
     if (signbit(v))
         *out++ = '-';
     if (v == 0) {

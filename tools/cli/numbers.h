@@ -1,23 +1,24 @@
-/* Numbers in text, exact both ways: read as strtod reads them, printed with the fewest digits that
- * read back as the same double. Any thread; the program never leaves the "C" locale. */
+/* Converts numbers and text exactly: reads as strtod does, prints the fewest digits that read back
+ * as the same double. Any thread; the program never leaves the "C" locale. */
 #ifndef EBPO_TOOLS_NUMBERS_H
 #define EBPO_TOOLS_NUMBERS_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Room for what the functions below print, which ends without a zero byte. */
-enum { NUMBER_ROOM = 32 };
+/* Size of the output of the functions below, which has no zero byte at its end. */
+enum { NUMBER_CAPACITY = 32 };
 
-/* The number at `text`, which is followed by something that no number goes on with, a zero byte at
- * last: *after it, or `text` where there is none. Never before `end`, which is where the line's
- * text ends. */
+/* Reads the number at `text`, which must end in a character that continues no number, at the latest
+ * a zero byte. *after: its end, or `text` when there is none. It never ends before `end`, the end
+ * of the text of the line. */
 double number_read(const char *text, const char *end, const char **after);
 
-/* Returns where a file's text begins: behind a mark of the order of bytes, if there is one. */
+/* Returns the beginning of the text of a file, after a byte order mark, if any. */
 const char *number_skip_mark(const char *text);
 
-/* Where it ends. The layout is that of printf's %.17g; not finite: inf, -inf, nan, -nan. */
+/* Returns the end of the output. The layout is that of printf's %.17g; not finite: inf, -inf, nan,
+ * -nan. */
 char *number_write(char *out, double v);
 char *number_write_uint(char *out, uint64_t v);
 char *number_write_int(char *out, int64_t v);
@@ -25,8 +26,8 @@ char *number_write_int(char *out, int64_t v);
 #ifdef __cplusplus
 extern "C" {
 #endif
-/* The two halves that the C++ library does, where it is there (EBPO_HAVE_CHARCONV).
- * False: strtod shall decide. Digits: as printf's %e, but as few as will do; where they end. */
+/* Parts done by the C++ library, when available (EBPO_HAVE_CHARCONV). False: strtod decides.
+ * Digits: as printf's %e, with the fewest digits; returns their end. */
 bool number_charconv_read(const char *text, const char *end, const char **after, double *out);
 char *number_charconv_digits(char *out, double v);
 #ifdef __cplusplus

@@ -1,4 +1,4 @@
-// The C++ library's conversions: correctly rounded, the fewest digits, no locale, several times as
+// Conversions of the C++ library: correctly rounded, the fewest digits, no locale, several times as
 // fast as strtod and printf.
 #include "cli/numbers.h"
 
@@ -13,5 +13,5 @@ bool number_charconv_read(const char *text, const char *end, const char **after,
 
 char *number_charconv_digits(char *out, double v)
 {
-    return std::to_chars(out, out + NUMBER_ROOM, v, std::chars_format::scientific).ptr;
+    return std::to_chars(out, out + NUMBER_CAPACITY, v, std::chars_format::scientific).ptr;
 }

@@ -73,7 +73,7 @@ void points_close(points *p)
 
 /* --- blocks --- */
 
-static bool block_room(points_block *b, size_t bytes)
+static bool block_capacity(points_block *b, size_t bytes)
 {
     if (b->capacity < bytes) {
         free(b->bytes);
@@ -101,7 +101,7 @@ static const char *last_line_end(const char *text, size_t bytes)
 #endif
 }
 
-/* Whole lines, as many as are there; the last one may lack its end. */
+/* Takes all complete lines; the last line may lack its line end. */
 static void take_lines(points *p, points_block *b)
 {
     size_t whole = 0, looked = 0;
@@ -129,7 +129,7 @@ static void take_lines(points *p, points_block *b)
     }
 }
 
-/* A copy that broke off between two rows, or bytes behind the last one. */
+/* Detects a truncated copy and bytes behind the last row. */
 static void check_rows(points *p, points_block *b, uint64_t more)
 {
     p->rows_taken += more;
@@ -140,7 +140,7 @@ static void check_rows(points *p, points_block *b, uint64_t more)
                      p->rows_taken > p->rows_total ? "something else" : "cut short");
 }
 
-/* Whole rows, as many as are there. */
+/* Takes all complete rows. */
 static void take_numbers(points *p, points_block *b)
 {
     size_t each = (size_t)(p->layout.per_row * p->layout.bytes), most = p->together * each;
@@ -153,11 +153,11 @@ static void take_numbers(points *p, points_block *b)
         keep_rest(p, b, b->count - left);
     else if (left && !b->failed)
         points_fault(b, 0,
-                     "%zu bytes are left over at the end, but each item takes %zu; the input is "
-                     "cut short or is something else",
+                     "%zu bytes remain at the end, but each item takes %zu; the input is "
+                     "truncated or in another format",
                      left, each);
     b->count -= p->ended ? left : 0;
-    if (p->rows_told)
+    if (p->rows_reported)
         check_rows(p, b, b->count / each);
 }
 
@@ -199,7 +199,7 @@ bool points_take(points *p, points_block *b)
     }
     size_t bytes =
         p->raw ? p->together * (size_t)(p->layout.per_row * p->layout.bytes) : (size_t)POINTS_LINE;
-    if (!block_room(b, bytes > p->rest_count ? bytes : p->rest_count))
+    if (!block_capacity(b, bytes > p->rest_count ? bytes : p->rest_count))
         return p->ended = true;
     memcpy(b->bytes, p->rest, p->rest_count);
     b->count = p->rest_count;
@@ -216,8 +216,8 @@ bool points_take(points *p, points_block *b)
 
 /* --- in order --- */
 
-/* Places are told as people count: lines, or points from 1. */
-static void say_fault(const points *p, const points_block *b)
+/* Reports positions as lines, or as points from 1. */
+static void report_fault(const points *p, const points_block *b)
 {
     static const char *const names[] = { "point", "ray", "box" };
     fprintf(stderr, "ebpo %s: %s: ", p->command, p->name);
@@ -235,7 +235,7 @@ static void say_fault(const points *p, const points_block *b)
 bool points_pass(points *p, points_block *b)
 {
     if (b->failed)
-        say_fault(p, b);
+        report_fault(p, b);
     p->failed |= b->failed;
     p->line += b->lines;
     p->row += b->row_count;

@@ -18,7 +18,7 @@ static bool fail_cut(points *p, const char *what)
     return false;
 }
 
-/* From here on only bytes `from` to `to` of the file are taken. */
+/* Limits reading to bytes `from` to `to` of the file. */
 static bool limit_bytes(points *p, uint64_t from, uint64_t to)
 {
     p->rest_count = 0;
@@ -34,16 +34,16 @@ static bool limit_bytes(points *p, uint64_t from, uint64_t to)
 static bool cut_numbers(points *p, uint64_t begin, uint64_t size, uint64_t number, uint64_t of)
 {
     uint64_t each = (uint64_t)(p->layout.per_row * p->layout.bytes), rows = (size - begin) / each;
-    if (p->rows_told && (size - begin) / each != p->rows_total)
+    if (p->rows_reported && (size - begin) / each != p->rows_total)
         return fail_cut(p, rows > p->rows_total
-                               ? "holds more rows than its shape tells; it is something else"
-                               : "holds fewer rows than its shape tells; it is cut short");
+                               ? "holds more rows than its shape states; it is in another format"
+                               : "holds fewer rows than its shape states; it is truncated");
     uint64_t first = points_share(rows, number, of), end = points_share(rows, number + 1, of);
     p->row = first;
-    p->rows_told = false; /* that was looked at here */
+    p->rows_reported = false; /* which was checked here */
     p->rows_known = true;
     p->rows_total = end - first;
-    /* what is left over behind the last row is told by the last part */
+    /* the last part reports the bytes behind the last row */
     return limit_bytes(p, begin + first * each, number + 1 < of ? begin + end * each : size);
 }
 
@@ -59,8 +59,8 @@ static bool cut_held(points *p, uint64_t number, uint64_t of)
 
 /* --- text --- */
 
-/* The beginning of the first line that begins at `at` or behind it, of a file of `size` bytes;
- * UINT64_MAX after an error (said on stderr). `begin`: of the first line. */
+/* Returns the beginning of the first line that begins at `at` or later, in a file of `size` bytes;
+ * UINT64_MAX after an error (reported on stderr). `begin`: of the first line. */
 static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
 {
     char piece[1 << 14];
@@ -82,8 +82,8 @@ static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
     return size;
 }
 
-/* All parts need the names of columns, and lines after them are what is shared. `begin`: of the
- * first line; *out is that of the first one behind the names. */
+/* All parts need the names of columns; the lines after the names are shared out. `begin`: of the
+ * first line; *out: of the first line after the names. */
 static bool take_names(points *p, uint64_t begin, uint64_t *out)
 {
     points_block b = { .bytes = malloc(POINTS_LINE + 1), .first = true };
@@ -124,7 +124,7 @@ bool points_cut(points *p, uint64_t number, uint64_t of)
 {
     struct stat st = { .st_size = 0 };
     if (!p->held && (p->fd < 0 || fstat(p->fd, &st) != 0 || !S_ISREG(st.st_mode)))
-        return fail_cut(p, "is no file, of which a shard could take its part");
+        return fail_cut(p, "is not a file; a shard needs a file");
     if (!points_begin(p))
         return false;
     if (p->held)

@@ -1,4 +1,4 @@
-/* What kind of file holds the points: told by its first bytes. */
+/* Recognises the format of points by the first bytes. */
 #include <ebpo/mesh.h>
 #include <ebpo/rows.h>
 #include <inttypes.h>
@@ -31,14 +31,14 @@ static bool read_ply(points *p, points_block *b)
         p->failed = true;
         return false;
     }
-    p->from_zero = true; /* vertices are numbered from 0 everywhere */
+    p->from_zero = true; /* vertices are counted from 0 everywhere */
     p->rows_known = true;
     return true;
 }
 
 /* --- NumPy arrays --- */
 
-/* The word behind 'name': in the head, which is a Python dictionary; or NULL. */
+/* Returns the word behind 'name': in the header, which is a Python dictionary; or NULL. */
 static const char *npy_value(const char *head, const char *name)
 {
     const char *at = strstr(head, name);
@@ -51,19 +51,19 @@ static const char *npy_value(const char *head, const char *name)
 static bool npy_type(points *p, const char *descr)
 {
     if (strnlen(descr, 5) < 5)
-        return false; /* the head ends in it */
+        return false; /* the header ends in it */
     p->layout.big_endian = descr[1] == '>';
     p->layout.bytes = descr[3] == '4' ? 4 : 8;
     return strchr("<>", descr[1]) && descr[2] == 'f' && strchr("48", descr[3]) && descr[4] == '\'';
 }
 
-/* Reads a count of at most 18 digits, so that it overflows nothing, and the blanks around it. */
+/* Reads a count of at most 18 digits, which cannot overflow, and the blanks around it. */
 static bool npy_count(const char **at, uint64_t *count)
 {
-    enum { DIGITS_MOST = 18 };
+    enum { DIGITS_MAX = 18 };
     *at += strspn(*at, " ");
     size_t digits = strspn(*at, "0123456789");
-    if (digits == 0 || digits > DIGITS_MOST)
+    if (digits == 0 || digits > DIGITS_MAX)
         return false;
     *count = strtoull(*at, NULL, 10);
     *at += digits;
@@ -71,7 +71,7 @@ static bool npy_count(const char **at, uint64_t *count)
     return true;
 }
 
-/* Reads "(N, 3)"; "(3,)" is one row. Blanks may be anywhere, a comma behind the last number. */
+/* Reads "(N, 3)"; "(3,)" is one row. Allows blanks anywhere and a comma after the last number. */
 static bool npy_shape(points *p, const char *shape)
 {
     uint64_t rows = 1, columns = 0;
@@ -91,7 +91,7 @@ static bool npy_shape(points *p, const char *shape)
         return false;
     p->layout.per_row = (int)columns;
     p->rows_total = rows;
-    p->rows_known = p->rows_told = true;
+    p->rows_known = p->rows_reported = true;
     return true;
 }
 
@@ -100,13 +100,13 @@ static bool npy_head(points *p, points_block *b, const char *head)
     const char *descr = npy_value(head, "'descr'"), *order = npy_value(head, "'fortran_order'"),
                *shape = npy_value(head, "'shape'");
     if (!descr || !order || !shape)
-        return points_fault(b, 0, "has a head that is no NumPy array's");
+        return points_fault(b, 0, "has no valid NumPy header");
     if (*descr == '[')
         return points_fault(b, 0,
-                            "holds numbers with names; save "
+                            "holds named fields; save "
                             "numpy.lib.recfunctions.structured_to_unstructured of it");
     if (*descr != '\'')
-        return points_fault(b, 0, "has a head that is no NumPy array's");
+        return points_fault(b, 0, "has no valid NumPy header");
     if (!npy_type(p, descr))
         return points_fault(b, 0, "holds numbers of type %.*s; give float64 or float32 (astype)",
                             (int)strcspn(descr + 1, "'") + 2, descr);
@@ -121,7 +121,7 @@ static bool npy_head(points *p, points_block *b, const char *head)
     return true;
 }
 
-/* Magic, version, length of the head, head, numbers. */
+/* Reads magic, version, length of the header, header, numbers. */
 static bool read_npy(points *p, points_block *b)
 {
     enum { BEFORE = 12, LONGEST = 1 << 16 };
@@ -129,7 +129,7 @@ static bool read_npy(points *p, points_block *b)
     while (p->rest_count < BEFORE && !p->ended && points_fill(p, b))
         ;
     if (!b->failed && p->rest_count < BEFORE)
-        return points_fault(b, 0, "has a head that is no NumPy array's");
+        return points_fault(b, 0, "has no valid NumPy header");
     const uint8_t *u = (const uint8_t *)p->rest;
     size_t before = u[6] == 1 ? 10 : 12,
            length = u[6] == 1 ? (size_t)u[8] | (size_t)u[9] << 8
@@ -140,14 +140,14 @@ static bool read_npy(points *p, points_block *b)
     if (b->failed)
         return false;
     if (u[6] < 1 || u[6] > 3)
-        return points_fault(b, 0, "is a NumPy array of version %d.%d; 1.0 to 3.0 are known", u[6],
+        return points_fault(b, 0, "is a NumPy array of version %d.%d; supported: 1.0 to 3.0", u[6],
                             u[7]);
     if (p->rest_count < before + length || length >= sizeof head)
-        return points_fault(b, 0, "has a head that is no NumPy array's");
+        return points_fault(b, 0, "has no valid NumPy header");
     memcpy(head, p->rest + before, length);
     head[length] = 0;
     for (char *quote = head; (quote = strchr(quote, '"'));)
-        *quote = '\''; /* Python has both */
+        *quote = '\''; /* Python uses both */
     points_drop(p, before + length);
     p->raw = true;
     return npy_head(p, b, head);
@@ -155,7 +155,7 @@ static bool read_npy(points *p, points_block *b)
 
 /* --- HDF5 datasets --- */
 
-/* The colon in "FILE.h5:/path"; or NULL. */
+/* Returns the colon in "FILE.h5:/path", or NULL. */
 static const char *dataset_colon(const char *path)
 {
     const char *colon = NULL;
@@ -180,7 +180,7 @@ bool points_file(const char *path, struct stat *st, const char **dataset)
     return found;
 }
 
-/* Rows from `first` to `end`, and how many there are in all. */
+/* Reads rows from `first` to `end`, and the total number of rows. */
 static ebpo_status read_dataset(points *p, const char *file, const char *name, uint64_t first,
                                 uint64_t end, uint64_t *total, ebpo_error *error)
 {
@@ -202,7 +202,7 @@ static ebpo_status read_part(points *p, const char *file, const char *name, uint
     end = points_share(total, number + 1, of);
     status = read_dataset(p, file, name, first, end, &now, error);
     if (status == EBPO_OK && (now != total || p->rows_total != end - first)) {
-        snprintf(error->message, sizeof error->message, "%s: was changed while it was read", file);
+        snprintf(error->message, sizeof error->message, "%s: changed while it was read", file);
         status = EBPO_E_IO;
     }
     return status;
@@ -229,8 +229,8 @@ static bool begins_with(const points *p, const char *with, size_t count)
     return p->rest_count >= count && memcmp(p->rest, with, count) == 0;
 }
 
-/* Raw doubles may begin with these four bytes, but hardly with letters behind: then the first one
- * is about 1e219 or 1e243. */
+/* Raw doubles may begin with these four bytes, but hardly with letters after them: the first double
+ * would be about 1e219 or 1e243. */
 static bool begins_as_ply(const points *p)
 {
     if (!begins_with(p, "ply\n", 4) && !begins_with(p, "ply\r", 4) &&
@@ -242,7 +242,7 @@ static bool begins_as_ply(const points *p)
     return true;
 }
 
-/* Files of other kinds, which the library names: text that is none, to say so. */
+/* Recognises other file formats that the library can name: text that is not points. */
 static bool is_foreign(points *p)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -256,7 +256,7 @@ static bool is_foreign(points *p)
     return true;
 }
 
-/* Fails, and says which datasets could be meant. */
+/* Fails, and lists the datasets that may be meant. */
 static bool refuse_hdf5(points *p, points_block *b)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -267,7 +267,7 @@ static bool refuse_hdf5(points *p, points_block *b)
                             "dataset by its name: FILE.h5:/path");
     if (read_dataset(p, p->name, "", 0, UINT64_MAX, &total, &error) == EBPO_E_ABSENT)
         return points_fault(
-            b, 0, "is an HDF5 file and holds no %s; the model comes first, then what to ask about",
+            b, 0, "is an HDF5 file and holds no %s; give the model first, then the query input",
             wanted[p->kind]);
     fprintf(stderr, "ebpo %s: %s\n", p->command, error.message);
     p->failed = true;
@@ -285,7 +285,7 @@ static bool recognise_format(points *p, points_block *b)
     if (begins_as_ply(p) && !p->raw)
         return read_ply(p, b);
     if (begins_as_ply(p) && p->kind == POINTS)
-        return points_fault(b, 0, "is a PLY file, not raw doubles; leave out --raw");
+        return points_fault(b, 0, "is a PLY file, not raw doubles; omit --raw");
     if (begins_as_ply(p))
         return points_fault(b, 0,
                             "is a PLY file, which holds points; give %s as text or as raw doubles",
@@ -293,7 +293,7 @@ static bool recognise_format(points *p, points_block *b)
     return p->raw || !is_foreign(p);
 }
 
-/* A short line of text is not kept waiting for more. */
+/* Does not wait for more when a short line of text is there. */
 bool points_recognise(points *p, points_block *b)
 {
     for (;;) {

@@ -1,4 +1,4 @@
-/* Text whose first line names its columns, as CSV files have it. */
+/* Reads text whose first line names its columns, as in CSV files. */
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
@@ -11,7 +11,7 @@ static bool is_blank(char c)
     return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
 }
 
-/* Without blanks around it, and without quotes: `end` is where it goes to. */
+/* Removes blanks and quotes around the field, which ends at `end`. */
 static char *trim_field(char *s, char *end)
 {
     while (s < end && is_blank(*s))
@@ -26,7 +26,7 @@ static char *trim_field(char *s, char *end)
     return s;
 }
 
-/* Where the field ends: at a separator outside of quotes. */
+/* Returns the end of the field: a separator outside quotes. */
 static char *field_end(char separator, char *s, const char *end)
 {
     for (bool quoted = false; s < end; s++) {
@@ -79,7 +79,7 @@ static bool all_numbers(char **field, int fields)
     return fields > 0;
 }
 
-/* By name; or the first ones, where there are not more than needed. */
+/* Chooses fields by name, or the first ones when there are no more than needed. */
 static bool choose_fields(points *p, char **field, int fields)
 {
     int needed = points_raw_width(p->kind), width = points_width(p->kind), found = 0;
@@ -125,8 +125,8 @@ bool points_take_header(points *p, points_block *b)
     if (all_numbers(field, fields)) {
         b->count = b->begin;
         return points_fault(b, b->lines--,
-                            "holds numbers, which --header would take for names; leave --header "
-                            "out, or put a line of names first");
+                            "holds numbers, which --header would take for names; omit --header, "
+                            "or add a line of names");
     }
     if (choose_fields(p, field, fields)) {
         p->fields = fields;

@@ -31,11 +31,11 @@ uint64_t points_share(uint64_t total, uint64_t number, uint64_t of)
 void points_block_free(points_block *b)
 {
     free(b->bytes);
-    free(b->room);
+    free(b->space);
     *b = (points_block){ .bytes = NULL };
 }
 
-/* False: who waits has been told to stop. */
+/* Returns false when the wait was interrupted. */
 static bool wait_for_more(const points *p)
 {
     struct pollfd both[] = { { .fd = p->wake, .events = POLLIN },

@@ -1,4 +1,4 @@
-/* Numbers from the bytes of a block. */
+/* Parses the numbers of a block. */
 #include "cli/points_header.h"
 #include "cli/points_parse.h"
 
@@ -10,7 +10,7 @@
 
 #include "cli/numbers.h"
 
-/* --- checks that all kinds of input share --- */
+/* --- checks for all kinds of input --- */
 
 static bool check_row(const points *p, points_block *b, uint64_t at, const double *row)
 {
@@ -30,15 +30,15 @@ static bool check_row(const points *p, points_block *b, uint64_t at, const doubl
     return true;
 }
 
-static bool rows_room(const points *p, points_block *b, uint64_t rows)
+static bool rows_capacity(const points *p, points_block *b, uint64_t rows)
 {
-    if (b->room_rows < rows) {
-        free(b->room);
-        b->room = malloc(rows * (uint64_t)points_width(p->kind) * sizeof *b->room);
-        b->room_rows = b->room ? rows : 0;
+    if (b->capacity_rows < rows) {
+        free(b->space);
+        b->space = malloc(rows * (uint64_t)points_width(p->kind) * sizeof *b->space);
+        b->capacity_rows = b->space ? rows : 0;
     }
-    b->rows = b->room;
-    return b->room || points_fault(b, 0, "not enough memory");
+    b->rows = b->space;
+    return b->space || points_fault(b, 0, "not enough memory");
 }
 
 /* --- raw numbers --- */
@@ -56,7 +56,7 @@ static double load_number(points_layout layout, const char *at)
     return layout.bytes == 4 ? (double)f : v;
 }
 
-/* Rows that may be taken as they stand. */
+/* Returns true when rows can be used without conversion. */
 static bool stands_as_rows(const points *p)
 {
     return p->layout.bytes == 8 && p->layout.per_row == points_width(p->kind) &&
@@ -91,10 +91,10 @@ static void parse_numbers(const points *p, points_block *b)
              bytes = (uint64_t)p->layout.bytes, count = b->count / (each * bytes);
     if (stands_as_rows(p))
         b->rows = (const double *)(const void *)b->bytes;
-    else if (!rows_room(p, b, count))
+    else if (!rows_capacity(p, b, count))
         return;
-    for (uint64_t i = 0; i < count && b->rows == b->room; i++) {
-        double *row = b->room + i * width;
+    for (uint64_t i = 0; i < count && b->rows == b->space; i++) {
+        double *row = b->space + i * width;
         row[width - 1] = p->tmax;
         for (uint64_t k = 0; k < each; k++)
             row[k] = load_number(p->layout, b->bytes + (i * each + k) * bytes);
@@ -116,7 +116,8 @@ static char *skip_blanks(char *s)
     return s;
 }
 
-/* `at`: what is no number; `more`: it follows as many numbers as a row may have. */
+/* Reports a wrong number of values. `at`: the text that is not a number; `more`: it follows the
+ * maximum number of values. */
 static bool wrong_count(const points *p, points_block *b, const char *at, bool more)
 {
     static const char *const expected[] = {
@@ -126,7 +127,7 @@ static bool wrong_count(const points *p, points_block *b, const char *at, bool m
     bool names = b->first && !b->row_count && !p->headless &&
                  (isalpha((uint8_t)*at) || *at == '"' || (at[0] == '/' && at[1] == '/'));
     return points_fault(b, b->lines, "%s%s%s", expected[p->kind], more ? ", but more follow" : "",
-                        names ? "; --header takes the first line for names of columns"
+                        names ? "; --header reads the first line as names of columns"
                         : more && !p->headless
                             ? "; name the columns in a line before the first, and give --header"
                             : "");
@@ -151,7 +152,7 @@ static bool parse_blanks(const points *p, points_block *b, char *s, char *end, d
     return true;
 }
 
-/* Where a header told which fields count. */
+/* Parses the fields chosen by a header. */
 static bool parse_fields(const points *p, points_block *b, char *s, char *end, double *row,
                          int *count)
 {
@@ -173,10 +174,10 @@ static bool parse_fields(const points *p, points_block *b, char *s, char *end, d
     return true;
 }
 
-/* False: it is wrong. Empty lines and comments hold no row. */
+/* Returns false after an error. Empty lines and comments hold no row. */
 static bool parse_line(const points *p, points_block *b, char *s, char *end)
 {
-    double *row = b->room + b->row_count * (uint64_t)points_width(p->kind);
+    double *row = b->space + b->row_count * (uint64_t)points_width(p->kind);
     int count = 0;
     s = skip_blanks(s);
     if (!*s || *s == '#')
@@ -195,8 +196,8 @@ static void parse_text(const points *p, points_block *b)
 {
     char *s = b->bytes + b->begin, *all = b->bytes + b->count;
     const char *zero = memchr(s, 0, (size_t)(all - s));
-    /* the shortest row: a digit and what is behind it, for each number */
-    if (!rows_room(p, b, (uint64_t)(all - s) / (2 * (uint64_t)points_raw_width(p->kind)) + 1))
+    /* the shortest row: a digit and a separator for each number */
+    if (!rows_capacity(p, b, (uint64_t)(all - s) / (2 * (uint64_t)points_raw_width(p->kind)) + 1))
         return;
     while (s < all) {
         char *end = memchr(s, '\n', (size_t)(all - s));
@@ -215,7 +216,8 @@ static void parse_text(const points *p, points_block *b)
     }
 }
 
-/* A fault that taking the block found is behind all of its rows; those found here come before. */
+/* Parses the block. An error found when taking the block follows all of its rows; errors found here
+ * come before it. */
 void points_parse(const points *p, points_block *b)
 {
     bool behind = b->failed && b->fault_at; /* the line after the last one */

@@ -1,10 +1,10 @@
-/* The numbers of a block of points. */
+/* Parses the numbers of a block of points. */
 #ifndef EBPO_TOOLS_POINTS_PARSE_H
 #define EBPO_TOOLS_POINTS_PARSE_H
 
 #include "cli/points_input.h"
 
-/* Reads its numbers. Any thread. */
+/* Any thread. */
 void points_parse(const points *p, points_block *block);
 
 #endif

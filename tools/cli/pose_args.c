@@ -4,17 +4,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST = 13 };
+enum { LIMIT = 13 };
 
-/* Returns how many numbers there are, -1: something else stands there, or more. */
-static int read_numbers(const char *text, double number[MOST])
+/* Returns how many numbers there are, -1 for other text or more numbers. */
+static int read_numbers(const char *text, double number[LIMIT])
 {
     static const char between[] = " \t,";
     int count = 0;
     for (text += strspn(text, between); *text; text += strspn(text, between)) {
         char *end;
         double x = strtod(text, &end);
-        if (end == text || count == MOST || !isfinite(x) || (*end && !strchr(between, *end)))
+        if (end == text || count == LIMIT || !isfinite(x) || (*end && !strchr(between, *end)))
             return -1;
         number[count++] = x;
         text = end;
@@ -32,7 +32,7 @@ static void take_rows(ebpo_pose *pose, const double *number)
 
 bool pose_read(const char *text, ebpo_pose *out)
 {
-    double number[MOST];
+    double number[LIMIT];
     int count = read_numbers(text, number);
     if (count != 3 && count != 7 && count != 8 && count != 12 && count != 13)
         return false;

@@ -1,4 +1,4 @@
-/* A pose as text, the same for every command. */
+/* Parses a pose, in the same form for every command. */
 #ifndef EBPO_TOOLS_POSE_ARGS_H
 #define EBPO_TOOLS_POSE_ARGS_H
 
@@ -8,9 +8,9 @@
 /* For help texts. */
 #define POSE_FORM "X Y Z [QX QY QZ QW [SCALE]]"
 
-/* POSE_FORM, the quaternion of any length but 0; or twelve numbers, the rows of a matrix of three
- * rows and four columns, a rotation and what it is moved by, and perhaps a scale. Blanks or commas
- * stand between. What the text does not say stays as it is in *out. False: it is none of these. */
+/* Reads POSE_FORM, the quaternion of any length but 0; or twelve numbers, the rows of a 3x4 matrix
+ * (rotation and translation), optionally followed by a scale. Blanks or commas separate them. Parts
+ * of *out that the text omits stay unchanged. Returns false for other text. */
 bool pose_read(const char *text, ebpo_pose *out);
 
 #endif

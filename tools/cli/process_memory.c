@@ -7,15 +7,15 @@
 
 #include "cli/words.h"
 
-enum { THREADS_MOST = 256 };
+enum { THREADS_MAX = 256 };
 
-/* Of this process, which has one thread and runs one command. */
+/* Limit for this process, which runs one command. */
 static uint64_t limit_bytes;
 static bool limit_given;
-static rlim_t before_us = RLIM_INFINITY; /* of who began the process */
+static rlim_t before_us = RLIM_INFINITY; /* limit inherited from the parent process */
 
-/* What counts has been taken before: private memory that may be written, which under sanitizers is
- * most of the address space. */
+/* Memory that counts is already in use: private writable memory, which under sanitizers is most of
+ * the address space. */
 static uint64_t taken_already(void)
 {
     unsigned long long pages = 0;
@@ -28,7 +28,7 @@ static uint64_t taken_already(void)
     return pages * (uint64_t)sysconf(_SC_PAGESIZE);
 }
 
-/* Stacks of threads count as a whole, though hardly any of each is used. So many threads; 0: one
+/* Stacks of threads count completely, although little of them is used. Number of threads; 0: one
  * for each core. */
 static uint64_t bytes_of_stacks(int64_t threads)
 {
@@ -38,10 +38,10 @@ static uint64_t bytes_of_stacks(int64_t threads)
     if (getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur != RLIM_INFINITY)
         each = stack.rlim_cur;
     int64_t most = threads > cores ? threads : cores;
-    return each * (uint64_t)(most < 1 ? 1 : most > THREADS_MOST ? THREADS_MOST : most);
+    return each * (uint64_t)(most < 1 ? 1 : most > THREADS_MAX ? THREADS_MAX : most);
 }
 
-/* 0: no limit of ours. Never more than the process was given by who began it. */
+/* 0: no additional limit. Never exceeds the limit inherited from the parent process. */
 static void limit_to(uint64_t bytes, int64_t threads, bool given)
 {
     struct rlimit limit;
@@ -58,7 +58,7 @@ static void limit_to(uint64_t bytes, int64_t threads, bool given)
     limit_given = given;
 }
 
-void process_memory_usual(void) { limit_to(ebpo_free_memory(), 0, false); }
+void process_memory_default(void) { limit_to(ebpo_free_memory(), 0, false); }
 
 bool process_memory_take(const char *command, const char *size, int64_t threads)
 {
@@ -82,5 +82,5 @@ void process_memory_why(char *out, size_t capacity)
     snprintf(out, capacity, "%s%s%s", limit_bytes ? "; " : "", limit_bytes ? size : "",
              !limit_bytes  ? ""
              : limit_given ? " is what --memory allows"
-                           : " was free when this began");
+                           : " was free at the start");
 }

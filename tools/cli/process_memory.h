@@ -1,20 +1,20 @@
-/* What a command may hold besides files, whatever it does: a model that is larger than it seems
- * ends with an error, and not with other programs of this machine. */
+/* Limits the memory of a command: a model that needs too much ends with an error and does not
+ * affect other programs. */
 #ifndef EBPO_TOOLS_PROCESS_MEMORY_H
 #define EBPO_TOOLS_PROCESS_MEMORY_H
 
 #include <ebpo/base.h>
 #include <stddef.h>
 
-/* The limit of all commands, before anything else: what is free. */
-void process_memory_usual(void);
+/* Sets the limit of all commands, before anything else: the free memory. */
+void process_memory_default(void);
 
-/* --memory of commands that hold as much as their work takes; NULL: as it is. `threads`
- * as of --threads: their stacks come on top. What whoever began the process allows is never
- * exceeded. False, with the usage message printed, when it is no size. */
+/* Sets the limit from --memory, for commands that hold as much as their work takes; NULL:
+ * unchanged. `threads`: as --threads; their stacks are added. The limit inherited from the parent
+ * process is never exceeded. Returns false, with the usage message printed, for an invalid size. */
 bool process_memory_take(const char *command, const char *size, int64_t threads);
 
-/* For messages where memory was short: what the limit is, and whose; "" where there is none. */
+/* Writes the limit and its origin, for messages about memory; "" when there is none. */
 void process_memory_why(char *out, size_t capacity);
 
 #endif

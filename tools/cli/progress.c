@@ -10,7 +10,7 @@
 
 double progress_now(void) { return 1e-9 * (double)tool_clock(); }
 
-/* While a mesh is read, what is done are bytes. */
+/* While a mesh is read, progress is counted in bytes. */
 static void draw_rate(const progress_line *line, double speed, uint64_t total)
 {
     char rate[32];
@@ -55,7 +55,7 @@ void progress_end_stage(progress_line *line)
     line->begun = now;
 }
 
-/* What does not fit is counted with the last one. */
+/* Counts further stages with the last one. */
 static void begin_stage(progress_line *line, const char *stage)
 {
     int i = 0;
@@ -65,7 +65,7 @@ static void begin_stage(progress_line *line, const char *stage)
         line->stages[line->stage_count++].name = stage;
     line->current = i < PROGRESS_STAGES ? i : PROGRESS_STAGES - 1;
     line->stage = stage;
-    for (i = line->at; i < line->plan_count; i++) /* never back */
+    for (i = line->at; i < line->plan_count; i++) /* never goes back */
         if (line->plan[i] == (int)stages_row(stage)) {
             line->at = i;
             break;
@@ -94,7 +94,7 @@ ebpo_progress progress_start(progress_line *line, const char *command, bool quie
     return (ebpo_progress){ report_progress, line };
 }
 
-void progress_tell(progress_line *line, const char *stage, uint64_t done, uint64_t total)
+void progress_report(progress_line *line, const char *stage, uint64_t done, uint64_t total)
 {
     (void)report_progress(line, stage, done, total);
 }

@@ -1,4 +1,4 @@
-/* Progress of long work: one line on a terminal, nothing elsewhere. */
+/* Shows progress of long work: one line on a terminal, otherwise nothing. */
 #ifndef EBPO_TOOLS_PROGRESS_H
 #define EBPO_TOOLS_PROGRESS_H
 
@@ -8,36 +8,36 @@ enum { PROGRESS_STAGES = 48 };
 
 typedef struct progress_line {
     const char *command;
-    bool active;        /* stderr is a terminal and the user does not want quiet */
-    bool shown;         /* there is a line to wipe */
-    const char *stage;  /* of the last report */
-    double begun, last; /* seconds: when the stage began, when the line was drawn */
-    /* in the order in which they began first */
+    bool active;        /* stderr is a terminal and --quiet was not given */
+    bool shown;         /* true if a line must be wiped */
+    const char *stage;  /* stage of the last report */
+    double begun, last; /* in seconds: start of the stage, last drawing of the line */
+    /* in the order of their first start */
     struct {
         const char *name;
         double seconds;
     } stages[PROGRESS_STAGES];
     int stage_count, current;
-    const int *plan; /* rows of stages.h that will come, in their order; NULL: not known */
+    const int *plan; /* rows of stages.h to come, in their order; NULL: not known */
     int plan_count, at;
-    /* of the mesh, 0 while it is not read; NULL: rates are of what is done */
+    /* number of faces of the mesh, 0 before it is read; NULL: rates count the work done */
     const uint64_t *faces;
 } progress_line;
 
-/* What to hand to the library; `line` must live as long as the work. */
+/* Returns the value to pass to the library; `line` must live as long as the work. */
 ebpo_progress progress_start(progress_line *line, const char *command, bool quiet);
-/* Work that the command does itself: how far it is. */
-void progress_tell(progress_line *line, const char *stage, uint64_t done, uint64_t total);
-/* Says which stages will come, so that the line tells how many are left, and gives rates in faces.
- * Both must live as long as the work. */
+/* Reports progress of work that the command does itself. */
+void progress_report(progress_line *line, const char *stage, uint64_t done, uint64_t total);
+/* Sets the stages to come, so that the line shows how many remain, and shows rates in faces. Both
+ * must live as long as the work. */
 void progress_plan(progress_line *line, const int *plan, int count, const uint64_t *faces);
-/* Wipes the line; call before printing anything else. Harmless at any time. */
+/* Wipes the line; call before printing anything else. May be called at any time. */
 void progress_wipe(progress_line *line);
 
-/* Lets the stages' times end here; before they are read. */
+/* Ends the times of stages; call before reading them. */
 void progress_end_stage(progress_line *line);
 
-/* Seconds on a clock that only goes forward. */
+/* Returns seconds on a monotonic clock. */
 double progress_now(void);
 
 #endif

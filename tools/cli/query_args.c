@@ -20,7 +20,7 @@ static const struct {
     { EBPO_LOAD_SUBTREE, EBPO_ENVELOPES_SKIP },
 };
 
-/* --- options that have no effect beside others --- */
+/* --- options without effect beside others --- */
 
 bool query_accepts(const char *name, const query_values *v, unsigned idle, const char *with)
 {
@@ -28,7 +28,7 @@ bool query_accepts(const char *name, const query_values *v, unsigned idle, const
         unsigned bit;
         bool given;
         const char *option;
-    } all[] = { { QUERY_LEVEL, v->level >= 0, "--level" },
+    } all[] = { { QUERY_LEVEL, v->level >= 0, "--max-level" },
                 { QUERY_DEADLINE, v->deadline != NULL, "--deadline" },
                 { QUERY_MAX_DISTANCE, isfinite(v->max_distance), "--max-distance" },
                 { QUERY_UNSIGNED, v->unsigned_distance, "--unsigned" },
@@ -36,8 +36,7 @@ bool query_accepts(const char *name, const query_values *v, unsigned idle, const
                 { QUERY_PREFETCH, v->prefetch, "--prefetch" } };
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         if (all[i].given && idle & all[i].bit) {
-            command_usage(name, "%s has no effect with %s; leave out one of them", all[i].option,
-                          with);
+            command_usage(name, "%s has no effect with %s; omit one of them", all[i].option, with);
             return false;
         }
     return true;
@@ -63,7 +62,7 @@ bool query_distance_fits(const char *name, const query_values *v)
     char with[40];
     snprintf(with, sizeof with, "--mode %s", distance_modes[v->distance_mode]);
     if (query_lists(v) && v->distance_mode != EBPO_DISTANCE_EXACT) {
-        command_usage(name, "%s has no effect with %s; leave out one of them", lists, with);
+        command_usage(name, "%s has no effect with %s; omit one of them", lists, with);
         return false;
     }
     if (query_lists(v))
@@ -71,7 +70,7 @@ bool query_distance_fits(const char *name, const query_values *v)
     if (!query_accepts(name, v, idle[v->distance_mode], with))
         return false;
     return v->level < 0 ||
-           query_accepts(name, v, QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH, "--level");
+           query_accepts(name, v, QUERY_UNSIGNED | QUERY_NO_WARM | QUERY_PREFETCH, "--max-level");
 }
 
 /* --- values --- */
@@ -102,7 +101,7 @@ bool query_options_from(const char *name, const query_values *v, ebpo_model_opti
     *model = (ebpo_model_options)EBPO_MODEL_OPTIONS_INIT;
     *inside = (ebpo_inside_options)EBPO_INSIDE_OPTIONS_INIT;
     *distance = (ebpo_distance_options)EBPO_DISTANCE_OPTIONS_INIT;
-    /* What is below the level is not looked at, so it need not be in memory. */
+    /* Nodes below the level are not visited, so they need not be in memory. */
     model->cut_level =
         v->cut_level < 0 && !v->memory && v->level >= 0 ? (int)v->level : (int)v->cut_level;
     model->loading = inside_meanings[v->inside_mode].loading;

@@ -1,5 +1,4 @@
-/* Options that the commands for questions share: how a model is held in memory, and how it is
- * asked. */
+/* Options shared by the query commands: memory of a model, and queries. */
 #ifndef EBPO_TOOLS_QUERY_ARGS_H
 #define EBPO_TOOLS_QUERY_ARGS_H
 
@@ -13,7 +12,7 @@ typedef struct query_values {
     const char *memory, *deadline, *attribute, *out, *shard;
     int64_t cut_level, threads, level, nearest, together;
     double max_distance, tmax, within;
-    int inside_mode, distance_mode, ray_sides; /* indices into the words below */
+    int inside_mode, distance_mode, ray_sides; /* indices into the word lists below */
     bool prefetch, raw, json, unsigned_distance, no_warm, all, any, header, csv, npy, force;
     remote_values remote;
 } query_values;
@@ -28,7 +27,7 @@ extern const char *const inside_modes[];   /* fast, cache, nodes, ... */
 extern const char *const distance_modes[]; /* in the order of ebpo_distance_mode */
 extern const char *const ray_sides[];      /* for --sides, in the order of ebpo_ray_sides */
 
-/* Options as bits, to say which of them another one leaves without effect. */
+/* Options as bits, to report options without effect. */
 enum {
     QUERY_LEVEL = 1,
     QUERY_DEADLINE = 2,
@@ -38,25 +37,26 @@ enum {
     QUERY_PREFETCH = 32
 };
 
-/* Whether distance is asked for lists: --nearest or --within. */
+/* Returns true when distance returns lists: --nearest or --within. */
 static inline bool query_lists(const query_values *v)
 {
     return v->nearest > 0 || isfinite(v->within);
 }
 
-/* False: one of the options `idle` was given, which has no effect with `with`, such as "--mode
- * leaves"; said on stderr (exit with EXIT_USAGE). */
+/* Returns false when one of the options `idle` was given, which has no effect with `with`, such as
+ * "--mode leaves"; reported on stderr (exit with EXIT_USAGE). */
 bool query_accepts(const char *name, const query_values *v, unsigned idle, const char *with);
-/* The same for what the modes of each question, and --level for distances, leave without effect. */
+/* The same for the modes of each query, and --max-level for distances, leave without
+ * effect. */
 bool query_inside_fits(const char *name, const query_values *v);
 bool query_distance_fits(const char *name, const query_values *v);
 
-/* Both forms; `name` is the command's, for messages. False: the values do not fit, which has been
- * said on stderr (exit with EXIT_USAGE). */
+/* Converts both forms; `name` is the command, for messages. Returns false for conflicting values,
+ * reported on stderr (exit with EXIT_USAGE). */
 bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model,
                         ebpo_inside_options *inside, ebpo_distance_options *distance);
 
-/* What --deadline takes, in ns. False as above. */
+/* Reads the value of --deadline in ns. Returns false as above. */
 bool query_read_time(const char *name, const char *text, uint64_t *out);
 
 /* A file, its model in memory, and a context. */
@@ -70,8 +70,8 @@ typedef struct query_session {
         NULL, NULL, NULL   \
     }
 
-/* Returns an exit code; what is wrong has been said on stderr, also that the file has no such level
- * (-1: none is asked for). query_close in any case. */
+/* Returns an exit code; errors have been reported on stderr, also a missing level (-1: none is
+ * requested). Call query_close in any case. */
 int query_open(query_session *s, const char *name, const char *path,
                const ebpo_model_options *options, int level, const remote_values *remote);
 /* The same in two steps, without a context. */

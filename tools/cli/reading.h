@@ -1,4 +1,4 @@
-/* How commands read: with as many threads as --threads says. */
+/* Options for reading, with the number of threads of --threads. */
 #ifndef EBPO_TOOLS_READING_H
 #define EBPO_TOOLS_READING_H
 

@@ -32,12 +32,12 @@ static bool options_from(const remote_values *v, ebpo_http_options *o, ebpo_erro
 ebpo_status remote_open_own(const char *path, ebpo_file **out, ebpo_error *error)
 {
     ebpo_open_options any = EBPO_OPEN_OPTIONS_INIT;
-    any.most_expansion = UINT64_MAX;
+    any.max_expansion = UINT64_MAX;
     return ebpo_open_with(path, &any, out, error);
 }
 
-/* The checksum of the content does not count attributes, such as the root's box. Nothing guards
- * them in such a file, so that everything is verified before the first answer. */
+/* The checksum of the content does not cover attributes, such as the root box. Nothing protects
+ * them in such a file, so everything is verified before the first result. */
 static ebpo_status verify_all(const ebpo_file *file, const char *name, ebpo_error *error)
 {
     ebpo_verify_report r = EBPO_VERIFY_REPORT_INIT;
@@ -48,8 +48,8 @@ static ebpo_status verify_all(const ebpo_file *file, const char *name, ebpo_erro
         if (counts[i]->violations) {
             status = error->status = EBPO_E_FORMAT;
             snprintf(error->message, sizeof error->message,
-                     "%s: is not whole, and has no checksums that say where: %s; get a fresh copy "
-                     "of the file",
+                     "%s: is damaged, and has no checksums that locate the damage: %s; get a "
+                     "fresh copy of the file",
                      remote_shown(name), counts[i]->first);
         }
     return status;
@@ -60,7 +60,7 @@ static ebpo_status open_foreign(const char *name, const ebpo_open_options *open,
 {
     ebpo_compat_options compat = EBPO_COMPAT_OPTIONS_INIT;
     compat.http = open->http;
-    compat.most_expansion = open->most_expansion;
+    compat.max_expansion = open->max_expansion;
     ebpo_status status = ebpo_open_compat(name, &compat, out, error);
     if (status == EBPO_OK)
         status = verify_all(*out, name, error);
@@ -80,7 +80,7 @@ ebpo_status remote_open(ebpo_file **out, const char *name, const remote_values *
         return EBPO_E_ARGUMENT;
     ebpo_open_options open = EBPO_OPEN_OPTIONS_INIT;
     open.http = &options;
-    open.most_expansion = (uint64_t)values->most_expansion;
+    open.max_expansion = (uint64_t)values->max_expansion;
     ebpo_status status = ebpo_open_with(name, &open, out, error);
     return status == EBPO_E_UNSUPPORTED && values->compat ? open_foreign(name, &open, out, error)
                                                           : status;
@@ -122,7 +122,7 @@ void remote_json(json *j, const traffic *t, const remote_values *values)
     json_end(j);
 }
 
-void remote_tell(const traffic *t, const remote_values *values, bool as_json)
+void remote_report(const traffic *t, const remote_values *values, bool as_json)
 {
     if (values->stats && as_json) {
         json j;

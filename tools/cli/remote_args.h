@@ -1,5 +1,4 @@
-/* Opening a FILE of a command, which may be a URL: options that all such commands share, and
- * --stats. */
+/* Opens the FILE of a command, which may be a URL: shared options, and --stats. */
 #ifndef EBPO_TOOLS_REMOTE_ARGS_H
 #define EBPO_TOOLS_REMOTE_ARGS_H
 
@@ -10,10 +9,10 @@
 
 typedef struct remote_values {
     bool stats, unversioned;
-    int64_t most_expansion; /* as in ebpo_open_options */
-    bool compat;            /* also what another program has laid out */
+    int64_t max_expansion; /* as in ebpo_open_options */
+    bool compat;           /* also layouts of other programs */
     const char *cache, *cache_size, *user, *ca_file;
-    unsigned cache_block; /* bytes; 0: as usual */
+    unsigned cache_block; /* bytes; 0: default */
     double timeout, stall;
     int64_t retries, connections;
     arg_list headers;
@@ -25,28 +24,28 @@ typedef struct remote_values {
         .timeout = -1, .stall = -1, .retries = -1, .connections = -1 \
     }
 
-/* ebpo_open or ebpo_open_compat, by path or by URL with these options. EBPO_E_ARGUMENT also for an
- * option that makes no sense. */
+/* Calls ebpo_open or ebpo_open_compat, by path or URL. Returns EBPO_E_ARGUMENT also for an invalid
+ * option. */
 EBPO_MUST_USE ebpo_status remote_open(ebpo_file **out, const char *name,
                                       const remote_values *values, ebpo_error *error);
 
-/* The command's own output: however much it has decoded. */
+/* Opens the output of the command itself, with no limit of decoding. */
 EBPO_MUST_USE ebpo_status remote_open_own(const char *path, ebpo_file **out, ebpo_error *error);
 
-/* The name as output shows it: of a URL without password and query. Valid until the next call. */
+/* Returns the name to print: a URL without password and query. Valid until the next call. */
 const char *remote_shown(const char *name);
 
-/* What was read of a file since it was opened. */
+/* Traffic of a file since it was opened. */
 typedef struct traffic {
-    uint64_t bytes, reads; /* asked of the source */
+    uint64_t bytes, reads; /* requested from the source */
     bool far;              /* the file is a URL */
     ebpo_http_stats http;
 } traffic;
 traffic traffic_of(const ebpo_file *file);
 
-/* With --stats: a line on stderr, or JSON there; as a member "traffic" of a JSON object. Nothing
- * without. */
-void remote_tell(const traffic *t, const remote_values *values, bool as_json);
+/* With --stats: prints a line or JSON on stderr, or a member "traffic" of a JSON object. Otherwise
+ * nothing. */
+void remote_report(const traffic *t, const remote_values *values, bool as_json);
 void remote_json(json *j, const traffic *t, const remote_values *values);
 
 #endif

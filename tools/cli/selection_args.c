@@ -7,9 +7,9 @@
 
 #include "cli/command.h"
 
-static const double most_planes = 1e9; /* as ebpo_build has it */
+static const double max_planes = 1e9; /* same limit as ebpo_build */
 
-/* "500", or "1%", which is a share. */
+/* Reads "500", or "1%", which is a share. */
 static bool read_k_root(const char *text, double *k, bool *share)
 {
     char *end;
@@ -17,7 +17,7 @@ static bool read_k_root(const char *text, double *k, bool *share)
     *share = *end == '%' && !end[1];
     if (end == text || (*end && !*share))
         return false;
-    return (*share ? *k > 0 : *k >= 1) && *k <= most_planes;
+    return (*share ? *k > 0 : *k >= 1) && *k <= max_planes;
 }
 
 static int check_k_root(const char *name, const char *text)
@@ -39,7 +39,8 @@ static bool from_root(const ebpo_selection_traits *t) { return !t->from_leaves; 
 static bool takes_normals(const ebpo_selection_traits *t) { return t->takes_normals; }
 static bool takes_seed(const ebpo_selection_traits *t) { return t->takes_seed; }
 
-/* The selections of a trait, as bits; their names, "kmedoids, offset or random", into `names`. */
+/* Returns the selections with a trait as bits, and writes their names, "kmedoids, offset or
+ * random", to `names`. */
 static uint32_t of_trait(trait_fn has, char *names, size_t size)
 {
     uint32_t bits = 0;
@@ -57,7 +58,7 @@ static uint32_t of_trait(trait_fn has, char *names, size_t size)
     return bits;
 }
 
-/* Refuses options that say nothing about any of the selections that were chosen. */
+/* Refuses options that affect none of the chosen selections. */
 static int check_effect(const char *name, const selection_options *o, bool given,
                         const char *options, trait_fn has)
 {
@@ -98,7 +99,7 @@ ebpo_status selection_k_root(const char *text, uint64_t faces, double *out, ebpo
     bool fine = read_k_root(text, &k, &share);
     if (share)
         k = fmax(1, k / 100 * (double)faces);
-    if (!fine || !(k <= most_planes)) {
+    if (!fine || !(k <= max_planes)) {
         snprintf(error->message, sizeof error->message,
                  "--k-root: %.40s of %" PRIu64
                  " faces is more than 1e9 planes; give a smaller share",

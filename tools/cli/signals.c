@@ -18,9 +18,9 @@ static void give_up(int number)
         also();
     if (scratch)
         scratch();
-    /* SA_RESETHAND brought the default back: the parent sees which signal it was. At once, and not
-     * when this handler returns: another thread may be about to open the output by its name again.
-     */
+    /* SA_RESETHAND restored the default action, so that the parent sees the signal. Raises it
+     * before this handler returns: another thread may be about to open the output again by its
+     * name. */
     sigset_t only;
     sigemptyset(&only);
     sigaddset(&only, number);
@@ -31,9 +31,9 @@ static void give_up(int number)
 
 void signals_install(void)
 {
-    /* A limit on file size is an error like a full disk, not the end. */
+    /* A limit on file size is an error like a full disk. */
     signal(SIGXFSZ, SIG_IGN);
-    /* SIGPIPE: who reads what we print has enough of it, as head has. */
+    /* SIGPIPE: the reader of the output has read enough, as head does. */
     static const int numbers[] = { SIGINT, SIGTERM, SIGHUP, SIGPIPE };
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
         struct sigaction action, before;
@@ -41,7 +41,7 @@ void signals_install(void)
         action.sa_handler = give_up;
         action.sa_flags = (int)SA_RESETHAND;
         sigfillset(&action.sa_mask);
-        /* Who started us with a signal ignored (nohup) wants it ignored. */
+        /* Keeps signals ignored that the parent process ignores (nohup). */
         if (sigaction(numbers[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
             sigaction(numbers[i], &action, NULL);
     }

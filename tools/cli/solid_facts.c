@@ -13,7 +13,7 @@ static double cell_volume(const ebpo_info *info, int level)
 
 double facts_volume(const ebpo_info *info, int level)
 {
-    if (!isnormal(cell_volume(info, level))) /* the file's sums mean nothing then */
+    if (!isnormal(cell_volume(info, level))) /* then the sums of the file have no meaning */
         return NAN;
     double sum = info->level[level].gray_volume;
     for (int i = 0; i <= level; i++)
@@ -60,7 +60,7 @@ double facts_share(const ebpo_info *info, const ebpo_solid_volume *solid, double
                    : findings_knows(solid) ? solid->lo
                                            : fabs(solid->integral);
     double percent = 100 * volume / whole;
-    return isfinite(percent) ? percent : NAN; /* without a sign that means nothing */
+    return isfinite(percent) ? percent : NAN; /* without a meaningless sign */
 }
 
 double facts_percent(const ebpo_info *info, const ebpo_solid_volume *solid, int level)
@@ -79,7 +79,7 @@ double facts_excess_ratio(const ebpo_info *info, const ebpo_solid_volume *solid,
                           double limit)
 {
     double least = facts_excess(info, solid, limit);
-    /* 1e-9 of the volume: what rounding may do to it */
+    /* 1e-9 of the volume: possible rounding error */
     return least > 1e-7 ? facts_excess(info, solid, volume) / least : NAN;
 }
 

@@ -4,7 +4,7 @@
 
 const stage_name stage_names[STAGE_ROWS] = {
     [STAGE_READING] = { "reading", 0, { "reading" } },
-    [STAGE_MENDING] = { "mending", 0, { "mending", "trying repairs" } },
+    [STAGE_REPAIR] = { "repairing", 0, { "repairing", "trying repairs" } },
     [STAGE_ORDERING] = { "ordering",
                          THESIS_LEAVES,
                          { "looking at faces", "measuring the box", "ordering vertices",
@@ -27,8 +27,7 @@ const stage_name stage_names[STAGE_ROWS] = {
     [STAGE_WRITING] = { "writing", THESIS_STORING, { "writing" } },
     [STAGE_JUDGING] = { "judging",
                         0,
-                        { "reading levels", "looking at envelopes", "bounding envelopes",
-                          "judging envelopes" } },
+                        { "reading levels", "measuring envelopes", "bounding envelopes" } },
     [STAGE_OTHER] = { "other", 0, { NULL } },
 };
 

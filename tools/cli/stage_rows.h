@@ -1,12 +1,11 @@
-/* The stages of a build as people see them: which of the library's each is made of. */
+/* Maps the stages of the library to the stages shown to users. */
 #ifndef EBPO_TOOLS_STAGE_ROWS_H
 #define EBPO_TOOLS_STAGE_ROWS_H
 
-/* In the order in which they begin, but for ordering and checking, which come before mending as
- * well. */
+/* In the order of their start, except for ordering and checking, which also come before repairs. */
 typedef enum stage_row {
     STAGE_READING,
-    STAGE_MENDING,
+    STAGE_REPAIR,
     STAGE_ORDERING,
     STAGE_CHECKING,
     STAGE_CUTTING,
@@ -36,12 +35,12 @@ enum {
 
 typedef struct stage_name {
     const char *name;
-    unsigned thesis;       /* the thesis' stages with the same work */
-    const char *stages[8]; /* the library's */
+    unsigned thesis;       /* stages of the thesis with the same work */
+    const char *stages[8]; /* stages of the library */
 } stage_name;
 extern const stage_name stage_names[STAGE_ROWS];
 
-/* Which of them the library's stage belongs to. */
+/* Returns the row of a stage of the library. */
 stage_row stages_row(const char *library_stage);
 
 #endif

@@ -19,15 +19,15 @@ int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX])
 {
     int n = 0;
     for (int r = 0; r < STAGE_OTHER; r++) {
-        bool left_out = (r == STAGE_MENDING && !f->mended) || (r == STAGE_CORNERS && !f->solid) ||
-                        r == STAGE_CELLS ||
-                        (r == STAGE_CHOOSING && !f->from_leaves) || /* cells are split off later */
-                        (r == STAGE_JUDGING && !f->judged);
-        if (r == STAGE_MENDING && f->mended) {
+        bool omitted = (r == STAGE_REPAIR && !f->was_repaired) ||
+                       (r == STAGE_CORNERS && !f->solid) || r == STAGE_CELLS ||
+                       (r == STAGE_CHOOSING && !f->from_leaves) || /* cells are split off later */
+                       (r == STAGE_JUDGING && !f->judged);
+        if (r == STAGE_REPAIR && f->was_repaired) {
             plan[n++] = STAGE_ORDERING;
             plan[n++] = STAGE_CHECKING;
         }
-        if (!left_out)
+        if (!omitted)
             plan[n++] = r;
     }
     if (f->judged)
@@ -104,8 +104,8 @@ void stages_print(FILE *out, const progress_line *line, const stage_facts *f, do
     print_row(out, "all", seconds, f->faces);
     fprintf(out, "7 total: %.2f of it in 1 to 6\n", sum);
     if (!(done & THESIS_LEAF_PLANES))
-        fprintf(out, "  not made: 3 leaf planes, 5 leaf clipping; readers derive them from a "
-                     "leaf's faces ('--with leaf-planes' stores them)\n");
+        fprintf(out, "  not made: 3 leaf planes, 5 leaf clipping; readers derive them from the "
+                     "faces of a leaf ('--profile full' stores them)\n");
 }
 
 /* --- JSON --- */
@@ -119,7 +119,7 @@ static void thesis_numbers(json *j, unsigned thesis)
     json_end(j);
 }
 
-/* A stage of the thesis, and the rows that do its work; the last one is the sum. */
+/* Writes a stage of the thesis, and the rows that do its work; the last one is the sum. */
 static void thesis_stage(json *j, int number, const stage_facts *f, const bool began[STAGE_ROWS],
                          const double taken[STAGE_ROWS])
 {

@@ -1,4 +1,4 @@
-/* The stages of a build as people see them, and where the EBP-Octree thesis has the same work. */
+/* Stages of a build as shown to users, and the matching stages of the EBP-Octree thesis. */
 #ifndef EBPO_TOOLS_STAGES_H
 #define EBPO_TOOLS_STAGES_H
 
@@ -11,21 +11,21 @@
 #include "cli/stage_rows.h"
 
 typedef struct stage_facts {
-    bool mended, solid, from_leaves, judged; /* from_leaves: the theses' selections */
-    bool leaf_planes;                        /* they are made, not left to readers */
+    bool was_repaired, solid, from_leaves, judged; /* from_leaves: selections of the theses */
+    bool leaf_planes;                              /* they are made, not derived by readers */
     uint64_t faces;
     ebpo_build_times times;
 } stage_facts;
 
 enum { STAGE_PLAN_MAX = STAGE_ROWS + 3 };
-/* The rows that will come, in their order, for progress; returns how many. */
+/* Writes the rows to come, in their order, for progress; returns how many. */
 int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX]);
 
-/* Cells and envelopes of the pieces are one stage of the library's: makes it two, by what their
- * threads took. Before the two below. */
+/* Splits the stage of the library for cells and envelopes of the pieces into two, by the times of
+ * their threads. Call before the two functions below. */
 void stages_split(progress_line *line, const ebpo_build_times *times);
 
-/* Both after progress_end_stage. `seconds`: of all. */
+/* Call both after progress_end_stage. `seconds`: total. */
 void stages_print(FILE *out, const progress_line *line, const stage_facts *f, double seconds);
 void stages_json(json *j, const progress_line *line, const stage_facts *f);
 

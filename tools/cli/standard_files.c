@@ -11,15 +11,15 @@
 #include "cli/command.h"
 #include "cli/signals.h"
 
-enum { PATH_MOST = 4096, PIECE = 1 << 16 };
+enum { PATH_MAX = 4096, PIECE = 1 << 16 };
 
-/* A handler of signals looks here as well: what is not there has an empty name. */
-static char folder[PATH_MOST], input[PATH_MOST], output[PATH_MOST];
-static int printed_to = -1; /* standard output, while it stands aside */
+/* A signal handler reads this, too: files that do not exist have empty names. */
+static char folder[PATH_MAX], input[PATH_MAX], output[PATH_MAX];
+static int printed_to = -1; /* copy of standard output while it is redirected */
 
-/* Files that are opened get the lowest free descriptors: without this, one of 0 to 2, and what is
- * printed goes into them. What is put there cannot be read in place of input, nor written in place
- * of output, so that using it is an error as it is with a closed stream (EBADF). */
+/* Opened files get the lowest free descriptors: without this, a file could get one of 0 to 2, and
+ * prints would go into it. The files put there can neither be read as input nor written as output,
+ * so that using them fails as a closed stream does (EBADF). */
 bool standard_files_occupy(void)
 {
     for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++) {
@@ -73,11 +73,11 @@ static int make_folder(const char *command)
     const char *where = getenv("TMPDIR");
     if (*folder)
         return EXIT_FINE;
-    char made[PATH_MOST - 32];
+    char made[PATH_MAX - 32];
     int length =
         snprintf(made, sizeof made, "%s/ebpo-XXXXXX", where && *where ? where : "/var/tmp");
     if (length >= (int)sizeof made || !mkdtemp(made))
-        return fail_stream(command, "no temporary folder; set TMPDIR to one that can be written");
+        return fail_stream(command, "no temporary folder; set TMPDIR to a writable folder");
     snprintf(folder, sizeof folder, "%s", made);
     signals_scratch(clean_up);
     return EXIT_FINE;
@@ -86,11 +86,11 @@ static int make_folder(const char *command)
 static int take_input(const char *command, const char **operand)
 {
     if (*input)
-        return command_usage(command, "standard input can be read once only");
+        return command_usage(command, "standard input can be read only once");
     int code = make_folder(command);
     if (code != EXIT_FINE)
         return code;
-    snprintf(input, sizeof input, "%.*s/standard-input", PATH_MOST - 32, folder);
+    snprintf(input, sizeof input, "%.*s/standard-input", PATH_MAX - 32, folder);
     int to = open(input, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     bool fine = to >= 0 && copy_stream(STDIN_FILENO, to);
     if (to >= 0 && close(to) != 0)
@@ -102,11 +102,11 @@ static int take_input(const char *command, const char **operand)
 static int take_output(const char *command, const char **operand)
 {
     if (isatty(STDOUT_FILENO))
-        return command_usage(command, "standard output is a terminal; give a file's name");
+        return command_usage(command, "standard output is a terminal; give a file name");
     int code = make_folder(command);
     if (code != EXIT_FINE)
         return code;
-    snprintf(output, sizeof output, "%.*s/standard-output", PATH_MOST - 32, folder);
+    snprintf(output, sizeof output, "%.*s/standard-output", PATH_MAX - 32, folder);
     fflush(stdout);
     printed_to = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
     if (printed_to < 0 || dup2(STDERR_FILENO, STDOUT_FILENO) < 0)
@@ -115,7 +115,7 @@ static int take_output(const char *command, const char **operand)
     return EXIT_FINE;
 }
 
-/* A pipe under a name, such as /dev/stdin or that of a shell's <(...), can only be read once. */
+/* A pipe with a name, such as /dev/stdin or <(...) of a shell, can be read only once. */
 static bool is_pipe(const char *path)
 {
     struct stat st;

@@ -7,7 +7,7 @@
 #include "cli/command.h"
 #include "cli/words.h"
 
-const char *const face_coding_words[] = { "usual", "gates", "high-water", NULL };
+const char *const face_coding_words[] = { "default", "gates", "high-water", NULL };
 
 bool subtree_faces_read(const char *command, const char *text, uint64_t *out)
 {

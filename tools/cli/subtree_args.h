@@ -1,4 +1,4 @@
-/* --subtree-faces and --face-coding, as commands that write files have it. */
+/* Options --subtree-faces and --face-coding of commands that write files. */
 #ifndef EBPO_TOOLS_SUBTREE_ARGS_H
 #define EBPO_TOOLS_SUBTREE_ARGS_H
 
@@ -10,8 +10,8 @@
 /* In the order of ebpo_face_coding. */
 extern const char *const face_coding_words[];
 
-/* The member of the same name of ebpo_write_options; `text` may be NULL. False, with the usage
- * message printed, when it is no such number. */
+/* Reads the member of the same name of ebpo_write_options; `text` may be NULL. Returns false, with
+ * the usage message printed, for an invalid number. */
 bool subtree_faces_read(const char *command, const char *text, uint64_t *out);
 
 #endif

@@ -30,7 +30,8 @@ const char *table_volume(char out[TABLE_CELL], const char *format, double x)
 
 void table_beyond(FILE *out)
 {
-    fputs("-: not known, as volumes are not what the file's numbers hold, 2.2e-308 to 1.8e+308\n",
+    fputs("-: not known, as volumes exceed the range of numbers in the file, 2.2e-308 to "
+          "1.8e+308\n",
           out);
 }
 
@@ -55,13 +56,14 @@ const char *table_scaled(char out[TABLE_CELL], int digits, double x, int64_t exp
         return strcpy(out, "-");
     double part = frexp(x, &own), log10_2 = 0.30102999566398119521;
     double power = log10(fabs(part)) + (double)(own + exponent) * log10_2, whole = floor(power);
-    digits = digits < 9 ? digits : 9; /* of power's some 13 digits up to four stand before */
+    digits = digits < 9 ? digits : 9; /* up to four of the 13 digits of the power come before the
+                                       * point */
     snprintf(mantissa, sizeof mantissa, "%.*f", digits - 1, copysign(pow(10, power - whole), x));
     if (fabs(strtod(mantissa, NULL)) >= 10) { /* 9.9999... was rounded */
         snprintf(mantissa, sizeof mantissa, "%.*f", digits - 1, copysign(1, x));
         whole += 1;
     }
-    size_t length = strlen(mantissa); /* no zeros behind, as %g has it */
+    size_t length = strlen(mantissa); /* no trailing zeros, as with %g */
     while (length > 1 && digits > 1 && mantissa[length - 1] == '0')
         mantissa[--length] = 0;
     if (mantissa[length - 1] == '.')

@@ -27,7 +27,7 @@ static span list_of(const textures *t, int which, uint64_t row)
                                        : (span){ "", 0 };
 }
 
-/* Which of the arrays it is; -1: none of them. */
+/* Returns the index of the array; -1: none of them. */
 static int which_of(const ebpo_attribute_facts *a)
 {
     static const char *const names[TEXTURE_ARRAYS] = { "name", "use", "sha256", "bytes" };
@@ -62,7 +62,7 @@ ebpo_status textures_read(textures *out, const ebpo_file *file, bool bytes, ebpo
         out->embedded = out->embedded || i == BYTES;
         if (i != BYTES || bytes)
             status = ebpo_file_read_attribute(file, n, NULL, &out->list[i], error);
-        else /* images may be large: only whether there are any */
+        else /* images may be large: only their presence is read */
             status = ebpo_file_attribute_ends(file, n, NULL, &out->list[i], error);
     }
     if (status != EBPO_OK)
@@ -97,14 +97,14 @@ bool textures_same(const ebpo_file *a, const ebpo_file *b)
 
 /* --- facts --- */
 
-/* Also where they were not read. */
+/* Also when they were not read. */
 static uint64_t byte_count(const textures *t, uint64_t row)
 {
     const uint64_t *ends = t->list[BYTES].ends;
     return !ends ? t->columns[BYTES] : row ? ends[row] - ends[row - 1] : ends[0];
 }
 
-/* A row has a digest and no bytes where the image was left out, unless it was an empty file. */
+/* A row has a digest and no bytes when the image was not embedded or was an empty file. */
 static bool is_kept(const textures *t, uint64_t row)
 {
     static const char nothing[] =
@@ -115,7 +115,7 @@ static bool is_kept(const textures *t, uint64_t row)
            (byte_count(t, row) || memcmp(digest.s, nothing, DIGEST) == 0);
 }
 
-/* A copy that ends with a zero, without control characters; NULL when memory is short. */
+/* Returns a zero-terminated copy without control characters; NULL when memory is short. */
 static char *text_of(span s)
 {
     char *text = strndup(s.s, s.n);
@@ -125,7 +125,7 @@ static char *text_of(span s)
     return text;
 }
 
-/* "": there is none. */
+/* Writes "" when there is none. */
 static void digest_of(const textures *t, uint64_t row, char hex[2 * DIGEST + 1])
 {
     span s = list_of(t, SHA256, row);
@@ -184,7 +184,7 @@ static ebpo_status fail_system(ebpo_error *error, const char *path)
     return fail_file(error, EBPO_E_IO, path, strerror(errno));
 }
 
-/* A name of this kind: words between slashes, none of which leads upwards. */
+/* Returns true for words between slashes, none of which leads upwards. */
 static bool leads_below(const char *name)
 {
     size_t n = 0;
@@ -199,7 +199,7 @@ static bool leads_below(const char *name)
     }
 }
 
-/* Slashes between words once only: materials double their backslashes. Nor words ".". */
+/* Removes repeated slashes, as materials double their backslashes, and words ".". */
 static void tidy_name(char *name)
 {
     char *to = name;
@@ -216,7 +216,8 @@ static void tidy_name(char *name)
     *to = 0;
 }
 
-/* Some names come with backslashes. NULL: memory is short, or it is no name of a file below. */
+/* Returns the name without backslashes. NULL: memory is short, or it is not the name of a file
+ * below. */
 static char *safe_name(span s)
 {
     char *name = strndup(s.s, s.n);
@@ -234,8 +235,7 @@ static char *safe_name(span s)
     return NULL;
 }
 
-/* The folder that a file is to be in, made if need be; links are not followed. -1: as errno says.
- */
+/* Opens the folder of a file and creates it if needed; does not follow links. -1: see errno. */
 static int open_folder(int top, char *name, char **last)
 {
     int folder = dup(top);
@@ -265,7 +265,8 @@ static bool write_all(int fd, span bytes)
     return true;
 }
 
-/* Less than 0: here are no files without a name, or /proc is missing, by which they get one. */
+/* Returns less than 0 when unnamed files are not supported, or /proc is missing, which names them.
+ */
 static int open_nameless(int folder)
 {
 #ifdef EBPO_HAVE_O_TMPFILE
@@ -276,7 +277,7 @@ static int open_nameless(int folder)
     return -1;
 }
 
-/* The name comes last, so that it never stands for a part of the image. */
+/* Names the file last, so that the name never refers to a part of the image. */
 static bool give_name(int fd, int folder, const char *name)
 {
     char path[64];
@@ -284,7 +285,7 @@ static bool give_name(int fd, int folder, const char *name)
     return linkat(AT_FDCWD, path, folder, name, AT_SYMLINK_FOLLOW) == 0;
 }
 
-/* What is there already is left as it is. */
+/* Leaves existing files unchanged. */
 static bool write_file(int top, char *name, span bytes)
 {
     char *last;
@@ -330,7 +331,7 @@ static ebpo_status check_names(const textures *t, ebpo_error *error)
     return kept ? EBPO_OK
                 : fail_file(
                       error, EBPO_E_ABSENT, "no images",
-                      "the file has the bytes of none; ebpo convert --embed-textures keeps them");
+                      "the file has no bytes of images; ebpo convert --embed-textures keeps them");
 }
 
 static bool spans_equal(span a, span b)
@@ -338,7 +339,7 @@ static bool spans_equal(span a, span b)
     return a.n == b.n && (!a.n || memcmp(a.s, b.s, a.n) == 0);
 }
 
-/* Whether a row before this one is the same image under the same name, written otherwise. */
+/* Returns true when an earlier row is the same image under the same name, spelled differently. */
 static bool is_again(const textures *t, uint64_t row)
 {
     char *name = safe_name(list_of(t, NAME, row));

@@ -1,4 +1,4 @@
-/* A clock that does not go back. */
+/* A monotonic clock. */
 #ifndef EBPO_TOOL_CLOCK_H
 #define EBPO_TOOL_CLOCK_H
 
@@ -6,7 +6,7 @@
 #include <stdint.h>
 #include <time.h>
 
-/* Nanoseconds since some time. */
+/* Returns nanoseconds since an arbitrary time. */
 static inline uint64_t tool_clock(void)
 {
     struct timespec t;
@@ -14,7 +14,7 @@ static inline uint64_t tool_clock(void)
     return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
 }
 
-/* Sleeps until that clock shows it. */
+/* Sleeps until the clock reaches `when`. */
 static inline void tool_wait_until(uint64_t when)
 {
 #ifdef EBPO_HAVE_CLOCK_NANOSLEEP

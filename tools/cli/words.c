@@ -125,7 +125,7 @@ bool words_read_unit(const char *text, const char *const *units, const uint64_t 
     return false;
 }
 
-/* Digits, also with a fraction, whose digits are from *fraction to *end. */
+/* Reads digits, also with a fraction, whose digits are from *fraction to *end. */
 static bool read_amount(const char *text, const char **end, uint64_t *whole, const char **fraction)
 {
     char *stop;
@@ -141,8 +141,8 @@ static bool read_amount(const char *text, const char **end, uint64_t *whole, con
     return *end > *fraction;
 }
 
-/* That many tenths, hundredths and so on of the factor, rounded down: from the last digit on, what
- * each leaves is exact. */
+/* Returns the fraction of the factor, rounded down: from the last digit on, each remainder is
+ * exact. */
 static uint64_t fraction_of(const char *digits, const char *end, uint64_t factor)
 {
     uint64_t sum = 0;
@@ -151,7 +151,7 @@ static uint64_t fraction_of(const char *digits, const char *end, uint64_t factor
     return sum;
 }
 
-/* What "", "K", "MB", "GiB" and the like multiply by; 0: no unit. */
+/* Returns the factor of "", "K", "MB", "GiB" and the like; 0: no unit. */
 static uint64_t size_factor(const char *unit)
 {
     static const char letters[] = "KMGT", small[] = "kmgt";
@@ -179,7 +179,7 @@ bool words_read_size(const char *text, uint64_t *out)
            !__builtin_add_overflow(bytes, fraction_of(fraction, end, factor), out);
 }
 
-/* "3" or "3-" or "0-5". */
+/* Reads "3" or "3-" or "0-5". */
 static const char *read_run(const char *text, int *first, int *last, bool *to_end)
 {
     char *end;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The public headers as ctypes: declare.py INCLUDE_FOLDER [OUTPUT]
+"""Translates the public headers to ctypes: declare.py INCLUDE_FOLDER [OUTPUT]
 
 Writes the module ebpo/_declared.py: each struct, enumeration, constant, function and initial value
 (EBPO_..._INIT) of lib/include/ebpo/*.h, so that nothing of them is written twice. It understands the
@@ -30,11 +30,11 @@ LITERALS = {"true": True, "false": False, "NULL": None, "UINT64_MAX": 2**64 - 1,
 
 
 class Unknown(Exception):
-    """Text that is not of the C of these headers."""
+    """Raised for C text that the translator does not support."""
 
 
 def text_of(header, seen):
-    """A header after those that it includes, without comments; each once."""
+    """Returns a header after the headers that it includes, each once, without comments."""
     if header in seen:
         return ""
     seen.add(header)
@@ -62,7 +62,7 @@ def value_of(text, known):
 
 
 def written(value):
-    """A value as Python text."""
+    """Returns a value as Python text."""
     if isinstance(value, list):
         return "[" + ", ".join(map(written, value)) + "]"
     if isinstance(value, str):
@@ -137,7 +137,7 @@ class Headers:
         self.lines.append("\n")
 
     def type_of(self, text, declarator, in_call):
-        """ctypes of a member or an argument, and its name."""
+        """Returns the ctypes type of a member or an argument, and its name."""
         text = re.sub(r"\bstruct\b", "", text)
         name = re.search(r"\w+(?=\s*(?:\)|\[|$))", declarator)[0]
         sizes = re.findall(r"\[([^]]*)\]", declarator)
@@ -187,8 +187,8 @@ class Headers:
             result = "c_char_p" if result == "const char *" else "c_void_p"
         else:
             result = "None" if result == "void" else self.types[result]
-        told = arguments.endswith("ebpo_error *error")
-        self.lines.append(f'FUNCTIONS["{found[2]}"] = ({result}, [{", ".join(kinds)}], {names}, {told})')
+        reports_error = arguments.endswith("ebpo_error *error")
+        self.lines.append(f'FUNCTIONS["{found[2]}"] = ({result}, [{", ".join(kinds)}], {names}, {reports_error})')
 
     def initial_values(self):
         for name, text in self.macros:

@@ -1,8 +1,8 @@
-// What of a view stands in an address, both ways, and short. Lengths are those of the scene (cut.js): halves of the box's diagonal, from the box's centre.
+// Writes views to addresses and reads them back. Lengths are those of the scene (cut.js): halves of the box's diagonal, from the box's centre.
 //   view=AZIMUTH,HEIGHT,DISTANCE[,X,Y,Z]   degrees around y from z and above; how far from what is looked at, and where that is
-//   clip=x0.25 or -x0.25                   a plane, by its share of the box's side; what is below it is kept, or what is above it
-//   box=X0,Y0,Z0,X1,Y1,Z1                  what is shown, in shares of the box's sides
-//   point=X,Y,Z                            the point asked about, in the model's coordinates
+//   clip=x0.25 or -x0.25                   a plane at a share of the box's side; keeps the part below it, with the minus sign the part above
+//   box=X0,Y0,Z0,X1,Y1,Z1                  the visible box, in shares of the box's sides
+//   point=X,Y,Z                            the queried point, in the model's coordinates
 //   measure=X,Y,Z,X,Y,Z,...                points whose distances are shown, likewise
 const DEGREES = 180 / Math.PI;
 
@@ -12,7 +12,7 @@ const numbers = (text, ...counts) => {
 };
 const short = (x, digits) => String(Number(x.toFixed(Math.max(0, Math.min(12, digits)))));
 
-/** -> { eye, target }, or undefined where the text says none. */
+/** Returns { eye, target }, or undefined when the text is not a view. */
 export function cameraOf(text) {
   const [azimuth, height, distance, ...target] = numbers(text, 3, 6) ?? [];
   if (!(distance > 0 && distance < 100 && Math.abs(height) <= 90))
@@ -44,7 +44,7 @@ export function boxOf(text) {
 
 export const boxText = (box) => (box?.some((x, i) => x !== (i < 3 ? 0 : 1)) ? box.map((x) => short(x, 3)).join(',') : undefined);
 
-/** What a plane and a box leave of a model's box, as corners in the scene: { low, high }; undefined if all of it. */
+/** Returns the part of a model's box that a plane and a box keep, as corners in the scene: { low, high }; undefined for the whole box. */
 export function cutOf(size, scale, clip, box) {
   const low = box?.slice(0, 3) ?? [0, 0, 0], high = box?.slice(3) ?? [1, 1, 1], k = clip?.axis;
   if (k !== undefined && clip.flip)
@@ -72,7 +72,7 @@ export function pointsText(points, diagonal) {
   return points.flatMap((p) => p.map((x) => short(x, digits))).join(',');
 }
 
-/** An address with these in place of what it said: [name, text or undefined] each. Commas stay commas. */
+/** Returns the address with replaced parameters: [name, text or undefined] each. Commas stay commas. */
 export function withQuery(href, entries) {
   const url = new URL(href);
   for (const [name, text] of entries)

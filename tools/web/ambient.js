@@ -1,4 +1,4 @@
-// How much of the sky each place that is seen has over it, by the depths around it in the picture: ambient occlusion. Source: McGuire, Mara, Luebke, "Scalable Ambient Obscurance",
+// Computes ambient occlusion in screen space from the depths around each pixel. Source: McGuire, Mara, Luebke, "Scalable Ambient Obscurance",
 // 2012, for the weight of a sample; the rest is plain.
 const VERTEX = 'void main() { gl_Position = vec4(position.xy, 0.0, 1.0); }';
 const FRAGMENT = `
@@ -11,7 +11,7 @@ const FRAGMENT = `
     return p.xyz / p.w;
   }
   vec3 place(vec2 at) { return place(at, texture2D(depths, at).r); }
-  // The step to the neighbour that lies less far: not over an edge.
+  // Returns the step to the neighbour with the smaller depth difference, so that it does not cross an edge.
   vec3 beside(vec3 here, vec2 at, vec2 step) {
     vec3 a = place(at + step) - here, b = here - place(at - step);
     return dot(a, a) < dot(b, b) ? a : b;
@@ -66,7 +66,7 @@ export class Ambient {
     this.target = undefined;
   }
 
-  /** A texture: 1 where nothing is over a place, down to 0. */
+  /** Returns a texture: 1 without occlusion, down to 0. */
   render(renderer, camera, depths, size) {
     const { kit, material: { uniforms } } = this;
     this.target ??= new kit.WebGLRenderTarget(size.x, size.y, { depthBuffer: false });

@@ -1,4 +1,4 @@
-// Longer questions of the page, answered in the worker: places on faces for what is painted and measured, and sections of the real faces.
+// Evaluates longer queries of the page in the worker: positions on faces for painting and measuring, and sections of the real faces.
 import { GRAY, LEAF, growForQuestion, nearestFace } from './reader/index.js';
 
 const ONE_WEIGHT = 2 ** 30;     // format-spec/paint.md
@@ -8,7 +8,7 @@ const FACES_MOST = 4_000_000;   // of a section
 const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]], dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-/** The weights of a triangle's second and third corner at a point of it, in units of 2^-30. `corners`: nine numbers. */
+/** Returns the weights of a triangle's second and third corner at a point of it, in units of 2^-30. `corners`: nine numbers. */
 export function weightsOf(p, corners) {
   const a = corners.subarray(0, 3), u = sub(corners.subarray(3, 6), a), v = sub(corners.subarray(6, 9), a), w = sub(p, a);
   const uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), wu = dot(w, u), wv = dot(w, v), area = uu * vv - uv * uv;
@@ -20,7 +20,7 @@ export function weightsOf(p, corners) {
 const unit = (x) => Math.round(Math.min(1, Math.max(0, x)) * ONE_WEIGHT);
 
 /**
- * The nearest places on the faces: [{ face, weights, place, normal, distance }], `face` as paint files number them. In doubles. Needs the part `mesh`.
+ * Returns the nearest positions on the faces: [{ face, weights, place, normal, distance }], `face` as paint files number them. In doubles. Needs the part `mesh`.
  */
 export async function placesOf(file, tree, points) {
   const found = [];
@@ -34,7 +34,7 @@ export async function placesOf(file, tree, points) {
 }
 
 /**
- * What a plane across an axis cuts of some faces (nine numbers each): adds segments [u, v, u, v] to `out`, on the two axes after `axis`, with what is
+ * Cuts faces (nine numbers each) by a plane across an axis. Adds segments [u, v, u, v] to `out`, on the two axes after `axis`, with what is
  * inside of a closed mesh on their left as seen from the axis' upper end. Corners on the plane count as above it, so that outlines are closed.
  */
 export function cutFaces(faces, axis, at, out) {
@@ -58,7 +58,7 @@ export function cutFaces(faces, axis, at, out) {
   }
 }
 
-/** Of segments as cutFaces() gives them: { area, length }; the area counts each place as often as faces wind around it. */
+/** Returns { area, length } of segments from cutFaces(); the area counts each place as often as faces wind around it. */
 export function measureOf(segments) {
   const [u, v] = segments; // near by, so that little is lost
   let area = 0, length = 0;
@@ -71,8 +71,8 @@ export function measureOf(segments) {
 }
 
 /**
- * The section of the real faces by a plane across an axis, in the model's coordinates. `tell` gets { looked, of } now and then, and in the end { segments,
- * area, length, faces, partial } or { fault }. Area only of solids. `partial`: a subset has left some of it out.
+ * Computes the section of the real faces by a plane across an axis, in the model's coordinates. `tell` gets { looked, of } now and then, and in the end { segments,
+ * area, length, faces, partial } or { fault }. Area only of solids. `partial`: a subset lacks part of the section.
  */
 export async function sectionOf(file, tree, axis, at, tell, ended) {
   const { info } = file;

@@ -1,4 +1,4 @@
-// The page: what is asked for, what is shown, and the worker in between.
+// Controls the page: requests, the picture, and messages to and from the worker.
 import { cutOf } from './address.js';
 import { frameMs, frameTook, makeLevels, showLevel, showLevels, showStats } from './figures.js';
 import { busy, bytes, showError, showLine, showOpening } from './line.js';
@@ -22,7 +22,7 @@ shareOf(scene);
 
 // --- opening ---
 
-// `begun`: boot.js has told the worker already.
+// `begun`: boot.js has already sent the messages to the worker.
 function open(what, name, begun) {
   state.opening++;
   Object.assign(state, { info: undefined, depth: -1, idle: false, timeline: [], stats: undefined, probe: undefined, box: undefined, measured: undefined, error: undefined,
@@ -42,7 +42,7 @@ function open(what, name, begun) {
   ask();
 }
 
-// `step`: a new one of the history; not when it has been taken already, or when the page comes with this file.
+// `step`: adds a step to the history; false when the step exists already, or when the page opens with this file.
 function openUrl(text, { begun = false, step = true } = {}) {
   let url;
   try {
@@ -108,7 +108,7 @@ function close({ step = true } = {}) {
   $('url').focus();
 }
 
-// The view that an address asks for, or the usual one.
+// Returns the view of an address, or the default view.
 function home(camera) {
   scene.home();
   atHome();
@@ -198,7 +198,7 @@ worker.onerror = (e) => showError({ message: `The page's worker failed (${e.mess
 
 // --- to the worker ---
 
-// What came before is kept, and not asked for again; a file that could not be opened is opened anew.
+// Received data is kept and not requested again. A file that could not be opened is opened again.
 function retry() {
   state.error = undefined;
   if (!state.info) {
@@ -289,7 +289,7 @@ function cutChanged() {
   tell('cut');
 }
 
-// All that an address can say of a view.
+// Returns all parameters of a view in an address.
 function shownAs({ camera, level, clip, box, point, measured, colouring, walls, detail: pixels }) {
   home(camera);
   $('level').value = level ?? $('level').max;
@@ -473,7 +473,7 @@ function more() {
   return coming;
 }
 
-// --- begin: what an address may say is told in docs/guide/viewer.md ---
+// --- begin: docs/guide/viewer.md describes the parameters of an address ---
 
 const { query } = boot;
 setTheme(document.documentElement.dataset.theme);
@@ -489,7 +489,7 @@ else if (query.has('file'))
 boot.over();
 boot.said.splice(0).forEach((data) => worker.onmessage({ data }));
 
-/** For tests and for the curious: what is shown. */
+/** The current state, for tests and debugging. */
 window.ebpoViewer = {
   get state() {
     return { idle: state.idle, depth: state.depth, stats: state.stats, traffic: state.traffic, timeline: state.timeline, shownAfter: state.shownAfter, probe: state.probe,
@@ -505,7 +505,7 @@ window.ebpoViewer = {
   scene, probeAt, address,
 };
 
-// more.js is bundled apart from this, and must not bring these along a second time.
+// more.js is bundled separately and must not include these modules a second time.
 export { kit } from './scene.js';
 export * from './shade.js';
 export * from './state.js';

@@ -1,4 +1,4 @@
-// Runs before everything else of the page, which is still on its way: reads the address, asks for the model, starts the worker and tells it what to
+// Runs before the rest of the page, which is still loading: reads the address, requests the model, starts the worker and sends it what to
 // open. What the worker has to say meanwhile waits for app.js. In a bundle this stands in index.html itself.
 (() => {
   const FIRST_BYTES = 1 << 20;    // small models come whole with the first answer; of large ones the levels that any view begins with
@@ -19,7 +19,7 @@
   worker.onmessage = ({ data }) => said.push(data);
   const boot = window.ebpoBoot = { worker, said, query, level: number('level'), detail: number('detail'), fieldOfView: FIELD_OF_VIEW, opening: 0, over() {},
     contextOptions: { antialias: true, powerPreference: 'high-performance', preserveDrawingBuffer: true } };
-  // A name may have a % that stands for itself.
+  // A name may contain a literal %.
   boot.nameOf = (url) => {
     const last = url.split(/[?#]/)[0].split('/').at(-1);
     try {
@@ -79,7 +79,7 @@
     post({ end: true });
   })().catch((error) => post({ failed: error.message })).finally(begin);
 
-  // About what the camera will see; the page tells exactly when it is there.
+  // Estimates the view of the camera; the page sends the exact view when it is loaded.
   const asked = (query.get('view') ?? '').split(',').filter(Boolean).map(Number);
   const [azimuth = 26.3, height = 18.65, distance = 0.98 / Math.sin(FIELD_OF_VIEW * Math.PI / 360), ...at] = asked.every(Number.isFinite) ? asked : [];
   const a = azimuth * Math.PI / 180, h = height * Math.PI / 180, away = [Math.sin(a) * Math.cos(h), Math.sin(h), Math.cos(a) * Math.cos(h)];

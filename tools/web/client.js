@@ -1,5 +1,5 @@
-// A worker and one file open in it, for pages that are not the viewer's own: what is asked is answered by promises, what comes by itself by calls.
-// Where the worker's code is, in the package and in the viewer's folder.
+// A worker with one open file, for other pages than the viewer. Queries return promises; other messages call functions.
+// Also finds the worker's code, in the package and in the viewer's folder.
 const WORKER = new URL('./worker.js', import.meta.url);
 
 // Workers must come from the page's own origin; those of another one are loaded by a line that is of this one.
@@ -12,10 +12,10 @@ function start(address) {
 }
 
 const AHEAD = 1 << 20;    // bytes of the first request: small models come whole
-const WORKERS_MOST = 4;   // of a crew, unless it is told otherwise
+const WORKERS_MOST = 4;   // default number of workers of a crew
 const PATIENCE_MS = 90;   // at most so often the worker hears of the camera
 
-/** Some workers for many files: each file goes to the worker that has fewest. */
+/** Several workers for many files: each file goes to the worker with the fewest files. */
 export class Crew {
   /** `worker`: the address of worker.js, or undefined for the one that lies beside this file; `most`: how many workers. */
   constructor({ worker = WORKER, most = Math.max(1, Math.min(WORKERS_MOST, (navigator.hardwareConcurrency ?? 2) - 1)) } = {}) {
@@ -102,7 +102,7 @@ export class Client {
     this.heard('failed', { error: problem });
   }
 
-  // What gets no answer any more.
+  // Rejects requests that get no answer any more.
   #forget(problem) {
     const all = [this.opened, this.asked, ...this.waiting.values()];
     this.opened = this.asked = undefined;
@@ -126,7 +126,7 @@ export class Client {
     this.worker.post({ type: 'close', opening: ++this.opening });
   }
 
-  /** What is seen (lookOf() of shade.js) and wanted: { level, mesh, pixels, triangles, black, lines, cells }. Told to the worker if it is new, and not too often; says whether it was. */
+  /** What is seen (lookOf() of shade.js) and wanted: { level, mesh, pixels, triangles, black, lines, cells }. Sent to the worker if it is new, at a limited rate. Returns true when sent. */
   look(view, wanted) {
     const text = JSON.stringify([view, wanted]);
     if (text === this.sent)
@@ -140,12 +140,12 @@ export class Client {
     return true;
   }
 
-  /** Whether the worker has not heard yet of what is seen now. */
+  /** Returns true while the worker does not know the current view. */
   get pending() {
     return this.timer !== undefined;
   }
 
-  /** About a point of the model: { where, distance, nearest, lo, hi, exact, depth, ... }. An answer that another question overtakes never comes: AbortError. */
+  /** Queries a point of the model: { where, distance, nearest, lo, hi, exact, depth, ... }. A newer query cancels an older one: AbortError. */
   probe(point) {
     this.asked?.fail(new DOMException('another point was asked about', 'AbortError'));
     const promise = new Promise((done, fail) => (this.asked = { done, fail }));
@@ -153,14 +153,14 @@ export class Client {
     return promise;
   }
 
-  /** The nearest places on the faces to some points of the model: [{ face, weights, place, normal, distance }]. */
+  /** Returns the nearest positions on the faces for points of the model: [{ face, weights, place, normal, distance }]. */
   places(points) {
     const id = ++this.asks, promise = new Promise((done, fail) => this.waiting.set(id, { done, fail }));
     this.worker.post({ type: 'places', opening: this.opening, id, points });
     return promise;
   }
 
-  /** Asks again for what has not come. What is seen is told anew by the next look(). */
+  /** Repeats pending requests. The next look() sends the current view again. */
   retry() {
     this.sent = undefined;
     this.worker.post({ type: 'retry' });

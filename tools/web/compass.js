@@ -1,4 +1,4 @@
-// A cube that shows how the model is turned, each side a button for the view from there; and a bar as long as a round length at what is looked at.
+// Draws a cube with the orientation of the model, whose sides are buttons for views, and a scale bar with a round length.
 import { $, length, on, state } from './state.js';
 
 const SIDES = [['+X', 'right', 90, 0], ['−X', 'left', -90, 0], ['+Y', 'top', 0, 89.9], ['−Y', 'bottom', 0, -89.9], ['+Z', 'front', 0, 0], ['−Z', 'back', 180, 0]];

@@ -1,5 +1,5 @@
-// What to draw: a cut through the tree that fits the camera, as a few hundred pieces of geometry ("tiles") of which only the changed ones are made
-// again. No DOM and no WebGL here: runs in the worker, and under node in the tests.
+// Selects the nodes to draw: a cut through the tree that fits the camera, as a few hundred pieces of geometry ("tiles"). Only changed tiles are
+// made again. No DOM and no WebGL here: runs in the worker, and under node in the tests.
 //
 // Coordinates of the scene: the model's box is centred on the origin and scaled so that half its diagonal is 1. Done in doubles, then rounded.
 import { Field } from './field.js';
@@ -17,7 +17,7 @@ const MESH_LEAVES = 1000;      // whose faces are asked for at once, about
 const MESH_SUBTREES = 16;      // the same where the file has subtrees
 const FACE_PIXELS = 10;        // of the picture for each face of a subtree, from which on its faces are fetched, at a detail of 16 pixels
 const NEARER_LEVELS = 2;       // nodes that lack so many more levels than others are fetched before these
-const NODES_MISSING = 1 << 14; // told of in one pass
+const NODES_MISSING = 1 << 14; // most missing nodes reported in one pass
 const LEAF_SHARE = 4;          // in small files leaves' faces are taken even when so many times smaller than a gray node may be
 const GROUP_LEVELS = 3;        // leaves below one node so many levels above have neighbouring faces in the file
 const GROUP_LEAVES = 12;       // fewer wanted ones are not worth their chunks, unless they are large
@@ -26,7 +26,7 @@ const WHOLE_FACES = 1 << 18;   // of a small file all faces are drawn rather tha
 const WHOLE_PIXELS = 16;       // unless larger cells are asked for
 const FACES_KEPT = 1.5e6;      // besides those of the cut itself
 
-/** How the scene's coordinates come from the model's: scene = (model - center) * scale. */
+/** Returns the transformation from the model's to the scene's coordinates: scene = (model - center) * scale. */
 export function sceneOf(info) {
   const center = info.box_origin.map((o, k) => o + info.box_size[k] / 2);
   return { center, scale: 2 / Math.hypot(...info.box_size) };
@@ -64,7 +64,7 @@ class Heap {
 }
 
 export class Cut {
-  /** `small`: fetching all of the mesh would not matter. */
+  /** `small`: the whole mesh is small enough to be fetched. */
   constructor(tree, { small = true } = {}) {
     this.tree = tree;
     this.small = small;
@@ -100,7 +100,7 @@ export class Cut {
     return px;
   }
 
-  // In one view; what is out of sight counts a tenth.
+  // The size in one view; invisible nodes count a tenth.
   #pixelsOf(node, view) {
     this.unseen = false;
     const h = this.half[node.level];
@@ -173,7 +173,7 @@ export class Cut {
     return tiles;
   }
 
-  // What is drawn now and was not, or otherwise: who draws which faces, and how envelopes are lit.
+  // Updates new and changed nodes: which node draws which faces, and how envelopes are lit.
   #enter(nodes) {
     const { pass } = this, entering = [], leaves = nodes.filter((node) => node.useMesh);
     for (const node of nodes) {
@@ -264,7 +264,7 @@ export class Cut {
     return Object.assign(out, whole ?? { leaves: this.#leavesToFetch(groups, want) });
   }
 
-  // Of a large file nothing is fetched that other nodes hide.
+  // In a large file, nodes hidden by others are not fetched.
   #leaveHidden(view, out, groups) {
     const hidden = new Hidden(view, out.nodes, (node) => {
       const { low, size } = this.#place(node);
@@ -296,7 +296,7 @@ export class Cut {
     group.most = Math.max(group.most, px);
   }
 
-  // Few faces are less to draw than envelopes would be, and nicer to look at.
+  // A few faces are cheaper to draw than envelopes, and look better.
   #takesWhole(want) {
     const { info } = this.tree;
     return want.mesh && this.small && want.pixels <= WHOLE_PIXELS && info.parts.has('mesh') && info.face_count <= WHOLE_FACES;

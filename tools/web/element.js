@@ -1,5 +1,5 @@
-// <ebpo-viewer src="statue.ebpo.h5">: the picture and its camera as an element for other people's pages; with <ebpo-part>s in it, or a scene, several models. Importing this file
-// defines it.
+// <ebpo-viewer src="statue.ebpo.h5">: the picture and its camera as an element for other pages. With <ebpo-part> children or a scene it shows several models. Importing this file
+// defines the element.
 import { boxOf, cameraOf, cameraText, clipOf, cutOf, pointsOf } from './address.js';
 import { Client } from './client.js';
 import { Scene } from './scene.js';
@@ -22,12 +22,12 @@ const STYLE = `
   #say:empty { display: none; }`;
 const STEER = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1], '+': 0.8, '=': 0.8, '-': 1.25 };
 
-// What of parts cannot change without opening them again.
+// Returns the properties of parts that cannot change without opening the parts again.
 const filesOf = (parts) => JSON.stringify(parts.map(({ src, colour, name }) => [src, colour, name]));
 
 export class EbpoViewerElement extends HTMLElement {
   static observedAttributes = [...OPENS, 'view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'theme', 'walls', 'time', 'hide', 'colours'];
-  /** Where worker.js is, if it does not lie beside this file. To be set before the first element is there. */
+  /** Sets the address of worker.js, if it is not beside this file. Call it before the first element exists. */
   static worker = undefined;
 
   #client;   // of one model
@@ -60,7 +60,7 @@ export class EbpoViewerElement extends HTMLElement {
     this.#open();
   }
 
-  // An element that is moved within its page is taken out of it for a moment.
+  // An element that is moved within its page is disconnected briefly.
   disconnectedCallback() {
     queueMicrotask(() => {
       if (this.isConnected || !this.#scene)
@@ -210,7 +210,7 @@ export class EbpoViewerElement extends HTMLElement {
     this.#say('');
   }
 
-  // --- what the attributes and the parts say is opened ---
+  // --- opening the attributes and parts ---
 
   #open() {
     const parts = this.parts, src = this.getAttribute('src'), scene = this.getAttribute('scene');
@@ -264,7 +264,7 @@ export class EbpoViewerElement extends HTMLElement {
     return this.#several ? this.#several.assembly.box && this.#several.facts : this.#client?.info;
   }
 
-  /** What the <ebpo-part>s in it say: [{ src, pose, name, colour, hidden }], texts as they are written. */
+  /** The attributes of the <ebpo-part> children: [{ src, pose, name, colour, hidden }], texts as they are written. */
   get parts() {
     const text = (part, name) => part.getAttribute(name) ?? undefined;
     return [...this.children].filter((part) => part.localName === PART && part.hasAttribute('src')).map((part) => ({ src: text(part, 'src'), pose: text(part, 'pose'),
@@ -312,7 +312,7 @@ export class EbpoViewerElement extends HTMLElement {
   }
 
   /**
-   * Asks about a point of the model and marks it: { point, where, distance, nearest, lo, hi, exact }; the event `point` has the same. Of several models: in the scene's coordinates,
+   * Queries a point of the model and marks it: { point, where, distance, nearest, lo, hi, exact }; the event `point` has the same. Of several models: in the scene's coordinates,
    * about the instance of this name.
    */
   async ask(point, instance) {

@@ -1,5 +1,5 @@
-// A smooth field of normals for envelopes: at each corner of a drawn cell the mean direction of the nodes around it, by area. Neighbouring nodes are lit
-// alike where they meet, so that the steps between envelopes do not look like edges of the model. It also tells when a node's neighbours have changed.
+// Computes a smooth field of normals for envelopes: at each corner of a drawn cell the mean direction of the nodes around it, by area. Neighbouring nodes
+// have the same light at common corners, so that the steps between envelopes do not look like edges of the model. It also detects changes of a node's neighbours.
 const DEEPEST = 20;
 const NONE = 0xffffffff;
 
@@ -64,7 +64,7 @@ export class Field {
     }
   }
 
-  /** The last pass in which something at a node's corners was another. */
+  /** Returns the last pass in which the field at a node's corners changed. */
   changedAt({ slots }) {
     let last = 0;
     for (const i of slots)
@@ -80,7 +80,7 @@ export class Field {
         this.here[3 * c + k] = this.sum[4 * slots[c] + k] / (this.sum[4 * slots[c] + 3] || 1);
   }
 
-  /** The field at a place of the cell, 0 .. 1 on each axis, into `out`: its length is 1 where all nodes agree, and 0 where they cancel. */
+  /** Evaluates the field at a position in the cell, 0 .. 1 on each axis, into `out`: its length is 1 where all nodes agree, and 0 where they cancel. */
   at(x, y, z, out) {
     out[0] = out[1] = out[2] = 0;
     for (let c = 0; c < 8; c++) {

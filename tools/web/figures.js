@@ -4,7 +4,7 @@ import { $, count, state, time } from './state.js';
 
 const bytesOf = (size) => (size >= 0 ? bytes(size) : 'not yet known how much');
 
-/** A button for each level and one for the mesh; `choose(level)` is called for one that is pressed. */
+/** Makes a button for each level and one for the mesh; a pressed button calls `choose(level)`. */
 export function makeLevels(choose) {
   const i = state.info, sizes = i.levels.map((_, l) => state.bytesTo[l] - (l ? state.bytesTo[l - 1] : 0)), stops = [...sizes]; // NaN: not known yet
   if (i.parts.has('mesh'))
@@ -21,7 +21,7 @@ export function makeLevels(choose) {
   }));
 }
 
-/** Which are here, which are drawn, which is chosen. */
+/** Shows which levels are loaded, drawn and chosen. */
 export function showLevels() {
   const at = Number($('level').value), drawn = state.stats?.levels ?? [];
   [...$('levels').children].forEach((b, l) => {
@@ -33,7 +33,7 @@ export function showLevels() {
   });
 }
 
-/** What a level means, in words and in volume. */
+/** Describes a level in words and by its volume. */
 export function showLevel() {
   const at = Number($('level').value), i = state.info, mesh = at === i.level_count;
   $('levelText').textContent = mesh ? 'all, and the mesh' : `0 to ${at}`;
@@ -55,7 +55,7 @@ function volumeExcess(level) {
   return Math.max(0, 100 * (sum / i.mesh_volume - 1));
 }
 
-/** A frame took so long. */
+/** Records the duration of a frame. */
 export function frameTook(ms, calls) {
   state.frames.push(ms);
   if (state.frames.length > 30)
@@ -67,7 +67,7 @@ export function frameTook(ms, calls) {
 
 export const frameMs = () => state.frames.reduce((a, b) => a + b, 0) / Math.max(state.frames.length, 1);
 
-/** `walls`: whether they are drawn. */
+/** `walls`: true when cell faces are drawn. */
 export function showStats(walls) {
   if (!state.info)
     return;

@@ -1,4 +1,4 @@
-// The first answer, which the page asked for before this code was there (boot.js), as the answer to the worker's own first request.
+// Passes the response to the page's first request, made by boot.js before this code was loaded, to the worker as its first response.
 let first;
 
 /** A part of it, as the page sends them. */
@@ -7,7 +7,7 @@ export function takeFirst({ url, range, head, bytes, end, failed }) {
     first = { url, range, taken: false };
     first.body = new ReadableStream({ start: (controller) => (first.controller = controller) });
     first.answer = new Promise((done, fail) => Object.assign(first, { done, fail }));
-    first.answer.catch(() => {}); // told to whom takes it
+    first.answer.catch(() => {}); // the receiver reports the error
   } else if (first.ended) {
     return; // nobody wants the rest
   } else if (head) {
@@ -24,7 +24,7 @@ export function takeFirst({ url, range, head, bytes, end, failed }) {
   }
 }
 
-/** fetch, but for that one request. `forget()` is called when nobody wants it any more. */
+/** Acts like fetch, except for that one request. `forget()` is called when the response is no longer needed. */
 export const fetchAfter = (forget) => (url, init) => {
   if (!first || first.taken || url !== first.url || init.headers.Range !== first.range)
     return fetch(url, init);

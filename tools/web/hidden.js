@@ -1,5 +1,5 @@
-// What is probably hidden behind nearer nodes, so that it need not be fetched: by a coarse picture of which part of the view is covered, and how far
-// away. A guess, not a test of visibility: what it says only puts off what is fetched.
+// Estimates which nodes are hidden behind nearer nodes and need not be fetched, from a coarse picture of the covered parts of the view and their
+// depths. This is no exact test of visibility: it only delays fetching.
 const ACROSS = 48, DOWN = 32;
 const COVERED = 0.8; // times its area, until a tile counts as covered
 
@@ -49,7 +49,7 @@ export class Hidden {
     return true;
   }
 
-  /** Whether all of a node lies behind what covers the view there. */
+  /** Returns true when the whole node is behind nodes that cover its part of the view. */
   has(node) {
     const s = this.depth && this.#see(node);
     return Boolean(s) && s.distance > s.radius && this.#tiles(s, (tile) => this.depth[tile] < s.distance - s.radius);

@@ -1,10 +1,10 @@
-// What the page says of the line: how far it is, what it waits for and for how long, what went wrong, and a way to try again.
+// Shows the state of the connection: progress, waiting time, errors, and a button to retry.
 const $ = (id) => document.getElementById(id);
 const STALL_MS = 3000; // without a byte: it is said
 
 export const bytes = (n) => (n < 1000 ? `${n} B` : n < 1e6 ? `${(n / 1e3).toFixed(n < 1e4 ? 1 : 0)} kB` : n < 1e9 ? `${(n / 1e6).toFixed(n < 1e7 ? 2 : 1)} MB` : `${(n / 1e9).toFixed(2)} GB`);
 
-/** Whether something is being fetched or made; how much of it is not known yet. */
+/** Shows that data is being fetched or computed, before the amount is known. */
 export function busy(on) {
   $('progress').classList.toggle('on', on);
   if (!on)

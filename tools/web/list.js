@@ -1,5 +1,5 @@
 // node list.js FILE ...: a list of files, and scenes (.scene.json), for the viewer's first page (?samples=), as JSON. Files that
-// cannot be read are left out, which is said; if no other is there, the exit code is 1.
+// cannot be read are omitted with a message; the exit code is 1 when no file remains.
 import { promises as fs } from 'node:fs';
 import { basename } from 'node:path';
 import { openEbpo } from './reader/index.js';

@@ -1,4 +1,4 @@
-// Distances between points, the section's area and outline, and a box of which only the inside is shown.
+// Measures distances between points and the section's area and outline, and clips the model to a box.
 import { complain, make, mark, modelName, placesOf, save, section, svg, take, taken } from './parts.js';
 import { $, length, on, state, toScene } from './state.js';
 

@@ -1,9 +1,9 @@
-// The real faces that have come, each once however many leaves list it, with vertices that faces share: for drawing them once, and smooth.
+// Stores the received real faces, each once even if several leaves list it, with shared vertices for smooth drawing.
 const CREASE = 0.866;        // cosine: faces at a vertex that differ by more (30 degrees) keep their edge
 const NONE = 0xffffffff;
 const EMPTY = new Uint32Array(0);
 
-// A typed array with room for `count` items and as much again.
+// Returns a typed array with capacity for twice `count` items.
 function grown(array, count) {
   if (count <= array.length)
     return array;
@@ -28,7 +28,7 @@ export class MeshStore {
     this.owner = new Int32Array(0);       // the id of the leaf that draws the face
     this.colour = new Uint8Array(0);      // red, green, blue of corners, if `coloured`
     this.coloured = false;
-    this.leafOf = [];                     // by face: a leaf that lists it, to be told that its normals changed
+    this.leafOf = [];                     // by face: a leaf that lists it, which is notified when its normals change
     this.position = new Float32Array(0);  // of vertices
     this.last = EMPTY;                    // of vertices: their newest corner
     this.table = new Uint32Array(4096).fill(NONE);
@@ -78,7 +78,7 @@ export class MeshStore {
     this.last = grown(this.last, this.vertices + 3);
   }
 
-  // Vertices are the same when their places are.
+  // Vertices with equal positions are one vertex.
   #vertex(x, y, z) {
     if (2 * this.vertices >= this.table.length)
       this.#rehash(2 * this.table.length);
@@ -153,7 +153,7 @@ export class MeshStore {
     }
   }
 
-  /** Decides which of some leaves (with ids) draws a face: the one with the least id. Their `owned` tells when that has changed. */
+  /** Decides which of some leaves (with ids) draws a face: the one with the least id. Their `owned` shows when that has changed. */
   share(leaves) {
     const { owner } = this;
     for (const { mesh } of leaves)

@@ -1,4 +1,4 @@
-// A model in somebody's own three.js scene: an Object3D that is finer where the camera looks. Its coordinates are the file's.
+// A model for any three.js scene: an Object3D with more detail in the view of the camera. Its coordinates are those of the file.
 import { Box3, DoubleSide, Group, MeshStandardMaterial, Object3D, Vector3 } from 'three';
 import { Client, Crew } from './client.js';
 import { NO_HUE, Tiles, lookOf, makeLook, setCut } from './shade.js';
@@ -49,7 +49,7 @@ const heightOf = (renderer) => (typeof renderer === 'number' ? renderer : render
 
 export class EbpoModel extends Object3D {
   /**
-   * Options, all of which may be left out: `worker`, the address of worker.js; `material`, 'standard' (the scene's lights), 'viewer' (as the viewer's page
+   * Options (all optional): `worker`, the address of worker.js; `material`, 'standard' (the scene's lights), 'viewer' (as the viewer's page
    * draws) or one of standardMaterial(); `crew`, workers shared with other models (EbpoGroup has one); `detail`, `level`, `mesh`, `triangles`: as the members of these names.
    */
   constructor({ worker, crew, material = 'standard', detail = PIXELS, level = Infinity, mesh = true, triangles = TRIANGLES_MOST } = {}) {
@@ -104,7 +104,7 @@ export class EbpoModel extends Object3D {
     return new Box3(new Vector3(...low), new Vector3(...low.map((x, k) => x + size[k])));
   }
 
-  /** To be called before each frame: tells what is seen. `renderer`, or the picture's height in pixels of the page. Costs little when nothing has moved. */
+  /** Sends the current view to the worker; call it before each frame. `renderer`: the renderer, or the picture's height in CSS pixels. Cheap when nothing has moved. */
   update(camera, renderer) {
     if (!this.info)
       return;
@@ -128,7 +128,7 @@ export class EbpoModel extends Object3D {
     return this.cut;
   }
 
-  /** About a point (Vector3) of this object's coordinates: { where, distance, nearest, lo, hi, exact }. */
+  /** Queries a point (Vector3) of this object's coordinates: { where, distance, nearest, lo, hi, exact }. */
   async probe(point) {
     const { where, distance, nearest, lo, hi, exact } = await this.client.probe(point.toArray());
     return { where, distance, nearest: nearest && new Vector3(...nearest), lo, hi, exact };
@@ -163,7 +163,7 @@ export class EbpoGroup extends Group {
     return this.children.filter((child) => child instanceof EbpoModel);
   }
 
-  /** To be called before each frame, in place of the models' own update(): shares the budget among those that are seen, then tells each. */
+  /** Shares the budget among the visible models and updates each of them. Call it before each frame instead of the models' own update(). */
   update(camera, renderer) {
     this.updateWorldMatrix(true, true);
     const height = heightOf(renderer), models = this.models.filter((model) => model.info && model.visible);

@@ -1,4 +1,4 @@
-// What the page loads when the picture is there: measuring, a section box, notes, the pen, sharing, shading, cube and scale.
+// Modules that the page loads after the first picture: measuring, a section box, notes, the pen, sharing, shading, cube and scale.
 import { addCompass } from './compass.js';
 import { addMeasuring } from './measure.js';
 import { addNotes } from './notes.js';
@@ -20,7 +20,7 @@ export async function begin(page) {
   addMeasuring(page);
   const pipeline = scene.pipeline = new Pipeline(kit), pen = addPen(page, pipeline);
   addNotes(page, pen.drawing);
-  pen.begin(); // its section stands last, and tells the others what is there
+  pen.begin(); // its section is last, and announces the loaded sections to the others
   addShading(scene, pipeline);
   addSharing(page);
   addCompass(page);
@@ -29,7 +29,7 @@ export async function begin(page) {
   state.more = true;
 }
 
-// Keys of what has come along; keys without meaning would be worse than none.
+// Enables the keys of the loaded modules only.
 function addHelp() {
   $('help').querySelector('dl').insertAdjacentHTML('beforeend', `<dt><kbd>D</kbd> <kbd>N</kbd></dt><dd>measure distances, add a note</dd>
     <dt><kbd>B</kbd> <kbd>R</kbd></dt><dd>pen, eraser; <kbd>Ctrl Z</kbd> undo</dd><dt><kbd>E</kbd> <kbd>A</kbd> <kbd>L</kbd></dt><dd>shade by depth, ambient occlusion, share</dd>`);

@@ -1,4 +1,4 @@
-// Notes on places of the model, which are kept with what is painted; and saved views, which are kept by this browser, and as files.
+// Notes at points of the model, stored with the paint, and saved views, stored in this browser and as files.
 import { complain, make, mark, modelName, save, section, take, taken } from './parts.js';
 import { MOST, cleanText } from './paint/paint_file.js';
 import { today } from './paint/document.js';

@@ -1,4 +1,4 @@
-// Pieces of the page that its tools are made of: folding sections of the panel, marks over the picture, files in and out.
+// Components of the page's tools: folding sections of the panel, marks over the picture, opening and saving files.
 import { $, on, state, tell } from './state.js';
 
 /** A folding section of the panel, before the statistics. `html` is ours; what users write is only ever set as text. */
@@ -19,7 +19,7 @@ export function make(name, text, members = {}) {
   return element;
 }
 
-// --- who gets clicks on the model ---
+// --- routing of clicks on the model ---
 
 let tool;
 /** One tool at a time: { click(point), end() }; `end` is called when another one takes its place, or Escape. Nothing: clicks ask about points again. */
@@ -39,7 +39,7 @@ on('closed', () => take());
 
 const marks = [];
 let project;
-/** `scene` says where points are. */
+/** `scene` computes the positions of points. */
 export function markOn(scene) {
   project = (point) => scene.project(point);
   const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg'), pins = document.createElement('div');
@@ -50,7 +50,7 @@ export function markOn(scene) {
   on('frame', placeMarks);
 }
 
-/** `points`: in the scene; `place(spots, element)` gets where they are on the page; the mark is hidden while one of them is behind the eye. Returns a function that takes the mark away. */
+/** `points`: in the scene; `place(positions, element)` receives their positions on the page; the mark is hidden while one of them is behind the eye. Returns a function that takes the mark away. */
 export function mark(element, points, place) {
   const it = { element, points, place };
   $(element instanceof SVGElement ? 'lines' : 'pins').append(element);
@@ -98,7 +98,7 @@ let asks = 0;
 /** The nearest places on the faces to some points of the model: [{ face, weights, place, normal, distance }]. */
 export const placesOf = (worker, points) => ask(worker, 'places', points);
 
-/** What points of paint cover, as reachOf() of reach.js says it. */
+/** Returns the faces that points of paint cover, from reachOf() of reach.js. */
 export const reachOf = (worker, points) => ask(worker, 'reach', points);
 
 function ask(worker, type, points) {

@@ -1,4 +1,4 @@
-// A picture in two steps: the scene with its depths first, then what is made of these: shading by depth ("eye-dome lighting", Boucheny 2009), ambient
+// Draws a picture in two steps: first the scene with its depths, then effects from the depths: shading by depth ("eye-dome lighting", Boucheny 2009), ambient
 // occlusion, and paint.
 import { Ambient, SMOOTHED } from './ambient.js';
 
@@ -68,7 +68,7 @@ export class Pipeline {
     return scene.add(triangle);
   }
 
-  /** Whether the plain way would show the same. */
+  /** Returns true when direct drawing gives the same picture. */
   get idle() {
     return !this.dome && !this.surroundings && !this.layers?.any;
   }

@@ -1,15 +1,15 @@
-// The point asked about: its numbers, its answer, its marker.
+// The queried point: its coordinates, result and marker.
 import { $, length, state, tell, toScene } from './state.js';
 
 let picture, questions;
 
-/** `scene` shows the marker, `worker` is asked. */
+/** `scene` shows the marker, `worker` evaluates the query. */
 export function probeWith(scene, worker) {
   picture = scene;
   questions = worker;
 }
 
-/** Asks about a point of the model; forgets the last one without a point. */
+/** Queries a point of the model. Without a point, clears the last query. */
 export function probeAt(point) {
   state.probe = point && { point, pending: true };
   if (point)

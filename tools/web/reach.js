@@ -1,4 +1,4 @@
-// What a point of paint covers (format-spec/paint.md, section 4), in the worker: the faces that hang together with its own one within its ball.
+// Computes in the worker which faces a point of paint covers (format-spec/paint.md, section 4): the faces connected with its own face within its ball.
 import { GRAY, LEAF, cellNear, growForQuestion, nearestOnTriangle } from './reader/index.js';
 
 const FACES_MOST = 100_000;   // around a point; beyond that the picture shows its ball

@@ -1,9 +1,9 @@
-// The picture: tiles from the worker, a camera, what is cut away and the probe's marker. Drawn only when something changed.
+// The picture: tiles from the worker, the camera, clipping and the probe's marker. Drawn only after a change.
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { Tiles, lookOf, makeLook, setCut, setTheme } from './shade.js';
 
-/** For code that is loaded later: it must not bring another three.js along. */
+/** For code that is loaded later, which must not load another copy of three.js. */
 export const kit = { InstancedBufferAttribute: THREE.InstancedBufferAttribute, InstancedBufferGeometry: THREE.InstancedBufferGeometry, BufferAttribute: THREE.BufferAttribute,
   BufferGeometry: THREE.BufferGeometry, Color: THREE.Color, DepthTexture: THREE.DepthTexture, Frustum: THREE.Frustum, Group: THREE.Group, InstancedMesh: THREE.InstancedMesh,
     Matrix4: THREE.Matrix4, Mesh: THREE.Mesh, Scene: THREE.Scene, ShaderMaterial: THREE.ShaderMaterial, Sphere: THREE.Sphere,
@@ -96,7 +96,7 @@ export class Scene {
     this.redraw();
   }
 
-  /** Room that panels take at the right and the bottom, in pixels: the model is centred in the rest. */
+  /** The size of panels at the right and the bottom, in pixels: the model is centred in the rest. */
   setInsets(right, bottom) {
     this.insets = [right, bottom];
     this.#offset();
@@ -155,7 +155,7 @@ export class Scene {
     this.redraw();
   }
 
-  /** What the worker needs to choose nodes. */
+  /** Returns the view data with which the worker chooses nodes. */
   view() {
     return lookOf(this.camera, this.canvas.clientHeight, this.scene.matrixWorld);
   }

@@ -1,4 +1,4 @@
-// A box of which only the inside is shown: two sliders an axis, in shares of the model's box.
+// Clips the model to a box: two sliders an axis, in shares of the model's box.
 import { section } from './parts.js';
 import { $, on, state } from './state.js';
 

@@ -1,4 +1,4 @@
-// How faces, envelopes and lines are shaded, and how tiles from the worker become meshes: what pages and other people's scenes have in common.
+// Shades faces, envelopes and lines, and converts tiles from the worker to meshes, for the viewer's pages and for other three.js scenes.
 import * as THREE from 'three';
 
 // By node type (white, black, leaf, gray) and for real faces; by level from coarse to fine.

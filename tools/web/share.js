@@ -1,4 +1,4 @@
-// The page's address follows what is shown, and what an address says is shown. Looking around never makes steps of the browser's history; another file does.
+// Synchronizes the page's address with the view. Camera moves add no steps to the browser's history; opening another file does.
 import { boxOf, boxText, cameraOf, cameraText, clipOf, clipText, pointsOf, pointsText, withQuery } from './address.js';
 import { $, state } from './state.js';
 
@@ -46,7 +46,7 @@ export function address() {
     ['walls', $('walls').checked ? undefined : '0'], ['detail', unless($('detail').value, 'auto')]]);
 }
 
-/** Something changed: soon the address says so. */
+/** Schedules an update of the address after a change. */
 export function changed() {
   if (state.together) // which keeps an address of its own
     return;

@@ -1,4 +1,4 @@
-// What to copy for others: a link to this view, a line for a page, an element.
+// Offers texts to copy: a link to this view, HTML for a page, an element.
 import { make } from './parts.js';
 import { $, state } from './state.js';
 

@@ -1,4 +1,4 @@
-// What the page knows of the open file, for all its parts; and how they hear of each other.
+// The page's state of the open file, shared by its modules, and the events between the modules.
 export const $ = (id) => document.getElementById(id);
 
 export const state = {

@@ -1,5 +1,5 @@
-// Geometry of some nodes of a cut, as typed arrays for the picture: envelopes with the walls that are seen, real faces, lines.
-// A vertex has a place, a tag [level, type, weight of its normal, 0] and a normal, octahedral in two numbers of 16 bits. In coloured tiles it
+// Builds the geometry of nodes of a cut as typed arrays: envelopes with visible cell faces, real faces, lines.
+// A vertex has a position, a tag [level, type, weight of its normal, 0] and a normal, octahedral in two numbers of 16 bits. In coloured tiles it
 // has a hue, too: [red, green, blue, 0], or 255 last where there is no colour.
 export const REAL_FACE = 4;  // in a tag's type, beside the node's
 const SURE = [0.25, 0.6];    // lengths of the field between which its weight goes from nothing to all: thin parts and edges are lit flat

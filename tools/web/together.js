@@ -1,3 +1,3 @@
-// What the page loads when it shows several models or a scene.
+// Module that the page loads to show several models or a scene.
 export { ofFiles, wanted } from './together/asked.js';
 export { begin } from './together/page.js';

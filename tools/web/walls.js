@@ -1,4 +1,4 @@
-// What can be seen of the polygons on cell walls: where two envelopes meet they hide each other's.
+// Computes the visible parts of polygons on cell faces: two touching envelopes hide each other's polygons.
 import { BLACK, WHITE } from './reader/index.js';
 
 const ON = 1e-9;           // in cells

@@ -1,4 +1,5 @@
-// Reads, chooses and cuts, so that the page stays responsive. The page sends 'open', 'close', 'end', 'view', 'probe', 'places', 'reach' and 'section'; it gets 'opened', 'located', 'tiles', 'loaded',
+// Reads files, chooses nodes and builds tiles outside the page's thread.
+// The page sends 'open', 'close', 'end', 'view', 'probe', 'places', 'reach' and 'section'; it gets 'opened', 'located', 'tiles', 'loaded',
 // 'probed', 'places', 'section', 'idle' and 'failed'. Several files may be open: `file` says about which one a message is, both ways; it is 0 where nothing is said.
 import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // workers have no import maps
 import { placesOf, sectionOf } from './answers.js';
@@ -156,7 +157,7 @@ class OpenFile {
     post(this.slot, { type: 'tiles', opening: this.number, set, removed, stats, traffic: this.file.traffic, ms: performance.now() - this.began, want: this.slot.want.number }, transfer);
   }
 
-  /** Where a point is: at once what the levels at hand say for certain, then exactly, by the faces of the leaves that matter. */
+  /** Classifies a point: first by the loaded levels, then exactly by the faces of the relevant leaves. */
   async probe(point) {
     const number = ++this.probes, { tree, file } = this, solid = tree.info.solid;
     const answer = (more) => this.ended || number !== this.probes || post(this.slot, { type: 'probed', opening: this.number, point, solid, traffic: file.traffic, ...more });
@@ -191,7 +192,7 @@ class OpenFile {
   }
 }
 
-// Longer questions, answered one after the other; a section that another overtakes ends.
+// Evaluates longer queries one after the other. A newer section query cancels an older one.
 async function answer(data, slot, mine) {
   if (data.type === 'section') {
     const number = ++slot.sections, over = () => mine.ended || number !== slot.sections;
@@ -209,7 +210,7 @@ async function answer(data, slot, mine) {
     mine.asked = mine.places = undefined; // what it has gathered goes
 }
 
-// What is under way, for the page; and that nothing is any more.
+// Reports progress to the page, and the end of all work.
 function tellLine(slot) {
   const { current } = slot, underway = current?.source?.underway?.() ?? [];
   if (!underway.length && slot.silent)

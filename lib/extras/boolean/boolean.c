@@ -1,11 +1,11 @@
 /* Boolean expressions over solids at poses: union, intersection, difference and symmetric
  * difference, evaluated at points of the world.
  *
- * An expression is a list of nodes, each of which refers to earlier nodes or operands. What is
- * known of the operands (in, out, or unknown) gives what is possible for the result; an operand on
- * whose boundary a point lies counts with both sides. Only operands that can still change the
- * result are queried. Proofs: docs/develop/booleans.md. The object is immutable after it is made;
- * each thread has its own contexts. */
+ * An expression is a list of nodes, each of which refers to earlier nodes or operands. The state of
+ * the operands (in, out, or unknown) gives the possible results; an operand on whose boundary a
+ * point lies counts with both sides. Only operands that can still change the result are queried.
+ * Proofs: docs/develop/booleans.md. The object is immutable after creation; each thread has
+ * separate contexts. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -28,8 +28,8 @@ static ebpo_status check_node(const ebpo_boolean_node *node, uint32_t number, ui
     bool operand = node->operation == EBPO_BOOLEAN_OPERAND;
     if (node->operation < 0 || node->operation > EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "node %" PRIu32 " of the expression: there is no operation %" PRId32,
-                         number, node->operation);
+                         "node %" PRIu32 " of the expression: unknown operation %" PRId32, number,
+                         node->operation);
     if (operand && node->left >= operands)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "node %" PRIu32 " of the expression: left is %" PRIu32
@@ -38,12 +38,12 @@ static ebpo_status check_node(const ebpo_boolean_node *node, uint32_t number, ui
     if (!operand && (node->left >= number || node->right >= number))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "node %" PRIu32 " of the expression names node %" PRIu32
-                         ", which does not stand before it",
+                         ", which is not before it",
                          number, node->left >= number ? node->left : node->right);
     return EBPO_OK;
 }
 
-/* EBPO_E_LIMIT, EBPO_E_ARGUMENT as ebpo_boolean_new says. */
+/* Fails with EBPO_E_LIMIT, EBPO_E_ARGUMENT as documented at ebpo_boolean_new. */
 static ebpo_status make_expression(ebpo_expression *out, const ebpo_boolean_node *nodes,
                                    uint32_t count, uint32_t operands, ebpo_error *error)
 {
@@ -65,7 +65,7 @@ static unsigned may_not(unsigned may)
     return (may & EBPO_MAY_IN ? EBPO_MAY_OUT : 0u) | (may & EBPO_MAY_OUT ? EBPO_MAY_IN : 0u);
 }
 
-/* In both: possible if it is in both; not in both: possible if it is not in either. */
+/* In both: possible if it may be in both; not in both: possible if it may be out of either. */
 static unsigned may_in_both(unsigned a, unsigned b)
 {
     return (a & b & EBPO_MAY_IN) | ((a | b) & EBPO_MAY_OUT);
@@ -124,7 +124,7 @@ static void combine_boxes(int32_t operation, const double a[6], const double b[6
         out[3 + k] = smaller ? fmin(a[3 + k], b[3 + k]) : fmax(a[3 + k], b[3 + k]);
     }
     if (out[0] > out[3] || out[1] > out[4] || out[2] > out[5])
-        for (int k = 0; k < 3; k++) { /* so that a union takes no part of what is empty */
+        for (int k = 0; k < 3; k++) { /* so that a union takes no part of an empty operand */
             out[k] = INFINITY;
             out[3 + k] = -INFINITY;
         }
@@ -144,16 +144,17 @@ void ebpo_expression_box(const ebpo_expression *e, const double (*box)[6], doubl
     memcpy(out, of[e->count - 1], sizeof of[0]);
 }
 
-/* --- making --- */
+/* --- creation --- */
 
 ebpo_status ebpo_fail_operand(const ebpo_model *model, uint32_t number, const ebpo_error *cause,
                               ebpo_error *error)
 {
-    const char *file = model->file->in.shown, *said = cause->message;
+    const char *file = model->file->in.shown, *reported = cause->message;
     size_t named = strlen(file);
-    if (strncmp(said, file, named) == 0 && strncmp(said + named, ": ", 2) == 0)
-        said += named + 2;
-    return ebpo_fail_file(error, cause->status, file, "operand %" PRIu32 ": %s", number + 1, said);
+    if (strncmp(reported, file, named) == 0 && strncmp(reported + named, ": ", 2) == 0)
+        reported += named + 2;
+    return ebpo_fail_file(error, cause->status, file, "operand %" PRIu32 ": %s", number + 1,
+                          reported);
 }
 
 static ebpo_status make_solids(ebpo_boolean *b, const ebpo_boolean_operand *operands,
@@ -233,11 +234,11 @@ void ebpo_boolean_free(ebpo_boolean *b)
 
 /* --- points --- */
 
-/* What the operands say of a point: those that it is on have two sides. */
+/* States of the operands at a point; an operand on whose boundary it lies has two sides. */
 typedef struct opinion {
-    uint64_t known;        /* of these operands, which side is inside is the same on both */
-    uint64_t above, below; /* inside there */
-    bool flat;             /* all faces through the point have one plane */
+    uint64_t known;        /* operands whose inside is the same on both sides */
+    uint64_t above, below; /* operands that are inside on that side */
+    bool flat;             /* all faces through the point are in one plane */
     bool on;
     double plane[3][3];
 } opinion;
@@ -254,7 +255,7 @@ static void add_opinion(opinion *o, uint32_t i, ebpo_rule rule, const ebpo_posed
 {
     uint64_t above = ebpo_rule_inside(rule, sides->above),
              below = ebpo_rule_inside(rule, sides->below);
-    if (sides->flat && above == below) { /* not its boundary, also if faces are there */
+    if (sides->flat && above == below) { /* not its boundary, even if faces are there */
         o->known |= UINT64_C(1) << i;
         o->above |= above << i;
         o->below |= above << i;
@@ -282,8 +283,8 @@ static void conclude_result(const ebpo_boolean *b, const opinion *o, unsigned ma
     out->certain = out->where != EBPO_ON || o->flat;
 }
 
-ebpo_status ebpo_boolean_ask(const ebpo_boolean *b, unsigned worker, const double w[3],
-                             ebpo_boolean_result *out, ebpo_error *error)
+ebpo_status ebpo_boolean_query(const ebpo_boolean *b, unsigned worker, const double w[3],
+                               ebpo_boolean_result *out, ebpo_error *error)
 {
     opinion o = { .flat = true };
     unsigned may = EBPO_MAY_BOTH;
@@ -300,19 +301,19 @@ ebpo_status ebpo_boolean_ask(const ebpo_boolean *b, unsigned worker, const doubl
     return EBPO_OK;
 }
 
-typedef struct asking {
+typedef struct querying {
     const ebpo_boolean *b;
     const double *points;
     ebpo_boolean_result *out;
-} asking;
+} querying;
 
-static ebpo_status ask_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                            ebpo_error *error)
+static ebpo_status query_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
-    const asking *a = context;
+    const querying *a = context;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
-        status = ebpo_boolean_ask(a->b, worker, a->points + 3 * i, &a->out[i], error);
+        status = ebpo_boolean_query(a->b, worker, a->points + 3 * i, &a->out[i], error);
     return status;
 }
 
@@ -321,11 +322,11 @@ ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolean, const double *points
 {
     EBPO_DEFAULT_FP;
     enum { GRAIN = 256 };
-    asking a = { boolean, points, out };
+    querying a = { boolean, points, out };
     ebpo_status status = ebpo_check_points(points, count, error);
     if (status != EBPO_OK)
         return status;
-    return ebpo_parallel_for(count <= GRAIN ? 1 : boolean->threads, NULL, count, GRAIN, ask_some,
+    return ebpo_parallel_for(count <= GRAIN ? 1 : boolean->threads, NULL, count, GRAIN, query_some,
                              &a, NULL, "booleans", error);
 }
 

@@ -1,5 +1,5 @@
-/* Boolean expressions over solids at poses, evaluated where each operand is known to be in or out,
- * or not known. Expressions: pure functions, any thread. */
+/* Boolean expressions over solids at poses, evaluated from operands that are in, out or unknown.
+ * Expressions: pure functions, any thread. */
 #ifndef EBPO_BOOLEAN_BOOLEAN_H
 #define EBPO_BOOLEAN_BOOLEAN_H
 
@@ -7,7 +7,7 @@
 
 #include "extras/collide/posed_solid.h"
 
-/* What is possible, as bits. */
+/* Possible states, as bits. */
 enum { EBPO_MAY_IN = 1, EBPO_MAY_OUT = 2, EBPO_MAY_BOTH = 3 };
 
 typedef struct ebpo_expression {
@@ -15,24 +15,25 @@ typedef struct ebpo_expression {
     uint32_t count;
 } ebpo_expression;
 
-/* Bit i of `known`: it is known of operand i, by bit i of `in`. MAY_IN or MAY_OUT is certain;
- * MAY_BOTH may be more than what is possible where an operand is used twice. */
+/* Evaluates an expression. If bit i of `known` is set, bit i of `in` is the state of operand i.
+ * MAY_IN or MAY_OUT is certain; MAY_BOTH may be more than is possible where an operand is used
+ * twice. */
 unsigned ebpo_expression_value(const ebpo_expression *e, uint64_t known, uint64_t in);
 
-/* Operands that the result depends on, a bit for each. */
+/* Returns the operands that the result depends on, a bit for each. */
 uint64_t ebpo_expression_operands(const ebpo_expression *e);
 
-/* A box that holds the result, low[3] and high[3] in turn; box: those of the operands. Empty: a low
- * above its high. */
+/* Computes a box that contains the result, low[3] and high[3] in turn, from the operands' boxes.
+ * Empty: a low above its high. */
 void ebpo_expression_box(const ebpo_expression *e, const double (*box)[6], double out[6]);
 
-/* An expression at work. */
+/* An expression with its operands. */
 
 struct ebpo_boolean {
     ebpo_expression expression;
-    uint32_t count; /* operands */
+    uint32_t count; /* number of operands */
     ebpo_posed_solid *solid;
-    ebpo_pose *pose; /* of each, as it was given */
+    ebpo_pose *pose; /* poses of the operands, as given */
     unsigned threads;
     ebpo_context **context; /* [threads][count] */
 };
@@ -43,12 +44,12 @@ static inline ebpo_context *ebpo_boolean_context(const ebpo_boolean *b, unsigned
     return b->context[(size_t)worker * b->count + operand];
 }
 
-/* With the contexts of one worker. */
-EBPO_MUST_USE ebpo_status ebpo_boolean_ask(const ebpo_boolean *b, unsigned worker,
-                                           const double w[3], ebpo_boolean_result *out,
-                                           ebpo_error *error);
+/* Uses the contexts of one worker. */
+EBPO_MUST_USE ebpo_status ebpo_boolean_query(const ebpo_boolean *b, unsigned worker,
+                                             const double w[3], ebpo_boolean_result *out,
+                                             ebpo_error *error);
 
-/* Hands on what a call about an operand has said: "FILE: operand 1: ...", from 1 on. */
+/* Fails with the error of a call about an operand: "FILE: operand 1: ...", from 1 on. */
 ebpo_status ebpo_fail_operand(const ebpo_model *model, uint32_t number, const ebpo_error *cause,
                               ebpo_error *error);
 

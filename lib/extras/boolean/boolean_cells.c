@@ -1,9 +1,9 @@
-/* The cells of the result of a boolean expression: cells of an octree of the world that are inside
- * as a whole, and mixed ones of the finest level.
+/* The cells of the result of a boolean expression: cells of an octree of the world that are
+ * entirely inside, and mixed ones of the finest level.
  *
- * Level by level the children of all mixed cells are classified on all processor cores, and those
- * that are mixed go to the next level. Everything is kept in the order of octcodes, so the result
- * does not depend on the number of threads. Their volumes bound the volume of the result. The
+ * Level by level the children of all mixed cells are classified on all processor cores, and the
+ * mixed ones continue to the next level. Everything is kept in the order of octcodes, so the result
+ * does not depend on the number of threads. The cells' volumes bound the volume of the result. The
  * surface between cells that are taken and others is a mesh of squares. */
 #include "core/strict_fp.h"
 
@@ -20,7 +20,7 @@
 #include "extras/collide/collider.h"
 #include "geometry/cells.h"
 
-/* An in-cell, as octcodes of the finest level. */
+/* A run of inside cells, as octcodes of the finest level. */
 typedef struct in_run {
     ebpo_octcode first;
     uint64_t count;
@@ -30,14 +30,14 @@ struct ebpo_boolean_cells {
     ebpo_world world;
     in_run *in; /* ascending */
     uint64_t in_count, in_capacity;
-    ebpo_octcode *mixed; /* of the finest level, ascending */
+    ebpo_octcode *mixed; /* mixed cells of the finest level, ascending */
     uint64_t mixed_count, mixed_capacity;
     uint64_t ways[EBPO_CUBE_WAYS];
 };
 
 enum { PARENTS = 1 << 14, GRAIN = 64 };
 
-/* A cell that is asked about. */
+/* A cell to classify. */
 typedef struct candidate {
     ebpo_world_cell cell;
     unsigned may;
@@ -48,21 +48,21 @@ typedef struct walk {
     const ebpo_boolean *boolean;
     ebpo_boolean_cells *cells;
     ebpo_cells_options options;
-    candidate *asked; /* [8 * PARENTS] */
+    candidate *queried; /* [8 * PARENTS] */
     ebpo_world_cell *parents, *next;
     uint64_t parent_count, parent_capacity, next_count, next_capacity;
-    int level; /* of what is asked about */
+    int level; /* level of these cells */
 } walk;
 
-static ebpo_status ask_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                            ebpo_error *error)
+static ebpo_status query_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     walk *w = context;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
-        candidate *c = &w->asked[i];
-        status = ebpo_world_cell_ask(w->boolean, worker, &w->cells->world, &c->cell, &c->may,
-                                     c->ways, error);
+        candidate *c = &w->queried[i];
+        status = ebpo_world_cell_query(w->boolean, worker, &w->cells->world, &c->cell, &c->may,
+                                       c->ways, error);
     }
     return status;
 }
@@ -99,12 +99,12 @@ static ebpo_status keep_mixed(walk *w, const ebpo_world_cell *c, ebpo_error *err
     return EBPO_OK;
 }
 
-static ebpo_status ask_and_keep(walk *w, uint64_t count, ebpo_error *error)
+static ebpo_status query_and_keep(walk *w, uint64_t count, ebpo_error *error)
 {
     ebpo_status status = ebpo_parallel_for(count <= GRAIN ? 1 : w->boolean->threads, NULL, count,
-                                           GRAIN, ask_some, w, NULL, "cells", error);
+                                           GRAIN, query_some, w, NULL, "cells", error);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        const candidate *c = &w->asked[i];
+        const candidate *c = &w->queried[i];
         for (int k = 0; k < EBPO_CUBE_WAYS; k++)
             w->cells->ways[k] += c->ways[k];
         if (c->may == EBPO_MAY_IN)
@@ -125,9 +125,9 @@ static ebpo_status next_level(walk *w, ebpo_error *error)
         if (!ebpo_progress_step(&w->options.progress, "cells", done, total, error))
             return EBPO_E_CANCELLED;
         for (uint64_t i = 0; i < 8 * count; i++)
-            w->asked[i] =
+            w->queried[i] =
                 (candidate){ .cell = ebpo_world_child(&w->parents[at + i / 8], (unsigned)(i % 8)) };
-        status = ask_and_keep(w, 8 * count, error);
+        status = query_and_keep(w, 8 * count, error);
     }
     return status;
 }
@@ -152,18 +152,18 @@ static int by_first(const void *a, const void *b)
 
 static ebpo_status walk_levels(walk *w, ebpo_error *error)
 {
-    w->asked = ebpo_alloc(8 * PARENTS, sizeof *w->asked);
-    if (!w->asked)
-        return ebpo_fail_memory(error, 8 * PARENTS * sizeof *w->asked);
-    w->asked[0] = (candidate){ .cell = { { 0, { 0, 0, 0 } }, 0, 0 } };
-    ebpo_status status = ask_and_keep(w, 1, error);
+    w->queried = ebpo_alloc(8 * PARENTS, sizeof *w->queried);
+    if (!w->queried)
+        return ebpo_fail_memory(error, 8 * PARENTS * sizeof *w->queried);
+    w->queried[0] = (candidate){ .cell = { { 0, { 0, 0, 0 } }, 0, 0 } };
+    ebpo_status status = query_and_keep(w, 1, error);
     for (w->level = 1; w->level <= w->cells->world.level && status == EBPO_OK; w->level++) {
         swap_lists(w);
         status = next_level(w, error);
     }
     if (w->cells->in_count)
         qsort(w->cells->in, w->cells->in_count, sizeof *w->cells->in, by_first);
-    free(w->asked);
+    free(w->queried);
     free(w->parents);
     free(w->next);
     return status;
@@ -203,7 +203,7 @@ void ebpo_boolean_cells_free(ebpo_boolean_cells *cells)
     free(cells);
 }
 
-/* So many finest cells, rounded down or up. */
+/* Returns the volume of this many finest cells, rounded down or up. */
 static double cells_volume(const ebpo_boolean_cells *c, uint64_t count, bool up)
 {
     double cells = (double)count, edge = ebpo_world_edge(&c->world, c->world.level);
@@ -228,7 +228,7 @@ ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells, ebpo_bool
                               .by_box = cells->ways[EBPO_CUBE_BY_BOX],
                               .by_nodes = cells->ways[EBPO_CUBE_BY_NODES],
                               .by_faces = cells->ways[EBPO_CUBE_BY_FACES] };
-    v.figure = ebpo_certain_of(v.lo, v.hi).figure;
+    v.metric = ebpo_certain_of(v.lo, v.hi).metric;
     return EBPO_GIVE(ebpo_boolean_volume, out, &v);
 }
 
@@ -259,7 +259,7 @@ static bool is_mixed(const ebpo_boolean_cells *c, ebpo_octcode code)
 
 static bool is_in(const ebpo_boolean_cells *c, ebpo_octcode code)
 {
-    uint64_t low = 0, high = c->in_count; /* of the runs below `low`, all begin at or before code */
+    uint64_t low = 0, high = c->in_count; /* all of the runs below `low` begin at or before code */
     while (low < high) {
         uint64_t middle = low + (high - low) / 2;
         if (c->in[middle].first <= code)
@@ -275,7 +275,7 @@ static corner corner_at(const uint32_t at[3])
     return (uint64_t)at[2] << 42 | (uint64_t)at[1] << 21 | at[0];
 }
 
-/* A side of a cell, seen from outside the cell, or else from within. */
+/* Adds a side of a cell, seen from outside the cell, or else from within. */
 static ebpo_status add_square(squares *s, ebpo_cell cell, int axis, bool upper, bool from_outside,
                               ebpo_error *error)
 {
@@ -349,7 +349,7 @@ static ebpo_status fill_mesh(const squares *s, ebpo_mesh *out, ebpo_error *error
     for (uint64_t i = 0; i < s->vertex_count; i++)
         for (int k = 0; k < 3; k++)
             out->xyz64[3 * i + (unsigned)k] =
-                ebpo_world_wall(w, k, w->level, (uint32_t)(s->vertex[i] >> 21 * k & mask));
+                ebpo_world_cell_face(w, k, w->level, (uint32_t)(s->vertex[i] >> 21 * k & mask));
     for (uint64_t i = 0; i < s->count; i++) {
         uint32_t n[4];
         for (int c = 0; c < 4; c++)
@@ -367,7 +367,8 @@ ebpo_status ebpo_boolean_cells_mesh(const ebpo_boolean_cells *cells, ebpo_boolea
     squares s = { .cells = cells };
     memset(out, 0, sizeof *out);
     if (side != EBPO_BOOLEAN_OUTER && side != EBPO_BOOLEAN_INNER)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "a surface of cells has no side %d", (int)side);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown side %d of the surface of cells",
+                         (int)side);
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < cells->mixed_count && status == EBPO_OK; i++)
         status = add_sides(&s, cells->mixed[i], side, error);

@@ -1,10 +1,9 @@
-/* The distance of a point to the boundary of the result of a boolean expression.
+/* Computes the distance of a point to the boundary of the result of a boolean expression.
  *
- * The boundary is a part of the operands' faces, so no point of it is nearer than the nearest
- * face. If the result changes just behind that face, that is the distance. If not, a search over
- * cells of the world, the nearest first, bounds the distance to the other side: cells that are
- * decided end the search, mixed ones are divided down to the tolerance or the greatest number of
- * cells. */
+ * The boundary is a part of the operands' faces, so no point of it is nearer than the nearest face.
+ * If the result changes just behind that face, that is the distance. If not, a search over cells of
+ * the world, the nearest first, bounds the distance to the other side: decided cells end the
+ * search, mixed ones are divided down to the tolerance or the greatest number of cells. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,7 +15,7 @@
 #include "core/sort.h"
 #include "extras/boolean/world_cell.h"
 
-/* Right to some ulp, without overflow. */
+/* Returns the length, correct to some ulp, without overflow. */
 static inline double scaled_length(const double x[3])
 {
     double most = fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
@@ -29,12 +28,12 @@ static inline double scaled_length(const double x[3])
 typedef struct boundary_search {
     const ebpo_boolean *boolean;
     const double *point;
-    unsigned side; /* EBPO_MAY_IN or EBPO_MAY_OUT: what is left behind */
+    unsigned side; /* EBPO_MAY_IN or EBPO_MAY_OUT: the side of the point */
     double tolerance;
-    uint64_t most;  /* cells */
-    uint64_t cells; /* is counted up */
-    /* No point of the other side is nearer than lo for certain, one is at most hi away; hi: what is
-     * known before. Both INFINITY: there is none. */
+    uint64_t most;  /* most cells */
+    uint64_t cells; /* number of cells so far */
+    /* Bounds of the distance to the other side, certain; hi is first the known bound. Both
+     * INFINITY: there is none. */
     double lo, hi;
 } boundary_search;
 
@@ -60,13 +59,13 @@ static ebpo_status push_waiting(queue *q, waiting w, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* From the point to the nearest one of the closed cell, right to some ulp. */
+/* Returns the distance from the point to the closed cell, correct to some ulp. */
 static double distance_to(const boundary_search *s, const ebpo_world *w, ebpo_cell cell)
 {
     double d[3];
     for (int k = 0; k < 3; k++)
-        d[k] = fmax(fmax(ebpo_world_wall(w, k, cell.level, cell.at[k]) - s->point[k],
-                         s->point[k] - ebpo_world_wall(w, k, cell.level, cell.at[k] + 1)),
+        d[k] = fmax(fmax(ebpo_world_cell_face(w, k, cell.level, cell.at[k]) - s->point[k],
+                         s->point[k] - ebpo_world_cell_face(w, k, cell.level, cell.at[k] + 1)),
                     0);
     return scaled_length(d);
 }
@@ -78,7 +77,7 @@ static ebpo_status push_cell(const boundary_search *s, const ebpo_world *w, queu
     return near < s->hi ? push_waiting(q, (waiting){ near, *c }, error) : EBPO_OK;
 }
 
-/* Beyond the root all is out. */
+/* Beyond the root everything is out. */
 static void look_beyond_root(boundary_search *s, const ebpo_world *w)
 {
     for (int k = 0; k < 3 && s->side == EBPO_MAY_IN; k++)
@@ -87,13 +86,14 @@ static void look_beyond_root(boundary_search *s, const ebpo_world *w)
                                 (1 + 0x1p-46));
 }
 
-/* The cell at hand; *unclear: the least distance at which cells of the finest level are mixed. */
+/* Decides the current cell; *unclear: the least distance at which cells of the finest level are
+ * mixed. */
 static ebpo_status settle_cell(boundary_search *s, const ebpo_world *w, queue *q, waiting *at,
                                double *unclear, ebpo_error *error)
 {
     unsigned may;
     uint8_t ways[EBPO_CUBE_WAYS] = { 0 };
-    ebpo_status status = ebpo_world_cell_ask(s->boolean, 0, w, &at->cell, &may, ways, error);
+    ebpo_status status = ebpo_world_cell_query(s->boolean, 0, w, &at->cell, &may, ways, error);
     if (status != EBPO_OK || may == s->side)
         return status;
     if (may != EBPO_MAY_BOTH) {
@@ -131,7 +131,7 @@ static ebpo_status search_cells(boundary_search *s, const ebpo_world *w, queue *
     return status;
 }
 
-/* As fine as doubles allow. */
+/* Makes the finest world that doubles allow. */
 static ebpo_status make_world(ebpo_world *w, const ebpo_boolean *b, ebpo_error *error)
 {
     int level = EBPO_BOOLEAN_LEVEL_MAX - 1; /* centres are one level finer */
@@ -160,7 +160,7 @@ typedef struct measuring {
     ebpo_boundary_distance *out;
 } measuring;
 
-/* A point beside w, if it is on the other side: the boundary is no farther. */
+/* Tries a point beside w: if it is on the other side, the boundary is no farther. */
 static ebpo_status try_point(const measuring *m, const double q[3], ebpo_error *error)
 {
     ebpo_boolean_result there;
@@ -168,13 +168,13 @@ static ebpo_status try_point(const measuring *m, const double q[3], ebpo_error *
     double away = scaled_length(way) * (1 + 0x1p-46);
     if (!(away < m->out->hi))
         return EBPO_OK;
-    ebpo_status status = ebpo_boolean_ask(m->b, 0, q, &there, error);
+    ebpo_status status = ebpo_boolean_query(m->b, 0, q, &there, error);
     if (status == EBPO_OK && there.where != m->out->inside.where && there.where != EBPO_ON)
         m->out->hi = away;
     return status;
 }
 
-/* Through the nearest point y of an operand and a little farther. */
+/* Tries points on the line through the nearest point y of an operand and a little farther. */
 static ebpo_status try_behind(const measuring *m, const ebpo_posed_solid *s, const double y[3],
                               ebpo_error *error)
 {
@@ -190,8 +190,8 @@ static ebpo_status try_behind(const measuring *m, const ebpo_posed_solid *s, con
     return status;
 }
 
-/* *lo: no posed face of the operand is nearer. */
-static ebpo_status look_at_operand(const measuring *m, uint32_t operand, double *lo,
+/* Sets *lo: no posed face of the operand is nearer. */
+static ebpo_status inspect_operand(const measuring *m, uint32_t operand, double *lo,
                                    ebpo_error *error)
 {
     const ebpo_posed_solid *s = &m->b->solid[operand];
@@ -201,7 +201,7 @@ static ebpo_status look_at_operand(const measuring *m, uint32_t operand, double 
     *lo = 0;
     ebpo_unpose(s, m->w, p, &doubt);
     if (!(fabs(p[0]) < 0x1p1000 && fabs(p[1]) < 0x1p1000 && fabs(p[2]) < 0x1p1000))
-        return EBPO_OK; /* so far away that its place in the model is no double */
+        return EBPO_OK; /* so far away that its position in the model is no double */
     o.unsigned_distance = true;
     ebpo_status status =
         ebpo_distance(ebpo_boolean_context(m->b, 0, operand), p, &o, &nearest, error);
@@ -211,20 +211,20 @@ static ebpo_status look_at_operand(const measuring *m, uint32_t operand, double 
     return try_behind(m, s, nearest.point, error);
 }
 
-static ebpo_status look_at_operands(const measuring *m, ebpo_error *error)
+static ebpo_status inspect_operands(const measuring *m, ebpo_error *error)
 {
     double least = INFINITY;
     ebpo_status status = EBPO_OK;
     for (uint32_t i = 0; i < m->b->count && status == EBPO_OK; i++) {
         double lo;
-        status = look_at_operand(m, i, &lo, error);
+        status = inspect_operand(m, i, &lo, error);
         least = fmin(least, lo);
     }
     m->out->lo = fmin(least, m->out->hi);
     return status;
 }
 
-static ebpo_status look_at_cells(const measuring *m, const ebpo_boundary_options *o, unsigned side,
+static ebpo_status inspect_cells(const measuring *m, const ebpo_boundary_options *o, unsigned side,
                                  double hi, boundary_search *s, ebpo_error *error)
 {
     *s = (boundary_search){ .boolean = m->b,
@@ -244,25 +244,25 @@ static ebpo_status measure_off(const measuring *m, const ebpo_boundary_options *
     boundary_search s;
     ebpo_boundary_distance *out = m->out;
     out->hi = INFINITY;
-    ebpo_status status = look_at_operands(m, error);
+    ebpo_status status = inspect_operands(m, error);
     bool enough = out->hi < INFINITY && out->hi - out->lo <= o->tolerance * out->hi;
     if (status != EBPO_OK || enough)
         return status;
     unsigned side = out->inside.where == EBPO_IN ? EBPO_MAY_IN : EBPO_MAY_OUT;
-    status = look_at_cells(m, o, side, out->hi, &s, error);
+    status = inspect_cells(m, o, side, out->hi, &s, error);
     out->hi = s.hi;
     out->lo = fmin(fmax(out->lo, s.lo), s.hi);
     return status;
 }
 
-/* On edges, perhaps: the boundary is no farther than what is in, nor than what is out. */
+/* Perhaps on edges: the boundary is no farther than inside points, nor than outside points. */
 static ebpo_status measure_unsure(const measuring *m, const ebpo_boundary_options *o,
                                   ebpo_error *error)
 {
     boundary_search in, out;
-    ebpo_status status = look_at_cells(m, o, EBPO_MAY_OUT, INFINITY, &in, error);
+    ebpo_status status = inspect_cells(m, o, EBPO_MAY_OUT, INFINITY, &in, error);
     if (status == EBPO_OK)
-        status = look_at_cells(m, o, EBPO_MAY_IN, INFINITY, &out, error);
+        status = inspect_cells(m, o, EBPO_MAY_IN, INFINITY, &out, error);
     if (status == EBPO_OK)
         m->out->hi = fmax(in.hi, out.hi);
     return status;

@@ -1,11 +1,11 @@
-/* The exact volume of the result of a boolean expression, where no face of an operand intersects
- * one of another.
+/* Computes the exact volume of the result of a boolean expression, where no face of an operand
+ * intersects one of another.
  *
  * Each patch of connected faces is then in or out of every other operand as a whole. So it bounds
- * the result, from within or from without, or it does not. The signed volumes below the faces that
- * do add up to the volume. They are summed without rounding: in a long accumulator of doubles'
+ * the result, from within or from without, or it does not. The signed volumes below the bounding
+ * faces add up to the volume. They are summed without rounding: in a long accumulator of doubles'
  * products where these are doubles, otherwise in integers (GMP); the sum is rounded once. Where
- * faces intersect, the result says which, and why there is no exact volume. Proof:
+ * faces intersect, the result gives the pair, and why there is no exact volume. Proof:
  * docs/develop/booleans.md, "Exact volumes". */
 #include "core/strict_fp.h"
 
@@ -33,34 +33,35 @@
 
 /* Six times the volumes of tetrahedra from the origin. */
 typedef struct volume_sum {
-    ebpo_sum usual; /* of faces whose products doubles can hold */
-    mpz_t other;    /* of all others, in units of 2^EBPO_VOLUME_UNIT */
+    ebpo_sum standard; /* sum for faces whose products are exact in doubles */
+    mpz_t other;       /* sum for all others, in units of 2^EBPO_VOLUME_UNIT */
 } volume_sum;
 
-/* Of products of three doubles; of each all 53 bits count, also of the least one, 2^-1074. */
+/* Sum of products of three doubles; it holds all 53 bits of each, also of the least one, 2^-1074.
+ */
 enum { EBPO_VOLUME_UNIT = -3 * (1074 + 52) };
 
 static void volume_sum_begin(volume_sum *s)
 {
-    s->usual = (ebpo_sum){ 0 };
+    s->standard = (ebpo_sum){ 0 };
     mpz_init(s->other);
 }
 
 static void volume_sum_end(volume_sum *s) { mpz_clear(s->other); }
 
-/* Products of three such numbers, and what rounding leaves of them, are doubles: their lowest bit
- * is 3 (250 + 52) below 1 at most. */
-static bool is_usual(const double t[3][3])
+/* Returns true if products of three such numbers and their rounding errors are doubles: their
+ * lowest bit is at most 3 (250 + 52) below 1. */
+static bool is_default(const double t[3][3])
 {
-    bool usual = true;
+    bool standard = true;
     for (int i = 0; i < 9; i++) {
         double x = fabs(t[i / 3][i % 3]);
-        usual &= x == 0 || (x >= 0x1p-250 && x <= 0x1p250);
+        standard &= x == 0 || (x >= 0x1p-250 && x <= 0x1p250);
     }
-    return usual;
+    return standard;
 }
 
-/* x y z, exactly. */
+/* Adds x y z, exactly. */
 static void add_product(ebpo_sum *s, double x, double y, double z)
 {
     double product[2], all[4];
@@ -70,7 +71,7 @@ static void add_product(ebpo_sum *s, double x, double y, double z)
         ebpo_sum_add(s, all[i]);
 }
 
-static void add_usual(ebpo_sum *s, const double t[3][3], int times)
+static void add_default(ebpo_sum *s, const double t[3][3], int times)
 {
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
@@ -100,22 +101,22 @@ static void add_other(mpz_t sum, const double t[3][3], int times)
     mpz_clear(volume);
 }
 
-/* Of the face t, counter-clockwise seen from outside; times: 1 or -1. Corners are finite. */
+/* Adds the face t, counter-clockwise seen from outside; times: 1 or -1. Corners must be finite. */
 static void volume_sum_add(volume_sum *s, const double t[3][3], int times)
 {
-    if (is_usual(t))
-        add_usual(&s->usual, t, times);
+    if (is_default(t))
+        add_default(&s->standard, t, times);
     else
         add_other(s->other, t, times);
 }
 
 static void volume_sum_merge(volume_sum *s, const volume_sum *more)
 {
-    ebpo_sum_merge(&s->usual, &more->usual);
+    ebpo_sum_merge(&s->standard, &more->standard);
     mpz_add(s->other, s->other, more->other);
 }
 
-/* In units of 2^-1074, as limbs have it. */
+/* Converts the limbs to units of 2^-1074. */
 static void to_integer(mpz_t out, const ebpo_sum *sum)
 {
     ebpo_sum s = *sum;
@@ -130,14 +131,14 @@ static void to_integer(mpz_t out, const ebpo_sum *sum)
     }
 }
 
-/* Returns the double nearest to the volume, ties to even; infinite beyond doubles. In *scaled and
- * *exponent the volume in units of 2^exponent, in which it is about 1, rounded likewise. */
+/* Returns the double nearest to the volume, ties to even; infinite beyond doubles. Sets *scaled to
+ * the volume in units of 2^*exponent, in which it is about 1, rounded likewise. */
 static double volume_sum_value(const volume_sum *s, double *scaled, int64_t *exponent)
 {
     mpz_t all, six;
     mpz_init(all);
     mpz_init_set_ui(six, 6);
-    to_integer(all, &s->usual);
+    to_integer(all, &s->standard);
     mpz_mul_2exp(all, all, -1074 - EBPO_VOLUME_UNIT);
     mpz_add(all, all, s->other);
     double value = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
@@ -158,14 +159,15 @@ typedef struct measuring {
     const ebpo_boolean *b;
     ebpo_volume_options options;
     ebpo_exact_volume *out;
-    uint64_t first;                           /* operands that are asked, a bit for each, and */
-    uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]; /* of each of these: those that are equal to it */
+    uint64_t first;                           /* queried operands, a bit for each, and */
+    uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]; /* for each of these: the operands that are equal to
+                                               * it */
     volume_sum *sum;                          /* [threads] */
 } measuring;
 
-static bool is_asked(const measuring *m, uint32_t i) { return m->first >> i & 1; }
+static bool is_queried(const measuring *m, uint32_t i) { return m->first >> i & 1; }
 
-/* --- what the expression is about --- */
+/* --- operands of the expression --- */
 
 static bool equal_operands(const ebpo_boolean *b, uint32_t i, uint32_t k)
 {
@@ -180,14 +182,14 @@ static void find_equal(measuring *m)
         uint32_t k = 0;
         if (!(used >> i & 1))
             continue;
-        while (k < i && !(is_asked(m, k) && equal_operands(m->b, k, i)))
+        while (k < i && !(is_queried(m, k) && equal_operands(m->b, k, i)))
             k++;
         m->first |= UINT64_C(1) << k;
         m->same[k] |= UINT64_C(1) << i;
     }
 }
 
-/* The result is in a box; so is its volume. Not even a box: it is empty. */
+/* Bounds the volume by the box of the result. An empty box means an empty result. */
 static void bound_by_box(measuring *m)
 {
     double boxes[EBPO_BOOLEAN_OPERANDS_MAX][6], box[6], most = 1;
@@ -214,14 +216,14 @@ static void check_models(measuring *m)
 {
     for (uint32_t i = 0; i < m->b->count && !m->out->doubt; i++) {
         const ebpo_model *model = m->b->solid[i].model;
-        if (is_asked(m, i) && model->info->pruned)
+        if (is_queried(m, i) && model->info->pruned)
             note_doubt(m, EBPO_VOLUME_SUBSET, i, i);
-        else if (is_asked(m, i) && !model->whole)
+        else if (is_queried(m, i) && !model->whole)
             note_doubt(m, EBPO_VOLUME_IN_PARTS, i, i);
     }
 }
 
-/* --- faces that meet --- */
+/* --- intersecting faces --- */
 
 static ebpo_status make_collider(const measuring *m, uint32_t i, uint32_t k,
                                  ebpo_collide_options *options, ebpo_collider **out,
@@ -258,7 +260,7 @@ static ebpo_status check_pair(measuring *m, uint32_t i, uint32_t k, ebpo_error *
         return status;
     status = ebpo_collide_first(collider, &options, &pair, &found, error);
     if (status == EBPO_OK && found) {
-        note_doubt(m, EBPO_VOLUME_OPERANDS_MEET, i, k);
+        note_doubt(m, EBPO_VOLUME_OPERANDS_INTERSECT, i, k);
         name_faces(m->out, &pair);
     }
     ebpo_collider_free(collider);
@@ -270,7 +272,7 @@ static ebpo_status check_pairs(measuring *m, ebpo_error *error)
     ebpo_status status = EBPO_OK;
     for (uint32_t i = 0; i < m->b->count && status == EBPO_OK; i++)
         for (uint32_t k = i + 1; k < m->b->count && status == EBPO_OK && !m->out->doubt; k++)
-            if (is_asked(m, i) && is_asked(m, k))
+            if (is_queried(m, i) && is_queried(m, k))
                 status = check_pair(m, i, k, error);
     return status;
 }
@@ -281,8 +283,8 @@ typedef struct operand {
     measuring *m;
     uint32_t number;
     const ebpo_posed_solid *solid;
-    uint32_t *slots, *patch; /* of each face, by its number in the file */
-    uint32_t *head;          /* faces that patches begin with, */
+    uint32_t *slots, *patch; /* for each face, by its number in the file */
+    uint32_t *head;          /* first faces of the patches, */
     uint64_t heads;
     int8_t *times; /* how often faces of the patch that begins with this one count: -1, 0, 1 */
 } operand;
@@ -304,8 +306,8 @@ static bool take_self(void *user, const ebpo_face_pair *pairs, uint64_t count)
     const operand *o = user;
     for (uint64_t i = 0; i < count && !o->m->out->doubt; i++) {
         if (!has_area(o, pairs[i].file_face_a) || !has_area(o, pairs[i].file_face_b))
-            continue; /* bounds nothing */
-        note_doubt(o->m, EBPO_VOLUME_FACES_MEET, o->number, o->number);
+            continue; /* no bound of the result */
+        note_doubt(o->m, EBPO_VOLUME_FACES_INTERSECT, o->number, o->number);
         name_faces(o->m->out, &pairs[i]);
     }
     return !o->m->out->doubt;
@@ -323,9 +325,9 @@ static ebpo_status check_self(operand *o, ebpo_error *error)
     return status;
 }
 
-/* --- what patches bound --- */
+/* --- patches that bound the result --- */
 
-/* In the middle of the face, which no other face meets. */
+/* Computes the winding number in the middle of the face, which no other face intersects. */
 static ebpo_status own_winding(const operand *o, ebpo_context *context, const double t[3][3],
                                int32_t *winding, ebpo_error *error)
 {
@@ -345,7 +347,7 @@ static ebpo_status own_winding(const operand *o, ebpo_context *context, const do
     return status;
 }
 
-/* Where the normal points to. */
+/* Computes the winding number on the side where the normal points. */
 static ebpo_status winding_in_front(const operand *o, unsigned worker, const double t[3][3],
                                     int32_t *front, ebpo_error *error)
 {
@@ -358,7 +360,7 @@ static ebpo_status winding_in_front(const operand *o, unsigned worker, const dou
     return status;
 }
 
-/* Other operands that the face is in, as bits. */
+/* Finds other operands that contain the face, as bits. */
 static ebpo_status find_around(const operand *o, unsigned worker, const double w[3], uint64_t *in,
                                ebpo_error *error)
 {
@@ -368,7 +370,7 @@ static ebpo_status find_around(const operand *o, unsigned worker, const double w
     for (uint32_t i = 0; i < m->b->count && status == EBPO_OK; i++) {
         ebpo_posed_sides sides;
         const ebpo_posed_solid *solid = &m->b->solid[i];
-        if (i == o->number || !is_asked(m, i))
+        if (i == o->number || !is_queried(m, i))
             continue;
         status =
             ebpo_posed_solid_sides(solid, ebpo_boolean_context(m->b, worker, i), w, &sides, error);
@@ -385,8 +387,8 @@ static int is_in(const operand *o, uint64_t around, int32_t winding)
     return ebpo_expression_value(&o->m->b->expression, UINT64_MAX, in) == EBPO_MAY_IN;
 }
 
-static ebpo_status ask_patches(void *user, uint64_t begin, uint64_t end, unsigned worker,
-                               ebpo_error *error)
+static ebpo_status query_patches(void *user, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     const operand *o = user;
     ebpo_status status = EBPO_OK;
@@ -443,7 +445,7 @@ static ebpo_status add_patches(operand *o, ebpo_error *error)
         status = find_heads(o, whole->face_count, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(o->heads <= PATCHES_GRAIN ? 1 : threads, NULL, o->heads,
-                                   PATCHES_GRAIN, ask_patches, o, progress, stage, error);
+                                   PATCHES_GRAIN, query_patches, o, progress, stage, error);
     if (status == EBPO_OK)
         status =
             ebpo_parallel_for(whole->face_count <= FACES_GRAIN ? 1 : threads, NULL,
@@ -470,7 +472,7 @@ static ebpo_status add_operand(measuring *m, uint32_t number, ebpo_error *error)
     return status;
 }
 
-/* --- all of them --- */
+/* --- all operands --- */
 
 static ebpo_status add_operands(measuring *m, ebpo_error *error)
 {
@@ -483,7 +485,7 @@ static ebpo_status add_operands(measuring *m, ebpo_error *error)
         volume_sum_begin(&m->sum[i]);
     for (uint32_t i = 0; i < m->b->count && status == EBPO_OK && !m->out->doubt; i++) {
         ebpo_error cause = EBPO_ERROR_INIT;
-        if (is_asked(m, i) && add_operand(m, i, &cause) != EBPO_OK)
+        if (is_queried(m, i) && add_operand(m, i, &cause) != EBPO_OK)
             status = ebpo_fail_operand(m->b->solid[i].model, i, &cause, error);
     }
     for (unsigned i = 1; i < threads; i++)

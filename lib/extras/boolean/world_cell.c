@@ -1,11 +1,10 @@
-/* Cells of an octree of the world, and whether the result of a boolean expression is the same in
- * all of a cell.
+/* Cells of an octree of the world; decides if the result of a boolean expression is the same in all
+ * of a cell.
  *
  * For each operand the ball around the cell is brought into the model. The box, then the white and
- * black nodes of the model's tree, then the nearest face decide whether the cell is inside,
- * outside, or may hold a face. A cell keeps what is known of the operands, so that its children
- * need not query them again. The root is a power of two in size, so corners and centres are exact.
- */
+ * black nodes of the model's tree, then the nearest face decide if the cell is inside, outside, or
+ * may contain a face. A cell keeps the state of the operands, so that its children need not query
+ * them again. The root is a power of two in size, so corners and centres are exact. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,20 +16,21 @@
 
 enum {
     SEEN_FACES = 4, /* beside EBPO_MAY_IN and EBPO_MAY_OUT: perhaps faces */
-    NODES_MOST = 64 /* looked at for a black and a white one once faces are seen */
+    NODES_MAX = 64  /* visited for a black and a white one once faces are seen */
 };
 
 typedef struct ball {
     const ebpo_model *model;
     ebpo_box box;
     const double *p;
-    double square; /* of its radius */
-    unsigned seen; /* perhaps in the ball */
-    unsigned sure; /* of EBPO_MAY_IN and EBPO_MAY_OUT: certainly in it */
+    double square; /* squared radius */
+    unsigned seen; /* possible contents of the ball */
+    unsigned sure; /* bits of EBPO_MAY_IN and EBPO_MAY_OUT that are certain */
     unsigned nodes;
 } ball;
 
-/* Squared distance of the cell, right to 2^-50 of itself while it is not almost 0. */
+/* Returns the squared distance of the cell, with a relative error of 2^-50 unless it is almost 0.
+ */
 static double square_to(const ball *b, ebpo_cell cell)
 {
     double low[3], high[3], sum = 0;
@@ -42,9 +42,9 @@ static double square_to(const ball *b, ebpo_cell cell)
     return sum;
 }
 
-static void look_at_node(ball *b, const ebpo_node *node)
+static void inspect_node(ball *b, const ebpo_node *node)
 {
-    bool enough = b->sure == EBPO_MAY_BOTH || (b->seen & SEEN_FACES && ++b->nodes > NODES_MOST);
+    bool enough = b->sure == EBPO_MAY_BOTH || (b->seen & SEEN_FACES && ++b->nodes > NODES_MAX);
     double square = enough ? 0 : square_to(b, node->cell);
     if (enough || square * (1 - 0x1p-48) > b->square + 0x1p-1000)
         return;
@@ -58,13 +58,13 @@ static void look_at_node(ball *b, const ebpo_node *node)
     } else {
         for (unsigned octant = 0; octant < 8; octant++) {
             ebpo_node child = ebpo_model_child(b->model, node, octant);
-            look_at_node(b, &child);
+            inspect_node(b, &child);
         }
     }
 }
 
-/* EBPO_MAY_IN or EBPO_MAY_OUT: no face is in the ball. EBPO_MAY_BOTH: one is. 0: not known. What is
- * said is what the faces would say, so that nothing depends on what is in memory. */
+/* Returns EBPO_MAY_IN or EBPO_MAY_OUT if no face is in the ball, EBPO_MAY_BOTH if one is, 0 if
+ * unknown. The result equals the faces' result, so it does not depend on what is in memory. */
 static unsigned decide_by_nodes(const ebpo_model *model, const double p[3], double radius)
 {
     ball b = { .model = model,
@@ -75,21 +75,21 @@ static unsigned decide_by_nodes(const ebpo_model *model, const double p[3], doub
     double low[3], high[3];
     ebpo_node root = ebpo_model_root(model);
     ebpo_cell_bounds(&b.box, root.cell, low, high);
-    for (int k = 0; k < 3; k++) { /* beyond the root cell all is out */
+    for (int k = 0; k < 3; k++) { /* beyond the root cell everything is out */
         double beyond = radius - fmin(p[k] - low[k], high[k] - p[k]);
         if (!(beyond < -0x1p-48 * radius))
             b.seen |= EBPO_MAY_OUT;
         if (beyond > 0x1p-48 * radius)
             b.sure |= EBPO_MAY_OUT;
     }
-    look_at_node(&b, &root);
+    inspect_node(&b, &root);
     if (b.sure == EBPO_MAY_BOTH) /* between a black and a white point there is a face */
         return EBPO_MAY_BOTH;
     return b.seen == EBPO_MAY_IN || b.seen == EBPO_MAY_OUT ? b.seen : 0;
 }
 
-/* What the faces say of the ball. */
-static ebpo_status look_at_faces(ebpo_context *context, const double p[3], double radius,
+/* Decides the ball by the faces. */
+static ebpo_status inspect_faces(ebpo_context *context, const double p[3], double radius,
                                  unsigned *may, ebpo_error *error)
 {
     ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;
@@ -107,9 +107,9 @@ static ebpo_status look_at_faces(ebpo_context *context, const double p[3], doubl
     return status;
 }
 
-/* An axis-parallel cube by its centre and half its edge. *may: EBPO_MAY_IN when all of the closed
- * cube is inner to the solid, EBPO_MAY_OUT when none of it belongs to it, on posed coordinates;
- * EBPO_MAY_BOTH when a face may be within half the cube's diagonal of its centre. */
+/* Decides an axis-parallel cube, given by its centre and half its edge. *may: EBPO_MAY_IN when all
+ * of the closed cube is inside the solid, EBPO_MAY_OUT when all of it is outside, on posed
+ * coordinates; EBPO_MAY_BOTH when a face may be within half the cube's diagonal of its centre. */
 static ebpo_status solid_in_cube(const ebpo_posed_solid *s, ebpo_context *context,
                                  const double centre[3], double half, unsigned *may, unsigned *way,
                                  ebpo_error *error)
@@ -127,18 +127,18 @@ static ebpo_status solid_in_cube(const ebpo_posed_solid *s, ebpo_context *contex
     if (*may)
         return EBPO_OK;
     *way = EBPO_CUBE_BY_FACES;
-    return look_at_faces(context, p, radius, may, error);
+    return inspect_faces(context, p, radius, may, error);
 }
 
-/* Smaller or larger than 2^+-this, and volumes of cells would leave the range of doubles. */
-enum { MOST_POWER = 300 };
+/* Beyond 2^+-this, volumes of cells would leave the range of doubles. */
+enum { MAX_POWER = 300 };
 
 static ebpo_status fail_place(const double box[6], int level, ebpo_error *error)
 {
     return ebpo_fail(error, EBPO_E_LIMIT,
-                     "the result is around (%g, %g, %g), up to %g long: corners of cells of level "
-                     "%d would be no exact doubles; give a lower level, or move the world's origin "
-                     "closer",
+                     "the result is around (%g, %g, %g), up to %g long: corners of cells of "
+                     "level %d would not be exact doubles; give a lower level, or move the "
+                     "world's origin closer",
                      box[0], box[1], box[2],
                      fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2])), level);
 }
@@ -146,9 +146,9 @@ static ebpo_status fail_place(const double box[6], int level, ebpo_error *error)
 static ebpo_status fail_range(double most, ebpo_error *error)
 {
     return ebpo_fail(error, EBPO_E_LIMIT,
-                     "the result is up to %g long, and volumes of cells are doubles from 2^-%d to "
-                     "2^%d only; scale the models by their poses",
-                     most, MOST_POWER, MOST_POWER);
+                     "the result is up to %g long, but volumes of cells must be doubles from "
+                     "2^-%d to 2^%d; scale the models by their poses",
+                     most, MAX_POWER, MAX_POWER);
 }
 
 ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, ebpo_error *error)
@@ -163,7 +163,7 @@ ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, e
         return EBPO_OK;
     double most = fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));
     frexp(1.07 * most, &power); /* 16 / 15 and its rounding: the origin is on a grid of 1 / 16 */
-    if (most == 0 || power < -MOST_POWER || power > MOST_POWER)
+    if (most == 0 || power < -MAX_POWER || power > MAX_POWER)
         return fail_range(most, error);
     out->edge = ldexp(1, power);
     double grid = out->edge / 16, finest = ldexp(out->edge, -(level > 4 ? level : 4) - 1);
@@ -175,12 +175,13 @@ ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, e
     return EBPO_OK;
 }
 
-ebpo_status ebpo_world_cell_ask(const ebpo_boolean *b, unsigned worker, const ebpo_world *w,
-                                ebpo_world_cell *c, unsigned *may, uint8_t *ways, ebpo_error *error)
+ebpo_status ebpo_world_cell_query(const ebpo_boolean *b, unsigned worker, const ebpo_world *w,
+                                  ebpo_world_cell *c, unsigned *may, uint8_t *ways,
+                                  ebpo_error *error)
 {
     double centre[3], half = ebpo_world_edge(w, c->cell.level + 1);
     for (int k = 0; k < 3; k++)
-        centre[k] = ebpo_world_wall(w, k, c->cell.level + 1, 2 * c->cell.at[k] + 1);
+        centre[k] = ebpo_world_cell_face(w, k, c->cell.level + 1, 2 * c->cell.at[k] + 1);
     *may = ebpo_expression_value(&b->expression, c->known, c->in);
     for (uint32_t i = 0; i < b->count && *may == EBPO_MAY_BOTH; i++) {
         unsigned operand, way;

@@ -1,4 +1,4 @@
-/* Cells of an octree of the world, and whether a cube is inside or outside of a solid at a pose. */
+/* Cells of an octree of the world; decides if a cube is inside or outside a solid at a pose. */
 #ifndef EBPO_BOOLEAN_WORLD_CELL_H
 #define EBPO_BOOLEAN_WORLD_CELL_H
 
@@ -6,22 +6,22 @@
 #include "extras/collide/posed_solid.h"
 #include "geometry/cells.h"
 
-/* What has decided. */
+/* Stages that can decide. */
 enum { EBPO_CUBE_BY_BOX, EBPO_CUBE_BY_NODES, EBPO_CUBE_BY_FACES, EBPO_CUBE_WAYS };
 
 /* The root: corners and centres of cells down to `level` are exact. */
 typedef struct ebpo_world {
-    double origin[3], edge; /* a power of two; 0: nothing is there */
+    double origin[3], edge; /* a power of two; 0: empty */
     int level;
 } ebpo_world;
 
-/* Around the result. EBPO_E_LIMIT: corners would be no doubles. */
+/* Makes a world around the result. Fails with EBPO_E_LIMIT if corners would not be doubles. */
 EBPO_MUST_USE ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level,
                                           ebpo_error *error);
 
 typedef struct ebpo_world_cell {
     ebpo_cell cell;
-    uint64_t known, in; /* operands, as ebpo_expression_value takes them */
+    uint64_t known, in; /* operands, as for ebpo_expression_value */
 } ebpo_world_cell;
 
 static inline double ebpo_world_edge(const ebpo_world *w, int level)
@@ -29,7 +29,7 @@ static inline double ebpo_world_edge(const ebpo_world *w, int level)
     return w->edge * ebpo_half_power(level);
 }
 
-static inline double ebpo_world_wall(const ebpo_world *w, int axis, int level, uint32_t k)
+static inline double ebpo_world_cell_face(const ebpo_world *w, int axis, int level, uint32_t k)
 {
     return w->origin[axis] + (double)k * ebpo_world_edge(w, level);
 }
@@ -39,10 +39,10 @@ static inline ebpo_world_cell ebpo_world_child(const ebpo_world_cell *c, unsigne
     return (ebpo_world_cell){ ebpo_cell_child(c->cell, octant), c->known, c->in };
 }
 
-/* Asks the operands that the cell does not know of yet, until the expression is decided: *may. Adds
- * to ways[EBPO_CUBE_WAYS]. */
-EBPO_MUST_USE ebpo_status ebpo_world_cell_ask(const ebpo_boolean *b, unsigned worker,
-                                              const ebpo_world *w, ebpo_world_cell *c,
-                                              unsigned *may, uint8_t *ways, ebpo_error *error);
+/* Queries the operands whose state the cell does not know yet, until the expression is decided:
+ * *may. Adds to ways[EBPO_CUBE_WAYS]. */
+EBPO_MUST_USE ebpo_status ebpo_world_cell_query(const ebpo_boolean *b, unsigned worker,
+                                                const ebpo_world *w, ebpo_world_cell *c,
+                                                unsigned *may, uint8_t *ways, ebpo_error *error);
 
 #endif

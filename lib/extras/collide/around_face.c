@@ -1,11 +1,10 @@
-/* What is on either side of a posed face of two models. The face is cut into pieces along the
- * faces of both models that intersect it (face_pieces.h). For a point of each piece the winding
+/* Finds what is on either side of a posed face of two models. The face is cut into pieces along the
+ * faces of both models that intersect it (face_pieces.h). For a point of each piece, the winding
  * numbers of both models give the sides on which each model is.
  *
- * All decisions are exact: points are fractions, posed coordinates are the doubles that
- * geometry/pose.h defines. Only the faces near a point are looked up in the models' hierarchies,
- * so a model may be loaded in parts. Proofs: docs/develop/collision.md, "Relation of two models".
- */
+ * All decisions are exact: points are fractions, and posed coordinates are the doubles that
+ * geometry/pose.h defines. Only the faces near a point are looked up in the models' hierarchies, so
+ * a model may be loaded in parts. Proofs: docs/develop/collision.md, "Relation of two models". */
 #include "core/strict_fp.h"
 
 #include "extras/collide/around_face.h"
@@ -23,7 +22,7 @@
 
 ebpo_status ebpo_two_models_begin(ebpo_two_models *two, ebpo_pair_faces *places, ebpo_error *error)
 {
-    const ebpo_collision *q = places->question;
+    const ebpo_collision *q = places->current_query;
     ebpo_status status = EBPO_OK;
     *two = (ebpo_two_models){ 0 };
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
@@ -72,14 +71,14 @@ ebpo_status ebpo_two_models_face(const ebpo_two_models *two, int m, uint64_t fac
     return status;
 }
 
-/* --- faces that meet a face --- */
+/* --- faces that intersect a face --- */
 
 typedef struct cutting {
     const ebpo_two_models *two;
     ebpo_face_cuts *pieces;
-    double low[3], high[3]; /* of the face */
-    int model;              /* whose faces are coming */
-    uint64_t own;           /* the face itself; EBPO_NO_FACE */
+    double low[3], high[3]; /* box of the face */
+    int model;              /* model whose faces are visited */
+    uint64_t own;           /* number of the face itself, or EBPO_NO_FACE */
 } cutting;
 
 static bool near_box(const cutting *c, const double t[3][3])
@@ -106,7 +105,7 @@ static bool cut_by(void *user, const ebpo_triangles *triangles)
     return true;
 }
 
-/* The face t of model m, cut by all others. */
+/* Cuts face t of model m by all other faces. */
 static ebpo_status cut_face(ebpo_two_models *two, ebpo_face_cuts *pieces, int m, uint64_t face,
                             const double t[3][3], ebpo_error *error)
 {
@@ -137,7 +136,7 @@ typedef struct looking {
     bool only_at_target;
 } looking;
 
-/* Whether x + (d0, d1, d2) is where the normal points to. */
+/* Returns true if the normal points to x + (d0, d1, d2). */
 static bool shift_is_front(const ebpo_face_cuts *f)
 {
     int sign = 0;
@@ -177,7 +176,7 @@ static ebpo_status look_around_piece(void *user, const ebpo_piece *piece, ebpo_e
     return status;
 }
 
-/* EBPO_E_CANCELLED comes from `look` alone, and means enough. */
+/* `look` alone returns EBPO_E_CANCELLED; it means that enough was found. */
 static ebpo_status visit_pieces(looking *l, ebpo_face_cuts *pieces, ebpo_error *error)
 {
     ebpo_status status = ebpo_face_pieces_visit(pieces, look_around_piece, l, error);
@@ -231,22 +230,22 @@ static ebpo_status find_faces(ebpo_two_models *two, int m, const mpq_t x[3], fac
     return status;
 }
 
-typedef struct asking {
+typedef struct querying {
     ebpo_two_models *two;
     int m;
-    bool in; /* the model has a side of a piece at the point */
-    bool on; /* a face with an area has the point */
-} asking;
+    bool in; /* the model is on a side of a piece at the point */
+    bool on; /* a face with an area contains the point */
+} querying;
 
 static bool note_side(void *user, const ebpo_around *around)
 {
-    asking *a = user;
+    querying *a = user;
     a->in = around->in[a->m] != 0;
     return !a->in;
 }
 
-/* One face that may have the point. */
-static ebpo_status ask_face(asking *a, uint64_t face, const mpq_t x[3], ebpo_error *error)
+/* Examines one face that may contain the point. */
+static ebpo_status query_face(querying *a, uint64_t face, const mpq_t x[3], ebpo_error *error)
 {
     double t[3][3];
     bool has_area;
@@ -265,16 +264,16 @@ static ebpo_status ask_face(asking *a, uint64_t face, const mpq_t x[3], ebpo_err
     return status == EBPO_OK && !a->in ? visit_pieces(&l, &two->others, error) : status;
 }
 
-/* Whether model m, a closed set, has the point. */
+/* Sets whether model m, as a closed set, contains the point. */
 static ebpo_status has_point(ebpo_two_models *two, int m, const mpq_t x[3], bool *has,
                              ebpo_error *error)
 {
-    asking a = { .two = two, .m = m };
+    querying a = { .two = two, .m = m };
     faces_at near = { 0 };
     int32_t winding = 0;
     ebpo_status status = find_faces(two, m, x, &near, error);
     for (uint64_t i = 0; i < near.count && status == EBPO_OK && !a.in; i++)
-        status = ask_face(&a, near.face[i], x, error);
+        status = query_face(&a, near.face[i], x, error);
     free(near.face);
     if (status == EBPO_OK && !a.on && two->solid[m]) {
         status = ebpo_exact_winding(&two->model[m], two->context[m], x, &winding, error);
@@ -289,7 +288,7 @@ typedef struct common {
     bool *has;
 } common;
 
-static ebpo_status ask_both(void *user, const mpq_t x[3], ebpo_error *error)
+static ebpo_status query_both(void *user, const mpq_t x[3], ebpo_error *error)
 {
     const common *c = user;
     bool in[2] = { false, false };
@@ -313,6 +312,6 @@ ebpo_status ebpo_face_has_common_point(ebpo_two_models *two, int m, uint64_t fac
     status = cut_face(two, &two->pieces, m, face, (const double(*)[3])t, error);
     common c = { two, has };
     if (status == EBPO_OK)
-        status = ebpo_face_pieces_vertices(&two->pieces, ask_both, &c, error);
+        status = ebpo_face_pieces_vertices(&two->pieces, query_both, &c, error);
     return *has ? EBPO_OK : status;
 }

@@ -1,12 +1,12 @@
-/* How deep the surface of one model is in the solid of another: the greatest distance of a point
- * of the surface inside the solid to the boundary of the solid.
+/* Computes how deep the surface of one model is in the solid of another: the greatest distance of a
+ * point of the surface inside the solid to the boundary of the solid.
  *
  * A branch-and-bound search goes through the cells of the surface's octree, then through faces and
- * parts of faces. Each is enclosed in a ball; the distance at its centre bounds how deep a point
- * of it can be. A heap gives the part that may be deepest. The search ends when no part can be
- * deeper than the best point and the tolerance, or at the deadline; lo and hi then bound the
- * depth. The steps do not depend on what is in memory. Bounds: docs/develop/collision.md, "Depth".
- * One thread. */
+ * parts of faces. Each is enclosed in a ball; the distance at its centre bounds the depth of its
+ * points. A heap gives the part that may be deepest. The search ends when no part can be deeper
+ * than the best point and the tolerance, or at the deadline; lo and hi then bound the depth. The
+ * steps do not depend on what is in memory. Bounds: docs/develop/collision.md, "Depth". One thread.
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -32,41 +32,42 @@
 
 /* A part of a face. */
 typedef struct depth_part {
-    double most;         /* no point of it is deeper */
-    double corner[3][3]; /* in the world */
+    double most;         /* no point of the part is deeper */
+    double corner[3][3]; /* in world coordinates */
 } depth_part;
 
 typedef struct depth_search {
-    /* In: */
-    ebpo_context *from; /* of the surface's model */
+    /* Input: */
+    ebpo_context *from; /* context of the surface's model */
     const ebpo_posing *posing;
-    double reach; /* no posed coordinate of it is greater */
+    double reach; /* greatest size of its posed coordinates */
     const ebpo_posed_solid *solid;
-    ebpo_context *context; /* of the solid's model, another one */
+    ebpo_context *context; /* separate context of the solid's model */
     double tolerance;
-    uint64_t late; /* by ebpo_clock; UINT64_MAX: never */
+    uint64_t late; /* deadline by ebpo_clock; UINT64_MAX: none */
     const ebpo_progress *progress;
-    /* Out: lo <= depth <= hi. */
+    /* Output: lo <= depth <= hi. */
     double lo, hi;
-    /* Begins as 0: */
-    double left, lost; /* the greatest `most` of what was left out; what rounding moves points by */
+    /* Initially 0: */
+    double left, lost; /* greatest `most` of the omitted parts; bound of how far rounding moves
+                        * points */
     depth_part *part;  /* a heap, the greatest first */
-    uint64_t count, capacity, asked;
+    uint64_t count, capacity, queried;
 } depth_search;
 
-/* Something of the surface is within `radius` of a point, all of it; and a point of it certainly
- * within `far`, INFINITY if that is not known. */
+/* All of a piece of the surface is within `radius` of a point. One of its points is certainly
+ * within `far`; INFINITY if that is not known. */
 typedef struct depth_ball {
     double radius, far;
-    /* Out: whether it matters still, and how deep it is at most. */
+    /* Output: true if the ball still matters, and a bound of its depth. */
     bool open;
     double most;
 } depth_ball;
 
 /* --- one point --- */
 
-/* How deep it is in the solid, less than 0 outside: surely within *lo .. *hi. rounding: how far it
- * may be from where it should be. */
+/* Bounds the depth in the solid by *lo .. *hi; it is negative outside. rounding: how far the point
+ * may be from its exact position. */
 static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, double *hi,
                             double *rounding, ebpo_error *error)
 {
@@ -74,14 +75,14 @@ static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, doub
     ebpo_distance_result r;
     ebpo_unpose(s->solid, w, p, &doubt);
     *rounding = doubt * scale;
-    s->asked++;
+    s->queried++;
     ebpo_status status = ebpo_distance(s->context, p, NULL, &r, error);
     if (status != EBPO_OK)
         return status;
     double size = fabs(r.distance), off = 2 * doubt + 0x1p-50 * size;
     *hi = (size + off) * scale;
     *lo = -*hi;
-    if (!(size > off)) /* a face may be on either side of it */
+    if (!(size > off)) /* a face may be on either side of the point */
         return EBPO_OK;
     if (r.distance < 0)
         *lo = (size - off) * scale;
@@ -90,9 +91,9 @@ static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, doub
     return EBPO_OK;
 }
 
-/* No point of the triangle in the solid is deeper than it is away from the face that was nearest to
- * the last point asked about; and that is convex, so its corners tell. */
-static double most_at_corners(const depth_search *s, const double corner[3][3])
+/* No point of the triangle in the solid is deeper than its distance from the face that was nearest
+ * to the last queried point. That distance is convex, so the corners bound it. */
+static double max_at_corners(const depth_search *s, const double corner[3][3])
 {
     double most = 0, p[3], doubt;
     for (int i = 0; i < 3; i++) {
@@ -125,8 +126,8 @@ static bool is_search_late(const depth_search *s)
     return s->late != UINT64_MAX && ebpo_clock() >= s->late;
 }
 
-/* What rounding alone leaves in doubt is no reason to divide: parts of faces that lie on others
- * have no end. */
+/* A doubt that rounding alone causes is no reason to divide: parts of faces that lie on other faces
+ * would be divided forever. */
 static bool is_enough(depth_search *s, double most, double rounding)
 {
     if (most > s->lo + s->tolerance + 4 * (rounding + s->lost))
@@ -135,13 +136,13 @@ static bool is_enough(depth_search *s, double most, double rounding)
     return true;
 }
 
-static double most_within(double hi, double radius)
+static double max_within(double hi, double radius)
 {
     return (hi + radius) * (hi + radius > 0 ? 1 + 0x1p-50 : 1);
 }
 
-static ebpo_status ask_ball(depth_search *s, const double middle[3], depth_ball *ball,
-                            ebpo_error *error)
+static ebpo_status query_ball(depth_search *s, const double middle[3], depth_ball *ball,
+                              ebpo_error *error)
 {
     double lo, hi, rounding;
     ball->open = false;
@@ -151,12 +152,12 @@ static ebpo_status ask_ball(depth_search *s, const double middle[3], depth_ball 
     if (status != EBPO_OK)
         return status;
     s->lo = fmax(s->lo, (lo - ball->far) * (1 - 0x1p-50) - s->lost);
-    ball->most = most_within(hi, ball->radius);
+    ball->most = max_within(hi, ball->radius);
     ball->open = !is_enough(s, ball->most, rounding);
     return EBPO_OK;
 }
 
-/* The part is within `radius` of the centre, a point of it. */
+/* Offers a part that is within `radius` of the centre, one of its points. */
 static ebpo_status offer_part(depth_search *s, depth_part *part, const double centre[3],
                               double radius, ebpo_error *error)
 {
@@ -167,9 +168,9 @@ static ebpo_status offer_part(depth_search *s, depth_part *part, const double ce
     if (status != EBPO_OK)
         return status;
     s->lo = fmax(s->lo, lo - s->lost);
-    part->most = most_within(hi, radius);
+    part->most = max_within(hi, radius);
     if (part->most > s->lo && s->context->warm)
-        part->most = fmin(part->most, most_at_corners(s, (const double(*)[3])part->corner));
+        part->most = fmin(part->most, max_at_corners(s, (const double(*)[3])part->corner));
     if (is_enough(s, part->most, rounding))
         return EBPO_OK;
     if (!(radius > 4 * s->lost)) {
@@ -194,20 +195,20 @@ static ebpo_status offer_triangle(depth_search *s, const double a[3], const doub
     return offer_part(s, &part, centre, radius * (1 + 0x1p-50) + s->lost, error);
 }
 
-/* A face, at its pose. */
+/* Offers a face at its pose. */
 static ebpo_status offer_face(depth_search *s, const double corner[3][3], ebpo_error *error)
 {
     return offer_triangle(s, corner[0], corner[1], corner[2], error);
 }
 
-/* The middle of corner k and the next one. */
+/* Computes the middle of corner k and the next one. */
 static void middle_of(const depth_part *p, int k, double out[3])
 {
     for (int i = 0; i < 3; i++)
         out[i] = p->corner[k][i] + (p->corner[(k + 1) % 3][i] - p->corner[k][i]) / 2;
 }
 
-/* Into two, by the middle of edge k. */
+/* Halves the triangle by the middle of edge k. */
 static ebpo_status halve_triangle(depth_search *s, const depth_part *p, int k, ebpo_error *error)
 {
     double middle[3];
@@ -218,8 +219,8 @@ static ebpo_status halve_triangle(depth_search *s, const depth_part *p, int k, e
                              : status;
 }
 
-/* Into four, by the middles of the edges; but a long one into two, as quarters of it would lie
- * beside each other, ever more of them as near to what is near to one. */
+/* Divides the triangle into four by the middles of its edges. Halves a long one: its quarters would
+ * lie side by side, and their number would grow without limit near another face. */
 static ebpo_status divide_triangle(depth_search *s, const depth_part *p, ebpo_error *error)
 {
     double middle[3][3], length[3];
@@ -239,13 +240,13 @@ static ebpo_status divide_triangle(depth_search *s, const depth_part *p, ebpo_er
     return status;
 }
 
-/* No part that waits is deeper than what is known and the tolerance. */
+/* Returns true if no waiting part is deeper than the known depth and the tolerance. */
 static bool is_search_done(const depth_search *s)
 {
     return s->count == 0 || !(s->part[0].most > s->lo + s->tolerance);
 }
 
-/* The part that may be deepest: it is not done. */
+/* Divides the part that may be deepest; it is not yet decided. */
 static ebpo_status divide_next(depth_search *s, ebpo_error *error)
 {
     depth_part part = heap_take(s->part, s->count--);
@@ -254,31 +255,31 @@ static ebpo_status divide_next(depth_search *s, ebpo_error *error)
 
 /* --- cells of the octree --- */
 
-/* Cells are visited level by level, and on each level in the order of the file, so that a subtree
- * is loaded about once for each level that matters. The cells do not depend on what is in memory,
- * and neither does the interval in which the search ends. */
+/* Cells are visited level by level, and in each level in file order, so that a subtree is loaded
+ * about once for each level that matters. Neither the cells nor the final interval depend on what
+ * is in memory. */
 
-/* What is in a cell may be so deep. */
+/* A cell whose content may be deep enough. */
 typedef struct open_cell {
     ebpo_cell cell;
     double most;
 } open_cell;
 
 typedef struct listed_face {
-    uint64_t number; /* in the file */
+    uint64_t number; /* number in the file */
     double corner[3][3];
 } listed_face;
 
 typedef struct going_down {
     depth_search *s;
     ebpo_posed_subtrees at; /* the pose of the surface */
-    open_cell *open, *next; /* of a level, and of the one below it */
+    open_cell *open, *next; /* cells of a level, and of the level below it */
     uint64_t open_count, open_capacity, next_count, next_capacity;
-    listed_face *face; /* of leaves, waiting to be offered */
+    listed_face *face; /* faces of leaves, waiting to be offered */
     uint64_t face_count, face_capacity;
 } going_down;
 
-/* So many wait at least. */
+/* Least number of faces that wait. */
 enum { FACES_AT_ONCE = 16384 };
 
 /* --- faces --- */
@@ -289,7 +290,7 @@ static int by_number(const void *x, const void *y)
     return (a->number > b->number) - (a->number < b->number);
 }
 
-/* Several leaves list one: once of those that wait. */
+/* Offers the waiting faces; a face that several leaves list is offered once. */
 static ebpo_status offer_faces(going_down *g, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -338,10 +339,10 @@ static ebpo_status offer_cell(going_down *g, ebpo_cell cell, ebpo_error *error)
     ebpo_posed_cell(&g->at, cell, corner);
     for (int k = 0; k < 3; k++)
         middle[k] = corner[0][k] / 2 + corner[7][k] / 2;
-    if (!g->at.model->info->pruned) /* a face has a point in the cell, or near it */
+    if (!g->at.model->info->pruned) /* a face has a point in the cell or near it */
         ball.far = ball.radius + EBPO_NEAR_SHARE * diagonal;
     open_cell open = { .cell = cell };
-    ebpo_status status = ask_ball(s, middle, &ball, error);
+    ebpo_status status = query_ball(s, middle, &ball, error);
     if (status != EBPO_OK || !ball.open)
         return status;
     open.most = ball.most;
@@ -351,7 +352,7 @@ static ebpo_status offer_cell(going_down *g, ebpo_cell cell, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Subtrees on the way are loaded. */
+/* Finds the node of a cell; loads subtrees on the path. */
 static ebpo_status find_node(going_down *g, ebpo_cell cell, ebpo_node *out, ebpo_error *error)
 {
     ebpo_context *context = g->s->from;
@@ -370,7 +371,7 @@ static ebpo_status divide_cell(going_down *g, ebpo_cell cell, ebpo_error *error)
 {
     ebpo_node node;
     ebpo_status status = find_node(g, cell, &node, error);
-    if (status != EBPO_OK || node.pruned) /* what it had is not in this file */
+    if (status != EBPO_OK || node.pruned) /* the content of a pruned node is not in this file */
         return status;
     if (node.type != EBPO_GRAY)
         return add_leaf(g, &node, error);
@@ -412,7 +413,7 @@ static void swap_levels(going_down *g)
     g->next_capacity = capacity;
 }
 
-/* Offers all faces that may matter, which wait then. As run_depth_search. */
+/* Offers all faces that may matter; they then wait. Fails as run_depth_search. */
 static ebpo_status offer_cells(depth_search *s, ebpo_error *error)
 {
     going_down g = { .s = s, .at = { .model = s->from->model, .posing = *s->posing } };
@@ -430,14 +431,14 @@ static ebpo_status search_parts(depth_search *s, ebpo_error *error)
 {
     ebpo_status status = offer_cells(s, error);
     while (status == EBPO_OK && !is_search_done(s) && !is_search_late(s)) {
-        if (s->asked % 64 == 0 && !ebpo_progress_step(s->progress, "depth", 0, 0, error))
+        if (s->queried % 64 == 0 && !ebpo_progress_step(s->progress, "depth", 0, 0, error))
             return EBPO_E_CANCELLED;
         status = divide_next(s, error);
     }
     return status;
 }
 
-/* EBPO_E_MEMORY, EBPO_E_CANCELLED, and those of ebpo_distance. */
+/* Fails with EBPO_E_MEMORY, EBPO_E_CANCELLED and the errors of ebpo_distance. */
 static ebpo_status run_depth_search(depth_search *s, ebpo_error *error)
 {
     s->lost = 0x1p-46 * s->reach;
@@ -453,7 +454,7 @@ static ebpo_status run_depth_search(depth_search *s, ebpo_error *error)
 
 /* --- the query --- */
 
-/* Of the caller's model `solid` (0: A), which holds the other one's surface. */
+/* Computes the depth in the caller's model `solid` (0: A) of the other one's surface. */
 static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance, ebpo_certain *out,
                             ebpo_error *error)
 {
@@ -504,7 +505,7 @@ ebpo_status ebpo_collide_depth(ebpo_collider *c, const ebpo_collide_options *opt
     ebpo_collision q;
     if (!(tolerance > 0 && tolerance < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the depth's tolerance has to be greater than 0 and finite");
+                         "the depth's tolerance must be greater than 0 and finite");
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;

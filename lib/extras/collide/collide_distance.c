@@ -1,14 +1,14 @@
-/* The distance of two models at poses, and the pair of faces that has it.
+/* Computes the distance of two models at poses, and a pair of faces at that distance.
  *
  * The kernels of gap_walk_kernels.c walk through pairs of nodes in floats and drop what is
- * certainly farther than the limit. What remains waits, and is decided here: in doubles with error
- * bounds (ebpo_triangles_distance_bounds), and exactly where the bounds overlap. Of pairs at the
- * same distance the first in the order of the files wins, so the result is the same with every
- * processor and number of threads.
+ * certainly farther than the limit. The remaining pairs wait and are decided here: in doubles with
+ * error bounds (ebpo_triangles_distance_bounds), and exactly where the bounds overlap. Of pairs at
+ * the same distance the first in file order wins, so the result is the same with every processor
+ * and number of threads.
  *
- * Models in parts are searched in pairs of subtrees, the smallest gap of envelopes first; a
- * subtree is loaded only if its envelope is nearer than the best pair so far. A collider remembers
- * its last pair, from which the next search begins. Bounds: docs/develop/collision.md. */
+ * Models in parts are searched in pairs of subtrees, the smallest gap of envelopes first; a subtree
+ * is loaded only if its envelope is nearer than the best pair so far. A collider remembers its last
+ * pair, from which the next search begins. Bounds: docs/develop/collision.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -29,27 +29,27 @@
 
 /* Two faces, as in their files and at their poses. */
 typedef struct ebpo_face_two {
-    uint64_t file[2], source[2]; /* their numbers */
+    uint64_t file[2], source[2]; /* face numbers in the file and in the source */
     double own[2][3][3], corner[2][3][3];
     ebpo_pair_distance_bounds bounds;
 } ebpo_face_two;
 
-/* Of one pair of accels, or of several, one after the other. */
+/* Search for the nearest pair of one pair of accels, or of several in sequence. */
 typedef struct nearest_pair {
-    /* In: */
+    /* Input: */
     double tolerance; /* 0: exact */
-    double at_least;  /* NAN: not asked */
-    uint64_t late;    /* by ebpo_clock; UINT64_MAX: never */
+    double at_least;  /* NAN: not queried */
+    uint64_t late;    /* deadline by ebpo_clock; UINT64_MAX: none */
     const ebpo_progress *progress;
-    /* Out: lo <= distance <= hi, equal if the answer is exact. */
+    /* Output: lo <= distance <= hi, equal if the result is exact. */
     double lo, hi;
     bool found;
-    bool meets;      /* `best` does, and is not the least one that does */
-    int is_at_least; /* 1, 0; -1: not asked, or open */
+    bool meets;      /* `best` intersects, and is not the least such pair */
+    int is_at_least; /* 1, 0; -1: not queried, or undecided */
     ebpo_face_two best;
-    bool ended; /* before all was seen: what was not is not nearer than: */
+    bool ended; /* ended early: all that was not visited is at least this far away: */
     double left;
-    ebpo_error *error; /* of `status`, while it is being searched */
+    ebpo_error *error; /* error of `status` during the search */
     ebpo_status status;
 } nearest_pair;
 
@@ -65,7 +65,7 @@ static void pose_faces(const ebpo_posing *const posing[2], ebpo_face_two *out)
     ebpo_triangles_distance_bounds(CORNERS(out, 0), CORNERS(out, 1), &out->bounds);
 }
 
-static void look_at_slots(const ebpo_gap_search *g, const uint32_t slot[2], ebpo_face_two *out)
+static void inspect_slots(const ebpo_gap_search *g, const uint32_t slot[2], ebpo_face_two *out)
 {
     const ebpo_posing *posing[2] = { &g->posing[0].posing, &g->posing[1].posing };
     for (int s = 0; s < 2; s++) {
@@ -77,7 +77,7 @@ static void look_at_slots(const ebpo_gap_search *g, const uint32_t slot[2], ebpo
     pose_faces(posing, out);
 }
 
-/* Of equal distances the first in the order of the files. */
+/* Orders pairs of equal distance by the order in the files. */
 static bool is_earlier(const ebpo_face_two *f, const ebpo_face_two *than)
 {
     return f->file[0] != than->file[0] ? f->file[0] < than->file[0] : f->file[1] < than->file[1];
@@ -97,16 +97,16 @@ static bool is_nearer(const ebpo_face_two *f, const ebpo_face_two *than)
     return order < 0 || (order == 0 && is_earlier(f, than));
 }
 
-/* --- all that wait --- */
+/* --- all waiting pairs --- */
 
-/* Rounded up, in the search's unit. */
+/* Converts a distance to the search's unit, rounded up. */
 static float to_unit(const ebpo_gap_search *g, double distance)
 {
     return (float)(distance * g->posing[0].unit * (1 + 0x1p-22)) + 0x1p-100f;
 }
 
-/* Of a pair that is apart; false: that is enough. */
-static bool compare_to_asked(nearest_pair *n, const ebpo_face_two *f)
+/* Compares a pair that is apart with `at_least`. Returns false if that decides. */
+static bool compare_to_queried(nearest_pair *n, const ebpo_face_two *f)
 {
     if (!(f->bounds.lo < n->at_least) ||
         (!(f->bounds.hi < n->at_least) &&
@@ -118,8 +118,9 @@ static bool compare_to_asked(nearest_pair *n, const ebpo_face_two *f)
     return false;
 }
 
-/* A tolerance asks for bounds only: the least of each. They are too wide for a gap that is tiny
- * beside its faces, whose direction doubles hardly know: then for the exact distance, rounded. */
+/* With a tolerance only the least bounds are kept. For a gap that is tiny beside its faces, the
+ * bounds are too wide, because doubles hardly give its direction; then the exact distance is
+ * rounded. */
 static void take_within_tolerance(nearest_pair *n, const ebpo_face_two *given)
 {
     ebpo_face_two f = *given;
@@ -135,7 +136,7 @@ static void take_within_tolerance(nearest_pair *n, const ebpo_face_two *given)
     n->found = true;
 }
 
-/* False: enough. */
+/* Returns false when enough is known. */
 static bool consider_faces(nearest_pair *n, const ebpo_face_two *f)
 {
     if (!(f->bounds.lo > 0) &&
@@ -145,7 +146,7 @@ static bool consider_faces(nearest_pair *n, const ebpo_face_two *f)
         return false;
     }
     if (!isnan(n->at_least))
-        return compare_to_asked(n, f);
+        return compare_to_queried(n, f);
     if (n->tolerance > 0)
         take_within_tolerance(n, f);
     else if (!n->found || is_nearer(f, &n->best)) {
@@ -158,7 +159,7 @@ static bool consider_faces(nearest_pair *n, const ebpo_face_two *f)
 static bool take_faces(ebpo_gap_search *g, nearest_pair *n, const uint32_t slot[2])
 {
     ebpo_face_two f;
-    look_at_slots(g, slot, &f);
+    inspect_slots(g, slot, &f);
     ebpo_gap_set_best(g, to_unit(g, f.bounds.hi), slot[0], slot[1]);
     return consider_faces(n, &f);
 }
@@ -172,7 +173,8 @@ static bool go_on(ebpo_gap_search *g)
     return !g->ended;
 }
 
-/* Of those that nobody will look at. Not by fmin: gcc 12 for ARM fails to compile such loops. */
+/* Returns the least bound of the waiting pairs from `first` on. Does not use fmin: gcc 12 for ARM
+ * fails to compile such loops. */
 static double least_waiting(const ebpo_gap_search *g, unsigned first)
 {
     double least = INFINITY;
@@ -182,7 +184,8 @@ static double least_waiting(const ebpo_gap_search *g, unsigned first)
     return fmax(least / g->posing[0].unit * (1 - 0x1p-20), 0);
 }
 
-/* Many may be at nearly the same distance, where models have flat parts. */
+/* Decides the waiting pairs. Many may be at nearly the same distance where models have flat parts.
+ */
 static bool judge_waiting(ebpo_gap_search *g)
 {
     nearest_pair *n = g->user;
@@ -197,9 +200,9 @@ static bool judge_waiting(ebpo_gap_search *g)
     return more;
 }
 
-/* --- the answer --- */
+/* --- the result --- */
 
-/* Of what has not been seen. */
+/* Returns a lower bound for what has not been visited. */
 static double left_over(const ebpo_gap_search *g)
 {
     double least = INFINITY;
@@ -227,11 +230,11 @@ static void end_open(nearest_pair *n)
 
 static void nearest_pair_end(nearest_pair *n)
 {
-    bool asked = !isnan(n->at_least);
+    bool queried = !isnan(n->at_least);
     if (n->meets) {
         n->lo = n->hi = 0;
-        n->is_at_least = asked ? n->at_least <= 0 : -1;
-    } else if (asked) {
+        n->is_at_least = queried ? n->at_least <= 0 : -1;
+    } else if (queried) {
         if (n->is_at_least < 0 && !n->ended)
             n->is_at_least = 1;
         n->lo = n->is_at_least == 1 ? n->at_least : fmin(n->lo, n->at_least);
@@ -245,7 +248,7 @@ static void nearest_pair_end(nearest_pair *n)
         end_open(n);
 }
 
-/* What was not looked at is not nearer. */
+/* Records that unvisited pairs are at least this far apart. */
 static void nearest_pair_leave(nearest_pair *n, double left)
 {
     n->ended = true;
@@ -254,7 +257,7 @@ static void nearest_pair_leave(nearest_pair *n, double left)
 
 /* --- the search --- */
 
-/* What is asked has been set. */
+/* Begins a search; the input has been set. */
 static void nearest_pair_begin(nearest_pair *n)
 {
     n->lo = n->left = INFINITY;
@@ -263,7 +266,7 @@ static void nearest_pair_begin(nearest_pair *n)
     n->is_at_least = -1;
 }
 
-/* A pair of faces that is known from before: own, file and source are set. */
+/* Starts with a pair of faces from an earlier query; own, file and source are set. */
 static void nearest_pair_start(nearest_pair *n, const ebpo_posing posing[2],
                                const ebpo_face_two *pair)
 {
@@ -273,14 +276,14 @@ static void nearest_pair_start(nearest_pair *n, const ebpo_posing posing[2],
     (void)consider_faces(n, &f);
 }
 
-/* Two faces of `g`, by their slots, that are known to meet. */
-static void nearest_pair_met(nearest_pair *n, const ebpo_gap_search *g, const uint32_t slot[2])
+/* Records two faces of `g`, by their slots, that are known to intersect. */
+static void nearest_pair_found(nearest_pair *n, const ebpo_gap_search *g, const uint32_t slot[2])
 {
-    look_at_slots(g, slot, &n->best);
+    inspect_slots(g, slot, &n->best);
     n->found = n->meets = true;
 }
 
-/* What is farther away does not matter any more. */
+/* Returns the distance beyond which nothing matters any more. */
 static double nearest_pair_limit(const nearest_pair *n)
 {
     if (!isnan(n->at_least))
@@ -288,13 +291,13 @@ static double nearest_pair_limit(const nearest_pair *n)
     return n->found ? n->best.bounds.hi - n->tolerance : INFINITY;
 }
 
-/* Nothing is left to be found out. */
+/* Returns true if nothing remains to be found. */
 static bool nearest_pair_is_done(const nearest_pair *n)
 {
     return n->meets || n->is_at_least >= 0 || n->ended || n->status != EBPO_OK;
 }
 
-/* What is known limits the search. */
+/* Limits the search by what is already known. */
 static void begin_search(const nearest_pair *n, ebpo_gap_search *g)
 {
     g->tolerance = (float)(n->tolerance * g->posing[0].unit * (1 - 0x1p-20));
@@ -306,7 +309,7 @@ static void begin_search(const nearest_pair *n, ebpo_gap_search *g)
     }
 }
 
-/* What waits, and the pair that is less than `before` and that nobody has judged yet. */
+/* Decides the waiting pairs, and an undecided pair whose bound is less than `before`. */
 static void judge_rest(ebpo_gap_search *g, nearest_pair *n, float before)
 {
     if (nearest_pair_is_done(n) || !judge_waiting(g) || n->meets || !isnan(n->at_least))
@@ -315,7 +318,8 @@ static void judge_rest(ebpo_gap_search *g, nearest_pair *n, float before)
         take_faces(g, n, g->best_slot);
 }
 
-/* Of two more accels, with which `g` has been begun. EBPO_E_MEMORY, EBPO_E_CANCELLED. */
+/* Continues with two more accels, with which `g` has begun. Fails with EBPO_E_MEMORY,
+ * EBPO_E_CANCELLED. */
 static ebpo_status nearest_pair_search(nearest_pair *n, ebpo_gap_search *g, ebpo_error *error)
 {
     g->user = n;
@@ -338,15 +342,15 @@ static const char stage[] = "distance";
 typedef struct searching {
     ebpo_subtree_search subtrees;
     nearest_pair *n;
-    double hi; /* cells tell that the distance is not greater */
+    double hi; /* upper bound of the distance by the cells */
 } searching;
 
 /* --- two accels --- */
 
-/* Goes on with `n` in two more accels of the question's models. `may_meet`: the walk for the first
- * contact comes first, as bounds say little where faces meet. */
+/* Continues `n` in two more accels of the query's models. `may_intersect`: searches for the first
+ * contact before, as bounds are weak where faces intersect. */
 static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel *const accel[2],
-                                      bool may_meet, nearest_pair *n, ebpo_error *error)
+                                      bool may_intersect, nearest_pair *n, ebpo_error *error)
 {
     ebpo_collider *c = q->collider;
     ebpo_posing posing[2] = { q->posing[0].posing, q->posing[1].posing };
@@ -354,11 +358,12 @@ static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel 
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
         return EBPO_OK;
     ebpo_gap_begin(c->gap, accel, posing, q->reach);
-    ebpo_status status = may_meet ? ebpo_collision_first(q, accel, stage, &meet, error) : EBPO_OK;
+    ebpo_status status =
+        may_intersect ? ebpo_collision_first(q, accel, stage, &meet, error) : EBPO_OK;
     if (status != EBPO_OK)
         return status;
     if (meet == 1) {
-        nearest_pair_met(n, c->gap, c->walk.met_slot);
+        nearest_pair_found(n, c->gap, c->walk.found_slot);
         return EBPO_OK;
     }
     status = nearest_pair_search(n, c->gap, error);
@@ -369,13 +374,13 @@ static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel 
 
 /* --- pairs of nodes --- */
 
-static ebpo_status look_at(searching *s, const ebpo_node_gap *pair, ebpo_error *error)
+static ebpo_status inspect_pair(searching *s, const ebpo_node_gap *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
     bool there;
     ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &there, error);
     return status == EBPO_OK && there
-               ? distance_of_accels(s->subtrees.question, accel, pair->gap == 0, s->n, error)
+               ? distance_of_accels(s->subtrees.current_query, accel, pair->gap == 0, s->n, error)
                : status;
 }
 
@@ -383,13 +388,13 @@ static ebpo_status add_node_pair(searching *s, const ebpo_posed_node node[2], do
                                  ebpo_error *error)
 {
     ebpo_node_gaps *nodes = &s->subtrees.nodes;
-    ebpo_model *const *model = s->subtrees.question->model;
+    ebpo_model *const *model = s->subtrees.current_query->model;
     ebpo_node_gap pair = { { node[0], node[1] }, 0 };
     for (int i = 0; i < 2; i++)
         if (ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_UNIFORM)
             return EBPO_OK;
     ebpo_status status = ebpo_node_gap_of(nodes, node, &pair.gap, error);
-    pair.gap = fmax(pair.gap, gap); /* the nodes are in those above them */
+    pair.gap = fmax(pair.gap, gap); /* the gap of the nodes above is a bound, too */
     if (status != EBPO_OK || pair.gap > fmin(s->hi, nearest_pair_limit(s->n)))
         return status;
     if (!model[0]->info->pruned && !model[1]->info->pruned)
@@ -408,12 +413,12 @@ static ebpo_status divide_pair(searching *s, const ebpo_node_gap *pair, int side
     return status;
 }
 
-/* Pairs come by their gaps: behind the first that is too far away there is nothing. */
+/* Pairs come in the order of their gaps: the search ends at the first that is too far away. */
 static ebpo_status search_subtrees(searching *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     ebpo_node_gaps *nodes = &s->subtrees.nodes;
-    const ebpo_collision *q = s->subtrees.question;
+    const ebpo_collision *q = s->subtrees.current_query;
     while (nodes->count > 0 && status == EBPO_OK && !nearest_pair_is_done(s->n)) {
         ebpo_node_gap pair = ebpo_node_gaps_pop(nodes);
         int side = ebpo_subtree_search_side(&s->subtrees, pair.node);
@@ -422,8 +427,8 @@ static ebpo_status search_subtrees(searching *s, ebpo_error *error)
         if (ebpo_collision_is_late(q))
             nearest_pair_leave(s->n, pair.gap);
         else
-            status = side < 0 ? look_at(s, &pair, error) : divide_pair(s, &pair, side, error);
-        if (nearest_pair_is_done(s->n)) /* nobody looks at the others */
+            status = side < 0 ? inspect_pair(s, &pair, error) : divide_pair(s, &pair, side, error);
+        if (nearest_pair_is_done(s->n)) /* the other pairs are not visited */
             nearest_pair_leave(s->n, pair.gap);
         if (!ebpo_progress_step(&q->options.progress, stage, 0, 0, error))
             return EBPO_E_CANCELLED;
@@ -431,8 +436,8 @@ static ebpo_status search_subtrees(searching *s, ebpo_error *error)
     return status;
 }
 
-/* Goes on with `n` in all pairs of subtrees whose envelopes are not farther apart than what has
- * been found, the nearest first: the same as of whole models. */
+/* Continues `n` in all pairs of subtrees whose envelopes are not farther apart than the best
+ * distance, the nearest first. Gives the same result as whole models. */
 static ebpo_status distance_of_parts(const ebpo_collision *q, nearest_pair *n, ebpo_error *error)
 {
     searching s = { .n = n, .hi = INFINITY };
@@ -454,13 +459,13 @@ static ebpo_status check_options(const ebpo_clearance_options *o, ebpo_error *er
 {
     if (!(o->tolerance >= 0 && o->tolerance < INFINITY) || isnan(o->at_least))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the distance's tolerance has to be 0 or more and finite, and the "
-                         "distance asked for a number");
+                         "the distance's tolerance must be 0 or more and finite, and the queried "
+                         "distance must be a number");
     return EBPO_OK;
 }
 
-/* A point that both have: an end of the common segment, or what the nearest features have. */
-static void meeting_point(const ebpo_face_two *f, ebpo_pair_kind kind, double point[2][3])
+/* Computes a common point: an end of the common segment, or a point of the nearest features. */
+static void clash_point(const ebpo_face_two *f, ebpo_pair_kind kind, double point[2][3])
 {
     ebpo_contact_end end[2];
     if (kind != EBPO_PAIR_CROSSING)
@@ -470,7 +475,7 @@ static void meeting_point(const ebpo_face_two *f, ebpo_pair_kind kind, double po
         point[0][k] = point[1][k] = end[0].point[k];
 }
 
-static void tell_pair(const ebpo_collision *q, const nearest_pair *n, ebpo_clearance *out)
+static void report_pair(const ebpo_collision *q, const nearest_pair *n, ebpo_clearance *out)
 {
     const ebpo_face_two *f = &n->best;
     int a = q->turned, b = !q->turned;
@@ -481,7 +486,7 @@ static void tell_pair(const ebpo_collision *q, const nearest_pair *n, ebpo_clear
     if (n->meets) {
         kind =
             ebpo_triangle_pair((const double(*)[3])f->corner[0], (const double(*)[3])f->corner[1]);
-        meeting_point(f, kind, point);
+        clash_point(f, kind, point);
     }
     out->pair =
         (ebpo_face_pair){ f->source[a], f->source[b], f->file[a], f->file[b], (int32_t)kind, 0 };
@@ -491,7 +496,7 @@ static void tell_pair(const ebpo_collision *q, const nearest_pair *n, ebpo_clear
     }
 }
 
-/* --- from one question to the next --- */
+/* --- from one query to the next --- */
 
 static ebpo_face_two in_order(const ebpo_collision *q, const ebpo_face_two *f)
 {
@@ -583,6 +588,6 @@ ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *
     out->at_least = n.is_at_least;
     if (!n.found)
         return EBPO_OK;
-    tell_pair(&q, &n, out);
+    report_pair(&q, &n, out);
     return keep_nearest(&q, &n, error);
 }

@@ -1,10 +1,10 @@
-/* What the levels of two octrees tell of two models at poses, without their faces: bounds of the
- * distance, and whether both solids certainly have a point in common.
+/* Bounds the distance of two models at poses from the levels of their octrees, without their faces,
+ * and finds whether both solids certainly have a common point.
  *
  * Pairs of nodes come by the gaps of their envelopes, the smallest first (subtree_search.h). A gap
- * is a lower bound of the distance. Two nodes with faces bound it from above. A black cell belongs
- * to its solid as a whole: if it holds a whole cell with faces of the other model, or a point of a
- * black one, both solids have a common point. One thread. */
+ * is a lower bound of the distance. Two nodes with faces give an upper bound. A black cell belongs
+ * to its solid as a whole: if it contains a whole cell with faces of the other model, or a point of
+ * a black one, both solids have a common point. One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,19 +16,19 @@
 
 /* Zero at first. */
 typedef struct level_search {
-    const ebpo_collision *question;
+    const ebpo_collision *current_query;
     ebpo_node_gaps nodes;
-    /* out */
-    double lo, hi;       /* of the distance of faces */
-    uint64_t open_pairs; /* that may have faces that meet */
-    bool meets;          /* a point is of both, of solids or of faces: certain */
-    bool may_meet;       /* a pair is left that may have such a point */
+    /* output */
+    double lo, hi;       /* bounds of the distance of faces */
+    uint64_t open_pairs; /* pairs whose faces may intersect */
+    bool meets;          /* the solids or faces certainly have a common point */
+    bool may_intersect;  /* a remaining pair may have such a point */
 } level_search;
 
 static const char stage[] = "pairs of nodes";
 
-/* Of a black cell's side, what is near its walls is not asked about. */
-static const double wall_share = 0x1p-14;
+/* Share of a black cell's side, near its cell faces, that is not examined. */
+static const double cell_face_share = 0x1p-14;
 
 /* --- nodes --- */
 
@@ -45,14 +45,14 @@ static content content_of(const level_search *g, int side, const ebpo_posed_node
 
 static bool has_children(const level_search *g, const ebpo_posed_node *node)
 {
-    int level = g->question->options.level;
+    int level = g->current_query->options.level;
     return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_GRAY &&
            (level < 0 || node->cell.level < level);
 }
 
-/* --- a point of both solids --- */
+/* --- a common point of both solids --- */
 
-/* A posed point is certainly within a posed cell. */
+/* Returns true if a posed point is certainly within a posed cell. */
 static bool is_within(const double corner[8][3], const double p[3], double reach)
 {
     for (int k = 0; k < 3; k++) {
@@ -62,16 +62,17 @@ static bool is_within(const double corner[8][3], const double p[3], double reach
             length2 += (to[i] - from[i]) * (to[i] - from[i]);
             along += (to[i] - from[i]) * (p[i] - from[i]);
         }
-        if (!(length2 > 0x1p-900 && length2 < 0x1p900)) /* squares are not what they should be */
+        if (!(length2 > 0x1p-900 && length2 < 0x1p900)) /* the squares overflow, underflow or are
+                                                         * not numbers */
             return false;
-        double room = wall_share * length2 + 0x1p-44 * reach * sqrt(length2);
-        if (!(along > room && along < length2 - room))
+        double space = cell_face_share * length2 + 0x1p-44 * reach * sqrt(length2);
+        if (!(along > space && along < length2 - space))
             return false;
     }
     return true;
 }
 
-/* A cell and what is near it: of a node with faces one comes there. */
+/* Widens a cell by the margin that faces of a node may be outside it. */
 static void widen_cell(double corner[8][3], double share)
 {
     double middle[3];
@@ -82,12 +83,12 @@ static void widen_cell(double corner[8][3], double share)
             corner[c][i] = middle[i] + (corner[c][i] - middle[i]) * (1 + share);
 }
 
-/* `solid` is of a black node: all of where a face of the other one must be is in it, or, if that is
- * black as well, one of some points. */
+/* Returns true if `solid`, a black node's cell, contains all of the region in which the other node
+ * has a face or, if the other node is black too, one of some of its points. */
 static bool shares_point(const level_search *g, double solid[8][3], double other[8][3], bool black)
 {
     int within = 0;
-    double middle[3], reach = g->question->reach;
+    double middle[3], reach = g->current_query->reach;
     if (!black)
         widen_cell(other, 2 * EBPO_NEAR_SHARE);
     for (int c = 0; c < 8; c++)
@@ -97,8 +98,8 @@ static bool shares_point(const level_search *g, double solid[8][3], double other
     return black ? within > 0 || is_within((const double(*)[3])solid, middle, reach) : within == 8;
 }
 
-static bool certainly_meet(const level_search *g, const ebpo_posed_node node[2],
-                           const content has[2])
+static bool certainly_intersect(const level_search *g, const ebpo_posed_node node[2],
+                                const content has[2])
 {
     for (int i = 0; i < 2; i++) {
         double solid[8][3], other[8][3];
@@ -123,12 +124,12 @@ static ebpo_status add_node_pair(level_search *g, const ebpo_posed_node node[2],
     if (has[0] == NOTHING || has[1] == NOTHING || (!faces && g->meets))
         return EBPO_OK;
     ebpo_status status = ebpo_node_gap_of(&g->nodes, node, &pair.gap, error);
-    pair.gap = fmax(pair.gap, gap); /* the nodes are in those above them */
+    pair.gap = fmax(pair.gap, gap); /* the gap of the nodes above is a bound, too */
     if (status != EBPO_OK || pair.gap > g->hi || (!faces && pair.gap > 0))
         return status;
     if (faces)
         g->hi = fmin(g->hi, ebpo_node_far_bound(&g->nodes, node));
-    else if (certainly_meet(g, node, has))
+    else if (certainly_intersect(g, node, has))
         g->meets = true;
     return ebpo_node_gaps_push(&g->nodes, &pair, error);
 }
@@ -138,7 +139,7 @@ static bool has_faces(const level_search *g, const ebpo_node_gap *pair)
     return content_of(g, 0, &pair->node[0]) == FACES && content_of(g, 1, &pair->node[1]) == FACES;
 }
 
-/* It is not divided. */
+/* Ends a pair that is not divided. */
 static void close_pair(level_search *g, const ebpo_node_gap *pair)
 {
     bool faces = has_faces(g, pair);
@@ -146,7 +147,7 @@ static void close_pair(level_search *g, const ebpo_node_gap *pair)
         g->lo = fmin(g->lo, pair->gap);
     if (pair->gap > 0)
         return;
-    g->may_meet = true;
+    g->may_intersect = true;
     g->open_pairs += faces;
 }
 
@@ -165,7 +166,7 @@ static ebpo_status divide_pair(level_search *g, const ebpo_node_gap *pair, ebpo_
 
 /* --- the search --- */
 
-/* Nothing is decided of what waits; its least gap is all that is known. */
+/* Ends all waiting pairs undecided; only their least gap is known. */
 static void close_all(level_search *g)
 {
     for (uint64_t i = 0; i < g->nodes.count; i++)
@@ -177,21 +178,21 @@ static bool is_full(const level_search *g)
 {
     return g->nodes.count * sizeof *g->nodes.heap + g->nodes.side[0].bytes +
                g->nodes.side[1].bytes >
-           g->question->collider->options.memory;
+           g->current_query->collider->options.memory;
 }
 
-/* Pairs come by their gaps: behind the first that is closed, and those that may meet, nothing is to
- * be found out. */
+/* Pairs come in the order of their gaps: the search ends after the first closed pair and the pairs
+ * that may intersect. */
 static ebpo_status search_levels(level_search *g, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     while (g->nodes.count > 0 && status == EBPO_OK) {
         ebpo_node_gap pair = ebpo_node_gaps_pop(&g->nodes);
         bool faces = has_faces(g, &pair);
-        g->question->collider->node_pairs++;
+        g->current_query->collider->node_pairs++;
         if ((!faces && g->meets) || pair.gap > g->lo)
             continue;
-        if (ebpo_collision_is_late(g->question) || is_full(g)) {
+        if (ebpo_collision_is_late(g->current_query) || is_full(g)) {
             close_pair(g, &pair);
             close_all(g);
         } else if (has_children(g, &pair.node[0]) || has_children(g, &pair.node[1])) {
@@ -199,7 +200,7 @@ static ebpo_status search_levels(level_search *g, ebpo_error *error)
         } else {
             close_pair(g, &pair);
         }
-        if (!ebpo_progress_step(&g->question->options.progress, stage, 0, 0, error))
+        if (!ebpo_progress_step(&g->current_query->options.progress, stage, 0, 0, error))
             return EBPO_E_CANCELLED;
     }
     return status;
@@ -207,7 +208,7 @@ static ebpo_status search_levels(level_search *g, ebpo_error *error)
 
 static ebpo_status level_search_run(level_search *g, const ebpo_collision *q, ebpo_error *error)
 {
-    g->question = q;
+    g->current_query = q;
     g->lo = g->hi = INFINITY;
     ebpo_status status = ebpo_node_gaps_begin(&g->nodes, q, error);
     if (status != EBPO_OK)
@@ -231,11 +232,11 @@ static int32_t last_level(const ebpo_model *m, int level)
 static void fill_result(const ebpo_collision *q, const level_search *g, ebpo_level_result *out)
 {
     double lo = fmin(g->lo, g->hi);
-    int32_t figure = isinf(lo)                 ? EBPO_FIGURE_EXACT
-                     : lo == 0 || isinf(g->hi) ? EBPO_FIGURE_BOUND
-                                               : EBPO_FIGURE_INTERVAL;
-    out->distance = (ebpo_certain){ lo, g->hi, figure, 0 };
-    out->common = g->meets ? 1 : g->may_meet ? -1 : 0;
+    int32_t metric = isinf(lo)                 ? EBPO_VALUE_EXACT
+                     : lo == 0 || isinf(g->hi) ? EBPO_VALUE_BOUND
+                                               : EBPO_VALUE_INTERVAL;
+    out->distance = (ebpo_certain){ lo, g->hi, metric, 0 };
+    out->common = g->meets ? 1 : g->may_intersect ? -1 : 0;
     out->contact = g->open_pairs ? -1 : 0;
     out->open_pairs = g->open_pairs;
     out->level_a = last_level(q->model[q->turned], q->options.level);

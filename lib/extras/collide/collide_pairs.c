@@ -1,10 +1,11 @@
-/* Which pairs of faces of two models intersect: the first contact, and all pairs in one order.
+/* Finds the pairs of faces of two models that intersect: the first contact, or all pairs in one
+ * order.
  *
- * All pairs: the walk through both hierarchies (pair_walk_kernels.c) is expanded to enough pairs
- * of nodes, which are shared among threads. Their results are sorted by the numbers of the first
- * face, then of the second, so the order does not depend on the number of threads. When the memory
- * of the collider is too small for all pairs, runs of the first model's faces are searched one
- * after the other. Models in parts are left to subtree_walk.h. */
+ * All pairs: the walk through both hierarchies (pair_walk_kernels.c) is expanded to enough pairs of
+ * nodes, which threads share. Their results are sorted by the numbers of the first face, then of
+ * the second, so the order does not depend on the number of threads. When the collider's memory is
+ * too small for all pairs, runs of the first model's faces are searched one after the other.
+ * subtree_walk.h handles models in parts. */
 #include "core/strict_fp.h"
 
 #include <stdatomic.h>
@@ -19,37 +20,37 @@
 #include "extras/collide/hierarchy_walk.h"
 #include "extras/collide/subtree_walk.h"
 
-/* All pairs of faces of two accels that intersect, for a run of the first accel's faces. Zero at
- * first. */
+/* Search for all intersecting pairs of faces of two accels, for a run of the first accel's faces.
+ * Zero at first. */
 typedef struct gathering {
-    const ebpo_collision *question;
+    const ebpo_collision *current_query;
     bool self;
-    ebpo_node_pair *part; /* of the descent, from which threads go on */
+    ebpo_node_pair *part; /* pairs of nodes from which threads continue */
     uint64_t parts, part_capacity;
     ebpo_pair_walk *walk; /* one for each thread */
     unsigned threads;
-    uint64_t most; /* pairs */
+    uint64_t most; /* most pairs */
     _Atomic uint64_t found;
-    _Atomic bool full; /* there are more than so many */
-    ebpo_met_pair *met;
-    uint64_t met_count, met_capacity;
+    _Atomic bool full; /* there are more than `most` pairs */
+    ebpo_found_pair *intersected;
+    uint64_t found_count, found_capacity;
 } gathering;
 
 /* --- sorting --- */
 
-/* Radix sort from the least digit on; a digit has so many bits that counting them takes no longer
+/* Radix sort from the least digit. The digit size is chosen so that counting digits takes no longer
  * than moving the pairs. */
-enum { LEAST_BITS = 4, MOST_BITS = 11 };
+enum { LEAST_BITS = 4, MAX_BITS = 11 };
 
-static inline uint32_t digit_of(const ebpo_met_pair *m, bool by_a, unsigned shift, unsigned bits)
+static inline uint32_t digit_of(const ebpo_found_pair *m, bool by_a, unsigned shift, unsigned bits)
 {
     return (by_a ? m->a : m->b) >> shift & ((1u << bits) - 1);
 }
 
-static void sort_by_digit(const ebpo_met_pair *from, ebpo_met_pair *to, uint64_t count, bool by_a,
-                          unsigned shift, unsigned bits)
+static void sort_by_digit(const ebpo_found_pair *from, ebpo_found_pair *to, uint64_t count,
+                          bool by_a, unsigned shift, unsigned bits)
 {
-    uint64_t begin[(1 << MOST_BITS) + 1];
+    uint64_t begin[(1 << MAX_BITS) + 1];
     memset(begin, 0, ((1u << bits) + 1) * sizeof *begin);
     for (uint64_t i = 0; i < count; i++)
         begin[digit_of(&from[i], by_a, shift, bits) + 1]++;
@@ -62,33 +63,34 @@ static void sort_by_digit(const ebpo_met_pair *from, ebpo_met_pair *to, uint64_t
 static unsigned bits_for(uint64_t count)
 {
     unsigned bits = LEAST_BITS;
-    while (bits < MOST_BITS && count >> bits > 1)
+    while (bits < MAX_BITS && count >> bits > 1)
         bits++;
     return bits;
 }
 
-/* `spare` has room for as many; the result is in `met`. The numbers are below most_a and most_b. */
-static void sort_met_pairs(ebpo_met_pair *met, ebpo_met_pair *spare, uint64_t count,
-                           uint32_t most_a, uint32_t most_b)
+/* Sorts pairs; `spare` has space for as many, and the result is in `met`. The numbers are below
+ * max_a and max_b. */
+static void sort_found_pairs(ebpo_found_pair *intersected, ebpo_found_pair *spare, uint64_t count,
+                             uint32_t max_a, uint32_t max_b)
 {
-    ebpo_met_pair *from = met, *to = spare;
+    ebpo_found_pair *from = intersected, *to = spare;
     unsigned bits = bits_for(count);
     if (count < 2)
         return;
     for (int by_a = 0; by_a < 2; by_a++)
-        for (unsigned shift = 0; shift < 32 && (by_a ? most_a : most_b) >> shift; shift += bits) {
+        for (unsigned shift = 0; shift < 32 && (by_a ? max_a : max_b) >> shift; shift += bits) {
             sort_by_digit(from, to, count, by_a, shift, bits);
-            ebpo_met_pair *other = from;
+            ebpo_found_pair *other = from;
             from = to;
             to = other;
         }
-    if (from != met)
-        memcpy(met, from, count * sizeof *met);
+    if (from != intersected)
+        memcpy(intersected, from, count * sizeof *intersected);
 }
 
 /* --- the first contact --- */
 
-/* -1: late. */
+/* Searches for the first contact. The result is -1 when the deadline has passed. */
 static ebpo_status search_first(const ebpo_collision *q, ebpo_pair_walk *w, const char *stage,
                                 int32_t *found, ebpo_error *error)
 {
@@ -104,7 +106,7 @@ static ebpo_status search_first(const ebpo_collision *q, ebpo_pair_walk *w, cons
         if (!ebpo_progress_step(&q->options.progress, stage, 0, 0, error))
             return EBPO_E_CANCELLED;
     }
-    *found = w->met_count > 0;
+    *found = w->found_count > 0;
     return EBPO_OK;
 }
 
@@ -143,13 +145,14 @@ ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *opt
     const ebpo_accel *accel[2] = { q.model[0]->whole, q.model[1]->whole };
     status = ebpo_collision_first(&q, accel, "first contact", found, error);
     if (status == EBPO_OK && *found == 1)
-        *out = ebpo_collision_pair(&q, q.model[0]->whole, q.model[1]->whole, &c->walk.met[0]);
+        *out =
+            ebpo_collision_pair(&q, q.model[0]->whole, q.model[1]->whole, &c->walk.intersected[0]);
     return status;
 }
 
 static const char stage[] = "pairs of faces";
 
-/* Enough for any number of threads: results do not depend on it, but the work's evenness does. */
+/* Enough for any number of threads. The results do not depend on it, only the balance of work. */
 enum { PARTS = 512, PARTS_EACH = 64 };
 
 static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
@@ -167,7 +170,7 @@ static bool hold_node_pairs(gathering *g, const ebpo_node_pair *pairs, uint64_t 
     return true;
 }
 
-/* One generation of the descent after the other, until there are parts enough or only blocks. */
+/* Expands the walk by whole generations until there are enough parts or only blocks. */
 static bool make_parts(gathering *g, ebpo_pair_walk *w)
 {
     bool fine = w->kernels->start(w) && hold_node_pairs(g, w->stack, w->top);
@@ -188,28 +191,28 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
 {
     gathering *g = user;
     ebpo_pair_walk *w = &g->walk[worker];
-    if (!ebpo_pair_walk_room(w, end - begin))
+    if (!ebpo_pair_walk_capacity(w, end - begin))
         return no_memory(w, error);
     memcpy(w->stack, g->part + begin, (end - begin) * sizeof *w->stack);
     w->top = end - begin;
     while (w->top > 0 && !g->full) {
-        uint64_t before = w->met_count;
+        uint64_t before = w->found_count;
         if (!w->kernels->run(w, EBPO_WALK_PAIRS))
             return no_memory(w, error);
-        uint64_t more = w->met_count - before;
+        uint64_t more = w->found_count - before;
         if (atomic_fetch_add(&g->found, more) + more > g->most)
             g->full = true;
-        if (ebpo_collision_is_late(g->question))
+        if (ebpo_collision_is_late(g->current_query))
             return ebpo_fail(error, EBPO_E_CANCELLED, "%s: the deadline has passed", stage);
     }
     return EBPO_OK;
 }
 
-/* The collider's, if they are not in use: a question may be asked by what is given another's pairs.
- */
+/* Takes the collider's walks if they are not in use: a callback that receives pairs may send
+ * another query. */
 static bool take_walks(gathering *g)
 {
-    ebpo_collider *c = g->question->collider;
+    ebpo_collider *c = g->current_query->collider;
     if (c->walks) {
         g->walk = c->walks;
         g->threads = c->walk_count;
@@ -238,28 +241,30 @@ static ebpo_status prepare_walks(gathering *g, const ebpo_accel_pair *pair, uint
     return EBPO_OK;
 }
 
-/* Puts together what threads have found. */
+/* Joins the threads' results. */
 static ebpo_status put_together(gathering *g, const ebpo_accel_pair *pair, ebpo_error *error)
 {
     uint64_t count = 0;
     for (unsigned i = 0; i < g->threads; i++)
-        count += g->walk[i].met_count;
-    if (!ebpo_grow(&g->met, &g->met_capacity, 2 * count, sizeof *g->met))
-        return ebpo_fail_memory(error, 2 * count * sizeof *g->met);
-    g->met_count = 0;
+        count += g->walk[i].found_count;
+    if (!ebpo_grow(&g->intersected, &g->found_capacity, 2 * count, sizeof *g->intersected))
+        return ebpo_fail_memory(error, 2 * count * sizeof *g->intersected);
+    g->found_count = 0;
     for (unsigned i = 0; i < g->threads; i++) {
         const ebpo_pair_walk *w = &g->walk[i];
-        if (w->met_count)
-            memcpy(g->met + g->met_count, w->met, w->met_count * sizeof *w->met);
-        g->met_count += w->met_count;
+        if (w->found_count)
+            memcpy(g->intersected + g->found_count, w->intersected,
+                   w->found_count * sizeof *w->intersected);
+        g->found_count += w->found_count;
     }
     if (count)
-        sort_met_pairs(g->met, g->met + count, count, pair->accel[0]->face_count,
-                       pair->accel[1]->face_count);
+        sort_found_pairs(g->intersected, g->intersected + count, count, pair->accel[0]->face_count,
+                         pair->accel[1]->face_count);
     return EBPO_OK;
 }
 
-/* Of faces `begin` to `end` of the pair's first accel: fills in `met`, sorted; or `full`. */
+/* Gathers pairs of faces `begin` to `end` of the pair's first accel: fills in `met`, sorted, or
+ * sets `full`. */
 static ebpo_status gather_pairs(gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
                                 uint32_t end, ebpo_error *error)
 {
@@ -270,18 +275,18 @@ static ebpo_status gather_pairs(gathering *g, const ebpo_accel_pair *pair, uint3
         return no_memory(&g->walk[0], error);
     uint64_t grain = g->parts / PARTS_EACH + 1;
     status = ebpo_parallel_for(g->threads, NULL, g->parts, grain, run_parts, g,
-                               &g->question->options.progress, stage, error);
+                               &g->current_query->options.progress, stage, error);
     for (unsigned i = 0; i < g->threads; i++)
-        ebpo_collider_count(g->question->collider, &g->walk[i]);
+        ebpo_collider_count(g->current_query->collider, &g->walk[i]);
     if (status != EBPO_OK || g->full)
         return status;
     return put_together(g, pair, error);
 }
 
-/* For the next question; stacks and pairs have another size then. */
+/* Returns walks for the next query; stacks and pairs may have grown. */
 static void give_walks_back(gathering *g)
 {
-    ebpo_collider *c = g->question->collider;
+    ebpo_collider *c = g->current_query->collider;
     for (unsigned i = 0; g->walk && i < g->threads; i++)
         ebpo_pair_walk_free(&g->walk[i]);
     if (c->walks) {
@@ -296,14 +301,14 @@ static void gathering_free(gathering *g)
 {
     give_walks_back(g);
     free(g->part);
-    free(g->met);
+    free(g->intersected);
 }
 
 /* --- all pairs --- */
 
-/* Pairs as they are handed out. */
+/* State of handing out pairs. */
 typedef struct giving {
-    const ebpo_collision *question;
+    const ebpo_collision *current_query;
     const ebpo_accel_pair *pair;
     ebpo_pairs_fn take;
     void *user;
@@ -312,24 +317,24 @@ typedef struct giving {
 
 enum { GIVEN_AT_ONCE = 1024 };
 
-static void give_pairs(giving *v, const ebpo_met_pair *met, uint64_t count)
+static void give_pairs(giving *v, const ebpo_found_pair *intersected, uint64_t count)
 {
     ebpo_face_pair out[GIVEN_AT_ONCE];
     for (uint64_t at = 0; at < count && !v->enough; at += GIVEN_AT_ONCE) {
         uint64_t n = count - at < GIVEN_AT_ONCE ? count - at : GIVEN_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
-            out[i] = ebpo_collision_pair(v->question, v->pair->accel[0], v->pair->accel[1],
-                                         &met[at + i]);
+            out[i] = ebpo_collision_pair(v->current_query, v->pair->accel[0], v->pair->accel[1],
+                                         &intersected[at + i]);
         v->enough = !v->take(v->user, out, n);
     }
 }
 
-/* Runs of faces of the first model: as long as what they find has room, twice as long after one
- * that had. A single face may take more. */
+/* Searches runs of faces of the first model. A run is halved until its pairs fit in memory, and
+ * doubled after one that fits. A single face may use more memory. */
 static ebpo_status in_runs(giving *v, gathering *g, ebpo_error *error)
 {
     uint32_t faces = v->pair->accel[0]->face_count, run = faces;
-    uint64_t most = v->question->collider->options.memory / (2 * sizeof(ebpo_met_pair)) + 1;
+    uint64_t most = v->current_query->collider->options.memory / (2 * sizeof(ebpo_found_pair)) + 1;
     for (uint32_t begin = 0; begin < faces && !v->enough;) {
         uint32_t end = faces - begin > run ? begin + run : faces;
         g->most = end - begin == 1 ? UINT64_MAX : most;
@@ -341,7 +346,7 @@ static ebpo_status in_runs(giving *v, gathering *g, ebpo_error *error)
             run = run / 2;
             continue;
         }
-        give_pairs(v, g->met, g->met_count);
+        give_pairs(v, g->intersected, g->found_count);
         begin = end;
         run = run < faces / 2 ? 2 * run : faces;
     }
@@ -362,7 +367,7 @@ static ebpo_status all_pairs(const ebpo_collision *q, bool self, ebpo_pairs_fn t
     if (pair.apart)
         return EBPO_OK;
     giving v = { q, &pair, take, user, false };
-    gathering g = { .question = q, .self = self };
+    gathering g = { .current_query = q, .self = self };
     ebpo_status status = in_runs(&v, &g, error);
     gathering_free(&g);
     return status;
@@ -384,7 +389,9 @@ ebpo_status ebpo_collide_self(ebpo_collider *c, const ebpo_collide_options *opti
     ebpo_collision q;
     ebpo_collide_options here = EBPO_COLLIDE_OPTIONS_INIT;
     if (c->model[0] != c->model[1])
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "one model with itself: the collider has two");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "one model with itself: expected a collider of "
+                         "two models");
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;

@@ -1,9 +1,9 @@
-/* Outputs for other programs: pairs of intersecting faces in an HDF5 file, and meshes in a PLY
- * file with the faces that matter in red.
+/* Writes results for other programs: pairs of intersecting faces in an HDF5 file, and meshes in a
+ * PLY file with the faces that matter in red.
  *
- * Rows are written as they are found, in blocks, so memory does not grow with their number. PLY
+ * Rows are written in blocks as they are found, so memory does not grow with their number. PLY
  * files read vertices and faces from a source in ascending order: a mesh in memory or a model in
- * parts. Outputs appear only when they are complete (io/publish.h). */
+ * parts. Output files appear only when they are complete (io/publish.h). */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -127,14 +127,14 @@ static const struct {
 enum { ROWS = 512 };
 
 typedef struct writing {
-    const ebpo_collision *question;
+    const ebpo_collision *current_query;
     ebpo_pair_faces places;
     ebpo_h5_out out;
     ebpo_h5_table table[TABLES];
     int64_t faces[ROWS][2], file_faces[ROWS][2], contact_faces[ROWS][2];
     uint8_t kind[ROWS], on[ROWS][4];
     double points[ROWS][6];
-    uint64_t pairs, contacts; /* that wait */
+    uint64_t pairs, contacts; /* waiting rows */
     ebpo_error *error;
     ebpo_status status;
 } writing;
@@ -204,7 +204,7 @@ static bool take_rows(void *user, const ebpo_face_pair *pairs, uint64_t count)
 
 static ebpo_status write_tables(writing *w, const char *path, ebpo_publish *target)
 {
-    const ebpo_collision *q = w->question;
+    const ebpo_collision *q = w->current_query;
     ebpo_status status = ebpo_h5_create_plain(&w->out, ebpo_publish_path(target), path, w->error);
     if (status == EBPO_OK)
         status = make_tables(w, w->error);
@@ -228,7 +228,7 @@ static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_pu
     writing *w = ebpo_alloc_zero(1, sizeof *w);
     if (!w)
         return ebpo_fail_memory(error, sizeof *w);
-    w->question = q;
+    w->current_query = q;
     w->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
     w->error = error;
     for (int i = 0; i < TABLES; i++)
@@ -243,22 +243,22 @@ static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_pu
 
 /* --- PLY --- */
 
-/* Of a model in parts a chunk at a time; the mesh of a whole one is read once more. */
+/* A model in parts is read a chunk at a time; the mesh of a whole model is read once more. */
 typedef struct painted {
     ebpo_mesh mesh;
     ebpo_faces_by_number parts;
     ebpo_red_source source;
-    uint64_t *met; /* a bit for each face */
+    uint64_t *intersected; /* a bit for each intersecting face */
 } painted;
 
 typedef struct painting {
-    painted side[2]; /* of the caller's A and B */
+    painted side[2]; /* the caller's A and B */
 } painting;
 
-static bool take_met(void *user, const ebpo_face_pair *pairs, uint64_t count)
+static bool take_found(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     const painting *p = user;
-    uint64_t *a = p->side[0].met, *b = p->side[1].met;
+    uint64_t *a = p->side[0].intersected, *b = p->side[1].intersected;
     for (uint64_t i = 0; i < count; i++) {
         a[pairs[i].file_face_a / 64] |= UINT64_C(1) << pairs[i].file_face_a % 64;
         b[pairs[i].file_face_b / 64] |= UINT64_C(1) << pairs[i].file_face_b % 64;
@@ -279,8 +279,8 @@ static ebpo_status part_face(void *user, uint64_t number, uint32_t out[3], ebpo_
 static ebpo_status begin_painted(painted *p, const ebpo_model *model, ebpo_error *error)
 {
     const ebpo_info *info = model->info;
-    p->met = ebpo_alloc_zero(info->face_count / 64 + 1, 8);
-    if (!p->met)
+    p->intersected = ebpo_alloc_zero(info->face_count / 64 + 1, 8);
+    if (!p->intersected)
         return ebpo_fail_memory(error, info->face_count / 8);
     if (model->whole) {
         ebpo_status status = ebpo_file_read_mesh(model->file, NULL, &p->mesh, error);
@@ -297,7 +297,7 @@ static void end_painted(painted *p)
 {
     ebpo_faces_by_number_end(&p->parts);
     ebpo_mesh_free(&p->mesh);
-    free(p->met);
+    free(p->intersected);
 }
 
 static ebpo_status write_ply(const ebpo_collision *q, ebpo_publish *target, ebpo_error *error)
@@ -309,11 +309,11 @@ static ebpo_status write_ply(const ebpo_collision *q, ebpo_publish *target, ebpo
     for (int m = 0; m < 2 && status == EBPO_OK; m++)
         status = begin_painted(&p.side[m], q->collider->model[m], error);
     if (status == EBPO_OK)
-        status = ebpo_collide_all(q->collider, &q->options, take_met, &p, error);
+        status = ebpo_collide_all(q->collider, &q->options, take_found, &p, error);
     uint64_t before = ebpo_collision_bytes_read(q);
     for (int m = 0; m < 2; m++)
         red[m] = (ebpo_red_mesh){ p.side[m].source, &q->posing[(int)q->turned ^ m].posing,
-                                  p.side[m].met, colour[m] };
+                                  p.side[m].intersected, colour[m] };
     if (status == EBPO_OK)
         status = ebpo_red_meshes_print(red, 2, target, error);
     q->collider->bytes_read += ebpo_collision_bytes_read(q) - before;
@@ -331,7 +331,7 @@ ebpo_status ebpo_collide_write(ebpo_collider *c, const ebpo_collide_options *opt
     ebpo_collision q;
     ebpo_publish target = EBPO_PUBLISH_INIT;
     if (format != EBPO_PAIRS_HDF5 && format != EBPO_PAIRS_PLY)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: no format of pairs", path);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%s: unknown format of pairs", path);
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&target, path, error);

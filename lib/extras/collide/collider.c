@@ -1,9 +1,9 @@
-/* A collider: two models, options, and what queries keep for the next ones. All queries begin with
- * ebpo_collision_begin, which checks the options and puts the models in an order that swapping
- * them does not change, so that results do not depend on the order of the caller.
+/* A collider: two models, options, and data that queries keep for the next ones. All queries begin
+ * with ebpo_collision_begin. It checks the options and puts the models in an order that swapping
+ * them does not change, so results do not depend on the caller's order.
  *
  * A collider belongs to one thread at a time. Colliders of models that are subsets are refused,
- * except where the caller knows what is left out (ebpo_collider_of_parts). */
+ * except where the caller knows what is omitted (ebpo_collider_of_parts). */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -19,15 +19,15 @@
 #include "extras/collide/posed_solid.h"
 #include "query/query_model.h"
 
-/* What was left out of a subset might meet as well. */
+/* Refuses a subset: its omitted faces might intersect as well. */
 static ebpo_status check_complete(const ebpo_model *model, ebpo_error *error)
 {
     if (!model->info->pruned)
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_ABSENT, model->file->in.shown,
-                          "is a part of another file, and what was left out might meet too: ask "
-                          "the whole file, or put both into a scene, which knows what matters "
-                          "(`ebpo scene`)");
+                          "is a part of another file, and omitted faces might intersect too; "
+                          "query the whole file, or put both into a scene, which knows the "
+                          "relevant faces (`ebpo scene`)");
 }
 
 ebpo_status ebpo_collider_new(ebpo_model *a, ebpo_model *b, const ebpo_collider_options *options,
@@ -103,9 +103,9 @@ ebpo_status ebpo_collider_get_stats(const ebpo_collider *c, ebpo_collider_stats 
     return EBPO_GIVE(ebpo_collider_stats, out, &stats);
 }
 
-/* --- questions --- */
+/* --- queries --- */
 
-/* Files first, then poses: bits, so that the order needs no meaning. */
+/* Orders by files, then by poses, compared as bits: the order needs no meaning. */
 static bool comes_second(const ebpo_collider *c, const ebpo_collide_options *o)
 {
     int by_file = memcmp(c->model[0]->info->content_sha256, c->model[1]->info->content_sha256,
@@ -119,12 +119,12 @@ static ebpo_status make_posings(ebpo_collision *q, ebpo_error *error)
     q->reach = 0;
     for (int i = 0; i < 2; i++) {
         double reach[3];
-        ebpo_model_reach(q->model[i], reach);
+        ebpo_model_extent(q->model[i], reach);
         const ebpo_pose *pose = (i == 1) != q->turned ? &q->options.pose_b : &q->options.pose_a;
         ebpo_status status = ebpo_posing_make(&posing[i], pose, reach, error);
         if (status != EBPO_OK)
             return status;
-        q->reach = fmax(q->reach, ebpo_posed_reach(&posing[i], reach));
+        q->reach = fmax(q->reach, ebpo_posed_extent(&posing[i], reach));
     }
     for (int i = 0; i < 2; i++)
         ebpo_block_posing_make(&q->posing[i], &posing[i], q->reach);
@@ -156,7 +156,7 @@ bool ebpo_collision_is_late(const ebpo_collision *q)
     return q->late != UINT64_MAX && ebpo_clock() >= q->late;
 }
 
-/* Of both files; of one, once. */
+/* Counts both files; a file that both models use counts once. */
 uint64_t ebpo_collision_bytes_read(const ebpo_collision *q)
 {
     uint64_t bytes = 0;
@@ -170,24 +170,24 @@ uint64_t ebpo_collision_bytes_read(const ebpo_collision *q)
 }
 
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *q, const ebpo_accel *first,
-                                   const ebpo_accel *second, const ebpo_met_pair *met)
+                                   const ebpo_accel *second, const ebpo_found_pair *intersected)
 {
-    uint64_t file[2] = { ebpo_accel_file_face(first, met->a),
-                         ebpo_accel_file_face(second, met->b) },
-             source[2] = { ebpo_accel_source_face(first, met->a),
-                           ebpo_accel_source_face(second, met->b) };
+    uint64_t file[2] = { ebpo_accel_file_face(first, intersected->a),
+                         ebpo_accel_file_face(second, intersected->b) },
+             source[2] = { ebpo_accel_source_face(first, intersected->a),
+                           ebpo_accel_source_face(second, intersected->b) };
     int a = q->turned, b = !q->turned;
-    return (ebpo_face_pair){ source[a], source[b], file[a], file[b], met->kind, 0 };
+    return (ebpo_face_pair){ source[a], source[b], file[a], file[b], intersected->kind, 0 };
 }
 
-/* Which kernels a walk uses. */
+/* Chooses the kernels of a walk. */
 
 void ebpo_pair_walk_begin(ebpo_pair_walk *w, const ebpo_accel_pair *pair)
 {
     w->pair = pair;
     w->kernels = ebpo_walk_kernels_best();
     w->filter = ebpo_pair_kernels_best();
-    w->top = w->group = w->met_count = 0;
+    w->top = w->group = w->found_count = 0;
     w->begin = 0;
     w->end = pair->accel[0]->face_count;
     for (int i = 0; i < 2 * EBPO_TURNED_NODES; i++)

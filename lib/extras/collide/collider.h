@@ -1,4 +1,4 @@
-/* A collider, and what all queries of two models begin with. */
+/* A collider, and the common beginning of all queries of two models. */
 #ifndef EBPO_COLLIDE_COLLIDER_H
 #define EBPO_COLLIDE_COLLIDER_H
 
@@ -9,35 +9,36 @@
 #include "extras/collide/hierarchy_walk.h"
 #include "query/query_model.h"
 
-/* As ebpo_collider_new, of models that may be subsets: results are about the faces that are there.
+/* As ebpo_collider_new, for models that may be subsets: results are about the faces in the files.
  */
 EBPO_MUST_USE ebpo_status ebpo_collider_of_parts(ebpo_model *a, ebpo_model *b,
                                                  const ebpo_collider_options *options,
                                                  ebpo_collider **out, ebpo_error *error);
 
 struct ebpo_collider {
-    ebpo_model *model[2]; /* as the caller has them */
+    ebpo_model *model[2]; /* in the caller's order */
     ebpo_collider_options options;
-    ebpo_pair_walk walk;   /* of the calling thread */
-    ebpo_pair_walk *walks; /* of the threads of all pairs, between questions; NULL: none are here */
+    ebpo_pair_walk walk;   /* walk of the calling thread */
+    ebpo_pair_walk *walks; /* walks of the threads of all pairs, between queries; NULL: none are
+                            * kept */
     unsigned walk_count;
     uint64_t node_pairs, block_pairs, exact;
-    uint64_t subtree_pairs, subtrees, loads, bytes_read; /* of models in parts */
-    struct ebpo_gap_search *gap;                         /* of distances, once one has been asked */
+    uint64_t subtree_pairs, subtrees, loads, bytes_read; /* for models in parts */
+    struct ebpo_gap_search *gap;   /* state of distances, after the first such query */
     struct ebpo_face_two *nearest; /* the last nearest pair, of the caller's A and B; or NULL */
-    ebpo_context *context[2];      /* of depths, once one has been asked of that model */
-    uint32_t *slots[2];            /* by numbers in the file, once they have been asked for */
+    ebpo_context *context[2]; /* contexts of depths, after the first such query of that model */
+    uint32_t *slots[2];       /* by numbers in the file, after the first query that needs them */
 };
 
-/* A question: options checked, models in the order that swapping does not change. */
+/* A query: options checked, models in the order that swapping does not change. */
 typedef struct ebpo_collision {
     ebpo_collider *collider;
     ebpo_collide_options options;
     bool turned; /* the caller's B comes first */
     ebpo_model *model[2];
     ebpo_block_posing posing[2];
-    double reach;  /* no posed coordinate is greater */
-    uint64_t late; /* by ebpo_clock; UINT64_MAX: never */
+    double reach;  /* greatest size of posed coordinates */
+    uint64_t late; /* deadline by ebpo_clock; UINT64_MAX: none */
 } ebpo_collision;
 
 EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collider *collider,
@@ -46,47 +47,47 @@ EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collide
 
 bool ebpo_collision_is_late(const ebpo_collision *collision);
 
-/* The first contact of two accels of the question's models: the collider's walk has it as met[0]
- * and met_slot. found: as of ebpo_collide_first. */
+/* Finds the first contact of two accels of the query's models: the collider's walk has it as met[0]
+ * and found_slot. found: as of ebpo_collide_first. */
 EBPO_MUST_USE ebpo_status ebpo_collision_first(const ebpo_collision *collision,
                                                const ebpo_accel *const accel[2], const char *stage,
                                                int32_t *found, ebpo_error *error);
 
-/* That have been read of both files. */
+/* Returns the bytes that have been read of both files. */
 uint64_t ebpo_collision_bytes_read(const ebpo_collision *collision);
 
-/* A model is not all in memory. */
+/* Returns true if a model is not entirely in memory. */
 bool ebpo_collision_is_in_parts(const ebpo_collision *collision);
 
-/* The walk is zero or has been used before: its memory stays. The pair must live as long as the
- * walk is used. */
+/* Begins a walk that is zero or was used before; its memory is reused. The pair must live as long
+ * as the walk is used. */
 void ebpo_pair_walk_begin(ebpo_pair_walk *walk, const ebpo_accel_pair *pair);
 
 /* Adds a walk's counts to the collider's. */
 void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 
-/* What the caller is told of local numbers of two accels. */
+/* Converts local numbers of two accels to the pair that the caller receives. */
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *collision, const ebpo_accel *first,
-                                   const ebpo_accel *second, const ebpo_met_pair *met);
+                                   const ebpo_accel *second, const ebpo_found_pair *intersected);
 
-/* ebpo_collide_self at a pose: options have it twice. */
+/* As ebpo_collide_self, at the pose that the options have twice. */
 EBPO_MUST_USE ebpo_status ebpo_collide_self_posed(ebpo_collider *collider,
                                                   const ebpo_collide_options *options,
                                                   ebpo_pairs_fn take, void *user,
                                                   ebpo_error *error);
 
-/* What is certain of a figure. */
+/* Returns the interval lo .. hi with its kind. */
 static inline ebpo_certain ebpo_certain_of(double lo, double hi)
 {
     bool bound = lo != hi && (lo == 0 || isinf(hi));
     return (ebpo_certain){ lo, hi,
-                           lo == hi ? EBPO_FIGURE_EXACT
-                           : bound  ? EBPO_FIGURE_BOUND
-                                    : EBPO_FIGURE_INTERVAL,
+                           lo == hi ? EBPO_VALUE_EXACT
+                           : bound  ? EBPO_VALUE_BOUND
+                                    : EBPO_VALUE_INTERVAL,
                            0 };
 }
 
-/* A walk takes so many pairs before it looks at the clock. */
+/* Number of pairs that a walk takes between checks of the clock. */
 enum { EBPO_WALK_PAIRS = 1024 };
 
 #endif

@@ -1,11 +1,10 @@
-/* Where two crossing faces intersect: the ends of the common segment.
+/* Computes where two crossing faces intersect: the ends of the common segment.
  *
  * Exact signs (geometry/predicates.h) decide which edges pierce the other face, so the result has
  * the right combinatorics. The point where an edge pierces a plane is computed in double-double
- * arithmetic; where numbers are too large or too small for its bounds, exactly with GMP and
- * rounded once. Neither the order of the faces nor that of their corners changes a bit of the
- * points. Bounds: docs/develop/collision.md, "Contact of a crossing pair". Pure functions, any
- * thread. */
+ * arithmetic; where numbers are too large or too small for its bounds, exactly with GMP and rounded
+ * once. Neither the order of the faces nor that of their corners changes a bit of the points.
+ * Bounds: docs/develop/collision.md, "Contact of a crossing pair". Pure functions, any thread. */
 #include "core/strict_fp.h"
 
 #include "extras/collide/face_pairs.h"
@@ -17,7 +16,7 @@
 #include "geometry/integer_vectors.h"
 #include "geometry/triangle_pair.h"
 
-/* An edge from below to above a plane, both in the order of coordinates. */
+/* An edge from below to above a plane; edge and plane in the order of coordinates. */
 typedef struct piercing {
     const double *end[2], *plane[3];
 } piercing;
@@ -42,7 +41,8 @@ static piercing piercing_of(const double edge_of[3][3], int from, int to, const 
 
 /* --- the point, in double-double arithmetic --- */
 
-/* Of `point` over the plane, times the normal's length; returns the sum of its products' sizes. */
+/* Computes the height of `point` over the plane, times the normal's length. Returns the sum of the
+ * sizes of its products. */
 static double height_over(const ebpo_pair normal[3], const double products[3], const double *from,
                           const double *point, ebpo_pair *height)
 {
@@ -55,7 +55,8 @@ static double height_over(const ebpo_pair normal[3], const double products[3], c
     return sum;
 }
 
-/* How far along the edge: height[0] / (height[0] - height[1]). False: not certain enough. */
+/* Computes the fraction along the edge: height[0] / (height[0] - height[1]). Returns false if it is
+ * not certain enough. */
 static bool share_of_edge(const piercing *p, ebpo_pair *share)
 {
     ebpo_pair e[3], f[3], normal[3], height[2];
@@ -74,7 +75,7 @@ static bool share_of_edge(const piercing *p, ebpo_pair *share)
     return most <= 0x1p30 * fabs(both.head) && fabs(both.head) >= 0x1p-600;
 }
 
-/* False: numbers so large or small that bounds do not hold. */
+/* Returns false if numbers are so large or small that the bounds do not hold. */
 static bool is_ordinary(const piercing *p)
 {
     const double *const all[] = { p->end[0], p->end[1], p->plane[0], p->plane[1], p->plane[2] };
@@ -124,7 +125,7 @@ static void set_exact(exact_piercing *e, const piercing *p, int unit)
     }
 }
 
-/* Heights h0 and h1 have different signs: (end1 h0 - end0 h1) / (h0 - h1). */
+/* Computes the point from heights h0 and h1 of different signs: (end1 h0 - end0 h1) / (h0 - h1). */
 static void exact_point(exact_piercing *e, int unit, double out[3])
 {
     if (mpz_sgn(e->height[0]) < 0 || mpz_sgn(e->height[1]) > 0)
@@ -192,7 +193,7 @@ static void end_of(const edge *e, double out[3])
     compute_piercing(&p, out);
 }
 
-/* Of two edges that meet: one that ends there, else the lesser one. */
+/* Chooses from two intersecting edges the one that ends there, else the lesser one. */
 static const edge *choose_edge(const edge *a, const edge *b)
 {
     if (a->ends_there || b->ends_there)
@@ -203,7 +204,8 @@ static const edge *choose_edge(const edge *a, const edge *b)
     return (order != 0 ? order : ebpo_corner_order(p.end[1], q.end[1])) <= 0 ? a : b;
 }
 
-/* `order`: negative: the end is that of A's edge, positive: of B's, 0: of both. */
+/* Sets an end of the segment by `order`: negative: it is the end of A's edge, positive: of B's, 0:
+ * of both. */
 static void set_end(const edge *a, const edge *b, int order, ebpo_contact_end *out)
 {
     end_of(order < 0 ? a : order > 0 ? b : choose_edge(a, b), out->point);
@@ -218,12 +220,12 @@ void ebpo_triangle_contact(const double a[3][3], const double b[3][3], ebpo_cont
     if (!ebpo_turn_pair(a, b, &t, &kind))
         return;
     bool reversed = t.flipped_a != t.flipped_b;
-    edge of_a[2], of_b[2]; /* to corners 1 and 2 */
+    edge of_a[2], of_b[2]; /* edges to corners 1 and 2 */
     for (int i = 0; i < 2; i++) {
         of_a[i] = (edge){ a, b, t.a[0], t.a[i + 1], t.side_a[t.a[i + 1]] == 0 };
         of_b[i] = (edge){ b, a, t.b[0], t.b[i + 1], t.side_b[t.b[i + 1]] == 0 };
     }
-    /* A's interval goes from its edge to corner 2 to that to corner 1, B's the other way. */
+    /* A's interval goes from its edge to corner 2 to its edge to corner 1, B's the other way. */
     set_end(&of_a[1], &of_b[0], ebpo_compare_ends(a, b, &t, 2, 1), &out[reversed]);
     set_end(&of_a[0], &of_b[1], -ebpo_compare_ends(a, b, &t, 1, 2), &out[!reversed]);
 }

@@ -1,10 +1,10 @@
-/* Lines of contact: the segments of all crossing pairs, joined where they end at the same features
+/* Joins the segments of all crossing pairs to lines of contact where they end at the same features
  * of the same faces.
  *
- * Each end has a key: the edge or corner of the face that it is on, and the face of the other
- * model. Ends with equal keys are the same point. Corners have numbers, equal for equal
- * coordinates (face_patches.h). A line goes on where exactly one segment ends and one begins;
- * elsewhere it ends. */
+ * Each end has a key: the edge or corner of the face that contains it, and the face of the other
+ * model. Ends with equal keys are the same point. Equal corner coordinates have equal numbers
+ * (face_patches.h). A line continues where exactly one segment ends and one begins; elsewhere it
+ * ends. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -19,23 +19,23 @@
 
 #define NONE UINT32_MAX
 
-/* Which features an end is on, of each model: two corners of an edge, the lesser first; a corner
- * and NONE; NONE and a face. */
+/* The features of each model that contain an end: two corners of an edge, the lesser first; a
+ * corner and NONE; NONE and a face. */
 typedef struct end_key {
     uint32_t on[2][2];
-    uint32_t end; /* twice the segment's number, and which of its ends */
+    uint32_t end; /* twice the segment's number, plus 1 for its second end */
 } end_key;
 
 typedef struct segment {
     ebpo_contact_segment contact;
     double normal[2][3];
-    uint32_t after, before; /* segments; NONE */
-    bool told;
+    uint32_t after, before; /* neighbouring segments, or NONE */
+    bool reported;
 } segment;
 
 typedef struct lines {
     ebpo_pair_faces places;
-    uint64_t most; /* segments */
+    uint64_t most; /* most segments */
     segment *segment;
     end_key *key; /* two for each segment */
     uint64_t count, capacity, key_capacity;
@@ -45,7 +45,7 @@ typedef struct lines {
     uint64_t *faces;
     uint64_t points_capacity, normals_capacity, faces_capacity;
     bool full, no_memory;
-    ebpo_error *error; /* of `status` */
+    ebpo_error *error; /* error of `status` */
     ebpo_status status;
 } lines;
 
@@ -71,7 +71,8 @@ static void unit_normal(const double t[3][3], double out[3])
         out[k] /= length;
 }
 
-/* The feature of a face of the caller's model m, with its corners in the file, that `on` names. */
+/* Sets the feature that `on` names, of a face of the caller's model m, with its corners in the
+ * file. */
 static bool set_feature(lines *l, int m, uint64_t face, const double t[3][3], unsigned on,
                         uint32_t out[2])
 {
@@ -92,7 +93,7 @@ static bool set_feature(lines *l, int m, uint64_t face, const double t[3][3], un
     return true;
 }
 
-/* False: no memory. */
+/* Returns false without memory. */
 static bool add_segment(lines *l, const ebpo_face_pair *pair)
 {
     ebpo_posed_pair faces;
@@ -170,18 +171,19 @@ static void join_segments(lines *l)
     }
 }
 
-/* --- telling --- */
+/* --- output --- */
 
 static bool add_point(lines *l, const double at[3])
 {
-    const double x[3] = { at[0], at[1], at[2] }; /* perhaps of the array that grows */
+    const double x[3] = { at[0], at[1],
+                          at[2] }; /* copied: `at` may point into the array that grows */
     if (!ebpo_grow(&l->points, &l->points_capacity, 3 * (l->line.count + 1), sizeof *l->points))
         return false;
     memcpy(l->points + 3 * l->line.count++, x, sizeof x);
     return true;
 }
 
-/* A segment, from its beginning; its end is the next one's beginning. */
+/* Adds the first point of a segment; its end is the first point of the next one. */
 static bool add_to_line(lines *l, segment *s)
 {
     uint64_t n = l->line.count;
@@ -192,11 +194,11 @@ static bool add_to_line(lines *l, segment *s)
     l->faces[2 * n] = s->contact.face_a;
     l->faces[2 * n + 1] = s->contact.face_b;
     memcpy(l->normals + 6 * n, s->normal, sizeof s->normal);
-    s->told = true;
+    s->reported = true;
     return true;
 }
 
-/* The line that segment i is the first one of, in the order of segments. */
+/* Makes the line that begins with segment i, in the order of segments. */
 static bool make_line(lines *l, uint32_t i)
 {
     uint32_t first = i, last = NONE;
@@ -206,7 +208,7 @@ static bool make_line(lines *l, uint32_t i)
     if (l->line.closed)
         first = i;
     l->line.count = 0;
-    for (uint32_t at = first; at != NONE && !l->segment[at].told; at = l->segment[at].after) {
+    for (uint32_t at = first; at != NONE && !l->segment[at].reported; at = l->segment[at].after) {
         if (!add_to_line(l, &l->segment[at]))
             return false;
         last = at;
@@ -222,7 +224,7 @@ static bool make_line(lines *l, uint32_t i)
 static ebpo_status give_lines(lines *l, ebpo_polylines_fn take, void *user, ebpo_error *error)
 {
     for (uint64_t i = 0; i < l->count; i++) {
-        if (l->segment[i].told)
+        if (l->segment[i].reported)
             continue;
         if (!make_line(l, (uint32_t)i))
             return ebpo_fail_memory(error, l->points_capacity * sizeof *l->points);
@@ -237,8 +239,8 @@ static ebpo_status fail_lines(const lines *l, ebpo_error *error)
     if (l->no_memory)
         return ebpo_fail_memory(error, l->capacity * sizeof *l->segment);
     return ebpo_fail(error, EBPO_E_LIMIT,
-                     "lines of contact: more than %llu segments, for which the collider's memory "
-                     "has room: give it more",
+                     "lines of contact: the collider's memory is too small for more than %llu "
+                     "segments; give it more",
                      (unsigned long long)l->most);
 }
 
@@ -254,12 +256,12 @@ static void free_lines(lines *l)
     free(l->faces);
 }
 
-enum { SEGMENT_BYTES = 256, SEGMENTS_MOST = 1 << 30 };
+enum { SEGMENT_BYTES = 256, SEGMENTS_MAX = 1 << 30 };
 
-uint64_t ebpo_contact_lines_most(const ebpo_collider *c)
+uint64_t ebpo_contact_lines_max(const ebpo_collider *c)
 {
     uint64_t most = c->options.memory / SEGMENT_BYTES;
-    return most < SEGMENTS_MOST ? most : SEGMENTS_MOST;
+    return most < SEGMENTS_MAX ? most : SEGMENTS_MAX;
 }
 
 ebpo_status ebpo_collide_polylines(ebpo_collider *c, const ebpo_collide_options *options,
@@ -267,7 +269,7 @@ ebpo_status ebpo_collide_polylines(ebpo_collider *c, const ebpo_collide_options 
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    lines l = { .error = error, .most = ebpo_contact_lines_most(c) };
+    lines l = { .error = error, .most = ebpo_contact_lines_max(c) };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&l.places, &q, error);

@@ -1,10 +1,10 @@
-/* Patches of faces: the connected components of a mesh, over corners with equal coordinates or
- * over edges that two faces share. Faces are joined with a disjoint-set forest whose roots are the
- * first faces of their patches. Corners are numbered by a hash table: equal coordinates, equal
- * numbers (0 and -0 are equal).
+/* Finds patches of faces: the connected components of a mesh, over corners with equal coordinates
+ * or over edges that two faces share. Faces are joined with a disjoint-set forest whose roots are
+ * the first faces of their patches. A hash table numbers corners: equal coordinates, equal numbers
+ * (0 and -0 are equal).
  *
- * Faces that intersect no face of the other model lie with their whole patch on one side of it;
- * the relation of two models and exact volumes of results rest on that. */
+ * A patch whose faces intersect no face of the other model lies entirely on one side of it. The
+ * relation of two models and exact volumes of results rely on that. */
 #include "core/strict_fp.h"
 
 #include <stdint.h>
@@ -19,7 +19,8 @@
 
 /* --- joined faces --- */
 
-/* Of the faces joined so far; paths get shorter. At first first[face] = face. */
+/* Returns the first face that is joined with `face` so far, and shortens paths. At first
+ * first[face] = face. */
 static inline uint32_t first_joined(uint32_t *first, uint32_t face)
 {
     while (first[face] != face) {
@@ -52,7 +53,7 @@ static bool same_corner(const double p[3], const double q[3])
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* Where the corner is in the table, or a free place. */
+/* Returns the corner's entry of the table, or a free one. */
 static uint32_t *find_corner(const ebpo_corner_ids *ids, const double x[3])
 {
     uint64_t i = hash_of(x) & (ids->table_size - 1);
@@ -100,7 +101,7 @@ void ebpo_corner_ids_free(ebpo_corner_ids *ids)
 
 typedef struct joining {
     ebpo_corner_ids corners;
-    uint32_t *user; /* of each corner: a face that has it */
+    uint32_t *user; /* for each corner: a face that has it */
     uint64_t users;
 } joining;
 
@@ -121,10 +122,10 @@ static bool join_face(joining *j, uint32_t *patch, uint32_t face, const double t
 }
 
 ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
-                              const uint64_t *left_out, uint32_t **out, ebpo_error *error)
+                              const uint64_t *omitted, uint32_t **out, ebpo_error *error)
 {
     joining j = { 0 };
-    uint32_t count = subtree->face_count - subtree->outer_count;
+    uint32_t count = subtree->face_count - subtree->shared_count;
     uint32_t *patch = ebpo_alloc(count, sizeof *patch);
     bool fine = patch != NULL;
     for (uint32_t f = 0; f < count && fine; f++)
@@ -132,9 +133,9 @@ ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
     for (uint32_t f = 0; f < count && fine; f++) {
         double t[3][3];
         uint64_t number = subtree->first_face + f;
-        if (left_out[number / 64] >> number % 64 & 1)
+        if (omitted[number / 64] >> number % 64 & 1)
             continue;
-        ebpo_accel_triangle(subtree, slots[subtree->outer_count + f], t);
+        ebpo_accel_triangle(subtree, slots[subtree->shared_count + f], t);
         fine = join_face(&j, patch, f, (const double(*)[3])t);
     }
     for (uint32_t f = 0; f < count && fine; f++)
@@ -158,9 +159,9 @@ ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
 
 typedef struct edges {
     const ebpo_accel *whole;
-    uint32_t (*corner)[3]; /* of each face; NO_CORNER: it has no area */
-    uint64_t *end;         /* of each corner's list: it begins where that of the one before ends */
-    uint64_t *edge;        /* other corner << 32 | face */
+    uint32_t (*corner)[3]; /* corners of each face; NO_CORNER: the face has no area */
+    uint64_t *end;  /* end of each corner's list, which begins at the end of the list before */
+    uint64_t *edge; /* other corner << 32 | face */
     uint32_t *patch;
 } edges;
 
@@ -180,7 +181,7 @@ static bool number_corners(edges *e, ebpo_corner_ids *ids, const uint32_t *slots
     return true;
 }
 
-/* Edge i of a face: its lesser corner and the other one. False: the face has no area. */
+/* Sets the lesser and the other corner of edge i. Returns false if the face has no area. */
 static bool edge_of(const edges *e, uint32_t f, int i, uint32_t *lesser, uint32_t *other)
 {
     uint32_t a = e->corner[f][i], b = e->corner[f][i == 2 ? 0 : i + 1];
@@ -189,7 +190,7 @@ static bool edge_of(const edges *e, uint32_t f, int i, uint32_t *lesser, uint32_
     return e->corner[f][0] != NO_CORNER;
 }
 
-/* Counts first, then fills lists from their ends. */
+/* Counts the entries, then fills the lists from their ends. */
 static void list_edges(edges *e, uint64_t corners)
 {
     uint32_t at, other;

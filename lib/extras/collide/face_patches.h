@@ -1,4 +1,4 @@
-/* Patches of connected faces, and the numbers of corners by which they are found. */
+/* Patches of connected faces, and numbers of corners, which find them. */
 #ifndef EBPO_COLLIDE_FACE_PATCHES_H
 #define EBPO_COLLIDE_FACE_PATCHES_H
 
@@ -8,29 +8,29 @@
 #include "geometry/pose.h"
 #include "query/accel.h"
 
-/* Numbers of corners: equal coordinates, equal numbers (0 and -0 are equal). Zero at first. */
+/* Numbers of corners: equal coordinates have equal numbers (0 and -0 are equal). Zero at first. */
 typedef struct ebpo_corner_ids {
     double (*at)[3]; /* [count] */
     uint64_t count, capacity;
-    uint32_t *table; /* open addressing: number and 1, 0: free */
+    uint32_t *table; /* open addressing: number + 1; 0: free */
     uint64_t table_size;
 } ebpo_corner_ids;
 
-/* False: no memory, or 2^32 - 2 corners. */
+/* Finds or adds a corner. Returns false without memory or with 2^32 - 2 corners. */
 bool ebpo_corner_id(ebpo_corner_ids *ids, const double x[3], uint32_t *id);
 void ebpo_corner_ids_free(ebpo_corner_ids *ids);
 
-/* For each own face of a subtree, by its number in the file less first_face, the first face of its
- * patch: those that are connected to it by corners (equal coordinates) of own faces that are not
- * left out (a bit for each face of the file). One that is left out is alone. The caller frees it.
- */
+/* Finds for each owned face of a subtree, by its number in the file less first_face, the first face
+ * of its patch: the faces connected to it by corners (equal coordinates) of owned faces that are
+ * not omitted (a bit for each face of the file). An omitted face is alone. The caller frees the
+ * result. */
 EBPO_MUST_USE ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
-                                            const uint64_t *left_out, uint32_t **out,
+                                            const uint64_t *omitted, uint32_t **out,
                                             ebpo_error *error);
 
-/* For each face of a whole model at a pose, by its number in the file, the first face of its patch:
- * those that are connected to it over edges (equal posed corners) that two faces with an area have,
- * no more and no less. One without area is alone. The caller frees it. */
+/* Finds for each face of a whole model at a pose, by its number in the file, the first face of its
+ * patch: the faces connected to it over edges (equal posed corners) that exactly two faces with an
+ * area share. A face without area is alone. The caller frees the result. */
 EBPO_MUST_USE ebpo_status ebpo_edge_patches(const ebpo_accel *whole, const uint32_t *slots,
                                             const ebpo_posing *posing, uint32_t **out,
                                             ebpo_error *error);

@@ -1,4 +1,4 @@
-/* The pieces of a face that other faces cut: a point of each piece, exact.
+/* Finds the pieces of a face that other faces cut: an exact point of each piece.
  *
  * Other faces cut the face in segments in its plane, seen along the axis of the largest component
  * of its normal: p and q are the two other coordinates. Coordinates are GMP fractions. Values of p
@@ -17,9 +17,9 @@
 #include "extras/collide/face_pieces.h"
 #include "geometry/predicates.h"
 
-/* --- arrays of fractions: made once, used again --- */
+/* --- arrays of fractions: made once, then reused --- */
 
-static bool room_for_cut(ebpo_face_cuts *f)
+static bool capacity_for_cut(ebpo_face_cuts *f)
 {
     if (!ebpo_grow(&f->cut, &f->cut_capacity, f->cuts + 1, sizeof *f->cut))
         return false;
@@ -30,7 +30,7 @@ static bool room_for_cut(ebpo_face_cuts *f)
     return true;
 }
 
-/* Adds a value of p, or a point (p, q); without memory the face says so. */
+/* Adds a value of p, or a point (p, q); without memory, records it in the face. */
 static void add_event(ebpo_face_cuts *f, const mpq_t p)
 {
     if (!ebpo_grow(&f->event, &f->event_capacity, f->events + 1, sizeof *f->event)) {
@@ -58,7 +58,7 @@ static void add_vertex(ebpo_face_cuts *f, const mpq_t p, const mpq_t q)
 
 /* --- the face --- */
 
-/* Along the axis on which the normal is longest, as far as doubles tell, and not 0. */
+/* Chooses an axis on which the normal is not 0 and, as far as doubles show, longest. */
 static void choose_view(ebpo_face_cuts *f)
 {
     double most = -1;
@@ -107,7 +107,7 @@ static void set_plane(ebpo_face_cuts *f)
     }
 }
 
-/* The cut's ends are in cut[cuts]: turns it, and adds it. */
+/* Orients and adds the cut whose ends are in cut[cuts]. */
 static void finish_cut(ebpo_face_cuts *f)
 {
     ebpo_face_cut *c = &f->cut[f->cuts];
@@ -142,7 +142,7 @@ static void set_end(ebpo_face_cuts *f, int end, const double x[3])
 static void cut_along_edges(ebpo_face_cuts *f, const double t[3][3])
 {
     for (int i = 0; i < 3; i++) {
-        if (!room_for_cut(f)) {
+        if (!capacity_for_cut(f)) {
             f->no_memory = true;
             return;
         }
@@ -179,7 +179,7 @@ static int side_in_view(const ebpo_face_cuts *f, int i, const double x[3])
                                    (double[]){ x[f->u], x[f->v] });
 }
 
-/* All of it lies beyond an edge of the face, or on the edge. */
+/* Returns true if all of t lies beyond an edge of the face or on the edge. */
 static bool beyond_an_edge(const ebpo_face_cuts *f, const double t[3][3])
 {
     for (int i = 0; i < 3; i++)
@@ -189,7 +189,8 @@ static bool beyond_an_edge(const ebpo_face_cuts *f, const double t[3][3])
     return false;
 }
 
-/* Where the edge from a to b, on both sides of the plane, goes through it. */
+/* Sets a cut's end to the point where the edge from a to b, which has ends on both sides of the
+ * plane, pierces it. */
 static void set_piercing(ebpo_face_cuts *f, int end, const double a[3], const double b[3])
 {
     mpq_t *s = f->scratch;
@@ -203,7 +204,7 @@ static void set_piercing(ebpo_face_cuts *f, int end, const double a[3], const do
         }
     }
     mpq_sub(s[1], s[0], s[1]);
-    mpq_div(s[0], s[0], s[1]); /* the share of the edge */
+    mpq_div(s[0], s[0], s[1]); /* the fraction of the edge */
     for (int i = 0; i < 2; i++) {
         int k = i == 0 ? f->u : f->v;
         difference_of(s[2], s[4], b[k], a[k]);
@@ -259,13 +260,13 @@ void ebpo_face_cuts_add(ebpo_face_cuts *f, const double t[3][3], int model)
         add_flat(f, t, model);
         return;
     }
-    if (room_for_cut(f))
+    if (capacity_for_cut(f))
         cut_across(f, t, side);
     else
         f->no_memory = true;
 }
 
-/* Sign of the turn from a to b to the point. */
+/* Returns the sign of the turn from a to b to the point. */
 static int side_of_edge(ebpo_face_cuts *f, const double a[3], const double b[3], const mpq_t p,
                         const mpq_t q)
 {
@@ -347,7 +348,7 @@ static bool cut_reaches(const ebpo_face_cut *c, const mpq_t p)
     return mpq_cmp(c->p[0], p) <= 0 && mpq_cmp(c->p[1], p) >= 0;
 }
 
-/* Both are not upright. */
+/* Adds the crossing of two cuts that are not vertical. */
 static void cross_two(ebpo_face_cuts *f, const ebpo_face_cut *a, const ebpo_face_cut *b)
 {
     mpq_t *s = f->scratch;
@@ -367,7 +368,7 @@ static void cross_two(ebpo_face_cuts *f, const ebpo_face_cut *a, const ebpo_face
     add_vertex(f, s[1], s[2]);
 }
 
-/* Its p is an event already. */
+/* Adds the crossing with a vertical cut; its p is already an event. */
 static void cross_upright(ebpo_face_cuts *f, const ebpo_face_cut *upright, const ebpo_face_cut *c)
 {
     if (!f->all_cuts || is_upright(c) || !cut_reaches(c, upright->p[0]))
@@ -404,7 +405,7 @@ static void find_events(ebpo_face_cuts *f)
 
 /* --- strips --- */
 
-/* A fraction between both, with few bits where a double is. */
+/* Computes a fraction between both, with few bits where a double is between them. */
 static void fraction_between(const mpq_t low, const mpq_t high, mpq_t out)
 {
     double middle = mpq_get_d(low) / 2 + mpq_get_d(high) / 2;
@@ -422,7 +423,7 @@ static mpq_t *value_at(const ebpo_face_cuts *f, uint32_t cut, int where)
     return &f->value[3 * (uint64_t)cut + (unsigned)where];
 }
 
-static bool room_for_values(ebpo_face_cuts *f)
+static bool capacity_for_values(ebpo_face_cuts *f)
 {
     if (!ebpo_grow(&f->value, &f->value_capacity, 3 * f->cuts, sizeof *f->value) ||
         !ebpo_grow(&f->order, &f->order_capacity, f->cuts, sizeof *f->order))
@@ -438,7 +439,7 @@ static bool room_for_values(ebpo_face_cuts *f)
     return true;
 }
 
-/* Cuts that go through the strip between two events within the face, in the order of q in the
+/* Collects the cuts through the strip between two events within the face, in the order of q in the
  * middle. */
 static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
 {
@@ -461,7 +462,7 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
             low = low < 0 ? (int)i : low;
             high = (int)i;
         }
-    /* an edge of the face may stand after an equal cut: nothing is between them */
+    /* an edge of the face may follow an equal cut: nothing is between them */
     for (uint64_t i = (uint64_t)(low < 0 ? 0 : low); low >= 0 && i <= (uint64_t)high; i++) {
         f->order[kept++] = f->order[i];
         at_p(&f->cut[f->order[kept - 1]], p[LEFT], *value_at(f, f->order[kept - 1], LEFT));
@@ -470,7 +471,8 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
     return kept;
 }
 
-/* A part of the strip before has an open interval of the border in common with this one. */
+/* Returns true if a part of the strip before shares an open interval of the border with this one.
+ */
 static bool goes_on(const ebpo_face_cuts *f, int before, const mpq_t low, const mpq_t high)
 {
     for (uint64_t i = 0; i < f->ends[before]; i++) {
@@ -489,7 +491,7 @@ static bool upright_at(const ebpo_face_cuts *f, const mpq_t p)
     return false;
 }
 
-/* x in the plane at p, q. */
+/* Computes x in the plane at p, q. */
 static void point_at(ebpo_face_cuts *f, const mpq_t p, const mpq_t q, mpq_t x[3])
 {
     mpq_set(x[f->u], p);
@@ -527,7 +529,7 @@ typedef struct strip_scratch {
     mpq_t p[3], q, x[3];
 } strip_scratch;
 
-/* The target is on the border of the part between two cuts. */
+/* Returns true if the target is on the border of the part between two cuts. */
 static bool is_at_target(const ebpo_face_cuts *f, const mpq_t p[3], uint32_t low, uint32_t high)
 {
     for (int where = LEFT; f->has_target && where <= RIGHT; where += RIGHT)
@@ -542,7 +544,7 @@ static ebpo_status visit_strip(ebpo_face_cuts *f, strip_scratch *s, int now, ebp
                                void *user, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    bool wall = upright_at(f, s->p[LEFT]);
+    bool cell_face = upright_at(f, s->p[LEFT]);
     uint64_t n = cuts_of_strip(f, (const mpq_t *)s->p);
     f->ends[now] = 0;
     for (uint64_t i = 0; i + 1 < n && status == EBPO_OK; i++) {
@@ -552,7 +554,7 @@ static ebpo_status visit_strip(ebpo_face_cuts *f, strip_scratch *s, int now, ebp
         ebpo_piece_end *e = &f->end[now][f->ends[now]++];
         mpq_set(e->low, *value_at(f, low, RIGHT));
         mpq_set(e->high, *value_at(f, high, RIGHT));
-        if (!wall && !f->all_cuts &&
+        if (!cell_face && !f->all_cuts &&
             goes_on(f, !now, *value_at(f, low, LEFT), *value_at(f, high, LEFT)))
             continue;
         fraction_between(*value_at(f, low, MIDDLE), *value_at(f, high, MIDDLE), s->q);
@@ -569,7 +571,7 @@ ebpo_status ebpo_face_pieces_visit(ebpo_face_cuts *f, ebpo_piece_fn visit, void 
     ebpo_status status = EBPO_OK;
     if (!f->no_memory)
         find_events(f);
-    if (f->no_memory || !room_for_values(f))
+    if (f->no_memory || !capacity_for_values(f))
         return ebpo_fail_memory(error, f->cuts * sizeof *f->cut);
     mpq_inits(s.p[0], s.p[1], s.p[2], s.q, s.x[0], s.x[1], s.x[2], NULL);
     f->ends[0] = f->ends[1] = 0;

@@ -1,13 +1,12 @@
-/* The walk through pairs of nodes of two hierarchies for the distance of two models, eight
- * children at a time, in floats. It is compiled for several instruction sets with the same
- * results.
+/* Walks through pairs of nodes of two hierarchies for the distance of two models, eight children at
+ * a time, in floats. It is compiled for several instruction sets with the same results.
  *
- * Gaps of boxes and slabs bound the distance of two nodes from below, and so do gaps along the
- * direction of the best pair. Until a limit is known the walk goes in depth; then a heap gives the
+ * Gaps of boxes, of bounding cylinders and along the direction of the best pair bound the distance
+ * of two nodes from below. Until a limit is known the walk is depth-first; then a heap gives the
  * smallest bound first. Pairs of blocks give pairs of faces with the bounds that a nearest pair of
- * points proves. Nothing that is dropped is nearer than the limit; what remains is decided in
- * collide_distance.c. Bounds: docs/develop/collision.md, "Bounds of pairs of nodes" and "Distance
- * of two faces". */
+ * points proves. No dropped pair is nearer than the limit; collide_distance.c decides the remaining
+ * ones. Bounds: docs/develop/collision.md, "Bounds of pairs of nodes" and "Distance of two faces".
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -38,7 +37,7 @@ EBPO_EIGHT place8 place_minus8(const place8 *a, const place8 *b)
         out.x[k] = f8_sub(a->x[k], b->x[k]);
     return out;
 }
-/* a + t b */
+/* Returns a + t b. */
 EBPO_EIGHT place8 place_along8(const place8 *a, f8 t, const place8 *b)
 {
     place8 out;
@@ -53,10 +52,10 @@ EBPO_EIGHT place8 place_cross8(const place8 *a, const place8 *b)
                        minor_of8(a->x[2], a->x[0], b->x[2], b->x[0]),
                        minor_of8(a->x[0], a->x[1], b->x[0], b->x[1]) } };
 }
-/* What is no number becomes 0. */
+/* Limits t to 0 .. 1; NaN becomes 0. */
 EBPO_EIGHT f8 within_unit8(f8 t) { return f8_min(f8_max(t, f8_all(0)), f8_all(1)); }
 
-/* The best pair of points so far: from A's to B's. */
+/* The best pair of points so far: the vector from A's to B's. */
 typedef struct nearest8 {
     f8 square;
     place8 way;
@@ -70,7 +69,7 @@ EBPO_EIGHT void offer_nearest8(nearest8 *n, const place8 *way, f8 square)
         n->way.x[k] = f8_pick(better, way->x[k], n->way.x[k]);
 }
 
-/* Edges with their squared lengths, and these inverted. */
+/* Edges with their squared lengths and the reciprocals. */
 typedef struct edges8 {
     place8 edge[3];
     f8 square[3], inverse[3];
@@ -103,7 +102,7 @@ EBPO_EIGHT void offer_edges8(nearest8 *n, const place8 *p, const edges8 *a, int 
     offer_nearest8(n, &way, place_dot8(&way, &way));
 }
 
-/* Corners that lie over the inner part of the face. sign: 1 when the corners are A's. */
+/* Offers the corners that lie over the inner part of the face. sign: 1 when the corners are A's. */
 EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 *of,
                                const triangle8 *corners, float sign)
 {
@@ -126,7 +125,8 @@ EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 
     }
 }
 
-/* No coordinate is greater than `size`, or farther than `error` from what it stands for. */
+/* Bounds eight distances. No coordinate is greater than `size`, or farther than `error` from its
+ * exact value. */
 EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float size, float error,
                                  f8 *low, f8 *high, place8 *way)
 {
@@ -152,7 +152,7 @@ EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float s
 
 /* --- nodes --- */
 
-/* Centres and half sides, decoded, and as boxes around them in the other frame. */
+/* Decodes centres and half sides, and the boxes around them in the other frame. */
 EBPO_EIGHT void node_boxes(ebpo_gap_node *out, const ebpo_bound *b, const ebpo_turned_frame *f)
 {
     f8 centre[3], half[3];
@@ -170,7 +170,7 @@ EBPO_EIGHT void node_boxes(ebpo_gap_node *out, const ebpo_bound *b, const ebpo_t
     }
 }
 
-/* An axis that is none says nothing: the slab is as thick as all there is. */
+/* Decodes bounding cylinders. One without an axis gives no bound: it is as thick as everything. */
 EBPO_EIGHT void node_slabs(ebpo_gap_node *out, const ebpo_bound_slab *b, const ebpo_turned_frame *f,
                            float slack)
 {
@@ -201,7 +201,7 @@ EBPO_EIGHT f8 sine_of8(f8 cosine)
     return f8_sqrt(f8_max(f8_sub(f8_all(1 + 0x1p-18f), f8_mul(cosine, cosine)), f8_all(0)));
 }
 
-/* How far the children reach along the search's direction. */
+/* Computes how far the children extend along the search's direction. */
 EBPO_EIGHT void node_reach(ebpo_gap_node *out, const float along[3])
 {
     f8 boxes = f8_all(0), slabs = f8_all(0), cosine = f8_all(0);
@@ -237,8 +237,8 @@ static const ebpo_gap_node *take_node(ebpo_gap_search *g, int side, uint32_t nod
 
 /* --- pairs of nodes --- */
 
-/* Gaps of eight boxes to the one in lane j of the other node, along the axes of one of the frames
- * (f: 0 that of the eight): the sum of their squares; *most: the greatest. */
+/* Returns the sum of the squared gaps of eight boxes to the one in lane j of the other node, along
+ * the axes of one of the frames (f: 0 the frame of the eight); *most: the greatest gap. */
 EBPO_EIGHT f8 box_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j, int f, f8 slack,
                         f8 *most)
 {
@@ -255,7 +255,7 @@ EBPO_EIGHT f8 box_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j, i
     return sum;
 }
 
-/* The greater of the gaps along both slabs' axes. */
+/* Returns the greater of the gaps along both cylinders' axes. */
 EBPO_EIGHT f8 slab_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j)
 {
     f8 dot = f8_all(0), by_p = dot, by_q = dot, box_p = dot, box_q = dot, size_p = dot,
@@ -287,7 +287,8 @@ EBPO_EIGHT f8 slab_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j)
     return f8_max3(far_p, far_q, none);
 }
 
-/* Squared lower bounds of eight children's distances to one; where boxes meet, less than 0. */
+/* Returns squared lower bounds of eight children's distances to one; negative where boxes
+ * intersect. */
 EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const ebpo_gap_node *q,
                         int j)
 {
@@ -303,9 +304,9 @@ EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const 
     return f8_pick(f8_less(zero, square), square, f8_min(most, zero));
 }
 
-/* --- what is to be visited --- */
+/* --- pairs to be visited --- */
 
-/* What comes next if nothing nearer turns up. */
+/* Prefetches the pair that comes next unless a nearer one is found. */
 EBPO_EIGHT void fetch_next(const ebpo_gap_search *g)
 {
     if (g->count == 0)
@@ -315,7 +316,7 @@ EBPO_EIGHT void fetch_next(const ebpo_gap_search *g)
         fetch_below(g->accel[i], below_child(g->accel[i], v->child[i]), true);
 }
 
-/* Before the heap: the least key on top of what has come since `base`. */
+/* Before the heap: puts the least key on top of the pairs added since `base`. */
 EBPO_EIGHT void push_visit(ebpo_gap_search *g, uint64_t base, ebpo_gap_visit v)
 {
     uint64_t at = g->count++;
@@ -328,7 +329,7 @@ EBPO_EIGHT void push_visit(ebpo_gap_search *g, uint64_t base, ebpo_gap_visit v)
     g->stack[at] = v;
 }
 
-/* Puts v at the place `at`, or below it. */
+/* Puts v at `at` or below it. */
 static void sift_down(ebpo_gap_search *g, uint64_t at, ebpo_gap_visit v)
 {
     for (uint64_t next; (next = 2 * at + 1) < g->count; at = next) {
@@ -340,7 +341,8 @@ static void sift_down(ebpo_gap_search *g, uint64_t at, ebpo_gap_visit v)
     g->stack[at] = v;
 }
 
-/* From now on the least key comes first: nothing is visited that a perfect start would not. */
+/* Makes the heap: from now on the least key comes first, so nothing is visited that a perfect start
+ * would skip. */
 static void make_heap(ebpo_gap_search *g)
 {
     uint64_t kept = 0;
@@ -363,7 +365,7 @@ EBPO_EIGHT ebpo_gap_visit pop_visit(ebpo_gap_search *g)
     return out;
 }
 
-/* Eight children of `p`, of a side, with child j of q, of the other one. */
+/* Pushes eight children of `p`, on one side, with child j of q, on the other. */
 EBPO_EIGHT void push_eight(ebpo_gap_search *g, uint64_t base, int side, const ebpo_gap_node *p,
                            const ebpo_gap_node *q, int j)
 {
@@ -389,7 +391,7 @@ static void push_both(ebpo_gap_search *g, uint32_t node_a, uint32_t node_b)
         push_eight(g, base, 0, p, q, j);
 }
 
-/* The children of `node`, of a side, with a child of the other one as it is. */
+/* Pushes the children of `node`, on one side, with an undivided child of the other. */
 static void push_side(ebpo_gap_search *g, int side, uint32_t node, uint32_t other)
 {
     const ebpo_gap_node *p = take_node(g, side, node), *q = take_node(g, 1 - side, other / 8);
@@ -403,7 +405,7 @@ typedef struct near_lanes {
     unsigned count;
 } near_lanes;
 
-/* Pairs of faces whose boxes are not farther than the limit, nor themselves along the direction. */
+/* Finds pairs of faces that are within the limit, both by boxes and along the direction. */
 EBPO_EIGHT void near_by_boxes(const ebpo_gap_search *g, const ebpo_posed_faces *a,
                               const ebpo_posed_faces *b, const float shift[3], float error,
                               near_lanes *out)
@@ -463,7 +465,7 @@ EBPO_EIGHT triangle8 load_faces8(const ebpo_posed_faces *f, const int32_t *lane,
     return out;
 }
 
-/* A nearer pair than all before: its direction is that of the search from now on. */
+/* Takes a pair nearer than all before: its direction is the search's from now on. */
 EBPO_EIGHT void take_nearer(ebpo_gap_search *g, f8 high, const place8 *way, unsigned used,
                             const uint32_t block[2], const near_lanes *near, unsigned at)
 {
@@ -485,7 +487,8 @@ EBPO_EIGHT void take_nearer(ebpo_gap_search *g, f8 high, const place8 *way, unsi
     ebpo_gap_set_way(g, (const float[3]){ ways[0][best], ways[1][best], ways[2][best] });
 }
 
-/* Lets those wait that may be near enough; true: one of them may meet. */
+/* Adds the pairs that may be near enough to the waiting ones. Returns true if one of them may
+ * intersect. */
 EBPO_EIGHT bool let_wait(ebpo_gap_search *g, f8 low, unsigned used, const uint32_t block[2],
                          const near_lanes *near, unsigned at)
 {
@@ -506,7 +509,7 @@ EBPO_EIGHT bool let_wait(ebpo_gap_search *g, f8 low, unsigned used, const uint32
     return meets;
 }
 
-/* False: enough. */
+/* Returns false when enough is known. */
 static bool block_pair(ebpo_gap_search *g, const uint32_t block[2])
 {
     const ebpo_posed_faces *a = posed_faces_of(g->faces[0], g->accel[0], &g->posing[0], block[0]),
@@ -522,7 +525,7 @@ static bool block_pair(ebpo_gap_search *g, const uint32_t block[2])
     near_by_boxes(g, a, b, shift, error + 0x1p-22f * size, &near);
     g->block_pairs++;
     bool meets = false;
-    if (near.count && !ebpo_gap_wait_room(g))
+    if (near.count && !ebpo_gap_wait_capacity(g))
         return false;
     for (unsigned at = 0; at < near.count; at += 8) {
         triangle8 p = load_faces8(a, near.lane[0] + at, none),
@@ -539,7 +542,7 @@ static bool block_pair(ebpo_gap_search *g, const uint32_t block[2])
 
 /* --- the walk --- */
 
-/* Of a key that is older than the direction. */
+/* Rechecks a key that is older than the direction. */
 static bool far_along(ebpo_gap_search *g, const ebpo_gap_visit *v)
 {
     if (v->way == g->way_number)
@@ -550,14 +553,14 @@ static bool far_along(ebpo_gap_search *g, const ebpo_gap_visit *v)
     return gap > 0 && gap * gap > g->square;
 }
 
-/* The sum of a box's half sides: the larger one is divided. */
+/* Returns the sum of a box's half sides: the larger box is divided. */
 static float child_size(ebpo_gap_search *g, int side, uint32_t child)
 {
     const ebpo_gap_node *n = take_node(g, side, child / 8);
     return (n->half[0][0][child % 8] + n->half[0][1][child % 8]) + n->half[0][2][child % 8];
 }
 
-/* Pushes what is below; false: enough. */
+/* Pushes the pairs below; returns false when enough is known. */
 static bool visit_pair(ebpo_gap_search *g, const ebpo_gap_visit *v)
 {
     uint32_t child[2];
@@ -570,7 +573,7 @@ static bool visit_pair(ebpo_gap_search *g, const ebpo_gap_visit *v)
         return block_pair(g, (const uint32_t[2]){ child[0] & ~EBPO_IS_BLOCK,
                                                   child[1] & ~EBPO_IS_BLOCK });
     g->node_pairs++;
-    if (!ebpo_gap_room(g) || (g->node_pairs % 256 == 0 && !g->go_on(g)))
+    if (!ebpo_gap_capacity(g) || (g->node_pairs % 256 == 0 && !g->go_on(g)))
         return false;
     if (block[0])
         push_side(g, 1, child[1], v->child[0]);
@@ -585,7 +588,7 @@ static bool visit_pair(ebpo_gap_search *g, const ebpo_gap_visit *v)
 
 static void walk_gaps(ebpo_gap_search *g)
 {
-    if (!ebpo_gap_room(g))
+    if (!ebpo_gap_capacity(g))
         return;
     push_both(g, g->accel[0]->top, g->accel[1]->top);
     while (g->count > 0) {
@@ -597,7 +600,7 @@ static void walk_gaps(ebpo_gap_search *g)
         fetch_next(g);
         if (far_along(g, &v) || visit_pair(g, &v))
             continue;
-        g->stack[g->count++] = v; /* it has been looked at in part, or not at all */
+        g->stack[g->count++] = v; /* the pair was visited only in part, or not at all */
         g->ended = true;
         return;
     }

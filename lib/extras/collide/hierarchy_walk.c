@@ -1,10 +1,10 @@
-/* The states of the two walks through the hierarchies of two models, and what the kernels of these
- * walks call: pair_walk_kernels.c looks for faces that intersect, gap_walk_kernels.c for the
- * nearest ones. Each state has a stack of pairs of nodes and keeps the nodes and blocks that it
- * has turned last. One thread each.
+/* States of the two walks through the hierarchies of two models, and functions that the kernels of
+ * these walks call: pair_walk_kernels.c searches for faces that intersect, gap_walk_kernels.c for
+ * the nearest ones. Each state has a stack of pairs of nodes and keeps the last nodes and blocks
+ * that it has transformed. One thread each.
  *
- * Pairs of faces that the float filter cannot decide are decided here exactly. When both models
- * are one mesh, the corner or edge that neighbouring faces share is no contact. */
+ * Pairs of faces that the float filter cannot decide are decided here exactly. When both models are
+ * one mesh, the corner or edge that neighbouring faces share is no contact. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -23,13 +23,13 @@
 void ebpo_pair_walk_free(ebpo_pair_walk *w)
 {
     free(w->stack);
-    free(w->met);
+    free(w->intersected);
     w->stack = NULL;
-    w->met = NULL;
-    w->capacity = w->met_capacity = 0;
+    w->intersected = NULL;
+    w->capacity = w->found_capacity = 0;
 }
 
-bool ebpo_pair_walk_room(ebpo_pair_walk *w, uint64_t more)
+bool ebpo_pair_walk_capacity(ebpo_pair_walk *w, uint64_t more)
 {
     return w->top + more <= w->capacity ||
            ebpo_grow(&w->stack, &w->capacity, w->top + more, sizeof *w->stack);
@@ -44,7 +44,7 @@ void ebpo_posed_triangle(const ebpo_accel *accel, const ebpo_posing *posing, uin
         ebpo_posing_apply(posing, t[i], out[i]);
 }
 
-/* The edge against corner i, as a face without area. */
+/* Makes the edge opposite corner i, as a face without area. */
 static void edge_opposite(const double a[3][3], int i, double out[3][3])
 {
     memcpy(out[0], a[(i + 1) % 3], sizeof out[0]);
@@ -52,24 +52,24 @@ static void edge_opposite(const double a[3][3], int i, double out[3][3])
     memcpy(out[2], out[1], sizeof out[2]);
 }
 
-static bool edge_meets(const double a[3][3], int i, const double b[3][3])
+static bool edge_intersects(const double a[3][3], int i, const double b[3][3])
 {
     double edge[3][3];
     edge_opposite(a, i, edge);
     return ebpo_triangle_pair((const double(*)[3])edge, b) != EBPO_PAIR_APART;
 }
 
-/* Two convex sets with one corner in common have more if, going from there to another common point
- * and on, one comes to an edge against that corner while still in the other face. */
+/* Two convex sets have one common corner. They have another common point only if a ray from the
+ * corner reaches the opposite edge of one face while still in the other face. */
 static ebpo_pair_kind one_corner(const double a[3][3], int i, const double b[3][3], int k)
 {
     ebpo_pair_kind kind = ebpo_triangle_pair(a, b);
-    if (kind == EBPO_PAIR_TOUCHING && !edge_meets(a, i, b) && !edge_meets(b, k, a))
+    if (kind == EBPO_PAIR_TOUCHING && !edge_intersects(a, i, b) && !edge_intersects(b, k, a))
         return EBPO_PAIR_APART;
     return kind;
 }
 
-/* With an edge in common, planes that differ have no other point. */
+/* With a common edge, faces in different planes have no other common point. */
 static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3])
 {
     for (int k = 0; k < 3; k++)
@@ -78,8 +78,8 @@ static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3])
     return ebpo_triangle_pair(a, b) == EBPO_PAIR_COPLANAR ? EBPO_PAIR_COPLANAR : EBPO_PAIR_APART;
 }
 
-/* As ebpo_triangle_pair, but EBPO_PAIR_APART where the common points are the corner, or the edge
- * between corners, that both faces have (equal coordinates). Swapping changes nothing. */
+/* As ebpo_triangle_pair, but returns EBPO_PAIR_APART where the common points are the corner, or the
+ * edge between corners, that both faces have (equal coordinates). Swapping changes nothing. */
 static ebpo_pair_kind neighbour_kind(const double a[3][3], const double b[3][3])
 {
     int shared = 0, in_a = 0, in_b = 0;
@@ -112,21 +112,23 @@ bool ebpo_pair_walk_decide(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b
     const ebpo_accel *const *s = w->pair->accel;
     uint32_t face_a = ebpo_accel_meshlet(s[0], block_a)->face,
              face_b = ebpo_accel_meshlet(s[1], block_b)->face;
-    if (!ebpo_grow(&w->met, &w->met_capacity, w->met_count + pairs->count, sizeof *w->met))
+    if (!ebpo_grow(&w->intersected, &w->found_capacity, w->found_count + pairs->count,
+                   sizeof *w->intersected))
         return false;
     for (unsigned i = 0; i < pairs->count; i++) {
         uint32_t lane_a = pairs->pair[i] & 7, lane_b = pairs->pair[i] >> 3 & 7;
-        ebpo_met_pair met = { face_a + lane_a, face_b + lane_b, EBPO_PAIR_CROSSING };
-        if (met.a < w->begin || met.a >= w->end || (w->self && met.a >= met.b))
+        ebpo_found_pair intersected = { face_a + lane_a, face_b + lane_b, EBPO_PAIR_CROSSING };
+        if (intersected.a < w->begin || intersected.a >= w->end ||
+            (w->self && intersected.a >= intersected.b))
             continue;
         if (w->neighbours || !(pairs->pair[i] & EBPO_CERTAINLY_CROSSING))
-            met.kind = (int32_t)exact_kind(w, block_a * EBPO_BLOCK + lane_a,
-                                           block_b * EBPO_BLOCK + lane_b);
-        if (met.kind == EBPO_PAIR_APART)
+            intersected.kind = (int32_t)exact_kind(w, block_a * EBPO_BLOCK + lane_a,
+                                                   block_b * EBPO_BLOCK + lane_b);
+        if (intersected.kind == EBPO_PAIR_APART)
             continue;
-        w->met_slot[0] = block_a * EBPO_BLOCK + lane_a;
-        w->met_slot[1] = block_b * EBPO_BLOCK + lane_b;
-        w->met[w->met_count++] = met;
+        w->found_slot[0] = block_a * EBPO_BLOCK + lane_a;
+        w->found_slot[1] = block_b * EBPO_BLOCK + lane_b;
+        w->intersected[w->found_count++] = intersected;
         if (w->first)
             break;
     }
@@ -150,7 +152,7 @@ void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
     g->limit = g->square = g->best = INFINITY;
     g->tolerance = 0;
     g->way_number = 0;
-    for (int k = 0; k < 3; k++) /* what centres show is better than nothing */
+    for (int k = 0; k < 3; k++) /* use the direction of the centres instead */
         g->way[k] = k == 0;
     ebpo_gap_set_way(g, g->way);
     double centre[2][3];
@@ -194,7 +196,7 @@ static float float_dot(const float a[3], const float b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Shorter than 1: gaps along it are not too great. */
+/* Makes the direction shorter than 1, so that gaps along it are not too great. */
 void ebpo_gap_set_way(ebpo_gap_search *g, const float way[3])
 {
     float length = sqrtf(float_dot(way, way));
@@ -213,7 +215,7 @@ void ebpo_gap_set_way(ebpo_gap_search *g, const float way[3])
     g->along_shift = float_dot(g->frames.frame[1].shift, g->along[0]);
 }
 
-bool ebpo_gap_room(ebpo_gap_search *g)
+bool ebpo_gap_capacity(ebpo_gap_search *g)
 {
     if (ebpo_grow(&g->stack, &g->capacity, g->count + 64, sizeof *g->stack))
         return true;
@@ -221,7 +223,7 @@ bool ebpo_gap_room(ebpo_gap_search *g)
     return false;
 }
 
-bool ebpo_gap_wait_room(ebpo_gap_search *g)
+bool ebpo_gap_wait_capacity(ebpo_gap_search *g)
 {
     unsigned kept = 0;
     if (g->waits + 64 <= EBPO_GAP_CANDIDATES)

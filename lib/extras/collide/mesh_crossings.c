@@ -1,8 +1,8 @@
-/* Faces of one mesh that intersect other than as neighbours.
+/* Finds faces of one mesh that intersect other than as neighbours.
  *
- * The mesh becomes a temporary file, and that a model under a memory budget, so the mesh may be
- * larger than memory. Only its faces matter, so it is built as a surface without planes, which
- * takes a fraction of the time. The crossings are then those of the model with itself
+ * The mesh becomes a temporary file, which is opened as a model with a memory budget, so the mesh
+ * may be larger than memory. Only its faces matter, so it is built as a surface without planes,
+ * which takes a fraction of the time. The crossings are those of the model with itself
  * (ebpo_collide_self_posed); the mesh in memory gives their positions. An optional PLY file shows
  * the faces in red. */
 #include "core/strict_fp.h"
@@ -30,9 +30,9 @@ typedef struct crossings {
     ebpo_file *file;
     ebpo_model *model;
     ebpo_collider *collider;
-    ebpo_publish target; /* of the picture, if one is wanted */
+    ebpo_publish target; /* target of the PLY file, if one is wanted */
     ebpo_crossings_summary sum;
-    uint64_t *met; /* a bit for each face, by its number in the source */
+    uint64_t *intersected; /* a bit for each face, by its number in the source */
     bool enough;
 } crossings;
 
@@ -50,14 +50,14 @@ static ebpo_status build_model(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_re
     return ebpo_build(mesh, &surface, NULL, &how, &c->tree, error);
 }
 
-/* What searching needs besides the file is the mesh, for places. */
+/* Frees the levels: besides the file, the search needs only the mesh, for positions. */
 static void drop_levels(ebpo_tree *tree)
 {
     for (int i = 0; i < tree->info.level_count; i++)
         ebpo_level_free(&tree->level[i]);
 }
 
-/* libhdf5 wants a name, so the file has one until it has been opened. */
+/* libhdf5 needs a name, so the file has one until it is open. */
 static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *error)
 {
     ebpo_write_options how = EBPO_WRITE_OPTIONS_INIT;
@@ -76,9 +76,9 @@ static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *err
     return status;
 }
 
-/* The workspace holds half of what is allowed; of the rest half is the model's, and an eighth is
- * for pairs that wait. */
-enum { LEAST_MODEL = 1 << 20 }; /* of workspaces for tests; others have more */
+/* The workspace has half of the allowed memory. Of the rest the model has half, and waiting pairs
+ * an eighth. */
+enum { LEAST_MODEL = 1 << 20 }; /* for workspaces of tests; others have more */
 
 static ebpo_status make_collider(crossings *c, uint64_t memory, ebpo_error *error)
 {
@@ -122,8 +122,8 @@ static void common_point(const double a[3][3], const double b[3][3], int32_t kin
 static void note_face(crossings *c, uint64_t face)
 {
     uint64_t bit = UINT64_C(1) << face % 64;
-    c->sum.faces += !(c->met[face / 64] & bit);
-    c->met[face / 64] |= bit;
+    c->sum.faces += !(c->intersected[face / 64] & bit);
+    c->intersected[face / 64] |= bit;
 }
 
 static void fill_crossing(crossings *c, const ebpo_face_pair *pair, ebpo_crossing *out)
@@ -141,14 +141,14 @@ static void fill_crossing(crossings *c, const ebpo_face_pair *pair, ebpo_crossin
         note_face(c, out->face[i]);
 }
 
-enum { TOLD_AT_ONCE = 256 };
+enum { REPORTED_AT_ONCE = 256 };
 
 static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     crossings *c = user;
-    ebpo_crossing out[TOLD_AT_ONCE];
-    for (uint64_t at = 0; at < count && !c->enough; at += TOLD_AT_ONCE) {
-        uint64_t n = count - at < TOLD_AT_ONCE ? count - at : TOLD_AT_ONCE;
+    ebpo_crossing out[REPORTED_AT_ONCE];
+    for (uint64_t at = 0; at < count && !c->enough; at += REPORTED_AT_ONCE) {
+        uint64_t n = count - at < REPORTED_AT_ONCE ? count - at : REPORTED_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
             fill_crossing(c, &pairs[at + i], &out[i]);
         c->enough = c->take && !c->take(c->user, out, n);
@@ -168,7 +168,7 @@ static ebpo_status paint_crossings(crossings *c, ebpo_workspace *workspace, ebpo
     ebpo_status status = ebpo_file_read_source_mesh(c->file, &how, &mesh, &source_order, error);
     if (status != EBPO_OK)
         return status;
-    const ebpo_red_mesh red = { ebpo_red_source_of(&mesh), NULL, c->met, "200 200 200" };
+    const ebpo_red_mesh red = { ebpo_red_source_of(&mesh), NULL, c->intersected, "200 200 200" };
     status = ebpo_red_meshes_print(&red, 1, &c->target, error);
     ebpo_mesh_free(&mesh);
     return status == EBPO_OK ? ebpo_publish_commit(&c->target, error) : status;
@@ -182,8 +182,8 @@ static ebpo_status search_crossings(crossings *c, ebpo_mesh *mesh, const ebpo_me
     ebpo_status status = build_model(c, mesh, report, error);
     if (status != EBPO_OK)
         return status;
-    c->met = ebpo_alloc_zero(c->tree.mesh.face_count / 64 + 1, sizeof *c->met);
-    if (!c->met)
+    c->intersected = ebpo_alloc_zero(c->tree.mesh.face_count / 64 + 1, sizeof *c->intersected);
+    if (!c->intersected)
         return ebpo_fail_memory(error, c->tree.mesh.face_count / 8);
     status = store_model(c, ebpo_workspace_folder(workspace), error);
     drop_levels(&c->tree);
@@ -200,7 +200,7 @@ static void close_all(crossings *c)
     ebpo_model_free(c->model);
     ebpo_close(c->file);
     ebpo_tree_free(&c->tree);
-    free(c->met);
+    free(c->intersected);
     ebpo_publish_abort(&c->target);
 }
 

@@ -1,11 +1,11 @@
-/* The distance of two triangles: bounds in doubles, and exact comparisons.
+/* Computes the distance of two triangles: bounds in doubles, and exact comparisons.
  *
  * Bounds come from a pair of near points, which need not be the nearest: its distance bounds from
- * above, the planes at right angles to the line between the points from below. All is seen from
- * A's first corner, so that the position of the faces does not matter. Where bounds do not decide,
- * the squared distance is a fraction of integers: the least over corners and faces, and over edges
- * whose inner points are nearest. docs/develop/collision.md, "Distance of two faces". Pure
- * functions, any thread; the results are the same with every compiler and its flags. */
+ * above, the planes perpendicular to the line between the points from below. All coordinates are
+ * relative to A's first corner, so the position of the faces does not matter. Where bounds do not
+ * decide, the squared distance is a fraction of integers: the least over corners and faces, and
+ * over edges whose inner points are nearest. docs/develop/collision.md, "Distance of two faces".
+ * Pure functions, any thread; the results are the same with every compiler and its flags. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,21 +18,22 @@
 #include "geometry/triangle_pair.h"
 #include "geometry/vec3.h"
 
-static const double most_reach = 0x1p200, least_reach = 0x1p-200;
+static const double max_reach = 0x1p200, least_reach = 0x1p-200;
 
 static double within_unit(double t) { return t > 0 ? (t < 1 ? t : 1) : 0; }
 
-/* The best pair of points so far, of the two faces as seen from A's first corner. */
+/* The best pair of points so far, relative to A's first corner. */
 typedef struct search {
     double face[2][3][3];
-    double reach; /* 1-norms of corners are at most that */
+    double reach; /* bound of the 1-norms of corners */
     double square, point[2][3];
     int feature[2];
-    double room; /* of the points: from where their features end, as a part of the reach */
+    double
+        space; /* of the points: distance from the ends of their features, as a part of the reach */
 } search;
 
 static void offer_points(search *s, int first, const double p[3], const double q[3], int on_p,
-                         int on_q, double room)
+                         int on_q, double space)
 {
     double d[3];
     ebpo_vec3_subtract(p, q, d);
@@ -44,7 +45,7 @@ static void offer_points(search *s, int first, const double p[3], const double q
     memcpy(s->point[!first], q, sizeof s->point[0]);
     s->feature[first] = on_p;
     s->feature[!first] = on_q;
-    s->room = room;
+    s->space = space;
 }
 
 /* --- edges with edges --- */
@@ -57,8 +58,8 @@ static void point_along(const double from[3], const double edge[3], double t, do
 
 static int on_edge(int i, double t) { return t == 0 ? i : t == 1 ? (i + 1) % 3 : 3 + i; }
 
-/* From the nearer end, in length; ends are what they are. */
-static double room_on_edge(double t, double square)
+/* Returns the length to the nearer end; ends are exact. */
+static double capacity_on_edge(double t, double square)
 {
     return t == 0 || t == 1 ? INFINITY : fmin(t, 1 - t) * sqrt(square);
 }
@@ -79,14 +80,14 @@ static void offer_edges(search *s, int i, int j)
     point_along(p, e, on_e, x);
     point_along(q, f, on_f, y);
     bool edges = on_e > 0 && on_e < 1 && on_f > 0 && on_f < 1;
-    double room = fmin(room_on_edge(on_e, ee), room_on_edge(on_f, ff));
+    double space = fmin(capacity_on_edge(on_e, ee), capacity_on_edge(on_f, ff));
     offer_points(s, 0, x, y, on_edge(i, on_e), on_edge(j, on_f),
-                 edges && !(area > 0x1p-20 * ee * ff) ? 0 : room);
+                 edges && !(area > 0x1p-20 * ee * ff) ? 0 : space);
 }
 
 /* --- corners with planes --- */
 
-/* Only corners that lie over the inner part matter: the rest is the edges'. */
+/* Only corners over the inner part matter: edges cover the rest. */
 static void offer_corner(search *s, int of, int i)
 {
     double(*plane)[3] = s->face[!of];
@@ -117,7 +118,7 @@ static bool see_from_corner(const double a[3][3], const double b[3][3], search *
 {
     s->reach = 0;
     s->square = INFINITY;
-    s->room = 0;
+    s->space = 0;
     memset(s->point, 0, sizeof s->point);
     memset(s->feature, 0, sizeof s->feature);
     for (int i = 0; i < 3; i++) {
@@ -128,10 +129,10 @@ static bool see_from_corner(const double a[3][3], const double b[3][3], search *
             s->reach = fmax(s->reach, fabs(x[0]) + fabs(x[1]) + fabs(x[2]));
         }
     }
-    return s->reach < most_reach && s->reach > least_reach;
+    return s->reach < max_reach && s->reach > least_reach;
 }
 
-/* The gap between the faces along n, which is not 0, less what rounding may have added. */
+/* Returns the gap between the faces along n, which is not 0, less a bound of the rounding. */
 static double gap_along(const search *s, const double n[3])
 {
     double least = INFINITY, most = -INFINITY, d[3];
@@ -153,13 +154,13 @@ static bool is_on(int corner, int feature)
            (feature >= 3 && (corner == feature - 3 || corner == (feature - 2) % 3));
 }
 
-/* Whether n from A's point to B's has all corners that the points' features do not have strictly
- * behind it, and ahead of it, by more than n and the points may be off: docs/develop/collision.md,
- * "Which features are nearest". */
+/* Returns true if all corners outside the points' features are strictly behind A's point and ahead
+ * of B's along n, by more than the error of n and the points: docs/develop/collision.md, "Which
+ * features are nearest". */
 static bool features_certain(const search *s, const double n[3])
 {
     const double enough = 0x1p-24;
-    if (!(s->room > enough * s->reach))
+    if (!(s->space > enough * s->reach))
         return false;
     for (int of = 0; of < 2; of++)
         for (int i = 0; i < 3; i++) {
@@ -172,7 +173,7 @@ static bool features_certain(const search *s, const double n[3])
     return true;
 }
 
-/* Corners of the feature, in an order of their own. */
+/* Compares the corners of two features in a canonical order. */
 static bool same_feature(const double a[3][3], int on_a, const double b[3][3], int on_b)
 {
     int count = on_a < 3 ? 1 : on_a < 6 ? 2 : 3, most = on_b < 3 ? 1 : on_b < 6 ? 2 : 3;
@@ -189,8 +190,8 @@ static bool same_feature(const double a[3][3], int on_a, const double b[3][3], i
     return true;
 }
 
-/* Both lie across one axis, each all at one coordinate, and one is over the other: they are as far
- * apart as these two. */
+/* Returns true if each face lies in a plane across one axis and one is over the other: their
+ * distance is that of these two planes. */
 static bool level_faces(const double a[3][3], const double b[3][3], double level[2])
 {
     for (int k = 0; k < 3; k++) {
@@ -257,7 +258,7 @@ void ebpo_triangles_distance_bounds(const double a[3][3], const double b[3][3],
 /* --- exact distances: fractions of integers --- */
 
 typedef struct fraction {
-    mpz_t square, denominator; /* of units */
+    mpz_t square, denominator; /* in units */
 } fraction;
 
 static void fraction_init(fraction *f) { mpz_inits(f->square, f->denominator, NULL); }
@@ -275,7 +276,7 @@ static int fraction_compare(const fraction *f, const fraction *g)
     return order;
 }
 
-/* Takes the lesser one; a denominator of 0: none so far. */
+/* Takes the lesser one; a denominator of 0 means none so far. */
 static void take_lesser(fraction *best, const fraction *other)
 {
     if (mpz_sgn(best->denominator) != 0 && fraction_compare(other, best) >= 0)
@@ -318,7 +319,7 @@ static void set_edge(edges *e, int of, const double from[3], const double to[3],
     ebpo_vectorz_subtract(&e->along[of], &e->along[of], &e->from[of]);
 }
 
-/* Where the lines are nearest is between the ends of edge `of`. */
+/* Returns true if the nearest points of the lines are between the ends of edge `of`. */
 static bool within_edge(edges *e, int of)
 {
     ebpo_vectorz_cross(&e->part, &e->between, &e->along[!of]);
@@ -326,7 +327,7 @@ static bool within_edge(edges *e, int of)
     return mpz_sgn(e->share) >= 0 && mpz_cmp(e->share, e->length2) <= 0;
 }
 
-/* False: parallel, or an end is nearer. */
+/* Returns false if the edges are parallel or an end is nearer. */
 static bool edges_square(edges *e, fraction *out)
 {
     ebpo_vectorz_subtract(&e->between, &e->from[1], &e->from[0]);
@@ -340,7 +341,7 @@ static bool edges_square(edges *e, fraction *out)
     return true;
 }
 
-/* Farther than `hi` for certain. */
+/* Returns true if the edges are certainly farther than `hi`. */
 static bool edges_far(const double a[3][3], int i, const double b[3][3], int j, double hi)
 {
     double p[3][3], q[3][3];
@@ -404,7 +405,7 @@ static void squared_distance(const double a[3][3], const double b[3][3], int uni
         mpz_set_ui(out->denominator, 1);
         return;
     }
-    ebpo_pair_distance_bounds bounds; /* what is farther is not the least */
+    ebpo_pair_distance_bounds bounds; /* a farther pair is not the least */
     ebpo_triangles_distance_bounds(a, b, &bounds);
     mpz_set_ui(out->denominator, 0);
     take_corners(out, a, b, bounds.hi, unit);

@@ -1,7 +1,8 @@
-/* The faces of pairs, looked up by their numbers in the file, and where crossing ones intersect.
+/* Looks up the faces of pairs by their numbers in the file, and computes where crossing ones
+ * intersect.
  *
- * A whole model is in memory: its slots say where in the blocks each face is. Faces of a model in
- * parts are read through the cache of chunks. A pair is posed by ebpo_posing_apply, as in all
+ * A whole model is in memory: its slots give the position of each face in the blocks. Faces of a
+ * model in parts are read through the cache of chunks. ebpo_posing_apply poses a pair, as in all
  * exact tests. ebpo_collide_contacts returns the segments of all crossing pairs in the order of
  * pairs. One thread. */
 #include "core/strict_fp.h"
@@ -93,7 +94,7 @@ ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face, dou
 
 /* --- contact segments --- */
 
-/* Slots of those models that are in memory, once for a collider. EBPO_E_MEMORY. */
+/* Makes slots of the models that are in memory, once for a collider. Fails with EBPO_E_MEMORY. */
 static ebpo_status make_slots(ebpo_collider *c, ebpo_error *error)
 {
     for (int i = 0; i < 2; i++) {
@@ -110,7 +111,7 @@ static ebpo_status make_slots(ebpo_collider *c, ebpo_error *error)
 ebpo_status ebpo_pair_faces_begin(ebpo_pair_faces *f, const ebpo_collision *q, ebpo_error *error)
 {
     ebpo_collider *c = q->collider;
-    f->question = q;
+    f->current_query = q;
     ebpo_status status = make_slots(c, error);
     for (int i = 0; i < 2 && status == EBPO_OK; i++)
         ebpo_faces_by_number_begin(&f->side[i], c->model[i], c->slots[i]);
@@ -128,7 +129,7 @@ ebpo_status ebpo_pose_pair(ebpo_pair_faces *f, const ebpo_face_pair *pair, ebpo_
 {
     const uint64_t face[2] = { pair->file_face_a, pair->file_face_b };
     for (int i = 0; i < 2; i++) {
-        const ebpo_posing *posing = &f->question->posing[f->question->turned ^ i].posing;
+        const ebpo_posing *posing = &f->current_query->posing[f->current_query->turned ^ i].posing;
         ebpo_status status = ebpo_faces_by_number_get(&f->side[i], face[i], out->own[i], error);
         if (status != EBPO_OK)
             return status;
@@ -154,17 +155,17 @@ void ebpo_contact_of(const ebpo_posed_pair *faces, const ebpo_face_pair *pair,
 
 enum { SEGMENTS_AT_ONCE = 512 };
 
-typedef struct telling {
+typedef struct reporting {
     ebpo_pair_faces faces;
     ebpo_segments_fn take;
     void *user;
-    ebpo_error *error; /* of `status` */
+    ebpo_error *error; /* error of `status` */
     ebpo_status status;
-} telling;
+} reporting;
 
 static bool give_segments(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
-    telling *t = user;
+    reporting *t = user;
     ebpo_contact_segment out[SEGMENTS_AT_ONCE];
     uint64_t n = 0;
     for (uint64_t i = 0; i < count; i++) {
@@ -189,7 +190,7 @@ ebpo_status ebpo_collide_contacts(ebpo_collider *c, const ebpo_collide_options *
 {
     EBPO_DEFAULT_FP;
     ebpo_collision q;
-    telling t = { .take = take, .user = user, .error = error };
+    reporting t = { .take = take, .user = user, .error = error };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&t.faces, &q, error);

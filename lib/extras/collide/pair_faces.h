@@ -1,5 +1,5 @@
-/* The faces of pairs by their numbers in the file, at their poses, and where crossing ones
- * intersect. */
+/* Looks up the faces of pairs by their numbers in the file, at their poses, and computes where
+ * crossing ones intersect. */
 #ifndef EBPO_COLLIDE_PAIR_FACES_H
 #define EBPO_COLLIDE_PAIR_FACES_H
 
@@ -7,30 +7,31 @@
 #include "query/accel.h"
 #include "query/query_model.h"
 
-/* Returns where the faces of a subtree, or of a whole model, are in its blocks: slots by local
- * numbers, which in a whole model are those in the file. NULL: no memory. The caller frees it. */
+/* Returns the slots of the faces in the blocks of a subtree or a whole model, by local numbers,
+ * which in a whole model are those in the file. Returns NULL without memory. The caller frees it.
+ */
 uint32_t *ebpo_face_slots(const ebpo_accel *subtree);
 
-/* Corners of single faces by their numbers in the file: of a whole model from its blocks, of one in
- * parts through its cache of chunks. One thread. */
+/* Reads corners of single faces by their numbers in the file: of a whole model from its blocks, of
+ * one in parts through its cache of chunks. One thread. */
 
 typedef struct ebpo_faces_by_number {
     const ebpo_model *model;
-    const uint32_t *slots;           /* of a whole model: ebpo_face_slots; else NULL */
-    ebpo_held_chunk faces, vertices; /* where the last ones were */
+    const uint32_t *slots;           /* for a whole model: ebpo_face_slots; else NULL */
+    ebpo_held_chunk faces, vertices; /* the last chunks */
 } ebpo_faces_by_number;
 
 void ebpo_faces_by_number_begin(ebpo_faces_by_number *f, const ebpo_model *model,
                                 const uint32_t *slots);
-/* As in the file, exactly. The errors of reading. */
+/* Returns the exact corners in the file. Fails with the errors of reading. */
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face,
                                                    double out[3][3], ebpo_error *error);
-/* Of a model in parts: a face's vertices, and a vertex, as in the file. */
+/* Returns, for a model in parts, a face's vertices, and a vertex, as in the file. */
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_corners(ebpo_faces_by_number *f, uint64_t face,
                                                        uint32_t out[3], ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_vertex(ebpo_faces_by_number *f, uint64_t vertex,
                                                       double out[3], ebpo_error *error);
-/* Lets go of what it holds; zero is fine. */
+/* Releases the chunks that it holds; a zero struct is allowed. */
 void ebpo_faces_by_number_end(ebpo_faces_by_number *f);
 
 /* A pair with its faces, of the caller's A and B: as in the files, and at their poses. */
@@ -38,25 +39,27 @@ typedef struct ebpo_posed_pair {
     double own[2][3][3], corner[2][3][3];
 } ebpo_posed_pair;
 
-/* Where faces of a question's pairs are looked up. */
+/* Looks up the faces of a query's pairs. */
 typedef struct ebpo_pair_faces {
-    const ebpo_collision *question;
-    ebpo_faces_by_number side[2]; /* of the caller's A and B */
+    const ebpo_collision *current_query;
+    ebpo_faces_by_number side[2]; /* the caller's A and B */
 } ebpo_pair_faces;
 
-/* Ended also after a failure; zero is fine. */
-EBPO_MUST_USE ebpo_status ebpo_pair_faces_begin(ebpo_pair_faces *f, const ebpo_collision *question,
+/* Must be ended, also after a failure; a zero struct is allowed. */
+EBPO_MUST_USE ebpo_status ebpo_pair_faces_begin(ebpo_pair_faces *f,
+                                                const ebpo_collision *current_query,
                                                 ebpo_error *error);
 void ebpo_pair_faces_end(ebpo_pair_faces *f);
 
-/* The errors of reading. */
+/* Fails with the errors of reading. */
 EBPO_MUST_USE ebpo_status ebpo_pose_pair(ebpo_pair_faces *f, const ebpo_face_pair *pair,
                                          ebpo_posed_pair *out, ebpo_error *error);
 
-/* Segments that ebpo_collide_polylines has room for: one for each crossing pair. */
-uint64_t ebpo_contact_lines_most(const ebpo_collider *collider);
+/* Returns the number of segments for which ebpo_collide_polylines has memory: one for each crossing
+ * pair. */
+uint64_t ebpo_contact_lines_max(const ebpo_collider *collider);
 
-/* The pair is EBPO_PAIR_CROSSING. */
+/* Computes the contact of an EBPO_PAIR_CROSSING pair. */
 void ebpo_contact_of(const ebpo_posed_pair *faces, const ebpo_face_pair *pair,
                      ebpo_contact_segment *out);
 

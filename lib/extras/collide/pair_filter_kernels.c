@@ -1,9 +1,9 @@
-/* The filter of pairs of faces, eight at a time in floats: which are certainly apart, and which
+/* Filters pairs of faces, eight at a time in floats: finds which are certainly apart and which
  * certainly cross. It is compiled for several instruction sets with the same results.
  *
- * First the boxes, then the sides of both planes, then the intervals on the common line of the
- * planes are compared, each with a proved error bound. All others are open and are decided
- * exactly. Letters are those of docs/develop/collision.md. */
+ * Boxes are compared first, then the sides of both planes, then the intervals on the common line of
+ * the planes, each with a proved error bound. All others are open and are decided exactly. Letters
+ * are those of docs/develop/collision.md. */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -38,7 +38,7 @@ EBPO_EIGHT vector8 vector8_cross(vector8 a, vector8 b)
                         minor_of8(a.x[0], a.x[1], b.x[0], b.x[1]) } };
 }
 
-/* At least the length. */
+/* Returns a value not less than the length. */
 EBPO_EIGHT f8 vector8_size(vector8 a)
 {
     return f8_add(f8_add(f8_abs(a.x[0]), f8_abs(a.x[1])), f8_abs(a.x[2]));
@@ -78,11 +78,11 @@ EBPO_EIGHT unsigned boxes_apart8(const box8 *a, const box8 *b, f8 e)
 /* --- sides of planes --- */
 
 typedef struct sides8 {
-    f8 above[3]; /* masks, right where certain */
+    f8 above[3]; /* masks, set only where certain */
     unsigned same, certain;
 } sides8;
 
-/* d: corners of the other face less the plane's first one; bound: of determinants. */
+/* d: corners of the other face less the plane's first one; bound: error of determinants. */
 EBPO_EIGHT sides8 sides_of8(vector8 e1, vector8 e2, const vector8 d[3], f8 bound)
 {
     vector8 n = vector8_cross(e1, e2);
@@ -102,7 +102,7 @@ EBPO_EIGHT sides8 sides_of8(vector8 e1, vector8 e2, const vector8 d[3], f8 bound
 
 /* --- the common line --- */
 
-/* Which corner is alone on its side, as masks (2 where neither 0 nor 1), and whether it is above.
+/* Masks of the corner that is alone on its side (2 where neither 0 nor 1), and of its being above.
  */
 typedef struct alone8 {
     f8 is0, is1, above;
@@ -119,7 +119,7 @@ EBPO_EIGHT alone8 alone_of8(const f8 above[3])
     return out;
 }
 
-/* Corner `first` after the one that is alone. */
+/* Returns corner `first` after the one that is alone. */
 EBPO_EIGHT vector8 turned_corner8(const face8 *f, const alone8 *alone, int first)
 {
     const vector8 *c = f->corner;
@@ -127,7 +127,7 @@ EBPO_EIGHT vector8 turned_corner8(const face8 *f, const alone8 *alone, int first
                         vector8_pick(alone->is1, c[(first + 1) % 3], c[(first + 2) % 3]));
 }
 
-/* Of each pair whose signs are certain: intervals on the common line apart; overlapping. */
+/* Decides pairs whose signs are certain: intervals on the common line are apart, or overlap. */
 EBPO_EIGHT ebpo_pair_masks on_line8(const face8 *a, const face8 *b, const sides8 *side_a,
                                     const sides8 *side_b, f8 bound)
 {
@@ -149,14 +149,14 @@ EBPO_EIGHT ebpo_pair_masks on_line8(const face8 *a, const face8 *b, const sides8
 
 /* --- bounds --- */
 
-/* m * (4 e (n1) + 12 v n2) */
+/* Returns m * (4 e (n1) + 12 v n2). */
 EBPO_EIGHT f8 error_bound8(f8 e, f8 m, f8 n1, f8 n2)
 {
     f8 inputs = f8_mul(f8_mul(e, f8_all(4)), n1), rounding = f8_mul(n2, f8_all(12 * 0x1p-24f));
     return f8_mul(m, f8_add(inputs, rounding));
 }
 
-/* Of a plane with edges of length l, and corners at a distance of d. */
+/* Bounds the error for a plane with edges of length l and corners at a distance of d. */
 EBPO_EIGHT f8 plane_bound8(f8 e, f8 l, f8 d)
 {
     return error_bound8(e, l, f8_add(f8_add(d, d), l), f8_mul(l, d));
@@ -167,7 +167,7 @@ EBPO_EIGHT f8 edges_size8(vector8 e1, vector8 e2, f8 e)
     return f8_add(f8_max(vector8_size(e1), vector8_size(e2)), f8_mul(e, f8_all(4)));
 }
 
-/* Without boxes. `out`: those known to be apart. */
+/* Decides faces without boxes. `out`: those known to be apart. */
 EBPO_EIGHT ebpo_pair_masks decide_faces8(const face8 *a, const face8 *b, f8 e, ebpo_pair_masks out)
 {
     vector8 e1 = vector8_less(a->corner[1], a->corner[0]),
@@ -236,13 +236,14 @@ typedef struct lane_pairs {
     int count;
 } lane_pairs;
 
-/* Those whose boxes are not apart; what follows the last one is a pair, too. */
+/* Lists pairs whose boxes are not apart; the entry after the last one is a valid pair, too. */
 EBPO_EIGHT void pairs_by_boxes(const face8 *a, unsigned lanes_a, const face8 *b, unsigned lanes_b,
                                f8 e, lane_pairs *out)
 {
     box8 box_a = box_of8(a), box_b = box_of8(b), box;
     float low[3][8], high[3][8];
-    uint64_t near = 0; /* a bit for each pair: one loop over these is guessed better than eight */
+    uint64_t near = 0; /* a bit for each pair: the processor predicts one loop over these better
+                        * than eight */
     for (int k = 0; k < 3; k++) {
         f8_store(low[k], box_b.low[k]);
         f8_store(high[k], box_b.high[k]);

@@ -1,11 +1,12 @@
-/* Two triangles of which one moves along a direction: the last time at which they have a common
- * point.
+/* Computes, for two triangles of which one moves along a direction, the last time at which they
+ * have a common point.
  *
  * Seen along the direction both faces are convex polygons with heights. The difference of heights
  * is concave where they overlap, so it is greatest over a corner of one polygon or where edges
  * cross. The exact time is a fraction of integers (GMP). A bound in doubles comes from separating
  * axes: normals, and products of edges with each other and with the direction.
- * docs/develop/collision.md, "The way out". Pure functions, any thread. */
+ * docs/develop/collision.md, "Separation distance along a direction". Pure functions, any thread.
+ */
 #include "core/strict_fp.h"
 
 #include "extras/collide/face_pairs.h"
@@ -56,7 +57,7 @@ double ebpo_sweep_time_round(const ebpo_sweep_time *t)
 /* --- in integers --- */
 
 typedef struct sweep {
-    ebpo_vectorz d, corner[2][3]; /* of the face that moves, and of the other */
+    ebpo_vectorz d, corner[2][3]; /* corners of the moving face, and of the other */
     ebpo_vectorz u, v, w, n, m;
     mpz_t top, bottom, share;
     ebpo_sweep_time *best;
@@ -82,7 +83,7 @@ static void sweep_clear(sweep *s)
     mpz_clears(s->top, s->bottom, s->share, NULL);
 }
 
-/* x . (y cross z); `m` is lost. */
+/* Computes x . (y cross z); overwrites `m`. */
 static void triple_product(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebpo_vectorz *y,
                            const ebpo_vectorz *z)
 {
@@ -90,8 +91,8 @@ static void triple_product(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebp
     ebpo_vectorz_dot(out, x, &s->m);
 }
 
-/* top / bottom is a time of contact. `other`: of the face that does not move, seen from which time
- * goes the other way. */
+/* Takes top / bottom as a time of contact. `other`: it was computed from the face that does not
+ * move, so its sign is reversed. */
 static void take_time(sweep *s, bool other)
 {
     if (mpz_sgn(s->bottom) < 0) {
@@ -111,7 +112,7 @@ static void take_time(sweep *s, bool other)
     s->best->ever = true;
 }
 
-/* 0 <= share / bottom <= 1; bottom is not 0. */
+/* Returns true if 0 <= share / bottom <= 1; bottom is not 0. */
 static bool is_share(const sweep *s)
 {
     int sign = mpz_sgn(s->bottom);
@@ -123,7 +124,8 @@ static const ebpo_vectorz *next_corner(const sweep *s, int of, int i)
     return &s->corner[of][i == 2 ? 0 : i + 1];
 }
 
-/* n: the normal of face `of`. False: it is parallel to the direction, or has no area. */
+/* Sets n to the normal of face `of`. Returns false if the face is parallel to the direction or has
+ * no area. */
 static bool find_normal(sweep *s, int of)
 {
     ebpo_vectorz_subtract(&s->u, &s->corner[of][1], &s->corner[of][0]);
@@ -133,7 +135,7 @@ static bool find_normal(sweep *s, int of)
     return mpz_sgn(s->share) != 0;
 }
 
-/* The corner, seen along the direction, is in face `of`. */
+/* Returns true if the corner, seen along the direction, is in face `of`. */
 static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
 {
     int signs[3] = { 0, 0, 0 };
@@ -146,7 +148,7 @@ static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
     return signs[0] == 0 || signs[2] == 0;
 }
 
-/* Corners of face `of` against the other one, which is not parallel to the direction. */
+/* Compares corners of face `of` with the other one, which is not parallel to the direction. */
 static void corners_and_face(sweep *s, int of)
 {
     (void)find_normal(s, !of);
@@ -160,7 +162,8 @@ static void corners_and_face(sweep *s, int of)
     }
 }
 
-/* Edges that cross, seen along the direction: w = t d + x u - y v, by Cramer's rule. */
+/* Takes the time of edges that cross, seen along the direction: w = t d + x u - y v, by Cramer's
+ * rule. */
 static void two_edges(sweep *s, int i, int j)
 {
     const ebpo_vectorz *p = &s->corner[0][i], *q = &s->corner[1][j];
@@ -180,7 +183,7 @@ static void two_edges(sweep *s, int i, int j)
     take_time(s, false);
 }
 
-/* Of a corner of face `of` that is over an edge of the other: w = t d - x v. */
+/* Takes the time of a corner of face `of` over an edge of the other: w = t d - x v. */
 static void corner_and_edge(sweep *s, int of, int i, int j)
 {
     const ebpo_vectorz *p = &s->corner[of][i], *q = &s->corner[!of][j];
@@ -198,7 +201,7 @@ static void corner_and_edge(sweep *s, int of, int i, int j)
     take_time(s, of == 1);
 }
 
-/* Of two corners one of which is over the other: w = t d. */
+/* Takes the time of two corners, one over the other: w = t d. */
 static void two_corners(sweep *s, int i, int j)
 {
     ebpo_vectorz_subtract(&s->w, &s->corner[1][j], &s->corner[0][i]);
@@ -211,7 +214,7 @@ static void two_corners(sweep *s, int i, int j)
     take_time(s, false);
 }
 
-static void look_at_faces(sweep *s)
+static void inspect_faces(sweep *s)
 {
     bool upright[2] = { !find_normal(s, 0), !find_normal(s, 1) };
     for (int of = 0; of < 2; of++)
@@ -246,18 +249,17 @@ void ebpo_sweep_last(const double a[3][3], const double b[3][3], const double di
     }
     out->ever = false;
     out->unit = unit - along;
-    look_at_faces(&s);
+    inspect_faces(&s);
     sweep_clear(&s);
 }
 
 /* --- bounds --- */
 
-/* The times left by one direction n after the other: n . d t lies between the extents' differences.
- */
+/* Times that each direction n restricts in turn: n . d t lies between the extents' differences. */
 typedef struct bounding {
-    double x[3][3], y[3][3], reach; /* seen from the first corner */
+    double x[3][3], y[3][3], reach; /* relative to the first corner */
     const double *d;
-    double most; /* less than 0: none */
+    double most; /* negative: none */
 } bounding;
 
 static void bound_by(bounding *b, const double n[3])
@@ -290,8 +292,8 @@ static void bound_by_cross(bounding *b, const double x[3], const double y[3])
     bound_by(b, n);
 }
 
-double ebpo_sweep_most(const double a[3][3], const double b[3][3], const double direction[3],
-                       double limit)
+double ebpo_sweep_max(const double a[3][3], const double b[3][3], const double direction[3],
+                      double limit)
 {
     bounding w = { .d = direction, .most = limit };
     double edge[2][3][3];

@@ -1,10 +1,11 @@
-/* The walk through two hierarchies to the pairs of faces that intersect, eight children at a time,
- * in floats. It is compiled for several instruction sets with the same results.
+/* Walks through two hierarchies to the pairs of faces that intersect, eight children at a time, in
+ * floats. It is compiled for several instruction sets with the same results.
  *
- * Boxes and slabs of one model's nodes are seen from the other model's frame and compared on the
- * axes of both. Bounds are rounded outwards, so nothing is lost. The larger of two nodes is
- * divided first. Two blocks go to the filter of pairs (pair_filter_kernels.c), and what that
- * leaves open to ebpo_pair_walk_decide. docs/develop/collision.md, "Going down two hierarchies". */
+ * Boxes and bounding cylinders of one model's nodes are transformed into the other model's frame
+ * and compared on the axes of both. Bounds are rounded outwards, so nothing is lost. The larger of
+ * two nodes is divided first. Two blocks go to the filter of pairs (pair_filter_kernels.c);
+ * ebpo_pair_walk_decide decides the open ones. docs/develop/collision.md, "Going down two
+ * hierarchies". */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -45,7 +46,7 @@ EBPO_EIGHT void turn_boxes(const ebpo_accel_pair *p, int side, const ebpo_bound 
     store_vector8(out->e2, e2);
 }
 
-/* Without an axis the slab says nothing. */
+/* A cylinder without an axis gives no bound. */
 EBPO_EIGHT void turn_slabs(const ebpo_accel_pair *p, int side, const ebpo_bound_slab *s,
                            ebpo_turned_node *out, const f8 c[3])
 {
@@ -97,8 +98,8 @@ EBPO_EIGHT const ebpo_turned_node *turned_node(ebpo_pair_walk *w, int side, uint
 
 /* --- eight children against one --- */
 
-/* P's eight children and Q's are compared; `in_p`: Q's origin less P's along P's axes, `in_q`: P's
- * less Q's along Q's axes. */
+/* Compares P's and Q's eight children; `in_p`: Q's origin less P's along P's axes, `in_q`: P's less
+ * Q's along Q's axes. */
 typedef struct two_nodes {
     const ebpo_turned_node *p, *q;
     float in_p[3], in_q[3];
@@ -125,12 +126,12 @@ EBPO_EIGHT two_nodes two_nodes_of(const ebpo_accel_pair *pair, const ebpo_turned
     float size = a->size + b->size + far;
     t.slack = 0x1p-18f * size + pair->doubt;
     t.slab_slack = pair->slab_share * size + pair->doubt;
-    t.sine = 1 + pair->sine_room;
+    t.sine = 1 + pair->sine_capacity;
     t.slabs = a->slabs | b->slabs;
     return t;
 }
 
-/* How far apart along the six axes of both boxes, less than 0 where they overlap. */
+/* Returns the greatest gap along the six axes of both boxes; negative where they overlap. */
 EBPO_EIGHT f8 box_gaps(const two_nodes *t, int j)
 {
     const ebpo_turned_node *p = t->p, *q = t->q;
@@ -148,7 +149,7 @@ EBPO_EIGHT f8 box_gaps(const two_nodes *t, int j)
     return gap;
 }
 
-/* The same along both slabs' axes; everything in P's frame. */
+/* Returns the same along both cylinders' axes; everything is in P's frame. */
 EBPO_EIGHT f8 slab_gaps(const two_nodes *t, int j)
 {
     const ebpo_turned_node *p = t->p, *q = t->q;
@@ -183,7 +184,7 @@ EBPO_EIGHT f8 slab_gaps(const two_nodes *t, int j)
     return f8_max(gap, f8_sub(f8_max(by_slab, by_box), q_half));
 }
 
-/* A bit for each child of P that may meet child j of Q. What is no number keeps it. */
+/* Returns a bit for each child of P that may intersect child j of Q. NaN keeps a child. */
 EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, float key[8])
 {
     f8 gap = box_gaps(t, j);
@@ -202,16 +203,16 @@ EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, floa
 
 /* --- pairs of nodes --- */
 
-/* Of the first contact: what one pair of nodes was divided into is a group, at the top of the
- * stack. Its deepest overlap is found when it is wanted, as most groups are left early. Below a
- * group is a mark with the place where the group before it begins. */
+/* For the first contact, the pairs into which one pair of nodes was divided are a group, at the top
+ * of the stack. Its deepest overlap is found only when needed, as most groups are left early. Below
+ * a group is a mark with the start of the group before it. */
 EBPO_EIGHT void open_group(ebpo_pair_walk *w)
 {
     w->stack[w->top++] = (ebpo_node_pair){ 0, (uint32_t)w->group, 0 };
     w->group = w->top;
 }
 
-/* Of equals the one that came last. False: there is none. */
+/* Pops the deepest overlap; of equals the last one. Returns false if there is none. */
 EBPO_EIGHT bool pop_deepest(ebpo_pair_walk *w, ebpo_node_pair *out)
 {
     ebpo_node_pair *s = w->stack;
@@ -236,8 +237,8 @@ EBPO_EIGHT void push_pair(ebpo_pair_walk *w, uint32_t a, uint32_t b, float key)
     w->stack[w->top++] = (ebpo_node_pair){ a, b, key };
 }
 
-/* The children of A's node with those of B's among `of_b`. A bit for each pair first: one loop over
- * these is guessed better than one for each child. */
+/* Pairs the children of A's node with those of B's among `of_b`. Collects a bit for each pair
+ * first: the processor predicts one loop over these better than one for each child. */
 EBPO_EIGHT void both_down(ebpo_pair_walk *w, const ebpo_turned_node *p, const ebpo_turned_node *q,
                           unsigned of_b, bool first)
 {
@@ -263,7 +264,7 @@ EBPO_EIGHT void both_down(ebpo_pair_walk *w, const ebpo_turned_node *p, const eb
     }
 }
 
-/* Those children of a node, of a side, that may meet a child of the other side's. */
+/* Returns the children of a node on one side that may intersect the child on the other side. */
 EBPO_EIGHT unsigned near_one(const ebpo_pair_walk *w, int side, const ebpo_turned_node *p,
                              const ebpo_turned_node *q, uint32_t one, bool first, float key[8])
 {
@@ -271,7 +272,7 @@ EBPO_EIGHT unsigned near_one(const ebpo_pair_walk *w, int side, const ebpo_turne
     return near_children_of(&t, (int)(one & 7), first, key);
 }
 
-/* The children of side `down` with the other one, a child of q, as it is. */
+/* Pairs the children on side `down` with the other one, an undivided child of q. */
 EBPO_EIGHT void one_down(ebpo_pair_walk *w, ebpo_node_pair r, int down, uint32_t node,
                          const ebpo_turned_node *q, bool first)
 {
@@ -286,10 +287,10 @@ EBPO_EIGHT void one_down(ebpo_pair_walk *w, ebpo_node_pair r, int down, uint32_t
     }
 }
 
-/* So much longer, a child is not worth dividing before the other. */
+/* If one child is this many times longer, it is divided first. */
 #define LONGER 4.0f
 
-/* Which of two children is divided: 0, 1, or 2 for both. */
+/* Returns which of two children is divided: 0, 1, or 2 for both. */
 EBPO_EIGHT int side_to_divide(uint32_t a, uint32_t b, float size_a, float size_b)
 {
     if (a & EBPO_IS_BLOCK)
@@ -302,7 +303,7 @@ EBPO_EIGHT int side_to_divide(uint32_t a, uint32_t b, float size_a, float size_b
 EBPO_EIGHT bool divide_pair(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uint32_t b, bool first)
 {
     w->node_pairs++;
-    if (!ebpo_pair_walk_room(w, 65))
+    if (!ebpo_pair_walk_capacity(w, 65))
         return false;
     if (first)
         open_group(w);
@@ -312,7 +313,7 @@ EBPO_EIGHT bool divide_pair(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uin
         one_down(w, r, side, side == 0 ? a : b, side == 0 ? of_b : of_a, first);
         return true;
     }
-    const ebpo_turned_node *q = turned_node(w, 1, b); /* in the place of of_b, perhaps */
+    const ebpo_turned_node *q = turned_node(w, 1, b); /* may overwrite of_b */
     float key[8];
     unsigned near = near_one(w, 1, q, of_a, r.a, false, key);
     if (near)
@@ -327,7 +328,8 @@ static const ebpo_posed_faces *posed_faces(ebpo_pair_walk *w, int side, uint32_t
     return posed_faces_of(w->posed[side], w->pair->accel[side], w->pair->posing[side], block);
 }
 
-/* The second's faces as seen from the first's base; ebpo_posed_block_place says why so far off. */
+/* Moves the second's faces relative to the first's base; ebpo_posed_block_place explains the error.
+ */
 EBPO_EIGHT float place_faces(const ebpo_posed_faces *b, double unit, const double origin[3],
                              float out[9][8])
 {
@@ -341,7 +343,7 @@ EBPO_EIGHT float place_faces(const ebpo_posed_faces *b, double unit, const doubl
     return b->error + 0x1.2p-24f * b->reach + 2.5f * 0x1p-24f * most;
 }
 
-static bool blocks_meet(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b)
+static bool blocks_intersect(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b)
 {
     const ebpo_posed_faces *a = posed_faces(w, 0, block_a), *b = posed_faces(w, 1, block_b);
     float placed[9][8];
@@ -365,11 +367,12 @@ EBPO_EIGHT bool run_any(ebpo_pair_walk *w, uint64_t pairs, bool first)
         else if (!pop_deepest(w, &r))
             break;
         uint32_t a = below_child(sa, r.a), b = below_child(sb, r.b);
-        bool fine = a & b & EBPO_IS_BLOCK ? blocks_meet(w, a & ~EBPO_IS_BLOCK, b & ~EBPO_IS_BLOCK)
-                                          : divide_pair(w, r, a, b, first);
+        bool fine = a & b & EBPO_IS_BLOCK
+                        ? blocks_intersect(w, a & ~EBPO_IS_BLOCK, b & ~EBPO_IS_BLOCK)
+                        : divide_pair(w, r, a, b, first);
         if (!fine)
             return false;
-        if (first && w->met_count)
+        if (first && w->found_count)
             w->top = 0;
     }
     return true;
@@ -382,7 +385,7 @@ static bool walk_run(ebpo_pair_walk *w, uint64_t pairs)
 
 static bool walk_start(ebpo_pair_walk *w)
 {
-    if (!ebpo_pair_walk_room(w, 64))
+    if (!ebpo_pair_walk_capacity(w, 64))
         return false;
     both_down(w, turned_node(w, 0, w->pair->accel[0]->top),
               turned_node(w, 1, w->pair->accel[1]->top), 255, w->first);
@@ -394,7 +397,7 @@ static bool walk_expand(ebpo_pair_walk *w, ebpo_node_pair r)
     uint32_t a = below_child(w->pair->accel[0], r.a), b = below_child(w->pair->accel[1], r.b);
     if (!(a & b & EBPO_IS_BLOCK))
         return divide_pair(w, r, a, b, false);
-    if (!ebpo_pair_walk_room(w, 1))
+    if (!ebpo_pair_walk_capacity(w, 1))
         return false;
     push_pair(w, r.a, r.b, r.key);
     return true;

@@ -1,7 +1,7 @@
-/* Models at poses in floats, with proved error bounds: the vertices of blocks as the filter of
- * pairs takes them, and how the frames of two models lie to each other.
+/* Poses models in floats, with proved error bounds: makes the vertices of blocks for the filter of
+ * pairs, and the relative position of the frames of two models.
  *
- * A unit, a power of two, brings posed coordinates into the range of floats. Blocks are turned in
+ * A unit, a power of two, brings posed coordinates into the range of floats. Blocks are rotated in
  * floats and placed relative to their first vertex, whose posed coordinates are doubles. Matrices
  * between frames come with the sizes of their entries, from which the kernels bound their errors.
  * Where frames are too different for floats, nothing is dropped. docs/develop/collision.md, "From
@@ -13,9 +13,9 @@
 
 #include "extras/collide/posed_frames.h"
 
-/* --- blocks: loops over 24 vertices, which compilers turn into vectors --- */
+/* --- blocks: loops over 24 vertices, which compilers vectorize --- */
 
-enum { MOST = EBPO_POSED_VERTICES };
+enum { LIMIT = EBPO_POSED_VERTICES };
 
 static float greater_of(float a, float b) { return a > b ? a : b; }
 
@@ -43,19 +43,19 @@ void ebpo_posed_block_make(ebpo_posed_block *out, const ebpo_block_posing *p, co
 {
     const float base[3] = { vertex[0], vertex[vertices], vertex[2 * vertices] };
     ebpo_posing_apply(&p->posing, (const double[3]){ base[0], base[1], base[2] }, out->base);
-    float most = 0, d[3][MOST] = { { 0 } };
+    float most = 0, d[3][LIMIT] = { { 0 } };
     for (unsigned k = 0; k < 3; k++)
         for (unsigned i = 0; i < vertices; i++)
             d[k][i] = vertex[k * vertices + i] - base[k];
-    for (int i = 0; i < MOST; i++)
+    for (int i = 0; i < LIMIT; i++)
         most = greater_of(most, fabsf(d[0][i]) + fabsf(d[1][i]) + fabsf(d[2][i]));
     for (int k = 0; k < 3; k++) {
         const float *m = p->matrix[k];
-        for (int i = 0; i < MOST; i++)
+        for (int i = 0; i < LIMIT; i++)
             out->x[k][i] = (m[0] * d[0][i] + m[1] * d[1][i]) + m[2] * d[2][i];
     }
     out->vertices = vertices;
-    out->reach = ebpo_posed_block_reach(p, most);
+    out->reach = ebpo_posed_block_extent(p, most);
     out->error = ebpo_posed_block_error(p, out->reach);
 }
 
@@ -85,13 +85,13 @@ float ebpo_posed_block_place(const ebpo_posed_block *b, double unit, const doubl
     for (int k = 0; k < 3; k++) {
         float shift = (float)((b->base[k] - origin[k]) * unit);
         most = greater_of(most, fabsf(shift));
-        for (int i = 0; i < MOST; i++)
+        for (int i = 0; i < LIMIT; i++)
             out[k][i] = b->x[k][i] + shift;
     }
     return b->error + 0x1.2p-24f * b->reach + 2.5f * 0x1p-24f * most;
 }
 
-/* 3x3 matrices in doubles, near rotations. */
+/* Inverts a 3x3 matrix near a rotation, in doubles. */
 static void invert_matrix(const double m[3][3], double out[3][3])
 {
     double det = 0;
@@ -120,8 +120,8 @@ static void to_floats(const double m[3][3], float out[3][3], float size[3][3])
     }
 }
 
-/* Frames too different or too strange for floats: every pair of nodes is looked at. */
-static void look_at_all(ebpo_accel_pair *out)
+/* Visits every pair of nodes: the frames are too different or too extreme for floats. */
+static void inspect_all(ebpo_accel_pair *out)
 {
     out->unit[0] = out->unit[1] = 1;
     for (int i = 0; i < 9; i++)
@@ -133,7 +133,7 @@ static void look_at_all(ebpo_accel_pair *out)
     out->slabs = out->apart = false;
 }
 
-/* By the axes of the first's frame; spheres would not do better. */
+/* Compares along the axes of the first's frame; spheres would not be better. */
 static bool turned_boxes_apart(const ebpo_accel_pair *p)
 {
     double first = p->accel[0]->reach * (double)p->unit[0],
@@ -148,7 +148,7 @@ static bool turned_boxes_apart(const ebpo_accel_pair *p)
     return false;
 }
 
-/* per_world: lengths of each frame for one of the world. */
+/* per_world: lengths in each frame for one in the world. */
 static void choose_units(ebpo_accel_pair *out, const double per_world[2])
 {
     double ratio = per_world[0] / per_world[1];
@@ -172,7 +172,7 @@ void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2]
            ratio = unit / ((double)out->unit[1] * per_world[1]);
     if (!(unit > 0x1p-900 && unit < 0x1p900 && ratio > 0x1p-900 && ratio < 0x1p900 &&
           reach * unit < 0x1p100)) {
-        look_at_all(out);
+        inspect_all(out);
         return;
     }
     invert_matrix((const double(*)[3])rotation[0], back);
@@ -191,10 +191,10 @@ void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2]
     to_floats((const double(*)[3])out->turn, out->into[0], out->size[0]);
     invert_matrix((const double(*)[3])out->turn, back);
     to_floats((const double(*)[3])back, out->into[1], out->size[1]);
-    double deviation = posing[0]->posing.deviation + posing[1]->posing.deviation;
+    double error_bound = posing[0]->posing.error_bound + posing[1]->posing.error_bound;
     out->doubt = (float)(0x1p-44 * reach * unit) + 0x1p-100f;
-    out->slab_share = (float)(0x1p-17 + 8 * deviation);
-    out->sine_room = (float)(0x1p-17 + 16 * deviation);
+    out->slab_share = (float)(0x1p-17 + 8 * error_bound);
+    out->sine_capacity = (float)(0x1p-17 + 16 * error_bound);
     out->apart = turned_boxes_apart(out);
 }
 
@@ -203,7 +203,7 @@ static double greatest_coordinate(const double x[3])
     return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
 }
 
-/* Frame `from` seen from frame `to`; offset: from's centre less to's, in the world. */
+/* Computes frame `from` relative to frame `to`; offset: from's centre less to's, in the world. */
 static void turn_into(ebpo_turned_frame *out, double from[3][3], double to[3][3],
                       const double offset[3])
 {
@@ -225,7 +225,7 @@ static void turn_into(ebpo_turned_frame *out, double from[3][3], double to[3][3]
 void ebpo_two_frames_make(ebpo_two_frames *out, const ebpo_accel *const accel[2],
                           const ebpo_block_posing posing[2])
 {
-    double rotation[2][3][3], centre[2][3], offset[2][3], size = 0, lost = 0, deviation = 0;
+    double rotation[2][3][3], centre[2][3], offset[2][3], size = 0, lost = 0, error_bound = 0;
     double unit = posing[0].unit;
     for (int s = 0; s < 2; s++) {
         const ebpo_posing *p = &posing[s].posing;
@@ -236,7 +236,7 @@ void ebpo_two_frames_make(ebpo_two_frames *out, const ebpo_accel *const accel[2]
         out->frame[s].unit = (float)(p->scale / accel[s]->scale * unit);
         size += length * p->scale * unit;
         lost += 2 * ebpo_posing_error(p, 1.7321 * far) * unit;
-        deviation += 2 * p->deviation + 0x1p-50;
+        error_bound += 2 * p->error_bound + 0x1p-50;
     }
     for (int k = 0; k < 3; k++) {
         offset[0][k] = (centre[0][k] - centre[1][k]) * unit;
@@ -245,5 +245,5 @@ void ebpo_two_frames_make(ebpo_two_frames *out, const ebpo_accel *const accel[2]
     double all = size + 1.7321 * greatest_coordinate(offset[0]);
     for (int s = 0; s < 2; s++)
         turn_into(&out->frame[s], rotation[s], rotation[1 - s], offset[s]);
-    out->slack = (float)((0x1p-19 * all + 2 * deviation * all + 2 * lost) * (1 + 0x1p-20));
+    out->slack = (float)((0x1p-19 * all + 2 * error_bound * all + 2 * lost) * (1 + 0x1p-20));
 }

@@ -1,12 +1,12 @@
-/* Solids at poses: on which side of a solid a point of the world is, exact on posed coordinates.
+/* Classifies points of the world by the sides of posed solids, exact on posed coordinates.
  *
- * The point is brought into the model's coordinates with a bound of the error. If no face is near,
- * the winding number there is the answer. Otherwise the faces near the point are posed and decide:
- * from a point farther away, whose winding number is known, axis-parallel segments lead to the
- * point in question, and their crossings are counted exactly. Points with fractions as coordinates
- * are reached from the nearest double in three such segments.
+ * The point is brought into the model's coordinates with an error bound. If no face is near, the
+ * result is the winding number there. Otherwise the faces near the point are posed and decide.
+ * Axis-parallel segments lead from a point farther away, whose winding number is known, to the
+ * queried point, and their crossings are counted exactly. Points with fractions as coordinates are
+ * reached from the nearest double in three such segments.
  *
- * Solids are not changed: any thread may use them, each with its own context. Proofs:
+ * Solids are not changed: any thread may use them, each with a separate context. Proofs:
  * docs/develop/booleans.md and docs/develop/collision.md, "Relation of two models". */
 #include "core/strict_fp.h"
 
@@ -23,7 +23,7 @@
 #include "geometry/predicates.h"
 #include "query/query_model.h"
 
-void ebpo_model_reach(const ebpo_model *m, double reach[3])
+void ebpo_model_extent(const ebpo_model *m, double reach[3])
 {
     for (int k = 0; k < 3; k++) {
         double low = m->info->box_origin[k], high = low + m->info->box_size[k];
@@ -31,7 +31,7 @@ void ebpo_model_reach(const ebpo_model *m, double reach[3])
     }
 }
 
-double ebpo_posed_reach(const ebpo_posing *p, const double reach[3])
+double ebpo_posed_extent(const ebpo_posing *p, const double reach[3])
 {
     double most = 0;
     for (int i = 0; i < 3; i++) {
@@ -48,7 +48,7 @@ ebpo_status ebpo_pose_check(const ebpo_model *model, const ebpo_pose *pose, ebpo
     EBPO_DEFAULT_FP;
     ebpo_posing posing;
     double reach[3];
-    ebpo_model_reach(model, reach);
+    ebpo_model_extent(model, reach);
     return ebpo_posing_make(&posing, pose, reach, error);
 }
 
@@ -61,7 +61,7 @@ bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b)
 
 /* --- points in the coordinates of the model --- */
 
-/* More than the roundings of a bound's own computation. */
+/* Factor above the rounding of a bound's own computation. */
 static const double more = 1 + 0x1p-40;
 
 static void bound_box(ebpo_posed_solid *s)
@@ -87,7 +87,7 @@ ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model, cons
     double reach[3];
     *out = (ebpo_posed_solid){ .model = model };
     memcpy(out->rotation, pose->rotation, sizeof out->rotation);
-    ebpo_model_reach(model, reach);
+    ebpo_model_extent(model, reach);
     ebpo_status status = ebpo_check_mesh(model, error);
     if (status == EBPO_OK)
         status = ebpo_posing_make(&out->posing, pose, reach, error);
@@ -98,8 +98,8 @@ ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model, cons
     bound_box(out);
     if (!(out->moved / out->posing.scale <= 0x1p990))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "pose: the model is too small for where it is: rounding moves it by %.3g "
-                         "of its own units",
+                         "pose: the model is too small for its position: rounding moves it by "
+                         "%.3g of its own units",
                          out->moved / out->posing.scale);
     return EBPO_OK;
 }
@@ -123,7 +123,7 @@ void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], doub
     for (int k = 0; k < 3; k++)
         p[k] = ((s->rotation[0][k] * y[0] + s->rotation[1][k] * y[1]) + s->rotation[2][k] * y[2]) /
                scale;
-    double far = s->moved + length * (2 * s->posing.deviation + 8 * 0x1p-53) + 0x1p-1060;
+    double far = s->moved + length * (2 * s->posing.error_bound + 8 * 0x1p-53) + 0x1p-1060;
     *doubt = far / scale * more + 0x1p-1060;
 }
 
@@ -138,7 +138,7 @@ void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double 
     }
     ebpo_unpose(s, middle, p, &doubt);
     for (int k = 0; k < 3; k++) {
-        double reach = 2 * s->posing.deviation * all;
+        double reach = 2 * s->posing.error_bound * all;
         for (int i = 0; i < 3; i++)
             reach += fabs(s->rotation[i][k]) * half[i];
         reach = reach / s->posing.scale * (1 + 0x1p-40) + doubt;
@@ -147,7 +147,7 @@ void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double 
     }
 }
 
-/* No face of the model is within `doubt` of p, for certain. */
+/* Finds whether certainly no face of the model is within `doubt` of p. */
 static ebpo_status is_clear_of_faces(ebpo_context *context, const double p[3], double doubt,
                                      bool *clear, ebpo_error *error)
 {
@@ -170,14 +170,14 @@ static ebpo_status is_clear_of_faces(ebpo_context *context, const double p[3], d
 typedef struct looking {
     const ebpo_posed_solid *solid;
     const double *w;
-    int axis;              /* the segment runs along it, */
-    double low[3], to;     /* from here to there */
+    int axis;              /* axis of the segment, */
+    double low[3], to;     /* from `low` to `to` */
     int32_t crossed, jump; /* winding numbers: end less beginning; above less below */
     ebpo_posed_sides *out;
 } looking;
 
-/* Which axis tells the two sides of a face apart: the first one that its plane is not parallel to;
- * -1: no area. */
+/* Returns the axis that separates the two sides of a face: the first one that its plane is not
+ * parallel to; -1: no area. */
 static int side_axis(const double t[3][3])
 {
     for (int k = 0; k < 3; k++)
@@ -193,12 +193,12 @@ static bool in_plane(const double plane[3][3], const double t[3][3])
            ebpo_orient3d(plane[0], plane[1], plane[2], t[2]) == 0;
 }
 
-/* A face that w is on. */
+/* Takes a face that contains w. */
 static void take_on(looking *l, const double t[3][3])
 {
     int axis = side_axis(t);
     if (axis < 0)
-        return; /* bounds nothing */
+        return; /* gives no bound */
     if (!l->out->on)
         memcpy(l->out->plane, t, sizeof l->out->plane);
     else if (!in_plane((const double(*)[3])l->out->plane, t))
@@ -227,8 +227,8 @@ static bool take_near_triangles(void *user, const ebpo_triangles *triangles)
 
 typedef struct anchor {
     double at[3];
-    int axis;        /* on which it is away from w */
-    int32_t winding; /* there */
+    int axis;        /* axis along which it is away from w */
+    int32_t winding; /* winding number there */
 } anchor;
 
 static ebpo_status try_anchor(const ebpo_posed_solid *s, ebpo_context *context, anchor *a,
@@ -248,7 +248,7 @@ static ebpo_status try_anchor(const ebpo_posed_solid *s, ebpo_context *context, 
     return status;
 }
 
-/* Farther and farther away; beyond the solid's box at the latest. */
+/* Tries points at increasing distances; one beyond the solid's box always succeeds. */
 static ebpo_status find_anchor(const ebpo_posed_solid *s, ebpo_context *context, const double w[3],
                                double step, anchor *a, ebpo_error *error)
 {
@@ -344,7 +344,7 @@ static void clear_path(path *p)
         ebpo_vectorz_clear(&p->corner[i]);
 }
 
-/* unit: 0 or less, so that x is a whole number. */
+/* unit: 0 or less, so that x is an integer. */
 static void set_points(path *p, const double t[3][3], int unit)
 {
     for (int i = 0; i < 3; i++)
@@ -363,7 +363,7 @@ static void set_points(path *p, const double t[3][3], int unit)
     }
 }
 
-/* Orientation of a, b, c seen against the axis. */
+/* Returns the orientation of a, b, c seen against the axis. */
 static int turn_of(path *p, int axis, const ebpo_vectorz *a, const ebpo_vectorz *b,
                    const ebpo_vectorz *c)
 {
@@ -377,8 +377,8 @@ static int turn_of(path *p, int axis, const ebpo_vectorz *a, const ebpo_vectorz 
     return mpz_sgn(p->number[0]);
 }
 
-/* As in geometry/triangle_predicates.c: the side of the shifted point of a line and of the plane.
- */
+/* As in geometry/triangle_predicates.c: returns the side of the shifted point relative to a line or
+ * the plane. */
 static int side_of_line(path *p, int axis, int i, const ebpo_vectorz *at)
 {
     const ebpo_vectorz *a = &p->corner[i], *b = &p->corner[i == 2 ? 0 : i + 1];
@@ -409,7 +409,7 @@ static int side_of_plane(path *p, const ebpo_vectorz *at)
     return sign;
 }
 
-/* Of the corners, along the axis from one point to another above it. */
+/* Counts the crossing of a face, along the axis from one point to another above it. */
 static int count_crossing(path *p, int axis, const ebpo_vectorz *from, const ebpo_vectorz *to)
 {
     int turn = side_of_line(p, axis, 0, from);

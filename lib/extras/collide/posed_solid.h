@@ -1,6 +1,6 @@
-/* Models at poses: their extent, and on which side of a solid a point of the world is, exact on
- * posed coordinates. Proofs: docs/develop/booleans.md. Solids are not changed: any thread may use
- * them, each with its own context. */
+/* Models at poses: their extent, and the exact side of a solid at a point of the world, on posed
+ * coordinates. Proofs: docs/develop/booleans.md. Solids are not changed: any thread may use them,
+ * each with a separate context. */
 #ifndef EBPO_COLLIDE_POSED_SOLID_H
 #define EBPO_COLLIDE_POSED_SOLID_H
 
@@ -10,13 +10,13 @@
 #include "geometry/pose.h"
 #include "query/query_model.h"
 
-/* No vertex of the model is beyond these coordinates, in size. */
-void ebpo_model_reach(const ebpo_model *model, double reach[3]);
+/* Returns bounds of the sizes of the model's vertex coordinates. */
+void ebpo_model_extent(const ebpo_model *model, double reach[3]);
 
-/* No posed coordinate of its vertices is greater in size. */
-double ebpo_posed_reach(const ebpo_posing *posing, const double reach[3]);
+/* Returns a bound of the sizes of the posed vertex coordinates. */
+double ebpo_posed_extent(const ebpo_posing *posing, const double reach[3]);
 
-/* One file, or two of the same content: the same faces, and the same is meant by them. */
+/* Returns true for one file, or two with the same content: the same faces with the same meaning. */
 bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b);
 
 typedef struct ebpo_posed_solid {
@@ -24,18 +24,19 @@ typedef struct ebpo_posed_solid {
     ebpo_posing posing;
     double rotation[3][3];
     double box[6]; /* low and high: no posed vertex is beyond */
-    double moved;  /* posed vertices are at most so far from where the true motion has them */
+    double moved;  /* bound of the distance of posed vertices from their exact motion */
 } ebpo_posed_solid;
 
-/* Of a surface too, which nobody may ask for winding numbers then. EBPO_E_ARGUMENT: a pose;
- * EBPO_E_ABSENT: a model without its mesh. */
+/* Also makes surfaces, whose winding numbers must not be queried. Fails with EBPO_E_ARGUMENT (the
+ * pose), EBPO_E_ABSENT (a model without its mesh). */
 EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model,
                                                 const ebpo_pose *pose, ebpo_error *error);
 
-/* False: w is certainly outside, beyond the box by more than `margin` (0 or more) on an axis. */
+/* Returns false if w is certainly outside: beyond the box by more than `margin` (0 or more) on an
+ * axis. */
 bool ebpo_posed_solid_near(const ebpo_posed_solid *s, const double w[3], double margin);
 
-/* Returns the greatest gap between two boxes on an axis: above 0 where they are apart. */
+/* Returns the greatest gap between two boxes on an axis: positive where they are apart. */
 static inline double ebpo_box_gap(const double a_low[3], const double a_high[3],
                                   const double b_low[3], const double b_high[3])
 {
@@ -45,24 +46,24 @@ static inline double ebpo_box_gap(const double a_low[3], const double a_high[3],
     return most;
 }
 
-/* The point in the model's coordinates that the true motion brings to w, and *doubt: that point is
- * within it of p, and so is what rounding has moved. If no face of the model is within *doubt of p,
- * the posed model has at w the winding number that the model has at p. */
+/* Computes the point p in the model's coordinates that the exact motion brings to w. *doubt bounds
+ * the error of p and of rounded coordinates. If no face of the model is within *doubt of p, the
+ * posed model has at w the winding number that the model has at p. */
 void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *doubt);
 
-/* The box, in the model, of all faces that may have a point of the box between a and b
- * (corners of it, in any order) when posed. */
+/* Computes the box, in the model, of all faces that may contain, when posed, a point of the box
+ * between a and b (its corners, in any order). */
 void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double b[3], double low[3],
                      double high[3]);
 
-/* Around a point of the world. */
+/* The sides of a solid around a point of the world. */
 typedef struct ebpo_posed_sides {
-    bool on;            /* a posed face with an area goes through it */
-    bool flat;          /* and all such faces have one plane */
-    double plane[3][3]; /* on: corners of one of them */
-    /* Winding numbers close to the point: on the side that is greater in x, or if the plane is
-     * parallel to the x axis in y, or else in z, and on the other one. Equal unless `on`. If on and
-     * not flat, `above` alone is right, somewhere near the point. */
+    bool on;            /* a posed face with an area contains it */
+    bool flat;          /* all such faces are in one plane */
+    double plane[3][3]; /* if on: corners of one of them */
+    /* Winding numbers close to the point: `above` on the side that is greater in x (or, if the
+     * plane is parallel to the x axis, in y, or else in z), `below` on the other. Equal unless
+     * `on`. If on and not flat, only `above` is valid, somewhere near the point. */
     int32_t above, below;
 } ebpo_posed_sides;
 
@@ -70,8 +71,8 @@ EBPO_MUST_USE ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo
                                                  const double w[3], ebpo_posed_sides *out,
                                                  ebpo_error *error);
 
-/* The winding number at x, whose coordinates are canonical fractions no farther than doubles reach,
- * shifted by (d0, d1, d2) as in ebpo_axis_crossing: never on a face. */
+/* Computes the winding number at x, whose coordinates are canonical fractions within the range of
+ * doubles, shifted by (d0, d1, d2) as in ebpo_axis_crossing: never on a face. */
 EBPO_MUST_USE ebpo_status ebpo_exact_winding(const ebpo_posed_solid *s, ebpo_context *context,
                                              const mpq_t x[3], int32_t *winding, ebpo_error *error);
 

@@ -1,9 +1,8 @@
-/* The subtrees of a model at a pose, and where each can have faces: convex envelopes, and gaps
- * between them. A model in parts has the subtrees that are loaded on demand; a whole model is a
- * single one.
+/* Subtrees of a model at a pose, with convex envelopes of their faces, and gaps between envelopes.
+ * A model in parts has the subtrees that are loaded on demand; a whole model is a single one.
  *
- * Envelopes are the cell's polytope, cut by the planes that are in memory for it and for its last
- * ancestors, then posed. They are kept in a hash table by octcode. Gaps are lower bounds of the
+ * An envelope is the cell's polytope, cut by the planes in memory for it and for its last
+ * ancestors, then posed. A hash table keeps envelopes by octcode. Gaps are lower bounds of the
  * distance of two convex sets, found by the iteration of Gilbert (1966): every direction gives a
  * bound, so it may stop at any time. */
 #include "core/strict_fp.h"
@@ -31,7 +30,7 @@ static void middle_of(const ebpo_convex *c, double out[3])
     }
 }
 
-/* The point that is farthest along a direction, or (sign -1) against it. */
+/* Returns the farthest point along a direction, or (sign -1) against it. */
 static const double *farthest_point(const ebpo_convex *c, const double n[3], double sign)
 {
     int best = 0;
@@ -46,12 +45,12 @@ static const double *farthest_point(const ebpo_convex *c, const double n[3], dou
     return c->point[best];
 }
 
-/* So many directions are tried; those that are nearly in contact would take more. */
+/* Most directions that are tried; sets nearly in contact would take more. */
 enum { DIRECTIONS = 32 };
 
-/* Of all differences of points of B and of A, `v` is one near the origin: the line from there to
- * the difference that is farthest back along v comes nearer (Gilbert 1966). Any v bounds the
- * distance: all differences are at least as far along it as that one. */
+/* `v` is a difference of points of B and A near the origin. The line from it to the difference that
+ * is farthest back along v comes nearer (Gilbert 1966). Any v bounds the distance: all differences
+ * are at least as far along it as that one. */
 double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough)
 {
     double v[3], w[3], from[3], best = 0;
@@ -61,7 +60,8 @@ double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough
         v[k] -= from[k];
     for (int turn = 0; turn < DIRECTIONS; turn++) {
         double length2 = ebpo_vec3_dot(v, v), along, step2 = 0, back = 0;
-        if (!(length2 > 0x1p-900 && length2 < 0x1p900)) /* squares are not what they should be */
+        if (!(length2 > 0x1p-900 && length2 < 0x1p900)) /* the squares overflow, underflow or are
+                                                         * not numbers */
             break;
         const double *p = farthest_point(a, v, 1), *q = farthest_point(b, v, -1);
         for (int k = 0; k < 3; k++)
@@ -98,17 +98,17 @@ typedef struct posed_hull {
     double point[][3];
 } posed_hull;
 
-/* Planes of so many levels cut an envelope: what rounding moves its corners by doubles from level
- * to level. */
+/* Number of levels whose planes cut an envelope. It limits how far rounding in doubles moves
+ * corners from level to level. */
 enum { LEVELS_OF_PLANES = 8 };
-/* Of the side of a cell: 255 planes a level, each off by 1e-10 of its cell, and what the levels
- * above have lost. */
+/* Share of a cell's side: 255 planes a level, each off by 1e-10 of its cell, and the error of the
+ * levels above. */
 static const double cut_share = 0x1p-15;
 
 /* --- their order --- */
 
 typedef struct place {
-    uint64_t code; /* of the first cell of the deepest level that it has */
+    uint64_t code; /* code of the first cell of its deepest level */
     uint32_t number;
 } place;
 
@@ -187,12 +187,12 @@ ebpo_posed_node ebpo_posed_child(const ebpo_posed_subtrees *s, const ebpo_posed_
 void ebpo_posed_cell(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[8][3])
 {
     ebpo_box box = ebpo_model_box(s->model);
-    double wall[2][3];
-    ebpo_cell_bounds(&box, cell, wall[0], wall[1]);
+    double cell_face[2][3];
+    ebpo_cell_bounds(&box, cell, cell_face[0], cell_face[1]);
     for (unsigned corner = 0; corner < 8; corner++) {
         double x[3];
         for (unsigned k = 0; k < 3; k++)
-            x[k] = wall[corner >> k & 1][k];
+            x[k] = cell_face[corner >> k & 1][k];
         ebpo_posing_apply(&s->posing, x, out[corner]);
     }
 }
@@ -224,7 +224,7 @@ static void cut_node(const ebpo_posed_subtrees *s, const ebpo_posed_node *node,
     ebpo_planes_cut(envelope, codes, count);
 }
 
-/* In the cell's coordinates. */
+/* Cuts the envelope in the cell's coordinates. */
 static void cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_polytope *out)
 {
     ebpo_posed_node node = ebpo_posed_root(s);
@@ -240,7 +240,7 @@ static void cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_poly
         node = ebpo_posed_child(s, &node, octant);
         if (matters) {
             ebpo_polytope_copy(&above, out);
-            (void)ebpo_polytope_child(&above, octant, out); /* or a box around what is there */
+            (void)ebpo_polytope_child(&above, octant, out); /* or a box around the content */
         }
     }
 }
@@ -272,7 +272,7 @@ static posed_hull **find_hull(posed_hull **hull, uint64_t slots, ebpo_octcode co
     return &hull[at];
 }
 
-/* Room for one more. */
+/* Makes space for one more. */
 static bool widen_table(ebpo_posed_subtrees *s)
 {
     if (4 * (s->hulls + 1) <= 3 * s->slots)

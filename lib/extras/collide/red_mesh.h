@@ -1,4 +1,4 @@
-/* Meshes in a PLY file for looking at, with faces that matter in red. */
+/* Writes meshes to a PLY file for viewing, with the faces that matter in red. */
 #ifndef EBPO_COLLIDE_RED_MESH_H
 #define EBPO_COLLIDE_RED_MESH_H
 
@@ -7,7 +7,8 @@
 #include "io/publish.h"
 #include "geometry/pose.h"
 
-/* Where a mesh comes from: a vertex, and the corners of a face, asked for in ascending order. */
+/* Source of a mesh: functions that return a vertex, and the corners of a face, called in ascending
+ * order. */
 typedef struct ebpo_red_source {
     uint64_t vertices, faces;
     void *user;
@@ -15,18 +16,18 @@ typedef struct ebpo_red_source {
     ebpo_status (*face)(void *user, uint64_t number, uint32_t out[3], ebpo_error *error);
 } ebpo_red_source;
 
-/* That is all in memory, and stays there. */
+/* Returns a source for a mesh in memory, which must stay there. */
 ebpo_red_source ebpo_red_source_of(const ebpo_mesh *mesh);
 
 typedef struct ebpo_red_mesh {
     ebpo_red_source source;
-    const ebpo_posing *posing; /* NULL: as it is */
+    const ebpo_posing *posing; /* NULL: unchanged */
     const uint64_t *red;       /* a bit for each face */
-    const char *colour;        /* of the others: "r g b" */
+    const char *colour;        /* colour of the others: "r g b" */
 } ebpo_red_mesh;
 
-/* One after the other. EBPO_E_LIMIT: more than 2^32 - 1 vertices. EBPO_E_IO, EBPO_E_MEMORY, and
- * the errors of the sources. */
+/* Prints the meshes in sequence. Fails with EBPO_E_LIMIT (more than 2^32 - 1 vertices), EBPO_E_IO,
+ * EBPO_E_MEMORY and the errors of the sources. */
 EBPO_MUST_USE ebpo_status ebpo_red_meshes_print(const ebpo_red_mesh *meshes, int count,
                                                 ebpo_publish *target, ebpo_error *error);
 

@@ -1,12 +1,12 @@
-/* The relation of two models at poses: disjoint, touching, intersecting, one inside the other, or
- * equal.
+/* Finds the relation of two models at poses: disjoint, touching, intersecting, one inside the
+ * other, or equal.
  *
- * The boundary of two models divides space into parts; the relation says which of these exist: in
- * both, in the first alone, in the second alone. Each part is bounded by pieces of faces, so it is
- * found around them (around_face.h). A crossing pair nearly always decides. If not, all faces that
- * intersect the other model are examined, then one face of each patch that does not: such a patch
- * is on one side as a whole. A patch whose side would tell nothing new is skipped, without loading
- * its subtree where the side is known. If the deadline passes, the relation is open.
+ * The boundary of two models divides space into parts; the relation depends on which of these
+ * exist: in both, in the first alone, in the second alone. Each part is bounded by pieces of faces,
+ * so it is found around them (around_face.h). A crossing pair nearly always decides. If not, all
+ * faces that intersect the other model are examined, then one face of each patch that does not:
+ * such a patch is on one side as a whole. A patch whose side would add nothing is skipped, without
+ * loading its subtree where the side is known. If the deadline passes, the relation is open.
  * docs/develop/collision.md, "Relation of two models". One thread. */
 #include "core/strict_fp.h"
 
@@ -29,52 +29,52 @@
 
 /* --- patches without contact --- */
 
-/* Subtrees of one of a question's models; a whole one is its only subtree. */
+/* Subtrees of one of a query's models; a whole model is its only subtree. */
 typedef struct unmet_patches {
-    const ebpo_collision *question;
+    const ebpo_collision *current_query;
     ebpo_two_models *two;
     int m;
     uint64_t subtrees;
-    /* Of the subtree asked for last: its own faces, by numbers in the file, and for each the first
+    /* The owned faces of the last queried subtree, by numbers in the file, and for each the first
      * of its patch (face_patches.h), less `first`. */
     uint64_t first, count;
     uint32_t *patch;
 } unmet_patches;
 
-static void unmet_patches_begin(unmet_patches *u, const ebpo_collision *question,
+static void unmet_patches_begin(unmet_patches *u, const ebpo_collision *current_query,
                                 ebpo_two_models *two, int m)
 {
-    const ebpo_model *model = question->model[m];
-    *u = (unmet_patches){ .question = question, .two = two, .m = m };
+    const ebpo_model *model = current_query->model[m];
+    *u = (unmet_patches){ .current_query = current_query, .two = two, .m = m };
     u->subtrees = model->whole ? 1 : model->top->below_count;
 }
 
 static void unmet_patches_end(unmet_patches *u) { free(u->patch); }
 
 static ebpo_status find_patches(unmet_patches *u, const ebpo_accel *subtree, const uint32_t *slots,
-                                const uint64_t *met, ebpo_error *error)
+                                const uint64_t *intersected, ebpo_error *error)
 {
     u->first = subtree->first_face;
-    u->count = subtree->face_count - subtree->outer_count;
-    return ebpo_face_patches(subtree, slots, met, &u->patch, error);
+    u->count = subtree->face_count - subtree->shared_count;
+    return ebpo_face_patches(subtree, slots, intersected, &u->patch, error);
 }
 
-/* met: a bit for each face of the model. Loads the subtree, and lets go of it. */
-static ebpo_status unmet_patches_find(unmet_patches *u, uint64_t number, const uint64_t *met,
-                                      ebpo_error *error)
+/* Loads the subtree, finds its patches and releases it. met: a bit for each face of the model. */
+static ebpo_status unmet_patches_find(unmet_patches *u, uint64_t number,
+                                      const uint64_t *intersected, ebpo_error *error)
 {
-    const ebpo_model *model = u->question->model[u->m];
+    const ebpo_model *model = u->current_query->model[u->m];
     ebpo_context *context = u->two->context[u->m];
     ebpo_accel *subtree;
     free(u->patch);
     u->patch = NULL;
     if (model->whole)
-        return find_patches(u, model->whole, u->two->faces[u->m]->slots, met, error);
+        return find_patches(u, model->whole, u->two->faces[u->m]->slots, intersected, error);
     ebpo_status status = ebpo_context_subtree(context, (uint32_t)number, &subtree, error);
     if (status != EBPO_OK)
         return status;
     uint32_t *slots = ebpo_face_slots(subtree);
-    status = slots ? find_patches(u, subtree, slots, met, error)
+    status = slots ? find_patches(u, subtree, slots, intersected, error)
                    : ebpo_fail_memory(error, subtree->face_count * sizeof *slots);
     free(slots);
     ebpo_context_let_go(context);
@@ -88,7 +88,7 @@ static bool note_any(void *user, const ebpo_triangles *triangles)
     return !*any;
 }
 
-/* Whether the solid has all of a ball around a point of the world inside, or outside. */
+/* Finds whether all of a ball around a point of the world is inside, or outside, the solid. */
 static ebpo_status side_of_ball(const unmet_patches *u, const double middle[3], double radius,
                                 int *in, ebpo_error *error)
 {
@@ -98,10 +98,10 @@ static ebpo_status side_of_ball(const unmet_patches *u, const double middle[3], 
     bool near = false;
     ebpo_inside_result inside;
     ebpo_unpose(other, middle, p, &doubt);
-    double room = (radius / other->posing.scale + 2 * doubt) * (1 + 0x1p-20);
+    double space = (radius / other->posing.scale + 2 * doubt) * (1 + 0x1p-20);
     for (int k = 0; k < 3; k++) {
-        low[k] = nextafter(p[k] - room, -INFINITY);
-        high[k] = nextafter(p[k] + room, INFINITY);
+        low[k] = nextafter(p[k] - space, -INFINITY);
+        high[k] = nextafter(p[k] + space, INFINITY);
     }
     ebpo_status status = ebpo_triangles_in_box(context, low, high, note_any, &near, error);
     if (status != EBPO_OK || near)
@@ -111,20 +111,21 @@ static ebpo_status side_of_ball(const unmet_patches *u, const double middle[3], 
     return status;
 }
 
-/* The cell has a point of each of its own faces; so does the ball around it. If no face of the
- * other model comes near the ball, it is on one side, and so is each face that meets none. */
+/* The cell, and so the ball around it, contains a point of each of its owned faces. If no face of
+ * the other model comes near the ball, it is on one side, and so is each face that intersects none.
+ */
 static ebpo_status unmet_patches_side(const unmet_patches *u, uint64_t number, int *in,
                                       ebpo_error *error)
 {
-    const ebpo_model *model = u->question->model[u->m];
-    ebpo_posed_subtrees as = { .model = model, .posing = u->question->posing[u->m].posing };
+    const ebpo_model *model = u->current_query->model[u->m];
+    ebpo_posed_subtrees as = { .model = model, .posing = u->current_query->posing[u->m].posing };
     double corner[8][3], middle[3];
     *in = -1;
     if (model->whole)
         return EBPO_OK;
     ebpo_cell cell = model->top->below[number].cell;
     double radius =
-        ebpo_posed_diagonal(&as, cell) / 2 + ebpo_posed_slack(&as, cell, u->question->reach);
+        ebpo_posed_diagonal(&as, cell) / 2 + ebpo_posed_slack(&as, cell, u->current_query->reach);
     ebpo_posed_cell(&as, cell, corner);
     for (int k = 0; k < 3; k++)
         middle[k] = corner[0][k] / 2 + corner[7][k] / 2;
@@ -138,20 +139,21 @@ static ebpo_status unmet_patches_side(const unmet_patches *u, uint64_t number, i
 
 static const char stage[] = "relation";
 
-/* Models in the question's order. */
+/* State of the search; models in the query's order. */
 typedef struct relating {
-    const ebpo_collision *question;
+    const ebpo_collision *current_query;
     ebpo_pair_faces places;
     ebpo_two_models two;
     ebpo_relation_result *out;
-    uint64_t *met[2], *seen[2]; /* a bit for each face: it meets one of the other; was looked at */
-    bool both, only[2];   /* there are points inner to both; of one that are not in the other */
-    bool told;            /* a face with an area has been looked at */
-    bool touch, doubtful; /* a common point; pairs that may have one */
-    unsigned last[2];     /* `in` of the piece looked at last */
-    uint64_t looked_at;
+    uint64_t *intersected[2], *seen[2]; /* bits for each face: it intersects the other model; it was
+                                         * examined */
+    bool both, only[2];   /* there are inner points of both; of one that are not in the other */
+    bool reported;        /* a face with an area has been examined */
+    bool touch, doubtful; /* a common point exists; undecided pairs exist */
+    unsigned last[2];     /* `in` of the last examined piece */
+    uint64_t inspected;
     bool open;
-    ebpo_error *error; /* of `status`, within callbacks */
+    ebpo_error *error; /* error of `status`, within callbacks */
     ebpo_status status;
 } relating;
 
@@ -159,7 +161,7 @@ static bool is_mixed(const relating *r) { return r->two.solid[0] != r->two.solid
 
 static bool are_surfaces(const relating *r) { return !r->two.solid[0] && !r->two.solid[1]; }
 
-/* Nothing that is still to be looked at can change the relation. */
+/* Returns true if no remaining face can change the relation. */
 static bool is_decided(const relating *r)
 {
     if (is_mixed(r))
@@ -169,14 +171,14 @@ static bool is_decided(const relating *r)
 
 static uint64_t face_count(const relating *r, int m)
 {
-    return r->question->model[m]->info->face_count;
+    return r->current_query->model[m]->info->face_count;
 }
 
 static bool has_bit(const uint64_t *bits, uint64_t i) { return bits[i / 64] >> i % 64 & 1; }
 
 static void set_bit(uint64_t *bits, uint64_t i) { bits[i / 64] |= UINT64_C(1) << i % 64; }
 
-/* --- looking at faces --- */
+/* --- examining faces --- */
 
 typedef struct facing {
     relating *r;
@@ -196,7 +198,7 @@ static bool note_piece(void *user, const ebpo_around *a)
     const facing *f = user;
     relating *r = f->r;
     unsigned other = a->in[!f->m];
-    r->told = true;
+    r->reported = true;
     memcpy(r->last, a->in, sizeof r->last);
     if (r->two.solid[0] && r->two.solid[1])
         note_solids(r, a);
@@ -207,26 +209,27 @@ static bool note_piece(void *user, const ebpo_around *a)
     return !is_decided(r);
 }
 
-/* Once; false: enough, or `status`. Of a solid and a surface the surface's faces tell all. */
-static bool look_at(relating *r, int m, uint64_t face)
+/* Examines a face once. Returns false when enough is known, or for `status`. Of a solid and a
+ * surface, the surface's faces decide. */
+static bool inspect_pair_one(relating *r, int m, uint64_t face)
 {
     facing f = { r, m };
     if ((is_mixed(r) && r->two.solid[m]) || has_bit(r->seen[m], face))
         return true;
     set_bit(r->seen[m], face);
     r->status = ebpo_look_around_face(&r->two, m, face, note_piece, &f, r->error);
-    if (r->status == EBPO_OK && ++r->looked_at % 64 == 0 &&
-        !ebpo_progress_step(&r->question->options.progress, stage, 0, 0, r->error))
+    if (r->status == EBPO_OK && ++r->inspected % 64 == 0 &&
+        !ebpo_progress_step(&r->current_query->options.progress, stage, 0, 0, r->error))
         r->status = EBPO_E_CANCELLED;
-    r->open |= ebpo_collision_is_late(r->question);
+    r->open |= ebpo_collision_is_late(r->current_query);
     return r->status == EBPO_OK && !r->open && !is_decided(r);
 }
 
-static bool look_at_pair(relating *r, const ebpo_face_pair *pair)
+static bool inspect_pair(relating *r, const ebpo_face_pair *pair)
 {
     const uint64_t face[2] = { pair->file_face_a, pair->file_face_b };
-    bool turned = r->question->turned;
-    return look_at(r, 0, face[turned]) && look_at(r, 1, face[!turned]);
+    bool turned = r->current_query->turned;
+    return inspect_pair_one(r, 0, face[turned]) && inspect_pair_one(r, 1, face[!turned]);
 }
 
 /* --- contacts --- */
@@ -243,7 +246,7 @@ static bool all_have_area(relating *r, const ebpo_face_pair *pair)
     return r->status == EBPO_OK;
 }
 
-/* What a pair tells of two surfaces. False: `status`. */
+/* Records a pair of two surfaces. Returns false for `status`. */
 static bool note_pair(relating *r, const ebpo_face_pair *pair)
 {
     r->both |= pair->kind != EBPO_PAIR_TOUCHING;
@@ -254,31 +257,31 @@ static bool note_pair(relating *r, const ebpo_face_pair *pair)
 static bool take_contacts(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     relating *r = user;
-    bool turned = r->question->turned, more = true;
+    bool turned = r->current_query->turned, more = true;
     for (uint64_t i = 0; i < count && more; i++) {
-        set_bit(r->met[turned], pairs[i].file_face_a);
-        set_bit(r->met[!turned], pairs[i].file_face_b);
+        set_bit(r->intersected[turned], pairs[i].file_face_a);
+        set_bit(r->intersected[!turned], pairs[i].file_face_b);
         if (are_surfaces(r))
             more = note_pair(r, &pairs[i]);
         else if (pairs[i].kind == EBPO_PAIR_CROSSING)
-            more = look_at_pair(r, &pairs[i]);
+            more = inspect_pair(r, &pairs[i]);
     }
     return more;
 }
 
-/* With what is left of the time. */
+/* Returns options with the remaining time. */
 static ebpo_collide_options options_left(const relating *r)
 {
-    ebpo_collide_options options = r->question->options;
+    ebpo_collide_options options = r->current_query->options;
     uint64_t now = ebpo_clock();
-    if (r->question->late != UINT64_MAX)
-        options.deadline_ns = r->question->late > now ? r->question->late - now : 1;
+    if (r->current_query->late != UINT64_MAX)
+        options.deadline_ns = r->current_query->late > now ? r->current_query->late - now : 1;
     return options;
 }
 
 static ebpo_status take_pairs(relating *r, ebpo_pairs_fn take, ebpo_error *error)
 {
-    const ebpo_collision *q = r->question;
+    const ebpo_collision *q = r->current_query;
     ebpo_collide_options options = options_left(r);
     ebpo_two_models_let_go(&r->two);
     ebpo_status status = ebpo_collide_all(q->collider, &options, take, r, error);
@@ -294,37 +297,37 @@ static bool goes_on(const relating *r)
     return r->status == EBPO_OK && !r->open && !is_decided(r);
 }
 
-static void look_at_met(relating *r)
+static void inspect_found(relating *r)
 {
     for (int m = 0; m < 2; m++) {
         uint64_t count = face_count(r, m);
         for (uint64_t f = 0; f < count && goes_on(r); f++)
-            if (has_bit(r->met[m], f))
-                (void)look_at(r, m, f);
+            if (has_bit(r->intersected[m], f))
+                (void)inspect_pair_one(r, m, f);
     }
 }
 
 /* --- faces without contact --- */
 
-/* Patches of them are on one side of the other model. Does another face on that side (`in`: in it)
- * tell nothing more? */
-static bool side_is_told(const relating *r, int m, bool in)
+/* Patches without contact are on one side of the other model. Returns true if another face on that
+ * side (`in`: inside) adds nothing. */
+static bool side_is_reported(const relating *r, int m, bool in)
 {
     if (is_mixed(r))
         return in ? r->both : r->only[m];
     return in ? r->both && r->only[!m] : r->only[m];
 }
 
-/* Own faces of a subtree that meet none of the other model, as long as their patch may tell more.
- */
+/* Examines owned faces of a subtree that intersect none of the other model, as long as their patch
+ * may add information. */
 static void look_through(relating *r, const unmet_patches *u, uint64_t *done)
 {
     for (uint64_t i = 0; i < u->count && goes_on(r); i++) {
-        if (has_bit(r->met[u->m], u->first + i) || has_bit(done, u->patch[i]))
+        if (has_bit(r->intersected[u->m], u->first + i) || has_bit(done, u->patch[i]))
             continue;
-        r->told = false;
-        (void)look_at(r, u->m, u->first + i);
-        if (r->told && side_is_told(r, u->m, r->last[!u->m] != 0))
+        r->reported = false;
+        (void)inspect_pair_one(r, u->m, u->first + i);
+        if (r->reported && side_is_reported(r, u->m, r->last[!u->m] != 0))
             set_bit(done, u->patch[i]);
     }
 }
@@ -336,9 +339,9 @@ static ebpo_status fail_bits(uint64_t count, ebpo_error *error)
     return ebpo_fail_memory(error, count / 8);
 }
 
-static void look_at_subtree(relating *r, unmet_patches *u, uint64_t number)
+static void inspect_subtree(relating *r, unmet_patches *u, uint64_t number)
 {
-    r->status = unmet_patches_find(u, number, r->met[u->m], r->error);
+    r->status = unmet_patches_find(u, number, r->intersected[u->m], r->error);
     if (r->status != EBPO_OK)
         return;
     uint64_t *done = make_bits(u->count);
@@ -349,69 +352,70 @@ static void look_at_subtree(relating *r, unmet_patches *u, uint64_t number)
     free(done);
 }
 
-/* All faces of the subtree are on a side that has been told: it need not be loaded. */
+/* Returns true if all faces of the subtree are on a known side: it need not be loaded. */
 static bool is_settled(relating *r, const unmet_patches *u, uint64_t number)
 {
     int in = -1;
-    if (side_is_told(r, u->m, true) || side_is_told(r, u->m, false))
+    if (side_is_reported(r, u->m, true) || side_is_reported(r, u->m, false))
         r->status = unmet_patches_side(u, number, &in, r->error);
-    return in >= 0 && side_is_told(r, u->m, in);
+    return in >= 0 && side_is_reported(r, u->m, in);
 }
 
-static void look_at_patches(relating *r, int m)
+static void inspect_patches(relating *r, int m)
 {
     unmet_patches u;
     if (is_mixed(r) && r->two.solid[m])
         return;
-    unmet_patches_begin(&u, r->question, &r->two, m);
+    unmet_patches_begin(&u, r->current_query, &r->two, m);
     for (uint64_t i = 0; i < u.subtrees && goes_on(r); i++) {
         if (!is_settled(r, &u, i) && r->status == EBPO_OK)
-            look_at_subtree(r, &u, i);
-        r->open |= ebpo_collision_is_late(r->question);
+            inspect_subtree(r, &u, i);
+        r->open |= ebpo_collision_is_late(r->current_query);
     }
     unmet_patches_end(&u);
 }
 
-/* --- common points of models that have no inner ones in common --- */
+/* --- common points of models without common inner points --- */
 
 static bool note_sound(void *user, const ebpo_around *a)
 {
     const facing *f = user;
-    f->r->told = true;
+    f->r->reported = true;
     f->r->doubtful |= a->in[f->m] == 0;
     return !f->r->doubtful;
 }
 
-/* Every piece of the face belongs to its model: so does every point of a contact. */
+/* Returns true if every piece of the face belongs to its model; then every point of a contact does.
+ */
 static bool is_sound(relating *r, int m, uint64_t face)
 {
     facing f = { r, m };
-    r->told = r->doubtful = false;
+    r->reported = r->doubtful = false;
     if (r->status == EBPO_OK)
         r->status = ebpo_look_around_face(&r->two, m, face, note_sound, &f, r->error);
-    return r->status == EBPO_OK && r->told && !r->doubtful;
+    return r->status == EBPO_OK && r->reported && !r->doubtful;
 }
 
 static bool take_sound(void *user, const ebpo_face_pair *pairs, uint64_t count)
 {
     relating *r = user;
-    bool turned = r->question->turned;
+    bool turned = r->current_query->turned;
     for (uint64_t i = 0; i < count && !r->touch && r->status == EBPO_OK && !r->open; i++) {
         const uint64_t face[2] = { pairs[i].file_face_a, pairs[i].file_face_b };
         r->touch = is_sound(r, 0, face[turned]) && is_sound(r, 1, face[!turned]);
-        r->open |= ebpo_collision_is_late(r->question);
+        r->open |= ebpo_collision_is_late(r->current_query);
     }
     return !r->touch && r->status == EBPO_OK && !r->open;
 }
 
-static ebpo_status find_touch(relating *r, ebpo_error *error)
+static ebpo_status find_haptic(relating *r, ebpo_error *error)
 {
     ebpo_status status = take_pairs(r, take_sound, error);
     uint64_t count = face_count(r, 0);
     for (uint64_t f = 0; f < count && status == EBPO_OK && !r->touch && !r->open; f++) {
-        if (has_bit(r->met[0], f))
+        if (has_bit(r->intersected[0], f))
             status = ebpo_face_has_common_point(&r->two, 0, f, &r->touch, error);
-        r->open |= ebpo_collision_is_late(r->question);
+        r->open |= ebpo_collision_is_late(r->current_query);
     }
     return status;
 }
@@ -423,69 +427,69 @@ static bool has_unmet_area(relating *r, int m)
     bool has = false;
     for (uint64_t f = 0; f < face_count(r, m) && r->status == EBPO_OK && !has; f++) {
         double t[3][3];
-        if (!has_bit(r->met[m], f))
+        if (!has_bit(r->intersected[m], f))
             r->status = ebpo_two_models_face(&r->two, m, f, t, &has, r->error);
     }
     return has;
 }
 
-/* One file twice, at one pose. */
+/* Returns true for one file twice, at one pose. */
 static bool is_same(const ebpo_collision *q)
 {
     return ebpo_same_model(q->model[0], q->model[1]) &&
            memcmp(&q->options.pose_a, &q->options.pose_b, sizeof q->options.pose_a) == 0;
 }
 
-/* Whether there is anything. */
-static void look_for_any(relating *r)
+/* Finds whether identical models have a common point. */
+static void find_any(relating *r)
 {
     uint64_t count = face_count(r, 0);
     r->out->contact = count > 0;
     if (are_surfaces(r))
         r->both = r->touch = has_unmet_area(r, 0);
     for (uint64_t f = 0; f < count && goes_on(r) && !r->both; f++)
-        (void)look_at(r, 0, f);
+        (void)inspect_pair_one(r, 0, f);
 }
 
-/* A pair that meets, and what is around its faces: if they cross, that nearly always decides. */
-static ebpo_status look_at_first(relating *r, ebpo_error *error)
+/* Finds an intersecting pair, and examines its faces: if they cross, that nearly always decides. */
+static ebpo_status inspect_first(relating *r, ebpo_error *error)
 {
-    const ebpo_collision *q = r->question;
+    const ebpo_collision *q = r->current_query;
     ebpo_collide_options options = options_left(r);
     ebpo_face_pair pair;
     ebpo_status status = ebpo_collide_first(q->collider, &options, &pair, &r->out->contact, error);
     r->open |= r->out->contact < 0;
     if (status != EBPO_OK || r->out->contact != 1 || are_surfaces(r))
         return status;
-    (void)look_at_pair(r, &pair);
+    (void)inspect_pair(r, &pair);
     return r->status;
 }
 
-static ebpo_status look_at_contacts(relating *r, ebpo_error *error)
+static ebpo_status inspect_contacts(relating *r, ebpo_error *error)
 {
     ebpo_status status = take_pairs(r, take_contacts, error);
     for (int m = 0; m < 2 && r->both && are_surfaces(r) && goes_on(r); m++)
         r->only[m] = has_unmet_area(r, m);
     if (status == EBPO_OK && (r->both || !are_surfaces(r)))
-        look_at_met(r);
+        inspect_found(r);
     return status == EBPO_OK ? r->status : status;
 }
 
 static ebpo_status gather_facts(relating *r, ebpo_error *error)
 {
-    ebpo_status status = look_at_first(r, error);
+    ebpo_status status = inspect_first(r, error);
     if (status == EBPO_OK && r->out->contact == 1 && goes_on(r))
-        status = look_at_contacts(r, error);
+        status = inspect_contacts(r, error);
     for (int m = 0; m < 2 && status == EBPO_OK && !are_surfaces(r); m++) {
-        look_at_patches(r, m);
+        inspect_patches(r, m);
         status = r->status;
     }
     if (status == EBPO_OK && !r->open && !r->both && !are_surfaces(r) && r->out->contact == 1)
-        status = find_touch(r, error);
+        status = find_haptic(r, error);
     return status;
 }
 
-/* Of the question's first model to its second. */
+/* Returns the relation of the query's first model to its second. */
 static ebpo_relation relation_of(const relating *r)
 {
     if (r->open)
@@ -518,7 +522,7 @@ static bool are_boxes_apart(const ebpo_two_models *two)
 
 static ebpo_status find_relation(relating *r, ebpo_error *error)
 {
-    const ebpo_collision *q = r->question;
+    const ebpo_collision *q = r->current_query;
     ebpo_status status = ebpo_two_models_begin(&r->two, &r->places, error);
     if (status != EBPO_OK)
         return status;
@@ -527,23 +531,23 @@ static ebpo_status find_relation(relating *r, ebpo_error *error)
         return EBPO_OK;
     for (int m = 0; m < 2; m++) {
         uint64_t count = face_count(r, m);
-        r->met[m] = make_bits(count);
+        r->intersected[m] = make_bits(count);
         r->seen[m] = make_bits(count);
-        if (!r->met[m] || !r->seen[m])
+        if (!r->intersected[m] || !r->seen[m])
             return fail_bits(count, error);
     }
     if (!is_same(q))
         return gather_facts(r, error);
-    look_for_any(r);
+    find_any(r);
     return r->status;
 }
 
-/* What subtrees cost, in both questions that are asked meanwhile and besides. */
-static void count_loads(const relating *r, uint64_t bytes_told, uint64_t read_before)
+/* Counts the cost of subtrees, in nested queries and here. */
+static void count_loads(const relating *r, uint64_t bytes_reported, uint64_t read_before)
 {
-    ebpo_collider *c = r->question->collider;
+    ebpo_collider *c = r->current_query->collider;
     c->loads += ebpo_two_models_loads(&r->two);
-    c->bytes_read = bytes_told + ebpo_collision_bytes_read(r->question) - read_before;
+    c->bytes_read = bytes_reported + ebpo_collision_bytes_read(r->current_query) - read_before;
 }
 
 static void end_relating(relating *r)
@@ -551,7 +555,7 @@ static void end_relating(relating *r)
     ebpo_two_models_end(&r->two);
     ebpo_pair_faces_end(&r->places);
     for (int m = 0; m < 2; m++) {
-        free(r->met[m]);
+        free(r->intersected[m]);
         free(r->seen[m]);
     }
 }
@@ -563,16 +567,16 @@ ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *
     ebpo_collision q;
     *out = (ebpo_relation_result){ EBPO_RELATION_OPEN, -1 };
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
-    relating r = { .question = &q, .out = out, .error = error };
+    relating r = { .current_query = &q, .out = out, .error = error };
     if (status == EBPO_OK)
         status = ebpo_pair_faces_begin(&r.places, &q, error);
     if (status != EBPO_OK)
         return status;
-    uint64_t told = c->bytes_read, before = ebpo_collision_bytes_read(&q);
+    uint64_t reported = c->bytes_read, before = ebpo_collision_bytes_read(&q);
     status = find_relation(&r, error);
     ebpo_relation relation = relation_of(&r);
     out->relation = (int32_t)(q.turned ? turned_relation(relation) : relation);
-    count_loads(&r, told, before);
+    count_loads(&r, reported, before);
     end_relating(&r);
     return status;
 }

@@ -1,10 +1,10 @@
-/* Pairs of nodes of two posed trees, the smallest gap first, down to subtrees that are loaded on
- * demand. The gap of two envelopes bounds the distance of all that is in the nodes.
+/* Visits pairs of nodes of two posed trees, the smallest gap first, down to subtrees that are
+ * loaded on demand. The gap of two envelopes bounds the distance of the nodes' contents.
  *
- * Depth, levels, distances and the way out search with it; each has its own measure of the best
- * result and of when it is enough. Of two nodes the larger one is divided first. Several pairs of
- * nodes of a whole model and one in parts may need the same subtree: it is visited once. One
- * thread. */
+ * Depth, levels, distances and separation distances along a direction use it; each has a separate
+ * measure of the best result and of when to stop. The larger of two nodes is divided first. Several
+ * pairs of nodes of a whole model and one in parts may need the same subtree: it is visited once.
+ * One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -85,7 +85,7 @@ ebpo_status ebpo_node_gap_of(ebpo_node_gaps *g, const ebpo_posed_node node[2], d
 ebpo_status ebpo_subtree_search_begin(ebpo_subtree_search *s, const ebpo_collision *q,
                                       ebpo_error *error)
 {
-    s->question = q;
+    s->current_query = q;
     s->read_before = ebpo_collision_bytes_read(q);
     ebpo_status status = ebpo_node_gaps_begin(&s->nodes, q, error);
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
@@ -100,8 +100,8 @@ ebpo_status ebpo_subtree_search_begin(ebpo_subtree_search *s, const ebpo_collisi
 
 void ebpo_subtree_search_end(ebpo_subtree_search *s)
 {
-    ebpo_collider *c = s->question->collider;
-    c->bytes_read += ebpo_collision_bytes_read(s->question) - s->read_before;
+    ebpo_collider *c = s->current_query->collider;
+    c->bytes_read += ebpo_collision_bytes_read(s->current_query) - s->read_before;
     for (int i = 0; i < 2; i++) {
         c->loads += s->context[i] ? s->context[i]->loaded : 0;
         ebpo_context_free(s->context[i]);
@@ -115,21 +115,22 @@ static bool is_gray(const ebpo_posed_node *node)
     return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_GRAY;
 }
 
-/* Nodes of a whole model are divided for their bounds only: not below the size of the other one's
+/* Nodes of a whole model are divided only for their bounds, not below the size of the other one's
  * subtree. */
 int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node node[2])
 {
     int larger = ebpo_node_larger(&s->nodes, node);
     if (is_gray(&node[larger]))
         return larger;
-    return is_gray(&node[!larger]) && !s->question->model[!larger]->whole ? !larger : -1;
+    return is_gray(&node[!larger]) && !s->current_query->model[!larger]->whole ? !larger : -1;
 }
 
-/* Of a whole model and one in parts several pairs of nodes call for the same subtree: once. */
+/* Returns true if a pair of subtrees was visited: with a whole model and one in parts, several
+ * pairs of nodes need the same one. */
 static bool was_seen(const ebpo_subtree_search *s, const uint32_t number[2])
 {
     for (int i = 0; i < 2; i++)
-        if (s->question->model[!i]->whole && s->seen[i][number[i]])
+        if (s->current_query->model[!i]->whole && s->seen[i][number[i]])
             return true;
     return false;
 }
@@ -137,20 +138,20 @@ static bool was_seen(const ebpo_subtree_search *s, const uint32_t number[2])
 ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s, const ebpo_posed_node node[2],
                                      const ebpo_accel *accel[2], bool *there, ebpo_error *error)
 {
-    ebpo_collider *c = s->question->collider;
+    ebpo_collider *c = s->current_query->collider;
     uint32_t number[2];
     *there = false;
     for (int i = 0; i < 2; i++) {
-        const ebpo_model *m = s->question->model[i];
+        const ebpo_model *m = s->current_query->model[i];
         number[i] = m->whole ? 0 : ebpo_entry_value(node[i].entry);
         if (!m->whole && m->top->below[number[i]].pruned)
-            return EBPO_OK; /* what it had is not in this file */
+            return EBPO_OK; /* the content of a pruned node is not in this file */
     }
     if (was_seen(s, number))
         return EBPO_OK;
     c->subtree_pairs++;
     for (int i = 0; i < 2; i++) {
-        ebpo_accel *loaded = s->question->model[i]->whole;
+        ebpo_accel *loaded = s->current_query->model[i]->whole;
         ebpo_status status =
             loaded ? EBPO_OK : ebpo_context_subtree(s->context[i], number[i], &loaded, error);
         if (status != EBPO_OK)

@@ -1,12 +1,11 @@
-/* Pairs of nodes of two posed trees, the smallest gap of envelopes first, down to subtrees that
- * are loaded on demand. One thread. */
+/* Visits pairs of nodes of two posed trees, the smallest gap of envelopes first. One thread. */
 #ifndef EBPO_COLLIDE_SUBTREE_SEARCH_H
 #define EBPO_COLLIDE_SUBTREE_SEARCH_H
 
 #include "extras/collide/collider.h"
 #include "extras/collide/posed_subtrees.h"
 
-/* Two nodes with something of each model in them; `gap`: they are not nearer to each other. */
+/* Two nodes with content of each model; `gap`: lower bound of their distance. */
 typedef struct ebpo_node_gap {
     ebpo_posed_node node[2];
     double gap;
@@ -15,54 +14,56 @@ typedef struct ebpo_node_gap {
 /* Zero at first. */
 typedef struct ebpo_node_gaps {
     ebpo_posed_subtrees side[2];
-    double reach;        /* no posed coordinate is greater */
-    ebpo_node_gap *heap; /* those of the least gaps first */
+    double reach;        /* bound of posed coordinates */
+    ebpo_node_gap *heap; /* the least gap first */
     uint64_t count, capacity;
 } ebpo_node_gaps;
 
-/* Freed also after a failure. */
-EBPO_MUST_USE ebpo_status ebpo_node_gaps_begin(ebpo_node_gaps *g, const ebpo_collision *question,
+/* Must be freed, also after a failure. */
+EBPO_MUST_USE ebpo_status ebpo_node_gaps_begin(ebpo_node_gaps *g,
+                                               const ebpo_collision *current_query,
                                                ebpo_error *error);
 void ebpo_node_gaps_free(ebpo_node_gaps *g);
 
 EBPO_MUST_USE ebpo_status ebpo_node_gaps_push(ebpo_node_gaps *g, const ebpo_node_gap *pair,
                                               ebpo_error *error);
-/* The least one; there is one. */
+/* Removes and returns the least one; the heap must not be empty. */
 ebpo_node_gap ebpo_node_gaps_pop(ebpo_node_gaps *g);
 
-/* The certain gap of two nodes' envelopes, 0 or more. */
+/* Computes a certain lower bound of the gap of two nodes' envelopes, 0 or more. */
 EBPO_MUST_USE ebpo_status ebpo_node_gap_of(ebpo_node_gaps *g, const ebpo_posed_node node[2],
                                            double *out, ebpo_error *error);
-/* Both have faces, one each in its cell or near it: these are not farther apart. */
+/* Bounds from above the distance of two nodes with faces, which have one each in or near the cell.
+ */
 double ebpo_node_far_bound(const ebpo_node_gaps *g, const ebpo_posed_node node[2]);
-/* Which of two nodes, both gray or neither, is to be divided first. */
+/* Returns which of two nodes, both gray or neither, is divided first. */
 int ebpo_node_larger(const ebpo_node_gaps *g, const ebpo_posed_node node[2]);
 
 /* A node may list a face that only comes near, within 1/256 of the cell's size on each axis
- * (format-spec, section 5); and some room for rounding. */
+ * (format-spec, section 5); plus a margin for rounding. */
 #define EBPO_NEAR_SHARE 0x1.1p-8
 
 /* Zero at first. */
 typedef struct ebpo_subtree_search {
-    const ebpo_collision *question;
+    const ebpo_collision *current_query;
     ebpo_node_gaps nodes;
-    ebpo_context *context[2]; /* of models that are in parts */
-    bool *seen[2];            /* subtrees that have been looked at */
+    ebpo_context *context[2]; /* for models in parts */
+    bool *seen[2];            /* visited subtrees */
     uint64_t read_before;
 } ebpo_subtree_search;
 
-/* Ended also after a failure. */
+/* Must be ended, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_search_begin(ebpo_subtree_search *s,
-                                                    const ebpo_collision *question,
+                                                    const ebpo_collision *current_query,
                                                     ebpo_error *error);
-/* Adds what has been loaded and read to the collider's counts. */
+/* Adds the loads and bytes read to the collider's counts. */
 void ebpo_subtree_search_end(ebpo_subtree_search *s);
 
-/* Which of two nodes is to be divided; -1: neither, they are to be looked at. */
+/* Returns which of two nodes is divided; -1: neither, they are visited. */
 int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node node[2]);
 
-/* What is to be looked at of two nodes that are not divided, loaded if need be: until the next
- * call. *there: false if nothing is, or it has been looked at. */
+/* Returns the accels of two undivided nodes, loaded if necessary; they are valid until the next
+ * call. *there: false if there is nothing to visit, or it was visited before. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s,
                                                    const ebpo_posed_node node[2],
                                                    const ebpo_accel *accel[2], bool *there,

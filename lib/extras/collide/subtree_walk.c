@@ -1,11 +1,11 @@
-/* All pairs of intersecting faces of models that are loaded in parts, with the same result as of
- * whole models.
+/* Finds all pairs of intersecting faces of models that are loaded in parts, with the same result as
+ * for whole models.
  *
- * Two faces with a common point are listed by the subtrees whose cells hold that point, so it
+ * Two faces with a common point are listed by the subtrees whose cells contain that point, so it
  * suffices to search pairs of subtrees whose envelopes may touch. These pairs are found before a
- * subtree is loaded, and sorted so that a loaded subtree is soon used again. Several threads
- * search pairs of subtrees. A face that several subtrees list is found more than once, so pairs
- * wait, are sorted and made unique, and are given in order as soon as no earlier one can come.
+ * subtree is loaded, and sorted so that a loaded subtree is soon reused. Several threads search
+ * pairs of subtrees. A face that several subtrees list is found more than once. So pairs wait, are
+ * sorted and made unique; they are returned in order as soon as no earlier one can come.
  *
  * When too many wait for the collider's memory, pairs of the first model's later faces are dropped
  * and found again in another round. */
@@ -34,22 +34,22 @@ typedef struct subtree_pair {
 typedef struct subtree_pairs {
     subtree_pair *pair;
     uint64_t count, capacity;
-    uint64_t subtrees[2]; /* different ones of each model */
+    uint64_t subtrees[2]; /* number of different ones of each model */
 } subtree_pairs;
 
-/* Faces that meet, with their numbers: [0] of the question's first model. */
-typedef struct told_pair {
+/* Intersecting faces, with their numbers: [0] of the query's first model. */
+typedef struct stored_pair {
     uint32_t file[2], source[2];
     int32_t kind;
-} told_pair;
+} stored_pair;
 
-/* Zero at first. Its contexts hold the two subtrees that it has come to last. */
+/* Search of one thread. Zero at first. Its contexts hold the last two subtrees. */
 typedef struct subtree_walk {
-    const ebpo_collision *question;
+    const ebpo_collision *current_query;
     bool self;
-    ebpo_context *context[2]; /* of models that are in parts */
+    ebpo_context *context[2]; /* for models in parts */
     ebpo_pair_walk walk;
-    told_pair *told; /* of the last pair, in no order; no face with itself */
+    stored_pair *reported; /* pairs of the last pair of subtrees, unordered; no face with itself */
     uint64_t count, capacity;
     uint64_t first_end; /* faces that the first's subtree lists have lesser numbers */
     bool late;          /* the deadline has passed before all was found */
@@ -63,7 +63,7 @@ typedef struct finding {
     ebpo_error *error;
 } finding;
 
-/* --- of two nodes --- */
+/* --- pairs of nodes --- */
 
 static double slack_of(const finding *f, const ebpo_posed_node node[2])
 {
@@ -104,7 +104,7 @@ static ebpo_status add_subtree_pair(const finding *f, const ebpo_posed_node node
     ebpo_convex convex[2];
     double slack = slack_of(f, node);
     if (is_pruned(f->side[0], a) || is_pruned(f->side[1], b))
-        return EBPO_OK; /* what it had is not in this file */
+        return EBPO_OK; /* the content of a pruned node is not in this file */
     subtree_pair pair = { a, b, f->side[0]->rank[a], f->side[1]->rank[b], apart_of(f, node) };
     if (f->self && pair.rank_a > pair.rank_b)
         return EBPO_OK;
@@ -190,11 +190,11 @@ static ebpo_status count_seconds(subtree_pairs *p, uint64_t most, ebpo_error *er
     return EBPO_OK;
 }
 
-/* Two faces that meet have a common point, and that is in a cell of each model that lists its face:
- * so they are listed by the subtrees of one of these pairs. They come sorted by the first's place,
- * back and forth in the second's, so that what was loaded is used again soon. `self`: both are one
- * model at one pose; each pair once, the first's place not behind the second's. Freed by the
- * caller (`pair`), also after a failure. */
+/* Finds the pairs of subtrees that may have intersecting faces. Two such faces have a common point,
+ * in a cell of each model that lists its face: so the subtrees of one of these pairs list them. The
+ * pairs are sorted by the first's position, back and forth in the second's, so that loaded subtrees
+ * are reused soon. `self`: both are one model at one pose; each pair comes once, the first's
+ * position not behind the second's. The caller frees the pairs (`pair`), also after a failure. */
 static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a,
                                       ebpo_posed_subtrees *b, double reach, bool self,
                                       ebpo_error *error)
@@ -217,28 +217,28 @@ static int by_nearness(const void *x, const void *y)
     return by_places(x, y);
 }
 
-/* By `apart`, the least first. */
+/* Sorts by `apart`, the least first. */
 static void sort_nearest_first(subtree_pairs *p)
 {
     if (p->count)
         qsort(p->pair, p->count, sizeof *p->pair, by_nearness);
 }
 
-static ebpo_status subtree_walk_begin(subtree_walk *w, const ebpo_collision *question, bool self,
-                                      ebpo_error *error)
+static ebpo_status subtree_walk_begin(subtree_walk *w, const ebpo_collision *current_query,
+                                      bool self, ebpo_error *error)
 {
-    w->question = question;
+    w->current_query = current_query;
     w->self = self;
     for (int i = 0; i < 2; i++)
-        if (!question->model[i]->whole && !w->context[i]) {
-            ebpo_status status = ebpo_context_new(question->model[i], &w->context[i], error);
+        if (!current_query->model[i]->whole && !w->context[i]) {
+            ebpo_status status = ebpo_context_new(current_query->model[i], &w->context[i], error);
             if (status != EBPO_OK)
                 return status;
         }
     return EBPO_OK;
 }
 
-/* Subtrees that it had to load. */
+/* Returns the number of subtrees that it loaded. */
 static uint64_t subtree_walk_loads(const subtree_walk *w)
 {
     uint64_t loads = 0;
@@ -247,7 +247,7 @@ static uint64_t subtree_walk_loads(const subtree_walk *w)
     return loads;
 }
 
-/* Others may have the room of its subtrees. */
+/* Releases the memory of its subtrees for other users. */
 static void subtree_walk_let_go(subtree_walk *w)
 {
     for (int i = 0; i < 2; i++)
@@ -259,18 +259,18 @@ static void subtree_walk_free(subtree_walk *w)
     for (int i = 0; i < 2; i++)
         ebpo_context_free(w->context[i]);
     ebpo_pair_walk_free(&w->walk);
-    free(w->told);
+    free(w->reported);
 }
 
-static int compare_told_pairs(const void *x, const void *y)
+static int compare_stored_pairs(const void *x, const void *y)
 {
-    const told_pair *p = x, *q = y;
+    const stored_pair *p = x, *q = y;
     if (p->file[0] != q->file[0])
         return p->file[0] < q->file[0] ? -1 : 1;
     return (p->file[1] > q->file[1]) - (p->file[1] < q->file[1]);
 }
 
-static ebpo_face_pair tell_told_pair(const ebpo_collision *q, const told_pair *t)
+static ebpo_face_pair report_stored_pair(const ebpo_collision *q, const stored_pair *t)
 {
     int a = q->turned, b = !q->turned;
     return (ebpo_face_pair){ t->source[a], t->source[b], t->file[a], t->file[b], t->kind, 0 };
@@ -281,21 +281,22 @@ static ebpo_face_pair tell_told_pair(const ebpo_collision *q, const told_pair *t
 static ebpo_status load_subtree(subtree_walk *w, int side, uint32_t number, const ebpo_accel **out,
                                 ebpo_error *error)
 {
-    ebpo_accel *loaded = w->question->model[side]->whole;
+    ebpo_accel *loaded = w->current_query->model[side]->whole;
     ebpo_status status =
         loaded ? EBPO_OK : ebpo_context_subtree(w->context[side], number, &loaded, error);
     *out = loaded;
     return status;
 }
 
-static ebpo_status tell_pairs(subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
+static ebpo_status report_pairs(subtree_walk *w, const ebpo_accel *const accel[2],
+                                ebpo_error *error)
 {
     const ebpo_pair_walk *found = &w->walk;
-    if (!ebpo_grow(&w->told, &w->capacity, found->met_count, sizeof *w->told))
-        return ebpo_fail_memory(error, found->met_count * sizeof *w->told);
-    for (uint64_t i = 0; i < found->met_count; i++) {
-        uint32_t local[2] = { found->met[i].a, found->met[i].b };
-        told_pair t = { .kind = found->met[i].kind };
+    if (!ebpo_grow(&w->reported, &w->capacity, found->found_count, sizeof *w->reported))
+        return ebpo_fail_memory(error, found->found_count * sizeof *w->reported);
+    for (uint64_t i = 0; i < found->found_count; i++) {
+        uint32_t local[2] = { found->intersected[i].a, found->intersected[i].b };
+        stored_pair t = { .kind = found->intersected[i].kind };
         for (int side = 0; side < 2; side++) {
             t.file[side] = (uint32_t)ebpo_accel_file_face(accel[side], local[side]);
             t.source[side] = (uint32_t)ebpo_accel_source_face(accel[side], local[side]);
@@ -303,8 +304,8 @@ static ebpo_status tell_pairs(subtree_walk *w, const ebpo_accel *const accel[2],
         if (w->self && t.file[0] == t.file[1])
             continue;
         if (w->self && t.file[0] > t.file[1])
-            t = (told_pair){ { t.file[1], t.file[0] }, { t.source[1], t.source[0] }, t.kind };
-        w->told[w->count++] = t;
+            t = (stored_pair){ { t.file[1], t.file[0] }, { t.source[1], t.source[0] }, t.kind };
+        w->reported[w->count++] = t;
     }
     return EBPO_OK;
 }
@@ -316,7 +317,7 @@ static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
 
 static ebpo_status walk_down(subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
 {
-    const ebpo_collision *q = w->question;
+    const ebpo_collision *q = w->current_query;
     const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
     ebpo_accel_pair pair;
     ebpo_pair_walk *down = &w->walk;
@@ -335,10 +336,10 @@ static ebpo_status walk_down(subtree_walk *w, const ebpo_accel *const accel[2], 
         if ((w->late = ebpo_collision_is_late(q)))
             return EBPO_OK;
     }
-    return tell_pairs(w, accel, error);
+    return report_pairs(w, accel, error);
 }
 
-/* Fills in what has been found. */
+/* Fills in the pairs found. */
 static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
@@ -350,7 +351,7 @@ static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, 
         status = load_subtree(w, 1, pair->b, &accel[1], error);
     if (status != EBPO_OK)
         return status;
-    w->first_end = accel[0]->first_face + (accel[0]->face_count - accel[0]->outer_count);
+    w->first_end = accel[0]->first_face + (accel[0]->face_count - accel[0]->shared_count);
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
         return EBPO_OK;
     return walk_down(w, accel, error);
@@ -360,56 +361,57 @@ static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, 
 
 static const char stage[] = "pairs of subtrees";
 
-/* So many in a row for one thread: they have the first's subtree in common. */
+/* Number of pairs in a row for one thread; they have the first's subtree in common. */
 enum { PAIRS_IN_A_ROW = 4 };
 
 typedef struct gathering_parts {
-    const ebpo_collision *question;
+    const ebpo_collision *current_query;
     bool self;
     ebpo_posed_subtrees subtrees[2];
     subtree_pairs pairs;
-    uint64_t *end; /* of each of the first's subtrees: its faces are before; 0: not known yet */
+    uint64_t *end; /* for each of the first's subtrees: its faces are before this number; 0: not
+                    * known yet */
     subtree_walk *walk; /* one for each thread */
     unsigned threads;
     uint64_t read_before;
-    pthread_mutex_t lock; /* for what follows */
-    uint64_t from, to;    /* faces of the first model that matter now */
-    told_pair *told;
+    pthread_mutex_t lock; /* protects the members below */
+    uint64_t from, to;    /* range of faces of the first model in this round */
+    stored_pair *reported;
     uint64_t count, capacity;
-    uint64_t most; /* that wait */
+    uint64_t most; /* most waiting pairs */
 } gathering_parts;
 
 static void count_walk(const gathering_parts *g, subtree_walk *w)
 {
-    g->question->collider->loads += subtree_walk_loads(w);
-    ebpo_collider_count(g->question->collider, &w->walk);
+    g->current_query->collider->loads += subtree_walk_loads(w);
+    ebpo_collider_count(g->current_query->collider, &w->walk);
 }
 
-/* --- what waits --- */
+/* --- waiting pairs --- */
 
 static void sort_once(gathering_parts *g)
 {
     uint64_t kept = 0;
     if (g->count)
-        qsort(g->told, g->count, sizeof *g->told, compare_told_pairs);
+        qsort(g->reported, g->count, sizeof *g->reported, compare_stored_pairs);
     for (uint64_t i = 0; i < g->count; i++)
-        if (kept == 0 || compare_told_pairs(&g->told[kept - 1], &g->told[i]) != 0)
-            g->told[kept++] = g->told[i];
+        if (kept == 0 || compare_stored_pairs(&g->reported[kept - 1], &g->reported[i]) != 0)
+            g->reported[kept++] = g->reported[i];
     g->count = kept;
 }
 
-/* Half of what may wait stays; those of one face alone stay in any case. */
-static void make_room(gathering_parts *g)
+/* Keeps half of the pairs that may wait; those of a single face always stay. */
+static void reserve_space(gathering_parts *g)
 {
     sort_once(g);
     uint64_t half = g->most / 2;
     if (g->count <= half)
         return;
-    uint64_t cut = g->told[half].file[0];
-    if (cut == g->told[0].file[0])
+    uint64_t cut = g->reported[half].file[0];
+    if (cut == g->reported[0].file[0])
         cut++;
     g->to = cut;
-    while (g->count > 0 && g->told[g->count - 1].file[0] >= cut)
+    while (g->count > 0 && g->reported[g->count - 1].file[0] >= cut)
         g->count--;
     if (g->most < 2 * g->count)
         g->most = 2 * g->count;
@@ -418,22 +420,22 @@ static void make_room(gathering_parts *g)
 static ebpo_status hold_pairs(gathering_parts *g, const subtree_walk *w, ebpo_error *error)
 {
     for (uint64_t i = 0; i < w->count; i++) {
-        if (w->told[i].file[0] < g->from || w->told[i].file[0] >= g->to)
+        if (w->reported[i].file[0] < g->from || w->reported[i].file[0] >= g->to)
             continue;
         if (g->count >= g->most)
-            make_room(g);
-        if (w->told[i].file[0] >= g->to)
+            reserve_space(g);
+        if (w->reported[i].file[0] >= g->to)
             continue;
-        if (!ebpo_grow(&g->told, &g->capacity, g->count + 1, sizeof *g->told))
-            return ebpo_fail_memory(error, (g->count + 1) * sizeof *g->told);
-        g->told[g->count++] = w->told[i];
+        if (!ebpo_grow(&g->reported, &g->capacity, g->count + 1, sizeof *g->reported))
+            return ebpo_fail_memory(error, (g->count + 1) * sizeof *g->reported);
+        g->reported[g->count++] = w->reported[i];
     }
     return EBPO_OK;
 }
 
-/* --- going through --- */
+/* --- searching --- */
 
-/* All faces that its first subtree lists have been given. */
+/* Returns true if all faces that its first subtree lists are done. */
 static bool is_done(gathering_parts *g, const subtree_pair *pair)
 {
     (void)pthread_mutex_lock(&g->lock);
@@ -466,16 +468,16 @@ static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned 
             status = keep_pairs(g, pair, w, error);
         if (status != EBPO_OK)
             return status;
-        if (w->late || ebpo_collision_is_late(g->question))
+        if (w->late || ebpo_collision_is_late(g->current_query))
             return ebpo_fail(error, EBPO_E_CANCELLED, "%s: the deadline has passed", stage);
     }
     return EBPO_OK;
 }
 
-/* Several threads hold several subtrees; where the budget has no room for these, one goes on. */
+/* Several threads hold several subtrees; where the budget is too small for these, one continues. */
 static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
 {
-    const ebpo_progress *progress = &g->question->options.progress;
+    const ebpo_progress *progress = &g->current_query->options.progress;
     ebpo_error many = EBPO_ERROR_INIT;
     ebpo_status status = EBPO_E_LIMIT;
     if (g->threads > 1)
@@ -499,16 +501,16 @@ static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
 
 enum { GIVEN_AT_ONCE = 1024 };
 
-/* False: enough. */
+/* Returns false when the caller wants no more. */
 static bool give_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *user)
 {
     ebpo_face_pair out[GIVEN_AT_ONCE];
-    for (unsigned i = 0; i < g->threads; i++) /* who takes them may want the room */
+    for (unsigned i = 0; i < g->threads; i++) /* the receiver may need the memory */
         subtree_walk_let_go(&g->walk[i]);
     for (uint64_t at = 0; at < g->count; at += GIVEN_AT_ONCE) {
         uint64_t n = g->count - at < GIVEN_AT_ONCE ? g->count - at : GIVEN_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
-            out[i] = tell_told_pair(g->question, &g->told[at + i]);
+            out[i] = report_stored_pair(g->current_query, &g->reported[at + i]);
         if (!take(user, out, n))
             return false;
     }
@@ -517,7 +519,7 @@ static bool give_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *use
 
 static ebpo_status in_passes(gathering_parts *g, ebpo_pairs_fn take, void *user, ebpo_error *error)
 {
-    uint64_t most = g->question->collider->options.memory / (2 * sizeof *g->told) + 2;
+    uint64_t most = g->current_query->collider->options.memory / (2 * sizeof *g->reported) + 2;
     for (g->from = 0; g->from < UINT64_MAX; g->from = g->to) {
         g->to = UINT64_MAX;
         g->count = 0;
@@ -532,11 +534,11 @@ static ebpo_status in_passes(gathering_parts *g, ebpo_pairs_fn take, void *user,
     return EBPO_OK;
 }
 
-/* --- both questions --- */
+/* --- both queries --- */
 
 static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_error *error)
 {
-    const ebpo_collision *q = g->question;
+    const ebpo_collision *q = g->current_query;
     ebpo_status status = EBPO_OK;
     g->walk = ebpo_alloc_zero(threads, sizeof *g->walk);
     if (!g->walk)
@@ -561,7 +563,8 @@ static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_er
 
 static void end_gathering(gathering_parts *g)
 {
-    g->question->collider->bytes_read += ebpo_collision_bytes_read(g->question) - g->read_before;
+    g->current_query->collider->bytes_read +=
+        ebpo_collision_bytes_read(g->current_query) - g->read_before;
     for (unsigned i = 0; i < g->threads; i++) {
         count_walk(g, &g->walk[i]);
         subtree_walk_free(&g->walk[i]);
@@ -571,14 +574,14 @@ static void end_gathering(gathering_parts *g)
     free(g->walk);
     free(g->pairs.pair);
     free(g->end);
-    free(g->told);
+    free(g->reported);
     (void)pthread_mutex_destroy(&g->lock);
 }
 
 ebpo_status ebpo_gather_parts(const ebpo_collision *q, bool self, ebpo_pairs_fn take, void *user,
                               ebpo_error *error)
 {
-    gathering_parts g = { .question = q, .self = self };
+    gathering_parts g = { .current_query = q, .self = self };
     (void)pthread_mutex_init(&g.lock, NULL);
     ebpo_status status =
         begin_gathering(&g, ebpo_thread_count(q->collider->options.threads), error);
@@ -588,11 +591,11 @@ ebpo_status ebpo_gather_parts(const ebpo_collision *q, bool self, ebpo_pairs_fn 
     return status;
 }
 
-/* The least of the pairs of faces that the first two subtrees have which have any. */
+/* Finds the least pair of faces of the first two subtrees that have intersecting faces. */
 static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, int32_t *found,
                                       ebpo_error *error)
 {
-    const ebpo_collision *q = g->question;
+    const ebpo_collision *q = g->current_query;
     subtree_walk *w = &g->walk[0];
     for (uint64_t i = 0; i < g->pairs.count; i++) {
         ebpo_status status = subtree_walk_pair(w, &g->pairs.pair[i], error);
@@ -602,8 +605,8 @@ static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, i
         if (*found < 0)
             return EBPO_OK;
         if (*found) {
-            qsort(w->told, w->count, sizeof *w->told, compare_told_pairs);
-            *out = tell_told_pair(q, &w->told[0]);
+            qsort(w->reported, w->count, sizeof *w->reported, compare_stored_pairs);
+            *out = report_stored_pair(q, &w->reported[0]);
             return EBPO_OK;
         }
         if (!ebpo_progress_step(&q->options.progress, stage, i, g->pairs.count, error))
@@ -615,7 +618,7 @@ static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, i
 ebpo_status ebpo_first_of_parts(const ebpo_collision *q, ebpo_face_pair *out, int32_t *found,
                                 ebpo_error *error)
 {
-    gathering_parts g = { .question = q };
+    gathering_parts g = { .current_query = q };
     (void)pthread_mutex_init(&g.lock, NULL);
     ebpo_status status = begin_gathering(&g, 1, error);
     if (status == EBPO_OK) {

@@ -1,17 +1,16 @@
-/* Follows a ball along a straight piece of its way, to the first face that it touches, and checks
- * that its centre goes through none.
+/* Follows a ball along a straight piece of its path to the first face in contact, and checks that
+ * its centre crosses no face.
  *
- * Nodes of the tree over the faces are visited in the order in which the ball may touch them,
- * until the next one would be touched after a face that is known. The distance from a box is
- * convex along a line, as that from a face is: Newton's steps towards the ball's radius never go
- * too far. Of the nodes that the ball touches already the closest come first.
+ * Nodes of the tree over the faces are visited in the order of possible contact, until the next one
+ * comes after the contact with a known face. The distance from a box or a face is convex along a
+ * line: Newton's steps towards the ball's radius never go too far. Of the nodes already in contact
+ * the closest come first.
  *
- * The work is bounded for each haptic step. Where it ends early, the ball goes as far as the next
- * node allows; it is held by what is known if that holds it where it is; otherwise the next step
- * goes on.
+ * The work is bounded for each haptic step. After an early end, the ball goes as far as the next
+ * node allows. If the known contacts hold it in place, it stays; otherwise the next step continues.
  *
- * The nearest point of the cone that planes leave free is in its inside, on a plane or on the line
- * of two planes: all are tried, since there are few; otherwise it is the apex. */
+ * The nearest point of the cone that planes leave free is inside it, on a plane or on the line of
+ * two planes: all are tried, since there are few; otherwise it is the apex. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -90,7 +89,7 @@ void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3])
     for (int k = 0; k < planes->count; k++)
         if (memcmp(planes->normal[k], normal, sizeof planes->normal[k]) == 0)
             return;
-    if (planes->count < EBPO_PLANES_MOST)
+    if (planes->count < EBPO_PLANES_LIMIT)
         ebpo_vec3_copy(normal, planes->normal[planes->count++]);
 }
 
@@ -98,24 +97,27 @@ void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3])
 
 enum {
     STEPS = 6,
-    /* What looking leaves of a tick's work for checking. */
+    /* Work of a haptic step that is reserved for the check. */
     KEPT_FACES = 64,
     KEPT_NODES = 256,
-    /* How many more are looked at where one holds the ball where it is. */
+    /* Number of further faces that are visited where one holds the ball in place. */
     HELD_FACES = 48
 };
 
-static const double worth = 1.0 / 32; /* part of a way that is worth ending it */
+static const double worth = 1.0 / 32; /* least part of a path worth an early end */
 
-/* What waits is as many parts of the tree at most as it has leaves. */
-static uint64_t room_for(uint64_t faces) { return ebpo_face_box_leaves(faces) + 1; }
+/* Returns the space for waiting nodes: at most as many parts of the tree as it has leaves. */
+static uint64_t capacity_for(uint64_t faces) { return ebpo_face_box_leaves(faces) + 1; }
 
-uint64_t ebpo_ball_walk_bytes(uint64_t faces) { return room_for(faces) * sizeof(ebpo_near_node); }
+uint64_t ebpo_ball_walk_bytes(uint64_t faces)
+{
+    return capacity_for(faces) * sizeof(ebpo_near_node);
+}
 
 ebpo_status ebpo_ball_walk_new(ebpo_ball_walk *w, uint64_t faces, ebpo_error *error)
 {
     *w = (ebpo_ball_walk){ .stage = EBPO_BALL_STANDS };
-    w->queue.item = ebpo_alloc(room_for(faces), sizeof *w->queue.item);
+    w->queue.item = ebpo_alloc(capacity_for(faces), sizeof *w->queue.item);
     if (!w->queue.item)
         return ebpo_fail_memory(error, ebpo_ball_walk_bytes(faces));
     memset(w->queue.item, 0xff, ebpo_ball_walk_bytes(faces));
@@ -128,7 +130,7 @@ void ebpo_ball_walk_free(ebpo_ball_walk *w)
     w->queue.item = NULL;
 }
 
-/* Of nothing in `e` the ball comes nearer. What rounding does to that is within the slacks. */
+/* Returns true if the ball comes no nearer to the content of `e`. The slacks cover rounding. */
 static bool goes_away(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double least = 0;
@@ -137,9 +139,9 @@ static bool goes_away(const ebpo_ball_walk *w, const ebpo_extent *e)
     return least >= 0;
 }
 
-/* The part of the way, at least, at which the ball may come to touch what is in `e`; where it may
- * touch it now, by how much that is too near, as a number below 0. INFINITY: not before the part
- * that is known, or not at all. */
+/* Returns a lower bound of the part of the path at which the ball touches the content of `e`. If it
+ * may touch it now, returns the negative overlap. INFINITY: not before the known contact, or not at
+ * all. */
 static double ball_walk_soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double part = 0;
@@ -173,31 +175,33 @@ void ebpo_ball_set_out(ebpo_ball_walk *w)
 {
     w->stage = EBPO_BALL_LOOKS;
     w->part = 1;
-    w->met.count = 0;
+    w->intersected.count = 0;
     w->cut = false;
     w->queue.count = 0;
     if (w->box && w->box->count > 0)
         wait_for(w, 1);
 }
 
-static void look_at_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
+static void inspect_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
 {
     const ebpo_ball_way way = { w->from, w->way, w->reach, w->band, w->slack, w->least_slack };
     uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
     for (; f < end && f < w->box->count; f++) {
         double away[3];
-        double met = ebpo_ball_meets(&way, (const double(*)[3])w->box->corner[f], away);
+        double intersected =
+            ebpo_ball_intersects(&way, (const double(*)[3])w->box->corner[f], away);
         work->faces++;
-        if (met > w->part)
+        if (intersected > w->part)
             continue;
-        if (met < w->part)
-            w->met.count = 0;
-        w->part = met;
-        ebpo_held_planes_add(&w->met, away);
+        if (intersected < w->part)
+            w->intersected.count = 0;
+        w->part = intersected;
+        ebpo_held_planes_add(&w->intersected, away);
     }
 }
 
-/* What is not looked at is farther than the first that waits. False: that is next to nothing. */
+/* Ends the path before the first waiting node; what was not visited is farther. Returns false if
+ * hardly any path remains. */
 static bool end_before_that(ebpo_ball_walk *w)
 {
     if (w->part <= 0)
@@ -205,16 +209,17 @@ static bool end_before_that(ebpo_ball_walk *w)
     if (!(w->queue.item[0].key >= worth))
         return false;
     w->part = w->queue.item[0].key;
-    w->met.count = 0;
+    w->intersected.count = 0;
     w->cut = true;
     return true;
 }
 
 static bool ball_walk_look(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
-    uint32_t held = work->faces; /* when it was not yet */
+    uint32_t held = work->faces; /* before the contact */
     while (w->queue.count > 0 && w->queue.item[0].key < w->part) {
-        if (w->part <= 0 && (w->met.count == EBPO_PLANES_MOST || work->faces >= held + HELD_FACES))
+        if (w->part <= 0 &&
+            (w->intersected.count == EBPO_PLANES_LIMIT || work->faces >= held + HELD_FACES))
             break;
         if (work->faces + EBPO_FACE_BOX_LEAF + KEPT_FACES > EBPO_BALL_FACES ||
             work->nodes + 2 + KEPT_NODES > EBPO_BALL_NODES) {
@@ -225,7 +230,7 @@ static bool ball_walk_look(ebpo_ball_walk *w, ebpo_ball_work *work)
         uint64_t node = ebpo_near_pop(&w->queue).node;
         if (node >= w->box->leaves) {
             held = w->part > 0 ? work->faces : held;
-            look_at_leaf(w, node - w->box->leaves, work);
+            inspect_leaf(w, node - w->box->leaves, work);
             continue;
         }
         work->nodes += 2;
@@ -245,8 +250,8 @@ static void begin_check(ebpo_ball_walk *w)
         w->stack[w->depth++] = 1;
 }
 
-/* Whether the segment may meet `e`: it is widened by more than rounding does to where it enters and
- * leaves, and by less than the ball stays away from faces. */
+/* Returns true if the segment may intersect `e`. It is widened by more than the rounding of its
+ * entry and exit, and by less than the ball's distance from faces. */
 static bool may_cross(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double enters = 0, leaves = 1, wider = 16 * w->band;
@@ -269,7 +274,7 @@ static bool crosses_leaf(const ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work 
     uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
     for (; f < end && f < w->box->count; f++) {
         work->faces++;
-        if (ebpo_segment_may_meet(w->from, w->to, (const double(*)[3])w->box->corner[f]))
+        if (ebpo_segment_may_intersect(w->from, w->to, (const double(*)[3])w->box->corner[f]))
             return true;
     }
     return false;

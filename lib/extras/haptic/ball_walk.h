@@ -1,71 +1,71 @@
-/* A straight piece of a ball's way: where it first touches a face, and that its centre goes
- * through none. The work is done in shares, and goes on where it ended. */
+/* Follows a straight piece of a ball's path: finds its first contact with a face, and checks that
+ * its centre crosses none. The work is done in shares and continues where it ended. */
 #ifndef EBPO_HAPTIC_BALL_WALK_H
 #define EBPO_HAPTIC_BALL_WALK_H
 
 #include "extras/haptic/face_box.h"
 
-enum { EBPO_PLANES_MOST = 12 };
+enum { EBPO_PLANES_LIMIT = 12 };
 
 typedef struct ebpo_held_planes {
-    double normal[EBPO_PLANES_MOST][3]; /* unit vectors to the side that is free */
+    double normal[EBPO_PLANES_LIMIT][3]; /* unit vectors to the free side */
     int count;
 } ebpo_held_planes;
 
-/* One more, unless it is there already, or there is no room. */
+/* Adds a plane, unless it is present or there is no space. */
 void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3]);
 
-/* `out` is the way `want` projected onto the cone n . x >= 0 for all planes; 0 if rounding finds
+/* Projects the path `want` onto the cone n . x >= 0 for all planes; `out` is 0 if rounding finds
  * none. Returns how far below 0 n . out may be. */
 double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], double out[3]);
 
-/* A straight piece of a ball's way: where it first touches a face, and that its centre went through
- * none. The work is done in shares, and goes on where it ended: so a ball may have any number of
- * faces around it. */
+/* Limits of a haptic step's work. It continues in the next one, so any number of faces may surround
+ * a ball. */
 
 enum {
-    /* Of a tick. */
+    /* For each haptic step. */
     EBPO_BALL_FACES = 512,
     EBPO_BALL_NODES = 2048
 };
 
-/* What was looked at: all pieces of a tick add to it. */
+/* Work done; all pieces of a haptic step add to it. */
 typedef struct ebpo_ball_work {
     uint32_t faces, nodes;
 } ebpo_ball_work;
 
 typedef enum ebpo_ball_stage {
     EBPO_BALL_STANDS,
-    EBPO_BALL_LOOKS, /* for what it touches first */
-    EBPO_BALL_CHECKS /* that the centre goes through nothing */
+    EBPO_BALL_LOOKS, /* search for the first contact */
+    EBPO_BALL_CHECKS /* check that the centre crosses nothing */
 } ebpo_ball_stage;
 
 typedef struct ebpo_ball_walk {
     ebpo_ball_stage stage;
-    const ebpo_face_box *box; /* as it is until the ball stands; NULL: no face is where it goes */
+    const ebpo_face_box *box; /* unchanged until the ball stops; NULL: no faces are on the path */
     double from[3], way[3];
-    double reach, band, slack, least_slack; /* as of ebpo_ball_way */
-    double part;                            /* of the way, until what it touches first */
-    ebpo_held_planes met;                   /* away from what it touches there */
-    bool cut;                               /* it ends before what it touches: work was done */
-    double to[3];                           /* known when it has looked */
-    ebpo_near_queue queue;                  /* of LOOKS */
-    uint64_t stack[64];                     /* of CHECKS; a level leaves one behind */
+    double reach, band, slack, least_slack; /* as in ebpo_ball_way */
+    double part;                            /* part of the path until the first contact */
+    ebpo_held_planes intersected;           /* normals of the contacts there */
+    bool cut;                               /* it ends before the contact, because the work was used
+                                             * up */
+    double to[3];                           /* known after the search */
+    ebpo_near_queue queue;                  /* for LOOKS */
+    uint64_t stack[64];                     /* for CHECKS; each level leaves one */
     int depth;
 } ebpo_ball_walk;
 
-/* Room for boxes of so many faces; all pages are written. */
+/* Allocates for boxes of this many faces; writes all pages. */
 EBPO_MUST_USE ebpo_status ebpo_ball_walk_new(ebpo_ball_walk *w, uint64_t faces, ebpo_error *error);
 void ebpo_ball_walk_free(ebpo_ball_walk *w);
 uint64_t ebpo_ball_walk_bytes(uint64_t faces);
 
-/* Begins; from, way, box, reach, band and slacks are set. */
+/* Begins; from, way, box, reach, band and slacks must be set. */
 void ebpo_ball_set_out(ebpo_ball_walk *w);
 
 typedef enum ebpo_ball_end {
-    EBPO_BALL_LATER,  /* there is more to look at than a tick may */
-    EBPO_BALL_THERE,  /* the way to `to` is free; it stands */
-    EBPO_BALL_THROUGH /* it is not, by exact arithmetic; it stands */
+    EBPO_BALL_LATER,  /* more work remains than a haptic step may do */
+    EBPO_BALL_THERE,  /* the path to `to` is free; the ball stops */
+    EBPO_BALL_THROUGH /* exact arithmetic finds a crossing; the ball stops */
 } ebpo_ball_end;
 
 ebpo_ball_end ebpo_ball_go_on(ebpo_ball_walk *w, ebpo_ball_work *work);

@@ -1,14 +1,14 @@
 /* The faces in a box around the proxy, with a tree of boxes over them: all that a haptic step
  * reads.
  *
- * The loading thread makes a box; a box never changes while a step uses it. Faces keep the order
- * of the file, which follows a curve, so that the tree needs no sorting. What steps call takes no
- * memory, and its work is bounded by limits that callers give.
+ * The loading thread makes a box; a box never changes while a step uses it. Faces keep the order of
+ * the file, which follows a curve, so the tree needs no sorting. Functions that steps call allocate
+ * no memory, and limits of the callers bound their work.
  *
- * Distances are in doubles, and are right within a few ulps. The side of a point is exact: its
- * winding number changes at each face that a straight way crosses through its inside. Where the
- * way meets an edge, or begins in a face's plane, it goes by way of another point, as almost every
- * one will do. */
+ * Distances are in doubles, correct to a few ulps. The side of a point is exact: its winding number
+ * changes at each face that a straight path crosses through its inside. Where the path crosses an
+ * edge, or begins in a face's plane, it is redirected through another point; almost every one
+ * works. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -35,7 +35,7 @@ uint64_t ebpo_face_box_bytes(uint64_t capacity)
            2 * ebpo_face_box_leaves(capacity) * sizeof(ebpo_extent);
 }
 
-/* All pages are written here, so that no tick is the first to use one. */
+/* Writes all pages here, so that no haptic step is the first to use one. */
 ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacity, ebpo_error *error)
 {
     *out = (ebpo_face_box){ .capacity = capacity, .leaves = 1 };
@@ -49,7 +49,7 @@ ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacity, ebpo_error 
     }
     memset(out->corner, 0xff, capacity * sizeof *out->corner);
     memset(out->face, 0xff, capacity * sizeof *out->face);
-    memset(out->node, 0xff, nodes * sizeof *out->node); /* NAN: meets nothing */
+    memset(out->node, 0xff, nodes * sizeof *out->node); /* NAN: intersects nothing */
     for (int i = 0; i < 3; i++)
         out->centres.min[i] = out->centres.max[i] = NAN; /* contains nothing */
     return EBPO_OK;
@@ -129,7 +129,7 @@ ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
     return status;
 }
 
-static bool face_box_meet(const ebpo_extent *a, const ebpo_extent *b)
+static bool face_box_intersect(const ebpo_extent *a, const ebpo_extent *b)
 {
     for (int i = 0; i < 3; i++)
         if (!(a->min[i] <= b->max[i] && a->max[i] >= b->min[i]))
@@ -137,20 +137,20 @@ static bool face_box_meet(const ebpo_extent *a, const ebpo_extent *b)
     return true;
 }
 
-static bool face_meets(const double face[3][3], const ebpo_extent *around)
+static bool face_intersects(const double face[3][3], const ebpo_extent *around)
 {
     ebpo_extent e;
     ebpo_vec3_copy(face[0], e.min);
     ebpo_vec3_copy(face[0], e.max);
     face_box_widen(&e, face[1], face[1]);
     face_box_widen(&e, face[2], face[2]);
-    return face_box_meet(&e, around);
+    return face_box_intersect(&e, around);
 }
 
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
                         uint32_t most, uint32_t *visits, uint32_t *count)
 {
-    uint64_t stack[64]; /* a level leaves one behind */
+    uint64_t stack[64]; /* each level leaves one */
     int depth = 0;
     *count = 0;
     stack[depth++] = 1;
@@ -159,7 +159,7 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
         if (*visits == 0)
             return false;
         --*visits;
-        if (!face_box_meet(&box->node[n], around))
+        if (!face_box_intersect(&box->node[n], around))
             continue;
         if (n < box->leaves) {
             stack[depth++] = 2 * n + 1;
@@ -168,7 +168,7 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
         }
         uint64_t f = (n - box->leaves) * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
         for (; f < end && f < box->count; f++)
-            if (face_meets((const double(*)[3])box->corner[f], around)) {
+            if (face_intersects((const double(*)[3])box->corner[f], around)) {
                 if (*count == most)
                     return false;
                 found[(*count)++] = (uint32_t)f;
@@ -177,7 +177,7 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
     return true;
 }
 
-/* Squared. */
+/* Returns the squared distance. */
 static double face_box_between(const ebpo_extent *a, const ebpo_extent *b)
 {
     double square = 0;
@@ -203,13 +203,13 @@ static double closest_of_leaf(const ebpo_face_box *box, uint64_t leaf, const ebp
     return least;
 }
 
-static double find_square(const ebpo_face_box *box, const ebpo_extent *around, uint32_t most_visits,
+static double find_square(const ebpo_face_box *box, const ebpo_extent *around, uint32_t max_visits,
                           uint64_t *visits)
 {
     struct {
         uint64_t node;
         double lower;
-    } stack[64]; /* a level leaves one behind */
+    } stack[64]; /* each level leaves one */
     int depth = 0;
     double least = INFINITY;
     if (box->count == 0)
@@ -222,14 +222,14 @@ static double find_square(const ebpo_face_box *box, const ebpo_extent *around, u
         if (!(lower < least))
             continue;
         ++*visits;
-        if (n >= most_visits) {
+        if (n >= max_visits) {
             least = lower;
         } else if (node >= box->leaves) {
             least = fmin(least, closest_of_leaf(box, node - box->leaves, around));
         } else {
             double l = face_box_between(&box->node[2 * node], around);
             double r = face_box_between(&box->node[2 * node + 1], around);
-            bool first = l <= r; /* is looked at first, so goes on last */
+            bool first = l <= r; /* visited first, so pushed last */
             stack[depth].node = 2 * node + first;
             stack[depth++].lower = first ? r : l;
             stack[depth].node = 2 * node + !first;
@@ -240,21 +240,21 @@ static double find_square(const ebpo_face_box *box, const ebpo_extent *around, u
 }
 
 double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *around,
-                               uint32_t most_visits, uint64_t *visits)
+                               uint32_t max_visits, uint64_t *visits)
 {
-    return sqrt(find_square(box, around, most_visits, visits)) * (1 - 0x1p-48);
+    return sqrt(find_square(box, around, max_visits, visits)) * (1 - 0x1p-48);
 }
 
 /* --- the nearest point of a face --- */
 
-/* The distance from a face, a convex set, is a convex function along a line: where it falls,
- * tangents lie below it, so that Newton's steps towards a distance never go too far. That finds
- * when a ball touches a face, whichever of its features it is. */
+/* The distance from a face, a convex set, is convex along a line: where it falls, tangents lie
+ * below it, so Newton's steps towards a distance never go too far. That finds when a ball touches a
+ * face, at any of its features. */
 
 typedef struct nearest {
-    double square, offset[3]; /* from the nearest point to p */
-    int edge;                 /* k to k + 1 */
-    double part;              /* of it */
+    double square, offset[3]; /* vector from the nearest point to p */
+    int edge;                 /* from corner k to k + 1 */
+    double part;              /* position on the edge */
 } nearest;
 
 static void try_edge(const double p[3], const double face[3][3], int k, nearest *best)
@@ -276,7 +276,7 @@ static void try_edge(const double p[3], const double face[3][3], int k, nearest 
     }
 }
 
-/* Where p is above the inside of the face. */
+/* Handles a p that is above the inside of the face. */
 static bool near_inside(const double p[3], const double face[3][3], ebpo_face_near *out)
 {
     double e[3], f[3], n[3], d[3], c[3];
@@ -321,7 +321,7 @@ void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_nea
 
 enum { STEPS = 24 };
 
-double ebpo_ball_meets(const ebpo_ball_way *w, const double face[3][3], double away[3])
+double ebpo_ball_intersects(const ebpo_ball_way *w, const double face[3][3], double away[3])
 {
     double part = 0;
     for (int step = 0; step < STEPS; step++) {
@@ -357,13 +357,15 @@ static int volume_sign(const double a[3], const double b[3], const double c[3], 
         sum += (fabs(l) + fabs(r)) * fabs(w[i]);
         last += fabs(w[i]);
     }
-    /* the bound of ebpo_orient3d; that function may take memory where expansions do not do */
+    /* the bound of ebpo_orient3d, which may allocate memory where expansions do not suffice */
     double bound = 0x1p-50 * sum + 0x1p-960 * (1 + last);
     return value > bound ? 1 : value < -bound ? -1 : ebpo_orient3d_expansion(a, b, c, d);
 }
 
-/* In the face's plane, seen along an axis: no line along an edge or along pq parts them. */
-static bool meets_in_plane(const double p[3], const double q[3], const double face[3][3], int axis)
+/* In the face's plane, seen along an axis: returns false if a line along an edge or along pq
+ * separates them. */
+static bool intersects_in_plane(const double p[3], const double q[3], const double face[3][3],
+                                int axis)
 {
     int u = (axis + 1) % 3, v = (axis + 2) % 3;
     double a[2] = { p[u], p[v] }, b[2] = { q[u], q[v] }, corner[3][2];
@@ -382,7 +384,7 @@ static bool meets_in_plane(const double p[3], const double q[3], const double fa
         if (ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], a) == -way &&
             ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], b) == -way)
             return false;
-    /* on the line of a flat view: along it, too */
+    /* on the line of a flat view: compare along the line, too */
     for (int i = 0; i < 2; i++)
         if (fmax(a[i], b[i]) < fmin(corner[0][i], fmin(corner[1][i], corner[2][i])) ||
             fmin(a[i], b[i]) > fmax(corner[0][i], fmax(corner[1][i], corner[2][i])))
@@ -390,8 +392,9 @@ static bool meets_in_plane(const double p[3], const double q[3], const double fa
     return true;
 }
 
-/* Along each axis in which the face is not a line; without area it is one along all. */
-static bool meets_flat(const double p[3], const double q[3], const double face[3][3])
+/* Compares along each axis in which the face is not a line; a face without area is one along all.
+ */
+static bool intersects_flat(const double p[3], const double q[3], const double face[3][3])
 {
     for (int axis = 0; axis < 3; axis++) {
         int u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -399,12 +402,12 @@ static bool meets_flat(const double p[3], const double q[3], const double face[3
                                  { face[1][u], face[1][v] },
                                  { face[2][u], face[2][v] } };
         if (ebpo_orient2d_expansion(c[0], c[1], c[2]) != 0)
-            return meets_in_plane(p, q, face, axis);
+            return intersects_in_plane(p, q, face, axis);
     }
     return false;
 }
 
-bool ebpo_segment_may_meet(const double p[3], const double q[3], const double face[3][3])
+bool ebpo_segment_may_intersect(const double p[3], const double q[3], const double face[3][3])
 {
     for (int i = 0; i < 3; i++)
         if (fmax(p[i], q[i]) < fmin(face[0][i], fmin(face[1][i], face[2][i])) ||
@@ -415,7 +418,7 @@ bool ebpo_segment_may_meet(const double p[3], const double q[3], const double fa
     if (at_p == at_q && (at_p == 1 || at_p == -1))
         return false;
     if (at_p == 0 && at_q == 0)
-        return meets_flat(p, q, face);
+        return intersects_flat(p, q, face);
     bool left = false, right = false;
     for (int k = 0; k < 3; k++) {
         int sign = volume_sign(p, q, face[k], face[(k + 1) % 3]);
@@ -427,7 +430,7 @@ bool ebpo_segment_may_meet(const double p[3], const double q[3], const double fa
 
 static int segment_crosses(const double p[3], const double q[3], const double face[3][3])
 {
-    if (!ebpo_segment_may_meet(p, q, face))
+    if (!ebpo_segment_may_intersect(p, q, face))
         return 0;
     int at_p = volume_sign(face[0], face[1], face[2], p);
     int at_q = volume_sign(face[0], face[1], face[2], q);
@@ -502,7 +505,7 @@ static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const dou
     return CROSSED;
 }
 
-/* A place near the middle of the way, another one each time. */
+/* Chooses a point near the middle of the path, a different one each time. */
 static void go_round(ebpo_side *side, const double to[3], const ebpo_extent *within, double via[3])
 {
     double length = 0;
@@ -549,7 +552,7 @@ bool ebpo_side_on(const ebpo_face_box *box, const double place[3], uint32_t *fou
     extent_of(place, place, &around);
     bool all = ebpo_face_box_find(box, &around, found, most, &visits, &count);
     for (uint32_t i = 0; i < count; i++)
-        if (ebpo_segment_may_meet(place, place, (const double(*)[3])box->corner[found[i]]))
+        if (ebpo_segment_may_intersect(place, place, (const double(*)[3])box->corner[found[i]]))
             return true;
     return !all;
 }

@@ -1,6 +1,5 @@
-/* The faces in a box with a tree of boxes over them, on which a haptic step works; distances from
- * faces and the side of a point. The loading thread makes a box; it never changes while a step
- * uses it. */
+/* The faces in a box with a tree of boxes over them, for haptic steps; distances from faces and the
+ * side of a point. The loading thread makes a box; it never changes while a step uses it. */
 #ifndef EBPO_HAPTIC_FACE_BOX_H
 #define EBPO_HAPTIC_FACE_BOX_H
 
@@ -24,12 +23,12 @@ static inline bool ebpo_extent_holds(const ebpo_extent *e, const double p[3])
 }
 
 typedef struct ebpo_face_box {
-    /* Of every ball whose centre is in it, all faces within the margin are there. */
+    /* Centres of balls for which the box has all faces within the margin. */
     ebpo_extent centres;
-    ebpo_extent loaded;               /* all faces that meet it are there */
+    ebpo_extent loaded;               /* the box has all faces that intersect it */
     uint64_t count, capacity, leaves; /* leaves: a power of two */
     double (*corner)[3][3];           /* [capacity] */
-    uint64_t *face;                   /* [capacity] as callers are told */
+    uint64_t *face;                   /* [capacity] numbers for callers */
     ebpo_extent *node;                /* [2 leaves] the root is 1, children of n are 2 n, 2 n + 1 */
 } ebpo_face_box;
 
@@ -37,59 +36,58 @@ EBPO_MUST_USE ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacit
                                             ebpo_error *error);
 void ebpo_face_box_free(ebpo_face_box *box);
 uint64_t ebpo_face_box_bytes(uint64_t capacity);
-uint64_t ebpo_face_box_leaves(uint64_t capacity); /* of its tree, at most */
+uint64_t ebpo_face_box_leaves(uint64_t capacity); /* Returns the most leaves of its tree. */
 
-/* Loads what is within `margin` of the centres. *fits is false if that is more than there is room
- * for. The order of faces is the file's, along a curve: so the tree needs no sorting. */
+/* Loads the faces within `margin` of the centres. *fits is false if there are more than there is
+ * memory for. */
 EBPO_MUST_USE ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
                                              const ebpo_extent *centres, double margin, bool *fits,
                                              ebpo_error *error);
 
-/* Faces whose boxes meet `around`, into found[most]; false: there are more, or more than *visits
- * nodes would have to be looked at, which is less by those that were. */
+/* Finds faces whose boxes intersect `around`, into found[most]. Returns false if there are more, or
+ * more than *visits nodes to visit; *visits is reduced by the visited nodes. */
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
                         uint32_t most, uint32_t *visits, uint32_t *count);
 
-/* Of what is in `around`, no point is closer to a face of the box than this; after so many nodes it
- * says less. *visits counts them. */
+/* Returns a lower bound of the distance of `around` from the faces of the box; it is weaker when
+ * the limit of nodes is reached. *visits counts them. */
 double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *around,
-                               uint32_t most_visits, uint64_t *visits);
+                               uint32_t max_visits, uint64_t *visits);
 
-/* How far a place is from a face, fast, and what a moving ball and a face are to each other. */
+/* Distance of a point from a face, computed fast; also for a moving ball. */
 
 typedef struct ebpo_face_near {
     double distance;
     double away[3];   /* unit vector from the nearest point of the face; 0 at distance 0 */
-    double weight[3]; /* of the corners at the nearest point */
+    double weight[3]; /* weights of the corners at the nearest point */
 } ebpo_face_near;
 
-/* In doubles: right within some ulps of the coordinates. */
+/* Computes in doubles: correct to some ulps of the coordinates. */
 void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_near *out);
 
 typedef struct ebpo_ball_way {
     const double *from, *way; /* [3] */
-    double reach, band;       /* the ball's radius; it touches if it is that much farther away */
-    /* Going towards a face by less than this over the whole way is none; the least where the ball
-     * is closer than its radius already. */
+    double reach, band;       /* the ball's radius; contact begins at that distance plus the band */
+    /* An approach to a face by less than this over the whole path is none; least_slack where the
+     * ball is closer than its radius already. */
     double slack, least_slack;
 } ebpo_ball_way;
 
-/* The part 0 to 1 of the way at which the ball comes to touch the face, or a little less; 2 if it
- * does not. `away` as above there. */
-double ebpo_ball_meets(const ebpo_ball_way *w, const double face[3][3], double away[3]);
+/* Returns the part 0 to 1 of the path at which the ball touches the face, or a little less; 2 if it
+ * does not. `away` as above at that point. */
+double ebpo_ball_intersects(const ebpo_ball_way *w, const double face[3][3], double away[3]);
 
-/* False: the closed segment and the closed face have certainly no common point. True: they have
- * one, or numbers are so large or small that only integers of any size could tell. Faces without
- * area have none. No memory is taken. */
-bool ebpo_segment_may_meet(const double p[3], const double q[3], const double face[3][3]);
+/* Returns false if the closed segment and the closed face certainly have no common point; true if
+ * they have one, or if numbers are so large or small that only integers of any size could decide.
+ * Faces without area have none. Allocates no memory. */
+bool ebpo_segment_may_intersect(const double p[3], const double q[3], const double face[3][3]);
 
-/* How the winding number changes from p to q through the face: 1 from outside to inside, -1 back,
- * 0: they have no common point. EBPO_CROSSES_BADLY: through an edge, a corner, from or to the
- * face's plane, or perhaps not at all. No memory is taken. */
+/* Returns the change of the winding number from p to q through the face: 1 from outside to inside,
+ * -1 back, 0: no common point. EBPO_CROSSES_BADLY: through an edge, a corner, from or to the face's
+ * plane, or perhaps not at all. Allocates no memory. */
 enum { EBPO_CROSSES_BADLY = 2 };
 
-/* Nodes of the tree over a box's faces, the one with the least key first. A heap in an array that
- * its owner gives. */
+/* A heap of nodes of the tree over a box's faces, the least key first, in an array of its owner. */
 
 typedef struct ebpo_near_node {
     double key; /* not NAN */
@@ -97,31 +95,31 @@ typedef struct ebpo_near_node {
 } ebpo_near_node;
 
 typedef struct ebpo_near_queue {
-    ebpo_near_node *item; /* there is room for all that are pushed */
+    ebpo_near_node *item; /* with space for all that are pushed */
     uint64_t count;
 } ebpo_near_queue;
 
 void ebpo_near_push(ebpo_near_queue *queue, double key, uint64_t node);
-/* item[0] is the first; this takes it out. */
+/* Removes and returns item[0], the first. */
 ebpo_near_node ebpo_near_pop(ebpo_near_queue *queue);
 
-/* On which side a probe is: its winding number, which exact arithmetic changes at each face that it
- * goes through. */
+/* The side of a probe: its winding number, which exact arithmetic changes at each face that it
+ * crosses. */
 
 typedef struct ebpo_side {
-    double at[3]; /* of this place, which is on no face, */
+    double at[3]; /* for this point, which is on no face */
     int32_t winding;
     bool known;
-    uint32_t turns; /* of ways around what is met badly */
+    uint32_t turns; /* number of detours around degenerate crossings */
 } ebpo_side;
 
-/* Goes on to `place`, as far as it gets with so little work: at most `most` faces for each of some
- * pieces, into found[most]. True: it is there. Else it stands where the winding number is known, or
- * has left the box (known is false then). */
+/* Continues to `place`, as far as bounded work allows: at most `most` faces for each of some
+ * pieces, into found[most]. Returns true if it is there. Otherwise it stops where the winding
+ * number is known, or has left the box (then known is false). */
 bool ebpo_side_go(ebpo_side *side, const ebpo_face_box *box, const double place[3], uint32_t *found,
                   uint32_t most, uint32_t visits, uint64_t *work);
 
-/* Whether a place is on a face: true also where that is not to be told without memory. */
+/* Returns true if the point is on a face, or if that cannot be decided without memory. */
 bool ebpo_side_on(const ebpo_face_box *box, const double place[3], uint32_t *found, uint32_t most,
                   uint32_t visits);
 

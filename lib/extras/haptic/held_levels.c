@@ -1,10 +1,10 @@
-/* The first levels of an octree, kept in memory for probes: bounds of the distance to the surface,
- * and the winding number of cells without faces, without reading a file.
+/* Keeps the first levels of an octree in memory for probes: bounds of the distance to the surface,
+ * and the winding number of cells without faces.
  *
  * There are at most 2^17 nodes, of 6 levels or fewer below the root. A node has its box, its
  * children, whether any face comes near its cell, and otherwise its winding number. Bounds are
- * certain: they allow for the rounding of the model's coordinates. A query visits at most as many
- * nodes as its caller allows, and returns wider bounds when that is too few. */
+ * certain: they include the rounding of the model's coordinates. A query visits at most as many
+ * nodes as its caller allows; its bounds are wider when that is too few. */
 #include "core/strict_fp.h"
 
 #include "extras/haptic/held_levels.h"
@@ -17,7 +17,7 @@
 #include "core/error.h"
 #include "geometry/cells.h"
 
-enum { DEEPEST = 6, MOST = 1 << 17 };
+enum { DEEPEST = 6, LIMIT = 1 << 17 };
 
 static ebpo_status held_levels_keep(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
                                     ebpo_held_levels *out, ebpo_error *error)
@@ -51,7 +51,7 @@ ebpo_status ebpo_held_levels_read(const ebpo_file *file, ebpo_held_levels *out, 
         ebpo_status status = ebpo_subtree_open(file, 1, &options, &tree, error);
         if (status == EBPO_OK)
             status = ebpo_subtree_get_nodes(tree, &nodes);
-        bool few = status == EBPO_OK && (nodes.node_count <= MOST || levels == 0);
+        bool few = status == EBPO_OK && (nodes.node_count <= LIMIT || levels == 0);
         if (few)
             status = held_levels_keep(file, &nodes, out, error);
         ebpo_subtree_close(tree);
@@ -92,7 +92,7 @@ typedef struct waiting {
     double lower;
 } waiting;
 
-/* The nearest on top. */
+/* Pushes the children, the nearest on top. */
 static void add_children(const ebpo_held_levels *levels, const double p[3], uint32_t first,
                          double enough, waiting *stack, int *depth)
 {
@@ -113,7 +113,7 @@ static void add_children(const ebpo_held_levels *levels, const double p[3], uint
 void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], int visits,
                             double *lo, double *hi)
 {
-    waiting stack[8 * (DEEPEST + 1)]; /* a level leaves seven behind at most */
+    waiting stack[8 * (DEEPEST + 1)]; /* each level leaves seven at most */
     int depth = 0;
     double lower = INFINITY, upper = INFINITY;
     if (levels->node[0].has_faces)

@@ -1,14 +1,13 @@
-/* A tool: a rigid set of points that move together, the contacts that hold it, and the forces that
- * it returns.
+/* A tool: a rigid set of points that move together, the contacts that hold it, and its forces.
  *
  * Points are split at the middle of their longest side into clusters of few points. A rotation is
  * measured as a length: its angle times the tool's arm.
  *
- * The way of a tool is held back by its contacts: the nearest way to the wanted one that takes no
- * point closer to a face than it may be. Hildreth's method solves that for the contacts that
- * matter, which are added one at a time, the most violated first.
+ * Contacts constrain the path of a tool: it is the nearest one to the wanted path that brings no
+ * point closer to a face than allowed. Hildreth's method solves that for the contacts that matter,
+ * which are added one at a time, the most violated first.
  *
- * Forces are passive: they are reduced where the hand would receive more energy than it gave. */
+ * Forces are passive: they are reduced where the device would receive more energy than it gave. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -28,19 +27,20 @@ static double passive_product(const double *a, const double *b, int n)
 
 void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *moved, int n)
 {
-    p->given += passive_product(force, moved, n);
-    p->step_most = fmax(p->step_most, sqrt(passive_product(moved, moved, n)));
+    p->energy += passive_product(force, moved, n);
+    p->longest_step = fmax(p->longest_step, sqrt(passive_product(moved, moved, n)));
 }
 
-/* So that what is given in sum, `given`, never exceeds A = stiffness s^2, s being the longest step
- * that the hand ever made in a tick. With g = -given, a step of s' gives at most F s', and F s' - g
- * must not exceed stiffness max(s, s')^2. That is so for all s' where F^2 <= 4 stiffness g; and
- * where F <= 2 stiffness s and F s - g <= A, as from s on the right side then grows faster than the
- * left one. A spring that was pressed steadily to the depth d has F = stiffness d and g at least
- * stiffness d^2 / 2: there the one or the other holds, and nothing is taken off. */
-static double most_force(const ebpo_passive *p)
+/* Limits the force F so that the energy given in total, `given`, never exceeds A = stiffness s^2, s
+ * being the longest motion of the device in one haptic step. With g = -given, a step of s' gives at
+ * most F s', and F s' - g must not exceed stiffness max(s, s')^2. That is so for all s' where F^2
+ * <= 4 stiffness g; and where F <= 2 stiffness s and F s - g <= A, as from s on the right side then
+ * grows faster than the left one. A spring that was pressed steadily to the depth d has F =
+ * stiffness d and g at least stiffness d^2 / 2: there one of the two holds, and the force is not
+ * reduced. */
+static double max_force(const ebpo_passive *p)
 {
-    double k = p->stiffness, g = -p->given, s = p->step_most;
+    double k = p->stiffness, g = -p->energy, s = p->longest_step;
     double by_step = s > 0 ? fmin(2 * k * s, k * s + g / s) : 0;
     double by_store = g > 0 ? 2 * sqrt(k * g) : 0;
     return fmax(fmax(by_step, by_store) * (1 - 0x1p-40), 0);
@@ -52,10 +52,10 @@ void ebpo_passive_push(const ebpo_passive *p, double damping, const double *dept
     for (int i = 0; i < n; i++)
         force[i] = p->stiffness * depth[i] - damping * moved[i];
     double into = passive_product(force, depth, n), square = passive_product(depth, depth, n);
-    if (into < 0 && square > 0) /* what pulls towards the faces is taken out */
+    if (into < 0 && square > 0) /* the part that pulls towards the faces is removed */
         for (int i = 0; i < n; i++)
             force[i] -= into / square * depth[i];
-    double length = sqrt(passive_product(force, force, n)), most = most_force(p);
+    double length = sqrt(passive_product(force, force, n)), most = max_force(p);
     if (length > most)
         for (int i = 0; i < n; i++)
             force[i] *= most / length;
@@ -155,7 +155,7 @@ static void tool_hold_sink(ebpo_tool_contacts *all)
 
 void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *contact)
 {
-    if (all->count == EBPO_CONTACTS_MOST) {
+    if (all->count == EBPO_CONTACTS_MAX) {
         if (contact->gap >= all->at[0].gap)
             return;
         all->at[0] = *contact;
@@ -178,8 +178,8 @@ typedef struct held {
 static double tool_hold_lacks(const held *h, const ebpo_tool_contact *c,
                               const double way[EBPO_SCREW])
 {
-    double room = h->release ? c->room : fmax(c->room, 0);
-    return -room - ebpo_screw_dot(c->grip, way);
+    double space = h->release ? c->space : fmax(c->space, 0);
+    return -space - ebpo_screw_dot(c->grip, way);
 }
 
 static void tool_hold_sweep(held *h, double close, double way[EBPO_SCREW])
@@ -199,7 +199,7 @@ static void tool_hold_sweep(held *h, double close, double way[EBPO_SCREW])
     }
 }
 
-static int most_offended(const held *h, double close, const double way[EBPO_SCREW])
+static int max_offended(const held *h, double close, const double way[EBPO_SCREW])
 {
     int found = -1;
     double most = close;
@@ -212,7 +212,7 @@ static int most_offended(const held *h, double close, const double way[EBPO_SCRE
     }
     for (int i = 0; i < h->count; i++)
         if (h->active[i] == found)
-            return -1; /* more sweeps would do; what is left is looked at when points move */
+            return -1; /* more sweeps would converge; the rest is checked when points move */
     return found;
 }
 
@@ -224,7 +224,7 @@ int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW],
     for (int k = 0; k < EBPO_SCREW; k++)
         out[k] = want[k];
     while (h.count < ACTIVE) {
-        int next = most_offended(&h, close, out);
+        int next = max_offended(&h, close, out);
         if (next < 0)
             break;
         h.active[h.count] = next;
@@ -325,8 +325,8 @@ static void tool_new_fill(ebpo_tool *t, const double (*points)[3], placed *p)
         t->close[i] = (ebpo_tool_close){ 0 };
     }
     for (uint64_t i = 0; i < EBPO_TOOL_POOL; i++)
-        t->pool[i] = 0;                     /* no tick is the first to use a page */
-    t->arm = square > 0 ? sqrt(square) : 1; /* one point in the middle: turning does nothing */
+        t->pool[i] = 0;                     /* no haptic step is the first to use a page */
+    t->arm = square > 0 ? sqrt(square) : 1; /* one point in the middle: rotation has no effect */
 }
 
 uint64_t ebpo_tool_bytes(const ebpo_tool *t)
@@ -372,7 +372,7 @@ void ebpo_tool_free(ebpo_tool *t)
 
 void ebpo_tool_put(ebpo_tool *t, const ebpo_rigid *at)
 {
-    t->proxy = t->hand = *at;
+    t->proxy = t->device = *at;
     t->stage = EBPO_TOOL_STANDS;
     t->contacts.count = 0;
     t->way_count = 0;

@@ -1,8 +1,8 @@
-/* Distances of many points: of given ones, and of the points of a lattice.
+/* Computes distances of given points and of the points of a lattice.
  *
- * A lattice is evaluated in slabs of layers, and a slab in bricks, whose points are close to each
- * other, so that subtrees are loaded few times and caches are warm. Each thread has a query
- * context of its own, made when it is first used. Results do not depend on the number of threads.
+ * A lattice is evaluated in groups of layers, and each group in bricks, whose points are close to
+ * each other, so that subtrees are loaded few times and caches are warm. Each thread has a separate
+ * query context, made when it is first used. Results do not depend on the number of threads.
  *
  * Source: docs/guide/maps.md. */
 #include "core/strict_fp.h"
@@ -19,7 +19,7 @@
 #include "query/load_ahead.h"
 #include "query/query_model.h"
 
-/* Takes the options, or the usual ones for NULL. */
+/* Reads the options, or the defaults for NULL. */
 static ebpo_status take_map_options(ebpo_map_options *out, const ebpo_map_options *given,
                                     ebpo_error *error)
 {
@@ -27,7 +27,7 @@ static ebpo_status take_map_options(ebpo_map_options *out, const ebpo_map_option
     ebpo_status status = EBPO_TAKE(ebpo_map_options, out, given, error);
     if (status == EBPO_OK && !(out->max_distance >= 0))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "max_distance must be 0 or more; INFINITY: everything matters");
+                         "max_distance must be 0 or more; INFINITY means no limit");
     return status;
 }
 
@@ -39,7 +39,7 @@ ebpo_status ebpo_map_askers_make(ebpo_map_askers *out, ebpo_model *model,
     distance.unsigned_distance = options->unsigned_distance;
     *out = (ebpo_map_askers){ .model = model, .distance = distance };
     out->threads = ebpo_thread_count(options->threads);
-    /* so that what cannot be asked at all is told before anything is made */
+    /* reports an unusable model before anything is made */
     ebpo_status status = ebpo_context_new(model, &out->context[0], error);
     return status == EBPO_OK ? ebpo_distance_many(out->context[0], NULL, 0, &distance, NULL, error)
                              : status;
@@ -51,8 +51,8 @@ void ebpo_map_askers_free(ebpo_map_askers *askers)
         ebpo_context_free(askers->context[i]);
 }
 
-ebpo_status ebpo_map_ask(ebpo_map_askers *askers, unsigned worker, const double *points,
-                         uint64_t count, ebpo_distance_result *results, ebpo_error *error)
+ebpo_status ebpo_map_query(ebpo_map_askers *askers, unsigned worker, const double *points,
+                           uint64_t count, ebpo_distance_result *results, ebpo_error *error)
 {
     ebpo_context **own = &askers->context[worker];
     ebpo_status status = *own ? EBPO_OK : ebpo_context_new(askers->model, own, error);
@@ -66,14 +66,14 @@ ebpo_status ebpo_map_ask(ebpo_map_askers *askers, unsigned worker, const double 
 typedef struct points_job {
     ebpo_map_askers askers;
     const double *points;
-    const uint64_t *order; /* along the curve; NULL: as they come */
+    const uint64_t *order; /* along the curve; NULL: in input order */
     double *distances;
 } points_job;
 
 static uint64_t place_of(const points_job *j, uint64_t i) { return j->order ? j->order[i] : i; }
 
-static ebpo_status ask_piece(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                             ebpo_error *error)
+static ebpo_status query_piece(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
     points_job *j = context;
     uint64_t count = end - begin;
@@ -84,7 +84,7 @@ static ebpo_status ask_piece(void *context, uint64_t begin, uint64_t end, unsign
     for (uint64_t i = 0; status == EBPO_OK && i < count; i++)
         memcpy(points[i], j->points + 3 * place_of(j, begin + i), sizeof points[i]);
     if (status == EBPO_OK)
-        status = ebpo_map_ask(&j->askers, worker, points[0], count, results, error);
+        status = ebpo_map_query(&j->askers, worker, points[0], count, results, error);
     for (uint64_t i = 0; status == EBPO_OK && i < count; i++)
         j->distances[place_of(j, begin + i)] = results[i].distance;
     free(points);
@@ -105,11 +105,11 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
         return status;
     ebpo_box box = ebpo_model_box(model);
     uint64_t *order = model->whole ? NULL : ebpo_curve_order(&box, points, count);
-    job.order = order; /* without memory for it, as they come: slower, and the same */
+    job.order = order; /* without memory for it, in input order: slower, with the same results */
     status = ebpo_map_askers_make(&job.askers, model, &o, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(job.askers.threads, NULL, count, EBPO_MAP_PIECE, ask_piece, &job,
-                                   &o.progress, "asking for distances", error);
+        status = ebpo_parallel_for(job.askers.threads, NULL, count, EBPO_MAP_PIECE, query_piece,
+                                   &job, &o.progress, "asking for distances", error);
     ebpo_map_askers_free(&job.askers);
     free(order);
     return status;
@@ -118,12 +118,12 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
 /* --- lattices --- */
 
 enum { BRICK = 16, SLAB_VALUES = 8 << 20 };
-#define POINTS_MOST (UINT64_C(1) << 40)
+#define POINTS_MAX (UINT64_C(1) << 40)
 
 typedef struct slab_job {
     ebpo_map_askers askers;
     const ebpo_lattice *lattice;
-    uint64_t first, layers; /* of the slab */
+    uint64_t first, layers; /* layers of the group */
     uint64_t bricks[3];
     double *values; /* [layers][count[1]][count[0]] */
 } slab_job;
@@ -136,7 +136,7 @@ static void point_of(const ebpo_lattice *l, uint64_t i, uint64_t j, uint64_t k, 
 }
 
 typedef struct brick {
-    uint64_t low[3], high[3]; /* points of the slab, high ones excluded */
+    uint64_t low[3], high[3]; /* range of points of the group, high ones excluded */
 } brick;
 
 static brick brick_of(const slab_job *j, uint64_t number)
@@ -170,8 +170,8 @@ static void lattice_keep(const slab_job *j, const brick *b, const ebpo_distance_
                 j->values[(z * size[1] + y) * size[0] + x] = (results++)->distance;
 }
 
-static ebpo_status ask_bricks(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                              ebpo_error *error)
+static ebpo_status query_bricks(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
 {
     slab_job *j = context;
     double(*points)[3] = ebpo_alloc(EBPO_MAP_PIECE, sizeof *points);
@@ -180,8 +180,8 @@ static ebpo_status ask_bricks(void *context, uint64_t begin, uint64_t end, unsig
         points && results ? EBPO_OK : ebpo_fail_memory(error, EBPO_MAP_PIECE * sizeof *results);
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
         brick b = brick_of(j, i);
-        status = ebpo_map_ask(&j->askers, worker, points[0], lattice_fill(j, &b, points), results,
-                              error);
+        status = ebpo_map_query(&j->askers, worker, points[0], lattice_fill(j, &b, points), results,
+                                error);
         if (status == EBPO_OK)
             lattice_keep(j, &b, results);
     }
@@ -190,23 +190,24 @@ static ebpo_status ask_bricks(void *context, uint64_t begin, uint64_t end, unsig
     return status;
 }
 
-/* Corners that are finite, and sums on the way to them, make all points so: each coordinate is
- * monotonous in i, j and k. */
+/* Checks that corners, and the sums leading to them, are finite. Then all points are: each
+ * coordinate is monotonous in i, j and k. */
 static ebpo_status check_lattice(const ebpo_lattice *l, ebpo_error *error)
 {
     uint64_t points = 0;
     if (l->count[0] == 0 || l->count[1] == 0 || l->count[2] == 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "a lattice needs at least one point on each axis");
     if (!ebpo_mul_ok(l->count[0], l->count[1], &points) ||
-        !ebpo_mul_ok(points, l->count[2], &points) || points > POINTS_MOST)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "a lattice of more than 2^40 points; take fewer");
+        !ebpo_mul_ok(points, l->count[2], &points) || points > POINTS_MAX)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the lattice has more than 2^40 points; use "
+                         "fewer");
     for (int corner = 0; corner < 8; corner++) {
         double p[3];
         point_of(l, corner & 1 ? l->count[0] - 1 : 0, corner & 2 ? l->count[1] - 1 : 0,
                  corner & 4 ? l->count[2] - 1 : 0, p);
         if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]))
-            return ebpo_fail(error, EBPO_E_ARGUMENT,
-                             "the lattice has points that are not finite numbers");
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "the lattice has points that are not finite");
     }
     return EBPO_OK;
 }
@@ -230,7 +231,7 @@ static ebpo_status map_slab(slab_job *j, const ebpo_map_options *o, ebpo_error *
         j->bricks[c] = (size[c] + BRICK - 1) / BRICK;
         bricks *= j->bricks[c];
     }
-    return ebpo_parallel_for(j->askers.threads, NULL, bricks, 1, ask_bricks, j, &progress,
+    return ebpo_parallel_for(j->askers.threads, NULL, bricks, 1, query_bricks, j, &progress,
                              "asking for distances", error);
 }
 

@@ -1,4 +1,4 @@
-/* Exact distances of many points, on many threads. */
+/* Computes exact distances of many points on many threads. */
 #ifndef EBPO_MAP_MAP_LATTICE_H
 #define EBPO_MAP_MAP_LATTICE_H
 
@@ -6,7 +6,7 @@
 
 enum { EBPO_MAP_THREADS = 256, EBPO_MAP_PIECE = 4096 };
 
-/* Who asks: each worker has a context of its own, made when it first asks. */
+/* Query contexts: each worker has one, made at its first query. */
 typedef struct ebpo_map_askers {
     ebpo_model *model;
     ebpo_distance_options distance;
@@ -14,14 +14,14 @@ typedef struct ebpo_map_askers {
     ebpo_context *context[EBPO_MAP_THREADS];
 } ebpo_map_askers;
 
-/* Takes the caller's options. Freed by ebpo_map_askers_free, also after a failure. */
+/* Reads the caller's options. Free it by ebpo_map_askers_free, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_map_askers_make(ebpo_map_askers *out, ebpo_model *model,
                                                const ebpo_map_options *options, ebpo_error *error);
 void ebpo_map_askers_free(ebpo_map_askers *askers);
 
-/* points[count][3], at most EBPO_MAP_PIECE, into results[count]. */
-EBPO_MUST_USE ebpo_status ebpo_map_ask(ebpo_map_askers *askers, unsigned worker,
-                                       const double *points, uint64_t count,
-                                       ebpo_distance_result *results, ebpo_error *error);
+/* Evaluates points[count][3], at most EBPO_MAP_PIECE, into results[count]. */
+EBPO_MUST_USE ebpo_status ebpo_map_query(ebpo_map_askers *askers, unsigned worker,
+                                         const double *points, uint64_t count,
+                                         ebpo_distance_result *results, ebpo_error *error);
 
 #endif

@@ -1,9 +1,10 @@
-/* Colours of distances, and distances with their colours as attributes of a mesh's vertices.
+/* Maps distances to colours, and adds distances with their colours as attributes of a mesh's
+ * vertices.
  *
  * The diverging palette is made in OKLab (B. Ottosson, 2020: the matrices below are its
  * definition), whose lightness agrees with perception. The other palette is that of the thesis.
  *
- * Attributes of vertices named distance, red, green or blue are replaced. */
+ * Vertex attributes named distance, red, green or blue are replaced. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -52,7 +53,7 @@ static void of_oklab(double light, double a, double b, uint8_t rgb[3])
             srgb_of(to_rgb[i][0] * cone[0] + to_rgb[i][1] * cone[1] + to_rgb[i][2] * cone[2]));
 }
 
-/* Hues of 255 and 50 degrees, which the colour blind tell apart. */
+/* Hues of 255 and 50 degrees, which are distinct for colour-blind readers. */
 static void palette_diverging(double share, uint8_t rgb[3])
 {
     static const double cosine[2] = { -0.2588190451, 0.6427876097 },
@@ -62,7 +63,7 @@ static void palette_diverging(double share, uint8_t rgb[3])
     of_oklab(light, chroma * cosine[outside], chroma * sine[outside], rgb);
 }
 
-/* Red over green to blue: a third of the circle of hues each. */
+/* Returns red over green to blue, each a third of the circle of hues. */
 static void palette_thesis(double share, uint8_t rgb[3])
 {
     double far = fabs(share), turn = 4 * far; /* red, yellow, green, cyan, blue */
@@ -135,7 +136,7 @@ ebpo_status ebpo_map_paint(ebpo_mesh *mesh, const double *distances, ebpo_map_pa
     EBPO_DEFAULT_FP;
     if ((unsigned)palette >= EBPO_MAP_PALETTES || !(range > 0) || !isfinite(range))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "painting takes one of the palettes, and a finite range above 0");
+                         "painting needs one of the palettes, and a finite range above 0");
     if (!mesh->attributes)
         mesh->attributes = ebpo_attributes_make(mesh->workspace);
     for (uint64_t i = mesh->attributes ? mesh->attributes->count : 0; i-- > 0;)
@@ -143,7 +144,7 @@ ebpo_status ebpo_map_paint(ebpo_mesh *mesh, const double *distances, ebpo_map_pa
             ebpo_attributes_remove(mesh->attributes, i);
     if (mesh->attributes && mesh->attributes->count > EBPO_ATTRIBUTE_ARRAYS - 2)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the mesh has so many attributes that no more fit; leave some out");
+                         "the mesh has too many attributes to add more; omit some");
     ebpo_attribute *colour =
         mesh->attributes ? paint_add(mesh, "red green blue", EBPO_ATTRIBUTE_UINT8, 3) : NULL;
     uint8_t *rgb = colour ? colour->values : NULL; /* adding moves the struct */

@@ -1,10 +1,10 @@
-/* The greatest distance of a mesh's faces from a model, their insides included (a one-sided
- * Hausdorff distance), as certain bounds.
+/* Computes certain bounds of the greatest distance of a mesh's faces, including their interior,
+ * from a model (a one-sided Hausdorff distance).
  *
- * Branch and bound over triangles, which are cut into four: the distance changes by no more than
- * its argument moves, so that all of a triangle is at most as far as a corner plus the longest way
- * from there. In each round those of the greatest bounds are cut at once, which makes the result
- * independent of threads. */
+ * Branch and bound over triangles, which are divided into four. The distance changes by no more
+ * than its argument moves, so each point of a triangle is at most as far as a corner plus the
+ * longest way from that corner. Each round divides the triangles with the greatest bounds at once,
+ * so the result is independent of threads. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -18,12 +18,12 @@
 #include "core/parallel.h"
 #include "extras/map/map_lattice.h"
 
-/* Faces that are looked at together; and triangles of a round, beyond which their bounds are taken
- * as they are. */
-enum { FACES_AT_A_TIME = 1 << 17, TRIANGLES_MOST = 1 << 20 };
+/* Number of faces evaluated together; and the number of triangles of a round, beyond which their
+ * bounds are used unchanged. */
+enum { FACES_AT_A_TIME = 1 << 17, TRIANGLES_MAX = 1 << 20 };
 
 typedef struct triangle {
-    double corner[3][3], away[3]; /* without signs */
+    double corner[3][3], away[3]; /* `away`: unsigned distances of the corners */
     double upper;
 } triangle;
 
@@ -36,13 +36,13 @@ typedef struct search {
     ebpo_map_askers askers;
     const ebpo_mesh *mesh;
     const double *distances;
-    ebpo_map_reach_options o;
-    double slack; /* more than what rounding may move a point or change a length */
-    ebpo_map_reach reach;
-    uint64_t allowed; /* questions by the end of these faces */
+    ebpo_map_range_options o;
+    double slack; /* above the effect of rounding on positions and lengths */
+    ebpo_map_range reach;
+    uint64_t allowed; /* queries allowed up to the end of these faces */
     triangles now, next;
-    uint64_t cut;                              /* the first ones of `now`, which are cut now */
-    double (*middle)[3][3], (*middle_away)[3]; /* [cut], of the edges after each corner */
+    uint64_t cut;                              /* the first ones of `now`, divided in this round */
+    double (*middle)[3][3], (*middle_away)[3]; /* [cut], for the edge after each corner */
     uint64_t middle_capacity, away_capacity;
 } search;
 
@@ -50,7 +50,7 @@ static double reach_apart(const double a[3], const double b[3])
 {
     double d[3] = { a[0] - b[0], a[1] - b[1], a[2] - b[2] };
     double most = fmax(fabs(d[0]), fmax(fabs(d[1]), fabs(d[2])));
-    if (most == 0 || isinf(most)) /* farther apart than a number can tell */
+    if (most == 0 || isinf(most)) /* the distance overflows a double */
         return most;
     for (int c = 0; c < 3; c++)
         d[c] /= most;
@@ -73,12 +73,12 @@ static bool in_the_way(const search *s, double upper)
     return upper > s->reach.lo * (1 + s->o.tolerance) && upper > s->reach.hi;
 }
 
-/* Keeps a triangle for the next round, or takes its bound as it is. */
+/* Keeps a triangle for the next round, or uses its bound unchanged. */
 static ebpo_status reach_keep(search *s, triangles *list, const triangle *t, ebpo_error *error)
 {
     if (!in_the_way(s, t->upper))
         return EBPO_OK;
-    if (list->count == TRIANGLES_MOST || s->reach.questions >= s->allowed) {
+    if (list->count == TRIANGLES_MAX || s->reach.queries >= s->allowed) {
         s->reach.hi = fmax(s->reach.hi, t->upper);
         return EBPO_OK;
     }
@@ -98,8 +98,8 @@ static void reach_learn(search *s, double away, const double place[3])
 
 /* --- a round --- */
 
-static ebpo_status ask_middles(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                               ebpo_error *error)
+static ebpo_status query_middles(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     search *s = context;
     ebpo_distance_result results[3 * 256];
@@ -109,7 +109,7 @@ static ebpo_status ask_middles(void *context, uint64_t begin, uint64_t end, unsi
                 s->middle[i][k][c] =
                     s->now.item[i].corner[k][c] / 2 + s->now.item[i].corner[(k + 1) % 3][c] / 2;
     ebpo_status status =
-        ebpo_map_ask(&s->askers, worker, s->middle[begin][0], 3 * (end - begin), results, error);
+        ebpo_map_query(&s->askers, worker, s->middle[begin][0], 3 * (end - begin), results, error);
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
         for (int k = 0; k < 3; k++)
             s->middle_away[i][k] = fabs(results[3 * (i - begin) + (uint64_t)k].distance);
@@ -127,12 +127,12 @@ static void child_of(const search *s, uint64_t i, int which, triangle *out)
     }
 }
 
-/* Puts those first whose bounds are above half of the greatest one: to cut others helps nobody yet.
- */
+/* Moves triangles with bounds above half of the greatest one to the front: dividing others does not
+ * help yet. */
 static void reach_choose(search *s)
 {
     double most = 0;
-    uint64_t left = s->allowed > s->reach.questions ? s->allowed - s->reach.questions : 0;
+    uint64_t left = s->allowed > s->reach.queries ? s->allowed - s->reach.queries : 0;
     s->cut = 0;
     for (uint64_t i = 0; i < s->now.count; i++)
         most = fmax(most, s->now.item[i].upper);
@@ -147,7 +147,7 @@ static void reach_choose(search *s)
 static ebpo_status reach_cut(search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    s->reach.questions += 3 * s->cut;
+    s->reach.queries += 3 * s->cut;
     for (uint64_t i = 0; i < s->cut; i++)
         for (int k = 0; k < 3; k++)
             reach_learn(s, s->middle_away[i][k] - s->slack, s->middle[i][k]);
@@ -176,8 +176,8 @@ static ebpo_status reach_refine(search *s, ebpo_error *error)
         if (!ebpo_grow(&s->middle, &s->middle_capacity, s->cut, sizeof *s->middle) ||
             !ebpo_grow(&s->middle_away, &s->away_capacity, s->cut, sizeof *s->middle_away))
             return ebpo_fail_memory(error, s->cut * sizeof *s->middle);
-        status = ebpo_parallel_for(s->askers.threads, NULL, s->cut, 256, ask_middles, s, &none, "",
-                                   error);
+        status = ebpo_parallel_for(s->askers.threads, NULL, s->cut, 256, query_middles, s, &none,
+                                   "", error);
         if (status == EBPO_OK)
             status = reach_cut(s, error);
     }
@@ -193,12 +193,12 @@ static void corner_of(const ebpo_mesh *m, uint32_t vertex, double out[3])
                           : m->xyz64[3 * (uint64_t)vertex + c];
 }
 
-static ebpo_status look_at_faces(search *s, uint64_t begin, uint64_t end, ebpo_error *error)
+static ebpo_status inspect_faces(search *s, uint64_t begin, uint64_t end, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    double share = (double)end / (double)s->mesh->face_count; /* all faces have theirs */
+    double share = (double)end / (double)s->mesh->face_count; /* all these faces are done */
     s->allowed =
-        end == s->mesh->face_count ? s->o.questions : (uint64_t)((double)s->o.questions * share);
+        end == s->mesh->face_count ? s->o.queries : (uint64_t)((double)s->o.queries * share);
     s->now.count = 0;
     for (uint64_t f = begin; f < end && status == EBPO_OK; f++) {
         triangle t;
@@ -222,7 +222,7 @@ static ebpo_status search_all(search *s, ebpo_error *error)
         if (!ebpo_progress_step(&s->o.progress, "bounding between vertices", f, m->face_count,
                                 error))
             return EBPO_E_CANCELLED;
-        status = look_at_faces(s, f, end, error);
+        status = inspect_faces(s, f, end, error);
         if (status != EBPO_OK)
             return status;
     }
@@ -230,7 +230,7 @@ static ebpo_status search_all(search *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* What vertices tell; and how much rounding may matter. */
+/* Evaluates the vertices, and sets the rounding margin. */
 static ebpo_status reach_begin(search *s, ebpo_error *error)
 {
     const ebpo_mesh *m = s->mesh;
@@ -242,8 +242,8 @@ static ebpo_status reach_begin(search *s, ebpo_error *error)
             if (v >= m->vertex_count || !isfinite(s->distances[v]))
                 return ebpo_fail(error, EBPO_E_ARGUMENT,
                                  "face %" PRIu64
-                                 " has a corner that is no vertex, or whose distance "
-                                 "is not finite",
+                                 " has a corner that is not a vertex index, or a vertex with a "
+                                 "non-finite distance",
                                  f);
             corner_of(m, v, p);
             most = fmax(most, fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2]))));
@@ -253,34 +253,34 @@ static ebpo_status reach_begin(search *s, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status reach_take(search *s, const ebpo_map_reach_options *given, ebpo_error *error)
+static ebpo_status reach_take(search *s, const ebpo_map_range_options *given, ebpo_error *error)
 {
-    s->o = (ebpo_map_reach_options)EBPO_MAP_REACH_OPTIONS_INIT;
-    ebpo_status status = EBPO_TAKE(ebpo_map_reach_options, &s->o, given, error);
+    s->o = (ebpo_map_range_options)EBPO_MAP_RANGE_OPTIONS_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_map_range_options, &s->o, given, error);
     if (status == EBPO_OK && !(s->o.tolerance > 0 && isfinite(s->o.tolerance)))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the tolerance must be finite and above 0");
-    if (s->o.questions == 0)
-        s->o.questions = 16 * s->mesh->face_count;
+    if (s->o.queries == 0)
+        s->o.queries = 16 * s->mesh->face_count;
     return status;
 }
 
-ebpo_status ebpo_map_find_reach(ebpo_model *model, const ebpo_mesh *mesh, const double *distances,
-                                const ebpo_map_reach_options *options, ebpo_map_reach *out,
+ebpo_status ebpo_map_find_range(ebpo_model *model, const ebpo_mesh *mesh, const double *distances,
+                                const ebpo_map_range_options *options, ebpo_map_range *out,
                                 ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_map_options asking = EBPO_MAP_OPTIONS_INIT;
+    ebpo_map_options querying = EBPO_MAP_OPTIONS_INIT;
     search s = { .mesh = mesh, .distances = distances };
-    ebpo_status status = EBPO_CHECK_SIZED(ebpo_map_reach, out, error);
+    ebpo_status status = EBPO_CHECK_SIZED(ebpo_map_range, out, error);
     if (status == EBPO_OK)
         status = reach_take(&s, options, error);
     if (status == EBPO_OK)
         status = reach_begin(&s, error);
     if (status != EBPO_OK)
         return status;
-    asking.unsigned_distance = true;
-    asking.threads = s.o.threads;
-    status = ebpo_map_askers_make(&s.askers, model, &asking, error);
+    querying.unsigned_distance = true;
+    querying.threads = s.o.threads;
+    status = ebpo_map_askers_make(&s.askers, model, &querying, error);
     if (status == EBPO_OK)
         status = search_all(&s, error);
     ebpo_map_askers_free(&s.askers);
@@ -288,5 +288,5 @@ ebpo_status ebpo_map_find_reach(ebpo_model *model, const ebpo_mesh *mesh, const 
     free(s.next.item);
     free(s.middle);
     free(s.middle_away);
-    return status == EBPO_OK ? EBPO_GIVE(ebpo_map_reach, out, &s.reach) : status;
+    return status == EBPO_OK ? EBPO_GIVE(ebpo_map_range, out, &s.reach) : status;
 }

@@ -1,11 +1,10 @@
-/* Statistics of distances, and files of the distances at a lattice's points.
+/* Writes statistics of distances, and files of the distances at a lattice's points.
  *
- * Sums are exact (mesh/sum.h), in three ranges of size so that neither values nor squares
- * overflow: statistics depend neither on the order of values nor on threads.
+ * Sums are exact (mesh/sum.h), in three ranges of size so that neither values nor squares overflow:
+ * statistics depend neither on the order of values nor on threads.
  *
  * A lattice is written layer by layer as NRRD (teem, "Definition of NRRD File Format") or as a
- * VTKHDF 1.0 image (VTK's documentation, "VTKHDF file format"). The file appears whole or not at
- * all. */
+ * VTKHDF 1.0 image (VTK's documentation, "VTKHDF file format"). The file is replaced atomically. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -24,14 +23,14 @@
 #include "io/publish.h"
 #include "mesh/sum.h"
 
-/* Statistics while values are added, without percentiles. */
+/* Statistics while values are added, excluding percentiles. */
 
 enum { MAP_BINS = 3, MAP_BIN_UNIT = 600 };
 
 typedef struct map_sums {
     ebpo_map_stats stats; /* counts, min and max */
-    /* of small, ordinary and large values: bin i counts 2^(MAP_BIN_UNIT (i - 1)), squares its
-     * square */
+    /* sums of small, ordinary and large values: the unit of bin i is 2^(MAP_BIN_UNIT (i - 1)), for
+     * squares its square */
     ebpo_sum sum[MAP_BINS], sum_unsigned[MAP_BINS], squares[MAP_BINS];
 } map_sums;
 
@@ -40,7 +39,7 @@ typedef struct map_sums {
 typedef struct map_file {
     const ebpo_lattice *lattice;
     const char *shown;
-    const char *path; /* of the file by name: HDF5 */
+    const char *path; /* name of the file, for HDF5 */
     FILE *stream;     /* NRRD */
     ebpo_h5_out out;
     ebpo_h5_id values;
@@ -55,7 +54,7 @@ double ebpo_map_percent(int index)
 
 /* --- sums --- */
 
-/* Freed by free(); NULL when memory is short. */
+/* Returns new sums, to be freed by free(); NULL when memory is short. */
 static map_sums *map_sums_new(void)
 {
     map_sums *s = ebpo_alloc_zero(1, sizeof *s);
@@ -64,8 +63,8 @@ static map_sums *map_sums_new(void)
     return s;
 }
 
-/* In multiples of a power of two that suits its size, so that neither sums nor squares overflow or
- * vanish, and so that nothing depends on the order. */
+/* Adds a multiple of a power of two that suits the value's size, so that neither sums nor squares
+ * overflow or underflow, and the result does not depend on the order. */
 static void add_to(ebpo_sum bins[MAP_BINS], double value, bool square)
 {
     double size = fabs(value);
@@ -74,7 +73,7 @@ static void add_to(ebpo_sum bins[MAP_BINS], double value, bool square)
     ebpo_sum_add(&bins[bin], square ? scaled * scaled : scaled);
 }
 
-/* Of the sum divided by count, as multiples of 2^unit. */
+/* Returns the sum divided by count, as a multiple of 2^unit. */
 static double mean_of(const ebpo_sum bins[MAP_BINS], bool square, uint64_t count, int unit)
 {
     double sum = 0;
@@ -106,7 +105,8 @@ static void map_sums_add(map_sums *s, const double *values, uint64_t count)
 static ebpo_map_stats describe_nothing(const ebpo_map_stats *s)
 {
     ebpo_map_stats out = *s;
-    out.min = out.max = out.farthest = out.mean = out.mean_unsigned = out.rms = out.deviation = NAN;
+    out.min = out.max = out.farthest = out.mean = out.mean_unsigned = out.rms = out.error_bound =
+        NAN;
     return out;
 }
 
@@ -125,7 +125,7 @@ static ebpo_map_stats map_sums_stats(const map_sums *s)
     out.mean = ldexp(mean, unit);
     out.mean_unsigned = ldexp(mean_of(s->sum_unsigned, false, out.count, unit), unit);
     out.rms = ldexp(sqrt(square), unit);
-    out.deviation = ldexp(sqrt(fmax(square - mean * mean, 0)), unit);
+    out.error_bound = ldexp(sqrt(fmax(square - mean * mean, 0)), unit);
     return out;
 }
 
@@ -191,8 +191,8 @@ static void put_vector(FILE *to, const double v[3])
     fprintf(to, " (%.17g,%.17g,%.17g)", v[0], v[1], v[2]);
 }
 
-/* Headers; then layers in order; then the end, which tells what failed late. `discard` after a
- * failure. */
+/* Begins an NRRD file. Each format has functions for the header, the layers in order, and the end,
+ * which reports late failures; `discard` after a failure. */
 static ebpo_status map_nrrd_begin(map_file *f, ebpo_error *error)
 {
     const ebpo_lattice *l = f->lattice;
@@ -215,7 +215,7 @@ static ebpo_status map_nrrd_layers(map_file *f, const double *values, uint64_t f
                                    uint64_t layers, ebpo_error *error)
 {
     uint64_t count = layers * f->lattice->count[0] * f->lattice->count[1];
-    (void)first; /* they come in order */
+    (void)first; /* layers come in order */
     for (uint64_t i = 0; i < count;) {
         uint8_t bytes[8 * 512];
         unsigned n = 0;
@@ -243,7 +243,7 @@ static double length_of(const double v[3])
     return most * sqrt(a * a + b * b + c * c);
 }
 
-/* An image's axes are unit vectors at right angles, and its spacing is theirs. */
+/* Computes an image's axes, which are perpendicular unit vectors, and their spacing. */
 static ebpo_status find_axes(const ebpo_lattice *l, double spacing[3], double direction[9],
                              ebpo_error *error)
 {
@@ -376,7 +376,7 @@ ebpo_status ebpo_map_write(ebpo_model *model, const ebpo_lattice *lattice, const
     if (status == EBPO_OK && stats)
         status = EBPO_CHECK_SIZED(ebpo_map_stats, stats, error);
     if (status == EBPO_OK && format != EBPO_MAP_NRRD && format != EBPO_MAP_VTKHDF)
-        status = ebpo_fail(error, EBPO_E_ARGUMENT, "this is no format of maps");
+        status = ebpo_fail(error, EBPO_E_ARGUMENT, "unknown format of maps");
     if (status == EBPO_OK)
         status = ebpo_publish_begin(&publish, path, error);
     if (status == EBPO_OK)

@@ -1,9 +1,9 @@
-/* Turns paint into colours of a mesh's vertices, and finds which faces a stroke covers.
+/* Turns paint into colours of a mesh's vertices, and finds the faces that a stroke covers.
  *
- * The strokes of a layer are applied in their order to the vertices that their points reach; then
- * the layers are put over the colours of vertices in their order. Colours are stored where the
- * mesh already has them, in the types of its columns; other meshes get columns for them. A stroke
- * covers the faces of its points' reaches.
+ * The strokes of a layer are applied in order to the vertices that their points reach; then the
+ * layers are blended in order over the colours of vertices. Colours are stored in the mesh's
+ * existing columns, in their types; other meshes get columns for them. A stroke covers the faces of
+ * its points' reaches.
  *
  * Source: format-spec/paint.md, section 5. */
 #include "core/strict_fp.h"
@@ -25,7 +25,7 @@
 #include "mesh/attributes.h"
 #include "query/query_model.h"
 
-/* The inverse of ebpo_colour_byte. */
+/* Stores a byte: the inverse of ebpo_colour_byte. */
 static void put_byte(const ebpo_colour_column *c, uint64_t row, uint8_t value)
 {
     uint8_t *to = c->of->values + row * ebpo_attribute_row_bytes(c->of) +
@@ -35,7 +35,7 @@ static void put_byte(const ebpo_colour_column *c, uint64_t row, uint8_t value)
     const float share = (float)(value / 255.0);
     const double exact = value / 255.0;
     switch (c->of->type) {
-    case EBPO_ATTRIBUTE_INT8: *to = value < 127 ? value : 127; break; /* the most it holds */
+    case EBPO_ATTRIBUTE_INT8: *to = value < 127 ? value : 127; break; /* limit of the type */
     case EBPO_ATTRIBUTE_UINT8: *to = value; break;
     case EBPO_ATTRIBUTE_INT16: memcpy(to, &two, sizeof two); break;
     case EBPO_ATTRIBUTE_UINT16: memcpy(to, &full, sizeof full); break;
@@ -46,7 +46,7 @@ static void put_byte(const ebpo_colour_column *c, uint64_t row, uint8_t value)
     }
 }
 
-/* Three new properties of all vertices. */
+/* Adds three new properties of all vertices. */
 static ebpo_status add_colours(ebpo_mesh *mesh, const uint8_t *rgba, ebpo_error *error)
 {
     ebpo_attribute like = { .element = "vertex",
@@ -59,7 +59,7 @@ static ebpo_status add_colours(ebpo_mesh *mesh, const uint8_t *rgba, ebpo_error 
         mesh->attributes = ebpo_attributes_make(mesh->workspace);
     if (mesh->attributes && mesh->attributes->count >= EBPO_ATTRIBUTE_ARRAYS)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the mesh has so many attributes that no more fit; leave some out");
+                         "the mesh has too many attributes to add more; omit some");
     ebpo_attribute *a = mesh->attributes ? ebpo_attributes_add(mesh->attributes, &like) : NULL;
     if (a && !ebpo_attribute_reserve(mesh->attributes->workspace, a, mesh->vertex_count, 0)) {
         ebpo_attributes_remove(mesh->attributes, mesh->attributes->count - 1);
@@ -72,7 +72,7 @@ static ebpo_status add_colours(ebpo_mesh *mesh, const uint8_t *rgba, ebpo_error 
     return EBPO_OK;
 }
 
-ebpo_status ebpo_paint_dye_mesh(ebpo_mesh *mesh, const uint8_t *rgba, ebpo_error *error)
+ebpo_status ebpo_paint_colour_mesh(ebpo_mesh *mesh, const uint8_t *rgba, ebpo_error *error)
 {
     ebpo_colour_column channels[EBPO_COLOUR_CHANNELS];
     if (!ebpo_colour_columns(mesh->attributes, "vertex", channels))
@@ -84,33 +84,33 @@ ebpo_status ebpo_paint_dye_mesh(ebpo_mesh *mesh, const uint8_t *rgba, ebpo_error
     return EBPO_OK;
 }
 
-/* --- which faces a stroke covers --- */
+/* --- faces that a stroke covers --- */
 
 static int by_file_face(const void *a, const void *b)
 {
-    const ebpo_met_face *x = a, *y = b;
+    const ebpo_found_face *x = a, *y = b;
     return (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-static ebpo_status add_point(ebpo_met_faces *met, ebpo_reach *reach, ebpo_error *error)
+static ebpo_status add_point(ebpo_found_faces *intersected, ebpo_reach *reach, ebpo_error *error)
 {
     for (uint64_t i = 0; i < reach->count; i++) {
         const ebpo_reach_face *f = &reach->face[i];
         uint32_t number;
-        ebpo_status status = ebpo_met_faces_add(met, f, &number, error);
+        ebpo_status status = ebpo_found_faces_add(intersected, f, &number, error);
         if (status != EBPO_OK)
             return status;
         for (int k = 0; k < 3; k++)
-            met->face[number].covered[k] |= f->within[k];
+            intersected->face[number].covered[k] |= f->within[k];
     }
     return EBPO_OK;
 }
 
-static void cover_give(const ebpo_met_faces *met, ebpo_paint_face_fn take, void *user)
+static void cover_give(const ebpo_found_faces *intersected, ebpo_paint_face_fn take, void *user)
 {
-    qsort(met->face, met->count, sizeof *met->face, by_file_face);
-    for (uint64_t i = 0; i < met->count; i++) {
-        const ebpo_met_face *f = &met->face[i];
+    qsort(intersected->face, intersected->count, sizeof *intersected->face, by_file_face);
+    for (uint64_t i = 0; i < intersected->count; i++) {
+        const ebpo_found_face *f = &intersected->face[i];
         ebpo_paint_face out = { .face = f->face, .file_face = f->file_face };
         memcpy(out.corner, f->corner, sizeof out.corner);
         for (int k = 0; k < 3; k++)
@@ -125,7 +125,7 @@ ebpo_status ebpo_paint_cover(const ebpo_paint *p, ebpo_context *context, uint64_
                              ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_met_faces met = { 0 };
+    ebpo_found_faces intersected = { 0 };
     ebpo_reach reach;
     uint64_t absent = 0;
     ebpo_status status = ebpo_paint_check_context(p, context, error);
@@ -139,15 +139,15 @@ ebpo_status ebpo_paint_cover(const ebpo_paint *p, ebpo_context *context, uint64_
         bool here;
         status = ebpo_paint_reach(&reach, p, stroke, i, &here, error);
         if (status == EBPO_OK && here)
-            status = add_point(&met, &reach, error);
+            status = add_point(&intersected, &reach, error);
         absent += status == EBPO_OK && !here;
     }
     ebpo_reach_end(&reach);
     if (status == EBPO_OK && elsewhere)
         *elsewhere = absent;
     if (status == EBPO_OK)
-        cover_give(&met, take, user);
-    ebpo_met_faces_free(&met);
+        cover_give(&intersected, take, user);
+    ebpo_found_faces_free(&intersected);
     return status;
 }
 
@@ -162,9 +162,9 @@ static ebpo_status check_point(ebpo_reach *reach, const ebpo_paint_point *q, con
                ? status
                : ebpo_fail_file(
                      error, EBPO_E_FORMAT, reach->context->model->file->in.shown,
-                     "%s %llu of the paint is not on face %lu, where it says to be: the "
-                     "paint does not fit the model; give the one that it was made on, or "
-                     "remove that %s without naming a model",
+                     "%s %llu of the paint is not on face %lu, which it names: the paint does "
+                     "not fit the model; give the one that it was made on, or remove that %s "
+                     "without naming a model",
                      what, (unsigned long long)number, (unsigned long)q->face, what);
 }
 
@@ -195,12 +195,12 @@ ebpo_status ebpo_paint_check_points(const ebpo_paint *p, ebpo_context *context,
 
 /* --- layers over colours --- */
 
-/* A vertex that something covers. */
+/* A vertex that a stroke covers. */
 typedef struct dyed {
-    double colour[3];   /* with the layers before */
-    double paint[3], a; /* of the layer at hand */
+    double colour[3];   /* including the layers before */
+    double paint[3], a; /* for the current layer */
     uint32_t vertex;
-    uint32_t layer, stroke; /* the last ones that covered it, and 1 */
+    uint32_t layer, stroke; /* the last layer and stroke that covered it, plus 1 */
 } dyed;
 
 typedef struct bake {
@@ -210,8 +210,9 @@ typedef struct bake {
     uint8_t *rgba;
     ebpo_context *context;
     ebpo_reacher *reacher;
-    uint32_t *numbers; /* the source's of the mesh's faces, ascending; NULL: 0, 1, 2, ... */
-    uint32_t *slot;    /* [vertex_count] in `dyed`, and 1; 0: none */
+    uint32_t
+        *numbers;   /* numbers of the mesh's faces in the source, ascending; NULL: 0, 1, 2, ... */
+    uint32_t *slot; /* [vertex_count] index in `dyed`, plus 1; 0: none */
     dyed *dyed;
     uint64_t count, capacity, done;
     ebpo_paint_baked baked;
@@ -225,7 +226,8 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Of a mesh in the source's order whose numbers have gaps, or go beyond the source. */
+/* Reads the face numbers of a mesh in the source's order whose numbers have gaps, or go beyond the
+ * source. */
 static ebpo_status read_numbers(bake *b, ebpo_error *error)
 {
     const ebpo_file *file = b->context->model->file;
@@ -248,7 +250,7 @@ static ebpo_status read_numbers(bake *b, ebpo_error *error)
     return status;
 }
 
-/* The row of the mesh. */
+/* Returns the row of the mesh. */
 static uint64_t row_of(const bake *b, uint64_t face)
 {
     uint32_t number = (uint32_t)face;
@@ -275,7 +277,7 @@ static ebpo_status find_dyed(bake *b, uint32_t vertex, dyed **out, ebpo_error *e
     return EBPO_OK;
 }
 
-/* A stroke covers it once. */
+/* Applies a stroke, which covers each vertex once. */
 static void bake_apply(dyed *d, const ebpo_stroke_held *s, uint32_t number)
 {
     double share = s->rgba[3] / 255.0;
@@ -337,7 +339,7 @@ static ebpo_status dye_stroke(bake *b, uint32_t number, ebpo_error *error)
     return status;
 }
 
-/* The layer at hand over those before. */
+/* Blends the current layer over those before. */
 static void put_layer_over(bake *b, uint32_t layer)
 {
     double opacity = (double)b->p->layer[layer].opacity / 255.0;
@@ -379,7 +381,7 @@ static ebpo_status check_mesh(const ebpo_context *context, const ebpo_mesh *mesh
                    mesh->vertex_count == info->vertex_count
                ? EBPO_OK
                : ebpo_fail(error, EBPO_E_ARGUMENT,
-                           "the mesh is not the model's, as ebpo_file_read_source_mesh gives it");
+                           "the mesh is not that of the model, from ebpo_file_read_source_mesh");
 }
 
 ebpo_status ebpo_paint_bake(const ebpo_paint *p, ebpo_context *context, const ebpo_mesh *mesh,

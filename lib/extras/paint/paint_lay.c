@@ -1,9 +1,9 @@
-/* Makes strokes from the way of a hand: points at even steps along it, and the more of them at
- * each step the harder it presses.
+/* Makes strokes from the path of a pen: points at even steps along it, more of them at each step
+ * with more pressure.
  *
- * Every point is on a face of the model, and is stored by the face and three integer weights of
- * its corners. The scatter of points is pseudorandom with a seed, so that a way makes the same
- * stroke on every machine. */
+ * Every point is on a face of the model, and is stored as the face and three integer weights of its
+ * corners. The scatter of points is pseudorandom with a seed, so that a path makes the same stroke
+ * on every machine. */
 #include "core/strict_fp.h"
 
 #include <ebpo/paint.h>
@@ -24,9 +24,9 @@
 #include "extras/haptic/face_box.h"
 #include "geometry/vec3.h"
 
-enum { DENSITY_MOST = 10000 };
+enum { DENSITY_MAX = 10000 };
 
-/* A stroke that is being laid. */
+/* An unfinished stroke. */
 typedef struct run {
     uint64_t first, count;
 } run;
@@ -37,10 +37,10 @@ typedef struct lay {
     ebpo_reach reach;
     ebpo_paint_point *point;
     run *run;
-    uint64_t point_count, point_capacity, run_count, run_capacity, random, room;
-    bool down;    /* the pen painted at the step before */
-    double begun; /* when the stroke did */
-    ebpo_paint_laid laid;
+    uint64_t point_count, point_capacity, run_count, run_capacity, random, space;
+    bool down;    /* the pen painted at the previous step */
+    double begun; /* time at which the stroke began */
+    ebpo_paint_drawn laid;
 } lay;
 
 /* --- checking --- */
@@ -49,37 +49,37 @@ static bool in_range(double v, double least, double most) { return v >= least &&
 
 static const char *pen_wrong(const ebpo_paint_pen *pen)
 {
-    if (!in_range(pen->radius, 1 / EBPO_PAINT_MOST, EBPO_PAINT_MOST))
+    if (!in_range(pen->radius, 1 / EBPO_PAINT_MAX, EBPO_PAINT_MAX))
         return "a pen's radius is 2^-200 to 2^200";
-    if (!in_range(pen->spread, 0, EBPO_PAINT_MOST))
+    if (!in_range(pen->spread, 0, EBPO_PAINT_MAX))
         return "a pen's spread is 0 to 2^200";
-    if (pen->density < 1 || pen->density > DENSITY_MOST || (pen->spread == 0 && pen->density != 1))
+    if (pen->density < 1 || pen->density > DENSITY_MAX || (pen->spread == 0 && pen->density != 1))
         return "a pen's density is 1 to 10,000, and 1 without spread";
     if (!in_range(pen->size_least, 0x1p-15, 1) || !in_range(pen->size_full, 0x1p-15, 1))
         return "a pen's sizes are 2^-15 to 1";
-    if (pen->step != 0 && !in_range(pen->step, 1 / EBPO_PAINT_MOST, DBL_MAX))
+    if (pen->step != 0 && !in_range(pen->step, 1 / EBPO_PAINT_MAX, DBL_MAX))
         return "a pen's step is 0, or 2^-200 and more";
     return pen->within >= 0 ? NULL : "a pen's distance from the surface is at least 0";
 }
 
-static const char *hand_wrong(const ebpo_paint_hand *h)
+static const char *device_wrong(const ebpo_paint_input *h)
 {
     for (int k = 0; k < 3; k++)
-        if (!(fabs(h->place[k]) <= EBPO_PAINT_MOST))
-            return "a place of the hand is not finite, or beyond 2^200";
+        if (!(fabs(h->place[k]) <= EBPO_PAINT_MAX))
+            return "a position of the pen is not finite, or beyond 2^200";
     if (!in_range(h->pressure, 0, 1))
-        return "the hand's pressure is 0 to 1";
-    return in_range(h->time, 0, UINT32_MAX) ? NULL : "the hand's time is 0 to 2^32 - 1";
+        return "the pen's pressure is 0 to 1";
+    return in_range(h->time, 0, UINT32_MAX) ? NULL : "the pen's time is 0 to 2^32 - 1";
 }
 
-static ebpo_status lay_check(const lay *l, const ebpo_paint *p, const ebpo_paint_hand *hand,
+static ebpo_status lay_check(const lay *l, const ebpo_paint *p, const ebpo_paint_input *hand,
                              uint64_t count, ebpo_error *error)
 {
     const char *wrong = pen_wrong(&l->pen);
     if (count == 0)
-        wrong = "a hand without a place lays nothing";
+        wrong = "a stroke needs at least one position of the pen";
     for (uint64_t i = 0; i < count && !wrong; i++)
-        wrong = hand_wrong(&hand[i]);
+        wrong = device_wrong(&hand[i]);
     ebpo_stroke_held stroke = { .radius = l->pen.radius,
                                 .time = l->pen.time,
                                 .layer =
@@ -95,7 +95,7 @@ static ebpo_status lay_check(const lay *l, const ebpo_paint *p, const ebpo_paint
 
 /* --- a point --- */
 
-/* The weights of the second and third corner, in 2^-30. */
+/* Rounds the weights of the second and third corner to multiples of 2^-30. */
 static void round_weights(const double weight[3], uint32_t out[2])
 {
     for (int i = 0; i < 2; i++) {
@@ -130,7 +130,8 @@ static bool lay_found(const ebpo_distance_result *at)
     return at->face != EBPO_NO_FACE && isfinite(at->distance);
 }
 
-/* The reach of a ball around an answer. EBPO_E_ABSENT: a subset does not have all that is there. */
+/* Finds the reach of a ball around a nearest point. EBPO_E_ABSENT: a subset lacks some of the faces
+ * there. */
 static ebpo_status reach_around(ebpo_reach *reach, const ebpo_distance_result *at, double radius,
                                 ebpo_error *error)
 {
@@ -140,12 +141,12 @@ static ebpo_status reach_around(ebpo_reach *reach, const ebpo_distance_result *a
     return status != EBPO_OK || here
                ? status
                : ebpo_fail(error, EBPO_E_ABSENT,
-                           "the subset does not have all faces around the pen; paint on the whole "
+                           "the subset lacks some faces around the pen; paint on the whole "
                            "model, or within the subset");
 }
 
-ebpo_status ebpo_paint_place(const ebpo_paint *p, ebpo_context *context, const double place[3],
-                             ebpo_paint_point *out, ebpo_error *error)
+ebpo_status ebpo_paint_locate(const ebpo_paint *p, ebpo_context *context, const double place[3],
+                              ebpo_paint_point *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     ebpo_distance_result at;
@@ -166,12 +167,12 @@ ebpo_status ebpo_paint_place(const ebpo_paint *p, ebpo_context *context, const d
 /* --- a step --- */
 
 static ebpo_status add_point(lay *l, const ebpo_distance_result *at, const double corner[3][3],
-                             const ebpo_paint_hand *hand, ebpo_error *error)
+                             const ebpo_paint_input *hand, ebpo_error *error)
 {
     double share = l->pen.size_least + hand->pressure * (l->pen.size_full - l->pen.size_least);
-    if (l->point_count == l->room)
+    if (l->point_count == l->space)
         return ebpo_fail(error, EBPO_E_LIMIT,
-                         "the way would become more than the %d points that a paint may have; take "
+                         "the stroke would exceed the %d points that a paint may have; take "
                          "longer steps or fewer points",
                          EBPO_PAINT_POINTS);
     if (!ebpo_grow(&l->point, &l->point_capacity, l->point_count + 1, sizeof *l->point))
@@ -185,7 +186,7 @@ static ebpo_status add_point(lay *l, const ebpo_distance_result *at, const doubl
     return EBPO_OK;
 }
 
-/* Two unit vectors at right angles to the face's normal, or some where it has none. */
+/* Makes two unit vectors perpendicular to the face's normal, or any two if it has none. */
 static void make_frame(const double normal[3], double u[3], double v[3])
 {
     double n[3] = { 0, 0, 1 }, axis[3] = { 0, 0, 0 };
@@ -203,7 +204,7 @@ static void make_frame(const double normal[3], double u[3], double v[3])
     ebpo_vec3_cross(n, u, v);
 }
 
-/* Evenly within the unit disc. */
+/* Returns a point, uniformly distributed within the unit disc. */
 static void random_in_disc(uint64_t *state, double out[2])
 {
     do {
@@ -212,7 +213,7 @@ static void random_in_disc(uint64_t *state, double out[2])
     } while (out[0] * out[0] + out[1] * out[1] > 1);
 }
 
-/* Of the reach the face with this number; or NULL. */
+/* Returns the face of the reach with this number, or NULL. */
 static const ebpo_reach_face *face_of(const ebpo_reach *reach, uint64_t face)
 {
     for (uint64_t i = 0; i < reach->count; i++)
@@ -222,7 +223,7 @@ static const ebpo_reach_face *face_of(const ebpo_reach *reach, uint64_t face)
 }
 
 static ebpo_status lay_scatter(lay *l, const ebpo_distance_result *middle,
-                               const ebpo_paint_hand *hand, ebpo_error *error)
+                               const ebpo_paint_input *hand, ebpo_error *error)
 {
     double u[3], v[3], place[3], disc[2], spread = l->pen.spread;
     unsigned wanted = (unsigned)fmax(1, floor(hand->pressure * l->pen.density + 0.5));
@@ -245,7 +246,7 @@ static ebpo_status lay_scatter(lay *l, const ebpo_distance_result *middle,
     return status;
 }
 
-static ebpo_status put_down(lay *l, const ebpo_paint_hand *hand, ebpo_error *error)
+static ebpo_status put_down(lay *l, const ebpo_paint_input *hand, ebpo_error *error)
 {
     if (l->down)
         return EBPO_OK;
@@ -257,7 +258,7 @@ static ebpo_status put_down(lay *l, const ebpo_paint_hand *hand, ebpo_error *err
     return EBPO_OK;
 }
 
-static ebpo_status make_step(lay *l, const ebpo_paint_hand *hand, ebpo_error *error)
+static ebpo_status make_step(lay *l, const ebpo_paint_input *hand, ebpo_error *error)
 {
     ebpo_distance_result at = { .face = EBPO_NO_FACE };
     ebpo_status status = EBPO_OK;
@@ -282,10 +283,10 @@ static ebpo_status make_step(lay *l, const ebpo_paint_hand *hand, ebpo_error *er
                            error);
 }
 
-/* --- the way --- */
+/* --- the path --- */
 
-static void lay_between(const ebpo_paint_hand *a, const ebpo_paint_hand *b, double t,
-                        ebpo_paint_hand *out)
+static void lay_between(const ebpo_paint_input *a, const ebpo_paint_input *b, double t,
+                        ebpo_paint_input *out)
 {
     for (int k = 0; k < 3; k++)
         out->place[k] = a->place[k] + t * (b->place[k] - a->place[k]);
@@ -293,18 +294,18 @@ static void lay_between(const ebpo_paint_hand *a, const ebpo_paint_hand *b, doub
     out->time = fmax(a->time + t * (b->time - a->time), 0);
 }
 
-static double length_between(const ebpo_paint_hand *a, const ebpo_paint_hand *b)
+static double length_between(const ebpo_paint_input *a, const ebpo_paint_input *b)
 {
     double d[3];
     ebpo_vec3_subtract(b->place, a->place, d);
     return sqrt(ebpo_vec3_dot(d, d));
 }
 
-/* Steps are at whole multiples of their length, from the first place on. */
-static ebpo_status lay_go(lay *l, const ebpo_paint_hand *hand, uint64_t count, ebpo_error *error)
+/* Follows the path; steps are at whole multiples of their length, from the first position on. */
+static ebpo_status lay_go(lay *l, const ebpo_paint_input *hand, uint64_t count, ebpo_error *error)
 {
     double step = l->pen.step != 0 ? l->pen.step : fmax(l->pen.radius, l->pen.spread) / 2,
-           ahead = step; /* from the place at hand to the next step */
+           ahead = step; /* distance from the current position to the next step */
     ebpo_status status = make_step(l, &hand[0], error);
     for (uint64_t i = 1; i < count && status == EBPO_OK; i++) {
         double length = length_between(&hand[i - 1], &hand[i]), at = ahead;
@@ -313,10 +314,10 @@ static ebpo_status lay_go(lay *l, const ebpo_paint_hand *hand, uint64_t count, e
         if (!(length / step <= EBPO_PAINT_POINTS))
             return ebpo_fail(
                 error, EBPO_E_LIMIT,
-                "two places of the hand are more than %d steps apart; take longer ones",
+                "two positions of the pen are more than %d steps apart; take longer ones",
                 EBPO_PAINT_POINTS);
         for (uint64_t k = 1; at <= length && status == EBPO_OK; k++) {
-            ebpo_paint_hand pen;
+            ebpo_paint_input pen;
             lay_between(&hand[i - 1], &hand[i], at / length, &pen);
             pen.time = fmax(pen.time, l->begun);
             status = make_step(l, &pen, error);
@@ -327,7 +328,7 @@ static ebpo_status lay_go(lay *l, const ebpo_paint_hand *hand, uint64_t count, e
     return status;
 }
 
-/* All or none. */
+/* Adds all strokes, or none. */
 static ebpo_status lay_keep(lay *l, ebpo_paint *p, ebpo_error *error)
 {
     uint64_t before = p->stroke_count;
@@ -353,16 +354,16 @@ static ebpo_status lay_keep(lay *l, ebpo_paint *p, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_paint_lay(ebpo_paint *p, ebpo_context *context, const ebpo_paint_hand *hand,
-                           uint64_t count, const ebpo_paint_pen *pen, ebpo_paint_laid *laid,
-                           ebpo_error *error)
+ebpo_status ebpo_paint_draw(ebpo_paint *p, ebpo_context *context, const ebpo_paint_input *hand,
+                            uint64_t count, const ebpo_paint_pen *pen, ebpo_paint_drawn *laid,
+                            ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     lay l = { .context = context, .pen = EBPO_PAINT_PEN_INIT };
     l.laid.struct_size = sizeof l.laid;
     ebpo_status status = EBPO_TAKE(ebpo_paint_pen, &l.pen, pen, error);
     if (status == EBPO_OK && laid)
-        status = EBPO_CHECK_SIZED(ebpo_paint_laid, laid, error);
+        status = EBPO_CHECK_SIZED(ebpo_paint_drawn, laid, error);
     if (status == EBPO_OK)
         status = lay_check(&l, p, hand, count, error);
     if (status == EBPO_OK)
@@ -370,13 +371,13 @@ ebpo_status ebpo_paint_lay(ebpo_paint *p, ebpo_context *context, const ebpo_pain
     if (status != EBPO_OK)
         return status;
     l.random = l.pen.seed;
-    l.room = EBPO_PAINT_POINTS - p->point_count;
+    l.space = EBPO_PAINT_POINTS - p->point_count;
     ebpo_reach_begin(&l.reach, context);
     status = lay_go(&l, hand, count, error);
     if (status == EBPO_OK)
         status = lay_keep(&l, p, error);
     if (status == EBPO_OK && laid)
-        EBPO_GIVE(ebpo_paint_laid, laid, &l.laid);
+        EBPO_GIVE(ebpo_paint_drawn, laid, &l.laid);
     ebpo_reach_end(&l.reach);
     free(l.point);
     free(l.run);

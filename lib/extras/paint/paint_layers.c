@@ -1,9 +1,8 @@
 /* A paint as an object: its strokes, layers and notes, and the model that it belongs to.
  *
- * Strokes are kept in the order in which they were made, and their points one behind the other.
- * Removing a layer removes its strokes and its notes. Texts are UTF-8 of limited size without
- * control characters. A paint belongs to the model whose SHA-256 digest it has: for another one,
- * queries fail.
+ * Strokes are kept in the order in which they were made, with consecutive points. Removing a layer
+ * removes its strokes and its notes. Texts are UTF-8 of limited size without control characters. A
+ * paint belongs to the model with a given SHA-256 digest: for another model, queries fail.
  *
  * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
@@ -26,8 +25,8 @@
 const char *ebpo_paint_point_wrong(const ebpo_paint_point *q)
 {
     for (int i = 0; i < 3; i++)
-        if (!(fabs(q->place[i]) <= EBPO_PAINT_MOST))
-            return "a place is not finite, or beyond 2^200";
+        if (!(fabs(q->place[i]) <= EBPO_PAINT_MAX))
+            return "a position is not finite, or beyond 2^200";
     if (q->face == UINT32_MAX)
         return "a point has no face";
     if ((uint64_t)q->weight[0] + q->weight[1] > EBPO_PAINT_WEIGHTS)
@@ -41,14 +40,14 @@ const char *ebpo_paint_stroke_wrong(const ebpo_stroke_held *s, uint64_t layers)
 {
     static const uint8_t none[4];
     if (s->layer >= layers)
-        return "a stroke is in a layer that there is not";
+        return "a stroke names a layer that does not exist";
     if (s->kind > EBPO_PAINT_ERASES)
-        return "a stroke is of a kind that is not known";
+        return "a stroke is of an unknown kind";
     if (s->kind == EBPO_PAINT_ERASES && memcmp(s->rgba, none, sizeof none) != 0)
-        return "an erasing stroke has a colour, which has to be 0";
-    if (!(s->radius >= 1 / EBPO_PAINT_MOST && s->radius <= EBPO_PAINT_MOST))
+        return "the colour of an erasing stroke must be 0";
+    if (!(s->radius >= 1 / EBPO_PAINT_MAX && s->radius <= EBPO_PAINT_MAX))
         return "the radius of a stroke is not 2^-200 to 2^200";
-    if (s->time > EBPO_PAINT_TIME_MOST)
+    if (s->time > EBPO_PAINT_TIME_MAX)
         return "the time of a stroke is beyond 2^53";
     return s->count == 0 ? "a stroke has no point" : NULL;
 }
@@ -138,7 +137,7 @@ const ebpo_paint_text_kind ebpo_paint_layer_texts[EBPO_PAINT_TEXTS] = {
     { "title", 255 }, { "author", 255 }, { "date", 31 }, { "description", 4095 }
 };
 const ebpo_paint_text_kind ebpo_paint_note_texts[EBPO_PAINT_TEXTS] = {
-    { "title", 255 }, { "author", 255 }, { "date", 31 }, { "body", EBPO_PAINT_TEXT_MOST }
+    { "title", 255 }, { "author", 255 }, { "date", 31 }, { "body", EBPO_PAINT_TEXT_MAX }
 };
 
 /* --- texts --- */
@@ -167,8 +166,8 @@ bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS])
     return copy_texts(none, text);
 }
 
-/* Checks texts before anything is changed, and copies them. `known` is a date that need not be one:
- * what other programs have written stays. */
+/* Checks texts before anything is changed, and copies them. `known` is accepted as a date without a
+ * check, because texts of other programs are kept. */
 static ebpo_status take_texts(const char *const from[EBPO_PAINT_TEXTS],
                               const ebpo_paint_text_kind *kinds, const char *of, const char *known,
                               char *to[EBPO_PAINT_TEXTS], ebpo_error *error)
@@ -189,8 +188,8 @@ static ebpo_status take_texts(const char *const from[EBPO_PAINT_TEXTS],
     }
     if (date && *date && strcmp(date, known) != 0 && !ebpo_is_date(date))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "%s: the date is not one as in ISO 8601 and in the calendar, such as "
-                         "2026-11-26 or 2026-11-26T21:43:05Z",
+                         "%s: the date is not a valid ISO 8601 date, such as 2026-11-26 or "
+                         "2026-11-26T21:43:05Z",
                          of);
     return copy_texts(from, to) ? EBPO_OK : ebpo_fail_memory(error, bytes);
 }
@@ -338,7 +337,7 @@ ebpo_status ebpo_paint_add_note(ebpo_paint *p, const ebpo_paint_note *given, ebp
     ebpo_status status = EBPO_TAKE(ebpo_paint_note, &note, given, error);
     if (status != EBPO_OK)
         return status;
-    note.at.size = EBPO_PAINT_FULL; /* they do not count */
+    note.at.size = EBPO_PAINT_FULL; /* unused in notes */
     note.at.pressure = 0;
     note.at.time = note.at.reserved = 0;
     const char *wrong = ebpo_paint_point_wrong(&note.at);
@@ -379,7 +378,8 @@ static void write_hex(const uint8_t digest[32], char out[65])
         snprintf(out + 2 * i, 3, "%02x", digest[i]);
 }
 
-/* Which model a paint made on this file is for: format-spec/paint.md, section 2. */
+/* Writes the digest of the model that a paint made on this file belongs to: format-spec/paint.md,
+ * section 2. */
 static void name_model(const ebpo_info *info, char out[65])
 {
     bool whole = info->pruned && info->parts & EBPO_PART_MAPS;
@@ -391,8 +391,8 @@ static ebpo_status check_mesh(const ebpo_file *model, ebpo_error *error)
     return model->info.parts & EBPO_PART_MESH
                ? EBPO_OK
                : ebpo_fail_file(error, EBPO_E_ABSENT, model->in.shown,
-                                "the file was written without its mesh, so there is nothing to "
-                                "paint on; build it again with that part");
+                                "the file was written without its mesh, so it cannot be painted "
+                                "on; build it again with that part");
 }
 
 ebpo_paint *ebpo_paint_begin(void)
@@ -492,8 +492,9 @@ ebpo_status ebpo_paint_check_model(const ebpo_paint *p, const ebpo_file *model, 
         return p->source_numbers == maps
                    ? EBPO_OK
                    : ebpo_fail_file(error, EBPO_E_ARGUMENT, model->in.shown,
-                                    "the paint names faces by their rows in the file, where this "
-                                    "model has numbers of the source: it was not made for it");
+                                    "the paint names faces by their rows in the file, but this "
+                                    "model has numbers of the source: the paint was not made for "
+                                    "it");
     return ebpo_fail_file(error, EBPO_E_ARGUMENT, model->in.shown,
                           "the paint belongs to another model%s%s, with content_sha256 %s; this "
                           "one has %s: give the model that it was made on",
@@ -506,8 +507,8 @@ ebpo_status ebpo_paint_check_context(const ebpo_paint *p, const ebpo_context *co
     const ebpo_info *info = context->model->info;
     ebpo_status status = ebpo_paint_check_model(p, context->model->file, error);
     for (int i = 0; i < 3 && status == EBPO_OK; i++)
-        if (!(fabs(info->box_origin[i]) <= EBPO_PAINT_MOST / 2 &&
-              info->box_size[i] <= EBPO_PAINT_MOST / 2))
+        if (!(fabs(info->box_origin[i]) <= EBPO_PAINT_MAX / 2 &&
+              info->box_size[i] <= EBPO_PAINT_MAX / 2))
             status = ebpo_fail_file(error, EBPO_E_UNSUPPORTED, context->model->file->in.shown,
                                     "coordinates beyond 2^199 cannot be painted on; scale the "
                                     "model");

@@ -1,12 +1,12 @@
-/* Measures the painted area, by stroke, by colour, by layer and in all.
+/* Measures the painted area, by stroke, by colour, by layer and in total.
  *
- * Faces are halved across their longest edge until it is clear to which stroke a part belongs, or
- * the part is small. In each layer the last stroke decides: where a ball of it holds the part, the
- * part is its own; where a ball only meets it, earlier strokes may have what is not covered. So
- * lower and upper bounds are summed.
+ * Faces are halved across their longest edge until the stroke of a part is certain, or the part is
+ * small. In each layer the last stroke decides: if one of its balls contains the part, the part
+ * belongs to this stroke; if a ball only intersects it, earlier strokes may own the uncovered rest.
+ * So lower and upper bounds are summed.
  *
- * Faces are distributed to a fixed number of pieces of work, whose sums are added in order:
- * results do not depend on the number of threads.
+ * Faces are distributed to a fixed number of pieces of work, whose sums are added in order: results
+ * do not depend on the number of threads.
  *
  * Source: format-spec/paint.md, section 6. */
 #include "core/strict_fp.h"
@@ -25,16 +25,16 @@
 #include "extras/paint/paint_parts.h"
 #include "extras/paint/paint_reach.h"
 
-/* A ball in whose reach a face is. */
+/* A ball whose reach contains a face. */
 typedef struct area_ball {
     double centre[3], radius;
     uint32_t layer, stroke;
 } area_ball;
 
-/* Areas by stroke, by colour, by layer and of all, one behind the other: area_key_count of them. */
+/* Areas by stroke, by colour, by layer and in total, consecutively: area_key_count of them. */
 typedef struct area_keys {
     const ebpo_paint *p;
-    uint32_t *colour; /* [strokes] the number of a stroke's colour */
+    uint32_t *colour; /* [strokes] index of a stroke's colour */
     uint64_t colours;
 } area_keys;
 
@@ -43,14 +43,14 @@ static inline uint64_t area_key_count(const area_keys *k)
     return k->p->stroke_count + k->colours + k->p->layer_count + 1;
 }
 
-/* One thread's. */
+/* Data of one thread. */
 typedef struct area_cut {
     const area_keys *keys;
     double fineness;
-    ebpo_paint_area *area; /* [keys] to which is added */
-    area_ball *ball;       /* a stack: of each part those balls that it meets */
+    ebpo_paint_area *area; /* [keys] sums */
+    area_ball *ball;       /* a stack: for each part the balls that intersect it */
     uint64_t ball_capacity;
-    uint64_t *seen; /* [colours] the last part that a colour was noted for */
+    uint64_t *seen; /* [colours] the last part for which a colour was noted */
     uint64_t part;
 } area_cut;
 
@@ -60,7 +60,7 @@ typedef struct triangle {
     double p[3][3], area;
 } triangle;
 
-/* Room for the sums of a thread: `area` stays the caller's. False: no memory. */
+/* Allocates the data of a thread; `area` stays the caller's. Returns false if memory is short. */
 static bool area_cut_begin(area_cut *c, const area_keys *keys, double fineness)
 {
     *c = (area_cut){ .keys = keys, .fineness = fineness };
@@ -100,22 +100,22 @@ static bool area_cut_holds(const area_ball *ball, const triangle *t)
            ebpo_ball_holds(ball->centre, square, t->p[2]);
 }
 
-static bool area_cut_meets(const area_ball *ball, const triangle *t)
+static bool area_cut_intersects(const area_ball *ball, const triangle *t)
 {
     ebpo_face_near near;
     ebpo_face_nearest(ball->centre, t->p, &near);
     return near.distance <= ball->radius;
 }
 
-/* --- which balls a part meets --- */
+/* --- balls that intersect a part --- */
 
-/* From a layer's balls at [from, end) those that may have a part of it go to `to`: up to the first
- * stroke of which one holds it, of which that one says it all. Their number; *sure: nothing is left
- * to be decided. */
+/* Copies those of a layer's balls at [from, end) that may contain a part of the triangle to `to`,
+ * up to the first stroke with a ball that contains all of it; of this stroke that ball is
+ * sufficient. Returns their number; *sure: the layer is decided. */
 static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64_t end, uint64_t to,
                            bool *sure)
 {
-    uint64_t kept = 0, first = 0; /* first: of the stroke at hand */
+    uint64_t kept = 0, first = 0; /* first: the first ball of the current stroke */
     *sure = false;
     for (uint64_t i = from; i < end; i++) {
         const area_ball *b = &c->ball[i];
@@ -126,14 +126,14 @@ static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64
             *sure = first == 0;
             return first + 1;
         }
-        if (area_cut_meets(b, t))
+        if (area_cut_intersects(b, t))
             c->ball[to + kept++] = *b;
     }
     *sure = kept == 0;
     return kept;
 }
 
-/* The same of all layers at [from, from + count), to behind them. */
+/* Same for all layers at [from, from + count), copying behind them. */
 static uint64_t area_cut_sift(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
                               bool *sure)
 {
@@ -166,12 +166,12 @@ static void area_cut_add(ebpo_paint_area *to, double area, bool certain, bool va
     to->hi += area;
 }
 
-/* A layer's part of a small or decided triangle. */
+/* The result of a layer for a small or decided triangle. */
 typedef struct verdict {
-    bool painted, unpainted; /* may be so */
-    uint32_t at_centre;      /* the stroke that has the middle; UINT32_MAX: none */
-    uint32_t colour;         /* of what may be painted, the first; */
-    bool one_colour;         /* and the only one */
+    bool painted, unpainted; /* possible states */
+    uint32_t at_centre;      /* the stroke at the centre; UINT32_MAX: none */
+    uint32_t colour;         /* the first possible colour */
+    bool one_colour;         /* it is the only possible one */
 } verdict;
 
 static bool area_cut_paints(const area_cut *c, uint32_t stroke)
@@ -179,7 +179,7 @@ static bool area_cut_paints(const area_cut *c, uint32_t stroke)
     return c->keys->p->stroke[stroke].kind == EBPO_PAINT_PAINTS;
 }
 
-/* Looks at a layer's balls [from, end), each stroke in turn. */
+/* Evaluates a layer's balls [from, end), stroke by stroke. */
 static verdict judge_layer(const area_cut *c, const triangle *t, const double centre[3],
                            uint64_t from, uint64_t end)
 {
@@ -197,7 +197,7 @@ static verdict judge_layer(const area_cut *c, const triangle *t, const double ce
             first = false;
         }
     }
-    if (end > from && area_cut_holds(&c->ball[end - 1], t)) { /* the last one leaves nothing over */
+    if (end > from && area_cut_holds(&c->ball[end - 1], t)) { /* the last stroke covers all */
         v.unpainted = false;
         for (uint64_t i = from; i < end; i++)
             v.unpainted = v.unpainted || !area_cut_paints(c, c->ball[i].stroke);
@@ -265,7 +265,7 @@ static double longest_edge(const triangle *t, int *which)
     return sqrt(longest);
 }
 
-/* The middle of an edge; false: it is one of its ends, as doubles are no finer. */
+/* Finds the middle of an edge; returns false if it equals one of the ends in doubles. */
 static bool find_middle(const double a[3], const double b[3], double middle[3])
 {
     for (int i = 0; i < 3; i++)
@@ -273,7 +273,8 @@ static bool find_middle(const double a[3], const double b[3], double middle[3])
     return memcmp(middle, a, 3 * sizeof *a) != 0 && memcmp(middle, b, 3 * sizeof *b) != 0;
 }
 
-/* Balls are at [from, from + count); deeper parts use what is behind. */
+/* Divides a triangle. Its balls are at [from, from + count); deeper parts use the stack behind
+ * them. */
 static bool area_cut_cut(area_cut *c, const triangle *t, uint64_t from, uint64_t count, int depth)
 {
     bool sure;
@@ -300,8 +301,8 @@ static bool area_cut_cut(area_cut *c, const triangle *t, uint64_t from, uint64_t
     return area_cut_cut(c, &half, at, kept, depth + 1);
 }
 
-/* Adds a face whose `count` balls stand at cut->ball, by layer, within a layer the last stroke
- * first. False: no memory. */
+/* Adds a face whose `count` balls are at cut->ball, by layer, within a layer the last stroke first.
+ * Returns false if memory is short. */
 static bool area_cut_face(area_cut *c, const double corner[3][3], uint64_t count)
 {
     triangle t;
@@ -312,27 +313,28 @@ static bool area_cut_face(area_cut *c, const double corner[3][3], uint64_t count
 
 /* --- the model --- */
 
-enum { PIECES_MOST = 64, SUMS_MOST = 1 << 22, FINENESS_MOST = 1 << 16 };
+enum { PIECES_MAX = 64, SUMS_MAX = 1 << 22, FINENESS_MAX = 1 << 16 };
 
-/* A point's reach has a face. */
+/* A face in a point's reach. */
 typedef struct hit {
-    uint32_t face, layer, stroke, point; /* face: among those met; point: of all */
+    uint32_t face, layer, stroke, point; /* face: index among the reached ones; point: index among
+                                          * all */
 } hit;
 
 typedef struct measure {
     const ebpo_paint *p;
     const ebpo_paint_options *options;
-    ebpo_met_faces met;
+    ebpo_found_faces intersected;
     hit *hit;
     uint64_t hit_count, hit_capacity, elsewhere;
-    uint64_t *first; /* [met.count + 1] of a face's hits */
+    uint64_t *first; /* [met.count + 1] first hit of each face */
     area_keys keys;
     ebpo_paint_colour_area *colour; /* [keys.colours] */
     uint64_t pieces;
     ebpo_paint_area *sum; /* [pieces][keys] */
 } measure;
 
-/* --- who reaches what --- */
+/* --- faces in the reaches --- */
 
 static ebpo_status add_point(measure *m, ebpo_reach *reach, uint32_t stroke, uint32_t point,
                              ebpo_error *error)
@@ -341,7 +343,8 @@ static ebpo_status add_point(measure *m, ebpo_reach *reach, uint32_t stroke, uin
         return ebpo_fail_memory(error, (m->hit_count + reach->count) * sizeof *m->hit);
     for (uint64_t i = 0; i < reach->count; i++) {
         hit *h = &m->hit[m->hit_count];
-        ebpo_status status = ebpo_met_faces_add(&m->met, &reach->face[i], &h->face, error);
+        ebpo_status status =
+            ebpo_found_faces_add(&m->intersected, &reach->face[i], &h->face, error);
         if (status != EBPO_OK)
             return status;
         h->layer = m->p->stroke[stroke].layer;
@@ -375,7 +378,7 @@ static ebpo_status find_hits(measure *m, ebpo_context *context, ebpo_error *erro
     return status;
 }
 
-/* By face, then layer, the last stroke first. */
+/* Orders by face, then layer, the last stroke first. */
 static int by_face(const void *a, const void *b)
 {
     const hit *x = a, *y = b;
@@ -390,9 +393,9 @@ static int by_face(const void *a, const void *b)
 
 static ebpo_status sort_hits(measure *m, ebpo_error *error)
 {
-    m->first = ebpo_alloc_zero(m->met.count + 1, sizeof *m->first);
+    m->first = ebpo_alloc_zero(m->intersected.count + 1, sizeof *m->first);
     if (!m->first)
-        return ebpo_fail_memory(error, m->met.count * sizeof *m->first);
+        return ebpo_fail_memory(error, m->intersected.count * sizeof *m->first);
     if (m->hit_count)
         qsort(m->hit, m->hit_count, sizeof *m->hit, by_face);
     for (uint64_t i = 0; i < m->hit_count; i++)
@@ -415,7 +418,7 @@ static ebpo_paint_colour_area colour_of(const ebpo_stroke_held *s)
     return (ebpo_paint_colour_area){ .layer = s->layer, .colour = ebpo_paint_pack(s->rgba) };
 }
 
-/* Those of strokes that paint, each once in its layer. */
+/* Finds the colours of strokes that paint, each once in its layer. */
 static ebpo_status find_colours(measure *m, ebpo_error *error)
 {
     const ebpo_paint *p = m->p;
@@ -456,7 +459,7 @@ static bool measure_face(measure *m, area_cut *cut, uint64_t face)
                                     h->layer,
                                     h->stroke };
     }
-    return area_cut_face(cut, (const double(*)[3])m->met.face[face].corner, count);
+    return area_cut_face(cut, (const double(*)[3])m->intersected.face[face].corner, count);
 }
 
 static ebpo_status measure_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -464,7 +467,7 @@ static ebpo_status measure_pieces(void *context, uint64_t begin, uint64_t end, u
 {
     measure *m = context;
     area_cut cut;
-    uint64_t faces = m->met.count, keys = area_key_count(&m->keys);
+    uint64_t faces = m->intersected.count, keys = area_key_count(&m->keys);
     (void)worker;
     bool fine = area_cut_begin(&cut, &m->keys, m->options->fineness);
     for (uint64_t piece = begin; piece < end && fine; piece++) {
@@ -480,8 +483,8 @@ static ebpo_status measure_pieces(void *context, uint64_t begin, uint64_t end, u
 static ebpo_status measure_all(measure *m, ebpo_error *error)
 {
     uint64_t keys = area_key_count(&m->keys);
-    m->pieces = SUMS_MOST / keys;
-    m->pieces = m->pieces < 1 ? 1 : m->pieces > PIECES_MOST ? PIECES_MOST : m->pieces;
+    m->pieces = SUMS_MAX / keys;
+    m->pieces = m->pieces < 1 ? 1 : m->pieces > PIECES_MAX ? PIECES_MAX : m->pieces;
     m->sum = ebpo_alloc_zero(m->pieces * keys, sizeof *m->sum);
     if (!m->sum)
         return ebpo_fail_memory(error, m->pieces * keys * sizeof *m->sum);
@@ -498,7 +501,7 @@ static ebpo_status measure_all(measure *m, ebpo_error *error)
     return status;
 }
 
-/* --- what is given --- */
+/* --- results --- */
 
 static ebpo_paint_area *copy_areas(const ebpo_paint_area *from, uint64_t count)
 {
@@ -516,7 +519,7 @@ static ebpo_status measure_give(measure *m, ebpo_paint_areas *out, ebpo_error *e
     own.all = layers[m->p->layer_count];
     own.strokes = copy_areas(strokes, m->p->stroke_count);
     own.layers = copy_areas(layers, m->p->layer_count);
-    own.faces = m->met.count;
+    own.faces = m->intersected.count;
     own.elsewhere = m->elsewhere;
     if (!own.strokes || !own.layers) {
         ebpo_paint_areas_free(&own);
@@ -553,9 +556,9 @@ ebpo_status ebpo_paint_measure(const ebpo_paint *p, ebpo_context *context,
     ebpo_status status = EBPO_TAKE(ebpo_paint_options, &wanted, options, error);
     if (status == EBPO_OK)
         status = EBPO_CHECK_SIZED(ebpo_paint_areas, out, error);
-    if (status == EBPO_OK && (wanted.fineness < 1 || wanted.fineness > FINENESS_MOST))
+    if (status == EBPO_OK && (wanted.fineness < 1 || wanted.fineness > FINENESS_MAX))
         status =
-            ebpo_fail(error, EBPO_E_ARGUMENT, "the fineness of areas is 1 to %d", FINENESS_MOST);
+            ebpo_fail(error, EBPO_E_ARGUMENT, "the fineness of areas is 1 to %d", FINENESS_MAX);
     if (status == EBPO_OK)
         status = ebpo_paint_check_context(p, context, error);
     if (status == EBPO_OK)
@@ -568,7 +571,7 @@ ebpo_status ebpo_paint_measure(const ebpo_paint *p, ebpo_context *context,
         status = measure_all(&m, error);
     if (status == EBPO_OK)
         status = measure_give(&m, out, error);
-    ebpo_met_faces_free(&m.met);
+    ebpo_found_faces_free(&m.intersected);
     free(m.hit);
     free(m.first);
     free(m.keys.colour);

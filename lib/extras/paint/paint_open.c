@@ -1,10 +1,10 @@
 /* Reads paint files, and has the table of their arrays.
  *
  * A paint file is untrusted input, read by the strict reader of HDF5 headers (lib/hdf5_read)
- * without libhdf5. Every count is compared with its limit and with the file's size before memory
- * is taken; every number is checked for its range, and texts for UTF-8 without control characters.
+ * without libhdf5. Every count is compared with its limit and with the file's size before memory is
+ * allocated; every number is checked for its range, and texts for UTF-8 without control characters.
  *
- * The table of arrays says for each column its path, its element type, and the member of a stroke
+ * The table of arrays states for each column its path, its element type, and the member of a stroke
  * or a point that it holds; paint_save.c writes by the same table.
  *
  * Source: format-spec/paint.md. */
@@ -58,7 +58,7 @@ ebpo_shape ebpo_paint_column_shape(const ebpo_paint_column *c, uint64_t rows)
                          .pipeline = EBPO_PIPELINE_CHECKSUM };
 }
 
-/* The member in a row. */
+/* Returns the member in a row. */
 static uint8_t *member_of(const ebpo_paint *p, const ebpo_paint_column *c, uint64_t row)
 {
     uint8_t *rows = c->of_points ? (uint8_t *)p->point : (uint8_t *)p->stroke;
@@ -80,7 +80,7 @@ static void take_value(const uint8_t *from, unsigned bytes, uint8_t *to)
 
 static unsigned values_of(const ebpo_paint_column *c) { return c->cols ? c->cols : 1; }
 
-/* Between members and the bytes of a file: rows one behind the other. */
+/* Copies consecutive rows between members and the bytes of a file. */
 static void take_column(ebpo_paint *p, const ebpo_paint_column *c, const uint8_t *bytes)
 {
     for (uint64_t row = 0; row < ebpo_paint_column_rows(p, c); row++)
@@ -88,7 +88,7 @@ static void take_column(ebpo_paint *p, const ebpo_paint_column *c, const uint8_t
             take_value(bytes, c->element, member_of(p, c, row) + k * c->element);
 }
 
-/* Turning bytes around is its own inverse. */
+/* Writes a column; swapping bytes is its own inverse. */
 void ebpo_paint_column_give(const ebpo_paint *p, const ebpo_paint_column *c, uint8_t *bytes)
 {
     for (uint64_t row = 0; row < ebpo_paint_column_rows(p, c); row++)
@@ -102,8 +102,8 @@ typedef struct reader {
     ebpo_head head;
     ebpo_input input;
     ebpo_paint *p;
-    uint64_t text_bytes; /* of all texts */
-    char text[EBPO_PAINT_TEXT_MOST + 1];
+    uint64_t text_bytes; /* bytes of all texts */
+    char text[EBPO_PAINT_TEXT_MAX + 1];
 } reader;
 
 static ebpo_status open_wrong(const reader *r, const char *path, const char *what,
@@ -123,7 +123,7 @@ static ebpo_status open_missing(const reader *r, const char *path, const char *n
     return open_wrong(r, path, what, error);
 }
 
-/* A text of less than `size` bytes. */
+/* Reads a text of less than `size` bytes. */
 static ebpo_status get_text(reader *r, ebpo_head_object object, const char *path, const char *name,
                             bool required, char *out, size_t size, ebpo_error *error)
 {
@@ -146,7 +146,7 @@ static ebpo_status get_count(reader *r, ebpo_head_object object, const char *pat
     return open_wrong(r, path, what, error);
 }
 
-/* What the file is, before all else. */
+/* Checks the kind of the file, before all else. */
 static ebpo_status open_judge(reader *r, ebpo_head_object root, ebpo_error *error)
 {
     char format[64];
@@ -165,10 +165,11 @@ static ebpo_status open_judge(reader *r, ebpo_head_object root, ebpo_error *erro
         return open_missing(r, "/", "format_version", error);
     if (status == EBPO_OK && major != EBPO_PAINT_FORMAT_MAJOR)
         return ebpo_fail_file(error, EBPO_E_VERSION, r->input.shown,
-                              "the paint file has version %" PRId64 " of its format, and this "
-                              "program reads version %d; get a later program",
+                              "the paint file has version %" PRId64
+                              " of its format, and this program reads "
+                              "version %d; use a newer program",
                               major, EBPO_PAINT_FORMAT_MAJOR);
-    if (status == EBPO_OK && (minor < 0 || minor > EBPO_PAINT_MINOR_MOST))
+    if (status == EBPO_OK && (minor < 0 || minor > EBPO_PAINT_MINOR_MAX))
         return open_wrong(r, "/", "attribute format_version_minor is out of range", error);
     return status;
 }
@@ -215,8 +216,8 @@ static ebpo_status read_texts(reader *r, ebpo_head_object group, const char *pat
             return status;
         r->text_bytes += strlen(r->text);
         if (r->text_bytes > r->input.source.size)
-            return open_wrong(r, path,
-                              "there is more text than the file has bytes: groups share it", error);
+            return open_wrong(r, path, "the texts have more bytes than the file: groups share them",
+                              error);
         char *copy = strdup(r->text);
         if (!copy)
             return ebpo_fail_memory(error, strlen(r->text));
@@ -265,8 +266,7 @@ static ebpo_status read_note_place(reader *r, ebpo_head_object group, const char
     for (int i = 0; i < 2; i++) {
         if (!(weights[i] >= 0 && weights[i] <= EBPO_PAINT_WEIGHTS) ||
             (double)(uint32_t)weights[i] != weights[i])
-            return open_wrong(r, path, "attribute weights is not whole numbers of 0 to 2^30",
-                              error);
+            return open_wrong(r, path, "attribute weights must be integers from 0 to 2^30", error);
         n->at.weight[i] = (uint32_t)weights[i];
     }
     const char *what = ebpo_paint_point_wrong(&n->at);
@@ -285,11 +285,11 @@ static ebpo_status read_note(reader *r, uint64_t number, ebpo_error *error)
     if (status == EBPO_OK)
         status = get_count(r, group, path, "layer", EBPO_PAINT_LAYERS, &n->layer, error);
     if (status == EBPO_OK && n->layer >= r->p->layer_count)
-        return open_wrong(r, path, "attribute layer names a layer that there is not", error);
+        return open_wrong(r, path, "attribute layer names a layer that does not exist", error);
     return status == EBPO_OK ? read_note_place(r, group, path, n, error) : status;
 }
 
-/* Room for so many, with empty texts; counts grow as they get them, so that freeing is right. */
+/* Allocates labels with empty texts; counts grow as labels are read, so that freeing is right. */
 static ebpo_status read_labels(reader *r, uint64_t layers, uint64_t notes, ebpo_error *error)
 {
     ebpo_paint *p = r->p;
@@ -317,12 +317,12 @@ static ebpo_status read_labels(reader *r, uint64_t layers, uint64_t notes, ebpo_
 
 /* --- strokes and points --- */
 
-/* Where the array's bytes are. They are in the file, which bounds what is allocated for them. */
+/* Finds the array's bytes. They are within the file, which bounds the memory allocated for them. */
 static ebpo_status find_column(reader *r, const ebpo_paint_column *c, uint64_t rows,
-                               ebpo_chunk_place *place, ebpo_error *error)
+                               ebpo_chunk_location *place, ebpo_error *error)
 {
     ebpo_shape shape = { .rows = 0 }, expected = ebpo_paint_column_shape(c, rows);
-    ebpo_chunk_place *chunks = NULL;
+    ebpo_chunk_location *chunks = NULL;
     uint64_t stored;
     ebpo_status status = ebpo_head_read_array(&r->head, c->path, 1, EBPO_HEAD_ROWS_ALL, &shape,
                                               NULL, &chunks, &stored, error);
@@ -335,17 +335,18 @@ static ebpo_status find_column(reader *r, const ebpo_paint_column *c, uint64_t r
     free(chunks);
     if (!same)
         return open_wrong(r, c->path,
-                          "the array has not the type, shape and filter that the format fixes",
+                          "the array does not have the type, shape and filter that the format "
+                          "fixes",
                           error);
     return place->bytes == rows * ebpo_shape_row_bytes(&expected) + 4
                ? EBPO_OK
-               : open_wrong(r, c->path, "the chunk has not as many bytes as its rows", error);
+               : open_wrong(r, c->path, "the size of the chunk does not match its rows", error);
 }
 
 static ebpo_status read_column(reader *r, const ebpo_paint_column *c, ebpo_error *error)
 {
     uint64_t rows = ebpo_paint_column_rows(r->p, c);
-    ebpo_chunk_place place;
+    ebpo_chunk_location place;
     if (rows == 0)
         return EBPO_OK;
     ebpo_status status = find_column(r, c, rows, &place, error);
@@ -377,7 +378,9 @@ static ebpo_status check_strokes(reader *r, ebpo_error *error)
         sum += p->stroke[i].count;
     }
     if (sum != p->point_count)
-        return open_wrong(r, "/strokes/points", "the strokes have not as many points as there are",
+        return open_wrong(r, "/strokes/points",
+                          "the points of all strokes are not as many as "
+                          "there are points",
                           error);
     for (uint64_t i = 0; i < p->point_count; i++) {
         const char *what = ebpo_paint_point_wrong(&p->point[i]);
@@ -387,12 +390,12 @@ static ebpo_status check_strokes(reader *r, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* All arrays are looked at before memory is taken for rows. */
+/* Reads strokes and points. All arrays are examined before memory is allocated for rows. */
 static ebpo_status read_strokes(reader *r, uint64_t strokes, uint64_t points, ebpo_error *error)
 {
     ebpo_paint *p = r->p;
     ebpo_status status = EBPO_OK;
-    ebpo_chunk_place place;
+    ebpo_chunk_location place;
     for (int i = 0; i < EBPO_PAINT_COLUMNS && status == EBPO_OK; i++) {
         const ebpo_paint_column *c = &ebpo_paint_columns[i];
         uint64_t rows = c->of_points ? points : strokes;
@@ -435,7 +438,7 @@ static ebpo_status read_all(reader *r, ebpo_error *error)
     return status == EBPO_OK ? read_strokes(r, strokes, points, error) : status;
 }
 
-/* Remembers which version of which file is read. */
+/* Records the file and version that are read. */
 static ebpo_status keep_version(const reader *r, ebpo_error *error)
 {
     ebpo_paint_file *f = r->p->file;
@@ -443,7 +446,7 @@ static ebpo_status keep_version(const reader *r, ebpo_error *error)
     char *path = fd >= 0 ? realpath(r->input.shown, NULL) : NULL;
     if (fd >= 0 && !path && errno == ENOMEM)
         return ebpo_fail_memory(error, strlen(r->input.shown));
-    if (!path) /* memory, or a file without a name by now */
+    if (!path) /* memory, or a file that has lost its name */
         return EBPO_OK;
     f->path = path;
     f->fd = fcntl(fd, F_DUPFD_CLOEXEC, 3);
@@ -453,7 +456,7 @@ static ebpo_status keep_version(const reader *r, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Takes the source over. */
+/* Opens a source and takes ownership of it. */
 static ebpo_status open_source(const ebpo_source *source, const char *name, ebpo_paint **out,
                                ebpo_error *error)
 {
@@ -496,8 +499,8 @@ ebpo_status ebpo_paint_open(const char *path, ebpo_paint **out, ebpo_error *erro
     return open_path(path, out, error);
 }
 
-/* Makes the paint of a file that is not there. Its path is known, so that saving it replaces no
- * file that another program has made there meanwhile. */
+/* Makes the paint of a file that does not exist. Its path is recorded, so that saving it replaces
+ * no file that another program has made there meanwhile. */
 static ebpo_status make_at(const char *path, const ebpo_file *model, ebpo_paint **out,
                            ebpo_error *error)
 {
@@ -520,7 +523,7 @@ ebpo_status ebpo_paint_open_to_change(const char *path, const ebpo_file *model, 
     ebpo_file_lock lock = EBPO_FILE_LOCK_INIT;
     *out = NULL;
     if (!(wait >= 0))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the time to wait is negative or no number");
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the time to wait is negative or not a number");
     ebpo_status status = ebpo_file_lock_take(&lock, path, wait, progress, error);
     if (status == EBPO_OK)
         status = model && access(path, F_OK) != 0 && errno == ENOENT

@@ -1,4 +1,4 @@
-/* What a paint holds. */
+/* The content of a paint. */
 #ifndef EBPO_PAINT_PAINT_PARTS_H
 #define EBPO_PAINT_PAINT_PARTS_H
 
@@ -10,28 +10,28 @@
 #include "io/publish.h"
 
 #define EBPO_PAINT_FORMAT "EBP-Octree paint 1"
-#define EBPO_PAINT_MOST   0x1p200 /* of places and radii */
+#define EBPO_PAINT_MAX    0x1p200 /* limit of positions and radii */
 
 enum {
     EBPO_PAINT_FORMAT_MAJOR = 1,
     EBPO_PAINT_FORMAT_MINOR = 0,
-    EBPO_PAINT_MINOR_MOST = 1 << 20,
-    EBPO_PAINT_WEIGHTS = 1 << 30, /* all three weights */
-    EBPO_PAINT_FULL = 1 << 15     /* a point's size */
+    EBPO_PAINT_MINOR_MAX = 1 << 20,
+    EBPO_PAINT_WEIGHTS = 1 << 30, /* sum of all three weights */
+    EBPO_PAINT_FULL = 1 << 15     /* full size of a point */
 };
-#define EBPO_PAINT_TIME_MOST (UINT64_C(1) << 53)
+#define EBPO_PAINT_TIME_MAX (UINT64_C(1) << 53)
 
-/* Texts of a layer or of a note, in this order: malloc's, never NULL. */
+/* Texts of a layer or of a note, in this order: from malloc, never NULL. */
 enum { EBPO_PAINT_TITLE, EBPO_PAINT_AUTHOR, EBPO_PAINT_DATE, EBPO_PAINT_BODY, EBPO_PAINT_TEXTS };
 
-/* A kind of texts: the attribute's name, and how many bytes it may have. */
+/* A kind of text: the attribute's name, and its maximum number of bytes. */
 typedef struct ebpo_paint_text_kind {
     const char *name;
     size_t most;
 } ebpo_paint_text_kind;
 extern const ebpo_paint_text_kind ebpo_paint_layer_texts[EBPO_PAINT_TEXTS];
 extern const ebpo_paint_text_kind ebpo_paint_note_texts[EBPO_PAINT_TEXTS];
-enum { EBPO_PAINT_TEXT_MOST = 32767 };
+enum { EBPO_PAINT_TEXT_MAX = 32767 };
 
 typedef struct ebpo_layer_held {
     char *text[EBPO_PAINT_TEXTS];
@@ -51,12 +51,13 @@ typedef struct ebpo_stroke_held {
     uint8_t rgba[4];
 } ebpo_stroke_held;
 
-/* The file that a paint belongs to: which version of it the paint was read from, or saved as.
- * Saving changes it, and not the paint. */
+/* The file that a paint belongs to, and the version that the paint was read from, or saved as.
+ * Saving changes this struct, and not the paint. */
 typedef struct ebpo_paint_file {
-    pthread_mutex_t mutex; /* of the rest, while saving */
+    pthread_mutex_t mutex; /* guards the rest while saving */
     char *path;            /* absolute; NULL: none yet */
-    int fd;                /* of the version, so that no later one can get its inode; -1: no file */
+    int fd;                /* keeps the version open, so that no later file gets its inode; -1: no
+                            * file */
     ebpo_file_version version;
     ebpo_file_lock lock; /* while it is open to change */
 } ebpo_paint_file;
@@ -78,24 +79,24 @@ static inline uint32_t ebpo_paint_pack(const uint8_t rgba[4])
     return (uint32_t)rgba[0] << 24 | (uint32_t)rgba[1] << 16 | (uint32_t)rgba[2] << 8 | rgba[3];
 }
 
-/* The radius of a point's ball. */
+/* Returns the radius of a point's ball. */
 static inline double ebpo_paint_radius(const ebpo_stroke_held *stroke,
                                        const ebpo_paint_point *point)
 {
     return stroke->radius * point->size * 0x1p-15;
 }
 
-/* What is wrong with it, in words; NULL: nothing. */
+/* Returns an error text, or NULL. */
 const char *ebpo_paint_point_wrong(const ebpo_paint_point *point);
 const char *ebpo_paint_stroke_wrong(const ebpo_stroke_held *stroke, uint64_t layers);
 
-/* Empty texts for a layer or a note. False: no memory. */
+/* Makes empty texts for a layer or a note. Returns false if memory is short. */
 bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS]);
 
-/* An empty paint, without a file. NULL: no memory. */
+/* Returns an empty paint, without a file; NULL if memory is short. */
 ebpo_paint *ebpo_paint_begin(void);
 
-/* EBPO_E_ARGUMENT where the context's model is another one, or too far from 0. */
+/* Returns EBPO_E_ARGUMENT when the context has another model, or one too far from 0. */
 EBPO_MUST_USE ebpo_status ebpo_paint_check_context(const ebpo_paint *paint,
                                                    const ebpo_context *context, ebpo_error *error);
 

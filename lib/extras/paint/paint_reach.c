@@ -1,10 +1,10 @@
 /* The reach of a point: the faces that are connected with the point's own face within its ball.
  *
- * Faces in the ball's box are joined at common corners and edges, by position, where the ball
- * holds or crosses these; the set that contains the point's face is the reach. So paint does not
- * go through a wall thinner than the ball.
+ * Faces in the ball's box are joined at common corners and edges, by position, where these are
+ * within the ball or cross it; the set that contains the point's face is the reach. So paint does
+ * not pass through a wall thinner than the ball.
  *
- * Points of a stroke are evaluated in batches on all cores; a reach is kept until it is asked for.
+ * Points of a stroke are evaluated in batches on all cores; a reach is kept until it is requested.
  * Results do not depend on the number of threads.
  *
  * Source: format-spec/paint.md, section 4. */
@@ -23,7 +23,7 @@
 #include "extras/paint/paint_reach.h"
 #include "query/query_model.h"
 
-enum { FACES_MOST = 1 << 28 };
+enum { FACES_MAX = 1 << 28 };
 
 void ebpo_reach_begin(ebpo_reach *r, ebpo_context *context)
 {
@@ -42,12 +42,12 @@ void ebpo_reach_end(ebpo_reach *r)
     *r = (ebpo_reach){ .context = NULL };
 }
 
-/* --- what is around --- */
+/* --- faces around the ball --- */
 
 static bool reach_take(void *user, const ebpo_triangles *t)
 {
     ebpo_reach *r = user;
-    r->too_many = r->count + t->count > FACES_MOST;
+    r->too_many = r->count + t->count > FACES_MAX;
     r->short_of_memory =
         !r->too_many && !ebpo_grow(&r->face, &r->capacity, r->count + t->count, sizeof *r->face);
     for (uint64_t i = 0; i < t->count && !r->too_many && !r->short_of_memory; i++) {
@@ -65,7 +65,7 @@ static int by_number(const void *a, const void *b)
     return (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-/* A little more than the ball, whose bounds are rounded here. */
+/* Gathers faces around a slightly larger ball, because its bounds are rounded here. */
 static ebpo_status reach_gather(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo_error *error)
 {
     double min[3], max[3], wide = fmax(ball->radius, r->tolerance) * (1 + 0x1p-40);
@@ -78,11 +78,12 @@ static ebpo_status reach_gather(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo
     ebpo_status status = ebpo_triangles_in_box(r->context, min, max, reach_take, r, error);
     if (status == EBPO_OK && r->too_many)
         status = ebpo_fail(error, EBPO_E_LIMIT,
-                           "the ball of a point meets more than %d faces; take a smaller radius",
-                           FACES_MOST);
+                           "the ball of a point intersects more than %d faces; take a smaller "
+                           "radius",
+                           FACES_MAX);
     if (status == EBPO_OK && r->short_of_memory)
-        status = ebpo_fail_memory(error, (r->count + EBPO_TRIANGLES_MOST) * sizeof *r->face);
-    if (status == EBPO_OK && r->count) /* none is there where a place is far from all faces */
+        status = ebpo_fail_memory(error, (r->count + EBPO_TRIANGLES_MAX) * sizeof *r->face);
+    if (status == EBPO_OK && r->count) /* a position far from all faces has none */
         qsort(r->face, r->count, sizeof *r->face, by_number);
     return status;
 }
@@ -104,7 +105,7 @@ static bool same_position(const double a[3], const double b[3])
     return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
-/* An empty table for `count` keys. */
+/* Makes an empty table for `count` keys. */
 static bool clear_slots(ebpo_reach *r, uint64_t count)
 {
     r->slots = ebpo_hash_slots(2 * count);
@@ -181,7 +182,7 @@ static void reach_join(ebpo_reach *r, uint64_t a, uint64_t b)
         r->root[x] = y;
 }
 
-/* Faces come first in the sets, then positions, then edges. */
+/* Joins faces at corners. In the sets, faces come first, then positions, then edges. */
 static void join_at_corners(ebpo_reach *r)
 {
     for (uint64_t i = 0; i < 3 * r->count; i++)
@@ -189,7 +190,7 @@ static void join_at_corners(ebpo_reach *r)
             reach_join(r, i / 3, r->count + r->face[i / 3].at[i % 3]);
 }
 
-/* Edges with an end within join their faces there already. */
+/* Joins faces at edges. Edges with an end within the ball have joined their faces there already. */
 static void join_at_edges(ebpo_reach *r, const ebpo_reach_ball *ball)
 {
     uint64_t first = r->count + r->position_count, at;
@@ -213,7 +214,7 @@ static void join_at_edges(ebpo_reach *r, const ebpo_reach_ball *ball)
     }
 }
 
-static bool make_room(ebpo_reach *r)
+static bool reserve_space(ebpo_reach *r)
 {
     uint64_t corners = 3 * r->count, all = r->count + 2 * corners;
     if (!ebpo_grow(&r->position, &r->position_capacity, corners, sizeof *r->position) ||
@@ -253,12 +254,13 @@ static bool find_own(ebpo_reach *r, uint64_t face)
 static ebpo_status fail_place(const ebpo_reach *r, uint64_t face, ebpo_error *error)
 {
     return ebpo_fail_file(error, EBPO_E_FORMAT, r->context->model->file->in.shown,
-                          "a point of the paint is not on face %llu, where it says to be: the "
-                          "paint does not fit the model",
+                          "a point of the paint is not on face %llu, which it names: the paint "
+                          "does not fit the model",
                           (unsigned long long)face);
 }
 
-/* Gathers what is around, and finds the face among it. *on: the place is on it. */
+/* Gathers the faces around the ball, and finds the given face among them. *on: the position is on
+ * it. */
 static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *here, bool *on,
                              ebpo_error *error)
 {
@@ -267,7 +269,7 @@ static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *h
     ebpo_error cause = EBPO_ERROR_INIT;
     *here = *on = false;
     ebpo_status status = reach_gather(r, ball, &cause);
-    if (status == EBPO_E_ABSENT && subset) /* what hangs together is not known there */
+    if (status == EBPO_E_ABSENT && subset) /* connectivity is not known there */
         return EBPO_OK;
     if (status != EBPO_OK)
         return ebpo_fail_with(error, &cause);
@@ -301,7 +303,7 @@ ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *he
         *here = false;
         return fail_place(r, ball->face, error);
     }
-    if (!make_room(r))
+    if (!reserve_space(r))
         return ebpo_fail_memory(error, r->count * 150);
     find_positions(r, ball);
     join_at_corners(r);
@@ -311,63 +313,65 @@ ebpo_status ebpo_reach_find(ebpo_reach *r, const ebpo_reach_ball *ball, bool *he
     return EBPO_OK;
 }
 
-static uint64_t met_faces_find(const ebpo_met_faces *met, uint64_t file_face)
+static uint64_t found_faces_find(const ebpo_found_faces *intersected, uint64_t file_face)
 {
     uint64_t at;
-    EBPO_HASH_FIND(at, ebpo_hash_number(file_face), met->slots - 1,
-                   met->slot[at] == 0 || met->face[met->slot[at] - 1].file_face == file_face);
+    EBPO_HASH_FIND(at, ebpo_hash_number(file_face), intersected->slots - 1,
+                   intersected->slot[at] == 0 ||
+                       intersected->face[intersected->slot[at] - 1].file_face == file_face);
     return at;
 }
 
-/* Twice as many slots, all faces in them. */
-static bool grow_slots(ebpo_met_faces *met)
+/* Doubles the slots, and inserts all faces again. */
+static bool grow_slots(ebpo_found_faces *intersected)
 {
-    uint64_t slots = ebpo_hash_slots(4 * (met->count + 1));
+    uint64_t slots = ebpo_hash_slots(4 * (intersected->count + 1));
     uint32_t *slot = ebpo_alloc_zero(slots, sizeof *slot);
     if (!slot)
         return false;
-    free(met->slot);
-    met->slot = slot;
-    met->slots = slots;
-    for (uint64_t i = 0; i < met->count; i++)
-        slot[met_faces_find(met, met->face[i].file_face)] = (uint32_t)i + 1;
+    free(intersected->slot);
+    intersected->slot = slot;
+    intersected->slots = slots;
+    for (uint64_t i = 0; i < intersected->count; i++)
+        slot[found_faces_find(intersected, intersected->face[i].file_face)] = (uint32_t)i + 1;
     return true;
 }
 
-ebpo_status ebpo_met_faces_add(ebpo_met_faces *met, const ebpo_reach_face *face, uint32_t *number,
-                               ebpo_error *error)
+ebpo_status ebpo_found_faces_add(ebpo_found_faces *intersected, const ebpo_reach_face *face,
+                                 uint32_t *number, ebpo_error *error)
 {
-    if (2 * (met->count + 1) > met->slots && !grow_slots(met))
-        return ebpo_fail_memory(error, 4 * met->count * sizeof *met->slot);
-    uint64_t at = met_faces_find(met, face->file_face);
-    if (met->slot[at] == 0) {
-        if (met->count == UINT32_MAX - 1)
+    if (2 * (intersected->count + 1) > intersected->slots && !grow_slots(intersected))
+        return ebpo_fail_memory(error, 4 * intersected->count * sizeof *intersected->slot);
+    uint64_t at = found_faces_find(intersected, face->file_face);
+    if (intersected->slot[at] == 0) {
+        if (intersected->count == UINT32_MAX - 1)
             return ebpo_fail(error, EBPO_E_LIMIT, "strokes reach more than 2^32 - 2 faces");
-        if (!ebpo_grow(&met->face, &met->capacity, met->count + 1, sizeof *met->face))
-            return ebpo_fail_memory(error, met->count * sizeof *met->face);
-        ebpo_met_face *f = &met->face[met->count++];
-        *f = (ebpo_met_face){ .face = face->face, .file_face = face->file_face };
+        if (!ebpo_grow(&intersected->face, &intersected->capacity, intersected->count + 1,
+                       sizeof *intersected->face))
+            return ebpo_fail_memory(error, intersected->count * sizeof *intersected->face);
+        ebpo_found_face *f = &intersected->face[intersected->count++];
+        *f = (ebpo_found_face){ .face = face->face, .file_face = face->file_face };
         memcpy(f->corner, face->corner, sizeof f->corner);
-        met->slot[at] = (uint32_t)met->count;
+        intersected->slot[at] = (uint32_t)intersected->count;
     }
-    *number = met->slot[at] - 1;
+    *number = intersected->slot[at] - 1;
     return EBPO_OK;
 }
 
-void ebpo_met_faces_free(ebpo_met_faces *met)
+void ebpo_found_faces_free(ebpo_found_faces *intersected)
 {
-    free(met->face);
-    free(met->slot);
-    *met = (ebpo_met_faces){ 0 };
+    free(intersected->face);
+    free(intersected->slot);
+    *intersected = (ebpo_found_faces){ 0 };
 }
 
 /* --- many points --- */
 
-/* Points that are looked at together: so many, or fewer when they reach so many faces already. */
+/* Number of points that are evaluated together, unless they already reach too many faces. */
 enum { TOGETHER = 1024, FACES_TOGETHER = 1 << 20, GRAIN = 8 };
 
-/* Of a budget, for each thread: more of them load what the others have just dropped. */
-enum { THREAD_ROOM = 1 << 20 };
+/* Part of the budget for each thread: more threads load items that others have just dropped. */
+enum { THREAD_CAPACITY = 1 << 20 };
 
 typedef struct found {
     ebpo_reached_face *face;
@@ -380,7 +384,7 @@ struct ebpo_reacher {
     unsigned threads;
     ebpo_reach *reach; /* one for each worker */
     found found[TOGETHER];
-    uint32_t stroke, first, count; /* of the points at hand */
+    uint32_t stroke, first, count; /* the current points */
     atomic_uint_least64_t faces;
 };
 
@@ -399,7 +403,8 @@ static ebpo_status reached_keep(found *f, const ebpo_reach *reach, ebpo_error *e
     return EBPO_OK;
 }
 
-/* What is not done as there are too many faces already is asked for again; never the first. */
+/* Evaluates some points. Points skipped because there are too many faces are requested again; the
+ * first is never skipped. */
 static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
 {
@@ -416,11 +421,12 @@ static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsign
         atomic_fetch_add(&r->faces, f->count);
         f->done = status == EBPO_OK;
     }
-    ebpo_context_let_go(reach->context); /* who waits here shall not keep others from room */
+    ebpo_context_let_go(
+        reach->context); /* a waiting thread must not hold memory that others need */
     return status;
 }
 
-/* Large reaches are freed again: what is kept for all of them is bounded. */
+/* Begins a batch. Large reaches are freed: the memory of all reaches is bounded. */
 static void begin_batch(ebpo_reacher *r, uint32_t stroke, uint32_t i)
 {
     uint32_t left = r->p->stroke[stroke].count - i;
@@ -464,8 +470,8 @@ ebpo_status ebpo_reacher_new(const ebpo_paint *p, ebpo_context *context, unsigne
         return ebpo_fail_memory(error, sizeof *r);
     r->p = p;
     uint64_t most = p->point_count / GRAIN + 1, memory = context->model->options.memory;
-    if (memory && memory / THREAD_ROOM < most)
-        most = memory / THREAD_ROOM + 1;
+    if (memory && memory / THREAD_CAPACITY < most)
+        most = memory / THREAD_CAPACITY + 1;
     r->threads = ebpo_thread_count(threads);
     r->threads = r->threads < most ? r->threads : (unsigned)most;
     ebpo_status status = EBPO_OK;

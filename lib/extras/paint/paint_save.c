@@ -155,7 +155,7 @@ static ebpo_status put_all(ebpo_h5_out *out, const ebpo_paint *p, ebpo_error *er
     return status;
 }
 
-/* Roughly what headers take. */
+/* Returns an estimate of the bytes of headers. */
 static uint64_t head_bytes(const ebpo_paint *p)
 {
     enum { GROUP = 700, ROOT = 8192 };
@@ -167,7 +167,7 @@ static uint64_t head_bytes(const ebpo_paint *p)
     return sum;
 }
 
-/* After a save: the file at `path` is the paint's. */
+/* Records after a save that the file at `path` is the paint's. */
 static void take_version(ebpo_paint_file *f, char *path, int fd)
 {
     if (f->fd >= 0)
@@ -205,7 +205,7 @@ static ebpo_status paint_save_save(const ebpo_paint *p, const char *path, ebpo_e
     if (status == EBPO_OK)
         status = ebpo_publish_commit(&publish, error);
     ebpo_publish_abort(&publish);
-    if (own) /* also where it failed: others need not wait for a paint that is kept in memory */
+    if (own) /* also after a failure: other programs need not wait for a paint in memory */
         ebpo_file_lock_release(&f->lock);
     if (status == EBPO_OK && fd >= 0) {
         take_version(f, place, fd);

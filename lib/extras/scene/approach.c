@@ -1,12 +1,12 @@
 /* Searches along the routes of pairs of instances: the first time at which a pair comes within its
  * clearance, and the least distance of a pair over an interval of time.
  *
- * Both rest on one bound: the distance of two instances changes by no more than the two move. The
- * first search goes from look to look, so that in between the motion is shorter than the gap to
- * the clearance and no contact is missed. The second one keeps parts of the interval in a heap by
- * the least distance that each allows, and halves the first until the result is within the
- * tolerance. Jumps of routes are ends of parts. A result is a pair of certain bounds; a search
- * that needs too many looks returns what it knows.
+ * Both depend on one bound: the distance of two instances changes by at most their motion. The
+ * first search goes from look to look, so that in between the motion is shorter than the gap to the
+ * clearance and no contact is missed. The second one keeps parts of the interval in a heap by the
+ * least distance that each allows, and halves the first until the result is within the tolerance.
+ * Jumps of routes are ends of parts. A result is a pair of certain bounds; a search that needs too
+ * many looks returns its current bounds.
  *
  * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"
@@ -22,24 +22,26 @@
 
 typedef struct travel {
     const ebpo_scene *scene;
-    ebpo_scene_way_options how;
+    ebpo_scene_approach_options how;
     double from, to;
 } travel;
 
-/* The next time to look: until then the way is shorter than `gap`; w->time where there is none. */
-static ebpo_status next_look(const travel *t, const ebpo_scene_looks *looks,
-                             const ebpo_scene_way *w, double gap, double *next, ebpo_error *error)
+/* Returns the next time to look: until then the motion is shorter than `gap`; w->time if there is
+ * none. */
+static ebpo_status next_look(const travel *t, const ebpo_scene_evaluations *looks,
+                             const ebpo_scene_approach_result *w, double gap, double *next,
+                             ebpo_error *error)
 {
     double low = w->time, high = t->to, at = high, length = 0;
-    ebpo_status status = ebpo_scene_looks_motion(looks, low, at, &length, error);
+    ebpo_status status = ebpo_scene_evaluations_motion(looks, low, at, &length, error);
     if (status != EBPO_OK || length < gap) {
         *next = at;
         return status;
     }
-    /* halved until it fits, then a little longer again */
+    /* halved until it fits, then lengthened slightly */
     for (int n = 0; n < 70 && status == EBPO_OK && (low == w->time || n < 8); n++) {
         at = low + (high - low) / 2;
-        status = ebpo_scene_looks_motion(looks, w->time, at, &length, error);
+        status = ebpo_scene_evaluations_motion(looks, w->time, at, &length, error);
         if (length < gap)
             low = at;
         else
@@ -49,35 +51,36 @@ static ebpo_status next_look(const travel *t, const ebpo_scene_looks *looks,
     return status;
 }
 
-/* Past a jump. *next stays where nothing jumps: there rounding alone may be longer than the gap,
- * however short the time. */
-static ebpo_status approach_jump(const ebpo_scene_looks *looks, const ebpo_scene_way *w,
-                                 double *next, ebpo_error *error)
+/* Moves past a jump. *next stays unchanged if there is none: there rounding alone may exceed the
+ * gap, however short the time. */
+static ebpo_status approach_jump(const ebpo_scene_evaluations *looks,
+                                 const ebpo_scene_approach_result *w, double *next,
+                                 ebpo_error *error)
 {
     double length, at = nextafter(w->time, INFINITY);
-    ebpo_status status = ebpo_scene_looks_motion(looks, w->time, at, &length, error);
+    ebpo_status status = ebpo_scene_evaluations_motion(looks, w->time, at, &length, error);
     if (status == EBPO_OK && length == INFINITY)
         *next = at;
     return status;
 }
 
-static bool is_reached(const travel *t, const ebpo_scene_way *w)
+static bool is_reached(const travel *t, const ebpo_scene_approach_result *w)
 {
     return ebpo_scene_is_within(w->hi, w->clearance, t->how.tolerance);
 }
 
-static ebpo_status approach_look(const travel *t, ebpo_scene_looks *looks, ebpo_scene_way *w,
-                                 ebpo_error *error)
+static ebpo_status approach_look(const travel *t, ebpo_scene_evaluations *looks,
+                                 ebpo_scene_approach_result *w, ebpo_error *error)
 {
-    ebpo_status status = ebpo_scene_look(looks, w->time, &w->lo, &w->hi, error);
+    ebpo_status status = ebpo_scene_evaluate(looks, w->time, &w->lo, &w->hi, error);
     w->looks++;
     if (status != EBPO_OK || is_reached(t, w) || looks->gap > w->clearance)
         return status;
     return ebpo_scene_lacks(t->scene, looks->pair, looks->lacking, w->time, false, error);
 }
 
-static ebpo_status approach_go(const travel *t, ebpo_scene_looks *looks, ebpo_scene_way *w,
-                               ebpo_error *error)
+static ebpo_status approach_go(const travel *t, ebpo_scene_evaluations *looks,
+                               ebpo_scene_approach_result *w, ebpo_error *error)
 {
     for (;;) {
         double next;
@@ -92,7 +95,7 @@ static ebpo_status approach_go(const travel *t, ebpo_scene_looks *looks, ebpo_sc
             status = approach_jump(looks, w, &next, error);
         if (status != EBPO_OK)
             return status;
-        if (w->looks >= t->how.most_looks || !(next > w->time)) {
+        if (w->looks >= t->how.max_evaluations || !(next > w->time)) {
             w->reached = -1;
             return EBPO_OK;
         }
@@ -104,12 +107,13 @@ static ebpo_status find_way(const void *how, const ebpo_scene_pair *pair, void *
                             ebpo_error *error)
 {
     const travel *t = how;
-    ebpo_scene_way *way = result;
-    ebpo_scene_looks looks;
-    *way = (ebpo_scene_way){
+    ebpo_scene_approach_result *way = result;
+    ebpo_scene_evaluations looks;
+    *way = (ebpo_scene_approach_result){
         .a = pair->a, .b = pair->b, .time = t->from, .clearance = pair->clearance
     };
-    ebpo_status status = ebpo_scene_looks_begin(&looks, t->scene, pair, t->how.tolerance, error);
+    ebpo_status status =
+        ebpo_scene_evaluations_begin(&looks, t->scene, pair, t->how.tolerance, error);
     if (status == EBPO_OK)
         status = approach_go(t, &looks, way, error);
     ebpo_collider_free(looks.collider);
@@ -117,17 +121,21 @@ static ebpo_status find_way(const void *how, const ebpo_scene_pair *pair, void *
 }
 
 ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
-                                const ebpo_scene_way_options *options, ebpo_scene_ways_fn take,
-                                void *user, ebpo_error *error)
+                                const ebpo_scene_approach_options *options,
+                                ebpo_scene_approaches_fn take, void *user, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    travel t = { .scene = scene, .how = EBPO_SCENE_WAY_OPTIONS_INIT, .from = from, .to = to };
+    travel t = { .scene = scene, .how = EBPO_SCENE_APPROACH_OPTIONS_INIT, .from = from, .to = to };
     void *ways = NULL;
     uint64_t count = 0;
-    ebpo_status status = ebpo_scene_take_way_options(&t.how, options, error);
-    ebpo_scene_search search = {
-        find_way, &t, sizeof(ebpo_scene_way), 1, t.how.threads, &t.how.progress, "following routes"
-    };
+    ebpo_status status = ebpo_scene_take_approach_options(&t.how, options, error);
+    ebpo_scene_search search = { find_way,
+                                 &t,
+                                 sizeof(ebpo_scene_approach_result),
+                                 1,
+                                 t.how.threads,
+                                 &t.how.progress,
+                                 "following routes" };
     if (status == EBPO_OK)
         status = ebpo_scene_find_in_pairs(scene, from, to, &search, &ways, &count, error);
     if (status == EBPO_OK && count)
@@ -141,21 +149,21 @@ ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
 typedef struct least_search {
     const ebpo_scene *scene;
     double from, to, tolerance;
-    uint64_t most_looks;
+    uint64_t max_evaluations;
 } least_search;
 
 /* A part of the time, without a jump within. */
 typedef struct part {
     double from, to;
     double at_from, at_to; /* lower bounds of the distance there */
-    double motion;         /* how far both go at most */
+    double motion;         /* bound of the motion of both */
     double least;          /* a lower bound of the distance in it */
 } part;
 
 typedef struct part_search {
-    ebpo_scene_looks looks;
+    ebpo_scene_evaluations looks;
     ebpo_scene_least *out;
-    double limit; /* the least that was seen of what files lack: no better bound can be had */
+    double limit; /* the least bound from omitted faces so far: no better bound is possible */
     EBPO_SCENE_LIST(part, parts); /* a heap: the one with the least `least` first */
 } part_search;
 
@@ -179,7 +187,7 @@ static ebpo_status put_part(part_search *s, const part *p, ebpo_error *error)
 static ebpo_status least_distance_look(part_search *s, double time, double *lo, ebpo_error *error)
 {
     double hi;
-    ebpo_status status = ebpo_scene_look(&s->looks, time, lo, &hi, error);
+    ebpo_status status = ebpo_scene_evaluate(&s->looks, time, lo, &hi, error);
     s->out->looks++;
     if (status == EBPO_OK && s->looks.gap < hi)
         s->limit = fmin(s->limit, *lo);
@@ -190,10 +198,10 @@ static ebpo_status least_distance_look(part_search *s, double time, double *lo, 
     return status;
 }
 
-/* Between its ends it can be nearer by half of what is left of the way. */
+/* Adds a part. Between its ends the distance can be less by half of the remaining motion. */
 static ebpo_status add_part(part_search *s, part p, ebpo_error *error)
 {
-    ebpo_status status = ebpo_scene_looks_motion(&s->looks, p.from, p.to, &p.motion, error);
+    ebpo_status status = ebpo_scene_evaluations_motion(&s->looks, p.from, p.to, &p.motion, error);
     if (status != EBPO_OK)
         return status;
     p.least = fmin(fmin(p.at_from, p.at_to), (p.at_from + p.at_to - p.motion) / 2);
@@ -213,13 +221,13 @@ static ebpo_status least_distance_halve(part_search *s, const part *p, double mi
                : status;
 }
 
-/* Routes may jump at keys; what rides together does not. */
+/* Returns the next key, where routes may jump; pairs on one route do not jump. */
 static double next_jump(const part_search *s, double from, double to)
 {
     return s->looks.rides ? to : ebpo_scene_pair_next(s->looks.scene, s->looks.pair, from, to);
 }
 
-/* From key to key, so that routes jump between parts only. */
+/* Makes parts from key to key, so that routes jump only between parts. */
 static ebpo_status begin_parts(part_search *s, double from, double to, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -239,21 +247,21 @@ static ebpo_status begin_parts(part_search *s, double from, double to, ebpo_erro
     return status;
 }
 
-/* Whether the least part tells enough, or all that can be found out. */
+/* Returns true if the least part is good enough, or cannot be improved. */
 static bool is_done(const part_search *s, const part *p, double middle, const least_search *how)
 {
-    double hi = s->out->hi, open = hi - s->limit; /* below 0: nothing that is lacking matters */
+    double hi = s->out->hi, open = hi - s->limit; /* below 0: no omitted face matters */
     return ebpo_scene_is_within(hi, p->least, how->tolerance) || s->limit - p->least <= open / 8 ||
-           s->out->looks >= how->most_looks || p->motion <= how->tolerance / 8 ||
+           s->out->looks >= how->max_evaluations || p->motion <= how->tolerance / 8 ||
            !(middle > p->from && middle < p->to);
 }
 
-/* What rounding may do stays, however short the part is: nearly all of its motion then. */
+/* Returns true if rounding, which does not shrink with the part, is nearly all of its motion. */
 static ebpo_status is_rounding(const part_search *s, const part *p, bool *out, ebpo_error *error)
 {
     double least = 0;
-    ebpo_status status =
-        ebpo_scene_looks_motion(&s->looks, p->from, nextafter(p->from, INFINITY), &least, error);
+    ebpo_status status = ebpo_scene_evaluations_motion(&s->looks, p->from,
+                                                       nextafter(p->from, INFINITY), &least, error);
     *out = p->motion <= 2 * least;
     return status;
 }
@@ -285,7 +293,8 @@ static ebpo_status find_least(const void *context, const ebpo_scene_pair *pair, 
     *out = (ebpo_scene_least){
         .a = pair->a, .b = pair->b, .time = how->from, .hi = INFINITY, .clearance = pair->clearance
     };
-    ebpo_status status = ebpo_scene_looks_begin(&s.looks, how->scene, pair, how->tolerance, error);
+    ebpo_status status =
+        ebpo_scene_evaluations_begin(&s.looks, how->scene, pair, how->tolerance, error);
     if (status == EBPO_OK)
         status = begin_parts(&s, how->from, how->to, error);
     if (status == EBPO_OK)
@@ -296,17 +305,17 @@ static ebpo_status find_least(const void *context, const ebpo_scene_pair *pair, 
 }
 
 ebpo_status ebpo_scene_least_distances(ebpo_scene *scene, double from, double to,
-                                       const ebpo_scene_way_options *options,
+                                       const ebpo_scene_approach_options *options,
                                        ebpo_scene_least_fn take, void *user, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     least_search s = { .scene = scene, .from = from, .to = to };
-    ebpo_scene_way_options how = EBPO_SCENE_WAY_OPTIONS_INIT;
+    ebpo_scene_approach_options how = EBPO_SCENE_APPROACH_OPTIONS_INIT;
     void *found = NULL;
     uint64_t count = 0;
-    ebpo_status status = ebpo_scene_take_way_options(&how, options, error);
+    ebpo_status status = ebpo_scene_take_approach_options(&how, options, error);
     s.tolerance = how.tolerance;
-    s.most_looks = how.most_looks;
+    s.max_evaluations = how.max_evaluations;
     ebpo_scene_search search = {
         find_least, &s, sizeof(ebpo_scene_least), 1, how.threads, &how.progress, "following routes"
     };

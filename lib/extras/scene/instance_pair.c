@@ -1,13 +1,13 @@
-/* Two instances of a scene at a time: where one is in the other's coordinates, how far they move
- * relative to each other, how far they are apart, and what their files omit that may matter.
+/* Two instances of a scene at a time: one in the other's coordinates, their relative motion, their
+ * distance, and the relevant parts that their files omit.
  *
  * Boxes and lengths are rounded outwards, so that every bound is certain in spite of rounding. A
- * file that is a subset has only the faces of its kept box: what it omits is bounded by up to six
- * boxes around that one. Two instances that follow one route have a relative motion of rounding
- * and scale alone.
+ * file that is a subset has only the faces of its kept box: the omitted part is bounded by up to
+ * six boxes around that box. Two instances that follow one route have no relative motion but that
+ * of rounding and scale.
  *
- * A list of pairs is evaluated on all cores by ebpo_scene_find_in_pairs, each pair by itself with
- * its own collider, so that results do not depend on the number of threads. */
+ * ebpo_scene_find_in_pairs evaluates a list of pairs on all cores, each pair with a separate
+ * collider, so that results do not depend on the number of threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -21,10 +21,10 @@
 #include "extras/scene/instance_pair.h"
 #include "geometry/pose.h"
 
-/* of sums of a few products: far above their rounding */
+/* for sums of a few products: far above their rounding */
 static const double slack = 0x1p-44;
 
-static const ebpo_scene_model_entry *left_out_model_of(const ebpo_scene *scene, uint64_t instance)
+static const ebpo_scene_model_entry *omitted_model_of(const ebpo_scene *scene, uint64_t instance)
 {
     return &scene->models[scene->instances[instance].as.model];
 }
@@ -32,7 +32,7 @@ static const ebpo_scene_model_entry *left_out_model_of(const ebpo_scene *scene, 
 static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double time,
                              ebpo_posing *out, ebpo_error *error)
 {
-    const ebpo_scene_model_entry *m = left_out_model_of(scene, instance);
+    const ebpo_scene_model_entry *m = omitted_model_of(scene, instance);
     double reach[3];
     ebpo_pose pose;
     for (int k = 0; k < 3; k++)
@@ -41,7 +41,7 @@ static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double 
     return status == EBPO_OK ? ebpo_posing_make(out, &pose, reach, error) : status;
 }
 
-/* Of the box of a model in the world: its middle, and half of it along each of its axes. */
+/* The box of a model in the world: its centre, and half of it along each of its axes. */
 typedef struct posed_box {
     double middle[3], half[3][3], size;
 } posed_box;
@@ -66,7 +66,7 @@ static void pose_box(const ebpo_posing *p, const ebpo_scene_model_entry *m, pose
 ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
                                  ebpo_scene_seen *out, ebpo_error *error)
 {
-    const ebpo_scene_model_entry *m = left_out_model_of(scene, of);
+    const ebpo_scene_model_entry *m = omitted_model_of(scene, of);
     ebpo_posing from, at;
     posed_box b;
     ebpo_status status = posing_of(scene, of, time, &from, error);
@@ -74,14 +74,14 @@ ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t 
         status = posing_of(scene, other, time, &at, error);
     if (status != EBPO_OK)
         return status;
-    pose_box(&at, left_out_model_of(scene, other), &b);
+    pose_box(&at, omitted_model_of(scene, other), &b);
     double scale = from.scale, sizes = b.size, reach = 0;
     for (int i = 0; i < 3; i++) {
         sizes += fabs(from.translation[i]);
         reach += fmax(fabs(m->min[i]), fabs(m->max[i]));
     }
-    /* the transposed matrix is the inverse but for the deviation, of points of the model's box */
-    double off = (sizes + reach * scale) * slack / scale + 3 * from.deviation * reach;
+    /* the transposed matrix is the inverse up to the error bound, for points of the model's box */
+    double off = (sizes + reach * scale) * slack / scale + 3 * from.error_bound * reach;
     out->rounding = off;
     for (int k = 0; k < 3; k++) {
         double middle = 0, half = off;
@@ -96,7 +96,7 @@ ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t 
         out->box.min[k] = middle - half;
         out->box.max[k] = middle + half;
     }
-    out->unit = scale * (1 - 2 * from.deviation);
+    out->unit = scale * (1 - 2 * from.error_bound);
     return EBPO_OK;
 }
 
@@ -108,7 +108,7 @@ double ebpo_scene_space_gap(const ebpo_scene_space *a, const ebpo_scene_space *b
     return ebpo_scene_length_above(apart) * (1 - 8 * slack);
 }
 
-/* The part of a model's box whose faces its file has; false: all. */
+/* Returns the part of a model's box whose faces its file has; false: all. */
 static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_space *out)
 {
     const ebpo_info *info =
@@ -124,7 +124,8 @@ static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_spac
     return true;
 }
 
-/* Of `other` to what is in the box `all` and not in `held`: up to six boxes on its sides. */
+/* Returns the distance of `other` from the part of the box `all` that is not in `held`: up to six
+ * boxes on its sides. */
 static double gap_around(const ebpo_scene_space *all, const ebpo_scene_space *held,
                          const ebpo_scene_space *other)
 {
@@ -142,10 +143,10 @@ static double gap_around(const ebpo_scene_space *all, const ebpo_scene_space *he
     return gap;
 }
 
-static ebpo_status left_out_of(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
-                               double *gap, ebpo_error *error)
+static ebpo_status omitted_of(const ebpo_scene *scene, uint64_t of, uint64_t other, double time,
+                              double *gap, ebpo_error *error)
 {
-    const ebpo_scene_model_entry *m = left_out_model_of(scene, of);
+    const ebpo_scene_model_entry *m = omitted_model_of(scene, of);
     ebpo_scene_space held, all;
     ebpo_scene_seen seen;
     *gap = INFINITY;
@@ -159,13 +160,13 @@ static ebpo_status left_out_of(const ebpo_scene *scene, uint64_t of, uint64_t ot
     return status;
 }
 
-ebpo_status ebpo_scene_left_out(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
-                                double *gap, uint64_t *lacking, ebpo_error *error)
+ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair, double time,
+                               double *gap, uint64_t *lacking, ebpo_error *error)
 {
     double of_a, of_b;
-    ebpo_status status = left_out_of(scene, pair->a, pair->b, time, &of_a, error);
+    ebpo_status status = omitted_of(scene, pair->a, pair->b, time, &of_a, error);
     if (status == EBPO_OK)
-        status = left_out_of(scene, pair->b, pair->a, time, &of_b, error);
+        status = omitted_of(scene, pair->b, pair->a, time, &of_b, error);
     if (status != EBPO_OK)
         return status;
     *gap = fmin(of_a, of_b);
@@ -176,12 +177,11 @@ ebpo_status ebpo_scene_left_out(const ebpo_scene *scene, const ebpo_scene_pair *
 ebpo_status ebpo_scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, uint64_t lacking,
                              double time, bool solids, ebpo_error *error)
 {
-    const ebpo_scene_model_entry *m = left_out_model_of(scene, lacking);
+    const ebpo_scene_model_entry *m = omitted_model_of(scene, lacking);
     return ebpo_fail(
         error, EBPO_E_ABSENT,
-        "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a "
-        "part of another or has no mesh, and what is not in it may matter; ask a scene "
-        "with more of it%s",
+        "instances '%.80s' and '%.80s' at time %.9g: the file of model '%.80s' is a part of "
+        "another or has no mesh, and the omitted part may matter; query a scene with more of it%s",
         scene->instances[pair->a].as.name, scene->instances[pair->b].as.name, time, m->name,
         solids ? ", such as ebpo scene pack --solids makes" : "");
 }
@@ -192,8 +192,8 @@ static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instan
     return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
 }
 
-/* Both ride on what moves along one route, or along two of the same keys: all that changes between
- * them is what rounding does, and their size where the route's scale does. */
+/* Returns true if both follow one route, or two with the same keys: only rounding changes between
+ * them, and their size where the route's scale changes. */
 static bool pair_rides(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     const ebpo_scene_route *a = route_of(scene, pair->a), *b = route_of(scene, pair->b);
@@ -203,8 +203,8 @@ static bool pair_rides(const ebpo_scene *scene, const ebpo_scene_pair *pair)
                       memcmp(a->keys, b->keys, a->count * sizeof *a->keys) == 0);
 }
 
-/* What rounding may do to their distance on all their ways, of the order of it; 0: neither moves.
- */
+/* Returns the order of the effect of rounding on their distance on all their ways; 0: neither
+ * moves. */
 static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     double sum = 0;
@@ -219,8 +219,9 @@ static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair
     return sum;
 }
 
-/* The pose of the route is the same for both, to the last bit: points of theirs that are `reach`
- * apart at most where the route begins are scale times that apart. */
+/* Bounds the motion of a pair on one route. The pose of the route is the same for both, to the last
+ * bit: points of theirs that are at most `reach` apart at the beginning of the route are scale
+ * times that apart. */
 static double pair_motion_ride(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
                                double to)
 {
@@ -230,8 +231,8 @@ static double pair_motion_ride(const ebpo_scene *scene, const ebpo_scene_pair *p
                                    (ebpo_scene_reach){ a.length + b.length, a.size + b.size });
 }
 
-/* Their distance changes by no more than *out on its way between two times, INFINITY over a jump.
- * rides: as pair_rides says. */
+/* Bounds the change of their distance between two times by *out, INFINITY over a jump. rides:
+ * result of pair_rides. */
 static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair, bool rides,
                                double from, double to, double *out, ebpo_error *error)
 {
@@ -293,7 +294,7 @@ ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double t
     return status;
 }
 
-/* The same; their models are made. On failure there is nothing to free. */
+/* Same, and makes their models. On failure there is nothing to free. */
 static ebpo_status list_pairs(ebpo_scene *scene, double from, double to, ebpo_scene_pairs_list *out,
                               ebpo_error *error)
 {
@@ -374,15 +375,15 @@ ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair 
     return status == EBPO_OK ? ebpo_scene_pose(scene, pair->b, time, &out->pose_b, error) : status;
 }
 
-/* Of a collider that is not there: nothing is left to be near. */
-static ebpo_status ask_distance(ebpo_scene_looks *l, double time, double *lo, double *hi,
-                                ebpo_error *error)
+/* Returns the distance; a missing collider has no faces to be near. */
+static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double *lo, double *hi,
+                                  ebpo_error *error)
 {
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
     ebpo_clearance found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
     how.tolerance = l->tolerance;
-    how.warm = true; /* lo and hi may differ by it: each pair has a collider of its own */
+    how.warm = true; /* lo and hi may depend on it: each pair has a separate collider */
     ebpo_status status = ebpo_scene_pose_pair(l->scene, l->pair, time, &options, error);
     if (status == EBPO_OK && l->collider)
         status = ebpo_collide_distance(l->collider, &options, &how, &found, error);
@@ -391,29 +392,30 @@ static ebpo_status ask_distance(ebpo_scene_looks *l, double time, double *lo, do
     return status;
 }
 
-ebpo_status ebpo_scene_look(ebpo_scene_looks *l, double time, double *lo, double *hi,
-                            ebpo_error *error)
+ebpo_status ebpo_scene_evaluate(ebpo_scene_evaluations *l, double time, double *lo, double *hi,
+                                ebpo_error *error)
 {
     l->gap = INFINITY;
-    ebpo_status status = ask_distance(l, time, lo, hi, error);
+    ebpo_status status = query_distance(l, time, lo, hi, error);
     if (status == EBPO_OK)
-        status = ebpo_scene_left_out(l->scene, l->pair, time, &l->gap, &l->lacking, error);
+        status = ebpo_scene_omitted(l->scene, l->pair, time, &l->gap, &l->lacking, error);
     *lo = fmin(*lo, l->gap);
     return status;
 }
 
-ebpo_status ebpo_scene_looks_begin(ebpo_scene_looks *l, const ebpo_scene *scene,
-                                   const ebpo_scene_pair *pair, double tolerance, ebpo_error *error)
+ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *l, const ebpo_scene *scene,
+                                         const ebpo_scene_pair *pair, double tolerance,
+                                         ebpo_error *error)
 {
-    *l = (ebpo_scene_looks){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
-    /* finer ones would take long, for digits that the next pose has otherwise */
+    *l = (ebpo_scene_evaluations){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
+    /* smaller ones would take long, for digits that change with the next pose */
     l->tolerance = fmax(l->tolerance, pair_rounding(scene, pair) / 16);
     l->rides = pair_rides(scene, pair);
     return ebpo_scene_collider(scene, pair, 1, &l->collider, error);
 }
 
-ebpo_status ebpo_scene_looks_motion(const ebpo_scene_looks *l, double from, double to, double *out,
-                                    ebpo_error *error)
+ebpo_status ebpo_scene_evaluations_motion(const ebpo_scene_evaluations *l, double from, double to,
+                                          double *out, ebpo_error *error)
 {
     return pair_motion(l->scene, l->pair, l->rides, from, to, out, error);
 }
@@ -423,13 +425,14 @@ bool ebpo_scene_is_within(double hi, double lo, double tolerance)
     return hi <= lo || (hi - lo) * (1 + 0x1p-52) <= tolerance;
 }
 
-ebpo_status ebpo_scene_take_way_options(ebpo_scene_way_options *own,
-                                        const ebpo_scene_way_options *options, ebpo_error *error)
+ebpo_status ebpo_scene_take_approach_options(ebpo_scene_approach_options *own,
+                                             const ebpo_scene_approach_options *options,
+                                             ebpo_error *error)
 {
-    ebpo_status status = EBPO_TAKE(ebpo_scene_way_options, own, options, error);
+    ebpo_status status = EBPO_TAKE(ebpo_scene_approach_options, own, options, error);
     if (status == EBPO_OK && !(own->tolerance > 0 && own->tolerance < INFINITY))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the tolerance %g is not above 0", own->tolerance);
-    if (!own->most_looks)
-        own->most_looks = 10000;
+    if (!own->max_evaluations)
+        own->max_evaluations = 10000;
     return status;
 }

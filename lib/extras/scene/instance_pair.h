@@ -1,5 +1,5 @@
-/* Two instances of a scene at a time: boxes in each other's coordinates, relative motion,
- * distance, and what their files omit. Bounds hold for posed coordinates. */
+/* Two instances of a scene at a time: boxes in each other's coordinates, relative motion, distance,
+ * and the parts that their files omit. Bounds hold for posed coordinates. */
 #ifndef EBPO_SCENE_INSTANCE_PAIR_H
 #define EBPO_SCENE_INSTANCE_PAIR_H
 
@@ -14,51 +14,52 @@ typedef struct ebpo_scene_space {
 /* One instance in another's coordinates. */
 typedef struct ebpo_scene_seen {
     ebpo_scene_space box;
-    double rounding; /* how far the box was widened for it */
-    double unit;     /* how long one of these coordinates is in the world, at least */
+    double rounding; /* widening of the box for rounding */
+    double unit;     /* least length of one of these coordinates in the world */
 } ebpo_scene_seen;
 
-/* A box in the coordinates of the instance `of` that holds the box of `other` at a time.
+/* Returns a box in the coordinates of the instance `of` that holds the box of `other` at a time.
  * EBPO_E_ARGUMENT: a pose. */
 EBPO_MUST_USE ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other,
                                                double time, ebpo_scene_seen *out,
                                                ebpo_error *error);
 
-/* The distance of two boxes, rounded down. */
+/* Returns the distance of two boxes, rounded down. */
 double ebpo_scene_space_gap(const ebpo_scene_space *a, const ebpo_scene_space *b);
 
-/* Of a pair at a time: no two faces of which one has been left out of its model's file are nearer
- * than this; INFINITY: nothing has been left out. *lacking: an instance whose file lacks some. */
-EBPO_MUST_USE ebpo_status ebpo_scene_left_out(const ebpo_scene *scene, const ebpo_scene_pair *pair,
-                                              double time, double *gap, uint64_t *lacking,
-                                              ebpo_error *error);
+/* Bounds the distance of omitted faces of a pair at a time: no two faces of which one is omitted
+ * from its model's file are nearer than *gap; INFINITY: nothing is omitted. *lacking: an instance
+ * whose file lacks some. */
+EBPO_MUST_USE ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair,
+                                             double time, double *gap, uint64_t *lacking,
+                                             ebpo_error *error);
 
-/* EBPO_E_ABSENT: what this instance's file lacks may come nearer than the question allows; or be
- * around the other one, where solids are asked about. */
+/* Returns EBPO_E_ABSENT: the omitted part of this instance's file may be nearer than the query
+ * allows; or around the other one, where solids are requested. */
 ebpo_status ebpo_scene_lacks(const ebpo_scene *scene, const ebpo_scene_pair *pair, uint64_t lacking,
                              double time, bool solids, ebpo_error *error);
 
-/* How far two instances go, seen from each other. */
+/* Relative motion of two instances. */
 
-/* The next time at which a route of theirs has a key; `to` if that comes first. */
+/* Returns the next time at which a route of theirs has a key; `to` if that comes first. */
 double ebpo_scene_pair_next(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
                             double to);
 
-/* Pairs of instances that are asked about one after the other, by any thread. */
+/* Pairs of instances that are evaluated in sequence, by any thread. */
 
 typedef struct ebpo_scene_pairs_list {
-    ebpo_scene_pair *pairs; /* malloc's */
+    ebpo_scene_pair *pairs; /* from malloc */
     uint64_t count;
 } ebpo_scene_pairs_list;
 
-/* Those of ebpo_scene_pairs. On failure there is nothing to free. */
+/* Lists the pairs of ebpo_scene_pairs. On failure there is nothing to free. */
 EBPO_MUST_USE ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double to,
                                                 ebpo_scene_pairs_list *out, ebpo_error *error);
-/* Finds a result for one pair; how: the search's. */
+/* Finds a result for one pair; how: data of the search. */
 typedef ebpo_status (*ebpo_scene_find_fn)(const void *how, const ebpo_scene_pair *pair,
                                           void *result, ebpo_error *error);
 
-/* A search in each pair by itself. */
+/* A search in each pair separately. */
 typedef struct ebpo_scene_search {
     ebpo_scene_find_fn find;
     const void *how;
@@ -69,57 +70,60 @@ typedef struct ebpo_scene_search {
     const char *stage;
 } ebpo_scene_search;
 
-/* Lists the pairs, makes their models, and finds the result of each on all cores. *results,
- * in the order of pairs, are to be freed, also on failure; *count is 0 where there is no list. */
+/* Lists the pairs, makes their models, and finds the result of each on all cores. Free *results, in
+ * the order of pairs, also on failure; *count is 0 without a list. */
 EBPO_MUST_USE ebpo_status ebpo_scene_find_in_pairs(ebpo_scene *scene, double from, double to,
                                                    const ebpo_scene_search *search, void **results,
                                                    uint64_t *count, ebpo_error *error);
 
-/* One after the other: questions then share them. */
+/* Makes models in sequence; queries then share them. */
 EBPO_MUST_USE ebpo_status ebpo_scene_make_models(ebpo_scene *scene, const ebpo_scene_pair *pairs,
                                                  uint64_t count, ebpo_error *error);
-/* For one of these pairs. NULL: a file has no mesh; then ebpo_scene_left_out counts all
- * of it. */
+/* Makes a collider for one of these pairs. NULL: a file has no mesh; then ebpo_scene_omitted
+ * counts all of it. */
 EBPO_MUST_USE ebpo_status ebpo_scene_collider(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                               unsigned threads, ebpo_collider **out,
                                               ebpo_error *error);
-/* Where both are at a time. */
+/* Sets the poses of both at a time. */
 EBPO_MUST_USE ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                                double time, ebpo_collide_options *out,
                                                ebpo_error *error);
 
-/* A pair of instances at one time after the other: how far apart, and how far they go. */
+/* A pair of instances at a sequence of times: distance and motion. */
 
-typedef struct ebpo_scene_looks {
+typedef struct ebpo_scene_evaluations {
     const ebpo_scene *scene;
     const ebpo_scene_pair *pair;
-    ebpo_collider *collider; /* of ebpo_scene_collider; to be freed */
-    double tolerance;        /* of a look */
+    ebpo_collider *collider; /* from ebpo_scene_collider; must be freed */
+    double tolerance;        /* tolerance of a look */
     bool rides;              /* both follow one route */
-    double gap;              /* at the last one, as ebpo_scene_left_out tells it, */
-    uint64_t lacking;        /* and of which */
-} ebpo_scene_looks;
+    double gap;              /* result of ebpo_scene_omitted at the last look, */
+    uint64_t lacking;        /* and its instance */
+} ebpo_scene_evaluations;
 
-/* `tolerance`: of what is asked for; looks take a quarter of it, or what rounding leaves. Free the
- * collider, also on failure. */
-EBPO_MUST_USE ebpo_status ebpo_scene_looks_begin(ebpo_scene_looks *looks, const ebpo_scene *scene,
-                                                 const ebpo_scene_pair *pair, double tolerance,
-                                                 ebpo_error *error);
+/* Begins looks. `tolerance`: that of the result; looks take a quarter of it, or the limit of
+ * rounding. Free the collider, also on failure. */
+EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *looks,
+                                                       const ebpo_scene *scene,
+                                                       const ebpo_scene_pair *pair,
+                                                       double tolerance, ebpo_error *error);
 
-/* How far the pair moves, as pair_motion finds it. */
-EBPO_MUST_USE ebpo_status ebpo_scene_looks_motion(const ebpo_scene_looks *looks, double from,
-                                                  double to, double *out, ebpo_error *error);
+/* Bounds the motion of the pair, as pair_motion does. */
+EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_motion(const ebpo_scene_evaluations *looks,
+                                                        double from, double to, double *out,
+                                                        ebpo_error *error);
 
-/* Bounds of the distance of their faces at a time, of those that were left out too. */
-EBPO_MUST_USE ebpo_status ebpo_scene_look(ebpo_scene_looks *looks, double time, double *lo,
-                                          double *hi, ebpo_error *error);
+/* Bounds the distance of their faces at a time, including omitted faces. */
+EBPO_MUST_USE ebpo_status ebpo_scene_evaluate(ebpo_scene_evaluations *looks, double time,
+                                              double *lo, double *hi, ebpo_error *error);
 
-/* Whether `hi` is no more than the tolerance above `lo`, in real numbers. */
+/* Returns true if `hi` is at most the tolerance above `lo`, in real numbers. */
 bool ebpo_scene_is_within(double hi, double lo, double tolerance);
 
-/* With the usual number of looks. EBPO_E_ARGUMENT: the tolerance is not above 0. */
-EBPO_MUST_USE ebpo_status ebpo_scene_take_way_options(ebpo_scene_way_options *own,
-                                                      const ebpo_scene_way_options *options,
-                                                      ebpo_error *error);
+/* Reads the options, with the default number of looks. EBPO_E_ARGUMENT: the tolerance is not above
+ * 0. */
+EBPO_MUST_USE ebpo_status
+ebpo_scene_take_approach_options(ebpo_scene_approach_options *own,
+                                 const ebpo_scene_approach_options *options, ebpo_error *error);
 
 #endif

@@ -1,9 +1,9 @@
-/* Reads members of a scene file, of which every error names the line, the path of the value and
- * what was expected.
+/* Reads members of a scene file; every error names the line, the path of the value and the
+ * expectation.
  *
- * A scene file is untrusted input. Before jansson parses the text, one pass counts its values and
- * its depth against the limits, so that parsing takes bounded memory. jansson keeps no positions:
- * a line is found by a second pass over the text, which follows the path of the member.
+ * A scene file is untrusted input. Before jansson parses the text, one pass compares the number and
+ * the depth of its values with the limits, so that parsing takes bounded memory. jansson keeps no
+ * positions: a second pass over the text follows the path of a member to find its line.
  *
  * A reader keeps that path: ebpo_json_enter and ebpo_json_leave bracket the evaluation of a value.
  * Unknown members are errors, except private ones, whose names begin with "x-".
@@ -25,7 +25,7 @@ size_t ebpo_scene_text_mark(const char *text, size_t size)
     return (size_t)ebpo_text_mark(text, size);
 }
 
-/* Behind the string that begins at text[i], or `size`. */
+/* Returns the index behind the string that begins at text[i], or `size`. */
 static size_t skip_string(const char *text, size_t size, size_t i)
 {
     for (i++; i < size && text[i] != '"'; i++)
@@ -33,7 +33,7 @@ static size_t skip_string(const char *text, size_t size, size_t i)
     return i + 1 < size ? i + 1 : size;
 }
 
-ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t most_values,
+ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t max_values,
                                  ebpo_error *error)
 {
     uint64_t values = 1, depth = 0;
@@ -46,15 +46,15 @@ ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t most_va
             return ebpo_fail(error, EBPO_E_LIMIT, "byte %zu: more than %d levels of brackets", i,
                              EBPO_SCENE_DEPTH);
         depth -= (c == '}' || c == ']') && depth > 0;
-        if (values > most_values)
+        if (values > max_values)
             return ebpo_fail(error, EBPO_E_LIMIT,
-                             "byte %zu: more than %llu values, the limit that was given", i,
-                             (unsigned long long)most_values);
+                             "byte %zu: more than %llu values, the given limit", i,
+                             (unsigned long long)max_values);
     }
     return EBPO_OK;
 }
 
-/* A place in valid JSON, and the lines before it. */
+/* A position in valid JSON, and the number of lines before it. */
 typedef struct cursor {
     const char *at;
     uint64_t line;
@@ -73,7 +73,7 @@ static void json_text_string(cursor *c)
     c->at += *c->at == '"';
 }
 
-/* Over a value, and blanks before it. */
+/* Skips a value, and blanks before it. */
 static void json_text_value(cursor *c)
 {
     int depth = 0;
@@ -103,7 +103,7 @@ static bool key_is(const cursor *c, const char *key)
     return *c->at == '"' && strncmp(c->at + 1, key, size) == 0 && c->at[1 + size] == '"';
 }
 
-/* From the bracket that `c` is at to the value in it that `at` names. */
+/* Moves from the bracket at `c` to the value in it that `at` names. */
 static bool json_text_enter(cursor *c, const ebpo_scene_at *at)
 {
     bool object = *c->at == '{';
@@ -125,8 +125,8 @@ static bool json_text_enter(cursor *c, const ebpo_scene_at *at)
     return false;
 }
 
-/* The line, from 1, on which the value at path[count] begins in text that is valid JSON; where that
- * is not there, of the deepest one above it that is. */
+/* Returns the line, from 1, on which the value at path[count] begins in valid JSON; if it does not
+ * exist, that of the deepest existing value above it. */
 static uint64_t find_line(const char *text, const ebpo_scene_at *path, int count)
 {
     cursor c = { text, 1 };
@@ -150,15 +150,16 @@ void ebpo_json_enter(ebpo_json_reader *r, const char *key, uint64_t item)
 
 void ebpo_json_leave(ebpo_json_reader *r) { r->depth--; }
 
-/* "instances[3].pose": what fits. */
-static void show_path(const ebpo_json_reader *r, char *out, size_t room)
+/* Writes "instances[3].pose", cut to fit. */
+static void show_path(const ebpo_json_reader *r, char *out, size_t space)
 {
     size_t used = 0;
     out[0] = 0;
-    for (int i = 0; i < r->depth && used < room; i++) {
+    for (int i = 0; i < r->depth && used < space; i++) {
         const ebpo_scene_at *at = &r->path[i];
-        int n = at->key ? snprintf(out + used, room - used, "%s%.60s", i ? "." : "", at->key)
-                        : snprintf(out + used, room - used, "[%llu]", (unsigned long long)at->item);
+        int n = at->key
+                    ? snprintf(out + used, space - used, "%s%.60s", i ? "." : "", at->key)
+                    : snprintf(out + used, space - used, "[%llu]", (unsigned long long)at->item);
         used += n > 0 ? (size_t)n : 0;
     }
     for (char *c = out; *c; c++)
@@ -207,9 +208,7 @@ ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *value, const ch
         while (*k && strcmp(*k, key) != 0)
             k++;
         if (!*k && strncmp(key, "x-", 2) != 0)
-            return ebpo_json_bad_at(r, key,
-                                    "is not a member that this version knows; private ones begin "
-                                    "with x-");
+            return ebpo_json_bad_at(r, key, "is not a known member; private ones begin with x-");
     }
     return EBPO_OK;
 }

@@ -1,4 +1,4 @@
-/* Members of a scene file, and what is wrong with them: line, path, and what was expected. */
+/* Reads members of a scene file, and reports errors with line, path and expectation. */
 #ifndef EBPO_SCENE_JSON_READER_H
 #define EBPO_SCENE_JSON_READER_H
 
@@ -8,28 +8,28 @@ typedef struct ebpo_json_reader {
     ebpo_scene *scene;
     const char *text, *name;
     const ebpo_scene_options *options;
-    uint64_t pose_bytes; /* that may still be read from other files */
+    uint64_t pose_bytes; /* remaining limit for other files */
     ebpo_scene_at path[EBPO_SCENE_DEPTH];
     int depth;
     ebpo_error *error;
 } ebpo_json_reader;
 
-/* Into a member, or an item where `key` is NULL; and out of it. */
+/* Enters a member, or an item where `key` is NULL; and leaves it. */
 void ebpo_json_enter(ebpo_json_reader *r, const char *key, uint64_t item);
 void ebpo_json_leave(ebpo_json_reader *r);
 
-/* EBPO_E_FORMAT about the value that was entered. */
+/* Returns EBPO_E_FORMAT about the entered value. */
 ebpo_status ebpo_json_bad(ebpo_json_reader *r, const char *format, ...) EBPO_PRINTF(2, 3);
-/* The same of its member. */
+/* Same about its member. */
 ebpo_status ebpo_json_bad_at(ebpo_json_reader *r, const char *key, const char *what);
-/* EBPO_E_ARGUMENT becomes ebpo_json_bad; others are handed on. */
+/* Turns EBPO_E_ARGUMENT into ebpo_json_bad; passes on other errors. */
 ebpo_status ebpo_json_judge(ebpo_json_reader *r, ebpo_status status, const ebpo_error *why);
 
-/* An object of these members (NULL ends them) and private ones, "x-...". */
+/* Checks for an object with these members (NULL ends the list) and private ones, "x-...". */
 EBPO_MUST_USE ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *value,
                                             const char *const *known);
 
-/* *out stays where the member is missing; then EBPO_E_FORMAT if it is needed. */
+/* Reads a member. If it is missing, *out stays unchanged; EBPO_E_FORMAT if it is needed. */
 EBPO_MUST_USE ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object,
                                              const char *key, bool needed, const char **out);
 EBPO_MUST_USE ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object,
@@ -40,8 +40,8 @@ EBPO_MUST_USE ebpo_status ebpo_json_get_reals(ebpo_json_reader *r, const json_t 
                                               const char *key, bool needed, double *out,
                                               size_t count);
 
-/* Each member (or item) of the member `key`, which may be missing, entered. `name` is NULL in
- * arrays. */
+/* Called for each member (or item) of the member `key`, which may be missing; it is entered. `name`
+ * is NULL in arrays. */
 typedef ebpo_status (*ebpo_json_each_fn)(ebpo_json_reader *r, const char *name,
                                          const json_t *value);
 EBPO_MUST_USE ebpo_status ebpo_json_each_member(ebpo_json_reader *r, const json_t *object,

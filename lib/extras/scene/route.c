@@ -1,12 +1,11 @@
-/* Routes: the pose at a time between keys, and bounds of how far points that follow a route move.
+/* Routes: the pose at a time between keys, and bounds of the motion of points that follow a route.
  *
- * A rotation is interpolated along the arc between two unit quaternions by halving it repeatedly.
- * Only sums, products, quotients and square roots are used, so that a pose has the same bits on
- * every machine.
+ * A rotation is interpolated along the arc between two unit quaternions by repeated halving. Only
+ * sums, products, quotients and square roots are used, so that a pose has the same bits on every
+ * machine.
  *
- * Bounds hold between two times without a key between them: the length of the motion, the
- * deviation from a straight line, and the part of it that rounding alone makes. They are rounded
- * upwards. */
+ * Bounds hold between two times without a key between them: the length of the motion, the deviation
+ * from a straight line, and the part of it due to rounding alone. They are rounded upwards. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,10 +16,10 @@
 #include "geometry/pose.h"
 #include "extras/scene/scene_parts.h"
 
-/* What rounding adds to lengths: of a few dozen operations, each 2^-53. */
+/* Relative rounding of lengths after a few dozen operations, each 2^-53. */
 static const double slack = 0x1p-44;
-/* Times beyond would have differences that are no numbers. */
-static const double most_time = 0x1p1000;
+/* Differences of greater times would not be finite. */
+static const double max_time = 0x1p1000;
 
 void ebpo_scene_turn_of_matrix(const double m[3][3], double turn[4])
 {
@@ -48,7 +47,7 @@ static bool route_fits(const ebpo_route_key *key)
     ebpo_posing posing;
     memcpy(pose.translation, key->translation, sizeof pose.translation);
     pose.scale = key->scale;
-    return fabs(key->time) <= most_time &&
+    return fabs(key->time) <= max_time &&
            ebpo_posing_make(&posing, &pose, nowhere, NULL) == EBPO_OK;
 }
 
@@ -72,7 +71,7 @@ ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *ke
     return EBPO_OK;
 }
 
-/* The last key whose time is at most `time`; the first, if there is none. */
+/* Returns the last key whose time is at most `time`, or the first key. */
 static uint64_t key_at(const ebpo_scene_route *route, double time)
 {
     uint64_t low = 0, high = route->count;
@@ -86,7 +85,7 @@ static uint64_t key_at(const ebpo_scene_route *route, double time)
     return low;
 }
 
-/* At even speed along the shorter arc: halved until chord and arc are one. */
+/* Interpolates at even speed along the shorter arc: halved until chord and arc are equal. */
 static void turn_between(const double from[4], const double to[4], double u, double out[4])
 {
     double a[4], b[4];
@@ -151,8 +150,8 @@ double ebpo_scene_route_next(const ebpo_scene_route *route, double from, double 
     return n + 1 < route->count ? fmin(to, route->keys[n + 1].time) : to;
 }
 
-/* An upper bound of the angle by which a rotation turns, in radians: twice that of quaternions, of
- * which asin's series is summed. */
+/* Returns an upper bound of the angle of a rotation, in radians: twice that of quaternions, from
+ * the series of asin. */
 static double angle_between(const double a[4], const double b[4])
 {
     double less[4], more[4];
@@ -169,7 +168,7 @@ static double angle_between(const double a[4], const double b[4])
         term *= square * (2 * n - 1) / (2 * n);
         sum += term / (2 * n + 1);
     }
-    return 4 * (sum + term) * (1 + slack); /* what is left is below its first term / (1 - 1/2) */
+    return 4 * (sum + term) * (1 + slack); /* the rest is below its first term / (1 - 1/2) */
 }
 
 double ebpo_scene_length_above(const double way[3])
@@ -208,7 +207,7 @@ ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from
     };
 }
 
-/* A pose on the way from one time to another. */
+/* A pose between two times. */
 typedef struct growing {
     double scale, grown, most, size;
 } growing;

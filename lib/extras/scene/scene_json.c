@@ -2,9 +2,9 @@
  * the CSV files of poses that routes name.
  *
  * A scene file is untrusted input: each member is checked for its type and range, names must be
- * unique, and other files may be named only as the options allow (scene_make.c). A file of poses
- * has a first line that names its columns time, x, y, z, qx, qy, qz, qw and scale in any order;
- * the bytes of all such files are limited. Numbers are read in the C locale.
+ * unique, and other files may be named only as the options allow (scene_make.c). The first line of
+ * a file of poses names its columns time, x, y, z, qx, qy, qz, qw and scale in any order; the bytes
+ * of all such files are limited. Numbers are read in the C locale.
  *
  * Source: format-spec/scene.md. */
 #include "core/strict_fp.h"
@@ -21,7 +21,7 @@
 #include "geometry/pose.h"
 #include "io/file_source.h"
 
-enum { COLUMNS = 9, NEEDED = 8, FIELDS_MOST = 64 };
+enum { COLUMNS = 9, NEEDED = 8, FIELDS_MAX = 64 };
 static const char *const columns[COLUMNS] = {
     "time", "x", "y", "z", "qx", "qy", "qz", "qw", "scale"
 };
@@ -29,7 +29,7 @@ static const char *const columns[COLUMNS] = {
 typedef struct lines {
     const char *at, *end, *name;
     uint64_t line;
-    int field[COLUMNS]; /* where each column stands; -1: not there */
+    int field[COLUMNS]; /* index of each column; -1: missing */
     int fields;
     locale_t c_locale;
 } lines;
@@ -48,7 +48,7 @@ static csv_text csv_trimmed(const char *from, const char *to)
     return (csv_text){ from, (size_t)(to - from) };
 }
 
-/* The next line that is not empty. */
+/* Reads the next line that is not empty. */
 static bool next_line(lines *l, csv_text *out)
 {
     while (l->at < l->end) {
@@ -63,8 +63,8 @@ static bool next_line(lines *l, csv_text *out)
     return false;
 }
 
-/* Commas or semicolons part fields; -1: too many. */
-static int csv_split(csv_text line, csv_text field[FIELDS_MOST])
+/* Splits fields at commas or semicolons; -1: too many. */
+static int csv_split(csv_text line, csv_text field[FIELDS_MAX])
 {
     int count = 0;
     const char *at = line.at, *end = line.at + line.size;
@@ -72,7 +72,7 @@ static int csv_split(csv_text line, csv_text field[FIELDS_MOST])
         const char *stop = at;
         while (stop < end && *stop != ',' && *stop != ';')
             stop++;
-        if (count == FIELDS_MOST)
+        if (count == FIELDS_MAX)
             return -1;
         field[count++] = csv_trimmed(at, stop);
         if (stop == end)
@@ -89,7 +89,7 @@ static ebpo_status csv_bad(const lines *l, const char *what, ebpo_error *error)
 
 static ebpo_status read_header(lines *l, ebpo_error *error)
 {
-    csv_text line, field[FIELDS_MOST];
+    csv_text line, field[FIELDS_MAX];
     for (int k = 0; k < COLUMNS; k++)
         l->field[k] = -1;
     if (!next_line(l, &line))
@@ -101,25 +101,27 @@ static ebpo_status read_header(lines *l, ebpo_error *error)
                                memcmp(columns[k], field[i].at, field[i].size) != 0))
             k++;
         if (k == COLUMNS || l->field[k] >= 0)
-            return csv_bad(l, "each column is one of time, x, y, z, qx, qy, qz, qw, scale", error);
+            return csv_bad(l, "each column must be one of time, x, y, z, qx, qy, qz, qw, scale",
+                           error);
         l->field[k] = i;
     }
     for (int k = 0; k < NEEDED; k++)
         if (l->field[k] < 0)
-            return csv_bad(l, "the first line names columns time, x, y, z, qx, qy, qz, qw", error);
+            return csv_bad(l, "the first line must name columns time, x, y, z, qx, qy, qz, qw",
+                           error);
     return EBPO_OK;
 }
 
 static ebpo_status read_row(lines *l, csv_text line, ebpo_scene_route *route, ebpo_error *error)
 {
-    csv_text field[FIELDS_MOST];
+    csv_text field[FIELDS_MAX];
     double v[COLUMNS] = { [8] = 1 };
     if (csv_split(line, field) != l->fields)
-        return csv_bad(l, "there are not as many numbers as columns", error);
+        return csv_bad(l, "the numbers are not as many as the columns", error);
     for (int k = 0; k < COLUMNS; k++)
         if (l->field[k] >= 0 &&
             !ebpo_number_double(&v[k], field[l->field[k]].at, field[l->field[k]].size, l->c_locale))
-            return csv_bad(l, "this is not a number in each column", error);
+            return csv_bad(l, "expected a number in every column", error);
     ebpo_route_key key = {
         v[0],
         { v[4], v[5], v[6], v[7] },
@@ -176,7 +178,7 @@ static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint
     ebpo_status status = ebpo_whole_file_open(&file, path, error);
     if (status == EBPO_OK && file.size > *left)
         status = ebpo_fail_file(error, EBPO_E_LIMIT, path,
-                                "files of poses have more bytes than the limit that was given");
+                                "files of poses have more bytes than the given limit");
     if (status == EBPO_OK)
         status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
     if (status == EBPO_OK)
@@ -217,7 +219,7 @@ static ebpo_status pose_members(ebpo_json_reader *r, const json_t *value, read_p
     return status;
 }
 
-/* As a key, whose quaternion has a length of 1. */
+/* Converts a pose to a key, whose quaternion has a length of 1. */
 static ebpo_status key_of(ebpo_json_reader *r, const read_pose *p, double time,
                           ebpo_scene_route *route)
 {
@@ -236,7 +238,7 @@ static ebpo_status key_of(ebpo_json_reader *r, const read_pose *p, double time,
     return ebpo_json_judge(r, ebpo_scene_add_key(route, &key, &why), &why);
 }
 
-/* *out stays where the member is missing. */
+/* Reads a pose; *out stays unchanged when the member is missing. */
 static ebpo_status json_read_pose(ebpo_json_reader *r, const json_t *object, const char *key,
                                   ebpo_pose *out)
 {
@@ -254,7 +256,7 @@ static ebpo_status json_read_pose(ebpo_json_reader *r, const json_t *object, con
         free(alone.keys);
     }
     ebpo_json_leave(r);
-    *out = p.pose; /* of a matrix: judged with the instance */
+    *out = p.pose; /* from a matrix: checked with the instance */
     return status;
 }
 
@@ -337,7 +339,7 @@ static ebpo_status read_between(ebpo_json_reader *r, const json_t *value)
                : ebpo_json_bad_at(r, "between", "is neither even nor jump");
 }
 
-/* For ebpo_json_each_member. */
+/* Reads a route, for ebpo_json_each_member. */
 static ebpo_status json_read_route(ebpo_json_reader *r, const char *name, const json_t *value)
 {
     static const char *const known[] = { "keys", "poses", "begin", "step", "csv", "between", NULL };
@@ -353,7 +355,7 @@ static ebpo_status json_read_route(ebpo_json_reader *r, const char *name, const 
     bool keys = json_object_get(value, "keys"), poses = json_object_get(value, "poses"),
          csv = json_object_get(value, "csv");
     if (keys + poses + csv != 1)
-        return ebpo_json_bad(r, "has not one of keys, poses and csv");
+        return ebpo_json_bad(r, "must have exactly one of keys, poses and csv");
     if (!poses && (json_object_get(value, "begin") || json_object_get(value, "step")))
         return ebpo_json_bad(r, "begin and step are for poses");
     status = keys    ? ebpo_json_each_item(r, value, "keys", read_key)
@@ -440,7 +442,7 @@ static ebpo_status read_model(ebpo_json_reader *r, const char *name, const json_
 
 /* --- instances --- */
 
-/* The number of what `key` names; *number stays where it is missing. */
+/* Returns the number of the member that `key` names; *number stays unchanged when it is missing. */
 static ebpo_status json_find(ebpo_json_reader *r, const json_t *object, const char *key,
                              const char *kind, bool needed, uint64_t *number)
 {
@@ -505,7 +507,7 @@ static ebpo_status check_camera(ebpo_json_reader *r, const ebpo_scene_camera *c,
         cross = fmax(cross, fabs(see[u] * c->up[v] - see[v] * c->up[u]));
     }
     if (!(cross > 0 && cross < INFINITY))
-        return ebpo_json_bad(r, "target is not beside eye, or up points to it");
+        return ebpo_json_bad(r, "target is equal to eye, or up points to it");
     if (!(c->fov > 0 && c->fov < 180))
         return ebpo_json_bad_at(r, "fov", "is not between 0 and 180 degrees");
     for (int k = 0; k < 2; k++)
@@ -551,7 +553,7 @@ static ebpo_status read_camera(ebpo_json_reader *r, const char *key, const json_
 
 /* --- rules --- */
 
-/* An array of two selectors. */
+/* Reads an array of two selectors. */
 static ebpo_status read_two(ebpo_json_reader *r, const json_t *two, uint64_t set[2])
 {
     if (!json_is_array(two) || json_array_size(two) != 2)
@@ -562,7 +564,7 @@ static ebpo_status read_two(ebpo_json_reader *r, const json_t *two, uint64_t set
         if (set[i] == EBPO_SCENE_NONE) {
             ebpo_json_enter(r, NULL, i);
             ebpo_status status =
-                ebpo_json_bad(r, "is no instance, layer:NAME, group:NAME or * of this scene");
+                ebpo_json_bad(r, "is not an instance, layer:NAME, group:NAME or * of this scene");
             ebpo_json_leave(r);
             return status;
         }
@@ -598,7 +600,7 @@ static ebpo_status read_clearance(ebpo_json_reader *r, const char *key, const js
                              : status;
 }
 
-/* --- all of it --- */
+/* --- the scene --- */
 
 static ebpo_status check_version(ebpo_json_reader *r, const json_t *root)
 {
@@ -661,7 +663,7 @@ ebpo_status ebpo_scene_too_long(const char *name, const ebpo_scene_options *opti
                                 ebpo_error *error)
 {
     return ebpo_fail_file(error, EBPO_E_LIMIT, name, "has more than %llu bytes",
-                          (unsigned long long)options->most_bytes);
+                          (unsigned long long)options->max_bytes);
 }
 
 ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *text, size_t size, const char *name,
@@ -669,12 +671,12 @@ ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *text, size_t siz
 {
     json_error_t parsed;
     ebpo_error why = EBPO_ERROR_INIT;
-    if (size > options->most_bytes)
+    if (size > options->max_bytes)
         return ebpo_scene_too_long(name, options, error);
     const char *foreign = ebpo_foreign_bytes((const uint8_t *)text, size);
     if (foreign)
         return ebpo_fail_file(error, EBPO_E_FORMAT, name, "%s", foreign);
-    if (ebpo_scene_text_fits(text, size, options->most_values, &why) != EBPO_OK)
+    if (ebpo_scene_text_fits(text, size, options->max_values, &why) != EBPO_OK)
         return ebpo_fail_file(error, EBPO_E_LIMIT, name, "%s", why.message);
     json_t *root =
         json_loadb(text, size, JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, &parsed);
@@ -684,7 +686,7 @@ ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *text, size_t siz
                            .text = text,
                            .name = name,
                            .options = options,
-                           .pose_bytes = options->most_pose_bytes,
+                           .pose_bytes = options->max_pose_bytes,
                            .error = error };
     ebpo_status status = read_root(&r, root);
     if (status == EBPO_OK)

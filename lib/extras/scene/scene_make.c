@@ -1,12 +1,12 @@
 /* A scene as an object: its names, the files that it may name, adding its members, and returning
  * them.
  *
- * Each kind of member has its own names; layers, groups and instances share one space of
- * selectors, which rules use. A selector is a set: every instance belongs to the set of all, to
- * its own, to that of its layer and to those of its groups.
+ * Each kind of member has separate names; layers, groups and instances share one space of
+ * selectors, which rules use. A selector is a set: every instance belongs to the set of all, to its
+ * own, to that of its layer and to those of its groups.
  *
- * A scene that is untrusted input may name files only below its own folder, unless the options
- * allow others; symbolic links that lead out of the folder are refused. */
+ * A scene that is untrusted input may name only files below its own folder, unless the options
+ * allow others; symbolic links that lead out of the folder are rejected. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -22,38 +22,39 @@
 #include "extras/scene/scene_parts.h"
 #include "geometry/pose.h"
 
-enum { NAME_MOST = 255, KIND_MOST = 8 };
+enum { NAME_MAX = 255, KIND_MAX = 8 };
 
 static bool is_plain(const char *name)
 {
     for (const unsigned char *c = (const unsigned char *)name; *c; c++)
         if (*c < 0x20 || *c == 0x7f)
             return false;
-    json_t *text = json_string(name); /* NULL where it is not UTF-8 */
+    json_t *text = json_string(name); /* NULL if it is not UTF-8 */
     json_decref(text);
     return text != NULL;
 }
 
-/* 1 to 255 bytes of UTF-8 without control characters, not beginning as selectors do. */
+/* Checks a name: 1 to 255 bytes of UTF-8 without control characters, not beginning as selectors do.
+ */
 static ebpo_status check_name(const char *name, const char *what, ebpo_error *error)
 {
-    size_t size = name ? strnlen(name, NAME_MOST + 1) : 0;
-    if (size == 0 || size > NAME_MOST || !is_plain(name))
+    size_t size = name ? strnlen(name, NAME_MAX + 1) : 0;
+    if (size == 0 || size > NAME_MAX || !is_plain(name))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "a name of %s is 1 to %d bytes of UTF-8 without control characters", what,
-                         NAME_MOST);
+                         NAME_MAX);
     if (strcmp(name, "*") == 0 || strncmp(name, "layer:", 6) == 0 ||
         strncmp(name, "group:", 6) == 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "'%.80s' cannot be a name of %s: '*', 'layer:' and 'group:' stand for "
-                         "many",
+                         "'%.80s' cannot be a name of %s: '*', 'layer:' and 'group:' are "
+                         "selectors",
                          name, what);
     return EBPO_OK;
 }
 
-static void names_join(char *out, size_t room, const char *kind, const char *name)
+static void names_join(char *out, size_t space, const char *kind, const char *name)
 {
-    size_t begin = strlen(kind), size = strnlen(name, room - begin - 1);
+    size_t begin = strlen(kind), size = strnlen(name, space - begin - 1);
     memcpy(out, kind, begin);
     memcpy(out + begin, name, size);
     out[begin + size] = 0;
@@ -61,17 +62,17 @@ static void names_join(char *out, size_t room, const char *kind, const char *nam
 
 uint64_t ebpo_scene_find_name(const ebpo_scene *scene, const char *kind, const char *name)
 {
-    char key[KIND_MOST + NAME_MOST + 2];
+    char key[KIND_MAX + NAME_MAX + 2];
     names_join(key, sizeof key, kind, name);
     const json_t *number = json_object_get(scene->names, key);
     return number ? (uint64_t)json_integer_value(number) : EBPO_SCENE_NONE;
 }
 
-/* Gives `kind` and `name` a number. EBPO_E_ARGUMENT: there is one already. */
+/* Assigns a number to `kind` and `name`. EBPO_E_ARGUMENT: the name exists already. */
 static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *name, uint64_t number,
                             ebpo_error *error)
 {
-    char key[KIND_MOST + NAME_MOST + 2];
+    char key[KIND_MAX + NAME_MAX + 2];
     names_join(key, sizeof key, kind, name);
     if (json_object_get(scene->names, key))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "there is another '%.80s'", name);
@@ -80,7 +81,7 @@ static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *nam
     return EBPO_OK;
 }
 
-/* A new set; *set may be NULL. */
+/* Adds a set; *set may be NULL. */
 static ebpo_status add_set(ebpo_scene *scene, const char *kind, const char *name, uint64_t *set,
                            ebpo_error *error)
 {
@@ -115,13 +116,14 @@ const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *
                                     bool has_digest)
 {
     if (!*path)
-        return "is no path";
+        return "is not a path";
     if (ebpo_is_url(path) && !options->remote)
-        return "is on a server, which has to be allowed (ebpo scene --remote)";
+        return "is on a server, which must be allowed (ebpo scene --remote)";
     if (ebpo_is_url(path) && !has_digest)
         return "is on a server, and needs its content_sha256 here";
     if (!ebpo_is_url(path) && !options->outside && (*path == '/' || goes_up(path)))
-        return "is outside the scene's folder, which has to be allowed (ebpo scene --outside)";
+        return "is outside the scene's folder, which must be allowed (ebpo scene "
+               "--allow-outside)";
     return NULL;
 }
 
@@ -144,15 +146,15 @@ static bool is_below(const char *folder, const char *path)
     return strncmp(folder, path, size) == 0 && path[size] == '/';
 }
 
-/* Names of files without links. */
+/* Checks names of files without links. */
 static ebpo_status check_real(const char *folder, const char *real, const char *path,
                               ebpo_error *error)
 {
     if (is_below(folder, real))
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_FORMAT, path,
-                          "is by a link the file %.160s, outside the scene's folder %.160s, which "
-                          "has to be allowed (ebpo scene --outside)",
+                          "is by a link the file %.160s, outside the scene's folder %.160s, "
+                          "which must be allowed (ebpo scene --allow-outside)",
                           real, folder);
 }
 
@@ -253,8 +255,8 @@ void ebpo_scene_free(ebpo_scene *scene)
     free(scene);
 }
 
-/* Makes room for one more, sets *number to its number. */
-#define ROOM(scene, list, number, error)                                             \
+/* Ensures capacity for one more item, and sets *number to its index. */
+#define SPACE(scene, list, number, error)                                            \
     (*(number) = (scene)->list##_count,                                              \
      ebpo_grow(&(scene)->list, &(scene)->list##_capacity, (scene)->list##_count + 1, \
                sizeof *(scene)->list)                                                \
@@ -267,7 +269,7 @@ ebpo_status ebpo_scene_add_model(ebpo_scene *scene, const char *name, const char
     uint64_t n;
     ebpo_status status = check_name(name, "a model", error);
     if (status == EBPO_OK)
-        status = ROOM(scene, models, &n, error);
+        status = SPACE(scene, models, &n, error);
     if (status == EBPO_OK)
         status = put_name(scene, EBPO_SCENE_MODEL, name, n, error);
     if (status != EBPO_OK)
@@ -278,7 +280,7 @@ ebpo_status ebpo_scene_add_model(ebpo_scene *scene, const char *name, const char
                                    .file = EBPO_SCENE_NONE };
     if (digest)
         memcpy(m->digest, digest, sizeof m->digest);
-    scene->models_count++; /* freed with the scene, whole or not */
+    scene->models_count++; /* freed with the scene, complete or not */
     if (!m->name || !m->path)
         return ebpo_fail_memory(error, strlen(name) + strlen(path));
     if (number)
@@ -304,7 +306,7 @@ static ebpo_status check_instance(const ebpo_scene *scene, const ebpo_scene_inst
         return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no layer %llu",
                          (unsigned long long)i->layer);
     if (i->fixed && i->route != EBPO_SCENE_NONE)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "what is fixed has no route");
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "a fixed instance has no route");
     return ebpo_posing_make(&posing, &i->pose, nowhere, error);
 }
 
@@ -327,7 +329,7 @@ ebpo_status ebpo_scene_add_instance(ebpo_scene *scene, const ebpo_scene_instance
     if (status == EBPO_OK)
         status = check_instance(scene, &as, error);
     if (status == EBPO_OK)
-        status = ROOM(scene, instances, &n, error);
+        status = SPACE(scene, instances, &n, error);
     if (status == EBPO_OK)
         status = add_set(scene, "", as.name, &set, error);
     if (status != EBPO_OK)
@@ -359,7 +361,7 @@ ebpo_status ebpo_scene_add_layer(ebpo_scene *scene, const char *name, ebpo_error
     uint64_t n, set;
     ebpo_status status = check_name(name, "a layer", error);
     if (status == EBPO_OK)
-        status = ROOM(scene, layers, &n, error);
+        status = SPACE(scene, layers, &n, error);
     if (status == EBPO_OK)
         status = add_set(scene, "layer:", name, &set, error);
     if (status != EBPO_OK)
@@ -374,7 +376,7 @@ ebpo_status ebpo_scene_add_group(ebpo_scene *scene, const char *name, ebpo_error
     uint64_t n, set;
     ebpo_status status = check_name(name, "a group", error);
     if (status == EBPO_OK)
-        status = ROOM(scene, groups, &n, error);
+        status = SPACE(scene, groups, &n, error);
     if (status == EBPO_OK)
         status = add_set(scene, "group:", name, &set, error);
     if (status != EBPO_OK)
@@ -389,7 +391,7 @@ ebpo_status ebpo_scene_add_route(ebpo_scene *scene, const char *name, uint64_t *
 {
     ebpo_status status = check_name(name, "a route", error);
     if (status == EBPO_OK)
-        status = ROOM(scene, routes, number, error);
+        status = SPACE(scene, routes, number, error);
     if (status == EBPO_OK)
         status = put_name(scene, EBPO_SCENE_ROUTE, name, *number, error);
     if (status != EBPO_OK)
@@ -404,7 +406,7 @@ ebpo_status ebpo_scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *ca
     uint64_t n;
     ebpo_status status = check_name(camera->name, "a camera", error);
     if (status == EBPO_OK)
-        status = ROOM(scene, cameras, &n, error);
+        status = SPACE(scene, cameras, &n, error);
     if (status == EBPO_OK)
         status = put_name(scene, EBPO_SCENE_CAMERA, camera->name, n, error);
     if (status != EBPO_OK)
@@ -420,7 +422,7 @@ ebpo_status ebpo_scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b, doubl
                                 ebpo_error *error)
 {
     uint64_t n;
-    ebpo_status status = ROOM(scene, rules, &n, error);
+    ebpo_status status = SPACE(scene, rules, &n, error);
     if (status != EBPO_OK)
         return status;
     scene->rules[scene->rules_count++] =
@@ -501,7 +503,7 @@ const char *ebpo_scene_get_group(const ebpo_scene *scene, uint64_t group)
     return group < scene->groups_count ? scene->sets[scene->groups[group]] : NULL;
 }
 
-/* EBPO_SCENE_NONE: the set is no group's. */
+/* Returns the group of a set; EBPO_SCENE_NONE: the set belongs to no group. */
 static uint64_t group_with(const ebpo_scene *scene, uint64_t set)
 {
     uint64_t low = 0, high = scene->groups_count;

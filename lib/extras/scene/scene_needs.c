@@ -1,12 +1,12 @@
-/* Finds which part of each model's file a scene can call for in an interval of time: a box for
+/* Finds the part of each model's file that a scene needs in an interval of time: a box for
  * collisions and for inside tests, and the last level for views.
  *
- * Boxes are in the model's own coordinates, and hold all that another instance comes near, over
- * steps of time so short that no instance moves far. They are rounded outwards, so that a subset
- * by them answers the same queries as the whole file.
+ * Boxes are in the model's own coordinates, and hold all parts that another instance comes near,
+ * over steps of time so short that no instance moves far. They are rounded outwards, so that a
+ * subset by them returns the same results as the whole file.
  *
- * A view needs the levels whose cells are larger than a pixel: a node's envelope and what it
- * stands for are both in its cell, so that finer levels cannot be told apart by a camera. */
+ * A view needs the levels whose cells are larger than a pixel: a node's envelope and its content
+ * are both in its cell, so a camera cannot distinguish finer levels. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,7 +22,7 @@
 
 enum { HALVINGS = 12 };
 
-/* One instance as another one comes near it. */
+/* One instance that another one approaches. */
 typedef struct nearing {
     ebpo_scene_needs *needs;
     const ebpo_scene *scene;
@@ -42,8 +42,8 @@ static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instan
     return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
 }
 
-/* How far points where the other one is are from what moves along the route, at most, in its
- * unit. */
+/* Bounds the distance of points near the other instance from the origin of the route, in its unit.
+ */
 static ebpo_status reach_of_other(const nearing *n, const ebpo_scene_route *route, double from,
                                   double to, double *reach)
 {
@@ -62,8 +62,8 @@ static ebpo_status reach_of_other(const nearing *n, const ebpo_scene_route *rout
     return status;
 }
 
-/* How far the other one goes at most, seen from this one, in the world's unit; no key is between
- * the times. */
+/* Bounds the motion of the other instance relative to this one, in the world's unit; no key is
+ * between the times. */
 static ebpo_status motion_seen(const nearing *n, double from, double to, double *out)
 {
     const ebpo_scene_route *route = route_of(n->scene, n->of);
@@ -77,7 +77,8 @@ static ebpo_status motion_seen(const nearing *n, double from, double to, double 
     return status;
 }
 
-/* What the other one may come near between two times, within the model's box; false: nothing. */
+/* Returns the part of the model's box that the other instance may come near between two times;
+ * false: nothing. */
 static ebpo_status near_box(const nearing *n, double from, double to, double motion,
                             ebpo_scene_space *out, bool *any)
 {
@@ -88,13 +89,13 @@ static ebpo_status near_box(const nearing *n, double from, double to, double mot
         status = ebpo_scene_seen_from(n->scene, n->of, n->other, to, &later, n->needs->error);
     if (status != EBPO_OK)
         return status;
-    /* beyond what rounding may do between these times: also where nothing else is added */
+    /* above the effect of rounding between these times: also where nothing else is added */
     double grow = (n->clearance + n->margin + motion) / fmin(at.unit, later.unit) * (1 + 0x1p-40) +
                   2 * fmax(at.rounding, later.rounding);
     *any = true;
     for (int k = 0; k < 3; k++) {
         double low = at.box.min[k] - grow, high = at.box.max[k] + grow;
-        /* what overflowed may be anywhere */
+        /* after an overflow it may be anywhere */
         out->min[k] = low > n->need->whole.min[k] ? low : n->need->whole.min[k];
         out->max[k] = high < n->need->whole.max[k] ? high : n->need->whole.max[k];
         *any = *any && out->min[k] <= out->max[k];
@@ -139,7 +140,8 @@ static ebpo_status come_near(const nearing *n, double from, double to, int halvi
     return status == EBPO_OK ? come_near(n, middle, to, halvings - 1) : status;
 }
 
-/* From key to key of either; a key itself begins the next part, as routes may jump there. */
+/* Goes from key to key of either; a key itself begins the next part, because routes may jump there.
+ */
 static ebpo_status come_near_along(const nearing *n)
 {
     const ebpo_scene_pair pair = { n->of, n->other, 0 };
@@ -153,28 +155,28 @@ static ebpo_status come_near_along(const nearing *n)
     return status == EBPO_OK ? come_near(n, to, to, HALVINGS) : status;
 }
 
-/* Longest side of an instance's box in the world. */
+/* Returns the longest side of an instance's box in the world. */
 static double size_of(const ebpo_scene *scene, uint64_t instance, double time)
 {
     const ebpo_scene_model_entry *m = &scene->models[scene->instances[instance].as.model];
     ebpo_pose pose = EBPO_POSE_INIT;
     double size = 0;
     if (ebpo_scene_pose(scene, instance, time, &pose, NULL) != EBPO_OK)
-        return 0; /* then it is told when the pose is asked for */
+        return 0; /* the error is reported when the pose is computed */
     for (int k = 0; k < 3; k++)
         size = fmax(size, m->max[k] - m->min[k]);
     return size * pose.scale;
 }
 
-/* Usual for a pair; a point has no size of its own. */
-static double usual_margin(const ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
+/* Returns the default margin of a pair; a point has no size. */
+static double default_margin(const ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     double a = size_of(needs->scene, pair->a, needs->from);
     double b = size_of(needs->scene, pair->b, needs->from);
     return (fmin(a, b) > 0 ? fmin(a, b) : fmax(a, b)) / 32;
 }
 
-/* A face anywhere may be around the other one. */
+/* Adds all faces, because any of them may be around the other instance. */
 static void add_whole(ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     for (int i = 0; i < 2; i++) {
@@ -192,7 +194,7 @@ static ebpo_status add_pair(ebpo_scene_needs *needs, const ebpo_scene_pair *pair
         return EBPO_OK;
     }
     bool inside = needs->how.purpose == EBPO_SCENE_FOR_INSIDE;
-    double margin = needs->how.margin > 0 ? needs->how.margin : usual_margin(needs, pair);
+    double margin = needs->how.margin > 0 ? needs->how.margin : default_margin(needs, pair);
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
         nearing n = { .needs = needs,
@@ -223,7 +225,7 @@ ebpo_status ebpo_scene_add_near(ebpo_scene_needs *needs)
     return status;
 }
 
-/* Two models of one file have one box. */
+/* Initialises files; two models of one file have one box. */
 static void begin_files(ebpo_scene_needs *needs)
 {
     for (uint64_t i = 0; i < needs->scene->models_count; i++) {
@@ -276,8 +278,8 @@ ebpo_subset_options ebpo_scene_need_options(const ebpo_scene_needs *needs, uint6
     return o;
 }
 
-ebpo_status ebpo_scene_tell_need(const ebpo_scene_needs *needs, uint64_t model,
-                                 ebpo_scene_need *out)
+ebpo_status ebpo_scene_report_need(const ebpo_scene_needs *needs, uint64_t model,
+                                   ebpo_scene_need *out)
 {
     uint64_t number = needs->scene->models[model].file;
     const ebpo_scene_file_need *need = &needs->files[number];
@@ -304,7 +306,7 @@ ebpo_status ebpo_scene_tell_need(const ebpo_scene_needs *needs, uint64_t model,
 
 /* --- views --- */
 
-enum { STEPS = 16 }; /* of a camera's way from key to key */
+enum { STEPS = 16 }; /* parts of a camera's way from key to key */
 
 typedef struct seeing {
     ebpo_scene_needs *needs;
@@ -312,7 +314,7 @@ typedef struct seeing {
     double pixel; /* width of a pixel at a distance of 1 */
 } seeing;
 
-/* Where the eye is between two times that no key of the camera's route is between. */
+/* Returns a box of the eye between two times without a key of the camera's route between them. */
 static void eye_box(const seeing *s, double from, double to, ebpo_scene_space *out)
 {
     const ebpo_scene_camera *c = s->camera;
@@ -337,7 +339,7 @@ static void eye_box(const seeing *s, double from, double to, ebpo_scene_space *o
     }
 }
 
-/* Of an instance, over a part of the time; the greatest scale that it has there. */
+/* Returns the least distance of an instance over a part of the time, and its greatest scale. */
 static ebpo_status distance_between(const seeing *s, uint64_t instance, double from, double to,
                                     double *distance, double *scale)
 {
@@ -355,7 +357,7 @@ static ebpo_status distance_between(const seeing *s, uint64_t instance, double f
     return EBPO_OK;
 }
 
-/* A static camera sees nothing that is behind it. */
+/* Returns true if a box is behind a static camera, which cannot see it. */
 static bool is_behind(const seeing *s, const ebpo_scene_space *box)
 {
     const ebpo_scene_camera *c = s->camera;
@@ -370,7 +372,7 @@ static bool is_behind(const seeing *s, const ebpo_scene_space *box)
     return c->route == EBPO_SCENE_NONE && most < 0;
 }
 
-/* The first level whose cells are at most so large; -1: the last one is needed. */
+/* Returns the first level whose cells are at most of this size; -1: the last one is needed. */
 static int level_for(const ebpo_info *info, double size)
 {
     double cell = ebpo_scene_length_above(info->box_size);
@@ -409,7 +411,7 @@ static ebpo_status see_from(const seeing *s, double from, double to)
     return status;
 }
 
-/* From key to key of the camera's route, in steps. */
+/* Goes from key to key of the camera's route, in steps. */
 static ebpo_status see_along(const seeing *s)
 {
     const ebpo_scene_needs *n = s->needs;

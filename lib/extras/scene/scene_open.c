@@ -1,9 +1,9 @@
 /* Opens scene files, and loads the models that they name.
  *
  * Models of the same path share one open file. Where a scene file states a digest, the
- * content_sha256 of the model's file must be equal. Loading sets the box of each model, on which
- * bounds of motion rest; until then a scene has no boxes. A model for queries is made when it is
- * first asked for. */
+ * content_sha256 of the model's file must be equal. Loading sets the box of each model, which
+ * bounds of motion use; until then a scene has no boxes. A model for queries is made when it is
+ * first needed. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -25,16 +25,16 @@ static ebpo_status take_options(ebpo_scene_options *own, const ebpo_scene_option
 {
     *own = (ebpo_scene_options)EBPO_SCENE_OPTIONS_INIT;
     ebpo_status status = EBPO_TAKE(ebpo_scene_options, own, options, error);
-    if (!own->most_bytes)
-        own->most_bytes = UINT64_C(64) << 20;
-    if (!own->most_pose_bytes)
-        own->most_pose_bytes = UINT64_C(256) << 20;
-    if (!own->most_values)
-        own->most_values = 4000000;
+    if (!own->max_bytes)
+        own->max_bytes = UINT64_C(64) << 20;
+    if (!own->max_pose_bytes)
+        own->max_pose_bytes = UINT64_C(256) << 20;
+    if (!own->max_values)
+        own->max_values = 4000000;
     return status;
 }
 
-/* For packing. */
+/* Keeps the text for packing. */
 static ebpo_status keep_text(ebpo_scene *scene, const char *text, size_t size, ebpo_error *error)
 {
     scene->text = malloc(size + 1);
@@ -47,7 +47,7 @@ static ebpo_status keep_text(ebpo_scene *scene, const char *text, size_t size, e
     return EBPO_OK;
 }
 
-/* `folder` is taken over; NULL: there was no memory. */
+/* Takes ownership of `folder`; NULL: memory was short. */
 static ebpo_status open_parse(const char *text, size_t size, const char *name, char *folder,
                               const ebpo_scene_options *options, ebpo_scene **out,
                               ebpo_error *error)
@@ -81,7 +81,7 @@ static char *folder_with_slash(const char *folder)
     char *out = malloc(size + 2);
     if (!out)
         return NULL;
-    if (size) /* memcpy wants no NULL */
+    if (size) /* memcpy requires non-NULL pointers */
         memcpy(out, folder, size);
     if (size && out[size - 1] != '/')
         out[size++] = '/';
@@ -111,7 +111,7 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
     ebpo_status status = take_options(&own, options, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_open(&file, path, error);
-    if (status == EBPO_OK && file.size > own.most_bytes)
+    if (status == EBPO_OK && file.size > own.max_bytes)
         status = ebpo_scene_too_long(path, &own, error);
     if (status == EBPO_OK)
         status = ebpo_whole_file_load(&file, NULL, 1, NULL, path, error);
@@ -130,7 +130,7 @@ ebpo_status ebpo_scene_open(const char *path, const ebpo_scene_options *options,
 
 /* --- models --- */
 
-static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t most_expansion,
+static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t max_expansion,
                              uint64_t *number, ebpo_error *error)
 {
     uint64_t n = 0;
@@ -143,7 +143,7 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t most_
         return ebpo_fail_memory(error, (n + 1) * sizeof *scene->files);
     ebpo_scene_file_entry f = { .path = strdup(path) };
     ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
-    how.most_expansion = most_expansion;
+    how.max_expansion = max_expansion;
     ebpo_status status =
         f.path ? ebpo_open_with(path, &how, &f.file, error) : ebpo_fail_memory(error, 1);
     if (status != EBPO_OK) {
@@ -154,7 +154,8 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t most_
     return EBPO_OK;
 }
 
-/* Of the faces, as the file says, where its root cell allows it; else the root cell. */
+/* Sets the box of the faces, as the file states it, if it is within the root cell; else the root
+ * cell. */
 static void box_of(ebpo_scene_model_entry *m, const ebpo_info *info)
 {
     for (int k = 0; k < 3; k++) {
@@ -179,7 +180,7 @@ static ebpo_status check_digest(const ebpo_scene_model_entry *m, const ebpo_info
                           m->name);
 }
 
-static ebpo_status load_model(ebpo_scene *scene, ebpo_scene_model_entry *m, uint64_t most_expansion,
+static ebpo_status load_model(ebpo_scene *scene, ebpo_scene_model_entry *m, uint64_t max_expansion,
                               ebpo_error *error)
 {
     char *path = ebpo_scene_join_path(scene->folder, m->path);
@@ -189,7 +190,7 @@ static ebpo_status load_model(ebpo_scene *scene, ebpo_scene_model_entry *m, uint
     if (status == EBPO_OK && of_text && !scene->outside)
         status = ebpo_scene_stays_within(scene->folder, path, error);
     if (status == EBPO_OK)
-        status = open_file(scene, path, most_expansion, &number, error);
+        status = open_file(scene, path, max_expansion, &number, error);
     free(path);
     if (status != EBPO_OK)
         return status;
@@ -228,7 +229,7 @@ ebpo_status ebpo_scene_load(ebpo_scene *scene, const ebpo_load_options *options,
         status = EBPO_E_CANCELLED;
     for (uint64_t i = 0; i < scene->models_count && status == EBPO_OK; i++) {
         if (scene->models[i].file == EBPO_SCENE_NONE)
-            status = load_model(scene, &scene->models[i], own.most_expansion, error);
+            status = load_model(scene, &scene->models[i], own.max_expansion, error);
         if (status == EBPO_OK &&
             !ebpo_progress_step(&own.progress, "opening models", i + 1, scene->models_count, error))
             status = EBPO_E_CANCELLED;

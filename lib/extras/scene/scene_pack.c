@@ -1,8 +1,9 @@
-/* Plans and packs a scene: which bytes of its models are needed, and a folder that has only those.
+/* Plans and packs a scene: finds the bytes of its models that are needed, and writes a folder that
+ * has only those.
  *
  * Packing writes a subset of each file (scene_needs.c), copies the files of poses, and writes a
- * scene file like the source's with other paths and digests. The folder is written beside its
- * place and renamed when it is complete, so that it appears whole or not at all; on failure it is
+ * scene file like the original with other paths and digests. The folder is written beside its
+ * target and renamed when it is complete, so that it is created atomically; on failure it is
  * removed.
  *
  * A plan finds the same needs without writing anything. */
@@ -26,10 +27,10 @@
 #include "format/file_in.h"
 #include "io/file_source.h"
 
-/* Names in the folder: of the scene, of a file of scene->files, of a route's poses. */
+/* Names in the folder: of the scene, a file of scene->files, a route's poses. */
 #define SCENE_PACKED "packed.scene.json"
 
-/* Takes the options; the scene and its times are right. */
+/* Reads the options; the scene and its times are valid. */
 static ebpo_status scene_plan_check(ebpo_scene_needs *needs, const ebpo_plan_options *options)
 {
     const ebpo_scene *scene = needs->scene;
@@ -39,12 +40,12 @@ static ebpo_status scene_plan_check(ebpo_scene_needs *needs, const ebpo_plan_opt
     if (status != EBPO_OK)
         return status;
     if (needs->how.purpose < EBPO_SCENE_FOR_COLLIDE || needs->how.purpose > EBPO_SCENE_FOR_SOLIDS)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no purpose %d", (int)needs->how.purpose);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown purpose %d", (int)needs->how.purpose);
     if (!(needs->how.margin >= 0 && needs->how.margin < INFINITY))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "the margin %g is below 0 or no length",
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "the margin %g is below 0 or not a length",
                          needs->how.margin);
     if (!(isfinite(needs->from) && isfinite(needs->to) && needs->from <= needs->to))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no time from %g to %g", needs->from,
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%g to %g is not an interval of time", needs->from,
                          needs->to);
     for (uint64_t i = 0; i < scene->models_count; i++)
         if (scene->models[i].file == EBPO_SCENE_NONE)
@@ -53,7 +54,7 @@ static ebpo_status scene_plan_check(ebpo_scene_needs *needs, const ebpo_plan_opt
     return EBPO_OK;
 }
 
-/* Finds what is needed of each file. Free needs->files, also on failure. */
+/* Finds the needed part of each file. Free needs->files, also on failure. */
 static ebpo_status scene_plan_needs(ebpo_scene_needs *needs)
 {
     ebpo_status status = ebpo_scene_begin_needs(needs);
@@ -65,14 +66,14 @@ static ebpo_status scene_plan_needs(ebpo_scene_needs *needs)
     return status;
 }
 
-/* A need of each model; free it, also on failure. */
+/* Returns the need of each model; free it, also on failure. */
 static ebpo_status scene_plan_list(const ebpo_scene_needs *needs, ebpo_scene_need **out)
 {
     uint64_t count = needs->scene->models_count;
     ebpo_scene_need *list = ebpo_alloc(count, sizeof *list);
     ebpo_status status = list ? EBPO_OK : ebpo_fail_memory(needs->error, count * sizeof *list);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++)
-        status = ebpo_scene_tell_need(needs, i, &list[i]);
+        status = ebpo_scene_report_need(needs, i, &list[i]);
     *out = list;
     return status;
 }
@@ -111,7 +112,7 @@ static bool set_text(json_t *object, const char *key, const char *text)
     return json_object_set_new(object, key, json_string(text)) == 0;
 }
 
-/* What the scene says of its models' files. */
+/* Sets the paths and digests of models' files in the scene. */
 static ebpo_status name_files(json_t *root, const ebpo_scene *scene, const ebpo_scene_packed *files,
                               ebpo_error *error)
 {
@@ -142,7 +143,7 @@ static ebpo_status write_in(const char *folder, const char *name, const void *da
     return status;
 }
 
-/* Byte for byte: poses stay what they are. */
+/* Copies poses byte for byte, so that they do not change. */
 static ebpo_status copy_poses(const ebpo_scene *scene, const char *csv, const char *folder,
                               const char *name, ebpo_error *error)
 {
@@ -186,7 +187,7 @@ static ebpo_status copy_routes(json_t *root, const ebpo_scene *scene, const char
 static ebpo_status scene_write_packed(const ebpo_scene *scene, const ebpo_scene_packed *files,
                                       const char *folder, ebpo_error *error)
 {
-    /* it has been read once already */
+    /* it has been parsed once already */
     json_t *root = json_loadb(scene->text, scene->text_size,
                               JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, NULL);
     if (!root)
@@ -208,7 +209,7 @@ typedef struct packing {
     ebpo_scene_needs needs;
     ebpo_pack_options how;
     const char *folder;
-    char *making; /* the folder until it is whole */
+    char *making; /* name of the folder until it is complete */
     ebpo_scene_packed *files;
     ebpo_error *error;
 } packing;
@@ -231,7 +232,8 @@ static void remove_in(const char *folder, const char *name)
         unlink(path);
 }
 
-/* With all that may have been written, without asking for memory or opening anything. */
+/* Removes the folder with all files that may have been written, without allocating memory or
+ * opening anything. */
 static void remove_folder(const ebpo_scene *scene, const char *folder)
 {
     char name[40];
@@ -259,8 +261,8 @@ static ebpo_status publish_folder(packing *p)
 
 /* --- models --- */
 
-/* What is on the disk. */
-static ebpo_status look_at(packing *p, const char *path, ebpo_scene_packed *out)
+/* Reads the size and digest of the file on disk. */
+static ebpo_status inspect_file(packing *p, const char *path, ebpo_scene_packed *out)
 {
     ebpo_file *file = NULL;
     ebpo_status status = ebpo_open_own(path, &file, p->error);
@@ -300,7 +302,7 @@ static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
     out->source_bytes = ebpo_file_info(file)->file_bytes;
     memcpy(out->source_digest, ebpo_file_info(file)->content_sha256, sizeof out->source_digest);
     if (status == EBPO_OK)
-        status = look_at(p, path, out);
+        status = inspect_file(p, path, out);
     free(path);
     return status;
 }
@@ -313,7 +315,8 @@ static uint64_t sum_of_files(const packing *p)
     return sum;
 }
 
-/* Too large: each file gives way by the same share, those that nothing is asked of not at all. */
+/* Reduces a plan that is too large: each file by the same share, except files of which nothing is
+ * needed. */
 static ebpo_status pack_shrink(packing *p)
 {
     uint64_t fixed = 0, sum = sum_of_files(p), target = p->how.target_bytes;
@@ -341,7 +344,7 @@ static ebpo_status write_files(packing *p)
     return status == EBPO_OK ? pack_shrink(p) : status;
 }
 
-/* --- all of it --- */
+/* --- packing --- */
 
 static ebpo_status pack_check(packing *p, const ebpo_pack_options *options)
 {
@@ -357,11 +360,12 @@ static ebpo_status pack_check(packing *p, const ebpo_pack_options *options)
     if (!scene->text || scene->text_models != scene->models_count ||
         scene->text_instances != scene->instances_count)
         return ebpo_fail(p->error, EBPO_E_ARGUMENT,
-                         "only a scene that was read from a file, and nothing else, is packed");
+                         "only a scene that was read from a file, without additions, can be "
+                         "packed");
     return scene_plan_check(&p->needs, &plan);
 }
 
-/* Of each model. What is published may not fail any more. */
+/* Lists the packed files of models, before publishing, because nothing may fail after it. */
 static ebpo_status list_packed(const packing *p, ebpo_scene_packed **out)
 {
     const ebpo_scene *scene = p->needs.scene;
@@ -373,7 +377,7 @@ static ebpo_status list_packed(const packing *p, ebpo_scene_packed **out)
         list[i] = p->files[scene->models[i].file];
         list[i].struct_size = sizeof *list;
         list[i].model = i;
-        list[i].answers = !(list[i].max_error > 0) || p->how.purpose == EBPO_SCENE_FOR_VIEW;
+        list[i].complete = !(list[i].max_error > 0) || p->how.purpose == EBPO_SCENE_FOR_VIEW;
     }
     return EBPO_OK;
 }

@@ -1,14 +1,14 @@
-/* The broad phase of a scene: which pairs of instances may come near each other in an interval of
- * time.
+/* The broad phase of a scene: finds the pairs of instances that may come near each other in an
+ * interval of time.
  *
- * Rules say which pairs are evaluated and which clearance they keep: of several rules for a pair
- * the greatest clearance counts, and one that ignores the pair counts more than all others.
+ * Rules select the pairs and their clearances: of several rules for a pair the greatest clearance
+ * applies, and one that ignores the pair overrides all others.
  *
- * The box of an instance holds it at all times of the interval. Between keys it is made in steps
- * of little rotation, each widened by what the motion deviates from a straight line.
+ * The box of an instance holds it at all times of the interval. Between keys it is made in steps of
+ * little rotation, each widened by the deviation of the motion from a straight line.
  *
- * Sweep and prune sorts boxes along the axis on which they overlap least by chance. Pairs are
- * returned in the order of their instances. All tests err towards a pair that is not needed. */
+ * Sweep and prune sorts boxes along the axis with the least expected overlap. Pairs are returned in
+ * the order of their instances. All tests err towards an unneeded pair. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -35,7 +35,7 @@ static int compare_sets(const void *a, const void *b)
     return (*x > *y) - (*x < *y);
 }
 
-/* Ascending, each once. */
+/* Sorts sets in ascending order, each once. */
 static void sort_sets(ebpo_scene_instance_entry *i)
 {
     uint32_t kept = 0;
@@ -47,7 +47,8 @@ static void sort_sets(ebpo_scene_instance_entry *i)
     i->set_count = kept;
 }
 
-/* One rule for a pair of sets: ignored if any line says so, else the greatest clearance. */
+/* Keeps one rule for each pair of sets: ignored if any rule ignores it, else the greatest
+ * clearance. */
 void ebpo_scene_sort_rules(ebpo_scene *scene)
 {
     uint64_t kept = 0;
@@ -68,7 +69,7 @@ void ebpo_scene_sort_rules(ebpo_scene *scene)
         sort_sets(&scene->instances[i]);
 }
 
-/* Of two sets: below 0 ignored, 0 also where there is no rule. */
+/* Returns the rule of two sets: below 0 ignored, 0 also without a rule. */
 static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
 {
     ebpo_scene_rule_entry wanted = { a < b ? a : b, a < b ? b : a, 0 };
@@ -77,7 +78,7 @@ static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
     return rule ? rule->clearance : 0;
 }
 
-/* What is said of a pair so far; false: it is ignored. */
+/* Applies a rule to a pair; false: it is ignored. */
 static bool take_rule(double rule, double *clearance)
 {
     *clearance = fmax(*clearance, rule);
@@ -119,7 +120,7 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
     const ebpo_scene_instance_entry *x = &scene->instances[a], *y = &scene->instances[b];
     if (x->as.fixed && y->as.fixed)
         return false;
-    /* each group with each of the other would take hours where both have 100,000 */
+    /* all pairs of groups would take hours where both instances have 100,000 */
     bool few = scene->rules_count < (uint64_t)x->set_count * y->set_count;
     return (few ? by_rules : by_sets)(scene, x, y, clearance);
 }
@@ -127,7 +128,7 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
 /* --- poses, boxes and motion --- */
 
 static const double slack = 0x1p-44;
-/* Of a turn, in radians, that is taken as one step of a box. */
+/* Rotation, in radians, in one step of a box. */
 static const double step_turn = 0.125;
 
 static const ebpo_scene_route *route_of(const ebpo_scene *scene, const ebpo_scene_instance_entry *i)
@@ -154,7 +155,7 @@ static ebpo_status check_time(const ebpo_scene *scene, uint64_t instance, double
         return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no instance %llu",
                          (unsigned long long)instance);
     if (!(isfinite(from) && isfinite(to) && from <= to))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no time from %g to %g", from, to);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%g to %g is not an interval of time", from, to);
     return EBPO_OK;
 }
 
@@ -180,7 +181,7 @@ ebpo_status ebpo_scene_pose(const ebpo_scene *scene, uint64_t instance, double t
     return status;
 }
 
-/* Of the posed vertices; rounding is within. */
+/* Returns a box of the posed vertices, including rounding. */
 static void posed_box(const ebpo_pose *pose, const ebpo_scene_model_entry *m, double min[3],
                       double max[3])
 {
@@ -198,7 +199,7 @@ static void posed_box(const ebpo_pose *pose, const ebpo_scene_model_entry *m, do
     }
 }
 
-/* What overflowed may be anywhere. */
+/* Returns `all` after an overflow, when the bound may be anywhere. */
 static double or_else(double x, double all) { return isnan(x) ? all : x; }
 
 static void join_box(double min[3], double max[3], const double low[3], const double high[3],
@@ -243,7 +244,7 @@ static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, 
     join_box(min, max, low, high, by);
 }
 
-/* Between two times that no key is between, in steps of little turning. */
+/* Returns a box between two times without a key between them, in steps of little rotation. */
 static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
                         ebpo_scene_reach reach, double from, double to, double min[3],
                         double max[3])
@@ -328,8 +329,8 @@ ebpo_status ebpo_scene_box(const ebpo_scene *scene, double from, double to, doub
 
 /* --- sweep and prune --- */
 
-/* 400 MB while they are sorted. */
-static const uint64_t most_pairs = UINT64_C(1) << 23;
+/* These take 400 MB while they are sorted. */
+static const uint64_t max_pairs = UINT64_C(1) << 23;
 
 typedef struct box {
     double min[3], max[3];
@@ -355,7 +356,7 @@ static ebpo_status make_boxes(sweep *s, double from, double to, ebpo_error *erro
     return status;
 }
 
-/* The axis of which least is overlapped by chance: boxes' sizes beside the size of all. */
+/* Returns the axis with the least expected overlap: sizes of boxes relative to the size of all. */
 static int best_axis(const sweep *s)
 {
     int best = 0;
@@ -376,7 +377,7 @@ static int best_axis(const sweep *s)
     return best;
 }
 
-/* The comparison's axis goes first in each box while they are sorted and swept. */
+/* Moves the axis of comparison to the front of each box while boxes are sorted and swept. */
 static void turn_axis(sweep *s, int axis)
 {
     for (uint64_t i = 0; i < s->count; i++) {
@@ -397,7 +398,8 @@ static int compare_boxes(const void *a, const void *b)
     return (x->instance > y->instance) - (x->instance < y->instance);
 }
 
-/* At most `by` apart on each axis, errs towards true: what differences lose is added. */
+/* Returns true if they are at most `by` apart on each axis; errs towards true, because the rounding
+ * of differences is added. */
 static bool near_each_other(const box *x, const box *y, double by)
 {
     for (int k = 0; k < 3; k++) {
@@ -416,11 +418,12 @@ static ebpo_status take_pair(sweep *s, const box *x, const box *y, ebpo_error *e
     if (!ebpo_scene_pair_rule(s->scene, pair.a, pair.b, &pair.clearance) ||
         !near_each_other(x, y, pair.clearance))
         return EBPO_OK;
-    if (s->pairs_count == most_pairs)
+    if (s->pairs_count == max_pairs)
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "more than %" PRIu64 " pairs of instances come near each other: place "
-                         "fewer at one place, have pairs ignored, or ask for a shorter time",
-                         most_pairs);
+                         "fewer at one position, have pairs ignored, or use "
+                         "a shorter time",
+                         max_pairs);
     if (!ebpo_grow(&s->pairs, &s->pairs_capacity, s->pairs_count + 1, sizeof pair))
         return ebpo_fail_memory(error, (s->pairs_count + 1) * sizeof pair);
     s->pairs[s->pairs_count++] = pair;
@@ -465,7 +468,7 @@ ebpo_status ebpo_scene_pairs(const ebpo_scene *scene, double from, double to,
 {
     EBPO_DEFAULT_FP;
     if (!(isfinite(from) && isfinite(to) && from <= to))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "there is no time from %g to %g", from, to);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "%g to %g is not an interval of time", from, to);
     sweep s = { .scene = scene,
                 .count = scene->instances_count,
                 .clearance = greatest_clearance(scene) };

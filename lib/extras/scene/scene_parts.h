@@ -1,35 +1,35 @@
-/* What a scene is made of, and what the files of lib/extras/scene share. */
+/* The parts of a scene, shared by the files of lib/extras/scene. */
 #ifndef EBPO_SCENE_SCENE_PARTS_H
 #define EBPO_SCENE_SCENE_PARTS_H
 
 #include <ebpo/scene.h>
 #include <jansson.h>
 
-/* A file that is open: one for all models of a path. */
+/* An open file, shared by all models of a path. */
 typedef struct ebpo_scene_file_entry {
-    char *path; /* as it is opened */
+    char *path; /* path for opening */
     ebpo_file *file;
-    ebpo_model *model; /* made when it is first asked for */
+    ebpo_model *model; /* made when first needed */
 } ebpo_scene_file_entry;
 
 typedef struct ebpo_scene_model_entry {
     char *name, *path;
     uint8_t digest[32];
     uint64_t instances;
-    uint64_t file; /* of scene.files; EBPO_SCENE_NONE: not loaded */
+    uint64_t file; /* index in scene.files; EBPO_SCENE_NONE: not loaded */
     double min[3], max[3];
 } ebpo_scene_model_entry;
 
-/* A moment of a route. The rotation is that of a unit quaternion: x, y, z, w. */
+/* A key of a route. The rotation is a unit quaternion: x, y, z, w. */
 typedef struct ebpo_route_key {
     double time, turn[4], translation[3], scale;
 } ebpo_route_key;
 
 typedef struct ebpo_scene_route {
     char *name;
-    ebpo_route_key *keys; /* times ascend */
+    ebpo_route_key *keys; /* in ascending order of time */
     uint64_t count, capacity;
-    bool jumps; /* stays at a key until the next one's time */
+    bool jumps; /* stays at a key until the time of the next */
 } ebpo_scene_route;
 
 /* A name that rules use: a layer, a group, an instance, or all. The sets of an instance are its
@@ -40,13 +40,13 @@ typedef struct ebpo_scene_instance_entry {
     uint32_t set_count;
 } ebpo_scene_instance_entry;
 
-/* Of two sets, a <= b: pairs of one of each. */
+/* A rule for pairs of one instance of each of two sets, a <= b. */
 typedef struct ebpo_scene_rule_entry {
     uint64_t a, b;
     double clearance; /* below 0: ignored */
 } ebpo_scene_rule_entry;
 
-/* A growing list: items, how many, room. */
+/* A growing list: items, count, capacity. */
 #define EBPO_SCENE_LIST(type, name) \
     type *name;                     \
     uint64_t name##_count, name##_capacity
@@ -58,17 +58,17 @@ struct ebpo_scene {
     EBPO_SCENE_LIST(ebpo_scene_camera, cameras);
     EBPO_SCENE_LIST(ebpo_scene_rule_entry, rules); /* sorted, once a file is read */
     EBPO_SCENE_LIST(char *, sets);     /* names: "*", those of layers, groups and instances */
-    EBPO_SCENE_LIST(uint64_t, layers); /* their sets */
-    EBPO_SCENE_LIST(uint64_t, groups); /* the same, ascending */
+    EBPO_SCENE_LIST(uint64_t, layers); /* sets of layers */
+    EBPO_SCENE_LIST(uint64_t, groups); /* sets of groups, ascending */
     EBPO_SCENE_LIST(ebpo_scene_file_entry, files);
-    json_t *names; /* of each kind and of sets, with their numbers */
+    json_t *names; /* names of each kind and of sets, with their numbers */
     uint64_t ignored, clearances;
-    char *folder; /* where relative paths begin, "" or with a closing "/" */
-    char *text;   /* that it was read from; NULL: none */
+    char *folder; /* base of relative paths, "" or ending with "/" */
+    char *text;   /* text that it was read from; NULL: none */
     size_t text_size;
-    uint64_t text_models, text_instances; /* that are in it */
-    bool outside;                         /* what it names may lie outside the folder */
-    ebpo_model_options how;               /* of ebpo_scene_model */
+    uint64_t text_models, text_instances; /* numbers of models and instances in it */
+    bool outside;                         /* named files may be outside the folder */
+    ebpo_model_options how;               /* options of ebpo_scene_model */
 };
 
 #define EBPO_SCENE_ALL_SET 0
@@ -81,12 +81,12 @@ struct ebpo_scene {
 #define EBPO_SCENE_CAMERA "\001c"
 #define EBPO_SCENE_LAYER  "\001l"
 
-/* EBPO_SCENE_NONE: there is none. */
+/* Returns a number; EBPO_SCENE_NONE: the name does not exist. */
 uint64_t ebpo_scene_find_name(const ebpo_scene *scene, const char *kind, const char *name);
 
 /* --- adding members --- */
 
-/* What only files can say. Texts are copied; numbers are valid. */
+/* Adds members that only files can have. Texts are copied; numbers are valid. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_layer(ebpo_scene *scene, const char *name,
                                                ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_scene_add_group(ebpo_scene *scene, const char *name,
@@ -95,99 +95,99 @@ EBPO_MUST_USE ebpo_status ebpo_scene_add_route(ebpo_scene *scene, const char *na
                                                uint64_t *number, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_scene_add_camera(ebpo_scene *scene, const ebpo_scene_camera *camera,
                                                 ebpo_error *error);
-/* Of the instance that was added last. */
+/* Adds the last added instance to a set. */
 EBPO_MUST_USE ebpo_status ebpo_scene_join_set(ebpo_scene *scene, uint64_t set, ebpo_error *error);
-/* clearance below 0: ignored. */
+/* Adds a rule; clearance below 0: ignored. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_rule(ebpo_scene *scene, uint64_t a, uint64_t b,
                                               double clearance, ebpo_error *error);
 
 /* --- rules --- */
 
-/* Before the scene is handed out. */
+/* Sorts the rules, before the caller gets the scene. */
 void ebpo_scene_sort_rules(ebpo_scene *scene);
 
 /* --- scene files --- */
 
-/* EBPO_E_LIMIT, of a text of more than `most_bytes`. */
+/* Returns EBPO_E_LIMIT for a text of more than `max_bytes`. */
 ebpo_status ebpo_scene_too_long(const char *name, const ebpo_scene_options *options,
                                 ebpo_error *error);
-/* Adds what `text` says to an empty scene with a folder. */
+/* Adds the content of `text` to an empty scene with a folder. */
 EBPO_MUST_USE ebpo_status ebpo_scene_read_json(ebpo_scene *scene, const char *text, size_t size,
                                                const char *name, const ebpo_scene_options *options,
                                                ebpo_error *error);
 
 /* --- routes --- */
 
-/* Appends; a key's rotation is made a unit quaternion's. EBPO_E_ARGUMENT: not finite, time not
- * above the last or beyond 2^1000, no rotation, scale out of range. */
+/* Appends a key and normalises its quaternion. EBPO_E_ARGUMENT: not finite, time not above the last
+ * or beyond 2^1000, no rotation, scale out of range. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *key,
                                              ebpo_error *error);
-/* The quaternion nearest to a matrix, of any length but 0. */
+/* Returns the quaternion nearest to a matrix, of any length but 0. */
 void ebpo_scene_turn_of_matrix(const double m[3][3], double turn[4]);
 void ebpo_scene_route_at(const ebpo_scene_route *route, double time, ebpo_pose *out);
-/* `outer` after `inner`. */
+/* Composes `outer` after `inner`. */
 void ebpo_scene_compose(const ebpo_pose *outer, const ebpo_pose *inner, ebpo_pose *out);
-/* Parts of from .. to between which a route's motion is smooth: the time at which the one that
- * begins at `from` ends. */
+/* Returns the end of the part of from .. to that begins at `from` and in which the route's motion
+ * is smooth. */
 double ebpo_scene_route_next(const ebpo_scene_route *route, double from, double to);
 
-/* At least the length, however small or large. */
+/* Returns an upper bound of the length, however small or large. */
 double ebpo_scene_length_above(const double way[3]);
 
-/* Of points that follow a route: how far from its origin, at most; and how large the coordinates
- * are that this is made of, which rounding goes by. */
+/* For points that follow a route: a bound of their distance from its origin, and the size of the
+ * coordinates it is computed from, which determines rounding. */
 typedef struct ebpo_scene_reach {
     double length, size;
 } ebpo_scene_reach;
 
-/* How points within `reach` of the route's origin move between two times that no key is between:
- * at most `length` from where they were; and at most `sag` off the straight line from the first to
- * the last place, passed evenly. */
+/* Motion of points within `reach` of the route's origin between two times without a key between
+ * them: at most `length` from their start, and at most `sag` off the straight line from the first
+ * to the last position, passed at even speed. */
 typedef struct ebpo_scene_step {
     double length, sag;
 } ebpo_scene_step;
 ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from, double to,
                                       ebpo_scene_reach reach);
 
-/* Of points that follow the route, anywhere on it: the part of their steps that does not become
- * shorter with them. */
+/* Returns, for points anywhere on the route, the part of their steps that does not shrink with the
+ * steps. */
 double ebpo_scene_route_rounding(const ebpo_scene_route *route, ebpo_scene_reach reach);
 
-/* How far the distance of two things that ride on what moves along the route changes on its way
- * from .. to, at most, by rounding too. reach: the sum of both. from < to. */
+/* Bounds the change of the distance of two instances on one route from .. to, including rounding.
+ * reach: the sum of both. from < to. */
 double ebpo_scene_route_growth(const ebpo_scene_route *route, double from, double to,
                                ebpo_scene_reach reach);
 
 /* --- boxes --- */
 
-/* Of the instance's points, from the origin of what moves along its route. */
+/* Returns the reach of the instance's points from the origin of its route. */
 ebpo_scene_reach ebpo_scene_reach_of(const ebpo_scene *scene,
                                      const ebpo_scene_instance_entry *instance);
 
 /* --- files that a scene names --- */
 
-/* NULL, or why the scene may not name this file. */
+/* Returns NULL, or the reason why the scene may not name this file. */
 const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *options,
                                     bool has_digest);
-/* `path` as it is opened: malloc's, NULL without memory. */
+/* Returns the path for opening, from malloc; NULL if memory is short. */
 char *ebpo_scene_join_path(const char *folder, const char *path);
-/* Of a path as it is opened, of a scene with this folder that may not name others: EBPO_E_FORMAT
- * where links lead it out of the folder. EBPO_E_IO, EBPO_E_MEMORY. */
+/* Checks a path for opening, for a scene with this folder that may not name other files:
+ * EBPO_E_FORMAT where links lead out of the folder. EBPO_E_IO, EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_scene_stays_within(const char *folder, const char *path,
                                                   ebpo_error *error);
-/* The part of a path up to its last "/", or "": malloc's. */
+/* Returns the part of a path up to its last "/", or "", from malloc. */
 char *ebpo_scene_folder_of(const char *path);
 
 /* --- the text of a scene file --- */
 
-/* Bytes of a byte order mark of UTF-8 that a text begins with: 0 or 3. */
+/* Returns the length of a UTF-8 byte order mark at the beginning of a text: 0 or 3. */
 size_t ebpo_scene_text_mark(const char *text, size_t size);
 
-/* EBPO_E_LIMIT: more than so many values or 32 levels of them, seen without parsing. */
-EBPO_MUST_USE ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t most_values,
+/* Returns EBPO_E_LIMIT for more than `max_values` values or 32 levels, without parsing. */
+EBPO_MUST_USE ebpo_status ebpo_scene_text_fits(const char *text, size_t size, uint64_t max_values,
                                                ebpo_error *error);
 
-/* A member's place: keys, and numbers of items where the key is NULL. */
+/* A member's path: keys, and indices of items where the key is NULL. */
 typedef struct ebpo_scene_at {
     const char *key;
     uint64_t item;

@@ -1,8 +1,8 @@
 /* Records results of a scene at several times in an HDF5 file, for other programs.
  *
- * The file has the names of instances and models, a row for each time, and for each pair that was
- * found a row with its kind, place and depth. Tables grow by rows while times are added. The file
- * is published when it is finished, and is absent after a failure. */
+ * The file has the names of instances and models, a row for each time, and a row for each pair
+ * found, with its kind, place and depth. Tables grow by rows while times are added. The file is
+ * published when it is finished, and is absent after a failure. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -15,12 +15,12 @@
 #include "io/publish.h"
 #include "extras/scene/scene_parts.h"
 
-/* Frames come first, then meetings. */
+/* Columns of frames come first, then those of clashes. */
 enum {
     TIME,
-    FIRST_MEETING,
-    MEETINGS,
-    ASKED,
+    FIRST_CLASH,
+    CLASHES,
+    QUERIED,
     NANOSECONDS,
     BYTES_READ,
     MODELS,
@@ -47,48 +47,50 @@ static const struct {
     const char *meaning;
 } layout[TABLES] = {
     [TIME] = { "/frames/time", EBPO_H5_F64, 0, "the scene's seconds" },
-    [FIRST_MEETING] = { "/frames/first_meeting", EBPO_H5_I64, 0, "row of /meetings" },
-    [MEETINGS] = { "/frames/meetings", EBPO_H5_I64, 0, "rows of /meetings" },
-    [ASKED] = { "/frames/asked", EBPO_H5_I64, 0, "pairs of instances asked about" },
-    [NANOSECONDS] = { "/frames/nanoseconds", EBPO_H5_I64, 0, "that the answer took" },
-    [BYTES_READ] = { "/frames/bytes_read", EBPO_H5_I64, 0, "of models' files, meanwhile" },
-    [MODELS] = { "/frames/models", EBPO_H5_I64, 0, "read into memory, meanwhile" },
-    [LOADS] = { "/frames/loads", EBPO_H5_I64, 0, "of subtrees, meanwhile" },
-    [FRAME] = { "/meetings/frame", EBPO_H5_I64, 0, "row of /frames" },
-    [INSTANCES] = { "/meetings/instances", EBPO_H5_I64, 2, "a and b, numbers of /instances" },
-    [KIND] = { "/meetings/kind", EBPO_H5_U8, 0,
+    [FIRST_CLASH] = { "/frames/first_clash", EBPO_H5_I64, 0, "row of /clashes" },
+    [CLASHES] = { "/frames/clashes", EBPO_H5_I64, 0, "rows of /clashes" },
+    [QUERIED] = { "/frames/tested", EBPO_H5_I64, 0, "pairs of instances evaluated" },
+    [NANOSECONDS] = { "/frames/nanoseconds", EBPO_H5_I64, 0, "duration of the query" },
+    [BYTES_READ] = { "/frames/bytes_read", EBPO_H5_I64, 0, "from models' files, during the query" },
+    [MODELS] = { "/frames/models", EBPO_H5_I64, 0, "read into memory, during the query" },
+    [LOADS] = { "/frames/loads", EBPO_H5_I64, 0, "of subtrees, during the query" },
+    [FRAME] = { "/clashes/frame", EBPO_H5_I64, 0, "row of /frames" },
+    [INSTANCES] = { "/clashes/instances", EBPO_H5_I64, 2, "a and b, numbers of /instances" },
+    [KIND] = { "/clashes/kind", EBPO_H5_U8, 0,
                "1 near, 2 touching, 3 coplanar, 4 crossing, 5 protruding, 6 enclosed, "
                "7 duplicate" },
-    [RELATION] = { "/meetings/relation", EBPO_H5_U8, 0,
+    [RELATION] = { "/clashes/relation", EBPO_H5_U8, 0,
                    "0 disjoint, 1 touching, 2 intersecting, 3 a inside b, 4 b inside a, 5 equal, "
-                   "6 not asked" },
-    [FACES] = { "/meetings/faces", EBPO_H5_I64, 2, "a pair that meets or is nearest; -1: none" },
-    [PAIRS] = { "/meetings/pairs", EBPO_H5_I64, 3, "of faces: touching, coplanar, crossing" },
-    [CONTACTS] = { "/meetings/contacts", EBPO_H5_I64, 0, "lines of contact; -1: not told" },
-    [CLEARANCE] = { "/meetings/clearance", EBPO_H5_F64, 0, "wanted, the scene's unit" },
-    [DISTANCE] = { "/meetings/distance", EBPO_H5_F64, 0, "of faces, the scene's unit" },
-    [PLACE] = { "/meetings/place", EBPO_H5_F64, 3, "x, y, z in the world; nan: not asked" },
-    [PLACE_BOX] = { "/meetings/place_box", EBPO_H5_F64, 6,
+                   "6 not requested" },
+    [FACES] = { "/clashes/faces", EBPO_H5_I64, 2,
+                "a pair that intersects or is nearest; -1: "
+                "none" },
+    [PAIRS] = { "/clashes/pairs", EBPO_H5_I64, 3, "of faces: touching, coplanar, crossing" },
+    [CONTACTS] = { "/clashes/contacts", EBPO_H5_I64, 0, "lines of contact; -1: not known" },
+    [CLEARANCE] = { "/clashes/clearance", EBPO_H5_F64, 0, "required, the scene's unit" },
+    [DISTANCE] = { "/clashes/distance", EBPO_H5_F64, 0, "of faces, the scene's unit" },
+    [PLACE] = { "/clashes/location", EBPO_H5_F64, 3, "x, y, z in the world; nan: not requested" },
+    [PLACE_BOX] = { "/clashes/location_box", EBPO_H5_F64, 6,
                     "of contacts in the world: least x, y, z, greatest x, y, z" },
-    [DEPTH] = { "/meetings/depth", EBPO_H5_F64, 4, "of a in b from, to; of b in a from, to" },
+    [DEPTH] = { "/clashes/depth", EBPO_H5_F64, 4, "of a in b from, to; of b in a from, to" },
 };
 
-struct ebpo_scene_record {
+struct ebpo_scene_report {
     const ebpo_scene *scene;
     char *path;
     ebpo_publish target;
     ebpo_h5_out out;
     ebpo_h5_table table[TABLES];
-    int64_t frames, meetings;
+    int64_t frames, clashes;
 };
 
-static ebpo_status put_meaning(ebpo_scene_record *r, ebpo_h5_id id, const char *meaning,
+static ebpo_status put_meaning(ebpo_scene_report *r, ebpo_h5_id id, const char *meaning,
                                ebpo_error *error)
 {
     return ebpo_h5_put_ascii(&r->out, id, "meaning", meaning, error);
 }
 
-/* --- what the scene holds --- */
+/* --- the scene's content --- */
 
 static const char *instance_name(const ebpo_scene *scene, uint64_t i)
 {
@@ -97,7 +99,7 @@ static const char *instance_name(const ebpo_scene *scene, uint64_t i)
 
 static const char *model_name(const ebpo_scene *scene, uint64_t i) { return scene->models[i].name; }
 
-static ebpo_status put_names(ebpo_scene_record *r, const char *path,
+static ebpo_status put_names(ebpo_scene_report *r, const char *path,
                              const char *(*name)(const ebpo_scene *, uint64_t), uint64_t count,
                              ebpo_error *error)
 {
@@ -112,7 +114,7 @@ static ebpo_status put_names(ebpo_scene_record *r, const char *path,
     return status;
 }
 
-static ebpo_status put_models(ebpo_scene_record *r, ebpo_error *error)
+static ebpo_status put_models(ebpo_scene_report *r, ebpo_error *error)
 {
     uint64_t count = r->scene->instances_count;
     int64_t *model = ebpo_alloc(count, sizeof *model);
@@ -132,7 +134,7 @@ static ebpo_status put_models(ebpo_scene_record *r, ebpo_error *error)
     return status;
 }
 
-static ebpo_status put_scene(ebpo_scene_record *r, ebpo_error *error)
+static ebpo_status put_scene(ebpo_scene_report *r, ebpo_error *error)
 {
     ebpo_status status =
         put_names(r, "/instances/names", instance_name, r->scene->instances_count, error);
@@ -145,15 +147,15 @@ static ebpo_status put_scene(ebpo_scene_record *r, ebpo_error *error)
 
 /* --- the file --- */
 
-static ebpo_status make_groups(ebpo_scene_record *r, ebpo_error *error)
+static ebpo_status make_groups(ebpo_scene_report *r, ebpo_error *error)
 {
     static const struct {
         const char *path, *meaning;
     } groups[] = {
-        { "/instances", "models at places, by number" },
+        { "/instances", "rigid instances, by number" },
         { "/models", "by number" },
-        { "/frames", "times that were asked about, one after the other" },
-        { "/meetings", "pairs of instances that meet or come too near, frame after frame" },
+        { "/frames", "times that were evaluated, in order" },
+        { "/clashes", "pairs of instances that intersect or come too near, frame by frame" },
     };
     ebpo_status status = EBPO_OK;
     for (size_t i = 0; i < sizeof groups / sizeof *groups && status == EBPO_OK; i++) {
@@ -166,7 +168,7 @@ static ebpo_status make_groups(ebpo_scene_record *r, ebpo_error *error)
     return status;
 }
 
-static ebpo_status make_tables(ebpo_scene_record *r, ebpo_error *error)
+static ebpo_status make_tables(ebpo_scene_report *r, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < TABLES && status == EBPO_OK; i++) {
@@ -178,7 +180,7 @@ static ebpo_status make_tables(ebpo_scene_record *r, ebpo_error *error)
     return status;
 }
 
-static ebpo_status record_begin(ebpo_scene_record *r, const char *path, ebpo_error *error)
+static ebpo_status record_begin(ebpo_scene_report *r, const char *path, ebpo_error *error)
 {
     ebpo_status status = ebpo_publish_begin(&r->target, path, error);
     if (status == EBPO_OK)
@@ -190,11 +192,11 @@ static ebpo_status record_begin(ebpo_scene_record *r, const char *path, ebpo_err
     return status == EBPO_OK ? make_tables(r, error) : status;
 }
 
-ebpo_status ebpo_scene_record_new(const ebpo_scene *scene, const char *path,
-                                  ebpo_scene_record **out, ebpo_error *error)
+ebpo_status ebpo_scene_report_new(const ebpo_scene *scene, const char *path,
+                                  ebpo_scene_report **out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_scene_record *r = ebpo_alloc_zero(1, sizeof *r);
+    ebpo_scene_report *r = ebpo_alloc_zero(1, sizeof *r);
     char *shown = strdup(path);
     *out = NULL;
     if (!r || !shown) {
@@ -212,17 +214,17 @@ ebpo_status ebpo_scene_record_new(const ebpo_scene *scene, const char *path,
     if (status == EBPO_OK)
         *out = r;
     else
-        ebpo_scene_record_free(r);
+        ebpo_scene_report_free(r);
     return status;
 }
 
-static void close_tables(ebpo_scene_record *r)
+static void close_tables(ebpo_scene_report *r)
 {
     for (int i = 0; i < TABLES; i++)
         ebpo_h5_close_table(&r->out, &r->table[i]);
 }
 
-ebpo_status ebpo_scene_record_finish(ebpo_scene_record *r, ebpo_error *error)
+ebpo_status ebpo_scene_report_finish(ebpo_scene_report *r, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
     close_tables(r);
@@ -230,7 +232,7 @@ ebpo_status ebpo_scene_record_finish(ebpo_scene_record *r, ebpo_error *error)
     return status == EBPO_OK ? ebpo_publish_commit(&r->target, error) : status;
 }
 
-void ebpo_scene_record_free(ebpo_scene_record *r)
+void ebpo_scene_report_free(ebpo_scene_report *r)
 {
     if (!r)
         return;
@@ -251,10 +253,10 @@ typedef struct rows {
     double clearance[ROWS], distance[ROWS], place[ROWS][3], place_box[ROWS][6], depth[ROWS][4];
 } rows;
 
-/* Numbers of nothing become -1. */
+/* Returns -1 for the number of a missing object. */
 static int64_t record_number(uint64_t n) { return n > INT64_MAX ? -1 : (int64_t)n; }
 
-static void fill_row(rows *out, uint64_t i, const ebpo_scene_meeting *m, int64_t frame)
+static void fill_row(rows *out, uint64_t i, const ebpo_scene_clash *m, int64_t frame)
 {
     out->frame[i] = frame;
     out->instances[i][0] = record_number(m->a);
@@ -278,7 +280,7 @@ static void fill_row(rows *out, uint64_t i, const ebpo_scene_meeting *m, int64_t
     }
 }
 
-static ebpo_status put_rows(ebpo_scene_record *r, const rows *d, uint64_t count, ebpo_error *error)
+static ebpo_status put_rows(ebpo_scene_report *r, const rows *d, uint64_t count, ebpo_error *error)
 {
     const void *const data[] = { d->frame,    d->instances, d->kind,      d->relation,
                                  d->faces,    d->pairs,     d->contacts,  d->clearance,
@@ -286,28 +288,28 @@ static ebpo_status put_rows(ebpo_scene_record *r, const rows *d, uint64_t count,
     ebpo_status status = EBPO_OK;
     for (int i = FRAME; i < TABLES && status == EBPO_OK; i++)
         status = ebpo_h5_append(&r->out, &r->table[i], data[i - FRAME], count, error);
-    r->meetings += (int64_t)count;
+    r->clashes += (int64_t)count;
     return status;
 }
 
-static ebpo_status put_frame(ebpo_scene_record *r, const ebpo_scene_frame *f, uint64_t meetings,
+static ebpo_status put_frame(ebpo_scene_report *r, const ebpo_scene_frame *f, uint64_t clashes,
                              ebpo_error *error)
 {
-    const int64_t n[] = { r->meetings,
-                          record_number(meetings),
-                          record_number(f->asked),
+    const int64_t n[] = { r->clashes,
+                          record_number(clashes),
+                          record_number(f->queried),
                           record_number(f->nanoseconds),
                           record_number(f->bytes_read),
                           record_number(f->models),
                           record_number(f->loads) };
     ebpo_status status = ebpo_h5_append(&r->out, &r->table[TIME], &f->time, 1, error);
-    for (int i = FIRST_MEETING; i < FRAME && status == EBPO_OK; i++)
-        status = ebpo_h5_append(&r->out, &r->table[i], &n[i - FIRST_MEETING], 1, error);
+    for (int i = FIRST_CLASH; i < FRAME && status == EBPO_OK; i++)
+        status = ebpo_h5_append(&r->out, &r->table[i], &n[i - FIRST_CLASH], 1, error);
     return status;
 }
 
-ebpo_status ebpo_scene_record_add(ebpo_scene_record *r, const ebpo_scene_frame *frame,
-                                  const ebpo_scene_meeting *meetings, uint64_t count,
+ebpo_status ebpo_scene_report_add(ebpo_scene_report *r, const ebpo_scene_frame *frame,
+                                  const ebpo_scene_clash *clashes, uint64_t count,
                                   ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
@@ -318,7 +320,7 @@ ebpo_status ebpo_scene_record_add(ebpo_scene_record *r, const ebpo_scene_frame *
     for (uint64_t at = 0; at < count && status == EBPO_OK; at += ROWS) {
         uint64_t n = count - at < ROWS ? count - at : ROWS;
         for (uint64_t i = 0; i < n; i++)
-            fill_row(some, i, &meetings[at + i], r->frames);
+            fill_row(some, i, &clashes[at + i], r->frames);
         status = put_rows(r, some, n, error);
     }
     r->frames++;

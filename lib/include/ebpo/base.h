@@ -1,38 +1,51 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: what all parts of the library share.
+ * Rules and types that all headers of the library share.
  *
  *   Versions   EBPO_VERSION_NUMBER, ebpo_version
- *   Structs    those that begin with their size, and EBPO_..._INIT
+ *   Structs    struct_size and EBPO_..._INIT
  *   Errors     ebpo_status, ebpo_error
  *   Dates      ebpo_is_date
  *   Progress   ebpo_progress
  *   Outputs    ebpo_write_file, ebpo_output_begin, ebpo_check_output, ebpo_abandon_outputs,
  *              ebpo_folder_begin, ebpo_folder_publish
  *
- * Rules that hold for every function:
+ * These rules hold for every function. Other headers do not repeat them.
  *
- * Arguments come in this order: the object that is worked on, what else is
- * needed, options, outputs, and the error last.
+ * Arguments: first the object, then other inputs, options and outputs; the error is last. Options
+ * may be NULL, which selects the default values. The error may be NULL, and so may an output whose
+ * comment says so. Indices begin at 0. `[n][3]` gives the shape of an array in row-major order.
  *
- * Options may be NULL: all of them have their usual values then. So may the
- * error, and any output that says so.
+ * Ownership: ebpo_..._free frees what ebpo_..._new made, and ebpo_..._close closes what
+ * ebpo_..._open opened. Both accept NULL. "Lent" memory belongs to the library. "Borrowed" memory
+ * belongs to the caller and must stay unchanged for the stated time.
  *
- * What is made by ebpo_..._new is freed by ebpo_..._free, and what is opened is
- * closed. NULL may be freed and closed. A function that fails makes nothing.
+ * Failure: a function that fails makes nothing. Its output for a new object is NULL.
  *
- * "Threads:" says who may call a function at the same time:
- *   any           any number of threads, also with the same arguments;
- *   one per X     one thread at a time for one object X; different objects do
- *                 not matter to each other.
- * Freeing an object is for the last thread that uses it.
+ * Callbacks that receive results return false to stop. They are then not called again, and the call
+ * succeeds.
  *
- * Stack: a query (query.h) takes less than 64 KiB of the calling thread's, building
- * and verifying less than 256 KiB, everything else less than 1 MiB. The library's
- * threads have stacks of 4 MiB, whatever the limit of the process is.
+ * Errors: comments list the statuses that need an explanation. Any function that returns
+ * ebpo_status can return EBPO_E_MEMORY, and EBPO_E_ARGUMENT for an argument that is NULL, out of
+ * range or not initialized with its macro. A function with a progress callback can return
+ * EBPO_E_CANCELLED. "The errors of reading" are those of ebpo_file_read_level (file.h).
  *
- * The caller's floating-point environment does not matter. Rounding mode,
- * flushing of denormals and traps are put aside while a function computes, and
- * are as they were when it returns. Callbacks run in the default environment.
+ * Parameter or member `threads`: number of threads to use; 0: all cores. The result does not depend
+ * on it.
+ *
+ * "Threads:" in a comment says which threads may call a function at the same time:
+ *   any           any number of threads, also with the same arguments, while no thread changes
+ *                 these
+ *   one per X     one thread at a time for each object X; different objects are independent
+ * The last thread that uses an object frees it. A function may start other threads; they end before
+ * it returns, unless its comment says otherwise.
+ *
+ * Stack: a query (query.h) uses less than 64 KiB of the calling thread's stack, building and
+ * verifying less than 256 KiB, all other functions less than 1 MiB. The library's own threads have
+ * stacks of 4 MiB, independent of the process limit.
+ *
+ * Floating-point environment: a function saves the rounding mode, flushing of denormals and traps
+ * of the caller, computes in the default environment, and restores them. Callbacks run in the
+ * default environment.
  */
 #ifndef EBPO_BASE_H
 #define EBPO_BASE_H
@@ -41,25 +54,22 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* ---- structs that begin with their size ---- */
+/* ---- structs with struct_size ---- */
 
 /*
- * A struct that may grow in later versions begins with its own size. That goes
- * for all options, and for most structs that the library fills in. Begin them
- * with their macro, which sets the size and the usual values:
+ * A struct that may grow in later versions begins with its own size. All options structs do, and
+ * most structs that the library fills in. Initialize them with their macro, which sets the size and
+ * the default values:
  *
  *     ebpo_build_options options = EBPO_BUILD_OPTIONS_INIT;
  *     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
  *
- * A program then runs with every later library of the same major version, from 1.0
- * on: what
- * its structs do not have yet keeps the usual values, or is not filled in. It
- * runs with an earlier library too, unless it sets something that this library
- * does not know, which is EBPO_E_UNSUPPORTED. Without the macro, struct_size is
- * wrong, which is EBPO_E_ARGUMENT.
+ * From version 1.0 on, a program then runs with every later library of the same major version:
+ * members that its structs lack keep their default values or are not filled in. It also runs with
+ * an earlier library, unless it sets a member that this library does not know (EBPO_E_UNSUPPORTED).
+ * A wrong struct_size is EBPO_E_ARGUMENT.
  *
- * All other structs stay as they are within a major version. Their reserved
- * members are 0.
+ * All other structs keep their layout within a major version. Their reserved members are 0.
  */
 #ifdef __cplusplus
 template <class T> inline T ebpo_sized()
@@ -92,13 +102,13 @@ extern "C" {
 
 /* ---- versions ---- */
 
-/* Of these headers. */
+/* Version of these headers. */
 #define EBPO_VERSION_MAJOR 0
 #define EBPO_VERSION_MINOR 1
 #define EBPO_VERSION_PATCH 0
 
 /*
- * One number to compare with:
+ * Version as one number for comparisons:
  *
  *     #if EBPO_VERSION_NUMBER >= EBPO_VERSION_OF(0, 2, 0)
  */
@@ -107,16 +117,15 @@ extern "C" {
     EBPO_VERSION_OF(EBPO_VERSION_MAJOR, EBPO_VERSION_MINOR, EBPO_VERSION_PATCH)
 
 /*
- * The version of the library that runs, as EBPO_VERSION_NUMBER is that of the
- * headers. Where the two differ in the major version, the program has to be
- * compiled again.
+ * Returns the version of the library in use, in the form of EBPO_VERSION_NUMBER. If its major
+ * version differs from that of the headers, compile the program again.
  *
  * Threads: any.
  */
 EBPO_API int ebpo_version_number(void);
 
 /*
- * The same as a text, "major.minor.patch". A static string.
+ * Returns the version of the library as a static string, "major.minor.patch".
  *
  * Threads: any.
  */
@@ -125,43 +134,43 @@ EBPO_API const char *ebpo_version(void);
 /* ---- errors ---- */
 
 /*
- * Every function that can fail returns one of these. Numbers are never reused.
- * There is no error state, neither global nor of a thread.
+ * Result of every function that can fail. Values are never reused. No error state is kept, neither
+ * global nor per thread.
  */
 typedef enum ebpo_status {
     EBPO_OK = 0,
     EBPO_E_MEMORY = -1,      /* an allocation failed */
     EBPO_E_ARGUMENT = -2,    /* the caller broke a documented rule */
-    EBPO_E_IO = -3,          /* the operating system or a server said no */
-    EBPO_E_FORMAT = -4,      /* a file is not what it says it is, or is damaged */
+    EBPO_E_IO = -3,          /* the operating system or a server reported an error */
+    EBPO_E_FORMAT = -4,      /* a file has the wrong format or is damaged */
     EBPO_E_VERSION = -5,     /* a file needs a newer reader */
     EBPO_E_UNSUPPORTED = -6, /* valid, but this build or version cannot do it */
-    EBPO_E_NOT_SOLID = -7,   /* a solid is required, and the mesh does not balance */
-    EBPO_E_LIMIT = -8,       /* a count or size is beyond a stated limit */
-    EBPO_E_CANCELLED = -9,   /* a callback asked to stop */
-    EBPO_E_ABSENT = -10      /* the file was written without what is needed */
+    EBPO_E_NOT_SOLID = -7,   /* a solid is required, and the mesh is not balanced */
+    EBPO_E_LIMIT = -8,       /* a count or size exceeds a stated limit */
+    EBPO_E_CANCELLED = -9,   /* a callback requested to stop */
+    EBPO_E_ABSENT = -10      /* the file does not contain the required data */
 } ebpo_status;
 
 /*
- * What went wrong. A function that fails fills it in, others leave it alone.
- * Begin it with EBPO_ERROR_INIT.
+ * Description of an error. A function that fails fills it in; other functions do not change it.
+ * Initialize it with EBPO_ERROR_INIT.
  */
 typedef struct ebpo_error {
     ebpo_status status;
 
     /*
-     * What happened, where, and what to do next: one sentence of UTF-8 without
-     * a newline. It begins with `file` and `object` where these are known.
+     * The error, its location and the remedy: one sentence of UTF-8 without a newline. It begins
+     * with `file` and `object` if these are known.
      */
     char message[480];
 
-    /* The file, URL or mesh at fault, as messages name it; "" if there is none. */
+    /* File, URL or mesh that caused the error, as messages name it; "" if none. */
     char file[256];
 
-    /* A path inside an .ebpo.h5 file, such as "/levels/03/planes"; or "". */
+    /* Path inside an .ebpo.h5 file, such as "/levels/03/planes"; "" if none. */
     char object[64];
 
-    /* The byte of the file at fault; -1 if it is not known. */
+    /* Byte offset of the error in the file; -1 if unknown. */
     int64_t offset;
 
     uint64_t reserved[4];
@@ -173,7 +182,7 @@ typedef struct ebpo_error {
     }
 
 /*
- * The name of a status, such as "EBPO_E_FORMAT". A static string, never NULL.
+ * Returns the name of a status, such as "EBPO_E_FORMAT". The string is static and never NULL.
  *
  * Threads: any.
  */
@@ -182,9 +191,9 @@ EBPO_API const char *ebpo_status_name(ebpo_status status);
 /* ---- dates ---- */
 
 /*
- * Returns true for a date as in ISO 8601 that the calendar has: YYYY, YYYY-MM, YYYY-MM-DD, or the
- * last with a T and a time: HH:MM, HH:MM:SS, or that with decimals, and behind it Z, +HH:MM, -HH:MM
- * or nothing.
+ * Returns true for a valid calendar date in ISO 8601: YYYY, YYYY-MM or YYYY-MM-DD. The last form
+ * may continue with T and a time (HH:MM, HH:MM:SS or HH:MM:SS with decimals), and then with Z,
+ * +HH:MM or -HH:MM.
  *
  * Threads: any.
  */
@@ -193,47 +202,40 @@ EBPO_API bool ebpo_is_date(const char *text);
 /* ---- progress ---- */
 
 /*
- * Called when a stage begins, and then a few times a second at most, by the
- * thread that called the library. `stage` is a static string. `done` counts up
- * to `total`, which is 0 if it is not known.
+ * Called by the thread that called the library, when a stage begins and then at most a few times a
+ * second. `stage` is a static string. `done` counts up to `total`, which is 0 if unknown.
  *
- * Return false to stop: the running call then ends with EBPO_E_CANCELLED, and
- * leaves no file behind.
+ * Return false to stop: the running call returns EBPO_E_CANCELLED and leaves no file.
  */
 typedef bool (*ebpo_progress_fn)(void *user, const char *stage, uint64_t done, uint64_t total);
 
 typedef struct ebpo_progress {
-    ebpo_progress_fn report; /* NULL: silent */
-    void *user;              /* handed to `report` */
+    ebpo_progress_fn report; /* NULL: no reports */
+    void *user;              /* argument of `report` */
 } ebpo_progress;
 
 /* ---- outputs ---- */
 
 /*
- * Writes `size` bytes as one file, which appears whole or not at all: it is
- * written under a temporary name, synced and renamed. An existing regular file
- * is replaced.
- *
- * EBPO_E_IO: it could not be written.
+ * Writes `size` bytes to a file, which is replaced atomically: they are written under a temporary
+ * name, synced and renamed. EBPO_E_IO: the file could not be written.
  *
  * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_write_file(const char *path, const void *data, size_t size,
                                                    ebpo_error *error);
 
-/* A file in the making. */
+/* A file that is being written. */
 typedef struct ebpo_output ebpo_output;
 
 /*
- * The same for what is too long for memory: begins a file that appears at `path` when it
- * is ended, and leaves nothing behind otherwise. What killed programs have left for the
- * same path is removed.
+ * Begins a file that is too large for memory. The file appears at `path` when ebpo_output_end is
+ * called. Temporary files of killed programs for the same path are removed.
  *
- * out          ended by ebpo_output_end, or ebpo_output_abandon. On failure NULL.
- * descriptor   to write to, and to read what was written; closed with the output
+ * out          ended by ebpo_output_end or ebpo_output_abandon
+ * descriptor   for writing, and for reading written data; closed with the output
  *
- * EBPO_E_IO: as ebpo_check_output. EBPO_E_LIMIT: more than 32 outputs at a time.
- * EBPO_E_MEMORY.
+ * EBPO_E_IO: as ebpo_check_output. EBPO_E_LIMIT: more than 32 outputs at the same time.
  *
  * Threads: any.
  */
@@ -241,50 +243,44 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_output_begin(const char *path, ebpo_outp
                                                      int *descriptor, ebpo_error *error);
 
 /*
- * Syncs it and gives it its name; frees `out` in any case.
- *
- * EBPO_E_IO: it could not be written; `path` is as it was.
+ * Syncs the file and renames it to its path. Always frees `out`. EBPO_E_IO: the file could not be
+ * written; the file at the path is unchanged.
  *
  * Threads: one per output.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_output_end(ebpo_output *out, ebpo_error *error);
 
 /*
- * Removes it. NULL is fine.
+ * Removes the temporary file and frees `out`. NULL is allowed.
  *
  * Threads: one per output.
  */
 EBPO_API void ebpo_output_abandon(ebpo_output *out);
 
 /*
- * Whether an output could be begun at `path` now. Worth asking before hours of
- * work.
- *
- * EBPO_E_IO: the folder is not there or cannot be written to, or the path is a
- * folder or a device.
+ * Checks that an output can be begun at `path` now. EBPO_E_IO: the folder does not exist or is not
+ * writable, or the path is a folder or a device.
  *
  * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_check_output(const char *path, ebpo_error *error);
 
 /*
- * Removes the temporary files of all outputs that this process is writing. They
- * cannot be finished afterwards. Made for signal handlers, just before the
- * process ends: it calls nothing but unlink.
+ * Removes the temporary files of all outputs that this process is writing; they cannot be completed
+ * afterwards. For signal handlers just before the process ends: it calls only unlink.
  *
  * Threads: any.
  */
 EBPO_API void ebpo_abandon_outputs(void);
 
 /*
- * Makes a folder beside `folder`, to be filled and then put in its place. It is
- * the caller's: where it is not published, he removes it and what is in it.
- * Those for the same `folder` that killed programs left are removed.
+ * Makes a folder beside `folder`, which the caller fills and ebpo_folder_publish then renames. The
+ * caller removes the new folder and its contents if it is not published. Folders of killed programs
+ * for the same `folder` are removed.
  *
- * making   the new folder's path. Freed by free(). On failure NULL.
+ * making   path of the new folder; freed by free()
  *
- * EBPO_E_IO: `folder` is there already, or nothing can be made beside it.
- * EBPO_E_MEMORY.
+ * EBPO_E_IO: `folder` exists already, or no folder can be made beside it.
  *
  * Threads: any.
  */
@@ -292,11 +288,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_folder_begin(const char *folder, char **
                                                      ebpo_error *error);
 
 /*
- * Renames it, whole, with the rights of any folder that the user makes.
+ * Renames the folder `making` to `folder` atomically, with the default permissions of a new folder.
+ * EBPO_E_IO: the folder cannot be renamed; it is still at `making`.
  *
- * EBPO_E_IO: it cannot be put there; it is still where it was.
- *
- * Threads: one at a time in the process, as it looks at the umask.
+ * Threads: one at a time in the process, because the umask is read.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_folder_publish(const char *making, const char *folder,
                                                        ebpo_error *error);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: unions, intersections and differences of solids at poses, by query.
+ * Evaluates unions, intersections and differences of solids at poses, by query.
  *
  *   Expressions     ebpo_boolean_new
  *   Point in solid  ebpo_boolean_inside, ebpo_boolean_inside_many
@@ -7,12 +7,12 @@
  *   Exact volume    ebpo_boolean_exact_volume
  *   Cells           ebpo_boolean_cells_new, ebpo_boolean_cells_volume, ebpo_boolean_cells_mesh
  *
- * Nothing is cut: there is no mesh of the result. Questions about it are answered by questions to
- * the models. Decisions are those of arithmetic without rounding on posed coordinates (pose.h).
+ * No mesh of the result is computed: queries of the result are evaluated by queries of the models.
+ * Decisions equal those of arithmetic without rounding on posed coordinates (pose.h).
  *
- * The result is *regularised*: of an operand is meant the closure of what its winding numbers and
- * its rule put inside, and the result is the closure of its own interior. So two boxes with a side
- * in common make one box, and a box less an equal one is nothing.
+ * The result is *regularised*: an operand is the closure of the points that its rule puts inside,
+ * and the result is the closure of its own interior. So two boxes with a common side are one box,
+ * and a box minus an equal box is empty.
  */
 #ifndef EBPO_BOOLEAN_H
 #define EBPO_BOOLEAN_H
@@ -27,34 +27,34 @@ extern "C" {
 /* ---- expressions ---- */
 
 typedef enum ebpo_boolean_operation {
-    EBPO_BOOLEAN_OPERAND = 0,             /* the operand with the number `left` */
-    EBPO_BOOLEAN_UNION = 1,               /* in one of both, or in both */
+    EBPO_BOOLEAN_OPERAND = 0,             /* the operand with index `left` */
+    EBPO_BOOLEAN_UNION = 1,               /* in at least one */
     EBPO_BOOLEAN_INTERSECTION = 2,        /* in both */
     EBPO_BOOLEAN_DIFFERENCE = 3,          /* in `left`, not in `right` */
-    EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE = 4 /* in one of both, not in both */
+    EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE = 4 /* in exactly one */
 } ebpo_boolean_operation;
 
-/* A node of the tree; `left` and `right` are numbers of nodes that stand before it. */
+/* Node of the expression tree; `left` and `right` are indices of earlier nodes. */
 typedef struct ebpo_boolean_node {
-    int32_t operation; /* an ebpo_boolean_operation */
+    int32_t operation; /* ebpo_boolean_operation */
     uint32_t left, right;
     uint32_t reserved;
 } ebpo_boolean_node;
 
-/* A solid at a pose. Of one model there may be many. */
+/* A solid at a pose. A model may be used many times. */
 typedef struct ebpo_boolean_operand {
     ebpo_model *model;
     ebpo_pose pose;
 } ebpo_boolean_operand;
 
-/* At most so many of each. */
+/* Maximum numbers. */
 #define EBPO_BOOLEAN_OPERANDS_MAX 64
 #define EBPO_BOOLEAN_NODES_MAX    256
 
 typedef struct ebpo_boolean_options {
-    size_t struct_size; /* EBPO_BOOLEAN_OPTIONS_INIT sets it */
+    size_t struct_size;
 
-    /* For questions about many points, and for cells. 0: all cores. Answers are the same. */
+    /* For many points, and for cells. 0: all cores. */
     unsigned threads;
 
     uint32_t reserved;
@@ -62,19 +62,18 @@ typedef struct ebpo_boolean_options {
 
 #define EBPO_BOOLEAN_OPTIONS_INIT EBPO_SIZED(ebpo_boolean_options)
 
-/* An expression, and what its questions work with: a context of each operand for each thread. */
+/* An expression with a context of each operand for each thread. */
 typedef struct ebpo_boolean ebpo_boolean;
 
 /*
- * An expression over operands[operand_count]: nodes[node_count], the last of which is the root. A
- * node may be used by several others, and an operand by several nodes. Both arrays are copied; the
- * models must outlive the expression.
+ * Makes an expression over operands[operand_count]: nodes[node_count], the last of which is the
+ * root. Several nodes may share a node or an operand. Both arrays are copied; the models must
+ * outlive the expression.
  *
- * EBPO_E_ARGUMENT: a node names one that does not stand before it, or an operand that is not there;
- * an unknown operation; a pose (ebpo_pose_check). EBPO_E_LIMIT: none, or too many, of operands or
- * of nodes. EBPO_E_NOT_SOLID: an operand is a surface. EBPO_E_ABSENT: an operand's file has no
- * mesh. EBPO_E_MEMORY. Each names the node, from 0, or the operand: its file, and its place
- * from 1 on.
+ * EBPO_E_ARGUMENT: an index is out of range or not of an earlier node; an invalid operation; a pose
+ * (ebpo_pose_check). EBPO_E_LIMIT: no or too many operands or nodes. EBPO_E_NOT_SOLID: an operand
+ * is a surface. EBPO_E_ABSENT: an operand's file has no mesh. Messages give the index of the node,
+ * or the file of the operand and its position from 1 on.
  *
  * Threads: any.
  */
@@ -86,7 +85,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_new(const ebpo_boolean_operand *
                                                     ebpo_boolean **out, ebpo_error *error);
 
 /*
- * Before its models.
+ * Frees an expression. Free its models later.
  *
  * Threads: one per expression.
  */
@@ -96,24 +95,24 @@ EBPO_API void ebpo_boolean_free(ebpo_boolean *boolean);
 
 typedef struct ebpo_boolean_result {
     /*
-     * EBPO_IN: an inner point of the result; EBPO_OUT: an inner point of what is not in it; both
-     * are certain. EBPO_ON: on a posed face, and the other operands do not decide.
+     * EBPO_IN: certainly an interior point of the result; EBPO_OUT: certainly an interior point of
+     * its complement. EBPO_ON: on a posed face, and the other operands do not decide.
      */
     int32_t where;
 
     /*
-     * 1: what `where` says is so; EBPO_ON: a boundary point of the result. 0, with EBPO_ON only:
-     * faces that are not all in one plane meet at the point, as on edges and at vertices, and it
-     * may be a boundary point or not.
+     * 1: `where` is certain; with EBPO_ON: a boundary point of the result. 0, only with EBPO_ON:
+     * faces of several planes intersect at the point, as on edges and at vertices; it may be a
+     * boundary point or not.
      */
     int32_t certain;
 } ebpo_boolean_result;
 
 /*
- * Whether a point of the world, three finite doubles, is in the result.
+ * Classifies a point of the world (three finite doubles).
  *
- * EBPO_E_ARGUMENT: the point is not finite. EBPO_E_ABSENT: a subset does not hold what decides.
- * EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading. On failure `out` is unspecified.
+ * EBPO_E_ARGUMENT: the point is not finite. EBPO_E_ABSENT: a subset lacks the required data.
+ * EBPO_E_LIMIT, and the errors of reading. On failure `out` is unspecified.
  *
  * Threads: one per expression.
  */
@@ -121,10 +120,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside(ebpo_boolean *boolean, co
                                                        ebpo_boolean_result *out, ebpo_error *error);
 
 /*
- * The same for points[count][3], into out[count]; the message names the point. Of several failures
- * the one of the first point that failed.
+ * Classifies points[count][3] into out[count]. The error is that of the first failed point, which
+ * the message names.
  *
- * Threads: one per expression; further ones live for the call.
+ * Threads: one per expression.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolean,
                                                             const double *points, uint64_t count,
@@ -134,12 +133,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolea
 /* ---- distance ---- */
 
 typedef struct ebpo_boundary_options {
-    size_t struct_size; /* EBPO_BOUNDARY_OPTIONS_INIT sets it */
+    size_t struct_size;
 
-    /* Enough when hi - lo <= tolerance hi; at least 0. */
+    /* Stops when hi - lo <= tolerance hi; at least 0. */
     double tolerance;
 
-    /* Stop after about so many cells of the world, and say what is certain. 0: 100,000. */
+    /* Stops after about this many cells of the world, with the bounds known so far. 0: 100,000. */
     uint64_t cells;
 } ebpo_boundary_options;
 
@@ -150,26 +149,25 @@ typedef struct ebpo_boundary_options {
 
 typedef struct ebpo_boundary_distance {
     /*
-     * The distance to the result's boundary is certainly within; unsigned, in the unit of the
-     * world. 0 .. 0: on the boundary. INFINITY .. INFINITY: the result is empty; hi alone is
-     * INFINITY: perhaps.
+     * Bounds of the unsigned distance to the result's boundary, in the unit of the world. 0 .. 0:
+     * on the boundary. INFINITY .. INFINITY: the result is empty; only hi INFINITY: perhaps empty.
      */
     double lo, hi;
 
-    /* Of the point itself. */
+    /* Classification of the point. */
     ebpo_boolean_result inside;
 
-    /* That were looked at. */
+    /* Number of visited cells. */
     uint64_t cells;
 } ebpo_boundary_distance;
 
 /*
- * How far a point of the world, three finite doubles, is from the boundary of the result. Where the
- * nearest face of all operands is a part of that boundary, two distances answer, and `lo` and `hi`
- * differ by rounding; elsewhere cells of the world are searched, the nearest first.
+ * Computes the distance from a point of the world (three finite doubles) to the boundary of the
+ * result. If the nearest face of all operands is part of that boundary, two distances suffice, and
+ * `lo` and `hi` differ only by rounding. Elsewhere cells of the world are searched, nearest first.
  *
- * EBPO_E_ARGUMENT: the point or the tolerance. EBPO_E_LIMIT: as ebpo_boolean_cells_new, of level 0.
- * The errors of ebpo_boolean_inside.
+ * EBPO_E_ARGUMENT: the point or the tolerance. EBPO_E_LIMIT: as ebpo_boolean_cells_new, for level
+ * 0. The errors of ebpo_boolean_inside.
  *
  * Threads: one per expression.
  */
@@ -182,50 +180,55 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_distance(ebpo_boolean *boolean,
 /* ---- exact volume ---- */
 
 typedef struct ebpo_volume_options {
-    size_t struct_size; /* EBPO_VOLUME_OPTIONS_INIT sets it */
+    size_t struct_size;
     ebpo_progress progress;
 } ebpo_volume_options;
 
 #define EBPO_VOLUME_OPTIONS_INIT EBPO_SIZED(ebpo_volume_options)
 
-/* Why a volume is not exact. */
+/* Reason why a volume is not exact. */
 typedef enum ebpo_volume_doubt {
-    EBPO_VOLUME_CERTAIN = 0,       /* it is */
-    EBPO_VOLUME_OPERANDS_MEET = 1, /* a face of operand[0] meets one of operand[1] */
-    EBPO_VOLUME_FACES_MEET = 2,    /* two of operand[0] meet otherwise than as neighbours */
-    EBPO_VOLUME_IN_PARTS = 3,      /* the model of operand[0] is not all in memory */
-    EBPO_VOLUME_SUBSET = 4         /* its file is a part of another */
+    EBPO_VOLUME_CERTAIN = 0,            /* it is exact */
+    EBPO_VOLUME_OPERANDS_INTERSECT = 1, /* a face of operand[0] intersects one of operand[1] */
+    EBPO_VOLUME_FACES_INTERSECT =
+        2,                    /* two faces of operand[0] intersect other than as neighbours */
+    EBPO_VOLUME_IN_PARTS = 3, /* the model of operand[0] is not entirely in memory */
+    EBPO_VOLUME_SUBSET = 4    /* its file is a subset */
 } ebpo_volume_doubt;
 
 typedef struct ebpo_exact_volume {
-    size_t struct_size; /* EBPO_EXACT_VOLUME_INIT sets it */
+    size_t struct_size;
 
     /*
-     * The result's volume, in the unit of the world, cubed. EBPO_FIGURE_EXACT: lo and hi are the
-     * double nearest to that of posed coordinates, ties to even (INFINITY beyond doubles, 0 below
-     * them); `scaled` of 0: the result is empty. EBPO_FIGURE_BOUND: from 0 to a box around the
-     * result; cells tell more.
+     * Volume of the result, in the cube of the world's unit. EBPO_VALUE_EXACT: lo and hi are the
+     * double nearest to the volume of posed coordinates, ties to even (INFINITY or 0 beyond the
+     * range of doubles); if `scaled` is 0, the result is empty. EBPO_VALUE_BOUND: from 0 to the
+     * volume of a box around the result; cells give better bounds.
      */
     ebpo_certain volume;
 
-    /* An ebpo_volume_doubt: the first one that was found; of which operands, from 0. */
+    /* ebpo_volume_doubt: the first reason found, and its operands. */
     int32_t doubt;
     uint32_t operand[2];
 
     uint32_t reserved;
 
-    /* Of EBPO_VOLUME_OPERANDS_MEET a face of each, of EBPO_VOLUME_FACES_MEET two faces that meet,
-     * by their numbers in the files; else EBPO_NO_FACE. */
+    /*
+     * EBPO_VOLUME_OPERANDS_INTERSECT: a face of each; EBPO_VOLUME_FACES_INTERSECT: two intersecting
+     * faces; indices in the files. Else EBPO_NO_FACE.
+     */
     uint64_t file_face[2];
 
-    /* Parts of the operands' surfaces that were looked at, and those of them that bound the result;
-     * of an exact volume. */
+    /*
+     * For an exact volume: parts of the operands' surfaces that were tested, and those that bound
+     * the result.
+     */
     uint64_t patches, bounding;
 
-    /* The same faces by their numbers in the sources, as ebpo_face_pair has them. */
+    /* The same faces by source indices (ebpo_face_pair). */
     uint64_t face[2];
 
-    /* An exact volume once more, rounded likewise but within any range: scaled * 2^exponent. */
+    /* The exact volume with the same rounding and unlimited range: scaled * 2^exponent. */
     double scaled;
     int64_t exponent;
 } ebpo_exact_volume;
@@ -233,19 +236,18 @@ typedef struct ebpo_exact_volume {
 #define EBPO_EXACT_VOLUME_INIT EBPO_SIZED(ebpo_exact_volume)
 
 /*
- * The exact volume of the result, where the operands' faces allow it: none meets one of another
- * operand, not even in a point, and those with an area of one operand meet as neighbours only (as
- * ebpo_collide_self has it, at their poses). So shells may be apart, in each other, and turned
- * inside out, with any winding numbers. Equal operands, models of the same content at poses that
- * are bit by bit the same, are taken for one, and of operands that the expression does not use
- * nothing is asked. Where that does not hold the call succeeds, and `doubt` says why.
+ * Computes the exact volume of the result if the operands' faces allow it. No face may intersect a
+ * face of another operand, not even in a point. Faces of one operand, except those without area,
+ * may intersect only as neighbours (ebpo_collide_self, at their poses). So shells may be apart,
+ * nested and inverted, with any winding numbers. Equal operands (models of equal content at bitwise
+ * equal poses) count as one, and unused operands are not tested. If the condition does not hold,
+ * the call succeeds and `doubt` gives the reason.
  *
- * Takes some 80 bytes for each face of one operand at a time.
+ * Takes about 80 bytes for each face of one operand at a time.
  *
- * EBPO_E_ARGUMENT: `out` was not begun with its macro. EBPO_E_CANCELLED: by `progress`.
- * EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading. On failure `out` is unspecified.
+ * EBPO_E_LIMIT, and the errors of reading. On failure `out` is unspecified.
  *
- * Threads: one per expression; further ones live for the call.
+ * Threads: one per expression.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_exact_volume(ebpo_boolean *boolean,
                                                              const ebpo_volume_options *options,
@@ -255,15 +257,17 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_exact_volume(ebpo_boolean *boole
 /* ---- cells ---- */
 
 typedef struct ebpo_cells_options {
-    size_t struct_size; /* EBPO_CELLS_OPTIONS_INIT sets it */
+    size_t struct_size;
 
-    /* The finest cells: 2^-level of the root's edge; 0 to EBPO_BOOLEAN_LEVEL_MAX. */
+    /* Finest cells: 2^-level of the root's edge; 0 to EBPO_BOOLEAN_LEVEL_MAX. */
     int level;
 
     uint32_t reserved;
 
-    /* EBPO_E_LIMIT if more cells of a level are mixed. They take 32 bytes each while the next level
-     * is made. 0: 2^25. */
+    /*
+     * EBPO_E_LIMIT if a level has more mixed cells. Each takes 32 bytes while the next level is
+     * made. 0: 2^25.
+     */
     uint64_t most;
 
     ebpo_progress progress;
@@ -277,26 +281,26 @@ typedef struct ebpo_cells_options {
     }
 
 /*
- * The cells of an octree of the world, a cube around the result's box. A cell is *in* if all of the
- * closed cell is inner to the result for certain, *out* if none of it belongs to the result for
- * certain, else *mixed*. Uniform cells are not divided; mixed ones are, down to the level.
+ * Cells of an octree of the world, a cube around the result's box. A cell is *in* if the closed
+ * cell is certainly in the interior of the result, *out* if certainly no point belongs to the
+ * result, else *mixed*. Mixed cells are subdivided down to the level.
  */
 typedef struct ebpo_boolean_cells ebpo_boolean_cells;
 
 /*
- * Each operand is looked at in a ball around the cell: first by the white and black nodes of its
- * tree, which decide most while cells are larger than leaves, then by its faces. What depends on
- * one operand no more is not asked of it again. An operand that is used twice is taken for two:
- * where its own boundary is, cells are mixed.
+ * Makes the cells. Each operand is tested in a ball around the cell: first by the white and black
+ * nodes of its tree, which usually decide while cells are larger than leaves, then by its faces. An
+ * operand that no longer matters is not tested again. An operand that is used twice counts as two:
+ * cells at its own boundary are mixed.
  *
- * EBPO_E_ARGUMENT: the level. EBPO_E_LIMIT: too many cells (`most`), or the result is so small or
- * so far from the origin that corners of cells are no doubles, or larger than 2^300 or smaller than
- * 2^-300, so that volumes of cells are none. EBPO_E_CANCELLED, EBPO_E_MEMORY, and
- * the errors of ebpo_boolean_inside.
+ * The cells stay valid after the expression is freed.
  *
- * The cells stay as they are when the expression is freed.
+ * EBPO_E_ARGUMENT: the level. EBPO_E_LIMIT: too many cells (`most`). Also if the result is too
+ * small or too far from the origin, so that doubles cannot hold the corners of cells, or larger
+ * than 2^300 or smaller than 2^-300, so that volumes are out of range. The errors of
+ * ebpo_boolean_inside.
  *
- * Threads: one per expression; further ones live for the call.
+ * Threads: one per expression.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_cells_new(ebpo_boolean *boolean,
                                                           const ebpo_cells_options *options,
@@ -304,32 +308,40 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_cells_new(ebpo_boolean *boolean,
                                                           ebpo_error *error);
 
 /*
+ * Frees the cells.
+ *
  * Threads: one per cells.
  */
 EBPO_API void ebpo_boolean_cells_free(ebpo_boolean_cells *cells);
 
 typedef struct ebpo_boolean_volume {
-    size_t struct_size; /* EBPO_BOOLEAN_VOLUME_INIT sets it */
+    size_t struct_size;
 
     /*
-     * The result's volume is certainly within, in the unit of the world, cubed: all in-cells, and
-     * these with all mixed ones. Exact on posed coordinates; 0 .. 0: the result is empty.
+     * Bounds of the result's volume, in the cube of the world's unit: all in-cells, and these plus
+     * all mixed cells. Exact on posed coordinates; 0 .. 0: the result is empty.
      */
     double lo, hi;
 
-    /* Of the root cell: its lowest corner and its edge, a power of two; 0: the result is empty. */
+    /*
+     * Lowest corner and edge of the root cell; the edge is a power of two; 0: the result is empty.
+     */
     double origin[3], edge;
 
     /* In-cells of any level; mixed cells of the finest level. */
     uint64_t in_cells, mixed_cells;
 
-    /* Questions whether an operand is in or out of a cell: decided by the operand's box, by its
-     * white and black nodes, and those that took its faces. */
+    /*
+     * Tests of an operand against a cell that were decided by the operand's box, by its white and
+     * black nodes, and by its faces.
+     */
     uint64_t by_box, by_nodes, by_faces;
 
-    /* How lo and hi are meant, an ebpo_figure: EBPO_FIGURE_INTERVAL; EBPO_FIGURE_BOUND as long as
-     * no cell is in; EBPO_FIGURE_EXACT of an empty result. */
-    int32_t figure;
+    /*
+     * Accuracy of lo and hi, an ebpo_value_kind: EBPO_VALUE_INTERVAL; EBPO_VALUE_BOUND if no cell
+     * is in; EBPO_VALUE_EXACT for an empty result.
+     */
+    int32_t metric;
 
     int32_t reserved;
 } ebpo_boolean_volume;
@@ -337,7 +349,7 @@ typedef struct ebpo_boolean_volume {
 #define EBPO_BOOLEAN_VOLUME_INIT EBPO_SIZED(ebpo_boolean_volume)
 
 /*
- * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ * Gets the volume of the cells.
  *
  * Threads: any.
  */
@@ -345,19 +357,19 @@ EBPO_API ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells,
                                                ebpo_boolean_volume *out);
 
 typedef enum ebpo_boolean_side {
-    EBPO_BOOLEAN_OUTER = 0, /* all in-cells and mixed cells: holds the result */
-    EBPO_BOOLEAN_INNER = 1  /* all in-cells: the result holds it */
+    EBPO_BOOLEAN_OUTER = 0, /* all in-cells and mixed cells: contains the result */
+    EBPO_BOOLEAN_INNER = 1  /* all in-cells: contained in the result */
 } ebpo_boolean_side;
 
 /*
- * The surface of these cells: squares of the finest level, two triangles each, in doubles. It
- * balances, winding numbers are 0 and 1; where cells touch along edges or at corners, more than two
- * faces meet. The mesh may be written, or converted: an .ebpo.h5 file that is built of the outer
- * cells holds a solid that holds the result, and so do its envelopes.
+ * Makes the surface of these cells: squares of the finest level, two triangles each, in doubles. It
+ * is balanced, with winding numbers 0 and 1. Where cells touch along edges or at corners, more than
+ * two faces share an edge or vertex. The mesh may be written or converted: an .ebpo.h5 file of the
+ * outer cells, and its envelopes, contain the result.
  *
  * out   freed by ebpo_mesh_free; without faces if there are no such cells
  *
- * EBPO_E_ARGUMENT: no such side. EBPO_E_LIMIT: more than 2^32 - 2 faces. EBPO_E_MEMORY.
+ * EBPO_E_LIMIT: more than 2^32 - 2 faces.
  *
  * Threads: any.
  */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: from a mesh to a tree.
+ * Builds a tree from a mesh.
  *
  *     ebpo_mesh mesh;
  *     ebpo_prepared prepared = EBPO_PREPARED_INIT;
@@ -22,56 +22,56 @@ extern "C" {
 #endif
 
 /*
- * How the planes of an envelope are chosen. Whatever the choice, offsets are
- * such that the envelope contains the solid.
+ * Selection of the planes of an envelope. With every selection, offsets are set so that the
+ * envelope contains the solid.
  */
 typedef enum ebpo_selection {
     /*
-     * From the root down, among the directions of the hull of the solid in the
-     * cell. A node starts from its parent's envelope and adds, greedily by the
-     * volume removed, what removes at least epsilon, then what cuts off needles.
+     * From the root down, among the directions of the hull of the solid in the cell. A node starts
+     * from its parent's envelope. It adds planes greedily by the volume that they remove, if this
+     * is at least epsilon, then planes that cut off needles.
      */
     EBPO_SELECT_INHERIT = 0,
 
     /*
-     * The other three are the theses', among the normals of the faces below the
-     * node: from the leaves up, of the children's planes and around the polygons
-     * of these planes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
+     * The other three selections are from the theses, among the normals of the faces below the
+     * node. They go from the leaves up, with the children's planes and around the polygons of these
+     * planes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
      */
-    EBPO_SELECT_KMEDOIDS = 1, /* the medoids of clusters of normals */
-    EBPO_SELECT_OFFSET = 2,   /* those that had to move least from their faces */
-    EBPO_SELECT_RANDOM = 3,   /* consecutive ones, from a random one on */
+    EBPO_SELECT_KMEDOIDS = 1, /* medoids of clusters of normals */
+    EBPO_SELECT_OFFSET = 2,   /* planes that moved least from their faces */
+    EBPO_SELECT_RANDOM = 3,   /* consecutive planes from a random one on */
 
-    /* No selection: how many there are. */
+    /* Number of selections. */
     EBPO_SELECTION_COUNT
 } ebpo_selection;
 
-/* What is known of a selection. */
+/* Properties of a selection. */
 typedef struct ebpo_selection_traits {
-    /* As files and commands call it, such as "inherit". */
+    /* Name in files and commands, such as "inherit". */
     const char *name;
 
-    /* From the leaves up: takes percent or k_root, not epsilon. */
+    /* From the leaves up: uses percent or k_root, not epsilon. */
     bool from_leaves;
 
-    /* The distance of normals matters to it. */
+    /* Uses the distance of normals. */
     bool takes_normals;
 
     bool takes_seed;
 } ebpo_selection_traits;
 
 /*
- * Static; NULL for what is no selection.
+ * Returns the static properties of a selection; NULL for an invalid selection.
  *
  * Threads: any.
  */
 EBPO_API const ebpo_selection_traits *ebpo_selection_describe(ebpo_selection selection);
 
-/* What k-medoids takes for the distance of two normals. */
+/* Distance of two normals for k-medoids. */
 typedef enum ebpo_normal_distance {
     /*
-     * Squared differences of the two spherical coordinates (EBP 2017, equation
-     * 4). Has poles and a seam.
+     * Sum of squared differences of the two spherical coordinates (EBP 2017, equation 4). Has poles
+     * and a seam.
      */
     EBPO_NORMALS_SPHERICAL = 0,
 
@@ -80,13 +80,13 @@ typedef enum ebpo_normal_distance {
 } ebpo_normal_distance;
 
 /*
- * Seconds of two steps that progress cannot tell apart, because each piece of a
- * tree goes through both in one go. Summed over all threads.
+ * Seconds of two steps that progress does not separate, because each piece of a tree passes both at
+ * once. Summed over all threads.
  */
 typedef struct ebpo_build_times {
-    size_t struct_size; /* EBPO_BUILD_TIMES_INIT sets it */
+    size_t struct_size;
 
-    /* Faces to cells, winding numbers of corners, numbers of faces. */
+    /* Assigning faces to cells, winding numbers of corners, indices of faces. */
     double cells;
 
     /* Planes and envelopes. */
@@ -96,69 +96,70 @@ typedef struct ebpo_build_times {
 #define EBPO_BUILD_TIMES_INIT EBPO_SIZED(ebpo_build_times)
 
 typedef struct ebpo_build_options {
-    size_t struct_size; /* EBPO_BUILD_OPTIONS_INIT sets it */
+    size_t struct_size;
 
-    /* The deepest level, 0 to 20. -1: by EBP 2017, equation 3. */
+    /* Deepest level, 0 to 20. -1: by EBP 2017, equation 3. */
     int max_level;
 
     /*
-     * A node with at most so many faces becomes a leaf (BP 2008, 3.3.1). 0: only
-     * the deepest level stops.
+     * A node with at most this many faces becomes a leaf (BP 2008, 3.3.1). 0: leaves only on the
+     * deepest level.
      */
     uint32_t leaf_faces;
 
     /*
-     * EBPO_SELECT_INHERIT, and stored leaf planes made with it: a plane is kept
-     * while it removes at least this share of the cell, 0 to 1 (in levels 0 to 4
-     * a tenth of it, less where the solid is thin), or cuts off what reaches a
-     * tenth of the cell beyond it.
+     * For EBPO_SELECT_INHERIT, and for leaf planes that are stored with it. A plane is kept if it
+     * removes at least this share of the cell, 0 to 1, or cuts off a part that extends a tenth of
+     * the cell beyond it. In levels 0 to 4 the share is a tenth of it, or less where the solid is
+     * thin.
      */
     double epsilon;
 
     /*
-     * Bits of ebpo_part. Leaf planes are made on request only. Colours are made
-     * where the mesh has colours, and with EBPO_PART_MESH only.
+     * ebpo_part bits. Leaf planes are stored only on request. Colours are stored only if the mesh
+     * has colours, and only with EBPO_PART_MESH.
      */
     uint32_t parts;
 
-    /* Which points the solid is made of. */
+    /* Rule that decides which points belong to the solid. */
     ebpo_rule rule;
 
-    /* Refuse a mesh that does not balance: EBPO_E_NOT_SOLID. */
+    /* True: reject a mesh that is not balanced with EBPO_E_NOT_SOLID. */
     bool require_solid;
 
-    /* 0: all cores. The result does not depend on it. */
     unsigned threads;
 
     ebpo_selection select;
 
     /*
-     * The theses' selections: which share of the candidates is taken, in
-     * percent, above 0 and at most 100, rounded up (EBP 2017, equation 5). Never
-     * more than 255, also with k_root: so many can be stored.
+     * For the selections of the theses: share of the candidates that is selected, in percent, above
+     * 0 and at most 100, rounded up (EBP 2017, equation 5). At most 255 planes are stored, also
+     * with k_root.
      */
     double percent;
 
     /*
-     * Instead of percent, if not 0: so many planes at the root, half as many at
-     * each next level, and halved on in a node until there are fewer than its
-     * candidates (BP 2008, 3.5.1).
+     * If not 0, used instead of percent: number of planes at the root. Each next level has half as
+     * many. In a node the number is halved until it is less than the number of its candidates (BP
+     * 2008, 3.5.1).
      */
     double k_root;
 
-    /* Of EBPO_SELECT_KMEDOIDS. */
+    /* For EBPO_SELECT_KMEDOIDS. */
     ebpo_normal_distance normals;
 
-    /* Of EBPO_SELECT_KMEDOIDS and EBPO_SELECT_RANDOM: equal seeds, equal files. */
+    /* For EBPO_SELECT_KMEDOIDS and EBPO_SELECT_RANDOM: equal seeds give equal files. */
     uint64_t seed;
 
-    /* Notes for the file: UTF-8 without control characters, or NULL. `ebpo convert` takes a date by
-     * ebpo_is_date only. */
+    /*
+     * Notes for the file: UTF-8 without control characters, or NULL. `ebpo convert` accepts a date
+     * only if ebpo_is_date is true.
+     */
     const char *unit, *crs, *date;
 
     ebpo_progress progress;
 
-    /* Filled in, if not NULL. */
+    /* Filled in if not NULL. */
     ebpo_build_times *times;
 } ebpo_build_options;
 
@@ -172,23 +173,19 @@ typedef struct ebpo_build_options {
     }
 
 /*
- * Builds the tree of a checked and perhaps mended mesh. Its arrays are moved
- * into `out` and put into another order: the mesh is empty afterwards, also when
- * building fails. `out` is freed by ebpo_tree_free.
+ * Builds the tree of a checked mesh. The arrays of the mesh are moved into `out` and reordered: the
+ * mesh is empty afterwards, also on failure. `out` is freed by ebpo_tree_free.
  *
- * report   what ebpo_mesh_check or ebpo_mesh_prepare has found; it is copied
- *          into the file's facts
- * mend     what was mended; copied as well; NULL: nothing
+ * report   from ebpo_mesh_check or ebpo_mesh_prepare; copied into the file's metadata
+ * repair_record   repairs that were made, copied as well; NULL: none
  *
- * EBPO_E_ARGUMENT: an option is out of range. EBPO_E_NOT_SOLID: see
- * require_solid. EBPO_E_FORMAT and EBPO_E_LIMIT: as ebpo_mesh_check and
- * ebpo_mesh_arrange. EBPO_E_IO: the workspace is full. EBPO_E_MEMORY,
- * EBPO_E_CANCELLED.
+ * EBPO_E_ARGUMENT: an option is out of range. EBPO_E_NOT_SOLID: see require_solid. EBPO_E_FORMAT,
+ * EBPO_E_LIMIT: as ebpo_mesh_check and ebpo_mesh_arrange. EBPO_E_IO: no space for the workspace.
  *
  * Threads: one per mesh.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
-                                              const ebpo_mend_record *mend,
+                                              const ebpo_repair_record *repair_record,
                                               const ebpo_build_options *options, ebpo_tree *out,
                                               ebpo_error *error);
 

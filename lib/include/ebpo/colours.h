@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: colours of vertices and faces.
+ * Returns the colours of vertices and faces.
  */
 #ifndef EBPO_COLOURS_H
 #define EBPO_COLOURS_H
@@ -18,19 +18,19 @@ typedef struct ebpo_colours {
     /* [face_count][4]; NULL: faces have no colours. */
     uint8_t *face;
 
-    /* 1: faces' colours say more: vertices have none, or all the same beside faces' */
+    /* 1: prefer the colours of faces, because vertices have none or all have the same */
     uint64_t by_face;
 } ebpo_colours;
 
 /*
- * The colours among a mesh's attributes: properties red, green and blue, and alpha
- * where there is one, else diffuse_red, diffuse_green and diffuse_blue. uint16 is
- * scaled from 65,535 and floats from 1; of other integers 0 to 255 count. What is
- * beyond is the nearest of these, NaN is 0. A mesh without attributes has none.
+ * Gets the colours from a mesh's attributes: properties red, green, blue and, if present, alpha,
+ * else diffuse_red, diffuse_green and diffuse_blue. uint16 is scaled from 65,535 and floats from 1;
+ * other integers count from 0 to 255. Values out of range are clamped; NaN is 0. A mesh without
+ * attributes has no colours.
  *
- * EBPO_E_MEMORY. On failure `out` is cleared.
+ * On failure `out` is cleared.
  *
- * Threads: any, while nobody changes the mesh.
+ * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_colours(const ebpo_mesh *mesh, ebpo_colours *out,
                                                      ebpo_error *error);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: levels and the mesh in other programs' formats. PLY is
- * written by ebpo_mesh_write_ply (mesh.h).
+ * Exports levels and the mesh to formats of other programs. ebpo_mesh_write_ply (mesh.h) writes
+ * PLY.
  */
 #ifndef EBPO_EXPORT_H
 #define EBPO_EXPORT_H
@@ -13,67 +13,62 @@ extern "C" {
 
 typedef enum ebpo_export_format {
     /*
-     * XDMF 3, a spatial collection of grids: each level is one grid of polyhedra
-     * with their nodes' data, the mesh one of triangles. The numbers are in a
-     * second file, NAME.h5.
+     * XDMF 3, a spatial collection of grids: each level is a grid of polyhedra with their nodes'
+     * data, the mesh is a grid of triangles. Arrays are in a second file, NAME.h5.
      */
     EBPO_EXPORT_XDMF,
 
     /*
-     * VTKHDF 1.0, one unstructured grid of polygons. Each level and the mesh are
-     * partitions of their own.
+     * VTKHDF 1.0, one unstructured grid of polygons. Each level and the mesh are separate
+     * partitions.
      */
     EBPO_EXPORT_VTKHDF,
 
     /*
-     * glTF 2.0, with a second file: NAME, its ending replaced by .bin. This
-     * format and those below hold float32.
+     * glTF 2.0 with a second file, NAME with extension .bin. This and the following formats hold
+     * float32.
      */
     EBPO_EXPORT_GLTF,
     EBPO_EXPORT_GLB, /* glTF 2.0 in one file */
-    EBPO_EXPORT_OBJ, /* by assimp; no material library */
-    EBPO_EXPORT_STL  /* by assimp, binary; one level or the mesh, no more */
+    EBPO_EXPORT_OBJ, /* by assimp; without material library */
+    EBPO_EXPORT_STL  /* by assimp, binary; only one level or the mesh */
 } ebpo_export_format;
 
 /*
- * The name, which is the usual ending: "xdmf", "vtkhdf", "gltf", "glb", "obj",
- * "stl". A static string; NULL for other values.
+ * Returns the name, which is the default extension: "xdmf", "vtkhdf", "gltf", "glb", "obj", "stl".
+ * A static string; NULL for invalid values.
  *
  * Threads: any.
  */
 EBPO_API const char *ebpo_export_format_name(ebpo_export_format format);
 
 typedef struct ebpo_export_options {
-    size_t struct_size; /* EBPO_EXPORT_OPTIONS_INIT sets it */
+    size_t struct_size;
 
-    /*
-     * Levels as ebpo_lod_level gives them, as closed polyhedra. With first_level
-     * beyond last_level there are none.
-     */
+    /* Levels of ebpo_lod_level, as closed polyhedra. None if first_level > last_level. */
     int first_level, last_level;
 
     /*
-     * The model as well. XDMF and VTKHDF hold it in the file's order with the
-     * source's numbers, the others in the source's order if the file has maps.
+     * Exports the mesh. XDMF and VTKHDF have it in the file's order with source indices; others in
+     * the source's order if the file has maps.
      *
-     * With its colours (colours.h), if it has any. XDMF and VTKHDF: arrays `rgba` of
-     * 4 bytes, of vertices and of faces. glTF: COLOR_0, which is linear, alpha too,
-     * though the material is opaque. OBJ: red, green and blue behind a vertex, 0 to
-     * 1, as many programs read them. STL holds none, and glTF and OBJ none of faces.
+     * Colours (colours.h) are exported if present. XDMF and VTKHDF: arrays `rgba` of 4 bytes, for
+     * vertices and faces. glTF: COLOR_0, linear, with alpha although the material is opaque. OBJ:
+     * red, green and blue after a vertex, 0 to 1. STL has no colours; glTF and OBJ have none for
+     * faces.
      *
-     * Levels likewise, if the file has colours of them: each vertex has that of its
-     * node. In VTKHDF's arrays what has no colours is white.
+     * Levels likewise, if the file has their colours: each vertex has the colour of its node. In
+     * VTKHDF, items without colours are white.
      */
     bool mesh;
 
-    /* 0: all cores. The result does not depend on it. */
     unsigned threads;
 
     ebpo_progress progress;
 
     /*
-     * glTF and OBJ: colours of the mesh's vertices in place of its own, [vertex_count][4] red,
-     * green, blue and alpha in the order of ebpo_file_read_source_mesh; NULL: its own. With other
+     * glTF and OBJ: colours for the mesh's vertices instead of its own, [vertex_count][4] red,
+     * green, blue and alpha in the order of ebpo_file_read_source_mesh; NULL: its own. Other
      * formats: EBPO_E_ARGUMENT.
      */
     const uint8_t *vertex_colours;
@@ -84,72 +79,64 @@ typedef struct ebpo_export_options {
         sizeof(ebpo_export_options), 0, -1, true, 0, { NULL, NULL }, NULL \
     }
 
-/* A level, or the mesh, as it was written. */
+/* Exported level or mesh. */
 typedef struct ebpo_export_block {
     int level;                    /* -1: the mesh */
-    uint64_t nodes;               /* polyhedra; of the mesh: 0 */
-    uint64_t polygons;            /* of the mesh: its triangles */
-    uint64_t triangles, vertices; /* how many were written */
-    double volume;                /* of the envelopes; of the mesh: 0 */
+    uint64_t nodes;               /* polyhedra; mesh: 0 */
+    uint64_t polygons;            /* mesh: its triangles */
+    uint64_t triangles, vertices; /* numbers written */
+    double volume;                /* of the envelopes; mesh: 0 */
 } ebpo_export_block;
 
-/* What became of colours. */
+/* Result of exporting colours. */
 typedef enum ebpo_export_colours {
-    EBPO_EXPORT_NO_COLOURS, /* there are none in what was wanted */
+    EBPO_EXPORT_NO_COLOURS, /* the exported data has none */
     EBPO_EXPORT_WRITTEN,
-    EBPO_EXPORT_LEFT_OUT /* the format has no place for them */
+    EBPO_EXPORT_OMITTED /* the format does not support them */
 } ebpo_export_colours;
 
 typedef struct ebpo_export_report {
-    size_t struct_size; /* EBPO_EXPORT_REPORT_INIT sets it */
+    size_t struct_size;
 
-    /* How many of `block` there are. */
+    /* Number of items of `block`. */
     int block_count;
     ebpo_export_block block[EBPO_LEVELS_MAX + 1];
 
     /*
-     * glTF: vertices are relative to this point, which is the translation of the
-     * nodes. Others: 0.
+     * glTF: vertices are relative to this point, which is the translation of the nodes. Others: 0.
      */
     double origin[3];
 
-    /*
-     * How much rounding to the format has moved a coordinate at most. 0: every
-     * bit was kept.
-     */
+    /* Maximum change of a coordinate by rounding to the format. 0: exact. */
     double largest_change;
 
-    /* Of vertices, of the mesh and of levels, and of faces: ebpo_export_colours. */
+    /* ebpo_export_colours for vertices (mesh and levels) and for faces. */
     uint64_t vertex_colours, face_colours;
 } ebpo_export_report;
 
 #define EBPO_EXPORT_REPORT_INIT EBPO_SIZED(ebpo_export_report)
 
 /*
- * The name of the second file that comes with `path`, in `room` bytes at `out`;
- * "" if there is none. False: there is no room for it, or the format does not
- * take this name (":" in an XDMF's).
+ * Writes the name of the second file of `path` to `out`, of `space` bytes; "" if there is none.
+ * Returns false if it does not fit, or if the format does not support this name (":" for XDMF).
  *
  * Threads: any.
  */
 EBPO_API bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *out,
-                                      size_t room);
+                                      size_t space);
 
 /*
- * Writes levels and the mesh to a file, which appears whole or not at all. A
- * second file is put in place just before it, so it may be new when putting the
- * first one in place fails (EBPO_E_IO).
+ * Exports levels and the mesh to a file, which is replaced atomically. A second file is replaced
+ * just before it, so it may be new if replacing the first one fails (EBPO_E_IO).
  *
- * XDMF and VTKHDF hold one level in memory at a time, the others all of them.
+ * XDMF and VTKHDF hold one level in memory at a time, other formats all of them.
  *
- * report   what was written; or NULL
+ * report   may be NULL
  *
- * EBPO_E_ARGUMENT: no such level, nothing to write, or more than the format
- * holds. EBPO_E_UNSUPPORTED: the library was built without assimp. EBPO_E_ABSENT:
- * the mesh is wanted, and the file has none. EBPO_E_LIMIT: more than 2^32 - 2
- * vertices or faces, a coordinate beyond float32 in a format that holds these, or
- * a GLB of 2^32 bytes. EBPO_E_CANCELLED, EBPO_E_IO, EBPO_E_MEMORY, and the errors
- * of reading.
+ * EBPO_E_ARGUMENT: invalid level, no data selected, or more than the format supports.
+ * EBPO_E_UNSUPPORTED: the library was built without assimp. EBPO_E_ABSENT: the mesh is requested,
+ * and the file has none. EBPO_E_LIMIT: more than 2^32 - 2 vertices or faces, a coordinate beyond
+ * float32 in a format of float32, or a GLB of 2^32 bytes. EBPO_E_IO, and the errors of reading.
  *
  * Threads: any.
  */

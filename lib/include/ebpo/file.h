@@ -1,13 +1,11 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: what an .ebpo.h5 file holds, reading and writing it.
- * format-spec/ describes the same, byte by byte.
+ * Reads and writes .ebpo.h5 files. format-spec/ describes the format byte by byte.
  *
  *   Contents   ebpo_level, ebpo_info, ebpo_tree: a whole model in memory
  *   Writing    ebpo_tree_write
- *   Sources    ebpo_source: where bytes come from
- *   Opening    ebpo_open, ebpo_open_with, ebpo_open_memory, ebpo_open_source,
- *              ebpo_close
- *   Facts      ebpo_file_info, ebpo_file_get_stats, ebpo_file_locate
+ *   Sources    ebpo_source: bytes from any storage
+ *   Opening    ebpo_open, ebpo_open_with, ebpo_open_memory, ebpo_open_source, ebpo_close
+ *   Metadata   ebpo_file_info, ebpo_file_get_stats, ebpo_file_locate
  *   Reading    ebpo_file_read_level, ebpo_file_read_mesh, ebpo_file_read_tree ...
  *   Rewriting  ebpo_file_repack
  */
@@ -20,37 +18,31 @@
 extern "C" {
 #endif
 
-/* Of the format that this library writes. */
+/* Version of the format that this library writes. */
 #define EBPO_FORMAT_MAJOR 1
 #define EBPO_FORMAT_MINOR 1
 
 /* Levels 0 to 20. */
 #define EBPO_LEVELS_MAX 21
 
-/* ---- what a file holds ---- */
+/* ---- contents of a file ---- */
 
-/* A node's type, two bits in `types` of ebpo_level. */
+/* Type of a node, two bits in `types` of ebpo_level. The cell of a node is closed. */
 typedef enum ebpo_node_type {
-    /*
-     * No face touches the closed cell, which lies outside. In a surface: no face
-     * touches it.
-     */
+    /* No face intersects the cell. In a solid, the cell is outside. */
     EBPO_WHITE = 0,
 
-    /* No face touches the closed cell, which lies inside. */
+    /* No face intersects the cell, and the cell is inside. */
     EBPO_BLACK = 1,
 
-    /* Lists its faces, and has no children. */
+    /* The node lists its faces and has no children. */
     EBPO_LEAF = 2,
 
-    /*
-     * Has eight children; or is pruned: has had them, but they are not in this
-     * file.
-     */
+    /* The node has eight children, or is pruned: its children are not in this file. */
     EBPO_GRAY = 3
 } ebpo_node_type;
 
-/* Which points a solid is made of, by their winding number w. */
+/* Rule that decides by the winding number w which points belong to a solid. */
 typedef enum ebpo_rule {
     EBPO_RULE_NONZERO = 0, /* w != 0 */
     EBPO_RULE_EVENODD = 1, /* w is odd */
@@ -61,65 +53,58 @@ typedef enum ebpo_rule {
 typedef enum ebpo_part {
     EBPO_PART_PLANES = 1,      /* envelope planes of gray nodes */
     EBPO_PART_MESH = 2,        /* vertices, faces, and the leaves' lists of faces */
-    EBPO_PART_MAPS = 4,        /* numbers in the source, of vertices and faces */
+    EBPO_PART_MAPS = 4,        /* source indices of vertices and faces */
     EBPO_PART_LEAF_PLANES = 8, /* stored envelope planes of leaves */
-    EBPO_PART_ATTRIBUTES = 16, /* what the source says of vertices and faces beyond these */
-    EBPO_PART_COLOURS = 32     /* means of the faces' colours, of gray nodes */
+    EBPO_PART_ATTRIBUTES = 16, /* other data of the source for vertices and faces */
+    EBPO_PART_COLOURS = 32     /* mean colours of the faces of gray nodes */
 } ebpo_part;
 
 typedef enum ebpo_codec {
     EBPO_CODEC_ZSTD = 0,    /* HDF5 filter 32015, frames with checksum */
-    EBPO_CODEC_DEFLATE = 1, /* HDF5's own, needs no plugin; fletcher32 checksum */
+    EBPO_CODEC_DEFLATE = 1, /* built-in filter of HDF5, needs no plugin; fletcher32 checksum */
     EBPO_CODEC_NONE = 2
 } ebpo_codec;
 
-/* How the corners of faces are written (format-spec/README.md, section 7). */
+/* Coding of the corners of faces (format-spec/README.md, section 7). */
 typedef enum ebpo_face_coding {
-    /* As the source of a copy has them, but for EBPO_CODEC_NONE; else `high-water`. */
-    EBPO_FACES_USUAL = 0,
+    /* The coding of the source when copying (except for EBPO_CODEC_NONE); else `high-water`. */
+    EBPO_FACES_DEFAULT = 0,
 
     /*
-     * Across edges of faces before them: 7 to 11 % off whole files, and more work for
-     * readers (docs/develop/codings.md). Since format 1.1.
+     * Across edges of preceding faces: whole files are 7 to 11 % smaller, decoding takes longer
+     * (docs/develop/codings.md). Since format 1.1.
      */
     EBPO_FACES_GATES = 1,
 
-    /* By number, as in format 1.0. */
+    /* By index, as in format 1.0. */
     EBPO_FACES_HIGH_WATER = 2
 } ebpo_face_coding;
 
 /*
- * One level: all nodes in the order of their octcodes.
- *
- * The i-th gray node of a level has the i-th group of eight children in the next
- * level. An array is NULL if its count is 0 or the file does not have its part.
+ * One level: all nodes in the order of their octcodes. The i-th gray node of a level has the i-th
+ * group of eight children in the next level. An array is NULL if its count is 0 or the file does
+ * not have its part.
  */
 typedef struct ebpo_level {
-    /*
-     * Groups of eight siblings; level 0: one group, of which only octant 0
-     * exists.
-     */
+    /* Groups of eight siblings. Level 0 has one group, of which only octant 0 exists. */
     uint64_t group_count;
 
     uint64_t gray_count, leaf_count, white_count, black_count;
 
-    /*
-     * [group_count]; type of octant i in bits 2i, 2i + 1; octant: bit 0 x, bit 1
-     * y, bit 2 z
-     */
+    /* [group_count] type of octant i in bits 2i, 2i + 1; octant: bit 0 x, bit 1 y, bit 2 z */
     uint16_t *types;
 
     /* [gray_count] planes that the node adds to its parent's envelope */
     uint8_t *plane_counts;
 
-    /* [plane_count] codes, see ebpo_plane_decode; node after node */
+    /* [plane_count] codes (ebpo_plane_decode), in the order of the nodes */
     uint32_t *planes;
 
     uint64_t plane_count;
 
     /*
-     * [leaf_count] winding number at the leaf's lowest corner, shifted (see
-     * format-spec); solids only
+     * [leaf_count] winding number at the leaf's lowest corner, shifted (see format-spec); solids
+     * only
      */
     int32_t *leaf_winding;
 
@@ -129,59 +114,55 @@ typedef struct ebpo_level {
     /* [white_count], NULL: all 0 */
     int32_t *white_winding;
 
-    /* [leaf_count] number of the leaf's first new face */
+    /* [leaf_count] index of the leaf's first new face */
     uint64_t *leaf_first;
 
     /*
-     * [leaf_count] faces leaf_first .. leaf_first + leaf_new - 1 touch this leaf
-     * and no leaf before it
+     * [leaf_count] faces leaf_first .. leaf_first + leaf_new - 1 intersect this leaf and no earlier
+     * leaf
      */
     uint32_t *leaf_new;
 
-    /* [leaf_count] further faces, all of a number below leaf_first */
+    /* [leaf_count] number of further faces, whose indices are below leaf_first */
     uint32_t *leaf_ref_count;
 
-    /* [ref_count] their numbers, ascending within each leaf; leaf after leaf */
+    /* [ref_count] their indices, ascending within each leaf, in the order of the leaves */
     uint32_t *leaf_refs;
 
     uint64_t ref_count;
 
-    /* Sum of leaf_new */
+    /* Sum of leaf_new. */
     uint64_t new_count;
 
-    /* [leaf_count], part EBPO_PART_LEAF_PLANES */
+    /* [leaf_count] number of planes of each leaf; part EBPO_PART_LEAF_PLANES */
     uint8_t *leaf_plane_counts;
 
-    /* [leaf_plane_count] */
+    /* [leaf_plane_count] codes */
     uint32_t *leaf_planes;
 
     uint64_t leaf_plane_count;
 
-    /*
-     * Volume of the envelopes of this level's gray nodes, in the model's unit
-     * cubed.
-     */
+    /* Volume of the envelopes of this level's gray nodes, in the cube of the model's unit. */
     double gray_volume;
 
     /*
-     * The same for its leaves: cut by stored planes, else as inherited (planes
-     * that readers derive cut off more)
+     * The same for its leaves: envelopes cut by stored planes, else inherited. Planes that readers
+     * derive cut off more.
      */
     double leaf_volume;
 
     /*
-     * Of the gray nodes: those whose children are not in the file. Their groups
-     * in the next level are 0 (and count as eight white nodes); on the last
-     * level all gray nodes are pruned, and have no groups.
+     * Number of pruned gray nodes. Their groups in the next level are 0 and count as eight white
+     * nodes. On the last level all gray nodes are pruned and have no groups.
      */
     uint64_t pruned_count;
 
-    /* Owns all its arrays; NULL: malloc's. */
+    /* Owns all arrays; NULL: allocated with malloc. */
     ebpo_workspace *workspace;
 
     /*
-     * [gray_count], part EBPO_PART_COLOURS: red + 256 green + 65,536 blue, sRGB;
-     * the mean of what is below the node
+     * [gray_count] mean colour below the node, sRGB: red + 256 green + 65,536 blue; part
+     * EBPO_PART_COLOURS
      */
     uint32_t *gray_colours;
 } ebpo_level;
@@ -194,35 +175,30 @@ typedef struct ebpo_level {
 EBPO_API void ebpo_level_free(ebpo_level *level);
 
 /*
- * The half-space of a plane code, in the coordinates of its node's cell: xi =
- * (p - corner) / cell size on each axis, so that xi is 0 to 1. The envelope keeps
- * the points with 4096 * (n . xi) <= d.
- *
- * All numbers are integers, |n0| + |n1| + |n2| = 511, and a reader never rounds
- * anything. False for the codes that stand for no plane.
+ * Decodes the half-space of a plane code. Coordinates are those of the node's cell: xi = (p -
+ * corner) / cell size on each axis, 0 to 1. The envelope keeps the points with 4096 * (n . xi) <=
+ * d. All values are integers, |n0| + |n1| + |n2| = 511, and readers never round. Returns false for
+ * invalid codes.
  *
  * Threads: any.
  */
 EBPO_API bool ebpo_plane_decode(uint32_t code, int32_t n[3], int32_t *d);
 
-/* What the head of a file tells about a level, without reading the level. */
+/* Summary of a level, from the head of the file. */
 typedef struct ebpo_level_summary {
     uint64_t gray_count, leaf_count, white_count, black_count;
     uint64_t plane_count, leaf_plane_count;
 
-    /* Faces first seen, faces referenced again. */
+    /* Faces first listed, and faces referenced again. */
     uint64_t new_count, ref_count;
 
     double gray_volume, leaf_volume;
 
-    /*
-     * Gray nodes without children; white_count of the next level counts eight
-     * for each.
-     */
+    /* Gray nodes without children; white_count of the next level counts eight for each. */
     uint64_t pruned_count;
 } ebpo_level_summary;
 
-/* Everything about a file but its arrays. */
+/* All data of a file except its arrays. */
 typedef struct ebpo_info {
     int version_major, version_minor;
     char generator[64];
@@ -230,28 +206,28 @@ typedef struct ebpo_info {
     uint8_t source_sha256[32];
     uint64_t source_size;
 
-    /* "" when not given */
+    /* "" if not given. */
     char unit[32], crs[256], date[32];
 
-    /* Else it is a surface. */
+    /* True for a solid, false for a surface. */
     bool solid;
 
     ebpo_rule rule;
     bool double_coordinates;
 
-    /* Of the mesh in the file */
+    /* Counts of the mesh in the file. */
     uint64_t vertex_count, face_count;
 
-    /* Triangles before mending */
+    /* Counts before repairs. */
     uint64_t source_vertex_count, source_face_count;
 
-    /* The root cell. */
+    /* Root cell. */
     double box_origin[3], box_size[3];
 
-    /* Deepest level for which the box is exact. */
+    /* Deepest level for which the coordinates of cells are exact. */
     int grid_level;
 
-    /* The limit used in building. */
+    /* Deepest level allowed in building. */
     int max_level;
 
     /* Levels 0 .. level_count - 1 are present. */
@@ -260,21 +236,21 @@ typedef struct ebpo_info {
     uint32_t leaf_faces;
     double epsilon;
 
-    /* The ebpo_selection (build.h) by which planes were chosen. */
+    /* ebpo_selection (build.h) that selected the planes. */
     int selection;
 
-    /* Of the theses' selections, one of the two; else 0. */
+    /* For the selections of the theses: one of the two; else 0. */
     double percent, k_root;
 
-    /* An ebpo_normal_distance, of k-medoids. */
+    /* ebpo_normal_distance, for k-medoids. */
     int normals;
 
-    /* Of k-medoids and random; else 0. */
+    /* For k-medoids and random; else 0. */
     uint64_t seed;
 
-    ebpo_mend_record mend;
+    ebpo_repair_record repair_record;
 
-    /* Counts and measures; places are not stored. */
+    /* Counts and measures; locations are not stored. */
     ebpo_mesh_report report;
 
     /* ebpo_part bits */
@@ -284,85 +260,77 @@ typedef struct ebpo_info {
     uint8_t content_sha256[32];
 
     /*
-     * Where the places of the chunks of large arrays stand, behind the first
-     * levels: for fetching ahead, not relied on; 0: there are none, or the file
-     * does not say.
+     * Location of the chunk directory of large arrays, behind the first levels. It only serves
+     * prefetching. 0: none, or not recorded.
      */
     uint64_t chunk_index_offset, chunk_index_bytes;
 
     /*
-     * The level whose gray nodes are the roots of subtrees: each of these lies
-     * together in the file, and a table tells where. 0: there is no such table.
+     * Level whose gray nodes are the roots of subtrees. Each subtree is contiguous in the file, and
+     * a table gives its location. 0: no table.
      */
     int subtree_level;
 
     /*
-     * With such a table: all that looking up a subtree takes lies within the first
-     * so many bytes. 0: the file does not say.
+     * With a table: number of bytes at the beginning that contain all data for finding a subtree.
+     * 0: not recorded.
      */
     uint64_t top_bytes;
 
     /*
-     * A subset: some gray nodes' children were left out (ebpo_subset). The rest
-     * below says what was asked for then.
+     * True for a subset: children of some gray nodes were omitted (ebpo_subset). The following
+     * members contain the request.
      */
     bool pruned;
 
     /* Levels 0 .. cut_levels - 1 were kept; 0: all. */
     int cut_levels;
 
-    /* What does not meet kept_box (min, max) was left out. */
+    /* Nodes that do not intersect kept_box (min, max) were omitted. */
     bool boxed;
     double kept_box[6];
 
     /*
-     * Where nodes were pruned for it, their envelopes reach at most so far
-     * beyond the model; 0: not asked for.
+     * Upper limit for the error bound of the envelopes of nodes that were pruned for it; 0: not
+     * requested.
      */
     double kept_error;
 
-    /*
-     * content_sha256 of the file that it was taken from; the first one's, when
-     * it was a subset itself.
-     */
+    /* content_sha256 of the original file; for a subset of a subset, of the first file. */
     uint8_t subset_of[32];
 
     ebpo_level_summary level[EBPO_LEVELS_MAX];
 
-    /* Set when reading; head: up to the first level. */
+    /* Set when reading. head_bytes: bytes before the first level. */
     uint64_t file_bytes, head_bytes;
 
-    /*
-     * Set when reading: levels from this one on need the index of chunks as
-     * well; level_count: none does.
-     */
+    /* Set when reading: first level that also needs the chunk directory; level_count: none. */
     int index_level;
 
     /* Checksum of the colours, with EBPO_PART_COLOURS. */
     uint8_t colours_sha256[32];
 
-    /* Corners of faces are stored as `gates`, across edges of other faces. */
+    /* True if the corners of faces are stored with coding `gates`. */
     bool gates;
 } ebpo_info;
 
 /*
- * A whole model in memory: what ebpo_build makes and ebpo_tree_write writes.
- *
- * The mesh is in the order of the file: faces by the first leaf that they touch,
- * depth first by octcode; vertices by their first use, those without faces last.
+ * A whole model in memory: ebpo_build makes it and ebpo_tree_write writes it. Faces are in the
+ * order of the first leaf that they intersect, depth first by octcode. Vertices are in the order of
+ * first use, unreferenced ones last.
  */
 typedef struct ebpo_tree {
     ebpo_info info;
     ebpo_level level[EBPO_LEVELS_MAX];
     ebpo_mesh mesh;
 
-    /* [vertex_count] number in the source, or NULL */
+    /* [vertex_count] source index, or NULL */
     uint32_t *vertex_source;
 
-    /* [face_count]; numbers >= source_face_count: faces added by filling holes */
+    /* [face_count] source index; >= source_face_count: face added by filling holes */
     uint32_t *face_source;
 
-    /* Owns the two; NULL: malloc's. */
+    /* Owns both arrays; NULL: allocated with malloc. */
     ebpo_workspace *workspace;
 } ebpo_tree;
 
@@ -376,46 +344,44 @@ EBPO_API void ebpo_tree_free(ebpo_tree *tree);
 /* ---- writing ---- */
 
 /*
- * Whether the file tells how each of its chunks ends (format-spec/README.md, section
- * 20), so that readers notice one that is in another's place or of another version.
+ * Chunk checksums: list of the checksum at the end of each chunk (format-spec/README.md, section
+ * 20). With it, readers detect a chunk that was exchanged with another one or with another version.
  */
-typedef enum ebpo_chunk_sums {
-    EBPO_SUMS_USUAL = 0, /* it does */
-    EBPO_SUMS_NONE = 1   /* as in files of 1.0 */
-} ebpo_chunk_sums;
+typedef enum ebpo_chunk_checksums {
+    EBPO_CHECKSUMS_DEFAULT = 0, /* written */
+    EBPO_CHECKSUMS_NONE = 1     /* not written, as in format 1.0 */
+} ebpo_chunk_checksums;
 
 typedef struct ebpo_write_options {
-    size_t struct_size; /* EBPO_WRITE_OPTIONS_INIT sets it */
+    size_t struct_size;
 
     ebpo_codec codec;
 
     /*
-     * 0: the default, 6 of deflate; of zstd 3 for small chunks, and from 4 KiB on
-     * 7 without matches of less than six bytes.
+     * 0: the default. deflate: 6. zstd: 3 for small chunks; from 4 KiB on 7 without matches of less
+     * than six bytes.
      */
     int codec_level;
 
-    /* 0: all cores. The result does not depend on it. */
     unsigned threads;
 
-    /* Bits of ebpo_part: which to write, of those the tree has. */
+    /* ebpo_part bits: parts to write if the tree has them. */
     uint32_t parts;
 
     ebpo_progress progress;
 
     /*
-     * What is laid out so that it is read at once (format-spec/README.md, section 9):
-     * the subtrees of the deepest level that has at least so many faces for each gray
-     * node, or of level 1 where that has fewer. 0: 1,024, and no subtrees in files of
-     * fewer than 131,072 faces. EBPO_NO_SUBTREES: none, as in format 1.0. Trees of fewer
-     * than three levels have none.
+     * Minimum mean number of faces per gray node of the level of subtrees (format-spec/README.md,
+     * section 9). A subtree is contiguous, so that one read loads it. The deepest level with this
+     * mean is used, or level 1 if that has fewer. 0: 1,024, but no subtrees below 131,072 faces.
+     * EBPO_NO_SUBTREES: none, as in format 1.0. Trees of fewer than three levels have none.
      */
     uint64_t subtree_faces;
 
-    /* Of the mesh, if it is written. */
+    /* For the mesh, if it is written. */
     ebpo_face_coding face_coding;
 
-    ebpo_chunk_sums chunk_sums;
+    ebpo_chunk_checksums chunk_checksums;
 } ebpo_write_options;
 
 #define EBPO_NO_SUBTREES UINT64_MAX
@@ -423,18 +389,16 @@ typedef struct ebpo_write_options {
 #define EBPO_WRITE_OPTIONS_INIT                                                    \
     {                                                                              \
         sizeof(ebpo_write_options), EBPO_CODEC_ZSTD, 0, 0, ~0u, { NULL, NULL }, 0, \
-            EBPO_FACES_USUAL, EBPO_SUMS_USUAL                                      \
+            EBPO_FACES_DEFAULT, EBPO_CHECKSUMS_DEFAULT                             \
     }
 
 /*
- * Writes a tree as a file, which appears whole or not at all: under a temporary
- * name, synced and renamed, and its folder synced. Equal trees give identical
- * bytes.
+ * Writes a tree to a file, which is replaced atomically: it is written under a temporary name,
+ * synced and renamed, and its folder is synced. Equal trees give identical bytes.
  *
- * EBPO_E_ARGUMENT: the tree is not valid, or no such codec. EBPO_E_IO,
- * EBPO_E_CANCELLED, EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: the tree or the codec is not valid. EBPO_E_IO.
  *
- * Threads: any, while nobody changes the tree.
+ * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_tree_write(const ebpo_tree *tree, const char *path,
                                                    const ebpo_write_options *options,
@@ -448,23 +412,21 @@ typedef struct ebpo_range {
 } ebpo_range;
 
 /*
- * Where bytes come from. Begin it with EBPO_SOURCE_INIT. Its functions are called
- * by several threads at once, but for `close`.
+ * Source of bytes. Initialize it with EBPO_SOURCE_INIT. Several threads may call its functions at
+ * the same time, except `close`.
  */
 typedef struct ebpo_source {
-    size_t struct_size; /* EBPO_SOURCE_INIT sets it */
+    size_t struct_size;
 
-    /* Handed to the functions. */
+    /* Argument of the functions. */
     void *user;
 
-    /* Bytes. */
+    /* Size in bytes. */
     uint64_t size;
 
     /*
-     * Fills `data` with `size` bytes from `offset` on, all of which lie within the
-     * source, or fails.
-     *
-     * It may be called from any thread that uses the file.
+     * Fills `data` with `size` bytes from `offset` on, or fails. The range is within the source.
+     * Any thread that uses the file may call it.
      */
     ebpo_status (*read)(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error);
 
@@ -472,17 +434,16 @@ typedef struct ebpo_source {
     void (*close)(void *user);
 
     /*
-     * Announces ranges within the source that will be read soon, each about once:
-     * a source far away fetches them together and ahead of the reader. It does not
-     * wait, and nothing depends on it. May be NULL.
+     * Prefetch hint: ranges that will be read soon, about once each. A remote source fetches them
+     * together and in advance. It returns immediately, and results do not depend on it. May be
+     * NULL.
      */
     void (*prefetch)(void *user, const ebpo_range *ranges, size_t count);
 
     /*
-     * With `prefetch`: so many bytes at the beginning need no fetching. If they are
-     * not the whole file, opening looks at no others. Where the chunks lie of
-     * arrays of more than one chunk is read when it is needed, or by
-     * ebpo_file_locate.
+     * With `prefetch`: number of bytes at the beginning that are available already. If they are not
+     * the whole file, opening reads only these; the chunk offsets of arrays of several chunks are
+     * read when needed, or by ebpo_file_locate.
      */
     uint64_t prefetched;
 } ebpo_source;
@@ -491,63 +452,57 @@ typedef struct ebpo_source {
 
 /* ---- opening ---- */
 
-/*
- * An open file. It does not change: any number of threads may use it at once.
- */
+/* An open file. It does not change, so any number of threads may use it at the same time. */
 typedef struct ebpo_file ebpo_file;
 
 /*
- * Opens a file by its path or URL (http.h), and reads its head only: the facts,
- * and where each chunk of each array lies. libhdf5 has no part in it, nor in anything
- * that is read later, and nothing that it could load has.
+ * Opens a file by its path or URL (http.h) and reads only its head: metadata and chunk offsets.
+ * Neither this nor later reading uses libhdf5 or its plugins.
  *
- * Safe on untrusted files: whatever the bytes, nothing is read or written beyond what
- * was allocated, and nothing is loaded or run because of them. What is answered about a
- * file that was made to deceive is true of that file; ebpo_verify proves that its parts
- * belong together. A file that another program shortens or damages while it is open
- * gives EBPO_E_IO or EBPO_E_FORMAT: chunks have checksums, and the file says which chunk
- * ends with which (ebpo_chunk_sums), so that a whole chunk in another's place is noticed
- * too; of files without that list ebpo_file_check_content tells.
- * Where chunks have no checksums, as in copies by other programs, all of the file is
- * read, and content_sha256 compared, before it is open; later changes are not noticed.
+ * Safe for untrusted files: for any bytes, memory accesses stay within allocations, and no code is
+ * loaded or executed. Results of a deceptive file are correct for that file; ebpo_verify proves
+ * that its parts are consistent.
  *
- * EBPO_E_IO. EBPO_E_FORMAT: not such a file, or damaged. EBPO_E_VERSION: another
- * major version, or a part that this library does not know. EBPO_E_UNSUPPORTED: a
- * file that another program, such as h5repack, has laid out in a way that this
- * library does not write. EBPO_E_LIMIT: its arrays take very much more room decoded
- * than in the file (ebpo_open_options). EBPO_E_MEMORY.
+ * If another program truncates or damages an open file, reading returns EBPO_E_IO or EBPO_E_FORMAT.
+ * Chunks have checksums, and the list of chunk checksums (ebpo_chunk_checksums) also detects
+ * exchanged chunks. For files without that list, ebpo_file_check_content detects them. If chunks
+ * have no checksums, as in copies by other programs, opening reads the whole file and compares
+ * content_sha256; later changes are not detected.
+ *
+ * EBPO_E_IO. EBPO_E_FORMAT: not an .ebpo.h5 file, or damaged. EBPO_E_VERSION: another major
+ * version, or an unknown part. EBPO_E_UNSUPPORTED: another program, such as h5repack, wrote a
+ * layout that this library does not write. EBPO_E_LIMIT: the decoded arrays are too large for the
+ * file size (ebpo_open_options).
  *
  * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error);
 
 /*
- * How often the bytes of a file its decoded arrays may take, and how many bytes they
- * may take in any case: small files are never refused. A flat sheet of two million
- * equal squares has 26 times its file; a file that was made to exhaust memory can
- * have thousands of times.
+ * Limits for the size of the decoded arrays: multiple of the file size, and size in bytes that is
+ * always allowed.
  */
-#define EBPO_EXPANSION_MOST 256
+#define EBPO_EXPANSION_MAX  256
 #define EBPO_EXPANSION_FREE (UINT64_C(64) << 20)
 
-/* How a file is opened; 0 and NULL: as usual. */
+/* Options for opening a file; 0 and NULL select defaults. */
 typedef struct ebpo_open_options {
-    size_t struct_size; /* EBPO_OPEN_OPTIONS_INIT sets it */
+    size_t struct_size;
 
-    /* Instead of EBPO_EXPANSION_MOST; UINT64_MAX: any. */
-    uint64_t most_expansion;
+    /* Used instead of EBPO_EXPANSION_MAX; UINT64_MAX: no limit. */
+    uint64_t max_expansion;
 
-    /* Open these bytes instead; the name is for messages. Closed as by ebpo_open_source. */
+    /* Opens this source instead; the path is only for messages. Closed as by ebpo_open_source. */
     const ebpo_source *source;
 
-    /* Of a URL: http.h. */
+    /* Options for a URL (http.h). */
     const struct ebpo_http_options *http;
 } ebpo_open_options;
 
 #define EBPO_OPEN_OPTIONS_INIT EBPO_SIZED(ebpo_open_options)
 
 /*
- * ebpo_open with options.
+ * Opens a file as ebpo_open does, with options.
  *
  * Threads: any.
  */
@@ -555,52 +510,56 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_with(const char *path,
                                                   const ebpo_open_options *options, ebpo_file **out,
                                                   ebpo_error *error);
 
-/* How ebpo_open_compat goes about it; 0 and NULL: as usual. */
+/* Options for ebpo_open_compat; 0 and NULL select defaults. */
 typedef struct ebpo_compat_options {
-    size_t struct_size; /* EBPO_COMPAT_OPTIONS_INIT sets it */
+    size_t struct_size;
 
-    /* Bytes that the other process may take, beyond those that this one has; 0: 1 GiB. */
+    /*
+     * Memory limit of the other process, in bytes in addition to the memory of this process; 0: 1
+     * GiB.
+     */
     uint64_t memory_bytes;
 
-    /* Seconds of processor time that it may take; 0: 60, and one for each 4 MiB of the file. */
+    /* Limit of its processor time in seconds; 0: 60, plus one for each 4 MiB of the file. */
     unsigned seconds;
 
     /* For checking the content; 0: all cores. */
     unsigned threads;
 
-    /* Of a URL: http.h. NULL: as usual. */
+    /* Options for a URL (http.h). NULL: defaults. */
     const struct ebpo_http_options *http;
 
     /* As in ebpo_open_options. */
-    uint64_t most_expansion;
+    uint64_t max_expansion;
 } ebpo_compat_options;
 
 #define EBPO_COMPAT_OPTIONS_INIT EBPO_SIZED(ebpo_compat_options)
 
 /*
- * ebpo_open, and what it refuses with EBPO_E_UNSUPPORTED is read through libhdf5: in
- * a separate process with limits on memory, time and what it writes, and without
- * plugins. That process writes the chunks, as they are or, where their filters, size or
- * byte order is none of this format, anew, into a file without a name in
- * TMPDIR, about as large as the original; a URL is fetched there as a whole before. The
- * copy is opened as every other file, and its content checksum compared. That does
- * not count attributes, such as the root's box, and such files have no checksums for
- * their heads: ebpo_verify finds what is wrong there. ebpo_info tells the copy's bytes.
+ * Opens a file as ebpo_open does. A file that ebpo_open rejects with EBPO_E_UNSUPPORTED is
+ * converted with libhdf5 in a separate process, without plugins and with limits on memory, time and
+ * output. That process copies the chunks to an unnamed file in TMPDIR, about as large as the
+ * original. It encodes chunks again if their filters, size or byte order differ from the format. A
+ * URL is first fetched completely to TMPDIR.
  *
- * The errors of ebpo_open. EBPO_E_FORMAT: libhdf5 refused the file or died of it, or
- * its content is not what the head says. EBPO_E_IO: no process or no file could be
- * made. EBPO_E_UNSUPPORTED: this library was built without libhdf5.
+ * The copy is then opened like any other file, and its content checksum is compared. This checksum
+ * does not include attributes, such as the root's box, and the heads of these files have no
+ * checksums: ebpo_verify finds errors there. ebpo_info describes the bytes of the copy.
  *
- * Threads: any. The process is copied (fork) while it runs; handlers for SIGCHLD
- * that take children which are not theirs make the result EBPO_E_FORMAT.
+ * Errors are those of ebpo_open. EBPO_E_FORMAT: libhdf5 rejected the file or crashed, or the
+ * content differs from the head. EBPO_E_IO: no process or no file could be made.
+ * EBPO_E_UNSUPPORTED: the library was built without libhdf5.
+ *
+ * Threads: any. The process is forked during the call. A SIGCHLD handler that reaps other children
+ * causes EBPO_E_FORMAT.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_compat(const char *path,
                                                     const ebpo_compat_options *options,
                                                     ebpo_file **out, ebpo_error *error);
 
 /*
- * The same from bytes in memory, which stay the caller's and must stay as long as
- * the file. `name` is for messages and may be NULL.
+ * Opens a file in memory. The bytes are borrowed until the file is closed. `name` is for messages
+ * and may be NULL.
  *
  * Threads: any.
  */
@@ -609,8 +568,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_memory(const void *data, uint64_t s
                                                     ebpo_error *error);
 
 /*
- * The same from any source, which is closed with the file. It is also closed if
- * opening fails, unless its struct_size was never set.
+ * Opens a file from any source. The source is closed with the file. It is also closed if opening
+ * fails, unless its struct_size is not set.
  *
  * Threads: any.
  */
@@ -618,133 +577,134 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_source(const ebpo_source *source, c
                                                     ebpo_file **out, ebpo_error *error);
 
 /*
- * After the models and streams that were made from the file.
+ * Closes a file. Free the models and streams of the file first.
  *
  * Threads: one per file.
  */
 EBPO_API void ebpo_close(ebpo_file *file);
 
-/* ---- facts ---- */
+/* ---- metadata ---- */
 
 /*
- * Valid until the file is closed.
+ * Returns the metadata, valid until the file is closed.
  *
  * Threads: any.
  */
 EBPO_API const ebpo_info *ebpo_file_info(const ebpo_file *file);
 
-/* Sums since opening, of which the head's reading is a part. */
+/* Sums since opening, including the reading of the head. */
 typedef struct ebpo_file_stats {
-    size_t struct_size; /* EBPO_FILE_STATS_INIT sets it */
+    size_t struct_size;
 
-    /* Bytes asked of the source. */
+    /* Bytes requested from the source. */
     uint64_t bytes_read;
 
-    /* How many times. */
+    /* Number of requests to the source. */
     uint64_t reads;
 } ebpo_file_stats;
 
 #define EBPO_FILE_STATS_INIT EBPO_SIZED(ebpo_file_stats)
 
 /*
- * What was asked of the source so far. ebpo_file_get_http_stats tells what went
- * over the net.
- *
- * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ * Gets statistics of the requests to the source. ebpo_file_get_http_stats reports network
+ * transfers.
  *
  * Threads: any.
  */
 EBPO_API ebpo_status ebpo_file_get_stats(const ebpo_file *file, ebpo_file_stats *out);
 
-/* An array of a file. Texts live as long as the library. */
+/* Description of an array of a file. Its texts are static. */
 typedef struct ebpo_array_facts {
-    size_t struct_size; /* EBPO_ARRAY_FACTS_INIT sets it */
+    size_t struct_size;
     char path[48];
     uint64_t rows;
-    unsigned columns;       /* 1: one number a row */
+    unsigned columns;       /* 1: one value per row */
     unsigned element_bytes; /* in the file, before compression */
     bool is_signed;
-    uint64_t stored_bytes;      /* compressed; after ebpo_file_locate */
-    const char *coding, *about; /* how numbers are to be read, and what they mean */
+    uint64_t stored_bytes;      /* compressed size; set after ebpo_file_locate */
+    const char *coding, *about; /* coding of the values, and their meaning */
 } ebpo_array_facts;
 #define EBPO_ARRAY_FACTS_INIT EBPO_SIZED(ebpo_array_facts)
 
-/* The n-th array of the file (n from 0) in the order of their bytes.
+/*
+ * Describes the n-th array of the file, in the order of their bytes. Returns false if there are
+ * fewer; `out` is then unchanged.
  *
- * False when there are fewer; `out` is then as it was. Its texts are static.
- *
- * Threads: any. */
+ * Threads: any.
+ */
 EBPO_API bool ebpo_file_array(const ebpo_file *file, unsigned n, ebpo_array_facts *out);
 
-/* An array of attributes: numbers that vertices, faces or other elements have. */
+/* Description of an array of attributes: values of vertices, faces or other elements. */
 typedef struct ebpo_attribute_facts {
-    size_t struct_size; /* EBPO_ATTRIBUTE_FACTS_INIT sets it */
+    size_t struct_size;
 
     /* "vertex", "face", or another element of the source. */
     char element[64];
 
-    /* Of each column, with one space between them. */
+    /* Names of the columns, separated by one space. */
     char names[256];
 
-    /* Of the values: an ebpo_attribute_type. */
+    /* ebpo_attribute_type of the values. */
     uint64_t type;
 
     uint64_t rows;
 
-    /* Of a list: its items, if all lists are as long; else 0. */
+    /* List: number of items if equal in all rows; else 0. */
     uint64_t columns;
 
-    /* 1: a list in each row. */
+    /* 1: each row is a list. */
     uint64_t list;
 
     /* 1: the file states the range. */
     uint64_t has_range;
 
-    /* Least and greatest of all values. */
+    /* Minimum and maximum of all values. */
     double range[2];
 
-    /* Compressed; after ebpo_file_locate. */
+    /* Compressed size; set after ebpo_file_locate. */
     uint64_t stored_bytes;
 } ebpo_attribute_facts;
 
 #define EBPO_ATTRIBUTE_FACTS_INIT EBPO_SIZED(ebpo_attribute_facts)
 
 /*
- * The n-th array of attributes of the file, n from 0.
- *
- * False when there are fewer; `out` is then as it was.
+ * Describes the n-th array of attributes. Returns false if there are fewer; `out` is then
+ * unchanged.
  *
  * Threads: any.
  */
 EBPO_API bool ebpo_file_attribute(const ebpo_file *file, unsigned n, ebpo_attribute_facts *out);
 
-/* The name of an ebpo_attribute_type: "int8" to "float64"; NULL: no such type. Static. Threads:
- * any. */
+/*
+ * Returns the static name of an ebpo_attribute_type, "int8" to "float64"; NULL for an invalid type.
+ *
+ * Threads: any.
+ */
 EBPO_API const char *ebpo_attribute_type_text(uint64_t type);
 
-/* Bytes that parts take in the file, compressed. */
+/* Compressed sizes of parts of the file, in bytes. */
 typedef struct ebpo_stored_sizes {
-    size_t struct_size; /* EBPO_STORED_SIZES_INIT sets it */
+    size_t struct_size;
 
     uint64_t level_bytes[EBPO_LEVELS_MAX];
     uint64_t mesh_vertex_bytes, mesh_face_bytes, map_bytes;
 
-    /* Of the table of subtrees. */
+    /* Table of subtrees. */
     uint64_t subtree_bytes;
 
     uint64_t attribute_bytes;
 
-    /* Of the list of all chunks' checksums. */
+    /* List of chunk checksums. */
     uint64_t sum_bytes;
 } ebpo_stored_sizes;
 
 #define EBPO_STORED_SIZES_INIT EBPO_SIZED(ebpo_stored_sizes)
 
 /*
- * Finds out where all chunks lie, if that has not been read yet (files far away,
- * `prefetched` of ebpo_source), and adds up what they take. `out` may be NULL.
+ * Reads all chunk offsets, if not done yet (remote files, `prefetched` of ebpo_source), and sums
+ * the sizes. `out` may be NULL.
  *
- * EBPO_E_ARGUMENT: `out` was not begun with its macro. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ * EBPO_E_IO, EBPO_E_FORMAT.
  *
  * Threads: any.
  */
@@ -752,12 +712,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_
                                                     ebpo_error *error);
 
 /*
- * Announces that levels `first` to `last`, or to the last level, will be read. A
- * source far away then fetches them with as few requests as it can, where reading
- * one after the other would ask for each by itself.
- *
- * Waits for the index of chunks at most (ebpo_file_locate). Cannot fail: what could
- * not be fetched is told when it is read.
+ * Prefetch hint: levels `first` to `last` (or to the last level) will be read. A remote source then
+ * fetches them with as few requests as possible. Waits only for the chunk directory
+ * (ebpo_file_locate). Errors are reported by later reads.
  *
  * Threads: any.
  */
@@ -766,25 +723,24 @@ EBPO_API void ebpo_file_prefetch_levels(const ebpo_file *file, int first, int la
 /* ---- reading ---- */
 
 typedef struct ebpo_read_options {
-    /* EBPO_READ_OPTIONS_INIT sets it. */
     size_t struct_size;
 
     /* 0: all cores */
     unsigned threads;
 
-    /* Owns what is read, and is freed after it; NULL: malloc does. */
+    /* Owns the results, and is freed after them; NULL: malloc. */
     ebpo_workspace *workspace;
 
     /*
-     * ebpo_file_read_level: bits of ebpo_part that are not read though the file has
-     * them: their arrays are NULL, the counts stay. Whole trees (ebpo_file_read_tree,
-     * ebpo_file_repack) are not read without: EBPO_E_ARGUMENT unless it is 0.
+     * For ebpo_file_read_level: ebpo_part bits that are not read. Their arrays are NULL, their
+     * counts are set. Must be 0 for whole trees (ebpo_file_read_tree, ebpo_file_repack): otherwise
+     * EBPO_E_ARGUMENT.
      */
     uint64_t without;
 
     /*
-     * 1: ebpo_file_read_mesh and ebpo_file_read_source_mesh read attributes as well, if
-     * the file has them. Trees always have them.
+     * 1: ebpo_file_read_mesh and ebpo_file_read_source_mesh also read attributes if the file has
+     * them. Trees always have them.
      */
     uint64_t attributes;
 } ebpo_read_options;
@@ -795,15 +751,12 @@ typedef struct ebpo_read_options {
     }
 
 /*
- * What is read is the caller's, and is freed by the function for its type. On
- * failure it is cleared.
+ * The caller owns the results of reading and frees them with the function for their type. On
+ * failure they are cleared. All can return EBPO_E_IO and EBPO_E_FORMAT.
  */
 
 /*
- * Reads one level, from 0 on, and checks it: counts, ranges, order, index arrays.
- * Freed by ebpo_level_free.
- *
- * EBPO_E_ARGUMENT: no such level. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ * Reads a level and checks its counts, ranges, order and index arrays. Freed by ebpo_level_free.
  *
  * Threads: any.
  */
@@ -812,9 +765,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_level(const ebpo_file *file, i
                                                         ebpo_level *out, ebpo_error *error);
 
 /*
- * Reads the mesh, in the order of the file. Freed by ebpo_mesh_free.
+ * Reads the mesh in the order of the file. Freed by ebpo_mesh_free.
  *
- * EBPO_E_ABSENT: the file has no mesh. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ * EBPO_E_ABSENT: the file has no mesh.
  *
  * Threads: any.
  */
@@ -822,7 +775,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_mesh(const ebpo_file *file,
                                                        const ebpo_read_options *options,
                                                        ebpo_mesh *out, ebpo_error *error);
 
-/* Numbers in the source. */
+/* Indices in the source. */
 typedef struct ebpo_maps {
     /* [vertex_count] */
     uint32_t *vertex_source;
@@ -830,15 +783,15 @@ typedef struct ebpo_maps {
     /* [face_count] */
     uint32_t *face_source;
 
-    /* Owns both; NULL: malloc's */
+    /* Owns both arrays; NULL: allocated with malloc. */
     ebpo_workspace *workspace;
 } ebpo_maps;
 
 /*
- * Reads the maps. They are checked to be permutations of 0 .. count - 1; after
- * welding, different numbers below source_vertex_count.
+ * Reads the maps. They are checked to be permutations of 0 .. count - 1; after welding, to be
+ * distinct indices below source_vertex_count.
  *
- * EBPO_E_ABSENT: the file has no maps. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ * EBPO_E_ABSENT: the file has no maps.
  *
  * Threads: any.
  */
@@ -853,29 +806,29 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_maps(const ebpo_file *file,
  */
 EBPO_API void ebpo_maps_free(ebpo_maps *maps);
 
-/* The values of an array of attributes. */
+/* Values of an array of attributes. */
 typedef struct ebpo_attribute_values {
     /*
-     * [rows][columns] of the array's type, in the machine's byte order; of lists of
-     * different lengths the items of all, row after row
+     * [rows][columns] of the array's type, in native byte order; lists of different lengths: the
+     * items of all rows in order
      */
     void *values;
 
-    /* [rows] of such lists, how many items all rows up to this one have; else NULL */
+    /* [rows] for such lists: number of items in all rows up to this one; else NULL */
     uint64_t *ends;
 
-    /* In `values`. */
+    /* Number of items in `values`. */
     uint64_t count;
 
-    /* Owns both; NULL: malloc's */
+    /* Owns both arrays; NULL: allocated with malloc. */
     ebpo_workspace *workspace;
 } ebpo_attribute_values;
 
 /*
- * Reads the n-th array of attributes, in the order of the file's vertices or faces.
- * Freed by ebpo_attribute_values_free. On failure `out` is cleared.
+ * Reads the n-th array of attributes, in the order of the file's vertices or faces. Freed by
+ * ebpo_attribute_values_free.
  *
- * EBPO_E_ABSENT: the file has fewer. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ * EBPO_E_ABSENT: the file has fewer.
  *
  * Threads: any.
  */
@@ -885,12 +838,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_attribute(const ebpo_file *fil
                                                             ebpo_error *error);
 
 /*
- * Of an array of lists only where they end: `values` is NULL, `ends` and `count` are
- * those of ebpo_file_read_attribute. `ends` is NULL where all lists are as long as the
- * array has columns, and of an array without lists. Freed by
- * ebpo_attribute_values_free. On failure `out` is cleared.
+ * Reads only the ends of the lists of an array: `values` is NULL, `ends` and `count` are those of
+ * ebpo_file_read_attribute. `ends` is NULL for an array without lists or with lists of equal
+ * length. Freed by ebpo_attribute_values_free.
  *
- * EBPO_E_ABSENT: the file has fewer. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ * EBPO_E_ABSENT: the file has fewer.
  *
  * Threads: any.
  */
@@ -907,9 +859,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_attribute_ends(const ebpo_file *fil
 EBPO_API void ebpo_attribute_values_free(ebpo_attribute_values *values);
 
 /*
- * Reads everything. Freed by ebpo_tree_free.
+ * Reads the whole file. Freed by ebpo_tree_free.
  *
- * EBPO_E_ARGUMENT: `without` is not 0. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: `without` is not 0.
  *
  * Threads: any.
  */
@@ -918,11 +870,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_tree(const ebpo_file *file,
                                                        ebpo_tree *out, ebpo_error *error);
 
 /*
- * Reads the mesh and puts it into the order of the source if the file has maps;
- * else it stays in the order of the file. *source_order tells which. Freed by
- * ebpo_mesh_free.
+ * Reads the mesh. If the file has maps, the mesh is in the order of the source and *source_order is
+ * true; otherwise it is in the order of the file. Freed by ebpo_mesh_free.
  *
- * EBPO_E_ABSENT: the file has no mesh. EBPO_E_IO, EBPO_E_FORMAT, EBPO_E_MEMORY.
+ * EBPO_E_ABSENT: the file has no mesh.
  *
  * Threads: any.
  */
@@ -932,10 +883,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_source_mesh(const ebpo_file *f
                                                               ebpo_error *error);
 
 /*
- * Computes the content checksum again from all arrays. Reads the whole file; of it a few
- * chunks for each thread are held, and images that it has embedded.
+ * Computes the content checksum from all arrays and compares it. Reads the whole file; memory holds
+ * a few chunks per thread, and the embedded images.
  *
- * EBPO_E_FORMAT: it is not the one in the head. EBPO_E_IO, EBPO_E_MEMORY.
+ * EBPO_E_FORMAT: it differs from the head. EBPO_E_IO.
  *
  * Threads: any.
  */
@@ -944,18 +895,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(const ebpo_file *file
                                                            ebpo_error *error);
 
 /*
- * Writes a file anew: all that it holds, laid out as `write` says (codec, subtrees;
- * its `parts` are not asked). The new file appears whole or not at all, and may take
- * the place of the one that is read. Before that it is read again: its
- * content_sha256 is that of `file`, which by that is checked as well.
+ * Writes the whole content of a file to a new file with the layout of `write` (codec, subtrees;
+ * `parts` is ignored). `path` is replaced atomically and may be the path of `file`. Before that the
+ * new file is read again: its content_sha256 must be that of `file`, which also checks `file`. The
+ * whole model is in memory, limited by `read`.
  *
- * The whole model is held at once, as `read` says.
- *
- * EBPO_E_FORMAT: the content of `file` is not what its checksum says.
- * EBPO_E_UNSUPPORTED: it is, but this library would write other arrays (another program
- * has chosen wider types than needed, say); nothing is written. EBPO_E_IO: also where
- * `path` is that of `file`, and another program has replaced it since it was opened.
- * EBPO_E_ARGUMENT, EBPO_E_CANCELLED, EBPO_E_MEMORY, as reading and writing give them.
+ * EBPO_E_FORMAT: the content of `file` differs from its checksum. EBPO_E_UNSUPPORTED: the checksum
+ * is correct, but this library would write other arrays (for example, another program chose wider
+ * types than needed); nothing is written. EBPO_E_IO: also if `path` is that of `file` and another
+ * program has replaced it since opening. Other errors are those of reading and writing.
  *
  * Threads: any.
  */
@@ -965,10 +913,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_repack(const ebpo_file *file, const
                                                     ebpo_error *error);
 
 /*
- * Registers the zstd filter with libhdf5 in this process, so that the caller's own
- * HDF5 calls can read the files too.
+ * Registers the zstd filter with libhdf5 in this process, so that HDF5 calls of the caller can read
+ * the files.
  *
- * EBPO_E_UNSUPPORTED: libhdf5 did not take it.
+ * EBPO_E_UNSUPPORTED: libhdf5 rejected the filter.
  *
  * Threads: any.
  */

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: groups of faces that a file has names for.
+ * Reads the named groups of faces of an OBJ file.
  *
  *   ebpo_mesh_read_groups      a mesh and its groups
- *   ebpo_mesh_groups_count, ebpo_mesh_groups_get, ebpo_mesh_groups_free
- *   ebpo_components_of_groups  each as a mesh of its own
+ * ebpo_mesh_groups_count, ebpo_mesh_groups_get, ebpo_mesh_groups_free
+ *   ebpo_components_of_groups  each group as a separate mesh
  */
 #ifndef EBPO_GROUPS_H
 #define EBPO_GROUPS_H
@@ -15,26 +15,26 @@ extern "C" {
 #endif
 
 /*
- * The groups that an OBJ file has names for: the faces that follow a line `g` or
- * `o`, up to the next of them, whichever of the two it is. The name is the rest of
- * the line, without spaces around it. Groups of one name are one. Faces before the
- * first name, and under an empty one, are in the group "default".
+ * Named groups of an OBJ file. A group contains the faces that follow a line `g` or `o`, up to the
+ * next line of either kind. The name is the rest of the line without surrounding spaces. Groups of
+ * equal name are one group. Faces before the first name or under an empty name are in the group
+ * "default".
  */
 typedef struct ebpo_mesh_groups ebpo_mesh_groups;
 
 typedef struct ebpo_mesh_group {
-    size_t struct_size; /* EBPO_MESH_GROUP_INIT sets it */
+    size_t struct_size;
 
     /*
-     * As the file has it: any bytes but 0 and ends of lines, in any number.
-     * Valid until ebpo_mesh_groups_free.
+     * Name as in the file: any number of any bytes except 0 and line ends. Valid until
+     * ebpo_mesh_groups_free.
      */
     const char *name;
 
-    /* 0: the file names it, but it has no faces. */
+    /* 0: the file names the group, but it has no faces. */
     uint64_t face_count;
 
-    /* Least number of its faces in the source. */
+    /* Lowest source index of its faces. */
     uint64_t first_face;
 } ebpo_mesh_group;
 
@@ -43,8 +43,7 @@ typedef struct ebpo_mesh_group {
 /*
  * Reads a mesh as ebpo_mesh_read does, and its groups.
  *
- * groups   freed by ebpo_mesh_groups_free; NULL where the file has no names or is
- *          no OBJ file, and on failure
+ * groups   freed by ebpo_mesh_groups_free; NULL if the file has no names or is not an OBJ file
  *
  * Errors are those of ebpo_mesh_read. On failure `out` is cleared.
  *
@@ -56,24 +55,22 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read_groups(const char *path,
                                                          ebpo_error *error);
 
 /*
- * NULL is fine.
+ * Frees the groups.
  *
  * Threads: one per object.
  */
 EBPO_API void ebpo_mesh_groups_free(ebpo_mesh_groups *groups);
 
 /*
- * How many; 0 for NULL. Those with faces come first, in the order of their first
- * faces, then those without.
+ * Returns the number of groups; 0 for NULL. Groups with faces come first, in the order of their
+ * first faces.
  *
  * Threads: any.
  */
 EBPO_API uint64_t ebpo_mesh_groups_count(const ebpo_mesh_groups *groups);
 
 /*
- * One of them, from 0.
- *
- * EBPO_E_ARGUMENT: there is none of that number, or `out` has no size.
+ * Gets group `number`.
  *
  * Threads: any.
  */
@@ -82,19 +79,17 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_groups_get(const ebpo_mesh_groups *
                                                         ebpo_error *error);
 
 /*
- * What ebpo_components_new gives, of groups: each with faces is one, of the group's
- * number. A vertex may be in several of them. Whether one is closed is not looked
- * at (ebpo_mesh_check of its mesh tells), and nothing is a cavity.
+ * Makes one component (ebpo_components_new) of each group with faces, with the group's number. A
+ * vertex may be in several groups. Components are not tested for closedness (use ebpo_mesh_check on
+ * their meshes) and are never cavities.
  *
- * mesh     what was read with the groups; faces may have been turned and vertices
- *          welded, but no holes filled. Borrowed, as the groups, until
- *          ebpo_components_free; neither may change.
- * out      freed by ebpo_components_free. On failure NULL.
+ * mesh   the mesh read with the groups; faces may have been turned and vertices welded, but no
+ *        holes filled. Mesh and groups are borrowed until ebpo_components_free.
+ * out    freed by ebpo_components_free
  *
- * EBPO_E_ARGUMENT: the groups are NULL or not of this mesh. EBPO_E_FORMAT,
- * EBPO_E_IO, EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: the groups are NULL or not of this mesh. EBPO_E_FORMAT, EBPO_E_IO.
  *
- * Threads: any, while nobody changes the mesh.
+ * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_components_of_groups(const ebpo_mesh *mesh,
                                                              const ebpo_mesh_groups *groups,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: files on web servers and object stores, read by ranges.
+ * Reads files on web servers and object stores by ranges.
  *
  *     ebpo_open("https://example.org/model.ebpo.h5", &file, &error);
  *
@@ -9,14 +9,14 @@
  *     options.cache_folder = "/var/cache/models";
  *     ebpo_open_url("https://example.org/model.ebpo.h5", &options, &file, &error);
  *
- * Any server will do that answers "Range: bytes=a-b" with 206. Opening costs one
- * request, for the first 128 KiB, which mostly hold levels 0 to 4 too. What is
- * read later is fetched ahead in requests of up to 4 MiB, several at a time.
+ * The server must respond to "Range: bytes=a-b" with 206. Opening takes one request for the first
+ * 128 KiB, which usually include levels 0 to 4. Later data is fetched in advance in requests of up
+ * to 4 MiB, several at a time.
  *
- * Every answer is checked: its range, its size, and that it is of the version of
- * the file that was opened (by ETag, weak or not, else Last-Modified, and size).
+ * Every response is checked: its range, its size, and the version of the file (ETag, weak or not,
+ * else Last-Modified, and size), which must be that of the opened file.
  *
- * Without libcurl the library answers EBPO_E_UNSUPPORTED.
+ * Without libcurl the functions return EBPO_E_UNSUPPORTED.
  */
 #ifndef EBPO_HTTP_H
 #define EBPO_HTTP_H
@@ -28,63 +28,63 @@ extern "C" {
 #endif
 
 typedef struct ebpo_http_options {
-    size_t struct_size; /* EBPO_HTTP_OPTIONS_INIT sets it */
+    size_t struct_size;
 
-    /* Seconds for name, connection and TLS together; above 0. */
+    /* Seconds for name resolution, connection and TLS together; above 0. */
     double connect_timeout;
 
     /*
-     * An answer that brings fewer than 100 bytes a second for so many seconds is
-     * given up, and asked for again; at least 1.
+     * Seconds, at least 1. A response slower than 100 bytes a second for this time is aborted and
+     * requested again.
      */
     double stall_timeout;
 
     /*
-     * Seconds for one request with all its retries and pauses; above 0. Reading a
-     * piece never takes longer.
+     * Seconds for one request with all retries and pauses; above 0. Reading a piece never takes
+     * longer.
      */
     double time_limit;
 
     /*
-     * How often a request is sent again: after dropped connections, short bodies,
-     * stalls, and the codes 408, 429, 500, 502, 503 and 504. Never after others.
+     * Maximum number of retries of a request: after dropped connections, short bodies, stalls, and
+     * the codes 408, 429, 500, 502, 503 and 504. Other failures are not retried.
      */
     unsigned retries;
 
-    /* Requests at a time, 1 to 32; of those above 1 MiB at most six. */
+    /* Requests at the same time, 1 to 32; at most six above 1 MiB. */
     unsigned connections;
 
     /*
-     * Bytes that may be held of what was read ahead and what was read last; more
-     * while readers wait for pieces of 4 MiB. Not part of a model's budget.
+     * Limit in bytes for prefetched and recently read data; exceeded while readers wait for pieces
+     * of 4 MiB. Not part of a model's budget.
      */
     uint64_t memory;
 
     /*
-     * From a server that has no ranges or tells no version, a file of up to so
-     * many bytes is read as a whole into memory.
+     * A file of at most this many bytes is read completely into memory if the server does not
+     * support ranges or sends no version.
      */
     uint64_t whole_limit;
 
     /*
-     * Of a file's version compare the size alone: for servers that send neither
-     * ETag nor Last-Modified, and for addresses where several servers answer, each
-     * with its ETag. A change under way may then go unnoticed.
+     * Compares only the size of the file, for servers that send neither ETag nor Last-Modified, and
+     * for addresses of several servers with different ETags. A change during reading may not be
+     * detected.
      */
     bool unversioned;
 
-    /* Take names and passwords from ~/.netrc. */
+    /* Reads names and passwords from ~/.netrc. */
     bool netrc;
 
     /* "name:password" for basic authentication, or NULL. */
     const char *user;
 
-    /* Certificates to trust (PEM) instead of the system's, or NULL. */
+    /* Trusted certificates (PEM) instead of those of the system, or NULL. */
     const char *ca_file;
 
     /*
-     * As libcurl takes it. NULL: from the environment (http_proxy, https_proxy,
-     * no_proxy). "": none.
+     * In the form of libcurl. NULL: from the environment (http_proxy, https_proxy, no_proxy). "":
+     * none.
      */
     const char *proxy;
 
@@ -92,32 +92,31 @@ typedef struct ebpo_http_options {
     const char *user_agent;
 
     /*
-     * "Name: value", NULL at the end, sent with every request; or NULL. Not to another
-     * host, port or scheme to which a redirect leads, nor to any behind it.
+     * Headers "Name: value", terminated by NULL, sent with every request; or NULL. They are not
+     * sent after a redirect to another host, port or scheme.
      */
     const char *const *headers;
 
     /*
-     * A folder where bytes that were fetched are kept for the next time; it and
-     * those above it are made if they are missing. Any number of processes may share it. NULL:
-     * none.
+     * Folder that keeps fetched bytes for later use; it and its parents are made if missing. Any
+     * number of processes may share it. NULL: none.
      */
     const char *cache_folder;
 
-    /* Bytes that the folder may hold. The least recently used go first. */
+    /* Size limit of the folder in bytes. The least recently used blocks are removed first. */
     uint64_t cache_bytes;
 
     /*
-     * Asked some ten times a second, by another thread. True: what is under way,
-     * and all that comes later, ends with EBPO_E_CANCELLED. NULL: never.
+     * Called about ten times a second by another thread. Return true to make current and later
+     * operations fail with EBPO_E_CANCELLED. NULL: never.
      */
     bool (*stop)(void *user);
     void *stop_user;
 
     /*
-     * Bytes of a block in the folder, a power of two from 4 KiB to 128 KiB: what is
-     * fetched is rounded outward to whole blocks, which small ones make cheaper and
-     * many. Blocks of other sizes are not found. 0: 32 KiB.
+     * Block size of the folder in bytes, a power of two from 4 KiB to 128 KiB; 0: 32 KiB. Fetched
+     * ranges are rounded outward to whole blocks. Smaller blocks reduce the transferred bytes and
+     * increase the number of blocks. Blocks of other sizes are not found.
      */
     unsigned cache_block;
 
@@ -132,12 +131,12 @@ typedef struct ebpo_http_options {
 
 /* Sums since opening. */
 typedef struct ebpo_http_stats {
-    size_t struct_size; /* EBPO_HTTP_STATS_INIT sets it */
+    size_t struct_size;
 
-    /* Requests sent, with retries and redirects. */
+    /* Requests sent, including retries and redirects. */
     uint64_t requests;
 
-    /* Of these, requests that were repeated after a failure. */
+    /* Requests that were repeated after a failure. */
     uint64_t retries;
 
     /* Connections made. */
@@ -146,12 +145,11 @@ typedef struct ebpo_http_stats {
     /* Bytes received in bodies. */
     uint64_t bytes;
 
-    /* Requests that the cache folder answered, and bytes taken from it. */
+    /* Requests served from the cache folder, and their bytes. */
     uint64_t cache_hits, cache_bytes;
 
     /*
-     * Bytes that the folder held at opening: of this version of the file, and of
-     * other files and versions.
+     * Bytes in the folder at opening: of this version of the file, and of other files and versions.
      */
     uint64_t cache_held, cache_others;
 
@@ -162,13 +160,12 @@ typedef struct ebpo_http_stats {
 #define EBPO_HTTP_STATS_INIT EBPO_SIZED(ebpo_http_stats)
 
 /*
- * A URL as messages show it: without user and password, and without what follows
- * "?". Any other name stays as it is. Into `room` bytes at `out`, cut off if need
- * be. Returns `out`.
+ * Writes a URL for messages to `out`: without user, password and the part from "?" on. Other names
+ * are unchanged. Truncates to `space` bytes. Returns `out`.
  *
  * Threads: any.
  */
-EBPO_API char *ebpo_url_redact(const char *name, char *out, size_t room);
+EBPO_API char *ebpo_url_redact(const char *name, char *out, size_t space);
 
 /*
  * True for names that begin with http:// or https://.
@@ -178,17 +175,16 @@ EBPO_API char *ebpo_url_redact(const char *name, char *out, size_t room);
 EBPO_API bool ebpo_is_url(const char *name);
 
 /*
- * A source of the bytes of a URL. The first request has been answered when it
- * returns. Texts in the options are copied. Begin `out` with EBPO_SOURCE_INIT;
- * close it by out->close, or hand it to ebpo_open_source.
+ * Makes a source for a URL, after the first response was received. Texts of the options are copied.
+ * Initialize `out` with EBPO_SOURCE_INIT. Close it by out->close, or pass it to ebpo_open_source.
  *
- * EBPO_E_IO: the server was not reached, refused, or gave wrong answers.
- * EBPO_E_UNSUPPORTED: it has no ranges and the file is too large, or the library
- * was built without HTTP. EBPO_E_ARGUMENT: no URL, options out of range, or a cache
- * folder that cannot be used. EBPO_E_CANCELLED, EBPO_E_MEMORY.
+ * EBPO_E_IO: the server was not reached, refused, or sent wrong responses. EBPO_E_UNSUPPORTED: the
+ * server does not support ranges and the file is too large, or the library was built without HTTP.
+ * EBPO_E_ARGUMENT: not a URL, options out of range, or a cache folder that cannot be used.
+ * EBPO_E_CANCELLED.
  *
- * Reading gives EBPO_E_IO and EBPO_E_CANCELLED. If the file on the server has
- * changed since it was opened, that is the answer to all reads.
+ * Reading can return EBPO_E_IO and EBPO_E_CANCELLED. If the file on the server has changed since
+ * opening, all reads fail.
  *
  * Threads: any.
  */
@@ -197,7 +193,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_source_of_url(const char *url,
                                                       ebpo_source *out, ebpo_error *error);
 
 /*
- * ebpo_open with options.
+ * Opens a URL as ebpo_open does, with options.
  *
  * Threads: any.
  */
@@ -205,8 +201,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_url(const char *url, const ebpo_htt
                                                  ebpo_file **out, ebpo_error *error);
 
 /*
- * What went over the net. EBPO_E_ABSENT, and zeros, if the file was not opened by
- * its URL. EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ * Gets statistics of network transfers. EBPO_E_ABSENT, and zeros: the file was not opened by its
+ * URL.
  *
  * Threads: any.
  */

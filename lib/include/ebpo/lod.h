@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: a level as closed polygons.
+ * Computes the envelopes of a level as closed polygons.
  */
 #ifndef EBPO_LOD_H
 #define EBPO_LOD_H
@@ -12,17 +12,16 @@ extern "C" {
 #endif
 
 typedef struct ebpo_lod_options {
-    size_t struct_size; /* EBPO_LOD_OPTIONS_INIT sets it */
+    size_t struct_size;
 
-    /* Keep polygons that lie on cell walls, so that each envelope is closed. */
-    bool walls;
+    /* Keeps polygons on cell faces, so that each envelope is closed. */
+    bool cell_faces;
 
-    /* 0: all cores. The result does not depend on it. */
     unsigned threads;
 
     ebpo_progress progress;
 
-    /* What is read of the file keeps to it. NULL: as much memory as it takes. */
+    /* Limits the memory for data read from the file. NULL: no limit. */
     ebpo_workspace *workspace;
 } ebpo_lod_options;
 
@@ -32,25 +31,21 @@ typedef struct ebpo_lod_options {
     }
 
 /*
- * The envelopes of `level`: of its gray nodes, and of the leaves and black nodes
- * of levels 0 to `level`. Each is a convex polyhedron, cut from its cell by the
- * half-spaces of the node and of its ancestors. Leaves are cut by stored planes
- * where the file has them, else by planes derived from their faces (EBP 2017,
- * 3.4).
+ * Computes the envelopes of `level`: of its gray nodes, and of the leaves and black nodes of levels
+ * 0 to `level`. Each is a convex polyhedron, cut from its cell by the half-spaces of the node and
+ * its ancestors. Leaves are cut by stored planes if the file has them, else by planes derived from
+ * their faces (EBP 2017, 3.4).
  *
- * The polygons are rounded. What is guaranteed to contain the solid is the
- * decoded half-spaces.
+ * The polygons are rounded. Only the decoded half-spaces are guaranteed to contain the solid.
  *
- * out      triangles with double vertices, node after node; nodes share no
- *          vertices. Freed by ebpo_mesh_free. NULL: only the volume is wanted.
- * volume   the sum of the polyhedra's volumes, in the model's unit cubed; or NULL
+ * out      triangles with double vertices, in the order of the nodes; nodes share no vertices.
+ *          Freed by ebpo_mesh_free. NULL: only the volume.
+ * volume   sum of the polyhedra's volumes, in the cube of the model's unit; or NULL
  *
- * The level's nodes, their polygons and `out` are held in memory, whatever `workspace`
- * says, and all of them are made: nothing but the level bounds memory and time, unless
- * `progress` stops it.
+ * The level's nodes, their polygons and `out` are in memory independent of `workspace`. Memory and
+ * time depend on the level without other limit, except by `progress`.
  *
- * EBPO_E_ARGUMENT: no such level. EBPO_E_LIMIT: more than 2^32 - 2 vertices or
- * triangles. EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
+ * EBPO_E_LIMIT: more than 2^32 - 2 vertices or triangles. The errors of reading.
  *
  * Threads: any.
  */
@@ -62,35 +57,34 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level(const ebpo_file *file, int lev
 typedef struct ebpo_lod_node {
     uint64_t octcode;
 
-    /* Of the envelope, in the model's unit cubed. */
+    /* Volume of the envelope, in the cube of the model's unit. */
     double volume;
 
     /* Black: in the cell. Leaf: at the lowest corner. Gray, and surfaces: 0. */
     int32_t winding;
 
-    /* EBPO_GRAY (of the level asked for only), EBPO_LEAF or EBPO_BLACK. */
+    /* EBPO_GRAY (only on the requested level), EBPO_LEAF or EBPO_BLACK. */
     ebpo_node_type type;
 
-    /* Of the polyhedron, without what `walls` left out. */
+    /* Counts of the polyhedron, without polygons omitted by `walls`. */
     uint32_t vertex_count, polygon_count;
 
     /*
-     * Red + 256 green + 65,536 blue, sRGB: of gray nodes their own, of leaves and
-     * black nodes their parent's. Gray (0x808080) where `coloured` is 0.
+     * Red + 256 green + 65,536 blue, sRGB. Gray nodes: their own colour; leaves and black nodes:
+     * their parent's. Gray (0x808080) if `coloured` is 0.
      */
     uint32_t colour;
 
-    /* 1: the file has colours of this node. */
+    /* 1: the file has a colour for this node. */
     uint32_t coloured;
 } ebpo_lod_node;
 
 /*
- * Whose the triangles of ebpo_lod_level are. Nodes come level after level, in
- * the order of their octcodes; the mesh holds their vertices and triangles in the
- * same order.
+ * Nodes of the triangles of ebpo_lod_level, level by level, in the order of their octcodes; the
+ * mesh has their vertices and triangles in the same order.
  *
- * A polygon of n corners is a fan of n - 2 triangles around its first corner:
- * corners 0 and 1 of its first triangle, then corner 2 of each.
+ * A polygon of n corners is a fan of n - 2 triangles around its first corner: corners 0 and 1 of
+ * its first triangle, then corner 2 of each.
  */
 typedef struct ebpo_lod_nodes {
     uint64_t node_count, polygon_count;
@@ -98,7 +92,7 @@ typedef struct ebpo_lod_nodes {
     /* [node_count] */
     ebpo_lod_node *nodes;
 
-    /* [polygon_count] how many corners each polygon has, node after node */
+    /* [polygon_count] number of corners of each polygon, in the order of the nodes */
     uint8_t *corners;
 } ebpo_lod_nodes;
 
@@ -110,8 +104,8 @@ typedef struct ebpo_lod_nodes {
 EBPO_API void ebpo_lod_nodes_free(ebpo_lod_nodes *nodes);
 
 /*
- * ebpo_lod_level, and the nodes with it, which are freed by ebpo_lod_nodes_free.
- * `nodes` may be NULL; without `out` it must be.
+ * Computes the envelopes as ebpo_lod_level does, with their nodes, which ebpo_lod_nodes_free frees.
+ * `nodes` may be NULL, and must be NULL without `out`.
  *
  * Threads: any.
  */
@@ -121,13 +115,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, i
                                                         double *volume, ebpo_error *error);
 
 /*
- * Colours of a level's vertices, each in its node's; none if the file has no
- * colours. Faces have none.
+ * Gets the colours of a level's vertices, those of their nodes; none if the file has no colours.
+ * Faces have none.
  *
- * vertex_count  of the mesh that came with the nodes
+ * vertex_count  of the mesh returned with the nodes
  * out           freed by ebpo_colours_free; cleared on failure
  *
- * EBPO_E_ARGUMENT: the nodes have another number of vertices. EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: the nodes have another number of vertices.
  *
  * Threads: any.
  */
@@ -136,18 +130,16 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes,
                                                     ebpo_error *error);
 
 /*
- * Which way to light a level's polygons: those on planes as they lie; those on
- * walls between cells, which are steps and not surface, as the planes around them
- * that look to the same side, by area, or as they lie where there is none. Walls of
- * the root cell count as planes. For pictures: rounded, and no promise about the
- * solid.
+ * Computes normals for shading a level's polygons. Polygons on planes have their own normal.
+ * Polygons on faces between cells are steps, not surface: they have the area-weighted mean normal
+ * of the surrounding planes that face the same side, or their own if there is none. Faces of the
+ * root cell count as planes. For images only: rounded, without guarantee about the solid.
  *
- * info  of the file that the level is of
- * mesh  that came with the nodes
- * out   [polygon_count][3] of length 1, of a polygon without area 0; the caller's
+ * info  of the file of the level
+ * mesh  returned with the nodes
+ * out   [polygon_count][3] of length 1, or 0 for a polygon without area; allocated by the caller
  *
- * EBPO_E_ARGUMENT: the nodes have another number of triangles, or the mesh is of
- * single precision. EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: the nodes have another number of triangles, or the mesh has single precision.
  *
  * Threads: any.
  */

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: maps of distance. A model's exact signed distances at the points of a plane,
- * of a grid or of another model, their statistics, and colours for them.
+ * Computes maps of a model's exact signed distances at the points of a plane, a grid or another
+ * model, with statistics and colours.
  *
  *   Distances     ebpo_map_points, ebpo_map_lattice
- *   Files         ebpo_map_write: HDF5 as VTK reads it, NRRD
- *   Two scans     ebpo_map_points of the one's vertices, ebpo_map_describe, ebpo_map_reach,
+ *   Files         ebpo_map_write: HDF5 for VTK, NRRD
+ *   Two scans     ebpo_map_points for the vertices of one, ebpo_map_describe, ebpo_map_range,
  *                 ebpo_map_paint
  *   Colours       ebpo_map_colour
  *
@@ -23,20 +23,16 @@ extern "C" {
 /* ---- distances ---- */
 
 typedef struct ebpo_map_options {
-    size_t struct_size; /* EBPO_MAP_OPTIONS_INIT sets it */
+    size_t struct_size;
 
-    /*
-     * Points farther away, in the model's unit, get INFINITY; at least 0. Less work, as
-     * nobody looks farther.
-     */
+    /* Points farther away, in the model's unit, get INFINITY, which is faster; at least 0. */
     double max_distance;
 
-    /* No signs. Surfaces have none anyway. */
+    /* True: without signs. Surfaces have none. */
     bool unsigned_distance;
 
     uint8_t reserved[3];
 
-    /* 0: all cores. The result does not depend on it. */
     unsigned threads;
 
     ebpo_progress progress;
@@ -48,14 +44,14 @@ typedef struct ebpo_map_options {
     }
 
 /*
- * The distances of points[count][3], each finite, into distances[count]: correctly rounded, and
- * negative inside a solid, as ebpo_distance gives them. Where not everything is in memory, points
- * are asked about along a curve, so that subtrees are loaded few times; that takes 24 bytes a
- * point.
+ * Computes the distances of points[count][3], each finite, into distances[count]: correctly
+ * rounded, and negative inside a solid, as ebpo_distance does. If not everything is in memory,
+ * points are processed along a curve, so that subtrees are loaded few times; this takes 24 bytes
+ * per point.
  *
- * EBPO_E_ARGUMENT: a point or an option is no such thing; the point's number is told.
- * EBPO_E_ABSENT: the file has no mesh. EBPO_E_CANCELLED, EBPO_E_LIMIT, EBPO_E_MEMORY, and the
- * errors of reading. On failure, `distances` is unspecified.
+ * EBPO_E_ARGUMENT: an option or a point is not valid; the message has the index of the point.
+ * EBPO_E_ABSENT: the file has no mesh. EBPO_E_LIMIT, and the errors of reading. On failure
+ * `distances` is unspecified.
  *
  * Threads: any.
  */
@@ -73,10 +69,11 @@ typedef struct ebpo_lattice {
 } ebpo_lattice;
 
 /*
- * Points that fill a box: the first ones on its lower walls, the last ones on its upper ones; of an
- * axis with one point it is in the middle.
+ * Makes a lattice that fills a box: the first points are on its lower faces, the last ones on its
+ * upper faces. On an axis with one point, the point is in the middle.
  *
- * EBPO_E_ARGUMENT: a count is 0, or the box is not finite or its low corner not below its high one.
+ * EBPO_E_ARGUMENT: a count is 0, or the box is not finite or its low corner is not below its high
+ * one.
  *
  * Threads: any.
  */
@@ -85,21 +82,21 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lattice_of_box(const double low[3], cons
                                                        ebpo_error *error);
 
 /*
- * Lent until the function returns: values[layers][count[1]][count[0]], in the lattice's order; the
- * first of them is of layer `first`. Anything but EBPO_OK ends the map with that status; `error`
- * is then the function's to fill in.
+ * Receives values[layers][count[1]][count[0]], lent until it returns, in the lattice's order, from
+ * layer `first` on. Any result except EBPO_OK ends the map with that status; the function then
+ * fills in `error`.
  */
 typedef ebpo_status (*ebpo_map_fn)(void *user, const double *values, uint64_t first,
                                    uint64_t layers, ebpo_error *error);
 
 /*
- * The distances at a lattice's points, given to `take` layer by layer. Takes some layers' memory,
- * 8 bytes a point: about 64 MiB, or one layer if that is more.
+ * Computes the distances at a lattice's points and passes them to `take` by layers. Takes memory
+ * for some layers, 8 bytes per point: about 64 MiB, or one layer if that is more.
  *
- * EBPO_E_ARGUMENT: also a lattice with points that are not finite, or too many. Else as
- * ebpo_map_points.
+ * EBPO_E_ARGUMENT: also a lattice with points that are not finite, or too many. Other errors are
+ * those of ebpo_map_points.
  *
- * Threads: any; `take` is called by one at a time, in order.
+ * Threads: any; calls of `take` are sequential and in order.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_lattice(ebpo_model *model, const ebpo_lattice *lattice,
                                                     const ebpo_map_options *options,
@@ -108,112 +105,112 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_lattice(ebpo_model *model, const ebp
 
 /* ---- statistics ---- */
 
-/* Shares for which percentiles are told: 1, 5, 25, 50, 75, 95, 99 percent. */
+/* Number of percentiles: 1, 5, 25, 50, 75, 95, 99 percent. */
 enum { EBPO_MAP_PERCENTILES = 7 };
 
-/* All but the counts are NAN where no value is finite. Lengths are in the model's unit. */
+/* Lengths are in the model's unit. All except the counts are NAN if no value is finite. */
 typedef struct ebpo_map_stats {
-    size_t struct_size; /* EBPO_MAP_STATS_INIT sets it */
+    size_t struct_size;
 
-    /* How many values are finite; how many are not, as they are beyond max_distance. */
+    /* Number of finite values, and of values beyond max_distance (not finite). */
     uint64_t count, beyond;
 
-    /* How many are below 0, and 0. */
+    /* Number of values below 0, and equal to 0. */
     uint64_t inside, on;
 
     double min, max;
 
-    /* The greatest without signs: the one-sided Hausdorff distance of the points. */
+    /* Maximum absolute value: the one-sided Hausdorff distance of the points. */
     double farthest;
 
-    /* Of the signed values; of those without signs; root of the mean square; about the mean. */
-    double mean, mean_unsigned, rms, deviation;
+    /* Mean of the values; mean of absolute values; root mean square; standard deviation. */
+    double mean, mean_unsigned, rms, error_bound;
 
-    /* The least value that so many percent of the finite ones do not exceed; with signs, and
-     * without. */
+    /*
+     * The least value that this percentage of the finite values does not exceed; signed and
+     * absolute.
+     */
     double percentile[EBPO_MAP_PERCENTILES], percentile_unsigned[EBPO_MAP_PERCENTILES];
 } ebpo_map_stats;
 
 #define EBPO_MAP_STATS_INIT EBPO_SIZED(ebpo_map_stats)
 
 /*
- * Percents: 1, 5, 25, ... of EBPO_MAP_PERCENTILES. NAN for another index.
+ * Returns the percentage of an index of EBPO_MAP_PERCENTILES: 1, 5, 25, ... NAN for another index.
  *
  * Threads: any.
  */
 EBPO_API double ebpo_map_percent(int index);
 
 /*
- * Statistics of values[count]; sums do not depend on the order of what is added. Takes 8 bytes a
- * value.
- *
- * EBPO_E_ARGUMENT: `out` was not begun with its macro. EBPO_E_MEMORY.
+ * Computes statistics of values[count]; sums do not depend on the order of values. Takes 8 bytes
+ * per value.
  *
  * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_describe(const double *values, uint64_t count,
                                                      ebpo_map_stats *out, ebpo_error *error);
 
-typedef struct ebpo_map_reach_options {
-    size_t struct_size; /* EBPO_MAP_REACH_OPTIONS_INIT sets it */
+typedef struct ebpo_map_range_options {
+    size_t struct_size;
 
-    /* The bounds are refined until hi <= (1 + tolerance) lo. Above 0. */
+    /* Bounds are refined until hi <= (1 + tolerance) lo. Above 0. */
     double tolerance;
 
-    /* Stop after about so many distances beyond those of vertices. 0: 16 for each face. */
-    uint64_t questions;
+    /* Stops after about this many distances besides those of vertices. 0: 16 for each face. */
+    uint64_t queries;
 
-    unsigned threads; /* 0: all cores. The result does not depend on it. */
+    unsigned threads; /* 0: all cores */
 
     uint32_t reserved;
 
     ebpo_progress progress;
-} ebpo_map_reach_options;
+} ebpo_map_range_options;
 
-#define EBPO_MAP_REACH_OPTIONS_INIT                                   \
+#define EBPO_MAP_RANGE_OPTIONS_INIT                                   \
     {                                                                 \
-        sizeof(ebpo_map_reach_options), 0.01, 0, 0, 0, { NULL, NULL } \
+        sizeof(ebpo_map_range_options), 0.01, 0, 0, 0, { NULL, NULL } \
     }
 
-typedef struct ebpo_map_reach {
-    size_t struct_size; /* EBPO_MAP_REACH_INIT sets it */
+typedef struct ebpo_map_range {
+    size_t struct_size;
 
     /*
-     * The one-sided Hausdorff distance, from all of the faces of the mesh to the model's faces, is
-     * certainly within these bounds.
+     * Bounds of the one-sided Hausdorff distance from all faces of the mesh to the model's faces.
      */
     double lo, hi;
 
-    /* A point of a face that is lo away. */
+    /* Point of a face at distance lo. */
     double place[3];
 
-    uint64_t questions;
-} ebpo_map_reach;
+    uint64_t queries;
+} ebpo_map_range;
 
-#define EBPO_MAP_REACH_INIT EBPO_SIZED(ebpo_map_reach)
+#define EBPO_MAP_RANGE_INIT EBPO_SIZED(ebpo_map_range)
 
 /*
- * How far a mesh's faces reach from a model's, insides of faces included: where vertices are close,
- * what is between them need not be.
+ * Computes the maximum distance of a mesh's faces from a model's faces. It includes the interior of
+ * faces, which may be farther away than their vertices.
  *
  * mesh        indices below vertex_count, finite coordinates
- * distances   [vertex_count] of its vertices, as ebpo_map_points gives them, all finite
+ * distances   [vertex_count] of its vertices, from ebpo_map_points, all finite
  *
- * EBPO_E_ARGUMENT: an option, a distance or an index is no such thing. Else as ebpo_map_points.
+ * EBPO_E_ARGUMENT: an option, a distance or an index is not valid. Other errors are those of
+ * ebpo_map_points.
  *
  * Threads: any.
  */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_find_reach(ebpo_model *model, const ebpo_mesh *mesh,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_find_range(ebpo_model *model, const ebpo_mesh *mesh,
                                                        const double *distances,
-                                                       const ebpo_map_reach_options *options,
-                                                       ebpo_map_reach *out, ebpo_error *error);
+                                                       const ebpo_map_range_options *options,
+                                                       ebpo_map_range *out, ebpo_error *error);
 
 /* ---- colours ---- */
 
 typedef enum ebpo_map_palette {
     /*
-     * With signs: blue inside, orange outside, grey at 0; the lightness falls evenly with the
-     * distance, for every eye.
+     * Signed: blue inside, orange outside, grey at 0; lightness decreases evenly with distance,
+     * also for colour-blind viewers.
      */
     EBPO_MAP_DIVERGING = 0,
 
@@ -223,16 +220,14 @@ typedef enum ebpo_map_palette {
 } ebpo_map_palette;
 
 /*
- * "diverging", "thesis". A static string; NULL for other values.
+ * Returns "diverging" or "thesis". A static string; NULL for invalid values.
  *
  * Threads: any.
  */
 EBPO_API const char *ebpo_map_palette_name(ebpo_map_palette palette);
 
 /*
- * sRGB of a distance: at `range` and beyond it is that of the end. Not finite: grey.
- *
- * range   above 0
+ * Gets the sRGB colour of a distance, clamped to `range`, which is above 0. Not finite: grey.
  *
  * Threads: any.
  */
@@ -240,14 +235,13 @@ EBPO_API void ebpo_map_colour(ebpo_map_palette palette, double distance, double 
                               uint8_t rgb[3]);
 
 /*
- * Gives a mesh's vertices distances and colours, as attributes `distance` (float64) and `red`,
- * `green`, `blue` (uint8), in place of what it had of these names; ebpo_mesh_write_ply writes them.
+ * Adds distances and colours of vertices to a mesh, as attributes `distance` (float64) and `red`,
+ * `green`, `blue` (uint8). They replace attributes of these names; ebpo_mesh_write_ply writes them.
  *
  * distances   [vertex_count]
  * range       above 0 and finite
  *
- * EBPO_E_ARGUMENT: palette or range is no such thing; or the mesh has more attributes than fit.
- * EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: palette or range is not valid, or the mesh has too many attributes.
  *
  * Threads: one per mesh.
  */
@@ -259,22 +253,23 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_map_paint(ebpo_mesh *mesh, const double 
 
 typedef enum ebpo_map_format {
     /*
-     * HDF5, as VTKHDF 1.0 has an image: /VTKHDF/PointData/distance[count[2]][count[1]][count[0]] of
+     * HDF5, as an image of VTKHDF 1.0: /VTKHDF/PointData/distance[count[2]][count[1]][count[0]] of
      * float64, with Origin, Spacing and Direction. Steps must be at right angles.
      */
     EBPO_MAP_VTKHDF = 0,
 
-    /* NRRD 4, with its numbers behind the header as they are. */
+    /* NRRD 4, uncompressed in the same file. */
     EBPO_MAP_NRRD = 1
 } ebpo_map_format;
 
 /*
- * Maps a lattice into a file, which appears whole or not at all. Values beyond max_distance are
- * INFINITY there, too.
+ * Writes the map of a lattice to a file, which is replaced atomically. Values beyond max_distance
+ * are INFINITY.
  *
  * stats   without percentiles (NAN); or NULL
  *
- * EBPO_E_ARGUMENT: also a lattice that the format cannot hold. EBPO_E_IO. Else as ebpo_map_lattice.
+ * EBPO_E_ARGUMENT: also a lattice that the format does not support. EBPO_E_IO. Other errors are
+ * those of ebpo_map_lattice.
  *
  * Threads: any.
  */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: how much memory there is.
+ * Reports the available memory.
  */
 #ifndef EBPO_MEMORY_H
 #define EBPO_MEMORY_H
@@ -11,9 +11,9 @@ extern "C" {
 #endif
 
 /*
- * Bytes that this process may still take: what the machine has available, or the least that a
- * control group of it has left. What files occupy counts as free. Half of the machine's, where the
- * system does not tell.
+ * Returns the number of bytes that this process can still allocate: the memory that the machine has
+ * available, or the smallest remainder of the limits of its control groups. Memory that caches
+ * files counts as free. Returns half of the machine's memory if the system does not report it.
  *
  * Threads: any.
  */

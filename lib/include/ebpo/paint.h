@@ -1,16 +1,15 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: paint and notes on a model, in a file of their own beside it.
+ * Adds colours (paint) and notes to a model, in a separate file.
  *
- *   Files      ebpo_paint_new, ebpo_paint_open, ebpo_paint_open_memory,
- *              ebpo_paint_open_to_change, ebpo_paint_save, ebpo_paint_free;
- *              ebpo_paint_get_info, ebpo_paint_check_model,
+ *   Files      ebpo_paint_new, ebpo_paint_open, ebpo_paint_open_memory, ebpo_paint_open_to_change,
+ *              ebpo_paint_save, ebpo_paint_free; ebpo_paint_get_info, ebpo_paint_check_model,
  *              ebpo_paint_check_points
  *   Layers     ebpo_paint_get_layer, ebpo_paint_add_layer, ebpo_paint_set_layer,
  *              ebpo_paint_remove_layer
  *   Notes      ebpo_paint_get_note, ebpo_paint_add_note, ebpo_paint_remove_note
  *   Strokes    ebpo_paint_get_stroke, ebpo_paint_add_stroke, ebpo_paint_remove_stroke
- *   A pen      ebpo_paint_lay, ebpo_paint_place: from where a hand was to strokes and notes
- *   Answers    ebpo_paint_cover, ebpo_paint_bake, ebpo_paint_dye_mesh, ebpo_paint_measure
+ *   A pen      ebpo_paint_draw, ebpo_paint_locate: from device positions to strokes and notes
+ *   Results    ebpo_paint_cover, ebpo_paint_bake, ebpo_paint_colour_mesh, ebpo_paint_measure
  *
  *     ebpo_paint *paint = NULL;
  *     ebpo_paint_layer layer = EBPO_PAINT_LAYER_INIT;
@@ -19,19 +18,19 @@
  *     pen.radius = 0.5;
  *     ebpo_paint_new(file, &paint, &error);
  *     ebpo_paint_add_layer(paint, &layer, &pen.layer, &error);
- *     ebpo_paint_lay(paint, context, hand, count, &pen, NULL, &error);
+ *     ebpo_paint_draw(paint, context, hand, count, &pen, NULL, &error);
  *     ebpo_paint_save(paint, "model.paint.h5", &error);
  *
- * What the file says, and what exactly is painted, is in format-spec/paint.md: strokes are points
- * on faces, each a ball that paints what of the surface in it hangs together with the point.
- * Strokes cover each other in the order in which they were made; undoing is removing the last one.
- * The model is never changed.
+ * format-spec/paint.md defines the file and the painted area. A stroke is a sequence of points on
+ * faces. Each point has a ball; it paints the part of the surface in the ball that is connected to
+ * the point. Later strokes cover earlier ones; removing the last stroke undoes it. The model is
+ * never changed.
  *
- * A paint is in memory as a whole, 48 bytes a point, and keeps a descriptor of its file open. What
- * asks the model keeps to the model's budget, beside what each function says. Texts and arrays that
- * are given out are the paint's, until it is changed or freed.
+ * A paint is entirely in memory, 48 bytes per point, and keeps a descriptor of its file open.
+ * Queries of the model stay within the model's budget, plus the memory stated for each function.
+ * Returned texts and arrays are lent until the paint is changed or freed.
  *
- * Source of the task: EBP 2017, section 4.5 (painting by a haptic hand).
+ * Application: EBP 2017, section 4.5 (painting by a haptic device).
  */
 #ifndef EBPO_PAINT_H
 #define EBPO_PAINT_H
@@ -45,7 +44,7 @@ extern "C" {
 
 typedef struct ebpo_paint ebpo_paint;
 
-/* At most so many of each in a file. */
+/* Maximum numbers in a file. */
 enum {
     EBPO_PAINT_LAYERS = 1024,
     EBPO_PAINT_NOTES = 4096,
@@ -56,9 +55,9 @@ enum {
 /* ---- files ---- */
 
 /*
- * An empty one for a model: no layers, no strokes.
+ * Makes an empty paint for a model.
  *
- * EBPO_E_ABSENT: the model has no mesh. EBPO_E_MEMORY.
+ * EBPO_E_ABSENT: the model has no mesh.
  *
  * Threads: any.
  */
@@ -66,11 +65,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_new(const ebpo_file *model, ebpo_p
                                                   ebpo_error *error);
 
 /*
- * Reads a file and checks all that can be checked without the model.
+ * Reads a file and makes all checks that do not need the model.
  *
- * EBPO_E_FORMAT: it is no paint file, or is damaged. EBPO_E_VERSION: of a later version.
- * EBPO_E_UNSUPPORTED: another program has laid it out in a way of its own. EBPO_E_IO,
- * EBPO_E_MEMORY.
+ * EBPO_E_FORMAT: not a paint file, or damaged. EBPO_E_VERSION: a later version. EBPO_E_UNSUPPORTED:
+ * another program wrote an unsupported layout. EBPO_E_IO.
  *
  * Threads: any.
  */
@@ -78,11 +76,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open(const char *path, ebpo_paint 
                                                    ebpo_error *error);
 
 /*
- * The same of bytes in memory, which are not needed afterwards.
- *
- * name   for messages; or NULL
- *
- * Errors are those of ebpo_paint_open.
+ * Reads a paint as ebpo_paint_open does, from bytes in memory that are not needed afterwards.
+ * `name` is for messages and may be NULL.
  *
  * Threads: any.
  */
@@ -91,28 +86,28 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_memory(const void *data, uint
                                                           ebpo_error *error);
 
 /*
- * Opens a file for a change that is saved, and makes others wait who do the same: between this and
- * the first ebpo_paint_save to `path`, or ebpo_paint_free, no other process or thread gets the file
- * by this function, and no other ebpo_paint_save replaces it. Changes of several programs follow
- * each other, and none is lost:
+ * Opens a file for a change, and locks it against other changes. Until the first ebpo_paint_save to
+ * `path`, or ebpo_paint_free, no other process or thread can open the file with this function, and
+ * no other ebpo_paint_save replaces it. So changes of several programs are sequential, and none is
+ * lost:
  *
  *     ebpo_paint_open_to_change("model.paint.h5", model, 60, NULL, &paint, &error);
  *     ebpo_paint_add_layer(paint, &layer, NULL, &error);
  *     ebpo_paint_save(paint, "model.paint.h5", &error);
  *     ebpo_paint_free(paint);
  *
- * model      where there is no file, the paint is a new one for this model; NULL: that is an error
- * wait       seconds to wait for others
+ * model      if the file does not exist, makes a new paint for this model; NULL: the file must
+ *            exist
+ * wait       maximum waiting time in seconds
  * progress   stage "waiting"; or NULL
  *
- * Two files that a thread opens so at once can make two programs wait for each other, until `wait`
- * is over. The lock is an empty file ".NAME.lock" in the same folder while it is held. On a
- * file system without locks (NFS without its lock service), in a folder that cannot be written
- * to, and where ".NAME.lock" is anything but an empty file, nobody waits; ebpo_paint_save still
- * compares.
+ * A thread that opens two files this way can cause a deadlock of two programs, which ends after
+ * `wait`. While the lock is held, an empty file ".NAME.lock" is in the same folder. There is no
+ * lock in three cases, but ebpo_paint_save still compares: the file system has no locks (NFS
+ * without its lock service), the folder is not writable, or ".NAME.lock" is not an empty file.
  *
- * EBPO_E_IO: also where others take longer than `wait`. EBPO_E_CANCELLED, EBPO_E_ARGUMENT, and the
- * errors of ebpo_paint_open and ebpo_paint_new.
+ * EBPO_E_IO: also if the lock is not free within `wait`. EBPO_E_CANCELLED, and the errors of
+ * ebpo_paint_open and ebpo_paint_new.
  *
  * Threads: any.
  */
@@ -122,41 +117,42 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_to_change(const char *path,
                                                              ebpo_paint **out, ebpo_error *error);
 
 /*
- * Writes it, whole or not at all.
+ * Writes the paint to a file, which is replaced atomically.
  *
- * A paint belongs to the file that it was read from, or else to the first that it was saved as. A
- * save to that path replaces what this paint has read or saved there, and fails with EBPO_E_IO
- * where another program, or another ebpo_paint, has changed or replaced it since: open the file
- * again and repeat the change, or save to another path. A save to any other path replaces
- * what is there.
+ * A paint belongs to the file that it was read from, or else to the first file that it was saved
+ * as. A save to this path fails with EBPO_E_IO if another program, or another ebpo_paint, has
+ * changed or replaced the file since this paint read or saved it. Then open the file again and
+ * repeat the change, or save to another path. A save to any other path replaces the file there.
  *
- * Comparing and replacing are under a lock, which binds all that use this library, in any process
- * and thread; others may replace the file between the two. Without locks (as above) the time
- * between the two is the shortest possible, but not none.
+ * A lock protects comparing and replacing against all users of this library, in any process and
+ * thread. Other programs may replace the file between the two. Without locks (see
+ * ebpo_paint_open_to_change) a short time between the two remains.
  *
- * EBPO_E_UNSUPPORTED: the library was built without libhdf5. EBPO_E_IO: also where another one has
- * had the file open to change for 10 seconds. EBPO_E_MEMORY.
+ * EBPO_E_UNSUPPORTED: the library was built without libhdf5. EBPO_E_IO: also if another user has
+ * had the file open to change for 10 seconds.
  *
- * Threads: any, while nobody changes the paint.
+ * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_save(const ebpo_paint *paint, const char *path,
                                                    ebpo_error *error);
 
 /*
- * NULL is fine.
+ * Frees a paint.
  *
  * Threads: one per paint.
  */
 EBPO_API void ebpo_paint_free(ebpo_paint *paint);
 
 typedef struct ebpo_paint_info {
-    size_t struct_size; /* EBPO_PAINT_INFO_INIT sets it */
+    size_t struct_size;
 
-    /* What wrote the file, and which model it is for: its content_sha256, 64 hexadecimal digits,
-     * and for people its name and unit; "": not known. */
+    /*
+     * Program that wrote the file; content_sha256 of the model, 64 hexadecimal digits; name and
+     * unit of the model; "": unknown.
+     */
     const char *generator, *model_sha256, *model_name, *unit;
 
-    /* 1: faces have their numbers in the source. 0: those in the model's file. */
+    /* 1: indices of faces are those of the source. 0: those of the model's file. */
     uint64_t source_numbers;
 
     uint64_t layer_count, note_count, stroke_count, point_count;
@@ -165,17 +161,17 @@ typedef struct ebpo_paint_info {
 #define EBPO_PAINT_INFO_INIT EBPO_SIZED(ebpo_paint_info)
 
 /*
- * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ * Gets the properties of a paint.
  *
- * Threads: any, while nobody changes the paint.
+ * Threads: any.
  */
 EBPO_API ebpo_status ebpo_paint_get_info(const ebpo_paint *paint, ebpo_paint_info *out);
 
 /*
- * Whether it is a paint of this model, or of the one that this is a subset of.
+ * Checks that the paint belongs to this model, or to the model of which this is a subset.
  *
- * EBPO_E_ARGUMENT: it is not; the message tells whose it is. EBPO_E_ABSENT: the model has no mesh,
- * or no numbers of the source where these are meant.
+ * EBPO_E_ARGUMENT: it does not; the message names its model. EBPO_E_ABSENT: the model has no mesh,
+ * or lacks the required source indices.
  *
  * Threads: any.
  */
@@ -184,17 +180,18 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_model(const ebpo_paint *pain
                                                           ebpo_error *error);
 
 /*
- * Checks that every point and note is on its face, or where a subset does not have the face or what
- * is around it. That is not in the file's checksums: whatever made the file may have written
- * other places. What asks the model of a point checks that point, too; this is for what is saved.
+ * Checks that every point and note is on its face. Points whose face or surroundings are missing in
+ * a subset pass. The checksums of the file do not ensure this, because the program that wrote the
+ * file may have stored other positions. Functions that query the model for a point check that
+ * point, too; use this function for data that is only stored.
  *
- * context    of a model that fits
+ * context    of a matching model
  * progress   stage "checking"; or NULL
  *
- * EBPO_E_FORMAT: one is not; the message has its number. EBPO_E_ARGUMENT, EBPO_E_ABSENT: as
- * ebpo_paint_check_model. EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
+ * EBPO_E_FORMAT: a point is not on its face; the message has its index. EBPO_E_ARGUMENT,
+ * EBPO_E_ABSENT: as ebpo_paint_check_model. EBPO_E_CANCELLED, and the errors of reading.
  *
- * Threads: one per context; any, while nobody changes the paint.
+ * Threads: one per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_points(const ebpo_paint *paint,
                                                            ebpo_context *context,
@@ -204,20 +201,22 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_points(const ebpo_paint *pai
 /* ---- layers ---- */
 
 /*
- * Texts are UTF-8 without control characters; lines are separated by U+2028. What is given is
- * copied; NULL stands for "".
+ * Properties of a layer. Texts are UTF-8 without control characters; U+2028 separates lines.
+ * Arguments are copied; NULL means "".
  */
 typedef struct ebpo_paint_layer {
-    size_t struct_size; /* EBPO_PAINT_LAYER_INIT sets it */
+    size_t struct_size;
 
-    /* At most 255, 255, 31 and 4,095 bytes. The date is "" or one as in ISO 8601 (ebpo_is_date);
-     * that which a file has may be any text, and may be kept. */
+    /*
+     * At most 255, 255, 31 and 4,095 bytes. The date is "" or valid for ebpo_is_date. An existing
+     * date of a file may be any text, and may be kept.
+     */
     const char *title, *author, *date, *description;
 
-    /* For lists, and for pens to begin with: 0xRRGGBBAA. */
+    /* Colour in lists, and default for pens: 0xRRGGBBAA. */
     uint32_t colour;
 
-    /* 0 to 255, of all that is painted in it. */
+    /* Opacity of the whole layer, 0 to 255. */
     uint32_t opacity;
 
     /* 0 or 1. */
@@ -230,20 +229,19 @@ typedef struct ebpo_paint_layer {
     }
 
 /*
- * EBPO_E_ARGUMENT: there is no such layer, or `out` was not begun with its macro.
+ * Gets a layer.
  *
- * Threads: any, while nobody changes the paint.
+ * Threads: any.
  */
 EBPO_API ebpo_status ebpo_paint_get_layer(const ebpo_paint *paint, uint64_t number,
                                           ebpo_paint_layer *out);
 
 /*
- * A new one, above all others.
+ * Adds a layer above all others.
  *
- * number   its number; or NULL
+ * number   its index; or NULL
  *
- * EBPO_E_ARGUMENT: a text or number is not as said above. EBPO_E_LIMIT: there are
- * EBPO_PAINT_LAYERS. EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: a member is not valid. EBPO_E_LIMIT: EBPO_PAINT_LAYERS layers exist.
  *
  * Threads: one per paint.
  */
@@ -252,10 +250,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_layer(ebpo_paint *paint,
                                                         uint64_t *number, ebpo_error *error);
 
 /*
- * Says something else of it. The layer's own texts, as ebpo_paint_get_layer gives them, may be
- * among those given.
+ * Replaces the properties of a layer. Texts of ebpo_paint_get_layer for this layer may be passed.
  *
- * Errors are those of adding; EBPO_E_ARGUMENT: there is no such layer.
+ * Errors are those of ebpo_paint_add_layer.
  *
  * Threads: one per paint.
  */
@@ -264,9 +261,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_set_layer(ebpo_paint *paint, uint6
                                                         ebpo_error *error);
 
 /*
- * Removes it with its strokes and notes; those above get the next lower numbers.
- *
- * EBPO_E_ARGUMENT: there is no such layer.
+ * Removes a layer with its strokes and notes. The indices of higher layers decrease by one.
  *
  * Threads: one per paint.
  */
@@ -280,20 +275,22 @@ typedef struct ebpo_paint_point {
     /* In the model's unit, finite, -2^200 to 2^200. */
     double place[3];
 
-    /* In the source or in the file, as ebpo_paint_info tells: 0 to 2^32 - 2. */
+    /* Index in the source or in the file, see ebpo_paint_info: 0 to 2^32 - 2. */
     uint32_t face;
 
-    /* Barycentric: of the second and third corner, in 2^-30; at most 2^30 in sum. The rest is the
-     * first one's. */
+    /*
+     * Barycentric weights of the second and third corner, in units of 2^-30; their sum is at most
+     * 2^30. The first corner has the rest.
+     */
     uint32_t weight[2];
 
     /* Milliseconds since the stroke's time. */
     uint32_t time;
 
-    /* Of the stroke's radius, in 2^-15: 1 to 2^15. */
+    /* Share of the stroke's radius, in units of 2^-15: 1 to 2^15. */
     uint16_t size;
 
-    /* Of the pen, 65,535 for full. */
+    /* Pressure of the pen; 65,535: full. */
     uint16_t pressure;
 
     uint32_t reserved;
@@ -302,31 +299,31 @@ typedef struct ebpo_paint_point {
 /* ---- notes ---- */
 
 typedef struct ebpo_paint_note {
-    size_t struct_size; /* EBPO_PAINT_NOTE_INIT sets it */
+    size_t struct_size;
 
-    /* At most 255, 255, 31 and 32,767 bytes; as of layers. */
+    /* At most 255, 255, 31 and 32,767 bytes; rules as for layers. */
     const char *title, *author, *date, *body;
 
-    /* The layer that it belongs to. */
+    /* Index of its layer. */
     uint64_t layer;
 
-    /* Where it is; size, pressure and time do not count. */
+    /* Position; size, pressure and time are ignored. */
     ebpo_paint_point at;
 } ebpo_paint_note;
 
 #define EBPO_PAINT_NOTE_INIT EBPO_SIZED(ebpo_paint_note)
 
 /*
- * EBPO_E_ARGUMENT: there is no such note, or `out` was not begun with its macro.
+ * Gets a note.
  *
- * Threads: any, while nobody changes the paint.
+ * Threads: any.
  */
 EBPO_API ebpo_status ebpo_paint_get_note(const ebpo_paint *paint, uint64_t number,
                                          ebpo_paint_note *out);
 
 /*
- * EBPO_E_ARGUMENT: a text, place or layer is not as said above. EBPO_E_LIMIT: there are
- * EBPO_PAINT_NOTES. EBPO_E_MEMORY.
+ * Adds a note. EBPO_E_ARGUMENT: a text, position or layer is not valid. EBPO_E_LIMIT:
+ * EBPO_PAINT_NOTES notes exist.
  *
  * Threads: one per paint.
  */
@@ -335,7 +332,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_note(ebpo_paint *paint,
                                                        ebpo_error *error);
 
 /*
- * EBPO_E_ARGUMENT: there is no such note.
+ * Removes a note.
  *
  * Threads: one per paint.
  */
@@ -346,7 +343,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_remove_note(ebpo_paint *paint, uin
 
 typedef enum ebpo_paint_kind {
     EBPO_PAINT_PAINTS = 0,
-    EBPO_PAINT_ERASES = 1 /* takes away what earlier strokes of its layer have painted */
+    EBPO_PAINT_ERASES = 1 /* removes the paint of earlier strokes of its layer */
 } ebpo_paint_kind;
 
 typedef struct ebpo_paint_stroke {
@@ -355,13 +352,13 @@ typedef struct ebpo_paint_stroke {
     uint64_t layer;
     ebpo_paint_kind kind;
 
-    /* 0xRRGGBBAA, of an erasing stroke 0: sRGB and how opaque it is. */
+    /* 0xRRGGBBAA: sRGB and opacity; 0 for an erasing stroke. */
     uint32_t colour;
 
-    /* Of points of full size, in the model's unit: 2^-200 to 2^200. */
+    /* Radius of points of full size, in the model's unit: 2^-200 to 2^200. */
     double radius;
 
-    /* Milliseconds since 1970-01-01 UTC, at most 2^53; 0: not known. */
+    /* Milliseconds since 1970-01-01 UTC, at most 2^53; 0: unknown. */
     uint64_t time;
 
     /* At least one. */
@@ -372,20 +369,16 @@ typedef struct ebpo_paint_stroke {
 #define EBPO_PAINT_STROKE_INIT EBPO_SIZED(ebpo_paint_stroke)
 
 /*
- * In the order in which they were made.
+ * Gets a stroke; strokes are in the order in which they were made.
  *
- * EBPO_E_ARGUMENT: there is no such stroke, or `out` was not begun with its macro.
- *
- * Threads: any, while nobody changes the paint.
+ * Threads: any.
  */
 EBPO_API ebpo_status ebpo_paint_get_stroke(const ebpo_paint *paint, uint64_t number,
                                            ebpo_paint_stroke *out);
 
 /*
- * A new one, over those before.
- *
- * EBPO_E_ARGUMENT: something is not as said above. EBPO_E_LIMIT: there are EBPO_PAINT_STROKES, or
- * EBPO_PAINT_POINTS. EBPO_E_MEMORY.
+ * Adds a stroke over the earlier ones. EBPO_E_ARGUMENT: a member is not valid. EBPO_E_LIMIT:
+ * EBPO_PAINT_STROKES strokes or EBPO_PAINT_POINTS points exist.
  *
  * Threads: one per paint.
  */
@@ -394,9 +387,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_add_stroke(ebpo_paint *paint,
                                                          ebpo_error *error);
 
 /*
- * Later ones get the next lower numbers. Of the last one: undo.
- *
- * EBPO_E_ARGUMENT: there is no such stroke.
+ * Removes a stroke. The indices of later strokes decrease by one. Removing the last stroke undoes
+ * it.
  *
  * Threads: one per paint.
  */
@@ -405,58 +397,62 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_remove_stroke(ebpo_paint *paint, u
 
 /* ---- a pen ---- */
 
-/* Where a hand was. */
-typedef struct ebpo_paint_hand {
+/* A sample of the haptic device. */
+typedef struct ebpo_paint_input {
     double place[3];
 
-    /* 0 to 1; 0: it does not paint. */
+    /* 0 to 1; 0: does not paint. */
     double pressure;
 
-    /* Milliseconds since the first one, at most 2^32 - 1. */
+    /* Milliseconds since the first sample, at most 2^32 - 1. */
     double time;
-} ebpo_paint_hand;
+} ebpo_paint_input;
 
 typedef struct ebpo_paint_pen {
-    size_t struct_size; /* EBPO_PAINT_PEN_INIT sets it */
+    size_t struct_size;
 
     uint64_t layer;
     ebpo_paint_kind kind;
-    uint32_t colour; /* as of strokes */
+    uint32_t colour; /* as in strokes */
 
-    /* Of the points it lays, as of strokes. */
+    /* Radius of its points, as in strokes. */
     double radius;
 
     /*
-     * Points are laid up to so far from where the pen is, in the model's unit, 0 to 2^200, on that
-     * part of the surface within this distance that hangs together with it. 0: where the pen is.
+     * Maximum distance of points from the pen, in the model's unit, 0 to 2^200. Points are on the
+     * part of the surface within this distance that is connected to the pen. 0: at the pen.
      */
     double spread;
 
     /*
-     * Points that are laid at each step at full pressure p = 1, of others the nearest whole number
-     * of p times it, at least 1; 1 to 10,000. With no spread it is 1.
+     * Points per step at full pressure, 1 to 10,000. At pressure p: p times this, rounded, at least
+     * 1. Without spread it is 1.
      */
     uint32_t density;
 
     uint32_t reserved;
 
     /*
-     * Points' sizes at pressure 0 and 1, as shares of the radius, 2^-15 to 1; between them linear.
+     * Sizes of points at pressure 0 and 1, as shares of the radius, 2^-15 to 1; linear in between.
      */
     double size_least, size_full;
 
-    /* A step along the hand's way, in the model's unit. 0: half of the greater of radius and
-     * spread. Else at least 2^-200. */
+    /*
+     * Step along the path, in the model's unit. 0: half of the larger of radius and spread. Else at
+     * least 2^-200.
+     */
     double step;
 
-    /* The hand is lifted where it is farther from the surface than this; at least 0. INFINITY:
-     * never. */
+    /*
+     * The pen is lifted where the device is farther from the surface than this; at least 0.
+     * INFINITY: never.
+     */
     double within;
 
-    /* Of where points are laid. */
+    /* For the positions of points. */
     uint64_t seed;
 
-    /* As of strokes. */
+    /* As in strokes. */
     uint64_t time;
 
     ebpo_progress progress;
@@ -471,64 +467,63 @@ typedef struct ebpo_paint_pen {
         }                                                                              \
     }
 
-typedef struct ebpo_paint_laid {
-    size_t struct_size; /* EBPO_PAINT_LAID_INIT sets it */
+typedef struct ebpo_paint_drawn {
+    size_t struct_size;
 
-    /* Strokes and their points; steps at which the pen painted, and at which it was lifted. */
+    /* Strokes and their points; steps that painted, and steps with the pen lifted. */
     uint64_t strokes, points, steps, lifted;
 
-    /* Points that would have come to lie elsewhere: not within the spread, or on another fold. */
+    /* Points that were discarded: not within the spread, or on another fold. */
     uint64_t strayed;
-} ebpo_paint_laid;
+} ebpo_paint_drawn;
 
-#define EBPO_PAINT_LAID_INIT EBPO_SIZED(ebpo_paint_laid)
+#define EBPO_PAINT_DRAWN_INIT EBPO_SIZED(ebpo_paint_drawn)
 
 /*
- * A hand's way becomes strokes, a new one wherever the pen was lifted: at each step along the way,
- * which goes straight from place to place, the pen is where the surface is nearest. The more
- * pressure, the more points; where they are depends on the seed and on nothing else.
+ * Converts the path of a device to strokes, with a new stroke after each lift of the pen. The path
+ * is straight between samples. At each step along the path the pen is at the nearest point of the
+ * surface. More pressure gives more points; their positions depend only on the seed.
  *
- * context   of a model that fits
+ * context   of a matching model
  * hand      [count], at least 1
- * laid      what was done; or NULL
+ * laid      statistics; or NULL
  *
- * On failure no stroke is added. EBPO_E_ARGUMENT: something is not as said above, or the model is
- * another one. EBPO_E_ABSENT, EBPO_E_CANCELLED, EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of
- * reading.
+ * On failure no stroke is added. EBPO_E_ARGUMENT: a value is not valid, or the model does not
+ * match. EBPO_E_ABSENT, EBPO_E_LIMIT, and the errors of reading.
  *
  * Threads: one per paint, one per context.
  */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_lay(ebpo_paint *paint, ebpo_context *context,
-                                                  const ebpo_paint_hand *hand, uint64_t count,
-                                                  const ebpo_paint_pen *pen, ebpo_paint_laid *laid,
-                                                  ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_draw(ebpo_paint *paint, ebpo_context *context,
+                                                   const ebpo_paint_input *hand, uint64_t count,
+                                                   const ebpo_paint_pen *pen,
+                                                   ebpo_paint_drawn *laid, ebpo_error *error);
 
 /*
- * The point of the surface nearest to a place, of full size, with pressure and time 0: for notes,
- * and for pens of one's own.
+ * Finds the point of the surface nearest to a position, with full size, pressure 0 and time 0: for
+ * notes and custom pens.
  *
- * Errors are those of ebpo_distance; EBPO_E_ARGUMENT also where the model is another one.
+ * Errors are those of ebpo_distance. EBPO_E_ARGUMENT: also if the model does not match.
  *
  * Threads: one per context.
  */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_place(const ebpo_paint *paint, ebpo_context *context,
-                                                    const double place[3], ebpo_paint_point *out,
-                                                    ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_locate(const ebpo_paint *paint, ebpo_context *context,
+                                                     const double place[3], ebpo_paint_point *out,
+                                                     ebpo_error *error);
 
-/* ---- answers ---- */
+/* ---- results ---- */
 
-/* How answers are found out. */
+/* Options for computing results. */
 typedef struct ebpo_paint_options {
-    size_t struct_size; /* EBPO_PAINT_OPTIONS_INIT sets it */
+    size_t struct_size;
 
     /*
-     * Of areas, 1 to 65,536: where it is not clear to which stroke a part of a face belongs, it is
-     * cut down to this part of the least radius around. 256 gives the area of a disc to 1 % for
-     * certain, and `value` to 0.1 %.
+     * For areas, 1 to 65,536. A part of a face that cannot be assigned to a stroke is subdivided
+     * down to 1/fineness of the least radius around. 256 gives bounds of the area of a disc to 1 %,
+     * and `value` to 0.1 %.
      */
     unsigned fineness;
 
-    /* Of areas and of baking. 0: all cores. The result does not depend on it. */
+    /* For areas and baking. 0: all cores. */
     unsigned threads;
 
     ebpo_progress progress;
@@ -539,35 +534,34 @@ typedef struct ebpo_paint_options {
         sizeof(ebpo_paint_options), 256, 0, { NULL, NULL } \
     }
 
-/* A face of a stroke's reach, lent until the function returns that is called with it. */
+/* A face within the reach of a stroke; lent until the callback returns. */
 typedef struct ebpo_paint_face {
-    /* As in ebpo_distance_result; and in the file. */
+    /* As in ebpo_distance_result; index in the file. */
     uint64_t face, file_face;
 
-    /* As the file stores them. */
+    /* As stored in the file. */
     double corner[3][3];
 
-    /* 1: this corner is covered. A face may have none, and be covered in its middle. */
+    /* 1: this corner is covered. A face without covered corners may be covered in its middle. */
     uint8_t covered[3];
 
     uint8_t reserved[5];
 } ebpo_paint_face;
 
-/* False: enough. */
+/* Return false to stop. */
 typedef bool (*ebpo_paint_face_fn)(void *user, const ebpo_paint_face *face);
 
 /*
- * The faces of the reach of a stroke's points, each once, in the order of the file, and which of
- * their corners are covered. Takes 110 bytes for each such face, and 300 for each that the box
- * around one point meets, as all that follows does.
+ * Passes the faces within the reach of a stroke's points, and their covered corners, to `take`:
+ * each once, in the order of the file. Like the following functions, it takes 110 bytes per face,
+ * and 300 for each face that intersects the box around one point.
  *
- * context     of a model that fits
- * elsewhere   points whose faces a subset does not have; or NULL
+ * context     of a matching model
+ * elsewhere   number of points whose faces a subset lacks; or NULL
  *
- * EBPO_E_ARGUMENT: there is no such stroke, or the model is another one. EBPO_E_FORMAT: a point
- * does not lie on its face. EBPO_E_UNSUPPORTED: the model's coordinates are beyond 2^200.
- * EBPO_E_LIMIT: a point's ball meets more than 2^28 faces. EBPO_E_ABSENT, EBPO_E_MEMORY, and the
- * errors of reading.
+ * EBPO_E_ARGUMENT: the model does not match. EBPO_E_FORMAT: a point is not on its face.
+ * EBPO_E_UNSUPPORTED: the model's coordinates are beyond 2^200. EBPO_E_LIMIT: a point's ball
+ * intersects more than 2^28 faces. EBPO_E_ABSENT, and the errors of reading.
  *
  * Threads: one per context.
  */
@@ -577,32 +571,34 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_cover(const ebpo_paint *paint, ebp
                                                     ebpo_error *error);
 
 typedef struct ebpo_paint_baked {
-    size_t struct_size; /* EBPO_PAINT_BAKED_INIT sets it */
+    size_t struct_size;
 
-    /* Vertices that a visible layer's stroke covers, also where it was erased. */
+    /* Vertices covered by a stroke of a visible layer, including erased ones. */
     uint64_t vertices;
 
-    /* Points of visible layers; those whose faces a subset does not have; those that cover no
-     * vertex, being smaller than their faces. */
+    /*
+     * Points of visible layers; points whose faces a subset lacks; points that cover no vertex
+     * because they are smaller than their faces.
+     */
     uint64_t points, elsewhere, between;
 } ebpo_paint_baked;
 
 #define EBPO_PAINT_BAKED_INIT EBPO_SIZED(ebpo_paint_baked)
 
 /*
- * The colours of vertices with the visible layers over them.
+ * Applies the visible layers to the colours of vertices.
  *
- * context   of a model that fits
- * mesh      as ebpo_file_read_source_mesh gives it of that model: its faces are needed
- * rgba      [vertex_count][4] in its order: the model's own colours, which become the new ones.
- *           Alpha stays. Where nothing covers a vertex, its colour stays.
- * baked     what was done; or NULL
+ * context   of a matching model
+ * mesh      of that model, from ebpo_file_read_source_mesh: its faces are needed
+ * rgba      [vertex_count][4] in its order: the model's own colours, replaced by the new ones.
+ *           Alpha is kept, and so are the colours of uncovered vertices.
+ * baked     statistics; or NULL
  *
- * Takes, beside the mesh, 4 bytes a vertex, 72 for each covered one, and where numbers of faces in
- * the source have gaps 4 for each face.
+ * Takes, besides the mesh, 4 bytes per vertex, 72 per covered vertex, and 4 per face if source
+ * indices of faces have gaps.
  *
- * Errors are those of ebpo_paint_cover; EBPO_E_ARGUMENT also where the mesh is another one;
- * EBPO_E_CANCELLED. On failure the colours are as they were.
+ * Errors are those of ebpo_paint_cover. EBPO_E_ARGUMENT: also if the mesh does not match.
+ * EBPO_E_CANCELLED. On failure the colours are unchanged.
  *
  * Threads: one per context.
  */
@@ -612,27 +608,29 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_bake(const ebpo_paint *paint, ebpo
                                                    ebpo_paint_baked *baked, ebpo_error *error);
 
 /*
- * Gives a mesh's vertices these colours where they differ from those that it has
- * (ebpo_mesh_colours): in the properties red, green and blue (or diffuse_red and so on), which
- * keep their types (of which int8 holds no more than 127). A mesh without them gets them, as uint8,
- * of all vertices. All else stays.
+ * Sets the colours of a mesh's vertices where they differ from the current ones
+ * (ebpo_mesh_colours). It sets the properties red, green and blue (or diffuse_red and so on) and
+ * keeps their types (int8 holds at most 127). A mesh without these gets them as uint8, for all
+ * vertices. All other data is unchanged.
  *
- * rgba   [vertex_count][4]; alpha is not looked at
+ * rgba   [vertex_count][4]; alpha is ignored
  *
- * EBPO_E_ARGUMENT: the mesh has so many attributes that no more fit. EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: the mesh has the maximum number of attributes.
  *
  * Threads: one per mesh.
  */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_dye_mesh(ebpo_mesh *mesh, const uint8_t *rgba,
-                                                       ebpo_error *error);
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_colour_mesh(ebpo_mesh *mesh, const uint8_t *rgba,
+                                                          ebpo_error *error);
 
-/* In the model's unit, squared. The area is from `lo` to `hi`, but for the rounding of sums (2^-40
- * of them); `value` is close to it. */
+/*
+ * In the square of the model's unit. `lo` and `hi` are bounds, except for the rounding of sums
+ * (2^-40 of them); `value` is near the area.
+ */
 typedef struct ebpo_paint_area {
     double lo, value, hi;
 } ebpo_paint_area;
 
-/* Of what has one colour in one layer. */
+/* Area of one colour in one layer. */
 typedef struct ebpo_paint_colour_area {
     uint64_t layer;
     uint32_t colour;
@@ -641,33 +639,33 @@ typedef struct ebpo_paint_colour_area {
 } ebpo_paint_colour_area;
 
 typedef struct ebpo_paint_areas {
-    size_t struct_size; /* EBPO_PAINT_AREAS_INIT sets it */
+    size_t struct_size;
 
-    /* Of all layers together. */
+    /* All layers together. */
     ebpo_paint_area all;
 
-    /* [layer_count], [stroke_count] of the paint; of erasing strokes 0 */
+    /* [layer_count], [stroke_count] of the paint; 0 for erasing strokes */
     ebpo_paint_area *layers, *strokes;
 
     /* [colour_count] by layer, then by colour */
     uint64_t colour_count;
     ebpo_paint_colour_area *colours;
 
-    /* Faces of all reaches; points whose faces a subset does not have. */
+    /* Faces within all reaches; points whose faces a subset lacks. */
     uint64_t faces, elsewhere;
 } ebpo_paint_areas;
 
 #define EBPO_PAINT_AREAS_INIT EBPO_SIZED(ebpo_paint_areas)
 
 /*
- * How much of the surface is painted: visible layers and others, whatever their opacity. What a
- * later stroke of the same layer covers is no longer an earlier one's.
+ * Measures the painted area, including invisible layers, with any opacity. The area covered by a
+ * later stroke of the same layer does not count for the earlier one.
  *
  * out   freed by ebpo_paint_areas_free
  *
- * Takes 24 bytes for each face and point that reaches it, and 80 for each such face.
+ * Takes 24 bytes for each pair of a face and a point that reaches it, and 80 for each such face.
  *
- * Errors are those of ebpo_paint_cover; EBPO_E_ARGUMENT also for the fineness; EBPO_E_CANCELLED.
+ * Errors are those of ebpo_paint_cover. EBPO_E_ARGUMENT: also for the fineness. EBPO_E_CANCELLED.
  *
  * Threads: one per context.
  */
@@ -677,7 +675,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_measure(const ebpo_paint *paint,
                                                       ebpo_paint_areas *out, ebpo_error *error);
 
 /*
- * Frees the arrays and clears the struct, but for its size.
+ * Frees the arrays and clears the struct, except its size.
  *
  * Threads: one per struct.
  */

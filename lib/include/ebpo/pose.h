@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: where a model is in the world.
+ * Pose of a model in the world.
  *
- * Each vertex is brought to the world by its model's pose, in doubles, with one rounding for each
- * operation in a stated order (docs/develop/collision.md, "Posed coordinates"). Decisions about
- * models at poses are those of arithmetic without rounding on these coordinates, as if files had
- * been written with them. Lengths are in the unit of the world: the model's, times the scale.
+ * The pose transforms each vertex to the world in doubles, with one rounding per operation in a
+ * defined order (docs/develop/collision.md, "Posed coordinates"). Decisions equal those of
+ * arithmetic without rounding on these coordinates, as if files had been written with them. Lengths
+ * are in the unit of the world: the model's unit times the scale.
  */
 #ifndef EBPO_POSE_H
 #define EBPO_POSE_H
@@ -16,8 +16,8 @@ extern "C" {
 #endif
 
 /*
- * x of the model becomes rotation (scale x) + translation. All finite; scale from 2^-300 to 2^300.
- * Rows of `rotation` are the axes of the world in the model: rotation[i][k] multiplies x_k.
+ * Transforms x of the model to rotation (scale x) + translation. All finite; scale from 2^-300 to
+ * 2^300. rotation[i][k] multiplies x_k: its rows are the axes of the world in model coordinates.
  */
 typedef struct ebpo_pose {
     double rotation[3][3];
@@ -25,17 +25,17 @@ typedef struct ebpo_pose {
     double scale;
 } ebpo_pose;
 
-/* The model stays where it is. */
+/* Identity. */
 #define EBPO_POSE_INIT                                            \
     {                                                             \
         { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, { 0, 0, 0 }, 1 \
     }
 
 /*
- * Sets pose->rotation to that of a quaternion x, y, z, w, w its real part, of any length: the same
- * bits as scene files give.
+ * Sets pose->rotation from a quaternion x, y, z, w (w is the real part) of any length; bitwise
+ * equal to the result for scene files.
  *
- * EBPO_E_ARGUMENT: its greatest part is not from 2^-500 to 2^500; the pose is as it was.
+ * EBPO_E_ARGUMENT: its greatest component is not from 2^-500 to 2^500; the pose is unchanged.
  *
  * Threads: any.
  */

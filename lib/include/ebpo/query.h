@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: questions to a file, with as much of it in memory as one
- * allows.
+ * Queries a file, within a memory budget.
  *
- *   Models           ebpo_model_new, and ebpo_context_new for each thread; ebpo_model_memory
- *   One budget       ebpo_budget_new
+ *   Models           ebpo_model_new, ebpo_context_new (one per thread), ebpo_model_memory
+ *   Shared budget    ebpo_budget_new
  *   Point in solid   ebpo_inside, ebpo_inside_many
  *   Distance         ebpo_distance, ebpo_distance_many, ebpo_distance_within
- *   Rays             ebpo_ray_first, ebpo_ray_any, ebpo_ray_all, and each of these for many
- *   Attributes       ebpo_sampler_new, ebpo_sample: of points on faces
+ *   Rays             ebpo_ray_first, ebpo_ray_any, ebpo_ray_all, and each for many rays
+ *   Attributes       ebpo_sampler_new, ebpo_sample: at points on faces
  *   Boxes            ebpo_faces_in_box, ebpo_triangles_in_box
  *   Mass             ebpo_measure, ebpo_solid_volume_of
  *
@@ -19,13 +18,11 @@
  *     ebpo_context_new(model, &context, &error);
  *     ebpo_inside(context, point, NULL, &answer, &error);
  *
- * Answers are exact. The decision is that of arithmetic without rounding on the
- * file's coordinates, for every finite double that is asked about, whatever the
- * compiler, the floating-point environment, the number of threads, the memory
- * budget or the way of loading.
+ * Results are exact: decisions equal those of arithmetic without rounding on the file's
+ * coordinates, for all finite doubles. They do not depend on the compiler, the floating-point
+ * environment, the number of threads, the memory budget or the loading mode.
  *
- * Sources of the methods: BP 2008, chapter 5; EBP 2017, chapter 4;
- * format-spec/README.md, section 5.
+ * Methods: BP 2008, chapter 5; EBP 2017, chapter 4; format-spec/README.md, section 5.
  */
 #ifndef EBPO_QUERY_H
 #define EBPO_QUERY_H
@@ -39,55 +36,50 @@ extern "C" {
 
 /* ---- models and contexts ---- */
 
-/*
- * How what is not in memory is loaded: EBP 2017, section 4.2. The answers are the
- * same.
- */
+/* How data that is not in memory is loaded (EBP 2017, section 4.2). Results do not depend on it. */
 typedef enum ebpo_loading {
     /*
-     * Whole subtrees, kept while the budget allows; the least recently used go
-     * first (4.2.3).
+     * Whole subtrees, kept while the budget allows; the least recently used are removed first
+     * (4.2.3).
      */
     EBPO_LOAD_CACHE = 0,
 
-    /* One whole subtree at a time, nothing else is kept (4.2.5). */
+    /* One whole subtree at a time; no other is kept (4.2.5). */
     EBPO_LOAD_SUBTREE = 1,
 
-    /* The nodes on the way and the leaf only, nothing is kept (4.2.4). */
+    /* Only the nodes on the path and the leaf; none is kept (4.2.4). */
     EBPO_LOAD_NODES = 2
 } ebpo_loading;
 
-/* Bytes of memory that models share: ebpo_budget_new. */
+/* Memory budget that models share (ebpo_budget_new). */
 typedef struct ebpo_budget ebpo_budget;
 
 typedef struct ebpo_model_options {
-    size_t struct_size; /* EBPO_MODEL_OPTIONS_INIT sets it */
+    size_t struct_size;
 
     /*
-     * Bytes that the model may take, with its caches and what loading needs on
-     * the way. 0: as much as it needs; of a file on a server (http.h) that has more
-     * than 2 MiB and is not cut by `cut_level`, 256 MiB. Such a file, if it has subtrees
-     * (ebpo_info.subtree_level), is read in parts however much is allowed. Beside it
-     * there are the file's table of chunks (24 bytes a chunk), what decodes chunks (some
-     * 250 kB for each thread that loads), and contexts: what they gather of answers and,
-     * for distances, 4 bytes for each subtree below the cut level and a queue of nodes.
+     * Memory limit of the model in bytes, including its caches and buffers for loading. 0: no
+     * limit; but 256 MiB for a file on a server (http.h) of more than 2 MiB if `cut_level` is not
+     * given. Such a file with subtrees (ebpo_info.subtree_level) is loaded in parts for any budget.
+     * Not included: the chunk directory of the file (24 bytes per chunk), decoders (about 250 kB
+     * per loading thread) and contexts. Contexts hold results, and for distances 4 bytes per
+     * subtree below the cut level and a queue of nodes.
      */
     uint64_t memory;
 
     /*
-     * Levels 0 to cut_level stay in memory, and subtrees below them are loaded on
-     * demand. -1: by the budget, everything at once if that fits; of a file on a
-     * server that has more than 2 MiB and subtrees, never everything, whatever
-     * the budget (`ebpo fetch` brings whole files).
+     * Levels 0 to cut_level stay in memory, and the subtrees below are loaded on demand. -1: chosen
+     * by the budget; everything is loaded at once if it fits. For a file on a server of more than 2
+     * MiB with subtrees, never everything.
      */
     int cut_level;
 
-    /* Matters only if not all fits, or a cut level is given. */
+    /* Used only if not everything fits, or with a cut level. */
     ebpo_loading loading;
 
     /*
-     * A thread in the background loads the subtrees that questions about points
-     * around the last one may need, the nearest first (EBP 2017, 4.2.3).
+     * A background thread loads the subtrees around the last query point, nearest first (EBP 2017,
+     * 4.2.3).
      */
     bool prefetch;
 
@@ -97,9 +89,9 @@ typedef struct ebpo_model_options {
     ebpo_progress progress;
 
     /*
-     * Bytes that several models share, in place of `memory`; NULL: none. Such a model is all
-     * in memory as long as those that are take up to half of the budget together, else in parts,
-     * and `loading` is EBPO_LOAD_CACHE.
+     * Shared budget, used instead of `memory`; NULL: none. Requires EBPO_LOAD_CACHE. The model is
+     * entirely in memory if all such models together take up to half of the budget; else it is
+     * loaded in parts.
      */
     ebpo_budget *budget;
 } ebpo_model_options;
@@ -109,18 +101,16 @@ typedef struct ebpo_model_options {
         sizeof(ebpo_model_options), 0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL }, NULL \
     }
 
-/* What is in memory of a file, made for speed. Threads share it. */
+/* The part of a file that is in memory, prepared for fast queries. Threads share it. */
 typedef struct ebpo_model ebpo_model;
 
 /*
- * Reads what the budget allows: everything, or the levels up to the cut level. A
- * model of a file without mesh answers questions to a level only. The file must
- * stay open as long as the model.
+ * Makes a model: loads everything, or the levels up to the cut level. A model of a file without
+ * mesh supports only queries with a level. The file must stay open as long as the model.
  *
- * EBPO_E_LIMIT: the budget is too small; the message names one that would do. A
- * budget that is large enough here holds the average subtree many times, but
- * perhaps not the largest: the question that needs that one is EBPO_E_LIMIT too.
- * EBPO_E_ARGUMENT, EBPO_E_CANCELLED, EBPO_E_MEMORY, and the errors of reading.
+ * EBPO_E_LIMIT: the budget is too small; the message names a sufficient one. An accepted budget
+ * holds the average subtree many times but perhaps not the largest: a query that needs a larger
+ * subtree returns EBPO_E_LIMIT. Other errors are those of reading.
  *
  * Threads: any.
  */
@@ -129,38 +119,38 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_new(const ebpo_file *file,
                                                   ebpo_model **out, ebpo_error *error);
 
 /*
- * What a budget buys: told by the counts in the file's head, with nothing read or loaded. Bytes are
- * bounds from above for ordinary models: of subtrees 1.05 to 1.4 times what is taken. What takes
- * more than that keeps to the budget all the same: others are dropped for it, or it is refused. All
- * but `budget`, `whole` and `least` are 0 if everything will be in memory.
+ * Estimated memory use for a budget. Bytes are upper bounds for ordinary models: for subtrees 1.05
+ * to 1.4 times the actual use. If the actual use is higher, the budget still holds: other data is
+ * removed, or loading fails. All members except `budget`, `whole` and `least` are 0 if everything
+ * will be in memory.
  */
 typedef struct ebpo_model_plan {
-    size_t struct_size; /* EBPO_MODEL_PLAN_INIT sets it */
+    size_t struct_size;
 
-    /* Everything will be in memory. */
+    /* True if everything will be in memory. */
     bool resident;
 
     int cut_level;
 
-    /* As ebpo_model_new will understand it. 0: none. */
+    /* Budget that ebpo_model_new will use. 0: none. */
     uint64_t budget;
 
     /*
-     * From which budget on everything is in memory (files far away: see ebpo_model_options.memory;
-     * a model that takes more stays in parts), and one that would do, little more than the least.
-     * With the least, few subtrees are there at a time.
+     * Budget from which on everything is in memory (remote files: see ebpo_model_options.memory; a
+     * model that takes more is loaded in parts), and a sufficient budget, slightly above the
+     * minimum. With the latter, few subtrees are in memory at a time.
      */
     uint64_t whole, least;
 
     /*
-     * Of the budget: levels down to the cut level; decoded chunks; what stays of subtrees that
-     * are not in memory. The rest is for subtrees.
+     * Parts of the budget: levels down to the cut level; decoded chunks; retained data of subtrees
+     * that are not in memory. Subtrees use the rest.
      */
     uint64_t top, chunks, skeletons;
 
     /*
-     * Below the cut level; bytes of the average one; so many of these are in memory at a time,
-     * while nothing is being loaded.
+     * Number of subtrees below the cut level; bytes of the average subtree; number of subtrees in
+     * memory at a time, while none is being loaded.
      */
     uint64_t subtrees, subtree_bytes, subtrees_held;
 } ebpo_model_plan;
@@ -168,11 +158,10 @@ typedef struct ebpo_model_plan {
 #define EBPO_MODEL_PLAN_INIT EBPO_SIZED(ebpo_model_plan)
 
 /*
- * What ebpo_model_new with these options (NULL: the usual ones) will make of the file. Where a cut
- * level and a budget are given, that may still find the levels to take more than the budget.
+ * Estimates memory use for a budget from the counts in the file header; reads no chunks. With both
+ * a cut level and a budget, ebpo_model_new may still find that the levels exceed the budget.
  *
- * EBPO_E_LIMIT: the budget is too small; the message names one that would do.
- * EBPO_E_ARGUMENT.
+ * EBPO_E_LIMIT: the budget is too small; the message names a sufficient one.
  *
  * Threads: any.
  */
@@ -181,7 +170,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_memory(const ebpo_file *file,
                                                      ebpo_model_plan *out, ebpo_error *error);
 
 /*
- * After its contexts.
+ * Frees a model. Free its contexts first.
  *
  * Threads: one per model.
  */
@@ -189,63 +178,64 @@ EBPO_API void ebpo_model_free(ebpo_model *model);
 
 /* Sums since the model was made, over all contexts. */
 typedef struct ebpo_model_stats {
-    size_t struct_size; /* EBPO_MODEL_STATS_INIT sets it */
+    size_t struct_size;
 
-    /* Everything is in memory. */
+    /* True if everything is in memory. */
     bool resident;
 
     /* 0 if resident. */
     int cut_level;
 
-    /* Bytes, now and at most: tree, caches, what loading needs on the way. */
+    /* Current and peak bytes: tree, caches, buffers for loading. */
     uint64_t memory, memory_peak;
 
     /* Bytes. 0: none. */
     uint64_t budget;
 
-    /* Subtrees found in memory, and loaded because a question needed them. */
+    /* Subtrees found in memory, and subtrees loaded for a query. */
     uint64_t hits, loads;
 
     /* Subtrees loaded in the background. */
     uint64_t prefetched;
 
-    /* Subtrees dropped to make room. */
+    /* Subtrees removed from memory. */
     uint64_t evicted;
 
-    /* Bytes read from the source, and how many times; opening the file included. */
+    /* Bytes and number of reads from the source, including opening of the file. */
     uint64_t bytes_read, reads;
 
-    /* That ebpo_model_new took. */
+    /* Duration of ebpo_model_new. */
     double open_seconds;
 
-    /* That questions spent waiting for subtrees. */
+    /* Time that queries waited for subtrees. */
     double load_seconds;
 
     /*
-     * Leaves in memory, and of those that many questions have come to, how many of each kind:
-     * general, one plane, two planes, convex set, concave set.
+     * Leaves in memory, and the frequently queried leaves by kind: general, one plane, two planes,
+     * convex set, concave set.
      */
     uint64_t leaves, leaves_of_kind[5];
 
-    /* Of the general ones, those with a wall that no face meets: one segment answers there. */
-    uint64_t leaves_one_wall;
+    /* General leaves with a cell face that no face intersects; there one segment decides. */
+    uint64_t leaves_one_cell_face;
 
     /*
-     * Points whose distance was asked for while not everything was in memory, the subtrees that
-     * were searched for them, and the loads that this took, with those for the sign: the quotients
-     * tell what a question costs.
+     * For distances while not everything was in memory: number of points, subtrees searched, and
+     * loads including those for the sign. Their ratios give the cost of a query.
      */
     uint64_t distances, distance_subtrees, distance_loads;
 
-    /* Bytes of `memory`: what is kept of subtrees that are not, so that they are not loaded again
-     * for nothing. */
+    /*
+     * Bytes of `memory` for retained data of subtrees that are not in memory; it avoids unnecessary
+     * loads.
+     */
     uint64_t skeleton_bytes;
 } ebpo_model_stats;
 
 #define EBPO_MODEL_STATS_INIT EBPO_SIZED(ebpo_model_stats)
 
 /*
- * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ * Gets the statistics of a model.
  *
  * Threads: any.
  */
@@ -254,38 +244,38 @@ EBPO_API ebpo_status ebpo_model_get_stats(const ebpo_model *model, ebpo_model_st
 /* ---- one budget for several models ---- */
 
 /*
- * What ebpo_model_options.budget takes: all that its models take is of these bytes, as for
- * ebpo_model_options.memory. Subtrees and chunks that were used least recently go first, whichever
- * model's they are; levels above the cuts, and models that are all in memory, stay. Each model
- * holds its own, also of one file: for two places of one file use one model.
+ * Makes a budget for ebpo_model_options.budget. It limits the memory of all its models, as
+ * ebpo_model_options.memory does for one. The least recently used subtrees and chunks of any model
+ * are removed first; levels above the cut levels and models entirely in memory stay. Models do not
+ * share data, even those of the same file: use one model for several instances of a file.
  *
- * bytes    greater than 0
+ * bytes   greater than 0
  *
- * EBPO_E_LIMIT: too few for any model. EBPO_E_ARGUMENT: 0. EBPO_E_MEMORY.
+ * EBPO_E_LIMIT: too few for any model.
  *
- * Threads: any; its models may be asked by different threads.
+ * Threads: any; different threads may query its models.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget **out,
                                                    ebpo_error *error);
 
 /*
- * After its models; NULL is fine.
+ * Frees a budget. Free its models first.
  *
  * Threads: one per budget.
  */
 EBPO_API void ebpo_budget_free(ebpo_budget *budget);
 
 typedef struct ebpo_budget_stats {
-    size_t struct_size; /* EBPO_BUDGET_STATS_INIT sets it */
+    size_t struct_size;
 
-    /* Bytes: what was given, what is taken of it now, and the most that ever was. */
+    /* Bytes: the budget, the current use and the peak use. */
     uint64_t budget, memory, memory_peak;
 } ebpo_budget_stats;
 
 #define EBPO_BUDGET_STATS_INIT EBPO_SIZED(ebpo_budget_stats)
 
 /*
- * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ * Gets the statistics of a budget.
  *
  * Threads: any.
  */
@@ -293,11 +283,13 @@ EBPO_API ebpo_status ebpo_budget_get_stats(const ebpo_budget *budget, ebpo_budge
 
 /* ---- contexts ---- */
 
-/* One thread's work with a model: position, scratch, what it holds in memory. */
+/*
+ * State of one thread that queries a model: position, scratch memory, data that it holds in memory.
+ */
 typedef struct ebpo_context ebpo_context;
 
 /*
- * EBPO_E_MEMORY.
+ * Makes a context.
  *
  * Threads: any.
  */
@@ -305,47 +297,46 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_context_new(ebpo_model *model, ebpo_cont
                                                     ebpo_error *error);
 
 /*
+ * Frees a context.
+ *
  * Threads: one per context.
  */
 EBPO_API void ebpo_context_free(ebpo_context *context);
 
-/* ---- what all questions have in common ---- */
+/* ---- rules for all queries ---- */
 
 /*
- * Points are three finite doubles in the model's unit. Others are
- * EBPO_E_ARGUMENT, with the point's number. Answers to many points are the same
- * as to one point after the other.
- *
- * On failure, the answers are unspecified.
+ * Points are three finite doubles in the model's unit; others are EBPO_E_ARGUMENT with the index of
+ * the point. A query of many points gives the same results as single queries. On failure results
+ * are unspecified. All queries can return the errors of reading, and EBPO_E_LIMIT (ebpo_model_new).
  */
 
-/* A level for exact answers. */
+/* Level for exact results. */
 enum { EBPO_LEVEL_ALL = -1 };
 
 /* ---- point in solid ---- */
 
-/* Whether envelopes are used to decide early. The answers are the same. */
+/* Use of envelopes for early decisions. Results do not depend on it. */
 typedef enum ebpo_envelopes {
-    EBPO_ENVELOPES_AUTO = 0, /* where they save loading */
-    EBPO_ENVELOPES_USE = 1,  /* at every gray node on the way (EBP 2017, 4.2.1) */
+    EBPO_ENVELOPES_AUTO = 0, /* where they avoid loading */
+    EBPO_ENVELOPES_USE = 1,  /* at every gray node on the path (EBP 2017, 4.2.1) */
     EBPO_ENVELOPES_SKIP = 2
 } ebpo_envelopes;
 
 typedef struct ebpo_inside_options {
-    size_t struct_size; /* EBPO_INSIDE_OPTIONS_INIT sets it */
+    size_t struct_size;
 
     /*
-     * Look at levels 0 to `level` only, and say what is certain by these.
-     * EBPO_LEVEL_ALL: exact answers.
+     * Uses only levels 0 to `level` and returns a certain result or EBPO_MAYBE. EBPO_LEVEL_ALL:
+     * exact results.
      */
     int level;
 
     ebpo_envelopes envelopes;
 
     /*
-     * Stop after about so many nanoseconds for each point, and say what is
-     * certain by then. 0: no deadline. A subtree or a leaf that is under way is
-     * finished.
+     * Stops after about this many nanoseconds per point and returns a certain result or EBPO_MAYBE.
+     * 0: no deadline. A started subtree or leaf is completed.
      */
     uint64_t deadline_ns;
 } ebpo_inside_options;
@@ -359,33 +350,32 @@ typedef enum ebpo_where {
     EBPO_OUT = 0,
     EBPO_IN = 1,
     EBPO_ON = 2,   /* on a face, an edge or a vertex */
-    EBPO_MAYBE = 3 /* the level or the deadline did not suffice */
+    EBPO_MAYBE = 3 /* not decided by the level or deadline */
 } ebpo_where;
 
 typedef struct ebpo_inside_result {
-    /* An ebpo_where. */
+    /* ebpo_where */
     int32_t where;
 
     /*
-     * The winding number. 0 if EBPO_ON or EBPO_MAYBE, and if an envelope decided
-     * because a level or deadline is given: with rules other than nonzero the
-     * true one may then be another that is not inside.
+     * Winding number. 0 for EBPO_ON and EBPO_MAYBE, and if an envelope decided because a level or
+     * deadline is given. In that case, with rules other than nonzero, the true value may be another
+     * one that is not inside.
      */
     int32_t winding;
 
     /*
-     * EBPO_MAYBE: the surface is at most so far away, which is the diagonal of the
-     * cell that was reached. Else 0.
+     * EBPO_MAYBE: upper bound of the distance to the surface (the diagonal of the cell reached).
+     * Else 0.
      */
     double doubt;
 } ebpo_inside_result;
 
 /*
- * Whether a point is in the solid. BP 2008, section 5.1; EBP 2017, 4.2.
+ * Classifies a point as inside, outside or on the surface. BP 2008, section 5.1; EBP 2017, 4.2.
  *
- * EBPO_E_NOT_SOLID: the model is a surface. EBPO_E_ABSENT: the file has no mesh,
- * and no level is given; or a subset does not hold what decides. EBPO_E_ARGUMENT,
- * EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading.
+ * EBPO_E_NOT_SOLID: the model is a surface. EBPO_E_ABSENT: the file has no mesh and no level is
+ * given, or a subset lacks the required data.
  *
  * Threads: one per context.
  */
@@ -394,7 +384,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside(ebpo_context *context, const doub
                                                ebpo_inside_result *out, ebpo_error *error);
 
 /*
- * The same for points[count][3], into out[count].
+ * Classifies points[count][3] into out[count].
  *
  * Threads: one per context.
  */
@@ -409,23 +399,23 @@ typedef enum ebpo_distance_mode {
     EBPO_DISTANCE_EXACT = 0,
 
     /*
-     * The faces below the deepest gray node around the point; not always the
-     * minimum (EBP 2017, 4.4).
+     * The faces below the deepest gray node around the point; not always the minimum (EBP 2017,
+     * 4.4).
      */
     EBPO_DISTANCE_RECURSIVE = 1,
 
-    /* The faces of the leaf around the point; no answer elsewhere. */
+    /* The faces of the leaf around the point; no result elsewhere. */
     EBPO_DISTANCE_LEAVES = 2,
 
     /*
-     * The envelope of the deepest gray node around the point, at most at `level`.
-     * Unsigned, not always the minimum; max_distance does not matter.
+     * The envelope of the deepest gray node around the point, at most at `level`. Unsigned, not
+     * always the minimum; max_distance is ignored.
      */
     EBPO_DISTANCE_ENVELOPE = 3
 } ebpo_distance_mode;
 
 typedef struct ebpo_distance_options {
-    size_t struct_size; /* EBPO_DISTANCE_OPTIONS_INIT sets it */
+    size_t struct_size;
 
     /* As in ebpo_inside_options. */
     int level;
@@ -435,18 +425,15 @@ typedef struct ebpo_distance_options {
     /* As in ebpo_inside_options. */
     uint64_t deadline_ns;
 
-    /*
-     * What is farther away, in the model's unit, does not matter; at least 0.
-     * INFINITY: everything does.
-     */
+    /* Faces farther away are ignored; in the model's unit, at least 0. INFINITY: no limit. */
     double max_distance;
 
-    /* Leave the sign away: less work. Surfaces have none anyway. */
+    /* True: do not compute the sign, which is faster. Surfaces have no sign. */
     bool unsigned_distance;
 
     /*
-     * Begin with the last answer of this context: faster for points that are
-     * close to each other. The answers are the same.
+     * Starts from the previous result of this context, which is faster for nearby points. Results
+     * do not depend on it.
      */
     bool warm;
 
@@ -462,46 +449,40 @@ typedef struct ebpo_distance_options {
         }                                                                                       \
     }
 
-/* The number of no face. */
+/* Index of no face. */
 #define EBPO_NO_FACE UINT64_MAX
 
 typedef struct ebpo_distance_result {
     /*
-     * Correctly rounded. Of solids negative inside, unless unsigned (-0.0 if it
-     * underflows). INFINITY: nothing within max_distance, and no face; or, with a face,
-     * farther than every double. NAN: not determined, see
-     * `lo` and `hi`.
+     * Correctly rounded. Negative inside a solid, unless unsigned (-0.0 if it underflows).
+     * INFINITY: without a face, nothing within max_distance; with a face, larger than every double.
+     * NAN: not determined, see `lo` and `hi`.
      */
     double distance;
 
-    /* The true distance, unsigned, is certainly within. Exact answers: both it. */
+    /* Bounds of the exact unsigned distance; equal for exact results. */
     double lo, hi;
 
-    /* The nearest point, rounded. NAN: none. */
+    /* Nearest point, rounded. NAN: none. */
     double point[3];
 
-    /*
-     * The unit normal of the face, outward by its orientation. (0, 0, 0) for a
-     * face without area.
-     */
+    /* Unit normal of the face, outward by its orientation. (0, 0, 0) for a face without area. */
     double normal[3];
 
     /*
-     * The number of the triangle in the source if the file has maps, else in the
-     * file. Of several at exactly the same distance, the first one in the file.
-     * EBPO_NO_FACE: none (limited answers, envelopes).
+     * Source index of the triangle if the file has maps, else its index in the file. Of several at
+     * exactly the same distance, the first one in the file. EBPO_NO_FACE: none (limited results,
+     * envelopes).
      */
     uint64_t face;
 } ebpo_distance_result;
 
 /*
- * How far a point is from the model, and from which of its faces. EBP 2017, 4.4.
- * With a level or a deadline the answer is `lo` and `hi`, and the distance if
- * they meet.
+ * Computes the distance from a point to the model, and the nearest face. EBP 2017, 4.4. With a
+ * level or a deadline the result is `lo` and `hi`, and the distance if both are equal.
  *
- * EBPO_E_ABSENT: the file has no mesh, and neither a level is given nor the mode
- * EBPO_DISTANCE_ENVELOPE; or a subset does not hold what decides. EBPO_E_ARGUMENT,
- * EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading.
+ * EBPO_E_ABSENT: the file has no mesh, no level is given, and the mode is not
+ * EBPO_DISTANCE_ENVELOPE; or a subset lacks the required data.
  *
  * Threads: one per context.
  */
@@ -510,7 +491,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance(ebpo_context *context, const do
                                                  ebpo_distance_result *out, ebpo_error *error);
 
 /*
- * The same for points[count][3], into out[count].
+ * Computes the distances of points[count][3] into out[count].
  *
  * Threads: one per context.
  */
@@ -520,18 +501,17 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_many(ebpo_context *context, con
                                                       ebpo_distance_result *out, ebpo_error *error);
 
 typedef struct ebpo_within_options {
-    size_t struct_size; /* EBPO_WITHIN_OPTIONS_INIT sets it */
+    size_t struct_size;
 
     /*
-     * Faces at most so far away, in the model's unit, decided without rounding; at least 0.
-     * INFINITY: all.
+     * Maximum distance of faces, in the model's unit, compared exactly; at least 0. INFINITY: all.
      */
     double radius;
 
-    /* The nearest so many of these; 0: all. */
+    /* Maximum number of faces, nearest first; 0: all. */
     uint64_t most;
 
-    /* Without, normals are NAN: less work. */
+    /* False: normals are NAN, which is faster. */
     bool normals;
 
     uint8_t reserved[7];
@@ -542,7 +522,7 @@ typedef struct ebpo_within_options {
         sizeof(ebpo_within_options), __builtin_inf(), 0, true, { 0 } \
     }
 
-/* A face and its distance, lent until the function returns that is called with it. */
+/* A face and its distance; lent until the callback returns. */
 typedef struct ebpo_near_face {
     /* Correctly rounded, unsigned. */
     double distance;
@@ -550,31 +530,30 @@ typedef struct ebpo_near_face {
     /* As in ebpo_distance_result. */
     double point[3], normal[3];
 
-    /* As in ebpo_distance_result; and in the file. */
+    /* As in ebpo_distance_result; index in the file. */
     uint64_t face, file_face;
 
     uint64_t reserved[3];
 } ebpo_near_face;
 
-/* False: enough. */
+/* Return false to stop. */
 typedef bool (*ebpo_near_fn)(void *user, const ebpo_near_face *face);
 
 /*
- * The nearest faces of a point, or all faces within a radius, each once, given to `take` in
- * ascending order of their exact distances; of several at the same distance the first one in the
- * file comes first, so the first of all is that of ebpo_distance.
+ * Passes the nearest faces of a point, or all faces within a radius, to `take`, each once, in
+ * ascending order of exact distance. Faces at the same distance are in the order of the file, so
+ * the first face is that of ebpo_distance.
  *
- * options   NULL for the usual ones: all faces of the model
- * take      must not use the context; when it returns false, nothing more is given, and the call
- *           succeeds
+ * options   NULL: all faces of the model
+ * take      must not use the context
  *
- * What is under way takes at most 16 MiB, beside the model's budget, however many faces are given:
- * after every 65,536 (without `most` also after some of the first ones) the search begins anew
- * behind the last one. Subtrees are loaded the nearest first, and only those that may have a face
- * of the answer; each once, if the budget holds them until the search is behind them.
+ * Uses at most 16 MiB besides the model's budget, for any number of faces: after every 65,536 faces
+ * (without `most` also after some of the first ones) the search restarts behind the last one.
+ * Subtrees are loaded in order of distance, and only if they may contain a result; each once, if
+ * the budget holds them long enough.
  *
- * EBPO_E_ABSENT: as for ebpo_distance; in a subset perhaps after some faces, which are right.
- * EBPO_E_ARGUMENT: before the first face. EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading.
+ * EBPO_E_ABSENT: as for ebpo_distance; in a subset perhaps after some faces, which are correct.
+ * EBPO_E_ARGUMENT: only before the first face.
  *
  * Threads: one per context.
  */
@@ -588,10 +567,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_within(ebpo_context *context,
 
 typedef struct ebpo_ray_hit {
     /*
-     * The hit is at origin + t direction. Correctly rounded: INFINITY if it is greater
-     * than every double, as along directions that are far too short. That is a hit: it has
-     * a face. A direction that is longer by a power of two has a finite t for the same face.
-     * Hits are in the order of the exact values.
+     * The hit is at origin + t direction. Correctly rounded; INFINITY if larger than every double,
+     * for very short directions. This is a hit with a face; a direction longer by a power of two
+     * gives a finite t for the same face. Hits are sorted by exact values.
      */
     double t;
 
@@ -599,23 +577,20 @@ typedef struct ebpo_ray_hit {
     uint64_t face;
 
     /*
-     * 1: the ray goes in through the inner part of the face. -1: it goes out. 0:
-     * it meets an edge or a vertex, runs within the face's plane, or the face has
-     * no area.
+     * 1: the ray enters through the interior of the face. -1: it leaves. 0: it hits an edge or a
+     * vertex, is within the face's plane, or the face has no area.
      */
     int32_t side;
 } ebpo_ray_hit;
 
 /*
- * The first closed triangle that a ray meets: origin + t direction, with t from 0
- * to t_max. Of several at the same t, the first one in the file. *hit is false if
- * there is none.
+ * Finds the first closed triangle that intersects the ray origin + t direction, t from 0 to t_max.
+ * Of several at the same t, returns the first one in the file. *hit is false if there is none.
  *
- * direction   of any length but 0
- * t_max       at least 0; INFINITY for a ray without end
+ * direction   of any length except 0
+ * t_max       at least 0; INFINITY: unbounded
  *
- * EBPO_E_ABSENT: the file has no mesh, or a subset does not hold what decides.
- * EBPO_E_ARGUMENT, EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of reading.
+ * EBPO_E_ABSENT: the file has no mesh, or a subset lacks the required data.
  *
  * Threads: one per context.
  */
@@ -624,8 +599,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_first(ebpo_context *context, const d
                                                   ebpo_ray_hit *out, bool *hit, ebpo_error *error);
 
 /*
- * All triangles that the ray meets, by t, then in the order of the file. `hits`
- * is the context's, until its next call.
+ * Finds all triangles that intersect the ray, sorted by t, then by the order of the file. `hits` is
+ * lent until the next call with the context. Errors are those of ebpo_ray_first.
  *
  * Threads: one per context.
  */
@@ -635,9 +610,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all(ebpo_context *context, const dou
                                                 ebpo_error *error);
 
 /*
- * Whether the ray meets any triangle: what ebpo_ray_first says in *hit, with less work.
- *
- * Errors are those of ebpo_ray_first.
+ * Tests if the ray intersects any triangle. Faster than ebpo_ray_first, with the same errors.
  *
  * Threads: one per context.
  */
@@ -646,24 +619,24 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any(ebpo_context *context, const dou
                                                 ebpo_error *error);
 
 /*
- * Which triangles count. Their normals decide, wherever they are met, so that nothing slips through
- * between two of them: an edge or a vertex belongs to all its triangles. Those without area, and
- * those in whose plane the ray runs, have no sides: they count with EBPO_RAY_BOTH only.
+ * Sides of triangles that count. Only the normals decide, at any point of a triangle, so there are
+ * no gaps between triangles: an edge or a vertex belongs to all its triangles. Triangles without
+ * area, and those whose plane contains the ray, count only with EBPO_RAY_BOTH.
  */
 typedef enum ebpo_ray_sides {
     EBPO_RAY_BOTH = 0,  /* all */
-    EBPO_RAY_FRONT = 1, /* met against their normal: from outside, if the model is a solid */
-    EBPO_RAY_BACK = 2   /* met along their normal */
+    EBPO_RAY_FRONT = 1, /* hit against their normal: from outside, for a solid */
+    EBPO_RAY_BACK = 2   /* hit along their normal */
 } ebpo_ray_sides;
 
 typedef struct ebpo_ray_options {
-    size_t struct_size; /* EBPO_RAY_OPTIONS_INIT sets it */
+    size_t struct_size;
 
     ebpo_ray_sides sides;
 
     /*
-     * 0: all cores. Few rays take fewer threads; ways of loading other than
-     * EBPO_LOAD_CACHE one.
+     * 0: all cores. Fewer are used for few rays, and one for loading modes other than
+     * EBPO_LOAD_CACHE.
      */
     unsigned threads;
 } ebpo_ray_options;
@@ -673,23 +646,22 @@ typedef struct ebpo_ray_options {
         sizeof(ebpo_ray_options), EBPO_RAY_BOTH, 0 \
     }
 
-/* origin + t direction, as in ebpo_ray_first. */
+/* Ray origin + t direction, as in ebpo_ray_first. */
 typedef struct ebpo_ray {
     double origin[3], direction[3];
     double t_max;
 } ebpo_ray;
 
 /*
- * ebpo_ray_first for rays[count], into out[count]; where nothing is met, t is INFINITY and the face
- * is EBPO_NO_FACE. options: NULL for the usual ones. Answers depend neither on the threads nor on
- * what else is asked. If not everything is in memory, rays are followed in the order in which they
- * enter the model, along a curve, so that subtrees are loaded few times.
+ * Finds the first hit of rays[count] as ebpo_ray_first does, into out[count]. Without a hit, t is
+ * INFINITY and the face is EBPO_NO_FACE. Results do not depend on threads or other rays. If not
+ * everything is in memory, rays are ordered along a curve by their entry into the model, so that
+ * subtrees are loaded few times.
  *
- * EBPO_E_ARGUMENT, with the ray's number: before any is answered. Else the errors of
- * ebpo_ray_first; of several the one of the first ray in the order of work. On failure, `out` is
- * unspecified.
+ * EBPO_E_ARGUMENT, with the index of the ray: before any is computed. Else the errors of
+ * ebpo_ray_first, for the first failed ray in processing order. On failure `out` is unspecified.
  *
- * Threads: one per context; further ones live for the call.
+ * Threads: one per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_first_many(ebpo_context *context, const ebpo_ray *rays,
                                                        uint64_t count,
@@ -697,9 +669,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_first_many(ebpo_context *context, co
                                                        ebpo_ray_hit *out, ebpo_error *error);
 
 /*
- * ebpo_ray_any for rays[count], into any[count]; the rest as in ebpo_ray_first_many.
+ * Tests rays[count] as ebpo_ray_any does, into any[count]; see ebpo_ray_first_many.
  *
- * Threads: one per context; further ones live for the call.
+ * Threads: one per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any_many(ebpo_context *context, const ebpo_ray *rays,
                                                      uint64_t count,
@@ -707,11 +679,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any_many(ebpo_context *context, cons
                                                      ebpo_error *error);
 
 /*
- * ebpo_ray_all for rays[count]: the hits of ray i are hits[begin[i]] to hits[begin[i + 1] - 1];
- * `begin` has count + 1 items. Both are the context's, until its next call. The rest as in
- * ebpo_ray_first_many.
+ * Finds all hits of rays[count] as ebpo_ray_all does; see ebpo_ray_first_many. Ray i has
+ * hits[begin[i]] to hits[begin[i + 1] - 1]; `begin` has count + 1 items. Both are lent until the
+ * next call with the context.
  *
- * Threads: one per context; further ones live for the call.
+ * Threads: one per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all_many(ebpo_context *context, const ebpo_ray *rays,
                                                      uint64_t count,
@@ -721,25 +693,23 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_all_many(ebpo_context *context, cons
 
 /* ---- attributes at hits ---- */
 
-/* So many attributes at a time, at most. */
-enum { EBPO_SAMPLER_MOST = 16 };
+/* Maximum number of attributes of a sampler. */
+enum { EBPO_SAMPLER_MAX = 16 };
 
-/* Attributes of a file (ebpo_file_attribute), ready to be told at points on faces. Threads share
- * it. */
+/* Attributes of a file (ebpo_file_attribute), for sampling at points on faces. Threads share it. */
 typedef struct ebpo_sampler ebpo_sampler;
 
 /*
- * Reads the named attributes, and what finds them: at 4 bytes a face the maps, if the file has
- * them, and for attributes of vertices the mesh (12 bytes a face, 12 or 24 a vertex), whatever the
- * model's budget. The file must stay open as long as the sampler.
+ * Reads the named attributes and the data to locate them, independent of the model's budget: the
+ * maps if present (4 bytes per face), and for attributes of vertices the mesh (12 bytes per face,
+ * 12 or 24 per vertex). The file must stay open as long as the sampler.
  *
- * names     separated by commas: "quality", "red,green,blue", or with the element, "face:red".
- *           Without that, vertices come before faces; of equal names the first in the file is
- *           taken. Lists are not found
- * threads   for reading. 0: all cores
+ * names   separated by commas: "quality", "red,green,blue", or with the element, "face:red".
+ *         Without an element, vertices precede faces; of equal names the first in the file is used.
+ *         Lists are not found
  *
  * EBPO_E_ABSENT: no such attribute, or the file has no mesh. EBPO_E_ARGUMENT: more than
- * EBPO_SAMPLER_MOST names. EBPO_E_MEMORY, and the errors of reading.
+ * EBPO_SAMPLER_MAX names. Other errors are those of reading.
  *
  * Threads: any.
  */
@@ -748,38 +718,41 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_sampler_new(const ebpo_file *file, const
                                                     ebpo_error *error);
 
 /*
- * NULL is fine.
+ * Frees a sampler.
  *
  * Threads: one per sampler.
  */
 EBPO_API void ebpo_sampler_free(ebpo_sampler *sampler);
 
 /*
- * How many attributes it has: so many values for each point.
+ * Returns the number of attributes, which is the number of values per point.
  *
  * Threads: any.
  */
 EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
 
 /*
- * Attributes at points on faces, as distances (`point` and `face`) and rays (origin + t direction)
- * give them: of faces the face's own; of vertices A, B and C, those of the corners a, b and c,
- * weighed by where the point p is. Labels are weighed as well.
+ * Samples attributes at points on faces, as distances (`point` and `face`) and rays (origin + t
+ * direction) return them. Attributes of faces give the face's value. Attributes of vertices give a
+ * mean of the values A, B and C at the corners a, b and c, weighted by the position of the point p;
+ * this includes labels.
  *
- * In doubles without fused operations: e = b - a, f = c - a, d = p - a, scaled by powers of two;
- * D = (e.e)(f.f) - (e.f)(e.f); w_b = ((f.f)(d.e) - (e.f)(d.f)) / D and
- * w_c = ((e.e)(d.f) - (e.f)(d.e)) / D, 0 if less; w_a = 1 - w_b - w_c, 0 if less; each is divided
- * by their sum. Scalar products add x, y, z in this order. The value is (w_a A + w_b B) + w_c C
- * without what weighs 0, and never outside of the values that take part: at a corner it is the
- * corner's, where all three are equal it is that. If D is at most 2^-900, where the greatest
- * coordinate of e and f is 1 to 2, the face has no area: the weights are those along the longest of
- * ab, ac, bc, the first of equal ones, where d is nearest to it.
+ * In doubles without fused operations: e = b - a, f = c - a, d = p - a, scaled by powers of two; D
+ * = (e.e)(f.f) - (e.f)(e.f); w_b = ((f.f)(d.e) - (e.f)(d.f)) / D and w_c = ((e.e)(d.f) -
+ * (e.f)(d.e)) / D, 0 if less; w_a = 1 - w_b - w_c, 0 if less; each is divided by their sum. Scalar
+ * products add x, y, z in this order.
+ *
+ * The value is (w_a A + w_b B) + w_c C without terms of weight 0, clamped to the range of the
+ * values used. At a corner it is the corner's value; if all three are equal, it is that value. If D
+ * is at most 2^-900, with the greatest coordinate of e and f scaled to 1 to 2, the face has no
+ * area: the weights are those along the longest of ab, ac, bc (the first of equal ones) at the
+ * point nearest to d.
  *
  * points   [count][3] finite
  * faces    [count] as in ebpo_distance_result; EBPO_NO_FACE: the values are NAN
  * values   [count][columns] in the order of `names`
  *
- * EBPO_E_ARGUMENT: a point is not finite, or the file has no such face.
+ * EBPO_E_ARGUMENT: a point is not finite, or a face index is out of range.
  *
  * Threads: any.
  */
@@ -790,11 +763,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_sample(const ebpo_sampler *sampler, cons
 /* ---- boxes ---- */
 
 /*
- * The closed triangles that meet the closed box min .. max, with min <= max on
- * each axis, in the order of the file; numbers as in ebpo_distance_result. `faces`
- * is the context's, until its next call.
- *
- * Errors are those of ebpo_ray_first.
+ * Finds the closed triangles that intersect the closed box min .. max (min <= max on each axis), in
+ * the order of the file; indices as in ebpo_distance_result. `faces` is lent until the next call
+ * with the context. Errors are those of ebpo_ray_first.
  *
  * Threads: one per context.
  */
@@ -802,39 +773,38 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_faces_in_box(ebpo_context *context, cons
                                                      const double max[3], const uint64_t **faces,
                                                      uint64_t *count, ebpo_error *error);
 
-/* At most so many triangles are given at a time. */
-enum { EBPO_TRIANGLES_MOST = 1024 };
+/* Maximum number of triangles in a block. */
+enum { EBPO_TRIANGLES_MAX = 1024 };
 
-/* Triangles, lent until the function returns that is called with them. */
+/* A block of triangles; lent until the callback returns. */
 typedef struct ebpo_triangles {
-    /* 1 to EBPO_TRIANGLES_MOST */
+    /* 1 to EBPO_TRIANGLES_MAX */
     uint64_t count;
 
-    /* [count] corner after corner, in the model's unit: what the file stores, exactly */
+    /* [count] corners, in the model's unit: exactly the stored values */
     const double (*corners)[3][3];
 
-    /* [count] as in ebpo_distance_result; and in the file */
+    /* [count] as in ebpo_distance_result; indices in the file */
     const uint64_t *faces, *file_faces;
 
     uint64_t reserved[4];
 } ebpo_triangles;
 
-/* False: enough. */
+/* Return false to stop. */
 typedef bool (*ebpo_triangles_fn)(void *user, const ebpo_triangles *triangles);
 
 /*
- * The triangles of ebpo_faces_in_box with their corners, each once, given to `take` block by block:
- * within the model's budget however many they are. What is under way takes 4 bytes more for each
- * triangle of one subtree; if all is resident, for each of the answer.
+ * Passes the triangles of ebpo_faces_in_box with their corners to `take`, each once, in blocks.
+ * Memory stays within the model's budget for any number of triangles, plus 4 bytes for each
+ * triangle of one subtree (if all is resident, of the result).
  *
- * In the order of the file if all is resident. Else subtree by subtree as the model holds them (cut
- * level), depth first, and within each in the order of the file.
+ * The order is that of the file if all is resident. Else it is by subtree (cut level), depth first,
+ * and within each in the order of the file.
  *
- * take   must not use the context; when it returns false, nothing more is given, and the call
- *        succeeds
+ * take   must not use the context
  *
- * Errors are those of ebpo_ray_first. EBPO_E_ABSENT and EBPO_E_ARGUMENT come before the first
- * triangle.
+ * Errors are those of ebpo_ray_first. EBPO_E_ABSENT and EBPO_E_ARGUMENT are returned before the
+ * first triangle.
  *
  * Threads: one per context.
  */
@@ -845,24 +815,20 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_triangles_in_box(ebpo_context *context, 
 
 /* ---- mass ---- */
 
-/*
- * What is known of the volume of a solid: of the points that the rule puts inside.
- * In the model's unit, cubed.
- */
+/* Volume of a solid: of the points that the rule puts inside, in the cube of the model's unit. */
 typedef struct ebpo_solid_volume {
-    size_t struct_size; /* EBPO_SOLID_VOLUME_INIT sets it */
+    size_t struct_size;
 
     /*
-     * The volume is certainly within. lo == hi: it is known but for rounding,
-     * provided that no component crosses itself, which is not looked for. Else
-     * components meet or repeat each other, or the mesh is no 2-manifold; without
-     * `info` these are 0 and INFINITY then. 0 for a surface.
+     * Bounds of the volume. lo == hi: known except for rounding, if no component intersects itself,
+     * which is not tested. lo < hi: components intersect or repeat each other, or the mesh is not a
+     * 2-manifold; without `info` the bounds are then 0 and INFINITY. 0 for a surface.
      */
     double lo, hi;
 
     /*
-     * The integral of the winding number: the volume if winding numbers are 0 and 1
-     * only. A part with winding number 2 counts twice, one with -1 is subtracted.
+     * Integral of the winding number: the volume if winding numbers are only 0 and 1. A part with
+     * winding number 2 counts twice; a part with -1 is subtracted.
      */
     double integral;
 } ebpo_solid_volume;
@@ -870,16 +836,13 @@ typedef struct ebpo_solid_volume {
 #define EBPO_SOLID_VOLUME_INIT EBPO_SIZED(ebpo_solid_volume)
 
 /*
- * Decides whether the volume of the solid is known. Takes no time worth mentioning.
+ * Computes bounds of the volume of the solid, in negligible time.
  *
- * report    of the mesh (ebpo_mesh_check); &info->report, of a file
- * rule      info->rule, of a file
- * shells    of the mesh (ebpo_mesh_count_shells); NULL: not counted, and the volume
- *           of several components is not known
- * info      of the mesh's file, whose black cells and envelopes bound the volume;
- *           NULL: there is none
- *
- * EBPO_E_ARGUMENT: `out` or `shells` was not begun with its macro, or `rule` is unknown.
+ * report    of the mesh (ebpo_mesh_check); for a file &info->report
+ * rule      for a file info->rule
+ * shells    of the mesh (ebpo_mesh_count_shells); NULL: not counted, and the volume of several
+ *           components is unknown
+ * info      of the mesh's file, whose black cells and envelopes bound the volume; NULL: no file
  *
  * Threads: any.
  */
@@ -890,45 +853,43 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_solid_volume_of(const ebpo_mesh_report *
 
 /* In the model's unit, squared, cubed and so on. */
 typedef struct ebpo_mass {
-    size_t struct_size; /* EBPO_MASS_INIT sets it */
+    size_t struct_size;
 
     double area;
 
     /*
-     * The volume of the solid, as ebpo_solid_volume_of has it; NAN where that is not
-     * known. 0 for a surface. If it is 0, so is what follows.
+     * Volume of the solid (ebpo_solid_volume_of); NAN if unknown, 0 for a surface. If it is 0, the
+     * following members are 0.
      */
     double volume;
 
-    /* Of the solid; where its volume is not known, of the winding number as a density. */
+    /* Centroid of the solid; if the volume is unknown, the winding number is the density. */
     double centroid[3];
 
     /* About the centroid, for density 1. */
     double inertia[3][3];
 
     /*
-     * The same in a unit of 2^exponent of the model's, in which the model is about
-     * 1 long: for models so large or so small that what is above is infinite or 0.
+     * The same in a unit of 2^exponent of the model's unit, in which the model is about 1 long. For
+     * very large or very small models, whose values above are infinite or 0.
      */
     double scaled_area, scaled_volume, scaled_inertia[3][3];
     int64_t exponent;
 
-    /* The volume is certainly within; both are `volume` where it is known. */
+    /* Bounds of the volume; equal to `volume` if it is known. */
     double volume_lo, volume_hi;
 
-    /* Of the winding number, as ebpo_solid_volume has it; and in that other unit. */
+    /* Integral of the winding number (ebpo_solid_volume), and in the scaled unit. */
     double integral, scaled_integral;
 } ebpo_mass;
 
 #define EBPO_MASS_INIT EBPO_SIZED(ebpo_mass)
 
 /*
- * Area, volume, centroid and inertia of the file's mesh, by compensated sums. Of a
- * mesh of several components ebpo_mesh_count_shells is a part of the work.
- * threads: 0 for all cores; the result does not depend on it.
+ * Computes area, volume, centroid and inertia of the file's mesh by compensated sums. For several
+ * components it includes ebpo_mesh_count_shells.
  *
- * EBPO_E_ABSENT: the file has no mesh, or is a subset. EBPO_E_MEMORY, and the
- * errors of reading.
+ * EBPO_E_ABSENT: the file has no mesh, or is a subset. Other errors are those of reading.
  *
  * Threads: any.
  */

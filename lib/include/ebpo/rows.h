@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: rows of numbers from any HDF5 file, to ask about.
+ * Reads rows of numbers from any HDF5 file, as input of queries.
  */
 #ifndef EBPO_ROWS_H
 #define EBPO_ROWS_H
@@ -11,22 +11,23 @@ extern "C" {
 #endif
 
 /*
- * Reads a dataset of rows x columns, of integers or floats of any size and byte order, as doubles;
- * what a double cannot hold is rounded to the nearest. It is read as a whole.
+ * Reads a whole dataset of rows x columns as doubles. It may hold integers or floats of any size
+ * and byte order; values are rounded to the nearest double.
  *
- * dataset        such as "/points"; NULL or "": none is read, and the error's message names
- *                those that could be
- * least, most    how many columns it may have; 1 to 64
- * fill           the value of columns from the dataset's to `most`
- * rows           [*count][most] doubles. Freed by free(). On failure NULL.
+ * dataset        such as "/points". NULL or "": reads none; the error message lists the candidates
+ * least, most    allowed number of columns, 1 to 64
+ * fill           value of the columns from the dataset's number of columns to `most`
+ * rows           [*count][most] doubles; freed by free()
  *
- * EBPO_E_IO: the file cannot be read, or is open for writing in another program. EBPO_E_FORMAT: it
- * is no HDF5 file, has no such dataset, or one of another shape or type (complex numbers, say, or
- * an array of an .ebpo.h5 file, which holds codes), or whose values lie in another file.
- * EBPO_E_ABSENT: no dataset was named, and none could be. EBPO_E_LIMIT: the rows would take more
- * than 64 MiB and than 1,024 times the file. EBPO_E_ARGUMENT, EBPO_E_MEMORY. EBPO_E_UNSUPPORTED:
- * this library was built without libhdf5. That reads the file in a process of its own, with limits
- * on memory and time and without plugins; rows come by a file without a name in TMPDIR.
+ * EBPO_E_IO: the file cannot be read, or another program has it open for writing. EBPO_E_FORMAT:
+ * not an HDF5 file; no such dataset; another shape or type (for example complex numbers, or an
+ * array of an .ebpo.h5 file, which holds codes); or the values are in another file. EBPO_E_ABSENT:
+ * no dataset was named, and there is no candidate. EBPO_E_LIMIT: the rows would take more than 64
+ * MiB and more than 1,024 times the file size. EBPO_E_UNSUPPORTED: the library was built without
+ * libhdf5.
+ *
+ * libhdf5 reads the file in a separate process, with limits on memory and time and without plugins.
+ * The rows are passed through an unnamed file in TMPDIR.
  *
  * Threads: any.
  */
@@ -36,17 +37,18 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_rows_read(const char *path, const char *
                                                   ebpo_error *error);
 
 /*
- * The same for a part of the rows; of a dataset in chunks those are read that it meets.
+ * Reads a part of the rows as ebpo_rows_read does. Of a chunked dataset, only the chunks that
+ * contain these rows are read.
  *
- * first, most_rows   from row `first` on, at most so many; 0: none, to learn *total
- * count              the rows that were there
- * total              the rows of the dataset, as the file says; 0 on failure
+ * first, max_rows   first row, and maximum number of rows; 0 rows: only sets *total
+ * count              number of rows read
+ * total              number of rows of the dataset; 0 on failure
  *
  * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_rows_read_part(const char *path, const char *dataset,
                                                        unsigned least, unsigned most, double fill,
-                                                       uint64_t first, uint64_t most_rows,
+                                                       uint64_t first, uint64_t max_rows,
                                                        double **rows, uint64_t *count,
                                                        uint64_t *total, ebpo_error *error);
 

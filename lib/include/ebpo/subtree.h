@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: a part of a model as plain arrays. The subtree of a node: its nodes, their
- * envelopes, and its faces with coordinates.
+ * Reads a part of a model as plain arrays: the nodes, envelopes and faces below a node.
  *
  *     ebpo_subtree *subtree = NULL;
  *     ebpo_subtree_faces faces = EBPO_SUBTREE_FACES_INIT;
@@ -9,9 +8,9 @@
  *         draw(faces.vertex_count, faces.xyz32, faces.face_count, faces.faces);
  *     ebpo_subtree_close(subtree);
  *
- * Of the file, about that is read which is given: of a file far away (http.h) in a few requests.
- * Octcodes are those of ebpo_stream_node and ebpo_view_node; ebpo_octcode_at gives that of the cell
- * around a point.
+ * Little more of the file is read than needed; remote files (http.h) take a few requests. Octcodes
+ * are those of ebpo_stream_node and ebpo_view_node; ebpo_octcode_at returns that of the cell around
+ * a point.
  */
 #ifndef EBPO_SUBTREE_H
 #define EBPO_SUBTREE_H
@@ -25,31 +24,31 @@ extern "C" {
 /* ---- opening ---- */
 
 typedef struct ebpo_subtree_options {
-    size_t struct_size; /* EBPO_SUBTREE_OPTIONS_INIT sets it */
+    size_t struct_size;
 
     /*
-     * Bits of ebpo_part that are read, of those the file has: envelopes, faces, numbers in the
-     * source, stored planes of leaves. Nodes always are.
+     * ebpo_part bits to read, of those the file has: envelopes, faces, source indices, stored
+     * planes of leaves. Nodes are always read.
      */
     uint32_t parts;
 
     /*
-     * Give nodes of at most so many levels below the subtree's root. -1: all. Otherwise there are
-     * no faces, because these are those of the whole subtree.
+     * Number of levels below the subtree's root. -1: all. Otherwise there are no faces, because
+     * faces are those of the whole subtree.
      */
     int levels;
 
     /*
-     * Bytes that the subtree may take, with all that reading it needs on the way. 0: as much as it
-     * takes. Beside it there is the file's table of chunks (24 bytes a chunk).
+     * Memory limit of the subtree in bytes, including buffers for reading. 0: no limit. Not
+     * included: the chunk directory of the file (24 bytes per chunk).
      */
     uint64_t memory;
 
-    /* Give the corners of each face as coordinates, too. */
+    /* Also returns the coordinates of the corners of each face. */
     bool corners;
 
     /*
-     * Where the tree ends above the octcode, open the leaf there. Else that is EBPO_E_ARGUMENT.
+     * If the tree ends above the octcode, opens the leaf there. Otherwise that is EBPO_E_ARGUMENT.
      */
     bool or_leaf_above;
 
@@ -61,17 +60,17 @@ typedef struct ebpo_subtree_options {
         sizeof(ebpo_subtree_options), ~0u, -1, 0, false, false, { 0 } \
     }
 
-/* A subtree in memory. It does not change. */
+/* An immutable subtree in memory. */
 typedef struct ebpo_subtree ebpo_subtree;
 
 /*
  * Reads the subtree of the gray node or leaf with this octcode; 1: the whole tree. The file may be
- * closed before the subtree is.
+ * closed before the subtree.
  *
- * EBPO_E_ARGUMENT: not an octcode; no such node; a white or black one, which no face touches.
- * EBPO_E_ABSENT: the file is a subset (ebpo_subset) that does not hold what is below this node.
- * EBPO_E_LIMIT: options.memory is too little, the message names enough; or more than 2^32 - 2
- * nodes, planes or listed faces. EBPO_E_MEMORY, and the errors of reading.
+ * EBPO_E_ARGUMENT: not an octcode; no such node; or a white or black node, which no face
+ * intersects. EBPO_E_ABSENT: the file is a subset (ebpo_subset) without the data below this node.
+ * EBPO_E_LIMIT: options.memory is too small, and the message names a sufficient value; or more than
+ * 2^32 - 2 nodes, planes or listed faces. The errors of reading.
  *
  * Threads: any.
  */
@@ -80,14 +79,16 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_open(const ebpo_file *file, uint
                                                      ebpo_subtree **out, ebpo_error *error);
 
 /*
+ * Closes a subtree.
+ *
  * Threads: one per subtree.
  */
 EBPO_API void ebpo_subtree_close(ebpo_subtree *subtree);
 
 /*
- * The octcode of the cell of a level that holds the point, walls being of the cell above them: of a
- * node that may or may not be in the tree (ebpo_subtree_options.or_leaf_above). 0: the point is not
- * in the model's root cell, or there can be no such level.
+ * Returns the octcode of the cell of a level that contains the point; a cell face belongs to the
+ * cell above it. The node may be missing in the tree (ebpo_subtree_options.or_leaf_above). Returns
+ * 0 if the point is not in the model's root cell, or the level is invalid.
  *
  * level   0 to EBPO_LEVELS_MAX - 1
  *
@@ -97,56 +98,56 @@ EBPO_API uint64_t ebpo_octcode_at(const ebpo_info *info, const double point[3], 
 
 /* ---- nodes ---- */
 
-/* In `children`: of a node that has none here. */
+/* In `children`: the node has none here. */
 #define EBPO_NO_CHILDREN UINT32_MAX
 
 /*
- * All nodes of a subtree, white ones included. They have numbers from 0, which is the subtree's
- * root, level after level and within each by octcode: octcodes ascend. Arrays are the subtree's.
+ * All nodes of a subtree, including white ones. Index 0 is the subtree's root; nodes are sorted by
+ * level and then by octcode, so octcodes ascend. Arrays are lent until the subtree is closed.
  */
 typedef struct ebpo_subtree_nodes {
-    size_t struct_size; /* EBPO_SUBTREE_NODES_INIT sets it */
+    size_t struct_size;
 
-    /* Of the subtree's root in the tree; and how many levels of the subtree are given. */
+    /* Level of the subtree's root in the tree; number of levels of the subtree. */
     int level, level_count;
 
     uint64_t node_count;
 
-    /* [level_count + 1] the first node of each level */
+    /* [level_count + 1] first node of each level */
     const uint64_t *level_first;
 
     /* [node_count] */
     const uint64_t *octcodes;
 
-    /* [node_count] an ebpo_node_type */
+    /* [node_count] ebpo_node_type */
     const uint8_t *types;
 
     /*
-     * [node_count] white, black: winding number in the cell. Leaf: at the lowest corner, shifted
+     * [node_count] winding number. White, black: in the cell. Leaf: at the lowest corner, shifted
      * (see format-spec). Gray: 0. NULL: the model is a surface.
      */
     const int32_t *windings;
 
     /*
-     * [node_count] the first of a gray node's eight children, octant after octant.
+     * [node_count] first of a gray node's eight children, which are in the order of octants.
      * EBPO_NO_CHILDREN: the node is not gray, its children are beyond options.levels, or it is
-     * pruned, having none in this file.
+     * pruned.
      */
     const uint32_t *children;
 
     /*
-     * [node_count + 1] where each node's own planes begin in `planes`: those that a gray node adds
-     * to its parent's envelope, and those stored for a leaf. NULL: the parts were not asked for, or
-     * the file does not have them.
+     * [node_count + 1] first index of each node's own planes in `planes`: those that a gray node
+     * adds to its parent's envelope, and those stored for a leaf. NULL: not requested, or not in
+     * the file.
      */
     const uint32_t *plane_first;
 
-    /* Codes, see ebpo_plane_decode, in coordinates of the node's cell. */
+    /* Codes (ebpo_plane_decode), in coordinates of the node's cell. */
     const uint32_t *planes;
 
     /*
-     * [level + 1] where the planes of each node above the subtree's root begin in `above_planes`,
-     * from the tree's root down: they bound all envelopes of the subtree as well. NULL as
+     * [level + 1] first index in `above_planes` of the planes of each node above the subtree's
+     * root, from the tree's root down. They also bound all envelopes of the subtree. NULL as
      * plane_first.
      */
     const uint32_t *above_first;
@@ -154,14 +155,14 @@ typedef struct ebpo_subtree_nodes {
     /* Codes in coordinates of that node's cell. */
     const uint32_t *above_planes;
 
-    /* Bytes that the subtree takes, all in all. */
+    /* Total memory of the subtree in bytes. */
     uint64_t memory;
 } ebpo_subtree_nodes;
 
 #define EBPO_SUBTREE_NODES_INIT EBPO_SIZED(ebpo_subtree_nodes)
 
 /*
- * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ * Gets the nodes.
  *
  * Threads: any.
  */
@@ -169,11 +170,11 @@ EBPO_API ebpo_status ebpo_subtree_get_nodes(const ebpo_subtree *subtree, ebpo_su
 
 /* A node in the model's coordinates. */
 typedef struct ebpo_subtree_node {
-    size_t struct_size; /* EBPO_SUBTREE_NODE_INIT sets it */
+    size_t struct_size;
 
     /*
-     * As streams give it, without polygons unless they are asked for. But leaves without stored
-     * planes have those that follow from their faces, where the subtree has faces (EBP 2017, 3.4).
+     * As in streams, with polygons only if requested. Leaves without stored planes have planes
+     * derived from their faces if the subtree has faces (EBP 2017, 3.4).
      */
     ebpo_stream_node node;
 
@@ -187,11 +188,9 @@ typedef struct ebpo_subtree_node {
 #define EBPO_SUBTREE_NODE_INIT EBPO_SIZED(ebpo_subtree_node)
 
 /*
- * Node `number` of ebpo_subtree_nodes: its cell, half-spaces and, with `polygons`, its envelope,
- * without planes where these have not been read. What it points to is the subtree's, until the next
- * call for a node of it.
- *
- * EBPO_E_ARGUMENT: no such node, or `out` was not begun with its macro. EBPO_E_MEMORY.
+ * Gets node `number` of ebpo_subtree_nodes: its cell, half-spaces and, with `polygons`, its
+ * envelope; without planes if these were not read. Its pointers are lent until the next call for a
+ * node of this subtree.
  *
  * Threads: one per subtree.
  */
@@ -202,52 +201,51 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_get_node(ebpo_subtree *subtree, 
 /* ---- faces ---- */
 
 /*
- * All faces that touch the subtree's cell (and maybe some that pass by it at the distance of a
- * rounding error, which its leaves list, too), in the order of the file: first those that are new
- * in a leaf before the subtree's and only listed here again, then its own. So of all subtrees that
- * share a face one has it as its own, the whole tree all. Of a subset (ebpo_subset) those that are
- * only below pruned nodes are missing. Arrays are the subtree's.
+ * All faces that intersect the subtree's cell, in the order of the file. Its leaves may also list
+ * faces outside within a rounding error. Shared faces, which an earlier leaf outside the subtree
+ * owns, come first; then owned faces. Of all disjoint subtrees that list a face, one owns it; the
+ * whole tree owns all. In a subset (ebpo_subset), faces that are only below pruned nodes are
+ * missing. Arrays are lent until the subtree is closed.
  */
 typedef struct ebpo_subtree_faces {
-    size_t struct_size; /* EBPO_SUBTREE_FACES_INIT sets it */
+    size_t struct_size;
 
-    /* All; and how many of them, the first ones, are other subtrees' own. */
-    uint64_t face_count, outer_count;
+    /* Number of faces; number of shared faces, which are first. */
+    uint64_t face_count, shared_count;
 
     uint64_t vertex_count;
 
-    /* [vertex_count][3] in the model's unit, as stored: one of the two, the other is NULL */
+    /* [vertex_count][3] in the model's unit, as stored; one of the two, the other is NULL */
     const float *xyz32;
     const double *xyz64;
 
-    /* [face_count][3] vertices, from 0 in this subtree */
+    /* [face_count][3] vertex indices in this subtree */
     const uint32_t *faces;
 
-    /* [face_count][3][3] corner after corner, with options.corners: one of the two */
+    /* [face_count][3][3] corners, with options.corners; one of the two */
     const float *corners32;
     const double *corners64;
 
-    /* [face_count] number in the file, ascending */
+    /* [face_count] indices in the file, ascending */
     const uint32_t *numbers;
 
-    /* [face_count] number in the source; NULL: not asked for, or the file has no maps */
+    /* [face_count] source indices; NULL: not requested, or the file has no maps */
     const uint32_t *source;
 
-    /*
-     * [node_count + 1] where each node's list of faces begins in `list`; of nodes that are not
-     * leaves the lists are empty
-     */
+    /* [node_count + 1] first index of each node's faces in `list`; only leaves have faces */
     const uint32_t *list_first;
 
-    /* Faces, from 0 in this subtree, ascending within each leaf. */
+    /* Face indices in this subtree, ascending within each leaf. */
     const uint32_t *list;
 } ebpo_subtree_faces;
 
 #define EBPO_SUBTREE_FACES_INIT EBPO_SIZED(ebpo_subtree_faces)
 
 /*
- * EBPO_E_ABSENT: the file has no mesh; or it was opened without EBPO_PART_MESH, or for few levels.
- * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ * Gets the faces.
+ *
+ * EBPO_E_ABSENT: the file has no mesh, or the subtree was opened without EBPO_PART_MESH or with
+ * limited levels.
  *
  * Threads: any.
  */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: proving that a file keeps its promises.
+ * Verifies the guarantees of a file.
  */
 #ifndef EBPO_VERIFY_H
 #define EBPO_VERIFY_H
@@ -10,51 +10,51 @@
 extern "C" {
 #endif
 
-/* One kind of check: how often it was made, and how often it failed. */
+/* One kind of check: number of checks and of violations. */
 typedef struct ebpo_verify_count {
     uint64_t checks, violations;
 
-    /* The first violation in the order of the file; "" if there is none. */
+    /* First violation in the order of the file; "" if none. */
     char first[240];
 } ebpo_verify_count;
 
 typedef struct ebpo_verify_report {
-    size_t struct_size; /* EBPO_VERIFY_REPORT_INIT sets it */
+    size_t struct_size;
 
     /* Head, shapes, counts, index arrays, order. */
     ebpo_verify_count structure;
 
-    /* The checksum of the content. */
+    /* Content checksum. */
     ebpo_verify_count content;
 
     /*
-     * Vertices, clipped faces and corners inside, against every half-space on
-     * the way from the root.
+     * Vertices, clipped faces and corners inside, against every half-space on the path from the
+     * root.
      */
     ebpo_verify_count containment;
 
-    /* A child's envelope lies in its parent's, leaf planes included. */
+    /* A child's envelope is contained in its parent's, including leaf planes. */
     ebpo_verify_count nesting;
 
     /*
-     * White and black cells, and winding numbers of corners, against winding
-     * numbers that are computed independently.
+     * White and black cells, and winding numbers of corners, against independently computed winding
+     * numbers.
      */
     ebpo_verify_count labels;
 
-    /* No face touches a cell that does not list it; no list names a face twice. */
+    /* No face intersects a cell that does not list it; no list contains a face twice. */
     ebpo_verify_count lists;
 
-    /* The mesh equals its source, bit for bit (options.source). */
+    /* The mesh equals its source bitwise (options.source). */
     ebpo_verify_count source;
 
     /* Sums over all kinds. */
     uint64_t checks, violations;
 
     /*
-     * Bytes of the file that belong to nothing, neither to its headers and indexes nor to a chunk,
-     * and how many of them are not zero: 0 in what this library writes. They change no answer, and
-     * are no violation. Files far away (http.h): 0, they are not read.
+     * Unused bytes of the file, outside headers, indexes and chunks, and how many of these are not
+     * zero: 0 in files of this library. They change no result and are not violations. Remote files
+     * (http.h): 0, they are not read.
      */
     uint64_t spare_bytes, spare_filled;
 } ebpo_verify_report;
@@ -62,30 +62,25 @@ typedef struct ebpo_verify_report {
 #define EBPO_VERIFY_REPORT_INIT EBPO_SIZED(ebpo_verify_report)
 
 typedef struct ebpo_verify_options {
-    size_t struct_size; /* EBPO_VERIFY_OPTIONS_INIT sets it */
+    size_t struct_size;
 
     /*
-     * The mesh as it was read, neither mended nor arranged; or NULL. Mending that
-     * the file records is done again.
+     * The mesh as it was read, not repaired or arranged; or NULL. Repairs that the file records are
+     * repeated.
      */
     const ebpo_mesh *source;
 
-    /* 0: all cores. The result does not depend on it. */
     unsigned threads;
 
     /*
-     * How many cells have their labels checked, at least one of each level and
-     * type. 0: all of up to 2^22, or 2^20 of more; 4096 where that would take
-     * more than some seconds.
+     * Number of cells whose labels are checked, at least one of each level and type. 0: all of up
+     * to 2^22, or 2^20 of more; 4096 if that would take more than some seconds.
      */
     uint64_t label_samples;
 
     ebpo_progress progress;
 
-    /*
-     * What the work keeps to, in memory and temporary files. NULL: as much memory
-     * as it takes.
-     */
+    /* Limits memory, and provides temporary files. NULL: no limit. */
     ebpo_workspace *workspace;
 } ebpo_verify_options;
 
@@ -95,12 +90,10 @@ typedef struct ebpo_verify_options {
     }
 
 /*
- * Verifies an open file. EBPO_OK means that the work could be done, whatever was
- * found: look at report->violations. A file too damaged to be read counts as a
- * violation of its structure.
+ * Verifies an open file. EBPO_OK means that the verification was completed; report->violations has
+ * the result. A file too damaged to be read counts as a violation of its structure.
  *
- * EBPO_E_ARGUMENT: the source is no valid mesh, or has been arranged.
- * EBPO_E_CANCELLED, EBPO_E_IO, EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: the source is not a valid mesh, or has been arranged. EBPO_E_IO.
  *
  * Threads: any.
  */

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: nodes in the order in which they matter to an observer, as
- * many as a budget allows.
+ * Streams nodes in the order of their importance to an observer, within a budget.
  *
  *     ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
  *     options.priority = EBPO_PRIORITY_PIXELS;
@@ -9,18 +8,17 @@
  *     ebpo_view_stream_new(file, &options, &stream, &error);
  *     while (ebpo_view_stream_next(stream, &node, &end, &error) == EBPO_OK &&
  *            end == EBPO_VIEW_NODE)
- *         draw(&node);               when node.complete, forget the parent
+ *         draw(&node);               when node.complete, discard the parent
  *
- * The root comes first, then the eight children of one gray node after the other.
- * Children replace their parent when all eight are there (`complete`). The nodes
- * that have not been replaced are the cut.
+ * The root comes first, then groups of the eight children of a gray node. Children replace their
+ * parent when all eight are delivered (`complete`). The nodes that are not replaced are the cut.
  *
- * At any time the cut is a conservative level of detail. Every point of the root
- * cell lies in exactly one of its cells, walls aside, and the solid lies within
- * the envelopes of its gray nodes and leaves and within its black cells.
+ * At any time the cut is a conservative level of detail. Every point of the root cell is in exactly
+ * one of its cells (except on cell faces). The solid is contained in the envelopes of its gray
+ * nodes and leaves, and its black cells.
  *
- * Sources: BP 2008, section 4.3, algorithm 9 (adaptive display); Meagher 1982
- * (octree enumeration front to back).
+ * Sources: BP 2008, section 4.3, algorithm 9 (adaptive display); Meagher 1982 (octree enumeration
+ * front to back).
  */
 #ifndef EBPO_VIEW_H
 #define EBPO_VIEW_H
@@ -32,48 +30,46 @@ extern "C" {
 #endif
 
 /*
- * Whose children come next: of all gray nodes of the cut that are to be refined,
- * the one that is first by this. Of equal ones, coarser levels come first, then
+ * Order in which gray nodes of the cut are refined. Ties are broken by coarser level first, then by
  * the order of octcodes.
  */
 typedef enum ebpo_priority {
-    /* Level after level, by octcode: the order of the file. */
+    /* Level by level, by octcode: the order of the file. */
     EBPO_PRIORITY_LEVEL = 0,
 
     /* Distance from the eye to the nearest point of the cell. */
     EBPO_PRIORITY_DISTANCE = 1,
 
-    /* Size on the picture, the largest first: `pixels` of ebpo_view_node. */
+    /* Size in the image, the largest first: `pixels` of ebpo_view_node. */
     EBPO_PRIORITY_PIXELS = 2,
 
     /*
-     * Front to back: of two cells on one ray from the eye, the one that it meets
-     * first, with all that is below it. The eight children of a node come front
-     * to back as well.
+     * Front to back: of two cells on a ray from the eye, the nearer one first with all its
+     * descendants. The eight children of a node are also front to back.
      */
     EBPO_PRIORITY_FRONT_TO_BACK = 3
 } ebpo_priority;
 
 /* A perspective camera. */
 typedef struct ebpo_observer {
-    size_t struct_size; /* EBPO_OBSERVER_INIT sets it */
+    size_t struct_size;
 
     /* In the model's unit. */
     double eye[3];
 
-    /* Of sight, of any length. (0, 0, 0): looks everywhere, all nodes are seen. */
+    /* Viewing direction of any length. (0, 0, 0): all directions, all nodes are visible. */
     double direction[3];
 
     /*
-     * What points upwards on the picture: of any length, not along `direction`.
-     * Does not matter to one who looks everywhere.
+     * Upward direction in the image: any length, not along `direction`. Ignored with all
+     * directions.
      */
     double up[3];
 
-    /* The vertical angle of view in degrees, above 0 and below 180. */
+    /* Vertical field of view in degrees, above 0 and below 180. */
     double fov;
 
-    /* Of the picture in pixels, from 1. */
+    /* Size of the image in pixels, from 1. */
     uint32_t width, height;
 } ebpo_observer;
 
@@ -82,64 +78,60 @@ typedef struct ebpo_observer {
         sizeof(ebpo_observer), { 0, 0, 0 }, { 0, 0, 0 }, { 0, 1, 0 }, 45, 1280, 720 \
     }
 
-/* What becomes of gray nodes whose cells lie outside the picture. */
+/* Treatment of gray nodes whose cells are outside the image. */
 typedef enum ebpo_unseen {
-    EBPO_UNSEEN_LAST = 0, /* refined when nothing is left that is seen */
+    EBPO_UNSEEN_LAST = 0, /* refined after all visible nodes */
     EBPO_UNSEEN_NEVER = 1 /* never refined */
 } ebpo_unseen;
 
 typedef struct ebpo_view_options {
-    size_t struct_size; /* EBPO_VIEW_OPTIONS_INIT sets it */
+    size_t struct_size;
 
-    /* ---- what ebpo_view_stream_change may change ---- */
+    /* ---- ebpo_view_stream_change may change these ---- */
 
     ebpo_priority priority;
 
-    /* Copied. NULL: none, which will do for EBPO_PRIORITY_LEVEL only. */
+    /* Copied. NULL: none, allowed only with EBPO_PRIORITY_LEVEL. */
     const ebpo_observer *observer;
 
     ebpo_unseen unseen;
 
-    /* Nodes no larger than this on the picture are not refined. 0: all are. */
+    /* Nodes up to this size in the image are not refined. 0: all are. */
     double pixels;
 
-    /*
-     * Nodes farther from the eye than this, in the model's unit, are not refined.
-     * INFINITY: all are.
-     */
+    /* Nodes farther from the eye, in the model's unit, are not refined. INFINITY: all are. */
     double distance;
 
-    /* The deepest level to deliver. -1: all. */
+    /* Deepest level to deliver. -1: all. */
     int level;
 
     /*
-     * Stop before more bytes of the file have been read than this, since it was
-     * opened and counted as by ebpo_file_get_stats. 0: no limit.
+     * Stops before the bytes read from the file since opening (ebpo_file_get_stats) exceed this. 0:
+     * no limit.
      */
     uint64_t bytes;
 
-    /* Stop before more nodes have been delivered than this. 0: no limit. */
+    /* Stops before more nodes are delivered. 0: no limit. */
     uint64_t nodes;
 
-    /* ---- what stays as it is ---- */
+    /* ---- fixed options ---- */
 
-    /* As in ebpo_stream_options. Without both, no planes are read. */
+    /* As in ebpo_stream_options. If both are false, no planes are read. */
     bool planes, polygons;
 
-    /* Read winding numbers. Else those of nodes are 0. */
+    /* Reads winding numbers; otherwise those of nodes are 0. */
     bool windings;
 
     /*
-     * Bytes for decoded chunks, at least 1 MiB; what falls out is read again when
-     * it is needed. 0: no limit. Beside it, the stream takes about 10 bytes for
-     * each node delivered, 4 more with winding numbers, 32 for each gray node of
-     * the cut, and the plane codes.
+     * Bytes for decoded chunks, at least 1 MiB; removed chunks are read again when needed. 0: no
+     * limit. The stream also takes about 10 bytes per delivered node, 4 more with winding numbers,
+     * 32 per gray node of the cut, and the plane codes.
      */
     uint64_t memory;
 
     /*
-     * With each leaf read its faces (ebpo_view_stream_get_faces), within the limits of bytes and
-     * memory. Beside these, the stream takes one bit more for each face of the file.
+     * Reads the faces of each leaf (ebpo_view_stream_get_faces), within the limits of bytes and
+     * memory. The stream then also takes one bit per face of the file.
      */
     bool faces;
 
@@ -160,34 +152,31 @@ typedef struct ebpo_view_node {
 
     int level;
 
-    /*
-     * The last of its siblings: from now on they replace their parent. The root
-     * is alone.
-     */
+    /* True for the last of eight siblings: they now replace their parent. True for the root. */
     bool complete;
 
     /*
-     * The cell is at least partly in the picture; errs towards true. True without
-     * an observer.
+     * True if the cell is at least partly in the image; may be true for others. True without an
+     * observer.
      */
     bool seen;
 
     /*
-     * From the eye to the nearest point of the cell, in the model's unit. 0: the
-     * eye is in it. NAN without an observer.
+     * Distance from the eye to the nearest point of the cell, in the model's unit. 0: the eye is in
+     * it. NAN without an observer.
      */
     double distance;
 
     /*
-     * Of the cell's diagonal, at this distance, in the middle of the picture.
-     * INFINITY: the eye is in the cell. NAN without an observer.
+     * Size of the cell's diagonal at this distance, in the middle of the image. INFINITY: the eye
+     * is in the cell. NAN without an observer.
      */
     double pixels;
 } ebpo_view_node;
 
 typedef enum ebpo_view_end {
-    EBPO_VIEW_NODE = 0,  /* not the end: there is a node */
-    EBPO_VIEW_DONE = 1,  /* every node is there that the options ask for */
+    EBPO_VIEW_NODE = 0,  /* a node was delivered */
+    EBPO_VIEW_DONE = 1,  /* all nodes that the options select were delivered */
     EBPO_VIEW_BYTES = 2, /* the next nodes would exceed options.bytes */
     EBPO_VIEW_NODES = 3  /* the next nodes would exceed options.nodes */
 } ebpo_view_end;
@@ -195,11 +184,10 @@ typedef enum ebpo_view_end {
 typedef struct ebpo_view_stream ebpo_view_stream;
 
 /*
- * Makes a stream of an open file, which must stay open. Nothing is read yet.
- * Others may use the file, but what they read counts as well (options.bytes).
+ * Makes a stream of an open file, which must stay open. Reads nothing yet. Others may use the file,
+ * but their reads count as well (options.bytes).
  *
- * EBPO_E_ARGUMENT: options that make no sense. EBPO_E_ABSENT: faces are wanted, and the file has no
- * mesh. EBPO_E_MEMORY.
+ * EBPO_E_ARGUMENT: invalid options. EBPO_E_ABSENT: faces are requested, and the file has no mesh.
  *
  * Threads: any.
  */
@@ -208,24 +196,23 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_new(const ebpo_file *file,
                                                         ebpo_view_stream **out, ebpo_error *error);
 
 /*
+ * Frees a stream.
+ *
  * Threads: one per stream.
  */
 EBPO_API void ebpo_view_stream_free(ebpo_view_stream *stream);
 
 /*
- * The next node. What it points to is the stream's, until the next call on it.
- * Unless *end is EBPO_VIEW_NODE, there is none and *out is left alone.
+ * Gets the next node; its pointers are lent until the next call with the stream. Unless *end is
+ * EBPO_VIEW_NODE, there is no node and *out is unchanged.
  *
- * Of the file, the chunks are read that hold the node and its siblings, unless
- * they are in memory. Of a file far away, what comes next in the order is fetched
- * ahead, within the budget.
+ * Reads the chunks of the node and its siblings, unless they are in memory. A remote file also
+ * prefetches the next ones in the order, within the budget.
  *
- * One may stop anywhere and go on later, and try again after EBPO_E_IO and
- * EBPO_E_MEMORY. EBPO_E_FORMAT stays, and so does EBPO_E_LIMIT, for more than 2^32
- * groups of siblings.
+ * The caller may pause at any time, and may retry after EBPO_E_IO and EBPO_E_MEMORY. EBPO_E_FORMAT
+ * is permanent, and so is EBPO_E_LIMIT (more than 2^32 groups of siblings).
  *
- * The sequence depends on the file and the options only. A budget cuts it short
- * and changes nothing else.
+ * The sequence depends only on the file and the options. A budget only truncates it.
  *
  * Threads: one per stream.
  */
@@ -233,22 +220,22 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_next(ebpo_view_stream *strea
                                                          ebpo_view_node *out, ebpo_view_end *end,
                                                          ebpo_error *error);
 
-/* The faces of a leaf: all that touch its cell. */
+/* Faces of a leaf: all that intersect its cell. */
 typedef struct ebpo_view_faces {
-    size_t struct_size; /* EBPO_VIEW_FACES_INIT sets it */
+    size_t struct_size;
 
-    /* All, and those of them that have come with no leaf before. */
+    /* Number of faces; number of faces that no earlier leaf delivered. */
     uint64_t face_count, new_count;
 
-    /* [face_count] corner after corner, in the model's unit */
+    /* [face_count] corners, in the model's unit */
     const double (*corners)[3][3];
 
-    /* [face_count] number in the file, ascending */
+    /* [face_count] indices in the file, ascending */
     const uint32_t *numbers;
 
     /*
-     * [face_count] 1: has come with a leaf before, so that who draws the others draws each face
-     * once; else 0
+     * [face_count] 1: an earlier leaf delivered it, so that a viewer can draw each face once; else
+     * 0
      */
     const uint8_t *repeated;
 } ebpo_view_faces;
@@ -256,13 +243,11 @@ typedef struct ebpo_view_faces {
 #define EBPO_VIEW_FACES_INIT EBPO_SIZED(ebpo_view_faces)
 
 /*
- * With options.faces: those of the leaf that ebpo_view_stream_next gave last; none if it gave
- * another node or none. Arrays are the stream's, until the next call on it.
+ * Gets the faces of the last node of ebpo_view_stream_next if it was a leaf, with options.faces;
+ * otherwise none. Arrays are lent until the next call with the stream.
  *
- * They have been read with the leaf and its siblings, at most as far as options.bytes allows: where
- * their faces would exceed it, the siblings do not come either.
- *
- * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ * Faces are read with the leaf and its siblings, within options.bytes: if their faces would exceed
+ * it, the siblings are not delivered.
  *
  * Threads: one per stream.
  */
@@ -270,12 +255,11 @@ EBPO_API ebpo_status ebpo_view_stream_get_faces(const ebpo_view_stream *stream,
                                                 ebpo_view_faces *out);
 
 /*
- * Takes other options, for example an observer who has moved. The cut stays; what
- * comes next is chosen anew, after siblings that are on their way. On failure
- * nothing changes. `options` must not be NULL.
+ * Sets other options, for example a moved observer. The cut is kept. The next nodes are selected
+ * again, after the current group of siblings. On failure nothing changes. `options` must not be
+ * NULL.
  *
- * EBPO_E_ARGUMENT: options that make no sense, or one that cannot be changed is
- * another.
+ * EBPO_E_ARGUMENT: invalid options, or a fixed option differs.
  *
  * Threads: one per stream.
  */
@@ -283,49 +267,44 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_view_stream_change(ebpo_view_stream *str
                                                            const ebpo_view_options *options,
                                                            ebpo_error *error);
 
-/* Called with one node after the other, lent until it returns. False: enough. */
+/* Receives a node, lent until it returns. Return false to stop. */
 typedef bool (*ebpo_view_visit_fn)(void *user, const ebpo_view_node *node);
 
 /*
- * Visits the cut: all nodes that have not been replaced, white ones included,
- * front to back of the observer, or by octcode and depth first if there is none.
- * `complete` is always true. Before the root has been delivered there is no node.
- * Reads nothing.
- *
- * `visit` must not use the stream.
+ * Visits the cut: all nodes that are not replaced, including white ones. The order is front to back
+ * of the observer, or by octcode and depth first without one. `complete` is always true. There are
+ * no nodes before the root is delivered. Reads nothing. `visit` must not use the stream.
  *
  * Threads: one per stream.
  */
 EBPO_API void ebpo_view_stream_cut(ebpo_view_stream *stream, ebpo_view_visit_fn visit, void *user);
 
 typedef struct ebpo_view_stats {
-    size_t struct_size; /* EBPO_VIEW_STATS_INIT sets it */
+    size_t struct_size;
 
-    /* Nodes delivered. */
+    /* Number of delivered nodes. */
     uint64_t nodes;
 
-    /* Nodes of the cut, by ebpo_node_type. */
+    /* Nodes of the cut, indexed by ebpo_node_type. */
     uint64_t cut[4];
 
-    /* Gray nodes of the cut that are to be refined. */
+    /* Gray nodes of the cut that will be refined. */
     uint64_t waiting;
 
     /*
-     * The size of the largest gray node of the cut that is seen, which bounds how
-     * coarse the picture is. 0: none is seen. NAN without an observer.
+     * Size of the largest visible gray node of the cut, which bounds the coarseness of the image.
+     * 0: none is visible. NAN without an observer.
      */
     double pixels;
 
-    /* Bytes of the file, since it was opened. */
+    /* Bytes read from the file since opening. */
     uint64_t bytes_read;
 } ebpo_view_stats;
 
 #define EBPO_VIEW_STATS_INIT EBPO_SIZED(ebpo_view_stats)
 
 /*
- * Looks at all gray nodes of the cut.
- *
- * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ * Gets statistics; visits all gray nodes of the cut.
  *
  * Threads: one per stream.
  */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * EBP-Octree in HDF5: how much memory reading, building and verifying may use.
+ * Limits the memory for reading, building and verifying.
  *
  *     ebpo_workspace_options options = EBPO_WORKSPACE_OPTIONS_INIT;
  *     ebpo_mesh_read_options read = EBPO_MESH_READ_OPTIONS_INIT;
@@ -18,30 +18,28 @@ extern "C" {
 #endif
 
 /*
- * The arrays of models that are read, built or verified. They are in memory while
- * they fit into half of what is allowed. The others lie in temporary files
- * without a name, which are gone with the process however it ends. These are
- * mapped, and only as much of them is resident as the budget allows.
- *
- * Results never depend on it.
+ * Holds the arrays of models that are read, built or verified. Arrays are in memory while they fit
+ * into half of the budget. The others are in unnamed temporary files, which disappear with the
+ * process. These files are mapped, and their resident part stays within the budget. Results do not
+ * depend on the workspace.
  */
 typedef struct ebpo_workspace ebpo_workspace;
 
-/* Fewer bytes of memory are refused. */
+/* Minimum budget, in bytes. */
 enum { EBPO_WORKSPACE_MIN = 128000000 };
 
 typedef struct ebpo_workspace_options {
-    size_t struct_size; /* EBPO_WORKSPACE_OPTIONS_INIT sets it */
+    size_t struct_size;
 
     /*
-     * Bytes that the whole process may have resident. 0: half of the machine's
-     * memory, or of what its control group is allowed.
+     * Maximum resident memory of the whole process, in bytes. 0: half of the memory of the machine
+     * or of its control group.
      */
     uint64_t memory;
 
     /*
-     * The folder for temporary files, which should lie on a disk, not in memory.
-     * NULL: $TMPDIR, else /var/tmp.
+     * Folder for temporary files; it should be on a disk, not in memory. NULL: $TMPDIR, else
+     * /var/tmp.
      */
     const char *temp_dir;
 } ebpo_workspace_options;
@@ -52,9 +50,8 @@ typedef struct ebpo_workspace_options {
     }
 
 /*
- * EBPO_E_ARGUMENT: less memory than EBPO_WORKSPACE_MIN. EBPO_E_IO: a folder that
- * cannot be written to, which is found out at once and not after an hour.
- * EBPO_E_MEMORY.
+ * Makes a workspace. EBPO_E_ARGUMENT: less memory than EBPO_WORKSPACE_MIN. EBPO_E_IO: the folder is
+ * not writable.
  *
  * Threads: any.
  */
@@ -62,30 +59,30 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_workspace_new(const ebpo_workspace_optio
                                                       ebpo_workspace **out, ebpo_error *error);
 
 /*
- * After everything that was made with it has been freed. NULL is fine.
+ * Frees a workspace. Free all objects that use it first.
  *
  * Threads: one per workspace.
  */
 EBPO_API void ebpo_workspace_free(ebpo_workspace *workspace);
 
-/* Bytes. */
+/* Sizes in bytes. */
 typedef struct ebpo_workspace_stats {
-    size_t struct_size; /* EBPO_WORKSPACE_STATS_INIT sets it */
+    size_t struct_size;
 
-    /* The budget. */
+    /* Budget. */
     uint64_t memory;
 
-    /* Of arrays in memory: now, and at most. */
+    /* Arrays in memory: current size and peak. */
     uint64_t held, held_peak;
 
-    /* Of arrays in files: now, at most at one time, and summed over all. */
+    /* Arrays in files: current size, peak, and sum over all arrays. */
     uint64_t filed, filed_peak, filed_total;
 } ebpo_workspace_stats;
 
 #define EBPO_WORKSPACE_STATS_INIT EBPO_SIZED(ebpo_workspace_stats)
 
 /*
- * EBPO_E_ARGUMENT: `out` was not begun with its macro.
+ * Gets the statistics of a workspace.
  *
  * Threads: any.
  */

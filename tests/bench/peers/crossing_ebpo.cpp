@@ -64,7 +64,7 @@ static bool count_pairs(void *user, const ebpo_face_pair *, uint64_t count)
     return true;
 }
 
-static uint64_t ask(ebpo_collider *collider, const ebpo_collide_options &options, bool all)
+static uint64_t run_query(ebpo_collider *collider, const ebpo_collide_options &options, bool all)
 {
     uint64_t pairs = 0;
     if (all) {
@@ -101,7 +101,7 @@ int main(int count, char **argument)
         options.pose_b.translation[0] += way * (1 - 2.0 * i / steps);
         check(ebpo_collider_get_stats(collider, &before));
         double start = processor();
-        uint64_t pairs = ask(collider, options, !strcmp(argument[4], "all"));
+        uint64_t pairs = run_query(collider, options, !strcmp(argument[4], "all"));
         double took = processor() - start;
         check(ebpo_collider_get_stats(collider, &after));
         printf("%.3f %" PRIu64 " %" PRIu64 " %" PRIu64 "\n", 1e6 * took, pairs,

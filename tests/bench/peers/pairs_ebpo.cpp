@@ -75,13 +75,13 @@ static bool keep(void *user, const ebpo_face_pair *pairs, uint64_t count)
     return true;
 }
 
-static double ask(two &t, const bench::pose &p, const std::string &question,
-                  bench::face_pairs &pairs)
+static double run_query(two &t, const bench::pose &p, const std::string &current_query,
+                        bench::face_pairs &pairs)
 {
     t.take(p);
-    if (question == "distance" || question == "within")
-        return t.distance(question == "within" ? 1e-12 * t.diagonal : 0);
-    if (question == "all") {
+    if (current_query == "distance" || current_query == "within")
+        return t.distance(current_query == "within" ? 1e-12 * t.diagonal : 0);
+    if (current_query == "all") {
         check(ebpo_collide_all(t.collider, &t.options, keep, &pairs, &error));
         return static_cast<double>(pairs.size());
     }
@@ -178,6 +178,8 @@ int main(int count, char **argument)
     check(ebpo_model_get_stats(t.model, &stats));
     printf("made %.3f %" PRIu64 "\n", t.seconds, (uint64_t)stats.memory);
     return bench::run_poses(argument + 2,
-                            [&](const bench::pose &p, const std::string &question,
-                                bench::face_pairs &pairs) { return ask(t, p, question, pairs); });
+                            [&](const bench::pose &p, const std::string &current_query,
+                                bench::face_pairs &pairs) {
+                                return run_query(t, p, current_query, pairs);
+                            });
 }

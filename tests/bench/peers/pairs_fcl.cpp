@@ -33,16 +33,17 @@ static fcl::Transform3d transform_of(const bench::pose &p)
     return out;
 }
 
-static double ask(const tree &t, const bench::pose &p, const std::string &question,
-                  bench::face_pairs &pairs)
+static double run_query(const tree &t, const bench::pose &p, const std::string &current_query,
+                        bench::face_pairs &pairs)
 {
     fcl::Transform3d here = fcl::Transform3d::Identity(), there = transform_of(p);
-    if (question == "distance") {
+    if (current_query == "distance") {
         fcl::DistanceRequestd request(true, false);
         fcl::DistanceResultd result;
         return fcl::distance(&t, here, &t, there, request, result);
     }
-    fcl::CollisionRequestd request(question == "first" ? 1 : std::numeric_limits<size_t>::max(),
+    fcl::CollisionRequestd request(current_query == "first" ? 1
+                                                            : std::numeric_limits<size_t>::max(),
                                    false);
     fcl::CollisionResultd result;
     fcl::collide(&t, here, &t, there, request, result);
@@ -73,6 +74,8 @@ int main(int count, char **argument)
     double build = (double)(b.tv_sec - a.tv_sec) + 1e-9 * (double)(b.tv_nsec - a.tv_nsec);
     printf("made %.3f %zu\n", build, allocated() - before);
     return bench::run_poses(argument + 2,
-                            [&](const bench::pose &p, const std::string &question,
-                                bench::face_pairs &pairs) { return ask(*t, p, question, pairs); });
+                            [&](const bench::pose &p, const std::string &current_query,
+                                bench::face_pairs &pairs) {
+                                return run_query(*t, p, current_query, pairs);
+                            });
 }

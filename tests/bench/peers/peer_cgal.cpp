@@ -23,12 +23,12 @@ using point_3 = kernel::Point_3;
 
 // ---- inside ----
 
-class inside : public bench::usual
+class inside : public bench::standard
 {
   public:
     static constexpr const char *name = "cgal";
     static constexpr int doubles = 3;
-    using answer_type = uint8_t;
+    using result_type = uint8_t;
 
     void begin(const bench::job &) {}
 
@@ -58,7 +58,7 @@ class inside : public bench::usual
     }
 
     // On the surface counts as inside.
-    uint8_t answer(const double *p)
+    uint8_t result(const double *p)
     {
         return (*side)(point_3(p[0], p[1], p[2])) != CGAL::ON_UNBOUNDED_SIDE;
     }
@@ -92,12 +92,12 @@ triangle_list read_triangles(const char *path)
     return out;
 }
 
-class distance : public bench::usual
+class distance : public bench::standard
 {
   public:
     static constexpr const char *name = "cgal";
     static constexpr int doubles = 3;
-    using answer_type = bench::hit;
+    using result_type = bench::hit;
 
     void begin(const bench::job &job) { warm = job.warm; }
     void load(const char *path) { triangles = read_triangles(path); }
@@ -110,7 +110,7 @@ class distance : public bench::usual
         last.second = triangles.cend();
     }
 
-    bench::hit answer(const double *p)
+    bench::hit result(const double *p)
     {
         point_3 query(p[0], p[1], p[2]);
         bool hint = warm && last.second != triangles.cend();
@@ -127,12 +127,12 @@ class distance : public bench::usual
     triangle_tree::Point_and_primitive_id last;
 };
 
-class first_hit : public bench::usual
+class first_hit : public bench::standard
 {
   public:
     static constexpr const char *name = "cgal";
     static constexpr int doubles = 6;
-    using answer_type = bench::hit;
+    using result_type = bench::hit;
 
     void begin(const bench::job &job)
     {
@@ -147,7 +147,7 @@ class first_hit : public bench::usual
         tree.build();
     }
 
-    bench::hit answer(const double *r)
+    bench::hit result(const double *r)
     {
         point_3 origin(r[0], r[1], r[2]);
         kernel::Vector_3 direction(r[3], r[4], r[5]);

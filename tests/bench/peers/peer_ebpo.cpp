@@ -23,7 +23,7 @@ class outcome
     ebpo_error error = EBPO_ERROR_INIT;
 };
 
-class model : public bench::usual
+class model : public bench::standard
 {
   public:
     static constexpr const char *name = "ebpo";
@@ -47,7 +47,7 @@ class model : public bench::usual
     void build() {}
     uint64_t bytes() const { return stats().memory; }
     // Since the last `begin`.
-    void tell() const
+    void report() const
     {
         ebpo_model_stats now = stats();
         printf(", \"resident\": %s, \"cut_level\": %d, \"memory_peak\": %" PRIu64
@@ -81,21 +81,21 @@ class inside : public model
 {
   public:
     static constexpr int doubles = 3;
-    using answer_type = uint8_t;
+    using result_type = uint8_t;
 
     void begin(const bench::job &job) { begin_all(job); }
-    uint8_t answer(const double *point)
+    uint8_t result(const double *point)
     {
         ebpo_inside_result found;
         done.must(ebpo_inside(context, point, nullptr, &found, done));
         return (uint8_t)found.where;
     }
-    void answer_all(const double *points, uint64_t count, uint8_t *answers)
+    void result_all(const double *points, uint64_t count, uint8_t *results)
     {
         std::vector<ebpo_inside_result> found(count);
         done.must(ebpo_inside_many(context, points, count, nullptr, found.data(), done));
         for (uint64_t i = 0; i < count; i++)
-            answers[i] = (uint8_t)found[i].where;
+            results[i] = (uint8_t)found[i].where;
     }
 };
 
@@ -103,7 +103,7 @@ class distance : public model
 {
   public:
     static constexpr int doubles = 3;
-    using answer_type = bench::hit;
+    using result_type = bench::hit;
 
     void begin(const bench::job &job)
     {
@@ -111,18 +111,18 @@ class distance : public model
         options.warm = job.warm;
         options.unsigned_distance = job.plain;
     }
-    bench::hit answer(const double *point)
+    bench::hit result(const double *point)
     {
         ebpo_distance_result found;
         done.must(ebpo_distance(context, point, &options, &found, done));
         return { found.distance, (int64_t)found.face };
     }
-    void answer_all(const double *points, uint64_t count, bench::hit *answers)
+    void result_all(const double *points, uint64_t count, bench::hit *results)
     {
         std::vector<ebpo_distance_result> found(count);
         done.must(ebpo_distance_many(context, points, count, &options, found.data(), done));
         for (uint64_t i = 0; i < count; i++)
-            answers[i] = { found[i].distance, (int64_t)found[i].face };
+            results[i] = { found[i].distance, (int64_t)found[i].face };
     }
 
   private:
@@ -133,7 +133,7 @@ class rays : public model
 {
   public:
     static constexpr int doubles = 6;
-    using answer_type = bench::hit;
+    using result_type = bench::hit;
 
     void begin(const bench::job &job)
     {
@@ -142,8 +142,8 @@ class rays : public model
         query = job.query;
         how = query == "ray" ? &rays::first : query == "ray-any" ? &rays::any : &rays::all;
     }
-    bench::hit answer(const double *ray) { return (this->*how)(ray); }
-    void answer_all(const double *points, uint64_t count, bench::hit *answers)
+    bench::hit result(const double *ray) { return (this->*how)(ray); }
+    void result_all(const double *points, uint64_t count, bench::hit *results)
     {
         std::vector<ebpo_ray> rays(count);
         for (uint64_t i = 0; i < count; i++) {
@@ -154,23 +154,23 @@ class rays : public model
         ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
         options.threads = 1;
         if (query == "ray")
-            first_many(rays, options, answers);
+            first_many(rays, options, results);
         else if (query == "ray-any")
-            any_many(rays, options, answers);
+            any_many(rays, options, results);
         else
-            all_many(rays, options, answers);
+            all_many(rays, options, results);
     }
 
   private:
-    static bench::hit told(const ebpo_ray_hit &hit)
+    static bench::hit reported(const ebpo_ray_hit &hit)
     {
         return { hit.face == EBPO_NO_FACE ? INFINITY : hit.t, (int64_t)hit.face };
     }
-    static bench::hit told_any(bool any)
+    static bench::hit reported_any(bool any)
     {
         return any ? bench::hit{ 0, 0 } : bench::hit{ INFINITY, -1 };
     }
-    static bench::hit told_all(const ebpo_ray_hit *hits, uint64_t count)
+    static bench::hit reported_all(const ebpo_ray_hit *hits, uint64_t count)
     {
         return count ? bench::hit{ (double)count, (int64_t)hits[0].face }
                      : bench::hit{ INFINITY, -1 };
@@ -181,46 +181,46 @@ class rays : public model
         ebpo_ray_hit hit;
         bool any;
         done.must(ebpo_ray_first(context, ray, ray + 3, tmax, &hit, &any, done));
-        return any ? told(hit) : bench::hit{ INFINITY, -1 };
+        return any ? reported(hit) : bench::hit{ INFINITY, -1 };
     }
     bench::hit any(const double *ray)
     {
         bool any;
         done.must(ebpo_ray_any(context, ray, ray + 3, tmax, &any, done));
-        return told_any(any);
+        return reported_any(any);
     }
     bench::hit all(const double *ray)
     {
         const ebpo_ray_hit *hits;
         uint64_t count;
         done.must(ebpo_ray_all(context, ray, ray + 3, tmax, &hits, &count, done));
-        return told_all(hits, count);
+        return reported_all(hits, count);
     }
 
     void first_many(const std::vector<ebpo_ray> &rays, const ebpo_ray_options &options,
-                    bench::hit *answers)
+                    bench::hit *results)
     {
         std::vector<ebpo_ray_hit> hits(rays.size());
         done.must(
             ebpo_ray_first_many(context, rays.data(), rays.size(), &options, hits.data(), done));
-        std::transform(hits.begin(), hits.end(), answers, told);
+        std::transform(hits.begin(), hits.end(), results, reported);
     }
     void any_many(const std::vector<ebpo_ray> &rays, const ebpo_ray_options &options,
-                  bench::hit *answers)
+                  bench::hit *results)
     {
         std::unique_ptr<bool[]> any(new bool[rays.size()]);
         done.must(ebpo_ray_any_many(context, rays.data(), rays.size(), &options, any.get(), done));
-        std::transform(any.get(), any.get() + rays.size(), answers, told_any);
+        std::transform(any.get(), any.get() + rays.size(), results, reported_any);
     }
     void all_many(const std::vector<ebpo_ray> &rays, const ebpo_ray_options &options,
-                  bench::hit *answers)
+                  bench::hit *results)
     {
         const ebpo_ray_hit *hits;
         const uint64_t *begin;
         done.must(
             ebpo_ray_all_many(context, rays.data(), rays.size(), &options, &hits, &begin, done));
         for (size_t i = 0; i < rays.size(); i++)
-            answers[i] = told_all(hits + begin[i], begin[i + 1] - begin[i]);
+            results[i] = reported_all(hits + begin[i], begin[i + 1] - begin[i]);
     }
 
     double tmax = INFINITY;

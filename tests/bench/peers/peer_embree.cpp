@@ -1,4 +1,4 @@
-// Embree 3 as a peer: one thread (building: more, if told so), single precision.
+// Embree 3 as a peer: one thread (building: more, on request), single precision.
 //
 // inside: parity of all hits of a ray in a fixed oblique direction, robust scene. distance:
 // rtcPointQuery with a shrinking radius. ray, ray-any, ray-all: the first hit, whether there is
@@ -80,12 +80,12 @@ void count_and_go_on(const RTCFilterFunctionNArguments *arguments)
     arguments->valid[0] = 0;
 }
 
-class inside : public bench::usual
+class inside : public bench::standard
 {
   public:
     static constexpr const char *name = "embree";
     static constexpr int doubles = 3;
-    using answer_type = uint8_t;
+    using result_type = uint8_t;
 
     // Splits in space would put a face into two leaves, and its hit would count twice: no build of
     // high quality.
@@ -99,7 +99,7 @@ class inside : public bench::usual
     void begin(const bench::job &) {}
     uint64_t bytes() const { return tree.bytes; }
 
-    uint8_t answer(const double *point)
+    uint8_t result(const double *point)
     {
         counting_context context;
         rtcInitIntersectContext(&context.base);
@@ -184,12 +184,12 @@ bool visit(RTCPointQueryFunctionArguments *arguments)
     return true;
 }
 
-class distance : public bench::usual
+class distance : public bench::standard
 {
   public:
     static constexpr const char *name = "embree";
     static constexpr int doubles = 3;
-    using answer_type = bench::hit;
+    using result_type = bench::hit;
 
     // Compact: measured faster (5 to 25 %) and half the memory; a build of high quality takes three
     // times as long and gains nothing here.
@@ -203,12 +203,12 @@ class distance : public bench::usual
     }
     uint64_t bytes() const { return tree.bytes; }
 
-    bench::hit answer(const double *point)
+    bench::hit result(const double *point)
     {
         RTCPointQuery query = {};
         query.x = (float)point[0], query.y = (float)point[1], query.z = (float)point[2];
         query.radius = INFINITY;
-        if (warm) { // the last nearest point is at most so far away; with room for rounding
+        if (warm) { // the last nearest point is at most so far away; with space for rounding
             vec step = vec{ query.x, query.y, query.z } - last_point;
             query.radius = (last_distance + std::sqrt(dot(step, step))) * 1.00001f + 1e-30f;
             last_point = { query.x, query.y, query.z };
@@ -243,11 +243,11 @@ RTCRay ray_of(const double *from, double tmax)
 
 struct gathering_context {
     RTCIntersectContext base; // first: Embree passes its address on
-    struct met {
+    struct intersected {
         float t;
         uint32_t face;
     };
-    std::vector<met> *list;
+    std::vector<intersected> *list;
 };
 
 void gather_and_go_on(const RTCFilterFunctionNArguments *arguments)
@@ -259,12 +259,12 @@ void gather_and_go_on(const RTCFilterFunctionNArguments *arguments)
 }
 
 // High quality is what Embree's authors advise where a scene is built once.
-class rays : public bench::usual
+class rays : public bench::standard
 {
   public:
     static constexpr const char *name = "embree";
     static constexpr int doubles = 6;
-    using answer_type = bench::hit;
+    using result_type = bench::hit;
 
     rays()
         : tree(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION,
@@ -279,7 +279,7 @@ class rays : public bench::usual
         how = job.query == "ray" ? &rays::first : job.query == "ray-any" ? &rays::any : &rays::all;
     }
     uint64_t bytes() const { return tree.bytes; }
-    bench::hit answer(const double *ray) { return (this->*how)(ray); }
+    bench::hit result(const double *ray) { return (this->*how)(ray); }
 
   private:
     bench::hit first(const double *from)
@@ -302,7 +302,7 @@ class rays : public bench::usual
         return ray.tfar < 0 ? bench::hit{ 0, 0 } : bench::hit{ INFINITY, -1 };
     }
 
-    // In their order. Splits in space put a face into several leaves: each is told once.
+    // In their order. Splits in space put a face into several leaves: each is reported once.
     bench::hit all(const double *from)
     {
         gathering_context context;
@@ -324,7 +324,7 @@ class rays : public bench::usual
     scene tree;
     double tmax = INFINITY;
     bench::hit (rays::*how)(const double *) = nullptr;
-    std::vector<gathering_context::met> list;
+    std::vector<gathering_context::intersected> list;
 };
 
 } // namespace

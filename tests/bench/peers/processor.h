@@ -1,4 +1,4 @@
-/* Which processor a model takes its kernels from. */
+/* Selects the processor whose kernels a model uses. */
 #ifndef EBPO_BENCH_PROCESSOR_H
 #define EBPO_BENCH_PROCESSOR_H
 
@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-/* The base kernels (SSE2), or the best ones that this processor runs. Between questions. */
+/* Selects the base kernels (SSE2), or the best ones for this processor. Call between queries. */
 void processor_is_base(ebpo_model *model, bool base);
 
 #ifdef __cplusplus

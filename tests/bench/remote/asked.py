@@ -1,4 +1,4 @@
-"""What is asked of a file by URL, and how often: rows that are measured for each side."""
+"""The queries by URL: rows that are measured for each side."""
 import json
 import math
 import random
@@ -10,7 +10,7 @@ BUDGET = "256M"
 NEAR = 1e-4     # of the diagonal
 VIEW_FROM = 0.03
 KEPT = 588e3    # bytes of the box that is fetched
-CONNECTIONS = 32  # where waves are counted: the most that the command opens
+CONNECTIONS = 32  # maximum of the command, used to count dependent round trips
 TRIES = 3
 
 
@@ -135,8 +135,8 @@ def rows(large, small, work, singles, views):
             "ebpo view --eye EYE --look AT --seen-only --pixels 16 URL",
             [["view", "--eye", eye, "--look", at, "--seen-only", "--pixels", "16", "URL"]
              for eye, at in seen]),
-        *(Row(f"levels {to}", f"levels 0 to {to}, types and planes", f"ebpo levels --to {to} URL",
-              [["levels", "--to", to, "URL"]]) for to in (5, 8)),
+        *(Row(f"levels {to}", f"levels 0 to {to}, types and planes", f"ebpo levels --max-level {to} URL",
+              [["levels", "--max-level", to, "URL"]]) for to in (5, 8)),
         Row("no budget", "one inside, without `--memory`", "ebpo inside URL POINT",
             points("inside", each[:1]), waves=False)]
     return {row.name: row for row in table}
@@ -168,7 +168,7 @@ def ask(server, line, side, row, work, connections=None):
 
 
 def measure(server, line, side, row, work):
-    """As the command asks by itself; and in what waves, with connections enough."""
+    """Measures a row with the default connections, and its dependent round trips with 32."""
     found = ask(server, line, side, row, work)
     found["round_trips"] = found.pop("waves")
     if row.waves:

@@ -24,7 +24,7 @@ class Readers:
         if to == "whole":
             command = [self.tool, "fetch", "-q", url, self.point.with_name("whole.ebpo.h5")]
         else:
-            command = [self.tool, "levels", "--json", "--to", str(to), url]
+            command = [self.tool, "levels", "--json", "--max-level", str(to), url]
         begin = time.perf_counter()
         text = subprocess.run(command, check=True, capture_output=True, text=True,
                               stdin=subprocess.DEVNULL).stdout

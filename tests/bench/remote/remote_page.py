@@ -1,4 +1,5 @@
-"""docs/measured/remote.md from what was measured."""
+"""Prints docs/measured/remote.md from the measurements. The page has those of the new build; --json keeps
+the others."""
 import statistics
 
 import asked
@@ -6,7 +7,7 @@ import measured
 from query_page import Page, figure
 
 BEFORE, MIXED, AFTER = "before", "old file", "after"
-SIDES = (BEFORE, MIXED, AFTER)
+NAMES = {"waves": "round trips"}  # on the page
 
 
 def middle(values):
@@ -18,7 +19,7 @@ def middle(values):
 
 
 class Found:
-    """What was measured, by side, row and what of it."""
+    """The measurements, by side, row and value."""
     def __init__(self, found):
         self.found = found
 
@@ -30,7 +31,7 @@ class Found:
         return row and row.get(what)
 
     def rows(self):
-        """Names of the questions by URL, in order, with words and command."""
+        """Names of the queries by URL, in order, with text and command."""
         seen = {}
         for name, row in self.found.items():
             if isinstance(row, dict) and "command" in row:
@@ -38,7 +39,7 @@ class Found:
         return seen
 
     def beyond(self, side, what):
-        """Of levels 6 to 8: what levels 0 to 8 take more than levels 0 to 5."""
+        """Levels 6 to 8: the difference of levels 0 to 8 and levels 0 to 5."""
         both = [self.values(side, name, what) for name in ("levels 8", "levels 5")]
         return both[0] and both[1] and [both[0][0] - both[1][0]]
 
@@ -47,7 +48,7 @@ class Found:
         if not row:
             return None
         if what == "first":
-            return [1e3 * r["cold_first_answer_seconds"] for q in row.values() for r in q["first"]]
+            return [1e3 * r["cold_first_result_seconds"] for q in row.values() for r in q["first"]]
         return [q["path"]["ns"]["p999"] / 1e6 for q in row.values()]
 
     def viewer(self, side, step, what):
@@ -56,26 +57,19 @@ class Found:
             return None
         return [row[step]["seconds"] if what == "seconds" else row[step]["model"][1]]
 
-    def ratio(self, what):
-        if what == "size":
-            sizes = [self.row(side, "size") for side in (BEFORE, AFTER)]
-            return all(sizes) and [sizes[1]["large"] / sizes[0]["large"]]
-        rounds = self.found.get("build")
-        return rounds and [after / before for before, after in rounds]
-
 
 # --- the goals ---
 
 def goals():
-    """(what is measured, how it is got for a side, the most it should be)"""
+    """Yields the name of each measured value, its getter for a side, and the upper limit."""
     for query in "distance", "inside":
         for what, most in (("waves", 4), ("requests", 20), ("bytes", 0.7e6), ("seconds", 0.8)):
-            yield (f"one {query}: {what}",
+            yield (f"one {query}: {NAMES.get(what, what)}",
                    lambda f, s, a=(f"{query} one", what): f.values(s, *a), most)
         for what, most in (("waves", 5), ("requests", 500), ("bytes", 20e6), ("seconds", 3)):
-            yield (f"100 near points, {query}: {what}",
+            yield (f"100 near points, {query}: {NAMES.get(what, what)}",
                    lambda f, s, a=(f"{query} 100", what): f.values(s, *a), most)
-    yield "`fetch --box`: waves", lambda f, s: f.values(s, "box", "waves"), 5
+    yield "`fetch --box`: round trips", lambda f, s: f.values(s, "box", "waves"), 5
     yield "`fetch --box`: bytes", lambda f, s: f.values(s, "box", "bytes"), 1.5e6
     yield "close-up, nodes: requests", lambda f, s: f.values(s, "view", "requests"), 20
     yield "close-up, nodes: bytes", lambda f, s: f.values(s, "view", "bytes"), 1e6
@@ -85,118 +79,116 @@ def goals():
     yield "viewer, first picture: s", lambda f, s: f.viewer(s, "first", "seconds"), 2
     yield "viewer, a click's distance: s", lambda f, s: f.viewer(s, "click", "seconds"), 1.5
     yield "viewer, close-up: bytes", lambda f, s: f.viewer(s, "close", "bytes"), 4e6
-    yield "local, first answer cold: ms", lambda f, s: f.local(s, "first"), 20
+    yield "local, first result cold: ms", lambda f, s: f.local(s, "first"), 20
     yield "local, p99.9 of a path at once: ms", lambda f, s: f.local(s, "path"), 1
-    for what, words, most in (("size", "file", 1.02), ("build", "build time", 1.05)):
-        yield f"{words}, of before", lambda f, s, w=what: f.ratio(w) if s == AFTER else None, most
 
 
-def goal_table(page, found):
-    page.text("## Goals", "",
-              "Of several: median / largest; the goal is for the median. Large model, cold: each "
-              "is a new process that has cached nothing. *Old file*: this build and the file that "
-              "the build before wrote.")
-    rows = []
+def goal_rows(found):
     for what, get, most in goals():
-        values = [get(found, side) for side in SIDES]
-        after = values[2]
-        rows.append([what, *map(middle, values), f"at most {figure(most)}",
-                     "-" if not after else
-                     "yes" if statistics.median(after) <= most else "no"])
-    page.table(["what", *SIDES, "goal", "met"], rows)
+        after = get(found, AFTER)
+        yield [what, middle(after), f"at most {figure(most)}",
+               "-" if not after else "yes" if statistics.median(after) <= most else "no"]
 
 
-# --- what was measured ---
+def goal_table(page, found, note):
+    page.text("## Goals", "",
+              "Missed goals first. *Measured* is the median, and the maximum where there are several "
+              "values; the goal is for the median. All queries are cold: each is a new process "
+              "without a cache.")
+    if note:
+        page.text(note)
+    page.table(["what", "measured", "goal", "met"],
+               sorted(goal_rows(found), key=lambda row: row[3] != "no"))
 
-def question_tables(page, found):
-    page.text("## Questions by URL", "",
-              "100 ms of round trip, and as much for each new connection. Requests and bytes (of "
-              "bodies) from nginx's log. *Round trips*: of the command as it is, the batches that "
-              "its requests come in: a request begins a new one if it was sent after an answer of "
-              "the present one had come in whole. *Waves*: the same with "
-              f"`--http-connections {asked.CONNECTIONS}`, where a request that is sent when a "
-              "connection becomes free, all having been busy, had only waited for that: what "
-              f"depends on what; the least of {asked.TRIES} tries, as a busy machine only adds to "
-              "them. Times as the line before nginx has them.", "",
-              f"*Near*: at most {asked.NEAR:g} diagonals from the surface, at places where random "
-              "lines enter the model.")
-    for name, row in found.rows().items():
-        page.text(f"**{row['what']}**: `{row['command']}`")
-        table = []
-        for side in SIDES:
-            if found.row(side, name):
-                table.append([side, *(middle(found.values(side, name, what)) for what in
-                                      ("waves", "round_trips", "requests", "bytes", "seconds"))])
-        page.table(["", "waves", "round trips", "requests", "bytes", "s"], table)
+
+def summary(found):
+    """Returns the result of the page in at most three sentences."""
+    def of(name):
+        return (f"{middle_only(found.values(AFTER, name, 'waves'))} round trips, "
+                f"{middle_only(found.values(AFTER, name, 'requests'))} requests, "
+                f"{middle_only(found.values(AFTER, name, 'bytes'))} bytes and "
+                f"{middle_only(found.values(AFTER, name, 'seconds'))} s")
+    lines = [f"- With a round trip of 100 ms, a cold distance query near the surface of a model of "
+             f"25.6 million faces takes {of('distance one')}.",
+             f"- 100 such queries together take {of('distance 100')}."]
+    if found.row(AFTER, "viewer"):
+        lines.append("- At 5 Mbit/s the viewer shows its first picture after "
+                     f"{middle(found.viewer(AFTER, 'first', 'seconds'))} s, and an exact distance "
+                     f"{middle(found.viewer(AFTER, 'click', 'seconds'))} s after a click.")
+    return lines
+
+
+def middle_only(values):
+    return figure(statistics.median(values)) if values else "-"
+
+
+# --- measurements ---
+
+def query_table(page, found):
+    page.text("## Queries by URL", "",
+              "The round trip is 100 ms, also for each new connection. nginx's log has the requests "
+              "and bytes (of bodies). *Round trips* are chains of dependent requests, counted with "
+              f"`--http-connections {asked.CONNECTIONS}`: the minimum of {asked.TRIES} tries. All "
+              "else is measured with the default connections.", "",
+              f"*Near*: at most {asked.NEAR:g} diagonals from the surface, where random lines enter "
+              f"the model. The commands are `ebpo distance` and `ebpo inside --memory {asked.BUDGET} "
+              "URL POINTS`, `ebpo fetch -q --box`, `ebpo levels --max-level` and `ebpo view --seen-only "
+              "--pixels 16`.")
+    page.table(["query", "round trips", "requests", "bytes", "s"],
+               [[row["what"],
+                 *(middle(found.values(AFTER, name, what))
+                   for what in ("waves", "requests", "bytes", "seconds"))]
+                for name, row in found.rows().items() if found.row(AFTER, name)])
     same = found.row(AFTER, "same")
     if same is not None:
-        page.text("10,000 points around the same places, asked by URL and of the file on disk "
-                  f"(`ebpo inside` and `ebpo distance`, `--memory {asked.BUDGET}`): the answers are "
+        page.text("The results for 10,000 points around the same positions by URL and from the file "
+                  f"on disk (`ebpo inside` and `ebpo distance`, `--memory {asked.BUDGET}`) are "
                   f"{'the same' if same else 'NOT the same'}.")
 
 
 def viewer_table(page, found):
-    page.text("## The viewer", "",
-              "Headless Chromium, rendering in software, 5 Mbit/s and 100 ms; page and model by "
-              "`samples/serve.sh`; `node tests/bench/remote/viewed.mjs`. Each on a page just "
-              "opened, nothing cached. *First picture*: since the address was called; *settled*: "
-              "until nothing more is asked for; *click*: from a settled page until the exact "
-              f"distance is there; *close-up*: the same until a view from {asked.VIEW_FROM} "
-              "diagonals away is settled.")
-    table = []
-    for side in SIDES:
-        row = found.row(side, "viewer")
-        for step in row or []:
-            part = row[step]
-            table.append([side, step, *map(figure, (part["seconds"], *part["model"],
-                                                    *part["page"]))])
-    page.table(["", "step", "s", "model: requests", "bytes", "page: requests", "bytes"], table)
+    page.text("## Viewer", "",
+              "Headless Chromium with software rendering, 5 Mbit/s and 100 ms; `samples/serve.sh` "
+              "serves page and model (`node tests/bench/remote/viewed.mjs`). Each page is newly "
+              "opened with an empty cache. *first*: time to the first picture; *settled*: time to "
+              "the last request; *click*: from a settled page to the exact distance; *close*: from "
+              f"a settled page to a settled view from {asked.VIEW_FROM} diagonals away.")
+    page.table(["step", "s", "model: requests", "bytes", "page: requests", "bytes"],
+               [[step, *map(figure, (part["seconds"], *part["model"], *part["page"]))]
+                for step, part in (found.row(AFTER, "viewer") or {}).items()])
 
 
 def local_table(page, found):
-    page.text("## On this machine", "",
-              f"`ebpo bench --memory {asked.BUDGET} --query QUERY --points path --count 1 --seed "
-              "1..5` (the first answer, the file forgotten by the system before), `--points path "
-              "--count 200000 --prefetch`, `--points uniform --count 1000`.")
+    page.text("## Local file", "",
+              f"`ebpo bench --memory {asked.BUDGET} --query QUERY`: the first result from a cold "
+              "file (`--points path --count 1 --seed 1..5`), a path (`--points path --count 200000 "
+              "--prefetch`), and uniform points (`--points uniform --count 1000`).")
     table = []
-    for side in SIDES:
-        for query, runs in (found.row(side, "local") or {}).items():
-            path, cold = runs["path"], runs["first"]
-            table.append([side, query, middle([1e3 * r["cold_first_answer_seconds"] for r in cold]),
-                          middle([r["cold_reads"] for r in cold]),
-                          middle([r["cold_bytes_read"] for r in cold]),
-                          figure(path["ns"]["mean"] / 1e3), figure(path["ns"]["p999"] / 1e3),
-                          figure(path["model"]["loads"]), figure(path["model"]["bytes_read"]),
-                          figure(runs["uniform"]["ns"]["mean"] / 1e6)])
-    page.table(["", "question", "first answer, ms", "reads", "bytes", "path: mean us", "p99.9 us",
+    for query, runs in (found.row(AFTER, "local") or {}).items():
+        path, cold = runs["path"], runs["first"]
+        table.append([query, middle([1e3 * r["cold_first_result_seconds"] for r in cold]),
+                      middle([r["cold_reads"] for r in cold]),
+                      middle([r["cold_bytes_read"] for r in cold]),
+                      figure(path["ns"]["mean"] / 1e3), figure(path["ns"]["p999"] / 1e3),
+                      figure(path["model"]["loads"]), figure(path["model"]["bytes_read"]),
+                      figure(runs["uniform"]["ns"]["mean"] / 1e6)])
+    page.table(["query", "first result, ms", "reads", "bytes", "path: mean us", "p99.9 us",
                 "loads", "bytes", "uniform: mean ms"], table)
 
 
-def size_table(page, found):
-    page.text("## Size and building", "",
-              "Files as they are on the disk; CPU seconds of `ebpo convert -q --memory 4GiB` of the "
-              "small model, two runs of each side in turns a row.")
-    page.table(["", "large, bytes", "small, bytes"],
-               [[side, f"{size['large']:,}", f"{size['small']:,}"]
-                for side in (BEFORE, AFTER) if (size := found.row(side, "size"))])
-    page.table(["before, CPU s", "after, CPU s", "after / before"],
-               [[figure(a), figure(b), f"{b / a:.3f}"] for a, b in found.found.get("build", [])])
-
-
 def driver_tables(page, found):
-    page.text("## Beside HDF5's own ways", "",
-              "The files of *after*. Whole files: `ebpo fetch`, all datasets by ros3 and h5wasm; "
-              "the viewer's reader reads levels and mesh, no maps. Files above 100 MB are read "
-              "whole by the command only.")
+    page.text("## HDF5's own readers", "",
+              "Whole files: `ebpo fetch`, all datasets by ros3 and h5wasm; the viewer's reader "
+              "reads levels and mesh, no maps. Only the command reads files above 100 MB whole.")
     page.table(["file", "bytes", "reader", "levels 0 to 4: requests", "bytes",
                 "levels 0 to 5: requests", "bytes", "whole: requests", "bytes", "MB a request"],
                [[name, f"{size:,}", reader,
                  *("-" if n is None else f"{n:,}" for n in counts),
                  figure(counts[5] / counts[4] / 1e6) if counts[4] else "-"]
                 for name, size, reader, *counts in found.found.get("drivers/requests", [])])
-    page.text("Time with latency: ms until level 0, and levels 0 to 5, of the large file are "
-              "decoded (medians of 3). The C command's second figure includes the start of the "
-              "process, the others' do not include theirs, nor loading their code.")
+    page.text("ms until level 0, and levels 0 to 5, of the large file are decoded (medians of 3). "
+              "For the C command the second value includes the start of the process; the others "
+              "exclude it and the loading of their code.")
     page.table(["round trip, ms", "reader", "level 0", "levels 0 to 5"],
                [[latency, reader, f"{first:,.0f}", f"{last:,.0f}"]
                 for latency, reader, first, last in found.found.get("drivers/latency", [])])
@@ -205,23 +197,19 @@ def driver_tables(page, found):
 def made(results, command, programs, note):
     page, found = Page(), Found(results)
     load = results.get("load", {}).values()
-    page.text("# Files on web servers: measured", "",
+    page.text("# Remote files", "", *summary(found))
+    goal_table(page, found, note)
+    page.text("## Measurement", "",
               f"Made by `{command}`; {programs} with its zstd plugin, HDF5's ros3 driver through "
-              f"Debian's h5py with our plugin, all on one machine: {measured.machine()}; its "
-              f"load average meanwhile {figure(statistics.median(load))} (median), "
-              f"{figure(max(load))} (most). Requests, bytes and waves are exact; times are to be "
-              "compared within a row, and roughly: rows were measured in several runs (`--json`, "
-              "`--only`).", "",
-              "The large model: `ebpo-generate --base lucy100k.ply --subdivide 4 lucy28.ply` "
-              "(25,592,320 faces), the small one: `ebpo-generate --base igea.ply --subdivide 2 "
+              f"Debian's h5py with our plugin, all on one machine: {measured.machine()}; load "
+              f"average {figure(statistics.median(load))} (median), {figure(max(load))} (maximum). "
+              "Requests, bytes and round trips are exact; compare times roughly.", "",
+              "Large model: `ebpo-generate --base lucy100k.ply --subdivide 4 lucy28.ply` "
+              "(25,592,320 faces). Small model: `ebpo-generate --base igea.ply --subdivide 2 "
               "igea4.ply` (4,298,976 faces).")
-    if note:
-        page.text(note)
-    goal_table(page, found)
-    question_tables(page, found)
+    query_table(page, found)
     viewer_table(page, found)
     local_table(page, found)
-    size_table(page, found)
     if found.found.get("drivers/latency"):
         driver_tables(page, found)
     return "\n".join(page.lines).rstrip() + "\n"

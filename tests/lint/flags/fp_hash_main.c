@@ -8,13 +8,14 @@
 
 int main(void)
 {
-    const fp_setting usual = { FE_TONEAREST, 0 };
-    for (int i = 0; i < stiff_case_count; i++) {
+    const fp_setting standard = { FE_TONEAREST, 0 };
+    for (int i = 0; i < degenerate_case_count; i++) {
         fp_hashes h;
-        if (!fp_hash_takes(&stiff_cases[i]))
+        if (!fp_hash_takes(&degenerate_cases[i]))
             continue;
-        fp_hash_case(&stiff_cases[i], &usual, 100, &h);
-        printf("%016" PRIx64 " %016" PRIx64 " %s\n", h.content, h.answers, stiff_cases[i].name);
+        fp_hash_case(&degenerate_cases[i], &standard, 100, &h);
+        printf("%016" PRIx64 " %016" PRIx64 " %s\n", h.content, h.results,
+               degenerate_cases[i].name);
     }
     return 0;
 }

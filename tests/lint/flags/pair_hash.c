@@ -6,11 +6,11 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "extras/collide/face_pairs.h"
 #include "geometry/pose.h"
 #include "geometry/triangle_pair.h"
-#include "pair_twin.h"
+#include "pair_reference.h"
 
 enum { ROUNDS = 1000 };
 
@@ -80,9 +80,9 @@ int main(void)
 {
     uint64_t hash = 0xcbf29ce484222325, state = 1;
     for (int i = 0; i < ROUNDS; i++)
-        for (int kind = 0; kind < TWIN_PAIR_KINDS; kind++) {
+        for (int kind = 0; kind < REFERENCE_PAIR_KINDS; kind++) {
             double a[3][3], b[3][3];
-            twin_pair_case(a, b, kind, &state);
+            reference_pair_case(a, b, kind, &state);
             hash = hash_pair(hash, a, b);
             if (kind == 12 || kind == 13)
                 continue;

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "exact_twin.h"
+#include "exact_reference.h"
 #include "geometry/cells.h"
 #include "geometry/predicates.h"
 #include "geometry/distance.h"
@@ -61,7 +61,7 @@ static uint64_t hash_rays(uint64_t hash, const double *p)
     const double other[3][3] = { { p[0], p[1], p[2] }, { p[6], p[7], p[8] }, { p[3], p[5], p[4] } };
     ebpo_segment ray = { .t_max = 1.5 };
     for (int aim = 0; aim < 2; aim++) {
-        ebpo_ray_meeting m, n;
+        ebpo_ray_intersection m, n;
         for (int k = 0; k < 3; k++) {
             double to = aim == 0 ? p[k] : .25 * p[k] + .25 * p[3 + k] + .5 * p[6 + k];
             ray.origin[k] = p[9 + k];
@@ -78,7 +78,7 @@ static uint64_t hash_rays(uint64_t hash, const double *p)
     }
     const double low[3] = { p[9], fmin(p[10], p[1]), p[11] },
                  high[3] = { p[9], fmax(p[10], p[1]), p[11] };
-    return mix(hash, ebpo_triangle_meets_box(triangle, low, high));
+    return mix(hash, ebpo_triangle_intersects_box(triangle, low, high));
 }
 
 static uint64_t hash_distances(uint64_t hash, const double *p)
@@ -102,9 +102,9 @@ int main(void)
 {
     uint64_t hash = 0xcbf29ce484222325, state = 1;
     for (int i = 0; i < ROUNDS; i++)
-        for (int kind = 0; kind < TWIN_KINDS; kind++) {
+        for (int kind = 0; kind < REFERENCE_KINDS; kind++) {
             double p[12];
-            twin_points(p, 3, kind, &state);
+            reference_points(p, 3, kind, &state);
             for (int k = 0; k < 12; k++)
                 hash = mix_double(hash, p[k]);
             hash = hash_points(hash, p);

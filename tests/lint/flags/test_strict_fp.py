@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Sources whose results rest on IEEE arithmetic refuse compilers and flags that do not give it.
+"""Checks that sources that need IEEE arithmetic reject compilers and flags that violate it.
 
     test_strict_fp.py SOURCE_ROOT COMPILER [ARGUMENT...]
 

@@ -88,7 +88,7 @@ static bool is_listed(const ebpo_file *file, const char *name, uint64_t rows)
     return false;
 }
 
-START_TEST(written_read_and_listed)
+START_TEST(test_new_array_round_trip_and_listing)
 {
     ebpo_tree back;
     ebpo_file *file = write_and_open((ebpo_codec)_i);
@@ -108,7 +108,7 @@ START_TEST(written_read_and_listed)
 }
 END_TEST
 
-START_TEST(its_values_count_for_the_content)
+START_TEST(test_new_array_changes_content_checksum)
 {
     uint8_t digest[32];
     ebpo_file *file = write_and_open(EBPO_CODEC_ZSTD);
@@ -121,7 +121,7 @@ START_TEST(its_values_count_for_the_content)
 }
 END_TEST
 
-START_TEST(usual_values_are_left_out)
+START_TEST(test_new_array_default_values_are_omitted)
 {
     ebpo_level back;
     memset(tree.level[6].leaf_mark, 0, tree.level[6].leaf_count);
@@ -134,7 +134,7 @@ START_TEST(usual_values_are_left_out)
 }
 END_TEST
 
-START_TEST(a_part_without_its_array_is_refused)
+START_TEST(test_new_array_required_by_part)
 {
     char vector[1024];
     ebpo_file *file;
@@ -156,7 +156,7 @@ START_TEST(a_part_without_its_array_is_refused)
 END_TEST
 
 /* Every second group, so that runs have gaps. */
-START_TEST(runs_are_picked)
+START_TEST(test_new_array_pick_of_runs)
 {
     ebpo_file *file = write_and_open(EBPO_CODEC_ZSTD);
     const ebpo_level *all = &tree.level[6];
@@ -186,7 +186,7 @@ START_TEST(runs_are_picked)
 END_TEST
 
 /* The children of the root, one after the other: each has the next stretch of every level. */
-START_TEST(sliced)
+START_TEST(test_new_array_slices)
 {
     ebpo_file *file = write_and_open(EBPO_CODEC_ZSTD);
     ebpo_chunks *chunks;
@@ -258,7 +258,7 @@ static void walk(side *a, side *b, int i)
     }
 }
 
-START_TEST(subsets_keep_it)
+START_TEST(test_new_array_in_subsets)
 {
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
     ebpo_file *file = write_and_open(EBPO_CODEC_ZSTD), *cut;
@@ -287,7 +287,7 @@ START_TEST(subsets_keep_it)
 END_TEST
 
 /* Without the part, the arrays that need it go too, and the others stay. */
-START_TEST(cut_by_part)
+START_TEST(test_new_array_is_cut_with_part)
 {
     ebpo_subset_options options = EBPO_SUBSET_OPTIONS_INIT;
     ebpo_file *file = write_and_open(EBPO_CODEC_ZSTD), *cut;
@@ -332,7 +332,7 @@ static void replace_marks(int level, hid_t type, hsize_t rows)
     H5Fclose(file);
 }
 
-START_TEST(length_and_type_are_checked)
+START_TEST(test_new_array_length_and_type)
 {
     static const char *const wrong[] = { "the array's length contradicts the counts in the head",
                                          "the array has the wrong type" };
@@ -347,7 +347,7 @@ END_TEST
 
 /* A real model, whose file says nothing of the array: with marks it verifies; with changed ones its
  * content is not what it says. */
-START_TEST(verified)
+START_TEST(test_new_array_is_verified)
 {
     char vector[1024];
     ebpo_file *file;
@@ -378,16 +378,17 @@ Suite *test_suite(void)
     TCase *c = tcase_create("all");
     tcase_set_timeout(c, 0);
     tcase_add_checked_fixture(c, set_up, tear_down);
-    tcase_add_loop_test(c, written_read_and_listed, EBPO_CODEC_ZSTD, EBPO_CODEC_NONE + 1);
-    tcase_add_test(c, its_values_count_for_the_content);
-    tcase_add_test(c, usual_values_are_left_out);
-    tcase_add_test(c, a_part_without_its_array_is_refused);
-    tcase_add_test(c, runs_are_picked);
-    tcase_add_test(c, sliced);
-    tcase_add_loop_test(c, subsets_keep_it, 0, 2);
-    tcase_add_test(c, cut_by_part);
-    tcase_add_loop_test(c, length_and_type_are_checked, 0, 2);
-    tcase_add_test(c, verified);
+    tcase_add_loop_test(c, test_new_array_round_trip_and_listing, EBPO_CODEC_ZSTD,
+                        EBPO_CODEC_NONE + 1);
+    tcase_add_test(c, test_new_array_changes_content_checksum);
+    tcase_add_test(c, test_new_array_default_values_are_omitted);
+    tcase_add_test(c, test_new_array_required_by_part);
+    tcase_add_test(c, test_new_array_pick_of_runs);
+    tcase_add_test(c, test_new_array_slices);
+    tcase_add_loop_test(c, test_new_array_in_subsets, 0, 2);
+    tcase_add_test(c, test_new_array_is_cut_with_part);
+    tcase_add_loop_test(c, test_new_array_length_and_type, 0, 2);
+    tcase_add_test(c, test_new_array_is_verified);
     suite_add_tcase(suite, c);
     return suite;
 }

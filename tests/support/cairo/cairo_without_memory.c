@@ -1,5 +1,5 @@
-/* Stands where libcairo.so.2 is looked for, and draws nothing. What its memory does not suffice
- * for the environment says: EBPO_TEST_CAIRO=drawing or surface; without it there is enough. */
+/* Replaces libcairo.so.2, and draws nothing. The environment selects the call that runs out of
+ * memory: EBPO_TEST_CAIRO=drawing or surface; without it none does. */
 #include <cairo.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -10,8 +10,8 @@ static unsigned char *surface_bytes;
 
 static bool lacks(const char *what)
 {
-    const char *said = getenv("EBPO_TEST_CAIRO");
-    return said && strcmp(said, what) == 0;
+    const char *reported = getenv("EBPO_TEST_CAIRO");
+    return reported && strcmp(reported, what) == 0;
 }
 
 #pragma GCC visibility push(default) /* the project's own symbols are hidden */

@@ -6,18 +6,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "cli/answers.h"
+#include "cli/results.h"
 #include "cli/bench/bench_rays.h"
 #include "cli/bench/bench_walk.h"
 #include "cli/command.h"
 
-enum { USUAL_COUNT = 100000 };
+enum { DEFAULT_COUNT = 100000 };
 
-/* Words for what is not read from a file. */
+/* Words for generated input. */
 typedef enum generator { UNIFORM, PATH, CAMERA, SEGMENTS, DEGENERATE, NO_GENERATOR } generator;
 static const char *const generators[] = { "uniform", "path", "camera", "segments", "degenerate" };
 
-static int make_room(bench_points *out, uint64_t count)
+static int reserve_space(bench_points *out, uint64_t count)
 {
     uint64_t bytes;
     if (__builtin_mul_overflow(count, sizeof(double) * (unsigned)points_width(out->kind), &bytes))
@@ -37,7 +37,7 @@ static void fill_uniform(bench_points *out, const bench_scene *scene, uint64_t s
     }
 }
 
-/* What is generated from the mesh itself: a path, or degenerate rays. */
+/* Generates points from the mesh: a path, or degenerate rays. */
 static int fill_from_mesh(bench_points *out, ebpo_file *file, const bench_scene *scene,
                           uint64_t seed)
 {
@@ -83,7 +83,7 @@ static int generate_rows(bench_points *out, const char *model, const remote_valu
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
-    int code = make_room(out, out->count);
+    int code = reserve_space(out, out->count);
     if (code == EXIT_FINE && remote_open(&file, model, remote, &error) != EBPO_OK)
         code = command_failed("bench", &error);
     if (code == EXIT_FINE)
@@ -101,7 +101,7 @@ static int read_all(bench_points *out, points *in, uint64_t most)
     while (got && out->count < most) {
         if (capacity < out->count + POINTS_BATCH) {
             capacity = 2 * capacity + POINTS_BATCH;
-            if (make_room(out, capacity) != EXIT_FINE)
+            if (reserve_space(out, capacity) != EXIT_FINE)
                 return EXIT_FAILED;
         }
         got = points_next(in, out->rows + out->count * (uint64_t)points_width(out->kind));
@@ -131,7 +131,7 @@ int bench_points_make(bench_points *out, points_kind kind, const char *model,
                       uint64_t seed, double tmax)
 {
     generator by = generator_of(what);
-    *out = (bench_points){ .kind = kind, .count = count ? count : USUAL_COUNT };
+    *out = (bench_points){ .kind = kind, .count = count ? count : DEFAULT_COUNT };
     if (by == PATH && kind == POINTS_RAYS)
         return command_usage("bench",
                              "a path has points; for rays give --points uniform or a file");

@@ -1,4 +1,4 @@
-/* What the benchmark asks about. */
+/* Reads or generates the query rows of the benchmark. */
 #ifndef EBPO_TOOLS_BENCH_POINTS_H
 #define EBPO_TOOLS_BENCH_POINTS_H
 
@@ -13,23 +13,23 @@ typedef struct bench_points {
     uint64_t count;
 } bench_points;
 
-/* `what`: "uniform" (in the mesh's bounding box), "path" (along the surface; points only),
+/* `what`: "uniform" (in the bounding box of the mesh), "path" (along the surface; points only),
  * "camera", "segments" or "degenerate" (rays: bench_rays.h), or a file, of which at most `count`
- * are taken (0: all; 100,000 of the others). `tmax`: of rays that tell none, and at most that of
- * generated ones. Returns an exit code; what is wrong is said on stderr. bench_points_free in any
- * case. */
+ * rows are taken (0: all; 100,000 for generated rows). `tmax`: default of rays without it, and at
+ * most that of generated rays. Returns an exit code; errors are reported on stderr. Call
+ * bench_points_free in any case. */
 int bench_points_make(bench_points *out, points_kind kind, const char *model,
                       const remote_values *remote, const char *what, bool raw, uint64_t count,
                       uint64_t seed, double tmax);
-/* Every file but the five words. */
+/* Returns false for files. */
 bool bench_points_generated(const char *what);
 void bench_points_free(bench_points *p);
 
 /* Closes a stream of open_memstream (NULL: there was no memory for it), writes its data to a file,
- * which appears whole or not at all, and frees it. */
+ * which is replaced atomically, and frees it. */
 int bench_save(FILE *stream, char *const *data, const size_t *size, const char *path);
 
-/* As little-endian doubles, 3 or 6 for each. */
+/* Writes little-endian doubles, 3 or 6 for each row. */
 int bench_points_save(const bench_points *p, const char *path);
 
 #endif

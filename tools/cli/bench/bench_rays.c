@@ -21,7 +21,8 @@ static void random_point(const bench_scene *s, uint64_t *random, double out[3])
         out[k] = s->low[k] + bench_random_unit(random) * (s->high[k] - s->low[k]);
 }
 
-/* Uniform over the sphere: by rejection, which takes no functions that differ between systems. */
+/* Generates a direction uniform over the sphere by rejection, which uses no functions that differ
+ * between systems. */
 static void random_direction(uint64_t *random, double out[3])
 {
     double square;
@@ -57,7 +58,7 @@ void bench_rays_segments(const bench_scene *s, uint64_t seed, uint64_t count, do
     }
 }
 
-/* Two vectors of length 1 across `along`. */
+/* Computes two unit vectors perpendicular to `along`. */
 static void make_across(const double along[3], double right[3], double up[3])
 {
     int axis = 0;

@@ -1,4 +1,4 @@
-/* Rays to be asked about, each seven doubles as in ebpo_ray. */
+/* Generates query rays, each seven doubles as in ebpo_ray. */
 #ifndef EBPO_TOOLS_BENCH_RAYS_H
 #define EBPO_TOOLS_BENCH_RAYS_H
 
@@ -9,15 +9,15 @@ typedef struct bench_scene {
     double low[3], high[3];
 } bench_scene;
 
-/* From points in the box, directions uniform over the sphere. */
+/* Rays from points in the box, directions uniform over the sphere. */
 void bench_rays_uniform(const bench_scene *scene, uint64_t seed, uint64_t count, double *rows);
 /* The same, but each ends after a twentieth of the box's diagonal, at t = 1. */
 void bench_rays_segments(const bench_scene *scene, uint64_t seed, uint64_t count, double *rows);
-/* Through the pixels of a square picture, row by row: the box fills it, the eye is one and a half
- * diagonals away. */
+/* Rays through the pixels of a square picture, row by row: the box fills it, the eye is one and a
+ * half diagonals away. */
 void bench_rays_camera(const bench_scene *scene, uint64_t seed, uint64_t count, double *rows);
-/* In turns: from a point in the box to a vertex, to the middle of an edge; from a vertex anywhere;
- * along an axis through a vertex, from outside. Origins are floats. */
+/* In turn: from a point in the box to a vertex, to the middle of an edge; from a vertex in any
+ * direction; along an axis through a vertex, from outside. Origins are floats. */
 void bench_rays_degenerate(const bench_scene *scene, const ebpo_mesh *mesh, uint64_t seed,
                            uint64_t count, double *rows);
 

@@ -14,14 +14,14 @@
 #include <malloc.h>
 #endif
 
-size_t bench_answer_bytes(bench_query query)
+size_t bench_result_bytes(bench_query query)
 {
     return query == BENCH_INSIDE     ? sizeof(ebpo_inside_result)
            : query == BENCH_DISTANCE ? sizeof(ebpo_distance_result)
                                      : sizeof(ebpo_ray_hit);
 }
 
-/* --- clock --- */
+/* --- times --- */
 
 static int compare_u64(const void *a, const void *b)
 {
@@ -43,19 +43,19 @@ uint64_t bench_clock_cost(void)
     return cost[READINGS / 2];
 }
 
-/* --- questions --- */
+/* --- queries --- */
 
 static const ebpo_ray_hit nothing = { .t = INFINITY, .face = EBPO_NO_FACE };
 
-static ebpo_ray_hit answer_any(bool any) { return any ? (ebpo_ray_hit){ .t = 0 } : nothing; }
+static ebpo_ray_hit result_any(bool any) { return any ? (ebpo_ray_hit){ .t = 0 } : nothing; }
 
-static ebpo_ray_hit answer_all(const ebpo_ray_hit *hits, uint64_t count)
+static ebpo_ray_hit result_all(const ebpo_ray_hit *hits, uint64_t count)
 {
     return count ? (ebpo_ray_hit){ .t = (double)count, .face = hits[0].face } : nothing;
 }
 
-static ebpo_status ask_ray(bench_query query, const double *row, ebpo_context *context,
-                           ebpo_ray_hit *out, ebpo_error *error)
+static ebpo_status query_ray(bench_query query, const double *row, ebpo_context *context,
+                             ebpo_ray_hit *out, ebpo_error *error)
 {
     bool hit = false;
     const ebpo_ray_hit *hits;
@@ -63,10 +63,10 @@ static ebpo_status ask_ray(bench_query query, const double *row, ebpo_context *c
     ebpo_status status;
     if (query == BENCH_RAY_ALL) {
         status = ebpo_ray_all(context, row, row + 3, row[6], &hits, &count, error);
-        *out = answer_all(hits, count);
+        *out = result_all(hits, count);
     } else if (query == BENCH_RAY_ANY) {
         status = ebpo_ray_any(context, row, row + 3, row[6], &hit, error);
-        *out = answer_any(hit);
+        *out = result_any(hit);
     } else {
         status = ebpo_ray_first(context, row, row + 3, row[6], out, &hit, error);
         if (!hit)
@@ -75,8 +75,8 @@ static ebpo_status ask_ray(bench_query query, const double *row, ebpo_context *c
     return status;
 }
 
-static ebpo_status ask_any_many(const bench_job *job, ebpo_context *context,
-                                const ebpo_ray_options *how, ebpo_ray_hit *out, ebpo_error *error)
+static ebpo_status query_any_many(const bench_job *job, ebpo_context *context,
+                                  const ebpo_ray_options *how, ebpo_ray_hit *out, ebpo_error *error)
 {
     bool *any = malloc(job->count ? job->count : 1);
     if (!any)
@@ -84,13 +84,13 @@ static ebpo_status ask_any_many(const bench_job *job, ebpo_context *context,
     ebpo_status status =
         ebpo_ray_any_many(context, (const void *)job->rows, job->count, how, any, error);
     for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++)
-        out[i] = answer_any(any[i]);
+        out[i] = result_any(any[i]);
     free(any);
     return status;
 }
 
-static ebpo_status ask_many_rays(const bench_job *job, ebpo_context *context, ebpo_ray_hit *out,
-                                 ebpo_error *error)
+static ebpo_status query_many_rays(const bench_job *job, ebpo_context *context, ebpo_ray_hit *out,
+                                   ebpo_error *error)
 {
     ebpo_ray_options how = EBPO_RAY_OPTIONS_INIT;
     const void *rays = job->rows;
@@ -100,34 +100,35 @@ static ebpo_status ask_many_rays(const bench_job *job, ebpo_context *context, eb
     if (job->query == BENCH_RAY)
         return ebpo_ray_first_many(context, rays, job->count, &how, out, error);
     if (job->query == BENCH_RAY_ANY)
-        return ask_any_many(job, context, &how, out, error);
+        return query_any_many(job, context, &how, out, error);
     ebpo_status status = ebpo_ray_all_many(context, rays, job->count, &how, &hits, &begin, error);
     for (uint64_t i = 0; i < job->count && status == EBPO_OK; i++)
-        out[i] = answer_all(hits + begin[i], begin[i + 1] - begin[i]);
+        out[i] = result_all(hits + begin[i], begin[i + 1] - begin[i]);
     return status;
 }
 
-static inline ebpo_status ask_into(const bench_job *job, ebpo_context *context, uint64_t i,
-                                   void *answers, ebpo_error *error)
+static inline ebpo_status query_into(const bench_job *job, ebpo_context *context, uint64_t i,
+                                     void *result_values, ebpo_error *error)
 {
     const double *row = job->rows + i * (uint64_t)job->width;
     switch (job->query) {
     case BENCH_INSIDE:
-        return ebpo_inside(context, row, &job->inside, (ebpo_inside_result *)answers + i, error);
+        return ebpo_inside(context, row, &job->inside, (ebpo_inside_result *)result_values + i,
+                           error);
     case BENCH_DISTANCE:
-        return ebpo_distance(context, row, &job->distance, (ebpo_distance_result *)answers + i,
-                             error);
-    default: return ask_ray(job->query, row, context, (ebpo_ray_hit *)answers + i, error);
+        return ebpo_distance(context, row, &job->distance,
+                             (ebpo_distance_result *)result_values + i, error);
+    default: return query_ray(job->query, row, context, (ebpo_ray_hit *)result_values + i, error);
     }
 }
 
-ebpo_status bench_ask(const bench_job *job, ebpo_context *context, uint64_t number,
-                      ebpo_error *error)
+ebpo_status bench_run_query(const bench_job *job, ebpo_context *context, uint64_t number,
+                            ebpo_error *error)
 {
-    return ask_into(job, context, number, job->answers, error);
+    return query_into(job, context, number, job->result_values, error);
 }
 
-/* Of ascending times: the least one that no more than 1 - thousandths / 1000 of them exceed. */
+/* Returns the least of ascending times that no more than 1 - thousandths / 1000 of them exceed. */
 static uint64_t time_quantile(const uint64_t *sorted, uint64_t count, unsigned thousandths)
 {
     uint64_t below = count / 1000 * thousandths + (count % 1000 * thousandths + 999) / 1000;
@@ -135,7 +136,7 @@ static uint64_t time_quantile(const uint64_t *sorted, uint64_t count, unsigned t
 }
 
 ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t clock_cost,
-                         bench_figures *out, ebpo_error *error)
+                         bench_metrics *out, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     double sum = 0;
@@ -144,7 +145,7 @@ ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t c
         if (job->rate > 0)
             tool_wait_until(begin + (uint64_t)((double)i / job->rate * 1e9));
         uint64_t start = tool_clock();
-        status = bench_ask(job, context, i, error);
+        status = bench_run_query(job, context, i, error);
         uint64_t took = tool_clock() - start;
         job->ns[i] = took > clock_cost ? took - clock_cost : 0;
     }
@@ -161,17 +162,19 @@ ebpo_status bench_singly(const bench_job *job, ebpo_context *context, uint64_t c
     return EBPO_OK;
 }
 
-ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *answers,
-                        bench_figures *out, ebpo_error *error)
+ebpo_status bench_batch(const bench_job *job, ebpo_context *context, void *result_values,
+                        bench_metrics *out, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     uint64_t start = tool_clock();
     if (job->query == BENCH_INSIDE)
-        status = ebpo_inside_many(context, job->rows, job->count, &job->inside, answers, error);
+        status =
+            ebpo_inside_many(context, job->rows, job->count, &job->inside, result_values, error);
     else if (job->query == BENCH_DISTANCE)
-        status = ebpo_distance_many(context, job->rows, job->count, &job->distance, answers, error);
+        status = ebpo_distance_many(context, job->rows, job->count, &job->distance, result_values,
+                                    error);
     else
-        status = ask_many_rays(job, context, answers, error);
+        status = query_many_rays(job, context, result_values, error);
     out->batch = (double)(tool_clock() - start) / (double)job->count;
     return status;
 }
@@ -202,7 +205,7 @@ double bench_drop_file(const char *path)
     int fd = open(path, O_RDONLY | O_CLOEXEC);
     if (fd < 0)
         return -1;
-    fsync(fd); /* only what is on the disk can be forgotten */
+    fsync(fd); /* only data on the disk can be dropped */
     if (posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED) == 0 && fstat(fd, &st) == 0)
         share = share_in_memory(fd, (size_t)st.st_size);
     close(fd);

@@ -8,14 +8,14 @@ enum { HOPS_MAX = 100, SWING_STEPS = 1000 };
 
 typedef struct walker {
     const ebpo_mesh *mesh;
-    uint64_t *first;  /* [vertex_count + 1] place in `around` */
+    uint64_t *first;  /* [vertex_count + 1] offsets into `around` */
     uint32_t *around; /* faces around each vertex */
     uint64_t random;
     uint64_t face;
-    double corner[3][3], n[3]; /* of the face; unit normal */
-    double p[3], d[3];         /* where, and a unit vector in the face's plane: where to */
-    double turn;               /* radians a step, to the left */
-    double side[3];            /* the normals that were passed, smoothed */
+    double corner[3][3], n[3]; /* corners of the face; unit normal */
+    double p[3], d[3];         /* position, and a unit vector in the plane of the face: direction */
+    double turn;               /* radians per step, to the left */
+    double side[3];            /* smoothed normals along the path */
 } walker;
 
 uint64_t bench_random(uint64_t *state)
@@ -55,14 +55,14 @@ static void add_scaled(double v[3], double s, const double w[3])
         v[k] += s * w[k];
 }
 
-/* False when there is no direction. */
+/* Returns false when there is no direction. */
 static bool normalise_vector(double v[3])
 {
     double most = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
     if (!(most > 0) || !isfinite(most))
         return false;
     for (int k = 0; k < 3; k++)
-        v[k] /= most; /* squares neither vanish nor overflow then */
+        v[k] /= most; /* so that squares neither vanish nor overflow */
     double length = sqrt(dot_product(v, v));
     for (int k = 0; k < 3; k++)
         v[k] /= length;
@@ -95,8 +95,8 @@ static void read_vertex(const ebpo_mesh *m, uint32_t number, double out[3])
                           : m->xyz64[3 * (uint64_t)number + (unsigned)k];
 }
 
-/* The corner of `face` from which its edge from a to b (or, with `any`, from b to a) starts; -1: it
- * has none. */
+/* Returns the corner of `face` from which its edge from a to b (or, with `any`, from b to a)
+ * starts; -1: it has none. */
 static int edge_corner(const ebpo_mesh *m, uint64_t face, uint32_t a, uint32_t b, bool any)
 {
     const uint32_t *f = m->faces + 3 * face;
@@ -106,8 +106,8 @@ static int edge_corner(const ebpo_mesh *m, uint64_t face, uint32_t a, uint32_t b
     return -1;
 }
 
-/* The face beyond the edge from a to b, the opposite one first; UINT64_MAX: there is none. `third`:
- * its other corner. */
+/* Returns the face beyond the edge from a to b, preferring the opposite edge; UINT64_MAX: there is
+ * none. `third`: its other corner. */
 static uint64_t find_neighbour(const walker *w, uint32_t a, uint32_t b, uint32_t *third)
 {
     for (int any = 0; any < 2; any++)
@@ -124,7 +124,7 @@ static uint64_t find_neighbour(const walker *w, uint32_t a, uint32_t b, uint32_t
 
 /* --- the walk --- */
 
-/* False for a face without area. */
+/* Returns false for a face without area. */
 static bool enter_face(walker *w, uint64_t face)
 {
     double e0[3], e1[3];
@@ -137,7 +137,7 @@ static bool enter_face(walker *w, uint64_t face)
     return normalise_vector(w->n);
 }
 
-/* To the middle of the face, along its first edge. */
+/* Moves to the middle of the face, along its first edge. */
 static void stand_on_face(walker *w)
 {
     for (int k = 0; k < 3; k++)
@@ -146,7 +146,7 @@ static void stand_on_face(walker *w)
     normalise_vector(w->d);
 }
 
-/* To any face with an area; false when a thousand have none. */
+/* Moves to a random face with an area; returns false when a thousand have none. */
 static bool land_anywhere(walker *w)
 {
     for (int i = 0; i < 1000; i++)
@@ -157,8 +157,8 @@ static bool land_anywhere(walker *w)
     return false;
 }
 
-/* How far the face's edge i is ahead; infinite when it is behind. `inward`: unit normal of the edge
- * in the plane. */
+/* Returns the distance to the edge i of the face; infinite when it is behind. `inward`: unit normal
+ * of the edge in the plane. */
 static double edge_distance(const walker *w, int i, double inward[3])
 {
     double edge[3], from[3];
@@ -171,7 +171,8 @@ static double edge_distance(const walker *w, int i, double inward[3])
     return rate < 0 ? fmax(0, dot_product(from, inward) / -rate) : INFINITY;
 }
 
-/* Over the edge i as if the two faces lay in one plane; at the end of the surface, back. */
+/* Crosses the edge i as if the two faces were in one plane; turns back at the end of the surface.
+ */
 static bool pass_edge(walker *w, int i)
 {
     const uint32_t *f = w->mesh->faces + 3 * w->face;
@@ -218,7 +219,7 @@ static bool advance_walker(walker *w, double left)
         if (!pass_edge(w, nearest))
             return false;
     }
-    stand_on_face(w); /* round and round a vertex */
+    stand_on_face(w); /* cycles around a vertex */
     return true;
 }
 
@@ -232,14 +233,15 @@ static void turn_walker(walker *w)
     if (!normalise_vector(w->d))
         stand_on_face(w);
     subtract_vectors(w->p, w->corner[0], off);
-    add_scaled(w->p, -dot_product(off, w->n), w->n); /* back onto the face: rounding adds up */
+    add_scaled(w->p, -dot_product(off, w->n),
+               w->n); /* back onto the face: rounding errors add up */
     for (int k = 0; k < 3; k++)
         w->side[k] = 0.95 * w->side[k] + 0.05 * w->n[k];
     if (!normalise_vector(w->side))
         memcpy(w->side, w->n, sizeof w->side);
 }
 
-/* Between -1 and 1, like a sine, with a period of 1. */
+/* Returns a value between -1 and 1, like a sine, with a period of 1. */
 static double wave_height(double phase)
 {
     double x = 2 * phase - 1;

@@ -1,4 +1,4 @@
-/* A walk over a mesh: points of a continuous path along the surface. */
+/* Generates points of a continuous path along the surface of a mesh. */
 #ifndef EBPO_TOOLS_BENCH_WALK_H
 #define EBPO_TOOLS_BENCH_WALK_H
 
@@ -8,11 +8,11 @@
 uint64_t bench_random(uint64_t *state);
 double bench_random_unit(uint64_t *state);
 
-/* Fills out[count][3]. The walk goes straight across edges (as on the unfolded surface), turns
- * slowly, and swings within 1 % of `diagonal` to both sides of the surface; a step is a tenth of
- * `mean_edge`. Where an edge has no neighbour it turns back; where it gets stuck, at faces without
- * area, it goes on elsewhere. The same points everywhere: only + - * / and square roots. False when
- * memory is short. */
+/* Fills out[count][3]. The walk crosses edges straight (as on the unfolded surface), turns slowly,
+ * and swings within 1 % of `diagonal` to both sides of the surface; a step is a tenth of
+ * `mean_edge`. At an edge without neighbour it turns back; at faces without area it continues
+ * elsewhere. The points are the same on all machines: only + - * / and square roots. Returns false
+ * when memory is short. */
 bool bench_walk(const ebpo_mesh *mesh, double mean_edge, double diagonal, uint64_t seed,
                 uint64_t count, double *out);
 

@@ -14,7 +14,7 @@ typedef struct places {
 } places;
 
 static const char *const kinds[] = { "APART", "TOUCHING", "CROSSING", "COPLANAR" };
-static const char *const verbs[] = { "", "touch", "cross", "lie on each other" };
+static const char *const verbs[] = { "", "touch", "cross", "overlap" };
 
 static void place_json(json *j, const ebpo_crossing *c)
 {
@@ -51,11 +51,11 @@ static void print_words(const places *p, const ebpo_crossings_summary *s)
     char pairs[64], faces[64];
     uint64_t all = pairs_of(s);
     if (all == 0) {
-        puts("  no faces that cross, touch or lie on each other otherwise than as neighbours");
+        puts("  no faces that cross, touch or overlap, other than neighbours");
         return;
     }
-    printf("  %s that meet otherwise than as neighbours (%llu crossing, %llu touching, %llu lying "
-           "on each other), of %s:\n",
+    printf("  %s that intersect, other than neighbours (%llu crossing, %llu touching, %llu "
+           "overlapping), of %s:\n",
            words_plural(pairs, sizeof pairs, all, "pair of faces", "pairs of faces"),
            (unsigned long long)s->pairs[EBPO_PAIR_CROSSING],
            (unsigned long long)s->pairs[EBPO_PAIR_TOUCHING],
@@ -71,8 +71,8 @@ static void print_words(const places *p, const ebpo_crossings_summary *s)
         printf("    ... (--json prints all)\n");
 }
 
-/* The outermost object is left open. After a failure what had been found stands there, and no
- * count. */
+/* Leaves the outermost object open. After a failure it holds the pairs found so far, and no count.
+ */
 static void end_json(json *j, const ebpo_crossings_summary *s, bool found)
 {
     json_end(j);

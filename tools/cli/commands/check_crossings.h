@@ -1,4 +1,4 @@
-/* ebpo check --crossings: faces of a mesh that meet otherwise than as neighbours. */
+/* Implements ebpo check --crossings: intersecting faces of a mesh, except neighbours. */
 #ifndef EBPO_TOOLS_CHECK_CROSSINGS_H
 #define EBPO_TOOLS_CHECK_CROSSINGS_H
 
@@ -7,8 +7,8 @@
 #include "cli/json.h"
 #include "cli/progress.h"
 
-/* Prints what is found, in words (the first places) or into `j` (all); `quiet`: nothing. The mesh
- * is empty afterwards. `line` is wiped before anything is printed. */
+/* Prints the pairs found, in words (the first ones) or into `j` (all); `quiet`: nothing. The mesh
+ * is empty afterwards. Wipes `line` before printing. */
 EBPO_MUST_USE ebpo_status check_crossings(ebpo_mesh *mesh, const ebpo_mesh_report *report,
                                           const ebpo_crossings_options *options, json *j,
                                           bool quiet, progress_line *line, ebpo_error *error);

@@ -1,4 +1,4 @@
-/* The page of `ebpo scene report`: meetings in a table with filters and pictures, in HTML. */
+/* Writes the HTML page of `ebpo scene report`: clashes in a table with filters and pictures. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,11 +7,11 @@
 #include "cli/commands/clash_list.h"
 #include "cli/commands/clash_page.h"
 
-/* --- names as text of a page --- */
+/* --- names as HTML text --- */
 
-/* Rows of a page of clashes by the groups of their parts: chosen without scripts. */
+/* Rows of a page of clashes can be filtered by the groups of their parts, without scripts. */
 
-/* Between tags. */
+/* Writes text between tags. */
 static void html_put_text(FILE *f, const char *text)
 {
     for (; *text; text++) {
@@ -31,23 +31,23 @@ const char *clash_kind_word(int32_t kind)
     return words[kind];
 }
 
-/* Of the worst the most. */
-static int rank_of(const ebpo_scene_meeting *m)
+/* Returns the severity, the highest for the worst. */
+static int rank_of(const ebpo_scene_clash *m)
 {
-    static const int ranks[] = { 0, 1, 2, 3, 4, 6, 5, 7 }; /* by ebpo_meeting_kind */
+    static const int ranks[] = { 0, 1, 2, 3, 4, 6, 5, 7 }; /* by ebpo_clash_kind */
     return ranks[m->kind];
 }
 
-/* How deep one is in the other at least; 0: not known. */
-static double clash_depth(const ebpo_scene_meeting *m)
+/* Returns the lower bound of the penetration depth; 0: not known. */
+static double clash_depth(const ebpo_scene_clash *m)
 {
     double a = m->depth[0].hi < INFINITY ? m->depth[0].lo : 0;
     double b = m->depth[1].hi < INFINITY ? m->depth[1].lo : 0;
     return fmax(a, b);
 }
 
-/* Below 0: the first is worse. */
-static int compare_meetings(const ebpo_scene_meeting *m, const ebpo_scene_meeting *n)
+/* Returns less than 0 when the first is worse. */
+static int order_clashes(const ebpo_scene_clash *m, const ebpo_scene_clash *n)
 {
     if (rank_of(m) != rank_of(n))
         return rank_of(n) - rank_of(m);
@@ -60,55 +60,55 @@ static int compare_meetings(const ebpo_scene_meeting *m, const ebpo_scene_meetin
 
 static int compare_pairs(const void *p, const void *q)
 {
-    const ebpo_scene_meeting *m = &((const clash *)p)->worst, *n = &((const clash *)q)->worst;
+    const ebpo_scene_clash *m = &((const clash *)p)->worst, *n = &((const clash *)q)->worst;
     return m->a != n->a ? (m->a < n->a ? -1 : 1) : m->b != n->b ? (m->b < n->b ? -1 : 1) : 0;
 }
 
 static int compare_clashes(const void *p, const void *q)
 {
-    int order = compare_meetings(&((const clash *)p)->worst, &((const clash *)q)->worst);
+    int order = order_clashes(&((const clash *)p)->worst, &((const clash *)q)->worst);
     return order ? order : compare_pairs(p, q);
 }
 
-static bool make_room(clash_list *list, uint64_t more)
+static bool reserve_space(clash_list *list, uint64_t more)
 {
     if (list->count + more <= list->capacity)
         return true;
     uint64_t capacity = 2 * (list->count + more);
-    clash *room = realloc(list->clash, capacity * sizeof *room);
-    if (!room)
+    clash *space = realloc(list->clash, capacity * sizeof *space);
+    if (!space)
         return false;
-    list->clash = room;
+    list->clash = space;
     list->capacity = capacity;
     return true;
 }
 
-static void note_again(clash *c, double time, const ebpo_scene_meeting *m)
+static void note_again(clash *c, double time, const ebpo_scene_clash *m)
 {
     c->frames++;
     c->last = time;
-    if (compare_meetings(m, &c->worst) < 0) {
+    if (order_clashes(m, &c->worst) < 0) {
         c->worst = *m;
         c->time = time;
     }
 }
 
-/* Both are in the order of pairs. */
-ebpo_status clash_add(clash_list *list, double time, const ebpo_scene_meeting *meetings,
+/* Both lists are in the order of pairs. */
+ebpo_status clash_add(clash_list *list, double time, const ebpo_scene_clash *found_clashes,
                       uint64_t count, ebpo_error *error)
 {
     uint64_t known = list->count, at = 0;
-    if (!make_room(list, count)) {
+    if (!reserve_space(list, count)) {
         snprintf(error->message, sizeof error->message, "no memory for %llu clashes",
                  (unsigned long long)(known + count));
         return error->status = EBPO_E_MEMORY;
     }
     for (uint64_t i = 0; i < count; i++) {
-        clash one = { meetings[i], time, time, time, 1, NULL };
+        clash one = { found_clashes[i], time, time, time, 1, NULL };
         while (at < known && compare_pairs(&list->clash[at], &one) < 0)
             at++;
         if (at < known && compare_pairs(&list->clash[at], &one) == 0)
-            note_again(&list->clash[at], time, &meetings[i]);
+            note_again(&list->clash[at], time, &found_clashes[i]);
         else
             list->clash[list->count++] = one;
     }
@@ -131,7 +131,7 @@ void clash_free(clash_list *list)
     *list = (clash_list){ 0 };
 }
 
-/* Of both parts, the nth; EBPO_SCENE_NONE behind the last. */
+/* Returns the nth group of both parts; EBPO_SCENE_NONE after the last. */
 static uint64_t group_of(const clash *c, const ebpo_scene *scene, uint64_t nth)
 {
     uint64_t of_a = 0;
@@ -182,8 +182,8 @@ static void put_choice(FILE *f, const uint64_t *sums, uint64_t groups, const cla
             put_button(f, i, sums[i], ebpo_scene_get_group(scene, i));
 }
 
-/* Buttons, one for each group that has clashes, before a table of class `c` that follows at once:
- * nothing where there is none. False: no memory. */
+/* Writes a button for each group with clashes, before a table of class `c` that follows at once;
+ * nothing when there is none. Returns false when memory is short. */
 static bool clash_put_choice(FILE *f, const clash_list *list, const ebpo_scene *scene)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
@@ -200,7 +200,7 @@ static bool clash_put_choice(FILE *f, const clash_list *list, const ebpo_scene *
     return true;
 }
 
-/* The class that a row has for them: what stands in <tr> behind its name. */
+/* Writes the classes of a row, which follow its name in <tr>. */
 static void clash_put_classes(FILE *f, const clash *c, const ebpo_scene *scene)
 {
     bool any = false;
@@ -224,7 +224,7 @@ static const char style[] =
     "input{margin:0 .3em 0 0}label{margin-right:1em}.q{color:#667;font-size:.9em}@media "
     "print{tr{break-inside:avoid}}";
 
-/* What an ebpo_meeting_kind means on a site. */
+/* Explanations of each ebpo_clash_kind. */
 static const char *const meanings[] = {
     "",
     "closer than the clearance",
@@ -232,14 +232,14 @@ static const char *const meanings[] = {
     "faces lie on each other",
     "surfaces cut each other",
     "one runs into the other",
-    "one is wholly within the other",
+    "one is completely within the other",
     "the same part twice in one place",
 };
 enum { KINDS = sizeof meanings / sizeof *meanings };
 
 /* --- the head --- */
 
-static void put_sums(FILE *f, const clash_list *list)
+static void put_checksums(FILE *f, const clash_list *list)
 {
     uint64_t sums[KINDS] = { 0 };
     for (uint64_t i = 0; i < list->count; i++)
@@ -261,13 +261,15 @@ static void put_head(FILE *f, const clash_list *list, const char *title, double 
     html_put_text(f, title);
     fprintf(f, "</h1>\n<p>%llu pairs of parts", (unsigned long long)list->count);
     if (frames > 1)
-        fprintf(f, ", looked at %llu times from %.9g to %.9g; between these times nothing is said",
+        fprintf(f,
+                ", evaluated at %llu times from %.9g to %.9g; times in between are not "
+                "evaluated",
                 (unsigned long long)frames, from, to);
     else
         fprintf(f, ", at time %.9g", from);
-    fputs(". Lengths and places are in the scene's unit. The decisions are exact. In pictures A is "
-          "brown, B is blue, faces that meet are red; of a part that encloses another only the "
-          "far side is drawn.</p>\n",
+    fputs(". Lengths and positions are in the unit of the scene. The decisions are exact. In "
+          "pictures A is brown, B is blue, intersecting faces are red; of a part that encloses "
+          "another only the far side is drawn.</p>\n",
           f);
 }
 
@@ -303,11 +305,11 @@ static void put_depth(FILE *f, const char *what, const ebpo_certain *depth)
         fprintf(f, "%s %.4g to %.4g deep<br>", what, depth->lo, depth->hi);
 }
 
-static void put_measure(FILE *f, const ebpo_scene_meeting *m)
+static void put_measure(FILE *f, const ebpo_scene_clash *m)
 {
-    if (m->kind == EBPO_MEETING_NEAR)
+    if (m->kind == EBPO_CLASH_NEAR)
         fprintf(f, "%.4g apart, wanted %.4g", m->distance, m->clearance);
-    if (m->kind == EBPO_MEETING_ENCLOSED)
+    if (m->kind == EBPO_CLASH_ENCLOSED)
         fprintf(f, "%s is inside<br>", m->relation == EBPO_A_INSIDE_B ? "A" : "B");
     put_depth(f, "A in B", &m->depth[0]);
     put_depth(f, "B in A", &m->depth[1]);
@@ -319,7 +321,7 @@ static void put_measure(FILE *f, const ebpo_scene_meeting *m)
 static void put_row(FILE *f, const ebpo_scene *scene, const clash *c, uint64_t number,
                     uint64_t frames)
 {
-    const ebpo_scene_meeting *m = &c->worst;
+    const ebpo_scene_clash *m = &c->worst;
     fputs("<tr", f);
     clash_put_classes(f, c, scene);
     fprintf(f, "><td class=n>%llu<td>", (unsigned long long)number);
@@ -339,12 +341,12 @@ static void put_row(FILE *f, const ebpo_scene *scene, const clash *c, uint64_t n
     fputc('\n', f);
 }
 
-/* False: no memory. */
+/* Returns false when memory is short. */
 static bool put_page(FILE *f, const clash_list *list, const ebpo_scene *scene, const char *title,
                      double from, double to, uint64_t frames)
 {
     put_head(f, list, title, from, to, frames);
-    put_sums(f, list);
+    put_checksums(f, list);
     fputs("<h2>The worst first</h2>\n", f);
     bool fine = clash_put_choice(f, list, scene);
     fprintf(f,

@@ -13,7 +13,7 @@
 #include "cli/render/picture.h"
 #include "cli/render/raster.h"
 
-enum { WIDTH = 480, HEIGHT = 360, CAPTION = 28, UP = 2, THREADS_MOST = 64 };
+enum { WIDTH = 480, HEIGHT = 360, CAPTION = 28, UP = 2, THREADS_MAX = 64 };
 static const double azimuth = 35, elevation = 28;
 
 const char *clash_pictures_missing(void) { return NULL; }
@@ -24,8 +24,8 @@ static ebpo_status no_memory(ebpo_error *error)
     return error->status = EBPO_E_MEMORY;
 }
 
-/* From where a box just fits. */
-static void look_at(camera *view, const double min[3], const double max[3], int height)
+/* Places the camera where a box just fits. */
+static void inspect_scene(camera *view, const double min[3], const double max[3], int height)
 {
     double corner[24];
     uint32_t face[3] = { 0, 1, 2 };
@@ -39,7 +39,7 @@ static ebpo_status draw_model(picture *out, int x, int y, int height, const came
                               const painted_mesh *p, unsigned threads, ebpo_error *error)
 {
     raster_style style = { .colour = { 0.66, 0.54, 0.40 }, .paint = p->paint };
-    unsigned count = threads && threads < THREADS_MOST ? threads : 4;
+    unsigned count = threads && threads < THREADS_MAX ? threads : 4;
     return p->mesh.face_count
                ? raster_draw(out, x, y, WIDTH, height, view, &p->mesh, &style, count, error)
                : EBPO_OK;
@@ -60,12 +60,12 @@ static double longest_side(const double min[3], const double max[3])
     return fmax(max[0] - min[0], fmax(max[1] - min[1], max[2] - min[2]));
 }
 
-/* What to show: the smaller of the two and where they meet; of a contact that is small on it, the
- * contact and what is around it. */
+/* Chooses the region: the smaller instance and the contact; when the contact is small on it, the
+ * contact and its surroundings. */
 static ebpo_status find_region(const ebpo_scene *scene, const clash *c, double middle[3],
                                double *reach, ebpo_error *error)
 {
-    const ebpo_scene_meeting *m = &c->worst;
+    const ebpo_scene_clash *m = &c->worst;
     double min[2][3], max[2][3];
     bool placed = isfinite(m->place[0]);
     for (int i = 0; i < 2; i++) {
@@ -92,13 +92,13 @@ static ebpo_status find_region(const ebpo_scene *scene, const clash *c, double m
 static ebpo_status paint_two(ebpo_scene *scene, const clash *c, unsigned threads, painted_mesh *out,
                              ebpo_error *error)
 {
-    const ebpo_scene_meeting *m = &c->worst;
+    const ebpo_scene_clash *m = &c->worst;
     bool meet = m->touching + m->coplanar + m->crossing > 0;
     uint8_t *red[2] = { NULL, NULL };
     ebpo_status status =
         meet ? painted_find_red(scene, m->a, m->b, c->time, threads, red, error) : EBPO_OK;
     for (int i = 0; i < 2 && status == EBPO_OK; i++) {
-        bool outer = m->kind == EBPO_MEETING_ENCLOSED &&
+        bool outer = m->kind == EBPO_CLASH_ENCLOSED &&
                      m->relation == (i ? EBPO_A_INSIDE_B : EBPO_B_INSIDE_A);
         status =
             painted_add(out, scene, i ? m->b : m->a, c->time, red[i],
@@ -138,12 +138,12 @@ ebpo_status clash_draw(ebpo_scene *scene, clash *c, unsigned threads, ebpo_error
     if (status == EBPO_OK)
         status = paint_two(scene, c, threads, &p, error);
     if (status == EBPO_OK) {
-        painted_crop(&p, middle, 1.5 * reach); /* nothing stands in the way, or behind the eye */
+        painted_crop(&p, middle, 1.5 * reach); /* nothing is in the way, or behind the eye */
         for (int k = 0; k < 3; k++) {
             min[k] = middle[k] - reach;
             max[k] = middle[k] + reach;
         }
-        look_at(&view, min, max, HEIGHT);
+        inspect_scene(&view, min, max, HEIGHT);
         status = draw_clash(&p, &view, c, threads, error);
     }
     painted_free(&p);
@@ -157,12 +157,13 @@ struct clash_strip {
     unsigned threads;
     int tiles, done, columns;
     uint64_t instances;
-    bool boxes; /* the scene has so many faces that only instances that meet are drawn with them */
+    bool boxes; /* the scene has so many faces that only intersecting instances are drawn with them
+                 */
     double min[3], max[3];
     picture picture;
 };
 
-enum { FACES_MOST = 2000000 };
+enum { FACES_MAX = 2000000 };
 
 static uint64_t faces_of(const ebpo_scene *scene, uint64_t models)
 {
@@ -190,7 +191,7 @@ clash_strip *clash_strip_new(ebpo_scene *scene, double from, double to, int tile
     for (s->columns = 1; s->columns * s->columns < tiles;)
         s->columns++;
     s->instances = counts.instances;
-    s->boxes = faces_of(scene, counts.models) > FACES_MOST;
+    s->boxes = faces_of(scene, counts.models) > FACES_MAX;
     int rows = (tiles + s->columns - 1) / s->columns;
     if (ebpo_scene_box(scene, from, to, s->min, s->max, &error) != EBPO_OK ||
         !picture_make(&s->picture, WIDTH * s->columns, HEIGHT * rows, ground)) {
@@ -207,13 +208,13 @@ void clash_strip_free(clash_strip *s)
     free(s);
 }
 
-/* Bytes of red faces of each instance that meets, else NULL. */
-static ebpo_status find_red(clash_strip *s, double time, const ebpo_scene_meeting *meetings,
+/* Finds bytes of red faces of each intersecting instance, else NULL. */
+static ebpo_status find_red(clash_strip *s, double time, const ebpo_scene_clash *found_clashes,
                             uint64_t count, uint8_t **red, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        const ebpo_scene_meeting *m = &meetings[i];
+        const ebpo_scene_clash *m = &found_clashes[i];
         uint8_t *two[2] = { red[m->a], red[m->b] };
         if (m->touching + m->coplanar + m->crossing == 0)
             continue;
@@ -246,7 +247,7 @@ static ebpo_status draw_tile(clash_strip *s, const painted_mesh *p, double time,
     camera view;
     int caption = picture_has_captions() ? CAPTION : 0;
     int x = s->done % s->columns * WIDTH, y = s->done / s->columns * HEIGHT;
-    look_at(&view, s->min, s->max, HEIGHT - caption);
+    inspect_scene(&view, s->min, s->max, HEIGHT - caption);
     s->done++;
     ebpo_status status =
         draw_model(&s->picture, x, y, HEIGHT - caption, &view, p, s->threads, error);
@@ -257,12 +258,13 @@ static ebpo_status draw_tile(clash_strip *s, const painted_mesh *p, double time,
     return status;
 }
 
-ebpo_status clash_strip_add(clash_strip *s, double time, const ebpo_scene_meeting *meetings,
+ebpo_status clash_strip_add(clash_strip *s, double time, const ebpo_scene_clash *found_clashes,
                             uint64_t count, ebpo_error *error)
 {
     painted_mesh p = { 0 };
     uint8_t **red = calloc(s->instances + 1, sizeof *red);
-    ebpo_status status = red ? find_red(s, time, meetings, count, red, error) : no_memory(error);
+    ebpo_status status =
+        red ? find_red(s, time, found_clashes, count, red, error) : no_memory(error);
     if (status == EBPO_OK)
         status = paint_all(s, time, red, &p, error);
     if (status == EBPO_OK && s->done < s->tiles)
@@ -295,10 +297,10 @@ clash_strip *clash_strip_new(ebpo_scene *scene, double from, double to, int tile
     return NULL;
 }
 
-ebpo_status clash_strip_add(clash_strip *s, double time, const ebpo_scene_meeting *meetings,
+ebpo_status clash_strip_add(clash_strip *s, double time, const ebpo_scene_clash *found_clashes,
                             uint64_t count, ebpo_error *error)
 {
-    (void)s, (void)time, (void)meetings, (void)count, (void)error;
+    (void)s, (void)time, (void)found_clashes, (void)count, (void)error;
     return EBPO_OK;
 }
 

@@ -1,4 +1,4 @@
-/* ebpo bench: how long questions take, alone and together, warm and from a cold start. */
+/* ebpo bench: measures query times, single and in batches, warm and after a cold start. */
 #include <errno.h>
 #include <float.h>
 #include <inttypes.h>
@@ -10,8 +10,8 @@
 
 #include "cli/bench/bench_points.h"
 #include "cli/bench/bench_run.h"
-#include "cli/answers.h"
-#include "cli/model_sums.h"
+#include "cli/results.h"
+#include "cli/model_stats.h"
 #include "cli/command.h"
 #include "cli/query_args.h"
 #include "cli/words.h"
@@ -20,7 +20,7 @@
 typedef struct values {
     query_values q; /* first: its rows of options are shared */
     int query;
-    const char *points, *mode, *save_points, *save_answers;
+    const char *points, *mode, *save_points, *save_results;
     int64_t count, seed, repeat;
     double rate;
 } values;
@@ -29,24 +29,23 @@ static const char *const query_words[] = {
     "inside", "distance", "ray", "ray-any", "ray-all", NULL
 };
 enum { REPEAT_MAX = 99 };
-/* What became of a question for a distance or a ray. Interval: level or deadline did not suffice.
- */
+/* Outcomes of a distance or ray query. Interval: level or deadline did not suffice. */
 enum { NOTHING, FOUND, INTERVAL };
 
 #include "cli/options/bench.inc"
 
-/* Everything measured. */
+/* All measurements. */
 typedef struct results {
     uint64_t clock_ns;
     double cold_pages, cold_open_seconds, cold_seconds, open_seconds;
     uint64_t cold_bytes, cold_reads, peak;
-    bench_figures figures;
-    ebpo_model_stats model, model_end; /* after the first pass, and after all */
-    traffic traffic;                   /* of the warm session */
+    bench_metrics metrics;
+    ebpo_model_stats model, model_end; /* after the first pass, and at the end */
+    traffic traffic;                   /* traffic of the warm session */
     uint64_t answered[4];              /* inside: by ebpo_where; else NOTHING, FOUND or INTERVAL */
 } results;
 
-/* The words of --mode belong to the question. */
+/* The words of --mode depend on the query. */
 static bool set_mode(values *v)
 {
     const char *const *words = v->query == BENCH_INSIDE ? inside_modes : distance_modes;
@@ -65,7 +64,7 @@ static bool set_mode(values *v)
 
 /* --- measuring --- */
 
-/* From a file that the system has forgotten to the first answer. */
+/* Measures the time from opening a file outside the page cache to the first result. */
 static int cold_start(const bench_job *job, const char *path, const ebpo_model_options *holding,
                       const remote_values *remote, results *r)
 {
@@ -76,7 +75,7 @@ static int cold_start(const bench_job *job, const char *path, const ebpo_model_o
     uint64_t begin = tool_clock();
     int code = query_open(&s, "bench", path, holding, job->inside.level, remote);
     r->cold_open_seconds = (double)(tool_clock() - begin) * 1e-9;
-    if (code == EXIT_FINE && bench_ask(job, s.context, 0, &error) != EBPO_OK)
+    if (code == EXIT_FINE && bench_run_query(job, s.context, 0, &error) != EBPO_OK)
         code = command_failed("bench", &error);
     r->cold_seconds = (double)(tool_clock() - begin) * 1e-9;
     if (code == EXIT_FINE) {
@@ -88,7 +87,7 @@ static int cold_start(const bench_job *job, const char *path, const ebpo_model_o
     return code;
 }
 
-static bench_figures median_by_mean(const bench_figures *f, int count)
+static bench_metrics median_by_mean(const bench_metrics *f, int count)
 {
     for (int i = 0; i < count; i++) {
         int below = 0;
@@ -100,15 +99,15 @@ static bench_figures median_by_mean(const bench_figures *f, int count)
     return f[0];
 }
 
-static double median_batch(const bench_figures *f, int count)
+static double median_batch(const bench_metrics *f, int count)
 {
-    bench_figures by_batch[REPEAT_MAX];
+    bench_metrics by_batch[REPEAT_MAX];
     for (int i = 0; i < count; i++)
-        by_batch[i] = (bench_figures){ .mean = f[i].batch };
+        by_batch[i] = (bench_metrics){ .mean = f[i].batch };
     return median_by_mean(by_batch, count).mean;
 }
 
-/* Options without effect are refused, or figures would be taken for something that they are not. */
+/* Refuses options without effect, which would make the results misleading. */
 static bool options_fit(const values *v)
 {
     char with[40];
@@ -117,19 +116,19 @@ static bool options_fit(const values *v)
         idle |= QUERY_LEVEL | QUERY_DEADLINE | QUERY_PREFETCH;
     snprintf(with, sizeof with, "--query %s", query_words[v->query]);
     if (isfinite(v->q.tmax) && v->query < BENCH_RAY) {
-        command_usage("bench", "--tmax has no effect with %s; leave out one of them", with);
+        command_usage("bench", "--tmax has no effect with %s; omit one of them", with);
         return false;
     }
     if (v->q.raw && bench_points_generated(v->points)) {
         fprintf(stderr,
-                "ebpo bench: --raw has no effect with --points %s; leave out one of them, or try "
+                "ebpo bench: --raw has no effect with --points %s; omit one of them, or try "
                 "'ebpo bench --help'\n",
                 v->points);
         return false;
     }
     if (v->seed >= 0 && !bench_points_generated(v->points)) {
         fprintf(stderr,
-                "ebpo bench: --seed has no effect with --points %s; leave out one of them, or try "
+                "ebpo bench: --seed has no effect with --points %s; omit one of them, or try "
                 "'ebpo bench --help'\n",
                 v->points);
         return false;
@@ -139,13 +138,13 @@ static bool options_fit(const values *v)
     return query_accepts("bench", &v->q, idle, with) && query_inside_fits("bench", &v->q);
 }
 
-/* Bit by bit: NAN stands for what was not found. */
+/* Compares bits: NAN means not found. */
 static bool same_reals(const double *a, const double *b, int count)
 {
     return memcmp(a, b, (size_t)count * sizeof *a) == 0;
 }
 
-static bool same_answer(bench_query query, const void *one, const void *other, uint64_t i)
+static bool same_result(bench_query query, const void *one, const void *other, uint64_t i)
 {
     if (query == BENCH_INSIDE) {
         const ebpo_inside_result *a = (const ebpo_inside_result *)one + i,
@@ -164,16 +163,16 @@ static bool same_answer(bench_query query, const void *one, const void *other, u
     return same_reals(&a->t, &b->t, 1) && a->face == b->face && a->side == b->side;
 }
 
-/* The batch must say what single questions said, unless time decides. */
-static int compare_answers(const bench_job *job, const void *batch)
+/* The batch must return the results of single queries, unless they depend on time. */
+static int compare_results(const bench_job *job, const void *batch)
 {
     if (job->inside.deadline_ns)
         return EXIT_FINE;
     for (uint64_t i = 0; i < job->count; i++)
-        if (!same_answer(job->query, job->answers, batch, i)) {
+        if (!same_result(job->query, job->result_values, batch, i)) {
             fprintf(stderr,
-                    "ebpo bench: question %" PRIu64
-                    " has one answer alone and another in a batch; please report this\n",
+                    "ebpo bench: query %" PRIu64
+                    " has different results alone and in a batch; please report this\n",
                     i);
             return EXIT_FAILED;
         }
@@ -183,7 +182,7 @@ static int compare_answers(const bench_job *job, const void *batch)
 static int measure_rounds(const bench_job *job, query_session *s, int repeat, void *batch,
                           results *r)
 {
-    bench_figures f[REPEAT_MAX] = { { 0 } };
+    bench_metrics f[REPEAT_MAX] = { { 0 } };
     ebpo_error error = EBPO_ERROR_INIT;
     for (int i = 0; i < repeat; i++) {
         ebpo_status status = bench_singly(job, s->context, r->clock_ns, &f[i], &error);
@@ -196,16 +195,16 @@ static int measure_rounds(const bench_job *job, query_session *s, int repeat, vo
     }
     ebpo_model_get_stats(s->model, &r->model_end);
     r->peak = bench_peak_memory();
-    r->figures = median_by_mean(f, repeat);
-    r->figures.batch = median_batch(f, repeat);
-    return compare_answers(job, batch);
+    r->metrics = median_by_mean(f, repeat);
+    r->metrics.batch = median_batch(f, repeat);
+    return compare_results(job, batch);
 }
 
-static void count_answers(const bench_job *job, results *r)
+static void count_results(const bench_job *job, results *r)
 {
-    const ebpo_inside_result *inside = job->answers;
-    const ebpo_distance_result *distance = job->answers;
-    const ebpo_ray_hit *hit = job->answers;
+    const ebpo_inside_result *inside = job->result_values;
+    const ebpo_distance_result *distance = job->result_values;
+    const ebpo_ray_hit *hit = job->result_values;
     for (uint64_t i = 0; i < job->count; i++)
         if (job->query == BENCH_INSIDE)
             r->answered[inside[i].where & 3]++;
@@ -217,49 +216,49 @@ static void count_answers(const bench_job *job, results *r)
             r->answered[hit[i].face != EBPO_NO_FACE ? FOUND : NOTHING]++;
 }
 
-static int save_answers(const bench_job *job, const char *path)
+static int save_results(const bench_job *job, const char *path)
 {
     char *data = NULL;
     size_t size = 0;
     FILE *f = open_memstream(&data, &size);
     for (uint64_t i = 0; f && i < job->count; i++) {
         if (job->query == BENCH_INSIDE) {
-            putc(((const ebpo_inside_result *)job->answers)[i].where, f);
+            putc(((const ebpo_inside_result *)job->result_values)[i].where, f);
             continue;
         }
-        const ebpo_distance_result *d = (const ebpo_distance_result *)job->answers + i;
-        const ebpo_ray_hit *h = (const ebpo_ray_hit *)job->answers + i;
+        const ebpo_distance_result *d = (const ebpo_distance_result *)job->result_values + i;
+        const ebpo_ray_hit *h = (const ebpo_ray_hit *)job->result_values + i;
         raw_double(f, job->query == BENCH_DISTANCE ? d->distance : h->t);
         raw_u64(f, job->query == BENCH_DISTANCE ? d->face : h->face); /* EBPO_NO_FACE is -1 */
     }
     return bench_save(f, &data, &size, path);
 }
 
-/* Before anything is measured. */
+/* Checks outputs before measuring. */
 static int outputs_are_free(const values *v)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    const char *const paths[] = { v->save_points, v->save_answers };
+    const char *const paths[] = { v->save_points, v->save_results };
     for (int i = 0; i < 2; i++)
         if (paths[i] && ebpo_check_output(paths[i], &error) != EBPO_OK)
             return command_failed("bench", &error);
     return EXIT_FINE;
 }
 
-/* --- telling --- */
+/* --- output --- */
 
 static const char *const inside_names[] = { "out", "in", "on", "maybe" }, *const other_names[] = {
     "not_found", "found", "interval"
 };
 
-static int answer_kinds(const values *v)
+static int result_kinds(const values *v)
 {
     return v->query == BENCH_INSIDE ? 4 : v->query == BENCH_DISTANCE ? 3 : 2;
 }
 
-static void print_answers(const values *v, const results *r)
+static void print_results_of(const values *v, const results *r)
 {
-    int count = answer_kinds(v);
+    int count = result_kinds(v);
     printf("\n%-12s", "answers");
     for (int i = 0; i < count; i++)
         printf(" %11s", v->query == BENCH_INSIDE ? inside_names[i] : other_names[i]);
@@ -272,19 +271,19 @@ static void print_answers(const values *v, const results *r)
 static void print_opening(const results *r)
 {
     char bytes[40];
-    printf("\n%-12s %11s %11s %11s %11s\n", "opening", "seconds", "to answer", "read", "reads");
+    printf("\n%-12s %11s %11s %11s %11s\n", "opening", "seconds", "to result", "read", "reads");
     printf("%-12s %11.6f %11.6f %11s %11" PRIu64 "\n", "cold", r->cold_open_seconds,
            r->cold_seconds, words_bytes(bytes, sizeof bytes, r->cold_bytes), r->cold_reads);
     printf("%-12s %11.6f %11s %11s %11" PRIu64 "\n", "again", r->open_seconds, "",
            words_bytes(bytes, sizeof bytes, r->model.bytes_read), r->model.reads);
     if (r->cold_pages >= 0)
         printf("cold: the system still held %.0f %% of the file; ", 100 * r->cold_pages);
-    puts("to answer: seconds to the first one");
+    puts("to result: seconds to the first one");
 }
 
 static void print_results(const values *v, const char *path, uint64_t count, const results *r)
 {
-    const bench_figures *f = &r->figures;
+    const bench_metrics *f = &r->metrics;
     char bytes[40];
     printf("%s: %s, %s, %" PRIu64 " questions\n\n", path, query_words[v->query], v->points, count);
     printf("%-12s %11s %11s %11s %11s %11s\n", "ns/question", "mean", "p50", "p99", "p99.9", "max");
@@ -295,37 +294,37 @@ static void print_results(const values *v, const char *path, uint64_t count, con
            "one thread\n",
            r->clock_ns);
     print_opening(r);
-    print_answers(v, r);
+    print_results_of(v, r);
     printf("\n%-18s %15s %15s\n", "model", "after single", "at the end");
     stats_table(stdout, &r->model, &r->model_end);
     printf("%-18s %15s %15s\n", "process_peak", "",
            r->peak ? words_bytes(bytes, sizeof bytes, r->peak) : "unknown");
-    remote_tell(&r->traffic, &v->q.remote, false);
+    remote_report(&r->traffic, &v->q.remote, false);
 }
 
-static void json_answers(json *j, const values *v, const results *r)
+static void json_results(json *j, const values *v, const results *r)
 {
-    int count = answer_kinds(v);
+    int count = result_kinds(v);
     json_object(j, "answers");
     for (int i = 0; i < count; i++)
         json_uint(j, v->query == BENCH_INSIDE ? inside_names[i] : other_names[i], r->answered[i]);
     json_end(j);
 }
 
-static void json_figures(json *j, const results *r)
+static void json_metrics(json *j, const results *r)
 {
     json_object(j, "ns");
-    json_real(j, "mean", r->figures.mean);
-    json_uint(j, "p50", r->figures.p50);
-    json_uint(j, "p99", r->figures.p99);
-    json_uint(j, "p999", r->figures.p999);
-    json_uint(j, "max", r->figures.max);
+    json_real(j, "mean", r->metrics.mean);
+    json_uint(j, "p50", r->metrics.p50);
+    json_uint(j, "p99", r->metrics.p99);
+    json_uint(j, "p999", r->metrics.p999);
+    json_uint(j, "max", r->metrics.max);
     json_end(j);
-    json_real(j, "batch_ns", r->figures.batch);
+    json_real(j, "batch_ns", r->metrics.batch);
     json_uint(j, "clock_ns", r->clock_ns);
     json_real(j, "open_seconds", r->open_seconds);
     json_real(j, "cold_open_seconds", r->cold_open_seconds);
-    json_real(j, "cold_first_answer_seconds", r->cold_seconds);
+    json_real(j, "cold_first_result_seconds", r->cold_seconds);
     json_uint(j, "cold_bytes_read", r->cold_bytes);
     json_uint(j, "cold_reads", r->cold_reads);
     if (r->cold_pages >= 0)
@@ -362,8 +361,8 @@ static void print_json(const values *v, const char *path, uint64_t count, const 
     json_int(&j, "repeat", v->repeat);
     if (v->rate > 0)
         json_real(&j, "rate", v->rate);
-    json_figures(&j, r);
-    json_answers(&j, v, r);
+    json_metrics(&j, r);
+    json_results(&j, v, r);
     json_object(&j, "model");
     stats_json(&j, &r->model);
     json_end(&j);
@@ -396,11 +395,11 @@ static int bench_model(bench_job *job, const values *v, const bench_points *p, c
     query_close(&s);
     if (code == EXIT_FINE && v->save_points)
         code = bench_points_save(p, v->save_points);
-    if (code == EXIT_FINE && v->save_answers)
-        code = save_answers(job, v->save_answers);
+    if (code == EXIT_FINE && v->save_results)
+        code = save_results(job, v->save_results);
     if (code != EXIT_FINE)
         return code;
-    count_answers(job, &r);
+    count_results(job, &r);
     (v->q.json ? print_json : print_results)(v, remote_shown(path), job->count, &r);
     return EXIT_FINE;
 }
@@ -415,7 +414,7 @@ static int prepare_points(const values *v, const char *path, bench_points *p)
                              (uint64_t)v->seed, v->q.tmax);
 }
 
-static const values usual = {
+static const values standard = {
     .q = QUERY_VALUES_INIT, .points = "uniform", .seed = -1, .repeat = 1
 };
 
@@ -423,7 +422,7 @@ static int run_bench(void *given, const char **operand)
 {
     values *v = given;
     ebpo_model_options holding;
-    bench_job job = { .answers = NULL };
+    bench_job job = { .result_values = NULL };
     bench_points p;
     if (!set_mode(v) || !options_fit(v) ||
         !query_options_from("bench", &v->q, &holding, &job.inside, &job.distance))
@@ -436,20 +435,20 @@ static int run_bench(void *given, const char **operand)
     job.width = points_width(p.kind);
     job.count = p.count;
     job.rate = v->rate;
-    size_t bytes = bench_answer_bytes(job.query);
+    size_t bytes = bench_result_bytes(job.query);
     void *batch = calloc(p.count + 1, bytes);
-    job.answers = calloc(p.count + 1, bytes);
+    job.result_values = calloc(p.count + 1, bytes);
     job.ns = calloc(p.count + 1, sizeof *job.ns);
-    if (code == EXIT_FINE && (!batch || !job.answers || !job.ns)) {
+    if (code == EXIT_FINE && (!batch || !job.result_values || !job.ns)) {
         code = command_no_memory("bench");
     }
     if (code == EXIT_FINE)
         code = bench_model(&job, v, &p, operand[0], &holding, batch);
     free(batch);
-    free(job.answers);
+    free(job.result_values);
     free(job.ns);
     bench_points_free(&p);
     return code;
 }
 
-const command command_bench = { &spec, sizeof usual, &usual, run_bench };
+const command command_bench = { &spec, sizeof standard, &standard, run_bench };

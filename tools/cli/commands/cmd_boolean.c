@@ -1,4 +1,4 @@
-/* ebpo boolean: questions about unions, intersections and differences of models at poses. */
+/* ebpo boolean: queries unions, intersections and differences of models at poses. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -31,7 +31,7 @@ typedef struct values {
 
 #include "cli/options/boolean.inc"
 
-/* --- answers --- */
+/* --- results --- */
 
 static const char *where_of(const ebpo_boolean_result *r)
 {
@@ -65,40 +65,41 @@ static void print_distance(const values *v, const ebpo_boundary_distance *d)
 
 /* --- volumes --- */
 
-/* What is asked about volumes and cells, and what comes out. */
-typedef struct cell_answer {
+/* Request and results for volumes and cells. */
+typedef struct cell_result {
     const values *v;
-    const char **models; /* as they were given */
+    const char **models; /* in the order of the command line */
     ebpo_exact_volume exact;
     ebpo_boolean_volume cells;
-    /* the volume is exact, but no cells can be made, and why */
+    /* the volume is exact, but no cells can be made, with the reason */
     bool no_cells;
     char why_no_cells[1024];
-    bool volume; /* is asked for */
+    bool volume; /* requested */
     uint64_t faces_written;
-} cell_answer;
+} cell_result;
 
-static bool is_exact(const cell_answer *a) { return a->exact.volume.figure == EBPO_FIGURE_EXACT; }
+static bool is_exact(const cell_result *a) { return a->exact.volume.metric == EBPO_VALUE_EXACT; }
 
-static int32_t figure_of(const cell_answer *a)
+static int32_t metric_of(const cell_result *a)
 {
-    return is_exact(a) ? (int32_t)EBPO_FIGURE_EXACT : a->cells.figure;
+    return is_exact(a) ? (int32_t)EBPO_VALUE_EXACT : a->cells.metric;
 }
 
-/* Why the volume is not exact. */
-static void say_why(const cell_answer *a, char *out, size_t capacity)
+/* Writes why the volume is not exact. */
+static void report_why(const cell_result *a, char *out, size_t capacity)
 {
     const ebpo_exact_volume *e = &a->exact;
     uint32_t i = e->operand[0], k = e->operand[1];
     const char *first = remote_shown(a->models[i]), *second = remote_shown(a->models[k]);
     switch ((ebpo_volume_doubt)e->doubt) {
-    case EBPO_VOLUME_OPERANDS_MEET:
-        snprintf(out, capacity, "face %" PRIu64 " of %c (%s) meets face %" PRIu64 " of %c (%s)",
-                 e->face[0], 'A' + (int)i, first, e->face[1], 'A' + (int)k, second);
-        break;
-    case EBPO_VOLUME_FACES_MEET:
+    case EBPO_VOLUME_OPERANDS_INTERSECT:
         snprintf(out, capacity,
-                 "faces %" PRIu64 " and %" PRIu64 " of %c (%s) meet otherwise than as neighbours",
+                 "face %" PRIu64 " of %c (%s) intersects face %" PRIu64 " of %c (%s)", e->face[0],
+                 'A' + (int)i, first, e->face[1], 'A' + (int)k, second);
+        break;
+    case EBPO_VOLUME_FACES_INTERSECT:
+        snprintf(out, capacity,
+                 "faces %" PRIu64 " and %" PRIu64 " of %c (%s) intersect, other than neighbours",
                  e->face[0], e->face[1], 'A' + (int)i, first);
         break;
     case EBPO_VOLUME_IN_PARTS:
@@ -111,13 +112,13 @@ static void say_why(const cell_answer *a, char *out, size_t capacity)
     }
 }
 
-static const char *const figure_words[] = { "exact", "interval", "bound" };
+static const char *const metric_words[] = { "exact", "interval", "bound" };
 
-static void print_volume(const cell_answer *a)
+static void print_volume(const cell_result *a)
 {
     const ebpo_boolean_volume *b = &a->cells;
     char why[1024], exact[32], lo[32], hi[32], cell[TABLE_CELL];
-    say_why(a, why, sizeof why);
+    report_why(a, why, sizeof why);
     if (is_exact(a))
         printf("volume    %s, exact but for one rounding\n",
                table_in_range(a->exact.scaled, a->exact.exponent)
@@ -131,7 +132,7 @@ static void print_volume(const cell_answer *a)
         printf("by cells  %s to %s\n", words_real(b->lo, lo), words_real(b->hi, hi));
     else
         printf("volume    %s to %s, %s: %s\n", words_real(b->lo, lo), words_real(b->hi, hi),
-               b->figure == EBPO_FIGURE_BOUND ? "a bound" : "an interval", why);
+               b->metric == EBPO_VALUE_BOUND ? "a bound" : "an interval", why);
     printf("cells     %" PRIu64 " in, %" PRIu64 " mixed of level %" PRId64
            ", edge %g\ndecided   %" PRIu64 " by boxes, %" PRIu64 " by nodes, %" PRIu64
            " by faces\n",
@@ -139,17 +140,17 @@ static void print_volume(const cell_answer *a)
            b->by_nodes, b->by_faces);
 }
 
-static void volume_to_json(json *j, const cell_answer *a)
+static void volume_to_json(json *j, const cell_result *a)
 {
     const ebpo_boolean_volume *b = &a->cells;
     char why[1024];
-    say_why(a, why, sizeof why);
+    report_why(a, why, sizeof why);
     for (int i = 0; i < 2; i++)
         if (is_exact(a))
             table_json(j, i ? "volume_hi" : "volume_lo", a->exact.scaled, a->exact.exponent);
         else
             json_real(j, i ? "volume_hi" : "volume_lo", i ? b->hi : b->lo);
-    json_text(j, "volume_figure", figure_words[figure_of(a)]);
+    json_text(j, "volume_kind", metric_words[metric_of(a)]);
     if (is_exact(a))
         json_null(j, "not_exact");
     else
@@ -170,7 +171,7 @@ static void volume_to_json(json *j, const cell_answer *a)
     json_uint(j, "by_faces", b->by_faces);
 }
 
-static void print_written(const cell_answer *a)
+static void print_written(const cell_result *a)
 {
     char faces[40], in[40], mixed[40];
     words_plural(faces, sizeof faces, a->faces_written, "face", "faces");
@@ -182,7 +183,7 @@ static void print_written(const cell_answer *a)
         printf("%s: %s around %s and %s that hold the result\n", a->v->out, faces, in, mixed);
 }
 
-static void print_cells(const cell_answer *a)
+static void print_cells(const cell_result *a)
 {
     json j;
     if (!a->v->query.json) {
@@ -206,7 +207,7 @@ static void print_cells(const cell_answer *a)
 
 /* --- points --- */
 
-static ebpo_status answer_points(const values *v, ebpo_boolean *b, const double *rows,
+static ebpo_status result_points(const values *v, ebpo_boolean *b, const double *rows,
                                  uint64_t count, ebpo_boolean_result *results, ebpo_error *error)
 {
     ebpo_boundary_options how = EBPO_BOUNDARY_OPTIONS_INIT;
@@ -225,7 +226,7 @@ static ebpo_status answer_points(const values *v, ebpo_boolean *b, const double 
     return status;
 }
 
-static int ask_points(const values *v, ebpo_boolean *b)
+static int query_points(const values *v, ebpo_boolean *b)
 {
     points in;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -237,7 +238,7 @@ static int ask_points(const values *v, ebpo_boolean *b)
     uint64_t count = 0;
     in.header = v->query.header;
     while (code == EXIT_FINE && (count = points_next(&in, rows)) > 0) {
-        if (answer_points(v, b, rows, count, results, &error) != EBPO_OK)
+        if (result_points(v, b, rows, count, results, &error) != EBPO_OK)
             code = command_failed("boolean", &error);
         if (!command_flush("boolean"))
             code = EXIT_FAILED;
@@ -273,7 +274,7 @@ static ebpo_status convert_cells(ebpo_mesh *mesh, const values *v, ebpo_progress
     return status;
 }
 
-static ebpo_status write_cells(const ebpo_boolean_cells *cells, cell_answer *a,
+static ebpo_status write_cells(const ebpo_boolean_cells *cells, cell_result *a,
                                ebpo_progress progress, ebpo_error *error)
 {
     ebpo_mesh mesh;
@@ -297,7 +298,7 @@ static ebpo_status write_cells(const ebpo_boolean_cells *cells, cell_answer *a,
     return status;
 }
 
-static ebpo_status answer_cells(cell_answer *a, ebpo_boolean *b, ebpo_progress progress,
+static ebpo_status result_cells(cell_result *a, ebpo_boolean *b, ebpo_progress progress,
                                 ebpo_error *error)
 {
     ebpo_boolean_cells *cells = NULL;
@@ -328,13 +329,13 @@ static int make_cells(const values *v, const char **models, ebpo_boolean *b)
 {
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
-    cell_answer a = { .v = v,
+    cell_result a = { .v = v,
                       .models = models,
                       .exact = EBPO_EXACT_VOLUME_INIT,
                       .cells = EBPO_BOOLEAN_VOLUME_INIT,
                       .volume = v->volume || !v->out };
     ebpo_progress progress = progress_start(&line, "boolean", v->query.json);
-    ebpo_status status = answer_cells(&a, b, progress, &error);
+    ebpo_status status = result_cells(&a, b, progress, &error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return command_failed("boolean", &error);
@@ -346,16 +347,16 @@ static int make_cells(const values *v, const char **models, ebpo_boolean *b)
 
 static int check_values(const values *v, const char **models, uint32_t count)
 {
-    bool points_asked = v->inside || v->distance;
+    bool points_queried = v->inside || v->distance;
     if (v->inside && v->distance)
         return command_usage("boolean", "--inside and --distance cannot be used together");
-    if (points_asked && (v->volume || v->out || v->inner))
+    if (points_queried && (v->volume || v->out || v->inner))
         return command_usage("boolean",
-                             "%s asks about points; --volume, --output and --inner are "
-                             "about cells; give them in a call of their own",
+                             "%s queries points; --volume, --output and --inner need cells; run "
+                             "them separately",
                              v->inside ? "--inside" : "--distance");
     if (v->inner && !v->out)
-        return command_usage("boolean", "--inner belongs to --output");
+        return command_usage("boolean", "--inner needs --output");
     if (v->out && !words_end_with(v->out, ".ply") && !words_end_with(v->out, ".ebpo.h5"))
         return command_usage("boolean",
                              "--output '%s': expected a name that ends with .ply or "
@@ -367,7 +368,7 @@ static int check_values(const values *v, const char **models, uint32_t count)
     return EXIT_FINE;
 }
 
-static int answer_expression(const values *v, const boolean_nodes *nodes,
+static int result_expression(const values *v, const boolean_nodes *nodes,
                              const query_session *sessions, const ebpo_pose *poses,
                              const char **models, uint32_t count)
 {
@@ -380,12 +381,12 @@ static int answer_expression(const values *v, const boolean_nodes *nodes,
         operands[i] = (ebpo_boolean_operand){ sessions[i].model, poses[i] };
     if (ebpo_boolean_new(operands, count, nodes->node, nodes->count, &how, &b, &error) != EBPO_OK)
         return command_failed("boolean", &error);
-    int code = v->inside || v->distance ? ask_points(v, b) : make_cells(v, models, b);
+    int code = v->inside || v->distance ? query_points(v, b) : make_cells(v, models, b);
     ebpo_boolean_free(b);
     return code;
 }
 
-static const values usual = { .query = QUERY_VALUES_INIT, .level = 6, .tolerance = 0.01 };
+static const values standard = { .query = QUERY_VALUES_INIT, .level = 6, .tolerance = 0.01 };
 
 static int run_boolean(void *given, const char **operand)
 {
@@ -410,10 +411,10 @@ static int run_boolean(void *given, const char **operand)
     for (uint32_t i = 0; i < count && code == EXIT_FINE; i++)
         code = query_open(&sessions[i], "boolean", models[i], &holding, -1, &v->query.remote);
     if (code == EXIT_FINE)
-        code = answer_expression(v, &nodes, sessions, poses, models, count);
+        code = result_expression(v, &nodes, sessions, poses, models, count);
     for (uint32_t i = 0; i < count; i++)
         query_close(&sessions[i]);
     return code;
 }
 
-const command command_boolean = { &spec, sizeof usual, &usual, run_boolean };
+const command command_boolean = { &spec, sizeof standard, &standard, run_boolean };

@@ -1,4 +1,4 @@
-/* ebpo box: which faces meet boxes. */
+/* ebpo box: finds the faces that intersect boxes. */
 #include <stddef.h>
 
 #include "cli/command.h"
@@ -7,17 +7,17 @@
 
 #include "cli/options/box.inc"
 
-static ebpo_status answer_boxes(const query_job *job, query_worker *w, const double *rows,
+static ebpo_status result_boxes(const query_job *job, query_worker *w, const double *rows,
                                 uint64_t count, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < count && status == EBPO_OK && !answer_text_is_over(w->text); i++) {
+    for (uint64_t i = 0; i < count && status == EBPO_OK && !result_text_is_over(w->text); i++) {
         const uint64_t *faces;
         uint64_t found;
         status =
             ebpo_faces_in_box(w->context, rows + 6 * i, rows + 6 * i + 3, &faces, &found, error);
         if (status == EBPO_OK)
-            answers_box(w->text, job->form, faces, found);
+            results_box(w->text, job->form, faces, found);
     }
     return status;
 }
@@ -35,7 +35,7 @@ static const char *box_dtype(const query_job *job, unsigned *bytes)
     return NULL; /* lists of faces */
 }
 
-static const query_values usual = QUERY_VALUES_INIT;
+static const query_values standard = QUERY_VALUES_INIT;
 
 static int run_box(void *given, const char **operand)
 {
@@ -43,11 +43,11 @@ static int run_box(void *given, const char **operand)
     query_job job = { .command = "box",
                       .values = v,
                       .kind = POINTS_BOXES,
-                      .parts_share = 0.25, /* docs/measured/asking.md */
-                      .answer = answer_boxes,
+                      .parts_share = 0.25, /* docs/measured/queries.md */
+                      .result = result_boxes,
                       .columns = box_columns,
                       .dtype = box_dtype };
     return query_run(&job, operand[0], operand[1]);
 }
 
-const command command_box = { &spec, sizeof usual, &usual, run_box };
+const command command_box = { &spec, sizeof standard, &standard, run_box };

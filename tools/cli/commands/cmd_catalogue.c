@@ -1,4 +1,4 @@
-/* ebpo catalogue: which models are below a folder, and where they are. Reads heads only. */
+/* ebpo catalogue: lists the models below a folder, with their boxes. Reads headers only. */
 #include <errno.h>
 #include <float.h>
 #include <inttypes.h>
@@ -21,41 +21,41 @@
 typedef struct values {
     const char *out;
     bool json, quiet;
-    int64_t threads, most_expansion;
+    int64_t threads, max_expansion;
 } values;
 
 #include "cli/options/catalogue.inc"
 
-static const values usual = { .out = NULL };
+static const values standard = { .out = NULL };
 
-/* What a head told, or why it told nothing. */
+/* Contents of a header, or why it could not be read. */
 typedef struct entry {
     bool known;
     char *why;
-    char *path;  /* as the catalogue has it */
-    char *shown; /* below the folder, as messages have it */
-    ebpo_catalogue_entry told;
+    char *path;  /* as in the catalogue */
+    char *shown; /* below the folder, as in messages */
+    ebpo_catalogue_entry reported;
 } entry;
 
 typedef struct catalogue {
     const values *v;
     const char *folder;
-    char *from; /* how paths of the catalogue begin: "" or "north/" */
+    char *from; /* prefix of paths in the catalogue: "" or "north/" */
     char *out;
     folder_files files;
     entry *entry; /* [files.count] */
     progress_line *progress;
-    pthread_mutex_t lock; /* of the line and the two below */
+    pthread_mutex_t lock; /* protects the line and the two below */
     size_t taken, done;
     atomic_bool no_memory;
-    /* of all models */
+    /* totals of all models */
     uint64_t models, solids, faces, bytes;
     double min[3], max[3];
 } catalogue;
 
-enum { THREADS_MOST = 64 };
+enum { THREADS_MAX = 64 };
 
-/* --- heads --- */
+/* --- headers --- */
 
 static bool has_box(const ebpo_catalogue_entry *e)
 {
@@ -81,7 +81,7 @@ static void leave_out(catalogue *c, entry *e, const char *why)
         c->no_memory = true;
 }
 
-static void look_at(catalogue *c, size_t number)
+static void inspect_file_one(catalogue *c, size_t number)
 {
     entry *e = &c->entry[number];
     const char *path = c->files.path[number];
@@ -89,7 +89,7 @@ static void look_at(catalogue *c, size_t number)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
     char *name = NULL;
-    how.most_expansion = c->v->most_expansion;
+    how.max_expansion = c->v->max_expansion;
     if (asprintf(&name, "%s/%s", c->folder, path) < 0)
         name = NULL;
     if (asprintf(&e->path, "%s%s", c->from, path) < 0)
@@ -100,9 +100,9 @@ static void look_at(catalogue *c, size_t number)
     } else if (!is_utf8(e->path)) {
         leave_out(c, e, "its name is not UTF-8; give it another one");
     } else if (remote_open(&file, name, &how, &error) == EBPO_OK) {
-        ebpo_catalogue_entry_of(file, e->path, &e->told);
+        ebpo_catalogue_entry_of(file, e->path, &e->reported);
         e->known = true;
-        if (!has_box(&e->told))
+        if (!has_box(&e->reported))
             leave_out(c, e, "has no box, as it has no faces");
     } else {
         leave_out(c, e, error.message[0] ? error.message : ebpo_status_name(error.status));
@@ -111,16 +111,16 @@ static void look_at(catalogue *c, size_t number)
     free(name);
 }
 
-static void *look_at_files(void *user)
+static void *inspect_files(void *user)
 {
     catalogue *c = user;
     pthread_mutex_lock(&c->lock);
     while (c->taken < c->files.count) {
         size_t number = c->taken++;
         pthread_mutex_unlock(&c->lock);
-        look_at(c, number);
+        inspect_file_one(c, number);
         pthread_mutex_lock(&c->lock);
-        progress_tell(c->progress, "heads", ++c->done, c->files.count);
+        progress_report(c->progress, "heads", ++c->done, c->files.count);
     }
     pthread_mutex_unlock(&c->lock);
     return NULL;
@@ -129,21 +129,21 @@ static void *look_at_files(void *user)
 static size_t threads_for(const catalogue *c)
 {
     size_t wanted = c->v->threads ? (size_t)c->v->threads : command_cores();
-    wanted = wanted < THREADS_MOST ? wanted : THREADS_MOST;
+    wanted = wanted < THREADS_MAX ? wanted : THREADS_MAX;
     return wanted < c->files.count ? wanted : c->files.count;
 }
 
-static bool look_at_all(catalogue *c)
+static bool inspect_all(catalogue *c)
 {
-    pthread_t thread[THREADS_MOST];
+    pthread_t thread[THREADS_MAX];
     size_t wanted = threads_for(c), started = 0;
     c->entry = calloc(c->files.count, sizeof *c->entry);
     if (!c->entry)
         return false;
     pthread_mutex_init(&c->lock, NULL);
-    while (started + 1 < wanted && command_thread(&thread[started], look_at_files, c) == 0)
+    while (started + 1 < wanted && command_thread(&thread[started], inspect_files, c) == 0)
         started++;
-    look_at_files(c);
+    inspect_files(c);
     while (started > 0)
         pthread_join(thread[--started], NULL);
     pthread_mutex_destroy(&c->lock);
@@ -158,7 +158,7 @@ static void add_up(catalogue *c)
         c->max[k] = -DBL_MAX;
     }
     for (size_t i = 0; i < c->files.count; i++) {
-        const ebpo_catalogue_entry *e = &c->entry[i].told;
+        const ebpo_catalogue_entry *e = &c->entry[i].reported;
         if (!c->entry[i].known)
             continue;
         c->models++;
@@ -174,7 +174,7 @@ static void add_up(catalogue *c)
 
 /* --- paths --- */
 
-/* The folder of a file that need not be there, without links; or NULL. */
+/* Returns the folder of a file that may not exist, with links resolved; or NULL. */
 static char *real_folder(const char *path)
 {
     const char *slash = strrchr(path, '/');
@@ -184,11 +184,12 @@ static char *real_folder(const char *path)
     return real;
 }
 
-/* How one gets from folder `a` to what is in `b`: "", "x/" or "../x/"; or NULL. Both are real. */
+/* Returns the relative path from folder `a` to files in `b`: "", "x/" or "../x/"; or NULL. Both
+ * must be resolved. */
 static char *way_between(const char *a, const char *b)
 {
     size_t same = 0, at = 0;
-    for (;; at++) { /* folders that both have */
+    for (;; at++) { /* common folders */
         bool ends_a = !a[at] || a[at] == '/', ends_b = !b[at] || b[at] == '/';
         if (ends_a && ends_b)
             same = at;
@@ -225,7 +226,7 @@ static int find_way(catalogue *c)
 
 /* --- the file --- */
 
-/* Paths of entries begin in the file's folder. */
+/* Paths of entries are relative to the folder of the file. */
 static int write_all(const catalogue *c)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -242,7 +243,7 @@ static int write_all(const catalogue *c)
     }
     for (size_t i = 0; i < c->files.count; i++)
         if (c->entry[i].known)
-            entries[count++] = c->entry[i].told;
+            entries[count++] = c->entry[i].reported;
     how.folder = folder;
     ebpo_status status = ebpo_catalogue_new(entries, count, &how, &made, &error);
     if (status == EBPO_OK)
@@ -253,21 +254,21 @@ static int write_all(const catalogue *c)
     return status == EBPO_OK ? EXIT_FINE : command_failed("catalogue", &error);
 }
 
-/* --- what is told --- */
+/* --- output --- */
 
-static uint64_t left_out(const catalogue *c)
+static uint64_t count_omitted(const catalogue *c)
 {
     return (uint64_t)(c->files.count - c->models) + c->files.unread;
 }
 
-static void tell_left_out(const catalogue *c)
+static void report_omitted(const catalogue *c)
 {
     for (size_t i = 0; i < c->files.count; i++) {
         const entry *e = &c->entry[i];
         if (e->known)
             continue;
         bool named = strstr(e->why, e->shown) != NULL;
-        fprintf(stderr, "ebpo catalogue: left out: %s%s%s\n", named ? "" : e->shown,
+        fprintf(stderr, "ebpo catalogue: omitted: %s%s%s\n", named ? "" : e->shown,
                 named ? "" : ": ", e->why);
     }
 }
@@ -285,7 +286,7 @@ static void print_json(const catalogue *c)
     json_reals(&j, "box_min", c->min, 3);
     json_reals(&j, "box_max", c->max, 3);
     json_uint(&j, "folders_unread", c->files.unread);
-    json_array(&j, "left_out");
+    json_array(&j, "omitted");
     for (size_t i = 0; i < c->files.count; i++)
         if (!c->entry[i].known) {
             json_object(&j, NULL);
@@ -303,16 +304,16 @@ static void print_words(const catalogue *c)
     words_plural(models, sizeof models, c->models, "model", "models");
     words_count(faces, sizeof faces, (double)c->faces);
     words_bytes(bytes, sizeof bytes, c->bytes);
-    words_plural(left, sizeof left, left_out(c), "was left out", "were left out");
+    words_plural(left, sizeof left, count_omitted(c), "was omitted", "were omitted");
     printf("%s: %s, %" PRIu64 " of them solid, %s faces, %s", c->out, models, c->solids, faces,
            bytes);
-    printf(left_out(c) ? "; %s\n" : "\n", left);
+    printf(count_omitted(c) ? "; %s\n" : "\n", left);
 }
 
-/* --- all of it --- */
+/* --- command --- */
 
-/* True, said on stderr: the catalogue would take the place of a file that it lists. `code` is then
- * set. */
+/* Returns true when the catalogue would overwrite a file that it lists; reports it on stderr and
+ * sets `code`. */
 static bool overwrites_model(const catalogue *c, int *code)
 {
     for (size_t i = 0; i < c->files.count; i++) {
@@ -341,10 +342,10 @@ static int make_catalogue(catalogue *c)
     int code = find_way(c);
     if (code != EXIT_FINE || overwrites_model(c, &code))
         return code;
-    if (!look_at_all(c))
+    if (!inspect_all(c))
         return command_no_memory("catalogue");
     add_up(c);
-    tell_left_out(c);
+    report_omitted(c);
     if (!c->models) {
         fprintf(stderr,
                 "ebpo catalogue: %s: holds no model; nothing was written (ebpo convert makes "
@@ -359,7 +360,7 @@ static int make_catalogue(catalogue *c)
         print_json(c);
     else if (!c->v->quiet)
         print_words(c);
-    return left_out(c) ? EXIT_DIFFERS : EXIT_FINE;
+    return count_omitted(c) ? EXIT_DIFFERS : EXIT_FINE;
 }
 
 static int run_catalogue(void *given, const char **operand)
@@ -367,8 +368,8 @@ static int run_catalogue(void *given, const char **operand)
     const values *v = given;
     progress_line line;
     if (v->out && strcmp(v->out, "-") == 0)
-        return command_usage("catalogue", "--output: '-': a file's name is needed here, in whose "
-                                          "folder paths begin");
+        return command_usage("catalogue", "--output: '-': a file name is needed here; paths are "
+                                          "relative to its folder");
     char *folder = strdup(operand[0]);
     catalogue c = { .v = v, .folder = folder, .progress = &line };
     for (size_t end = folder ? strlen(folder) : 0; end > 1 && folder[end - 1] == '/';)
@@ -392,4 +393,4 @@ static int run_catalogue(void *given, const char **operand)
     return code;
 }
 
-const command command_catalogue = { &spec, sizeof usual, &usual, run_catalogue };
+const command command_catalogue = { &spec, sizeof standard, &standard, run_catalogue };

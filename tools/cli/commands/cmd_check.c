@@ -1,10 +1,10 @@
-/* ebpo check: what a mesh is before anything is built from it, and where its findings are. */
+/* ebpo check: reports the properties of a mesh before building, and the positions of findings. */
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
-#include <ebpo/places.h>
+#include <ebpo/findings.h>
 
 #include "cli/command.h"
 #include "cli/commands/commands.h"
@@ -21,26 +21,26 @@
 #include "cli/commands/check_crossings.h"
 #endif
 
-/* --- places of findings --- */
+/* --- positions of findings --- */
 
-typedef struct telling {
+typedef struct reporting {
     json *j; /* NULL: words, if `words` */
     bool words;
     progress_line *line;
     uint64_t count[EBPO_FINDING_KINDS];
-} telling;
+} reporting;
 
-/* False: `to` is neither "all" nor the name of a PLY file. */
+/* Returns false when `to` is neither "all" nor the name of a PLY file. */
 static bool check_places_good(const char *to)
 {
     size_t length = strlen(to);
     return strcmp(to, "all") == 0 || (length > 4 && strcasecmp(to + length - 4, ".ply") == 0);
 }
 
-/* The PLY that `to` names; NULL: "all". */
+/* Returns the PLY that `to` names; NULL: "all". */
 static const char *check_places_ply(const char *to) { return strcmp(to, "all") == 0 ? NULL : to; }
 
-static void place_json(json *j, const ebpo_mesh_place *p)
+static void place_json(json *j, const ebpo_mesh_finding *p)
 {
     json_object(j, NULL);
     json_text(j, "kind", ebpo_finding_name(p->kind));
@@ -62,7 +62,7 @@ static void place_json(json *j, const ebpo_mesh_place *p)
 
 enum { FACES_SHOWN = 8 };
 
-static void place_words(const ebpo_mesh_place *p)
+static void place_words(const ebpo_mesh_finding *p)
 {
     printf("    at %.9g %.9g %.9g", p->point[0], p->point[1], p->point[2]);
     if (p->component != EBPO_NO_COMPONENT)
@@ -81,9 +81,9 @@ static void place_words(const ebpo_mesh_place *p)
     puts(p->face_count > FACES_SHOWN ? " ..." : "");
 }
 
-static bool take_place(void *user, const ebpo_mesh_place *p)
+static bool take_place(void *user, const ebpo_mesh_finding *p)
 {
-    telling *t = user;
+    reporting *t = user;
     bool first = t->count[p->kind]++ == 0;
     if (!t->j && !t->words)
         return true;
@@ -100,7 +100,7 @@ static bool take_place(void *user, const ebpo_mesh_place *p)
 
 static void print_legend(const char *path, const uint64_t count[EBPO_FINDING_KINDS])
 {
-    printf("  places of findings, in colours: %s\n", path);
+    printf("  positions of findings, in colours: %s\n", path);
     for (int kind = 0; kind < EBPO_FINDING_KINDS; kind++) {
         uint8_t rgb[3];
         ebpo_finding_colour(kind, rgb);
@@ -110,21 +110,21 @@ static void print_legend(const char *path, const uint64_t count[EBPO_FINDING_KIN
     }
 }
 
-/* Prints all places, or writes the picture and prints its legend. `j`: into its open object
+/* Prints all positions, or writes the picture and prints its legend. `j`: into its open object
  * instead; NULL: words, unless `quiet`. */
 static ebpo_status check_places(const ebpo_mesh *mesh, const char *to, unsigned threads,
                                 ebpo_progress progress, json *j, bool quiet, progress_line *line,
                                 ebpo_error *error)
 {
-    ebpo_places_options how = EBPO_PLACES_OPTIONS_INIT;
-    telling t = { .j = j, .line = line };
+    ebpo_findings_options how = EBPO_FINDINGS_OPTIONS_INIT;
+    reporting t = { .j = j, .line = line };
     how.threads = threads;
     how.progress = progress;
     how.ply = check_places_ply(to);
     t.words = !quiet && !how.ply;
     if (j)
-        json_array(j, "places");
-    ebpo_status status = ebpo_mesh_places(mesh, &how, take_place, &t, NULL, error);
+        json_array(j, "locations");
+    ebpo_status status = ebpo_mesh_findings(mesh, &how, take_place, &t, NULL, error);
     progress_wipe(line);
     if (j)
         json_end(j);
@@ -136,7 +136,7 @@ static ebpo_status check_places(const ebpo_mesh *mesh, const char *to, unsigned 
 /* --- the command --- */
 
 typedef struct values {
-    mending mend;
+    repairing repair_record;
     bool require_solid, crossings, json, quiet;
     const char *out, *places;
     int64_t threads;
@@ -145,7 +145,7 @@ typedef struct values {
 
 #include "cli/options/check.inc"
 
-/* The outermost object is left open. */
+/* Leaves the outermost object open. */
 static void print_json(json *j, const mesh_input *p, const char *path)
 {
     ebpo_solid_volume before = mesh_input_solid(p, false), after = mesh_input_solid(p, true);
@@ -154,9 +154,9 @@ static void print_json(json *j, const mesh_input *p, const char *path)
     json_text(j, "file", path);
     findings_json_source(j, "source", &p->as_read, p->unread);
     findings_json(j, "report", &p->prepared.before, &before);
-    if (p->prepared.mended) {
-        findings_json_mending(j, "mend", &p->prepared.record);
-        findings_json(j, "report_after_mending", &p->prepared.report, &after);
+    if (p->prepared.was_repaired) {
+        findings_json_repair(j, "repair", &p->prepared.record);
+        findings_json(j, "report_after_repair", &p->prepared.report, &after);
     }
     advice_json(j, p);
 }
@@ -166,9 +166,9 @@ static void print_reports(const values *v, const mesh_input *p, const char *path
     ebpo_solid_volume before = mesh_input_solid(p, false), after = mesh_input_solid(p, true);
     findings_print(stdout, path, &p->as_read, &p->prepared.before, &before, v->crossings);
     advice_print(stdout, p);
-    if (!p->prepared.mended)
+    if (!p->prepared.was_repaired)
         return;
-    findings_print_mending(stdout, &p->prepared.record);
+    findings_print_repair(stdout, &p->prepared.record);
     findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, &after, v->crossings);
 }
 
@@ -203,13 +203,13 @@ static ebpo_status report_findings(const values *v, mesh_input *p, const char *p
     command_flush("check");
     mesh_input_warn("check", path, p);
     advice_warn(stderr, "check", path, p);
-    if (v->places) /* before crossings, which take the mesh */
+    if (v->places) /* before crossings, which consume the mesh */
         status = check_places(&p->mesh, v->places, (unsigned)v->threads, progress,
                               v->json ? &j : NULL, v->quiet, line, error);
     else if (v->json)
-        json_null(&j, "places"); /* not asked for */
+        json_null(&j, "locations"); /* not requested */
     if (v->json && !(status == EBPO_OK && v->crossings))
-        json_null(&j, "crossings"); /* not looked for */
+        json_null(&j, "crossings"); /* not checked */
 #if EBPO_HAVE_EXTRAS
     else if (status == EBPO_OK && v->crossings)
         status = search_crossings(v, p, progress, &j, line, error);
@@ -225,10 +225,10 @@ static ebpo_status check_mesh(const values *v, const char *path, mesh_input *p,
 {
     progress_line line;
     ebpo_progress progress = progress_start(&line, "check", v->quiet);
-    mending mend = v->mend;
-    mend.advise = true;
-    ebpo_status status =
-        mesh_input_read(p, path, mend, READ_MESH, workspace, (unsigned)v->threads, progress, error);
+    repairing repair_record = v->repair_record;
+    repair_record.advise = true;
+    ebpo_status status = mesh_input_read(p, path, repair_record, READ_MESH, workspace,
+                                         (unsigned)v->threads, progress, error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;
@@ -237,20 +237,20 @@ static ebpo_status check_mesh(const values *v, const char *path, mesh_input *p,
     return status;
 }
 
-static const values usual = { 0 };
+static const values standard = { 0 };
 
 static int run_check(void *given, const char **operand)
 {
     values *v = given;
-    if (!memory_good("check", &v->memory) || mending_check("check", v->mend) != EXIT_FINE)
+    if (!memory_good("check", &v->memory) || repair_check("check", v->repair_record) != EXIT_FINE)
         return EXIT_USAGE;
     if (v->crossings && !EBPO_HAVE_EXTRAS)
         return command_usage("check", "this program was built without --crossings "
                                       "(-Dextras=disabled); build it with -Dextras=enabled");
     if (v->out && !v->crossings)
-        return command_usage("check", "--output shows what --crossings finds; give both");
+        return command_usage("check", "--output needs --crossings; give both");
     if (v->places && !check_places_good(v->places))
-        return command_usage("check", "--places takes 'all', or a file whose name ends in .ply");
+        return command_usage("check", "--findings takes 'all', or a file whose name ends in .ply");
     const char *picture = v->places ? check_places_ply(v->places) : NULL;
     if (picture && command_overwrites("check", operand[0], picture))
         return EXIT_USAGE;
@@ -274,4 +274,4 @@ static int run_check(void *given, const char **operand)
     return v->require_solid && p.doubts ? EXIT_NOT_SOLID : EXIT_FINE;
 }
 
-const command command_check = { &spec, sizeof usual, &usual, run_check };
+const command command_check = { &spec, sizeof standard, &standard, run_check };

@@ -1,4 +1,4 @@
-/* ebpo collide: which faces of two models meet, and how far apart the models are. */
+/* ebpo collide: finds intersecting faces of two models, and the distance between the models. */
 #include <float.h>
 #include <inttypes.h>
 #include <stddef.h>
@@ -21,12 +21,12 @@
 
 /* --- distance, depth and relation --- */
 
-/* As the options say; not given: a tolerance of 0, an at_least below 0. */
+/* Options as given; not given: a tolerance of 0, an at_least below 0. */
 typedef struct collide_far {
     bool distance, depth;
     double tolerance, at_least;
-    const char *way_out; /* X Y Z, or NULL */
-    double direction[3]; /* set by collide_far_fits */
+    const char *separation; /* X Y Z, or NULL */
+    double direction[3];    /* set by collide_far_fits */
 } collide_far;
 
 #define COLLIDE_FAR_INIT                           \
@@ -34,15 +34,15 @@ typedef struct collide_far {
         false, false, 0.0, -1.0, NULL, { 0, 0, 0 } \
     }
 
-/* --- how models lie to each other --- */
+/* --- relation of models --- */
 
-/* By ebpo_relation. */
+/* Indexed by ebpo_relation. */
 static const char *const collide_relations[] = { "DISJOINT",   "TOUCHING",   "INTERSECTING",
                                                  "A_INSIDE_B", "B_INSIDE_A", "EQUAL",
                                                  "not known" };
 
-/* How models whose faces do not meet lie to each other: *relation is an ebpo_relation as its name;
- * NULL: they are DISJOINT, or faces meet after all. */
+/* Finds the relation of models whose faces do not intersect: *relation is the name of an
+ * ebpo_relation; NULL: they are DISJOINT, or faces intersect after all. */
 static ebpo_status collide_unmet(ebpo_collider *c, const ebpo_collide_options *how,
                                  const char **relation, ebpo_error *error)
 {
@@ -53,12 +53,12 @@ static ebpo_status collide_unmet(ebpo_collider *c, const ebpo_collide_options *h
         *relation = collide_relations[r.relation];
     if (status != EBPO_E_ABSENT && status != EBPO_E_LIMIT)
         return status;
-    *error = (ebpo_error)EBPO_ERROR_INIT; /* a subset lacks what would tell */
+    *error = (ebpo_error)EBPO_ERROR_INIT; /* the required data is not in the subset */
     *relation = collide_relations[EBPO_RELATION_OPEN];
     return EBPO_OK;
 }
 
-/* Prints it behind what the line has: " NAME", or as a member of JSON. NULL: nothing. */
+/* Prints it at the end of the line: " NAME", or as a member of JSON. NULL: nothing. */
 static void collide_print_unmet(bool as_json, const char *relation)
 {
     bool open = relation == collide_relations[EBPO_RELATION_OPEN];
@@ -70,7 +70,7 @@ static void collide_print_unmet(bool as_json, const char *relation)
 
 /* --- options --- */
 
-/* Three numbers with blanks or commas between. */
+/* Reads three numbers separated by blanks or commas. */
 static bool read_direction(const char *text, double out[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -84,21 +84,24 @@ static bool read_direction(const char *text, double out[3])
     return text[strspn(text, " \t")] == '\0';
 }
 
-static bool collide_far_asked(const collide_far *f)
+static bool collide_far_queried(const collide_far *f)
 {
-    return f->distance || f->depth || f->way_out;
+    return f->distance || f->depth || f->separation;
 }
 
-/* False, and a message on standard error: they do not go together. others: --all or --self. */
+/* Returns false, with a message on standard error, for options that cannot be combined. others:
+ * --all or --self. */
 static bool collide_far_fits(collide_far *f, bool others)
 {
     const char *wrong = NULL;
-    if ((collide_far_asked(f) && others) || f->distance + f->depth + (f->way_out != NULL) > 1 ||
+    if ((collide_far_queried(f) && others) ||
+        f->distance + f->depth + (f->separation != NULL) > 1 ||
         (!f->distance && !f->depth && f->tolerance > 0))
-        wrong = "--distance, --depth and --way-out take neither --all nor --self nor each other, "
-                "and only the first two take --tolerance";
-    else if (f->way_out && !read_direction(f->way_out, f->direction))
-        wrong = "--way-out expects a direction, three numbers 'X Y Z'";
+        wrong =
+            "--distance, --depth and --separation take neither --all nor --self nor each other, "
+            "and only the first two take --tolerance";
+    else if (f->separation && !read_direction(f->separation, f->direction))
+        wrong = "--separation expects a direction, three numbers 'X Y Z'";
     else if (f->at_least >= 0 && (!f->distance || f->tolerance > 0))
         wrong = "--at-least is for --distance, without --tolerance";
     else if (f->depth && !(f->tolerance > 0))
@@ -108,7 +111,7 @@ static bool collide_far_fits(collide_far *f, bool others)
     return !wrong;
 }
 
-/* What is certain. */
+/* Prints certain bounds. */
 static void print_bounds(bool as_json, const ebpo_certain *d)
 {
     char lo[32], hi[32];
@@ -130,7 +133,7 @@ static void pair_to_json(const ebpo_clearance *c)
     putchar(']');
 }
 
-/* The faces, if some have been found. */
+/* Prints the faces, if known. */
 static void print_clearance_pair(bool as_json, const ebpo_clearance *c)
 {
     if (c->pair.face_a == EBPO_NO_FACE)
@@ -141,7 +144,7 @@ static void print_clearance_pair(bool as_json, const ebpo_clearance *c)
         printf(" %" PRIu64 " %" PRIu64, c->pair.face_a, c->pair.face_b);
 }
 
-/* The end of the line, with how models lie to each other that are not apart as sets of points. */
+/* Ends the line, with the relation of models that overlap as sets of points. */
 static void print_end(bool as_json, const char *relation)
 {
     collide_print_unmet(as_json, relation);
@@ -165,8 +168,8 @@ static void print_at_least(bool as_json, const ebpo_clearance *c, const char *re
     print_end(as_json, relation);
 }
 
-static ebpo_status ask_distance(const collide_far *f, bool as_json, ebpo_collider *c,
-                                const ebpo_collide_options *how, ebpo_error *error)
+static ebpo_status query_distance(const collide_far *f, bool as_json, ebpo_collider *c,
+                                  const ebpo_collide_options *how, ebpo_error *error)
 {
     ebpo_clearance_options wanted = EBPO_CLEARANCE_OPTIONS_INIT;
     ebpo_clearance got;
@@ -175,7 +178,7 @@ static ebpo_status ask_distance(const collide_far *f, bool as_json, ebpo_collide
     ebpo_status status = ebpo_collide_distance(c, how, &wanted, &got, error);
     if (status != EBPO_OK)
         return status;
-    /* where faces meet, or nothing is known of them, the line says so already */
+    /* when faces intersect, or nothing is known of them, the line already reports it */
     bool apart = got.distance.lo > 0 || (got.at_least >= 0 && got.distance.hi > 0);
     const char *relation = NULL;
     if (apart)
@@ -203,8 +206,8 @@ static void print_depth(bool as_json, const char *name, bool solid, const ebpo_c
     printf("%s", as_json ? "}" : "");
 }
 
-static ebpo_status ask_depth(const collide_far *f, bool as_json, ebpo_collider *c,
-                             const ebpo_collide_options *how, ebpo_error *error)
+static ebpo_status query_depth(const collide_far *f, bool as_json, ebpo_collider *c,
+                               const ebpo_collide_options *how, ebpo_error *error)
 {
     ebpo_certain depth[2] = { { 0, 0, 0, 0 }, { 0, 0, 0, 0 } };
     ebpo_status status[2];
@@ -224,21 +227,21 @@ static ebpo_status ask_depth(const collide_far *f, bool as_json, ebpo_collider *
     return EBPO_OK;
 }
 
-/* --- how far along a direction the models are apart --- */
+/* --- separation distance along a direction --- */
 
-static ebpo_status ask_way_out(const collide_far *f, bool as_json, ebpo_collider *c,
-                               const ebpo_collide_options *how, ebpo_error *error)
+static ebpo_status query_separation(const collide_far *f, bool as_json, ebpo_collider *c,
+                                    const ebpo_collide_options *how, ebpo_error *error)
 {
-    static const char *const figures[] = { "exact", "interval", "bound" };
-    ebpo_way_out w;
-    ebpo_status status = ebpo_collide_way_out(c, how, f->direction, &w, error);
+    static const char *const metrics[] = { "exact", "interval", "bound" };
+    ebpo_separation w;
+    ebpo_status status = ebpo_collide_separation(c, how, f->direction, &w, error);
     if (status != EBPO_OK)
         return status;
     bool any = w.pair.face_a != EBPO_NO_FACE;
     printf("%s", as_json ? "{" : "");
     print_bounds(as_json, &w.t);
     if (as_json)
-        printf(", \"figure\": \"%s\"", figures[w.t.figure]);
+        printf(", \"figure\": \"%s\"", metrics[w.t.metric]);
     if (any)
         printf(as_json ? ", \"face_a\": %" PRIu64 ", \"face_b\": %" PRIu64
                        : " %" PRIu64 " %" PRIu64,
@@ -247,12 +250,12 @@ static ebpo_status ask_way_out(const collide_far *f, bool as_json, ebpo_collider
     return EBPO_OK;
 }
 
-static ebpo_status collide_far_ask(const collide_far *f, bool as_json, ebpo_collider *c,
-                                   const ebpo_collide_options *how, ebpo_error *error)
+static ebpo_status collide_far_query(const collide_far *f, bool as_json, ebpo_collider *c,
+                                     const ebpo_collide_options *how, ebpo_error *error)
 {
-    return f->way_out    ? ask_way_out(f, as_json, c, how, error)
-           : f->distance ? ask_distance(f, as_json, c, how, error)
-                         : ask_depth(f, as_json, c, how, error);
+    return f->separation ? query_separation(f, as_json, c, how, error)
+           : f->distance ? query_distance(f, as_json, c, how, error)
+                         : query_depth(f, as_json, c, how, error);
 }
 
 /* --- the command --- */
@@ -277,7 +280,7 @@ static bool read_pose(const char *name, const char *text, ebpo_pose *out)
     return false;
 }
 
-/* --- answers --- */
+/* --- results --- */
 
 static const char *const kinds[] = { "APART", "TOUCHING", "CROSSING", "COPLANAR" };
 
@@ -303,8 +306,8 @@ static bool take_pairs(void *user, const ebpo_face_pair *pairs, uint64_t count)
 /* -1 .. 1 */
 static const char *const truths[] = { "null", "false", "true" };
 
-/* Prints the line of models whose faces do not meet. Of all pairs JSON has an object for each, and
- * one where there is none but more to say. */
+/* Prints the line for models whose faces do not intersect. For all pairs, JSON has an object for
+ * each pair, and one object when there is no pair but other results. */
 static ebpo_status print_none(const collide_values *v, ebpo_collider *c,
                               const ebpo_collide_options *how, ebpo_error *error)
 {
@@ -319,8 +322,8 @@ static ebpo_status print_none(const collide_values *v, ebpo_collider *c,
     return EBPO_OK;
 }
 
-static ebpo_status ask_first(const collide_values *v, ebpo_collider *c,
-                             const ebpo_collide_options *how, ebpo_error *error)
+static ebpo_status query_first(const collide_values *v, ebpo_collider *c,
+                               const ebpo_collide_options *how, ebpo_error *error)
 {
     ebpo_face_pair pair;
     int32_t found;
@@ -336,8 +339,8 @@ static ebpo_status ask_first(const collide_values *v, ebpo_collider *c,
     return EBPO_OK;
 }
 
-static ebpo_status ask_relation(const collide_values *v, ebpo_collider *c,
-                                const ebpo_collide_options *how, ebpo_error *error)
+static ebpo_status query_relation(const collide_values *v, ebpo_collider *c,
+                                  const ebpo_collide_options *how, ebpo_error *error)
 {
     ebpo_relation_result r;
     ebpo_status status = ebpo_collide_relation(c, how, &r, error);
@@ -369,8 +372,8 @@ static void print_levels(bool as_json, const ebpo_level_result *r)
                words_real(r->distance.lo, lo), words_real(r->distance.hi, hi));
 }
 
-static ebpo_status ask_levels(const collide_values *v, ebpo_collider *c,
-                              const ebpo_collide_options *how, ebpo_error *error)
+static ebpo_status query_levels(const collide_values *v, ebpo_collider *c,
+                                const ebpo_collide_options *how, ebpo_error *error)
 {
     ebpo_level_result r;
     ebpo_status status = ebpo_collide_levels(c, how, &r, error);
@@ -380,8 +383,8 @@ static ebpo_status ask_levels(const collide_values *v, ebpo_collider *c,
 }
 
 /* Prints every pair, or that there is none. */
-static ebpo_status ask_pairs(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
-                             ebpo_error *error)
+static ebpo_status query_pairs(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
+                               ebpo_error *error)
 {
     ebpo_status status = v->self ? ebpo_collide_self(c, how, take_pairs, v, error)
                                  : ebpo_collide_all(c, how, take_pairs, v, error);
@@ -394,7 +397,7 @@ static ebpo_status ask_pairs(collide_values *v, ebpo_collider *c, const ebpo_col
     return EBPO_OK;
 }
 
-/* Said on standard error, as answers are on the other. */
+/* Reported on standard error, as results are on standard output. */
 static ebpo_status write_pairs(const collide_values *v, ebpo_collider *c,
                                const ebpo_collide_options *how, ebpo_error *error)
 {
@@ -408,29 +411,29 @@ static ebpo_status write_pairs(const collide_values *v, ebpo_collider *c,
         status = collide_unmet(c, how, &relation, error);
     if (status == EBPO_OK)
         fprintf(stderr, "%s: %s%s%s\n", v->out,
-                ply ? "both models, in which the faces that meet are red"
-                    : "all pairs of faces that meet, and where they cross",
-                relation ? "; none meet: " : "", relation ? relation : "");
+                ply ? "both models, with intersecting faces in red"
+                    : "all pairs of intersecting faces, and where they cross",
+                relation ? "; none intersect: " : "", relation ? relation : "");
     return status;
 }
 
-/* What is asked on the command line, one after the other. */
-static ebpo_status ask_all(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
-                           ebpo_error *error)
+/* Runs the queries of the command line one after the other. */
+static ebpo_status query_all(collide_values *v, ebpo_collider *c, const ebpo_collide_options *how,
+                             ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     if (v->query.level >= 0)
-        return ask_levels(v, c, how, error);
+        return query_levels(v, c, how, error);
     if (v->relation)
-        status = ask_relation(v, c, how, error);
+        status = query_relation(v, c, how, error);
     if (status == EBPO_OK && v->out)
         status = write_pairs(v, c, how, error);
-    if (status == EBPO_OK && collide_far_asked(&v->far))
-        return collide_far_ask(&v->far, v->query.json, c, how, error);
+    if (status == EBPO_OK && collide_far_queried(&v->far))
+        return collide_far_query(&v->far, v->query.json, c, how, error);
     if (status == EBPO_OK && (v->query.all || v->self))
-        return ask_pairs(v, c, how, error);
+        return query_pairs(v, c, how, error);
     bool other = v->relation || v->out;
-    return status == EBPO_OK && (v->first || !other) ? ask_first(v, c, how, error) : status;
+    return status == EBPO_OK && (v->first || !other) ? query_first(v, c, how, error) : status;
 }
 
 static void json_stats(const ebpo_collider_stats *s)
@@ -448,7 +451,7 @@ static void json_stats(const ebpo_collider_stats *s)
     json_finish(&j);
 }
 
-static void tell_stats(const ebpo_collider *c, bool as_json)
+static void report_stats(const ebpo_collider *c, bool as_json)
 {
     ebpo_collider_stats s = EBPO_COLLIDER_STATS_INIT;
     if (ebpo_collider_get_stats(c, &s) != EBPO_OK)
@@ -466,7 +469,8 @@ static void tell_stats(const ebpo_collider *c, bool as_json)
                 (unsigned long long)s.loads, (unsigned long long)s.bytes_read);
 }
 
-static int ask_collider(collide_values *v, ebpo_model *a, ebpo_model *b, ebpo_collide_options *how)
+static int query_collider(collide_values *v, ebpo_model *a, ebpo_model *b,
+                          ebpo_collide_options *how)
 {
     ebpo_collider_options with = EBPO_COLLIDER_OPTIONS_INIT;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -476,18 +480,18 @@ static int ask_collider(collide_values *v, ebpo_model *a, ebpo_model *b, ebpo_co
     ebpo_status status = ebpo_collider_new(a, b, &with, &c, &error);
     how->progress = progress_start(&line, "collide", v->quiet);
     if (status == EBPO_OK)
-        status = ask_all(v, c, how, &error);
+        status = query_all(v, c, how, &error);
     progress_wipe(&line);
     if (c && v->query.remote.stats)
-        tell_stats(c, v->query.json);
+        report_stats(c, v->query.json);
     ebpo_collider_free(c);
     if (status != EBPO_OK)
         return command_failed("collide", &error);
     return command_flush("collide") ? EXIT_FINE : EXIT_FAILED;
 }
 
-/* --memory is of both models together: all of both if they fit, else both in parts that share it.
- */
+/* --memory applies to both models together: both are loaded completely if they fit, else both in
+ * parts that share it. */
 static ebpo_status share_memory(const query_session *a, const query_session *b,
                                 ebpo_model_options *holding, ebpo_error *error)
 {
@@ -503,24 +507,24 @@ static ebpo_status share_memory(const query_session *a, const query_session *b,
     return ebpo_budget_new(holding->memory, &holding->budget, error);
 }
 
-/* Where --memory is not given: half of what is free if all of both would take more, or the least
- * that will do. Files on a server keep the library's usual budget. */
-static void usual_memory(const query_session *a, const query_session *b, const char *const path[2],
-                         ebpo_model_options *holding)
+/* Without --memory: half of the free memory if both models would need more, or the minimum. Remote
+ * files keep the default budget of the library. */
+static void default_memory(const query_session *a, const query_session *b,
+                           const char *const path[2], ebpo_model_options *holding)
 {
     if (ebpo_is_url(path[0]) || (b && ebpo_is_url(path[1])))
         return;
     ebpo_model_plan plan[2] = { EBPO_MODEL_PLAN_INIT, EBPO_MODEL_PLAN_INIT };
     if (ebpo_model_memory(a->file, holding, &plan[0], NULL) != EBPO_OK ||
         (b && ebpo_model_memory(b->file, holding, &plan[1], NULL) != EBPO_OK))
-        return; /* what is wrong is said when the models are made */
+        return; /* errors are reported when the models are made */
     uint64_t half = ebpo_free_memory() / 2;
     uint64_t least = plan[0].least + plan[1].least;
     if (plan[0].whole + plan[1].whole <= half)
         return;
     holding->memory = half > least ? half : least;
     if (least > half)
-        model_memory_tell_least("collide", "both models", least, half);
+        model_memory_report_least("collide", "both models", least, half);
 }
 
 static int open_both(query_session *a, query_session *b, const collide_values *v,
@@ -528,13 +532,13 @@ static int open_both(query_session *a, query_session *b, const collide_values *v
 {
     ebpo_error error = EBPO_ERROR_INIT;
     const char *path[2] = { operand[0], operand[1] };
-    bool one = v->self || strcmp(path[0], path[1]) == 0; /* then it is in memory once */
+    bool one = v->self || strcmp(path[0], path[1]) == 0; /* then it is loaded once */
     int level = (int)v->query.level;
     int code = query_open_file(a, "collide", path[0], holding, level, &v->query.remote);
     if (code == EXIT_FINE && !one)
         code = query_open_file(b, "collide", path[1], holding, level, &v->query.remote);
     if (code == EXIT_FINE && !v->query.memory && holding->cut_level < 0)
-        usual_memory(a, one ? NULL : b, path, holding);
+        default_memory(a, one ? NULL : b, path, holding);
     if (code == EXIT_FINE && !one && holding->memory &&
         share_memory(a, b, holding, &error) != EBPO_OK)
         return command_failed("collide", &error);
@@ -560,15 +564,15 @@ static int run_collide(void *given, const char **operand)
     if (v->self && (v->query.all || v->pose_a || v->pose_b || v->relation || v->out))
         return command_usage("collide",
                              "--self takes neither --all nor poses, --relation or --output");
-    if (v->first && (v->self || v->query.all || collide_far_asked(&v->far)))
+    if (v->first && (v->self || v->query.all || collide_far_queried(&v->far)))
         return command_usage("collide", "--first takes neither --all, --self, --distance, --depth "
-                                        "nor --way-out");
+                                        "nor --separation");
     if (v->out && !words_end_with(v->out, ".h5") && !words_end_with(v->out, ".ply"))
         return command_usage("collide", "--output %s: expected a name that ends in .h5 or .ply",
                              v->out);
-    if (v->query.level >= 0 && (v->first || v->self || v->query.all || collide_far_asked(&v->far) ||
-                                v->relation || v->out))
-        return command_usage("collide", "--level takes no other question");
+    if (v->query.level >= 0 && (v->first || v->self || v->query.all ||
+                                collide_far_queried(&v->far) || v->relation || v->out))
+        return command_usage("collide", "--max-level allows no other query");
     if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
         !read_pose("pose-b", v->pose_b, &how.pose_b) ||
         !query_options_from("collide", &v->query, &holding, &inside, &distance))
@@ -578,13 +582,13 @@ static int run_collide(void *given, const char **operand)
     setvbuf(stdout, NULL, _IOFBF, 1 << 18);
     int code = open_both(&a, &b, v, operand, &holding);
     if (code == EXIT_FINE)
-        code = ask_collider(v, a.model, b.model ? b.model : a.model, &how);
+        code = query_collider(v, a.model, b.model ? b.model : a.model, &how);
     query_close(&b);
     query_close(&a);
     ebpo_budget_free(holding.budget);
     return code;
 }
 
-static const collide_values usual = { .query = QUERY_VALUES_INIT, .far = COLLIDE_FAR_INIT };
+static const collide_values standard = { .query = QUERY_VALUES_INIT, .far = COLLIDE_FAR_INIT };
 
-const command command_collide = { &spec, sizeof usual, &usual, run_collide };
+const command command_collide = { &spec, sizeof standard, &standard, run_collide };

@@ -28,24 +28,24 @@
 
 /* --- the mesh and the file, described --- */
 
-/* What is told, and how. */
-typedef struct convert_told {
-    const char *in, *out; /* `in` as it is told of */
+/* Facts to report, and their form. */
+typedef struct convert_reported {
+    const char *in, *out; /* `in` as in messages */
     bool piped;           /* it came from standard input */
     bool json, quiet, timings;
     bool repaired, chosen; /* --repair was given; the parts were chosen by size */
-    bool by_groups;        /* warnings are told of each group, not here */
-} convert_told;
+    bool by_groups;        /* warnings are reported for each group, not here */
+} convert_reported;
 
-/* Before building: what the mesh is, and warnings. */
-static void convert_tell_mesh(const convert_told *t, const mesh_input *p)
+/* Before building: reports the mesh, and warnings. */
+static void convert_report_mesh(const convert_reported *t, const mesh_input *p)
 {
     ebpo_solid_volume before = mesh_input_solid(p, false), after = mesh_input_solid(p, true);
     if (!t->json && !t->quiet) {
         findings_print(stdout, t->in, &p->as_read, &p->prepared.before, &before, false);
         advice_print(stdout, p);
-        findings_print_mending(stdout, &p->prepared.record);
-        if (p->prepared.mended)
+        findings_print_repair(stdout, &p->prepared.record);
+        if (p->prepared.was_repaired)
             findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, &after, false);
         advice_print_shells(stdout, p);
     }
@@ -76,7 +76,7 @@ static void print_sound(const ebpo_info *info, const ebpo_solid_volume *solid, c
         printf("  sound     no: %s\n", advice_doubts(text, sizeof text, p));
         return;
     }
-    printf("  sound     yes: %s, %s; faces that cross were not looked for\n",
+    printf("  sound     yes: %s, %s; intersecting faces were not checked\n",
            info->report.manifold ? "a closed 2-manifold" : "its edges balance",
            findings_volume(volume, solid, &info->report, info->unit));
 }
@@ -109,7 +109,7 @@ static void print_levels(const ebpo_info *info, const ebpo_solid_volume *solid)
     putchar('\n');
 }
 
-/* A name as a shell reads it. */
+/* Prints a name quoted for a shell. */
 static void print_name(const char *name)
 {
     static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
@@ -128,7 +128,7 @@ static void print_name(const char *name)
     putchar('\'');
 }
 
-static void print_next(const convert_told *t, const ebpo_info *info, const mesh_input *p)
+static void print_next(const convert_reported *t, const ebpo_info *info, const mesh_input *p)
 {
     fputs("  next      ", stdout);
     if (p->doubts && t->repaired) {
@@ -142,12 +142,13 @@ static void print_next(const convert_told *t, const ebpo_info *info, const mesh_
         fputs(" --against", stdout);
         print_name(t->in);
     }
-    puts(p->doubts ? " (which repairs would make it a solid)" : " (whether all of it is there)");
+    puts(p->doubts ? " (finds repairs that make it a solid)"
+                   : " (checks that the file is complete)");
 }
 
 /* --- JSON --- */
 
-static void print_json(const convert_told *t, const mesh_input *p, const ebpo_info *info,
+static void print_json(const convert_reported *t, const mesh_input *p, const ebpo_info *info,
                        const ebpo_stored_sizes *stored, const progress_line *line,
                        const stage_facts *stages, double seconds)
 {
@@ -166,10 +167,10 @@ static void print_json(const convert_told *t, const mesh_input *p, const ebpo_in
     json_finish(&j);
 }
 
-/* Afterwards: what is on the disk, as a reader sees it. */
-static ebpo_status convert_tell_file(const convert_told *t, const mesh_input *p,
-                                     const progress_line *line, const stage_facts *stages,
-                                     double seconds, ebpo_error *error)
+/* Afterwards: reports the file on the disk, as a reader sees it. */
+static ebpo_status convert_report_file(const convert_reported *t, const mesh_input *p,
+                                       const progress_line *line, const stage_facts *stages,
+                                       double seconds, ebpo_error *error)
 {
     if (t->quiet && !t->json)
         return EBPO_OK;
@@ -202,26 +203,51 @@ typedef struct values {
     double epsilon, percent, max_error;
     int select, normals;
     int64_t seed;
-    const char *k_root, *target_size, *subtree_faces;
+    const char *k_root, *target_size, *subtree_faces, *parts;
     memory_values memory;
-    uint32_t with, without;
     int codec, face_coding, rule, profile;
-    mending mend;
+    repairing repair_record;
     bool require_solid, split_components, split_groups, embed_textures, timings, json, quiet;
     const char *unit, *crs, *date;
 } values;
 
-static const char *const with_words[] = { "leaf-planes", NULL };
-static const char *const without_words[] = {
-    "planes", "mesh", "maps", "attributes", "colours", NULL
-};
-/* of each word */
-static const uint32_t without_parts[] = { EBPO_PART_PLANES, EBPO_PART_MESH, EBPO_PART_MAPS,
-                                          EBPO_PART_ATTRIBUTES, EBPO_PART_COLOURS };
-
-enum { WITHOUT_MESH = 1 << 1, WITHOUT_ATTRIBUTES = 1 << 3 };
+/* Stored unless --parts or --profile is given. */
+#define DEFAULT_PARTS \
+    (EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS)
 
 #include "cli/options/convert.inc"
+
+/* Returns the parts of --parts, with all that they need, or 0 when the list is not usable. */
+static uint32_t listed_parts(const char *text)
+{
+    uint32_t parts = 0;
+    if (!subset_read_parts(text, DEFAULT_PARTS, &parts))
+        return 0;
+    uint32_t usable = parts;
+    if (!(parts & EBPO_PART_MESH))
+        usable &= ~(uint32_t)(EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS);
+    if (!(parts & EBPO_PART_ATTRIBUTES))
+        usable &= ~(uint32_t)EBPO_PART_COLOURS;
+    return text[0] == '-' || usable == parts ? usable : 0;
+}
+
+static int check_parts(const values *v)
+{
+    uint32_t parts;
+    if (!v->parts)
+        return EXIT_FINE;
+    if (v->profile >= 0)
+        return command_usage("convert", "--parts and --profile cannot be used together");
+    if (!subset_read_parts(v->parts, DEFAULT_PARTS, &parts))
+        return command_usage("convert", "--parts: '%s' " SUBSET_PARTS_EXPECTED, v->parts);
+    if (v->parts[0] != '-' && parts != listed_parts(v->parts))
+        return command_usage("convert", "--parts: maps, attributes and colours need mesh, and "
+                                        "colours need attributes; add them");
+    if (v->embed_textures && !(parts & EBPO_PART_ATTRIBUTES && parts & EBPO_PART_MESH))
+        return command_usage("convert", "--embed-textures needs the parts mesh and attributes: "
+                                        "textures are among the attributes");
+    return EXIT_FINE;
+}
 
 static int check_values(const values *v, const char *in, const char *out)
 {
@@ -230,20 +256,16 @@ static int check_values(const values *v, const char *in, const char *out)
     int code = selection_check("convert", &chosen);
     if (code != EXIT_FINE)
         return code;
-    if (!memory_good("convert", &v->memory) || mending_check("convert", v->mend) != EXIT_FINE)
+    if (!memory_good("convert", &v->memory) ||
+        repair_check("convert", v->repair_record) != EXIT_FINE)
         return EXIT_USAGE;
     if (v->zstd_level && v->codec != EBPO_CODEC_ZSTD)
         return command_usage("convert", "--zstd-level does not apply to --codec deflate or none");
-    if (v->profile >= 0 && (v->with || v->without))
-        return command_usage(
-            "convert", "--profile says which parts are stored; leave out --with and --without");
-    if (v->embed_textures && v->without & (WITHOUT_ATTRIBUTES | WITHOUT_MESH))
-        return command_usage("convert",
-                             "--embed-textures does not go with --without attributes or mesh: "
-                             "textures are among the attributes");
+    if (check_parts(v) != EXIT_FINE)
+        return EXIT_USAGE;
     if (v->split_components && v->split_groups)
         return command_usage("convert", "--split-components and --split-groups: choose one");
-    if (v->split_groups && (v->mend.fill_holes || v->mend.repair))
+    if (v->split_groups && (v->repair_record.fill_holes || v->repair_record.repair))
         return command_usage("convert", "--fill-holes and --repair do not go with --split-groups: "
                                         "what they add is in no group");
     if (v->date && !ebpo_is_date(v->date))
@@ -260,33 +282,21 @@ static bool judges_file(const values *v) { return v->max_error > 0 || v->target_
 static int check_need(const values *v, ebpo_subset_options *need)
 {
     int code = subset_need("convert", v->max_error, v->target_size, need);
-    if (code == EXIT_FINE && judges_file(v) && v->without & EBPO_PART_MESH)
-        return command_usage("convert",
-                             "--max-error and --target-size measure against the mesh; leave it out "
-                             "with --profile lod instead of --without mesh");
+    if (code == EXIT_FINE && judges_file(v) && v->parts &&
+        !(listed_parts(v->parts) & EBPO_PART_MESH))
+        return command_usage("convert", "--max-error and --target-size measure against the mesh, "
+                                        "which --parts omits; use --profile lod instead");
     return code;
 }
 
-static bool chooses_parts(const values *v)
-{
-    return v->target_size && v->profile < 0 && !v->with && !v->without;
-}
+static bool chooses_parts(const values *v) { return v->target_size && v->profile < 0 && !v->parts; }
 
 static uint32_t parts_of(const values *v)
 {
-    uint32_t without = 0;
-    for (int i = 0; without_words[i]; i++)
-        without |= v->without >> i & 1 ? without_parts[i] : 0;
     if (v->profile >= 0 ||
-        chooses_parts(
-            v)) /* all are built, so that the file is the one that a subset of the full one is */
+        chooses_parts(v)) /* all are built, so that the file equals a subset of the full file */
         return ebpo_profile_parts(EBPO_PROFILE_FULL);
-    if (without & EBPO_PART_MESH)
-        without |= EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS;
-    uint32_t parts = (EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES |
-                      EBPO_PART_COLOURS) &
-                     ~without;
-    return v->with ? parts | EBPO_PART_LEAF_PLANES : parts;
+    return v->parts ? listed_parts(v->parts) : DEFAULT_PARTS;
 }
 
 static mesh_reading reading_of(const values *v)
@@ -296,43 +306,43 @@ static mesh_reading reading_of(const values *v)
                                                  : READ_ATTRIBUTES;
 }
 
-static convert_told told_of(const values *v, const char *in, const char *out)
+static convert_reported reported_of(const values *v, const char *in, const char *out)
 {
     const char *shown = standard_files_shown(in);
-    return (convert_told){ .in = shown,
-                           .piped = shown != in,
-                           .out = out,
-                           .json = v->json,
-                           .quiet = v->quiet,
-                           .timings = v->timings,
-                           .repaired = v->mend.repair,
-                           .chosen = chooses_parts(v),
-                           .by_groups = v->split_groups };
+    return (convert_reported){ .in = shown,
+                               .piped = shown != in,
+                               .out = out,
+                               .json = v->json,
+                               .quiet = v->quiet,
+                               .timings = v->timings,
+                               .repaired = v->repair_record.repair,
+                               .chosen = chooses_parts(v),
+                               .by_groups = v->split_groups };
 }
 
 /* --- work --- */
 
-/* Said before the hours of building that judging afterwards would be too much. */
-static ebpo_status room_to_judge(const values *v, uint64_t faces, const char *in,
-                                 const ebpo_workspace *workspace, ebpo_error *error)
+/* Reports before a long build that checking the error afterwards would need too much memory. */
+static ebpo_status capacity_to_judge(const values *v, uint64_t faces, const char *in,
+                                     const ebpo_workspace *workspace, ebpo_error *error)
 {
-    ebpo_workspace_stats figures = EBPO_WORKSPACE_STATS_INIT;
+    ebpo_workspace_stats metrics = EBPO_WORKSPACE_STATS_INIT;
     uint64_t needed = ebpo_subset_memory(faces, (uint32_t)v->leaf_faces);
     char bytes[32], budget[32];
-    ebpo_workspace_get_stats(workspace, &figures);
-    if (needed <= figures.memory)
+    ebpo_workspace_get_stats(workspace, &metrics);
+    if (needed <= metrics.memory)
         return EBPO_OK;
     error->status = EBPO_E_LIMIT;
     snprintf(error->message, sizeof error->message,
-             "%s: --max-error and --target-size measure with the whole model in memory, about %s, "
-             "but the budget is %s; allow more with --memory, or leave them out here and use 'ebpo "
-             "subset' on a machine that has it",
+             "%s: --max-error and --target-size measure with the whole model in memory, about "
+             "%s, but the budget is %s; allow more with --memory, or omit them here and use "
+             "'ebpo subset' on a machine with more memory",
              in, words_bytes(bytes, sizeof bytes, needed),
-             words_bytes(budget, sizeof budget, figures.memory));
+             words_bytes(budget, sizeof budget, metrics.memory));
     return EBPO_E_LIMIT;
 }
 
-/* `need`: the error or size that was asked for. */
+/* `need`: the requested error or size. */
 static ebpo_status build_and_write(const values *v, mesh_input *p, const char *out,
                                    const ebpo_subset_options *need, ebpo_progress progress,
                                    ebpo_build_times *times, ebpo_error *error)
@@ -390,7 +400,7 @@ static ebpo_status build_and_write(const values *v, mesh_input *p, const char *o
     return status;
 }
 
-/* What the files of all components are made with. */
+/* Options for the files of all components. */
 typedef struct part_build {
     const values *v;
     const ebpo_subset_options *need;
@@ -401,7 +411,7 @@ typedef struct part_build {
 static ebpo_status part_fits(void *user, uint64_t faces, ebpo_error *error)
 {
     const part_build *b = user;
-    return judges_file(b->v) ? room_to_judge(b->v, faces, b->in, b->workspace, error) : EBPO_OK;
+    return judges_file(b->v) ? capacity_to_judge(b->v, faces, b->in, b->workspace, error) : EBPO_OK;
 }
 
 static ebpo_status build_part(void *user, mesh_input *part, const char *path,
@@ -433,14 +443,15 @@ static ebpo_status build_parts(part_build *build, mesh_input *p, const char *fol
     return parts_write(&run, p, begun, error);
 }
 
-/* What is known before the mesh is read; the rest afterwards. */
+/* Sets the stages known before the mesh is read; the others follow. */
 static stage_facts plan_stages(const values *v, const char *in)
 {
     const char *dot = strrchr(in, '.');
-    return (stage_facts){ .mended = v->mend.weld || v->mend.weld_distance > 0 ||
-                                    v->mend.drop_duplicates || v->mend.orient || v->mend.flip ||
-                                    v->mend.fill_holes || v->mend.repair ||
-                                    (dot && strcasecmp(dot, ".stl") == 0),
+    return (stage_facts){ .was_repaired =
+                              v->repair_record.weld || v->repair_record.weld_distance > 0 ||
+                              v->repair_record.drop_duplicates || v->repair_record.orient ||
+                              v->repair_record.flip || v->repair_record.fill_holes ||
+                              v->repair_record.repair || (dot && strcasecmp(dot, ".stl") == 0),
                           .solid = true,
                           .from_leaves =
                               ebpo_selection_describe((ebpo_selection)v->select)->from_leaves,
@@ -449,27 +460,26 @@ static stage_facts plan_stages(const values *v, const char *in)
                           .times = EBPO_BUILD_TIMES_INIT };
 }
 
-static const values usual = { .max_level = -1,
-                              .profile = -1,
-                              .leaf_faces = -1,
-                              .epsilon = -1,
-                              .percent = -1,
-                              .normals = -1,
-                              .seed = -1 };
+static const values standard = { .max_level = -1,
+                                 .profile = -1,
+                                 .leaf_faces = -1,
+                                 .epsilon = -1,
+                                 .percent = -1,
+                                 .normals = -1,
+                                 .seed = -1 };
 
-/* What was read is not what may be built. */
+/* The mesh must not be built. */
 static ebpo_status refuse_mesh(const values *v, const mesh_input *p, const char *in,
                                const ebpo_workspace *workspace, ebpo_error *error)
 {
     if (v->require_solid && !v->split_groups && p->doubts) {
         snprintf(error->message, sizeof error->message,
                  "%s: is %s, and --require-solid was given; nothing was written", in,
-                 p->doubts & EBPO_DOUBT_OPEN ? "not a solid"
-                                             : "probably not the solid that was meant");
+                 p->doubts & EBPO_DOUBT_OPEN ? "not a solid" : "probably not the intended solid");
         return error->status = EBPO_E_NOT_SOLID;
     }
     return judges_file(v) && !splits_mesh(v)
-               ? room_to_judge(v, p->mesh.face_count, in, workspace, error)
+               ? capacity_to_judge(v, p->mesh.face_count, in, workspace, error)
                : EBPO_OK;
 }
 
@@ -496,15 +506,15 @@ static ebpo_status convert_mesh(const values *v, const char *in, const char *out
     if (!splits_mesh(v))
         progress_plan(&line, plan, stages_plan(&stages, plan), &p.as_read.face_count);
     double begun = progress_now();
-    ebpo_status status =
-        mesh_input_read_groups(&p, in, v->mend, reading_of(v), v->split_groups ? &groups : NULL,
-                               workspace, (unsigned)v->threads, progress, error);
+    ebpo_status status = mesh_input_read_groups(&p, in, v->repair_record, reading_of(v),
+                                                v->split_groups ? &groups : NULL, workspace,
+                                                (unsigned)v->threads, progress, error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return status;
     p.rule = (ebpo_rule)v->rule;
-    convert_told told = told_of(v, in, out);
-    convert_tell_mesh(&told, &p);
+    convert_reported reported = reported_of(v, in, out);
+    convert_report_mesh(&reported, &p);
     status = refuse_mesh(v, &p, in, workspace, error);
     if (status == EBPO_OK && v->split_groups && !groups)
         status = no_groups(in, error);
@@ -525,7 +535,7 @@ static ebpo_status convert_mesh(const values *v, const char *in, const char *out
     stages_split(&line, &stages.times);
     stages.faces = p.as_read.face_count;
     return status == EBPO_OK
-               ? convert_tell_file(&told, &p, &line, &stages, progress_now() - begun, error)
+               ? convert_report_file(&reported, &p, &line, &stages, progress_now() - begun, error)
                : status;
 }
 
@@ -554,4 +564,4 @@ static int run_convert(void *given, const char **operand)
     return status == EBPO_OK ? EXIT_FINE : command_failed("convert", &error);
 }
 
-const command command_convert = { &spec, sizeof usual, &usual, run_convert };
+const command command_convert = { &spec, sizeof standard, &standard, run_convert };

@@ -1,4 +1,4 @@
-/* ebpo distance: how far points are from the model, and from what. */
+/* ebpo distance: measures distances of points to the model, and finds the nearest points. */
 #include <float.h>
 #include <stddef.h>
 
@@ -9,7 +9,7 @@
 
 #include "cli/options/distance.inc"
 
-/* Then all that is certain is an interval. */
+/* Then the result is only a certain interval. */
 static bool is_limited(const ebpo_distance_options *o)
 {
     return o->mode == EBPO_DISTANCE_EXACT && (o->level >= 0 || o->deadline_ns);
@@ -17,50 +17,50 @@ static bool is_limited(const ebpo_distance_options *o)
 
 typedef struct listing {
     const ebpo_sampler *sampler;
-    answer_text *text;
-    answer_form form;
+    result_text *text;
+    result_form form;
     bool begun;
 } listing;
 
 static bool list_face(void *user, const ebpo_near_face *face)
 {
     listing *l = user;
-    answers_near(l->text, l->form, face, !l->begun, l->sampler);
+    results_near(l->text, l->form, face, !l->begun, l->sampler);
     l->begun = true;
-    return !answer_text_is_over(l->text);
+    return !result_text_is_over(l->text);
 }
 
-static ebpo_status answer_lists(const query_job *job, query_worker *w, const double *rows,
+static ebpo_status result_lists(const query_job *job, query_worker *w, const double *rows,
                                 uint64_t count, ebpo_error *error)
 {
     ebpo_within_options o = EBPO_WITHIN_OPTIONS_INIT;
     ebpo_status status = EBPO_OK;
     o.radius = job->values->within;
     o.most = (uint64_t)job->values->nearest;
-    for (uint64_t i = 0; i < count && status == EBPO_OK && !answer_text_is_over(w->text); i++) {
+    for (uint64_t i = 0; i < count && status == EBPO_OK && !result_text_is_over(w->text); i++) {
         listing l = { job->sampler, w->text, job->form, false };
         status = ebpo_distance_within(w->context, rows + 3 * i, &o, list_face, &l, error);
         if (status == EBPO_OK)
-            answers_near_end(w->text, job->form, !l.begun, job->sampler);
+            results_near_end(w->text, job->form, !l.begun, job->sampler);
     }
     return status;
 }
 
-/* The numbers of a catalogue's models, behind the results. */
+/* Returns the indices of models in a catalogue, which follow the results. */
 static uint64_t *models_of(const query_worker *w, uint64_t count)
 {
     return (uint64_t *)(void *)((ebpo_distance_result *)w->results + count);
 }
 
-static ebpo_status answer_distances(const query_job *job, query_worker *w, const double *rows,
+static ebpo_status result_distances(const query_job *job, query_worker *w, const double *rows,
                                     uint64_t count, ebpo_error *error)
 {
-    ebpo_catalogue_ask_options how = query_catalogue_options(job);
+    ebpo_catalogue_query_options how = query_catalogue_options(job);
     if (job->catalogue)
         return ebpo_catalogue_distance(job->catalogue, job->models, rows, count, &how, w->results,
                                        models_of(w, count), error);
     if (count && query_lists(job->values))
-        return answer_lists(job, w, rows, count, error);
+        return result_lists(job, w, rows, count, error);
     return ebpo_distance_many(w->context, rows, count, &job->distance, w->results, error);
 }
 
@@ -69,7 +69,7 @@ static void print_distances(const query_job *job, query_worker *w, const double 
 {
     (void)rows;
     if (!query_lists(job->values))
-        answers_distance(w->text, job->form, !job->catalogue && is_limited(&job->distance),
+        results_distance(w->text, job->form, !job->catalogue && is_limited(&job->distance),
                          w->results, count, job->sampler,
                          job->catalogue ? models_of(w, count) : NULL);
 }
@@ -98,29 +98,29 @@ static const char *distance_dtype(const query_job *job, unsigned *bytes)
                  "'<u8')]";
 }
 
-static const query_values usual = QUERY_VALUES_INIT;
+static const query_values standard = QUERY_VALUES_INIT;
 
 static int run_distance(void *given, const char **operand)
 {
     query_values *v = given;
     if (!query_distance_fits("distance", v) ||
-        (v->level >= 0 && !query_accepts("distance", v, QUERY_MAX_DISTANCE, "--level")))
+        (v->level >= 0 && !query_accepts("distance", v, QUERY_MAX_DISTANCE, "--max-level")))
         return EXIT_USAGE;
     if (v->attribute && v->distance_mode == EBPO_DISTANCE_ENVELOPE)
-        return command_usage("distance", "--attribute has no effect with --mode envelope; leave "
-                                         "out one of them");
+        return command_usage("distance", "--attribute has no effect with --mode envelope; omit "
+                                         "one of them");
     if (v->attribute && !query_accepts("distance", v, QUERY_LEVEL | QUERY_DEADLINE, "--attribute"))
         return EXIT_USAGE;
     query_job job = { .command = "distance",
                       .values = v,
                       .kind = POINTS,
                       .result_bytes = sizeof(ebpo_distance_result),
-                      .parts_share = 0.65, /* docs/measured/asking.md */
-                      .answer = answer_distances,
+                      .parts_share = 0.65, /* docs/measured/queries.md */
+                      .result = result_distances,
                       .print = print_distances,
                       .columns = distance_columns,
                       .dtype = distance_dtype };
     return query_run(&job, operand[0], operand[1]);
 }
 
-const command command_distance = { &spec, sizeof usual, &usual, run_distance };
+const command command_distance = { &spec, sizeof standard, &standard, run_distance };

@@ -1,4 +1,5 @@
-/* ebpo export: levels and the model in other programs' formats. PLY is ebpo extract's. */
+/* ebpo export: writes levels and the model in formats of other programs. ebpo extract writes PLY.
+ */
 #include <inttypes.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -58,8 +59,7 @@ static int choose_levels(values *v, ebpo_export_options *o)
     if (!words_read_levels(v->levels, &levels))
         return command_usage("export", "--levels: '%s' is not " WORDS_LEVELS_EXPECTED, v->levels);
     if (!levels.is_run)
-        return command_usage("export",
-                             "--levels: '%s' leaves out levels; give a first and a last one",
+        return command_usage("export", "--levels: '%s' omits levels; give a first and a last one",
                              v->levels);
     o->first_level = levels.first;
     o->last_level = levels.last;
@@ -76,7 +76,7 @@ static int check_names(const char *in, const char *out, const char *second)
     return EXIT_FINE;
 }
 
-/* --- what was written --- */
+/* --- output --- */
 
 static void print_colours(const ebpo_export_report *r)
 {
@@ -85,8 +85,8 @@ static void print_colours(const ebpo_export_report *r)
         if (of[i] != EBPO_EXPORT_NO_COLOURS)
             printf("colours of %s: %s\n", i ? "faces" : "vertices",
                    of[i] == EBPO_EXPORT_WRITTEN ? "written"
-                   : i ? "left out, as this format has none; xdmf and vtkhdf do"
-                       : "left out, as this format has none; the other formats do");
+                   : i ? "omitted, as this format has none; xdmf and vtkhdf do"
+                       : "omitted, as this format has none; the other formats do");
 }
 
 static void print_report(const char *out, const char *second, const ebpo_export_report *r)
@@ -178,13 +178,13 @@ static int write_out(const values *v, const char *in, const char *out, const cha
         else if (!v->quiet)
             print_report(out, second, &report);
         if (!v->json)
-            remote_tell(&t, &v->remote, false);
+            remote_report(&t, &v->remote, false);
     }
     ebpo_close(file);
     return status == EBPO_OK ? EXIT_FINE : command_failed("export", &error);
 }
 
-static const values usual = { .format = -1, .level = -1, .remote = REMOTE_VALUES_INIT };
+static const values standard = { .format = -1, .level = -1, .remote = REMOTE_VALUES_INIT };
 
 static int run_export(void *given, const char **operand)
 {
@@ -210,4 +210,4 @@ static int run_export(void *given, const char **operand)
     return write_out(v, operand[0], operand[1], second, &o);
 }
 
-const command command_export = { &spec, sizeof usual, &usual, run_export };
+const command command_export = { &spec, sizeof standard, &standard, run_export };

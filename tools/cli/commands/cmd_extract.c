@@ -1,4 +1,4 @@
-/* ebpo extract: a level's envelopes, the model itself, or a part of it, as PLY. */
+/* ebpo extract: writes the envelopes of a level, the model, or a part of it, as PLY. */
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -15,49 +15,49 @@
 #include "cli/words.h"
 #include "cli/commands/commands.h"
 
-/* What is written. */
+/* The mesh to write. */
 typedef struct extracted {
     ebpo_mesh mesh;
-    ebpo_subtree *lender; /* of the mesh, unless NULL */
+    ebpo_subtree *lender; /* owner of the mesh, unless NULL */
     double volume;
 } extracted;
 
 typedef struct values {
     int64_t level, subtree, threads;
     memory_values memory;
-    bool mesh, no_walls, json, quiet;
+    bool mesh, no_cell_faces, json, quiet;
     const char *textures;
     remote_values remote;
 } values;
 
-/* All octcodes are below; limits of options are doubles, which hold this one. */
-#define OCTCODE_MOST (INT64_C(1) << 61)
+/* All octcodes are smaller; limits of options are doubles, which represent this one exactly. */
+#define OCTCODE_MAX (INT64_C(1) << 61)
 
 #include "cli/options/extract.inc"
 
 static int check_values(const values *v, const char *in, const char *out)
 {
-    int asked = (v->level >= 0) + v->mesh + (v->subtree > 0);
+    int queried = (v->level >= 0) + v->mesh + (v->subtree > 0);
     if (v->textures && strcmp(v->textures, "-") == 0)
         return command_usage("extract", "--textures: '-': a folder's name is needed here");
-    if (asked == 0 && v->textures && !out)
+    if (queried == 0 && v->textures && !out)
         return v->json ? command_usage("extract", "--json does not go with --textures alone")
                        : EXIT_FINE;
-    if (asked == 0)
+    if (queried == 0)
         return command_usage("extract", "specify --level N, --mesh or --subtree OCTCODE");
     if (!out)
         return command_usage("extract", "missing operand; expected: FILE OUT.ply");
-    if (asked > 1)
+    if (queried > 1)
         return command_usage("extract", "--level, --mesh and --subtree cannot be used together");
-    if (v->level < 0 && v->no_walls)
+    if (v->level < 0 && v->no_cell_faces)
         return command_usage("extract",
-                             "--no-walls belongs to --level; the model has no cell walls");
+                             "--no-cell-faces belongs to --level; the model has no cell walls");
     if (command_overwrites("extract", in, out))
         return EXIT_USAGE;
     return EXIT_FINE;
 }
 
-/* Gray nodes of a whole subtree that have no children are pruned. */
+/* Gray nodes without children in a whole subtree are pruned. */
 static void warn_of_pruned(const ebpo_subtree *subtree, const char *path)
 {
     ebpo_subtree_nodes nodes = EBPO_SUBTREE_NODES_INIT;
@@ -70,12 +70,12 @@ static void warn_of_pruned(const ebpo_subtree *subtree, const char *path)
     words_plural(lacking, sizeof lacking, pruned, "node", "nodes");
     if (pruned)
         fprintf(stderr,
-                "ebpo extract: %s: note: is a subset without what is below %s of this subtree, so "
-                "faces are missing\n",
+                "ebpo extract: %s: note: is a subset without the nodes below %s of this subtree, "
+                "so faces are missing\n",
                 remote_shown(path), lacking);
 }
 
-/* Its faces as a mesh, lent by the subtree. */
+/* Returns the faces as a mesh, borrowed from the subtree. */
 static ebpo_status take_subtree(const ebpo_file *file, const values *v, const char *path,
                                 const ebpo_workspace *workspace, extracted *out, ebpo_error *error)
 {
@@ -98,7 +98,7 @@ static ebpo_status take_subtree(const ebpo_file *file, const values *v, const ch
     return status;
 }
 
-/* What stands in other elements is written where numbers of vertices are those of the source. */
+/* Data of other elements is written when vertex indices are those of the source. */
 static void warn_of_elements(const ebpo_file *file, bool source_order, const char *path)
 {
     ebpo_attribute_facts a = EBPO_ATTRIBUTE_FACTS_INIT;
@@ -106,10 +106,10 @@ static void warn_of_elements(const ebpo_file *file, bool source_order, const cha
     for (unsigned n = 0; ebpo_file_attribute(file, n, &a); n++)
         others = others || (strcmp(a.element, "vertex") != 0 && strcmp(a.element, "face") != 0 &&
                             strcmp(a.element, "ebpo:texture") != 0);
-    if (others && (!source_order || ebpo_file_info(file)->mend.welded_vertices))
+    if (others && (!source_order || ebpo_file_info(file)->repair_record.welded_vertices))
         fprintf(stderr,
-                "ebpo extract: %s: note: other elements are left out, as their numbers of vertices "
-                "are the source's\n",
+                "ebpo extract: %s: note: other elements are omitted, as their vertex indices "
+                "refer to the source\n",
                 remote_shown(path));
 }
 
@@ -121,7 +121,7 @@ static ebpo_status take_part(ebpo_file *file, const values *v, const char *path,
         return take_subtree(file, v, path, workspace, out, error);
     if (!v->mesh) {
         ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
-        lod.walls = !v->no_walls;
+        lod.cell_faces = !v->no_cell_faces;
         lod.threads = (unsigned)v->threads;
         lod.progress = progress;
         lod.workspace = workspace;
@@ -187,7 +187,7 @@ static void summarise_json(const values *v, const char *path, const extracted *o
     json_finish(&j);
 }
 
-static const values usual = { .level = -1, .subtree = -1, .remote = REMOTE_VALUES_INIT };
+static const values standard = { .level = -1, .subtree = -1, .remote = REMOTE_VALUES_INIT };
 
 static int run_extract(void *given, const char **operand)
 {
@@ -222,7 +222,7 @@ static int run_extract(void *given, const char **operand)
         else if (operand[1] && !v->quiet)
             print_summary(v, operand[1], &out);
         if (!v->json)
-            remote_tell(&t, &v->remote, false);
+            remote_report(&t, &v->remote, false);
     }
     if (!out.lender)
         ebpo_mesh_free(&out.mesh);
@@ -232,4 +232,4 @@ static int run_extract(void *given, const char **operand)
     return status == EBPO_OK ? EXIT_FINE : command_failed("extract", &error);
 }
 
-const command command_extract = { &spec, sizeof usual, &usual, run_extract };
+const command command_extract = { &spec, sizeof standard, &standard, run_extract };

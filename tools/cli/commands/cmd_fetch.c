@@ -1,4 +1,4 @@
-/* ebpo fetch: a file, or a part of it, from a web server; what has come stays when it is
+/* ebpo fetch: fetches a file, or a part of it, from a web server; keeps the fetched data when
  * interrupted. */
 #include <dirent.h>
 #include <errno.h>
@@ -19,7 +19,7 @@
 
 #include "cli/options/fetch.inc"
 
-/* --- the folder OUT.part: blocks as the library keeps them (--http-cache) --- */
+/* --- the folder OUT.part: blocks as in the cache of the library (--http-cache) --- */
 
 static const char BLOCK[] = ".ebpo-block", TEMPORARY[] = ".ebpo-part-";
 
@@ -30,7 +30,7 @@ static bool is_ours(const char *name)
            strncmp(name, TEMPORARY, sizeof TEMPORARY - 1) == 0;
 }
 
-/* Takes the blocks away, and the folder when nothing else is in it. */
+/* Removes the blocks, and the folder when it is then empty. */
 static void remove_part(const char *folder)
 {
     DIR *d = opendir(folder);
@@ -43,11 +43,11 @@ static void remove_part(const char *folder)
     rmdir(folder);
 }
 
-/* --- progress: the transfers' own thread draws, as this one waits for them --- */
+/* --- progress: drawn by the thread of transfers, while this thread waits --- */
 
 typedef struct ticker {
     _Atomic bool active;
-    _Atomic bool shown;        /* the transfers' thread ticks */
+    _Atomic bool shown;        /* called by the thread of transfers */
     _Atomic(ebpo_file *) file; /* NULL while it is being opened */
     double last;
 } ticker;
@@ -85,9 +85,9 @@ static void wipe_ticker(ticker *t)
 
 /* --- work --- */
 
-/* What the folder held when the file was opened; true when that is of use. */
-static bool tell_resuming(const subset_values *v, ebpo_file *file, const char *url,
-                          const char *part)
+/* Reports the data in the folder when the file was opened; returns true when it is usable. */
+static bool report_resuming(const subset_values *v, ebpo_file *file, const char *url,
+                            const char *part)
 {
     ebpo_http_stats s = EBPO_HTTP_STATS_INIT;
     char bytes[32];
@@ -126,7 +126,7 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
     ebpo_status status = remote_open(&file, url, &v->remote, &error);
     if (t.shown)
         fputs("\r\033[K", stderr);
-    bool held = status == EBPO_OK && part && tell_resuming(v, file, url, part);
+    bool held = status == EBPO_OK && part && report_resuming(v, file, url, part);
     atomic_store(&t.file, file);
     if (status == EBPO_OK)
         status = subset_settle(v, ebpo_file_info(file), remote_shown(url), subset, &error);
@@ -136,35 +136,35 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
     wipe_ticker(&t);
     if (status == EBPO_OK) {
         traffic seen = traffic_of(file);
-        status = subset_tell(v, out, ebpo_file_info(file), &seen, progress_now() - begun, &error);
+        status = subset_report(v, out, ebpo_file_info(file), &seen, progress_now() - begun, &error);
         if (status == EBPO_OK && !v->json)
-            remote_tell(&seen, &v->remote, false);
+            remote_report(&seen, &v->remote, false);
     }
     ebpo_close(file);
     if (part && status == EBPO_E_FORMAT &&
-        access(part, F_OK) == 0) { /* kept blocks would be damaged the next time as well */
+        access(part, F_OK) == 0) { /* otherwise the kept blocks would be damaged the next time as
+                                    * well */
         remove_part(part);
         int code = command_failed("fetch", &error);
-        fprintf(stderr, "ebpo fetch: what had been fetched was removed, as it may have been "
-                        "damaged in transit; the same command starts again\n");
+        fprintf(stderr, "ebpo fetch: the fetched data was removed, as it may have been damaged "
+                        "in transit; run the same command to start again\n");
         return code;
     }
     if (part && (status == EBPO_OK ||
-                 (usage && !held))) /* a slip in an option takes nothing away that came before */
+                 (usage && !held))) /* an error in an option never removes existing data */
         remove_part(part);
     if (part && status != EBPO_OK && !usage && access(part, F_OK) == 0 &&
         rmdir(part) != 0) { /* an empty one is of no use */
         int code = command_failed("fetch", &error);
         fprintf(stderr,
-                "ebpo fetch: what has been fetched is kept in %s; the same command resumes from "
-                "there\n",
+                "ebpo fetch: the fetched data is kept in %s; run the same command to resume\n",
                 part);
         return code;
     }
     return status == EBPO_OK ? EXIT_FINE : command_failed("fetch", &error);
 }
 
-/* Before anything is fetched: false when it could not be put in its place. */
+/* Checks before fetching: returns false when the output could not be put in its place. */
 static bool out_fits(const char *out, const char *part)
 {
     struct stat s;
@@ -173,16 +173,14 @@ static bool out_fits(const char *out, const char *part)
         return false;
     }
     if (part && lstat(part, &s) == 0 && !S_ISDIR(s.st_mode)) {
-        fprintf(
-            stderr,
-            "ebpo fetch: %s: is in the way of the folder for what has been fetched; move it away\n",
-            part);
+        fprintf(stderr, "ebpo fetch: %s: prevents the folder for fetched data; move it away\n",
+                part);
         return false;
     }
     return true;
 }
 
-static const subset_values usual = SUBSET_VALUES_INIT;
+static const subset_values standard = SUBSET_VALUES_INIT;
 
 static int run_fetch(void *given, const char **operand)
 {
@@ -193,7 +191,7 @@ static int run_fetch(void *given, const char **operand)
         return code;
     if (!command_wants_hdf5("fetch", operand[0]))
         return EXIT_FAILED;
-    char *part = NULL; /* with a folder of the user's, that one does */
+    char *part = NULL; /* with a cache folder of the user, that one keeps the data */
     if (ebpo_is_url(operand[0]) && !v->remote.cache && asprintf(&part, "%s.part", operand[1]) < 0)
         return command_no_memory("fetch");
     code = out_fits(operand[1], part) ? fetch_subset(v, operand[0], operand[1], part, &subset)
@@ -202,4 +200,4 @@ static int run_fetch(void *given, const char **operand)
     return code;
 }
 
-const command command_fetch = { &spec, sizeof usual, &usual, run_fetch };
+const command command_fetch = { &spec, sizeof standard, &standard, run_fetch };

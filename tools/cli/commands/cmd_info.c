@@ -1,4 +1,4 @@
-/* ebpo info: what a file is and holds. Reads the head only. */
+/* ebpo info: describes a file and its contents. Reads the header only. */
 #include <stddef.h>
 #include <stdio.h>
 
@@ -18,7 +18,7 @@ typedef struct values {
 
 #include "cli/options/info.inc"
 
-static const values usual = { .remote = REMOTE_VALUES_INIT };
+static const values standard = { .remote = REMOTE_VALUES_INIT };
 
 static ebpo_status plan_memory(const ebpo_file *file, const values *v, ebpo_model_plan *out,
                                ebpo_error *error)
@@ -26,7 +26,7 @@ static ebpo_status plan_memory(const ebpo_file *file, const values *v, ebpo_mode
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     if (!v->memory)
         return EBPO_OK;
-    (void)words_read_size(v->memory, &how.memory); /* run saw to it */
+    (void)words_read_size(v->memory, &how.memory); /* run has checked it */
     return ebpo_model_memory(file, &how, out, error);
 }
 
@@ -93,11 +93,11 @@ static int run_info(void *given, const char **operand)
         print_json(v, remote_shown(operand[0]), file, &stored, &plan, &images, &t);
     } else {
         print_words(v, remote_shown(operand[0]), file, &stored, &plan, &images);
-        remote_tell(&t, &v->remote, false);
+        remote_report(&t, &v->remote, false);
     }
     textures_free(&images);
     ebpo_close(file);
     return EXIT_FINE;
 }
 
-const command command_info = { &spec, sizeof usual, &usual, run_info };
+const command command_info = { &spec, sizeof standard, &standard, run_info };

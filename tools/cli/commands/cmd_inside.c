@@ -1,4 +1,4 @@
-/* ebpo inside: which points are in the solid. */
+/* ebpo inside: classifies points as inside, outside or on the surface. */
 #include <stddef.h>
 
 #include "cli/command.h"
@@ -8,10 +8,10 @@
 
 #include "cli/options/inside.inc"
 
-static ebpo_status answer_inside(const query_job *job, query_worker *w, const double *rows,
+static ebpo_status result_inside(const query_job *job, query_worker *w, const double *rows,
                                  uint64_t count, ebpo_error *error)
 {
-    ebpo_catalogue_ask_options how = query_catalogue_options(job);
+    ebpo_catalogue_query_options how = query_catalogue_options(job);
     return job->catalogue
                ? ebpo_catalogue_inside(job->catalogue, job->models, rows, count, &how, w->results,
                                        error)
@@ -21,7 +21,7 @@ static ebpo_status answer_inside(const query_job *job, query_worker *w, const do
 static void print_inside(const query_job *job, query_worker *w, const double *rows, uint64_t count)
 {
     (void)rows;
-    answers_inside(w->text, job->form, w->results, count);
+    results_inside(w->text, job->form, w->results, count);
 }
 
 static const char *inside_columns(const query_job *job)
@@ -37,7 +37,7 @@ static const char *inside_dtype(const query_job *job, unsigned *bytes)
     return "[('where', '<i4'), ('winding', '<i4')]";
 }
 
-static const query_values usual = QUERY_VALUES_INIT;
+static const query_values standard = QUERY_VALUES_INIT;
 
 static int run_inside(void *given, const char **operand)
 {
@@ -48,12 +48,12 @@ static int run_inside(void *given, const char **operand)
                       .values = v,
                       .kind = POINTS,
                       .result_bytes = sizeof(ebpo_inside_result),
-                      .parts_share = 0.05, /* docs/measured/asking.md */
-                      .answer = answer_inside,
+                      .parts_share = 0.05, /* docs/measured/queries.md */
+                      .result = result_inside,
                       .print = print_inside,
                       .columns = inside_columns,
                       .dtype = inside_dtype };
     return query_run(&job, operand[0], operand[1]);
 }
 
-const command command_inside = { &spec, sizeof usual, &usual, run_inside };
+const command command_inside = { &spec, sizeof standard, &standard, run_inside };

@@ -1,4 +1,4 @@
-/* ebpo levels: the levels as they arrive, coarse to fine. */
+/* ebpo levels: prints the levels as they arrive, coarse to fine. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -17,7 +17,7 @@
 #include "cli/commands/commands.h"
 
 typedef struct values {
-    int64_t to, threads;
+    int64_t max_level, threads;
     const char *memory;
     bool nodes, json;
     remote_values remote;
@@ -32,7 +32,7 @@ typedef struct printer {
     json j;
 } printer;
 
-/* Of the last level's volume; a flat surface has none. */
+/* Share of the last level's volume; a flat surface has none. */
 static double volume_share(const printer *p, double volume)
 {
     double last = facts_volume(p->info, p->info->level_count - 1);
@@ -108,7 +108,7 @@ static void json_node(json *j, const ebpo_stream_node *n)
     json_end(j);
 }
 
-static ebpo_status tell_nodes(printer *p, ebpo_stream *stream, ebpo_error *error)
+static ebpo_status report_nodes(printer *p, ebpo_stream *stream, ebpo_error *error)
 {
     ebpo_stream_node node;
     ebpo_status status;
@@ -128,10 +128,10 @@ static ebpo_status tell_nodes(printer *p, ebpo_stream *stream, ebpo_error *error
 
 /* --- all levels --- */
 
-/* Whoever reads along sees each level when it is there; once nobody can (*arrived false), there is
- * no point in reading on. */
-static ebpo_status tell_levels(printer *p, ebpo_stream *stream, int last, bool *arrived,
-                               ebpo_error *error)
+/* Flushes each level for a reader of the output; stops reading when the output is closed (*arrived
+ * false). */
+static ebpo_status report_levels(printer *p, ebpo_stream *stream, int last, bool *arrived,
+                                 ebpo_error *error)
 {
     ebpo_stream_level level;
     ebpo_status status = EBPO_OK;
@@ -146,7 +146,7 @@ static ebpo_status tell_levels(printer *p, ebpo_stream *stream, int last, bool *
         else
             print_level(p, &level, ms);
         if (p->v->nodes)
-            status = tell_nodes(p, stream, error);
+            status = report_nodes(p, stream, error);
         if (p->v->json)
             json_end(&p->j);
         *arrived = command_flush("levels");
@@ -193,9 +193,9 @@ static ebpo_status stream_levels(printer *p, ebpo_file *file, const char *path, 
     } else {
         print_head(remote_shown(path), p->info);
     }
-    int to = p->v->to >= 0 ? (int)p->v->to : last;
+    int to = p->v->max_level >= 0 ? (int)p->v->max_level : last;
     ebpo_stream_prefetch(stream, to);
-    status = tell_levels(p, stream, to, arrived, error);
+    status = report_levels(p, stream, to, arrived, error);
     traffic t = traffic_of(file);
     if (p->v->json) {
         json_end(&p->j);
@@ -204,13 +204,13 @@ static ebpo_status stream_levels(printer *p, ebpo_file *file, const char *path, 
     } else {
         if (status == EBPO_OK && *arrived)
             print_legend(p->info);
-        remote_tell(&t, &p->v->remote, false);
+        remote_report(&t, &p->v->remote, false);
     }
     ebpo_stream_free(stream);
     return status;
 }
 
-static const values usual = { .to = -1, .remote = REMOTE_VALUES_INIT };
+static const values standard = { .max_level = -1, .remote = REMOTE_VALUES_INIT };
 
 static int run_levels(void *given, const char **operand)
 {
@@ -225,7 +225,7 @@ static int run_levels(void *given, const char **operand)
     if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)
         return command_failed("levels", &error);
     p.info = ebpo_file_info(file);
-    bool there = command_has_level("levels", p.info, v->to), arrived = true;
+    bool there = command_has_level("levels", p.info, v->max_level), arrived = true;
     ebpo_status status = there ? stream_levels(&p, file, operand[0], &arrived, &error) : EBPO_OK;
     ebpo_close(file);
     if (!there)
@@ -235,4 +235,4 @@ static int run_levels(void *given, const char **operand)
     return status == EBPO_OK ? EXIT_FINE : command_failed("levels", &error);
 }
 
-const command command_levels = { &spec, sizeof usual, &usual, run_levels };
+const command command_levels = { &spec, sizeof standard, &standard, run_levels };

@@ -1,4 +1,4 @@
-/* ebpo map: distances on a plane, on a grid, or at another model's vertices. */
+/* ebpo map: computes distances on a plane, on a grid, or at the vertices of another model. */
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
@@ -21,9 +21,9 @@
 
 /* --- the points of a plane or grid --- */
 
-enum { LONGER_EDGE = 1000, GRID_MOST = 1 << 20 };
+enum { LONGER_EDGE = 1000, GRID_MAX = 1 << 20 };
 
-/* `count` finite numbers with commas between them, and nothing else. */
+/* Reads `count` finite numbers separated by commas, and nothing else. */
 static bool read_reals(const char *text, int count, double *out)
 {
     for (int i = 0; i < count; i++) {
@@ -70,8 +70,8 @@ static int find_box(const map_job *j, double low[3], double high[3])
             low[c] = info->box_origin[c] - j->v->margin * longest;
             high[c] = info->box_origin[c] + info->box_size[c] + j->v->margin * longest;
         }
-        if (!isfinite(high[c] - low[c])) /* what is computed of it would be no number */
-            return command_usage("map", "a box whose edges are longer than a double tells");
+        if (!isfinite(high[c] - low[c])) /* results would be no numbers */
+            return command_usage("map", "the edges of the box are beyond the range of a double");
     }
     return EXIT_FINE;
 }
@@ -84,7 +84,7 @@ typedef struct rectangle {
     double corner[3], edge[2][3];
 } rectangle;
 
-/* "z=0.5" or "z=50%": the coordinate, by the model's box. */
+/* Reads "z=0.5" or "z=50%": the coordinate, in the bounding box of the model. */
 static bool read_place(const map_job *j, const char *text, int *axis, double *at)
 {
     const ebpo_info *info = ebpo_file_info(j->file);
@@ -102,7 +102,7 @@ static bool read_place(const map_job *j, const char *text, int *axis, double *at
     return isfinite(*at);
 }
 
-/* Right and up as one looks at it: x and y, x and z, or y and z. */
+/* Right and up for the viewer: x and y, x and z, or y and z. */
 static int find_rectangle(const map_job *j, rectangle *r)
 {
     double all[9], low[3], high[3], at;
@@ -121,8 +121,8 @@ static int find_rectangle(const map_job *j, rectangle *r)
     if (!read_reals(j->v->plane, 9, all))
         return refuse_value(
             "--plane", j->v->plane,
-            "x=V, y=V or z=V with a number or a share such as 50%, or nine numbers: a "
-            "corner and two edges");
+            "x=V, y=V or z=V with a number or a share such as 50%, or nine numbers: a corner and "
+            "two edges");
     if (j->v->box)
         return command_usage("map", "--box belongs to --grid and to planes across an axis");
     if (j->v->margin != MAP_MARGIN)
@@ -165,7 +165,7 @@ static int lattice_of_plane(map_job *j)
         for (int c = 0; c < 3; c++)
             l->step[i][c] = r.edge[i][c] / (double)(l->count[i] - 1);
     step = length_of(l->step[0]);
-    for (int c = 0; c < 3; c++) { /* across, for formats that want one */
+    for (int c = 0; c < 3; c++) { /* the normal, for formats that need one */
         int d = (c + 1) % 3, e = (c + 2) % 3;
         l->step[2][c] =
             step * (r.edge[0][d] / a * (r.edge[1][e] / b) - r.edge[0][e] / a * (r.edge[1][d] / b));
@@ -180,7 +180,7 @@ static int lattice_of_grid(map_job *j)
     ebpo_error error = EBPO_ERROR_INIT;
     bool good = read_reals(j->v->grid, 3, numbers);
     for (int c = 0; c < 3 && good; c++) {
-        good = numbers[c] >= 1 && numbers[c] <= GRID_MOST && numbers[c] == floor(numbers[c]);
+        good = numbers[c] >= 1 && numbers[c] <= GRID_MAX && numbers[c] == floor(numbers[c]);
         count[c] = good ? (uint64_t)numbers[c] : 0;
     }
     if (!good)
@@ -193,14 +193,14 @@ static int lattice_of_grid(map_job *j)
     return EXIT_FINE;
 }
 
-/* From --plane, --grid, --box, --margin and --size. An exit code; what is wrong was said. */
+/* Reads --plane, --grid, --box, --margin and --size. Returns an exit code; errors were reported. */
 static int map_find_lattice(map_job *j)
 {
     j->plane = j->v->plane != NULL;
     return j->plane ? lattice_of_plane(j) : lattice_of_grid(j);
 }
 
-/* Pictures of distances: a plane's points as pixels, a painted mesh; a legend beside them. */
+/* Pictures of distances: the points of a plane as pixels, or a painted mesh, with a legend. */
 
 #if EBPO_HAVE_PNG
 
@@ -222,7 +222,7 @@ static void put_pixel(picture *p, int x, int y, const uint8_t rgb[3])
         to[c] = rgb[c];
 }
 
-/* A bar of all colours, with numbers where it ends and in the middle. */
+/* Draws a bar of all colours, with numbers at its ends and in the middle. */
 static ebpo_status draw_legend(const map_job *j, picture *p, int x, bool has_signs,
                                ebpo_error *error)
 {
@@ -246,7 +246,7 @@ static ebpo_status draw_legend(const map_job *j, picture *p, int x, bool has_sig
     return status;
 }
 
-/* Where the sign changes between neighbours, or it is 0: the surface. */
+/* Returns true when the sign changes between neighbours, or the value is 0: the surface. */
 static bool on_surface(const double *values, int width, int height, int x, int y)
 {
     double own = values[(size_t)y * (size_t)width + (size_t)x];
@@ -360,7 +360,7 @@ static ebpo_status keep_layer(void *user, const double *values, uint64_t first, 
     return EBPO_OK;
 }
 
-/* The values of a plane, which its picture needs anyway. */
+/* Computes the values of a plane, which its picture needs, too. */
 static ebpo_status map_plane(map_job *j, ebpo_error *error)
 {
     uint64_t count = j->lattice.count[0] * j->lattice.count[1];
@@ -419,7 +419,7 @@ static ebpo_status read_other(const map_job *j, ebpo_progress progress, ebpo_mes
     return status;
 }
 
-/* A mesh's coordinates may be floats. */
+/* Converts coordinates of a mesh, which may be floats. */
 static double *points_of(const ebpo_mesh *m)
 {
     double *points = malloc((m->vertex_count + 1) * 3 * sizeof *points);
@@ -432,7 +432,7 @@ static ebpo_status paint_map(map_job *j, ebpo_mesh *m, const double *distances, 
 {
     if (j->range == 0)
         j->range = j->stats.percentile_unsigned[5];
-    if (!(j->range > 0)) /* nothing but zeros */
+    if (!(j->range > 0)) /* only zeros */
         j->range = j->stats.farthest > 0 ? j->stats.farthest : 1;
     ebpo_status status =
         ebpo_map_paint(m, distances, (ebpo_map_palette)j->v->palette, j->range, error);
@@ -446,10 +446,10 @@ static ebpo_status paint_map(map_job *j, ebpo_mesh *m, const double *distances, 
 static ebpo_status find_reach(map_job *j, const ebpo_mesh *m, const double *distances,
                               ebpo_error *error)
 {
-    ebpo_map_reach_options o = EBPO_MAP_REACH_OPTIONS_INIT;
+    ebpo_map_range_options o = EBPO_MAP_RANGE_OPTIONS_INIT;
     o.threads = j->options.threads;
     o.progress = j->options.progress;
-    return ebpo_map_find_reach(j->model, m, distances, &o, &j->reach, error);
+    return ebpo_map_find_range(j->model, m, distances, &o, &j->reach, error);
 }
 
 static ebpo_status map_vertices(map_job *j, ebpo_progress progress, ebpo_error *error)
@@ -462,7 +462,7 @@ static ebpo_status map_vertices(map_job *j, ebpo_progress progress, ebpo_error *
     double *points = points_of(&m), *distances = malloc((m.vertex_count + 1) * sizeof *distances);
     if (!points || !distances)
         status = no_memory(error);
-    if (status == EBPO_OK) /* that every index can be drawn */
+    if (status == EBPO_OK) /* so that every index can be drawn */
         status = ebpo_mesh_check(&m, j->options.threads, progress, &report, error);
     if (status == EBPO_OK)
         status = ebpo_map_points(j->model, points, m.vertex_count, &j->options, distances, error);
@@ -486,11 +486,11 @@ static const char *const palette_words[] = { "diverging", "thesis", NULL };
 
 #include "cli/options/map.inc"
 
-static const map_values usual = { .margin = MAP_MARGIN,
-                                  .max_distance = INFINITY,
-                                  .remote = REMOTE_VALUES_INIT };
+static const map_values standard = { .margin = MAP_MARGIN,
+                                     .max_distance = INFINITY,
+                                     .remote = REMOTE_VALUES_INIT };
 
-/* --- what is asked for --- */
+/* --- options --- */
 
 static bool ends_so(const char *out, const char *const *endings)
 {
@@ -521,7 +521,7 @@ static int check_output(const map_values *v)
         return command_usage("map", "--picture '%s': expected a name that ends with .png",
                              v->picture);
     bool coloured = v->picture || (v->out && (v->from || ends_so(v->out, png)));
-    if (!coloured && (v->range != usual.range || v->palette != usual.palette))
+    if (!coloured && (v->range != standard.range || v->palette != standard.palette))
         return command_usage("map", "--range and --palette belong to pictures and to the PLY of "
                                     "--from");
     return EXIT_FINE;
@@ -532,16 +532,16 @@ static int check_values(const map_values *v)
     int kinds = (v->plane != NULL) + (v->grid != NULL) + (v->from != NULL);
     if (kinds != 1)
         return command_usage("map", "expected one of --plane, --grid and --from: which points?");
-    if (v->from && (v->box || v->margin != usual.margin))
+    if (v->from && (v->box || v->margin != standard.margin))
         return command_usage("map", "--box and --margin belong to --plane and --grid");
     if ((v->grid || v->from) && v->size && !v->picture)
         return command_usage("map", "--size belongs to --plane and to the picture of --from");
-    if (v->box && v->margin != usual.margin)
-        return command_usage("map", "--margin is around the model's box; leave it out with --box");
+    if (v->box && v->margin != standard.margin)
+        return command_usage("map", "--margin is around the model's box; omit it with --box");
     if (v->bounds && !v->from)
         return command_usage("map", "--bounds belongs to --from");
     if (v->bounds && isfinite(v->max_distance))
-        return command_usage("map", "--bounds needs all distances: leave out --max-distance");
+        return command_usage("map", "--bounds needs all distances: omit --max-distance");
     return check_output(v);
 }
 
@@ -556,7 +556,7 @@ static int check_outputs(const char *path, const map_values *v)
     return EXIT_FINE;
 }
 
-/* --- what is told --- */
+/* --- output --- */
 
 static void print_percentiles(const ebpo_map_stats *s)
 {
@@ -586,12 +586,12 @@ static void print_stats(const map_job *j)
     printf("\n  from       %.9g to %.9g, farthest without signs %.9g\n", s->min, s->max,
            s->farthest);
     printf("  mean       %.9g, without signs %.9g\n  rms        %.9g, standard deviation %.9g\n",
-           s->mean, s->mean_unsigned, s->rms, s->deviation);
+           s->mean, s->mean_unsigned, s->rms, s->error_bound);
     if (isfinite(s->percentile[0]))
         print_percentiles(s);
     if (j->v->bounds)
         printf("  hausdorff  %.9g to %.9g, from all of its faces; %llu distances\n", j->reach.lo,
-               j->reach.hi, (unsigned long long)j->reach.questions);
+               j->reach.hi, (unsigned long long)j->reach.queries);
 }
 
 static void json_stats(const map_job *j, json *out)
@@ -613,7 +613,7 @@ static void json_stats(const map_job *j, json *out)
     json_real(out, "mean", s->mean);
     json_real(out, "mean_unsigned", s->mean_unsigned);
     json_real(out, "rms", s->rms);
-    json_real(out, "standard_deviation", s->deviation);
+    json_real(out, "standard_deviation", s->error_bound);
     if (isfinite(s->percentile[0])) {
         json_reals(out, "percents", percents, EBPO_MAP_PERCENTILES);
         json_reals(out, "percentiles", s->percentile, EBPO_MAP_PERCENTILES);
@@ -623,8 +623,8 @@ static void json_stats(const map_job *j, json *out)
         json_object(out, "hausdorff");
         json_real(out, "lo", j->reach.lo);
         json_real(out, "hi", j->reach.hi);
-        json_reals(out, "place", j->reach.place, 3);
-        json_uint(out, "questions", j->reach.questions);
+        json_reals(out, "location", j->reach.place, 3);
+        json_uint(out, "queries", j->reach.queries);
         json_end(out);
     }
     if (j->range > 0)
@@ -635,13 +635,13 @@ static void json_stats(const map_job *j, json *out)
         json_text(out, "picture", j->v->picture);
 }
 
-static void tell_map(const map_job *j)
+static void report_map(const map_job *j)
 {
     traffic t = traffic_of(j->file);
     if (!j->v->json) {
         if (!j->v->quiet)
             print_stats(j);
-        remote_tell(&t, &j->v->remote, false);
+        remote_report(&t, &j->v->remote, false);
         return;
     }
     json out;
@@ -662,7 +662,7 @@ static ebpo_status open_model(map_job *j, uint64_t memory, bool given, ebpo_prog
     o.threads = (unsigned)j->v->threads;
     o.progress = progress;
     if (!given)
-        model_memory_usual("map", j->file, j->path, &o);
+        model_memory_default("map", j->file, j->path, &o);
     return ebpo_model_new(j->file, &o, &j->model, error);
 }
 
@@ -684,7 +684,7 @@ static int run_job(map_job *j, uint64_t memory)
         status = v->from ? map_vertices(j, progress, &error) : map_plane_or_grid(j, &error);
     progress_wipe(&line);
     if (status == EBPO_OK)
-        tell_map(j);
+        report_map(j);
     return status == EBPO_OK ? EXIT_FINE : command_failed("map", &error);
 }
 
@@ -695,7 +695,7 @@ static int run_map(void *given, const char **operand)
                   .path = operand[0],
                   .options = EBPO_MAP_OPTIONS_INIT,
                   .stats = EBPO_MAP_STATS_INIT,
-                  .reach = EBPO_MAP_REACH_INIT,
+                  .reach = EBPO_MAP_RANGE_INIT,
                   .range = v->range };
     uint64_t memory = 0;
     int code = check_values(v);
@@ -722,4 +722,4 @@ static int run_map(void *given, const char **operand)
     return code;
 }
 
-const command command_map = { &spec, sizeof usual, &usual, run_map };
+const command command_map = { &spec, sizeof standard, &standard, run_map };

@@ -1,4 +1,4 @@
-/* ebpo measure: area, volume, centroid, inertia, and the volume of each level. */
+/* ebpo measure: computes area, volume, centroid, inertia, and the volume of each level. */
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -16,8 +16,8 @@
 #include "cli/commands/commands.h"
 
 typedef struct values {
-    bool json, deviation, derived, limit;
-    int64_t threads, questions;
+    bool json, error_bound, derived, limit;
+    int64_t threads, queries;
     double tolerance;
     const char *memory;
     remote_values remote;
@@ -27,11 +27,11 @@ typedef struct values {
 
 /* --- words --- */
 
-/* What is measured of levels, as wished; [level_count], or NULL. */
+/* Requested measurements of levels; [level_count], or NULL. */
 typedef struct measures {
     ebpo_solid_volume solid;
     const double *derived; /* with limit: always */
-    const ebpo_deviation *deviation;
+    const ebpo_error_bound *error_bound;
     const ebpo_limit *limit;
 } measures;
 
@@ -47,11 +47,11 @@ static void print_limit(const ebpo_info *info, const ebpo_solid_volume *solid, d
 
 static void print_levels(const ebpo_info *info, const measures *m)
 {
-    const ebpo_deviation *deviation = m->deviation;
+    const ebpo_error_bound *error_bound = m->error_bound;
     char whole[TABLE_CELL];
     snprintf(whole, sizeof whole, "%% %s", facts_whole(info, &m->solid));
     printf("%5s %24s %10s", "level", "envelopes' volume", whole);
-    if (deviation)
+    if (error_bound)
         printf(" %13s %13s %13s %13s", "reaches", "at most", "mean", "rms");
     if (m->derived)
         printf(" %24s %10s", "leaves' planes derived", whole);
@@ -62,9 +62,9 @@ static void print_levels(const ebpo_info *info, const measures *m)
         char volume[TABLE_CELL], percent[TABLE_CELL];
         printf("%5d %24s %10s", i, table_cell(volume, "%.16g", facts_volume(info, i)),
                table_cell(percent, "%.2f", facts_percent(info, &m->solid, i)));
-        if (deviation)
-            printf(" %13.6g %13.6g %13.6g %13.6g", deviation[i].lo, deviation[i].hi,
-                   deviation[i].mean, deviation[i].rms);
+        if (error_bound)
+            printf(" %13.6g %13.6g %13.6g %13.6g", error_bound[i].lo, error_bound[i].hi,
+                   error_bound[i].mean, error_bound[i].rms);
         if (m->derived)
             printf(" %24s %10s", table_cell(volume, "%.16g", m->derived[i]),
                    table_cell(percent, "%.2f", facts_share(info, &m->solid, m->derived[i])));
@@ -78,7 +78,7 @@ static void print_legend(const ebpo_info *info, const measures *m)
 {
     printf("volumes in the model's unit%s%s cubed; ", info->unit[0] ? " " : "", info->unit);
     facts_print_whole(stdout, info, &m->solid);
-    if (m->deviation)
+    if (m->error_bound)
         puts("reaches, at most: bounds of how far the farthest point is beyond the model;\n"
              "mean, rms: over the envelopes' surface");
     if (m->limit && info->solid)
@@ -142,7 +142,7 @@ static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass 
     if (!info->unit[0])
         puts("  (in the model's unit, which the file does not name, squared, cubed and so on)");
     if (info->solid)
-        puts("  (faces of one component that cross were not looked for: ebpo check --crossings)");
+        puts("  (intersecting faces of one component were not checked: ebpo check --crossings)");
     putchar('\n');
     print_levels(info, m);
     print_legend(info, m);
@@ -150,16 +150,16 @@ static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass 
 
 /* --- JSON --- */
 
-static void json_deviation(json *j, const ebpo_deviation *d)
+static void json_error_bound(json *j, const ebpo_error_bound *d)
 {
-    json_object(j, "deviation");
+    json_object(j, "error_bound");
     json_real(j, "lo", d->lo);
     json_real(j, "hi", d->hi);
-    json_reals(j, "place", d->place, 3);
+    json_reals(j, "location", d->place, 3);
     json_real(j, "mean", d->mean);
     json_real(j, "rms", d->rms);
     json_uint(j, "samples", d->samples);
-    json_uint(j, "questions", d->questions);
+    json_uint(j, "queries", d->queries);
     json_end(j);
 }
 
@@ -207,8 +207,8 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
         json_int(j, "level", i);
         json_real(j, "envelope_volume", facts_volume(info, i));
         json_real(j, percent, facts_percent(info, &m->solid, i));
-        if (m->deviation)
-            json_deviation(j, &m->deviation[i]);
+        if (m->error_bound)
+            json_error_bound(j, &m->error_bound[i]);
         if (m->derived)
             json_real(j, "derived_volume", m->derived[i]);
         if (m->limit)
@@ -219,19 +219,19 @@ static void json_mass(json *j, const char *path, const ebpo_info *info, const eb
 }
 
 static ebpo_status measure_levels(ebpo_file *file, const values *v, ebpo_progress progress,
-                                  ebpo_deviation *out, ebpo_error *error)
+                                  ebpo_error_bound *out, ebpo_error *error)
 {
     ebpo_model *model = NULL;
     ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
-    ebpo_deviation_options wanted = EBPO_DEVIATION_OPTIONS_INIT;
+    ebpo_error_bound_options wanted = EBPO_ERROR_BOUND_OPTIONS_INIT;
     opening.threads = wanted.threads = (unsigned)v->threads;
     wanted.tolerance = v->tolerance;
-    wanted.questions = (uint64_t)v->questions;
+    wanted.queries = (uint64_t)v->queries;
     wanted.progress = opening.progress = progress;
     ebpo_status status = ebpo_model_new(file, &opening, &model, error);
     for (int i = 0; i < ebpo_file_info(file)->level_count && status == EBPO_OK; i++) {
-        out[i] = (ebpo_deviation)EBPO_DEVIATION_INIT;
-        status = ebpo_deviation_level(model, file, i, &wanted, &out[i], error);
+        out[i] = (ebpo_error_bound)EBPO_ERROR_BOUND_INIT;
+        status = ebpo_level_error_bound(model, file, i, &wanted, &out[i], error);
         wanted.at_most = out[i].hi;
     }
     ebpo_model_free(model);
@@ -263,12 +263,12 @@ static ebpo_status derive_levels(ebpo_file *file, const values *v, ebpo_progress
 
 static int measure_file(const char *path, const values *v)
 {
-    ebpo_deviation levels[EBPO_LEVELS_MAX];
+    ebpo_error_bound levels[EBPO_LEVELS_MAX];
     ebpo_limit limits[EBPO_LEVELS_MAX];
     double volumes[EBPO_LEVELS_MAX];
     bool derived = v->derived || v->limit;
     measures m = { .derived = derived ? volumes : NULL,
-                   .deviation = v->deviation ? levels : NULL,
+                   .error_bound = v->error_bound ? levels : NULL,
                    .limit = v->limit ? limits : NULL };
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -278,16 +278,16 @@ static int measure_file(const char *path, const values *v)
         return command_failed("measure", &error);
     if (!(ebpo_file_info(file)->parts & EBPO_PART_MESH)) {
         ebpo_close(file);
-        fprintf(stderr,
-                "ebpo measure: %s: has no mesh to measure; convert the mesh again without "
-                "'--without mesh'\n",
-                path);
+        fprintf(
+            stderr,
+            "ebpo measure: %s: has no mesh to measure; convert the source again with its mesh\n",
+            path);
         return EXIT_FAILED;
     }
     ebpo_status status = ebpo_measure(file, (unsigned)v->threads, &mass, &error);
     m.solid = facts_measured(ebpo_file_info(file), &mass);
     ebpo_progress progress = progress_start(&line, "measure", v->json);
-    if (status == EBPO_OK && v->deviation)
+    if (status == EBPO_OK && v->error_bound)
         status = measure_levels(file, v, progress, levels, &error);
     if (status == EBPO_OK && derived)
         status = derive_levels(file, v, progress, volumes, &error);
@@ -304,15 +304,15 @@ static int measure_file(const char *path, const values *v)
         json_finish(&j);
     } else if (status == EBPO_OK) {
         print_mass(remote_shown(path), ebpo_file_info(file), &mass, &m);
-        remote_tell(&t, &v->remote, false);
+        remote_report(&t, &v->remote, false);
     }
     ebpo_close(file);
     return status == EBPO_OK ? EXIT_FINE : command_failed("measure", &error);
 }
 
-static const values usual = { .tolerance = 0.05,
-                              .questions = 200000,
-                              .remote = REMOTE_VALUES_INIT };
+static const values standard = { .tolerance = 0.05,
+                                 .queries = 200000,
+                                 .remote = REMOTE_VALUES_INIT };
 
 static int run_measure(void *given, const char **operand)
 {
@@ -322,4 +322,4 @@ static int run_measure(void *given, const char **operand)
     return command_wants_hdf5("measure", operand[0]) ? measure_file(operand[0], v) : EXIT_FAILED;
 }
 
-const command command_measure = { &spec, sizeof usual, &usual, run_measure };
+const command command_measure = { &spec, sizeof standard, &standard, run_measure };

@@ -1,4 +1,4 @@
-/* ebpo paint: paint and notes on a model, in a file beside it. */
+/* ebpo paint: adds paint and notes to a model, in a separate file. */
 #include <errno.h>
 #include <float.h>
 #include <math.h>
@@ -16,9 +16,9 @@
 #include "cli/progress.h"
 #include "cli/words.h"
 
-/* --- colours, places and paths are read --- */
+/* --- reading colours, positions and paths --- */
 
-/* "RRGGBB" or "RRGGBBAA" as 0xRRGGBBAA. False: it is not that. */
+/* Reads "RRGGBB" or "RRGGBBAA" as 0xRRGGBBAA. Returns false for other text. */
 static bool paint_read_colour(const char *text, uint32_t *out)
 {
     size_t length = strlen(text), digits = strspn(text, "0123456789abcdefABCDEF");
@@ -31,7 +31,7 @@ static bool paint_read_colour(const char *text, uint32_t *out)
 
 /* --- paths --- */
 
-/* Numbers separated by blanks or commas; -1: there is something else, or more than `most`. */
+/* Reads numbers separated by blanks or commas; -1: other text, or more than `most`. */
 static int read_numbers(const char *text, double *out, int most)
 {
     int count = 0;
@@ -49,7 +49,7 @@ static int read_numbers(const char *text, double *out, int most)
     }
 }
 
-/* Three numbers with commas. False: it is not that. */
+/* Reads three numbers separated by commas. Returns false for other text. */
 static bool paint_read_place(const char *text, double out[3])
 {
     return read_numbers(text, out, 3) == 3;
@@ -61,9 +61,9 @@ static bool fail_line(const paint_values *v, uint64_t line, const char *what)
     return false;
 }
 
-/* A line's numbers as a place of the hand; `number` of those before. */
+/* Reads the numbers of a line as a position of the pen; `number`: index of the position. */
 static const char *take_row(const paint_values *v, const double *row, int count, uint64_t number,
-                            ebpo_paint_hand *out)
+                            ebpo_paint_input *out)
 {
     if (count < 3)
         return "expected three to five numbers: x y z [pressure [ms]]";
@@ -77,14 +77,14 @@ static const char *take_row(const paint_values *v, const double *row, int count,
                : "the time is not 0 to 2^32 - 1 milliseconds, which are 49 days";
 }
 
-static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_hand **hand, uint64_t *count)
+static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_input **hand, uint64_t *count)
 {
     char *line = NULL;
-    size_t room = 0;
+    size_t space = 0;
     uint64_t number = 0, capacity = 0;
     const char *wrong = NULL;
     ssize_t length;
-    while (!wrong && (length = getline(&line, &room, in)) >= 0) {
+    while (!wrong && (length = getline(&line, &space, in)) >= 0) {
         double row[5];
         const char *text = number++ ? line : number_skip_mark(line);
         int found = strlen(line) == (size_t)length ? read_numbers(text, row, 5) : -1;
@@ -92,7 +92,7 @@ static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_hand **hand, 
             continue;
         if (*count == capacity) {
             capacity = capacity ? 2 * capacity : 1024;
-            ebpo_paint_hand *more = realloc(*hand, capacity * sizeof *more);
+            ebpo_paint_input *more = realloc(*hand, capacity * sizeof *more);
             wrong = more ? NULL : "not enough memory";
             *hand = more ? more : *hand;
         }
@@ -106,12 +106,13 @@ static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_hand **hand, 
     if (ferror(in))
         return fail_line(v, number + 1, strerror(errno));
     if (*count == 0)
-        fprintf(stderr, "ebpo paint: the path '%s' has no place\n", v->path);
+        fprintf(stderr, "ebpo paint: the path '%s' has no position\n", v->path);
     return *count > 0;
 }
 
-/* The hand's way; the caller frees it. False: what is wrong was said. */
-static bool paint_read_path(const paint_values *v, ebpo_paint_hand **hand, uint64_t *count)
+/* Reads the path of the pen; the caller frees it. Returns false after an error, which was reported.
+ */
+static bool paint_read_path(const paint_values *v, ebpo_paint_input **hand, uint64_t *count)
 {
     bool standard = strcmp(v->path, "-") == 0;
     FILE *in = standard ? stdin : fopen(v->path, "r");
@@ -143,7 +144,7 @@ static ebpo_paint_info info_of(const paint_job *j)
     return info;
 }
 
-/* The number of --layer, or of the topmost. EBPO_E_ARGUMENT: there is none. */
+/* Finds the index of --layer, or of the topmost layer. EBPO_E_ARGUMENT: there is none. */
 static ebpo_status paint_layer(const paint_job *j, uint64_t *layer, ebpo_error *error)
 {
     ebpo_paint_info info = info_of(j);
@@ -162,7 +163,7 @@ static ebpo_status paint_layer(const paint_job *j, uint64_t *layer, ebpo_error *
 
 /* --- layers and notes --- */
 
-/* What of a layer is said on the command line. */
+/* Sets the facts of a layer from the command line. */
 static void set_layer_facts(const paint_values *v, ebpo_paint_layer *layer)
 {
     layer->title = v->new_layer ? v->new_layer : v->title ? v->title : layer->title;
@@ -170,7 +171,7 @@ static void set_layer_facts(const paint_values *v, ebpo_paint_layer *layer)
     layer->date = v->date ? v->date : layer->date;
     layer->description = v->description ? v->description : layer->description;
     if (v->colour)
-        (void)paint_read_colour(v->colour, &layer->colour); /* which was checked */
+        (void)paint_read_colour(v->colour, &layer->colour); /* already checked */
     if (v->opacity >= 0)
         layer->opacity = (uint32_t)v->opacity;
     if (v->show || v->hide)
@@ -196,7 +197,7 @@ static ebpo_status set_layer(paint_job *j, ebpo_error *error)
     return ebpo_paint_set_layer(j->paint, number, &layer, error);
 }
 
-/* Lines are separated by U+2028 in files. The caller frees it. */
+/* Returns the text with U+2028 as line separators. The caller frees it. */
 static char *as_lines(const char *text)
 {
     char *out = malloc(3 * strlen(text) + 1), *to = out;
@@ -217,10 +218,10 @@ static ebpo_status add_note(paint_job *j, ebpo_error *error)
 {
     ebpo_paint_note note = EBPO_PAINT_NOTE_INIT;
     double place[3] = { 0, 0, 0 };
-    (void)paint_read_place(j->v->at, place); /* which was checked */
+    (void)paint_read_place(j->v->at, place); /* already checked */
     ebpo_status status = paint_layer(j, &note.layer, error);
     if (status == EBPO_OK)
-        status = ebpo_paint_place(j->paint, j->context, place, &note.at, error);
+        status = ebpo_paint_locate(j->paint, j->context, place, &note.at, error);
     if (status != EBPO_OK)
         return status;
     char *body = as_lines(j->v->note);
@@ -237,7 +238,7 @@ static ebpo_status add_note(paint_job *j, ebpo_error *error)
 
 /* --- strokes --- */
 
-static ebpo_status lay_stroke(paint_job *j, const ebpo_paint_hand *hand, uint64_t count,
+static ebpo_status lay_stroke(paint_job *j, const ebpo_paint_input *hand, uint64_t count,
                               ebpo_error *error)
 {
     const paint_values *v = j->v;
@@ -259,7 +260,7 @@ static ebpo_status lay_stroke(paint_job *j, const ebpo_paint_hand *hand, uint64_
     pen.within = v->within;
     pen.seed = (uint64_t)v->seed;
     pen.progress = j->progress;
-    status = ebpo_paint_lay(j->paint, j->context, hand, count, &pen, &j->laid, error);
+    status = ebpo_paint_draw(j->paint, j->context, hand, count, &pen, &j->laid, error);
     return status != EBPO_OK || j->laid.points
                ? status
                : fail_paint(
@@ -274,7 +275,7 @@ static ebpo_status undo_strokes(paint_job *j, ebpo_error *error)
     uint64_t strokes = info_of(j).stroke_count;
     if ((uint64_t)j->v->undo > strokes) {
         char what[80];
-        snprintf(what, sizeof what, "--undo %lld: the paint has not so many strokes, but %llu",
+        snprintf(what, sizeof what, "--undo %lld: the paint has only %llu strokes",
                  (long long)j->v->undo, (unsigned long long)strokes);
         return fail_paint(error, EBPO_E_ARGUMENT, what);
     }
@@ -283,8 +284,9 @@ static ebpo_status undo_strokes(paint_job *j, ebpo_error *error)
     return status;
 }
 
-/* The change that was asked for; a paint that is not there is made before. Exit code, said. */
-static ebpo_status paint_change(paint_job *j, const ebpo_paint_hand *hand, uint64_t count,
+/* Applies the requested change; creates the paint before if it does not exist. Returns an exit
+ * code; errors were reported. */
+static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *hand, uint64_t count,
                                 ebpo_error *error)
 {
     const paint_values *v = j->v;
@@ -313,7 +315,7 @@ static ebpo_status paint_change(paint_job *j, const ebpo_paint_hand *hand, uint6
 
 /* --- baking --- */
 
-/* [vertex_count][4], the model's own colours, or the base. NULL: no memory. */
+/* Returns [vertex_count][4], the colours of the model, or the base. NULL: no memory. */
 static uint8_t *own_colours(paint_job *j, const ebpo_mesh *mesh, ebpo_error *error)
 {
     ebpo_colours colours;
@@ -341,14 +343,14 @@ static ebpo_status write_baked(paint_job *j, ebpo_mesh *mesh, const uint8_t *rgb
 {
     const char *out = j->v->bake;
     if (words_end_with(out, ".ply")) {
-        ebpo_status status = ebpo_paint_dye_mesh(mesh, rgba, error);
+        ebpo_status status = ebpo_paint_colour_mesh(mesh, rgba, error);
         return status == EBPO_OK ? ebpo_mesh_write_ply(mesh, out, error) : status;
     }
     ebpo_export_options o = EBPO_EXPORT_OPTIONS_INIT;
     o.threads = (unsigned)j->v->threads;
     o.progress = j->progress;
     o.vertex_colours = rgba;
-    ebpo_mesh_free(mesh); /* the export reads its own */
+    ebpo_mesh_free(mesh); /* the export reads it again */
     return ebpo_export(j->file, out,
                        words_end_with(out, ".glb")    ? EBPO_EXPORT_GLB
                        : words_end_with(out, ".gltf") ? EBPO_EXPORT_GLTF
@@ -384,28 +386,28 @@ static ebpo_status paint_bake(paint_job *j, ebpo_error *error)
 
 #include "cli/options/paint.inc"
 
-static const paint_values usual = { .layer = -1,
-                                    .opacity = -1,
-                                    .density = 1,
-                                    .seed = 1,
-                                    .remove_stroke = -1,
-                                    .remove_note = -1,
-                                    .remove_layer = -1,
-                                    .fineness = 256,
-                                    .thin = 1,
-                                    .within = INFINITY,
-                                    .pressure = 1,
-                                    .rate = 1000,
-                                    .remote = REMOTE_VALUES_INIT };
+static const paint_values defaults = { .layer = -1,
+                                       .opacity = -1,
+                                       .density = 1,
+                                       .seed = 1,
+                                       .remove_stroke = -1,
+                                       .remove_note = -1,
+                                       .remove_layer = -1,
+                                       .fineness = 256,
+                                       .thin = 1,
+                                       .within = INFINITY,
+                                       .pressure = 1,
+                                       .rate = 1000,
+                                       .remote = REMOTE_VALUES_INIT };
 
-/* --- what is asked for --- */
+/* --- options --- */
 
 static bool says_of_layer(const paint_values *v)
 {
     return v->description || v->opacity >= 0 || v->show || v->hide;
 }
 
-/* Says something of a layer that is there, and nothing else. */
+/* Returns true when options set only facts of an existing layer. */
 static bool sets_layer(const paint_values *v)
 {
     return !v->new_layer && !v->path && !v->note &&
@@ -430,7 +432,7 @@ static int check_pen(const paint_values *v)
     if (pen && !v->path)
         return command_usage("paint", "--radius and other options of a pen belong to --path");
     if (v->path && v->radius == 0)
-        return command_usage("paint", "--path needs --radius: how large are points?");
+        return command_usage("paint", "--path needs --radius, the size of points");
     if (v->density != 1 && v->spread == 0)
         return command_usage("paint", "--density belongs to --spread");
     if (v->erase && v->colour)
@@ -489,7 +491,7 @@ static int check_values(const paint_values *v)
     if (v->out && !changes_paint(v))
         return command_usage("paint", "--output is for a paint that is changed");
     if (v->layer >= 0 && !v->path && !v->note && !sets_layer(v))
-        return command_usage("paint", "--layer N: what of it? --remove-layer removes one");
+        return command_usage("paint", "--layer N: nothing to do; --remove-layer removes a layer");
     int code = check_pen(v);
     return code == EXIT_FINE ? check_texts(v) : code;
 }
@@ -514,8 +516,8 @@ static int check_outputs(const paint_job *j)
 /* Seconds to wait for other commands that change the same paint. */
 static const double WAIT = 600;
 
-/* Opens the paint; one that is to be changed once no other command changes it. One that is not
- * there is made where a layer is added. */
+/* Opens the paint; waits for other commands before changing it. Creates it when a layer is added.
+ */
 static ebpo_status open_paint(paint_job *j, ebpo_error *error)
 {
     const paint_values *v = j->v;
@@ -546,7 +548,7 @@ static ebpo_status open_model(paint_job *j, uint64_t memory, ebpo_error *error)
     o.threads = (unsigned)j->v->threads;
     o.progress = j->progress;
     if (!j->v->memory)
-        model_memory_usual("paint", j->file, j->model_path, &o);
+        model_memory_default("paint", j->file, j->model_path, &o);
     ebpo_status status = ebpo_model_new(j->file, &o, &j->model, error);
     return status == EBPO_OK ? ebpo_context_new(j->model, &j->context, error) : status;
 }
@@ -560,7 +562,7 @@ static ebpo_status measure_areas(paint_job *j, ebpo_error *error)
     return ebpo_paint_measure(j->paint, j->context, &o, &j->areas, error);
 }
 
-static ebpo_status do_paint_work(paint_job *j, const ebpo_paint_hand *hand, uint64_t count,
+static ebpo_status do_paint_work(paint_job *j, const ebpo_paint_input *hand, uint64_t count,
                                  uint64_t memory, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -571,7 +573,7 @@ static ebpo_status do_paint_work(paint_job *j, const ebpo_paint_hand *hand, uint
         j->file && (info.point_count || info.note_count) && (j->changed || needs_model(j->v));
     if (needs_model(j->v) || check)
         status = open_model(j, memory, error);
-    if (status == EBPO_OK && check) /* all of it, whatever is asked for */
+    if (status == EBPO_OK && check) /* checks all of it, whatever is requested */
         status = ebpo_paint_check_points(j->paint, j->context, &j->progress, error);
     if (status == EBPO_OK && j->changed)
         status = paint_change(j, hand, count, error);
@@ -582,7 +584,7 @@ static ebpo_status do_paint_work(paint_job *j, const ebpo_paint_hand *hand, uint
     return status;
 }
 
-static int run_job(paint_job *j, const ebpo_paint_hand *hand, uint64_t count, uint64_t memory)
+static int run_job(paint_job *j, const ebpo_paint_input *hand, uint64_t count, uint64_t memory)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     progress_line line;
@@ -603,7 +605,7 @@ static int run_job(paint_job *j, const ebpo_paint_hand *hand, uint64_t count, ui
     progress_wipe(&line);
     if (status != EBPO_OK)
         return command_failed("paint", &error);
-    paint_tell(j);
+    paint_report(j);
     return EXIT_FINE;
 }
 
@@ -613,10 +615,10 @@ static int run_paint(void *given, const char **operand)
     paint_job j = { .v = v,
                     .paint_path = operand[0],
                     .model_path = operand[1],
-                    .laid = EBPO_PAINT_LAID_INIT,
+                    .laid = EBPO_PAINT_DRAWN_INIT,
                     .baked = EBPO_PAINT_BAKED_INIT,
                     .areas = EBPO_PAINT_AREAS_INIT };
-    ebpo_paint_hand *hand = NULL;
+    ebpo_paint_input *hand = NULL;
     uint64_t memory = 0, count = 0;
     int code = check_values(v);
     if (code == EXIT_FINE && v->memory && !words_read_size(v->memory, &memory))
@@ -640,4 +642,4 @@ static int run_paint(void *given, const char **operand)
     return code;
 }
 
-const command command_paint = { &spec, sizeof usual, &usual, run_paint };
+const command command_paint = { &spec, sizeof defaults, &defaults, run_paint };

@@ -1,4 +1,4 @@
-/* ebpo ray: what rays hit. */
+/* ebpo ray: finds the faces hit by rays. */
 #include <float.h>
 #include <stddef.h>
 
@@ -12,38 +12,38 @@
 /* Rows are rays. */
 _Static_assert(sizeof(ebpo_ray) == POINTS_WIDEST * sizeof(double), "as points_parse fills them");
 
-static ebpo_status answer_all(const query_job *job, query_worker *w, const ebpo_ray *rays,
+static ebpo_status result_all(const query_job *job, query_worker *w, const ebpo_ray *rays,
                               uint64_t count, const ebpo_ray_options *how, ebpo_error *error)
 {
     const ebpo_ray_hit *hits;
     const uint64_t *begin;
     ebpo_status status = ebpo_ray_all_many(w->context, rays, count, how, &hits, &begin, error);
-    for (uint64_t i = 0; i < count && status == EBPO_OK && !answer_text_is_over(w->text); i++)
-        answers_ray_all(w->text, job->form, &rays[i], hits + begin[i], begin[i + 1] - begin[i],
+    for (uint64_t i = 0; i < count && status == EBPO_OK && !result_text_is_over(w->text); i++)
+        results_ray_all(w->text, job->form, &rays[i], hits + begin[i], begin[i + 1] - begin[i],
                         job->sampler);
     return status;
 }
 
-/* The numbers of a catalogue's models, behind the results. */
+/* Returns the indices of models in a catalogue, which follow the results. */
 static uint64_t *models_of(const query_worker *w, uint64_t count)
 {
     return (uint64_t *)(void *)((ebpo_ray_hit *)w->results + count);
 }
 
-static ebpo_status answer_rays(const query_job *job, query_worker *w, const double *rows,
+static ebpo_status result_rays(const query_job *job, query_worker *w, const double *rows,
                                uint64_t count, ebpo_error *error)
 {
     const ebpo_ray *rays = (const ebpo_ray *)(const void *)rows;
     ebpo_ray_options how = EBPO_RAY_OPTIONS_INIT;
     how.sides = (ebpo_ray_sides)job->values->ray_sides;
-    how.threads = 1; /* others ask about other rays */
+    how.threads = 1; /* other threads query other rays */
     if (job->catalogue) {
-        ebpo_catalogue_ask_options all = query_catalogue_options(job);
+        ebpo_catalogue_query_options all = query_catalogue_options(job);
         return ebpo_catalogue_ray(job->catalogue, job->models, rays, count, &all, w->results,
                                   models_of(w, count), error);
     }
     if (job->values->all)
-        return answer_all(job, w, rays, count, &how, error);
+        return result_all(job, w, rays, count, &how, error);
     if (job->values->any)
         return ebpo_ray_any_many(w->context, rays, count, &how, w->results, error);
     return ebpo_ray_first_many(w->context, rays, count, &how, w->results, error);
@@ -53,9 +53,9 @@ static void print_rays(const query_job *job, query_worker *w, const double *rows
 {
     const ebpo_ray *rays = (const ebpo_ray *)(const void *)rows;
     if (job->values->any)
-        answers_ray_any(w->text, job->form, w->results, count);
+        results_ray_any(w->text, job->form, w->results, count);
     else if (!job->values->all)
-        answers_ray_first(w->text, job->form, rays, w->results, count, job->sampler,
+        results_ray_first(w->text, job->form, rays, w->results, count, job->sampler,
                           job->catalogue ? models_of(w, count) : NULL);
 }
 
@@ -79,25 +79,25 @@ static const char *ray_dtype(const query_job *job, unsigned *bytes)
                               : "[('t', '<f8'), ('face', '<u8'), ('side', '<i8')]";
 }
 
-static const query_values usual = QUERY_VALUES_INIT;
+static const query_values standard = QUERY_VALUES_INIT;
 
 static int run_ray(void *given, const char **operand)
 {
     query_values *v = given;
     if (v->any && v->all)
-        return command_usage("ray", "--any has no effect with --all; leave out one of them");
+        return command_usage("ray", "--any has no effect with --all; omit one of them");
     if (v->any && v->attribute)
-        return command_usage("ray", "--attribute has no effect with --any; leave out one of them");
+        return command_usage("ray", "--attribute has no effect with --any; omit one of them");
     query_job job = { .command = "ray",
                       .values = v,
                       .kind = POINTS_RAYS,
                       .result_bytes = sizeof(ebpo_ray_hit),
-                      .parts_share = 0.6, /* docs/measured/asking.md */
-                      .answer = answer_rays,
+                      .parts_share = 0.6, /* docs/measured/queries.md */
+                      .result = result_rays,
                       .print = print_rays,
                       .columns = ray_columns,
                       .dtype = ray_dtype };
     return query_run(&job, operand[0], operand[1]);
 }
 
-const command command_ray = { &spec, sizeof usual, &usual, run_ray };
+const command command_ray = { &spec, sizeof standard, &standard, run_ray };

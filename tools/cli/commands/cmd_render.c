@@ -1,4 +1,4 @@
-/* ebpo render: a shaded picture of a level, of the model, or of several side by side. */
+/* ebpo render: draws a shaded picture of a level, of the model, or of several side by side. */
 #include "ebpo_config.h"
 
 #include <stddef.h>
@@ -44,8 +44,8 @@ typedef struct tile {
     bool if_there;
     uint64_t face_count;
     ebpo_mesh mesh;
-    ebpo_colours colours; /* of the model, as far as it has any */
-    float *normals;       /* of a level, by triangle: which way it is lit */
+    ebpo_colours colours; /* colours of the model, if any */
+    float *normals;       /* normals of a level for lighting, by triangle */
     bool closed;
     char caption[64];
 } tile;
@@ -58,7 +58,7 @@ typedef struct job {
     tile tiles[TILES_MAX];
     int tile_count;
     bool from_file; /* an .ebpo.h5 file, not a mesh */
-    traffic read;   /* of it */
+    traffic read;   /* traffic of the file */
 } job;
 
 /* --- arguments --- */
@@ -77,7 +77,7 @@ static bool add_tile(job *j, int level, bool if_there)
     return j->tile_count++ < TILES_MAX;
 }
 
-/* Those of "3-" that the file does not have are left out. */
+/* Levels of "3-" that the file does not have are omitted. */
 static bool add_levels(job *j, const char *text)
 {
     word_levels levels;
@@ -89,7 +89,7 @@ static bool add_levels(job *j, const char *text)
     return true;
 }
 
-/* In the order in which they were given. */
+/* In the order of the command line. */
 static bool parse_levels(job *j)
 {
     for (const char *at = j->v.levels;; at++) {
@@ -129,7 +129,7 @@ static int parse_values(job *j)
     return EXIT_FINE;
 }
 
-/* --- what to draw --- */
+/* --- loading --- */
 
 static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress progress,
                              ebpo_error *error)
@@ -146,7 +146,7 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
         return read_well == EBPO_OK ? ebpo_mesh_colours(&t->mesh, &t->colours, error) : read_well;
     }
     ebpo_lod_options lod =
-        /* walls too: they close the envelopes, and inner ones cannot be seen */
+        /* also cell faces: they close the envelopes, and inner ones are invisible */
         EBPO_LOD_OPTIONS_INIT;
     lod.threads = threads;
     lod.progress = progress;
@@ -189,7 +189,7 @@ static ebpo_status load_file(job *j, ebpo_progress progress, ebpo_error *error)
         j->read = traffic_of(file);
         j->from_file = true;
         if (!j->v.json)
-            remote_tell(&j->read, &j->v.remote, false);
+            remote_report(&j->read, &j->v.remote, false);
     }
     ebpo_close(file);
     return status;
@@ -208,7 +208,7 @@ static ebpo_status load_mesh(job *j, ebpo_progress progress, ebpo_error *error)
         return error->status = EBPO_E_ARGUMENT;
     }
     ebpo_status status = ebpo_mesh_read(j->in, &read, &t->mesh, error);
-    /* The check makes sure that every index and coordinate can be drawn. */
+    /* The check ensures that every index and coordinate can be drawn. */
     if (status == EBPO_OK)
         status = ebpo_mesh_check(&t->mesh, (unsigned)j->v.threads, progress, &report, error);
     if (status == EBPO_OK)
@@ -229,7 +229,7 @@ static void paint_background(picture *p)
     }
 }
 
-/* All tiles show the model from one place: that from which the coarsest fits. */
+/* All tiles share one viewpoint, at which the coarsest one fits. */
 static const tile *coarsest_tile(const job *j)
 {
     const tile *best = &j->tiles[0];
@@ -282,7 +282,7 @@ static ebpo_status draw_tiles(const job *j, picture *p, ebpo_error *error)
     const tile *first = coarsest_tile(j);
     if (height <= caption) {
         snprintf(error->message, sizeof error->message,
-                 "--size %s has no room for %d tiles; choose a larger one", j->v.size,
+                 "--size %s is too small for %d tiles; choose a larger one", j->v.size,
                  j->tile_count);
         return error->status = EBPO_E_ARGUMENT;
     }
@@ -321,7 +321,7 @@ static ebpo_status render_picture(job *j, bool is_file, ebpo_progress progress, 
     return status;
 }
 
-static void tell_json(const job *j)
+static void report_json(const job *j)
 {
     json out;
     json_begin(&out, stdout);
@@ -364,13 +364,13 @@ static int run_job(job *j)
     ebpo_status status = render_picture(j, is_file, progress, &error);
     progress_wipe(&line);
     if (status == EBPO_OK && j->v.json)
-        tell_json(j);
+        report_json(j);
     return status == EBPO_OK ? EXIT_FINE : command_failed("render", &error);
 }
 
 #endif
 
-static const values usual = {
+static const values standard = {
     .level = -1, .view = "30,20", .size = "1200x900", .up = 1, .remote = REMOTE_VALUES_INIT
 };
 
@@ -397,4 +397,4 @@ static int run_render(void *given, const char **operand)
 #endif
 }
 
-const command command_render = { &spec, sizeof usual, &usual, run_render };
+const command command_render = { &spec, sizeof standard, &standard, run_render };

@@ -1,4 +1,4 @@
-/* ebpo repack: the same content in the layout of today, or in another. */
+/* ebpo repack: writes the same content in the current layout, or in another one. */
 #include <inttypes.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -38,7 +38,7 @@ static int check_values(const values *v, ebpo_write_options *write)
     return EXIT_FINE;
 }
 
-/* The codec, when the file's own is to stay. */
+/* Chooses the codec when the codec of the file is kept. */
 static ebpo_status settle_codec(const values *v, const ebpo_info *info, ebpo_write_options *write,
                                 ebpo_error *error)
 {
@@ -78,8 +78,8 @@ static void print_json(const values *v, const ebpo_info *info, const ebpo_stored
     json_finish(&j);
 }
 
-static ebpo_status tell_sizes(const values *v, const char *out, const ebpo_file *from,
-                              double seconds, ebpo_error *error)
+static ebpo_status report_sizes(const values *v, const char *out, const ebpo_file *from,
+                                double seconds, ebpo_error *error)
 {
     ebpo_file *file = NULL;
     ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
@@ -94,12 +94,12 @@ static ebpo_status tell_sizes(const values *v, const char *out, const ebpo_file 
     else if (status == EBPO_OK)
         print_words(ebpo_file_info(file), out, ebpo_file_info(from), seconds);
     if (status == EBPO_OK && !v->json)
-        remote_tell(&t, &v->remote, false);
+        remote_report(&t, &v->remote, false);
     ebpo_close(file);
     return status;
 }
 
-static const values usual = { .codec = -1, .remote = REMOTE_VALUES_INIT };
+static const values standard = { .codec = -1, .remote = REMOTE_VALUES_INIT };
 
 static int run_repack(void *given, const char **operand)
 {
@@ -126,13 +126,13 @@ static int run_repack(void *given, const char **operand)
         status = written = ebpo_file_repack(file, operand[1], &read, &write, &error);
     progress_wipe(&line);
     if (status == EBPO_OK)
-        status = tell_sizes(v, operand[1], file, progress_now() - begun, &error);
+        status = report_sizes(v, operand[1], file, progress_now() - begun, &error);
     ebpo_close(file);
     ebpo_workspace_free(read.workspace);
     code = status == EBPO_OK ? EXIT_FINE : command_failed("repack", &error);
-    /* where the output is at fault, this build cannot write at all */
+    /* when the output is the cause, this build cannot write it at all */
     bool differs = written == EBPO_E_UNSUPPORTED && strcmp(error.file, operand[1]) != 0;
     return differs ? EXIT_DIFFERS : code;
 }
 
-const command command_repack = { &spec, sizeof usual, &usual, run_repack };
+const command command_repack = { &spec, sizeof standard, &standard, run_repack };

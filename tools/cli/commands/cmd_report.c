@@ -1,4 +1,4 @@
-/* ebpo report: methods compared level by level: bytes, error, run time. */
+/* ebpo report: compares methods level by level: bytes, error, run time. */
 #include <errno.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -24,7 +24,8 @@ static int refuse_value(const char *option, const char *value, const char *expec
 
 /* --- options --- */
 
-/* The next of a list with commas; false: there is none, or it is too long. */
+/* Reads the next item of a comma-separated list; returns false when there is none, or it is too
+ * long. */
 static bool next_word(const char **at, char *word, size_t capacity)
 {
     size_t length = strcspn(*at, ",");
@@ -56,14 +57,14 @@ static int add_setting(comparison *c, const report_values *v, const char *word)
     return selection_check("report", &chosen);
 }
 
-/* How many planes the theses' selections take. */
+/* Reads the numbers of planes for the selections of the theses. */
 static int read_settings(comparison *c, const report_values *v)
 {
     const char *list = v->percent ? v->percent : v->k_root;
     char word[sizeof c->setting->k_root];
     int code = EXIT_FINE;
     selection_options all = { v->select, v->percent ? 1 : -1, v->epsilon, NULL, v->normals, -1 };
-    if (!list) { /* the seed is of the points, too */
+    if (!list) { /* the seed also applies to points */
         c->setting[c->settings++].percent = 40;
         return selection_check("report", &all);
     }
@@ -102,14 +103,14 @@ static int read_options(comparison *c, report_values *v, bool mesh)
         return command_usage(
             "report", "--select, --percent, --k-root, --normals, --max-level, --leaf-faces, "
                       "--epsilon and --keep only apply to a mesh, from which files are made");
-    const ebpo_build_options usual = EBPO_BUILD_OPTIONS_INIT;
+    const ebpo_build_options standard = EBPO_BUILD_OPTIONS_INIT;
     v->select = v->select ? v->select : 1u << EBPO_SELECT_INHERIT;
     int code = read_settings(c, v);
     if (code != EXIT_FINE)
         return code;
-    v->normals = v->normals >= 0 ? v->normals : (int)usual.normals;
-    v->leaf_faces = v->leaf_faces >= 0 ? v->leaf_faces : usual.leaf_faces;
-    v->epsilon = v->epsilon >= 0 ? v->epsilon : usual.epsilon;
+    v->normals = v->normals >= 0 ? v->normals : (int)standard.normals;
+    v->leaf_faces = v->leaf_faces >= 0 ? v->leaf_faces : standard.leaf_faces;
+    v->epsilon = v->epsilon >= 0 ? v->epsilon : standard.epsilon;
     return EXIT_FINE;
 }
 
@@ -215,7 +216,7 @@ static int make_report(comparison *c, const char *const *operand, const char *pl
     return EXIT_FINE;
 }
 
-/* Of "dir/bunny.ply" report-bunny. */
+/* Writes report-bunny for "dir/bunny.ply". */
 static void default_place(const char *operand, char *out, size_t capacity)
 {
     char stem[201];
@@ -223,15 +224,15 @@ static void default_place(const char *operand, char *out, size_t capacity)
     snprintf(out, capacity, "report-%s", stem);
 }
 
-static const report_values usual = { .normals = -1,
-                                     .max_level = -1,
-                                     .leaf_faces = -1,
-                                     .epsilon = -1,
-                                     .points = 5000,
-                                     .seed = 1,
-                                     .up = 1,
-                                     .view = "30,20",
-                                     .remote = REMOTE_VALUES_INIT };
+static const report_values standard = { .normals = -1,
+                                        .max_level = -1,
+                                        .leaf_faces = -1,
+                                        .epsilon = -1,
+                                        .points = 5000,
+                                        .seed = 1,
+                                        .up = 1,
+                                        .view = "30,20",
+                                        .remote = REMOTE_VALUES_INIT };
 
 static int run_report(void *given, const char **operand)
 {
@@ -263,4 +264,4 @@ static int run_report(void *given, const char **operand)
     return code;
 }
 
-const command command_report = { &spec, sizeof usual, &usual, run_report };
+const command command_report = { &spec, sizeof standard, &standard, run_report };

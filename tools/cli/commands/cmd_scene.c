@@ -1,4 +1,4 @@
-/* ebpo scene: models at many places, that move. */
+/* ebpo scene: queries rigid and animated instances of models. */
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -15,7 +15,7 @@
 
 /* --- contents, boxes and pairs --- */
 
-/* Bytes of the files of models, each counted once. */
+/* Total bytes of model files, each counted once. */
 typedef struct sums {
     uint64_t bytes, faces, posed_faces;
 } sums;
@@ -118,7 +118,7 @@ static ebpo_status scene_info(const scene_values *v, const char *path, ebpo_scen
     return status;
 }
 
-/* All was checked while it was opened. */
+/* Everything was checked while opening. */
 static ebpo_status scene_check(const scene_values *v, const char *path, ebpo_scene *scene,
                                ebpo_error *error)
 {
@@ -135,7 +135,7 @@ static ebpo_status scene_check(const scene_values *v, const char *path, ebpo_sce
         json_uint(&j, "models", c.models);
         json_finish(&j);
     } else if (status == EBPO_OK && !v->quiet)
-        printf("%s: fine: %llu models, all contents as their checksums say\n", path,
+        printf("%s: OK: %llu models, all contents match their checksums\n", path,
                (unsigned long long)c.models);
     return status;
 }
@@ -216,7 +216,7 @@ static ebpo_status scene_pairs(const scene_values *v, const char *path, ebpo_sce
     return status;
 }
 
-/* When instances of a scene first come near each other; and how near they come. */
+/* The times when instances of a scene first come near each other; and their least distances. */
 
 typedef struct listing {
     const scene_values *v;
@@ -232,12 +232,12 @@ static const char *name_of(const listing *l, uint64_t instance)
     return i.name;
 }
 
-static const char *word_of(const ebpo_scene_way *w)
+static const char *word_of(const ebpo_scene_approach_result *w)
 {
     return w->reached > 0 ? "reached" : w->reached == 0 ? "apart" : "open";
 }
 
-static void way_json(listing *l, const ebpo_scene_way *w)
+static void way_json(listing *l, const ebpo_scene_approach_result *w)
 {
     json *j = &l->j;
     json_object(j, NULL);
@@ -248,12 +248,12 @@ static void way_json(listing *l, const ebpo_scene_way *w)
     json_real(j, "distance_lo", w->lo);
     json_real(j, "distance_hi", w->hi);
     json_real(j, "clearance", w->clearance);
-    json_uint(j, "looks", w->looks);
+    json_uint(j, "evaluations", w->looks);
     json_end(j);
 }
 
-/* Bounds are bounds to their last digit. */
-static void print_way(const listing *l, const ebpo_scene_way *w)
+/* Prints all digits of bounds. */
+static void print_way(const listing *l, const ebpo_scene_approach_result *w)
 {
     char time[32], lo[32], hi[32];
     printf("%s\t%s\t%s\t%s\t", words_real(w->time, time), word_of(w), name_of(l, w->a),
@@ -263,12 +263,12 @@ static void print_way(const listing *l, const ebpo_scene_way *w)
     printf("%s\n", words_real(w->hi, hi));
 }
 
-static bool print_ways(void *user, const ebpo_scene_way *ways, uint64_t count)
+static bool print_ways(void *user, const ebpo_scene_approach_result *ways, uint64_t count)
 {
     listing *l = user;
     l->ways += count;
     for (uint64_t i = 0; i < count; i++) {
-        const ebpo_scene_way *w = &ways[i];
+        const ebpo_scene_approach_result *w = &ways[i];
         l->reached += w->reached > 0;
         l->open += w->reached < 0;
         l->looks += w->looks;
@@ -280,7 +280,8 @@ static bool print_ways(void *user, const ebpo_scene_way *ways, uint64_t count)
     return true;
 }
 
-/* So many looks as are allowed, or what files lack, left more in doubt than was asked for. */
+/* Returns true when the limit of evaluations, or missing data of files, left a wider interval than
+ * requested. */
 static bool is_open(const listing *l, const ebpo_scene_least *w)
 {
     return w->hi - w->lo > l->v->tolerance;
@@ -297,7 +298,7 @@ static void least_json(listing *l, const ebpo_scene_least *w)
     json_real(j, "distance_hi", w->hi);
     json_bool(j, "open", is_open(l, w));
     json_real(j, "clearance", w->clearance);
-    json_uint(j, "looks", w->looks);
+    json_uint(j, "evaluations", w->looks);
     json_end(j);
 }
 
@@ -330,7 +331,7 @@ static ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_
                                   ebpo_error *error)
 {
     listing l = { .v = v, .scene = scene };
-    ebpo_scene_way_options how = EBPO_SCENE_WAY_OPTIONS_INIT;
+    ebpo_scene_approach_options how = EBPO_SCENE_APPROACH_OPTIONS_INIT;
     progress_line line;
     double begun = progress_now();
     (void)path;
@@ -364,7 +365,7 @@ static const char *const purpose_words[] = { "collide", "view", "inside", "solid
 
 #include "cli/options/scene.inc"
 
-/* Which times are asked about: one, unless a span is given, or `spans` makes it the usual. */
+/* Sets the times: one, unless a span is given, or `spans` makes it the default. */
 static bool settle_times(scene_values *v, bool spans, const ebpo_scene *scene)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
@@ -381,9 +382,9 @@ static bool settle_times(scene_values *v, bool spans, const ebpo_scene *scene)
     return v->from <= v->to;
 }
 
-enum { FRAMES_MOST = 10000000 };
+enum { FRAMES_MAX = 10000000 };
 
-/* NULL, or what is wrong with the options of a report. */
+/* Returns NULL, or an error in the options of a report. */
 static const char *wrong_report(const scene_values *v)
 {
     if (v->json && v->csv)
@@ -393,7 +394,7 @@ static const char *wrong_report(const scene_values *v)
         return "--output of a report ends in .h5, .html or .png";
     if (v->to > v->from && !(v->step > 0))
         return "from one time to another a report needs --step";
-    if (v->to > v->from && !((v->to - v->from) / v->step < FRAMES_MOST))
+    if (v->to > v->from && !((v->to - v->from) / v->step < FRAMES_MAX))
         return "--step is so small that there are more than ten million times";
     return NULL;
 }
@@ -415,7 +416,7 @@ static bool is_for_all(int deed)
            deeds[deed].run == scene_pack;
 }
 
-/* NULL, or what is wrong with the options of a plan: those of a report say what it is for. */
+/* Returns NULL, or an error in the options of a plan: the options of a report give its purpose. */
 static const char *settle_purpose(scene_values *v)
 {
     if (!v->solids && !(v->depth > 0))
@@ -426,7 +427,7 @@ static const char *settle_purpose(scene_values *v)
     return NULL;
 }
 
-/* NULL, or what is wrong with the options of this deed. */
+/* Returns NULL, or an error in the options of this command. */
 static const char *wrong_options(int deed, scene_values *v, ebpo_load_options *load)
 {
     uint64_t target;
@@ -457,7 +458,7 @@ static int run_scene(void *given, const char **operand)
             operand[0]);
     ebpo_scene_options how = EBPO_SCENE_OPTIONS_INIT;
     ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
-    load.most_expansion = (uint64_t)v->most_expansion;
+    load.max_expansion = (uint64_t)v->max_expansion;
     how.outside = v->outside;
     how.remote = v->remote;
     const char *wrong = NULL;
@@ -481,6 +482,6 @@ static int run_scene(void *given, const char **operand)
     return status == EBPO_OK ? EXIT_FINE : command_failed("scene", &error);
 }
 
-static const scene_values usual = SCENE_VALUES_INIT;
+static const scene_values standard = SCENE_VALUES_INIT;
 
-const command command_scene = { &spec, sizeof usual, &usual, run_scene };
+const command command_scene = { &spec, sizeof standard, &standard, run_scene };

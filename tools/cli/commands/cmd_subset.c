@@ -1,4 +1,4 @@
-/* ebpo subset: a smaller file of a file. */
+/* ebpo subset: writes a part of a file as a smaller file. */
 #include <stddef.h>
 #include <stdio.h>
 
@@ -10,7 +10,7 @@
 
 #include "cli/options/subset.inc"
 
-static const subset_values usual = SUBSET_VALUES_INIT;
+static const subset_values standard = SUBSET_VALUES_INIT;
 
 static int run_subset(void *given, const char **operand)
 {
@@ -35,12 +35,12 @@ static int run_subset(void *given, const char **operand)
     if (status == EBPO_OK) {
         traffic t = traffic_of(file);
         status =
-            subset_tell(v, operand[1], ebpo_file_info(file), &t, progress_now() - begun, &error);
+            subset_report(v, operand[1], ebpo_file_info(file), &t, progress_now() - begun, &error);
         if (status == EBPO_OK && !v->json)
-            remote_tell(&t, &v->remote, false);
+            remote_report(&t, &v->remote, false);
     }
     ebpo_close(file);
     return status == EBPO_OK ? EXIT_FINE : command_failed("subset", &error);
 }
 
-const command command_subset = { &spec, sizeof usual, &usual, run_subset };
+const command command_subset = { &spec, sizeof standard, &standard, run_subset };

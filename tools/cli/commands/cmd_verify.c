@@ -1,4 +1,4 @@
-/* ebpo verify: proves that a file keeps its promises, or shows where it does not. */
+/* ebpo verify: verifies the guarantees of a file, or shows violations. */
 #include <stddef.h>
 #include <stdio.h>
 
@@ -40,7 +40,7 @@ static const ebpo_verify_count *count_of(const ebpo_verify_report *report, int i
     return (const ebpo_verify_count *)(const void *)((const char *)report + kinds[i].offset);
 }
 
-/* What of the source could not be compared, as the file has it not. */
+/* Data of the source that could not be compared, as the file does not have it. */
 typedef struct unseen {
     char words[900]; /* "": nothing */
 } unseen;
@@ -49,7 +49,7 @@ static unseen unseen_of(const ebpo_file *file, const ebpo_mesh *source)
 {
     uint64_t parts = ebpo_file_info(file)->parts;
     unseen u = { "" };
-    const char *lost = ebpo_mesh_attributes_lost(source), *unread = ebpo_mesh_unread(source);
+    const char *lost = ebpo_mesh_attributes_lost(source), *unread = ebpo_mesh_ignored(source);
     bool has = ebpo_mesh_has_attributes(source);
     if (has && !(parts & EBPO_PART_ATTRIBUTES))
         snprintf(u.words, sizeof u.words,
@@ -78,12 +78,11 @@ static void print_words(const ebpo_verify_report *report, const char *path, cons
     if (u->words[0])
         printf("%s: not compared: %s\n", against, u->words);
     if (report->spare_filled)
-        printf("%s: note: %llu of %llu bytes that belong to nothing are not zero, as this program "
-               "leaves them\n",
+        printf("%s: note: %llu of %llu unused bytes are not zero; this program writes zeros\n",
                path, (unsigned long long)report->spare_filled,
                (unsigned long long)report->spare_bytes);
     if (!report->violations)
-        printf("%s: fine: %llu checks, no violation\n", path, (unsigned long long)report->checks);
+        printf("%s: OK: %llu checks, no violation\n", path, (unsigned long long)report->checks);
 }
 
 static void print_violations(const ebpo_verify_report *report, const char *path)
@@ -104,7 +103,7 @@ static void print_json(const ebpo_verify_report *report, const char *path, const
     json_begin(&j, stdout);
     json_object(&j, NULL);
     json_text(&j, "file", remote_shown(path));
-    json_bool(&j, "fine", report->violations == 0);
+    json_bool(&j, "ok", report->violations == 0);
     json_uint(&j, "checks", report->checks);
     json_uint(&j, "violations", report->violations);
     if (u->words[0])
@@ -163,7 +162,7 @@ static ebpo_status verify_model(const values *v, const char *path, ebpo_progress
     return status;
 }
 
-static const values usual = { .remote = REMOTE_VALUES_INIT };
+static const values standard = { .remote = REMOTE_VALUES_INIT };
 
 static int run_verify(void *given, const char **operand)
 {
@@ -189,8 +188,8 @@ static int run_verify(void *given, const char **operand)
     command_flush("verify");
     print_violations(&report, remote_shown(operand[0]));
     if (!v->json)
-        remote_tell(&t, &v->remote, false);
+        remote_report(&t, &v->remote, false);
     return report.violations ? EXIT_FAILED : EXIT_FINE;
 }
 
-const command command_verify = { &spec, sizeof usual, &usual, run_verify };
+const command command_verify = { &spec, sizeof standard, &standard, run_verify };

@@ -1,4 +1,4 @@
-/* ebpo view: nodes in the order in which they matter to an observer, under a budget. */
+/* ebpo view: prints nodes by their importance for an observer, under a budget. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -20,7 +20,7 @@ typedef struct values {
     int order;
     const char *eye, *look, *up, *size, *bytes, *memory, *out;
     double fov, pixels, distance;
-    int64_t to, count;
+    int64_t max_level, count;
     bool seen_only, nodes, json;
     remote_values remote;
 } values;
@@ -104,7 +104,7 @@ static bool read_options(const values *v, ebpo_view_options *o, ebpo_observer *o
     o->unseen = v->seen_only ? EBPO_UNSEEN_NEVER : EBPO_UNSEEN_LAST;
     o->pixels = v->pixels > 0 ? v->pixels : 0;
     o->distance = v->distance >= 0 ? v->distance : INFINITY;
-    o->level = (int)v->to;
+    o->level = (int)v->max_level;
     o->nodes = v->count > 0 ? (uint64_t)v->count : 0;
     o->polygons = v->out != NULL;
     o->windings = v->nodes;
@@ -191,8 +191,8 @@ static void print_legend(void)
 
 /* --- streaming --- */
 
-static ebpo_status tell_nodes(printer *p, ebpo_view_stream *stream, ebpo_view_end *end,
-                              bool *arrived, ebpo_error *error)
+static ebpo_status report_nodes(printer *p, ebpo_view_stream *stream, ebpo_view_end *end,
+                                bool *arrived, ebpo_error *error)
 {
     ebpo_view_node node;
     ebpo_status status;
@@ -231,7 +231,7 @@ static ebpo_status stream_nodes(printer *p, ebpo_file *file, const char *path,
         printf("%s: by %s\n%12s %10s %9s %9s %9s %9s %9s %10s %9s\n", remote_shown(path), order,
                "bytes", "nodes", "gray", "leaf", "white", "black", "waiting", "pixels", "ms");
     }
-    status = tell_nodes(p, stream, &end, arrived, error);
+    status = report_nodes(p, stream, &end, arrived, error);
     if (p->v->json)
         json_end(&p->j);
     print_row(p, stream, "last");
@@ -244,11 +244,11 @@ static ebpo_status stream_nodes(printer *p, ebpo_file *file, const char *path,
         if (status == EBPO_OK && *arrived)
             print_legend();
         if (status == EBPO_OK && *arrived)
-            printf("%s\n", end == EBPO_VIEW_DONE    ? "everything that was asked for has arrived"
+            printf("%s\n", end == EBPO_VIEW_DONE    ? "all requested data has arrived"
                            : end == EBPO_VIEW_BYTES ? "stopped by --bytes"
                                                     : "stopped by --count");
         (void)command_flush("view");
-        remote_tell(&t, &p->v->remote, false);
+        remote_report(&t, &p->v->remote, false);
     }
     ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
     ebpo_view_stream_get_stats(stream, &stats);
@@ -264,13 +264,13 @@ static ebpo_status stream_nodes(printer *p, ebpo_file *file, const char *path,
     return status;
 }
 
-static const values usual = { .order = -1,
-                              .fov = -1,
-                              .pixels = -1,
-                              .distance = -1,
-                              .to = -1,
-                              .count = -1,
-                              .remote = REMOTE_VALUES_INIT };
+static const values standard = { .order = -1,
+                                 .fov = -1,
+                                 .pixels = -1,
+                                 .distance = -1,
+                                 .max_level = -1,
+                                 .count = -1,
+                                 .remote = REMOTE_VALUES_INIT };
 
 static int run_view(void *given, const char **operand)
 {
@@ -291,7 +291,7 @@ static int run_view(void *given, const char **operand)
         return EXIT_FAILED;
     if (remote_open(&file, operand[0], &v->remote, &error) != EBPO_OK)
         return command_failed("view", &error);
-    bool there = command_has_level("view", ebpo_file_info(file), v->to), arrived = true;
+    bool there = command_has_level("view", ebpo_file_info(file), v->max_level), arrived = true;
     ebpo_status status =
         there ? stream_nodes(&p, file, operand[0], &wanted, &arrived, &error) : EBPO_OK;
     ebpo_close(file);
@@ -302,4 +302,4 @@ static int run_view(void *given, const char **operand)
     return status == EBPO_OK ? EXIT_FINE : command_failed("view", &error);
 }
 
-const command command_view = { &spec, sizeof usual, &usual, run_view };
+const command command_view = { &spec, sizeof standard, &standard, run_view };

@@ -1,4 +1,4 @@
-/* The commands: one cmd_NAME.c for each. Their table is in options/meson.build. */
+/* Lists the commands: one cmd_NAME.c for each. Their table is in options/meson.build. */
 #ifndef EBPO_TOOLS_COMMANDS_H
 #define EBPO_TOOLS_COMMANDS_H
 
@@ -7,8 +7,8 @@
 
 typedef struct command {
     const arg_spec *spec;
-    size_t size;       /* of the struct that spec->options fills */
-    const void *usual; /* what is in it before */
+    size_t size;          /* size of the struct that spec->options fills */
+    const void *standard; /* its defaults */
     /* operand[ARGS_OPERANDS_MAX], NULL where none was given; returns the exit code */
     int (*run)(void *values, const char **operand);
 } command;

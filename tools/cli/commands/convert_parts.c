@@ -1,5 +1,5 @@
-/* ebpo convert --split-components and --split-groups: a folder with one model for each part, and a
- * scene of them. */
+/* Implements ebpo convert --split-components and --split-groups: a folder with one model for each
+ * part, and a scene of them. */
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,7 +23,7 @@
 
 enum { PART_NAME_SIZE = 96, PART_SHOWN_SIZE = 256 };
 
-enum { OWN_IN_FILE = 40, SPELT_MOST = 220 };
+enum { OWN_IN_FILE = 40, SPELT_MAX = 220 };
 
 static bool is_safe(char c)
 {
@@ -31,8 +31,8 @@ static bool is_safe(char c)
            c == '_';
 }
 
-/* "KIND-NUMBER-NAME", of letters, digits, '-' and '_' only; the number, of so many digits, tells
- * them apart. `own`: NULL: without. */
+/* Writes "KIND-NUMBER-NAME", with letters, digits, '-' and '_' only; the number, with so many
+ * digits, makes it unique. `own`: NULL: without a name. */
 static void part_file_name(char out[PART_NAME_SIZE], const char *kind, int digits, uint64_t number,
                            const char *own)
 {
@@ -46,22 +46,22 @@ static void part_file_name(char out[PART_NAME_SIZE], const char *kind, int digit
     out[size] = 0;
 }
 
-/* Words that stand for many instances. */
+/* Returns true for words that select many instances. */
 static bool is_selector(const char *own)
 {
     return strcmp(own, "*") == 0 || strncmp(own, "layer:", 6) == 0 ||
            strncmp(own, "group:", 6) == 0;
 }
 
-/* Bytes of the character there; 0: a scene cannot have it. */
+/* Returns the bytes of the character there; 0: not allowed in a scene. */
 static int plain_length(const char *s)
 {
     unsigned char c = (unsigned char)*s;
     return c < 0x20 || c == 0x7f ? 0 : json_utf8_length(s);
 }
 
-/* A scene can have this name: 1 to 255 bytes of UTF-8 without control characters and no selector.
- */
+/* Returns true when a scene can have this name: 1 to 255 bytes of UTF-8 without control characters
+ * and no selector. */
 static bool part_name_fits(const char *own)
 {
     size_t size = strnlen(own, PART_SHOWN_SIZE);
@@ -76,18 +76,18 @@ static bool part_name_fits(const char *own)
     return true;
 }
 
-/* For qsort, of pointers to names. */
+/* For qsort of pointers to names. */
 static int part_compare_names(const void *a, const void *b)
 {
     return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-/* Each byte that cannot be there as \xNN, as far as there is room. */
+/* Writes each byte that is not allowed as \xNN, as far as it fits. */
 static size_t spell_name(char *out, const char *own)
 {
     size_t size = 0;
     bool first = is_selector(own);
-    for (const char *s = own; *s && size + 4 <= SPELT_MOST; first = false) {
+    for (const char *s = own; *s && size + 4 <= SPELT_MAX; first = false) {
         int length = first ? 0 : plain_length(s);
         if (length)
             memcpy(out + size, s, (size_t)length);
@@ -99,8 +99,8 @@ static size_t spell_name(char *out, const char *own)
     return size;
 }
 
-/* The group's own name, where a scene can have it; else what can be said of it, with a number.
- * `taken`: sorted, the own names that are shown as they are. */
+/* Writes the name of the group, when a scene can have it; else a derived name with a number.
+ * `taken`: sorted names that are used unchanged. */
 static void part_shown_name(char out[PART_SHOWN_SIZE], const char *own, uint64_t number,
                             const char *const *taken, uint64_t taken_count)
 {
@@ -118,7 +118,7 @@ static void part_shown_name(char out[PART_SHOWN_SIZE], const char *own, uint64_t
     }
 }
 
-/* How it is called. */
+/* Words for a kind of parts. */
 typedef struct part_kind {
     const char *one, *many, *scene, *building, *too_many;
 } part_kind;
@@ -128,12 +128,12 @@ static const part_kind components = { "component", "components", "components.sce
                                       "; merge vertices at the same position with --weld" },
                        groups = { "group", "groups", "groups.scene.json", "building groups", "" };
 
-enum { PARTS_MOST = 100000, ENDING_SIZE = 16 };
+enum { PARTS_MAX = 100000, ENDING_SIZE = 16 };
 
-/* Of a part, as it is on the disk. */
+/* Facts of a part, as it is on the disk. */
 typedef struct part {
     char name[PART_NAME_SIZE], file[PART_NAME_SIZE + ENDING_SIZE];
-    char *shown; /* in the scene: the group's own name; NULL: `name` */
+    char *shown; /* in the scene: the name of the group; NULL: `name` */
     ebpo_component facts;
     bool solid;
     int levels;
@@ -152,14 +152,14 @@ typedef struct writing {
 
 /* ---- the folder ---- */
 
-/* What a signal's handler removes too. */
+/* Also removed by a signal handler. */
 static char *making;
 static int making_fd = -1;
 static part *volatile made;
 static volatile uint64_t made_count;
-static const char *scene_name; /* of what is being made */
+static const char *scene_name; /* scene that is being made */
 
-/* Only what a signal handler may call. Once it has its name, the folder stays. */
+/* Uses only async-signal-safe calls. The folder stays once it has its final name. */
 static void remove_all(void)
 {
     if (!making || access(making, F_OK) != 0)
@@ -224,7 +224,7 @@ static ebpo_status too_many(const writing *w, ebpo_error *error)
     error->status = EBPO_E_LIMIT;
     snprintf(error->message, sizeof error->message, "%s: has %llu %s, and at most %d are written%s",
              w->whole->as_read.source_name,
-             (unsigned long long)ebpo_components_count(w->components), w->kind->many, PARTS_MOST,
+             (unsigned long long)ebpo_components_count(w->components), w->kind->many, PARTS_MAX,
              w->kind->too_many);
     return EBPO_E_LIMIT;
 }
@@ -243,7 +243,7 @@ static ebpo_status name_part(const writing *w, uint64_t i, int digits, ebpo_erro
     return status == EBPO_OK ? ebpo_components_get(w->components, i, &p->facts, error) : status;
 }
 
-/* What groups are called in the scene. */
+/* Sets the names of groups in the scene. */
 static ebpo_status show_names(const writing *w, ebpo_error *error)
 {
     const char **own = calloc(w->count, sizeof *own), **taken = calloc(w->count, sizeof *taken);
@@ -272,7 +272,7 @@ static ebpo_status show_names(const writing *w, ebpo_error *error)
 static ebpo_status name_parts(writing *w, ebpo_error *error)
 {
     uint64_t count = ebpo_components_count(w->components), most = 0;
-    if (count > PARTS_MOST)
+    if (count > PARTS_MAX)
         return too_many(w, error);
     w->parts = calloc(count, sizeof *w->parts);
     if (!w->parts)
@@ -304,7 +304,7 @@ static bool report_part(void *user, const char *stage, uint64_t done, uint64_t t
            outer->report(outer->user, w->kind->building, w->faces_done, w->whole->mesh.face_count);
 }
 
-static ebpo_status look_at(part *p, const char *path, ebpo_error *error)
+static ebpo_status inspect_part(part *p, const char *path, ebpo_error *error)
 {
     ebpo_file *file = NULL;
     ebpo_status status = remote_open_own(path, &file, error);
@@ -320,7 +320,7 @@ static ebpo_status look_at(part *p, const char *path, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* The mesh of one, checked; mending was the whole mesh's. */
+/* Takes the mesh of a part, checked; repairs were made on the whole mesh. */
 static ebpo_status take_mesh(const writing *w, uint64_t number, mesh_input *out, ebpo_error *error)
 {
     ebpo_progress progress = { report_part, (void *)(uintptr_t)w };
@@ -345,14 +345,15 @@ static ebpo_status write_part(writing *w, uint64_t number, ebpo_error *error)
     if (!path)
         return no_memory(error);
     ebpo_status status = take_mesh(w, number, &one, error);
-    if (status == EBPO_OK && w->run->groups) { /* the whole says little of them */
+    if (status == EBPO_OK && w->run->groups) { /* the report of the whole mesh does not describe
+                                                * them */
         progress_wipe(w->run->line);
         advice_warn(stderr, "convert", shown_name(&w->parts[number]), &one);
     }
     if (status == EBPO_OK)
         status = w->run->build(w->run->user, &one, path, progress, error);
     if (status == EBPO_OK)
-        status = look_at(&w->parts[number], path, error);
+        status = inspect_part(&w->parts[number], path, error);
     w->faces_done += w->parts[number].facts.face_count;
     free(path);
     return status;
@@ -404,7 +405,7 @@ static ebpo_status write_scene(const writing *w, ebpo_error *error)
     return status;
 }
 
-/* ---- what is told ---- */
+/* ---- output ---- */
 
 static void print_words(const writing *w, double seconds)
 {
@@ -465,8 +466,8 @@ static void print_json(const writing *w, double seconds)
 
 /* ---- all of it ---- */
 
-/* Names without faces have no model, which is said. */
-static ebpo_status tell_empty(const writing *w, ebpo_error *error)
+/* Reports groups without faces, which have no model. */
+static ebpo_status report_empty(const writing *w, ebpo_error *error)
 {
     uint64_t count = ebpo_mesh_groups_count(w->run->groups);
     if (count <= w->count)
@@ -501,7 +502,7 @@ static ebpo_status write_all(writing *w, ebpo_error *error)
     if (status == EBPO_OK)
         status = name_parts(w, error);
     if (status == EBPO_OK)
-        status = tell_empty(w, error);
+        status = report_empty(w, error);
     for (uint64_t i = 0; i < w->count && status == EBPO_OK; i++)
         status = write_part(w, i, error);
     if (status == EBPO_OK)
@@ -518,7 +519,7 @@ ebpo_status parts_write(const parts_run *run, mesh_input *whole, double begun, e
     ebpo_components_free(w.components);
     ebpo_mesh_free(&whole->mesh);
     if (status == EBPO_OK) {
-        made_count = 0; /* it is there, and stays */
+        made_count = 0; /* it is complete, and stays */
         free(making);
         making = NULL;
         progress_wipe(run->line);

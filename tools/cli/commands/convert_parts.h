@@ -1,5 +1,5 @@
-/* `ebpo convert --split-components` and `--split-groups`: a folder with a file for each part, and a
- * scene. */
+/* Implements `ebpo convert --split-components` and `--split-groups`: a folder with a file for each
+ * part, and a scene. */
 #ifndef EBPO_TOOLS_CONVERT_PARTS_H
 #define EBPO_TOOLS_CONVERT_PARTS_H
 
@@ -10,7 +10,7 @@ typedef struct parts_run {
     /* Builds a file; the mesh is freed in any case. */
     ebpo_status (*build)(void *user, mesh_input *part, const char *path, ebpo_progress progress,
                          ebpo_error *error);
-    /* Whether there is room for the largest one. */
+    /* Checks memory for the largest part. */
     ebpo_status (*fits)(void *user, uint64_t faces, ebpo_error *error);
     void *user;
     const ebpo_mesh_groups *groups; /* NULL: components are the parts */
@@ -21,14 +21,15 @@ typedef struct parts_run {
     ebpo_progress progress;
 } parts_run;
 
-/* Makes the folder beside its place, before anything is read; the exit's clean-up is set. */
+/* Makes the folder beside its place, before anything is read, and registers clean-up at exit. */
 EBPO_MUST_USE ebpo_status parts_begin(const char *folder, bool groups, ebpo_error *error);
 
-/* Of the mesh, mended: frees it. Then the folder is in its place, and what it holds is told. */
+/* Writes the parts of the repaired mesh, and frees it. Then moves the folder to its place, and
+ * reports its contents. */
 EBPO_MUST_USE ebpo_status parts_write(const parts_run *run, mesh_input *whole, double begun,
                                       ebpo_error *error);
 
-/* Removes what was made and not put in its place. Harmless at any time. */
+/* Removes parts that were made and not moved to their place. May be called at any time. */
 void parts_end(void);
 
 #endif

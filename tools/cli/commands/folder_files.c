@@ -16,7 +16,7 @@ static bool is_of_model(const char *name)
            !words_end_with(name, ".paint.h5");
 }
 
-/* Takes `path`, also when it fails. */
+/* Takes ownership of `path`, also on failure. */
 static bool add_path(folder_files *f, char *path)
 {
     if (path && f->count == f->capacity) {
@@ -53,8 +53,9 @@ char *folder_files_shown(const char *path)
     return text;
 }
 
-/* folder/below/name, or what of it is not ""; why is in errno. False: `no_memory`. */
-static bool tell_unread(folder_files *f, const char *folder, const char *below, const char *name)
+/* Reports folder/below/name, without empty parts; the reason is in errno. Returns false on
+ * `no_memory`. */
+static bool report_unread(folder_files *f, const char *folder, const char *below, const char *name)
 {
     const char *why = strerror(errno);
     char *within = *name ? join_path(below, name) : strdup(below);
@@ -72,20 +73,20 @@ static bool tell_unread(folder_files *f, const char *folder, const char *below, 
 
 static bool look_into(folder_files *f, const char *folder, const char *below);
 
-/* Folders by links are not entered: links may go round in circles. */
-static bool look_at(folder_files *f, DIR *dir, const char *folder, const char *below,
-                    const char *name)
+/* Does not follow links to folders, which may form cycles. */
+static bool inspect_entry(folder_files *f, DIR *dir, const char *folder, const char *below,
+                          const char *name)
 {
     struct stat st;
     bool known = fstatat(dirfd(dir), name, &st, AT_SYMLINK_NOFOLLOW) == 0;
     if (!known && errno == ENOENT)
-        return true; /* it went meanwhile */
+        return true; /* it was removed meanwhile */
     bool enter = known && S_ISDIR(st.st_mode);
     if (!known && !is_of_model(name)) /* it may be a folder */
-        return tell_unread(f, folder, below, name);
+        return report_unread(f, folder, below, name);
     if (!enter && !is_of_model(name))
         return true;
-    /* a link that leads nowhere is told when it is opened; one to a folder is none of ours */
+    /* a dangling link is reported when it is opened; a link to a folder is skipped */
     if (!enter && fstatat(dirfd(dir), name, &st, 0) == 0 && S_ISDIR(st.st_mode))
         return true;
     char *path = join_path(below, name);
@@ -102,7 +103,7 @@ static DIR *open_folder(folder_files *f, const char *folder, const char *below)
     DIR *dir = path ? opendir(path) : NULL;
     f->no_memory |= !path;
     if (path && !dir)
-        (void)tell_unread(f, folder, below, "");
+        (void)report_unread(f, folder, below, "");
     free(path);
     return dir;
 }
@@ -115,9 +116,9 @@ static bool look_into(folder_files *f, const char *folder, const char *below)
     bool fine = true;
     for (const struct dirent *entry; fine && (errno = 0, entry = readdir(dir));)
         if (entry->d_name[0] != '.')
-            fine = look_at(f, dir, folder, below, entry->d_name);
+            fine = inspect_entry(f, dir, folder, below, entry->d_name);
     if (fine && errno != 0)
-        fine = tell_unread(f, folder, below, "");
+        fine = report_unread(f, folder, below, "");
     closedir(dir);
     return fine;
 }

@@ -1,5 +1,4 @@
-/* The command line: `ebpo COMMAND ...`. A table of the commands in groups; each has its cmd_NAME.c.
- */
+/* The command line: `ebpo COMMAND ...`. Each command is in a file cmd_NAME.c. */
 #include <fenv.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,6 +7,7 @@
 
 #include "cli/command.h"
 #include "cli/process_memory.h"
+#include "cli/renamed.h"
 #include "cli/signals.h"
 #include "cli/standard_files.h"
 #include "cli/words.h"
@@ -54,16 +54,20 @@ static void print_usage(FILE *out)
                  "as trees of convex envelopes.\n");
     print_commands(out);
     fprintf(out, "\n  %-10s %s\n", "help", "describe a command and its options: ebpo help COMMAND");
-    fprintf(out,
-            "  --version  print the version and exit; with --verbose, where the program, its "
-            "library and the HDF5 plugin are\n\nexit codes: 0 success, 1 bad data "
-            "or input/output, 2 wrong usage, 3 not a solid where one is required, 4 (repack) "
-            "the content "
-            "would differ, (repair) it does, (paint) the model is another one, (catalogue) files "
-            "were left out\n");
+    fprintf(out, "  %-10s %s\n", "", "describe the options for URLs: ebpo help remote");
+    fputs("  --version  print the version and exit; with --verbose, also the paths of the\n"
+          "             program, its library and the HDF5 plugin\n\n"
+          "exit codes\n"
+          "  0  success\n"
+          "  1  bad data, or an input or output error\n"
+          "  2  wrong usage\n"
+          "  3  not a solid where one is required\n"
+          "  4  repack, recover: the content would differ, or differs; paint: the paint\n"
+          "     belongs to another model; catalogue: files were omitted\n",
+          out);
 }
 
-/* Says whether `name` is one of the words of `names`. */
+/* Returns true when `name` is one of the words of `names`. */
 static bool is_among(const char *names, const char *name)
 {
     size_t length = strlen(name);
@@ -75,6 +79,11 @@ static bool is_among(const char *names, const char *name)
 
 static int unknown_command(const char *name)
 {
+    const char *now = renamed_command(name);
+    if (now) {
+        fprintf(stderr, "ebpo: the command '%s' is now '%s'\n", name, now);
+        return EXIT_USAGE;
+    }
     for (int g = 0; g < GROUPS; g++)
         if (groups[g].extras && is_among(groups[g].extras, name)) {
             fprintf(stderr,
@@ -87,6 +96,15 @@ static int unknown_command(const char *name)
     return EXIT_USAGE;
 }
 
+/* The options for URLs, which all commands that read files share. */
+static void print_remote(void)
+{
+    printf("A command that reads an .ebpo.h5 file also accepts its URL, http:// or https://.\n"
+           "Options for URLs:\n\n");
+    args_help_page(command_info.spec, "remote");
+    printf("\nSee also ebpo-remote(7).\n");
+}
+
 static int print_help(int argc, char **argv)
 {
     if (argc > 3) {
@@ -97,6 +115,10 @@ static int print_help(int argc, char **argv)
     }
     if (argc < 3) {
         print_usage(stdout);
+        return EXIT_FINE;
+    }
+    if (strcmp(argv[2], "remote") == 0) {
+        print_remote();
         return EXIT_FINE;
     }
     const command *c = find_command(argv[2]);
@@ -120,7 +142,7 @@ static void *run_command(void *user)
     return NULL;
 }
 
-/* Runs the command on a thread with enough stack, where RLIMIT_STACK gives the main thread less. */
+/* Runs the command on a thread with enough stack when RLIMIT_STACK gives the main thread less. */
 static int run_with_stack(command_call *call)
 {
     struct rlimit stack;
@@ -139,7 +161,7 @@ static int run_parsed(const command *c, int argc, char **argv)
     void *values = malloc(c->size);
     if (!values)
         return command_no_memory(c->spec->command);
-    memcpy(values, c->usual, c->size);
+    memcpy(values, c->standard, c->size);
     arg_result parsed = args_parse(c->spec, argc, argv, values, operand);
     int code = parsed == ARGS_WRONG ? EXIT_USAGE : EXIT_FINE;
     if (parsed == ARGS_RUN && (code = standard_files_begin(c->spec, operand)) == EXIT_FINE)
@@ -157,7 +179,7 @@ static int dispatch_command(int argc, char **argv)
     }
     const char *name = argv[1];
     if (strcmp(name, "--version") == 0 || strcmp(name, "-V") == 0)
-        return version_tell(argv[2]);
+        return version_report(argv[2]);
     if (strcmp(name, "help") == 0 || strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0)
         return print_help(argc, argv);
     const command *c = find_command(name);
@@ -168,11 +190,11 @@ int main(int argc, char **argv)
 {
     if (!standard_files_occupy())
         return EXIT_FAILED;
-    /* whatever a preloaded library has set: numbers are parsed and printed here, too */
+    /* undoes changes by a preloaded library: numbers are parsed and printed here, too */
     fesetenv(FE_DFL_ENV);
     signals_install();
     words_init();
-    process_memory_usual();
+    process_memory_default();
     int code = dispatch_command(argc, argv);
     const command *c = argc > 1 ? find_command(argv[1]) : NULL;
     if (!command_flush(c ? c->spec->command : NULL) && code == EXIT_FINE)

@@ -1,4 +1,4 @@
-/* What `ebpo map` was asked for, as its files share it. */
+/* Options and results of `ebpo map`, shared by its files. */
 #ifndef EBPO_TOOLS_MAP_JOB_H
 #define EBPO_TOOLS_MAP_JOB_H
 
@@ -6,7 +6,7 @@
 
 #include "cli/remote_args.h"
 
-#define MAP_MARGIN 0.1 /* usually */
+#define MAP_MARGIN 0.1 /* default */
 
 typedef struct map_values {
     const char *plane, *grid, *from, *out, *picture, *size, *box, *memory;
@@ -23,18 +23,19 @@ typedef struct map_job {
     ebpo_file *file;
     ebpo_model *model;
     ebpo_map_options options;
-    /* of a plane or grid */
+    /* points of a plane or grid */
     bool plane;
     ebpo_lattice lattice;
-    /* of vertices */
-    int width, height; /* of their picture */
-    /* what came of it */
-    double range; /* of the colours */
+    /* map of vertices */
+    int width, height; /* size of their picture */
+    /* results */
+    double range; /* range of the colours */
     ebpo_map_stats stats;
-    ebpo_map_reach reach;
+    ebpo_map_range reach;
 } map_job;
 
-/* "800x600" into two numbers of 2 to 8192 each. False, said. */
+/* Reads "800x600" into two numbers of 2 to 8192 each. Returns false after an error, which was
+ * reported. */
 bool map_read_size(const char *text, int *width, int *height);
 
 #endif

@@ -1,4 +1,4 @@
-/* What `ebpo paint` was asked for, as its files share it. */
+/* Options and results of `ebpo paint`, shared by its files. */
 #ifndef EBPO_TOOLS_PAINT_JOB_H
 #define EBPO_TOOLS_PAINT_JOB_H
 
@@ -18,20 +18,20 @@ typedef struct paint_values {
 
 typedef struct paint_job {
     const paint_values *v;
-    const char *paint_path, *model_path; /* the latter NULL: not given */
+    const char *paint_path, *model_path; /* model_path NULL: not given */
     ebpo_paint *paint;
     ebpo_file *file;
     ebpo_model *model;
     ebpo_context *context;
     ebpo_progress progress;
     bool changed;            /* in memory */
-    ebpo_paint_laid laid;    /* by --path */
+    ebpo_paint_drawn laid;   /* by --path */
     ebpo_paint_baked baked;  /* by --bake */
     ebpo_paint_areas areas;  /* by --area */
     uint64_t colours_of_own; /* by --bake: the model has colours of vertices */
 } paint_job;
 
-/* Prints the list, and what was done. */
-void paint_tell(const paint_job *job);
+/* Prints the list, and the results. */
+void paint_report(const paint_job *job);
 
 #endif

@@ -52,7 +52,7 @@ ebpo_status painted_find_red(ebpo_scene *scene, uint64_t a, uint64_t b, double t
 
 /* --- what is drawn --- */
 
-static bool make_room(painted_mesh *p, uint64_t vertices, uint64_t faces)
+static bool reserve_space(painted_mesh *p, uint64_t vertices, uint64_t faces)
 {
     ebpo_mesh *m = &p->mesh;
     double *xyz = realloc(m->xyz64, 3 * (m->vertex_count + vertices) * sizeof *xyz);
@@ -85,7 +85,7 @@ static ebpo_status add_mesh(painted_mesh *p, const ebpo_mesh *from, const ebpo_p
                             const uint8_t *red, uint8_t paint, ebpo_error *error)
 {
     uint32_t first = (uint32_t)p->mesh.vertex_count;
-    if (!make_room(p, from->vertex_count, from->face_count))
+    if (!reserve_space(p, from->vertex_count, from->face_count))
         return no_memory(error);
     for (uint64_t i = 0; i < from->vertex_count; i++) {
         double x[3];
@@ -129,7 +129,7 @@ ebpo_status painted_add_box(painted_mesh *p, const ebpo_scene *scene, uint64_t i
         return status;
     (void)ebpo_scene_get_instance(scene, instance, &at);
     (void)ebpo_scene_get_model(scene, at.model, &m);
-    if (!make_room(p, 8, 12))
+    if (!reserve_space(p, 8, 12))
         return no_memory(error);
     for (int i = 0; i < 8; i++) {
         const double x[3] = { (i & 1 ? m.max : m.min)[0], (i & 2 ? m.max : m.min)[1],

@@ -7,9 +7,9 @@
 #include <sys/stat.h>
 
 #include "cli/command.h"
-#include "cli/model_sums.h"
+#include "cli/model_stats.h"
 
-/* What a catalogue is not asked, in the order in which it is said. */
+/* Options that a catalogue does not support, in the order of reports. */
 static const char *refused_option(const query_job *job)
 {
     const query_values *v = job->values;
@@ -19,7 +19,7 @@ static const char *refused_option(const query_job *job)
            : v->all                  ? "--all"
            : v->any                  ? "--any"
            : v->attribute            ? "--attribute"
-           : v->level >= 0           ? "--level"
+           : v->level >= 0           ? "--max-level"
            : v->deadline             ? "--deadline"
            : v->inside_mode          ? "--mode"
            : v->distance_mode        ? "--mode"
@@ -39,11 +39,12 @@ bool query_catalogue_fits(const query_job *job)
 {
     const char *what = refused_option(job);
     if (what)
-        command_usage(job->command, "%s asks one model, not a catalogue", what);
+        command_usage(job->command, "%s needs a model, not a catalogue", what);
     return !what;
 }
 
-static ebpo_status open_as_told(void *user, const char *path, ebpo_file **out, ebpo_error *error)
+static ebpo_status open_as_reported(void *user, const char *path, ebpo_file **out,
+                                    ebpo_error *error)
 {
     return remote_open(out, path, user, error);
 }
@@ -54,7 +55,7 @@ int query_catalogue_open(query_job *job, const char *path, const ebpo_model_opti
     const query_values *v = job->values;
     ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
     ebpo_catalogue_models_options o = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
-    how.open_file = open_as_told;
+    how.open_file = open_as_reported;
     how.user = (void *)&v->remote;
     o.memory = v->memory ? options->memory : ebpo_free_memory() / 2;
     o.threads = options->threads;
@@ -72,17 +73,17 @@ void query_catalogue_close(query_job *job)
     job->catalogue = NULL;
 }
 
-ebpo_catalogue_ask_options query_catalogue_options(const query_job *job)
+ebpo_catalogue_query_options query_catalogue_options(const query_job *job)
 {
-    ebpo_catalogue_ask_options o = EBPO_CATALOGUE_ASK_OPTIONS_INIT;
-    o.threads = 1; /* others ask about other rows */
+    ebpo_catalogue_query_options o = EBPO_CATALOGUE_QUERY_OPTIONS_INIT;
+    o.threads = 1; /* other threads query other rows */
     o.max_distance = job->distance.max_distance;
     o.unsigned_distance = job->distance.unsigned_distance;
     o.sides = (ebpo_ray_sides)job->values->ray_sides;
     return o;
 }
 
-void query_catalogue_tell(const query_job *job)
+void query_catalogue_report(const query_job *job)
 {
     ebpo_catalogue_facts facts = EBPO_CATALOGUE_FACTS_INIT;
     ebpo_catalogue_models_stats n = EBPO_CATALOGUE_MODELS_STATS_INIT;
@@ -121,7 +122,7 @@ int query_catalogue_facts(json *j, const char *command, const char *path)
     snprintf(hash, sizeof hash, "%016" PRIx64, facts.file_hash);
     json_object(j, "catalogue");
     json_uint(j, "bytes", facts.file_bytes);
-    json_text(j, "fnv1a", hash); /* it has the digest of each model */
+    json_text(j, "fnv1a", hash); /* it contains the digest of each model */
     json_array(j, "numbers");
     for (uint64_t i = 0; i < facts.count; i++) {
         const char *numbers = ebpo_catalogue_get_entry(c, i)->numbers;

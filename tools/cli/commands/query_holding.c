@@ -7,16 +7,16 @@
 #include "cli/command.h"
 #include "cli/words.h"
 
-/* What is loaded at once without further thought: some milliseconds. */
+/* Size that is always loaded completely: takes some milliseconds. */
 enum { SMALL = 16 << 20 };
 
-/* Loads after which their mean is believed; and what is foretold must exceed all subtrees so many
- * times. */
+/* Number of loads before their mean is used; and the factor by which the estimate must exceed all
+ * subtrees. */
 enum { LOADS_BELIEVED = 8, CERTAIN = 4 };
 
 /* --- opening --- */
 
-/* As if not all of it fitted: a model with subtrees is cut at their roots, each of which is one
+/* As if not everything fitted: cuts a model with subtrees at their roots, each of which is one
  * read. */
 static void cut_at_subtrees(query_holding *h)
 {
@@ -35,13 +35,13 @@ static void cut_at_subtrees(query_holding *h)
         h->subtrees = parts.subtrees;
 }
 
-/* Half of what is free is the most, or the least that will do. */
+/* Uses at most half of the free memory, or the minimum. */
 static void decide_memory(query_holding *h)
 {
     uint64_t half = (h->free_memory = ebpo_free_memory()) / 2;
     h->plan = (ebpo_model_plan)EBPO_MODEL_PLAN_INIT;
     if (ebpo_model_memory(h->session.file, &h->options, &h->plan, NULL) != EBPO_OK)
-        return; /* it is said when the model is made */
+        return; /* reported when the model is made */
     h->options.memory = half > h->plan.least ? half : h->plan.least;
     if (ebpo_model_memory(h->session.file, &h->options, &h->plan, NULL) != EBPO_OK ||
         (h->plan.resident && h->plan.whole <= SMALL))
@@ -103,13 +103,13 @@ static ebpo_status ready_context(query_holding *h, ebpo_context **context, ebpo_
         return EBPO_OK;
     ebpo_status status = ebpo_context_new(h->session.model, context, error);
     pthread_mutex_lock(&h->books);
-    if (status == EBPO_OK && h->contexts < QUERY_THREADS_MOST)
+    if (status == EBPO_OK && h->contexts < QUERY_THREADS_MAX)
         h->context[h->contexts++] = context;
     pthread_mutex_unlock(&h->books);
     return status;
 }
 
-/* Alone. */
+/* Needs exclusive access. */
 static void drop_contexts(query_holding *h)
 {
     for (unsigned i = 0; i < h->contexts; i++) {
@@ -134,24 +134,25 @@ void query_holding_forget(query_holding *h, ebpo_context **context)
 
 /* --- all of the model --- */
 
-/* Loading everything costs what loading each subtree once costs, and no more is spent on that as
- * long as all are kept. What parts cost beyond it: subtrees that are loaded again, and a share of
- * the time that questions take, which go from subtree to subtree. All at once pays when so much has
- * been spent, which is at most twice of what would have been best; or at the beginning, when the
- * questions that are still to come will need all of it by far. */
+/* Loading everything costs as much as loading each subtree once, and while all are kept, parts cost
+ * no more. Parts cost more when subtrees are loaded again, and because queries that change between
+ * subtrees are slower. Loading everything pays when this extra cost equals its own cost, so the
+ * total is at most twice the optimum; or at the beginning, when the remaining queries will clearly
+ * need everything. */
 static bool loading_pays(query_holding *h, double total)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
     if (ebpo_model_get_stats(h->session.model, &s) != EBPO_OK || s.loads < LOADS_BELIEVED)
         return false;
     pthread_mutex_lock(&h->books);
-    double each = s.load_seconds / (double)s.loads, asked = (double)h->questions,
+    double each = s.load_seconds / (double)s.loads, queried = (double)h->queries,
            again = (double)(s.evicted < s.loads ? s.evicted : s.loads) * each,
-           asking = h->asking_seconds > s.load_seconds ? h->asking_seconds - s.load_seconds : 0,
-           foretold = asked > 0 ? (double)s.loads / asked * (total - asked) : 0;
+           querying =
+               h->querying_seconds > s.load_seconds ? h->querying_seconds - s.load_seconds : 0,
+           foretold = queried > 0 ? (double)s.loads / queried * (total - queried) : 0;
     h->whole_seconds = each * (double)h->subtrees;
-    h->extra_seconds = again + h->parts_share * asking;
-    h->questions_before = h->questions;
+    h->extra_seconds = again + h->parts_share * querying;
+    h->queries_before = h->queries;
     h->loads_before = s.loads;
     bool does = h->extra_seconds >= h->whole_seconds ||
                 (s.loads < h->subtrees / CERTAIN && foretold >= CERTAIN * (double)h->subtrees);
@@ -159,7 +160,7 @@ static bool loading_pays(query_holding *h, double total)
     return does;
 }
 
-/* Alone. What was held in parts goes first, so that there is never more than the budget. */
+/* Needs exclusive access. Frees the parts first, so that the budget is never exceeded. */
 static ebpo_status bring_in_all(query_holding *h, ebpo_error *error)
 {
     ebpo_model_options all = h->options;
@@ -169,12 +170,12 @@ static ebpo_status bring_in_all(query_holding *h, ebpo_error *error)
     h->session.model = NULL;
     ebpo_status status = ebpo_model_new(h->session.file, &all, &h->session.model, error);
     h->whole_later = status == EBPO_OK;
-    if (status == EBPO_E_LIMIT || status == EBPO_E_MEMORY) /* more than its counts told */
+    if (status == EBPO_E_LIMIT || status == EBPO_E_MEMORY) /* more than estimated by its counts */
         status = ebpo_model_new(h->session.file, &h->options, &h->session.model, error);
     return status;
 }
 
-/* Once, by whom it occurs to first; others wait. */
+/* Runs once, on the first thread that needs it; other threads wait. */
 static ebpo_status change_holding(query_holding *h, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -192,7 +193,7 @@ static ebpo_status enter_model(query_holding *h, ebpo_context **context, ebpo_er
     if (h->elsewhere)
         return EBPO_OK;
     ebpo_status status = h->session.model ? ready_context(h, context, error)
-                                          : EBPO_E_CANCELLED; /* another one failed */
+                                          : EBPO_E_CANCELLED; /* another thread failed */
     if (status != EBPO_OK)
         pthread_rwlock_unlock(&h->lock);
     return status;
@@ -219,18 +220,18 @@ bool query_holding_enter_alone(query_holding *h, ebpo_context **context)
     return false;
 }
 
-void query_holding_leave(query_holding *h, uint64_t questions, double seconds)
+void query_holding_leave(query_holding *h, uint64_t queries, double seconds)
 {
     pthread_mutex_lock(&h->books);
-    h->questions += questions;
-    h->asking_seconds += seconds;
+    h->queries += queries;
+    h->querying_seconds += seconds;
     pthread_mutex_unlock(&h->books);
     pthread_rwlock_unlock(&h->lock);
 }
 
-/* --- what was decided --- */
+/* --- report --- */
 
-void query_holding_tell(const query_holding *h)
+void query_holding_report(const query_holding *h)
 {
     char half[32];
     if (!h->automatic)
@@ -238,16 +239,16 @@ void query_holding_tell(const query_holding *h)
     words_bytes(half, sizeof half, h->options.memory);
     fprintf(stderr, "memory: at most %s, %s; ", half,
             h->options.memory > h->free_memory / 2
-                ? "the least that will do, which is more than half of what was free"
-                : "half of what was free");
+                ? "the minimum, which is more than half of the free memory"
+                : "half of the free memory");
     if (!h->subtrees)
         fprintf(stderr, "all of the model at once, as it is small\n");
     else if (h->whole_later)
         fprintf(stderr,
-                "all of the model after %" PRIu64 " questions and %" PRIu64 " of %" PRIu64
+                "all of the model after %" PRIu64 " queries and %" PRIu64 " of %" PRIu64
                 " subtrees; parts had cost %.3f s more than all of it at once, "
                 "which was estimated at %.3f s\n",
-                h->questions_before, h->loads_before, h->subtrees, h->extra_seconds,
+                h->queries_before, h->loads_before, h->subtrees, h->extra_seconds,
                 h->whole_seconds);
     else
         fprintf(stderr, "in parts%s\n",
@@ -260,10 +261,10 @@ void query_holding_json(const query_holding *h, json *j)
         return;
     json_object(j, "automatic_memory");
     json_uint(j, "free", h->free_memory);
-    json_uint(j, "most", h->options.memory);
+    json_uint(j, "max", h->options.memory);
     json_text(j, "held", !h->subtrees ? "whole" : h->whole_later ? "whole later" : "parts");
     json_bool(j, "fits", h->plan.resident);
-    json_uint(j, "questions_before", h->whole_later ? h->questions_before : 0);
+    json_uint(j, "queries_before", h->whole_later ? h->queries_before : 0);
     json_uint(j, "loads_before", h->whole_later ? h->loads_before : 0);
     json_real(j, "extra_seconds_before", h->whole_later ? h->extra_seconds : 0);
     json_real(j, "whole_seconds_estimated", h->whole_later ? h->whole_seconds : 0);

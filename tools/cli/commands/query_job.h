@@ -1,19 +1,19 @@
-/* What a command for questions asks: how blocks are answered, and what answers look like. */
+/* Defines the jobs of query commands: how blocks are evaluated, and how results are printed. */
 #ifndef EBPO_TOOLS_QUERY_JOB_H
 #define EBPO_TOOLS_QUERY_JOB_H
 
 #include <ebpo/catalogue.h>
 
-#include "cli/answers.h"
+#include "cli/results.h"
 #include "cli/points.h"
 #include "cli/query_args.h"
 
-/* Who answers: a thread with what is its own. */
+/* A thread with its own data. */
 typedef struct query_worker {
     ebpo_context *context;
-    void *results; /* [row_room] of `result_bytes` */
-    uint64_t row_room;
-    answer_text *text; /* where answers go */
+    void *results; /* [row_capacity] of `result_bytes` */
+    uint64_t row_capacity;
+    result_text *text; /* output */
 } query_worker;
 
 typedef struct query_job query_job;
@@ -21,25 +21,26 @@ struct query_job {
     const char *command;
     const query_values *values;
     points_kind kind;
-    size_t result_bytes; /* of the answer to one row */
-    double parts_share;  /* as query_holding_open takes it */
-    /* Answers rows[count][points_width(kind)], while the model is held: answers of one size go to
-     * the results, lists are printed, until the text is over. Called with no rows first, so that
-     * what cannot be answered at all is reported before the command waits for input. */
-    ebpo_status (*answer)(const query_job *job, query_worker *worker, const double *rows,
+    size_t result_bytes; /* size of the result of one row */
+    double parts_share;  /* as for query_holding_open */
+    /* Evaluates rows[count][points_width(kind)], while the model is held: results of one size go to
+     * `results`; lists are printed until the text is over. Called with no rows first, so that an
+     * unsupported query is reported before the command waits for input. */
+    ebpo_status (*result)(const query_job *job, query_worker *worker, const double *rows,
                           uint64_t count, ebpo_error *error);
-    /* Prints the results of these rows, without the model; NULL: all answers are lists. */
+    /* Prints the results of these rows, without the model; NULL: all results are lists. */
     void (*print)(const query_job *job, query_worker *worker, const double *rows, uint64_t count);
-    const char *(*columns)(const query_job *job); /* names of what a line of answers holds */
-    /* What --raw prints for an answer, as a NumPy type; NULL: lists have none. */
+    const char *(*columns)(const query_job *job); /* Returns the names of the columns of a result
+                                                   * line. */
+    /* Returns the NumPy type of a result for --raw; NULL: lists have none. */
     const char *(*dtype)(const query_job *job, unsigned *bytes);
     ebpo_inside_options inside; /* these are set by query_run */
     ebpo_distance_options distance;
-    answer_form form;
-    const ebpo_sampler *sampler; /* of --attribute; NULL: none */
-    ebpo_catalogue *catalogue;   /* is asked in place of a model; NULL: a model is asked */
+    result_form form;
+    const ebpo_sampler *sampler; /* sampler for --attribute; NULL: none */
+    ebpo_catalogue *catalogue;   /* queried instead of a model; NULL: a model is queried */
     ebpo_catalogue_models *models;
-    bool continues; /* answers go on behind those of another run: without names */
+    bool continues; /* results are appended to those of another run: no column names */
 };
 
 #endif

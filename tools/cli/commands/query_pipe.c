@@ -9,17 +9,17 @@
 #include "cli/command.h"
 #include "cli/points_parse.h"
 
-/* Blocks under way for each thread: while the oldest one is waited for, others are done. Of large
- * ones fewer. */
+/* Blocks in progress for each thread: while the oldest one is pending, others are evaluated. Fewer
+ * for large blocks. */
 enum { BLOCKS_EACH = 4, LARGE_EACH = 2, FIRST_PIECE = 16 };
-/* Answers to a block that are kept, for each of its rows. */
+/* Results of a block that are kept, for each of its rows. */
 enum { KEPT_EACH = 128 };
 
-/* A block of questions, and its answers. */
+/* A block of queries, and its results. */
 typedef struct slot {
     struct pipe_line *pipe;
     points_block block;
-    answer_text text;
+    result_text text;
     uint64_t number;
     bool holds; /* its thread holds the model */
     bool done;
@@ -33,33 +33,34 @@ typedef struct crew {
     pthread_t thread;
 } crew;
 
-/* Two locks: the model's (query_holding.h), which is held while rows are answered, and `lock`. No
- * thread waits for `moved` while it holds the model, and none takes another lock while it holds
- * `lock`. So whoever holds the model lets it go, and the oldest block waits for nothing else. */
+/* Two locks: the lock of the model (query_holding.h), which is held while rows are evaluated, and
+ * `lock`. No thread waits for `moved` while it holds the model, and none takes another lock while
+ * it holds `lock`. So each thread that holds the model releases it, and the oldest block waits for
+ * nothing else. */
 typedef struct pipe_line {
     const query_job *job;
     query_holding *holding;
     points *in;
-    int waker; /* a byte written here ends its waiting; -1: nobody waits beside others */
+    int waker; /* writing a byte here ends the wait of the reading thread; -1: unsupported */
     progress_line *progress;
-    unsigned threads; /* at most */
+    unsigned threads; /* maximum */
     uint64_t slots;
     slot *slot;           /* [slots] block i is in slot i % slots */
-    crew *crew;           /* [threads] the first `working` of them have begun */
-    atomic_uint working;  /* changed by the thread that takes */
-    pthread_mutex_t lock; /* of all below */
-    pthread_cond_t moved; /* any of these has changed */
-    bool taking;          /* a thread takes a block; no other one does */
+    crew *crew;           /* [threads] the first `working` threads have started */
+    atomic_uint working;  /* changed by the thread that takes blocks */
+    pthread_mutex_t lock; /* protects all members below */
+    pthread_cond_t moved; /* signals that any of these has changed */
+    bool taking;          /* a thread is taking a block; only one at a time */
     uint64_t taken;       /* blocks */
-    uint64_t left;        /* blocks whose answers have left */
-    bool leaving;         /* a thread lets block `left` leave; no other one does */
+    uint64_t left;        /* blocks whose results have been written */
+    bool leaving;         /* a thread is writing block `left`; only one at a time */
     bool stopped;
-    /* these belong to the thread that lets blocks leave */
+    /* used only by the thread that writes blocks */
     uint64_t rows_left, bytes_left;
     int code;
 } pipe_line;
 
-/* --- answers leave in order --- */
+/* --- writing results in order --- */
 
 static void stop_pipe(pipe_line *p)
 {
@@ -69,8 +70,8 @@ static void stop_pipe(pipe_line *p)
     pthread_cond_broadcast(&p->moved);
 }
 
-/* Returns whether all blocks before this one have left; waits for that unless the thread holds the
- * model. */
+/* Returns true when all earlier blocks have been written; waits for that unless the thread holds
+ * the model. */
 static bool has_turn(slot *s)
 {
     pipe_line *p = s->pipe;
@@ -79,24 +80,24 @@ static bool has_turn(slot *s)
         pthread_cond_wait(&p->moved, &p->lock);
     bool turn = p->left == s->number;
     if (p->stopped)
-        answer_text_lose(&s->text);
+        result_text_lose(&s->text);
     pthread_mutex_unlock(&p->lock);
     return turn;
 }
 
-/* Long answers leave in the block's turn. Before it they stop at a row, behind which they go on
- * when the model has been let go. */
-static void spill_answers(answer_text *t, void *user)
+/* Long results are written when it is the turn of the block. Before, evaluation stops at a row, and
+ * continues after the model was released. */
+static void spill_results(result_text *t, void *user)
 {
     slot *s = user;
     if (has_turn(s))
-        (void)answer_text_leave(t, s->pipe->job->command);
+        (void)result_text_leave(t, s->pipe->job->command);
     else
         t->full = !t->failed;
 }
 
-/* Of a file it is known how much there is, so that the number of questions can be estimated. */
-static void tell_progress(pipe_line *p, const slot *s)
+/* The size of a file is known, so the number of queries can be estimated. */
+static void report_progress(pipe_line *p, const slot *s)
 {
     uint64_t total = p->in->rows_known ? p->in->rows_total : 0;
     p->rows_left += s->block.row_count;
@@ -104,13 +105,13 @@ static void tell_progress(pipe_line *p, const slot *s)
     if (!total && p->in->bytes_total && p->bytes_left)
         total =
             (uint64_t)((double)p->rows_left * ((double)p->in->bytes_total / (double)p->bytes_left));
-    progress_tell(p->progress, "questions", p->rows_left, total);
+    progress_report(p->progress, "queries", p->rows_left, total);
 }
 
-/* The answers, then what is wrong behind them. False: nothing may follow. */
+/* Writes the results, then reports an error behind them. Returns false when nothing may follow. */
 static bool leave_block(pipe_line *p, slot *s)
 {
-    bool left = answer_text_leave(&s->text, p->job->command);
+    bool left = result_text_leave(&s->text, p->job->command);
     if (!left || s->status != EBPO_OK || s->block.failed)
         progress_wipe(p->progress);
     if (!left)
@@ -120,11 +121,11 @@ static bool leave_block(pipe_line *p, slot *s)
     else if (!points_pass(p->in, &s->block))
         p->code = EXIT_FAILED;
     else
-        tell_progress(p, s);
+        report_progress(p, s);
     return p->code == EXIT_FINE;
 }
 
-/* Who finishes the oldest block lets it leave, with all those behind it that are done. */
+/* The thread that finishes the oldest block writes it, and all finished blocks behind it. */
 static void finish_block(pipe_line *p, slot *s)
 {
     pthread_mutex_lock(&p->lock);
@@ -148,17 +149,17 @@ static void finish_block(pipe_line *p, slot *s)
 
 /* --- one block --- */
 
-static bool results_room(query_worker *w, size_t each, uint64_t rows)
+static bool results_capacity(query_worker *w, size_t each, uint64_t rows)
 {
-    if (each && w->row_room < rows) {
+    if (each && w->row_capacity < rows) {
         free(w->results);
         w->results = malloc(rows * each);
-        w->row_room = w->results ? rows : 0;
+        w->row_capacity = w->results ? rows : 0;
     }
-    return !each || w->row_room >= rows;
+    return !each || w->row_capacity >= rows;
 }
 
-/* How many questions there will be; 0: not known. */
+/* Estimates the number of queries; 0: not known. */
 static double total_of(const points *in, const points_block *b)
 {
     if (in->rows_known)
@@ -166,46 +167,47 @@ static double total_of(const points *in, const points_block *b)
     return (double)in->bytes_total * (double)b->row_count / (double)(b->count ? b->count : 1);
 }
 
-/* Answers the rows behind text->rows, with the model as it has been entered. */
-static void answer_rest(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count)
+/* Evaluates the rows behind text->rows, with the current model. */
+static void result_rest(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count)
 {
     uint64_t done = s->text.rows, width = (uint64_t)points_width(p->job->kind);
     double begin = progress_now();
     s->holds = true;
-    s->status = p->job->answer(p->job, w, rows + done * width, count - done, &s->error);
+    s->status = p->job->result(p->job, w, rows + done * width, count - done, &s->error);
     s->holds = false;
     query_holding_leave(p->holding, count - done, progress_now() - begin);
 }
 
-/* Answers rows of a block, or the first ones of them: text->rows. Other threads may hold what these
- * need: then they are answered while no other thread holds the model. False: nothing may follow. */
-static bool answer_piece(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count,
+/* Evaluates rows of a block, or the first ones of them: text->rows. When other threads hold memory
+ * that these need, they are evaluated while no other thread holds the model. Returns false when
+ * nothing may follow. */
+static bool result_piece(pipe_line *p, query_worker *w, slot *s, const double *rows, uint64_t count,
                          double total)
 {
     s->text.rows = 0;
     s->status = query_holding_enter(p->holding, &w->context, total, &s->error);
     if (s->status != EBPO_OK)
         return false;
-    answer_rest(p, w, s, rows, count);
+    result_rest(p, w, s, rows, count);
     if (s->status == EBPO_E_LIMIT && p->working > 1 &&
         query_holding_enter_alone(p->holding, &w->context)) {
-        answer_text_retry(&s->text);
-        answer_rest(p, w, s, rows, count);
+        result_text_retry(&s->text);
+        result_rest(p, w, s, rows, count);
     }
     if (s->status != EBPO_OK)
-        return count > 1 && s->text.rows == 0; /* those before the one that fails are answered */
+        return count > 1 && s->text.rows == 0; /* rows before the failing one are evaluated */
     if (p->job->print)
         p->job->print(p->job, w, rows, count);
     if (s->text.full) {
-        answer_text_retry(&s->text);
+        result_text_retry(&s->text);
         (void)has_turn(s);
     }
-    return !answer_text_is_over(&s->text);
+    return !result_text_is_over(&s->text);
 }
 
-/* The first questions come in small pieces, each as large as all before it: after each it may be
- * decided to bring in all of the model. Questions that fail together are answered one by one. */
-static void answer_block(pipe_line *p, query_worker *w, slot *s)
+/* The first queries come in small pieces, each as large as all before it: after each piece the
+ * whole model may be loaded. Queries that fail together are evaluated one by one. */
+static void result_block(pipe_line *p, query_worker *w, slot *s)
 {
     const points_block *b = &s->block;
     uint64_t width = (uint64_t)points_width(p->job->kind), most = b->row_count;
@@ -214,8 +216,8 @@ static void answer_block(pipe_line *p, query_worker *w, slot *s)
     s->error = none;
     s->status = EBPO_OK;
     w->text = &s->text;
-    if (!results_room(w, p->job->result_bytes, b->row_count)) {
-        answer_text_lose(&s->text);
+    if (!results_capacity(w, p->job->result_bytes, b->row_count)) {
+        result_text_lose(&s->text);
         return;
     }
     for (uint64_t at = 0; at < b->row_count; at += s->text.rows) {
@@ -224,7 +226,7 @@ static void answer_block(pipe_line *p, query_worker *w, slot *s)
         most = s->status == EBPO_OK ? most : 1;
         piece = piece < most ? piece : most;
         piece = piece < b->row_count - at ? piece : b->row_count - at;
-        if (!answer_piece(p, w, s, b->rows + at * width, piece, total))
+        if (!result_piece(p, w, s, b->rows + at * width, piece, total))
             break;
     }
 }
@@ -233,7 +235,7 @@ static void answer_block(pipe_line *p, query_worker *w, slot *s)
 
 static void *work_on_blocks(void *user);
 
-/* Another thread joins when there is more than a little to do. */
+/* Starts another thread when there is enough to do. */
 static void call_another(pipe_line *p)
 {
     crew *next = &p->crew[p->working];
@@ -241,7 +243,7 @@ static void call_another(pipe_line *p)
         p->working++;
 }
 
-/* Waits until this thread may take a block and there is a slot for it. False: nothing more is
+/* Waits until this thread may take a block and a slot is free. Returns false when nothing more is
  * taken. */
 static bool begin_to_take(pipe_line *p)
 {
@@ -263,7 +265,7 @@ static void end_taking(pipe_line *p, bool took)
     pthread_mutex_unlock(&p->lock);
 }
 
-/* NULL: there is no more. */
+/* Returns NULL at the end. */
 static slot *take_block(pipe_line *p)
 {
     if (!begin_to_take(p))
@@ -285,20 +287,20 @@ static void *work_on_blocks(void *user)
     pipe_line *p = c->pipe;
     for (slot *s = take_block(p); s; s = take_block(p)) {
         points_parse(p->in, &s->block);
-        answer_block(p, &c->worker, s);
+        result_block(p, &c->worker, s);
         finish_block(p, s);
     }
     return NULL;
 }
 
-/* --- all of it --- */
+/* --- run --- */
 
-/* By which who waits for input is told to stop. */
+/* Makes the pipe that interrupts a wait for input. */
 static void make_waker(pipe_line *p)
 {
     int ends[2];
     if (pipe(ends) != 0)
-        return; /* it is told when the next input comes */
+        return; /* the thread stops at the next input */
     for (int i = 0; i < 2; i++)
         (void)fcntl(ends[i], F_SETFD, FD_CLOEXEC);
     p->in->wake = ends[0];
@@ -312,12 +314,12 @@ static bool make_slots(pipe_line *p)
     if (!p->slot || !p->crew)
         return false;
     for (uint64_t i = 0; i < p->slots; i++) {
-        if (!answer_text_init(&p->slot[i].text))
+        if (!result_text_init(&p->slot[i].text))
             return false;
         p->slot[i].pipe = p;
         if (p->in->together > POINTS_BATCH)
             p->slot[i].text.spill_at = KEPT_EACH * p->in->together;
-        p->slot[i].text.spill = spill_answers;
+        p->slot[i].text.spill = spill_results;
         p->slot[i].text.user = &p->slot[i];
     }
     for (unsigned i = 0; i < p->threads; i++)
@@ -335,7 +337,7 @@ static void free_slots(pipe_line *p)
     }
     for (uint64_t i = 0; p->slot && i < p->slots; i++) {
         points_block_free(&p->slot[i].block);
-        answer_text_free(&p->slot[i].text);
+        result_text_free(&p->slot[i].text);
     }
     if (p->waker >= 0) {
         close(p->waker);
@@ -346,21 +348,21 @@ static void free_slots(pipe_line *p)
     free(p->crew);
 }
 
-/* What cannot be asked at all, and the line of names. */
-static int ask_nothing(pipe_line *p, query_worker *w)
+/* Reports unsupported queries, and writes the line of names. */
+static int query_nothing(pipe_line *p, query_worker *w)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     w->text = &p->slot[0].text;
     ebpo_status status = query_holding_enter(p->holding, &w->context, 0, &error);
     if (status == EBPO_OK) {
-        status = p->job->answer(p->job, w, NULL, 0, &error);
+        status = p->job->result(p->job, w, NULL, 0, &error);
         query_holding_leave(p->holding, 0, 0);
     }
     if (status != EBPO_OK)
         return command_failed(p->job->command, &error);
-    if (p->job->values->header && !p->job->continues && p->job->form != ANSWERS_JSON &&
-        p->job->form != ANSWERS_RAW)
-        answers_header(w->text, p->job->form, p->job->columns(p->job), p->job->values->attribute);
+    if (p->job->values->header && !p->job->continues && p->job->form != RESULTS_JSON &&
+        p->job->form != RESULTS_RAW)
+        results_header(w->text, p->job->form, p->job->columns(p->job), p->job->values->attribute);
     return EXIT_FINE;
 }
 
@@ -376,15 +378,15 @@ int query_pipe_run(const query_job *job, query_holding *holding, points *in, uns
     pthread_cond_init(&p.moved, NULL);
     p.code = make_slots(&p) ? EXIT_FINE : command_no_memory(job->command);
     if (p.code == EXIT_FINE)
-        p.code = ask_nothing(&p, &p.crew[0].worker);
+        p.code = query_nothing(&p, &p.crew[0].worker);
     if (p.code == EXIT_FINE) {
         p.working = 1;
         work_on_blocks(&p.crew[0]);
-        /* threads are called by those before them, which have ended here */
+        /* threads are started by earlier ones, which have ended here */
         for (unsigned i = 1; i < p.working; i++)
             pthread_join(p.crew[i].thread, NULL);
-        if (p.code == EXIT_FINE && !answer_text_leave(&p.slot[0].text, job->command))
-            p.code = EXIT_FAILED; /* a line of names without answers */
+        if (p.code == EXIT_FINE && !result_text_leave(&p.slot[0].text, job->command))
+            p.code = EXIT_FAILED; /* a line of names without results */
         if (p.code == EXIT_FINE && in->failed)
             p.code = EXIT_FAILED;
     }

@@ -1,5 +1,5 @@
-/* Reading, asking and printing at the same time, on all cores: each thread takes the next block of
- * questions, reads its numbers, asks, and prints to memory; blocks leave in their order. */
+/* Reads, evaluates and prints concurrently on all cores: each thread takes the next block of
+ * queries, parses its numbers, evaluates, and prints to memory; blocks are written in order. */
 #ifndef EBPO_TOOLS_QUERY_PIPE_H
 #define EBPO_TOOLS_QUERY_PIPE_H
 
@@ -7,8 +7,8 @@
 #include "cli/commands/query_holding.h"
 #include "cli/commands/query_job.h"
 
-/* Answers all of `in`; returns an exit code. `threads`: at most so many, at least 1; few questions
- * take fewer. */
+/* Evaluates all of `in`; returns an exit code. `threads`: maximum, at least 1; few queries use
+ * fewer threads. */
 int query_pipe_run(const query_job *job, query_holding *holding, points *in, unsigned threads,
                    progress_line *progress);
 

@@ -6,23 +6,23 @@
 
 #include "cli/command.h"
 #include "cli/json.h"
-#include "cli/model_sums.h"
-#include "cli/npy_answers.h"
+#include "cli/model_stats.h"
+#include "cli/npy_results.h"
 #include "cli/points_cut.h"
 #include "cli/commands/query_catalogue.h"
 #include "cli/commands/query_holding.h"
 #include "cli/commands/query_pipe.h"
 #include "cli/commands/query_shard.h"
 
-static void tell_stats(const query_job *job, const query_holding *holding)
+static void report_stats(const query_job *job, const query_holding *holding)
 {
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     traffic t = traffic_of(holding->session.file);
     ebpo_model_get_stats(holding->session.model, &stats);
     if (!job->values->json) {
         stats_print(stderr, &stats);
-        query_holding_tell(holding);
-        remote_tell(&t, &job->values->remote, false);
+        query_holding_report(holding);
+        remote_report(&t, &job->values->remote, false);
         return;
     }
     json j;
@@ -34,16 +34,16 @@ static void tell_stats(const query_job *job, const query_holding *holding)
     json_finish(&j);
 }
 
-/* Cores that this process may use, unless a number was given. Ways of loading that keep nothing
- * have one thread: each would drop what the other one has. */
+/* Returns the number of cores that this process may use, unless a number was given. Loading modes
+ * that keep nothing use one thread: each would drop the data of the others. */
 static unsigned threads_for(const query_values *v, const ebpo_model_options *holding)
 {
     unsigned wanted = v->threads ? (unsigned)v->threads : command_cores();
-    wanted = wanted < QUERY_THREADS_MOST ? wanted : QUERY_THREADS_MOST;
+    wanted = wanted < QUERY_THREADS_MAX ? wanted : QUERY_THREADS_MAX;
     return holding->loading == EBPO_LOAD_CACHE && wanted ? wanted : 1;
 }
 
-/* The attributes that are asked for. */
+/* Opens the requested attributes. */
 static int open_sampler(query_job *job, const query_holding *holding, ebpo_sampler **out)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -56,13 +56,13 @@ static int open_sampler(query_job *job, const query_holding *holding, ebpo_sampl
     return EXIT_FINE;
 }
 
-static int ask_all(query_job *job, query_holding *holding, points *in,
-                   const ebpo_model_options *options)
+static int query_all(query_job *job, query_holding *holding, points *in,
+                     const ebpo_model_options *options)
 {
     progress_line line;
-    /* the line stands between answers where both go to one terminal */
+    /* shows the line between results when both go to one terminal */
     (void)progress_start(&line, job->command, isatty(STDOUT_FILENO));
-    npy_answers npy = { .command = job->command };
+    npy_results npy = { .command = job->command };
     bool as_npy = job->values->npy;
     if (as_npy)
         npy.dtype = job->dtype(job, &npy.bytes);
@@ -73,48 +73,47 @@ static int ask_all(query_job *job, query_holding *holding, points *in,
     return as_npy && !npy_end(&npy) ? EXIT_FAILED : code;
 }
 
-/* Forms of answers exclude each other; --raw, which tells of the questions too, gives way to them.
- */
+/* Output formats exclude each other; --raw, which also describes the input, has the lowest
+ * priority. */
 static bool form_fits(const query_job *job)
 {
     const query_values *v = job->values;
     unsigned bytes;
     const char *given = v->npy ? "--npy" : "--csv", *other = v->json ? "--json" : "--csv";
     if ((v->npy && v->csv) || (v->json && (v->npy || v->csv)))
-        (void)command_usage(job->command, "%s has no effect with %s; leave out one of them", given,
+        (void)command_usage(job->command, "%s has no effect with %s; omit one of them", given,
                             other);
     else if (v->npy && !job->dtype(job, &bytes))
-        (void)command_usage(job->command, "--npy takes answers of one size each, not lists");
+        (void)command_usage(job->command, "--npy needs results of a fixed size, not lists");
     else if (v->npy && v->attribute)
-        (void)command_usage(job->command,
-                            "--attribute has no effect with --npy; leave out one of them");
-    else if (v->attribute && strlen(v->attribute) > ANSWER_NAMES)
+        (void)command_usage(job->command, "--attribute has no effect with --npy; omit one of them");
+    else if (v->attribute && strlen(v->attribute) > RESULT_NAMES)
         (void)command_usage(job->command, "--attribute: names of at most %d bytes in all",
-                            ANSWER_NAMES);
+                            RESULT_NAMES);
     else
         return true;
     return false;
 }
 
-static answer_form form_of(const query_values *v)
+static result_form form_of(const query_values *v)
 {
-    return v->json  ? ANSWERS_JSON
-           : v->npy ? ANSWERS_RAW
-           : v->csv ? ANSWERS_CSV
-           : v->raw ? ANSWERS_RAW
-                    : ANSWERS_TEXT;
+    return v->json  ? RESULTS_JSON
+           : v->npy ? RESULTS_RAW
+           : v->csv ? RESULTS_CSV
+           : v->raw ? RESULTS_RAW
+                    : RESULTS_TEXT;
 }
 
-/* Nobody waits for answers that go to a file: where the model is held in parts, so many points are
- * asked about together, in the order in which subtrees come, that few are loaded again. */
+/* For output to a file: when the model is held in parts, so many points are evaluated together, in
+ * the order of subtrees, that few are loaded again. */
 enum { TOGETHER_IN_PARTS = 1 << 20 };
-/* What is kept of one of them in one array, at most. */
+/* Maximum number of values kept in one array. */
 enum { TOGETHER_BYTES = 1024 };
 
 static uint64_t bytes_together(const query_values *v, const query_holding *holding)
 {
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
-    const uint64_t most = SIZE_MAX / TOGETHER_BYTES; /* on machines of 32 bits */
+    const uint64_t most = SIZE_MAX / TOGETHER_BYTES; /* on 32-bit machines */
     if (v->together)
         return (uint64_t)v->together < most ? (uint64_t)v->together : most;
     bool parts =
@@ -124,38 +123,38 @@ static uint64_t bytes_together(const query_values *v, const query_holding *holdi
     return parts ? TOGETHER_IN_PARTS : POINTS_BATCH;
 }
 
-static int open_asked(query_job *job, const char *model, const ebpo_model_options *options,
-                      query_holding *holding)
+static int open_queried(query_job *job, const char *model, const ebpo_model_options *options,
+                        query_holding *holding)
 {
     if (!query_catalogue_named(model))
         return query_holding_open(holding, job->command, model, job->values, options,
                                   job->parts_share);
     query_holding_elsewhere(holding, job->command);
-    job->result_bytes += sizeof(uint64_t); /* the model's number, behind all results */
+    job->result_bytes += sizeof(uint64_t); /* index of the model, behind all results */
     return query_catalogue_open(job, model, options);
 }
 
-/* With the model, of what is in `in`. */
+/* Runs the query with the model on the points of `in`. */
 static int run_query(query_job *job, const char *model, points *in,
                      const ebpo_model_options *options, query_shard *shard)
 {
     query_holding holding;
     ebpo_sampler *sampler = NULL;
-    int code = open_asked(job, model, options, &holding);
+    int code = open_queried(job, model, options, &holding);
     if (code == EXIT_FINE)
         code = open_sampler(job, &holding, &sampler);
     if (code == EXIT_FINE)
         code = query_shard_begin(shard);
     if (code == EXIT_FINE) {
         in->together = bytes_together(job->values, &holding);
-        code = ask_all(job, &holding, in, options);
+        code = query_all(job, &holding, in, options);
         code = query_shard_end(shard, job, code);
     }
     ebpo_sampler_free(sampler);
     if (holding.session.model && job->values->remote.stats)
-        tell_stats(job, &holding);
+        report_stats(job, &holding);
     if (job->catalogue && job->values->remote.stats)
-        query_catalogue_tell(job);
+        query_catalogue_report(job);
     query_catalogue_close(job);
     query_holding_close(&holding);
     return code;

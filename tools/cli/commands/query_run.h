@@ -1,4 +1,5 @@
-/* The commands inside, distance, ray and box: blocks of questions in, their answers out. */
+/* Runs the commands inside, distance, ray and box: reads blocks of queries and writes their
+ * results. */
 #ifndef EBPO_TOOLS_QUERY_RUN_H
 #define EBPO_TOOLS_QUERY_RUN_H
 

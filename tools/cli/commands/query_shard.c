@@ -15,7 +15,7 @@
 #include "cli/words.h"
 #include "cli/commands/query_catalogue.h"
 
-enum { SHARDS_MOST = 1000000000 };
+enum { SHARDS_MAX = 1000000000 };
 
 /* --- options --- */
 
@@ -27,7 +27,7 @@ static bool read_number(const char **at, uint64_t *out)
     errno = 0;
     *out = strtoull(*at, &end, 10);
     *at = end;
-    return errno == 0 && *out <= SHARDS_MOST;
+    return errno == 0 && *out <= SHARDS_MAX;
 }
 
 static bool read_shard(query_shard *s, const char *text)
@@ -43,8 +43,8 @@ static bool read_shard(query_shard *s, const char *text)
     return false;
 }
 
-/* True, said on stderr: `path` is the model, or the file of the points, which may be asked for as
- * FILE.h5:/path. */
+/* Returns true, with a report on stderr, when `path` is the model, or the file of the points, which
+ * may be named FILE.h5:/path. */
 static bool overwrites_input(const query_shard *s, const char *path)
 {
     struct stat in, out;
@@ -59,36 +59,36 @@ static bool overwrites_input(const query_shard *s, const char *path)
     return true;
 }
 
-bool query_shard_fits(query_shard *s, const query_job *job, const char *model, const char *asked)
+bool query_shard_fits(query_shard *s, const query_job *job, const char *model, const char *queried)
 {
     const query_values *v = job->values;
     *s = (query_shard){
-        .command = job->command, .v = v, .model = model, .points = asked, .kept = -1
+        .command = job->command, .v = v, .model = model, .points = queried, .kept = -1
     };
     if (v->shard && !read_shard(s, v->shard))
         return false;
     if (v->shard && !v->out)
-        command_usage(s->command, "--shard has its answers in a file; name it with -o");
+        command_usage(s->command, "--shard writes to a file; name it with -o");
     else if (v->force && !v->shard)
-        command_usage(s->command, "--force has no effect without --shard; leave it out");
-    else if (v->shard && (!asked || strcmp(asked, "-") == 0))
+        command_usage(s->command, "--force has no effect without --shard; omit it");
+    else if (v->shard && (!queried || strcmp(queried, "-") == 0))
         command_usage(s->command, "--shard takes its part of a file, not of standard input");
     else if (v->shard && v->npy)
-        command_usage(s->command, "--npy has no effect with --shard; --raw gives answers that are "
+        command_usage(s->command, "--npy has no effect with --shard; outputs of --raw can be "
                                   "joined by cat");
     else if (v->shard && v->deadline)
-        command_usage(s->command, "--deadline has no effect with --shard, whose answers do not "
-                                  "depend on time; leave out one of them");
+        command_usage(s->command, "--deadline has no effect with --shard, whose results do not "
+                                  "depend on time; omit one of them");
     else if (v->out && strcmp(v->out, "-") == 0)
-        command_usage(s->command, "answers go to standard output without -o; leave it out");
+        command_usage(s->command, "results go to standard output without -o; omit it");
     else
         return !v->out || !overwrites_input(s, v->out);
     return false;
 }
 
-/* --- what answers are made of --- */
+/* --- inputs of the results --- */
 
-static void tell_question(json *j, const query_job *job)
+static void report_query(json *j, const query_job *job)
 {
     const query_values *v = job->values;
     json_int(j, "form", (int)job->form);
@@ -107,7 +107,7 @@ static void tell_question(json *j, const query_job *job)
     json_bool(j, "any", v->any);
 }
 
-static void tell_file(json *j, const char *key, const struct stat *st)
+static void report_file(json *j, const char *key, const struct stat *st)
 {
     char time[48];
     snprintf(time, sizeof time, "%" PRId64 ".%09ld", (int64_t)st->st_mtim.tv_sec,
@@ -117,7 +117,7 @@ static void tell_file(json *j, const char *key, const struct stat *st)
     json_text(j, "modified", time);
 }
 
-static int tell_model(json *j, const query_shard *s)
+static int report_model(json *j, const query_shard *s)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_file *file = NULL;
@@ -135,10 +135,9 @@ static int tell_model(json *j, const query_shard *s)
     return EXIT_FINE;
 }
 
-/* How the model is held and how many ask changes no answer, and is not in it. Returns an exit
- * code. */
-static int tell_facts(const query_shard *s, const query_job *job, const struct stat *st,
-                      const char *dataset, char **facts)
+/* Memory and threads do not change results, and are not included. Returns an exit code. */
+static int report_facts(const query_shard *s, const query_job *job, const struct stat *st,
+                        const char *dataset, char **facts)
 {
     char *text = NULL;
     size_t size;
@@ -154,12 +153,12 @@ static int tell_facts(const query_shard *s, const query_job *job, const struct s
     json_text(&j, "command", s->command);
     json_uint(&j, "shard", s->number);
     json_uint(&j, "of", s->of);
-    int code = tell_model(&j, s);
-    tell_file(&j, "points", st);
+    int code = report_model(&j, s);
+    report_file(&j, "points", st);
     json_text(&j, "dataset", dataset);
     json_end(&j);
     json_object(&j, "question");
-    tell_question(&j, job);
+    report_query(&j, job);
     json_finish(&j);
     if (fclose(out) != 0 && code == EXIT_FINE)
         code = command_no_memory(s->command);
@@ -170,8 +169,8 @@ static int tell_facts(const query_shard *s, const query_job *job, const struct s
     return code;
 }
 
-/* The head of the model and the file of points, as they are now. */
-static int look_at_inputs(const query_shard *s, const query_job *job, char **facts)
+/* The current header of the model and file of points. */
+static int inspect_inputs(const query_shard *s, const query_job *job, char **facts)
 {
     struct stat st;
     const char *dataset;
@@ -182,19 +181,19 @@ static int look_at_inputs(const query_shard *s, const query_job *job, char **fac
                 strerror(errno));
         return EXIT_FAILED;
     }
-    return tell_facts(s, job, &st, dataset, facts);
+    return report_facts(s, job, &st, dataset, facts);
 }
 
 /* --- the note --- */
 
-/* The facts, and which answers: how long they are, and when they were written, so that the note of
- * one of two commands is not taken for that of the other's answers. */
-static char *note_text(const char *facts, const struct stat *answers)
+/* Returns the facts, with the length and the time of the results, so that the note of one of two
+ * commands is not taken for the results of the other. */
+static char *note_text(const char *facts, const struct stat *results)
 {
     char *text = NULL;
     return asprintf(&text, "%sanswers: %" PRIu64 " bytes, of %" PRId64 ".%09ld\n", facts,
-                    (uint64_t)answers->st_size, (int64_t)answers->st_mtim.tv_sec,
-                    (long)answers->st_mtim.tv_nsec) < 0
+                    (uint64_t)results->st_size, (int64_t)results->st_mtim.tv_sec,
+                    (long)results->st_mtim.tv_nsec) < 0
                ? NULL
                : text;
 }
@@ -211,15 +210,15 @@ static bool file_is(const char *path, const char *text)
     return same;
 }
 
-/* What stands in the note's place and is none, such as an input, stays: it is said before all the
- * work is done. */
+/* A file in the place of the note that is no note, such as an input, is kept: it is reported before
+ * the work begins. */
 static bool note_is_free(const query_shard *s)
 {
     static const char begins[] = "{\n  \"format\": \"ebpo-shard\",\n";
     struct stat st;
     char there[sizeof begins - 1];
     if (lstat(s->note, &st) != 0)
-        return true; /* what else is wrong is told of the answers, which are in the same folder */
+        return true; /* other errors are reported for the results, which are in the same folder */
     FILE *in = S_ISREG(st.st_mode) ? fopen(s->note, "re") : NULL;
     bool is_note = in && fread(there, 1, sizeof there, in) == sizeof there &&
                    memcmp(there, begins, sizeof there) == 0;
@@ -227,13 +226,13 @@ static bool note_is_free(const query_shard *s)
         fclose(in);
     if (!is_note)
         fprintf(stderr,
-                "ebpo %s: %s: is there and no note of a shard, and would be replaced by one; "
-                "choose another output\n",
+                "ebpo %s: %s: exists, is not a note of a shard, and would be replaced; choose "
+                "another output\n",
                 s->command, s->note);
     return is_note;
 }
 
-/* Whether the answers are there, of these inputs. */
+/* Returns true when the results of these inputs exist. */
 static bool is_there(const query_shard *s)
 {
     struct stat st, note;
@@ -243,13 +242,13 @@ static bool is_there(const query_shard *s)
     free(text);
     if (same)
         fprintf(stderr,
-                "ebpo %s: %s: is there, of the same model, points and options; nothing is done "
-                "(--force makes it anew)\n",
+                "ebpo %s: %s: exists, from the same model, points and options; nothing to do "
+                "(--force writes it again)\n",
                 s->command, s->v->out);
     else if (out && stat(s->note, &note) == 0)
         fprintf(stderr,
-                "ebpo %s: %s: is of another model, other points or options, or was changed, as %s "
-                "tells; it is made anew\n",
+                "ebpo %s: %s: is from another model, other points or options, or was changed, "
+                "according to %s; writing it again\n",
                 s->command, s->v->out, s->note);
     return same;
 }
@@ -259,7 +258,7 @@ bool query_shard_done(query_shard *s, const query_job *job, int *code)
     *code = EXIT_FINE;
     if (!s->of)
         return false;
-    *code = look_at_inputs(s, job, &s->facts);
+    *code = inspect_inputs(s, job, &s->facts);
     if (*code == EXIT_FINE && asprintf(&s->note, "%s.shard", s->v->out) < 0) {
         s->note = NULL;
         *code = command_no_memory(s->command);
@@ -271,7 +270,7 @@ bool query_shard_done(query_shard *s, const query_job *job, int *code)
     return *code != EXIT_FINE || (!s->v->force && is_there(s));
 }
 
-/* --- the answers --- */
+/* --- results --- */
 
 int query_shard_begin(query_shard *s)
 {
@@ -289,11 +288,11 @@ int query_shard_begin(query_shard *s)
     return EXIT_FAILED;
 }
 
-/* What was asked about must still be what was looked at. */
+/* Checks that the inputs have not changed since the first check. */
 static int look_again(const query_shard *s, const query_job *job)
 {
     char *now = NULL;
-    int code = look_at_inputs(s, job, &now);
+    int code = inspect_inputs(s, job, &now);
     if (code == EXIT_FINE && strcmp(now, s->facts) != 0) {
         fprintf(stderr,
                 "ebpo %s: the model or the points were changed while they were read; nothing was "
@@ -305,16 +304,16 @@ static int look_again(const query_shard *s, const query_job *job)
     return code;
 }
 
-static int fail_answers(const query_shard *s)
+static int fail_results(const query_shard *s)
 {
     fprintf(stderr, "ebpo %s: %s: %s\n", s->command, s->v->out, strerror(errno));
     return EXIT_FAILED;
 }
 
-static int write_note(const query_shard *s, const struct stat *answers)
+static int write_note(const query_shard *s, const struct stat *results)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    char *text = note_text(s->facts, answers);
+    char *text = note_text(s->facts, results);
     if (!text)
         return command_no_memory(s->command);
     ebpo_status status = ebpo_write_file(s->note, text, strlen(text), &error);
@@ -322,10 +321,10 @@ static int write_note(const query_shard *s, const struct stat *answers)
     return status == EBPO_OK ? EXIT_FINE : command_failed(s->command, &error);
 }
 
-/* The note of the answers that were there goes first, and comes last: whenever this is killed, it
- * stands beside no others. `answers` is their descriptor: another command may have replaced them.
- */
-static int put_in_place(query_shard *s, int answers)
+/* Removes the old note first, and writes the new note last: if the process is killed at any time,
+ * the note is never beside other results. `answers` is their descriptor: another command may have
+ * replaced them. */
+static int put_in_place(query_shard *s, int results)
 {
     struct stat st;
     ebpo_error error = EBPO_ERROR_INIT;
@@ -339,25 +338,25 @@ static int put_in_place(query_shard *s, int answers)
         return command_failed(s->command, &error);
     if (!s->of)
         return EXIT_FINE;
-    return fstat(answers, &st) == 0 ? write_note(s, &st) : fail_answers(s);
+    return fstat(results, &st) == 0 ? write_note(s, &st) : fail_results(s);
 }
 
 int query_shard_end(query_shard *s, const query_job *job, int code)
 {
     if (s->kept < 0)
         return code;
-    int answers = code == EXIT_FINE ? fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3) : -1;
-    if (code == EXIT_FINE && answers < 0)
-        code = fail_answers(s);
+    int results = code == EXIT_FINE ? fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3) : -1;
+    if (code == EXIT_FINE && results < 0)
+        code = fail_results(s);
     dup2(s->kept, STDOUT_FILENO);
     close(s->kept);
     s->kept = -1;
     if (code == EXIT_FINE && s->of)
         code = look_again(s, job);
     if (code == EXIT_FINE)
-        code = put_in_place(s, answers);
-    if (answers >= 0)
-        close(answers);
+        code = put_in_place(s, results);
+    if (results >= 0)
+        close(results);
     return code;
 }
 

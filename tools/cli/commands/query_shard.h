@@ -1,5 +1,5 @@
-/* Answers that go to a file, whole; of all questions or of a shard of them. Beside the answers of a
- * shard a note is left of what they were made of: who finds it there has nothing to do. */
+/* Writes results to a file atomically, for all queries or a shard of them. Beside the results of a
+ * shard it leaves a note of their inputs: a later run that finds the note has nothing to do. */
 #ifndef EBPO_TOOLS_QUERY_SHARD_H
 #define EBPO_TOOLS_QUERY_SHARD_H
 
@@ -9,22 +9,23 @@ typedef struct query_shard {
     const char *command;
     const query_values *v;
     const char *model, *points; /* paths */
-    uint64_t number, of;        /* of 0: no shard */
-    char *facts;                /* of all that answers are made of, as the note has them */
+    uint64_t number, of;        /* number of shards; of 0: no shard */
+    char *facts;                /* all inputs of the results, as in the note */
     char *note;                 /* its path */
     ebpo_output *out;
-    int kept; /* standard output, while the file is in its place; -1: it is not */
+    int kept; /* original standard output, while the file replaces it; -1: not replaced */
 } query_shard;
 
-/* Whether options of outputs and shards fit; takes I/N. False: said on stderr (exit with
- * EXIT_USAGE). query_shard_free in any case. */
-bool query_shard_fits(query_shard *s, const query_job *job, const char *model, const char *asked);
-/* Looks at the inputs. True: the answers are there, which has been said, or *code is not EXIT_FINE.
- */
+/* Checks options of outputs and shards; reads I/N. Returns false after an error, reported on stderr
+ * (exit with EXIT_USAGE). Call query_shard_free in any case. */
+bool query_shard_fits(query_shard *s, const query_job *job, const char *model, const char *queried);
+/* Examines the inputs. Returns true when the results exist, which was reported, or *code is not
+ * EXIT_FINE. */
 bool query_shard_done(query_shard *s, const query_job *job, int *code);
-/* Puts the file of answers in the place of standard output; nothing where none is asked for. */
+/* Redirects standard output to the file of results, if one is requested. */
 int query_shard_begin(query_shard *s);
-/* Puts standard output back and, after EXIT_FINE, the file in its place; returns the exit code. */
+/* Restores standard output and, after EXIT_FINE, moves the file to its place; returns the exit
+ * code. */
 int query_shard_end(query_shard *s, const query_job *job, int code);
 void query_shard_free(query_shard *s);
 

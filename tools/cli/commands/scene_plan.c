@@ -20,7 +20,7 @@ static const char *name_of(const ebpo_scene *scene, uint64_t model)
     return m.name;
 }
 
-/* The first model of a file counts for all of it. */
+/* Returns true for the first model of a file, which counts for the file. */
 static bool is_first(const ebpo_scene *scene, uint64_t model)
 {
     for (uint64_t i = 0; i < model; i++)
@@ -32,7 +32,7 @@ static bool is_first(const ebpo_scene *scene, uint64_t model)
 static void need_json(json *j, const ebpo_scene *scene, const ebpo_scene_need *need)
 {
     json_text(j, "model", name_of(scene, need->model));
-    json_uint(j, "askers", need->askers);
+    json_uint(j, "pairs_using", need->askers);
     json_int(j, "last_level", need->last_level);
     json_uint(j, "levels", (uint64_t)need->level_count);
     json_array(j, "parts");
@@ -111,7 +111,7 @@ ebpo_status scene_plan(const scene_values *v, const char *path, ebpo_scene *scen
         json_finish(&p.j);
     } else if (status == EBPO_OK && !v->quiet) {
         char bytes[32], whole[32];
-        fprintf(stderr, "%s of %s are called for from %g to %g\n",
+        fprintf(stderr, "%s of %s are needed from %g to %g\n",
                 words_bytes(bytes, sizeof bytes, p.bytes),
                 words_bytes(whole, sizeof whole, p.file_bytes), v->from, v->to);
     }
@@ -138,7 +138,7 @@ static void packed_json(pack *p, const ebpo_scene_packed *m)
     json_uint(&p->j, "source_bytes", m->source_bytes);
     json_uint(&p->j, "bytes_read", m->bytes_read);
     json_real(&p->j, "max_error", m->max_error);
-    json_bool(&p->j, "answers", m->answers);
+    json_bool(&p->j, "answers", m->complete);
     json_text(&p->j, "content_sha256", digest);
     json_text(&p->j, "subset_of", source);
     json_end(&p->j);
@@ -152,7 +152,7 @@ static void packed_words(const pack *p, const ebpo_scene_packed *m)
            words_bytes(got, sizeof got, m->bytes_read), name_of(p->scene, m->model));
     if (m->max_error > 0)
         printf(": with an error of at most %.6g", m->max_error);
-    puts(m->answers ? "" : "; exact questions are refused");
+    puts(m->complete ? "" : "; exact queries are refused");
 }
 
 static bool print_packed(void *user, const ebpo_scene_packed *models, uint64_t count)
@@ -164,7 +164,7 @@ static bool print_packed(void *user, const ebpo_scene_packed *models, uint64_t c
         bool first = is_first(p->scene, models[i].model);
         p->bytes += first ? models[i].bytes : 0;
         p->source_bytes += first ? models[i].source_bytes : 0;
-        p->refused += !models[i].answers;
+        p->refused += !models[i].complete;
         if (p->v->json)
             packed_json(p, &models[i]);
         else if (!p->v->quiet)
@@ -173,7 +173,7 @@ static bool print_packed(void *user, const ebpo_scene_packed *models, uint64_t c
     return true;
 }
 
-static void tell_packed(pack *p)
+static void report_packed(pack *p)
 {
     if (p->v->json) {
         json_end(&p->j);
@@ -198,7 +198,7 @@ ebpo_status scene_pack(const scene_values *v, const char *path, ebpo_scene *scen
     how.margin = v->margin;
     how.purpose = v->purpose;
     how.threads = (unsigned)v->threads;
-    if (v->target_size) /* the command has seen to it that it is right */
+    if (v->target_size) /* already checked by the command */
         (void)words_read_size(v->target_size, &how.target_bytes);
     how.progress = progress_start(&line, "scene", v->quiet);
     json_begin(&p.j, stdout);
@@ -210,6 +210,6 @@ ebpo_status scene_pack(const scene_values *v, const char *path, ebpo_scene *scen
         ebpo_scene_pack(scene, v->out, v->from, v->to, &how, print_packed, &p, error);
     progress_wipe(&line);
     if (status == EBPO_OK)
-        tell_packed(&p);
+        report_packed(&p);
     return status;
 }

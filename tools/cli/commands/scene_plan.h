@@ -1,5 +1,5 @@
-/* `ebpo scene plan`: what of its models a scene can ever call for; `ebpo scene pack`: that, as a
- * folder. */
+/* `ebpo scene plan`: lists the parts of models that a scene can need; `ebpo scene pack`: writes
+ * them to a folder. */
 #ifndef EBPO_TOOLS_SCENE_PLAN_H
 #define EBPO_TOOLS_SCENE_PLAN_H
 

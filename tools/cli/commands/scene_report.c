@@ -1,4 +1,4 @@
-/* ebpo scene report: the meetings of a scene's instances, as JSON, CSV or words. */
+/* ebpo scene report: prints contacts of the instances of a scene, as JSON, CSV or words. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,9 +13,9 @@
 #include "cli/progress.h"
 #include "cli/words.h"
 
-/* --- a meeting --- */
+/* --- a contact --- */
 
-/* Until the scene is freed. */
+/* Valid until the scene is freed. */
 static const char *scene_instance_name(const ebpo_scene *scene, uint64_t instance)
 {
     ebpo_scene_instance i = EBPO_SCENE_INSTANCE_INIT;
@@ -40,7 +40,7 @@ static void depth_json(json *j, const char *key, const ebpo_certain *depth)
     json_end(j);
 }
 
-static void counts_json(json *j, const ebpo_scene_meeting *m)
+static void counts_json(json *j, const ebpo_scene_clash *m)
 {
     json_uint(j, "touching", m->touching);
     json_uint(j, "coplanar", m->coplanar);
@@ -52,7 +52,7 @@ static void counts_json(json *j, const ebpo_scene_meeting *m)
 }
 
 static void scene_row_json(json *j, const scene_values *v, const ebpo_scene *scene,
-                           const ebpo_scene_meeting *m)
+                           const ebpo_scene_clash *m)
 {
     const char *relation = relation_word(m->relation);
     json_object(j, NULL);
@@ -68,9 +68,9 @@ static void scene_row_json(json *j, const scene_values *v, const ebpo_scene *sce
     json_real(j, "clearance", m->clearance);
     json_real(j, "distance", m->distance);
     if (v->places) {
-        json_reals(j, "place", m->place, 3);
-        json_reals(j, "place_min", m->place_min, 3);
-        json_reals(j, "place_max", m->place_max, 3);
+        json_reals(j, "location", m->place, 3);
+        json_reals(j, "location_min", m->place_min, 3);
+        json_reals(j, "location_max", m->place_max, 3);
     }
     if (v->depth > 0) {
         depth_json(j, "depth_of_a", &m->depth[0]);
@@ -89,8 +89,8 @@ static void scene_head_csv(const scene_values *v)
            v->depth > 0 ? ",a_in_b_lo,a_in_b_hi,b_in_a_lo,b_in_a_hi" : "");
 }
 
-/* Quotes are doubled. Tables take what begins so for a formula: then there is a ' before it, and
- * before another one, so that taking the first one away gives the text. */
+/* Doubles quotes. Spreadsheets take some beginnings for a formula: then a ' precedes the text, also
+ * before an existing ', so that removing the first one restores the text. */
 static void csv_text(const char *text)
 {
     putchar('"');
@@ -104,7 +104,7 @@ static void csv_text(const char *text)
     putchar('"');
 }
 
-/* What is not known stays empty. */
+/* Unknown values stay empty. */
 static void csv_real(double x)
 {
     char text[32];
@@ -121,7 +121,7 @@ static void csv_count(uint64_t n)
 }
 
 static void scene_row_csv(const scene_values *v, const ebpo_scene *scene, double time,
-                          const ebpo_scene_meeting *m)
+                          const ebpo_scene_clash *m)
 {
     const uint64_t counts[] = { m->touching, m->coplanar, m->crossing, m->contacts };
     char text[32];
@@ -153,15 +153,15 @@ static void depth_words(const char *which, const ebpo_certain *depth)
 }
 
 static void scene_row_words(const scene_values *v, const ebpo_scene *scene, double time,
-                            const ebpo_scene_meeting *m)
+                            const ebpo_scene_clash *m)
 {
     uint64_t pairs = m->touching + m->coplanar + m->crossing;
     printf("%.9g\t%s\t%s\t%s", time, clash_kind_word(m->kind), scene_instance_name(scene, m->a),
            scene_instance_name(scene, m->b));
-    if (m->kind == EBPO_MEETING_ENCLOSED)
+    if (m->kind == EBPO_CLASH_ENCLOSED)
         printf("\t%s is inside",
                scene_instance_name(scene, m->relation == EBPO_A_INSIDE_B ? m->a : m->b));
-    if (m->kind == EBPO_MEETING_NEAR)
+    if (m->kind == EBPO_CLASH_NEAR)
         printf("\t%.9g of %.9g", m->distance, m->clearance);
     else if (v->count && pairs)
         printf("\t%llu pairs of faces", (unsigned long long)pairs);
@@ -174,21 +174,21 @@ static void scene_row_words(const scene_values *v, const ebpo_scene *scene, doub
     putchar('\n');
 }
 
-/* Who meets in a scene, time after time. */
+/* Contacts in a scene, time after time. */
 
 typedef struct report {
     const scene_values *v;
     ebpo_scene *scene;
-    ebpo_scene_ask_options how;
-    uint64_t meetings, frames_met, asked;
+    ebpo_scene_clash_options how;
+    uint64_t found_clashes, frames_found, queried;
     scene_frame frame;
-    uint64_t capacity; /* of its meetings */
+    uint64_t capacity; /* capacity for contacts */
     bool prints;       /* rows on standard output */
     json j;
     const char *path;
-    uint64_t frames, told;
-    /* What is written, as the name of v->out ends; else NULL and false. */
-    ebpo_scene_record *record;
+    uint64_t frames, reported;
+    /* Output format, by the ending of v->out; else NULL and false. */
+    ebpo_scene_report *record;
     clash_strip *strip;
     bool page;
     clash_list clashes;
@@ -196,21 +196,21 @@ typedef struct report {
 
 /* --- a frame --- */
 
-static bool keep_meetings(void *user, const ebpo_scene_meeting *meetings, uint64_t count)
+static bool keep_clashes(void *user, const ebpo_scene_clash *found_clashes, uint64_t count)
 {
     report *r = user;
     if (count > r->capacity) {
-        free(r->frame.meetings);
-        r->frame.meetings = malloc(count * sizeof *meetings);
-        r->capacity = r->frame.meetings ? count : 0;
+        free(r->frame.found_clashes);
+        r->frame.found_clashes = malloc(count * sizeof *found_clashes);
+        r->capacity = r->frame.found_clashes ? count : 0;
     }
-    if (r->frame.meetings)
-        memcpy(r->frame.meetings, meetings, count * sizeof *meetings);
+    if (r->frame.found_clashes)
+        memcpy(r->frame.found_clashes, found_clashes, count * sizeof *found_clashes);
     r->frame.count = count;
     return true;
 }
 
-static ebpo_status ask_frame(report *r, double time, ebpo_error *error)
+static ebpo_status query_frame(report *r, double time, ebpo_error *error)
 {
     ebpo_scene_stats before = EBPO_SCENE_STATS_INIT, after = EBPO_SCENE_STATS_INIT;
     scene_frame *f = &r->frame;
@@ -219,9 +219,9 @@ static ebpo_status ask_frame(report *r, double time, ebpo_error *error)
     f->count = 0;
     f->cost = (ebpo_scene_frame){ .time = time };
     ebpo_status status =
-        ebpo_scene_meet(r->scene, time, &r->how, keep_meetings, r, &f->cost.asked, error);
-    if (status == EBPO_OK && f->count && !f->meetings) {
-        snprintf(error->message, sizeof error->message, "no memory for %llu meetings",
+        ebpo_scene_find_clashes(r->scene, time, &r->how, keep_clashes, r, &f->cost.queried, error);
+    if (status == EBPO_OK && f->count && !f->found_clashes) {
+        snprintf(error->message, sizeof error->message, "no memory for %llu clashes",
                  (unsigned long long)f->count);
         status = error->status = EBPO_E_MEMORY;
     }
@@ -230,24 +230,24 @@ static ebpo_status ask_frame(report *r, double time, ebpo_error *error)
     f->cost.bytes_read = after.bytes_read - before.bytes_read;
     f->cost.models = after.models - before.models;
     f->cost.loads = after.loads - before.loads;
-    r->asked += f->cost.asked;
-    r->meetings += f->count;
-    r->frames_met += f->count > 0;
+    r->queried += f->cost.queried;
+    r->found_clashes += f->count;
+    r->frames_found += f->count > 0;
     return status;
 }
 
-/* --- what is told of it --- */
+/* --- output of a frame --- */
 
 static void frame_json(report *r)
 {
     const ebpo_scene_frame *cost = &r->frame.cost;
     json_object(&r->j, NULL);
     json_real(&r->j, "time", cost->time);
-    json_array(&r->j, "meetings");
+    json_array(&r->j, "clashes");
     for (uint64_t i = 0; i < r->frame.count; i++)
-        scene_row_json(&r->j, r->v, r->scene, &r->frame.meetings[i]);
+        scene_row_json(&r->j, r->v, r->scene, &r->frame.found_clashes[i]);
     json_end(&r->j);
-    json_uint(&r->j, "pairs_asked", cost->asked);
+    json_uint(&r->j, "pairs_tested", cost->queried);
     json_real(&r->j, "seconds", (double)cost->nanoseconds * 1e-9);
     json_uint(&r->j, "bytes_read", cost->bytes_read);
     json_uint(&r->j, "models_read", cost->models);
@@ -262,29 +262,29 @@ static void print_frame(report *r)
         frame_json(r);
     for (uint64_t i = 0; i < f->count && !r->v->json; i++)
         (r->v->csv ? scene_row_csv : scene_row_words)(r->v, r->scene, f->cost.time,
-                                                      &f->meetings[i]);
+                                                      &f->found_clashes[i]);
 }
 
-/* Frames are as many as pictures, or spread evenly. */
+/* As many frames as pictures, or frames spread evenly. */
 static bool is_pictured(const report *r)
 {
-    uint64_t n = r->told, most = r->frames < CLASH_TILES ? r->frames : CLASH_TILES;
+    uint64_t n = r->reported, most = r->frames < CLASH_TILES ? r->frames : CLASH_TILES;
     return n == 0 || n * (most - 1) / (r->frames - 1) != (n - 1) * (most - 1) / (r->frames - 1);
 }
 
-static ebpo_status tell_frame(report *r, ebpo_error *error)
+static ebpo_status report_frame(report *r, ebpo_error *error)
 {
     const scene_frame *f = &r->frame;
     ebpo_status status = EBPO_OK;
     if (r->prints)
         print_frame(r);
     if (r->record)
-        status = ebpo_scene_record_add(r->record, &f->cost, f->meetings, f->count, error);
+        status = ebpo_scene_report_add(r->record, &f->cost, f->found_clashes, f->count, error);
     if (r->page)
-        status = clash_add(&r->clashes, f->cost.time, f->meetings, f->count, error);
+        status = clash_add(&r->clashes, f->cost.time, f->found_clashes, f->count, error);
     if (r->strip && is_pictured(r))
-        status = clash_strip_add(r->strip, f->cost.time, f->meetings, f->count, error);
-    r->told++;
+        status = clash_strip_add(r->strip, f->cost.time, f->found_clashes, f->count, error);
+    r->reported++;
     return status;
 }
 
@@ -313,17 +313,17 @@ static ebpo_status begin_report(report *r, ebpo_error *error)
     }
     if (out && words_end_with(out, ".png"))
         return begin_strip(r, error);
-    return out && !r->page ? ebpo_scene_record_new(r->scene, out, &r->record, error) : EBPO_OK;
+    return out && !r->page ? ebpo_scene_report_new(r->scene, out, &r->record, error) : EBPO_OK;
 }
 
-/* Of the worst ones, as many as people look at. */
-enum { PICTURES_MOST = 60 };
+/* Number of the worst clashes with pictures. */
+enum { PICTURES_MAX = 60 };
 
 static ebpo_status write_page(report *r, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     clash_sort(&r->clashes);
-    for (uint64_t i = 0; i < r->clashes.count && i < PICTURES_MOST && status == EBPO_OK; i++)
+    for (uint64_t i = 0; i < r->clashes.count && i < PICTURES_MAX && status == EBPO_OK; i++)
         status = clash_draw(r->scene, &r->clashes.clash[i], (unsigned)r->v->threads, error);
     return status == EBPO_OK ? clash_page(&r->clashes, r->scene, r->path, r->v->from, r->v->to,
                                           r->frames, r->v->out, error)
@@ -333,7 +333,7 @@ static ebpo_status write_page(report *r, ebpo_error *error)
 static ebpo_status finish_files(report *r, ebpo_error *error)
 {
     if (r->record)
-        return ebpo_scene_record_finish(r->record, error);
+        return ebpo_scene_report_finish(r->record, error);
     if (r->strip)
         return clash_strip_write(r->strip, r->v->out, error);
     return r->page ? write_page(r, error) : EBPO_OK;
@@ -343,24 +343,24 @@ static void finish_report(report *r, double seconds)
 {
     if (r->prints && r->v->json) {
         json_end(&r->j);
-        json_uint(&r->j, "pairs_asked", r->asked);
-        json_uint(&r->j, "pairs_that_meet", r->meetings);
+        json_uint(&r->j, "pairs_tested", r->queried);
+        json_uint(&r->j, "pairs_clashing", r->found_clashes);
         json_real(&r->j, "seconds", seconds);
         json_finish(&r->j);
     } else if (!r->v->quiet) {
-        char times[40], asked[40];
+        char times[40], queried[40];
         words_plural(times, sizeof times, r->frames, "time", "times");
-        words_plural(asked, sizeof asked, r->asked, "pair", "pairs");
-        fprintf(stderr, "%s, %llu with meetings; %s asked, %llu meet%s; %.3g s\n", times,
-                (unsigned long long)r->frames_met, asked, (unsigned long long)r->meetings,
-                r->how.relate ? "" : " (one within another is not looked for without --solids)",
+        words_plural(queried, sizeof queried, r->queried, "pair", "pairs");
+        fprintf(stderr, "%s, %llu with contacts; %s tested, %llu in contact%s; %.3g s\n", times,
+                (unsigned long long)r->frames_found, queried, (unsigned long long)r->found_clashes,
+                r->how.relate ? "" : " (enclosed instances are not checked without --solids)",
                 seconds);
     }
 }
 
 /* --- all frames --- */
 
-/* Of the frame `n`: the last one is at the last time. */
+/* Returns the time of frame `n`: the last one is at the last time. */
 static double time_of(const scene_values *v, uint64_t n, uint64_t frames)
 {
     return n + 1 == frames ? v->to : v->from + v->step * (double)n;
@@ -368,7 +368,7 @@ static double time_of(const scene_values *v, uint64_t n, uint64_t frames)
 
 static uint64_t frames_of(const scene_values *v)
 {
-    return v->to > v->from /* the command has seen to it that these are not too many */
+    return v->to > v->from /* the command has checked that these are not too many */
                ? 1 + (uint64_t)ceil((v->to - v->from) / v->step * (1 - 0x1p-40))
                : 1;
 }
@@ -376,7 +376,7 @@ static uint64_t frames_of(const scene_values *v)
 ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *scene,
                          ebpo_error *error)
 {
-    report r = { .v = v, .scene = scene, .how = EBPO_SCENE_ASK_OPTIONS_INIT };
+    report r = { .v = v, .scene = scene, .how = EBPO_SCENE_CLASH_OPTIONS_INIT };
     double begun = progress_now();
     progress_line line;
     r.path = path;
@@ -391,18 +391,18 @@ ebpo_status scene_report(const scene_values *v, const char *path, ebpo_scene *sc
     r.how.progress = progress_start(&line, "scene", v->quiet);
     ebpo_status status = begin_report(&r, error);
     for (uint64_t n = 0; n < r.frames && status == EBPO_OK; n++) {
-        status = ask_frame(&r, time_of(v, n, r.frames), error);
+        status = query_frame(&r, time_of(v, n, r.frames), error);
         if (status == EBPO_OK)
-            status = tell_frame(&r, error);
+            status = report_frame(&r, error);
     }
     if (status == EBPO_OK)
         status = finish_files(&r, error);
     progress_wipe(&line);
     if (status == EBPO_OK)
         finish_report(&r, progress_now() - begun);
-    ebpo_scene_record_free(r.record);
+    ebpo_scene_report_free(r.record);
     clash_strip_free(r.strip);
     clash_free(&r.clashes);
-    free(r.frame.meetings);
+    free(r.frame.found_clashes);
     return status;
 }

@@ -1,14 +1,14 @@
-/* `ebpo scene report`: who meets, time after time; `ebpo scene approach`: when they first come
- * near. */
+/* `ebpo scene report`: finds contacts, time after time; `ebpo scene approach`: finds when instances
+ * first come near each other. */
 #ifndef EBPO_TOOLS_SCENE_REPORT_H
 #define EBPO_TOOLS_SCENE_REPORT_H
 
 #include "cli/commands/scene_run.h"
 
-/* What was asked at a time. */
+/* Queries and results at a time. */
 typedef struct scene_frame {
     ebpo_scene_frame cost;
-    ebpo_scene_meeting *meetings;
+    ebpo_scene_clash *found_clashes;
     uint64_t count;
 } scene_frame;
 

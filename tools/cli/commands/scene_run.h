@@ -1,4 +1,4 @@
-/* What `ebpo scene` does with a scene whose models are loaded. */
+/* Subcommands of `ebpo scene` for a scene with loaded models. */
 #ifndef EBPO_TOOLS_SCENE_RUN_H
 #define EBPO_TOOLS_SCENE_RUN_H
 
@@ -10,7 +10,7 @@ typedef struct scene_values {
     const char *out, *target_size, *memory;
     int purpose; /* an ebpo_scene_purpose */
     int64_t threads;
-    int64_t most_expansion; /* as in ebpo_open_options */
+    int64_t max_expansion; /* as in ebpo_open_options */
     bool outside, remote, json, csv, count, places, solids, least, quiet;
 } scene_values;
 

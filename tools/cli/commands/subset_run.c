@@ -59,8 +59,7 @@ static uint32_t part_named(const char *word, size_t length)
     return 0;
 }
 
-/* Words with commas between: all to be kept, or all, with a minus sign, to be left out. */
-static bool read_parts(const char *text, uint32_t *parts)
+bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts)
 {
     bool without = text[0] == '-';
     uint32_t named = 0;
@@ -76,7 +75,7 @@ static bool read_parts(const char *text, uint32_t *parts)
         if (!*at)
             break;
     }
-    *parts = without ? ebpo_profile_parts(EBPO_PROFILE_FULL) & ~named : named;
+    *parts = without ? base & ~named : named;
     return true;
 }
 
@@ -98,7 +97,7 @@ void subset_print_need(const ebpo_info *info, bool chosen)
                                              : info->parts & EBPO_PART_MESH ? EBPO_PROFILE_COLLISION
                                                                             : EBPO_PROFILE_LOD]);
     if (info->kept_error > 0)
-        printf(", pruned where envelopes reach at most %.6g beyond the model", info->kept_error);
+        printf(", pruned where envelopes extend at most %.6g beyond the model", info->kept_error);
 }
 
 int subset_options(const char *name, const subset_values *v, const char *in, const char *out_path,
@@ -106,19 +105,18 @@ int subset_options(const char *name, const subset_values *v, const char *in, con
 {
     *out = (ebpo_subset_options)EBPO_SUBSET_OPTIONS_INIT;
     if (v->levels && !read_levels(v->levels, &out->last_level))
-        return command_usage(name,
-                             "--levels: '%s' is not 0-N with N up to 20; without 0 and all up to "
-                             "N there is none, as each level builds on those above",
-                             v->levels);
+        return command_usage(
+            name,
+            "--levels: '%s' is not 0-N with N up to 20; all levels from 0 to N are "
+            "needed, as each level builds on those above",
+            v->levels);
     if (v->box && !read_box(v->box, out))
         return command_usage(
             name, "--box: '%s' is not six numbers separated by commas, the lower corner first",
             v->box);
-    if (v->parts && !read_parts(v->parts, &out->parts))
-        return command_usage(name,
-                             "--parts: '%s' is not a list of mesh, maps, attributes, envelopes, "
-                             "leaf-planes, colours, or of these with a minus sign before each",
-                             v->parts);
+    uint32_t all = ebpo_profile_parts(EBPO_PROFILE_FULL);
+    if (v->parts && !subset_read_parts(v->parts, all, &out->parts))
+        return command_usage(name, "--parts: '%s' " SUBSET_PARTS_EXPECTED, v->parts);
     if (v->parts && v->profile >= 0)
         return command_usage(name, "--parts and --profile cannot be used together");
     if (v->zstd_level && v->codec > EBPO_CODEC_ZSTD)
@@ -153,13 +151,13 @@ ebpo_status subset_settle(const subset_values *v, const ebpo_info *info, const c
     bool named = v->parts && v->parts[0] != '-';
     if (named && out->parts & ~info->parts) {
         char parts[80];
-        snprintf(what, sizeof what, "--parts asks for %s, which the file does not have",
+        snprintf(what, sizeof what, "--parts requests %s, which the file does not have",
                  words_parts(parts, sizeof parts, out->parts & ~info->parts));
         return refuse_values(error, shown, what);
     }
     if (named && out->parts & EBPO_PART_MAPS && !(out->parts & EBPO_PART_MESH))
         return refuse_values(error, shown,
-                             "--parts asks for maps without the mesh that they number; add mesh");
+                             "--parts requests maps without the mesh that they number; add mesh");
     if (!v->parts && v->profile < 0 && out->last_level >= 0 &&
         out->last_level < info->level_count - 1)
         out->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);
@@ -197,8 +195,8 @@ static void print_summary(const subset_values *v, const char *out_path, const eb
     printf(", in %.1f s\n", seconds);
 }
 
-ebpo_status subset_tell(const subset_values *v, const char *out_path, const ebpo_info *from,
-                        const traffic *t, double seconds, ebpo_error *error)
+ebpo_status subset_report(const subset_values *v, const char *out_path, const ebpo_info *from,
+                          const traffic *t, double seconds, ebpo_error *error)
 {
     ebpo_file *file = NULL;
     if (v->quiet && !v->json)

@@ -1,4 +1,5 @@
-/* What `ebpo subset` and `ebpo fetch` share: which part of a file, and telling of the result. */
+/* Shared by `ebpo subset` and `ebpo fetch`: options for a part of a file, and the report of the
+ * result. */
 #ifndef EBPO_TOOLS_SUBSET_RUN_H
 #define EBPO_TOOLS_SUBSET_RUN_H
 
@@ -24,28 +25,35 @@ typedef struct subset_values {
 
 extern const char *const profile_words[];
 
-/* The two, read; the exit code. */
+/* Reads --parts: part names separated by commas, or, with a minus sign before each, `base` without
+ * these parts. Returns false when the list is neither. */
+bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts);
+#define SUBSET_PARTS_EXPECTED                                                                     \
+    "is not a list of mesh, maps, attributes, envelopes, leaf-planes, colours, or of these with " \
+    "a minus sign before each"
+
+/* The the two; returns the exit code. */
 int subset_need(const char *name, double max_error, const char *target_size,
                 ebpo_subset_options *out);
 
-/* ", ..." for summaries: the error that was kept to and, if it was `chosen`, the profile; or
- * nothing. */
+/* Prints ", ..." for summaries: the maximum error and, if it was `chosen`, the profile; or nothing.
+ */
 void subset_print_need(const ebpo_info *info, bool chosen);
 
-/* What can be said before the file is open; the exit code, EXIT_FINE to go on. `out` gets all but
- * what depends on the file. */
+/* Checks options before the file is open; returns the exit code, EXIT_FINE to continue. `out` gets
+ * all values that do not depend on the file. */
 int subset_options(const char *name, const subset_values *v, const char *in, const char *out_path,
                    ebpo_subset_options *out);
 
-/* The rest, which depends on what the file has. EBPO_E_ARGUMENT: a part that the file does not have
- * was asked for by name. */
+/* Sets the rest, which depends on the file. EBPO_E_ARGUMENT: a part requested by name is not in the
+ * file. */
 EBPO_MUST_USE ebpo_status subset_settle(const subset_values *v, const ebpo_info *info,
                                         const char *shown, ebpo_subset_options *out,
                                         ebpo_error *error);
 
-/* What is on the disk, as a reader sees it. `t`: what was read of the input. */
-EBPO_MUST_USE ebpo_status subset_tell(const subset_values *v, const char *out_path,
-                                      const ebpo_info *from, const traffic *t, double seconds,
-                                      ebpo_error *error);
+/* Reports the file on the disk, as a reader sees it. `t`: traffic of the input. */
+EBPO_MUST_USE ebpo_status subset_report(const subset_values *v, const char *out_path,
+                                        const ebpo_info *from, const traffic *t, double seconds,
+                                        ebpo_error *error);
 
 #endif

@@ -10,7 +10,7 @@
 
 typedef struct longer {
     int fd;
-    uint64_t size; /* of the file; the source has one more */
+    uint64_t size; /* size of the file; the source has one more byte */
     const char *path;
 } longer;
 
@@ -32,7 +32,7 @@ static ebpo_status read_longer(void *user, uint64_t offset, uint64_t size, void 
         if (got < 0 && errno == EINTR)
             continue;
         if (got == 0)
-            errno = EIO; /* it has been shortened */
+            errno = EIO; /* it has been truncated */
         if (got <= 0)
             return fail_path(l->path, error);
         to += got;
@@ -48,7 +48,7 @@ static void close_longer(void *user)
     free(l);
 }
 
-ebpo_status unlisted_open(const char *path, uint64_t most_expansion, ebpo_file **out,
+ebpo_status unlisted_open(const char *path, uint64_t max_expansion, ebpo_file **out,
                           ebpo_error *error)
 {
     ebpo_open_options how = EBPO_OPEN_OPTIONS_INIT;
@@ -68,7 +68,7 @@ ebpo_status unlisted_open(const char *path, uint64_t most_expansion, ebpo_file *
     source.size = l->size + 1;
     source.read = read_longer;
     source.close = close_longer;
-    how.most_expansion = most_expansion;
+    how.max_expansion = max_expansion;
     how.source = &source;
     return ebpo_open_with(path, &how, out, error);
 }

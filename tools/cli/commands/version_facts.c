@@ -13,12 +13,12 @@
 
 typedef struct installation {
     char program[PATH_MAX];
-    char library[PATH_MAX]; /* the one that runs */
-    char own[PATH_MAX];     /* the one that was installed with the program; "": none is there */
-    char plugin[PATH_MAX];  /* the folder; "": not there */
+    char library[PATH_MAX]; /* the running one */
+    char own[PATH_MAX];     /* the one installed with the program; "": none exists */
+    char plugin[PATH_MAX];  /* the folder; "": does not exist */
 } installation;
 
-/* A path of what was installed, which is from the program's folder unless it is absolute; "": there
+/* Writes the path of an installed file, relative to the program's folder unless absolute; "": there
  * is no such file. */
 static void locate_file(const char *program, const char *path, const char *name, char out[PATH_MAX])
 {
@@ -29,7 +29,7 @@ static void locate_file(const char *program, const char *path, const char *name,
         out[0] = 0;
 }
 
-static void look_at_installation(installation *i)
+static void inspect_installation(installation *i)
 {
     Dl_info library;
     if (!realpath("/proc/self/exe", i->program))
@@ -57,7 +57,7 @@ static void print_installation(const installation *i)
            EBPO_HAVE_QHULL ? " qhull" : "");
 }
 
-/* Not printed with the rest: whoever asks for the version alone is told, too. */
+/* Printed separately: it is also reported when only the version is requested. */
 static int warn_of_other(const installation *i)
 {
     bool other = i->own[0] && i->library[0] && !command_same_file(i->own, i->library);
@@ -74,7 +74,7 @@ static int warn_of_other(const installation *i)
     return other || differs ? EXIT_FAILED : EXIT_FINE;
 }
 
-int version_tell(const char *argument)
+int version_report(const char *argument)
 {
     char format[32];
     bool verbose = argument && strcmp(argument, "--verbose") == 0;
@@ -83,7 +83,7 @@ int version_tell(const char *argument)
         return EXIT_USAGE;
     }
     installation i;
-    look_at_installation(&i);
+    inspect_installation(&i);
     printf("ebpo %s, format %s\n", ebpo_version(),
            words_format(format, sizeof format, EBPO_FORMAT_MAJOR, EBPO_FORMAT_MINOR));
     if (verbose)

@@ -1,12 +1,12 @@
-"""Completions for bash, zsh and fish, of the tables of options."""
+"""Completions for bash, zsh and fish, from the tables of options."""
 import re
 
-BASH = """# Completion of ebpo(1) for bash. Made of tools/cli/options.
+BASH = """# Completion of ebpo(1) for bash. Generated from tools/cli/options.
 _ebpo()
 {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]}
     local commands="@COMMANDS@" options= words= values= file=
-    # "--codec=z" comes as three words
+    # bash splits "--codec=z" into three words
     if [[ $word == = ]]; then
         word=
     elif [[ $before == = && COMP_CWORD -gt 1 ]]; then
@@ -17,7 +17,7 @@ _ebpo()
         return
     fi
     if [[ ${COMP_WORDS[1]} == help ]]; then
-        COMPREPLY=($(compgen -W "$commands" -- "$word"))
+        COMPREPLY=($(compgen -W "$commands remote" -- "$word"))
         return
     fi
     case ${COMP_WORDS[1]} in
@@ -34,8 +34,8 @@ _ebpo()
     complete -o filenames -o bashdefault -F _ebpo ebpo
 """
 
-# Values that are names of files, by what --help calls them.
-FILES = re.compile(r"^(FILE|DIR|PATH|POINTS|WHAT|OUT|.*\.(ply|h5|json))$")
+# Values that are names of files, as --help names them.
+FILES = re.compile(r"^(FILE|DIR|PATH|POINTS|WHAT|OUT|.*\.(ply|h5|json|png))$")
 
 
 def marks(option):
@@ -80,7 +80,7 @@ def zsh_option(option, has_many):
 
 
 def zsh(commands, help_option):
-    lines = ["#compdef ebpo", "# Made of tools/cli/options.", "_ebpo()", "{",
+    lines = ["#compdef ebpo", "# Generated from tools/cli/options.", "_ebpo()", "{",
              "    local -a commands options", "    commands=("]
     lines += [f"        '{c.name}:{zsh_text(c.summary)}'" for c in commands]
     lines += ["        'help:describe a command and its options'", "    )",
@@ -91,7 +91,8 @@ def zsh(commands, help_option):
         for option in command.options() + [help_option]:
             lines += zsh_option(option, option.kind in ("list", "set"))
         lines.append("    ) ;;")
-    lines += ["    help) _describe command commands; return ;;", "    esac", "    shift words",
+    lines += ["    help) commands+=('remote:describe the options for URLs')",
+              "        _describe command commands; return ;;", "    esac", "    shift words",
               "    (( CURRENT-- ))", "    _arguments -S $options '*:file:_files'", "}", '_ebpo "$@"']
     return "\n".join(lines) + "\n"
 
@@ -101,13 +102,13 @@ def fish_text(text):
 
 
 def fish(commands, help_option):
-    lines = ["# Made of tools/cli/options.",
+    lines = ["# Generated from tools/cli/options.",
              "complete -c ebpo -n __fish_use_subcommand -f -a help -d 'describe a command'"]
     for command in commands:
         lines.append(f"complete -c ebpo -n __fish_use_subcommand -f -a {command.name} "
                      f"-d {fish_text(command.summary)}")
     names = " ".join(command.name for command in commands)
-    lines.append(f"complete -c ebpo -n '__fish_seen_subcommand_from help' -f -a '{names}'")
+    lines.append(f"complete -c ebpo -n '__fish_seen_subcommand_from help' -f -a '{names} remote'")
     for command in commands:
         begin = f"complete -c ebpo -n '__fish_seen_subcommand_from {command.name}'"
         for option in command.options() + [help_option]:

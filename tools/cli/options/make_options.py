@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
-"""make_options.py tables|pages|completions OUT.DIR COMMAND...: of NAME.options and shared.options
+"""make_options.py tables|pages|completions OUT.DIR COMMAND...
 
-tables       COMMAND.inc, the C tables that cmd_COMMAND.c includes: what is parsed, and --help
+Generates files from NAME.options and shared.options:
+
+tables       COMMAND.inc, the C tables that cmd_COMMAND.c includes, for parsing and --help
 pages        ../../man/*.1 and *.7 with their marks filled: @NAME@ @SYNOPSIS@ @OPTIONS@ @COMMANDS@
              @PAGES@, and @OPTIONS KEY@ for a shared group
 completions  ebpo.bash, _ebpo (zsh), ebpo.fish
@@ -18,11 +20,11 @@ import option_tables
 HERE = os.path.dirname(os.path.abspath(__file__))
 HELP = option_tables.Option(name="help", letter="h", value="", kind="flag", words=[],
                             help="print this help and exit",
-                            man=["Print a summary of the options and exit."])
+                            man=["Print a summary of the options and exit."], page="")
 
 
 def write(path, text):
-    """A file that stays as it is keeps its time."""
+    """Writes a file, unless it has this text already, so that its time stays."""
     if os.path.exists(path):
         with open(path, encoding="utf-8") as file:
             if file.read() == text:
@@ -37,16 +39,17 @@ def c_text(text):
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"' if text else "NULL"
 
 
-# of a field, by the kind of its option
+# C type of the field of an option, by the kind of option
 C_TYPES = {"flag": "bool", "int": "int64_t", "real": "double", "text": "const char *",
            "list": "arg_list", "word": "int", "set": "uint32_t"}
 
 
 def c_option(command, o):
     letter = f"'{o.letter}'" if o.letter else "0"
-    return (f"    {{ {c_text(o.name)}, {letter}, ARG_{o.kind.upper()}, "
-            f"offsetof({o.of or command.values}, {o.field}),\n      {c_text(o.value)}, "
-            f"{c_text(o.help)},\n      {o.low}, {o.high}, {o.array or 'NULL'} }},")
+    offset = o.field if o.kind == "operand" else f"offsetof({o.of or command.values}, {o.field})"
+    return (f"    {{ {c_text(o.name)}, {letter}, ARG_{o.kind.upper()}, {offset},\n"
+            f"      {c_text(o.value)}, {c_text(o.help)},\n"
+            f"      {o.low}, {o.high}, {o.array or 'NULL'}, {c_text(o.page)} }},")
 
 
 def c_check(command, o):
@@ -57,8 +60,8 @@ def c_check(command, o):
 
 def c_tables(command):
     rows = "\n".join(c_option(command, o) for o in command.options())
-    checks = "\n".join(c_check(command, o) for o in command.options())
-    return f"""/* Made of tools/cli/options/{command.name}.options and shared.options, which are to be changed. */
+    checks = "\n".join(c_check(command, o) for o in command.options() if o.kind != "operand")
+    return f"""/* Generated from tools/cli/options/{command.name}.options and shared.options; edit these. */
 static const arg_option options[] = {{
 {rows}
     {{ 0 }},
@@ -97,14 +100,17 @@ def mdoc_item(o):
 
 
 def mdoc_options(runs):
-    lines = [".Bl -tag -width Ds"]
+    lines, after = [".Bl -tag -width Ds"], []
     for options, about in runs:
+        if options[0].page:
+            after += [".Pp", *about]
+            continue
         for o in options:
             lines.append(mdoc_item(o))
             if about is None:
                 lines += o.man or [mdoc_sentence(o.help)]
         lines += about or []
-    return lines + [".El"]
+    return lines + [".El"] + after
 
 
 def mdoc_operand(word):
@@ -125,12 +131,13 @@ def mdoc_list_of_commands(commands):
     lines = [".Bl -tag -width distance"]
     for command in commands:
         lines += [f".It Cm {command.name}", f"{command.summary}; see", f".Xr ebpo-{command.name} 1"]
-    return lines + [".It Cm help", "prints the options of a command, as its", ".Fl -help", "does",
+    return lines + [".It Cm help", "prints the options of a command, as its", ".Fl -help", "does;",
+                    "for", ".Cm remote", "prints the options for URLs",
                     ".El"]
 
 
 def filled(line, name, shared, commands):
-    """What stands in the place of a mark, or the line."""
+    """Returns the lines that replace a mark, or the line itself."""
     command = next((c for c in commands if f"ebpo-{c.name}.1" == name), None)
     if line == "@COMMANDS@":
         return mdoc_list_of_commands(commands)
@@ -151,12 +158,12 @@ def page(name, shared, commands):
     with open(os.path.join(HERE, "..", "..", "man", name), encoding="utf-8") as file:
         lines = [part for line in file.read().splitlines()
                  for part in filled(line, name, shared, commands)]
-    # of itself a page has only the name
+    # a page refers to itself by name only
     itself = f".Xr {name[:-2]} {name[-1]}"
     lines = [".Nm" + line[len(itself):] if line.startswith(itself) else line for line in lines]
     marks = [line for line in lines if re.fullmatch(r"@.*@", line)]
     if marks:
-        raise option_tables.Wrong(f"tools/man/{name}: '{marks[0]}' is no mark of this page")
+        raise option_tables.Wrong(f"tools/man/{name}: '{marks[0]}' is not a mark of this page")
     return "\n".join(lines) + "\n"
 
 

@@ -1,46 +1,50 @@
-"""Reads NAME.options and shared.options, of which everything that tells of options is made.
+"""Reads NAME.options and shared.options, the source of parsing, --help, manuals and completions.
 
-A file is records with an empty line between them; a line that begins with # is a comment. A record
-is a line of what it is, lines that begin with two blanks (a word and what it says; four blanks
-continue it), and lines of mdoc for the man page:
+A file has records, separated by empty lines; a line that begins with # is a comment. A record has a
+first line, lines that begin with two blanks (a word and its value; four blanks continue it), and
+lines of mdoc for the man page:
 
-    command NAME              of a file NAME.options, once, with the lines
-      operands A [B] C...     what is expected, in brackets what may be absent
+    command NAME              once in a file NAME.options, with the lines
+      operands A [B] C...     expected operands; those in brackets are optional
       summary TEXT            one line
-      text TEXT               more for --help
-      values TYPE             the C struct that options fill; else `values`
-      least N, most N         of operands, where that is not what `operands` says
-      dash .io                what "-" is, for each operand: see arg_spec
-      writes h5 hdf5          endings that fit the second operand
+      text TEXT               further text for --help
+      values TYPE             C struct that options fill; default: `values`
+      least N, most N         numbers of operands, if `operands` does not give them
+      dash .io                meaning of "-" for each operand: see arg_spec
+      writes h5 hdf5          allowed endings of the second operand
     option NAME [-LETTER] [VALUE]
       flag|int|real|text|list|word|set FIELD ...
-                              for int and real the least and the greatest value; for word and set the
-                              C array of the words and the words
-      help TEXT               for --help, short
-      of TYPE                 the struct of FIELD, where it is the first member of the command's
-      key KEY                 in shared.options: its name for `use`; else NAME
-    (mdoc)                    for the man page; without any the help is taken
-    use KEY...                shared options; mdoc is put behind that of the last one
+                              for int and real: least and greatest value; for word and set: C array of
+                              the words, and the words
+      help TEXT               short text for --help
+      of TYPE                 struct of FIELD, if it is the first member of the command's struct
+      key KEY                 in shared.options: name for `use`; default: NAME
+    (mdoc)                    for the man page; default: the help
+    use KEY...                shared options; mdoc is added after that of the last one
       of TYPE                 as above
-      in MEMBER.              their fields are members of this one
-      set NAME TEXT           in place of {NAME} in help and mdoc
-    group KEY                 in shared.options: `use KEY` stands for several
+      in MEMBER.              prefix of their fields
+      set NAME TEXT           replaces {NAME} in help and mdoc
+    group KEY                 in shared.options: `use KEY` uses several options
       options KEY...
-    (mdoc)                    once for all of them: their own is for the page that tells of the group
-    text KEY                  in shared.options: mdoc; a line @KEY@ stands for it
+      page NAME               `ebpo help NAME` describes them instead of --help
+    (mdoc)                    common text; the texts of the options are for the page of the group
+    text KEY                  in shared.options: mdoc that replaces a line @KEY@
 """
 import os
 import re
 
 KINDS = ("flag", "int", "real", "text", "list", "word", "set")
+# The option that commands with an operand OUT accept in its place; kind "operand" is made here only.
+OUTPUT = "output"
 
 
 class Wrong(Exception):
-    """What is wrong in a table, and where."""
+    """An error in a table, with its position."""
 
 
 class Option:
-    """name, letter, value ('' for flags), kind, of, field, low, high, array, words, help, man."""
+    """name, letter, value ('' for flags), kind, of, field, low, high, array, words, help, man, and page:
+    the page of `ebpo help` that describes the option, or '' for --help."""
 
     def __init__(self, **members):
         self.__dict__.update(members)
@@ -52,7 +56,7 @@ class Option:
 
 class Command:
     """A command: name, operands, least, most, summary, text, values, dash, writes, and `runs`: lists
-    of options, with the mdoc that stands for all of a list, or None."""
+    of options, with the common mdoc of a list, or None."""
 
     def __init__(self, **members):
         self.__dict__.update(members)
@@ -88,7 +92,7 @@ def records(path):
 def fact(where, facts, word, usual=None):
     found = [text for name, text in facts if name == word]
     if len(found) > 1 or (not found and usual is None):
-        raise Wrong(f"{where}: there is not one line '{word}'")
+        raise Wrong(f"{where}: expected one line '{word}'")
     return found[0] if found else usual
 
 
@@ -97,10 +101,10 @@ def read_option(where, head, facts, man):
     letter = rest.pop(0)[1] if rest and re.fullmatch(r"-[a-zA-Z]", rest[0]) else ""
     known = [(name, text) for name, text in facts if name in KINDS]
     if len(known) != 1:
-        raise Wrong(f"{where}: an option has one line of {', '.join(KINDS)}")
+        raise Wrong(f"{where}: expected one line of {', '.join(KINDS)}")
     kind, words = known[0][0], known[0][1].split()
     if (kind == "flag") != (not rest):
-        raise Wrong(f"{where}: all options but flags have a value, which --help shows")
+        raise Wrong(f"{where}: an option that is not a flag needs the name of its value")
     more = {"low": "0", "high": "0", "array": "", "words": []}
     if kind in ("int", "real"):
         more["low"], more["high"] = words[1:]
@@ -108,10 +112,10 @@ def read_option(where, head, facts, man):
         more["array"], more["words"] = words[1], words[2:]
     for name, _ in facts:
         if name not in KINDS + ("help", "key", "of"):
-            raise Wrong(f"{where}: '{name}' is not known of options")
+            raise Wrong(f"{where}: '{name}' unknown line of an option")
     return Option(where=where, name=head[1], letter=letter, value=" ".join(rest), kind=kind,
                   field=words[0], help=fact(where, facts, "help"), of=fact(where, facts, "of", ""), man=man,
-                  **more)
+                  page="", **more)
 
 
 class Shared:
@@ -124,27 +128,28 @@ class Shared:
                 self.options[fact(where, facts, "key", head[1])] = read_option(where, head, facts,
                                                                                man)
             elif head[0] == "group":
-                self.groups[head[1]] = (fact(where, facts, "options").split(), man)
+                self.groups[head[1]] = (fact(where, facts, "options").split(), man,
+                                        fact(where, facts, "page", ""))
             elif head[0] == "text":
                 self.texts[head[1]] = man
             else:
-                raise Wrong(f"{where}: '{head[0]}' is no record of this file")
+                raise Wrong(f"{where}: '{head[0]}' unknown record")
 
     def mdoc(self, where, lines):
         out = []
         for line in lines:
             key = re.fullmatch(r"@([a-z-]+)@", line)
             if key and key[1] not in self.texts:
-                raise Wrong(f"{where}: there is no text '{key[1]}'")
+                raise Wrong(f"{where}: text '{key[1]}' not found")
             out += self.texts[key[1]] if key else [line]
         return out
 
-    def take(self, where, key, member, sets, of=""):
+    def take(self, where, key, member, sets, of="", page=""):
         if key not in self.options:
-            raise Wrong(f"{where}: there is no shared option '{key}'")
+            raise Wrong(f"{where}: shared option '{key}' not found")
         self.used.add(key)
         option = Option(**self.options[key].__dict__)
-        option.of, option.field = of, member + option.field
+        option.of, option.field, option.page = of, member + option.field, page
 
         def filled(text):
             for name, value in sets:
@@ -157,14 +162,14 @@ class Shared:
         return option
 
     def use(self, where, head, facts, man):
-        """Runs of options, as Command has them."""
+        """Returns runs of options for Command.runs."""
         member, of = fact(where, facts, "in", ""), fact(where, facts, "of", "")
         sets = [text.partition(" ")[::2] for name, text in facts if name == "set"]
         runs = []
         for key in head[1:]:
             if key in self.groups:
-                keys, about = self.groups[key]
-                runs.append(([self.take(where, k, member, sets, of) for k in keys], about))
+                keys, about, page = self.groups[key]
+                runs.append(([self.take(where, k, member, sets, of, page) for k in keys], about))
             else:
                 runs.append(([self.take(where, key, member, sets, of)], None))
         if man:
@@ -177,6 +182,19 @@ def count_operands(where, facts):
     least = sum(not word.startswith("[") for word in words)
     most = "ARGS_OPERANDS_MAX" if words[-1].endswith("...") else str(len(words))
     return fact(where, facts, "least", str(least)), fact(where, facts, "most", most)
+
+
+def add_output(command):
+    """Lets --output stand for the operand OUT, where the command has no such option."""
+    names = [word.strip("[]") for word in command.operands.split()]
+    at = next((i for i, word in enumerate(names) if word.startswith("OUT")), None)
+    if at is None or any(o.name == OUTPUT for o in command.options()):
+        return
+    option = Option(where=command.name, name=OUTPUT, letter="o", value=names[at], kind="operand",
+                    field=str(at), of="", low="0", high="0", array="", words=[], page="",
+                    help=f"the output, in place of the operand {names[at]}",
+                    man=["The output, in place of the operand", f".Ar {names[at]} ."])
+    command.runs.insert(0, ([option], None))
 
 
 def read_command(folder, name, shared):
@@ -195,12 +213,13 @@ def read_command(folder, name, shared):
         elif head[0] == "use":
             command.runs += shared.use(where, head, facts, man)
         else:
-            raise Wrong(f"{where}: '{head[0]}' is no record of this file")
+            raise Wrong(f"{where}: '{head[0]}' unknown record")
+    add_output(command)
     seen = set()
     for option in command.options():
         for mark in [option.name] + [option.letter] * bool(option.letter):
             if mark in seen or mark in ("help", "h"):
-                raise Wrong(f"{option.where}: '{mark}' is taken")
+                raise Wrong(f"{option.where}: '{mark}' is defined twice")
             seen.add(mark)
     return command
 
@@ -210,5 +229,5 @@ def read_all(folder, names):
     commands = [read_command(folder, name, shared) for name in names]
     idle = set(shared.options) - shared.used
     if idle:
-        raise Wrong(f"shared.options: nobody has {', '.join(sorted(idle))}")
+        raise Wrong(f"shared.options: unused options: {', '.join(sorted(idle))}")
     return shared, commands

@@ -47,8 +47,8 @@ static void centre_model(camera *c, const ebpo_mesh *mesh)
         c->target[k] = low[k] / 2 + high[k] / 2;
 }
 
-/* The distance at which every vertex is seen, and by how much the picture is then off its middle.
- */
+/* Computes the distance at which every vertex is visible, and the offset of the picture from its
+ * middle. */
 static void measure_view(camera *c, const ebpo_mesh *mesh, double aspect, double *shift_x,
                          double *shift_y)
 {
@@ -85,7 +85,7 @@ void camera_fit(camera *out, const ebpo_mesh *mesh, double azimuth, double eleva
 {
     double aspect = (double)width / height, sx, sy;
     memset(out, 0, sizeof *out);
-    out->tangent = 0.22; /* a long lens: 25 degrees */
+    out->tangent = 0.22; /* a long focal length: 25 degrees */
     aim_camera(out, azimuth, elevation, up_axis);
     centre_model(out, mesh);
     for (int round = 0; round < 3; round++) {

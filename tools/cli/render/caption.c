@@ -1,4 +1,5 @@
-/* Captions by cairo: the text is drawn as coverage, which mixes its colour into the picture. */
+/* Draws captions with cairo: the text is drawn as coverage, which mixes its colour into the
+ * picture. */
 #include "ebpo_config.h"
 
 #include "cli/render/picture.h"
@@ -12,7 +13,7 @@
 #include <string.h>
 
 #if defined __SANITIZE_ADDRESS__
-/* fontconfig keeps some of its patterns to the end, and nobody else may free them. */
+/* fontconfig keeps some of its patterns to the end, and other code must not free them. */
 #define SHOWN __attribute__((visibility("default")))
 SHOWN const char *__lsan_default_suppressions(void);
 SHOWN const char *__lsan_default_options(void);
@@ -20,8 +21,8 @@ const char *__lsan_default_suppressions(void) { return "leak:libfontconfig"; }
 const char *__lsan_default_options(void) { return "print_suppressions=0"; }
 #endif
 
-/* Loaded when the first caption is drawn: cairo comes with fifteen libraries, which every command
- * would otherwise load when it starts. */
+/* Loaded when the first caption is drawn: cairo needs fifteen libraries, which every command would
+ * otherwise load at start. */
 #define CAIRO_FUNCTIONS(X)      \
     X(image_surface_create)     \
     X(image_surface_get_data)   \
@@ -43,8 +44,8 @@ static struct {
 #undef MEMBER
 } lib;
 
-/* MISSING: it is not installed. FAILED: it is, but could not be loaded: a picture without captions
- * would then not be the one that was asked for. */
+/* MISSING: it is not installed. FAILED: it is installed, but could not be loaded: a picture without
+ * captions would not be the requested one. */
 static enum { UNTRIED, LOADED, MISSING, FAILED } loaded;
 
 static void load_cairo(void)
@@ -57,7 +58,7 @@ static void load_cairo(void)
 #define FIND(name)                                                         \
     *(void **)&lib.name = library ? dlsym(library, "cairo_" #name) : NULL; \
     if (library && !lib.name)                                              \
-        loaded = MISSING; /* a version without it */
+        loaded = MISSING; /* a version without this function */
     CAIRO_FUNCTIONS(FIND)
 #undef FIND
 }
@@ -68,7 +69,7 @@ bool picture_has_captions(void)
     return loaded != MISSING;
 }
 
-/* *good: memory sufficed. */
+/* *good: false when memory was short. */
 static cairo_surface_t *text_coverage(int width, int height, const char *text, bool *good)
 {
     cairo_surface_t *surface = lib.image_surface_create(CAIRO_FORMAT_A8, width, height);
@@ -78,11 +79,11 @@ static cairo_surface_t *text_coverage(int width, int height, const char *text, b
     lib.select_font_face(cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
     lib.set_font_size(cairo, size);
     lib.text_extents(cairo, text, &extents);
-    if (extents.x_advance > 0.96 * width) { /* as large as there is room */
+    if (extents.x_advance > 0.96 * width) { /* as large as it fits */
         lib.set_font_size(cairo, size * 0.96 * width / extents.x_advance);
         lib.text_extents(cairo, text, &extents);
     }
-    /* on whole pixels, and all captions on one line, whichever letters they have */
+    /* on whole pixels, and all captions on one baseline, independent of their letters */
     lib.move_to(cairo, floor((width - extents.x_advance) / 2), floor(0.72 * height));
     lib.show_text(cairo, text);
     *good = lib.status(cairo) == CAIRO_STATUS_SUCCESS;

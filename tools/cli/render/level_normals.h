@@ -1,11 +1,11 @@
-/* Which way a level's triangles are lit. */
+/* Computes normals for the lighting of a level. */
 #ifndef EBPO_TOOLS_LEVEL_NORMALS_H
 #define EBPO_TOOLS_LEVEL_NORMALS_H
 
 #include <ebpo/ebpo.h>
 
-/* What ebpo_lod_normals says of polygons, of their triangles: [face_count][3], for raster_style, to
- * be freed. NULL on failure. */
+/* Returns the normals of ebpo_lod_normals for the triangles of polygons: [face_count][3], for
+ * raster_style, to be freed. NULL on failure. */
 EBPO_MUST_USE ebpo_status level_normals(const ebpo_info *info, const ebpo_mesh *mesh,
                                         const ebpo_lod_nodes *nodes, float **out,
                                         ebpo_error *error);

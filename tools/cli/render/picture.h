@@ -9,28 +9,28 @@ typedef struct picture {
     uint8_t *rgb; /* [height][width][3] */
 } picture;
 
-/* All of one colour; false when memory is short. */
+/* Makes a picture of one colour. Returns false when memory is short. */
 bool picture_make(picture *out, int width, int height, const uint8_t colour[3]);
 void picture_free(picture *p);
 
-/* Whether this build can write into pictures (cairo); without, captions are left out. */
+/* Returns true when this build can draw text (cairo); otherwise captions are omitted. */
 bool picture_has_captions(void);
-/* Text in the middle of a rectangle that lies in the picture. EBPO_E_MEMORY, also where what draws
- * it is there and could not be loaded. */
+/* Draws text in the middle of a rectangle in the picture. EBPO_E_MEMORY, also when the library for
+ * text is installed and could not be loaded. */
 EBPO_MUST_USE ebpo_status picture_caption(picture *p, int x, int y, int width, int height,
                                           const uint8_t colour[3], const char *text,
                                           ebpo_error *error);
 
-/* PNG in memory, to be freed: `channels` 3 (RGB) or 4 (RGB and opacity), 8 bits each, rows from the
- * top. `what` is for messages. */
+/* Encodes a PNG in memory, to be freed: `channels` 3 (RGB) or 4 (RGB and opacity), 8 bits each,
+ * rows from the top. `what` is for messages. */
 EBPO_MUST_USE ebpo_status picture_encode_png(const uint8_t *pixels, int width, int height,
                                              int channels, const char *what, void **bytes,
                                              size_t *size, ebpo_error *error);
 
-/* Of a PNG in memory: "data:image/png;base64,...", to be freed; NULL: no memory. */
+/* Returns a PNG in memory as "data:image/png;base64,...", to be freed; NULL: no memory. */
 char *picture_data_uri(const uint8_t *bytes, size_t size);
 
-/* As a PNG file, whole or not at all. */
+/* Writes a PNG file; replaces it atomically. */
 EBPO_MUST_USE ebpo_status picture_write_png(const picture *p, const char *path, ebpo_error *error);
 
 #endif

@@ -1,5 +1,5 @@
-/* Two steps: each sample gets the nearest triangle (z-buffer on 1/depth, which is linear on the
- * screen); then pixels are shaded from their samples. */
+/* Rasterizes in two steps: each sample gets the nearest triangle (z-buffer on 1/depth, which is
+ * linear on the screen); then pixels are shaded from their samples. */
 #include "cli/render/raster.h"
 
 #include <math.h>
@@ -14,11 +14,11 @@ enum { OCCLUSION_STEPS = 10, THREADS_MAX = 64 };
 #define EDGE UINT32_C(0x80000000)
 
 typedef struct sample {
-    float inverse; /* 1 / depth; 0: far away */
+    float inverse; /* 1 / depth; 0: background */
     uint32_t what; /* triangle, top bit: on an outline */
 } sample;
 
-/* A vertex in the camera's axes (x right, y up, z depth) and on the screen. */
+/* A vertex in camera axes (x right, y up, z depth) and on the screen. */
 typedef struct seen {
     double x, y, inverse;
 } seen;
@@ -28,12 +28,12 @@ typedef struct raster {
     const ebpo_mesh *mesh;
     const raster_style *style;
     int width, height, side; /* in samples; side: samples across a pixel */
-    double focal, per_focal; /* samples per unit of x / depth, and one by that */
+    double focal, per_focal; /* samples per unit of x / depth, and its reciprocal */
     sample *samples;
-    float (*normal)[3]; /* of each triangle, in the camera's axes, towards the eye */
-    double spiral[OCCLUSION_STEPS][2],
-        turn[256][2];   /* where occlusion looks: a spiral in the unit disk, and turns of it */
-    double linear[256]; /* sRGB values as light */
+    float (*normal)[3]; /* normal of each triangle, in camera axes, towards the eye */
+    double spiral[OCCLUSION_STEPS][2], turn[256][2]; /* sample positions for occlusion: a spiral in
+                                                      * the unit disk, and its rotations */
+    double linear[256];                              /* sRGB values as linear light */
 } raster;
 
 static double dot_product(const double a[3], const double b[3])
@@ -48,7 +48,7 @@ static void cross_product(const double a[3], const double b[3], double out[3])
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* In the camera's axes: x right, y up, z towards the eye, from the target. */
+/* Converts to camera axes: x right, y up, z towards the eye, from the target. */
 static void to_camera(const raster *r, uint64_t i, double out[3])
 {
     double v[3];
@@ -83,8 +83,8 @@ static bool unit_normal(double (*c)[3], double out[3])
 
 /* --- first step --- */
 
-/* Which sides (bit i: from corner i to the next) are outlines of the polygon: in the fans of
- * ebpo_lod_level the sides between neighbouring triangles of one plane are none. */
+/* Returns the sides (bit i: from corner i to the next) that are outlines of the polygon: in the
+ * fans of ebpo_lod_level, sides between neighbouring triangles of one plane are not outlines. */
 static unsigned outline_sides(const raster *r, uint64_t face, const double normal[3])
 {
     const uint32_t *f = r->mesh->faces + 3 * face;
@@ -133,7 +133,7 @@ static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned ou
     sides s;
     if (!make_sides(p, &s))
         return;
-    double line = 0.42 * r->side; /* half the outline's breadth */
+    double line = 0.42 * r->side; /* half the outline's width */
     double det = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[1].y - p[0].y) * (p[2].x - p[0].x);
     double gx = ((p[1].inverse - p[0].inverse) * (p[2].y - p[0].y) -
                  (p[2].inverse - p[0].inverse) * (p[1].y - p[0].y)) /
@@ -162,7 +162,7 @@ static void fill_triangle(raster *r, const seen p[3], uint32_t what, unsigned ou
         }
 }
 
-/* The normal that the style has for a face, in the camera's axes. */
+/* Returns the normal of the style for a face, in camera axes. */
 static void light_from(const raster *r, uint64_t face, double n[3])
 {
     const float *given = r->style->normals ? r->style->normals + 3 * face : NULL;
@@ -205,8 +205,8 @@ static void sample_position(const raster *r, int x, int y, double inverse, doubl
     out[2] = r->view->distance - depth;
 }
 
-/* How much of the sky near a sample is hidden, 0 .. 1: points on a spiral around it that lie above
- * its plane. */
+/* Returns the hidden share of the sky near a sample, 0 .. 1: from points on a spiral around it that
+ * are above its plane. */
 static double sky_hidden(const raster *r, int x, int y, const sample *at, const float n[3],
                          double reach)
 {
@@ -237,7 +237,7 @@ static double sky_hidden(const raster *r, int x, int y, const sample *at, const 
     return hidden > 1 ? 1 : hidden;
 }
 
-/* Shares of a face's corners at a point of its plane, in the camera's axes. */
+/* Computes the weights of a face's corners at a point of its plane, in camera axes. */
 static void corner_shares(const raster *r, uint32_t face, const double p[3], double out[3])
 {
     double c[3][3], from[3][3], n[3], part[3], sum = 0;
@@ -256,7 +256,7 @@ static void corner_shares(const raster *r, uint32_t face, const double p[3], dou
         out[i] = sum > 0 ? out[i] / sum : 1.0 / 3;
 }
 
-/* A face's colour at a sample, linear. */
+/* Computes the linear colour of a face at a sample. */
 static void colour_at(const raster *r, int x, int y, const sample *at, double out[3])
 {
     static const double other[3] = { 0.30, 0.48, 0.66 }, red[3] = { 0.85, 0.04, 0.03 };
@@ -283,8 +283,8 @@ static void colour_at(const raster *r, int x, int y, const sample *at, double ou
     }
 }
 
-/* Key light from the upper left, a weak fill from the right, the sky above, a gloss. Linear light.
- */
+/* Computes linear light: key light from the upper left, a weak fill from the right, the sky above,
+ * a gloss. */
 static void light_sample(const raster *r, int x, int y, const sample *at, double hidden,
                          double out[3])
 {
@@ -356,7 +356,7 @@ static void resolve_pixel(const raster *r, int x, int y, double reach, uint8_t *
         rgb[k] = to_srgb(sum[k] / (r->side * r->side));
 }
 
-/* One thread's share of the second step: every threads-th row. */
+/* Share of one thread in the second step: every threads-th row. */
 typedef struct share {
     const raster *r;
     picture *out;
@@ -395,7 +395,7 @@ static void resolve_picture(const raster *r, picture *out, int x, int y, int wid
            command_thread(&shares[started].thread, resolve_rows, &shares[started]) == 0)
         started++;
     resolve_rows(&shares[0]);
-    for (unsigned i = started; i < count; i++) /* threads that could not be had */
+    for (unsigned i = started; i < count; i++) /* threads that could not be started */
         resolve_rows(&shares[i]);
     for (unsigned i = 1; i < started; i++)
         pthread_join(shares[i].thread, NULL);

@@ -1,4 +1,4 @@
-/* The files of the page (page/, and Chart.js), which the build puts into the program. */
+/* Files of the page (page/, and Chart.js), which the build embeds in the program. */
 #ifndef EBPO_TOOLS_PAGE_PARTS_H
 #define EBPO_TOOLS_PAGE_PARTS_H
 
@@ -9,6 +9,6 @@ typedef struct page_part {
     size_t size;
 } page_part;
 
-extern const page_part page_parts[]; /* the last has no name */
+extern const page_part page_parts[]; /* the last one has no name */
 
 #endif

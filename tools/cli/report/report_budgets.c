@@ -1,16 +1,16 @@
-/* Distances under a memory budget: what stays in memory tells an interval at once; the exact answer
- * loads subtrees. */
+/* Measures distances under a memory budget: the part in memory gives an interval at once; the exact
+ * result loads subtrees. */
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "cli/bench/bench_run.h"
 #include "cli/report/report_data.h"
 
-/* loads take their time: no more of the points than this */
+/* maximum number of points, as loads take time */
 enum { BUDGET_POINTS = 500 };
 
-static ebpo_status ask_within_budget(const comparison *c, ebpo_model *model, int cut, double *f,
-                                     ebpo_error *error)
+static ebpo_status query_within_budget(const comparison *c, ebpo_model *model, int cut, double *f,
+                                       ebpo_error *error)
 {
     uint64_t count = c->points < BUDGET_POINTS ? c->points : BUDGET_POINTS;
     double *width = malloc(count * sizeof *width);
@@ -22,17 +22,17 @@ static ebpo_status ask_within_budget(const comparison *c, ebpo_model *model, int
     options.warm = near.warm = false;
     near.level = cut;
     for (uint64_t i = 0; i < count && status == EBPO_OK && cut >= 0; i++) {
-        ebpo_distance_result answer;
-        status = ebpo_distance(context, c->uniform + 3 * i, &near, &answer, error);
-        width[i] = answer.hi - answer.lo;
+        ebpo_distance_result result;
+        status = ebpo_distance(context, c->uniform + 3 * i, &near, &result, error);
+        width[i] = result.hi - result.lo;
     }
     if (status == EBPO_OK)
         f[OF_BUDGET_WIDTH] = cut >= 0 ? quantile_of(width, count, 0.5) : 0;
     ebpo_model_get_stats(model, &before);
     uint64_t begin = tool_clock();
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        ebpo_distance_result answer;
-        status = ebpo_distance(context, c->uniform + 3 * i, &options, &answer, error);
+        ebpo_distance_result result;
+        status = ebpo_distance(context, c->uniform + 3 * i, &options, &result, error);
     }
     f[OF_BUDGET_NS] = (double)(tool_clock() - begin) / (double)count;
     ebpo_model_get_stats(model, &after);
@@ -43,7 +43,7 @@ static ebpo_status ask_within_budget(const comparison *c, ebpo_model *model, int
     return status;
 }
 
-/* A budget that is too small, as the error says, leaves the figures away. */
+/* A budget that is too small, according to the error, has no results. */
 static ebpo_status one_budget(comparison *c, method *m, ebpo_file *file, int i, ebpo_error *error)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
@@ -57,13 +57,13 @@ static ebpo_status one_budget(comparison *c, method *m, ebpo_file *file, int i, 
         ebpo_model_get_stats(model, &stats);
         if (!stats.resident)
             f[OF_BUDGET_LEVEL] = stats.cut_level;
-        status = ask_within_budget(c, model, stats.resident ? -1 : stats.cut_level, f, error);
+        status = query_within_budget(c, model, stats.resident ? -1 : stats.cut_level, f, error);
     }
     ebpo_model_free(model);
     return status;
 }
 
-/* What levels take in memory. */
+/* Computes the memory of levels. */
 static ebpo_status level_memory(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     for (int i = c->first; i <= method_last(c, m); i++) {
@@ -104,11 +104,11 @@ ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file, ebpo_error
             continue;
         if (status == EBPO_E_IO || status == EBPO_E_CANCELLED)
             return status;
-        for (int k = OF_BUDGET_BYTES + 1; k < BUDGET_FIGURES; k++)
+        for (int k = OF_BUDGET_BYTES + 1; k < BUDGET_METRICS; k++)
             m->budget[i][k] = NAN;
         method_note(m, "memory budgets", error->message);
         *error = (ebpo_error)EBPO_ERROR_INIT;
-        return EBPO_OK; /* smaller ones are too small as well */
+        return EBPO_OK; /* smaller budgets are too small as well */
     }
     return EBPO_OK;
 }

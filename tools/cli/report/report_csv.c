@@ -1,11 +1,11 @@
-/* report.csv: a line for each figure. */
+/* Writes report.csv: a line for each value. */
 #include <stdio.h>
 
 #include "cli/report/report_data.h"
 
-/* Names have no commas; the empty value stands for what could not be had. */
-static void print_figure(FILE *out, const char *name, int level, const char *parameter,
-                         const figure_name *q, double v)
+/* Names have no commas; an empty value means that it is not available. */
+static void print_metric(FILE *out, const char *name, int level, const char *parameter,
+                         const metric_name *q, double v)
 {
     fprintf(out, "%s,", name);
     if (level >= 0)
@@ -19,26 +19,26 @@ static void print_figure(FILE *out, const char *name, int level, const char *par
 static void one_method(FILE *out, const comparison *c, const method *m)
 {
     char parameter[64];
-    for (int k = 0; k < WHOLE_FIGURES; k++)
-        print_figure(out, m->name, -1, "", &whole_figures[k], m->whole[k]);
+    for (int k = 0; k < WHOLE_METRICS; k++)
+        print_metric(out, m->name, -1, "", &whole_metrics[k], m->whole[k]);
     for (int i = c->first; i <= method_last(c, m); i++)
-        for (int k = 0; k < LEVEL_FIGURES; k++)
-            print_figure(out, m->name, i, "", &level_figures[k], m->level[i][k]);
+        for (int k = 0; k < LEVEL_METRICS; k++)
+            print_metric(out, m->name, i, "", &level_metrics[k], m->level[i][k]);
     for (int i = 0; i < DEADLINES; i++) {
         snprintf(parameter, sizeof parameter, "%uus", deadlines_us[i]);
-        for (int k = 0; k < DEADLINE_FIGURES; k++)
-            print_figure(out, m->name, -1, parameter, &deadline_figures[k], m->due[i][k]);
+        for (int k = 0; k < DEADLINE_METRICS; k++)
+            print_metric(out, m->name, -1, parameter, &deadline_metrics[k], m->due[i][k]);
     }
     for (int i = 0; i < BUDGETS; i++) {
         snprintf(parameter, sizeof parameter, "memory/%u", budget_parts[i]);
-        for (int k = 0; k < BUDGET_FIGURES; k++)
-            print_figure(out, m->name, -1, parameter, &budget_figures[k], m->budget[i][k]);
+        for (int k = 0; k < BUDGET_METRICS; k++)
+            print_metric(out, m->name, -1, parameter, &budget_metrics[k], m->budget[i][k]);
     }
     for (int i = 0; i < m->need_count; i++) {
         snprintf(parameter, sizeof parameter, "%s=%.17g",
-                 m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes", m->need[i].asked);
-        for (int k = 0; k < NEED_FIGURES; k++)
-            print_figure(out, m->name, -1, parameter, &need_figures[k], m->need[i].figure[k]);
+                 m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes", m->need[i].queried);
+        for (int k = 0; k < NEED_METRICS; k++)
+            print_metric(out, m->name, -1, parameter, &need_metrics[k], m->need[i].metric[k]);
     }
 }
 

@@ -9,29 +9,29 @@
 const unsigned deadlines_us[DEADLINES] = { 1, 2, 5, 10, 20, 50, 100, 1000 };
 const unsigned budget_parts[BUDGETS] = { 1, 2, 4, 8, 16 };
 
-#define NO_VOLUME                                                                            \
-    "a surface, or a solid without volume, has none that could be exceeded; or the solid's " \
-    "volume is not known, as components meet or the mesh is no 2-manifold; or volumes are "  \
-    "beyond the range of a double, and there is nothing that they are taken by instead"
+#define NO_VOLUME                                                                                \
+    "a surface, or a solid without volume, has no volume to exceed; or the volume of the solid " \
+    "is not known, as components intersect or the mesh is no 2-manifold; or volumes are "        \
+    "beyond the range of a double, and there is no other base"
 #define OUT_OF_RANGE "in the model's unit cubed it is beyond the range of a double"
 #define NO_MESH      "the file has no mesh, see below"
 #define NO_INSIDE    "a surface has no inside"
-#define NOT_TIMED    "this could not be asked of the method, see below"
+#define NOT_TIMED    "this query is not available for the method, see below"
 
-const figure_name level_figures[LEVEL_FIGURES] = {
+const metric_name level_metrics[LEVEL_METRICS] = {
     [OF_BYTES] = { "bytes", "B", false, "of the level in the file", NULL },
     [OF_CUMULATIVE_BYTES] = { "cumulative_bytes", "B", false,
-                              "of the head and of levels 0 to this one", NULL },
+                              "of the header and of levels 0 to this one", NULL },
     [OF_GRAY] = { "gray", "nodes", false, "gray nodes of the level", NULL },
     [OF_LEAVES] = { "leaf", "nodes", false, "leaves of the level", NULL },
     [OF_PLANES] = { "planes", "planes", false, "stored for the level's gray nodes", NULL },
     [OF_LEAF_PLANES] = { "leaf_planes", "planes", false, "stored for the level's leaves", NULL },
     [OF_VOLUME] = { "envelope_volume", "model^3", false,
-                    "of the envelopes that stand for the model at this level; leaves by their "
+                    "of the envelopes that represent the model at this level; leaves by their "
                     "stored planes, else by planes derived from their faces",
                     OUT_OF_RANGE },
     [OF_EXCESS] = { "excess", "%", false,
-                    "volume of the envelopes beyond the solid's, in percent of the solid's",
+                    "volume of the envelopes beyond the volume of the solid, in percent of it",
                     NO_VOLUME },
     [OF_LEVELS_VOLUME] = { "levels_volume", "model^3", false,
                            "the same from levels 0 to this one alone, without the mesh: leaves "
@@ -48,126 +48,133 @@ const figure_name level_figures[LEVEL_FIGURES] = {
                              "the limit is the solid itself, or there is none, or no volume within "
                              "the range of a double" },
     [OF_FAR_LO] = { "hausdorff_lo", "model", false,
-                    "the one-sided Hausdorff distance from the envelopes to the model is at least "
-                    "this",
+                    "lower bound of the one-sided Hausdorff distance from the envelopes to the "
+                    "model",
                     NO_MESH },
-    [OF_FAR_HI] = { "hausdorff_hi", "model", false, "and certainly at most this", NO_MESH },
+    [OF_FAR_HI] = { "hausdorff_hi", "model", false, "its upper bound", NO_MESH },
     [OF_FAR_MEAN] = { "distance_mean", "model", false,
                       "mean distance from the level's surface to the model, sampled",
                       "no sample lies on the level's surface, or the file has no mesh" },
     [OF_FAR_RMS] = { "distance_rms", "model", false, "root of its mean square",
                      "no sample lies on the level's surface, or the file has no mesh" },
     [OF_MAYBE_UNIFORM] = { "maybe_uniform", "1", false,
-                           "share of points, uniform in the model's box, that a point-in-solid "
-                           "test to this level leaves open",
+                           "share of points, uniform in the bounding box of the model, that a "
+                           "point-in-solid query to this level leaves undecided",
                            NO_INSIDE },
     [OF_MAYBE_NEAR] = { "maybe_near", "1", false,
-                        "the same of points within 1 % of the diagonal from the surface",
-                        "a surface has no inside, and a file without mesh no points near it" },
+                        "the same for points within 1 % of the diagonal from the surface",
+                        "a surface has no inside, and a file without a mesh has no points near "
+                        "it" },
     [OF_WIDTH_MEAN] = { "width_mean", "model", false,
-                        "of the interval that holds the distance, known to this level; uniform "
-                        "points",
+                        "of the interval that contains the distance, known to this level; "
+                        "uniform points",
                         NULL },
-    [OF_WIDTH_MEDIAN] = { "width_median", "model", false, "half of the points have a narrower one",
+    [OF_WIDTH_MEDIAN] = { "width_median", "model", false,
+                          "half of the points have a narrower "
+                          "interval",
                           NULL },
-    [OF_WIDTH_P99] = { "width_p99", "model", false, "99 % of the points have a narrower one",
+    [OF_WIDTH_P99] = { "width_p99", "model", false, "99 % of the points have a narrower interval",
                        NULL },
     [OF_INSIDE_NS] = { "inside_ns", "ns", true,
-                       "a point-in-solid test to this level, uniform points, many at a time, one "
+                       "a point-in-solid query to this level, uniform points, in a batch, one "
                        "thread",
                        NO_INSIDE },
-    [OF_DISTANCE_NS] = { "distance_ns", "ns", true, "a distance to this level, the same way",
+    [OF_DISTANCE_NS] = { "distance_ns", "ns", true, "a distance query to this level, the same way",
                          NULL },
     [OF_HAVE_SECONDS] = { "have_seconds", "s", true,
-                          "to open the file and read levels 0 to this one, after the system was "
-                          "asked to forget the file",
+                          "to open the file and read levels 0 to this one, after the file was "
+                          "dropped from the page cache",
                           NULL },
-    [OF_READ_BYTES] = { "read_bytes", "B", false, "asked of the file for that", NULL },
-    [OF_READS] = { "reads", "reads", false, "in so many reads", NULL },
+    [OF_READ_BYTES] = { "read_bytes", "B", false, "bytes requested from the file for that", NULL },
+    [OF_READS] = { "reads", "reads", false, "read calls for that", NULL },
     [OF_LINE_BYTES] = { "line_bytes", "B", false,
-                        "sent by a server for that: the file's first 128 KiB, and what else is "
-                        "needed in pieces of 4 KiB",
+                        "bytes sent by a server for that: the first 128 KiB of the file, and "
+                        "further data in blocks of 4 KiB",
                         NOT_TIMED },
     [OF_LINE_TRIPS] = { "line_trips", "trips", false,
-                        "round trips to the server, the first 128 KiB included; what is announced "
-                        "together comes together",
+                        "round trips to the server, including the first 128 KiB; ranges with a "
+                        "common prefetch hint need one round trip",
                         NOT_TIMED },
     [OF_LEVEL_MEMORY] = { "level_memory_bytes", "B", false,
-                          "memory of a model that keeps levels 0 to this one and loads what is "
-                          "below when it is asked for; before anything is loaded",
+                          "memory of a model that keeps levels 0 to this one and loads lower "
+                          "levels on demand; before anything is loaded",
                           NOT_TIMED },
     [OF_THESIS_BYTES] = { "thesis_bytes", "B", false,
-                          "what the theses' cost model takes for the level", NO_MESH },
+                          "cost of the level in the cost model of the theses", NO_MESH },
     [OF_THESIS_CUMULATIVE] = { "thesis_cumulative_bytes", "B", false,
-                               "and for levels 0 to this one", NO_MESH },
+                               "cost of levels 0 to this one", NO_MESH },
 };
 
-const figure_name whole_figures[WHOLE_FIGURES] = {
+const metric_name whole_metrics[WHOLE_METRICS] = {
     [OF_FILE_BYTES] = { "file_bytes", "B", false,
-                        "of the file, mesh included where it is in the file", NULL },
-    [OF_HEAD_BYTES] = { "head_bytes", "B", false, "in front of level 0", NULL },
+                        "of the file, including the mesh if the file has it", NULL },
+    [OF_HEAD_BYTES] = { "head_bytes", "B", false, "before level 0", NULL },
     [OF_ALL_PLANES] = { "all_planes", "planes", false, "stored in the file", NULL },
     [OF_BUILD_SECONDS] = { "build_seconds", "s", true,
-                           "to build the tree from the checked mesh; files that were there before "
-                           "do not tell",
-                           "files that were there before do not tell" },
+                           "to build the tree from the checked mesh; not known for existing files",
+                           "not known for existing files" },
     [OF_OPEN_SECONDS] = { "open_seconds", "s", true,
-                          "to take the whole model into memory, made for questions", NULL },
-    [OF_MEMORY_BYTES] = { "memory_bytes", "B", false, "that it takes there", NOT_TIMED },
+                          "to load the whole model into memory, ready for queries", NULL },
+    [OF_MEMORY_BYTES] = { "memory_bytes", "B", false, "memory of the whole model", NOT_TIMED },
     [OF_EXACT_INSIDE_NS] = { "exact_inside_ns", "ns", true,
-                             "an exact point-in-solid test, uniform points, many at a time, one "
+                             "an exact point-in-solid query, uniform points, in a batch, one "
                              "thread",
-                             "a surface has no inside, and a file without mesh no exact answers" },
-    [OF_EXACT_DISTANCE_NS] = { "exact_distance_ns", "ns", true, "an exact distance, the same way",
-                               NO_MESH },
+                             "a surface has no inside, and a file without a mesh has no exact "
+                             "results" },
+    [OF_EXACT_DISTANCE_NS] = { "exact_distance_ns", "ns", true,
+                               "an exact distance query, the same way", NO_MESH },
 };
 
-const figure_name deadline_figures[DEADLINE_FIGURES] = {
+const metric_name deadline_metrics[DEADLINE_METRICS] = {
     [OF_DUE_EXACT] = { "deadline_exact", "1", true,
-                       "share of distances that are exact by then; uniform points, one at a time",
+                       "share of distances that are exact at the deadline; uniform points, one "
+                       "at a time",
                        NOT_TIMED },
     [OF_DUE_WIDTH_MEDIAN] = { "deadline_width_median", "model", true,
-                              "width of the interval that is certain by then: half of the points "
-                              "have a narrower one",
+                              "width of the certain interval at the deadline: half of the points "
+                              "have a narrower interval",
                               NOT_TIMED },
     [OF_DUE_WIDTH_P99] = { "deadline_width_p99", "model", true,
-                           "99 % of the points have a narrower one", NOT_TIMED },
+                           "99 % of the points have a narrower interval", NOT_TIMED },
     [OF_DUE_TOOK_MEDIAN] = { "deadline_took_median", "ns", true,
-                             "time that the answer took: half took less", NOT_TIMED },
+                             "time of the query: half took less", NOT_TIMED },
     [OF_DUE_TOOK_P99] = { "deadline_took_p99", "ns", true, "99 % took less", NOT_TIMED },
     [OF_DUE_TOOK_MAX] = { "deadline_took_max", "ns", true, "the longest", NOT_TIMED },
     [OF_DUE_LATE] = { "deadline_late", "1", true,
-                      "share of answers that took longer than the deadline", NOT_TIMED },
+                      "share of queries that took longer than the deadline", NOT_TIMED },
 };
 
-const figure_name budget_figures[BUDGET_FIGURES] = {
-    [OF_BUDGET_BYTES] = { "budget_bytes", "B", false, "the budget for all of a model's memory",
+const metric_name budget_metrics[BUDGET_METRICS] = {
+    [OF_BUDGET_BYTES] = { "budget_bytes", "B", false, "the budget for all memory of a model",
                           NOT_TIMED },
     [OF_BUDGET_LEVEL] = { "budget_level", "level", false,
-                          "the deepest level that stays in memory; all where everything fits",
+                          "the deepest level that stays in memory; all levels when everything "
+                          "fits",
                           "everything is in memory, or the budget is too small, see below" },
     [OF_BUDGET_WIDTH] = { "budget_width_median", "model", false,
-                          "what stays in memory tells of a distance: half of the points have a "
-                          "narrower interval; 0 where everything fits",
+                          "interval of a distance from the data in memory: half of the points "
+                          "have a narrower interval; 0 when everything fits",
                           NOT_TIMED },
     [OF_BUDGET_NS] = { "budget_distance_ns", "ns", true,
-                       "an exact distance, uniform points, one at a time, loads included",
+                       "an exact distance query, uniform points, one at a time, including loads",
                        NOT_TIMED },
     [OF_BUDGET_LOADS] = { "budget_loads", "loads", false, "subtrees loaded for a distance, mean",
                           NOT_TIMED },
     [OF_BUDGET_READ] = { "budget_read_bytes", "B", false, "read for a distance, mean", NOT_TIMED },
 };
 
-const figure_name need_figures[NEED_FIGURES] = {
+const metric_name need_metrics[NEED_METRICS] = {
     [OF_NEED_BYTES] = { "need_bytes", "B", false, "of the file that was cut to the need", NULL },
     [OF_NEED_FAR_LO] = { "need_hausdorff_lo", "model", false,
-                         "its envelopes reach beyond the model by at least this", NO_MESH },
-    [OF_NEED_FAR_HI] = { "need_hausdorff_hi", "model", false, "and certainly by at most this",
+                         "lower bound of the error of its envelopes", NO_MESH },
+    [OF_NEED_FAR_HI] = { "need_hausdorff_hi", "model", false,
+                         "upper bound of the error of its "
+                         "envelopes",
                          NO_MESH },
     [OF_NEED_RATIO] = { "need_ratio", "1", false,
-                        "need_hausdorff_hi / the error that was asked for, or / what the whole "
-                        "file reaches where that is more (leaves cannot be refined); need_bytes / "
-                        "the size: 1 or less keeps the word",
+                        "need_hausdorff_hi / the requested error, or / the error of the whole "
+                        "file if larger (leaves cannot be refined); need_bytes / the size: 1 or "
+                        "less meets the request",
                         NO_MESH },
     [OF_NEED_SECONDS] = { "need_seconds", "s", true, "to make the file", NULL },
 };
@@ -196,16 +203,16 @@ void method_begin(method *m, const char *name, const char *path)
     memset(m, 0, sizeof *m);
     snprintf(m->name, sizeof m->name, "%s", name);
     snprintf(m->path, sizeof m->path, "%s", path);
-    fill_nan(m->whole, WHOLE_FIGURES);
-    fill_nan(&m->level[0][0], EBPO_LEVELS_MAX * LEVEL_FIGURES);
-    fill_nan(&m->due[0][0], DEADLINES * DEADLINE_FIGURES);
-    fill_nan(&m->budget[0][0], BUDGETS * BUDGET_FIGURES);
+    fill_nan(m->whole, WHOLE_METRICS);
+    fill_nan(&m->level[0][0], EBPO_LEVELS_MAX * LEVEL_METRICS);
+    fill_nan(&m->due[0][0], DEADLINES * DEADLINE_METRICS);
+    fill_nan(&m->budget[0][0], BUDGETS * BUDGET_METRICS);
     for (int i = 0; i < ROUNDS; i++) {
         round_times *r = &m->round[i];
         fill_nan(r->have, EBPO_LEVELS_MAX);
         fill_nan(r->inside, EBPO_LEVELS_MAX);
         fill_nan(r->distance, EBPO_LEVELS_MAX);
-        fill_nan(&r->due[0][0], DEADLINES * DEADLINE_FIGURES);
+        fill_nan(&r->due[0][0], DEADLINES * DEADLINE_METRICS);
         r->open = r->exact_inside = r->exact_distance = NAN;
     }
 }

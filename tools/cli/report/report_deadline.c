@@ -1,5 +1,5 @@
-/* The best distance within so many microseconds: how wide what is certain then is, and how long it
- * really took. */
+/* Measures the best distance before a deadline: the width of the certain interval, and the time
+ * taken. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -11,25 +11,25 @@ typedef struct timing {
     uint64_t exact, late;
 } timing;
 
-static ebpo_status ask_in_time(const comparison *c, ebpo_context *context, unsigned us,
-                               uint64_t clock_cost, timing *t, ebpo_error *error)
+static ebpo_status query_in_time(const comparison *c, ebpo_context *context, unsigned us,
+                                 uint64_t clock_cost, timing *t, ebpo_error *error)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.deadline_ns = UINT64_C(1000) * us;
     options.unsigned_distance = true;
-    options.warm = false; /* each point by itself */
+    options.warm = false; /* each point separately */
     t->exact = t->late = 0;
     for (uint64_t i = 0; i < c->points; i++) {
-        ebpo_distance_result answer;
+        ebpo_distance_result result;
         uint64_t begin = tool_clock();
-        ebpo_status status = ebpo_distance(context, c->uniform + 3 * i, &options, &answer, error);
+        ebpo_status status = ebpo_distance(context, c->uniform + 3 * i, &options, &result, error);
         uint64_t took = tool_clock() - begin;
         if (status != EBPO_OK)
             return status;
         t->took[i] = took > clock_cost ? (double)(took - clock_cost) : 0;
         t->late += t->took[i] > 1e3 * us;
-        t->exact += !isnan(answer.distance);
-        t->width[i] = isnan(answer.distance) ? answer.hi - answer.lo : 0;
+        t->exact += !isnan(result.distance);
+        t->width[i] = isnan(result.distance) ? result.hi - result.lo : 0;
     }
     return EBPO_OK;
 }
@@ -43,7 +43,7 @@ static void note_timing(const comparison *c, timing *t, double *f)
     f[OF_DUE_WIDTH_P99] = quantile_of(t->width, c->points, 0.99);
     f[OF_DUE_TOOK_MEDIAN] = quantile_of(t->took, c->points, 0.5);
     f[OF_DUE_TOOK_P99] = quantile_of(t->took, c->points, 0.99);
-    f[OF_DUE_TOOK_MAX] = t->took[c->points - 1]; /* they are sorted now */
+    f[OF_DUE_TOOK_MAX] = t->took[c->points - 1]; /* they are sorted here */
 }
 
 ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int round,
@@ -62,7 +62,7 @@ ebpo_status report_deadlines(comparison *c, method *m, ebpo_model *model, int ro
     for (int i = 0; i < DEADLINES && status == EBPO_OK; i++) {
         if (c->progress.report)
             c->progress.report(c->progress.user, "deadlines", (uint64_t)i, DEADLINES);
-        status = ask_in_time(c, context, deadlines_us[i], clock_cost, &t, error);
+        status = query_in_time(c, context, deadlines_us[i], clock_cost, &t, error);
         if (status == EBPO_OK)
             note_timing(c, &t, m->round[round].due[i]);
     }

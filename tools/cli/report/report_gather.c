@@ -1,5 +1,5 @@
-/* The figures of one method, but for times: what the head tells, volumes, the limit, how far the
- * envelopes reach; then needs and the theses' costs. */
+/* Gathers the results of one method except times: header, volumes, limit, error bounds; then needs
+ * and the costs of the theses. */
 #include <stdio.h>
 #include <string.h>
 
@@ -28,16 +28,16 @@ static void from_head(const comparison *c, method *m)
     }
 }
 
-/* --- what the levels are --- */
+/* --- levels --- */
 
-/* The volume of the root cell, or of a cell far below it, is no normal double. */
+/* Returns true when the volume of the root cell, or of a cell far below it, is no normal double. */
 static bool is_out_of_range(const ebpo_info *info)
 {
     double volume = info->box_size[0] * info->box_size[1] * info->box_size[2];
     return !isnormal(volume) || !isnormal(ldexp(volume, -60));
 }
 
-/* Volume within the mesh in root cells: free of the model's scale. */
+/* Returns the volume within the mesh in root cells, independent of the scale of the model. */
 static double share_of_root(const ebpo_info *info, const ebpo_mesh *mesh)
 {
     double sum = 0;
@@ -56,7 +56,7 @@ static double share_of_root(const ebpo_info *info, const ebpo_mesh *mesh)
     return fabs(sum) / 6;
 }
 
-/* Where volumes are beyond the range of a double. */
+/* Used when volumes are beyond the range of a double. */
 static ebpo_status solid_in_root(const comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
@@ -88,7 +88,7 @@ static ebpo_status excess_in_root(const comparison *c, method *m, ebpo_file *fil
     return status;
 }
 
-/* Finds out the solid's volume: from the head, or else from the mesh. */
+/* Computes the volume of the solid from the header, or else from the mesh. */
 static ebpo_status solid_volume(const comparison *c, method *m, const ebpo_file *file,
                                 ebpo_error *error)
 {
@@ -102,7 +102,7 @@ static ebpo_status solid_volume(const comparison *c, method *m, const ebpo_file 
     return status;
 }
 
-/* With all that the file holds. */
+/* Uses all data of the file. */
 static ebpo_status gather_volumes(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     ebpo_status status = solid_volume(c, m, file, error);
@@ -118,7 +118,7 @@ static ebpo_status gather_volumes(comparison *c, method *m, ebpo_file *file, ebp
     return status;
 }
 
-/* Volumes from the levels alone. */
+/* Computes volumes from the levels alone. */
 static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     ebpo_stream_options wanted = { sizeof(ebpo_stream_options), true, true,
@@ -127,13 +127,13 @@ static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_
     bool more = true;
     ebpo_status status = ebpo_stream_new(file, &wanted, &stream, error);
     for (int i = 0; i <= method_last(c, m) && status == EBPO_OK; i++) {
-        ebpo_stream_level told;
-        status = ebpo_stream_next_level(stream, &told, &more, error);
+        ebpo_stream_level reported;
+        status = ebpo_stream_next_level(stream, &reported, &more, error);
         if (status == EBPO_OK && i >= c->first) {
-            m->level[i][OF_LEVELS_VOLUME] = told.volume;
-            /* with leaf planes in the file, the levels alone are all that is known */
+            m->level[i][OF_LEVELS_VOLUME] = reported.volume;
+            /* with leaf planes in the file, the levels alone are all known data */
             m->level[i][OF_LEVELS_EXCESS] =
-                !(m->solid_share > 0) ? facts_excess(&m->info, &m->solid, told.volume)
+                !(m->solid_share > 0) ? facts_excess(&m->info, &m->solid, reported.volume)
                 : m->info.parts & EBPO_PART_LEAF_PLANES ? m->level[i][OF_EXCESS]
                                                         : NAN;
         }
@@ -142,7 +142,7 @@ static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_
     return status;
 }
 
-/* --- the limit, and how far envelopes reach --- */
+/* --- the limit, and error bounds --- */
 
 static ebpo_status gather_limits(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
@@ -170,21 +170,22 @@ static ebpo_status gather_limits(comparison *c, method *m, ebpo_file *file, ebpo
     return EBPO_OK;
 }
 
-static ebpo_status gather_deviations(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
-                                     ebpo_error *error)
+static ebpo_status gather_error_bounds(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
+                                       ebpo_error *error)
 {
-    ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
+    ebpo_error_bound_options options = EBPO_ERROR_BOUND_OPTIONS_INIT;
     const uint64_t samples = options.samples;
-    options.questions = REPORT_QUESTIONS;
+    options.queries = REPORT_QUERIES;
     options.seed = (uint64_t)c->v->seed;
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
-    /* from the root on: a level's bound is at most that of the one before, whichever are wanted */
+    /* from the root on: the bound of a level is at most that of the previous one, whichever are
+     * requested */
     for (int i = 0; i <= method_last(c, m); i++) {
-        ebpo_deviation far = EBPO_DEVIATION_INIT;
+        ebpo_error_bound far = EBPO_ERROR_BOUND_INIT;
         double *f = m->level[i];
         options.samples = i < c->first ? 0 : samples;
-        ebpo_status status = ebpo_deviation_level(model, file, i, &options, &far, error);
+        ebpo_status status = ebpo_level_error_bound(model, file, i, &options, &far, error);
         if (status != EBPO_OK)
             return method_without(m, "Hausdorff distance", status, error);
         options.at_most = far.hi;
@@ -211,7 +212,7 @@ static ebpo_status with_model(comparison *c, method *m, ebpo_file *file, ebpo_er
         return status;
     ebpo_model_get_stats(model, &stats);
     m->whole[OF_MEMORY_BYTES] = (double)stats.memory;
-    status = gather_deviations(c, m, file, model, error);
+    status = gather_error_bounds(c, m, file, model, error);
     if (status == EBPO_OK && c->v->need)
         status = report_needs(c, m, file, model, error);
     ebpo_model_free(model);

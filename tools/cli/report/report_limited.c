@@ -1,5 +1,5 @@
-/* Questions to a level: how many points it leaves open, how wide its intervals are, and how long it
- * takes. */
+/* Measures queries to a level: the share of undecided points, the widths of intervals, and the
+ * times. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -52,7 +52,7 @@ static uint64_t pick_by_sum(const double *sums, uint64_t count, double value)
     return low;
 }
 
-/* Anywhere in a ball around a point that is uniform on the surface. */
+/* Generates a point in a ball around a point that is uniform on the surface. */
 static void near_point(const ebpo_mesh *mesh, const double *sums, double reach, uint64_t *random,
                        double out[3])
 {
@@ -115,9 +115,9 @@ ebpo_status report_make_points(comparison *c, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* --- questions --- */
+/* --- queries --- */
 
-typedef struct asker {
+typedef struct querier {
     comparison *c;
     method *m;
     ebpo_context *context;
@@ -125,12 +125,12 @@ typedef struct asker {
     ebpo_distance_result *distance;
     double *width;
     round_times *round;
-    bool first; /* round: later ones only look at the clock */
-} asker;
+    bool first; /* round: later ones only measure times */
+} querier;
 
-/* Nanoseconds a point; answers in a->distance or a->inside. */
-static ebpo_status time_questions(asker *a, bool distance, const double *points, int level,
-                                  double *ns, ebpo_error *error)
+/* Returns nanoseconds per point; results are in a->distance or a->inside. */
+static ebpo_status time_queries(querier *a, bool distance, const double *points, int level,
+                                double *ns, ebpo_error *error)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.level = level;
@@ -147,7 +147,7 @@ static ebpo_status time_questions(asker *a, bool distance, const double *points,
     return status;
 }
 
-static double share_of_maybe(const asker *a)
+static double share_of_maybe(const querier *a)
 {
     uint64_t count = 0;
     for (uint64_t i = 0; i < a->c->points; i++)
@@ -155,26 +155,26 @@ static double share_of_maybe(const asker *a)
     return (double)count / (double)a->c->points;
 }
 
-static ebpo_status inside_at(asker *a, int level, ebpo_error *error)
+static ebpo_status inside_at(querier *a, int level, ebpo_error *error)
 {
     double *f = a->m->level[level], ignored;
     ebpo_status status =
-        time_questions(a, false, a->c->uniform, level, &a->round->inside[level], error);
+        time_queries(a, false, a->c->uniform, level, &a->round->inside[level], error);
     if (status != EBPO_OK || !a->first)
         return status;
     f[OF_MAYBE_UNIFORM] = share_of_maybe(a);
     if (!a->c->near)
         return EBPO_OK;
-    status = time_questions(a, false, a->c->near, level, &ignored, error);
+    status = time_queries(a, false, a->c->near, level, &ignored, error);
     f[OF_MAYBE_NEAR] = share_of_maybe(a);
     return status;
 }
 
-static ebpo_status distance_at(asker *a, int level, ebpo_error *error)
+static ebpo_status distance_at(querier *a, int level, ebpo_error *error)
 {
     double *f = a->m->level[level], sum = 0;
     ebpo_status status =
-        time_questions(a, true, a->c->uniform, level, &a->round->distance[level], error);
+        time_queries(a, true, a->c->uniform, level, &a->round->distance[level], error);
     if (status != EBPO_OK || !a->first)
         return status;
     for (uint64_t i = 0; i < a->c->points; i++) {
@@ -188,28 +188,28 @@ static ebpo_status distance_at(asker *a, int level, ebpo_error *error)
 }
 
 /* Needs the mesh. */
-static ebpo_status time_exact(asker *a, ebpo_error *error)
+static ebpo_status time_exact(querier *a, ebpo_error *error)
 {
-    ebpo_status status = a->m->info.solid ? time_questions(a, false, a->c->uniform, EBPO_LEVEL_ALL,
-                                                           &a->round->exact_inside, error)
+    ebpo_status status = a->m->info.solid ? time_queries(a, false, a->c->uniform, EBPO_LEVEL_ALL,
+                                                         &a->round->exact_inside, error)
                                           : EBPO_OK;
     if (status == EBPO_OK)
-        status = time_questions(a, true, a->c->uniform, EBPO_LEVEL_ALL, &a->round->exact_distance,
-                                error);
+        status =
+            time_queries(a, true, a->c->uniform, EBPO_LEVEL_ALL, &a->round->exact_distance, error);
     if (status == EBPO_OK)
         return EBPO_OK;
     a->round->exact_inside = a->round->exact_distance = NAN;
-    return method_without(a->m, "exact answers", status, error);
+    return method_without(a->m, "exact results", status, error);
 }
 
-static ebpo_status ask_all(asker *a, ebpo_error *error)
+static ebpo_status query_all(querier *a, ebpo_error *error)
 {
     const comparison *c = a->c;
     ebpo_status status = EBPO_OK;
     int last = method_last(c, a->m);
     for (int i = c->first; i <= last && status == EBPO_OK; i++) {
         if (c->progress.report)
-            c->progress.report(c->progress.user, "questions", (uint64_t)(i - c->first),
+            c->progress.report(c->progress.user, "queries", (uint64_t)(i - c->first),
                                (uint64_t)(last - c->first + 1));
         if (a->m->info.solid)
             status = inside_at(a, i, error);
@@ -222,7 +222,7 @@ static ebpo_status ask_all(asker *a, ebpo_error *error)
 ebpo_status report_limited(comparison *c, method *m, ebpo_model *model, int round,
                            ebpo_error *error)
 {
-    asker a = { .c = c, .m = m, .round = &m->round[round], .first = round == 0 };
+    querier a = { .c = c, .m = m, .round = &m->round[round], .first = round == 0 };
     ebpo_status status = ebpo_context_new(model, &a.context, error);
     a.inside = malloc(c->points * sizeof *a.inside);
     a.distance = malloc(c->points * sizeof *a.distance);
@@ -230,7 +230,7 @@ ebpo_status report_limited(comparison *c, method *m, ebpo_model *model, int roun
     if (status == EBPO_OK && (!a.inside || !a.distance || !a.width))
         status = no_memory(error);
     if (status == EBPO_OK)
-        status = ask_all(&a, error);
+        status = query_all(&a, error);
     free(a.inside);
     free(a.distance);
     free(a.width);

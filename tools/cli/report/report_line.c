@@ -1,6 +1,5 @@
-/* Having a level over a line: bytes and round trips, counted at a source that only pretends to be
- * far away. How long they take on a line follows from its rate and its delay; the page says so for
- * some. */
+/* Counts bytes and round trips for reading a level over a network, with a simulated remote source.
+ * The time follows from rate and latency; the page shows it for some networks. */
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,20 +9,20 @@
 
 #include "cli/report/report_data.h"
 
-/* as the library has it for URLs: what opening fetches, and the pieces that are fetched later */
+/* as in the library for URLs: bytes fetched when opening, and the size of later blocks */
 enum { HEAD_BYTES = 128 << 10, PIECE = 4096 };
 
 /* One thread reads, so there is no lock. */
 typedef struct line {
     int file;
     uint64_t size, bytes;
-    uint64_t trips;    /* gone by */
-    uint32_t *arrives; /* of each piece: with which trip; 0: not asked for */
+    uint64_t trips;    /* completed */
+    uint32_t *arrives; /* for each block: the round trip that brings it; 0: not requested */
 } line;
 
-/* Asks for the pieces of a range that have not been asked for; they come with the next trip. The
- * last trip that any of the range comes with. */
-static uint64_t ask_for(line *l, uint64_t offset, uint64_t size)
+/* Requests the missing blocks of a range; they come with the next round trip. Returns the last
+ * round trip that brings any block of the range. */
+static uint64_t query_for(line *l, uint64_t offset, uint64_t size)
 {
     uint64_t last = 0;
     for (uint64_t i = offset / PIECE; size && i <= (offset + size - 1) / PIECE; i++) {
@@ -40,7 +39,7 @@ static ebpo_status read_range(void *user, uint64_t offset, uint64_t size, void *
                               ebpo_error *error)
 {
     line *l = user;
-    uint64_t arrival = ask_for(l, offset, size), done = 0;
+    uint64_t arrival = query_for(l, offset, size), done = 0;
     l->trips = arrival > l->trips ? arrival : l->trips;
     while (done < size) {
         ssize_t got = pread(l->file, (char *)data + done, size - done, (off_t)(offset + done));
@@ -53,17 +52,17 @@ static ebpo_status read_range(void *user, uint64_t offset, uint64_t size, void *
     return EBPO_OK;
 }
 
-static void announce_ranges(void *user, const ebpo_range *ranges, size_t count)
+static void hint_ranges(void *user, const ebpo_range *ranges, size_t count)
 {
     for (size_t i = 0; i < count; i++)
-        (void)ask_for(user, ranges[i].offset, ranges[i].size);
+        (void)query_for(user, ranges[i].offset, ranges[i].size);
 }
 
 static ebpo_status have_level(line *l, const char *path, int level, ebpo_error *error)
 {
     ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
     ebpo_source source = EBPO_SOURCE_INIT;
-    ebpo_stream_level told;
+    ebpo_stream_level reported;
     ebpo_stream *stream = NULL;
     ebpo_file *file = NULL;
     bool more = true;
@@ -71,18 +70,18 @@ static ebpo_status have_level(line *l, const char *path, int level, ebpo_error *
     source.user = l;
     source.size = l->size;
     source.read = read_range;
-    source.prefetch = announce_ranges;
+    source.prefetch = hint_ranges;
     source.prefetched = l->size < HEAD_BYTES ? l->size : HEAD_BYTES;
     l->trips = l->bytes = 0;
     memset(l->arrives, 0, (l->size / PIECE + 1) * sizeof *l->arrives);
-    l->trips = ask_for(l, 0, source.prefetched);
+    l->trips = query_for(l, 0, source.prefetched);
     ebpo_status status = ebpo_open_source(&source, path, &file, error);
     if (status == EBPO_OK) {
         ebpo_file_prefetch_levels(file, 0, level);
         status = ebpo_stream_new(file, &wanted, &stream, error);
     }
     for (int i = 0; i <= level && status == EBPO_OK; i++)
-        status = ebpo_stream_next_level(stream, &told, &more, error);
+        status = ebpo_stream_next_level(stream, &reported, &more, error);
     ebpo_stream_free(stream);
     ebpo_close(file);
     return status;

@@ -1,4 +1,5 @@
-/* Which methods are compared: files as they are, or files made of one mesh with each selection. */
+/* Finds the methods to compare: existing files, or files built from one mesh with each selection.
+ */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -52,7 +53,7 @@ static int learn_file(comparison *c, method *m)
     return EXIT_FAILED;
 }
 
-/* A file's name makes a method's, whatever is in it. */
+/* Derives the name of a method from a file name with any characters. */
 static void usable_stem(const char *path, char *name, size_t capacity)
 {
     report_stem(path, name, capacity);
@@ -93,7 +94,8 @@ static void build_options(const comparison *c, int selection, const plane_settin
     o->max_level = (int)v->max_level;
     o->leaf_faces = (uint32_t)v->leaf_faces;
     o->epsilon = v->epsilon;
-    o->parts |= EBPO_PART_LEAF_PLANES; /* so that each method's levels hold all of its own planes */
+    o->parts |=
+        EBPO_PART_LEAF_PLANES; /* so that the levels of each method hold all of its planes */
     o->select = (ebpo_selection)selection;
     o->percent = setting->percent;
     o->normals = (ebpo_normal_distance)v->normals;
@@ -102,7 +104,7 @@ static void build_options(const comparison *c, int selection, const plane_settin
     o->progress = c->progress;
 }
 
-/* The builder consumes the mesh, so it is read for each. */
+/* The builder consumes the mesh, so it is read for each method. */
 static ebpo_status build_one(comparison *c, const char *mesh, int selection,
                              const plane_setting *setting, const char *path, double *seconds,
                              ebpo_error *error)
@@ -111,7 +113,7 @@ static ebpo_status build_one(comparison *c, const char *mesh, int selection,
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_tree tree;
     mesh_input p;
-    ebpo_status status = mesh_input_read(&p, mesh, (mending){ 0 }, READ_MESH, NULL,
+    ebpo_status status = mesh_input_read(&p, mesh, (repairing){ 0 }, READ_MESH, NULL,
                                          (unsigned)c->v->threads, c->progress, error);
     if (status != EBPO_OK)
         return status;
@@ -188,11 +190,12 @@ static int find_files(comparison *c, const char *const *operand)
         if (is_hdf5 < 0)
             return EXIT_FAILED;
         if (!is_hdf5 && operand[1])
-            return refuse_method("a mesh stands alone; its methods are named by --select",
+            return refuse_method("a mesh must be the only operand; its methods are named by "
+                                 "--select",
                                  operand[i]);
         if (!is_hdf5 && c->v->names.count)
             return refuse_method(
-                "the methods of a mesh have the selections' names; leave --name away", operand[i]);
+                "the methods of a mesh have the names of the selections; omit --name", operand[i]);
         if (!is_hdf5)
             return build_all(c, operand[i]);
         int code = add_file(c, operand[i]);

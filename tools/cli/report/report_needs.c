@@ -1,4 +1,4 @@
-/* Files cut to a need, an error or a size: how well they keep to it. */
+/* Cuts files to a need, an error or a size, and compares the result with the request. */
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -9,7 +9,7 @@
 static const double errors[] = { 10, 3, 1, 0.3 }; /* percent of the diagonal */
 static const double sizes[] = { 3, 5, 10, 50 };   /* percent of the first file */
 
-/* What a viewer needs: envelopes without mesh. */
+/* Cuts the part for a viewer: envelopes without mesh. */
 static ebpo_status cut_subset(const comparison *c, ebpo_file *file, const need_result *n,
                               const char *path, ebpo_error *error)
 {
@@ -18,45 +18,45 @@ static ebpo_status cut_subset(const comparison *c, ebpo_file *file, const need_r
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
     if (n->kind == NEED_ERROR)
-        options.max_error = n->asked;
+        options.max_error = n->queried;
     else
-        options.target_bytes = (uint64_t)n->asked;
+        options.target_bytes = (uint64_t)n->queried;
     return ebpo_subset(file, path, &options, error);
 }
 
 static ebpo_status measure_reach(const comparison *c, ebpo_model *model, const char *path,
                                  need_result *n, ebpo_error *error)
 {
-    ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
-    options.questions = REPORT_QUESTIONS;
-    ebpo_deviation far = EBPO_DEVIATION_INIT;
+    ebpo_error_bound_options options = EBPO_ERROR_BOUND_OPTIONS_INIT;
+    options.queries = REPORT_QUERIES;
+    ebpo_error_bound far = EBPO_ERROR_BOUND_INIT;
     ebpo_file *file = NULL;
     options.samples = 0;
-    options.tolerance = 0.01; /* or a word that is kept would seem broken */
+    options.tolerance = 0.01; /* otherwise a met bound would seem exceeded */
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
     ebpo_status status = ebpo_open(path, &file, error);
     if (status == EBPO_OK) {
         const ebpo_info *info = ebpo_file_info(file);
-        n->figure[OF_NEED_BYTES] = (double)info->file_bytes;
-        status = ebpo_deviation_level(model, file, info->level_count - 1, &options, &far, error);
+        n->metric[OF_NEED_BYTES] = (double)info->file_bytes;
+        status = ebpo_level_error_bound(model, file, info->level_count - 1, &options, &far, error);
     }
     if (status == EBPO_OK) {
-        n->figure[OF_NEED_FAR_LO] = far.lo;
-        n->figure[OF_NEED_FAR_HI] = far.hi;
+        n->metric[OF_NEED_FAR_LO] = far.lo;
+        n->metric[OF_NEED_FAR_HI] = far.hi;
     }
     ebpo_close(file);
     return status;
 }
 
-/* Leaves cannot be refined: no subset is promised to be closer than the file's last level is, which
- * --levels may have left out. 0: not known. */
+/* Computes the error of the whole file. Leaves cannot be refined: no subset is closer than the last
+ * level of the file, which --levels may have omitted. 0: not known. */
 static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, ebpo_model *model,
                              double *reach, ebpo_error *error)
 {
-    ebpo_deviation_options options = EBPO_DEVIATION_OPTIONS_INIT;
-    options.questions = REPORT_QUESTIONS;
-    ebpo_deviation far = EBPO_DEVIATION_INIT;
+    ebpo_error_bound_options options = EBPO_ERROR_BOUND_OPTIONS_INIT;
+    options.queries = REPORT_QUERIES;
+    ebpo_error_bound far = EBPO_ERROR_BOUND_INIT;
     *reach = m->level[m->levels - 1][OF_FAR_HI];
     if (!isnan(*reach))
         return EBPO_OK;
@@ -65,7 +65,7 @@ static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, eb
     options.progress = c->progress;
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < m->levels && status == EBPO_OK; i++) {
-        status = ebpo_deviation_level(model, file, i, &options, &far, error);
+        status = ebpo_level_error_bound(model, file, i, &options, &far, error);
         options.at_most = far.hi;
     }
     *reach = status == EBPO_OK ? far.hi : 0;
@@ -73,26 +73,26 @@ static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, eb
 }
 
 static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
-                            need_kind kind, double asked, double own, ebpo_error *error)
+                            need_kind kind, double queried, double own, ebpo_error *error)
 {
     char path[sizeof c->folder + 16];
     need_result *n = &m->need[m->need_count];
-    *n = (need_result){ kind, asked, { NAN, NAN, NAN, NAN, NAN } };
+    *n = (need_result){ kind, queried, { NAN, NAN, NAN, NAN, NAN } };
     snprintf(path, sizeof path, "%s/need.ebpo.h5", c->folder);
     uint64_t begin = tool_clock();
     ebpo_status status = cut_subset(c, file, n, path, error);
-    n->figure[OF_NEED_SECONDS] = 1e-9 * (double)(tool_clock() - begin);
+    n->metric[OF_NEED_SECONDS] = 1e-9 * (double)(tool_clock() - begin);
     if (status == EBPO_OK)
         status = measure_reach(c, model, path, n, error);
     unlink(path);
-    n->figure[OF_NEED_RATIO] = kind == NEED_ERROR ? n->figure[OF_NEED_FAR_HI] / fmax(asked, own)
-                                                  : n->figure[OF_NEED_BYTES] / asked;
+    n->metric[OF_NEED_RATIO] = kind == NEED_ERROR ? n->metric[OF_NEED_FAR_HI] / fmax(queried, own)
+                                                  : n->metric[OF_NEED_BYTES] / queried;
     if (status == EBPO_OK || status == EBPO_E_ABSENT)
         m->need_count++;
     return status;
 }
 
-/* What cannot be cut to a need is noted, and left out. */
+/* A need that cannot be met is noted and omitted. */
 ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
                          ebpo_error *error)
 {
@@ -100,10 +100,11 @@ ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *
     ebpo_status status = own_reach(c, m, file, model, &own, error);
     for (unsigned i = 0; i < NEEDS && status == EBPO_OK; i++) {
         bool by_error = i < NEEDS / 2;
-        double asked =
+        double queried =
             by_error ? errors[i] / 100 * c->diagonal
                      : floor(sizes[i - NEEDS / 2] / 100 * (double)c->methods[0].info.file_bytes);
-        status = one_need(c, m, file, model, by_error ? NEED_ERROR : NEED_SIZE, asked, own, error);
+        status =
+            one_need(c, m, file, model, by_error ? NEED_ERROR : NEED_SIZE, queried, own, error);
         if (status == EBPO_E_MEMORY || status == EBPO_E_IO || status == EBPO_E_CANCELLED)
             return status;
         if (status != EBPO_OK)

@@ -31,7 +31,7 @@ static bool is_named(const char *name, const char *const *names)
 
 static bool is_dot(const char *name) { return strcmp(name, ".") == 0 || strcmp(name, "..") == 0; }
 
-/* What a report holds besides a file for each selection, SELECTION.ebpo.h5. */
+/* Files of a report besides SELECTION.ebpo.h5 for each selection. */
 static const char *const fixed_names[] = { "report.csv", "report.json", "report.html", NULL };
 #define MODEL_ENDING ".ebpo.h5"
 
@@ -51,7 +51,7 @@ static bool is_selection_file(const char *name)
     return false;
 }
 
-/* Only files of the names that a report has: whatever else is there is somebody's own. */
+/* Returns true for the file names of a report; other files belong to the user. */
 static bool is_ours(const char *folder, const char *name)
 {
     char path[8192];
@@ -71,7 +71,8 @@ static bool is_operand(const char *folder, const char *name, const char *const *
     return false;
 }
 
-/* What is there would be deleted, so it has to be a report, and not the one that is compared. */
+/* Checks the existing folder, which would be deleted: it must be a report and must not hold an
+ * operand. */
 static int look_into(const char *place, DIR *folder, const char *const *operand)
 {
     char text[600];
@@ -91,8 +92,8 @@ static int look_into(const char *place, DIR *folder, const char *const *operand)
         }
         if (!is_ours(place, name)) {
             snprintf(text, sizeof text,
-                     "is a folder with something else than a report in it, '%.255s'; give another "
-                     "one with -o",
+                     "is a folder with other files than a report, '%.255s'; give another one "
+                     "with -o",
                      name);
             return fail_output(EXIT_FAILED, place, text);
         }
@@ -112,13 +113,13 @@ static int place_is_free(const char *place, const char *const *operand)
     DIR *folder = S_ISDIR(st.st_mode) ? opendir(place) : NULL;
     if (!folder)
         return fail_output(EXIT_FAILED, place,
-                           "is in the way and no folder; give another one with -o");
+                           "exists and is not a folder; give another one with -o");
     int code = look_into(place, folder, operand);
     closedir(folder);
     return code;
 }
 
-/* Removes the files, and the folder if nothing is left in it. */
+/* Removes the files, and the folder if it is then empty. */
 static bool remove_folder(const char *folder, bool ours_only)
 {
     char path[8192];
@@ -134,7 +135,7 @@ static bool remove_folder(const char *folder, bool ours_only)
     return rmdir(folder) == 0;
 }
 
-/* In a signal handler: only what may be called there. Names are known beforehand. */
+/* Called in a signal handler: only async-signal-safe calls. Names are known in advance. */
 static void abandon_file(const char *stem, const char *ending)
 {
     size_t length = strlen(being_made);
@@ -157,7 +158,7 @@ static void abandon_files(void)
     rmdir(being_made);
 }
 
-/* Without memory for looking into the folder, what a report has goes by its names. */
+/* When memory for listing the folder is short, removes the files of a report by name. */
 void output_drop(const char *folder)
 {
     if (folder[0] && !remove_folder(folder, false))
@@ -165,7 +166,7 @@ void output_drop(const char *folder)
     being_made[0] = 0;
 }
 
-/* Under a hidden name, since a report may be in its place, which the library would refuse. */
+/* Uses a hidden name, as an existing report may be in the way, which the library would refuse. */
 static bool make_folder(const char *place, size_t length, char *folder, size_t capacity)
 {
     char *making, hidden[4200];
@@ -210,12 +211,11 @@ int output_begin(const char *place, const char *const *operand, char *folder, si
     return EXIT_FINE;
 }
 
-/* Of the report that was there. Something may have come into it meanwhile. */
-static bool tell_rest(const char *older)
+/* Reports other files that were added to the replaced report meanwhile. */
+static bool report_rest(const char *older)
 {
     if (!remove_folder(older, true))
-        fprintf(stderr,
-                "ebpo report: warning: what else is in the report that was there is now in %s\n",
+        fprintf(stderr, "ebpo report: warning: other files of the replaced report are now in %s\n",
                 older);
     return true;
 }
@@ -228,12 +228,12 @@ bool output_commit(const char *place, const char *folder)
     while (length > 1 && place[length - 1] == '/')
         length--;
     snprintf(target, sizeof target, "%.*s", (int)length, place);
-    /* At once, so that there is no moment without a report; not all file systems can. */
+    /* Replaces atomically, so that a report always exists; some file systems cannot. */
     errno = 0;
 #ifdef EBPO_HAVE_RENAMEAT2
     if (renameat2(AT_FDCWD, folder, AT_FDCWD, target, RENAME_EXCHANGE) == 0) {
         being_made[0] = 0;
-        return tell_rest(folder);
+        return report_rest(folder);
     }
 #endif
     snprintf(older, sizeof older, "%s.old", folder);
@@ -241,9 +241,9 @@ bool output_commit(const char *place, const char *folder)
     if (rename(folder, target) != 0) {
         fail_output(EXIT_FAILED, place, strerror(errno));
         if (moved && rename(older, target) != 0)
-            fprintf(stderr, "ebpo report: the report that was there is now %s\n", older);
+            fprintf(stderr, "ebpo report: the replaced report is now %s\n", older);
         return false;
     }
     being_made[0] = 0;
-    return !moved || tell_rest(older);
+    return !moved || report_rest(older);
 }

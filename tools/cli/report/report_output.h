@@ -1,19 +1,19 @@
-/* The folder of a report: made beside its place, put there when it is whole. */
+/* Makes the folder of a report beside its place, and moves it there when complete. */
 #ifndef EBPO_TOOLS_REPORT_OUTPUT_H
 #define EBPO_TOOLS_REPORT_OUTPUT_H
 
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Makes the folder. An exit code; what is wrong has been said on stderr. EXIT_FAILED: something is
- * in the way at `place` that is not a report, or the folder cannot be made; EXIT_USAGE: one of the
- * operands (NULL-terminated) lies in the report that would be replaced. A report: a folder with
- * nothing but the files of one, report.json among them. */
+/* Makes the folder. Returns an exit code; errors have been reported on stderr. EXIT_FAILED: `place`
+ * exists and is not a report, or the folder cannot be made; EXIT_USAGE: one of the operands
+ * (NULL-terminated) is in the report that would be replaced. A report: a folder with only files of
+ * a report, including report.json. */
 int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity);
-/* Moves the folder to its place; a report that was there is replaced. False, said on stderr: it
- * cannot be. */
+/* Moves the folder to its place and replaces an existing report. Returns false after a failure,
+ * reported on stderr. */
 bool output_commit(const char *place, const char *folder);
-/* Removes the folder with what is in it. Harmless when there is none. */
+/* Removes the folder and its contents, if it exists. */
 void output_drop(const char *folder);
 
 #endif

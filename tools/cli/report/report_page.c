@@ -1,5 +1,5 @@
-/* report.html: the template page/page.html, in which each {{name}} gives way to the file of that
- * name, or to the report's data. */
+/* Writes report.html from the template page/page.html: each {{name}} is replaced by the file of
+ * that name, or by the data of the report. */
 #include "ebpo_config.h"
 
 #include <stdio.h>

@@ -1,5 +1,4 @@
-/* Pictures of the levels for the page: drawn by the renderer, see-through where nothing is, as data
- * URIs. */
+/* Draws pictures of the levels for the page, with a transparent background, as data URIs. */
 #include "ebpo_config.h"
 
 #include <stdio.h>
@@ -26,11 +25,11 @@ enum {
 static ebpo_status no_memory(ebpo_error *error)
 {
     snprintf(error->message, sizeof error->message,
-             "no memory for pictures; leave them away with --no-pictures");
+             "no memory for pictures; omit them with --no-pictures");
     return error->status = EBPO_E_MEMORY;
 }
 
-/* The same picture on black and on white tells how much of each pixel is covered. */
+/* The same picture on black and on white gives the coverage of each pixel. */
 static void make_see_through(const picture *black, const picture *white, uint8_t *rgba)
 {
     for (size_t i = 0; i < (size_t)black->width * (size_t)black->height; i++) {
@@ -75,7 +74,7 @@ static ebpo_status draw_picture(const comparison *c, const ebpo_mesh *mesh, cons
     return status;
 }
 
-/* --- what is drawn --- */
+/* --- drawing --- */
 
 static ebpo_status level_mesh(const comparison *c, ebpo_file *file, int level, ebpo_mesh *out,
                               ebpo_error *error)
@@ -85,7 +84,7 @@ static ebpo_status level_mesh(const comparison *c, ebpo_file *file, int level, e
     return ebpo_lod_level(file, level, &options, out, NULL, error);
 }
 
-/* All levels of all methods are seen from one place, from which the coarsest of each fits. */
+/* All levels of all methods share one viewpoint, from which the coarsest level of each fits. */
 static ebpo_status fit_camera(const comparison *c, ebpo_file *const *file, camera *view,
                               ebpo_error *error)
 {

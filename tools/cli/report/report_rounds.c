@@ -1,17 +1,17 @@
-/* What the clock tells, in rounds in which the methods take turns: having a level, questions to a
- * level, questions with a deadline. */
+/* Measures times in rounds in which the methods take turns: reading a level, queries to a level,
+ * queries with a deadline. */
 #include <stdio.h>
 
 #include "cli/bench/bench_run.h"
 #include "cli/report/report_data.h"
 
-/* --- having a level --- */
+/* --- reading a level --- */
 
 static ebpo_status have_level(const comparison *c, const method *m, int level, double *seconds,
                               traffic *t, ebpo_error *error)
 {
     ebpo_stream_options wanted = EBPO_STREAM_OPTIONS_INIT;
-    ebpo_stream_level told;
+    ebpo_stream_level reported;
     ebpo_stream *stream = NULL;
     ebpo_file *file = NULL;
     bool more = true;
@@ -25,7 +25,7 @@ static ebpo_status have_level(const comparison *c, const method *m, int level, d
         status = ebpo_stream_new(file, &wanted, &stream, error);
     }
     for (int i = 0; i <= level && status == EBPO_OK; i++)
-        status = ebpo_stream_next_level(stream, &told, &more, error);
+        status = ebpo_stream_next_level(stream, &reported, &more, error);
     *seconds = 1e-9 * (double)(tool_clock() - begin);
     if (status == EBPO_OK)
         *t = traffic_of(file);
@@ -77,7 +77,7 @@ ebpo_status report_round(comparison *c, method *m, int round, ebpo_error *error)
 
 #define MEDIAN(field) median_of_rounds(m->round[0].field, m->round[1].field, m->round[2].field)
 
-/* NAN when one is: then the figure could not be had. */
+/* NAN when one of them is: then the value is not available. */
 static double median_of_rounds(double a, double b, double c)
 {
     double v[ROUNDS] = { a, b, c };
@@ -95,6 +95,6 @@ void report_settle(const comparison *c, method *m)
     m->whole[OF_EXACT_INSIDE_NS] = MEDIAN(exact_inside);
     m->whole[OF_EXACT_DISTANCE_NS] = MEDIAN(exact_distance);
     for (int i = 0; i < DEADLINES; i++)
-        for (int k = 0; k < DEADLINE_FIGURES; k++)
+        for (int k = 0; k < DEADLINE_METRICS; k++)
             m->due[i][k] = MEDIAN(due[i][k]);
 }

@@ -1,8 +1,8 @@
-/* What the theses' cost model takes to send each level of a tree (BP 2008, section 4.2):
- * uncompressed, level after level from the root, a leaf with its faces and their vertices. A leaf:
- * 1 byte for its corners. A plane: 16 bytes the first time its normal comes, else 4, and 4 for its
- * offset. A face: 12 bytes the first time, else 4. A vertex of a leaf: 12 bytes the first time,
- * else 4. */
+/* Computes the cost of sending each level of a tree in the cost model of the theses (BP 2008,
+ * section 4.2): uncompressed, level after level from the root, a leaf with its faces and their
+ * vertices. A leaf: 1 byte for its corners. A plane: 16 bytes the first time its normal occurs,
+ * else 4, and 4 for its offset. A face: 12 bytes the first time, else 4. A vertex of a leaf: 12
+ * bytes the first time, else 4. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,13 +13,13 @@ enum { NORMAL_SPAN = 1023 }; /* -511 .. 511 */
 
 typedef struct sent {
     ebpo_mesh mesh;
-    uint8_t *normals, *faces, *vertices; /* bits: came before */
-    /* [vertex_count] number of the leaf that had the vertex last, from 1 */
+    uint8_t *normals, *faces, *vertices; /* bits: occurred before */
+    /* [vertex_count] number of the last leaf with the vertex, from 1 */
     uint64_t *leaf_of;
     uint64_t leaves;
 } sent;
 
-/* Whether it is the first time. */
+/* Returns true the first time. */
 static bool first_time(uint8_t *bits, uint64_t i)
 {
     bool before = bits[i >> 3] >> (i & 7) & 1;
@@ -48,7 +48,7 @@ static double face_costs(sent *s, uint64_t face)
     for (int k = 0; k < 3; k++) {
         uint32_t v = s->mesh.faces[3 * face + (unsigned)k];
         if (s->leaf_of[v] == s->leaves)
-            continue; /* of another face of this leaf */
+            continue; /* belongs to another face of this leaf */
         s->leaf_of[v] = s->leaves;
         sum += first_time(s->vertices, v) ? 12 : 4;
     }

@@ -1,11 +1,10 @@
-/* report.json: the same figures as report.csv, with what the quantities are, the model and the
- * machine. */
+/* Writes report.json: the values of report.csv, with descriptions, the model and the machine. */
 #include "cli/json.h"
 #include "cli/mesh_findings.h"
 #include "cli/report/report_data.h"
 #include "cli/words.h"
 
-static void print_names(json *j, const char *scope, const figure_name *q, int count)
+static void print_names(json *j, const char *scope, const metric_name *q, int count)
 {
     for (int i = 0; i < count; i++) {
         json_object(j, NULL);
@@ -20,7 +19,7 @@ static void print_names(json *j, const char *scope, const figure_name *q, int co
     }
 }
 
-static void print_figures(json *j, const figure_name *q, const double *v, int count)
+static void print_metrics(json *j, const metric_name *q, const double *v, int count)
 {
     for (int i = 0; i < count; i++)
         json_real(j, q[i].name, v[i]);
@@ -40,12 +39,12 @@ static void one_method(json *j, const comparison *c, const method *m)
         json_real(j, "k_root", m->info.k_root);
     json_int(j, "levels_in_file", m->levels);
     json_bool(j, "leaf_planes_stored", m->info.parts & EBPO_PART_LEAF_PLANES);
-    print_figures(j, whole_figures, m->whole, WHOLE_FIGURES);
+    print_metrics(j, whole_metrics, m->whole, WHOLE_METRICS);
     json_array(j, "levels");
     for (int i = c->first; i <= method_last(c, m); i++) {
         json_object(j, NULL);
         json_int(j, "level", i);
-        print_figures(j, level_figures, m->level[i], LEVEL_FIGURES);
+        print_metrics(j, level_metrics, m->level[i], LEVEL_METRICS);
         json_end(j);
     }
     json_end(j);
@@ -53,7 +52,7 @@ static void one_method(json *j, const comparison *c, const method *m)
     for (int i = 0; i < DEADLINES; i++) {
         json_object(j, NULL);
         json_uint(j, "microseconds", deadlines_us[i]);
-        print_figures(j, deadline_figures, m->due[i], DEADLINE_FIGURES);
+        print_metrics(j, deadline_metrics, m->due[i], DEADLINE_METRICS);
         json_end(j);
     }
     json_end(j);
@@ -61,7 +60,7 @@ static void one_method(json *j, const comparison *c, const method *m)
     for (int i = 0; i < BUDGETS; i++) {
         json_object(j, NULL);
         json_uint(j, "part", budget_parts[i]);
-        print_figures(j, budget_figures, m->budget[i], BUDGET_FIGURES);
+        print_metrics(j, budget_metrics, m->budget[i], BUDGET_METRICS);
         json_end(j);
     }
     json_end(j);
@@ -69,8 +68,8 @@ static void one_method(json *j, const comparison *c, const method *m)
     for (int i = 0; i < m->need_count; i++) {
         json_object(j, NULL);
         json_real(j, m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes",
-                  m->need[i].asked);
-        print_figures(j, need_figures, m->need[i].figure, NEED_FIGURES);
+                  m->need[i].queried);
+        print_metrics(j, need_metrics, m->need[i].metric, NEED_METRICS);
         json_end(j);
     }
     json_end(j);
@@ -127,11 +126,11 @@ void report_to_json(FILE *out, const comparison *c, bool in_page)
     if (c->without_pictures)
         json_text(&j, "without_pictures", c->without_pictures);
     json_array(&j, "quantities");
-    print_names(&j, "method", whole_figures, WHOLE_FIGURES);
-    print_names(&j, "level", level_figures, LEVEL_FIGURES);
-    print_names(&j, "deadline", deadline_figures, DEADLINE_FIGURES);
-    print_names(&j, "budget", budget_figures, BUDGET_FIGURES);
-    print_names(&j, "need", need_figures, NEED_FIGURES);
+    print_names(&j, "method", whole_metrics, WHOLE_METRICS);
+    print_names(&j, "level", level_metrics, LEVEL_METRICS);
+    print_names(&j, "deadline", deadline_metrics, DEADLINE_METRICS);
+    print_names(&j, "budget", budget_metrics, BUDGET_METRICS);
+    print_names(&j, "need", need_metrics, NEED_METRICS);
     json_end(&j);
     json_array(&j, "methods");
     for (int i = 0; i < c->count; i++)

@@ -4,7 +4,7 @@
     pip wheel tools/python --no-deps -w dist --config-settings setup-args=-Dhttp=enabled
     python3 tools/python/backend/ebpo_wheel.py BUILD_FOLDER DIST    # packs what has been built
 
-It needs meson, ninja, a C compiler, binutils and patchelf, and fetches nothing. The library is built without
+It needs meson, ninja, a C compiler, binutils and patchelf, and downloads nothing. The library is built without
 libhdf5, libcurl, assimp and qhull. Libraries that it still needs (zstd, zlib, GMP, nettle, jansson) go
 into the wheel beside it under names of their own, so that no other package's copy is taken for them;
 so do their licences. There is no code for a version of Python in it: one wheel is for all of them. Its
@@ -52,7 +52,7 @@ def package_in(folder):
 
 
 def build(folder, setup_args):
-    """The library and the package, nothing else of the project."""
+    """Builds only the library and the package."""
     print(run("meson", "setup", folder, ROOT, *SETUP, *setup_args), flush=True)
     library = f"lib/libebpo.so.{version()}"
     modules = [f"tools/python/ebpo/{path.name}" for path in package_in(ROOT / "tools/python/ebpo")]
@@ -84,7 +84,7 @@ def bundle(library, folder, system):
 
 
 def copied(path, copy):
-    """Without what debuggers want; before patchelf, as strip spoils what that has moved."""
+    """Copies a library without debug symbols. Runs before patchelf, because strip breaks patched files."""
     shutil.copy(path, copy)
     copy.chmod(0o755)
     run("strip", "--strip-unneeded", copy)
@@ -94,8 +94,8 @@ def copied(path, copy):
 def licences(names):
     """Of libraries that are in the wheel, as Debian keeps them; (name, text)."""
     for name in names:
-        told = subprocess.run(["dpkg-query", "-S", f"*/{name}"], capture_output=True, text=True).stdout
-        package = told.partition(":")[0].strip()
+        printed = subprocess.run(["dpkg-query", "-S", f"*/{name}"], capture_output=True, text=True).stdout
+        package = printed.partition(":")[0].strip()
         path = pathlib.Path("/usr/share/doc") / package / "copyright"
         if package and path.is_file():
             yield f"licenses/{package}.txt", path.read_bytes()
@@ -103,8 +103,8 @@ def licences(names):
 
 def glibc(file):
     """Versions of glibc that a library's symbols are of, as its table of needed versions has them."""
-    told = run("env", "LC_ALL=C", "readelf", "--wide", "--version-info", file).partition("Version needs section")[2]
-    names = re.findall(r"Name: GLIBC_(\S+)", told)
+    printed = run("env", "LC_ALL=C", "readelf", "--wide", "--version-info", file).partition("Version needs section")[2]
+    names = re.findall(r"Name: GLIBC_(\S+)", printed)
     relative = [(2, 36)] if "ABI_DT_RELR" in names else []  # packed relocations, which that one reads first
     return relative + [tuple(map(int, name.split(".")[:2])) for name in names if name[0].isdigit()]
 
@@ -114,8 +114,8 @@ def tag(files):
     machine = sysconfig.get_platform().rpartition("-")[2].replace("-", "_")
     if platform.libc_ver()[0] != "glibc":
         return f"py3-none-linux_{machine}"
-    asked = [(2, 17)] + [version for file in files for version in glibc(file)]
-    return "py3-none-manylinux_%d_%d_%s" % (*max(asked), machine)
+    versions = [(2, 17)] + [version for file in files for version in glibc(file)]
+    return "py3-none-manylinux_%d_%d_%s" % (*max(versions), machine)
 
 
 METADATA = """Metadata-Version: 2.1
@@ -189,7 +189,7 @@ def setup_args(config_settings):
 
 
 def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
-    """So that pip need not build the library to know the name."""
+    """Writes the metadata, so that pip knows the name without building the library."""
     about = pathlib.Path(metadata_directory) / f"ebpo-{version()}.dist-info"
     about.mkdir()
     (about / "METADATA").write_bytes(metadata())

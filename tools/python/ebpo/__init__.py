@@ -1,34 +1,34 @@
-"""EBP-Octree in HDF5: .ebpo.h5 files, and exact questions to them, with numpy arrays.
+"""EBP-Octree in HDF5: .ebpo.h5 files, and exact queries of them, with numpy arrays.
 
 >>> import ebpo
 >>> m = ebpo.open("cube.ebpo.h5")
 >>> m.inside([[.5, .5, .5], [2, 0, 0]])
 array([ True, False])
 
-docs/guide/python.md shows all of it; `open` and `Model` are where to begin.
+docs/guide/python.md describes the package; begin with `open` and `Model`.
 """
 from __future__ import annotations
 
-from ._declared import (MeetingKind, NodeType, PaintKind, PairKind, Part, Relation, Rule, Where)
+from ._declared import (ClashKind, NodeType, PaintKind, PairKind, Part, Relation, Rule, Where)
 from ._library import lib as _lib
 from .adapters import from_trimesh
-from .asking import bar
+from .queries import bar
 from .catalogue import Catalogue
 from .collide import Collider, pose
-from .converting import convert
+from .build import convert
 from .errors import (AbsentError, ArgumentError, Cancelled, Error, FormatError, IOFailure, LimitError, NoMemory,
                      NotSolidError, UnsupportedError, VersionError)
 from .model import AllHits, Bounds, Hits, Located, Model, Nearest, open
-from .painting import Areas, Paint, Stroke
+from .paint import Areas, Paint, Stroke
 from .parts import Attributes, Info, Level, Maps, Mass, Mesh, Subtree, half_spaces
-from .scenes import Scene, open_scene
-from .touching import Sensed, Touch, Touched
+from .scene import Scene, open_scene
+from .haptic import Haptic, HapticResult, ProbeResult
 
 __version__: str = _lib.ebpo_version().decode()
 
 
 def library() -> str:
-    """The path or name of the shared library that is used.
+    """Returns the path or name of the shared library that is used.
 
     It is that of the variable EBPO_LIBRARY, else the one inside the package, else the one of the build
     folder that the package lies in, else that of the `ebpo` in PATH, else the system's.
@@ -39,8 +39,8 @@ def library() -> str:
 __all__ = [
     "open", "Model", "Info", "Located", "Nearest", "Bounds", "Hits", "AllHits", "Where",
     "Mesh", "Maps", "Level", "Subtree", "Attributes", "Mass", "NodeType", "Part", "Rule", "half_spaces",
-    "Catalogue", "Collider", "pose", "Relation", "PairKind", "Scene", "open_scene", "MeetingKind",
-    "Touch", "Touched", "Sensed", "Paint", "Stroke", "Areas", "PaintKind",
+    "Catalogue", "Collider", "pose", "Relation", "PairKind", "Scene", "open_scene", "ClashKind",
+    "Haptic", "HapticResult", "ProbeResult", "Paint", "Stroke", "Areas", "PaintKind",
     "convert", "from_trimesh", "bar", "library",
     "Error", "ArgumentError", "IOFailure", "FormatError", "VersionError", "UnsupportedError", "NotSolidError",
     "LimitError", "Cancelled", "AbsentError", "NoMemory",

@@ -1,4 +1,4 @@
-"""The shared library: where it is, its functions, their errors, and arrays that it owns."""
+"""Loads the shared library, and wraps its functions, errors and arrays."""
 from __future__ import annotations
 
 import ctypes
@@ -21,7 +21,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 
 
 def candidates():
-    """Names of libraries, the first that is there is taken."""
+    """Returns names of libraries; the first library that exists is used."""
     if os.environ.get("EBPO_LIBRARY"):
         yield os.environ["EBPO_LIBRARY"]
         return
@@ -30,8 +30,8 @@ def candidates():
     for folder in (HERE.parents[2], HERE.parents[2] / "lib", HERE.parents[2] / several):  # prefix, build, Debian
         yield from map(str, sorted(folder.glob("libebpo.so.?")))
     try:
-        told = subprocess.run(["ebpo", "--version", "--verbose"], capture_output=True, text=True)
-        found = re.search(r"^library: (/.*) \([0-9.]+\)$", told.stdout, re.MULTILINE)
+        printed = subprocess.run(["ebpo", "--version", "--verbose"], capture_output=True, text=True)
+        found = re.search(r"^library: (/.*) \([0-9.]+\)$", printed.stdout, re.MULTILINE)
         if found:
             yield found[1]
     except OSError:
@@ -42,7 +42,7 @@ def candidates():
 
 
 def absent(function, library):
-    """Stands for a function that the library lacks: it was built without its extras."""
+    """Returns a replacement for a function that the library lacks because it was built without extras."""
     def refuse(*_):
         raise UnsupportedError(f"{library} has no {function}: it was built with -Dextras=disabled; build it with "
                           "-Dextras=enabled", "EBPO_E_UNSUPPORTED", "", "", None)
@@ -50,7 +50,7 @@ def absent(function, library):
 
 
 def load():
-    """The library, with arguments and results of its functions declared."""
+    """Loads the library and declares the arguments and results of its functions."""
     name = next(candidates(), None)
     if name is None:
         raise ImportError("libebpo is not found; install it, or name it in EBPO_LIBRARY")
@@ -125,7 +125,7 @@ def text(raw):
 
 
 def error_of(error):
-    """A Python exception of an ebpo_error."""
+    """Returns the Python exception of an ebpo_error."""
     kind = BY_STATUS.get(error.status, Error)
     name = text(lib.ebpo_status_name(error.status))
     return kind(text(error.message), name, text(error.file), text(error.object),
@@ -133,7 +133,7 @@ def error_of(error):
 
 
 def call(name, *arguments):
-    """Calls a function that can fail, and raises what it says."""
+    """Calls a function that can fail, and raises its error."""
     error = made(c.ebpo_error)
     if getattr(lib, name)(*arguments, ctypes.byref(error)) != 0:
         raise error_of(error)
@@ -149,14 +149,14 @@ class Owned:
 
 
 def array(owner, address, shape, dtype):
-    """A read-only array over memory of `owner`; an empty one for NULL."""
+    """Returns a read-only array over memory of `owner`; an empty array for NULL."""
     if not address or 0 in shape:
         return np.zeros(shape, dtype) if 0 in shape else None
     return np.asarray(Owned(owner, address, shape, dtype))
 
 
 def copied(address, shape, dtype):
-    """An array of its own from memory that will go."""
+    """Returns a copy of memory that will be freed."""
     dtype = np.dtype(dtype)
     if not address or 0 in shape:
         return np.zeros(shape, dtype)
@@ -182,7 +182,7 @@ class Handle:
         del keep
 
     def end_now(self):
-        """Frees it before the last reference goes. Nothing may use it any more."""
+        """Frees the object before the last reference is dropped. The object must not be used afterwards."""
         self._end()
 
     @classmethod
@@ -211,9 +211,9 @@ class Struct:
 
 
 class Callback:
-    """A function of Python for the library, which it calls in the thread that asked.
+    """A Python function for the library, which calls it in the querying thread.
 
-    What it raises stops the call and comes out of it, where ctypes would go on with half an answer.
+    An exception of the function stops the library call and is raised from it. ctypes alone would continue.
     """
 
     def __init__(self, kind, function):

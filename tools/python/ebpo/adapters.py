@@ -9,7 +9,7 @@ from .model import Model
 
 
 def to_trimesh(model: Model, **options: Any) -> Any:
-    """The mesh as a trimesh.Trimesh; options are its own. It is not processed unless they say so."""
+    """Returns the mesh as a trimesh.Trimesh; options are those of trimesh. Not processed by default."""
     import trimesh
     mesh = model.mesh(order="source" if "maps" in model.info.parts else "file")
     return trimesh.Trimesh(vertices=np.array(mesh.vertices), faces=np.array(mesh.faces, dtype=np.int64),
@@ -18,12 +18,12 @@ def to_trimesh(model: Model, **options: Any) -> Any:
 
 def from_trimesh(mesh: Any, output: Any, **options: Any) -> Model:
     """Converts a trimesh.Trimesh, or what else has vertices and faces, as `convert` does."""
-    from .converting import convert
+    from .build import convert
     return convert((mesh.vertices, mesh.faces), output, **options)
 
 
 def to_pyvista(model: Model, level: int | None = None) -> Any:
-    """The mesh, or a level's envelopes with octcode, type and volume of cells, as a pyvista.PolyData."""
+    """Returns the mesh, or a level's envelopes with octcode, type and volume of cells, as a pyvista.PolyData."""
     import pyvista
     if level is None:
         mesh = model.mesh(order="source" if "maps" in model.info.parts else "file")
@@ -43,7 +43,7 @@ def faces_of_vtk(faces: np.ndarray) -> np.ndarray:
 
 
 class TrimeshLike:
-    """A model that answers as a trimesh.Trimesh does, with its shapes and signs, exactly.
+    """A model with the queries of a trimesh.Trimesh: the same array shapes and signs, but exact results.
 
     contains, ray.intersects_any, intersects_first, intersects_id, intersects_location, contains_points;
     nearest.on_surface, signed_distance; bounds, extents, area, volume, center_mass, is_watertight,

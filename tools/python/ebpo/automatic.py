@@ -25,7 +25,7 @@ class Automatic:
     def __init__(self, file: Handle, options: Any) -> None:
         self.file, self.options, self.waiting = file, options, False
         self.lock = threading.Lock()  # of the counts
-        self.questions, self.seconds, self.subtrees, self.next = 0, 0.0, 0, FIRST
+        self.queries, self.seconds, self.subtrees, self.next = 0, 0.0, 0, FIRST
         wished = options.memory or options.cut_level >= 0 or options.prefetch
         info = c.ebpo_info.from_address(lib.ebpo_file_info(file))
         if not wished and info.parts & c.EBPO_PART_MESH:
@@ -41,26 +41,26 @@ class Automatic:
         if plan.budget:  # the library has decided for a file elsewhere
             return
         options = self.options
-        options.memory = most = max(lib.ebpo_free_memory() // 2, plan.least)
+        options.memory = limit = max(lib.ebpo_free_memory() // 2, plan.least)
         plan = self._plan()
         if plan.resident and plan.whole <= SMALL:
             return
         options.cut_level = info.subtree_level or -1
         if options.cut_level < 0:  # as if not all of it fitted
-            options.memory = plan.whole - 1 if plan.resident else most
+            options.memory = plan.whole - 1 if plan.resident else limit
             with contextlib.suppress(LimitError):  # the whole model is as small as the least budget
                 options.cut_level = self._plan().cut_level
-            options.memory = most
+            options.memory = limit
         self.subtrees = self._plan().subtrees
         self.waiting = bool(plan.resident and self.subtrees)
 
     def piece(self) -> int:
         """Returns how many queries at most come before the next decision."""
-        return max(FIRST, self.questions) if self.waiting else 1 << 62
+        return max(FIRST, self.queries) if self.waiting else 1 << 62
 
-    def asked(self, questions: int, seconds: float) -> None:
+    def add(self, queries: int, seconds: float) -> None:
         with self.lock:
-            self.questions += questions
+            self.queries += queries
             self.seconds += seconds
 
     def pays(self, model: Handle, total: int, parts_share: float) -> bool:
@@ -68,9 +68,9 @@ class Automatic:
 
         total: queries that are known to come; parts_share: of the time of queries, the cost of parts.
         """
-        if self.questions < self.next:
+        if self.queries < self.next:
             return False
-        self.next = self.questions + self.questions // 8
+        self.next = self.queries + self.queries // 8
         stats = made(c.ebpo_model_stats)
         lib.ebpo_model_get_stats(model, ctypes.byref(stats))
         if stats.loads < BELIEVED:
@@ -78,9 +78,9 @@ class Automatic:
         with self.lock:
             each = stats.load_seconds / stats.loads
             spent = min(stats.evicted, stats.loads) * each + parts_share * max(0.0, self.seconds - stats.load_seconds)
-            foretold = stats.loads / self.questions * (total - self.questions)
+            expected = stats.loads / self.queries * (total - self.queries)
         return spent >= each * self.subtrees or (stats.loads < self.subtrees / CERTAIN and
-                                                 foretold >= CERTAIN * self.subtrees)
+                                                 expected >= CERTAIN * self.subtrees)
 
     def whole(self) -> Any:
         """Returns the options of a model that is all in memory."""

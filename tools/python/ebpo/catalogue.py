@@ -1,4 +1,4 @@
-"""Catalogues: any number of models that are asked as one, or the parts of one that is too large for a file."""
+"""Catalogues: any number of models that are queried as one, or parts of a model that is too large for a file."""
 from __future__ import annotations
 
 import ctypes
@@ -17,9 +17,9 @@ from ._checked import path as path_bytes
 from ._checked import real
 from ._library import Handle, Reporter, call, lib, made
 from ._declared import Where
-from .asking import Rows, thread_count
+from .queries import Rows, thread_count
 from .errors import ArgumentError, Error
-from .holding import CLOSE_FILE, OPEN_FILE, opened_by, opener, ours, raised_by
+from .open_models import CLOSE_FILE, OPEN_FILE, opened_by, opener, process_models, raised_by
 
 BLOCK = 1 << 22  # rows whose answers are in memory twice; the library puts so many in order together
 LONG = 1 << 14  # rows that may take longer than one waits
@@ -75,9 +75,9 @@ class Catalogue:
         def entry(path: Any) -> Entry:
             name = os.fspath(path)
             name = name if "://" in name else os.path.join(os.getcwd(), name)
-            file, told, kept = opened_by(name, options), c.ebpo_catalogue_entry(), path_bytes(name)
-            lib.ebpo_catalogue_entry_of(file, kept, ctypes.byref(told))  # whose path is that
-            return entry_of(told)
+            file, entry, kept = opened_by(name, options), c.ebpo_catalogue_entry(), path_bytes(name)
+            lib.ebpo_catalogue_entry_of(file, kept, ctypes.byref(entry))  # whose path is that
+            return entry_of(entry)
 
         with ThreadPoolExecutor(8) as pool:
             return cls(list(pool.map(entry, paths)), parts=parts, rule=rule, **options)
@@ -123,26 +123,26 @@ class Catalogue:
 
     # ---- asking ----
 
-    def _ask(self, function: str, count: int, rows: Callable, result: Any, memory: int | str | None,
-             threads: int | None, **options: Any) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+    def _query(self, function: str, count: int, rows: Callable, result: Any, memory: int | str | None,
+               threads: int | None, **options: Any) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
         """Has the library answer rows(begin, end), block by block: where they are, answers, numbers of models."""
-        models, most = ours(memory).models, min(count, BLOCK)
-        answers, numbers = np.empty(most, result), np.empty(most, np.uint64)
+        models, limit = process_models(memory).models, min(count, BLOCK)
+        results, numbers = np.empty(limit, result), np.empty(limit, np.uint64)
         threads = thread_count(threads or 0, "threads")
         for begin in range(0, max(1, count), BLOCK):
             end = min(count, begin + BLOCK)
-            asked = rows(begin, end)
-            out = (answers.ctypes.data, numbers.ctypes.data)[:1 if function == "ebpo_catalogue_inside" else 2]
+            given = rows(begin, end)
+            out = (results.ctypes.data, numbers.ctypes.data)[:1 if function == "ebpo_catalogue_inside" else 2]
 
             def work(progress: Any) -> None:
-                how = made(c.ebpo_catalogue_ask_options, progress=progress, threads=threads, **options)
-                call(function, self._made, models, asked.ctypes.data, end - begin, ctypes.byref(how), *out)
+                how = made(c.ebpo_catalogue_query_options, progress=progress, threads=threads, **options)
+                call(function, self._made, models, given.ctypes.data, end - begin, ctypes.byref(how), *out)
 
             try:
                 interruptible(work, end - begin)
             except Error as error:
                 raise numbered(raised_by(error), begin) from None
-            yield slice(begin, end), answers[:end - begin], numbers[:end - begin]
+            yield slice(begin, end), results[:end - begin], numbers[:end - begin]
 
     def locate(self, points: Any, *, memory: int | str | None = None, threads: int | None = None) -> np.ndarray:
         """Where points are: a structured array (n,), `where` as of `Model.locate`, `winding` the sum.
@@ -156,10 +156,10 @@ class Catalogue:
         """
         rows = Rows(points)
         out = np.empty(rows.count, LOCATED)
-        for where, answers, _ in self._ask("ebpo_catalogue_inside", rows.count, lambda a, b: rows[a:b],
-                                           c.ebpo_inside_result, memory, threads):
+        for where, results, _ in self._query("ebpo_catalogue_inside", rows.count, lambda a, b: rows[a:b],
+                                             c.ebpo_inside_result, memory, threads):
             for name in LOCATED.names or ():
-                out[name][where] = answers[name]
+                out[name][where] = results[name]
         return out[0] if rows.single else out
 
     def inside(self, points: Any, *, boundary: bool = True, memory: int | str | None = None,
@@ -188,12 +188,12 @@ class Catalogue:
         self._need_surface()
         rows = Rows(points)
         out = np.empty(rows.count, NEAREST)
-        for where, answers, models in self._ask("ebpo_catalogue_distance", rows.count, lambda a, b: rows[a:b],
-                                                c.ebpo_distance_result, memory, threads,
-                                                max_distance=max_distance, unsigned_distance=not signed):
+        for where, results, models in self._query("ebpo_catalogue_distance", rows.count, lambda a, b: rows[a:b],
+                                                  c.ebpo_distance_result, memory, threads,
+                                                  max_distance=max_distance, unsigned_distance=not signed):
             for name in ("distance", "point", "normal"):
-                out[name][where] = answers[name]
-            out["face"][where], out["model"][where] = answers["face"].view(np.int64), models.view(np.int64)
+                out[name][where] = results[name]
+            out["face"][where], out["model"][where] = results["face"].view(np.int64), models.view(np.int64)
         return out[0] if rows.single else out
 
     def ray(self, origins: Any, directions: Any, *, t_max: float = float("inf"), memory: int | str | None = None,
@@ -204,20 +204,20 @@ class Catalogue:
         count = d.count if o.single else o.count
         if o.count != d.count and not (o.single or d.single):
             raise ValueError(f"{o.count} origins and {d.count} directions")
-        most = real(t_max, "t_max")
+        limit = real(t_max, "t_max")
 
         def rays(begin: int, end: int) -> np.ndarray:
             rows = np.empty((end - begin, 7))
             rows[:, 0:3] = o[0:1] if o.single else o[begin:end]
             rows[:, 3:6] = d[0:1] if d.single else d[begin:end]
-            rows[:, 6] = most
+            rows[:, 6] = limit
             return rows
 
         out = np.empty(count, HIT)
-        for where, answers, models in self._ask("ebpo_catalogue_ray", count, rays, c.ebpo_ray_hit, memory, threads):
+        for where, results, models in self._query("ebpo_catalogue_ray", count, rays, c.ebpo_ray_hit, memory, threads):
             for name in ("t", "side"):
-                out[name][where] = answers[name]
-            out["face"][where], out["model"][where] = answers["face"].view(np.int64), models.view(np.int64)
+                out[name][where] = results[name]
+            out["face"][where], out["model"][where] = results["face"].view(np.int64), models.view(np.int64)
         return out[0] if o.single and d.single else out
 
 
@@ -264,11 +264,11 @@ def numbered(error: BaseException, first: int) -> BaseException:
     return error
 
 
-def entry_of(told: Any) -> Entry:
+def entry_of(entry: Any) -> Entry:
     """Of an ebpo_catalogue_entry."""
-    surface, numbers = os.fsdecode(told.surface or b""), os.fsdecode(told.numbers or b"")
-    return Entry(os.fsdecode(told.path), bytes(told.digest).hex(), told.solid, tuple(told.min), tuple(told.max),
-                 None if told.unseen else surface, bytes(told.surface_digest).hex() if surface else "", numbers)
+    surface, numbers = os.fsdecode(entry.surface or b""), os.fsdecode(entry.numbers or b"")
+    return Entry(os.fsdecode(entry.path), bytes(entry.digest).hex(), entry.solid, tuple(entry.min), tuple(entry.max),
+                 None if entry.unseen else surface, bytes(entry.surface_digest).hex() if surface else "", numbers)
 
 
 def fill_entry(struct: Any, entry: Entry) -> None:

@@ -1,4 +1,4 @@
-"""Two models that meet."""
+"""Queries of two models: collision, distance and penetration."""
 from __future__ import annotations
 
 import contextlib
@@ -44,7 +44,7 @@ class Clearance(NamedTuple):
     point_b: np.ndarray
 
 
-class WayOut(NamedTuple):
+class Separation(NamedTuple):
     """lo, hi: so many times the direction, exact where they are equal. face_a, face_b: part last."""
 
     lo: float
@@ -102,7 +102,7 @@ def matrix_of(value: Any) -> np.ndarray:
 
 
 class Gathered(Callback):
-    """Items that the library lends to a callback, kept as an array."""
+    """Collects items that the library passes to a callback, as an array."""
 
     def __init__(self, function: Any, dtype: np.dtype) -> None:
         super().__init__(function, self.keep)
@@ -162,7 +162,7 @@ class Collider:
         return (pair.face_a, pair.face_b, c.PairKind(pair.kind)) if found.value == 1 else None
 
     def relation(self, pose_a: Any = None, pose_b: Any = None, *, deadline: float | None = None) -> c.Relation:
-        """How they lie to each other: a Relation, exact. deadline: seconds, after which it may be OPEN."""
+        """Returns the exact Relation of the models. deadline: seconds, after which the result may be OPEN."""
         result = c.ebpo_relation_result()
         with self._options((pose_a, pose_b), deadline) as options:
             call("ebpo_collide_relation", self._handle, options, ctypes.byref(result))
@@ -176,11 +176,11 @@ class Collider:
         return Pairs(pairs["face_a"].astype(np.int64), pairs["face_b"].astype(np.int64), pairs["kind"].copy())
 
     def pairs(self, pose_a: Any = None, pose_b: Any = None, *, progress: Callable | None = None) -> Pairs:
-        """Every pair of faces that meet, once."""
+        """Returns every pair of intersecting faces, once."""
         return self._pairs("ebpo_collide_all", (pose_a, pose_b), progress)
 
     def self_pairs(self, *, progress: Callable | None = None) -> Pairs:
-        """Of a collider of one model, twice: pairs of its faces that meet otherwise than as neighbours do.
+        """Returns pairs of faces of one model that intersect other than as neighbours. Needs a collider of one model with itself.
 
         >>> len(Collider(cube, cube).self_pairs().kind)
         0
@@ -188,7 +188,7 @@ class Collider:
         return self._pairs("ebpo_collide_self", (None, None), progress)
 
     def contacts(self, pose_a: Any = None, pose_b: Any = None, *, progress: Callable | None = None) -> Contacts:
-        """Where they cross: a segment for each pair of crossing faces."""
+        """Returns the intersections: a segment for each pair of crossing faces."""
         found = Gathered(c.ebpo_segments_fn, SEGMENT)
         with self._options((pose_a, pose_b), None, progress) as options, found as taking:
             call("ebpo_collide_contacts", self._handle, options, taking, None)
@@ -197,7 +197,7 @@ class Collider:
                         all_of_them["face_b"].astype(np.int64))
 
     def polylines(self, pose_a: Any = None, pose_b: Any = None) -> list[np.ndarray]:
-        """Lines along which they cross: (k, 3) points each; of a closed one the last is the first.
+        """Returns the intersection lines: (k, 3) points each; in a closed line the last point equals the first.
 
         >>> len(Collider(cube, cube).polylines(pose_b=pose(translation=[.5, .25, .25])))
         1
@@ -215,18 +215,18 @@ class Collider:
 
     def distance(self, pose_a: Any = None, pose_b: Any = None, *, tolerance: float = 0.0,
                  deadline: float | None = None) -> Clearance:
-        """The least distance of their faces; 0 if any meet, not negative inside a solid.
+        """Returns the least distance between the faces: 0 if any intersect, not negative inside a solid.
 
-        tolerance: hi - lo may be so much. deadline: seconds, after which what is certain is said.
+        tolerance: hi - lo may be so much. deadline: seconds, after which the current bounds are returned.
         """
-        asked, out = made(c.ebpo_clearance_options, tolerance=tolerance), c.ebpo_clearance()
+        clearance, out = made(c.ebpo_clearance_options, tolerance=tolerance), c.ebpo_clearance()
         with self._options((pose_a, pose_b), deadline) as options:
-            call("ebpo_collide_distance", self._handle, options, ctypes.byref(asked), ctypes.byref(out))
+            call("ebpo_collide_distance", self._handle, options, ctypes.byref(clearance), ctypes.byref(out))
         return Clearance(out.distance.lo, out.distance.hi, number(out.pair.face_a), number(out.pair.face_b),
                          np.array(out.point_a), np.array(out.point_b))
 
     def depth(self, tolerance: float, pose_a: Any = None, pose_b: Any = None) -> tuple[tuple, tuple]:
-        """How deep a's surface is in b, and b's in a: (lo, hi) each, at most `tolerance` apart.
+        """Returns the depth of a's surface in b, and of b's surface in a: (lo, hi) each, at most `tolerance` apart.
 
         >>> (lo, hi), _ = Collider(cube, cube).depth(.01, pose_b=pose(translation=[.75, 0, 0]))
         >>> lo <= .25 <= hi
@@ -237,13 +237,13 @@ class Collider:
             call("ebpo_collide_depth", self._handle, options, tolerance, ctypes.byref(a_in_b), ctypes.byref(b_in_a))
         return (a_in_b.lo, a_in_b.hi), (b_in_a.lo, b_in_a.hi)
 
-    def way_out(self, direction: Any, pose_a: Any = None, pose_b: Any = None) -> WayOut:
-        """How far a has to be moved along a direction to be clear of b, in lengths of it.
+    def separation(self, direction: Any, pose_a: Any = None, pose_b: Any = None) -> Separation:
+        """Returns the separation distance of a from b along a direction, in multiples of the direction's length.
 
-        >>> Collider(cube, cube).way_out([1, 0, 0], pose_b=pose(translation=[-.25, 0, 0])).hi
+        >>> Collider(cube, cube).separation([1, 0, 0], pose_b=pose(translation=[-.25, 0, 0])).hi
         0.75
         """
-        along, out = doubles(direction, "direction").reshape(3), c.ebpo_way_out()
+        along, out = doubles(direction, "direction").reshape(3), c.ebpo_separation()
         with self._options((pose_a, pose_b)) as options:
-            call("ebpo_collide_way_out", self._handle, options, along.ctypes.data, ctypes.byref(out))
-        return WayOut(out.t.lo, out.t.hi, number(out.pair.face_a), number(out.pair.face_b))
+            call("ebpo_collide_separation", self._handle, options, along.ctypes.data, ctypes.byref(out))
+        return Separation(out.t.lo, out.t.hi, number(out.pair.face_a), number(out.pair.face_b))

@@ -8,7 +8,7 @@
     inside = ebpo.dask.inside("https://example.org/scan.ebpo.h5", P, memory="2G")
     ebpo.dask.to_file(inside, "inside.npy")              # goes on where it was, if it was stopped
 
-Answers are dask arrays, computed when they are asked for. Each worker opens the model, or those of the
+Results are dask arrays, computed when they are needed. Each worker opens the model, or those of the
 catalogue that its points come to, by path or URL, and keeps them between tasks. Answers are the same, byte
 for byte, whatever the number of workers and the size of chunks. Dask is imported when it is needed.
 """
@@ -26,8 +26,8 @@ import numpy as np
 from . import catalogue as cat
 from .catalogue import Catalogue
 from .errors import ArgumentError
-from .holding import ours
-from .stretches import HDF5, PointFile, h5py_of, load_npy, published, save_array, shape_of_npy
+from .open_models import process_models
+from .point_files import HDF5, PointFile, h5py_of, load_npy, published, save_array, shape_of_npy
 
 CHUNK = 1 << 18  # points of a task
 DTYPES = {"inside": np.dtype(bool), "winding": np.dtype("i4"), "locate": cat.LOCATED, "distance": cat.NEAREST,
@@ -86,13 +86,13 @@ def points(source: Any, dataset: str | None = None, *, chunk: int = CHUNK, colum
     file = PointFile.at(source, dataset, columns)
     name = "ebpo-points-" + tokenize(tuple(file), chunk)
     begins = range(0, max(1, file.count), chunk)
-    graph = {(name, i, 0): (read_stretch, tuple(file), begin, min(file.count, begin + chunk))
+    graph = {(name, i, 0): (read_rows, tuple(file), begin, min(file.count, begin + chunk))
              for i, begin in enumerate(begins)}
     sizes = tuple(min(file.count, begin + chunk) - begin for begin in begins)
     return da.Array(graph, name, (sizes, (columns,)), np.float64)
 
 
-def read_stretch(file: tuple, begin: int, end: int) -> np.ndarray:
+def read_rows(file: tuple, begin: int, end: int) -> np.ndarray:
     return PointFile(*file).read(begin, end)
 
 
@@ -106,13 +106,13 @@ class Means:
         return "ebpo-means"
 
 
-def answer_block(block: np.ndarray, what: str, asked: Catalogue, means: Means, options: tuple,
-                 block_info: Any = None) -> np.ndarray:
+def query_block(block: np.ndarray, what: str, models: Catalogue, means: Means, options: tuple,
+                block_info: Any = None) -> np.ndarray:
     """Of a chunk, in the worker. block_info: Dask's, where the chunk is in the whole."""
-    block, ask, rest = np.asarray(block), getattr(asked, what), dict(options)
+    block, query, rest = np.asarray(block), getattr(models, what), dict(options)
     rows = (block[:, :3], block[:, 3:]) if what == "ray" else (block,)
     try:
-        return ask(*rows, **rest, **means.options)
+        return query(*rows, **rest, **means.options)
     except ArgumentError as error:
         begin = block_info[0]["array-location"][0][0] if block_info else np.nan
         if begin == begin:  # of some chunks Dask does not know where they begin
@@ -120,8 +120,8 @@ def answer_block(block: np.ndarray, what: str, asked: Catalogue, means: Means, o
         raise
 
 
-def ask(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk: int = CHUNK,
-        memory: int | str | None = None, threads: int = 1, http: dict | None = None, **options: Any) -> Any:
+def query(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk: int = CHUNK,
+          memory: int | str | None = None, threads: int = 1, http: dict | None = None, **options: Any) -> Any:
     """A dask array (n,) of answers: bool, int32, or structured (`catalogue.LOCATED`, NEAREST, HIT).
 
     what: "inside", "winding", "locate", "distance" or "ray".
@@ -136,33 +136,33 @@ def ask(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk: 
     """
     import dask.array as da
     if what not in DTYPES:
-        raise ValueError(f"{', '.join(DTYPES)} can be asked for, not {what!r}")
-    asked = catalogue(model, **(http or {}))
+        raise ValueError(f"{', '.join(DTYPES)} can be queried, not {what!r}")
+    models = catalogue(model, **(http or {}))
     given = points(rows, dataset, chunk=chunk, columns=6 if what == "ray" else 3)
     columns = 6 if what == "ray" else 3
     if given.ndim != 2 or given.shape[1] != columns:
         raise ValueError(f"{what} takes the shape (n, {columns}), not {given.shape}")
-    return da.map_blocks(answer_block, given, what, asked, Means(memory, threads), tuple(sorted(options.items())),
+    return da.map_blocks(query_block, given, what, models, Means(memory, threads), tuple(sorted(options.items())),
                          dtype=DTYPES[what], drop_axis=1, name=f"ebpo-{what}", meta=np.zeros(0, DTYPES[what]))
 
 
 def inside(model: Any, rows: Any, **options: Any) -> Any:
-    """Whether points are inside: a dask array (n,) of bool. Options are those of `ask`; boundary=True."""
-    return ask("inside", model, rows, **options)
+    """Returns True for points inside: a dask array (n,) of bool. Options are those of `query`; boundary=True."""
+    return query("inside", model, rows, **options)
 
 
 def winding(model: Any, rows: Any, **options: Any) -> Any:
-    """Winding numbers, summed over models: a dask array (n,) of int32. Options are those of `ask`."""
-    return ask("winding", model, rows, **options)
+    """Returns winding numbers, summed over models: a dask array (n,) of int32. Options are those of `query`."""
+    return query("winding", model, rows, **options)
 
 
 def distance(model: Any, rows: Any, **options: Any) -> Nearest:
-    """Nearest faces. Options are those of `ask`; max_distance, signed. For files: `ask("distance", ...)`."""
-    return Nearest(*members(ask("distance", model, rows, **options)))
+    """Returns nearest faces. Options are those of `query`; max_distance, signed. For files: `query("distance", ...)`."""
+    return Nearest(*members(query("distance", model, rows, **options)))
 
 
 def ray(model: Any, origins: Any, directions: Any, **options: Any) -> Hits:
-    """First hits of rays. origins: dask or numpy (n, 3); directions: the same, or (3,); t_max."""
+    """Returns first hits of rays. origins: dask or numpy (n, 3); directions: the same, or (3,); t_max."""
     import dask.array as da
     o = points(origins, chunk=options.get("chunk", CHUNK))
     if isinstance(directions, da.Array) or np.ndim(directions) == 2:
@@ -170,7 +170,7 @@ def ray(model: Any, origins: Any, directions: Any, **options: Any) -> Hits:
     else:
         d = da.broadcast_to(da.from_array(np.asarray(directions, np.float64)), o.shape, chunks=o.chunks)
     rays = da.concatenate([o, d], axis=1).rechunk({1: 6})
-    return Hits(*members(ask("ray", model, rays, **options)))
+    return Hits(*members(query("ray", model, rays, **options)))
 
 
 def members(rows: Any) -> list:
@@ -184,26 +184,26 @@ def member(block: np.ndarray, name: str) -> np.ndarray:
     return np.ascontiguousarray(block[name])
 
 
-def counts(client: Any = None) -> Any:
-    """What models have cost (`holding.Holding.counts`): of this process, or a dict of the client's workers."""
-    return ours().counts() if client is None else client.run(worker_counts)
+def stats(client: Any = None) -> Any:
+    """What models have cost (`open_models.OpenModels.stats`): of this process, or a dict of the client's workers."""
+    return process_models().stats() if client is None else client.run(worker_stats)
 
 
-def worker_counts() -> dict:
-    return ours().counts()
+def worker_stats() -> dict:
+    return process_models().stats()
 
 
 # ---- files of answers ----
 
-def to_file(answers: Any, path: Any, *, dataset: str = "answers", **compute: Any) -> None:
-    """Computes a dask array into a file, which appears whole: .npy, HDF5 (.h5, with h5py), or else a folder.
+def to_file(results: Any, path: Any, *, dataset: str = "results", **compute: Any) -> None:
+    """Computes a dask array into a file, which is replaced atomically: .npy, HDF5 (.h5, with h5py), or else a folder.
 
     Workers write their chunks to PATH.parts (a folder that they share with this process), each whole or not
     at all. When it is called again after it was stopped, what is there is not computed again; chunks of
     another question are refused (ValueError). In the end they become the file, and the folder goes; with a
     path without such an ending, PATH itself is the folder, of 000000.npy and so on.
 
-    answers: one array, also structured, as `ask` gives it.
+    results: one array, also structured, as `query` gives it.
     compute: for dask.compute, such as scheduler="threads".
     """
     import dask
@@ -214,32 +214,31 @@ def to_file(answers: Any, path: Any, *, dataset: str = "answers", **compute: Any
     if is_file and path.exists():
         raise FileExistsError(f"{path} is there already")
     folder = path.with_name(path.name + ".parts") if is_file else path
-    begin_parts(folder, answers)
-    blocks = answers.to_delayed().ravel()
+    begin_parts(folder, results)
+    blocks = results.to_delayed().ravel()
     names = [folder / f"{i:06d}.npy" for i in range(len(blocks))]
     dask.compute(*[dask.delayed(save_part)(str(name), block) for name, block in zip(names, blocks)
                    if not name.exists()], **compute)
     missing = [name for name in names if not name.exists()]
     if missing:
         raise FileNotFoundError(f"{missing[0]}: workers have written it elsewhere; the folder has to be shared")
-    check_parts(names, answers)
+    check_parts(names, results)
     if is_file:
         join_parts(path, names, dataset)
         shutil.rmtree(folder)
 
 
-def begin_parts(folder: pathlib.Path, answers: Any) -> None:
-    question = {"question": answers.name, "chunks": answers.numblocks[0], "dtype": repr(answers.dtype)}
+def begin_parts(folder: pathlib.Path, results: Any) -> None:
+    query = {"query": results.name, "chunks": results.numblocks[0], "dtype": repr(results.dtype)}
     folder.mkdir(parents=True, exist_ok=True)
-    stated = folder / "question.json"
+    stated = folder / "query.json"
     if not stated.exists():
         if any(name.name[0] != "." for name in folder.iterdir()) and not stated.exists():
-            raise ValueError(f"{folder} is not empty, and does not say of what question it is; remove it, or name "
-                             "another")
+            raise ValueError(f"{folder} is not empty, and has no query.json; remove it, or name another")
         with contextlib.suppress(FileExistsError), published(stated, new=True) as file:
-            file.write(json.dumps(question).encode())
-    if json.loads(stated.read_bytes()) != question:  # also where another process has begun at the same time
-        raise ValueError(f"{folder} holds answers to another question, or of other chunks; remove it, or name another "
+            file.write(json.dumps(query).encode())
+    if json.loads(stated.read_bytes()) != query:  # also where another process has begun at the same time
+        raise ValueError(f"{folder} holds results of another query, or of other chunks; remove it, or name another "
                          "file")
 
 
@@ -247,15 +246,15 @@ def save_part(name: str, block: np.ndarray) -> None:
     save_array(name, block)
 
 
-def check_parts(names: list, answers: Any) -> None:
+def check_parts(names: list, results: Any) -> None:
     """ValueError: a chunk that was there is not one of these answers. Of some Dask knows no rows (NaN)."""
-    for name, rows in zip(names, answers.chunks[0]):
+    for name, rows in zip(names, results.chunks[0]):
         try:
             part = load_npy(str(name))
         except ValueError as error:
-            raise ValueError(f"{name}: no chunk of answers ({error}); remove it, and it is made anew") from None
-        if part.dtype != answers.dtype or (rows == rows and len(part) != rows):
-            raise ValueError(f"{name}: {len(part)} rows of {part.dtype}, not {rows} of {answers.dtype}; remove it, and "
+            raise ValueError(f"{name}: no chunk of results ({error}); remove it, and it is made anew") from None
+        if part.dtype != results.dtype or (rows == rows and len(part) != rows):
+            raise ValueError(f"{name}: {len(part)} rows of {part.dtype}, not {rows} of {results.dtype}; remove it, and "
                              "it is made anew")
 
 

@@ -1,4 +1,4 @@
-"""What goes wrong. Each failure of the library is one of these, with its message.
+"""Exceptions. Each failure of the library is one of these classes, with its message.
 
 The message says what, where and what next. The classes are also those of Python that fit, so that
 `except OSError` catches what the system or a server said no to.
@@ -32,15 +32,15 @@ class Error(Exception):
 
 
 class ArgumentError(Error, ValueError):
-    """A rule of the function was broken: a point that is not finite, a level that is not there."""
+    """An argument is invalid: for example a point that is not finite, or a level that does not exist."""
 
 
 class IOFailure(Error, OSError):
-    """The system, a server or a source of bytes said no."""
+    """The system, a server or a source of bytes reported a failure."""
 
 
 class FormatError(Error, ValueError):
-    """A file is not what it says it is, or is damaged."""
+    """A file violates its format or is damaged."""
 
 
 class VersionError(Error, ValueError):
@@ -48,7 +48,7 @@ class VersionError(Error, ValueError):
 
 
 class UnsupportedError(Error, NotImplementedError):
-    """Valid, but this build of the library cannot do it."""
+    """The request is valid, but this build of the library does not support it."""
 
 
 class NotSolidError(Error, ValueError):
@@ -60,11 +60,11 @@ class LimitError(Error, ValueError):
 
 
 class Cancelled(Error):
-    """A progress callback asked to stop."""
+    """A progress callback requested a stop."""
 
 
 class AbsentError(Error, LookupError):
-    """The file was written without what is needed."""
+    """The file was written without a part that is needed."""
 
 
 class NoMemory(Error, MemoryError):

@@ -1,7 +1,7 @@
-"""How programs of h5py read .ebpo.h5 files, with or without the rest of this package.
+"""Lets programs with h5py read .ebpo.h5 files, with or without the rest of this package.
 
 The files are HDF5, and format-spec/README.md says what is in them. Arrays of files that were written
-with `--codec deflate` or `none` are read by any h5py. The usual codec is zstd, HDF5's filter 32015,
+with `--codec deflate` or `none` are read by any h5py. The default codec is zstd, HDF5's filter 32015,
 which takes a plugin; one of these is enough:
 
     import hdf5plugin                   # of the package index: registers zstd, and others, on import
@@ -31,17 +31,17 @@ ZSTD = 32015
 
 
 def plugin_folder() -> str | None:
-    """The folder of the project's plugin for zstd, as the `ebpo` in PATH tells it; None: there is none."""
+    """Returns the folder of the project's zstd plugin, as the `ebpo` in PATH prints it, or None."""
     try:
-        told = subprocess.run(["ebpo", "--version", "--verbose"], capture_output=True, text=True)
+        printed = subprocess.run(["ebpo", "--version", "--verbose"], capture_output=True, text=True)
     except OSError:
         return None
-    found = re.search(r"^HDF5 plugin: (/.*)$", told.stdout, re.MULTILINE)
+    found = re.search(r"^HDF5 plugin: (/.*)$", printed.stdout, re.MULTILINE)
     return found[1] if found and os.path.isdir(found[1]) else None
 
 
 def enable() -> str:
-    """Makes h5py read zstd in this process, and says by what. ImportError: neither is there.
+    """Enables zstd for h5py in this process. Returns the name of the plugin. ImportError: no plugin found.
 
     Before the first file is opened: HDF5 remembers that it has found no plugin.
     """

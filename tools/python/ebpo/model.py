@@ -1,4 +1,4 @@
-"""Models: an open file, and the questions that it answers."""
+"""Models: an open file and its queries."""
 from __future__ import annotations
 
 import collections
@@ -13,7 +13,7 @@ import numpy as np
 from . import _declared as c
 from ._checked import doubles, index_of, integers, nanoseconds, within
 from ._library import Callback, Handle, Reporter, call, copied, lib, made, size_in_bytes
-from .asking import Rows, Told, share
+from .queries import Rows, StageProgress, share
 from .automatic import Automatic
 from .errors import ArgumentError, LimitError, NoMemory
 from .parts import Attributes, Info, Level, Maps, Mass, Mesh, Subtree, read_level, read_maps, read_mesh
@@ -27,7 +27,7 @@ DISTANCE = np.dtype(c.ebpo_distance_result)
 HIT = np.dtype(c.ebpo_ray_hit)
 NEAR = np.dtype(c.ebpo_near_face)
 
-# The share of a query's time that parts cost (docs/measured/asking.md).
+# The share of a query's time that parts cost (docs/measured/queries.md).
 PARTS_SHARE = {"inside": 0.05, "distance": 0.65, "rays": 0.6, "box": 0.25}
 
 Progress = Callable[[str, int, int], Any]
@@ -77,8 +77,8 @@ class AllHits(NamedTuple):
 
 def open(source: Any, *, memory: int | str | None = None, cut_level: int | None = None,
          prefetch: bool = False, threads: int | None = None,
-         storage_options: dict | None = None, most_expansion: int | None = None, **http: Any) -> Model:
-    """Opens a file: reads its head, and nothing else before it is asked for.
+         storage_options: dict | None = None, max_expansion: int | None = None, **http: Any) -> Model:
+    """Opens a file. Reads only its head; other data is read when it is needed.
 
     source: a path; a URL (http, https, or what fsspec knows); bytes, an mmap or an array of them, which
         are not copied; a file with seek and read; an object with `size` and `read_range(offset, size)`,
@@ -92,7 +92,7 @@ def open(source: Any, *, memory: int | str | None = None, cut_level: int | None 
     prefetch: subtrees around the last questions are loaded in the background.
     threads: so many work at questions and at reading. None: all cores.
     storage_options: fsspec's, of the URL.
-    most_expansion: how often the file's bytes its decoded arrays may take. None: 256 times, and 64 MiB in
+    max_expansion: how often the file's bytes its decoded arrays may take. None: 256 times, and 64 MiB in
         any case; beyond that a file is refused (LimitError), as it may be made to exhaust memory.
     http: members of ebpo_http_options in ebpo/http.h: headers={"Name": "value"}, user="name:password",
         cache_folder=..., retries=...
@@ -104,7 +104,7 @@ def open(source: Any, *, memory: int | str | None = None, cut_level: int | None 
     12
     """
     options = {"memory": memory, "cut_level": cut_level, "prefetch": prefetch, "threads": threads,
-               "storage_options": storage_options, "most_expansion": most_expansion, **http}
+               "storage_options": storage_options, "max_expansion": max_expansion, **http}
     return Model(source, options)
 
 
@@ -127,7 +127,7 @@ class Model:
     def __init__(self, source: Any, options: dict) -> None:
         http = {name: value for name, value in options.items()
                 if name not in ("memory", "cut_level", "prefetch", "threads", "storage_options",
-                                 "most_expansion")}
+                                 "max_expansion")}
         self._source, self._options = source, options
         self._threads = options["threads"] or 0
         self._model_options = made(c.ebpo_model_options, memory=size_in_bytes(options["memory"]),
@@ -135,7 +135,7 @@ class Model:
         if options["cut_level"] is not None:
             self._model_options.cut_level = options["cut_level"]
         self._file: Handle | None = opened(source, http, options["storage_options"],
-                                            options.get("most_expansion") or 0)
+                                            options.get("max_expansion") or 0)
         self._lock = threading.RLock()
         self._back = threading.Condition(self._lock)  # contexts are back, or the whole model is there
         self._bringing = False
@@ -206,14 +206,14 @@ class Model:
                 self._back.notify_all()
 
     @contextlib.contextmanager
-    def _context(self, questions: int = 0, total: int = 0, kind: str = "") -> Iterator[Handle]:
+    def _context(self, queries: int = 0, total: int = 0, kind: str = "") -> Iterator[Handle]:
         """A context of the model for one thread.
 
-        questions: so many will be asked of `total` that are known to come, without functions of the caller;
+        queries: so many will be asked of `total` that are known to come, without functions of the caller;
         kind: of PARTS_SHARE.
         """
-        began, asking = time.perf_counter(), questions > 0
-        if asking and self._automatic.waiting:
+        began, querying = time.perf_counter(), queries > 0
+        if querying and self._automatic.waiting:
             with self._lock:
                 pays = self._automatic.waiting and self._automatic.pays(self._current(), total, PARTS_SHARE[kind])
             if pays:
@@ -221,21 +221,21 @@ class Model:
         with self._lock:
             while self._bringing:
                 self._back.wait()
-            model, waiting = self._current(), asking and self._automatic.waiting
+            model, waiting = self._current(), querying and self._automatic.waiting
             try:
                 context = self._contexts.pop()
             except IndexError:
                 context = Handle.made("ebpo_context_new", model, free="ebpo_context_free", keep=(model,))
-            self._lent[asking] += 1
+            self._lent[querying] += 1
         try:
             yield context
         finally:
             if waiting:
-                self._automatic.asked(questions, time.perf_counter() - began)
+                self._automatic.add(queries, time.perf_counter() - began)
             with self._lock:
                 if self._made is model:
                     self._contexts.append(context)
-                self._lent[asking] -= 1
+                self._lent[querying] -= 1
                 if self._bringing:
                     self._back.notify_all()
 
@@ -270,19 +270,19 @@ class Model:
 
     # ---- point in solid ----
 
-    def _ask(self, rows: Rows, function: str, options: Any, dtype: np.dtype, put: Callable, threads: int | None,
-             progress: Progress | None, stage: str) -> None:
-        """Has `function` answer rows, and put(answers, begin, end) keep them."""
+    def _query(self, rows: Rows, function: str, options: Any, dtype: np.dtype, put: Callable, threads: int | None,
+               progress: Progress | None, stage: str) -> None:
+        """Has `function` answer rows, and put(results, begin, end) keep them."""
         entry = function
 
         @contextlib.contextmanager
         def worker() -> Iterator[Callable[[int, int], None]]:
-            answers = np.empty(0, dtype)
+            results = np.empty(0, dtype)
 
             def work(begin: int, end: int) -> None:
-                nonlocal answers
-                if len(answers) < end - begin:
-                    answers = np.empty(end - begin, dtype)
+                nonlocal results
+                if len(results) < end - begin:
+                    results = np.empty(end - begin, dtype)
                 points = rows[begin:end]
                 at = 0
                 while at < end - begin:
@@ -290,12 +290,12 @@ class Model:
                     try:
                         with self._context(count, rows.count, stage) as context:
                             call(entry, context, points[at:].ctypes.data, count, ctypes.byref(options),
-                                 answers[at:].ctypes.data)
+                                 results[at:].ctypes.data)
                     except ArgumentError:
                         rows.check(begin, end)
                         raise
                     at += count
-                put(answers[:end - begin], begin, end)
+                put(results[:end - begin], begin, end)
 
             yield work
 
@@ -306,7 +306,7 @@ class Model:
 
     def locate(self, points: Any, *, level: int | None = None, deadline: float | None = None,
                threads: int | None = None, progress: Progress | None = None) -> Located:
-        """Where points are: outside, inside or on a face.
+        """Classifies points as outside, inside or on a face.
 
         level: look at levels 0 to `level` only, and say what is certain by these.
         deadline: seconds for each point, after which what is certain is said.
@@ -326,11 +326,11 @@ class Model:
         options = self._inside_options(level, deadline)
         out = Located(np.empty(rows.count, np.int8), np.empty(rows.count, np.int32), np.empty(rows.count))
 
-        def put(answers: np.ndarray, begin: int, end: int) -> None:
+        def put(results: np.ndarray, begin: int, end: int) -> None:
             for array, name in zip(out, Located._fields):
-                array[begin:end] = answers[name]
+                array[begin:end] = results[name]
 
-        self._ask(rows, "ebpo_inside_many", options, INSIDE, put, threads, progress, "inside")
+        self._query(rows, "ebpo_inside_many", options, INSIDE, put, threads, progress, "inside")
         return Located(*(array[0] for array in out)) if rows.single else out
 
     @staticmethod
@@ -344,7 +344,7 @@ class Model:
 
     def inside(self, points: Any, *, boundary: bool = True, threads: int | None = None,
                progress: Progress | None = None) -> Any:
-        """Whether points are in the solid.
+        """Returns True for points in the solid.
 
         boundary: points on faces are.
 
@@ -358,17 +358,17 @@ class Model:
         rows = Rows(points)
         out = np.empty(rows.count, bool)
 
-        def put(answers: np.ndarray, begin: int, end: int) -> None:
+        def put(results: np.ndarray, begin: int, end: int) -> None:
             if boundary:  # of OUT, IN and ON, all but the first
-                np.not_equal(answers["where"], c.EBPO_OUT, out=out[begin:end])
+                np.not_equal(results["where"], c.EBPO_OUT, out=out[begin:end])
             else:
-                np.equal(answers["where"], c.EBPO_IN, out=out[begin:end])
+                np.equal(results["where"], c.EBPO_IN, out=out[begin:end])
 
-        self._ask(rows, "ebpo_inside_many", made(c.ebpo_inside_options), INSIDE, put, threads, progress, "inside")
+        self._query(rows, "ebpo_inside_many", made(c.ebpo_inside_options), INSIDE, put, threads, progress, "inside")
         return out[0] if rows.single else out
 
     def winding(self, points: Any, *, threads: int | None = None, progress: Progress | None = None) -> Any:
-        """Winding numbers of points: (n,) int32, 0 on faces. Raises as `locate`.
+        """Returns winding numbers of points: (n,) int32, 0 on faces. Raises as `locate`.
 
         >>> cube.winding([[.5, .5, .5], [2, 0, 0]])
         array([1, 0], dtype=int32)
@@ -379,10 +379,10 @@ class Model:
 
     def distance(self, points: Any, *, max_distance: float = float("inf"), signed: bool = True,
                  threads: int | None = None, progress: Progress | None = None) -> Nearest:
-        """How far points are from the model, and from which of its faces.
+        """Returns the distance of points to the model, and the nearest faces.
 
-        max_distance: what is farther away does not matter.
-        signed: of solids distances are negative inside; without, less work.
+        max_distance: faces farther away are ignored.
+        signed: distances are negative inside solids; False is faster.
 
         Returns distance: (n,) float64, correctly rounded, inf: nothing within max_distance, or, where there is
         a face, farther than every double; point:
@@ -402,17 +402,17 @@ class Model:
         options = made(c.ebpo_distance_options, max_distance=max_distance, unsigned_distance=not signed)
         out = Nearest(np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n, np.int64))
 
-        def put(answers: np.ndarray, begin: int, end: int) -> None:
+        def put(results: np.ndarray, begin: int, end: int) -> None:
             for array, name in zip(out[:3], Nearest._fields):
-                array[begin:end] = answers[name]
-            out.face[begin:end] = answers["face"].view(np.int64)  # EBPO_NO_FACE is -1
+                array[begin:end] = results[name]
+            out.face[begin:end] = results["face"].view(np.int64)  # EBPO_NO_FACE is -1
 
-        self._ask(rows, "ebpo_distance_many", options, DISTANCE, put, threads, progress, "distance")
+        self._query(rows, "ebpo_distance_many", options, DISTANCE, put, threads, progress, "distance")
         return Nearest(*(array[0] for array in out)) if rows.single else out
 
     def distance_bounds(self, points: Any, *, level: int | None = None, deadline: float | None = None,
                         threads: int | None = None, progress: Progress | None = None) -> Bounds:
-        """What is certain of distances by levels 0 to `level`, or in `deadline` seconds for each point.
+        """Returns certain bounds of distances from levels 0 to `level`, or in `deadline` seconds for each point.
 
         Returns lo, hi: (n,) float64, unsigned; equal where the distance is known.
 
@@ -428,16 +428,16 @@ class Model:
             options.deadline_ns = nanoseconds(deadline)
         out = Bounds(np.empty(rows.count), np.empty(rows.count))
 
-        def put(answers: np.ndarray, begin: int, end: int) -> None:
-            out.lo[begin:end], out.hi[begin:end] = answers["lo"], answers["hi"]
+        def put(results: np.ndarray, begin: int, end: int) -> None:
+            out.lo[begin:end], out.hi[begin:end] = results["lo"], results["hi"]
 
-        self._ask(rows, "ebpo_distance_many", options, DISTANCE, put, threads, progress, "distance")
+        self._query(rows, "ebpo_distance_many", options, DISTANCE, put, threads, progress, "distance")
         return Bounds(*(array[0] for array in out)) if rows.single else out
 
-    def near(self, point: Any, *, radius: float = float("inf"), most: int | None = None) -> Nearest:
-        """The faces nearest to one point, by their exact distances; unsigned.
+    def near(self, point: Any, *, radius: float = float("inf"), count: int | None = None) -> Nearest:
+        """Returns the faces nearest to one point, by their exact unsigned distances.
 
-        radius: at most so far away. most: at most so many; None: all.
+        radius: at most so far away. count: at most so many; None: all.
 
         Returns arrays as `distance`, of k faces.
 
@@ -447,8 +447,8 @@ class Model:
         rows = Rows(point, "the point")
         if not rows.single:
             raise ValueError("near() takes one point of three numbers")
-        options = made(c.ebpo_within_options, radius=radius, most=most or 0)
-        if most == 0:
+        options = made(c.ebpo_within_options, radius=radius, most=count or 0)
+        if count == 0:
             return Nearest(np.empty(0), np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.int64))
         found = bytearray()
 
@@ -470,15 +470,15 @@ class Model:
         count = max(o.count, d.count)
         if o.count != d.count and not (o.single or d.single):
             raise ValueError(f"{o.count} origins and {d.count} directions")
-        most = doubles(t_max, "t_max")
-        if most.ndim and most.shape != (count,):
-            raise ValueError(f"t_max is a number, or has the shape ({count},), not {most.shape}")
+        limits = doubles(t_max, "t_max")
+        if limits.ndim and limits.shape != (count,):
+            raise ValueError(f"t_max is a number, or has the shape ({count},), not {limits.shape}")
 
         def rays(begin: int, end: int) -> np.ndarray:
             made = np.empty((end - begin, 7))
             made[:, 0:3] = o[0:1] if o.single else o[begin:end]
             made[:, 3:6] = d[0:1] if d.single else d[begin:end]
-            made[:, 6] = most[begin:end] if most.ndim else most
+            made[:, 6] = limits[begin:end] if limits.ndim else limits
             return made
 
         return count, o.single and d.single, rays
@@ -487,19 +487,19 @@ class Model:
               outputs: Callable[[int, int], tuple], keep: Callable[..., None]) -> None:
         count, _, block = rays
         options = made(c.ebpo_ray_options, threads=threads or self._threads, sides=self._sides(sides))
-        told = Told(progress, "rays", count)
+        report = StageProgress(progress, "rays", count)
         begin = 0
         while begin < count:
             end = min(count, begin + RAYS, begin + self._automatic.piece())
-            told(begin)
-            asked = block(begin, end)
-            if not np.isfinite(asked[:, :6]).all():
-                bad = begin + int((~np.isfinite(asked[:, :6]).all(axis=1)).argmax())
+            report(begin)
+            given_rays = block(begin, end)
+            if not np.isfinite(given_rays[:, :6]).all():
+                bad = begin + int((~np.isfinite(given_rays[:, :6]).all(axis=1)).argmax())
                 raise ArgumentError(f"ray {bad} has a coordinate that is not a finite number", "EBPO_E_ARGUMENT")
             out = outputs(begin, end)
             try:
                 with self._context(end - begin, count, "rays") as context:
-                    call(function, context, asked.ctypes.data, end - begin, ctypes.byref(options), *out)
+                    call(function, context, given_rays.ctypes.data, end - begin, ctypes.byref(options), *out)
                     keep(begin, end, *out)  # lists of hits are the context's
             except ArgumentError as error:
                 if begin:
@@ -507,7 +507,7 @@ class Model:
                 raise
             begin = end
         if count:
-            told(count)
+            report(count)
         else:
             self._current()  # says what a question would
 
@@ -520,7 +520,7 @@ class Model:
 
     def ray(self, origins: Any, directions: Any, *, t_max: Any = float("inf"), sides: str = "both",
             threads: int | None = None, progress: Progress | None = None) -> Hits:
-        """The first face that each ray origin + t direction meets, with t from 0 to t_max.
+        """Returns the first face that each ray origin + t direction intersects, with t from 0 to t_max.
 
         origins, directions: (n, 3); one of both may be (3,). Directions are of any length but 0.
         t_max: a number, or (n,).
@@ -545,7 +545,7 @@ class Model:
 
     def ray_any(self, origins: Any, directions: Any, *, t_max: Any = float("inf"), sides: str = "both",
                 threads: int | None = None, progress: Progress | None = None) -> Any:
-        """Whether each ray meets any face: what `ray` says, with less work. Returns (n,) bool.
+        """Returns True for rays that intersect any face, (n,) bool. Faster than `ray`.
 
         >>> cube.ray_any([[.5, .25, 3], [5, 5, 5]], [0, 0, -1.])
         array([ True, False])
@@ -558,7 +558,7 @@ class Model:
 
     def ray_all(self, origins: Any, directions: Any, *, t_max: Any = float("inf"), sides: str = "both",
                 threads: int | None = None, progress: Progress | None = None) -> AllHits:
-        """All faces that each ray meets, by t, then in the order of the file.
+        """Returns all faces that each ray intersects, by t, then in the order of the file.
 
         Returns t, face, side: (k,) as `ray`, ray after ray; ray: (k,) int64, the number of its ray;
         begin: (n + 1,) int64, hits begin[i] to begin[i + 1] - 1 are those of ray i.
@@ -591,7 +591,7 @@ class Model:
         return corners
 
     def faces_in_box(self, low: Any, high: Any) -> np.ndarray:
-        """The closed triangles that meet the closed box from `low` to `high`, (3,) each.
+        """Returns the closed triangles that intersect the closed box from `low` to `high`, (3,) each.
 
         Returns (k,) int64, in the order of the file.
 
@@ -606,7 +606,7 @@ class Model:
             return copied(faces.value, (count.value,), np.int64)
 
     def triangles_in_box(self, low: Any, high: Any) -> tuple[np.ndarray, np.ndarray]:
-        """The triangles of `faces_in_box` with their corners, within the budget however many.
+        """Returns the triangles of `faces_in_box` with their corners, within the memory budget.
 
         Returns corners: (k, 3, 3) float64, what the file stores exactly, and faces: (k,) int64. Their
         order is that of the file if all of the model is in memory, else subtree by subtree.
@@ -631,7 +631,7 @@ class Model:
     # ---- attributes, mass ----
 
     def sample(self, names: str, points: Any, faces: Any) -> np.ndarray:
-        """Attributes at points on faces, as `distance` and `ray` give them.
+        """Returns attributes at points on faces, such as results of `distance` and `ray`.
 
         names: separated by commas: "red,green,blue", "face:label". Of vertices they are weighed by where
             the point is on its face.
@@ -650,13 +650,13 @@ class Model:
                                                     free="ebpo_sampler_free", keep=(self.file,))
             sampler = self._samplers[names]
         out = np.empty((rows.count, lib.ebpo_sampler_columns(sampler)))
-        asked = rows[0:rows.count].copy()
-        asked[numbers < 0] = 0  # of no face there is no point either
-        call("ebpo_sample", sampler, asked.ctypes.data, numbers.ctypes.data, rows.count, out.ctypes.data)
+        given = rows[0:rows.count].copy()
+        given[numbers < 0] = 0  # of no face there is no point either
+        call("ebpo_sample", sampler, given.ctypes.data, numbers.ctypes.data, rows.count, out.ctypes.data)
         return out[0] if rows.single else out
 
     def measure(self, *, threads: int | None = None) -> Mass:
-        """Area, volume, centroid and inertia.
+        """Returns area, volume, centroid and inertia.
 
         >>> cube.measure().volume, cube.measure().area
         (1.0, 6.0)
@@ -669,7 +669,7 @@ class Model:
     # ---- parts ----
 
     def mesh(self, *, order: str = "file") -> Mesh:
-        """The whole mesh. order: "file", or "source" as in the PLY, bit for bit.
+        """Returns the whole mesh. order: "file", or "source" as in the PLY, bit for bit.
 
         Returns vertices and faces, which are the library's own arrays, read-only.
 
@@ -680,18 +680,18 @@ class Model:
         return read_mesh(self.file, order, self._threads)
 
     def maps(self) -> Maps:
-        """Numbers in the source of the file's vertices and faces. AbsentError: it has none."""
+        """Returns the source indices of the file's vertices and faces. AbsentError: the file has none."""
         return read_maps(self.file, self.info, self._threads)
 
     @property
     def attributes(self) -> Attributes:
-        """What the source says of vertices and faces beyond the mesh."""
+        """Returns the attributes of vertices and faces of the source."""
         return Attributes(self.file, self._threads)
 
-    def level(self, level: int, *, walls: bool = True, progress: Progress | None = None) -> Level:
-        """The envelopes of a level, 0 to info.level_count - 1, as triangles.
+    def level(self, level: int, *, cell_faces: bool = True, progress: Progress | None = None) -> Level:
+        """Returns the envelopes of a level, 0 to info.level_count - 1, as triangles.
 
-        walls: with polygons on walls of cells, so that each envelope is closed.
+        cell_faces: with polygons on walls of cells, so that each envelope is closed.
 
         Of the level's gray nodes, and of the leaves and black nodes of this one and those above. What is
         guaranteed to hold the solid is the half-spaces; polygons are these, rounded.
@@ -700,19 +700,19 @@ class Model:
         0
         """
         with Reporter(progress) as reported:
-            return read_level(self.file, level, walls, self._threads, reported)
+            return read_level(self.file, level, cell_faces, self._threads, reported)
 
     def octcode(self, point: Any, level: int) -> int:
-        """The octcode of the cell of a level that holds a point; 0: the point is not in the root cell.
+        """Returns the octcode of the cell of a level that contains a point; 0: the point is not in the root cell.
 
         >>> cube.octcode([.1, .1, .1], 1)
         8
         """
-        asked = doubles(point, "the point")
-        if asked.shape != (3,):
+        given = doubles(point, "the point")
+        if given.shape != (3,):
             raise ValueError("octcode() takes one point of three numbers")
         level = within(index_of(level, "level"), 0, c.EBPO_LEVELS_MAX - 1, "level")
-        return lib.ebpo_octcode_at(lib.ebpo_file_info(self.file), asked.ctypes.data, level)
+        return lib.ebpo_octcode_at(lib.ebpo_file_info(self.file), given.ctypes.data, level)
 
     def subtree(self, octcode: int = 1, *, levels: int | None = None, memory: int | str | None = None,
                 or_leaf_above: bool = True) -> Subtree:
@@ -732,16 +732,16 @@ class Model:
     # ---- other packages ----
 
     def as_trimesh(self) -> Any:
-        """An object that answers as a trimesh.Trimesh does: `contains`, `ray`, `nearest`, `bounds`."""
+        """Returns an object with the queries of a trimesh.Trimesh: `contains`, `ray`, `nearest`, `bounds`."""
         from .adapters import TrimeshLike
         return TrimeshLike(self)
 
     def to_trimesh(self, **options: Any) -> Any:
-        """The mesh as a trimesh.Trimesh, in the source's order if the file tells it, unprocessed."""
+        """Returns the mesh as an unprocessed trimesh.Trimesh, in the source's order if the file has maps."""
         from .adapters import to_trimesh
         return to_trimesh(self, **options)
 
     def to_pyvista(self, level: int | None = None) -> Any:
-        """The mesh, or the envelopes of a level with their nodes' data, as a pyvista.PolyData."""
+        """Returns the mesh, or the envelopes of a level with their nodes' data, as a pyvista.PolyData."""
         from .adapters import to_pyvista
         return to_pyvista(self, level)

@@ -1,4 +1,4 @@
-"""What a file holds, as arrays: facts, mesh, attributes, levels, subtrees."""
+"""Contents of a file as arrays: facts, mesh, attributes, levels, subtrees."""
 from __future__ import annotations
 
 import ctypes
@@ -165,8 +165,8 @@ def read_maps(file: Handle, info: Info, threads: int) -> Maps:
                 array(maps, maps.c.face_source, (info.face_count,), np.uint32))
 
 
-def read_level(file: Handle, level: int, walls: bool, threads: int, progress: Any) -> Level:
-    options = made(c.ebpo_lod_options, walls=walls, threads=threads, progress=progress)
+def read_level(file: Handle, level: int, cell_faces: bool, threads: int, progress: Any) -> Level:
+    options = made(c.ebpo_lod_options, cell_faces=cell_faces, threads=threads, progress=progress)
     mesh = Struct(c.ebpo_mesh, "ebpo_mesh_free")
     nodes = Struct(c.ebpo_lod_nodes, "ebpo_lod_nodes_free")
     call("ebpo_lod_level_nodes", file, level, ctypes.byref(options), mesh, nodes, None)
@@ -258,7 +258,7 @@ class Subtree:
     Faces, if the file has a mesh and no `levels` were given; else None:
 
     vertices: (v, 3) float32 or float64; faces: (f, 3) uint32, of these vertices.
-    outer_count: so many of the faces, the first ones, are other subtrees' own.
+    shared_count: so many of the faces, the first ones, are other subtrees' own.
     number: (f,) uint32, in the file; source: (f,) uint32, in the source, or None.
     list_first: (n + 1,) uint32, where each leaf's list of faces begins in list.
     """
@@ -276,7 +276,7 @@ class Subtree:
         self._set_nodes(nodes)
         none: Any = None
         self.vertices = self.faces = self.number = self.source = self.list_first = self.list = none
-        self.outer_count = 0
+        self.shared_count = 0
         faces = made(c.ebpo_subtree_faces)
         from .errors import AbsentError
         try:
@@ -312,12 +312,12 @@ class Subtree:
         self.faces = self._array(faces.faces, (faces.face_count, 3), np.uint32)
         self.number = self._array(faces.numbers, (faces.face_count,), np.uint32)
         self.source = self._array(faces.source, (faces.face_count,), np.uint32)
-        self.outer_count = faces.outer_count
+        self.shared_count = faces.shared_count
         self.list_first = self._array(faces.list_first, (self.node_count + 1,), np.uint32)
         self.list = self._array(faces.list, (int(self.list_first[-1]),), np.uint32)
 
     def faces_of(self, node: int) -> np.ndarray:
-        """The faces of a leaf: rows of `faces`."""
+        """Returns the faces of a leaf: rows of `faces`."""
         return self.list[self.list_first[node]:self.list_first[node + 1]]
 
     def __repr__(self) -> str:

@@ -11,7 +11,7 @@ HEAD = 1 << 17  # bytes that are read at once when a source is opened
 MEMORY = 48 << 20  # bytes of what was read ahead and what was read last
 CONNECTIONS = 16  # ranges that are asked for at a time
 GAP, GAP_OF_MANY, MANY = 1 << 14, 1 << 15, 256  # between ranges: fetching it costs less than another request
-MOST = 4 << 20  # of a request
+MAX = 4 << 20  # of a request
 STALE = 64  # announcements: what has not been read by then hardly will be
 NOTED, COMING, THERE, FAILED = range(4)
 
@@ -49,7 +49,7 @@ class Ranges:
         self.begins: list[int] = []  # of pieces, ascending, without overlaps
         self.pieces: dict[int, Piece] = {}
         self.queue: collections.deque[Piece] = collections.deque()
-        self.unasked: set[int] = set()  # begins of pieces that were announced and not asked for
+        self.unrequested: set[int] = set()  # begins of pieces that were announced and not asked for
         self.held = self.plan = self.clock = self.running = 0
         self.process = os.getpid()
 
@@ -68,7 +68,7 @@ class Ranges:
         for piece in [*self._over(begin, end), None]:
             stop = piece.begin if piece else end
             if begin < stop:
-                count = -(-(stop - begin) // MOST)
+                count = -(-(stop - begin) // MAX)
                 cuts = [begin + (stop - begin) * i // count for i in range(count + 1)]
                 for low, high in zip(cuts, cuts[1:]):
                     self.pieces[low] = Piece(low, high, self.plan)
@@ -78,7 +78,7 @@ class Ranges:
     def _remove(self, piece: Piece) -> None:
         self._drop(piece)
         del self.pieces[piece.begin]
-        self.unasked.discard(piece.begin)
+        self.unrequested.discard(piece.begin)
         self.begins.pop(bisect.bisect_left(self.begins, piece.begin))
 
     def _drop(self, piece: Piece) -> None:
@@ -87,7 +87,7 @@ class Ranges:
             self.held -= piece.size
         piece.state, piece.data, piece.error = NOTED, None, None
 
-    def _make_room(self, size: int) -> None:
+    def _reserve_space(self, size: int) -> None:
         """Forgets what was read longest ago, then what was announced long ago, until `size` more bytes fit."""
         if self.held + size <= self.memory:
             return
@@ -109,7 +109,7 @@ class Ranges:
 
     def _start(self, piece: Piece, urgent: bool) -> None:
         piece.state = COMING
-        self.unasked.discard(piece.begin)
+        self.unrequested.discard(piece.begin)
         self.held += piece.size
         (self.queue.appendleft if urgent else self.queue.append)(piece)
         if self.running < self.connections:
@@ -121,9 +121,9 @@ class Ranges:
 
     def _ahead(self, begin: int) -> None:
         """Requests announced pieces from an offset on, as far as they fit."""
-        for start in sorted(start for start in self.unasked if start >= begin):
+        for start in sorted(start for start in self.unrequested if start >= begin):
             piece = self.pieces[start]
-            self._make_room(piece.size)
+            self._reserve_space(piece.size)
             if self.held + piece.size > self.memory:
                 return
             self._start(piece, False)
@@ -177,7 +177,7 @@ class Ranges:
                     if piece.begin in anew:  # of others it has been counted
                         piece.wanted += min(end, piece.end) - max(begin, piece.begin)
                         if piece.state == NOTED:
-                            self.unasked.add(piece.begin)
+                            self.unrequested.add(piece.begin)
             self._ahead(0)
 
     def read_range(self, offset: int, size: int) -> bytes:
@@ -210,7 +210,7 @@ class Ranges:
                 raise piece.error  # type: ignore[misc]
             for other in pieces[pieces.index(piece):]:
                 if other.state == NOTED:
-                    self._make_room(other.size)
+                    self._reserve_space(other.size)
                     if other is piece or self.held + other.size <= self.memory:
                         self._start(other, True)
             if piece in self.queue:  # before those that only are announced
@@ -235,7 +235,7 @@ class Ranges:
                 self._drop(piece)
             if not piece.users and piece.state == NOTED and not piece.wanted:
                 self._remove(piece)
-        self._make_room(0)
+        self._reserve_space(0)
 
     def close(self) -> None:
         """Stops fetching; requests under way end by themselves."""

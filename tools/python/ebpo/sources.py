@@ -1,4 +1,4 @@
-"""Where bytes come from: paths, URLs, bytes in memory, file objects, objects with ranges, fsspec."""
+"""Sources of bytes: paths, URLs, bytes in memory, file objects, objects with ranges, fsspec."""
 from __future__ import annotations
 
 import ctypes
@@ -90,8 +90,8 @@ class Source:
         try:
             if self.interrupted:
                 raise KeyboardInterrupt
-            told = read_whole(self.ranges, offset, size)
-            ctypes.memmove(data, np.frombuffer(told, np.uint8).ctypes.data, size)
+            given = read_whole(self.ranges, offset, size)
+            ctypes.memmove(data, np.frombuffer(given, np.uint8).ctypes.data, size)
             return 0
         except BaseException as raised:
             status = CANCELLED if isinstance(raised, KeyboardInterrupt) else IO
@@ -135,8 +135,8 @@ def http_options(options: dict) -> tuple[Any, list]:
     return of_members(c.ebpo_http_options, given, **own), keep
 
 
-def by_name(name: Any, most_expansion: int, keep: tuple = (), **members: Any) -> Handle:
-    options = made(c.ebpo_open_options, most_expansion=most_expansion,
+def by_name(name: Any, max_expansion: int, keep: tuple = (), **members: Any) -> Handle:
+    options = made(c.ebpo_open_options, max_expansion=max_expansion,
                    **{member: ctypes.addressof(struct) for member, struct in members.items()})
     return Handle.made("ebpo_open_with", name, ctypes.byref(options), free="ebpo_close", keep=keep)
 
@@ -153,50 +153,50 @@ def has_http() -> bool:
     return True
 
 
-def by_url(url: str, http: dict, most_expansion: int) -> Handle:
+def by_url(url: str, http: dict, max_expansion: int) -> Handle:
     struct, keep = http_options(http)
     own = {"headers", "time_limit", "retries", "whole_limit", "unversioned", "connections"}
     if has_http() or set(http) - own:  # other options it takes, or refuses without HTTP
-        return by_name(url, most_expansion, http=struct)
+        return by_name(url, max_expansion, http=struct)
     del keep
     connections = within(struct.connections if "connections" in http else CONNECTIONS, 1, 32, "connections")
     web = Web(url, **{name: value for name, value in http.items() if name != "connections"})
-    return by_ranges(far(web, web.size, web.shown, connections=connections), web.shown, most_expansion)
+    return by_ranges(far(web, web.size, web.shown, connections=connections), web.shown, max_expansion)
 
 
-def by_ranges(ranges: Any, name: str, most_expansion: int = 0) -> Handle:
+def by_ranges(ranges: Any, name: str, max_expansion: int = 0) -> Handle:
     """Opens a Ranges, or an object with `size` and `read_range` on this machine."""
     source = Source(ranges)
-    return by_name(shown(name), most_expansion, keep=(source,), source=source.struct)
+    return by_name(shown(name), max_expansion, keep=(source,), source=source.struct)
 
 
-def opened(source: Any, http: dict, storage_options: dict | None, most_expansion: int = 0) -> Handle:
+def opened(source: Any, http: dict, storage_options: dict | None, max_expansion: int = 0) -> Handle:
     """An ebpo_file of whatever `ebpo.open` takes."""
     if isinstance(source, (str, os.PathLike)):
         name = os.fspath(source)
         if isinstance(name, str) and name.startswith(("http://", "https://")) and storage_options is None:
-            return by_url(name, http, most_expansion)
+            return by_url(name, http, max_expansion)
         if http:
             raise TypeError(f"{name} is no URL: there is nothing to do for {', '.join(http)}")
         if isinstance(name, str) and "://" in name:
             stored = Stored(name, storage_options)
-            return by_ranges(far(stored, stored.size, name), name, most_expansion)
-        return by_name(path(name), most_expansion)
+            return by_ranges(far(stored, stored.size, name), name, max_expansion)
+        return by_name(path(name), max_expansion)
     if http or storage_options is not None:
         raise TypeError("options of URLs are for URLs")
     name = str(getattr(source, "name", "") or type(source).__name__)
     if hasattr(source, "read_range") and hasattr(source, "size"):
         return by_ranges(far(source, source.size() if callable(source.size) else source.size, name), name,
-                         most_expansion)
+                         max_expansion)
     if hasattr(source, "seek") and hasattr(source, "read") and not isinstance(source, _mmap()):
-        return by_ranges(of_file(source, name), name, most_expansion)
+        return by_ranges(of_file(source, name), name, max_expansion)
     try:
         data = np.frombuffer(source, np.uint8)
     except (TypeError, ValueError):
         raise TypeError(f"{type(source).__name__} is neither a path, a URL, bytes, a file with seek and read nor "
                         "an object with size and read_range(offset, size)") from None
-    if most_expansion:
-        return by_ranges(Bytes(data), name, most_expansion)
+    if max_expansion:
+        return by_ranges(Bytes(data), name, max_expansion)
     return Handle.made("ebpo_open_memory", data.ctypes.data, data.nbytes, shown(name), free="ebpo_close",
                        keep=(data, source))
 

@@ -1,4 +1,4 @@
-"""Reads URLs by Python's own HTTP, where the library has none: each range within a time, of one version."""
+"""Reads URLs with Python's HTTP when the library has none. Each range has a time limit; all ranges are of one version."""
 from __future__ import annotations
 
 import collections
@@ -37,19 +37,19 @@ class Timed(io.RawIOBase):
     def readable(self) -> bool:
         return True
 
-    def readinto(self, room: Any) -> int | None:
+    def readinto(self, buffer: Any) -> int | None:
         left = self.end - time.monotonic()
         if left <= 0:
             raise TimeoutError("the answer did not end in time")
         self.sock.settimeout(min(SILENT, left))
-        return self.raw.readinto(room)
+        return self.raw.readinto(buffer)
 
     def close(self) -> None:
         self.raw.close()
         super().close()
 
 
-class Answer(http.client.HTTPResponse):
+class Response(http.client.HTTPResponse):
     """An answer of which every byte comes before `end`: status, headers, body and trailers.
 
     connection: what it comes by; when it has been read to its end, `idle` gets it for the next request.
@@ -86,7 +86,7 @@ def opened(handler: Any, kind: Any, request: Any, **options: Any) -> Any:
     """Sends a request, by a connection that an earlier one has left, and returns its answer, read up to its body."""
     def connection(*host: Any, **given: Any) -> Any:
         made = kind(*host, **given, **options)
-        made.response_class = functools.partial(Answer, end=request.end)
+        made.response_class = functools.partial(Response, end=request.end)
         return made
 
     request.timeout = max(0.001, min(SILENT, request.end - time.monotonic()))
@@ -96,14 +96,14 @@ def opened(handler: Any, kind: Any, request: Any, **options: Any) -> Any:
     while True:
         try:
             used, again = idle.pop(), True
-            used.response_class = functools.partial(Answer, end=request.end)
+            used.response_class = functools.partial(Response, end=request.end)
             used.sock.settimeout(request.timeout)
         except IndexError:
             used, again = connection(request.host, timeout=request.timeout), False
         try:
             headers = {name.title(): value for name, value in request.header_items()}
             used.request(request.get_method(), request.selector, headers=headers)
-            answer = used.getresponse()
+            response = used.getresponse()
         except (OSError, http.client.HTTPException) as error:
             used.close()
             if again and not isinstance(error, TimeoutError):
@@ -114,12 +114,12 @@ def opened(handler: Any, kind: Any, request: Any, **options: Any) -> Any:
         except BaseException:
             used.close()
             raise
-        if answer.will_close:
+        if response.will_close:
             used.close()
         else:
-            answer.connection, answer.idle = used, idle
-        answer.url, answer.msg = request.full_url, answer.reason
-        return answer
+            response.connection, response.idle = used, idle
+        response.url, response.msg = request.full_url, response.reason
+        return response
 
 
 class Http(urllib.request.HTTPHandler):
@@ -142,9 +142,9 @@ class Redirects(urllib.request.HTTPRedirectHandler):
 
     max_redirections = 5
 
-    def redirect_request(self, request: Any, answer: Any, code: int, message: str, headers: Any, url: str) -> Any:
-        answer.close()  # its body may have no end
-        new: Any = super().redirect_request(request, answer, code, message, headers, url)
+    def redirect_request(self, request: Any, response: Any, code: int, message: str, headers: Any, url: str) -> Any:
+        response.close()  # its body may have no end
+        new: Any = super().redirect_request(request, response, code, message, headers, url)
         before, after = urllib.parse.urlsplit(request.full_url), urllib.parse.urlsplit(url)
         if after.scheme not in ("http", "https") or (before.scheme, after.scheme) == ("https", "http"):
             raise IOFailure(f"the server redirects from {before.scheme} to {after.scheme}, which is not followed",
@@ -172,14 +172,14 @@ class Patience:
         self.began, self.seconds, self.retries, self.what, self.failures = time.monotonic(), seconds, retries, what, 0
 
     def wait(self, error: Exception) -> None:
-        """Before the next trial. Raises IOFailure if it would come too late, or is no use."""
+        """Waits before the next attempt. Raises IOFailure when the attempt would be too late or is useless."""
         code, reason = getattr(error, "code", None), getattr(error, "reason", error)
         if code is not None and code not in self.AGAIN:
             raise self.failure(f"the server answered with status {code}") from error
         if isinstance(reason, ssl.SSLCertVerificationError):
             raise self.failure(f"the server's certificate is not trusted: {reason.verify_message}") from error
         pause = min(self.LONGEST, self.FIRST * 2**min(self.failures, 16)) * random.uniform(0.5, 1)
-        pause = max(pause, self.told(error))
+        pause = max(pause, self.retry_after(error))
         self.failures += 1
         gone = time.monotonic() - self.began
         if gone + pause > self.seconds or (self.retries is not None and self.failures > self.retries):
@@ -194,8 +194,8 @@ class Patience:
         return IOFailure(f"{self.what}: {message}", "EBPO_E_IO", self.what)
 
     @staticmethod
-    def told(error: Exception) -> float:
-        """Seconds that a server asks for, as a number or a date; 0: none."""
+    def retry_after(error: Exception) -> float:
+        """Returns the delay that a server requests, in seconds, from a number or a date; 0: none."""
         text = (getattr(error, "headers", None) or {}).get("Retry-After") or ""
         if text.strip().isdecimal():
             return float(text)
@@ -267,7 +267,7 @@ class Web:
         patience, data = Patience(self.time_limit, self.retries, self.shown), bytearray()
         while True:
             try:
-                self.ask(offset + len(data), offset + size, patience, data)
+                self.send(offset + len(data), offset + size, patience, data)
                 if self.size:
                     size = min(size, max(self.size - offset, len(data)))
                 if len(data) >= size:
@@ -285,8 +285,8 @@ class Web:
             if at_once:
                 data.clear()
 
-    def ask(self, begin: int, end: int, patience: Patience, data: bytearray) -> None:
-        """Sends one request, and appends to `data` what comes of it, also before it fails."""
+    def send(self, begin: int, end: int, patience: Patience, data: bytearray) -> None:
+        """Sends one request, and appends the received bytes to `data`, also before a failure."""
         request = Request(self.url, headers={**self.headers, "Range": f"bytes={begin}-{end - 1}"})
         if self.process != os.getpid():  # a process that was forked: the connections are those of the other one
             self.process, self.idle = os.getpid(), {}
@@ -295,41 +295,41 @@ class Web:
             self.requests += 1
         before = len(data)
         try:
-            with opener().open(request) as answer:
-                if (answer.headers["Content-Encoding"] or "identity").lower() != "identity":
+            with opener().open(request) as response:
+                if (response.headers["Content-Encoding"] or "identity").lower() != "identity":
                     raise patience.failure("the server sends the file in another encoding; download it")
-                if answer.status == 200 and self.version is None and begin == 0:
-                    self.take_whole(answer, patience, data)
+                if response.status == 200 and self.version is None and begin == 0:
+                    self.take_whole(response, patience, data)
                 else:
-                    self.take(answer, self.range_of(answer, begin, end, patience), patience, data)
+                    self.take(response, self.range_of(response, begin, end, patience), patience, data)
         finally:
             with self.lock:
                 self.received += len(data) - before
 
-    def range_of(self, answer: Any, begin: int, end: int, patience: Patience) -> int:
+    def range_of(self, response: Any, begin: int, end: int, patience: Patience) -> int:
         """Returns how many bytes of the range the server sends: all, or fewer. IOFailure: another range or version."""
-        if answer.status != 206:
-            raise patience.failure(f"the server does not answer ranges (status {answer.status})")
-        stated = re.fullmatch(r"bytes (\d{1,18})-(\d{1,18})/(\d{1,18})", (answer.headers["Content-Range"] or "").strip())
+        if response.status != 206:
+            raise patience.failure(f"the server does not answer ranges (status {response.status})")
+        stated = re.fullmatch(r"bytes (\d{1,18})-(\d{1,18})/(\d{1,18})", (response.headers["Content-Range"] or "").strip())
         if not stated:
             raise patience.failure("the server does not say which range it sent")
         first, last, size = map(int, stated.groups())
-        etag = answer.headers["ETag"] and re.sub(r"^\s*W/", "", answer.headers["ETag"])
-        version = etag or answer.headers["Last-Modified"], size
+        etag = response.headers["ETag"] and re.sub(r"^\s*W/", "", response.headers["ETag"])
+        version = etag or response.headers["Last-Modified"], size
         if self.version not in (None, version):
             raise patience.failure("the file on the server has changed since it was opened; open it again")
-        length = answer.headers["Content-Length"]
+        length = response.headers["Content-Length"]
         if first != begin or not begin <= last < min(end, size) or (length and length.strip() != str(last + 1 - begin)):
             raise patience.failure("the server sent another range than was asked for")
         self.version, self.size = version, size
         return last + 1 - begin
 
     @staticmethod
-    def take(answer: Any, size: int, patience: Patience, data: bytearray) -> None:
+    def take(response: Any, size: int, patience: Patience, data: bytearray) -> None:
         """Appends a body of so many bytes. ConnectionError: it is shorter; IOFailure: longer."""
         whole = len(data) + size
         while len(data) < whole + 1:
-            some = answer.read1(min(1 << 16, whole + 1 - len(data)))
+            some = response.read1(min(1 << 16, whole + 1 - len(data)))
             if not some:
                 break
             data += some
@@ -338,24 +338,24 @@ class Web:
         if len(data) < whole:
             raise ConnectionError(f"the connection ended after {len(data) - whole + size} bytes")
 
-    def take_whole(self, answer: Any, patience: Patience, data: bytearray) -> None:
+    def take_whole(self, response: Any, patience: Patience, data: bytearray) -> None:
         """Appends the body of an answer of status 200, which must have an end that is certain."""
         try:
-            self.take_all(answer, patience, data)
+            self.take_all(response, patience, data)
         except BaseException:
             data.clear()  # what follows might be of another version
             raise
 
-    def take_all(self, answer: Any, patience: Patience, data: bytearray) -> None:
-        size, content = answer.length, answer.headers["Content-Type"] or ""
+    def take_all(self, response: Any, patience: Patience, data: bytearray) -> None:
+        size, content = response.length, response.headers["Content-Type"] or ""
         if content.startswith("text/"):
             raise patience.failure(f"the server sends {content[:60]} in place of the file; check the URL, and whether it "
                                    "takes a login")
-        if size is None and not answer.chunked:
+        if size is None and not response.chunked:
             raise patience.failure("the server does not answer ranges, and does not say how long the file is")
         if (size or 0) <= self.whole_limit:
             while len(data) <= self.whole_limit:
-                some = answer.read1(1 << 16)
+                some = response.read1(1 << 16)
                 if not some:
                     break
                 data += some

@@ -1,4 +1,4 @@
-// What is painted and noted on one model, with undo. A state is never changed, only followed by another, so that steps back cost nothing.
+// The paint and notes of one model, with undo. States are immutable; each change makes a new state, so that undo is cheap.
 import { MOST, cleanText } from './paint_file.js';
 
 const STEPS_MOST = 200;
@@ -11,7 +11,7 @@ export function identityOf(info) {
   return { model: maps && info.subset_of ? info.subset_of : info.content_sha256, faceNumbers: maps ? 'source' : 'file' };
 }
 
-/** Why a paint file is not for a model, or undefined. */
+/** Returns the reason why a paint file does not belong to a model, or undefined. */
 export function misfit(doc, info) {
   const { model, faceNumbers } = identityOf(info), wanted = doc.modelName ? `"${doc.modelName}"` : 'another model';
   if (!(doc.model === model && doc.faceNumbers === faceNumbers) && !(doc.faceNumbers === 'source' && info.parts.has('maps') && doc.model === info.content_sha256))
@@ -93,7 +93,7 @@ export class PaintDocument {
     this.step({ layers: this.state.layers.map((l, i) => (i === number ? { ...l, ...members } : l)) });
   }
 
-  /** With its strokes and notes. */
+  /** Removes a layer with its strokes and notes. */
   removeLayer(number) {
     const keep = (items) => items.filter((item) => item.layer !== number).map((item) => (item.layer > number ? { ...item, layer: item.layer - 1 } : item));
     this.step({ layers: this.state.layers.filter((_, i) => i !== number), notes: keep(this.state.notes), strokes: keep(this.state.strokes) });

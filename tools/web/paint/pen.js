@@ -34,7 +34,7 @@ export function addPen({ scene, worker, query }, pipeline) {
     return placesOf(worker, points);
   };
 
-  // What the rest of the page may ask of the document.
+  // Queries of the document for the rest of the page.
   const drawing = () => Object.assign(doc, { placesOf: askPlaces, layerForNew() {
     if (!doc.state.layers.length)
       doc.addLayer({});
@@ -46,7 +46,7 @@ export function addPen({ scene, worker, query }, pipeline) {
   const decal = (s) => ({ erases: s.erases, colour: s.colour, radius: s.radius * state.scene.scale,
     points: s.points.map((p) => ({ centre: toScene(p.place), normal: reaches.get(p)?.normal ?? p.normal, faces: reaches.get(p)?.faces, share: p.size / FULL_SIZE })) });
   const inPicture = (faces) => faces && Float32Array.from({ length: faces.length }, (_, i) => (faces[i] - state.scene.center[i % 3]) * state.scene.scale);
-  // Real faces are in their places, envelopes within a cell of them.
+  // Real faces are drawn at their exact positions, envelopes within one cell of them.
   decals.near = () => (state.stats?.meshTriangles === state.stats?.triangles ? 0 : 2 * (Number($('detail').value) || state.auto || 0));
   function draw() {
     const { layers, strokes } = doc.state, all = stroke ? [...strokes, stroke] : strokes;

@@ -1,12 +1,12 @@
-// HDF5, as much of it as a paint file needs: groups with links and attributes, and arrays of integers in one chunk with a checksum.
-// format-spec/paint.md, section 7. Blocks lie one behind the other; what is pointed at stands before what points.
+// Writes the subset of HDF5 that a paint file needs: groups with links and attributes, and arrays of integers in one chunk with a checksum.
+// format-spec/paint.md, section 7. Blocks are consecutive; a block is written before the blocks that refer to it.
 import { fletcher32 } from '../reader/chunk.js';
 import { lookup3 } from '../reader/hdf5.js';
 
 const NONE = 2n ** 64n - 1n;
 const utf8 = new TextEncoder();
 
-// Bytes that grow.
+// A growing array of bytes.
 class Bytes {
   constructor() {
     this.array = new Uint8Array(1 << 12);

@@ -1,17 +1,17 @@
-// Chunks on their way from bytes to values: asked for in batches, neighbours in one request, several requests under way, decoded as they come, and
-// kept under a budget of memory.
+// Fetches and decodes chunks in batches. Neighbouring chunks share a request, several requests run at once, and chunks are decoded as they arrive.
+// Decoded chunks are cached within a memory budget.
 import { decodeChunk } from './chunk.js';
 import { formatError } from './error.js';
 import { decodeGates } from './gates.js';
 import { chunkEnd } from './sums.js';
 
-const GAP_BYTES = 16 * 1024;            // rather read this much for nothing than ask twice
-const REQUEST_BYTES = 4 * 1024 * 1024;  // a request's most
-const FEW = 12, SPARE_SHARE = 0.25, SPARE_BYTES = 64 * 1024; // of one batch more requests than these are joined over wider gaps, for so much more of its bytes
-const REQUESTS = 6;                     // at once, as browsers do for a host
+const GAP_BYTES = 16 * 1024;            // gaps of at most this size are read rather than split into two requests
+const REQUEST_BYTES = 4 * 1024 * 1024;  // most bytes of a request
+const FEW = 12, SPARE_SHARE = 0.25, SPARE_BYTES = 64 * 1024; // above FEW requests per batch, wider gaps are joined, up to this share and size of extra bytes
+const REQUESTS = 6;                     // concurrent requests, as browsers allow for a host
 export const CACHE_BYTES = 64 * 1024 * 1024;
 
-/** Requests for ranges: neighbours together, and when many are left, more than neighbours. */
+/** Joins ranges into requests: neighbouring ranges first, and ranges with wider gaps when many requests remain. */
 export function joined(ranges) {
   const runs = [];
   for (const r of ranges.sort((a, b) => a.from - b.from)) {
@@ -26,7 +26,7 @@ export function joined(ranges) {
   return runs.length > FEW ? fewer(runs) : runs;
 }
 
-// Over the least gaps first, while not much is read for nothing.
+// Join over the smallest gaps first, while few extra bytes are read.
 function fewer(runs) {
   let left = Math.max(SPARE_BYTES, runs.reduce((sum, r) => sum + r.to - r.from, 0) * SPARE_SHARE), most = 0, joins = runs.length - FEW;
   for (const gap of runs.slice(1).map((r, i) => r.from - runs[i].to).sort((a, b) => a - b)) {
@@ -52,26 +52,26 @@ const keyOf = ({ array, chunk }) => array.number * 2 ** 32 + chunk;
 
 function withoutGates(bytes, array, chunk) {
   const codes = decodeGates(bytes, Math.min(array.chunkRows, array.rows - chunk * array.chunkRows));
-  return codes ? { bytes: new Uint8Array(codes.buffer) } : { fault: 'its streams are those of no faces' };
+  return codes ? { bytes: new Uint8Array(codes.buffer) } : { fault: 'its streams do not encode faces' };
 }
 
 export class ChunkCache {
   /**
-   * `head`: the file's first bytes, which are not fetched again. `values(array, chunk, bytes)`: what is kept of a chunk: something with byteLength, or a promise of it.
-   * `sums()`: a promise of how chunks must end (sums.js), or of undefined; it is not asked about lists of chunks. `late()`: whether that has still to come,
-   * so that what has come before is given first.
+   * `head`: the file's first bytes, which are not fetched again. `values(array, chunk, bytes)`: returns the cached value of a chunk (an object with byteLength), or a promise of it.
+   * `sums()`: a promise of the expected chunk checksums (sums.js), or of undefined; not used for lists of chunks. `late()`: true while the checksums are still loading;
+   * chunks that arrived earlier are then returned first.
    */
   constructor(source, head, { zstd, values, sums, late, budget = CACHE_BYTES }) {
     Object.assign(this, { source, head, zstd, values, sums, late, budget });
-    this.early = [];          // chunks that were given before it was known how they must end
-    this.kept = new Map();    // by key, oldest first
-    this.bytes = 0;           // of what is kept
+    this.early = [];          // chunks that were returned before their checksums were known
+    this.kept = new Map();    // values by key, oldest first
+    this.bytes = 0;           // size of the cached values
     this.pending = new Map(); // promises by key
     this.busy = 0;
     this.queue = [];
   }
 
-  /** Values of chunks: wanted is [{ array, chunk }], of any arrays, all of which have their `chunks`. */
+  /** Returns values of chunks. `wanted` is [{ array, chunk }] of any arrays; each array must have its `chunks`. */
   async get(wanted) {
     const missing = [], found = wanted.map((item) => {
       const key = keyOf(item), hit = this.recall(key);
@@ -103,7 +103,7 @@ export class ChunkCache {
     });
   }
 
-  /** How many bytes would be fetched for these. */
+  /** Returns the number of bytes that would be fetched for these chunks. */
   cost(wanted) {
     let sum = 0;
     for (const item of wanted) {
@@ -114,10 +114,10 @@ export class ChunkCache {
     return sum;
   }
 
-  /** Decoded bytes of chunks, not kept: [Promise]. */
+  /** Returns decoded bytes of chunks without caching them: [Promise]. */
   decoded(wanted) {
-    const sums = wanted.some(({ array }) => !array.list) ? this.sums?.() : undefined; // on its way beside what it tells of
-    sums?.catch(() => {}); // who waits for it tells
+    const sums = wanted.some(({ array }) => !array.list) ? this.sums?.() : undefined; // fetched in parallel with the chunks
+    sums?.catch(() => {}); // the caller that awaits the checksums reports the error
     return this.fetch(wanted.map(({ array, chunk }) => array.chunks[chunk])).map(async (promise, i) => {
       const { array, chunk } = wanted[i], stored = await promise;
       if (!array.list)
@@ -145,7 +145,7 @@ export class ChunkCache {
       throw formatError(`${array.path}: chunk ${chunk}`, 'the chunk is damaged: it is not the one that was written there');
   }
 
-  /** Now it is known how chunks must end: was one of those that were given another one, nothing more is given. */
+  /** Compares the chunks that were returned early with the checksums. After a mismatch no further chunks are returned. */
   judgeEarly(sums) {
     try {
       for (const { array, chunk, end } of this.early.splice(0))
@@ -155,12 +155,12 @@ export class ChunkCache {
     }
   }
 
-  // --- what is kept: also other things than chunks, under keys that are texts ---
+  // --- the cache: chunks, and other values under string keys ---
 
   recall(key) {
     const hit = this.kept.get(key);
     if (hit !== undefined) {
-      this.kept.delete(key); // to the young end
+      this.kept.delete(key); // move it to the newest end
       this.kept.set(key, hit);
     }
     return hit;
@@ -181,19 +181,19 @@ export class ChunkCache {
 
   // --- bytes ---
 
-  /** How many of the file's first bytes are there or on their way: to read them takes no request. */
+  /** Returns how many of the file's first bytes are loaded or loading; reading them takes no request. */
   get coming() {
     return Math.max(this.head.length, this.source.coming ?? 0);
   }
 
-  /** Ranges [{ at, bytes }] of the file: [Promise of Uint8Array], in the same order. */
+  /** Reads ranges [{ at, bytes }] of the file. Returns [Promise of Uint8Array] in the same order. */
   fetch(ranges) {
     const { coming } = this, out = new Array(ranges.length), behind = [];
     ranges.forEach((r, i) => (r.at + r.bytes <= coming ? (out[i] = this.#first(r.at, r.at + r.bytes))
       : behind.push({ i, from: Math.max(r.at, coming), to: r.at + r.bytes })));
     for (const run of joined(behind)) {
       run.data = this.#turn(() => this.source.read(run.from, run.to - run.from));
-      run.data.catch(() => {}); // its pieces tell
+      run.data.catch(() => {}); // the promises of its pieces report the error
       for (const { i, from, to } of run.ranges)
         out[i] = this.#piece(run, ranges[i].at, from, to);
     }
@@ -204,7 +204,7 @@ export class ChunkCache {
     const data = await run.data, piece = data.subarray(from - run.from, to - run.from);
     if (at === from)
       return piece;
-    const out = new Uint8Array(to - at); // begins in the first bytes and goes on behind them
+    const out = new Uint8Array(to - at); // the range begins in the head and continues after it
     out.set(await this.#first(at, from));
     out.set(piece, from - at);
     return out;
@@ -216,7 +216,7 @@ export class ChunkCache {
 
   async #turn(work) {
     if (this.busy >= REQUESTS)
-      await new Promise((done) => this.queue.push(done)); // takes over the turn of the one that ended
+      await new Promise((done) => this.queue.push(done)); // takes the slot of the request that ended
     else
       this.busy++;
     try {

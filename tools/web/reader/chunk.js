@@ -1,9 +1,9 @@
-// A chunk's bytes as HDF5 stores them: shuffle, zstd or deflate, fletcher32. Every checksum and every length is compared.
+// Decodes chunks as HDF5 stores them: shuffle, zstd or deflate, fletcher32. Compares every checksum and every length.
 
 export const CHUNK_BYTES_MAX = 65536; // before compression
 export const FILTER = { deflate: 1, shuffle: 2, fletcher32: 3, zstd: 32015 };
 
-/** 'zstd', 'deflate', 'checksum' or 'bare' for an array's filters, or undefined when they are none of the format's. Single bytes may be shuffled, too. */
+/** Returns 'zstd', 'deflate', 'checksum' or 'bare' for an array's filters, or undefined when the format does not allow the filters. Single bytes may be shuffled too. */
 export function pipelineOf(filters, elementSize) {
   const ids = filters.map((f) => f.id), shuffle = elementSize > 1 || ids[0] === FILTER.shuffle ? [FILTER.shuffle] : [];
   const is = (...wanted) => wanted.length === ids.length && wanted.every((id, i) => id === ids[i]);
@@ -16,12 +16,12 @@ export function pipelineOf(filters, elementSize) {
   return is(FILTER.fletcher32) ? 'checksum' : is() ? 'bare' : undefined;
 }
 
-/** The most bytes that an encoded chunk may have. */
+/** Returns the maximum size of an encoded chunk in bytes. */
 export function chunkBound(bytes) {
   return bytes + (bytes >> 8) + 1024;
 }
 
-/** HDF5's fletcher32: big-endian 16-bit words, sums modulo 65535. */
+/** Returns HDF5's fletcher32 checksum: big-endian 16-bit words, sums modulo 65535. */
 export function fletcher32(data) {
   let low = 0, high = 0;
   const words = data.length >> 1;
@@ -52,7 +52,7 @@ function unshuffle(data, size) {
   return out;
 }
 
-/** Whether a compressed block's sequences have one of the two bits of their modes that zstd does not look at. Source: RFC 8878, section 3.1.1.3. */
+/** Returns true when a compressed block sets one of the two reserved bits of its sequence modes, which zstd ignores. Source: RFC 8878, section 3.1.1.3. */
 function modesFault(block) {
   const kind = block[0] & 3, format = block[0] >> 2 & 3;
   let at;
@@ -67,15 +67,15 @@ function modesFault(block) {
       bits = bits * 256 + block[i];
     at = header + Math.floor(bits / 2 ** (4 + width)) % 2 ** width;
   }
-  if (!(at < block.length) || block[at] === 0) // cut short, which decoding tells; or no sequences
+  if (!(at < block.length) || block[at] === 0) // truncated (decoding reports it), or no sequences
     return false;
   at += block[at] < 128 ? 1 : block[at] < 255 ? 2 : 3;
   return (block[at] & 3) !== 0;
 }
 
 /**
- * What is wrong with a chunk as a single zstd frame that states its size, has a checksum and fills the chunk, or undefined. (The wasm decoder
- * alone would take several frames, and frames without a checksum.) Source: RFC 8878, section 3.1.
+ * Checks that a chunk is a single zstd frame with its size and a checksum, and that the frame fills the chunk. Returns the fault, or undefined.
+ * (The wasm decoder alone accepts several frames, and frames without a checksum.) Source: RFC 8878, section 3.1.
  */
 export function zstdFrameFault(data, size) {
   const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
@@ -93,7 +93,7 @@ export function zstdFrameFault(data, size) {
     return "the zstd frame does not state the chunk's size";
   if (!(descriptor & 4))
     return 'the zstd frame has no checksum';
-  if (descriptor & 16) // which zstd does not look at, and no checksum covers
+  if (descriptor & 16) // a bit that zstd ignores and no checksum covers
     return 'an unused bit of the zstd frame is set';
   at += contentBytes;
   for (let last = 0; !last;) {
@@ -102,7 +102,7 @@ export function zstdFrameFault(data, size) {
     const header = data[at] | data[at + 1] << 8 | data[at + 2] << 16;
     last = header & 1;
     const kind = header >> 1 & 3, size = kind === 1 ? 1 : header >> 3;
-    if (kind === 1 && header >> 3 === 1) // zstd writes it as it is
+    if (kind === 1 && header >> 3 === 1) // zstd writes such a block uncompressed
       return 'a block of the zstd frame repeats its byte once';
     if (kind === 2 && modesFault(data.subarray(at + 3, at + 3 + size)))
       return 'an unused bit of the zstd frame is set';
@@ -139,13 +139,13 @@ async function inflate(data, most) {
 
 let wasm;
 
-/** The zstd decoder that is used unless another is given: the wasm of npm's zstddec. Its import needs Node.js, a bundler or an import map. */
+/** Loads the default zstd decoder: the wasm of npm's zstddec. Its import needs Node.js, a bundler or an import map. */
 async function usualZstd() {
   wasm ??= import('zstddec').then(({ ZSTDDecoder }) => loadZstd(ZSTDDecoder));
   return wasm;
 }
 
-/** A zstd decoder from zstddec's class, for places that cannot resolve bare imports (module workers). */
+/** Makes a zstd decoder from zstddec's class, for code that cannot resolve bare imports (module workers). */
 export async function loadZstd(ZSTDDecoder) {
   const decoder = new ZSTDDecoder();
   await decoder.init();
@@ -153,8 +153,8 @@ export async function loadZstd(ZSTDDecoder) {
 }
 
 /**
- * Decodes one stored chunk to exactly `size` bytes. Returns { bytes } or { fault }, a sentence part.
- * `zstd` has decode(bytes, size) as npm's zstddec; undefined: that.
+ * Decodes one stored chunk to exactly `size` bytes. Returns { bytes } or { fault }, where the fault is part of a sentence.
+ * `zstd` has decode(bytes, size) like npm's zstddec, which is the default.
  */
 export async function decodeChunk(stored, pipeline, elementSize, size, zstd) {
   let data = stored;
@@ -169,7 +169,7 @@ export async function decodeChunk(stored, pipeline, elementSize, size, zstd) {
     if (fault)
       return { fault };
     data = (zstd ?? await usualZstd()).decode(data, size);
-    if (data.length !== size) // the decoder gives no bytes on errors
+    if (data.length !== size) // the decoder returns no bytes on errors
       return { fault: 'the zstd frame does not decode, or its checksum does not match' };
   } else if (pipeline === 'deflate') {
     data = await inflate(data, size).catch(() => new Uint8Array(0));

@@ -1,14 +1,14 @@
-// Which of a file's attributes are colours, and these as bytes: format-spec/README.md, section 18.
+// Finds the colour attributes of a file and converts them to bytes: format-spec/README.md, section 18.
 import { formatError } from './error.js';
 
 const CHANNELS = [['red', 'green', 'blue'], ['diffuse_red', 'diffuse_green', 'diffuse_blue']];
-const TYPES = { // views of the values, and what is full
+const TYPES = { // the typed array of the values, and the value of full intensity
   int8: [Int8Array, 255], uint8: [Uint8Array, 255], int16: [Int16Array, 255], uint16: [Uint16Array, 65535], int32: [Int32Array, 255], uint32: [Uint32Array, 255],
   float32: [Float32Array, 1], float64: [Float64Array, 1],
 };
 const ARRAYS_MOST = 1000, COLUMNS_MOST = 64;
 
-/** What an array of the group says of itself; undefined: it can hold no colours. `text(name)`: an attribute. */
+/** Returns the description of an array of the group, or undefined when it cannot hold colours. `text(name)` returns an attribute. */
 export function describeColumns(path, text, isList) {
   const element = text('element'), names = text('names').split(' '), type = text('type'), coding = text('coding');
   if (isList || !['vertex', 'face'].includes(element))
@@ -20,14 +20,14 @@ export function describeColumns(path, text, isList) {
   return { path, element, names, type, coding, elementSize: TYPES[type][0].BYTES_PER_ELEMENT };
 }
 
-/** Paths of the group's arrays, by how many it says there are. */
+/** Returns the paths of the group's arrays from the group's count. */
 export function columnPaths(count) {
   if (count > ARRAYS_MOST)
     throw formatError('/attributes', 'it has more arrays than the format allows');
   return Array.from({ length: count }, (_, n) => `/attributes/${String(n).padStart(3, '0')}`);
 }
 
-/** Of described arrays with columns: { element, channels: three of { path, column } }; undefined: there are no colours. Vertices come first, unless all of them have one gray. */
+/** Finds colours among described arrays. Returns { element, channels: three of { path, column } }, or undefined without colours. Prefers vertex colours, unless all vertices have the same gray. */
 export function chooseColours(described) {
   const of = (element) => {
     for (const names of CHANNELS) {
@@ -44,7 +44,7 @@ export function chooseColours(described) {
   return face && (!vertex || flat) ? face : vertex;
 }
 
-/** A chunk's values as bytes 0 .. 255, row by row. `rows`: without filling. */
+/** Converts a chunk's values to bytes 0 .. 255, row by row. `rows`: the number of rows, padding excluded. */
 export function decodeColours(bytes, array, rows) {
   const { cols, elementSize, columns: { type, coding } } = array, [Type, full] = TYPES[type], width = Math.max(cols, 1), out = new Uint8Array(rows * width);
   const whole = bytes.slice(0, rows * width * elementSize), values = new Type(whole.buffer);
@@ -57,7 +57,7 @@ export function decodeColours(bytes, array, rows) {
   return out;
 }
 
-// Zigzag differences, each to the one before in its column, become values: in place.
+// Decodes zigzag differences to the previous value of the column, in place.
 function undo(bytes, size, isFloat, rows) {
   const wide = size === 8, codes = new ({ 1: Uint8Array, 2: Uint16Array, 4: Uint32Array, 8: BigUint64Array })[size](bytes.buffer), zero = wide ? 0n : 0;
   const difference = wide ? (c) => (c >> 1n) ^ -(c & 1n) : (c) => (c >>> 1) ^ -(c & 1);

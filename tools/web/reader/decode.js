@@ -1,4 +1,4 @@
-// From arrays as stored to values, and what must hold of them: format-spec/README.md, sections 4, 5 and 7.
+// Decodes stored arrays to values and checks the values: format-spec/README.md, sections 4, 5 and 7.
 import { formatError } from './error.js';
 import { INDEX_ROWS } from './facts.js';
 
@@ -6,12 +6,12 @@ export const WHITE = 0, BLACK = 1, LEAF = 2, GRAY = 3;
 
 const levelPath = (level, name) => `/levels/${String(level).padStart(2, '0')}/${name}`;
 
-/** Whether a winding rule takes a winding number as inside. */
+/** Returns true when a winding rule classifies a winding number as inside. */
 export function isInside(rule, winding) {
   return rule === 'nonzero' ? winding !== 0 : rule === 'evenodd' ? winding % 2 !== 0 : winding > 0;
 }
 
-/** How many nodes of each type (white, black, leaf, gray) groups of a level have. */
+/** Returns the number of nodes of each type (white, black, leaf, gray) in groups of a level. */
 export function countTypes(types, level) {
   const counts = [0, 0, 0, 0], octants = level ? 8 : 1;
   if (level === 0 && types[0] > 3)
@@ -27,16 +27,16 @@ function checkTypes(info, level) {
   if (counts[WHITE] !== s.white || counts[BLACK] !== s.black || counts[LEAF] !== s.leaf || counts[GRAY] !== s.gray)
     throw formatError(levelPath(level.level, 'types'), 'the types do not add up to the counts in the head');
   if (level.level && level.types.reduce((sum, t) => sum + (t === 0), 0) !== info.levels[level.level - 1].pruned)
-    throw formatError(levelPath(level.level, 'types'), info.parts.has('pruned') ? 'there is not one empty group for each pruned node of the level above'
+    throw formatError(levelPath(level.level, 'types'), info.parts.has('pruned') ? 'there is not exactly one empty group for each pruned node of the level above'
       : 'a group is 0: all children of a gray node are white');
 }
 
-/** Winding numbers of black and white nodes against the rule. */
+/** Checks winding numbers of black and white nodes against the rule. */
 export function checkWindings(info, level, black, white) {
   if (black?.some((w) => !isInside(info.winding_rule, w)))
-    throw formatError(levelPath(level, 'black_winding'), 'a black node lies outside by the winding rule');
+    throw formatError(levelPath(level, 'black_winding'), 'a black node is outside by the winding rule');
   if (white?.some((w) => isInside(info.winding_rule, w)))
-    throw formatError(levelPath(level, 'white_winding'), 'a white node lies inside by the winding rule');
+    throw formatError(levelPath(level, 'white_winding'), 'a white node is inside by the winding rule');
 }
 
 function checkPlanes(level, countsName, counts, planesName, planes, total) {
@@ -47,16 +47,16 @@ function checkPlanes(level, countsName, counts, planesName, planes, total) {
     throw formatError(levelPath(level.level, countsName), 'the counts do not add up to the number of planes');
   for (const code of planes ?? [])
     if ((code & 1023) === 1023 || (code >>> 10 & 1023) === 1023 || code >>> 20 === 4095)
-      throw formatError(levelPath(level.level, planesName), 'a code stands for no plane');
+      throw formatError(levelPath(level.level, planesName), 'invalid plane code');
 }
 
-/** Colours of gray nodes, if there are any. */
+/** Returns the colours of gray nodes, if the file has any. */
 export function checkColours(level, colours) {
   if (colours?.some((colour) => colour >= 2 ** 24))
     throw formatError(levelPath(level, 'gray_colours'), 'a colour is above 2^24 - 1');
 }
 
-/** A level's tree, planes and colours, against the head's counts. */
+/** Decodes a level's tree, planes and colours, and checks them against the counts in the head. */
 export function checkLevel(info, level) {
   checkTypes(info, level);
   checkPlanes(level, 'plane_counts', level.planeCounts, 'planes', level.planes, level.summary.planes);
@@ -65,9 +65,9 @@ export function checkLevel(info, level) {
   checkColours(level.level, level.grayColours);
 }
 
-/** types_index and gray_index against the sums that they state. */
+/** Checks types_index and gray_index against the sums that they store. */
 export function checkIndexes(level, index) {
-  const wrong = (name) => formatError(levelPath(level.level, name), 'the index contradicts the arrays that it is about');
+  const wrong = (name) => formatError(levelPath(level.level, name), 'the index contradicts the arrays that it indexes');
   if (index.types) {
     const before = [0, 0, 0, 0], order = [WHITE, BLACK, LEAF, GRAY], octants = level.level ? 8 : 1;
     level.types.forEach((types, i) => {
@@ -100,11 +100,11 @@ export function decodeLeaves(info, level, { skip, fresh, refCount, refs, index }
     if (index && leaf % INDEX_ROWS === 0) {
       const row = leaf / INDEX_ROWS * 3;
       if (index[row] !== end || index[row + 1] !== at || index[row + 2] !== planes)
-        throw fail('leaf_index', 'the index contradicts the arrays that it is about');
+        throw fail('leaf_index', 'the index contradicts the arrays that it indexes');
     }
     first[leaf] = end + skip[leaf];
     if (first[leaf] + fresh[leaf] > info.face_count)
-      throw fail('leaf_skip', "a leaf's new faces lie beyond the last face");
+      throw fail('leaf_skip', "a leaf's new faces are beyond the last face");
     end = first[leaf] + fresh[leaf];
     news += fresh[leaf];
     planes += level.leafPlaneCounts?.[leaf] ?? 0;
@@ -112,7 +112,7 @@ export function decodeLeaves(info, level, { skip, fresh, refCount, refs, index }
     for (let k = 0; k < refCount[leaf]; k++) { // descending gaps, ascending numbers
       above -= refs[at + k] + 1;
       if (above < 0)
-        throw fail('leaf_refs', "a reference does not lead to a face before the leaf's own");
+        throw fail('leaf_refs', "a reference is not to a face before the leaf's own");
       refs[at + k] = above;
     }
     refs?.subarray(at, at + refCount[leaf]).reverse();
@@ -123,7 +123,7 @@ export function decodeLeaves(info, level, { skip, fresh, refCount, refs, index }
   Object.assign(level, { leafFirst: first, leafNew: fresh, leafRefCount: refCount, leafRefs: refs });
 }
 
-/** The face lists of a block of leaves: `start` is the end of the new faces of the leaf before, `refs` are the block's. file.js, leafBlock(). */
+/** Decodes the face lists of a block of leaves. `start`: the end of the new faces of the previous leaf. `refs`: the references of the block. See leafBlock() in file.js. */
 export function decodeLeafBlock(info, level, { start, skip, fresh, refCount, refs }) {
   const n = fresh.length, first = new Float64Array(n), refBegin = new Uint32Array(n), out = Float64Array.from(refs);
   let end = start, at = 0;
@@ -131,7 +131,7 @@ export function decodeLeafBlock(info, level, { start, skip, fresh, refCount, ref
     first[i] = end + Number(skip[i]);
     end = first[i] + fresh[i];
     if (end > info.face_count)
-      throw formatError(levelPath(level, 'leaf_skip'), "a leaf's new faces lie beyond the last face");
+      throw formatError(levelPath(level, 'leaf_skip'), "a leaf's new faces are beyond the last face");
     if (refCount[i] > refs.length - at)
       throw formatError(levelPath(level, 'leaf_ref_count'), 'the counts do not add up to the number of references');
     let above = first[i];
@@ -139,14 +139,14 @@ export function decodeLeafBlock(info, level, { start, skip, fresh, refCount, ref
     for (let k = 0; k < refCount[i]; k++, at++)
       out[at] = above -= refs[at] + 1;
     if (above < 0)
-      throw formatError(levelPath(level, 'leaf_refs'), "a reference does not lead to a face before the leaf's own");
+      throw formatError(levelPath(level, 'leaf_refs'), "a reference is not to a face before the leaf's own");
   }
   if (at !== refs.length)
     throw formatError(levelPath(level, 'leaf_ref_count'), 'the counts do not add up to the number of references');
   return { first, fresh, refCount, refBegin, refs: out };
 }
 
-/** Leaves of all levels, depth first, have all faces as new ones in order. `levels` are all of the file, with their face lists. */
+/** Checks that the leaves of all levels, depth first, list every face as new exactly once, in order. `levels`: all levels of the file, with face lists. */
 export function checkOrder(info, levels) {
   const group = levels.map(() => 0), leaf = levels.map(() => 0);
   let seen = 0;
@@ -166,12 +166,12 @@ export function checkOrder(info, levels) {
   };
   walk(0);
   if (seen !== info.face_count)
-    throw formatError(levelPath(0, 'leaf_new'), 'the leaves do not have every face as a new one once');
+    throw formatError(levelPath(0, 'leaf_new'), 'not every face is new in exactly one leaf');
 }
 
 const rowsIn = (array, chunk) => Math.min(array.chunkRows, array.rows - chunk * array.chunkRows);
 
-/** Vertices of one chunk: running sums of zigzag differences of the coordinates' ordered bits, for each axis. */
+/** Decodes the vertices of one chunk: running sums of zigzag differences of the coordinates' ordered bits, for each axis. */
 export function decodeVertices(bytes, array, chunk) {
   const n = rowsIn(array, chunk) * 3;
   const values = array.elementSize === 4 ? vertices32(bytes, n) : vertices64(bytes, n);
@@ -200,7 +200,7 @@ function vertices64(bytes, n) {
   return new Float64Array(bits.buffer);
 }
 
-/** Codes of differences that begin anew each array.chunkRows rows -> bytes of those that do so each `rows` rows. */
+/** Recodes differences that restart every array.chunkRows rows as differences that restart every `rows` rows. Returns bytes. */
 export function recode(bytes, array, rows) {
   const wide = array.elementSize === 8, codes = new (wide ? BigUint64Array : Uint32Array)(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length)), cols = Math.max(array.cols, 1);
   const value = wide ? (code) => (code >> 1n) ^ -(code & 1n) : (code) => (code >>> 1) ^ -(code & 1), none = wide ? 0n : 0;
@@ -218,12 +218,12 @@ export function recode(bytes, array, rows) {
   return new Uint8Array(codes.buffer);
 }
 
-/** Faces of one chunk: 0 is the next vertex not seen before, k the k-th before that one. `index`: vertices seen before each chunk. */
+/** Decodes the faces of one chunk: code 0 is the next new vertex, code k the k-th vertex before it. `index`: the number of vertices used before each chunk. */
 export function decodeFaces(bytes, array, chunk, index, vertexCount) {
   const n = rowsIn(array, chunk) * 3, codes = new Uint32Array(bytes.buffer, bytes.byteOffset, n), out = new Uint32Array(n);
   let seen = index[chunk];
   if (seen > vertexCount || (chunk === 0 && seen !== 0))
-    throw formatError('/mesh/faces_index', 'the index names more vertices than there are');
+    throw formatError('/mesh/faces_index', 'the index has more vertices than the mesh');
   for (let i = 0; i < n; i++) {
     const code = codes[i];
     if (code > seen)
@@ -237,18 +237,18 @@ export function decodeFaces(bytes, array, chunk, index, vertexCount) {
   return out;
 }
 
-// A map's running sums of zigzag differences, afresh in each chunk; `each` is called with them.
+// Decodes a map: running sums of zigzag differences, which restart in each chunk. Calls `each` with the sums.
 function sumMap(codes, array, limit, each) {
   let sum = 0;
   for (let i = 0; i < codes.length; i++) {
     const code = codes[i];
     sum = ((i % array.chunkRows ? sum : 0) + ((code >>> 1) ^ -(code & 1))) >>> 0;
     if (sum >= limit || !each(i, sum))
-      throw formatError(array.path, 'a source number is out of range or used twice');
+      throw formatError(array.path, 'a source index is out of range or used twice');
   }
 }
 
-/** A whole map. */
+/** Decodes a whole map. */
 export function decodeMap(bytes, array, limit) {
   const codes = new Uint32Array(bytes.buffer, bytes.byteOffset, array.rows), out = new Uint32Array(array.rows), used = new Uint8Array(Math.ceil(limit / 8));
   sumMap(codes, array, limit, (i, sum) => {
@@ -260,7 +260,7 @@ export function decodeMap(bytes, array, limit) {
   return out;
 }
 
-/** A chunk of a map; whether other chunks have a number, too, is not known. */
+/** Decodes one chunk of a map. Does not detect numbers that occur in other chunks too. */
 export function decodeMapChunk(bytes, array, limit) {
   const codes = new Uint32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4), out = new Uint32Array(codes.length);
   sumMap(codes, array, limit, (i, sum) => {

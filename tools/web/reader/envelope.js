@@ -1,13 +1,13 @@
-// Envelopes as convex polytopes, cut from the cell: for drawing. Their vertices are rounded; what is certain comes from the decoded half-spaces
-// (query.js). The same steps in the same order as the library's (lib/geometry/polytope.c), so that both draw the same polygons.
-// Source: BP 2008, section 3.4.3 (clipping of the box), done here on vertex loops.
+// Computes envelopes as convex polytopes for drawing by clipping the cell. The vertices are rounded; exact queries use the decoded half-spaces
+// (query.js). The steps and their order are those of lib/geometry/polytope.c, so that both draw the same polygons.
+// Source: BP 2008, section 3.4.3 (clipping of the box); this code clips vertex loops.
 
 const TOLERANCE = 1e-10; // in cell units
 const VERTICES = 192, FACES = 96, CORNERS = 576;
 
 /**
  * In cell coordinates, 0 .. 1 on each axis. `x`: three numbers a vertex; polygon f has the vertices corner[first[f]] .. corner[first[f + 1] - 1],
- * counter-clockwise seen from outside, and wall[f] is 1 when it lies on a wall of the cell.
+ * counter-clockwise seen from outside, and wall[f] is 1 when the polygon is on a face of the cell.
  * @typedef {{ vertices: number, faces: number, x: Float64Array, first: Uint16Array, corner: Uint8Array, wall: Uint8Array }} Polytope
  */
 const room = () => ({ vertices: 0, faces: 0, x: new Float64Array(3 * VERTICES), first: new Uint16Array(FACES + 1), corner: new Uint8Array(CORNERS), wall: new Uint8Array(FACES) });
@@ -21,7 +21,7 @@ function copy(to, from) {
   to.wall.set(from.wall.subarray(0, from.faces));
 }
 
-/** The whole cell. Vertex i has bit 0 x, bit 1 y, bit 2 z. */
+/** Returns the whole cell. In the number of a vertex, bit 0 is x, bit 1 is y, bit 2 is z. */
 const CUBE = {
   vertices: 8, faces: 6,
   x: Float64Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1),
@@ -31,14 +31,14 @@ const CUBE = {
 };
 export const cube = () => CUBE;
 
-/** The half-space of a plane code (format-spec, section 6): { n, d }, integers; 4096 * (n . xi) <= d is kept. */
+/** Returns the half-space 4096 * (n . xi) <= d of a plane code (format-spec, section 6) as integers { n, d }. */
 export function decodePlane(code) {
   const u = (code & 1023) - 511, v = (code >>> 10 & 1023) - 511, w = 511 - Math.abs(u) - Math.abs(v);
   const n = w >= 0 ? [u, v, w] : [(u < 0 ? -1 : 1) * (511 - Math.abs(v)), (v < 0 ? -1 : 1) * (511 - Math.abs(u)), w];
   return { n, d: 4096 * (Math.min(n[0], 0) + Math.min(n[1], 0) + Math.min(n[2], 0)) + 511 * ((code >>> 20) + 1) };
 }
 
-// Room for the work on one polytope: `at` is it, `spare` becomes the next one.
+// Working memory for one polytope: `at` is the current polytope, `spare` receives the next one.
 let at = room(), spare = room();
 const dist = new Float64Array(VERTICES), number = new Uint8Array(VERTICES), on = new Uint8Array(VERTICES), next = new Int16Array(VERTICES);
 const edgeIn = new Uint8Array(FACES), edgeOut = new Uint8Array(FACES), edgeNumber = new Uint8Array(FACES);
@@ -58,10 +58,10 @@ function addVertex(x, y, z, isOn) {
   return i;
 }
 
-// The new vertex on an edge that leaves the half-space.
+// Returns the new vertex on an edge that leaves the half-space.
 function crossing(i, o) {
   if (dist[i] >= -TOLERANCE)
-    return number[i]; // the inner end itself lies on the plane
+    return number[i]; // the inner end of the edge is on the plane
   for (let e = 0; e < edges; e++)
     if (edgeIn[e] === i && edgeOut[e] === o)
       return edgeNumber[e];
@@ -121,7 +121,7 @@ function clipFace(f) {
   }
 }
 
-// Rim edges used in both directions lie between two kept polygons; the others, reversed, bound the cap.
+// Rim edges used in both directions are between two kept polygons. The other rim edges, reversed, bound the cap.
 function closeCap(wall) {
   let open = 0, begin = -1;
   next.fill(-1, 0, spare.vertices);
@@ -152,8 +152,8 @@ function closeCap(wall) {
 }
 
 /**
- * Keeps n . x <= d of `at`. False when next to nothing would remain, or there is no room, or rounding spoiled the loops: it is then left as it
- * was, too large, never too small.
+ * Keeps n . x <= d of `at`. Returns false when almost nothing would remain, memory is too small, or rounding broke the loops. The polytope is
+ * then unchanged: too large, never too small.
  */
 function clip(nx, ny, nz, d, wall) {
   let most = -Infinity, least = Infinity;
@@ -188,8 +188,8 @@ function half(axis, side) {
 }
 
 /**
- * An envelope: what `parent` (undefined: the whole cell) leaves of its child number `octant`, scaled to the child's cell and cut by plane codes.
- * Where numerically nothing is left, the whole cell.
+ * Returns the envelope of child `octant` of `parent` (undefined: the whole cell), scaled to the child's cell and cut by plane codes.
+ * Returns the whole cell when the envelope is numerically empty.
  * @returns {Polytope}
  */
 export function envelope(parent, octant, codes) {
@@ -205,7 +205,7 @@ export function envelope(parent, octant, codes) {
     corner: at.corner.slice(0, at.first[at.faces]), wall: at.wall.slice(0, at.faces) };
 }
 
-/** Volume in cells. */
+/** Returns the volume in units of the cell's volume. */
 export function volume({ x, faces, first, corner }) {
   let sum = 0;
   for (let f = 0; f < faces; f++)

@@ -1,4 +1,4 @@
-// What goes wrong is said in one sentence: what, where, and what to do next. `code` is for programs.
+// Errors of the reader. The message is one sentence: what is wrong, where, and what to do next. Programs use `code`.
 
 export class EbpoError extends Error {
   /**
@@ -12,12 +12,12 @@ export class EbpoError extends Error {
   }
 }
 
-/** A file that breaks its format. `where` is an object's path, or '' for the file as a whole. */
+/** Makes the error of a file that violates the format. `where` is an object's path, or '' for the whole file. */
 export function formatError(where, what, next = 'get a fresh copy of the file') {
   return new EbpoError('FORMAT', `${where ? where + ': ' : ''}${what}; ${next}`);
 }
 
-/** An array that another program has stored anew: not damaged, but not in the form that the format fixes. */
+/** Makes the error of an array that another program has rewritten: not damaged, but not in the layout that the format requires. */
 export function foreignError(where, what) {
   return new EbpoError('UNSUPPORTED', `${where}: ${what}; write the file anew with 'ebpo repack --compat'`);
 }

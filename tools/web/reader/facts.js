@@ -1,4 +1,4 @@
-// What a file's head says: root attributes, levels, and the table of arrays. format-spec/README.md, sections 3 and 4.
+// Reads a file's head: root attributes, levels, and the table of arrays. format-spec/README.md, sections 3 and 4.
 import { CHUNK_BYTES_MAX } from './chunk.js';
 import { EbpoError, formatError } from './error.js';
 import { text } from './hdf5.js';
@@ -15,7 +15,7 @@ const COUNTS = ['source_size', 'vertex_count', 'face_count', 'source_vertex_coun
   'mesh_nonmanifold_edges', 'mesh_misoriented_edges', 'mesh_unbalanced_edges', 'mesh_bowtie_vertices', 'mesh_zero_area_faces',
   'mesh_index_repeated_faces', 'mesh_repeated_faces', 'mesh_unreferenced_vertices', 'mesh_repeated_positions', 'mesh_edges', 'mesh_components',
   'mesh_boundary_loops'];
-const HINTS = ['chunk_index_offset', 'chunk_index_bytes', 'top_bytes']; // may be absent, and wrong
+const HINTS = ['chunk_index_offset', 'chunk_index_bytes', 'top_bytes']; // may be absent or wrong
 const NUMBERS = ['grid_level', 'max_level', 'level_count'];
 const REALS = ['epsilon', 'mesh_area', 'mesh_volume', 'mesh_mean_edge'];
 const TRIPLES = ['box_origin', 'box_size', 'mesh_min', 'mesh_max'];
@@ -66,7 +66,7 @@ export class Facts {
     return Number(value);
   }
 
-  /** A count that may be absent, or of another program's type: then 0. */
+  /** Returns a count, or 0 when it is absent or has a type that another program wrote. */
   hint(name) {
     try {
       return this.count(name);
@@ -116,7 +116,7 @@ function readParts(facts) {
   return seen;
 }
 
-/** The root's attributes as an object with the attributes' names, and `parts`, a Set of words. */
+/** Returns the root's attributes as an object with the attributes' names, and `parts`, a Set of words. */
 export function readFacts(attributes) {
   const facts = new Facts(attributes, '/'), out = {};
   let format;
@@ -124,14 +124,14 @@ export function readFacts(attributes) {
     format = facts.text('format');
   } catch { /* said below */ }
   if (format !== 'EBP-Octree in HDF5')
-    throw formatError('', 'an HDF5 file, but not an EBP-Octree (its root attribute format does not say "EBP-Octree in HDF5")',
+    throw formatError('', 'an HDF5 file, but not an EBP-Octree (its root attribute format is not "EBP-Octree in HDF5")',
       /^EBP-Octree paint/.test(format) ? 'this is paint for a model: open the model, then this file by Open in its section Paint' : 'make one with `ebpo convert`');
   out.format_version_major = facts.int('format_version_major');
   out.format_version_minor = facts.int('format_version_minor');
   if (out.format_version_major !== 1)
     throw new EbpoError('VERSION', `format version ${out.format_version_major}.${out.format_version_minor}, and this reader reads version 1; use a newer one`);
   if (facts.has('format_version') && facts.text('format_version') === '1.0-draft') // for people, but files of the draft have the same numbers
-    throw new EbpoError('VERSION', 'was written while the format was a draft, which is not read any more; convert the model again');
+    throw new EbpoError('VERSION', 'was written by a draft of the format, which is no longer supported; convert the model again');
   out.parts = readParts(facts);
   out.generator = facts.text('generator');
   for (const name of TEXTS)
@@ -185,7 +185,7 @@ export function readFacts(attributes) {
   return out;
 }
 
-/** A level's attributes. */
+/** Returns a level's attributes. */
 export function readLevelFacts(attributes, where) {
   const facts = new Facts(attributes, where), out = {};
   for (const name of LEVEL_COUNTS)
@@ -196,7 +196,7 @@ export function readLevelFacts(attributes, where) {
   return out;
 }
 
-/** Whether an axis of the root box lies on a grid of exact doubles (format-spec, section 5). Exact: in integers. */
+/** Returns true when an axis of the root box is on a grid of exact doubles (format-spec, section 5). Computes exactly, in integers. */
 function axisValid(origin, size, gridLevel) {
   const largest = 2 ** 1002;
   if (!(Math.abs(origin) <= largest && size > 0 && size <= largest))
@@ -234,11 +234,11 @@ function checkLevelCounts(info, level) {
   if (last ? s.gray && !subset : s.gray === 0)
     return 'the gray nodes do not end at the deepest level';
   if (subset ? s.pruned > s.gray || (last && s.pruned !== s.gray) : s.pruned !== 0)
-    return "a level's pruned nodes are not some of its gray ones, or not all of them at the deepest level";
+    return "a level's pruned nodes exceed its gray nodes, or differ from them at the deepest level";
   if (!last && subset && (s.pruned === s.gray || info.levels[level + 1].white < 8 * s.pruned))
-    return "a level has nothing but the places of pruned nodes' children, or not all of these";
+    return "a level has only the empty groups of pruned nodes, or not all of them";
   if (s.planes > (has('planes') ? 255 * s.gray : 0) || s.leaf_planes > (has('leaf-planes') ? 255 * s.leaf : 0))
-    return 'a level has more planes than its nodes can';
+    return 'a level has more planes than its nodes can have';
   if (!has('mesh') && (s.faces_new || s.faces_referenced))
     return 'a level counts faces, and there is no mesh';
   if (s.leaf === 0 && (s.faces_new || s.faces_referenced))
@@ -246,11 +246,11 @@ function checkLevelCounts(info, level) {
   if (s.black && !info.solid)
     return 'a surface has black nodes';
   if (s.leaf && s.faces_referenced / s.leaf > info.face_count)
-    return 'a level refers to more faces than there are';
+    return 'a level refers to more faces than the mesh has';
   return undefined;
 }
 
-/** Whether the facts can be true together, before anything is sized by them. */
+/** Checks that the facts are consistent before any memory is sized by them. */
 export function checkFacts(info) {
   const mesh = (what) => formatError('/', what);
   if (info.parts.has('gates') && !info.parts.has('mesh'))
@@ -263,7 +263,7 @@ export function checkFacts(info) {
     throw mesh('more faces were dropped than the source has');
   if (info.vertex_count > info.source_vertex_count
     || info.face_count > info.source_face_count + info.mend_added_faces - info.mend_dropped_faces)
-    throw mesh('the mesh has more vertices or faces than its source and the mending account for');
+    throw mesh('the mesh has more vertices or faces than its source and the repair record explain');
   if (info.parts.has('maps') && !info.parts.has('mesh'))
     throw mesh('there are maps but no mesh');
   if (info.grid_level > 20 || info.max_level > info.grid_level || info.level_count > info.max_level + 1)
@@ -277,13 +277,13 @@ export function checkFacts(info) {
     const wrong = checkLevelCounts(info, level);
     faces += info.levels[level].faces_new;
     if (wrong || faces > info.face_count)
-      throw formatError('/levels', wrong ?? 'the levels have more new faces than there are');
+      throw formatError('/levels', wrong ?? 'the levels have more new faces than the mesh');
   }
   if (info.parts.has('mesh') && faces !== info.face_count)
     throw formatError('/levels', "the levels' new faces do not add up to face_count");
 }
 
-/** Rows of a chunk: the largest power of two that fits, or all rows when there are fewer. */
+/** Returns the rows of a chunk: the largest power of two that fits, or all rows when there are fewer. */
 export function chunkRows(rows, cols, elementSize) {
   const fit = 2 ** Math.floor(Math.log2(65536 / (elementSize * Math.max(cols, 1))));
   return Math.min(rows, fit);
@@ -328,28 +328,28 @@ const ROOT_ARRAYS = {
   '/maps/face_source': [0, [4], false, (info) => has(info, 'maps', info.face_count)],
 };
 
-/** Throws unless an array's attribute names the coding that the format has for it. In older files `delta` stands at leaf_skip. */
+/** Throws unless an array's attribute names the coding that the format requires. Older files have `delta` for leaf_skip. */
 export function checkCoding(attributes, path, gates) {
   const word = new Facts(attributes, path).text('coding', 15), name = path.startsWith('/levels/') ? path.slice(path.lastIndexOf('/') + 1) : path;
   if (!(path.startsWith('/attributes/') ? ['plain', 'columns'] : gates ? ['gates'] : CODINGS[name] ?? ['plain']).includes(word))
-    throw formatError(path, "the array's coding is none that the format has for it");
+    throw formatError(path, "the array's coding is not valid for this array");
 }
 
-/** What the arrays of a group of attributes say of themselves: `count` of the group, `text` and `range` of an array. */
+/** Describes the arrays of a group of attributes: `count` of the group, `text` and `range` of an array. */
 export function attributesFacts(attributes, path) {
   const facts = new Facts(attributes, path);
   return { count: () => facts.count('arrays'), text: (name) => facts.text(name, 255), isList: facts.has('list'), range: facts.has('range') ? facts.reals('range', 2) : undefined };
 }
 
-/** Columns of /subtrees/counts. */
+/** Returns the columns of /subtrees/counts. */
 export const subtreeCols = (info) => 6 + 7 * (info.level_count - 1 - info.subtree_level);
 
 export const PLACES = '/subtrees/places', CHUNK_SUMS = '/chunk_sums';
 
-/** Whether an array is a list about all chunks: a single one itself, and not told of in any. */
+/** Returns true for lists about all chunks. Such a list is itself a single chunk, and no list contains it. */
 export const isList = (path) => path === PLACES || path === CHUNK_SUMS;
 
-// With the part subtrees. rows: undefined where the array itself says it.
+// With the part subtrees. rows: undefined when the array itself stores the number.
 const subtreeArrays = (info) => (info.subtree_level === undefined ? [] : [
   { path: '/subtrees/counts', cols: subtreeCols(info), sizes: [4], rows: info.levels[info.subtree_level].gray },
   { path: '/subtrees/index', cols: subtreeCols(info), sizes: [8], rows: undefined },
@@ -357,7 +357,7 @@ const subtreeArrays = (info) => (info.subtree_level === undefined ? [] : [
   { path: PLACES, cols: 0, sizes: [8], rows: undefined },
 ]);
 
-/** The arrays that a file with these facts has: [{ path, level, order, name, cols, sizes, signed, rows, mayBeAbsent }]. `order`: among those of its level. */
+/** Returns the arrays of a file with these facts: [{ path, level, order, name, cols, sizes, signed, rows, mayBeAbsent }]. `order`: the array's index in its level. */
 export function arraysOf(info) {
   const out = [];
   info.levels.forEach((summary, level) => {
@@ -372,10 +372,10 @@ export function arraysOf(info) {
   return out.filter((a) => a.rows !== 0);
 }
 
-/** Rows of a chunk, with the part subtrees. */
+/** Returns the rows of a chunk in files with the part subtrees. */
 export const FIXED_ROWS = { '/mesh/faces': 2048, '/mesh/vertices': 1024 };
 
-/** Whether chunks of an array may have so many rows. */
+/** Returns true when chunks of an array may have this number of rows. */
 export function chunkRowsFit(info, path, rows, cols, elementSize, chunk) {
   if (isList(path))
     return chunk === rows;

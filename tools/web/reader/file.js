@@ -1,4 +1,4 @@
-// An open EBP-Octree file: its facts, its levels, its mesh. Bytes are fetched when they are asked for, neighbours in one request.
+// Reads an EBP-Octree file: facts, levels, mesh. Bytes are fetched when needed; neighbouring ranges share a request.
 import { CHUNK_BYTES_MAX, chunkBound, pipelineOf } from './chunk.js';
 import { EbpoError, foreignError, formatError } from './error.js';
 import { chooseColours, columnPaths, describeColumns } from './colours.js';
@@ -29,7 +29,7 @@ export async function openEbpo(what, options = {}) {
   try {
     const file = new EbpoFile(source, options);
     await file.openHead(options.headBytes ?? HEAD_BYTES);
-    if (file.arrays.get('/levels/00/types').pipeline === 'bare') // chunks without checksums: only that of all content tells of damage
+    if (file.arrays.get('/levels/00/types').pipeline === 'bare') // chunks without checksums: only the checksum of all content detects damage
       await file.verifyContent();
     return file;
   } catch (error) {
@@ -52,7 +52,7 @@ export class EbpoFile {
     this.arrays = new Map(); // path: { path, rows, cols, elementSize, signed, chunkRows, chunkCount, pipeline, chunks, bytes }; chunks and bytes are undefined until located
   }
 
-  /** Requests made and bytes received so far. */
+  /** Returns the requests made and bytes received so far. */
   get traffic() {
     return { requests: this.source.requests, bytes: this.source.bytes };
   }
@@ -69,7 +69,7 @@ export class EbpoFile {
       } catch (error) {
         if (!(error instanceof NeedBytes))
           throw error;
-        const { length } = this.head, coming = source.coming > length ? source.coming : source.size; // rather what is on its way than another request
+        const { length } = this.head, coming = source.coming > length ? source.coming : source.size; // prefer bytes that are already loading to another request
         await this.#moreHead(Math.min(source.size, Math.max(error.end, Math.min(2 * length, coming))));
       }
     this.store = new Store(this.info, this.arrays, source, this.head, { zstd: this.options.zstd, budget: this.options.cacheBytes });
@@ -115,14 +115,14 @@ export class EbpoFile {
       this.colours = this.#findColours(hdf5, group('/attributes', root.links.get('attributes')), info, arrays);
     for (const array of arrays.values())
       if (array.pipeline !== arrays.get('/levels/00/types').pipeline)
-        throw foreignError(array.path, "the array's filters are other ones than the file's first array has");
+        throw foreignError(array.path, "the array's filters differ from those of the file's first array");
     const counts = arrays.get('/subtrees/counts');
     if (counts && arrays.get('/subtrees/index').rows !== counts.chunkCount)
       throw formatError('/subtrees/index', "the array's length contradicts the chunks of counts");
     this.info = info;
     this.arrays = arrays;
     this.hdf5 = hdf5;
-    this.#placeArrays((array) => !array.indexed); // a single chunk's place stands in its array's header
+    this.#placeArrays((array) => !array.indexed); // the header of an array with a single chunk has the chunk offset
     if (arrays.has(PLACES))
       return; // has a list of all chunks
     try {
@@ -133,7 +133,7 @@ export class EbpoFile {
     }
   }
 
-  // Of the attributes only colours are read.
+  // Only colours are read from the attributes.
   #findColours(hdf5, group, info, arrays) {
     const described = columnPaths(attributesFacts(group.attributes, '/attributes').count()).map((path) => {
       const address = group.links.get(path.slice(-3)), o = address === undefined ? undefined : hdf5.object(address, path);
@@ -163,12 +163,12 @@ export class EbpoFile {
       throw formatError('', "the arrays' chunks take more room than the file has");
   }
 
-  /** Whether it is known where all chunks are. Arrays of several chunks have an index, and in files with subtrees there is a list of all chunks. */
+  /** Returns true when all chunk offsets are known. Arrays of several chunks have an index; files with subtrees have a directory of all chunks. */
   get located() {
     return [...this.arrays.values()].every((a) => a.chunks);
   }
 
-  /** Fetches that, if it is not there yet. Reading does so by itself when it must. */
+  /** Fetches the chunk offsets unless they are known. Reading does this automatically when needed. */
   async locate() {
     if (this.located)
       return;
@@ -208,7 +208,7 @@ export class EbpoFile {
       } catch (error) {
         if (!(error instanceof NeedBytes))
           throw named(this.source, error);
-        // Another program wrote the file: ever more of it around what was missed.
+        // Another program wrote the file: read growing ranges around the missing bytes.
         const from = Math.min(piece?.at ?? error.at, error.at), to = Math.max(piece?.end ?? error.end, error.end);
         piece = { at: from, end: Math.min(this.source.size, from + 2 * (to - from) + 128 * 1024) };
         if (piece.end - piece.at > INDEX_BYTES_MOST)
@@ -217,7 +217,7 @@ export class EbpoFile {
     }
   }
 
-  /** Bytes of the file up to the end of a level: what a reader has fetched that went through it in order. NaN where that is not known yet (`located`). */
+  /** Returns the bytes from the beginning of the file to the end of a level. NaN while the chunk offsets are unknown (`located`). */
   bytesToLevel(level) {
     const arrays = [...this.arrays.values()].filter((a) => a.level <= level), places = (a) => a.chunks?.map((c) => c.at + c.bytes) ?? [NaN];
     if (!this.info.parts.has('subtrees'))
@@ -226,7 +226,7 @@ export class EbpoFile {
     return arrays.reduce((sum, a) => sum + (a.bytes ?? NaN), begin);
   }
 
-  // Whole arrays as stored; absent ones are undefined. -> Map(path, bytes)
+  // Reads whole arrays as stored; absent arrays are undefined. Returns Map(path, bytes).
   async #raw(paths) {
     await this.#findChunks(paths);
     return this.store.raw(paths);
@@ -237,7 +237,7 @@ export class EbpoFile {
       await this.locate();
   }
 
-  // What goes wrong is told with the file's name.
+  // Adds the file's name to errors.
   async #told(work) {
     try {
       return await work();
@@ -249,7 +249,7 @@ export class EbpoFile {
   // --- levels ---
 
   /**
-   * Levels first .. last, in one go: as few requests as their bytes allow. With `faces`, their leaves' face lists too.
+   * Reads levels first .. last in as few requests as possible. With `faces`, reads the face lists of their leaves too.
    * Each: { level, summary, groups, types, planeCounts, planes, leafWinding, blackWinding, whiteWinding, leafPlaneCounts, leafPlanes,
    *         leafFirst, leafNew, leafRefCount, leafRefs }
    * as typed arrays; undefined where the file has no such array (format-spec, section 4). Windings are Int32Array, leafRefs ascending.
@@ -266,7 +266,7 @@ export class EbpoFile {
     }
   }
 
-  /** The face lists of levels that were read without them; adds them to the levels' objects. */
+  /** Reads the face lists of levels that were read without them, and adds the lists to the levels' objects. */
   async addFaces(levels) {
     try {
       const raw = await this.#raw(levels.flatMap((l) => FACE_TABLES.map((name) => folder(l.level) + name)));
@@ -304,8 +304,8 @@ export class EbpoFile {
   // --- parts of levels ---
 
   /**
-   * Nodes of parts of levels, as segments for Tree.addPart(): wanted is [{ level, part }], Tree.partOf() names them. In one batch. With `planes` what
-   * drawing needs, else what exact questions need: leaves' winding numbers.
+   * Reads nodes of parts of levels in one batch, as segments for Tree.addPart(). `wanted` is [{ level, part }] from Tree.partOf(). With `planes` reads the
+   * data for drawing, else the data for exact queries: winding numbers of leaves.
    */
   async nodeParts(wanted, { planes = true } = {}) {
     return this.#told(async () => {
@@ -314,7 +314,7 @@ export class EbpoFile {
     });
   }
 
-  /** How many bytes nodeParts() would have to fetch. */
+  /** Returns the number of bytes that nodeParts() would fetch. */
   async costOfParts(wanted, { planes = true } = {}) {
     return this.#told(async () => {
       await this.locate();
@@ -324,7 +324,7 @@ export class EbpoFile {
   }
 
   /**
-   * Subtrees, by the ranks of their roots in level `subtree_level`: all that exact questions need of them, in one batch. Returns their nodes,
+   * Reads the data of subtrees for exact queries in one batch. Subtrees are numbered by the ranks of their roots in level `subtree_level`. Returns their nodes,
    * [{ level, part, segment }], without planes; lists, faces and vertices are kept for leafFaces().
    */
   async subtrees(numbers) {
@@ -346,7 +346,7 @@ export class EbpoFile {
       throw new EbpoError('ABSENT', `${this.source.name}: the file was written without its mesh; convert it again with it`);
   }
 
-  /** The whole mesh: { vertices: Float32Array or Float64Array, faces: Uint32Array }, three numbers each. */
+  /** Reads the whole mesh: { vertices: Float32Array or Float64Array, faces: Uint32Array }, three numbers each. */
   async mesh() {
     this.#needMesh();
     return this.#told(async () => {
@@ -364,7 +364,7 @@ export class EbpoFile {
     });
   }
 
-  /** Some faces: `numbers` are face numbers, the answer their corners: Float64Array, nine numbers each. Fetches the chunks of faces, then those of vertices. */
+  /** Reads faces by their face numbers. Returns their corners: Float64Array, nine numbers each. Fetches the chunks of faces, then those of vertices. */
   async facesByNumber(numbers) {
     this.#needMesh();
     return this.#told(async () => {
@@ -378,7 +378,7 @@ export class EbpoFile {
     });
   }
 
-  // Red, green, blue of each corner, nine bytes a face.
+  // Reads red, green, blue of each corner, nine bytes a face.
   async #coloursOf(numbers, corners) {
     if (!this.colours)
       return undefined;
@@ -390,15 +390,15 @@ export class EbpoFile {
     return out;
   }
 
-  // The rows of colours that subtrees have as their own.
+  // Returns the rows of colours that subtrees own.
   #colourRanges(rows) {
     const own = this.colours?.element === 'vertex' ? (r) => [r.firstVertex, r.vertices] : (r) => [r.firstFace, r.faces];
     return (this.colours?.channels ?? []).flatMap(({ path }) => rows.map((r) => ({ path, from: own(r)[0], to: own(r)[0] + own(r)[1] })));
   }
 
   /**
-   * The face lists of leaves 4096 * block .. of a level, without reading the others': { first, fresh, refCount, refBegin, refs }, the arrays by
-   * the leaf's place in the block. A leaf's faces are first .. first + fresh - 1 and refs[refBegin] .. refs[refBegin + refCount - 1].
+   * Reads only the face lists of leaves 4096 * block .. of a level: { first, fresh, refCount, refBegin, refs }, arrays indexed by
+   * the leaf's position in the block. A leaf's faces are first .. first + fresh - 1 and refs[refBegin] .. refs[refBegin + refCount - 1].
    */
   async leafBlock(level, block) {
     this.#needMesh();
@@ -411,8 +411,8 @@ export class EbpoFile {
   }
 
   /**
-   * The faces of leaves (nodes of tree.js), nine numbers each: [Float64Array], and their numbers as `.numbers` of each. Of a subtree everything is
-   * fetched in one batch: lists, faces, vertices. `.colours`, where the file has any: red, green, blue of each corner, 0 to 255.
+   * Reads the faces of leaves (nodes of tree.js): [Float64Array], nine numbers a face; `.numbers` of each array has the face indices. The lists, faces
+   * and vertices of a subtree are fetched in one batch. `.colours`, where the file has any: red, green, blue of each corner, 0 to 255.
    */
   async leafFaces(leaves) {
     this.#needMesh();
@@ -439,7 +439,7 @@ export class EbpoFile {
     });
   }
 
-  /** { vertexSource, faceSource }: Uint32Array, the source's numbers. */
+  /** Reads the maps { vertexSource, faceSource }: Uint32Array, indices in the source mesh. */
   async maps() {
     if (!this.info.parts.has('maps'))
       throw new EbpoError('ABSENT', `${this.source.name}: the file was written without its maps to the source's numbers; convert it again with them`);
@@ -452,7 +452,7 @@ export class EbpoFile {
     }
   }
 
-  /** The source's numbers of some faces, by theirs in the file; from `source_face_count` on: faces that mending has added. Without reading the whole map. */
+  /** Returns the source indices of faces from their indices in the file, without reading the whole map. Indices from `source_face_count` on are faces that the repair added. */
   async sourceFaces(numbers) {
     if (!this.info.parts.has('maps'))
       throw new EbpoError('ABSENT', `${this.source.name}: the file was written without its maps to the source's numbers; convert it again with them`);
@@ -479,7 +479,7 @@ export class EbpoFile {
     const paths = [...this.arrays.keys()].filter((p) => !isList(p) && !/^\/(subtrees|attributes)\//.test(p)).sort();
     for (const name of ['content_sha256', 'colours_sha256'].filter((n) => this.info[n])) {
       if (await this.#checksum(paths.filter((p) => of(p) === name)) !== this.info[name])
-        throw named(this.source, formatError('', `the content is not what ${name} says: the file was changed`, 'get a fresh copy'));
+        throw named(this.source, formatError('', `the content does not match ${name}: the file was changed`, 'get a fresh copy'));
     }
   }
 
@@ -495,7 +495,7 @@ export class EbpoFile {
     return [...await digest(all)].map((b) => b.toString(16).padStart(2, '0')).join('');
   }
 
-  // What counts of an array: what it would hold without subtrees, which have smaller chunks.
+  // Returns the hashed content of an array: the content of a file without subtrees, which have smaller chunks.
   #digested(path, bytes) {
     const array = this.arrays.get(path), rows = chunkRows(array.rows, array.cols, array.elementSize);
     if (!this.info.parts.has('subtrees'))
@@ -506,13 +506,13 @@ export class EbpoFile {
   }
 }
 
-// SHA-256 by the platform: bytes -> Uint8Array. Only old Node.js has no global one; bundlers for browsers need not look for it.
+// Computes SHA-256 with the platform's function: bytes -> Uint8Array. Only old Node.js lacks the global; browser bundlers need not resolve this import.
 async function sha256() {
   const node = 'node:crypto', { subtle } = globalThis.crypto ?? (await import(/* @vite-ignore */ /* webpackIgnore: true */ node)).webcrypto;
   return async (bytes) => new Uint8Array(await subtle.digest('SHA-256', bytes));
 }
 
-// The numbers of a leaf's faces, ascending.
+// Returns the indices of a leaf's faces, ascending.
 function numbersOf(lists, rank) {
   const i = rank - lists.begin, refs = lists.refCount[i], out = new Uint32Array(refs + lists.fresh[i]);
   for (let k = 0; k < refs; k++)
@@ -527,7 +527,7 @@ function place(array, chunks) {
   array.bytes = chunks.reduce((sum, c) => sum + c.bytes, 0);
 }
 
-// An array's object against what the facts call for.
+// Checks an array's object against the facts.
 function describe(hdf5, wanted, linked, address, info) {
   const { path, cols, gates } = wanted;
   if (!linked)
@@ -552,7 +552,7 @@ function describe(hdf5, wanted, linked, address, info) {
   const elementSize = o.type.size, rows = wanted.rows ?? o.space.dims[0], [fit] = o.layout.chunk, chunk = [fit, ...o.space.dims.slice(1)];
   if (o.layout.elementSize !== elementSize || chunk.length !== o.layout.chunk.length || chunk.some((n, i) => n !== o.layout.chunk[i]) ||
       !chunkRowsFit(info, path, o.space.dims[0], o.space.dims[1] ?? 0, elementSize, fit))
-    throw foreignError(path, "the array's chunks do not have the size that the format fixes");
+    throw foreignError(path, "the array's chunks do not have the size that the format requires");
   const pipeline = pipelineOf(o.filters, elementSize);
   if (!pipeline)
     throw foreignError(path, "the array's filters are none of the format's");
@@ -565,7 +565,7 @@ function describe(hdf5, wanted, linked, address, info) {
   checkCoding(o.attributes, path, gates);
   const storedRow = elementSize * Math.max(gates ? GATES_COLS : cols, 1), whole = fit * storedRow;
   if (whole > (isList(path) ? Math.min(LIST_BYTES_MOST, 2 * hdf5.size) : CHUNK_BYTES_MAX))
-    throw formatError(path, "the array's chunks do not have the size that the format fixes");
+    throw formatError(path, "the array's chunks do not have the size that the format requires");
   return { path, number: placeNumber(path, wanted.level, wanted.order), level: wanted.level, name: wanted.name, rows, cols,
     elementSize: gates ? 4 : elementSize, signed: o.type.signed, chunkRows: fit, chunkCount: Math.ceil(rows / fit), chunkMost: chunkBound(whole), gates,
     stored: { elementSize, rowBytes: storedRow }, rowBytes: gates ? 4 * cols : storedRow, pipeline,

@@ -1,8 +1,8 @@
-// Faces across edges (coding `gates`, format-spec/README.md, section 7): a chunk's streams -> its codes of high-water.
+// Decodes faces across edges (coding `gates`, format-spec/README.md, section 7): converts a chunk's streams to high-water codes.
 
 export const GATES_COLS = 13;
 const OPEN_MOST = 64, NEAR = 32, LOW_END = 224, LONG = 240;
-const NEW = 0, AT_SECOND = 1, AT_FIRST = 2, BY_NUMBER = 3, AT_OPEN = 4; // what `third` says of the corner beyond the edge
+const NEW = 0, AT_SECOND = 1, AT_FIRST = 2, BY_NUMBER = 3, AT_OPEN = 4; // values of `third`: the corner beyond the edge
 
 /** Pairs of vertices, newest last. Vertices are counted from the first one that is new in the chunk, modulo 2^32: codes say no more. */
 class OpenEdges {
@@ -37,7 +37,7 @@ class OpenEdges {
     this.push(b, a);
   }
 
-  /** What is open behind a face (a, b, c) that lay across (a, b); `at`: where the edge was that named c. */
+  /** Updates the open edges behind a face (a, b, c) across (a, b). `at`: the position of the edge that named c. */
   goThrough(kind, at, a, b, c) {
     if (kind === NEW) {
       this.push(c, b);
@@ -63,7 +63,7 @@ class Streams {
     Object.assign(this, { bytes, gate: 0, third: rows, low: rows + thirds, more: rows + thirds + 3 * (rows - thirds) + numbers, end: GATES_COLS * rows });
   }
 
-  /** The next number; undefined: it is none. */
+  /** Returns the next number, or undefined when the bytes are not a number. */
   number() {
     const { bytes } = this, low = bytes[this.low++];
     if (low < LOW_END)
@@ -119,7 +119,7 @@ function withoutStreams(bytes, rows) {
   return out;
 }
 
-/** Codes of `rows` faces, or undefined where the bytes are those of none. Numbers above `seen` come out as codes above it: decodeFaces refuses these. */
+/** Returns the codes of `rows` faces, or undefined when the bytes are invalid. Numbers above `seen` become codes above it, which decodeFaces rejects. */
 export function decodeGates(bytes, rows) {
   if (bytes[0] === 1)
     return withoutStreams(bytes, rows);

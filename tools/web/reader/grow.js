@@ -1,11 +1,11 @@
-// Brings into a tree what is below some of its nodes: whole levels where little is left out by that, else parts of levels, all in one batch.
+// Loads the nodes below some nodes of a tree in one batch: whole levels when most of a level is needed, else parts of levels.
 import { INDEX_ROWS } from './facts.js';
 
-const BATCH_BYTES = 256 * 1024;                // of parts, so that pictures come in between
-const WHOLE_SHARE = 0.3;                       // of a level's parts, from which on all of it is taken
+const BATCH_BYTES = 256 * 1024;                // of parts; pictures are drawn between batches
+const WHOLE_SHARE = 0.3;                       // the share of a level's parts from which on the whole level is loaded
 const WHOLE_BYTES_MOST = 64 * 1024 * 1024;     // of whole levels, decoded, about
 
-/** Levels that are always read as a whole: those above subtrees, in other files small ones. */
+/** Returns the levels that are always read whole: the levels above subtrees, or small levels in other files. */
 export function isSmall(info, level) {
   return info.subtree_level === undefined ? level === 0 || info.levels[level - 1].gray <= INDEX_ROWS : level <= info.subtree_level;
 }
@@ -25,8 +25,8 @@ async function addWhole(file, tree, numbers) {
 }
 
 /**
- * For drawing. wants: [{ node, levels }], most important first: nodes whose children are not at hand, and how many levels below them are wanted.
- * `bytes`: fetch about so much at most. Returns how many parts and levels came.
+ * Loads nodes for drawing. wants: [{ node, levels }], most important first: nodes whose children are not loaded, and the number of levels to load below them.
+ * `bytes`: fetch about so much at most. Returns the number of parts and levels that were loaded.
  */
 export async function growForView(file, tree, wants, { bytes = BATCH_BYTES } = {}) {
   const { info } = tree, whole = new Set(), parts = new Map(), count = [];
@@ -59,7 +59,7 @@ async function affordable(file, parts, bytes) {
   return parts.slice(0, n);
 }
 
-/** For exact questions: nodes without planes, and in files with subtrees the faces at once. `tree` is a lean one. */
+/** Loads nodes for exact queries, without planes; in files with subtrees also loads the faces. `tree` is a tree without planes. */
 export async function growForQuestion(file, tree, nodes) {
   const { info } = tree, C = info.subtree_level, whole = [], parts = new Map(), subtrees = new Set();
   for (const node of nodes)

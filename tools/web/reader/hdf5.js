@@ -1,17 +1,17 @@
-// The part of HDF5's file format that EBP-Octree files are made of, and nothing else: superblock 3, version 2 object headers with all links and
-// attributes in them, arrays of fixed size in chunks with the single-chunk or the fixed-array index. Everything else is refused by name.
+// Reads the subset of HDF5's file format that EBP-Octree files use: superblock 3, version 2 object headers with all links and
+// attributes in them, arrays of fixed size in chunks with the single-chunk or the fixed-array index. Other features are rejected with their name.
 // Every block's checksum is compared, and every count and address is checked before it is used.
 // Source: The HDF Group, "HDF5 File Format Specification Version 3.0".
 import { EbpoError, formatError } from './error.js';
 
 const UNDEFINED = 0xffffffffffffffffn;
 const SIGNATURE = [0x89, 0x48, 0x44, 0x46, 0x0d, 0x0a, 0x1a, 0x0a];
-const MESSAGES_MOST = 8192, BLOCKS_MOST = 256; // of one object header: far above what is written, far below what hurts
+const MESSAGES_MOST = 8192, BLOCKS_MOST = 256; // limits of one object header: far above written files, low enough for untrusted input
 
 const NIL = 0x00, DATASPACE = 0x01, LINK_INFO = 0x02, DATATYPE = 0x03, FILL_OLD = 0x04, FILL = 0x05, LINK = 0x06, LAYOUT = 0x08, GROUP_INFO = 0x0a,
   EXTERNAL = 0x07, PIPELINE = 0x0b, ATTRIBUTE = 0x0c, CONTINUATION = 0x10, ATTRIBUTE_INFO = 0x15;
 
-/** Thrown when bytes beyond the parts at hand are needed, from `at` to `end`. */
+/** Thrown when bytes `at` to `end` are needed and not loaded. */
 export class NeedBytes extends Error {
   constructor(at, end) {
     super('more of the metadata is needed');
@@ -62,7 +62,7 @@ export function lookup3(bytes, start, length) {
   return c >>> 0;
 }
 
-/** A reading place in a block, which ends at `end`. `where` names the object in errors. */
+/** A cursor in a block that ends at `end`. `where` names the object in errors. */
 class Cursor {
   constructor(bytes, at, end, where) {
     this.bytes = bytes;
@@ -84,7 +84,7 @@ class Cursor {
   u32() { return this.view.getUint32(this.take(4), true); }
   u64() { return this.view.getBigUint64(this.take(8), true); }
 
-  /** An unsigned integer of 1 to 8 bytes. */
+  /** Reads an unsigned integer of 1 to 8 bytes. */
   uint(size) {
     let value = 0;
     const from = this.take(size);
@@ -95,7 +95,7 @@ class Cursor {
     return value;
   }
 
-  /** An address or length of 8 bytes; undefined when it says "none". */
+  /** Reads an address or length of 8 bytes; undefined for HDF5's undefined address. */
   address() {
     const value = this.u64();
     if (value === UNDEFINED)
@@ -111,7 +111,7 @@ class Cursor {
   }
 }
 
-/** The metadata of a file of `size` bytes, of which the first `head.length` are at hand, and perhaps a `piece` { at, data } elsewhere. */
+/** The metadata of a file of `size` bytes. The first `head.length` bytes are loaded, and optionally a `piece` { at, data } elsewhere. */
 export class Hdf5 {
   constructor(head, size) {
     this.head = head;
@@ -146,7 +146,7 @@ export class Hdf5 {
     if (c.u8() !== 3)
       throw formatError('', 'the HDF5 file has another layout than EBP-Octree files have (superblock version)', 'convert it again with ebpo');
     const sizes = [c.u8(), c.u8()];
-    c.u8(); // consistency flags: a writer is or was at it
+    c.u8(); // consistency flags: a writer has or had the file open
     const [base, extension, end, root] = [c.address(), c.address(), c.address(), c.address()];
     this.#checksum(0, 44, '');
     c.must(sizes[0] === 8 && sizes[1] === 8 && base === 0 && extension === undefined, 'the HDF5 file has another layout than EBP-Octree files have');
@@ -162,7 +162,7 @@ export class Hdf5 {
       throw formatError(where, 'its description is damaged: the checksum differs');
   }
 
-  /** All messages of an object header, as [{ type, cursor }]. */
+  /** Returns all messages of an object header as [{ type, cursor }]. */
   #messages(address, where) {
     this.#need(address, 16, where);
     let c = new Cursor(this.head, address, this.head.length, where);
@@ -199,7 +199,7 @@ export class Hdf5 {
     return [at + 4, length - 8, 4];
   }
 
-  /** A group or an array: { kind: 'group', links: Map(name, address | undefined), attributes } or { kind: 'array', shape, attributes }. */
+  /** Reads a group or an array: { kind: 'group', links: Map(name, address | undefined), attributes } or { kind: 'array', shape, attributes }. */
   object(address, where) {
     const attributes = new Map(), links = new Map(), parts = {};
     let group = false;
@@ -216,7 +216,7 @@ export class Hdf5 {
         case PIPELINE: parts.filters = pipeline(cursor); break;
         case LAYOUT: parts.layout = layout(cursor); break;
         case EXTERNAL: parts.external = true; break;
-        default: break; // times, comments, reference counts: nothing that changes what is read
+        default: break; // times, comments, reference counts: they do not affect the data
       }
     }
     if (group)
@@ -237,7 +237,7 @@ export class Hdf5 {
     c.take((flags & 4 ? 8 : 0) + (flags & 16 ? 1 : 0));
     const length = c.uint(1 << (flags & 3)), name = text(c.bytes.subarray(c.take(length), c.at));
     c.must(name !== undefined && !links.has(name), 'a link has no proper name');
-    links.set(name, type === 0 ? c.address() : undefined); // soft and external links lead nowhere here
+    links.set(name, type === 0 ? c.address() : undefined); // soft and external links are not followed
   }
 
   #attribute(c, attributes) {
@@ -253,7 +253,7 @@ export class Hdf5 {
   }
 
   /**
-   * Where the chunks of an array are: [{ at, bytes }], in order. `count` chunks are expected, each of at most `most` bytes; `whole` is a
+   * Returns the offsets of an array's chunks: [{ at, bytes }], in order. `count` chunks are expected, each of at most `most` bytes; `whole` is a
    * chunk's size before filters.
    */
   chunks(array, where, count, whole, most) {
@@ -343,7 +343,7 @@ function datatype(c) {
     return { class: size === 8 && bits === 0x3f20 && ieee.every((byte, i) => c.bytes[at + i] === byte) ? 'double' : 'other', size };
   }
   if ((kind & 15) === 3)
-    return { class: 'text', size }; // however it is padded, it ends at its first zero byte
+    return { class: 'text', size }; // with any padding, the text ends at its first zero byte
   return { class: 'other', size };
 }
 
@@ -386,7 +386,7 @@ function layout(c) {
 
 const strict = new TextDecoder('utf-8', { fatal: true });
 
-/** UTF-8 without control characters, or undefined. */
+/** Decodes UTF-8 without control characters; returns undefined for other bytes. */
 export function text(bytes) {
   try {
     const out = strict.decode(bytes);

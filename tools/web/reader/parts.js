@@ -1,5 +1,5 @@
-// Parts of levels: the nodes, and the face lists, of one subtree in one level (files with the part subtrees, below its level), else of 4,096 groups
-// or leaves, at which the index arrays begin. All chunks that a batch of parts needs are asked for at once.
+// Reads parts of levels. In files with subtrees, a part has the nodes and face lists of one subtree in one level. In other files, and above the
+// subtrees, a part has 4,096 groups or leaves, one entry of the index arrays. All chunks of a batch of parts are requested at once.
 import { LEAF, GRAY, WHITE, BLACK, checkColours, checkWindings, countTypes, decodeLeafBlock } from './decode.js';
 import { formatError } from './error.js';
 import { INDEX_ROWS } from './facts.js';
@@ -16,14 +16,14 @@ export class Parts {
     this.subtrees = this.info.subtree_level === undefined ? undefined : new Subtrees(store);
   }
 
-  /** Whether a level's parts are subtrees. */
+  /** Returns true when a level's parts are subtrees. */
   bySubtree(level) {
     return this.info.subtree_level !== undefined && level > this.info.subtree_level;
   }
 
-  // --- which rows ---
+  // --- rows of parts ---
 
-  /** Descriptions of the nodes of parts: wanted is [{ level, part }]. */
+  /** Describes the nodes of parts. `wanted` is [{ level, part }]. */
   async nodes(wanted) {
     const rows = await this.#subtreeRows(wanted);
     const described = await Promise.all(wanted.map(({ level, part }) => (this.bySubtree(level) ? this.#ofSubtree(rows.get(part), level) : this.#ofBlock(level, part))));
@@ -48,12 +48,12 @@ export class Parts {
     const all = [s.white, s.black, s.leaf, s.gray], row = (i) => (types ? types.slice(4 * i, 4 * i + 4) : [0, 0, 0, 0]), group = block * INDEX_ROWS, last = group + INDEX_ROWS >= groups;
     const first = row(block), next = last ? all : row(block + 1), count = [...next].map((n, t) => n - first[t]);
     if (count.some((n, t) => n < 0 || next[t] > all[t]))
-      throw formatError(at + 'types_index', 'the index contradicts the arrays that it is about');
+      throw formatError(at + 'types_index', 'the index contradicts the arrays that it indexes');
     const span = (index, name, cols, col, total, type) => { // between the index's rows around the nodes of a type
       const from = Math.floor(first[type] / INDEX_ROWS), to = Math.ceil(next[type] / INDEX_ROWS);
       const value = (i) => (i * INDEX_ROWS >= all[type] ? total : index ? index[cols * i + col] : 0);
       if (value(from) > value(to) || value(to) > total)
-        throw formatError(at + name, 'the index contradicts the arrays that it is about');
+        throw formatError(at + name, 'the index contradicts the arrays that it indexes');
       return { row: from * INDEX_ROWS, from: value(from), to: value(to) };
     };
     return { level, group, groups: Math.min(INDEX_ROWS, groups - group), first: [...first], count, exact: false,
@@ -61,7 +61,7 @@ export class Parts {
       leafPlanes: store.arrays.has(at + 'leaf_plane_counts') ? span(leaf, 'leaf_index', 3, 2, s.leaf_planes, LEAF) : undefined };
   }
 
-  /** The rows of arrays that hold a part's nodes: [{ path, from, to }]. With `planes` for drawing, in colours, else for exact questions, which need leaves' winding numbers. */
+  /** Returns the rows of arrays that hold a part's nodes: [{ path, from, to }]. With `planes` for drawing (with colours), else for exact queries (with winding numbers of leaves). */
   nodeRanges(d, planes) {
     const at = folder(d.level), of = (name, type) => ({ path: at + name, from: d.first[type], to: d.first[type] + d.count[type] });
     const out = [{ path: at + 'types', from: d.group, to: d.group + d.groups }, of('black_winding', BLACK), of('white_winding', WHITE)];
@@ -76,7 +76,7 @@ export class Parts {
 
   // --- nodes ---
 
-  /** Segments (segment.js) of described parts. */
+  /** Reads segments (segment.js) of described parts. */
   async segments(described, planes) {
     const wanted = described.map((d) => this.nodeRanges(d, planes)), values = await this.store.rows(wanted.flat());
     return described.map((d, i) => this.#segment(d, values.splice(0, wanted[i].length), planes));
@@ -102,18 +102,18 @@ export class Parts {
     const codes = (d.exact ? planes : planes?.slice(before, before + n)) ?? new Uint32Array(0);
     for (const code of codes)
       if ((code & 1023) === 1023 || (code >>> 10 & 1023) === 1023 || code >>> 20 === 4095)
-        throw formatError(path.replace('_counts', 's'), 'a code stands for no plane');
+        throw formatError(path.replace('_counts', 's'), 'invalid plane code');
     return { counts: d.exact ? counts : counts.slice(own), planes: codes };
   }
 
   // --- face lists ---
 
-  /** Which part of its level's leaves a leaf is in. */
+  /** Returns the part of its level that contains a leaf. */
   partOfLeaf(leaf) {
     return this.bySubtree(leaf.level) ? leaf.subtree : Math.floor(leaf.rank / INDEX_ROWS);
   }
 
-  /** Descriptions of the face lists of parts: wanted is [{ level, part }]. */
+  /** Describes the face lists of parts. `wanted` is [{ level, part }]. */
   async lists(wanted) {
     const rows = await this.#subtreeRows(wanted);
     return Promise.all(wanted.map(async ({ level, part }) => {
@@ -125,12 +125,12 @@ export class Parts {
     }));
   }
 
-  /** The same of leaves 4096 * block .. of any level. */
+  /** Describes the face lists of leaves 4096 * block .. of any level. */
   async block(level, block) {
     const s = this.info.levels[level], first = block * INDEX_ROWS, index = await this.store.whole(folder(level) + 'leaf_index'), next = 3 * block + 3;
     const refs = { from: index ? index[3 * block + 1] : 0, to: index && next < index.length ? index[next + 1] : s.faces_referenced };
     if (refs.from > refs.to || refs.to > s.faces_referenced)
-      throw formatError(folder(level) + 'leaf_index', 'the index contradicts the arrays that it is about');
+      throw formatError(folder(level) + 'leaf_index', 'the index contradicts the arrays that it indexes');
     const start = index ? index[3 * block] : 0;
     return { level, part: block, key: `lists ${block} ${level}`, first, count: Math.min(s.leaf - first, INDEX_ROWS), refs,
       end: { from: start, to: index && next < index.length ? index[next] : undefined }, faces: { from: 0, to: this.info.face_count } };

@@ -1,24 +1,24 @@
-// Where all chunks lie, by the list that files with subtrees have: format-spec/README.md, section 9, "Places".
+// Reads the chunk directory of files with subtrees: format-spec/README.md, section 9, "Places".
 import { formatError } from './error.js';
 import { LEVELS_MAX, LEVEL_ARRAY_COUNT, PLACES } from './facts.js';
 
-/** The number of an array in that list. `order`: of the arrays of a level. */
+/** Returns the number of an array in the directory. `order`: the array's index in its level. */
 export function placeNumber(path, level, order) {
   const [, attribute] = /^\/attributes\/(\d{3})$/.exec(path) ?? [];
   return attribute ? 8192 + 2 * Number(attribute) : level === undefined ? ROOT_NUMBERS[path] : 64 * level + order;
 }
 
 const ROOT_NUMBERS = { '/mesh/vertices': 4096, '/mesh/faces': 4097, '/mesh/faces_index': 4098, '/maps/vertex_source': 4099, '/maps/face_source': 4100,
-  '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/outer': 4114, '/subtrees/places': 4115, '/chunk_sums': 4116 }; // neither list of chunks tells of itself
+  '/subtrees/index': 4112, '/subtrees/counts': 4113, '/subtrees/outer': 4114, '/subtrees/places': 4115, '/chunk_sums': 4116 }; // the chunk directory and the checksums do not list themselves
 
 const WHERE = PLACES;
 
-// Whether a number is that of an array which may be in the list; others are gaps, or of later versions.
+// Returns true when an array with this number may be in the directory. Other numbers are gaps or belong to later versions.
 function isArray(number) {
   return number < 64 * LEVELS_MAX ? number % 64 < LEVEL_ARRAY_COUNT : number < ROOT_NUMBERS[WHERE] && Object.values(ROOT_NUMBERS).includes(number);
 }
 
-/** Whether a list about all chunks is still true: other programs that write the file anew leave it as it was. */
+/** Returns true when a list about all chunks is still valid. Other programs that rewrite the file keep the old list. */
 export function placesHold(places, size) {
   const { attributes } = places.object, stated = (name) => {
     const a = attributes.get(name);
@@ -28,7 +28,7 @@ export function placesHold(places, size) {
   return stated('file_bytes') === size && places.chunks !== undefined && stated('offset') === places.chunks[0].at;
 }
 
-// Where the list begins: an array of a single chunk tells its place.
+// The offset of the directory: the header of an array with a single chunk has it.
 function begin(rows, byNumber) {
   let before = 0;
   for (let i = 0; i < rows.length; i += 2) {
@@ -67,7 +67,7 @@ export function readPlaces(rows, arrays, size) {
   for (const [array, chunks] of out) {
     if (chunks.length !== array.chunkCount)
       throw formatError(WHERE, `${array.path} has fewer chunks here than it has`);
-    if (array.chunks && (array.chunks[0].at !== chunks[0].at || array.chunks[0].bytes !== chunks[0].bytes)) // of a single chunk, its header tells
+    if (array.chunks && (array.chunks[0].at !== chunks[0].at || array.chunks[0].bytes !== chunks[0].bytes)) // the header of an array with a single chunk has the offset
       throw formatError(WHERE, `${array.path} lies elsewhere`);
   }
   return out;

@@ -1,5 +1,5 @@
-// Exact predicates over doubles: a filter in floating point answers nearly always, the rest is done in integers of any size. The same predicates,
-// and the same infinitely small shift, as the library's (lib/geometry/triangle_predicates.c, where the reasons stand).
+// Exact predicates over doubles: a floating-point filter decides nearly all cases, integers of any size decide the rest. The predicates and the
+// infinitely small shift are those of the library; lib/geometry/triangle_predicates.c explains them.
 // Source of the filters: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997; of the shift:
 // Edelsbrunner and Muecke, "Simulation of Simplicity", 1990.
 
@@ -7,7 +7,7 @@ const view = new DataView(new ArrayBuffer(8));
 const BOUND_2D = 3.4e-16, BOUND_3D = 7.9e-16; // above (3 + 16 u) u and (7 + 56 u) u, u = 2^-53
 const SMALL = 1e-250;                         // below this the filters' products may have lost bits to underflow
 
-// All numbers as integers times one power of two.
+// Converts all numbers to integers times one common power of two.
 function integers(numbers) {
   let least = Infinity;
   const parts = numbers.map((x) => {
@@ -23,7 +23,7 @@ function integers(numbers) {
 
 const signOf = (big) => (big > 0n) - (big < 0n);
 
-/** 1 when a, b, c (two numbers each, as separate arguments) turn counter-clockwise, -1 when clockwise, 0 on a line. */
+/** Returns 1 when a, b, c (two numbers each, as separate arguments) turn counter-clockwise, -1 when clockwise, 0 on a line. */
 function turn(ax, ay, bx, by, cx, cy) {
   const left = (bx - ax) * (cy - ay), right = (by - ay) * (cx - ax), det = left - right, bulk = Math.abs(left) + Math.abs(right);
   if (bulk > SMALL && bulk < Infinity && Math.abs(det) > BOUND_2D * bulk)
@@ -32,7 +32,7 @@ function turn(ax, ay, bx, by, cx, cy) {
   return signOf((r - p) * (u - q) - (s - q) * (t - p));
 }
 
-/** 1 when d lies on the side to which the normal of counter-clockwise a, b, c points, -1 on the other, 0 in their plane. */
+/** Returns 1 when d is on the side to which the normal of counter-clockwise a, b, c points, -1 on the other side, 0 in their plane. */
 export function orient3d(a, b, c, d) {
   const bx = b[0] - a[0], by = b[1] - a[1], bz = b[2] - a[2], cx = c[0] - a[0], cy = c[1] - a[1], cz = c[2] - a[2];
   const dx = d[0] - a[0], dy = d[1] - a[1], dz = d[2] - a[2];
@@ -46,7 +46,7 @@ export function orient3d(a, b, c, d) {
   return signOf((u[1] * v[2] - u[2] * v[1]) * w[0] + (u[2] * v[0] - u[0] * v[2]) * w[1] + (u[0] * v[1] - u[1] * v[0]) * w[2]);
 }
 
-// Sign of component k of the normal of a, b, c.
+// Returns the sign of component k of the normal of a, b, c.
 function normalSign(k, a, b, c) {
   const u = k === 2 ? 0 : k + 1, v = k === 0 ? 2 : k - 1;
   return turn(a[u], a[v], b[u], b[v], c[u], c[v]);
@@ -66,7 +66,7 @@ function shiftedSide3d(a, b, c, p) {
 }
 
 /**
- * Change of the winding number along the segment from `from` in direction +axis to coordinate `to`, both ends shifted by infinitely small
+ * Returns the change of the winding number along the segment from `from` in direction +axis to coordinate `to`, both ends shifted by infinitely small
  * (d0, d1, d2): +1 when it enters through the face a, b, c, -1 when it leaves, 0 when it does not cross it.
  */
 export function axisCrossing(from, to, axis, a, b, c) {
@@ -96,7 +96,7 @@ function onSegment(p, a, b) {
   return [0, 1, 2].every((k) => normalSign(k, a, b, p) === 0);
 }
 
-/** Whether p lies on the closed triangle a, b, c, also one without area. */
+/** Returns true when p is on the closed triangle a, b, c, which may have no area. */
 export function onTriangle(p, a, b, c) {
   for (let k = 0; k < 3; k++)
     if (p[k] < Math.min(a[k], b[k], c[k]) || p[k] > Math.max(a[k], b[k], c[k]))

@@ -1,15 +1,15 @@
-// Questions about points. What is said to be certain is certain: bounds are widened by more than rounding can amount to, and inside is decided by
-// exact predicates. Distances to faces are computed in doubles.
+// Queries of points. Bounds are widened by more than the rounding error, and exact predicates decide between inside and outside.
+// Distances to faces are computed in doubles.
 import { BLACK, GRAY, LEAF, WHITE, isInside } from './decode.js';
 import { decodePlane } from './envelope.js';
 import { EbpoError } from './error.js';
 import { axisCrossing, onTriangle } from './predicates.js';
 
-const MORE = 1 + 1e-12, LESS = 1 - 1e-12; // for lengths: a few roundings are 1e-15
-const TOGETHER = 8, TOGETHER_MOST = 64;   // leaves whose faces are asked for at once, at first and later
+const MORE = 1 + 1e-12, LESS = 1 - 1e-12; // factors for lengths: the rounding error is about 1e-15
+const TOGETHER = 8, TOGETHER_MOST = 64;   // number of leaves whose faces are requested together: initial and maximum
 const NEAR = 1 / 256;                     // a gray node or leaf has surface within so much of its cell: format-spec, section 5
 
-/** Whether p certainly lies beyond one of the node's own half-spaces. In doubles with a margin: values are up to 2^22, errors below 1e-8. */
+/** Returns true when p is certainly outside one of the node's own half-spaces. Computes in doubles with a margin: values are up to 2^22, errors below 1e-8. */
 function beyondPlanes(tree, node, p) {
   const codes = tree.planes(node);
   if (!codes.length)
@@ -28,8 +28,8 @@ function inRoot(tree, p) {
 }
 
 /**
- * Where a point is, by the levels at hand, down to `deepest`: { where: 'in' | 'out' | 'maybe', node, winding }. 'in' and 'out' are certain. `node`
- * is the leaf or gray node at which the way ended; a leaf can be decided by its faces (insideLeaf). Solids only.
+ * Classifies a point by the loaded levels, down to `deepest`: { where: 'in' | 'out' | 'maybe', node, winding }. 'in' and 'out' are certain. `node`
+ * is the leaf or gray node at which the descent ended. The faces of a leaf can decide the result (insideLeaf). Solids only.
  */
 export function inside(tree, p, deepest = tree.depth) {
   const rule = tree.info.winding_rule;
@@ -50,8 +50,8 @@ export function inside(tree, p, deepest = tree.depth) {
 }
 
 /**
- * A point in a leaf's cell, by the leaf's faces (nine numbers each): { where: 'in' | 'out' | 'on', winding }. Exact: signed crossings along the way
- * from the cell's lowest corner, whose winding number the file has.
+ * Classifies a point in a leaf's cell by the leaf's faces (nine numbers each): { where: 'in' | 'out' | 'on', winding }. Exact: sums signed crossings along the path
+ * from the cell's lowest corner; the file stores the winding number of that corner.
  */
 export function insideLeaf(tree, leaf, p, faces) {
   const corner = (i, k) => faces.subarray(9 * i + 3 * k, 9 * i + 3 * k + 3);
@@ -68,7 +68,7 @@ export function insideLeaf(tree, leaf, p, faces) {
   return { where: isInside(tree.info.winding_rule, winding) ? 'in' : 'out', winding };
 }
 
-/** A lower bound of the distance from p to the node's cell. */
+/** Returns a lower bound of the distance from p to the node's cell. */
 export function cellNear(tree, node, p) {
   let sum = 0;
   for (let k = 0; k < 3; k++) {
@@ -78,7 +78,7 @@ export function cellNear(tree, node, p) {
   return Math.sqrt(sum) * LESS;
 }
 
-// An upper bound of the distance from p to the surface that the node promises.
+// Returns an upper bound of the distance from p to the surface inside the node.
 function cellFar(tree, node, p) {
   let sum = 0, size = 0;
   for (let k = 0; k < 3; k++) {
@@ -89,7 +89,7 @@ function cellFar(tree, node, p) {
   return (Math.sqrt(sum) + NEAR * Math.sqrt(size)) * MORE;
 }
 
-/** { lo, hi }: the distance to the surface lies between, by the cells of the levels at hand, down to `deepest`. Certain. */
+/** Returns { lo, hi }: certain bounds of the distance to the surface, from the cells of the loaded levels, down to `deepest`. */
 export function distanceInterval(tree, p, deepest = tree.depth) {
   let lo = Infinity, hi = Infinity;
   const walk = (node, near) => {
@@ -107,7 +107,7 @@ export function distanceInterval(tree, p, deepest = tree.depth) {
   return { lo: Math.min(lo, hi), hi };
 }
 
-/** The nearest point of a triangle (nine numbers from `at` on) to p: [distance, x, y, z]. In doubles. Source: Ericson, "Real-Time Collision Detection", 5.1.5. */
+/** Returns the point of a triangle (nine numbers from `at` on) that is nearest to p: [distance, x, y, z]. Computes in doubles. Source: Ericson, "Real-Time Collision Detection", 5.1.5. */
 export function nearestOnTriangle(p, f, at) {
   const sub = (i, j) => [f[at + i] - f[at + j], f[at + i + 1] - f[at + j + 1], f[at + i + 2] - f[at + j + 2]];
   const dot = (u, v) => u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
@@ -135,14 +135,14 @@ export function nearestOnTriangle(p, f, at) {
   if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
     return result(3, sub(6, 3), (d4 - d3) / (d4 - d3 + (d5 - d6)));
   const sum = va + vb + vc;
-  if (!(sum > 0)) // next to no area: the nearest of the edges, which the corners stand for
+  if (!(sum > 0)) // almost no area: use the nearest edge
     return [0, 3, 6].map((i) => result(i, ab, 0)).reduce((a, b) => (b[0] < a[0] ? b : a));
   return result(0, ab, vb / sum, ac, vc / sum);
 }
 
 /**
- * The nearest face: { distance, point, face, corners, leaves }: its number and its nine coordinates. `facesOf(leaves)` gives (a promise of) the faces of each leaf, and `deeper(nodes)` brings the
- * children of these nodes into the tree, all at once. Cells are searched nearest first, so few leaves are looked at.
+ * Finds the nearest face: { distance, point, face, corners, leaves }: its index and nine coordinates. `facesOf(leaves)` gives (a promise of) the faces of each leaf, and `deeper(nodes)` brings the
+ * children of these nodes into the tree, all at once. Cells are searched nearest first, so that few leaves are visited.
  */
 export async function nearestFace(tree, p, facesOf, deeper) {
   let best = [Infinity], face, bound = Infinity, looked = 0, together = TOGETHER, ahead = 1;
@@ -155,7 +155,7 @@ export async function nearestFace(tree, p, facesOf, deeper) {
   const missing = (node) => node.type === GRAY && !tree.children(node) && !tree.isPruned(node);
   add(tree.root);
   while (queue.length) {
-    queue.sort((a, b) => b[0] - a[0]); // few entries: a heap would not pay
+    queue.sort((a, b) => b[0] - a[0]); // few entries: a heap is not faster
     const [near, node] = queue.at(-1), leaves = [];
     if (!wanted(near))
       break;

@@ -1,7 +1,7 @@
-// Nodes of one level, a stretch of them: which types, planes and winding numbers. Ranks are found by counting from every 16th group.
+// A range of nodes of one level: types, planes and winding numbers. Ranks are counted from every 16th group.
 const STEP = 16; // 8 * 16 fits a byte
 
-// How many of the four types in a byte are white, black, leaf, gray: a byte each.
+// For each byte of four types: the numbers of white, black, leaf and gray nodes, a byte each.
 const COUNTS = Uint32Array.from({ length: 256 }, (_, types) => [0, 2, 4, 6].reduce((sum, bit) => sum + 2 ** (8 * (types >> bit & 3)), 0));
 
 function begins(counts) {
@@ -47,7 +47,7 @@ export class Segment {
       + [planeCounts, planes, leafPlaneCounts, leafPlanes, grayColours, this.planeBegin, this.leafPlaneBegin, ...this.windings].reduce((sum, a) => sum + (a?.byteLength ?? 0), 0);
   }
 
-  /** Ranks (white, black, leaf, gray) at which a group begins. */
+  /** Returns the ranks (white, black, leaf, gray) at the beginning of a group. */
   ranks(group) {
     const g = group - this.group, at = 4 * Math.floor(g / STEP);
     let sum = 0;
@@ -68,12 +68,12 @@ export class Segment {
     return this.leafPlanes && this.leafPlaneCounts ? slice(this.leafPlanes, this.leafPlaneCounts, this.leafPlaneBegin, rank - this.first[2]) : NONE;
   }
 
-  /** Red + 256 green + 65,536 blue of a gray node; undefined where none is. */
+  /** Returns red + 256 green + 65,536 blue of a gray node, or undefined without a colour. */
   colour(rank) {
     return this.grayColours?.[rank - this.first[3]];
   }
 
-  /** The winding number of a white, black or leaf node as stored; undefined where none is. */
+  /** Returns the stored winding number of a white, black or leaf node, or undefined when none is stored. */
   winding(type, rank) {
     return this.windings[type]?.[rank - this.first[type]];
   }

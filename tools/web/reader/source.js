@@ -1,4 +1,4 @@
-// Where bytes come from. A source has `name`, `size` (bytes; known after `open()`), `requests` and `bytes` (counted traffic), and
+// Sources of bytes. A source has `name`, `size` (bytes; known after `open()`), `requests` and `bytes` (counted traffic), and
 //   open(bytes)           -> Promise<Uint8Array>  the first `bytes` bytes of the file, or all of it when it is shorter
 //   read(offset, length)  -> Promise<Uint8Array>  exactly `length` bytes, or an EbpoError
 // Ranges are checked by the caller against `size`.
@@ -54,11 +54,11 @@ export class BlobSource {
 
 const RETRIES = 3;
 const WAIT_MS = 250;
-const PATIENCE_MS = 20000;    // a patient source on a dead line tries again by itself so often
-const GOOD_BYTES = 64 * 1024; // an answer that brought so much was no failure: the counting of retries begins anew
+const PATIENCE_MS = 20000;    // interval of automatic retries of a patient source without a connection
+const GOOD_BYTES = 64 * 1024; // a response with this many bytes is no failure: resets the count of retries
 const RETRY_STATUS = new Set([429, 500, 502, 503, 504]);
 
-// Answers that no repetition mends: what they mean, and what to do next.
+// Responses that a retry cannot fix: their meaning, and what to do next.
 const REFUSED = {
   401: ['the server wants to know who asks', 'sign in there, or ask for an address that needs no password'],
   403: ['the server does not let this page have it', 'ask its owner for access, or for a fresh address where it was signed: such run out'],
@@ -66,7 +66,7 @@ const REFUSED = {
   410: ['there is no such file any more', 'check the address'],
 };
 
-/** Bytes from .. to - 1 while they come, over as many requests as that takes; what has come is never asked for again. */
+/** Receives bytes from .. to - 1 over one or more requests. Received bytes are never requested again. */
 class Transfer {
   constructor(from, to) {
     Object.assign(this, { from, to, got: 0, data: undefined, at: performance.now(), waiting: [] });
@@ -84,12 +84,12 @@ class Transfer {
     this.waiting = this.waiting.filter((w) => w.to > this.end || w.done());
   }
 
-  /** When everything before `to` is there. */
+  /** Resolves when all bytes before `to` are received. */
   reaches(to) {
     return this.end >= to ? undefined : new Promise((done, fail) => this.waiting.push({ to, done, fail }));
   }
 
-  /** No more will come. */
+  /** Ends the transfer. */
   finish(error) {
     this.waiting.splice(0).forEach((w) => (error ? w.fail(error) : w.done()));
   }
@@ -97,10 +97,10 @@ class Transfer {
 
 /**
  * A file on any static web server, by range requests. The server must answer 206 with Content-Range; one that answers 200 is read once as a
- * whole when the file is not larger than `wholeLimit`. The ETag of the first answer (else Last-Modified) is pinned: a file that changes under
- * way is an error, never a mixture, where the server tells either (and, to pages of other origins, exposes it). Failed requests are repeated a few times, with pauses that grow and vary.
+ * whole when the file is not larger than `wholeLimit`. The ETag of the first answer (else Last-Modified) is pinned: a file that changes while
+ * it is read is an error, if the server sends one of them (and exposes it to pages of other origins). Failed requests are repeated a few times, with pauses that grow and vary.
  *
- * The browser's cache may answer: the first request asks the server whether what it has is still right, and others must have the same ETag.
+ * The browser's cache may be used: the first request revalidates the cached response, and later responses must have the same ETag.
  *
  * Options: `wholeLimit` (bytes, 64 MiB), `timeout` (ms without a byte, 30000), `fetch` (another implementation), `headers` (for credentials),
  * `ahead` (bytes that the first request asks for at least: what is read of them comes from that answer, as it arrives), `patient` (an open file whose
@@ -118,7 +118,7 @@ export class UrlSource {
     this.patient = options.patient ?? false;
     this.requests = this.bytes = 0;
     this.size = undefined;
-    this.tag = undefined;     // what the file's ETag or date was at first
+    this.tag = undefined;     // the first ETag or date of the file
     this.whole = undefined;   // all bytes, from a server without ranges
     this.first = undefined;   // the first answer, which is read from while it comes
     this.running = new Map(); // transfers under way, and how to end their request
@@ -131,7 +131,7 @@ export class UrlSource {
   async open(bytes) {
     this.first = new Transfer(0, Math.max(bytes, this.ahead));
     const all = this.#run(this.first, true), enough = this.first.reaches(bytes);
-    all.catch(() => {}); // what fails later is told to whom reads it
+    all.catch(() => {}); // a later failure is reported to the reader of the bytes
     await Promise.race([all, enough]);
     return this.whole ? this.whole.subarray(0, bytes) : this.first.data.subarray(0, Math.min(bytes, this.first.got));
   }

@@ -1,4 +1,4 @@
-// Arrays of an open file, by rows: which chunks hold them, and their values.
+// Reads arrays of an open file by rows: finds their chunks and returns their values.
 import { ChunkCache } from './cache.js';
 import { decodeColours } from './colours.js';
 import { decodeFaces, decodeMapChunk, decodeVertices } from './decode.js';
@@ -34,7 +34,7 @@ export class Store {
     return sums;
   }
 
-  // Of a source that tells how much has come, the first levels are given as soon as they have, also when the list never does.
+  // When the source reports its progress, the first levels are returned as soon as they arrive, even if the list never arrives.
   #sumsAreLate() {
     const [{ at, bytes }] = this.arrays.get(CHUNK_SUMS)?.chunks ?? [{ at: 0, bytes: 0 }], { head, source } = this.cache;
     return !this.summed && source.come !== undefined && at + bytes > Math.max(head.length, source.come);
@@ -50,7 +50,7 @@ export class Store {
     return array.path === '/mesh/vertices' ? decodeVertices(bytes, array, chunk) : typed(array, bytes);
   }
 
-  /** Rows from .. to - 1 of arrays, as chunks: wanted is [{ path, from, to }] -> [{ array, chunk }], each once. Nothing of absent arrays. */
+  /** Returns the chunks of rows from .. to - 1 of arrays: wanted is [{ path, from, to }] -> [{ array, chunk }], each once. Nothing of absent arrays. */
   chunksOf(wanted) {
     const out = [], seen = new Set();
     for (const { path, from, to } of wanted) {
@@ -65,7 +65,7 @@ export class Store {
     return out;
   }
 
-  /** Rows from .. to - 1 of arrays of one column: [typed array of its own]; undefined for absent arrays. */
+  /** Reads rows from .. to - 1 of arrays of one column: [a new typed array]; undefined for absent arrays. */
   async rows(wanted) {
     const chunks = this.chunksOf(wanted), values = await this.cache.get(chunks), byArray = new Map();
     chunks.forEach(({ array, chunk }, i) => {
@@ -133,7 +133,7 @@ export class Store {
     return out;
   }
 
-  /** A small array of 64-bit numbers, read once; undefined if absent. */
+  /** Returns a small array of 64-bit numbers, read once; undefined if absent. */
   whole(path) {
     if (!this.small.has(path))
       this.small.set(path, this.raw([path]).then((raw) => this.integers(raw, path, Float64Array), (error) => {

@@ -1,4 +1,4 @@
-// What each subtree has and where it begins in every array: format-spec/README.md, section 9, "The table".
+// Reads the table of subtrees: the counts and the first rows of each subtree in every array. format-spec/README.md, section 9, "The table".
 import { formatError } from './error.js';
 import { FIXED_ROWS, subtreeCols } from './facts.js';
 
@@ -108,7 +108,7 @@ export class Subtrees {
   }
 }
 
-/** What one subtree has, and where it begins. */
+/** The counts and first rows of one subtree. */
 class SubtreeRow {
   constructor(info, subtree, before, counts) {
     Object.assign(this, { info, subtree, before, counts });

@@ -1,4 +1,4 @@
-// How every chunk ends, by the list that files may have, so that one in another's place is noticed: format-spec/README.md, section 20.
+// Reads the chunk checksums, an optional list that detects swapped chunks: format-spec/README.md, section 20.
 import { formatError } from './error.js';
 
 const WHERE = '/chunk_sums';
@@ -22,7 +22,7 @@ export function readSums(rows, arrays) {
   return out;
 }
 
-/** How a chunk ends; undefined: it is too short. */
+/** Returns the checksum at the end of a chunk, or undefined when the chunk is too short. */
 export function chunkEnd(stored) {
   return stored.length >= 4 ? new DataView(stored.buffer, stored.byteOffset + stored.length - 4, 4).getUint32(0, true) : undefined;
 }

@@ -1,4 +1,4 @@
-// The octree as nodes with children, from levels as they arrive: format-spec/README.md, section 5.
+// Builds the octree of nodes with children from levels as they arrive: format-spec/README.md, section 5.
 import { BLACK, GRAY, LEAF } from './decode.js';
 import { cube, envelope } from './envelope.js';
 import { INDEX_ROWS } from './facts.js';
@@ -32,7 +32,7 @@ export class Tree {
     this.root = undefined;
   }
 
-  /** Deepest level of which something is at hand. */
+  /** Returns the deepest level with loaded nodes. */
   get depth() {
     return Math.max(this.levels.length - 1, this.partDepth);
   }
@@ -72,7 +72,7 @@ export class Tree {
     return tree;
   }
 
-  /** The part of the next level in which a gray node's children are. */
+  /** Returns the part of the next level that contains a gray node's children. */
   partOf(node) {
     const { subtree_level: C } = this.info;
     return C === undefined || node.level < C ? Math.floor(node.rank / INDEX_ROWS) : node.level === C ? node.rank : node.subtree;
@@ -102,7 +102,7 @@ export class Tree {
     return segment && segment.typesOf(node.rank) === 0;
   }
 
-  /** The eight children of a gray node; undefined while their part of the level is not at hand, and for a pruned node. */
+  /** Returns the eight children of a gray node; undefined while their part of the level is not loaded, and for a pruned node. */
   children(node) {
     if (node.children || node.type !== GRAY)
       return node.children;
@@ -141,7 +141,7 @@ export class Tree {
     return node.polytope;
   }
 
-  /** A wall of the node's cell: side 0 or 1. Exact. */
+  /** Returns the exact coordinate of a face of the node's cell: side 0 or 1. */
   wall(node, axis, side) {
     const { box_origin: origin, box_size: size } = this.info;
     return origin[axis] + (node.at[axis] + side) * (size[axis] / 2 ** node.level);

@@ -1,4 +1,4 @@
-// A page's side of workers: who gets which answer, what is told to those who get none, and what becomes of a worker that fails.
+// Tests the page's side of workers: routing of answers, errors for requests without an answer, and failing workers.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 

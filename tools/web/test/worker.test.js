@@ -7,7 +7,7 @@ import { fileURLToPath } from 'node:url';
 const listeners = [];
 globalThis.self = { addEventListener() {}, postMessage: (message) => [...listeners].forEach((listener) => listener(message)) };
 const { setInterval: usual } = globalThis;
-globalThis.setInterval = () => {}; // what is under way is not told here, and nothing keeps node from ending
+globalThis.setInterval = () => {}; // progress is not reported in this test, and no timer keeps node running
 await import('../worker.js');
 globalThis.setInterval = usual;
 

@@ -1,4 +1,4 @@
-// What several models an address asks for: ?model=A&model=B, each with &pose= in the same order, or ?scene=.
+// Parses addresses of several models: ?model=A&model=B, each with &pose= in the same order, or ?scene=.
 import { AT_HOME, unitQuaternion, matrixOf } from './poses.js';
 import { MOST, isFar, readScene } from './scene_file.js';
 

@@ -293,7 +293,7 @@ export class Assembly {
     return out;
   }
 
-  /** What is under way, of all files together, as showLine() of line.js tells it. */
+  /** Returns the progress of all files together, in the form that showLine() of line.js displays. */
   get line() {
     const all = this.models.map((m) => m.line).filter((line) => line?.want > 0), sum = (of) => all.reduce((total, line) => total + of(line), 0);
     return { got: sum((l) => l.got), want: sum((l) => l.want), quiet: all.length ? Math.min(...all.map((l) => l.quiet)) : 0, what: 'the models', trouble: all.find((l) => l.trouble)?.trouble };

@@ -1,4 +1,4 @@
-// The box of all instances at all times of their routes: what is looked at, not a promise. No DOM, no WebGL.
+// Computes the approximate box of all instances at all times of their routes, for the camera. No DOM, no WebGL.
 import { placed, poseAt } from './poses.js';
 
 const BETWEEN = 32;         // times besides the keys of a route

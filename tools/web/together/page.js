@@ -1,4 +1,4 @@
-// The page with several models or a scene in it: who is there, where, in which colour; the time; what is clicked. What one model has (levels, paint, notes) is not here.
+// The page with several models or a scene: instances, poses, colours, time and clicks. Levels, paint and notes of single models are not supported here.
 import { Assembly, COLOURS } from './assembly.js';
 import { boxText, cameraOf, cameraText, boxOf, pointsOf, pointsText, withQuery } from '../address.js';
 import { addCompass } from '../compass.js';

@@ -1,4 +1,4 @@
-// JSON as scene files have it: what JSON.parse() lets pass, members twice in one object and brackets without end, is refused. No DOM.
+// Checks JSON of scene files more strictly than JSON.parse(): rejects duplicate members and too deep nesting. No DOM.
 const LEVELS_MOST = 32;
 const PIECES = /"(?:[^"\\]|\\.)*"|[{}[\],]/g; // colons, numbers and words do not matter
 

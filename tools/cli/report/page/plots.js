@@ -34,7 +34,7 @@ function scaleOf(values, axis) {
   return { type: 'logarithmic', min, max, ticks: { autoSkip: false } };
 }
 
-// Of a logarithmic axis 1, 2 and 5 get a number where there is room, else powers of ten alone.
+// On a logarithmic axis, 1, 2 and 5 have labels where there is space, else only powers of ten.
 function isLabelled(scale, v) {
   if (scale.type !== 'logarithmic')
     return true;

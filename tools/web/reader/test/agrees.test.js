@@ -54,7 +54,7 @@ for (const path of files) {
       return Number(/element face (\d+)/.exec(readFileSync(join(folder, 'out.ply'), 'latin1').slice(0, 2000))[1]);
     };
     for (let level = 0; level <= Math.min(6, tree.depth); level++)
-      assert.deepEqual(countTriangles(tree, level), { all: triangles('--level', String(level)), inner: triangles('--level', String(level), '--no-walls') }, `level ${level}`);
+      assert.deepEqual(countTriangles(tree, level), { all: triangles('--level', String(level)), inner: triangles('--level', String(level), '--no-cell-faces') }, `level ${level}`);
     rmSync(folder, { recursive: true });
   });
 

@@ -1,0 +1,605 @@
+/* Measures the error of a level: bounds of the largest distance by which its envelopes extend
+ * beyond the model, and the mean distance, from samples. A level's bounds are those of its nodes. A
+ * short search for each node gives bounds that dismiss most of them; the others are searched in the
+ * order of their upper bounds. Samples are points on the level's polygons, distributed by area, one
+ * in each of equal parts of the area; a sample counts if a point slightly outside its polygon is in
+ * no other envelope. */
+#include "core/strict_fp.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <ebpo/error_bound.h>
+#include <ebpo/lod.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/parallel.h"
+#include "core/hash.h"
+#include "derive/error_bound.h"
+#include "derive/fragments.h"
+#include "geometry/cells.h"
+#include "query/query_model.h"
+
+typedef struct sampling {
+    const ebpo_error_bound_options *o;
+    int level;
+    ebpo_box box;
+    ebpo_cell_frame frame; /* frame of the root cell: the unit of areas and distances */
+    ebpo_mesh mesh;
+    ebpo_lod_nodes nodes;
+    uint64_t *first_triangle; /* [node_count + 1] */
+    uint32_t *triangle;       /* [samples] */
+    double *distance;         /* [samples]; NAN: not on the surface */
+    ebpo_context **contexts;  /* [threads] */
+    unsigned threads;
+} sampling;
+
+/* Returns the number of the stream at `place`. */
+static double random_unit(uint64_t seed, uint64_t place)
+{
+    uint64_t number = seed * UINT64_C(0xd1342543de82ef95) + place + 1;
+    return ebpo_random_unit(ebpo_random_mix(number * EBPO_RANDOM_STEP));
+}
+
+static const double *triangle_corner(const sampling *s, uint64_t triangle, int i)
+{
+    return s->mesh.xyz64 + 3 * (uint64_t)s->mesh.faces[3 * triangle + (uint64_t)i];
+}
+
+static double triangle_area(const sampling *s, uint64_t triangle)
+{
+    double u[3], v[3], n[3];
+    for (int k = 0; k < 3; k++) {
+        u[k] = ebpo_cell_frame_length(&s->frame, triangle_corner(s, triangle, 1)[k] -
+                                                     triangle_corner(s, triangle, 0)[k]);
+        v[k] = ebpo_cell_frame_length(&s->frame, triangle_corner(s, triangle, 2)[k] -
+                                                     triangle_corner(s, triangle, 0)[k]);
+    }
+    for (int k = 0; k < 3; k++)
+        n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+    return .5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+}
+
+/* Distributes one sample to each of `samples` equal parts of the area. */
+static void share_out(sampling *s)
+{
+    double total = 0, below = 0;
+    uint64_t t = 0;
+    for (uint64_t i = 0; i < s->mesh.face_count; i++)
+        total += triangle_area(s, i);
+    double next = s->mesh.face_count ? triangle_area(s, 0) : 0;
+    for (uint64_t i = 0; i < s->o->samples; i++) {
+        double at = ((double)i + random_unit(s->o->seed, 3 * i)) / (double)s->o->samples * total;
+        while (below + next <= at && t + 1 < s->mesh.face_count) {
+            below += next;
+            next = triangle_area(s, ++t);
+        }
+        s->triangle[i] = (uint32_t)t;
+    }
+}
+
+/* --- the envelope that contains a point --- */
+
+static uint64_t node_of_triangle(const sampling *s, uint64_t triangle)
+{
+    uint64_t low = 0, high = s->nodes.node_count;
+    while (high - low > 1) {
+        uint64_t middle = low + (high - low) / 2;
+        *(s->first_triangle[middle] <= triangle ? &low : &high) = middle;
+    }
+    return low;
+}
+
+/* Returns the node with the octcode, or node_count. Nodes ascend. */
+static uint64_t find_node(const sampling *s, uint64_t octcode)
+{
+    uint64_t low = 0, high = s->nodes.node_count;
+    while (low < high) {
+        uint64_t middle = low + (high - low) / 2;
+        *(s->nodes.nodes[middle].octcode < octcode ? &low : &high) =
+            s->nodes.nodes[middle].octcode < octcode ? middle + 1 : middle;
+    }
+    return low < s->nodes.node_count && s->nodes.nodes[low].octcode == octcode
+               ? low
+               : s->nodes.node_count;
+}
+
+/* Computes a triangle's normal in root cell coordinates, of length 1; returns false without area.
+ */
+static bool unit_normal(const sampling *s, uint64_t triangle, double n[3])
+{
+    double u[3], v[3], length = 0;
+    for (int k = 0; k < 3; k++) {
+        u[k] = (triangle_corner(s, triangle, 1)[k] - triangle_corner(s, triangle, 0)[k]) /
+               s->box.size[k];
+        v[k] = (triangle_corner(s, triangle, 2)[k] - triangle_corner(s, triangle, 0)[k]) /
+               s->box.size[k];
+    }
+    for (int k = 0; k < 3; k++)
+        n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+    length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (int k = 0; k < 3 && length > 0; k++)
+        n[k] /= length;
+    return length > 0;
+}
+
+static bool node_holds(const sampling *s, uint64_t node, const double p[3])
+{
+    double slack = 1e-9 * ebpo_half_power(s->level);
+    for (uint64_t t = s->first_triangle[node]; t < s->first_triangle[node + 1]; t++) {
+        double n[3], out = 0;
+        if (!unit_normal(s, t, n))
+            continue;
+        for (int k = 0; k < 3; k++)
+            out += n[k] * ((p[k] - triangle_corner(s, t, 0)[k]) / s->box.size[k]);
+        if (out > slack)
+            return false;
+    }
+    return true;
+}
+
+static bool in_another(const sampling *s, uint64_t own, const double p[3])
+{
+    double xi[3];
+    for (int k = 0; k < 3; k++) {
+        xi[k] = (p[k] - s->box.origin[k]) / s->box.size[k];
+        if (!(xi[k] >= 0 && xi[k] < 1))
+            return false;
+    }
+    for (int level = 0; level <= s->level; level++) {
+        ebpo_cell cell = { level, { 0, 0, 0 } };
+        for (int k = 0; k < 3; k++)
+            cell.at[k] = (uint32_t)(xi[k] * (double)(1u << level));
+        uint64_t node = find_node(s, ebpo_octcode_of_cell(cell));
+        if (node < s->nodes.node_count)
+            return node != own && node_holds(s, node, p);
+    }
+    return false;
+}
+
+/* --- --- */
+
+static ebpo_status measure_sample(sampling *s, uint64_t i, ebpo_context *context, ebpo_error *error)
+{
+    double a = sqrt(random_unit(s->o->seed, 3 * i + 1)), b = random_unit(s->o->seed, 3 * i + 2),
+           p[3], n[3], q[3];
+    uint64_t t = s->triangle[i];
+    s->distance[i] = NAN;
+    if (!unit_normal(s, t, n))
+        return EBPO_OK;
+    for (int k = 0; k < 3; k++) {
+        double step =
+            fmax(1e-6 * ebpo_half_power(s->level) * s->box.size[k],
+                 16 * DBL_EPSILON *
+                     fmax(fabs(s->box.origin[k]), fabs(s->box.origin[k] + s->box.size[k])));
+        p[k] = (1 - a) * triangle_corner(s, t, 0)[k] +
+               a * ((1 - b) * triangle_corner(s, t, 1)[k] + b * triangle_corner(s, t, 2)[k]);
+        q[k] = p[k] + n[k] * step;
+    }
+    if (in_another(s, node_of_triangle(s, t), q))
+        return EBPO_OK;
+    ebpo_distance_result result;
+    ebpo_status status = ebpo_distance(context, p, NULL, &result, error);
+    s->distance[i] = fmax(0, ebpo_cell_frame_length(&s->frame, result.distance));
+    return status;
+}
+
+static ebpo_status sample_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
+{
+    sampling *s = context;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
+        status = measure_sample(s, i, s->contexts[worker], error);
+    return status;
+}
+
+static void sum_up(const sampling *s, ebpo_error_bound *out)
+{
+    double sum = 0, squares = 0;
+    for (uint64_t i = 0; i < s->o->samples; i++)
+        if (!isnan(s->distance[i])) {
+            out->samples++;
+            sum += s->distance[i];
+            squares += s->distance[i] * s->distance[i];
+        }
+    if (!out->samples)
+        return;
+    out->mean = ldexp(sum / (double)out->samples, s->frame.exponent);
+    out->rms = ldexp(sqrt(squares / (double)out->samples), s->frame.exponent);
+}
+
+static ebpo_status reserve_space(sampling *s, ebpo_model *model, ebpo_error *error)
+{
+    uint64_t triangles = 0, polygon = 0;
+    s->first_triangle = ebpo_alloc(s->nodes.node_count + 1, sizeof *s->first_triangle);
+    s->triangle = ebpo_alloc(s->o->samples, sizeof *s->triangle);
+    s->distance = ebpo_alloc(s->o->samples, sizeof *s->distance);
+    s->contexts = ebpo_alloc_zero(s->threads, sizeof *s->contexts);
+    if (!s->first_triangle || !s->triangle || !s->distance || !s->contexts)
+        return ebpo_fail_memory(error, s->nodes.node_count * 8 + s->o->samples * 12);
+    for (uint64_t i = 0; i < s->nodes.node_count; i++) {
+        s->first_triangle[i] = triangles;
+        for (uint32_t k = 0; k < s->nodes.nodes[i].polygon_count; k++)
+            triangles += s->nodes.corners[polygon++] - 2u;
+    }
+    s->first_triangle[s->nodes.node_count] = triangles;
+    ebpo_status status = EBPO_OK;
+    for (unsigned i = 0; i < s->threads && status == EBPO_OK; i++)
+        status = ebpo_context_new(model, &s->contexts[i], error);
+    return status;
+}
+
+/* Sets out->mean, rms and samples. */
+static ebpo_status error_bound_sample(ebpo_model *model, const ebpo_file *file, int level,
+                                      const ebpo_error_bound_options *options,
+                                      ebpo_error_bound *out, ebpo_error *error)
+{
+    sampling s = { .o = options,
+                   .level = level,
+                   .box = ebpo_model_box(model),
+                   .threads = ebpo_thread_count(options->threads) };
+    ebpo_lod_options lod = EBPO_LOD_OPTIONS_INIT;
+    lod.threads = options->threads;
+    ebpo_cell_frame_make(&s.frame, &s.box, (ebpo_cell){ 0, { 0, 0, 0 } });
+    ebpo_status status = ebpo_lod_level_nodes(file, level, &lod, &s.mesh, &s.nodes, NULL, error);
+    if (status == EBPO_OK)
+        status = reserve_space(&s, model, error);
+    if (status == EBPO_OK && s.mesh.face_count) {
+        share_out(&s);
+        status = ebpo_parallel_for(s.threads, NULL, options->samples, 64, sample_some, &s,
+                                   &options->progress, "sampling the level's surface", error);
+        if (status == EBPO_OK)
+            sum_up(&s, out);
+    }
+    for (unsigned i = 0; s.contexts && i < s.threads; i++)
+        ebpo_context_free(s.contexts[i]);
+    free(s.contexts);
+    free(s.first_triangle);
+    free(s.triangle);
+    free(s.distance);
+    ebpo_lod_nodes_free(&s.nodes);
+    ebpo_mesh_free(&s.mesh);
+    return status;
+}
+
+/* --- bounds --- */
+
+/* for each node: the rest is then in flat places, close to the model */
+enum { BLOCK_MAX = 512, QUERIES_MAX = 1 << 16 };
+
+typedef struct level_node {
+    ebpo_cell cell;
+    ebpo_reach_bound bound;
+} level_node;
+
+typedef struct survey {
+    const ebpo_lod_model *tree, *whole; /* trees of the file and of the model's file; may be the
+                                         * same */
+    int level;
+    level_node *nodes;
+    uint64_t count, capacity, *order;
+    ebpo_bounder *bounders; /* [threads] */
+    unsigned threads;
+    ebpo_bound_goal goal;
+    uint64_t first; /* start of the current block in `order` */
+    bool spent;     /* the queries were used up before the tolerance was reached */
+    const ebpo_progress *progress;
+    ebpo_error *error;
+} survey;
+
+/* --- the level's nodes --- */
+
+static ebpo_status add_node(survey *s, const ebpo_node *node)
+{
+    if (!ebpo_grow(&s->nodes, &s->capacity, s->count + 1, sizeof *s->nodes))
+        return ebpo_fail_memory(s->error, (s->count + 1) * sizeof *s->nodes);
+    s->nodes[s->count++] = (level_node){ node->cell, { 0, INFINITY, { 0, 0, 0 }, 0 } };
+    return EBPO_OK;
+}
+
+static ebpo_status list_nodes(survey *s, const ebpo_level_nodes *tree, const ebpo_node *node)
+{
+    if (node->type == EBPO_LEAF)
+        return add_node(s, node);
+    if (node->type != EBPO_GRAY)
+        return EBPO_OK;
+    if (node->cell.level == s->level || node->pruned)
+        return add_node(s, node);
+    ebpo_status status = EBPO_OK;
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
+        ebpo_node child = ebpo_level_child(tree, node, octant);
+        status = list_nodes(s, tree, &child);
+    }
+    return status;
+}
+
+/* --- bounds of nodes --- */
+
+static ebpo_status bound_node(survey *s, ebpo_bounder *b, level_node *node, ebpo_error *error)
+{
+    ebpo_node own;
+    ebpo_status status = EBPO_OK;
+    (void)ebpo_tree_bounds(s->tree, node->cell, true, &own, &b->halves);
+    if (own.type == EBPO_LEAF && s->tree->leaf_source == EBPO_LEAF_DERIVED)
+        status = ebpo_tree_derive(s->tree, &own, &b->scratch, &b->halves, error);
+    if (status != EBPO_OK)
+        return status;
+    return s->goal.ratio > 0 ? ebpo_bound_closely(b, node->cell, &s->goal, &node->bound, error)
+                             : ebpo_bound_envelope(b, node->cell, &s->goal, &node->bound, error);
+}
+
+static ebpo_status bound_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
+{
+    survey *s = context;
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
+        status = bound_node(s, &s->bounders[worker], &s->nodes[s->order[s->first + i]], error);
+    return status;
+}
+
+typedef struct ranked {
+    double hi;
+    uint64_t node;
+} ranked;
+
+static int farthest_first(const void *a, const void *b)
+{
+    const ranked *x = a, *y = b;
+    if (x->hi != y->hi)
+        return x->hi < y->hi ? 1 : -1;
+    return (x->node > y->node) - (x->node < y->node);
+}
+
+static ebpo_status sort_nodes(survey *s)
+{
+    ranked *list = ebpo_alloc(s->count, sizeof *list);
+    if (!list)
+        return ebpo_fail_memory(s->error, s->count * sizeof *list);
+    for (uint64_t i = 0; i < s->count; i++)
+        list[i] = (ranked){ s->nodes[i].bound.hi, i };
+    if (s->count)
+        qsort(list, s->count, sizeof *list, farthest_first);
+    for (uint64_t i = 0; i < s->count; i++)
+        s->order[i] = list[i].node;
+    free(list);
+    return EBPO_OK;
+}
+
+/* Gathers the results of nodes first .. last - 1 in the order. */
+static void gather_survey(const survey *s, uint64_t first, uint64_t last, ebpo_error_bound *out)
+{
+    for (uint64_t i = first; i < last; i++) {
+        const ebpo_reach_bound *b = &s->nodes[s->order[i]].bound;
+        if (b->lo > out->lo) {
+            out->lo = b->lo;
+            memcpy(out->place, b->place, sizeof out->place);
+        }
+    }
+}
+
+static uint64_t count_queries(const survey *s)
+{
+    uint64_t sum = 0;
+    for (uint64_t i = 0; i < s->count; i++)
+        sum += s->nodes[i].bound.queries;
+    return sum;
+}
+
+/* A block is decided together, for any number of threads: the results of one block are known to the
+ * next. */
+static ebpo_status search_nodes(survey *s, const ebpo_error_bound_options *o, ebpo_error_bound *out)
+{
+    uint64_t done = 0, block = 4, queried = count_queries(s);
+    ebpo_status status = EBPO_OK;
+    s->goal.ratio = 1 + o->tolerance;
+    while (done < s->count && status == EBPO_OK && (!o->queries || queried < o->queries)) {
+        uint64_t size = 0;
+        s->goal.enough = (1 + o->tolerance) * out->lo;
+        while (size < block && done + size < s->count &&
+               s->nodes[s->order[done + size]].bound.hi > s->goal.enough)
+            size++;
+        if (!size)
+            break;
+        s->goal.queries = o->queries ? (o->queries - queried) / size + 1 : QUERIES_MAX;
+        s->first = done;
+        uint64_t before = 0, after = 0;
+        for (uint64_t i = 0; i < size; i++)
+            before += s->nodes[s->order[done + i]].bound.queries;
+        status = ebpo_parallel_for(s->threads, NULL, size, 1, bound_some, s, NULL, NULL, s->error);
+        for (uint64_t i = 0; i < size; i++)
+            after += s->nodes[s->order[done + i]].bound.queries;
+        queried += after - before;
+        gather_survey(s, done, done + size, out);
+        done += size;
+        block = block < BLOCK_MAX ? 2 * block : block;
+        if (status == EBPO_OK &&
+            !ebpo_progress_step(s->progress, "bounding envelopes", done, s->count, s->error))
+            status = EBPO_E_CANCELLED;
+    }
+    return status;
+}
+
+/* Applies the certain bound of a coarser level to its descendants. */
+static void bound_by_coarser(survey *s, double at_most)
+{
+    for (uint64_t i = 0; i < s->count && at_most > 0; i++) {
+        ebpo_reach_bound *b = &s->nodes[i].bound;
+        b->hi = fmax(b->lo, fmin(b->hi, at_most));
+    }
+}
+
+static bool has_spent(const survey *s, const ebpo_error_bound_options *o,
+                      const ebpo_error_bound *out)
+{
+    if (out->hi <= (1 + o->tolerance) * out->lo)
+        return false;
+    bool spent = o->queries && out->queries >= o->queries;
+    for (uint64_t i = 0; i < s->count && !spent; i++)
+        spent = s->nodes[i].bound.queries >= QUERIES_MAX;
+    return spent;
+}
+
+static ebpo_status bound_level(survey *s, const ebpo_error_bound_options *o, ebpo_error_bound *out)
+{
+    ebpo_level_nodes tree = ebpo_lod_model_nodes(s->tree);
+    ebpo_node root = ebpo_level_root(&tree);
+    free(s->order);
+    s->order = NULL;
+    s->count = 0;
+    s->first = 0; /* the end of the search in a finer level */
+    ebpo_status status = list_nodes(s, &tree, &root);
+    if (status == EBPO_OK && !(s->order = ebpo_alloc(s->count, sizeof *s->order)))
+        status = ebpo_fail_memory(s->error, s->count * sizeof *s->order);
+    for (uint64_t i = 0; i < s->count && status == EBPO_OK; i++)
+        s->order[i] = i;
+    s->goal = (ebpo_bound_goal){ 0, INFINITY, 0, 1 };
+    if (status == EBPO_OK)
+        status = ebpo_parallel_for(s->threads, NULL, s->count, 16, bound_some, s, s->progress,
+                                   "measuring envelopes", s->error);
+    bound_by_coarser(s, o->at_most);
+    if (status == EBPO_OK)
+        status = sort_nodes(s);
+    if (status != EBPO_OK)
+        return status;
+    gather_survey(s, 0, s->count, out);
+    status = search_nodes(s, o, out);
+    for (uint64_t i = 0; i < s->count; i++)
+        out->hi = fmax(out->hi, s->nodes[i].bound.hi);
+    out->queries = count_queries(s);
+    s->spent = has_spent(s, o, out);
+    return status;
+}
+
+/* Envelopes nest, so no level has a larger error than the one before. Its search has other pieces
+ * to cut and may be more precise. */
+static ebpo_status query_coarser(survey *s, const ebpo_error_bound_options *o,
+                                 ebpo_error_bound *out)
+{
+    ebpo_status status = EBPO_OK;
+    while (s->spent && s->level > 0 && !(o->at_most > 0) && status == EBPO_OK) {
+        ebpo_error_bound coarser = EBPO_ERROR_BOUND_INIT;
+        s->level--;
+        status = bound_level(s, o, &coarser);
+        if (status == EBPO_OK)
+            out->hi = fmax(out->lo, fmin(out->hi, coarser.hi));
+        out->queries += coarser.queries;
+    }
+    return status;
+}
+
+/* --- --- */
+
+static ebpo_status make_bounders(survey *s, ebpo_model *model)
+{
+    ebpo_status status = EBPO_OK;
+    if (!(s->bounders = ebpo_alloc_zero(s->threads, sizeof *s->bounders)))
+        return ebpo_fail_memory(s->error, s->threads * sizeof *s->bounders);
+    for (unsigned i = 0; i < s->threads && status == EBPO_OK; i++)
+        status = ebpo_bounder_make(&s->bounders[i], s->whole, model, s->error);
+    return status;
+}
+
+/* Returns the difference that shows that the file is no subset of the model's, or NULL. Digests
+ * cannot show it, as subsets of subsets name only the first file, or none when all nodes were kept.
+ */
+static const char *find_difference(const ebpo_info *info, const ebpo_info *model)
+{
+    if (memcmp(info->box_origin, model->box_origin, sizeof info->box_origin) != 0 ||
+        memcmp(info->box_size, model->box_size, sizeof info->box_size) != 0)
+        return "root cells";
+    if (memcmp(info->content_sha256, model->content_sha256, sizeof info->content_sha256) == 0 ||
+        (info->pruned &&
+         memcmp(info->subset_of, model->content_sha256, sizeof info->subset_of) == 0))
+        return NULL;
+    if (memcmp(info->source_sha256, model->source_sha256, sizeof info->source_sha256) != 0 ||
+        info->source_vertex_count != model->source_vertex_count ||
+        info->source_face_count != model->source_face_count)
+        return "sources";
+    if (info->solid != model->solid || info->rule != model->rule ||
+        info->max_level != model->max_level || info->leaf_faces != model->leaf_faces ||
+        info->epsilon != model->epsilon || info->selection != model->selection ||
+        info->percent != model->percent || info->k_root != model->k_root ||
+        info->seed != model->seed)
+        return "build parameters";
+    return NULL;
+}
+
+static ebpo_status check_error_bound(const ebpo_info *info, const ebpo_info *model, int level,
+                                     const ebpo_error_bound_options *o, ebpo_error *error)
+{
+    if (level < 0 || level >= info->level_count)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "there is no level %d; this file has levels 0 to %d", level,
+                         info->level_count - 1);
+    if (!(o->tolerance > 0) || !(o->tolerance <= 1e6))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "tolerance %g: give a number above 0, such as 0.05", o->tolerance);
+    if (!(o->at_most >= 0))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "at_most %g: give an upper bound from a coarser level, or 0", o->at_most);
+    if (o->samples > UINT32_MAX)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "more than 4294967295 samples; a million give the mean to three digits");
+    const char *differ = find_difference(info, model);
+    if (differ)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the file is neither the model's file nor a subset of it: their %s "
+                         "differ; open the model of the original file",
+                         differ);
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_level_error_bound(ebpo_model *model, const ebpo_file *file, int level,
+                                   const ebpo_error_bound_options *options, ebpo_error_bound *out,
+                                   ebpo_error *error)
+{
+    ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
+    EBPO_DEFAULT_FP;
+    ebpo_error_bound_options wanted = EBPO_ERROR_BOUND_OPTIONS_INIT;
+    const ebpo_error_bound_options *o = &wanted;
+    ebpo_error_bound found = EBPO_ERROR_BOUND_INIT;
+    ebpo_status status = EBPO_TAKE(ebpo_error_bound_options, &wanted, options, error);
+    if (status == EBPO_OK)
+        status = EBPO_CHECK_SIZED(ebpo_error_bound, out, error);
+    if (status != EBPO_OK)
+        return status;
+    found.mean = found.rms = NAN;
+    ebpo_lod_model whole = { 0 }, own = { 0 };
+    survey s = { .level = level,
+                 .threads = ebpo_thread_count(o->threads),
+                 .progress = &o->progress,
+                 .error = error,
+                 .whole = &whole,
+                 .tree = &whole };
+    status = check_error_bound(ebpo_file_info(file), model->info, level, o, error);
+    if (status == EBPO_OK)
+        status = ebpo_tree_read_whole(&whole, model->file, s.threads, error);
+    if (status == EBPO_OK && file != model->file) {
+        read.threads = s.threads;
+        status = ebpo_lod_model_read(&own, file, level, &read, error);
+        s.tree = &own;
+    }
+    if (status == EBPO_OK)
+        status = make_bounders(&s, model);
+    if (status == EBPO_OK)
+        status = bound_level(&s, o, &found);
+    if (status == EBPO_OK)
+        status = query_coarser(&s, o, &found);
+    for (unsigned i = 0; s.bounders && i < s.threads; i++)
+        ebpo_bounder_free(&s.bounders[i]);
+    free(s.bounders);
+    free(s.nodes);
+    free(s.order);
+    if (status == EBPO_OK && o->samples)
+        status = error_bound_sample(model, file, level, o, &found, error);
+    EBPO_GIVE(ebpo_error_bound, out, &found);
+    ebpo_lod_model_free(&own);
+    ebpo_lod_model_free(&whole);
+    return status;
+}

@@ -1,0 +1,448 @@
+/* Computes how far one model has to move along a direction until both models have no common point:
+ * the last time of contact.
+ *
+ * A heap holds pairs of nodes, those first that may separate last. Their extents along the
+ * direction and along two axes perpendicular to it bound the time of the last contact. Pairs of
+ * faces are bounded in doubles (ebpo_sweep_max) and decided exactly (ebpo_sweep_last). Models in
+ * parts are searched in pairs of subtrees: a subtree is loaded only if its envelope may separate
+ * later than the last contact found. Bounds: docs/develop/collision.md, "Separation distance along
+ * a direction". One thread.
+ */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "core/sort.h"
+#include "core/parallel.h"
+#include "extras/collide/collider.h"
+#include "extras/collide/face_pairs.h"
+#include "extras/collide/subtree_search.h"
+#include "geometry/vec3.h"
+
+/* A pair of children of nodes, each as the node's number * 8 + lane. */
+typedef struct way_pair {
+    double most; /* bound of the last time with a common point */
+    uint32_t a, b;
+} way_pair;
+
+/* One model relative to the direction: its posed frame axes along three perpendicular axes, of
+ * which the first is the direction. */
+typedef struct way_side {
+    const ebpo_accel *accel;
+    const ebpo_posing *posing;
+    double row[3][3], base[3];
+} way_side;
+
+typedef struct way_search {
+    /* Input: */
+    const ebpo_collision *current_query;
+    double direction[3]; /* in which the query's first model moves; the greatest component is 1/2 ..
+                          * 1 */
+    /* Output: the last contact in units of that direction, and its pair; none before 0. */
+    ebpo_sweep_time last;
+    ebpo_face_pair pair; /* faces of the caller's A and B */
+    double hi;           /* omitted pairs are certainly not later; negative: none was omitted */
+    /* Initially 0: */
+    way_side side[2];
+    double axis[3][3]; /* perpendicular; the first is the direction */
+    double step, lost; /* direction along the first axis; bound of how far rounding moves extents */
+    double sure;       /* `last` is not earlier */
+    way_pair *pairs;   /* a heap, the greatest first */
+    uint64_t count, capacity, looked;
+} way_search;
+
+/* Extents along the axes of a convex set or its content. */
+typedef struct way_extent {
+    double low[3], high[3];
+} way_extent;
+
+/* --- the heap --- */
+
+static bool is_later(const way_pair *a, const way_pair *b) { return a->most > b->most; }
+
+EBPO_HEAP(heap, way_pair, is_later)
+
+static bool push_pair(way_search *s, const way_pair *pair)
+{
+    if (!ebpo_grow(&s->pairs, &s->capacity, s->count + 1, sizeof *s->pairs))
+        return false;
+    heap_add(s->pairs, s->count++, pair);
+    return true;
+}
+
+/* --- extents along the three axes --- */
+
+static way_extent extent_of(const way_search *s, int which, uint32_t ref)
+{
+    const way_side *side = &s->side[which];
+    const ebpo_bound *b = &side->accel->bound[ref / 8];
+    double middle[3], half[3];
+    way_extent out;
+    for (int k = 0; k < 3; k++) {
+        ebpo_bound_sides ends = ebpo_bound_side(b, (int)(ref % 8), k);
+        middle[k] = (ends.low + ends.high) / 2;
+        half[k] = (ends.high - ends.low) / 2;
+    }
+    for (int i = 0; i < 3; i++) {
+        const double *row = side->row[i];
+        double at = row[0] * middle[0] + row[1] * middle[1] + row[2] * middle[2] + side->base[i],
+               reach = fabs(row[0]) * half[0] + fabs(row[1]) * half[1] + fabs(row[2]) * half[2];
+        out.low[i] = at - reach;
+        out.high[i] = at + reach;
+    }
+    return out;
+}
+
+/* Returns the greatest t at which sets with these extents may have a common point; negative: none.
+ */
+static double way_max(const way_search *s, const way_extent *a, const way_extent *b)
+{
+    for (int i = 1; i < 3; i++)
+        if (b->low[i] - a->high[i] > s->lost || a->low[i] - b->high[i] > s->lost)
+            return -1;
+    double along = b->high[0] - a->low[0] + s->lost;
+    return along < 0 ? -1 : along / s->step * (1 + 0x1p-40);
+}
+
+/* Makes two axes perpendicular to the direction and to each other. */
+static void make_axes(const double d[3], double axis[3][3])
+{
+    double length = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    int least = 0;
+    for (int k = 0; k < 3; k++) {
+        axis[0][k] = d[k] / length;
+        least = fabs(d[k]) < fabs(d[least]) ? k : least;
+    }
+    int u = (least + 1) % 3, v = (least + 2) % 3;
+    length = sqrt(axis[0][u] * axis[0][u] + axis[0][v] * axis[0][v]);
+    axis[1][least] = 0;
+    axis[1][u] = -axis[0][v] / length;
+    axis[1][v] = axis[0][u] / length;
+    for (int k = 0; k < 3; k++) {
+        int p = (k + 1) % 3, q = (k + 2) % 3;
+        axis[2][k] = axis[0][p] * axis[1][q] - axis[0][q] * axis[1][p];
+    }
+}
+
+static void make_side(way_search *s, int which, const ebpo_accel *accel)
+{
+    way_side *side = &s->side[which];
+    double centre[3];
+    side->accel = accel;
+    side->posing = &s->current_query->posing[which].posing;
+    ebpo_posing_apply(side->posing, side->accel->centre, centre);
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 3; k++) {
+            double column[3] = { side->posing->matrix[0][k], side->posing->matrix[1][k],
+                                 side->posing->matrix[2][k] };
+            side->row[i][k] = ebpo_vec3_dot(s->axis[i], column) / side->accel->scale;
+        }
+        side->base[i] = ebpo_vec3_dot(s->axis[i], centre);
+    }
+}
+
+/* --- faces --- */
+
+/* Returns true if x precedes y in the order of the query's models. */
+static bool comes_first(const way_search *s, const ebpo_found_pair *x)
+{
+    uint64_t a = ebpo_accel_file_face(s->side[0].accel, x->a),
+             b = ebpo_accel_file_face(s->side[1].accel, x->b);
+    const uint64_t has[2] = { s->pair.file_face_a, s->pair.file_face_b };
+    bool turned = s->current_query->turned;
+    return a != has[turned] ? a < has[turned] : b < has[!turned];
+}
+
+static void inspect_faces(way_search *s, const double a[3][3], const double b[3][3],
+                          const ebpo_found_pair *pair)
+{
+    double most = ebpo_sweep_max(a, b, s->direction, INFINITY);
+    ebpo_sweep_time t;
+    s->looked++;
+    if (most < s->sure)
+        return;
+    ebpo_sweep_time_init(&t);
+    ebpo_sweep_last(a, b, s->direction, &t);
+    int order = t.ever && mpz_sgn(t.numerator) >= 0 ? ebpo_sweep_time_compare(&t, &s->last) : -1;
+    if (order > 0 || (order == 0 && comes_first(s, pair))) {
+        mpz_swap(t.numerator, s->last.numerator);
+        mpz_swap(t.denominator, s->last.denominator);
+        s->last.unit = t.unit;
+        s->last.ever = true;
+        s->pair = ebpo_collision_pair(s->current_query, s->side[0].accel, s->side[1].accel, pair);
+        s->sure = fmax(0, nextafter(ebpo_sweep_time_round(&s->last), 0));
+    }
+    ebpo_sweep_time_clear(&t);
+}
+
+static void inspect_blocks(way_search *s, uint32_t block_a, uint32_t block_b)
+{
+    const uint32_t block[2] = { block_a, block_b };
+    const ebpo_meshlet *m[2];
+    double corner[2][EBPO_BLOCK][3][3];
+    for (int w = 0; w < 2; w++) {
+        m[w] = ebpo_accel_meshlet(s->side[w].accel, block[w]);
+        for (uint32_t lane = 0; lane < m[w]->faces; lane++)
+            ebpo_posed_triangle(s->side[w].accel, s->side[w].posing, block[w] * EBPO_BLOCK + lane,
+                                corner[w][lane]);
+    }
+    for (uint32_t i = 0; i < m[0]->faces; i++)
+        for (uint32_t j = 0; j < m[1]->faces; j++) {
+            ebpo_found_pair pair = { m[0]->face + i, m[1]->face + j, EBPO_PAIR_APART };
+            inspect_faces(s, (const double(*)[3])corner[0][i], (const double(*)[3])corner[1][j],
+                          &pair);
+        }
+}
+
+/* --- the search --- */
+
+static uint32_t child_of(const way_search *s, int which, uint32_t ref)
+{
+    return s->side[which].accel->bound[ref / 8].child[ref % 8];
+}
+
+static double size_of(const way_extent *e)
+{
+    return e->high[0] - e->low[0] + (e->high[1] - e->low[1]) + (e->high[2] - e->low[2]);
+}
+
+/* Pairs all children of one node with one child, or a node's children, of the other model. */
+static ebpo_status offer_children(way_search *s, int which, uint32_t node, uint32_t other,
+                                  ebpo_error *error)
+{
+    way_extent seen[2];
+    seen[!which] = extent_of(s, !which, other);
+    for (uint32_t i = 0; i < s->side[which].accel->bound[node].count; i++) {
+        uint32_t ref[2];
+        ref[which] = node * 8 + i;
+        ref[!which] = other;
+        seen[which] = extent_of(s, which, ref[which]);
+        way_pair pair = { way_max(s, &seen[0], &seen[1]), ref[0], ref[1] };
+        if (pair.most < s->sure)
+            continue;
+        if (!push_pair(s, &pair))
+            return ebpo_fail_memory(error, s->capacity * sizeof *s->pairs);
+    }
+    return EBPO_OK;
+}
+
+/* Divides the larger one, if both are nodes. */
+static ebpo_status divide_pair(way_search *s, const way_pair *pair, ebpo_error *error)
+{
+    uint32_t child[2] = { child_of(s, 0, pair->a), child_of(s, 1, pair->b) };
+    bool block[2] = { child[0] & EBPO_IS_BLOCK, child[1] & EBPO_IS_BLOCK };
+    if (block[0] && block[1]) {
+        inspect_blocks(s, child[0] & ~EBPO_IS_BLOCK, child[1] & ~EBPO_IS_BLOCK);
+        return EBPO_OK;
+    }
+    way_extent a = extent_of(s, 0, pair->a), b = extent_of(s, 1, pair->b);
+    int which = block[0] || (!block[1] && size_of(&b) > size_of(&a));
+    return offer_children(s, which, child[which], which ? pair->a : pair->b, error);
+}
+
+/* Begins a search, once; the caller clears `last`. */
+static void way_search_begin(way_search *s)
+{
+    ebpo_sweep_time_init(&s->last);
+    make_axes(s->direction, s->axis);
+    s->step = ebpo_vec3_dot(s->axis[0], s->direction);
+    s->lost = 0x1p-40 * s->current_query->reach;
+    s->hi = -1;
+    s->pair = (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE,    EBPO_NO_FACE,
+                                EBPO_NO_FACE, EBPO_PAIR_APART, 0 };
+}
+
+static ebpo_status offer_tops(way_search *s, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    const ebpo_accel *b = s->side[1].accel;
+    for (uint32_t j = 0; j < b->bound[b->top].count && status == EBPO_OK; j++)
+        status = offer_children(s, 0, s->side[0].accel->top, b->top * 8 + j, error);
+    return status;
+}
+
+/* Continues with two accels of the query's models. Fails with EBPO_E_MEMORY, EBPO_E_CANCELLED. */
+static ebpo_status way_search_run(way_search *s, const ebpo_accel *const accel[2],
+                                  ebpo_error *error)
+{
+    const ebpo_progress *progress = &s->current_query->options.progress;
+    if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
+        return EBPO_OK;
+    for (int w = 0; w < 2; w++)
+        make_side(s, w, accel[w]);
+    ebpo_status status = offer_tops(s, error);
+    while (status == EBPO_OK && s->count > 0 && s->pairs[0].most >= s->sure) {
+        if (ebpo_collision_is_late(s->current_query))
+            break;
+        if (s->looked % 64 == 0 &&
+            !ebpo_progress_step(progress, "separation distance", 0, 0, error)) {
+            status = EBPO_E_CANCELLED;
+            break;
+        }
+        way_pair pair = heap_take(s->pairs, s->count--);
+        status = divide_pair(s, &pair, error);
+    }
+    if (s->count > 0 && s->pairs[0].most >= s->sure)
+        s->hi = fmax(s->hi, s->pairs[0].most);
+    free(s->pairs);
+    s->pairs = NULL;
+    s->count = s->capacity = 0;
+    return status;
+}
+
+/* --- pairs of subtrees --- */
+
+/* When one model has been moved, the last common point of two faces is in a cell of each model that
+ * lists its face. So both subtrees' envelopes contain it and do not separate before. */
+
+typedef struct searching {
+    ebpo_subtree_search subtrees; /* `gap`: negative of the time until which they may intersect */
+    way_search *way;
+} searching;
+
+static ebpo_status cell_extent(searching *s, int which, ebpo_cell cell, way_extent *out,
+                               ebpo_error *error)
+{
+    ebpo_posed_subtrees *side = &s->subtrees.nodes.side[which];
+    ebpo_convex hull;
+    double slack = ebpo_posed_slack(side, cell, s->subtrees.current_query->reach);
+    ebpo_status status = ebpo_posed_envelope(side, cell, &hull, error);
+    for (int i = 0; i < 3 && status == EBPO_OK; i++) {
+        const double *axis = s->way->axis[i];
+        out->low[i] = INFINITY;
+        out->high[i] = -INFINITY;
+        for (int v = 0; v < hull.count; v++) {
+            const double *x = hull.point[v];
+            double at = axis[0] * x[0] + axis[1] * x[1] + axis[2] * x[2];
+            out->low[i] = fmin(out->low[i], at - slack);
+            out->high[i] = fmax(out->high[i], at + slack);
+        }
+    }
+    return status;
+}
+
+static ebpo_status add_node_pair(searching *s, const ebpo_posed_node node[2], ebpo_error *error)
+{
+    way_extent extent[2];
+    for (int i = 0; i < 2; i++) {
+        if (ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_UNIFORM)
+            return EBPO_OK;
+        ebpo_status status = cell_extent(s, i, node[i].cell, &extent[i], error);
+        if (status != EBPO_OK)
+            return status;
+    }
+    ebpo_node_gap pair = { { node[0], node[1] }, -way_max(s->way, &extent[0], &extent[1]) };
+    return -pair.gap < s->way->sure ? EBPO_OK
+                                    : ebpo_node_gaps_push(&s->subtrees.nodes, &pair, error);
+}
+
+static ebpo_status divide_node_pair(searching *s, const ebpo_node_gap *pair, int side,
+                                    ebpo_error *error)
+{
+    ebpo_posed_node part[2] = { pair->node[0], pair->node[1] };
+    ebpo_status status = EBPO_OK;
+    for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++) {
+        part[side] = ebpo_posed_child(&s->subtrees.nodes.side[side], &pair->node[side], octant);
+        status = add_node_pair(s, part, error);
+    }
+    return status;
+}
+
+static ebpo_status inspect_pair(searching *s, const ebpo_node_gap *pair, ebpo_error *error)
+{
+    const ebpo_accel *accel[2];
+    bool there;
+    int side = ebpo_subtree_search_side(&s->subtrees, pair->node);
+    if (side >= 0)
+        return divide_node_pair(s, pair, side, error);
+    ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &there, error);
+    return status == EBPO_OK && there ? way_search_run(s->way, accel, error) : status;
+}
+
+static ebpo_status search_node_pairs(searching *s, ebpo_error *error)
+{
+    const ebpo_collision *q = s->subtrees.current_query;
+    ebpo_node_gaps *nodes = &s->subtrees.nodes;
+    ebpo_posed_node root[2] = { ebpo_posed_root(&nodes->side[0]),
+                                ebpo_posed_root(&nodes->side[1]) };
+    ebpo_status status = add_node_pair(s, root, error);
+    while (status == EBPO_OK && nodes->count > 0) {
+        ebpo_node_gap pair = ebpo_node_gaps_pop(nodes);
+        if (-pair.gap < s->way->sure)
+            return EBPO_OK;
+        if (ebpo_collision_is_late(q)) {
+            s->way->hi = fmax(s->way->hi, -pair.gap);
+            return EBPO_OK;
+        }
+        status = inspect_pair(s, &pair, error);
+        if (!ebpo_progress_step(&q->options.progress, "separation distance", 0, 0, error))
+            return EBPO_E_CANCELLED;
+    }
+    return status;
+}
+
+/* Continues in all pairs of subtrees whose envelopes may separate as late as the last contact
+ * found, the latest first. Gives the same result as whole models. */
+static ebpo_status way_of_parts(way_search *way, ebpo_error *error)
+{
+    searching s = { .way = way };
+    ebpo_status status = ebpo_subtree_search_begin(&s.subtrees, way->current_query, error);
+    if (status == EBPO_OK)
+        status = search_node_pairs(&s, error);
+    ebpo_subtree_search_end(&s.subtrees);
+    return status;
+}
+
+/* --- the query --- */
+
+/* Sets the direction of the query's first model, times a power of two, and returns the exponent. */
+static int set_direction(way_search *s, const double direction[3])
+{
+    int exponent;
+    (void)frexp(fmax(fabs(direction[0]), fmax(fabs(direction[1]), fabs(direction[2]))), &exponent);
+    for (int k = 0; k < 3; k++)
+        s->direction[k] =
+            ldexp(s->current_query->turned ? -direction[k] : direction[k], -exponent) + 0.0;
+    return exponent;
+}
+
+static void fill_separation(const way_search *s, int exponent, ebpo_separation *out)
+{
+    double lo = 0, hi = ldexp(s->hi, -exponent) * (1 + 0x1p-50);
+    *out = (ebpo_separation){ .pair = s->pair };
+    if (s->last.ever) {
+        ebpo_sweep_time t = s->last;
+        t.unit -= exponent;
+        lo = ebpo_sweep_time_round(&t);
+    }
+    out->t = ebpo_certain_of(lo, s->hi < 0 ? lo : fmax(lo, hi));
+}
+
+ebpo_status ebpo_collide_separation(ebpo_collider *c, const ebpo_collide_options *options,
+                                    const double direction[3], ebpo_separation *out,
+                                    ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_collision q;
+    double size = fabs(direction[0]) + fabs(direction[1]) + fabs(direction[2]);
+    if (!(size > 0x1p-500 && size < 0x1p500))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "expected a direction of three finite numbers, not all 0");
+    ebpo_status status = ebpo_collision_begin(&q, c, options, error);
+    if (status != EBPO_OK)
+        return status;
+    way_search s = { .current_query = &q };
+    int exponent = set_direction(&s, direction);
+    way_search_begin(&s);
+    const ebpo_accel *const whole[2] = { q.model[0]->whole, q.model[1]->whole };
+    status =
+        ebpo_collision_is_in_parts(&q) ? way_of_parts(&s, error) : way_search_run(&s, whole, error);
+    if (status == EBPO_OK)
+        fill_separation(&s, exponent, out);
+    ebpo_sweep_time_clear(&s.last);
+    return status;
+}

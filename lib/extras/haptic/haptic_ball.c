@@ -1,0 +1,420 @@
+/* The object of a haptic session: its options and memory, the step of a ball, and the placement of
+ * the proxy.
+ *
+ * A step moves the proxy towards the device (haptic_step.c), held back by the planes in contact
+ * with it. It returns the force of a spring between them, with friction along the surface. A step
+ * allocates no memory, takes no lock and reads no file: all that it uses is made before or comes
+ * from the loading thread. A device position at infinity or NaN is ignored.
+ *
+ * Documentation: docs/guide/haptic.md. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/fp_env.h"
+#include "extras/haptic/tool.h"
+#include "extras/haptic/haptic_parts.h"
+#include "geometry/vec3.h"
+#include "query/query_model.h"
+
+void ebpo_haptic_report(ebpo_haptic *t, const double device[3])
+{
+    for (int i = 0; i < 3; i++) {
+        atomic_store_explicit(&t->proxy_reported[i], t->proxy[i], memory_order_relaxed);
+        atomic_store_explicit(&t->device_reported[i], device[i], memory_order_relaxed);
+    }
+}
+
+uint32_t ebpo_haptic_stopped(const ebpo_haptic *t)
+{
+    return atomic_load_explicit(&t->stopped, memory_order_acquire) ? EBPO_HAPTIC_STOPPED : 0;
+}
+
+static bool move_stands(const ebpo_haptic *t) { return t->walk.stage == EBPO_BALL_STANDS; }
+
+/* Applies Coulomb friction: the proxy, which slid from `from` without friction, follows only as far
+ * as the tangential part of the spring exceeds the friction. */
+static uint32_t move_rub(ebpo_haptic *t, const double from[3], const double device[3],
+                         ebpo_ball_work *work)
+{
+    double slid[3], depth[3], goal[3];
+    ebpo_vec3_subtract(t->proxy, from, slid);
+    ebpo_vec3_subtract(device, t->proxy, depth);
+    double length = sqrt(ebpo_vec3_dot(slid, slid));
+    double holds = t->options.friction * sqrt(ebpo_vec3_dot(depth, depth));
+    double part = length > holds ? 1 - holds / length : 0;
+    for (int i = 0; i < 3; i++)
+        goal[i] = from[i] + part * slid[i] + (part > 0 ? depth[i] : 0);
+    ebpo_vec3_copy(from, t->proxy);
+    t->way_count = 1;
+    if (part > 0)
+        return ebpo_haptic_go(t, goal, work);
+    if (length > 0 && memcmp(from, t->along_at, sizeof t->along_at) == 0)
+        t->planes = t->along; /* the proxy is there again */
+    return 0;
+}
+
+/* Computes the vector from the device to the proxy; where the proxy waits, only the part that faces
+ * hold back. */
+static void find_depth(const ebpo_haptic *t, const double device[3], uint32_t flags, double out[3])
+{
+    double want[3], way[3];
+    ebpo_vec3_subtract(t->proxy, device, out);
+    if (!(flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE)))
+        return;
+    ebpo_vec3_subtract(device, t->proxy, want);
+    (void)ebpo_hold_back(&t->planes, want, way);
+    ebpo_vec3_subtract(way, want, out);
+}
+
+/* The vector from device to proxy is not exactly along the faces' normals: the proxy's remaining
+ * path, rounding far from 0, and friction tilt it. Damping across it may pull towards faces, and
+ * huge damping with full force: that part is removed, without increasing the force. The first
+ * contact may be the edge of a face that the ball is beside, by a tiny distance: so the nearest
+ * face counts, too. A face that the spring itself pulls to is another one of a narrow corner. */
+static void keep_from_faces(const ebpo_haptic *t, bool near, const double depth[3], double force[3])
+{
+    ebpo_held_planes off = { .count = 0 };
+    double wanted[3];
+    if (near && ebpo_vec3_dot(t->away, depth) >= 0)
+        ebpo_held_planes_add(&off, t->away);
+    for (int i = 0; i < t->planes.count; i++)
+        if (ebpo_vec3_dot(t->planes.normal[i], depth) >= 0)
+            ebpo_held_planes_add(&off, t->planes.normal[i]);
+    ebpo_vec3_copy(force, wanted);
+    (void)ebpo_hold_back(&off, wanted, force);
+}
+
+void ebpo_haptic_count(ebpo_haptic *t, uint32_t flags, uint64_t work)
+{
+    ebpo_haptic_stats *s = &t->stats;
+    s->step_count++;
+    s->contacts += (flags & EBPO_HAPTIC_CONTACT) != 0;
+    s->waiting += (flags & EBPO_HAPTIC_WAITING) != 0;
+    s->incomplete += (flags & EBPO_HAPTIC_INCOMPLETE) != 0;
+    s->partial += (flags & EBPO_HAPTIC_PARTIAL) != 0;
+    s->stopped += (flags & EBPO_HAPTIC_STOPPED) != 0;
+    s->work_max = work > s->work_max ? work : s->work_max;
+    s->energy_max = fmax(s->energy_max, t->passive.energy);
+}
+
+void ebpo_haptic_step_ball(ebpo_haptic *t, const double device[3], ebpo_haptic_ball_result *out)
+{
+    EBPO_DEFAULT_FP;
+    double at[3], from[3], moved[3], along_at[3];
+    bool astray = false;
+    ebpo_ball_work work = { 0 };
+    if (t->options.kind != EBPO_HAPTIC_BALL) {
+        *out = (ebpo_haptic_ball_result){ .face = EBPO_NO_FACE, .flags = EBPO_HAPTIC_WRONG_KIND };
+        return;
+    }
+    for (int i = 0; i < 3; i++)
+        astray |= !(fabs(device[i]) <= 0x1p200);
+    ebpo_vec3_copy(astray ? t->device : device, at);
+    *out = (ebpo_haptic_ball_result){ .flags = astray ? EBPO_HAPTIC_BAD_INPUT : 0 };
+    ebpo_vec3_subtract(at, t->device, moved);
+    ebpo_passive_moved(&t->passive, t->force, moved, 3);
+    ebpo_vec3_copy(t->proxy, from);
+    ebpo_vec3_copy(t->along_at, along_at);
+    ebpo_held_planes along = t->along;
+    uint32_t flags = ebpo_haptic_go(t, at, &work);
+    if (t->touching && (flags & EBPO_HAPTIC_CONTACT) && t->options.friction > 0 && move_stands(t)) {
+        t->along = along;
+        ebpo_vec3_copy(along_at, t->along_at);
+        flags |= move_rub(t, from, at, &work);
+    }
+    out->work = work.faces;
+    out->flags |= flags | ebpo_haptic_stopped(t);
+    ebpo_haptic_look(t, out);
+    t->touching = (flags & EBPO_HAPTIC_CONTACT) != 0;
+    if (t->touching) {
+        double depth[3];
+        find_depth(t, at, flags, depth);
+        ebpo_passive_push(&t->passive, t->options.damping / t->options.step_seconds, depth, moved,
+                          3, out->force);
+        keep_from_faces(t, out->face != EBPO_NO_FACE, depth, out->force);
+        out->depth = sqrt(ebpo_vec3_dot(depth, depth));
+    }
+    ebpo_vec3_copy(t->proxy, out->proxy);
+    ebpo_vec3_copy(out->force, t->force);
+    ebpo_vec3_copy(at, t->device);
+    if ((flags & EBPO_HAPTIC_WAITING) && move_stands(t))
+        ebpo_haptic_try_other(t);
+    ebpo_haptic_count(t, out->flags, out->work);
+    ebpo_haptic_report(t, at);
+}
+
+ebpo_status ebpo_haptic_get_stats(const ebpo_haptic *t, ebpo_haptic_stats *out)
+{
+    ebpo_haptic_stats s = t->stats;
+    s.loads = atomic_load(&t->loads);
+    s.too_many = atomic_load(&t->too_many);
+    s.load_seconds = 1e-9 * (double)atomic_load(&t->load_ns);
+    s.load_seconds_max = 1e-9 * (double)atomic_load(&t->load_ns_max);
+    s.faces = t->box[t->at].count;
+    s.memory = EBPO_HAPTIC_BOXES * ebpo_face_box_bytes(t->options.faces);
+    s.energy = t->passive.energy;
+    s.longest_step = t->passive.longest_step;
+    if (t->options.kind == EBPO_HAPTIC_BALL)
+        s.memory += ebpo_ball_walk_bytes(t->options.faces);
+    if (t->tool)
+        s.memory += ebpo_tool_bytes(t->tool);
+    return EBPO_GIVE(ebpo_haptic_stats, out, &s);
+}
+
+uint32_t ebpo_haptic_ball_path(const ebpo_haptic *t, double way[EBPO_HAPTIC_PATH_MAX][3])
+{
+    for (uint32_t i = 0; i < t->way_count; i++)
+        ebpo_vec3_copy(t->way[i], way[i]);
+    return t->way_count;
+}
+
+/* --- making the object --- */
+
+static bool is_amount(double x) { return x >= 0 && x <= 0x1p200; }
+
+static ebpo_status check_options(const ebpo_haptic_options *o, ebpo_error *error)
+{
+    if (!is_amount(o->radius) || !is_amount(o->skin) || !is_amount(o->search_radius))
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "radius, skin and look must be 0 to 2^200");
+    if (!is_amount(o->stiffness) || !is_amount(o->damping) || !is_amount(o->friction))
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "stiffness, damping and friction must be 0 to 2^200");
+    if (!is_amount(o->step_seconds) || o->step_seconds == 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "a haptic step must take more than 0 seconds, and 2^200 at most");
+    if (o->kind > EBPO_HAPTIC_TOOL)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "unknown kind of haptic device");
+    if (o->kind != EBPO_HAPTIC_BALL && o->radius != 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "only balls have a radius");
+    if ((o->kind == EBPO_HAPTIC_TOOL) != (o->points != NULL && o->point_count > 0) ||
+        o->point_count > EBPO_TOOL_POINTS)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "expected 1 to %d points for a tool, and none "
+                         "for other kinds",
+                         EBPO_TOOL_POINTS);
+    for (uint64_t i = 0; i < 3 * o->point_count; i++)
+        if (!(fabs(o->points[i / 3][i % 3]) <= 0x1p200))
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "point %llu of the tool is not finite",
+                             (unsigned long long)(i / 3));
+    if (o->faces < 64 || o->faces > 1 << 20)
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "a box must have space for 64 to 2^20 faces");
+    return EBPO_OK;
+}
+
+/* Computes values that depend on the model: its box, and the least distance of the ball from faces.
+ */
+static ebpo_status new_measure(ebpo_haptic *t, ebpo_error *error)
+{
+    const ebpo_info *info = ebpo_file_info(t->model->file);
+    double most = 0;
+    t->solid = info->solid;
+    for (int i = 0; i < 3; i++) {
+        double low = info->box_origin[i], high = low + info->box_size[i];
+        double wider = 0x1p-50 * (fabs(low) + fabs(high)); /* rounding of the sum */
+        t->root.min[i] = low - wider;
+        t->root.max[i] = high + wider;
+        most = fmax(most, fmax(fabs(t->root.min[i]), fabs(t->root.max[i])));
+    }
+    t->diagonal = ebpo_vec3_scaled_distance(t->root.min, t->root.max);
+    if (!(most <= 0x1p200 && t->diagonal >= 0x1p-200))
+        return ebpo_fail(error, EBPO_E_UNSUPPORTED,
+                         "coordinates are too large or too small for haptics");
+    double wide = t->tool ? t->tool->radius * (1 + 0x1p-40) : t->options.radius;
+    most += wide; /* possible device position at contact */
+    double least = fmax(0x1p-30 * t->diagonal, 0x1p-42 * most);
+    if (t->options.skin == 0)
+        t->options.skin = fmax((t->tool ? 0x1p-15 : 0x1p-20) * t->diagonal, least);
+    if (t->options.skin < least)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the skin must be at least %g, for rounding of coordinates", least);
+    if (t->options.search_radius == 0)
+        t->options.search_radius = 3 * t->diagonal / sqrt(fmax(1, (double)info->face_count));
+    t->options.search_radius = fmax(t->options.search_radius, 4 * t->options.skin);
+    t->reach = wide + t->options.skin;
+    t->band = fmax(0x1p-24 * t->options.skin, 0x1p-48 * most);
+    t->margin = wide + (t->tool ? 4 * t->options.skin : t->options.search_radius);
+    t->stride = t->diagonal;
+    t->half = fmin(1, sqrt((double)t->options.faces / fmax(1, (double)info->face_count))) *
+              t->diagonal / 8;
+    return EBPO_OK;
+}
+
+static ebpo_status make_parts(ebpo_haptic *t, ebpo_error *error)
+{
+    ebpo_status status = ebpo_context_new(t->model, &t->querying, error);
+    if (status == EBPO_OK)
+        status = ebpo_context_new(t->model, &t->loading, error);
+    for (int i = 0; i < EBPO_HAPTIC_BOXES && status == EBPO_OK; i++)
+        status = ebpo_face_box_new(&t->box[i], t->options.faces, error);
+    if (status == EBPO_OK && t->options.kind == EBPO_HAPTIC_BALL)
+        status = ebpo_ball_walk_new(&t->walk, t->options.faces, error);
+    t->seen = 1;
+    t->own = 3;
+    atomic_store(&t->between, 2);
+    t->own_known = 1;
+    atomic_store(&t->known_between, 2);
+    if (status == EBPO_OK && t->options.kind == EBPO_HAPTIC_PROBE)
+        status = ebpo_held_levels_read(t->model->file, &t->levels, error);
+    return status;
+}
+
+static ebpo_status check_point(ebpo_haptic *t, const double place[3], double reach,
+                               ebpo_error *error)
+{
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+    ebpo_distance_result near;
+    options.max_distance = reach + t->options.skin / 2;
+    ebpo_status status = ebpo_distance(t->querying, place, &options, &near, error);
+    if (status == EBPO_OK && near.distance <= options.max_distance && near.distance >= 0)
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "the device is %g from a face there; it must be farther than %g",
+                         near.distance, options.max_distance);
+    if (status != EBPO_OK || !t->solid)
+        return status;
+    ebpo_inside_result inside;
+    status = ebpo_inside(t->querying, place, NULL, &inside, error);
+    return status != EBPO_OK || inside.where == EBPO_OUT
+               ? status
+               : ebpo_fail(error, EBPO_E_ARGUMENT, "the position is in the solid; begin outside");
+}
+
+/* A probe may be anywhere; a tool has its axes along the model's. */
+static ebpo_status check_place(ebpo_haptic *t, const double place[3], ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (int i = 0; i < 3; i++)
+        if (!(fabs(place[i]) <= 0x1p200))
+            return ebpo_fail(error, EBPO_E_ARGUMENT, "the position must be three finite numbers");
+    if (t->options.kind == EBPO_HAPTIC_BALL)
+        return check_point(t, place, t->reach, error);
+    for (uint64_t i = 0; t->tool && i < t->tool->count && status == EBPO_OK; i++) {
+        double at[3];
+        for (int k = 0; k < 3; k++)
+            at[k] = place[k] + t->tool->point[i][k];
+        status = check_point(t, at, t->options.skin, error);
+    }
+    return status;
+}
+
+/* The box before counts, too: it may be the last one loaded, which a haptic step discarded because
+ * it was made for another position; no other comes for this one. */
+static bool has_box(ebpo_haptic *t)
+{
+    if (ebpo_extent_holds(&t->box[t->at].centres, t->proxy) || ebpo_haptic_take_box(t))
+        return true;
+    ebpo_haptic_try_other(t);
+    return ebpo_extent_holds(&t->box[t->at].centres, t->proxy);
+}
+
+/* Waits until a box contains the proxy. */
+static ebpo_status await_box(ebpo_haptic *t, ebpo_error *error)
+{
+    const struct timespec short_time = { 0, 100000 };
+    while (!has_box(t)) {
+        ebpo_status status = ebpo_haptic_check(t, error);
+        if (status != EBPO_OK)
+            return status;
+        nanosleep(&short_time, NULL);
+    }
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_haptic_reset(ebpo_haptic *t, const double place[3], ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    double proxy[3], device[3];
+    ebpo_vec3_copy(t->proxy, proxy);
+    ebpo_vec3_copy(t->device, device);
+    ebpo_status status = check_place(t, place, error);
+    if (status != EBPO_OK)
+        return status;
+    t->walk.stage = EBPO_BALL_STANDS; /* also after a failure: it continues from its position */
+    ebpo_vec3_copy(place, t->proxy);
+    ebpo_vec3_copy(place, t->device);
+    ebpo_haptic_report(t, place);
+    if (!t->has_thread)
+        status = ebpo_haptic_loader_start(t, error);
+    if (status == EBPO_OK)
+        status = await_box(t, error);
+    if (status != EBPO_OK) {
+        ebpo_vec3_copy(proxy, t->proxy);
+        ebpo_vec3_copy(device, t->device);
+        ebpo_haptic_report(t, device);
+        return status;
+    }
+    t->side.known = false;
+    if (t->tool) {
+        ebpo_rigid there = { .turn = { 0, 0, 0, 1 } };
+        ebpo_vec3_copy(place, there.place);
+        ebpo_tool_put(t->tool, &there);
+    }
+    t->touching = false;
+    for (int i = 0; i < 3; i++)
+        t->force[i] = 0;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_haptic_check(ebpo_haptic *t, ebpo_error *error)
+{
+    pthread_mutex_lock(&t->mutex);
+    ebpo_error failure = t->failure;
+    pthread_mutex_unlock(&t->mutex);
+    return failure.status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &failure);
+}
+
+ebpo_status ebpo_haptic_new(ebpo_model *model, const ebpo_haptic_options *options,
+                            const double place[3], ebpo_haptic **out, ebpo_error *error)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_haptic_options own = EBPO_HAPTIC_OPTIONS_INIT;
+    *out = NULL;
+    ebpo_status status = EBPO_TAKE(ebpo_haptic_options, &own, options, error);
+    if (status == EBPO_OK)
+        status = check_options(&own, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_haptic *t = ebpo_alloc_zero(1, sizeof *t);
+    if (!t)
+        return ebpo_fail_memory(error, sizeof *t);
+    t->model = model;
+    t->options = own;
+    t->failure = (ebpo_error)EBPO_ERROR_INIT;
+    pthread_mutex_init(&t->mutex, NULL);
+    t->passive.stiffness = own.stiffness;
+    if (own.kind == EBPO_HAPTIC_TOOL)
+        status = ebpo_tool_new(own.points, own.point_count, &t->tool, error);
+    t->options.points = NULL; /* the caller's memory */
+    if (status == EBPO_OK)
+        status = new_measure(t, error);
+    if (status == EBPO_OK)
+        status = make_parts(t, error);
+    if (status == EBPO_OK)
+        status = ebpo_haptic_reset(t, place, error);
+    if (status == EBPO_OK)
+        *out = t;
+    else
+        ebpo_haptic_free(t);
+    return status;
+}
+
+void ebpo_haptic_free(ebpo_haptic *t)
+{
+    if (!t)
+        return;
+    ebpo_haptic_loader_stop(t);
+    for (int i = 0; i < EBPO_HAPTIC_BOXES; i++)
+        ebpo_face_box_free(&t->box[i]);
+    ebpo_ball_walk_free(&t->walk);
+    ebpo_held_levels_free(&t->levels);
+    ebpo_tool_free(t->tool);
+    ebpo_context_free(t->querying);
+    ebpo_context_free(t->loading);
+    pthread_mutex_destroy(&t->mutex);
+    free(t);
+}

@@ -1,0 +1,208 @@
+/* The thread that loads boxes of faces ahead of the haptic device, and exact results for probes.
+ *
+ * A haptic step never waits for it. Boxes and results are passed through buffers that are exchanged
+ * atomically: the loader writes its buffer and swaps it with the middle one, which the step swaps
+ * with its own. The position of the device is predicted from its speed. When a box has more faces
+ * than there is memory for, a smaller one is loaded. */
+#include "core/strict_fp.h"
+
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include <time.h>
+
+#include "core/error.h"
+#include "core/os.h"
+#include "core/parallel.h"
+#include "extras/haptic/haptic_parts.h"
+#include "geometry/vec3.h"
+
+static ebpo_status known_query(ebpo_haptic *t, ebpo_known_place *out, ebpo_error *error)
+{
+    ebpo_distance_result near;
+    ebpo_inside_result inside = { .where = EBPO_OUT };
+    ebpo_status status = ebpo_distance(t->loading, out->place, NULL, &near, error);
+    if (status == EBPO_OK && t->solid)
+        status = ebpo_inside(t->loading, out->place, NULL, &inside, error);
+    if (status != EBPO_OK)
+        return status;
+    out->distance = fabs(near.distance);
+    ebpo_vec3_copy(near.point, out->point);
+    ebpo_vec3_copy(near.normal, out->normal);
+    out->winding = inside.winding;
+    out->on = inside.where == EBPO_ON;
+    out->there = true;
+    return EBPO_OK;
+}
+
+/* Queries the probe's position in the loading thread. *moved: true if it has moved. */
+static ebpo_status learn_place(ebpo_haptic *t, bool *moved, ebpo_error *error)
+{
+    ebpo_known_place *known = &t->known[t->own_known];
+    for (int i = 0; i < 3; i++)
+        known->place[i] = atomic_load_explicit(&t->device_reported[i], memory_order_relaxed);
+    *moved = known->place[0] != t->queried[0] || known->place[1] != t->queried[1] ||
+             known->place[2] != t->queried[2];
+    if (!*moved)
+        return EBPO_OK;
+    ebpo_status status = known_query(t, known, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_vec3_copy(known->place, t->queried);
+    unsigned got = atomic_exchange_explicit(&t->known_between, t->own_known | EBPO_HAPTIC_FRESH,
+                                            memory_order_acq_rel);
+    t->own_known = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+    return EBPO_OK;
+}
+
+const ebpo_known_place *ebpo_haptic_known(ebpo_haptic *t)
+{
+    if (atomic_load_explicit(&t->known_between, memory_order_relaxed) & EBPO_HAPTIC_FRESH) {
+        unsigned got = atomic_exchange_explicit(&t->known_between, t->result, memory_order_acq_rel);
+        t->result = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+    }
+    return &t->known[t->result];
+}
+
+/* --- boxes --- */
+
+/* Seconds of prediction for a box, and over which the speed is measured. As a part of half a box's
+ * side: the greatest distance of the proxy from the middle of a new box, and the motion of the
+ * middle that requires another box. */
+static const double ahead = 0.05, measured = 0.02, aside = 0.6, enough = 0.25;
+
+static void wait_a_little(void)
+{
+    const struct timespec half_a_millisecond = { 0, 500000 };
+    nanosleep(&half_a_millisecond, NULL);
+}
+
+/* Predicts the position of the device. Its speed is averaged over several haptic steps: between two
+ * checks the device has often made one step or none. */
+static void loader_foresee(ebpo_haptic *t, double out[3])
+{
+    uint64_t now = ebpo_clock();
+    double seconds = 1e-9 * (double)(now - t->when_before);
+    bool again = seconds >= measured;
+    for (int i = 0; i < 3; i++) {
+        double device = atomic_load_explicit(&t->device_reported[i], memory_order_relaxed);
+        if (again) {
+            t->speed[i] = (device - t->device_before[i]) / seconds;
+            t->device_before[i] = device;
+        }
+        out[i] = device + ahead * t->speed[i];
+    }
+    if (again)
+        t->when_before = now;
+}
+
+/* Computes the centres of a box around the proxy, shifted towards the predicted position. */
+static void place_box(const ebpo_haptic *t, const double goal[3], ebpo_extent *out)
+{
+    for (int i = 0; i < 3; i++) {
+        double proxy = atomic_load_explicit(&t->proxy_reported[i], memory_order_relaxed);
+        double shift = fmin(fmax(goal[i] - proxy, -aside * t->half), aside * t->half);
+        out->min[i] = proxy + shift - t->half;
+        out->max[i] = proxy + shift + t->half;
+    }
+}
+
+static bool far_from_last(const ebpo_haptic *t, const ebpo_extent *e)
+{
+    for (int i = 0; i < 3; i++)
+        if (!(fabs(e->min[i] + e->max[i] - t->last.min[i] - t->last.max[i]) <=
+              2 * enough * t->half))
+            return true;
+    return false;
+}
+
+static void hand_over(ebpo_haptic *t, uint64_t began)
+{
+    uint64_t ns = ebpo_clock() - began;
+    unsigned got =
+        atomic_exchange_explicit(&t->between, t->own | EBPO_HAPTIC_FRESH, memory_order_acq_rel);
+    t->own = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+    atomic_fetch_add(&t->loads, 1);
+    atomic_fetch_add(&t->load_ns, ns);
+    if (ns > atomic_load(&t->load_ns_max))
+        atomic_store(&t->load_ns_max, ns);
+}
+
+static ebpo_status loader_load(ebpo_haptic *t, const double goal[3], ebpo_error *error)
+{
+    uint64_t began = ebpo_clock();
+    ebpo_face_box *box = &t->box[t->own];
+    ebpo_extent centres;
+    for (bool fits = false; !fits;) {
+        place_box(t, goal, &centres);
+        ebpo_status status = ebpo_face_box_load(box, t->loading, &centres, t->margin, &fits, error);
+        if (status != EBPO_OK)
+            return status;
+        if (fits)
+            break;
+        atomic_fetch_add(&t->too_many, 1);
+        t->half /= 2;
+        if (!(t->half > t->reach * 0x1p-10 + t->band))
+            return ebpo_fail(
+                error, EBPO_E_LIMIT,
+                "more than %llu faces around one point; allow more "
+                "(ebpo_haptic_options.faces), or use a smaller radius or search radius",
+                (unsigned long long)t->options.faces);
+    }
+    t->last = centres;
+    bool few = box->count < box->capacity / 4; /* and the haptic step owns the box from here on */
+    hand_over(t, began);
+    if (few)
+        t->half = fmin(1.5 * t->half, t->diagonal);
+    return EBPO_OK;
+}
+
+static void *loader_run(void *user)
+{
+    ebpo_haptic *t = user;
+    ebpo_status status = EBPO_OK;
+    ebpo_error error = EBPO_ERROR_INIT;
+    while (status == EBPO_OK && !atomic_load(&t->stop)) {
+        double goal[3];
+        ebpo_extent centres;
+        loader_foresee(t, goal);
+        place_box(t, goal, &centres);
+        bool moved = false;
+        if (far_from_last(t, &centres))
+            status = loader_load(t, goal, &error);
+        else if (t->options.kind == EBPO_HAPTIC_PROBE)
+            status = learn_place(t, &moved, &error);
+        if (status == EBPO_OK && !moved)
+            wait_a_little();
+    }
+    if (status != EBPO_OK) {
+        pthread_mutex_lock(&t->mutex);
+        t->failure = error;
+        pthread_mutex_unlock(&t->mutex);
+        atomic_store(&t->stopped, true);
+    }
+    return NULL;
+}
+
+ebpo_status ebpo_haptic_loader_start(ebpo_haptic *t, ebpo_error *error)
+{
+    for (int i = 0; i < 3; i++) {
+        t->last.min[i] = t->last.max[i] = NAN; /* far from all */
+        t->queried[i] = NAN;
+        t->device_before[i] = atomic_load(&t->device_reported[i]);
+    }
+    t->when_before = ebpo_clock();
+    int failed = ebpo_thread_start(&t->thread, loader_run, t);
+    t->has_thread = failed == 0;
+    return failed ? ebpo_fail(error, EBPO_E_MEMORY, "cannot start the loading thread: %s",
+                              strerror(failed))
+                  : EBPO_OK;
+}
+
+void ebpo_haptic_loader_stop(ebpo_haptic *t)
+{
+    atomic_store(&t->stop, true);
+    if (t->has_thread)
+        pthread_join(t->thread, NULL);
+    t->has_thread = false;
+}

@@ -1,0 +1,153 @@
+/* The haptic step of a probe: bounds of its distance to the surface, and its side.
+ *
+ * Bounds come from three sources, all certain: the faces of the current box, the exact result for a
+ * recent position of the probe, and the first levels of the octree. Their intersection is returned.
+ * The side is the winding number, which exact arithmetic changes at each face that the probe
+ * crosses; it is EBPO_MAYBE where a step is too short to find it. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+
+#include "core/fp_env.h"
+#include "query/query_model.h"
+#include "extras/haptic/haptic_parts.h"
+#include "geometry/vec3.h"
+
+enum { VISITS = 512 };
+
+/* Unsigned bounds. */
+typedef struct bounds {
+    double lo, hi;
+} bounds;
+
+static void sense_narrow(bounds *b, double lo, double hi)
+{
+    b->lo = fmax(b->lo, lo);
+    b->hi = fmin(b->hi, hi);
+}
+
+/* Bounds the rounding of the model's coordinates and of such a length. */
+static double rounding_of(const ebpo_haptic *t, double length)
+{
+    return t->levels.slack + EBPO_LENGTH_SLACK * length;
+}
+
+/* Bounds the distance by the faces of the current box. Returns true if the nearest is known. */
+static bool sense_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out,
+                        bounds *b)
+{
+    ebpo_haptic_ball_result near = { 0 };
+    ebpo_haptic_look(t, &near);
+    out->work += near.work;
+    out->flags |= near.flags;
+    out->face = near.face;
+    ebpo_vec3_copy(near.normal, out->normal);
+    ebpo_vec3_copy(near.point, out->point);
+    ebpo_vec3_copy(near.weight, out->weight);
+    bool all = !(near.flags & EBPO_HAPTIC_PARTIAL);
+    double distance = INFINITY, search_radius = t->options.search_radius;
+    if (near.face != EBPO_NO_FACE) {
+        double way[3];
+        ebpo_vec3_subtract(place, near.point, way);
+        distance = sqrt(ebpo_vec3_dot(way, way));
+    }
+    double nearer = fmin(distance, search_radius);
+    sense_narrow(b, all ? nearer - rounding_of(t, nearer) : 0, distance + rounding_of(t, distance));
+    return all && near.face != EBPO_NO_FACE;
+}
+
+/* Bounds the distance by a recent result and the path since then. */
+static bool sense_known(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out,
+                        bounds *b)
+{
+    const ebpo_known_place *known = ebpo_haptic_known(t);
+    double way[3];
+    if (!known->there)
+        return false;
+    ebpo_vec3_subtract(place, known->place, way);
+    double far = sqrt(ebpo_vec3_dot(way, way)), rounding = rounding_of(t, far + known->distance);
+    sense_narrow(b, known->distance - far - rounding, known->distance + far + rounding);
+    if (out->normal[0] == 0 && out->normal[1] == 0 && out->normal[2] == 0)
+        ebpo_vec3_copy(known->normal, out->normal);
+    return far == 0;
+}
+
+/* Restarts the side at the position of the recent result, if that is in the box. */
+static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out)
+{
+    const ebpo_known_place *known = &t->known[t->result];
+    const ebpo_face_box *box = &t->box[t->at];
+    for (int turn = 0; turn < 2; turn++) {
+        if (ebpo_side_go(&t->side, box, place, t->found, EBPO_HAPTIC_FACES, EBPO_HAPTIC_VISITS,
+                         &out->work))
+            return true;
+        if (t->side.known || !known->there || known->on)
+            return false;
+        ebpo_vec3_copy(known->place, t->side.at);
+        t->side.winding = known->winding;
+        t->side.known = true;
+    }
+    return false;
+}
+
+static int32_t sense_where(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out)
+{
+    int32_t winding;
+    const ebpo_face_box *box = &t->box[t->at];
+    if (!t->solid)
+        return EBPO_OUT;
+    if (ebpo_held_levels_winding(&t->levels, place, &winding)) {
+        ebpo_vec3_copy(place, t->side.at);
+        t->side.winding = winding;
+        t->side.known = true;
+    } else if (ebpo_extent_holds(&box->centres, place) &&
+               ebpo_side_on(box, place, t->found, EBPO_HAPTIC_FACES, EBPO_HAPTIC_VISITS)) {
+        return EBPO_ON;
+    } else if (!find_side(t, place, out)) {
+        return EBPO_MAYBE;
+    }
+    return ebpo_rule_inside(t->model->info->rule, t->side.winding) ? EBPO_IN : EBPO_OUT;
+}
+
+static void sense_report(ebpo_haptic_probe_result *out, const bounds *b, bool close)
+{
+    double lo = fmax(0, fmin(b->lo, b->hi)), hi = b->hi;
+    bool in = out->where == EBPO_IN, maybe = out->where == EBPO_MAYBE;
+    out->lo = in || maybe ? -hi : lo;
+    out->hi = in ? -lo : hi;
+    out->distance = !close || maybe ? NAN : in ? 0.5 * (out->lo + out->hi) : 0.5 * (lo + hi);
+    if (out->where == EBPO_ON)
+        out->distance = 0;
+    if (isfinite(out->distance))
+        out->flags |= EBPO_HAPTIC_ACCURATE;
+}
+
+void ebpo_haptic_step_probe(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out)
+{
+    EBPO_DEFAULT_FP;
+    double at[3];
+    bool astray = false;
+    bounds b = { 0, INFINITY };
+    *out = (ebpo_haptic_probe_result){ .face = EBPO_NO_FACE, .where = EBPO_MAYBE };
+    if (t->options.kind != EBPO_HAPTIC_PROBE) {
+        out->flags = EBPO_HAPTIC_WRONG_KIND;
+        return;
+    }
+    for (int i = 0; i < 3; i++)
+        astray |= !(fabs(place[i]) <= 0x1p200);
+    ebpo_vec3_copy(astray ? t->device : place, at);
+    out->flags = (astray ? EBPO_HAPTIC_BAD_INPUT : 0) | ebpo_haptic_stopped(t);
+    ebpo_vec3_copy(at, t->proxy);
+    ebpo_vec3_copy(at, t->device);
+    (void)ebpo_haptic_take_box(t);
+    bool close = sense_faces(t, at, out, &b);
+    close |= sense_known(t, at, out, &b);
+    double lo, hi;
+    ebpo_held_levels_bound(&t->levels, at, VISITS, &lo, &hi);
+    sense_narrow(&b, lo, hi);
+    out->where = sense_where(t, at, out);
+    sense_report(out, &b, close);
+    ebpo_haptic_count(t, out->flags | (out->flags & EBPO_HAPTIC_ACCURATE ? 0 : EBPO_HAPTIC_WAITING),
+                      out->work);
+    ebpo_haptic_report(t, at);
+}

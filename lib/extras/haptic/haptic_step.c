@@ -1,0 +1,377 @@
+/* The path of the proxy in a haptic step: straight until the ball is in contact, then along the
+ * contacts, a few times.
+ *
+ * Each straight piece is decided twice: by distances, which find where the ball stops, and by exact
+ * arithmetic, which finds that the centre crossed no face. A piece takes several steps if very many
+ * faces are around.
+ *
+ * Also here: the exchange of a box that the loading thread has made, and the nearest face with a
+ * normal that changes continuously. */
+#include "core/strict_fp.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "extras/haptic/face_box.h"
+#include "extras/haptic/haptic_parts.h"
+#include "geometry/vec3.h"
+
+static void swap_boxes(ebpo_haptic *t)
+{
+    unsigned before = t->at;
+    t->at = t->seen;
+    t->seen = before;
+}
+
+bool ebpo_haptic_take_box(ebpo_haptic *t)
+{
+    if (!(atomic_load_explicit(&t->between, memory_order_relaxed) & EBPO_HAPTIC_FRESH))
+        return false;
+    unsigned got = atomic_exchange_explicit(&t->between, t->seen, memory_order_acq_rel);
+    t->seen = got & ~(unsigned)EBPO_HAPTIC_FRESH;
+    if (!ebpo_extent_holds(&t->box[t->seen].centres, t->proxy))
+        return false; /* it was made for another position */
+    swap_boxes(t);
+    t->stats.taken++;
+    return true;
+}
+
+void ebpo_haptic_try_other(ebpo_haptic *t)
+{
+    if (ebpo_extent_holds(&t->box[t->seen].centres, t->proxy))
+        swap_boxes(t);
+}
+
+/* --- the nearest face --- */
+
+typedef struct around {
+    ebpo_haptic *t;
+    const ebpo_face_box *box;
+    ebpo_near_queue queue;
+    double search_radius; /* all faces that are closer to the ball are found */
+    double nearest;       /* from centre to face */
+    uint32_t looked;
+    uint32_t count; /* entries of t->found */
+    ebpo_haptic_ball_result *out;
+} around;
+
+/* Adds a normal, weighted by area and a factor that falls to 0 at the search distance. It points to
+ * the proxy's side; of a solid always outwards. */
+static void add_normal(const around *a, const double face[3][3], double gap, double sum[3])
+{
+    double e[3], f[3], n[3], d[3];
+    double far = fmax(gap, 0) / a->search_radius, weight = (1 - far) * (1 - far);
+    ebpo_vec3_subtract(face[1], face[0], e);
+    ebpo_vec3_subtract(face[2], face[0], f);
+    ebpo_vec3_subtract(a->t->proxy, face[0], d);
+    ebpo_vec3_cross(e, f, n);
+    if (!a->t->solid && ebpo_vec3_dot(n, d) < 0)
+        weight = -weight;
+    for (int i = 0; i < 3; i++)
+        sum[i] += weight * n[i];
+}
+
+static void add_face(around *a, uint64_t f)
+{
+    const double(*face)[3] = (const double(*)[3])a->box->corner[f];
+    ebpo_face_near near;
+    ebpo_face_nearest(a->t->proxy, face, &near);
+    double gap = near.distance - a->t->options.radius;
+    a->looked++;
+    if (!(gap < a->t->options.search_radius))
+        return;
+    a->t->found[a->count] = (uint32_t)f;
+    a->t->gap[a->count++] = gap;
+    if (near.distance >= a->nearest)
+        return;
+    a->nearest = near.distance;
+    ebpo_vec3_copy(near.away, a->t->away);
+    a->out->face = a->box->face[f];
+    for (int i = 0; i < 3; i++) {
+        a->out->weight[i] = near.weight[i];
+        a->out->point[i] = a->t->proxy[i] - near.distance * near.away[i];
+    }
+}
+
+static void wait_for(around *a, uint64_t node)
+{
+    const ebpo_extent *e = &a->box->node[node];
+    double off[3];
+    for (int i = 0; i < 3; i++)
+        off[i] = fmax(0, fmax(e->min[i] - a->t->proxy[i], a->t->proxy[i] - e->max[i]));
+    double least = sqrt(ebpo_vec3_dot(off, off)) * (1 - 0x1p-48);
+    if (least < a->t->options.radius + a->t->options.search_radius)
+        ebpo_near_push(&a->queue, least, node);
+}
+
+/* Finds the nearest faces first. When there are too many, the farthest are omitted, and the normal
+ * uses those that are surely closer. */
+static void find_faces(around *a)
+{
+    for (uint32_t visits = 0; a->queue.count > 0; visits++) {
+        if (visits >= EBPO_HAPTIC_VISITS || a->looked + EBPO_FACE_BOX_LEAF > EBPO_HAPTIC_FACES) {
+            a->out->flags |= EBPO_HAPTIC_PARTIAL;
+            a->search_radius = fmin(a->search_radius, a->queue.item[0].key - a->t->options.radius);
+            return;
+        }
+        uint64_t node = ebpo_near_pop(&a->queue).node;
+        if (node < a->box->leaves) {
+            wait_for(a, 2 * node);
+            wait_for(a, 2 * node + 1);
+            continue;
+        }
+        uint64_t f = (node - a->box->leaves) * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
+        for (; f < end && f < a->box->count; f++)
+            add_face(a, f);
+    }
+}
+
+static bool no_face_close(const ebpo_haptic *t)
+{
+    double wide = t->options.radius + t->options.search_radius;
+    for (int i = 0; i < 3; i++)
+        if (t->proxy[i] - wide > t->root.max[i] || t->proxy[i] + wide < t->root.min[i])
+            return true;
+    return false;
+}
+
+/* Sets the normal away from the nearest face when too many faces surround the ball to be sure of
+ * all. */
+static void report_normal(const around *a, double out[3])
+{
+    double sum[3] = { 0 };
+    for (uint32_t i = 0; i < a->count; i++)
+        if (a->t->gap[i] < a->search_radius)
+            add_normal(a, (const double(*)[3])a->box->corner[a->t->found[i]], a->t->gap[i], sum);
+    double length = sqrt(ebpo_vec3_dot(sum, sum));
+    if (!(length > 0) && a->count > 0 && a->t->options.kind == EBPO_HAPTIC_BALL) {
+        ebpo_vec3_subtract(a->t->proxy, a->out->point, sum);
+        length = sqrt(ebpo_vec3_dot(sum, sum));
+    }
+    for (int i = 0; i < 3; i++)
+        out[i] = length > 0 ? sum[i] / length : 0;
+}
+
+void ebpo_haptic_look(ebpo_haptic *t, ebpo_haptic_ball_result *out)
+{
+    around a = { .t = t,
+                 .box = &t->box[t->at],
+                 .queue = { t->looking, 0 },
+                 .search_radius = t->options.search_radius,
+                 .nearest = INFINITY,
+                 .out = out };
+    out->face = EBPO_NO_FACE;
+    if (!ebpo_extent_holds(&a.box->centres, t->proxy)) {
+        if (!no_face_close(t))
+            out->flags |= EBPO_HAPTIC_PARTIAL;
+    } else if (a.box->count > 0) {
+        wait_for(&a, 1);
+        find_faces(&a);
+    }
+    out->work += a.looked;
+    report_normal(&a, out->normal);
+    out->depth = -fmin(t->options.search_radius, a.nearest - t->options.radius);
+}
+
+/* --- the path --- */
+
+typedef struct step {
+    ebpo_haptic *t;
+    const double *goal;
+    double way[3], slack, least_slack;
+    uint32_t flags;
+    ebpo_ball_work *work;
+} step;
+
+static void step_swept(const double p[3], const double way[3], double wider, ebpo_extent *out)
+{
+    for (int i = 0; i < 3; i++) {
+        out->min[i] = fmin(p[i], p[i] + way[i]) - wider;
+        out->max[i] = fmax(p[i], p[i] + way[i]) + wider;
+    }
+}
+
+static bool step_apart(const ebpo_extent *a, const ebpo_extent *b)
+{
+    for (int i = 0; i < 3; i++)
+        if (a->min[i] > b->max[i] || a->max[i] < b->min[i])
+            return true;
+    return false;
+}
+
+static void step_shorten(double way[3], double part)
+{
+    for (int i = 0; i < 3; i++)
+        way[i] *= part;
+}
+
+/* Returns the part of the path until the boundary of `e`, from within; slightly less, so that
+ * rounding stays inside. */
+static double part_inside(const double p[3], const double way[3], const ebpo_extent *e)
+{
+    double part = 1;
+    for (int i = 0; i < 3; i++) {
+        double to = p[i] + way[i];
+        if (to > e->max[i])
+            part = fmin(part, (e->max[i] - p[i]) / way[i]);
+        else if (to < e->min[i])
+            part = fmin(part, (e->min[i] - p[i]) / way[i]);
+    }
+    return part < 1 ? fmax(0, part * (1 - 0x1p-20)) : 1;
+}
+
+double ebpo_haptic_known_part(const ebpo_haptic *t, const double way[3], double reach)
+{
+    const ebpo_extent *centres = &t->box[t->at].centres;
+    ebpo_extent all;
+    step_swept(t->proxy, way, reach, &all);
+    if (step_apart(&all, &t->root))
+        return 1;
+    return ebpo_extent_holds(centres, t->proxy) ? part_inside(t->proxy, way, centres) : 0;
+}
+
+/* Cuts the path to the part where all faces around it are known. Returns false if there is none. */
+static bool keep_known(step *s)
+{
+    ebpo_haptic *t = s->t;
+    double part = ebpo_haptic_known_part(t, s->way, t->reach + t->band);
+    if (part < 1) {
+        t->cut = EBPO_HAPTIC_WAITING;
+        step_shorten(s->way, part);
+    }
+    if (part <= 0 && !ebpo_extent_holds(&t->box[t->at].centres, t->proxy)) {
+        s->flags |= EBPO_HAPTIC_WAITING;
+        return false;
+    }
+    return true;
+}
+
+static bool step_differ(const double a[3], const double b[3])
+{
+    return a[0] != b[0] || a[1] != b[1] || a[2] != b[2];
+}
+
+/* Begins the next piece. Returns false if the proxy stays. */
+static bool set_out(step *s)
+{
+    ebpo_haptic *t = s->t;
+    ebpo_ball_walk *w = &t->walk;
+    double want[3];
+    (void)ebpo_haptic_take_box(t);
+    if (memcmp(t->along_at, t->proxy, sizeof t->along_at) != 0)
+        t->along.count = 0;
+    ebpo_vec3_subtract(s->goal, t->proxy, want);
+    s->slack = ebpo_hold_back(&t->along, want, s->way);
+    if (step_differ(s->way, want))
+        s->flags |= EBPO_HAPTIC_CONTACT;
+    s->least_slack = 0x1p-44 * sqrt(ebpo_vec3_dot(want, want));
+    double whole = sqrt(ebpo_vec3_dot(s->way, s->way));
+    if (whole <= 0x1p-12 * t->options.skin)
+        return false;
+    t->cut = 0;
+    if (!keep_known(s))
+        return false;
+    /* Slacks are those of the whole path: for a distant device they would be those of long pieces.
+     */
+    double share = sqrt(ebpo_vec3_dot(s->way, s->way)) / whole;
+    const ebpo_face_box *box = &t->box[t->at];
+    ebpo_vec3_copy(t->proxy, w->from);
+    ebpo_vec3_copy(s->way, w->way);
+    w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL; /* see keep_known */
+    w->reach = t->reach;
+    w->band = t->band;
+    w->slack = s->slack * share;
+    w->least_slack = s->least_slack * share;
+    ebpo_ball_set_out(w);
+    return true;
+}
+
+/* Three planes are enough to hold back: drops those along which the last path did not go. */
+static void reserve_space(ebpo_held_planes *along, const double way[3])
+{
+    double length = sqrt(ebpo_vec3_dot(way, way));
+    int kept = 0;
+    for (int i = 0; i < along->count; i++)
+        if (ebpo_vec3_dot(along->normal[i], way) <= 0x1p-30 * length)
+            ebpo_vec3_copy(along->normal[i], along->normal[kept++]);
+    along->count = kept < EBPO_PLANES_LIMIT ? kept : kept - 1;
+}
+
+static void add_planes(ebpo_haptic *t)
+{
+    const ebpo_ball_walk *w = &t->walk;
+    if (w->part > 0)
+        t->along.count = 0;
+    else if (t->along.count + w->intersected.count > EBPO_PLANES_LIMIT)
+        reserve_space(&t->along, w->way);
+    for (int i = 0; i < w->intersected.count; i++)
+        ebpo_held_planes_add(&t->along, w->intersected.normal[i]);
+    ebpo_vec3_copy(t->proxy, t->along_at);
+}
+
+/* Ends the piece. The ball then slides along its contacts there; after a motion, only along those.
+ * Returns false if it has no contact and stops for this haptic step. */
+static bool step_settle(step *s)
+{
+    ebpo_haptic *t = s->t;
+    const ebpo_ball_walk *w = &t->walk;
+    bool touches = !w->cut && w->part < 1;
+    if (w->part > 0) {
+        ebpo_vec3_copy(w->to, t->proxy);
+        ebpo_vec3_copy(w->to, t->way[t->way_count++]);
+    }
+    if (touches)
+        add_planes(t);
+    s->flags |= touches ? EBPO_HAPTIC_CONTACT : w->cut ? EBPO_HAPTIC_INCOMPLETE : t->cut;
+    t->planes = t->along;
+    t->felt = true;
+    return touches;
+}
+
+/* Until more is known, the previous contacts hold the proxy. */
+static uint32_t still_held(const step *s)
+{
+    const ebpo_haptic *t = s->t;
+    double want[3], way[3];
+    if (t->felt)
+        return 0;
+    ebpo_vec3_subtract(s->goal, t->proxy, want);
+    (void)ebpo_hold_back(&t->planes, want, way);
+    return step_differ(way, want) ? EBPO_HAPTIC_CONTACT : 0;
+}
+
+static uint32_t go_by_pieces(step *s)
+{
+    ebpo_haptic *t = s->t;
+    bool resumed = t->walk.stage != EBPO_BALL_STANDS;
+    for (int piece = 0; piece < EBPO_HAPTIC_PIECES; piece++) {
+        if (t->walk.stage == EBPO_BALL_STANDS && !set_out(s))
+            return s->flags;
+        ebpo_ball_end end = ebpo_ball_go_on(&t->walk, s->work);
+        if (end == EBPO_BALL_LATER)
+            return s->flags | EBPO_HAPTIC_INCOMPLETE | still_held(s);
+        if (end == EBPO_BALL_THROUGH)
+            return s->flags | EBPO_HAPTIC_INCOMPLETE;
+        if (!step_settle(s)) {
+            if (!resumed)
+                return s->flags;
+            s->flags = 0; /* flags of the path to the last device position */
+            t->felt = false;
+        }
+        resumed = false;
+    }
+    return s->flags | EBPO_HAPTIC_INCOMPLETE;
+}
+
+uint32_t ebpo_haptic_go(ebpo_haptic *t, const double goal[3], ebpo_ball_work *work)
+{
+    step s = { .t = t, .goal = goal, .work = work };
+    double left[3];
+    t->felt = false;
+    t->way_count = 0;
+    ebpo_vec3_copy(t->proxy, t->way[t->way_count++]);
+    uint32_t flags = go_by_pieces(&s);
+    ebpo_vec3_subtract(goal, t->proxy, left);
+    bool there = sqrt(ebpo_vec3_dot(left, left)) <= 0x1p-12 * t->options.skin;
+    return there ? flags & ~(uint32_t)EBPO_HAPTIC_CONTACT : flags;
+}

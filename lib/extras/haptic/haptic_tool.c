@@ -1,0 +1,468 @@
+/* A haptic step of a tool. Gauss' principle for a body without mass: of all motions that its
+ * contacts allow, the nearest to the device (Ortega, Redon, Coquillart 2007).
+ *
+ * A piece of the path is decided in two passes. First each point that may hit a face is followed
+ * along it, up to where the first one comes too close. Then all these points are examined at their
+ * new positions: exact arithmetic finds that they crossed no face, and distances find that they are
+ * not too close. Only then the tool moves there. Both passes may take several steps, if many points
+ * are close. */
+#include "core/strict_fp.h"
+
+#include "core/fp_env.h"
+#include "extras/haptic/face_box.h"
+#include "extras/haptic/tool.h"
+#include "extras/haptic/haptic_parts.h"
+
+enum { CLUSTER_VISITS = 64, POINT_VISITS = 48, FACE_VISITS = 256, FACE_COST = 6 };
+
+/* In units of the skin: distance at which faces are examined; distance at which a point ends the
+ * path; least distance at its end. Rotation adds less than a bend to straight paths (see limit). */
+static const double looks = 2.5, blocks = 0.75, least = 0.5, bend = 0.125;
+
+typedef struct tool_piece {
+    ebpo_haptic *t;
+    ebpo_tool *tool;
+    const ebpo_face_box *box; /* NULL: no faces are on the path */
+    double skin, turned;      /* the angle of the whole path */
+    uint64_t *work;
+} tool_piece;
+
+static tool_piece piece_of(ebpo_haptic *t, uint64_t *work)
+{
+    ebpo_tool *tool = t->tool;
+    const ebpo_face_box *box = &t->box[t->at];
+    bool known = ebpo_extent_holds(&box->centres, tool->proxy.place);
+    return (tool_piece){ t,
+                         tool,
+                         known ? box : NULL,
+                         t->options.skin,
+                         sqrt(ebpo_vec3_dot(tool->way + 3, tool->way + 3)) / tool->arm,
+                         work };
+}
+
+static void tool_step_around(const double p[3], const double q[3], double wide, ebpo_extent *out)
+{
+    for (int i = 0; i < 3; i++) {
+        out->min[i] = fmin(p[i], q[i]) - wide;
+        out->max[i] = fmax(p[i], q[i]) + wide;
+    }
+}
+
+/* Returns a distance within which no face is near `e`: by the faces of the box, by the end of the
+ * loaded region, and by the end of the model. */
+static double tool_step_clearance(const tool_piece *p, const ebpo_extent *e, uint32_t visits)
+{
+    double out = 0, inside = INFINITY;
+    for (int i = 0; i < 3; i++)
+        out = fmax(out, fmax(p->t->root.min[i] - e->max[i], e->min[i] - p->t->root.max[i]));
+    if (!p->box)
+        return out;
+    for (int i = 0; i < 3; i++)
+        inside = fmin(inside,
+                      fmin(e->min[i] - p->box->loaded.min[i], p->box->loaded.max[i] - e->max[i]));
+    return fmax(out, fmin(inside, ebpo_face_box_clearance(p->box, e, visits, p->work)));
+}
+
+/* Bounds the motion of a point from its lever arm about the middle of the rotation. */
+static double tool_step_far(const tool_piece *p, double lever)
+{
+    return sqrt(ebpo_vec3_dot(p->tool->way, p->tool->way)) + lever * p->turned;
+}
+
+static double lever_of(const double p[3]) { return sqrt(ebpo_vec3_dot(p, p)); }
+
+static double max_way(const tool_piece *p, const ebpo_tool_cluster *c)
+{
+    return tool_step_far(p, lever_of(c->middle) + c->radius) * (1 + 0x1p-40);
+}
+
+/* Returns false if the pool is full, or too many faces are at one point. */
+static bool add_close(const tool_piece *p, uint32_t point)
+{
+    ebpo_tool *tool = p->tool;
+    double from[3], way[3], to[3];
+    ebpo_extent e;
+    uint32_t count, visits = FACE_VISITS;
+    ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[point], from);
+    ebpo_rigid_lever((const double(*)[3])tool->to_matrix, tool->point[point], way);
+    for (int i = 0; i < 3; i++)
+        to[i] = tool->proxy.place[i] + tool->way[i] + way[i];
+    ebpo_vec3_subtract(to, from, way);
+    tool_step_around(from, to, looks * p->skin, &e);
+    if (tool->pool_count + EBPO_TOOL_NEAR > EBPO_TOOL_POOL)
+        return false;
+    bool all = ebpo_face_box_find(p->box, &e, tool->pool + tool->pool_count, EBPO_TOOL_NEAR,
+                                  &visits, &count);
+    *p->work += FACE_VISITS - visits + FACE_COST * (uint64_t)count;
+    if (!all)
+        return false;
+    const ebpo_ball_way w = { from, way, blocks * p->skin, p->t->band, 0, 0 };
+    for (uint32_t i = 0; i < count; i++) {
+        double away[3];
+        double intersected = ebpo_ball_intersects(
+            &w, (const double(*)[3])p->box->corner[tool->pool[tool->pool_count + i]], away);
+        tool->part = fmin(tool->part, intersected);
+    }
+    tool->close[tool->close_count++] =
+        (ebpo_tool_close){ point, (uint32_t)tool->pool_count, count };
+    tool->pool_count += count;
+    return true;
+}
+
+/* Examines points of a cluster that as a whole may hit faces. */
+static bool inspect_points(const tool_piece *p, uint32_t number)
+{
+    ebpo_tool *tool = p->tool;
+    ebpo_tool_cluster *c = &tool->cluster[number];
+    double need = looks * p->skin;
+    double all = INFINITY;
+    c->free = 0; /* if it is given up */
+    for (uint32_t i = c->first; i < c->first + c->count; i++) {
+        double way = tool_step_far(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
+        if (tool->free[i] - c->gone - way <= 0) {
+            double at[3];
+            ebpo_extent e;
+            ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[i], at);
+            tool_step_around(at, at, 0, &e);
+            tool->free[i] = c->gone + tool_step_clearance(p, &e, POINT_VISITS) - need;
+        }
+        if (tool->free[i] - c->gone - way <= 0 && !add_close(p, i))
+            return false;
+        all = fmin(all, tool->free[i]);
+    }
+    c->free = all;
+    return true;
+}
+
+static bool inspect_cluster(const tool_piece *p, uint32_t number)
+{
+    ebpo_tool *tool = p->tool;
+    ebpo_tool_cluster *c = &tool->cluster[number];
+    double way = max_way(p, c);
+    ++*p->work;
+    if (!p->box || c->free - c->gone - way > 0)
+        return true;
+    double at[3], from_all;
+    ebpo_extent e;
+    ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, c->middle, at);
+    tool_step_around(at, at, c->radius, &e);
+    from_all = tool_step_clearance(p, &e, CLUSTER_VISITS) - looks * p->skin;
+    if (from_all - way <= 0)
+        return inspect_points(p, number);
+    c->free = c->gone + from_all;
+    for (uint32_t i = c->first; i < c->first + c->count; i++)
+        tool->free[i] = fmax(tool->free[i], c->free);
+    return true;
+}
+
+static void add_contact(const tool_piece *p, const ebpo_tool_close *close, uint32_t face,
+                        const ebpo_face_near *near)
+{
+    ebpo_tool *tool = p->tool;
+    ebpo_tool_contact c = { .space = near->distance - p->skin,
+                            .gap = near->distance,
+                            .point = tool->number[close->point],
+                            .face = p->box->face[face] };
+    double lever[3];
+    ebpo_rigid_lever((const double(*)[3])tool->end_matrix, tool->point[close->point], lever);
+    ebpo_vec3_copy(near->away, c.normal);
+    ebpo_vec3_copy(near->away, c.grip);
+    ebpo_vec3_cross(lever, near->away, c.grip + 3);
+    for (int i = 0; i < 3; i++)
+        c.grip[3 + i] /= tool->arm;
+    ebpo_tool_contact_add(&tool->next, &c);
+}
+
+/* Where faces share an edge, one is below the point and pushes it straight away; the others would
+ * hold it back obliquely. So a face counts if its nearest point is in its inside, or if it is the
+ * nearest of all. */
+static void add_contacts(const tool_piece *p, const ebpo_tool_close *close,
+                         const ebpo_face_near *near)
+{
+    double nearest = INFINITY;
+    for (uint32_t i = 0; i < close->count; i++)
+        nearest = fmin(nearest, near[i].distance);
+    for (uint32_t i = 0; i < close->count; i++) {
+        const double *w = near[i].weight;
+        bool straight = w[0] > 0 && w[1] > 0 && w[2] > 0;
+        if (near[i].distance < looks * p->skin &&
+            (straight || near[i].distance <= nearest + 0x1p-10 * p->skin))
+            add_contact(p, close, p->tool->pool[close->first + i], &near[i]);
+    }
+}
+
+/* Checks the new position of the point. Returns false if it is not allowed. */
+static bool check_close(const tool_piece *p, const ebpo_tool_close *close)
+{
+    ebpo_tool *tool = p->tool;
+    ebpo_face_near near[EBPO_TOOL_NEAR];
+    double from[3], to[3];
+    ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[close->point],
+                 from);
+    ebpo_tool_at(&tool->end, (const double(*)[3])tool->end_matrix, tool->point[close->point], to);
+    *p->work += FACE_COST * (uint64_t)close->count;
+    for (uint32_t i = 0; i < close->count; i++) {
+        const double(*face)[3] = (const double(*)[3])p->box->corner[tool->pool[close->first + i]];
+        ebpo_face_nearest(to, face, &near[i]);
+        if (tool->part > 0 && (near[i].distance < least * p->skin + p->t->band ||
+                               ebpo_segment_may_intersect(from, to, face)))
+            return false;
+    }
+    add_contacts(p, close, near);
+    return true;
+}
+
+static void begin_check(ebpo_tool *tool)
+{
+    tool->stage = EBPO_TOOL_CHECKS;
+    tool->at = 0;
+    tool->next.count = 0;
+    tool->end = tool->proxy;
+    if (tool->part > 0)
+        ebpo_rigid_go(&tool->proxy, tool->way, tool->part, tool->arm, &tool->end);
+    ebpo_rigid_matrix(&tool->end, tool->end_matrix);
+}
+
+/* Moves the tool there and reduces the free distance of each point. */
+static void tool_step_arrive(const tool_piece *p)
+{
+    ebpo_tool *tool = p->tool;
+    for (uint64_t i = 0; i < tool->cluster_count; i++)
+        tool->cluster[i].gone += tool->part * max_way(p, &tool->cluster[i]) + 0x1p-8 * p->t->band;
+    tool->contacts = tool->next;
+    tool->proxy = tool->end;
+    tool->stage = EBPO_TOOL_STANDS;
+}
+
+/* Limits the angle: straight paths and rotations differ by at most lever times angle^2 / 8. */
+static void tool_step_limit(ebpo_haptic *t, double way[EBPO_SCREW], uint32_t *flags)
+{
+    ebpo_tool *tool = t->tool;
+    double most = fmin(0.25, sqrt(8 * bend * t->options.skin / tool->radius));
+    double angle = sqrt(ebpo_vec3_dot(way + 3, way + 3)) / tool->arm, part = 1;
+    if (angle > most)
+        part = most / angle;
+    double length = ebpo_screw_length(way);
+    if (part * length > t->stride)
+        part = t->stride / length;
+    if (part >= 1)
+        return;
+    *flags |= EBPO_HAPTIC_INCOMPLETE;
+    for (int k = 0; k < EBPO_SCREW; k++)
+        way[k] *= part;
+}
+
+/* Begins a tool's next piece; flags are returned at its end. Returns false if it cannot begin. */
+static bool begin_tool_way(ebpo_haptic *t, const double wanted[EBPO_SCREW], uint32_t *flags)
+{
+    ebpo_tool *tool = t->tool;
+    for (int k = 0; k < EBPO_SCREW; k++)
+        tool->way[k] = wanted[k];
+    tool->flags = 0;
+    tool_step_limit(t, tool->way, &tool->flags);
+    double part = ebpo_haptic_known_part(t, tool->way, tool->radius + looks * t->options.skin);
+    if (part < 1) {
+        tool->flags |= EBPO_HAPTIC_WAITING;
+        if (part <= 0) {
+            *flags |= EBPO_HAPTIC_WAITING;
+            return false;
+        }
+        for (int k = 0; k < EBPO_SCREW; k++)
+            tool->way[k] *= part;
+    }
+    ebpo_rigid_matrix(&tool->proxy, tool->from_matrix);
+    ebpo_rigid end;
+    ebpo_rigid_go(&tool->proxy, tool->way, 1, tool->arm, &end);
+    ebpo_rigid_matrix(&end, tool->to_matrix);
+    tool->stage = EBPO_TOOL_LOOKS;
+    tool->at = tool->close_count = tool->pool_count = 0;
+    tool->part = 1;
+    return true;
+}
+
+/* Gives up a path with too many close faces; the next one is shorter. */
+static uint32_t give_up(tool_piece *p)
+{
+    p->t->stride = fmax(0.25 * ebpo_screw_length(p->tool->way), 0x1p-8 * p->skin);
+    p->tool->stage = EBPO_TOOL_STANDS;
+    return EBPO_HAPTIC_INCOMPLETE;
+}
+
+/* Continues the piece; returns bits of ebpo_haptic_flag. */
+static uint32_t continue_tool_way(ebpo_haptic *t, uint64_t *work, bool *arrived)
+{
+    tool_piece p = piece_of(t, work);
+    ebpo_tool *tool = t->tool;
+    *arrived = false;
+    for (; tool->stage == EBPO_TOOL_LOOKS && tool->at < tool->cluster_count; tool->at++) {
+        if (*work > EBPO_TOOL_WORK)
+            return EBPO_HAPTIC_INCOMPLETE;
+        if (!inspect_cluster(&p, (uint32_t)tool->at))
+            return give_up(&p);
+    }
+    if (tool->stage == EBPO_TOOL_LOOKS)
+        begin_check(tool);
+    for (; tool->at < tool->close_count; tool->at++) {
+        if (*work > EBPO_TOOL_WORK)
+            return EBPO_HAPTIC_INCOMPLETE;
+        if (!check_close(&p, &tool->close[tool->at]))
+            return give_up(&p);
+    }
+    tool_step_arrive(&p);
+    *arrived = true;
+    if (t->stride < t->diagonal && tool->pool_count < EBPO_TOOL_POOL / 4)
+        t->stride *= 2;
+    return tool->part < 1 ? 0 : tool->flags;
+}
+
+/* --- the step --- */
+
+static double turn_closeness(const ebpo_haptic *t) { return 0x1p-6 * t->options.skin; }
+
+/* Applies Coulomb friction: along the contacts, it removes friction times the held-back part from
+ * the path. */
+static void turn_rub(const ebpo_haptic *t, const double want[EBPO_SCREW], double way[EBPO_SCREW])
+{
+    double held[EBPO_SCREW];
+    for (int k = 0; k < EBPO_SCREW; k++)
+        held[k] = want[k] - way[k];
+    double length = ebpo_screw_length(way), holds = t->options.friction * ebpo_screw_length(held);
+    double part = length > holds ? 1 - holds / length : 0;
+    for (int k = 0; k < EBPO_SCREW; k++)
+        way[k] *= part;
+}
+
+/* Begins the next piece. Returns false if the tool stays. */
+static bool set_out(ebpo_haptic *t, const ebpo_rigid *device, uint32_t *flags)
+{
+    ebpo_tool *tool = t->tool;
+    double want[EBPO_SCREW], way[EBPO_SCREW];
+    ebpo_rigid_between(&tool->proxy, device, tool->arm, want);
+    int holding = ebpo_tool_hold(&tool->contacts, want, turn_closeness(t), true, way);
+    if (holding > 0 && t->touching && t->options.friction > 0)
+        turn_rub(t, want, way);
+    if (ebpo_screw_length(way) <= turn_closeness(t) / 2)
+        return false;
+    return begin_tool_way(t, way, flags);
+}
+
+static uint32_t turn_go(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *work)
+{
+    ebpo_tool *tool = t->tool;
+    uint32_t flags = 0;
+    tool->way_count = 1;
+    tool->way_of[0] = tool->proxy;
+    for (int piece = 0; piece < EBPO_TOOL_PIECES; piece++) {
+        bool arrived;
+        if (tool->stage == EBPO_TOOL_STANDS) {
+            if (*work > EBPO_TOOL_WORK)
+                return flags | EBPO_HAPTIC_INCOMPLETE;
+            (void)ebpo_haptic_take_box(t);
+            *work += 4 * (uint64_t)tool->contacts.count; /* work of the contacts */
+            if (!set_out(t, device, &flags))
+                return flags;
+        }
+        flags |= continue_tool_way(t, work, &arrived);
+        ebpo_vec3_copy(tool->proxy.place, t->proxy);
+        if (arrived)
+            tool->way_of[tool->way_count++] = tool->proxy;
+        if (!arrived || (flags & EBPO_HAPTIC_WAITING))
+            return flags;
+    }
+    return flags | EBPO_HAPTIC_INCOMPLETE;
+}
+
+/* Computes the part of the vector from device to proxy that contacts cause; returns the number of
+ * these contacts. */
+static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t flags,
+                      double out[EBPO_SCREW])
+{
+    const ebpo_tool *tool = t->tool;
+    double want[EBPO_SCREW], way[EBPO_SCREW];
+    ebpo_rigid_between(&tool->proxy, device, tool->arm, want);
+    int holding = ebpo_tool_hold(&tool->contacts, want, turn_closeness(t), false, way);
+    bool part = flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE) || t->options.friction == 0;
+    for (int k = 0; k < EBPO_SCREW; k++)
+        out[k] = (part ? way[k] : 0) - want[k];
+    return holding;
+}
+
+static void report_contact(const ebpo_haptic *t, ebpo_haptic_tool_result *out)
+{
+    const ebpo_tool_contacts *all = &t->tool->contacts;
+    const ebpo_tool_contact *nearest = NULL;
+    out->face = out->point = EBPO_NO_FACE;
+    out->contacts = (uint64_t)all->count;
+    for (int i = 0; i < all->count; i++)
+        if (!nearest || all->at[i].gap < nearest->gap)
+            nearest = &all->at[i];
+    if (!nearest)
+        return;
+    out->point = nearest->point;
+    out->face = nearest->face;
+    ebpo_vec3_copy(nearest->normal, out->normal);
+}
+
+static void turn_push(ebpo_haptic *t, const double depth[EBPO_SCREW],
+                      const double moved[EBPO_SCREW], ebpo_haptic_tool_result *out)
+{
+    ebpo_tool *tool = t->tool;
+    double *force = tool->force;
+    ebpo_passive_push(&t->passive, t->options.damping / t->options.step_seconds, depth, moved,
+                      EBPO_SCREW, force);
+    for (int i = 0; i < 3; i++) {
+        out->force[i] = force[i];
+        out->torque[i] = force[3 + i] * tool->arm;
+    }
+}
+
+void ebpo_haptic_step_tool(ebpo_haptic *t, const double place[3], const double turn[4],
+                           ebpo_haptic_tool_result *out)
+{
+    EBPO_DEFAULT_FP;
+    ebpo_tool *tool = t->tool;
+    ebpo_rigid device;
+    double moved[EBPO_SCREW], depth[EBPO_SCREW];
+    *out = (ebpo_haptic_tool_result){ .face = EBPO_NO_FACE, .point = EBPO_NO_FACE };
+    if (!tool) {
+        out->flags = EBPO_HAPTIC_WRONG_KIND;
+        return;
+    }
+    bool astray = !ebpo_rigid_read(place, turn, &device);
+    if (astray)
+        device = tool->device;
+    ebpo_rigid_between(&tool->device, &device, tool->arm, moved);
+    ebpo_passive_moved(&t->passive, tool->force, moved, EBPO_SCREW);
+    uint32_t flags = turn_go(t, &device, &out->work);
+    int holding = find_depth(t, &device, flags, depth);
+    t->touching = holding > 0;
+    for (int k = 0; k < EBPO_SCREW; k++)
+        tool->force[k] = 0;
+    if (t->touching) {
+        flags |= EBPO_HAPTIC_CONTACT;
+        turn_push(t, depth, moved, out);
+        out->depth = ebpo_screw_length(depth);
+    }
+    report_contact(t, out);
+    tool->device = device;
+    ebpo_vec3_copy(device.place, t->device);
+    ebpo_vec3_copy(tool->proxy.place, out->proxy);
+    for (int k = 0; k < 4; k++)
+        out->turn[k] = tool->proxy.turn[k];
+    out->flags = flags | (astray ? EBPO_HAPTIC_BAD_INPUT : 0) | ebpo_haptic_stopped(t);
+    if ((flags & EBPO_HAPTIC_WAITING) && tool->stage == EBPO_TOOL_STANDS)
+        ebpo_haptic_try_other(t);
+    ebpo_haptic_count(t, out->flags, out->work);
+    ebpo_haptic_report(t, device.place);
+}
+
+uint32_t ebpo_haptic_tool_path(const ebpo_haptic *t, double way[EBPO_HAPTIC_PATH_MAX][7])
+{
+    uint32_t count = t->tool ? t->tool->way_count : 0;
+    for (uint32_t i = 0; i < count; i++) {
+        ebpo_vec3_copy(t->tool->way_of[i].place, way[i]);
+        for (int k = 0; k < 4; k++)
+            way[i][3 + k] = t->tool->way_of[i].turn[k];
+    }
+    return count;
+}

@@ -1,0 +1,422 @@
+/* SPDX-License-Identifier: MIT
+ * Computes haptic forces for a device that explores a model, at a steady rate with a deadline for
+ * each step.
+ *
+ *   Making    ebpo_haptic_new, ebpo_haptic_free
+ *
+ *   A step    ebpo_haptic_step_ball, ebpo_haptic_ball_path: a ball
+ *             ebpo_haptic_step_probe: a probe, a point without collisions
+ *             ebpo_haptic_step_tool, ebpo_haptic_tool_path: a tool of many points, with force and
+ * torque
+ *
+ *   Other     ebpo_haptic_reset, ebpo_haptic_check, ebpo_haptic_get_stats
+ *
+ *     ebpo_haptic *touch = NULL;
+ *     ebpo_haptic_ball_result answer;
+ *     ebpo_haptic_new(model, NULL, start, &touch, &error);
+ *     for (;;) {
+ *         ebpo_haptic_step_ball(touch, device_position, &answer);
+ *         send(answer.force);
+ *     }
+ *
+ * The ball (or point) follows the haptic device. Where the device passes through a face, a proxy of
+ * the ball stays on the side from which it came. Every step of the proxy's centre is a segment
+ * that, by exact arithmetic, intersects no face. So the proxy passes through no wall of any
+ * thickness at any speed. Faces count from both sides, so surfaces work like solids.
+ *
+ * A haptic step uses only data in memory: a limited number of faces in a box around the device. A
+ * thread of the object loads the next box ahead of the device and passes it by one atomic exchange.
+ * A step takes no lock, allocates no memory and reads no file. If the device leaves the box before
+ * the next one is loaded, the proxy waits at the boundary of the box (EBPO_HAPTIC_WAITING), so
+ * deadlines are kept. If no further box can be loaded, because reading failed or there are too many
+ * faces, steps report EBPO_HAPTIC_STOPPED.
+ *
+ * Methods: EBP 2017, section 4.5; Zilles and Salisbury 1995 (god-object); Ruspini, Kolarov and
+ * Khatib 1997 (proxy of a size).
+ */
+#ifndef EBPO_HAPTIC_H
+#define EBPO_HAPTIC_H
+
+#include <ebpo/query.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct ebpo_haptic ebpo_haptic;
+
+/* Kind of the haptic object; decides which step function is allowed. */
+typedef enum ebpo_haptic_kind {
+    EBPO_HAPTIC_BALL = 0,  /* ebpo_haptic_step_ball */
+    EBPO_HAPTIC_PROBE = 1, /* ebpo_haptic_step_probe */
+    EBPO_HAPTIC_TOOL = 2   /* ebpo_haptic_step_tool */
+} ebpo_haptic_kind;
+
+typedef struct ebpo_haptic_options {
+    size_t struct_size;
+
+    /*
+     * Radius of the ball in the model's unit, at least 0. 0: a point. All faces within the radius
+     * and `look` must fit into a box (`faces`). A step tests at most 512 of them, in the order in
+     * which the ball may touch them; the next steps continue with the others.
+     */
+    double radius;
+
+    /*
+     * Distance beyond the radius that the proxy keeps from faces because of rounding, in the
+     * model's unit. 0: 2^-20 of the diagonal of the model's root cell. Else at least 2^-30 of it,
+     * and 2^-42 of the coordinates and the radius.
+     */
+    double skin;
+
+    /*
+     * Search distance for the nearest face, in the model's unit, at least 0. Faces within this
+     * distance of the ball contribute to the smooth normal, nearer ones more. 0: 3 times the
+     * diagonal divided by the square root of the number of faces, some edge lengths of an even
+     * mesh.
+     */
+    double search_radius;
+
+    /*
+     * Force per unit of depth; force per unit of device speed (units per second) during contact; at
+     * least 0.
+     */
+    double stiffness, damping;
+
+    /*
+     * Coefficient of Coulomb friction: the proxy slides where the tangential force exceeds this
+     * part of the normal force. At least 0.
+     */
+    double friction;
+
+    /* Seconds between calls of ebpo_haptic_step_ball; above 0. */
+    double step_seconds;
+
+    /*
+     * Maximum number of faces of a box; 64 to 2^20. Four boxes are held: about 550 bytes per face
+     * in total, besides the model's budget.
+     */
+    uint64_t faces;
+
+    /*
+     * Tool: points[point_count][3] in its own coordinates, 1 to 10,000; copied. Points stay on the
+     * side of faces from which they came, and need no normals. Other kinds: NULL and 0.
+     */
+    const double (*points)[3];
+    uint64_t point_count;
+
+    /* ebpo_haptic_kind */
+    uint64_t kind;
+} ebpo_haptic_options;
+
+#define EBPO_HAPTIC_OPTIONS_INIT                                                      \
+    {                                                                                 \
+        sizeof(ebpo_haptic_options), 0, 0, 0, 400, 0.4, 0, 0.001, 1 << 14, NULL, 0, 0 \
+    }
+
+/*
+ * Makes a haptic object at a position and starts loading around it.
+ *
+ * model   must outlive the object; other contexts may use it at the same time. Its budget limits
+ *         loading (ebpo_model_options.memory)
+ * place   three finite doubles, outside the solid, and farther from every face than the ball needs
+ *
+ * EBPO_E_ARGUMENT: an option or the position is not valid. EBPO_E_UNSUPPORTED: coordinates are
+ * beyond 2^200. EBPO_E_ABSENT: the file has no mesh, or is a subset without the surroundings of the
+ * position. EBPO_E_LIMIT, and the errors of reading.
+ *
+ * Threads: any; one more is started.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_new(ebpo_model *model,
+                                                   const ebpo_haptic_options *options,
+                                                   const double place[3], ebpo_haptic **out,
+                                                   ebpo_error *error);
+
+/*
+ * Frees the object and ends its thread, after the current load.
+ *
+ * Threads: one per object.
+ */
+EBPO_API void ebpo_haptic_free(ebpo_haptic *haptic);
+
+/* State of a haptic step: bits. */
+typedef enum ebpo_haptic_flag {
+    /* A face keeps the proxy away from the device. */
+    EBPO_HAPTIC_CONTACT = 1,
+
+    /* The proxy waits at the boundary of the loaded box; this causes no force. */
+    EBPO_HAPTIC_WAITING = 2,
+
+    /*
+     * The work of a step ended before the path; the next step continues. A ball in contact stays in
+     * contact with the same faces meanwhile.
+     */
+    EBPO_HAPTIC_INCOMPLETE = 4,
+
+    /*
+     * Some faces within `look` were not tested (the farthest ones) or not loaded. Nearest face,
+     * distance and normal are those of the others.
+     */
+    EBPO_HAPTIC_PARTIAL = 8,
+
+    /* The device position was not finite; the previous one was used. */
+    EBPO_HAPTIC_BAD_INPUT = 16,
+
+    /* Wrong step function for this kind; nothing was done. */
+    EBPO_HAPTIC_WRONG_KIND = 32,
+
+    /* ebpo_haptic_step_probe: the distance is exact except for rounding. */
+    EBPO_HAPTIC_ACCURATE = 64,
+
+    /*
+     * Loading has ended permanently, see ebpo_haptic_check. The proxy moves only in the loaded box.
+     * Set in all steps after the failure.
+     */
+    EBPO_HAPTIC_STOPPED = 128
+} ebpo_haptic_flag;
+
+typedef struct ebpo_haptic_ball_result {
+    /* Centre of the ball on the free side. */
+    double proxy[3];
+
+    /* Force for the device; 0 unless EBPO_HAPTIC_CONTACT. */
+    double force[3];
+
+    /*
+     * Unit vector away from the near faces: weighted mean of their normals on the proxy's side. It
+     * turns steadily when the proxy passes an edge. (0, 0, 0) if no face is within `look`.
+     */
+    double normal[3];
+
+    /*
+     * In contact: distance of the device behind the proxy. Else minus the distance from the ball to
+     * the nearest face. Minus `look` if none is that near: the distance is then at least `look`,
+     * unless EBPO_HAPTIC_PARTIAL.
+     */
+    double depth;
+
+    /*
+     * Nearest face within `look`: its index as in ebpo_distance_result (EBPO_NO_FACE: none), the
+     * nearest point, and the weights of its corners there, whose sum is 1.
+     */
+    uint64_t face;
+    double point[3], weight[3];
+
+    /* ebpo_haptic_flag bits */
+    uint32_t flags;
+
+    /* Faces tested in this step. */
+    uint32_t work;
+} ebpo_haptic_ball_result;
+
+/*
+ * Computes one haptic step with the device at `hand`. Takes bounded time, without locks, allocation
+ * or reading. After EBPO_HAPTIC_WAITING or EBPO_HAPTIC_INCOMPLETE the proxy's progress depends on
+ * when boxes were loaded.
+ *
+ * The force is stiffness times the vector from device to proxy, minus damping times the device
+ * velocity. It never points towards faces that the spring pushes away from, except for 1e-7 of
+ * itself. It is reduced to bound the total energy given to the device for any motion: at most the
+ * energy taken from it, plus stiffness times the square of its longest step.
+ *
+ * Threads: one per object.
+ */
+EBPO_API void ebpo_haptic_step_ball(ebpo_haptic *haptic, const double device[3],
+                                    ebpo_haptic_ball_result *out);
+
+/* Maximum number of points of a path. */
+enum { EBPO_HAPTIC_PATH_MAX = 17 };
+
+/*
+ * Gets the path of a tool in the last step, as ebpo_haptic_ball_path does: a position and a
+ * quaternion each. Each point of the tool moved straight from one of its positions to the next.
+ *
+ * Threads: one per object.
+ */
+EBPO_API uint32_t ebpo_haptic_tool_path(const ebpo_haptic *haptic,
+                                        double way[EBPO_HAPTIC_PATH_MAX][7]);
+
+/*
+ * Gets the path of the proxy in the last step: segments between way[0] and way[n - 1] that
+ * intersect no face. Returns n, which is 1 if the proxy did not move, and 0 before the first step.
+ *
+ * Threads: one per object.
+ */
+EBPO_API uint32_t ebpo_haptic_ball_path(const ebpo_haptic *haptic,
+                                        double way[EBPO_HAPTIC_PATH_MAX][3]);
+
+/* Result of a probe at a position. */
+typedef struct ebpo_haptic_probe_result {
+    /*
+     * Negative inside a solid. With EBPO_HAPTIC_ACCURATE correct except for some roundings of the
+     * coordinates, else NAN: only the bounds are known. ebpo_map_colour gives its colour.
+     */
+    double distance;
+
+    /*
+     * Bounds of the signed distance; from -hi to hi if it is unknown whether the position is
+     * inside.
+     */
+    double lo, hi;
+
+    /*
+     * Unit vector, outward for solids: as in ebpo_haptic_ball_result if a face is within `look`;
+     * else that of the previous nearest face, or (0, 0, 0) if there was none.
+     */
+    double normal[3];
+
+    /* Nearest face within `look` as in ebpo_haptic_ball_result; else EBPO_NO_FACE. */
+    uint64_t face;
+    double point[3], weight[3];
+
+    /* ebpo_where; EBPO_OUT for surfaces. */
+    int32_t where;
+
+    /* ebpo_haptic_flag bits */
+    uint32_t flags;
+
+    /* Faces tested in this step. */
+    uint64_t work;
+} ebpo_haptic_probe_result;
+
+/*
+ * Computes one haptic step of a probe, which has no collisions: bounds of the distance from its
+ * position to the model, from data in memory. The bounds combine
+ *   - the near faces, and by exact arithmetic the side of each on which the probe passed through
+ *     it: within `look` of a face the result is exact except for rounding;
+ *   - the first levels of the octree, at most 2^17 nodes: cells with faces, and cells without faces
+ *     that are inside;
+ *   - the exact result for a previous position of the probe, from the loading thread: the distance
+ *     has changed by at most the path since.
+ * Time, locks, memory and reading are as in ebpo_haptic_step_ball.
+ *
+ * Threads: one per object.
+ */
+EBPO_API void ebpo_haptic_step_probe(ebpo_haptic *haptic, const double place[3],
+                                     ebpo_haptic_probe_result *out);
+
+/* Result of a haptic step of a tool. */
+typedef struct ebpo_haptic_tool_result {
+    /* Pose of the tool on the free side: position, and rotation as a unit quaternion x, y, z, w. */
+    double proxy[3], turn[4];
+
+    /*
+     * Force and torque for the device, in the axes of the model; the torque is about the tool's
+     * position. 0 unless EBPO_HAPTIC_CONTACT.
+     */
+    double force[3], torque[3];
+
+    /*
+     * In contact: distance of the device behind the proxy along motions that contacts prevent, with
+     * angles as lengths (ebpo_haptic_step_tool). Else 0.
+     */
+    double depth;
+
+    /*
+     * The point nearest to a face, if within 2 skins: its index in the tool (EBPO_NO_FACE: none),
+     * the face as in ebpo_distance_result, and the unit vector from the face to the point.
+     */
+    uint64_t point, face;
+    double normal[3];
+
+    /* Number of pairs of a point and a face that near, at most 256. */
+    uint64_t contacts;
+
+    /* Nodes visited in this step, plus six for each face. */
+    uint64_t work;
+
+    /* ebpo_haptic_flag bits */
+    uint32_t flags;
+    uint32_t reserved;
+} ebpo_haptic_tool_result;
+
+/*
+ * Computes one haptic step of a tool with the device at `place`, rotated by the quaternion x, y, z,
+ * w of any length. No point of the tool passes through a face, or comes closer than half a skin to
+ * one; each step is decided as for a ball. Between its points a tool has no collisions, so their
+ * spacing must be finer than the features to feel.
+ *
+ * A rotation counts as its angle times the arm of the tool, the root mean square distance of the
+ * points from the tool's position. Among all motions that the contacts allow, the proxy takes the
+ * one that ends nearest to the device. Force and torque are those of a spring of `stiffness` for
+ * the prevented motion (for an angle, stiffness times arm^2). They are reduced by the energy rule
+ * of ebpo_haptic_step_ball, which includes rotations as lengths.
+ *
+ * Time is bounded as in ebpo_haptic_step_ball. Points that cannot have come near since their last
+ * test take almost no time. If many points are near and the work exceeds a step, the next steps
+ * continue it (EBPO_HAPTIC_INCOMPLETE), and the tool does not move until then.
+ *
+ * Methods: Ortega, Redon and Coquillart 2007 (six degrees of freedom, motion by Gauss' principle);
+ * McNeely, Puterbaugh and Troy 1999 (points for a tool); Barbic and James 2008 (clusters of points,
+ * tested only if they can have come near).
+ *
+ * Threads: one per object.
+ */
+EBPO_API void ebpo_haptic_step_tool(ebpo_haptic *haptic, const double place[3],
+                                    const double turn[4], ebpo_haptic_tool_result *out);
+
+/*
+ * Moves the object to another position without collisions (a tool without rotation), and waits
+ * until the surroundings are loaded. Not for use in a step.
+ *
+ * Errors are those of ebpo_haptic_new. After a failure the position is unchanged.
+ *
+ * Threads: one per object.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_reset(ebpo_haptic *haptic, const double place[3],
+                                                     ebpo_error *error);
+
+/*
+ * Returns the error that stopped the loading thread (EBPO_HAPTIC_STOPPED). Takes a lock: not for
+ * use in a step.
+ *
+ * EBPO_OK: not stopped; else the errors of reading, EBPO_E_LIMIT, EBPO_E_MEMORY.
+ *
+ * Threads: any.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_check(ebpo_haptic *haptic, ebpo_error *error);
+
+/* Sums since the object was made. */
+typedef struct ebpo_haptic_stats {
+    size_t struct_size;
+
+    uint64_t step_count;
+
+    /* Number of steps with each of these flags. */
+    uint64_t contacts, waiting, incomplete, partial;
+
+    /* Boxes loaded, boxes used by steps, boxes cancelled because of too many faces. */
+    uint64_t loads, taken, too_many;
+
+    /* Faces of the current box; maximum number of faces tested in a step. */
+    uint64_t faces, work_max;
+
+    /*
+     * Energy given to the device by forces minus energy taken; its maximum over time. Longest step
+     * of the device.
+     */
+    double energy, energy_max, longest_step;
+
+    /* Bytes of the boxes. */
+    uint64_t memory;
+
+    /* Seconds of loading: total, and maximum of one box. */
+    double load_seconds, load_seconds_max;
+
+    /* Number of steps with EBPO_HAPTIC_STOPPED. */
+    uint64_t stopped;
+} ebpo_haptic_stats;
+
+#define EBPO_HAPTIC_STATS_INIT EBPO_SIZED(ebpo_haptic_stats)
+
+/*
+ * Gets the statistics of the object.
+ *
+ * Threads: one per object.
+ */
+EBPO_API ebpo_status ebpo_haptic_get_stats(const ebpo_haptic *haptic, ebpo_haptic_stats *out);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

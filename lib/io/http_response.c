@@ -1,0 +1,287 @@
+/* Parses the head of a server's response line by line, and compares it with the request. A response
+ * is a part of the file, all of it, a reason to try again later, or refused: ranges, lengths,
+ * versions (entity tags or dates) and encodings must all fit. This file reads nothing from the
+ * network, so tests and fuzzers pass any bytes. Source: RFC 9110, sections 8.8, 14 and 15. */
+#include <ctype.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "core/checksum.h"
+#include "io/http_response.h"
+
+/* --- header lines --- */
+
+/* Finds the text of a header field without surrounding blanks; returns false when the line is
+ * another field. */
+static bool take_field(const char *line, size_t size, const char *name, const char **text,
+                       size_t *length)
+{
+    size_t at = strlen(name);
+    if (size <= at || strncasecmp(line, name, at) != 0 || line[at] != ':')
+        return false;
+    at++;
+    while (at < size && (line[at] == ' ' || line[at] == '\t'))
+        at++;
+    while (size > at && isspace((unsigned char)line[size - 1]))
+        size--;
+    *text = line + at;
+    *length = size - at;
+    return true;
+}
+
+/* Reads digits only; returns false beyond 2^63. */
+static bool take_number(const char **at, const char *end, uint64_t *out)
+{
+    const char *begin = *at;
+    *out = 0;
+    for (; *at < end && **at >= '0' && **at <= '9'; (*at)++) {
+        if (*out > (UINT64_C(1) << 63) / 10 - 1)
+            return false;
+        *out = *out * 10 + (uint64_t)(**at - '0');
+    }
+    return *at > begin;
+}
+
+static bool take_token(const char **at, const char *end, char c)
+{
+    if (*at >= end || **at != c)
+        return false;
+    (*at)++;
+    return true;
+}
+
+/* Parses "bytes 0-99/1000" or "bytes * / 1000" without the blanks; a size of "*" means no size. */
+static bool content_range(ebpo_http_response *a, const char *at, const char *end)
+{
+    uint64_t begin = 0, last = 0, total = 0;
+    bool range;
+    if (end - at < 6 || strncasecmp(at, "bytes", 5) != 0 || at[5] != ' ')
+        return false;
+    at += 6;
+    range = !take_token(&at, end, '*');
+    if (range && (!take_number(&at, end, &begin) || !take_token(&at, end, '-') ||
+                  !take_number(&at, end, &last)))
+        return false;
+    if (!take_token(&at, end, '/'))
+        return false;
+    bool sized = !take_token(&at, end, '*');
+    if ((sized && !take_number(&at, end, &total)) || at != end || begin > last ||
+        (range && sized && last >= total))
+        return false;
+    if ((a->has_range || a->has_total) &&
+        (a->begin != begin || a->last != last || a->total != total))
+        return false;
+    a->has_range = range;
+    a->has_total = sized;
+    a->begin = begin;
+    a->last = last;
+    a->total = total;
+    return true;
+}
+
+/* Keeps "text/html" of "Text/HTML; charset=utf-8". */
+static void keep_type(char out[EBPO_HTTP_TYPE_BYTES], const char *text, size_t length)
+{
+    size_t i = 0;
+    for (; i < length && i + 1 < EBPO_HTTP_TYPE_BYTES && isgraph((unsigned char)text[i]) &&
+           text[i] != ';' && text[i] != ',';
+         i++)
+        out[i] = (char)tolower((unsigned char)text[i]);
+    out[i] = 0;
+}
+
+bool ebpo_http_response_is_text(const char *type)
+{
+    size_t length = strlen(type);
+    return strncmp(type, "text/", 5) == 0 || strcmp(type, "application/json") == 0 ||
+           (length >= 3 && strcmp(type + length - 3, "xml") == 0);
+}
+
+/* Keeps a text, or its digest if it is too long: it is only compared. */
+static void keep_text(char out[EBPO_HTTP_TAG_BYTES], const char *text, size_t length)
+{
+    if (length < EBPO_HTTP_TAG_BYTES) {
+        memcpy(out, text, length);
+        out[length] = 0;
+        return;
+    }
+    ebpo_sha256 sha;
+    uint8_t digest[32];
+    char hex[65];
+    ebpo_sha256_begin(&sha);
+    ebpo_sha256_add(&sha, text, length);
+    ebpo_sha256_end(&sha, digest);
+    ebpo_sha256_hex(digest, hex);
+    snprintf(out, EBPO_HTTP_TAG_BYTES, "sha256:%s", hex);
+}
+
+static void status_line(ebpo_http_response *a, const char *line, size_t size)
+{
+    uint64_t bytes = a->header_bytes;
+    *a = (ebpo_http_response){ .header_bytes = bytes, .http2 = size > 5 && line[5] >= '2' };
+    const char *at = memchr(line, ' ', size), *end = line + size;
+    uint64_t code = 0;
+    while (at && at < end && *at == ' ')
+        at++;
+    if (at && take_number(&at, end, &code) && code < 1000)
+        a->code = (int)code;
+}
+
+void ebpo_http_response_line(ebpo_http_response *a, const char *line, size_t size)
+{
+    const char *text;
+    size_t length;
+    a->header_bytes += size;
+    if (size > 5 && memcmp(line, "HTTP/", 5) == 0) {
+        status_line(a, line, size);
+    } else if (take_field(line, size, "content-range", &text, &length)) {
+        if (!content_range(a, text, text + length))
+            a->bad_range = true;
+    } else if (take_field(line, size, "content-length", &text, &length)) {
+        const char *at = text;
+        a->has_length = take_number(&at, text + length, &a->length) && at == text + length;
+    } else if (take_field(line, size, "content-encoding", &text, &length)) {
+        a->encoded = length && !(length == 8 && strncasecmp(text, "identity", 8) == 0);
+    } else if (take_field(line, size, "transfer-encoding", &text, &length)) {
+        a->chunked = length >= 7 && strncasecmp(text + length - 7, "chunked", 7) == 0;
+    } else if (take_field(line, size, "etag", &text, &length)) {
+        size_t weak = length > 2 && text[0] == 'W' && text[1] == '/' ? 2 : 0;
+        keep_text(a->etag, text + weak, length - weak);
+    } else if (take_field(line, size, "content-type", &text, &length)) {
+        keep_type(a->type, text, length);
+    } else if (take_field(line, size, "last-modified", &text, &length)) {
+        keep_text(a->modified, text, length);
+    }
+}
+
+/* --- the verdict --- */
+
+static ebpo_verdict give_verdict(ebpo_verdict verdict, char why[EBPO_WHY_BYTES], const char *text)
+{
+    snprintf(why, EBPO_WHY_BYTES, "%s", text);
+    return verdict;
+}
+
+static bool may_pass(int code)
+{
+    return code == 408 || code == 429 || code == 500 || code == 502 || code == 503 || code == 504;
+}
+
+/* Compares weak tags like strong ones: servers and proxies add and drop the weak mark for one file.
+ */
+static const char *what_changed(const ebpo_http_response *a, const ebpo_http_request *request,
+                                uint64_t size)
+{
+    const ebpo_http_version *pinned = request->pinned;
+    if (size != pinned->size)
+        return "has changed on the server while it was open (another size); open it again";
+    if (request->unversioned)
+        return NULL;
+    /* Mirrors of one file may report different times, but not different tags. */
+    if (strcmp(a->etag, pinned->etag) != 0)
+        return "has changed on the server while it was open (another ETag); open it again, or "
+               "with --http-unversioned if several servers with different tags respond there";
+    if (!*pinned->etag && strcmp(a->modified, pinned->modified) != 0)
+        return "has changed on the server while it was open (another Last-Modified); open it "
+               "again, or with --http-unversioned if several servers with different times "
+               "respond there";
+    return NULL;
+}
+
+static ebpo_verdict judge_part(const ebpo_http_response *a, const ebpo_http_request *request,
+                               char why[EBPO_WHY_BYTES])
+{
+    if (a->bad_range || !a->has_range)
+        return give_verdict(
+            EBPO_HTTP_REFUSED, why,
+            "the server sent a part with a missing or invalid Content-Range; this server or a "
+            "proxy on the way is broken");
+    if (!a->has_total)
+        return give_verdict(
+            EBPO_HTTP_REFUSED, why,
+            "the server does not report the file's size (Content-Range ends with /*); such files "
+            "cannot be read by ranges");
+    const char *change = request->pinned ? what_changed(a, request, a->total) : NULL;
+    if (change)
+        return give_verdict(EBPO_HTTP_REFUSED, why, change);
+    if (a->begin != request->begin || a->last >= request->end) {
+        snprintf(why, EBPO_WHY_BYTES,
+                 "the server sent bytes %" PRIu64 " to %" PRIu64 " for a request of %" PRIu64
+                 " to %" PRIu64 "; this server or a proxy on the way is broken",
+                 a->begin, a->last, request->begin, request->end - 1);
+        return EBPO_HTTP_REFUSED;
+    }
+    return EBPO_HTTP_PART;
+}
+
+static ebpo_verdict judge_whole(const ebpo_http_response *a, const ebpo_http_request *request,
+                                ebpo_status *status, char why[EBPO_WHY_BYTES])
+{
+    if (request->pinned && ebpo_http_response_is_text(a->type)) {
+        snprintf(
+            why, EBPO_WHY_BYTES,
+            "the server returned %s instead of a part, after it had sent parts of a model; open "
+            "it again, in case a login or the address has expired",
+            a->type);
+        return EBPO_HTTP_REFUSED;
+    }
+    const char *change =
+        request->pinned && a->has_length ? what_changed(a, request, a->length) : NULL;
+    if (change)
+        return give_verdict(EBPO_HTTP_REFUSED, why, change);
+    if (request->pinned)
+        return give_verdict(
+            EBPO_HTTP_REFUSED, why,
+            "the server sent the whole file instead of a part, after it had sent parts; try "
+            "again later");
+    *status = EBPO_E_UNSUPPORTED;
+    if (a->has_length && a->length > request->whole_limit) {
+        snprintf(why, EBPO_WHY_BYTES,
+                 "the server has no byte ranges, and %" PRIu64 " bytes are more than the %" PRIu64
+                 " that would be read as a whole; download the file, or use a server with ranges",
+                 a->length, request->whole_limit);
+        return EBPO_HTTP_REFUSED;
+    }
+    if (!a->has_length && !a->chunked && !a->http2)
+        return give_verdict(
+            EBPO_HTTP_REFUSED, why,
+            "the server has no byte ranges and does not report the size of the file; download "
+            "the file, or use a server with ranges");
+    return EBPO_HTTP_WHOLE;
+}
+
+ebpo_verdict ebpo_http_response_judge(const ebpo_http_response *a, const ebpo_http_request *request,
+                                      ebpo_status *status, char why[EBPO_WHY_BYTES])
+{
+    *status = EBPO_E_IO;
+    if (may_pass(a->code)) {
+        snprintf(why, EBPO_WHY_BYTES, "the server returned status %d", a->code);
+        return EBPO_HTTP_LATER;
+    }
+    if (a->code == 416 && request->pinned)
+        return give_verdict(
+            EBPO_HTTP_REFUSED, why,
+            "has changed on the server while it was open (it became shorter); open it again");
+    if (a->code == 416)
+        return give_verdict(
+            EBPO_HTTP_REFUSED, why,
+            "the server has no such bytes (416): the file is empty, or this server is broken");
+    if (a->code != 200 && a->code != 206) {
+        const char *hint = a->code == 404 || a->code == 410
+                               ? ": there is no such file; check the address"
+                           : a->code == 401 || a->code == 403 || a->code == 407
+                               ? ": not allowed; check name, password and rights"
+                               : "";
+        snprintf(why, EBPO_WHY_BYTES, "the server returned status %d%s", a->code, hint);
+        return EBPO_HTTP_REFUSED;
+    }
+    if (a->encoded)
+        return give_verdict(
+            EBPO_HTTP_REFUSED, why,
+            "the server compressed the file although this was not requested (Content-Encoding); "
+            "switch that off for this file");
+    return a->code == 206 ? judge_part(a, request, why) : judge_whole(a, request, status, why);
+}

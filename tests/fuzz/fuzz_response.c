@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: MIT
+ * Any bytes as response headers of a server: an accepted part or whole file is the requested one,
+ * and others have a reason.
+ *
+ * Input: a byte of flags, two for the requested offset, then lines. */
+#include "fuzz_support.h"
+
+#include <ebpo/http.h>
+
+#include "io/http_response.h"
+
+static const ebpo_http_version version = { 100000, "\"tag\"", "Mon, 23 Nov 2026 09:00:00 GMT" };
+
+static void judge(const ebpo_http_response *result, const ebpo_http_request *queried)
+{
+    char why[EBPO_WHY_BYTES] = "";
+    ebpo_status status = EBPO_OK;
+    ebpo_verdict verdict = ebpo_http_response_judge(result, queried, &status, why);
+    fuzz_must(memchr(why, 0, sizeof why) != NULL);
+    switch (verdict) {
+    case EBPO_HTTP_PART:
+        fuzz_must(result->code == 206 && result->has_range && result->begin == queried->begin &&
+                  result->last >= result->begin && result->last < queried->end &&
+                  result->last < result->total);
+        fuzz_must(!queried->pinned || result->total == queried->pinned->size);
+        fuzz_must(!queried->pinned || strcmp(result->etag, queried->pinned->etag) == 0);
+        break;
+    case EBPO_HTTP_WHOLE: fuzz_must(result->code == 200 && !queried->pinned); break;
+    case EBPO_HTTP_LATER: fuzz_must(*why); break;
+    case EBPO_HTTP_REFUSED: fuzz_must(*why && status != EBPO_OK); break;
+    }
+}
+
+static void redact(const uint8_t *data, size_t size)
+{
+    char *name = fuzz_text(data, size);
+    for (size_t space = 0; space < 40; space += 13) {
+        char *out = fuzz_capacity(space + 1);
+        out[space] = 'x';
+        (void)ebpo_url_redact(name, out, space);
+        fuzz_must(out[space] == 'x' && (space == 0 || memchr(out, 0, space)));
+        free(out);
+    }
+    (void)ebpo_is_url(name);
+    free(name);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    if (size < 3)
+        return 0;
+    ebpo_http_request queried = { .begin = data[1] | (uint64_t)data[2] << 8, .whole_limit = 65536 };
+    queried.end = queried.begin + 1 + (data[0] >> 1) * UINT64_C(100);
+    queried.pinned = data[0] & 1 ? &version : NULL;
+    ebpo_http_response result = { .code = 0 };
+    const uint8_t *at = data + 3, *end = data + size;
+    while (at < end) {
+        const uint8_t *next = memchr(at, '\n', (size_t)(end - at));
+        next = next ? next + 1 : end;
+        char *line = fuzz_copy(at, (size_t)(next - at));
+        ebpo_http_response_line(&result, line, (size_t)(next - at));
+        free(line);
+        at = next;
+    }
+    fuzz_must(memchr(result.etag, 0, sizeof result.etag) &&
+              memchr(result.modified, 0, sizeof result.modified));
+    judge(&result, &queried);
+    redact(data + 3, size - 3);
+    return 0;
+}

@@ -1,0 +1,106 @@
+"""Tests a haptic device over UDP, and untrusted senders of invalid packets: haptic_udp.py EBPO."""
+import re
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+
+PLACE = struct.Struct("<4sHHQQ3d4d")
+FEEL = struct.Struct("<4sHHQQ3d3d3d4d3d3dQI3BB")
+assert PLACE.size == 80 and FEEL.size == 192
+
+
+def place(sequence, at=(0.4, 0.5, 3.0), turn=(0, 0, 0, 1), magic=b"EBPT", version=1, kind=1):
+    return PLACE.pack(magic, version, kind, sequence, sequence * 7 % 2 ** 64, *at, *turn)
+
+
+NAN, HUGE = float("nan"), 1e300
+NONE = [
+    b"", b"EBPT", place(9)[:79], place(9) + b"x", bytes(80), bytes(65000), place(9, magic=b"EBPO"),
+    place(9, version=2), place(9, kind=0), place(9, kind=2), place(9, at=(NAN, 0, 0)),
+    place(9, at=(HUGE, 0, 0)), place(9, turn=(0, 0, 0, 0)), place(9, turn=(NAN, 0, 0, 1)),
+    place(9, turn=(HUGE, 0, 0, 1)), place(9, kind=3)]
+
+
+def begin(ebpo, model, *more):
+    p = subprocess.Popen([ebpo, "haptic", "--json", "--device", "udp:0", *more, model],
+                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    line = p.stderr.readline()
+    found = re.search(r"at 127\.0\.0\.1, port (\d+)$", line.strip())
+    assert found, line
+    return p, ("127.0.0.1", int(found[1]))
+
+
+def sender():
+    s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    s.settimeout(1)
+    return s
+
+
+def answer(s, to, packet, sequence):
+    """The answer to that place; earlier ones are passed over. What a full queue has dropped is sent again."""
+    tries = 20
+    s.sendto(packet, to)
+    while True:
+        try:
+            got = FEEL.unpack(s.recv(4096))
+        except socket.timeout:
+            assert tries > 0, "no answer"
+            tries -= 1
+            s.sendto(packet, to)
+            continue
+        assert got[:3] == (b"EBPT", 1, 2) and got[4] == 7 * got[3], got
+        assert got[3] <= sequence, (got[3], sequence)
+        if got[3] == sequence:
+            return got
+
+
+CUBE = """ply
+format ascii 1.0
+element vertex 8
+property float x
+property float y
+property float z
+element face 12
+property list uchar int vertex_indices
+end_header
+""" + "".join(f"{i & 1} {i >> 1 & 1} {i >> 2}\n" for i in range(8)) + "".join(
+    f"3 {f}\n" for f in ("0 2 3", "0 3 1", "4 5 7", "4 7 6", "0 1 5", "0 5 4", "2 6 7", "2 7 3",
+                         "0 4 6", "0 6 2", "1 3 7", "1 7 5"))
+
+
+def main(ebpo):
+    with tempfile.TemporaryDirectory() as folder:
+        ply, model = folder + "/m.ply", folder + "/m.ebpo.h5"
+        with open(ply, "w", encoding="ascii") as out:
+            out.write(CUBE)
+        subprocess.run([ebpo, "convert", "-q", ply, model], check=True)
+        p, to = begin(ebpo, model, "--seconds", "20", "--rate", "500")
+        device, other = sender(), sender()
+        for packet in NONE:  # before there is a device
+            other.sendto(packet, to)
+        first = answer(device, to, place(10), 10)
+        assert first[11:14] == (0.4, 0.5, 3.0), first
+        for packet in NONE + [place(1 << 63), place(2 ** 64 - 1, kind=3)]:
+            other.sendto(packet, to)
+        for packet in NONE + [place(10, at=(9, 9, 9)), place(3, kind=3)]:  # the device's own, wrong or old
+            device.sendto(packet, to)
+        second = answer(device, to, place(11, at=(0.4, 0.5, 2.5), turn=(0, 0, 0.6, 0.8)), 11)
+        assert second[11:14] == (0.4, 0.5, 2.5), second
+        other.settimeout(0.1)
+        try:
+            raise SystemExit("an untrusted sender got a reply: %r" % other.recv(4096))
+        except socket.timeout:
+            pass
+        device.sendto(place(12, kind=3), to)
+        out, err = p.communicate(timeout=60)
+        assert p.returncode == 0, (p.returncode, err)
+
+        p, to = begin(ebpo, model, "--seconds", "2")  # no device connects, or only untrusted senders
+        other.sendto(b"hello", to)
+        out, err = p.communicate(timeout=60)
+        assert p.returncode == 1 and "no device has sent its position in 2 seconds (1 invalid packets" in err, err
+
+
+main(*sys.argv[1:])

@@ -1,0 +1,28 @@
+/* Queries of every kind, numbered: each gives a hash of its result. The same number gives the same
+ * hash on any thread, and with any part of the model in memory. */
+#ifndef EBPO_TESTS_QUERY_MIX_H
+#define EBPO_TESTS_QUERY_MIX_H
+
+#include "ebpo_config.h"
+
+#include <ebpo/query.h>
+
+/* Data of a querying thread: its context, and the file. */
+typedef struct mix_querier {
+    const ebpo_file *file;
+    ebpo_model *model;
+    ebpo_context *context;
+} mix_querier;
+
+enum { MIX_KINDS = EBPO_HAVE_EXTRAS ? 16 : 15 };
+extern const char *const mix_names[MIX_KINDS];
+
+/* Returns true when the library also reads in its own threads for it. */
+bool mix_has_workers(int kind);
+
+/* Runs query `number` of a kind. *hash is 0 for queries without a fixed result (haptic devices,
+ * counts). */
+ebpo_status mix_query(const mix_querier *querier, int kind, uint64_t number, uint64_t *hash,
+                      ebpo_error *error);
+
+#endif

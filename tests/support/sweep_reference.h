@@ -1,0 +1,16 @@
+/* Reference implementation of the separation of two faces along a direction. The line of the
+ * direction leaves the convex hull of the nine differences of corners through a corner, an edge or
+ * a triangle of three of them. All of these are tried, in integers. Shares no code with the
+ * library. */
+#ifndef EBPO_TESTS_SWEEP_REFERENCE_H
+#define EBPO_TESTS_SWEEP_REFERENCE_H
+
+#include <gmp.h>
+#include <stdbool.h>
+
+/* Sets `t` to the greatest value (may be negative) with a common point of a + t * direction and b,
+ * if it is above `t` or if `any` is false. Returns true if it did. */
+bool sweep_reference(const double a[3][3], const double b[3][3], const double direction[3],
+                     bool any, mpq_t t);
+
+#endif

@@ -1,0 +1,194 @@
+/* The list of chunk ends: it matches the file, and only the correct chunks are accepted. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/endian.h"
+#include "check_main.h"
+#include "format/chunk_directory.h"
+#include "format/reader.h"
+#include "model_file.h"
+#include "scratch.h"
+#include "solids.h"
+
+typedef struct bytes {
+    uint8_t *at;
+    size_t size;
+} bytes;
+
+static bytes slurp(const char *path)
+{
+    FILE *f = fopen(path, "rb");
+    bytes b = { NULL, 0 };
+    ck_assert(f && fseek(f, 0, SEEK_END) == 0);
+    b.size = (size_t)ftell(f);
+    rewind(f);
+    b.at = malloc(b.size);
+    ck_assert(b.at && fread(b.at, 1, b.size, f) == b.size && fclose(f) == 0);
+    return b;
+}
+
+/* All of a kind have the same topology: files of one codec without compression have chunks of the
+ * same sizes. `wide`: how large. */
+static bytes write_torus(const char *name, double wide, ebpo_codec codec, uint64_t subtree_faces,
+                         ebpo_chunk_checksums checksums)
+{
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    write.codec = codec;
+    write.subtree_faces = subtree_faces;
+    write.chunk_checksums = checksums;
+    ebpo_tree tree = model_build_parts(ebpo_test_torus(wide, 0.25, 60, 40), 4, ~0u);
+    model_write(&tree, scratch(name), &write);
+    return slurp(scratch(name));
+}
+
+static ebpo_file *open_bytes(const bytes *b)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_file *file;
+    ck_assert_msg(ebpo_open_memory(b->at, b->size, "x", &file, &error) == EBPO_OK, "%s",
+                  error.message);
+    ck_assert_int_eq(ebpo_file_locate(file, NULL, NULL), EBPO_OK);
+    return file;
+}
+
+/* Returns array n of the file, present or not; NULL after the last one. */
+static const ebpo_array_in *array_of(const ebpo_file *file, int n)
+{
+    int levels = EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS;
+    return n < levels ? &file->level_array[n / EBPO_LEVEL_ARRAYS][n % EBPO_LEVEL_ARRAYS]
+           : n < levels + EBPO_ARRAYS - EBPO_LEVEL_ARRAYS
+               ? &file->root_array[EBPO_LEVEL_ARRAYS + n - levels]
+               : NULL;
+}
+
+static uint64_t chunks_of(const ebpo_array_in *a)
+{
+    return a->present && !ebpo_schema_is_list(a->id) ? ebpo_shape_chunks(&a->shape) : 0;
+}
+
+static const struct {
+    ebpo_codec codec;
+    uint64_t subtree_faces;
+} kinds[] = { { EBPO_CODEC_ZSTD, EBPO_NO_SUBTREES },    { EBPO_CODEC_ZSTD, 8 },
+              { EBPO_CODEC_DEFLATE, EBPO_NO_SUBTREES }, { EBPO_CODEC_DEFLATE, 8 },
+              { EBPO_CODEC_NONE, EBPO_NO_SUBTREES },    { EBPO_CODEC_NONE, 8 } };
+enum { KINDS = sizeof kinds / sizeof *kinds };
+
+START_TEST(test_chunk_checksums_list_every_chunk)
+{
+    bytes b = write_torus("a.ebpo.h5", 1, kinds[_i].codec, kinds[_i].subtree_faces,
+                          EBPO_CHECKSUMS_DEFAULT);
+    ebpo_file *file = open_bytes(&b);
+    const ebpo_array_in *list = &file->root_array[EBPO_A_CHUNK_CHECKSUMS], *a;
+    uint64_t *rows, row = 0;
+    ck_assert(list->present && file->has_checksums);
+    ck_assert_int_eq(ebpo_long_chunk_read(file, list, &rows, NULL), EBPO_OK);
+    for (int n = 0; (a = array_of(file, n)); n++)
+        for (uint64_t k = 0; k < chunks_of(a); k++, row++) {
+            ck_assert_uint_lt(row, list->shape.rows);
+            ck_assert_uint_eq((uint32_t)rows[row],
+                              ebpo_load32(b.at + a->chunks[k].address + a->chunks[k].bytes - 4));
+        }
+    ck_assert_uint_eq(row, list->shape.rows);
+    free(rows);
+    ebpo_close(file);
+    free(b.at);
+}
+END_TEST
+
+static ebpo_status pass(void *context, const ebpo_array_in *array, uint64_t chunk, uint64_t row,
+                        uint64_t rows, const uint8_t *data, ebpo_error *error)
+{
+    (void)context, (void)array, (void)chunk, (void)row, (void)rows, (void)data, (void)error;
+    return EBPO_OK;
+}
+
+/* Returns true when reading array n of these bytes reports chunk `chunk` as a wrong one. */
+static bool is_noticed(const bytes *b, int n, uint64_t chunk)
+{
+    ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    char expected[64];
+    options.threads = 1;
+    snprintf(expected, sizeof expected, "chunk %llu is damaged: it is not the one",
+             (unsigned long long)chunk);
+    ebpo_file *file = open_bytes(b);
+    ebpo_status status = ebpo_reader_rows(file, array_of(file, n), &options, pass, NULL, &error);
+    ebpo_close(file);
+    return status == EBPO_E_FORMAT && strstr(error.message, expected);
+}
+
+/* Each chunk of one file in the other: all have the same length, and valid checksums. */
+START_TEST(test_chunks_of_other_version_are_refused)
+{
+    uint64_t subtrees = _i ? 8 : EBPO_NO_SUBTREES, found = 0;
+    bytes b = write_torus("a.ebpo.h5", 1, EBPO_CODEC_NONE, subtrees, EBPO_CHECKSUMS_DEFAULT),
+          other =
+              write_torus("b.ebpo.h5", 1.0625, EBPO_CODEC_NONE, subtrees, EBPO_CHECKSUMS_DEFAULT);
+    ebpo_file *file = open_bytes(&b), *from = open_bytes(&other);
+    const ebpo_array_in *a;
+    uint8_t kept[1 << 17];
+    for (int n = 0; (a = array_of(file, n)); n++) {
+        const ebpo_array_in *theirs = array_of(from, n);
+        for (uint64_t k = 0; k < chunks_of(a) && k < chunks_of(theirs); k++) {
+            uint8_t *at = b.at + a->chunks[k].address;
+            uint32_t size = a->chunks[k].bytes;
+            if (size != theirs->chunks[k].bytes ||
+                memcmp(at, other.at + theirs->chunks[k].address, size) == 0)
+                continue;
+            memcpy(kept, at, size);
+            memcpy(at, other.at + theirs->chunks[k].address, size);
+            ck_assert_msg(is_noticed(&b, n, k), "%s, chunk %d", a->path, (int)k);
+            memcpy(at, kept, size);
+            found++;
+        }
+    }
+    ck_assert_uint_gt(found, 10);
+    ebpo_close(file);
+    ebpo_close(from);
+    free(b.at);
+    free(other.at);
+}
+END_TEST
+
+/* Such files report nothing. */
+START_TEST(test_files_without_checksums_are_equal)
+{
+    bytes with = write_torus("a.ebpo.h5", 1, EBPO_CODEC_NONE, 8, EBPO_CHECKSUMS_DEFAULT),
+          without = write_torus("b.ebpo.h5", 1, EBPO_CODEC_NONE, 8, EBPO_CHECKSUMS_NONE);
+    ebpo_file *a = open_bytes(&with), *b = open_bytes(&without);
+    ck_assert(!b->root_array[EBPO_A_CHUNK_CHECKSUMS].present && !b->has_checksums && !b->checksums);
+    ck_assert_mem_eq(ebpo_file_info(a)->content_sha256, ebpo_file_info(b)->content_sha256, 32);
+    ck_assert_int_eq(ebpo_file_check_content(a, NULL, NULL), EBPO_OK);
+    ck_assert_int_eq(ebpo_file_check_content(b, NULL, NULL), EBPO_OK);
+    ebpo_close(a);
+    ebpo_close(b);
+    free(with.at);
+    free(without.at);
+}
+END_TEST
+
+START_TEST(test_invalid_checksum_option_is_refused)
+{
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    write.chunk_checksums = (ebpo_chunk_checksums)2;
+    ebpo_tree tree = model_build_parts(ebpo_test_torus(1, 0.25, 12, 8), 4, ~0u);
+    ck_assert_int_eq(ebpo_tree_write(&tree, scratch("a.ebpo.h5"), &write, NULL), EBPO_E_ARGUMENT);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+TEST_SUITE(chunk_checksums)
+{
+    Suite *suite = suite_create("chunk_sums");
+    TCase *tests = tcase_create("sums");
+    tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
+    tcase_set_timeout(tests, 120);
+    tcase_add_loop_test(tests, test_chunk_checksums_list_every_chunk, 0, KINDS);
+    tcase_add_loop_test(tests, test_chunks_of_other_version_are_refused, 0, 2);
+    tcase_add_test(tests, test_files_without_checksums_are_equal);
+    tcase_add_test(tests, test_invalid_checksum_option_is_refused);
+    suite_add_tcase(suite, tests);
+    return suite;
+}

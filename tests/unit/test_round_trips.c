@@ -1,0 +1,246 @@
+/* Counts the sequential round trips of queries to a remote file. */
+#include <stdlib.h>
+
+#include <ebpo/query.h>
+#include <ebpo/subset.h>
+#include <ebpo/view.h>
+
+#include "check_main.h"
+#include "counted_source.h"
+#include "scratch.h"
+#include "solids.h"
+#include "two_layouts.h"
+
+enum { ALL = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES };
+
+/* --- queries --- */
+
+typedef struct result {
+    double distance;
+    int32_t where;
+    uint64_t waves;
+} result;
+
+/* Runs one cold query: its distance, or the class of the point. */
+static result run_query(const ebpo_file *file, const counted_source *far, const double p[3],
+                        bool inside)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model *model;
+    ebpo_context *context;
+    ebpo_distance_result distance = { .distance = 0 };
+    ebpo_inside_result where = { .where = EBPO_OUT };
+    uint64_t opened = far ? far->batches + far->alone : 0;
+    options.threads = 1;
+    options.memory = 64 << 20;
+    ck_assert(ebpo_model_new(file, &options, &model, NULL) == EBPO_OK);
+    ck_assert(ebpo_context_new(model, &context, NULL) == EBPO_OK);
+    ck_assert((inside ? ebpo_inside(context, p, NULL, &where, NULL)
+                      : ebpo_distance(context, p, NULL, &distance, NULL)) == EBPO_OK);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    return (result){ distance.distance, where.where, far ? far->batches + far->alone - opened : 0 };
+}
+
+/* Distance or inside of points near the surface: maximum of round trips after opening. */
+START_TEST(test_remote_query_round_trips)
+{
+    enum { WAVES = 4 };
+    two_layouts l;
+    counted_source c;
+    uint64_t state = 3;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 200, 120), 8, ALL, EBPO_CODEC_ZSTD, 400);
+    for (int n = 0; n < 10; n++) {
+        double cosine, sine;
+        ebpo_test_circle((uint32_t)(ebpo_test_random(&state) % 1000), 1000, &cosine, &sine);
+        double p[3] = { 2.71 * cosine, 2.71 * sine, 0.01 };
+        ebpo_file *far = counted_open(&c, l.packed, true);
+        result a = run_query(far, &c, p, n % 2), b = run_query(l.without, NULL, p, n % 2);
+        counted_close(&c, far);
+        ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
+        ck_assert(a.distance == b.distance && a.where == b.where);
+    }
+    two_layouts_close(&l);
+}
+END_TEST
+
+static bool add_up(void *user, const ebpo_near_face *face)
+{
+    *(double *)user += face->distance;
+    return true;
+}
+
+/* Cold. */
+static double sum_within(const ebpo_file *file, const double p[3], double radius)
+{
+    ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_within_options within = EBPO_WITHIN_OPTIONS_INIT;
+    ebpo_model *model;
+    ebpo_context *context;
+    double sum = 0;
+    options.threads = 1;
+    options.memory = 64 << 20;
+    within.radius = radius;
+    ck_assert(ebpo_model_new(file, &options, &model, NULL) == EBPO_OK);
+    ck_assert(ebpo_context_new(model, &context, NULL) == EBPO_OK);
+    ck_assert(ebpo_distance_within(context, p, &within, add_up, &sum, NULL) == EBPO_OK);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    return sum;
+}
+
+/* All subtrees within a radius are requested together. */
+START_TEST(test_remote_radius_query_round_trips)
+{
+    enum { WAVES = 4 };
+    static const double p[3] = { 2.71, 0, 0.01 };
+    two_layouts l;
+    counted_source c;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+    ebpo_file *far = counted_open(&c, l.packed, true);
+    uint64_t opened = c.batches + c.alone;
+    ck_assert(sum_within(far, p, 1) == sum_within(l.without, p, 1));
+    ck_assert_msg(c.batches + c.alone - opened <= WAVES, "%d waves",
+                  (int)(c.batches + c.alone - opened));
+    counted_close(&c, far);
+    two_layouts_close(&l);
+}
+END_TEST
+
+/* --- parts of the file --- */
+
+/* After the header: the top levels, rows of the table, nodes with lists, faces with their vertices.
+ */
+START_TEST(test_remote_box_query_round_trips)
+{
+    enum { WAVES = 4 };
+    two_layouts l;
+    counted_source c;
+    ebpo_subset_options box = EBPO_SUBSET_OPTIONS_INIT;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+    box.boxed = true;
+    for (int k = 0; k < 3; k++) {
+        box.min[k] = k ? -0.3 : 2.2;
+        box.max[k] = k ? 0.3 : 3;
+    }
+    ebpo_file *far = counted_open(&c, l.packed, true);
+    uint64_t opened = c.batches + c.alone;
+    ck_assert(ebpo_subset(far, scratch("box.ebpo.h5"), &box, NULL) == EBPO_OK);
+    ck_assert_msg(c.batches + c.alone - opened <= WAVES, "%d waves",
+                  (int)(c.batches + c.alone - opened));
+    ck_assert_msg(c.queried < c.size / 2, "%d of %d bytes", (int)c.queried, (int)c.size);
+    counted_close(&c, far);
+    two_layouts_close(&l);
+}
+END_TEST
+
+static uint64_t count_nodes(const ebpo_file *file, const ebpo_view_options *options)
+{
+    ebpo_view_stream *stream;
+    ebpo_view_node node;
+    ebpo_view_end end;
+    uint64_t count = 0;
+    ck_assert(ebpo_view_stream_new(file, options, &stream, NULL) == EBPO_OK);
+    do {
+        ck_assert(ebpo_view_stream_next(stream, &node, &end, NULL) == EBPO_OK);
+        count += end == EBPO_VIEW_NODE;
+    } while (end == EBPO_VIEW_NODE);
+    ebpo_view_stream_free(stream);
+    return count;
+}
+
+/* The torus seen from outside: with planes, and without invisible parts. */
+static ebpo_view_options look(ebpo_observer *observer, ebpo_priority order)
+{
+    ebpo_view_options view = EBPO_VIEW_OPTIONS_INIT;
+    observer->eye[0] = 4;
+    observer->direction[0] = -1;
+    observer->up[2] = 1;
+    view.observer = observer;
+    view.unseen = EBPO_UNSEEN_NEVER;
+    view.planes = true;
+    view.priority = order;
+    return view;
+}
+
+/* In any order: all subtrees that a view will visit are requested together. */
+START_TEST(test_remote_view_round_trips)
+{
+    if (!ebpo_test_wanted(_i))
+        return;
+    enum { WAVES = 4 };
+    static const ebpo_priority order[] = { EBPO_PRIORITY_LEVEL, EBPO_PRIORITY_PIXELS,
+                                           EBPO_PRIORITY_FRONT_TO_BACK };
+    two_layouts l;
+    counted_source c;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
+    ebpo_view_options view = look(&observer, order[_i]);
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+    view.pixels = 8;
+    ebpo_file *far = counted_open(&c, l.packed, true);
+    uint64_t opened = c.batches + c.alone, nodes = count_nodes(far, &view);
+    ck_assert_msg(c.batches + c.alone - opened <= WAVES, "%d waves",
+                  (int)(c.batches + c.alone - opened));
+    ck_assert(nodes == count_nodes(l.without, &view) && nodes > 1000);
+    counted_close(&c, far);
+    two_layouts_close(&l);
+}
+END_TEST
+
+/* Writes the same file with faces by index, for the limit of a fifth of its bytes below. */
+static const char *by_number(const ebpo_file *file)
+{
+    ebpo_subset_options all = EBPO_SUBSET_OPTIONS_INIT;
+    const char *path = scratch("by_number.ebpo.h5");
+    all.subtree_faces = 400;
+    all.face_coding = EBPO_FACES_HIGH_WATER;
+    ck_assert(ebpo_subset(file, path, &all, NULL) == EBPO_OK);
+    return path;
+}
+
+/* The final depth is not known in advance: prefetch hints cover nodes whose turn is near, neither
+ * the deepest levels, for which there is no memory, nor single nodes. */
+START_TEST(test_remote_limited_view_round_trips)
+{
+    static const struct {
+        ebpo_priority order;
+        uint64_t bytes, nodes, waves;
+    } ends[] = { { EBPO_PRIORITY_LEVEL, 0, 30000, 6 },
+                 { EBPO_PRIORITY_PIXELS, 0, 30000, 6 },
+                 { EBPO_PRIORITY_LEVEL, 400000, 0, 60 },
+                 { EBPO_PRIORITY_PIXELS, 400000, 0, 30 } };
+    two_layouts l;
+    counted_source c;
+    ebpo_observer observer = EBPO_OBSERVER_INIT;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 400, 240), 9, ALL, EBPO_CODEC_ZSTD, 400);
+    const char *path = by_number(l.with);
+    for (size_t i = 0; i < sizeof ends / sizeof *ends; i++) {
+        ebpo_view_options view = look(&observer, ends[i].order);
+        view.bytes = ends[i].bytes;
+        view.nodes = ends[i].nodes;
+        ebpo_file *far = counted_open(&c, path, true);
+        uint64_t opened = c.batches + c.alone, nodes = count_nodes(far, &view),
+                 waves = c.batches + c.alone - opened;
+        ck_assert_msg(waves <= ends[i].waves, "%d waves of view %d", (int)waves, (int)i);
+        ck_assert(c.queried <= (view.bytes ? view.bytes : c.size / 5));
+        ck_assert(view.bytes || nodes == count_nodes(l.without, &view));
+        counted_close(&c, far);
+    }
+    two_layouts_close(&l);
+}
+END_TEST
+
+TEST_SUITE(round_trips)
+{
+    Suite *suite = suite_create("far_waves");
+    TCase *tests = tcase_create("far_waves");
+    tcase_set_timeout(tests, 900);
+    tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
+    tcase_add_test(tests, test_remote_query_round_trips);
+    tcase_add_test(tests, test_remote_radius_query_round_trips);
+    tcase_add_test(tests, test_remote_box_query_round_trips);
+    tcase_add_loop_test(tests, test_remote_view_round_trips, 0, 3);
+    tcase_add_test(tests, test_remote_limited_view_round_trips);
+    suite_add_tcase(suite, tests);
+    return suite;
+}

@@ -1,0 +1,649 @@
+/* ebpo haptic: plays a haptic device at a steady rate, and measures the times of its haptic steps.
+ */
+#include <float.h>
+#include <math.h>
+#include <sched.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <time.h>
+
+#include <ebpo/map.h>
+
+#include "cli/command.h"
+#include "cli/commands/commands.h"
+#include "cli/commands/haptic_device.h"
+#include "cli/json.h"
+#include "cli/model_memory.h"
+#include "cli/numbers.h"
+#include "cli/points.h"
+#include "cli/remote_args.h"
+#include "cli/tool_clock.h"
+#include "cli/words.h"
+
+/* --- haptic steps at a steady rate --- */
+
+/* In microseconds: bin 0 is less than 1, bin n from 2^(n - 1) to 2^n, the last one also all above.
+ */
+enum { HAPTIC_BINS = 16 };
+
+typedef struct haptic_times {
+    uint64_t step_count, late;            /* not finished a period after their due times */
+    double p50, p99, p99_9, p99_99, most; /* seconds from begin to end of a step */
+    double wake_p99_9, wake_max;          /* seconds from the due time of a step to its begin */
+    double cpu_p99_9, cpu_max;            /* processor time from begin to end of a step */
+    uint64_t over_ms;                     /* took more than a millisecond from begin to end */
+    uint64_t bins[HAPTIC_BINS];
+    uint64_t page_faults;             /* page faults of the thread of steps */
+    double between_mean, between_max; /* widths of the bounds of a probe */
+} haptic_times;
+
+typedef struct haptic_play {
+    double rate, seconds;
+    ebpo_haptic *haptic;         /* NULL: an empty loop */
+    const haptic_device *device; /* source of positions */
+    ebpo_haptic_kind kind;
+    double range;        /* range of the colours, for probes */
+    haptic_pose *record; /* [ticks] positions of the device, or NULL */
+} haptic_play;
+
+/* Requests real-time scheduling for this thread and locked memory for the process. Returns a text
+ * on what was granted. Threads created afterwards inherit the scheduling. */
+static const char *haptic_play_first(void)
+{
+    bool kept = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+#ifdef EBPO_HAVE_SCHED_SETSCHEDULER
+    struct sched_param first = { .sched_priority = sched_get_priority_max(SCHED_FIFO) / 2 };
+    /* for this thread; the loading thread was created before and keeps its scheduling */
+    bool ahead = sched_setscheduler(0, SCHED_FIFO, &first) == 0;
+#else
+    bool ahead = false;
+#endif
+    return ahead  ? kept ? "SCHED_FIFO, memory locked" : "SCHED_FIFO, memory not locked"
+           : kept ? "as other threads, memory locked"
+                  : "as other threads, memory not locked";
+}
+
+/* Returns to normal scheduling. */
+static void haptic_play_behind(void)
+{
+#ifdef EBPO_HAVE_SCHED_SETSCHEDULER
+    (void)sched_setscheduler(0, SCHED_OTHER, &(struct sched_param){ 0 });
+#endif
+    (void)munlockall();
+}
+
+static int compare_times(const void *a, const void *b)
+{
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+/* Returns the least time that this part of all times does not exceed. */
+static double time_quantile(const float *sorted, uint64_t count, double part)
+{
+    uint64_t rank = (uint64_t)ceil(part * (double)count);
+    return sorted[rank > 0 ? rank - 1 : 0];
+}
+
+static void sort_times(float *times, uint64_t count)
+{
+    qsort(times, count, sizeof *times, compare_times);
+}
+
+/* Times of each step. */
+typedef struct spans {
+    float *took, *wake, *cpu;
+} spans;
+
+static void sum_up(const spans *s, uint64_t count, haptic_times *out)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        int bin = s->took[i] < 1e-6F ? 0 : 1 + (int)log2(1e6 * (double)s->took[i]);
+        out->bins[bin < HAPTIC_BINS ? bin : HAPTIC_BINS - 1]++;
+        out->over_ms += s->took[i] > 1e-3F;
+    }
+    sort_times(s->took, count);
+    sort_times(s->wake, count);
+    sort_times(s->cpu, count);
+    out->p50 = time_quantile(s->took, count, 0.5);
+    out->p99 = time_quantile(s->took, count, 0.99);
+    out->p99_9 = time_quantile(s->took, count, 0.999);
+    out->p99_99 = time_quantile(s->took, count, 0.9999);
+    out->most = s->took[count - 1];
+    out->wake_p99_9 = time_quantile(s->wake, count, 0.999);
+    out->wake_max = s->wake[count - 1];
+    out->cpu_p99_9 = time_quantile(s->cpu, count, 0.999);
+    out->cpu_max = s->cpu[count - 1];
+}
+
+static uint64_t page_faults(void)
+{
+    struct rusage r;
+#ifdef EBPO_HAVE_RUSAGE_THREAD
+    bool known = getrusage(RUSAGE_THREAD, &r) == 0;
+#else
+    bool known = getrusage(RUSAGE_SELF, &r) == 0;
+#endif
+    return known ? (uint64_t)(r.ru_minflt + r.ru_majflt) : 0;
+}
+
+static uint64_t thread_clock(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return (uint64_t)t.tv_sec * UINT64_C(1000000000) + (uint64_t)t.tv_nsec;
+}
+
+static void move_ball(ebpo_haptic *haptic, const haptic_pose *hand, haptic_result *a)
+{
+    ebpo_haptic_ball_result r;
+    ebpo_haptic_step_ball(haptic, hand->place, &r);
+    memcpy(a->proxy.place, r.proxy, sizeof r.proxy);
+    memcpy(a->proxy.turn, hand->turn, sizeof hand->turn);
+    memcpy(a->force, r.force, sizeof r.force);
+    memcpy(a->normal, r.normal, sizeof r.normal);
+    a->depth = r.depth;
+    a->face = r.face;
+    a->flags = r.flags;
+}
+
+static void turn_tool(ebpo_haptic *haptic, const haptic_pose *hand, haptic_result *a)
+{
+    ebpo_haptic_tool_result r;
+    ebpo_haptic_step_tool(haptic, hand->place, hand->turn, &r);
+    memcpy(a->proxy.place, r.proxy, sizeof r.proxy);
+    memcpy(a->proxy.turn, r.turn, sizeof r.turn);
+    memcpy(a->force, r.force, sizeof r.force);
+    memcpy(a->torque, r.torque, sizeof r.torque);
+    memcpy(a->normal, r.normal, sizeof r.normal);
+    a->depth = r.depth;
+    a->face = r.face;
+    a->flags = r.flags;
+}
+
+static void sense_distance(const haptic_play *p, const haptic_pose *hand, haptic_result *a)
+{
+    ebpo_haptic_probe_result r;
+    ebpo_haptic_step_probe(p->haptic, hand->place, &r);
+    a->proxy = *hand;
+    memcpy(a->normal, r.normal, sizeof r.normal);
+    a->depth = r.distance;
+    a->lo = r.lo;
+    a->hi = r.hi;
+    a->face = r.face;
+    a->flags = r.flags;
+    a->where = (uint8_t)r.where;
+    ebpo_map_colour(EBPO_MAP_THESIS, r.distance, p->range, a->rgb);
+}
+
+/* Returns false when the device has ended. */
+static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
+{
+    haptic_result result = { .depth = 0 };
+    haptic_pose hand;
+    if (!p->haptic)
+        return true;
+    if (!p->device->read(p->device->self, i, &hand))
+        return false;
+    if (p->record)
+        p->record[i] = hand;
+    switch (p->kind) {
+    case EBPO_HAPTIC_BALL: move_ball(p->haptic, &hand, &result); break;
+    case EBPO_HAPTIC_PROBE: sense_distance(p, &hand, &result); break;
+    case EBPO_HAPTIC_TOOL: turn_tool(p->haptic, &hand, &result); break;
+    }
+    p->device->write(p->device->self, &result);
+    out->between_mean += result.hi - result.lo; /* a sum, until the end */
+    out->between_max = fmax(out->between_max, result.hi - result.lo);
+    return true;
+}
+
+/* Plays late steps, too, and the following ones at their due times. Returns how many there were. */
+static uint64_t play_all(const haptic_play *p, uint64_t count, const spans *s, haptic_times *out)
+{
+    const double period = 1e9 / p->rate;
+    uint64_t begin = tool_clock() + (uint64_t)(2 * period), faults = page_faults(), i = 0;
+    for (; i < count; i++) {
+        uint64_t due = begin + (uint64_t)((double)i * period);
+        tool_wait_until(due);
+        uint64_t worked = thread_clock(), began = tool_clock();
+        if (!play_step(p, i, out))
+            break;
+        uint64_t ended = tool_clock();
+        s->cpu[i] = 1e-9F * (float)(thread_clock() - worked);
+        s->took[i] = 1e-9F * (float)(ended - began);
+        s->wake[i] = 1e-9F * (float)(began - due);
+        out->late += (double)(ended - due) > period;
+    }
+    out->page_faults = page_faults() - faults;
+    return i;
+}
+
+/* Returns the maximum number of steps. */
+static uint64_t haptic_play_steps(const haptic_play *p)
+{
+    uint64_t most = p->haptic ? p->device->step_count(p->device->self) : 0;
+    return most ? most : (uint64_t)ceil(p->rate * p->seconds);
+}
+
+/* Returns false when there is no memory for the times. */
+static bool haptic_play_run(const haptic_play *p, haptic_times *out)
+{
+    uint64_t count = haptic_play_steps(p);
+    /* writes zeros, so that no step is the first to use a page */
+    float *all = malloc(3 * count * sizeof *all);
+    *out = (haptic_times){ .step_count = 0 };
+    if (!all)
+        return false;
+    memset(all, 0, 3 * count * sizeof *all);
+    const spans s = { all, all + count, all + 2 * count };
+    out->step_count = play_all(p, count, &s, out);
+    out->between_mean /= fmax(1, (double)out->step_count);
+    if (out->step_count > 0)
+        sum_up(&s, out->step_count, out);
+    free(all);
+    return true;
+}
+
+/* --- the command --- */
+
+typedef struct values {
+    const char *path, *device, *record, *tool, *memory;
+    double rate, seconds, radius, friction, stiffness, damping, skin, search_radius;
+    int64_t faces;
+    bool probe, json;
+    remote_values remote;
+} values;
+
+#include "cli/options/haptic.inc"
+
+typedef struct job {
+    const values *v;
+    const char *name; /* FILE */
+    ebpo_file *file;
+    ebpo_model *model;
+    ebpo_haptic *haptic;
+    double *points; /* points of the tool */
+    uint64_t point_count;
+    ebpo_haptic_kind kind;
+    haptic_device device;
+    haptic_pose *record;
+    const char *scheduling;
+    haptic_times empty, times;
+    ebpo_haptic_stats stats;
+    ebpo_error stopped; /* EBPO_OK, or the error that ended loading */
+    ebpo_model_stats memory;
+} job;
+
+/* --- output --- */
+
+static const char *const kinds[] = { "a ball", "a probe", "a tool" };
+
+static void print_times(const char *name, const haptic_times *t)
+{
+    printf("  %-8s %10llu %6llu %7llu %9.2f %9.2f %9.2f %9.2f %9.2f %11.2f %9.2f %10.2f %9.2f\n",
+           name, (unsigned long long)t->step_count, (unsigned long long)t->late,
+           (unsigned long long)t->over_ms, 1e6 * t->p50, 1e6 * t->p99, 1e6 * t->p99_9,
+           1e6 * t->p99_99, 1e6 * t->most, 1e6 * t->wake_p99_9, 1e6 * t->wake_max,
+           1e6 * t->cpu_p99_9, 1e6 * t->cpu_max);
+}
+
+static void print_bins(const haptic_times *t)
+{
+    puts("  microseconds from begin to end: steps");
+    for (int i = 0; i < HAPTIC_BINS; i++)
+        if (t->bins[i])
+            printf("  %6d %s %llu\n", i ? 1 << (i - 1) : 0,
+                   i < HAPTIC_BINS - 1 ? "up  " : "and more", (unsigned long long)t->bins[i]);
+}
+
+static void print_report(const job *j)
+{
+    const ebpo_haptic_stats *s = &j->stats;
+    printf("%s: %s at %g Hz, %s\n", remote_shown(j->name), kinds[j->kind], j->v->rate,
+           j->scheduling);
+    printf("  %-8s %10s %6s %7s %9s %9s %9s %9s %9s %11s %9s %10s %9s\n", "us", "steps", "missed",
+           ">1 ms", "p50", "p99", "p99.9", "p99.99", "max", "wake p99.9", "max", "cpu p99.9",
+           "max");
+    print_times("haptic", &j->times);
+    print_times("empty", &j->empty);
+    printf("  contact %llu, waiting %llu, incomplete %llu, partial %llu; faces at most %llu; page "
+           "faults "
+           "%llu\n",
+           (unsigned long long)s->contacts, (unsigned long long)s->waiting,
+           (unsigned long long)s->incomplete, (unsigned long long)s->partial,
+           (unsigned long long)s->work_max, (unsigned long long)j->times.page_faults);
+    if (j->kind == EBPO_HAPTIC_PROBE)
+        printf("  distances known to %g on average, %g at most\n", j->times.between_mean,
+               j->times.between_max);
+    printf("  boxes loaded %llu, taken %llu, too full %llu; %.3f s, the longest %.3f s; %llu "
+           "bytes\n",
+           (unsigned long long)s->loads, (unsigned long long)s->taken,
+           (unsigned long long)s->too_many, s->load_seconds, s->load_seconds_max,
+           (unsigned long long)s->memory);
+    if (j->stopped.status != EBPO_OK)
+        printf("  loading failed: in %llu steps\n", (unsigned long long)s->stopped);
+    printf("  model: %llu bytes at most, %llu subtrees loaded\n",
+           (unsigned long long)j->memory.memory_peak, (unsigned long long)j->memory.loads);
+    print_bins(&j->times);
+}
+
+static void json_times(json *out, const char *key, const haptic_times *t)
+{
+    json_object(out, key);
+    json_uint(out, "steps", t->step_count);
+    json_uint(out, "missed", t->late);
+    json_real(out, "p50", t->p50);
+    json_real(out, "p99", t->p99);
+    json_real(out, "p99_9", t->p99_9);
+    json_real(out, "p99_99", t->p99_99);
+    json_real(out, "max", t->most);
+    json_real(out, "wake_p99_9", t->wake_p99_9);
+    json_real(out, "wake_max", t->wake_max);
+    json_real(out, "cpu_p99_9", t->cpu_p99_9);
+    json_real(out, "cpu_max", t->cpu_max);
+    json_uint(out, "over_ms", t->over_ms);
+    json_uint(out, "page_faults", t->page_faults);
+    json_array(out, "histogram");
+    for (int i = 0; i < HAPTIC_BINS; i++)
+        json_uint(out, NULL, t->bins[i]);
+    json_end(out);
+    json_end(out);
+}
+
+static void json_report(const job *j)
+{
+    const ebpo_haptic_stats *s = &j->stats;
+    json out;
+    json_begin(&out, stdout);
+    json_object(&out, NULL);
+    json_text(&out, "file", remote_shown(j->name));
+    json_text(&out, "device", kinds[j->kind] + 2);
+    json_real(&out, "rate", j->v->rate);
+    json_text(&out, "scheduling", j->scheduling);
+    json_times(&out, "haptic", &j->times);
+    json_times(&out, "empty", &j->empty);
+    if (j->kind == EBPO_HAPTIC_PROBE) {
+        json_real(&out, "between_mean", j->times.between_mean);
+        json_real(&out, "between_max", j->times.between_max);
+    }
+    json_uint(&out, "contacts", s->contacts);
+    json_uint(&out, "waiting", s->waiting);
+    json_uint(&out, "incomplete", s->incomplete);
+    json_uint(&out, "partial", s->partial);
+    json_uint(&out, "faces_max", s->work_max);
+    json_uint(&out, "loads", s->loads);
+    json_uint(&out, "taken", s->taken);
+    json_uint(&out, "too_full", s->too_many);
+    json_real(&out, "load_seconds", s->load_seconds);
+    json_real(&out, "load_seconds_max", s->load_seconds_max);
+    json_uint(&out, "box_bytes", s->memory);
+    json_uint(&out, "model_bytes_max", j->memory.memory_peak);
+    json_uint(&out, "subtrees_loaded", j->memory.loads);
+    json_uint(&out, "stopped", s->stopped);
+    if (j->stopped.status != EBPO_OK)
+        json_text(&out, "failure", j->stopped.message);
+    json_finish(&out);
+}
+
+/* --- running --- */
+
+/* Reads tools: vertices of a mesh file, or points as `ebpo inside` reads them. */
+static bool read_mesh_tool(job *j)
+{
+    ebpo_mesh_read_options read = EBPO_MESH_READ_OPTIONS_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh mesh;
+    if (ebpo_mesh_read(j->v->tool, &read, &mesh, &error) != EBPO_OK) {
+        (void)command_failed("haptic", &error);
+        return false;
+    }
+    j->point_count = mesh.vertex_count;
+    j->points = malloc(3 * mesh.vertex_count * sizeof *j->points);
+    for (uint64_t i = 0; j->points && i < 3 * mesh.vertex_count; i++)
+        j->points[i] = mesh.xyz32 ? (double)mesh.xyz32[i] : mesh.xyz64[i];
+    ebpo_mesh_free(&mesh);
+    return j->points != NULL;
+}
+
+static bool read_point_tool(job *j)
+{
+    points p;
+    double rows[3 * POINTS_BATCH];
+    uint64_t got;
+    bool fine = points_open(&p, "haptic", j->v->tool, POINTS, false, INFINITY);
+    while (fine && (got = points_next(&p, rows)) > 0) {
+        double *more = realloc(j->points, (j->point_count + got) * 3 * sizeof *more);
+        fine = more != NULL;
+        if (!fine)
+            break;
+        memcpy(more + 3 * j->point_count, rows, got * 3 * sizeof *more);
+        j->points = more;
+        j->point_count += got;
+    }
+    fine = fine && !p.failed;
+    points_close(&p);
+    return fine;
+}
+
+static bool read_tool(job *j)
+{
+    const char *name = j->v->tool;
+    if (!name)
+        return true;
+    bool mesh = words_end_with(name, ".obj") || words_end_with(name, ".stl") ||
+                words_end_with(name, ".off");
+    if (!(mesh ? read_mesh_tool(j) : read_point_tool(j)))
+        return false;
+    if (j->point_count > 0 && j->point_count <= 10000)
+        return true;
+    fprintf(stderr, "ebpo haptic: the tool %s has %llu points; 1 to 10,000 are expected\n", name,
+            (unsigned long long)j->point_count);
+    return false;
+}
+
+static double tool_radius(const job *j)
+{
+    double most = j->v->radius;
+    for (uint64_t i = 0; i < j->point_count; i++)
+        most =
+            fmax(most, hypot(hypot(j->points[3 * i], j->points[3 * i + 1]), j->points[3 * i + 2]));
+    return most;
+}
+
+static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
+{
+    ebpo_model_options opening = EBPO_MODEL_OPTIONS_INIT;
+    opening.memory = memory;
+    ebpo_status status = remote_open(&j->file, j->name, &j->v->remote, error);
+    if (status == EBPO_OK && !j->v->memory)
+        model_memory_default("haptic", j->file, j->name, &opening);
+    if (status == EBPO_OK)
+        status = ebpo_model_new(j->file, &opening, &j->model, error);
+    if (status == EBPO_OK && !j->v->path && !j->v->device)
+        status = haptic_own_open(&j->device, j->model, ebpo_file_info(j->file), j->v->rate,
+                                 tool_radius(j), error);
+    return status;
+}
+
+static ebpo_status open_device(job *j, const double start[3], ebpo_error *error)
+{
+    const values *v = j->v;
+    ebpo_haptic_options wanted = EBPO_HAPTIC_OPTIONS_INIT;
+    wanted.radius = v->radius;
+    wanted.friction = v->friction;
+    wanted.stiffness = v->stiffness;
+    wanted.damping = v->damping;
+    wanted.skin = v->skin;
+    wanted.search_radius = v->search_radius;
+    wanted.step_seconds = 1 / v->rate;
+    wanted.faces = (uint64_t)v->faces;
+    wanted.kind = j->kind;
+    wanted.points = (const double(*)[3])j->points;
+    wanted.point_count = j->point_count;
+    return ebpo_haptic_new(j->model, &wanted, start, &j->haptic, error);
+}
+
+static double model_diagonal(const ebpo_info *info)
+{
+    return hypot(hypot(info->box_size[0], info->box_size[1]), info->box_size[2]);
+}
+
+static ebpo_status no_memory(ebpo_error *error, const char *what)
+{
+    *error = (ebpo_error){ .status = EBPO_E_MEMORY };
+    snprintf(error->message, sizeof error->message, "not enough memory for %s", what);
+    return EBPO_E_MEMORY;
+}
+
+/* Plays an empty loop of a tenth of the length: the delay of the machine itself. Before a device
+ * begins. */
+static ebpo_status play_nothing(job *j, ebpo_error *error)
+{
+    const values *v = j->v;
+    uint64_t step_count = v->path ? j->device.step_count(j->device.self) : 0;
+    const haptic_play empty = { .rate = v->rate,
+                                .seconds = step_count ? (double)step_count / v->rate / 10
+                                                      : v->seconds / 10 };
+    haptic_play_first();
+    bool fine = haptic_play_run(&empty, &j->empty);
+    haptic_play_behind(); /* and so does the loading thread, which is created now */
+    return fine ? EBPO_OK : no_memory(error, "the times of steps");
+}
+
+static ebpo_status play_device(job *j, ebpo_error *error)
+{
+    const values *v = j->v;
+    haptic_play all = { v->rate,    v->seconds, j->haptic,
+                        &j->device, j->kind,    model_diagonal(ebpo_file_info(j->file)) / 20,
+                        NULL };
+    if (v->record) {
+        j->record = calloc(haptic_play_steps(&all), sizeof *j->record);
+        if (!j->record)
+            return no_memory(error, "the record");
+        all.record = j->record;
+    }
+    j->scheduling = haptic_play_first();
+    if (!haptic_play_run(&all, &j->times))
+        return no_memory(error, "the times of steps");
+    ebpo_haptic_get_stats(j->haptic, &j->stats);
+    ebpo_model_get_stats(j->model, &j->memory);
+    j->stopped.status = ebpo_haptic_check(j->haptic, &j->stopped);
+    return EBPO_OK;
+}
+
+/* Writes it as --path reads it, with all bits of each number. */
+static ebpo_status write_record(const job *j, ebpo_error *error)
+{
+    enum { LINE = 7 * (NUMBER_CAPACITY + 1) };
+    char *text = malloc(j->times.step_count * LINE + 1), *at = text;
+    if (!text)
+        return no_memory(error, "what is recorded");
+    for (uint64_t i = 0; i < j->times.step_count; i++) {
+        const haptic_pose *p = &j->record[i];
+        for (int k = 0; k < 7; k++) {
+            at = number_write(at, k < 3 ? p->place[k] : p->turn[k - 3]);
+            *at++ = k < 6 ? ' ' : '\n';
+        }
+    }
+    ebpo_status status = ebpo_write_file(j->v->record, text, (size_t)(at - text), error);
+    free(text);
+    return status;
+}
+
+static int run_job(job *j, uint64_t memory)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    haptic_pose start;
+    ebpo_status status = j->v->record ? ebpo_check_output(j->v->record, &error) : EBPO_OK;
+    if (status == EBPO_OK)
+        status = open_model(j, memory, &error);
+    if (status == EBPO_OK)
+        status = play_nothing(j, &error);
+    if (status == EBPO_OK && !j->device.begin(j->device.self, j->v->seconds, &start))
+        return EXIT_FAILED;
+    if (status == EBPO_OK)
+        status = open_device(j, start.place, &error);
+    if (status == EBPO_OK)
+        status = play_device(j, &error);
+    if (status == EBPO_OK && j->v->record)
+        status = write_record(j, &error);
+    if (status != EBPO_OK)
+        return command_failed("haptic", &error);
+    if (j->v->json)
+        json_report(j);
+    else
+        print_report(j);
+    return j->stopped.status == EBPO_OK ? EXIT_FINE : command_failed("haptic", &j->stopped);
+}
+
+/* Returns 0 when they are valid. */
+static int check_values(const values *v, uint64_t *memory)
+{
+    if (v->memory && !words_read_size(v->memory, memory))
+        return command_usage("haptic", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
+    if (v->path && v->seconds != 10)
+        return command_usage("haptic", "--seconds cannot be combined with --path, which ends at "
+                                       "its last position");
+    if (v->path && v->device)
+        return command_usage("haptic", "--path and --device both move the tool; choose one");
+    if (v->device && !haptic_udp_named(v->device))
+        return command_usage("haptic", "--device '%s': expected udp:PORT or udp:ADDRESS:PORT",
+                             v->device);
+    if (v->tool && v->probe)
+        return command_usage("haptic", "--tool and --probe: a probe is a point");
+    if ((v->tool || v->probe) && v->radius > 0)
+        return command_usage("haptic", "--radius is for a ball, without --tool and --probe");
+    return 0;
+}
+
+/* Returns true when the record would overwrite an input. */
+static bool overwrites_input(const values *v, const char *model)
+{
+    const char *in[] = { model, v->path, v->tool };
+    for (int i = 0; v->record && i < 3; i++)
+        if (in[i] && command_overwrites("haptic", in[i], v->record))
+            return true;
+    return false;
+}
+
+static int run_haptic(void *energy, const char **operand)
+{
+    const values *v = energy;
+    job j = { .v = v,
+              .name = operand[0],
+              .kind = v->tool    ? EBPO_HAPTIC_TOOL
+                      : v->probe ? EBPO_HAPTIC_PROBE
+                                 : EBPO_HAPTIC_BALL,
+              .stats = EBPO_HAPTIC_STATS_INIT,
+              .memory = EBPO_MODEL_STATS_INIT };
+    uint64_t memory = 0;
+    int code = check_values(v, &memory);
+    if (code != 0 || overwrites_input(v, operand[0]))
+        return EXIT_USAGE;
+    bool fine = command_wants_hdf5("haptic", operand[0]) && read_tool(&j) &&
+                (!v->path || haptic_path_open(&j.device, v->path)) &&
+                (!v->device || haptic_udp_open(&j.device, v->device));
+    code = fine ? run_job(&j, memory) : EXIT_FAILED;
+    ebpo_haptic_free(j.haptic);
+    ebpo_model_free(j.model);
+    ebpo_close(j.file);
+    if (j.device.end)
+        j.device.end(j.device.self);
+    free(j.points);
+    free(j.record);
+    return code;
+}
+
+static const values standard = { .rate = 1000,
+                                 .seconds = 10,
+                                 .stiffness = 400,
+                                 .damping = 0.4,
+                                 .faces = 1 << 14,
+                                 .remote = REMOTE_VALUES_INIT };
+
+const command command_haptic = { &spec, sizeof standard, &standard, run_haptic };

@@ -1,0 +1,52 @@
+/* Interface of haptic devices: a driver gives the position in each haptic step and takes the
+ * feedback. A new driver is a file with these five functions, and a line in cmd_haptic.c. */
+#ifndef EBPO_TOOLS_HAPTIC_DEVICE_H
+#define EBPO_TOOLS_HAPTIC_DEVICE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include <ebpo/haptic.h>
+
+/* Unit quaternions x, y, z, w; 0 0 0 1: not rotated. */
+typedef struct haptic_pose {
+    double place[3], turn[4];
+} haptic_pose;
+
+/* Feedback: for a probe distance, lo, hi and where, for others the rest. */
+typedef struct haptic_result {
+    haptic_pose proxy;
+    double force[3], torque[3], normal[3];
+    double depth; /* as in ebpo_haptic_ball_result; of a probe its distance, perhaps NAN */
+    double lo, hi;
+    uint64_t face;
+    uint32_t flags;
+    uint8_t rgb[3], where; /* the colour of the distance; an ebpo_where */
+} haptic_result;
+
+typedef struct haptic_device {
+    /* Waits for the first position, at most so long. Returns false after an error, reported on
+     * stderr. */
+    bool (*begin)(void *self, double seconds, haptic_pose *first);
+    /* Called in a haptic step: never waits. Returns false at the end. */
+    bool (*read)(void *self, uint64_t step_seconds, haptic_pose *out);
+    void (*write)(void *self, const haptic_result *result);
+    /* Returns the number of its steps; 0: as many as requested. */
+    uint64_t (*step_count)(void *self);
+    void (*end)(void *self);
+    void *self;
+} haptic_device;
+
+/* haptic_path.c: lines 'x y z' or 'x y z qx qy qz qw' of a file, '-': standard input. Returns false
+ * after an error, reported on stderr. Call `end` in any case. */
+bool haptic_path_open(haptic_device *out, const char *path);
+
+/* haptic_udp.c: 'udp:PORT' or 'udp:ADDRESS:PORT', checked by haptic_udp_named. */
+bool haptic_udp_named(const char *name);
+bool haptic_udp_open(haptic_device *out, const char *name);
+
+/* haptic_path_own.c: goes around the model, into its surface and out again. */
+ebpo_status haptic_own_open(haptic_device *out, ebpo_model *model, const ebpo_info *info,
+                            double rate, double clear, ebpo_error *error);
+
+#endif

@@ -1,0 +1,137 @@
+/* Reads recorded positions of a haptic device. */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "cli/numbers.h"
+#include "cli/commands/haptic_device.h"
+
+typedef struct path {
+    haptic_pose *pose;
+    uint64_t count, capacity;
+} path;
+
+static const char *skip_blanks(const char *at)
+{
+    while (*at == ' ' || *at == '\t' || *at == '\r' || *at == '\n')
+        at++;
+    return at;
+}
+
+/* Returns how many numbers a line has; -1: other text. */
+static int read_numbers(const char *line, size_t length, double out[7])
+{
+    const char *at = skip_blanks(line), *end = line + length;
+    int count = 0;
+    while (*at && *at != '#') {
+        const char *after;
+        double x = number_read(at, end, &after);
+        if (after == at || count == 7 || !isfinite(x) || fabs(x) > 0x1p200)
+            return -1;
+        out[count++] = x;
+        at = skip_blanks(after);
+    }
+    return count;
+}
+
+static bool make_unit(double q[4])
+{
+    double length = hypot(hypot(q[0], q[1]), hypot(q[2], q[3]));
+    for (int k = 0; k < 4; k++)
+        q[k] /= length;
+    return length >= 0x1p-200;
+}
+
+static bool add_pose(path *p, const double v[7], int count)
+{
+    if (p->count == p->capacity) {
+        uint64_t more = p->capacity ? 2 * p->capacity : 1024;
+        haptic_pose *pose = realloc(p->pose, more * sizeof *pose);
+        if (!pose)
+            return false;
+        p->pose = pose;
+        p->capacity = more;
+    }
+    haptic_pose *t = &p->pose[p->count++];
+    memcpy(t->place, v, sizeof t->place);
+    memcpy(t->turn, count == 7 ? v + 3 : (const double[4]){ 0, 0, 0, 1 }, sizeof t->turn);
+    return make_unit(t->turn);
+}
+
+static bool read_lines(path *p, FILE *in, const char *name)
+{
+    char *line = NULL;
+    size_t space = 0;
+    bool fine = true;
+    ssize_t length;
+    for (uint64_t n = 1; fine && (length = getline(&line, &space, in)) >= 0; n++) {
+        double v[7];
+        const char *text = n == 1 ? number_skip_mark(line) : line;
+        int count = strlen(line) == (size_t)length
+                        ? read_numbers(text, (size_t)(line + length - text), v)
+                        : -1;
+        fine = count == 0 || ((count == 3 || count == 7) && add_pose(p, v, count));
+        if (!fine)
+            fprintf(
+                stderr,
+                "ebpo haptic: %s, line %llu: expected three numbers, or seven of which the last "
+                "four are a quaternion\n",
+                name, (unsigned long long)n);
+    }
+    free(line);
+    if (fine && ferror(in)) {
+        perror(name);
+        return false;
+    }
+    if (fine && p->count == 0)
+        fprintf(stderr, "ebpo haptic: the path '%s' has no position\n", name);
+    return fine && p->count > 0;
+}
+
+static bool begin_path(void *self, double seconds, haptic_pose *first)
+{
+    (void)seconds;
+    *first = ((path *)self)->pose[0];
+    return true;
+}
+
+static bool read_pose(void *self, uint64_t step_seconds, haptic_pose *out)
+{
+    path *p = self;
+    if (step_seconds >= p->count)
+        return false;
+    *out = p->pose[step_seconds];
+    return true;
+}
+
+static void write_result(void *self, const haptic_result *result)
+{
+    (void)self;
+    (void)result;
+}
+
+static uint64_t count_steps(void *self) { return ((path *)self)->count; }
+
+static void end_path(void *self)
+{
+    free(((path *)self)->pose);
+    free(self);
+}
+
+bool haptic_path_open(haptic_device *out, const char *name)
+{
+    path *p = calloc(1, sizeof *p);
+    bool standard = strcmp(name, "-") == 0;
+    FILE *in = standard ? stdin : fopen(name, "r");
+    *out = (haptic_device){ begin_path, read_pose, write_result, count_steps, end_path, p };
+    bool fine = p && in;
+    if (!in)
+        fprintf(stderr, "ebpo haptic: %s: cannot be opened: %s\n", name, strerror(errno));
+    if (fine)
+        fine = read_lines(p, in, standard ? "standard input" : name);
+    if (in && !standard)
+        fclose(in);
+    return fine;
+}

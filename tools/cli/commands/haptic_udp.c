@@ -1,0 +1,249 @@
+/* A device that sends its positions in UDP packets, and receives the feedback: docs/guide/haptic.md
+ * has their layout. The sender of the first valid packet is the device; other packets are ignored.
+ */
+#include <arpa/inet.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "cli/tool_clock.h"
+#include "cli/commands/haptic_device.h"
+
+enum {
+    VERSION = 1,
+    PLACE = 1, /* kinds */
+    FEEL = 2,
+    END = 3,
+    PLACE_BYTES = 80,
+    FEEL_BYTES = 192,
+    PACKETS = 32 /* maximum taken in a step */
+};
+
+typedef struct udp {
+    int socket;
+    struct sockaddr_in device;
+    bool known, ended;
+    uint64_t sequence, tag, ignored;
+    haptic_pose pose;
+} udp;
+
+/* --- bytes: little-endian on all machines --- */
+
+static uint64_t get_bytes(const uint8_t *at, int bytes)
+{
+    uint64_t v = 0;
+    for (int i = 0; i < bytes; i++)
+        v |= (uint64_t)at[i] << 8 * i;
+    return v;
+}
+
+static double get_real(const uint8_t *at)
+{
+    uint64_t bits = get_bytes(at, 8);
+    double v;
+    memcpy(&v, &bits, sizeof v);
+    return v;
+}
+
+static uint8_t *put_bytes(uint8_t *at, uint64_t v, int bytes)
+{
+    for (int i = 0; i < bytes; i++)
+        at[i] = (uint8_t)(v >> 8 * i);
+    return at + bytes;
+}
+
+static uint8_t *put_reals(uint8_t *at, const double *v, int count)
+{
+    for (int i = 0; i < count; i++) {
+        uint64_t bits;
+        memcpy(&bits, &v[i], sizeof bits);
+        at = put_bytes(at, bits, 8);
+    }
+    return at;
+}
+
+/* --- packets --- */
+
+static bool read_pose(const uint8_t *p, haptic_pose *out)
+{
+    double square = 0;
+    for (int k = 0; k < 3; k++) {
+        out->place[k] = get_real(p + 24 + 8 * k);
+        if (!(fabs(out->place[k]) <= 0x1p200))
+            return false;
+    }
+    for (int k = 0; k < 4; k++) {
+        out->turn[k] = get_real(p + 48 + 8 * k);
+        square += out->turn[k] * out->turn[k];
+    }
+    for (int k = 0; k < 4; k++)
+        out->turn[k] /= sqrt(square);
+    return square >= 0.25 && square <= 4;
+}
+
+/* Returns false when it is no packet of the device, or an old one. */
+static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_in *from)
+{
+    haptic_pose pose;
+    if (size != PLACE_BYTES || memcmp(p, "EBPT", 4) != 0 || get_bytes(p + 4, 2) != VERSION)
+        return false;
+    uint64_t kind = get_bytes(p + 6, 2), sequence = get_bytes(p + 8, 8);
+    if (u->known && (from->sin_port != u->device.sin_port ||
+                     from->sin_addr.s_addr != u->device.sin_addr.s_addr || sequence <= u->sequence))
+        return false;
+    if (kind == END && u->known)
+        u->ended = true;
+    else if (kind == PLACE && read_pose(p, &pose))
+        u->pose = pose;
+    else
+        return false;
+    u->known = true;
+    u->device = *from;
+    u->sequence = sequence;
+    u->tag = get_bytes(p + 16, 8);
+    return true;
+}
+
+static void take_all(udp *u)
+{
+    uint8_t bytes[PLACE_BYTES + 1];
+    for (int i = 0; i < PACKETS; i++) {
+        struct sockaddr_in from;
+        socklen_t length = sizeof from;
+        ssize_t size = recvfrom(u->socket, bytes, sizeof bytes, MSG_DONTWAIT | MSG_TRUNC,
+                                (struct sockaddr *)&from, &length);
+        if (size < 0 && errno != ECONNREFUSED) /* the device is not reachable: it may return */
+            return;
+        if (size >= 0 && !(length == sizeof from && take_packet(u, bytes, size, &from)))
+            u->ignored++;
+    }
+}
+
+static void report_port(const udp *u)
+{
+    struct sockaddr_in at = { .sin_port = 0 };
+    socklen_t length = sizeof at;
+    char text[64] = "";
+    (void)getsockname(u->socket, (struct sockaddr *)&at, &length);
+    inet_ntop(AF_INET, &at.sin_addr, text, sizeof text);
+    fprintf(stderr, "ebpo haptic: waits for a device at %s, port %u\n", text, ntohs(at.sin_port));
+}
+
+static bool begin_udp(void *self, double seconds, haptic_pose *first)
+{
+    udp *u = self;
+    report_port(u);
+    uint64_t until = tool_clock() + (uint64_t)(1e9 * fmin(seconds, 1e9));
+    while (!u->known && tool_clock() < until) {
+        struct pollfd waiting = { .fd = u->socket, .events = POLLIN };
+        (void)poll(&waiting, 1, 50);
+        take_all(u);
+    }
+    *first = u->pose;
+    if (!u->known)
+        fprintf(stderr,
+                "ebpo haptic: no device has sent its position in %g seconds (%llu invalid "
+                "packets)\n",
+                seconds, (unsigned long long)u->ignored);
+    return u->known;
+}
+
+static bool read_place(void *self, uint64_t step_seconds, haptic_pose *out)
+{
+    udp *u = self;
+    (void)step_seconds;
+    take_all(u);
+    *out = u->pose;
+    return !u->ended;
+}
+
+static void write_result(void *self, const haptic_result *a)
+{
+    udp *u = self;
+    uint8_t bytes[FEEL_BYTES], *at = bytes;
+    memcpy(at, "EBPT", 4);
+    at = put_bytes(at + 4, VERSION, 2);
+    at = put_bytes(at, FEEL, 2);
+    at = put_bytes(at, u->sequence, 8);
+    at = put_bytes(at, u->tag, 8);
+    at = put_reals(at, a->force, 3);
+    at = put_reals(at, a->torque, 3);
+    at = put_reals(at, a->proxy.place, 3);
+    at = put_reals(at, a->proxy.turn, 4);
+    at = put_reals(at, &a->depth, 1);
+    at = put_reals(at, &a->lo, 1);
+    at = put_reals(at, &a->hi, 1);
+    at = put_reals(at, a->normal, 3);
+    at = put_bytes(at, a->face, 8);
+    at = put_bytes(at, a->flags, 4);
+    memcpy(at, a->rgb, 3);
+    at[3] = a->where;
+    (void)sendto(u->socket, bytes, sizeof bytes, MSG_DONTWAIT, (const struct sockaddr *)&u->device,
+                 sizeof u->device);
+}
+
+static uint64_t count_steps(void *self)
+{
+    (void)self;
+    return 0;
+}
+
+static void end_udp(void *self)
+{
+    udp *u = self;
+    if (u && u->socket >= 0)
+        close(u->socket);
+    free(u);
+}
+
+/* 'udp:PORT' accepts only this machine. */
+static bool read_name(const char *name, struct sockaddr_in *out)
+{
+    char address[64] = "127.0.0.1", *after;
+    const char *port = name + 4, *colon = strrchr(port, ':');
+    if (strncmp(name, "udp:", 4) != 0)
+        return false;
+    if (colon) {
+        if (colon - port >= (ptrdiff_t)sizeof address)
+            return false;
+        memcpy(address, port, (size_t)(colon - port));
+        address[colon - port] = 0;
+        port = colon + 1;
+    }
+    if (*port < '0' || *port > '9')
+        return false;
+    unsigned long number = strtoul(port, &after, 10);
+    *out = (struct sockaddr_in){ .sin_family = AF_INET, .sin_port = htons((uint16_t)number) };
+    return *after == 0 && number <= 65535 && inet_pton(AF_INET, address, &out->sin_addr) == 1;
+}
+
+bool haptic_udp_named(const char *name)
+{
+    struct sockaddr_in at;
+    return read_name(name, &at);
+}
+
+bool haptic_udp_open(haptic_device *out, const char *name)
+{
+    struct sockaddr_in at;
+    udp *u = calloc(1, sizeof *u);
+    *out = (haptic_device){ begin_udp, read_place, write_result, count_steps, end_udp, u };
+    if (!u)
+        return false;
+    u->socket = -1;
+    if (!read_name(name, &at))
+        return false;
+    u->socket = socket(AF_INET, SOCK_DGRAM, 0);
+    if (u->socket < 0 || fcntl(u->socket, F_SETFD, FD_CLOEXEC) != 0 ||
+        bind(u->socket, (const struct sockaddr *)&at, sizeof at) != 0) {
+        fprintf(stderr, "ebpo haptic: %s: %s\n", name, strerror(errno));
+        return false;
+    }
+    return true;
+}

@@ -1,0 +1,63 @@
+#include "cli/npy_results.h"
+
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+
+/* Magic, version and length of the header, whose total size is this. */
+enum { BEFORE = 10, HEAD = 192 };
+
+static void write_head(char head[HEAD], const char *dtype, uint64_t count)
+{
+    memset(head, ' ', HEAD);
+    memcpy(head, "\x93NUMPY\x01\x00", 8);
+    head[8] = (char)(HEAD - BEFORE);
+    head[9] = 0;
+    int length =
+        snprintf(head + BEFORE, HEAD - BEFORE,
+                 "{'descr': %s, 'fortran_order': False, 'shape': (%" PRIu64 ",), }", dtype, count);
+    head[BEFORE + length] = ' ';
+    head[HEAD - 1] = '\n';
+}
+
+/* Returns true when standard output is a file whose header can be rewritten. */
+static bool can_go_back(void)
+{
+    struct stat st;
+    int flags = fcntl(STDOUT_FILENO, F_GETFL);
+    return fstat(STDOUT_FILENO, &st) == 0 && S_ISREG(st.st_mode) && flags >= 0 &&
+           !(flags & O_APPEND);
+}
+
+bool npy_begin(npy_results *npy, points *in)
+{
+    char head[HEAD];
+    npy->begin = can_go_back() ? lseek(STDOUT_FILENO, 0, SEEK_CUR) : -1;
+    if (npy->begin < 0 && !points_begin(in))
+        return false;
+    if (npy->begin < 0 && !in->rows_known) {
+        fprintf(stderr,
+                "ebpo %s: --npy needs the number of results first, which this input does not "
+                "state; write to a file, or use a .npy, PLY or HDF5 file as input\n",
+                npy->command);
+        return false;
+    }
+    write_head(head, npy->dtype, npy->begin < 0 ? in->rows_total : 0);
+    return command_write(npy->command, head, HEAD);
+}
+
+bool npy_end(npy_results *npy)
+{
+    char head[HEAD];
+    off_t end = npy->begin < 0 ? -1 : lseek(STDOUT_FILENO, 0, SEEK_CUR);
+    if (npy->begin < 0)
+        return true;
+    write_head(head, npy->dtype, (uint64_t)(end - npy->begin - HEAD) / npy->bytes);
+    return pwrite(STDOUT_FILENO, head, HEAD, npy->begin) == HEAD ||
+           command_not_written(npy->command);
+}

@@ -1,0 +1,22 @@
+/* Writes results as one NumPy array: a header, then the output of --raw. */
+#ifndef EBPO_TOOLS_NPY_RESULTS_H
+#define EBPO_TOOLS_NPY_RESULTS_H
+
+#include <sys/types.h>
+
+#include "cli/points.h"
+
+typedef struct npy_results {
+    const char *command, *dtype; /* as NumPy writes it in a header */
+    unsigned bytes;              /* bytes of a result */
+    off_t begin; /* offset of the header in standard output; -1: the count was known */
+} npy_results;
+
+/* Writes the header, which states the number of results. It is set at the end when standard output
+ * is a file, otherwise the input must state it. Returns false when neither holds or writing failed;
+ * reported on stderr. */
+bool npy_begin(npy_results *npy, points *in);
+/* Returns false as above. */
+bool npy_end(npy_results *npy);
+
+#endif

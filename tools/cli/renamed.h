@@ -1,0 +1,17 @@
+/* Former names of commands, options and values, for messages that give the current ones. */
+#ifndef EBPO_TOOLS_RENAMED_H
+#define EBPO_TOOLS_RENAMED_H
+
+#include <stddef.h>
+
+/* Returns the current name of a command, or NULL when `name` is no former name. */
+const char *renamed_command(const char *name);
+
+/* Returns the current option, "--parts (for example --parts -mesh)", or NULL when `name` is no
+ * former option of the command. */
+const char *renamed_option(const char *command, const char *name, size_t length);
+
+/* Returns the current value of an option, or NULL when `word` is no former value. */
+const char *renamed_word(const char *option, const char *word, size_t length);
+
+#endif

@@ -1,0 +1,103 @@
+#include "cli/result_text.h"
+
+#include <stdlib.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/command.h"
+
+enum { FIRST = 1 << 16 };
+
+bool result_text_init(result_text *t)
+{
+    *t = (result_text){ .bytes = malloc(FIRST), .capacity = FIRST, .spill_at = RESULT_SPILL };
+    return t->bytes != NULL;
+}
+
+void result_text_free(result_text *t)
+{
+    free(t->bytes);
+    free(t->cuts);
+    *t = (result_text){ .bytes = NULL };
+}
+
+static void clear_counts(result_text *t)
+{
+    t->count = t->result = t->piece = t->row = t->cut_count = 0;
+}
+
+void result_text_lose(result_text *t)
+{
+    t->failed = true;
+    clear_counts(t);
+}
+
+/* Drops the text behind the last complete row. */
+static void cut_row(result_text *t)
+{
+    while (t->cut_count > 0 && t->cuts[t->cut_count - 1] > t->row)
+        t->cut_count--;
+    t->piece = t->cut_count ? t->cuts[t->cut_count - 1] : 0;
+    t->count = t->result = t->row;
+}
+
+void result_text_retry(result_text *t)
+{
+    cut_row(t);
+    t->full = false;
+    t->again += t->gone;
+    t->gone = 0;
+}
+
+char *result_text_grow(result_text *t)
+{
+    if (t->count >= t->spill_at && t->spill && !t->full)
+        t->spill(t, t->user);
+    if (t->full)
+        cut_row(t);
+    if (t->count + RESULT_MAX > t->capacity) {
+        char *wider = realloc(t->bytes, 2 * t->capacity);
+        if (wider) {
+            t->bytes = wider;
+            t->capacity *= 2;
+        } else
+            result_text_lose(t);
+    }
+    return t->bytes + t->count;
+}
+
+void result_text_cut(result_text *t, size_t at)
+{
+    if (t->cut_count == t->cut_capacity) {
+        size_t capacity = t->cut_capacity ? 2 * t->cut_capacity : 64;
+        size_t *wider = realloc(t->cuts, capacity * sizeof *wider);
+        if (!wider) {
+            result_text_lose(t);
+            return;
+        }
+        t->cuts = wider;
+        t->cut_capacity = capacity;
+    }
+    t->cuts[t->cut_count++] = t->piece = at;
+}
+
+bool result_text_leave(result_text *t, const char *command)
+{
+    struct stat st;
+    bool fine = !t->failed && !t->refused,
+         file = fstat(STDOUT_FILENO, &st) == 0 && S_ISREG(st.st_mode);
+    size_t at = t->again < t->count ? t->again : t->count;
+    t->again -= at;
+    for (size_t i = 0; fine && !file && i < t->cut_count; i++) {
+        if (t->cuts[i] <= at)
+            continue;
+        fine = command_write(command, t->bytes + at, t->cuts[i] - at);
+        at = t->cuts[i];
+    }
+    if (fine && at < t->count)
+        fine = command_write(command, t->bytes + at, t->count - at);
+    t->gone = (t->row ? 0 : t->gone) + t->count - t->row;
+    clear_counts(t);
+    t->refused |= !fine;
+    return fine;
+}

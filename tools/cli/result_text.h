@@ -1,0 +1,89 @@
+/* Buffers results as bytes until they are written; the buffer grows and records where each result
+ * ends. */
+#ifndef EBPO_TOOLS_RESULT_TEXT_H
+#define EBPO_TOOLS_RESULT_TEXT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct result_text result_text;
+struct result_text {
+    char *bytes;
+    size_t count, capacity;
+    size_t spill_at;      /* size from which the buffer spills */
+    size_t result, piece; /* end of the last result and of the last piece */
+    size_t *cuts;         /* [cut_count] ends of pieces: groups of results of at most 4096 bytes */
+    size_t cut_count, cut_capacity;
+    uint64_t rows; /* rows with complete results since it was last set to 0 */
+    size_t row;    /* end of the last complete row */
+    size_t gone;   /* bytes behind `row` that were already written */
+    size_t again;  /* first bytes of the text that were already written and are not repeated */
+    bool failed;   /* out of memory; the buffered text is lost */
+    bool refused;  /* writing failed, which has been reported */
+    bool full;     /* text behind the last complete row is lost until result_text_retry */
+    /* Called when the text is too long to be kept: writes it, discards it, or sets `full`. */
+    void (*spill)(result_text *t, void *user);
+    void *user;
+};
+
+/* Longest result in bytes, except lists of hits and faces, whose items are shorter. */
+enum { RESULT_MAX = 768 };
+
+/* Returns false when memory is short. Call result_text_free in any case. */
+bool result_text_init(result_text *t);
+void result_text_free(result_text *t);
+
+/* Makes space for result_text_capacity: grows the buffer or spills it. */
+char *result_text_grow(result_text *t);
+/* A pipe takes RESULT_PIECE bytes atomically; RESULT_SPILL is the default size before spilling. */
+enum { RESULT_PIECE = 4096, RESULT_SPILL = 1 << 20 };
+
+/* Returns space for RESULT_MAX bytes; result_text_end sets how many are used. Never NULL: when
+ * memory is short, the buffered text is lost and `failed` is set. */
+static inline char *result_text_capacity(result_text *t)
+{
+    return t->count < t->spill_at && t->count + RESULT_MAX <= t->capacity ? t->bytes + t->count
+                                                                          : result_text_grow(t);
+}
+static inline void result_text_end(result_text *t, const char *end)
+{
+    t->count = (size_t)(end - t->bytes);
+}
+
+void result_text_cut(result_text *t, size_t at);
+/* Ends a result. Results that fit into one piece are written together. */
+static inline void result_text_close(result_text *t)
+{
+    if (t->count - t->piece > RESULT_PIECE && t->result > t->piece)
+        result_text_cut(t, t->result);
+    t->result = t->count;
+}
+
+/* Ends the results of an input row. */
+static inline void result_text_end_row(result_text *t)
+{
+    result_text_close(t);
+    if (t->full)
+        return;
+    t->rows++;
+    t->row = t->count;
+    t->gone = 0;
+}
+/* Returns true when further results would be lost. */
+static inline bool result_text_is_over(const result_text *t)
+{
+    return t->failed || t->refused || t->full;
+}
+
+/* Drops the text behind the last complete row. The caller must add the same bytes again; bytes that
+ * were already written are not written twice. */
+void result_text_retry(result_text *t);
+/* Discards the text; later text is discarded, too, when it would be written. */
+void result_text_lose(result_text *t);
+
+/* Writes the text to standard output (to a pipe in pieces) and empties the buffer. Returns false
+ * after an error, which is reported. `command` is for the message. */
+bool result_text_leave(result_text *t, const char *command);
+
+#endif

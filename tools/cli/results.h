@@ -1,0 +1,45 @@
+/* Writes query results as text, JSON or raw numbers. */
+#ifndef EBPO_TOOLS_RESULTS_H
+#define EBPO_TOOLS_RESULTS_H
+
+#include <ebpo/query.h>
+#include <stdio.h>
+
+#include "cli/result_text.h"
+
+/* Separators of numbers in a line: blanks or commas. */
+typedef enum result_form { RESULTS_TEXT, RESULTS_JSON, RESULTS_RAW, RESULTS_CSV } result_form;
+
+extern const char *const where_words[]; /* OUT, IN, ON, MAYBE */
+
+void results_inside(result_text *t, result_form form, const ebpo_inside_result *results,
+                    uint64_t count);
+/* `limited`: lo and hi only. `sampler`, here and below: attributes follow the face; or NULL.
+ * `model`, likewise: [count] index of the model in the catalogue, UINT64_MAX for none; or NULL. */
+void results_distance(result_text *t, result_form form, bool limited,
+                      const ebpo_distance_result *results, uint64_t count,
+                      const ebpo_sampler *sampler, const uint64_t *model);
+/* Writes the nearest faces of one point in order: each with the text before it, then the text after
+ * the last one. */
+void results_near(result_text *t, result_form form, const ebpo_near_face *face, bool first,
+                  const ebpo_sampler *sampler);
+void results_near_end(result_text *t, result_form form, bool none, const ebpo_sampler *sampler);
+void results_ray_first(result_text *t, result_form form, const ebpo_ray *rays,
+                       const ebpo_ray_hit *hits, uint64_t count, const ebpo_sampler *sampler,
+                       const uint64_t *model);
+void results_ray_any(result_text *t, result_form form, const bool *any, uint64_t count);
+/* Writes the results of one ray. */
+void results_ray_all(result_text *t, result_form form, const ebpo_ray *ray,
+                     const ebpo_ray_hit *hits, uint64_t count, const ebpo_sampler *sampler);
+void results_box(result_text *t, result_form form, const uint64_t *faces, uint64_t count);
+
+/* Writes a line of names, which are separated by commas; `attributes`: at most RESULT_NAMES bytes
+ * of names, or NULL. */
+enum { RESULT_NAMES = 400 };
+void results_header(result_text *t, result_form form, const char *names, const char *attributes);
+
+/* Little-endian, as all raw results. */
+void raw_u64(FILE *out, uint64_t v);
+void raw_double(FILE *out, double v);
+
+#endif

@@ -1,0 +1,139 @@
+"""Converts a mesh to a file. Needs a library with libhdf5."""
+from __future__ import annotations
+
+import ctypes
+import os
+import warnings
+from typing import Any, Callable
+
+import numpy as np
+
+from . import _declared as c
+from ._checked import doubles, integers, path
+from ._library import Handle, Reporter, Struct, call, lib, made, size_in_bytes
+from .model import Model
+from .model import open as open_model
+
+PREPARE = ("weld", "orient", "fill_holes", "flip", "drop_duplicates", "weld_distance")
+BUILD = ("max_level", "leaf_faces", "epsilon", "require_solid", "seed", "unit", "crs", "date")
+PARTS = {"mesh": c.EBPO_PART_MESH, "maps": c.EBPO_PART_MAPS, "attributes": c.EBPO_PART_ATTRIBUTES,
+         "envelopes": c.EBPO_PART_PLANES, "leaf-planes": c.EBPO_PART_LEAF_PLANES, "colours": c.EBPO_PART_COLOURS}
+DEFAULT_PARTS = sum(PARTS.values()) & ~c.EBPO_PART_LEAF_PLANES
+NEEDS = {"maps": "mesh", "attributes": "mesh", "colours": "attributes"}
+CODECS = {"zstd": c.EBPO_CODEC_ZSTD, "deflate": c.EBPO_CODEC_DEFLATE, "none": c.EBPO_CODEC_NONE}
+RULES = {rule.name.lower(): int(rule) for rule in c.Rule}
+
+
+def convert(mesh: Any, output: Any, *, parts: Any = None, rule: str = "nonzero", codec: str = "zstd",
+            codec_level: int = 0, memory: int | str | None = None, temp_dir: Any = None,
+            threads: int | None = None, progress: Callable | None = None, **options: Any) -> Model:
+    """Converts a mesh to an .ebpo.h5 file, which is replaced atomically, and opens it.
+
+    mesh: the path of a PLY, OBJ, STL or OFF, or (vertices, faces): (v, 3) of float32, which stay such, or
+        anything that float64 takes, and (f, 3) integers.
+    parts: as `ebpo convert --parts`: "mesh,maps,attributes,envelopes,leaf-planes,colours", the parts to store,
+        or parts with minus signs, "-maps,-colours", to omit; or a list of such names. None: all but leaf-planes.
+    rule: "nonzero", "evenodd" or "positive": winding numbers that are inside.
+    codec: "zstd", "deflate" or "none".
+    memory: bytes that the process may take; the rest goes to temporary files in temp_dir. None: half
+        of the machine's.
+    options: weld, orient, fill_holes, flip, drop_duplicates, weld_distance: repair the mesh; max_level, leaf_faces,
+        epsilon, require_solid, seed, unit, crs, date as in ebpo_build_options, ebpo/build.h. Defaults are
+        those of the command `ebpo convert`, and so are the bytes of the file.
+
+    Warns of data that was lost while reading, such as digits that a PLY's floats do not keep.
+
+    Raises NotSolidError with require_solid, UnsupportedError where the library is one without libhdf5,
+    FormatError, IOFailure.
+
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> m = convert((corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]), "corner.ebpo.h5")
+    >>> m.info.solid, m.info.face_count
+    (True, 4)
+    """
+    unknown = set(options) - {*PREPARE, *BUILD}
+    if unknown:
+        raise TypeError(f"convert() has no option {', '.join(sorted(unknown))}")
+    if options.get("date") and not lib.ebpo_is_date(options["date"]):
+        raise ValueError(f"date: {options['date']!r} is not one as in ISO 8601 and in the calendar, such as 2026-11-26")
+    for what, given, known in (("rule", rule, RULES), ("codec", codec, CODECS)):
+        if given not in known:
+            raise ValueError(f"{what}: {', '.join(map(repr, known))}, not {given!r}")
+    stored = parts_of(parts)
+    call("ebpo_register_filters")  # a library without libhdf5 says now, not after hours, that it cannot write
+    call("ebpo_check_output", path(output, "output"))
+    space = made(c.ebpo_workspace_options, memory=size_in_bytes(memory),
+                 temp_dir=None if temp_dir is None else path(temp_dir, "temp_dir"))
+    workspace = Handle.made("ebpo_workspace_new", ctypes.byref(space), free="ebpo_workspace_free")
+    with Reporter(progress) as reported:
+        common = {"threads": threads or 0, "progress": reported}
+        read = read_mesh(mesh, workspace, bool(stored & c.EBPO_PART_ATTRIBUTES), common)
+        prepare = made(c.ebpo_prepare_options, **common, **{n: options[n] for n in PREPARE if n in options})
+        prepared = made(c.ebpo_prepared)
+        call("ebpo_mesh_prepare", read, ctypes.byref(prepare), ctypes.byref(prepared))
+        build = made(c.ebpo_build_options, parts=stored, rule=RULES[rule], **common,
+                     **{n: options[n] for n in BUILD if options.get(n) is not None})
+        tree = Struct(c.ebpo_tree, "ebpo_tree_free", workspace)
+        call("ebpo_build", read, ctypes.byref(prepared.report), ctypes.byref(prepared.record),
+             ctypes.byref(build), tree)
+        write = made(c.ebpo_write_options, codec=CODECS[codec], codec_level=codec_level, **common)
+        call("ebpo_tree_write", tree, path(output, "output"), ctypes.byref(write))
+    return open_model(output)
+
+
+def parts_of(parts: Any) -> int:
+    """Returns the bits of parts that are named as for `ebpo convert --parts`. ValueError: no such list."""
+    if parts is None:
+        return DEFAULT_PARTS
+    given = parts.split(",") if isinstance(parts, str) else list(parts)
+    omits = {name.startswith("-") for name in given}
+    names = {name[1:] if name.startswith("-") else name for name in given}
+    names = {"envelopes" if name == "planes" else name for name in names}  # as in Info.parts
+    if len(omits) != 1 or not names <= set(PARTS):
+        raise ValueError(f"parts: a list of {', '.join(PARTS)}, or of these with a minus sign before each, "
+                         f"not {','.join(given)!r}")
+    if omits == {True}:
+        names = {name for name, bit in PARTS.items() if bit & DEFAULT_PARTS} - names
+        for name, needed in NEEDS.items():  # in this order
+            names -= {name} if needed not in names else set()
+    for name in names & set(NEEDS):
+        if NEEDS[name] not in names:
+            raise ValueError(f"parts: {name} needs {NEEDS[name]}; add it, not {','.join(given)!r}")
+    return sum(PARTS[name] for name in names)
+
+
+def read_mesh(mesh: Any, workspace: Handle, attributes: bool, common: dict) -> Struct:
+    """An ebpo_mesh of a file, or of arrays."""
+    if isinstance(mesh, (str, bytes, os.PathLike)):
+        options = made(c.ebpo_mesh_read_options, attributes=attributes, workspace=workspace.pointer, **common)
+        read = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace)
+        call("ebpo_mesh_read", path(mesh, "mesh"), ctypes.byref(options), read)
+        ignored = lib.ebpo_mesh_ignored(read)
+        if ignored:
+            warnings.warn(f"{os.fsdecode(mesh)}: ignored in reading: {ignored.decode()}", stacklevel=3)
+        return read
+    vertices, faces = map(np.asarray, mesh)
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
+        raise ValueError(f"vertices are (v, 3) and faces (f, 3), not {vertices.shape} and {faces.shape}")
+    faces = integers(faces, np.uint32, "faces")
+    if faces.size and faces.max() >= len(vertices):
+        raise ValueError("a face names a vertex that is not there")
+    single = vertices.dtype == np.float32
+    read = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace, vertex_count=len(vertices), face_count=len(faces))
+    xyz = of_malloc(vertices if single else doubles(vertices, "vertices"))
+    setattr(read.c, "xyz32" if single else "xyz64", xyz)
+    read.c.faces = of_malloc(faces)
+    read.c.workspace = workspace.pointer
+    return read
+
+
+def of_malloc(values: np.ndarray) -> int:
+    """Returns a copy that free() frees."""
+    values = np.ascontiguousarray(values)
+    malloc = ctypes.CDLL(None).malloc
+    malloc.restype, malloc.argtypes = ctypes.c_void_p, [ctypes.c_size_t]
+    address = malloc(max(1, values.nbytes))
+    if not address:
+        raise MemoryError
+    ctypes.memmove(address, values.ctypes.data, values.nbytes)
+    return address

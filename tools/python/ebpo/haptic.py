@@ -1,0 +1,115 @@
+"""Haptics: force, distance, and a proxy path that passes through no face."""
+from __future__ import annotations
+
+import ctypes
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import _declared as c
+from ._checked import doubles
+from ._library import Handle, call, lib, of_members
+
+_STOPPED = c.EBPO_HAPTIC_STOPPED
+
+
+class HapticResult(NamedTuple):
+    """The result of a haptic step of a ball or a tool; see ebpo/haptic.h. face: -1 if none is near."""
+
+    proxy: np.ndarray
+    force: np.ndarray
+    torque: np.ndarray
+    turn: np.ndarray
+    normal: np.ndarray
+    depth: float
+    face: int
+    flags: int
+
+    @property
+    def stopped(self) -> bool:
+        """No more faces will be loaded: `Haptic.check` raises why."""
+        return bool(self.flags & _STOPPED)
+
+
+class ProbeResult(NamedTuple):
+    """The result of a haptic step of a probe: the distance (NaN if only its bounds are known), from lo to hi."""
+
+    distance: float
+    lo: float
+    hi: float
+    normal: np.ndarray
+    face: int
+    where: int
+    flags: int
+
+    @property
+    def stopped(self) -> bool:
+        """No more faces will be loaded: `Haptic.check` raises why."""
+        return bool(self.flags & _STOPPED)
+
+
+def _vector(values: Any, count: int) -> Any:
+    got = doubles(values, "place")
+    if got.shape != (count,):
+        raise ValueError(f"expected {count} numbers, got an array of shape {got.shape}")
+    return (ctypes.c_double * count)(*got)
+
+
+def _number(face: int) -> int:
+    return -1 if face == 2**64 - 1 else face
+
+
+class Haptic:
+    """A hand at `place`: a ball of `radius`, or with `points` (n, 3) a tool, or with `probe` a point that
+    nothing stops. Other options are those of ebpo_haptic_options. One thread at a time.
+
+    Loading goes on beside it; where `flags` has EBPO_HAPTIC_WAITING (2), the hand is ahead of that; where
+    a tick is `stopped`, no more will come.
+
+    >>> haptic = Haptic(cube, [.5, .5, 2], radius=.1, stiffness=100, damping=0)
+    >>> for step in range(200):
+    ...     result = haptic.step([.5, .5, 2 - .006 * step])
+    >>> haptic.check()
+    >>> bool(result.proxy[2] > 1.0999), result.stopped
+    (True, False)
+    """
+
+    def __init__(self, model: Any, place: Any, *, points: Any = None, probe: bool = False, **options: Any) -> None:
+        wanted = of_members(c.ebpo_haptic_options, options, points=None, point_count=0, kind=0)
+        if points is not None:
+            rows = doubles(points, "points")
+            if rows.ndim != 2 or rows.shape[1] != 3:
+                raise ValueError("points: expected an array of shape (n, 3)")
+            wanted.points, wanted.point_count, wanted.kind = rows.ctypes.data, len(rows), 2
+        elif probe:
+            wanted.kind = 1
+        self._handle = Handle.made("ebpo_haptic_new", model.model, ctypes.byref(wanted), _vector(place, 3),
+                                   free="ebpo_haptic_free", keep=(model.model,))
+
+    def step(self, device: Any) -> HapticResult:
+        """Computes a haptic step of a ball."""
+        r = c.ebpo_haptic_ball_result()
+        lib.ebpo_haptic_step_ball(self._handle, _vector(device, 3), ctypes.byref(r))
+        return HapticResult(np.array(r.proxy), np.array(r.force), np.zeros(3), np.array([0, 0, 0, 1.0]),
+                            np.array(r.normal), r.depth, _number(r.face), r.flags)
+
+    def step_tool(self, place: Any, quaternion: Any) -> HapticResult:
+        """Computes a haptic step of a tool; quaternions are x, y, z, w."""
+        r = c.ebpo_haptic_tool_result()
+        lib.ebpo_haptic_step_tool(self._handle, _vector(place, 3), _vector(quaternion, 4), ctypes.byref(r))
+        return HapticResult(np.array(r.proxy), np.array(r.force), np.array(r.torque), np.array(r.turn),
+                            np.array(r.normal), r.depth, _number(r.face), r.flags)
+
+    def step_probe(self, place: Any) -> ProbeResult:
+        """Computes a haptic step of a probe."""
+        r = c.ebpo_haptic_probe_result()
+        lib.ebpo_haptic_step_probe(self._handle, _vector(place, 3), ctypes.byref(r))
+        return ProbeResult(r.distance, r.lo, r.hi, np.array(r.normal), _number(r.face), r.where, r.flags)
+
+    def reset(self, place: Any) -> None:
+        """Moves the device and the proxy to another position, without contact."""
+        call("ebpo_haptic_reset", self._handle, _vector(place, 3))
+
+    def check(self) -> None:
+        """Raises the error that stopped loading of faces, if any."""
+        call("ebpo_haptic_check", self._handle)

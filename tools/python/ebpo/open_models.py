@@ -1,0 +1,116 @@
+"""Keeps models of a process open between queries, within one memory budget."""
+from __future__ import annotations
+
+import ctypes
+import os
+from typing import Any
+
+from . import _declared as c
+from ._library import Handle, lib, made, size_in_bytes, text
+from .errors import BY_STATUS, Error
+from .sources import opened, shown
+
+BUDGET = 1 << 30
+CODES = {kind: code for code, kind in BY_STATUS.items()}
+IO, CANCELLED = -3, -9
+ENTRY: dict = {name: kind for name, kind in c.ebpo_catalogue_options._fields_}
+
+_files: dict[int, Handle] = {}  # that the library has open, by their addresses
+_options: list[dict] = []  # of catalogues; an opener's number is a place here, from 1 on
+_numbers: dict[str, int] = {}
+_raised: dict[str, BaseException] = {}  # what is no failure of the library, by its message
+
+
+def opener(options: dict) -> int:
+    """The number by which catalogues with these options of URLs know how files are opened."""
+    key = repr(sorted(options.items()))
+    if key not in _numbers:
+        _options.append(options)
+        _numbers[key] = len(_options)
+    return _numbers[key]
+
+
+def opened_by(name: str, options: dict) -> Handle:
+    """An ebpo_file. Options are those of URLs; long work waits for servers that are away for some minutes."""
+    http: dict = {}
+    if "://" in name:
+        http = dict(options)
+        if name.startswith(("http://", "https://")) and "storage_options" not in options:
+            http = {"time_limit": 300.0, "retries": 60, **options}
+    storage, expansion = http.pop("storage_options", None), http.pop("max_expansion", None)
+    return opened(name, http, storage, expansion or 0)
+
+
+def _open_file(number: int, path: bytes, out: int, error: int) -> int:
+    """For the library, in any thread."""
+    try:
+        file = opened_by(os.fsdecode(path), _options[number - 1])
+        _files[file.pointer.value] = file
+        ctypes.c_void_p.from_address(out).value = file.pointer.value
+        return 0
+    except BaseException as raised:
+        struct = c.ebpo_error.from_address(error) if error else made(c.ebpo_error)
+        code = CODES.get(type(raised), CANCELLED if isinstance(raised, KeyboardInterrupt) else IO)
+        said = str(raised) if type(raised) in CODES else f"{type(raised).__name__}: {raised}"
+        struct.status, struct.message = code, shown(said)[:479]
+        if isinstance(raised, Error):
+            struct.file, struct.object = shown(raised.file)[:255], shown(raised.object)[:63]
+        if type(raised) not in CODES:
+            _raised[text(struct.message)] = raised
+        return code
+
+
+def _close_file(_number: int, file: int) -> None:
+    _files.pop(file, None)
+
+
+OPEN_FILE, CLOSE_FILE = ENTRY["open_file"](_open_file), ENTRY["close_file"](_close_file)
+
+
+def raised_by(error: Error) -> BaseException:
+    """What was raised in a function that opened a file, of the failure that came of it."""
+    return _raised.pop(str(error), error)
+
+
+class OpenModels:
+    """Models of catalogues that stay open, the least recently asked goes first. Any number of threads.
+
+    memory: bytes for all of them together.
+    """
+
+    def __init__(self, memory: int | str | None = None) -> None:
+        self._memory = size_in_bytes(memory) or BUDGET
+        options = made(c.ebpo_catalogue_models_options, memory=self._memory)
+        self.models = Handle.made("ebpo_catalogue_models_new", ctypes.byref(options), free="ebpo_catalogue_models_free")
+
+    @property
+    def memory(self) -> int:
+        return self._memory
+
+    @memory.setter
+    def memory(self, size: int | str) -> None:
+        self._memory = size_in_bytes(size) or BUDGET
+        lib.ebpo_catalogue_models_set_memory(self.models, self._memory)
+
+    def stats(self) -> dict[str, int]:
+        """Since the process began: opened, closed: models; bytes_read, reads, loads, hits, evicted: as in
+        `Model.stats`, of all of them; now: open, memory (bytes)."""
+        counts, sums = made(c.ebpo_catalogue_models_stats), made(c.ebpo_model_stats)
+        lib.ebpo_catalogue_models_get_stats(self.models, ctypes.byref(counts), ctypes.byref(sums))
+        stats = {name: getattr(sums, name) for name in ("bytes_read", "reads", "loads", "hits", "evicted", "memory")}
+        return dict(stats, opened=counts.opened, closed=counts.closed, open=counts.open)
+
+    def clear(self) -> None:
+        """Closes models that are not in use."""
+        lib.ebpo_catalogue_models_close_idle(self.models)
+
+
+_process_models = OpenModels()
+_process_models.models._end.detach()  # it ends with the process; threads may still be asking
+
+
+def process_models(memory: int | str | None = None) -> OpenModels:
+    """That of this process. A budget that is given holds from now on."""
+    if memory is not None:
+        _process_models.memory = memory
+    return _process_models

@@ -1,0 +1,243 @@
+"""Paint on a model: strokes, layers and notes in a separate file."""
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+from typing import Any, Callable, Iterator, NamedTuple
+
+import numpy as np
+
+from . import _declared as c
+from ._checked import doubles
+from ._checked import path as path_in_c
+from ._library import Callback, Handle, Reporter, call, copied, lib, made, of_members, text
+from .model import Model
+
+POINT = np.dtype(c.ebpo_paint_point)
+FACE = np.dtype(c.ebpo_paint_face)
+AREA = np.dtype(c.ebpo_paint_area)
+
+
+class Stroke(NamedTuple):
+    """layer: its number; kind: a PaintKind; colour: 0xRRGGBBAA; radius: of points of full size, in the
+    model's unit; time: milliseconds since 1970, 0: not known; points: structured as ebpo_paint_point."""
+
+    layer: int
+    kind: Any
+    colour: int
+    radius: float
+    time: int
+    points: np.ndarray
+
+
+class Areas(NamedTuple):
+    """In the model's unit, squared, each as lo, value, hi: the area is from lo to hi.
+
+    all: of all layers, (). layers, strokes: of each, structured arrays.
+    """
+
+    all: np.ndarray
+    layers: np.ndarray
+    strokes: np.ndarray
+
+
+class Paint:
+    """Paint on a model, which is never changed. Made by `Paint(model)`, or `Paint.open` of a file.
+
+    The rules are those of ebpo/paint.h. Several threads may read it while none changes it.
+
+    >>> paint = Paint(cube)
+    >>> layer = paint.add_layer(title="Cracks", colour=0x3366ffff)
+    >>> paint.draw(cube, [[.2, .5, 1, 1], [.8, .5, 1, 1]], layer=layer, radius=.1)["strokes"]
+    1
+    >>> area = paint.measure(cube).all
+    >>> bool(area["lo"] <= .12 + .01 * np.pi <= area["hi"] * 1.1)
+    True
+    """
+
+    def __init__(self, model: Model | None = None, *, _handle: Handle | None = None) -> None:
+        if _handle is None:
+            if model is None:
+                raise TypeError("Paint() takes the model that it is on")
+            _handle = Handle.made("ebpo_paint_new", model.file, free="ebpo_paint_free")
+        self._held: Handle | None = _handle
+
+    @property
+    def _handle(self) -> Handle:
+        if self._held is None:
+            raise ValueError("the change of this paint ended with an exception; open it again")
+        return self._held
+
+    @classmethod
+    def open(cls, source: Any) -> Paint:
+        """Of a path, or the bytes of a file. FormatError, VersionError, IOFailure."""
+        if isinstance(source, (str, os.PathLike)):
+            return cls(_handle=Handle.made("ebpo_paint_open", path_in_c(source), free="ebpo_paint_free"))
+        data = np.frombuffer(source, np.uint8)
+        return cls(_handle=Handle.made("ebpo_paint_open_memory", data.ctypes.data, data.nbytes, None,
+                                       free="ebpo_paint_free"))
+
+    @classmethod
+    @contextlib.contextmanager
+    def change(cls, path: Any, model: Model | None = None, *, wait: float = 60) -> Iterator[Paint]:
+        """For `with`: opens a file, and saves it at the end, unless something was raised.
+
+        Others who open it so, in any process or thread, wait until then, up to `wait` seconds (IOFailure):
+        changes follow each other, and none is lost. See ebpo_paint_open_to_change.
+
+        model: where there is no file, the paint is a new one for this model; the paint of a file is checked
+        as by `check` with points.
+
+        >>> for title in "Cracks", "Repairs":
+        ...     with Paint.change("cube.paint.h5", cube) as paint:
+        ...         _ = paint.add_layer(title=title)
+        >>> len(Paint.open("cube.paint.h5").layers)
+        2
+        """
+        path = os.path.abspath(path)  # the same at the end
+        paint = cls(_handle=Handle.made("ebpo_paint_open_to_change", path_in_c(path),
+                                        None if model is None else model.file, wait, None, free="ebpo_paint_free"))
+        try:
+            if model is not None:
+                paint.check(model, points=True)
+            yield paint
+        except BaseException:
+            paint._handle._end()  # now, and not with the traceback: others wait
+            paint._held = None
+            raise
+        paint.save(path)
+
+    def save(self, path: Any) -> None:
+        """Whole or not at all. UnsupportedError: the library is one without libhdf5.
+
+        IOFailure: another program or Paint has changed the file that this one is of, since it was read
+        from it or saved there. Open it again and repeat the change, or save to another path.
+        """
+        call("ebpo_paint_save", self._handle, path_in_c(path))
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """Members of ebpo_paint_info: layer_count, stroke_count, note_count, point_count, model_sha256, ..."""
+        return facts(self._got("ebpo_paint_get_info", c.ebpo_paint_info))
+
+    def check(self, model: Model, *, points: bool = False) -> None:
+        """Raises ArgumentError if it is paint of another model; with `points`, FormatError if a point or note is
+        not on its face."""
+        call("ebpo_paint_check_model", self._handle, model.file)
+        if points:
+            with model._context() as context:
+                call("ebpo_paint_check_points", self._handle, context, None)
+
+    def _got(self, function: str, kind: Any, *number: int) -> Any:
+        struct = made(kind)
+        if getattr(lib, function)(self._handle, *number, ctypes.byref(struct)) != 0:
+            raise IndexError(f"there is no number {number[0]}")
+        return struct
+
+    # ---- layers, notes, strokes ----
+
+    @property
+    def layers(self) -> list[dict]:
+        """Of each: title, author, date, description, colour (0xRRGGBBAA), opacity (0 to 255), visible (0, 1)."""
+        return [facts(self._got("ebpo_paint_get_layer", c.ebpo_paint_layer, i)) for i in range(self.info["layer_count"])]
+
+    def add_layer(self, **members: Any) -> int:
+        """Adds a layer above all others. Returns its number."""
+        number = ctypes.c_uint64()
+        call("ebpo_paint_add_layer", self._handle, ctypes.byref(of_members(c.ebpo_paint_layer, members)),
+             ctypes.byref(number))
+        return number.value
+
+    def remove_layer(self, number: int) -> None:
+        """Removes a layer with its strokes and notes."""
+        call("ebpo_paint_remove_layer", self._handle, number)
+
+    @property
+    def notes(self) -> list[dict]:
+        """Of each: title, author, date, body, layer, and `at`, structured as ebpo_paint_point."""
+        return [facts(self._got("ebpo_paint_get_note", c.ebpo_paint_note, i)) for i in range(self.info["note_count"])]
+
+    def add_note(self, model: Model, place: Any, *, layer: int = 0, **texts: Any) -> None:
+        """At the point of the surface nearest to a place. texts: title, author, date, body."""
+        note = of_members(c.ebpo_paint_note, {**texts, "layer": layer})
+        at = doubles(place, "a place")
+        if at.shape != (3,):
+            raise ValueError("a place has three numbers")
+        with model._context() as context:
+            call("ebpo_paint_locate", self._handle, context, at.ctypes.data, ctypes.byref(note.at))
+        call("ebpo_paint_add_note", self._handle, ctypes.byref(note))
+
+    def remove_note(self, number: int) -> None:
+        """Removes a note. Later notes get the next lower numbers."""
+        call("ebpo_paint_remove_note", self._handle, number)
+
+    @property
+    def strokes(self) -> list[Stroke]:
+        """Returns the strokes in the order in which they were made."""
+        out = []
+        for i in range(self.info["stroke_count"]):
+            s = self._got("ebpo_paint_get_stroke", c.ebpo_paint_stroke, i)
+            out.append(Stroke(s.layer, c.PaintKind(s.kind), s.colour, s.radius, s.time,
+                              copied(s.points, (s.point_count,), POINT)))
+        return out
+
+    def remove_stroke(self, number: int) -> None:
+        """Removes a stroke. Removing the last stroke is an undo."""
+        call("ebpo_paint_remove_stroke", self._handle, number)
+
+    def draw(self, model: Model, input: Any, *, progress: Callable | None = None, **pen: Any) -> dict[str, int]:
+        """Adds strokes along the path of a haptic device.
+
+        input: (n, 4), places and pressures of 0 to 1, or (n, 5), with milliseconds.
+        pen: members of ebpo_paint_pen: radius, which is needed, layer, colour, spread, density, seed, ...
+
+        Returns members of ebpo_paint_drawn: strokes, points, steps, lifted, strayed.
+        """
+        rows = doubles(input, "input")
+        if rows.ndim != 2 or rows.shape[1] not in (4, 5):
+            raise ValueError(f"input has the shape (n, 4) or (n, 5), not {rows.shape}")
+        way = np.zeros((len(rows), 5))
+        way[:, :rows.shape[1]] = rows
+        drawn = made(c.ebpo_paint_drawn)
+        with Reporter(progress) as reported, model._context() as context:
+            given = of_members(c.ebpo_paint_pen, pen, progress=reported)
+            call("ebpo_paint_draw", self._handle, context, way.ctypes.data, len(way), ctypes.byref(given),
+                 ctypes.byref(drawn))
+        return facts(drawn)
+
+    # ---- answers ----
+
+    def cover(self, model: Model, stroke: int) -> np.ndarray:
+        """Returns the faces that a stroke covers: structured as ebpo_paint_face, in the order of the file."""
+        found = bytearray()
+
+        def take(_user: int, face: int) -> bool:
+            found.extend(ctypes.string_at(face, FACE.itemsize))
+            return True
+
+        with model._context() as context, Callback(c.ebpo_paint_face_fn, take) as taking:
+            call("ebpo_paint_cover", self._handle, context, stroke, taking, None, None)
+        return np.frombuffer(bytes(found), FACE)
+
+    def measure(self, model: Model, *, fineness: int = 256, progress: Callable | None = None) -> Areas:
+        """Returns the painted areas; see ebpo_paint_measure."""
+        areas = made(c.ebpo_paint_areas)
+        with Reporter(progress) as reported, model._context() as context:
+            options = made(c.ebpo_paint_options, fineness=fineness, threads=model._threads, progress=reported)
+            call("ebpo_paint_measure", self._handle, context, ctypes.byref(options), ctypes.byref(areas))
+        info = self.info
+        out = Areas(np.array(areas.all), copied(areas.layers, (info["layer_count"],), AREA),
+                    copied(areas.strokes, (info["stroke_count"],), AREA))
+        lib.ebpo_paint_areas_free(ctypes.byref(areas))
+        return out
+
+
+def facts(struct: Any) -> dict[str, Any]:
+    out = {}
+    for name, _ in struct._fields_:
+        value = getattr(struct, name)
+        if name not in ("struct_size", "reserved"):
+            out[name] = text(value) if isinstance(value, bytes) else \
+                np.array(value) if isinstance(value, ctypes.Structure) else value
+    return out

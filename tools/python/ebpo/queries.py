@@ -1,0 +1,185 @@
+"""Runs many queries on all cores: blocks of rows, a context for each thread."""
+from __future__ import annotations
+
+import ctypes
+import itertools
+import os
+import threading
+from typing import Any, Callable, Iterator
+
+import numpy as np
+
+from ._checked import doubles, integer_as
+
+# Rows whose answers stay in a core's cache until they have been put where they belong; and so many that
+# Python's lock, which is taken after each block, does not matter.
+BLOCK = 1 << 15
+thread_count = integer_as(ctypes.c_uint)
+
+
+CODES = "codes of the .ebpo.h5 format; Model.mesh() gives the vertices"
+
+
+def holds_codes(values: Any) -> bool:
+    """Returns True for an array of an .ebpo.h5 file that has a coding; files of others may use that word too."""
+    if "coding" not in getattr(values, "attrs", ()):
+        return False
+    root = getattr(getattr(values, "file", None), "attrs", None)  # of a dataset of h5py
+    if root is None:
+        return True
+    name = root.get("format", "")
+    return (name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)).startswith("EBP-Octree")
+
+
+def cores() -> int:
+    """Returns the number of processors that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1
+
+
+class Rows:
+    """Points, or anything of three columns, as contiguous doubles block by block.
+
+    What is that already is not copied. Anything with a shape and slices will do.
+    """
+
+    def __init__(self, values: Any, what: str = "points") -> None:
+        if not hasattr(values, "shape") or not hasattr(values, "dtype"):
+            values = np.asarray(values)
+        shape = tuple(values.shape)
+        if shape == (0,):
+            values = np.zeros((0, 3))
+        self.single = shape == (3,)
+        if self.single:
+            values = np.asarray(values)[None, :]
+        elif tuple(values.shape)[1:] != (3,):
+            raise ValueError(f"{what} have the shape (n, 3), or (3,) for a single one, not {shape}")
+        if np.dtype(values.dtype).kind not in "fiuO":
+            raise TypeError(f"{what}: expected real numbers, got {values.dtype}")
+        if holds_codes(values):
+            raise TypeError(f"{what}: expected real numbers, got {CODES}")
+        self.values, self.what, self.count = values, what, int(values.shape[0])
+
+    def __getitem__(self, part: slice) -> np.ndarray:
+        return doubles(self.values[part], self.what)
+
+    def check(self, begin: int, end: int) -> None:
+        """The library numbers the points of a block; here the one that is not finite has its own number."""
+        bad = ~np.isfinite(self[begin:end]).all(axis=1)
+        if bad.any():
+            number = begin + int(bad.argmax())
+            from .errors import ArgumentError
+            raise ArgumentError(f"{self.what}: number {number} has a coordinate that is not a finite number",
+                                "EBPO_E_ARGUMENT")
+
+
+class StageProgress:
+    """Progress over all threads, reported by the querying thread."""
+
+    def __init__(self, progress: Callable | None, stage: str, total: int) -> None:
+        self.progress, self.stage, self.total = progress, stage, total
+
+    def __call__(self, done: int) -> None:
+        if self.progress is not None and self.progress(self.stage, done, self.total) is False:
+            from .errors import Cancelled
+            raise Cancelled(f"{self.stage} was stopped by the progress callback", "EBPO_E_CANCELLED")
+
+
+def block_of(count: int, threads: int) -> int:
+    """Returns the block size: a few blocks for each thread, none larger than BLOCK."""
+    return max(64, min(BLOCK, -(-count // (8 * threads))))
+
+
+def share(count: int, threads: int | None, worker: Callable[[], Any], progress: Callable | None = None,
+          stage: str = "querying") -> None:
+    """Processes rows 0 to count - 1 block by block.
+
+    worker() is a context manager that gives a function work(begin, end); each thread has its own. The
+    calling thread is one of them. Of several failures the one of the first block is raised.
+    """
+    threads = thread_count(threads or cores(), "threads")
+    size = block_of(count, threads)
+    blocks = -(-count // size)
+    numbers: Iterator[int] = itertools.count()
+    lock, finished = threading.Lock(), [0]
+    failed: dict[int, Any] = {}
+    report_total = StageProgress(progress, stage, count)
+
+    def run(report: Callable[[int], None] | None) -> None:
+        number = -1
+        try:
+            with worker() as work:
+                while not failed:
+                    with lock:
+                        number = next(numbers)
+                    if number >= blocks:
+                        return
+                    begin = number * size
+                    end = min(count, begin + size)
+                    work(begin, end)
+                    with lock:
+                        finished[0] += end - begin
+                    if report:
+                        report(finished[0])
+        except BaseException as error:
+            failed[number] = error
+
+    others = [threading.Thread(target=run, args=(None,), daemon=True) for _ in range(min(threads, blocks) - 1)]
+    if count:
+        report_total(0)
+    for thread in others:
+        thread.start()
+    run(report_total if progress else None)
+    try:
+        for thread in others:
+            thread.join()
+    except BaseException:  # interrupted: the others end with their blocks
+        failed[-1] = None
+        raise
+    if failed:
+        raise failed[min(failed)]
+    if count:
+        report_total(count)
+
+
+def bar(make: Callable[..., Any], **options: Any) -> Callable[[str, int, int], bool]:
+    """Returns a progress callback for bars like those of tqdm: `progress=ebpo.bar(tqdm.tqdm)`.
+
+    make(total=, desc=, **options) gives a bar with update(n) and close(); each stage has its own.
+
+    >>> class Line:
+    ...     def __init__(self, total, desc): print(desc, total)
+    ...     def update(self, n): print("+", n)
+    ...     def close(self): print("done")
+    >>> report = bar(Line)
+    >>> for done in (0, 3, 4):
+    ...     _ = report("inside", done, 4)
+    inside 4
+    + 3
+    + 1
+    done
+    """
+    now: dict[str, Any] = {}
+
+    def close() -> None:
+        if now:
+            now.pop("bar").close()
+            now.clear()
+
+    def report(stage: str, done: int, total: int) -> bool:
+        if now and now["stage"] != stage:
+            close()
+        if not now:
+            if total and done >= total:
+                return True  # reported again after the bar was closed
+            now.update(stage=stage, done=0, bar=make(total=total or None, desc=stage, **options))
+        if done > now["done"]:
+            now["bar"].update(done - now["done"])
+            now["done"] = done
+        if total and done >= total:
+            close()
+        return True
+
+    return report

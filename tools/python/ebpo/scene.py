@@ -1,0 +1,110 @@
+"""Scenes: rigid instances of models, which may be animated."""
+from __future__ import annotations
+
+import ctypes
+import threading
+from typing import Any, Callable, Iterator
+
+import numpy as np
+
+from . import _declared as c
+from ._checked import path as path_in_c
+from ._library import Handle, Reporter, call, lib, made, size_in_bytes, text
+from .collide import PAIR, Gathered, Pairs, matrix_of
+
+CLASH = np.dtype(c.ebpo_scene_clash)
+CLOSE = np.dtype(c.ebpo_scene_pair)
+
+
+def open_scene(path: Any, *, memory: int | str | None = None, allow_outside: bool = False, remote: bool = False,
+               progress: Callable | None = None) -> Scene:
+    """Opens a scene file (format-spec/scene.md), and the heads of its models' files.
+
+    memory: bytes for all models that are asked questions, together. None: as much as they need.
+    allow_outside: files that it names may lie anywhere, not only in its folder or below it.
+    remote: models on web servers may be named.
+    """
+    options = made(c.ebpo_scene_options, outside=allow_outside, remote=remote)
+    handle = Handle.made("ebpo_scene_open", path_in_c(path), ctypes.byref(options), free="ebpo_scene_free")
+    with Reporter(progress) as reported:
+        load = made(c.ebpo_load_options, memory=size_in_bytes(memory), progress=reported)
+        call("ebpo_scene_load", handle, ctypes.byref(load))
+    return Scene(handle)
+
+
+class Scene:
+    """An open scene. Made by `open_scene`. One thread asks at a time; others wait.
+
+    models, instances: lists of names; numbers of instances are places in the list.
+    begin, end: from the first time of any route to the last, in the scene's seconds.
+    """
+
+    def __init__(self, handle: Handle) -> None:
+        self._handle, self._lock = handle, threading.Lock()
+        counts = made(c.ebpo_scene_counts)
+        lib.ebpo_scene_get_counts(handle, ctypes.byref(counts))
+        self.begin, self.end = counts.begin, counts.end
+        self.models = list(self._names(c.ebpo_scene_model_facts, "ebpo_scene_get_model", counts.models))
+        self.instances = list(self._names(c.ebpo_scene_instance, "ebpo_scene_get_instance", counts.instances))
+
+    def _names(self, kind: Any, function: str, count: int) -> Iterator[str]:
+        for number in range(count):
+            facts = made(kind)
+            getattr(lib, function)(self._handle, number, ctypes.byref(facts))
+            yield text(facts.name)
+
+    def _number(self, instance: Any) -> Any:
+        return self.instances.index(instance) if isinstance(instance, str) else instance
+
+    def pose(self, instance: Any, time: float = 0.0) -> np.ndarray:
+        """Where an instance, a number or a name, is at a time: a (4, 4) matrix."""
+        out = c.ebpo_pose()
+        with self._lock:
+            call("ebpo_scene_pose", self._handle, self._number(instance), time, ctypes.byref(out))
+        return matrix_of(out)
+
+    def box(self, begin: float | None = None, end: float | None = None) -> np.ndarray:
+        """Returns a box (2, 3) that contains all instances at all times of begin to end; by default all times."""
+        out = np.empty((2, 3))
+        with self._lock:
+            call("ebpo_scene_box", self._handle, *self._times(begin, end), out.ctypes.data, out[1:].ctypes.data)
+        return out
+
+    def _times(self, begin: float | None, end: float | None) -> tuple[float, float]:
+        return self.begin if begin is None else begin, self.end if end is None else end
+
+    def pairs(self, begin: float | None = None, end: float | None = None) -> np.ndarray:
+        """Pairs whose boxes come within their clearance at some time: a structured array of a, b and
+        clearance, ascending. No other pair comes that close."""
+        found = Gathered(c.ebpo_scene_pairs_fn, CLOSE)
+        with self._lock, found as taking:
+            call("ebpo_scene_pairs", self._handle, *self._times(begin, end), taking, None)
+        return found.array
+
+    def clashes(self, time: float = 0.0, *, count: bool = False, places: bool = False, relate: bool = False,
+             depth: float = 0.0, threads: int | None = None, progress: Callable | None = None) -> np.ndarray:
+        """Pairs of instances that meet at a time, or are nearer than their clearance.
+
+        count: all pairs of faces, and lines. places: tell where. relate: tell how solids lie to each
+        other. depth: tell how deep, within so much.
+
+        Returns a structured array with the members of ebpo_scene_clash in ebpo/scene.h: a, b, kind (a
+        ClashKind), relation (a Relation), face_a, face_b, distance, place ...
+        """
+        found = Gathered(c.ebpo_scene_clashes_fn, CLASH)
+        with self._lock, Reporter(progress) as reported, found as taking:
+            options = made(c.ebpo_scene_clash_options, progress=reported, threads=threads or 0, count=count,
+                           places=places, relate=relate, depth=depth)
+            call("ebpo_scene_find_clashes", self._handle, time, ctypes.byref(options), taking, None, None)
+        return found.array
+
+    def collide(self, a: Any, b: Any, time: float = 0.0, *, threads: int | None = None) -> Pairs:
+        """Returns every pair of faces of two instances that intersect at a time."""
+        found = Gathered(c.ebpo_pairs_fn, PAIR)
+        with self._lock, found as taking:
+            call("ebpo_scene_collide", self._handle, self._number(a), self._number(b), time, threads or 0, taking, None)
+        pairs = found.array
+        return Pairs(pairs["face_a"].astype(np.int64), pairs["face_b"].astype(np.int64), pairs["kind"].copy())
+
+    def __repr__(self) -> str:
+        return f"<ebpo.Scene: {len(self.instances)} instances of {len(self.models)} models>"
