@@ -34,9 +34,9 @@ typedef struct ebpo_catalogue_held ebpo_catalogue_held;
 typedef ebpo_status (*ebpo_catalogue_query)(ebpo_context *context, const ebpo_catalogue_held *model,
                                             void *user, ebpo_error *error);
 
-/* Calls `ask` with a model, or the part of it that rays and distances use, when memory is
- * available. Where its budget is too small for several threads, calls `ask` again, alone. Returns
- * the errors of ebpo/catalogue.h for opening. */
+/* Calls `run_query` with a model, or the part of it that rays and distances use, when memory is
+ * available. Where its budget is too small for several threads, calls `run_query` again, alone.
+ * Returns the errors of ebpo/catalogue.h for opening. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models,
                                               const ebpo_catalogue *c, uint64_t number,
                                               bool surface, ebpo_catalogue_query run_query,

@@ -25,8 +25,8 @@ typedef struct ebpo_polyhedra {
     double volume;
 } ebpo_polyhedra;
 
-/* Appends the polytope (cell coordinates) of a cell's node as triangle fans. With `walls` false,
- * omits the polygons on cell faces. */
+/* Appends the polytope (cell coordinates) of a cell's node as triangle fans. With `cell_faces`
+ * false, omits the polygons on cell faces. */
 EBPO_MUST_USE ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_polytope *p,
                                              const ebpo_box *box, ebpo_cell cell,
                                              ebpo_node_type type, bool cell_faces,

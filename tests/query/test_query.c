@@ -22,7 +22,7 @@ START_TEST(test_difficult_points_match_brute_force)
     query_model m;
     query_model_make(&m, query_solid_name(solid), query_solid_make(solid),
                      &query_variants[variant]);
-    query_query(&m, query_scaled(points_for(m.name, m.mesh.face_count)), (uint64_t)_i);
+    query_one(&m, query_scaled(points_for(m.name, m.mesh.face_count)), (uint64_t)_i);
     query_model_free(&m);
 }
 END_TEST

@@ -39,7 +39,7 @@ static bool query_ends(query_model *m, ebpo_context *context, const query_ray *r
     for (int i = -1; i <= 1 && isfinite(t); i++) {
         query_ray cut = *r;
         cut.t_max = i < 0 ? fmax(0, nextafter(t, -INFINITY)) : i > 0 ? nextafter(t, INFINITY) : t;
-        good &= query_query_ray(m, context, &cut);
+        good &= query_one_ray(m, context, &cut);
     }
     return good;
 }
@@ -56,7 +56,7 @@ START_TEST(test_rays_match_brute_force)
     for (uint64_t i = 0; i < count && wrong < 3; i++) {
         query_ray r;
         some_ray(&m, &state, &r);
-        wrong += !query_query_ray(&m, m.context, &r);
+        wrong += !query_one_ray(&m, m.context, &r);
         if (i % 8 == 0)
             wrong += !query_ends(&m, m.context, &r);
     }
@@ -86,7 +86,7 @@ START_TEST(test_rays_same_in_all_load_modes)
             for (uint64_t i = 0; i < query_scaled(60) && wrong == 0; i++) {
                 query_ray r;
                 some_ray(&m, &state, &r);
-                wrong += !query_query_ray(&m, context, &r);
+                wrong += !query_one_ray(&m, context, &r);
             }
             ck_assert_uint_eq(wrong, 0);
             ebpo_context_free(context);

@@ -60,7 +60,7 @@ typedef struct degenerate_result {
     char fault[640]; /* reason why it is not stable; "": it is */
 } degenerate_result;
 
-/* Builds, writes and verifies, queries `questions` points and a quarter as many rays; `fault`
+/* Builds, writes and verifies, queries `queries` points and a quarter as many rays; `fault`
  * describes a failure. */
 void degenerate_run(const degenerate_case *c, uint64_t queries, degenerate_result *out);
 /* Only checks and builds; the mesh is consumed. */

@@ -120,7 +120,7 @@ static void query_rays(query_model *m, uint64_t count, degenerate_result *r)
             if (!isfinite(ray.direction[k]))
                 ray.direction[k] = copysign(DBL_MAX, ray.direction[k]);
         }
-        r->wrong += !query_query_ray(m, m->context, &ray);
+        r->wrong += !query_one_ray(m, m->context, &ray);
         r->queried++;
     }
 }

@@ -375,7 +375,7 @@ static bool query_sides(query_model *m, ebpo_context *context, const query_ray *
            any == (n > 0);
 }
 
-bool query_query_ray(query_model *m, ebpo_context *context, const query_ray *r)
+bool query_one_ray(query_model *m, ebpo_context *context, const query_ray *r)
 {
     const oracle_hit *expected;
     const ebpo_ray_hit *hits;
@@ -402,7 +402,7 @@ bool query_query_ray(query_model *m, ebpo_context *context, const query_ray *r)
     return hits_fit(m, r, expected, n, hits, count) && query_sides(m, context, r, expected, n);
 }
 
-void query_query(query_model *m, uint64_t count, uint64_t seed)
+void query_one(query_model *m, uint64_t count, uint64_t seed)
 {
     enum { BATCH = 512 };
     double *points = query_capacity(count, 3 * sizeof *points);

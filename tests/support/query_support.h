@@ -103,7 +103,7 @@ uint64_t query_wrong_limited_distance(const query_model *m, const double *points
 
 /* Queries `count` hard points of `seed` in batches, inside and distance; fails the test on a wrong
  * result. */
-void query_query(query_model *m, uint64_t count, uint64_t seed);
+void query_one(query_model *m, uint64_t count, uint64_t seed);
 
 /* Returns the index that queries return for a face of the file. */
 uint64_t query_reported(const query_model *m, uint32_t face);
@@ -113,7 +113,7 @@ uint64_t query_reported(const query_model *m, uint32_t face);
 typedef struct query_ray {
     double origin[3], direction[3], t_max;
 } query_ray;
-bool query_query_ray(query_model *m, ebpo_context *context, const query_ray *r);
+bool query_one_ray(query_model *m, ebpo_context *context, const query_ray *r);
 
 /* Returns EBPO_TEST_SCALE times `count`, at least 1; a tenth with sanitizers. */
 uint64_t query_scaled(uint64_t count);

@@ -26,7 +26,7 @@ static ebpo_mesh sphere_at(double x, double radius)
 
 static ebpo_mesh make_tetrahedron(void) { return ebpo_test_tetrahedron(1); }
 static ebpo_mesh make_cube(void) { return cube_at(0.1, 0.2, 0.3, 1, 1); }
-static ebpo_mesh make_cube_in_cell_cell_faces(void) { return cube_at(-4, -4, -4, 8, 8); }
+static ebpo_mesh make_cube_in_cell_faces(void) { return cube_at(-4, -4, -4, 8, 8); }
 static ebpo_mesh make_sphere(void) { return sphere_at(0, 1); }
 static ebpo_mesh make_torus(void) { return ebpo_test_torus(2, 0.7, 24, 12); }
 static ebpo_mesh make_cone_slivers(void) { return ebpo_test_cone(1, 3, 1000); }
@@ -191,7 +191,7 @@ const ebpo_test_solid ebpo_test_solids[] = {
     { "tetrahedron", make_tetrahedron, true, true, 1.0 / 6 },
     { "cube", make_cube, true, true, 1 },
     { "cube_float", make_cube_float, true, true, 8 },
-    { "cube_in_cell_walls", make_cube_in_cell_cell_faces, true, true, 512 },
+    { "cube_in_cell_walls", make_cube_in_cell_faces, true, true, 512 },
     { "box_subdivided", make_box_subdivided, true, true, 1.5 },
     { "sphere", make_sphere, true, true, NAN },
     { "sphere_float", make_sphere_float, true, true, NAN },

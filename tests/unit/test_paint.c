@@ -571,19 +571,20 @@ END_TEST
 
 /* --- a device --- */
 
-enum { HAND = 40 };
+enum { INPUT = 40 };
 
 static ebpo_paint_drawn laid_by(opened *o, const ebpo_paint_pen *pen, double pressure,
                                 double height)
 {
-    ebpo_paint_input hand[HAND];
+    ebpo_paint_input input[INPUT];
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_paint_drawn laid = EBPO_PAINT_DRAWN_INIT;
-    for (int i = 0; i < HAND; i++)
-        hand[i] = (ebpo_paint_input){ { 1 + 0.15 * i, 4, i == 20 ? 3 : height }, pressure, 5. * i };
-    model_must(ebpo_paint_draw(o->paint, o->context, hand, HAND, pen, &laid, &error), "laying",
+    ebpo_paint_drawn drawn = EBPO_PAINT_DRAWN_INIT;
+    for (int i = 0; i < INPUT; i++)
+        input[i] =
+            (ebpo_paint_input){ { 1 + 0.15 * i, 4, i == 20 ? 3 : height }, pressure, 5. * i };
+    model_must(ebpo_paint_draw(o->paint, o->context, input, INPUT, pen, &drawn, &error), "drawing",
                &error);
-    return laid;
+    return drawn;
 }
 
 /* Checks that points are on their faces, at their weights, and within the spread. */
@@ -646,18 +647,18 @@ END_TEST
 START_TEST(test_paint_invalid_pen_adds_nothing)
 {
     opened o = open_model(ebpo_test_sheet(8, 2), -1);
-    const ebpo_paint_input hand[2] = { { { 1, 1, 1 }, 1, 0 }, { { 1e9, 1, 1 }, 1, 0 } };
+    const ebpo_paint_input input[2] = { { { 1, 1, 1 }, 1, 0 }, { { 1e9, 1, 1 }, 1, 0 } };
     ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
     ebpo_paint_pen pen = EBPO_PAINT_PEN_INIT;
-    ck_assert(ebpo_paint_draw(o.paint, o.context, hand, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
+    ck_assert(ebpo_paint_draw(o.paint, o.context, input, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
     pen.radius = 0.1;
-    ck_assert(ebpo_paint_draw(o.paint, o.context, hand, 0, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
-    ck_assert(ebpo_paint_draw(o.paint, o.context, hand, 2, &pen, NULL, NULL) == EBPO_E_LIMIT);
+    ck_assert(ebpo_paint_draw(o.paint, o.context, input, 0, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
+    ck_assert(ebpo_paint_draw(o.paint, o.context, input, 2, &pen, NULL, NULL) == EBPO_E_LIMIT);
     pen.density = 2;
-    ck_assert(ebpo_paint_draw(o.paint, o.context, hand, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
+    ck_assert(ebpo_paint_draw(o.paint, o.context, input, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
     pen.density = 1;
     pen.layer = 1;
-    ck_assert(ebpo_paint_draw(o.paint, o.context, hand, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
+    ck_assert(ebpo_paint_draw(o.paint, o.context, input, 1, &pen, NULL, NULL) == EBPO_E_ARGUMENT);
     ck_assert(ebpo_paint_get_info(o.paint, &info) == EBPO_OK && info.stroke_count == 0);
     close_model(&o);
 }

@@ -68,8 +68,8 @@ static unsigned bits_for(uint64_t count)
     return bits;
 }
 
-/* Sorts pairs; `spare` has space for as many, and the result is in `met`. The numbers are below
- * max_a and max_b. */
+/* Sorts pairs; `spare` has space for as many, and the result is in `intersected`. The numbers are
+ * below max_a and max_b. */
 static void sort_found_pairs(ebpo_found_pair *intersected, ebpo_found_pair *spare, uint64_t count,
                              uint32_t max_a, uint32_t max_b)
 {
@@ -263,8 +263,8 @@ static ebpo_status put_together(gathering *g, const ebpo_accel_pair *pair, ebpo_
     return EBPO_OK;
 }
 
-/* Gathers pairs of faces `begin` to `end` of the pair's first accel: fills in `met`, sorted, or
- * sets `full`. */
+/* Gathers pairs of faces `begin` to `end` of the pair's first accel: fills in `intersected`,
+ * sorted, or sets `full`. */
 static ebpo_status gather_pairs(gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
                                 uint32_t end, ebpo_error *error)
 {

@@ -11,12 +11,12 @@
  *
  *   Other     ebpo_haptic_reset, ebpo_haptic_check, ebpo_haptic_get_stats
  *
- *     ebpo_haptic *touch = NULL;
- *     ebpo_haptic_ball_result answer;
- *     ebpo_haptic_new(model, NULL, start, &touch, &error);
+ *     ebpo_haptic *haptic = NULL;
+ *     ebpo_haptic_ball_result result;
+ *     ebpo_haptic_new(model, NULL, start, &haptic, &error);
  *     for (;;) {
- *         ebpo_haptic_step_ball(touch, device_position, &answer);
- *         send(answer.force);
+ *         ebpo_haptic_step_ball(haptic, device_position, &result);
+ *         send(result.force);
  *     }
  *
  * The ball (or point) follows the haptic device. Where the device passes through a face, a proxy of
@@ -57,8 +57,8 @@ typedef struct ebpo_haptic_options {
 
     /*
      * Radius of the ball in the model's unit, at least 0. 0: a point. All faces within the radius
-     * and `look` must fit into a box (`faces`). A step tests at most 512 of them, in the order in
-     * which the ball may touch them; the next steps continue with the others.
+     * and `search_radius` must fit into a box (`faces`). A step tests at most 512 of them, in the
+     * order in which the ball may touch them; the next steps continue with the others.
      */
     double radius;
 
@@ -154,8 +154,8 @@ typedef enum ebpo_haptic_flag {
     EBPO_HAPTIC_INCOMPLETE = 4,
 
     /*
-     * Some faces within `look` were not tested (the farthest ones) or not loaded. Nearest face,
-     * distance and normal are those of the others.
+     * Some faces within `search_radius` were not tested (the farthest ones) or not loaded. Nearest
+     * face, distance and normal are those of the others.
      */
     EBPO_HAPTIC_PARTIAL = 8,
 
@@ -184,20 +184,20 @@ typedef struct ebpo_haptic_ball_result {
 
     /*
      * Unit vector away from the near faces: weighted mean of their normals on the proxy's side. It
-     * turns steadily when the proxy passes an edge. (0, 0, 0) if no face is within `look`.
+     * turns steadily when the proxy passes an edge. (0, 0, 0) if no face is within `search_radius`.
      */
     double normal[3];
 
     /*
      * In contact: distance of the device behind the proxy. Else minus the distance from the ball to
-     * the nearest face. Minus `look` if none is that near: the distance is then at least `look`,
-     * unless EBPO_HAPTIC_PARTIAL.
+     * the nearest face. Minus `search_radius` if none is that near: the distance is then at least
+     * `search_radius`, unless EBPO_HAPTIC_PARTIAL.
      */
     double depth;
 
     /*
-     * Nearest face within `look`: its index as in ebpo_distance_result (EBPO_NO_FACE: none), the
-     * nearest point, and the weights of its corners there, whose sum is 1.
+     * Nearest face within `search_radius`: its index as in ebpo_distance_result (EBPO_NO_FACE:
+     * none), the nearest point, and the weights of its corners there, whose sum is 1.
      */
     uint64_t face;
     double point[3], weight[3];
@@ -210,9 +210,9 @@ typedef struct ebpo_haptic_ball_result {
 } ebpo_haptic_ball_result;
 
 /*
- * Computes one haptic step with the device at `hand`. Takes bounded time, without locks, allocation
- * or reading. After EBPO_HAPTIC_WAITING or EBPO_HAPTIC_INCOMPLETE the proxy's progress depends on
- * when boxes were loaded.
+ * Computes one haptic step with the device at `device`. Takes bounded time, without locks,
+ * allocation or reading. After EBPO_HAPTIC_WAITING or EBPO_HAPTIC_INCOMPLETE the proxy's progress
+ * depends on when boxes were loaded.
  *
  * The force is stiffness times the vector from device to proxy, minus damping times the device
  * velocity. It never points towards faces that the spring pushes away from, except for 1e-7 of
@@ -260,12 +260,12 @@ typedef struct ebpo_haptic_probe_result {
     double lo, hi;
 
     /*
-     * Unit vector, outward for solids: as in ebpo_haptic_ball_result if a face is within `look`;
-     * else that of the previous nearest face, or (0, 0, 0) if there was none.
+     * Unit vector, outward for solids: as in ebpo_haptic_ball_result if a face is within
+     * `search_radius`; else that of the previous nearest face, or (0, 0, 0) if there was none.
      */
     double normal[3];
 
-    /* Nearest face within `look` as in ebpo_haptic_ball_result; else EBPO_NO_FACE. */
+    /* Nearest face within `search_radius` as in ebpo_haptic_ball_result; else EBPO_NO_FACE. */
     uint64_t face;
     double point[3], weight[3];
 
@@ -283,7 +283,7 @@ typedef struct ebpo_haptic_probe_result {
  * Computes one haptic step of a probe, which has no collisions: bounds of the distance from its
  * position to the model, from data in memory. The bounds combine
  *   - the near faces, and by exact arithmetic the side of each on which the probe passed through
- *     it: within `look` of a face the result is exact except for rounding;
+ *     it: within `search_radius` of a face the result is exact except for rounding;
  *   - the first levels of the octree, at most 2^17 nodes: cells with faces, and cells without faces
  *     that are inside;
  *   - the exact result for a previous position of the probe, from the loading thread: the distance

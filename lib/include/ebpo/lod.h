@@ -66,7 +66,7 @@ typedef struct ebpo_lod_node {
     /* EBPO_GRAY (only on the requested level), EBPO_LEAF or EBPO_BLACK. */
     ebpo_node_type type;
 
-    /* Counts of the polyhedron, without polygons omitted by `walls`. */
+    /* Counts of the polyhedron, without polygons omitted by `cell_faces`. */
     uint32_t vertex_count, polygon_count;
 
     /*

@@ -18,7 +18,7 @@
  *     pen.radius = 0.5;
  *     ebpo_paint_new(file, &paint, &error);
  *     ebpo_paint_add_layer(paint, &layer, &pen.layer, &error);
- *     ebpo_paint_draw(paint, context, hand, count, &pen, NULL, &error);
+ *     ebpo_paint_draw(paint, context, input, count, &pen, NULL, &error);
  *     ebpo_paint_save(paint, "model.paint.h5", &error);
  *
  * format-spec/paint.md defines the file and the painted area. A stroke is a sequence of points on
@@ -485,8 +485,8 @@ typedef struct ebpo_paint_drawn {
  * surface. More pressure gives more points; their positions depend only on the seed.
  *
  * context   of a matching model
- * hand      [count], at least 1
- * laid      statistics; or NULL
+ * input      [count], at least 1
+ * drawn      statistics; or NULL
  *
  * On failure no stroke is added. EBPO_E_ARGUMENT: a value is not valid, or the model does not
  * match. EBPO_E_ABSENT, EBPO_E_LIMIT, and the errors of reading.
@@ -494,9 +494,9 @@ typedef struct ebpo_paint_drawn {
  * Threads: one per paint, one per context.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_draw(ebpo_paint *paint, ebpo_context *context,
-                                                   const ebpo_paint_input *hand, uint64_t count,
+                                                   const ebpo_paint_input *input, uint64_t count,
                                                    const ebpo_paint_pen *pen,
-                                                   ebpo_paint_drawn *laid, ebpo_error *error);
+                                                   ebpo_paint_drawn *drawn, ebpo_error *error);
 
 /*
  * Finds the point of the surface nearest to a position, with full size, pressure 0 and time 0: for

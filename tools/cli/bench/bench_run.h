@@ -53,7 +53,7 @@ EBPO_MUST_USE ebpo_status bench_run_query(const bench_job *job, ebpo_context *co
 EBPO_MUST_USE ebpo_status bench_singly(const bench_job *job, ebpo_context *context,
                                        uint64_t clock_cost, bench_metrics *out, ebpo_error *error);
 /* Runs all queries in a batch by the functions for many points or rays, on one thread, into
- * `answers`, which has the size of job->answers. */
+ * `result_values`, which has the size of job->answers. */
 EBPO_MUST_USE ebpo_status bench_batch(const bench_job *job, ebpo_context *context,
                                       void *result_values, bench_metrics *out, ebpo_error *error);
 

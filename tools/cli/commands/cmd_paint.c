@@ -77,7 +77,7 @@ static const char *take_row(const paint_values *v, const double *row, int count,
                : "the time is not 0 to 2^32 - 1 milliseconds, which are 49 days";
 }
 
-static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_input **hand, uint64_t *count)
+static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_input **input, uint64_t *count)
 {
     char *line = NULL;
     size_t space = 0;
@@ -92,12 +92,12 @@ static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_input **hand,
             continue;
         if (*count == capacity) {
             capacity = capacity ? 2 * capacity : 1024;
-            ebpo_paint_input *more = realloc(*hand, capacity * sizeof *more);
+            ebpo_paint_input *more = realloc(*input, capacity * sizeof *more);
             wrong = more ? NULL : "not enough memory";
-            *hand = more ? more : *hand;
+            *input = more ? more : *input;
         }
         if (!wrong)
-            wrong = take_row(v, row, found, *count, &(*hand)[*count]);
+            wrong = take_row(v, row, found, *count, &(*input)[*count]);
         *count += !wrong;
     }
     free(line);
@@ -112,17 +112,17 @@ static bool read_lines(const paint_values *v, FILE *in, ebpo_paint_input **hand,
 
 /* Reads the path of the pen; the caller frees it. Returns false after an error, which was reported.
  */
-static bool paint_read_path(const paint_values *v, ebpo_paint_input **hand, uint64_t *count)
+static bool paint_read_path(const paint_values *v, ebpo_paint_input **input, uint64_t *count)
 {
     bool standard = strcmp(v->path, "-") == 0;
     FILE *in = standard ? stdin : fopen(v->path, "r");
-    *hand = NULL;
+    *input = NULL;
     *count = 0;
     if (!in) {
         fprintf(stderr, "ebpo paint: %s: cannot be opened: %s\n", v->path, strerror(errno));
         return false;
     }
-    bool fine = read_lines(v, in, hand, count);
+    bool fine = read_lines(v, in, input, count);
     if (!standard)
         fclose(in);
     return fine;
@@ -238,8 +238,8 @@ static ebpo_status add_note(paint_job *j, ebpo_error *error)
 
 /* --- strokes --- */
 
-static ebpo_status lay_stroke(paint_job *j, const ebpo_paint_input *hand, uint64_t count,
-                              ebpo_error *error)
+static ebpo_status draw_stroke(paint_job *j, const ebpo_paint_input *input, uint64_t count,
+                               ebpo_error *error)
 {
     const paint_values *v = j->v;
     ebpo_paint_pen pen = EBPO_PAINT_PEN_INIT;
@@ -260,8 +260,8 @@ static ebpo_status lay_stroke(paint_job *j, const ebpo_paint_input *hand, uint64
     pen.within = v->within;
     pen.seed = (uint64_t)v->seed;
     pen.progress = j->progress;
-    status = ebpo_paint_draw(j->paint, j->context, hand, count, &pen, &j->laid, error);
-    return status != EBPO_OK || j->laid.points
+    status = ebpo_paint_draw(j->paint, j->context, input, count, &pen, &j->drawn, error);
+    return status != EBPO_OK || j->drawn.points
                ? status
                : fail_paint(
                      error, EBPO_E_ARGUMENT,
@@ -286,14 +286,14 @@ static ebpo_status undo_strokes(paint_job *j, ebpo_error *error)
 
 /* Applies the requested change; creates the paint before if it does not exist. Returns an exit
  * code; errors were reported. */
-static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *hand, uint64_t count,
+static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *input, uint64_t count,
                                 ebpo_error *error)
 {
     const paint_values *v = j->v;
     ebpo_status status = EBPO_OK;
     if (v->new_layer)
         status = add_layer(j, error);
-    else if (hand || v->note)
+    else if (input || v->note)
         ;
     else if (v->undo)
         status = undo_strokes(j, error);
@@ -305,8 +305,8 @@ static ebpo_status paint_change(paint_job *j, const ebpo_paint_input *hand, uint
         status = ebpo_paint_remove_layer(j->paint, (uint64_t)v->remove_layer, error);
     else
         status = set_layer(j, error);
-    if (status == EBPO_OK && hand)
-        status = lay_stroke(j, hand, count, error);
+    if (status == EBPO_OK && input)
+        status = draw_stroke(j, input, count, error);
     if (status == EBPO_OK && v->note)
         status = add_note(j, error);
     return status == EBPO_OK ? ebpo_paint_save(j->paint, v->out ? v->out : j->paint_path, error)
@@ -562,7 +562,7 @@ static ebpo_status measure_areas(paint_job *j, ebpo_error *error)
     return ebpo_paint_measure(j->paint, j->context, &o, &j->areas, error);
 }
 
-static ebpo_status do_paint_work(paint_job *j, const ebpo_paint_input *hand, uint64_t count,
+static ebpo_status do_paint_work(paint_job *j, const ebpo_paint_input *input, uint64_t count,
                                  uint64_t memory, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -576,7 +576,7 @@ static ebpo_status do_paint_work(paint_job *j, const ebpo_paint_input *hand, uin
     if (status == EBPO_OK && check) /* checks all of it, whatever is requested */
         status = ebpo_paint_check_points(j->paint, j->context, &j->progress, error);
     if (status == EBPO_OK && j->changed)
-        status = paint_change(j, hand, count, error);
+        status = paint_change(j, input, count, error);
     if (status == EBPO_OK && j->v->bake)
         status = paint_bake(j, error);
     if (status == EBPO_OK && j->v->area)
@@ -584,7 +584,7 @@ static ebpo_status do_paint_work(paint_job *j, const ebpo_paint_input *hand, uin
     return status;
 }
 
-static int run_job(paint_job *j, const ebpo_paint_input *hand, uint64_t count, uint64_t memory)
+static int run_job(paint_job *j, const ebpo_paint_input *input, uint64_t count, uint64_t memory)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     progress_line line;
@@ -601,7 +601,7 @@ static int run_job(paint_job *j, const ebpo_paint_input *hand, uint64_t count, u
         int code = command_failed("paint", &error);
         return status == EBPO_E_ARGUMENT ? EXIT_DIFFERS : code;
     }
-    status = do_paint_work(j, hand, count, memory, &error);
+    status = do_paint_work(j, input, count, memory, &error);
     progress_wipe(&line);
     if (status != EBPO_OK)
         return command_failed("paint", &error);
@@ -615,10 +615,10 @@ static int run_paint(void *given, const char **operand)
     paint_job j = { .v = v,
                     .paint_path = operand[0],
                     .model_path = operand[1],
-                    .laid = EBPO_PAINT_DRAWN_INIT,
+                    .drawn = EBPO_PAINT_DRAWN_INIT,
                     .baked = EBPO_PAINT_BAKED_INIT,
                     .areas = EBPO_PAINT_AREAS_INIT };
-    ebpo_paint_input *hand = NULL;
+    ebpo_paint_input *input = NULL;
     uint64_t memory = 0, count = 0;
     int code = check_values(v);
     if (code == EXIT_FINE && v->memory && !words_read_size(v->memory, &memory))
@@ -629,16 +629,16 @@ static int run_paint(void *given, const char **operand)
         code = check_outputs(&j);
     if (code == EXIT_FINE && j.model_path && !command_wants_hdf5("paint", j.model_path))
         code = EXIT_FAILED;
-    if (code == EXIT_FINE && v->path && !paint_read_path(v, &hand, &count))
+    if (code == EXIT_FINE && v->path && !paint_read_path(v, &input, &count))
         code = EXIT_FAILED;
     if (code == EXIT_FINE)
-        code = run_job(&j, hand, count, memory);
+        code = run_job(&j, input, count, memory);
     ebpo_paint_areas_free(&j.areas);
     ebpo_context_free(j.context);
     ebpo_model_free(j.model);
     ebpo_close(j.file);
     ebpo_paint_free(j.paint);
-    free(hand);
+    free(input);
     return code;
 }
 

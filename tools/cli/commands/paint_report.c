@@ -134,11 +134,11 @@ static void print_areas(const paint_job *j, const ebpo_paint_info *info)
 
 static void print_done(const paint_job *j)
 {
-    const ebpo_paint_drawn *l = &j->laid;
+    const ebpo_paint_drawn *l = &j->drawn;
     const ebpo_paint_baked *b = &j->baked;
     char points[40], strokes[40], steps[40], vertices[40];
     if (j->v->path)
-        printf("  laid       %s in %s, at %s; lifted at %llu, strayed %llu\n",
+        printf("  drawn      %s in %s, at %s; lifted at %llu, strayed %llu\n",
                words_plural(points, sizeof points, l->points, "point", "points"),
                words_plural(strokes, sizeof strokes, l->strokes, "stroke", "strokes"),
                words_plural(steps, sizeof steps, l->steps, "step", "steps"),
@@ -312,11 +312,11 @@ static void json_done(const paint_job *j, json *out)
 {
     if (j->v->path) {
         json_object(out, "drawn");
-        json_uint(out, "strokes", j->laid.strokes);
-        json_uint(out, "points", j->laid.points);
-        json_uint(out, "steps", j->laid.steps);
-        json_uint(out, "lifted", j->laid.lifted);
-        json_uint(out, "strayed", j->laid.strayed);
+        json_uint(out, "strokes", j->drawn.strokes);
+        json_uint(out, "points", j->drawn.points);
+        json_uint(out, "steps", j->drawn.steps);
+        json_uint(out, "lifted", j->drawn.lifted);
+        json_uint(out, "strayed", j->drawn.strayed);
         json_end(out);
     }
     if (j->v->bake) {

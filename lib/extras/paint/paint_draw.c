@@ -31,7 +31,7 @@ typedef struct run {
     uint64_t first, count;
 } run;
 
-typedef struct lay {
+typedef struct drawing {
     ebpo_context *context;
     ebpo_paint_pen pen;
     ebpo_reach reach;
@@ -40,8 +40,8 @@ typedef struct lay {
     uint64_t point_count, point_capacity, run_count, run_capacity, random, space;
     bool down;    /* the pen painted at the previous step */
     double begun; /* time at which the stroke began */
-    ebpo_paint_drawn laid;
-} lay;
+    ebpo_paint_drawn drawn;
+} drawing;
 
 /* --- checking --- */
 
@@ -72,14 +72,14 @@ static const char *device_wrong(const ebpo_paint_input *h)
     return in_range(h->time, 0, UINT32_MAX) ? NULL : "the pen's time is 0 to 2^32 - 1";
 }
 
-static ebpo_status lay_check(const lay *l, const ebpo_paint *p, const ebpo_paint_input *hand,
-                             uint64_t count, ebpo_error *error)
+static ebpo_status draw_check(const drawing *l, const ebpo_paint *p, const ebpo_paint_input *input,
+                              uint64_t count, ebpo_error *error)
 {
     const char *wrong = pen_wrong(&l->pen);
     if (count == 0)
         wrong = "a stroke needs at least one position of the pen";
     for (uint64_t i = 0; i < count && !wrong; i++)
-        wrong = device_wrong(&hand[i]);
+        wrong = device_wrong(&input[i]);
     ebpo_stroke_held stroke = { .radius = l->pen.radius,
                                 .time = l->pen.time,
                                 .layer =
@@ -116,8 +116,8 @@ static void set_point(ebpo_paint_point *q, const ebpo_distance_result *at,
     round_weights(near.weight, q->weight);
 }
 
-static ebpo_status lay_nearest(ebpo_context *context, const double place[3], double within,
-                               ebpo_distance_result *out, ebpo_error *error)
+static ebpo_status draw_nearest(ebpo_context *context, const double place[3], double within,
+                                ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.unsigned_distance = true;
@@ -125,7 +125,7 @@ static ebpo_status lay_nearest(ebpo_context *context, const double place[3], dou
     return ebpo_distance(context, place, &options, out, error);
 }
 
-static bool lay_found(const ebpo_distance_result *at)
+static bool draw_found(const ebpo_distance_result *at)
 {
     return at->face != EBPO_NO_FACE && isfinite(at->distance);
 }
@@ -153,7 +153,7 @@ ebpo_status ebpo_paint_locate(const ebpo_paint *p, ebpo_context *context, const 
     ebpo_reach reach;
     ebpo_status status = ebpo_paint_check_context(p, context, error);
     if (status == EBPO_OK)
-        status = lay_nearest(context, place, INFINITY, &at, error);
+        status = draw_nearest(context, place, INFINITY, &at, error);
     if (status != EBPO_OK)
         return status;
     ebpo_reach_begin(&reach, context);
@@ -166,10 +166,10 @@ ebpo_status ebpo_paint_locate(const ebpo_paint *p, ebpo_context *context, const 
 
 /* --- a step --- */
 
-static ebpo_status add_point(lay *l, const ebpo_distance_result *at, const double corner[3][3],
-                             const ebpo_paint_input *hand, ebpo_error *error)
+static ebpo_status add_point(drawing *l, const ebpo_distance_result *at, const double corner[3][3],
+                             const ebpo_paint_input *input, ebpo_error *error)
 {
-    double share = l->pen.size_least + hand->pressure * (l->pen.size_full - l->pen.size_least);
+    double share = l->pen.size_least + input->pressure * (l->pen.size_full - l->pen.size_least);
     if (l->point_count == l->space)
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "the stroke would exceed the %d points that a paint may have; take "
@@ -180,8 +180,8 @@ static ebpo_status add_point(lay *l, const ebpo_distance_result *at, const doubl
     ebpo_paint_point *q = &l->point[l->point_count++];
     set_point(q, at, corner);
     q->size = (uint16_t)fmax(1, floor(share * EBPO_PAINT_FULL + 0.5));
-    q->pressure = (uint16_t)floor(hand->pressure * UINT16_MAX + 0.5);
-    q->time = (uint32_t)(hand->time - l->begun);
+    q->pressure = (uint16_t)floor(input->pressure * UINT16_MAX + 0.5);
+    q->time = (uint32_t)(input->time - l->begun);
     l->run[l->run_count - 1].count++;
     return EBPO_OK;
 }
@@ -222,11 +222,11 @@ static const ebpo_reach_face *face_of(const ebpo_reach *reach, uint64_t face)
     return NULL;
 }
 
-static ebpo_status lay_scatter(lay *l, const ebpo_distance_result *middle,
-                               const ebpo_paint_input *hand, ebpo_error *error)
+static ebpo_status draw_scatter(drawing *l, const ebpo_distance_result *middle,
+                                const ebpo_paint_input *input, ebpo_error *error)
 {
     double u[3], v[3], place[3], disc[2], spread = l->pen.spread;
-    unsigned wanted = (unsigned)fmax(1, floor(hand->pressure * l->pen.density + 0.5));
+    unsigned wanted = (unsigned)fmax(1, floor(input->pressure * l->pen.density + 0.5));
     ebpo_status status = EBPO_OK;
     make_frame(middle->normal, u, v);
     for (unsigned i = 0; i < wanted && status == EBPO_OK; i++) {
@@ -234,59 +234,59 @@ static ebpo_status lay_scatter(lay *l, const ebpo_distance_result *middle,
         random_in_disc(&l->random, disc);
         for (int k = 0; k < 3; k++)
             place[k] = middle->point[k] + spread * (disc[0] * u[k] + disc[1] * v[k]);
-        status = lay_nearest(l->context, place, spread, &at, error);
+        status = draw_nearest(l->context, place, spread, &at, error);
         if (status != EBPO_OK)
             return status;
-        const ebpo_reach_face *f = lay_found(&at) ? face_of(&l->reach, at.face) : NULL;
+        const ebpo_reach_face *f = draw_found(&at) ? face_of(&l->reach, at.face) : NULL;
         if (f && ebpo_ball_holds(middle->point, spread * spread, at.point))
-            status = add_point(l, &at, f->corner, hand, error);
+            status = add_point(l, &at, f->corner, input, error);
         else
-            l->laid.strayed++;
+            l->drawn.strayed++;
     }
     return status;
 }
 
-static ebpo_status put_down(lay *l, const ebpo_paint_input *hand, ebpo_error *error)
+static ebpo_status put_down(drawing *l, const ebpo_paint_input *input, ebpo_error *error)
 {
     if (l->down)
         return EBPO_OK;
     if (!ebpo_grow(&l->run, &l->run_capacity, l->run_count + 1, sizeof *l->run))
         return ebpo_fail_memory(error, l->run_count * sizeof *l->run);
     l->run[l->run_count++] = (run){ l->point_count, 0 };
-    l->begun = hand->time;
+    l->begun = input->time;
     l->down = true;
     return EBPO_OK;
 }
 
-static ebpo_status make_step(lay *l, const ebpo_paint_input *hand, ebpo_error *error)
+static ebpo_status make_step(drawing *l, const ebpo_paint_input *input, ebpo_error *error)
 {
     ebpo_distance_result at = { .face = EBPO_NO_FACE };
     ebpo_status status = EBPO_OK;
-    if (hand->pressure > 0)
-        status = lay_nearest(l->context, hand->place, l->pen.within, &at, error);
+    if (input->pressure > 0)
+        status = draw_nearest(l->context, input->place, l->pen.within, &at, error);
     if (status != EBPO_OK)
         return status;
-    if (!lay_found(&at)) {
+    if (!draw_found(&at)) {
         l->down = false;
-        l->laid.lifted++;
+        l->drawn.lifted++;
         return EBPO_OK;
     }
-    l->laid.steps++;
-    status = put_down(l, hand, error);
+    l->drawn.steps++;
+    status = put_down(l, input, error);
     if (status == EBPO_OK)
         status = reach_around(&l->reach, &at, l->pen.spread, error);
     if (status != EBPO_OK)
         return status;
     return l->pen.spread > 0
-               ? lay_scatter(l, &at, hand, error)
-               : add_point(l, &at, (const double(*)[3])l->reach.face[l->reach.own].corner, hand,
+               ? draw_scatter(l, &at, input, error)
+               : add_point(l, &at, (const double(*)[3])l->reach.face[l->reach.own].corner, input,
                            error);
 }
 
 /* --- the path --- */
 
-static void lay_between(const ebpo_paint_input *a, const ebpo_paint_input *b, double t,
-                        ebpo_paint_input *out)
+static void draw_between(const ebpo_paint_input *a, const ebpo_paint_input *b, double t,
+                         ebpo_paint_input *out)
 {
     for (int k = 0; k < 3; k++)
         out->place[k] = a->place[k] + t * (b->place[k] - a->place[k]);
@@ -302,14 +302,15 @@ static double length_between(const ebpo_paint_input *a, const ebpo_paint_input *
 }
 
 /* Follows the path; steps are at whole multiples of their length, from the first position on. */
-static ebpo_status lay_go(lay *l, const ebpo_paint_input *hand, uint64_t count, ebpo_error *error)
+static ebpo_status draw_go(drawing *l, const ebpo_paint_input *input, uint64_t count,
+                           ebpo_error *error)
 {
     double step = l->pen.step != 0 ? l->pen.step : fmax(l->pen.radius, l->pen.spread) / 2,
            ahead = step; /* distance from the current position to the next step */
-    ebpo_status status = make_step(l, &hand[0], error);
+    ebpo_status status = make_step(l, &input[0], error);
     for (uint64_t i = 1; i < count && status == EBPO_OK; i++) {
-        double length = length_between(&hand[i - 1], &hand[i]), at = ahead;
-        if (i % 64 == 1 && !ebpo_progress_step(&l->pen.progress, "lay", i, count, error))
+        double length = length_between(&input[i - 1], &input[i]), at = ahead;
+        if (i % 64 == 1 && !ebpo_progress_step(&l->pen.progress, "drawing", i, count, error))
             return EBPO_E_CANCELLED;
         if (!(length / step <= EBPO_PAINT_POINTS))
             return ebpo_fail(
@@ -318,7 +319,7 @@ static ebpo_status lay_go(lay *l, const ebpo_paint_input *hand, uint64_t count, 
                 EBPO_PAINT_POINTS);
         for (uint64_t k = 1; at <= length && status == EBPO_OK; k++) {
             ebpo_paint_input pen;
-            lay_between(&hand[i - 1], &hand[i], at / length, &pen);
+            draw_between(&input[i - 1], &input[i], at / length, &pen);
             pen.time = fmax(pen.time, l->begun);
             status = make_step(l, &pen, error);
             at = ahead + (double)k * step;
@@ -329,7 +330,7 @@ static ebpo_status lay_go(lay *l, const ebpo_paint_input *hand, uint64_t count, 
 }
 
 /* Adds all strokes, or none. */
-static ebpo_status lay_keep(lay *l, ebpo_paint *p, ebpo_error *error)
+static ebpo_status draw_keep(drawing *l, ebpo_paint *p, ebpo_error *error)
 {
     uint64_t before = p->stroke_count;
     ebpo_status status = EBPO_OK;
@@ -345,8 +346,8 @@ static ebpo_status lay_keep(lay *l, ebpo_paint *p, ebpo_error *error)
         if (s.point_count)
             status = ebpo_paint_add_stroke(p, &s, error);
     }
-    l->laid.strokes = p->stroke_count - before;
-    l->laid.points = l->point_count;
+    l->drawn.strokes = p->stroke_count - before;
+    l->drawn.points = l->point_count;
     while (status != EBPO_OK && p->stroke_count > before) {
         p->stroke_count--;
         p->point_count -= p->stroke[p->stroke_count].count;
@@ -354,18 +355,18 @@ static ebpo_status lay_keep(lay *l, ebpo_paint *p, ebpo_error *error)
     return status;
 }
 
-ebpo_status ebpo_paint_draw(ebpo_paint *p, ebpo_context *context, const ebpo_paint_input *hand,
-                            uint64_t count, const ebpo_paint_pen *pen, ebpo_paint_drawn *laid,
+ebpo_status ebpo_paint_draw(ebpo_paint *p, ebpo_context *context, const ebpo_paint_input *input,
+                            uint64_t count, const ebpo_paint_pen *pen, ebpo_paint_drawn *drawn,
                             ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    lay l = { .context = context, .pen = EBPO_PAINT_PEN_INIT };
-    l.laid.struct_size = sizeof l.laid;
+    drawing l = { .context = context, .pen = EBPO_PAINT_PEN_INIT };
+    l.drawn.struct_size = sizeof l.drawn;
     ebpo_status status = EBPO_TAKE(ebpo_paint_pen, &l.pen, pen, error);
-    if (status == EBPO_OK && laid)
-        status = EBPO_CHECK_SIZED(ebpo_paint_drawn, laid, error);
+    if (status == EBPO_OK && drawn)
+        status = EBPO_CHECK_SIZED(ebpo_paint_drawn, drawn, error);
     if (status == EBPO_OK)
-        status = lay_check(&l, p, hand, count, error);
+        status = draw_check(&l, p, input, count, error);
     if (status == EBPO_OK)
         status = ebpo_paint_check_context(p, context, error);
     if (status != EBPO_OK)
@@ -373,11 +374,11 @@ ebpo_status ebpo_paint_draw(ebpo_paint *p, ebpo_context *context, const ebpo_pai
     l.random = l.pen.seed;
     l.space = EBPO_PAINT_POINTS - p->point_count;
     ebpo_reach_begin(&l.reach, context);
-    status = lay_go(&l, hand, count, error);
+    status = draw_go(&l, input, count, error);
     if (status == EBPO_OK)
-        status = lay_keep(&l, p, error);
-    if (status == EBPO_OK && laid)
-        EBPO_GIVE(ebpo_paint_drawn, laid, &l.laid);
+        status = draw_keep(&l, p, error);
+    if (status == EBPO_OK && drawn)
+        EBPO_GIVE(ebpo_paint_drawn, drawn, &l.drawn);
     ebpo_reach_end(&l.reach);
     free(l.point);
     free(l.run);
