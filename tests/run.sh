@@ -28,7 +28,7 @@ plan() { # build
     default-clang) echo "0.1 full once costly viewer calls" ;;
     default-sanitize | default-undefined) echo "0.02 full once costly slow viewer calls" ;;
     full-thread | *-memory) echo "1" ;; # one suite
-    *-thread) echo "0.3" ;;
+    *-thread) echo "0.1" ;;
     *-posix) echo "0.1" ;;           # the tests that are named here
     esac
 }
