@@ -2,8 +2,8 @@
  *
  * `crossings` counts the faces that a segment along an axis crosses, as far as single precision (in
  * accels of doubles: double precision) is certain. The other faces are decided exactly by inside.c.
- * `cell_faces` finds the cell faces that no face reaches, and the boxes of the leaf's list, at the first
- * queries in the leaf; its comparisons are exact.
+ * `cell_faces` finds the cell faces that no face reaches, and the boxes of the leaf's list, at the
+ * first queries in the leaf; its comparisons are exact.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md; crossings: EBP 2017, 4.2. */

@@ -25,7 +25,7 @@ typedef struct paint_job {
     ebpo_context *context;
     ebpo_progress progress;
     bool changed;            /* in memory */
-    ebpo_paint_drawn drawn;   /* by --path */
+    ebpo_paint_drawn drawn;  /* by --path */
     ebpo_paint_baked baked;  /* by --bake */
     ebpo_paint_areas areas;  /* by --area */
     uint64_t colours_of_own; /* by --bake: the model has colours of vertices */
