@@ -1,6 +1,6 @@
-/* Writes the faces around a point as PLY, for a model of any size, from a disk or by HTTP: reads
- * the subtree of the cell that contains the point. In a model of 28 million faces, a cell of level
- * 6 has about 2,000.
+/* Writes the faces around a point as PLY, for a model of any size, from a disk or by HTTP. Reads
+ * only the subtree of the cell of a level that contains the point. In a model of 28 million faces,
+ * a cell of level 6 contains about 2,000 faces.
  *
  *     draw_around FILE.ebpo.h5|URL X Y Z LEVEL OUT.ply
  *     cc draw_around.c $(pkg-config --cflags --libs ebpo) */
@@ -11,8 +11,8 @@
 
 static bool write_faces(const ebpo_subtree_faces *faces, const char *path, ebpo_error *error)
 {
-    /* Lent, so it is not freed. The members are not const, but ebpo_mesh_write_ply does not change
-     * them. */
+    /* The arrays are lent, so this mesh is not freed. Its members are not const, but
+     * ebpo_mesh_write_ply does not change the arrays. */
     ebpo_mesh mesh = { .vertex_count = faces->vertex_count,
                        .face_count = faces->face_count,
                        .xyz32 = (float *)faces->xyz32,
@@ -47,8 +47,8 @@ int main(int argc, char **argv)
     }
     for (int k = 0; k < 3; k++)
         point[k] = strtod(argv[2 + k], NULL);
-    options.parts = EBPO_PART_MESH;     /* no envelopes, no source indices */
-    options.memory = UINT64_C(1) << 30; /* error if the cell of LEVEL needs more */
+    options.parts = EBPO_PART_MESH;     /* without envelopes and source indices */
+    options.memory = UINT64_C(1) << 30; /* EBPO_E_LIMIT if the cell of LEVEL needs more */
     options.or_leaf_above = true;
     if (ebpo_open(argv[1], &file, &error) != EBPO_OK)
         goto done;

@@ -1,6 +1,6 @@
 /* The device side of `ebpo haptic --device udp:PORT`: moves a pen down into a model and up again,
- * and prints the forces. A driver for a real device (OpenHaptics, CHAI3D, a robot controller) makes
- * its two calls where the comments are.
+ * and prints the forces. The two comments "driver" mark where a driver for a real device
+ * (OpenHaptics, CHAI3D, a robot controller) reads the position and applies the force.
  *
  *     ebpo haptic --device udp:5601 model.ebpo.h5 &
  *     haptic_device 5601 X Y Z DOWN
@@ -16,22 +16,22 @@
 #include <time.h>
 #include <unistd.h>
 
-typedef struct place_packet {
+typedef struct position_packet {
     char magic[4];
     uint16_t version, kind; /* 1: a position, 3: the end */
     uint64_t sequence, tag;
     double place[3], turn[4];
-} place_packet;
+} position_packet;
 
-typedef struct feel_packet {
+typedef struct force_packet {
     char magic[4];
     uint16_t version, kind; /* 2 */
-    uint64_t sequence, tag; /* of the position that this is the reply to */
+    uint64_t sequence, tag; /* of the position to which this replies */
     double force[3], torque[3], proxy[3], turn[4], depth, lo, hi, normal[3];
     uint64_t face;
     uint32_t flags;
     uint8_t rgb[3], where;
-} feel_packet;
+} force_packet;
 
 enum { STEPS = 1000 };
 
@@ -47,19 +47,21 @@ int main(int argc, char **argv)
     int s = socket(AF_INET, SOCK_DGRAM, 0);
     if (s < 0 || connect(s, (const struct sockaddr *)&to, sizeof to) != 0)
         return 1;
-    place_packet out = { "EBPT", 1, 1, 0, 0, { atof(argv[2]), atof(argv[3]), 0 }, { 0, 0, 0, 1 } };
-    feel_packet in = { .depth = 0 }, most = in;
-    int results = 0;
+    position_packet out = {
+        "EBPT", 1, 1, 0, 0, { atof(argv[2]), atof(argv[3]), 0 }, { 0, 0, 0, 1 }
+    };
+    force_packet in = { .depth = 0 }, most = in;
+    int replies = 0;
     for (int i = 0; i < STEPS; i++) {
         int down = i < STEPS / 2 ? i : STEPS - i;
         out.sequence++;
-        out.place[2] = atof(argv[4]) - atof(argv[5]) * down / (STEPS / 2); /* the position of the
-                                                                            * device */
+        out.place[2] =
+            atof(argv[4]) - atof(argv[5]) * down / (STEPS / 2); /* driver: read the position */
         (void)send(s, &out, sizeof out, 0);
         struct pollfd waiting = { .fd = s, .events = POLLIN };
         while (poll(&waiting, 1, 0) > 0 && recv(s, &in, sizeof in, 0) == (ssize_t)sizeof in) {
-            results++;
-            if (in.force[2] > most.force[2]) /* the device would apply in.force here */
+            replies++;
+            if (in.force[2] > most.force[2]) /* driver: apply in.force */
                 most = in;
         }
         nanosleep(&(struct timespec){ 0, 1000000 }, NULL);
@@ -68,7 +70,7 @@ int main(int argc, char **argv)
     out.sequence++;
     (void)send(s, &out, sizeof out, 0);
     close(s);
-    printf("%s answers, %s force up, proxy at %.2f %.2f %.2f\n", results > 0 ? "some" : "no",
+    printf("%s replies, %s force up, proxy at %.2f %.2f %.2f\n", replies > 0 ? "some" : "no",
            most.force[2] > 0 ? "a" : "no", most.proxy[0], most.proxy[1], most.proxy[2]);
-    return results > 0 ? 0 : 1;
+    return replies > 0 ? 0 : 1;
 }

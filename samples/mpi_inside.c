@@ -1,24 +1,25 @@
 /* Classifies points as inside, outside or on the surface, on all processes of an MPI program:
  *
- *     mpirun -n 4 mpi_inside MODEL.ebpo.h5 POINTS.raw ANSWERS.raw [MEGABYTES]
+ *     mpirun -n 4 mpi_inside MODEL.ebpo.h5 POINTS.raw RESULTS.raw [MEGABYTES]
  *
- * POINTS.raw holds three doubles for each point. ANSWERS.raw gets two int32 for each, as `ebpo
+ * POINTS.raw holds three doubles for each point. RESULTS.raw gets two int32 for each, as `ebpo
  * inside --raw` prints them: location (0 outside, 1 inside, 2 on the surface) and winding number.
  * The bytes do not depend on the number of processes. Each process opens the model, within
- * MEGABYTES (default 256). An error of one process ends all, and no results are left. */
+ * MEGABYTES (default 256). An error of one process ends all processes, and the results are removed.
+ */
 #include <ebpo/ebpo.h>
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/stat.h>
 
-enum { TOGETHER = 1 << 18 }; /* points of a process in each collective read */
+enum { TOGETHER = 1 << 18 }; /* number of points of a process in each collective read */
 
 static int rank, ranks;
 
-/* Prints the error of the process that has one; then all processes end. Every process must call it.
- */
-static int all_fine(int fine, const char *what)
+/* Returns true if all processes are OK; a process that is not prints its error. Every process must
+ * call this function. */
+static int all_ok(int fine, const char *what)
 {
     int every;
     if (!fine)
@@ -27,99 +28,99 @@ static int all_fine(int fine, const char *what)
     return every;
 }
 
-/* Reports an MPI error of a file as text. */
-static int mpi_fine(int code, const char *path)
+/* Returns true if an MPI call for a file succeeded in all processes; prints MPI errors as text. */
+static int mpi_ok(int code, const char *path)
 {
     char why[MPI_MAX_ERROR_STRING] = "", what[MPI_MAX_ERROR_STRING + 512];
     int length;
     if (code != MPI_SUCCESS)
         MPI_Error_string(code, why, &length);
     snprintf(what, sizeof what, "%s: %s", path, why);
-    return all_fine(code == MPI_SUCCESS, what);
+    return all_ok(code == MPI_SUCCESS, what);
 }
 
-/* The library numbers the points of one call. */
-static int queried_fine(ebpo_status status, MPI_Offset first, const char *message)
+/* Returns true if the query succeeded in all processes. The message of the library contains the
+ * index of a point in one call; `first` is the index of the call's first point in the file. */
+static int query_ok(ebpo_status status, MPI_Offset first, const char *message)
 {
     char what[sizeof(ebpo_error) + 64];
     snprintf(what, sizeof what, "in the points from index %lld on: %s", (long long)first, message);
-    return all_fine(status == EBPO_OK, what);
+    return all_ok(status == EBPO_OK, what);
 }
 
 /* Reads, queries and writes `count` points from `first` on, together with those of the other
  * processes. */
-static int query_stretch(ebpo_context *context, MPI_File in, MPI_File out, const char *const *paths,
-                         MPI_Offset first, int count, double *points, ebpo_inside_result *results,
-                         int *answers)
+static int query_range(ebpo_context *context, MPI_File in, MPI_File out, const char *const *paths,
+                       MPI_Offset first, int count, double *points, ebpo_inside_result *results,
+                       int *pairs)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     MPI_Status got;
     int doubles = 0;
     int code = MPI_File_read_at_all(in, first * 24, points, 3 * count, MPI_DOUBLE, &got);
-    if (!mpi_fine(code, paths[0]))
+    if (!mpi_ok(code, paths[0]))
         return 0;
     MPI_Get_count(&got, MPI_DOUBLE, &doubles);
-    if (!all_fine(doubles == 3 * count, "the points file became shorter during reading"))
+    if (!all_ok(doubles == 3 * count, "the points file became shorter during reading"))
         return 0;
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
     ebpo_status status =
         ebpo_inside_many(context, points, (uint64_t)count, &options, results, &error);
-    if (!queried_fine(status, first, error.message))
+    if (!query_ok(status, first, error.message))
         return 0;
     for (int i = 0; i < count; i++) {
-        answers[2 * i] = (int)results[i].where;
-        answers[2 * i + 1] = results[i].winding;
+        pairs[2 * i] = (int)results[i].where;
+        pairs[2 * i + 1] = results[i].winding;
     }
-    code = MPI_File_write_at_all(out, first * 8, answers, 2 * count, MPI_INT, &got);
-    return mpi_fine(code, paths[1]);
+    code = MPI_File_write_at_all(out, first * 8, pairs, 2 * count, MPI_INT, &got);
+    return mpi_ok(code, paths[1]);
 }
 
-/* Processes the stretches of points in turn. All processes take the same number of stretches,
- * because collective reads need every process. */
+/* Processes all points, in ranges. All processes process the same number of ranges, because every
+ * process must take part in a collective read. */
 static int query_all(ebpo_context *context, MPI_File in, MPI_File out, const char *const *paths,
                      MPI_Offset rows)
 {
     double *points = malloc(sizeof *points * 3 * TOGETHER);
     ebpo_inside_result *results = malloc(sizeof *results * TOGETHER);
-    int *answers = malloc(sizeof *answers * 2 * TOGETHER);
-    int fine = all_fine(points && results && answers, "not enough memory");
+    int *pairs = malloc(sizeof *pairs * 2 * TOGETHER);
+    int fine = all_ok(points && results && pairs, "not enough memory");
     for (MPI_Offset at = 0; fine && at < rows; at += (MPI_Offset)TOGETHER * ranks) {
         MPI_Offset first = at + (MPI_Offset)TOGETHER * rank, left = first < rows ? rows - first : 0;
-        fine = query_stretch(context, in, out, paths, first, left < TOGETHER ? (int)left : TOGETHER,
-                             points, results, answers);
+        fine = query_range(context, in, out, paths, first, left < TOGETHER ? (int)left : TOGETHER,
+                           points, results, pairs);
     }
     free(points);
     free(results);
-    free(answers);
+    free(pairs);
     return fine;
 }
 
-/* Results are written directly to the file, which would destroy an input. */
-static int is_input(const char *input, const char *answers)
+/* Returns true if the output file is an input file, which writing would destroy. */
+static int is_input(const char *input, const char *output)
 {
     struct stat a, b;
-    return stat(input, &a) == 0 && stat(answers, &b) == 0 && a.st_dev == b.st_dev &&
+    return stat(input, &a) == 0 && stat(output, &b) == 0 && a.st_dev == b.st_dev &&
            a.st_ino == b.st_ino;
 }
 
-static int query_files(ebpo_context *context, const char *points, const char *answers)
+static int query_files(ebpo_context *context, const char *points, const char *output)
 {
-    const char *const paths[] = { points, answers };
+    const char *const paths[] = { points, output };
     MPI_File in, out;
     MPI_Offset bytes = 0;
-    if (!mpi_fine(MPI_File_open(MPI_COMM_WORLD, points, MPI_MODE_RDONLY, MPI_INFO_NULL, &in),
-                  points))
+    if (!mpi_ok(MPI_File_open(MPI_COMM_WORLD, points, MPI_MODE_RDONLY, MPI_INFO_NULL, &in), points))
         return 0;
-    int fine = mpi_fine(MPI_File_get_size(in, &bytes), points) &&
-               all_fine(bytes % 24 == 0, "the points file does not contain rows of three doubles");
-    if (fine && mpi_fine(MPI_File_open(MPI_COMM_WORLD, answers, MPI_MODE_WRONLY | MPI_MODE_CREATE,
-                                       MPI_INFO_NULL, &out),
-                         answers)) {
-        fine = mpi_fine(MPI_File_set_size(out, bytes / 3), answers) &&
+    int fine = mpi_ok(MPI_File_get_size(in, &bytes), points) &&
+               all_ok(bytes % 24 == 0, "the points file does not contain rows of three doubles");
+    if (fine && mpi_ok(MPI_File_open(MPI_COMM_WORLD, output, MPI_MODE_WRONLY | MPI_MODE_CREATE,
+                                     MPI_INFO_NULL, &out),
+                       output)) {
+        fine = mpi_ok(MPI_File_set_size(out, bytes / 3), output) &&
                query_all(context, in, out, paths, bytes / 24);
-        fine = mpi_fine(MPI_File_close(&out), answers) && fine;
+        fine = mpi_ok(MPI_File_close(&out), output) && fine;
         if (!fine && rank == 0)
-            MPI_File_delete(answers, MPI_INFO_NULL);
+            MPI_File_delete(output, MPI_INFO_NULL);
     } else {
         fine = 0;
     }
@@ -136,15 +137,15 @@ static int query_model(const char *const *path, double megabytes)
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
     options.memory = (uint64_t)(megabytes * 1e6);
     options.threads = 1;
-    if (!all_fine(!is_input(path[0], path[2]) && !is_input(path[1], path[2]),
-                  "the results would overwrite the model or the points"))
+    if (!all_ok(!is_input(path[0], path[2]) && !is_input(path[1], path[2]),
+                "the results would overwrite the model or the points"))
         return 0;
     ebpo_status status = ebpo_open(path[0], &file, &error);
     if (status == EBPO_OK)
         status = ebpo_model_new(file, &options, &model, &error);
     if (status == EBPO_OK)
         status = ebpo_context_new(model, &context, &error);
-    int fine = all_fine(status == EBPO_OK, error.message) && query_files(context, path[1], path[2]);
+    int fine = all_ok(status == EBPO_OK, error.message) && query_files(context, path[1], path[2]);
     ebpo_context_free(context);
     ebpo_model_free(model);
     ebpo_close(file);
@@ -163,7 +164,7 @@ int main(int argc, char **argv)
         const char *const path[] = { argv[1], argv[2], argv[3] };
         fine = query_model(path, megabytes);
     } else if (rank == 0) {
-        fprintf(stderr, "usage: mpi_inside MODEL.ebpo.h5 POINTS.raw ANSWERS.raw [MEGABYTES]\n");
+        fprintf(stderr, "usage: mpi_inside MODEL.ebpo.h5 POINTS.raw RESULTS.raw [MEGABYTES]\n");
     }
     MPI_Finalize();
     return fine ? 0 : 1;

@@ -1,4 +1,5 @@
-/* Reads lines "x y z" and prints for each point if it is inside, and its distance from the surface.
+/* Reads lines "x y z". Prints for each point whether it is inside, and its distance from the
+ * surface.
  *
  *     query MODEL.ebpo.h5 <points.txt
  *     cc query.c $(pkg-config --cflags --libs ebpo) */
@@ -8,7 +9,8 @@
 
 static const char *const words[] = { "OUT", "IN", "ON", "MAYBE" };
 
-static bool result(ebpo_context *context, bool solid, const double point[3], ebpo_error *error)
+static bool print_results(ebpo_context *context, bool solid, const double point[3],
+                          ebpo_error *error)
 {
     ebpo_inside_result where = { EBPO_MAYBE, 0, 0 }; /* a surface has distances, but no inside */
     ebpo_distance_result nearest;
@@ -40,14 +42,14 @@ int main(int argc, char **argv)
             continue;
         good = count == 3 && line[end] == 0;
         if (good)
-            good = result(context, ebpo_file_info(file)->solid, p, &error);
+            good = print_results(context, ebpo_file_info(file)->solid, p, &error);
         else
-            snprintf(error.message, sizeof error.message, "line %ld: three numbers are expected",
+            snprintf(error.message, sizeof error.message, "line %ld: expected three numbers",
                      number);
     }
     if (!good)
         fprintf(stderr, "query: %s\n", error.message);
-    good = fflush(stdout) == 0 && !ferror(stdout) && good; /* a full disk is detected here */
+    good = fflush(stdout) == 0 && !ferror(stdout) && good; /* detects a full disk */
     if (ferror(stdout))
         perror("query: standard output");
     ebpo_context_free(context);

@@ -26,7 +26,7 @@ def parse(line, number):
     try:
         x, y, z = map(float, re.split(r"\s*,\s*|\s+", line))
     except ValueError:
-        raise ValueError(f"line {number}: three numbers are expected") from None
+        raise ValueError(f"line {number}: expected three numbers") from None
     return x, y, z
 
 

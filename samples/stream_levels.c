@@ -30,11 +30,11 @@ int main(int argc, char **argv)
         uint64_t polyhedra = 0, polygons = 0;
         while (ebpo_stream_next_node(stream, &node, &more, &error) == EBPO_OK && more) {
             polyhedra += node.polygon_count > 0; /* white nodes have none */
-            /* a renderer would use node.vertices, polygon_first and corners here */
+            /* a renderer draws node.vertices, node.polygon_first and node.corners here */
             polygons += node.polygon_count;
         }
         printf("level %d after %" PRIu64 " bytes: %" PRIu64 " new polyhedra with %" PRIu64
-               " polygons; with the leaves before, volume %.9g\n",
+               " polygons; volume with earlier leaves %.9g\n",
                level.level, level.cumulative_bytes, polyhedra, polygons, level.volume);
         if (error.status != EBPO_OK || level.level >= last)
             break;

@@ -1,7 +1,7 @@
-/* Main loop of a viewer with a camera: gets the nodes that are largest in the image first, until no
- * visible node is larger than 16 pixels or a budget is used; then the camera moves.
+/* Main loop of a viewer with a camera. Gets the nodes that are largest in the image first, until no
+ * visible node is larger than 16 pixels, or until BYTES are read. Then the camera moves.
  *
- *     view_nodes FILE.ebpo.h5 X Y Z [BYTES]
+ *     view_nodes FILE.ebpo.h5|URL X Y Z [BYTES]
  *     cc view_nodes.c $(pkg-config --cflags --libs ebpo) */
 #include <ebpo/ebpo.h>
 #include <inttypes.h>
@@ -11,8 +11,7 @@
 static bool draw(void *user, const ebpo_view_node *node)
 {
     *(uint64_t *)user += node->seen ? node->node.polygon_count
-                                    : 0; /* a renderer would draw node->node.vertices, polygon_first
-                                          * and corners here, front to back */
+                                    : 0; /* a renderer draws node->node here, front to back */
     return true;
 }
 
@@ -51,7 +50,7 @@ int main(int argc, char **argv)
         uint64_t arrived = 0, polygons = 0;
         while (ebpo_view_stream_next(stream, &node, &end, &error) == EBPO_OK &&
                end == EBPO_VIEW_NODE)
-            arrived++; /* children replace their parent when node.complete */
+            arrived++; /* if node.complete, the children replace their parent */
         ebpo_view_stats stats = EBPO_VIEW_STATS_INIT;
         ebpo_view_stream_get_stats(stream, &stats);
         ebpo_view_stream_cut(stream, draw, &polygons);

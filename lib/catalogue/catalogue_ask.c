@@ -1,10 +1,10 @@
-/* Queries to a catalogue: they are cut into stretches, each processed by one thread, and each model
- * is queried once per stretch.
+/* Queries to a catalogue: they are cut into stretches. One thread processes a stretch, and queries
+ * each model once for it.
  *
- * Points are taken by laps of some millions, and each lap along the Morton curve of the catalogue's
- * box, so that a stretch visits few models and few of their subtrees; a single model that is all in
- * memory needs no order. Rays are processed in their given order, as each model orders its rays
- * itself.
+ * Points are taken in laps of some millions of points, and each lap in the order of the Morton
+ * curve of the catalogue's box, so that a stretch visits few models and few of their subtrees; a
+ * single model that is all in memory needs no order. Rays are processed in their given order, as
+ * each model orders its rays itself.
  *
  * A result depends on its point or ray alone: not on the stretch, the threads, or the models that
  * happen to be open. A thread holds the results of its stretch only, and one model at a time. */
@@ -21,9 +21,11 @@
 #include "core/parallel.h"
 #include "query/query_model.h"
 
-/* Rows of a stretch; number of rows that are ordered together; fewer are not worth it. */
+/* Least and greatest number of rows in a stretch; number of rows that are ordered together; number
+ * of rows for which ordering is not worth the time. */
 enum { STRETCH_LEAST = 1 << 10, STRETCH_MAX = 1 << 16, LAP = 1 << 22, UNORDERED = 1 << 8 };
-/* Stretches for each thread, so that none waits long for the last one. */
+/* Number of stretches for each thread: several, so that no thread waits long for the last stretch.
+ */
 enum { STRETCHES_EACH = 4 };
 
 ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, ebpo_error *error)

@@ -1,12 +1,12 @@
 /* Finds the boxes that points and rays reach.
  *
  * Boxes are in a tree: eight neighbours along the Morton curve of their centres have a box around
- * them on the next level, up to one that contains all. A query goes down from there and skips boxes
- * that it cannot reach. The tree is immutable, so any number of threads may query it.
+ * them on the next level, up to a box that contains all. A query goes down from there and skips
+ * boxes that it cannot reach. The tree is immutable, so any number of threads may query it.
  *
- * Skipped boxes are certainly irrelevant: lengths are rounded some ten times here, each by 2^-53,
- * and only boxes farther by a share of 2^-40 are skipped. So boxes may be returned that a query
- * does not reach, and the model then finds nothing; none is missing. */
+ * A skipped box certainly does not matter: lengths are rounded some ten times here, each time by
+ * 2^-53, and only boxes that are farther by a share of 2^-40 are skipped. So a query may get boxes
+ * that it does not reach, whose models then find nothing; but no box is missing. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -129,8 +129,8 @@ void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t)
 typedef struct walk {
     const ebpo_catalogue_boxes *t;
     const double *p, *d; /* the point, or the ray's origin and direction */
-    double reach;        /* near: boxes farther away are not wanted */
-    double pad;          /* ray: more than the rounding error */
+    double reach;        /* nearest query: boxes farther away are not wanted */
+    double pad;          /* ray: margin, more than the rounding error */
     uint32_t item;
     ebpo_catalogue_pairs *out; /* NULL: only `reach` is computed */
     bool (*keep)(struct walk *w, const ebpo_catalogue_box *box, double *least);
@@ -189,7 +189,7 @@ bool ebpo_catalogue_boxes_holding(const ebpo_catalogue_boxes *t, const double p[
     return walk_boxes(&w);
 }
 
-/* Returns the length, also where squares overflow. */
+/* Returns the length of a vector, also when squares overflow. */
 static double vector_length(const double v[3]) { return hypot(hypot(v[0], v[1]), v[2]); }
 
 static double least_length(const ebpo_catalogue_box *b, const double p[3])
@@ -214,7 +214,8 @@ static bool may_be_near(walk *w, const ebpo_catalogue_box *b, double *least)
     return *least * (1 - EBPO_CATALOGUE_SLACK) <= w->reach;
 }
 
-/* Lowers `reach` to the box's farthest corner: part of a box is nearer than that. */
+/* Lowers `reach` to the distance of the box's farthest corner: the model in the box is nearer than
+ * that. */
 static bool comes_nearer(walk *w, const ebpo_catalogue_box *b, double *least)
 {
     if (!may_be_near(w, b, least))

@@ -6,10 +6,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Each level has eight times as many boxes: enough for 2^33. */
+/* Maximum number of levels. Each level has eight times as many boxes as the one above: enough for
+ * 2^33 boxes. */
 enum { EBPO_CATALOGUE_LEVELS = 12 };
 
-/* Lengths are rounded some ten times; skipped boxes are farther by at least this share. */
+/* Share by which skipped boxes are farther at least; lengths are rounded some ten times. */
 #define EBPO_CATALOGUE_SLACK 0x1p-40
 
 /* A closed box. */
@@ -21,14 +22,14 @@ typedef struct ebpo_catalogue_boxes {
     uint32_t *number; /* [count[0]] numbers of the boxes, along the Morton curve of their centres */
     int levels;       /* 0: there is no box */
     size_t count[EBPO_CATALOGUE_LEVELS];
-    /* level 0: the boxes; above: those around eight each */
+    /* level 0: the boxes; levels above: the boxes around eight each */
     ebpo_catalogue_box *box[EBPO_CATALOGUE_LEVELS];
 } ebpo_catalogue_boxes;
 
 /* A box, and a point or ray that reaches it. */
 typedef struct ebpo_catalogue_pair {
     uint32_t box, item;
-    double least; /* ebpo_catalogue_boxes_near: lower bound of the distance to the box */
+    double least; /* set by ebpo_catalogue_boxes_near: lower bound of the distance to the box */
 } ebpo_catalogue_pair;
 
 typedef struct ebpo_catalogue_pairs {
@@ -36,25 +37,27 @@ typedef struct ebpo_catalogue_pairs {
     uint64_t count, capacity;
 } ebpo_catalogue_pairs;
 
-/* Makes the tree of boxes[count] with numbers[count], which identify them in pairs. Returns false
- * without memory; call ebpo_catalogue_boxes_free in any case. */
+/* Makes the tree of boxes[count]. numbers[count] identify the boxes in pairs. Returns false without
+ * memory; call ebpo_catalogue_boxes_free in any case. */
 bool ebpo_catalogue_boxes_make(ebpo_catalogue_boxes *t, const ebpo_catalogue_box *boxes,
                                const uint32_t *numbers, size_t count);
 void ebpo_catalogue_boxes_free(ebpo_catalogue_boxes *t);
 
-/* Each of these appends pairs (box, item); false: not enough memory. Finds boxes that contain the
- * point: */
+/* Appends a pair (box, item) for each box that contains the point. This and the next two functions
+ * return false without memory. */
 bool ebpo_catalogue_boxes_holding(const ebpo_catalogue_boxes *t, const double p[3], uint32_t item,
                                   ebpo_catalogue_pairs *out);
-/* Finds all boxes that may contain the nearest face to the point, at most `most` away: */
+/* Appends pairs for all boxes that may contain the face nearest to the point, at most `most` away.
+ */
 bool ebpo_catalogue_boxes_near(const ebpo_catalogue_boxes *t, const double p[3], double most,
                                uint32_t item, ebpo_catalogue_pairs *out);
-/* Finds all boxes that the ray from o along d may intersect: */
+/* Appends pairs for all boxes that the ray from o along d may intersect. */
 bool ebpo_catalogue_boxes_on_ray(const ebpo_catalogue_boxes *t, const double o[3],
                                  const double d[3], uint32_t item, ebpo_catalogue_pairs *out);
 
-/* Orders points[count][3], numbered from 0, along the Morton curve of a box; points outside count
- * as on its sides. Returns false without memory. */
+/* Writes the numbers (from 0) of points[count][3] in the order of the Morton curve of a box. Points
+ * outside the box have the position of the nearest point of the box. Returns false without memory.
+ */
 bool ebpo_catalogue_morton_order(const double *points, size_t count, const double min[3],
                                  const double max[3], uint32_t *numbers);
 

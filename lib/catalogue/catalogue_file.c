@@ -2,11 +2,11 @@
  *
  * A catalogue file is untrusted input. Every used member is checked for its kind and range before
  * the catalogue is made: paths are texts, digests are 64 hexadecimal digits, boxes have two corners
- * of three finite numbers each, and none is inverted. open_models.c compares these with a model
- * when it is opened. Unknown members are ignored.
+ * of three finite numbers each, with min not above max. open_models.c compares these with a model
+ * when the model is opened. Unknown members are ignored.
  *
- * Paths are kept as they are opened: relative ones of a file begin in its folder. A catalogue is
- * immutable, and any number of threads may use it.
+ * Paths are kept as they are opened: relative paths of a file begin in the file's folder. A
+ * catalogue is immutable, and any number of threads may use it.
  *
  * Source: docs/guide/clusters.md has the format. */
 #include "core/strict_fp.h"
@@ -28,7 +28,8 @@
 #include "core/fp_env.h"
 #include "core/hash.h"
 
-/* Some millions of models; a larger file would take many times as much memory. */
+/* Maximum length of a file: enough for some millions of models; a larger file would take many times
+ * as much memory. */
 enum { MAX_BYTES = 1 << 30, DIGEST_LETTERS = 64 };
 
 const char *const ebpo_catalogue_rules[] = { "nonzero", "evenodd", "positive" };
@@ -41,8 +42,8 @@ const char *ebpo_catalogue_shown(const ebpo_catalogue *c)
 
 /* --- making --- */
 
-/* Returns a path as it is opened, relative to a folder ("" or ending in '/'); NULL: not enough
- * memory. */
+/* Returns a path by which a file is opened, from a path relative to a folder ("" or ending in '/').
+ * Returns NULL without memory. */
 static char *joined_path(const char *folder, const char *path)
 {
     bool whole = *path == '/' || strstr(path, "://");
@@ -55,7 +56,8 @@ static char *joined_path(const char *folder, const char *path)
     return joined;
 }
 
-/* Makes the boxes of all models, or of those that rays and distances use. */
+/* Makes the tree of the boxes of all models; with `seen`, of the models that rays and distances
+ * use. */
 static bool make_boxes(ebpo_catalogue_boxes *boxes, const ebpo_catalogue *c, bool seen)
 {
     ebpo_catalogue_box *box = ebpo_alloc(c->count, sizeof *box);
@@ -133,7 +135,7 @@ static ebpo_status end_making(ebpo_catalogue *c, ebpo_status status, ebpo_catalo
     return status;
 }
 
-/* --- of entries --- */
+/* --- checks of entries --- */
 
 static const char *fault_of_entry(const ebpo_catalogue_entry *e)
 {
@@ -422,7 +424,7 @@ static ebpo_status parse_text(reader *r, const char *text, size_t size)
     return status;
 }
 
-/* Reads the file's text, of c->file_bytes, which the caller frees. Does not wait for pipes. */
+/* Reads the file's text, of c->file_bytes bytes; the caller frees it. Does not wait for pipes. */
 static ebpo_status read_text(ebpo_catalogue *c, char **text, ebpo_error *error)
 {
     struct stat st;

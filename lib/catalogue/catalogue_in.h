@@ -11,15 +11,15 @@
 struct ebpo_catalogue {
     char *path; /* path of the file that was read, or NULL */
     uint64_t file_bytes, file_hash;
-    uint64_t count;                      /* at least 1, less than 2^32 - 1 */
+    uint64_t count;                      /* at least 1, at most 2^32 - 2 */
     ebpo_catalogue_entry *entry;         /* the catalogue owns their texts */
-    ebpo_catalogue_options how;          /* without `folder` */
+    ebpo_catalogue_options how;          /* options; `folder` is not set */
     ebpo_catalogue_boxes all, seen;      /* boxes of all models; of those that rays and distances
                                           * use */
     const ebpo_catalogue_entry *surface; /* the first model without an inside; NULL: all have one */
 };
 
-/* Names of an ebpo_rule in files. */
+/* Names of the values of ebpo_rule in catalogue files. */
 extern const char *const ebpo_catalogue_rules[];
 
 /* Returns the catalogue's name in messages. */
@@ -30,13 +30,14 @@ const char *ebpo_catalogue_shown(const ebpo_catalogue *c);
 /* An open model, lent to a thread. */
 typedef struct ebpo_catalogue_held ebpo_catalogue_held;
 
-/* Queries with a context of the model that belongs to its thread. */
+/* Runs a query, in a context of the model that belongs to the calling thread. */
 typedef ebpo_status (*ebpo_catalogue_query)(ebpo_context *context, const ebpo_catalogue_held *model,
                                             void *user, ebpo_error *error);
 
-/* Calls `run_query` with a model, or the part of it that rays and distances use, when memory is
- * available. Where its budget is too small for several threads, calls `run_query` again, alone.
- * Returns the errors of ebpo/catalogue.h for opening. */
+/* Calls `run_query` with a model (with `surface`: the part of it that rays and distances use) when
+ * memory is available. If the model's budget is too small for several threads, calls `run_query`
+ * again while no other thread queries the model. Fails with the errors of ebpo/catalogue.h for
+ * opening. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models,
                                               const ebpo_catalogue *c, uint64_t number,
                                               bool surface, ebpo_catalogue_query run_query,
@@ -45,14 +46,15 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models,
 /* Returns true if the catalogue has one model, which is open and all in memory. */
 bool ebpo_catalogue_in_memory(ebpo_catalogue_models *models, const ebpo_catalogue *c);
 
-/* Converts a face's number to the number in the whole, where the catalogue has it; *face may be
- * EBPO_NO_FACE. */
+/* Converts the number of a part's face to its number in the whole model, if the catalogue has such
+ * numbers; *face may be EBPO_NO_FACE. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *model, uint64_t *face,
                                                    ebpo_error *error);
 
 /* --- numbers of faces: part_numbers.c --- */
 
-/* Numbers in the whole of a part's faces: a .npy of integers, read when needed. */
+/* For each face of a part, its number in the whole model: a .npy file of integers, read when
+ * needed. */
 typedef struct ebpo_catalogue_numbers {
     const char *path; /* owned by the caller */
     int fd;           /* -1: not open */
@@ -62,14 +64,14 @@ typedef struct ebpo_catalogue_numbers {
     bool is_signed, big_endian;
 } ebpo_catalogue_numbers;
 
-/* Opens the file. Returns EBPO_E_FORMAT if it cannot be read as an array of integers with one
- * dimension. Then, and after ebpo_catalogue_numbers_close, it is not open. */
+/* Opens the file. Returns EBPO_E_FORMAT if it is not an array of integers with one dimension. After
+ * a failure, and after ebpo_catalogue_numbers_close, no file is open. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_numbers_open(ebpo_catalogue_numbers *f, const char *path,
                                                       ebpo_error *error);
 void ebpo_catalogue_numbers_close(ebpo_catalogue_numbers *f);
 
-/* Replaces *face by the number at that index. Returns EBPO_E_FORMAT if there is no such number, or
- * if it is negative or beyond 2^63; EBPO_E_IO. Any thread. */
+/* Replaces *face by the number at the index *face. Returns EBPO_E_FORMAT if there is no such
+ * number, or if it is negative or beyond 2^63; EBPO_E_IO. Any thread. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_numbers_get(const ebpo_catalogue_numbers *f,
                                                      uint64_t *face, ebpo_error *error);
 
@@ -81,10 +83,10 @@ typedef struct ebpo_catalogue_querier {
     const ebpo_catalogue_query_options *options;
 } ebpo_catalogue_querier;
 
-/* Maximum number of pairs in memory, except for those of one query. */
+/* Maximum number of pairs in memory; the pairs of one query may be more. */
 enum { EBPO_CATALOGUE_PAIRS = 1 << 21 };
 
-/* Input of a model: rows[count][width]; pair[].item is the query of each. */
+/* Input for one model: rows[count][width]; pair[i].item is the query of row i. */
 typedef struct ebpo_catalogue_run {
     uint32_t model;
     const ebpo_catalogue_pair *pair;
@@ -93,15 +95,15 @@ typedef struct ebpo_catalogue_run {
     void *user;
 } ebpo_catalogue_run;
 
-/* Queries each model of `pairs` (sorted by model and query) once, for rows[item]; the callback's
- * `user` is a run, which has `user`. */
+/* Queries each model of `pairs` (sorted by model, then by query) once, for the rows of its items.
+ * The callback gets an ebpo_catalogue_run as its `user`; the run has the `user` given here. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_query_runs(const ebpo_catalogue_querier *a,
                                                     ebpo_catalogue_pairs *pairs, const double *rows,
                                                     size_t width, bool surface,
                                                     ebpo_catalogue_query run_query, void *user,
                                                     ebpo_error *error);
 
-/* Appends the pairs of an item, given its row; false: not enough memory. */
+/* Appends the pairs of an item, given the item's row; returns false without memory. */
 typedef bool (*ebpo_catalogue_find)(const ebpo_catalogue_boxes *boxes, const double *row,
                                     uint32_t item, ebpo_catalogue_pairs *out);
 bool ebpo_catalogue_find_point(const ebpo_catalogue_boxes *boxes, const double *row, uint32_t item,
@@ -109,8 +111,8 @@ bool ebpo_catalogue_find_point(const ebpo_catalogue_boxes *boxes, const double *
 bool ebpo_catalogue_find_ray(const ebpo_catalogue_boxes *boxes, const double *row, uint32_t item,
                              ebpo_catalogue_pairs *out);
 
-/* Does the same for rows[count], for which `find` returns the boxes (`seen`, if `surface`) that
- * they reach. */
+/* As ebpo_catalogue_query_runs, for rows[count]: `find` gives the boxes that each row reaches. With
+ * `surface` these are the boxes of models that rays and distances use. */
 EBPO_MUST_USE ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_querier *a,
                                                    const double *rows, uint32_t count, size_t width,
                                                    ebpo_catalogue_find find, bool surface,
@@ -122,7 +124,7 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, e
 
 /* --- many rows, by any number of threads: catalogue_ask.c --- */
 
-/* Processes a stretch of rows, which are points, or as an ebpo_ray, in one thread. */
+/* Processes a stretch of rows in one thread. A row is a point, or an ebpo_ray as numbers. */
 typedef ebpo_status (*ebpo_catalogue_stretch)(const ebpo_catalogue_querier *a, const double *rows,
                                               uint32_t count, void *out, uint64_t *model,
                                               ebpo_error *error);
@@ -133,10 +135,10 @@ typedef struct ebpo_catalogue_job {
     const char *stage;
     size_t width, result; /* numbers in a row; bytes of a result */
     bool ordered;         /* true if rows are points along the curve */
-    const double *rows;   /* of the remaining queries, as the two below */
+    const double *rows;   /* rows of the remaining queries; the next two members also begin there */
     char *out;
     uint64_t *model;       /* or NULL */
-    const uint32_t *order; /* set while rows are processed */
+    const uint32_t *order; /* order of the current lap, set while rows are processed */
 } ebpo_catalogue_job;
 
 EBPO_MUST_USE ebpo_status ebpo_catalogue_query_rows(ebpo_catalogue_job *job, uint64_t count,

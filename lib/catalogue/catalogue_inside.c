@@ -1,16 +1,16 @@
 /* Classifies points by winding numbers, summed over the models whose boxes contain them.
  *
- * With independent models a point is inside if it is inside any, and a model that has the point on
- * a face adds 0 to the sum.
+ * Independent models: a point is inside if it is inside any model. A model that has the point on a
+ * face adds 0 to the sum.
  *
- * Parts of one model are closed by caps, which are no surface of the whole; the winding numbers of
- * all parts add up to the whole's where the point is on no face and no cap. A point that is on a
- * face of some part is doubtful: it is on the whole's surface if a real face intersects the box of
- * this one point, which is decided exactly. Otherwise it is on a cap, and its winding number is
- * counted along a ray through the surfaces, which have no caps: faces that the ray leaves through
- * less those that it enters through. A ray that hits an edge or runs along a face does not decide,
- * and another one is cast. Directions are always the same ones, and every deciding ray gives the
- * same number.
+ * Parts of one model are closed by caps, which are not part of the whole surface. Where the point
+ * is on no face and no cap, the winding numbers of all parts add up to that of the whole. A point
+ * on a face of some part is doubtful. It is on the whole's surface if a real face intersects the
+ * box of this one point, which is decided exactly. Otherwise it is on a cap, and its winding number
+ * is counted along a ray through the surfaces, which have no caps: faces that the ray leaves
+ * through less those that it enters through. A ray that hits an edge or runs along a face does not
+ * decide, and another ray is cast. The directions are always the same, and every deciding ray gives
+ * the same number.
  *
  * Source: docs/guide/clusters.md, "Beyond 2^32 faces". */
 #include "core/strict_fp.h"
@@ -26,7 +26,7 @@
 #include "core/hash.h"
 #include "query/query_model.h"
 
-/* Maximum number of rays tried for a point. */
+/* Maximum number of rays that are cast from a point. */
 enum { DIRECTIONS = 64 };
 
 /* Result for a point so far. */
@@ -62,9 +62,9 @@ typedef struct doubtful {
     uint32_t count;
     uint32_t *number; /* [count] index among all points */
     double *rows;     /* [count][7] as rays */
-    bool *real;       /* [count] it is on a face of the whole */
+    bool *real;       /* [count] true: the point is on a face of the whole */
     int64_t *sum;     /* [count] sum of the last ray */
-    bool *plain;      /* [count] that ray gives the winding number */
+    bool *plain;      /* [count] true: the last ray gives the winding number */
 } doubtful;
 
 static ebpo_status query_box(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
@@ -86,7 +86,7 @@ static ebpo_status query_box(ebpo_context *context, const ebpo_catalogue_held *m
     return status;
 }
 
-/* Writes the results of the points with `known` to `all`, and keeps the others. */
+/* Writes the results of the points with known[i] to `all`, and keeps the other points in `d`. */
 static void keep_unknown(doubtful *d, const bool *known, bool on, found *all)
 {
     uint32_t kept = 0;

@@ -1,14 +1,14 @@
 /* Finds the nearest face of all models to a point, and the first face that a ray hits.
  *
  * A point queries the models in the order of the distance of their boxes, while the next box may
- * contain something nearer than the found face; many points take their turns together, so that each
- * model is queried for all of them at once. Of models at the same rounded distance the first one in
- * the catalogue is taken, independent of the order of queries; so a box counts as near while it is
- * not farther by more than the rounding error (catalogue_boxes.c).
+ * contain a face nearer than the found one. Many points take their turns together, so that each
+ * model is queried for all of them at once. Of models at the same rounded distance, the result is
+ * from the first one in the catalogue, independent of the order of queries. So a box counts as near
+ * unless it is farther by more than the rounding error (catalogue_boxes.c).
  *
  * A ray queries the models whose boxes it may intersect in the order of the catalogue, each only up
- * to the hit found before. Where t overflows for several, a ray whose direction is longer by a
- * power of two, exactly, decides which is first. */
+ * to the hit found before. If t overflows for several hits, a ray whose direction is longer by a
+ * power of two, exactly, decides which hit is first. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -81,8 +81,9 @@ static ebpo_status query_distances(ebpo_context *context, const ebpo_catalogue_h
     return status;
 }
 
-/* Queries for each of some points its next box, while that may contain something nearer. `begin`
- * has the start of each point's boxes, and of the next point's; `turn` has space for as many. */
+/* For each of some points, queries its next box while that may contain a nearer face. `begin`: for
+ * each point the start of its boxes, and one entry for the end. `turn` has space for as many
+ * entries. */
 static ebpo_status query_in_turn(search *s, const uint64_t *begin, uint64_t *turn, uint32_t points,
                                  ebpo_error *error)
 {
@@ -99,7 +100,7 @@ static ebpo_status query_in_turn(search *s, const uint64_t *begin, uint64_t *tur
                 s->queries.pair[s->queries.count++] = *next;
                 turn[i]++;
             } else {
-                turn[i] = begin[i + 1]; /* later boxes are farther still */
+                turn[i] = begin[i + 1]; /* later boxes are farther away */
             }
         }
         status = ebpo_catalogue_query_runs(s->a, &s->queries, s->points, 3, true, query_distances,
@@ -108,7 +109,7 @@ static ebpo_status query_in_turn(search *s, const uint64_t *begin, uint64_t *tur
     return status;
 }
 
-/* Processes as many points from *at on as fit; *at is then after them. */
+/* Processes as many points from *at on as fit in memory, and sets *at to the next point. */
 static ebpo_status query_some(search *s, uint32_t *at, uint64_t *begin, uint64_t *turn,
                               ebpo_error *error)
 {
@@ -210,11 +211,11 @@ typedef struct shot {
     ebpo_ray_sides sides;
     ebpo_ray_hit *out;
     uint64_t *model;
-    double *far; /* for hits whose t overflows (inf): t along the ray's longer direction */
+    double *far; /* for hits whose t overflows (inf): t for the longer direction */
 } shot;
 
-/* Returns a ray whose direction is longer by a power of two, exactly, so that every hit's t is
- * finite. */
+/* Returns the ray with a direction that is longer by a power of two, exactly, so that every hit's t
+ * is finite. */
 static ebpo_ray longer_ray(const ebpo_ray *ray)
 {
     enum { ENOUGH = 3 }; /* coordinates are at most 2^1025 apart */
@@ -267,8 +268,8 @@ static ebpo_status take_hits(const shot *s, const ebpo_catalogue_run *run, const
     return status;
 }
 
-/* Queries one model. Models come in their order: with equal t the first one's hit stays. Faces
- * behind it are not searched. */
+/* Queries one model, but no faces beyond the hits found so far. Models come in the order of the
+ * catalogue: with equal t the first model's hit stays. */
 static ebpo_status query_hits(ebpo_context *context, const ebpo_catalogue_held *model, void *user,
                               ebpo_error *error)
 {

@@ -1,5 +1,5 @@
-/* Writes catalogues as JSON files for ebpo_catalogue_open. Boxes are the same bit for bit, and
- * counts below 2^53; entries without `file_bytes` are written without their counts.
+/* Writes catalogues as JSON files for ebpo_catalogue_open. Boxes read back bit for bit, and counts
+ * below 2^53 exactly; entries without `file_bytes` are written without their counts.
  *
  * Paths that begin with the folder of the file become relative to it, so that a folder of models
  * and its catalogue can be moved together; a path that would then be read differently stays as it
@@ -36,8 +36,8 @@ static void write_text(FILE *to, const char *text)
     fputc('"', to);
 }
 
-/* Returns the fewest digits that read back as the same double, "1.5e+00", in any locale: their
- * number, the digits in `digits`, and the exponent of ten. */
+/* Finds the fewest digits that read back as the same double in the form "1.5e+00", in any locale.
+ * Returns the number of digits; sets `digits` and the exponent of ten. */
 static int fewest_digits(double x, char digits[20], int *exponent)
 {
     char text[40];
@@ -93,8 +93,8 @@ static void write_digest(FILE *to, const char *key, const uint8_t digest[32])
     fputc('"', to);
 }
 
-/* Writes a path without the folder (ending in '/', or ""), if it begins with that and the rest is a
- * relative path. */
+/* Writes a path without the folder (ending in '/', or ""), if the path begins with the folder and
+ * the rest is a relative path. */
 static void write_path(FILE *to, const char *before, const char *key, const char *path,
                        const char *folder)
 {

@@ -1,17 +1,18 @@
 /* Open models of any number of catalogues, all within one memory budget.
  *
  * A model is identified by the path and digest of its file, the options of opening, its face
- * numbers, and its share of the budget: an equal one for each model of its catalogue, but at least
- * an eighth. The first query that needs it opens it. A querying thread holds it, and its share is
- * taken as long as any thread does. When memory is short, models that no thread holds are closed,
- * the least recently used first; if that is not enough, the query waits until others are done. A
- * thread holds one model at a time, so that none waits for itself.
+ * numbers, and its share of the budget. The share is the same for each model of a catalogue, but at
+ * least an eighth of the budget. A model is opened by the first query that needs it. A querying
+ * thread holds the model, and its share is taken as long as any thread does. When memory is short,
+ * models that no thread holds are closed, the least recently used first; if that is not enough, the
+ * query waits until others are done. A thread holds one model at a time, so that no thread waits
+ * for itself.
  *
- * The file is compared with its catalogue: the digest when it is opened, and the box whenever it is
- * lent, as two entries may describe one file differently.
+ * The file is compared with its catalogue: the digest when the file is opened, and the box whenever
+ * the model is lent, as two entries may describe one file differently.
  *
- * Locks: one for the list and its sums, which is never held during a query or while a file is
- * opened, but while one is closed; each model has one for opening and one for queries. */
+ * Locks: one lock is for the list and its sums; it is never held during a query or while a file is
+ * opened, but while one is closed. Each model has a lock for opening and a lock for queries. */
 #include "core/strict_fp.h"
 
 #include <pthread.h>
@@ -22,29 +23,30 @@
 #include "catalogue/catalogue_in.h"
 #include "core/error.h"
 
-/* Maximum number of models that are queried at a time, where there are many; maximum number of open
- * ones, for which the system may allow fewer: each has a file or two. */
+/* Maximum number of models that are queried at a time, if there are many; maximum number of open
+ * models. The system may allow fewer: each model has one or two open files. */
 enum { SHARES = 8, OPEN_MAX = 256, DESCRIPTORS_EACH = 4, CONTEXTS_KEPT = 256 };
 
-/* The requested model, which identifies it. */
+/* What identifies a requested model. */
 typedef struct wanted {
-    const char *path, *numbers; /* numbers NULL: none */
+    const char *path, *numbers; /* numbers: NULL if there are no face numbers */
     uint8_t digest[32];
-    uint64_t share; /* bytes; 0: no limit */
+    uint64_t share; /* maximum bytes; 0: no limit */
     ebpo_catalogue_open_fn open_file;
     ebpo_catalogue_close_fn close_file;
     void *user;
 } wanted;
 
 struct ebpo_catalogue_held {
-    ebpo_catalogue_held *before, *behind; /* in the order of use, the latest first */
-    wanted key;                           /* it owns its texts */
-    unsigned users;                       /* the next fields are under the lock of all models */
-    uint64_t bytes;                       /* counted bytes */
-    pthread_mutex_t opening; /* protects the next fields until there is a model; and the contexts */
-    pthread_rwlock_t querying; /* exclusive: for a query while no other one runs */
+    ebpo_catalogue_held *before, *behind; /* list in the order of use, the latest first */
+    wanted key;                           /* the model owns the texts of its key */
+    unsigned users;                       /* `users` and the next fields are protected by the lock
+                                           * of all models */
+    uint64_t bytes;                       /* bytes that are counted for the model */
+    pthread_mutex_t opening;   /* protects the contexts, and the next fields until `model` is set */
+    pthread_rwlock_t querying; /* locked exclusively for a query that must run alone */
     ebpo_file *file;
-    ebpo_model *_Atomic model; /* read without that lock for sums */
+    ebpo_model *_Atomic model; /* for sums it is read without that lock */
     ebpo_catalogue_numbers numbers;
     ebpo_context *idle[CONTEXTS_KEPT];
     unsigned idle_count;
@@ -59,7 +61,7 @@ struct ebpo_catalogue_models {
     unsigned held, busy;
     uint64_t taken;
     uint64_t closed;       /* number of closed models */
-    ebpo_model_stats gone; /* their sums */
+    ebpo_model_stats gone; /* sums of the closed models */
 };
 
 /* --- one model --- */
@@ -96,7 +98,9 @@ static ebpo_status open_numbers(ebpo_catalogue_held *m, ebpo_error *error)
         return EBPO_OK;
     ebpo_status status = ebpo_catalogue_numbers_open(&m->numbers, m->key.numbers, error);
     if (status == EBPO_OK && m->numbers.count != faces)
-        status = ebpo_fail_file(error, EBPO_E_FORMAT, m->key.numbers, "%llu numbers of %llu faces",
+        status = ebpo_fail_file(error, EBPO_E_FORMAT, m->key.numbers,
+                                "expected a number for each face: %llu "
+                                "numbers of %llu faces",
                                 (unsigned long long)m->numbers.count, (unsigned long long)faces);
     return status;
 }
@@ -265,8 +269,8 @@ static bool has_capacity(const ebpo_catalogue_models *h, uint64_t size, unsigned
     return h->held + more <= h->open_max && (!h->memory || h->taken + size <= h->memory);
 }
 
-/* Closes idle models until `size` more bytes are available. Returns true if they are, or if nothing
- * else is used, so that waiting would not help. */
+/* Closes idle models until `size` more bytes are available. Returns true if they are available, or
+ * if no other model is used, so that waiting would not help. */
 static bool reserve_space(ebpo_catalogue_models *h, uint64_t size, const ebpo_catalogue_held *but)
 {
     unsigned more = but == NULL;
@@ -292,7 +296,8 @@ static uint64_t share_of(const ebpo_catalogue_models *h, const ebpo_catalogue *c
     return h->memory && !share ? 1 : share; /* 0 would mean no limit */
 }
 
-/* Returns NULL without memory. */
+/* Returns the model with this key, new or already open, as used by the calling thread. Returns NULL
+ * without memory. */
 static ebpo_catalogue_held *take_model(ebpo_catalogue_models *h, const ebpo_catalogue *c,
                                        wanted *key)
 {
@@ -316,7 +321,8 @@ static ebpo_catalogue_held *take_model(ebpo_catalogue_models *h, const ebpo_cata
         link_first(h, m);
         if (!m->users++) {
             h->busy++;
-            h->taken += key->share - m->bytes; /* its use may grow or shrink from now on */
+            h->taken +=
+                key->share - m->bytes; /* its use of memory may grow or shrink from now on */
             m->bytes = key->share;
         }
     }
@@ -324,7 +330,7 @@ static ebpo_catalogue_held *take_model(ebpo_catalogue_models *h, const ebpo_cata
     return m;
 }
 
-/* Gives a model back; removes one that could not be opened. */
+/* Ends the calling thread's use of a model; removes a model that could not be opened. */
 static void give_back(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
 {
     ebpo_model_stats s = EBPO_MODEL_STATS_INIT;
@@ -344,8 +350,8 @@ static void give_back(ebpo_catalogue_models *h, ebpo_catalogue_held *m)
 
 /* --- lending --- */
 
-/* Queries alone. Contexts hold their last subtrees: they are freed to make memory available for
- * one. */
+/* Runs a query while no other one runs. Contexts hold their last subtrees, so they are freed first:
+ * their memory becomes available for this query. */
 static ebpo_status query_alone(ebpo_catalogue_held *m, ebpo_catalogue_query run_query, void *user,
                                ebpo_error *error)
 {
@@ -417,7 +423,7 @@ ebpo_status ebpo_catalogue_held_face(const ebpo_catalogue_held *m, uint64_t *fac
                : ebpo_catalogue_numbers_get(&m->numbers, face, error);
 }
 
-/* --- beginning and end --- */
+/* --- creating and freeing --- */
 
 static unsigned may_be_open(void)
 {

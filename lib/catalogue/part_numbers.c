@@ -1,5 +1,6 @@
-/* Numbers in the whole of a part's faces: a .npy of integers with one dimension (NumPy's format,
- * versions 1 to 3), from which any thread reads single numbers when needed.
+/* For each face of a part, its number in the whole model. The file is a .npy of integers with one
+ * dimension (NumPy's format, versions 1 to 3), from which any thread reads single numbers when
+ * needed.
  *
  * The file is untrusted input, as is the catalogue that refers to it. Its header is read once: the
  * type, the byte order, and the count of numbers, which must match the file's size. An invalid face
@@ -23,7 +24,7 @@ static ebpo_status bad_numbers(const ebpo_catalogue_numbers *f, ebpo_error *erro
                           "is not a .npy array of integers with one dimension: %s", what);
 }
 
-/* Returns the text after 'key': in the header; or NULL. */
+/* Returns the text after 'key': in the header, or NULL. */
 static const char *value_of(const char *head, const char *key)
 {
     const char *at = strstr(head, key);
@@ -31,7 +32,7 @@ static const char *value_of(const char *head, const char *key)
     return at ? at + 1 + strspn(at + 1, " ") : NULL;
 }
 
-/* Reads '<i8' and the like; reads nothing beyond the end of the header. */
+/* Reads a type such as '<i8'; reads nothing beyond the end of the header. */
 static bool read_type(ebpo_catalogue_numbers *f, const char *at)
 {
     if (!at || (*at != '\'' && *at != '"') || strlen(at) < sizeof "'<i8'" - 1 ||
@@ -43,7 +44,7 @@ static bool read_type(ebpo_catalogue_numbers *f, const char *at)
     return true;
 }
 
-/* Reads (N,) */
+/* Reads the shape, (N,). */
 static bool read_shape(ebpo_catalogue_numbers *f, const char *at)
 {
     char *end;

@@ -4,16 +4,16 @@
 
 #include <ebpo/mesh.h>
 
-/* Does the same as ebpo_mesh_arrange, for trees down to `level`; -1: as deep as the coordinates'
- * size allows without enlarging the root cell too much. A mesh that is already arranged is arranged
- * again. */
+/* Does the same as ebpo_mesh_arrange, for trees down to `level`. With -1, the level is as deep as
+ * the size of the coordinates allows without enlarging the root cell too much. A mesh that is
+ * already arranged is arranged again. */
 EBPO_MUST_USE ebpo_status ebpo_arrange(ebpo_mesh *mesh, int level, unsigned threads,
                                        const ebpo_progress *progress, ebpo_error *error);
 
-/* Does the same before repairs: vertices without faces are sorted among the others, so that
+/* Arranges a mesh before repairs: vertices without faces are sorted among the others, so that
  * vertices at one position are neighbours. Then checking and repairing access memory in order too;
- * afterwards ebpo_arrange sorts the changes. The source's numbers are those of the repaired mesh in
- * the source's order: the result is the same as without this call. */
+ * afterwards ebpo_arrange sorts the changes. The source numbers are those of the repaired mesh in
+ * the order of the source: the result is the same as without this call. */
 EBPO_MUST_USE ebpo_status ebpo_arrange_to_repair(ebpo_mesh *mesh, unsigned threads,
                                                  const ebpo_progress *progress, ebpo_error *error);
 

@@ -1,13 +1,21 @@
-/* The builder's state, shared by its stages. Before them, vertices and faces are arranged along the
- * curve. Then:
- *   1. the top: faces to the pieces that the tree is cut into (partition), winding numbers
- *      (corner_windings), planes that are chosen from the leaves up (propose), the envelopes above
- *      the pieces (envelopes);
- *   2. piece by piece, on all cores: faces to cells (partition), their numbers (face_numbers),
- *      envelopes and the piece's part of each level (emit_levels), moved to the store (pieces);
- *   3. the levels' arrays (emit_levels), final vertex numbers (face_numbers). A piece is a subtree.
- *     Its only input about others comes from the top; its only results are its part of the levels
- *     and its faces' numbers. */
+/* The builder's state, shared by its stages. Before the stages, vertices and faces are arranged
+ * along the Morton curve. The stages are:
+ *   1. The top of the tree:
+ *      - partition assigns faces to the pieces into which the tree is cut;
+ *      - corner_windings computes winding numbers;
+ *      - propose chooses planes, if the selection works from the leaves up;
+ *      - envelopes computes the envelopes above the pieces.
+ *   2. Piece by piece, on all cores:
+ *      - partition assigns faces to cells;
+ *      - face_numbers numbers the faces;
+ *      - emit_levels computes envelopes and the piece's part of each level;
+ *      - pieces moves the results to the store.
+ *   3. The entire tree:
+ *      - emit_levels joins the levels' arrays;
+ *      - face_numbers computes the final numbers of the vertices.
+ *
+ * A piece is a subtree. The top is its only source of data about other pieces. Its only results are
+ * its part of the levels and the numbers of its faces. */
 #ifndef EBPO_CONSTRUCT_BUILDER_H
 #define EBPO_CONSTRUCT_BUILDER_H
 
@@ -24,8 +32,8 @@
 #define EBPO_NO_NUMBER UINT32_MAX
 #define EBPO_NO_VERTEX UINT64_MAX
 
-/* A node of a subtree under construction. Empty nodes get their colour after the winding numbers.
- */
+/* A node of a subtree under construction. An empty node becomes white or black after the winding
+ * numbers are computed. */
 typedef struct ebpo_build_node {
     uint8_t type;   /* ebpo_node_type; empty nodes are EBPO_WHITE */
     uint32_t child; /* gray: index of the first of eight children */
@@ -35,7 +43,7 @@ typedef struct ebpo_build_node {
 
 typedef struct ebpo_build_detail {
     int32_t delta[8]; /* winding numbers of the corners minus that of corner 0 */
-    /* the leaf's list, or those of all leaves below a gray node, in `entries` */
+    /* range in `entries`: list of the leaf, or lists of all leaves below the gray node */
     uint64_t entry_begin, entry_end;
     uint64_t cross_begin, cross_end; /* gray: faces that are not entirely inside, in `crossing` */
     uint32_t first, new_count;       /* leaf: final number of its first new face */
@@ -48,7 +56,7 @@ typedef struct ebpo_branch {
     uint32_t *list;
     uint64_t list_count;
     uint8_t *fresh;              /* bit i: no piece before this one lists face list[i] */
-    uint64_t fresh_count, first; /* their number; the final number of the first */
+    uint64_t fresh_count, first; /* number of fresh faces; final number of the first of them */
     ebpo_build_node *nodes;
     uint64_t node_count, node_capacity;
     ebpo_build_detail *details;
@@ -58,8 +66,8 @@ typedef struct ebpo_branch {
     uint32_t *crossing; /* indices in `list` */
     uint64_t cross_count, cross_capacity;
     int32_t winding; /* winding number at the lowest corner */
-    uint8_t
-        root_type; /* type of nodes[0], and its corner differences: kept longer than the nodes */
+    /* type and corner differences of nodes[0]: kept longer than the nodes */
+    uint8_t root_type;
     int32_t root_delta[8];
     struct ebpo_proposals *proposals; /* NULL: planes are chosen on the way down */
     struct ebpo_piece_level *out;     /* [EBPO_LEVELS_MAX] results of emit */
@@ -89,8 +97,8 @@ typedef struct ebpo_builder {
     const uint64_t *key; /* octcode of the vertex's cell at box.grid_level, ascending */
     const uint32_t (*face)[3];
     ebpo_bounds bounds;
-    uint32_t *number; /* final number of each face; a piece sets those of its fresh ones */
-    /* gray nodes above the subtrees; its leaves refer to subtrees in `detail` */
+    uint32_t *number; /* final number of each face; a piece sets those of its fresh faces */
+    /* nodes above the subtrees; `detail` of a leaf of the top is the number of a subtree */
     ebpo_branch top;
     ebpo_branch *sub;
     uint64_t sub_count, sub_capacity;

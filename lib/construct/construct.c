@@ -2,8 +2,9 @@
  * of the result.
  *
  * This file checks options and chooses the deepest level (EBP 2017, equation 3). All threads
- * process pieces; a piece's envelopes need its parent's, so the top of the tree comes first. With a
- * selection from the leaves up, the planes of all nodes are chosen before that. ebpo_build takes
+ * process pieces. The envelopes of a piece need the envelope of its parent, so the top of the tree
+ * comes first. With a selection from the leaves up, the planes of all nodes are chosen before the
+ * top. ebpo_build takes
  * over the mesh and frees it, also on failure. */
 #include "core/strict_fp.h"
 
@@ -94,18 +95,18 @@ static void copy_name(char *to, const char *from)
                      : c[0] >= 0xe0 && c[0] < 0xf0 ? 3
                      : c[0] >= 0xf0 && c[0] < 0xf5 ? 4
                                                    : 0;
-        bool fine = length > 0 && c[0] >= 32 && c[0] != 127;
-        for (int i = 1; i < length && fine; i++)
-            fine = (c[i] & 0xc0) == 0x80;
+        bool valid = length > 0 && c[0] >= 32 && c[0] != 127;
+        for (int i = 1; i < length && valid; i++)
+            valid = (c[i] & 0xc0) == 0x80;
         /* Control characters of Latin 1, overlong sequences, surrogates, code points beyond
          * Unicode. */
         if ((c[0] == 0xc2 && c[1] < 0xa0) || (c[0] == 0xe0 && c[1] < 0xa0) ||
             (c[0] == 0xed && c[1] >= 0xa0) || (c[0] == 0xf0 && c[1] < 0x90) ||
             (c[0] == 0xf4 && c[1] >= 0x90))
-            fine = false;
-        for (int i = 0; i < (fine ? length : 1); i++)
-            *to++ = fine ? from[i] : '_';
-        from += fine ? length : 1;
+            valid = false;
+        for (int i = 0; i < (valid ? length : 1); i++)
+            *to++ = valid ? from[i] : '_';
+        from += valid ? length : 1;
     }
     *to = 0;
 }
@@ -257,7 +258,7 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
 }
 
 /* Builds the tree. From the root down, each piece is finished in one pass. From the leaves up, the
- * top needs all pieces first: their cells are made twice rather than kept. */
+ * top needs all pieces first: the cells of the pieces are made twice, not kept. */
 static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
 {
     ebpo_status status = ebpo_build_corner_windings(b, error);
@@ -297,7 +298,7 @@ ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
 {
     EBPO_DEFAULT_FP;
     ebpo_build_options wanted = EBPO_BUILD_OPTIONS_INIT;
-    ebpo_build_times times = EBPO_BUILD_TIMES_INIT, *queried = NULL;
+    ebpo_build_times times = EBPO_BUILD_TIMES_INIT, *requested = NULL;
     ebpo_builder b = { .workspace = mesh->workspace,
                        .top.workspace = mesh->workspace,
                        .bounds.workspace = mesh->workspace };
@@ -312,7 +313,7 @@ ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
     if (status == EBPO_OK && wanted.times)
         status = EBPO_CHECK_SIZED(ebpo_build_times, wanted.times, error);
     if (status == EBPO_OK) {
-        queried = wanted.times;
+        requested = wanted.times;
         wanted.times = &times;
         status = check_options(&wanted, &out->info, error);
     }
@@ -322,8 +323,8 @@ ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
         fill_info(&out->info, &b, mesh, report, repair_record);
     if (status == EBPO_OK)
         status = run_stages(&b, mesh, out, error);
-    if (queried)
-        EBPO_GIVE(ebpo_build_times, queried, &times);
+    if (requested)
+        EBPO_GIVE(ebpo_build_times, requested, &times);
     builder_free(&b);
     ebpo_mesh_free(mesh);
     if (status != EBPO_OK)

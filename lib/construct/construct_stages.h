@@ -1,6 +1,6 @@
 /* The stages of building, run by construct.c; builder.h lists them in order. Each function
- * processes one piece (ebpo_branch) or the whole builder. Stages that allocate report EBPO_E_MEMORY
- * or EBPO_E_IO, long ones EBPO_E_CANCELLED. */
+ * processes one piece (ebpo_branch) or all of the builder. Stages that allocate report
+ * EBPO_E_MEMORY or EBPO_E_IO, long ones EBPO_E_CANCELLED. */
 #ifndef EBPO_CONSTRUCT_CONSTRUCT_STAGES_H
 #define EBPO_CONSTRUCT_CONSTRUCT_STAGES_H
 
@@ -15,13 +15,13 @@ ebpo_status ebpo_build_partition(ebpo_builder *b, ebpo_branch *s, ebpo_error *er
 ebpo_status ebpo_build_check_lists(uint64_t face_count, uint64_t leaves, uint64_t entries,
                                    ebpo_error *error);
 
-/* Cuts the top of the tree, and lists the faces of the pieces below it. */
+/* Builds the top of the tree, and lists the faces of the pieces below the top. */
 ebpo_status ebpo_build_split(ebpo_builder *b, ebpo_error *error);
 
 /* --- propose.c: selections from the leaves up (of the theses) --- */
 
-/* Chooses planes for all branches, after the corner windings; does nothing for a selection from the
- * root. Pieces are partitioned for it, and their nodes are freed again. */
+/* Chooses planes for all pieces, after the corner windings are computed. Does nothing for a
+ * selection from the root. Partitions each piece for this, and frees its nodes again. */
 EBPO_MUST_USE ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error);
 
 /* --- emit_levels.c --- */
@@ -61,15 +61,16 @@ EBPO_MUST_USE ebpo_status ebpo_build_gray_colours(const ebpo_builder *b, ebpo_tr
 
 /* --- corner_windings.c --- */
 
-/* Computes the windings of all branches, before the pieces are partitioned. */
+/* Computes the winding numbers of all pieces, before the pieces are partitioned. */
 ebpo_status ebpo_build_corner_windings(ebpo_builder *b, ebpo_error *error);
 /* Computes the winding number at corner 0 of each child minus that of the parent, from the
  * children's corner differences. */
 void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                          int32_t offset[8]);
-/* Computes the corner differences of a cell from the branch's faces that touch it: list[places[i]],
- * or with NULL the first `count` of the list. Long lists are processed EBPO_CORNER_FACES at a time,
- * so `capacity` needs the lesser of that and `count`. */
+/* Computes the corner differences of a cell from the piece's faces that touch the cell. The faces
+ * are list[places[i]]; if `places` is NULL, the first `count` of the list. Long lists are processed
+ * EBPO_CORNER_FACES at a time, so `capacity` has space for the lesser of EBPO_CORNER_FACES and
+ * `count`. */
 enum { EBPO_CORNER_FACES = 1 << 14 };
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
                          const uint32_t *places, uint64_t count, ebpo_triangle *capacity,
@@ -87,8 +88,9 @@ typedef struct ebpo_envelope_scratch ebpo_envelope_scratch;
 ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error);
 void ebpo_scratch_free(ebpo_envelope_scratch *scratch);
 
-/* Sets the planes of a gray node itself, chosen now or proposed before; `envelope` is its parent's
- * cut to its cell, then its envelope. Returns their number, -1: out of memory. */
+/* Sets the planes that a gray node adds, chosen now or proposed before. On entry `envelope` is the
+ * parent's envelope cut to the node's cell, on return the node's envelope. Returns the number of
+ * planes, or -1 when out of memory. */
 int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s,
                      uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
                      uint32_t codes[EBPO_PLANES_STORED]);

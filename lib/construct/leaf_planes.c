@@ -2,9 +2,10 @@
  * from the same faces, bit for bit, so most files do not store them.
  *
  * The candidates' directions are those of the convex hull of the extreme points: the corners of the
- * faces' parts in the cell, and the cell's corners inside. With too many points, or with all in one
- * plane, the directions are the normals of the faces. A plane's offset is the support of all
- * points, plus a bound of the rounding error, so no part of a face in the cell is cut off. */
+ * faces' parts in the cell, and the cell's corners that are inside the solid. With too many points,
+ * or with all in one plane, the directions are the normals of the faces. A plane's offset is the
+ * support of all points, plus a bound of the rounding error, so no part of a face in the cell is
+ * cut off. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -63,7 +64,7 @@ static bool add_point(leaf_points *points, const double p[3], double slack)
     return true;
 }
 
-/* Returns false when there are too many. */
+/* Collects the extreme points. Returns false when there are more than LEAF_POINTS. */
 static bool gather_points(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
                           uint64_t count, unsigned inside, leaf_points *points)
 {

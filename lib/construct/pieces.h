@@ -9,7 +9,7 @@
 
 /* --- a piece's part of the levels' arrays --- */
 
-/* Stretches of one level. */
+/* A piece's stretches of the arrays of one level. */
 typedef struct ebpo_piece_level {
     ebpo_level level;
     bool packed;                          /* its arrays are in the builder's store */
@@ -40,14 +40,14 @@ typedef struct ebpo_handover {
     uint64_t offer_count, offer_capacity, corner_count, corner_capacity;
 } ebpo_handover;
 
-/* Chosen planes of a branch's gray nodes and leaves, by detail. */
+/* Chosen planes of a piece's gray nodes and leaves, by detail. */
 typedef struct ebpo_proposals {
     uint64_t *first; /* [detail_count] index in `codes` */
     uint8_t *count;  /* [detail_count] */
     uint32_t *codes;
     uint64_t code_count, code_capacity;
     bool packed;        /* the arrays are in the builder's store */
-    ebpo_handover root; /* of a subtree, until the top has used it */
+    ebpo_handover root; /* data of a subtree's root, until the top has used them */
 } ebpo_proposals;
 
 /* Makes proposals without planes. Returns false when out of memory. */
@@ -77,10 +77,10 @@ void ebpo_store_free(struct ebpo_store *store);
 /* Adds an empty detail, or eight empty nodes. Returns false when out of memory. */
 bool ebpo_branch_detail(const ebpo_builder *b, ebpo_branch *s, uint32_t *index);
 bool ebpo_branch_children(const ebpo_builder *b, ebpo_branch *s, uint32_t *first);
-/* Returns EBPO_E_LIMIT when 32 bits cannot number more nodes of the branch. */
+/* Returns EBPO_E_LIMIT when 32 bits cannot number more nodes of the piece. */
 ebpo_status ebpo_build_check_branch(const ebpo_branch *s, ebpo_error *error);
 
-/* Frees the results of partition for the piece's list, which can be made again. */
+/* Frees the results of partition for the piece; a second call of partition makes them again. */
 void ebpo_branch_forget(ebpo_branch *s);
 /* Frees the data that only partition and envelopes need; keeps `out` and the root's facts. */
 void ebpo_branch_release(ebpo_branch *s);

@@ -12,11 +12,12 @@
 #include "geometry/polytope.h"
 
 enum {
-    /* maximum that a leaf, and a gray node below the first levels, adds to its parent's */
+    /* maximum number of planes that a leaf, or a gray node below the first levels, adds to the
+     * planes of its parent */
     EBPO_PLANES_MAX = 32,
     EBPO_PLANES_CANDIDATES = 512, /* maximum number of candidates of such a node */
-    /* maximum that the selections of the theses, which start from the cell, choose: a byte counts
-     * them */
+    /* maximum number of planes that the selections of the theses choose, which start from the
+     * cell: a byte counts the planes */
     EBPO_PLANES_STORED = 255
 };
 
@@ -24,23 +25,26 @@ enum {
  * without volume. */
 static const double ebpo_needle = 0.1;
 
-/* A candidate: a normal (bits 0-19 of a plane code) and the support of the solid in the cell in
- * that direction: an upper bound of n . xi over it, in cell coordinates. `moved`: its distance from
- * its face's plane, in the model's unit; only for the selections of the theses. */
+/* A candidate for a plane of the envelope. */
 typedef struct ebpo_candidate {
-    uint32_t normal;
-    double support, moved;
+    uint32_t normal; /* bits 0-19 of a plane code */
+    /* upper bound of n . xi over the solid in the cell, in cell coordinates */
+    double support;
+    /* distance of the candidate from the plane of its face, in the model's unit; only for the
+     * selections of the theses */
+    double moved;
 } ebpo_candidate;
 
 /* Input of a selection for a node. */
 typedef struct ebpo_choice {
-    const ebpo_candidate *candidates; /* normals differ */
-    int count, most;                  /* number of candidates; maximum number of codes */
+    const ebpo_candidate *candidates; /* [count] no two have the same normal */
+    int count;                        /* number of candidates */
+    int most;                         /* maximum number of codes */
     /* inherit: volume that no candidate can remove, in cells (0: not known) */
     double core;
-    /* inherit: a plane removes at least this share of the cell, or cuts off a part that extends
-     * farther beyond it than this, in cells (0: any part) */
-    double epsilon, reach;
+    double epsilon; /* inherit: a plane must remove at least this share of the cell, */
+    /* or cut off a part that extends beyond the plane by more than this, in cells (0: any part) */
+    double reach;
     int wanted;              /* selections of the theses: number of candidates to choose */
     const double *cell_size; /* [3] cell coordinates to the model's unit */
     ebpo_normal_distance normals;
@@ -48,25 +52,26 @@ typedef struct ebpo_choice {
 } ebpo_choice;
 
 /* A selection: takes planes from the candidates, clips `envelope` by them and writes their codes;
- * returns their number, -1: out of memory. Adding one: CONTRIBUTING.md, "A new plane selection".
- * Codes may come in any order. From the root down, there are at most EBPO_PLANES_CANDIDATES
- * candidates; from the leaves up any number. */
+ * returns their number, or -1 when out of memory. Adding one: CONTRIBUTING.md, "A new plane
+ * selection". Codes may come in any order. From the root down, there are at most
+ * EBPO_PLANES_CANDIDATES candidates; from the leaves up any number. */
 typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
-/* Returns the function of a selection, NULL if invalid. With from_leaves (ebpo_selection_describe)
- * nodes come after their children, each from its cell alone (EBP 2017, 3.4.1); else from the root
- * down, each from its parent's envelope. */
+/* Returns the function of a selection, NULL if invalid. If from_leaves is true
+ * (ebpo_selection_describe), a node comes after its children and its selection starts from its cell
+ * (EBP 2017, 3.4.1). Otherwise nodes come from the root down, and the selection of a node starts
+ * from its parent's envelope. */
 ebpo_select_fn ebpo_selection_function(ebpo_selection selection);
 
 /* Selects greedily by removed volume, lazily re-evaluated, until the gain falls below epsilon *
  * cell volume. */
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
-/* Returns the number to choose of `count` candidates: `percent` of them, rounded up (EBP 2017,
- * equation 5); or, with k_root > 0, BP's K: k_root / 2^level, halved until it is below `count`
- * (2008, 3.5.1); all of them where it is below 1 from the start (as there). At most
- * EBPO_PLANES_STORED: more cannot be stored, and clusters of more planes would not be the best for
- * the stored ones. */
+/* Returns how many of `count` candidates a selection of the theses chooses: `percent` of the
+ * candidates, rounded up (EBP 2017, equation 5). With k_root > 0, it is K of BP (2008, 3.5.1):
+ * k_root / 2^level, halved until K is below `count`; as in BP, all candidates if k_root / 2^level
+ * is below 1. At most EBPO_PLANES_STORED: more planes cannot be stored, and clusters for more
+ * planes would not be the best clusters for the stored planes. */
 int ebpo_selection_wanted(int count, int level, double percent, double k_root);
 
 /* Selects every candidate that may remove 0.03 % of the cell or more, deepest cut first, then
@@ -81,7 +86,8 @@ typedef struct ebpo_triangle {
 
 /* Returns the number of extreme points of face ∩ cell in cell coordinates (polygon corners, at most
  * 9), and an error bound: the exact intersection is within `*slack` (cell units, each axis) of the
- * polygon's hull. 0: they do not intersect. The cell is enlarged by the slack before clipping, so
+ * polygon's hull. Returns 0 when they do not
+ * intersect. The cell is enlarged by the slack before clipping, so
  * that a face touching the closed cell always gives points. */
 int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
                        double points[9][3], double *slack);

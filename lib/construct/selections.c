@@ -121,7 +121,7 @@ static void drop_first(ranked *heap, int *count)
         sift_down(heap, *count, 0);
 }
 
-/* Cuts off needles, which have hardly any volume: the farthest extents first. Skips a plane that
+/* Cuts off needles, which have hardly any volume, starting with the farthest. Skips a plane that
  * clipping refuses. */
 static int cut_needles(ebpo_polytope *envelope, contest *c, double reach, int most, int taken,
                        uint32_t *codes)
@@ -199,7 +199,7 @@ int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, i
 
 /* Clips by the chosen candidates in ascending order of their numbers. Drops those that then cut
  * nothing. No more than `most` are chosen (ebpo_selection_wanted): candidates are sorted by
- * direction, and omitted ones here would all face one way. */
+ * direction, so candidates omitted here would all face in similar directions. */
 static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen,
                           uint32_t *codes)
 {
@@ -438,7 +438,7 @@ static bool swap_once(clustering *c)
     return true;
 }
 
-/* Handles one medoid, which has no second nearest. */
+/* Finds the best medoid when only one is wanted: then no point has a second nearest medoid. */
 static void single_medoid(clustering *c)
 {
     double best = INFINITY;
@@ -497,8 +497,8 @@ ebpo_select_fn ebpo_selection_function(ebpo_selection selection)
     return (unsigned)selection < EBPO_SELECTION_COUNT ? selection_functions[selection] : NULL;
 }
 
-/* Returns equation 5, or BP's K. */
-static int queried_for(int count, int level, double percent, double k_root)
+/* Computes equation 5, or K of BP. */
+static int requested_number(int count, int level, double percent, double k_root)
 {
     if (!(k_root > 0))
         return (int)ceil(count * percent / 100);
@@ -512,6 +512,6 @@ static int queried_for(int count, int level, double percent, double k_root)
 
 int ebpo_selection_wanted(int count, int level, double percent, double k_root)
 {
-    int wanted = queried_for(count, level, percent, k_root);
+    int wanted = requested_number(count, level, percent, k_root);
     return wanted < EBPO_PLANES_STORED ? wanted : EBPO_PLANES_STORED;
 }

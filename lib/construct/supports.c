@@ -242,7 +242,7 @@ static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebp
     return true;
 }
 
-/* Clears the table, sized for about `points` points. */
+/* Clears the hash table and sets its size for about `points` points. */
 static bool clear_table(ebpo_supports *s, uint64_t points)
 {
     uint64_t size = ebpo_hash_slots(2 * points < TABLE_MAX ? 2 * points : TABLE_MAX);

@@ -25,8 +25,9 @@ typedef struct ebpo_supports {
     double (*point)[4][4];
     uint64_t count, capacity; /* number of points; number of fours */
     const ebpo_sweep *sweep;
-    uint16_t *place; /* hash table: 1 + number of the point; most occur several times. */
-    uint64_t place_capacity, place_count; /* a power of two */
+    uint16_t *place; /* hash table: 1 + number of the point; most points occur several times */
+    uint64_t place_capacity;
+    uint64_t place_count; /* size of the table, a power of two */
     /* for each stretch of points: least and greatest coordinates, greatest slack */
     double (*box)[7];
     uint64_t box_capacity;
@@ -39,7 +40,7 @@ bool ebpo_supports_gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_br
                           const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding);
 
 /* Returns an upper bound of n . xi, exact except for rounding errors that ebpo_plane_code_offset
- * allows for; a search that reaches `enough` ends there. `where` is the point of the maximum, in
+ * allows for. The search ends when it reaches `enough`. `where` is the point of the maximum, in
  * cell coordinates. Returns -1e300 when there are no points. */
 double ebpo_supports_find(const ebpo_supports *s, const int32_t n[3], double enough,
                           double where[3]);

@@ -1,6 +1,6 @@
 /* The two inner loops of hulls and supports, four doubles at a time (sweep_kernels.c). They are
- * compiled once for each instruction set, with the same operations in the same order, so results
- * are the same. */
+ * compiled once for each instruction set. Each variant does the same operations in the same order,
+ * so the results are the same. */
 #ifndef EBPO_CONSTRUCT_SWEEP_H
 #define EBPO_CONSTRUCT_SWEEP_H
 
@@ -19,7 +19,7 @@ typedef struct ebpo_sweep_planes {
 } ebpo_sweep_planes;
 
 /* Points in fours, by coordinate: x, y, z, and an addition to n . x. The padding of the last four
- * is a copy. */
+ * is a copy of a point. */
 typedef struct ebpo_sweep_points {
     const double (*point)[4][4]; /* [fours] */
     /* for each stretch: least and greatest coordinates, greatest addition */

@@ -1,7 +1,7 @@
 /* The two inner loops of hulls and supports, four doubles at a time: planes that a point is above,
  * and the greatest value among points. meson.build compiles this file once for each instruction
- * set; the operations and their order are the same in each, so results are too. The interface is
- * sweep.h; core/cpu.h chooses the variant. */
+ * set; the operations and their order are the same in each, so the results are the same. The
+ * interface is sweep.h; core/cpu.h chooses the variant. */
 #include "core/strict_fp.h"
 
 #include "construct/sweep.h"
@@ -42,8 +42,8 @@ static int planes_seen(const ebpo_sweep_planes *planes, const double p[3], doubl
     return count;
 }
 
-/* Returns an upper bound for a stretch: computed like the points' values, so rounding does not make
- * it less. */
+/* Returns an upper bound for the values of a stretch's points. The bound is computed like the
+ * values, so rounding does not make it less than a value. */
 static double reach_of(const double box[7], const double n[3])
 {
     return n[0] * box[n[0] < 0 ? 0 : 3] + n[1] * box[n[1] < 0 ? 1 : 4] +

@@ -1,7 +1,7 @@
-/* Memory from malloc with checked sizes: the number of items comes from a file or a mesh, and its
- * product with the item size may overflow. Arrays that may be larger than memory come from a
- * workspace instead (workspace.c). Also counts the memory of an object that is being built against
- * a limit. */
+/* Memory from malloc with checked sizes: the number of items comes from a file or a mesh, and the
+ * product of this number and the item size may overflow. Arrays that may be larger than memory come
+ * from a workspace instead (workspace.c). A quota limits the memory of an object that is being
+ * built. */
 #include "core/alloc.h"
 
 #include <inttypes.h>
@@ -72,11 +72,11 @@ ebpo_status ebpo_quota_check(ebpo_quota *space, uint64_t bytes, ebpo_error *erro
     if (!space || (space->taken <= space->most && bytes <= space->most - space->taken))
         return EBPO_OK;
     uint64_t all = bytes > UINT64_MAX - space->taken ? UINT64_MAX : space->taken + bytes,
-             grown = space->most + space->most / 4 + 1;
-    space->needed = all > grown ? all : grown;
+             larger = space->most + space->most / 4 + 1;
+    space->needed = all > larger ? all : larger;
     return ebpo_fail(error, EBPO_E_LIMIT,
-                     "the memory budget leaves %" PRIu64
-                     " bytes for this, which takes up to %" PRIu64,
+                     "the memory budget allows %" PRIu64
+                     " bytes for an object that needs up to %" PRIu64,
                      space->most, all);
 }
 

@@ -26,10 +26,8 @@ void *ebpo_realloc(void *block, uint64_t count, size_t size);
  * which grows by half. Returns false when memory is short; the array stays valid. */
 bool ebpo_grow(void *array, uint64_t *capacity, uint64_t need, size_t size);
 
-/* A limit for the memory of an object that is being built. */
-
-/* Used by one thread. A refused request sets `needed`: a limit that might suffice, always above
- * `most`. */
+/* The memory limit of an object that is being built; used by one thread. A refused request sets
+ * `needed` to a limit that might suffice, always above `most`. */
 typedef struct ebpo_quota {
     uint64_t most, taken, needed;
 } ebpo_quota;

@@ -20,47 +20,46 @@
 #include "core/os.h"
 #include "core/parallel.h"
 
-/* Items of all caches that share a budget: a table by cache and key, and the order of last use of
- * the unused items. */
+/* The slots of all caches that share a budget: a table by cache and key, and the order of last use
+ * of the items that are not in use. */
 
 typedef enum cache_slot_state { LOADING, READY, FAILED } cache_slot_state;
 
 struct ebpo_cache;
 
-/* One key of one cache. In the table while LOADING or READY; a FAILED slot lives until its last
- * waiter has seen it. */
+/* The slot of one key of one cache. It is in the table while LOADING or READY; a FAILED slot lives
+ * until its last waiter has seen it. */
 typedef struct cache_slot {
     struct ebpo_cache *owner;
     uint64_t key, bytes;
     cache_slot_state state;
     unsigned pins, waiters;
     void *item;
-    struct cache_slot *chain;         /* next in its bucket, or in a list of leaving items */
+    struct cache_slot *chain;         /* next slot in the bucket, or in a list of leaving items */
     struct cache_slot *older, *newer; /* READY and not pinned: neighbours in order of last use */
 } cache_slot;
 
-/* Chains by hash: unlike in core/hash.h, keys are removed again. */
+/* A hash table with chains, because keys are removed again; the tables of core/hash.h cannot do
+ * that. */
 typedef struct cache_slots {
     cache_slot **bucket;
     uint64_t bucket_count, count;
     cache_slot *oldest, *newest;
 } cache_slots;
 
-/* Parts of a cache, and reservations in the budget that caches share. */
-
-/* One lock and one order of last use for all its caches; a cache with a separate budget has a pool
- * too. */
+/* A budget, with one lock and one order of last use for all caches of the pool. A cache with a
+ * separate budget has a separate pool. */
 struct ebpo_cache_pool {
     uint64_t budget;
     pthread_mutex_t lock;   /* guards all below; never held while a source is called */
     pthread_cond_t changed; /* loads ended, or memory became free */
     cache_slots slots;
-    uint64_t bytes, peak_bytes; /* bytes of all caches, and permanently taken ones */
+    uint64_t bytes, peak_bytes; /* of all caches, and those taken permanently */
     uint64_t pinned;            /* bytes of items that are in use */
-    uint64_t taken;             /* permanently: ebpo_cache_pool_take */
+    uint64_t taken;             /* bytes taken permanently by ebpo_cache_pool_take */
     uint64_t aside_max;
-    /* bytes reserved for running loads, and bytes of items being released: these become free or
-     * pinned without further action */
+    /* bytes reserved for running loads, and bytes of items being released: they become free or
+     * pinned when the loads and releases end */
     uint64_t passing;
     /* waiting gets are served in order of arrival; otherwise a large one might wait for ever */
     uint64_t tickets, serving;
@@ -71,8 +70,9 @@ struct ebpo_cache {
     char name[32];
     ebpo_cache_pool *pool;
     bool alone; /* the pool belongs to this cache alone */
-    /* the background thread has work: separate from `changed`, or each unpin would wake it */
-    pthread_cond_t queried;
+    /* signalled when the background thread has work; it is separate from `changed`, because each
+     * unpin would wake the thread */
+    pthread_cond_t work_added;
     uint64_t aside_max, aside;
     uint64_t leaving; /* items that are out of the table and being released */
     ebpo_cache_stats stats;
@@ -80,16 +80,16 @@ struct ebpo_cache {
     pthread_t ahead_thread;
     uint64_t ahead[EBPO_CACHE_AHEAD];
     unsigned ahead_count, ahead_next;
-    uint64_t querying; /* number of prefetch requests */
+    uint64_t prefetch_count; /* number of calls of ebpo_cache_prefetch */
 };
 
-/* A reservation. The background thread yields to all others, and drops no item of the same
- * prefetch. */
+/* A request for a reservation. Those of the background thread wait for all others, and drop no item
+ * of the same prefetch. */
 typedef struct cache_demand {
-    ebpo_cache *cache; /* NULL: permanent */
+    ebpo_cache *cache; /* NULL: ebpo_cache_pool_take */
     uint64_t key, peak;
     bool ahead;
-    bool aside; /* part of the bytes that are set aside anyway */
+    bool aside; /* a part of the bytes set aside (ebpo_cache_set_aside) */
     bool known; /* the peak is known from an earlier attempt */
 } cache_demand;
 
@@ -196,7 +196,7 @@ static void count_bytes(ebpo_cache_pool *p, ebpo_cache *c, uint64_t bytes)
         c->stats.peak_bytes = c->stats.bytes;
 }
 
-static bool is_queried_ahead(const ebpo_cache *c, uint64_t key)
+static bool is_in_prefetch(const ebpo_cache *c, uint64_t key)
 {
     for (unsigned i = 0; i < c->ahead_count; i++)
         if (c->ahead[i] == key)
@@ -204,8 +204,8 @@ static bool is_queried_ahead(const ebpo_cache *c, uint64_t key)
     return false;
 }
 
-/* Releases items that are out of the table. Their bytes count until they are released, or another
- * thread would use these bytes twice. */
+/* Releases items that are out of the table. Their bytes count until then; otherwise another thread
+ * would reserve memory that is still in use. */
 static void release_leaving(ebpo_cache_pool *p, cache_slot *leaving)
 {
     if (!leaving)
@@ -236,7 +236,8 @@ static void drop_item(ebpo_cache_pool *p, cache_slot *s, cache_slot **leaving)
     *leaving = s;
 }
 
-/* Returns the bytes that the background thread may not drop: items of the same prefetch. */
+/* Returns the bytes of the items that the background thread may not drop: those of the same
+ * prefetch. */
 static uint64_t kept_for(const ebpo_cache_pool *p, const cache_demand *d)
 {
     uint64_t bytes = 0;
@@ -273,7 +274,7 @@ static cache_capacity reserve_space(ebpo_cache_pool *p, const cache_demand *d)
         uint64_t left = saturated_sum(p->bytes, d->peak);
         for (cache_slot *s = p->slots.oldest, *newer; s && left > p->budget; s = newer) {
             newer = s->newer;
-            if (d->ahead && s->owner == d->cache && is_queried_ahead(d->cache, s->key))
+            if (d->ahead && s->owner == d->cache && is_in_prefetch(d->cache, s->key))
                 continue;
             left -= s->bytes;
             s->owner->stats.evicted++;
@@ -286,8 +287,8 @@ static cache_capacity reserve_space(ebpo_cache_pool *p, const cache_demand *d)
     return CAPACITY_MADE;
 }
 
-/* Same as reserve_space, in order of arrival, waiting for free memory. Returns false if there will
- * be none. */
+/* Waits its turn, in order of arrival, then reserves as reserve_space does and waits for free
+ * memory. Returns false if there will never be enough. */
 static bool wait_in_turn(ebpo_cache_pool *p, const cache_demand *d)
 {
     uint64_t ticket = p->tickets++;
@@ -348,8 +349,8 @@ ebpo_status ebpo_cache_pool_take(ebpo_cache_pool *p, uint64_t bytes, ebpo_error 
     pthread_mutex_unlock(&p->lock);
     return made ? EBPO_OK
                 : ebpo_fail(error, EBPO_E_LIMIT,
-                            "%" PRIu64 " bytes of a shared budget are not free: there are %" PRIu64
-                            ", and with what is in use that would be %" PRIu64,
+                            "%" PRIu64 " bytes are not free in a shared budget of %" PRIu64 " bytes"
+                            "; with the items in use, %" PRIu64 " would be needed",
                             bytes, p->budget, held);
 }
 
@@ -391,12 +392,12 @@ static ebpo_status wait_for_capacity(ebpo_cache *c, uint64_t peak, ebpo_error *e
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the %s cache's budget is %" PRIu64 " bytes, of which %" PRIu64
                      " are in use, and one %s more takes up to %" PRIu64 "; a budget of %" PRIu64
-                     " would do",
+                     " would suffice",
                      c->name, p->budget, used, c->name, peak, saturated_sum(used, peak));
 }
 
-/* Ends a load: the item replaces `reserved` and is pinned by each waiting thread (and `own` times
- * more); after a failure only `reserved` is given back. */
+/* Ends a load: the item replaces `reserved` and is pinned once for each waiting thread and `own`
+ * times more; after a failure only `reserved` is given back. */
 static void end_load(ebpo_cache *c, cache_slot *s, bool loaded, uint64_t reserved, unsigned own)
 {
     give_back_reserved(c, reserved);
@@ -426,7 +427,7 @@ static ebpo_status estimate_bytes(ebpo_cache *c, uint64_t key, uint64_t *peak, e
 }
 
 /* Calls the source, without the lock; an item larger than its estimate is dropped. *needed: bytes
- * that the source requests, or 0. */
+ * that the source requests instead of `reserved`, or 0. */
 static ebpo_status call_load(ebpo_cache *c, cache_slot *s, uint64_t reserved, uint64_t *needed,
                              ebpo_error *error)
 {
@@ -580,7 +581,7 @@ void ebpo_cache_unpin(ebpo_cache *c, uint64_t key)
     pthread_mutex_unlock(&c->pool->lock);
 }
 
-/* --- aside --- */
+/* --- bytes set aside --- */
 
 void ebpo_cache_set_aside(ebpo_cache *c, uint64_t most)
 {
@@ -616,8 +617,8 @@ void ebpo_cache_give_back_aside(ebpo_cache *c, uint64_t bytes)
 
 /* --- prefetch --- */
 
-/* Loads d->key in the background, or skips it; returns false when it must wait for other loads. No
- * thread waits for this key meanwhile: a thread that needs it loads it. */
+/* Loads d->key in the background, or skips it; returns false when it must wait for other loads. In
+ * the latter case the slot is removed, and a thread that needs the key loads it. */
 static bool load_ahead(ebpo_cache *c, cache_demand *d)
 {
     cache_slot *s =
@@ -652,18 +653,18 @@ static void *run_ahead(void *context)
     pthread_mutex_lock(&c->pool->lock);
     while (!c->stop) {
         if (c->ahead_next == c->ahead_count) {
-            pthread_cond_wait(&c->queried, &c->pool->lock);
+            pthread_cond_wait(&c->work_added, &c->pool->lock);
             continue;
         }
-        uint64_t querying = c->querying;
+        uint64_t prefetch_count = c->prefetch_count;
         if (!d.known || d.key != c->ahead[c->ahead_next])
             d = (cache_demand){ .cache = c, .key = c->ahead[c->ahead_next], .ahead = true };
         bool done = load_ahead(c, &d);
         if (done)
             d.known = false;
-        if (done && querying == c->querying)
+        if (done && prefetch_count == c->prefetch_count)
             c->ahead_next++;
-        else if (!done && querying == c->querying && !c->stop)
+        else if (!done && prefetch_count == c->prefetch_count && !c->stop)
             pthread_cond_wait(&c->pool->changed, &c->pool->lock);
     }
     pthread_mutex_unlock(&c->pool->lock);
@@ -686,9 +687,9 @@ static bool start_ahead(ebpo_cache *c)
 static void take_list(ebpo_cache *c, const uint64_t *keys, unsigned count)
 {
     c->ahead_count = c->ahead_next = 0;
-    c->querying++;
+    c->prefetch_count++;
     for (unsigned i = 0; i < count && i < EBPO_CACHE_AHEAD; i++)
-        if (!is_queried_ahead(c, keys[i]))
+        if (!is_in_prefetch(c, keys[i]))
             c->ahead[c->ahead_count++] = keys[i];
     for (unsigned i = c->ahead_count; i-- > 0;) {
         cache_slot *s = find_slot(&c->pool->slots, c, c->ahead[i]);
@@ -705,7 +706,7 @@ void ebpo_cache_prefetch(ebpo_cache *c, const uint64_t *keys, unsigned count)
     take_list(c, keys, count);
     if (!c->ahead_runs && c->ahead_count)
         c->ahead_runs = start_ahead(c);
-    pthread_cond_signal(&c->queried);
+    pthread_cond_signal(&c->work_added);
     pthread_cond_broadcast(&c->pool->changed);
     pthread_mutex_unlock(&c->pool->lock);
 }
@@ -721,7 +722,7 @@ ebpo_status ebpo_cache_make_in(ebpo_cache **out, const ebpo_cache_source *source
     c->source = *source;
     strncpy(c->name, name, sizeof c->name - 1);
     c->pool = pool;
-    pthread_cond_init(&c->queried, NULL);
+    pthread_cond_init(&c->work_added, NULL);
     return EBPO_OK;
 }
 
@@ -771,7 +772,7 @@ static void stop_ahead(ebpo_cache *c)
     pthread_mutex_lock(&c->pool->lock);
     c->stop = true;
     pthread_cond_broadcast(&c->pool->changed);
-    pthread_cond_signal(&c->queried);
+    pthread_cond_signal(&c->work_added);
     pthread_mutex_unlock(&c->pool->lock);
     if (c->ahead_runs)
         pthread_join(c->ahead_thread, NULL);
@@ -785,13 +786,13 @@ void ebpo_cache_free(ebpo_cache *c)
     stop_ahead(c);
     pthread_mutex_lock(&p->lock);
     drop_unpinned(c);
-    while (c->leaving) /* other threads drop them for reservations */
+    while (c->leaving) /* dropped by other threads, for reservations */
         pthread_cond_wait(&p->changed, &p->lock);
     p->bytes -= c->aside;
     p->aside_max -= c->aside_max;
     pthread_cond_broadcast(&p->changed);
     pthread_mutex_unlock(&p->lock);
-    pthread_cond_destroy(&c->queried);
+    pthread_cond_destroy(&c->work_added);
     if (c->alone)
         ebpo_cache_pool_free(p);
     free(c);

@@ -8,7 +8,8 @@
 typedef struct ebpo_cache ebpo_cache;
 
 /* The source of items. Called without locks held, by any thread; estimate and load never run twice
- * at once for one key. They may use other caches, and of this cache only ebpo_cache_take_aside. */
+ * at once for one key. They may use other caches; on this cache they may only call
+ * ebpo_cache_take_aside. */
 typedef struct ebpo_cache_source {
     void *user;
     /* Estimates the bytes that loading `key` takes, including the item; they are reserved first.
@@ -35,15 +36,15 @@ typedef struct ebpo_cache_stats {
 /* Number of keys that may be prefetched. */
 enum { EBPO_CACHE_AHEAD = 64 };
 
-/* A budget shared by caches: the least recently used of all their items are dropped first. */
+/* A budget shared by caches: the least recently used items of all of them are dropped first. */
 typedef struct ebpo_cache_pool ebpo_cache_pool;
 
 EBPO_MUST_USE ebpo_status ebpo_cache_pool_make(ebpo_cache_pool **out, uint64_t budget,
                                                ebpo_error *error);
 /* Frees the pool; call it after freeing its caches. NULL is allowed. */
 void ebpo_cache_pool_free(ebpo_cache_pool *pool);
-/* Takes bytes of the budget for another purpose until they are given back; drops items for it.
- * EBPO_E_LIMIT: items in use leave too little. */
+/* Takes bytes from the budget for another purpose, until they are given back. Drops items to free
+ * the bytes. EBPO_E_LIMIT: items in use leave too little. */
 EBPO_MUST_USE ebpo_status ebpo_cache_pool_take(ebpo_cache_pool *pool, uint64_t bytes,
                                                ebpo_error *error);
 void ebpo_cache_pool_give_back(ebpo_cache_pool *pool, uint64_t bytes);
@@ -51,10 +52,7 @@ void ebpo_cache_pool_give_back(ebpo_cache_pool *pool, uint64_t bytes);
 void ebpo_cache_pool_get_bytes(ebpo_cache_pool *pool, uint64_t *now, uint64_t *peak,
                                uint64_t *taken);
 
-/* Items in memory under a budget: found by key, loaded when missing; the least recently used are
- * dropped first. Thread-safe. */
-
-/* Makes a cache. `budget` in bytes, 0: no limit. `name` ("subtree") is for messages. */
+/* Makes a cache. `budget` is in bytes; 0 means no limit. `name` ("subtree") is for messages. */
 EBPO_MUST_USE ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source,
                                           const char *name, uint64_t budget, ebpo_error *error);
 /* Makes a cache in a shared pool, which must outlive it. */
@@ -64,13 +62,13 @@ EBPO_MUST_USE ebpo_status ebpo_cache_make_in(ebpo_cache **out, const ebpo_cache_
 /* Stops the background thread and releases all items; none may be pinned. NULL is allowed. */
 void ebpo_cache_free(ebpo_cache *cache);
 
-/* Finds or loads an item and pins it: it stays until unpinned as often as it was got. Waits while
- * another thread loads the same key, or while a background load holds the memory. EBPO_E_LIMIT when
- * the item does not fit the budget even with all unpinned items dropped; the message states a
- * sufficient budget. *hit may be NULL. */
+/* Finds or loads an item and pins it: the item stays until ebpo_cache_unpin was called once for
+ * each get. Waits while another thread loads the same key, or while a background load holds the
+ * memory. EBPO_E_LIMIT when the item does not fit the budget even with all unpinned items dropped;
+ * the message states a sufficient budget. *hit may be NULL. */
 EBPO_MUST_USE ebpo_status ebpo_cache_get(ebpo_cache *cache, uint64_t key, void **item, bool *hit,
                                          ebpo_error *error);
-/* Returns true if an item is in memory now; does not count as use or hit. */
+/* Returns true if an item is in memory now; this does not count as a use or a hit. */
 bool ebpo_cache_has(ebpo_cache *cache, uint64_t key);
 void ebpo_cache_unpin(ebpo_cache *cache, uint64_t key);
 
@@ -83,13 +81,13 @@ bool ebpo_cache_try(ebpo_cache *cache, uint64_t key, void **item);
  * EBPO_CACHE_AHEAD are ignored. Items that are in memory already count as just used. */
 void ebpo_cache_prefetch(ebpo_cache *cache, const uint64_t *keys, unsigned count);
 
-/* Sets the most bytes of the budget that data beside the items may take; loads are refused as if
- * all of them were taken. Call it before the cache is used. */
+/* Sets the number of bytes of the budget that are set aside for other data than the items. Loads
+ * are refused as if all these bytes were taken. Call it before the cache is used. */
 void ebpo_cache_set_aside(ebpo_cache *cache, uint64_t most);
-/* Takes some of these bytes, and drops items for it. Returns false if they are all taken, or if
- * items in use and running loads leave too little now. */
+/* Takes bytes of those set aside, and drops items to free them. Returns false if too few are left,
+ * or if items in use and running loads leave too little memory now. */
 bool ebpo_cache_take_aside(ebpo_cache *cache, uint64_t bytes);
-/* Gives back bytes that were taken aside and are not needed any more. */
+/* Gives back bytes taken by ebpo_cache_take_aside. */
 void ebpo_cache_give_back_aside(ebpo_cache *cache, uint64_t bytes);
 
 /* Drops all unpinned items. */

@@ -19,9 +19,9 @@ void ebpo_sha256_end(ebpo_sha256 *state, uint8_t digest[32]);
 /* Writes lower-case hexadecimal digits and a terminating zero byte. */
 void ebpo_sha256_hex(const uint8_t digest[32], char hex[65]);
 
-/* Compares checksums that files state. All comparisons are here, so that a fuzzing build
- * (`-Dfuzzing=true`, never installed) can skip them: otherwise damaged input would be rejected at
- * the checksum and never reach the code behind it. */
+/* Compares a computed checksum with the one that a file states. All comparisons are here, so that a
+ * fuzzing build (`-Dfuzzing=true`, never installed) can skip them: otherwise damaged input would be
+ * rejected at the checksum and never reach the code after it. */
 
 #ifdef EBPO_FUZZING
 enum { EBPO_CHECKSUMS_COMPARED = 0 };
@@ -39,7 +39,8 @@ static inline bool ebpo_digest_differs(const uint8_t stated[32], const uint8_t c
     return EBPO_CHECKSUMS_COMPARED && memcmp(stated, computed, 32) != 0;
 }
 
-/* Returns Jenkins' lookup3 ("hashlittle", from 0), the checksum of HDF5 metadata. */
+/* Returns Jenkins' lookup3 ("hashlittle" with the initial value 0), the checksum of HDF5 metadata.
+ */
 
 uint32_t ebpo_lookup3(const uint8_t *bytes, size_t size);
 

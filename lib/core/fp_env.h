@@ -2,8 +2,8 @@
  * traps, whatever the caller has set.
  *
  * EBPO_DEFAULT_FP; as the first line of a public function saves the caller's environment and
- * restores it on every return. It costs a few nanoseconds where the environment is the default one,
- * because nothing is written then. Threads that the function starts inherit the environment.
+ * restores it on every return. Where the caller's environment is already the default, it writes
+ * nothing and takes a few nanoseconds. Threads that the function starts inherit the environment.
  * Exception flags that the caller had raised stay; the flags of the library's own operations may be
  * added. */
 #ifndef EBPO_CORE_FP_ENV_H
@@ -12,13 +12,13 @@
 #if defined(__SSE2__)
 #include <xmmintrin.h>
 
-/* Only SSE determines results: strict_fp.h rejects x87 arithmetic. */
+/* On x86 only the SSE control register is set, because strict_fp.h rejects x87 arithmetic. */
 typedef struct ebpo_fp_env {
     unsigned control;
 } ebpo_fp_env;
 
 /* Mask of the control register without the six exception flags, and its default: all exceptions
- * masked, to nearest, no flush to zero, no denormals-are-zero. */
+ * masked, rounding to nearest, no flush to zero, no denormals-are-zero. */
 enum { EBPO_FP_CONTROL = 0xffc0, EBPO_FP_DEFAULT = 0x1f80 };
 
 /* Sets the default environment. The asm prevents the compiler from moving memory reads, and

@@ -19,7 +19,8 @@ static inline uint64_t ebpo_hash_three(const uint64_t key[3])
     return ebpo_hash_number(ebpo_hash_number(ebpo_hash_number(key[0]) + key[1]) + key[2]);
 }
 
-/* Continues the FNV-1a hash `hash` with bytes; it is EBPO_HASH_BYTES_BEGIN for the first bytes. */
+/* Continues the FNV-1a hash `hash` with bytes; `hash` is EBPO_HASH_BYTES_BEGIN for the first bytes.
+ */
 #define EBPO_HASH_BYTES_BEGIN UINT64_C(0xcbf29ce484222325)
 static inline uint64_t ebpo_hash_bytes(uint64_t hash, const void *bytes, size_t size)
 {
@@ -39,7 +40,8 @@ static inline uint64_t ebpo_hash_slots(uint64_t least)
 }
 
 /* Sets `at` to the slot that a key with this hash has or would get, out of mask + 1 slots. `found`
- * is an expression in `at`: the slot is free or holds the key. At least one slot must be free. */
+ * is an expression in `at` that is true if the slot is free or holds the key. At least one slot
+ * must be free. */
 #define EBPO_HASH_FIND(at, hash, mask, found)                          \
     for ((at) = (hash) & (mask); !(found); (at) = ((at) + 1) & (mask)) \
     continue

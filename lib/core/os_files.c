@@ -1,6 +1,6 @@
-/* Unnamed temporary files. Where the system cannot make them without a name, they have one for a
- * moment: it is recorded before the file exists, so that a signal handler can remove it. One file
- * at a time. */
+/* Unnamed temporary files. Where the system cannot make a file without a name, the file has one for
+ * a moment. The name is stored before the file exists, so that a signal handler can remove the
+ * file. Only one file at a time has a name. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -13,8 +13,8 @@
 
 enum { PATH_BYTES = 4096 + 64 }; /* the longest name of a folder, and of a file in it */
 
-/* The temporary name where files cannot be made without one; a signal may come at that moment. One
- * at a time. */
+/* The name of the file that has one for a moment, for ebpo_workspace_abandon in a signal handler.
+ */
 static pthread_mutex_t passing_lock = PTHREAD_MUTEX_INITIALIZER;
 static atomic_bool is_passing;
 static char passing[PATH_BYTES];

@@ -1,7 +1,8 @@
 /* Reads the machine's properties from the operating system: instruction sets, cores, the memory
- * that this process may use, and large pages. Memory is that of the machine or the lowest limit of
- * a control group of this process, version 1 or 2 (cgroups(7)), as in containers. The system may
- * ignore advice on pages. On systems without these files the values come from sysconf. */
+ * that this process may use, and large pages. The memory is that of the machine, or the lowest
+ * limit of the control groups of this process (as in containers; version 1 or 2, cgroups(7)). The
+ * system may ignore advice on pages. On systems without the files in /proc and /sys, the values
+ * come from sysconf. */
 #include <sched.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -39,7 +40,7 @@ static uint64_t number_in(const char *path)
     return value;
 }
 
-/* Returns the number after a word that begins a line; 0 when there is none. */
+/* Returns the number after the word `word` at the beginning of a line; 0 when there is none. */
 static uint64_t number_of(const char *path, const char *word)
 {
     char line[256];

@@ -1,8 +1,8 @@
-/* Threads: runs independent pieces of work, in ascending order, on several threads. The calling
- * thread is the first of them and alone reports progress. The thread of a piece is not determined,
- * so results must not depend on it; of several failures, the one of the lowest piece is returned.
- * All threads of the library are started here, with a fixed stack size and the floating-point
- * environment of the call. */
+/* Threads: runs independent pieces of work on several threads, which take the pieces in ascending
+ * order. The calling thread is the first of them and alone reports progress. The thread of a piece
+ * is not determined, so results must not depend on it; of several failures, the one of the lowest
+ * piece is returned. All threads of the library are started here, with a fixed stack size and the
+ * floating-point environment of the call. */
 #include "core/parallel.h"
 
 #include <stdatomic.h>
@@ -118,7 +118,7 @@ static bool report_pass(void *user, const char *stage, uint64_t done, uint64_t t
 {
     const ebpo_pass *p = user;
     double share = total ? (double)done / (double)total : 0;
-    enum { PARTS = 1024 }; /* a pass may be one of a few */
+    enum { PARTS = 1024 }; /* so that shares of a pass are whole numbers */
     return p->to->report(p->to->user, stage,
                          PARTS * p->begin + (uint64_t)(share * PARTS * (double)(p->end - p->begin)),
                          PARTS * p->of);

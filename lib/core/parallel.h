@@ -28,16 +28,17 @@ ebpo_status ebpo_parallel_for(unsigned threads, ebpo_workspace *workspace, uint6
                               uint64_t grain, ebpo_task_fn task, void *context,
                               const ebpo_progress *progress, const char *stage, ebpo_error *error);
 
-/* Begins a stage without pieces. Returns false when the caller must stop; `error` then says so. */
+/* Begins a stage without pieces. Returns false when the caller must stop, with EBPO_E_CANCELLED in
+ * `error`. */
 bool ebpo_progress_stage(const ebpo_progress *progress, const char *stage, ebpo_error *error);
 
-/* Reports progress of a stage without pieces; false as above. Call it at most once for every few
- * thousand steps. */
+/* Reports progress of a stage without pieces. Returns false as ebpo_progress_stage does. Call it at
+ * most once for every few thousand steps. */
 bool ebpo_progress_step(const ebpo_progress *progress, const char *stage, uint64_t done,
                         uint64_t total, ebpo_error *error);
 
-/* One of several passes of a stage: its progress is reported as the part from `begin` to `end` of
- * `of`, so that the total only grows. */
+/* One of several passes of a stage: its progress is reported as the range from `begin` to `end` out
+ * of `of`, so that the reported progress of the stage never goes back. */
 typedef struct ebpo_pass {
     const ebpo_progress *to; /* NULL is allowed */
     uint64_t begin, end, of;

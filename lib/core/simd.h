@@ -58,11 +58,13 @@ EBPO_EIGHT f8 f8_abs(f8 a)
 }
 /* Eight numbers below 16, which select from 16 floats. */
 typedef struct n8 {
-    __m256i low, high; /* the lower three bits count; all ones from 8 on */
+    /* low: the numbers, of which the lower three bits are used; high: all ones for numbers from 8
+     * on */
+    __m256i low, high;
 } n8;
 typedef struct f8_table {
     f8 first;
-    __m256i other; /* converts a number of the first eight to that of the others */
+    __m256i other; /* bits of floats 0 to 7, exclusive-or those of floats 8 to 15 */
 } f8_table;
 EBPO_EIGHT n8 n8_from_bits(uint32_t bits)
 {
@@ -220,20 +222,20 @@ EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
 #endif
 #endif
 
-/* f8_load_twice loads four floats into both halves; f8_spread0 to 3 copy one of such four to all
- * lanes. */
+/* f8_load_twice loads four floats into both halves; f8_spread0 to f8_spread3 copy one of these four
+ * to all lanes. */
 EBPO_EIGHT f8 f8_min3(f8 a, f8 b, f8 c) { return f8_min(a, f8_min(b, c)); }
 EBPO_EIGHT f8 f8_max3(f8 a, f8 b, f8 c) { return f8_max(a, f8_max(b, c)); }
 
-/* Returns 1 / a to about 2^-22; results differ between processors, so only for filters. Not a
- * number for 0. */
+/* Returns 1 / a to about 2^-22; results differ between processors, so only for filters. NaN for 0.
+ */
 EBPO_EIGHT f8 f8_inverse(f8 a)
 {
     f8 x = f8_about_inverse(a);
     return f8_mul(x, f8_sub(f8_all(2), f8_mul(a, x)));
 }
 
-/* Returns the least of the eight, none of which may be NaN. */
+/* Returns the least of the eight floats, none of which may be NaN. */
 EBPO_EIGHT float f8_least(f8 a)
 {
 #if defined(__AVX2__)
@@ -252,8 +254,8 @@ EBPO_EIGHT float f8_least(f8 a)
 #endif
 }
 
-/* Four doubles at a time, in the compiler's own vectors. All functions are inline, so no call
- * passes one under any ABI. */
+/* Four doubles at a time, in the compiler's own vectors. All functions are inline, so no vector is
+ * passed between functions, and the ABI does not matter. */
 
 #if !defined(__clang__)
 #pragma GCC diagnostic push
@@ -317,7 +319,7 @@ EBPO_EIGHT unsigned d3_signs(d3 a) { return (unsigned)_mm256_movemask_pd(a) & 7;
 EBPO_EIGHT void d3_store(double x[4], d3 a) { _mm256_storeu_pd(x, a); }
 /* Stores as floats, rounded to nearest; the fourth is unused. */
 EBPO_EIGHT void d3_store_floats(float x[4], d3 a) { _mm_storeu_ps(x, _mm256_cvtpd_ps(a)); }
-/* Same, one position later. */
+/* Stores as d3_store_floats does, to x[1] .. x[3]. */
 EBPO_EIGHT void d3_store_floats_after(float x[4], d3 a)
 {
     __m128 y = _mm256_cvtpd_ps(a);

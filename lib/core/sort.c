@@ -1,8 +1,8 @@
 /* Sorts records that do not fit into memory. Records are made, distributed to groups by the leading
- * bits of their keys, and each group is sorted in memory: by digits of the keys, then by the
- * comparison where keys are equal. Each of these three passes reads and writes in order, or at as
- * many positions as there are groups, so a workspace may keep the records in files. The result
- * depends neither on the number of threads nor on memory. */
+ * bits of their keys, and each group is sorted in memory: by digits of the keys, and records with
+ * equal keys by the comparison. Each of these three passes reads and writes in order, or at as many
+ * positions as there are groups, so a workspace may keep the records in files. The result depends
+ * neither on the number of threads nor on memory. */
 #include "core/sort.h"
 
 #include <stdlib.h>
@@ -12,8 +12,9 @@
 #include "core/error.h"
 #include "core/parallel.h"
 
-/* Approximate number of records of a group, which fit a core's own cache. The number of groups is
- * limited to the positions that may be written to at once. */
+/* The approximate number of records in a group, chosen so that a group fits a core's own cache. The
+ * number of groups is limited, because each group is a position that is written to at the same
+ * time. */
 enum {
     GROUP = 1 << 16,
     LARGE_GROUP = 4 * GROUP,
@@ -26,7 +27,7 @@ enum {
 
 typedef struct sorting {
     const ebpo_sort *s;
-    uint8_t *made, *dealt; /* records as made, and by groups */
+    uint8_t *made, *dealt; /* records in the order in which they were made, and by groups */
     uint64_t *first;       /* [groups + 1] first record of each group in `dealt` */
     uint64_t *next;        /* [groups] position of the group's next records */
     uint32_t *group_of;    /* [EBPO_SORT_BINS] */
@@ -233,15 +234,15 @@ static ebpo_status run_alone(sorting *t, ebpo_error *error)
 static unsigned threads_for_groups(const sorting *t)
 {
     const ebpo_sort *s = t->s;
-    ebpo_workspace_stats metrics = EBPO_WORKSPACE_STATS_INIT;
-    metrics.memory = UINT64_MAX;
+    ebpo_workspace_stats usage = EBPO_WORKSPACE_STATS_INIT;
+    usage.memory = UINT64_MAX;
     uint64_t largest = 1;
     if (s->workspace)
-        ebpo_workspace_get_stats(s->workspace, &metrics);
+        ebpo_workspace_get_stats(s->workspace, &usage);
     for (uint64_t g = 0; g < t->groups; g++)
         largest = t->first[g + 1] - t->first[g] > largest ? t->first[g + 1] - t->first[g] : largest;
     uint64_t fit =
-        metrics.memory / 8 /
+        usage.memory / 8 /
         ((largest < LARGE_GROUP ? largest : LARGE_GROUP) * (2 * sizeof(keyed) + s->record));
     return fit < 1 ? 1 : s->threads < fit ? s->threads : (unsigned)fit;
 }
@@ -272,7 +273,7 @@ static ebpo_status run_passes(sorting *t, ebpo_error *error)
 ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error)
 {
     if (sort->record > EBPO_SORT_RECORD_MAX)
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "records of %zu bytes are not sorted",
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "records of %zu bytes are too large to sort",
                          sort->record);
     sorting t = { .s = sort };
     uint64_t bytes = sort->count * sort->record;

@@ -17,27 +17,28 @@ typedef struct ebpo_sort {
     unsigned threads;
     const ebpo_progress *progress;
     const char *stage;
-    /* passes of this stage that the caller has finished; sorting takes EBPO_SORT_PASSES */
+    /* for the progress: passes of this stage before the sort, which has EBPO_SORT_PASSES passes */
     uint64_t passes_before;
     uint64_t count;
     size_t record;  /* bytes of a record, at most EBPO_SORT_RECORD_MAX; each begins with its key, 8
                      * bytes */
     unsigned shift; /* key >> shift is below EBPO_SORT_BINS for all keys */
     void *context;
-    /* Writes the records of items [begin, end). Called from any thread. */
+    /* Writes the records of the items [begin, end). Called from any thread. */
     ebpo_status (*make)(void *context, uint64_t begin, uint64_t end, void *records,
                         ebpo_error *error);
-    /* Orders records with equal keys, which must differ: less than 0 when `a` comes first. */
+    /* Orders two different records with equal keys: less than 0 when `a` comes first. */
     int (*compare)(const void *a, const void *b);
-    /* Receives the sorted records, group by group, from any thread; the first has position `place`.
-     */
+    /* Receives the sorted records of a group. Called from any thread. The first record is number
+     * `place` of the whole result. */
     void (*take)(void *context, uint64_t place, const void *records, uint64_t count);
 } ebpo_sort;
 
 /* Sorts; the result does not depend on threads or memory. */
 EBPO_MUST_USE ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error);
 
-/* qsort with a context for the comparison; systems have it in different forms or not at all. */
+/* qsort with a context for the comparison; systems declare such a qsort differently or have none.
+ */
 
 typedef int (*ebpo_compare_with)(const void *a, const void *b, void *context);
 

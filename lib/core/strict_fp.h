@@ -16,7 +16,7 @@
 #error \
     "exact predicates need strict floating point: build without -funsafe-math-optimizations and its parts (-fassociative-math, -freciprocal-math, -fno-signed-zeros)"
 #endif
-/* 16 is the same as 0 for double; it only changes how compilers treat _Float16. */
+/* For double, the values 16 and 0 mean the same; 16 only changes how compilers treat _Float16. */
 #if FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
 #error \
     "exact predicates need FLT_EVAL_METHOD 0, without excess precision: on x86 build with -msse2 -mfpmath=sse"

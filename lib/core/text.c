@@ -114,7 +114,7 @@ static ssize_t keep_text(void *cookie, const char *data, size_t bytes)
     ebpo_text_stream *s = cookie;
     if (s->failed || !ebpo_grow(&s->text, &s->capacity, s->bytes + bytes + 1, 1)) {
         s->failed = true;
-        return 0; /* stdio takes this for an error */
+        return 0; /* stdio treats 0 as an error */
     }
     memcpy(s->text + s->bytes, data, bytes);
     s->bytes += bytes;

@@ -1,4 +1,4 @@
-/* Text in files: UTF-8, dates, streams into memory, named runs. */
+/* Text in files: checks of UTF-8 and dates, streams into memory, and named runs of faces. */
 #ifndef EBPO_CORE_TEXT_H
 #define EBPO_CORE_TEXT_H
 
@@ -32,7 +32,7 @@ bool ebpo_text_stream_begin(ebpo_text_stream *s);
 /* Ends a stream. Returns false if data is missing; then there is no text. */
 bool ebpo_text_stream_end(ebpo_text_stream *s);
 
-/* A named part of a file, from the line that names it to the next name. */
+/* A named run of triangles in a mesh file, from the line that names it to the next name. */
 
 typedef struct ebpo_named_run {
     const char *name; /* points into the file's bytes, without surrounding spaces */

@@ -1,9 +1,10 @@
 /* Workspaces: the owners of large arrays. An array is an extent of whole pages, in memory up to
  * half of the budget and then in an unnamed temporary file. Arrays below LEAST_EXTENT are parts of
- * a pool, and those below a page come from malloc. Each extent holds its workspace, so either may
- * be freed first. Pages of a file count towards the budget only while resident: loops release them
- * between pieces of work (ebpo_release_pages), and written data stays in the file. Any thread may
- * allocate and free. docs/develop/design.md describes how a build keeps to a budget. */
+ * a pool, and those below a page come from malloc. Each extent is a holder of its workspace, so the
+ * workspace and the extent may be freed in any order. Pages of a file count towards the budget only
+ * while resident: loops release them between pieces of work (ebpo_release_pages), and written data
+ * stays in the file. Any thread may allocate and free. docs/develop/design.md describes how a build
+ * keeps to a budget. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -21,10 +22,8 @@
 #include "core/os.h"
 #include "core/workspace.h"
 
-/* Parts of a workspace. */
-
-/* Arrays smaller than a page come from malloc. Those smaller than an extent are parts of a pool,
- * which is one extent: a build has thousands of them. */
+/* Arrays smaller than a page come from malloc. Arrays smaller than LEAST_EXTENT are parts of a
+ * pool, which is one extent, because a build has thousands of such arrays. */
 enum { PAGE_BYTES = 4096, LEAST_EXTENT = 1 << 16, POOL_BYTES = 1 << 20, BUCKET_BITS = 10 };
 
 typedef enum extent_kind { EXTENT_OWN, EXTENT_POOL, EXTENT_PART } extent_kind;
@@ -43,7 +42,7 @@ typedef struct extent {
 struct ebpo_workspace {
     pthread_mutex_t lock; /* guards the statistics */
     pthread_mutex_t pool_lock;
-    ebpo_workspace_stats metrics;
+    ebpo_workspace_stats usage;
     uint64_t holders;   /* number of holders, including the owner */
     extent *pool;       /* pool for the next part; NULL: none */
     _Atomic int failed; /* errno of the last failed allocation in a file, 0: memory */
@@ -52,7 +51,7 @@ struct ebpo_workspace {
     uint64_t floor;
     size_t page;
     char folder[EBPO_FOLDER_BYTES];
-    /* extents by address: arrays of a build are freed one by one, so there are thousands at most */
+    /* extents by address; there are thousands at most */
     pthread_mutex_t table_lock;
     extent *table[1 << BUCKET_BITS];
 };
@@ -112,7 +111,7 @@ ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory, const
     pthread_mutex_init(&w->lock, NULL);
     pthread_mutex_init(&w->pool_lock, NULL);
     pthread_mutex_init(&w->table_lock, NULL);
-    w->metrics.memory = memory;
+    w->usage.memory = memory;
     w->holders = 1;
     w->page = (size_t)sysconf(_SC_PAGESIZE);
     w->statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
@@ -124,7 +123,8 @@ ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t memory, const
     return status;
 }
 
-/* Removes one holder; each extent is one. The last one frees the workspace. */
+/* Removes one holder of the workspace (its owner or an extent). The last one frees the workspace.
+ */
 static void leave_workspace(ebpo_workspace *w)
 {
     pthread_mutex_lock(&w->lock);
@@ -150,17 +150,14 @@ ebpo_status ebpo_workspace_get_stats(const ebpo_workspace *workspace, ebpo_works
 {
     ebpo_workspace *w = (ebpo_workspace *)workspace;
     pthread_mutex_lock(&w->lock);
-    ebpo_workspace_stats metrics = w->metrics;
+    ebpo_workspace_stats usage = w->usage;
     pthread_mutex_unlock(&w->lock);
-    return EBPO_GIVE(ebpo_workspace_stats, out, &metrics);
+    return EBPO_GIVE(ebpo_workspace_stats, out, &usage);
 }
 
 const char *ebpo_workspace_folder(const ebpo_workspace *workspace) { return workspace->folder; }
 
-uint64_t ebpo_workspace_memory(const ebpo_workspace *workspace)
-{
-    return workspace->metrics.memory;
-}
+uint64_t ebpo_workspace_memory(const ebpo_workspace *workspace) { return workspace->usage.memory; }
 
 ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes, ebpo_error *error)
 {
@@ -196,8 +193,9 @@ static void enter_extent(ebpo_workspace *w, extent *b)
 
 static bool is_at(const extent *b, const void *at) { return b->at == at && b->kind != EXTENT_POOL; }
 
-/* Removes the extent that begins there from the table; returns NULL if the workspace has none.
- * Never a pool: its first part begins at the same address. */
+/* Removes the extent that begins at `at` from the table and returns it, or NULL if the workspace
+ * has none there. Never returns a pool, but the pool's first part, which begins at the same
+ * address. */
 static extent *take_extent(ebpo_workspace *w, const void *at)
 {
     pthread_mutex_lock(&w->table_lock);
@@ -215,7 +213,7 @@ static extent *take_extent(ebpo_workspace *w, const void *at)
 /* Chooses memory or file, and counts the bytes. */
 static bool choose_and_count(ebpo_workspace *w, size_t bytes)
 {
-    ebpo_workspace_stats *f = &w->metrics;
+    ebpo_workspace_stats *f = &w->usage;
     pthread_mutex_lock(&w->lock);
     bool filed = f->held + bytes > f->memory / 2;
     if (filed) {
@@ -231,10 +229,10 @@ static bool choose_and_count(ebpo_workspace *w, size_t bytes)
     return filed;
 }
 
-static void count_off(ebpo_workspace *w, size_t bytes, bool filed)
+static void subtract_bytes(ebpo_workspace *w, size_t bytes, bool filed)
 {
     pthread_mutex_lock(&w->lock);
-    *(filed ? &w->metrics.filed : &w->metrics.held) -= bytes;
+    *(filed ? &w->usage.filed : &w->usage.held) -= bytes;
     pthread_mutex_unlock(&w->lock);
     leave_workspace(w);
 }
@@ -288,7 +286,8 @@ static void *map_memory(ebpo_workspace *w, size_t bytes)
 /* Makes an extent; returns NULL with the reason in the workspace's `failed`. */
 static extent *make_extent(ebpo_workspace *w, size_t bytes, extent_kind kind)
 {
-    ebpo_release_pages(w); /* callers that make many may write without releasing pages */
+    /* callers that make many extents may not release pages between them */
+    ebpo_release_pages(w);
     extent *b = ebpo_alloc_zero(1, sizeof *b);
     if (!b) {
         w->failed = 0;
@@ -298,7 +297,7 @@ static extent *make_extent(ebpo_workspace *w, size_t bytes, extent_kind kind)
     *b = (extent){ .bytes = bytes, .kind = kind, .filed = choose_and_count(w, bytes) };
     b->at = b->filed ? map_file(w, bytes) : map_memory(w, bytes);
     if (b->at == MAP_FAILED) {
-        count_off(w, bytes, b->filed);
+        subtract_bytes(w, bytes, b->filed);
         free(b);
         return NULL;
     }
@@ -309,13 +308,13 @@ static extent *make_extent(ebpo_workspace *w, size_t bytes, extent_kind kind)
 static void unmap_extent(ebpo_workspace *w, extent *b)
 {
     munmap(b->at, b->bytes);
-    count_off(w, b->bytes, b->filed);
+    subtract_bytes(w, b->bytes, b->filed);
     free(b);
 }
 
 /* --- parts of pools --- */
 
-/* Makes a part. No position is given out twice, so parts are zero. */
+/* Makes a part of the pool. No bytes of a pool are given out twice, so a new part is zero. */
 static extent *make_part(ebpo_workspace *w, size_t bytes)
 {
     extent *part = ebpo_alloc_zero(1, sizeof *part);
@@ -485,7 +484,7 @@ static residency read_residency(const ebpo_workspace *w)
     return (residency){ pages * w->page, of_files * w->page };
 }
 
-static void let_go(const extent *b)
+static void release_extent(const extent *b)
 {
 #ifdef EBPO_HAVE_MADVISE
     madvise(b->at, b->bytes, MADV_DONTNEED);
@@ -497,12 +496,12 @@ static void let_go(const extent *b)
 void ebpo_release_pages(ebpo_workspace *workspace)
 {
     ebpo_workspace *w = workspace;
-    if (!w || read_residency(w).all <= w->metrics.memory / 4 * 3)
+    if (!w || read_residency(w).all <= w->usage.memory / 4 * 3)
         return;
     pthread_mutex_lock(&w->table_lock);
     residency now = read_residency(w); /* another thread may have released pages meanwhile */
-    if (now.all <= w->metrics.memory / 4 * 3 ||
-        now.files < w->floor + w->metrics.memory / 16) { /* there is hardly anything to release */
+    /* releasing would free hardly anything */
+    if (now.all <= w->usage.memory / 4 * 3 || now.files < w->floor + w->usage.memory / 16) {
         pthread_mutex_unlock(&w->table_lock);
         return;
     }
@@ -510,9 +509,10 @@ void ebpo_release_pages(ebpo_workspace *workspace)
         for (extent *b = w->table[i]; b; b = b->next)
             if (b->kind != EXTENT_PART && b->filed)
                 /* for a file: written data stays in it */
-                let_go(b);
-    /* Other threads bring in pages meanwhile, which do not count as floor: it rises slowly. */
-    uint64_t left = read_residency(w).files, most = w->floor + w->metrics.memory / 64;
+                release_extent(b);
+    /* The floor rises slowly, because pages that other threads bring in meanwhile do not belong to
+     * it. */
+    uint64_t left = read_residency(w).files, most = w->floor + w->usage.memory / 64;
     w->floor = left < most ? left : most;
     pthread_mutex_unlock(&w->table_lock);
 }

@@ -12,7 +12,8 @@ EBPO_MUST_USE ebpo_status ebpo_workspace_make_any(ebpo_workspace **out, uint64_t
 /* Reports why the last allocation of this size failed: EBPO_E_MEMORY, or EBPO_E_IO with the folder.
  */
 ebpo_status ebpo_workspace_fail(const ebpo_workspace *workspace, uint64_t bytes, ebpo_error *error);
-/* Same, when the size is not known any more; `what` as in "while joining levels". */
+/* Same as ebpo_workspace_fail, when the size is not known any more. `what` completes the message,
+ * as in "while joining levels". */
 ebpo_status ebpo_workspace_fail_while(const ebpo_workspace *workspace, const char *what,
                                       ebpo_error *error);
 
@@ -23,15 +24,14 @@ const char *ebpo_workspace_folder(const ebpo_workspace *workspace);
 /* Returns the budget in bytes. */
 uint64_t ebpo_workspace_memory(const ebpo_workspace *workspace);
 
-/* Budget: pages of files can be released; written data stays in the file. */
-
-/* Releases pages of files when the budget is nearly used up. Call it between pieces of work, on
- * each thread and for every few megabytes visited; it is cheap, and NULL is allowed. Loops (below)
- * and runs of pieces (core/parallel.h) call it; only other code, such as a recursion, needs to. */
+/* Releases pages of files when the budget is nearly used up; written data stays in the file. Call
+ * it between pieces of work, on each thread and for every few megabytes visited; it is cheap, and
+ * NULL is allowed. Loops (below) and runs of pieces (core/parallel.h) call it; other code, such as
+ * a recursion, must call it itself. */
 void ebpo_release_pages(ebpo_workspace *workspace);
 
-/* Numbers of items between releases: for arrays visited in order, and where each item may bring in
- * 16 pages. */
+/* Number of items between two releases, for arrays visited in order, and for loops whose items may
+ * each bring in 16 pages. */
 enum { EBPO_ITEMS_IN_ORDER = 1 << 15, EBPO_ITEMS_SCATTERED = 1 << 7 };
 
 /* Loops over the items of large arrays. A workspace with a budget keeps arrays in files, whose
@@ -52,8 +52,8 @@ enum { EBPO_ITEMS_IN_ORDER = 1 << 15, EBPO_ITEMS_SCATTERED = 1 << 7 };
 #define EBPO_FOR_ITEMS_SCATTERED(workspace, i, begin, end) \
     EBPO_FOR_ITEMS_EVERY(workspace, EBPO_ITEMS_SCATTERED, i, begin, end)
 
-/* Loops over pieces of a few megabytes, or of fewer bytes if they take long; each begins at `at`.
- */
+/* Loops over pieces of a few megabytes each, or smaller ones if the work on them takes long. Each
+ * piece begins at `at`. */
 #define EBPO_FOR_PIECES(workspace, at, end, piece)         \
     for (uint64_t at = 0, at##_end = (end); at < at##_end; \
          at += (piece), ebpo_release_pages(workspace))
@@ -64,20 +64,20 @@ static inline void ebpo_items_step(ebpo_workspace *workspace, uint64_t every, ui
         ebpo_release_pages(workspace);
 }
 
-/* Arrays in memory or in temporary files. */
+/* --- arrays in memory or in temporary files --- */
 
 /* Allocates count * size uninitialised bytes; returns NULL when the product overflows, memory is
  * short or the disk full (ebpo_workspace_fail reports which). A NULL workspace means malloc. The
- * array belongs to the workspace: a holder of the array also holds the workspace, and frees one
- * with the other. */
+ * array belongs to the workspace: an object that owns the array also keeps the workspace, to free
+ * the array with it. */
 void *ebpo_array_alloc(ebpo_workspace *workspace, uint64_t count, size_t size);
 /* Same, zeroed. */
 void *ebpo_array_zero(ebpo_workspace *workspace, uint64_t count, size_t size);
 /* Same as ebpo_grow, for workspace arrays. */
 bool ebpo_array_grow(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,
                      size_t size);
-/* Uses ebpo_grow while the array is small, as nearly all are, and ebpo_array_grow once it is large.
- */
+/* Grows by ebpo_grow while the array is small, as nearly all are, and by ebpo_array_grow once it is
+ * large. */
 bool ebpo_array_grow_late(ebpo_workspace *workspace, void *array, uint64_t *capacity, uint64_t need,
                           size_t size);
 /* Frees an array of `workspace`, or of malloc if `workspace` is NULL. A NULL array is allowed. */

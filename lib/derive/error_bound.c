@@ -244,7 +244,7 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
         ebpo_cell_frame frame;
         ebpo_box box = b->whole->box;
         ebpo_cell_frame_make(&frame, &box, cell);
-        /* a gray node or leaf touches a face */
+        /* a gray node or leaf touches a face, so no point is farther than the diagonal */
         out->hi = ebpo_cell_frame_model_length(&frame, ebpo_cell_frame_diagonal(&frame, 0));
     }
     for (;;) {

@@ -26,49 +26,50 @@ EBPO_MUST_USE ebpo_status ebpo_bounder_make(ebpo_bounder *out, const ebpo_lod_mo
                                             ebpo_model *model, ebpo_error *error);
 void ebpo_bounder_free(ebpo_bounder *b);
 
-/* Bounds max d(x) over the envelope of `cell` and b->halves, its inside included. d is the distance
- * to the closed solid and to the faces, 0 inside. Branch and bound over convex pieces. d changes by
- * no more than its argument moves (signed, it does so within the solid, too). The distance to a
- * single face is convex, so its largest value over a piece is at a corner. Pieces follow the
- * model's tree down to leaves; within these, they are cut along the faces' planes, until each is
- * inside or outside. The order and the cuts depend on the envelope alone, so a larger `enough`
- * never needs more queries. */
+/* Bounds max d(x) over the envelope of `cell` and b->halves, including the envelope's inside. d is
+ * the distance to the closed solid and to the faces, 0 inside. The search is a branch and bound
+ * over convex pieces. d changes by no more than x moves (the signed distance has this property
+ * within the solid, too). The distance to a single face is convex, so its largest value over a
+ * piece is at a corner. Pieces follow the model's tree down to leaves; within these, they are cut
+ * along the faces' planes, until each is inside or outside. The order and the cuts depend on the
+ * envelope alone, so a larger `enough` never needs more queries. */
 EBPO_MUST_USE ebpo_status ebpo_bound_envelope(ebpo_bounder *b, ebpo_cell cell,
                                               const ebpo_bound_goal *goal, ebpo_reach_bound *out,
                                               ebpo_error *error);
 
-/* Bounds the distance for a `ratio`, from the known bounds in *out (0, INFINITY and 0 questions:
- * nothing known). Each step uses half the upper bound, so that far places are found before close
+/* Bounds the distance for a `ratio`, from the known bounds in *out (0, INFINITY and 0 queries if
+ * nothing is known). Each step uses half the upper bound, so that far places are found before close
  * ones are examined. When the queries are used up, the certain bounds are returned. */
 EBPO_MUST_USE ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell,
                                              const ebpo_bound_goal *goal, ebpo_reach_bound *out,
                                              ebpo_error *error);
 
-/* Decides which envelopes are close enough to the model, and keeps its results for other limits. */
+/* --- which envelopes are close enough to the model; results are kept for other limits --- */
 
 typedef struct ebpo_tolerance ebpo_tolerance;
 
 /* A gray node, as stored; or a leaf, with its parent's envelope in its cell. */
 typedef struct ebpo_tolerance_node {
     ebpo_cell cell;
-    bool queried; /* else the result does not matter */
+    bool queried; /* if false, the result does not matter */
     bool enough;  /* the result; false where not queried */
 } ebpo_tolerance_node;
 
 /* Opens a model of all of the file. Fails with EBPO_E_ABSENT for a file without mesh or a subset.
- * `planes` false: envelopes are cells. The file must stay open as long. */
+ * If `planes` is false, envelopes are cells. The file must stay open until ebpo_tolerance_close. */
 EBPO_MUST_USE ebpo_status ebpo_tolerance_open(ebpo_tolerance **out, const ebpo_file *file,
                                               bool planes, unsigned threads, ebpo_progress progress,
                                               ebpo_error *error);
 void ebpo_tolerance_close(ebpo_tolerance *need);
 
-/* Sets node[i].enough if its envelope certainly extends at most max_error beyond the model. It is
- * then also set for every larger max_error. Results do not depend on earlier queries or on threads.
+/* Sets node[i].enough if its envelope certainly extends at most max_error beyond the model. Then
+ * `enough` is also set for every larger max_error. Results do not depend on earlier queries or on
+ * threads.
  */
 EBPO_MUST_USE ebpo_status ebpo_tolerance_judge(ebpo_tolerance *need, ebpo_tolerance_node *nodes,
                                                uint64_t count, double max_error, ebpo_error *error);
 
-/* Returns a max_error for which the root is enough. */
+/* Computes a max_error for which the root's envelope is close enough. */
 EBPO_MUST_USE ebpo_status ebpo_tolerance_max(ebpo_tolerance *need, double *out, ebpo_error *error);
 
 #endif

@@ -83,13 +83,13 @@ static ebpo_status check_export(const ebpo_info *info, const ebpo_export_row *ro
                                 const ebpo_export_options *o, ebpo_error *error)
 {
     int blocks = ebpo_block_count(o),
-        queried = o->first_level < 0 || o->first_level >= info->level_count ? o->first_level
-                                                                            : o->last_level;
+        requested = o->first_level < 0 || o->first_level >= info->level_count ? o->first_level
+                                                                              : o->last_level;
     if (blocks == 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "nothing to export; give a level or the mesh");
-    if (o->first_level <= o->last_level && (queried < 0 || queried >= info->level_count))
+    if (o->first_level <= o->last_level && (requested < 0 || requested >= info->level_count))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "there is no level %d; this file has levels 0 to %d", queried,
+                         "there is no level %d; this file has levels 0 to %d", requested,
                          info->level_count - 1);
     if (o->vertex_colours && (!o->mesh || !row || !row->takes_colours))
         return ebpo_fail(error, EBPO_E_ARGUMENT,

@@ -18,16 +18,19 @@ typedef struct ebpo_block {
     double volume;
 } ebpo_block;
 
-/* Return the number of blocks, and the i-th block's level. */
+/* Returns the number of blocks; ebpo_block_level returns the level of block i. */
 int ebpo_block_count(const ebpo_export_options *options);
 int ebpo_block_level(const ebpo_export_options *options, int i);
 
-/* Order of the mesh (`level` -1): the file's order with the source's numbers, or the source's order
- * if the maps are present. A block is freed by ebpo_block_free, also after a failure. */
+/* Order of the mesh (`level` -1): the order of the file with the numbers of the source, or the
+ * order of the source if the maps are present. */
 typedef enum ebpo_block_order { EBPO_FILE_ORDER, EBPO_SOURCE_ORDER } ebpo_block_order;
+
+/* Frees a block, also after a failure. */
 void ebpo_block_free(ebpo_block *block);
 
-/* A number for each node, or for each polygon that of its node; in the mesh, for each triangle. */
+/* A column of numbers: one for each node; or one for each polygon, the number of its node; in the
+ * mesh one for each triangle. */
 typedef struct ebpo_column {
     const char *name;
     ebpo_h5_number number;
@@ -90,8 +93,9 @@ EBPO_MUST_USE ebpo_status ebpo_export_read_block(const ebpo_export_job *job, int
                                                  ebpo_block_order order, ebpo_block *out,
                                                  ebpo_error *error);
 
-/* Fail with EBPO_E_LIMIT for counts that a format cannot represent. GLB, with this many bytes of
- * text and of numbers: its sizes have 32 bits. OBJ and STL: assimp numbers corners in 32 bits. */
+/* These functions fail with EBPO_E_LIMIT for counts that a format cannot represent. GLB has sizes
+ * of 32 bits; `text` and `bin` are the bytes of text and of numbers. For OBJ and STL, assimp
+ * numbers corners in 32 bits. */
 enum { EBPO_GLB_HEADS = 28 };
 EBPO_MUST_USE ebpo_status ebpo_export_check_glb(const char *path, uint64_t text, uint64_t bin,
                                                 ebpo_error *error);

@@ -58,8 +58,8 @@ void ebpo_extent_of(const ebpo_polytope *p, ebpo_extent *out);
  * that is cut. */
 #define EBPO_CUT_THIN 1.2e-7 /* ebpo_polytope_clip refuses 1e-7 */
 
-/* The trees behind the bounds: the one whose envelopes are queried, and the whole model's, which
- * determines the solid. */
+/* Two trees determine a bound: the tree whose envelopes are bounded, and the tree of the whole
+ * model, which determines the solid. */
 
 /* Reads the whole model of a file that has a mesh and is no subset, else fails with EBPO_E_ABSENT.
  * The caller frees it by ebpo_lod_model_free. */
@@ -69,8 +69,8 @@ EBPO_MUST_USE ebpo_status ebpo_tree_read_whole(ebpo_lod_model *out, const ebpo_f
 /* Finds the node of `cell`; returns false if there is none. */
 bool ebpo_tree_find(const ebpo_lod_model *tree, ebpo_cell cell, ebpo_node *out);
 
-/* Also returns the half-spaces of its ancestors in the cell's coordinates, and with `own` those
- * that the file stores for the node. */
+/* Does the same, and returns the half-spaces of the node's ancestors in the cell's coordinates;
+ * with `own`, also the half-spaces that the file stores for the node. */
 bool ebpo_tree_bounds(const ebpo_lod_model *tree, ebpo_cell cell, bool own, ebpo_node *out,
                       ebpo_half_spaces *halves);
 

@@ -340,22 +340,22 @@ ebpo_status ebpo_limit_level(const ebpo_file *file, int level, const ebpo_limit_
                              ebpo_limit *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_limit_options queried = EBPO_LIMIT_OPTIONS_INIT;
+    ebpo_limit_options requested = EBPO_LIMIT_OPTIONS_INIT;
     job j = { 0 };
     ebpo_limit found = EBPO_LIMIT_INIT;
-    ebpo_status status = EBPO_TAKE(ebpo_limit_options, &queried, options, error);
+    ebpo_status status = EBPO_TAKE(ebpo_limit_options, &requested, options, error);
     if (status == EBPO_OK)
         status = EBPO_CHECK_SIZED(ebpo_limit, out, error);
     if (status == EBPO_OK)
         status = check_level(file, level, error);
     if (status != EBPO_OK)
         return status;
-    unsigned threads = ebpo_thread_count(queried.threads);
-    j.in_root_cells = queried.in_root_cells != 0;
+    unsigned threads = ebpo_thread_count(requested.threads);
+    j.in_root_cells = requested.in_root_cells != 0;
     status = prepare_job(&j, file, level, threads, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(threads, NULL, j.node_count, 1, measure_hulls, &j,
-                                   &queried.progress, "convex hulls", error);
+                                   &requested.progress, "convex hulls", error);
     for (uint64_t i = 0; i < j.node_count && status == EBPO_OK; i++) {
         /* not 0 times infinity */
         double volume = j.volume[i] > 0 ? j.volume[i] * cell_volume(&j, j.nodes[i].cell.level) : 0;

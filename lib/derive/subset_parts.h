@@ -13,10 +13,10 @@ typedef struct ebpo_cutting {
     const ebpo_info *from;
     const ebpo_subset_options *options;
     ebpo_chunks *chunks;
-    ebpo_tolerance *need; /* with max_error */
+    ebpo_tolerance *need; /* if max_error is given */
     ebpo_box box;         /* the root cell */
     int last_level;       /* deepest level that may be kept */
-    uint32_t parts;       /* kept, and in the file */
+    uint32_t parts;       /* parts that are kept and are in the file */
     ebpo_tree *out;
     ebpo_error *error;
 } ebpo_cutting;
@@ -38,13 +38,13 @@ EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file
 /* --- the bytes that a subset needs of its file, from heads and tables, without cutting it --- */
 
 typedef struct ebpo_subset_reads {
-    uint64_t subtrees, of_subtrees; /* subtrees that intersect the box, and all; 0, 0: the file has
-                                     * none */
-    uint64_t bytes;                 /* bytes of the chunks that contain it, each counted once */
+    uint64_t subtrees;    /* subtrees that intersect the box; 0 if the file has none */
+    uint64_t of_subtrees; /* all subtrees; 0 if the file has none */
+    uint64_t bytes;       /* bytes of the chunks that contain the subset, each counted once */
 } ebpo_subset_reads;
 
-/* Counts the reads. Of the options the parts, the box and last_level matter. With the mesh, all
- * levels are included. */
+/* Counts the reads. Of the options, only the parts, the box and last_level matter. With the mesh,
+ * all levels are included. */
 EBPO_MUST_USE ebpo_status ebpo_subset_count_reads(const ebpo_file *file,
                                                   const ebpo_subset_options *options,
                                                   ebpo_subset_reads *out, ebpo_error *error);

@@ -24,8 +24,8 @@ typedef struct ebpo_subtree_checksums {
  * subtrees are needed. */
 int ebpo_subtree_level_for(const ebpo_info *info, uint64_t subtree_faces);
 
-/* Computes the sums. `info` is the information that the file will state, with a subtree_level that
- * is not 0. The tree has been checked. */
+/* Computes the counts of the subtrees and their sums. `info` is the information that the file will
+ * state; its subtree_level is not 0. The caller has checked the tree. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_checksums_make(ebpo_subtree_checksums *out,
                                                       const ebpo_tree *tree, const ebpo_info *info,
                                                       ebpo_error *error);
@@ -43,9 +43,8 @@ typedef struct ebpo_array_out {
     const void *values;
     uint8_t value_size;
     ebpo_h5_id handle;
-    /* for attributes: true if written as columns; and the array whose rows they have: vertices,
-     * faces, or EBPO_A_ATTRIBUTE */
-    bool columns;
+    bool columns; /* for attributes: true if written as columns */
+    /* for attributes: the array that has the same rows (vertices or faces), or EBPO_A_ATTRIBUTE */
     ebpo_array_id rows_of;
 } ebpo_array_out;
 
@@ -70,13 +69,15 @@ typedef struct ebpo_plan {
 
 /* --- rows of chunks --- */
 
-/* Returns the rows of an array's chunks: all rows or a power of two. `rows`: rows of the array. */
+/* Returns the number of rows in each chunk of an array: all rows, or a power of two. `rows` is the
+ * number of rows of the array. */
 uint32_t ebpo_rows_of_chunk(const ebpo_info *info, ebpo_array_id id, int level, uint64_t rows,
                             uint32_t cols, uint32_t element_size);
 
-/* Returns the rows of chunks for a file that another program has rewritten, as described at
- * ebpo_h5_chunk_rows_fn. Codes restart at chunks, so the original number must be found if that
- * program changed it. Arrays whose chunk size is not fixed keep theirs if the format allows it. */
+/* Returns the number of rows in each chunk for a file that another program has rewritten, as
+ * described at ebpo_h5_chunk_rows_fn. Codes restart at chunks, so the original number must be found
+ * if that program changed it. Arrays whose chunk size is not fixed keep their chunk size if the
+ * format allows it. */
 uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, bool subtrees,
                                     bool kept);
 
@@ -85,7 +86,7 @@ uint32_t ebpo_rows_of_foreign_chunk(const char *path, const ebpo_shape *stored, 
 typedef struct ebpo_ordered_chunk {
     uint32_t array; /* index in the plan */
     uint32_t chunk;
-    uint64_t subtree; /* subtree of its first row, if chunks are sorted by it */
+    uint64_t subtree; /* subtree of the chunk's first row, if chunks are sorted by subtree */
 } ebpo_ordered_chunk;
 
 typedef struct ebpo_chunk_order {

@@ -1,5 +1,5 @@
 /* Reads ranges of arrays through a cache of decoded chunks. Results are checked: untrusted input
- * gives EBPO_E_FORMAT, never an index out of range. Any thread. */
+ * gives EBPO_E_FORMAT, never an index out of range. Any thread may call these functions. */
 #ifndef EBPO_FORMAT_CHUNKS_H
 #define EBPO_FORMAT_CHUNKS_H
 
@@ -12,12 +12,12 @@
 typedef struct ebpo_chunks ebpo_chunks;
 EBPO_MUST_USE ebpo_status ebpo_chunks_make(ebpo_chunks **out, const ebpo_file *file,
                                            uint64_t budget, ebpo_error *error);
-/* Creates one under a shared budget. */
+/* Creates a cache under a shared budget. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_make_in(ebpo_chunks **out, const ebpo_file *file,
                                               ebpo_cache_pool *pool, ebpo_error *error);
 /* Creates a counted cache for one thread at a time. Only requested data are read or prefetched, and
  * no read may exceed the limit of bytes read from the file (ebpo_chunks_limit; initially none).
- * Beyond it: EBPO_E_LIMIT, and ebpo_chunks_refused is true. */
+ * A read beyond the limit returns EBPO_E_LIMIT, and ebpo_chunks_refused returns true. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_make_counted(ebpo_chunks **out, const ebpo_file *file,
                                                    uint64_t budget, ebpo_error *error);
 void ebpo_chunks_limit(ebpo_chunks *chunks, uint64_t bytes);
@@ -26,7 +26,7 @@ void ebpo_chunks_free(ebpo_chunks *chunks);
 void ebpo_chunks_get_stats(ebpo_chunks *chunks, ebpo_cache_stats *out);
 
 /* Reads rows [row, row + rows) of a plain integer array that is present, each value widened to
- * `size` bytes. Beyond the array's end: EBPO_E_ARGUMENT. */
+ * `size` bytes. Returns EBPO_E_ARGUMENT for rows beyond the array's end. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_integers(ebpo_chunks *chunks, ebpo_array_id id, int level,
                                                uint64_t row, uint64_t rows, void *values,
                                                size_t size, ebpo_error *error);
@@ -43,7 +43,7 @@ struct ebpo_chunks {
     /* State of counted chunks (ebpo_chunks_make_counted), which one thread uses at a time. */
     bool counted;
     bool refused;    /* a load was refused because of the limit */
-    uint64_t limit;  /* of bytes read from the file, including prefetched ones */
+    uint64_t limit;  /* maximum number of bytes read from the file, including prefetched bytes */
     uint64_t *ahead; /* [ahead_count] keys that are prefetched and not yet read */
     uint64_t ahead_count, ahead_capacity, ahead_bytes;
     struct ebpo_chunk_keys *collecting; /* set by ebpo_chunks_collect */
@@ -88,7 +88,7 @@ void ebpo_chunks_hint(ebpo_chunks *chunks, ebpo_hints *expected, ebpo_array_id i
 enum { EBPO_CHUNK_KEYS = 8192 };
 typedef struct ebpo_chunk_keys {
     unsigned count, mask; /* mask + 1 slots */
-    uint64_t bytes;       /* bytes of the file to read for them */
+    uint64_t bytes;       /* bytes of the file to read for these chunks */
     uint64_t key[EBPO_CHUNK_KEYS];
     uint16_t slot[2 * EBPO_CHUNK_KEYS]; /* index in `key` + 1; 0: free */
 } ebpo_chunk_keys;
@@ -108,7 +108,7 @@ bool ebpo_chunks_hinted(const ebpo_chunks *chunks, const ebpo_chunk_keys *keys);
  * read: chunks that are not in memory are added to `keys`, and reading them returns EBPO_E_LIMIT.
  */
 void ebpo_chunks_collect(ebpo_chunks *chunks, ebpo_chunk_keys *keys);
-/* Sends prefetch hints for counted chunks, as ebpo_chunks_announce, and reads the first `now`. */
+/* Sends prefetch hints for counted chunks and reads the first `now` of them. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_fetch(ebpo_chunks *chunks, const ebpo_chunk_keys *keys,
                                             unsigned now, ebpo_error *error);
 

@@ -5,13 +5,13 @@
 #include "format/chunks.h"
 #include "geometry/level_nodes.h"
 
-/* Returns EBPO_E_ARGUMENT unless the node can exist according to the head. */
+/* Returns EBPO_E_ARGUMENT unless the node can exist according to the file's header. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_check_node(const ebpo_chunks *chunks, const ebpo_node *node,
                                                  ebpo_error *error);
 
 /* Reads the children of a gray node: the group's types, and the rank of the group's first node of
- * each type (indexed by ebpo_node_type) in level + 1. For a pruned node the types are 0, and the
- * file's info has `pruned`. */
+ * each type (indexed by ebpo_node_type) in the next level. For a pruned node the types are 0, and
+ * the file's info has `pruned`. */
 EBPO_MUST_USE ebpo_status ebpo_chunks_children(ebpo_chunks *chunks, const ebpo_node *gray,
                                                uint16_t *types, uint64_t ranks[4],
                                                ebpo_error *error);

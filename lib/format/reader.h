@@ -32,7 +32,7 @@ void ebpo_hint_level(ebpo_hints *expected, int level, uint32_t without);
 void ebpo_hint_root(ebpo_hints *expected, uint32_t needs);
 /* Collects the arrays of attributes. */
 void ebpo_hint_attributes(ebpo_hints *expected);
-/* Sends prefetch hints for the whole file. */
+/* Sends prefetch hints for all of the file. */
 void ebpo_hint_tree(const ebpo_file *file);
 /* Sends prefetch hints for looking up a subtree, if the file has subtrees and states their size:
  * levels down to their roots, the sums before them, and the chunk offsets. */
@@ -54,7 +54,7 @@ static inline ebpo_read_options ebpo_read_threads(unsigned threads)
 
 /* Fetches and decodes chunk number `chunk` of an array that is present: chunk_rows rows as
  * specified (the last chunk with its padding), into `raw` of EBPO_CHUNK_BYTES_MAX bytes. Several
- * threads at once, each with its own reader. */
+ * threads may call it at once, each with a separate reader. */
 EBPO_MUST_USE ebpo_status ebpo_reader_chunk(const ebpo_file *file, const ebpo_array_in *array,
                                             uint64_t chunk, ebpo_chunk_reader *reader, uint8_t *raw,
                                             ebpo_error *error);
@@ -77,14 +77,14 @@ EBPO_MUST_USE ebpo_status ebpo_reader_rows(const ebpo_file *file, const ebpo_arr
                                            const ebpo_read_options *options, ebpo_rows_fn take,
                                            void *context, ebpo_error *error);
 
-/* Does the same into new memory: NULL when the array is absent. The workspace of the options owns
- * it. */
+/* Reads an array into new memory, which the workspace of the options owns. NULL when the array is
+ * absent. */
 EBPO_MUST_USE ebpo_status ebpo_reader_make(const ebpo_file *file, ebpo_array_id id, int level,
                                            const ebpo_read_options *options, size_t size,
                                            void *values_out, ebpo_error *error);
 
 /* Decodes a leaf's references in place: gaps, counted down from its first new face, become
- * ascending indices. Returns false when one falls below 0. */
+ * ascending indices. Returns false when an index would be below 0. */
 bool ebpo_refs_decode(uint32_t *refs, uint64_t count, uint64_t first);
 
 void ebpo_idle_readers_make(ebpo_idle_readers *readers);

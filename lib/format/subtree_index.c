@@ -484,16 +484,17 @@ static ebpo_status check_list(ebpo_chunks *chunks, int level, const ebpo_subtree
                : row_lies(chunks, error);
 }
 
-/* Checks the end of the leaves' faces, and that these are within the subtree's. */
+/* Checks the end of the leaves' faces, and that the faces of the leaves are within the range of the
+ * subtree's faces. */
 static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree_row *row,
                               ebpo_error *error)
 {
     uint64_t first = level_sum(chunks, row, level, EBPO_S_LEAF),
              leaves = level_has(chunks, row, level, EBPO_S_LEAF),
-             grown = level_has(chunks, row, level, EBPO_S_ENDS),
+             growth = level_has(chunks, row, level, EBPO_S_ENDS),
              begin = level_sum(chunks, row, level, EBPO_S_ENDS), gap = 0, skip = 0, fresh = 0;
     if (leaves == 0)
-        return grown ? row_lies(chunks, error) : EBPO_OK;
+        return growth ? row_lies(chunks, error) : EBPO_OK;
     ebpo_status status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, first, 1, &gap, error);
     if (status == EBPO_OK)
         status = ebpo_chunks_sum(chunks, EBPO_A_LEAF_SKIP, level, first, leaves, &skip, error);
@@ -502,7 +503,7 @@ static ebpo_status check_ends(ebpo_chunks *chunks, int level, const ebpo_subtree
     if (status != EBPO_OK)
         return status;
     uint64_t has = row->after[EBPO_S_FACES] - row->before[EBPO_S_FACES];
-    return skip + fresh == grown && begin + gap >= row->face && begin + grown <= row->face + has
+    return skip + fresh == growth && begin + gap >= row->face && begin + growth <= row->face + has
                ? EBPO_OK
                : row_lies(chunks, error);
 }

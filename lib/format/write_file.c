@@ -3,7 +3,7 @@
  * compressed by several threads, in windows of some chunks, and appended in the order of
  * chunk_layout.c: first those of the top levels, which looking up a subtree needs, then all others.
  * The lists of chunk offsets and chunk checksums are the last chunks. Content checksums are
- * computed meanwhile. ebpo_repack reads a file and writes it again with other options. Source:
+ * computed meanwhile. ebpo_file_repack reads a file and writes it again with other options. Source:
  * format-spec/README.md, sections 2, 9 and 20. */
 #include <stdio.h>
 #include <stdlib.h>

@@ -18,14 +18,15 @@ void ebpo_plan_free(ebpo_plan *plan);
 void ebpo_plan_encode(const ebpo_plan *plan, const ebpo_array_out *array, uint64_t row,
                       uint64_t rows, uint8_t *file);
 
-/* Return prefix sums that let a reader start in the middle of a level; readers compare them with
- * those of the file. One row for each EBPO_INDEX_ROWS items, at least one; NULL when memory is
- * short. */
+/* These functions return prefix sums, with which a reader can start in the middle of a level.
+ * Readers compare them with the sums in the file. There is one row for each EBPO_INDEX_ROWS items,
+ * and at least one row. NULL when out of memory. */
 uint64_t *ebpo_index_types(const ebpo_level *level, bool root);
 uint64_t *ebpo_index_gray(const ebpo_level *level);
 uint64_t *ebpo_index_leaves(const ebpo_level *level);
 
-/* Write the HDF5 attributes of /attributes, and those of its arrays except `about`. */
+/* These functions write the HDF5 attributes of the group /attributes, and the HDF5 attributes of
+ * the arrays in the group, except `about`. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_put_group(ebpo_h5_out *out, const ebpo_plan *plan,
                                                     ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_attributes_put_array(ebpo_h5_out *out, const ebpo_plan *plan,

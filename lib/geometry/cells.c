@@ -1,8 +1,8 @@
 /* Cells of an octree: the root box, positions in the grid of a level, octcodes.
  *
- * The root box has for each axis a unit u = 2^e such that the faces of the cells of all levels are
- * integers of at most 53 bits times u. So every cell face is a double without rounding, and
- * neighbouring cells agree on it.
+ * Each axis of the root box has a unit u = 2^e, chosen so that the coordinates of the cell faces of
+ * all levels are u times integers of at most 53 bits. So every cell face is a double without
+ * rounding, and neighbouring cells agree on it.
  *
  * An octcode is a leading 1 and three bits for each level (EBP 2017, section 3.3), the interleaved
  * bits of the cell's position. */
@@ -16,8 +16,8 @@
 
 enum { MANTISSA_BITS = 53, LEAST_EXPONENT = -1074, LARGEST_EXPONENT = 1000 };
 
-/* Margins on each side of the model: a fraction of the axis' own extent, and at least a fraction of
- * the largest extent, so that flat models do not get cells too thin to compute with. */
+/* Margins on each side of the model: a fraction of the extent along the axis, and at least a
+ * fraction of the largest extent, so that flat models do not get cells too thin to compute with. */
 static const double own_margin = 0x1p-22, flat_margin = 0x1p-32;
 
 static bool extents_usable(const double min[3], const double max[3])
@@ -43,8 +43,8 @@ static double model_size(const double min[3], const double max[3])
     return magnitude > 0 ? magnitude : 1;
 }
 
-/* Sets one axis with unit 2^e; returns false when the unit is too fine. [low, high] holds [min,
- * max], with margins. */
+/* Sets one axis with the unit 2^e. Returns false when the unit is too fine. [low, high] is [min,
+ * max] with margins. */
 static bool axis_with_unit(ebpo_box *box, int axis, double min, double max, double low, double high,
                            int e)
 {
@@ -79,7 +79,7 @@ bool ebpo_box_make(ebpo_box *out, const double min[3], const double max[3], int 
         if (magnitude > 0)
             frexp(magnitude, &e);
         e = e - MANTISSA_BITS < LEAST_EXPONENT ? LEAST_EXPONENT : e - MANTISSA_BITS;
-        /* The finest unit may be too fine for the margins; the next ones are not. */
+        /* The finest unit may be too fine for the margins; the next coarser ones are not. */
         while (!axis_with_unit(&box, k, min[k], max[k], low, high, e))
             e++;
     }

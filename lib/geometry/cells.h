@@ -43,13 +43,13 @@ static inline double ebpo_cell_face(const ebpo_box *box, int axis, int level, ui
     return box->origin[axis] + (double)k * (box->size[axis] * ebpo_half_power(level));
 }
 
-/* Builds the root box around [min, max] (finite, min <= max), strictly larger on every side, exact
- * down to `grid_level` (0 .. 20). Returns false when the coordinates are too large (beyond 2^1000)
- * for that. */
+/* Makes the root box around [min, max] (finite, min <= max). The box is strictly larger on every
+ * side, and exact down to `grid_level` (0 .. 20). Returns false when coordinates are beyond 2^1000.
+ */
 bool ebpo_box_make(ebpo_box *out, const double min[3], const double max[3], int grid_level);
 
-/* Returns true when the box has the properties that ebpo_box_make guarantees: used on boxes read
- * from files. */
+/* Returns true when a box that was read from a file has the properties that ebpo_box_make
+ * guarantees. */
 bool ebpo_box_valid(const ebpo_box *box);
 
 /* Cells of an octree: children and parents, neighbours, positions of points. */
@@ -70,7 +70,7 @@ static inline ebpo_cell ebpo_cell_child(ebpo_cell cell, unsigned octant)
                           2 * cell.at[2] + (octant >> 2 & 1) } };
 }
 
-/* Returns the cell of a coarser level that contains it. */
+/* Returns the cell of the coarser level `level` that contains `cell`. */
 static inline ebpo_cell ebpo_cell_ancestor(ebpo_cell cell, int level)
 {
     int up = cell.level - level;
@@ -87,20 +87,22 @@ static inline bool ebpo_cell_equal(ebpo_cell a, ebpo_cell b)
     return a.level == b.level && a.at[0] == b.at[0] && a.at[1] == b.at[1] && a.at[2] == b.at[2];
 }
 
-/* Returns the octant of the position's ancestor, `up` levels above it, in its own parent. */
+/* Returns the octant, in its parent, of the cell that is `up` levels above the cell at position
+ * `at`. */
 static inline unsigned ebpo_octant_at(const uint32_t at[3], int up)
 {
     return (at[0] >> up & 1) | (at[1] >> up & 1) << 1 | (at[2] >> up & 1) << 2;
 }
 
-/* Returns the octant of the cell's ancestor below `level`, a coarser level, in its parent. */
+/* Returns the octant, in its parent, of the cell's ancestor at level + 1, where `level` is coarser
+ * than the cell's. */
 static inline unsigned ebpo_cell_octant(ebpo_cell cell, int level)
 {
     return ebpo_octant_at(cell.at, cell.level - level - 1);
 }
 
-/* Returns the cell of the same level one step of -1, 0 or 1 away on each axis: across a face, an
- * edge or a corner. False outside the root. */
+/* Gets the cell of the same level that is one step of -1, 0 or 1 away on each axis: across a face,
+ * an edge or a corner. Returns false outside the root cell. */
 static inline bool ebpo_cell_neighbour(ebpo_cell cell, const int step[3], ebpo_cell *out)
 {
     *out = cell;
@@ -142,7 +144,8 @@ static inline void ebpo_cell_bounds(const ebpo_box *box, ebpo_cell cell, double 
 static inline uint32_t ebpo_locate_on_axis(const ebpo_box *box, int level, int axis, double p)
 {
     double cells = (double)(1u << level), guess = (p - box->origin[axis]) / box->size[axis] * cells;
-    /* The guess is accurate to 2^-30 of a cell: three roundings, of at most 2^20 cells. */
+    /* The guess is accurate to 2^-30 of a cell, because it has three roundings, of at most 2^20
+     * cells. */
     uint32_t i = guess >= cells ? (1u << level) - 1 : (uint32_t)guess;
     double part = guess - (double)i;
     if (part > 0x1p-30 && part < 1 - 0x1p-30)
@@ -171,7 +174,7 @@ static inline bool ebpo_locate(const ebpo_box *box, int level, const double p[3]
 typedef struct ebpo_locator {
     ebpo_box box;
     int level;
-    double scale[3], half; /* cells per unit; half of all cells of an axis */
+    double scale[3], half; /* cells per unit of length; half of the number of cells along an axis */
 } ebpo_locator;
 
 /* A point's position in the grid of that level. */
@@ -188,10 +191,10 @@ static inline ebpo_locator ebpo_locator_make(const ebpo_box *box, int level)
     return l;
 }
 
-/* Decides for points near a cell face, or outside. */
+/* Finds the cell of a point that is near a cell face or outside. */
 bool ebpo_locator_decide(const ebpo_locator *locator, const double p[3], ebpo_position *out);
 
-/* Same as ebpo_locate. */
+/* Same as ebpo_locate, for the locator's level. */
 static inline bool ebpo_locator_find(const ebpo_locator *l, const double p[3], ebpo_position *out)
 {
     bool sure = true;
@@ -206,9 +209,9 @@ static inline bool ebpo_locator_find(const ebpo_locator *l, const double p[3], e
     return __builtin_expect(sure, 1) || ebpo_locator_decide(l, p, out);
 }
 
-/* Converts the cell's coordinates to the model's. A point on a cell face (`sides`:
- * ebpo_polytope_sides) gets the face's own coordinate, so that neighbouring cells agree to the last
- * bit. */
+/* Converts a coordinate within the cell to the model's. A point on a cell face (`sides`: see
+ * ebpo_polytope_sides) gets exactly the coordinate of that face, so that neighbouring cells agree
+ * to the last bit. */
 static inline double ebpo_cell_face_point(const ebpo_box *box, ebpo_cell cell, int axis, double xi,
                                           unsigned sides)
 {
@@ -245,13 +248,13 @@ static inline ebpo_octcode ebpo_octcode_child(ebpo_octcode code, unsigned octant
 }
 
 /* Returns the first octcode of a node's descendants at `level`: they are [first, first + 8^(level -
- * its level)). */
+ * the node's level)). */
 static inline ebpo_octcode ebpo_octcode_first_descendant(ebpo_octcode code, int level)
 {
     return code << 3 * (level - ebpo_octcode_level(code));
 }
 
-/* Interleaves the cell's position; the reference implementation in the tests works bit by bit. */
+/* Returns the octcode of a cell. The reference implementation in the tests works bit by bit. */
 ebpo_octcode ebpo_octcode_of_cell(ebpo_cell cell);
 ebpo_cell ebpo_cell_of_octcode(ebpo_octcode code);
 

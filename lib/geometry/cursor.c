@@ -14,7 +14,7 @@ static void arrive_at(ebpo_cursor *c, int depth, const ebpo_node *node)
 {
     c->depth = depth;
     c->at[depth].node = *node;
-    c->at[depth].queried = c->at[depth].has_children = false;
+    c->at[depth].requested = c->at[depth].has_children = false;
 }
 
 void ebpo_cursor_begin(ebpo_cursor *c, const ebpo_node_source *source, void *holder, ebpo_node root)
@@ -28,13 +28,13 @@ ebpo_status ebpo_cursor_children(ebpo_cursor *c, const ebpo_node **child, ebpo_e
 {
     ebpo_node *node = &c->at[c->depth].node;
     *child = NULL;
-    if (!c->at[c->depth].queried && node->type == EBPO_GRAY && !node->pruned) {
+    if (!c->at[c->depth].requested && node->type == EBPO_GRAY && !node->pruned) {
         ebpo_status status = c->source->children(c->holder, node, c->at[c->depth].child, error);
         if (status != EBPO_OK)
             return status;
         c->at[c->depth].has_children = !node->pruned;
     }
-    c->at[c->depth].queried = true;
+    c->at[c->depth].requested = true;
     if (c->at[c->depth].has_children)
         *child = c->at[c->depth].child;
     return EBPO_OK;

@@ -18,24 +18,25 @@
 #include "geometry/level_nodes.h"
 #include "geometry/cells.h"
 
-/* About 8 KB; avoid copies. */
+/* A cursor takes about 8 KB; avoid copies. */
 typedef struct ebpo_cursor {
     const ebpo_node_source *source;
     void *holder;
     int depth; /* depth below the root of the cursor */
     struct {
         ebpo_node node;
-        bool queried; /* children were read; there are some: */
+        bool requested; /* the children were requested: has_children is valid */
         bool has_children;
         ebpo_node child[8];
     } at[EBPO_LEVELS_MAX];
 } ebpo_cursor;
 
-/* Begins at `root`, above which it never moves: of a tree, or of any part of one. */
+/* Begins at `root`, which is the root of a tree or of any part of a tree. The cursor never moves
+ * above it. */
 void ebpo_cursor_begin(ebpo_cursor *cursor, const ebpo_node_source *source, void *holder,
                        ebpo_node root);
 
-/* Returns the current node. A gray node is known to be pruned only after requesting its children.
+/* Returns the current node. `pruned` of a gray node is set only after its children were requested.
  */
 static inline const ebpo_node *ebpo_cursor_node(const ebpo_cursor *cursor)
 {
@@ -58,26 +59,26 @@ void ebpo_cursor_down(ebpo_cursor *cursor, unsigned octant);
 /* Moves to the parent; returns false at the root. */
 bool ebpo_cursor_up(ebpo_cursor *cursor);
 
-/* Moves to the next node in depth-first order: the first child, or, without children or with
- * `over`, the node after the subtree. *more is false after the last: the cursor is at the root
- * then. */
+/* Moves to the next node in depth-first order: the first child or, if there are no children or
+ * `over` is true, the node after the subtree. After the last node, *more is false and the cursor is
+ * at the root. */
 EBPO_MUST_USE ebpo_status ebpo_cursor_next(ebpo_cursor *cursor, bool over, bool *more,
                                            ebpo_error *error);
 
-/* Moves to the node of this cell, which must be within the root's; or to the deepest node around
- * it, where the tree is less deep. Moves up no further than necessary. */
+/* Moves to the node of `cell`, which must be within the root's cell, or, where the tree is less
+ * deep, to the deepest node around it. Moves up no further than necessary. */
 EBPO_MUST_USE ebpo_status ebpo_cursor_to_cell(ebpo_cursor *cursor, ebpo_cell cell,
                                               ebpo_error *error);
 
-/* Moves to the deepest node around p, of `level` at most; *within is false, and the cursor does not
- * move, when p is outside the root's cell. */
+/* Moves to the deepest node around p, at level `level` or above. When p is outside the root's cell,
+ * *within is false and the cursor does not move. */
 EBPO_MUST_USE ebpo_status ebpo_cursor_to_point(ebpo_cursor *cursor, const ebpo_box *box,
                                                const double p[3], int level, bool *within,
                                                ebpo_error *error);
 
 /* --- properties of the current node --- */
 
-/* Returns the codes of its own planes. */
+/* Returns the codes of the node's own planes. */
 EBPO_MUST_USE ebpo_status ebpo_cursor_planes(ebpo_cursor *cursor, uint32_t codes[EBPO_NODE_PLANES],
                                              unsigned *count, ebpo_error *error);
 
@@ -85,14 +86,15 @@ EBPO_MUST_USE ebpo_status ebpo_cursor_planes(ebpo_cursor *cursor, uint32_t codes
 EBPO_MUST_USE ebpo_status ebpo_cursor_winding(ebpo_cursor *cursor, int32_t *winding,
                                               ebpo_error *error);
 
-/* Returns the half-spaces that bound it within its cell, from the root of the tree down; with `own`
- * including its own planes. */
+/* Returns the half-spaces that bound the node's envelope within its cell: those of its ancestors
+ * from the root down and, if `own` is true, its own planes. */
 EBPO_MUST_USE ebpo_status ebpo_cursor_half_spaces(ebpo_cursor *cursor, bool own,
                                                   ebpo_half_spaces *out, ebpo_error *error);
 
-/* Returns the same as a polytope in coordinates of its cell, with its own planes; for a black node
- * the cell. Valid while the stack, which serves only this cursor, holds it. Both functions need a
- * cursor that began at the root of the whole tree. */
+/* Returns the envelope as a polytope in coordinates of the node's cell, with its own planes; for a
+ * black node the cell. The polytope is valid while `stack`, which serves only this cursor, holds
+ * it. This function and ebpo_cursor_half_spaces need a cursor that began at the root of the whole
+ * tree. */
 EBPO_MUST_USE ebpo_status ebpo_cursor_envelope(ebpo_cursor *cursor, ebpo_envelope_stack *stack,
                                                const ebpo_polytope **out, ebpo_error *error);
 

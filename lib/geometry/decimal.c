@@ -1,9 +1,12 @@
 /* Converts decimal text to the nearest float or double. There are three methods, each exact where
- * it applies, tried in order of cost: 1. Digits below 2^53 times or over a power of ten up to
- * 10^22: both are doubles, so one operation rounds once (Clinger, "How to read floating point
- * numbers accurately", 1990). That double also decides the float, unless it is exactly between two
- * floats (then rounding twice may err). 2. Up to 19 digits over a power of ten up to 10^27: a
- * 128-bit quotient with its remainder, rounded by this code. 3. The C library. */
+ * it applies, tried in order of cost:
+ * 1. Digits below 2^53, multiplied or divided by a power of ten up to 10^22. Both numbers are
+ *   doubles, so one operation rounds once (Clinger, "How to read floating point numbers
+ *   accurately", 1990). That double also decides the float, unless it is exactly between two
+ *   floats: rounding twice may then err.
+ * 2. Up to 19 digits, divided by a power of ten up to 10^27: a 128-bit quotient with its remainder,
+ *   rounded by this code.
+ * 3. The C library. */
 #include "core/strict_fp.h"
 
 #include "geometry/decimal.h"
@@ -18,7 +21,7 @@ typedef struct decimal {
     uint64_t digits;
     int32_t exponent; /* value = digits * 10^exponent */
     bool negative;
-    bool short_form; /* at most 19 digits: none was dropped */
+    bool short_form; /* at most 19 digits, so none was dropped */
 } decimal;
 
 static const double tens[] = { 1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
@@ -78,7 +81,8 @@ static bool scan_number(decimal *d, const char *s, const char *end)
            scan_exponent_of(d, *s == '-', s + 2, end);
 }
 
-/* Recognises infinite and undefined numbers of Microsoft's C library; precision adds zeros. */
+/* Recognises infinite and undefined numbers as Microsoft's C library prints them; zeros may follow,
+ * depending on the precision. */
 static bool scan_foreign_word(double *out, const char *s, size_t n)
 {
     static const struct {
@@ -161,9 +165,10 @@ static bool long_quotient(double *out, const decimal *d, int bits)
     return true;
 }
 
-/* Decides exactly whether the float nearest to digits / 10^e, rounded to the last digit (ties to
- * even), gives the digits: value * 10^e is less than a half away from them. The value is from 1e-27
- * to 1e20, where floats are normal. *keeps is set when it returns true. */
+/* Decides exactly whether `value`, the float nearest to digits / 10^e, gives the digits when it is
+ * rounded to the last digit (ties to even). It does if value * 10^e is less than a half away from
+ * the digits. The value is from 1e-27 to 1e20, where floats are normal. Sets *keeps when it returns
+ * true. */
 static bool compare_scaled(bool *keeps, float value, const decimal *d)
 {
     if (!d->short_form || !d->digits || d->exponent > 0 || d->exponent < -27)
@@ -218,7 +223,7 @@ static void copy_token(char buffer[EBPO_NUMBER_LONGEST + 1], const char *s, size
     }
 }
 
-/* Converts by the slower methods. */
+/* Converts by methods 2 and 3. */
 static float nearest_float(const decimal *d, const char *s, size_t n, locale_t c_locale)
 {
     double value;
@@ -242,8 +247,8 @@ static bool prints_digits(float value, const char *digits, size_t count, int32_t
     return count == 1 || memcmp(exponent - (count - 1), digits + 1, count - 1) == 0;
 }
 
-/* Decides by printing whether the float, rounded to the text's last digit, gives the text. A float
- * below a power of ten has one digit fewer before that last one than the power has. */
+/* Decides by printing whether the float, rounded to the text's last digit, gives the text. (A float
+ * below a power of ten has one digit fewer before the last one than the power of ten.) */
 static bool prints_as(float value, const decimal *d, const char *s, size_t n)
 {
     char digits[EBPO_NUMBER_LONGEST];
@@ -260,10 +265,10 @@ static bool prints_as(float value, const decimal *d, const char *s, size_t n)
            (power && count > 1 && prints_digits(value, digits, count - 1, first));
 }
 
-/* Decides in doubles that the float nearest to digits * 10^exponent keeps the digits: it is less
- * than half of 10^exponent away. That holds for digits below 2^23, whose last one is greater than
- * the distance between floats. For digits below 2^40 the double is accurate to 2^-12 of the half.
- */
+/* Returns true if arithmetic in doubles shows that the float nearest to digits * 10^exponent keeps
+ * the digits: it is less than half of 10^exponent away. That is so for digits below 2^23, because a
+ * unit of the last digit is greater than the distance between floats. For digits below 2^40 the
+ * double is accurate to 2^-12 of the half. */
 static inline bool surely_keeps(double nearest, float value, const decimal *d)
 {
     return d->digits < UINT64_C(1) << 23 ||
@@ -276,7 +281,7 @@ static bool keeps_digits(float value, const decimal *d, const char *s, size_t n,
 {
     bool keeps;
     double wide_value;
-    if (isinf(value)) /* a double may hold it */
+    if (isinf(value)) /* a double may be finite */
         return ebpo_number_double(&wide_value, s, n, c_locale) && isinf(wide_value);
     return compare_scaled(&keeps, value, d) ? keeps : prints_as(value, d, s, n);
 }

@@ -1,6 +1,6 @@
-/* Distance of a point to a triangle: fast bounds, exact values and comparisons. For every finite
- * double, including triangles without area. Pure functions, any thread; the results are the same
- * with every compiler and its flags. */
+/* Distance of a point to a triangle: fast bounds, exact values and exact comparisons, for every
+ * finite double, also for triangles without area. Pure functions, any thread; the results are the
+ * same with every compiler and its flags. */
 #ifndef EBPO_GEOMETRY_DISTANCE_H
 #define EBPO_GEOMETRY_DISTANCE_H
 
@@ -16,12 +16,12 @@ typedef enum ebpo_feature {
     EBPO_NEAR_EDGE1,
     EBPO_NEAR_EDGE2, /* corner k to k + 1 */
     EBPO_NEAR_INTERIOR,
-    EBPO_NEAR_UNKNOWN /* not certain because of rounding */
+    EBPO_NEAR_UNKNOWN /* not certain, because of rounding */
 } ebpo_feature;
 
-/* Certain bounds: lo <= distance <= hi, usually within some 1e-15 of the larger of distance and the
- * triangle's reach |p - corner|. `feature` is certain unless UNKNOWN. Overflow and underflow give
- * wide bounds (lo = 0, hi = INFINITY), never wrong ones. */
+/* Certain bounds: lo <= distance <= hi. Their gap is usually some 1e-15 of the greater of the
+ * distance and the largest |p - corner|. `feature` is certain unless UNKNOWN. Overflow and
+ * underflow give wide bounds (lo = 0, hi = INFINITY), never wrong ones. */
 typedef struct ebpo_distance_bounds {
     double lo, hi;
     ebpo_feature feature;
@@ -37,11 +37,11 @@ typedef struct ebpo_triangle_nearest {
     /* certain, never UNKNOWN; the lowest-dimensional one that contains the nearest point */
     ebpo_feature feature;
 } ebpo_triangle_nearest;
-/* Computes the nearest point by double-double arithmetic with an error bound, or integers of any
+/* Computes the nearest point by double-double arithmetic with an error bound, or by integers of any
  * size (GMP) when that does not decide the rounding. `bounds`: result of
- * ebpo_triangle_distance_bounds for the same input, or NULL. `normal`: result of
- * ebpo_triangle_unit_normal, at little extra cost where the nearest point is in the interior, or
- * NULL. */
+ * ebpo_triangle_distance_bounds for the same input, or NULL. `normal`: receives the result of
+ * ebpo_triangle_unit_normal, which takes little extra time where the nearest point is in the
+ * interior; or NULL. */
 void ebpo_triangle_nearest_exact(const double p[3], const double triangle[3][3],
                                  const ebpo_distance_bounds *bounds, double *normal,
                                  ebpo_triangle_nearest *out);

@@ -1,9 +1,9 @@
 /* Double-double arithmetic for distances and rays, compiled once for each instruction set.
  *
  * On processors with FMA one instruction gives the rounding error of a product. Without it the
- * product is split (expansion.h). Errors of distances are relative to the distance, errors of rays
- * are bounded by the computed permanent (the sum of absolute values; as in predicates.c), so both
- * builds give the same decisions and results. */
+ * product is split (expansion.h). Errors of distances are bounded relative to the distance, and
+ * errors of rays relative to the computed permanent (the sum of absolute values; as in
+ * predicates.c), so both builds give the same decisions and results. */
 #include "core/strict_fp.h"
 
 #ifdef __FMA__
@@ -17,7 +17,7 @@
 
 /* --- distances: triangle_distance.c --- */
 
-/* Returns the root to a relative error of about 2^-100; x > 0. */
+/* Returns the square root to a relative error of about 2^-100; x > 0. */
 static inline ebpo_pair pair_root(ebpo_pair x)
 {
     double first = sqrt(x.head);
@@ -25,9 +25,9 @@ static inline ebpo_pair pair_root(ebpo_pair x)
     return ebpo_pair_add(ebpo_pair_of(first), ebpo_pair_of(rest.head / (2 * first)));
 }
 
-/* Returns the root of a / b to a relative error of about 2^-100, from an estimate accurate to
- * 2^-50: one Newton step, whose own error is half of the square of that. It saves one root and two
- * quotients compared with pair_root and ebpo_pair_divide. */
+/* Returns the square root of a / b to a relative error of about 2^-100, by one Newton step from an
+ * estimate that is accurate to 2^-50; the error of the step is half of the square of that. Compared
+ * with pair_root and ebpo_pair_divide, this saves one root and two quotients. */
 static inline ebpo_pair root_of_quotient(ebpo_pair a, ebpo_pair b, double first)
 {
     ebpo_pair back = ebpo_pair_multiply(b, ebpo_two_product(first, first));
@@ -103,7 +103,8 @@ static inline bool to_normal(const pair_plane *plane, double normal[3])
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
         double products = fabs(e[u].head * f[v].head) + fabs(e[v].head * f[u].head);
         bool nothing = (e[u].head == 0 || f[v].head == 0) && (e[v].head == 0 || f[u].head == 0);
-        /* 2^-96 of the products is the error; if one factor of each is 0, the component is 0. */
+        /* The error is 2^-96 of the products. If each product has a factor of 0, the component is
+         * 0. */
         sure = sure && (nothing || (fabs(n[k].head) > 0x1p-40 * products && products > 0x1p-800));
     }
     if (!sure)
@@ -141,8 +142,8 @@ const ebpo_distance_pairs EBPO_KERNEL(ebpo_distance_pairs) = { to_feature, unit_
 
 /* --- rays: ray_triangle.c --- */
 
-/* The slack covers underflow; an overflow makes a bound infinite or not a number, so that no
- * comparison succeeds. */
+/* The slack (EBPO_RAY_SLACK) covers underflow. An overflow makes a bound infinite or NaN, so that
+ * no comparison succeeds. */
 
 /* A normal and the sum of absolute values for each component. */
 typedef struct plane_normal {
@@ -162,8 +163,8 @@ static inline plane_normal cross_bounded(const ebpo_pair f[3], const ebpo_pair g
     return n;
 }
 
-/* Returns n . y. Errors: some 12 * 2^-106 of the permanent in n, 12 more in products and sums;
- * 2^-97 leaves a margin. */
+/* Returns n . y. The errors are some 12 * 2^-106 of the permanent in n, and as much in products and
+ * sums; the bound of 2^-97 leaves a margin. */
 static inline ebpo_bounded dot_bounded(const plane_normal *n, const ebpo_pair y[3])
 {
     ebpo_pair first = ebpo_pair_multiply(n->x[0], y[0]), second = ebpo_pair_multiply(n->x[1], y[1]);

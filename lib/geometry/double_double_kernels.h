@@ -9,7 +9,7 @@
 #include "geometry/expansion.h"
 #include "geometry/ray.h"
 
-/* A distance (head + tail, which may overlap by some bits) with a bound on its relative error, and
+/* A distance (head + tail, which may overlap by some bits) with a bound of its relative error, and
  * the nearest point. */
 typedef struct ebpo_measured {
     ebpo_pair distance;
@@ -19,28 +19,28 @@ typedef struct ebpo_measured {
 
 typedef struct ebpo_distance_pairs {
     /* Computes the triangle's distance when its nearest feature is known. Products of four
-     * coordinates, and their rounding errors, must stay within the doubles. Returns the result of
-     * unit_normal, and its normal in `normal`; true if `normal` is NULL. */
+     * coordinates, and their rounding errors, must be in the range of doubles. Also calls
+     * unit_normal for `normal` and returns its result; returns true if `normal` is NULL. */
     bool (*measure)(const double p[3], const double triangle[3][3], ebpo_feature feature,
                     double *normal, ebpo_measured *out);
-    /* Returns false when the arithmetic does not suffice: numbers beyond its range, or too much
-     * cancellation. */
+    /* Computes the unit normal. Returns false when double-double arithmetic does not suffice:
+     * numbers are beyond its range, or too many digits cancel. */
     bool (*unit_normal)(const double triangle[3][3], double normal[3]);
 } ebpo_distance_pairs;
 
 EBPO_KERNELS(ebpo_distance_pairs, ebpo_distance_pairs)
 
-/* A value with the bound `error`. */
+/* A value with a bound of its error. */
 typedef struct ebpo_bounded {
     ebpo_pair x;
     double error;
 } ebpo_bounded;
 
-/* Intersection of a line with a triangle's plane: t = numerator / denominator, which is 0 when they
- * are parallel. */
+/* Intersection of a line with a triangle's plane: t = numerator / denominator. The denominator is 0
+ * when line and plane are parallel. */
 typedef struct ebpo_plane_pairs {
     ebpo_bounded numerator, denominator;
-    /* result of ebpo_pair_quotient, where it succeeds */
+    /* result of ebpo_pair_quotient, if it succeeded */
     bool has_quotient;
     double quotient[2];
 } ebpo_plane_pairs;

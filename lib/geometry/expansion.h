@@ -1,6 +1,6 @@
 /* Exact arithmetic on doubles: a value is an unevaluated sum of doubles that do not overlap, the
- * smallest first, without zeros. Exact as long as nothing overflows or underflows: callers keep
- * exponents in range (see predicates.c). An array of n = 0 components is 0. Include
+ * smallest first, without zeros. Results are exact as long as nothing overflows or underflows;
+ * callers keep exponents in range (see predicates.c). An array of n = 0 components is 0. Include
  * strict_fp.h first. Source: Shewchuk 1997, section 2: TWO-SUM, SPLIT, TWO-PRODUCT,
  * FAST-EXPANSION-SUM and SCALE-EXPANSION. */
 #ifndef EBPO_GEOMETRY_EXPANSION_H
@@ -34,7 +34,7 @@ static inline ebpo_pair ebpo_split(double a)
 static inline ebpo_pair ebpo_two_product(double a, double b)
 {
     double head = a * b;
-#ifdef EBPO_PRODUCTS_BY_FMA /* equal if nothing overflows or underflows, and faster */
+#ifdef EBPO_PRODUCTS_BY_FMA /* faster, with equal results if nothing overflows or underflows */
     return (ebpo_pair){ head, __builtin_fma(a, b, -head) };
 #else
     ebpo_pair p = ebpo_split(a), q = ebpo_split(b);
@@ -97,8 +97,8 @@ static inline int ebpo_expansion_sign(const double *e, int n)
     return n == 0 ? 0 : e[n - 1] > 0 ? 1 : -1;
 }
 
-/* Reduces the number of components, in place: each becomes the rounded sum of itself and all below.
- * Shewchuk's COMPRESS. */
+/* Reduces the number of components, in place: each becomes the rounded sum of itself and all
+ * smaller ones. Shewchuk's COMPRESS. */
 static inline int ebpo_expansion_compress(double *e, int n)
 {
     if (n == 0)
@@ -124,7 +124,8 @@ static inline int ebpo_expansion_compress(double *e, int n)
     return top;
 }
 
-/* Computes out = e * f for f of at most two components, e of at most 16; capacity 4 n. */
+/* Computes out = e * f for f of at most two components and e of at most 16; `out` has capacity 4 n.
+ */
 static inline int ebpo_expansion_times(double *out, const double *e, int n, const double *f, int m)
 {
     double low[32], high[32];
@@ -161,10 +162,11 @@ static inline int ebpo_expansion_minor(double *out, ebpo_difference p, ebpo_diff
     return ebpo_expansion_sum(out, left, left_n, right, right_n);
 }
 
-/* Double-double arithmetic: a value is head + tail, |tail| at most about half an ulp of head.
- * Errors of each operation are at most some 2^-104 of the sum of its operands' absolute values (of
- * the product of these), apart from overflow and underflow. Include strict_fp.h first. Source:
- * Dekker 1971, "A floating-point technique for extending the available precision". */
+/* Double-double arithmetic: a value is head + tail, |tail| at most about half an ulp of head. The
+ * error of a sum is at most some 2^-104 of the sum of its operands' absolute values, the error of a
+ * product at most some 2^-104 of the product, apart from overflow and underflow. Include
+ * strict_fp.h first. Source: Dekker 1971, "A floating-point technique for extending the available
+ * precision". */
 
 static inline ebpo_pair ebpo_pair_of(double x) { return (ebpo_pair){ x, 0 }; }
 
@@ -189,7 +191,7 @@ static inline ebpo_pair ebpo_pair_multiply(ebpo_pair a, ebpo_pair b)
     return product;
 }
 
-/* Returns a / b, b not 0, to some 2^-100. */
+/* Returns a / b to a relative error of some 2^-100; b is not 0. */
 static inline ebpo_pair ebpo_pair_divide(ebpo_pair a, ebpo_pair b)
 {
     double first = a.head / b.head;
@@ -197,9 +199,9 @@ static inline ebpo_pair ebpo_pair_divide(ebpo_pair a, ebpo_pair b)
     return ebpo_pair_add(ebpo_pair_of(first), ebpo_pair_of(rest.head / b.head));
 }
 
-/* Returns a / b as two doubles that differ by one step at most; one of them is the exact quotient
- * rounded to nearest. They are equal if the rounding is certain. `error`: relative error of a and b
- * together. Returns false where the quotient is so large or small that this does not hold. */
+/* Computes two doubles, equal or adjacent, one of which is the exact a / b rounded to nearest. They
+ * are equal if the rounding is certain. `error`: relative error of a and b together. Returns false
+ * where the quotient is too large or too small for this. */
 static inline bool ebpo_pair_quotient(ebpo_pair a, ebpo_pair b, double error, double out[2])
 {
     double q = a.head / b.head;

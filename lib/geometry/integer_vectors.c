@@ -1,6 +1,6 @@
 /* Converts doubles to integers in a common power of two, and back with one rounding. Used where
  * filters and expansions do not decide. Quotients and roots are computed with some 70 bits, and the
- * lowest bit is set when the remainder is not 0, so that rounding to a double is always right. */
+ * lowest bit is set when the remainder is not 0, so that rounding to a double is always correct. */
 #include "core/strict_fp.h"
 
 #include "geometry/integer_vectors.h"

@@ -1,5 +1,5 @@
-/* Vectors of integers of any size (GMP, which ends the program when memory is short), where
- * floating point does not decide: coordinates in units of a power of two. Pure functions, any
+/* Vectors of integers of any size, for cases that floating point does not decide. Coordinates are
+ * in units of a power of two. GMP ends the program when memory is short. Pure functions, any
  * thread. */
 #ifndef EBPO_GEOMETRY_INTEGER_VECTORS_H
 #define EBPO_GEOMETRY_INTEGER_VECTORS_H
@@ -17,7 +17,7 @@ void ebpo_vectorz_dot(mpz_t out, const ebpo_vectorz *a, const ebpo_vectorz *b);
 /* Computes a x b; `out` is neither of them. */
 void ebpo_vectorz_cross(ebpo_vectorz *out, const ebpo_vectorz *a, const ebpo_vectorz *b);
 
-/* Returns the greatest e, not above `unit`, for which all are multiples of 2^e. Begin with
+/* Returns the greatest e, not above `unit`, for which all numbers are multiples of 2^e. Begin with
  * EBPO_UNIT_OF_ZEROS. */
 enum { EBPO_UNIT_OF_ZEROS = 0x7fffffff - 64 };
 int ebpo_common_unit(const double *x, int n, int unit);

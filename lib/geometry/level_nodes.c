@@ -5,7 +5,7 @@
  * the groups, made once for each level; contradictory counts are rejected.
  *
  * The table of children stores four bytes for each node. A grid over its top levels replaces the
- * first steps from the root, with fewer cells than about twice the groups. */
+ * first steps from the root. The grid has at most about twice as many cells as there are groups. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -18,7 +18,7 @@
 static const uint64_t EVEN = UINT64_C(0x5555555555555555), PAIRS = UINT64_C(0x3333333333333333),
                       NIBBLES = UINT64_C(0x0f0f0f0f0f0f0f0f), BYTES = UINT64_C(0x00ff00ff00ff00ff);
 
-/* Counts set bits of each byte; only even bits are set. */
+/* Counts the set bits of each byte of x, of which only even bits may be set. */
 static inline uint64_t bits_of_bytes(uint64_t x)
 {
     x = (x & PAIRS) + (x >> 2 & PAIRS);
@@ -75,7 +75,7 @@ void ebpo_level_ranks_free(ebpo_level_ranks *ranks)
     memset(ranks, 0, sizeof *ranks);
 }
 
-/* Counts nodes of a type in the groups before each, and in all of them. */
+/* Counts, for each group, the nodes of a type in the groups before it, and checks their total. */
 static ebpo_status count_before(uint64_t **out, const ebpo_level *level, ebpo_node_type type,
                                 uint64_t *count, ebpo_error *error)
 {
@@ -114,13 +114,13 @@ static ebpo_status make_ranks(ebpo_level_ranks *out, const ebpo_level *level, in
     return EBPO_OK;
 }
 
-static ebpo_status checksums_disagree(int number, const char *what, ebpo_error *error)
+static ebpo_status fail_counts(int number, const char *what, ebpo_error *error)
 {
     return ebpo_fail(error, EBPO_E_FORMAT,
                      "level %d: the counts of its %s do not add up; run ebpo verify", number, what);
 }
 
-/* Computes the sums of the counts before each; `bytes`: size of a count, 1 or 4. */
+/* Computes for each count the sum of the counts before it. `bytes`: size of a count, 1 or 4. */
 static ebpo_status sum_before(uint64_t **out, const void *counts, size_t bytes, uint64_t count,
                               uint64_t total, int number, const char *what, ebpo_error *error)
 {
@@ -133,7 +133,7 @@ static ebpo_status sum_before(uint64_t **out, const void *counts, size_t bytes, 
         (*out)[i] = sum;
         sum += bytes == 1 ? narrow[i] : wide[i];
     }
-    return sum == total ? EBPO_OK : checksums_disagree(number, what, error);
+    return sum == total ? EBPO_OK : fail_counts(number, what, error);
 }
 
 ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebpo_level *level, int number,
@@ -157,7 +157,7 @@ ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebpo_level *level
 
 /* --- nodes of levels --- */
 
-/* Returns a node of a group of the cell's level. */
+/* Returns the node of an octant in a group; the cell has the group's level. */
 static ebpo_node node_of(const ebpo_level_nodes *n, uint64_t group, unsigned octant, ebpo_cell cell)
 {
     uint16_t types = n->level[cell.level].types[group];

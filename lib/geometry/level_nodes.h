@@ -26,11 +26,11 @@ static inline uint16_t ebpo_group_set(uint16_t types, unsigned octant, ebpo_node
     return (uint16_t)((types & ~(3u << 2 * octant)) | ebpo_group_of(type, octant));
 }
 
-/* Returns a word whose bit 2i is set when octant i is a leaf or gray: when faces touch it. */
+/* Returns a word whose bit 2i is set when octant i is a leaf or gray: then faces touch it. */
 static inline unsigned ebpo_group_filled(uint16_t types) { return types >> 1 & 0x5555u; }
 
-/* Returns the number of octants below `octants` (at most 8) of this type: for an octant's own
- * number, its rank among its siblings of the type. */
+/* Returns the number of octants below `octants` (at most 8) of this type: if `octants` is an
+ * octant's own number, that is its rank among its siblings of this type. */
 static inline unsigned ebpo_group_count(uint16_t types, ebpo_node_type type, unsigned octants)
 {
     unsigned differs = types ^ 0x5555u * (unsigned)type;
@@ -43,7 +43,7 @@ static inline unsigned ebpo_group_count(uint16_t types, ebpo_node_type type, uns
 /* Counts nodes of each type in groups of eight, 16 bits each, little-endian, at any address. */
 void ebpo_groups_count(const void *types, uint64_t groups, uint64_t counts[4]);
 
-/* Same for groups of one level; level 0 has only its root. */
+/* Same as ebpo_groups_count for groups of one level. Level 0 has only its root. */
 static inline void ebpo_groups_count_at(int level, const uint16_t *types, uint64_t groups,
                                         uint64_t counts[4])
 {
@@ -71,7 +71,8 @@ typedef struct ebpo_node {
     const struct ebpo_accel *subtree;
 } ebpo_node;
 
-/* Returns true for white or black: no face touches it, and all of it is on one side. */
+/* Returns true for a white or black node: no face touches it, and all of it is inside or all
+ * outside. */
 static inline bool ebpo_node_is_uniform(const ebpo_node *node)
 {
     return node->type == EBPO_WHITE || node->type == EBPO_BLACK;
@@ -87,8 +88,6 @@ static inline ebpo_node ebpo_node_child(const ebpo_node *gray, unsigned octant, 
                         .type = type,
                         .rank = ranks[type] + ebpo_group_count(types, type, octant) };
 }
-
-/* The meaning of a winding number. */
 
 /* Returns true where points of this winding number belong to the solid. */
 static inline bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)
@@ -107,9 +106,8 @@ static inline bool ebpo_rule_inside(ebpo_rule rule, int32_t winding)
 enum { EBPO_NODE_PLANES = 255 }; /* counts of planes are bytes */
 
 typedef struct ebpo_node_source {
-    /* Returns the eight children of a gray node. If this holder has none, it marks the node as
-     * pruned instead. It also stores other findings in the node, so that they are not computed
-     * again. */
+    /* Returns the eight children of a gray node. If this holder has none, marks the node as pruned
+     * instead. Also stores what it has found out in the node, so that it is not computed again. */
     ebpo_status (*children)(void *holder, ebpo_node *gray, ebpo_node child[8], ebpo_error *error);
     /* Returns the codes of the planes that a gray node adds to its parent's envelope; other nodes
      * have none, except leaves where levels store theirs. */
@@ -124,8 +122,8 @@ typedef struct ebpo_node_source {
  * leaf's references. They are prefix sums, so that nodes can be visited in any order. */
 
 typedef struct ebpo_level_ranks {
-    /* [group_count] by type: number of such nodes in the groups before; for white and black nodes
-     * only where the level has their winding numbers, else NULL */
+    /* [group_count] by type: number of such nodes in the groups before; NULL for white and black
+     * nodes if the level has no winding numbers for them */
     uint64_t *before[4];
     uint64_t *plane_first;      /* [gray_count] */
     uint64_t *leaf_plane_first; /* [leaf_count], NULL without stored leaf planes */
@@ -138,10 +136,9 @@ EBPO_MUST_USE ebpo_status ebpo_level_ranks_make(ebpo_level_ranks *out, const ebp
                                                 int number, ebpo_error *error);
 void ebpo_level_ranks_free(ebpo_level_ranks *ranks);
 
-/* The nodes of levels in memory, from the root down to some level. */
-
-/* Pointers are not owned; gray nodes without children in these levels are pruned, as are all of the
- * last level. */
+/* The nodes of levels in memory, from the root down to some level. The pointers are borrowed. Gray
+ * nodes without children in these levels are pruned, and so are all gray nodes of the last level.
+ */
 typedef struct ebpo_level_nodes {
     const ebpo_level *level;       /* [level_count] */
     const ebpo_level_ranks *ranks; /* [level_count] */
@@ -168,13 +165,13 @@ extern const ebpo_node_source ebpo_level_source;
 /* A decoded tree as a table of children: four bytes a node, found by following indices. It is used
  * for many successive queries: finding a point's node is a loop of one line. */
 
-/* An entry: two bits of kind, 30 of value. */
+/* An entry has two bits for its kind and 30 bits for its value. */
 typedef enum ebpo_entry_kind {
     EBPO_ENTRY_UNIFORM = 0, /* white or black; value: winding number + EBPO_ENTRY_ZERO */
     EBPO_ENTRY_LEAF = 1,    /* value: index of the leaf */
     EBPO_ENTRY_GRAY = 2,    /* value: index of the group of its eight children */
     /* in the top of a tree: value: index of a subtree that is loaded on demand; in a subtree: a
-     * pruned node, with its index among gray nodes as value */
+     * pruned node; value: its index among gray nodes */
     EBPO_ENTRY_BELOW = 3
 } ebpo_entry_kind;
 enum { EBPO_ENTRY_ZERO = 1 << 29 };
@@ -193,8 +190,8 @@ static inline int32_t ebpo_entry_winding(uint32_t entry)
     return (int32_t)ebpo_entry_value(entry) - EBPO_ENTRY_ZERO;
 }
 
-/* Makes the entry of a white or black node; returns false for a winding number that it cannot hold.
- */
+/* Makes the entry of a white or black node; returns false for a winding number that an entry cannot
+ * hold. */
 static inline bool ebpo_entry_uniform(int32_t winding, uint32_t *entry)
 {
     if (winding <= -EBPO_ENTRY_ZERO || winding >= EBPO_ENTRY_ZERO)
@@ -223,17 +220,16 @@ typedef struct ebpo_node_table {
     uint32_t root;        /* its entry */
     uint32_t (*group)[8]; /* entries of the children, octant by octant */
     uint32_t group_count;
-    /* 0: no grid. The entry of the node that contains the cell at level root_level + grid_bits, or
-     * of this cell, */
+    /* the grid over the cells of level root_level + grid_bits; 0: no grid */
     int grid_bits;
-    uint32_t *grid;      /* at [z][y][x]; */
-    uint8_t *grid_depth; /* and the depth of that node below the root */
+    uint32_t *grid;      /* [z][y][x] entry of the node that is or contains the cell */
+    uint8_t *grid_depth; /* [z][y][x] depth of that node below the root */
 } ebpo_node_table;
 
 /* Returns the bits of the grid of a table of this many groups; 0: none. */
 int ebpo_node_grid_bits(uint64_t groups);
-/* Makes the grid: fewer cells than about twice the groups. Optional; there is none when memory is
- * short. */
+/* Makes the grid, of at most about twice as many cells as there are groups. The grid is optional:
+ * there is none when memory is short. */
 void ebpo_node_table_make_grid(ebpo_node_table *table);
 void ebpo_node_table_free(ebpo_node_table *table);
 
@@ -268,7 +264,8 @@ static inline ebpo_descent ebpo_descent_begin(const ebpo_node_table *table, int 
         return (ebpo_descent){ table->root, table->root_level };
     uint64_t cell = ebpo_grid_cell(table, fine_level, at);
     uint32_t entry = table->grid[cell];
-    /* most gray ones are of the grid's own level: this saves a cache line */
+    /* most gray nodes in the grid are of its own level, so grid_depth, another cache line, need not
+     * be read */
     bool deep = ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY;
     int depth = deep ? table->grid_bits : table->grid_depth[cell];
     return (ebpo_descent){ entry, table->root_level + depth };

@@ -1,12 +1,12 @@
 /* Cuts polygons in space and closed chains into triangles over their own corners.
  *
  * A polygon is projected along the axis on which its normal is largest. A convex one becomes a fan;
- * any other is cut ear by ear, with exact tests, in any order of coordinates. A corner is tested
- * again only when its own neighbours have changed, or when the corner that blocked its ear is gone.
- * Blocking corners are searched for in a tree of boxes. So outlines of 100,000 corners and more are
- * cut in about n log n steps. Outlines that cross themselves get the triangles of least area in
- * space, as a chain does. Sources: Meisters, "Polygons have ears", 1975; Barequet and Sharir,
- * "Filling gaps in the boundary of a polyhedron", 1995. */
+ * any other is cut ear by ear, with exact tests. A corner is tested again only when its own
+ * neighbours have changed, or when the corner that blocked its ear is gone. Blocking corners are
+ * searched for in a tree of boxes. So outlines of 100,000 corners and more are cut in about n log n
+ * steps. Outlines that cross themselves get the triangles of least area in space, as closed chains
+ * do. Sources: Meisters, "Polygons have ears", 1975; Barequet and Sharir, "Filling gaps in the
+ * boundary of a polyhedron", 1995. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -93,24 +93,25 @@ static bool least_area(const ebpo_chain *c, uint32_t (*triangles)[3])
     return ok;
 }
 
-/* ---- long chains: the smallest ear first, those that bend outward last ---- */
+/* ---- long chains: smallest ears first, ears that bend outward last ---- */
 
 typedef struct chain_ear {
     double area;
     uint32_t tip;
-    uint32_t version; /* version of the tip at this computation; an older one is stale */
+    /* version of the tip when the ear was computed; the ear is stale if the tip has a newer one */
+    uint32_t version;
     bool reflex;
 } chain_ear;
 
 typedef struct cutting {
     const ebpo_chain *chain;
     uint32_t *before, *after, *version;
-    double normal[3]; /* area vector of the whole chain */
+    double normal[3]; /* area vector of the chain */
     chain_ear *heap;  /* least first */
     uint64_t count;
 } cutting;
 
-static bool cut_sooner(const chain_ear *a, const chain_ear *b)
+static bool comes_before(const chain_ear *a, const chain_ear *b)
 {
     if (a->reflex != b->reflex)
         return b->reflex;
@@ -129,7 +130,7 @@ static void push_ear(cutting *c, uint32_t tip)
                     .version = ++c->version[tip],
                     .reflex = n[0] * c->normal[0] + n[1] * c->normal[1] + n[2] * c->normal[2] < 0 };
     uint64_t i = c->count++;
-    for (; i > 0 && cut_sooner(&e, &c->heap[(i - 1) / 2]); i = (i - 1) / 2)
+    for (; i > 0 && comes_before(&e, &c->heap[(i - 1) / 2]); i = (i - 1) / 2)
         c->heap[i] = c->heap[(i - 1) / 2];
     c->heap[i] = e;
 }
@@ -139,9 +140,9 @@ static chain_ear pop_ear(cutting *c)
     chain_ear top = c->heap[0], last = c->heap[--c->count];
     uint64_t i = 0;
     for (uint64_t child; (child = 2 * i + 1) < c->count; i = child) {
-        if (child + 1 < c->count && cut_sooner(&c->heap[child + 1], &c->heap[child]))
+        if (child + 1 < c->count && comes_before(&c->heap[child + 1], &c->heap[child]))
             child++;
-        if (!cut_sooner(&c->heap[child], &last))
+        if (!comes_before(&c->heap[child], &last))
             break;
         c->heap[i] = c->heap[child];
     }
@@ -221,7 +222,7 @@ typedef enum ear_rule {
 } ear_rule;
 
 typedef enum ears_result {
-    EBPO_EARS_CUT,   /* all was cut: every triangle turns counter-clockwise, or has no area */
+    EBPO_EARS_CUT, /* everything was cut: every triangle turns counter-clockwise, or has no area */
     EBPO_EARS_STUCK, /* the outline crosses itself */
     EBPO_EARS_WORK   /* more steps than `limit` would be needed */
 } ears_result;
@@ -245,15 +246,17 @@ typedef struct outline {
 
     uint32_t *next, *previous; /* next: NONE once cut off */
 
-    /* [LEVELS][words] corners whose ears are to be tested; above, words that are not 0 */
+    /* [LEVELS][words] level 0: a bit for each corner whose ear is to be tested; each other level: a
+     * bit for each word of the level below that is not 0 */
     uint64_t *bits[LEVELS];
     uint64_t words[LEVELS];
     int levels;
 
-    /* The corner that blocks an ear, and lists of the ears that a corner blocks. */
+    /* for each ear the corner that blocks it; for each corner the list of ears that it blocks */
     uint32_t *blocker, *first_blocked, *next_blocked, *previous_blocked;
 
-    /* [2 * leaves] boxes around runs of corners, from 1; corners left in each */
+    /* [2 * leaves] boxes around runs of corners, from index 1, and the number of corners left in
+     * each */
     box *boxes;
     uint32_t *corners;
     uint32_t leaves; /* a power of two; 0: no tree */
@@ -264,7 +267,7 @@ typedef struct tested_ear {
     uint32_t corner[3];
     const double *at[3];
     double low[2], high[2];
-    bool along_a, along_c; /* other edges run from b's position towards a; towards c */
+    bool along_a, along_c; /* other edges run from b's position towards a, towards c */
 } tested_ear;
 
 static int turn_of_corners(const outline *o, uint32_t a, uint32_t b, uint32_t c)
@@ -299,7 +302,7 @@ static void clear_bit(outline *o, uint64_t i)
     }
 }
 
-/* Returns the first one from i on, or NONE. */
+/* Returns the first set bit from i on, or NONE. */
 static uint32_t find_bit(const outline *o, uint64_t i)
 {
     for (int l = 0; l < o->levels && i / WORD < o->words[l]; l++, i = i / WORD + 1) {
@@ -418,7 +421,8 @@ static void note_edges_along(const outline *o, tested_ear *e, uint32_t i)
     }
 }
 
-/* Returns true if the edge from a corner on the ear's border, where side[k] is 0, enters it. */
+/* Returns true if the edge to `to`, from a corner on the ear's border (where side[k] is 0), enters
+ * the ear. */
 static bool edge_enters(const outline *o, const tested_ear *e, const int side[3], uint32_t to)
 {
     for (int k = 0; k < 3; k++)
@@ -533,8 +537,8 @@ static int64_t winding_around(outline *o, uint32_t start, const double q[2])
     return winding;
 }
 
-/* Returns true if the ear is a bend of a passage without width, whose other side runs beside it:
- * such an ear is empty. */
+/* Returns true if the ear is not inside the outline: it is a bend of a passage without width, whose
+ * other side runs along it. */
 static bool is_outside(outline *o, const tested_ear *e)
 {
     double q[2];
@@ -579,7 +583,7 @@ static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
     set_bit(o, a);
     set_bit(o, c);
     test_blocked_again(o, b);
-    if (o->touching) { /* these have other edges now */
+    if (o->touching) { /* the neighbours have other edges now */
         test_blocked_again(o, a);
         test_blocked_again(o, c);
     }
@@ -587,7 +591,8 @@ static void cut_off(outline *o, uint32_t b, uint32_t triangle[3])
         o->corners[node]--;
 }
 
-/* Returns true if the ear at b may be cut; if not, it is tested again when that may change. */
+/* Returns true if the ear at b may be cut. If not, the ear is tested again when that may have
+ * changed. */
 static bool is_ear(outline *o, uint32_t b)
 {
     tested_ear e = ear_at(o, b);
@@ -601,8 +606,8 @@ static bool is_ear(outline *o, uint32_t b)
     return x == NONE && !is_outside(o, &e);
 }
 
-/* Goes around and cuts every ear, skipping one corner after each cut so that fans of slivers stay
- * short. */
+/* Goes around the outline and cuts every ear, skipping one corner after each cut so that fans of
+ * slivers stay short. */
 static ears_result cut_all(outline *o, uint32_t (*triangle)[3], uint64_t limit)
 {
     uint32_t done = 0, b = 0;
@@ -692,13 +697,14 @@ static ears_result cut_outline(uint32_t (*triangle)[3], const double (*at)[2], u
 /* ==== polygons in space ==== */
 
 /* Limit of steps of cutting an outline that touches itself; beyond it, the outline is treated as
- * one that crosses itself. Thousands of corners at one position are compared with each other. */
+ * one that crosses itself. The limit matters where thousands of corners are at one position,
+ * because all these are compared with each other. */
 #define TOUCHING_WORK (UINT64_C(1) << 28)
 
 /* A polygon and its projection. */
 typedef struct polygon {
     const double (*corner)[3];
-    double (*flat)[2]; /* so that it runs counter-clockwise */
+    double (*flat)[2]; /* projected so that the polygon runs counter-clockwise */
     uint32_t n;
     double scale; /* a power of two that prevents products of differences from overflow and
                      underflow */
@@ -723,7 +729,8 @@ static void make_fan(uint32_t (*triangle)[3], uint32_t n)
     }
 }
 
-/* Returns half of the difference between the first corner and another one: that cannot overflow. */
+/* Returns half of the difference between the first corner and another one, which cannot overflow.
+ */
 static double from_first(const polygon *p, uint32_t i, int k)
 {
     return p->scale * (0.5 * p->corner[i][k] - 0.5 * p->corner[0][k]);
@@ -748,7 +755,8 @@ static bool find_scale(polygon *p)
     return true;
 }
 
-/* Computes half of the projected areas, relative to the first corner to keep digits. */
+/* Computes the normal by Newell's sum: half of the projected areas. Coordinates are relative to the
+ * first corner, which keeps digits. */
 static void newell_normal(const polygon *p, double normal[3])
 {
     normal[0] = normal[1] = normal[2] = 0;
@@ -793,13 +801,13 @@ static int turn_of_projected(const polygon *p, uint32_t a, uint32_t b, uint32_t 
     return ebpo_orient2d(p->flat[a], p->flat[b], p->flat[c]);
 }
 
-static bool goes_up(const double a[2], const double b[2])
+static bool is_ascending(const double a[2], const double b[2])
 {
     return a[0] < b[0] || (a[0] == b[0] && a[1] < b[1]);
 }
 
-/* Classifies. Left turns alone do not make a polygon convex (a pentagram has them too): it must
- * also change its direction only twice. */
+/* Classifies the polygon. Left turns alone do not make it convex (a pentagram has only left turns):
+ * its direction must also change only twice. */
 static ebpo_polygon_kind classify_polygon(const polygon *p)
 {
     bool straight = false;
@@ -810,7 +818,7 @@ static ebpo_polygon_kind classify_polygon(const polygon *p)
         if (t < 0)
             return EBPO_POLYGON_CONCAVE;
         straight = straight || t == 0;
-        changes += goes_up(p->flat[i], p->flat[j]) != goes_up(p->flat[j], p->flat[k]);
+        changes += is_ascending(p->flat[i], p->flat[j]) != is_ascending(p->flat[j], p->flat[k]);
     }
     if (changes > 2)
         return EBPO_POLYGON_GUESSED;
@@ -824,7 +832,8 @@ static bool has_area(const polygon *p, const uint32_t t[3])
     return !ebpo_zero_area(p->corner[t[0]], p->corner[t[1]], p->corner[t[2]]);
 }
 
-/* Classifies triangles of least area: they may cover the outline after all, or have no area. */
+/* Classifies the polygon by its triangles of least area: they may cover the outline after all, or
+ * have no area. */
 static ebpo_polygon_kind kind_of_guess(const polygon *p, uint32_t (*triangle)[3])
 {
     bool turned = !p->projected, empty = true;

@@ -1,5 +1,5 @@
-/* Triangulates a closed chain in space over its vertices: closes a hole, or covers a polygon that
- * crosses itself. */
+/* Triangulates closed chains in space, which closes holes, and polygons in space. No vertices are
+ * added. */
 #ifndef EBPO_GEOMETRY_POLYGON_H
 #define EBPO_GEOMETRY_POLYGON_H
 
@@ -23,12 +23,13 @@ static inline void ebpo_face_cross(const double a[3], const double b[3], const d
 /* A chain of n >= 3 points in order. */
 typedef struct ebpo_chain {
     uint32_t n;
-    /* up to this length the triangulation of least area is found, O(n^3); longer chains are cut ear
-     * by ear, O(n log n) */
+    /* up to this length, the triangulation of least area is found in O(n^3); longer chains are cut
+     * ear by ear in O(n log n) */
     uint32_t optimal;
     const double (*point)[3];
     /* NULL, or [n][n]: 1 where the mesh has an edge between two points already (a triangle there
-     * would make it non-manifold); avoided where possible; only for n <= optimal */
+     * would make the edge non-manifold). Such edges are avoided where possible. Used only for n <=
+     * optimal */
     const uint8_t *taken;
     ebpo_workspace *workspace; /* for long chains, or NULL */
 } ebpo_chain;
@@ -48,10 +49,10 @@ bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3]);
  * polygon with slits, with bridges to holes, or pinched at corners.
  *
  * Outlines whose projection crosses itself (including folded quads) have no such triangles. They
- * get those of least area in space, up to EBPO_POLYGON_OPTIMAL corners, else the least ears first:
- * a guess, which callers count. The result depends only on the corners. Sources: Meisters,
- * "Polygons have ears", 1975; Barequet and Sharir, "Filling gaps in the boundary of a polyhedron",
- * 1995, for the least area. */
+ * get triangles that are a guess, which callers count: up to EBPO_POLYGON_OPTIMAL corners those of
+ * least area in space, otherwise those that result from cutting the smallest ears first. The result
+ * depends only on the corners. Sources: Meisters, "Polygons have ears", 1975; Barequet and Sharir,
+ * "Filling gaps in the boundary of a polyhedron", 1995, for the least area. */
 
 typedef enum ebpo_polygon_kind {
     EBPO_POLYGON_CONVEX, /* a fan; also every triangle */
@@ -60,7 +61,7 @@ typedef enum ebpo_polygon_kind {
     EBPO_POLYGON_FLAT,
     EBPO_POLYGON_CONCAVE, /* cut by ears; also where the outline touches itself */
     EBPO_POLYGON_GUESSED, /* it crosses itself: triangles of least area */
-    /* a fan: its corners are on a line, or a coordinate is not finite */
+    /* a fan, because all corners are on a line or a coordinate is not finite */
     EBPO_POLYGON_DEGENERATE,
     /* more than EBPO_POLYGON_WORK steps were not enough; `triangle` is not usable */
     EBPO_POLYGON_TOO_LARGE,

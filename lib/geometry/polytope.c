@@ -3,9 +3,9 @@
  * Half-spaces are stored as plane codes of 32 bits, which decode to integers, so that no reader
  * rounds. Polytopes have rounded vertices: they serve volumes, drawing and the choice of planes.
  * Containment never depends on them. Clipping works on the vertex loops of the faces (BP 2008,
- * section 3.4.3) and refuses a cut that rounding would spoil, so that a polytope may be too large
- * and is never too small. An envelope is the cell of a node, cut by the planes of its ancestors and
- * its own. */
+ * section 3.4.3) and refuses a cut that rounding would spoil. So a polytope may be too large, but
+ * is never too small. An envelope is the cell of a node, cut by the planes of its ancestors and its
+ * own. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -61,7 +61,8 @@ int ebpo_plane_code_offset(const int32_t n[3], double support)
     double least = 0;
     for (int i = 0; i < 3; i++)
         least += n[i] < 0 ? n[i] : 0;
-    /* A relative rounding of a few 2^-53 of values below 2^21: 1e-8 steps is far above it. */
+    /* The values are below 2^21 and have relative errors of a few 2^-53; 1e-8 steps is far above
+     * that. */
     double q = ceil((support - least) * ((double)EBPO_OFFSET_STEPS / EBPO_NORMAL_NORM) + 1e-8) - 1;
     if (!(q < EBPO_OFFSET_STEPS - 1))
         return -1;
@@ -74,7 +75,7 @@ static const double tolerance = 1e-10;
 
 void ebpo_polytope_cube(ebpo_polytope *p)
 {
-    /* Vertex i has bit 0 x, bit 1 y, bit 2 z. */
+    /* The coordinates of vertex i are the bits of i: bit 0 is x, bit 1 y, bit 2 z. */
     static const uint16_t loops[6][4] = { { 0, 4, 6, 2 }, { 1, 3, 7, 5 }, { 0, 1, 5, 4 },
                                           { 2, 6, 7, 3 }, { 0, 2, 3, 1 }, { 4, 5, 7, 6 } };
     p->vertex_count = 8;
@@ -126,8 +127,9 @@ double ebpo_polytope_cap_bound(double volume, double width, double height)
     return volume * (1 - left * left * left);
 }
 
-/* The part beyond a plane, seen from its farthest vertex: faces with this vertex add nothing, each
- * other one a fan, and the cut is a polygon whose area follows from its edges in any order. */
+/* The part beyond a plane, seen from its farthest vertex: faces with this vertex add nothing, and
+ * each other face adds a fan. The cut is a polygon whose area is computed from its edges in any
+ * order. */
 typedef struct beyond {
     const ebpo_polytope *p;
     /* area: twice the area of the cut, as a vector; origin: a point of the plane */
@@ -138,7 +140,7 @@ typedef struct beyond {
 
 static void point_between(const beyond *c, int out, int in, double x[3])
 {
-    /* always from the outer end, so that neighbours get the same point */
+    /* always from the outer end, so that both faces at the edge get the same point */
     interpolate_crossing(c->p->vertex[out], c->dist[out], c->p->vertex[in], c->dist[in], x);
 }
 
@@ -148,7 +150,7 @@ static void add_edge(beyond *c, const double from[3], const double to[3])
     if (!c->started) {
         c->started = true;
         memcpy(c->origin, from, sizeof c->origin);
-        return; /* seen from its own end it has no area */
+        return; /* its triangle with this end has no area */
     }
     double u[3], v[3], n[3];
     ebpo_vec3_subtract(from, c->origin, u);
@@ -232,7 +234,7 @@ typedef struct cut {
     ebpo_polytope *out;
     double dist[EBPO_POLYTOPE_VERTICES];
     uint16_t number[EBPO_POLYTOPE_VERTICES]; /* indices of kept vertices in `out` */
-    bool on[EBPO_POLYTOPE_VERTICES];         /* `out` vertex is on the cutting plane */
+    bool on[EBPO_POLYTOPE_VERTICES];         /* the vertex of `out` is on the cutting plane */
     /* cut edges and their new vertices */
     struct {
         uint16_t in, out, number;
@@ -244,7 +246,8 @@ typedef struct cut {
     } rim[EBPO_POLYTOPE_CORNERS];
     int rims;
     bool full;
-    bool touched; /* old vertices are on the plane: rim edges may have kept faces on both sides */
+    /* old vertices are on the plane, so rim edges may have kept faces on both sides */
+    bool touched;
 } cut;
 
 static uint16_t add_vertex(cut *c, const double x[3], bool on)
@@ -337,8 +340,8 @@ static void clip_face(cut *c, int f)
     }
 }
 
-/* Closes the cap. Rim edges used in both directions are between two kept faces; the others,
- * reversed, bound the cap. */
+/* Closes the cap. A rim edge that is used in both directions is between two kept faces. The other
+ * rim edges, reversed, bound the cap. */
 static bool close_cap(cut *c, int32_t tag)
 {
     int16_t next[EBPO_POLYTOPE_VERTICES];

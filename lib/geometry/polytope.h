@@ -1,12 +1,19 @@
 /* Plane codes: a half-space in the coordinates of its node's cell, in 32 bits, decoded to integers
  * so that no reader rounds.
  *
- * bits 0-9 u, bits 10-19 v, bits 20-31 q. With U = u - 511, V = v - 511 in [-511, 511]: the normal
- * is the point (U, V) of the octahedral map (Cigolle et al., "A Survey of Efficient Representations
- * for Independent Unit Vectors", 2014) kept as integers of 1-norm 511. With m the sum of the
- * normal's negative components (the least value of n . xi over the cell), the half-space is 4096 *
- * (n . xi) <= 4096 * m + 511 * (q + 1),   0 <= q <= 4094, so q counts 4096ths of the cell's width
- * in direction n. q = 4095 would keep the whole cell and means no plane. */
+ *   bits 0-9    u
+ *   bits 10-19  v
+ *   bits 20-31  q
+ *
+ * With U = u - 511, V = v - 511 in [-511, 511]: the normal is the point (U, V) of the octahedral
+ * map (Cigolle et al., "A Survey of Efficient Representations for Independent Unit Vectors", 2014)
+ * kept as integers of 1-norm 511. With m the sum of the normal's negative components (the least
+ * value of n . xi over the cell), the half-space is
+ *
+ *   4096 * (n . xi) <= 4096 * m + 511 * (q + 1),   0 <= q <= 4094
+ *
+ * So q counts 4096ths of the cell's width in direction n. q = 4095 would keep the whole cell and
+ * means no plane. */
 #ifndef EBPO_GEOMETRY_POLYTOPE_H
 #define EBPO_GEOMETRY_POLYTOPE_H
 
@@ -27,8 +34,8 @@ bool ebpo_plane_code_decode(uint32_t code, int32_t n[3], int32_t *d);
  * direction is a face's world normal multiplied by the cell's size, axis by axis. */
 bool ebpo_plane_code_normal(const double direction[3], uint32_t *normal);
 
-/* Returns the least q whose half-space keeps every point with n . xi <= support, or -1 when only
- * the whole cell does. `support` is in units of n . xi; this function rounds to the safe side. */
+/* Returns the least q whose half-space keeps every point with n . xi <= support, or -1 when no q
+ * does. `support` is in units of n . xi; rounding is to the safe side. */
 int ebpo_plane_code_offset(const int32_t n[3], double support);
 
 static inline uint32_t ebpo_plane_code_make(uint32_t normal, int q)
@@ -36,8 +43,8 @@ static inline uint32_t ebpo_plane_code_make(uint32_t normal, int q)
     return normal | (uint32_t)q << 20;
 }
 
-/* Converts the half-space, 4096 * (n . xi) <= d, to the coordinates of child `octant`: xi_parent =
- * (xi_child + octant) / 2. Exact; d grows by less than one bit for each level. */
+/* Returns the d of the half-space 4096 * (n . xi) <= d in the coordinates of the child `octant`,
+ * where xi_parent = (xi_child + octant) / 2. Exact; d grows by less than one bit a level. */
 static inline int64_t ebpo_plane_to_child(const int32_t n[3], int64_t d, unsigned octant)
 {
     int64_t shift = 0;
@@ -47,10 +54,10 @@ static inline int64_t ebpo_plane_to_child(const int32_t n[3], int64_t d, unsigne
     return 2 * d - (int64_t)EBPO_OFFSET_STEPS * shift;
 }
 
-/* Convex polytopes in cell coordinates, cut from the unit cube by half-spaces: for volumes, drawing
- * and choosing planes. Their vertices are rounded. Containment never depends on them, only on the
- * decoded half-spaces. Source: BP 2008, section 3.4.3 (clipping of the box), done here on vertex
- * loops. */
+/* Convex polytopes in cell coordinates, cut from the unit cube by half-spaces: they serve volumes,
+ * drawing and the choice of planes. Their vertices are rounded. Containment never depends on them,
+ * only on the decoded half-spaces. Source: BP 2008, section 3.4.3 (clipping of the box), here on
+ * vertex loops. */
 
 /* Capacity for the 255 planes that a node may have, on a cube, where no more than three intersect
  * in a point. */
@@ -69,8 +76,8 @@ typedef struct ebpo_polytope {
 typedef enum ebpo_clip {
     EBPO_CLIP_NONE, /* nothing was removed */
     EBPO_CLIP_CUT,
-    /* next to nothing would remain, or capacity is exceeded, or rounding spoiled the loops:
-     * unchanged (too large, never too small) */
+    /* next to nothing would remain, or the capacity is exceeded, or rounding would spoil the loops:
+     * the polytope is unchanged (too large, never too small) */
     EBPO_CLIP_REFUSED
 } ebpo_clip;
 
@@ -80,36 +87,37 @@ void ebpo_polytope_cube(ebpo_polytope *p);
 /* Keeps n . x <= d. |n| should be about 1 (tolerance 1e-10 in cell units). */
 ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int32_t tag);
 
-/* Cuts out the octant and scales it to the unit cube; returns false when it is (numerically) empty:
- * *out is then a box around it. `out` may not be `p`. Faces between siblings get the tags of the
- * cube again. */
+/* Cuts out the octant and scales it to the unit cube. Returns false when the octant's part is
+ * (numerically) empty; *out is then a box around it. `out` may not be `p`. Faces between siblings
+ * get the tags of the cube. */
 bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out);
 
-/* Cuts out one half along `axis` (side 0: lower, 1: upper), scaled to the unit cube;
- * ebpo_polytope_child is z, then y, then x. Returns false, and the whole cube, when it is
- * (numerically) empty. */
+/* Cuts out one half along `axis` (side 0: lower, 1: upper), and scales it to the unit cube.
+ * ebpo_polytope_child halves along z, then y, then x. When the half is (numerically) empty, returns
+ * false and the whole cube. */
 bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out);
 
 /* Copies only the used part of the struct. */
 void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from);
 
-/* Sets for each vertex bit 2 * axis + side for each face of the cube that it is on, regardless of
- * rounding. */
+/* Sets, for each vertex and each face of the cube that it is on, the bit 2 * axis + side. Rounding
+ * of the vertices does not matter. */
 void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES]);
 
 double ebpo_polytope_volume(const ebpo_polytope *p);
 
-/* Returns the volume that clipping by n . x <= d would remove; 0 when it is certainly below
- * `least`, for which `volume` is the polytope's own. */
+/* Returns the volume that clipping by n . x <= d would remove; 0 when that is certainly below
+ * `least`. `volume` is the polytope's volume. */
 double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d, double volume,
                              double least);
 
-/* Returns an upper bound of the volume beyond a plane, for a body of the given volume, width along
- * the plane's normal, and height beyond the plane: among convex bodies of volume V and width H the
- * cap of height h is largest for the cone with its base on the far side, V (1 - (1 - h/H)^3). */
+/* Returns an upper bound of the volume beyond a plane, for a convex body of the given volume and
+ * width along the plane's normal, and its height beyond the plane. Among convex bodies of volume V
+ * and width H the cap of height h is largest for the cone with its base on the far side, V (1 - (1
+ * - h/H)^3). */
 double ebpo_polytope_cap_bound(double volume, double width, double height);
 
-/* Polytopes cut by plane codes. */
+/* --- polytopes cut by plane codes --- */
 
 /* Converts n to a direction of length about 1 and the matching offset, for ebpo_polytope_clip. */
 static inline double ebpo_plane_as_double(const int32_t n[3], int64_t d, double out[3])
@@ -122,10 +130,7 @@ static inline double ebpo_plane_as_double(const int32_t n[3], int64_t d, double 
 /* Cuts the envelope by plane codes of its own cell; a face's tag is the index of its code. */
 void ebpo_planes_cut(ebpo_polytope *envelope, const uint32_t *codes, uint64_t count);
 
-/* The half-spaces that bound a node's envelope within its cell: those of its ancestors and its own,
- * as exact integers in the coordinates of its cell. */
-
-/* 4096 (n . xi) <= d */
+/* The half-space 4096 (n . xi) <= d. */
 typedef struct ebpo_half_space {
     int32_t n[3];
     int64_t d;
@@ -133,7 +138,9 @@ typedef struct ebpo_half_space {
 
 enum { EBPO_HALF_SPACES_MAX = EBPO_LEVELS_MAX * 256 }; /* plane counts are bytes */
 
-/* Half-spaces that keep the whole cell are omitted. */
+/* The half-spaces that bound a node's envelope within its cell: those of its ancestors and its own,
+ * as exact integers in the coordinates of its cell. Half-spaces that keep the whole cell are
+ * omitted. */
 typedef struct ebpo_half_spaces {
     int count;
     ebpo_half_space at[EBPO_HALF_SPACES_MAX];
@@ -145,14 +152,12 @@ void ebpo_half_spaces_add(ebpo_half_spaces *spaces, const uint32_t *codes, uint6
 /* Moves from the cell to its child. */
 void ebpo_half_spaces_to_child(ebpo_half_spaces *spaces, unsigned octant);
 
-/* Cuts the cell by the half-spaces, each moved outwards by `slack` (in the units of n / 511, about
- * cells). */
+/* Cuts the cell by the half-spaces, each moved outwards by `slack` (in units of n / 511, which are
+ * about one cell). */
 void ebpo_half_spaces_cut(const ebpo_half_spaces *spaces, double slack, ebpo_polytope *out);
 
-/* Envelopes along a path down the tree, as polytopes, so that neighbours share those of their
- * ancestors. */
-
-/* About 170 KB; zeroed before first use. */
+/* The envelopes of the nodes on a path down the tree, as polytopes. Neighbouring nodes share those
+ * of their common ancestors. About 170 KB; initialise it with zeros. */
 typedef struct ebpo_envelope_stack {
     ebpo_octcode octcode[EBPO_LEVELS_MAX]; /* node of each envelope; 0: none */
     ebpo_polytope at[EBPO_LEVELS_MAX];
@@ -166,13 +171,13 @@ static inline const ebpo_polytope *ebpo_envelope_held(const ebpo_envelope_stack 
     return stack->octcode[level] == octcode ? &stack->at[level] : NULL;
 }
 
-/* Adds the envelope of a node whose parent's is held (for the root: the cube), in coordinates of
- * its cell: its parent's part in the cell, cut by its own planes. Valid until another node of its
- * level is added. */
+/* Adds the envelope of a node in coordinates of its cell: the part of its parent's envelope in the
+ * cell, cut by its own planes. The parent's envelope must be in the stack (for the root, it is the
+ * cube). The result is valid until another node of the same level is added. */
 const ebpo_polytope *ebpo_envelope_put(ebpo_envelope_stack *stack, ebpo_octcode octcode,
                                        const uint32_t *codes, uint64_t count);
 
-/* Adds the envelope of a black node: its cell. */
+/* Adds the envelope of a black node, which is its cell. */
 const ebpo_polytope *ebpo_envelope_put_cube(ebpo_envelope_stack *stack, ebpo_octcode octcode);
 
 #endif

@@ -59,9 +59,10 @@ ebpo_status ebpo_pose_turn(ebpo_pose *pose, const double quaternion[4], ebpo_err
     double q[4];
     memcpy(q, quaternion, sizeof q);
     if (!ebpo_quaternion_normalise(q))
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the quaternion's greatest part is not from 2^-500 to 2^500: %g %g %g %g",
-                         q[0], q[1], q[2], q[3]);
+        return ebpo_fail(
+            error, EBPO_E_ARGUMENT,
+            "the greatest component of the quaternion is not from 2^-500 to 2^500: %g %g %g %g",
+            q[0], q[1], q[2], q[3]);
     ebpo_quaternion_matrix(q, pose->rotation);
     return EBPO_OK;
 }

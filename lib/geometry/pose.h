@@ -1,4 +1,4 @@
-/* Rotations as quaternions: x, y, z, w (the real part). Thread-safe. */
+/* Rotations as quaternions (x, y, z, w; w is the real part), and posed coordinates. Thread-safe. */
 #ifndef EBPO_GEOMETRY_POSE_H
 #define EBPO_GEOMETRY_POSE_H
 
@@ -8,11 +8,11 @@
 
 double ebpo_quaternion_length(const double q[4]);
 
-/* Scales to length 1 up to rounding. Returns false if its greatest component is not within 2^-500
- * .. 2^500. */
+/* Scales a quaternion to length 1, up to rounding. Returns false if its greatest component is not
+ * within 2^-500 .. 2^500. */
 bool ebpo_quaternion_normalise(double q[4]);
 
-/* Converts a quaternion of length 1 up to rounding to a matrix; m: [3][3]. */
+/* Converts a quaternion, whose length is 1 up to rounding, to a matrix. */
 void ebpo_quaternion_matrix(const double q[4], double (*m)[3]);
 
 /* The pose of a model in the world, and the posed coordinates of its vertices: doubles, each
@@ -24,18 +24,18 @@ typedef struct ebpo_posing {
     double matrix[3][3]; /* rotation times scale, each rounded once */
     double translation[3];
     double scale;
-    double error_bound; /* error bound of the rotation: the greatest |R^T R - 1|, and rounding */
+    double error_bound; /* error bound of the rotation: the greatest |R^T R - 1|, plus rounding */
 } ebpo_posing;
 
 /* Checks a pose, for vertices whose coordinates are at most reach[axis] in size.
  *
- * EBPO_E_ARGUMENT: a number is not finite, the matrix is not a rotation (the message has the error)
- * or is a mirror, the scale or a posed coordinate would leave its range. */
+ * EBPO_E_ARGUMENT: a number is not finite, the matrix is not a rotation (the message gives the
+ * deviation) or is a mirror, or the scale or a posed coordinate is out of range. */
 EBPO_MUST_USE ebpo_status ebpo_posing_make(ebpo_posing *out, const ebpo_pose *pose,
                                            const double reach[3], ebpo_error *error);
 
-/* Applies the pose; the result is finite, within 2^1000. Compiled where core/strict_fp.h comes
- * first: never contracted. */
+/* Applies the pose. The result is finite and within 2^1000. Files that use this function include
+ * core/strict_fp.h first, so its operations are never contracted. */
 static inline void ebpo_posing_apply(const ebpo_posing *p, const double x[3], double out[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -47,8 +47,8 @@ static inline void ebpo_posing_apply(const ebpo_posing *p, const double x[3], do
 /* Returns the rows of the rotation, in doubles. */
 void ebpo_posing_rotation(const ebpo_posing *p, double out[3][3]);
 
-/* Bounds the distance of each posed coordinate from that of the true motion (nearest rotation, no
- * rounding), for vertices at most `length` from the model's origin. */
+/* Returns a bound of the error of each posed coordinate, compared with the pose by the nearest true
+ * rotation without rounding, for vertices at most `length` from the model's origin. */
 double ebpo_posing_error(const ebpo_posing *p, double length);
 
 #endif

@@ -1,9 +1,9 @@
 /* Orientation predicates and signs of sums of products, exact for every finite double.
  *
  * Each predicate passes stages, cheapest first: signs of factors, a floating-point filter, exact
- * arithmetic on doubles (expansions) where exponents are in range, integers of any size. Sources:
- * Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates",
- * 1997; docs/develop/design.md. */
+ * arithmetic on doubles (expansions) where exponents are in range, and integers of any size.
+ * Sources: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
+ * Predicates", 1997; docs/develop/design.md. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -18,8 +18,8 @@
 
 /* --- integers of any size --- */
 
-/* A finite double is an integer times a power of two. Coordinates of one axis are brought to a
- * common power, which scales the determinant by a positive factor and leaves integers. */
+/* A finite double is an integer times a power of two. The coordinates of one axis are divided by a
+ * common power of two, which scales the determinant by a positive factor and leaves integers. */
 
 /* Returns the largest e such that x is an integer multiple of 2^e with a 53-bit factor; INT_MAX for
  * 0, which is a multiple of all. */
@@ -43,7 +43,7 @@ static int common_exponent(const double *x, int n)
     return least;
 }
 
-/* Computes out = x / 2^unit, an integer by choice of unit. */
+/* Computes out = x / 2^unit, which is an integer for the chosen unit. */
 static void set_integer(mpz_t out, double x, int unit)
 {
     if (x == 0) {
@@ -151,8 +151,8 @@ int ebpo_sign_of_products_exact(const double *factor, int n)
  * differences of such numbers and their rounding errors; products of three are multiples of 2^-900
  * and below 2^910: no operation here overflows or underflows. */
 
-/* The sum of absolute products times this factor bounds the error of taking rounded differences for
- * exact ones: 3 eps and a margin. */
+/* The sum of absolute products times this factor bounds the error of using rounded differences in
+ * place of exact ones: 3 eps, with a margin. */
 static const double heads_error = 4 * 0x1p-53;
 
 static bool in_range(const double *x, int n, double least, double largest)
@@ -214,9 +214,9 @@ static bool row_to_integers(int64_t out[3], const ebpo_pair row[3])
     return exact;
 }
 
-/* Computes the determinant of differences that are exact and have few bits, as those of
- * single-precision or integer input. Each is below 2^41, so that minors are below 2^83 and the
- * determinant below 2^126. Returns false for other differences. */
+/* Computes the determinant of differences that are exact and have few bits, as those of float or
+ * integer input. Each is below 2^41, so that minors are below 2^83 and the determinant below 2^126.
+ * Returns false for other differences. */
 static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 {
     int64_t z[3][3];
@@ -233,7 +233,7 @@ static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 }
 
 #else
-/* Without 128-bit integers, expansions decide alone. */
+/* Without 128-bit integers, all decisions are left to expansions. */
 static bool integer_determinant(int *sign, ebpo_pair m[3][3])
 {
     (void)sign, (void)m;
@@ -267,8 +267,9 @@ static double error_of_heads(ebpo_pair m[3][3])
     return heads_error * permanent;
 }
 
-/* Returns a lower bound of |e| for n <= 24. Components do not overlap, so the sum of their sizes is
- * below twice the last one, and the error of adding them is less than n eps of that. */
+/* Returns a lower bound of the absolute value of the expansion e, for n <= 24. Components do not
+ * overlap, so the sum of their sizes is below twice the last one, and the error of adding them is
+ * less than n eps of that. */
 static double expansion_size(const double *e, int n)
 {
     double sum = 0;
@@ -342,7 +343,7 @@ int ebpo_sign_of_products_expansion(const double *factor, int n)
 
 /* Error bounds: eps = 2^-53. Each bound holds for the computed permanent (the sum of absolute
  * values); the slack term covers underflow in the products, and an overflow makes the bound
- * infinite or not a number, so that no comparison succeeds. */
+ * infinite or NaN, so that no comparison succeeds. */
 static const double eps = 0x1p-53;
 /* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
 static const double slack = 0x1p-960;
@@ -375,7 +376,8 @@ int ebpo_orient2d(const double a[2], const double b[2], const double c[2])
     return sign != EBPO_SIGN_UNKNOWN ? sign : ebpo_orient2d_exact(a, b, c);
 }
 
-/* Filters the differences of b, c, d to a, one row for each axis. */
+/* Returns the sign by floating point, if it is certain, from the differences of b, c, d to a, one
+ * row for each axis. */
 static int orient3d_filter(double m[3][3])
 {
     double det = 0, permanent = 0, third = 0;
@@ -405,11 +407,11 @@ int ebpo_orient3d(const double a[3], const double b[3], const double c[3], const
     int sign = orient3d_filter(m);
     if (sign != EBPO_SIGN_UNKNOWN)
         return sign;
-    /* All points in one axis-parallel plane: the most common zero. */
+    /* All points are in one axis-parallel plane: the most frequent case of 0. */
     for (int k = 0; k < 3; k++)
         if (m[k][0] == 0 && m[k][1] == 0 && m[k][2] == 0)
             return 0;
-    /* Faces that share a corner. */
+    /* Two points are equal: faces that share a corner. */
     if (same_point(a, b) || same_point(a, c) || same_point(a, d) || same_point(b, c) ||
         same_point(b, d) || same_point(c, d))
         return 0;

@@ -1,9 +1,9 @@
 /* Exact predicates over doubles: the sign is right for every finite input, whatever the compiler
- * and its flags. A floating-point filter decides nearly always; the rest goes to exact arithmetic
- * on doubles (expansions), then to integers of any size (GMP). Overflow and underflow in the filter
- * are detected and fall back too. All functions are pure and thread-safe. Source: Shewchuk,
- * "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997, for
- * the idea of filters. */
+ * and its flags. A floating-point filter decides nearly always. Where it does not, exact arithmetic
+ * on doubles (expansions) decides, or integers of any size (GMP). The filter detects overflow and
+ * underflow and does not decide then. All functions are pure and thread-safe. Source of the
+ * filters: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
+ * Predicates", 1997. */
 #ifndef EBPO_GEOMETRY_PREDICATES_H
 #define EBPO_GEOMETRY_PREDICATES_H
 
@@ -26,8 +26,8 @@ int ebpo_normal_sign(int axis, const double a[3], const double b[3], const doubl
 /* Returns true when a, b, c are collinear or coincide: a face without area. */
 bool ebpo_zero_area(const double a[3], const double b[3], const double c[3]);
 
-/* Returns the exact sign of the sum of n products factor[2i] * factor[2i+1]; up to 8 are fastest.
- */
+/* Returns the exact sign of the sum of n products factor[2i] * factor[2i+1]; up to 8 products are
+ * fastest. */
 int ebpo_sign_of_products(const double *factor, int n);
 
 /* Computes signed crossings of the face (a, b, c) with an axis-parallel segment, for winding
@@ -45,7 +45,7 @@ int ebpo_sign_of_products(const double *factor, int n);
 int ebpo_axis_crossing(const double from[3], double to, int axis, const double a[3],
                        const double b[3], const double c[3]);
 
-/* Returns true when p is on the closed triangle (a, b, c), also one without area. Exact. */
+/* Returns true when p is on the closed triangle (a, b, c), which may have no area. Exact. */
 bool ebpo_point_on_triangle(const double p[3], const double a[3], const double b[3],
                             const double c[3]);
 
@@ -54,20 +54,20 @@ bool ebpo_point_on_triangle(const double p[3], const double a[3], const double b
 /* Returned instead of a sign when coordinates are too large or too small for this stage. */
 enum { EBPO_SIGN_UNKNOWN = 2 };
 
-/* Computes in exact arithmetic on doubles: tens to hundreds of nanoseconds, without allocation.
- * Same results as the functions above without "_expansion"; -1, 0, 1 are exact. */
+/* Compute in exact arithmetic on doubles, in tens to hundreds of nanoseconds, without allocation.
+ * Same results as the functions above without "_expansion", or EBPO_SIGN_UNKNOWN. */
 int ebpo_orient2d_expansion(const double a[2], const double b[2], const double c[2]);
 int ebpo_orient3d_expansion(const double a[3], const double b[3], const double c[3],
                             const double d[3]);
 int ebpo_sign_of_products_expansion(const double *factor, int n);
 
-/* Returns the exact sign of the determinant of three columns of differences, m[axis][column];
- * coordinates in the range of ebpo_orient3d_expansion, or closer to 1. */
+/* Returns the exact sign of the determinant of three columns of differences, m[axis][column]; the
+ * coordinates must be in the range of ebpo_orient3d_expansion, or closer to 1. */
 int ebpo_determinant_expansion(ebpo_pair m[3][3]);
 
-/* Computes in integers of any size. Same results and ranges as the functions above without
- * "_exact". Each call allocates through GMP, which ends the program when memory is short (a few
- * kilobytes suffice). */
+/* Compute in integers of any size. Same results and ranges as the functions above without "_exact".
+ * Each call allocates through GMP, which ends the program when memory is short (a few kilobytes
+ * suffice). */
 int ebpo_orient2d_exact(const double a[2], const double b[2], const double c[2]);
 int ebpo_orient3d_exact(const double a[3], const double b[3], const double c[3], const double d[3]);
 int ebpo_sign_of_products_exact(const double *factor, int n);

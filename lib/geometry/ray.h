@@ -4,7 +4,8 @@
 
 #include <stdbool.h>
 
-/* origin + t direction, 0 <= t <= t_max; direction is not zero; t_max >= 0 or INFINITY. */
+/* The points origin + t * direction with 0 <= t <= t_max. The direction is not zero; t_max >= 0, or
+ * INFINITY. */
 typedef struct ebpo_segment {
     double origin[3], direction[3];
     double t_max;
@@ -12,25 +13,26 @@ typedef struct ebpo_segment {
 
 typedef struct ebpo_ray_intersection {
     bool meets; /* the closed triangle and the ray have a common point with 0 <= t <= t_max */
-    /* 1: it goes against the normal through the triangle's interior (enters), -1: with it (leaves),
-     * 0: an edge, a corner, within the plane, or no area */
+    /* 1: the ray passes through the triangle's interior against the normal (enters); -1: with the
+     * normal (leaves); 0: it intersects an edge or corner, is within the plane, or the triangle has
+     * no area */
     int side;
-    /* 1: the line goes against the normal, -1: with it, wherever it intersects the triangle; 0:
-     * within the plane, or no area */
+    /* direction of the line, wherever it intersects the triangle. 1: against the normal; -1: with
+     * the normal; 0: the line is within the plane, or the triangle has no area */
     int facing;
     double t; /* t of the first common point, correctly rounded */
 } ebpo_ray_intersection;
 
 /* Exact tests of rays and boxes against triangles: the decisions are those of arithmetic without
- * rounding, for every finite double. Filters in floating point first, then exact arithmetic on
- * doubles (expansions), integers of any size (GMP) where numbers are too large or too small for
- * these. Pure functions, any thread; the same results with every compiler and its flags. */
+ * rounding, for every finite double. Filters in floating point come first, then exact arithmetic on
+ * doubles (expansions), or integers of any size (GMP) where numbers are too large or too small for
+ * expansions. Pure functions, any thread; the same results with every compiler and its flags. */
 
 void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3],
                        ebpo_ray_intersection *out);
 
-/* Same where the line certainly passes through the triangle's interior, `facing` as in the result
- * (not 0). */
+/* Same as ebpo_ray_triangle, for a line that certainly passes through the triangle's interior.
+ * `facing` is as in the result, and not 0. */
 void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int facing,
                        ebpo_ray_intersection *out);
 
@@ -40,8 +42,8 @@ int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3],
                      const ebpo_ray_intersection *at_a, const double b[3][3],
                      const ebpo_ray_intersection *at_b);
 
-/* Same in rational numbers, for every finite double. Each call allocates through GMP, which ends
- * the program when memory is short (a few kilobytes suffice). */
+/* Same as ebpo_ray_triangle, computed in rational numbers. Each call allocates through GMP, which
+ * ends the program when memory is short (a few kilobytes suffice). */
 void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3],
                              ebpo_ray_intersection *out);
 int ebpo_ray_compare_exact(const ebpo_segment *ray, const double a[3][3], const double b[3][3]);

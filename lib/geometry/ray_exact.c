@@ -1,12 +1,12 @@
-/* Intersects rays with triangles in rational numbers: right for every finite double, and slow. The
- * last stage of ray_triangle.c.
+/* Intersects rays with triangles in rational numbers, which is exact for every finite double, and
+ * slow. This is the last stage of ray_triangle.c.
  *
- * Corners relative to the origin become integers e_i in one unit, the direction integers d in
- * another. With s_i = d . (e_j x e_k) for the edge opposite corner i, the line intersects the plane
- * at t = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2), and it intersects the triangle when no two of the
- * s_i have different signs. When the denominator is 0 the line is parallel to the triangle or the
- * triangle has no area: then there is a common point only where all s_i are 0, and line and
- * triangle are in one plane. */
+ * Corners relative to the origin become integers e_i in one unit, and the direction becomes
+ * integers d in another unit. With s_i = d . (e_j x e_k) for the edge opposite corner i, the line
+ * intersects the plane at t = e_0 . (e_1 x e_2) / (s_0 + s_1 + s_2), and it intersects the triangle
+ * when no two of the s_i have different signs. When the denominator is 0 the line is parallel to
+ * the triangle or the triangle has no area: then there is a common point only where all s_i are 0,
+ * and line and triangle are in one plane. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -21,10 +21,11 @@
 typedef struct integer_scene {
     mpz_t corner[3][3]; /* e_i */
     mpz_t direction[3];
-    int shift; /* a parameter in these units times 2^shift is t */
+    int shift; /* t is the parameter in these units times 2^shift */
 } integer_scene;
 
-/* The intersection of the line and the triangle, in units of the scene. */
+/* The intersection of the line and the triangle, in the units of integer_scene: an interval of the
+ * parameter. */
 typedef struct stretch {
     bool any;
     int side, facing;
@@ -117,8 +118,8 @@ static void set_fraction(mpq_t out, const mpz_t numerator, const mpz_t denominat
 
 /* --- the line and the triangle --- */
 
-/* Returns the axis with the direction's largest component: there, a multiple of the direction
- * determines the factor. */
+/* Returns the axis with the direction's largest component: along that axis, the factor of a
+ * multiple of the direction is computed. */
 static int main_axis(const integer_scene *s)
 {
     int axis = 0;
@@ -154,7 +155,7 @@ static void offsets_from_line(const integer_scene *s, mpz_t out[3])
 }
 
 /* Adds the crossing of the edge from corner i to corner j with the line, at (e_i w_j - e_j w_i) /
- * (w_j - w_i) = t d, w being the offsets. */
+ * (w_j - w_i) = t d, where w are the offsets. */
 static void add_edge_crossing(stretch *st, const integer_scene *s, int axis, mpz_t w[3], int i,
                               int j)
 {

@@ -2,14 +2,15 @@
  *
  * A ray passes stages, cheapest first: the side of each edge on which the line passes, in floating
  * point with error bounds; then numerator and denominator of t in double-double arithmetic
- * (double_double_kernels.c), which gives t to its last bits; expansions where these are not
- * certain; rational numbers where exponents leave the range of expansions (ray_exact.c).
+ * (double_double_kernels.c), which gives t to its last bits; then expansions where this is not
+ * certain; then rational numbers where exponents are out of the range of expansions (ray_exact.c).
  *
  * With e_i = corner i - origin the line passes the edge (i, j) on the side given by the sign of d .
- * (e_i x e_j). Two edges with different signs: the line misses the triangle, also one without area
- * or seen edge-on, because all three signs are those of one planar figure, the triangle projected
- * along d. Three equal signs: it passes through the interior. In all other cases it touches an edge
- * or a corner, or is not certain. */
+ * (e_i x e_j). If two edges have different signs, the line misses the triangle. This is also true
+ * of triangles that have no area or are seen edge-on, because the three signs are those of one
+ * planar figure, the triangle projected along d. If the three signs are equal, the line passes
+ * through the interior. In all other cases the line touches an edge or a corner, or is not certain.
+ */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -23,8 +24,8 @@
 #include "geometry/ray.h"
 #include "geometry/double_double_kernels.h"
 
-/* The sign of the determinant of direction, corner i and corner i + 1 (relative to the origin),
- * where it is certain; otherwise: */
+/* In place of the sign of the determinant of direction, corner i and corner i + 1 (relative to the
+ * origin), where that sign is not certain. */
 enum { SIDE_OPEN = 2 };
 
 /* Returns true if a and b, which are rounded, are so far apart that their order is certain. */
@@ -41,9 +42,10 @@ static inline void set_miss(ebpo_ray_intersection *out)
 /* --- expansions: t as a fraction, exact without allocation --- */
 
 /* Ranges. A double x with 2^-172 <= |x| <= 2^225 is a multiple of 2^-225; products of four such
- * numbers, their differences and rounding errors are multiples of 2^-900 and below 2^910. Comparing
- * two hits needs products of six, so numbers from 2^-97 to 2^150, which are multiples of 2^-150.
- * Functions that return false or EBPO_SIGN_UNKNOWN got numbers outside of these ranges. */
+ * numbers, their differences and rounding errors are multiples of 2^-900 and below 2^910. The
+ * comparison of two hits needs products of six numbers, so these must be from 2^-97 to 2^150, which
+ * are multiples of 2^-150. Functions return false or EBPO_SIGN_UNKNOWN for numbers outside of these
+ * ranges. */
 
 /* numerator / denominator; the denominator is not 0. */
 typedef struct fraction_of_expansions {
@@ -66,8 +68,8 @@ static bool all_in_range(const ebpo_segment *ray, const double triangle[3][3], d
            in_range(ray->direction, 3, least, largest) && in_range(triangle[0], 9, least, largest);
 }
 
-/* Returns true for values that are zero, or of a size that no product of four of them leaves the
- * doubles. */
+/* Returns true if every value is zero or within the range in which products of four can be computed
+ * exactly. */
 static bool ray_in_range(const ebpo_segment *ray, const double triangle[3][3])
 {
     return all_in_range(ray, triangle, 0x1p-172, 0x1p225);
@@ -80,7 +82,7 @@ static int fraction_sign(const fraction_of_expansions *f)
     return ebpo_expansion_sign(f->numerator, f->n) * ebpo_expansion_sign(f->denominator, f->m);
 }
 
-/* Returns the sign of f - t for t >= 0. */
+/* Returns the sign of the fraction f minus t, for t >= 0. */
 static int fraction_beyond(const fraction_of_expansions *f, double t)
 {
     double end[192], rest[384];
@@ -106,7 +108,8 @@ static void compress_fraction(fraction_of_expansions *f)
     f->m = ebpo_expansion_compress(f->denominator, f->m);
 }
 
-/* Returns the neighbour that the fraction is closer to, or the even one. */
+/* Returns the neighbour to which the fraction is closer, or the even one of the two if it is in the
+ * middle. */
 static double nearest_neighbour(const fraction_of_expansions *f, const double neighbour[2])
 {
     double low[192], high[192], middle[384], rest[576], half = (neighbour[1] - neighbour[0]) / 2;
@@ -121,8 +124,8 @@ static double nearest_neighbour(const fraction_of_expansions *f, const double ne
     return sign > 0 || (sign == 0 && bits % 2) ? neighbour[1] : neighbour[0];
 }
 
-/* Sets *t to the fraction, which is positive, correctly rounded. The fraction keeps its value, in
- * fewer components. */
+/* Sets *t to the fraction, which is positive, correctly rounded. The fraction may get fewer
+ * components, with the same value. */
 static bool fraction_value(fraction_of_expansions *f, double *t)
 {
     double out[2];
@@ -136,7 +139,8 @@ static bool fraction_value(fraction_of_expansions *f, double *t)
 }
 
 /* Computes the t at which the line intersects the triangle's plane: normal . (corner - origin) over
- * normal . direction, for input that ray_in_range accepts. Returns false if it is parallel. */
+ * normal . direction, for input that ray_in_range accepts. Returns false if the line is parallel to
+ * the plane. */
 static bool plane_fraction(const ebpo_segment *ray, const double triangle[3][3],
                            fraction_of_expansions *out)
 {
@@ -219,7 +223,7 @@ static void add_corner(crossings *c, const scene *s, int i)
 }
 
 /* Adds the crossing of the edge from corner i to j with the line, at (e_i w_j - e_j w_i) / (w_j -
- * w_i) = t d, w being the offsets. */
+ * w_i) = t d, where w are the offsets. */
 static void add_crossing(crossings *c, const scene *s, double w[3][16], const int *n, int i, int j)
 {
     fraction_of_expansions *f = &c->at[c->count++];
@@ -314,7 +318,7 @@ static int compare_fractions(fraction_of_expansions *a, fraction_of_expansions *
            ebpo_expansion_sign(b->denominator, b->m);
 }
 
-/* Returns the t of the first common point; false: not known. */
+/* Gets the t of the first common point. Returns false if it is not known. */
 static bool first_fraction(const ebpo_segment *ray, const double triangle[3][3],
                            fraction_of_expansions *out)
 {
@@ -330,7 +334,7 @@ static bool first_fraction(const ebpo_segment *ray, const double triangle[3][3],
         if (sign < 0)
             *out = c.at[i];
     }
-    if (fraction_sign(out) < 0) /* the ray begins within */
+    if (fraction_sign(out) < 0) /* the ray begins within the triangle */
         out->n = 0;
     return c.count > 0;
 }
@@ -353,13 +357,12 @@ static inline int bounded_sign(const ebpo_bounded *b)
     return b->x.head > b->error ? 1 : b->x.head < -b->error ? -1 : SIDE_OPEN;
 }
 
-/* t as a fraction, at first in double-double arithmetic, and as expansions when these are needed.
- */
+/* t as a fraction: first in double-double arithmetic, and in expansions when these are needed. */
 typedef struct parameter {
     const ebpo_segment *ray;
     const double (*triangle)[3];
     ebpo_plane_pairs at;
-    bool made; /* the fraction is set */
+    bool made; /* `fraction` is set */
     fraction_of_expansions fraction;
 } parameter;
 
@@ -380,7 +383,7 @@ static bool make_fraction(parameter *p)
     return p->made;
 }
 
-/* Returns the sign of t; that of the denominator is known. */
+/* Returns the sign of t; `denominator` is the sign of the denominator. */
 static int sign_of_t(parameter *p, int denominator)
 {
     int sign = bounded_sign(&p->at.numerator);
@@ -401,7 +404,8 @@ static bool value_of_t(parameter *p, double *t)
     return make_fraction(p) && fraction_value(&p->fraction, t);
 }
 
-/* Returns the sign of t - t_max, which are close; that of the denominator is known. */
+/* Returns the sign of t - t_max, where both are close; `denominator` is the sign of the
+ * denominator. */
 static int beyond_end(parameter *p, int denominator)
 {
     double end = p->ray->t_max;
@@ -416,8 +420,8 @@ static int beyond_end(parameter *p, int denominator)
     return make_fraction(p) ? fraction_beyond(&p->fraction, end) : EBPO_SIGN_UNKNOWN;
 }
 
-/* Same where the line intersects the triangle: `side` as in the result, `sign` that of normal .
- * direction. */
+/* Intersects the ray with a triangle that the line intersects. `side` is as in the result; `sign`
+ * is the sign of normal . direction. */
 static bool intersect_plane(const ebpo_segment *ray, const double triangle[3][3], int sign,
                             int side, ebpo_ray_intersection *out)
 {
@@ -443,7 +447,7 @@ static bool intersect_plane(const ebpo_segment *ray, const double triangle[3][3]
 
 /* --- rays close to an edge or a corner --- */
 
-/* Frequent cases are recognised first: a corner at the origin (t = 0), a corner on the line, an
+/* Frequent cases are recognised first: a corner at the origin (t = 0), a corner on the line, and an
  * edge through the origin. */
 
 /* Returns true if a x b = 0, exactly, for numbers in range. */
@@ -463,7 +467,7 @@ typedef struct corner {
     const double *at; /* position in the model */
     ebpo_pair x[3];
     double head[3];
-    bool exact; /* no tails */
+    bool exact; /* the position relative to the origin has no rounding errors */
 } corner;
 
 static corner corner_at(const ebpo_segment *ray, const double p[3])
@@ -520,8 +524,9 @@ static void close_sides(const double d[3], const corner e[3], int sign[3])
             sign[i] = close_edge_side(d, &e[i], &e[i == 2 ? 0 : i + 1]);
 }
 
-/* Intersects; no two of the given signs differ unless unknown. Returns false if not certain:
- * numbers are too large or too small. */
+/* Intersects a ray that passes close to an edge or corner. No two of the given signs differ, except
+ * unknown ones. Returns false if the result is not certain, because numbers are too large or too
+ * small. */
 static bool intersect_closely(const ebpo_segment *ray, const double triangle[3][3], int sign[3],
                               ebpo_ray_intersection *out)
 {
@@ -559,7 +564,7 @@ static bool has_corner(const double triangle[3][3], const double p[3])
 }
 
 /* Returns true when the ray, which intersects both triangles, certainly does so in a shared corner
- * or edge, and therefore at the same t. `across`: it is in the plane of neither. */
+ * or edge, and therefore at the same t. `across`: the ray is in neither triangle's plane. */
 static bool intersects_shared(const ebpo_segment *ray, const double a[3][3], const double b[3][3],
                               bool across)
 {
@@ -581,8 +586,8 @@ static bool intersects_shared(const ebpo_segment *ray, const double a[3][3], con
 /* --- the filter --- */
 
 /* Error bounds: as in predicates.c; each holds for the computed permanent (the sum of absolute
- * values), the slack covers underflow, and an overflow makes the bound infinite or not a number, so
- * that no comparison succeeds. */
+ * values), the slack covers underflow, and an overflow makes the bound infinite or NaN, so that no
+ * comparison succeeds. */
 static const double eps = 0x1p-53;
 /* Far above every underflow error (2^-1075 each), and normal: arithmetic on denormals is slow. */
 static const double slack = 0x1p-960;

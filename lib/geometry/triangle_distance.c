@@ -1,14 +1,16 @@
 /* Distance of a point to a triangle: bounds, correctly rounded values, and exact comparisons.
  *
- * The stages, cheapest first: bounds in doubles; signs of products with relative errors, for points
+ * The stages, cheapest first: bounds in doubles; signs of products with error bounds, for points
  * that are far from the triangle compared with its size; double-double arithmetic
  * (double_double_kernels.c) while its error bound decides the rounding (Ziv, "Fast evaluation of
- * elementary mathematical functions with correctly rounded last bit", 1991); integers of any size.
+ * elementary mathematical functions with correctly rounded last bit", 1991); and integers of any
+ * size.
  *
  * In all stages the nearest feature (corner, edge or interior) follows from the same signs, with
  * the corners taken relative to the point p. A corner is nearest when p is behind it along both of
- * its edges. An edge is nearest when p projects between its ends and outside of it in the plane.
- * The interior is nearest when p projects inside of all edges. Docs: docs/develop/bounds.md. */
+ * its edges. An edge is nearest when p, projected to the plane, is between the edge's ends and
+ * outside of the edge. The interior is nearest when the projection of p is inside of all edges.
+ * Docs: docs/develop/bounds.md. */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -23,12 +25,13 @@
 
 /* --- points that are far from the triangle compared with its size --- */
 
-/* A number and its error bound; 0 with error 0 is exact. */
+/* A number with an error bound. A number 0 with the bound 0 is exactly 0. */
 typedef struct near {
     double x, error;
 } near;
 
-/* Rounding of the errors themselves, and loss below the normal doubles. */
+/* `more` covers the rounding of the bounds themselves, and `lost` the underflow of denormal
+ * results. */
 static const double more = 1 + 0x1p-40, rounding = 0x1p-52, lost = 0x1p-1060;
 
 static near near_multiply(near a, near b)
@@ -91,13 +94,13 @@ static int exponent_of(const double (*a)[3], int count, const double b[3])
 }
 
 typedef struct far_triangle {
-    near corner[3][3], edge[3][3]; /* in separate units: corners relative to p */
+    near corner[3][3], edge[3][3]; /* in separate units; corners are relative to p */
     near along[3], back[3];        /* corner k . edge k; corner k + 1 . edge k */
     int exponent, edge_exponent;
 } far_triangle;
 
-/* Computes the products. Returns false if two corners are equal; this stage does not decide which
- * of them is nearest. */
+/* Computes the products. Returns false if two corners are equal; then this stage cannot decide
+ * which of the two is nearest. */
 static bool relate_far(const double p[3], const double triangle[3][3], far_triangle *t)
 {
     bool apart = true;
@@ -164,12 +167,12 @@ static void bound_far(const far_triangle *t, ebpo_feature feature, ebpo_distance
     out->feature = feature;
     out->lo = low > 0 ? fmax(nextafter(ldexp(low, t->exponent), -INFINITY), 0) : 0;
     out->hi = nextafter(ldexp(high, t->exponent), INFINITY);
-    /* a value that overflows may have been finite before rounding */
+    /* a bound that overflows may be finite before rounding */
     out->lo = fmin(out->lo, 0x1.fffffffffffffp1023);
 }
 
-/* Returns the nearest feature, or EBPO_NEAR_UNKNOWN. `out`, unless NULL: bounds of the distance
- * whose gap is about the triangle's size. */
+/* Returns the nearest feature, or EBPO_NEAR_UNKNOWN. `out` may be NULL; it receives bounds of the
+ * distance with a gap of about the triangle's size. */
 static ebpo_feature find_far_feature(const double p[3], const double triangle[3][3],
                                      ebpo_distance_bounds *out)
 {
@@ -182,7 +185,8 @@ static ebpo_feature find_far_feature(const double p[3], const double triangle[3]
     return feature;
 }
 
-/* Uses |p - a|^2 - |p - b|^2 = (a - b) . ((a - p) + (b - p)). */
+/* Compares the distances of two corners, by |p - a|^2 - |p - b|^2 = (a - b) . ((a - p) + (b - p)).
+ */
 static bool compare_far_corners(const double p[3], const double a[3], const double b[3], int *sign)
 {
     const double both[2][3] = { { a[0], a[1], a[2] }, { b[0], b[1], b[2] } };
@@ -213,9 +217,9 @@ static void keep_feature(double t[3][3], ebpo_feature feature)
     memcpy(t[2], to, sizeof to);
 }
 
-/* Reduces features in one plane across an axis: their distances compare like those from the foot of
- * the point in that plane. Returns true if p has been moved there, and a and b have been reduced to
- * their features. */
+/* Handles two features in one plane across an axis. Their distances compare in the same way from
+ * the projection of p to that plane. Returns true if p has been moved to the projection, and a and
+ * b have been reduced to their features. */
 static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b[3][3],
                         ebpo_feature of_b)
 {
@@ -236,13 +240,18 @@ static bool flatten_far(double p[3], double a[3][3], ebpo_feature of_a, double b
 
 /* --- bounds in doubles --- */
 
-/* Rounding (u = 2^-53; r: 1-norms of the relative corners at most; l: of the edges; s = l^2, at
- * least the normal's length): relative corners are off by u of themselves, edges likewise. So
- * products of a corner and an edge are off by 8 u r l, the normal by 8 u l^2 on each axis, products
- * of a corner with edge x normal by 64 u r l^3. Distances to points of corners and edges are off by
- * 16 u r. The distance to the plane is off by what tilting the normal by 16 u l^2 / |n| moves the
- * plane within the triangle, and by 16 u r. Everything below doubles these at least. Numbers whose
- * fourth powers leave the doubles are scaled first. */
+/* Bounds of rounding errors. u = 2^-53, r bounds the 1-norms of the corners relative to p, l those
+ * of the edges, and l^2 the normal's length.
+ * - Relative corners and edges have relative errors of u.
+ * - Products of a corner and an edge: 8 u r l.
+ * - The normal: 8 u l^2 on each axis.
+ * - Products of a corner with edge x normal: 64 u r l^3.
+ * - Distances to corners and to points of edges: 16 u r.
+ * - The distance to the plane: 16 u r, and the distance by which the plane moves within the
+ *   triangle when its normal is tilted by 16 u l^2 / |n|.
+ *
+ * The code uses at least twice these bounds. Numbers whose fourth powers leave the doubles are
+ * scaled first. */
 static const double huge_reach = 0x1p200, tiny_reach = 0x1p-200;
 /* Above this multiple of the triangle's size, errors relative to the greatest product are too wide.
  */
@@ -289,8 +298,8 @@ static void multiply_relation(relation *r)
     }
 }
 
-/* Returns the distance to the line through edge i, where p projects between its ends: to corner
- * plus a share of the edge. */
+/* Returns the distance to edge i, where the projection of p is between its ends. The nearest point
+ * is the corner plus a fraction of the edge. */
 static double edge_distance(const relation *r, int i)
 {
     double length2 = ebpo_vec3_dot(r->edge[i], r->edge[i]),
@@ -325,8 +334,9 @@ static double plane_distance(const relation *r, double *error)
     return fabs(ebpo_vec3_dot(r->normal, r->corner[0])) / length;
 }
 
-/* Bounds the distance. The plane is never farther than the triangle; a plane of unknown tilt gives
- * no bound, but no point of the triangle is farther from its edges than its height. */
+/* Bounds the distance. The plane is never farther than the triangle. If the tilt of the plane is
+ * not known, it gives no bound; but no point of the triangle is farther from its edges than the
+ * triangle's height. */
 static void bound_by_edges(const relation *r, double plane, double error, ebpo_distance_bounds *out)
 {
     double edges = edge_distance(r, 0), length = sqrt(ebpo_vec3_dot(r->normal, r->normal));
@@ -393,7 +403,7 @@ static void bound_scaled(const double p[3], const double triangle[3][3], ebpo_di
     relation r;
     relate_to_point(q, (const double(*)[3])t, &r);
     if (!(r.reach > tiny_reach * 0x1p-100) || !(r.size > tiny_reach || r.size == 0)) {
-        /* Almost a point: nothing more is known. */
+        /* The triangle is almost a point: nothing more is known. */
         *out = (ebpo_distance_bounds){
             0, ldexp(r.reach + 0x1p-1000, exponent) * (1 + 0x1p-50) + 0x1p-1074, EBPO_NEAR_UNKNOWN
         };
@@ -491,7 +501,8 @@ static bool try_interior(nearest *n)
     return true;
 }
 
-/* Takes corner or edge when it is nearer than the current feature (of equal ones: the corner). */
+/* Takes a corner or edge when it is nearer than the current feature; of equally near ones, takes
+ * the corner. */
 static void offer_feature(nearest *n, bool first, const mpz_t square, const mpz_t denominator,
                           ebpo_feature feature, bool *taken)
 {
@@ -648,7 +659,8 @@ static void unit_normal_by_integers(const double triangle[3][3], double normal[3
 
 /* --- double-double arithmetic first, then integers --- */
 
-/* Beyond these, products of four coordinates or their rounding errors would leave the doubles. */
+/* Beyond these limits, products of four coordinates or their rounding errors would leave the range
+ * of doubles. */
 static const double max_reach = 0x1p120, least_size = 0x1p-120;
 
 static bool in_pair_range(const double p[3], const double triangle[3][3])
@@ -664,7 +676,7 @@ static bool in_pair_range(const double p[3], const double triangle[3][3])
     return reach < max_reach && size > least_size;
 }
 
-/* Applies Ziv's test. */
+/* Applies Ziv's test: returns true if the error bound determines the rounded distance. */
 static bool rounds_certainly(const ebpo_measured *m, double *distance)
 {
     double error = m->error * m->distance.head;
@@ -695,7 +707,8 @@ static bool corner_by_pairs(const double p[3], const double triangle[3][3],
     return true;
 }
 
-/* Returns false if the arithmetic does not decide. *known: the normal (if requested) is set. */
+/* Returns false if the arithmetic does not decide. Sets *known if the normal was requested and is
+ * set. */
 static bool nearest_by_pairs(const double p[3], const double triangle[3][3],
                              const ebpo_distance_bounds *bounds, double *normal, bool *known,
                              ebpo_triangle_nearest *out)

@@ -18,42 +18,42 @@
 
 /* --- figures in a plane, projected along an axis --- */
 
-/* Points of one plane, corners in order; two points are a segment, whose both sides are outer ones.
- */
-typedef struct metric {
+/* The projected corners of a face or segment, in order. With two corners it is a segment, and both
+ * sides of its edge are outer sides. */
+typedef struct figure {
     double corner[3][2];
     int corners;
-} metric;
+} figure;
 
-static metric seen_along(int axis, const double (*corner)[3], int corners)
+static figure seen_along(int axis, const double (*corner)[3], int corners)
 {
     const int to[2] = { axis == 2 ? 0 : axis + 1, axis == 0 ? 2 : axis - 1 };
-    metric f = { .corners = corners };
+    figure f = { .corners = corners };
     for (int i = 0; i < corners; i++)
         for (int k = 0; k < 2; k++)
             f.corner[i][k] = corner[i][to[k]];
     return f;
 }
 
-static int turn_of(const metric *f)
+static int turn_of(const figure *f)
 {
     return ebpo_orient2d(f->corner[0], f->corner[1], f->corner[2]);
 }
 
-/* Returns an axis along which the projected corners have an area; -1: they have no area. */
+/* Returns an axis along which the projected face has an area, or -1 if the face has no area. */
 static int axis_of(const double corner[3][3])
 {
     for (int k = 0; k < 3; k++) {
-        metric f = seen_along(k, corner, 3);
+        figure f = seen_along(k, corner, 3);
         if (turn_of(&f) != 0)
             return k;
     }
     return -1;
 }
 
-/* Returns how an edge separates two figures: 2: the other one is strictly beyond it, 1: not
- * strictly, 0: not. */
-static int parted_by(const double from[2], const double to[2], int outer, const metric *other)
+/* Returns how an edge separates its figure from the other one: 2: the other one is strictly beyond
+ * the edge; 1: beyond it or on it; 0: not separated. */
+static int parted_by(const double from[2], const double to[2], int outer, const figure *other)
 {
     int parted = 2;
     for (int i = 0; i < other->corners; i++) {
@@ -65,7 +65,7 @@ static int parted_by(const double from[2], const double to[2], int outer, const 
     return parted;
 }
 
-static int parted_by_edges(const metric *f, const metric *other)
+static int parted_by_edges(const figure *f, const figure *other)
 {
     int most = 0, edges = f->corners == 3 ? 3 : 2, inner = f->corners == 3 ? turn_of(f) : 1;
     for (int i = 0; i < edges; i++) {
@@ -75,8 +75,9 @@ static int parted_by_edges(const metric *f, const metric *other)
     return most;
 }
 
-/* Returns 2: no common point, 1: no common inner point, 0: neither. */
-static int metrics_parted(const metric *f, const metric *g)
+/* Returns 2 if the figures have no common point, 1 if they have no common inner point, otherwise 0.
+ */
+static int figures_parted(const figure *f, const figure *g)
 {
     int by_f = parted_by_edges(f, g), by_g = parted_by_edges(g, f);
     return by_f > by_g ? by_f : by_g;
@@ -119,7 +120,7 @@ static bool segments_cross(const ends *s, const ends *t)
     int axis = axis_of((const double(*)[3])corner);
     if (axis < 0)
         return false;
-    metric f = seen_along(axis, (const double(*)[3])s->at, 2),
+    figure f = seen_along(axis, (const double(*)[3])s->at, 2),
            g = seen_along(axis, (const double(*)[3])t->at, 2);
     int side[2][2];
     for (int i = 0; i < 2; i++) {
@@ -137,7 +138,7 @@ static bool segments_intersect(const ends *s, const ends *t)
     return segments_cross(s, t);
 }
 
-/* Returns true if they intersect; the triangle has an area. */
+/* Returns true if the segment intersects the triangle, which has an area. */
 static bool segment_intersects_triangle(const ends *s, const double t[3][3], int axis)
 {
     int side[2], around[3];
@@ -146,8 +147,8 @@ static bool segment_intersects_triangle(const ends *s, const double t[3][3], int
     if (side[0] * side[1] > 0)
         return false;
     if (side[0] == 0 && side[1] == 0 && !s->point) {
-        metric f = seen_along(axis, t, 3), g = seen_along(axis, (const double(*)[3])s->at, 2);
-        return metrics_parted(&f, &g) != 2;
+        figure f = seen_along(axis, t, 3), g = seen_along(axis, (const double(*)[3])s->at, 2);
+        return figures_parted(&f, &g) != 2;
     }
     for (int i = 0; i < 2; i++)
         if (side[i] == 0)
@@ -165,18 +166,19 @@ static ebpo_pair_kind classify_flat(const double a[3][3], const double b[3][3])
     if (axis_a >= 0 && axis_b >= 0) {
         static const ebpo_pair_kind kinds[] = { EBPO_PAIR_COPLANAR, EBPO_PAIR_TOUCHING,
                                                 EBPO_PAIR_APART };
-        metric f = seen_along(axis_a, a, 3), g = seen_along(axis_a, b, 3);
-        return kinds[metrics_parted(&f, &g)];
+        figure f = seen_along(axis_a, a, 3), g = seen_along(axis_a, b, 3);
+        return kinds[figures_parted(&f, &g)];
     }
     ends s = ends_of(axis_a < 0 ? a : b);
-    bool meet;
+    bool intersect;
     if (axis_a < 0 && axis_b < 0) {
         ends t = ends_of(b);
-        meet = segments_intersect(&s, &t);
+        intersect = segments_intersect(&s, &t);
     } else {
-        meet = segment_intersects_triangle(&s, axis_a < 0 ? b : a, axis_a < 0 ? axis_b : axis_a);
+        intersect =
+            segment_intersects_triangle(&s, axis_a < 0 ? b : a, axis_a < 0 ? axis_b : axis_a);
     }
-    return meet ? EBPO_PAIR_TOUCHING : EBPO_PAIR_APART;
+    return intersect ? EBPO_PAIR_TOUCHING : EBPO_PAIR_APART;
 }
 
 /* --- pairs of faces in general --- */
@@ -203,15 +205,17 @@ static bool one_side(const int side[3])
 
 static bool within_plane(const int side[3]) { return !(side[0] | side[1] | side[2]); }
 
-/* Returns true if corners are on both strict sides; otherwise the face at most touches. */
+/* Returns true if corners are strictly on both sides of the plane; otherwise the face at most
+ * touches the plane. */
 static bool has_both(const int side[3])
 {
     bool above = side[0] > 0 || side[1] > 0 || side[2] > 0;
     return above && (side[0] < 0 || side[1] < 0 || side[2] < 0);
 }
 
-/* Returns the corner that is alone on a strict side, the others being on the other side or in the
- * plane; or alone in the plane, with both others on one side. Prefers the positive side. */
+/* Returns the corner that is alone strictly on one side, while the others are on the other side or
+ * in the plane; or the corner that is alone in the plane, while both others are on one side.
+ * Prefers the positive side. */
 static int corner_alone(const int side[3])
 {
     static const int order[] = { 1, -1, 0 };

@@ -1,4 +1,4 @@
-/* Compares corners by their coordinates: x, then y, then z. */
+/* The relation of two faces: apart, touching, crossing or coplanar. Exact. */
 #ifndef EBPO_GEOMETRY_TRIANGLE_PAIR_H
 #define EBPO_GEOMETRY_TRIANGLE_PAIR_H
 
@@ -20,13 +20,15 @@ static inline int ebpo_corner_order(const double p[3], const double q[3])
 
 ebpo_pair_kind ebpo_triangle_pair(const double a[3][3], const double b[3][3]);
 
-/* Two faces that have corners on both strict sides of each other's plane, or at least one there and
- * not all in it, turned for the tests on the common line: a[0] is alone on B's positive side, b[0]
- * on A's, after `flipped_b` and `flipped_a` have turned the planes. */
+/* Two faces A and B whose planes intersect in a line that both faces reach, prepared for the tests
+ * on that line. The corners are turned so that a[0] is alone on the positive side of B's plane, and
+ * b[0] alone on that of A's plane. `flipped_b` and `flipped_a` say whether the orientation of B's
+ * and A's plane was reversed for this. */
 typedef struct ebpo_turned_pair {
     int a[3], b[3]; /* indices of corners */
-    int side_a[3],
-        side_b[3]; /* sides of corners by their own index: of the other's plane as given */
+    /* side of each corner, by its index in its face, relative to the other face's plane before it
+     * is flipped */
+    int side_a[3], side_b[3];
     bool flipped_a, flipped_b;
 } ebpo_turned_pair;
 

@@ -4,10 +4,10 @@
  * no case is degenerate (Edelsbrunner and Muecke, "Simulation of Simplicity", 1990).
  *
  * Boxes: a triangle and a box are disjoint exactly when they are separated along one of 13 axes:
- * those of the box, the triangle's normal, the products of an axis of the box with an edge of the
- * triangle (separating axes; Gottschalk, Lin and Manocha 1996). The last nine are tests in the
- * plane: projected along each axis of the box, the triangle is a triangle and the box a rectangle,
- * and the rectangle is beyond an edge. */
+ * those of the box, the triangle's normal, and the cross products of an axis of the box with an
+ * edge of the triangle (separating axes; Gottschalk, Lin and Manocha 1996). The last nine tests are
+ * made in the plane: projected along an axis of the box, the box is a rectangle, and the test is
+ * whether this rectangle is beyond an edge of the projected triangle. */
 #include "core/strict_fp.h"
 
 #include "geometry/predicates.h"
@@ -32,8 +32,9 @@ bool ebpo_zero_area(const double a[3], const double b[3], const double c[3])
 }
 
 /* Returns the side of the shifted point p relative to the line a-b, all projected along `axis`,
- * positive to the left; 0 only when a and b coincide in this projection. The orientation changes by
- * (a_v - b_v) d_u + (b_u - a_u) d_v; of u and v the lower axis has the larger shift. */
+ * positive to the left; 0 only when a and b coincide in this projection. The shift changes the
+ * orientation by (a_v - b_v) d_u + (b_u - a_u) d_v, where d_u and d_v are the shifts. The lower one
+ * of the axes u and v has the larger shift. */
 static int shifted_side2d(int axis, const double a[3], const double b[3], const double p[3])
 {
     int sign = ebpo_normal_sign(axis, a, b, p);
@@ -46,8 +47,8 @@ static int shifted_side2d(int axis, const double a[3], const double b[3], const 
     return by_v != 0 ? by_v : by_u;
 }
 
-/* Returns the side of the shifted point p relative to the plane of a, b, c; the orientation changes
- * by normal . (d0, d1, d2). */
+/* Returns the side of the shifted point p relative to the plane of a, b, c; the shift changes the
+ * orientation by normal . (d0, d1, d2). */
 static int shifted_side3d(const double a[3], const double b[3], const double c[3],
                           const double p[3])
 {
@@ -57,8 +58,8 @@ static int shifted_side3d(const double a[3], const double b[3], const double c[3
     return sign;
 }
 
-/* Rejects by coordinates. The shift is positive on every axis, so an end equal to the face's
- * maximum is beyond it. */
+/* Returns true if the coordinates alone show that there is no crossing. The shift is positive on
+ * every axis, so an end equal to the face's maximum is beyond it. */
 static inline bool misses_bounds(const double from[3], double to, int axis, const double a[3],
                                  const double b[3], const double c[3])
 {
@@ -74,8 +75,9 @@ int ebpo_axis_crossing(const double from[3], double to, int axis, const double a
 {
     if (!(from[axis] < to) || misses_bounds(from, to, axis, a, b, c))
         return 0;
-    /* In the projection against the axis, the point is inside when all edges turn the same way
-     * around it: `turn` is the sign of the normal along the axis. Faces seen edge-on never do. */
+    /* In the projection along the axis, the point is inside when all edges turn the same way around
+     * it: `turn`, the sign of the normal along the axis. No point is inside a face that is seen
+     * edge-on. */
     int turn = shifted_side2d(axis, a, b, from);
     if (turn == 0 || shifted_side2d(axis, b, c, from) != turn ||
         shifted_side2d(axis, c, a, from) != turn)
@@ -144,7 +146,7 @@ static shadow shadow_along(int axis, const double triangle[3][3], const double m
  * to b, without touching it. */
 static bool rectangle_on_side(const shadow *s, const double a[2], const double b[2], int side)
 {
-    /* The corner that is farthest to the other side. */
+    /* Test the corner of the rectangle that is farthest to the other side. */
     bool far_x = side > 0 ? b[1] < a[1] : b[1] > a[1], far_y = side > 0 ? b[0] > a[0] : b[0] < a[0];
     const double corner[2] = { far_x ? s->min[0] : s->max[0], far_y ? s->min[1] : s->max[1] };
     return ebpo_orient2d(a, b, corner) == side;
@@ -162,8 +164,8 @@ static bool shadows_apart(const shadow *s)
     return false;
 }
 
-/* Returns true if the triangle's plane separates them; `normal`: signs of the normal's components.
- */
+/* Returns true if the triangle's plane does not intersect the box. `normal`: signs of the normal's
+ * components. */
 static bool apart_from_plane(const double triangle[3][3], const double min[3], const double max[3],
                              const int normal[3])
 {

@@ -1,5 +1,5 @@
 /* Vectors of three doubles, in plain floating-point arithmetic. Each function has a fixed order of
- * operations, on which results depend: sums go from x to z. */
+ * operations, on which results depend: sums are computed from x to z. */
 #ifndef EBPO_GEOMETRY_VEC3_H
 #define EBPO_GEOMETRY_VEC3_H
 
@@ -18,7 +18,7 @@ static inline void ebpo_vec3_cross(const double a[3], const double b[3], double 
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* Computes a - b; `out` may be one of them. */
+/* Computes a - b; `out` may be a or b. */
 static inline void ebpo_vec3_subtract(const double a[3], const double b[3], double out[3])
 {
     for (int k = 0; k < 3; k++)
@@ -31,10 +31,10 @@ static inline void ebpo_vec3_copy(const double a[3], double out[3])
         out[k] = a[k];
 }
 
-/* Returns the length; overflows and underflows where squares do. */
+/* Returns the length, which overflows or underflows where its square does. */
 static inline double ebpo_vec3_length(const double v[3]) { return sqrt(ebpo_vec3_dot(v, v)); }
 
-/* Returns the least (the greatest) of three numbers. */
+/* Return the least and the greatest of three numbers. */
 
 static inline double ebpo_min3(double a, double b, double c)
 {
@@ -48,8 +48,8 @@ static inline double ebpo_max3(double a, double b, double c)
     return high > c ? high : c;
 }
 
-/* Returns the length, scaled where squares would overflow or underflow: within 2^-50 of itself, or
- * 2^-1073; INFINITY when the length itself overflows. */
+/* Returns the length to a relative error of 2^-50 or an absolute error of 2^-1073, also where
+ * squares overflow or underflow; INFINITY when the length itself overflows. */
 static inline double ebpo_vec3_scaled_length(const double v[3])
 {
     double square = (v[0] * v[0] + v[1] * v[1]) + v[2] * v[2];

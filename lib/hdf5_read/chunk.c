@@ -2,9 +2,9 @@
  * functions that encode and decode. The row determines everything else: shuffle before compression,
  * the fletcher32 checksum after it, the pipeline of a file's filters, the filters of a new array. A
  * new codec needs a number in chunk.h, a row, and its functions in a separate file, as
- * zstd_codec.c. Deflate is two calls of zlib, in this file. The output is bit for bit that of
- * libhdf5's own filters. Source: docs of HDF5 ("HDF5 filters"), format-spec/README.md, section 2.
- */
+ * zstd_codec.c. Deflate needs only two calls of zlib, which are in this file. The output is bit for
+ * bit that of libhdf5's own filters. Source: docs of HDF5 ("HDF5 filters"), format-spec/README.md,
+ * section 2. */
 #include <string.h>
 #include <zlib.h>
 
@@ -22,8 +22,8 @@ void ebpo_shuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t 
             out[k * count + i] = in[i * element_size + k];
 }
 
-/* Restores elements of common sizes, byte by byte but element after element, which compilers
- * vectorise. */
+/* Restores elements of two bytes. There is a function for each common size, with a loop over
+ * elements that compilers vectorise. */
 static void unshuffle_two(const uint8_t *in, size_t count, uint8_t *out)
 {
     for (size_t i = 0; i < count; i++) {
@@ -61,7 +61,7 @@ uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes)
     uint32_t low = 0, high = 0;
     size_t words = bytes / 2;
     while (words) {
-        /* no overflow of 32 bits before the sums are folded */
+        /* so many words that the sums do not overflow 32 bits before they are folded */
         size_t run = words > 360 ? 360 : words;
         words -= run;
         for (; run; run--, data += 2) {
@@ -195,7 +195,10 @@ void ebpo_chunk_coder_clear(ebpo_chunk_coder *coder) { ebpo_zstd_coder_clear(cod
 
 static ebpo_chunk_blocks blocks_of_planes(size_t raw_bytes, size_t element_size)
 {
-    enum { PLANE_LEAST = 1024 }; /* a table of codes takes some 100 bytes */
+    enum {
+        /* below this, a separate table of codes for a plane, some 100 bytes, does not pay */
+        PLANE_LEAST = 1024
+    };
     ebpo_chunk_blocks b = { .count = 0 };
     size_t plane = raw_bytes / element_size;
     for (size_t at = plane; at < raw_bytes && plane >= PLANE_LEAST; at += plane)
@@ -203,7 +206,8 @@ static ebpo_chunk_blocks blocks_of_planes(size_t raw_bytes, size_t element_size)
     return b;
 }
 
-/* Returns the ends of streams that are neither empty nor the whole chunk. */
+/* Returns the ends of the streams as blocks, without those of empty streams and the end of the
+ * chunk. */
 static ebpo_chunk_blocks blocks_of_streams(size_t raw_bytes, const size_t *ends, int count)
 {
     ebpo_chunk_blocks b = { .count = 0 };

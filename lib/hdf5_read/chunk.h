@@ -1,6 +1,6 @@
 /* Chunks of arrays: their bytes as HDF5 stores them (shuffle, compression, checksum), bit for bit
- * what libhdf5's own filters read and write; the shape of an array, and the offset of a chunk in
- * its file. */
+ * as libhdf5's own filters read and write them. Also the shape of an array, and the location of a
+ * chunk in its file. */
 #ifndef EBPO_HDF5_READ_CHUNK_H
 #define EBPO_HDF5_READ_CHUNK_H
 
@@ -30,7 +30,7 @@ enum {
     EBPO_FILTER_ZSTD = 32015
 };
 
-/* The properties of a pipeline: a row of the table in chunk.c. */
+/* The properties of a pipeline; each is a row of the table in chunk.c. */
 typedef struct ebpo_pipeline_facts {
     unsigned filter[2]; /* in the order of application, excluding shuffle */
     int filter_count;
@@ -54,8 +54,9 @@ EBPO_MUST_USE ebpo_status ebpo_chunk_encode(ebpo_chunk_coder *coder, ebpo_pipeli
                                             int level, size_t element_size, const uint8_t *raw,
                                             size_t raw_bytes, uint8_t *out, size_t *out_bytes);
 
-/* Same, for single bytes that form `count` consecutive streams, which end at ends[i] (ascending,
- * some may be empty), and a rest: zstd compresses each separately. */
+/* Same as ebpo_chunk_encode, for elements of one byte that form `count` consecutive streams and a
+ * rest. Stream i ends at ends[i] (ascending; streams may be empty). zstd compresses each stream and
+ * the rest separately. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_encode_streams(ebpo_chunk_coder *coder, ebpo_pipeline pipeline,
                                                     int level, const uint8_t *raw, size_t raw_bytes,
                                                     const size_t *ends, int count, uint8_t *out,
@@ -68,16 +69,17 @@ EBPO_MUST_USE ebpo_status ebpo_chunk_decode(ebpo_chunk_coder *coder, ebpo_pipeli
                                             size_t stored_bytes, uint8_t *raw, size_t raw_bytes,
                                             const char **why);
 
-/* Applies HDF5's shuffle: byte k of every element, for k = 0, 1, ...; bytes is a multiple of
- * element_size. */
+/* Applies HDF5's shuffle: writes byte 0 of every element, then byte 1 of every element, and so on.
+ * `bytes` is a multiple of element_size. */
 void ebpo_shuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t *out);
 void ebpo_unshuffle(const uint8_t *in, size_t bytes, size_t element_size, uint8_t *out);
 
-/* Returns HDF5's fletcher32: over big-endian 16-bit words, both sums kept modulo 65535 (never
- * reduced to 0 from a positive sum). */
+/* Returns HDF5's fletcher32: over big-endian 16-bit words, with both sums modulo 65535 (a positive
+ * sum is never reduced to 0). */
 uint32_t ebpo_fletcher32(const uint8_t *data, size_t bytes);
 
-/* An integer array: [rows] when cols is 0, else [rows][cols]; chunks of chunk_rows rows. */
+/* The shape of an integer array: [rows] when cols is 0, else [rows][cols]. Its chunks have
+ * chunk_rows rows. */
 typedef struct ebpo_shape {
     uint64_t rows;
     uint32_t cols;
@@ -93,8 +95,8 @@ typedef struct ebpo_chunk_location {
     uint32_t bytes;
 } ebpo_chunk_location;
 
-/* Returns the rows of a chunk: the power of two that fills up to 64 KiB, or all rows when there are
- * fewer. rows > 0. */
+/* Returns the rows of a chunk: the largest power of two whose rows take at most 64 KiB, or all rows
+ * when there are fewer. rows > 0. */
 static inline uint32_t ebpo_full_chunk_rows(uint64_t rows, uint32_t cols, uint32_t element_size)
 {
     uint32_t row = element_size * (cols ? cols : 1), full = 1;

@@ -19,13 +19,14 @@ typedef struct ebpo_chunk_coder {
 
 /* Returns the most bytes of an encoded chunk of `raw_bytes` <= EBPO_CHUNK_BYTES_MAX, in any
  * pipeline. The format fixes this bound above those of zlib and zstd (at most a 256th and 68 bytes
- * more than the data), so that it does not change with them. */
+ * more than the data), so that the bound does not change with their versions. */
 static inline size_t ebpo_chunk_bound(size_t raw_bytes)
 {
     return raw_bytes + raw_bytes / 256 + 1024;
 }
 
-/* Ends of blocks before the end of the chunk: at most one for each byte of the widest element. */
+/* The ends of the blocks of a chunk, without the last one. There are at most as many as the widest
+ * element has bytes. */
 typedef struct ebpo_chunk_blocks {
     size_t end[8];
     int count;
@@ -41,14 +42,15 @@ EBPO_MUST_USE ebpo_status ebpo_zstd_decode(ebpo_chunk_coder *coder, const uint8_
                                            const char **why);
 void ebpo_zstd_coder_clear(ebpo_chunk_coder *coder);
 
-/* Returns an error text, or NULL. Faults: a bit is set that RFC 8878 requires to be 0 and most
- * versions of zstd ignore (bit 4 of the frame's descriptor, and the two lowest of the modes of each
- * section of sequences); a block repeats its byte once, which zstd writes as a raw byte. Also
- * returns NULL where the frame cannot be parsed; decoding reports that. */
+/* Returns an error text, or NULL. There are two kinds of error. First, a bit is set that RFC 8878
+ * requires to be 0 and most versions of zstd ignore (bit 4 of the frame's descriptor, and the two
+ * lowest bits of the modes of each section of sequences). Second, a block repeats its byte only
+ * once; zstd writes this as a raw byte. Also returns NULL where the frame cannot be parsed;
+ * decoding reports that. */
 const char *ebpo_zstd_fault(const uint8_t *frame, size_t bytes);
 
-/* Returns true if a frame has a checksum of its content: zstd decodes frames without one too, and
- * does not detect damage then. RFC 8878, 3.1.1. */
+/* Returns true if a frame has a checksum of its content: zstd also decodes frames without a
+ * checksum, but detects no damage in them. RFC 8878, 3.1.1. */
 bool ebpo_zstd_has_checksum(const uint8_t *frame, size_t bytes);
 
 #endif

@@ -1,7 +1,8 @@
-/* Number codings of format-spec/README.md, section "Codings": wrapping differences to the value
- * before, as zigzag; corners of faces relative to the number of vertices seen; integers of fewer
- * bytes. Encoding and decoding are exact inverses for every bit pattern; floats are coded as
- * integers of the same order. Files are little-endian. Pure functions. */
+/* Number codings of format-spec/README.md, section "Codings": differences to the previous value
+ * (modulo the integer's size, in zigzag code), corners of faces relative to the number of vertices
+ * seen, and integers of fewer bytes. Encoding and decoding are exact inverses for every bit
+ * pattern; floats are coded as integers of the same order. Files are little-endian. Pure functions.
+ */
 #include "hdf5_read/coding.h"
 
 #include <string.h>
@@ -165,7 +166,8 @@ static uint64_t sortable_bits(uint64_t bits, size_t size)
     return size == 4 ? ebpo_float_order32((uint32_t)bits) : ebpo_float_order64(bits);
 }
 
-/* Returns the zigzag code of a difference of `size` bytes: its highest bit is its sign. */
+/* Returns the zigzag code of a difference of `size` bytes: the difference's highest bit is its
+ * sign. */
 static uint64_t zigzag_of(uint64_t difference, size_t size)
 {
     unsigned unused = 64 - 8 * (unsigned)size;

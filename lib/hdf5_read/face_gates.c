@@ -17,12 +17,13 @@ enum {
     FACE_MAX = 3 /* edges that a face opens */
 };
 enum { IS_NEW, IS_LEFT, IS_RIGHT, BY_NUMBER, AT_OPEN }; /* kinds of corners beyond an edge */
-/* Ends of the values of a byte of `low` with one byte, and with two. */
+/* A vertex number takes one byte if its first byte in `low` is below LOW_END, and two bytes if that
+ * byte is below TWO_BYTES_END. */
 enum { LOW_END = 224, TWO_BYTES_END = 240 };
 enum { AS_CODES = 1 }; /* first byte of a chunk without streams */
 
-/* Open edges, newest last: (a, b) where a face on the other side would run from a to b. Vertices
- * are counted from the first new one of the chunk, modulo 2^32, as in codes. */
+/* Open edges, newest last: (a, b) means that a face on the other side of the edge would run from a
+ * to b. Vertices are counted from the first new one of the chunk, modulo 2^32, as in codes. */
 typedef struct open_edges {
     uint64_t edge[SPACE];
     uint32_t begin, end;
@@ -84,8 +85,8 @@ static bool any_of_eight(const uint64_t *edges, uint64_t wanted)
     return any;
 }
 
-/* Passes the side of a face from a to b: closes that edge if it is among the newest, else opens the
- * reverse edge. */
+/* Processes the side of a face from a to b: closes the open edge (a, b) if it is among the newest
+ * ones, otherwise opens the reverse edge. */
 static void pass_edge(open_edges *o, uint32_t a, uint32_t b)
 {
     uint64_t wanted = edge_of(a, b);
@@ -106,7 +107,7 @@ static void open_all(open_edges *o, const uint32_t *face)
         push_edge(o, edge_of(face[(k + 1) % 3], face[k]));
 }
 
-/* Updates the open edges after face (a, b, c) across (a, b), which is open no longer. */
+/* Updates the open edges after face (a, b, c) across (a, b), an edge that is not open any more. */
 static void go_through(open_edges *o, uint32_t kind, uint32_t at, uint32_t a, uint32_t b,
                        uint32_t c)
 {
@@ -159,7 +160,8 @@ static uint32_t gate_of(const open_edges *o, const uint32_t *face, int *first)
     return o->end;
 }
 
-/* Returns the kind of corner c beyond the edge; *at is the position of its edge. */
+/* Returns the kind of corner c beyond the edge; *at is the position of the open edge that gives the
+ * corner. */
 static uint32_t kind_of(const open_edges *o, uint32_t a, uint32_t b, uint32_t c, uint32_t *at)
 {
     if (c == o->seen)
@@ -196,7 +198,7 @@ static void write_face(writing *w, const uint32_t *code, const uint32_t *face)
     go_through(o, kind, at, a, b, c);
 }
 
-/* Writes byte 0 of all codes, then bytes 1, ... */
+/* Writes byte 0 of all codes, then byte 1 of all codes, and so on. */
 static void write_codes(const uint8_t *codes, uint32_t rows, uint8_t *out,
                         size_t ends[EBPO_GATES_ENDS])
 {

@@ -29,21 +29,22 @@ typedef struct ebpo_head {
 /* Address of an object's header. There is nothing to close. */
 typedef uint64_t ebpo_head_object;
 
-/* Opens for reading through the input, which stays the caller's and outlives the head. Close it
- * also after an error. EBPO_E_FORMAT when it is not a complete HDF5 file; EBPO_E_UNSUPPORTED, here
- * and below, when another program has written it in an unsupported layout. */
+/* Opens a head for reading through `input`, which stays the caller's and must outlive the head.
+ * Close it also after an error. EBPO_E_FORMAT when it is not a complete HDF5 file;
+ * EBPO_E_UNSUPPORTED, here and below, when another program has written the file in an unsupported
+ * layout. */
 EBPO_MUST_USE ebpo_status ebpo_head_open(ebpo_head *head, ebpo_input *input, ebpo_error *error);
-/* Sets the range of more metadata within the file, which is then read at once. */
+/* Sets the range of further metadata in the file. It is then read in one piece. */
 void ebpo_head_hint_index(ebpo_head *head, ebpo_range index);
 /* Returns `status`, unless the input failed at any time since opening: then the input's status with
  * its message, because unreadable data may have been taken for absent. */
 EBPO_MUST_USE ebpo_status ebpo_head_close(ebpo_head *head, ebpo_status status, ebpo_error *error);
 
-/* Starts to record the byte ranges of headers and indexes, each as often as it is read, for callers
- * that look for unused bytes. */
+/* Starts to record the byte ranges of the headers and indexes that are read, for callers that look
+ * for unused bytes. A range that is read several times is recorded several times. */
 void ebpo_head_keep_ranges(ebpo_head *head);
-/* Returns these ranges, which the caller frees; the superblock is not included. EBPO_E_MEMORY, also
- * when memory was short meanwhile. */
+/* Returns the recorded ranges, without the superblock; the caller frees them. EBPO_E_MEMORY, also
+ * when memory was short during recording. */
 EBPO_MUST_USE ebpo_status ebpo_head_take_ranges(ebpo_head *head, ebpo_range **ranges,
                                                 uint64_t *count, ebpo_error *error);
 enum { EBPO_HEAD_SUPERBLOCK_BYTES = 48 };
@@ -65,8 +66,9 @@ EBPO_MUST_USE ebpo_status ebpo_head_open_array(ebpo_head *head, const char *path
                                                ebpo_head_object *object, ebpo_error *error);
 
 /* Reads an attribute of an open object; `path` names it in messages. EBPO_E_ABSENT (without a
- * message) when there is none, EBPO_E_FORMAT for another type or size. Text: of fixed length, at
- * most size - 1 bytes up to its first zero byte, UTF-8 without control characters. */
+ * message) when there is none, EBPO_E_FORMAT for another type or size. A text must have a fixed
+ * length, at most size - 1 bytes before its first zero byte, and be UTF-8 without control
+ * characters. */
 EBPO_MUST_USE ebpo_status ebpo_head_get_text(ebpo_head *head, ebpo_head_object object,
                                              const char *path, const char *name, char *text,
                                              size_t size, ebpo_error *error);
@@ -76,7 +78,7 @@ EBPO_MUST_USE ebpo_status ebpo_head_get_int(ebpo_head *head, ebpo_head_object ob
 EBPO_MUST_USE ebpo_status ebpo_head_get_count(ebpo_head *head, ebpo_head_object object,
                                               const char *path, const char *name, uint64_t *value,
                                               ebpo_error *error);
-/* Reads `count` numbers; 0: one. */
+/* Reads `count` numbers; with `count` 0, one number. */
 EBPO_MUST_USE ebpo_status ebpo_head_get_real(ebpo_head *head, ebpo_head_object object,
                                              const char *path, const char *name, double *values,
                                              unsigned count, ebpo_error *error);
@@ -89,11 +91,12 @@ typedef enum ebpo_head_rows {
 } ebpo_head_rows;
 
 /* Returns an array's shape and its chunk offsets, ebpo_shape_chunks(shape) of them, which the
- * caller frees; NULL on failure. Checks: little-endian integers, one or two fixed dimensions, one
- * of the pipelines, chunks of the required rows; every chunk is present, within the file, has
- * passed its filters, and takes at most ebpo_chunk_bound bytes. `stored_bytes`: their sum. For
- * arrays of more than `most` chunks only the shape is returned; *chunks is NULL. `coding`: the
- * value of that attribute, which must exist; or NULL. */
+ * caller frees; NULL on failure. Checks that the array has little-endian integers, one or two fixed
+ * dimensions, one of the pipelines, and chunks of the required rows. Checks that every chunk is
+ * present, within the file, stored with all filters, and at most ebpo_chunk_bound bytes large.
+ * `stored_bytes`: the sum of the chunks' sizes. For arrays of more than `most` chunks only the
+ * shape is returned; *chunks is NULL. `coding`: receives the value of the attribute "coding", which
+ * must exist; or NULL. */
 enum { EBPO_HEAD_CODING_BYTES = 16 };
 EBPO_MUST_USE ebpo_status ebpo_head_read_array(ebpo_head *head, const char *path, uint64_t most,
                                                ebpo_head_rows rows, ebpo_shape *shape,

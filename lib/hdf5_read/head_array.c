@@ -21,25 +21,26 @@ typedef enum ebpo_head_index {
 
 typedef struct ebpo_head_layout {
     unsigned rank;     /* number of dimensions of the chunks */
-    uint64_t chunk[3]; /* their size; the last is the element's */
+    uint64_t chunk[3]; /* size of a chunk; the last number is the size of an element */
     ebpo_head_index index;
-    unsigned page_bits; /* FIXED: a page has two to this many chunks */
+    unsigned page_bits; /* FIXED: a page has 2^page_bits chunks */
     bool single_filtered;
     uint64_t single_bytes; /* SINGLE with filters */
     uint32_t single_mask;
-    uint64_t address; /* address of the chunk, the chunks, or the table; EBPO_NO_ADDRESS: nothing
-                       * was written */
+    /* address of the chunk (SINGLE), the chunks (IMPLICIT) or the table (FIXED); EBPO_NO_ADDRESS:
+     * nothing was written */
+    uint64_t address;
 } ebpo_head_layout;
 
 /* The chunks to be found. */
 typedef struct ebpo_head_chunks {
     const ebpo_head_layout *layout;
     bool filtered;
-    uint64_t count, whole, bound; /* chunks; bytes of one before its filters, and the most after
-                                   * them */
-    ebpo_chunk_location *place;   /* out: `count` offsets and sizes */
-    uint64_t stored;              /* out: bytes of all chunks */
-    uint64_t at;                  /* out: the invalid chunk; UINT64_MAX: none in particular */
+    /* number of chunks; bytes of a chunk before its filters, and the most bytes after them */
+    uint64_t count, whole, bound;
+    ebpo_chunk_location *place; /* out: `count` offsets and sizes */
+    uint64_t stored;            /* out: bytes of all chunks */
+    uint64_t at;                /* out: the invalid chunk; UINT64_MAX: none in particular */
 } ebpo_head_chunks;
 
 static const char missing[] = "the chunk is missing", cut[] = "its description is cut short",
@@ -76,7 +77,8 @@ static const char *read_chunked(ebpo_head_cursor *c, ebpo_head_layout *l, bool *
     return c->cut ? cut : NULL;
 }
 
-/* Returns an error text, or NULL. `*foreign`: valid, but only libhdf5 reads it. */
+/* Returns an error text, or NULL. Sets *foreign if the layout is valid, but only libhdf5 reads it.
+ */
 static const char *read_layout(ebpo_head_cursor c, ebpo_head_layout *l, bool *foreign)
 {
     enum { CHUNKED = 2, VIRTUAL = 3 };
@@ -134,7 +136,7 @@ static const char *read_implicit(ebpo_head_chunks *t, uint64_t file_bytes)
     const ebpo_head_layout *l = t->layout;
     const char *wrong = t->filtered ? contradicts : NULL;
     for (uint64_t i = 0; i < t->count && !wrong; i++) {
-        uint64_t begin = EBPO_NO_ADDRESS; /* the sum does not fit 64 bits, so there is no address */
+        uint64_t begin = EBPO_NO_ADDRESS; /* if the sum does not fit 64 bits, there is no address */
         if (l->address != EBPO_NO_ADDRESS && (__builtin_mul_overflow(i, t->whole, &begin) ||
                                               __builtin_add_overflow(begin, l->address, &begin)))
             begin = EBPO_NO_ADDRESS;
@@ -176,8 +178,8 @@ static const char *read_fixed_header(ebpo_head_state *s, const ebpo_head_chunks 
                : contradicts;
 }
 
-/* Reads `count` entries from chunk `first` on, and the checksum after them; `before`: preceding
- * bytes that the checksum includes. */
+/* Reads the entries of `count` chunks from chunk `first` on, and the checksum after them, which
+ * also includes the `before` bytes in front of the entries. */
 static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const fixed_array *f,
                                 uint64_t at, uint64_t before, uint64_t first, uint64_t count)
 {
@@ -199,7 +201,7 @@ static const char *read_entries(ebpo_head_state *s, ebpo_head_chunks *t, const f
     return wrong;
 }
 
-/* Checks the bits of the written pages. */
+/* Checks that the bits of all pages say that the page is written. */
 static const char *check_pages(ebpo_head_state *s, ebpo_head_chunks *t, const fixed_array *f,
                                uint64_t prefix, uint64_t pages)
 {
@@ -294,8 +296,8 @@ static bool rows_fit(const ebpo_shape *shape, ebpo_head_rows rule, uint64_t rows
     return rows == full || (rule == EBPO_HEAD_ROWS_POWER && power && rows < full);
 }
 
-/* Returns the only message of a type, or NULL; *wrong gives the reason if it is not merely absent.
- */
+/* Returns the only message of a type, or NULL; *wrong is set to the reason, unless the message is
+ * only absent. */
 static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type,
                                          ebpo_head_refusal *wrong)
 {
@@ -315,7 +317,7 @@ static const ebpo_head_message *find_one(const ebpo_head_header *h, uint8_t type
 
 static ebpo_head_refusal fail_sound(const char *what) { return (ebpo_head_refusal){ what, false }; }
 
-/* Returns the refusal of an array that another program has rewritten; it is not damaged. */
+/* Returns the refusal of an array that is not damaged, but was rewritten by another program. */
 static ebpo_head_refusal fail_foreign(const char *what)
 {
     return (ebpo_head_refusal){ what, true };
@@ -376,7 +378,8 @@ static ebpo_head_refusal read_storage(const ebpo_head_header *h, ebpo_head_rows 
     return wrong;
 }
 
-/* Finds the chunks. A chunk takes some bytes, so the file's size bounds their number. */
+/* Finds the chunks. A chunk takes at least CHUNK_MIN bytes, so the file's size bounds the number of
+ * chunks. */
 static ebpo_status find_chunks(ebpo_head *head, const char *path, const ebpo_shape *shape,
                                const ebpo_head_layout *layout, ebpo_chunk_location **places,
                                uint64_t *stored, ebpo_error *error)

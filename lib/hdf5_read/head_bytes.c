@@ -1,7 +1,8 @@
 /* Reads the bytes of an open head in few reads, and keeps the first failure. The first bytes hold
  * all headers and are fetched at once, the index of large arrays comes in one piece, and all else
  * is read through a window. Nothing beyond the end of the file is read, and nothing after a failure
- * of the input. An error states the refusal, unless the input itself failed. */
+ * of the input. An error gives the reason of the refusal, or, if the input itself failed, the
+ * input's error. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,7 +12,7 @@
 
 enum {
     FIRST_BYTES = 131072, /* holds all headers */
-    /* for the rest: chunk indexes, and headers that were added later */
+    /* size of the window for all else: chunk indexes, and headers that were added later */
     WINDOW_BYTES = 131072
 };
 
@@ -36,8 +37,8 @@ void ebpo_head_bytes_close(ebpo_head_bytes *b)
     *b = (ebpo_head_bytes){ .status = EBPO_OK };
 }
 
-static const uint8_t *held_within(const uint8_t *buffer, ebpo_range held, uint64_t at,
-                                  uint64_t size)
+static const uint8_t *bytes_within(const uint8_t *buffer, ebpo_range held, uint64_t at,
+                                   uint64_t size)
 {
     if (!buffer || at < held.offset || at - held.offset > held.size ||
         size > held.size - (at - held.offset))
@@ -58,12 +59,13 @@ static bool read_into(ebpo_head_bytes *b, uint8_t **buffer, uint64_t capacity, e
 static const uint8_t *read_table(ebpo_head_bytes *b, uint64_t at, uint64_t size)
 {
     return read_into(b, &b->table, b->index.size, b->index)
-               ? held_within(b->table, b->index, at, size)
+               ? bytes_within(b->table, b->index, at, size)
                : NULL;
 }
 
-/* Returns a window. Windows begin at multiples of half their size, so that reading back and forth
- * around an offset does not move them. They end before the index, which is read in one piece. */
+/* Returns the range of the window to read for an offset. Windows begin at multiples of half their
+ * size, so that reading back and forth around an offset does not move them. They end before the
+ * index, which is read in one piece. */
 static ebpo_range window_around(const ebpo_head_bytes *b, uint64_t at)
 {
     uint64_t begin = at / (WINDOW_BYTES / 2) * (WINDOW_BYTES / 2), end = b->input->source.size;
@@ -87,11 +89,11 @@ const uint8_t *ebpo_head_bytes_at(ebpo_head_bytes *b, uint64_t at, uint64_t size
     uint64_t end = b->input->source.size;
     if (b->status != EBPO_OK || at > end || size > end - at)
         return NULL;
-    const uint8_t *found = held_within(b->first, (ebpo_range){ 0, b->first_bytes }, at, size);
+    const uint8_t *found = bytes_within(b->first, (ebpo_range){ 0, b->first_bytes }, at, size);
     if (!found)
-        found = held_within(b->window, (ebpo_range){ b->window_at, b->window_bytes }, at, size);
+        found = bytes_within(b->window, (ebpo_range){ b->window_at, b->window_bytes }, at, size);
     if (!found && b->table)
-        found = held_within(b->table, b->index, at, size);
+        found = bytes_within(b->table, b->index, at, size);
     if (found)
         return found;
     if (b->index.size && !b->table && at >= b->index.offset &&

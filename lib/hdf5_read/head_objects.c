@@ -1,7 +1,7 @@
 /* Reads headers of objects: blocks with checksums, their messages, and the types, dimensions,
- * filters and attributes in these. The last read headers are kept. Counts and sizes are bounded
- * before memory is allocated for them, and each checksum is compared. Source: HDF5 File Format
- * Specification 3.0, section IV.A. */
+ * filters and attributes in the messages. The last read headers are kept. Counts and sizes are
+ * bounded before memory is allocated for them, and each checksum is compared. Source: HDF5 File
+ * Format Specification 3.0, section IV.A. */
 #include "core/strict_fp.h"
 
 #include <stdio.h>
@@ -15,7 +15,7 @@
 #include "hdf5_read/head_parts.h"
 
 enum {
-    /* limits of one header: far above those of written files, and low enough to be harmless */
+    /* limits of one header: far above what files need, and low enough to be harmless */
     BLOCKS_MAX = 256,
     BLOCK_BYTES_MAX = 1 << 20,
     HEADER_BYTES_MAX = 4 << 20,
@@ -26,7 +26,8 @@ static const char *const damaged_block = "its header is beyond the end of the fi
 
 bool ebpo_head_sound(const uint8_t *block, uint64_t size)
 {
-    /* not computed where it would not be compared: that took most of a fuzzer's time */
+    /* a fuzzing build does not compute the checksum, because it does not compare it, and a fuzzer
+     * would spend most of its time on it */
     return size >= 4 &&
            (!EBPO_CHECKSUMS_COMPARED || !ebpo_sum_differs(ebpo_load32(block + size - 4),
                                                           ebpo_lookup3(block, (size_t)size - 4)));
@@ -66,8 +67,8 @@ static bool add_message(ebpo_head_state *s, ebpo_head_header *h, const ebpo_head
     return true;
 }
 
-/* Lists the messages of one block; `from`: its offset in the header's bytes; `gap`: bytes of
- * creation order. */
+/* Lists the messages of one block; `from`: offset of the block in the header's bytes; `gap`: bytes
+ * of the creation order in each message. */
 static bool list_messages(ebpo_head_state *s, ebpo_head_header *h, uint64_t from, unsigned gap)
 {
     ebpo_head_cursor c = { h->bytes + from, h->bytes + h->byte_count, false };
@@ -85,7 +86,8 @@ static bool list_messages(ebpo_head_state *s, ebpo_head_header *h, uint64_t from
     return true;
 }
 
-/* Reads a block: `before` bytes in front of its messages, four of checksum behind. */
+/* Reads a block, which has `before` bytes in front of its messages and four bytes of checksum after
+ * them. */
 static bool take_block(ebpo_head_state *s, ebpo_head_header *h, uint64_t at, uint64_t before,
                        uint64_t size, unsigned gap)
 {
@@ -182,7 +184,7 @@ static bool find_kind(ebpo_head_state *s, ebpo_head_header *h)
         case EBPO_M_DATASPACE: array |= 1; break;
         case EBPO_M_DATATYPE: array |= 2; break;
         case EBPO_M_LAYOUT: array |= 4; break;
-        default: break; /* times, comments, counts: they do not affect reading */
+        default: break; /* times, comments, counts: such messages do not affect reading */
         }
     }
     if (h->kind == EBPO_HEAD_OTHER && array == 7)
@@ -190,7 +192,7 @@ static bool find_kind(ebpo_head_state *s, ebpo_head_header *h)
     return true;
 }
 
-/* Empties and returns the slot that has been idle for longest; its memory is reused. */
+/* Empties and returns the slot that was used least recently; its memory is reused. */
 static ebpo_head_header *free_slot(ebpo_head_state *s)
 {
     ebpo_head_header *h = &s->slot[0];
@@ -226,7 +228,8 @@ void ebpo_head_headers_free(ebpo_head_state *s)
 
 static bool is_double(ebpo_head_cursor *c, unsigned bits, uint32_t size)
 {
-    /* offset, bits, exponent's position and size, mantissa's, bias */
+    /* bit offset, bits, position and size of the exponent, position and size of the mantissa, bias
+     */
     static const uint8_t ieee[12] = { 0, 0, 64, 0, 52, 11, 0, 52, 255, 3, 0, 0 };
     const uint8_t *at = ebpo_cursor_take(c, sizeof ieee);
     return at && size == 8 && bits == 0x3f20 && memcmp(at, ieee, sizeof ieee) == 0;
@@ -258,8 +261,8 @@ ebpo_head_type ebpo_head_read_type(ebpo_head_cursor c)
     return type;
 }
 
-/* Reads dimensions. Programs with default settings of HDF5 that add an attribute to a file write
- * version 1. */
+/* Reads dimensions. Version 1 is read too, because programs with HDF5's default settings write it
+ * when they add an attribute to a file. */
 ebpo_head_space ebpo_head_read_space(ebpo_head_cursor c)
 {
     enum { HAS_MAX = 1, PLAIN = 1, RANK_MAX = 32 };
@@ -333,7 +336,7 @@ static ebpo_head_cursor part_of(ebpo_head_cursor *c, unsigned version, unsigned 
     return part;
 }
 
-/* Returns true if a message is the attribute of this name, and reads it. */
+/* Reads a message as an attribute; returns true if it has this name. */
 static bool attribute_is(ebpo_head_cursor c, const char *name, attribute *a)
 {
     unsigned version = ebpo_cursor_u8(&c), flags = ebpo_cursor_u8(&c);
@@ -399,7 +402,7 @@ ebpo_status ebpo_head_get_text(ebpo_head *head, ebpo_head_object object, const c
                            "it is not a fixed-length UTF-8 text of an allowed length", error);
 }
 
-/* Reads the eight bytes of each value. */
+/* Reads an attribute's values, each of eight bytes. */
 static ebpo_status get_numbers(ebpo_head *head, ebpo_head_object object, const char *path,
                                const char *name, ebpo_head_type type, uint64_t *values,
                                unsigned count, const char *what, ebpo_error *error)

@@ -15,7 +15,7 @@
 static const char signature[8] = "\211HDF\r\n\032\n";
 
 /* Returns true if other data precedes the superblock, which HDF5 allows; the superblock is then at
- * one of these offsets. */
+ * offset 512, 1024, 2048, and so on. */
 static bool has_user_block(ebpo_head_state *s)
 {
     for (uint64_t at = 512; at <= s->bytes.first_bytes; at *= 2) {
@@ -26,7 +26,7 @@ static bool has_user_block(ebpo_head_state *s)
     return false;
 }
 
-/* Returns true if the bytes begin as those of any HDF5 file. */
+/* Returns true if the file begins with HDF5's signature. */
 static bool has_signature(ebpo_head_state *s)
 {
     const uint8_t *first = ebpo_head_bytes_at(&s->bytes, 0, sizeof signature);
@@ -107,7 +107,7 @@ ebpo_status ebpo_head_close(ebpo_head *head, ebpo_status status, ebpo_error *err
 void ebpo_head_keep_ranges(ebpo_head *head)
 {
     head->state->keeps = true;
-    for (int i = 0; i < EBPO_HEAD_SLOTS; i++) /* headers are read again */
+    for (int i = 0; i < EBPO_HEAD_SLOTS; i++) /* the headers are read again when needed */
         head->state->slot[i].used = 0;
 }
 

@@ -1,6 +1,7 @@
-/* Private to lib/hdf5_read: the parts of an open head: its bytes, in few reads; a cursor in them;
- * headers of objects; types, dimensions and filters. The library's writer puts headers at the start
- * of the file, and the index of large arrays in one piece behind the first levels. */
+/* Private to lib/hdf5_read: the parts of an open head. These are its bytes, which are read in few
+ * reads, a cursor in them, headers of objects, and types, dimensions and filters. The library's
+ * writer puts headers at the start of the file, and the index of large arrays in one piece behind
+ * the first levels. */
 #ifndef EBPO_HDF5_READ_HEAD_PARTS_H
 #define EBPO_HDF5_READ_HEAD_PARTS_H
 
@@ -16,11 +17,12 @@
 
 typedef struct ebpo_head_bytes {
     ebpo_input *input;
-    uint8_t *first, *window; /* the first bytes, and a piece at another offset, NULL until needed */
-    uint8_t *table;          /* all of `index`, NULL until needed */
-    uint8_t *large;          /* ranges that fit none of them */
+    /* the file's first bytes, and a piece at another offset; NULL until needed */
+    uint8_t *first, *window;
+    uint8_t *table; /* all of `index`, NULL until needed */
+    uint8_t *large; /* a range that fits none of these */
     uint64_t first_bytes, window_at, window_bytes, large_capacity;
-    ebpo_range index; /* range of more metadata, or empty */
+    ebpo_range index; /* range of further metadata (ebpo_head_hint_index), or empty */
     /* status of the input's first failure, after which nothing more is read */
     ebpo_status status;
     ebpo_error error;
@@ -31,12 +33,11 @@ EBPO_MUST_USE ebpo_status ebpo_head_bytes_open(ebpo_head_bytes *bytes, ebpo_inpu
                                                ebpo_error *error);
 void ebpo_head_bytes_close(ebpo_head_bytes *bytes);
 
-/* Returns bytes [at, at + size), valid until the next call; the caller bounds `size`. NULL: they
- * are beyond the end of the file, or could not be read (`status`). */
+/* Returns the bytes [at, at + size), valid until the next call; the caller bounds `size`. NULL: the
+ * bytes are beyond the end of the file, or could not be read (see `status`). */
 const uint8_t *ebpo_head_bytes_at(ebpo_head_bytes *bytes, uint64_t at, uint64_t size);
 
-/* Private to lib/hdf5_read: a read position in untrusted bytes. Beyond the end it returns zeros and
- * records that. */
+/* A read position in untrusted bytes. Reads beyond the end return zeros and set `cut`. */
 
 #define EBPO_NO_ADDRESS UINT64_MAX
 
@@ -93,7 +94,7 @@ static inline ebpo_head_cursor ebpo_cursor_part(ebpo_head_cursor *c, size_t byte
     return (ebpo_head_cursor){ from ? from : c->end, from ? from + bytes : c->end, !from };
 }
 
-/* Private to lib/hdf5_read: an open head, and the headers of its objects. */
+/* --- an open head, and the headers of its objects --- */
 
 /* Types of messages. */
 enum {
@@ -128,7 +129,7 @@ typedef struct ebpo_head_header {
 /* The reason of a refusal. */
 typedef struct ebpo_head_refusal {
     const char *what; /* NULL: no refusal */
-    bool foreign;     /* true if it is not damaged, but only libhdf5 reads it */
+    bool foreign;     /* true if the file is not damaged, but only libhdf5 reads it */
 } ebpo_head_refusal;
 
 enum { EBPO_HEAD_SLOTS = 32 };
@@ -143,7 +144,7 @@ typedef struct ebpo_head_state {
     bool keeps, kept_short; /* kept_short: memory was short */
 } ebpo_head_state;
 
-/* Records a range of the file that is in use. */
+/* Records a range of the file that is in use, if ebpo_head_keep_ranges was called. */
 static inline void ebpo_head_note_range(ebpo_head_state *s, uint64_t at, uint64_t size)
 {
     if (!s->keeps)
@@ -189,7 +190,7 @@ ebpo_head_kind ebpo_head_find(ebpo_head_state *s, const char *path, ebpo_head_ob
 EBPO_MUST_USE ebpo_status ebpo_head_fail(const ebpo_head *head, const char *path, const char *what,
                                          ebpo_error *error);
 
-/* Private to lib/hdf5_read: types, dimensions and filters as messages describe them. */
+/* Types, dimensions and filters as messages describe them. */
 
 typedef enum ebpo_head_class {
     EBPO_CLASS_INTEGER,       /* little-endian, using all bits */
@@ -221,7 +222,7 @@ enum { EBPO_HEAD_FILTERS = 3 };
 typedef struct ebpo_head_filters {
     unsigned count; /* more than EBPO_HEAD_FILTERS: not of this format */
     struct {
-        unsigned id, values, first; /* number of values, and the first one */
+        unsigned id, values, first; /* the filter, the number of its values, and the first value */
     } filter[EBPO_HEAD_FILTERS];
 } ebpo_head_filters;
 

@@ -1,7 +1,7 @@
 /* Chunks as zstd frames (RFC 8878), each with its content's size and a checksum. Parts of a frame
  * that neither zstd's decoder checks nor a checksum covers are checked here: a changed bit must not
- * go unnoticed. The blocks of a frame are the planes of shuffled elements, or the streams of a
- * coding, because each has separate statistics. */
+ * go unnoticed. The blocks of a frame are the planes of shuffled elements or the streams of a
+ * coding, because the statistics of these differ. */
 #include <string.h>
 #include <zstd.h>
 
@@ -14,8 +14,8 @@ enum { RAW, RLE, COMPRESSED, RESERVED };
 enum { DESCRIPTOR = 4 };
 static const char unused_set[] = "an unused bit of the zstd frame is set";
 
-/* Returns the bytes of the literals of a compressed block, with their header; 0: it is cut short.
- */
+/* Returns the bytes of the literals of a compressed block, with their header; 0: the block is cut
+ * short. */
 static size_t literals_bytes(const uint8_t *block, size_t size)
 {
     unsigned kind = block[0] & 3, format = block[0] >> 2 & 3;
@@ -91,8 +91,8 @@ bool ebpo_zstd_has_checksum(const uint8_t *frame, size_t bytes)
 
 /* Begins a frame. A shuffled chunk consists of planes of bytes that have little in common: the low
  * ones are noise, the high ones nearly constant. Each plane is a block and has a separate table of
- * codes. Short matches are not used: in such planes they cost more than single bytes. Chunks too
- * small to gain by this are encoded as HDF5's filter does. */
+ * codes. Short matches are not used: in such planes they cost more than single bytes. Chunks that
+ * are too small to gain by this are encoded as HDF5's filter encodes them. */
 static bool begin_frame(ZSTD_CCtx *out, int level, size_t raw_bytes)
 {
     enum { LARGE = 4096, LEVEL_OF_LARGE = 7, MATCH_LEAST = 6 };
@@ -133,7 +133,8 @@ ebpo_status ebpo_zstd_encode(ebpo_chunk_coder *coder, int level, const uint8_t *
                            : ZSTD_compress2(coder->zstd_out, out, ebpo_chunk_bound(raw_bytes), raw,
                                             raw_bytes);
     *out_bytes = size;
-    return ZSTD_isError(size) ? EBPO_E_MEMORY : EBPO_OK; /* the bound excludes other causes */
+    /* the size of `out` excludes other causes */
+    return ZSTD_isError(size) ? EBPO_E_MEMORY : EBPO_OK;
 }
 
 /* --- decoding --- */

@@ -1,6 +1,6 @@
 /* Runs libhdf5 on untrusted files in a separate process: forked, with limits of memory, time and
- * bytes written, without plugins, and with a pipe for its status and error. Any failure in it ends
- * that process and not this one. */
+ * bytes written, without plugins, and with a pipe for its status and error. A crash ends that
+ * process and not this one. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -83,13 +83,14 @@ static int read_all(int fd, void *data, size_t bytes)
     return 1;
 }
 
-static void be_apart(ebpo_process_fn work, void *user, const ebpo_process_limits *limits,
+static void run_work(ebpo_process_fn work, void *user, const ebpo_process_limits *limits,
                      uint64_t has, int out)
 {
-    static const int standard[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGTERM };
+    static const int handled[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGTERM };
     report r = { EBPO_OK, EBPO_ERROR_INIT };
-    for (size_t i = 0; i < sizeof standard / sizeof standard[0]; i++)
-        signal(standard[i], SIG_DFL); /* the caller's handlers are for its own process */
+    for (size_t i = 0; i < sizeof handled / sizeof handled[0]; i++)
+        /* signal handlers of the caller are for the caller's process */
+        signal(handled[i], SIG_DFL);
     signal(SIGXFSZ, SIG_IGN);
     signal(SIGPIPE, SIG_IGN);
     take_limits(limits, has);
@@ -100,9 +101,9 @@ static void be_apart(ebpo_process_fn work, void *user, const ebpo_process_limits
     _exit(0);
 }
 
-static ebpo_status judge_death(int state, const char *shown, ebpo_error *error)
+static ebpo_status fail_by_state(int state, const char *shown, ebpo_error *error)
 {
-    if (!WIFSIGNALED(state)) /* it could not report its result */
+    if (!WIFSIGNALED(state)) /* the process ended by itself, but could not report its result */
         return ebpo_fail_file(error, EBPO_E_IO, shown,
                               "the process that read it through libhdf5 ended early");
     if (WTERMSIG(state) == SIGXCPU || WTERMSIG(state) == SIGKILL)
@@ -140,7 +141,7 @@ ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *sh
     if (child == 0) {
         ebpo_h5_leave(&scope);
         close(ends[0]);
-        be_apart(work, user, limits, has, ends[1]);
+        run_work(work, user, limits, has, ends[1]);
     }
     int fault = errno;
     ebpo_h5_leave(&scope);
@@ -156,14 +157,14 @@ ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *sh
     }
     errno = fault;
     if (reported < 0)
-        return ebpo_fail_errno(error, shown, "the report of the process that read it is invalid");
+        return ebpo_fail_errno(error, shown, "the result of the process that read it is invalid");
     if (!reported)
-        return judge_death(state, shown, error);
+        return fail_by_state(state, shown, error);
     /* terminates the texts, as the process may have written anything */
     r.error.message[sizeof r.error.message - 1] = r.error.file[sizeof r.error.file - 1] =
         r.error.object[sizeof r.error.object - 1] = 0;
     if (r.status != EBPO_OK && r.status != r.error.status)
-        return judge_death(state, shown, error);
+        return fail_by_state(state, shown, error);
     if (r.status != EBPO_OK || *r.error.message)
         (void)!ebpo_fail_with(error, &r.error);
     return r.status;

@@ -33,9 +33,9 @@ typedef struct copying {
     const char *from_path, *to_path, *shown;
     bool from_goes;
     ebpo_h5_chunk_rows_fn chunk_rows;
-    bool subtrees, kept;    /* arguments of chunk_rows */
+    bool subtrees, kept;    /* arguments of chunk_rows (ebpo_h5_chunk_rows_fn) */
     ebpo_pipeline pipeline; /* filters of all arrays of the copy */
-    hid_t access;           /* access list of arrays: with a cache for large chunks */
+    hid_t access;           /* access list of arrays, with a cache for large chunks */
     unsigned objects, depth;
     ebpo_error omitted; /* reason why the first array was omitted */
     ebpo_status status;
@@ -75,7 +75,7 @@ static herr_t copy_attribute(hid_t object, const char *name, const H5A_info_t *i
         return copy_fails(a->c, ebpo_text_ok(name) ? name : "",
                           "the file has too many objects and attributes");
     if (plain && H5Aread(attribute, type, value) >= 0) {
-        hid_t own = H5Tcopy(type); /* in case it belongs to another object */
+        hid_t own = H5Tcopy(type); /* a copy, in case the type belongs to another object */
         ebpo_status status = ebpo_h5_put_attribute(&a->c->to, a->to, name, own, H5Scopy(space), -1,
                                                    value, a->c->error);
         a->c->status = a->c->status == EBPO_OK ? status : a->c->status;
@@ -110,7 +110,7 @@ typedef struct array_copy {
     hid_t type;             /* type for reading values */
 } array_copy;
 
-static void leave_out(copying *c, const char *path, const char *what)
+static void omit_array(copying *c, const char *path, const char *what)
 {
     if (!*c->omitted.message)
         (void)!ebpo_fail_at(&c->omitted, EBPO_E_FORMAT, c->shown, path, -1, "%s", what);
@@ -143,7 +143,7 @@ static bool has_filter(hid_t plist, int id)
     return false;
 }
 
-/* Returns true if libhdf5 has all filters; else reports the missing one. */
+/* Returns true if libhdf5 has all filters of the array. Otherwise reports the missing one. */
 static bool can_decode(copying *c, const array_copy *a)
 {
     for (int i = 0; i < H5Pget_nfilters(a->plist); i++) {
@@ -160,13 +160,13 @@ static bool can_decode(copying *c, const array_copy *a)
             "the array is compressed by HDF5's filter %d (%.40s), which is not built in; where "
             "its plugin is installed, rewrite the file with `h5repack -f SHUF -f GZIP=6 -f FLET`",
             id, *name && ebpo_text_ok(name) ? name : "no name");
-        leave_out(c, a->path, what);
+        omit_array(c, a->path, what);
         return false;
     }
     return true;
 }
 
-/* Finds type and size. Returns NULL, or the reason why it is not an array of the format. */
+/* Finds type and size. Returns NULL, or the reason why the array is not one of the format. */
 static const char *find_values(array_copy *a)
 {
     hsize_t dims[2] = { 0, 0 };
@@ -215,7 +215,7 @@ static bool inspect_object(copying *c, array_copy *a)
 {
     const char *wrong = a->plist >= 0 ? find_values(a) : "the array is damaged";
     if (wrong) {
-        leave_out(c, a->path, wrong);
+        omit_array(c, a->path, wrong);
         return false;
     }
     find_chunks(a);
@@ -230,7 +230,7 @@ static bool inspect_object(copying *c, array_copy *a)
     return can_decode(c, a);
 }
 
-/* Returns true if all chunks are stored; HDF5 returns its fill value for missing ones. */
+/* Returns true if all chunks are stored. For missing chunks HDF5 would return the fill value. */
 static bool all_is_there(const array_copy *a)
 {
     hsize_t chunks = 0;
@@ -316,8 +316,9 @@ static void copy_values(copying *c, const array_copy *a)
     free(data);
 }
 
-/* Makes the chunk directory: it must exist, but belongs to the original file. It gets one row,
- * which is never read, because it lacks the attributes that make it valid. */
+/* Makes the chunk directory, which must exist in the copy. Its content would describe the original
+ * file, so it gets one row, which is never read: the attributes that make the directory valid are
+ * missing. */
 static void make_places(copying *c, const char *path)
 {
     static const uint64_t none[2];
@@ -365,8 +366,8 @@ static hsize_t rows_of(hid_t file, const char *path)
     return chunk[0];
 }
 
-/* Chooses the filters of the copy by an array that every file has, and finds out whether chunks are
- * those of the format. */
+/* Chooses the filters of the copy, by those of an array that every file has, and finds out whether
+ * the chunks have the rows of the format. */
 static void inspect_file(copying *c)
 {
     array_copy a = { .set = H5Dopen2(c->from, "/levels/00/types", H5P_DEFAULT) };

@@ -1,6 +1,7 @@
 /* Writes HDF5 files in this library's layout: groups, fixed-size attributes, chunked integer arrays
- * whose chunks are already encoded (lib/hdf5_read reads them). The only module that includes
- * <hdf5.h>; it serialises calls, and any thread may make them. Errors name file and object. */
+ * whose chunks are already encoded (lib/hdf5_read reads them). This is the only module that
+ * includes <hdf5.h>. It serialises calls, so any thread may call it. Errors name file and object.
+ */
 #ifndef EBPO_HDF5_WRITE_H5_H
 #define EBPO_HDF5_WRITE_H5_H
 
@@ -26,16 +27,17 @@ typedef struct ebpo_h5_out {
         "", -1, 0, NULL  \
     }
 
-/* Closes an object opened or created below, before the file is closed; a negative id is allowed.
- * The next call reports a failure, ebpo_h5_finish at the latest. */
+/* Closes an object that was opened or created by a function below. Call it before the file is
+ * closed. A negative id is allowed. The next call reports a failure of it, ebpo_h5_finish at the
+ * latest. */
 void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id);
 
 /* Creates a file by name, or in memory when path is NULL. The first `head_bytes` bytes are for
  * metadata. `links`: number of objects in the root group. */
 EBPO_MUST_USE ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown,
                                          uint64_t head_bytes, unsigned links, ebpo_error *error);
-/* Closes the file and reopens it; none of its objects may be open. Metadata allocated after that
- * takes the next `metadata_bytes` in one piece. */
+/* Closes the file and reopens it; none of its objects may be open. Metadata that is allocated
+ * afterwards is stored in one piece of `metadata_bytes` bytes, which is next in the file. */
 EBPO_MUST_USE ebpo_status ebpo_h5_reopen(ebpo_h5_out *out, uint64_t metadata_bytes,
                                          ebpo_error *error);
 /* Opens the root group for its attributes, or creates a group with capacity for `links` links. The
@@ -55,8 +57,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_count(ebpo_h5_out *out, ebpo_h5_id id, con
 EBPO_MUST_USE ebpo_status ebpo_h5_put_real(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
                                            const double *values, unsigned count, ebpo_error *error);
 
-/* Writes attributes as VTKHDF requires: 64-bit integers [count], count > 0, ASCII of fixed length.
- */
+/* Write attributes as VTKHDF requires: 64-bit integers [count], count > 0, and ASCII texts of fixed
+ * length. */
 EBPO_MUST_USE ebpo_status ebpo_h5_put_ints(ebpo_h5_out *out, ebpo_h5_id id, const char *name,
                                            const int64_t *values, unsigned count,
                                            ebpo_error *error);
@@ -65,7 +67,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_ascii(ebpo_h5_out *out, ebpo_h5_id id, con
 
 EBPO_MUST_USE ebpo_status ebpo_h5_open_array(ebpo_h5_out *out, const char *path, ebpo_h5_id *id,
                                              ebpo_error *error);
-/* Creates an array, whose id the caller closes; then writes its encoded chunks by index. */
+/* The first creates an array, whose id the caller closes. The second writes its encoded chunks by
+ * index. */
 EBPO_MUST_USE ebpo_status ebpo_h5_make_array(ebpo_h5_out *out, const char *path,
                                              const ebpo_shape *shape, ebpo_h5_id *id,
                                              ebpo_error *error);
@@ -73,8 +76,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_chunk(ebpo_h5_out *out, const char *path, 
                                             const ebpo_shape *shape, uint64_t chunk,
                                             const void *data, size_t bytes, ebpo_error *error);
 
-/* Returns, for a file in memory, the bytes from the start to the end of the last metadata so far;
- * raw data begins at first_raw. */
+/* For a file in memory: returns the number of bytes from the start to the end of the last metadata
+ * so far. Raw data begins at first_raw. */
 EBPO_MUST_USE ebpo_status ebpo_h5_head_used(ebpo_h5_out *out, uint64_t first_raw, uint64_t *bytes,
                                             ebpo_error *error);
 /* Returns the current size of the file in bytes. */
@@ -86,7 +89,7 @@ EBPO_MUST_USE ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error);
 void ebpo_h5_discard(ebpo_h5_out *out);
 
 /* HDF5 files for other programs: plain arrays of numbers that grow by rows, with filters that every
- * HDF5 has (shuffle, deflate). Errors name file and object. */
+ * build of HDF5 has (shuffle, deflate). Errors name file and object. */
 
 typedef enum ebpo_h5_number {
     EBPO_H5_U8,
@@ -136,13 +139,12 @@ EBPO_MUST_USE ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path,
                                             ebpo_h5_number number, uint32_t cols, const void *data,
                                             uint64_t rows, ebpo_error *error);
 
-/* HDF5 arrays of three dimensions of float64 for other programs, written layer by layer. */
-
-/* Creates a volume of [dims[0]][dims[1]][dims[2]], each at least 1. The caller closes the id. */
+/* Creates a volume for other programs: an array of float64, [dims[0]][dims[1]][dims[2]], each at
+ * least 1. It is written layer by layer. The caller closes the id. */
 EBPO_MUST_USE ebpo_status ebpo_h5_make_volume(ebpo_h5_out *out, const char *path,
                                               const uint64_t dims[3], ebpo_h5_id *id,
                                               ebpo_error *error);
-/* Writes layers from `first` on; data[layers][dims[1]][dims[2]]. */
+/* Writes layers from `first` on, from data[layers][dims[1]][dims[2]]. */
 EBPO_MUST_USE ebpo_status ebpo_h5_put_layers(ebpo_h5_out *out, const char *path, ebpo_h5_id id,
                                              const uint64_t dims[3], uint64_t first,
                                              uint64_t layers, const double *data,
@@ -156,19 +158,20 @@ typedef struct ebpo_process_limits {
     unsigned seconds;      /* processor time */
 } ebpo_process_limits;
 
-/* Returns the rows of a chunk of an array of this format. `stored`: its shape, with the current
- * chunk_rows of the other program, 0 for none; `subtrees`: the file has that part; `kept`: the
- * arrays whose chunks the format fixes have these. */
+/* Returns the number of rows of a chunk of an array in this format. `stored`: the array's shape in
+ * the file, with the chunk_rows of the other program, 0 for none. `subtrees`: the file has
+ * subtrees. `kept`: the arrays whose chunks are fixed by the format have such chunks in the file.
+ */
 typedef uint32_t (*ebpo_h5_chunk_rows_fn)(const char *path, const ebpo_shape *stored, bool subtrees,
                                           bool kept);
 
 /* Rewrites the parts of a file that belong to this format in this format's layout: from the file
- * `from` to the empty file `to`. libhdf5 opens files by name; `to` loses its name as soon as
- * libhdf5 has opened it, and so does `from` with `from_goes`. Chunks that fit the format are copied
- * as stored; from other layouts, filters and byte orders, libhdf5 reads the values. Arrays that do
- * not fit the format are omitted; *omitted then describes the first such array and the reason
- * (EBPO_E_FORMAT), otherwise it has no message; on failure it is the failure. EBPO_E_FORMAT,
- * EBPO_E_IO, EBPO_E_MEMORY; EBPO_E_UNSUPPORTED without libhdf5. */
+ * `from` to the empty file `to`. libhdf5 opens files by name. The name `to` is removed as soon as
+ * libhdf5 has opened that file, and so is `from` if `from_goes` is true. Chunks that fit the format
+ * are copied as stored; from other layouts, filters and byte orders, libhdf5 reads the values.
+ * Arrays that do not fit the format are omitted; *omitted then describes the first such array and
+ * the reason (EBPO_E_FORMAT). If no array is omitted, *omitted has no message; on failure it holds
+ * the failure. EBPO_E_FORMAT, EBPO_E_IO, EBPO_E_MEMORY; EBPO_E_UNSUPPORTED without libhdf5. */
 EBPO_MUST_USE ebpo_status ebpo_h5_clean_copy(const char *from, bool from_goes, const char *to,
                                              const char *shown, ebpo_h5_chunk_rows_fn chunk_rows,
                                              const ebpo_process_limits *limits, ebpo_error *omitted,

@@ -1,6 +1,6 @@
 /* Private to lib/hdf5_write: the use of libhdf5. Every call happens between enter and leave.
  * Debian's serial build is not thread-safe, so one mutex of the library serialises calls; HDF5's
- * error printing is switched off meanwhile and then restored. */
+ * error printing is switched off in between and then restored. */
 #ifndef EBPO_HDF5_WRITE_H5_PARTS_H
 #define EBPO_HDF5_WRITE_H5_PARTS_H
 
@@ -23,12 +23,12 @@ void ebpo_h5_leave(ebpo_h5_scope *scope);
 ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *shown,
                          const char *object, const char *what);
 
-/* Returns true if the immediately preceding, failed call lacked memory. */
+/* Returns true if the last call failed for lack of memory. */
 bool ebpo_h5_short_of_memory(void);
 
-/* Opens a file of another program to read. With `lock` it fails while another program has the file
- * open for writing, because the data may then be a mixture of two versions; a file system without
- * locks is not a failure. -1 in *file on failure. */
+/* Opens a file of another program to read. With `lock`, fails while another program has the file
+ * open for writing, because the data may then be a mixture of two versions. If the file system has
+ * no locks, the file is opened without one. -1 in *file on failure. */
 EBPO_MUST_USE ebpo_status ebpo_h5_open_to_read(const char *path, const char *shown, bool lock,
                                                hid_t *file, ebpo_error *error);
 
@@ -40,8 +40,8 @@ hid_t ebpo_h5_integer_type(unsigned size, bool is_signed);
 
 /* A virtual file driver, through which libhdf5 writes. libhdf5 1.10 does not survive a failing
  * write: unflushed data stays behind with an id that has lost its file, and libhdf5 fails on it
- * when it is closed or at exit. This driver keeps the first failure and reports it in all later
- * calls; for libhdf5 all writes succeed, so it always terminates. */
+ * when it is closed or at exit. This driver stores the first failure, which all later calls of this
+ * module report. To libhdf5 all writes appear to succeed, so libhdf5 always terminates. */
 
 typedef struct ebpo_h5_sink {
     hid_t id;        /* libhdf5's registration of the driver */
@@ -54,15 +54,16 @@ typedef struct ebpo_h5_sink {
     char shown[]; /* for messages */
 } ebpo_h5_sink;
 
-/* Opens the file and empties it, or opens memory when path is NULL. Inside or outside the scope. */
+/* Opens the file and empties it, or opens memory when path is NULL. May be called inside or outside
+ * the scope. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_open(ebpo_h5_sink **out, const char *path, const char *shown,
                                             ebpo_error *error);
 /* Makes a file access list use the sink; returns false when libhdf5 refuses. Call it inside the
  * scope. */
 bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl);
-/* Keeps a failure, if it is the first. */
+/* Stores a failure, if it is the first one. */
 void ebpo_h5_sink_fail(ebpo_h5_sink *sink, const ebpo_error *error);
-/* Returns the kept failure, or EBPO_OK. */
+/* Returns the stored failure, or EBPO_OK. */
 EBPO_MUST_USE ebpo_status ebpo_h5_sink_status(const ebpo_h5_sink *sink, ebpo_error *error);
 /* Closes the sink's file after libhdf5 has closed it, inside the scope. Returns the first failure,
  * including that of this close. */
@@ -71,8 +72,8 @@ EBPO_MUST_USE ebpo_status ebpo_h5_sink_close(ebpo_h5_sink *sink, ebpo_error *err
  * may call the driver again at any time. */
 void ebpo_h5_sink_abandon(ebpo_h5_sink *sink);
 
-/* Private to lib/hdf5_write, within a scope: writing common to all layouts. Objects whose ownership
- * is transferred are closed, also after an earlier failure. */
+/* Writing that all layouts have in common; call it inside the scope. These functions close the
+ * spaces and property lists that they receive, also after an earlier failure. */
 
 /* Returns properties of a file that is written through the sink; -1 when libhdf5 refuses. */
 struct ebpo_h5_sink;
@@ -91,7 +92,8 @@ ebpo_status ebpo_h5_put_group(const ebpo_h5_out *out, const char *path, hid_t gc
 /* Creates a dataset; closes space and properties. */
 ebpo_status ebpo_h5_put_dataset(const ebpo_h5_out *out, const char *path, hid_t type, hid_t space,
                                 hid_t dcpl, bool good, ebpo_h5_id *id, ebpo_error *error);
-/* Writes an attribute, from its stored type where `memory` is -1. Closes the space. */
+/* Writes an attribute, from values of the type `memory`, or of the stored type if `memory` is -1.
+ * Closes the space. */
 ebpo_status ebpo_h5_put_attribute(const ebpo_h5_out *out, hid_t object, const char *name,
                                   hid_t type, hid_t space, hid_t memory, const void *value,
                                   ebpo_error *error);
@@ -99,15 +101,14 @@ ebpo_status ebpo_h5_put_attribute(const ebpo_h5_out *out, hid_t object, const ch
 void ebpo_h5_close_list(hid_t list);
 void ebpo_h5_close_space(hid_t space);
 
-/* libhdf5 handles untrusted files in a separate process, with limits. Any failure there ends that
- * process and not this one. */
-
-/* The work in that process: no other thread exists, no plugin is loaded, libhdf5 prints nothing.
- * Its changes of memory are lost; files that it writes stay. */
+/* The work in a separate process, with limits, in which libhdf5 reads untrusted files. There is no
+ * other thread, no plugin is loaded, and libhdf5 prints nothing. Changes of memory are lost; files
+ * that the work writes stay. */
 typedef ebpo_status (*ebpo_process_fn)(void *user, ebpo_error *error);
 
-/* Returns the status and error of the work; EBPO_OK may have an error, too. EBPO_E_FORMAT when the
- * process crashed or exceeded a limit; `shown`: the file. */
+/* Runs `work` in a separate process; a crash ends only that process. Returns the status and error
+ * of the work; with EBPO_OK, *error may be set, too. EBPO_E_FORMAT when the process crashed or
+ * exceeded a limit. `shown`: name of the file for messages. */
 EBPO_MUST_USE ebpo_status ebpo_run_in_process(ebpo_process_fn work, void *user, const char *shown,
                                               const ebpo_process_limits *limits, ebpo_error *error);
 

@@ -20,8 +20,9 @@
 enum {
     COLUMNS_MAX = 64,
     ROWS_AT_ONCE = 16384,
-    /* Limits of the bytes of rows: a multiple of the file's bytes, as much as deflate can save, and
-     * a minimum. A file of a kilobyte can state any number of rows. */
+    /* The limit of the bytes of all rows is a multiple of the file's size, which is the most by
+     * which deflate can compress, but not less than a minimum. A file of a kilobyte can state any
+     * number of rows. */
     EXPANSION_MAX = 1024,
     EXPANSION_FREE = 64 << 20
 };
@@ -119,14 +120,14 @@ static void describe_rows(const dataset *d, char what[64])
 }
 
 /* Writes a shape as "2 x 3"; nothing for a single value. */
-static void describe_shape(hid_t space, char *text, size_t room)
+static void describe_shape(hid_t space, char *text, size_t capacity)
 {
     hsize_t size[H5S_MAX_RANK];
     int rank = H5Sget_simple_extent_dims(space, size, NULL), at = 0;
     *text = 0;
-    for (int i = 0; i < rank && at >= 0 && (size_t)at < room; i++)
-        at +=
-            snprintf(text + at, room - (size_t)at, "%s%" PRIu64, i ? " x " : "", (uint64_t)size[i]);
+    for (int i = 0; i < rank && at >= 0 && (size_t)at < capacity; i++)
+        at += snprintf(text + at, capacity - (size_t)at, "%s%" PRIu64, i ? " x " : "",
+                       (uint64_t)size[i]);
 }
 
 static ebpo_status check_set(dataset *d, ebpo_error *error)
@@ -135,17 +136,18 @@ static ebpo_status check_set(dataset *d, ebpo_error *error)
     const char *others = other_values(d, d->set, d->type);
     describe_rows(d, wanted);
     if (others) {
-        snprintf(what, sizeof what, "holds no numbers but %s; %s are expected", others, wanted);
+        snprintf(what, sizeof what, "has %s; expected %s", others, wanted);
         return rows_fail(d, what, error);
     }
     if (has_rows(d->space, d->least, d->most, d->size))
         return d->size[0] <= d->bytes_max / (d->most * sizeof(double))
                    ? EBPO_OK
-                   : ebpo_h5_fail(error, EBPO_E_LIMIT, d->path, d->name,
-                                  "has so many more rows than its file has bytes that it may be "
-                                  "made to exhaust memory; give its rows as a NumPy array");
+                   : ebpo_h5_fail(
+                         error, EBPO_E_LIMIT, d->path, d->name,
+                         "has so many more rows than its file has bytes that reading it may "
+                         "exhaust memory; give its rows as a NumPy array");
     describe_shape(d->space, shape, sizeof shape);
-    snprintf(what, sizeof what, "%s are expected; this is %s%s", wanted,
+    snprintf(what, sizeof what, "expected %s, got %s%s", wanted,
              *shape ? "an array of " : "a single value", shape);
     return rows_fail(d, what, error);
 }
@@ -164,7 +166,7 @@ static herr_t inspect_object(hid_t file, const char *name, const H5O_info_t *inf
     hsize_t size[2];
     if (++c->objects > OBJECTS_MAX)
         return 1;
-    if (info->type != H5O_TYPE_DATASET || !ebpo_text_ok(name)) /* the name is printed */
+    if (info->type != H5O_TYPE_DATASET || !ebpo_text_ok(name)) /* because the name is printed */
         return 0;
     hid_t set = H5Dopen2(file, name, H5P_DEFAULT);
     /* first: H5Dget_space opens a virtual dataset's files */
@@ -202,8 +204,8 @@ static ebpo_status name_sets(dataset *d, ebpo_error *error)
                           *c.names ? c.names : "FILE.h5:/path", c.found > 4 ? ", ..." : "");
 }
 
-/* Reads rows from `first` on, into the first columns of rows that are `most` wide.
- * *short_of_memory: the reason of a failure. */
+/* Reads rows from `first` on, into the first columns of rows with `most` columns. On failure sets
+ * *short_of_memory if that is the reason. */
 static bool read_piece(const dataset *d, hsize_t first, hsize_t count, double *rows,
                        bool *short_of_memory)
 {
@@ -291,7 +293,8 @@ static ebpo_status make_ready(dataset *d, ebpo_error *error)
     if (access(d->path, R_OK) != 0 || stat(d->path, &facts) != 0)
         return ebpo_fail_errno(error, d->path, "cannot be opened");
     if (!S_ISREG(facts.st_mode))
-        return ebpo_fail_file(error, EBPO_E_IO, d->path, "is no regular file; name one");
+        return ebpo_fail_file(error, EBPO_E_IO, d->path,
+                              "is not a regular file; name a regular file");
     uint64_t bytes = (uint64_t)facts.st_size;
     d->bytes_max = bytes > UINT64_MAX / 2 / EXPANSION_MAX ? UINT64_MAX / 2 : bytes * EXPANSION_MAX;
     d->bytes_max = d->bytes_max < EXPANSION_FREE ? EXPANSION_FREE : d->bytes_max;
@@ -321,8 +324,8 @@ ebpo_status ebpo_rows_read_part(const char *path, const char *name, unsigned lea
     if (least < 1 || most < least || most > COLUMNS_MAX)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "rows: 1 to %d columns can be requested",
                          COLUMNS_MAX);
-    ebpo_status status =
-        ebpo_h5_register(error); /* files of this library have such datasets, too */
+    /* because datasets of this library's files have the library's filter */
+    ebpo_status status = ebpo_h5_register(error);
     if (status == EBPO_OK)
         status = make_ready(&d, error);
     limits.file_bytes = d.bytes_max + sizeof *total;

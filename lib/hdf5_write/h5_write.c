@@ -1,7 +1,8 @@
-/* Creates files in this library's layout: headers in one piece at the start, everything compact in
- * object headers, chunks that are already encoded. Spaces and property lists are closed, also after
- * an earlier failure. All calls after a failed write return the first failure (sink.c). Attributes
- * of all kinds, also those of tables for other programs, are written here. */
+/* Creates files in this library's layout: with headers in one piece at the start, links and
+ * attributes in the object headers, and chunks that are already encoded. Spaces and property lists
+ * are closed, also after an earlier failure. All calls after a failed write return the first
+ * failure (sink.c). Attributes of all kinds, also those of tables for other programs, are written
+ * here. */
 #include <string.h>
 
 #include "core/error.h"
@@ -24,8 +25,8 @@ void ebpo_h5_close_id(const ebpo_h5_out *out, ebpo_h5_id id)
     ebpo_h5_leave(&scope);
 }
 
-/* Evicts no metadata, so none must be read back: reading may fail, and then libhdf5 cannot close
- * the file. */
+/* Makes libhdf5 keep all metadata in memory. Metadata that must be read back may fail to be read,
+ * and then libhdf5 cannot close the file. */
 static bool keep_metadata(hid_t fapl)
 {
     H5AC_cache_config_t config = { .version = H5AC__CURR_CACHE_CONFIG_VERSION };
@@ -88,8 +89,7 @@ ebpo_status ebpo_h5_create(ebpo_h5_out *out, const char *path, const char *shown
     return status;
 }
 
-/* Closes the file once: libhdf5 does not try twice, and has released the file even if closing
- * failed. */
+/* Closes the file, only once: libhdf5 has released the file even if closing failed. */
 static ebpo_status close_file(ebpo_h5_out *out, ebpo_error *error)
 {
     bool flushed = H5Fflush(out->file, H5F_SCOPE_LOCAL) >= 0;
@@ -344,7 +344,7 @@ void ebpo_h5_discard(ebpo_h5_out *out)
         return;
     ebpo_h5_scope scope;
     ebpo_h5_enter(&scope);
-    /* these bytes are not needed any more */
+    /* a failure makes the sink discard the rest, which is not needed any more */
     (void)ebpo_fail(&unwanted, EBPO_E_CANCELLED, "given up");
     ebpo_h5_sink_fail(out->sink, &unwanted);
     if (out->file >= 0 && H5Fclose(out->file) < 0)

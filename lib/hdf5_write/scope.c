@@ -31,7 +31,7 @@ void ebpo_h5_leave(ebpo_h5_scope *scope)
     pthread_mutex_unlock(&library);
 }
 
-/* libhdf5 prints the path first, then the error number */
+/* libhdf5's messages have the path first, then the error number, so both must fit */
 enum { CAUSE_BYTES = 8192, CAUSE_SHOWN = 160 };
 
 static herr_t take_first(unsigned depth, const H5E_error2_t *entry, void *data)
@@ -39,10 +39,10 @@ static herr_t take_first(unsigned depth, const H5E_error2_t *entry, void *data)
     (void)depth;
     if (entry->desc)
         snprintf(data, CAUSE_BYTES, "%s", entry->desc);
-    return 1; /* the innermost is enough */
+    return 1; /* stop: only the innermost message is needed */
 }
 
-static herr_t take_memory(unsigned depth, const H5E_error2_t *entry, void *data)
+static herr_t note_memory(unsigned depth, const H5E_error2_t *entry, void *data)
 {
     (void)depth;
     *(bool *)data |= entry->maj_num == H5E_RESOURCE && entry->min_num == H5E_NOSPACE;
@@ -52,7 +52,7 @@ static herr_t take_memory(unsigned depth, const H5E_error2_t *entry, void *data)
 bool ebpo_h5_short_of_memory(void)
 {
     bool found = false;
-    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_memory, &found);
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, note_memory, &found);
     return found;
 }
 
@@ -72,7 +72,7 @@ ebpo_status ebpo_h5_fail(ebpo_error *error, ebpo_status status, const char *show
     int number = system_error(cause);
     if (number > 0)
         return ebpo_fail_at(error, status, shown, object, -1, "%s: %s", what, strerror(number));
-    if (*cause && ebpo_text_ok(cause)) /* it may contain names from the file */
+    if (*cause && ebpo_text_ok(cause)) /* the cause may contain names from the file */
         return ebpo_fail_at(error, status, shown, object, -1, "%s (libhdf5: %.*s)", what,
                             CAUSE_SHOWN, cause);
     return ebpo_fail_at(error, status, shown, object, -1, "%s", what);
@@ -84,8 +84,7 @@ static hid_t open_with(const char *path, bool lock)
     if (!lock)
         H5Pset_file_locking(fapl, false, true);
     hid_t file = H5Fopen(path, H5F_ACC_RDONLY, fapl);
-    if (fapl >= 0 && file >= 0) /* otherwise closing erases libhdf5's reason, of which there is only
-                                 * one list */
+    if (fapl >= 0 && file >= 0) /* after a failure, closing would erase libhdf5's reason */
         H5Pclose(fapl);
     return file;
 }

@@ -1,8 +1,8 @@
 /* The virtual file driver through which libhdf5 writes. libhdf5 1.10 does not survive a failing
  * write: unflushed data stays behind with an id that has lost its file, and libhdf5 fails on it at
- * exit. So the driver keeps the first failure and reports it in all later calls of this module; for
- * libhdf5 all writes succeed, so it always terminates. Bytes go to a file or, without one, to
- * memory. */
+ * exit. So the driver stores the first failure, which all later calls of this module report; to
+ * libhdf5 all writes appear to succeed, so libhdf5 always terminates. Bytes go to a file or,
+ * without one, to memory. */
 #include "hdf5_write/h5_parts.h"
 
 #include <errno.h>
@@ -18,7 +18,7 @@
 /* No system writes more in one call. */
 static const size_t PIECE_MAX = (size_t)1 << 30;
 
-/* libhdf5's view of an open file; begins with libhdf5's own part. */
+/* libhdf5's view of an open file; the first member is libhdf5's own. */
 typedef struct sink_file {
     H5FD_t libhdf5;
     ebpo_h5_sink *sink;
@@ -73,7 +73,7 @@ ebpo_status ebpo_h5_sink_open(ebpo_h5_sink **out, const char *path, const char *
     return EBPO_OK;
 }
 
-static void let_go(ebpo_h5_sink *sink)
+static void release_sink(ebpo_h5_sink *sink)
 {
     if (sink->fd >= 0 && close(sink->fd) != 0)
         fail_errno(sink, "could not be written");
@@ -85,7 +85,7 @@ static void let_go(ebpo_h5_sink *sink)
 
 ebpo_status ebpo_h5_sink_close(ebpo_h5_sink *sink, ebpo_error *error)
 {
-    let_go(sink);
+    release_sink(sink);
     ebpo_status status = ebpo_h5_sink_status(sink, error);
     if (sink->id >= 0)
         H5Idec_ref(sink->id);
@@ -95,7 +95,7 @@ ebpo_status ebpo_h5_sink_close(ebpo_h5_sink *sink, ebpo_error *error)
 
 void ebpo_h5_sink_abandon(ebpo_h5_sink *sink)
 {
-    let_go(sink);
+    release_sink(sink);
     if (sink->status == EBPO_OK)
         sink->status = EBPO_E_MEMORY; /* nothing more is written */
 }
@@ -262,7 +262,8 @@ static const H5FD_class_t sink_class = {
     .name = "ebpo sink",
     .maxaddr = (haddr_t)INT64_MAX,
     .fc_degree = H5F_CLOSE_STRONG,
-    .fapl_size = sizeof(sink_choice), /* without functions for it, libhdf5 copies it as bytes */
+    /* libhdf5 copies it as bytes, because there are no functions to copy it */
+    .fapl_size = sizeof(sink_choice),
     .open = sink_open,
     .close = sink_close,
     .query = sink_query,
@@ -276,7 +277,7 @@ static const H5FD_class_t sink_class = {
 };
 
 /* Registers the driver for each file: the caller may have closed and reopened libhdf5 since. The
- * registration is held until the file is closed, because libhdf5 calls the driver's `close` through
+ * registration stays until the file is closed, because libhdf5 calls the driver's `close` through
  * it after releasing its own reference. */
 bool ebpo_h5_sink_use(ebpo_h5_sink *sink, hid_t fapl)
 {

@@ -1,7 +1,7 @@
 /* Writes HDF5 files for other programs (VTKHDF, Python): arrays that grow by rows, and volumes that
  * are written layer by layer. They use filters that every HDF5 has, shuffle and deflate at its
- * fastest level: these files are read once or twice, and numbers of nodes and corners compress well
- * even so. */
+ * fastest level: these files are read once or twice, and indices of nodes and corners compress
+ * well even at that level. */
 #include <stdio.h>
 #include <string.h>
 
@@ -132,7 +132,8 @@ ebpo_status ebpo_h5_put_table(ebpo_h5_out *out, const char *path, ebpo_h5_number
     return status;
 }
 
-/* Neighbouring distances differ only in their last bytes, which deflate compresses little. */
+/* Size of a chunk of a volume. Neighbouring distances differ only in their last bytes, which
+ * deflate compresses little. */
 enum { LAYERS_OF_A_CHUNK = 16, SIDE_OF_A_CHUNK = 64 };
 
 static hsize_t smaller_of(uint64_t a, uint64_t b) { return a < b ? a : b; }

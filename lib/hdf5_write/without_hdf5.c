@@ -1,5 +1,5 @@
-/* Replaces this module where the library is built without libhdf5 (-Dhdf5=disabled): it reads
- * everything, and the functions that write HDF5 files fail. */
+/* Replaces this module where the library is built without libhdf5 (-Dhdf5=disabled): the library
+ * still reads its own files, and those functions of this module that return a status fail. */
 #include <ebpo/rows.h>
 
 #include "core/error.h"
@@ -111,7 +111,7 @@ ebpo_status ebpo_h5_size(ebpo_h5_out *out, uint64_t *bytes, ebpo_error *error)
 
 ebpo_status ebpo_h5_finish(ebpo_h5_out *out, ebpo_error *error)
 {
-    /* nothing was started */
+    /* nothing is open */
     (void)out, (void)error;
     return EBPO_OK;
 }

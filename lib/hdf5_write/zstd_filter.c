@@ -1,7 +1,7 @@
-/* HDF5 filter 32015, a chunk as one zstd frame. It is registered with libhdf5 in this process and,
- * compiled a second time with EBPO_FILTER_IN_PLUGIN, is a plugin for h5dump, h5py and all other
- * programs. It uses only headers of HDF5 and links nothing of it, so one plugin serves all builds.
- */
+/* HDF5 filter 32015, which stores a chunk as one zstd frame. It is registered with libhdf5 in this
+ * process and, compiled a second time with EBPO_FILTER_IN_PLUGIN, is a plugin for h5dump, h5py and
+ * all other programs. It uses only headers of HDF5 and does not link with HDF5's library, so one
+ * plugin serves all builds. */
 #include "hdf5_write/zstd_filter.h"
 
 #ifdef EBPO_FILTER_IN_PLUGIN
@@ -17,7 +17,8 @@ enum { DEFAULT_LEVEL = 3 };
 static const uint64_t CHUNK_MAX = UINT32_MAX;
 
 /* Returns 0, HDF5's sign of failure, and sets the cause. The plugin sets no cause: programs with a
- * private libhdf5, such as h5py, could not load it because these symbols would be missing. */
+ * private libhdf5, such as h5py, could not load the plugin, because HDF5's error functions would be
+ * missing. */
 static size_t short_of_memory(void)
 {
 #ifndef EBPO_FILTER_IN_PLUGIN

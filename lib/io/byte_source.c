@@ -1,8 +1,8 @@
 /* Sources of a file's bytes: a regular file by pread, memory of the caller, or a URL
  * (http_source.c), all as ebpo_source. An input is a source with a name for messages and a count of
- * reads; it bounds each read by the source's size. Files are not mapped, because a file shortened
- * by another program would end the process. Also recognises URLs, and shows them without passwords.
- */
+ * reads; each read is bounded by the source's size. Files are not mapped, because the process would
+ * end if another program shortened a mapped file. Also recognises URLs, and shows them without
+ * passwords. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -146,14 +146,14 @@ static ebpo_status memory_read(void *user, uint64_t offset, uint64_t size, void 
 
 ebpo_source ebpo_source_of_memory(const void *data, uint64_t size)
 {
-    /* only read, although `user` is not const */
+    /* `user` is not const, but the source only reads */
     return (ebpo_source){
         sizeof(ebpo_source), (void *)(uintptr_t)data, size, memory_read, NULL, NULL, 0
     };
 }
 
-/* Returns the bytes that the source fetched before it was opened; counted once, however often this
- * is called. */
+/* Returns the number of bytes that the source fetched before it was opened. They are counted once,
+ * however often this is called. */
 static uint64_t bytes_prefetched(const ebpo_input *input)
 {
     return input->source.prefetched < input->source.size ? input->source.prefetched
@@ -202,7 +202,7 @@ ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size, v
     if (status == EBPO_OK)
         return EBPO_OK;
     if (*cause.message) {
-        cause.status = status; /* a caller's own source may set only the message */
+        cause.status = status; /* a source of the caller may have set only the message */
         return ebpo_fail_with(error, &cause);
     }
     return ebpo_fail_at(error, status, input->shown, "", (int64_t)offset,
@@ -217,7 +217,7 @@ void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count
         return;
     for (size_t i = 0; i < count; i++)
         if (ranges[i].offset > size || ranges[i].size > size - ranges[i].offset)
-            return; /* reading will report it */
+            return; /* the read will report it */
     input->source.prefetch(input->source.user, ranges, count);
 }
 
@@ -242,8 +242,9 @@ char *ebpo_url_redact(const char *name, char *out, size_t capacity)
         const char *host = strstr(name, "//") + 2;
         used = append_text(out, 0, capacity, name, (size_t)(host - name));
         for (size_t i = strcspn(host, "/?#"); i > 0; i--)
-            if (host[i - 1] == '@') { /* the last @: a password that contains one is invalid in a
-                                       * URL, but is a password */
+            /* the last @ counts: a password with @ makes the URL invalid, but must not be shown
+             * either */
+            if (host[i - 1] == '@') {
                 host += i;
                 break;
             }

@@ -8,14 +8,14 @@
 #include <ebpo/file.h>
 #include <ebpo/http.h>
 
-/* Opens a regular file, by pread: if it is shortened while open, reads return EBPO_E_IO, where a
- * mapping would raise SIGBUS. EBPO_E_IO when it is missing, may not be read, or is a folder, pipe
- * or device. The owner of the source calls out->close. */
+/* Opens a regular file, which is read by pread. If the file is shortened while open, reads return
+ * EBPO_E_IO; a mapping would raise SIGBUS. EBPO_E_IO when it is missing, may not be read, or is a
+ * folder, pipe or device. The owner of the source calls out->close. */
 EBPO_MUST_USE ebpo_status ebpo_source_of_path(ebpo_source *out, const char *path,
                                               ebpo_error *error);
 
-/* Returns a source of `size` bytes, which stay the caller's and outlive the source. There is
- * nothing to close. */
+/* Returns a source of `size` bytes in memory. The bytes stay the caller's and must outlive the
+ * source. The source need not be closed. */
 ebpo_source ebpo_source_of_memory(const void *data, uint64_t size);
 
 /* A source being read. Thread-safe for reading. */
@@ -32,13 +32,13 @@ EBPO_MUST_USE ebpo_status ebpo_input_open(ebpo_input *input, const ebpo_source *
 void ebpo_input_close(ebpo_input *input);
 
 /* Reads bytes [offset, offset + size) into `data`. Beyond the source's end: EBPO_E_FORMAT, because
- * only the file itself can have named such an offset. The status of the source's own `read` is
+ * such an offset can only come from the file itself. The status of the source's own `read` is
  * passed on, with a message if it gave none. */
 EBPO_MUST_USE ebpo_status ebpo_input_read(ebpo_input *input, uint64_t offset, uint64_t size,
                                           void *data, ebpo_error *error);
 
-/* Returns the descriptor of the file, which stays the input's; -1: it reads none, or a copy in
- * place of the named file (open_file.c). */
+/* Returns the descriptor of the file, which stays the input's; -1 if the input reads no file, or a
+ * copy in place of the named file (open_file.c). */
 int ebpo_input_descriptor(const ebpo_input *input);
 
 /* Returns true when prefetch hints are useful. */
@@ -55,18 +55,19 @@ static inline bool ebpo_input_is_far(const ebpo_input *input)
 /* Passes on prefetch hints. Ranges beyond the source's end are ignored: reading them will fail. */
 void ebpo_input_expect(ebpo_input *input, const ebpo_range *ranges, size_t count);
 
-/* Returns true when the system accepts prefetch hints for the source, which helps where it is on a
- * disk: a file opened by its name. */
+/* Returns true when the system accepts prefetch hints for the source, which help where the data is
+ * on a disk: true for a file opened by its name. */
 bool ebpo_input_hints(const ebpo_input *input);
-/* Passes prefetch hints to the system, which starts reading without blocking. Large ranges, which
- * it reads ahead by itself, are skipped. */
+/* Passes prefetch hints to the system, which starts reading without blocking. Large ranges are
+ * skipped, because the system reads ahead within them by itself. */
 void ebpo_input_hint(ebpo_input *input, const ebpo_range *ranges, size_t count);
 
-/* Sources by URL for the layers above: ebpo/http.h, and the statistics of such a source. */
+/* Sources by URL (ebpo/http.h). */
 
 enum { EBPO_SHOWN_BYTES = 300 }; /* size of a URL in a message */
 
-/* Returns false when the source is not from ebpo_source_of_url. */
+/* Gets the statistics of a source by URL. Returns false when the source is not from
+ * ebpo_source_of_url. */
 bool ebpo_source_http_stats(const ebpo_source *source, ebpo_http_stats *out);
 
 #endif

@@ -1,7 +1,7 @@
 /* Locks the file at a path: a lock file beside it, locked by flock, which the system releases when
- * the process ends. A lock file that has lost its name is released and taken anew. Locks affect
- * only users of this library, and some file systems have none, so replacing a file also compares
- * versions (publish.c). */
+ * the process ends. If the lock file has lost its name by the time it is locked, it is released,
+ * and another one is made. Locks affect only users of this library, and some file systems have
+ * none, so replacing a file also compares versions (publish.c). */
 #include "io/file_lock.h"
 
 #include <errno.h>
@@ -21,8 +21,9 @@
 #include "io/file_source.h"
 #include "io/unfinished.h"
 
-/* Opens the lock file and makes it if necessary. Opens it to write, which locks over NFS need, or
- * else to read: another user's. errno EACCES: it cannot be made or read. */
+/* Opens the lock file, and makes it if necessary. It is opened for writing, because locks over NFS
+ * need that, or, if it belongs to another user, for reading. errno EACCES: it cannot be made or
+ * read. */
 static int open_lock_file(const char *path)
 {
     enum { HOW = O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY };
@@ -30,19 +31,19 @@ static int open_lock_file(const char *path)
     if (fd < 0 && errno == ENOENT)
         return open(path, O_RDWR | O_CREAT | O_EXCL | HOW, 0666);
     if (fd < 0 && errno == EACCES && (fd = open(path, O_RDONLY | HOW)) < 0 && errno == ENOENT)
-        errno = EEXIST; /* it existed: try again */
+        errno = EEXIST; /* the file existed: try again */
     return fd;
 }
 
-/* Returns false for another file with the lock file's name: it must not be removed. */
+/* Returns false for a file that has the lock file's name but is not one, and must not be removed.
+ */
 static bool is_lock_file(int fd)
 {
     struct stat st;
     return fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && st.st_size == 0;
 }
 
-/* Returns true if the descriptor's file still has its name; the previous holder removes the name.
- */
+/* Returns true if the descriptor's file still has its name, which the previous holder removes. */
 static bool has_its_name(int fd, const char *path)
 {
     struct stat open_one, named;
@@ -52,8 +53,8 @@ static bool has_its_name(int fd, const char *path)
 
 typedef enum attempt { TAKEN, BUSY, NO_LOCKS } attempt;
 
-/* Tries without waiting, repeatedly if other processes made or removed the lock file at the same
- * moment. */
+/* Tries to take the lock without waiting. Tries again if another process made or removed the lock
+ * file at the same moment. */
 static attempt try_lock(ebpo_file_lock *lock)
 {
     for (int tries = 0; tries < 100; tries++) {
@@ -68,7 +69,8 @@ static attempt try_lock(ebpo_file_lock *lock)
         }
         if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
             attempt why = errno == EWOULDBLOCK || errno == EINTR ? BUSY : NO_LOCKS;
-            if (why == NO_LOCKS && errno != EBADF) /* EBADF: it belongs to another user */
+            /* EBADF: the lock file belongs to another user */
+            if (why == NO_LOCKS && errno != EBADF)
                 unlink(lock->path);
             close(fd);
             return why;
@@ -142,7 +144,8 @@ ebpo_status ebpo_file_lock_take(ebpo_file_lock *lock, const char *path, double s
 void ebpo_file_lock_release(ebpo_file_lock *lock)
 {
     if (lock->fd >= 0 && lock->process == (long)getpid()) {
-        unlink(lock->path); /* first, so that the next holder sees that the name is gone */
+        /* before the release, so that the next holder sees that the name is gone */
+        unlink(lock->path);
         flock(lock->fd, LOCK_UN);
     }
     if (lock->fd >= 0)

@@ -1,9 +1,10 @@
 /* Locks for programs that read, change and replace the file at a path. They affect only programs
  * that use this library.
  *
- * The lock of NAME is the empty file ".NAME.lock" beside it, locked by flock and removed when it is
- * released: not NAME itself, which is replaced, and which libhdf5 locks for all readers. A killed
- * process leaves the lock file behind, unlocked; the next process uses and removes it. */
+ * The lock of NAME is the empty file ".NAME.lock" beside it, which is locked by flock, and removed
+ * when the lock is released. NAME itself is not locked, because it is replaced, and because libhdf5
+ * locks it for all readers. A killed process leaves the lock file behind, unlocked; the next
+ * process uses and removes it. */
 #ifndef EBPO_IO_FILE_LOCK_H
 #define EBPO_IO_FILE_LOCK_H
 

@@ -1,8 +1,8 @@
 /* Reads whole files into memory or a workspace: meshes, images, scenes. A file that changes while
- * it is read is rejected, by its size, its times and, where these are in doubt, its bytes. Files
- * that another file names are opened below a folder and never outside it, in one system call where
- * available (openat2). Files of wrong kinds are recognised by their first bytes, and the message
- * gives a remedy. */
+ * it is read is rejected, according to its size, its times and, where these are in doubt, its
+ * bytes. A file that is named in another file is opened below a folder and never outside it, in one
+ * system call (openat2) where available. Files of other kinds are recognised by their first bytes,
+ * and the message gives a remedy. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -222,7 +222,7 @@ static bool open_at_once(int top, const char *name, int *fd)
 #endif
 }
 
-/* Opens part by part, from folder to folder. */
+/* Opens the folders of the path one after the other, then the file. */
 static int open_word_by_word(int top, char *name)
 {
     char *left = NULL, *word = strtok_r(name, "/", &left), *next;
@@ -276,7 +276,7 @@ static const struct {
     const char *what;
 } kinds[] = {
     { "version https://git-lfs.github.com/spec/", 40,
-      "is a Git LFS pointer, not the file itself; fetch that: git lfs pull" },
+      "is a Git LFS pointer, not the file itself; fetch the file: git lfs pull" },
     { "\xff\xfe\0\0", 4, "is text of four bytes a character (UTF-32); save it as UTF-8" },
     { "\0\0\xfe\xff", 4, "is text of four bytes a character (UTF-32); save it as UTF-8" },
     { "\xff\xfe", 2, "is text of two bytes a character (UTF-16); save it as UTF-8" },
@@ -290,7 +290,7 @@ static const struct {
       "is a ZIP archive, as 3MF and NPZ files are; extract the file from it (unzip), or save the "
       "mesh as PLY, OBJ, STL or OFF" },
     { "\211HDF\r\n\032\n", 8,
-      "is an HDF5 file; of an .ebpo.h5 file, 'ebpo extract --mesh' writes the mesh as a PLY" },
+      "is an HDF5 file; if it is an .ebpo.h5 file, 'ebpo extract --mesh' writes the mesh as PLY" },
     { "glTF", 4, "is a glTF file; save the mesh as PLY, OBJ, STL or OFF" },
 };
 

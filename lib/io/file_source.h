@@ -1,5 +1,5 @@
-/* Whole files for reading, files below a folder, and files of other kinds. They are read and not
- * mapped: if another program shortens a mapped file, the process ends. */
+/* Reads whole files, opens files below a folder, and recognises files of other kinds. Files are
+ * read and not mapped, because the process would end if another program shortened a mapped file. */
 #ifndef EBPO_IO_FILE_SOURCE_H
 #define EBPO_IO_FILE_SOURCE_H
 
@@ -14,7 +14,7 @@
 typedef struct ebpo_whole_file {
     const uint8_t *data;
     uint64_t size;
-    void *buffer; /* to be freed, or NULL */
+    void *buffer; /* allocated memory behind `data`, or NULL */
     ebpo_workspace *workspace;
     int fd; /* stays open, for ebpo_whole_file_unchanged */
     /* at opening: the times of its last change, and whether it had just been changed, so that the
@@ -34,26 +34,27 @@ typedef struct ebpo_whole_file {
 EBPO_MUST_USE ebpo_status ebpo_whole_file_open(ebpo_whole_file *out, const char *path,
                                                ebpo_error *error);
 
-/* Same for a descriptor, which is closed with the file, or on failure; `path` for messages. */
+/* Same as ebpo_whole_file_open for a descriptor, which is closed with the file, or on failure.
+ * `path` is for messages. */
 EBPO_MUST_USE ebpo_status ebpo_whole_file_take(ebpo_whole_file *out, int fd, const char *path,
                                                ebpo_error *error);
 
 /* Reads all bytes, into an array of `workspace` (NULL: into memory) that is freed with the file;
- * `data` is not NULL then. Stage "reading" of `progress`, which may be NULL. EBPO_E_IO when the
- * file has become shorter; EBPO_E_LIMIT when it is longer than an array may be, which on machines
- * of 32 bits is 2 GiB. */
+ * `data` is not NULL then. Reports the stage "reading" to `progress`, which may be NULL. EBPO_E_IO
+ * when the file has become shorter; EBPO_E_LIMIT when it is longer than an array may be, which on
+ * machines of 32 bits is 2 GiB. */
 EBPO_MUST_USE ebpo_status ebpo_whole_file_load(ebpo_whole_file *file, ebpo_workspace *workspace,
                                                unsigned threads, const ebpo_progress *progress,
                                                const char *path, ebpo_error *error);
 
-/* Reads some of its bytes, loaded or not; errors as above. */
+/* Reads some bytes of the file, whether it is loaded or not; errors as for ebpo_whole_file_load. */
 EBPO_MUST_USE ebpo_status ebpo_whole_file_read(const ebpo_whole_file *file, uint64_t at, void *to,
                                                uint64_t bytes, const char *path, ebpo_error *error);
 
 /* Returns EBPO_E_IO when the file has changed since opening, according to its size, the time of its
  * last change or, where that time could be set back or be too coarse, a comparison of its content
- * with `data` (which must then be loaded): the bytes read may belong to no single version. Renaming
- * another file over it is not a change: this is the old file. */
+ * with `data` (which must then be loaded): the bytes read may belong to no single version. If
+ * another file is renamed to `path`, that is not a change, because `file` still is the old file. */
 EBPO_MUST_USE ebpo_status ebpo_whole_file_unchanged(const ebpo_whole_file *file, const char *path,
                                                     ebpo_error *error);
 
@@ -67,18 +68,16 @@ const char *ebpo_path_name(const char *path);
  * caller frees it. EBPO_E_IO: `path` ends with '/', or its folder cannot be used. EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_target_path(const char *path, char **out, ebpo_error *error);
 
-/* Opens a file below a folder, even if names are changed meanwhile. */
-
-/* Returns a descriptor for reading, which does not wait for pipes; -1 with errno, EXDEV where the
- * name leads out of the folder. Links are followed while they stay below it; where the system
- * cannot check that while opening (Linux before 5.6), links are not followed at all. Thread-safe.
- */
+/* Opens a file below a folder for reading, and never one outside it, even if names are changed
+ * meanwhile. Opening does not wait for pipes. Returns a descriptor, or -1 with errno: EXDEV where
+ * the name leads out of the folder. Symbolic links are followed while they stay below the folder;
+ * where the system cannot check that while opening (Linux before 5.6), links are not followed at
+ * all. Thread-safe. */
 int ebpo_open_below(const char *folder, const char *name);
 
-/* Files of other kinds that are given as meshes or models by mistake. */
-
-/* Describes the first bytes and a remedy, to follow a file's name in a message: "is compressed by
- * gzip; ...". NULL: nothing known. A binary STL file begins with any bytes: check for it first. */
+/* Recognises files of other kinds that are given as meshes or models by mistake. Returns a
+ * description and a remedy, to follow the file's name in a message: "is compressed by gzip; ...".
+ * NULL: not recognised. A binary STL file begins with any bytes: check for it first. */
 const char *ebpo_foreign_bytes(const uint8_t *data, uint64_t size);
 
 /* Returns true for text: the first bytes contain no control characters but white space. */

@@ -1,9 +1,10 @@
-/* Fetched parts of a file on a server. In memory: pieces, in order and without overlaps, each
- * fetched by one request and kept while memory allows; pieces with prefetch hints that are not read
- * yet are kept first, then the last read ones. In a folder, if there is one: blocks as files, named
- * by a digest of address and version, each with a SHA-256. They are written under temporary names,
- * so any number of processes may share the folder, and the oldest are removed beyond its limit.
- * Nothing depends on the folder: missing or damaged blocks are fetched. */
+/* Fetched parts of a file on a server. In memory there are pieces, in order and without overlaps.
+ * Each is fetched by one request and kept while memory allows. Pieces with prefetch hints that are
+ * not read yet are kept longest, then those read last. The cache folder, if there is one, holds
+ * blocks as files, named by a digest of address and version, each with a SHA-256. Blocks are
+ * written under temporary names, so any number of processes may share the folder. When its limit is
+ * reached, the oldest blocks are removed. Nothing depends on the folder: missing or damaged blocks
+ * are fetched. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -24,11 +25,13 @@
 #include "core/os.h"
 #include "io/http_cache.h"
 
-/* A block's file: magic, block number, size, SHA-256 of these three and the bytes, the bytes. */
+/* A block's file consists of a magic number, the block's number, its size, the SHA-256 of these
+ * three and the bytes, and the bytes. */
 enum { MAGIC_BYTES = 8, DIGEST_AT = 24, HEAD_BYTES = 56, NAME_BYTES = 128 };
 static const char MAGIC[MAGIC_BYTES + 1] = "EBPOBLK2", SUFFIX[] = ".ebpo-block",
                                       TEMPORARY[] = ".ebpo-part-";
-static const double STALE_SECONDS = 3600; /* an older temporary file has lost its writer */
+/* the writer of a temporary file older than this has ended */
+static const double STALE_SECONDS = 3600;
 
 struct ebpo_disk {
     int folder;
@@ -195,7 +198,7 @@ ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes, 
     *out = NULL;
     int fd = make_folder(folder) ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
     if (fd < 0 || !is_writable(fd)) {
-        /* another folder does not help a process with too many open files */
+        /* with too many open files or without memory, another folder does not help */
         bool folders = errno != EMFILE && errno != ENFILE && errno != ENOMEM;
         ebpo_status status = ebpo_fail_file(error, folders ? EBPO_E_ARGUMENT : EBPO_E_IO, folder,
                                             "cannot be used as a cache folder: %s%s",
@@ -267,7 +270,8 @@ static bool write_fully(int fd, const void *data, size_t size)
     return true;
 }
 
-/* Reads a block of `size` bytes, fewer at the end of the file. Returns false if it is missing. */
+/* Reads a block of `size` bytes (the last block of the file has fewer). Returns false if it is
+ * missing. */
 static bool get_block(ebpo_disk *d, uint64_t block, void *data, size_t size)
 {
     char name[NAME_BYTES];
@@ -326,12 +330,12 @@ static void put_block(ebpo_disk *d, uint64_t block, const void *data, size_t siz
 }
 
 enum {
-    /* between prefetched ranges: fetching a gap costs less than another request; with many ranges,
-     * requests dominate the time */
+    /* smaller gaps between prefetched ranges are fetched too, because that takes less time than
+     * another request */
     GAP_BYTES = 16384,
     GAP_BYTES_OF_MANY = 32768,
     MANY = 256,
-    STALE_AFTER = 64 /* hints: pieces not read by then will probably not be read */
+    STALE_AFTER = 64 /* after so many later hints, a hinted piece will probably not be read */
 };
 
 typedef enum piece_state {
@@ -344,14 +348,15 @@ typedef enum piece_state {
 struct ebpo_cached_range {
     uint64_t begin, end;
     uint64_t wanted; /* hinted bytes that are not read yet */
-    uint64_t plan;   /* last prefetch hint that included it */
-    uint64_t used;   /* last read, by p->clock */
+    uint64_t plan;   /* number of the last prefetch hint that included it */
+    uint64_t used;   /* time of the last read, by p->clock */
     bool fresh;      /* made for the current prefetch hint */
     piece_state state;
-    unsigned users;                  /* threads that need it to stay in the list */
-    bool demanded;                   /* a reader waits for it and gets its failure */
-    bool to_store;                   /* fetched, not on disk yet */
-    uint64_t fetch_begin, fetch_end; /* blocks at its ends may have come from disk */
+    unsigned users; /* threads that need it to stay in the list */
+    bool demanded;  /* a reader waits for it, and receives its failure */
+    bool to_store;  /* fetched, not on disk yet */
+    /* the requested part: blocks at the ends of the piece may have come from disk */
+    uint64_t fetch_begin, fetch_end;
     ebpo_request request;
     uint8_t *data; /* [end - begin] */
 };
@@ -402,7 +407,7 @@ static bool insert_piece(ebpo_range_cache *p, uint64_t i, uint64_t begin, uint64
     piece->begin = begin;
     piece->end = end;
     piece->plan = p->plan;
-    piece->fresh = p->announcing;
+    piece->fresh = p->hinting;
     memmove(p->piece + i + 1, p->piece + i, (p->count - i) * sizeof *p->piece);
     p->piece[i] = piece;
     p->count++;
@@ -482,15 +487,15 @@ static void load_from_disk(ebpo_range_cache *p, ebpo_cached_range *piece)
     p->disk_hits += begin == end;
 }
 
-/* Returns true if no thread needs it to stay. */
+/* Returns true if no thread needs the piece to stay. */
 static bool is_idle(const ebpo_cached_range *piece)
 {
     return piece->users == 0 && piece->data &&
            (piece->state == PIECE_THERE || (piece->state == PIECE_COMING && piece->request.done));
 }
 
-/* Drops the least recently read piece; if none was read, one with an old prefetch hint that was not
- * used. */
+/* Drops the piece that was read least recently; if none was read, one whose prefetch hint is old.
+ */
 static bool forget_one(ebpo_range_cache *p)
 {
     uint64_t read = p->count, stale = p->count;
@@ -517,7 +522,7 @@ static void reserve_space(ebpo_range_cache *p, uint64_t bytes)
         ;
 }
 
-/* Requests a piece that is only noted. Returns false when memory is short. */
+/* Requests a piece that is only noted (PIECE_NOTED). Returns false when memory is short. */
 static bool start_request(ebpo_range_cache *p, ebpo_cached_range *piece, bool urgent)
 {
     piece->users++; /* must not be dropped here */
@@ -610,7 +615,7 @@ static void add_wanted(ebpo_range_cache *p, const ebpo_range *range)
 static void note_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t count)
 {
     uint64_t before = p->count, gap = count > MANY ? GAP_BYTES_OF_MANY : GAP_BYTES;
-    p->announcing = true;
+    p->hinting = true;
     for (size_t i = 0; i < count;) {
         uint64_t begin = sorted[i].offset, end = begin + sorted[i].size;
         for (i++; i < count && (sorted[i].offset <= end || sorted[i].offset - end <= gap); i++)
@@ -618,12 +623,12 @@ static void note_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t co
         if (begin < end && !cover_range(p, begin, end))
             break;
     }
-    p->announcing = false;
+    p->hinting = false;
     p->plan += p->count > before;
     uint64_t first = find_piece(p, sorted[0].offset),
              end = sorted[count - 1].offset + sorted[count - 1].size;
     for (uint64_t i = first; i < p->count && p->piece[i]->begin < end; i++)
-        p->piece[i]->fresh |= p->piece[i]->wanted == 0; /* read before, and needed again */
+        p->piece[i]->fresh |= p->piece[i]->wanted == 0; /* was read before, and is needed again */
     for (size_t i = 0; i < count; i++)
         add_wanted(p, &sorted[i]);
     for (uint64_t i = first; i < p->count && p->piece[i]->begin < end; i++)
@@ -724,7 +729,7 @@ static ebpo_status read_piece(ebpo_range_cache *p, uint64_t *at, uint64_t end, u
                               ebpo_error *error)
 {
     uint64_t i = find_piece(p, *at);
-    if (i == p->count || p->piece[i]->begin > *at) { /* dropped since it was covered */
+    if (i == p->count || p->piece[i]->begin > *at) { /* the piece was dropped in the meantime */
         if (!cover_range(p, *at, end))
             return ebpo_fail_memory(error, end - *at);
         i = find_piece(p, *at);
@@ -776,7 +781,7 @@ ebpo_status ebpo_range_cache_read(ebpo_range_cache *p, uint64_t offset, uint64_t
     }
     for (uint64_t i = find_piece(p, at);
          status != EBPO_OK && i < p->count && p->piece[i]->begin < end; i++)
-        /* failures of these requests do not concern this reader any more */
+        /* this reader does not receive failures of these requests any more */
         p->piece[i]->demanded = p->piece[i]->users > 0;
     p->wait_seconds += ebpo_seconds() - since;
     pthread_mutex_unlock(&p->lock);

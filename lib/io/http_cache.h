@@ -11,16 +11,16 @@
 enum {
     EBPO_DISK_BLOCK = 32768, /* default */
     EBPO_DISK_BLOCK_LEAST = 4096,
-    /* size of the first request, after which whole blocks follow: opening needs some 50 KB (13
-     * levels), and levels 0 to 4 are included */
+    /* size of the first request, after which whole blocks follow. It includes the bytes that
+     * opening needs, some 50 KB for 13 levels, and levels 0 to 4 */
     EBPO_HTTP_HEAD = 131072
 };
 _Static_assert(EBPO_HTTP_HEAD % EBPO_DISK_BLOCK == 0, "blocks would begin within the head");
 
 /* Each block is a separate file, named by the digest of address and version and the block's index,
  * with a checksum. It is written to a temporary name and renamed, so any number of processes may
- * share the folder. Nothing depends on it: unreadable, damaged or unwritable blocks count as
- * missing. Thread-safe. */
+ * share the folder. Nothing depends on the folder: unreadable, damaged or unwritable blocks count
+ * as missing. Thread-safe. */
 typedef struct ebpo_disk ebpo_disk;
 
 /* Makes the folder, if its parent exists. EBPO_E_ARGUMENT when it cannot be written. `bytes`: limit
@@ -28,13 +28,14 @@ typedef struct ebpo_disk ebpo_disk;
 EBPO_MUST_USE ebpo_status ebpo_disk_open(ebpo_disk **out, const char *folder, uint64_t bytes,
                                          size_t block, const char *url,
                                          const ebpo_http_version *version, ebpo_error *error);
-/* Returns the bytes in the folder when it was opened: of this version of this file, and others. */
+/* Returns the number of bytes that the folder held when it was opened: *held of this version of
+ * this file, *others of all else. */
 void ebpo_disk_held(const ebpo_disk *disk, uint64_t *held, uint64_t *others);
 void ebpo_disk_close(ebpo_disk *disk);
 
 /* Reading and reading ahead: a file's bytes in pieces, each fetched by one request and kept while
- * memory allows. Pieces with prefetch hints that are not read yet are kept first, then the last
- * read ones. */
+ * memory allows. Pieces with prefetch hints that are not read yet are kept longest, then those read
+ * last. */
 
 enum { EBPO_RANGE_BYTES = 4 << 20 }; /* limit of one request */
 
@@ -54,13 +55,13 @@ typedef struct ebpo_range_cache {
     /* bytes of fetched and requested pieces; number of prefetch hints with new ranges */
     uint64_t held, plan;
     uint64_t clock; /* counts reads */
-    bool announcing;
+    bool hinting;
     uint64_t disk_hits, disk_bytes;
     double wait_seconds;
 } ebpo_range_cache;
 
 /* Notes prefetch hints within [0, size), in any order. Ranges that cannot be noted for lack of
- * memory are read without it. */
+ * memory are read without a hint. */
 void ebpo_range_cache_hint(ebpo_range_cache *pieces, const ebpo_range *ranges, size_t count);
 /* Reads bytes [offset, offset + size) within [begin, size of the file). */
 EBPO_MUST_USE ebpo_status ebpo_range_cache_read(ebpo_range_cache *pieces, uint64_t offset,

@@ -14,8 +14,8 @@
 
 /* --- header lines --- */
 
-/* Finds the text of a header field without surrounding blanks; returns false when the line is
- * another field. */
+/* Finds the text of the header field `name`, without surrounding blanks. Returns false when the
+ * line is another field. */
 static bool take_field(const char *line, size_t size, const char *name, const char **text,
                        size_t *length)
 {
@@ -100,7 +100,7 @@ bool ebpo_http_response_is_text(const char *type)
            (length >= 3 && strcmp(type + length - 3, "xml") == 0);
 }
 
-/* Keeps a text, or its digest if it is too long: it is only compared. */
+/* Keeps a text, or its digest if the text is too long, because it is only used in comparisons. */
 static void keep_text(char out[EBPO_HTTP_TAG_BYTES], const char *text, size_t length)
 {
     if (length < EBPO_HTTP_TAG_BYTES) {
@@ -165,13 +165,13 @@ static ebpo_verdict give_verdict(ebpo_verdict verdict, char why[EBPO_WHY_BYTES],
     return verdict;
 }
 
-static bool may_pass(int code)
+static bool is_temporary(int code)
 {
     return code == 408 || code == 429 || code == 500 || code == 502 || code == 503 || code == 504;
 }
 
-/* Compares weak tags like strong ones: servers and proxies add and drop the weak mark for one file.
- */
+/* Returns the message about a change of version, or NULL. Weak tags are compared like strong ones,
+ * because servers and proxies add and drop the weak mark for one and the same file. */
 static const char *what_changed(const ebpo_http_response *a, const ebpo_http_request *request,
                                 uint64_t size)
 {
@@ -257,7 +257,7 @@ ebpo_verdict ebpo_http_response_judge(const ebpo_http_response *a, const ebpo_ht
                                       ebpo_status *status, char why[EBPO_WHY_BYTES])
 {
     *status = EBPO_E_IO;
-    if (may_pass(a->code)) {
+    if (is_temporary(a->code)) {
         snprintf(why, EBPO_WHY_BYTES, "the server returned status %d", a->code);
         return EBPO_HTTP_LATER;
     }
@@ -281,7 +281,7 @@ ebpo_verdict ebpo_http_response_judge(const ebpo_http_response *a, const ebpo_ht
     if (a->encoded)
         return give_verdict(
             EBPO_HTTP_REFUSED, why,
-            "the server compressed the file although this was not requested (Content-Encoding); "
+            "the server compressed the file, which was not requested (Content-Encoding); "
             "switch that off for this file");
     return a->code == 206 ? judge_part(a, request, why) : judge_whole(a, request, status, why);
 }

@@ -18,11 +18,11 @@ typedef struct ebpo_http_version {
 
 typedef struct ebpo_http_response {
     int code;       /* 0: no status line yet */
-    bool http2;     /* HTTP/2 or later: the end of a body is certain */
+    bool http2;     /* HTTP/2 or later: a body that was cut off is detected */
     bool has_range; /* Content-Range with a range, [begin, last] of `total` */
     /* Content-Range with a size: also without a range, "bytes * / 123" without the blanks */
     bool has_total;
-    bool bad_range; /* an invalid one, or two different ones */
+    bool bad_range; /* an invalid Content-Range, or two different ones */
     bool has_length, chunked, encoded;
     uint64_t begin, last, total, length;
     char etag[EBPO_HTTP_TAG_BYTES], modified[EBPO_HTTP_TAG_BYTES];
@@ -34,7 +34,7 @@ typedef struct ebpo_http_response {
  * redirect or an interim response. */
 void ebpo_http_response_line(ebpo_http_response *response, const char *line, size_t size);
 
-/* Returns true for types of text, which pages about a login or an error have and models do not. */
+/* Returns true for content types of text, which login and error pages have, and models do not. */
 bool ebpo_http_response_is_text(const char *type);
 
 typedef enum ebpo_verdict {
@@ -54,8 +54,8 @@ typedef struct ebpo_http_request {
 
 enum { EBPO_WHY_BYTES = 240 };
 
-/* Judges a response. `why` is set for LATER and REFUSED: the rest of a sentence that begins with
- * the file's name. *status: for REFUSED. */
+/* Judges a response. For LATER and REFUSED, `why` is set to the rest of a sentence that begins with
+ * the file's name. For REFUSED, *status is set. */
 ebpo_verdict ebpo_http_response_judge(const ebpo_http_response *response,
                                       const ebpo_http_request *request, ebpo_status *status,
                                       char why[EBPO_WHY_BYTES]);

@@ -16,7 +16,7 @@ enum { HEAD_BYTES = EBPO_HTTP_HEAD, CONNECTIONS_MAX = 32 };
 typedef struct http_source {
     char *url, shown[EBPO_SHOWN_BYTES];
     ebpo_http_options options; /* owns its texts */
-    ebpo_range_cache pieces;   /* and the lock and the transfers */
+    ebpo_range_cache pieces;   /* it also holds the lock and the transfers */
     bool has_lock;
     ebpo_http_version version;
     uint8_t *head; /* the first bytes, or the whole file, kept in memory */
@@ -54,7 +54,7 @@ static bool copy_headers(ebpo_http_options *o)
     return true;
 }
 
-/* Sets all texts, also after a failure, so that they can be freed. */
+/* Copies all texts. After a failure all are set, too, so that they can be freed. */
 static bool copy_options(ebpo_http_options *o)
 {
     bool good = copy_text(&o->user);
@@ -192,7 +192,7 @@ static void pin_version(http_source *s)
     pthread_mutex_unlock(&s->pieces.lock);
 }
 
-/* Rejects a page, which servers send with a success status where a login is required. */
+/* Rejects an HTML or XML page: servers send one with a success status where a login is required. */
 static ebpo_status check_type(const http_source *s, const ebpo_request *r, ebpo_error *error)
 {
     static const char signature[] = "\211HDF", blanks[] = " \t\r\n\357\273\277";
@@ -231,15 +231,15 @@ static ebpo_status read_head(http_source *s, ebpo_error *error)
     return check_type(s, &r, error);
 }
 
-/* Reads the whole file. Without ETag and Last-Modified, two responses may belong to different
- * versions; a single response belongs to one. */
+/* Reads the whole file. It is needed without ETag and Last-Modified, where two responses may belong
+ * to different versions. */
 static ebpo_status read_whole(http_source *s, ebpo_error *error)
 {
     if (s->version.size > s->options.whole_limit)
         return ebpo_fail_file(
             error, EBPO_E_UNSUPPORTED, s->shown,
-            "the server sends neither ETag nor Last-Modified, so a change under "
-            "way could not be noticed, and %llu bytes are more than "
+            "the server sends neither ETag nor Last-Modified, so a change of the "
+            "file could not be noticed, and its %llu bytes are more than "
             "would be read at once; download the file, or read it with --http-unversioned",
             (unsigned long long)s->version.size);
     uint8_t *all = ebpo_alloc(s->version.size, 1);
@@ -264,8 +264,8 @@ static ebpo_status open_source(http_source *s, ebpo_error *error)
     bool versioned = *s->version.etag || *s->version.modified;
     if (status == EBPO_OK && s->head_bytes < s->version.size && !versioned && !o->unversioned)
         status = read_whole(s, error);
-    /* The folder comes last, because the version names it. An unusable folder is reported even
-     * where it is not needed. */
+    /* The folder is opened last, because the names of its blocks depend on the version. An unusable
+     * folder is reported even where it is not needed. */
     s->pieces.block = o->cache_block ? o->cache_block : EBPO_DISK_BLOCK;
     if (status == EBPO_OK && o->cache_folder)
         status = ebpo_disk_open(&s->pieces.disk, o->cache_folder, o->cache_bytes, s->pieces.block,

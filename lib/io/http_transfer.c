@@ -3,7 +3,7 @@
  * response is judged by its head (http_response.c), before its body is accepted. If a body breaks
  * off, its bytes are kept, and the next attempt requests the rest, after growing pauses. At most
  * five redirects are followed, never from https to http, and the caller's credentials are not sent
- * to another server. The caller owns the lock. */
+ * to another server. The lock belongs to the caller (http_transfer.h). */
 #include <curl/curl.h>
 #include <inttypes.h>
 #include <pthread.h>
@@ -29,7 +29,7 @@ typedef struct ebpo_redirect {
     bool elsewhere; /* the scheme, host or port differs, or is not known */
 } ebpo_redirect;
 
-/* Clears it, for another attempt or at the end. */
+/* Clears the redirects, for another attempt or at the end. */
 static void clear_redirect(ebpo_redirect *r)
 {
     curl_url_cleanup(r->at);
@@ -53,7 +53,7 @@ static bool same_server(CURLU *a, CURLU *b)
            same_part(a, b, CURLUPART_PORT);
 }
 
-/* Returns false if it is another server, or not known. */
+/* Returns false if the target is on another server, or its server is not known. */
 static bool stays_on_server(ebpo_redirect *r, const char *url)
 {
     CURLU *first = curl_url();
@@ -62,7 +62,7 @@ static bool stays_on_server(ebpo_redirect *r, const char *url)
         if (r->at && curl_url_set(r->at, CURLUPART_URL, url, 0) != CURLUE_OK)
             r->elsewhere = true;
     }
-    /* the second is relative to the first, if it is not a complete address */
+    /* the second address may be relative to the first */
     bool stays = first && r->at && curl_url_set(first, CURLUPART_URL, url, 0) == CURLUE_OK &&
                  curl_url_set(r->at, CURLUPART_URL, r->target, CURLU_URLENCODE) == CURLUE_OK &&
                  same_server(first, r->at);
@@ -83,8 +83,8 @@ static void keep_target(ebpo_redirect *r, const char *from, size_t size)
     r->elsewhere = r->elsewhere || !r->target;
 }
 
-/* Reads one unmodified line of a head; `code` is that of the response. Returns true when it first
- * redirects the request to another server. */
+/* Reads one unmodified line of a head; `code` is that of the response. Returns true when the line
+ * redirects the request to another server for the first time. */
 static bool take_redirect_line(ebpo_redirect *r, const char *url, int code, const char *line,
                                size_t size)
 {
@@ -117,7 +117,7 @@ typedef struct ebpo_slot {
     bool is_pinned;
     ebpo_http_response response;
     ebpo_redirect redirect;
-    bool judged, stopped, stalled; /* stopped, stalled: this code ended the transfer */
+    bool judged, stopped, stalled; /* stopped, stalled: ended by this code, not by libcurl */
     bool sent;                     /* connected, and the request was sent */
     double moved;                  /* time of the last bytes */
     ebpo_verdict verdict;
@@ -145,14 +145,14 @@ struct ebpo_transfers {
     ebpo_http_version pinned;
     bool is_pinned;
     ebpo_http_stats stats;
-    /* Private to the thread. */
+    /* Used by the thread only. */
     uint64_t random;
 };
 
 enum {
     REDIRECTS_MAX = 5,
     STALL_BYTES = 100, /* per second */
-    /* limit of an unwanted body: reading it to its end keeps the connection */
+    /* an unwanted body up to this size is read to its end, which keeps the connection */
     DRAIN_BYTES = 65536
 };
 
@@ -185,7 +185,7 @@ static size_t take_header(char *line, size_t size, size_t count, void *user)
     ebpo_slot *s = user;
     s->moved = ebpo_seconds();
     ebpo_http_response_line(&s->response, line, size * count);
-    /* headers for one server are not for others: libcurl would send them, too */
+    /* headers for one server are not for others, but libcurl would send them */
     if (take_redirect_line(&s->redirect, s->owner->url, s->response.code, line, size * count))
         curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, s->owner->bare_headers);
     if (s->response.header_bytes <= EBPO_HTTP_HEADERS_MAX)
@@ -201,10 +201,11 @@ static size_t take_header(char *line, size_t size, size_t count, void *user)
 /* Judges the response by its head; once for each attempt. */
 static void judge_slot(ebpo_slot *s)
 {
-    ebpo_http_request queried = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL,
-                                  s->owner->options->whole_limit, s->owner->options->unversioned };
+    ebpo_http_request http_request = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL,
+                                       s->owner->options->whole_limit,
+                                       s->owner->options->unversioned };
     if (!s->judged)
-        s->verdict = ebpo_http_response_judge(&s->response, &queried, &s->status, s->why);
+        s->verdict = ebpo_http_response_judge(&s->response, &http_request, &s->status, s->why);
     s->judged = true;
 }
 
@@ -223,7 +224,7 @@ static size_t take_part(ebpo_slot *s, const char *bytes, size_t size)
     if (size > capacity)
         return refuse_body(
             s, EBPO_E_IO,
-            "the server sent more bytes than requested and announced; this server or a proxy on "
+            "the server sent more bytes than its Content-Range states; this server or a proxy on "
             "the way is broken");
     memcpy(s->request->data + (s->begin - s->request->offset) + s->taken, bytes, size);
     s->taken += size;
@@ -319,7 +320,7 @@ enum {
     LOOK_MS = 100, /* between checks of `stop` and for stalls */
     IDLE_MS = 60000
 };
-static const double PAUSE_FIRST = 0.2, PAUSE_MAX = 8, PAUSE_QUERIED_MAX = 60; /* seconds */
+static const double PAUSE_FIRST = 0.2, PAUSE_MAX = 8, PAUSE_BY_SERVER_MAX = 60; /* seconds */
 
 static pthread_once_t curl_once = PTHREAD_ONCE_INIT;
 static CURLcode curl_state;
@@ -481,19 +482,19 @@ static void finish_request(ebpo_transfers *t, ebpo_request *r, ebpo_status statu
 /* --- attempts, by the thread --- */
 
 /* Returns the seconds until the next attempt: doubling, with jitter so that many readers do not
- * return at once. A longer pause requested by the server takes precedence. */
-static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *queried_for)
+ * return at once. A longer pause that the server requests takes precedence. */
+static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *by_server)
 {
-    curl_off_t queried = 0;
+    curl_off_t retry_after = 0;
     double pause = PAUSE_FIRST;
     for (unsigned i = 1; i < s->request->failures && pause < PAUSE_MAX; i++)
         pause *= 2;
     pause = (pause < PAUSE_MAX ? pause : PAUSE_MAX) *
             (0.5 + 0.5 * ebpo_random_unit(ebpo_random_next(&t->random)));
     if (s->judged && s->verdict == EBPO_HTTP_LATER)
-        curl_easy_getinfo(s->easy, CURLINFO_RETRY_AFTER, &queried);
-    *queried_for = (double)queried > pause;
-    return *queried_for ? (double)queried : pause;
+        curl_easy_getinfo(s->easy, CURLINFO_RETRY_AFTER, &retry_after);
+    *by_server = (double)retry_after > pause;
+    return *by_server ? (double)retry_after : pause;
 }
 
 static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, double now)
@@ -525,7 +526,7 @@ static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, doub
 }
 
 /* Returns true for errors after which the same request may succeed. */
-static bool may_pass_by(CURLcode code)
+static bool is_temporary(CURLcode code)
 {
     switch (code) {
     case CURLE_COULDNT_RESOLVE_HOST:
@@ -570,9 +571,9 @@ static bool keep_arrived(ebpo_slot *s, CURLcode code)
     return r->got == r->size;
 }
 
-/* Returns the error of libcurl, which reports a lack of memory for lines that are too long for it.
- */
-static const char *trouble_of(const ebpo_slot *s, CURLcode code)
+/* Returns the text of libcurl's error. libcurl reports a line that is too long for it as a lack of
+ * memory. */
+static const char *error_text(const ebpo_slot *s, CURLcode code)
 {
     if (code == CURLE_OUT_OF_MEMORY && !s->received)
         return "the head of the server's response, such as the address of a redirect, is too "
@@ -580,9 +581,9 @@ static const char *trouble_of(const ebpo_slot *s, CURLcode code)
     return *s->trouble ? s->trouble : curl_easy_strerror(code);
 }
 
-static void describe_trouble(const ebpo_slot *s, CURLcode code, char *out, size_t capacity)
+static void describe_error(const ebpo_slot *s, CURLcode code, char *out, size_t capacity)
 {
-    const char *trouble = trouble_of(s, code);
+    const char *trouble = error_text(s, code);
     if (s->judged && s->verdict == EBPO_HTTP_LATER)
         snprintf(out, capacity, "%s", s->why);
     else if (s->stalled)
@@ -595,8 +596,8 @@ static void describe_trouble(const ebpo_slot *s, CURLcode code, char *out, size_
         snprintf(out, capacity, "%s", trouble);
 }
 
-/* Returns true if the rest may come in another response: not if a change of version would be
- * undetected. */
+/* Returns true if the rest may come in another response; false if a change of version would go
+ * unnoticed. */
 static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
 {
     const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
@@ -611,15 +612,15 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
     if (code == CURLE_OK && s->judged && s->verdict == EBPO_HTTP_PART && s->taken &&
         s->taken == s->response.last - s->response.begin + 1 && may_join(t, r) &&
         now < r->deadline) {
-        r->due = now; /* a server that sends smaller parts: not a failure */
+        r->due = now; /* the server sends smaller parts than requested: not a failure */
         enqueue_request(t, r);
         return;
     }
-    describe_trouble(s, code, what, sizeof what);
+    describe_error(s, code, what, sizeof what);
     r->failures++;
-    bool queried_for;
-    double pause = pause_after(t, s, &queried_for);
-    if (now >= r->deadline - 0.01 || (!queried_for && now + pause >= r->deadline))
+    bool by_server;
+    double pause = pause_after(t, s, &by_server);
+    if (now >= r->deadline - 0.01 || (!by_server && now + pause >= r->deadline))
         snprintf(why, sizeof why,
                  "bytes %" PRIu64 " to %" PRIu64
                  ": not read within %g s (%s); try again later, or with a longer time limit",
@@ -630,7 +631,7 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
                  ": %s; given up after %u attempt%s, try again later",
                  r->offset, r->offset + r->size - 1, what, r->failures,
                  r->failures == 1 ? "" : "s");
-    else if (pause > PAUSE_QUERIED_MAX || now + pause >= r->deadline)
+    else if (pause > PAUSE_BY_SERVER_MAX || now + pause >= r->deadline)
         snprintf(why, sizeof why,
                  "bytes %" PRIu64 " to %" PRIu64
                  ": %s and requires a pause of %.0f s; try again then",
@@ -666,11 +667,11 @@ static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
         finish_request(t, r, s->status, s->why);
     else if (usable && keep_arrived(s, code))
         finish_request(t, r, EBPO_OK, NULL);
-    else if (code == CURLE_OK || s->stalled || may_pass_by(code) ||
+    else if (code == CURLE_OK || s->stalled || is_temporary(code) ||
              (s->judged && s->verdict == EBPO_HTTP_LATER))
         try_again(t, s, code, now);
     else
-        finish_request(t, r, EBPO_E_IO, trouble_of(s, code));
+        finish_request(t, r, EBPO_E_IO, error_text(s, code));
     s->request = NULL;
     pthread_mutex_unlock(t->lock);
 }

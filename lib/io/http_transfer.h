@@ -8,21 +8,21 @@
 
 #include "io/http_response.h"
 
-/* A requested byte range, and its result. Zero-initialise it, fill in the first part, do not move
- * it until done. */
+/* A requested byte range, and its result. Zero-initialise it, fill in the members up to `first`,
+ * and do not move it until it is done. */
 typedef struct ebpo_request {
     uint64_t offset, size; /* size > 0 */
     uint8_t *data;         /* [size] */
-    /* the file's size and version are not known yet: the file may be shorter, and may be sent
-     * completely */
+    /* true while the file's size and version are not known: the file may be shorter than the range,
+     * and the server may send all of it */
     bool first;
     /* Valid when done. */
     bool done;
     ebpo_status status;
     ebpo_error error;
-    uint64_t got; /* bytes received; fewer than `size` at the end of the file, when `first` */
-    /* `first`, from a server without ranges: the file, [version.size] bytes, which the receiver
-     * frees; then `data` is unused */
+    uint64_t got; /* bytes received; fewer than `size` only if `first` and the file is shorter */
+    /* if `first` and the server has no ranges: all version.size bytes of the file, which the
+     * receiver frees; `data` is unused then */
     uint8_t *whole;
     ebpo_http_version version; /* `first` */
     char type[EBPO_HTTP_TYPE_BYTES];
@@ -42,7 +42,8 @@ EBPO_MUST_USE ebpo_status ebpo_transfers_make(ebpo_transfers **out, const char *
                                               const char *shown, const ebpo_http_options *options,
                                               pthread_mutex_t *lock, pthread_cond_t *done,
                                               ebpo_error *error);
-/* Aborts running requests, which stay unchanged. NULL is allowed. The lock must not be held. */
+/* Stops the thread and frees the transfers. Running requests are aborted and stay unchanged. NULL
+ * is allowed. The lock must not be held. */
 void ebpo_transfers_free(ebpo_transfers *transfers);
 
 /* Lock held. Queues a request; `urgent` ones come first. */
@@ -52,7 +53,7 @@ void ebpo_transfers_add(ebpo_transfers *transfers, ebpo_request *request, bool u
 void ebpo_transfers_urge(ebpo_transfers *transfers, ebpo_request *request);
 /* Lock held. Requires this version in all further responses. */
 void ebpo_transfers_pin(ebpo_transfers *transfers, const ebpo_http_version *version);
-/* Lock held. Adds requests, retries, connections, bytes. */
+/* Lock held. Adds the numbers of requests, retries, connections and bytes to *stats. */
 void ebpo_transfers_add_stats(const ebpo_transfers *transfers, ebpo_http_stats *stats);
 
 #endif

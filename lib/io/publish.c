@@ -1,8 +1,8 @@
 /* Replaces output files atomically: a temporary file in the same folder, sync, rename, sync of the
- * folder. The replaced file may be compared with the version that was read, under the target's
- * lock. Two files that belong together are exchanged, and the first is restored when the second
- * fails. A new file takes over owner, permissions and extended attributes of the file that it
- * replaces. The functions for the library's callers are at the end. */
+ * folder. The file to be replaced may be compared with the version that was read, under the
+ * target's lock. Of two outputs that belong together, the first is restored when the second fails.
+ * A new file takes over owner, permissions and extended attributes of the file that it replaces.
+ * The functions for the library's callers are at the end. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -28,7 +28,7 @@
 /* --- properties that a new file takes over from the replaced one --- */
 
 #ifdef EBPO_HAVE_XATTR
-/* No system allows a file more of these. */
+/* No system allows more bytes of names or of a value. */
 enum { NAMES_MAX = 65536, VALUE_MAX = 65536 };
 
 static void take_attribute(int from, int to, const char *name, void *value)
@@ -53,8 +53,9 @@ static void take_attributes(int from, int to)
 static void take_attributes(int from, int to) { (void)from, (void)to; }
 #endif
 
-/* Sets the owner. A process that may not give the file away keeps it; the file then does not act
- * for another owner (set-user-ID). */
+/* Sets the owner and group of `was`, and returns the mode that fits them. If the process may not
+ * give the file away, the file stays the process's, without the bits that let it act for its owner
+ * (set-user-ID). */
 static mode_t take_owner(int to, const struct stat *was)
 {
     struct stat is;
@@ -65,13 +66,13 @@ static mode_t take_owner(int to, const struct stat *was)
          group = is.st_gid == was->st_gid || fchown(to, (uid_t)-1, was->st_gid) == 0;
     if (user && group)
         return mode;
-    /* the group's permissions are not for another group */
+    /* permissions of the group must not apply to another group */
     return group ? mode & 0777 : mode & (0707 | (mode & 007) << 3);
 }
 
-/* Gives the open file mode, owner and extended attributes (including access control lists) of the
- * regular file at `path`; owner and attributes only as far as the system allows. Without such a
- * file: `mode`, if it is not -1. Returns false with errno when the mode cannot be set. */
+/* Gives the open file the mode, owner and extended attributes (including access control lists) of
+ * the regular file at `path`; owner and attributes only as far as the system allows. Without such a
+ * file, sets `mode`, if it is not -1. Returns false with errno when the mode cannot be set. */
 static bool take_over_facts(int fd, const char *path, int mode)
 {
     struct stat was;
@@ -80,8 +81,8 @@ static bool take_over_facts(int fd, const char *path, int mode)
     if (there && S_ISREG(was.st_mode)) {
         mode = (int)take_owner(fd, &was);
         if (from >= 0)
-            take_attributes(from, fd); /* before the mode, because an access control list may change
-                                        * it */
+            /* before the mode, because an access control list may change the mode */
+            take_attributes(from, fd);
     }
     if (from >= 0)
         close(from);
@@ -133,15 +134,15 @@ static ebpo_status create_temporary(ebpo_publish *publish, ebpo_error *error)
         if (strlen(publish->temporary) >= PATH_MAX)
             return ebpo_fail_file(error, EBPO_E_IO, publish->shown,
                                   "the path is too long; write to a folder with a shorter one");
-        /* Registered for the signal handler before it exists, so that a signal never leaves it
-         * behind. */
+        /* Registered for the signal handler before the file exists, so that a signal never leaves
+         * it behind. */
         ebpo_unfinished_set(publish->slot, publish->temporary);
         /* Content that others may not read stays private meanwhile. */
         publish->fd = open(publish->temporary, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW,
                            publish->mode < 0 ? 0666 : 0600);
         if (publish->fd >= 0) {
-            (void)flock(publish->fd,
-                        LOCK_EX | LOCK_NB); /* for programs that look for stale files */
+            /* for programs that remove abandoned files */
+            (void)flock(publish->fd, LOCK_EX | LOCK_NB);
             return EBPO_OK;
         }
         ebpo_unfinished_unset(publish->slot);
@@ -213,8 +214,8 @@ void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input)
 
 const char *ebpo_publish_path(const ebpo_publish *publish) { return publish->temporary; }
 
-/* Opens the stream with an explicit buffer: a lack of memory for it is then reported, and writes
- * are few. */
+/* Opens the stream with an explicit buffer: a lack of memory for the buffer is then reported, and
+ * writes are few. */
 FILE *ebpo_publish_stream(ebpo_publish *publish)
 {
     enum { BUFFER = 1 << 16 };
@@ -332,15 +333,15 @@ ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error)
     return status;
 }
 
-/* Exchanges it for the previous file, which then is the temporary file. */
+/* Exchanges the temporary file and the target, so that the temporary file is the previous file. */
 static bool exchange_files(const ebpo_publish *publish)
 {
 #ifdef EBPO_HAVE_RENAMEAT2
     return renameat2(AT_FDCWD, publish->temporary, AT_FDCWD, publish->target, RENAME_EXCHANGE) == 0;
 #else
     struct stat st;
-    if (lstat(publish->target, &st) ==
-        0) /* otherwise errno says that there is nothing to exchange */
+    /* otherwise errno says whether there was nothing to exchange */
+    if (lstat(publish->target, &st) == 0)
         errno = ENOSYS;
     return false;
 #endif

@@ -42,7 +42,7 @@ typedef struct ebpo_publish {
     int fd;       /* descriptor of the temporary file */
     int slot;     /* in the registry of temporary files */
     int mode;     /* mode of the file that existed at the beginning; -1: none */
-    bool expects; /* the target must still be `expected` when it is replaced */
+    bool expects; /* the target must still have the version `expected` when it is replaced */
     bool locked;  /* the caller holds the lock */
     ebpo_file_version expected;
 } ebpo_publish;
@@ -53,12 +53,12 @@ typedef struct ebpo_publish {
     }
 
 /* Creates the temporary file, exclusively. An existing regular file at `path` is replaced on
- * commit. The new file takes over its mode and, where the system allows, its owner and extended
- * attributes, including its access control list; its hard links keep the old file. If there is
- * none, the mode is 0666 less the umask. A folder, device or symbolic link at `path`, or a folder
- * without write permission, is EBPO_E_IO. On failure nothing is left behind. Temporary files that
- * killed processes left for the same target are removed. EBPO_E_LIMIT: the process has
- * EBPO_UNFINISHED_MAX outputs and locks (io/file_lock.h) already. */
+ * commit. The new file takes over that file's mode and, where the system allows, owner and extended
+ * attributes, including the access control list; other hard links of the replaced file keep the old
+ * content. If there is no such file, the mode is 0666 less the umask. A folder, device or symbolic
+ * link at `path`, or a folder without write permission, is EBPO_E_IO. On failure nothing is left
+ * behind. Temporary files that killed processes left for the same target are removed. EBPO_E_LIMIT:
+ * the process has EBPO_UNFINISHED_MAX outputs and locks (io/file_lock.h) already. */
 EBPO_MUST_USE ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path,
                                              ebpo_error *error);
 
@@ -68,7 +68,7 @@ EBPO_MUST_USE ebpo_status ebpo_publish_begin(ebpo_publish *out, const char *path
 void ebpo_publish_expect(ebpo_publish *publish, const ebpo_file_version *expected, bool locked);
 
 /* Same, for an output that replaces `input`; does nothing for others. If the input reads a copy,
- * the current file counts as the version. */
+ * the expected version is that of the file now at the path. */
 void ebpo_publish_expect_input(ebpo_publish *publish, const ebpo_input *input);
 
 /* Returns the absolute name of the temporary file, for libraries that open by name (truncating is
@@ -84,10 +84,10 @@ FILE *ebpo_publish_stream(ebpo_publish *publish);
  * sync of the folder, failed, the new file is in place. */
 EBPO_MUST_USE ebpo_status ebpo_publish_commit(ebpo_publish *publish, ebpo_error *error);
 
-/* Same for two files that belong together: replaces both, or, on failure, neither (unless only the
- * sync of the folder failed). On file systems without atomic exchange, the first may be replaced
- * when the second cannot be. Two programs that do this at once take turns: the resulting files are
- * from one of them. */
+/* Same as ebpo_publish_commit for two files that belong together: replaces both, or, on failure,
+ * neither (unless only the sync of the folder failed). On file systems without atomic exchange, the
+ * first may be replaced when the second cannot be. If two programs do this at the same time, they
+ * take turns, so the two files in place are of the same program. */
 EBPO_MUST_USE ebpo_status ebpo_publish_commit_pair(ebpo_publish *first, ebpo_publish *second,
                                                    ebpo_error *error);
 

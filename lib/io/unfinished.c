@@ -1,8 +1,9 @@
-/* Unfinished files. Names of outputs and locks that are removed when a signal ends this process: in
- * fixed storage with lock-free states, because a signal handler reads them. Temporary files and
- * folders of killed processes: recognised by their names, which contain the process, and removed
- * when it has ended and no process holds their lock. Folders that are created atomically: made
- * beside their target and renamed. Files that cannot be examined or removed stay. */
+/* Unfinished files. Outputs and locks are removed when a signal ends this process; their names are
+ * in fixed storage with lock-free states, because a signal handler reads them. Temporary files and
+ * folders of killed processes are recognised by their names, which contain the process id; they are
+ * removed when the process has ended and no process holds their lock. New folders are created
+ * atomically: they are made beside their target and renamed. Files that cannot be examined or
+ * removed stay. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -26,7 +27,6 @@
 #include "io/file_source.h"
 #include "io/unfinished.h"
 
-/* Fixed storage and lock-free states, because a signal handler reads them. */
 enum { SLOT_FREE, SLOT_TAKEN, SLOT_LIVE };
 static struct slot {
     atomic_int state;
@@ -66,7 +66,7 @@ void ebpo_unfinished_remove(void)
     errno = saved;
 }
 
-/* Returns the process in ".NAME.PROCESS-NUMBER.tmp", or 0. */
+/* Returns the process id in ".NAME.PROCESS-NUMBER.tmp", or 0. */
 static long process_of(const char *file, const char *name)
 {
     char *end;
@@ -87,7 +87,7 @@ static void remove_if_stale(int folder, const char *file)
     if (fd < 0)
         return;
     if (fstat(fd, &facts) == 0 && S_ISREG(facts.st_mode) && flock(fd, LOCK_EX | LOCK_NB) == 0)
-        (void)unlinkat(folder, file, 0); /* it may stay */
+        (void)unlinkat(folder, file, 0); /* the file may stay */
     close(fd);
 }
 
@@ -107,8 +107,8 @@ void ebpo_remove_stale_files(const char *folder, const char *name)
 
 static const char MARK[] = ".part-", MADE[] = "XXXXXX";
 
-/* Returns a number that is equal for all processes that see the same process ids: since this start
- * of the machine, in this namespace. 0: not known. */
+/* Returns a number of the system that process ids belong to: the same for all processes in this
+ * namespace since this start of the machine. 0: not known. */
 static uint32_t system_number(void)
 {
     struct stat space;
@@ -123,7 +123,8 @@ static uint32_t system_number(void)
     return (uint32_t)(sum ^ sum >> 32);
 }
 
-/* Returns the bytes of the path without slashes at its end, and sets the beginning of its name. */
+/* Returns the length of the path without slashes at its end, and sets *name to the offset of its
+ * last part. */
 static size_t without_slashes(const char *folder, size_t *name)
 {
     size_t size = strlen(folder);
@@ -134,8 +135,8 @@ static size_t without_slashes(const char *folder, size_t *name)
     return size - *name > EBPO_TARGET_NAME_KEPT ? *name + EBPO_TARGET_NAME_KEPT : size;
 }
 
-/* Returns "FOLDER.part-SYSTEM-PROCESS-XXXXXX" for mkdtemp, where SYSTEM identifies the system of
- * the process id; long names are cut. Freed by free(); NULL: no memory. */
+/* Returns "FOLDER.part-SYSTEM-PROCESS-XXXXXX" for mkdtemp, where SYSTEM is system_number(); long
+ * names are cut. Freed by free(); NULL: no memory. */
 static char *making_name(const char *folder)
 {
     char *path;
@@ -146,8 +147,8 @@ static char *making_name(const char *folder)
     return path;
 }
 
-/* Renames the folder made under that name, with its inode in place of XXXXXX: another folder put
- * there in exchange is then not mistaken for it. */
+/* Renames the folder made by mkdtemp, with its inode number in place of XXXXXX, so that another
+ * folder that is put in its place is not mistaken for it. */
 static void settle_making(char **made)
 {
     char *path;
@@ -182,14 +183,14 @@ static void empty_folder(int fd)
 {
     DIR *d = fdopendir(fd);
     for (struct dirent *e; d && (e = readdir(d));)
-        (void)unlinkat(dirfd(d), e->d_name, 0); /* folders are not this library's, and stay */
+        (void)unlinkat(dirfd(d), e->d_name, 0); /* the library makes no folders here: any stay */
     if (d)
         closedir(d);
     else
         close(fd);
 }
 
-/* Removes one folder; a folder without its inode number yet is empty. */
+/* Removes one folder; if its name has no inode number yet, it is empty. */
 static void remove_one(int parent, const char *file, const char *rest)
 {
     struct stat facts;
@@ -207,8 +208,8 @@ static void remove_one(int parent, const char *file, const char *rest)
         (void)unlinkat(parent, file, AT_REMOVEDIR);
 }
 
-/* Removes abandoned unfinished folders for `folder` with their content: they belong to this user
- * and to a process of this system that has ended. Files that cannot be examined or removed stay. */
+/* Removes abandoned unfinished folders for `folder` with their content: those of this user, made by
+ * a process of this system that has ended. Files that cannot be examined or removed stay. */
 static void remove_stale_folders(const char *folder)
 {
     int saved = errno;

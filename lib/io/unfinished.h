@@ -1,10 +1,10 @@
-/* Unfinished files: outputs and locks that are removed with the process, and files left by killed
- * processes. */
+/* Unfinished files: outputs and locks that are removed when a signal ends the process, and files
+ * left by killed processes. */
 #ifndef EBPO_IO_UNFINISHED_H
 #define EBPO_IO_UNFINISHED_H
 
-/* Names of files that are removed when a signal ends this process: unfinished outputs, and locks.
- */
+/* The registry: names of files that are removed when a signal ends this process, namely unfinished
+ * outputs and locks. */
 
 enum { EBPO_UNFINISHED_MAX = 32 }; /* at one time */
 
@@ -23,10 +23,8 @@ void ebpo_unfinished_forget(int slot);
 /* Removes all registered files. Only calls unlink: allowed in a signal handler. */
 void ebpo_unfinished_remove(void);
 
-/* Temporary files of killed writers. */
-
-/* Bytes of a target's name with which its temporary files begin: enough to recognise it, and few
- * enough to keep the total below the common limit of 255. */
+/* Number of bytes of a target's name that the names of its temporary files contain: enough to
+ * recognise the target, and few enough to keep names below the common limit of 255. */
 enum { EBPO_TARGET_NAME_KEPT = 200 };
 
 /* Removes abandoned temporary files for `name` in `folder`: their process does not exist, and no

@@ -319,8 +319,8 @@ ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, ui
     return EBPO_OK;
 }
 
-/* Cuts `envelope` (on entry the parent's in this cell) to that of leaf number `leaf` of the cell's
- * level. */
+/* Cuts `envelope` (on entry the parent's envelope in this cell) to the envelope of leaf number
+ * `leaf` of the cell's level. */
 static ebpo_status cut_to_leaf(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,
                                ebpo_leaf_scratch *scratch, ebpo_polytope *envelope,
                                ebpo_error *error)

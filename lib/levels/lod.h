@@ -32,9 +32,9 @@ EBPO_MUST_USE ebpo_status ebpo_polyhedra_add(ebpo_polyhedra *piece, const ebpo_p
                                              ebpo_node_type type, bool cell_faces,
                                              ebpo_error *error);
 
-/* Joins `count` pieces, in order, to a mesh of double vertices, and frees them. EBPO_E_LIMIT beyond
- * 2^32 - 2 vertices or faces. `nodes` may be NULL; otherwise all pieces must have nodes; windings
- * are 0. */
+/* Joins `count` pieces, in order, to a mesh of double vertices, and frees the pieces. Returns
+ * EBPO_E_LIMIT for more than 2^32 - 2 vertices or faces. `nodes` may be NULL; otherwise all pieces
+ * must have nodes. Winding numbers in `nodes` are 0. */
 EBPO_MUST_USE ebpo_status ebpo_polyhedra_join(ebpo_mesh *out, ebpo_lod_nodes *nodes,
                                               ebpo_polyhedra *const *pieces, uint64_t count,
                                               ebpo_error *error);
@@ -82,12 +82,13 @@ EBPO_MUST_USE ebpo_status ebpo_lod_leaf_faces(const ebpo_lod_model *model, ebpo_
                                               uint64_t leaf, ebpo_leaf_scratch *scratch,
                                               uint64_t *count, ebpo_error *error);
 
-/* Returns the corners of a solid's leaf that are inside, for ebpo_leaf_planes; `winding`: at its
- * lowest corner. */
+/* Returns the corners of a solid's leaf that are inside, for ebpo_leaf_planes; `winding` is the
+ * winding number at the lowest corner of the leaf. */
 unsigned ebpo_lod_inside_corners(const ebpo_box *box, ebpo_cell cell, ebpo_rule rule,
                                  int32_t winding, const ebpo_triangle *faces, uint64_t count);
 
-/* Derives the planes of a leaf from its faces; `envelope` as in ebpo_lod_leaf. */
+/* Derives the planes of a leaf from its faces. On entry `envelope` is the parent's envelope cut to
+ * the leaf's cell, on return the leaf's envelope. */
 EBPO_MUST_USE ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell,
                                                uint64_t leaf, ebpo_leaf_scratch *scratch,
                                                ebpo_polytope *envelope,

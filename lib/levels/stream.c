@@ -210,7 +210,7 @@ static const ebpo_polytope *ancestor_envelope(const level_walk *w, int depth,
     return ebpo_envelope_put(e, node->octcode, node->codes, node->code_count);
 }
 
-/* Returns the envelope, in cell coordinates, of the last node from ebpo_level_walk_next. For gray
+/* Returns the envelope, in cell coordinates, of the last node from level_walk_next. For gray
  * nodes and leaves: the cube, cut by the planes of all ancestors and of the node. For black nodes:
  * the cube. Valid until the next call with these envelopes. */
 static const ebpo_polytope *level_walk_envelope(const level_walk *w, const level_walk_node *node,

@@ -16,7 +16,7 @@
 /* Converts the code's half-space 4096 (n . xi) <= d to out[0..2] . p <= out[3] with a unit normal
  * (to 4 ulps). Every real point p of the cell that satisfies the code satisfies the result, also
  * when the left side is evaluated in doubles in any order, for double p. The offset exceeds the
- * necessary one by about 1e-14 of the cell's coordinates. */
+ * necessary offset by about 1e-14 of the cell's coordinates. */
 void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3], int32_t d,
                          double out[4]);
 

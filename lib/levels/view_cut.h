@@ -17,15 +17,16 @@
 typedef struct ebpo_viewpoint {
     bool given, everywhere;
     double eye[3]; /* in the model's unit */
-    double unit;   /* its size in the model's unit */
+    double unit;   /* size of the unit of length, in the model's unit */
     double focal;  /* pixels of length 1 at distance 1 */
     /* normals of the frustum's planes, all through the eye, and of the plane through the eye
      * parallel to the picture */
     double inward[5][3];
-    double diagonal2[EBPO_LEVELS_MAX]; /* squared, for a level's cells */
+    double diagonal2[EBPO_LEVELS_MAX]; /* squared diagonal of the cells of each level */
 } ebpo_viewpoint;
 
-/* Prepares an observer; `observer` may be NULL. EBPO_E_ARGUMENT: invalid observer. */
+/* Prepares an observer; `observer` may be NULL. Returns EBPO_E_ARGUMENT for an
+ * invalid observer. */
 EBPO_MUST_USE ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
                                               const ebpo_observer *observer, ebpo_error *error);
 
@@ -35,7 +36,7 @@ typedef struct ebpo_seen {
 } ebpo_seen;
 ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *viewpoint, const ebpo_box *box, ebpo_cell cell);
 
-/* Returns the value in the model's unit, or in pixels. */
+/* Returns the distance in the model's unit; ebpo_viewpoint_pixels: the size of a cell in pixels. */
 double ebpo_viewpoint_distance(const ebpo_viewpoint *viewpoint, double distance2);
 double ebpo_viewpoint_pixels(const ebpo_viewpoint *viewpoint, int level, double distance2);
 
@@ -66,7 +67,7 @@ typedef struct ebpo_partial {
     int32_t (*winding)[8]; /* NULL: not requested */
     uint64_t group_count, group_capacity, winding_capacity, code_count, code_capacity;
     bool windings;
-    /* gray nodes delivered of each level; more than stated in the head means a damaged file */
+    /* delivered gray nodes of each level; more than the file's header states: a damaged file */
     uint64_t grays[EBPO_LEVELS_MAX];
 } ebpo_partial;
 
@@ -117,7 +118,7 @@ typedef enum ebpo_turn { EBPO_TURN_SEEN, EBPO_TURN_UNSEEN, EBPO_TURN_NEVER } ebp
 
 typedef struct ebpo_waiting {
     uint64_t key, octcode; /* sorted by key, then by octcode */
-    uint64_t below;        /* index of its children's group in their level */
+    uint64_t below;        /* index of the children's group in the children's level */
     uint32_t group;
     uint8_t octant, turn;
 } ebpo_waiting;

@@ -60,7 +60,7 @@ struct ebpo_view_stream {
     ebpo_chunks *chunks;
     ebpo_partial partial;
     ebpo_frontier frontier; /* gray nodes of the cut, except `parent` */
-    /* True while the last group of `grown` is being delivered. */
+    /* True while the last group of `partial` is being delivered. */
     bool delivering;
     ebpo_waiting parent; /* unused for the root's group */
     unsigned step, flip; /* the next octant is step ^ flip */
@@ -69,7 +69,7 @@ struct ebpo_view_stream {
     ebpo_envelope_stack *envelopes; /* if polygons are requested */
     ebpo_node_buffers capacity;
     view_leaves *leaves; /* if faces are requested */
-    /* deeper or smaller nodes are not prefetched yet */
+    /* nodes that are deeper, or smaller in pixels, are not prefetched yet */
     int soon_level;
     double soon_pixels;
 };
@@ -702,7 +702,7 @@ static void end_group(ebpo_view_stream *s)
 
 /* --- nodes --- */
 
-/* Fills in a node of `grown`; the caller sets `complete`. */
+/* Fills in a node of `partial`; the caller sets `complete`. */
 static void fill_node(ebpo_view_stream *s, ebpo_partial_node node, ebpo_view_node *out)
 {
     ebpo_node_type type = ebpo_partial_type(&s->partial, node);

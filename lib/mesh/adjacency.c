@@ -48,8 +48,8 @@ static ebpo_status count_faces(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Stores a face. first[v] is initially the end of the row and counts down to its begin. */
-static inline void adjacency_put(ebpo_stars *stars, uint32_t v, uint64_t f)
+/* Stores a face. first[v] is initially the end of the row and counts down to its beginning. */
+static inline void put_face(ebpo_stars *stars, uint32_t v, uint64_t f)
 {
     stars->face[__atomic_fetch_sub(&stars->first[v], 1, __ATOMIC_RELAXED) - 1] = (uint32_t)f;
 }
@@ -61,11 +61,11 @@ static ebpo_status place_faces(void *context, uint64_t begin, uint64_t end, unsi
     build *b = context;
     EBPO_FOR_ITEMS_SCATTERED(b->mesh->workspace, f, begin, end) {
         const uint32_t *v = b->mesh->faces + 3 * f;
-        adjacency_put(b->stars, v[0], f);
+        put_face(b->stars, v[0], f);
         if (v[1] != v[0])
-            adjacency_put(b->stars, v[1], f);
+            put_face(b->stars, v[1], f);
         if (v[2] != v[0] && v[2] != v[1])
-            adjacency_put(b->stars, v[2], f);
+            put_face(b->stars, v[2], f);
     }
     return EBPO_OK;
 }
@@ -258,7 +258,8 @@ void ebpo_edge_faces_sort(ebpo_edge_faces *e)
         qsort(e->face, e->count, sizeof *e->face, compare_patches);
 }
 
-/* Returns the sign of the first nonzero component of the normal of v, w, p. */
+/* Returns the sign of the first nonzero component of the normal of the face v, w, p, and sets *axis
+ * to that component. */
 static int normal_sign(const edge *e, const double p[3], int *axis)
 {
     for (*axis = 0; *axis < 3; ++*axis) {
@@ -269,7 +270,8 @@ static int normal_sign(const edge *e, const double p[3], int *axis)
     return 0;
 }
 
-/* Returns less than 0 if a comes first, and 0 if both are in one plane. */
+/* Compares the angles of two faces around the edge: less than 0 if a comes first, 0 if both have
+ * the same angle. */
 static int compare_angles(const ebpo_edge_face *a, const ebpo_edge_face *b, const edge *e)
 {
     if (a->quarter != b->quarter)
@@ -318,8 +320,9 @@ bool ebpo_edge_faces_turn(ebpo_edge_faces *e, const ebpo_mesh *mesh, uint32_t v,
     return true;
 }
 
-/* Returns true if every layer has as many faces along the edge as its positions require, where
- * `first` is 1 if the first position is along it. */
+/* Returns true if the faces can alternate in direction, given that coplanar faces may be in any
+ * order: every layer must have as many faces along the edge as its positions require. `first` is 1
+ * if the face at the first position runs along the edge. */
 static bool alternate_from(const ebpo_edge_faces *e, unsigned first)
 {
     int64_t surplus = 0;

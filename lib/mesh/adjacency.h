@@ -64,8 +64,8 @@ static inline uint64_t ebpo_star_run_end(const ebpo_star *star, uint64_t begin)
 /* Returns the first link of the run to `neighbour`, or star->count when there is none. */
 uint64_t ebpo_star_find(const ebpo_star *star, uint32_t neighbour);
 
-/* A face in a search for faces with the same three vertices, which are found at their lowest
- * vertex. */
+/* An item in the search for faces with the same three vertices. Such faces are found at their
+ * lowest vertex. */
 
 typedef struct ebpo_same_face {
     uint64_t corners; /* the two greater vertices: lesser << 32 | greater */
@@ -81,8 +81,8 @@ typedef struct ebpo_same_faces {
     ebpo_workspace *workspace; /* the mesh's, once something was gathered */
 } ebpo_same_faces;
 
-/* Gathers the faces of three distinct vertices whose lowest is v. Returns false when memory is
- * short. */
+/* Gathers the faces that have three distinct vertices of which v is the lowest. Returns false when
+ * memory is short. */
 bool ebpo_same_faces_gather(ebpo_same_faces *out, const ebpo_stars *stars, const ebpo_mesh *mesh,
                             uint32_t v);
 void ebpo_same_faces_free(ebpo_same_faces *faces);
@@ -96,12 +96,12 @@ static inline bool ebpo_same_faces_repeats(const ebpo_same_faces *faces, uint64_
 /* The faces at one edge, sorted by patch or by angle around the edge. */
 
 typedef struct ebpo_edge_face {
-    uint64_t patch; /* shifted by 1; the lowest bit belongs to the caller */
+    uint64_t patch; /* number of the patch, shifted by 1; the lowest bit belongs to the caller */
     uint32_t face;
     uint8_t out; /* 1: the face runs from the edge's first vertex to the other one */
 
-    /* set during sorting: the third corner, and the quarter of the turn from the first face: 0 at
-     * it, 1 before the half turn, 2 at it, 3 after it */
+    /* set during sorting: the third corner, and the position in the turn from the first face: 0: at
+     * the first face; 1: before the half turn; 2: at the half turn; 3: after it */
     uint8_t quarter;
     bool layered;    /* coplanar with the face before it */
     bool reversed;   /* among coplanar faces, greater indices come first */
@@ -122,8 +122,8 @@ bool ebpo_edge_faces_add(ebpo_edge_faces *e, uint32_t face, uint8_t out, uint64_
 void ebpo_edge_faces_sort(ebpo_edge_faces *e);
 
 /* Sorts the faces by angle around the edge from vertex v to w, exactly, beginning anywhere.
- * Coplanar faces count as stacked layers, ordered by their source indices: they have the same order
- * at every shared edge. Returns false if a face has no area. */
+ * Coplanar faces are treated as layers in the order of their source indices, so their order is the
+ * same at every shared edge. Returns false if a face has no area. */
 bool ebpo_edge_faces_turn(ebpo_edge_faces *e, const ebpo_mesh *mesh, uint32_t v, uint32_t w);
 
 /* Returns true if the sorted faces alternate in direction along the edge; coplanar faces may be in

@@ -65,7 +65,7 @@ ebpo_status ebpo_mesh_need_attributes(ebpo_mesh *mesh, ebpo_error *error)
     return mesh->attributes ? EBPO_OK : ebpo_fail_memory(error, sizeof *mesh->attributes);
 }
 
-static void attributes_clear(ebpo_workspace *workspace, ebpo_attribute *a)
+static void free_values(ebpo_workspace *workspace, ebpo_attribute *a)
 {
     if (!a->borrowed) {
         ebpo_array_free(workspace, a->values);
@@ -80,7 +80,7 @@ void ebpo_attributes_free(ebpo_attributes *attributes)
     if (!attributes)
         return;
     for (uint64_t i = 0; i < attributes->count; i++)
-        attributes_clear(attributes->workspace, &attributes->array[i]);
+        free_values(attributes->workspace, &attributes->array[i]);
     free(attributes->array);
     free(attributes->header);
     free(attributes);
@@ -102,7 +102,7 @@ ebpo_attribute *ebpo_attributes_add(ebpo_attributes *to, const ebpo_attribute *l
 
 void ebpo_attributes_remove(ebpo_attributes *from, uint64_t index)
 {
-    attributes_clear(from->workspace, &from->array[index]);
+    free_values(from->workspace, &from->array[index]);
     from->count--;
     memmove(from->array + index, from->array + index + 1,
             (from->count - index) * sizeof *from->array);
@@ -126,11 +126,10 @@ bool ebpo_attribute_reserve(ebpo_workspace *workspace, ebpo_attribute *a, uint64
            ebpo_array_grow(workspace, &a->values, &a->item_capacity, items, bytes);
 }
 
-/* Appends to a text of `size` bytes, or "and more" when it is full. */
-static void attributes_append(char *to, size_t size, const char *format, va_list args)
-    EBPO_PRINTF(3, 0);
+/* Appends to the text `to` of `size` bytes, or appends "and more" when it is full. */
+static void append_note(char *to, size_t size, const char *format, va_list args) EBPO_PRINTF(3, 0);
 
-static void attributes_append(char *to, size_t size, const char *format, va_list args)
+static void append_note(char *to, size_t size, const char *format, va_list args)
 {
     static const char more[] = "; and more";
     char text[200];
@@ -146,7 +145,7 @@ void ebpo_attributes_lose(ebpo_attributes *attributes, const char *format, ...)
 {
     va_list args;
     va_start(args, format);
-    attributes_append(attributes->lost, sizeof attributes->lost, format, args);
+    append_note(attributes->lost, sizeof attributes->lost, format, args);
     va_end(args);
 }
 
@@ -154,7 +153,7 @@ void ebpo_attributes_note_unread(ebpo_attributes *attributes, const char *format
 {
     va_list args;
     va_start(args, format);
-    attributes_append(attributes->unread, sizeof attributes->unread, format, args);
+    append_note(attributes->unread, sizeof attributes->unread, format, args);
     va_end(args);
 }
 
@@ -230,8 +229,7 @@ ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo_attributes *f
     return make_of(out, from, workspace, copy_array, error);
 }
 
-/* Row operations on attributes: selecting and reordering rows, converting lists to columns, ranges
- * of values. */
+/* --- rows --- */
 
 typedef struct picking {
     ebpo_workspace *workspace;
@@ -281,7 +279,7 @@ static void pick_items(picking *p)
 }
 
 /* Writes the selected rows to p->made, which the caller frees. */
-static bool attributes_pick(picking *p)
+static bool pick_rows(picking *p)
 {
     const ebpo_attribute *from = p->from;
     p->made = *from;
@@ -315,7 +313,7 @@ ebpo_status ebpo_attributes_pick(ebpo_attributes *attributes, const char *elemen
         if (!ebpo_attribute_is_of(a, element))
             continue;
         picking p = { attributes->workspace, a, rows, count, { .rows = 0 } };
-        if (!attributes_pick(&p)) {
+        if (!pick_rows(&p)) {
             ebpo_array_free(attributes->workspace, p.made.ends);
             return ebpo_workspace_fail(attributes->workspace,
                                        count * (ebpo_attribute_row_bytes(a) + sizeof *a->ends),
@@ -368,7 +366,7 @@ void ebpo_attributes_keep(ebpo_attributes *attributes, const char *element, cons
     }
 }
 
-/* Returns the number of items of a row, and sets *begin to the first. */
+/* Returns the number of items of a row, and sets *begin to the index of the first item. */
 static uint64_t items_of(const ebpo_attribute *a, uint64_t row, uint64_t *begin)
 {
     *begin = a->ends ? list_begin(a, row) : row * a->columns;
@@ -466,20 +464,20 @@ static const char *const together[][4] = {
     { "u", "v", NULL, NULL },
 };
 
-/* Returns the length of the name before the ending, or -1 if the name has another ending. */
-static int attributes_beginning(const ebpo_attribute_name *name, const char *end)
+/* Returns the length of the name before the ending `end`, or -1 if the name has another ending. */
+static int length_before(const ebpo_attribute_name *name, const char *end)
 {
     size_t n = strlen(end);
     return name->n >= n && memcmp(name->s + name->n - n, end, n) == 0 ? (int)(name->n - n) : -1;
 }
 
-static unsigned attributes_match(const char *const ends[4], const ebpo_attribute_name *names,
-                                 unsigned count)
+static unsigned count_matching(const char *const ends[4], const ebpo_attribute_name *names,
+                               unsigned count)
 {
     unsigned n = 0;
-    int before = attributes_beginning(&names[0], ends[0]);
+    int before = length_before(&names[0], ends[0]);
     for (; n < 4 && ends[n]; n++)
-        if (before < 0 || n == count || attributes_beginning(&names[n], ends[n]) != before ||
+        if (before < 0 || n == count || length_before(&names[n], ends[n]) != before ||
             memcmp(names[n].s, names[0].s, (size_t)before) != 0)
             return 1;
     return n;
@@ -488,7 +486,7 @@ static unsigned attributes_match(const char *const ends[4], const ebpo_attribute
 unsigned ebpo_attribute_names_together(const ebpo_attribute_name *names, unsigned count)
 {
     for (size_t i = 0; i < sizeof together / sizeof together[0]; i++) {
-        unsigned n = attributes_match(together[i], names, count);
+        unsigned n = count_matching(together[i], names, count);
         if (n > 1)
             return n;
     }

@@ -1,6 +1,6 @@
 /* Attributes of a mesh: numeric data beyond positions and corners, such as colours, normals and
- * labels. The arrays belong to vertices and faces, in the order of the source, and to other
- * elements of the source. format-spec/README.md, "Attributes". For use by one thread. */
+ * labels. Each array belongs to the vertices or faces, in the order of the source, or to another
+ * element of the source. Source: format-spec/README.md, "Attributes". For use by one thread. */
 #ifndef EBPO_MESH_ATTRIBUTES_H
 #define EBPO_MESH_ATTRIBUTES_H
 
@@ -22,8 +22,9 @@ typedef struct ebpo_attribute {
     int list;         /* type of a list length in the source, or EBPO_ATTRIBUTE_NO_LIST */
     uint32_t columns; /* at least 1 */
     uint64_t rows;
-    uint8_t *values; /* [rows][columns] in native byte order, or [ends[rows - 1]] */
-    uint64_t *ends;  /* [rows] items of the lists up to here; NULL: all have `columns` items */
+    uint8_t *values; /* [rows][columns] in native byte order; for lists [ends[rows - 1]] */
+    /* [rows] number of list items up to the end of each row; NULL: each row has `columns` items */
+    uint64_t *ends;
     uint64_t row_capacity, item_capacity;
     bool borrowed; /* values and ends belong to another mesh, which frees them */
 } ebpo_attribute;
@@ -54,8 +55,8 @@ static inline bool ebpo_attributes_hold(const ebpo_attributes *attributes)
     return attributes && (attributes->count || attributes->header);
 }
 
-/* Return the bytes of a value (1, 2, 4 or 8), the name of a type in files, and the type of a name
- * or -1. */
+/* Return the number of bytes of a value (1, 2, 4 or 8), the name of a type in files, and the type
+ * with a name, or -1. */
 unsigned ebpo_attribute_bytes(ebpo_attribute_type type);
 const char *ebpo_attribute_type_name(ebpo_attribute_type type);
 int ebpo_attribute_type_of(const char *name);
@@ -69,7 +70,7 @@ bool ebpo_attribute_is_of(const ebpo_attribute *a, const char *element);
 /* Returns true for attributes of the mesh's vertices or faces, which are selected and sorted with
  * them. */
 bool ebpo_attribute_is_of_mesh(const ebpo_attribute *a);
-/* Element for images that the source names: mesh/textures.h. */
+/* The element for images that the source names (mesh/textures.h). */
 #define EBPO_TEXTURE_ELEMENT "ebpo:texture"
 bool ebpo_attribute_is_of_textures(const ebpo_attribute *a);
 
@@ -84,7 +85,7 @@ static inline uint64_t ebpo_attribute_value_count(const ebpo_attribute *a)
     return !a->ends ? a->rows * a->columns : a->rows ? a->ends[a->rows - 1] : 0;
 }
 
-/* Adds an array of `rows` rows without values. Returns NULL when there are too many or memory is
+/* Adds an array like `like`, without values. Returns NULL when there are too many or memory is
  * short. */
 ebpo_attribute *ebpo_attributes_add(ebpo_attributes *to, const ebpo_attribute *like);
 void ebpo_attributes_remove(ebpo_attributes *from, uint64_t index);
@@ -115,8 +116,8 @@ EBPO_MUST_USE ebpo_status ebpo_attributes_pick(ebpo_attributes *attributes, cons
 void ebpo_attributes_keep(ebpo_attributes *attributes, const char *element, const uint32_t *rows,
                           uint64_t count);
 
-/* Returns true if row i of one array equals row k of another (or the same) of its type, bit for
- * bit. */
+/* Returns true if row i of an array equals row k of an array of the same type (which may be the
+ * same array), bit for bit. */
 bool ebpo_attribute_same_row(const ebpo_attribute *a, uint64_t i, const ebpo_attribute *b,
                              uint64_t k);
 
@@ -145,11 +146,9 @@ bool ebpo_attribute_range(const ebpo_attribute *a, ebpo_workspace *workspace, do
 EBPO_MUST_USE ebpo_status ebpo_attributes_borrow(ebpo_attributes **out, const ebpo_attributes *from,
                                                  ebpo_error *error);
 
-/* Copies into another workspace; NULL for NULL. */
+/* Copies attributes into another workspace; NULL for NULL. */
 EBPO_MUST_USE ebpo_status ebpo_attributes_copy(ebpo_attributes **out, const ebpo_attributes *from,
                                                ebpo_workspace *workspace, ebpo_error *error);
-
-/* Finds colour columns in a mesh's attributes and converts their values to bytes. */
 
 enum { EBPO_COLOUR_CHANNELS = 4 }; /* red, green, blue and an optional alpha */
 
@@ -164,7 +163,7 @@ typedef struct ebpo_colour_column {
 bool ebpo_colour_columns(const ebpo_attributes *in, const char *element,
                          ebpo_colour_column out[EBPO_COLOUR_CHANNELS]);
 
-/* Converts as described at ebpo_mesh_colours. The row must exist. */
+/* Converts a value to a byte, as described at ebpo_mesh_colours. The row must exist. */
 uint8_t ebpo_colour_byte(const ebpo_colour_column *column, uint64_t row);
 
 /* Returns true if vertices or faces have colours. */

@@ -71,14 +71,14 @@ typedef struct chaining {
     ebpo_boundary_edge *edges; /* sorted by key */
     uint64_t count;
     arrival *arrivals;  /* sorted by key */
-    uint64_t *next;     /* next of each edge; NONE when there is none */
-    uint8_t *continued; /* true if the edge is another edge's next */
+    uint64_t *next;     /* [edges] edge that continues each edge; NONE when there is none */
+    uint8_t *continued; /* true if the edge continues another edge */
     uint8_t *walked;
     uint32_t *place; /* [vertex_count] position on the path, or EBPO_NO_INDEX */
     uint32_t *path;
     uint64_t path_length;
-    uint64_t start; /* of the current walk: for ebpo_loops.start */
-    uint64_t steps; /* of all walks */
+    uint64_t start; /* key of the current walk, for ebpo_loops.start */
+    uint64_t steps; /* steps of all walks */
     const ebpo_stars *stars;
     const ebpo_mesh *mesh;
     unsigned threads;
@@ -97,7 +97,8 @@ static ebpo_status make_edges(void *context, uint64_t begin, uint64_t end, void 
     return EBPO_OK;
 }
 
-/* Compares edges. Not needed for the order: each edge that is used once has a unique key. */
+/* Compares edges for the sort. Keys of edges that are used once are unique, so this function
+ * decides nothing. */
 static int compare_edges(const void *a, const void *b)
 {
     const ebpo_boundary_edge *x = a, *y = b;
@@ -136,8 +137,9 @@ static void take_arrivals(void *context, uint64_t place, const void *records, ui
 
 static const ebpo_progress silent = { NULL, NULL };
 
-/* Returns the position of the leading bits of a vertex << 32. */
-static unsigned boundary_leading(const ebpo_mesh *mesh)
+/* Returns the bit position from which on the keys (vertex << 32) have the bits that the sort uses.
+ */
+static unsigned leading_shift(const ebpo_mesh *mesh)
 {
     unsigned shift = 32;
     while (mesh->vertex_count >> (shift - 32) >= EBPO_SORT_BINS)
@@ -153,7 +155,7 @@ static ebpo_status sort_all(chaining *c, ebpo_error *error)
                        .stage = "",
                        .count = c->count,
                        .record = sizeof *c->edges,
-                       .shift = boundary_leading(c->mesh),
+                       .shift = leading_shift(c->mesh),
                        .context = c,
                        .make = make_edges,
                        .compare = compare_edges,
@@ -168,15 +170,15 @@ static ebpo_status sort_all(chaining *c, ebpo_error *error)
 
 /* --- chaining of edges --- */
 
-/* Releases pages. Each step may access a distant part of each of ten arrays. */
-static void let_go(const chaining *c, uint64_t steps)
+/* Releases pages. Call it often: each step may access distant parts of ten arrays. */
+static void release_pages(const chaining *c, uint64_t steps)
 {
     enum { OFTEN = 32 };
     if (steps % OFTEN == 0)
         ebpo_release_pages(c->mesh->workspace);
 }
 
-static void boundary_connect(chaining *c, uint64_t edge, uint64_t next)
+static void connect_edges(chaining *c, uint64_t edge, uint64_t next)
 {
     c->next[edge] = next;
     c->continued[next] = 1;
@@ -189,8 +191,8 @@ static uint32_t leaves_to(const chaining *c, uint32_t vertex, uint32_t face)
     return v[0] == vertex ? v[1] : v[1] == vertex ? v[2] : v[0];
 }
 
-/* Walks around c->star from the face of an arriving edge, over edges used twice. Returns the
- * neighbour at the end of the fan. */
+/* Walks around c->star, from the face of an arriving edge across edges that are used twice. Returns
+ * the neighbour at the end of the fan. */
 static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
 {
     for (uint64_t steps = 0; steps <= c->star.faces; steps++) {
@@ -211,8 +213,7 @@ static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
 
 /* Returns the edge that leaves for `neighbour` (a source index) in the sorted range [begin, end),
  * or NONE. */
-static uint64_t boundary_departure(const chaining *c, uint64_t begin, uint64_t end,
-                                   uint64_t neighbour)
+static uint64_t find_departure(const chaining *c, uint64_t begin, uint64_t end, uint64_t neighbour)
 {
     while (begin < end) {
         uint64_t middle = begin + (end - begin) / 2;
@@ -227,8 +228,8 @@ static uint64_t boundary_departure(const chaining *c, uint64_t begin, uint64_t e
     return NONE;
 }
 
-/* Connects arrivals [a, b) and departures [d, e) at one vertex: by fans first, the rest in
- * ascending order. */
+/* Connects the arriving edges [a, b) and the departing edges [d, e) at one vertex: first by fans,
+ * then the others in ascending order. */
 static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b, uint64_t d,
                            uint64_t e)
 {
@@ -241,9 +242,9 @@ static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b,
             uint64_t next =
                 neighbour == EBPO_NO_INDEX
                     ? NONE
-                    : boundary_departure(c, d, e, ebpo_mesh_source_vertex(c->mesh, neighbour));
+                    : find_departure(c, d, e, ebpo_mesh_source_vertex(c->mesh, neighbour));
             if (next != NONE && !c->continued[next])
-                boundary_connect(c, edge, next);
+                connect_edges(c, edge, next);
         }
     }
     for (uint64_t i = a; i < b; i++) {
@@ -253,7 +254,7 @@ static bool connect_vertex(chaining *c, uint32_t vertex, uint64_t a, uint64_t b,
             d++;
         if (d == e)
             break;
-        boundary_connect(c, c->arrivals[i].edge, d);
+        connect_edges(c, c->arrivals[i].edge, d);
     }
     return true;
 }
@@ -271,7 +272,7 @@ static bool connect_all(chaining *c)
         uint64_t e = d;
         while (e < c->count && c->edges[e].from == vertex)
             e++;
-        let_go(c, visits++);
+        release_pages(c, visits++);
         if (!connect_vertex(c, vertex, a, b, d, e))
             return false;
         a = b;
@@ -296,7 +297,7 @@ static void emit_loop(chaining *c, uint64_t place)
     c->path_length = place;
 }
 
-static void boundary_visit(chaining *c, uint32_t vertex)
+static void visit_vertex(chaining *c, uint32_t vertex)
 {
     if (c->place[vertex] != EBPO_NO_INDEX)
         emit_loop(c, c->place[vertex]);
@@ -311,8 +312,8 @@ static uint64_t source_key(const chaining *c, uint64_t edge)
            (uint32_t)c->edges[edge].key;
 }
 
-/* Chains share no edges, so their order does not matter. A closed chain is walked from its first
- * edge in the source. */
+/* Returns the first edge in the source of a closed chain; the walk begins there. Chains share no
+ * edges, so the order in which chains are walked does not matter. */
 static uint64_t first_of_cycle(chaining *c, uint64_t edge)
 {
     uint64_t first = edge, key = source_key(c, edge);
@@ -320,21 +321,21 @@ static uint64_t first_of_cycle(chaining *c, uint64_t edge)
         uint64_t other = source_key(c, e);
         first = other < key ? e : first;
         key = other < key ? other : key;
-        let_go(c, ++c->steps);
+        release_pages(c, ++c->steps);
     }
     return first;
 }
 
-static void boundary_walk(chaining *c, uint64_t edge)
+static void walk_chain(chaining *c, uint64_t edge)
 {
     c->path_length = 0;
     c->start = source_key(c, edge);
-    boundary_visit(c, c->edges[edge].from);
+    visit_vertex(c, c->edges[edge].from);
     while (edge != NONE && !c->walked[edge]) {
         c->walked[edge] = 1;
-        boundary_visit(c, c->edges[edge].to);
+        visit_vertex(c, c->edges[edge].to);
         edge = c->next[edge];
-        let_go(c, ++c->steps);
+        release_pages(c, ++c->steps);
     }
     if (c->path_length > 1)
         c->out->open_chains++;
@@ -342,7 +343,7 @@ static void boundary_walk(chaining *c, uint64_t edge)
         c->place[c->path[i]] = EBPO_NO_INDEX;
 }
 
-static bool boundary_allocate(chaining *c)
+static bool allocate_arrays(chaining *c)
 {
     ebpo_workspace *w = c->mesh->workspace;
     uint64_t n = c->count, vertices = c->mesh->vertex_count;
@@ -363,10 +364,10 @@ static bool boundary_allocate(chaining *c)
     return true;
 }
 
-static ebpo_status boundary_chain(chaining *c, ebpo_error *error)
+static ebpo_status chain_edges(chaining *c, ebpo_error *error)
 {
     ebpo_workspace *w = c->mesh->workspace;
-    if (!boundary_allocate(c))
+    if (!allocate_arrays(c))
         return ebpo_workspace_fail(w, c->count * 56 + c->mesh->vertex_count * sizeof *c->place,
                                    error);
     ebpo_status status = sort_all(c, error);
@@ -376,12 +377,12 @@ static ebpo_status boundary_chain(chaining *c, ebpo_error *error)
         return ebpo_fail_memory(error, c->star.capacity * 2 * sizeof *c->star.links);
     EBPO_FOR_ITEMS(w, e, 0, c->count) {
         if (!c->continued[e])
-            boundary_walk(c, e);
+            walk_chain(c, e);
     }
     c->out->on_paths = c->out->count;
     EBPO_FOR_ITEMS(w, e, 0, c->count) {
         if (!c->walked[e])
-            boundary_walk(c, first_of_cycle(c, e));
+            walk_chain(c, first_of_cycle(c, e));
     }
     return EBPO_OK;
 }
@@ -396,7 +397,7 @@ ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *boundary, const 
                    .mesh = mesh,
                    .threads = threads,
                    .out = out };
-    ebpo_status status = boundary_chain(&c, error);
+    ebpo_status status = chain_edges(&c, error);
     ebpo_star_free(&c.star);
     ebpo_array_free(mesh->workspace, c.arrivals);
     ebpo_array_free(mesh->workspace, c.next);
@@ -467,7 +468,7 @@ ebpo_status ebpo_loops_rank(uint64_t **triangles, const ebpo_loops *loops, const
                            .stage = "",
                            .count = count,
                            .record = sizeof *r.sorted,
-                           .shift = boundary_leading(mesh),
+                           .shift = leading_shift(mesh),
                            .context = &r,
                            .make = make_ranks,
                            .compare = compare_ranks,

@@ -6,7 +6,7 @@
 
 /* A boundary edge, in the direction in which its face uses it. */
 typedef struct ebpo_boundary_edge {
-    /* from << 32 | the source index of to: keeps neighbours together, and makes decisions
+    /* from << 32 | the source index of to: keeps edges of one vertex together, and makes decisions
      * independent of the mesh's order */
     uint64_t key;
     uint32_t from, to, face;
@@ -34,9 +34,10 @@ typedef struct ebpo_loops {
     uint64_t *first;  /* [count + 1] */
     uint32_t *vertex; /* indices in the current mesh */
     uint64_t *start;  /* [count] key of the first edge of its walk, in source indices */
-    /* loops removed from chains that are not closed; these come first */
+    /* number of loops that were removed from chains that are not closed; these loops come first */
     uint64_t on_paths;
-    /* chains that cannot be closed, as the directions of their edges do not continue one another */
+    /* number of chains that cannot be closed, because the directions of their edges do not continue
+     * one another */
     uint64_t open_chains;
     ebpo_workspace *workspace; /* the mesh's; owns all arrays */
 } ebpo_loops;
@@ -50,7 +51,7 @@ EBPO_MUST_USE ebpo_status ebpo_boundary_loops(ebpo_loops *out, ebpo_boundary *bo
 void ebpo_loops_free(ebpo_loops *loops);
 
 /* Computes, in the source's order, the number of triangles of all loops before each one (n - 2 for
- * each loop). [count]; owned by the mesh's workspace. */
+ * each loop). *triangles: [count], owned by the mesh's workspace. */
 EBPO_MUST_USE ebpo_status ebpo_loops_rank(uint64_t **triangles, const ebpo_loops *loops,
                                           const ebpo_mesh *mesh, unsigned threads,
                                           ebpo_error *error);

@@ -16,14 +16,14 @@ typedef struct ebpo_point_box {
     double min[3], max[3];
 } ebpo_point_box;
 
-/* Each item has a point, by which the tree divides the items. Initialise the struct with zeros,
- * except the workspace, which owns the arrays. */
+/* A tree of items, each with a point by which the tree divides the items. Initialise the struct
+ * with zeros, except the workspace, which owns the arrays. */
 typedef struct ebpo_box_tree {
     ebpo_workspace *workspace;
     ebpo_tree_point *point; /* added in any order; sorted by the build */
     uint64_t count, capacity;
-    /* boxes of points; nodes 2 i + 1 and 2 i + 2 are the halves of i, and the first has count / 2
-     * points */
+    /* boxes of points; nodes 2 i + 1 and 2 i + 2 are the halves of node i; the first half has count
+     * / 2 points */
     ebpo_point_box *node;
     uint64_t node_capacity;
     /* like node, for the boxes of items; NULL: points only */
@@ -41,8 +41,8 @@ typedef void (*ebpo_box_of_fn)(const void *user, const ebpo_tree_point *p, ebpo_
 bool ebpo_box_tree_build(ebpo_box_tree *tree, ebpo_box_of_fn box_of, const void *user);
 void ebpo_box_tree_free(ebpo_box_tree *tree);
 
-/* A node of `count` items: the box of their points and the box of their boxes; both are equal for
- * points. */
+/* A node of `count` items, with the box of their points and the box of their boxes. In a tree of
+ * points both boxes are equal. */
 typedef struct ebpo_box_node {
     const ebpo_point_box *points, *filled;
     uint64_t count;
@@ -52,7 +52,7 @@ typedef struct ebpo_box_node {
  * the walk. */
 typedef bool (*ebpo_box_node_fn)(void *user, const ebpo_box_node *node);
 typedef bool (*ebpo_tree_points_fn)(void *user, ebpo_tree_point *points, uint64_t count);
-/* Returns false if `visit` stopped the walk. */
+/* Walks the tree. Returns false if `visit` stopped the walk. */
 bool ebpo_box_tree_walk(const ebpo_box_tree *tree, ebpo_box_node_fn wanted,
                         ebpo_tree_points_fn visit, void *user);
 

@@ -12,8 +12,8 @@
 #include "core/error.h"
 #include "mesh/attributes.h"
 
-static ebpo_colour_column colours_find(const ebpo_attributes *in, const char *element,
-                                       const char *name)
+static ebpo_colour_column find_colour_column(const ebpo_attributes *in, const char *element,
+                                             const char *name)
 {
     size_t length = strlen(name);
     for (uint64_t i = 0; i < in->count; i++) {
@@ -40,7 +40,7 @@ bool ebpo_colour_columns(const ebpo_attributes *in, const char *element,
     };
     for (unsigned set = 0; in && set < sizeof names / sizeof *names; set++) {
         for (int k = 0; k < EBPO_COLOUR_CHANNELS; k++)
-            out[k] = colours_find(in, element, names[set][k]);
+            out[k] = find_colour_column(in, element, names[set][k]);
         if (out[0].of && out[1].of && out[2].of)
             return true;
     }
@@ -83,11 +83,9 @@ bool ebpo_attributes_coloured(const ebpo_attributes *in)
     return ebpo_colour_columns(in, "vertex", column) || ebpo_colour_columns(in, "face", column);
 }
 
-/* Colour attributes of a mesh as bytes. */
-
 enum { CHANNELS = EBPO_COLOUR_CHANNELS };
 
-static ebpo_status colours_make(uint8_t **out, const ebpo_attributes *from, const char *element,
+static ebpo_status make_colours(uint8_t **out, const ebpo_attributes *from, const char *element,
                                 uint64_t count, ebpo_error *error)
 {
     ebpo_colour_column channels[CHANNELS];
@@ -114,9 +112,9 @@ ebpo_status ebpo_mesh_colours(const ebpo_mesh *mesh, ebpo_colours *out, ebpo_err
 {
     memset(out, 0, sizeof *out);
     ebpo_status status =
-        colours_make(&out->vertex, mesh->attributes, "vertex", mesh->vertex_count, error);
+        make_colours(&out->vertex, mesh->attributes, "vertex", mesh->vertex_count, error);
     if (status == EBPO_OK)
-        status = colours_make(&out->face, mesh->attributes, "face", mesh->face_count, error);
+        status = make_colours(&out->face, mesh->attributes, "face", mesh->face_count, error);
     if (status != EBPO_OK)
         ebpo_colours_free(out);
     out->by_face = out->face && (!out->vertex || all_the_same(out->vertex, mesh->vertex_count));

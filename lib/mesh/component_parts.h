@@ -11,14 +11,14 @@
 typedef struct ebpo_found_component {
     uint64_t first; /* least source index of its faces */
     uint32_t face;  /* that face, in the current mesh */
-    bool open;      /* an edge is not used equally often in both directions */
+    bool open;      /* some edge is not used equally often in both directions */
     double volume;  /* signed volume of a closed component, in the unit common to all components
                      * (mesh_parts.h) */
     double min[3], max[3];
     uint32_t host; /* for a cavity, the component around it; otherwise itself */
 } ebpo_found_component;
 
-/* Indices of faces or vertices by group, ascending within each group. */
+/* The indices of faces or vertices by group, ascending within each group. */
 typedef struct ebpo_number_groups {
     uint64_t *begin; /* [groups + 1] into `of` */
     uint32_t *of;
@@ -39,7 +39,8 @@ struct ebpo_components {
     ebpo_number_groups faces, vertices;
 };
 
-/* Returns EBPO_E_FORMAT without faces or for an invalid vertex index. EBPO_E_ARGUMENT. */
+/* Returns EBPO_E_FORMAT for a mesh without faces or with an invalid vertex index; EBPO_E_ARGUMENT
+ * for an invalid mesh. */
 EBPO_MUST_USE ebpo_status ebpo_components_check(const ebpo_mesh *mesh, ebpo_error *error);
 
 /* Groups faces (or vertices) by their components or named groups. */
@@ -49,7 +50,7 @@ EBPO_MUST_USE ebpo_status ebpo_components_group(const ebpo_components *c, bool f
 /* Finds components with their faces, edges and volumes; cavities are not yet joined to their hosts.
  * Free with ebpo_components_free, also on failure. `closed`: NULL, or the result of
  * ebpo_mesh_find_shells; then each shell is a component, and the other faces are connected by
- * vertices. It becomes `of_face`. */
+ * vertices. The array `closed` becomes `of_face`. */
 EBPO_MUST_USE ebpo_status ebpo_components_find(const ebpo_mesh *mesh, uint32_t *closed,
                                                unsigned threads, const ebpo_progress *progress,
                                                ebpo_components **out, ebpo_error *error);
@@ -66,7 +67,7 @@ EBPO_MUST_USE ebpo_status ebpo_components_measure(ebpo_components *c, unsigned t
 /* Sets the host of each component; needs the measurements. */
 EBPO_MUST_USE ebpo_status ebpo_cavities_place(const ebpo_components *c, ebpo_error *error);
 
-/* Groups of faces that are named in a file. */
+/* The groups of faces that a file names. */
 
 struct ebpo_mesh_groups {
     ebpo_mesh_group *list; /* [count] groups with faces first, in the order of their faces */

@@ -27,7 +27,7 @@ typedef struct measuring {
 
 /* ---- edges ---- */
 
-static bool component_volume_balances(const ebpo_link *links, uint64_t uses)
+static bool uses_balance(const ebpo_link *links, uint64_t uses)
 {
     uint64_t out = 0;
     for (uint64_t i = 0; i < uses; i++)
@@ -40,7 +40,8 @@ static void set_open(ebpo_components *c, uint32_t component)
     __atomic_store_n(&c->list[component].open, true, __ATOMIC_RELAXED);
 }
 
-/* Visits an edge, whose faces may be in several components. */
+/* Visits an edge and marks its components as open if it does not balance. Its faces may be in
+ * several components. */
 static bool visit_edge(ebpo_components *c, const ebpo_link *links, uint64_t uses,
                        ebpo_edge_faces *e)
 {
@@ -79,7 +80,7 @@ static ebpo_status visit_vertices(void *context, uint64_t begin, uint64_t end, u
             if (c->of_face && next - i > 2) {
                 if (!visit_edge(c, links, next - i, &m->around[worker]))
                     return ebpo_fail_memory(error, (next - i) * sizeof(ebpo_edge_face));
-            } else if (!component_volume_balances(links, next - i))
+            } else if (!uses_balance(links, next - i))
                 set_open(c, c->of_face ? c->of_face[ebpo_link_face(links)] : c->number[v]);
         }
     }
@@ -111,8 +112,8 @@ static ebpo_status inspect_edges(measuring *m, unsigned threads, const ebpo_prog
 /* ---- volumes ---- */
 
 /* Returns six times the volume of the tetrahedron with apex `base`, in the frame. */
-static double term_of(const measuring *m, ebpo_found_component *c, uint64_t face,
-                      const double base[3])
+static double volume_term(const measuring *m, ebpo_found_component *c, uint64_t face,
+                          const double base[3])
 {
     const ebpo_mesh *mesh = m->components->mesh;
     double t[3][3], cross[3];
@@ -146,7 +147,7 @@ static ebpo_status sum_volumes(void *context, uint64_t begin, uint64_t end, unsi
         for (int k = 0; k < 3; k++)
             one->min[k] = INFINITY, one->max[k] = -INFINITY;
         EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[n], c->faces.begin[n + 1]) {
-            double term = term_of(m, one, c->faces.of[i], base);
+            double term = volume_term(m, one, c->faces.of[i], base);
             most = fmax(most, fabs(term));
             ebpo_sum_add(&sum, term);
         }
@@ -169,7 +170,7 @@ ebpo_status ebpo_components_measure(ebpo_components *c, unsigned threads,
                              : status;
 }
 
-/* Finds the closed component around a cavity. */
+/* --- the closed component around a cavity --- */
 
 /* A closed component of negative volume, represented by the first vertex of its first face. */
 typedef struct cavity {
@@ -221,8 +222,8 @@ static void list_both(placing *p)
     ebpo_sort_with(p->hosts, p->host_count, sizeof *p->hosts, compare_hosts, c->list);
 }
 
-/* Returns the first cavity with a coordinate of at least y. */
-static uint64_t from_y(const placing *p, double y)
+/* Returns the first cavity whose y coordinate is at least y. */
+static uint64_t first_from_y(const placing *p, double y)
 {
     uint64_t low = 0, high = p->count;
     while (low < high) {
@@ -246,7 +247,7 @@ static void cross_face(placing *p, const ebpo_found_component *host, uint64_t fa
     high = t[0][1] > t[1][1] ? t[0][1] : t[1][1];
     low = t[2][1] < low ? t[2][1] : low;
     high = t[2][1] > high ? t[2][1] : high;
-    for (uint64_t i = from_y(p, low); i < p->count && p->cavities[i].at[1] <= high; i++)
+    for (uint64_t i = first_from_y(p, low); i < p->count && p->cavities[i].at[1] <= high; i++)
         if (!p->cavities[i].placed)
             p->cavities[i].winding +=
                 ebpo_axis_crossing(p->cavities[i].at, host->max[0], 0, t[0], t[1], t[2]);
@@ -255,8 +256,8 @@ static void cross_face(placing *p, const ebpo_found_component *host, uint64_t fa
 /* Returns true if a cavity without a host may be in this host. */
 static bool any_within(const placing *p, const ebpo_found_component *host)
 {
-    for (uint64_t i = from_y(p, host->min[1]); i < p->count && p->cavities[i].at[1] <= host->max[1];
-         i++) {
+    for (uint64_t i = first_from_y(p, host->min[1]);
+         i < p->count && p->cavities[i].at[1] <= host->max[1]; i++) {
         const double *x = p->cavities[i].at;
         if (!p->cavities[i].placed && x[0] >= host->min[0] && x[0] <= host->max[0] &&
             x[2] >= host->min[2] && x[2] <= host->max[2])
@@ -274,8 +275,8 @@ static void fill_host(placing *p, uint32_t number)
     EBPO_FOR_ITEMS_SCATTERED(c->mesh->workspace, i, c->faces.begin[number],
                              c->faces.begin[number + (uint64_t)1])
         cross_face(p, host, c->faces.of[i]);
-    for (uint64_t i = from_y(p, host->min[1]); i < p->count && p->cavities[i].at[1] <= host->max[1];
-         i++) {
+    for (uint64_t i = first_from_y(p, host->min[1]);
+         i < p->count && p->cavities[i].at[1] <= host->max[1]; i++) {
         cavity *v = &p->cavities[i];
         if (!v->placed && v->winding != 0) {
             v->placed = true;

@@ -25,7 +25,7 @@ static uint32_t root_of(uint32_t *above, uint32_t v)
     return v;
 }
 
-static void components_join(uint32_t *above, uint32_t a, uint32_t b)
+static void join_trees(uint32_t *above, uint32_t a, uint32_t b)
 {
     a = root_of(above, a);
     b = root_of(above, b);
@@ -61,11 +61,11 @@ static void join_vertices(const ebpo_mesh *mesh, const uint32_t *closed, uint32_
         const uint32_t *corner = mesh->faces + 3 * f;
         if (closed && closed[f] != EBPO_NO_INDEX)
             continue;
-        components_join(above, corner[0], corner[1]);
-        components_join(above, corner[0], corner[2]);
+        join_trees(above, corner[0], corner[1]);
+        join_trees(above, corner[0], corner[2]);
     }
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count)
-        above[v] = above[above[v]]; /* lower vertices are finished */
+        above[v] = above[above[v]]; /* lower vertices have their final root */
 }
 
 static int compare_first(const void *x, const void *y)
@@ -91,10 +91,10 @@ static ebpo_status add_face(ebpo_components *c, uint64_t f, uint32_t *number, ui
     return EBPO_OK;
 }
 
-/* Returns the location of the face's component index: at the lowest face of its shell, or at the
- * root of its vertices. */
-static uint32_t *number_at(const ebpo_components *c, const uint32_t *above, uint32_t *of_shell,
-                           uint64_t f)
+/* Returns the address at which the face's component index is kept: that of the lowest face of its
+ * shell, or of the root of its vertices. */
+static uint32_t *component_address(const ebpo_components *c, const uint32_t *above,
+                                   uint32_t *of_shell, uint64_t f)
 {
     return of_shell && c->of_face[f] != EBPO_NO_INDEX ? &of_shell[c->of_face[f]]
                                                       : &c->number[above[c->mesh->faces[3 * f]]];
@@ -109,16 +109,16 @@ static ebpo_status list_components(ebpo_components *c, const uint32_t *above, ui
     ebpo_status status = EBPO_OK;
     ebpo_array_fill(mesh->workspace, c->number, 0xff, mesh->vertex_count * sizeof *c->number);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
-        status = add_face(c, f, number_at(c, above, of_shell, f), &capacity, error);
+        status = add_face(c, f, component_address(c, above, of_shell, f), &capacity, error);
         if (status != EBPO_OK)
             return status;
     }
     qsort(c->list, c->count, sizeof *c->list, compare_first);
     for (uint64_t i = 0; i < c->count; i++)
-        *number_at(c, above, of_shell, c->list[i].face) = (uint32_t)i;
+        *component_address(c, above, of_shell, c->list[i].face) = (uint32_t)i;
     if (of_shell)
         EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count)
-            c->of_face[f] = *number_at(c, above, of_shell, f);
+            c->of_face[f] = *component_address(c, above, of_shell, f);
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, v, 0, mesh->vertex_count)
         c->number[v] = c->number[above[v]];
     return EBPO_OK;
@@ -136,7 +136,7 @@ static uint32_t component_of(const ebpo_components *c, bool faces, uint64_t i)
     return c->number[faces ? c->mesh->faces[3 * i] : i];
 }
 
-/* Counts, then places each index: ascending within a group. */
+/* Counts the indices of each group, then stores them, ascending within a group. */
 static void fill_groups(const ebpo_components *c, bool faces, ebpo_number_groups *g)
 {
     uint64_t items = faces ? c->mesh->face_count : c->mesh->vertex_count, sum = 0;
@@ -174,8 +174,8 @@ ebpo_status ebpo_components_group(const ebpo_components *c, bool faces, ebpo_num
 
 /* ---- joining cavities to hosts ---- */
 
-/* Numbers hosts by their first faces, which may belong to a cavity. `moved`: the new index of each
- * component. */
+/* Numbers hosts by their first faces; the first face of a host may belong to its cavity. `moved`:
+ * the new index of each component. */
 static void number_hosts(ebpo_components *c, uint32_t *moved)
 {
     uint64_t count = 0;
@@ -215,7 +215,7 @@ static ebpo_status join_cavities(ebpo_components *c, ebpo_error *error)
 
 /* ---- main functions ---- */
 
-static ebpo_status components_find(ebpo_components *c, ebpo_error *error)
+static ebpo_status find_components(ebpo_components *c, ebpo_error *error)
 {
     const ebpo_mesh *mesh = c->mesh;
     uint64_t n = mesh->vertex_count;
@@ -275,7 +275,7 @@ ebpo_status ebpo_components_find(const ebpo_mesh *mesh, uint32_t *closed, unsign
     c->of_face = closed;
     if (progress && !ebpo_progress_stage(progress, "components", error))
         return EBPO_E_CANCELLED;
-    status = components_find(c, error);
+    status = find_components(c, error);
     return status == EBPO_OK ? ebpo_components_measure(c, threads, progress, error) : status;
 }
 
@@ -289,7 +289,7 @@ ebpo_status ebpo_components_number(const ebpo_mesh *mesh, uint32_t **number, ebp
     if (!c)
         return ebpo_fail_memory(error, sizeof *c);
     c->mesh = mesh;
-    status = components_find(c, error);
+    status = find_components(c, error);
     if (status == EBPO_OK) {
         *number = c->number;
         c->number = NULL;
@@ -371,7 +371,7 @@ static void copy_vertices(const ebpo_components *c, uint64_t number, ebpo_mesh *
 }
 
 /* Returns the position of vertex v within the part. */
-static uint32_t place_of(const ebpo_components *c, uint64_t number, uint32_t v)
+static uint32_t position_of(const ebpo_components *c, uint64_t number, uint32_t v)
 {
     if (c->place)
         return c->place[v];
@@ -393,12 +393,12 @@ static void copy_faces(const ebpo_components *c, uint64_t number, ebpo_mesh *out
     const uint32_t *from = c->faces.of + c->faces.begin[number];
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, i, 0, out->face_count) {
         for (uint64_t k = 0; k < 3; k++)
-            out->faces[3 * i + k] = place_of(c, number, mesh->faces[3 * (uint64_t)from[i] + k]);
+            out->faces[3 * i + k] = position_of(c, number, mesh->faces[3 * (uint64_t)from[i] + k]);
         out->arrangement->face_source[i] = (uint32_t)ebpo_mesh_source_face(mesh, from[i]);
     }
 }
 
-/* Adds source indices and their totals; the order does not suffice for building a file. */
+/* Adds source indices and their totals. The mesh is not arranged for building a file. */
 static bool make_arrangement(const ebpo_mesh *whole, ebpo_mesh *out)
 {
     struct ebpo_arrangement *a = ebpo_alloc_zero(1, sizeof *a);
@@ -468,19 +468,19 @@ typedef struct naming {
     uint64_t count;
     uint32_t *order;  /* by name, then in file order */
     uint32_t *alike;  /* first run of the same name */
-    uint32_t *number; /* group of a first run */
+    uint32_t *number; /* for a first run: its group */
     ebpo_mesh_groups *out;
     uint64_t name_bytes;
 } naming;
 
-static ebpo_named_run components_shown(const ebpo_named_run *run)
+static ebpo_named_run shown_name(const ebpo_named_run *run)
 {
     return run->size ? *run : (ebpo_named_run){ unnamed, sizeof unnamed - 1, run->faces };
 }
 
 static int compare_names(const ebpo_named_run *x, const ebpo_named_run *y)
 {
-    ebpo_named_run a = components_shown(x), b = components_shown(y);
+    ebpo_named_run a = shown_name(x), b = shown_name(y);
     if (a.size != b.size)
         return a.size < b.size ? -1 : 1;
     return memcmp(a.name, b.name, a.size);
@@ -514,7 +514,7 @@ static void name_group(naming *n, uint64_t run, uint64_t first_face)
     uint32_t *number = &n->number[n->alike[run]];
     if (*number != EBPO_NO_INDEX)
         return;
-    ebpo_named_run name = components_shown(&n->runs[run]);
+    ebpo_named_run name = shown_name(&n->runs[run]);
     char *to = n->out->names + n->name_bytes;
     memcpy(to, name.name, name.size);
     to[name.size] = 0;
@@ -545,7 +545,7 @@ static void name_groups(naming *n)
         name_group(n, i, 0);
 }
 
-static ebpo_status components_make(naming *n, ebpo_error *error)
+static ebpo_status make_groups(naming *n, ebpo_error *error)
 {
     uint64_t bytes = n->count * sizeof unnamed;
     for (uint64_t i = 0; i < n->count; i++)
@@ -573,8 +573,7 @@ ebpo_status ebpo_mesh_groups_new(const ebpo_named_run *runs, uint64_t count, ebp
     if (count >= EBPO_NO_INDEX)
         return ebpo_fail(error, EBPO_E_LIMIT, "there are too many group names");
     n.out = ebpo_alloc_zero(1, sizeof *n.out);
-    ebpo_status status =
-        n.out ? components_make(&n, error) : ebpo_fail_memory(error, sizeof *n.out);
+    ebpo_status status = n.out ? make_groups(&n, error) : ebpo_fail_memory(error, sizeof *n.out);
     free(n.order);
     free(n.alike);
     free(n.number);
@@ -628,7 +627,7 @@ uint32_t ebpo_mesh_group_of(const ebpo_mesh_groups *groups, uint64_t face)
     return low < groups->run_count ? groups->run_group[low] : EBPO_NO_INDEX;
 }
 
-/* Named groups as components; a vertex may be in several groups. */
+/* --- named groups in place of components; a vertex may be in several groups --- */
 
 /* Lists each group's vertices once, in the order of its faces; only counts them if `of` is NULL.
  * `seen`: [vertex_count] last group that used the vertex. */
@@ -653,7 +652,7 @@ static void list_vertices(ebpo_components *c, uint32_t *seen)
     c->vertices.begin[c->count] = count;
 }
 
-static int components_ascending(const void *x, const void *y)
+static int compare_vertices(const void *x, const void *y)
 {
     uint32_t a = *(const uint32_t *)x, b = *(const uint32_t *)y;
     return a < b ? -1 : a > b;
@@ -675,8 +674,7 @@ static ebpo_status gather_vertices(ebpo_components *c, ebpo_error *error)
     if (!v->of)
         return ebpo_workspace_fail(workspace, c->mesh->vertex_count * sizeof *v->of, error);
     for (uint64_t n = 0; n < c->count; n++)
-        qsort(v->of + v->begin[n], v->begin[n + 1] - v->begin[n], sizeof *v->of,
-              components_ascending);
+        qsort(v->of + v->begin[n], v->begin[n + 1] - v->begin[n], sizeof *v->of, compare_vertices);
     return EBPO_OK;
 }
 
@@ -694,8 +692,8 @@ static ebpo_status list_groups(ebpo_components *c, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status components_check(const ebpo_mesh *mesh, const ebpo_mesh_groups *groups,
-                                    ebpo_error *error)
+static ebpo_status check_groups(const ebpo_mesh *mesh, const ebpo_mesh_groups *groups,
+                                ebpo_error *error)
 {
     ebpo_status status = ebpo_components_check(mesh, error);
     if (status != EBPO_OK)
@@ -713,7 +711,7 @@ ebpo_status ebpo_components_of_groups(const ebpo_mesh *mesh, const ebpo_mesh_gro
                                       ebpo_components **out, ebpo_error *error)
 {
     *out = NULL;
-    ebpo_status status = components_check(mesh, groups, error);
+    ebpo_status status = check_groups(mesh, groups, error);
     if (status != EBPO_OK)
         return status;
     ebpo_components *c = ebpo_alloc_zero(1, sizeof *c);

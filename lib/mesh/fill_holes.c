@@ -46,8 +46,8 @@ typedef struct filling {
     uint64_t added;
 } filling;
 
-static ebpo_status fill_holes_collect(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                      ebpo_error *error)
+static ebpo_status collect_edges(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     filling *f = context;
     scratch *s = &f->scratch[worker];
@@ -71,7 +71,7 @@ static ebpo_status fill_holes_collect(void *context, uint64_t begin, uint64_t en
 static ebpo_status collect_boundary(filling *f, ebpo_error *error)
 {
     ebpo_status status = ebpo_parallel_for(f->threads, NULL, f->mesh->vertex_count, VERTEX_GRAIN,
-                                           fill_holes_collect, f, NULL, "", error);
+                                           collect_edges, f, NULL, "", error);
     ebpo_boundary *lists = ebpo_alloc(f->threads, sizeof *lists);
     if (!lists)
         return ebpo_fail_memory(error, f->threads * sizeof *lists);
@@ -95,7 +95,7 @@ static int by_vertex(const void *a, const void *b)
     return (x->vertex > y->vertex) - (x->vertex < y->vertex);
 }
 
-/* Marks pairs of loop vertices that are connected by a mesh edge. */
+/* Marks the pairs of the loop's vertices that an edge of the mesh connects. */
 static void mark_taken(const filling *f, scratch *s, const uint32_t *loop, uint32_t n)
 {
     memset(s->taken, 0, (size_t)n * n);
@@ -137,7 +137,7 @@ static bool fill_loop(filling *f, scratch *s, uint64_t number)
     if (!ebpo_triangulate_chain(&chain, s->triangles))
         return false;
     uint32_t *face = f->mesh->faces + 3 * (f->mesh->face_count + f->before[number]);
-    /* against the chain, as the adjacent faces follow it */
+    /* the triangles run against the chain, because the adjacent faces run along it */
     EBPO_FOR_ITEMS_SCATTERED(workspace, t, 0, n - 2)
         for (uint64_t k = 0; k < 3; k++)
             face[3 * t + k] = loop[s->triangles[t][2 - k]];
@@ -179,7 +179,7 @@ static ebpo_status reserve_space(filling *f, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status fill_holes_run(filling *f, ebpo_error *error)
+static ebpo_status run_filling(filling *f, ebpo_error *error)
 {
     ebpo_mesh *mesh = f->mesh;
     f->scratch = ebpo_alloc_zero(f->threads, sizeof *f->scratch);
@@ -228,7 +228,7 @@ ebpo_status ebpo_mesh_fill_holes(ebpo_mesh *mesh, ebpo_repair_record *record, eb
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)
         return status;
-    status = fill_holes_run(&f, error);
+    status = run_filling(&f, error);
     if (status == EBPO_OK && record) {
         record->fill_holes = true;
         record->filled_holes += f.loops.count;

@@ -1,6 +1,6 @@
-/* Reads meshes of all formats. The table below has one row for each format. To add a format: write
- * NAME.c with its reader and its row, declare the row in import_build.h, and add a line to the
- * table. */
+/* Reads meshes of all formats. The table `formats` has one row for each format. To add a format:
+ * write NAME.c with its reader and its row, declare the row in import_build.h, and add a line to
+ * the table. */
 #include "core/strict_fp.h"
 
 #include "mesh/import.h"
@@ -16,7 +16,7 @@
 #include "mesh/import_build.h"
 #include "io/file_source.h"
 
-/* Sorted in the order of recognition. Messages list the formats from the last row to the first. */
+/* In the order of recognition. Messages list the formats from the last row to the first. */
 static const ebpo_import_format *const formats[] = {
     &ebpo_import_off,
     &ebpo_import_stl,
@@ -47,8 +47,8 @@ static void drop_empty(ebpo_mesh *mesh)
     mesh->attributes = NULL;
 }
 
-/* Reads the file with float or double positions. Sets *again if floats do not keep its text. On
- * failure only the mesh's workspace remains. */
+/* Reads the file with float or double positions. Sets *again if floats do not keep the text of its
+ * coordinates. On failure only the mesh's workspace remains. */
 static ebpo_status read_once(ebpo_mesh *mesh, const ebpo_import_format *format,
                              const ebpo_import_job *job, bool doubles, bool *again,
                              ebpo_error *error)
@@ -121,8 +121,8 @@ static bool has_mark(const uint8_t *data, uint64_t size)
     return false;
 }
 
-/* Checks the ending of the name. A name with another format's ending hides a format without a mark.
- */
+/* Checks the ending of the name: rejects a file without its format's mark if its name has the
+ * ending of another format. */
 static ebpo_status check_name(const ebpo_import_format *format, const ebpo_import_job *job,
                               ebpo_error *error)
 {

@@ -1,5 +1,5 @@
-/* Reading of meshes in all formats: recognises the format and builds the mesh. Safe for untrusted
- * bytes. */
+/* Reads meshes of all formats: recognises the format and builds the mesh. Safe for untrusted input.
+ */
 #ifndef EBPO_MESH_IMPORT_H
 #define EBPO_MESH_IMPORT_H
 
@@ -7,13 +7,13 @@
 
 #include "mesh/import_build.h"
 
-/* Recognises the format by the first bytes, otherwise by the ending of `name`. OBJ has no mark and
- * is recognised by its first word outside comments. Returns NULL for an unknown format. */
+/* Recognises the format by the first bytes, otherwise by the ending of `name`. An OBJ file has no
+ * mark and is recognised by its first word outside comments. Returns NULL for an unknown format. */
 const ebpo_import_format *ebpo_import_recognise(const uint8_t *data, uint64_t size,
                                                 const char *name);
 
 /* Parses a file in memory with the recognised format. EBPO_E_FORMAT: unknown format; the message
- * names the file type if it is known. Otherwise like ebpo_import_memory. */
+ * names the type of the file if it is known. Otherwise the same as ebpo_import_memory. */
 EBPO_MUST_USE ebpo_status ebpo_import_any(ebpo_mesh *out, const ebpo_import_job *job,
                                           ebpo_error *error);
 

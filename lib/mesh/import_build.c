@@ -143,7 +143,7 @@ static void *positions_of(const ebpo_mesh *mesh)
     return mesh->xyz32 ? (void *)mesh->xyz32 : (void *)mesh->xyz64;
 }
 
-/* Numbers a vertex when the first polygon uses it. */
+/* Numbers the vertices of a polygon that no earlier polygon uses. */
 static void number_vertices(ebpo_import_build *b)
 {
     ebpo_mesh *mesh = b->mesh;
@@ -221,7 +221,7 @@ static void load_position(const ebpo_import_build *b, uint64_t vertex, double xy
         xyz[k] = b->doubles ? wide[3 * vertex + k] : (double)narrow[3 * vertex + k];
 }
 
-static ebpo_status build_cut(ebpo_import_build *b, uint32_t n)
+static ebpo_status cut_polygon(ebpo_import_build *b, uint32_t n)
 {
     ebpo_status status = reserve_scratch(b, n);
     if (status != EBPO_OK)
@@ -261,7 +261,7 @@ ebpo_status ebpo_import_polygon(ebpo_import_build *b)
         if (status == EBPO_OK && n == 3)
             put_triangle(b, 0, 1, 2);
         else if (status == EBPO_OK)
-            status = build_cut(b, (uint32_t)n);
+            status = cut_polygon(b, (uint32_t)n);
     }
     b->corners = 0;
     return status;
@@ -269,8 +269,9 @@ ebpo_status ebpo_import_polygon(ebpo_import_build *b)
 
 /* --- the end --- */
 
-/* Frees unused capacity: arrays grow by halves, and vertices may have been merged. */
-static void build_trim(ebpo_mesh *mesh, size_t position_size)
+/* Frees unused capacity, which exists because arrays grow by halves and vertices may have been
+ * merged. */
+static void trim_arrays(ebpo_mesh *mesh, size_t position_size)
 {
     if (mesh->workspace)
         return;
@@ -306,7 +307,7 @@ ebpo_status ebpo_import_end(ebpo_import_build *b)
             mesh->faces[i] = map[mesh->faces[i]];
     ebpo_array_free(workspace, map);
     if (status == EBPO_OK)
-        build_trim(mesh, b->position_size);
+        trim_arrays(mesh, b->position_size);
     return status;
 }
 
@@ -339,8 +340,7 @@ void ebpo_import_free(ebpo_import_build *b)
         freelocale(b->c_locale);
 }
 
-/* Converts corner values to attributes of vertices, attributes of faces, or lists. */
-
+/* For each table: the names of its columns, and the name of the list of a face's three corners. */
 static const struct {
     const char *names, *list_name;
 } sorts[EBPO_IMPORT_SORTS] = { { "red green blue", "color" },
@@ -364,7 +364,7 @@ static ebpo_attribute head_of(const placing *p, const char *element)
     return head;
 }
 
-static ebpo_status build_add(const placing *p, ebpo_attribute *head, ebpo_attribute **out)
+static ebpo_status add_attribute(const placing *p, ebpo_attribute *head, ebpo_attribute **out)
 {
     const ebpo_mesh *mesh = p->b->mesh;
     size_t bytes = head->columns * (size_t)ebpo_attribute_bytes(head->type);
@@ -378,7 +378,7 @@ static ebpo_status build_add(const placing *p, ebpo_attribute *head, ebpo_attrib
 }
 
 /* Removes the last attribute. */
-static void build_drop(const placing *p)
+static void drop_attribute(const placing *p)
 {
     ebpo_attributes_remove(p->b->mesh->attributes, p->b->mesh->attributes->count - 1);
 }
@@ -397,7 +397,7 @@ static ebpo_status place_on_vertices(const placing *p, bool *fits)
 {
     const ebpo_mesh *mesh = p->b->mesh;
     ebpo_attribute head = head_of(p, "vertex"), *a;
-    ebpo_status status = build_add(p, &head, &a);
+    ebpo_status status = add_attribute(p, &head, &a);
     *fits = status == EBPO_OK;
     if (!*fits)
         return status;
@@ -409,7 +409,7 @@ static ebpo_status place_on_vertices(const placing *p, bool *fits)
             break;
     }
     if (!*fits)
-        build_drop(p);
+        drop_attribute(p);
     return EBPO_OK;
 }
 
@@ -418,7 +418,7 @@ static ebpo_status place_on_faces(const placing *p, bool *fits)
 {
     const ebpo_mesh *mesh = p->b->mesh;
     ebpo_attribute head = head_of(p, "face"), *a;
-    ebpo_status status = build_add(p, &head, &a);
+    ebpo_status status = add_attribute(p, &head, &a);
     *fits = status == EBPO_OK;
     for (uint64_t f = 0; f < mesh->face_count && *fits; f++) {
         const void *first = value_at(p, 3 * f);
@@ -427,7 +427,7 @@ static ebpo_status place_on_faces(const placing *p, bool *fits)
         memcpy(a->values + f * p->bytes, first, p->bytes);
     }
     if (status == EBPO_OK && !*fits)
-        build_drop(p);
+        drop_attribute(p);
     return status;
 }
 
@@ -437,13 +437,14 @@ static ebpo_status place_in_lists(const placing *p)
     head.columns *= 3;
     head.list = EBPO_ATTRIBUTE_UINT8;
     snprintf(head.names, sizeof head.names, "%s", sorts[p->sort].list_name);
-    ebpo_status status = build_add(p, &head, &a);
+    ebpo_status status = add_attribute(p, &head, &a);
     for (uint64_t i = 0; status == EBPO_OK && i < 3 * p->b->mesh->face_count; i++)
         memcpy(a->values + i * p->bytes, value_at(p, i), p->bytes);
     return status;
 }
 
-/* Works in place: values are written below those still to be read. */
+/* Converts values to bytes in place: they are written below the values that are still to be read.
+ */
 static void make_bytes(ebpo_import_table *t, size_t columns)
 {
     uint8_t *to = (uint8_t *)t->values;
@@ -500,8 +501,8 @@ static inline bool has_key(const char *xyz, size_t size, const uint64_t key[3])
 }
 
 /* Callers pass a constant size, for which the compiler specialises this function. */
-static inline uint64_t build_weld(char *xyz, size_t size, uint64_t count, uint32_t *map,
-                                  uint32_t *table, uint64_t slots)
+static inline uint64_t weld_positions(char *xyz, size_t size, uint64_t count, uint32_t *map,
+                                      uint32_t *table, uint64_t slots)
 {
     uint32_t kept = 0;
     for (uint64_t i = 0; i < count; i++) {
@@ -528,8 +529,8 @@ ebpo_status ebpo_import_weld(void *xyz, bool doubles, uint64_t count, uint32_t *
     if (!table)
         return ebpo_fail_memory(error, slots * sizeof *table);
     memset(table, 0xff, (size_t)slots * sizeof *table);
-    *welded = doubles ? build_weld(xyz, sizeof(double), count, map, table, slots)
-                      : build_weld(xyz, sizeof(float), count, map, table, slots);
+    *welded = doubles ? weld_positions(xyz, sizeof(double), count, map, table, slots)
+                      : weld_positions(xyz, sizeof(float), count, map, table, slots);
     free(table);
     return EBPO_OK;
 }

@@ -1,4 +1,4 @@
-/* Builder of a mesh from a file with vertices, faces and corner values.
+/* Builds a mesh from a file with vertices, faces and values of corners.
  *
  * The vertices of the mesh are those that faces use, in the order of first use, one for each
  * position: OBJ and OFF files often, and STL files always, repeat vertices where faces meet. */
@@ -49,7 +49,7 @@ typedef struct ebpo_import_build {
 
     bool doubles;         /* positions are doubles, otherwise floats */
     bool loses_digits;    /* floats do not keep the text of a coordinate */
-    uint64_t rounded;     /* table values whose text floats do not keep */
+    uint64_t rounded;     /* number of table values whose text floats do not keep */
     size_t position_size; /* bytes */
     void *xyz;            /* [vertices][3] of the file */
     uint64_t vertices, vertex_capacity;
@@ -72,7 +72,7 @@ EBPO_MUST_USE ebpo_status ebpo_import_begin(ebpo_import_build *b, ebpo_mesh *mes
  * number. */
 bool ebpo_import_coordinate(ebpo_import_build *b, double *value, const char *s, size_t n);
 
-/* Parses a number again and divides it by a weight. The result is a float if the float equals the
+/* Parses the number again and divides it by a weight. The result is a float if that equals the
  * quotient. */
 void ebpo_import_quotient(ebpo_import_build *b, double *value, const char *s, size_t n,
                           double weight);
@@ -87,7 +87,8 @@ EBPO_MUST_USE ebpo_status ebpo_import_position(ebpo_import_build *b, const doubl
 /* Adds a vertex of a binary file, which holds floats. */
 EBPO_MUST_USE ebpo_status ebpo_import_vertex(ebpo_import_build *b, const float xyz[3]);
 
-/* Adds a row to a table, with as many values as the sort has columns. Same errors. */
+/* Adds a row to a table, with as many values as the sort has columns. Returns the errors of
+ * ebpo_import_position. */
 EBPO_MUST_USE ebpo_status ebpo_import_row(ebpo_import_build *b, ebpo_import_sort sort,
                                           const float *values);
 unsigned ebpo_import_columns(ebpo_import_sort sort);
@@ -115,8 +116,6 @@ void ebpo_import_word_text(char text[EBPO_IMPORT_WORD_TEXT], const char *s, size
 
 /* Frees everything except the mesh. */
 void ebpo_import_free(ebpo_import_build *b);
-
-/* Merging of vertices at identical positions. */
 
 /* Moves the first vertex of each position to the front of xyz [count][3] (doubles or floats), in
  * order, and writes the new index of each old vertex to map [count]. Positions are equal if their
@@ -157,7 +156,7 @@ typedef struct ebpo_import_format {
         *ending; /* ending of file names: ".obj"; without the dot, the mesh's source_format */
     /* Returns true if the file begins like files of this format. */
     bool (*recognise)(const uint8_t *data, uint64_t size);
-    bool mark_comes_first; /* recognised whatever format the name indicates */
+    bool mark_comes_first; /* the mark counts, whatever format the name indicates */
     bool has_no_mark;      /* files of other formats may begin in the same way */
     /* Exactly one of `build` and `read` is set. `build` adds the content of the file to a mesh
      * under construction. `read` creates the complete mesh, reports progress, and clears `out` on

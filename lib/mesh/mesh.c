@@ -44,7 +44,7 @@ ebpo_status ebpo_mesh_check_whole(const ebpo_mesh *mesh, ebpo_error *error)
                           "a component cannot be repaired; repair the mesh that contains it");
 }
 
-/* Returns NULL when there is no space. */
+/* Copies an array; returns NULL when there is no space. */
 static void *copy_of(ebpo_workspace *workspace, const void *from, uint64_t count, size_t size)
 {
     void *to = ebpo_array_alloc(workspace, count, size);
@@ -125,7 +125,7 @@ int ebpo_mesh_has_attributes(const ebpo_mesh *mesh)
     return ebpo_attributes_hold(mesh->attributes);
 }
 
-static void mesh_include(double most[3], const ebpo_mesh *mesh, uint64_t vertex)
+static void include_vertex(double most[3], const ebpo_mesh *mesh, uint64_t vertex)
 {
     double p[3];
     ebpo_mesh_position(mesh, vertex, p);
@@ -143,19 +143,19 @@ static ebpo_mesh_frame frame_of(const double most[3])
     return frame;
 }
 
-/* Checks vertices first, which is faster. Coordinates are rarely far from 1, and then perhaps only
- * at unused vertices. */
+/* Examines the corners of faces only if some vertex is far from 1, which is rare; that vertex may
+ * be unused. Examining all vertices first is faster. */
 ebpo_mesh_frame ebpo_mesh_frame_of(const ebpo_mesh *mesh)
 {
     double most[3] = { 0, 0, 0 }, used[3] = { 0, 0, 0 };
-    if (mesh->xyz32) /* their exponents are from -148 to 128 */
+    if (mesh->xyz32) /* exponents of floats are from -148 to 128 */
         return (ebpo_mesh_frame){ .scaled = false };
     EBPO_FOR_ITEMS(mesh->workspace, v, 0, mesh->vertex_count)
-        mesh_include(most, mesh, v);
+        include_vertex(most, mesh, v);
     if (!frame_of(most).scaled)
         return (ebpo_mesh_frame){ .scaled = false };
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count)
         for (uint64_t k = 0; k < 3; k++)
-            mesh_include(used, mesh, mesh->faces[3 * f + k]);
+            include_vertex(used, mesh, mesh->faces[3 * f + k]);
     return frame_of(used);
 }

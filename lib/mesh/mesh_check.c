@@ -1,5 +1,5 @@
 /* Checks a mesh. Examines faces, edges, vertices and positions in parallel, and reports whether the
- * mesh is a closed 2-manifold, the errors and their places. */
+ * mesh is a closed 2-manifold, and the errors with their places. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,7 +16,7 @@
 #include "mesh/mesh_parts.h"
 #include "mesh/adjacency.h"
 
-/* Places found during the check, a list for each worker. */
+/* Adds a place to the worker's list. */
 void ebpo_found_add(const ebpo_check *check, unsigned worker, ebpo_found found)
 {
     ebpo_found_list *list = &check->found[worker];
@@ -48,8 +48,8 @@ typedef struct face_pass {
     double centre[3];
 } face_pass;
 
-/* Returns the root of v and halves the path. Any thread may do so, as parents only move towards the
- * root. */
+/* Returns the root of v and halves the path. Any thread may do that at any time, because parents
+ * only move towards the root. */
 static uint32_t find_root(uint32_t *parents, uint32_t v)
 {
     for (;;) {
@@ -64,9 +64,9 @@ static uint32_t find_root(uint32_t *parents, uint32_t v)
     }
 }
 
-/* Links the higher root to the lower one, which avoids cycles. The number of roots does not depend
- * on the order. */
-static void check_join(uint32_t *parents, uint32_t a, uint32_t b)
+/* Joins two trees: links the higher root to the lower one, which avoids cycles. The number of roots
+ * does not depend on the order. */
+static void join_trees(uint32_t *parents, uint32_t a, uint32_t b)
 {
     for (;;) {
         a = find_root(parents, a);
@@ -112,16 +112,16 @@ static double cross_length(const ebpo_units *u, const double cross[3])
     return ebpo_scaled_length(cross, exponent, u->area);
 }
 
-static void check_measure(face_block *block, const ebpo_units *units, const double centre[3],
-                          const double a[3], const double cross[3])
+static void measure_face(face_block *block, const ebpo_units *units, const double centre[3],
+                         const double a[3], const double cross[3])
 {
     ebpo_sum_add(&block->area2, cross_length(units, cross));
     ebpo_sum_add(&block->volume6, (a[0] - centre[0]) * cross[0] + (a[1] - centre[1]) * cross[1] +
                                       (a[2] - centre[2]) * cross[2]);
 }
 
-static void check_note(const ebpo_check *check, unsigned worker, ebpo_finding *finding,
-                       ebpo_finding_kind kind, uint64_t face)
+static void note_face(const ebpo_check *check, unsigned worker, ebpo_finding *finding,
+                      ebpo_finding_kind kind, uint64_t face)
 {
     ebpo_check_note(check, worker, finding, kind, ebpo_mesh_source_face(check->mesh, face),
                     (uint32_t)face, (uint32_t)face);
@@ -137,12 +137,12 @@ static ebpo_status check_faces(void *context, uint64_t begin, uint64_t end, unsi
     face_block block = { .area2 = { .adds = 0 } };
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, begin, end) {
         const uint32_t *v = mesh->faces + 3 * f;
-        check_join(parents, v[0], v[1]);
-        check_join(parents, v[1], v[2]);
+        join_trees(parents, v[0], v[1]);
+        join_trees(parents, v[1], v[2]);
         if (ebpo_face_repeats_index(v)) {
-            check_note(pass->check, worker, &block.index_repeated, EBPO_FOUND_INDEX_REPEATED_FACE,
-                       f);
-            check_note(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
+            note_face(pass->check, worker, &block.index_repeated, EBPO_FOUND_INDEX_REPEATED_FACE,
+                      f);
+            note_face(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
             continue;
         }
         double a[3], b[3], c[3], cross[3];
@@ -150,14 +150,14 @@ static ebpo_status check_faces(void *context, uint64_t begin, uint64_t end, unsi
         ebpo_check_position(pass->check, v[1], b);
         ebpo_check_position(pass->check, v[2], c);
         ebpo_face_cross(a, b, c, cross);
-        check_measure(&block, &pass->check->units, pass->centre, a, cross);
+        measure_face(&block, &pass->check->units, pass->centre, a, cross);
         if (pass->check->units.scaled) { /* the test is exact: it uses unscaled coordinates */
             ebpo_mesh_position(mesh, v[0], a);
             ebpo_mesh_position(mesh, v[1], b);
             ebpo_mesh_position(mesh, v[2], c);
         }
         if (zero_area(a, b, c))
-            check_note(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
+            note_face(pass->check, worker, &block.zero_area, EBPO_FOUND_ZERO_AREA_FACE, f);
     }
     pass->blocks[begin / FACE_GRAIN] = block;
     return EBPO_OK;
@@ -282,7 +282,7 @@ static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, 
         end = ebpo_star_run_end(star, begin);
         fans -= join_fans(s->fans, star->links + begin, end - begin);
         uint32_t neighbour = ebpo_link_neighbour(&star->links[begin]);
-        if (neighbour < v) /* the edge is counted at its lower vertex */
+        if (neighbour < v) /* each edge is counted at its lower vertex */
             continue;
         ebpo_sum_add(&block->length, edge_length(check, v, neighbour));
         if (!classify_edge(check, block, s, v, star->links + begin, end - begin))
@@ -294,7 +294,7 @@ static bool check_edges(const ebpo_check *check, star_block *block, scratch *s, 
     return true;
 }
 
-static bool check_repeated(const ebpo_check *check, star_block *block, scratch *s, uint32_t v)
+static bool note_repeated_faces(const ebpo_check *check, star_block *block, scratch *s, uint32_t v)
 {
     if (!ebpo_same_faces_gather(&s->same, &check->stars, check->mesh, v))
         return false;
@@ -322,7 +322,8 @@ static ebpo_status check_stars(void *context, uint64_t begin, uint64_t end, unsi
             continue;
         block.components += check->parents[v] == v;
         if (!ebpo_star_gather(&s->star, &check->stars, check->mesh, vertex) ||
-            !check_edges(check, &block, s, vertex) || !check_repeated(check, &block, s, vertex))
+            !check_edges(check, &block, s, vertex) ||
+            !note_repeated_faces(check, &block, s, vertex))
             return ebpo_workspace_fail(check->mesh->workspace, degree * 2 * sizeof *s->star.links,
                                        error);
     }
@@ -503,8 +504,8 @@ typedef struct curve_run {
     uint64_t at, end;
 } curve_run;
 
-/* Compares the next vertices of two runs along the curve, as arranging does: less than 0 for `a`, 0
- * for equal positions. */
+/* Compares the next vertices of two runs along the curve, in the order in which the mesh is
+ * arranged: less than 0 if that of `a` comes first, 0 for equal positions. */
 static int compare_runs(const curve_run *a, const curve_run *b)
 {
     const uint64_t *key = a->mesh->arrangement->key;
@@ -527,7 +528,8 @@ static void note_repeated(const ebpo_check *check, uint32_t v)
                     ebpo_mesh_source_vertex(check->mesh, v), v, v);
 }
 
-/* Skips the vertices at a run's next position. All but the first in the source are repetitions. */
+/* Skips the vertices at a run's next position. All but the first of them in the source are
+ * repetitions. */
 static void take_position(const ebpo_check *check, curve_run *r, uint32_t *lowest)
 {
     double here[3], p[3];
@@ -546,8 +548,8 @@ static void take_position(const ebpo_check *check, curve_run *r, uint32_t *lowes
     } while (r->at < r->end && p[0] == here[0] && p[1] == here[1] && p[2] == here[2]);
 }
 
-/* Compares positions in an arranged mesh: used and unused vertices are one run each, or all are one
- * run. */
+/* Compares positions in an arranged mesh. The used vertices are one run and the unused ones
+ * another, or all vertices are one run. */
 static void compare_along_curve(const ebpo_check *check)
 {
     const ebpo_mesh *mesh = check->mesh;
@@ -608,7 +610,7 @@ ebpo_status ebpo_check_positions(ebpo_check *check, ebpo_error *error)
 
 /* Completes the report. Source: EBP 2017, section 3.1, for the definition of a closed 2-manifold;
  * Euler's formula for the genus. */
-static void check_conclude(ebpo_check *c)
+static void complete_report(ebpo_check *c)
 {
     ebpo_mesh_report *r = c->report;
     r->balanced = r->unbalanced_edges.count == 0;
@@ -660,11 +662,11 @@ static ebpo_status check_run(ebpo_check *c, ebpo_error *error)
         status = boundary_loops(c, error);
     ebpo_array_free(c->mesh->workspace, c->parents);
     c->parents = NULL;
-    ebpo_stars_free(&c->stars); /* frees memory for the table of positions */
+    ebpo_stars_free(&c->stars); /* makes memory free for the table of positions */
     if (status == EBPO_OK)
         status = ebpo_check_positions(c, error);
     if (status == EBPO_OK)
-        check_conclude(c);
+        complete_report(c);
     return status;
 }
 

@@ -11,16 +11,17 @@
 #include "mesh/adjacency.h"
 #include "mesh/sum.h"
 
-/* Along axis k, the unit of length is 2^exponent[k] if squares and cubes could otherwise leave the
- * range of a double; otherwise 0. */
+/* The units of measurement. Along axis k, the unit of length is 2^exponent[k]. All exponents are 0
+ * unless squares and cubes could leave the range of doubles. */
 typedef struct ebpo_units {
     bool scaled;
     int exponent[3];
     int length, area, volume; /* exponents of the sums */
 } ebpo_units;
 
-/* A place during the check, with indices in the current mesh: the vertices of an edge or a vertex;
- * of a face its index (`b` of a repeated one: the first of its vertices). */
+/* A place that was found during the check, with indices in the current mesh: the vertices of an
+ * edge, a vertex, or the index of a face. For a repeated face, `b` is the first face with its
+ * vertices. */
 typedef struct ebpo_found {
     uint32_t kind, place; /* as in ebpo_finding */
     uint32_t a, b;
@@ -31,12 +32,12 @@ static inline bool ebpo_found_is_edge(uint32_t kind) { return kind <= EBPO_FOUND
 typedef struct ebpo_found_list {
     ebpo_found *item;
     uint64_t count, capacity;
-    bool short_of_memory; /* some are missing */
+    bool short_of_memory; /* some places are missing */
 } ebpo_found_list;
 
 typedef struct ebpo_check {
     const ebpo_mesh *mesh;
-    unsigned threads; /* resolved count */
+    unsigned threads; /* number of threads, not 0 */
     ebpo_progress progress;
     ebpo_mesh_report *report;
     uint32_t *parents; /* [vertex_count] union-find forest over vertices */
@@ -109,7 +110,7 @@ EBPO_MUST_USE ebpo_status ebpo_check_run(ebpo_check *check, ebpo_error *error);
 
 /* Checks that every coordinate is finite. */
 EBPO_MUST_USE ebpo_status ebpo_check_coordinates(ebpo_check *check, ebpo_error *error);
-/* Computes the bounding box, the unit of measurement and unreferenced vertices; needs stars. */
+/* Computes the bounding box, the unit of measurement and unreferenced vertices; needs the stars. */
 EBPO_MUST_USE ebpo_status ebpo_check_vertices(ebpo_check *check, ebpo_error *error);
 /* Computes area, volume (relative to the box's centre), faces of zero area and repeated indices;
  * joins components. Needs the bounding box. */

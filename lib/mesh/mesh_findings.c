@@ -1,6 +1,6 @@
-/* Finds the places of a mesh's findings. They are noted during the mesh check and sorted. They are
- * passed to the caller with the surrounding faces, or written as a PLY with a colour for each kind.
- */
+/* Finds the places of a mesh's findings. The places are noted during the mesh check and sorted.
+ * They are then passed to the caller with the surrounding faces, or written as a PLY with a colour
+ * for each kind of finding. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -20,13 +20,11 @@
 #include "mesh/component_parts.h"
 #include "mesh/mesh_check_parts.h"
 
-/* --- names and colours of findings --- */
-
-/* A mesh with the places of findings in colour. */
+/* --- the PLY with the places of findings in colour --- */
 
 typedef struct places_picture {
     const ebpo_mesh *mesh;
-    uint8_t *face; /* kind shown for each element, indexed as in the current mesh */
+    uint8_t *face; /* kind of finding shown at each vertex or face, by index in the current mesh */
     ebpo_publish target;
 } places_picture;
 
@@ -37,10 +35,10 @@ typedef struct places_picture {
 
 static ebpo_status begin_picture(places_picture *picture, const ebpo_mesh *mesh, const char *path,
                                  ebpo_error *error);
-/* `faces`: indices in the current mesh. */
+/* Notes a place in the picture. `faces`: indices in the current mesh. */
 static void note_in_picture(places_picture *picture, const ebpo_found *found, const uint64_t *faces,
                             uint64_t count);
-/* `report`: for the legend. */
+/* Writes the picture. `report` is for the legend. */
 static ebpo_status write_picture(places_picture *picture, const ebpo_mesh_report *report,
                                  ebpo_error *error);
 static void end_picture(places_picture *picture);
@@ -72,9 +70,6 @@ void ebpo_finding_colour(int32_t kind, uint8_t rgb[3])
     memcpy(rgb, ebpo_finding_name(kind) ? kinds[kind].rgb : grey, 3);
 }
 
-/* Lists every place of a mesh's findings: noted during the check, then sorted, then reported with
- * the surrounding faces. */
-
 static bool is_vertex(uint32_t kind) { return kind >= EBPO_FOUND_BOWTIE_VERTEX; }
 
 /* ---- reporting ---- */
@@ -87,7 +82,7 @@ typedef struct places {
     ebpo_found_list all;
     uint32_t *component; /* [vertex_count] */
     ebpo_stars stars;
-    uint64_t *faces; /* around a place */
+    uint64_t *faces; /* faces around the current place */
     uint64_t face_count, face_capacity;
     places_picture picture;
 } places;
@@ -161,8 +156,8 @@ static ebpo_status join_lists(const places *p, const ebpo_found_list *lists, uns
 }
 
 /* Gathers one sorted list, which does not depend on the threads. */
-static ebpo_status find_places_gather(places *p, const ebpo_found_list *lists, unsigned count,
-                                      ebpo_error *error)
+static ebpo_status gather_places(places *p, const ebpo_found_list *lists, unsigned count,
+                                 ebpo_error *error)
 {
     ebpo_workspace *workspace = p->mesh->workspace;
     ebpo_found_list joined = { NULL, 0, 0, false };
@@ -201,8 +196,8 @@ static int compare_numbers(const void *x, const void *y)
     return *a < *b ? -1 : *a > *b;
 }
 
-/* Collects source indices of the faces that have all `count` corners. Searches around the corner
- * with the fewest faces, as another may be the hub of a large fan. */
+/* Collects the faces that have all `count` corners, as indices in the current mesh. Searches the
+ * faces at the corner that has the fewest, because another corner may be the hub of a large fan. */
 static bool gather_faces(places *p, const uint32_t *corner, int count)
 {
     uint32_t about = corner[0];
@@ -224,7 +219,7 @@ static bool gather_faces(places *p, const uint32_t *corner, int count)
     return true;
 }
 
-/* Collects the faces of a finding in the current mesh. */
+/* Collects the faces of a finding, as indices in the current mesh. */
 static bool faces_of(places *p, const ebpo_found *f)
 {
     if (ebpo_found_is_edge(f->kind))
@@ -252,7 +247,7 @@ static int vertices_of(const places *p, const ebpo_found *f, uint32_t out[3])
     return ebpo_found_is_edge(f->kind) ? 2 : 1;
 }
 
-static ebpo_mesh_finding place_of(places *p, const ebpo_found *f)
+static ebpo_mesh_finding make_finding(places *p, const ebpo_found *f)
 {
     uint32_t v[3];
     int count = vertices_of(p, f, v);
@@ -287,7 +282,7 @@ static ebpo_status report_all(places *p, ebpo_error *error)
         if (i % BETWEEN_STEPS == 0 &&
             !ebpo_progress_step(&p->options.progress, "places", i, p->all.count, error))
             return EBPO_E_CANCELLED;
-        ebpo_mesh_finding place = place_of(p, f);
+        ebpo_mesh_finding place = make_finding(p, f);
         if (p->take && !p->take(p->user, &place)) {
             p->take = NULL;
             if (!p->options.ply)
@@ -312,14 +307,14 @@ static ebpo_status note_all(places *p, ebpo_mesh_report *report, ebpo_error *err
                          .found = lists };
     ebpo_status status = ebpo_check_run(&check, error);
     if (status == EBPO_OK)
-        status = find_places_gather(p, lists, threads, error);
+        status = gather_places(p, lists, threads, error);
     for (unsigned t = 0; t < threads; t++)
         ebpo_array_free(p->mesh->workspace, lists[t].item);
     free(lists);
     return status;
 }
 
-static ebpo_status find_places_find(places *p, ebpo_mesh_report *report, ebpo_error *error)
+static ebpo_status find_places(places *p, ebpo_mesh_report *report, ebpo_error *error)
 {
     ebpo_status status = note_all(p, report, error);
     if (status == EBPO_OK)
@@ -349,7 +344,7 @@ ebpo_status ebpo_mesh_findings(const ebpo_mesh *mesh, const ebpo_findings_option
     ebpo_mesh_report found = { .edges = 0 };
     ebpo_status status = EBPO_TAKE(ebpo_findings_options, &p.options, options, error);
     if (status == EBPO_OK)
-        status = find_places_find(&p, &found, error);
+        status = find_places(&p, &found, error);
     ebpo_array_free(mesh->workspace, p.all.item);
     ebpo_array_free(mesh->workspace, p.component);
     ebpo_array_free(mesh->workspace, p.faces);
@@ -423,8 +418,8 @@ static void put_colour(uint8_t kind, uint8_t rgb[3])
     ebpo_finding_colour(kind == NOTHING ? -1 : kind, rgb);
 }
 
-/* Returns the mesh indices in ascending order of source indices, without dropped faces. NULL when
- * memory is short. */
+/* Returns the indices of the mesh in ascending order of their source indices, without dropped
+ * faces. NULL when memory is short. */
 static uint32_t *in_source_order(const ebpo_mesh *mesh, const uint32_t *source, uint64_t count)
 {
     uint64_t most = count;

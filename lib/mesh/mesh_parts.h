@@ -14,20 +14,21 @@
 /* The order of a mesh whose vertices and faces are sorted along a Morton curve (ebpo_mesh_arrange),
  * or whose faces were partly dropped. */
 struct ebpo_arrangement {
-    /* around the referenced vertices, with exact cell faces down to box.grid_level */
+    /* the box around the referenced vertices, with exact cell faces down to box.grid_level */
     ebpo_box box;
     /* referenced vertices come first, along the curve; the others follow, also along the curve */
     uint64_t referenced;
     /* [vertex_count] octcode of the vertex's cell at box.grid_level, ascending among the referenced
-     * and among the other vertices. NULL: arranged for repair, or repaired since; neighbours in
-     * space are still close in memory, but building must arrange the mesh again */
+     * and among the other vertices. NULL if the mesh was arranged for repair, or repaired since;
+     * neighbours in space are then still close in memory, but building must arrange the mesh again
+     */
     uint64_t *key;
     int level;                 /* requested level; -1: as deep as useful */
     bool grouped;              /* vertices at one position are adjacent */
     uint32_t *vertex_source;   /* [vertex_count] source indices */
     uint32_t *face_source;     /* [face_count] */
     ebpo_workspace *workspace; /* the mesh's; owns all arrays */
-    /* for a component: counts of the repaired whole mesh; otherwise 0 */
+    /* for a component: counts of the repaired mesh that it is a part of; otherwise 0 */
     uint64_t whole_vertices, whole_faces;
     uint64_t
         dropped_faces; /* faces of the source that were dropped later; their indices are unused */
@@ -85,7 +86,7 @@ static inline bool ebpo_face_repeats_index(const uint32_t face[3])
 }
 
 /* Returns true if a sum of `count` rounded volume terms, the largest of which is `most`, may be
- * rounding noise: two-sided sheets have no volume and no outside. */
+ * rounding noise: sheets of two sides have no volume and no outside. */
 static inline bool ebpo_volume_is_noise(double sum, uint64_t count, double most)
 {
     return (sum < 0 ? -sum : sum) <= 1e-12 * (double)count * most;
@@ -110,8 +111,9 @@ enum {
     EBPO_REPAIR_DROP = 32
 };
 
-/* Performs the requested steps: merges vertices (within a distance if it is above 0), drops faces,
- * orients, flips, fills holes, and orients the components that this closed. */
+/* Performs the requested steps: merges vertices (those within weld_distance if it is above 0),
+ * drops faces, orients, flips, fills holes, and orients the components that were closed by filling
+ * holes. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, double weld_distance,
                                            ebpo_repair_record *record, ebpo_error *error);
 
@@ -120,20 +122,21 @@ EBPO_MUST_USE ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, doub
 EBPO_MUST_USE ebpo_status ebpo_mesh_make_consistent(ebpo_mesh *mesh, ebpo_repair_record *record,
                                                     uint32_t **closed, ebpo_error *error);
 
-/* Turns shells outwards, or inwards if they are within an odd number of others: the second part.
- * `closed`: result of ebpo_mesh_find_shells; modified. */
+/* Turns shells outwards, or inwards if they are within an odd number of others: the second part of
+ * ebpo_mesh_orient. `closed`: result of ebpo_mesh_find_shells, which is modified. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_turn_shells(ebpo_mesh *mesh, uint32_t *closed,
                                                 ebpo_repair_record *record, ebpo_error *error);
 
 /* Finds the shell of each face, closed [face_count]: a number unique to the shell, or
- * EBPO_NO_INDEX. A shell is closed by itself: its faces are connected by edges with two faces, or
- * around edges with more. Owned by the mesh's workspace. */
+ * EBPO_NO_INDEX. A shell is a set of faces that is closed by itself; they are connected by edges
+ * with two faces, or around edges with more. The array is owned by the mesh's workspace. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_find_shells(const ebpo_mesh *mesh, unsigned threads,
                                                 uint32_t **closed, ebpo_error *error);
 
 /* Decides which vertices are merged, by the rule of ebpo_mesh_weld_within, in a mesh without
- * repeated positions. map [vertex_count]: new index of each vertex; from [vertex_count]: the *kept
- * remaining vertices, ascending; *moved: the largest distance. */
+ * repeated positions. map [vertex_count] receives the new index of each vertex, from [vertex_count]
+ * the *kept remaining vertices, ascending, and *moved the largest distance by which a vertex moves.
+ */
 EBPO_MUST_USE ebpo_status ebpo_weld_group_within(const ebpo_mesh *mesh, double distance,
                                                  uint32_t *map, uint32_t *from, uint64_t *kept,
                                                  double *moved, ebpo_error *error);
@@ -145,10 +148,9 @@ const char *ebpo_mesh_label(const ebpo_mesh *mesh);
  * exceeds 2^32 - 2. */
 EBPO_MUST_USE ebpo_status ebpo_mesh_check_shape(const ebpo_mesh *mesh, ebpo_error *error);
 
-/* Coordinates in units of powers of two, one for each axis, in which volumes of meshes far from 1
- * neither overflow nor underflow; signs and order are unchanged. */
-
-/* Squares and cubes of values between 2^-256 and 2^256 are far from overflow and underflow. */
+/* A frame has a power of two as the unit of each axis, so that volumes of meshes with coordinates
+ * far from 1 neither overflow nor underflow. Signs and order of coordinates are unchanged. Squares
+ * and cubes of values between 2^-256 and 2^256 are far from overflow and underflow. */
 enum { EBPO_EXPONENT_MAX = 256 };
 
 static inline bool ebpo_exponent_is_far(int exponent)
@@ -172,8 +174,6 @@ static inline void ebpo_frame_position(const ebpo_mesh_frame *frame, const ebpo_
         for (int k = 0; k < 3; k++)
             out[k] = ldexp(out[k], -frame->exponent[k]);
 }
-
-/* Vertices with identical positions. */
 
 /* A hash table of all positions; each entry is the lowest vertex index at its position. 5.3 to 10.7
  * bytes a vertex. */

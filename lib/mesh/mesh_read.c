@@ -36,7 +36,8 @@ static void *hash_file(void *argument)
     return NULL;
 }
 
-/* Hashes in a thread parallel to parsing: both take about equally long and read the same pages. */
+/* Starts a thread that hashes the file while it is parsed. Both take about the same time and read
+ * the same pages. */
 static void hash_begin(hashing *h)
 {
     h->threaded = ebpo_thread_start(&h->thread, hash_file, h) == 0;
@@ -71,7 +72,8 @@ static ebpo_status read_parse(ebpo_mesh *out, const ebpo_whole_file *file, const
     return status;
 }
 
-/* Reports a change of the file during reading in place of the format error that it may cause. */
+/* If the file was changed while it was read, reports that in place of the format error that the
+ * change may have caused. */
 static ebpo_status report_change(const ebpo_whole_file *file, const char *path, ebpo_status status,
                                  ebpo_error *error)
 {

@@ -36,9 +36,9 @@ static inline bool same_key(const key *a, const key *b)
     return a->bits[0] == b->bits[0] && a->bits[1] == b->bits[1] && a->bits[2] == b->bits[2];
 }
 
-/* Returns true if the position was already present. In any order of insertion, the slot ends with
- * the lowest index. */
-static bool weld_insert(ebpo_positions *t, uint32_t v)
+/* Returns true if the position was already present. The slot has the lowest index at the end, in
+ * any order of insertion. */
+static bool insert_position(ebpo_positions *t, uint32_t v)
 {
     key k = key_of(t->mesh, v);
     for (uint64_t h = ebpo_hash_three(k.bits) & t->mask;; h = (h + 1) & t->mask) {
@@ -64,7 +64,7 @@ static ebpo_status insert_range(void *context, uint64_t begin, uint64_t end, uns
     ebpo_positions *t = context;
     uint64_t repeated = 0;
     EBPO_FOR_ITEMS_SCATTERED(t->mesh->workspace, v, begin, end)
-        repeated += weld_insert(t, (uint32_t)v);
+        repeated += insert_position(t, (uint32_t)v);
     __atomic_fetch_add(&t->repeated, repeated, __ATOMIC_RELAXED);
     return EBPO_OK;
 }
@@ -117,12 +117,12 @@ typedef struct welding {
     uint64_t collapsed; /* faces that repeat a vertex only after welding */
     uint64_t kept;
     uint32_t *map;  /* [vertex_count] new index of each vertex */
-    uint32_t *from; /* [kept] vertex that stays, of those at one position */
-    /* arranged mesh: [blocks of GRAIN vertices + 1] positions that begin in the block; later the
-     * sum before it */
+    uint32_t *from; /* [kept] the vertex that stays of each group */
+    /* arranged mesh: [blocks of GRAIN vertices + 1] number of groups that begin in the block; later
+     * the number in all blocks before it */
     uint64_t *heads;
-    uint64_t *stays;  /* arranged mesh: bit s: vertex s of the source stays */
-    uint64_t *before; /* [words of `stays`] bits set before it */
+    uint64_t *stays;  /* arranged mesh: bit s is set if vertex s of the source stays */
+    uint64_t *before; /* [words of `stays`] number of bits set before the word */
     uint32_t *rows;   /* arranged mesh with attributes: [kept] attribute rows that stay */
 } welding;
 
@@ -228,9 +228,10 @@ static ebpo_status group_within(welding *w, ebpo_error *error)
 
 /* --- remaining vertices --- */
 
-/* Chooses the first vertex in the source of each group. Groups are numbered by their first
- * vertices, so a new index is first seen as the next one. */
-static ebpo_status weld_choose(welding *w, ebpo_error *error)
+/* Chooses the vertex of each group that is first in the source. Groups are numbered in the order of
+ * their first vertices, so the first vertex of a group is recognised: its new index is the next
+ * one. */
+static ebpo_status choose_staying(welding *w, ebpo_error *error)
 {
     const ebpo_mesh *mesh = w->mesh;
     uint64_t intersected = 0;
@@ -339,8 +340,8 @@ static void move_attributes(const welding *w)
     ebpo_attributes_keep(attributes, "vertex", w->rows ? w->rows : w->from, w->kept);
 }
 
-/* Moves vertices to their new indices. As an index never exceeds those of the group's vertices,
- * moving in ascending order overwrites no needed vertex. */
+/* Moves vertices to their new indices. The new index is at most the least index of the group's
+ * vertices, so moving in ascending order overwrites no vertex that is still needed. */
 static void move_vertices(welding *w)
 {
     ebpo_mesh *mesh = w->mesh;
@@ -371,7 +372,7 @@ static void move_vertices(welding *w)
         mesh->xyz64 = smaller;
 }
 
-static ebpo_status weld_run(welding *w, ebpo_error *error)
+static ebpo_status run_welding(welding *w, ebpo_error *error)
 {
     ebpo_mesh *mesh = w->mesh;
     ebpo_status status = ebpo_parallel_for(0, mesh->workspace, mesh->face_count, GRAIN,
@@ -390,7 +391,7 @@ static ebpo_status weld_run(welding *w, ebpo_error *error)
         return status;
     status = ebpo_mesh_check_whole(mesh, error);
     if (status == EBPO_OK && !w->from)
-        status = weld_choose(w, error);
+        status = choose_staying(w, error);
     if (status != EBPO_OK)
         return status;
     if (mesh->arrangement)
@@ -408,15 +409,15 @@ static ebpo_status weld_run(welding *w, ebpo_error *error)
 }
 
 /* Welds the mesh. Distance 0 means equal positions. */
-static ebpo_status mesh_weld_weld(ebpo_mesh *mesh, double distance, ebpo_repair_record *record,
-                                  ebpo_error *error)
+static ebpo_status weld_mesh(ebpo_mesh *mesh, double distance, ebpo_repair_record *record,
+                             ebpo_error *error)
 {
     welding w = { .mesh = mesh, .distance = distance };
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)
         return status;
     uint64_t count = mesh->vertex_count;
-    status = weld_run(&w, error);
+    status = run_welding(&w, error);
     if (status == EBPO_OK && record) {
         record->weld = true;
         record->welded_vertices += count - mesh->vertex_count;
@@ -438,7 +439,7 @@ static ebpo_status mesh_weld_weld(ebpo_mesh *mesh, double distance, ebpo_repair_
 ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_repair_record *record, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    return mesh_weld_weld(mesh, 0, record, error);
+    return weld_mesh(mesh, 0, record, error);
 }
 
 ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double distance, ebpo_repair_record *record,
@@ -448,6 +449,6 @@ ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double distance, ebpo_repair_
     if (!(distance > 0))
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, ebpo_mesh_label(mesh),
                               "the weld distance must be above 0, not %g", distance);
-    ebpo_status status = mesh_weld_weld(mesh, 0, record, error);
-    return status == EBPO_OK ? mesh_weld_weld(mesh, distance, record, error) : status;
+    ebpo_status status = weld_mesh(mesh, 0, record, error);
+    return status == EBPO_OK ? weld_mesh(mesh, distance, record, error) : status;
 }

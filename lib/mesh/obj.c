@@ -24,11 +24,15 @@
 
 /* Counts of data in the file that the mesh cannot hold. */
 typedef struct obj_losses {
-    uint64_t weights, surplus;              /* vertices divided by w; vertices with extra values */
-    uint64_t curves, unknown, unknown_line; /* statements; line of the first unknown one */
-    uint64_t absent[EBPO_IMPORT_SORTS];     /* corners that refer to missing values */
-    uint64_t uncoloured, alpha, no_numbers; /* counts for vertices, vertices, and normals and
-                                             * coordinates */
+    /* number of vertices divided by w, and of vertices with extra values */
+    uint64_t weights, surplus;
+    /* numbers of curve statements and of unknown statements, and the line of the first unknown one
+     */
+    uint64_t curves, unknown, unknown_line;
+    uint64_t absent[EBPO_IMPORT_SORTS]; /* number of corners that refer to missing values */
+    /* numbers of vertices without colour, of vertices with opacity, and of values that are no
+     * numbers */
+    uint64_t uncoloured, alpha, no_numbers;
     bool third, smoothing, library, groups;
 } obj_losses;
 
@@ -171,18 +175,18 @@ static uint64_t hash_of(ebpo_obj_word word)
     return ebpo_hash_number(hash);
 }
 
-static bool obj_names_same(ebpo_obj_word a, ebpo_obj_word b)
+static bool same_word(ebpo_obj_word a, ebpo_obj_word b)
 {
     return a.n == b.n && memcmp(a.s, b.s, a.n) == 0;
 }
 
-/* Returns the slot that holds the name's index or would hold it. 0 marks a free slot, as index 0
+/* Returns the slot that holds or would hold the name's index. 0 marks a free slot, because index 0
  * has no name. */
-static uint64_t obj_names_find(const ebpo_obj_names *names, ebpo_obj_word word)
+static uint64_t find_slot(const ebpo_obj_names *names, ebpo_obj_word word)
 {
     uint64_t at;
     EBPO_HASH_FIND(at, hash_of(word), names->slots - 1,
-                   !names->slot[at] || obj_names_same(names->material[names->slot[at]], word));
+                   !names->slot[at] || same_word(names->material[names->slot[at]], word));
     return at;
 }
 
@@ -196,7 +200,7 @@ static bool grow_table(ebpo_obj_names *names)
     names->slot = slot;
     names->slots = slots;
     for (uint64_t i = 1; i < names->count; i++)
-        slot[obj_names_find(names, names->material[i])] = (uint32_t)i;
+        slot[find_slot(names, names->material[i])] = (uint32_t)i;
     return true;
 }
 
@@ -211,7 +215,7 @@ ebpo_status ebpo_obj_use_material(ebpo_obj_names *names, ebpo_obj_word material,
         return ebpo_fail_memory(error, need * sizeof *names->material);
     if (!names->count)
         names->material[names->count++] = (ebpo_obj_word){ "DefaultMaterial", 15 };
-    uint64_t at = obj_names_find(names, material);
+    uint64_t at = find_slot(names, material);
     if (!names->slot[at]) {
         names->material[names->count] = material;
         names->slot[at] = (uint32_t)names->count++;
@@ -259,7 +263,7 @@ static void print_properties(FILE *out, const ebpo_attributes *attributes, const
     }
 }
 
-/* Creates a PLY header, as the mesh is exported as PLY. */
+/* Creates a PLY header with the names, because the mesh is exported as PLY. */
 static ebpo_status make_header(const ebpo_mesh *mesh, const ebpo_obj_names *names,
                                ebpo_error *error)
 {
@@ -332,7 +336,7 @@ static ebpo_status fail_statement(const obj_reading *r, const char *format, ...)
 }
 
 /* Reads the first word of the next statement. Releases pages now and then. */
-static bool ebpo_obj_step(obj_reading *r, ebpo_obj_word *word)
+static bool step_to_statement(obj_reading *r, ebpo_obj_word *word)
 {
     uint64_t at = (uint64_t)(r->text.at - (const char *)r->data);
     if (at >= r->next_release) {
@@ -344,7 +348,7 @@ static bool ebpo_obj_step(obj_reading *r, ebpo_obj_word *word)
     return more;
 }
 
-/* The second pass: faces, and their materials and groups. */
+/* --- the second pass: faces, and their materials and groups --- */
 
 /* Index kinds of the second and third part of a corner, v/vt/vn. */
 static const ebpo_import_sort sort_of[2] = { EBPO_IMPORT_TEXTURE, EBPO_IMPORT_NORMALS };
@@ -372,15 +376,15 @@ static bool read_number(const char **at, const char *end, int64_t *number)
 }
 
 /* Converts an index that counts from 1, or back from the current position, to a row. */
-static bool obj_faces_resolve(const obj_reading *r, ebpo_import_sort sort, uint64_t total,
-                              int64_t number, uint32_t *row)
+static bool resolve_index(const obj_reading *r, ebpo_import_sort sort, uint64_t total,
+                          int64_t number, uint32_t *row)
 {
     int64_t at = number > 0 ? number - 1 : (int64_t)r->rows[sort] + number;
     *row = (uint32_t)at;
     return number != 0 && at >= 0 && (uint64_t)at < total;
 }
 
-static ebpo_status obj_faces_fail_vertex(const obj_reading *r, int64_t number)
+static ebpo_status fail_vertex_index(const obj_reading *r, int64_t number)
 {
     if (number > 0)
         return fail_statement(r,
@@ -406,8 +410,8 @@ static ebpo_status add_corner(obj_reading *r, const uint64_t total[EBPO_IMPORT_S
     memset(c, 0xff, sizeof *c);
     if (!read_number(&at, end, &number))
         return fail_corner(r, word);
-    if (!obj_faces_resolve(r, EBPO_IMPORT_COLOURS, r->build->vertices, number, &c->vertex))
-        return obj_faces_fail_vertex(r, number);
+    if (!resolve_index(r, EBPO_IMPORT_COLOURS, r->build->vertices, number, &c->vertex))
+        return fail_vertex_index(r, number);
     c->row[EBPO_IMPORT_COLOURS] = c->vertex;
     for (int i = 0; i < 2 && at < end; i++) {
         ebpo_import_sort sort = sort_of[i];
@@ -416,7 +420,7 @@ static ebpo_status add_corner(obj_reading *r, const uint64_t total[EBPO_IMPORT_S
             continue;
         if (!read_number(&at, end, &number))
             return fail_corner(r, word);
-        if (!obj_faces_resolve(r, sort, total[sort], number, &c->row[sort])) {
+        if (!resolve_index(r, sort, total[sort], number, &c->row[sort])) {
             c->row[sort] = EBPO_IMPORT_NONE;
             r->losses.absent[sort]++;
         }
@@ -521,7 +525,7 @@ static ebpo_status read_statement(obj_reading *r, const uint64_t total[EBPO_IMPO
 }
 
 /* Reads the faces and their statements. Returns the errors of ebpo_import_memory. */
-static ebpo_status ebpo_obj_read_faces(obj_reading *r)
+static ebpo_status read_faces(obj_reading *r)
 {
     ebpo_import_build *b = r->build;
     uint64_t total[EBPO_IMPORT_SORTS];
@@ -532,15 +536,14 @@ static ebpo_status ebpo_obj_read_faces(obj_reading *r)
     memset(r->rows, 0, sizeof r->rows);
     r->text = ebpo_obj_text_begin(r->data, r->size);
     r->next_release = 0;
-    while (status == EBPO_OK && ebpo_obj_step(r, &word))
+    while (status == EBPO_OK && step_to_statement(r, &word))
         status = read_statement(r, total, word);
     return status == EBPO_OK && r->names.count
                ? ebpo_obj_give_material(&r->names, b->mesh, b->error)
                : status;
 }
 
-/* The first pass: vertices, normals and texture coordinates. Faces may refer to later values and
- * need a second pass. */
+/* --- the first pass: vertices, normals and texture coordinates --- */
 
 enum { MAX_WORDS = 8 };
 
@@ -572,7 +575,7 @@ static bool read_position(const obj_reading *r, const ebpo_obj_word *word, doubl
     return true;
 }
 
-static ebpo_status obj_fail_vertex(const obj_reading *r, ebpo_obj_word word)
+static ebpo_status fail_number(const obj_reading *r, ebpo_obj_word word)
 {
     char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
@@ -581,11 +584,11 @@ static ebpo_status obj_fail_vertex(const obj_reading *r, ebpo_obj_word word)
 }
 
 /* Divides homogeneous coordinates by w. */
-static ebpo_status obj_divide(obj_reading *r, const ebpo_obj_word word[4], double xyz[3])
+static ebpo_status divide_by_weight(obj_reading *r, const ebpo_obj_word word[4], double xyz[3])
 {
     double w;
     if (!ebpo_number_double(&w, word[3].s, word[3].n, r->build->c_locale) || w == 0)
-        return obj_fail_vertex(r, word[3]);
+        return fail_number(r, word[3]);
     for (int k = 0; k < 3 && w != 1; k++)
         ebpo_import_quotient(r->build, &xyz[k], word[k].s, word[k].n, w);
     r->losses.weights += w != 1;
@@ -628,8 +631,8 @@ static ebpo_status read_vertex(obj_reading *r)
                               "plane), or repair the file",
                               r->build->vertices + 1, n);
     if (!read_position(r, word, xyz, &bad))
-        return obj_fail_vertex(r, word[bad]);
-    ebpo_status status = n == 4 ? obj_divide(r, word, xyz) : EBPO_OK;
+        return fail_number(r, word[bad]);
+    ebpo_status status = n == 4 ? divide_by_weight(r, word, xyz) : EBPO_OK;
     if (status == EBPO_OK)
         status = ebpo_import_position(r->build, xyz);
     r->losses.surplus += n == 5 || n == 8;
@@ -660,7 +663,7 @@ static ebpo_status read_values(obj_reading *r)
 {
     ebpo_obj_word word;
     ebpo_status status = EBPO_OK;
-    while (status == EBPO_OK && ebpo_obj_step(r, &word)) {
+    while (status == EBPO_OK && step_to_statement(r, &word)) {
         if (*word.s != 'v' || word.n > 2)
             continue;
         if (word.n == 1)
@@ -674,7 +677,7 @@ static ebpo_status read_values(obj_reading *r)
 
 /* --- omitted data --- */
 
-/* Notes data that also matter to callers that read only the mesh. */
+/* Notes omitted data that also matter to callers that read only the mesh. */
 static void note_unread(const obj_reading *r, ebpo_attributes *to)
 {
     const obj_losses *l = &r->losses;
@@ -741,7 +744,7 @@ static ebpo_status read_all(obj_reading *r)
     if (status == EBPO_OK)
         status = ebpo_import_faces(b);
     if (status == EBPO_OK)
-        status = ebpo_obj_read_faces(r);
+        status = read_faces(r);
     if (status == EBPO_OK)
         status = ebpo_import_end(b);
     if (status == EBPO_OK && b->attributes)

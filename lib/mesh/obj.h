@@ -1,5 +1,5 @@
-/* Declares functions that read the statements and words of an OBJ file. Source: "Object Files
- * (.obj)", appendix B1 of Wavefront's Advanced Visualizer manual, 3.0. */
+/* Reads the statements and words of an OBJ file, and its material and group names. Source: "Object
+ * Files (.obj)", appendix B1 of Wavefront's Advanced Visualizer manual, 3.0. */
 #ifndef EBPO_MESH_OBJ_H
 #define EBPO_MESH_OBJ_H
 
@@ -38,7 +38,7 @@ bool ebpo_obj_next_statement(ebpo_obj_text *t, ebpo_obj_word *word);
 
 bool ebpo_obj_word_is(ebpo_obj_word word, const char *text);
 
-/* Names in OBJ files: materials, stored as indices per face, and groups. */
+/* Names in OBJ files: materials, which are stored as an index for each face, and groups. */
 
 /* Begins a run. EBPO_E_LIMIT, EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_obj_runs_add(ebpo_import_runs *runs, ebpo_obj_word run,

@@ -95,7 +95,7 @@ static uint64_t count_lines(const off_text *t)
 
 enum { MAX_REST = 16, RELEASE = 1 << 22 };
 
-/* How rows are arranged in lines, derived from the two counts. */
+/* The arrangement of rows in lines, which is derived from the numbers of rows and lines. */
 typedef enum rows_in { ROW_A_LINE, ROWS_OVER_LINES, ROWS_ANYHOW } rows_in;
 
 typedef struct off_reading {
@@ -104,20 +104,20 @@ typedef struct off_reading {
     off_text text;
     uint64_t next_release; /* byte offset */
     uint64_t size, vertices, faces;
-    bool normals, colours, texture, weights; /* values that vertices have */
+    bool normals, colours, texture, weights; /* what the vertices have */
     rows_in rows;
     off_word rest[MAX_REST]; /* extra words of the row */
     int rest_count;
     bool broken;                                       /* a colour is not an integer */
     float most;                                        /* greatest colour value */
-    uint64_t surplus_vertices, surplus_faces, indexed; /* rows with omitted values */
+    uint64_t surplus_vertices, surplus_faces, indexed; /* numbers of rows with omitted values */
     uint64_t divided;
     bool alpha, both, more;
 } off_reading;
 
-static ebpo_status off_fail(const off_reading *r, const char *format, ...) EBPO_PRINTF(2, 3);
+static ebpo_status fail_line(const off_reading *r, const char *format, ...) EBPO_PRINTF(2, 3);
 
-static ebpo_status off_fail(const off_reading *r, const char *format, ...)
+static ebpo_status fail_line(const off_reading *r, const char *format, ...)
 {
     char text[320];
     va_list args;
@@ -130,8 +130,8 @@ static ebpo_status off_fail(const off_reading *r, const char *format, ...)
 
 /* --- head --- */
 
-/* Reads ST, C, N, 4 and n in this order, then OFF. Returns their length, or 0 when they are
- * missing. In ModelNet's files the first count follows without a blank: OFF8. */
+/* Reads ST, C, N, 4 and n in this order, then OFF. Returns the length of letters and word, or 0
+ * when OFF is missing. In ModelNet's files the first count follows without a blank: OFF8. */
 static size_t read_kind(off_word word, off_reading *r, bool *dimension)
 {
     const char *s = word.s, *end = s + word.n;
@@ -181,9 +181,9 @@ static bool read_count(off_word word, uint64_t *value)
 
 static ebpo_status fail_counts(const off_reading *r)
 {
-    return off_fail(r,
-                    "counts of vertices, faces and edges expected after the word OFF; repair the "
-                    "file");
+    return fail_line(r,
+                     "counts of vertices, faces and edges expected after the word OFF; repair the "
+                     "file");
 }
 
 /* Reads the edge count: on the line of the faces, or alone on the next one. Some programs omit it.
@@ -217,7 +217,7 @@ static ebpo_status read_head(off_reading *r)
     off_word word;
     bool dimension = false;
     if (!next_word(&r->text, &word))
-        return off_fail(r, "the file is empty and contains no mesh");
+        return fail_line(r, "the file is empty and contains no mesh");
     off_text behind = r->text;
     size_t named = read_kind(word, r, &dimension);
     if (named) {
@@ -239,8 +239,8 @@ static ebpo_status read_head(off_reading *r)
     }
     if (!read_count(word, &r->vertices))
         return named ? fail_counts(r)
-                     : off_fail(r, "expected the word OFF or counts; this is not a readable OFF "
-                                   "file");
+                     : fail_line(r, "expected the word OFF or counts; this is not a readable OFF "
+                                    "file");
     if (!next_word(&r->text, &word) || !read_count(word, &r->faces))
         return fail_counts(r);
     read_edges(r);
@@ -254,7 +254,7 @@ static ebpo_status read_head(off_reading *r)
 
 /* --- rows --- */
 
-static void let_go(off_reading *r)
+static void release_pages(off_reading *r)
 {
     uint64_t at = (uint64_t)(r->text.at - r->begin);
     if (at < r->next_release)
@@ -281,7 +281,7 @@ static void take_rest(off_reading *r)
 }
 
 /* Stores the numbers of the rest, from `first` on, in a row of a table. */
-static ebpo_status off_keep(off_reading *r, ebpo_import_sort sort, int first, bool *good)
+static ebpo_status keep_values(off_reading *r, ebpo_import_sort sort, int first, bool *good)
 {
     float value[3] = { 0, 0, 0 };
     int columns = (int)ebpo_import_columns(sort);
@@ -306,19 +306,19 @@ static ebpo_status keep_rest(off_reading *r)
     bool fine = left >= 0, good;
     ebpo_status status = EBPO_OK;
     if (r->normals) {
-        status = off_keep(r, EBPO_IMPORT_NORMALS, 0, &good);
+        status = keep_values(r, EBPO_IMPORT_NORMALS, 0, &good);
         fine &= good;
     }
     if (r->colours && status == EBPO_OK) {
-        status = off_keep(r, EBPO_IMPORT_COLOURS, at, &good);
+        status = keep_values(r, EBPO_IMPORT_COLOURS, at, &good);
         fine &= good && (left == 3 || left == 4);
         r->alpha |= left == 4;
     } else {
         fine &= left == 0;
     }
     if (r->texture && status == EBPO_OK) {
-        status =
-            off_keep(r, EBPO_IMPORT_TEXTURE, r->rest_count - 2 > 0 ? r->rest_count - 2 : 0, &good);
+        status = keep_values(r, EBPO_IMPORT_TEXTURE, r->rest_count - 2 > 0 ? r->rest_count - 2 : 0,
+                             &good);
         fine &= good;
     }
     r->surplus_vertices += !fine;
@@ -350,7 +350,7 @@ static ebpo_status fail_number(const off_reading *r, off_word word, uint64_t row
 {
     char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
-    return off_fail(r, "invalid number '%s' in vertex %" PRIu64 "; repair the file", text, row);
+    return fail_line(r, "invalid number '%s' in vertex %" PRIu64 "; repair the file", text, row);
 }
 
 static ebpo_status read_vertex(off_reading *r, uint64_t row)
@@ -361,7 +361,8 @@ static ebpo_status read_vertex(off_reading *r, uint64_t row)
         if (!next_needed(r, k == 0, &word[k])) {
             if (k == 0 || r->text.at == r->text.end)
                 return fail_end(r, "vertex", row + (k > 0));
-            return off_fail(r, "vertex %" PRIu64 " has no three coordinates; repair the file", row);
+            return fail_line(r, "vertex %" PRIu64 " has no three coordinates; repair the file",
+                             row);
         }
         const char *s = word[k].s;
         size_t n = word[k].n;
@@ -396,7 +397,7 @@ static ebpo_status keep_face(off_reading *r, uint32_t *row)
     }
     r->alpha |= r->rest_count == 4;
     t->of_face = true;
-    ebpo_status status = off_keep(r, EBPO_IMPORT_COLOURS, 0, &good);
+    ebpo_status status = keep_values(r, EBPO_IMPORT_COLOURS, 0, &good);
     r->surplus_faces += !good;
     if (t->rows)
         *row = (uint32_t)(t->rows - 1);
@@ -411,15 +412,15 @@ static ebpo_status read_corner(off_reading *r, uint64_t row, uint64_t corners)
     if (!c)
         return ebpo_fail_memory(r->build->error, r->build->corners * sizeof *c);
     if (!next_needed(r, false, &word) || !read_count(word, &index))
-        return off_fail(r,
-                        "face %" PRIu64 " names fewer than its %" PRIu64
-                        " vertices; repair the file",
-                        row, corners);
+        return fail_line(r,
+                         "face %" PRIu64 " names fewer than its %" PRIu64
+                         " vertices; repair the file",
+                         row, corners);
     if (index >= r->vertices)
-        return off_fail(r,
-                        "face %" PRIu64 " names vertex %" PRIu64 ", but there are %" PRIu64
-                        " vertices; repair the file or drop the face",
-                        row, index, r->vertices);
+        return fail_line(r,
+                         "face %" PRIu64 " names vertex %" PRIu64 ", but there are %" PRIu64
+                         " vertices; repair the file or drop the face",
+                         row, index, r->vertices);
     c->vertex = (uint32_t)index;
     c->row[EBPO_IMPORT_COLOURS] = r->colours ? c->vertex : EBPO_IMPORT_NONE;
     c->row[EBPO_IMPORT_NORMALS] = r->normals ? c->vertex : EBPO_IMPORT_NONE;
@@ -436,12 +437,12 @@ static ebpo_status read_face(off_reading *r, uint64_t row)
     if (!next_needed(r, true, &word))
         return fail_end(r, "face", row);
     if (!read_count(word, &corners) || !corners)
-        return off_fail(r, "face %" PRIu64 " has no corner count; repair the file", row);
+        return fail_line(r, "face %" PRIu64 " has no corner count; repair the file", row);
     if (corners > r->size / 2)
-        return off_fail(r,
-                        "face %" PRIu64 " has %" PRIu64 " corners, more than the file can hold; "
-                        "repair it",
-                        row, corners);
+        return fail_line(r,
+                         "face %" PRIu64 " has %" PRIu64 " corners, more than the file can hold; "
+                         "repair it",
+                         row, corners);
     ebpo_status status = EBPO_OK;
     for (uint64_t i = 0; i < corners && status == EBPO_OK; i++)
         status = read_corner(r, row, corners);
@@ -490,17 +491,17 @@ static ebpo_status read_rows(off_reading *r)
 {
     off_word word;
     ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < r->vertices && status == EBPO_OK; i++, let_go(r))
+    for (uint64_t i = 0; i < r->vertices && status == EBPO_OK; i++, release_pages(r))
         status = read_vertex(r, i);
     if (status == EBPO_OK)
         status = ebpo_import_faces(r->build);
-    for (uint64_t i = 0; i < r->faces && status == EBPO_OK; i++, let_go(r))
+    for (uint64_t i = 0; i < r->faces && status == EBPO_OK; i++, release_pages(r))
         status = read_face(r, i);
     if (status == EBPO_OK)
         r->more = next_word(&r->text, &word);
     if (status == EBPO_OK && r->more && r->rows == ROWS_ANYHOW)
-        status = off_fail(r, "there is text after the last face, though lines hold several rows; "
-                             "repair the counts");
+        status = fail_line(r, "there is text after the last face, though lines hold several rows; "
+                              "repair the counts");
     return status;
 }
 

@@ -18,10 +18,14 @@
 
 enum { FACE_GRAIN = 1 << 14, VERTEX_GRAIN = 1 << 13 };
 
-/* Flags of faces, collected at the root of their patch. OPEN: edges with more than two faces do not
- * balance within the patch; BOUNDARY: it has an edge with one face. The others are for patches
- * joined around edges with more than two faces: ROOT: was a patch before; CONTRADICTED: faces
- * around its edges cannot alternate; SEPARATE: becomes a separate patch again. */
+/* Flags of faces, collected at the root of their patch.
+ * - OPEN: edges with more than two faces do not balance within the patch.
+ * - BOUNDARY: the patch has an edge with one face.
+ *
+ * The others are for patches that were joined around edges with more than two faces.
+ * - ROOT: the face was the root of a patch before.
+ * - CONTRADICTED: the faces around the patch's edges cannot alternate.
+ * - SEPARATE: becomes a separate patch again. */
 enum {
     OPEN = 1,
     INCONSISTENT = 2,
@@ -37,11 +41,11 @@ enum {
  * that are used more often if that closes the patch (join_crowded). */
 typedef struct patch {
     uint32_t root;
-    uint32_t seed;          /* its first face in the source, which decides when nothing else does */
-    bool closed;            /* every edge has a face on its other side */
-    bool seed_turned;       /* it runs against the root */
+    uint32_t seed; /* first face in the source; it decides the direction when nothing else does */
+    bool closed;   /* every edge has a face on its other side */
+    bool seed_turned;       /* the seed runs against the root */
     bool turn_others;       /* turn the faces that run as the seed does */
-    uint64_t count, turned; /* faces; faces that run against the root */
+    uint64_t count, turned; /* number of faces, and of faces that run against the root */
     ebpo_sum volume;        /* six times the volume, with all faces oriented like the root */
     double most;            /* largest of its terms */
 } patch;
@@ -53,15 +57,15 @@ typedef ebpo_status (*edge_fn)(orienting *o, const ebpo_link *links, uint64_t us
 struct orienting {
     const ebpo_mesh *mesh; /* the mesh whose faces are turned */
     unsigned threads;
-    edge_fn visit; /* called at edges, or only at those with more than two faces */
+    edge_fn visit; /* called at every edge, or only at those with more than two faces */
     bool crowded_only;
-    ebpo_mesh_frame frame; /* frame for volumes, whose signs are used */
+    ebpo_mesh_frame frame; /* frame for volumes, of which only the signs are used */
     ebpo_stars stars;
     ebpo_star *star;         /* one for each thread */
     ebpo_edge_faces *around; /* one for each thread */
-    bool crowded;            /* there are edges with more than two faces */
-    /* [face_count] a lower face of the patch, or itself: index << 1 | 1 when the two run against
-     * each other */
+    bool crowded;            /* the mesh has edges with more than two faces */
+    /* [face_count] index << 1 of a lower face of the patch or of the face itself; plus 1 when the
+     * two faces run against each other */
     uint64_t *above;
     uint8_t *flags; /* [face_count] */
     patch *patches; /* sorted by root */
@@ -72,7 +76,8 @@ struct orienting {
 
 /* --- joining faces to patches --- */
 
-/* Returns the root of f << 1 | 1 when f runs against it. Halves the path; any thread may do so. */
+/* Returns the root of f << 1, plus 1 when f runs against the root. Halves the path; any thread may
+ * do so. */
 static uint64_t find_root(uint64_t *above, uint32_t f)
 {
     for (uint64_t turned = 0;;) {
@@ -90,7 +95,7 @@ static uint64_t find_root(uint64_t *above, uint32_t f)
 
 /* Links the higher root to the lower one, so the roots do not depend on the order. Returns false if
  * the faces are already in one patch with the opposite orientation. */
-static bool orient_join(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned)
+static bool join_patches(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned)
 {
     for (;;) {
         uint64_t ra = find_root(above, a), rb = find_root(above, b);
@@ -104,7 +109,7 @@ static bool orient_join(uint64_t *above, uint32_t a, uint32_t b, uint64_t turned
     }
 }
 
-static void orient_flag(orienting *o, uint32_t face, uint8_t flags)
+static void set_flags(orienting *o, uint32_t face, uint8_t flags)
 {
     __atomic_fetch_or(&o->flags[face], flags, __ATOMIC_RELAXED);
 }
@@ -118,14 +123,14 @@ static void visit_edge(orienting *o, const ebpo_link *links, uint64_t uses)
         return;
     }
     if (uses != 2 || a == b) {
-        orient_flag(o, a, BOUNDARY);
+        set_flags(o, a, BOUNDARY);
         return;
     }
     uint64_t turned = links[0].out == links[1].out;
     if (turned)
-        orient_flag(o, a, INCONSISTENT);
-    if (!orient_join(o->above, a, b, turned))
-        orient_flag(o, a, TWISTED);
+        set_flags(o, a, INCONSISTENT);
+    if (!join_patches(o->above, a, b, turned))
+        set_flags(o, a, TWISTED);
 }
 
 static ebpo_status begin_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
@@ -216,7 +221,7 @@ static uint64_t patch_at(const orienting *o, uint32_t face)
                : __atomic_load_n(&o->above[face], __ATOMIC_RELAXED);
 }
 
-/* Lists the usable faces at an edge. `joined`: with their current patch. */
+/* Lists the usable faces at an edge. `joined`: lists them with their current patch. */
 static bool list_around(orienting *o, const ebpo_link *links, uint64_t uses, bool joined,
                         ebpo_edge_faces *e)
 {
@@ -240,7 +245,7 @@ static void flag_unbalanced(orienting *o, ebpo_edge_faces *e, uint8_t flags)
         for (next = i; next < e->count && e->face[next].patch >> 1 == e->face[i].patch >> 1; next++)
             sum += (e->face[next].out ^ (e->face[next].patch & 1)) ? 1 : -1;
         if (sum)
-            orient_flag(o, (uint32_t)(e->face[i].patch >> 1), flags);
+            set_flags(o, (uint32_t)(e->face[i].patch >> 1), flags);
     }
 }
 
@@ -284,13 +289,13 @@ static ebpo_status join_around(orienting *o, const ebpo_link *links, uint64_t us
     bool turns = kept % 2 == 0 && ebpo_edge_faces_turn(e, o->mesh, v, ebpo_link_neighbour(links));
     if (!turns || !ebpo_edge_faces_alternate(e))
         for (uint64_t i = 0; i < kept; i++)
-            orient_flag(o, (uint32_t)(e->face[i].patch >> 1), INCONSISTENT);
+            set_flags(o, (uint32_t)(e->face[i].patch >> 1), INCONSISTENT);
     for (uint64_t i = 0; turns && i + 1 < kept; i++) {
         const ebpo_edge_face *a = &e->face[i], *b = a + 1;
         uint64_t turned = a->out == b->out;
-        if (!orient_join(o->above, (uint32_t)(a->patch >> 1), (uint32_t)(b->patch >> 1),
-                         (turned ^ a->patch ^ b->patch) & 1))
-            orient_flag(o, (uint32_t)(a->patch >> 1), CONTRADICTED);
+        if (!join_patches(o->above, (uint32_t)(a->patch >> 1), (uint32_t)(b->patch >> 1),
+                          (turned ^ a->patch ^ b->patch) & 1))
+            set_flags(o, (uint32_t)(a->patch >> 1), CONTRADICTED);
     }
     return EBPO_OK;
 }
@@ -414,8 +419,8 @@ static void add_volume(orienting *o, patch *p, const ebpo_sum *sum, double most)
 }
 
 /* Measures the patches. The sum is exact, so the order of additions by threads does not matter. */
-static ebpo_status orient_measure(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                  ebpo_error *error)
+static ebpo_status measure_patches(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                   ebpo_error *error)
 {
     orienting *o = context;
     const ebpo_mesh *mesh = o->mesh;
@@ -451,7 +456,7 @@ static ebpo_status orient_measure(void *context, uint64_t begin, uint64_t end, u
     return EBPO_OK;
 }
 
-static void orient_decide(patch *p)
+static void decide_direction(patch *p)
 {
     double volume = p->closed ? ebpo_sum_value(&p->volume) : 0;
     volume = ebpo_volume_is_noise(volume, p->count, p->most) ? 0 : volume;
@@ -460,8 +465,8 @@ static void orient_decide(patch *p)
     p->turn_others = volume < 0 || (!(volume > 0) && against_seed > p->count - against_seed);
 }
 
-static ebpo_status orient_flip(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                               ebpo_error *error)
+static ebpo_status flip_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     orienting *o = context;
     (void)worker, (void)error;
@@ -507,11 +512,11 @@ static ebpo_status turn_patches(orienting *o, ebpo_error *error)
     count_faces(o);
     o->frame = ebpo_mesh_frame_of(o->mesh);
     ebpo_status status =
-        ebpo_parallel_for(0, NULL, count, FACE_GRAIN, orient_measure, o, NULL, "", error);
+        ebpo_parallel_for(0, NULL, count, FACE_GRAIN, measure_patches, o, NULL, "", error);
     for (uint64_t i = 0; i < o->patch_count; i++)
-        orient_decide(&o->patches[i]);
+        decide_direction(&o->patches[i]);
     return status == EBPO_OK
-               ? ebpo_parallel_for(0, NULL, count, FACE_GRAIN, orient_flip, o, NULL, "", error)
+               ? ebpo_parallel_for(0, NULL, count, FACE_GRAIN, flip_faces, o, NULL, "", error)
                : status;
 }
 

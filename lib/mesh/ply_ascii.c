@@ -16,8 +16,9 @@ typedef struct rows {
     uint64_t row;
     uint64_t to; /* row of the attributes; for a face, the row of its first triangle */
     bool store;
-    bool once;     /* false in the first pass over elements before the vertices, so that nothing is
-                    * counted twice */
+    /* false in the first pass over elements that precede the vertices, which are read twice, so
+     * that nothing is counted twice */
+    bool once;
     uint64_t line; /* line where the row begins */
 } rows;
 
@@ -55,8 +56,8 @@ static ebpo_status next_integer(rows *r, int64_t *value)
     return EBPO_OK;
 }
 
-/* Reads a coordinate that the header declares as float. If float cannot hold the text exactly,
- * notes the rounding error; points, which cannot carry a note, get the double. */
+/* Reads a coordinate that the header declares as float. If the float differs from the text, notes
+ * the rounding error; points (`strict`), which have no notes, get the double. */
 static bool parse_float(ebpo_ply_parser *p, ebpo_ply_word token, double *value)
 {
     float narrow;
@@ -149,7 +150,7 @@ static ebpo_status read_list(rows *r, const ebpo_ply_property *property)
     if (count < 0)
         return ebpo_ply_fail(p, "%s %" PRIu64 " has a list of %" PRId64 " items; repair the file",
                              ebpo_ply_row_name(r->element), r->row, count);
-    if ((uint64_t)count > (p->size - p->at) / 2) { /* a blank and a digit for each */
+    if ((uint64_t)count > (p->size - p->at) / 2) { /* each item has at least a blank and a digit */
         return ebpo_ply_fail(
             p,
             "%s %" PRIu64 " has a list of %" PRId64
@@ -190,8 +191,8 @@ static bool more_here(ebpo_ply_parser *p)
     return p->at < p->size && !ends_line(p->data[p->at]);
 }
 
-/* Counts extra values at the end of a row. If the row spans lines, an earlier row has too few
- * values: that is an error. */
+/* Counts extra values at the end of a row. If the row began in an earlier line, a row has too few
+ * or too many values, which is an error. */
 static ebpo_status end_row(rows *r)
 {
     ebpo_ply_parser *p = r->p;

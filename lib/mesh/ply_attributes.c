@@ -62,8 +62,8 @@ static unsigned find_together(const ebpo_ply_property *property, uint64_t left)
     return count ? ebpo_attribute_names_together(names, count) : 1;
 }
 
-static void ply_attributes_lose(const ebpo_ply_parser *p, const ebpo_ply_element *element,
-                                const ebpo_ply_property *property, const char *why)
+static void lose_property(const ebpo_ply_parser *p, const ebpo_ply_element *element,
+                          const ebpo_ply_property *property, const char *why)
 {
     char of[EBPO_IMPORT_WORD_TEXT], name[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(of, element->name.s, element->name.n);
@@ -71,8 +71,8 @@ static void ply_attributes_lose(const ebpo_ply_parser *p, const ebpo_ply_element
     ebpo_attributes_lose(p->mesh->attributes, "property '%s' of '%s' (%s)", name, of, why);
 }
 
-/* Returns true if an element of the same name has another number of rows; arrays are found by name.
- */
+/* Returns true if an earlier element of the same name has another number of rows. Such elements
+ * cannot be kept, because arrays are found by name. */
 static bool is_second(const ebpo_attributes *to, const ebpo_attribute *a, uint64_t rows)
 {
     for (uint64_t i = 0; i < to->count; i++)
@@ -92,16 +92,16 @@ static ebpo_status plan_array(ebpo_ply_parser *p, const ebpo_ply_element *elemen
     if (!take_word(a.element, sizeof a.element, element->name) ||
         !take_names(a.names, sizeof a.names, property, columns) ||
         to->count == EBPO_ATTRIBUTE_ARRAYS) {
-        ply_attributes_lose(p, element, property,
-                            "the name is too long or not valid text, or there are too many "
-                            "attributes");
+        lose_property(p, element, property,
+                      "the name is too long or not valid text, or there are too many "
+                      "attributes");
         return EBPO_OK;
     }
     bool face = element->kind == EBPO_PLY_KIND_FACE;
     a.rows = face ? 0 : element->count;
     if (is_second(to, &a, a.rows)) {
-        ply_attributes_lose(p, element, property,
-                            "another element has the same name and a different row count");
+        lose_property(p, element, property,
+                      "another element has the same name and a different row count");
         return EBPO_OK;
     }
     ebpo_attribute *made = ebpo_attributes_add(to, &a);
@@ -123,7 +123,7 @@ static ebpo_status plan_element(ebpo_ply_parser *p, const ebpo_ply_element *elem
     for (uint64_t i = 0; i < element->properties && status == EBPO_OK;) {
         unsigned columns = 1;
         if (property[i].role == EBPO_PLY_ROLE_NONE && element->kind == EBPO_PLY_KIND_STRIPS) {
-            ply_attributes_lose(p, element, &property[i], "not supported for triangle strips");
+            lose_property(p, element, &property[i], "not supported for triangle strips");
         } else if (property[i].role == EBPO_PLY_ROLE_NONE && element->count) {
             columns = find_together(property + i, element->properties - i);
             status = plan_array(p, element, property + i, columns);
@@ -196,7 +196,7 @@ ebpo_status ebpo_ply_put_list(ebpo_ply_parser *p, const ebpo_ply_property *prope
     return EBPO_OK;
 }
 
-static bool ply_attributes_fits(int64_t value, ebpo_ply_type type)
+static bool value_fits(int64_t value, ebpo_ply_type type)
 {
     static const int64_t least[] = { INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0 },
                          most[] = { INT8_MAX,   UINT8_MAX, INT16_MAX,
@@ -225,7 +225,7 @@ static bool text_bits(ebpo_ply_parser *p, ebpo_ply_type type, ebpo_ply_word toke
         memcpy(bits, &wide, sizeof wide);
         return true;
     default:
-        if (!ebpo_number_integer(&whole, token.s, token.n) || !ply_attributes_fits(whole, type))
+        if (!ebpo_number_integer(&whole, token.s, token.n) || !value_fits(whole, type))
             return false;
         *bits = (uint64_t)whole;
         return true;

@@ -1,6 +1,6 @@
 /* Reads the body of a binary PLY file, of either byte order. All cores read rows of equal size.
  * Other rows are read one by one, which also locates errors. Positions go to the mesh, faces are
- * divided into triangles, and other properties go to the attributes.
+ * triangulated, and other properties go to the attributes.
  *
  * Source: Greg Turk, "The PLY Polygon File Format", 1994. */
 #include "core/strict_fp.h"
@@ -138,8 +138,8 @@ static ebpo_status read_list(rows *r, const ebpo_ply_property *property)
         return ebpo_ply_fail(p,
                              "%s %" PRIu64 " has a list of %" PRId64 " items; the file is damaged",
                              ebpo_ply_row_name(r->element), r->row, count);
-    if ((uint64_t)count * bytes >
-        p->size - p->at - count_bytes) /* no overflow: counts have 32 bits at most */
+    /* counts have at most 32 bits, so nothing overflows */
+    if ((uint64_t)count * bytes > p->size - p->at - count_bytes)
         return ebpo_ply_fail_end(p, r->element, r->row);
     p->at += count_bytes;
     ebpo_status status = EBPO_OK;
@@ -245,8 +245,8 @@ typedef struct plain {
     bool swap;
 } plain;
 
-/* Reports rows as bytes of the file, like the row-by-row reader. */
-static bool ply_binary_report(void *user, const char *stage, uint64_t done, uint64_t total)
+/* Reports progress in bytes of the file, as the row-by-row reader does. */
+static bool report_bytes(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     const plain *t = user;
     (void)total;
@@ -254,16 +254,16 @@ static bool ply_binary_report(void *user, const char *stage, uint64_t done, uint
                                   t->p->size);
 }
 
-static void ply_binary_put(const plain *t, const ebpo_ply_property *property, uint64_t row,
-                           const uint8_t *at)
+static void put_value(const plain *t, const ebpo_ply_property *property, uint64_t row,
+                      const uint8_t *at)
 {
     if (ebpo_ply_is_attribute(property))
         ebpo_ply_put_value(t->p, property, row,
                            load_raw(at, ebpo_ply_type_bytes(property->type), t->swap));
 }
 
-static ebpo_status ply_binary_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                       ebpo_error *error)
+static ebpo_status read_vertices(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     const plain *t = context;
     const ebpo_ply_property *property = t->p->header.property + t->element->first;
@@ -274,13 +274,13 @@ static ebpo_status ply_binary_vertices(void *context, uint64_t begin, uint64_t e
             if (property[i].role != EBPO_PLY_ROLE_NONE)
                 store_coordinate(t->p->mesh, row, &property[i], at, t->swap);
             else
-                ply_binary_put(t, &property[i], row, at);
+                put_value(t, &property[i], row, at);
             at += ebpo_ply_type_bytes(property[i].type);
         }
     return EBPO_OK;
 }
 
-static ebpo_status ply_binary_deviate(plain *t, uint64_t row)
+static ebpo_status note_deviation(plain *t, uint64_t row)
 {
     uint64_t known = __atomic_load_n(&t->deviates, __ATOMIC_RELAXED);
     while (row < known && !__atomic_compare_exchange_n(&t->deviates, &known, row, true,
@@ -294,7 +294,7 @@ static void put_face(const plain *t, uint64_t row, const uint8_t *at)
 {
     const ebpo_ply_property *property = t->p->header.property + t->element->first;
     for (uint64_t i = 0; i < t->element->properties; i++) {
-        ply_binary_put(t, &property[i], t->first + row, at);
+        put_value(t, &property[i], t->first + row, at);
         at += property[i].list ? ebpo_ply_type_bytes(property[i].count_type) +
                                      3 * ebpo_ply_type_bytes(property[i].type)
                                : ebpo_ply_type_bytes(property[i].type);
@@ -303,8 +303,8 @@ static void put_face(const plain *t, uint64_t row, const uint8_t *at)
 
 /* Reads faces. After a row that deviates, offsets are wrong; the row-by-row reader reads those rows
  * again. */
-static ebpo_status ply_binary_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                    ebpo_error *error)
+static ebpo_status read_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                              ebpo_error *error)
 {
     plain *t = context;
     uint64_t count = t->p->header.element[t->p->header.vertex].count;
@@ -319,7 +319,7 @@ static ebpo_status ply_binary_faces(void *context, uint64_t begin, uint64_t end,
                 k ? load_integer(at + count_bytes + (k - 1) * bytes, t->corners->type, t->swap)
                   : load_integer(at, t->corners->count_type, t->swap);
             if (k ? (uint64_t)value >= count : value != 3)
-                return ply_binary_deviate(t, row);
+                return note_deviation(t, row);
             if (k)
                 *face++ = (uint32_t)value;
         }
@@ -329,8 +329,8 @@ static ebpo_status ply_binary_faces(void *context, uint64_t begin, uint64_t end,
     return EBPO_OK;
 }
 
-/* Fills in the layout of triangle rows. Returns false when rows have another list or would not fit.
- */
+/* Fills in the layout of triangle rows. Returns false when rows have another list, or the rows do
+ * not fit the file. */
 static bool describe_triangles(plain *t)
 {
     uint64_t at = 0;
@@ -352,19 +352,19 @@ static bool describe_triangles(plain *t)
            t->element->count <= t->p->face_capacity - t->first;
 }
 
-static ebpo_status ply_binary_run(plain *t, ebpo_task_fn task)
+static ebpo_status run_on_rows(plain *t, ebpo_task_fn task)
 {
     ebpo_ply_parser *p = t->p;
     bool watched = p->progress && p->progress->report;
-    t->progress = (ebpo_progress){ watched ? ply_binary_report : NULL, t };
+    t->progress = (ebpo_progress){ watched ? report_bytes : NULL, t };
     ebpo_status status = ebpo_parallel_for(p->threads, p->mesh->workspace, t->element->count, GRAIN,
                                            task, t, &t->progress, "reading", NULL);
     return status == EBPO_E_CANCELLED ? ebpo_ply_fail_stopped(p) : status;
 }
 
-/* Reads rows from p->at while all have one size, and sets *done to their number: all vertices or
- * none; the faces before the first that is not a triangle or has an invalid vertex index. The
- * row-by-row reader reads the others and reports their errors. */
+/* Read rows from p->at while all have one size, and set *done to their number: all vertices or
+ * none, and the faces before the first one that is not a triangle or has an invalid vertex index.
+ * The row-by-row reader reads the others and reports their errors. */
 static ebpo_status read_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_element *element,
                                        bool swap, uint64_t *done)
 {
@@ -373,7 +373,7 @@ static ebpo_status read_plain_vertices(ebpo_ply_parser *p, const ebpo_ply_elemen
     if (element->has_list || !element->row_bytes ||
         element->count > (p->size - p->at) / element->row_bytes)
         return EBPO_OK;
-    ebpo_status status = ply_binary_run(&t, ply_binary_vertices);
+    ebpo_status status = run_on_rows(&t, read_vertices);
     if (status == EBPO_OK) {
         *done = element->count;
         p->at += element->count * t.row_bytes;
@@ -388,7 +388,7 @@ static ebpo_status read_plain_faces(ebpo_ply_parser *p, const ebpo_ply_element *
     *done = 0;
     if (!describe_triangles(&t))
         return EBPO_OK;
-    ebpo_status status = ply_binary_run(&t, ply_binary_faces);
+    ebpo_status status = run_on_rows(&t, read_faces);
     if (status != EBPO_OK && status != EBPO_E_FORMAT)
         return status;
     *done = t.deviates;

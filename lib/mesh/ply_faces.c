@@ -33,7 +33,7 @@ ebpo_status ebpo_ply_fail_index(const ebpo_ply_parser *p, const ebpo_ply_element
                          p->header.element[p->header.vertex].count, ebpo_ply_row_name(element));
 }
 
-static ebpo_status face_capacity(ebpo_ply_parser *p, uint64_t more)
+static ebpo_status reserve_faces(ebpo_ply_parser *p, uint64_t more)
 {
     ebpo_mesh *mesh = p->mesh;
     if (more > MAX_FACES - mesh->face_count)
@@ -56,7 +56,7 @@ static void add_triangle(ebpo_mesh *mesh, uint32_t a, uint32_t b, uint32_t c)
 
 /* Reserves scratch memory for corner positions, triangles and the workspace of the triangulation,
  * in this order. */
-static ebpo_status scratch_capacity(ebpo_ply_parser *p, uint64_t n)
+static ebpo_status reserve_scratch(ebpo_ply_parser *p, uint64_t n)
 {
     uint64_t each = 3 * sizeof(double) + 3 * sizeof(uint32_t) + sizeof(uint32_t), bytes;
     if (!ebpo_mul_ok(n, each, &bytes) ||
@@ -74,11 +74,11 @@ static void corner_position(const ebpo_mesh *mesh, uint32_t vertex, double out[3
                              : (double)mesh->xyz32[3 * (uint64_t)vertex + k];
 }
 
-static ebpo_status ply_faces_triangulate(ebpo_ply_parser *p, uint32_t n, uint64_t row)
+static ebpo_status triangulate_face(ebpo_ply_parser *p, uint32_t n, uint64_t row)
 {
-    ebpo_status status = scratch_capacity(p, n);
+    ebpo_status status = reserve_scratch(p, n);
     if (status == EBPO_OK)
-        status = face_capacity(p, n - 2);
+        status = reserve_faces(p, n - 2);
     if (status != EBPO_OK)
         return status;
     double(*position)[3] = p->scratch;
@@ -117,16 +117,16 @@ ebpo_status ebpo_ply_add_polygon(ebpo_ply_parser *p, uint64_t row)
         return p->corner_count > MAX_FACES
                    ? ebpo_fail_file(p->error, EBPO_E_LIMIT, p->name,
                                     "face %" PRIu64 " has more than 2^32 - 2 corners", row)
-                   : ply_faces_triangulate(p, (uint32_t)p->corner_count, row);
-    ebpo_status status = face_capacity(p, 1);
+                   : triangulate_face(p, (uint32_t)p->corner_count, row);
+    ebpo_status status = reserve_faces(p, 1);
     if (status == EBPO_OK)
         add_triangle(p->mesh, p->corners[0], p->corners[1], p->corners[2]);
     return status;
 }
 
-/* Adds the triangles of a strip. Every second one has the opposite orientation. Triangles that
- * repeat a vertex join parts of a strip and are skipped. */
-static void ply_faces_unroll(ebpo_mesh *mesh, const uint32_t *v, uint64_t n)
+/* Adds the triangles of a strip. Every second triangle has the opposite orientation. Triangles that
+ * repeat a vertex only connect parts of a strip and are skipped. */
+static void add_strip(ebpo_mesh *mesh, const uint32_t *v, uint64_t n)
 {
     mesh->strips++;
     for (uint64_t i = 0; i + 2 < n; i++) {
@@ -145,13 +145,13 @@ ebpo_status ebpo_ply_add_strip(ebpo_ply_parser *p, uint64_t row)
     (void)row;
     uint64_t n = p->corner_count;
     uint64_t first = p->mesh->face_count;
-    ebpo_status status = n < 3 ? EBPO_OK : face_capacity(p, n - 2);
+    ebpo_status status = n < 3 ? EBPO_OK : reserve_faces(p, n - 2);
     for (uint64_t begin = 0; begin < n && status == EBPO_OK;) {
         uint64_t end = begin;
         while (end < n && p->corners[end] != EBPO_PLY_RESTART)
             end++;
         if (end - begin >= 3)
-            ply_faces_unroll(p->mesh, p->corners + begin, end - begin);
+            add_strip(p->mesh, p->corners + begin, end - begin);
         begin = end + 1;
     }
     if (status == EBPO_OK)
@@ -167,8 +167,9 @@ enum { GRAIN = 1 << 15, WORD = 64 };
 typedef struct leaving {
     ebpo_ply_parser *p;
     bool found; /* a coordinate is not finite */
-    bool
-        refused; /* such a vertex is used: the mesh check will reject it, with the file's indices */
+    /* a face uses such a vertex: nothing is removed, and the mesh check will report it with the
+     * file's indices */
+    bool refused;
     uint64_t *used; /* bit v: a face uses vertex v */
     uint32_t *from; /* [kept] old indices of the kept vertices */
     uint32_t *to;   /* [vertices] new indices */
@@ -183,8 +184,8 @@ static bool is_finite(const ebpo_mesh *mesh, uint64_t v)
     return finite;
 }
 
-static ebpo_status ply_faces_find(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                  ebpo_error *error)
+static ebpo_status find_non_finite(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                   ebpo_error *error)
 {
     leaving *l = context;
     (void)worker, (void)error;
@@ -196,7 +197,7 @@ static ebpo_status ply_faces_find(void *context, uint64_t begin, uint64_t end, u
     return EBPO_OK;
 }
 
-static ebpo_status ply_faces_choose(leaving *l)
+static ebpo_status choose_kept(leaving *l)
 {
     ebpo_mesh *mesh = l->p->mesh;
     ebpo_workspace *workspace = mesh->workspace;
@@ -221,7 +222,7 @@ static ebpo_status ply_faces_choose(leaving *l)
     return EBPO_OK;
 }
 
-static void ply_faces_move(const leaving *l)
+static void move_vertices(const leaving *l)
 {
     ebpo_mesh *mesh = l->p->mesh;
     size_t size = 3 * (mesh->xyz32 ? sizeof *mesh->xyz32 : sizeof *mesh->xyz64);
@@ -236,7 +237,8 @@ static void ply_faces_move(const leaving *l)
     }
 }
 
-/* Elements of other names may refer to vertices by index; the indices have changed. */
+/* Drops elements of other names, because they may refer to vertices by indices that have changed.
+ */
 static void move_attributes(const leaving *l)
 {
     ebpo_attributes *attributes = l->p->mesh->attributes;
@@ -252,7 +254,7 @@ static void move_attributes(const leaving *l)
                                          "vertex indices that have changed");
 }
 
-static ebpo_status ply_faces_note(const leaving *l, uint64_t left)
+static ebpo_status note_removed(const leaving *l, uint64_t left)
 {
     ebpo_status status = ebpo_mesh_need_attributes(l->p->mesh, l->p->error);
     if (status == EBPO_OK)
@@ -268,14 +270,14 @@ ebpo_status ebpo_ply_leave_unused(ebpo_ply_parser *p)
     ebpo_mesh *mesh = p->mesh;
     uint64_t count = mesh->vertex_count;
     ebpo_status status = ebpo_parallel_for(p->threads, mesh->workspace, count, GRAIN,
-                                           ply_faces_find, &l, NULL, "", p->error);
+                                           find_non_finite, &l, NULL, "", p->error);
     if (status == EBPO_OK && l.found)
-        status = ply_faces_choose(&l);
+        status = choose_kept(&l);
     if (status == EBPO_OK && l.found && !l.refused && l.kept < count) {
-        ply_faces_move(&l);
+        move_vertices(&l);
         move_attributes(&l);
         mesh->vertex_count = l.kept;
-        status = ply_faces_note(&l, count - l.kept);
+        status = note_removed(&l, count - l.kept);
     }
     ebpo_array_free(mesh->workspace, l.used);
     ebpo_array_free(mesh->workspace, l.from);

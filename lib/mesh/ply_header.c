@@ -1,5 +1,5 @@
-/* Parses the header of a PLY file. Also contains the messages and progress shared by the parts of
- * the PLY reader. */
+/* Parses the header of a PLY file. This file also has the messages and the progress reports that
+ * the parts of the PLY reader share. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -16,9 +16,9 @@
 #include "mesh/ply_parts.h"
 
 enum {
+    /* no statement has more than five words; a sixth one shows that there are too many */
     MAX_WORDS = 6
-}; /* no statement has more than five; a sixth word shows that there are too
-    * many */
+};
 
 typedef struct reader {
     ebpo_ply_header *header;
@@ -49,12 +49,12 @@ unsigned ebpo_ply_type_bytes(ebpo_ply_type type)
     return bytes[type];
 }
 
-static bool ply_header_is(ebpo_ply_word word, const char *text)
+static bool word_is(ebpo_ply_word word, const char *text)
 {
     return strlen(text) == word.n && memcmp(word.s, text, word.n) == 0;
 }
 
-static ebpo_status ply_header_fail(const reader *r, const char *what, ebpo_ply_word word)
+static ebpo_status fail_in_line(const reader *r, const char *what, ebpo_ply_word word)
 {
     char text[EBPO_IMPORT_WORD_TEXT];
     ebpo_import_word_text(text, word.s, word.n);
@@ -80,7 +80,7 @@ static bool next_line(reader *r, ebpo_ply_word *line)
     return true;
 }
 
-static int ply_header_split(ebpo_ply_word line, ebpo_ply_word words[MAX_WORDS])
+static int split_line(ebpo_ply_word line, ebpo_ply_word words[MAX_WORDS])
 {
     int n = 0;
     const char *s = line.s, *end = line.s + line.n;
@@ -101,7 +101,7 @@ static int ply_header_split(ebpo_ply_word line, ebpo_ply_word words[MAX_WORDS])
 static bool parse_type(ebpo_ply_word word, ebpo_ply_type *type)
 {
     for (size_t i = 0; i < sizeof type_names / sizeof *type_names; i++)
-        if (ply_header_is(word, type_names[i].word)) {
+        if (word_is(word, type_names[i].word)) {
             *type = type_names[i].type;
             return true;
         }
@@ -124,17 +124,17 @@ static bool parse_count(ebpo_ply_word word, uint64_t *count)
 static ebpo_status format_statement(reader *r, const ebpo_ply_word *words, int n)
 {
     if (n != 3 || r->format_seen)
-        return ply_header_fail(r, "unexpected statement", words[0]);
-    if (ply_header_is(words[1], "ascii"))
+        return fail_in_line(r, "unexpected statement", words[0]);
+    if (word_is(words[1], "ascii"))
         r->header->encoding = EBPO_PLY_ASCII;
-    else if (ply_header_is(words[1], "binary_little_endian"))
+    else if (word_is(words[1], "binary_little_endian"))
         r->header->encoding = EBPO_PLY_LITTLE;
-    else if (ply_header_is(words[1], "binary_big_endian"))
+    else if (word_is(words[1], "binary_big_endian"))
         r->header->encoding = EBPO_PLY_BIG;
     else
-        return ply_header_fail(r, "unknown format", words[1]);
-    if (!ply_header_is(words[2], "1.0"))
-        return ply_header_fail(r, "unknown format version", words[2]);
+        return fail_in_line(r, "unknown format", words[1]);
+    if (!word_is(words[2], "1.0"))
+        return fail_in_line(r, "unknown format version", words[2]);
     r->format_seen = true;
     return EBPO_OK;
 }
@@ -143,20 +143,20 @@ static ebpo_status note_kind(reader *r, ebpo_ply_element *element)
 {
     ebpo_ply_header *h = r->header;
     int64_t *place;
-    if (ply_header_is(element->name, "vertex")) {
+    if (word_is(element->name, "vertex")) {
         element->kind = EBPO_PLY_KIND_VERTEX;
         place = &h->vertex;
-    } else if (ply_header_is(element->name, "face")) {
+    } else if (word_is(element->name, "face")) {
         element->kind = EBPO_PLY_KIND_FACE;
         place = &h->face;
-    } else if (ply_header_is(element->name, "tristrips")) {
+    } else if (word_is(element->name, "tristrips")) {
         element->kind = EBPO_PLY_KIND_STRIPS;
         place = &h->strips;
     } else {
         return EBPO_OK;
     }
     if (*place >= 0)
-        return ply_header_fail(r, "duplicate element", element->name);
+        return fail_in_line(r, "duplicate element", element->name);
     *place = (int64_t)h->elements;
     return EBPO_OK;
 }
@@ -167,9 +167,9 @@ static ebpo_status element_statement(reader *r, const ebpo_ply_word *words, int 
     ebpo_ply_header *h = r->header;
     ebpo_ply_element element = { .line = r->line, .first = h->properties };
     if (n != 3)
-        return ply_header_fail(r, "expected a name and a count after", words[0]);
+        return fail_in_line(r, "expected a name and a count after", words[0]);
     if (!parse_count(words[2], &element.count))
-        return ply_header_fail(r, "not a count:", words[2]);
+        return fail_in_line(r, "not a count:", words[2]);
     element.name = words[1];
     ebpo_status status = note_kind(r, &element);
     if (status != EBPO_OK)
@@ -189,8 +189,8 @@ static ebpo_ply_role role_of(const ebpo_ply_element *element, const ebpo_ply_pro
                : c == 'z' ? EBPO_PLY_ROLE_Z
                           : EBPO_PLY_ROLE_NONE;
     }
-    bool corners = ply_header_is(property->name, "vertex_indices") ||
-                   ply_header_is(property->name, "vertex_index");
+    bool corners =
+        word_is(property->name, "vertex_indices") || word_is(property->name, "vertex_index");
     if ((element->kind == EBPO_PLY_KIND_FACE || element->kind == EBPO_PLY_KIND_STRIPS) &&
         property->list && corners)
         return EBPO_PLY_ROLE_CORNERS;
@@ -211,23 +211,22 @@ static ebpo_status property_statement(reader *r, const ebpo_ply_word *words, int
 {
     ebpo_ply_header *h = r->header;
     if (!h->elements)
-        return ply_header_fail(r, "no element before", words[0]);
-    ebpo_ply_property property = { .list = n > 1 && ply_header_is(words[1], "list"),
-                                   .attribute = -1 };
+        return fail_in_line(r, "no element before", words[0]);
+    ebpo_ply_property property = { .list = n > 1 && word_is(words[1], "list"), .attribute = -1 };
     if (n != (property.list ? 5 : 3))
-        return ply_header_fail(r, "wrong number of words in", words[0]);
+        return fail_in_line(r, "wrong number of words in", words[0]);
     if (!parse_type(words[n - 2], &property.type))
-        return ply_header_fail(r, "unknown type", words[n - 2]);
+        return fail_in_line(r, "unknown type", words[n - 2]);
     if (property.list &&
         (!parse_type(words[2], &property.count_type) || property.count_type >= EBPO_PLY_FLOAT32))
-        return ply_header_fail(r, "invalid type for a list length:", words[2]);
+        return fail_in_line(r, "invalid type for a list length:", words[2]);
     property.name = words[n - 1];
     ebpo_ply_element *element = &h->element[h->elements - 1];
     property.role = role_of(element, &property);
     if (property.role == EBPO_PLY_ROLE_CORNERS && property.type >= EBPO_PLY_FLOAT32)
-        return ply_header_fail(r, "invalid type for vertex indices:", words[n - 2]);
+        return fail_in_line(r, "invalid type for vertex indices:", words[n - 2]);
     if (role_taken(h, element, property.role))
-        return ply_header_fail(r, "duplicate property", property.name);
+        return fail_in_line(r, "duplicate property", property.name);
     if (!ebpo_grow(&h->property, &h->property_capacity, h->properties + 1, sizeof *h->property))
         return ebpo_fail_memory(r->error, sizeof property);
     h->property[h->properties++] = property;
@@ -237,28 +236,28 @@ static ebpo_status property_statement(reader *r, const ebpo_ply_word *words, int
     return EBPO_OK;
 }
 
-static ebpo_status ply_header_statement(reader *r, ebpo_ply_word line, bool *ended)
+static ebpo_status read_statement(reader *r, ebpo_ply_word line, bool *ended)
 {
     ebpo_ply_word words[MAX_WORDS];
-    int n = ply_header_split(line, words);
-    if (n == 0 || ply_header_is(words[0], "comment") || ply_header_is(words[0], "obj_info")) {
+    int n = split_line(line, words);
+    if (n == 0 || word_is(words[0], "comment") || word_is(words[0], "obj_info")) {
         r->header->notes++;
         return EBPO_OK;
     }
-    if (ply_header_is(words[0], "format"))
+    if (word_is(words[0], "format"))
         return format_statement(r, words, n);
-    if (ply_header_is(words[0], "element"))
+    if (word_is(words[0], "element"))
         return element_statement(r, words, n);
-    if (ply_header_is(words[0], "property"))
+    if (word_is(words[0], "property"))
         return property_statement(r, words, n);
-    if (ply_header_is(words[0], "end_header")) {
+    if (word_is(words[0], "end_header")) {
         *ended = true;
         return EBPO_OK;
     }
     /* Blender 2.47 omitted the word "comment" in its first line. After the first element, an
      * unknown statement is an error, as it could change the meaning of the body. */
     r->header->notes++;
-    return r->header->elements ? ply_header_fail(r, "unknown statement", words[0]) : EBPO_OK;
+    return r->header->elements ? fail_in_line(r, "unknown statement", words[0]) : EBPO_OK;
 }
 
 const char *ebpo_ply_first_line(const uint8_t *data, uint64_t size, char *line_end)
@@ -287,7 +286,7 @@ static ebpo_status check_magic(reader *r, uint64_t size)
     return EBPO_OK;
 }
 
-static ebpo_status ply_header_statements(reader *r, bool whole)
+static ebpo_status read_statements(reader *r, bool whole)
 {
     bool ended = false;
     ebpo_ply_word line = { "", 0 };
@@ -299,12 +298,12 @@ static ebpo_status ply_header_statements(reader *r, bool whole)
                                   "file",
                                   r->line + 1,
                                   whole ? "the file ends" : "the header exceeds 1 MiB");
-        ebpo_status status = ply_header_statement(r, line, &ended);
+        ebpo_status status = read_statement(r, line, &ended);
         if (status != EBPO_OK)
             return status;
     }
     if (!r->format_seen)
-        return ply_header_fail(r, "no format statement before", line);
+        return fail_in_line(r, "no format statement before", line);
     return EBPO_OK;
 }
 
@@ -354,7 +353,7 @@ ebpo_status ebpo_ply_header_parse(ebpo_ply_header *out, const uint8_t *data, uin
                  .error = error };
     ebpo_status status = check_magic(&r, size);
     if (status == EBPO_OK)
-        status = ply_header_statements(&r, visible == size);
+        status = read_statements(&r, visible == size);
     if (status == EBPO_OK)
         status = check_roles(&r);
     out->body = (uint64_t)((const uint8_t *)r.at - data);

@@ -23,7 +23,8 @@ bool ebpo_ply_recognise(const uint8_t *data, uint64_t size)
     return ebpo_ply_first_line(data, size, &line_end) != NULL;
 }
 
-/* Computes the least number of bytes of all rows. Returns false when it exceeds any file. */
+/* Computes the least number of bytes that all rows can take. Returns false when the number does not
+ * fit 64 bits. */
 static bool least_bytes(const ebpo_ply_parser *p, const ebpo_ply_element *element, uint64_t *bytes)
 {
     uint64_t row = element->row_bytes;
@@ -38,7 +39,8 @@ static bool least_bytes(const ebpo_ply_parser *p, const ebpo_ply_element *elemen
 static ebpo_status check_counts(ebpo_ply_parser *p)
 {
     uint64_t left = p->size - p->header.body;
-    left += p->header.encoding == EBPO_PLY_ASCII; /* the last blank may be missing */
+    /* the blank after the last value may be missing */
+    left += p->header.encoding == EBPO_PLY_ASCII;
     for (uint64_t i = 0; i < p->header.elements; i++) {
         const ebpo_ply_element *e = &p->header.element[i];
         uint64_t need;
@@ -112,7 +114,7 @@ static ebpo_status allocate_vertices(ebpo_ply_parser *p)
     return EBPO_OK;
 }
 
-static ebpo_status ply_parse_allocate(ebpo_ply_parser *p)
+static ebpo_status allocate_arrays(ebpo_ply_parser *p)
 {
     const ebpo_ply_header *h = &p->header;
     p->face_capacity = h->face >= 0 ? h->element[h->face].count : 0;
@@ -130,8 +132,8 @@ static ebpo_status read_element(ebpo_ply_parser *p, const ebpo_ply_element *elem
                                                 : ebpo_ply_binary_element(p, element, store);
 }
 
-/* Skips faces that come before the vertices and reads them afterwards: triangulation needs
- * positions. */
+/* Reads faces that come before the vertices: skips them, reads the vertices, then reads the faces,
+ * because triangulation needs positions. */
 static ebpo_status read_early_faces(ebpo_ply_parser *p)
 {
     uint64_t at = p->at, line = p->line;
@@ -162,8 +164,8 @@ static ebpo_status read_body(ebpo_ply_parser *p)
     return status;
 }
 
-/* Returns the unused capacity of the face array, which grows by halves. */
-static void ply_parse_trim(ebpo_ply_parser *p)
+/* Gives back the unused capacity of the face array, which grows by halves. */
+static void trim_faces(ebpo_ply_parser *p)
 {
     if (p->face_capacity == p->mesh->face_count || p->mesh->workspace)
         return;
@@ -172,7 +174,7 @@ static void ply_parse_trim(ebpo_ply_parser *p)
         p->mesh->faces = faces;
 }
 
-static void ply_parse_describe(ebpo_ply_parser *p)
+static void describe_source(ebpo_ply_parser *p)
 {
     static const char *const formats[] = { "ply-ascii", "ply-le", "ply-be" };
     snprintf(p->mesh->source_name, sizeof p->mesh->source_name, "%s", p->name);
@@ -207,7 +209,7 @@ static ebpo_status note_unread(ebpo_ply_parser *p)
 }
 
 /* Releases everything except the mesh. */
-static void ply_parse_release(ebpo_ply_parser *p)
+static void free_parser(ebpo_ply_parser *p)
 {
     if (p->c_locale)
         freelocale(p->c_locale);
@@ -235,7 +237,7 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
     if (status == EBPO_OK)
         status = check_parts(&p);
     if (status == EBPO_OK)
-        status = ply_parse_allocate(&p);
+        status = allocate_arrays(&p);
     if (status == EBPO_OK && attributes)
         status = ebpo_ply_attributes_plan(&p);
     if (status == EBPO_OK)
@@ -247,8 +249,8 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
     if (status == EBPO_OK)
         status = ebpo_ply_leave_unused(&p);
     if (status == EBPO_OK) {
-        ply_parse_trim(&p);
-        ply_parse_describe(&p);
+        trim_faces(&p);
+        describe_source(&p);
     } else {
         ebpo_array_free(workspace, mesh.xyz32);
         ebpo_array_free(workspace, mesh.xyz64);
@@ -256,7 +258,7 @@ ebpo_status ebpo_ply_parse_all(ebpo_mesh *out, const uint8_t *data, uint64_t siz
         ebpo_attributes_free(mesh.attributes);
         mesh = (ebpo_mesh){ 0 };
     }
-    ply_parse_release(&p);
+    free_parser(&p);
     *out = mesh;
     return status;
 }
@@ -300,6 +302,6 @@ ebpo_status ebpo_points_parse_ply(const void *data, uint64_t size, const char *n
     } else {
         free(mesh.xyz64);
     }
-    ply_parse_release(&p);
+    free_parser(&p);
     return status;
 }

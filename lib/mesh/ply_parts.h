@@ -1,5 +1,6 @@
-/* Declares the header of a PLY file: its elements and properties. Source: Greg Turk, "The PLY
- * Polygon File Format", 1994. */
+/* The parts of the PLY reader: the header with its elements and properties, the state of the
+ * reader, attributes, and the two kinds of body. Source: Greg Turk, "The PLY Polygon File Format",
+ * 1994. */
 #ifndef EBPO_MESH_PLY_PARTS_H
 #define EBPO_MESH_PLY_PARTS_H
 
@@ -45,7 +46,7 @@ typedef struct ebpo_ply_word {
 
 typedef struct ebpo_ply_property {
     ebpo_ply_word name;
-    ebpo_ply_type type;       /* type of the value or of the list items */
+    ebpo_ply_type type;       /* type of the value, or of the items of a list */
     ebpo_ply_type count_type; /* type of the list length */
     bool list;
     ebpo_ply_role role;
@@ -79,8 +80,8 @@ typedef struct ebpo_ply_header {
 enum { EBPO_PLY_HEADER_LONGEST = 1 << 20 };
 
 /* Parses the header at the start of `data`; `name` appears in messages. The words point into
- * `data`. On failure `out` is empty. Does not check that the counts fit the file:
- * ebpo_ply_parse_memory does. */
+ * `data`. On failure `out` is empty. Whether the counts fit the file is checked later, by
+ * ebpo_ply_parse_memory. */
 EBPO_MUST_USE ebpo_status ebpo_ply_header_parse(ebpo_ply_header *out, const uint8_t *data,
                                                 uint64_t size, const char *name, ebpo_error *error);
 void ebpo_ply_header_free(ebpo_ply_header *header);
@@ -116,7 +117,7 @@ typedef struct ebpo_ply_parser {
     /* ascii: values that the header does not describe, and the number of rows that end with such
      * values */
     uint64_t surplus_values, surplus_rows;
-    bool strict;        /* ascii: such values are an error; coordinates are doubles */
+    bool strict;        /* ascii: surplus values are an error; coordinates are doubles */
     double max_rounded; /* ascii: largest rounding error of a float coordinate */
     uint64_t rounded;   /* ascii: number of attribute values whose text a float cannot hold */
     bool *lost; /* [attribute arrays] true if a value does not fit its type; NULL: attributes are
@@ -141,10 +142,10 @@ ebpo_status ebpo_ply_report(ebpo_ply_parser *p);
 /* Returns EBPO_E_CANCELLED. */
 ebpo_status ebpo_ply_fail_stopped(const ebpo_ply_parser *p);
 
-/* Conversion of properties other than positions and corners to attributes of the mesh. These
- * functions do nothing when attributes are not read (ebpo_ply_parser.lost is NULL). */
+/* --- attributes: properties other than positions and corners --- */
 
-/* Creates arrays for the header's properties, with space for the declared rows. */
+/* Creates arrays for the header's properties, with space for the declared rows. This function and
+ * those below do nothing when attributes are not read (ebpo_ply_parser.lost is NULL). */
 EBPO_MUST_USE ebpo_status ebpo_ply_attributes_plan(ebpo_ply_parser *p);
 /* Moves the values into the mesh after the last row. Keeps the header when it has information that
  * the mesh lacks. */
@@ -176,11 +177,11 @@ void ebpo_ply_store_bits(uint8_t *at, unsigned bytes, uint64_t bits);
 /* Copies the values of face `row`, which came from a polygon, to all later faces. */
 EBPO_MUST_USE ebpo_status ebpo_ply_repeat_face(ebpo_ply_parser *p, uint64_t row);
 
-/* Sets zeros and empty lists for faces from `first` on, which have no row in the face element.
- * Needs reserved space. */
+/* Gives faces from `first` on zeros and empty lists, because they have no row in the face element.
+ * Space must have been reserved. */
 void ebpo_ply_blank_faces(ebpo_ply_parser *p, uint64_t first);
 
-/* Functions for the body of an ascii PLY file. */
+/* --- the body of an ascii file --- */
 
 /* Reads all rows of an element, from p->at to the byte after its last row. Only skips them if
  * `store` is false. */
@@ -189,15 +190,15 @@ ebpo_status ebpo_ply_ascii_element(ebpo_ply_parser *p, const ebpo_ply_element *e
 /* Skips blanks after the last row. Returns true if more text follows. */
 bool ebpo_ply_ascii_more(ebpo_ply_parser *p);
 
-/* Functions for the body of a binary PLY file, of either byte order. */
+/* --- the body of a binary file, of either byte order --- */
 
-/* Does the same as ebpo_ply_ascii_element. */
+/* Same as ebpo_ply_ascii_element, for a binary file. */
 ebpo_status ebpo_ply_binary_element(ebpo_ply_parser *p, const ebpo_ply_element *element,
                                     bool store);
 
-/* Conversion of the corners of a row to triangles. */
+/* --- conversion of the corners of a row to triangles --- */
 
-/* Begins a new strip among the corners of a strip row. No vertex has this index. */
+/* Separates two strips in the corners of one row. No vertex has this index. */
 #define EBPO_PLY_RESTART UINT32_MAX
 
 /* Clears the corners and makes space for `count` new ones. */
@@ -209,8 +210,6 @@ ebpo_status ebpo_ply_fail_index(const ebpo_ply_parser *p, const ebpo_ply_element
 /* Adds the triangles of the current corners, which form a face or a strip, to the mesh. */
 ebpo_status ebpo_ply_add_polygon(ebpo_ply_parser *p, uint64_t row);
 ebpo_status ebpo_ply_add_strip(ebpo_ply_parser *p, uint64_t row);
-
-/* Removal of unusable vertices. */
 
 /* Removes vertices that no face uses and whose coordinates are not finite, and notes their number.
  * Call it after all rows are read. EBPO_E_MEMORY, EBPO_E_IO. */

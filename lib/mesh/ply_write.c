@@ -1,5 +1,5 @@
 /* Writes a mesh and its attributes as PLY. Uses the header of the source where it fits, otherwise a
- * new one. Properties keep the source's types where these hold every value. */
+ * new one. Properties keep the types of the source where these hold every value. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -20,14 +20,15 @@
 
 /* --- the layout --- */
 
-/* Elements and properties of the PLY file to write: those of the mesh and its attributes, in the
- * order of the source header if there is one. */
+/* A property of the PLY file to write. The file has the elements and properties of the mesh and its
+ * attributes, in the order of the source header if there is one. */
 
 typedef struct ply_out_property {
-    ebpo_ply_role role; /* role of positions and corners; an attribute has: */
-    uint32_t attribute; /* array index */
+    /* role of positions and corners; for an attribute, the members below count */
+    ebpo_ply_role role;
+    uint32_t attribute; /* index of the array */
     uint32_t column;
-    ebpo_ply_type type, count_type; /* types as written, for positions and corners */
+    ebpo_ply_type type, count_type; /* types in the written file, for positions and corners */
 } ply_out_property;
 
 typedef struct ply_out_element {
@@ -95,7 +96,7 @@ static ebpo_ply_type position_type(const ebpo_mesh *mesh)
 }
 
 /* Returns true if the type holds the coordinate exactly, bit for bit. */
-static bool ply_write_holds(ebpo_ply_type type, double v)
+static bool type_holds(ebpo_ply_type type, double v)
 {
     static const double least[] = { INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0 }, most[] = {
         INT8_MAX, UINT8_MAX, INT16_MAX, UINT16_MAX, INT32_MAX, UINT32_MAX
@@ -112,7 +113,7 @@ static bool ply_write_holds(ebpo_ply_type type, double v)
     return bits == back;
 }
 
-/* Returns the header's type if it holds all coordinates of the axis. */
+/* Returns the wanted type if it holds all coordinates of the axis. */
 static ebpo_ply_type axis_type(const making *m, ebpo_ply_role role, ebpo_ply_type wanted)
 {
     const ebpo_mesh *mesh = m->mesh;
@@ -120,12 +121,12 @@ static ebpo_ply_type axis_type(const making *m, ebpo_ply_role role, ebpo_ply_typ
     if (!mesh->xyz64)
         return EBPO_PLY_FLOAT32;
     EBPO_FOR_ITEMS(mesh->workspace, i, 0, wanted == EBPO_PLY_FLOAT64 ? 0 : mesh->vertex_count)
-        if (!ply_write_holds(wanted, mesh->xyz64[3 * i + axis]))
+        if (!type_holds(wanted, mesh->xyz64[3 * i + axis]))
             return EBPO_PLY_FLOAT64;
     return wanted;
 }
 
-/* Copies a line of the source header unchanged, since types have several names. */
+/* Copies a line of the source header unchanged, because a type may have several names. */
 static void put_line(making *m, ebpo_ply_word line)
 {
     fprintf(m->text, "%.*s\n", (int)line.n, line.s);
@@ -278,7 +279,7 @@ static void make_plain(making *m)
 typedef struct following {
     making *m;
     ebpo_ply_header header;
-    uint64_t element, property; /* statements so far */
+    uint64_t element, property; /* number of statements so far */
     ebpo_ply_kind kind;         /* kind of the current element, as written */
     uint64_t rows;              /* rows of that element */
     bool skipped;               /* the element is omitted */
@@ -330,7 +331,7 @@ static void follow_property(following *f, ebpo_ply_word line)
         put_line(m, line);
 }
 
-static bool ply_write_begins(ebpo_ply_word line, const char *word)
+static bool begins_with_word(ebpo_ply_word line, const char *word)
 {
     size_t n = strlen(word), at = 0;
     while (at < line.n && (line.s[at] == ' ' || line.s[at] == '\t'))
@@ -341,22 +342,22 @@ static bool ply_write_begins(ebpo_ply_word line, const char *word)
 
 static void follow_line(following *f, ebpo_ply_word line)
 {
-    if (ply_write_begins(line, "format"))
+    if (begins_with_word(line, "format"))
         fputs("format binary_little_endian 1.0\n", f->m->text);
-    else if (ply_write_begins(line, "element"))
+    else if (begins_with_word(line, "element"))
         follow_element(f);
-    else if (ply_write_begins(line, "property"))
+    else if (begins_with_word(line, "property"))
         follow_property(f, line);
     else
         put_line(f->m, line);
 }
 
-static void ply_write_follow(following *f, const char *at, const char *end)
+static void follow_header(following *f, const char *at, const char *end)
 {
     while (at < end && !f->m->no_memory) {
         const char *stop = memchr(at, '\n', (size_t)(end - at));
         ebpo_ply_word line = { at, (size_t)((stop ? stop : end) - at) };
-        if (ply_write_begins(line, "end_header"))
+        if (begins_with_word(line, "end_header"))
             close_element(f);
         if (line.n && line.s[line.n - 1] == '\r')
             line.n--;
@@ -377,7 +378,7 @@ static bool make_as_source(making *m)
     bool usable =
         (f.header.face >= 0 || f.header.strips >= 0) && f.header.body == all->header_bytes;
     if (usable)
-        ply_write_follow(&f, all->header, all->header + all->header_bytes);
+        follow_header(&f, all->header, all->header + all->header_bytes);
     ebpo_ply_header_free(&f.header);
     return usable;
 }
@@ -420,11 +421,11 @@ static void free_layout(ply_layout *layout)
     *layout = (ply_layout){ .element = NULL };
 }
 
-/* Writing of a mesh as a binary little-endian PLY file. */
+/* --- writing --- */
 
 enum { BUFFER = 1 << 16 };
 
-static ebpo_status ply_write_check(const ebpo_mesh *mesh, ebpo_error *error)
+static ebpo_status check_mesh(const ebpo_mesh *mesh, ebpo_error *error)
 {
     if (mesh->vertex_count > UINT32_MAX - 1 || mesh->face_count > UINT32_MAX - 1)
         return ebpo_fail(error, EBPO_E_LIMIT,
@@ -453,14 +454,14 @@ typedef struct writing {
     bool failed;
 } writing;
 
-static void ply_write_flush(writing *w)
+static void flush_buffer(writing *w)
 {
     w->failed = w->failed || fwrite(w->buffer, 1, w->used, w->f) != w->used;
     w->used = 0;
 }
 
 /* Writes the low bytes of a number, little-endian. */
-static void ply_write_put(writing *w, unsigned bytes, uint64_t bits)
+static void put_bytes(writing *w, unsigned bytes, uint64_t bits)
 {
     uint8_t *at = w->buffer + w->used;
     if (bytes == 1)
@@ -473,7 +474,7 @@ static void ply_write_put(writing *w, unsigned bytes, uint64_t bits)
         ebpo_store64(at, bits);
     w->used += bytes;
     if (w->used > BUFFER - sizeof(uint64_t))
-        ply_write_flush(w);
+        flush_buffer(w);
 }
 
 static void put_position(writing *w, const ply_out_property *p, uint64_t row)
@@ -488,14 +489,14 @@ static void put_position(writing *w, const ply_out_property *p, uint64_t row)
     } else {
         bits = (uint64_t)(int64_t)w->mesh->xyz64[at]; /* the layout guarantees an integer */
     }
-    ply_write_put(w, ebpo_ply_type_bytes(p->type), bits);
+    put_bytes(w, ebpo_ply_type_bytes(p->type), bits);
 }
 
 static void put_corners(writing *w, const ply_out_property *p, uint64_t row)
 {
-    ply_write_put(w, ebpo_ply_type_bytes(p->count_type), 3);
+    put_bytes(w, ebpo_ply_type_bytes(p->count_type), 3);
     for (uint64_t k = 0; k < 3; k++)
-        ply_write_put(w, ebpo_ply_type_bytes(p->type), w->mesh->faces[3 * row + k]);
+        put_bytes(w, ebpo_ply_type_bytes(p->type), w->mesh->faces[3 * row + k]);
 }
 
 static uint64_t native_bits(const uint8_t *at, unsigned bytes)
@@ -519,10 +520,10 @@ static void put_attribute(writing *w, const ply_out_property *p, uint64_t row)
     if (a->list != EBPO_ATTRIBUTE_NO_LIST) {
         begin = !a->ends ? row * a->columns : row ? a->ends[row - 1] : 0;
         count = a->ends ? a->ends[row] - begin : a->columns;
-        ply_write_put(w, ebpo_ply_type_bytes(p->count_type), count);
+        put_bytes(w, ebpo_ply_type_bytes(p->count_type), count);
     }
     for (uint64_t i = begin; i < begin + count; i++)
-        ply_write_put(w, bytes, native_bits(a->values + i * bytes, bytes));
+        put_bytes(w, bytes, native_bits(a->values + i * bytes, bytes));
 }
 
 static void put_row(writing *w, uint64_t row)
@@ -548,7 +549,7 @@ static bool write_rows(writing *w)
                 break;
         }
     }
-    ply_write_flush(w);
+    flush_buffer(w);
     return !w->failed;
 }
 
@@ -557,7 +558,7 @@ ebpo_status ebpo_mesh_write_ply(const ebpo_mesh *mesh, const char *path, ebpo_er
     ebpo_publish out = EBPO_PUBLISH_INIT;
     ply_layout layout = { .element = NULL };
     writing w = { .mesh = mesh, .layout = &layout };
-    ebpo_status status = ply_write_check(mesh, error);
+    ebpo_status status = check_mesh(mesh, error);
     if (status == EBPO_OK)
         status = make_layout(&layout, mesh, error);
     if (status == EBPO_OK)

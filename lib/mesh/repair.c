@@ -1,5 +1,5 @@
-/* Repairs a mesh. Removes repeated faces, or counts them by the positions of their corners; then
- * makes the requested repairs in a fixed order. */
+/* Repairs a mesh. Performs the requested repairs in a fixed order. Also removes repeated faces, or
+ * counts faces that are repeated by the positions of their corners. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -24,11 +24,11 @@ typedef struct dropping {
     ebpo_stars stars;
     ebpo_same_faces *scratch; /* one for each worker */
     unsigned threads;
-    uint64_t *gone; /* bit f: remove face f */
+    uint64_t *gone; /* bit f is set if face f is to be removed */
     uint64_t count, opposite;
 } dropping;
 
-static bool repair_goes(const dropping *d, uint64_t f) { return d->gone[f / WORD] >> f % WORD & 1; }
+static bool is_removed(const dropping *d, uint64_t f) { return d->gone[f / WORD] >> f % WORD & 1; }
 
 /* Returns true if the face runs from its lowest vertex to the lesser of the other two. */
 static bool runs_up(const uint32_t face[3])
@@ -71,7 +71,7 @@ static ebpo_status find_repeated(void *context, uint64_t begin, uint64_t end, un
 }
 
 /* Adds source indices to a mesh in the source's order. */
-static ebpo_status keep_numbers(ebpo_mesh *mesh, ebpo_error *error)
+static ebpo_status add_source_indices(ebpo_mesh *mesh, ebpo_error *error)
 {
     if (mesh->arrangement)
         return EBPO_OK;
@@ -96,12 +96,12 @@ static ebpo_status keep_numbers(ebpo_mesh *mesh, ebpo_error *error)
 }
 
 /* Removes the faces in place: sorted faces stay sorted, and every vertex keeps a face. */
-static void close_ranks(const dropping *d)
+static void remove_marked(const dropping *d)
 {
     ebpo_mesh *mesh = d->mesh;
     uint64_t to = 0;
     EBPO_FOR_ITEMS(mesh->workspace, f, 0, mesh->face_count) {
-        if (repair_goes(d, f))
+        if (is_removed(d, f))
             continue;
         if (to != f) {
             memcpy(mesh->faces + 3 * to, mesh->faces + 3 * f, 3 * sizeof *mesh->faces);
@@ -130,7 +130,7 @@ static ebpo_status find_all(dropping *d, ebpo_error *error)
                              find_repeated, d, NULL, "", error);
 }
 
-static ebpo_status repair_drop(dropping *d, ebpo_error *error)
+static ebpo_status drop_faces(dropping *d, ebpo_error *error)
 {
     ebpo_mesh *mesh = d->mesh;
     ebpo_status status = find_all(d, error);
@@ -138,9 +138,9 @@ static ebpo_status repair_drop(dropping *d, ebpo_error *error)
         return status;
     status = ebpo_mesh_check_whole(mesh, error);
     if (status == EBPO_OK)
-        status = keep_numbers(mesh, error);
+        status = add_source_indices(mesh, error);
     if (status == EBPO_OK)
-        close_ranks(d);
+        remove_marked(d);
     return status;
 }
 
@@ -161,7 +161,7 @@ ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh, ebpo_repair_record *recor
     ebpo_status status = ebpo_mesh_check_shape(mesh, error);
     if (status != EBPO_OK)
         return status;
-    status = repair_drop(&d, error);
+    status = drop_faces(&d, error);
     if (status == EBPO_OK && record) {
         record->drop_duplicates = true;
         record->dropped_faces += d.count;
@@ -173,9 +173,9 @@ ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh, ebpo_repair_record *recor
 
 /* ---- by position ---- */
 
-/* Sets corners to the first vertex at their position. */
-static ebpo_status name_positions(const ebpo_mesh *mesh, unsigned threads, uint32_t *corner,
-                                  ebpo_error *error)
+/* Sets each corner to the first vertex at its position. */
+static ebpo_status merge_corners(const ebpo_mesh *mesh, unsigned threads, uint32_t *corner,
+                                 ebpo_error *error)
 {
     ebpo_positions positions = { .mesh = NULL };
     ebpo_status status = ebpo_positions_build(&positions, mesh, threads, NULL, error);
@@ -198,12 +198,12 @@ ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mesh, unsigned threads, eb
         return status;
     uint64_t bytes = 3 * mesh->face_count * sizeof *welded.faces;
     welded.faces = ebpo_array_alloc(mesh->workspace, 3 * mesh->face_count, sizeof *welded.faces);
-    status = welded.faces ? name_positions(mesh, threads, welded.faces, error)
+    status = welded.faces ? merge_corners(mesh, threads, welded.faces, error)
                           : ebpo_workspace_fail(mesh->workspace, bytes, error);
     if (status == EBPO_OK)
         status = find_all(&d, error);
     EBPO_FOR_ITEMS(mesh->workspace, f, 0, status == EBPO_OK ? mesh->face_count : 0)
-        if (repair_goes(&d, f))
+        if (is_removed(&d, f))
             ebpo_finding_add(out, ebpo_mesh_source_face(mesh, f));
     *opposite = d.opposite;
     free_dropping(&d);
@@ -271,7 +271,7 @@ ebpo_status ebpo_mesh_repair(ebpo_mesh *mesh, unsigned steps, double weld_distan
         status = ebpo_mesh_flip(mesh, record, error);
     if (status == EBPO_OK && steps & EBPO_REPAIR_FILL)
         status = ebpo_mesh_fill_holes(mesh, record, error);
-    /* open components may now be closed and have an outside */
+    /* components that were open may now be closed, and have an outside */
     if (status == EBPO_OK && steps & EBPO_REPAIR_ORIENT && !(steps & EBPO_REPAIR_EARLIER) &&
         record->filled_holes > filled) {
         record->unorientable_components = unorientable;

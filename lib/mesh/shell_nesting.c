@@ -1,7 +1,8 @@
 /* Computes the nesting of closed shells and turns each outwards, or inwards if it bounds a cavity.
- * A tree of boxes holds sample points of all shells. Probes classify the samples near the faces of
- * a host; rays do so in crowded hosts. Decisions are exact (geometry/predicates.h), so the result
- * does not depend on threads. */
+ * A tree of boxes holds sample points of all shells. The samples within a host are found by a pass
+ * over its faces, each with the samples near it (probes); in crowded hosts, by rays from the
+ * samples. Decisions are exact (geometry/predicates.h), so the result does not depend on threads.
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,9 +18,9 @@
 #include "geometry/predicates.h"
 #include "mesh/shell_nesting.h"
 
-/* State of one thread: shells that may be within the current host. */
+/* State of one thread, with the shells that may be within the current host. */
 typedef struct seeker {
-    ebpo_box_tree probes; /* samples of these shells; values are winding numbers */
+    ebpo_box_tree probes; /* samples of these shells, whose values are winding numbers */
     struct probing *all;
     const ebpo_shell *host;
     const double (*face)[3];
@@ -61,8 +62,8 @@ static bool list_inner(void *user, ebpo_tree_point *points, uint64_t count)
 }
 
 /* Returns true if a line along the edge from t[0] to t[1], in the y-z plane, separates the box from
- * the triangle. Safe: rounding errors are bounded, and NaN separates nothing. */
-static bool shell_probes_separates(const double *const t[3], const ebpo_point_box *box)
+ * the triangle. Never true by mistake: rounding errors are bounded, and NaN separates nothing. */
+static bool edge_separates(const double *const t[3], const ebpo_point_box *box)
 {
     static const double ROUNDING = 0x1p-49, TINY = 0x1p-1000;
     const double *a = t[0], e[2] = { a[2] - t[1][2], t[1][1] - a[1] };
@@ -84,7 +85,7 @@ static bool shell_probes_separates(const double *const t[3], const ebpo_point_bo
 }
 
 /* Returns false only if no line along x from a point of the box intersects the triangle. */
-static bool ebpo_face_may_intersect_lines(const double t[3][3], const ebpo_point_box *box)
+static bool face_may_intersect_lines(const double t[3][3], const ebpo_point_box *box)
 {
     bool before = false;
     for (int i = 0; i < 3; i++)
@@ -99,7 +100,7 @@ static bool ebpo_face_may_intersect_lines(const double t[3][3], const ebpo_point
     }
     for (int i = 0; i < 3; i++) {
         const double *const turned[3] = { t[i], t[(i + 1) % 3], t[(i + 2) % 3] };
-        if (shell_probes_separates(turned, box))
+        if (edge_separates(turned, box))
             return false;
     }
     return true;
@@ -107,7 +108,7 @@ static bool ebpo_face_may_intersect_lines(const double t[3][3], const ebpo_point
 
 static bool near_face(void *user, const ebpo_box_node *node)
 {
-    return ebpo_face_may_intersect_lines(((const seeker *)user)->face, node->points);
+    return face_may_intersect_lines(((const seeker *)user)->face, node->points);
 }
 
 /* Counts crossings of a face with segments from the probes along x to the host's end. */
@@ -150,7 +151,8 @@ static void count_inner(const seeker *w)
             continue;
         ebpo_shell *inner = &w->all->n->shells[p[i].number];
         __atomic_fetch_add(&inner->depth, 1, __ATOMIC_RELAXED);
-        __atomic_fetch_sub(&inner->around, p[i].value, __ATOMIC_RELAXED); /* it ends outside */
+        /* the segment ends outside */
+        __atomic_fetch_sub(&inner->around, p[i].value, __ATOMIC_RELAXED);
     }
 }
 
@@ -178,8 +180,8 @@ static ebpo_status find_inner(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-/* Tests each face against nearby samples; adds to the depths. */
-static ebpo_status ebpo_nesting_probe(ebpo_nesting *n, ebpo_error *error)
+/* Tests each face against the samples near it, and adds the results to the depths. */
+static ebpo_status probe_shells(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->components->mesh->workspace;
     probing all = { n, ebpo_alloc_zero(n->threads, sizeof *all.seeker) };
@@ -210,7 +212,8 @@ typedef struct casting {
     ebpo_nesting *n;
     uint32_t *host; /* indices of the crowded shells */
     uint64_t host_count;
-    ebpo_box_tree faces; /* number: the face; value: its index in `host` */
+    /* faces of the crowded shells; number: the face; value: index of its shell in `host` */
+    ebpo_box_tree faces;
     struct caster *caster;
 } casting;
 
@@ -253,7 +256,7 @@ static bool cross_faces(void *user, ebpo_tree_point *points, uint64_t count)
         if (w->all->host[points[i].value] == w->shell)
             continue;
         ebpo_face_corners(n->components->mesh, points[i].number, t);
-        if (!ebpo_face_may_intersect_lines((const double(*)[3])t, &w->at))
+        if (!face_may_intersect_lines((const double(*)[3])t, &w->at))
             continue;
         int crossing = ebpo_axis_crossing(w->at.min, INFINITY, 0, t[0], t[1], t[2]);
         if (crossing != 0)
@@ -277,8 +280,8 @@ static uint32_t count_hosts(const caster *w, int32_t *around)
     return count;
 }
 
-/* Tests all samples. They are the extreme points of the shell: if a host contains them all, the
- * shell's box is within the host's. */
+/* Tests all samples. The samples are the extreme points of the shell, so if a host contains them
+ * all, the shell's box is within the host's box. */
 static ebpo_status cast_rays(void *context, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
 {
@@ -298,7 +301,7 @@ static ebpo_status cast_rays(void *context, uint64_t begin, uint64_t end, unsign
             hosts = count_hosts(w, &around);
         }
         all->n->shells[i].depth += hosts;
-        all->n->shells[i].around -= around; /* rays end outside */
+        all->n->shells[i].around -= around; /* the rays end outside */
     }
     return EBPO_OK;
 }
@@ -316,7 +319,7 @@ static ebpo_status add_faces(casting *all, uint64_t host, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status shell_rays_plant(casting *all, ebpo_error *error)
+static ebpo_status build_face_tree(casting *all, ebpo_error *error)
 {
     const ebpo_mesh *mesh = all->n->components->mesh;
     ebpo_status status = EBPO_OK;
@@ -328,7 +331,7 @@ static ebpo_status shell_rays_plant(casting *all, ebpo_error *error)
                                error);
 }
 
-static ebpo_status shell_rays_hire(casting *all, ebpo_error *error)
+static ebpo_status make_casters(casting *all, ebpo_error *error)
 {
     ebpo_workspace *workspace = all->n->components->mesh->workspace;
     all->caster = ebpo_alloc_zero(all->n->threads, sizeof *all->caster);
@@ -360,7 +363,7 @@ static void free_casting(casting *all)
 
 /* Casts a ray from each sample through a tree of the faces of all crowded hosts; adds to the
  * depths. */
-static ebpo_status ebpo_nesting_cast(ebpo_nesting *n, ebpo_error *error)
+static ebpo_status cast_all_rays(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->components->mesh->workspace;
     casting all = { .n = n, .faces = { .workspace = workspace } };
@@ -372,9 +375,9 @@ static ebpo_status ebpo_nesting_cast(ebpo_nesting *n, ebpo_error *error)
             all.host[all.host_count++] = (uint32_t)i;
     ebpo_status status = EBPO_OK;
     if (all.host_count) {
-        status = shell_rays_plant(&all, error);
+        status = build_face_tree(&all, error);
         if (status == EBPO_OK)
-            status = shell_rays_hire(&all, error);
+            status = make_casters(&all, error);
         if (status == EBPO_OK)
             status = ebpo_parallel_for(n->threads, workspace, n->count, SHELL_RAYS_GRAIN, cast_rays,
                                        &all, NULL, "", error);
@@ -383,16 +386,16 @@ static ebpo_status ebpo_nesting_cast(ebpo_nesting *n, ebpo_error *error)
     return status;
 }
 
-/* Closed components and the number of hosts that contain each. */
+/* --- closed components, and the number of hosts that contain each --- */
 
 /* A host is crowded if it has more than this number of samples for each of its faces. */
 enum { CROWD = 8, SHELL_NESTING_GRAIN = 64 };
 
 /* ---- extreme points of each shell ---- */
 
-/* Returns true if a comes before b along direction d: by that coordinate, then by all, so that only
- * equal positions are equal. */
-static bool shell_nesting_before(const double a[3], const double b[3], int d)
+/* Returns true if a comes before b along direction d: by the coordinate along d, then by all
+ * coordinates, so that only equal positions are equal. */
+static bool comes_before(const double a[3], const double b[3], int d)
 {
     int axis = d / 2;
     if (a[axis] != b[axis])
@@ -422,7 +425,7 @@ static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, un
                 double at[3];
                 ebpo_mesh_position(c->mesh, c->mesh->faces[3 * (uint64_t)c->faces.of[i] + k], at);
                 for (int d = 0; d < EBPO_SHELL_SAMPLES; d++)
-                    if (shell_nesting_before(at, one->sample[d], d))
+                    if (comes_before(at, one->sample[d], d))
                         memcpy(one->sample[d], at, sizeof at);
             }
         }
@@ -435,10 +438,11 @@ static ebpo_status sample_shells(void *context, uint64_t begin, uint64_t end, un
 typedef struct crowd {
     const ebpo_nesting *n;
     const ebpo_shell *host;
-    uint64_t inner; /* shells with a box within the host's, including the host */
+    uint64_t inner; /* number of shells whose box is within the host's, including the host */
 } crowd;
 
-/* Counts nodes that are completely within the host, without entering them. */
+/* Counts the shells of nodes that are completely within the host, without visiting the nodes below.
+ */
 static bool count_node(void *user, const ebpo_box_node *node)
 {
     crowd *c = user;
@@ -513,7 +517,7 @@ static ebpo_status make_tree(ebpo_nesting *n, ebpo_error *error)
                : ebpo_workspace_fail(workspace, 2 * n->count * sizeof(ebpo_point_box), error);
 }
 
-static ebpo_status shell_nesting_nest(ebpo_nesting *n, ebpo_error *error)
+static ebpo_status find_nesting(ebpo_nesting *n, ebpo_error *error)
 {
     ebpo_status status = list_shells(n, error);
     if (status != EBPO_OK || n->count < 2)
@@ -526,8 +530,8 @@ static ebpo_status shell_nesting_nest(ebpo_nesting *n, ebpo_error *error)
         status = ebpo_parallel_for(n->threads, NULL, n->count, SHELL_NESTING_GRAIN, find_crowded, n,
                                    NULL, "", error);
     if (status == EBPO_OK)
-        status = ebpo_nesting_probe(n, error);
-    return status == EBPO_OK ? ebpo_nesting_cast(n, error) : status;
+        status = probe_shells(n, error);
+    return status == EBPO_OK ? cast_all_rays(n, error) : status;
 }
 
 ebpo_status ebpo_nesting_find(ebpo_nesting *n, const ebpo_mesh *mesh, uint32_t *closed,
@@ -536,7 +540,7 @@ ebpo_status ebpo_nesting_find(ebpo_nesting *n, const ebpo_mesh *mesh, uint32_t *
     n->threads = ebpo_thread_count(threads);
     ebpo_status status =
         ebpo_components_find(mesh, closed, threads, progress, &n->components, error);
-    return status == EBPO_OK ? shell_nesting_nest(n, error) : status;
+    return status == EBPO_OK ? find_nesting(n, error) : status;
 }
 
 void ebpo_nesting_free(ebpo_nesting *n, const ebpo_mesh *mesh)

@@ -8,7 +8,7 @@
 #include "mesh/component_parts.h"
 
 /* A component is within another one, its host, if its least and greatest vertices along each axis
- * are. */
+ * are within the host. */
 enum { EBPO_SHELL_SAMPLES = 6 };
 
 typedef struct ebpo_shell {
@@ -16,15 +16,16 @@ typedef struct ebpo_shell {
     double min[3], max[3];
     uint32_t component;
     uint32_t depth; /* number of closed components that contain it */
-    int32_t around; /* sum of their winding numbers there */
-    bool crowded;   /* too many samples for its number of faces: uses rays */
+    int32_t around; /* sum of the winding numbers of these components at the samples */
+    /* too many samples are within its box for its number of faces, so rays are used */
+    bool crowded;
 } ebpo_shell;
 
 typedef struct ebpo_nesting {
     ebpo_components *components;
     ebpo_shell *shells; /* closed, with a volume */
     uint64_t count;
-    ebpo_box_tree tree; /* boxes of the shells; the points are sample[0] */
+    ebpo_box_tree tree; /* tree over the boxes of the shells; the point of each is its sample[0] */
     unsigned threads;
 } ebpo_nesting;
 
@@ -52,7 +53,7 @@ static inline void ebpo_face_box(const void *user, const ebpo_tree_point *p, ebp
     }
 }
 
-/* Adds a face to such a tree. Returns false when memory is short. */
+/* Adds a face to a box tree over faces. Returns false when memory is short. */
 static inline bool ebpo_face_add(ebpo_box_tree *tree, const ebpo_mesh *mesh, uint32_t face,
                                  int32_t value)
 {
@@ -84,10 +85,9 @@ static inline bool ebpo_shell_may_hold(const ebpo_shell *host, const ebpo_box_no
     return true;
 }
 
-/* The number of closed components that contain each component. */
-
-/* Finds the nesting. Initialise with zeros; free on failure as well. `closed`: result of
- * ebpo_mesh_find_shells, borrowed until then and modified. */
+/* Finds the nesting: the number of closed components that contain each component. Initialise `n`
+ * with zeros, and free it also on failure. `closed`: result of ebpo_mesh_find_shells, which is
+ * modified and borrowed until `n` is freed. */
 EBPO_MUST_USE ebpo_status ebpo_nesting_find(ebpo_nesting *n, const ebpo_mesh *mesh,
                                             uint32_t *closed, unsigned threads,
                                             const ebpo_progress *progress, ebpo_error *error);

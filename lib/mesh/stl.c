@@ -1,7 +1,7 @@
 /* Reads STL files, text and binary. Source: "StereoLithography Interface Specification", 3D
- * Systems, 1989. A binary file has an 80-byte header, a count and facets of 50 bytes. By the
- * format, the last two bytes of a facet are the number of bytes that follow it; most programs store
- * a colour there. */
+ * Systems, 1989. A binary file has an 80-byte header, a count and facets of 50 bytes. According to
+ * the format, the last two bytes of a facet are the number of bytes that follow the facet; most
+ * programs store a colour there instead. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -20,8 +20,8 @@
 #include "mesh/attributes.h"
 #include "mesh/import_build.h"
 
-/* Attribute bytes of the faces of a binary STL file. They are read here because assimp takes them
- * for colours even where Magics means "no colour". */
+/* Sizes and offsets in a binary STL file. The last two bytes of a facet, the attribute bytes, are
+ * read here because assimp treats them as colours even where Magics means "no colour". */
 
 enum { COUNT = 80, STL_BINARY_HEAD = 84, RECORD = 50, STL_BINARY_WORD = 48 };
 
@@ -39,7 +39,7 @@ static uint64_t stated_size(const uint8_t *head)
     return STL_BINARY_HEAD + RECORD * stated_faces(head);
 }
 
-/* Counts the concatenated models that fill the file. Returns 0 when other bytes are present. */
+/* Returns the number of concatenated models that fill the file exactly, or 0 if they do not. */
 static uint64_t count_models(const uint8_t *data, uint64_t size)
 {
     uint64_t models = 0, bytes;
@@ -52,7 +52,7 @@ static uint64_t count_models(const uint8_t *data, uint64_t size)
 }
 
 /* Returns the end of the last facet if each facet is followed by the bytes that its last two bytes
- * declare. Returns UINT64_MAX when it is beyond the file. */
+ * declare. Returns UINT64_MAX when that end is beyond the file. */
 static uint64_t end_with_payload(ebpo_workspace *workspace, const uint8_t *data, uint64_t size)
 {
     uint64_t at = STL_BINARY_HEAD;
@@ -92,8 +92,8 @@ static ebpo_status fail_ambiguous(const ebpo_import_build *b, const uint8_t *dat
 
 /* Determines the meaning of the bytes beyond the declared facets. Returns EBPO_E_FORMAT when it is
  * ambiguous. */
-static ebpo_status stl_binary_explain(const ebpo_import_build *b, const uint8_t *data,
-                                      uint64_t size, stl_bytes *is)
+static ebpo_status explain_bytes(const ebpo_import_build *b, const uint8_t *data, uint64_t size,
+                                 stl_bytes *is)
 {
     uint64_t end = stated_size(data), held = (size - STL_BINARY_HEAD) / RECORD;
     *is = (stl_bytes){ .models = 1 };
@@ -149,7 +149,7 @@ static uint64_t count_words(const ebpo_import_build *b, const uint8_t *model)
     return words;
 }
 
-static ebpo_status stl_binary_note(ebpo_import_build *b, const stl_bytes *is, uint64_t words)
+static ebpo_status note_bytes(ebpo_import_build *b, const stl_bytes *is, uint64_t words)
 {
     ebpo_status status =
         is->payload || is->behind || words ? ebpo_mesh_need_attributes(b->mesh, b->error) : EBPO_OK;
@@ -208,14 +208,14 @@ static ebpo_status read_binary(ebpo_import_build *b, const uint8_t *data, uint64
                               "corners; split the model",
                               faces);
     stl_bytes is;
-    ebpo_status status = stl_binary_explain(b, data, size, &is);
+    ebpo_status status = explain_bytes(b, data, size, &is);
     for (uint64_t m = 0, at = 0; status == EBPO_OK && m < is.models; m++) {
         status = read_facets(b, data + at, is.payload > 0);
         words += is.models > 1 ? count_words(b, data + at) : 0;
         at += stated_size(data + at);
     }
     *plain = is.models == 1 && !is.payload ? stated_size(data) : 0;
-    return status == EBPO_OK ? stl_binary_note(b, &is, words) : status;
+    return status == EBPO_OK ? note_bytes(b, &is, words) : status;
 }
 
 enum { HEADER = 80, FIRST = 84, FACE = 50, STL_COLOURS_WORD = 48, OWN = 0x8000 };
@@ -223,8 +223,9 @@ enum { HEADER = 80, FIRST = 84, FACE = 50, STL_COLOURS_WORD = 48, OWN = 0x8000 }
 typedef struct stl_colours {
     const uint8_t *data;
     uint64_t faces;
-    bool magics, words, coloured; /* a word is not 0; a face has a colour */
-    uint8_t others[3];            /* colour of faces without one */
+    /* words: some attribute bytes are not 0; coloured: some face has a colour */
+    bool magics, words, coloured;
+    uint8_t others[3]; /* colour of faces without one */
 } stl_colours;
 
 static uint16_t word_of(const stl_colours *s, uint64_t face)
@@ -249,7 +250,7 @@ static void find_default(stl_colours *s)
     }
 }
 
-static void stl_colours_look(stl_colours *s)
+static void inspect_words(stl_colours *s)
 {
     find_default(s);
     s->coloured = s->magics;
@@ -261,17 +262,17 @@ static void stl_colours_look(stl_colours *s)
 }
 
 /* Scales a five-bit value to 0..255 with steps as equal as possible. */
-static uint8_t stl_colours_widen(unsigned five) { return (uint8_t)((five * 255 + 15) / 31); }
+static uint8_t widen_five_bits(unsigned five) { return (uint8_t)((five * 255 + 15) / 31); }
 
 static void colour_of(const stl_colours *s, uint16_t word, uint8_t rgb[3])
 {
     memcpy(rgb, s->others, 3);
     for (unsigned k = 0; k < 3 && has_own(s, word); k++)
-        rgb[s->magics ? k : 2 - k] = stl_colours_widen(word >> 5 * k & 31);
+        rgb[s->magics ? k : 2 - k] = widen_five_bits(word >> 5 * k & 31);
 }
 
-static ebpo_status stl_colours_add(ebpo_mesh *mesh, const char *names, ebpo_attribute_type type,
-                                   uint32_t columns, uint8_t **values, ebpo_error *error)
+static ebpo_status add_array(ebpo_mesh *mesh, const char *names, ebpo_attribute_type type,
+                             uint32_t columns, uint8_t **values, ebpo_error *error)
 {
     ebpo_attribute head = { .element = "face", .type = type, .columns = columns };
     head.list = EBPO_ATTRIBUTE_NO_LIST;
@@ -288,8 +289,7 @@ static ebpo_status stl_colours_add(ebpo_mesh *mesh, const char *names, ebpo_attr
 static ebpo_status add_colours(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *error)
 {
     uint8_t *values = NULL;
-    ebpo_status status =
-        stl_colours_add(mesh, "red green blue", EBPO_ATTRIBUTE_UINT8, 3, &values, error);
+    ebpo_status status = add_array(mesh, "red green blue", EBPO_ATTRIBUTE_UINT8, 3, &values, error);
     for (uint64_t f = 0; f < s->faces && status == EBPO_OK; f++)
         colour_of(s, word_of(s, f), values + 3 * f);
     return status;
@@ -298,8 +298,7 @@ static ebpo_status add_colours(ebpo_mesh *mesh, const stl_colours *s, ebpo_error
 static ebpo_status add_words(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *error)
 {
     uint8_t *values = NULL;
-    ebpo_status status =
-        stl_colours_add(mesh, "attribute", EBPO_ATTRIBUTE_UINT16, 1, &values, error);
+    ebpo_status status = add_array(mesh, "attribute", EBPO_ATTRIBUTE_UINT16, 1, &values, error);
     for (uint64_t f = 0; f < s->faces && status == EBPO_OK; f++) {
         uint16_t word = word_of(s, f);
         memcpy(values + f * sizeof word, &word, sizeof word);
@@ -309,16 +308,16 @@ static ebpo_status add_words(ebpo_mesh *mesh, const stl_colours *s, ebpo_error *
 
 /* Adds the face attributes `attribute` (unchanged) and `red green blue` (five bits each) unless all
  * are empty. Files with COLOR= in the first 80 bytes (Magics): red first, valid where bit 15 is 0,
- * otherwise the colour stated there. Other files (VisCAM): blue first, valid where bit 15 is 1,
- * otherwise white. Text files have none. The mesh's faces are those of the file. EBPO_E_MEMORY,
- * EBPO_E_IO. */
+ * otherwise the face has the colour stated there. Other files (VisCAM): blue first, valid where bit
+ * 15 is 1, otherwise white. Text files have none. The mesh's faces are those of the file.
+ * EBPO_E_MEMORY, EBPO_E_IO. */
 static ebpo_status keep_stl_colours(ebpo_mesh *mesh, const uint8_t *data, uint64_t size,
                                     ebpo_error *error)
 {
     stl_colours s = { .data = data, .faces = mesh->face_count };
     if (size != FIRST + FACE * s.faces || ebpo_load32(data + HEADER) != s.faces)
         return EBPO_OK;
-    stl_colours_look(&s);
+    inspect_words(&s);
     ebpo_status status = s.coloured ? add_colours(mesh, &s, error) : EBPO_OK;
     return status == EBPO_OK && s.words ? add_words(mesh, &s, error) : status;
 }
@@ -353,11 +352,12 @@ typedef struct stl_text {
     ebpo_import_build *build;
     const char *begin, *at, *end;
     uint64_t line;
-    uint64_t loops, corners; /* loops so far; corners of this loop */
+    uint64_t loops, corners; /* number of loops so far, and of corners of the current loop */
     uint64_t next_release;   /* byte offset */
     uint64_t solids;         /* solids that have facets */
-    bool begun;              /* a solid without facets so far */
-    uint64_t odd, odd_line;  /* unexpected words after others; line of the first one */
+    bool begun;              /* a solid has begun and has no facets so far */
+    /* number of unexpected words after a statement's words, and the line of the first one */
+    uint64_t odd, odd_line;
 } stl_text;
 
 typedef struct stl_word {
@@ -376,7 +376,7 @@ static bool next_word(stl_text *t, stl_word *word)
     return word->n > 0;
 }
 
-static bool stl_is(stl_word word, const char *text)
+static bool word_is(stl_word word, const char *text)
 {
     return word.n == strlen(text) && strncasecmp(word.s, text, word.n) == 0;
 }
@@ -424,7 +424,7 @@ static void pass_odd(stl_text *t)
     stl_word word;
     while (next_word(&ahead, &word) && ahead.line == t->line) {
         for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-            if (stl_is(word, words[i]))
+            if (word_is(word, words[i]))
                 return;
         note_odd(t);
         t->at = ahead.at;
@@ -439,23 +439,23 @@ static ebpo_status read_loop(stl_text *t)
     for (int passed = 0;; passed++) {
         if (!next_word(t, &word))
             return fail_end(t);
-        if (stl_is(word, "outer") || stl_is(word, "vertex") || stl_is(word, "endfacet"))
+        if (word_is(word, "outer") || word_is(word, "vertex") || word_is(word, "endfacet"))
             break;
         if (passed > 3)
             note_odd(t);
     }
-    if (stl_is(word, "endfacet"))
+    if (word_is(word, "endfacet"))
         return fail_word(t, "outer loop", word);
-    if (stl_is(word, "outer") && next_word(t, &word) && !stl_is(word, "loop"))
+    if (word_is(word, "outer") && next_word(t, &word) && !word_is(word, "loop"))
         return fail_word(t, "the word loop", word);
-    if (stl_is(word, "vertex"))
+    if (word_is(word, "vertex"))
         status = read_vertex(t);
-    for (t->corners = stl_is(word, "vertex"); status == EBPO_OK;) {
+    for (t->corners = word_is(word, "vertex"); status == EBPO_OK;) {
         if (!next_word(t, &word))
             return fail_end(t);
-        if (stl_is(word, "endloop") || stl_is(word, "endfacet"))
+        if (word_is(word, "endloop") || word_is(word, "endfacet"))
             break;
-        status = stl_is(word, "vertex") ? read_vertex(t) : fail_word(t, "vertex or endloop", word);
+        status = word_is(word, "vertex") ? read_vertex(t) : fail_word(t, "vertex or endloop", word);
     }
     if (status == EBPO_OK && t->corners != 3)
         status = ebpo_fail_file(t->build->error, EBPO_E_FORMAT, t->build->name,
@@ -475,21 +475,21 @@ static bool holds_facet(const stl_text *t)
     stl_word word;
     float x;
     bool more = next_word(&ahead, &word);
-    for (int i = 0; more && i < 4 && !stl_is(word, "outer") && (i || stl_is(word, "normal")); i++)
+    for (int i = 0; more && i < 4 && !word_is(word, "outer") && (i || word_is(word, "normal")); i++)
         more = next_word(&ahead, &word);
-    return more && stl_is(word, "outer") && next_word(&ahead, &word) && stl_is(word, "loop") &&
-           next_word(&ahead, &word) && stl_is(word, "vertex") && next_word(&ahead, &word) &&
+    return more && word_is(word, "outer") && next_word(&ahead, &word) && word_is(word, "loop") &&
+           next_word(&ahead, &word) && word_is(word, "vertex") && next_word(&ahead, &word) &&
            ebpo_number_float(&x, word.s, word.n, t->build->c_locale);
 }
 
-/* Skips the rest of a line that names a solid. Names may contain any words, but files of one line
- * exist. */
+/* Skips the rest of a line that names a solid. Names may contain any words, but some files have
+ * only one line, so a name ends where a facet begins. */
 static void pass_name(stl_text *t)
 {
     stl_text ahead = *t;
     stl_word word;
     while (next_word(&ahead, &word) && ahead.line == t->line &&
-           !(stl_is(word, "facet") && holds_facet(&ahead)))
+           !(word_is(word, "facet") && holds_facet(&ahead)))
         t->at = ahead.at;
 }
 
@@ -497,13 +497,13 @@ static bool begins_facet(stl_text *t, stl_word word)
 {
     stl_text ahead = *t;
     stl_word next;
-    return stl_is(word, "facet") &&
-           (!next_word(&ahead, &next) || stl_is(next, "normal") || stl_is(next, "outer"));
+    return word_is(word, "facet") &&
+           (!next_word(&ahead, &next) || word_is(next, "normal") || word_is(next, "outer"));
 }
 
 static ebpo_status read_text(stl_text *t)
 {
-    bool between = true; /* outside a solid any words are allowed */
+    bool between = true; /* outside a solid, where any words are allowed */
     stl_word word;
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK && next_word(t, &word)) {
@@ -515,14 +515,15 @@ static ebpo_status read_text(stl_text *t)
             t->solids += t->begun;
             between = t->begun = false;
             status = read_loop(t);
-        } else if (stl_is(word, "solid") || stl_is(word, "endsolid")) {
+        } else if (word_is(word, "solid") || word_is(word, "endsolid")) {
             between = t->begun = true;
             pass_name(t);
         } else if (between) {
             note_odd(t);
-        } else if (stl_is(word, "end")) {
+        } else if (word_is(word, "end")) {
             continue;
-        } else if (stl_is(word, "endfacet") || stl_is(word, "endloop") || stl_is(word, "color")) {
+        } else if (word_is(word, "endfacet") || word_is(word, "endloop") ||
+                   word_is(word, "color")) {
             pass_odd(t);
         } else {
             status = fail_word(t, "facet or endsolid", word);

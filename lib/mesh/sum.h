@@ -11,7 +11,7 @@
 
 #include "core/wide.h"
 
-/* Range from 2^-1074 to 2^1024, for 2^62 terms. */
+/* Size of the number: it has the bits from 2^-1074 to 2^1024, and space for 2^62 terms. */
 enum { EBPO_SUM_LIMBS = (1074 + 1024 + 63) / 32 + 2, EBPO_SUM_CARRY = 1 << 29 };
 
 typedef struct ebpo_sum {
@@ -20,7 +20,7 @@ typedef struct ebpo_sum {
     double beyond;                /* sum of infinite or NaN terms */
 } ebpo_sum;
 
-/* Leaves 0 .. 2^32 - 1 in all limbs except the last, which has the sign. */
+/* Propagates carries, so that all limbs are 0 .. 2^32 - 1 except the last, which has the sign. */
 static inline void ebpo_sum_carry(ebpo_sum *s)
 {
     for (int i = 0; i + 1 < EBPO_SUM_LIMBS; i++) {
@@ -76,7 +76,7 @@ static inline double ebpo_sum_value(const ebpo_sum *sum)
     int top = EBPO_SUM_LIMBS - 1;
     while (top > 0 && s.limb[top] == 0)
         top--;
-    /* The leading 64 bits or more, then a sticky bit for the rest. */
+    /* Take the leading 64 bits or more, and a sticky bit for the rest. */
     ebpo_wide head = { (uint64_t)s.limb[top], top > 0 ? (uint64_t)s.limb[top - 1] << 32 : 0 };
     head.low |= top > 1 ? (uint64_t)s.limb[top - 2] : 0;
     bool rest = false;

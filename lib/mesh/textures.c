@@ -28,7 +28,7 @@ const char *ebpo_texture_array_name(ebpo_texture_array which)
     return names[which];
 }
 
-static ebpo_attribute *textures_find(const ebpo_attributes *all, ebpo_texture_array which)
+static ebpo_attribute *find_array(const ebpo_attributes *all, ebpo_texture_array which)
 {
     for (uint64_t i = 0; all && i < all->count; i++) {
         ebpo_attribute *a = &all->array[i];
@@ -42,7 +42,7 @@ static ebpo_attribute *textures_find(const ebpo_attributes *all, ebpo_texture_ar
 
 const ebpo_attribute *ebpo_textures_array(const ebpo_attributes *all, ebpo_texture_array which)
 {
-    return textures_find(all, which);
+    return find_array(all, which);
 }
 
 ebpo_texture_bytes ebpo_texture_list(const ebpo_attribute *a, uint64_t row)
@@ -57,7 +57,7 @@ ebpo_texture_bytes ebpo_texture_list(const ebpo_attribute *a, uint64_t row)
     return (ebpo_texture_bytes){ a->values ? a->values + from : NULL, to - from };
 }
 
-static ebpo_attribute *textures_make(ebpo_attributes *to, ebpo_texture_array which)
+static ebpo_attribute *make_array(ebpo_attributes *to, ebpo_texture_array which)
 {
     ebpo_attribute head = { .element = EBPO_TEXTURE_ELEMENT,
                             .type = EBPO_ATTRIBUTE_UINT8,
@@ -82,8 +82,8 @@ ebpo_status ebpo_textures_add(ebpo_attributes *to, bool keep,
                               const ebpo_texture_bytes list[EBPO_TEXTURE_ARRAYS], ebpo_error *error)
 {
     for (int which = 0; which < (keep ? EBPO_TEXTURE_ARRAYS : EBPO_TEXTURE_BYTES); which++) {
-        ebpo_attribute *a = textures_find(to, (ebpo_texture_array)which);
-        if (!a && !(a = textures_make(to, (ebpo_texture_array)which)))
+        ebpo_attribute *a = find_array(to, (ebpo_texture_array)which);
+        if (!a && !(a = make_array(to, (ebpo_texture_array)which)))
             return ebpo_fail_memory(error, sizeof *a);
         if (!add_row(to->workspace, a, list[which]))
             return ebpo_workspace_fail(to->workspace, list[which].count, error);
@@ -107,8 +107,8 @@ static bool is_digest(ebpo_texture_bytes bytes, ebpo_texture_bytes sha256,
 
 bool ebpo_textures_good(const ebpo_attributes *all)
 {
-    const ebpo_attribute *bytes = textures_find(all, EBPO_TEXTURE_BYTES),
-                         *sha256 = textures_find(all, EBPO_TEXTURE_SHA256);
+    const ebpo_attribute *bytes = find_array(all, EBPO_TEXTURE_BYTES),
+                         *sha256 = find_array(all, EBPO_TEXTURE_SHA256);
     for (uint64_t i = 0; bytes && i < bytes->rows; i++) {
         ebpo_texture_bytes list = ebpo_texture_list(bytes, i);
         if (list.count && !is_digest(list, ebpo_texture_list(sha256, i), all->workspace))
@@ -137,7 +137,7 @@ typedef struct naming {
     bool *kept; /* [rows] */
 } naming;
 
-static words textures_trimmed(words t)
+static words trim_words(words t)
 {
     while (t.n && (*t.s == ' ' || *t.s == '\t' || *t.s == '\r'))
         t = (words){ t.s + 1, t.n - 1 };
@@ -149,10 +149,10 @@ static words textures_trimmed(words t)
 /* Removes and returns the first word. */
 static words first_word(words *rest)
 {
-    words t = textures_trimmed(*rest), word = { t.s, 0 };
+    words t = trim_words(*rest), word = { t.s, 0 };
     while (word.n < t.n && t.s[word.n] != ' ' && t.s[word.n] != '\t')
         word.n++;
-    *rest = textures_trimmed((words){ t.s + word.n, t.n - word.n });
+    *rest = trim_words((words){ t.s + word.n, t.n - word.n });
     return word;
 }
 
@@ -169,7 +169,7 @@ static bool first_line(words *text, words *line)
     return true;
 }
 
-static bool textures_is(words a, const char *text)
+static bool words_are(words a, const char *text)
 {
     return a.n == strlen(text) && (!a.n || memcmp(a.s, text, a.n) == 0);
 }
@@ -199,12 +199,12 @@ static bool read_header(naming *n)
     words text = { n->all->header, n->all->header_bytes }, line;
     bool good = true;
     while (good && first_line(&text, &line)) {
-        if (!textures_is(first_word(&line), "comment"))
+        if (!words_are(first_word(&line), "comment"))
             continue;
         words word = first_word(&line);
-        if (textures_is(word, "TextureFile"))
+        if (words_are(word, "TextureFile"))
             good = add_name(&n->files, line);
-        else if (textures_is(word, "material") && n->materials.of_faces) {
+        else if (words_are(word, "material") && n->materials.of_faces) {
             words number = first_word(&line);
             bool next = number.n && strtoull(number.s, NULL, 10) == n->materials.count;
             good = !next || add_name(&n->materials, line);
@@ -213,8 +213,8 @@ static bool read_header(naming *n)
     return good;
 }
 
-static bool textures_mark(numbered *to, const uint32_t *faces, uint64_t count,
-                          ebpo_workspace *workspace)
+static bool mark_used(numbered *to, const uint32_t *faces, uint64_t count,
+                      ebpo_workspace *workspace)
 {
     const ebpo_attribute *a = to->of_faces;
     to->used = ebpo_alloc_zero(to->count + 1, sizeof *to->used);
@@ -236,7 +236,7 @@ static int compare_words(const void *x, const void *y)
     return order ? order : (a->n > b->n) - (a->n < b->n);
 }
 
-/* Keeps only used names, sorted by their bytes. */
+/* Keeps only the used names, and sorts them by their bytes. */
 static void sort_used(numbered *n)
 {
     uint64_t used = 0;
@@ -248,7 +248,7 @@ static void sort_used(numbered *n)
         qsort(n->name, used, sizeof *n->name, compare_words);
 }
 
-static bool textures_has(const numbered *n, words name)
+static bool has_name(const numbered *n, words name)
 {
     return n->count && bsearch(&name, n->name, n->count, sizeof *n->name, compare_words);
 }
@@ -257,12 +257,12 @@ static bool textures_has(const numbered *n, words name)
 static bool is_named(const naming *n, words file, words use)
 {
     words word = first_word(&use);
-    if (textures_is(word, "TextureFile"))
-        return !n->files.of_faces || textures_has(&n->files, file);
-    return !n->materials.of_faces || textures_has(&n->materials, use);
+    if (words_are(word, "TextureFile"))
+        return !n->files.of_faces || has_name(&n->files, file);
+    return !n->materials.of_faces || has_name(&n->materials, use);
 }
 
-static bool textures_keeps(const naming *n, uint64_t row)
+static bool keeps_bytes(const naming *n, uint64_t row)
 {
     ebpo_texture_bytes name =
                            ebpo_texture_list(ebpo_textures_array(n->all, EBPO_TEXTURE_NAME), row),
@@ -275,7 +275,7 @@ static bool textures_keeps(const naming *n, uint64_t row)
 }
 
 /* Rebuilds the array with the kept lists; all others become empty. */
-static ebpo_status textures_cut(naming *n, ebpo_attribute *a, ebpo_error *error)
+static ebpo_status cut_array(naming *n, ebpo_attribute *a, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->all->workspace;
     ebpo_attribute made = *a;
@@ -308,13 +308,13 @@ static ebpo_status textures_cut(naming *n, ebpo_attribute *a, ebpo_error *error)
     return EBPO_OK;
 }
 
-static ebpo_status textures_keep(naming *n, ebpo_attribute *bytes, const uint32_t *faces,
-                                 uint64_t count, ebpo_error *error)
+static ebpo_status keep_used(naming *n, ebpo_attribute *bytes, const uint32_t *faces,
+                             uint64_t count, ebpo_error *error)
 {
     ebpo_workspace *workspace = n->all->workspace;
     uint64_t kept = 0;
-    if (!read_header(n) || !textures_mark(&n->materials, faces, count, workspace) ||
-        !textures_mark(&n->files, faces, count, workspace))
+    if (!read_header(n) || !mark_used(&n->materials, faces, count, workspace) ||
+        !mark_used(&n->files, faces, count, workspace))
         return ebpo_fail_memory(error, n->all->header_bytes);
     sort_used(&n->materials);
     sort_used(&n->files);
@@ -322,9 +322,9 @@ static ebpo_status textures_keep(naming *n, ebpo_attribute *bytes, const uint32_
     if (!n->kept)
         return ebpo_fail_memory(error, bytes->rows);
     for (uint64_t i = 0; i < bytes->rows; i++)
-        kept += n->kept[i] = textures_keeps(n, i);
+        kept += n->kept[i] = keeps_bytes(n, i);
     if (kept < bytes->rows && kept)
-        return textures_cut(n, bytes, error);
+        return cut_array(n, bytes, error);
     if (!kept)
         ebpo_attributes_remove(n->all, (uint64_t)(bytes - n->all->array));
     return EBPO_OK;
@@ -339,7 +339,7 @@ ebpo_status ebpo_textures_keep_named(ebpo_attributes *of, const uint32_t *faces,
     naming n = { .all = of };
     n.materials.of_faces = of_faces(of, "material");
     n.files.of_faces = of_faces(of, "texnumber");
-    ebpo_status status = textures_keep(&n, &of->array[bytes - of->array], faces, count, error);
+    ebpo_status status = keep_used(&n, &of->array[bytes - of->array], faces, count, error);
     free(n.materials.name);
     free(n.materials.used);
     free(n.files.name);
@@ -356,7 +356,7 @@ typedef struct span {
 
 static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 
-static span texture_names_trimmed(span t)
+static span trim_span(span t)
 {
     while (t.n && is_blank(*t.s))
         t = (span){ t.s + 1, t.n - 1 };
@@ -368,19 +368,19 @@ static span texture_names_trimmed(span t)
 /* Removes and returns the first word. */
 static span take_word(span *rest)
 {
-    span t = texture_names_trimmed(*rest), word = { t.s, 0 };
+    span t = trim_span(*rest), word = { t.s, 0 };
     while (word.n < t.n && !is_blank(t.s[word.n]))
         word.n++;
-    *rest = texture_names_trimmed((span){ t.s + word.n, t.n - word.n });
+    *rest = trim_span((span){ t.s + word.n, t.n - word.n });
     return word;
 }
 
-static bool texture_names_is(span word, const char *text)
+static bool span_is(span word, const char *text)
 {
     return word.n == strlen(text) && memcmp(word.s, text, word.n) == 0;
 }
 
-static bool texture_names_begins(span word, const char *text)
+static bool span_begins(span word, const char *text)
 {
     return word.n >= strlen(text) && memcmp(word.s, text, strlen(text)) == 0;
 }
@@ -422,11 +422,11 @@ static uint64_t hash_of(span name)
     return ebpo_hash_number(hash);
 }
 
-static ebpo_texture_name *place_of(ebpo_texture_names *names, span name)
+static ebpo_texture_name *find_or_add_name(ebpo_texture_names *names, span name)
 {
     uint64_t at;
     EBPO_HASH_FIND(at, hash_of(name), EBPO_TEXTURE_SLOTS - 1,
-                   !names->slot[at] || texture_names_is(name, names->of[names->slot[at] - 1].name));
+                   !names->slot[at] || span_is(name, names->of[names->slot[at] - 1].name));
     if (names->slot[at])
         return &names->of[names->slot[at] - 1];
     if (!is_name(name) || names->count == EBPO_TEXTURES) {
@@ -445,17 +445,17 @@ static ebpo_texture_name *place_of(ebpo_texture_names *names, span name)
 }
 
 /* Appends text. Control characters become question marks, since line feeds separate lines. */
-static void texture_names_append(ebpo_texture_name *to, span text)
+static void append_span(ebpo_texture_name *to, span text)
 {
     for (size_t i = 0; i < text.n; i++)
         to->use[to->use_bytes++] =
             (unsigned char)text.s[i] < ' ' || text.s[i] == 127 ? '?' : text.s[i];
 }
 
-/* Adds a use: a word, and the name of the user. */
-static void texture_names_add(ebpo_texture_names *names, span name, span word, span owner)
+/* Adds a name with its use: a word, and the name of the material that uses it. */
+static void add_use(ebpo_texture_names *names, span name, span word, span owner)
 {
-    ebpo_texture_name *to = place_of(names, name);
+    ebpo_texture_name *to = find_or_add_name(names, name);
     if (!to)
         return;
     if (to->use_bytes + word.n + owner.n + 2 > EBPO_TEXTURE_USE_BYTES) {
@@ -468,10 +468,10 @@ static void texture_names_add(ebpo_texture_names *names, span name, span word, s
     }
     if (to->use_bytes)
         to->use[to->use_bytes++] = '\n';
-    texture_names_append(to, word);
+    append_span(to, word);
     if (owner.n)
         to->use[to->use_bytes++] = ' ';
-    texture_names_append(to, owner);
+    append_span(to, owner);
 }
 
 void ebpo_texture_names_free(ebpo_texture_names *names)
@@ -490,11 +490,11 @@ void ebpo_texture_names_of_ply(ebpo_texture_names *names, const char *header, ui
 {
     span text = { header, bytes }, line;
     while (next_line(&text, &line)) {
-        if (!texture_names_is(take_word(&line), "comment"))
+        if (!span_is(take_word(&line), "comment"))
             continue;
         span word = take_word(&line);
-        if (texture_names_is(word, "TextureFile"))
-            texture_names_add(names, line, word, (span){ "", 0 });
+        if (span_is(word, "TextureFile"))
+            add_use(names, line, word, (span){ "", 0 });
     }
 }
 
@@ -503,10 +503,10 @@ void ebpo_texture_names_of_ply(ebpo_texture_names *names, const char *header, ui
 static bool is_map(span word)
 {
     static const char *const others[] = { "bump", "disp", "decal", "refl", "norm" };
-    bool found = texture_names_begins(word, "map_");
+    bool found = span_begins(word, "map_");
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++)
-        found = found || texture_names_is(word, others[i]);
-    return found && !texture_names_is(word, "map_aat"); /* a switch */
+        found = found || span_is(word, others[i]);
+    return found && !span_is(word, "map_aat"); /* map_aat is a switch, not a map */
 }
 
 static bool is_number(span word)
@@ -525,9 +525,8 @@ static span skip_options(span rest)
 {
     while (rest.n > 1 && rest.s[0] == '-') {
         span option = take_word(&rest);
-        bool numbers = texture_names_is(option, "-o") || texture_names_is(option, "-s") ||
-                       texture_names_is(option, "-t");
-        int most = numbers ? 3 : texture_names_is(option, "-mm") ? 2 : 1;
+        bool numbers = span_is(option, "-o") || span_is(option, "-s") || span_is(option, "-t");
+        int most = numbers ? 3 : span_is(option, "-mm") ? 2 : 1;
         for (int i = 0; i < most; i++) {
             span ahead = rest, value = take_word(&ahead);
             if ((numbers && !is_number(value)) || !ahead.n)
@@ -543,10 +542,10 @@ void ebpo_texture_names_of_mtl(ebpo_texture_names *names, const uint8_t *text, u
     span rest = whole_text(text, bytes), line, material = { "", 0 };
     while (next_line(&rest, &line)) {
         span word = take_word(&line);
-        if (texture_names_is(word, "newmtl"))
+        if (span_is(word, "newmtl"))
             material = line;
         else if (is_map(word))
-            texture_names_add(names, skip_options(line), word, material);
+            add_use(names, skip_options(line), word, material);
     }
 }
 
@@ -576,9 +575,11 @@ enum {
 typedef struct finding {
     const char *path; /* path of the source */
     ebpo_texture_names names;
-    uint64_t absent, outside, large; /* not found; outside the folder; too large */
-    uint64_t tried, libraries;       /* library names; libraries that could not be read */
-    uint64_t library_bytes;          /* bytes read */
+    /* numbers of files that are not found, outside the folder, too large */
+    uint64_t absent, outside, large;
+    /* number of library names that were tried, and of libraries that could not be read */
+    uint64_t tried, libraries;
+    uint64_t library_bytes; /* bytes read */
     bool keep, no_memory;
     ebpo_error *error;
 } finding;
@@ -601,7 +602,7 @@ static bool stays_below(const char *name)
 
 typedef enum found { FOUND, ABSENT, OUTSIDE, NO_MEMORY } found;
 
-/* Converts backslashes, which other systems use. */
+/* Returns the path with backslashes converted to slashes. */
 static char *path_of(const char *name)
 {
     char *path = strdup(name);
@@ -675,7 +676,8 @@ static void find_names(finding *f, const ebpo_mesh *mesh, const uint8_t *data, u
 
 /* --- images --- */
 
-/* Works in pieces, so that bytes that are not kept need not fit in memory. */
+/* Computes the digest of a file in pieces, so that bytes that are not kept need not fit in memory.
+ */
 static ebpo_status make_digest(const ebpo_whole_file *file, const char *name,
                                uint8_t digest[TEXTURE_FILES_DIGEST], ebpo_error *error)
 {
@@ -739,8 +741,7 @@ static ebpo_status add_image(finding *f, ebpo_attributes *to, const ebpo_texture
 
 /* --- notes --- */
 
-static void texture_files_lose(ebpo_attributes *to, uint64_t count, const char *one,
-                               const char *several)
+static void lose_files(ebpo_attributes *to, uint64_t count, const char *one, const char *several)
 {
     if (count == 1)
         ebpo_attributes_lose(to, "%s", one);
@@ -751,23 +752,21 @@ static void texture_files_lose(ebpo_attributes *to, uint64_t count, const char *
 static void note_losses(const finding *f, ebpo_attributes *to)
 {
     uint64_t known = f->names.count - f->absent - f->outside - f->large;
-    texture_files_lose(to, f->names.omitted, "a name or a use of an image (too many)",
-                       "%" PRIu64 " names and uses of images (too many)");
-    texture_files_lose(to, f->libraries, "names of images (a material library cannot be read)",
-                       "names of images (%" PRIu64 " material libraries cannot be read)");
-    texture_files_lose(to, f->absent, "the digest of an image (file not found beside the source)",
-                       "the digests of %" PRIu64 " images (files not found beside the source)");
-    texture_files_lose(to, f->outside,
-                       "the digest of an image (its path leaves the source's folder)",
-                       "the digests of %" PRIu64 " images (their paths leave the source's folder)");
-    texture_files_lose(to, f->large, "an image of more than 1 GiB",
-                       "%" PRIu64 " images of more than 1 GiB");
-    texture_files_lose(to, f->keep ? 0 : known,
-                       "the bytes of an image (--embed-textures keeps them)",
-                       "the bytes of %" PRIu64 " images (--embed-textures keeps them)");
+    lose_files(to, f->names.omitted, "a name or a use of an image (too many)",
+               "%" PRIu64 " names and uses of images (too many)");
+    lose_files(to, f->libraries, "names of images (a material library cannot be read)",
+               "names of images (%" PRIu64 " material libraries cannot be read)");
+    lose_files(to, f->absent, "the digest of an image (file not found beside the source)",
+               "the digests of %" PRIu64 " images (files not found beside the source)");
+    lose_files(to, f->outside, "the digest of an image (its path leaves the source's folder)",
+               "the digests of %" PRIu64 " images (their paths leave the source's folder)");
+    lose_files(to, f->large, "an image of more than 1 GiB",
+               "%" PRIu64 " images of more than 1 GiB");
+    lose_files(to, f->keep ? 0 : known, "the bytes of an image (--embed-textures keeps them)",
+               "the bytes of %" PRIu64 " images (--embed-textures keeps them)");
 }
 
-/* Removes an element of this reserved name that comes from a PLY. */
+/* Removes an element with the reserved name ebpo:texture that comes from a PLY. */
 static void drop_own(ebpo_attributes *from)
 {
     bool any = false;

@@ -1,5 +1,5 @@
-/* Image files that a source names: a row of the element `ebpo:texture` for each, with lists of
- * bytes. format-spec/README.md, "Attributes". For use by one thread. */
+/* Image files that a source names. Each is a row of the element `ebpo:texture`, with lists of
+ * bytes. Source: format-spec/README.md, "Attributes". For use by one thread. */
 #ifndef EBPO_MESH_TEXTURES_H
 #define EBPO_MESH_TEXTURES_H
 
@@ -20,7 +20,7 @@ typedef enum ebpo_texture_array {
     EBPO_TEXTURE_NAME,   /* the name in the source */
     EBPO_TEXTURE_USE,    /* lines of uses, such as map_Kd and a material's name */
     EBPO_TEXTURE_SHA256, /* 32 bytes; empty: the file was not found */
-    EBPO_TEXTURE_BYTES,  /* of the file; this array exists if bytes are kept */
+    EBPO_TEXTURE_BYTES,  /* bytes of the file; this array exists only if bytes are kept */
     EBPO_TEXTURE_ARRAYS
 } ebpo_texture_array;
 
@@ -46,16 +46,12 @@ EBPO_MUST_USE ebpo_status ebpo_textures_add(ebpo_attributes *to, bool keep,
 /* Returns true if all kept bytes match their digests. */
 bool ebpo_textures_good(const ebpo_attributes *all);
 
-/* Selection of the images that given faces use. */
-
 /* Keeps all rows with names, uses and digests, but only the bytes of images that these faces
  * (source indices) use: by the name of their `material`, or as index `texnumber` into a PLY's
  * TextureFile comments. Images whose faces are unknown keep their bytes. EBPO_E_MEMORY, EBPO_E_IO.
  */
 EBPO_MUST_USE ebpo_status ebpo_textures_keep_named(ebpo_attributes *of, const uint32_t *faces,
                                                    uint64_t count, ebpo_error *error);
-
-/* Image files that a mesh's source names: their digests and bytes. */
 
 /* Adds the textures of a mesh that was read from `data`, the file `path`, to its attributes; with
  * bytes if `keep`. Files are searched only in the source's folder and below; links that leave it
@@ -67,7 +63,7 @@ EBPO_MUST_USE ebpo_status ebpo_textures_find(ebpo_mesh *mesh, const char *path, 
 
 typedef struct ebpo_texture_name {
     char *name; /* no control characters; zero-terminated */
-    char *use;  /* lines; the last one has no line end */
+    char *use;  /* one line for each use; the last line has no line end */
     uint64_t use_bytes, use_capacity;
 } ebpo_texture_name;
 
@@ -79,7 +75,7 @@ typedef struct ebpo_texture_names {
     uint16_t slot[EBPO_TEXTURE_SLOTS]; /* hash table of indices from 1; 0: free */
     uint64_t omitted;                  /* names that are too long, too many, or with control
                                         * characters */
-    bool no_memory;                    /* incomplete, as memory was short */
+    bool no_memory;                    /* names are missing, because memory was short */
 } ebpo_texture_names;
 
 /* Adds the names from a header: `comment TextureFile NAME`. */

@@ -14,9 +14,9 @@
 
 enum { GRAIN = 1 << 12, KEY_SHIFT = 20 };
 
-/* Grid cells have an edge of twice the distance and indices below 2^49, so that rounding moves a
- * vertex by at most an eighth of a cell. Vertices within the distance are within REACH cells along
- * each axis. */
+/* The edge of a grid cell is twice the distance. Indices of cells are below 2^49, so that rounding
+ * moves a vertex by at most an eighth of a cell. So vertices within the distance of each other are
+ * within REACH cells along each axis. */
 static const double REACH = 0.75, MAX_CELLS = 0x1p49, LEAST_DISTANCE = 0x1p-1000;
 
 /* A squared distance is decided by rounded arithmetic if the relative difference exceeds this
@@ -28,8 +28,8 @@ typedef struct grouping {
     double distance, min[3];
     double extent;   /* half of the longest side of the box around all vertices */
     uint32_t *order; /* [vertex_count] vertices, ascending by x, then y, then z */
-    uint32_t *map;   /* [vertex_count] vertex that replaces it */
-    uint32_t *slots; /* [mask + 1] by cell hash: the last remaining vertex there */
+    uint32_t *map;   /* [vertex_count] vertex that replaces each vertex */
+    uint32_t *slots; /* [mask + 1] the last remaining vertex of each cell, by the cell's hash */
     uint32_t *chain; /* [vertex_count] previous remaining vertex in the slot */
     uint64_t mask;
     double *moved; /* [threads] largest squared distance */
@@ -93,7 +93,7 @@ static ebpo_status sort_positions(grouping *g, ebpo_error *error)
 
 /* ---- exact distances ---- */
 
-static double weld_within_squared(const double p[3], const double q[3])
+static double squared_distance(const double p[3], const double q[3])
 {
     double d[3] = { p[0] - q[0], p[1] - q[1], p[2] - q[2] };
     return d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
@@ -123,7 +123,7 @@ static int put_distance(double (*factor)[2], double sign, const double p[3], con
 
 static bool is_within(const double p[3], const double q[3], double distance)
 {
-    double square = weld_within_squared(p, q), limit = distance * distance, factor[13][2];
+    double square = squared_distance(p, q), limit = distance * distance, factor[13][2];
     if (is_certain(square, limit))
         return square < limit;
     int n = put_distance(factor, 1, p, q);
@@ -134,13 +134,13 @@ static bool is_within(const double p[3], const double q[3], double distance)
 
 static bool is_nearer(const double p[3], const double a[3], const double b[3])
 {
-    double to_a = weld_within_squared(p, a), to_b = weld_within_squared(p, b), factor[24][2];
+    double to_a = squared_distance(p, a), to_b = squared_distance(p, b), factor[24][2];
     if (is_certain(to_a, to_b))
         return to_a < to_b;
     int n = put_distance(factor, 1, p, a);
     n += put_distance(factor + n, -1, p, b);
     int sign = ebpo_sign_of_products(factor[0], n);
-    for (int k = 0; k < 3 && sign == 0; k++) /* the first of two at equal distance */
+    for (int k = 0; k < 3 && sign == 0; k++) /* of two at equal distance, take the first */
         sign = a[k] < b[k] ? -1 : a[k] > b[k];
     return sign < 0;
 }
@@ -158,7 +158,7 @@ static uint64_t slot_of(const grouping *g, const int64_t cell[3])
     return ebpo_hash_three(key) & g->mask;
 }
 
-static void weld_within_stay(grouping *g, uint32_t v, const double p[3])
+static void keep_vertex(grouping *g, uint32_t v, const double p[3])
 {
     int64_t cell[3];
     for (int k = 0; k < 3; k++)
@@ -208,7 +208,7 @@ static ebpo_status choose_nearest(void *context, uint64_t begin, uint64_t end, u
         ebpo_mesh_position(g->mesh, v, p);
         g->map[v] = find_staying(g, p, true);
         ebpo_mesh_position(g->mesh, g->map[v], q);
-        g->moved[worker] = fmax(g->moved[worker], weld_within_squared(p, q));
+        g->moved[worker] = fmax(g->moved[worker], squared_distance(p, q));
     }
     return EBPO_OK;
 }
@@ -264,8 +264,8 @@ static uint64_t number_staying(grouping *g, uint32_t *from)
     return kept;
 }
 
-static ebpo_status weld_within_group(grouping *g, uint32_t *from, uint64_t *kept, double *moved,
-                                     ebpo_error *error)
+static ebpo_status group_vertices(grouping *g, uint32_t *from, uint64_t *kept, double *moved,
+                                  ebpo_error *error)
 {
     const ebpo_mesh *mesh = g->mesh;
     ebpo_workspace *workspace = mesh->workspace;
@@ -290,7 +290,7 @@ static ebpo_status weld_within_group(grouping *g, uint32_t *from, uint64_t *kept
         double p[3];
         ebpo_mesh_position(mesh, g->order[i], p);
         if (find_staying(g, p, false) == EBPO_NO_INDEX)
-            weld_within_stay(g, g->order[i], p);
+            keep_vertex(g, g->order[i], p);
     }
     status = ebpo_parallel_for(threads, NULL, mesh->vertex_count, GRAIN, choose_nearest, g, NULL,
                                "", error);
@@ -306,7 +306,7 @@ ebpo_status ebpo_weld_group_within(const ebpo_mesh *mesh, double distance, uint3
                                    uint32_t *from, uint64_t *kept, double *moved, ebpo_error *error)
 {
     grouping g = { .mesh = mesh, .distance = distance, .map = map };
-    ebpo_status status = weld_within_group(&g, from, kept, moved, error);
+    ebpo_status status = group_vertices(&g, from, kept, moved, error);
     ebpo_array_free(mesh->workspace, g.order);
     ebpo_array_free(mesh->workspace, g.chain);
     ebpo_array_free(mesh->workspace, g.slots);

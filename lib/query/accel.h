@@ -1,6 +1,6 @@
-/* Acceleration structures: a subtree (or a whole tree) decoded for queries: child tables, leaves
- * with blocks of faces, and a bounding hierarchy. Immutable once made, except leaf kinds, which are
- * found at the first queries. Any thread may use them. */
+/* Acceleration structures ("accels"): a subtree (or a whole tree) decoded for queries. It has child
+ * tables, leaves with blocks of faces, and a bounding hierarchy. It does not change once made,
+ * except leaf kinds, which are found at the first queries. Any thread may use it. */
 #ifndef EBPO_QUERY_ACCEL_H
 #define EBPO_QUERY_ACCEL_H
 
@@ -22,22 +22,22 @@ typedef enum ebpo_leaf_kind {
     EBPO_LEAF_TWO_PLANES = 2,
     EBPO_LEAF_CONVEX = 3,
     EBPO_LEAF_CONCAVE = 4,
-    EBPO_LEAF_UNKNOWN =
-        5, /* few queries so far: treated as a general leaf without a free cell face */
+    EBPO_LEAF_UNKNOWN = 5, /* few queries so far: treated as a general leaf without a free cell face
+                            * (one that no face intersects) */
     EBPO_LEAF_CLAIMED = 6, /* a thread is finding its free cell face and the boxes of its list */
-    EBPO_LEAF_BOUNDED = 7, /* these are known: treated as a general leaf */
-    EBPO_LEAF_SORTED = 8   /* as before, and a thread is finding the kind */
+    EBPO_LEAF_BOUNDED = 7, /* cell face and boxes are known: treated as a general leaf */
+    EBPO_LEAF_SORTED = 8   /* as EBPO_LEAF_BOUNDED, and a thread is finding the kind */
 } ebpo_leaf_kind;
-/* Finding a free cell face takes as long as one query, finding the kind as long as dozens. Each is
- * done after this number of queries. */
+/* Finding a free cell face takes as long as one query, finding the kind as long as dozens of
+ * queries. Each is done after this number of queries. */
 enum { EBPO_LEAF_CELL_FACE_QUERIED = 1, EBPO_LEAF_KIND_QUERIED = 128 };
 enum { EBPO_NO_CELL_FACE = 6, EBPO_KIND_PLANES_MAX = 16 };
 
-/* A block in a leaf's list: bits 0 to 28 are its number; bit 29 is set in the last entry of the
- * leaf; bits 32 to 39 are the lanes listed by the leaf, as other faces may share the block. Bits 40
- * to 63 are a box around these faces in the cell, set in state EBPO_LEAF_BOUNDED: for each axis
- * four bits of the lower side and four of 15 less the upper one, in sixteenths of the cell, rounded
- * outward. */
+/* A block in a leaf's list. Bits 0 to 28 are the block's number. Bit 29 is set in the last entry of
+ * the leaf. Bits 32 to 39 are the lanes that the leaf lists, as other faces may share the block.
+ * Bits 40 to 63 are a box around these faces in the cell, set in state EBPO_LEAF_BOUNDED: for each
+ * axis four bits for the lower side and four bits for 15 less the upper side, in sixteenths of the
+ * cell, rounded outward. */
 typedef _Atomic uint64_t ebpo_listed_block;
 enum { EBPO_LISTED_CELLS = 16, EBPO_LISTED_BOX = 40, EBPO_LISTED_LANES = 32 };
 #define EBPO_LISTED_LAST (UINT64_C(1) << 29)
@@ -53,39 +53,42 @@ static inline void ebpo_list(ebpo_listed_block *b, uint64_t listed)
 static inline uint32_t ebpo_listed_number(uint64_t b) { return b & (EBPO_LISTED_LAST - 1); }
 static inline unsigned ebpo_listed_lanes(uint64_t b) { return b >> EBPO_LISTED_LANES & 255; }
 
-/* The results of ebpo_leaf_query are valid once `kind` says so, and do not change then. */
+/* A leaf. The results of ebpo_leaf_query are valid once `kind` has the corresponding value, and do
+ * not change then. */
 typedef struct ebpo_accel_leaf {
-    uint32_t list;           /* its blocks begin at list[list] of the subtree */
-    int32_t winding;         /* at the lowest corner, shifted (format-spec, section 5) */
+    uint32_t list;           /* the leaf's blocks begin at list[list] of the subtree */
+    int32_t winding;         /* winding number at the lowest corner, shifted (format-spec, section
+                              * 5) */
     uint32_t rows;           /* for kinds other than general: EBPO_KIND_ROW */
     _Atomic uint8_t kind;    /* ebpo_leaf_kind; for surfaces always EBPO_LEAF_GENERAL */
     _Atomic uint8_t queried; /* approximate number of queries until the kind is known */
     /* 2 axis + side (1: upper) of a cell face that no face intersects, or EBPO_NO_CELL_FACE */
     uint8_t cell_face;
-    int8_t cell_face_step; /* winding number on that cell face less the one at the corner */
+    int8_t cell_face_step; /* winding number on that cell face less the one at the lowest corner */
 } ebpo_accel_leaf;
 
-/* Returns true if the free cell face and the boxes of the list may be read. False: treat the leaf
- * as a general one. */
+/* Returns true if the free cell face and the boxes of the list may be read. If false, the leaf is
+ * treated as a general one. */
 static inline bool ebpo_leaf_is_bounded(ebpo_leaf_kind kind)
 {
     return kind != EBPO_LEAF_UNKNOWN && kind != EBPO_LEAF_CLAIMED;
 }
 
-/* A row of a leaf's planes: a row of winding numbers, then four rows for each four planes n . xi -
- * d in the cell's coordinates (0 .. 1 on each axis): n0 of all four, n1, n2, d.
- * |n0| + |n1| + |n2| = 1; beyond EBPO_PLANE_ERROR the sign is certain. */
+/* A row of a leaf's planes. The first row has the winding numbers. Then come four rows for each
+ * four planes n . xi - d, in the cell's coordinates (0 .. 1 on each axis): n0 of all four planes,
+ * n1, n2, d.
+ * |n0| + |n1| + |n2| = 1; for values beyond EBPO_PLANE_ERROR the sign is certain. */
 typedef union ebpo_kind_row {
     float of_four[4];
     struct {
-        int32_t inner, outer; /* below all planes; elsewhere in the cell */
+        int32_t inner, outer; /* winding number below all planes; elsewhere in the cell */
         uint32_t fours;       /* number of groups of four planes; the last is padded */
     } says;
 } ebpo_kind_row;
 #define EBPO_PLANE_ERROR 0x1p-19f
 
-/* Kinds found so far for a subtree's leaves. Rows are stored in pages: a row's number is the page's
- * number, then the number within it. */
+/* Kinds found so far for a subtree's leaves. Rows are stored in pages. A row's number consists of
+ * the page's number and the row's number within the page. */
 enum { EBPO_KIND_PAGES = 23, EBPO_KIND_PAGE_BITS = 27 };
 #define EBPO_NO_ROWS UINT32_MAX
 typedef struct ebpo_leaf_kinds {
@@ -93,8 +96,8 @@ typedef struct ebpo_leaf_kinds {
                            * lock */
     ebpo_kind_row *page[EBPO_KIND_PAGES];
     uint32_t pages;
-    uint64_t used, space;                       /* rows of the last page */
-    _Atomic uint64_t rows;                      /* in all pages */
+    uint64_t used, space;                       /* used rows and capacity of the last page */
+    _Atomic uint64_t rows;                      /* rows in all pages */
     uint64_t rows_max;                          /* leaves beyond this limit stay general */
     _Atomic uint64_t of_kind[5], one_cell_face; /* leaves whose kind is known */
 } ebpo_leaf_kinds;
@@ -114,40 +117,41 @@ static inline bool ebpo_leaf_has_planes(ebpo_leaf_kind kind)
 
 /* --- faces --- */
 
-/* A block of at most eight faces, the head of a record of variable size. After it follow x of all
- * vertices, then y, then z, in the model's unit: floats, or doubles (from EBPO_MESHLET_WIDE on).
- * Corner i of lane l is vertex (corner[i] >> 4 * l) % 16. A block of more than 16 vertices has 24,
- * and corner i of lane l is vertex 8 * i + l. Lanes without a face repeat the first one. Kernels
- * read it with face_block.h; docs/develop/blocks.md. */
+/* A block of at most eight faces: the head of a record of variable size. After the head follow x of
+ * all vertices, then y, then z, in the model's unit: floats, or doubles (from EBPO_MESHLET_WIDE
+ * on). Corner i of lane l is vertex (corner[i] >> 4 * l) % 16. A block of more than 16 vertices has
+ * 24, and corner i of lane l is vertex 8 * i + l. Lanes without a face repeat the first face.
+ * Kernels read blocks with face_block.h. See docs/develop/blocks.md. */
 typedef struct ebpo_meshlet {
-    uint32_t face; /* local number of the first face; the others follow */
+    uint32_t face; /* local number of the first face; the other faces have the next numbers */
     uint32_t corner[3];
     uint8_t faces, vertices;
     uint8_t spare[2];
 } ebpo_meshlet;
 enum { EBPO_BLOCK = 8, EBPO_NO_SLOT = 0x7fffffff };
 enum { EBPO_MESHLET_SHARED = 16, EBPO_MESHLET_VERTICES = 24, EBPO_MESHLET_WIDE = 24 };
-/* A record begins at a multiple of this number of bytes; the multiple is the block's number. */
+/* A unit: records begin at multiples of this number of bytes. The multiple is the block's number.
+ */
 enum { EBPO_MESHLET_UNIT = 64 };
 /* Maximum number of units: slots (block * EBPO_BLOCK + lane) have 32 bits. */
 enum { EBPO_BLOCKS_MAX = 1 << 29 };
 
 /* --- bounding hierarchy over the blocks --- */
 
-/* Eight children, their boxes in steps of 8 bits: axis k from origin + step * low to origin + step
- * * high, in the subtree's frame: (x - centre) * scale, about -1 .. 1 (farther where listed faces
- * extend beyond the cell). The boxes are enlarged by the rounding errors of single precision:
+/* Eight children and their boxes in steps of 8 bits: on axis k from origin + step * low to origin +
+ * step * high, in the subtree's frame: (x - centre) * scale, about -1 .. 1 (farther where listed
+ * faces extend beyond the cell). The boxes are enlarged by the rounding errors of single precision:
  * docs/develop/bounds.md. */
 typedef struct ebpo_bound {
     _Alignas(64) float origin[3];
     float step[3];
     uint8_t low[3][8], high[3][8];
     uint32_t child[8]; /* number of a node, or of a block with EBPO_IS_BLOCK */
-    /* Bounding cylinders are worth testing above this squared limit of a search, where the node is
-     * not large compared with the search. */
+    /* Squared limit of a search. Above it, bounding cylinders are worth testing; below it, the node
+     * is large compared with the search. */
     float slab_limit2;
     uint32_t parent; /* number of a node; 0 for the top */
-    uint8_t count;   /* number of children; they have the first lanes */
+    uint8_t count;   /* number of children, which are in the first lanes */
     uint8_t spare[15];
 } ebpo_bound;
 #define EBPO_IS_BLOCK UINT32_C(0x80000000)
@@ -164,11 +168,13 @@ static inline ebpo_bound_sides ebpo_bound_side(const ebpo_bound *b, int lane, in
                                origin + step * b->high[axis][lane] };
 }
 
-/* Bounding cylinder of a curved sheet, which separates its distance from that of its neighbours.
- * With x a point of the child relative to the middle of its decoded box, and a = axis / 2^15,
- *   along_step * from <= x . a <= along_step * to,   x . x - (x . a)^2 <= (aside_step * radius)^2.
- *   16 bits: with 8 the error of the axis is as large as the thickness of curved sheets, and a
- *   fifth more blocks are visited. */
+/* Bounding cylinder of a curved sheet. It separates the sheet's distance from that of neighbouring
+ * sheets. With x a point of the child relative to the middle of its decoded box, and a = axis /
+ * 2^15,
+ *   along_step * from <= x . a <= along_step * to,
+ *   x . x - (x . a)^2 <= (aside_step * radius)^2.
+ * Values have 16 bits: with 8 bits, the error of the axis would be as large as the thickness of
+ * curved sheets, and a fifth more blocks would be visited. */
 typedef struct ebpo_bound_slab {
     _Alignas(64) int16_t axis[3][8];
     int16_t from[8], to[8], radius[8];
@@ -193,7 +199,7 @@ static inline ebpo_child_slab ebpo_bound_slab_of(const ebpo_bound_slab *b, int l
 typedef struct ebpo_accel {
     ebpo_node root;
     ebpo_box box; /* box of the whole model */
-    int deepest;  /* level of its deepest nodes */
+    int deepest;  /* level of the tree's deepest nodes */
     bool solid, has_planes;
     uint8_t rule; /* ebpo_rule */
     ebpo_node_table nodes;
@@ -215,7 +221,7 @@ typedef struct ebpo_accel {
     uint32_t bound_count;
     uint32_t top; /* the root of the hierarchy */
     uint32_t shared_count;
-    uint32_t *outer;       /* file indices of shared faces, which are new elsewhere */
+    uint32_t *outer;       /* file indices of the shared faces, which are owned by other subtrees */
     uint64_t first_face;   /* index of the owned faces: first_face + local - shared_count */
     uint32_t *face_source; /* [local] or NULL */
     /* codes of gray nodes' planes, in the order of group numbers; only for subtrees loaded on
@@ -224,19 +230,20 @@ typedef struct ebpo_accel {
     /* [group_count + 1]: planes of the gray node whose children are group g */
     uint32_t *gray_first;
     uint64_t gray_count;
-    /* total bytes of memory; without the planes of leaf kinds for a whole model, with their maximum
-     * for a subtree */
+    /* total bytes of memory: for a whole model without the planes of leaf kinds, for a subtree with
+     * their maximum */
     uint64_t bytes;
 } ebpo_accel;
 
-/* Sets the boxes of a leaf's list. Returns the cell faces that its faces reach, a bit for each: 2
- * axis + side (1: upper). A function of ebpo_inside_kernels. */
+/* Sets the boxes of a leaf's list. Returns the cell faces that the leaf's faces reach, a bit for
+ * each: 2 axis + side (1: upper). A function of ebpo_inside_kernels. */
 typedef unsigned ebpo_cell_faces_fn(const ebpo_accel *subtree, ebpo_listed_block *list,
                                     ebpo_cell cell);
 
-/* Counts a query in a leaf of a solid whose kind is not known. Query EBPO_LEAF_CELL_FACE_QUERIED
- * finds the free cell face and the boxes of its list, query * EBPO_LEAF_KIND_QUERIED the kind.
- * Returns true when this query found the kind. Without memory the leaf stays general. */
+/* Counts a query in a leaf of a solid whose kind is not known. Query number
+ * EBPO_LEAF_CELL_FACE_QUERIED finds the free cell face and the boxes of the leaf's list. Query
+ * number EBPO_LEAF_KIND_QUERIED finds the kind. Returns true when this query has found the kind.
+ * Without memory the leaf stays general. */
 bool ebpo_leaf_query(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell cell,
                      ebpo_cell_faces_fn *cell_faces);
 
@@ -245,41 +252,41 @@ bool ebpo_leaf_query(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell
 EBPO_MUST_USE ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice,
                                           const ebpo_info *info, bool with_planes, unsigned threads,
                                           ebpo_error *error);
-/* Does the same within a quota. Returns EBPO_E_LIMIT if that took more than the quota, slice
- * included (NULL: no limit). Ordinary subtrees and models are refused before they exceed it. */
+/* As ebpo_accel_make, within a quota. Returns EBPO_E_LIMIT if the memory, slice included, exceeded
+ * the quota (NULL: no limit). Ordinary subtrees and models are refused before they exceed it. */
 EBPO_MUST_USE ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice,
                                                  const ebpo_info *info, ebpo_quota *space,
                                                  bool with_planes, unsigned threads,
                                                  ebpo_error *error);
 void ebpo_accel_free(ebpo_accel *subtree);
 
-/* Returns the bytes of memory of a whole model now. */
+/* Returns the bytes of memory that a whole model uses now. */
 static inline uint64_t ebpo_accel_bytes(const ebpo_accel *whole)
 {
     return whole->bytes + (whole->kinds ? whole->kinds->rows * sizeof(ebpo_kind_row) : 0);
 }
 
-/* Sets the bytes that the subtree will take and the maximum while it is made (slice included).
- * Upper bounds from counts. */
+/* Sets upper bounds, from counts, of the bytes that a subtree will keep, and of the maximum while
+ * it is made (slice included). */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak);
-/* Does the same with closer estimates for ordinary models: for a whole model, or for a subtree (its
- * planes counted, or none kept). ebpo_slice_read_within and ebpo_accel_make_within refuse larger
- * ones. */
+/* As ebpo_accel_estimate, but closer, for ordinary models. The functions estimate a whole model,
+ * and a subtree (with its planes counted, or without planes). ebpo_slice_read_within and
+ * ebpo_accel_make_within refuse larger models. */
 void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *peak);
 void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                                  uint64_t *peak);
-/* Returns the average bytes of ordinary subtrees, given their number and the counts `all` of all
- * together: closer still, and only slightly above. */
+/* Returns the average bytes of ordinary subtrees, from their number and the counts `all` of all
+ * subtrees together. This estimate is closer still, and only slightly too high. */
 uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info,
                                uint64_t subtrees);
 
-/* --- its nodes (query_node.c), found by `entry` --- */
+/* --- nodes of an accel (query_node.c), found by `entry` --- */
 
 ebpo_node ebpo_accel_root(const ebpo_accel *subtree);
 /* Returns the child of a gray node that is not pruned. */
 ebpo_node ebpo_accel_child(const ebpo_accel *subtree, const ebpo_node *gray, unsigned octant);
-/* For cursors (geometry/cursor.h); the holder is an ebpo_accel. */
+/* For cursors (geometry/cursor.h); the cursor's holder is an ebpo_accel. */
 extern const ebpo_node_source ebpo_accel_source;
 
 static inline const ebpo_meshlet *ebpo_accel_meshlet(const ebpo_accel *s, uint32_t block)
@@ -287,7 +294,7 @@ static inline const ebpo_meshlet *ebpo_accel_meshlet(const ebpo_accel *s, uint32
     return (const void *)(s->meshlets + (uint64_t)block * EBPO_MESHLET_UNIT);
 }
 
-/* Returns the coordinates of its vertices, [3][vertices]. */
+/* Returns the coordinates of the block's vertices, [3][vertices]. */
 static inline const float *ebpo_meshlet_floats(const ebpo_meshlet *m)
 {
     return (const void *)(m + 1);

@@ -5,9 +5,9 @@
  * blocks (block_bounds.c), child tables and leaf records (here). Leaf kinds are found later
  * (leaf_kinds.c).
  *
- * Memory is estimated from counts, before anything is read. Only blocks, the hierarchy over them
- * and faces across a subtree's border use the bounds of ordinary models; ebpo_accel_make_within and
- * ebpo_slice_read_within refuse models that exceed these. */
+ * Memory is estimated from counts, before anything is read. Three parts use bounds that hold for
+ * ordinary models only: blocks, the hierarchy over them, and faces across a subtree's border.
+ * ebpo_accel_make_within and ebpo_slice_read_within refuse models that exceed these bounds. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -26,8 +26,8 @@
 
 /* --- memory --- */
 
-/* Returns the maximum number of entries of leaves' lists: each reference is one entry, and more
- * than eight new faces of a leaf are in at most 2 n / 9 blocks, fewer faces in one. */
+/* Returns the maximum number of entries of leaves' lists. Each reference is one entry. A leaf with
+ * more than eight new faces has them in at most 2 n / 9 blocks, a leaf with fewer in one block. */
 static inline uint64_t list_max(uint64_t refs, uint64_t leaves, uint64_t faces)
 {
     return refs + leaves + faces / 9 * 2 + 2;
@@ -57,14 +57,14 @@ typedef struct counts {
     bool keeps_planes;
 } counts;
 
-/* Sizes in bytes. */
-typedef struct reported {
-    uint64_t levels, mesh, maps, outer; /* parts of the slice */
-    uint64_t only_read;                 /* memory needed only while reading, not for a slice in
-                                         * memory */
+/* Sizes in bytes, computed from counts. */
+typedef struct sizes {
+    uint64_t levels, mesh, maps, outer; /* sizes of the parts of the slice */
+    uint64_t only_read;                 /* memory that is needed only while reading, not for a slice
+                                         * in memory */
     uint64_t nodes, list, planes, rows, slots;
     uint64_t beside;
-} reported;
+} sizes;
 
 static uint64_t grid_bytes(uint64_t groups)
 {
@@ -72,15 +72,15 @@ static uint64_t grid_bytes(uint64_t groups)
     return bits ? (UINT64_C(1) << 3 * bits) * 5 : 0;
 }
 
-/* Returns the bytes of corner references to vertices before the subtree, from shared faces and
- * their neighbours. */
+/* Returns the bytes of corner references to vertices of faces before the subtree: from shared faces
+ * and their neighbours. */
 static uint64_t border_bytes(const counts *c) { return ebpo_compact_bytes(6 * c->outer); }
 
-static reported reported_by(const counts *c, const ebpo_info *info)
+static sizes sizes_of(const counts *c, const ebpo_info *info)
 {
     uint64_t coordinate = info->double_coordinates ? sizeof(double) : sizeof(float),
              maps = info->parts & EBPO_PART_MAPS ? 4 : 0;
-    return (reported){
+    return (sizes){
         .levels = 3 * c->groups + 20 * c->leaves + 4 * (c->uniform + c->refs + c->planes),
         .mesh = 12 * c->faces + 3 * coordinate * c->vertices,
         .maps = maps * c->faces,
@@ -133,13 +133,14 @@ static counts counts_of_slice(const ebpo_slice *slice, bool with_planes)
 }
 
 /* Estimates counts. The number of faces across a subtree's border is about three times the square
- * root of its number of faces; here `most` times, and at most the listed ones. */
+ * root of its number of faces. Here it is `roots` times that root plus `more`, and at most the
+ * number of listed faces. */
 static counts counts_of_size(const ebpo_slice_size *size, const ebpo_info *info, double roots,
                              uint64_t more)
 {
     uint64_t own = size->new_faces, nodes = 8 * size->groups,
              outer = lesser_of(size->refs, (uint64_t)(roots * sqrt((double)own)) + more),
-             faces = own + outer, standard = faces / 4 * 3 + 64;
+             faces = own + outer, vertices = faces / 4 * 3 + 64;
     double of_face = info->face_count ? (double)info->vertex_count / (double)info->face_count : 0;
     return (counts){ .groups = size->groups,
                      .leaves = size->leaves,
@@ -148,7 +149,7 @@ static counts counts_of_size(const ebpo_slice_size *size, const ebpo_info *info,
                      .planes = size->planes,
                      .faces = faces,
                      .outer = outer,
-                     .vertices = greater_of(standard, (uint64_t)(1.25 * of_face * (double)faces)),
+                     .vertices = greater_of(vertices, (uint64_t)(1.25 * of_face * (double)faces)),
                      .below = true,
                      .keeps_planes = size->planes > 0 };
 }
@@ -167,21 +168,21 @@ static found default_model(const counts *c, const ebpo_info *info)
                     .units = bytes / EBPO_MESHLET_UNIT + 64 };
 }
 
-static uint64_t kept_bytes(const reported *t, const found *f)
+static uint64_t kept_bytes(const sizes *t, const found *f)
 {
     return sizeof(ebpo_accel) + sizeof(ebpo_leaf_kinds) + t->maps + t->outer + t->nodes + t->list +
            t->planes + t->rows + (f->units + 1) * EBPO_MESHLET_UNIT +
            (f->bounds + 1) * (sizeof(ebpo_bound) + sizeof(ebpo_bound_slab));
 }
 
-/* Arrays of a layout have grown by half. Beside all memory that is kept later there are first the
- * mesh and the data of blocks, then extents, then the nodes. A refused layout fits too. It takes 12
- * bytes a block and 60 a bound; there are no more blocks than faces, and 7 bounds for 13 blocks.
- * (The first run that is wrapped in a join has at least five members, the others four, three, two,
- * two ..) With 8 bytes a face to number them, this is below the 56 bytes a face of ordinary
- * records, bounds and layout. Added to it all is the memory for decoding a whole model with one
- * thread. */
-static uint64_t peak_bytes(const reported *t, const found *f)
+/* Returns the maximum memory while an accel is made. Arrays of a layout have grown by half. Beside
+ * all memory that is kept later there are first the mesh and the data of blocks, then extents, then
+ * the nodes. The layout of a refused model fits, too. A layout takes 12 bytes for each block and 60
+ * for each bound; there are at most as many blocks as faces, and 7 bounds for 13 blocks. (The first
+ * run that a join wraps has at least five members, the others have four, three, two, two ..) With 8
+ * bytes a face to number the faces, this is below the 56 bytes a face of ordinary records, bounds
+ * and layout. The memory for decoding a whole model with one thread is added. */
+static uint64_t peak_bytes(const sizes *t, const found *f)
 {
     enum { LAYOUT_BLOCK = 16, LAYOUT_BOUND = 60, FOUND = 25, EXTENT = 72 };
     uint64_t layout = f->blocks * LAYOUT_BLOCK + f->bounds * LAYOUT_BOUND,
@@ -199,7 +200,7 @@ static uint64_t peak_bytes(const reported *t, const found *f)
 void ebpo_accel_estimate_whole(const ebpo_info *info, uint64_t *keep, uint64_t *peak)
 {
     counts c = counts_of_all(info);
-    reported t = reported_by(&c, info);
+    sizes t = sizes_of(&c, info);
     found f = default_model(&c, info);
     *keep = kept_bytes(&t, &f);
     *peak = peak_bytes(&t, &f);
@@ -209,14 +210,14 @@ void ebpo_accel_estimate_subtree(const ebpo_slice_size *size, const ebpo_info *i
                                  uint64_t *peak)
 {
     counts c = counts_of_size(size, info, 8, 64);
-    reported t = reported_by(&c, info);
+    sizes t = sizes_of(&c, info);
     found f = default_model(&c, info);
     *keep = kept_bytes(&t, &f);
     *peak = peak_bytes(&t, &f);
 }
 
-/* Blocks and the hierarchy are fuller than the proven minimum, and a leaf's list names a block once
- * for several faces. */
+/* Uses averages: blocks and the hierarchy are fuller than the proven minimum, and a leaf's list has
+ * one entry of a block for several faces. */
 uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info, uint64_t subtrees)
 {
     uint64_t n = subtrees ? subtrees : 1;
@@ -226,7 +227,7 @@ uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info
                              .new_faces = all->new_faces / n + 1,
                              .planes = all->planes / n + 1 };
     counts c = counts_of_size(&mean, info, 3.5, 2);
-    reported t = reported_by(&c, info);
+    sizes t = sizes_of(&c, info);
     uint64_t bytes = c.faces * (accel_needs_doubles(info) ? 48 : 27);
     found f = { .units = bytes / EBPO_MESHLET_UNIT + 4, .bounds = c.faces / 24 + 1 };
     t.list = ((c.refs + c.leaves) / 2 + c.faces / 16 + 4) * sizeof(ebpo_listed_block);
@@ -234,8 +235,8 @@ uint64_t ebpo_accel_mean_bytes(const ebpo_slice_size *all, const ebpo_info *info
 }
 
 /* Blocks are at least half full, except the only block of a leaf with few faces whose neighbours
- * fill theirs. The 64 bytes of each leaf cover the excess of such blocks and the planes in a
- * subtree. Lists name at most one block for each listed face. A record has at most three vertices a
+ * fill theirs. The 64 bytes for each leaf cover the excess of such blocks and the planes in a
+ * subtree. Lists have at most one block for each listed face. A record has at most three vertices a
  * face, or four if it has space for more than 16. */
 void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uint64_t *keep,
                          uint64_t *peak)
@@ -253,8 +254,8 @@ void ebpo_accel_estimate(const ebpo_slice_size *size, const ebpo_info *info, uin
 
 /* --- limits --- */
 
-/* Returns EBPO_E_LIMIT if making it with these blocks (ordinary ones without a layout) takes more
- * memory, slice included, than the quota (NULL: no limit). */
+/* Returns EBPO_E_LIMIT if making the accel with these blocks takes more memory, slice included,
+ * than the quota (NULL: no limit). Without a layout, an ordinary number of blocks is assumed. */
 static ebpo_status accel_fits(ebpo_quota *space, const ebpo_accel_plan *plan, uint64_t units,
                               ebpo_error *error)
 {
@@ -262,7 +263,7 @@ static ebpo_status accel_fits(ebpo_quota *space, const ebpo_accel_plan *plan, ui
         return EBPO_OK;
     const ebpo_layout *layout = plan->layout;
     counts c = counts_of_slice(plan->slice, plan->with_planes);
-    reported t = reported_by(&c, plan->info);
+    sizes t = sizes_of(&c, plan->info);
     t.only_read = 0; /* the slice has been read */
     found f = layout ? (found){ layout->block_count, layout->bound_count, units }
                      : default_model(&c, plan->info);
@@ -288,8 +289,8 @@ typedef struct walk {
     ebpo_error *error;
 } walk;
 
-/* Reserves list entries for one leaf (upper bound). The minimum for all leaves was reserved at
- * once; the excess is freed at the end. */
+/* Reserves list entries for one leaf (upper bound). The minimum for all leaves was reserved before;
+ * the excess is freed at the end. */
 static bool reserve_list(walk *w, uint64_t more)
 {
     ebpo_accel *s = w->s;
@@ -305,12 +306,13 @@ static bool reserve_list(walk *w, uint64_t more)
 /* A leaf's entries so far. */
 typedef struct listing {
     ebpo_listed_block *list;
-    uint32_t count, block; /* block of the last entry; with no entry: not a valid block number */
+    uint32_t count, block; /* count: entries so far; block: block of the last entry (not a valid
+                            * number if there is no entry) */
     uint64_t last;
 } listing;
 
-/* Faces and blocks come in ascending order: faces of one block become one entry. Branch-free,
- * because a branch on a new entry is unpredictable. */
+/* Adds a face. Faces and blocks come in ascending order: faces of one block become one entry.
+ * Branch-free, because a branch on a new entry is unpredictable. */
 static inline void list_face(const walk *w, uint64_t face, listing *l)
 {
     uint32_t slot = w->slot_of[face], block = slot / EBPO_BLOCK;
@@ -322,7 +324,8 @@ static inline void list_face(const walk *w, uint64_t face, listing *l)
     ebpo_list(&l->list[l->count - 1], l->last);
 }
 
-/* Fills a leaf record: first references, which come before the leaf's new faces, then these. */
+/* Fills a leaf record: first the references, which come before the leaf's new faces, then the new
+ * faces. */
 static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank, uint32_t number)
 {
     ebpo_accel_leaf *leaf = &w->s->leaf[number];
@@ -335,7 +338,7 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
         list_face(w, ref[i], &l);
     for (uint64_t i = level->leaf_first[rank], end = i + fresh; i < end; i++)
         list_face(w, i, &l);
-    if (!l.count) /* a leaf without faces: block 0 without lanes */
+    if (!l.count) /* a leaf without faces gets block 0 without lanes */
         l.count = 1;
     ebpo_list(&l.list[l.count - 1], l.last | EBPO_LISTED_LAST);
     if (w->s->list_longest < l.count)
@@ -347,10 +350,11 @@ static void fill_leaf(walk *w, const ebpo_level *level, int depth, uint64_t rank
     leaf->winding = level->leaf_winding ? level->leaf_winding[rank] : 0;
 }
 
-static uint32_t uniform_entry(walk *w, const int32_t *windings, uint64_t rank, int32_t standard)
+static uint32_t uniform_entry(walk *w, const int32_t *windings, uint64_t rank,
+                              int32_t default_winding)
 {
     uint32_t entry = 0;
-    if (!ebpo_entry_uniform(windings ? windings[rank] : standard, &entry))
+    if (!ebpo_entry_uniform(windings ? windings[rank] : default_winding, &entry))
         w->status =
             ebpo_fail(w->error, EBPO_E_LIMIT,
                       "the winding number of a node is beyond 2^29: the solid has too many shells");
@@ -432,7 +436,7 @@ static void trim_list(ebpo_accel *s)
     s->list = less ? less : s->list;
 }
 
-/* Fills child tables and leaf records with their lists of blocks (one walk). */
+/* Fills child tables and leaf records with their lists of blocks, in one walk through the tree. */
 static ebpo_status accel_fill_nodes(ebpo_accel *s, const ebpo_slice *slice,
                                     const ebpo_layout *layout, ebpo_error *error)
 {
@@ -486,7 +490,7 @@ static ebpo_status copy_planes(ebpo_accel *s, const ebpo_slice *slice, ebpo_erro
         grays += slice->level[i].gray_count;
         planes += slice->level[i].plane_count;
     }
-    if (planes > UINT32_MAX) /* range of gray_first */
+    if (planes > UINT32_MAX) /* larger numbers do not fit into gray_first */
         return ebpo_fail(error, EBPO_E_LIMIT,
                          "the tree has too many planes to be held in memory at once; give a "
                          "memory budget");
@@ -511,8 +515,8 @@ static ebpo_status copy_planes(ebpo_accel *s, const ebpo_slice *slice, ebpo_erro
     return EBPO_OK;
 }
 
-/* Returns the maximum number of rows of leaf planes. Few leaves of one subtree are queried; the
- * maximum counts from the beginning. */
+/* Returns the maximum number of rows of leaf planes. Few leaves of one subtree are queried, so the
+ * maximum is small and counts as used from the beginning. */
 static uint64_t rows_max(const ebpo_accel *s)
 {
     return s->root.cell.level ? s->leaf_count : 5 * (uint64_t)s->leaf_count;

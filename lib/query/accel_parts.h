@@ -5,10 +5,11 @@
 #include "core/cpu.h"
 #include "query/accel.h"
 
-/* Layout: assigns faces to blocks and blocks to a hierarchy in one walk through the tree; computes
- * nothing from coordinates. */
+/* Layout: assigns faces to blocks and blocks to a hierarchy in one walk through the tree; it uses
+ * no coordinates. */
 typedef struct ebpo_layout {
-    /* [block_count] first local face of each block, and one past the last; all faces, in order */
+    /* [block_count] first local face of each block, and one past the last; blocks contain all
+     * faces, in order */
     uint32_t *block_begin;
     uint32_t *block_end;
     uint64_t block_count, block_capacity;
@@ -36,8 +37,8 @@ typedef struct ebpo_accel_plan {
     ebpo_layout *layout; /* NULL: not known yet */
 } ebpo_accel_plan;
 
-/* Computes the sizes of blocks, numbers them and sets s->units (parallel); then fills them
- * (parallel). */
+/* The first function computes the sizes of blocks, numbers them and sets s->units; the second fills
+ * them. Both are parallel. */
 EBPO_MUST_USE ebpo_status ebpo_accel_number_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
                                                    unsigned threads, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
@@ -51,25 +52,26 @@ void ebpo_leaf_kinds_free(ebpo_leaf_kinds *kinds);
 
 /* --- kernels (block_measure_kernels.c) ---
  *
- * Measures of blocks of floats, eight vertices at a time: compiled for any processor and for those
- * with AVX2, the same operations in the same order. Error bounds: docs/develop/bounds.md, "How
- * bounding cylinders are measured". */
+ * They measure blocks of floats, eight vertices at a time. They are compiled for any processor and
+ * for those with AVX2, with the same operations in the same order. Error bounds:
+ * docs/develop/bounds.md, "How bounding cylinders are measured". */
 
 typedef struct ebpo_block_extent {
-    float low[3], high[3]; /* extent of its vertices, in the model's unit */
-    /* The sum of its faces' normals, as long as twice their areas. The direction of a cylinder's
-     * axis affects only the tightness. */
+    float low[3], high[3]; /* extent of the block's vertices, in the model's unit */
+    /* The sum of the faces' normals, each as long as twice the face's area. The direction of a
+     * cylinder's axis affects only the tightness of the bounds, so rounding does not matter. */
     float normal[3];
 } ebpo_block_extent;
 
-/* Frame of a bounding cylinder: an origin in two parts, in the model's unit; the frame's scale; the
- * axis, and 1 less its square. */
+/* Frame of a bounding cylinder: an origin in two parts, in the model's unit; the scale of the
+ * subtree's frame; the axis, and 1 less its squared length. */
 typedef struct ebpo_slab_view {
     float high[3], low[3], scale, axis[3], rest;
 } ebpo_slab_view;
 
 typedef struct ebpo_slab_extent {
-    float from, to, aside2; /* in the frame; the square of the greatest distance from the axis */
+    float from, to, aside2; /* extent along the axis, in the subtree's frame; square of the greatest
+                             * distance from the axis */
 } ebpo_slab_extent;
 
 typedef struct ebpo_block_measures {

@@ -20,14 +20,14 @@
 #include "core/parallel.h"
 #include "query/accel_parts.h"
 
-/* Above this number of blocks the bounding cylinder is omitted: such patches are too curved. */
+/* Maximum number of blocks with a bounding cylinder: larger patches are too curved. */
 enum { SLAB_BLOCKS_MAX = 1024 };
 /* Enlargement of boxes, relative to the largest coordinate of their faces. */
 static const double box_slack = 0x1p-19;
 /* Enlargement of bounding cylinders, relative to the node's size: patches are thinner than their
  * distance from the origin. */
 static const double slab_slack = 0x1p-19;
-/* Share of a node's size, squared: cylinders of nodes that are large compared with a search exclude
+/* Share of a node's size, squared. If a node is large compared with a search, its cylinders exclude
  * hardly any child. */
 static const double slab_share = 0.01;
 /* Enlargement for a model without extent. */
@@ -45,7 +45,7 @@ typedef struct job {
     extent *of_block, *of_node;
 } job;
 
-/* Two lanes. */
+/* Two lanes of doubles. */
 typedef double pair __attribute__((vector_size(16)));
 
 #if defined(__SSE2__)
@@ -68,7 +68,7 @@ static double max_of(pair x) { return x[0] > x[1] ? x[0] : x[1]; }
 enum { PAIRS = EBPO_MESHLET_VERTICES / 2 };
 typedef struct vertices {
     pair x[3][PAIRS];
-    unsigned pairs; /* the last vertex may occur twice */
+    unsigned pairs; /* number of pairs; the last vertex may occur twice */
 } vertices;
 
 static void load_vertices(const ebpo_accel *s, uint32_t block, vertices *out)
@@ -166,7 +166,7 @@ static const extent *extent_of(const job *j, uint32_t child)
     return child & EBPO_IS_BLOCK ? &j->of_block[child & ~EBPO_IS_BLOCK] : &j->of_node[child];
 }
 
-/* Extends nodes; they come after their children. */
+/* Computes the extents of nodes; a node comes after its children. */
 static void extend_nodes(job *j)
 {
     for (uint64_t n = 0; n < j->layout->bound_count; n++) {
@@ -223,7 +223,7 @@ static void set_boxes(ebpo_bound *b, const extent *all, const extent child[8])
     b->slab_limit2 = (float)(size * size * slab_share);
 }
 
-/* Returns the largest coordinate of its boxes. */
+/* Returns the largest absolute coordinate of the node's boxes. */
 static double reach_of(const ebpo_bound *b)
 {
     double reach = 0;
@@ -272,8 +272,8 @@ static inline void add_to_slab(const vertices *v, slab_pairs *p)
     }
 }
 
-/* Adds all vertices of a run of blocks. The middle of the box need not be between them: for a
- * tilted patch it is off its plane. */
+/* Extends a cylinder by all vertices of a run of blocks. The middle of the box need not be between
+ * the vertices: for a tilted patch it is off the patch's plane. */
 static void add_run_wide(const job *j, uint32_t begin, uint32_t end, slab *out)
 {
     slab_pairs p = { .from = { INFINITY, INFINITY }, .to = { -INFINITY, -INFINITY } };
@@ -291,8 +291,8 @@ static void add_run_wide(const job *j, uint32_t begin, uint32_t end, slab *out)
     out->radius2 = max_of(p.most);
 }
 
-/* Does the same in single precision, relative to two floats near the middle; adds their distance
- * from the middle. */
+/* As add_run_wide, in single precision, relative to two floats near the middle; adds the distance
+ * of these from the middle. */
 static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, slab *out)
 {
     const ebpo_accel *s = j->s;
@@ -318,7 +318,7 @@ static void add_run_narrow(const job *j, uint32_t begin, uint32_t end, slab *out
     out->radius2 = aside * aside;
 }
 
-/* Sets a cylinder without axis, as wide as the box: it adds nothing to the box. */
+/* Sets a cylinder without axis, as wide as the box: it bounds no better than the box. */
 static void no_slab(ebpo_bound_slab *b, int lane, const double half[3], slab *out)
 {
     for (int k = 0; k < 3; k++) {
@@ -361,7 +361,8 @@ static double size_of(const ebpo_bound *b)
 }
 
 /* Returns false for faces so far from their leaf that squares overflow (possible in untrusted
- * files). Such cylinders exclude nothing, as no multiples of an infinite or NaN step exist. */
+ * files). Cylinders of such faces exclude nothing, as no multiples of an infinite or NaN step
+ * exist. */
 static bool is_known(int count, const slab child[8], const double radius[8])
 {
     for (int lane = 0; lane < count; lane++)
@@ -397,7 +398,7 @@ static void set_slabs(ebpo_bound_slab *b, int count, double size, const slab chi
 
 /* --- all nodes --- */
 
-/* Returns the number that the accel uses. */
+/* Returns the number by which the accel refers to a child. */
 static uint32_t child_number(const job *j, uint32_t child)
 {
     return child == EBPO_NO_CHILD || !(child & EBPO_IS_BLOCK)

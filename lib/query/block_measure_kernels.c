@@ -14,7 +14,7 @@ static const float lane_number[8] = { 0, 1, 2, 3, 4, 5, 6, 7 };
 
 EBPO_EIGHT float max_of(f8 x) { return -f8_least(f8_sub(f8_all(0), x)); }
 
-/* Loads vertices at .. at + 7 on an axis; repeats the first one where there are fewer. */
+/* Loads vertices at .. at + 7 on an axis; repeats the first one if there are fewer. */
 EBPO_EIGHT f8 load_vertices(const float *x, unsigned at, unsigned count)
 {
     f8 there = f8_less(f8_load(lane_number), f8_all((float)count - (float)at));

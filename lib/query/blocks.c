@@ -1,11 +1,10 @@
 /* Makes blocks: at most eight faces, with the vertices that they share.
  *
- * The layout decides which faces share a block and builds the hierarchy of blocks; it computes
- * nothing from coordinates. The octree is the skeleton of the hierarchy: a node's new faces are one
- * range of numbers, so neighbouring children with few faces share a block, and nodes with few
- * blocks are passed up until eight come together. The blocks are then measured, numbered and filled
- * in parallel; block_bounds.c makes their bounds. The encoding is that of ebpo_meshlet (accel.h).
- */
+ * The layout decides which faces share a block and builds the hierarchy of blocks; it uses no
+ * coordinates. The hierarchy follows the octree. The new faces of a node are one range of numbers,
+ * so neighbouring children with few faces share a block, and nodes with few blocks are passed up
+ * until eight come together. The blocks are then measured, numbered and filled in parallel;
+ * block_bounds.c computes their bounds. The encoding is that of ebpo_meshlet (accel.h). */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -18,10 +17,10 @@
 #include "geometry/level_nodes.h"
 #include "query/accel_parts.h"
 
-/* Result of a walk below a node: either up to eight faces without a block, or up to eight members
+/* Result of the walk below a node: either up to eight faces without a block, or up to eight members
  * of the hierarchy. */
 typedef struct bundle {
-    uint32_t begin, end; /* faces */
+    uint32_t begin, end; /* range of faces */
     int members;         /* 0: no block yet */
     uint32_t member[8];
 } bundle;
@@ -49,7 +48,7 @@ static uint32_t add_block(walk *w, uint32_t begin, uint32_t end)
     return (uint32_t)o->block_count++ | EBPO_IS_BLOCK;
 }
 
-/* Adds a node. first_block and last_block hold faces until all blocks are known. */
+/* Adds a node. Its first_block and last_block are numbers of faces until all blocks are known. */
 static uint32_t add_bound(walk *w, const bundle *b)
 {
     ebpo_layout *o = w->out;
@@ -75,8 +74,8 @@ static void close_bundle(walk *w, bundle *b)
     }
 }
 
-/* Neighbours that together fill a node best, among those not wrapped yet; otherwise the hierarchy
- * would get deep. */
+/* Neighbours that together fill a node best, among those not wrapped yet. Without this choice the
+ * hierarchy would become deep. */
 typedef struct run {
     int begin, end, members;
 } run;
@@ -130,7 +129,7 @@ static bundle join_parts(walk *w, bundle *part, int parts)
                      : gather_parts(part, parts);
 }
 
-/* Splits a range in its order: blocks of equal size, eight under each node. */
+/* Splits a range of faces in its order: into blocks of equal size, eight under each node. */
 static bundle split_range(walk *w, uint32_t begin, uint32_t end)
 {
     uint64_t count = end - begin;
@@ -174,15 +173,16 @@ static bundle walk_gray(walk *w, int depth, uint32_t begin)
 
 static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
 {
-    if (type == EBPO_GRAY && depth + 1 < w->slice->level_count) /* otherwise pruned */
+    if (type == EBPO_GRAY && depth + 1 < w->slice->level_count) /* if the next level is not in the
+                                                                 * slice, the node is pruned */
         return walk_gray(w, depth, begin);
     if (type == EBPO_LEAF)
         return split_range(w, begin, begin + w->slice->level[depth].leaf_new[w->leaf[depth]++]);
     return (bundle){ begin, begin, 0, { 0 } };
 }
 
-/* Renumbers blocks, which are found in the order in which they are filled, by their faces, so that
- * the blocks below a node are one range. */
+/* Renumbers blocks by their faces, so that the blocks below a node are one range. Before, their
+ * numbers are in the order in which the walk made them. */
 static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
 {
     uint32_t *at_face = ebpo_alloc(faces + 1, sizeof *at_face),
@@ -198,7 +198,7 @@ static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
     for (uint64_t face = 0; face < faces; number++) {
         uint32_t old = at_face[face];
         end[number] = o->block_end[old];
-        o->block_end[old] = number; /* from here on: the new number of an old one */
+        o->block_end[old] = number; /* from here on block_end has the new number of each old one */
         at_face[face] = number;
         face = end[number];
     }
@@ -261,7 +261,8 @@ void ebpo_layout_free(ebpo_layout *layout)
 
 /* --- blocks --- */
 
-/* Indices into a block's vertices, in the order in which its faces have them: [face][corner]. */
+/* For each corner of a block's faces, [face][corner]: index of its vertex in the block. Vertices
+ * are in the order in which the faces first use them. */
 struct ebpo_block_corners {
     uint8_t at[EBPO_MESHLET_VERTICES], count;
 };
@@ -279,7 +280,8 @@ typedef struct shared {
     unsigned faces, count;
 } shared;
 
-/* Open addressing: one more than the index of a vertex among the block's, 0: free. */
+/* Hash table with open addressing. An entry is the index of a vertex in the block plus one; 0:
+ * free. */
 enum { TABLE_BITS = 6, TABLE = 1 << TABLE_BITS };
 
 static const uint32_t *corners_of(const job *j, uint64_t block, unsigned *count)
@@ -293,7 +295,7 @@ static void find_shared(const job *j, uint64_t block)
 {
     unsigned corners, count = 0;
     const uint32_t *corner = corners_of(j, block, &corners);
-    uint32_t vertex[EBPO_MESHLET_VERTICES + 1]; /* and the searched one */
+    uint32_t vertex[EBPO_MESHLET_VERTICES + 1]; /* one more for the searched vertex */
     uint8_t table[TABLE] = { 0 };
     for (unsigned i = 0; i < corners; i++) {
         unsigned slot = corner[i] * UINT32_C(0x9e3779b1) >> (32 - TABLE_BITS), at;
@@ -358,7 +360,8 @@ static bool number_blocks(ebpo_accel *s, ebpo_layout *layout)
 
 /* --- filling --- */
 
-/* Makes each corner of each lane a separate vertex, for blocks that share too few. */
+/* Makes each corner of each lane a separate vertex, for blocks whose faces share too few vertices.
+ */
 static void spread_corners(shared *v)
 {
     uint32_t corner[EBPO_MESHLET_VERTICES];
@@ -416,8 +419,8 @@ static ebpo_status fill_blocks(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Allocates records. Kernels read tables of 16 entries, so memory behind the last record is
- * allocated too. */
+/* Allocates records. Kernels read tables of 16 entries, so memory after the last record is
+ * allocated, too. */
 static ebpo_status reserve_space(ebpo_accel *s, ebpo_error *error)
 {
     uint64_t bytes = s->units * EBPO_MESHLET_UNIT;

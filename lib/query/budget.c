@@ -30,9 +30,9 @@ uint64_t ebpo_chunk_budget(uint64_t budget)
                                           : budget / 8;
 }
 
-/* Returns the maximum bytes of skeletons of subtrees: searches over the whole model gain more by
- * them than by a few more subtrees. Taken from the part above the minimum, so that the minimum
- * budget does not grow. */
+/* Returns the maximum bytes of skeletons of subtrees: searches over the whole model gain more from
+ * skeletons than from a few more subtrees. The bytes are taken from the part above the minimum, so
+ * that the minimum budget does not grow. */
 uint64_t ebpo_skeleton_budget(const ebpo_model_options *o, uint64_t budget)
 {
     const uint64_t least = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
@@ -54,7 +54,7 @@ struct ebpo_budget {
 ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget **out, ebpo_error *error)
 {
     *out = NULL;
-    ebpo_model_options standard = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_options default_options = EBPO_MODEL_OPTIONS_INIT;
     uint64_t chunks = ebpo_chunk_budget(bytes), least = EBPO_CHUNKS_LEAST + EBPO_SUBTREES_LEAST;
     if (bytes == 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the budget is 0 bytes");
@@ -69,7 +69,7 @@ ebpo_status ebpo_budget_new(uint64_t bytes, ebpo_budget **out, ebpo_error *error
     (void)pthread_mutex_init(&b->lock, NULL);
     b->bytes = bytes;
     b->whole = bytes / 2;
-    b->skeletons = ebpo_skeleton_budget(&standard, bytes);
+    b->skeletons = ebpo_skeleton_budget(&default_options, bytes);
     ebpo_status status = ebpo_cache_pool_make(&b->subtrees, bytes - chunks, error);
     if (status == EBPO_OK)
         status = ebpo_cache_pool_make(&b->chunks, chunks, error);
@@ -157,7 +157,7 @@ void ebpo_budget_give_back_skeletons(ebpo_budget *b, uint64_t bytes)
 /* --- the plan of a model --- */
 
 /* Minimum number of subtrees in a cache: a path needs the current subtree, its neighbours, and
- * memory to load the next. More and smaller ones load faster. */
+ * memory to load the next one. More and smaller subtrees load faster. */
 enum { SUBTREES_NEEDED = 64, SUBTREES_WANTED = 320 };
 
 static ebpo_slice_size whole_size(const ebpo_info *info)
@@ -207,7 +207,7 @@ static uint64_t least_budget(const ebpo_info *info, const ebpo_model_options *o)
     return budget;
 }
 
-/* Remote files are read in parts, unless they are small, as queries rarely need the whole file. */
+/* Remote files are read in parts, unless they are small, as queries rarely need a whole file. */
 enum { FAR_MEMORY = 256 << 20, FAR_WHOLE_BYTES = 2 << 20 };
 
 static bool reads_parts(const ebpo_file *file, bool default_memory)
@@ -221,13 +221,14 @@ bool ebpo_default_memory(const ebpo_file *file, ebpo_model_options *o)
 {
     if (o->budget)
         o->memory = budget_left(o->budget);
-    bool standard = !o->memory && ebpo_input_is_far(&file->in);
-    if (standard && o->cut_level < 0)
+    bool is_default = !o->memory && ebpo_input_is_far(&file->in);
+    if (is_default && o->cut_level < 0)
         o->memory = FAR_MEMORY;
-    return standard;
+    return is_default;
 }
 
-/* Prefers the roots of the file's subtrees, which are read as one, if the budget allows them. */
+/* Returns the level of the roots of the file's subtrees, each of which is read at once, if the
+ * budget allows that cut level. */
 static int prefer_subtrees(const ebpo_info *info, const ebpo_model_options *o, int cut)
 {
     int level = info->subtree_level;
@@ -258,7 +259,8 @@ static ebpo_status choose_plan(const ebpo_file *file, const ebpo_model_options *
 {
     const ebpo_info *info = ebpo_file_info(file);
     int deepest = info->level_count - 1;
-    if (!(info->parts & EBPO_PART_MESH)) /* nothing could be loaded below a cut level */
+    if (!(info->parts &
+          EBPO_PART_MESH)) /* without a mesh nothing can be loaded below a cut level */
         out->cut_level = deepest;
     else if (o->cut_level >= 0)
         out->cut_level = o->cut_level < deepest ? o->cut_level : deepest;
@@ -269,7 +271,7 @@ static ebpo_status choose_plan(const ebpo_file *file, const ebpo_model_options *
     return EBPO_OK;
 }
 
-/* Shares the budget, based on counts. */
+/* Divides the budget, based on counts. */
 static void share_budget(const ebpo_info *info, const ebpo_model_options *o, ebpo_model_plan *out)
 {
     ebpo_slice_size size = whole_size(info);

@@ -1,11 +1,11 @@
 /* Distance to the surface, nearest point and normal: EBP 2017, 4.4.
  *
- * The exact minimum comes from nearest_subtrees.c. The modes of the thesis, which are not always
- * the minimum, search the leaf around the point, all leaves below the deepest gray node around it,
- * or the envelope of a node. With a level, a query returns an interval that the envelopes of that
- * level's nodes prove; when a deadline passes, an interval from the nodes searched by then. In a
- * subset a query fails with EBPO_E_ABSENT when an omitted face might be nearer than the found one.
- */
+ * The exact minimum comes from nearest_subtrees.c. The modes of the thesis, whose result is not
+ * always the minimum, search the leaf around the point, all leaves below the deepest gray node
+ * around it, or the envelope of a node. With a level, a query returns an interval that the
+ * envelopes of that level's nodes prove. When a deadline passes, the interval comes from the nodes
+ * searched by then. In a subset a query fails with EBPO_E_ABSENT when an omitted face might be
+ * nearer than the found one. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -47,7 +47,7 @@ static ebpo_status all_leaves(ebpo_context *c, ebpo_nearest *n, ebpo_node node, 
     return status;
 }
 
-/* Searches the leaf around p. Where there is none, finds nothing (LEAVES), or searches all leaves
+/* Searches the leaf around p. If there is none, finds nothing (LEAVES), or searches all leaves
  * below the deepest gray node around p (RECURSIVE). */
 static ebpo_status distance_around(ebpo_context *c, const double p[3],
                                    const ebpo_distance_options *o, ebpo_distance_result *out,
@@ -77,7 +77,7 @@ static ebpo_status distance_around(ebpo_context *c, const double p[3],
         status = all_leaves(c, &n, gray, error);
     if (status == EBPO_OK)
         ebpo_nearest_end(&n, o->max_distance, out);
-    out->lo = 0; /* not the minimum: only an upper bound is certain */
+    out->lo = 0; /* the result may not be the minimum: only an upper bound is certain */
     return status == EBPO_OK ? ebpo_give_sign(c, p, o, out, error) : status;
 }
 
@@ -120,7 +120,7 @@ static void nearest_polygon(const ebpo_polytope *e, const ebpo_box *box, ebpo_ce
 typedef struct node_chain {
     ebpo_node node[EBPO_LEVELS_MAX];
     int count;
-    const ebpo_node *pruned; /* after the last one, or NULL */
+    const ebpo_node *pruned; /* the node after the last one, if it is pruned; or NULL */
     ebpo_node child;
 } node_chain;
 
@@ -145,7 +145,7 @@ static ebpo_status follow_cells(ebpo_context *c, const uint32_t at[3], int level
         if (out->child.type != EBPO_GRAY)
             return EBPO_OK;
         if (c->model->info->boxed && out->child.pruned) {
-            /* leaves outside a subset's box look the same */
+            /* leaves outside a subset's box are pruned in the same way */
             out->pruned = &out->child;
             return EBPO_OK;
         }
@@ -159,8 +159,9 @@ static unsigned octant_of(ebpo_cell cell)
     return (cell.at[0] & 1) | (cell.at[1] & 1) << 1 | (cell.at[2] & 1) << 2;
 }
 
-/* Leaves the envelope of the last node that has one in cutting[0]; returns its number in the chain.
- * A node's envelope is cut from its parent's, so one stored envelope replaces all above it. */
+/* Cuts the envelope of the last node that has one, into cutting[0]; returns the node's number in
+ * the chain. A node's envelope is cut from its parent's, so one stored envelope replaces all above
+ * it. */
 static int cut_envelope(ebpo_context *c, const node_chain *chain)
 {
     ebpo_polytope *out = &c->cutting[0], *above = &c->cutting[1];
@@ -238,7 +239,8 @@ static ebpo_status pruned_within(ebpo_context *c, const ebpo_nearest *n,
     return status;
 }
 
-/* Fails when an omitted part may matter; after the deadline it only widens the interval. */
+/* Fails when an omitted part may change the result; after the deadline it only widens the interval.
+ */
 static ebpo_status inspect_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
     ebpo_ranking ranking = ebpo_ranking_of(c->model, n->p, &n->far);
@@ -277,7 +279,7 @@ static ebpo_status exact_distance(ebpo_context *c, const double p[3],
     if (status != EBPO_OK)
         return status;
     if (n.late && n.passed_over <= n.limit) {
-        /* With a very short deadline nothing may have been found; but some face is in the root
+        /* With a very short deadline nothing may have been found; but there is a face in the root
          * cell. */
         ebpo_box box = ebpo_model_box(c->model);
         double hi = fmin(n.upper, ebpo_cell_far(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, p)),
@@ -307,7 +309,7 @@ typedef struct interval {
     ebpo_ranking ranking;
     ebpo_far far;
     uint64_t deadline;
-    double lo, hi; /* distances, or a far point's keys */
+    double lo, hi; /* distances; for a far point keys (point_bounds.h) */
 } interval;
 
 static ebpo_status narrow_interval(interval *v, ebpo_node node, double lower, ebpo_error *error)

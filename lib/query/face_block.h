@@ -1,6 +1,6 @@
 /* Reads a block's faces for kernels: eight lanes at a time, one axis after the other. Lanes from
- * `count` on repeat one of its faces: bounds need no mask, counting does. Included by files that
- * are compiled for several processors. */
+ * `count` on repeat one of the block's faces, so computing bounds needs no mask, but counting does.
+ * Included by files that are compiled for several processors. */
 #ifndef EBPO_QUERY_FACE_BLOCK_H
 #define EBPO_QUERY_FACE_BLOCK_H
 
@@ -9,7 +9,7 @@
 
 typedef struct ebpo_face_block {
     const ebpo_meshlet *m;
-    n8 corner[3]; /* vertex indices, where vertices are shared */
+    n8 corner[3]; /* vertex indices, in blocks with shared vertices */
 } ebpo_face_block;
 
 EBPO_EIGHT ebpo_face_block ebpo_face_block_open(const ebpo_accel *s, uint32_t block)
@@ -35,12 +35,13 @@ EBPO_EIGHT void ebpo_face_block_floats(const ebpo_face_block *b, int axis, f8 co
             corner[i] = f8_load(x + i * EBPO_BLOCK);
         return;
     }
-    f8_table table = f8_table_load(x); /* beyond its vertices: following memory, never picked */
+    f8_table table = f8_table_load(x); /* memory after the block's vertices is loaded, but never
+                                        * picked */
     for (int i = 0; i < 3; i++)
         corner[i] = f8_look_up(table, b->corner[i]);
 }
 
-/* Does the same for an accel of doubles. */
+/* As ebpo_face_block_floats, for an accel of doubles. */
 EBPO_EIGHT void ebpo_face_block_doubles(const ebpo_face_block *b, int axis,
                                         double corner[3][EBPO_BLOCK])
 {

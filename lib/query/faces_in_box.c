@@ -1,10 +1,10 @@
 /* Finds the faces that intersect a box: their numbers, or their triangles block by block.
  *
- * The walk goes through the tree depth first, from accel to accel. In each it tests the boxes of
- * children, dropping only those certainly outside, then triangles exactly. In remote files the walk
- * sends prefetch hints for the subtrees that it will enter. A face that several subtrees list is
- * reported once, for the first of them. In a subset the query fails when an omitted node intersects
- * the box. */
+ * The walk goes through the tree depth first, from accel to accel. In each accel it tests the boxes
+ * of children, dropping only those certainly outside, then triangles exactly. In remote files the
+ * walk sends prefetch hints for the subtrees that it will enter. A face that several subtrees list
+ * is returned once, for the first of them. In a subset the query fails when an omitted node
+ * intersects the box. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -23,11 +23,11 @@ typedef struct box_walk box_walk;
 struct box_walk {
     ebpo_context *context;
     const double *min, *max;
-    /* Slots of the faces of the current accel that intersect the box, ascending, which is the order
-     * of the file. */
+    /* Slots of the faces of the current accel that intersect the box, in ascending order, which is
+     * the order of the file. */
     uint32_t *slot;
     uint64_t count, capacity;
-    ebpo_node below; /* the node that the accel represents, when it is not the whole tree */
+    ebpo_node below; /* the subtree's root, if the accel is not the whole tree */
     bool no_memory, enough;
     /* For a remote file: the subtrees that the walk will enter, in order, and their number. */
     uint32_t *ahead;
@@ -64,8 +64,8 @@ static void try_block(box_walk *w, const ebpo_accel *s, uint32_t block)
     }
 }
 
-/* Gathers faces. low, high: the box in the frame. Boxes of the hierarchy are enlarged by more than
- * the rounding error of floats here. */
+/* Gathers faces. low, high: the box in the subtree's frame. Boxes of the hierarchy are enlarged by
+ * more than the rounding error of floats here. */
 static void gather_bound(box_walk *w, const ebpo_accel *s, const float low[3], const float high[3],
                          uint32_t child)
 {
@@ -118,7 +118,8 @@ static bool box_matters(void *user, const ebpo_box *box, const ebpo_node *node)
     return ebpo_cell_intersects(box, node->cell, w->min, w->max);
 }
 
-/* Lists subtrees ahead. Without memory, each prefetch hint is sent when its subtree is entered. */
+/* Lists the subtrees that the walk will enter. Without memory for the list, each prefetch hint is
+ * sent when its subtree is entered. */
 static void list_ahead(box_walk *w, const ebpo_box *box, ebpo_node node)
 {
     if (ebpo_node_is_uniform(&node) || !box_matters(w, box, &node) || w->no_memory)
@@ -191,9 +192,9 @@ static bool touches_cell(const ebpo_box *box, const ebpo_node *node, const doubl
     return ebpo_triangle_intersects_box(triangle, low, high);
 }
 
-/* Accels list the faces that touch their cells, and some that only pass by (format-spec, section
- * 5). So among the accels whose cell the face touches, one is the first, depth first: no list of
- * visited faces is needed. */
+/* Finds the first accel, depth first, whose cell the face touches. Accels list the faces that touch
+ * their cells, and some that only come near them (format-spec, section 5). A face is taken in this
+ * first accel, so no list of visited faces is needed. */
 static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
                        const double triangle[3][3], uint32_t *entry)
 {
@@ -208,8 +209,8 @@ static bool find_first(const box_walk *w, const ebpo_box *box, ebpo_node node,
     return found;
 }
 
-/* Returns true if the triangle, which intersects the box, is to be taken in the current accel; this
- * is true in exactly one accel. `own`: the accel owns it. */
+/* Returns true if the triangle, which intersects the box, is to be taken in the current accel. This
+ * is true in exactly one accel. `own`: the current accel owns the face. */
 static bool box_walk_is_first(const box_walk *w, bool own, const double triangle[3][3])
 {
     const ebpo_model *m = w->context->model;
@@ -224,13 +225,13 @@ static bool box_walk_is_first(const box_walk *w, bool own, const double triangle
 
 /* --- numbers of faces --- */
 
-/* Number in the file, and the reported number. */
+/* A face: its number in the file, and the number that callers get. */
 typedef struct pair {
     uint64_t file_face, source_face;
 } pair;
 
 typedef struct gathering {
-    box_walk walk; /* first */
+    box_walk walk; /* must be the first member */
     pair *list;
     uint64_t count, capacity;
 } gathering;
@@ -263,7 +264,9 @@ static ebpo_status finish_faces(gathering *g, const uint64_t **faces, uint64_t *
     if (g->count)
         qsort(g->list, g->count, sizeof *g->list, compare_pairs);
     for (uint64_t i = 0; i < g->count; i++)
-        if (i == 0 || g->list[i].file_face != g->list[i - 1].file_face) /* subtrees share faces */
+        if (i == 0 || g->list[i].file_face != g->list[i - 1].file_face) /* subtrees share faces: a
+                                                                         * face may be in the list
+                                                                         * twice */
             c->faces[(*count)++] = g->list[i].source_face;
     *faces = c->faces;
     return EBPO_OK;
@@ -298,9 +301,9 @@ typedef struct block {
 } block;
 
 typedef struct delivery {
-    box_walk walk; /* first */
+    box_walk walk; /* must be the first member */
     block *block;
-    uint64_t count; /* in the block */
+    uint64_t count; /* triangles in the block */
     ebpo_triangles_fn take;
     void *user;
 } delivery;
@@ -345,7 +348,8 @@ ebpo_status ebpo_triangles_in_box(ebpo_context *context, const double min[3], co
     if (status == EBPO_OK)
         status = ebpo_check_mesh(context->model, error);
     if (status == EBPO_OK)
-        status = box_walk_check(&d.walk, error); /* before the first triangle is given */
+        status = box_walk_check(&d.walk, error); /* checked before the first triangle is passed to
+                                                  * the caller */
     if (status == EBPO_OK && !(d.block = ebpo_alloc(1, sizeof *d.block)))
         status = ebpo_fail_memory(error, sizeof *d.block);
     if (status == EBPO_OK)

@@ -1,13 +1,14 @@
 /* Point in solid, exact.
  *
  * In a leaf the signs of its faces' planes decide where possible (leaf_kinds.c). Otherwise the
- * faces that axis-parallel segments cross are counted, from a cell face that no face intersects or
- * from the lowest corner: a filter in single precision (inside_kernels.c), then exact predicates.
- * Many points in a model that is all in memory go down the tree several at a time.
+ * faces that axis-parallel segments cross are counted. A segment begins at a cell face that no face
+ * intersects, or segments begin at the lowest corner. A filter in single precision counts first
+ * (inside_kernels.c), exact predicates count the rest. Many points in a model that is all in memory
+ * go down the tree several at a time.
  *
  * A query that may use envelopes, stops at a level or has a deadline goes from node to node and
- * loads subtrees on the way; with EBPO_LOAD_NODES it reads only the nodes on the way. Pruned nodes
- * are decided by envelopes, or the query fails with EBPO_E_ABSENT.
+ * loads subtrees on the way; with EBPO_LOAD_NODES it reads only the nodes on the way. Envelopes
+ * decide pruned nodes, or the query fails with EBPO_E_ABSENT.
  *
  * Sources: EBP 2017, 4.2; format-spec, section 5. */
 #include "core/strict_fp.h"
@@ -27,7 +28,8 @@
 #include "query/query_model.h"
 #include "query/query_node.h"
 
-/* Recursive: a subtree may end in a pruned node, above which envelopes decide. */
+/* Decides points in pruned nodes. Recursive: a subtree may end in a pruned node, above which
+ * envelopes decide. */
 static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_inside_result *out,
                                  ebpo_error *error);
 
@@ -48,8 +50,8 @@ static bool decide_open(const ebpo_accel *s, const uint32_t *open, uint32_t coun
     return false;
 }
 
-/* Counts crossings along a segment. Tests if `point` (its end) is on the faces; NULL: no test.
- * Returns false when it is on one. */
+/* Counts crossings along a segment. Tests if `point` (the segment's end) is on a face; NULL: no
+ * test. Returns false when it is on one. */
 static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
                        const ebpo_accel_leaf *leaf, const ebpo_axis_segment *g, const double *point,
                        uint32_t *open, int32_t *sum)
@@ -62,8 +64,10 @@ static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
 /* A point in a leaf's cell. */
 typedef struct in_leaf {
     ebpo_cell leaf;
-    double xi[3];       /* the point in the cell, 0 .. 1, error at most 2^-30 */
-    uint32_t sixteenth; /* the point in the unit of ebpo_listed_block, eight bits an axis */
+    double xi[3];       /* the point in the coordinates of the cell, 0 .. 1; the error is at most
+                         * 2^-30 */
+    uint32_t sixteenth; /* the point in sixteenths of the cell as in ebpo_listed_block, eight bits
+                         * for each axis */
 } in_leaf;
 
 static inline void find_in_leaf(int fine, int level, const ebpo_position *place, in_leaf *out)
@@ -80,8 +84,8 @@ static inline void find_in_leaf(int fine, int level, const ebpo_position *place,
     }
 }
 
-/* Returns ebpo_axis_segment.reach of the point alone; a segment from it to a cell face extends
- * this. */
+/* Returns the `reach` of ebpo_axis_segment for the point alone; a segment from the point to a cell
+ * face extends this. */
 static inline uint32_t reach_of(const in_leaf *i)
 {
     return i->sixteenth | (UINT32_C(0x0f0f0f) - i->sixteenth) << 4;
@@ -95,7 +99,7 @@ static ebpo_axis_segment cell_face_segment(const ebpo_box *box, uint8_t cell_fac
     ebpo_axis_segment g = { { p[0], p[1], p[2] },
                             p[axis],
                             axis,
-                            /* the cell face: 15 above, or 15 less 0 */
+                            /* the cell face is at 15 above, or at 15 less 0 */
                             reach_of(i) | (cell_face % 2 ? 0x0fu : 0xf0u) << 8 * axis };
     double end = ebpo_cell_face(box, axis, i->leaf.level, i->leaf.at[axis] + cell_face % 2);
     if (cell_face % 2)
@@ -105,7 +109,7 @@ static ebpo_axis_segment cell_face_segment(const ebpo_box *box, uint8_t cell_fac
     return g;
 }
 
-/* Uses one segment from a cell face that no face intersects. */
+/* Finds the winding number by one segment from a cell face that no face intersects. */
 static bool from_cell_face(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
                            const ebpo_accel_leaf *leaf, const in_leaf *i, const double p[3],
                            uint32_t *open, int32_t *winding)
@@ -118,8 +122,9 @@ static bool from_cell_face(const ebpo_inside_kernels *kernels, const ebpo_accel 
     return true;
 }
 
-/* Uses three segments from the lowest corner: format-spec, section 5. Faces that contain the point
- * are found in the last one. `boxed`: the boxes of the leaf's list are known. */
+/* Finds the winding number by three segments from the lowest corner: format-spec, section 5. The
+ * last segment finds the faces that contain the point. `boxed`: the boxes of the leaf's list are
+ * known. */
 static bool from_corner(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
                         const ebpo_accel_leaf *leaf, bool boxed, const in_leaf *i,
                         const double p[3], uint32_t *open, int32_t *winding)
@@ -127,7 +132,7 @@ static bool from_corner(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
     double low[3], high[3];
     ebpo_cell_bounds(&s->box, i->leaf, low, high);
     ebpo_axis_segment g = { { low[0], low[1], low[2] }, 0, 0, EBPO_REACH_ALL };
-    uint32_t reach = 0xf0f0f0; /* at the corner on all axes */
+    uint32_t reach = 0xf0f0f0; /* the segment begins at the corner on all axes */
     *winding = leaf->winding;
     for (int axis = 0; axis < 3; axis++) {
         int32_t sum;
@@ -243,8 +248,8 @@ static ebpo_status result_in_leaf(ebpo_context *context, const ebpo_accel *s, eb
     return EBPO_OK;
 }
 
-/* Classifies p in a leaf of a subtree at this level; the cell holds p, whose shifted position is
- * `place`. */
+/* Classifies p in a leaf of a subtree at this level; p is in the leaf's cell, and `place` is its
+ * shifted position. */
 static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t number,
                                int level, const ebpo_position *place, const double p[3],
                                ebpo_inside_result *out, ebpo_error *error)
@@ -260,7 +265,7 @@ static void inside_uniform(const ebpo_context *context, uint32_t entry, ebpo_ins
     give_winding(context, ebpo_entry_winding(entry), out);
 }
 
-/* Classifies p in a subtree whose root holds p, whose shifted position is `place`. */
+/* Classifies p in a subtree whose root's cell contains p; `place` is its shifted position. */
 static ebpo_status inside_subtree(ebpo_context *context, const ebpo_accel *s,
                                   const ebpo_position *place, const double p[3],
                                   ebpo_inside_result *out, ebpo_error *error)
@@ -275,8 +280,8 @@ static ebpo_status inside_subtree(ebpo_context *context, const ebpo_accel *s,
     return inside_leaf(context, s, ebpo_entry_value(d.entry), d.level, place, p, out, error);
 }
 
-/* Several points at a time, stage by stage, so that memory for one stage is fetched while other
- * points are processed. */
+/* Number of points that are processed together, stage by stage, so that memory for one stage is
+ * fetched while other points are processed. */
 enum { TOGETHER = 16 };
 
 typedef struct lane {
@@ -285,7 +290,7 @@ typedef struct lane {
     ebpo_descent d;
 } lane;
 
-/* A point that ended in a leaf. */
+/* A point whose way down the tree ended in a leaf. */
 typedef struct waiting {
     ebpo_accel_leaf *leaf;
     unsigned point;
@@ -413,8 +418,8 @@ static ebpo_status inside_whole(ebpo_context *context, const double *points, uin
 
 static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)
 {
-    /* An envelope proves that a point is outside, but not its winding number: with rules other than
-     * nonzero the result would be incomplete. */
+    /* An envelope proves that a point is outside, but not which winding number the point has: with
+     * rules other than nonzero the result would be incomplete. */
     bool whole_result =
         c->model->info->rule == EBPO_RULE_NONZERO || o->level >= 0 || o->deadline_ns;
     if (o->envelopes == EBPO_ENVELOPES_SKIP || !whole_result)
@@ -428,7 +433,7 @@ typedef struct querying {
     const ebpo_inside_options *options;
     ebpo_box box;
     bool envelopes;
-    uint64_t deadline; /* 0: none */
+    uint64_t deadline; /* a time of ebpo_clock; 0: none */
     const double *p;
     ebpo_position place;
 } querying;
@@ -456,8 +461,8 @@ static bool stops_here(const querying *a, const ebpo_node *node)
     return is_late(a);
 }
 
-/* Decides at a node of the top or of a subtree, without visiting its children. Returns false if it
- * cannot. */
+/* Decides the point at a node of the top or of a subtree, without visiting the node's children.
+ * Returns false if that is not possible. */
 static inline bool decide_at(const querying *a, const ebpo_node *node, ebpo_inside_result *out)
 {
     if (ebpo_node_is_uniform(node))
@@ -493,8 +498,8 @@ static ebpo_status walk_down(querying *a, ebpo_inside_result *out, ebpo_error *e
     }
 }
 
-/* --- node by node from the file: only nodes on the way are read; only decoded chunks are kept ---
- */
+/* --- node by node from the file: only nodes on the way are read, and only decoded chunks are kept
+ * --- */
 
 static ebpo_status leaf_from_file(querying *a, const ebpo_node *leaf, ebpo_inside_result *out,
                                   ebpo_error *error)
@@ -527,8 +532,8 @@ static ebpo_status uniform_from_file(querying *a, const ebpo_node *node, ebpo_in
     return status;
 }
 
-/* Handles a gray node on the way; sets *done when it decides. A node is known to be pruned once its
- * children have been requested. */
+/* Handles a gray node on the way; sets *done when the node decides. Only after its children have
+ * been requested, it is known if the node is pruned. */
 static ebpo_status pass_gray(querying *a, ebpo_cursor *c, bool *done, ebpo_inside_result *out,
                              ebpo_error *error)
 {
@@ -565,7 +570,7 @@ static ebpo_status pass_gray(querying *a, ebpo_cursor *c, bool *done, ebpo_insid
     return status;
 }
 
-/* Walks down from a node BELOW. */
+/* Walks down from a node of the kind BELOW (the root of a subtree that is not in the top). */
 static ebpo_status walk_file(querying *a, const ebpo_node *below, ebpo_inside_result *out,
                              ebpo_error *error)
 {
@@ -601,8 +606,8 @@ static ebpo_status walk_nodes(querying *a, ebpo_inside_result *out, ebpo_error *
     return walk_file(a, &node, out, error);
 }
 
-/* Returns the subtree that the context holds and that contains p, or NULL. *entry: the result of
- * the levels above, when they decide. */
+/* Returns the subtree that the context holds if its cell contains p, else NULL. *entry: the result
+ * of the levels above, when they decide. */
 static const ebpo_accel *held_around(const querying *a, uint32_t *entry)
 {
     const ebpo_context *c = a->context;
@@ -615,8 +620,8 @@ static const ebpo_accel *held_around(const querying *a, uint32_t *entry)
     return below && ebpo_context_has_pinned(c, ebpo_entry_value(*entry)) ? c->pinned : NULL;
 }
 
-/* Returns true when the context holds everything that p needs: then envelopes save nothing, and
- * only the faces of a leaf take time. */
+/* Returns true when the context holds all data that p needs: then envelopes save nothing, and only
+ * the faces of a leaf take time. */
 static bool result_at_hand(querying *a, ebpo_inside_result *out, ebpo_status *status,
                            ebpo_error *error)
 {
@@ -637,7 +642,7 @@ static bool result_at_hand(querying *a, ebpo_inside_result *out, ebpo_status *st
     int fine = m->info->level_count - 1;
     ebpo_descent d = ebpo_descend(&held->nodes, fine, a->place.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_BELOW)
-        return false; /* pruned: envelopes may decide */
+        return false; /* pruned: an envelope may decide */
     ebpo_cell cell = ebpo_descent_cell(&d, fine, a->place.at);
     if (ebpo_entry_kind_of(d.entry) == EBPO_ENTRY_UNIFORM)
         inside_uniform(a->context, d.entry, out);
@@ -663,7 +668,8 @@ static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_
         return ebpo_fail(error, EBPO_E_ARGUMENT, "a point outside the root cell has no node");
     ebpo_status status = walk_down(&a, out, error);
     if (status == EBPO_OK && out->where == EBPO_OUT &&
-        m->info->rule != EBPO_RULE_NONZERO) /* outside, but the winding number is not known */
+        m->info->rule != EBPO_RULE_NONZERO) /* the point is outside, but its winding number is not
+                                             * known */
         return ebpo_fail_pruned(m, (ebpo_cell){ 0, { 0, 0, 0 } }, error);
     return status;
 }
@@ -734,7 +740,8 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
     return status;
 }
 
-/* Returns true if only the point must be checked and everything is in memory. */
+/* Returns true if the query has no special options and everything is in memory: only the point must
+ * be checked. */
 static inline bool is_plain(const ebpo_context *context, const ebpo_inside_options *o)
 {
     return context->model->results_inside &&

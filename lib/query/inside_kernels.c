@@ -20,13 +20,14 @@
 
 /* --- crossings --- */
 
-/* Positions of eight faces around the segment's line: a bit for each that turns left around it,
- * right, or perhaps either. The others do not contain it. */
+/* Positions of eight faces relative to the segment's line: a bit for each face that turns left
+ * around the line, turns right, or may do either. The other faces do not contain a point of the
+ * line. */
 typedef struct turns {
     unsigned left, right, open;
 } turns;
 
-/* Combines the turns at the three corners. */
+/* Combines the turns at the three edges of each face. */
 EBPO_EIGHT turns judge_turns(unsigned some_left, unsigned some_right, unsigned all_left,
                              unsigned all_right, unsigned lanes)
 {
@@ -35,9 +36,9 @@ EBPO_EIGHT turns judge_turns(unsigned some_left, unsigned some_right, unsigned a
 }
 
 /* Rounding: let R be the largest coordinate of the model's box and M its largest size. The error of
- * a difference q is 2^-23 of itself and 2^-47 R (two floats represent `from` to 2^-48 R). So the
- * error of a cross product is 2^-21 of the sum of its products' sizes and 2^-45 R M, as no |q| is
- * above M. Underflow loses far less, R being above 2^-41 and M above 2^-40. */
+ * a difference q is 2^-23 of q plus 2^-47 R (two floats represent `from` to 2^-48 R). So the error
+ * of a cross product is 2^-21 of the sum of its products' sizes plus 2^-45 R M, as no |q| is above
+ * M. The error of underflow is far less, as R is above 2^-41 and M above 2^-40. */
 #define TURN_ERROR 0x1p-20f
 
 EBPO_EIGHT void see_axis(const ebpo_face_block *b, int axis, double from, f8 out[3])
@@ -68,9 +69,9 @@ EBPO_EIGHT turns turns_of_floats(const ebpo_face_block *b, unsigned lanes, int u
                        f8_bits(f8_and(right[0], f8_and(right[1], right[2]))), lanes);
 }
 
-/* Rounding: the error of a difference of two doubles is 2^-53 of itself; of a cross product of two
- * differences 2^-50 of the sum of its products' sizes. The last term covers underflow; overflow
- * makes bounds infinite or NaN, and then nothing is certain. */
+/* Rounding: the error of a difference of two doubles is 2^-53 of the difference; the error of a
+ * cross product of two differences is 2^-50 of the sum of its products' sizes. The last term covers
+ * underflow; overflow makes bounds infinite or NaN, and then nothing is certain. */
 #define CROSS_ERROR     0x1p-50
 #define HEIGHT_ERROR    0x1p-47
 #define UNDERFLOW_ERROR 0x1p-960
@@ -110,8 +111,8 @@ static turns turns_of_doubles(const ebpo_face_block *b, unsigned lanes, int u, i
     return judge_turns(some[0], some[1], all[0], all[1], lanes);
 }
 
-/* Returns the side of a plane along the segment, relative to coordinate `at`: 1 above, -1 below, 0
- * not certain. `turn` is 1 for a face that turns left around the line. */
+/* Returns the side of a face's plane on which the segment's point at coordinate `at` is: 1 above,
+ * -1 below, 0 not certain. `turn` is 1 for a face that turns left around the line. */
 static int side_of_plane(const double weight[3], const double size[3], const double k[3], double at,
                          int turn)
 {
@@ -122,8 +123,8 @@ static int side_of_plane(const double weight[3], const double size[3], const dou
     return height > error ? 1 : height < -error ? -1 : 0;
 }
 
-/* Tests if a face that turns around the line intersects it between the segment's ends: 1 yes, 0 no,
- * -1 not certain. */
+/* Tests if a face that turns around the line intersects the line between the segment's ends: 1 yes,
+ * 0 no, -1 not certain. */
 static int found_between(const double t[3][3], int u, int v, const ebpo_axis_segment *g, int turn)
 {
     double from = g->from[g->axis], weight[3], size[3], x[3], y[3],
@@ -192,16 +193,16 @@ static int32_t sum_crossings(const ebpo_accel *s, const ebpo_listed_block *list,
 
 /* --- cell faces --- */
 
-/* A cell's faces, and the floats next to them: no float is between. */
+/* A cell's faces, and the floats next to them: there is no float between a face and its float. */
 typedef struct faces_of_cell {
     double low[3], high[3];
-    double inverse[3]; /* inverse of its size */
+    double inverse[3]; /* inverse of the cell's size */
     float low_down[3], low_up[3], high_down[3], high_up[3];
     bool fine; /* false in cells too small for boxes; a box is then the whole cell */
 } faces_of_cell;
 
-/* Returns the float `steps` (-1, 0, 1) away, in the order of floats; the zeros count as two, and
- * rounding gives the one with the number's sign. */
+/* Returns the float that is `steps` (-1, 0, 1) away, in the order of floats. The two zeros count as
+ * two floats; rounding gives the zero with the number's sign. */
 static inline float step_float(float f, int32_t steps)
 {
     uint32_t bits;
@@ -241,11 +242,11 @@ static void find_cell_faces(const ebpo_accel *s, ebpo_cell cell, faces_of_cell *
     }
 }
 
-/* Extents of a block's faces on an axis; a bit for each lane. */
+/* Extents of a block's faces on an axis; masks have a bit for each lane. */
 typedef struct spans {
     f8 least, most;      /* rounded outward */
-    unsigned away;       /* faces that are away from the cell */
-    unsigned touches[2]; /* faces that reach its lower cell face, its upper one */
+    unsigned away;       /* faces that are entirely outside the cell on this axis */
+    unsigned touches[2]; /* faces that reach the cell's lower cell face, its upper one */
 } spans;
 
 static inline spans span_floats(const ebpo_face_block *b, const faces_of_cell *w, int k)
@@ -282,13 +283,15 @@ static spans span_doubles(const ebpo_face_block *b, const faces_of_cell *w, int 
     return out;
 }
 
-/* Returns on each axis the lower side in sixteenths of the cell, and 15 less the upper one; 0 to
- * 15. Widened by far more than the rounding error here and in queries (2^-20 of a sixteenth). */
+/* Returns the lower side of a box in sixteenths of the cell (direction -1), or 15 less its upper
+ * side (direction 1); 0 to 15. Widened by far more than the rounding error here and in queries
+ * (2^-20 of a sixteenth). */
 static inline uint64_t find_sixteenth(float x, double low, double inverse, double direction)
 {
     double cells = ((double)x - low) * inverse * EBPO_LISTED_CELLS + direction * 0x1p-8;
     cells = direction < 0 ? cells : 16 - cells;
-    cells = cells > 0 ? cells : 0; /* one after the other: branch-free */
+    cells = cells > 0 ? cells : 0; /* two comparisons one after the other, so that the code is
+                                    * branch-free */
     return (uint64_t)(int32_t)(cells < 15 ? cells : 15);
 }
 
@@ -306,8 +309,8 @@ static uint64_t box_of(const spans span[3], unsigned near, const faces_of_cell *
     return box << EBPO_LISTED_BOX;
 }
 
-/* Sets the block's box. Returns the cell faces that its listed faces reach, if their boxes
- * intersect the cell (bit 2 axis + side). Exact comparisons. */
+/* Sets the block's box. Returns the cell faces that the listed faces of the block reach, of those
+ * whose boxes intersect the cell (bit 2 axis + side). The comparisons are exact. */
 static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const faces_of_cell *w)
 {
     uint64_t listed = ebpo_listed(at);
@@ -325,7 +328,7 @@ static unsigned bound_block(const ebpo_accel *s, ebpo_listed_block *at, const fa
     return come_to;
 }
 
-/* Prefetches blocks while the cell is read; of long lists the first ones. */
+/* Prefetches blocks while the cell is read; of long lists only the first blocks. */
 static void fetch_blocks(const ebpo_accel *s, const ebpo_listed_block *list)
 {
     for (int i = 0; i < 8; i++) {

@@ -1,18 +1,18 @@
 /* Kinds of leaves: finds and stores the kind of a leaf during queries.
  *
- * The first queries find a cell face that no face intersects and the boxes of the leaf's list;
- * after many queries the leaf is classified: one plane, two planes, convex or concave (then the
+ * The first queries find a cell face that no face intersects and the boxes of the leaf's list.
+ * After many queries the leaf is classified: one plane, two planes, convex or concave (then the
  * signs of planes decide), or general (accel.h). One thread does that, while the others treat the
  * leaf as a general one. Kinds never change results.
  *
- * Leaves whose faces' planes alone decide: Let P be the set of points of the cell below all planes
- * of the leaf's faces. If every face is in P (all its corners below all planes), then each face is
- * on the boundary of P, so the winding number is constant within P's interior; and it is constant
- * in each component of the rest of the cell. Every such component contains a corner of the cell: a
- * point above plane i can move to the corner that is farthest along that plane's normal and stays
- * above. So when all corners of the cell outside P's closure have the same winding number, and one
- * point of P's interior is known, the planes decide. The same holds with "above" for "below"
- * (concave). */
+ * Proof that the planes of some leaves decide: let P be the set of points of the cell below all
+ * planes of the leaf's faces. Suppose that every face is in P (all its corners are below all
+ * planes). Then each face is on the boundary of P, so the winding number is constant within P's
+ * interior; and it is constant in each component of the rest of the cell. Every such component
+ * contains a corner of the cell: a point above plane i can move to the corner that is farthest
+ * along that plane's normal and stays above. So when all corners of the cell outside P's closure
+ * have the same winding number, and one point of P's interior is known, the planes decide. The same
+ * holds with "above" for "below" (concave). */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -26,13 +26,14 @@
 
 /* --- planes that decide --- */
 
-/* n . xi - d in the cell's coordinates (0 .. 1 on each axis), 1-norm of n 1. */
+/* The plane n . xi - d = 0 in the cell's coordinates (0 .. 1 on each axis); the 1-norm of n is 1.
+ */
 typedef struct leaf_plane {
     double n[3], d;
 } leaf_plane;
 
-/* Planes of a convex leaf (`flip` 1), or of a concave one (-1: planes turned): the winding number
- * below all planes, and elsewhere in the cell. */
+/* Planes of a convex leaf (`flip` 1) or of a concave leaf (`flip` -1: planes are turned). The
+ * winding numbers are those below all planes, and elsewhere in the cell. */
 typedef struct deciding_planes {
     int count, flip;
     int32_t inner, outer;
@@ -41,8 +42,8 @@ typedef struct deciding_planes {
 
 enum { FACES_MAX = 64 };
 
-/* The leaf in its cell's coordinates (0 .. 1), rounded: corners of faces whose boxes intersect the
- * cell. */
+/* The faces of a leaf in the coordinates of its cell (0 .. 1), rounded: only faces whose boxes
+ * intersect the cell. */
 typedef struct leaf_faces {
     int count;
     double p[FACES_MAX][3][3];
@@ -66,8 +67,8 @@ static void add_face(uint32_t slot, const double t[3][3], leaf_faces *f)
     f->slot[f->count++] = slot;
 }
 
-/* Gathers the faces whose boxes intersect the cell. Returns false when there are too many, or when
- * the cell is too small for the next steps. */
+/* Gathers the faces whose boxes intersect the cell. Returns false when there are too many faces, or
+ * when the cell is too small for the next steps. */
 static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell,
                          leaf_faces *f)
 {
@@ -100,7 +101,8 @@ static bool gather_faces(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_
 }
 
 /* Counts crossings of the leaf's faces with a segment along an axis. Skips blocks whose box has any
- * bit of `beside`: their lower side is not the cell's, where the segment is. */
+ * bit of `beside`: the lower side of such a box is above the lower side of the cell, where the
+ * segment is. */
 static int32_t leaf_crossings(const ebpo_accel *s, const ebpo_accel_leaf *leaf,
                               const double from[3], double to, int axis, uint64_t beside)
 {
@@ -134,14 +136,14 @@ static int32_t winding_at(const ebpo_accel *s, const ebpo_accel_leaf *leaf, cons
     return winding;
 }
 
-/* Computes the plane of a face in the cell's coordinates, 1-norm 1. Returns false when rounding may
- * matter: a sliver, or corners far outside the cell. */
+/* Computes the plane of a face in the cell's coordinates, with a normal of 1-norm 1. Returns false
+ * when rounding may matter: for a sliver, or for corners far outside the cell. */
 static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, leaf_plane *out)
 {
     const double(*p)[3] = (const double(*)[3])f->p[face];
     double t[3][3], e[3], g[3], norm = 0, products = 0, reach = 0;
     ebpo_accel_triangle(s, f->slot[face], t);
-    for (int k = 0; k < 3; k++) { /* from the exact corners: those in the cell's coordinates are
+    for (int k = 0; k < 3; k++) { /* uses the exact corners: those in the cell's coordinates are
                                    * rounded, which is too inexact for short edges */
         e[k] = (t[1][k] - t[0][k]) * f->inverse[k];
         g[k] = (t[2][k] - t[0][k]) * f->inverse[k];
@@ -154,8 +156,8 @@ static bool face_plane(const ebpo_accel *s, const leaf_faces *f, int face, leaf_
         products += fabs(a) + fabs(b);
         reach = ebpo_max3(reach, ebpo_max3(fabs(p[0][k]), fabs(p[1][k]), fabs(p[2][k])), 0);
     }
-    /* The error of n is 2^-50 of the products, so 2^-40 of its norm, and of n . xi 2^-33 for every
-     * corner: less than the margin of sides_of. */
+    /* The error of n is 2^-50 of the products, so 2^-40 of its norm. The error of n . xi is 2^-33
+     * for every corner: less than the margin of sides_of. */
     if (!(norm > products * 0x1p-10) || !(products > 0x1p-900) || !(reach < 64))
         return false;
     out->d = 0;
@@ -173,14 +175,14 @@ static int exact_side(const ebpo_accel *s, uint32_t plane_slot, uint32_t point_s
     double a[3][3], b[3][3];
     ebpo_accel_triangle(s, plane_slot, a);
     ebpo_accel_triangle(s, point_slot, b);
-    for (int i = 0; i < 3; i++) /* neighbours share corners */
+    for (int i = 0; i < 3; i++) /* neighbouring faces share corners, which are in the plane */
         if (a[i][0] == b[corner][0] && a[i][1] == b[corner][1] && a[i][2] == b[corner][2])
             return 0;
     return ebpo_orient3d(a[0], a[1], a[2], b[corner]);
 }
 
-/* Collects the sides of plane i that have faces: bit 0 some corner above, bit 1 some corner below.
- */
+/* Returns the sides of plane i on which there are corners of other faces: bit 0: above, bit 1:
+ * below. Stops when it has found all wanted sides. */
 static unsigned sides_of(const ebpo_accel *s, const leaf_faces *f, int i, const leaf_plane *q,
                          unsigned wanted)
 {
@@ -207,7 +209,7 @@ static bool same_plane(const ebpo_accel *s, const leaf_faces *f, int i, int j)
     return true;
 }
 
-/* Returns true if they may be one plane with the same orientation. */
+/* Returns true if both planes may be the same with the same orientation. */
 static bool turned_alike(const leaf_plane *a, const leaf_plane *b)
 {
     return fabs(a->d - b->d) < 0x1p-20 &&
@@ -260,8 +262,8 @@ static bool below_all(const deciding_planes *planes, const double xi[3], bool *c
 static double within_cell(double x) { return x < 0 ? 0 : x > 1 ? 1 : x; }
 
 /* Finds the winding numbers in P and in the rest of the cell. Uses the cell's corners and, if none
- * of them is in P, a point near the middle of the faces. Returns false when that does not decide.
- */
+ * of them is in P, a point near the middle of the faces. Returns false when these points do not
+ * decide. */
 static bool find_windings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, const leaf_faces *f,
                           deciding_planes *out)
 {
@@ -299,7 +301,8 @@ static bool find_windings(const ebpo_accel *s, const ebpo_accel_leaf *leaf, cons
     return have_outer;
 }
 
-/* Returns false when the planes of its faces do not decide. */
+/* Finds the planes and winding numbers. Returns false when the planes of the leaf's faces do not
+ * decide. */
 static bool leaf_find_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, ebpo_cell cell,
                              deciding_planes *out)
 {
@@ -308,12 +311,10 @@ static bool leaf_find_planes(const ebpo_accel *s, const ebpo_accel_leaf *leaf, e
            find_windings(s, leaf, &f, out);
 }
 
-/* --- kinds of leaves --- */
-
 /* --- rows of all leaves: pages, each twice as large as the one before, so that stored rows do not
  * move --- */
 
-/* The maximum for one leaf fits: 1 + 4 * 4. */
+/* The maximum number of rows for one leaf fits into a page: 1 + 4 * 4. */
 enum { FIRST_PAGE = 32, PAGE_BYTES = 64 };
 
 ebpo_leaf_kinds *ebpo_leaf_kinds_make(uint64_t rows_max)
@@ -336,7 +337,8 @@ void ebpo_leaf_kinds_free(ebpo_leaf_kinds *k)
     free(k);
 }
 
-/* Adds a page for at least `least` rows. Returns false when there is none. */
+/* Adds a page for at least `least` rows. Returns false without memory or when there are too many
+ * pages. */
 static bool add_page(ebpo_leaf_kinds *k, uint64_t least)
 {
     uint64_t size = (uint64_t)FIRST_PAGE << k->pages, left = k->rows_max - k->rows;
@@ -368,7 +370,7 @@ static uint32_t take_rows(ebpo_leaf_kinds *k, uint64_t rows)
     return number;
 }
 
-/* Returns the kind of a leaf with these planes; without memory it stays general. */
+/* Stores the planes of a leaf and returns its kind; without memory the leaf stays general. */
 static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
                                   const deciding_planes *planes)
 {
@@ -392,7 +394,8 @@ static ebpo_leaf_kind keep_planes(ebpo_leaf_kinds *kinds, ebpo_accel_leaf *leaf,
 
 /* --- a leaf --- */
 
-/* Returns a lower cell face if there is one: its winding number is the corner's. */
+/* Returns a lower cell face if one is free, because its winding number is that of the lowest
+ * corner. */
 static uint8_t choose_cell_face(unsigned cell_faces)
 {
     unsigned open = ~cell_faces & 63;
@@ -408,7 +411,7 @@ static ebpo_leaf_kind classify_leaf(const ebpo_accel *s, ebpo_accel_leaf *leaf, 
                                                     : EBPO_LEAF_GENERAL;
 }
 
-/* Finds the free cell face, the winding number there, and the boxes of its list. */
+/* Finds the free cell face, the winding number on it, and the boxes of the leaf's list. */
 static void bound_leaf(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
                        ebpo_cell_faces_fn *cell_faces)
 {
@@ -440,7 +443,7 @@ static void end_kind(ebpo_accel_leaf *leaf, ebpo_leaf_kind kind)
 static void find_cell_face(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
                            ebpo_cell_faces_fn *cell_faces)
 {
-    /* test first: later queries only need this read */
+    /* this test comes first: later queries need only this read */
     if (ebpo_leaf_kind_of(leaf) == EBPO_LEAF_UNKNOWN &&
         begin_kind(leaf, EBPO_LEAF_UNKNOWN, EBPO_LEAF_CLAIMED)) {
         bound_leaf(s, leaf, cell, cell_faces);
@@ -463,7 +466,7 @@ static bool find_kind(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell
 bool ebpo_leaf_query(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
                      ebpo_cell_faces_fn *cell_faces)
 {
-    /* threads may overwrite counts; the kind is then found slightly later */
+    /* threads may overwrite each other's counts; the kind is then found slightly later */
     int queried = atomic_load_explicit(&leaf->queried, memory_order_relaxed) + 1;
     bool found = false;
     if (queried >= EBPO_LEAF_CELL_FACE_QUERIED)

@@ -1,9 +1,9 @@
-/* Loading ahead: subtrees are loaded, or prefetch hints for a remote file are sent, before queries
- * need them.
+/* Loading ahead: before queries need subtrees, they are loaded, or prefetch hints for a remote file
+ * are sent.
  *
- * Prefetching requests the subtrees that queries near the last one may need, in the order of their
- * distance. EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that holds the position
- * instead.
+ * Prefetching requests the subtrees that queries near the last query may need, in the order of
+ * their distance. EBP 2017, 4.2.3, loads the 26 neighbours of the subtree that contains the
+ * position instead.
  *
  * A batch evaluates many points sorted along the Morton curve, so that subtrees are loaded few
  * times, and returns results in the order of the points; prefetch hints for the next points are
@@ -91,8 +91,8 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double reach)
     c->prefetched_reach = fabs(reach);
     memcpy(c->prefetched_from, p, sizeof c->prefetched_from);
     /* When p moves by w, distances and their bounds change by at most w each: the subtrees needed
-     * until then are within `reach` and 2 w. A cell's diagonal is 1.73 sides: where envelopes do
-     * not decide (rules other than nonzero), the cell that holds the point is needed. */
+     * until then are within `reach` + 2 w. A cell's diagonal is 1.73 sides. Where envelopes do not
+     * decide (rules other than nonzero), the query needs the cell that contains the point. */
     uint64_t keys[EBPO_CACHE_AHEAD];
     unsigned count = ebpo_subtrees_near(m, p, fabs(reach) + 2.25 * side, keys);
     for (unsigned i = 0; i < count; i++)
@@ -100,8 +100,8 @@ void ebpo_context_prefetch(ebpo_context *c, const double p[3], double reach)
     ebpo_cache_prefetch(m->cache, keys, count);
 }
 
-/* Returns the number in the file's table of the subtree that contains this one, when it is to be
- * loaded; UINT64_MAX: none. */
+/* Returns the number, in the file's table of subtrees, of the subtree that contains `below`, if it
+ * is to be loaded; UINT64_MAX: none. */
 static uint64_t table_number(const ebpo_context *c, uint32_t below)
 {
     const ebpo_model *m = c->model;
@@ -161,8 +161,8 @@ void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t co
 
 /* --- batches --- */
 
-/* Subtrees in one prefetch hint, and points that they are gathered from: some megabytes, of which
- * two are in flight. */
+/* Number of subtrees in one prefetch hint, and of points from which they are gathered: some
+ * megabytes. Two hints are in flight. */
 enum { SUBTREES_A_TIME = 128, POINTS_A_TIME = 4096 };
 
 typedef struct placed {
@@ -177,7 +177,8 @@ static int compare_placed(const void *x, const void *y)
     return (a->point > b->point) - (a->point < b->point);
 }
 
-/* Returns the key of the nearest cell, for points outside the box. */
+/* Returns the position on the curve of the cell that contains p, or of the nearest cell for a point
+ * outside the box. */
 static uint64_t curve_key(const ebpo_box *box, const double p[3])
 {
     ebpo_cell cell = { .level = EBPO_MAX_LEVEL };
@@ -206,9 +207,9 @@ uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t c
     return order;
 }
 
-/* Returns true for points in no order. They are evaluated along the curve also when everything is
- * in memory: the next point finds the data in the caches, and its result is close. A path is in
- * order already. */
+/* Returns true if consecutive points are far apart. Such points are evaluated along the curve also
+ * when everything is in memory: then the next point finds its data in the processor's caches, and
+ * its result is near. The points of a path are in order already. */
 static bool are_scattered(const ebpo_box *box, const double *points, uint64_t count)
 {
     const double far = 0x1p-5;
@@ -283,8 +284,8 @@ static const double *ordered_point(const ebpo_batch *b, uint64_t i)
     return b->points + 3 * (b->order ? b->order[i] : i);
 }
 
-/* Sends hints for the subtrees where the next points begin. */
-static void report_next(ebpo_batch *b)
+/* Sends prefetch hints for the subtrees where the searches for the next points begin. */
+static void hint_next(ebpo_batch *b)
 {
     uint64_t begin = b->reported;
     while (b->reported < b->count && b->reported - begin < POINTS_A_TIME &&
@@ -296,9 +297,9 @@ static void report_next(ebpo_batch *b)
     hint_collected(b);
 }
 
-/* Adds other near subtrees, as far as the starting subtrees show; after that no subtree is
- * requested separately. A subtree that cannot be loaded ends the search: the query will report it,
- * and each further try may wait as long as the first. */
+/* Sends hints for other subtrees near the points, as far as the starting subtrees show which ones;
+ * after that no subtree is requested separately. A subtree that cannot be loaded ends the search:
+ * the query will return the error, and each further try may wait as long as the first. */
 static void search_around(ebpo_batch *b, uint64_t end)
 {
     ebpo_context *c = b->context;
@@ -324,12 +325,12 @@ static void search_around(ebpo_batch *b, uint64_t end)
 uint64_t ebpo_batch_next(ebpo_batch *b, uint64_t i)
 {
     if (b->far && i == 0)
-        report_next(b);
+        hint_next(b);
     if (b->far && i >= (b->reach ? b->searched : b->reported - (b->reported != 0)) &&
         i < b->count) {
         uint64_t end = b->reported;
         if (b->reported < b->count)
-            report_next(b);
+            hint_next(b);
         if (b->reach)
             search_around(b, end);
     }

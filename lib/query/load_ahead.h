@@ -5,8 +5,9 @@
 #include "query/query_model.h"
 
 /* Requests subtrees near p, the nearest first, when p has moved by a quarter of the side of a cell
- * of the cut level. Their envelopes are within `reach` (of either sign) and 2.25 such sides of p.
- * `reach`: search distance of the query at p, 0 for point in solid. Models with a cache only. */
+ * of the cut level. These are the subtrees whose envelopes are within |reach| plus 2.25 such sides
+ * of p. `reach`: search distance of the query at p, 0 for point in solid. For models with a cache
+ * only. */
 void ebpo_context_prefetch(ebpo_context *context, const double p[3], double reach);
 
 /* Lists the subtrees whose envelopes may be within `limit` of p, the nearest first; returns their
@@ -15,18 +16,18 @@ unsigned ebpo_subtrees_near(const ebpo_model *model, const double p[3], double l
                             uint64_t keys[EBPO_CACHE_AHEAD]);
 
 /* Sends one prefetch hint for subtrees that will be entered soon, given by their numbers in the
- * top: for remote files that have a table of subtrees. Skips subtrees in memory. */
+ * top. For remote files that have a table of subtrees. Skips subtrees in memory. */
 enum { EBPO_HINTED_MAX = 64 };
 void ebpo_context_hint(const ebpo_context *context, const uint32_t *below, uint64_t count);
 
-/* Returns true when the model's options enable it. */
+/* Returns true when the model's options enable prefetching. */
 static inline bool ebpo_model_prefetches(const ebpo_model *m)
 {
     return m->options.prefetch && !m->whole && m->options.loading == EBPO_LOAD_CACHE;
 }
 
-/* Many points: evaluated along the curve, so that subtrees are loaded few times; for a remote file
- * prefetch hints are sent in advance. One thread. */
+/* A batch of many points. They are evaluated along the Morton curve, so that subtrees are loaded
+ * few times; for a remote file prefetch hints are sent in advance. One thread. */
 
 typedef struct ebpo_batch {
     ebpo_context *context;
@@ -34,8 +35,8 @@ typedef struct ebpo_batch {
     uint64_t count;
     uint64_t *order; /* [count] order of evaluation; NULL: in the given order */
     bool far, reach;
-    uint64_t reported; /* points whose subtrees have been hinted */
-    uint64_t searched; /* points around which further subtrees have been searched */
+    uint64_t reported; /* number of points for whose subtrees hints have been sent */
+    uint64_t searched; /* number of points around which further subtrees have been searched */
     uint32_t *below; /* [capacity] subtrees that are being collected, by their numbers in the top */
     uint64_t below_count, capacity;
 } ebpo_batch;
@@ -46,8 +47,8 @@ void ebpo_batch_begin(ebpo_batch *batch, ebpo_context *context, const double *po
                       uint64_t count, bool reach);
 void ebpo_batch_end(ebpo_batch *batch);
 
-/* Returns the points' numbers [count] along the curve, of the nearest cell for points outside the
- * box; the caller frees it. NULL: no memory. */
+/* Returns the numbers of the points [count] in the order of the Morton curve; a point outside the
+ * box has the position of the nearest cell. The caller frees the array. NULL: no memory. */
 uint64_t *ebpo_curve_order(const ebpo_box *box, const double *points, uint64_t count);
 
 /* Returns the i-th point to evaluate; i goes from 0 on. */

@@ -1,12 +1,14 @@
-/* Area, volume, centroid and inertia as integrals over the faces (divergence theorem): each face
- * and the middle of the model span a tetrahedron, whose moments are polynomials in its corners.
- * With det = a . (b x c), s = a + b + c for corners a, b, c relative to the middle: volume det / 6,
- * first moments det s / 24,   second moments det (s s' + a a' + b b' + c c') / 120. All values are
- * in double-double arithmetic, on coordinates scaled by a power of two to about 1, in blocks of
- * faces that do not depend on threads. A face counts as often as its component bounds the solid,
- * where that is known (construct/solid_shells.h), else once. Source of the moments: Tonon 2004,
- * "Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex
- * coordinates". */
+/* Computes area, volume, centroid and inertia as integrals over the faces (divergence theorem).
+ * Each face and the middle of the model span a tetrahedron, whose moments are polynomials in its
+ * corners. For corners a, b, c relative to the middle, with det = a . (b x c) and s = a + b + c:
+ *   volume          det / 6
+ *   first moments   det s / 24
+ *   second moments  det (s s' + a a' + b b' + c c') / 120
+ * All values are in double-double arithmetic, on coordinates scaled by a power of two to about 1.
+ * They are summed in blocks of faces that do not depend on threads. A face counts as often as its
+ * component bounds the solid, where that is known (construct/solid_shells.h), else once. Source of
+ * the moments: Tonon 2004, "Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms
+ * of its vertex coordinates". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -27,7 +29,7 @@
 
 enum { BLOCK_FACES = 16384 };
 
-/* A volume below this share of the sum of absolute values is a rounding error: 0. */
+/* A volume whose share of the sum of absolute values is less than this is a rounding error: 0. */
 static const double nothing = 0x1p-85;
 
 /* Scaled coordinates are p / 2^exponent; `middle` is scaled. */
@@ -38,7 +40,8 @@ typedef struct frame {
 } frame;
 
 typedef struct moments {
-    ebpo_pair area2, volume6, first24[3], second120[6]; /* second: xx, yy, zz, yz, zx, xy */
+    ebpo_pair area2, volume6, first24[3], second120[6]; /* order of second moments: xx, yy, zz, yz,
+                                                         * zx, xy */
     ebpo_pair integral6;                                /* with each face counted once */
     /* the sum of absolute values of the terms of volume6 */
     double absolute6;
@@ -47,7 +50,7 @@ typedef struct moments {
 typedef struct pass {
     const ebpo_mesh *mesh;
     const uint32_t *component; /* [faces]; NULL: all faces count once */
-    int8_t *times;             /* [components] multiplicity of its faces */
+    int8_t *times;             /* [components] multiplicity of each component's faces */
     frame frame;
     moments *blocks;
 } pass;
@@ -69,7 +72,7 @@ static void frame_of(frame *f, const ebpo_mesh *mesh)
     for (int k = 0; k < 3; k++)
         half = fmax(half, mesh->face_count ? .5 * high[k] - .5 * low[k] : 0);
     frexp(half, &f->exponent);
-    /* A flat model far from the origin with a tiny extent must not overflow. */
+    /* A flat model that is far from the origin and has a tiny extent must not overflow. */
     int top;
     frexp(largest, &top);
     f->exponent = f->exponent > top - 900 ? f->exponent : top - 900;
@@ -245,7 +248,7 @@ static ebpo_status count_components(pass *p, const ebpo_solid_shells *s, ebpo_ru
     return EBPO_OK;
 }
 
-/* Finds out if the volume is known; then sets the multiplicity of faces. */
+/* Finds if the volume is known; then sets the multiplicity of faces. */
 static ebpo_status decide_volume(pass *p, const ebpo_info *info, unsigned threads,
                                  ebpo_solid_shells *s, ebpo_solid_volume *volume, ebpo_error *error)
 {

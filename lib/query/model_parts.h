@@ -19,21 +19,21 @@ typedef struct ebpo_top_planes {
 
 typedef struct ebpo_top {
     int cut_level;
-    /* entries UNIFORM, GRAY (levels above the cut), BELOW (gray nodes of the cut level, leaves down
-     * to it, pruned nodes) */
+    /* Entries are UNIFORM, GRAY (levels above the cut), or BELOW: gray nodes of the cut level,
+     * leaves down to this level, and pruned nodes. */
     ebpo_node_table nodes;
-    uint32_t *planes;      /* codes */
+    uint32_t *planes;      /* codes of all planes */
     ebpo_top_planes *gray; /* planes of the gray node whose children are group g */
 
     uint64_t below_count;
-    ebpo_node *below;              /* NULL for envelopes alone */
+    ebpo_node *below;              /* nodes of the kind BELOW; NULL in a table of envelopes alone */
     ebpo_top_planes *below_planes; /* [below_count]; leaves have none */
     uint64_t bytes;
 } ebpo_top;
 
 EBPO_MUST_USE ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, int cut_level,
                                         unsigned threads, ebpo_error *error);
-/* Reads only envelopes, with memory for nothing else: without `below`. */
+/* Reads only envelopes, and allocates memory for nothing else; `below` is NULL. */
 EBPO_MUST_USE ebpo_status ebpo_top_read_envelopes(ebpo_top **out, const ebpo_file *file,
                                                   int cut_level, unsigned threads,
                                                   ebpo_error *error);
@@ -45,22 +45,24 @@ uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
 
 /* --- skeletons ---
  *
- * The upper nodes of the hierarchy over faces (query/accel.h), kept in memory for each subtree that
- * has been loaded: eight nodes at first, 2 KB where the subtree takes hundreds. They bound the
- * distance to its faces much better than its cell and its envelope do, so that searches load it
- * again only if it may matter. A skeleton is made when the subtree is loaded and kept when the
- * cache drops it: this works for every file, and costs no reading. When a search loads a subtree
- * without need, nodes are added near the query point: memory is used where bounds are too loose.
+ * A skeleton has the upper nodes of a subtree's hierarchy over faces (query/accel.h). It is kept in
+ * memory for each subtree that has been loaded: eight nodes at first, 2 KB where the subtree takes
+ * hundreds. Skeletons bound the distance to a subtree's faces much better than its cell and its
+ * envelope do, so searches load the subtree again only if it may matter. A skeleton is made when
+ * the subtree is loaded and kept when the cache drops the subtree: this works for every file, and
+ * needs no further reading. When a search loads a subtree without need, nodes are added near the
+ * query point: memory is used where bounds are too loose.
  *
- * Lower bounds only. Subtrees are searched in the order of certain lower bounds until the next is
- * beyond the found distance (nearest_subtrees.c): those searched are the ones whose bound is at
- * most the result. No upper bound could save one of them. */
+ * Skeletons give lower bounds only. Subtrees are searched in the order of certain lower bounds
+ * until the next bound is beyond the found distance (nearest_subtrees.c): the searched subtrees are
+ * those whose bound is at most the result. No upper bound could avoid searching one of these. */
 
-/* Any thread; one at a time where it is not const. */
+/* Any thread may use const skeletons; one thread at a time may change one. */
 typedef struct ebpo_skeleton ebpo_skeleton;
 
 /* Certain lower bounds of the distance to a subtree's faces, in the model's unit: to its owned
- * faces, which no other subtree owns, and to its shared ones. INFINITY: it has none. */
+ * faces, which no other subtree owns, and to its shared faces. INFINITY: there are no such faces.
+ */
 typedef struct ebpo_skeleton_bounds {
     double own, outer;
 } ebpo_skeleton_bounds;
@@ -69,25 +71,27 @@ typedef struct ebpo_skeleton_bounds {
  * squares of its size overflow or underflow, or without memory. */
 ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *subtree, unsigned nodes);
 void ebpo_skeleton_free(ebpo_skeleton *skeleton);
-/* Returns the maximum bytes of memory. */
+/* Returns the maximum bytes of a skeleton with this number of nodes. */
 uint64_t ebpo_skeleton_bytes(unsigned nodes);
 
 /* Returns lower bounds; those beyond `limit` may be INFINITY. */
 ebpo_skeleton_bounds ebpo_skeleton_lower_bounds(const ebpo_skeleton *skeleton, const double p[3],
                                                 double limit);
-/* Does the same with keys, for a far point. */
+/* As ebpo_skeleton_lower_bounds, with keys instead of distances, for a far point (point_bounds.h).
+ */
 ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *skeleton, const ebpo_far *far,
                                               double limit);
 
 /* Maximum number of nodes after growing. */
 enum { EBPO_SKELETON_NODES = 64 };
-/* Adds up to eight nodes of the same subtree, the nearest to p as far as is known, while they are
- * within `limit`. `take` returns true if the quota allows more. */
+/* Adds up to eight nodes of the same subtree: those nearest to p, as far as is known, and within
+ * `limit`. `take` returns true if the quota allows more. */
 void ebpo_skeleton_grow(ebpo_skeleton *skeleton, const ebpo_accel *subtree, const double p[3],
                         double limit, bool (*take)(void *user, uint64_t bytes), void *user);
 
 /* Writes boxes, in the model's unit, around the shared faces that may be within `limit` of p;
- * returns their count. Each shared face is owned by another subtree, whose cell it intersects. */
+ * returns the number of boxes. Each shared face is owned by another subtree, whose cell it
+ * intersects. */
 typedef struct ebpo_shared_box {
     double low[3], high[3];
 } ebpo_shared_box;
@@ -95,21 +99,22 @@ enum { EBPO_SHARED_BOXES = 64 };
 unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *skeleton, const double p[3], double limit,
                                     ebpo_shared_box out[EBPO_SHARED_BOXES]);
 
-/* Skeletons of a model's subtrees, by their numbers. Any thread. */
+/* The skeletons of a model's subtrees, by the subtrees' numbers. Any thread. */
 typedef struct ebpo_skeletons ebpo_skeletons;
 
-/* Makes the table. `space`: quota in bytes for all, see ebpo_skeletons_capacity. Taken from a
- * cache's budget when needed, or NULL. Returns NULL without memory. */
+/* Makes the table. `space`: quota in bytes for all skeletons, see ebpo_skeletons_capacity. The
+ * bytes are taken when needed from the budget of `cache`, unless it is NULL. Returns NULL without
+ * memory. */
 ebpo_skeletons *ebpo_skeletons_make(uint64_t count, uint64_t space, ebpo_cache *cache);
 /* Frees the table after all other threads have finished; NULL is allowed. */
 void ebpo_skeletons_free(ebpo_skeletons *all);
 /* Returns the part of `space` that `count` skeletons can use. */
 uint64_t ebpo_skeletons_capacity(uint64_t count, uint64_t space);
-/* Takes bytes from their quota for other data about subtrees; returns false if not enough is left.
- * The other function returns such bytes. Any thread. */
+/* Takes bytes from the quota of skeletons for other data about subtrees; returns false if not
+ * enough is left. The other function returns such bytes to the quota. Any thread. */
 bool ebpo_skeletons_take(ebpo_skeletons *all, uint64_t bytes);
 void ebpo_skeletons_give_back(ebpo_skeletons *all, uint64_t bytes);
-/* Returns the bytes of memory used now. */
+/* Returns the bytes of memory that are used now. */
 uint64_t ebpo_skeletons_bytes(const ebpo_skeletons *all);
 
 /* Keeps the skeleton of a subtree, unless it exists or the quota is used up. */
@@ -136,11 +141,11 @@ uint64_t ebpo_beside_subtrees(const ebpo_model_options *options, uint64_t budget
 
 /* --- the plan for a model's budget, from the counts in the file header --- */
 
-/* Sets the budget: the remainder of a shared budget, or a default one for a remote file if none was
- * given; returns true in the last case. */
+/* Sets options->memory: the remainder of a shared budget, or a default for a remote file if no
+ * budget was given. Returns true in the last case. */
 bool ebpo_default_memory(const ebpo_file *file, ebpo_model_options *options);
 
-/* Plans to load everything at once, or chooses the cut level. Errors are those of
+/* Plans to load everything at once, or chooses the cut level. Fails with the errors of
  * ebpo_model_memory. */
 EBPO_MUST_USE ebpo_status ebpo_plan_model(const ebpo_file *file, const ebpo_model_options *options,
                                           bool default_memory, ebpo_model_plan *out,
@@ -152,22 +157,24 @@ EBPO_MUST_USE ebpo_status ebpo_plan_parts(const ebpo_file *file, const ebpo_mode
 
 /* --- shared budgets ---
  *
- * A budget that models share: the bytes that each takes permanently, and those for the caches of
- * all. Any thread. */
+ * A budget that several models share. It counts the bytes that each model takes permanently, and
+ * those for the caches of all models. Any thread. */
 
-/* Return the pools of the caches of subtrees and of chunks: a load by one needs memory in the
- * other. */
+/* Return the pools of the caches of subtrees and of chunks. When one pool loads data, it needs
+ * memory in the other. */
 ebpo_cache_pool *ebpo_budget_subtrees(const ebpo_budget *budget);
 ebpo_cache_pool *ebpo_budget_chunks(const ebpo_budget *budget);
 
 uint64_t ebpo_budget_bytes(const ebpo_budget *budget);
 
-/* Takes bytes for a model that is all in memory, for its lifetime. Returns false if they exceed the
- * limit or the free part. The other function returns unused bytes, or all. */
+/* Takes bytes for a model that is all in memory, for the lifetime of the model. Returns false if
+ * they exceed the limit or the free part. The other function returns unused bytes, or all bytes, to
+ * the budget. */
 bool ebpo_budget_take_whole(ebpo_budget *budget, uint64_t bytes);
 void ebpo_budget_give_back_whole(ebpo_budget *budget, uint64_t bytes);
 
-/* Takes at most `wanted` bytes of the quota for skeletons; the other function returns them. */
+/* Takes at most `wanted` bytes of the quota for skeletons; the other function returns them to the
+ * quota. */
 uint64_t ebpo_budget_take_skeletons(ebpo_budget *budget, uint64_t wanted);
 void ebpo_budget_give_back_skeletons(ebpo_budget *budget, uint64_t bytes);
 

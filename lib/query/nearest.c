@@ -1,11 +1,12 @@
 /* Finds the nearest face: the search in one accel, and the comparison of two faces.
  *
- * Depth first, nearest child first; prunes nodes that are certainly farther than the best face.
- * Bounds and triangles are in single precision with bounded errors (nearest_kernels.c). The
- * remaining faces are compared by certain bounds in double precision, and exactly where these
- * cannot separate two faces; of equally near faces the one with the least number in the file is
- * returned. Points too far for single precision use boxes in doubles, points too far for doubles
- * use keys (point_bounds.h). An ebpo_nearest may search several accels one after the other. */
+ * The search is depth first, the nearest child first. It drops nodes that are certainly farther
+ * than the best face. Bounds and triangles are in single precision with bounded errors
+ * (nearest_kernels.c). The remaining faces are compared by certain bounds in double precision, and
+ * exactly where these cannot separate two faces; of equally near faces the one with the least
+ * number in the file is returned. For points too far for single precision, the search uses boxes in
+ * doubles; for points too far for doubles, it uses keys (point_bounds.h). An ebpo_nearest may
+ * search several accels one after the other. */
 #include "core/strict_fp.h"
 
 #include <float.h>
@@ -29,7 +30,8 @@ static bool is_edge(ebpo_feature feature)
     return feature >= EBPO_NEAR_EDGE0 && feature <= EBPO_NEAR_EDGE2;
 }
 
-/* Faces around one vertex or edge are the most frequent tie. */
+/* Returns true if both nearest features are the same: faces around one vertex or edge are the most
+ * frequent tie. */
 static bool same_feature(const double a[3][3], ebpo_feature of_a, const double b[3][3],
                          ebpo_feature of_b)
 {
@@ -57,7 +59,8 @@ int ebpo_near_compare(const double p[3], const double a[3][3], const ebpo_distan
 
 /* --- the search --- */
 
-/* Beyond this multiple of half the subtree's size, single precision cannot separate distances. */
+/* Single precision cannot separate distances of points that are farther from a subtree than this
+ * multiple of half its size. */
 #define FAR 32.0
 
 void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p[3],
@@ -94,7 +97,7 @@ static ebpo_far_keys keys_of(const ebpo_nearest *n, const double triangle[3][3])
     return n->far.far ? ebpo_far_face(&n->far, triangle) : (ebpo_far_keys){ -INFINITY, INFINITY };
 }
 
-/* Returns the exact sign of the face's distance less the one of the nearest face so far. */
+/* Returns the exact sign of the face's distance less that of the nearest face so far. */
 static int compare_with_nearest(const ebpo_nearest *n, const double triangle[3][3],
                                 const ebpo_distance_bounds *b, const ebpo_far_keys *keys)
 {
@@ -115,7 +118,7 @@ void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint6
         take_face(n, triangle, &b, &keys, file_face, source_face);
 }
 
-/* Returns true if it is the nearest so far. */
+/* Returns true if the face is the nearest so far. */
 static bool try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
 {
     uint32_t local = ebpo_accel_slot_face(s, slot);
@@ -178,7 +181,7 @@ static bool make_probe(const ebpo_accel *s, const double p[3], ebpo_probe *out)
     return true;
 }
 
-/* Returns the limit in the frame, rounded up. */
+/* Returns the limit in the subtree's frame, rounded up. */
 static float frame_limit(const ebpo_near_search *g)
 {
     const ebpo_nearest *n = g->user;
@@ -212,7 +215,7 @@ static void judge_waiting(ebpo_near_search *g)
     }
 }
 
-/* Stops at the deadline: the nodes on the stack bound the unvisited part. */
+/* Stops at the deadline: the nodes on the stack give the bound of the unvisited part. */
 static void give_up(const ebpo_near_search *g)
 {
     ebpo_nearest *n = g->user;
@@ -273,8 +276,8 @@ typedef struct far_search {
     ebpo_far_frame frame;
 } far_search;
 
-/* Does the same with bounding cylinders, which cost more: only for children that pass the test of
- * boxes. */
+/* Returns the children within the limit, a bit for each, by boxes and bounding cylinders. Cylinders
+ * take more time: they are tested only for children that pass the test of boxes. */
 static unsigned far_children(const far_search *g, uint32_t node, double lower[8])
 {
     const ebpo_nearest *n = g->n;
@@ -326,8 +329,8 @@ static double box_distance(const ebpo_accel *s, const ebpo_bound *b, int lane, c
         return most;
     for (int k = 0; k < 3; k++)
         sum += d[k] / most * (d[k] / most);
-    /* p[k] is FAR away on the axis that matters, so the rounding error of the box sides is far
-     * below 2^-40 of it. */
+    /* p[k] is far away (by FAR) on the axis that matters, so the rounding error of the box sides is
+     * far below 2^-40 of that distance. */
     return most * sqrt(sum) * (1 - 0x1p-40);
 }
 

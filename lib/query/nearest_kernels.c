@@ -1,8 +1,8 @@
 /* Kernel of the nearest face: the walk from node to node of one accel's hierarchy over faces, eight
  * children or eight faces at a time, in single precision.
  *
- * The walk drops only nodes and faces certainly farther than the best upper bound. It collects the
- * other faces as candidates, which nearest.c compares.
+ * The walk drops only nodes and faces that are certainly farther than the best upper bound. It
+ * collects the other faces as candidates, which nearest.c compares.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md. */
@@ -15,7 +15,8 @@
 
 /* --- boxes and bounding cylinders --- */
 
-/* The children's boxes relative to the point: nearer sides, and farther ones negated. */
+/* The children's boxes relative to the point: their nearer sides, and their farther sides negated.
+ */
 typedef struct near_boxes {
     f8 low[3], minus_high[3];
 } near_boxes;
@@ -39,7 +40,7 @@ EBPO_EIGHT f8 near_by_boxes(const ebpo_bound *b, const ebpo_probe *probe, near_b
     return near_square_sum(d);
 }
 
-/* Does the same from bounding cylinders. */
+/* Returns squared lower bounds of the distances, from bounding cylinders. */
 EBPO_EIGHT f8 near_by_slabs(const ebpo_bound_slab *slab, const near_boxes *boxes)
 {
     f8 zero = f8_all(0), twice[3], part[3];
@@ -52,8 +53,8 @@ EBPO_EIGHT f8 near_by_slabs(const ebpo_bound_slab *slab, const near_boxes *boxes
        from = f8_mul(f8_from_shorts(slab->from), step), to = f8_mul(f8_from_shorts(slab->to), step),
        radius = f8_mul(f8_from_shorts(slab->radius), f8_all(slab->aside_step));
     f8 over = f8_max3(f8_add(along, from), f8_sub(f8_sub(zero, along), to), zero);
-    /* Below the true value by a margin, so that the root of a small difference of large squares
-     * stays a lower bound. */
+    /* Less than the true value by a margin, so that the root of a small difference of large squares
+     * is a lower bound. */
     f8 away = f8_mul(near_square_sum(twice), f8_all(0.25f * (1 - 0x1p-19f))),
        aside2 = f8_max(f8_sub(away, f8_mul(along, along)), zero),
        aside = f8_max(f8_sub(f8_sqrt(aside2), radius), zero);
@@ -101,8 +102,8 @@ EBPO_EIGHT f8 edge_distance2(three a, three e, f8 ee)
     return three_dot(q, q);
 }
 
-/* Corners relative to the point, and edges, in the frame. Edges are computed from the corners
- * themselves: a far point must not increase their error. */
+/* Corners of eight faces relative to the point, and their edges, in the subtree's frame. Edges are
+ * computed from the corners themselves: a far point must not increase their error. */
 typedef struct near_faces {
     three corner[3], edge[3];
 } near_faces;
@@ -158,11 +159,11 @@ EBPO_EIGHT near_faces near_load(const ebpo_near_search *g, const ebpo_face_block
     return out;
 }
 
-/* Computes distances of eight faces, 2^-16 of r less and more, where r is the sum of all
- * coordinates' sizes of a corner and two edges. Faces whose height is at least an eighth of their
- * longest edge use their planes. Others use their edges, from which no point of the face is farther
- * than its height. The last term covers underflow of squares. Proof: docs/develop/bounds.md,
- * "Points against eight faces". */
+/* Computes bounds of the distances of eight faces: 2^-16 of r less and more than computed, where r
+ * is the sum of all coordinates' sizes of a corner and two edges. Faces whose height is at least an
+ * eighth of their longest edge use their planes. Other faces use their edges, from which no point
+ * of the face is farther than its height. The last term covers underflow of squares. Proof:
+ * docs/develop/bounds.md, "Points against eight faces". */
 EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 {
     f8 zero = f8_all(0), length[3], longest2;
@@ -175,8 +176,8 @@ EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
         edges = f8_min(edge_distance2(f->corner[i], f->edge[i], length[i]), edges);
         out = f8_or(out, f8_less(three_dot(three_cross(f->edge[i], n), f->corner[i]), zero));
     }
-    /* its square would underflow for a small triangle close to the point, but not the quotient
-     * below */
+    /* not squared before the division: the square would underflow for a small triangle close to the
+     * point */
     f8 an = three_dot(f->corner[0], n);
     f8 sturdy = f8_and(f8_at_most(f8_mul(f8_mul(longest2, longest2), f8_all(0x1p-6f)), nn),
                        f8_less(f8_all(0x1p-54f), longest2));
@@ -197,7 +198,8 @@ EBPO_EIGHT void near_bounds(const near_faces *f, f8 *low, f8 *high)
 
 /* --- the walk --- */
 
-/* Visits a block. The least upper bound first: then most of the eight are known to be farther. */
+/* Visits a block. The face with the least upper bound comes first: then most of the eight faces are
+ * known to be farther. */
 EBPO_EIGHT void near_block(ebpo_near_search *g, uint32_t block, uint32_t node, bool wide)
 {
     ebpo_face_block faces = ebpo_face_block_open(g->s, block);
@@ -228,16 +230,16 @@ EBPO_EIGHT void near_fetch(const ebpo_accel *s, uint32_t child)
         ebpo_visit_fetch_slab(s, child);
 }
 
-/* Prefetches the next visit during the current one: far from the surface it costs two cache misses
- * at a time. */
+/* Prefetches the data of the next visit during the current one: far from the surface, a visit takes
+ * two cache misses. */
 EBPO_EIGHT void near_fetch_next(const ebpo_near_search *g, uint32_t top)
 {
     if (top)
         near_fetch(g->s, (uint32_t)g->stack[top - 1]);
 }
 
-/* The search is small compared with nodes this many times larger (squared) than the size from which
- * cylinders are worth testing. */
+/* A search is small compared with a node if its squared limit is at most this multiple of the
+ * node's slab_limit2. */
 #define NEAR_SMALL 25.0f
 
 /* Pushes a node's children, farthest first; returns the new top. */
@@ -273,7 +275,7 @@ EBPO_EIGHT bool near_descend(ebpo_near_search *g, uint32_t *top, uint32_t *child
     return true;
 }
 
-/* Visits the first block and chooses the next node: the least ancestor compared with which the
+/* Visits the first block and chooses the next node: the lowest ancestor compared with which the
  * search is small. Above that node, the search hardly ever leaves through another child, and no
  * visit depends on the result of the previous one. */
 EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g, bool wide)
@@ -283,7 +285,7 @@ EBPO_EIGHT uint32_t near_begin(ebpo_near_search *g, bool wide)
     if (g->first_block == EBPO_NO_BLOCK)
         return g->s->top;
     near_block(g, g->first_block, node, wide);
-    if (g->late) /* the rest must be on the stack */
+    if (g->late) /* at the deadline, the nodes not visited must be on the stack */
         return g->s->top;
     while (node != g->s->top && g->limit2 > bound[node].slab_limit2 * NEAR_SMALL)
         node = bound[node].parent;

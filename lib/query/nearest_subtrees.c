@@ -1,11 +1,12 @@
-/* Finds the nearest face of a model: under a budget, subtrees are searched, and loaded, in the
+/* Finds the nearest face of a model. Under a budget, subtrees are searched, and loaded, in the
  * order in which they may matter.
  *
- * Nodes of the top and subtrees wait in a queue, ordered by certain lower bounds of their distance;
- * the search ends when the next is beyond the best face. A subtree is loaded only if its bound is
- * at most the result, independent of the data in memory. Bounds come from a subtree's skeleton, if
- * it has ever been loaded (skeleton.c), else from the envelopes of the levels right below the cut
- * (deep bounds). Deep bounds are read once queries have loaded enough subtrees without need. */
+ * Nodes of the top and subtrees wait in a queue, ordered by certain lower bounds of their distance.
+ * The search ends when the next bound is beyond the best face. A subtree is loaded only if its
+ * bound is at most the result, independent of the data in memory. Bounds come from a subtree's
+ * skeleton, if it has ever been loaded (skeleton.c), else from the envelopes of the levels right
+ * below the cut (deep bounds). Deep bounds are read once queries have loaded enough subtrees
+ * without need. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -18,7 +19,7 @@
 #include "geometry/cells.h"
 #include "query/nearest.h"
 
-/* Returns the order of the heap. */
+/* Returns true if `a` comes before `b` in the queue. */
 static bool comes_out_before(const ebpo_ranked *a, const ebpo_ranked *b)
 {
     return a->lower != b->lower ? a->lower < b->lower : a->node.entry < b->node.entry;
@@ -51,11 +52,12 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *c)
     return first;
 }
 
-/* Each level takes four times the one above it; the third would save a tenth of the loads that
- * remain with two: docs/develop/design.md. */
+/* Number of levels of deep bounds. Each level takes four times the memory of the one above it; a
+ * third level would save a tenth of the loads that remain with two: docs/develop/design.md. */
 enum { DEEP_LEVELS = 2 };
-/* On a path, a query visits few new subtrees. Further ones were loaded without need; reading two
- * levels takes about as long as this number of loads. */
+/* Number of new subtrees without need after which deep bounds are read. On a path, a query visits
+ * few new subtrees, so further ones were loaded without need. Reading two levels takes about as
+ * long as this number of loads. */
 enum { NEW_AS_DEFAULT = 4, LOADS_TO_READ = 64 };
 
 /* --- deep bounds --- */
@@ -111,7 +113,7 @@ static ebpo_top_planes planes_of(const ebpo_top *t, uint32_t entry)
     return ebpo_entry_kind_of(entry) == EBPO_ENTRY_BELOW ? t->below_planes[value] : t->gray[value];
 }
 
-/* Ranks the children that may be nearer than the best, the nearest first. */
+/* Ranks the children that may be nearer than the best distance, the nearest first. */
 static int rank_deep_children(const deep_search *g, uint32_t gray, ebpo_cell cell, double parent,
                               deep_child out[8])
 {
@@ -167,25 +169,25 @@ static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node
 
 /* --- the search --- */
 
-/* Parts of a subtree in the queue: the node without other data; its owned faces; its shared ones.
- */
+/* Entries of the queue for a subtree: the node without further data; its owned faces; its shared
+ * faces. */
 enum { NODE = 0, OWN, OUTER };
 
 typedef struct searching {
     ebpo_context *c;
     ebpo_nearest *n;
     ebpo_ranking ranking;
-    unsigned new_loads; /* loaded subtrees without bounds */
+    unsigned new_loads; /* number of loaded subtrees that had no bounds */
 } searching;
 
 static ebpo_status add_node(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_nearest *n = g->n;
     if (r->lower > ebpo_nearest_limit(n) || ebpo_node_is_uniform(&r->node) ||
-        r->node.pruned) /* pruned: see inspect_pruned */
+        r->node.pruned) /* pruned: inspect_pruned handles the node */
         return EBPO_OK;
     if (ebpo_node_is_below(&r->node)) {
-        /* it contains some face */
+        /* the node contains a face */
         double end = ebpo_rank_cell_end(&g->ranking, r->node.cell);
         n->upper = fmin(n->upper, n->far.far ? ebpo_far_upper(&n->far, end) : end);
         n->limit = fmin(n->limit, n->upper);
@@ -205,7 +207,7 @@ static ebpo_status add_children(searching *g, const ebpo_ranked *r, ebpo_error *
     return status;
 }
 
-/* --- subtrees, once each: marked by twice the query's number, or one more --- */
+/* --- subtrees are searched once: each is marked by twice the query's number, or one more --- */
 
 static bool is_searched(const ebpo_context *c, uint32_t below)
 {
@@ -246,7 +248,7 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
         return status;
     ebpo_nearest_search(g->n, g->c, node.subtree);
     g->new_loads += g->c->loaded > loaded && is_new;
-    /* without need, or as one of many at about the same distance */
+    /* loaded without need, or one of many subtrees at about the same distance */
     bool again =
         g->n->limit == limit || g->n->limit > ebpo_cell_diagonal(&g->ranking.box, node.cell);
     if (g->c->loaded > loaded && again)
@@ -256,14 +258,14 @@ static ebpo_status search_below(searching *g, ebpo_node node, ebpo_error *error)
 
 /* --- bounds from skeletons ---
  *
- * A face is listed by every subtree whose cell it intersects, and owned by one of them: otherwise a
- * face across a cell face would be searched on both sides. A subtree is visited by its cell, for
- * the parts of its faces within it. For its owned faces it is searched. For shared faces that may
- * matter, the subtrees that may own them are searched, by bounds that hold wherever their faces
- * are; if one of those has no skeleton, the subtree itself is searched. So the nearest face is
- * found: its nearest point is in a visited cell, and that subtree or the face's owner is searched.
- * No bound on the way there is greater than the face's distance. The queue may return these two in
- * any order. */
+ * A face is listed by every subtree whose cell it intersects, and owned by one of them. Without
+ * this rule a face across a cell face would be searched on both sides. A subtree is visited by its
+ * cell, for the parts of its faces within the cell. For its owned faces the subtree is searched.
+ * For its shared faces that may matter, the subtrees that may own them are searched, by bounds that
+ * hold wherever their faces are; if one of those owners has no skeleton, the subtree itself is
+ * searched. So the nearest face is found: its nearest point is in a visited cell, and the subtree
+ * of that cell or the face's owner is searched. All bounds that lead to this search are at most the
+ * face's distance. The queue may return the subtree and the owner in any order. */
 
 static ebpo_skeleton_bounds skeleton_bounds(const searching *g, const ebpo_skeleton *k)
 {
@@ -278,8 +280,8 @@ static ebpo_node node_below(const ebpo_model *m, uint32_t below)
     return node;
 }
 
-/* Considers a subtree for its owned faces. `lower`: bound for which it is considered. Bounds only
- * rise, so once is enough. */
+/* Adds a subtree to the queue for its owned faces. `lower`: bound for which it is added. Bounds
+ * only increase, so adding it once is enough. */
 static ebpo_status consider_own(searching *g, uint32_t below, double lower, ebpo_error *error)
 {
     ebpo_context *c = g->c;
@@ -292,11 +294,11 @@ static ebpo_status consider_own(searching *g, uint32_t below, double lower, ebpo
     return r.lower <= ebpo_nearest_limit(g->n) ? ebpo_queue_push(c, &r, error) : EBPO_OK;
 }
 
-/* Walk to the subtrees that may own shared faces of another one: their cells intersect the faces'
- * box and come before it, depth first. */
+/* Walk to the subtrees that may own shared faces of another subtree: their cells intersect the box
+ * of the faces and come before that subtree, depth first. */
 typedef struct owners {
     searching *g;
-    uint64_t code; /* octcode of the other one */
+    uint64_t code; /* octcode of the other subtree */
     int level;
     double lower;
     const ebpo_shared_box *outer;
@@ -304,8 +306,8 @@ typedef struct owners {
     ebpo_status status;
 } owners;
 
-/* Returns true if the box reaches the cell, which also lists faces that come near it:
- * point_bounds.c. */
+/* Returns true if the box reaches the cell. The cell is widened, as its node also lists faces near
+ * the cell: point_bounds.c. */
 static bool cell_intersects(const owners *o, ebpo_cell cell)
 {
     double low[3], high[3];
@@ -337,7 +339,7 @@ static bool consider_owner(owners *o, uint32_t below, ebpo_error *error)
     return o->status == EBPO_OK;
 }
 
-/* Returns false as soon as a visit does. */
+/* Visits the owners. Returns false as soon as a visit does. */
 static bool visit_owners(owners *o, uint32_t entry, ebpo_cell cell, ebpo_error *error)
 {
     const ebpo_node_table *nodes = &o->g->c->model->top->nodes;
@@ -363,7 +365,8 @@ static bool visit_all(owners *o, const ebpo_shared_box *boxes, unsigned count, e
     return true;
 }
 
-/* Returns false if some owner has no skeleton; nothing has been done then. */
+/* Adds the owners to the queue. Returns false if some owner has no skeleton; nothing has been added
+ * then. */
 static bool consider_owners(searching *g, const ebpo_skeleton *k, const ebpo_ranked *r,
                             ebpo_status *status, ebpo_error *error)
 {
@@ -388,7 +391,8 @@ static double deep_bound(const searching *g, const ebpo_ranked *r)
     return bound_below_cut(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n));
 }
 
-/* Handles a subtree without skeleton: searches it after everything nearer than its bound. */
+/* Handles a subtree without skeleton: it is searched after everything that is nearer than its
+ * bound. */
 static ebpo_status inspect_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
     ebpo_ranked all = { r->node, deep_bound(g, r), OWN };
@@ -410,7 +414,7 @@ static ebpo_status inspect_subtree(searching *g, const ebpo_ranked *r, ebpo_erro
     double least = fmax(r->lower, fmin(bounds.own, bounds.outer));
     if (least > ebpo_nearest_limit(g->n))
         return EBPO_OK;
-    bool there = is_there(g->c, below); /* then both at once */
+    bool there = is_there(g->c, below); /* then owned and shared faces are searched together */
     double lower = there ? r->lower : deep_bound(g, r);
     ebpo_ranked own = { r->node, there ? least : fmax(lower, bounds.own), OWN },
                 outer = { r->node, there ? INFINITY : fmax(lower, bounds.outer), OUTER };

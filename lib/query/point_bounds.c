@@ -1,10 +1,10 @@
 /* Certain bounds of the distance of a point to a cell, to the half-spaces of an envelope, and to
  * the hierarchy over faces.
  *
- * From a distance of 16 sizes of the model's box, doubles hardly separate distances; there the
+ * From a distance of 16 sizes of the model's box on, doubles hardly separate distances. There the
  * bounds are those of keys, which grow with the distance (point_bounds.h). Upper bounds include
- * faces that a node may list without containing them: within 1/256 of the cell's size (format-spec,
- * section 5). Rounding: docs/develop/bounds.md, "Points far away". */
+ * faces that a node may list without containing them: faces within 1/256 of the cell's size
+ * (format-spec, section 5). Rounding: docs/develop/bounds.md, "Points far away". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -13,8 +13,8 @@
 #include "geometry/polytope.h"
 #include "query/point_bounds.h"
 
-/* A node may list a face that only comes near, within 1/256 of the cell's size on each axis
- * (format-spec, section 5); plus a margin for rounding. */
+/* A node may list a face that is outside its cell but near it: within 1/256 of the cell's size on
+ * each axis (format-spec, section 5). This value adds a margin for rounding. */
 static const double near_share = 0x1.1p-8;
 
 static void cell_size(const ebpo_box *box, ebpo_cell cell, double low[3], double size[3])
@@ -107,7 +107,7 @@ double ebpo_cell_far(const ebpo_box *box, ebpo_cell cell, const double p[3])
     return scaled_length(d) * (1 + 0x1p-40) + scaled_length(size) * near_share;
 }
 
-/* Limit in sizes of the model's box. */
+/* Distance from which points are far, in sizes of the model's box. */
 static const double far_away = 16;
 /* Error of keys, relative to the largest coordinate: docs/develop/bounds.md. */
 static const double loss = 0x1p-46;
@@ -162,12 +162,12 @@ static double distance_of(const ebpo_far *f, double key, double share)
     return square > 0 ? f->distance * sqrt(square) * (1 + share) : 0;
 }
 
-/* Below the normal doubles the error is larger. */
+/* Added to bounds: for numbers below the normal doubles the rounding error is larger. */
 static const double tiny = 0x1p-1070;
 
 double ebpo_far_lower(const ebpo_far *f, double key)
 {
-    /* the distance may be finite where its computation in doubles overflows */
+    /* the distance may be finite, although its computation in doubles overflows */
     double distance = distance_of(f, key, -0x1p-40) - tiny;
     return key == INFINITY ? INFINITY : fmin(fmax(distance, 0), 0x1p1023);
 }
@@ -180,13 +180,14 @@ static double place_on_axis(const ebpo_far *f, double x, int axis)
     return (x - f->centre[axis]) * f->unit[0] * f->unit[1];
 }
 
-/* Returns the minimum position of h y^2 - u y. */
+/* Returns the position of the minimum of h y^2 - u y. */
 static double apex_of_square(double half, double toward)
 {
     return half > 0 ? toward / (2 * half) : toward > 0 ? INFINITY : -INFINITY;
 }
 
-/* Returns its minimum from `low` to `high`. */
+/* Returns the minimum of h y^2 - u y from `low` to `high`; `at`: the position of the minimum
+ * without limits. */
 static inline double least_between(double half, double toward, double at, double low, double high)
 {
     double y = at < low ? low : at > high ? high : at;
@@ -235,8 +236,8 @@ double ebpo_far_cell_end(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell)
     return sum + margin_of(f, 2 * c.most);
 }
 
-/* By Lagrange: where n . xi <= d, adding share (n . xi - d) makes nothing greater, so the minimum
- * over the whole cell is a lower bound, for every share of 0 or more. */
+/* A bound by Lagrange: where n . xi <= d, adding share (n . xi - d) to a function makes it nowhere
+ * greater. So its minimum over the whole cell is a lower bound, for every share of 0 or more. */
 static double cut_bound(const ebpo_far *f, const placed_cell *c, const double gradient[3],
                         double beyond, double share)
 {
@@ -268,7 +269,8 @@ double ebpo_far_envelope(const ebpo_far *f, const ebpo_box *box, ebpo_cell cell,
             gradient[k] = c.size[k] > 0 ? n[k] / c.size[k] : 0;
             beyond += gradient[k] * c.low[k];
         }
-        /* as a function of the share the bound is concave, and its slope changes only here */
+        /* as a function of the share, the bound is concave, and its slope changes only at these
+         * values */
         for (int k = 0; k < 3; k++) {
             double share = f->toward[k] / gradient[k];
             if (c.size[k] > 0 && share > 0 && isfinite(share))
@@ -307,9 +309,9 @@ void ebpo_far_boxes(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound
     }
 }
 
-/* |p - x|^2 >= |p - m|^2 - 2 (p - m) . (x - m) for the middle m of the box, and by Cauchy and
- * Schwarz (p - m) . (x - m) <= ((p - m) . a) ((x - m) . a) + N(p - m) N(x - m), N as in bounds.md.
- */
+/* |p - x|^2 >= |p - m|^2 - 2 (p - m) . (x - m) for the middle m of the box.
+ * By Cauchy and Schwarz (p - m) . (x - m) <= ((p - m) . a) ((x - m) . a) + N(p - m) N(x - m).
+ * N is that of bounds.md. */
 double ebpo_far_slab(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_bound *b,
                      const ebpo_bound_slab *slab, int lane)
 {
@@ -329,8 +331,8 @@ double ebpo_far_slab(const ebpo_far *f, const ebpo_far_frame *g, const ebpo_boun
 
 /* --- faces --- */
 
-/* |y|^2 >= 2 z . y - |z|^2 for every z: with the best corner for z that is linear in y, and its
- * least is at a corner. */
+/* |y|^2 >= 2 z . y - |z|^2 for every z. With the best corner for z, the right side is linear in y,
+ * so its minimum is at a corner. */
 ebpo_far_keys ebpo_far_face(const ebpo_far *f, const double triangle[3][3])
 {
     double y[3][3], key[3], most = 0;

@@ -1,6 +1,6 @@
-/* The kernels of queries and their data: inner loops over blocks of faces and bounds of eight. They
- * are filters, whose "certain" holds in exact arithmetic. Compiled for several instruction sets
- * with the same results (core/cpu.h). */
+/* The kernels of queries and their data: inner loops over blocks of faces and over bounds of eight
+ * children. They are filters: "certain" means that the result holds in exact arithmetic. Compiled
+ * for several instruction sets with the same results (core/cpu.h). */
 #ifndef EBPO_QUERY_QUERY_KERNELS_H
 #define EBPO_QUERY_QUERY_KERNELS_H
 
@@ -13,10 +13,11 @@
 
 /* --- stack of children still to visit, the nearest on top --- */
 
-/* The bits of a nonnegative key (so with the order of integers), then the child's number. */
+/* The bits of a nonnegative key (which are ordered as integers), then the child's number. */
 typedef uint64_t ebpo_visit;
 
-/* An octree level adds at most one level to the hierarchy, a long list of one leaf eleven. */
+/* Maximum number of visits. An octree level adds at most one level to the hierarchy, a long list of
+ * one leaf adds eleven. */
 enum { EBPO_VISITS_MAX = 64 * 8 };
 
 static inline ebpo_visit ebpo_visit_make(float key, uint32_t child)
@@ -72,21 +73,22 @@ static inline uint32_t ebpo_visit_push(ebpo_visit *stack, uint32_t top, const eb
 
 /* --- a search for the nearest face of one accel --- */
 
-/* A point in the form for kernels. */
+/* A point, prepared for kernels. */
 typedef struct ebpo_probe {
     double p[3];
-    float high[3], low[3]; /* p = high + low with an error of 2^-48 of |p| (blocks of floats) */
+    float high[3], low[3]; /* p = high + low with an error of 2^-48 of |p| (for blocks of floats) */
     float local[3];        /* position in the subtree's frame */
     float scale;           /* scale of the frame */
     double scale64;
-    /* bound of the error of distances from the rounding of `local`, in the frame */
+    /* bound of the error of distances that the rounding of `local` causes, in the frame */
     float error;
 } ebpo_probe;
 
-/* Faces that may be nearest wait until the end: by then nearly all are known to be farther. */
+/* A face that may be nearest. Candidates wait until the end: by then nearly all are known to be
+ * farther. */
 typedef struct ebpo_near_candidate {
     float low;
-    uint32_t slot, node; /* the node has the face's block as a child */
+    uint32_t slot, node; /* the node is the parent of the face's block */
 } ebpo_near_candidate;
 enum { EBPO_NEAR_CANDIDATES = 64 };
 #define EBPO_NO_BLOCK UINT32_MAX
@@ -98,19 +100,20 @@ struct ebpo_near_search {
     void *user;
     void (*judge)(ebpo_near_search *search); /* compares all waiting candidates */
     bool (*late)(ebpo_near_search *search);  /* NULL: no deadline */
-    /* visited before all others, and the node above it; EBPO_NO_BLOCK: none */
+    /* block that is visited before all others, and the node above it; EBPO_NO_BLOCK: none */
     uint32_t first_block, first_node;
     float best;   /* upper bound in the frame: some face is certainly not farther, or farther faces
-                   * are irrelevant */
+                   * do not matter */
     float limit2; /* limit for squared lower bounds */
     int count;
     ebpo_near_candidate waiting[EBPO_NEAR_CANDIDATES];
-    uint32_t top; /* number of visits left at the deadline */
+    uint32_t top; /* number of visits that remained at the deadline */
     ebpo_visit stack[EBPO_VISITS_MAX];
     uint32_t from[EBPO_VISITS_MAX]; /* parents of the stack's visits */
 };
 
-/* The error of a distance from underflow of squares is far less: about sqrt(2^-149). */
+/* Added to errors of distances. The error from underflow of squares is far less: about
+ * sqrt(2^-149). */
 #define EBPO_NEAR_UNDERFLOW 0x1p-56f
 
 static inline void ebpo_near_set_best(ebpo_near_search *g, float best)
@@ -135,8 +138,8 @@ typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL }
 
 typedef struct ebpo_ray_search ebpo_ray_search;
 
-/* A face that the ray may hit, not before `low`, a t of the frame. `facing`: of
- * ebpo_ray_intersection, where the line certainly goes through its interior; else 0. */
+/* A face that the ray may hit, not before `low`, a value of t in the frame. `facing` is that of
+ * ebpo_ray_intersection if the line certainly goes through the face's interior; else 0. */
 typedef struct ebpo_ray_candidate {
     float low;
     uint32_t slot;
@@ -149,7 +152,7 @@ struct ebpo_ray_search {
     const ebpo_segment *ray;
     ebpo_ray_wants wants;
     int facing;   /* 1, -1: only front faces, back faces; 0: all */
-    double limit; /* t beyond which hits are irrelevant, certain; decreases */
+    double limit; /* hits with a greater t certainly do not matter; decreases */
     /* Tests a face exactly (`facing`: as in a candidate), keeps it if it counts, and updates
      * search->limit and search->done. */
     void (*decide)(ebpo_ray_search *search, uint32_t slot, int facing);
@@ -157,25 +160,26 @@ struct ebpo_ray_search {
 
     /* ebpo_ray_search_accel sets the following fields. */
     bool done;        /* the search is complete */
-    bool intersected; /* any wanted: some face is certainly hit (`decide` was not called) */
+    bool intersected; /* if any hit is wanted: some face is certainly hit (`decide` was not called)
+                       */
     void (*judge)(ebpo_ray_search *search); /* tests all waiting candidates */
     const ebpo_accel *s;
-    /* In the frame: the direction with a longest coordinate of 2^-12 to 2^12, and the origin, moved
-     * along the ray to `moved`; the origin's error, for boxes. */
+    /* In the frame: the direction with a longest coordinate of 2^-12 to 2^12; the origin, moved
+     * along the ray to t = `moved`; the origin's error, for boxes. */
     double direction[3], origin[3], error;
-    /* Set by the kernels from these: start values of distances to the nearer and farther sides of
-     * boxes; four floats, of which three are used. */
+    /* Set by the kernels from direction and origin: start values of distances to the nearer and
+     * farther sides of boxes; four floats, of which three are used. */
     float near_from[4], far_from[4], inverse[4];
     float step_inverse[4];    /* unused value, then `inverse` */
     double inverse_double[4]; /* inverse of the direction, small coordinates replaced */
-    /* byte offsets of those sides in ebpo_bound: nearer ones, farther ones */
+    /* byte offsets in ebpo_bound of the sides of boxes: nearer ones, farther ones */
     const uint8_t (*side_at)[3];
     int axis[3];    /* z: the axis with the longest coordinate of the direction */
-    float shear[3]; /* x and y for a step of 1 along z; t for such a step */
+    float shear[3]; /* motion in x and y for a step of 1 along z; change of t for such a step */
     /* The origin in the model's unit, in two parts for blocks of floats. */
     double from[3];
     float from_high[4], from_low[4];
-    float blur; /* distance at which rounding errors equal the origin's error */
+    float blur; /* distance at which other rounding errors equal the origin's error */
     double moved, limit_scale;
     float bound, surely; /* limit, rounded up; t_max, rounded down */
     int count;
@@ -190,14 +194,15 @@ typedef struct ebpo_axis_segment {
     double from[3];
     double to;
     int axis;
-    /* In the encoding of an ebpo_listed_block, but for each axis the upper side and 15 less the
-     * lower one, rounded down; all ones: intersects everything. */
+    /* Extent of the segment in the cell, in the encoding of an ebpo_listed_block; but for each axis
+     * it has the upper side and 15 less the lower side, rounded down. All ones: intersects
+     * everything. */
     uint32_t reach;
 } ebpo_axis_segment;
 #define EBPO_REACH_ALL UINT32_C(0xffffff)
 
-/* Returns false when the block's faces in the cell cannot intersect the segment: a side of the box,
- * four bits each, is above the segment's. */
+/* Returns false when the block's faces in the cell cannot intersect the segment. Then one side of
+ * the block's box, four bits each, is greater than that of the segment. */
 static inline bool ebpo_axis_segment_intersects(const ebpo_axis_segment *g, uint64_t listed)
 {
     const uint32_t digits = 0x0f0f0f, carry = 0x101010;
@@ -211,17 +216,17 @@ static inline bool ebpo_axis_segment_intersects(const ebpo_axis_segment *g, uint
 
 /* Pure functions. */
 typedef struct ebpo_inside_kernels {
-    /* Returns the sum of the certain crossings of the segment with a leaf's listed faces, in the
-     * part of them within the leaf's cell (as ebpo_axis_crossing gives them). Appends lanes that
-     * are not certain to `open` as slots (capacity 8 a block), their number to *open_count. These
-     * include every face that contains the segment's end at `to` or `from`. */
+    /* Returns the sum of the certain crossings of the segment with a leaf's listed faces, for the
+     * part of the faces within the leaf's cell (as ebpo_axis_crossing returns them). Appends lanes
+     * that are not certain to `open` as slots (capacity 8 for each block), and sets *open_count.
+     * These include every face that contains the segment's end at `to` or `from`. */
     int32_t (*crossings)(const ebpo_accel *s, const ebpo_listed_block *list,
                          const ebpo_axis_segment *segment, uint32_t *open, uint32_t *open_count);
     ebpo_cell_faces_fn *cell_faces;
 } ebpo_inside_kernels;
 
-/* Not pure: they call search->judge when many faces wait. They walk through search->s. Afterwards
- * the waiting faces may be nearest, or hit, and best, or the limit, has decreased. */
+/* Walk through search->s. Not pure: they call search->judge when many faces wait. Afterwards the
+ * waiting faces may be nearest, or hit; and best, or the limit, has decreased. */
 typedef struct ebpo_nearest_kernels {
     void (*walk)(ebpo_near_search *search);
 } ebpo_nearest_kernels;

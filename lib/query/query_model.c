@@ -2,8 +2,8 @@
  * queries.
  *
  * A model holds everything if that fits into its budget, else the top of the tree and a cache of
- * subtrees (budget.c plans this). Models may be used by any thread; a context, with the buffers of
- * queries and its pinned subtree, by one. */
+ * subtrees (budget.c plans this). Models may be used by any thread. A context, with the buffers of
+ * queries and its pinned subtree, is used by one thread. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -70,10 +70,11 @@ ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error)
 
 /* --- envelopes that a context keeps --- */
 
-/* Most take 1 to 3 KB. */
+/* Number of envelopes; most take 1 to 3 KB. */
 enum { SLOTS = 256 };
 
-/* Followed by the used parts of the arrays, in the order of ebpo_polytope. */
+/* The head of a kept envelope. The used parts of the arrays follow, in the order of ebpo_polytope.
+ */
 typedef struct kept {
     ebpo_cell cell;
     int vertices, faces, corners;
@@ -152,8 +153,6 @@ static void kept_envelopes_free(ebpo_kept_envelopes *k)
         free(k->slot[i]);
     free(k);
 }
-
-/* --- models and contexts --- */
 
 /* --- subtrees for the cache --- */
 
@@ -248,7 +247,7 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
     return status;
 }
 
-/* Makes caches under the model's separate budget; 0: none. */
+/* Makes caches under the model's own budget; 0: no limit. */
 static ebpo_status make_own(ebpo_model *m, const ebpo_cache_source *source, ebpo_error *error)
 {
     uint64_t budget = m->options.memory, chunks = budget ? ebpo_chunk_budget(budget) : 0;
@@ -302,7 +301,7 @@ static ebpo_status open_top(ebpo_model *m, int cut_level, ebpo_error *error)
     if (status == EBPO_OK && m->options.loading == EBPO_LOAD_CACHE && skeletons) {
         m->skeletons = ebpo_skeletons_make(m->top->below_count, skeletons, m->cache);
         if (!m->skeletons && m->options.budget)
-            ebpo_cache_set_aside(m->cache, 0); /* others use all of it now */
+            ebpo_cache_set_aside(m->cache, 0); /* other models use the whole budget now */
         else if (!m->skeletons)
             return ebpo_fail_memory(error, m->top->below_count * sizeof(void *));
     }
@@ -332,7 +331,7 @@ static ebpo_status open_parts(ebpo_model *m, ebpo_error *error)
         uint64_t memory = m->options.memory;
         status = m->options.budget ? open_shared_whole(m, plan.whole, error) : open_whole(m, error);
         m->options.memory = memory;
-        /* more than ordinary models with its counts take */
+        /* the model needs more memory than ordinary models with its counts */
         if (status != EBPO_E_LIMIT || !m->options.memory)
             return status;
         status = ebpo_plan_parts(m->file, &m->options, &plan, error);
@@ -475,7 +474,7 @@ void ebpo_context_free(ebpo_context *c)
     free(c);
 }
 
-/* Reports the value of --memory that would suffice. */
+/* Fails; the message gives a value of --memory that would suffice. */
 static ebpo_status too_little(const ebpo_model *m, uint32_t below, ebpo_error *error)
 {
     uint64_t peak, keep, least;

@@ -20,22 +20,24 @@
 struct ebpo_model {
     const ebpo_file *file;
     const ebpo_info *info;
-    ebpo_locator locator; /* locator for the deepest level's cells */
+    ebpo_locator locator; /* finds cells of the deepest level */
     ebpo_model_options options;
     uint64_t shared_taken, shared_skeletons; /* bytes taken permanently from a shared budget */
     bool default_memory;                     /* no budget was given, but the file is remote */
     ebpo_query_kernels kernels;
-    ebpo_accel *whole;   /* everything, or NULL: */
-    bool results_inside; /* whole solid with the mesh */
+    ebpo_accel *whole;   /* the whole model in memory, or NULL; then: */
+    bool results_inside; /* `whole` is a solid with its mesh */
     ebpo_top *top;       /* levels 0 .. cut level */
     ebpo_chunks *chunks;
     ebpo_cache *cache;         /* subtrees by their number in the top */
     ebpo_skeletons *skeletons; /* skeletons of subtrees that have been loaded; or NULL */
     _Atomic(ebpo_top *) deep;  /* levels below the cut: nearest_subtrees.c; or NULL */
     atomic_bool deep_begun;
-    _Atomic uint64_t new_loads; /* loads that may have been without need, until `deep` is set */
+    _Atomic uint64_t new_loads; /* number of loads that may have been without need, until `deep` is
+                                 * set */
     double open_seconds;
-    /* leaves of the subtrees in memory; kinds of the queried ones */
+    /* leaves of the subtrees in memory; leaves of each kind, of those that were queried often
+     * enough */
     _Atomic uint64_t leaves, leaves_of_kind[5], leaves_one_cell_face;
     _Atomic uint64_t distances, distance_subtrees, distance_loads; /* as in ebpo_model_stats */
 };
@@ -70,22 +72,24 @@ struct ebpo_context {
     uint32_t current_query;
     uint64_t searched, loaded;      /* subtrees visited by distance queries; subtrees loaded by all
                                      * queries */
-    ebpo_kept_envelopes *envelopes; /* for distances to them; or NULL */
-    ebpo_polytope *cutting;         /* [2] too large for a small stack; NULL before the first use */
-    bool has_prefetched;            /* position and search distance of the last prefetching query */
+    ebpo_kept_envelopes *envelopes; /* envelopes for distances to them; or NULL */
+    ebpo_polytope *cutting;         /* [2] these are too large for a small stack; NULL before the
+                                     * first use */
+    bool has_prefetched;            /* position and search distance of the last query that
+                                     * prefetched are valid */
     double prefetched_from[3], prefetched_reach;
-    /* The last nearest face: start of ebpo_distance, if enabled. */
+    /* The last nearest face: the next ebpo_distance starts there, if enabled. */
     bool warm;
     double warm_triangle[3][3];
     uint64_t warm_face,
         warm_source_face; /* its number in the file, and the number that callers get */
-    /* its block in the whole model, and the node above; or EBPO_NO_BLOCK */
+    /* its block in the whole model, and the node above the block; or EBPO_NO_BLOCK */
     uint32_t warm_block, warm_node;
 };
 
 static inline ebpo_box ebpo_model_box(const ebpo_model *m) { return ebpo_root_box(m->info); }
 
-/* Returns EBPO_E_ARGUMENT for a point that is not finite; `number` is for the message. */
+/* Returns EBPO_E_ARGUMENT if a point is not finite; the message gives its number. */
 EBPO_MUST_USE ebpo_status ebpo_check_points(const double *points, uint64_t count,
                                             ebpo_error *error);
 
@@ -93,16 +97,16 @@ EBPO_MUST_USE ebpo_status ebpo_check_points(const double *points, uint64_t count
 EBPO_MUST_USE ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t count,
                                               ebpo_error *error);
 
-/* Returns EBPO_E_LIMIT when the budget does not hold this leaf alone, for one context;
- * EBPO_LOAD_NODES loads it without the cache. */
+/* Returns EBPO_E_LIMIT when the budget does not hold this leaf alone, for one context.
+ * EBPO_LOAD_NODES loads the leaf without the cache. */
 EBPO_MUST_USE ebpo_status ebpo_model_has_capacity(const ebpo_model *model, const ebpo_node *leaf,
                                                   ebpo_error *error);
 
-/* Subtrees are kept without the planes of their nodes, or with them: few queries need planes, and
- * they take separate reads. */
+/* Returns a subtree's key in the cache. Subtrees are kept without the planes of their nodes, or
+ * with them: few queries need planes, which take separate reads. */
 static inline uint64_t ebpo_subtree_key(uint64_t below, bool planes) { return below << 1 | planes; }
 
-/* Returns the parts of the file that such a subtree needs. */
+/* Returns the parts of the file that a subtree needs, with or without planes. */
 static inline uint32_t ebpo_subtree_needs(bool planes)
 {
     return EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH | EBPO_NEEDS_MAPS | EBPO_NEEDS_SOLID |
@@ -114,7 +118,8 @@ static inline bool ebpo_context_has_pinned(const ebpo_context *c, uint64_t below
     return c->pinned && c->pinned_key >> 1 == below && (c->pinned_key & 1 || !c->planes);
 }
 
-/* Returns the key under which the query finds it: a subtree with planes serves all queries. */
+/* Returns the key under which the query finds the subtree: a subtree with planes serves all
+ * queries. */
 static inline uint64_t ebpo_context_key(const ebpo_context *c, uint64_t below)
 {
     uint64_t full = ebpo_subtree_key(below, true);
@@ -122,34 +127,34 @@ static inline uint64_t ebpo_context_key(const ebpo_context *c, uint64_t below)
                                                               : ebpo_subtree_key(below, false);
 }
 
-/* Returns the subtree with this number, in memory until the context requests another one or
- * releases it. */
+/* Returns the subtree with this number. It stays in memory until the context requests another one
+ * or releases it. */
 EBPO_MUST_USE ebpo_status ebpo_context_subtree(ebpo_context *context, uint32_t below,
                                                ebpo_accel **out, ebpo_error *error);
-/* Releases the pinned subtree, so that others may use its memory; NULL is allowed. */
+/* Releases the pinned subtree, so that other contexts may use its memory; NULL is allowed. */
 void ebpo_context_let_go(ebpo_context *context);
 
-/* Envelopes that a context has cut, kept for its next queries: cutting one takes ten times as long
- * as finding its nearest point. One thread. */
+/* Envelopes that a context has cut, kept for its next queries: cutting an envelope takes ten times
+ * as long as finding its nearest point. One thread. */
 
 /* Finds the envelope of the node with this cell. Returns false if it is not kept. */
 bool ebpo_kept_envelopes_get(const ebpo_kept_envelopes *kept, ebpo_cell cell, ebpo_polytope *out);
-/* Keeps an envelope in the place of another. *kept begins as NULL; without memory nothing is kept.
- */
+/* Keeps an envelope, replacing another one. *kept is NULL initially; without memory nothing is
+ * kept. */
 void ebpo_kept_envelopes_put(ebpo_kept_envelopes **kept, ebpo_cell cell,
                              const ebpo_polytope *envelope);
 
 /* --- common checks of all queries --- */
 
 EBPO_MUST_USE ebpo_status ebpo_check_query_level(int level, ebpo_error *error);
-/* Returns EBPO_E_ARGUMENT: invalid enum value in an option. */
+/* Returns EBPO_E_ARGUMENT with a message: an option has an invalid enum value. */
 ebpo_status ebpo_fail_value(ebpo_error *error);
 /* Returns EBPO_E_ABSENT when the file has no mesh. */
 EBPO_MUST_USE ebpo_status ebpo_check_mesh(const ebpo_model *model, ebpo_error *error);
 /* Returns EBPO_E_NOT_SOLID for a surface. */
 EBPO_MUST_USE ebpo_status ebpo_check_solid(const ebpo_model *model, ebpo_error *error);
 
-/* Makes the distance of a result negative inside: for solids, unless unsigned. */
+/* Makes the distance of a result negative inside a solid, unless the options request no sign. */
 EBPO_MUST_USE ebpo_status ebpo_give_sign(ebpo_context *context, const double p[3],
                                          const ebpo_distance_options *options,
                                          ebpo_distance_result *out, ebpo_error *error);

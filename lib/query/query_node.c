@@ -1,11 +1,11 @@
-/* Nodes of a model: goes from a node to its children, in the top of the tree and in subtrees alike,
- * with bounds from envelopes.
+/* Nodes of a model: goes from a node to its children, in the top of the tree and in subtrees, with
+ * bounds from envelopes.
  *
  * Accels (nodes of one subtree) and contexts (nodes of the model; they load subtrees on demand) are
- * also sources for cursors. Nodes of a subtree are valid until the context enters another one.
+ * also sources for cursors. Nodes of a subtree are valid until the context enters another subtree.
  *
- * In a subset nodes may be pruned: a query that needs a part omitted below one fails with
- * EBPO_E_ABSENT, and the message gives the position and the cut of the file. */
+ * In a subset nodes may be pruned. A query that needs a part omitted below one fails with
+ * EBPO_E_ABSENT, and the message gives the position and how the file was cut. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -35,7 +35,7 @@ ebpo_node ebpo_accel_child(const ebpo_accel *s, const ebpo_node *gray, unsigned 
                          ebpo_cell_child(gray->cell, octant));
 }
 
-/* Returns the codes of a gray node's planes, where the subtree has kept them. */
+/* Returns the codes of a gray node's planes, if the subtree has kept them. */
 static const uint32_t *accel_planes(const ebpo_accel *s, const ebpo_node *node, unsigned *count)
 {
     uint32_t number = ebpo_entry_value(node->entry);
@@ -46,7 +46,7 @@ static const uint32_t *accel_planes(const ebpo_accel *s, const ebpo_node *node, 
     return s->gray_planes + s->gray_first[number];
 }
 
-/* --- for cursors --- */
+/* --- nodes of a subtree, for cursors --- */
 
 static ebpo_status accel_children(void *holder, ebpo_node *gray, ebpo_node child[8],
                                   ebpo_error *error)
@@ -116,7 +116,7 @@ ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node, ebpo_error 
         return status;
     node->subtree = subtree;
     node->entry = subtree->nodes.root;
-    if (ebpo_node_is_below(node)) /* a file whose counts do not include it */
+    if (ebpo_node_is_below(node)) /* possible in a file whose counts do not include the node */
         return ebpo_fail_pruned(context->model, node->cell, error);
     return EBPO_OK;
 }
@@ -173,7 +173,7 @@ int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, doubl
     const ebpo_node_table *table = gray->subtree ? &gray->subtree->nodes : &m->top->nodes;
     int count = 0;
     for (unsigned octant = 0; octant < 8; octant++) {
-        /* most are uniform: no node is made for them */
+        /* most children are uniform: no node is made for these */
         if (ebpo_entry_kind_of(ebpo_table_child(table, gray->entry, octant)) == EBPO_ENTRY_UNIFORM)
             continue;
         ebpo_ranked r = { ebpo_model_child(m, gray, octant), 0, 0 };
@@ -188,7 +188,7 @@ int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, doubl
     return count;
 }
 
-/* --- for cursors --- */
+/* --- nodes of a model, for cursors --- */
 
 static ebpo_status model_children(void *holder, ebpo_node *gray, ebpo_node child[8],
                                   ebpo_error *error)
@@ -197,7 +197,7 @@ static ebpo_status model_children(void *holder, ebpo_node *gray, ebpo_node child
     ebpo_status status = EBPO_OK;
     if (gray->pruned)
         return EBPO_OK;
-    context->planes = true; /* cursors may request them */
+    context->planes = true; /* cursors may request planes */
     if (ebpo_node_is_below(gray))
         status = ebpo_model_enter(context, gray, error);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
@@ -219,7 +219,7 @@ static ebpo_status copy_model_planes(void *holder, const ebpo_node *node,
 
 const ebpo_node_source ebpo_context_source = { model_children, copy_model_planes, uniform_winding };
 
-/* Describes the cut of the file in words. */
+/* Describes in words how the file was cut. */
 static void describe_cut(const ebpo_info *info, char *out, size_t capacity)
 {
     const double *b = info->kept_box;
@@ -268,7 +268,7 @@ static ebpo_status check_below(const checking *k, ebpo_node node, ebpo_error *er
     if (ebpo_node_is_uniform(&node) || node.type != EBPO_GRAY ||
         !k->matters(k->user, &k->box, &node))
         return EBPO_OK;
-    if (ebpo_node_is_below(&node)) /* fails for pruned ones */
+    if (ebpo_node_is_below(&node)) /* entering fails for pruned nodes */
         status = ebpo_model_enter(k->context, &node, error);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)
         status = check_below(k, ebpo_model_child(k->context->model, &node, octant), error);

@@ -1,5 +1,5 @@
-/* Nodes of a model: goes down from one to the next, in the top of its tree and in subtrees alike,
- * with bounds from envelopes. Nodes of a subtree are valid until the context enters another one. */
+/* Nodes of a model: goes from a node to its children, in the top of the tree and in subtrees, with
+ * bounds from envelopes. Nodes of a subtree are valid until the context enters another subtree. */
 #ifndef EBPO_QUERY_QUERY_NODE_H
 #define EBPO_QUERY_QUERY_NODE_H
 
@@ -8,26 +8,27 @@
 
 ebpo_node ebpo_model_root(const ebpo_model *model);
 
-/* Returns true for a node below which another table begins: a subtree that is loaded on demand, or
- * nothing, for pruned nodes, which cannot be entered. */
+/* Returns true for a node BELOW: one below which another table begins. That is a subtree that is
+ * loaded on demand, or nothing for a pruned node, which cannot be entered. */
 static inline bool ebpo_node_is_below(const ebpo_node *node)
 {
     return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_BELOW;
 }
 
-/* Returns EBPO_E_ABSENT for a pruned node. For a node BELOW: sets the root of its subtree, loaded
- * if needed; it stays until the context enters another one. */
+/* Returns EBPO_E_ABSENT for a pruned node. For a node BELOW: replaces it by the root of its
+ * subtree, loaded if needed; the subtree stays until the context enters another one. */
 EBPO_MUST_USE ebpo_status ebpo_model_enter(ebpo_context *context, ebpo_node *node,
                                            ebpo_error *error);
 
 /* Returns the child of a gray node that is not BELOW. */
 ebpo_node ebpo_model_child(const ebpo_model *model, const ebpo_node *gray, unsigned octant);
 
-/* For cursors (geometry/cursor.h); the holder is an ebpo_context, which loads subtrees as the
- * cursor enters them: one cursor at a time, and no other query while its nodes are used. */
+/* For cursors (geometry/cursor.h); the cursor's holder is an ebpo_context, which loads subtrees as
+ * the cursor enters them. Only one cursor at a time may use a context, and no other query while its
+ * nodes are used. */
 extern const ebpo_node_source ebpo_context_source;
 
-/* Returns the plane codes of the node itself, without its ancestors'. */
+/* Returns the plane codes of the node itself, without those of its ancestors. */
 const uint32_t *ebpo_model_planes(const ebpo_model *model, const ebpo_node *node, uint32_t *count);
 
 /* A point by which nodes are ranked. */
@@ -35,7 +36,8 @@ typedef struct ebpo_ranking {
     const ebpo_model *model;
     ebpo_box box; /* box of the model */
     const double *p;
-    const ebpo_far *far; /* bounds and limits are its keys; NULL: they are distances */
+    const ebpo_far *far; /* if not NULL, bounds and limits are keys of this far point; NULL: they
+                          * are distances */
 } ebpo_ranking;
 static inline ebpo_ranking ebpo_ranking_of(const ebpo_model *model, const double p[3],
                                            const ebpo_far *far)
@@ -43,12 +45,13 @@ static inline ebpo_ranking ebpo_ranking_of(const ebpo_model *model, const double
     return (ebpo_ranking){ model, ebpo_model_box(model), p, far && far->far ? far : NULL };
 }
 
-/* Returns a lower bound for the contents of the node, from its envelope and its ancestors':
- * `parent` is its parent's bound. The other function returns that of the root. */
+/* Returns a lower bound for the contents of the node, from its envelope and those of its ancestors:
+ * `parent` is the bound of its parent. The other function returns the bound of the root. */
 double ebpo_rank_node(const ebpo_ranking *ranking, const ebpo_node *node, double parent);
 double ebpo_rank_root(const ebpo_ranking *ranking);
-/* Returns the same for cells with only their planes; may stop at any bound beyond `enough`. The
- * other function returns an upper bound for the farthest point of a cell. */
+/* Returns a lower bound for a cell, from the given planes only; the computation may stop at any
+ * bound beyond `enough`. The other function returns an upper bound for the farthest point of a
+ * cell. */
 double ebpo_rank_cell(const ebpo_ranking *ranking, ebpo_cell cell, const uint32_t *codes,
                       uint32_t count, double enough);
 double ebpo_rank_cell_end(const ebpo_ranking *ranking, ebpo_cell cell);
@@ -67,14 +70,14 @@ int ebpo_rank_children(const ebpo_ranking *ranking, const ebpo_node *gray, doubl
 /* --- subsets: omitted parts must not change a result --- */
 
 /* Returns EBPO_E_ABSENT: the query needs a part omitted below this node. The message gives the
- * file, the position and the cut. */
+ * file, the position and how the file was cut. */
 ebpo_status ebpo_fail_pruned(const ebpo_model *model, ebpo_cell cell, ebpo_error *error);
 
 /* Returns true if something in the node's cell matters to the query. */
 typedef bool (*ebpo_matters_fn)(void *user, const ebpo_box *box, const ebpo_node *node);
 
-/* Returns EBPO_OK when no pruned node matters. `matters` holds for a node when it does for one
- * below it. */
+/* Returns EBPO_OK when no pruned node matters to the query. If `matters` is true for a node, it
+ * must be true for the node's parent. */
 EBPO_MUST_USE ebpo_status ebpo_check_pruned(ebpo_context *context, ebpo_matters_fn matters,
                                             void *user, ebpo_error *error);
 

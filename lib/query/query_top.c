@@ -1,6 +1,6 @@
 /* The top of a tree: levels 0 to the cut level without faces, and the nodes below.
  *
- * A model under a budget always has only the top in memory; queries go down through it to the
+ * A model under a budget always has only the top in memory; queries go down through the top to the
  * subtrees. The same table, with envelopes alone, holds the levels right below the cut for deep
  * bounds (nearest_subtrees.c). Immutable once it is read; any thread may use it. */
 #include "query/model_parts.h"
@@ -14,16 +14,16 @@
 #include "format/reader.h"
 #include "geometry/level_nodes.h"
 
-/* State of reading, level by level, with data about the level before for the next one. */
+/* State of reading level by level. It has data about the previous level for the next one. */
 typedef struct reading {
     ebpo_top *top;
     const ebpo_info *info;
-    uint64_t group, plane, below; /* next free index */
-    ebpo_cell *gray;              /* cells of the last level's gray nodes */
-    /* types of the level below the current one, where pruned nodes depend on them */
+    uint64_t group, plane, below; /* next free index of each array */
+    ebpo_cell *gray;              /* cells of the previous level's gray nodes */
+    /* types of the nodes in the level below the current one, if pruned nodes depend on these */
     uint16_t *next_types;
     uint64_t group_capacity, gray_capacity, plane_capacity, below_capacity, below_planes_capacity;
-    bool envelopes; /* only envelopes */
+    bool envelopes; /* only envelopes are read */
     ebpo_error *error;
 } reading;
 
@@ -32,8 +32,8 @@ static ebpo_status no_memory(const reading *r)
     return ebpo_fail_memory(r->error, ebpo_top_estimate(r->info, r->top->cut_level));
 }
 
-/* Adds the planes of a node of the level, `count` more from the start of its planes in the level's
- * list. */
+/* Adds the planes of a node: the next `count` planes in the level's list, which begin at *in_level.
+ */
 static ebpo_status add_planes(reading *r, const ebpo_level *level, uint32_t count,
                               uint64_t *in_level, ebpo_top_planes *out)
 {
@@ -58,9 +58,9 @@ typedef struct ranks {
 } ranks;
 
 static ebpo_status uniform_entry(const reading *r, const int32_t *windings, uint64_t rank,
-                                 int32_t standard, uint32_t *entry)
+                                 int32_t default_winding, uint32_t *entry)
 {
-    return ebpo_entry_uniform(windings ? windings[rank] : standard, entry)
+    return ebpo_entry_uniform(windings ? windings[rank] : default_winding, entry)
                ? EBPO_OK
                : ebpo_fail(r->error, EBPO_E_LIMIT,
                            "the winding number of a node is beyond 2^29: the solid has too many "
@@ -109,7 +109,7 @@ static bool is_pruned_group(const reading *r, int number, uint64_t rank)
            (number + 1 == r->info->level_count || (r->next_types && r->next_types[rank] == 0));
 }
 
-/* Adds a pruned node. Above the cut the next level has a group for it, which is empty. */
+/* Adds a pruned node. If it is above the cut, the next level has an empty group for it. */
 static ebpo_status add_pruned(reading *r, const ebpo_level *level, const ebpo_node *node,
                               uint64_t *in_level, uint32_t *entry)
 {
@@ -169,7 +169,7 @@ static ebpo_status add_level(reading *r, int number, const ebpo_level *level, ui
     return status;
 }
 
-/* Shrinks an array to its contents; afterwards it takes less memory or the same. */
+/* Shrinks an array to its contents; afterwards it takes less memory, or the same. */
 static void shrink_array(void *array, uint64_t *capacity, uint64_t count, size_t size)
 {
     void **at = array, *less = *at ? realloc(*at, (count ? count : 1) * size) : NULL;
@@ -258,7 +258,7 @@ void ebpo_top_free(ebpo_top *top)
     free(top);
 }
 
-/* Growing arrays allocate memory for several items at first: for bytes five. */
+/* Growing arrays allocate memory for several items at first; arrays of bytes for five. */
 enum { GROWN_LEAST = 4096 };
 
 static uint64_t estimate_levels(const ebpo_info *info, int cut_level, size_t node)
@@ -267,7 +267,7 @@ static uint64_t estimate_levels(const ebpo_info *info, int cut_level, size_t nod
     for (int i = 0; i <= cut_level && i < info->level_count; i++) {
         const ebpo_level_summary *s = &info->level[i];
         uint64_t below = s->leaf_count + (i == cut_level ? s->gray_count : 0);
-        /* The kept data, and the arrays of the level while it is read. */
+        /* The data that are kept, and the arrays of the level while it is read. */
         bytes += (s->gray_count * (sizeof(uint32_t[8]) + sizeof(ebpo_top_planes)) +
                   s->plane_count * 4 + below * (node + sizeof(ebpo_top_planes))) *
                  3 / 2;

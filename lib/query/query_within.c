@@ -1,11 +1,12 @@
 /* Returns the faces within a distance of a point, one after the other, the nearest first.
  *
- * Faces come in bands: those after a given one, up to a number of them. Bands follow each other, so
- * that a stream of any length needs little memory; the first is small, for callers that need few
- * faces. A band is searched depth first, nearest child first; nodes and faces certainly beyond its
- * limit, or certainly in an earlier band, are skipped. The order is exact: by distance, then by
- * number in the file. Subtrees that are not in memory are loaded in the order of certain lower
- * bounds, until the next is beyond the band. */
+ * Faces come in bands. A band has the faces that come after a given face, up to a number of them.
+ * Bands follow each other, so that a stream of any length needs little memory; the first band is
+ * small, for callers that need few faces. A band is searched depth first, the nearest child first.
+ * Nodes and faces that are certainly beyond its limit, or certainly in an earlier band, are
+ * skipped. The order is exact: by distance, then by number in the file. Subtrees that are not in
+ * memory are loaded in the order of certain lower bounds, until the next bound is beyond the band.
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -34,16 +35,16 @@ typedef struct near_band {
     double p[3];
     double radius;  /* exact radius: farther faces are in no band */
     double limit;   /* certain limit: farther faces are not in this band */
-    uint64_t most;  /* maximum number of faces in it, at least 1 */
-    bool has_after; /* faces up to `after` were in bands before */
+    uint64_t most;  /* maximum number of faces in the band, at least 1 */
+    bool has_after; /* faces up to `after` were in earlier bands */
     near_face after;
     near_face *near;
     uint64_t count, capacity;
-    bool cut; /* there may be faces after the last one */
+    bool cut; /* there may be further faces after the band's last one */
     bool no_memory;
 } near_band;
 
-/* Returns true if everything with a distance of at most `far` was in bands before. */
+/* Returns true if everything at a distance of at most `far` was in earlier bands. */
 static inline bool near_band_is_past(const near_band *band, double far)
 {
     return band->has_after && far < band->after.bounds.lo;
@@ -70,8 +71,8 @@ static int compare_faces(const void *x, const void *y)
     return sign ? sign : a->file_face < b->file_face ? -1 : 1;
 }
 
-/* Sorts by exact distance, then by number in the file, removes duplicates, and keeps at most
- * `most`. Lowers the limit accordingly. */
+/* Sorts by exact distance, then by number in the file, removes duplicates, and keeps at most `most`
+ * faces. Lowers the limit accordingly. */
 static void near_band_settle(near_band *band)
 {
     uint64_t kept = 0;
@@ -89,7 +90,7 @@ static void near_band_settle(near_band *band)
 
 /* --- faces --- */
 
-/* Adds a face. Sorting waits until there are about twice as many as wanted. */
+/* Adds a face. The faces are sorted when there are about twice as many as wanted. */
 static void add_face(near_band *band, const near_face *face)
 {
     enum { SPARE_LEAST = 64 };
@@ -132,7 +133,7 @@ typedef struct searching {
     double error; /* bound of the rounding error of distances to the hierarchy's boxes */
 } searching;
 
-/* Returns a length that is finite where exact arithmetic might be finite. */
+/* Returns a length that is finite if the exact length may be finite. */
 static double length_of_positive(const double x[3])
 {
     double most = fmax(x[0], fmax(x[1], x[2]));
@@ -155,7 +156,7 @@ static void box_bounds(const searching *g, const ebpo_bound *b, int lane, double
         near[k] = fmax(fmax(low - p[k], p[k] - high), 0);
         far[k] = fmax(fabs(low - p[k]), fabs(p[k] - high));
     }
-    /* a difference that overflows may have been finite before rounding */
+    /* a difference that overflows may be finite in exact arithmetic */
     *lower = fmin(fmax(length_of_positive(near) - g->error, 0), 0x1p1022);
     *upper = length_of_positive(far) + g->error;
 }
@@ -189,7 +190,7 @@ static void near_band_search(near_band *band, const ebpo_accel *s)
 {
     searching g = { band, s, 0 };
     double size = s->reach / s->scale * 0x1p-46;
-    for (int k = 0; k < 3; k++) /* each side contributes a few rounding errors of such numbers */
+    for (int k = 0; k < 3; k++) /* each side adds a few rounding errors of numbers of this size */
         size += fabs(band->p[k]) * 0x1p-46 + fabs(s->centre[k]) * 0x1p-46;
     g.error = size;
     if (s->bound_count)
@@ -198,8 +199,8 @@ static void near_band_search(near_band *band, const ebpo_accel *s)
 
 /* --- the stream --- */
 
-/* The first band is small, for callers that need few faces; each next one is several times larger,
- * so that starting again costs little. */
+/* Sizes of bands. The first band is small, for callers that need few faces. Each next band is
+ * several times larger, so that searching again from the start costs little. */
 enum { FIRST_BAND = 256, BAND_GROWTH = 8, BAND_MAX = 1 << 16 };
 
 typedef struct within {
@@ -208,16 +209,16 @@ typedef struct within {
     near_band band;
     uint64_t given;
     bool ahead;      /* result of lists_ahead */
-    uint64_t hinted; /* subtrees with a prefetch hint that have not been entered */
+    uint64_t hinted; /* number of subtrees with a prefetch hint that have not been entered */
     ebpo_near_fn take;
     void *user;
 } within;
 
-/* --- not everything in memory: the nearest of the rest, until it is beyond the limit --- */
+/* --- not everything in memory: the nearest remaining subtree, until it is beyond the limit --- */
 
-/* Returns true for a remote file with a radius: all subtrees within it will be entered, so they are
- * listed at once and requested together. For a number of nearest faces the subtrees are not known
- * in advance. */
+/* Returns true for a remote file with a radius: all subtrees within the radius will be entered, so
+ * they are listed at once and requested together. For a number of nearest faces the subtrees are
+ * not known in advance. */
 static bool lists_ahead(const within *w)
 {
     const ebpo_model *m = w->context->model;
@@ -251,8 +252,8 @@ static ebpo_status put_node(within *w, const ebpo_box *box, const ebpo_ranked *r
     return below.lower > w->band.limit ? EBPO_OK : ebpo_queue_push(w->context, &below, error);
 }
 
-/* Sends prefetch hints before a subtree is entered: at the first of each window, for some of the
- * next ones. */
+/* Sends prefetch hints before a subtree is entered. The first subtree of each window sends them,
+ * for some of the next subtrees. */
 static void hint_window(within *w, const ebpo_ranked *next)
 {
     const ebpo_context *c = w->context;
@@ -272,7 +273,7 @@ static void hint_window(within *w, const ebpo_ranked *next)
 
 static ebpo_status search_below(within *w, ebpo_ranked *r, ebpo_error *error)
 {
-    if (w->band.count > w->band.most) /* it may not be needed */
+    if (w->band.count > w->band.most) /* the next subtree may not be needed */
         near_band_settle(&w->band);
     if (r->lower > w->band.limit)
         return EBPO_OK;
@@ -339,7 +340,7 @@ static ebpo_status search_band(within *w, uint64_t most, ebpo_error *error)
     return ebpo_check_pruned(w->context, node_matters, w, error);
 }
 
-/* Returns false when the caller has enough. */
+/* Passes a face to the caller. Returns false when the caller wants no more. */
 static bool give_face(within *w, const near_face *n)
 {
     ebpo_triangle_nearest exact;

@@ -1,9 +1,8 @@
 /* Kernel of rays: the walk of a ray through one accel's hierarchy over faces, and the filter for
  * eight faces, in single precision.
  *
- * The kernel decides no result: it drops only faces that the ray certainly misses, or hits beyond
- * the limit. Certain hits are certain in exact arithmetic. The other faces are tested exactly by
- * rays.c.
+ * The kernel drops only faces that the ray certainly misses, or hits beyond the limit. A certain
+ * hit also holds in exact arithmetic. rays.c tests the other faces exactly.
  *
  * Compiled for several instruction sets with the same results (core/cpu.h). Error bounds:
  * docs/develop/bounds.md. */
@@ -18,8 +17,8 @@
 
 /* --- the ray --- */
 
-/* Sides by the signs of the direction: a bit for each axis. Branch-free: half of the branches would
- * be mispredicted. */
+/* Offsets of the nearer and farther sides of boxes, for the signs of the direction: a bit for each
+ * axis. Branch-free: half of the branches would be mispredicted. */
 #define LOW(k)  (offsetof(ebpo_bound, low) + 8 * (k))
 #define HIGH(k) (offsetof(ebpo_bound, high) + 8 * (k))
 static const uint8_t ray_side_at[8][2][3] = {
@@ -72,9 +71,10 @@ EBPO_EIGHT f8 side_at(const ebpo_bound *b, unsigned at, f8 step, f8 from)
     return f8_add(f8_mul(f8_from_bytes((const uint8_t *)b + at), step), from);
 }
 
-/* Returns the children whose boxes the ray may intersect between 0 and the limit, and the entry of
- * each. The three axes' sides are prepared together: lanes 0 to 2, of steps 1 to 3 (origin and step
- * are adjacent, and each load of four floats reads only numbers). */
+/* Returns the children whose boxes the ray may intersect between 0 and the limit; *enter: where it
+ * enters each box. The three axes are prepared together: lanes 0 to 2 for the origin, lanes 1 to 3
+ * for the step (origin and step are adjacent in memory, and each load of four floats reads only
+ * numbers). */
 EBPO_EIGHT unsigned ray_children(const ebpo_ray_search *r, const ebpo_bound *b, f8 *enter)
 {
     f8 origin = f8_load_twice(b->origin), inverse = f8_load_twice(r->inverse),
@@ -134,8 +134,8 @@ EBPO_EIGHT seen ray_view(const ebpo_ray_search *r, const ebpo_face_block *b, boo
     return out;
 }
 
-/* Twice the signed areas of the triangles that the ray forms with each edge, and a bound of the
- * rounding error of each. */
+/* For each edge: twice the signed area of the triangle that the ray's line forms with the edge, and
+ * a bound of its rounding error. */
 typedef struct edges {
     f8 u, v, w, least, most, error;
 } edges;
@@ -161,14 +161,14 @@ EBPO_EIGHT edges ray_edges(const seen *a, f8 size_z)
     return e;
 }
 
-/* Lanes of a block's faces: possible hits from 0 to the limit, bounds of their t, certain hits, and
- * faces through whose interior the line certainly goes from the front, from the back. */
+/* Masks of a block's lanes: possible hits from 0 to the limit (with bounds of their t), certain
+ * hits, faces through whose interior the line certainly goes from the front, and from the back. */
 typedef struct ray_lanes {
     float low[8], high[8];
     unsigned alive, sure, front, back;
 } ray_lanes;
 
-/* Comparisons are such that NaN stays and is not certain. */
+/* Tests eight faces. Comparisons are written such that a lane with NaN stays and is not certain. */
 EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, ray_lanes *out, bool wide)
 {
     ebpo_face_block faces = ebpo_face_block_open(r->s, block);
@@ -275,7 +275,7 @@ EBPO_EIGHT uint32_t ray_nearest(const ebpo_accel *s, ebpo_visit *stack, uint32_t
     return (uint32_t)stack[*top];
 }
 
-/* Pushes the children of two or more lanes except one, which is returned, in any order. */
+/* Pushes the children of two or more lanes, in any order, except one, which is returned. */
 EBPO_EIGHT uint32_t ray_next(const ebpo_accel *s, ebpo_visit *stack, uint32_t *top,
                              const ebpo_bound *b, unsigned lanes, bool wide)
 {

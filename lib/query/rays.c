@@ -1,10 +1,10 @@
 /* Rays: the first face that a ray hits, a test for any hit, all hits; and many rays on all cores.
  *
- * On the way down the tree tests are conservative: a node is skipped only if the ray certainly
+ * On the way down the tree, tests are conservative: a node is skipped only if the ray certainly
  * misses its cell, or its contents are beyond the limit. In an accel a filter in single precision
  * (ray_kernels.c) leaves a few faces, which are tested by exact predicates, the most promising
  * first. Hits are ordered by t, then by the number in the file. Results do not depend on threads:
- * of many rays each thread takes some at a time, with a separate context. Error bounds:
+ * each thread takes some rays at a time, with a separate context. Error bounds:
  * docs/develop/bounds.md. */
 #include "core/strict_fp.h"
 
@@ -29,15 +29,15 @@
 struct ebpo_ray_found {
     double triangle[3][3];
     uint64_t file_face, source_face;
-    ebpo_ray_intersection clash;
+    ebpo_ray_intersection intersection;
 };
 
 typedef struct casting {
-    ebpo_context *context; /* its list of faces holds all hits */
+    ebpo_context *context; /* the context's list of faces holds all hits */
     ebpo_segment ray;
     ebpo_ray_wants wants;
-    ebpo_ray_sides sides; /* only such faces count */
-    double limit;         /* t beyond which hits are irrelevant, certain; decreases during the
+    ebpo_ray_sides sides; /* sides of faces that count as hits */
+    double limit;         /* hits with a greater t certainly do not matter; decreases during the
                            * search */
     bool done;            /* the search is complete */
     bool no_memory;
@@ -61,20 +61,21 @@ static inline void casting_begin(casting *c, ebpo_context *context, const double
 
 static inline ebpo_ray_hit hit_of(const ebpo_ray_found *m)
 {
-    return (ebpo_ray_hit){ m->clash.t, m->source_face, m->clash.side };
+    return (ebpo_ray_hit){ m->intersection.t, m->source_face, m->intersection.side };
 }
 
 /* --- one ray through one accel --- */
 
-/* Origins farther from the box than this multiple of its half size are moved towards it. */
+/* Origins whose distance from the box is greater than this multiple of half its size are moved
+ * towards the box. */
 static const double near_enough = 4;
-/* Replaces infinity: finite, so that products with 0 are not NaN. */
+/* Replaces infinity by a finite value, so that products with 0 are not NaN. */
 #define BEYOND 0x1p100f
 
 /* --- limits --- */
 
-/* Returns t in the frame, from the moved origin; `sign` 1: not less than the true one, -1: not
- * greater. */
+/* Returns t in the frame, relative to the moved origin; `sign` 1: at least the exact value, -1: at
+ * most. */
 static float frame_t(const ebpo_ray_search *r, double t, int sign)
 {
     double scaled = t * r->limit_scale;
@@ -95,8 +96,8 @@ static void lower_bound(ebpo_ray_search *r)
 /* Returns the maximum without a call of fmax. */
 static inline double greater_of(double a, double b) { return a > b ? a : b; }
 
-/* Scales a direction with an extreme longest coordinate by a power of two. As this delays all later
- * steps, most directions are left as they are. */
+/* Scales a direction with an extreme longest coordinate by a power of two. Most directions are not
+ * scaled, because that delays all later steps. */
 static void scale_direction(ebpo_ray_search *r, double longest)
 {
     int exponent;
@@ -106,7 +107,7 @@ static void scale_direction(ebpo_ray_search *r, double longest)
     r->limit_scale = ldexp(r->s->scale, exponent);
 }
 
-/* Returns the largest absolute coordinate of the origin. */
+/* Transforms the ray to the frame. Returns the largest absolute coordinate of the origin. */
 static double to_frame(ebpo_ray_search *r)
 {
     const ebpo_accel *s = r->s;
@@ -125,9 +126,10 @@ static double to_frame(ebpo_ray_search *r)
     return most;
 }
 
-/* Computes a point shortly before the ray enters the cube of `reach` around all faces; false: it
- * misses. The rounding error is far below the enlargement of the cube, unless the origin is so far
- * away that its error is as large as the cube; then it is not moved. */
+/* Computes a point shortly before the ray enters the cube of size `reach` around all faces; returns
+ * false if the ray misses the cube. The rounding error is far below the enlargement of the cube,
+ * unless the origin is so far away that its error is as large as the cube; then the origin is not
+ * moved. */
 static bool enters_cube(const ebpo_ray_search *r, double reach, double *t)
 {
     double from = 0, to = INFINITY;
@@ -145,7 +147,7 @@ static bool enters_cube(const ebpo_ray_search *r, double reach, double *t)
     return from <= to;
 }
 
-/* Moves the origin in double-double arithmetic, so that its distance hardly matters. */
+/* Moves the origin in double-double arithmetic, so that its original distance hardly matters. */
 static bool move_origin(ebpo_ray_search *r, double *most)
 {
     const ebpo_accel *s = r->s;
@@ -165,9 +167,9 @@ static bool move_origin(ebpo_ray_search *r, double *most)
     return true;
 }
 
-/* Sets the error of the origin in the frame: moving it, transforming it to the frame and back to
- * the model's unit, splitting it into floats, and replacing a small direction.
- * docs/develop/bounds.md, "A ray against boxes". */
+/* Sets the error of the origin in the frame. Its causes: moving the origin, transforming it to the
+ * frame and back to the model's unit, splitting it into floats, and replacing a small direction.
+ * See docs/develop/bounds.md, "A ray against boxes". */
 static void set_error(ebpo_ray_search *r, double most)
 {
     const double *c = r->s->centre;
@@ -176,13 +178,13 @@ static void set_error(ebpo_ray_search *r, double most)
     r->blur = most < 0x1p30 ? (float)(r->error * 0x1p23 + 0x1p-30) : INFINITY;
     if (most < 0x1p80)
         return;
-    r->error = (double)BEYOND; /* all boxes are open */
+    r->error = (double)BEYOND; /* the ray may intersect all boxes */
     memset(r->origin, 0, sizeof r->origin);
 }
 
 /* --- candidates --- */
 
-/* Tests the nearest candidate first, where that may exclude others. */
+/* Tests the nearest candidate first, if its hit may exclude others. */
 static void judge_waiting(ebpo_ray_search *r)
 {
     while (r->count && !r->done) {
@@ -223,25 +225,26 @@ static void ray_search_accel(ebpo_ray_search *r, const ebpo_ray_kernels *kernels
         judge_waiting(r);
 }
 
-/* Returns true if the ray hits m->triangle from a side that counts; sets m->meeting. `facing`: its
- * side where that is already certain, because the line goes through its interior; else 0. */
+/* Returns true if the ray hits m->triangle from a side that counts; sets m->intersection. `facing`:
+ * the face's side if it is already certain, because the line goes through the interior; else 0. */
 static bool casting_intersects(const casting *c, int facing, ebpo_ray_found *m)
 {
     const double(*triangle)[3] = (const double(*)[3])m->triangle;
     if (facing)
-        ebpo_ray_interior(&c->ray, triangle, facing, &m->clash);
+        ebpo_ray_interior(&c->ray, triangle, facing, &m->intersection);
     else
-        ebpo_ray_triangle(&c->ray, triangle, &m->clash);
-    return m->clash.meets &&
-           (c->sides == EBPO_RAY_BOTH || m->clash.facing == (c->sides == EBPO_RAY_FRONT ? 1 : -1));
+        ebpo_ray_triangle(&c->ray, triangle, &m->intersection);
+    return m->intersection.meets &&
+           (c->sides == EBPO_RAY_BOTH ||
+            m->intersection.facing == (c->sides == EBPO_RAY_FRONT ? 1 : -1));
 }
 
 /* Orders by t, then by the order of the file. */
 static int compare_found(const void *a, const void *b, void *ray)
 {
     const ebpo_ray_found *x = a, *y = b;
-    int sign = ebpo_ray_compare(ray, (const double(*)[3])x->triangle, &x->clash,
-                                (const double(*)[3])y->triangle, &y->clash);
+    int sign = ebpo_ray_compare(ray, (const double(*)[3])x->triangle, &x->intersection,
+                                (const double(*)[3])y->triangle, &y->intersection);
     return sign ? sign : (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
@@ -251,7 +254,7 @@ static void keep_first(casting *c, const ebpo_ray_found *m)
         return;
     c->first = *m;
     c->count = 1;
-    double limit = m->clash.t * (1 + 0x1p-48) + DBL_MIN;
+    double limit = m->intersection.t * (1 + 0x1p-48) + DBL_MIN;
     c->limit = limit < c->limit ? limit : c->limit;
 }
 
@@ -272,19 +275,20 @@ static void casting_keep(casting *c, const ebpo_ray_found *m)
     }
 }
 
-/* Sorts hits. Mostly few, and nearly in order, because boxes are visited from the nearest on. */
-static void sort_found(ebpo_ray_found *intersected, uint64_t count, ebpo_segment *ray)
+/* Sorts hits. There are few in most cases, and nearly in order, because boxes are visited from the
+ * nearest on. */
+static void sort_found(ebpo_ray_found *found, uint64_t count, ebpo_segment *ray)
 {
     if (count > 16) {
-        ebpo_sort_with(intersected, count, sizeof *intersected, compare_found, ray);
+        ebpo_sort_with(found, count, sizeof *found, compare_found, ray);
         return;
     }
     for (uint64_t i = 1; i < count; i++) {
         uint64_t at = i;
-        ebpo_ray_found m = intersected[i];
-        for (; at > 0 && compare_found(&intersected[at - 1], &m, ray) > 0; at--)
-            intersected[at] = intersected[at - 1];
-        intersected[at] = m;
+        ebpo_ray_found m = found[i];
+        for (; at > 0 && compare_found(&found[at - 1], &m, ray) > 0; at--)
+            found[at] = found[at - 1];
+        found[at] = m;
     }
 }
 
@@ -298,7 +302,8 @@ static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_
     sort_found(k->intersected, c->count, &c->ray);
     for (uint64_t i = 0; i < c->count; i++)
         if (i == 0 || k->intersected[i].file_face !=
-                          k->intersected[i - 1].file_face) /* subtrees share faces */
+                          k->intersected[i - 1].file_face) /* subtrees share faces: a face may be
+                                                            * hit twice */
             k->hits[(*end)++] = hit_of(&k->intersected[i]);
     return EBPO_OK;
 }
@@ -374,7 +379,7 @@ static void cast_subtree(casting *c, const ebpo_accel *s)
     r.decide = decide_face;
     r.user = c;
     ray_search_accel(&r, c->context->model->kernels.ray, s);
-    if (r.intersected) { /* only where any hit was wanted */
+    if (r.intersected) { /* only if any hit is wanted */
         c->count = 1;
         c->done = true;
     }
@@ -399,7 +404,7 @@ static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, eb
 {
     const ebpo_model *m = c->context->model;
     if (c->done || ebpo_node_is_uniform(&node) || !intersects_cell(c, box, &node) ||
-        node.pruned) /* pruned: see ray_walk */
+        node.pruned) /* pruned: ray_walk handles the node */
         return EBPO_OK;
     if (ebpo_node_is_below(&node)) {
         ebpo_status status = ebpo_model_enter(c->context, &node, error);
@@ -407,7 +412,7 @@ static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, eb
             cast_subtree(c, node.subtree);
         return status;
     }
-    /* Children in the order in which the ray enters their cells. */
+    /* Visits the children in the order in which the ray enters their cells. */
     unsigned turn = 0;
     for (int k = 0; k < 3; k++)
         turn |= (unsigned)(c->ray.direction[k] < 0) << k;
@@ -417,7 +422,7 @@ static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, eb
     return status;
 }
 
-/* Passes every face that may matter to the casting. The ray is valid. */
+/* Visits every face that may matter to the ray. The ray is valid. */
 static ebpo_status ray_walk(casting *c, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -491,11 +496,11 @@ ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const do
 
 /* --- many rays --- */
 
-/* Rays that a thread takes at a time; more for a model that is not all in memory: neighbours on the
- * curve. */
+/* Number of rays that a thread takes at a time. It is larger for a model that is not all in memory,
+ * because neighbours on the curve need the same subtrees. */
 enum { PIECE = 128, PIECE_ALONG_CURVE = 1024 };
 
-/* Position of the hits of a ray, before they are gathered. */
+/* Where the hits of a ray are, before they are gathered: in which context, and from where on. */
 typedef struct found {
     unsigned worker;
     uint64_t begin, end;
@@ -508,10 +513,11 @@ typedef struct batch {
     ebpo_ray_wants wants;
     unsigned threads;
     ebpo_context **context; /* [threads] the first one is the caller's */
-    uint64_t *held;         /* [threads] number of hits in these, if all are wanted */
-    double *entry;          /* [count][3] in the order of work; NULL: the rays' own order */
-    uint64_t *order;        /* [count] */
-    /* results, [count] each: one of these three is used */
+    uint64_t *held;         /* [threads] number of hits in each context, if all hits are wanted */
+    double *entry;          /* [count][3] entry points, in the order of work; NULL: the order of
+                             * work is that of the rays */
+    uint64_t *order;        /* [count] order of work */
+    /* results, [count] each; one of the following three is used */
     ebpo_ray_hit *first;
     bool *any;
     found *all;
@@ -559,8 +565,8 @@ static ebpo_status result_piece(void *user, uint64_t begin, uint64_t end, unsign
 
 /* --- the order of work --- */
 
-/* Sets the approximate point where the ray enters the box; the ray's origin where that is inside,
- * or the ray misses. */
+/* Sets the approximate point where the ray enters the box. If the origin is inside, or the ray
+ * misses the box, sets the origin. */
 static void entry_of(const ebpo_box *box, const ebpo_ray *ray, double out[3])
 {
     double from = 0;
@@ -575,7 +581,7 @@ static void entry_of(const ebpo_box *box, const ebpo_ray *ray, double out[3])
     }
 }
 
-/* Orders the rays. Without memory for an order, they are followed in the given order. */
+/* Chooses the order of work. Without memory for it, the rays are processed in the given order. */
 static void put_in_order(batch *b, const ebpo_model *m)
 {
     ebpo_box box = ebpo_model_box(m);

@@ -1,5 +1,5 @@
-/* Samples attributes at points on faces: those of vertices are interpolated at the point's position
- * on its face, those of faces are returned as stored.
+/* Samples attributes at points on faces. Attributes of vertices are interpolated at the point's
+ * position on its face; attributes of faces are returned as stored.
  *
  * A sampler reads the requested columns once, and then serves any number of points. ebpo/query.h
  * documents the exactness of results. */
@@ -22,15 +22,15 @@
 typedef struct sampled {
     const ebpo_attribute *head; /* attribute of the file */
     unsigned array, column;
-    bool of_vertices, owner; /* owner: the first column with these values */
+    bool of_vertices, owner; /* owner: this is the first column that uses these values */
     ebpo_attribute_values values;
 } sampled;
 
 struct ebpo_sampler {
     const ebpo_file *file;
-    ebpo_mesh mesh; /* read if an attribute belongs to vertices; else empty */
-    uint32_t
-        *file_face; /* [numbers] file index of a source face, UINT32_MAX: none; NULL: the same */
+    ebpo_mesh mesh;      /* read if any attribute belongs to vertices; else empty */
+    uint32_t *file_face; /* [numbers] file index of each source face, UINT32_MAX: none; NULL: both
+                          * numbers are the same */
     uint64_t numbers;
     unsigned count;
     sampled item[EBPO_SAMPLER_MAX];
@@ -55,7 +55,7 @@ static wanted next_wanted(const char *text)
     return w;
 }
 
-/* Returns the column of this name, or -1. */
+/* Returns the number of the column with this name, or -1. */
 static int column_named(const char *names, const wanted *w)
 {
     for (int column = 0; *names; column++) {
@@ -139,7 +139,7 @@ static ebpo_status read_mesh(ebpo_sampler *s, const ebpo_read_options *read, ebp
     return needed ? ebpo_file_read_mesh(s->file, read, &s->mesh, error) : EBPO_OK;
 }
 
-/* Inverts the map: callers use face numbers of the source. */
+/* Inverts the map from file faces to source faces: callers use face numbers of the source. */
 static ebpo_status invert_map(ebpo_sampler *s, const ebpo_read_options *read, ebpo_error *error)
 {
     uint64_t faces = s->file->info.face_count;
@@ -239,7 +239,7 @@ static void edges_of(const double corner[3][3], const double p[3], double e[3][3
     scale_by_power(e[0], 9, -greatest_exponent(e[0], 6));
 }
 
-/* Weighs along the longest edge, for a face without area. */
+/* Computes weights by the position along the longest edge, for a face without area. */
 static void weigh_edge(const double e[3][3], double weight[3])
 {
     static const int from[3] = { 0, 0, 1 }, to[3] = { 1, 2, 2 };
@@ -330,7 +330,7 @@ static void sample_face(const ebpo_sampler *s, uint64_t f, const double point[3]
     }
 }
 
-/* Returns the file's index of a face; UINT64_MAX: it has no such face. */
+/* Returns the file's index of a face; UINT64_MAX: the file has no such face. */
 static uint64_t face_in_file(const ebpo_sampler *s, uint64_t number)
 {
     if (number >= s->numbers)

@@ -1,10 +1,10 @@
 /* Skeletons: bounds of the distance to the faces of subtrees that are not in memory.
  *
- * For each subtree that has been loaded the upper nodes of its hierarchy over faces are kept, eight
- * at first; searches load it again only if it may matter. When a search has loaded it without need,
- * nodes are added near the query point. All skeletons together stay within their share of the
- * budget. They give lower bounds only (reason: model_parts.h); any thread may use them, also while
- * one grows. */
+ * For each subtree that has been loaded, the upper nodes of its hierarchy over faces are kept,
+ * eight at first; searches load the subtree again only if it may matter. When a search has loaded a
+ * subtree without need, nodes are added near the query point. All skeletons together stay within
+ * their share of the budget. They give lower bounds only (reason: model_parts.h). Any thread may
+ * use a skeleton, also while it grows. */
 #include "core/strict_fp.h"
 
 #include "query/model_parts.h"
@@ -19,20 +19,21 @@
 #include "core/alloc.h"
 
 typedef struct kept_node {
-    /* `child`: EBPO_IS_BLOCK; or the number of a node kept here; or a number in the subtree's
-     * hierarchy, which is replaced when the skeleton grows */
+    /* `child` is one of: EBPO_IS_BLOCK; the number of a node of the skeleton; a number in the
+     * subtree's hierarchy, which is replaced when the skeleton grows. */
     ebpo_bound bound;
     ebpo_bound_slab slab;
 } kept_node;
 
-/* Nodes of a part, and parts: powers of two. */
+/* Maximum numbers of nodes in a part, and of parts: powers of two. */
 enum { PART_NODES = 8, PARTS = EBPO_SKELETON_NODES / PART_NODES, GROWN_AT_ONCE = 8 };
 #define IS_KEPT UINT32_C(0x40000000)
 
 struct ebpo_skeleton {
     double centre[3], scale; /* frame of the subtree */
-    unsigned count, first;   /* number of nodes; the maximum in the first part */
-    uint8_t own, outer;      /* a bit for each child of node 0 that has such faces: never both */
+    unsigned count, first;   /* number of nodes; maximum number in the first part */
+    uint8_t own, outer;      /* a bit for each child of node 0 that has owned faces, shared faces;
+                              * no child has both */
     kept_node *_Atomic part[PARTS];
 };
 
@@ -42,21 +43,21 @@ static kept_node *node_at(const ebpo_skeleton *k, uint32_t number)
            number % PART_NODES;
 }
 
-/* Returns a child; a node below may be added while other threads read. */
+/* Returns a child; another thread may add the node below it at the same time. */
 static uint32_t child_of(const kept_node *n, int lane)
 {
     return __atomic_load_n(&n->bound.child[lane], __ATOMIC_ACQUIRE);
 }
 static bool is_kept(uint32_t child) { return (child & (IS_KEPT | EBPO_IS_BLOCK)) == IS_KEPT; }
 
-/* Squares of numbers in such frames, and the results, are far from overflow and underflow of
- * doubles. */
+/* Within these limits, squares of numbers in the frames, and the results, are far from overflow and
+ * underflow of doubles. */
 static const double scale_max = 0x1p500, place_max = 0x1p200;
 
 static uint64_t part_bytes(unsigned nodes) { return nodes * (uint64_t)sizeof(kept_node); }
 uint64_t ebpo_skeleton_bytes(unsigned nodes) { return sizeof(ebpo_skeleton) + part_bytes(nodes); }
 
-/* Keeps the node below this child of a node of the skeleton. */
+/* Adds the node below this child, `place`, of a node of the skeleton. */
 static void keep_child(ebpo_skeleton *k, const ebpo_accel *s, uint32_t *place)
 {
     uint32_t number = k->count++;
@@ -76,8 +77,8 @@ static double squared_diagonal(const ebpo_bound *b, int lane)
     return sum;
 }
 
-/* Returns true for shared faces. Blocks, and so children of the topmost node, hold either shared
- * faces or owned ones: see blocks.c. */
+/* Returns true if the faces below the child are shared. Blocks, and so children of the topmost
+ * node, hold either shared faces or owned ones: see blocks.c. */
 static bool is_outer(const ebpo_accel *s, uint32_t child)
 {
     while (!(child & EBPO_IS_BLOCK))
@@ -85,7 +86,7 @@ static bool is_outer(const ebpo_accel *s, uint32_t child)
     return ebpo_accel_slot_face(s, (child & ~EBPO_IS_BLOCK) * EBPO_BLOCK) < s->shared_count;
 }
 
-static void report_kinds(ebpo_skeleton *k, const ebpo_accel *s)
+static void note_kinds(ebpo_skeleton *k, const ebpo_accel *s)
 {
     const ebpo_bound *top = &s->bound[s->top];
     for (int lane = 0; lane < top->count; lane++)
@@ -95,8 +96,8 @@ static void report_kinds(ebpo_skeleton *k, const ebpo_accel *s)
             k->own |= (uint8_t)(1u << lane);
 }
 
-/* Keeps for shared faces the one or two nodes below the topmost one, which hold them all: such
- * faces are searched in the subtrees that own them, and small boxes identify these. */
+/* Adds the one or two nodes below the topmost one that hold all shared faces: these faces are
+ * searched in the subtrees that own them, and small boxes identify the owners. */
 static void keep_shared(ebpo_skeleton *k, const ebpo_accel *s)
 {
     kept_node *top = node_at(k, 0);
@@ -105,8 +106,8 @@ static void keep_shared(ebpo_skeleton *k, const ebpo_accel *s)
             keep_child(k, s, &top->bound.child[lane]);
 }
 
-/* Keeps for owned faces the node below the largest child that is not kept yet: its box is the
- * loosest. */
+/* Adds, for owned faces, the node below the largest child without a node in the skeleton: the box
+ * of this child is the loosest. */
 static bool keep_largest(ebpo_skeleton *k, const ebpo_accel *s, uint32_t outer_end)
 {
     double most = -1;
@@ -145,7 +146,7 @@ ebpo_skeleton *ebpo_skeleton_make(const ebpo_accel *s, unsigned nodes)
     k->first = most;
     uint32_t top = s->top;
     keep_child(k, s, &top);
-    report_kinds(k, s);
+    note_kinds(k, s);
     keep_shared(k, s);
     for (uint32_t outer_end = k->count; k->count < most && keep_largest(k, s, outer_end);)
         ;
@@ -161,13 +162,13 @@ void ebpo_skeleton_free(ebpo_skeleton *k)
 
 /* --- bounds --- */
 
-/* Near the point, the enlargement of boxes and cylinders covers the rounding errors of doubles.
- * Elsewhere these are below 2^-45 of the distance, which the factor below covers
- * (docs/develop/bounds.md, "Points against skeletons"). */
+/* Factor for rounding. Near the point, the enlargement of boxes and cylinders covers the rounding
+ * errors of doubles. Elsewhere these errors are below 2^-45 of the distance, which this factor
+ * covers (docs/develop/bounds.md, "Points against skeletons"). */
 static const double certainly = 1 - 0x1p-40;
 
-/* Uses |p - x|^2 >= (N(p) - radius)^2 + (along - [from, to])^2, as in the kernels: `to` is the
- * position of p relative to the middle of the box. */
+/* Returns a squared lower bound by |p - x|^2 >= (N(p) - radius)^2 + (along - [from, to])^2, as in
+ * the kernels. `to` is the position of p relative to the middle of the box. */
 static double by_slab(const ebpo_child_slab *slab, const double to[3])
 {
     double along = 0, square = 0;
@@ -176,15 +177,15 @@ static double by_slab(const ebpo_child_slab *slab, const double to[3])
         square += to[k] * to[k];
     }
     double over = fmax(fmax(slab->from - along, along - slab->to), 0);
-    /* below the true value, so that the root of a small difference of large squares stays a lower
+    /* less than the true value, so that the root of a small difference of large squares is a lower
      * bound */
     double aside2 = fmax(square * (1 - 0x1p-48) - along * along, 0);
     double aside = fmax(sqrt(aside2) - slab->radius, 0);
     return aside * aside + over * over;
 }
 
-/* Computes squared lower bounds of the distances to the children, in the frame, before `certainly`:
- * by boxes. */
+/* Computes squared lower bounds of the distances to the children from their boxes, in the frame;
+ * the factor `certainly` is applied later. */
 static void by_boxes(const ebpo_bound *b, const double p[3], double lower2[8])
 {
     for (int lane = 0; lane < 8; lane++)
@@ -210,13 +211,13 @@ static double by_child_slab(const kept_node *n, int lane, const double p[3])
     return by_slab(&slab, to);
 }
 
-/* The nearest child that has not been opened. */
+/* The nearest child whose node is not in the skeleton. */
 typedef struct nearest_place {
     double lower2;
     uint32_t *place;
 } nearest_place;
 
-/* Searches below these children of a node, where it is nearer than `best`. Bounding cylinders are
+/* Searches below these children of a node for a child nearer than `best`. Bounding cylinders are
  * tested only where boxes do not decide. */
 static void look_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes, const double p[3],
                        double parent, nearest_place *best)
@@ -247,7 +248,7 @@ static void look_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes, 
     }
 }
 
-/* Returns false, with an unspecified point, if it is too far. */
+/* Transforms a point to the frame. Returns false if it is too far; p is then not valid. */
 static bool to_frame(const ebpo_skeleton *k, const double point[3], double p[3])
 {
     bool near = true;
@@ -327,8 +328,8 @@ ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *k, const ebpo
     return (ebpo_skeleton_bounds){ k->own ? own.best : INFINITY, k->outer ? outer.best : INFINITY };
 }
 
-/* Allocates the next part of nodes. Returns false if the skeleton has its maximum size, or without
- * memory. */
+/* Allocates the next part of nodes if needed. Returns false if the skeleton has its maximum size,
+ * or without memory. */
 static bool has_place(ebpo_skeleton *k, bool (*take)(void *user, uint64_t bytes), void *user)
 {
     unsigned part = k->count / PART_NODES;
@@ -401,15 +402,15 @@ unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *k, const double point[3
 
 /* --- the skeletons of a model --- */
 
-/* Initial number of nodes of each, if the quota allows it for all. */
+/* Initial number of nodes of each skeleton, if the quota allows it for all. */
 enum { BEGIN_NODES = PART_NODES };
 
 struct ebpo_skeletons {
     uint64_t count, space;
     ebpo_cache *cache;    /* the cache whose budget is used, or NULL */
-    unsigned nodes;       /* initial number of nodes of each */
+    unsigned nodes;       /* initial number of nodes of each skeleton */
     pthread_mutex_t lock; /* protects the changing fields; searches do not wait for it */
-    uint64_t left;        /* number of skeletons not kept yet */
+    uint64_t left;        /* number of subtrees without a skeleton */
     _Atomic uint64_t bytes;
     _Atomic(ebpo_skeleton *) of[];
 };
@@ -419,7 +420,7 @@ static uint64_t frame_bytes(uint64_t count)
     return sizeof(ebpo_skeletons) + count * sizeof(ebpo_skeleton *);
 }
 
-/* Returns a number of nodes that all can have, at least one. */
+/* Returns a number of nodes that all skeletons can have, at least one. */
 static unsigned nodes_each(uint64_t count, uint64_t space)
 {
     unsigned nodes = BEGIN_NODES;
@@ -434,7 +435,7 @@ uint64_t ebpo_skeletons_capacity(uint64_t count, uint64_t space)
     return space < frame_bytes(count) + ebpo_skeleton_bytes(1) ? 0 : space < most ? space : most;
 }
 
-/* Takes bytes of the quota. `later`: bytes that must remain. */
+/* Takes bytes of the quota. `later`: bytes that must remain afterwards. */
 static bool take_capacity(ebpo_skeletons *all, uint64_t bytes, uint64_t later)
 {
     if (all->bytes + bytes > all->space || all->space - all->bytes - bytes < later ||
@@ -444,7 +445,7 @@ static bool take_capacity(ebpo_skeletons *all, uint64_t bytes, uint64_t later)
     return true;
 }
 
-/* Takes bytes for growing; reserves the initial nodes of all others. */
+/* Takes bytes for growing; leaves the bytes of the initial nodes of all other skeletons. */
 static bool take_more(void *user, uint64_t bytes)
 {
     ebpo_skeletons *all = user;
@@ -504,7 +505,7 @@ void ebpo_skeletons_keep(ebpo_skeletons *all, uint64_t number, const ebpo_accel 
         return;
     ebpo_skeleton *made = ebpo_skeleton_make(subtree, all->nodes);
     pthread_mutex_lock(&all->lock);
-    /* another thread may have loaded it, too: with planes */
+    /* another thread may have loaded the subtree, too: with planes */
     if (made && !all->of[number] && take_capacity(all, ebpo_skeleton_bytes(made->first), 0)) {
         atomic_store_explicit(&all->of[number], made, memory_order_release);
         all->left--;

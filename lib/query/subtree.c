@@ -1,10 +1,10 @@
 /* A subtree as plain arrays, for ebpo/subtree.h.
  *
- * A node is found by its octcode; the part below it is read as a slice, if an upper bound of its
- * memory, from counts, is within the caller's limit. The slice has an array for each type of node;
- * this file makes arrays with a row for each node, faces with corners and numbers, and lists of
- * leaves. A single node can then be described in the model's coordinates: half-spaces inherited on
- * the way from the root, and the polygons of its envelope. */
+ * A node is found by its octcode. The part below it is read as a slice, if an upper bound of its
+ * memory, computed from counts, is within the caller's limit. The slice has an array for each type
+ * of node. From these, this file makes arrays with a row for each node, faces with corners and
+ * numbers, and lists of leaves. A single node can then be described in the model's coordinates: the
+ * half-spaces that it inherits from all nodes above it, and the polygons of its envelope. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -39,13 +39,13 @@ struct ebpo_subtree {
     uint8_t *types;
     int32_t *windings;
     uint32_t *children;
-    bool has_planes;       /* any were read: the next three arrays exist */
-    bool has_leaf_planes;  /* stored planes */
+    bool has_planes;       /* planes were read: the next three arrays exist */
+    bool has_leaf_planes;  /* leaves have stored planes */
     uint32_t *plane_first; /* [node_count + 1] */
     uint32_t *planes;
     uint32_t above_first[EBPO_LEVELS_MAX + 1];
     uint32_t *above_planes;
-    /* Faces; without them: the reason. */
+    /* Faces; no_faces: the reason if there are none. */
     const char *no_faces;
     uint32_t shared_count;
     ebpo_mesh mesh;
@@ -53,12 +53,12 @@ struct ebpo_subtree {
     double *corners64;
     uint32_t *numbers, *source, *list_first, *list;
     uint64_t memory;
-    subtree_scratch *scratch; /* made for the first described node */
+    subtree_scratch *scratch; /* made for the first node that is described */
 };
 
 /* --- capacity --- */
 
-/* Returns true for the group of a pruned node, which in subsets replaces eight missing nodes. */
+/* Returns true for the group of a pruned node; in subsets it replaces eight missing nodes. */
 static bool is_pruned_group(const ebpo_slice *slice, int level, uint64_t group)
 {
     return level && slice->pruned && slice->level[level].types[group] == 0;
@@ -164,8 +164,8 @@ static void take_node(ebpo_subtree *s, const ebpo_level *level, ebpo_node_type t
     at->rank[type]++;
 }
 
-/* Takes the nodes of a level below the root: the children of the gray nodes of the level before,
- * and links them. */
+/* Takes the nodes of a level below the root: the children of the previous level's gray nodes. Links
+ * them to their parents. */
 static void take_level(ebpo_subtree *s, const ebpo_slice *slice, int i)
 {
     const ebpo_level *level = &slice->level[i];
@@ -338,7 +338,7 @@ struct subtree_scratch {
     ebpo_polytope leaf;
     ebpo_node_buffers lent;
     double inherited[EBPO_HALF_SPACES_MAX][4];
-    ebpo_triangle *faces; /* faces of a leaf */
+    ebpo_triangle *faces; /* faces of the leaf that is described */
     uint64_t face_capacity;
 };
 
@@ -349,10 +349,10 @@ static void subtree_free_scratch(subtree_scratch *scratch)
     free(scratch);
 }
 
-/* --- the way from the tree's root down to a node --- */
+/* --- the path from the tree's root to a node --- */
 
-/* Returns the planes of the node of this level on the way to `octcode`; `node` is that node's
- * number, and becomes the next one's, where the level is the subtree's. */
+/* Returns the planes of the node at this level on the path to `octcode`. If the level is in the
+ * subtree, `node` is the number of that node, and is set to the number of the next one. */
 static const uint32_t *planes_on_way(const ebpo_subtree *s, uint64_t octcode, int level,
                                      uint64_t *node, uint32_t *count)
 {
@@ -390,7 +390,8 @@ static void add_inherited(ebpo_subtree *s, uint64_t octcode, ebpo_subtree_node *
     out->inherited = (const double(*)[4])s->scratch->inherited;
 }
 
-/* Returns the node's envelope without planes that a leaf derives. */
+/* Returns the node's envelope by stored planes, without the planes that are derived from a leaf's
+ * faces. */
 static const ebpo_polytope *stored_envelope(ebpo_subtree *s, uint64_t octcode, ebpo_node_type type)
 {
     ebpo_envelope_stack *stack = &s->scratch->envelopes;
@@ -429,7 +430,7 @@ static ebpo_status gather_faces(ebpo_subtree *s, uint64_t leaf, uint64_t *count,
     return EBPO_OK;
 }
 
-/* Cuts the scratch's envelope of a leaf by planes derived from its faces. */
+/* Cuts a leaf's envelope in the scratch memory by planes that are derived from the leaf's faces. */
 static ebpo_status derive_planes(ebpo_subtree *s, uint64_t leaf, uint32_t codes[EBPO_PLANES_MAX],
                                  unsigned *code_count, ebpo_error *error)
 {
@@ -489,15 +490,14 @@ ebpo_status ebpo_subtree_get_node(ebpo_subtree *s, uint64_t number, bool polygon
         return status;
     if (number >= s->node_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "no node has number %" PRIu64 "; the subtree has %" PRIu64 " nodes",
+                         "there is no node with the number %" PRIu64 "; the subtree has %" PRIu64
+                         " nodes",
                          number, s->node_count);
     if (!s->scratch && !(s->scratch = ebpo_alloc_zero(1, sizeof *s->scratch)))
         return ebpo_fail_memory(error, sizeof *s->scratch);
     status = describe_node(s, number, polygons, &node, error);
     return status == EBPO_OK ? EBPO_GIVE(ebpo_subtree_node, out, &node) : status;
 }
-
-/* --- opening --- */
 
 /* --- the node of an octcode --- */
 
@@ -524,7 +524,7 @@ static ebpo_status check_found(const ebpo_chunks *chunks, uint64_t octcode, bool
 {
     const ebpo_node *child = NULL, *node = ebpo_cursor_node(c);
     ebpo_octcode found = ebpo_cursor_octcode(c);
-    ebpo_status status = ebpo_cursor_children(c, &child, error); /* finds out if it is pruned */
+    ebpo_status status = ebpo_cursor_children(c, &child, error); /* finds if the node is pruned */
     if (status != EBPO_OK)
         return status;
     if (ebpo_node_is_uniform(node))
@@ -582,7 +582,7 @@ static ebpo_status take_above(ebpo_subtree *s, ebpo_cursor *c, ebpo_error *error
 
 /* --- memory --- */
 
-/* Decoded chunks while reading: a quarter of the limit, within these values. */
+/* Bytes of decoded chunks while reading: a quarter of the limit, within these values. */
 enum { CHUNKS_LEAST = 2 << 20, CHUNKS_MAX = 32 << 20 };
 
 static uint64_t chunk_budget(uint64_t memory)
@@ -600,19 +600,21 @@ static uint64_t least_memory(uint64_t bytes)
     return bytes <= 3 * (uint64_t)CHUNKS_MAX ? bytes + bytes / 3 + 4 : bytes + CHUNKS_MAX;
 }
 
-/* Returns an upper bound, from counts, of the bytes of a slice, the arrays made from it, and
+/* Returns an upper bound, from counts, of the bytes of a slice, of the arrays made from it, and of
  * temporary memory. */
 static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, bool whole,
                             bool corners)
 {
     enum {
-        NODE = 32,      /* octcode, type, winding, children, planes, list; winding in the slice */
-        GROUP = 4,      /* types, plane counts */
-        LEAF = 24,      /* data of a level for each leaf */
-        PLANE = 8,      /* in the slice and in the subtree */
-        REFERENCE = 52, /* in slice, list, and the table that numbers the shared faces */
-        FACE = 24,      /* corners, number, number in the source, list */
-        OLDER = 36,     /* for each corner: the table that numbers vertices of earlier faces */
+        NODE = 32,      /* bytes of a node: octcode, type, winding, children, planes, list; winding
+                         * in the slice */
+        GROUP = 4,      /* of a group: types, plane counts */
+        LEAF = 24,      /* of a leaf: data of a level */
+        PLANE = 8,      /* of a plane: in the slice and in the subtree */
+        REFERENCE = 52, /* of a reference: in the slice, in the list, and in the table that numbers
+                         * the shared faces */
+        FACE = 24,      /* of a face: corners, number, number in the source, list */
+        OLDER = 36,     /* of each corner: the table that numbers vertices of earlier faces */
         ALWAYS = 1 << 20
     };
     uint64_t number = info->double_coordinates ? sizeof(double) : sizeof(float),
@@ -623,8 +625,8 @@ static uint64_t bound_bytes(const ebpo_slice_size *size, const ebpo_info *info, 
            (whole ? 0 : 3 * faces * OLDER) + vertices * 3 * number;
 }
 
-/* Counts references to faces that are new before the subtree: an upper bound of the shared faces.
- * Reads the lists, of which most are references within the subtree. */
+/* Counts references to faces that are new before the subtree: an upper bound of the number of
+ * shared faces. Reads the lists, of which most are references within the subtree. */
 static ebpo_status count_shared(const ebpo_subtree *s, ebpo_chunks *chunks, uint64_t *outer,
                                 ebpo_error *error)
 {
@@ -636,7 +638,7 @@ static ebpo_status count_shared(const ebpo_subtree *s, ebpo_chunks *chunks, uint
                               EBPO_SLICE_ALL, error);
     if (status != EBPO_OK)
         return status;
-    for (int i = 0; i < lists.level_count; i++) /* ascending within a level */
+    for (int i = 0; i < lists.level_count; i++) /* numbers are ascending within a level */
         if (lists.level[i].leaf_count && lists.level[i].leaf_first[0] < first)
             first = lists.level[i].leaf_first[0];
     for (int i = 0; i < lists.level_count; i++)
@@ -675,7 +677,7 @@ static ebpo_status check_memory(const ebpo_subtree *s, ebpo_chunks *chunks, uint
 
 /* --- reading --- */
 
-/* Returns the wanted parts of the arrays; sets `no_faces`. */
+/* Returns the parts of the file that are wanted; sets `no_faces`. */
 static uint32_t choose_needs(ebpo_subtree *s, const ebpo_subtree_options *o, uint32_t parts)
 {
     uint32_t most = EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES,

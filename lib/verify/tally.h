@@ -19,7 +19,7 @@ typedef enum ebpo_verify_kind {
 #define EBPO_NO_FACE  UINT64_MAX
 #define EBPO_NO_PLANE UINT32_MAX
 
-/* Position of a violation. Octcode 0: the file as a whole. File order is the order of these fields
+/* Position of a violation. Octcode 0: all of the file. File order is the order of these fields
  * (octcodes order nodes breadth-first). */
 typedef struct ebpo_verify_place {
     uint64_t octcode;
@@ -27,7 +27,7 @@ typedef struct ebpo_verify_place {
     uint32_t plane; /* EBPO_NO_PLANE: none */
 } ebpo_verify_place;
 
-/* One worker's counts. Zeroed is empty. */
+/* Counts of one thread. A tally of zeros is empty. */
 typedef struct ebpo_tally {
     uint64_t checks[EBPO_VERIFY_KINDS], violations[EBPO_VERIFY_KINDS];
     ebpo_verify_place place[EBPO_VERIFY_KINDS]; /* places of `first` */
@@ -38,7 +38,8 @@ typedef struct ebpo_tally {
     uint64_t exact_touches, exact_half_spaces; /* number of tests in rationals */
 } ebpo_tally;
 
-/* Counts one violation; keeps "place: text" when it comes before the first one so far. */
+/* Counts one violation. Keeps "place: text" if this violation comes before the first one so far, in
+ * file order. */
 void ebpo_tally_violation(ebpo_tally *tally, ebpo_verify_kind kind, const ebpo_verify_place *place,
                           const char *format, ...) EBPO_PRINTF(4, 5);
 

@@ -29,7 +29,7 @@ bool ebpo_exact_half_space(const double low[3], const double high[3], const ebpo
 
 /* --- floating point with error bounds, rationals when in doubt --- */
 
-/* A cell: its faces (exact) and the reciprocals of its sizes (rounded). */
+/* A cell: the coordinates of its faces (exact) and the reciprocals of its sizes (rounded). */
 typedef struct ebpo_frame {
     double low[3], high[3], inverse[3];
 } ebpo_frame;
@@ -50,8 +50,8 @@ bool ebpo_face_touches(const ebpo_frame *frame, const ebpo_corners *face, ebpo_t
  *
  * A point is shifted by (d0, d1, d2), infinitely small and positive, d0 >> d1 >> d2, as the format
  * defines for the corners of cells. The ray has direction +axis; far out the winding number is 0.
- * So a point's number is the sum over the faces that its ray crosses: +1 when the ray leaves
- * through the face (along its normal), -1 when it enters. */
+ * So a point's winding number is the sum over the faces that its ray crosses: +1 when the ray
+ * leaves through the face (along its normal), -1 when it enters. */
 
 /* Returns the face's exact contribution to the winding number of p: -1, 0 or 1. */
 int ebpo_ray_hit(const double p[3], int axis, const ebpo_corners *face);

@@ -1,14 +1,14 @@
 /* Verifies labels: the winding numbers of cells. Two proofs:
  *
  * - By links, for all cells: equal points must have equal winding numbers in all cells.
- *   A cell without faces has one number for all its corners; a leaf gives one for its lowest
- *   corner, and the others follow by signed crossings along its edges; the 64 corners of a gray
- *   node's children are 27 points. The root's corners are outside. This links every cell to the
- *   root, so all numbers are right when all links hold and the lists are complete
- *   (verify_lists.c).
+ *   A cell without faces has one winding number for all its corners. A leaf stores the winding
+ *   number of its lowest corner; the numbers of the other corners follow from signed crossings
+ *   along the cell's edges. The 64 corners of a gray node's children are 27 points. The root's
+ * corners are outside. This links every cell to the root, so all winding numbers are right when all
+ * links hold and the lists are complete (verify_lists.c).
  * - By rays through the whole mesh, for all cells or an even sample, without the links. The
- *   points are sorted into columns along x, and each face visits the points that it is in front of;
- *   so faces are visited once, in their order, and only the points are in memory. */
+ *   points are sorted into columns along x, and each face visits the points that it is in front of.
+ *   Thus faces are visited once, in their order, and only the points are in memory. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

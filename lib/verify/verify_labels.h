@@ -20,7 +20,7 @@ typedef struct ebpo_ray_point {
     int64_t found;    /* set by ebpo_rays_follow */
 } ebpo_ray_point;
 
-/* Points in order of appearance. Zeroed is empty; free `point` with ebpo_array_free. */
+/* Points in order of appearance. A list of zeros is empty; free `point` with ebpo_array_free. */
 typedef struct ebpo_ray_points {
     ebpo_workspace *workspace; /* quota of the list, or NULL */
     ebpo_ray_point *point;
@@ -45,12 +45,12 @@ typedef struct ebpo_node_windings {
     unsigned known; /* bit i: at[i] is set; not all are in a file without mesh */
 } ebpo_node_windings;
 
-/* The cells that are checked by rays: of each level and type, about every n-th. */
+/* The cells that are checked by rays: about every n-th of each level and type. */
 typedef struct ebpo_label_plan {
     uint64_t cells[EBPO_LEVELS_MAX][4], take[EBPO_LEVELS_MAX][4];
 } ebpo_label_plan;
 
-/* samples 0: the default of ebpo_verify_options. */
+/* Chooses the cells. With 0 samples, the default of ebpo_verify_options is used. */
 void ebpo_label_plan_make(ebpo_label_plan *plan, const ebpo_reference_tree *view, uint64_t samples);
 
 /* Computes corner windings of a leaf, white or black node; `faces`: the `count` faces that touch
@@ -78,7 +78,7 @@ void ebpo_check_links(ebpo_tally *tally, const ebpo_reference_node *node,
 /* Checks that the root's corners are outside. */
 void ebpo_check_root_corners(ebpo_tally *tally, const ebpo_node_windings *root);
 
-/* Returns bit i if corner i is in the solid. */
+/* Returns a mask; bit i is set if corner i is in the solid. */
 unsigned ebpo_windings_inside(const ebpo_reference_tree *view, const ebpo_node_windings *corners);
 
 #endif

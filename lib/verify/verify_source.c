@@ -65,30 +65,31 @@ static ebpo_status copy_mesh(ebpo_mesh *out, const ebpo_mesh *mesh, ebpo_workspa
 
 /* Returns the repair steps of the record. Faces that were flipped without a request for consistency
  * were all flipped. */
-static unsigned steps_of(const ebpo_repair_record *queried)
+static unsigned steps_of(const ebpo_repair_record *to_repeat)
 {
-    return (queried->weld ? EBPO_REPAIR_WELD : 0) | (queried->orient ? EBPO_REPAIR_ORIENT : 0) |
-           (queried->dropped_faces ? EBPO_REPAIR_DROP : 0) |
-           (!queried->orient && queried->flipped_faces ? EBPO_REPAIR_FLIP : 0) |
-           (queried->fill_holes ? EBPO_REPAIR_FILL : 0);
+    return (to_repeat->weld ? EBPO_REPAIR_WELD : 0) | (to_repeat->orient ? EBPO_REPAIR_ORIENT : 0) |
+           (to_repeat->dropped_faces ? EBPO_REPAIR_DROP : 0) |
+           (!to_repeat->orient && to_repeat->flipped_faces ? EBPO_REPAIR_FLIP : 0) |
+           (to_repeat->fill_holes ? EBPO_REPAIR_FILL : 0);
 }
 
-/* Earlier builds flipped fewer faces, as their record shows. */
+/* Repeats the recorded repairs on a copy of the source. Earlier versions flipped fewer faces: if
+ * the record has another number of flipped faces, repeats the repairs as these versions did. */
 static ebpo_status repair_again(ebpo_mesh *mesh, const ebpo_mesh *source,
-                                const ebpo_repair_record *queried, ebpo_repair_record *did,
+                                const ebpo_repair_record *to_repeat, ebpo_repair_record *did,
                                 ebpo_workspace *workspace, ebpo_error *error)
 {
     const ebpo_repair_record fresh = *did;
     ebpo_status status = copy_mesh(mesh, source, workspace, error);
     if (status == EBPO_OK)
-        status = ebpo_mesh_repair(mesh, steps_of(queried), queried->weld_distance, did, error);
-    if (status != EBPO_OK || !queried->orient || did->flipped_faces == queried->flipped_faces)
+        status = ebpo_mesh_repair(mesh, steps_of(to_repeat), to_repeat->weld_distance, did, error);
+    if (status != EBPO_OK || !to_repeat->orient || did->flipped_faces == to_repeat->flipped_faces)
         return status;
     *did = fresh;
     ebpo_mesh_free(mesh);
     status = copy_mesh(mesh, source, workspace, error);
-    return status == EBPO_OK ? ebpo_mesh_repair(mesh, steps_of(queried) | EBPO_REPAIR_EARLIER,
-                                                queried->weld_distance, did, error)
+    return status == EBPO_OK ? ebpo_mesh_repair(mesh, steps_of(to_repeat) | EBPO_REPAIR_EARLIER,
+                                                to_repeat->weld_distance, did, error)
                              : status;
 }
 
@@ -96,21 +97,21 @@ static void check_record(ebpo_tally *tally, const ebpo_repair_record *stored,
                          const ebpo_repair_record *did)
 {
     CHECK(stored->welded_vertices == did->welded_vertices,
-          "%" PRIu64 " welded vertices are recorded, repeating it welds %" PRIu64,
+          "%" PRIu64 " welded vertices are recorded, repeating the repair welds %" PRIu64,
           stored->welded_vertices, did->welded_vertices);
     CHECK(stored->weld_moved == did->weld_moved && stored->collapsed_faces == did->collapsed_faces,
-          "welding by up to %g is recorded, repeating it moves vertices by up to %g",
+          "welding by up to %g is recorded, repeating the repair moves vertices by up to %g",
           stored->weld_moved, did->weld_moved);
     CHECK(stored->dropped_faces == did->dropped_faces,
-          "%" PRIu64 " dropped faces are recorded, repeating it drops %" PRIu64,
+          "%" PRIu64 " dropped faces are recorded, repeating the repair drops %" PRIu64,
           stored->dropped_faces, did->dropped_faces);
     CHECK(stored->flipped_faces == did->flipped_faces &&
               stored->unorientable_components == did->unorientable_components,
-          "%" PRIu64 " flipped faces are recorded, repeating it flips %" PRIu64,
+          "%" PRIu64 " flipped faces are recorded, repeating the repair flips %" PRIu64,
           stored->flipped_faces, did->flipped_faces);
     CHECK(stored->filled_holes == did->filled_holes && stored->added_faces == did->added_faces &&
               stored->unfilled_holes == did->unfilled_holes,
-          "%" PRIu64 " faces filling holes are recorded, repeating it adds %" PRIu64,
+          "%" PRIu64 " faces filling holes are recorded, repeating the repair adds %" PRIu64,
           stored->added_faces, did->added_faces);
 }
 
@@ -353,7 +354,7 @@ static ebpo_status compare_meshes(ebpo_tally *tally, const ebpo_mesh *was_repair
     return status;
 }
 
-/* A component: its file records that the source has more. */
+/* Returns true for the file of a component, which records that the source has more faces. */
 static bool is_part(const ebpo_info *info)
 {
     return info->source_face_count + info->repair_record.added_faces -
@@ -374,22 +375,22 @@ ebpo_status ebpo_check_source(ebpo_tally *tally, const ebpo_file *file, const eb
     }
     CHECK(info->source_vertex_count == source->vertex_count &&
               info->source_face_count == source->face_count,
-          "the source has %" PRIu64 " vertices and %" PRIu64 " faces, but recorded are %" PRIu64
+          "the source has %" PRIu64 " vertices and %" PRIu64 " faces, but the file records %" PRIu64
           " and %" PRIu64,
           source->vertex_count, source->face_count, info->source_vertex_count,
           info->source_face_count);
     ebpo_mesh was_repaired = { 0 };
-    const ebpo_repair_record *queried = &info->repair_record;
-    bool as_it_is = steps_of(queried) == 0;
+    const ebpo_repair_record *to_repeat = &info->repair_record;
+    bool as_it_is = steps_of(to_repeat) == 0;
     ebpo_repair_record did = { .weld = info->repair_record.weld,
                                .orient = info->repair_record.orient,
                                .fill_holes = info->repair_record.fill_holes };
     ebpo_status status =
         as_it_is ? EBPO_OK
-                 : repair_again(&was_repaired, source, queried, &did, read->workspace, error);
+                 : repair_again(&was_repaired, source, to_repeat, &did, read->workspace, error);
     if (status == EBPO_E_ARGUMENT) { /* due to the record, not the caller */
         CHECK(false, "welding within %g is recorded, but the source cannot be welded within it",
-              queried->weld_distance);
+              to_repeat->weld_distance);
         ebpo_mesh_free(&was_repaired);
         return EBPO_OK;
     }

@@ -6,10 +6,10 @@
  * - Structure: the arrays fit together (ebpo_check_shape; nothing else is checked before), and the
  *   format allows the tree: summaries, leaf sizes, the order of faces, the root box,
  *   balanced edges of a solid.
- * - Nesting: a node's envelope is its own planes and all its ancestors', so it is within its
- *   parent's by definition, if a plane means the same in every cell's coordinates. That is
- *   checked in integers on points of sampled cells: each plane is transformed down to the cell,
- *   and the point up to the plane. */
+ * - Nesting: the planes of a node and of all its ancestors bound the node's envelope, so the
+ *   envelope is within the parent's envelope by definition, if a plane means the same in every
+ *   cell's coordinates. This condition is checked in integers on points of sampled cells: each
+ * plane is transformed down to the cell, and the point up to the plane. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>

@@ -34,8 +34,8 @@ typedef struct ebpo_reference_node {
     uint64_t rank;
 } ebpo_reference_node;
 
-/* Makes the view. The level arrays of the tree must have passed ebpo_check_shape. `workspace`: its
- * quota, or NULL. Cleared on failure. */
+/* Makes the view. The level arrays of the tree must have passed ebpo_check_shape. `workspace` is
+ * the quota of the view, or NULL. The view is cleared on failure. */
 EBPO_MUST_USE ebpo_status ebpo_reference_make(ebpo_reference_tree *out, const ebpo_tree *tree,
                                               ebpo_workspace *workspace, ebpo_error *error);
 void ebpo_reference_free(ebpo_reference_tree *view);

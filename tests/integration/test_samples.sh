@@ -43,13 +43,13 @@ printf '0.5 0.25 0.5\n\n \t\n3 0.25\t0.5\r\n1 2\n7 7 7\n' >"$work/points"
 for model in cube box; do
     "$query" "$work/$model.ebpo.h5" <"$work/points" >"$work/out" 2>"$work/err" &&
         fail "query takes a bad line of $model"
-    [ "$(cat "$work/err")" = "query: line 5: three numbers are expected" ] ||
+    [ "$(cat "$work/err")" = "query: line 5: expected three numbers" ] ||
         fail "query says where: $(cat "$work/err")"
     [ "$(wc -l <"$work/out")" = 2 ] || fail "query answers what comes before a bad line"
     [ -n "$numpy" ] || continue
     "$numpy" "$samples/query.py" "$work/$model.ebpo.h5" <"$work/points" >"$work/out.py" 2>"$work/err" &&
         fail "query.py takes a bad line"
-    [ "$(cat "$work/err")" = "query.py: line 5: three numbers are expected" ] ||
+    [ "$(cat "$work/err")" = "query.py: line 5: expected three numbers" ] ||
         fail "query.py says where: $(cat "$work/err")"
     sed 's/\.0\b//g' "$work/out.py" | cmp - "$work/out" >/dev/null ||
         { diff "$work/out.py" "$work/out"; fail "query.py answers as query does for $model"; }
@@ -133,7 +133,7 @@ for i in $(seq 60); do
 done
 "$1" "$port" 0.3 0.4 1.5 0.8 >"$work/felt" 2>&1 || { cat "$work/felt"; fail "touch_device is answered"; }
 wait $touching || fail "ebpo haptic ends with its device"
-[ "$(cat "$work/felt")" = "some answers, a force up, proxy at 0.30 0.40 1.00" ] ||
+[ "$(cat "$work/felt")" = "some replies, a force up, proxy at 0.30 0.40 1.00" ] ||
     { cat "$work/felt"; fail "touch_device feels the cube"; }
 [ "$(wc -l <"$work/hand.txt")" -gt 50 ] && "$ebpo" haptic --path "$work/hand.txt" \
     "$work/cube.ebpo.h5" >"$work/out" 2>&1 || fail "a recorded hand is played"

@@ -316,7 +316,7 @@ class Parts(Case):
             with self.assertRaisesRegex(ebpo.FormatError, "negative"):
                 Catalogue([entry]).distance([entry.low])
         entries = [entry._replace(numbers=os.path.abspath("few.npy")) for entry in self.catalogue.entries]
-        with self.assertRaisesRegex(ebpo.FormatError, "few.npy: 3 numbers of"):
+        with self.assertRaisesRegex(ebpo.FormatError, "few.npy: expected a number for each face: 3 numbers of"):
             Catalogue(entries, parts=True).distance(P[:99])
 
     def test_cells_of_which_a_half_is_empty(self):

@@ -1,4 +1,5 @@
-/* The filters of the kernels for eight faces, for any processor or for processors with AVX2. */
+/* Filters of the kernels for eight faces. Compiled twice: for any processor, and for processors
+ * with AVX2. */
 #include "core/strict_fp.h"
 
 #include "filter_faces.h"

@@ -370,7 +370,8 @@ static ebpo_status query_haptic(const mix_querier *a, uint64_t number, uint64_t 
     }
     status = ebpo_haptic_check(touch, error);
     ebpo_haptic_free(touch);
-    return good ? status : EBPO_E_FORMAT; /* which no file here has */
+    return good ? status
+                : EBPO_E_FORMAT; /* a status that no query here returns for another reason */
 }
 #endif
 

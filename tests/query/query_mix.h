@@ -17,7 +17,7 @@ typedef struct mix_querier {
 enum { MIX_KINDS = EBPO_HAVE_EXTRAS ? 16 : 15 };
 extern const char *const mix_names[MIX_KINDS];
 
-/* Returns true when the library also reads in its own threads for it. */
+/* Returns true when the library also reads in threads of its own for this kind of query. */
 bool mix_has_workers(int kind);
 
 /* Runs query `number` of a kind. *hash is 0 for queries without a fixed result (haptic devices,

@@ -33,8 +33,8 @@ static double distance_and_sign(ebpo_model *model, const double p[3])
     ebpo_inside_result inside;
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     ASSERT_OK(ebpo_context_new(model, &context, error));
-    /* envelopes do not decide then: the cell that contains p is needed at any distance of its
-     * envelope */
+    /* the cell that contains p is needed at any distance of its envelope, as envelopes do not
+     * decide under these rules */
     options.unsigned_distance = model->info->rule != EBPO_RULE_NONZERO;
     ASSERT_OK(ebpo_distance(context, p, &options, &distance, error));
     if (!options.unsigned_distance)
@@ -51,7 +51,7 @@ static bool loads_nothing_more(ebpo_model *model, const double p[3], const doubl
     uint64_t keys[EBPO_CACHE_AHEAD];
     unsigned count = ebpo_subtrees_near(model, p, distance_and_sign(model, p) + 2 * way, keys);
     if (count == EBPO_CACHE_AHEAD)
-        return false; /* there may be more */
+        return false; /* there may be more subtrees than listed */
     ebpo_cache_stats before, after;
     ebpo_cache_clear(model->cache);
     load(model, keys, count);

@@ -78,7 +78,7 @@ static ebpo_pose shifted(double x, double y, double z)
     return pose;
 }
 
-/* About z, and translated. */
+/* Returns a quarter turn about z with a translation. */
 static ebpo_pose quarter_turn(double x, double y, double z)
 {
     ebpo_pose pose = shifted(x, y, z);
@@ -156,7 +156,7 @@ static bool find_truths(operand *o, const double p[3], int32_t where[OPERANDS])
     return on;
 }
 
-/* Returns true when no face except those with p on them is this near to p. */
+/* Returns true when p is farther than `distance` from every face that does not contain p. */
 static bool nothing_else_near(operand *o, const double p[3], double distance)
 {
     uint32_t count;
@@ -220,7 +220,8 @@ static void judge(const formula *f, operand *o, const double p[3], const ebpo_bo
 
 /* --- points --- */
 
-/* On vertices, edges and faces of an operand, exactly or within rounding; or anywhere. */
+/* Makes a point on a vertex, an edge or a face of an operand, exactly or within rounding; or
+ * anywhere. */
 static void make_point(const operand *o, uint64_t *state, double p[3])
 {
     const operand *of = &o[ebpo_test_random(state) % OPERANDS];
@@ -258,7 +259,8 @@ static void run_query(operand *o, const formula *f, uint64_t count, uint64_t see
     free(points);
 }
 
-/* reported: counts of the results IN, OUT, certain ON, and ON, in the order of ebpo_where. */
+/* reported: counts of results in the order of ebpo_where (OUT, IN, certain ON), then of other ON.
+ */
 static void query_all(const char *const solids[OPERANDS], const ebpo_pose poses[OPERANDS],
                       uint64_t reported[4])
 {

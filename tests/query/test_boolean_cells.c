@@ -70,7 +70,8 @@ static ebpo_boolean_volume volume_of(ebpo_boolean *boolean, int level)
     return v;
 }
 
-/* The truth within `slack` is in the interval at every level, and levels never widen it. */
+/* Checks that the interval contains the true volume, within `slack`, at every level, and that
+ * deeper levels never widen the interval. */
 static void check_volume(ebpo_boolean *boolean, double truth, double slack)
 {
     double lo = 0, hi = INFINITY, first = 0;
@@ -84,7 +85,7 @@ static void check_volume(ebpo_boolean *boolean, double truth, double slack)
         if (level == 2)
             first = hi - lo;
     }
-    ck_assert_msg(hi - lo < 0.2 * first, "%g of %g is left", hi - lo, first);
+    ck_assert_msg(hi - lo < 0.2 * first, "the interval is still %g of %g wide", hi - lo, first);
 }
 
 static double combined(int operation, double a, double b, double both)
@@ -126,8 +127,8 @@ START_TEST(test_cell_volumes_of_cubes)
 }
 END_TEST
 
-/* Two unit balls at a distance of 1 share a lens of 5/12 pi; 5,120 faces lack less than a hundredth
- * of it. */
+/* Two unit balls at a distance of 1 share a lens with a volume of 5/12 pi; for meshes of 5,120
+ * faces, the volume is smaller by less than a hundredth. */
 START_TEST(test_cell_volumes_of_spheres)
 {
     query_model sphere = make_sphere();
@@ -151,7 +152,8 @@ static void check_closed(const ebpo_mesh *mesh)
                       0);
 }
 
-/* Points of the result are in the outer cells, points of the inner cells are in the result. */
+/* Checks that points of the result are in the outer cells, and that points of the inner cells are
+ * in the result. */
 static void check_points(ebpo_boolean *boolean, oracle *outer, oracle *inner)
 {
     uint64_t state = 5, in = 0, sure = 0;
@@ -272,7 +274,7 @@ END_TEST
 
 /* --- distances --- */
 
-/* The result of two boxes in a row: boxes apart, or none. */
+/* The result for two boxes in a row: up to two boxes that do not touch. */
 typedef struct row_of_boxes {
     int operation, count;
     double low[2], high[2]; /* in x; 0 to 1 in y and z */

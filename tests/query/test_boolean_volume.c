@@ -54,7 +54,7 @@ static ebpo_exact_volume measure_pair(ebpo_model *a, ebpo_pose pose_a, ebpo_mode
 static void check_exact(const ebpo_exact_volume *v, double truth)
 {
     ck_assert_int_eq(v->doubt, EBPO_VOLUME_CERTAIN);
-    ck_assert_int_eq(v->volume.metric, EBPO_VALUE_EXACT);
+    ck_assert_int_eq(v->volume.kind, EBPO_VALUE_EXACT);
     ck_assert_msg(v->volume.lo == truth && v->volume.hi == truth, "%.17g .. %.17g, not %.17g",
                   v->volume.lo, v->volume.hi, truth);
 }
@@ -130,7 +130,7 @@ static bool surfaces_intersect(const box *a, const box *b)
     return !apart && !in_a && !in_b;
 }
 
-/* --- poses that keep the grid: quarter turns, twice as large, translations --- */
+/* --- poses that keep the grid: quarter turns, a scale of 2, translations --- */
 
 static ebpo_pose random_pose(uint64_t *state)
 {
@@ -155,7 +155,7 @@ static ebpo_pose random_pose(uint64_t *state)
     return pose;
 }
 
-/* Exact on these poses. */
+/* Converts to model coordinates; exact for these poses. */
 static void to_model(const ebpo_pose *pose, const int w[3], double x[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -312,7 +312,8 @@ static void free_scene(scene *s)
         query_model_free(&s->model[i]);
 }
 
-/* Results reported as exact are exact, and possible exact results are reported as exact. */
+/* Checks that results reported as exact are exact, and that exact results are reported when they
+ * are possible. */
 START_TEST(test_volume_of_boxes_matches_cell_count)
 {
     int positive = 0;
@@ -342,7 +343,7 @@ START_TEST(test_volume_of_possibly_intersecting_boxes)
         if (v.doubt == EBPO_VOLUME_CERTAIN || (!two && !one))
             check_exact(&v, truth);
         else
-            ck_assert_int_eq(v.volume.metric, EBPO_VALUE_BOUND);
+            ck_assert_int_eq(v.volume.kind, EBPO_VALUE_BOUND);
         ck_assert(v.doubt != EBPO_VOLUME_OPERANDS_INTERSECT || two);
         ck_assert(v.doubt != EBPO_VOLUME_FACES_INTERSECT || (one && !two));
         ck_assert(!two || truth == 0 || v.doubt == EBPO_VOLUME_OPERANDS_INTERSECT);
@@ -434,16 +435,16 @@ static void check_nearest_double(double x, const mpq_t truth, int64_t exponent)
         mpq_mul_2exp(units, truth, (mp_bitcnt_t)-exponent);
     distance_to(here, units, x);
     distance_to(other, units, nextafter(x, INFINITY));
-    ck_assert_msg(mpq_cmp(here, other) <= 0, "%.17g is too little", x);
+    ck_assert_msg(mpq_cmp(here, other) <= 0, "%.17g is too small", x);
     distance_to(other, units, nextafter(x, -INFINITY));
-    ck_assert_msg(mpq_cmp(here, other) <= 0, "%.17g is too much", x);
+    ck_assert_msg(mpq_cmp(here, other) <= 0, "%.17g is too large", x);
     mpq_clears(units, here, other, NULL);
 }
 
 static void check_nearest(const ebpo_exact_volume *v, const mpq_t truth)
 {
     ck_assert_int_eq(v->doubt, EBPO_VOLUME_CERTAIN);
-    ck_assert(v->volume.metric == EBPO_VALUE_EXACT && v->volume.lo == v->volume.hi);
+    ck_assert(v->volume.kind == EBPO_VALUE_EXACT && v->volume.lo == v->volume.hi);
     ck_assert(v->scaled == 0 || (fabs(v->scaled) > 0x1p-5 && fabs(v->scaled) < 0x1p5));
     check_nearest_double(v->scaled, truth, v->exponent);
     if (isfinite(v->volume.lo))
@@ -452,7 +453,7 @@ static void check_nearest(const ebpo_exact_volume *v, const mpq_t truth)
         ck_assert(v->exponent > 1000);
 }
 
-/* A ball and a smaller one in it. */
+/* Checks the volumes of a ball and a smaller ball in it. */
 static void check_nested(const query_model *outer, ebpo_pose pose, const query_model *inner,
                          ebpo_pose within)
 {
@@ -554,7 +555,7 @@ START_TEST(test_volume_contact_is_not_exact)
     beside.translation[0] = 1;
     v = measure_pair(cube.model, at, cube.model, beside, EBPO_BOOLEAN_UNION, 1);
     ck_assert_int_eq(v.doubt, EBPO_VOLUME_OPERANDS_INTERSECT);
-    ck_assert_int_eq(v.volume.metric, EBPO_VALUE_BOUND);
+    ck_assert_int_eq(v.volume.kind, EBPO_VALUE_BOUND);
     ck_assert(v.operand[0] == 0 && v.operand[1] == 1 && v.volume.lo == 0 && v.volume.hi >= 2);
     ck_assert(v.file_face[0] < cube.mesh.face_count && v.file_face[1] < cube.mesh.face_count);
     mpq_clear(truth);
@@ -647,7 +648,8 @@ static ebpo_mesh tetrahedron_on_edge(int size)
     return m;
 }
 
-/* One in the other, with a common edge of four faces: they belong to two patches. */
+/* One solid is in the other, and they share an edge with four faces: the faces belong to two
+ * patches. */
 START_TEST(test_volume_patches_at_four_face_edges)
 {
     static const ebpo_rule rules[] = { EBPO_RULE_NONZERO, EBPO_RULE_EVENODD, EBPO_RULE_POSITIVE };
@@ -707,7 +709,7 @@ START_TEST(test_volume_of_partly_loaded_is_refused)
     ebpo_pose at = EBPO_POSE_INIT, away = pose_of(0, 1, 9, 0, 0);
     ebpo_exact_volume v = measure_pair(ball.model, at, parts, away, EBPO_BOOLEAN_UNION, 1);
     ck_assert_int_eq(v.doubt, EBPO_VOLUME_IN_PARTS);
-    ck_assert(v.operand[0] == 1 && v.volume.metric == EBPO_VALUE_BOUND);
+    ck_assert(v.operand[0] == 1 && v.volume.kind == EBPO_VALUE_BOUND);
     ebpo_model_free(parts);
     query_model_free(&ball);
 }

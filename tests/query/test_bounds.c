@@ -84,8 +84,8 @@ static double size_of(const ebpo_bound *b)
     return 255 * fmax((double)b->step[0], fmax((double)b->step[1], (double)b->step[2]));
 }
 
-/* Computes the corner relative to the middle of the child's box: the coordinate along the axis, and
- * the squared distance from it. */
+/* Computes the corner relative to the middle of the child's box: its coordinate along the axis, and
+ * its squared distance from the axis. */
 static void seen_from_middle(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
 {
     mpq_set_ui(e->along, 0, 1);
@@ -104,8 +104,8 @@ static void seen_from_middle(exact *e, const ebpo_bound *b, const ebpo_bound_sla
     mpq_sub(e->square, e->square, e->part);
 }
 
-/* Includes the margin for single precision, 15 u of the size of the node: docs/develop/bounds.md,
- * "Points against slabs". */
+/* Returns true when the corner is in the bounding cylinder with the margin for single precision, 15
+ * u of the size of the node: docs/develop/bounds.md, "Points against slabs". */
 static bool in_slab(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
 {
     double needed = size_of(b) * 0x1p-24 * 15;
@@ -123,8 +123,8 @@ static bool in_slab(exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, 
     return in && mpq_cmp(e->square, e->bound) <= 0;
 }
 
-/* Called after all corners of the child: a bounding cylinder wider than rounding requires excludes
- * too little. */
+/* Returns true when the bounding cylinder is no wider than rounding requires. Call after all
+ * corners of the child. */
 static bool is_tight(const exact *e, const ebpo_bound *b, const ebpo_bound_slab *slab, int lane)
 {
     bool has_axis = slab->axis[0][lane] || slab->axis[1][lane] || slab->axis[2][lane];

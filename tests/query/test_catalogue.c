@@ -1,5 +1,5 @@
 /* Catalogues: combined results against separate results of each model; parts with caps against the
- * whole; budgets that hold few of the models; and callbacks. */
+ * undivided model; budgets that hold few of the models; and callbacks. */
 #include <math.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -25,7 +25,8 @@ static ebpo_mesh box_mesh(double x, double y, double z, double size)
     return ebpo_test_box(low, high, 16);
 }
 
-/* Some overlap, some are in contact, one occurs twice; all have about as many faces. */
+/* Makes mesh i. Some meshes overlap, some are in contact, one occurs twice; all have about as many
+ * faces. */
 static ebpo_mesh mesh_of(int i)
 {
     const double centre[3] = { 0.25 * i, 0.25 * (i % 3), 0.125 * (i % 5) };
@@ -154,7 +155,7 @@ static void judge_rays(const ebpo_ray_hit *got, const uint64_t *intersected)
             }
         }
         if (isinf(best.t) && best.face != EBPO_NO_FACE)
-            continue; /* several may be beyond doubles */
+            continue; /* several distances may be beyond doubles */
         ck_assert_double_eq(got[r].t, best.t);
         ck_assert_uint_eq(got[r].face, best.face);
         ck_assert_int_eq(got[r].side, best.side);
@@ -253,7 +254,7 @@ END_TEST
 
 /* --- parts --- */
 
-/* The box of one side, 0 to 1 or 1 to 2 along x, between caps at x = 1. */
+/* Makes one half of a box, 0 to 1 or 1 to 2 along x; `capped`: with a cap at x = 1. */
 static ebpo_mesh half_box(int side, bool capped)
 {
     const double low[3] = { side, 0, 0 }, high[3] = { side + 1, 1, 1 };
@@ -307,7 +308,7 @@ static void free_halves(halves *h)
     query_model_free(&h->whole);
 }
 
-/* A grid with points on faces, on the cap, on its border, and elsewhere. */
+/* Makes a grid of points: on faces, on the cap, on the border of the cap, and elsewhere. */
 static uint64_t grid_points(double *out)
 {
     uint64_t count = 0;
@@ -389,7 +390,7 @@ static ebpo_status open_counted(void *user, const char *path, ebpo_file **out, e
     if (++o->opened == o->fails) {
         o->opened--;
         error->status = EBPO_E_IO;
-        snprintf(error->message, sizeof error->message, "the tape is torn");
+        snprintf(error->message, sizeof error->message, "the source has failed");
         return EBPO_E_IO;
     }
     return ebpo_open(path, out, error);
@@ -418,7 +419,7 @@ START_TEST(test_catalogue_uses_callers_open_function)
     ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, points, POINTS, NULL, out,
                                            &reported),
                      EBPO_E_IO);
-    ck_assert_str_eq(reported.message, "the tape is torn");
+    ck_assert_str_eq(reported.message, "the source has failed");
     o.fails = 0;
     query_everything(&a, 2);
     ck_assert_int_gt(o.closed, 0);

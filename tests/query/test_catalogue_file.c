@@ -1,5 +1,5 @@
-/* Catalogue files: written files are read again; errors in a file or an entry are detected; and the
- * tree of boxes against all boxes. */
+/* Catalogue files: written files can be read; errors in a file or an entry are detected; the tree
+ * of boxes finds the same models as a test of all boxes. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

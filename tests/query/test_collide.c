@@ -15,7 +15,7 @@ enum { POSES = 12 };
 
 /* --- poses --- */
 
-/* Poses by a unit quaternion. */
+/* Sets the rotation from a quaternion. */
 static void turn_by(ebpo_pose *pose, const double q[4])
 {
     double n = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
@@ -29,8 +29,8 @@ static void turn_by(ebpo_pose *pose, const double q[4])
 
 static double signed_unit(uint64_t *state) { return 2 * ebpo_test_random_unit(state) - 1; }
 
-/* Kinds: identical; quarter turns; shifts by halves and by tiny amounts; rotations; random, also
- * scaled, and far from the origin. */
+/* Makes a pose. The kinds are: identity; quarter turns; translations by halves and by tiny amounts;
+ * rotations; random poses, also scaled and far from the origin. */
 static ebpo_pose make_pose(int kind, double size, uint64_t *state)
 {
     ebpo_pose pose = EBPO_POSE_INIT;
@@ -200,12 +200,13 @@ static void check_first(const pair_list *want, const query_model *a, const ebpo_
     other = turned(other);
     ck_assert_msg(memcmp(&pair, &other, sizeof pair) == 0, "%s: swapped", what);
     const ebpo_face_pair *is = bsearch(&pair, want->pair, want->count, sizeof pair, by_file);
-    ck_assert_msg(is && memcmp(is, &pair, sizeof pair) == 0, "%s: no pair that meets", what);
+    ck_assert_msg(is && memcmp(is, &pair, sizeof pair) == 0,
+                  "%s: the reported pair does not intersect", what);
 }
 
 /* --- in parts --- */
 
-/* The same file, cut at a level, or under the minimum budget (level -1). */
+/* Opens the same file, cut at a level, or under the minimum budget (level -1). */
 static ebpo_model *in_parts(const query_model *m, int cut_level)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
@@ -230,7 +231,7 @@ static void check_first_of_parts(const pair_list *want, ebpo_model *a, const ebp
     bool is = !found;
     for (uint64_t i = 0; i < want->count && !is; i++)
         is = memcmp(&want->pair[i], &pair, sizeof pair) == 0;
-    ck_assert_msg(is, "%s: no pair that meets", what);
+    ck_assert_msg(is, "%s: the reported pair does not intersect", what);
     other = turned(other);
     ck_assert_msg(!found || memcmp(&pair, &other, sizeof pair) == 0, "%s: swapped", what);
 }
@@ -306,12 +307,13 @@ static void check_level(const ebpo_level_result *r, bool meet, double distance, 
     ck_assert_msg(r->distance.lo <= distance && distance <= r->distance.hi,
                   "%s: %.17g is not in %.17g .. %.17g", what, distance, r->distance.lo,
                   r->distance.hi);
-    ck_assert_msg(!meet || (r->contact == -1 && r->common != 0), "%s: faces do meet", what);
-    ck_assert_msg((r->open_pairs == 0) == (r->contact == 0), "%s: pairs that are open", what);
+    ck_assert_msg(!meet || (r->contact == -1 && r->common != 0), "%s: faces intersect", what);
+    ck_assert_msg((r->open_pairs == 0) == (r->contact == 0), "%s: undecided pairs", what);
     ck_assert_msg(!(r->common == 1 && apart), "%s: boxes are apart", what);
 }
 
-/* Whole, in parts and after the deadline, with the true distance in the interval; swapped. */
+/* Checks results for whole models, in parts, after the deadline and swapped: the interval contains
+ * the true distance. */
 static void check_levels(bool meet, const query_model *a, const ebpo_pose *pa, const query_model *b,
                          const ebpo_pose *pb, const char *what)
 {
@@ -377,7 +379,7 @@ static const char *const names[] = {
 enum { FEW_PAIRS = 300000 };
 enum { NAMES = sizeof names / sizeof *names };
 
-/* Scales solids of other sizes to about one. */
+/* Checks two solids, scaled to sizes of about one. */
 static void check_two(const char *name_a, const char *name_b, int variant)
 {
     query_model a, b;
@@ -443,7 +445,7 @@ static bool intersects_beyond(const double a[3][3], const double b[3][3])
     return false;
 }
 
-/* Returns true when a pair counts. */
+/* Returns true when a pair of faces intersects other than as neighbours. */
 static bool intersect_unrelated(const query_model *m, const ebpo_face_pair *p)
 {
     ebpo_pose here = EBPO_POSE_INIT;
@@ -529,8 +531,8 @@ START_TEST(test_collide_levels_bound_result)
 }
 END_TEST
 
-/* A small box within a large one: their boxes intersect, and nothing is found to be merged. Clang's
- * sanitizer detects a sort of memory that was not allocated. */
+/* A small box within a large one: their boxes intersect, and there are no pairs to merge. Clang's
+ * sanitizer would detect a call of qsort with memory that was not allocated. */
 START_TEST(test_collide_boxes_overlap_without_contact)
 {
     static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };

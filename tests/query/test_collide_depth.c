@@ -15,7 +15,7 @@ static const char *const names[] = { "cube", "torus", "sphere", "nested_windings
 enum { NAMES = sizeof names / sizeof *names };
 /* Samples per edge of a face. */
 enum { STEPS = 4 };
-/* Faces of both: larger pairs are tested at a few kinds of poses. */
+/* Product of the numbers of faces; larger pairs of models are tested at a few kinds of poses. */
 enum { MAX_PAIRS = 100000 };
 
 typedef struct two_models {
@@ -119,7 +119,7 @@ static void check_one(const ebpo_certain *got, double lo, double hi, double tole
                   "%s: %.17g .. %.17g, by points %.17g .. %.17g", what, got->lo, got->hi, lo, hi);
     ck_assert_msg(got->lo >= 0 && got->hi - got->lo <= tolerance + 1e-11 * size,
                   "%s: %.17g .. %.17g is too wide", what, got->lo, got->hi);
-    ck_assert_int_eq(got->metric == EBPO_VALUE_EXACT, got->lo == got->hi);
+    ck_assert_int_eq(got->kind == EBPO_VALUE_EXACT, got->lo == got->hi);
 }
 
 static void check_case(two_models *t, int kind, uint64_t *state)
@@ -191,7 +191,7 @@ START_TEST(test_depth_of_boxes_matches_formula)
     run_query(t.collider, &a, &b, 1e-9, 0, got);
     ck_assert_msg(got[0].lo <= depth && depth <= got[0].hi && got[0].hi - got[0].lo <= 2e-9,
                   "%.17g is not in %.17g .. %.17g", depth, got[0].lo, got[0].hi);
-    ck_assert(got[1].lo == 0 && got[1].hi == 0 && got[1].metric == EBPO_VALUE_EXACT);
+    ck_assert(got[1].lo == 0 && got[1].hi == 0 && got[1].kind == EBPO_VALUE_EXACT);
     free_two(&t);
 }
 END_TEST

@@ -16,7 +16,7 @@ static const char *const names[] = { "cube",           "torus",      "touching_s
                                      "sheet",          "cube_twice", "zero_area_face",
                                      "far_away_float", "blob",       "nested_windings" };
 enum { NAMES = sizeof names / sizeof *names };
-/* Faces of both: the reference implementation takes seconds for more. */
+/* Product of the numbers of faces; the reference implementation takes seconds for more. */
 enum { MAX_PAIRS = 100000 };
 
 typedef struct two_models {
@@ -51,7 +51,8 @@ static void check_pair(const reference_faces *f, const ebpo_clearance *got, cons
            !(intersected[i].a == got->pair.file_face_a &&
              intersected[i].b == got->pair.file_face_b && intersected[i].kind == got->pair.kind))
         i++;
-    ck_assert_msg(count == 0 || i < count, "%s: a pair that does not meet so", what);
+    ck_assert_msg(count == 0 || i < count, "%s: the reported pair does not intersect in this way",
+                  what);
     ck_assert_msg((got->distance.hi == 0) == (count > 0), "%s: %g", what, got->distance.hi);
     free(intersected);
     if (count)
@@ -143,7 +144,7 @@ static void check_case(two_models *t, int kind, uint64_t *state)
     ck_assert_msg(memcmp(&got, &other, sizeof got) == 0, "%s: swapped", what);
     ck_assert_msg(memcmp(&got.distance, &warm.distance, sizeof got.distance) == 0, "%s: warm",
                   what);
-    ck_assert_int_eq(got.distance.metric, EBPO_VALUE_EXACT);
+    ck_assert_int_eq(got.distance.kind, EBPO_VALUE_EXACT);
     check_pair(f, &got, what);
     check_points(&got, size, what);
     check_intervals(t, &a, &b, got.distance.hi, size, what);
@@ -199,7 +200,7 @@ static double box_gap(const double a[3][3], const double b[3][3])
     return sqrt(square);
 }
 
-/* The least bounds of all pairs of faces: the distance is in *lo .. *hi. */
+/* Computes the least bounds over all pairs of faces: the distance is in *lo .. *hi. */
 static void distance_of_all(const reference_faces *a, const reference_faces *b, double *lo,
                             double *hi)
 {

@@ -17,7 +17,7 @@ typedef struct gathered {
     /* counts of lines: */
     uint64_t lines, open, parts;
     double length;
-    const struct gathered *all; /* source of their segments */
+    const struct gathered *all; /* the owner of the segments */
     const ebpo_collide_options *how;
     double *points; /* points of all lines, for comparisons */
     uint64_t point_count;
@@ -161,7 +161,7 @@ static ebpo_collide_options swapped(const ebpo_collide_options *how)
     return out;
 }
 
-/* Compares with the lines of swapped models: each runs the other way. */
+/* Compares with the lines of swapped models: each line runs the other way. */
 static void check_swap(const query_model *a, const query_model *b, const ebpo_collide_options *how,
                        const gathered *g)
 {
@@ -194,7 +194,7 @@ static query_model model_of(const char *name, int variant)
     return m;
 }
 
-/* Two boxes with one corner in each other: six edges of their common box. */
+/* Two boxes, each with one corner in the other: the line has the six edges of their common box. */
 START_TEST(test_intersection_lines_of_two_cubes)
 {
     query_model m = model_of("cube", 0);

@@ -135,7 +135,7 @@ static void check_distance(const two_models *t, const ebpo_pose pose[2], const e
     options.pose_a = pose[0];
     options.pose_b = pose[1];
     ASSERT_OK(ebpo_collide_all(t->whole, &options, find, &l, error));
-    ck_assert_msg(l.found, "%s: a pair that does not meet so", what);
+    ck_assert_msg(l.found, "%s: the reported pair does not intersect in this way", what);
 }
 
 static void check_distances(const two_models *t, const ebpo_pose pose[2], const char *what)
@@ -322,17 +322,17 @@ static void check_separation(const two_models *t, const ebpo_pose pose[2], uint6
                     both = separation(t->parts, pose, d, 0), one = separation(t->one, pose, d, 0),
                     late = separation(t->parts, pose, d, 1),
                     swapped = turned_way(separation(t->swapped, back, against, 0));
-    ck_assert_int_eq(want.t.metric, EBPO_VALUE_EXACT);
+    ck_assert_int_eq(want.t.kind, EBPO_VALUE_EXACT);
     ck_assert_msg(memcmp(&want, &both, sizeof want) == 0 && memcmp(&want, &one, sizeof want) == 0 &&
                       memcmp(&want, &swapped, sizeof want) == 0,
-                  "%s: out by %.17g, of parts %.17g, %.17g, %.17g", what, want.t.lo, both.t.lo,
+                  "%s: separation %.17g, of parts %.17g, %.17g, %.17g", what, want.t.lo, both.t.lo,
                   one.t.lo, swapped.t.lo);
     ck_assert_msg(late.t.lo <= want.t.lo && want.t.lo <= late.t.hi, "%s: late separation", what);
 }
 
 /* --- depths --- */
 
-/* Surfaces have no depth: bytes 0. */
+/* Computes the depths. Surfaces have no depth: then all bytes are 0. */
 static void depths(ebpo_collider *c, const two_models *t, const ebpo_pose pose[2], bool back,
                    uint64_t deadline, ebpo_certain out[2])
 {
@@ -423,7 +423,7 @@ static ebpo_collider_stats stats_of(const ebpo_collider *c)
     return out;
 }
 
-/* Reads are counted. */
+/* Checks relations of a model in parts, and counts the reads. */
 static void check_far_relation(ebpo_collider *whole, ebpo_collider *parts, const ebpo_pose pose[2],
                                int32_t expected)
 {
@@ -517,7 +517,8 @@ START_TEST(test_collision_shares_one_budget)
 }
 END_TEST
 
-/* A model that takes up to half is loaded completely; its memory is returned. */
+/* A model that takes up to half of the budget is loaded completely; its memory is returned
+ * afterwards. */
 START_TEST(test_small_models_load_whole)
 {
     query_model m;

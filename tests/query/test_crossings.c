@@ -46,7 +46,7 @@ static ebpo_mesh copy_of(const ebpo_mesh *mesh)
     return out;
 }
 
-/* memory 0: without a workspace */
+/* Finds all pairs. memory 0: without a workspace */
 static found look(const ebpo_mesh *mesh, unsigned threads, uint64_t memory)
 {
     found out = { .sum = EBPO_CROSSINGS_SUMMARY_INIT };
@@ -67,7 +67,7 @@ static found look(const ebpo_mesh *mesh, unsigned threads, uint64_t memory)
     return out;
 }
 
-/* A reported position is in the boxes of both faces. */
+/* Checks that each reported position is in the boxes of both faces. */
 static void check_places(const ebpo_mesh *mesh, const found *f)
 {
     for (uint64_t i = 0; i < f->count; i++)
@@ -183,7 +183,7 @@ END_TEST
 
 /* --- solids --- */
 
-/* Two copies a little apart from each other, or overlapping. */
+/* Makes two copies that are `apart` from each other, or overlap. */
 static ebpo_mesh make_two(uint32_t cut, double apart)
 {
     const double here[3] = { 0, 0, 0 }, there[3] = { apart, 0.1, 0.2 };
@@ -214,7 +214,7 @@ START_TEST(test_crossings_of_coincident_faces)
     memcpy(mesh.faces, faces, sizeof faces);
     mesh.face_count = 4;
     found f = look(&mesh, 1, 0);
-    /* 0 and 1 are one face, 3 overlaps both, and 2 partly */
+    /* 0 and 1 are one face; 3 overlaps both of these, and 2 overlaps them partly */
     ck_assert_uint_eq(f.count, 4);
     ck_assert_uint_eq(f.sum.pairs[EBPO_PAIR_COPLANAR], 4);
     ck_assert_uint_eq(f.sum.faces, 4);

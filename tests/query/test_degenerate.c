@@ -1,5 +1,5 @@
-/* Each degenerate or ill-conditioned case keeps its limits: degenerate_cases.c. `test_stiff TEXT`
- * runs the cases whose name contains the text. */
+/* Each degenerate or ill-conditioned case keeps its limits: degenerate_cases.c. `test_degenerate
+ * TEXT` runs the cases whose name contains the text. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +7,8 @@
 #include "check_main.h"
 #include "degenerate.h"
 
-/* The oracle tests every face for every query. */
+/* Returns the number of queries; few for large meshes, as the oracle tests every face for every
+ * query. */
 static uint64_t queries_for(const degenerate_case *c)
 {
     ebpo_mesh mesh = c->make(c);
@@ -48,7 +49,7 @@ TEST_SUITE(degenerate)
     if (test_arguments[0])
         wanted = test_arguments[0];
     if (!is_any_wanted()) {
-        fprintf(stderr, "test_stiff: no case's name holds '%s'\n", wanted);
+        fprintf(stderr, "test_degenerate: no case has '%s' in its name\n", wanted);
         exit(2);
     }
     Suite *suite = suite_create("stiff");

@@ -35,7 +35,8 @@ static ebpo_error_bound error_bound(query_model *m, int level, double tolerance,
     return out;
 }
 
-/* Only rounding may remain in hi: some 1e-5 of the model. */
+/* Checks the bounds of a level. hi may exceed the true error only by rounding: some 1e-5 of the
+ * model. */
 static void check_level(query_model *m, int level)
 {
     ebpo_error_bound d = error_bound(m, level, 0.05, 500, 1);
@@ -51,8 +52,8 @@ static void check_level(query_model *m, int level)
     if (d.lo > 0) {
         double there = reference_distance(&m->mesh, m->info.solid, d.place);
         ck_assert_msg(fabs(there - d.lo) <= slack,
-                      "%s, %s, level %d: the place is %.17g away, not %.17g", m->name, m->variant,
-                      level, there, d.lo);
+                      "%s, %s, level %d: the farthest point is %.17g away, not %.17g", m->name,
+                      m->variant, level, there, d.lo);
     }
     ck_assert(d.samples <= 500);
     if (d.samples)
@@ -113,7 +114,7 @@ START_TEST(test_error_bound_includes_cavity)
     query_model_make(&m, "hollow box", hollow_box(), &stored);
     ebpo_error_bound d = error_bound(&m, 0, 0.01, 0, 1);
     ck_assert_msg(d.lo > 2.95 && d.hi >= 3 && d.hi < 3.04,
-                  "%.17g to %.17g, and the cavity's middle is 3 from its walls", d.lo, d.hi);
+                  "%.17g to %.17g, but the middle of the cavity is at distance 3", d.lo, d.hi);
     query_model_free(&m);
 }
 END_TEST

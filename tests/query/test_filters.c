@@ -50,7 +50,7 @@ static double power(uint64_t *state, int least, int most)
     return ldexp(1, (int)reference_integer(state, least, most));
 }
 
-/* Faces of all sizes and shapes: slivers, needles, without area, on a grid. */
+/* Makes faces of all sizes and shapes: slivers, needles, faces without area, faces on a grid. */
 static void make_faces(block *b, uint64_t *state)
 {
     memset(b, 0, sizeof *b);
@@ -78,7 +78,8 @@ static void make_faces(block *b, uint64_t *state)
     close_block(b);
 }
 
-/* Near a face, or anywhere in the range of the single-precision search; most at and above faces. */
+/* Makes a point near a face, or anywhere in the range of the single-precision search; most points
+ * are on and above faces. */
 static void make_point(const block *b, uint64_t *state, double p[3])
 {
     unsigned lane = (unsigned)reference_integer(state, 0, EBPO_BLOCK - 1);
@@ -92,7 +93,7 @@ static void make_point(const block *b, uint64_t *state, double p[3])
     }
 }
 
-/* As in the search. */
+/* Returns the probe that the search would use. */
 static ebpo_probe probe_of(const block *b, const double p[3])
 {
     ebpo_probe probe = { .scale = (float)b->s.scale, .scale64 = b->s.scale };
@@ -178,7 +179,8 @@ static void make_line(block *b, ebpo_axis_segment *g, uint64_t *state)
     g->to = high[g->axis];
 }
 
-/* Bits of the exact turns at a face's corners: 1 some left, 2 some right, 4 some neither. */
+/* Returns the exact turns at a face's corners as bits: 1 some left, 2 some right, 4 some neither.
+ */
 static unsigned exact_turns(const block *b, const ebpo_axis_segment *g, unsigned lane)
 {
     int u = g->axis == 2 ? 0 : g->axis + 1, v = g->axis == 0 ? 2 : g->axis - 1;

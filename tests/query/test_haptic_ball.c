@@ -1,6 +1,8 @@
-/* A haptic proxy: never passes a face and never gets closer than its radius, checked by exact
- * arithmetic, for any motion; forces on a plane, by formula; friction; energy; and a haptic step
- * calls nothing that could delay it. */
+/* A haptic proxy:
+ * - for any motion it never passes a face and never gets closer than its radius (checked by exact
+ *   arithmetic)
+ * - forces on a plane, friction and energy follow the formulas
+ * - a haptic step calls nothing that could delay it */
 #include <stdlib.h>
 #include <ebpo/haptic.h>
 #include <math.h>
@@ -100,7 +102,8 @@ static void judge_step(judged *j, const double device[3], bool closely)
     j->energy += work;
     j->step = fmax(j->step, apart(device, j->device));
     ck_assert_msg(j->energy <= j->options.stiffness * j->step * j->step,
-                  "%s: the wall gave %g, the longest step is %g", j->m->name, j->energy, j->step);
+                  "%s: contact gave energy %g, the longest step is %g", j->m->name, j->energy,
+                  j->step);
     judge_way(j, r.proxy);
     if (closely)
         judge_face(j, &r);
@@ -113,7 +116,7 @@ static void judge_step(judged *j, const double device[3], bool closely)
     }
 }
 
-/* Returns a position outside, far enough from faces; false: this is none. */
+/* Chooses a position; returns false when it is not outside and far enough from faces. */
 static bool begin(judged *j, uint64_t *state)
 {
     const ebpo_info *info = ebpo_file_info(j->m->file);
@@ -187,7 +190,7 @@ START_TEST(test_haptic_proxy_never_penetrates)
         ASSERT_OK(ebpo_haptic_check(j.haptic, error));
         ebpo_haptic_free(j.haptic);
     }
-    ck_assert_msg(forbidden == 0, "%lu calls in ticks that may not be", forbidden);
+    ck_assert_msg(forbidden == 0, "%lu forbidden calls in haptic steps", forbidden);
     query_model_free(&m);
 }
 END_TEST
@@ -272,7 +275,7 @@ START_TEST(test_haptic_cube_force_matches_planes)
     ck_assert_double_le(fabs(c.r.depth - (0.1 + radius)), 3e-6);
     cube_move(&c, 0.7, 0.6, 0.8, 50); /* along it: edges within the plane do not matter */
     check_vector(c.r.proxy, 0.7, 0.6, 1 + radius, 3e-6);
-    cube_move(&c, 0.7, 0.6, -3, 1); /* out at the bottom: still on top */
+    cube_move(&c, 0.7, 0.6, -3, 1); /* the device leaves at the bottom, the proxy is still on top */
     check_vector(c.r.proxy, 0.7, 0.6, 1 + radius, 3e-6);
     cube_move(&c, 1.5, 0.6, -3, 40); /* over the edge, and down outside */
     check_vector(c.r.proxy, 1.5, 0.6, -3, 3e-6);
@@ -347,7 +350,8 @@ START_TEST(test_haptic_friction_follows_coulomb)
 }
 END_TEST
 
-/* Over the top of a cube, around its edge x = z = 1 and down its side: at part 0 to 3. */
+/* Computes a point of a path over the top of a cube, around its edge x = z = 1 and down its side;
+ * `part` is 0 to 3. */
 static void around_edge(double part, double at[3])
 {
     double turn = fmin(fmax(part - 1, 0), 1) * 1.5707963267948966;
@@ -356,7 +360,7 @@ static void around_edge(double part, double at[3])
     at[2] = 1 + 0.15 * cos(turn) - 0.3 * fmax(part - 2, 0);
 }
 
-/* Where normals of faces jump by a right angle. */
+/* The forces are continuous where the normals of faces jump by a right angle. */
 START_TEST(test_haptic_normals_are_continuous)
 {
     cube_device c;
@@ -409,8 +413,8 @@ START_TEST(test_haptic_invalid_options_are_refused)
 END_TEST
 
 /* For any damping, and although rounding rotates the path from device to proxy, far from 0 and with
- * friction: no force towards a face that the spring pushes away from. Which of a face and its edge
- * is nearer is known to the square root of the rounding error, 1e-7. */
+ * friction: no force towards a face that the spring pushes away from. Whether a face or its edge is
+ * nearer is known only to the square root of the rounding error, 1e-7. */
 START_TEST(test_haptic_damping_never_pulls)
 {
     static const double offsets[] = { 0, 1e7, 1e13 }, factors[] = { 1, 1e3, 1e6 };
@@ -487,7 +491,7 @@ static uint32_t step_of(ebpo_haptic *haptic, uint64_t kind, const double at[3], 
 }
 
 /* Far away there is no error; around the target there are more faces than a box can hold. Each step
- * reports it from then on, and loaded faces still constrain the proxy. */
+ * there reports the error, and loaded faces still constrain the proxy. */
 START_TEST(test_haptic_step_reports_stopped_loading)
 {
     static const double zero[3] = { 0, 0, 0 }, points[2][3] = { { 0.6, 0, 0 }, { -0.6, 0, 0 } };
@@ -528,8 +532,8 @@ START_TEST(test_haptic_step_reports_stopped_loading)
 END_TEST
 
 /* The last loaded box may be the previous one, when a step has put it aside; when the proxy is
- * placed there again, no other box is loaded for it. This needs a slow loader, so the test does it
- * directly. */
+ * placed there again, no other box is loaded for it. In use this needs a slow loader, so the test
+ * creates the state directly. */
 START_TEST(test_haptic_place_uses_previous_box)
 {
     cube_device c;
@@ -551,7 +555,7 @@ START_TEST(test_haptic_place_uses_previous_box)
 }
 END_TEST
 
-/* There are more faces around it than a step visits; so it is placed elsewhere. */
+/* There are more faces around the ball than a step visits, so the ball is placed elsewhere. */
 START_TEST(test_haptic_ball_leaves_dense_faces)
 {
     static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };

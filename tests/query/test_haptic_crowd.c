@@ -105,7 +105,7 @@ static void ball_begin(ball *b, const char *name, ebpo_mesh mesh, double radius,
 
 static void ball_end(ball *b)
 {
-    ck_assert_msg(forbidden == 0, "%lu calls in ticks that may not be", forbidden);
+    ck_assert_msg(forbidden == 0, "%lu forbidden calls in haptic steps", forbidden);
     ASSERT_OK(ebpo_haptic_check(b->haptic, error));
     ebpo_haptic_free(b->haptic);
     query_model_free(&b->m);
@@ -114,7 +114,7 @@ static void ball_end(ball *b)
 /* Maximum number of faces visited in a step of an open ball, and for the normal. */
 enum { FACES_OF_A_STEP = 512 + 384 };
 
-/* Moves until the ball is at rest: in at most so many steps, except steps that wait for faces. */
+/* Moves until the ball is at rest, in at most `most` steps except steps that wait for faces. */
 static void ball_move(ball *b, const double device[3], uint32_t most)
 {
     int patience = 100000;
@@ -128,7 +128,7 @@ static void ball_move(ball *b, const double device[3], uint32_t most)
             pause_a_little();
             continue;
         }
-        ck_assert_msg(++b->step_count <= most, "%s: not at rest after %u ticks", b->m.name, most);
+        ck_assert_msg(++b->step_count <= most, "%s: not at rest after %u steps", b->m.name, most);
         if (!(b->r.flags & EBPO_HAPTIC_INCOMPLETE))
             return;
     }
@@ -151,8 +151,8 @@ static void ball_rest(ball *b, const double device[3], uint32_t most)
     } while (apart(before, b->r.proxy) > 1e-3 * b->options.skin);
 }
 
-/* At rest: in contact with a face, pushed away from the device; and every position nearer to the
- * device is too near to a face. */
+/* Checks a ball at rest: it is in contact with a face and pushed away from the device, and every
+ * position nearer to the device is too near to a face. */
 static void judge_rest(const ball *b, const double device[3], uint64_t *state)
 {
     double radius = b->options.radius, skin = b->options.skin, back[3];
@@ -187,8 +187,8 @@ static void judge_rest(const ball *b, const double device[3], uint64_t *state)
 
 /* --- cases --- */
 
-/* By formula: a box of 19,200 faces is a box. More than a thousand of them are in the range of the
- * ball at the edge. */
+/* The expected results are those of a box, although it has 19,200 faces. More than a thousand of
+ * them are in the range of the ball at the edge. */
 START_TEST(test_haptic_large_ball_rests_on_box)
 {
     static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
@@ -252,7 +252,7 @@ START_TEST(test_haptic_ball_fills_cavity)
 }
 END_TEST
 
-/* Returns the middle of the model's box if it is no further than its faces. */
+/* Computes the middle of the model's box. */
 static void middle_of(const ball *b, double out[3])
 {
     const ebpo_info *info = ebpo_file_info(b->m.file);
@@ -288,8 +288,7 @@ static void haptic_model(const char *name, ebpo_mesh mesh, double part, uint64_t
     middle_of(&b, middle);
     double gap = from_all(&b.m.mesh, start) - b.options.radius, at[3];
     for (int step_seconds = 0; gap > 4 * b.options.skin;
-         step_seconds++) { /* free: as far as the reference
-                            * implementation allows */
+         step_seconds++) { /* free motion, as far as the reference implementation allows */
         ck_assert_int_lt(step_seconds, 200);
         double way = apart(start, middle), go = fmin(1, (gap - 2 * b.options.skin) / way);
         for (int k = 0; k < 3; k++)

@@ -1,6 +1,6 @@
 /* Haptic proxies and tools on real models (the folder EBPO_MODELS) and on degenerate or
- * ill-conditioned cases: they pass no face and keep their distance, and gain no energy from
- * contact. Checked by exact arithmetic on faces found by a separate grid around each step.
+ * ill-conditioned cases: they pass no face, keep their distance, and gain no energy from contact.
+ * This is checked by exact arithmetic on the faces around each step, which a separate grid finds.
  * EBPO_TEST_SCALE=500 plays a million steps each. */
 #include <stdlib.h>
 #include <ebpo/haptic.h>
@@ -95,7 +95,7 @@ static void grid_make(grid *g, const ebpo_mesh *mesh)
     for (int c = 0; c < CELLS; c++)
         g->first[c + 1] += g->first[c];
     g->list = malloc((g->first[CELLS] + 1) * sizeof *g->list);
-    for_all(g, enter); /* and each `first` now belongs to the next one */
+    for_all(g, enter); /* each `first` is now the beginning of the next cell */
     for (int c = CELLS; c > 0; c--)
         g->first[c] = g->first[c - 1];
     g->first[0] = 0;
@@ -240,7 +240,8 @@ static void judge_energy(device *h, const double to[7], double turn)
     h->energy += h->force[5] * turn;
     h->step = fmax(h->step, sqrt(square + h->arm * h->arm * turn * turn));
     ck_assert_msg(h->energy <= h->options.stiffness * h->step * h->step * (1 + 1e-9),
-                  "%s: the wall gave %g, the longest step is %g", h->m->name, h->energy, h->step);
+                  "%s: contact gave energy %g, the longest step is %g", h->m->name, h->energy,
+                  h->step);
 }
 
 static void step_seconds(device *h, const double to[7], double turn)
@@ -353,7 +354,7 @@ static uint64_t play(const query_model *m, bool tool, uint64_t step_count, uint6
         grid_free(&h.grid);
         break;
     }
-    ck_assert_msg(forbidden == 0, "%lu calls in ticks that may not be", forbidden);
+    ck_assert_msg(forbidden == 0, "%lu forbidden calls in haptic steps", forbidden);
     return contacts;
 }
 
@@ -375,7 +376,7 @@ START_TEST(test_haptic_on_real_models)
     query_model_make(&m, names[_i / 2], mesh, &query_variants[0]);
     uint64_t step_count = query_scaled(2000);
     uint64_t contacts = play(&m, _i % 2, step_count, 40 + (uint64_t)_i);
-    ck_assert_msg(contacts > 0 || step_count < 2000, "%s: never touched", names[_i / 2]);
+    ck_assert_msg(contacts > 0 || step_count < 2000, "%s: never in contact", names[_i / 2]);
     query_model_free(&m);
 }
 END_TEST
@@ -386,14 +387,14 @@ START_TEST(test_haptic_on_degenerate_models)
     ebpo_error error = EBPO_ERROR_INIT;
     query_model m;
     if (_i / 2 % 12 && ebpo_test_scale() < 1)
-        return; /* a share of them */
+        return; /* runs only a share of the cases */
     ebpo_mesh mesh = c->make(c);
     if (mesh.face_count > 20000 || c->status != EBPO_OK) {
         ebpo_mesh_free(&mesh);
         return;
     }
     if (query_model_try(&m, c->name, mesh, &query_variants[0], &error) != EBPO_OK)
-        return; /* test_stiff checks that */
+        return; /* test_degenerate checks that */
     play(&m, _i % 2, query_scaled(2000), 80 + (uint64_t)_i);
     query_model_free(&m);
 }

@@ -130,9 +130,9 @@ START_TEST(test_haptic_probe_bounds_exact_distance)
                      &query_variants[_i % query_variant_count]);
     begin(&p, &m);
     roam(&p, query_scaled(4000), &state);
-    ck_assert_uint_gt(p.close, 0); /* it rests until then */
+    ck_assert_uint_gt(p.close, 0); /* the probe rests until its bounds are close */
     ck_assert_uint_ge(p.sided, p.close);
-    ck_assert_msg(forbidden == 0, "%lu calls in ticks that may not be", forbidden);
+    ck_assert_msg(forbidden == 0, "%lu forbidden calls in haptic steps", forbidden);
     ASSERT_OK(ebpo_haptic_check(p.haptic, error));
     ebpo_haptic_free(p.haptic);
     query_model_free(&m);
@@ -171,7 +171,8 @@ START_TEST(test_haptic_probe_bounds_after_long_jump)
 }
 END_TEST
 
-/* On faces, edges and corners of a cube, and through them along its planes. */
+/* The probe is on faces, edges and corners of a cube, and moves through these along the planes of
+ * the cube. */
 START_TEST(test_haptic_probe_on_cube_faces)
 {
     static const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };

@@ -1,6 +1,8 @@
-/* A tool of many points: none passes a face or gets closer than half a skin, for any motion and
- * rotation of device and tool, checked by exact arithmetic; force and torque on a plane, by
- * formula; energy; and a haptic step calls nothing that could delay it. */
+/* A tool of many points:
+ * - for any motion and rotation of device and tool, no point passes a face or gets closer than half
+ *   a skin (checked by exact arithmetic)
+ * - force and torque on a plane, and the energy, follow the formulas
+ * - a haptic step calls nothing that could delay it */
 #include <stdlib.h>
 #include <ebpo/haptic.h>
 #include <math.h>
@@ -106,7 +108,7 @@ static void judge_way(judged *j, const ebpo_haptic_tool_result *r)
     }
 }
 
-/* A moving and rotating device gains no more than its longest step may. */
+/* Checks that a moving and rotating device gains no more energy than its longest step allows. */
 static void judge_energy(judged *j, const pose *device)
 {
     double turn[3], way[3];
@@ -117,7 +119,8 @@ static void judge_energy(judged *j, const pose *device)
     }
     j->step = fmax(j->step, hypot(length(way), j->arm * length(turn)));
     ck_assert_msg(j->energy <= j->options.stiffness * j->step * j->step * (1 + 1e-9),
-                  "%s: the wall gave %g, the longest step is %g", j->m->name, j->energy, j->step);
+                  "%s: contact gave energy %g, the longest step is %g", j->m->name, j->energy,
+                  j->step);
 }
 
 static ebpo_haptic_tool_result judge_step(judged *j, const pose *device, bool closely)
@@ -162,7 +165,7 @@ static ebpo_status begin(judged *j, query_model *m, const double place[3], ebpo_
     return ebpo_haptic_new(m->model, &j->options, place, &j->haptic, error);
 }
 
-/* Uses points in a ball; false: the position was unsuitable. */
+/* Begins with a tool of points in a ball; returns false when the position is unsuitable. */
 static bool begin_wild(judged *j, query_model *m, uint64_t *state)
 {
     const ebpo_info *info = ebpo_file_info(m->file);
@@ -238,7 +241,7 @@ START_TEST(test_haptic_tool_never_penetrates)
         ebpo_haptic_free(j.haptic);
     }
     ck_assert(contacts > 0 || ebpo_test_scale() < 1);
-    ck_assert_msg(forbidden == 0, "%lu calls in ticks that may not be", forbidden);
+    ck_assert_msg(forbidden == 0, "%lu forbidden calls in haptic steps", forbidden);
     query_model_free(&m);
 }
 END_TEST
@@ -247,8 +250,8 @@ END_TEST
 
 enum { PUSHING = 6 };
 
-/* Computes the motion allowed by contacts that is nearest to the wanted one: Hildreth's method for
- * all of them, a thousand iterations. */
+/* Computes the motion allowed by contacts that is nearest to the wanted one: a thousand iterations
+ * of Hildreth's method over all contacts. */
 static void hold_plainly(const ebpo_tool_contacts *all, const double want[EBPO_SCREW],
                          double out[EBPO_SCREW])
 {
@@ -272,7 +275,7 @@ static double apart_by(const double a[EBPO_SCREW], const double b[EBPO_SCREW])
     return ebpo_screw_length(way);
 }
 
-/* A point with a lever of up to 3 arms on a face of any direction upward. */
+/* Makes a contact of a point, with a lever of up to 3 arms, on a face with any upward normal. */
 static void random_contact(uint64_t *state, ebpo_tool_contact *c)
 {
     double lever[3];
@@ -383,7 +386,8 @@ START_TEST(test_haptic_plate_rests_on_cube)
     ck_assert_double_ge(r.normal[2], 0.999);
     go(&j, (const double[3]){ 0.55, 0.45, 0.9 }, 20, &r); /* along it */
     check_vector(r.proxy, 0.55, 0.45, 1 + 1e-4, 2e-4);
-    go(&j, (const double[3]){ 0.55, 0.45, -2 }, 1, &r); /* out at the bottom: still on top */
+    go(&j, (const double[3]){ 0.55, 0.45, -2 }, 1,
+       &r); /* the device leaves at the bottom, the tool is still on top */
     ck_assert_double_ge(r.proxy[2], 0.999);
     cube_end(&j, &m);
 }

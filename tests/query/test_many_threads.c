@@ -3,8 +3,8 @@
  * everything in memory, and an error reaches only the caller whose read failed. Reads a file, a
  * source and a server; test_many_threads [FAULTY_SERVER]
  *
- * EBPO_TEST_SECONDS=600 runs for so long with each of them, on larger models. Without it each
- * thread runs some queries. For ThreadSanitizer and AddressSanitizer. */
+ * EBPO_TEST_SECONDS=600 runs for 600 seconds with each of these three, on larger models. Without
+ * the variable each thread runs some queries. Intended for ThreadSanitizer and AddressSanitizer. */
 #include <inttypes.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -196,8 +196,8 @@ static void report(worker *w, int kind, uint64_t number, const char *what)
                 names[w->which], what);
 }
 
-/* Returns true for an expected failure: of its own read, or of a read by a library thread on its
- * behalf. */
+/* Returns true for an expected failure: of a read by the worker, or of a read by a library thread
+ * for the worker. */
 static bool is_own(const worker *w, int kind, bool wanted, const ebpo_error *error)
 {
     char own[64];
@@ -207,7 +207,7 @@ static bool is_own(const worker *w, int kind, bool wanted, const ebpo_error *err
     return mix_has_workers(kind) && strstr(error->message, "refused by background");
 }
 
-/* The first query of each thread meets injected faults, so that there are some for any number of
+/* The first query of each thread has injected faults, so that there are some for any number of
  * queries: not everything is in memory yet. */
 static void query_one(worker *w, bool first)
 {
@@ -224,11 +224,11 @@ static void query_one(worker *w, bool first)
         if (status != EBPO_E_IO || !is_own(w, kind, wanted, &error))
             report(w, kind, number, error.message[0] ? error.message : "fails without a message");
     } else if (hash != right[w->which][kind][number]) {
-        report(w, kind, number, "another answer than that of one thread");
+        report(w, kind, number, "the result differs from that of one thread");
     }
 }
 
-/* Replaces the context by one of either model, one at a time. */
+/* Replaces the context by a context of one of the two models. */
 static bool change_context(worker *w)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -256,7 +256,7 @@ static void *work(void *user)
             break;
         query_one(w, i == 0);
         if (ebpo_budget_get_stats(s->budget, &stats) != EBPO_OK || stats.memory > stats.budget)
-            report(w, 0, 0, "more is taken than the budget");
+            report(w, 0, 0, "more memory is used than the budget");
     }
     ebpo_context_free(w->querier.context);
     return NULL;
@@ -333,7 +333,7 @@ START_TEST(test_many_threads_match_single_thread)
         pthread_join(thread[i], NULL);
     for (int kind = 0; kind < MIX_KINDS; kind++)
         queried += s.queried[kind];
-    printf("%" PRIu64 " questions, %" PRIu64 " refused, %" PRIu64 " wrong\n", queried, s.refused,
+    printf("%" PRIu64 " queries, %" PRIu64 " refused, %" PRIu64 " wrong\n", queried, s.refused,
            s.wrong);
     free_models(&s);
     ck_assert_uint_eq(s.wrong, 0);

@@ -66,7 +66,8 @@ static void verify(const result *r)
                   report.labels.first, report.lists.first);
 }
 
-/* Every gray node and leaf of the coarser file is one in the finer file. */
+/* Returns the number of gray nodes and leaves of the coarser file that are not gray nodes or leaves
+ * in the finer file. */
 static uint64_t missing(ebpo_file *coarse, ebpo_file *fine_file, uint64_t *nodes)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -125,7 +126,7 @@ static uint64_t missing(ebpo_file *coarse, ebpo_file *fine_file, uint64_t *nodes
     return out;
 }
 
-/* Leaves cannot be refined by any limit. */
+/* Checks that subsets keep the requested errors; leaves cannot be refined. */
 static void keeps_its_word(query_model *m, uint32_t parts)
 {
     ebpo_subset_options o = EBPO_SUBSET_OPTIONS_INIT;
@@ -143,9 +144,9 @@ static void keeps_its_word(query_model *m, uint32_t parts)
         double hi = reach(m, r.file, r.info->level_count - 1),
                reference = reference_reach(r.file, r.info->level_count - 1, &m->mesh, m->info.solid,
                                            300, 1);
-        ck_assert_msg(hi <= e * 1.06 + 1e-5 * m->size, "%s: asked for %g, and it may reach %g",
+        ck_assert_msg(hi <= e * 1.06 + 1e-5 * m->size, "%s: requested error %g, upper bound %g",
                       m->name, e, hi);
-        ck_assert_msg(reference <= e + 1e-9 * m->size, "%s: asked for %g, and it reaches %g",
+        ck_assert_msg(reference <= e + 1e-9 * m->size, "%s: requested error %g, reference %g",
                       m->name, e, reference);
         ck_assert(r.info->pruned ? r.info->kept_error == e : r.info->kept_error == 0);
         if (!first) {

@@ -1,5 +1,5 @@
-/* Tests the reference of the tests: against closed forms, against itself without its shortcuts, and
- * against the exact predicates of the library. */
+/* Tests the reference implementation of the tests (oracle): against closed forms, against itself
+ * without its shortcuts, and against the exact predicates of the library. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -64,7 +64,7 @@ START_TEST(test_oracle_rounds_at_range_limits)
     ck_assert_double_eq(rounded(1, 0, 0, 1, -2148, true), 0x1p-1074);
     /* half of the smallest double: ties to even */
     ck_assert_double_eq(rounded(1, 0, 0, 1, -2150, true), 0);
-    /* a little more than half */
+    /* a little more than half of the smallest double */
     ck_assert_double_eq(rounded(1, 200, 1, 1, -2350, true), 0x1p-1074);
     ck_assert_double_eq(rounded(9, 0, 0, 1, -2150, true), 0x1p-1073); /* 1.5 times the smallest: to
                                                                        * 2 */
@@ -133,7 +133,7 @@ START_TEST(test_oracle_cube_distance_matches_formula)
 }
 END_TEST
 
-/* All faces, one by one, without skipping any. */
+/* Compares with a search through all faces that skips none. */
 START_TEST(test_oracle_omitted_faces_are_never_nearest)
 {
     const char *names[] = { "sphere",    "cone_slivers",   "needle", "giant_and_dust",
@@ -303,7 +303,7 @@ START_TEST(test_oracle_rays_along_edges_and_vertices)
         double first, last;
         int side; /* side of the first hit */
     } rows[] = {
-        { { -1, 1, 2 }, { 1, 0, 0 }, INFINITY, 2, 1, 5, 1 }, /* through two faces */
+        { { -1, 1, 2 }, { 1, 0, 0 }, INFINITY, 2, 1, 5, 1 }, /* crosses two faces */
         { { -1, 1, 2 }, { 1, 0, 0 }, 1, 1, 1, 1, 1 },        /* up to the side */
         { { -1, 1, 2 }, { 1, 0, 0 }, 0.999, 0, 0, 0, 0 },
         /* from inside; t counts lengths of the direction */

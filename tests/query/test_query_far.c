@@ -29,11 +29,12 @@ static const struct {
 };
 enum { CASES = sizeof cases / sizeof *cases, KINDS = 7, POINTS = 200 };
 
-/* From 1.6 box sizes away, which the other search still handles, to the greatest doubles. */
+/* Returns a distance from 1.6 box sizes, which the search for near points still handles, to the
+ * greatest doubles. */
 static double magnitude(const query_model *m, uint64_t *state)
 {
     double least = log2(m->size) + 1, most = 1022;
-    if (ebpo_test_random(state) % 4 == 0) /* near the end of the other search */
+    if (ebpo_test_random(state) % 4 == 0) /* near the limit of the search for near points */
         most = fmin(least + 8, most);
     least = fmin(least, 1021);
     return exp2(least + (most - least) * ebpo_test_random_unit(state));

@@ -86,8 +86,8 @@ static void query_loaded(queried *a, const ebpo_model_options *how)
     ebpo_model_free(model);
 }
 
-/* With EBPO_TEST_SCALE below 1 each test takes other cases than the previous one, so that all cases
- * are run. */
+/* With EBPO_TEST_SCALE below 1 each test runs other cases than the test before, so that together
+ * they run all cases. */
 
 START_TEST(test_results_same_in_all_load_modes)
 {
@@ -323,8 +323,8 @@ START_TEST(test_deadline_limited_results_are_certain)
             ASSERT_OK(ebpo_context_new(model, &context, error));
             query_limited(&a, context, EBPO_ENVELOPES_AUTO, &options);
             for (uint64_t i = 0; i < a.count;
-                 i++) /* even after the shortest time, some face is in the root cell; beyond the
-                       * largest double nothing is known */
+                 i++) /* even after the shortest time, a bound is known, as some face is in the root
+                         cell; distances beyond the largest double are not known */
                 ck_assert(isfinite(a.distance[i].hi) || isinf(a.truth[i].distance) ||
                           fabs(a.points[3 * i]) + fabs(a.points[3 * i + 1]) +
                                   fabs(a.points[3 * i + 2]) >
@@ -353,7 +353,7 @@ START_TEST(test_thesis_mode_bounds_hold)
                           "mode %d, point (%a, %a, %a): [%a, %a], it is %a", mode, a.points[3 * i],
                           a.points[3 * i + 1], a.points[3 * i + 2], got->lo, got->hi, d);
             if (mode != EBPO_DISTANCE_ENVELOPE &&
-                isfinite(got->distance)) { /* the distance of some face */
+                isfinite(got->distance)) { /* this is the distance of some face */
                 ck_assert_double_ge(fabs(got->distance), d);
                 ck_assert(got->face != EBPO_NO_FACE);
             }
@@ -601,7 +601,7 @@ static void *query_often(void *user)
     return NULL;
 }
 
-/* Points close to faces, on either side: in leaves. */
+/* Points close to faces, on either side: so that they are in leaves. */
 static void begin_in_leaves(queried *a, int number)
 {
     query_model_make(&a->m, cases[number].name, query_solid_by_name(cases[number].name),

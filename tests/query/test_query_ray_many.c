@@ -135,8 +135,8 @@ END_TEST
 
 /* --- closed solids --- */
 
-/* Aims from p about towards a vertex, a point of an edge or of a face; false: there is no
- * direction. */
+/* Aims from p approximately towards a vertex or a point of an edge or face; returns false when
+ * there is no direction. */
 static bool aim(const query_model *m, const double p[3], uint64_t *state, ebpo_ray *out)
 {
     static const double weights[][3] = {

@@ -349,7 +349,7 @@ START_TEST(test_triangle_beside_cell_is_returned_once)
 }
 END_TEST
 
-/* All triangles, and triangles of some blocks: each once. */
+/* Checks that a query for all triangles, and a query for some blocks, return each triangle once. */
 static void take_all(const query_model *m, ebpo_context *context)
 {
     for (int turn = 0; turn < 2; turn++) {
@@ -367,8 +367,8 @@ static void take_all(const query_model *m, ebpo_context *context)
     }
 }
 
-/* More than the budget holds at once; and the callback ends the query. The file is large enough for
- * separate subtrees: for a remote file, many are requested at a time. */
+/* All triangles are more than the budget holds at once. The callback can end the query. The file is
+ * large enough for separate subtrees, of which a remote file requests many at a time. */
 START_TEST(test_triangles_of_whole_model_keep_budget)
 {
     query_model m;

@@ -189,8 +189,8 @@ END_TEST
 
 /* --- degenerate faces --- */
 
-/* Writes a tetrahedron at a scale, and two faces without area or nearly so; its vertices have 1, 2,
- * 4, 8, and the one far along an edge NaN. */
+/* Writes a tetrahedron of a given size, and two faces without area or nearly so. The vertices of
+ * the tetrahedron have the values 1, 2, 4 and 8; the vertex far along an edge has NaN. */
 static void write_hard(double size)
 {
     FILE *out = fopen(scratch("h.ply"), "w");
@@ -219,7 +219,7 @@ START_TEST(test_sample_of_slivers_at_any_scale)
         convert(scratch("h.ply"), scratch("h.ebpo.h5"), 0);
         queried a = run_query(scratch("h.ebpo.h5"), "q");
         ck_assert_double_eq(at(&a, 0, s / 4, s / 2, 0), 0.25 * 1 + 0.5 * 4 + 0.25 * 2);
-        ck_assert_double_eq(at(&a, 0, s / 2, 0, 0), 1.5);  /* 2: of weight 0 */
+        ck_assert_double_eq(at(&a, 0, s / 2, 0, 0), 1.5);  /* vertex 2 has weight 0 */
         ck_assert_double_eq(at(&a, 0, -s, s / 2, 0), 2.5); /* beside it: nearest by weights */
         ck_assert_double_eq(at(&a, 4, s / 4, 0, 0), 1.25); /* without area: along 0 1 */
         ck_assert_double_eq(at(&a, 4, s / 2, s, s), 1.5);

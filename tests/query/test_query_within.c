@@ -122,7 +122,8 @@ static void compare_first(const current_query *q)
     free(s.face);
 }
 
-/* Radii at which a face is just within, or just not; counts near the number of all faces. */
+/* Checks a point, with radii at which a face is just within or just outside, and counts near the
+ * number of all faces. */
 static void check_point(const query_model *m, ebpo_context *context, const double *p,
                         uint64_t *state)
 {
@@ -333,7 +334,7 @@ END_TEST
 static bool never(void *user, const ebpo_near_face *face)
 {
     (void)user, (void)face;
-    ck_abort_msg("a face of a question that cannot be asked");
+    ck_abort_msg("an invalid query returned a face");
     return false;
 }
 

@@ -26,7 +26,8 @@ typedef struct grid_model {
     bool solid;
 } grid_model;
 
-/* Parts share their vertices: otherwise they would not be closed. */
+/* Returns the index of a vertex. Faces of parts share vertices, as parts would otherwise not be
+ * closed. */
 static uint32_t vertex(ebpo_mesh *m, const double x[3])
 {
     for (uint64_t i = 0; i < m->vertex_count; i++) {
@@ -38,7 +39,7 @@ static uint32_t vertex(ebpo_mesh *m, const double x[3])
     return ebpo_test_append_vertex(m, x[0], x[1], x[2]);
 }
 
-/* The four corners of a rectangle, and one of its diagonals; or four faces around its middle. */
+/* Adds a rectangle: two faces at one of its diagonals, or four faces around its middle. */
 static void add_rectangle(ebpo_mesh *m, const double corner[4][3], bool reversed, unsigned how)
 {
     uint32_t v[5], n = 4;
@@ -57,7 +58,7 @@ static void add_rectangle(ebpo_mesh *m, const double corner[4][3], bool reversed
     ebpo_test_append_face(m, v[how], v[how + 2], v[(how + 3) % 4]);
 }
 
-/* The side of a box across `axis`; its normal points up the axis unless `reversed`. */
+/* Adds the side of a box across `axis`; its normal points up the axis unless `reversed`. */
 static void add_side(ebpo_mesh *m, const part *p, int axis, bool upper, bool reversed, unsigned how)
 {
     int u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -247,7 +248,7 @@ static int32_t reference_of_surface(const cells *surface, const cells *solid)
     return f.both ? EBPO_INTERSECTING : f.touch ? EBPO_TOUCHING : EBPO_DISJOINT;
 }
 
-/* Squares of a surface, a bit for each axis. */
+/* Marks the squares of a surface, with a bit for each axis. */
 static void mark_squares(const cells *s, int8_t *mark)
 {
     for (int i = 0; i < s->parts; i++) {
@@ -344,7 +345,7 @@ static ebpo_model *in_parts(const query_model *m, int cut_level)
     return out;
 }
 
-/* Swapped, and in parts. */
+/* Runs the query also swapped, and in parts. */
 static int32_t query_both_ways(const query_model *a, const ebpo_pose *pa, const query_model *b,
                                const ebpo_pose *pb)
 {
@@ -367,7 +368,7 @@ static query_model make(const grid_model *g, uint64_t seed, int variant)
     return m;
 }
 
-/* At some poses of both models. */
+/* Checks two models at some poses of both. */
 static void check_models(const grid_model *a, const grid_model *b, uint64_t seed, int poses)
 {
     int variant[2] = { (int)(seed % 4), (int)(seed / 4 % 4) };

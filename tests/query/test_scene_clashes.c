@@ -46,7 +46,8 @@ static void begin(void)
     write_model("m2.ebpo.h5", sheet());
 }
 
-/* On a grid of quarters, some of half the size: so that instances nest and are in contact. */
+/* Makes a scene with instances on a grid of quarters, some of half the size, so that instances nest
+ * and are in contact. */
 static ebpo_scene *some_scene(uint64_t seed)
 {
     uint64_t state = 31 * seed + 7;

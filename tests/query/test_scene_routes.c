@@ -160,7 +160,8 @@ START_TEST(test_packed_scene_gives_same_results)
 }
 END_TEST
 
-/* For one time only: another time gives the same result as before, or an error. */
+/* A scene is packed for one time only: another time gives the same result as the original scene, or
+ * an error. */
 START_TEST(test_packed_scene_refuses_omitted_time)
 {
     uint64_t refused = 0, rounds = query_scaled(60) + 3;
@@ -317,7 +318,7 @@ END_TEST
 
 /* --- threads --- */
 
-/* Runs all queries of a scene with so many threads; loads the models again. */
+/* Results of all queries of a scene, with freshly loaded models. */
 typedef struct all_results {
     intersected intersected;
     ways ways;

@@ -34,7 +34,7 @@ typedef struct two_faces {
     double a[3][3], b[3][3], d[3];
 } two_faces;
 
-/* In one plane that contains the direction; some are points. */
+/* Moves both faces into one plane that contains the direction; some faces become points. */
 static void flatten(two_faces *f, uint64_t i)
 {
     for (int c = 0; c < 3; c++)
@@ -153,7 +153,7 @@ static ebpo_separation run_query(ebpo_collider *c, const ebpo_pose *a, const ebp
     return out;
 }
 
-/* t is the double nearest to the exact one. */
+/* Checks that t is the double nearest to the exact time. */
 static void check_time(mpq_t exact, double t, const char *what)
 {
     mpq_t low, high;
@@ -165,7 +165,7 @@ static void check_time(mpq_t exact, double t, const char *what)
     mpq_clears(low, high, NULL);
 }
 
-/* All pairs: *t is the last contact at 0 or later; false: there is none. */
+/* Tests all pairs: *t is the last contact at 0 or later; returns false when there is none. */
 static bool brute_force(const reference_faces *a, const reference_faces *b, const double d[3],
                         mpq_t t)
 {
@@ -201,22 +201,22 @@ static bool parts_at(const reference_faces *a, uint64_t i, const reference_faces
     return parts;
 }
 
-/* Among pairs that separate at the same time, it is the first by the faces of a or of b: the order
- * of the models depends on digests. */
+/* Checks the reported pair. Among pairs that separate at the same time, it is the first by the
+ * faces of a or of b, as the order of the models depends on digests. */
 static void check_pair(const reference_faces *a, const reference_faces *b, const double d[3],
                        mpq_t t, const ebpo_face_pair *pair, const char *what)
 {
     uint64_t x = pair->file_face_a, y = pair->file_face_b;
     bool by_a = true, by_b = true;
     ck_assert_msg(x < a->count && y < b->count && parts_at(a, x, b, y, d, t),
-                  "%s: another pair parts last", what);
+                  "%s: another pair separates last", what);
     for (uint64_t i = 0; i <= x; i++)
         for (uint64_t j = 0; j < (i < x ? b->count : y); j++)
             by_a = by_a && !parts_at(a, i, b, j, d, t);
     for (uint64_t j = 0; j <= y && !by_a; j++)
         for (uint64_t i = 0; i < (j < y ? a->count : x); i++)
             by_b = by_b && !parts_at(a, i, b, j, d, t);
-    ck_assert_msg(by_a || by_b, "%s: not the first pair that parts last", what);
+    ck_assert_msg(by_a || by_b, "%s: not the first pair that separates last", what);
 }
 
 static void check_case(ebpo_collider *c, ebpo_collider *swapped, const query_model m[2], int kind,
@@ -240,7 +240,7 @@ static void check_case(ebpo_collider *c, ebpo_collider *swapped, const query_mod
                     late = run_query(c, &a, &b, d, 1);
     bool any = brute_force(&f[0], &f[1], d, t);
     ck_assert_msg(any == (got.pair.face_a != EBPO_NO_FACE), "%s: any %d", what, any);
-    ck_assert_int_eq(got.t.metric, EBPO_VALUE_EXACT);
+    ck_assert_int_eq(got.t.kind, EBPO_VALUE_EXACT);
     check_time(t, got.t.lo, what);
     if (any)
         check_pair(&f[0], &f[1], d, t, &got.pair, what);
@@ -290,8 +290,8 @@ static int32_t meets(ebpo_collider *c, const ebpo_pose *a, const ebpo_pose *b)
     return found;
 }
 
-/* On a grid little is rounded: moved by t they are in contact, moved farther they never are again.
- */
+/* On a grid little is rounded. Models moved by t are in contact; models moved farther are never in
+ * contact again. */
 START_TEST(test_separation_of_grid_solids)
 {
     query_model m[2];

@@ -1,5 +1,5 @@
-/* Data kept of subtrees that are not in memory: its bounds hold exactly for every face; it takes
- * the given memory; and it saves loading without changing a result. */
+/* Skeletons, which are kept for subtrees that are not in memory: their bounds hold exactly for
+ * every face, they take the given memory, and they save loading without changing a result. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -57,7 +57,7 @@ static uint64_t count_nearer(const ebpo_accel *s, const slots *all, const double
     return nearer;
 }
 
-/* Distances beyond a limit may be infinite. */
+/* Checks bounds with a limit: distances beyond the limit may be infinite. */
 static void check_limit(const ebpo_skeleton *k, const double p[3], ebpo_skeleton_bounds all)
 {
     double limit[] = { all.own * (1 - 0x1p-30), all.own, all.outer, all.own / 2 + all.outer / 2 };
@@ -79,7 +79,7 @@ static bool take(void *user, uint64_t bytes)
     return true;
 }
 
-/* More nodes improve the bounds, as far as memory allows. */
+/* Checks bounds for several amounts of memory: more nodes improve the bounds. */
 static void check_bounds(const ebpo_accel *s, const double *points, uint64_t count)
 {
     uint64_t space = 3 * (ebpo_skeleton_bytes(8) - ebpo_skeleton_bytes(0));
@@ -200,7 +200,7 @@ static void end(queried *s)
     free(s->got);
 }
 
-/* Returns subtrees searched, with none in memory at the beginning. */
+/* Returns the number of subtrees searched, with none in memory at the beginning. */
 static uint64_t subtrees_searched(queried *s)
 {
     ebpo_model_stats before = EBPO_MODEL_STATS_INIT, after = EBPO_MODEL_STATS_INIT;
@@ -216,8 +216,8 @@ static uint64_t subtrees_searched(queried *s)
     return after.distance_subtrees - before.distance_subtrees;
 }
 
-/* With no subtree known, some, or nearly all; or those that fit a small budget; with levels below
- * the cut, if there is memory, or without. */
+/* Skeletons of no subtree, of some, of nearly all, or of those that fit a small budget; with or
+ * without the levels below the cut. */
 START_TEST(test_results_do_not_depend_on_skeletons)
 {
     queried s;
@@ -268,7 +268,8 @@ START_TEST(test_skeleton_avoids_subtree_searches)
 }
 END_TEST
 
-/* Counts for the first points, with a model of which nothing is known yet. */
+/* Returns the number of subtrees searched for the first points, with a new model that has no
+ * skeletons yet. */
 static uint64_t searched_at_first(int solid, int cut_level, bool deep)
 {
     queried s;
@@ -297,7 +298,8 @@ START_TEST(test_levels_below_cut_bound_unvisited)
 }
 END_TEST
 
-/* Queries that visit many new subtrees have them read; few new ones do not. */
+/* Levels below the cut are read when queries visit many new subtrees, and not when they visit few.
+ */
 START_TEST(test_levels_below_cut_load_on_demand)
 {
     queried s;
@@ -320,8 +322,8 @@ static bool add_distance(void *user, const ebpo_near_face *face)
     return true;
 }
 
-/* Returns subtrees loaded for all faces within a radius, none in memory at the beginning; *sum: of
- * their distances, in order. */
+/* Returns the number of subtrees loaded for all faces within a radius, with none in memory at the
+ * beginning; *sum: sum of the distances of these faces, in order. */
 static uint64_t loaded_within(queried *s, double *sum)
 {
     ebpo_within_options how = EBPO_WITHIN_OPTIONS_INIT;
@@ -386,7 +388,7 @@ START_TEST(test_skeleton_memory_limit_is_kept)
 }
 END_TEST
 
-/* Returns true when there is a model. */
+/* Checks the plan of a budget. Returns true when a model fits the budget. */
 static bool check_plan(const query_model *m, uint64_t budget, uint64_t *least)
 {
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
@@ -411,7 +413,7 @@ static bool check_plan(const query_model *m, uint64_t budget, uint64_t *least)
     return true;
 }
 
-/* With a given cut level, by counts. */
+/* Checks a plan with a given cut level, made from counts. */
 static void check_cut_plan(const query_model *m, int cut_level)
 {
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;

@@ -1,6 +1,6 @@
 /* Queries need little stack: threads of a program that links the library may have 64 KiB each. Each
  * kind of query runs on a stack whose unused part is counted afterwards, with the model in memory
- * and in parts that are loaded meanwhile. Not with sanitizers, which need more. */
+ * and in parts that are loaded meanwhile. Not run with sanitizers, which need more stack. */
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -6,7 +6,7 @@
 #include "mesh/attributes.h"
 #include "tree_json.h"
 
-/* Bytes as characters of Latin 1. */
+/* Writes bytes as characters of Latin 1. */
 static inline void aj_text(FILE *out, const char *text, uint64_t bytes)
 {
     fputc('"', out);

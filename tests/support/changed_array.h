@@ -19,7 +19,7 @@ void changeable_free(changeable *c);
 
 /* Returns the number of values of an array of the root; 0: not present. */
 uint64_t changeable_count(const changeable *c, ebpo_array_id id);
-/* Gets a value, counted row by row; and sets a value and returns the original one. */
+/* Returns a value, or sets a value and returns the original one; values are counted row by row. */
 uint64_t changeable_get(const changeable *c, ebpo_array_id id, uint64_t item);
 uint64_t changeable_put(changeable *c, ebpo_array_id id, uint64_t item, uint64_t value);
 

@@ -5,11 +5,11 @@
 #include <check.h>
 
 /* Check writes the location of every passed assertion into a pipe, which takes most of the time of
- * tests with millions of them. Only failed assertions are written. */
+ * tests with millions of assertions. With this macro only failed assertions are written. */
 #define _mark_point(file, line) ((void)0)
 
-/* Defined by each program: its tests. It may end the program with TEST_SKIPPED after printing the
- * reason. */
+/* Returns the tests of the program, which defines this function. The function may print a reason
+ * and end the program with TEST_SKIPPED. */
 Suite *test_suite(void);
 
 /* Begins the definition of a suite of a program with several suites (suites.c.in). */

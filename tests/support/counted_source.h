@@ -1,4 +1,4 @@
-/* A file with a source that counts once each byte that is read or prefetched, and that can fail. */
+/* A file whose source counts each byte that is read or prefetched once, and can fail. */
 #ifndef EBPO_TESTS_COUNTED_SOURCE_H
 #define EBPO_TESTS_COUNTED_SOURCE_H
 

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Finds intersecting faces: orientations in doubles where a bound on their rounding allows it, else
- * in integers of GMP, and a uniform grid for the candidates. */
+/* Finds intersecting faces. A uniform grid gives the candidates. Orientations are computed in
+ * doubles where a bound on the rounding error allows it, else in integers of GMP. */
 
 static void *make(uint64_t count, size_t size)
 {
@@ -79,7 +79,7 @@ static int orient3(const float *a, const float *b, const float *c, const float *
     return fabs(sum) > 1e-14 * size + 1e-300 ? sign_of(sum) : exact_orient3(p);
 }
 
-/* Returns the same for a triangle in the plane of axes k and l. */
+/* Returns the sign of the area of a triangle in the plane of axes k and l. */
 static int orient2(const float *a, const float *b, const float *c, int k, int l)
 {
     float flat[4][3] = {
@@ -179,7 +179,8 @@ static bool meet(const face_model *m, uint64_t f, uint64_t g)
     }
     if (shared > 2)
         return true;
-    /* They share an edge: then they overlap if they are in one plane, on the same side of it. */
+    /* The faces share an edge: they overlap if they are in one plane, on the same side of the edge.
+     */
     const float *p = a[at_a[0]], *q = a[at_a[1]], *r = a[3 - at_a[0] - at_a[1]],
                 *s = b[3 - at_b[0] - at_b[1]];
     if (orient3(p, q, r, s) != 0)
@@ -221,7 +222,7 @@ static uint64_t cell_at(const grid *g, const int64_t i[3])
     return (uint64_t)((i[2] * g->cells[1] + i[1]) * g->cells[0] + i[0]);
 }
 
-/* Cells of twice the mean extent of a face. */
+/* Makes a grid with cells of twice the mean extent of a face. */
 static grid make_grid(const face_model *m)
 {
     grid g = { .low = { INFINITY, INFINITY, INFINITY } };
@@ -244,7 +245,7 @@ static grid make_grid(const face_model *m)
     return g;
 }
 
-/* Writes the entries of a face, if there is space; returns how many there are. */
+/* Writes the entries of a face, if `to` is not NULL; returns their number. */
 static uint64_t enter(const face_model *m, const grid *g, uint64_t f, entry *to)
 {
     float low[3], high[3];

@@ -1,12 +1,12 @@
-/* Finds intersecting faces of a mesh. Shares no code with the library, whose predicates and readers
- * the results test. */
+/* Finds intersecting faces of a mesh. Shares no code with the library, as the results test the
+ * library's predicates and readers. */
 #ifndef EBPO_TESTS_CROSSING_FACES_H
 #define EBPO_TESTS_CROSSING_FACES_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Lent. Coordinates are finite, corners below `vertices`. */
+/* A mesh; its arrays belong to the caller. Coordinates are finite, corners below `vertices`. */
 typedef struct face_model {
     const float (*xyz)[3];
     const uint32_t (*corners)[3];

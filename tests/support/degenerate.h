@@ -1,6 +1,6 @@
-/* Degenerate and ill-conditioned cases: one line each in degenerate_cases.c. test_stiff checks
- * every case against its limits, stiff_table prints the measured values
- * (docs/measured/degenerate.md). */
+/* Degenerate and ill-conditioned cases: one line each in degenerate_cases.c. test_degenerate.c
+ * checks every case against its limits; a table of the measured values is in
+ * docs/measured/degenerate.md. */
 #ifndef EBPO_TESTS_DEGENERATE_H
 #define EBPO_TESTS_DEGENERATE_H
 
@@ -22,26 +22,26 @@ struct degenerate_case {
     uint32_t leaf; /* a node of at most this many faces becomes a leaf; 0: 16 */
     ebpo_rule rule;
 
-    /* required results: always 0 violations and 0 wrong results, and volumes within the limits
-     * below; also */
-    ebpo_status status;  /* not EBPO_OK: converting fails with it ... */
-    const char *message; /* ... and the message contains this */
-    bool surface;        /* not balanced; else a solid */
+    /* required results: always 0 violations, 0 wrong results, and volumes within the limits below;
+     * in addition: */
+    ebpo_status status;  /* not EBPO_OK: converting fails with this status ... */
+    const char *message; /* ... and the message contains this text */
+    bool surface;        /* the mesh is not balanced, so a surface; else a solid */
     int reached;         /* number of levels of the tree; 0: any */
     double volume;       /* integral of the winding number by a formula; 0: none */
-    /* relative error of it allowed for the rounding of coordinates; 0: DEGENERATE_MEASURE */
+    /* allowed relative error of `volume` for the rounding of coordinates; 0: DEGENERATE_MEASURE */
     double within;
     double measure; /* allowed relative error of ebpo_measure; 0: DEGENERATE_MEASURE */
-    double set;     /* volume of the set of points; 0: as the integral; NAN: unknown */
+    double set;     /* volume of the set of points; 0: equal to the integral; NAN: unknown */
 };
 extern const degenerate_case degenerate_cases[];
 extern const int degenerate_case_count;
 
 #define DEGENERATE_MEASURE \
     1e-15 /* relative error of ebpo_measure against the exact volume of the mesh */
-#define DEGENERATE_ENVELOPE                                                                        \
-    1e-9 /* by so much, relatively, a level's volume may be below the solid's or above the level's \
-            before: its sum is rounded */
+#define DEGENERATE_ENVELOPE                                                                     \
+    1e-9 /* relative rounding error of a level's volume: it may be this much below the solid's, \
+            or above that of the level before */
 
 typedef struct degenerate_result {
     uint64_t faces;
@@ -57,11 +57,11 @@ typedef struct degenerate_result {
     /* the greatest V(level + 1) / V(level) - 1; at most 0 except for rounding */
     double rise;
     double bytes_per_face;
-    char fault[640]; /* reason why it is not stable; "": it is */
+    char fault[640]; /* reason why the case is not stable; "": it is stable */
 } degenerate_result;
 
-/* Builds, writes and verifies, queries `queries` points and a quarter as many rays; `fault`
- * describes a failure. */
+/* Builds, writes and verifies a case, and queries `queries` points and a quarter as many rays;
+ * out->fault describes a failure. */
 void degenerate_run(const degenerate_case *c, uint64_t queries, degenerate_result *out);
 /* Only checks and builds; the mesh is consumed. */
 ebpo_status degenerate_build(const degenerate_case *c, ebpo_mesh *mesh, ebpo_tree *tree,
@@ -75,14 +75,15 @@ ebpo_mesh degenerate_shells(const degenerate_case *c);
 ebpo_mesh degenerate_torus(const degenerate_case *c);
 ebpo_mesh degenerate_ring(const degenerate_case *c);       /* radius, tube, n, m */
 ebpo_mesh degenerate_box(const degenerate_case *c);        /* sides x, y, z, squares along a side */
-ebpo_mesh degenerate_turned_box(const degenerate_case *c); /* the same */
+ebpo_mesh degenerate_turned_box(const degenerate_case *c); /* as degenerate_box */
 ebpo_mesh degenerate_sphere(const degenerate_case *c);     /* radius, subdivisions, shift */
 ebpo_mesh degenerate_cone(const degenerate_case *c);       /* n */
 ebpo_mesh degenerate_cylinder(const degenerate_case *c);   /* n */
 /* n around, m rows: Schwarz's lantern, whose area grows without bound */
 ebpo_mesh degenerate_lantern(const degenerate_case *c);
-ebpo_mesh degenerate_wedge(const degenerate_case *c); /* n slivers of an angle */
-ebpo_mesh degenerate_dome(const degenerate_case *c);  /* n planes within an angle, on a block */
+ebpo_mesh degenerate_wedge(const degenerate_case *c); /* n slivers, their angle */
+/* n planes, the angle that contains them; on a block */
+ebpo_mesh degenerate_dome(const degenerate_case *c);
 /* n: a box of side 2 n, each face connected to its neighbour by one without area; volume 8 n^3 */
 ebpo_mesh degenerate_split_edges(const degenerate_case *c);
 ebpo_mesh degenerate_t_junctions(const degenerate_case *c); /* n: a box with one side undivided */
@@ -95,15 +96,15 @@ ebpo_mesh degenerate_nested(const degenerate_case *c);
 ebpo_mesh degenerate_repeated(
     const degenerate_case *c); /* the same cube n times; volume n, set 1 */
 ebpo_mesh degenerate_minus_zero(const degenerate_case *c); /* a tetrahedron whose zeros are -0.0 */
-/* a bipyramid of n sides whose corners are repeated m times; */
+/* n, m: a bipyramid of n sides whose corners are repeated m times */
 ebpo_mesh degenerate_repeated_fan(const degenerate_case *c);
 /* depth: Menger's sponge of cells of 1; volume 20^depth */
 ebpo_mesh degenerate_menger(const degenerate_case *c);
 /* n^3 voxels, each second one filled; n even: volume n^3 / 2 */
 ebpo_mesh degenerate_checkers(const degenerate_case *c);
-ebpo_mesh degenerate_needles(const degenerate_case *c); /* n needles of a width, from one point */
+ebpo_mesh degenerate_needles(const degenerate_case *c); /* n needles from one point, their width */
 ebpo_mesh degenerate_book(const degenerate_case *c);    /* n tetrahedra sharing one edge */
-/* n plates of a thickness, twice a distance apart */
+/* n plates, their thickness, the distance from each plate to the next */
 ebpo_mesh degenerate_plates(const degenerate_case *c);
 /* n: a box whose vertices are moved by an ulp */
 ebpo_mesh degenerate_jittered(const degenerate_case *c);

@@ -39,7 +39,7 @@ const degenerate_case degenerate_cases[] = {
     { "aspect 1e6 : 1e6 : 1, turned", degenerate_turned_box, .a = { 1e6, 1e6, 1, 8 } },
     { "aspect 1e15 : 1 : 1", degenerate_box, .a = { 1e15, 1, 1, 8 }, .volume = 1e15 },
     { "aspect 1e100 : 1 : 1e-100", degenerate_box, .a = { 1e100, 1, 1e-100, 4 }, .volume = 1 },
-    /* ebpo_measure has one unit for all axes: this volume underflows to 0 in it */
+    /* ebpo_measure has one unit for all axes, in which this volume underflows to 0 */
     { "aspect 1e300 : 1 : 1e-300", degenerate_box, .a = { 1e300, 1, 1e-300, 4 }, .volume = 1, .measure = 1 },
     { "2,000 slivers of 1e-9", degenerate_wedge, .a = { 1000, 1e-9 } },
     { "2,000 slivers of 1e-15", degenerate_wedge, .a = { 1000, 1e-15 } },

@@ -100,7 +100,7 @@ static bool query_points(query_model *m, uint64_t count, degenerate_result *r)
         r->queried += n;
     }
     if (!fine)
-        fault(r, "a question fails: %s", error.message);
+        fault(r, "a query fails: %s", error.message);
     free(points);
     free(truth);
     free(inside);
@@ -145,10 +145,11 @@ static void run_levels(const degenerate_case *c, query_model *m, degenerate_resu
         double rise = before < INFINITY ? volume / before - 1 : -1;
         r->rise = fmax(r->rise, rise);
         if (!(rise <= DEGENERATE_ENVELOPE))
-            fault(r, "level %d of volume %.17g does not lie in the one before, of %.17g", level,
+            fault(r, "level %d of volume %.17g is larger than the level before, of %.17g", level,
                   volume, before);
         if (!isnan(set) && !(volume >= set * (1 - DEGENERATE_ENVELOPE)))
-            fault(r, "level %d of volume %.17g cannot hold the solid of %.17g", level, volume, set);
+            fault(r, "level %d of volume %.17g is smaller than the solid, of %.17g", level, volume,
+                  set);
         before = volume;
     }
     r->excess = volume / set - 1;
@@ -214,7 +215,7 @@ static void run_converted(const degenerate_case *c, query_model *m, const ebpo_m
     if (query_points(m, queries, r))
         query_rays(m, queries / 4 + 1, r);
     if (r->wrong)
-        fault(r, "%llu wrong answers of %llu", (unsigned long long)r->wrong,
+        fault(r, "%llu wrong results of %llu", (unsigned long long)r->wrong,
               (unsigned long long)r->queried);
 }
 

@@ -5,7 +5,7 @@
 
 #include "degenerate.h"
 
-/* approximately a rotation, of exact numbers */
+/* approximately a rotation, with entries that are exact doubles */
 static const double turn[3][3] = { { 0.75, -0.5, 0.4375 },
                                    { 0.5, 0.8125, -0.3125 },
                                    { -0.25, 0.375, 0.8125 } };

@@ -116,8 +116,8 @@ static double one_coordinate(int kind, uint64_t *state)
     }
 }
 
-/* The last point is an affine combination of the others: nearly so in doubles, then moved by some
- * ulps. */
+/* Makes the last point nearly an affine combination of the others, rounded to doubles and moved by
+ * some ulps. */
 static void nearly_degenerate(double *p, int n, double shift, uint64_t *state)
 {
     double s[2];
@@ -135,8 +135,8 @@ static void nearly_degenerate(double *p, int n, double shift, uint64_t *state)
     }
 }
 
-/* The last point is an integer affine combination of the others: exactly degenerate, except one
- * time in four. */
+/* Makes the last point an integer affine combination of the others, so that the points are exactly
+ * degenerate, except one time in four. */
 static void degenerate_integers(double *p, int n, int64_t size, int exponent, uint64_t *state)
 {
     int64_t s = reference_integer(state, -4, 4), t = n == 3 ? reference_integer(state, -4, 4) : 0;
@@ -164,7 +164,7 @@ void reference_points(double *p, int dimension, int kind, uint64_t *state)
     else
         for (int i = 0; i < dimension * (dimension + 1); i++)
             p[i] = one_coordinate(kind, state);
-    /* Shared coordinates and shared points, as in meshes. */
+    /* repeats some coordinates and points, as in meshes */
     int64_t to = reference_integer(state, 0, dimension),
             from = reference_integer(state, 0, dimension * dimension);
     if (reference_random(state) % 4 == 0)

@@ -14,7 +14,7 @@ int64_t reference_integer(uint64_t *state, int64_t low, int64_t high);
 /* Returns a uniform value in [-1, 1). */
 double reference_uniform(uint64_t *state);
 
-/* Return signs by rational determinants; points are consecutive. */
+/* Return signs of rational determinants; the points are consecutive. */
 int reference_orient2d(const double p[6]);
 int reference_orient3d(const double p[12]);
 int reference_sign_of_products(const double *factor, int n);

@@ -73,7 +73,8 @@ static struct {
 } modules[MODULES];
 static int module_count;
 
-/* For the C library the caller is not known; nor for C++ and sanitizers. */
+/* Returns the kind of a module. The C library, C++ and sanitizers are neutral: they make calls for
+ * others. */
 static module_kind kind_of(const char *path)
 {
     static const char *const neutral[] = { "/libc.so",   "/libstdc++",  "/libasan",
@@ -207,7 +208,7 @@ static void map_counts(const char *path)
 __attribute__((constructor)) static void begin(void)
 {
     void *frame[2];
-    (void)backtrace(frame, 2); /* which allocates once */
+    (void)backtrace(frame, 2); /* the first backtrace allocates memory */
     dl_iterate_phdr(note_module, NULL);
     const char *order = getenv("EBPO_TEST_FAULT"), *path = getenv("EBPO_TEST_FAULT_COUNT");
     if (path)
@@ -478,7 +479,7 @@ static ssize_t cookie_write(void *cookie, const char *data, size_t size)
         if (put < 0 && errno == EINTR)
             continue;
         if (put <= 0)
-            return 0; /* how cookies report a failure */
+            return 0; /* cookies report a failure in this way */
         done += (size_t)put;
     }
     return (ssize_t)done;

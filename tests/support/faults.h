@@ -32,8 +32,8 @@ enum {
     FAULT_KINDS = 13
 };
 
-/* Lets the n-th call of these kinds from now on fail (1 is the next one), and with `onward` all
- * later ones. 0: none. Resets the count. */
+/* Lets the n-th call of these kinds from now on fail (1: the next call; 0: none), and with `onward`
+ * all later calls. Resets the count. */
 __attribute__((weak)) void faults_begin(unsigned kinds, uint64_t n, bool onward, int error);
 /* Ends all failures. Returns the number of calls. */
 __attribute__((weak)) uint64_t faults_end(void);

@@ -73,7 +73,7 @@ static void bytes(hashing *h, const void *data, size_t size)
         *h->hash = (*h->hash ^ p[i]) * 0x100000001b3;
 }
 
-/* In little-endian order. */
+/* Hashes a number in little-endian order. */
 static void number(hashing *h, uint64_t x)
 {
     x = ebpo_little64(x);
@@ -88,7 +88,7 @@ static void words(hashing *h, const uint32_t *x, uint64_t count)
     }
 }
 
-/* All NaNs are equal: their bits depend on the compiler. */
+/* Hashes a double. All NaNs count as equal, as their bits depend on the compiler. */
 static void real(hashing *h, double x)
 {
     if (isnan(x))

@@ -1,5 +1,5 @@
-/* For one file of each program that is built with LeakSanitizer: suppresses leaks of libhdf5 1.10
- * after a damaged object header. */
+/* Suppresses leaks of libhdf5 1.10 after a damaged object header. One file of each program that is
+ * built with LeakSanitizer includes this header. */
 #ifndef EBPO_TESTS_KNOWN_LEAKS_H
 #define EBPO_TESTS_KNOWN_LEAKS_H
 

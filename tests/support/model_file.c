@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Not ck_assert: programs without Check use this, too. */
+/* Does not use ck_assert, as programs without Check call this, too. */
 void model_must(ebpo_status status, const char *what, const ebpo_error *error)
 {
     if (status == EBPO_OK)

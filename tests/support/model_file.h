@@ -8,7 +8,7 @@
 /* Ends the program unless the status is EBPO_OK; `what` names the operation. */
 void model_must(ebpo_status status, const char *what, const ebpo_error *error);
 
-/* Builds a tree of a mesh, which it takes. NULL: default options. */
+/* Builds a tree of a mesh, which is consumed. NULL: default options. */
 ebpo_tree model_build(ebpo_mesh mesh, const ebpo_build_options *options);
 /* Builds a tree with this number of faces per leaf and these parts (ebpo_part bits). */
 ebpo_tree model_build_parts(ebpo_mesh mesh, uint32_t leaf_faces, uint32_t parts);

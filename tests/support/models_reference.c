@@ -11,12 +11,14 @@
 
 typedef enum pose_turn { STRAIGHT, QUARTER, ANYHOW } pose_turn;
 
-/* B: rotated, scaled, then moved by this share of the size along x, or along a random direction. */
+/* A kind of poses. B is rotated, scaled, then moved by a share of the size along x, or along a
+ * random direction. */
 typedef struct pose_kind {
     const char *name;
     pose_turn turn;
     double scale, along_x, along_any;
-    double both; /* A is randomly rotated, too, and both are moved by so many sizes */
+    double
+        both; /* not 0: A is also rotated at random, and both models are moved by this many sizes */
 } pose_kind;
 
 static const pose_kind kinds[REFERENCE_POSES] = {

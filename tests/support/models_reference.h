@@ -15,9 +15,13 @@
 
 enum { REFERENCE_POSES = 16, REFERENCE_TURNED_APART = 14 };
 const char *reference_pose_name(int kind);
-/* Makes poses of a and b as meshes of sizes `size`: identical, quarter turns, half a size along
- * axes, touching boxes, overlaps of 1e-9 of the size, slight and deep overlaps, straight and
- * rotated, one small inside the other, apart by 0.01, 0.05 and 0.2, far from the origin. */
+/* Makes poses of a and b, two meshes of size `size`. The kinds are:
+ * - identical poses, quarter turns, half a size along axes
+ * - touching boxes, overlaps of 1e-9 of the size
+ * - slight and deep overlaps, straight and rotated
+ * - a small model inside the other
+ * - apart by 0.01, 0.05 and 0.2
+ * - far from the origin */
 void reference_pose(int kind, double size, uint64_t *state, ebpo_pose *a, ebpo_pose *b);
 
 /* --- faces --- */

@@ -137,8 +137,8 @@ double oracle_round(const mpz_t num, const mpz_t den, int exponent, bool root)
         sticky |= mpz_sgn(r) != 0;
         e /= 2;
     }
-    /* Far below the smallest double there may be too few bits to drop: 2^-1074 has its own
-     * rounding. */
+    /* Far below the smallest double there may be too few bits to drop, so numbers below 2^-1074 are
+     * rounded separately. */
     if ((int)mpz_sizeinbase(q, 2) + e < -1074) {
         mpz_clears(q, r, NULL);
         return 0;

@@ -1,7 +1,7 @@
 /* Reference implementation of queries for small meshes: brute force over all faces in integers of
  * any size (GMP). Independent of the library. Floating point only excludes faces that certainly do
- * not matter, with margins a thousand times larger than any rounding error; the rest is computed
- * without rounding. */
+ * not matter, with margins a thousand times larger than any rounding error. All other computations
+ * are exact. */
 #ifndef EBPO_TESTS_ORACLE_H
 #define EBPO_TESTS_ORACLE_H
 
@@ -10,8 +10,8 @@
 
 #include <ebpo/mesh.h>
 
-/* A mesh to query. It holds scratch memory, so it is for one thread at a time. Functions abort if
- * memory is short. */
+/* A mesh to query. An oracle has scratch memory, so only one thread at a time may use it. Functions
+ * abort if memory is short. */
 typedef struct oracle oracle;
 oracle *oracle_make(const ebpo_mesh *mesh); /* copies; coordinates are finite */
 void oracle_free(oracle *o);
@@ -49,7 +49,8 @@ int32_t oracle_winding(oracle *o, const double p[3]);
  */
 double oracle_volume(oracle *o);
 
-/* Computes the unit normal by orientation, within some ulps; (0, 0, 0) without area. */
+/* Computes the outward unit normal of a face, within some ulps; (0, 0, 0) for a face without area.
+ */
 void oracle_normal(oracle *o, uint32_t face, double out[3]);
 
 typedef struct oracle_hit {

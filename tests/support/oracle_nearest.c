@@ -76,7 +76,7 @@ int oracle_distance_compare(oracle *o, double d)
 {
     if (isinf(d))
         return -1;
-    /* best / 4^-e against d^2 = m^2 4^f */
+    /* compares best / 4^-e with d^2 = m^2 4^f */
     int f = d == 0 ? o->e : oracle_low_bit(d), low = f < o->e ? f : o->e;
     oracle_set(o->s[0], d, low);
     mpz_mul(o->s[0], o->s[0], o->s[0]);
@@ -175,7 +175,7 @@ static void near_weights(double a[3][3], double w[3])
 }
 
 /* Computes low <= distance <= high for the origin, for any rounding: high is the distance of a
- * point of the triangle, low that of a plane before it. */
+ * point of the triangle, low the distance of a plane before the triangle. */
 static void face_bounds(const double corner[9], const double p[3], double *low, double *high)
 {
     double a[3][3], w[3], q[3], reach = 0;
@@ -218,8 +218,8 @@ static double box_squared(const double corner[9], const double p[3])
     return sum;
 }
 
-/* Writes candidates to found, `*count` of them: every face at the minimum distance is among them.
- */
+/* Writes candidates to o->found, and returns their number. Every face at the minimum distance is
+ * among the candidates. */
 static uint32_t candidates(oracle *o, const double p[3])
 {
     double q[3], best = INFINITY;

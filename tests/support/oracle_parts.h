@@ -50,7 +50,7 @@ struct oracle {
 int oracle_low_bit(double x);
 /* Sets z = x / 2^e, which is an integer. */
 void oracle_set(mpz_t z, double x, int e);
-/* Chooses the unit for the mesh and the points `p` of `count` numbers in total. */
+/* Chooses the unit for the mesh and for the points `p`, which have `count` coordinates in total. */
 void oracle_choose_unit(oracle *o, const double *p, int count);
 /* Loads a face in the unit: a[i] = corner i of the face - p, edge[i] = a[i + 1] - a[i], normal =
  * edge[0] x edge[1]. */

@@ -43,7 +43,8 @@ static void dot(problem *p, mpq_t out, mpq_t a[3], mpq_t b[3])
     mpq_set(out, p->sum);
 }
 
-/* Returns the first corner of a feature: 0 to 2: corners; 3 to 5: edges; 6: the face. */
+/* Returns the first corner of a feature. Features 0 to 2 are corners, 3 to 5 edges, 6 is the face.
+ */
 static int begin_of(int feature) { return feature < 6 ? feature % 3 : 0; }
 
 static void add_directions(problem *p, int of, int feature)
@@ -58,8 +59,8 @@ static void add_directions(problem *p, int of, int feature)
         }
 }
 
-/* Solves for the Gram matrix and right side; false: not independent, so a lower feature also has
- * the minimum. */
+/* Solves the equations of the Gram matrix and the right side. Returns false when the directions are
+ * not independent, so that a lower feature also has the minimum. */
 static bool solve(problem *p)
 {
     int n = p->parameters;
@@ -88,7 +89,7 @@ static bool solve(problem *p)
     return true;
 }
 
-/* Returns true when parameters from .. to - 1 are of a point within its feature. */
+/* Returns true when parameters from .. to - 1 belong to a point within its feature. */
 static bool within(problem *p, int from, int to)
 {
     mpq_set_ui(p->sum, 0, 1);

@@ -118,7 +118,7 @@ static work *begin(const double a[3][3], const double b[3][3])
 
 /* --- corners of the intersection --- */
 
-/* x + y * s / den */
+/* Adds the point x + y * s / den. */
 static void add_point(work *k, zector x, zector y, mpz_t s, mpz_t den)
 {
     if (k->count == CORNERS_MAX)
@@ -158,7 +158,8 @@ static bool last_within(work *k, int of)
     return sign[0] >= 0 && sign[1] >= 0 && sign[2] >= 0;
 }
 
-/* Adds the point of edge i of face `of` in the plane of the other, or corner i in it. */
+/* Adds the point where edge i of face `of` intersects the plane of the other face, or corner i if
+ * it is in this plane. */
 static void pierce(work *k, int of, int i)
 {
     if (z_none(k->normal[!of]))
@@ -231,7 +232,8 @@ static void find_common(work *k)
     }
 }
 
-/* The mean of the found points is an inner point of the intersection. */
+/* Returns true when the mean of the found points, an inner point of the intersection, is in the
+ * interior of face `of`. */
 static bool mean_within(work *k, int of, zector sum, mpz_t weight)
 {
     int sign[3];
@@ -285,7 +287,7 @@ static int feature_at(work *k, int of, int i)
     return 6;
 }
 
-/* |x - point i| <= 0.51 ulp(x) + 2^-60 most */
+/* Returns true when |x - point i| <= 0.51 ulp(x) + 2^-60 most on each axis. */
 static bool close_to(work *k, int i, const double *x, const double most[3])
 {
     bool close = true;
@@ -341,9 +343,9 @@ const char *reference_pair_contact(const double a[3][3], const double b[3][3],
         if (!close_to(k, i, end[e].point, most))
             return e ? "the second end is elsewhere" : "the first end is elsewhere";
         if (feature_at(k, 0, i) != end[e].on_a)
-            return "another feature of A";
+            return "the feature of A differs";
         if (feature_at(k, 1, i) != end[e].on_b)
-            return "another feature of B";
+            return "the feature of B differs";
     }
     return NULL;
 }

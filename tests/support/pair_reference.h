@@ -10,7 +10,7 @@
  * coplanar. It is found from the corners of the intersection, and their mean. */
 int reference_pair_kind(const double a[3][3], const double b[3][3]);
 
-/* An end of a segment, as reference_pair_contact takes it. */
+/* An end of a segment, an argument of reference_pair_contact. */
 typedef struct reference_end {
     const double *point;
     int on_a, on_b; /* 0 to 2 a corner, 3 to 5 the edge from corner k - 3, 6 the interior */
@@ -21,8 +21,8 @@ typedef struct reference_end {
 const char *reference_pair_contact(const double a[3][3], const double b[3][3],
                                    const reference_end end[2], const double most[3]);
 
-/* Returns the sign of (distance of the faces) - d, d finite and not negative: minimises the
- * distance over all pairs of corners, edges and faces. */
+/* Returns the sign of (distance of the faces) - d, where d is finite and not negative; minimises
+ * the distance over all pairs of corners, edges and faces. */
 int reference_pair_distance_compare(const double a[3][3], const double b[3][3], double d);
 
 /* Fills two faces with a case of the given kind. */

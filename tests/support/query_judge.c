@@ -395,7 +395,7 @@ bool query_one_ray(query_model *m, ebpo_context *context, const query_ray *r)
     }
     if (hit != (n > 0) || (n > 0 && !hit_fits(m, &expected[0], &first))) {
         show_ray(m, r);
-        fprintf(stderr, "the first hit is not right: %d, t %a, face %llu, side %d\n", hit, first.t,
+        fprintf(stderr, "the first hit is wrong: %d, t %a, face %llu, side %d\n", hit, first.t,
                 (unsigned long long)first.face, first.side);
         return false;
     }
@@ -423,7 +423,7 @@ void query_one(query_model *m, uint64_t count, uint64_t seed)
         wrong += query_wrong_inside(m, p, truth, n, inside);
         wrong += query_wrong_distance(m, p, truth, n, false, distance);
     }
-    ck_assert_msg(wrong == 0, "%s, %s, seed %llu: %llu wrong answers", m->name, m->variant,
+    ck_assert_msg(wrong == 0, "%s, %s, seed %llu: %llu wrong results", m->name, m->variant,
                   (unsigned long long)seed, (unsigned long long)wrong);
     free(points);
     free(truth);

@@ -49,7 +49,7 @@ static double cell_face(const query_model *m, uint64_t *state, int k, int level)
                                        (m->info.box_size[k] / (double)(1u << level));
 }
 
-/* All coordinates on cell faces of one level, or some. */
+/* Makes a point with all (`corner`) or some coordinates on cell faces of one level. */
 static void cell_point(const query_model *m, uint64_t *state, bool corner, double out[3])
 {
     int top =
@@ -61,7 +61,7 @@ static void cell_point(const query_model *m, uint64_t *state, bool corner, doubl
             out[k] = cell_face(m, state, k, level);
 }
 
-/* The cell face next to a point of the surface: where cells are deep. */
+/* Makes a point on the cell face next to a point of the surface, where cells are deep. */
 static void cell_face_near_surface(const query_model *m, uint64_t *state, double out[3])
 {
     int level = m->info.level_count - 1 - (int)pick(state, 2), axis = (int)pick(state, 3);

@@ -124,8 +124,8 @@ static ebpo_mesh make_sliver(void)
     return m;
 }
 
-/* A flat box (winding number 0 everywhere, completely coplanar) and a tetrahedron collapsed to a
- * line. */
+/* Makes a flat box (winding number 0 everywhere, completely coplanar) and a tetrahedron collapsed
+ * to a line. */
 static ebpo_mesh make_flat(void)
 {
     ebpo_mesh m = box(0, 0, 0.5, 1, 1, 0.5), line = ebpo_test_tetrahedron(1);
@@ -135,8 +135,8 @@ static ebpo_mesh make_flat(void)
     return m;
 }
 
-/* Its sides are in cell faces: the root box is that of two tetrahedra in opposite corners, and does
- * not depend on the boxes between. */
+/* Makes boxes whose sides are in cell faces. The root box is determined by two tetrahedra in
+ * opposite corners, and does not depend on the boxes between. */
 static ebpo_mesh make_boxes_in_cell_faces(void)
 {
     ebpo_mesh m = ebpo_test_tetrahedron(0.5), frame, other = ebpo_test_tetrahedron(0.5);
@@ -172,7 +172,8 @@ static ebpo_mesh make_far_away(void)
     return m;
 }
 
-/* Rounded to floats with a spacing of a quarter: many faces coincide, cross or lose their area. */
+/* Makes a solid rounded to floats with a spacing of a quarter: many faces coincide, intersect or
+ * lose their area. */
 static ebpo_mesh make_far_away_float(void)
 {
     ebpo_mesh m = ebpo_test_torus(6, 2, 16, 8);

@@ -58,7 +58,7 @@ typedef struct query_model {
     uint32_t *face_source; /* [face_count] or NULL */
     double (*normal)[3];   /* [face_count] */
     double size, largest;  /* longest side of the mesh's box; largest coordinate */
-    oracle *judge;         /* not for several threads */
+    oracle *judge;         /* only for one thread at a time */
     char folder[SCRATCH_LENGTH], path[SCRATCH_LENGTH + 16];
     ebpo_file *file;
     ebpo_model *model;

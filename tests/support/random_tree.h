@@ -17,8 +17,8 @@
 typedef struct random_tree_options {
     uint64_t seed;
     int levels;          /* exact number */
-    unsigned gray_share; /* of 16 children above the deepest level */
-    unsigned new_faces;  /* of a leaf, maximum */
+    unsigned gray_share; /* gray children of 16, above the deepest level */
+    unsigned new_faces;  /* maximum number of new faces of a leaf */
     bool solid, doubles, windings, leaf_planes;
 } random_tree_options;
 

@@ -33,7 +33,8 @@ static double to_segment(const double p[3], const double a[3], const double b[3]
     return sqrt(dot(w, w));
 }
 
-/* Returns the distance to the plane, where the foot is in the triangle; else to the sides. */
+/* Returns the distance to the plane if the projection of the point is in the triangle, else to the
+ * sides. */
 static double to_triangle(const double p[3], const double t[3][3])
 {
     double u[3], v[3], n[3], w[3],
@@ -55,7 +56,7 @@ static double to_triangle(const double p[3], const double t[3][3])
     return over ? fmin(best, fabs(dot(w, n)) / area) : best;
 }
 
-/* van Oosterom, Strackee 1983. */
+/* Returns the solid angle of a triangle (van Oosterom, Strackee 1983). */
 static double solid_angle(const double p[3], const double t[3][3])
 {
     double r[3][3], length[3], c[3];
@@ -100,7 +101,7 @@ double reference_reach(ebpo_file *file, int level, const ebpo_mesh *mesh, bool s
             p[k] = a * lod.xyz64[3 * face[1] + (uint32_t)k] +
                    b * lod.xyz64[3 * face[2] + (uint32_t)k] +
                    (1 - a - b) * lod.xyz64[3 * face[0] + (uint32_t)k];
-        if (i % 2) { /* between it and another corner of the same node */
+        if (i % 2) { /* a point between this corner and another corner of the same node */
             uint64_t node = 0, first = 0;
             while (first + nodes.nodes[node].vertex_count <= face[0])
                 first += nodes.nodes[node++].vertex_count;

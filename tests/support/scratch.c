@@ -22,7 +22,7 @@ void scratch_make(char folder[SCRATCH_LENGTH])
         die(folder);
 }
 
-/* Tests remove permissions; nftw cannot enter such folders. */
+/* Adds permissions: tests remove them, and nftw cannot enter such folders. */
 static int open_folder(const char *path, const struct stat *st, int type, struct FTW *at)
 {
     (void)st, (void)at;

@@ -15,10 +15,10 @@ void scratch_remove(const char *folder);
 void scratch_enter(void);
 void scratch_leave(void);
 void scratch_end(void); /* for check_main.c */
-/* Returns the number of entries, for tests that must leave no files. */
+/* Returns the number of entries of the program's folder, for tests that must leave no files. */
 int scratch_entries(void);
-/* Returns a path in it: the same string for the same name while the program runs. NULL: the folder
- * itself. */
+/* Returns a path in the program's folder: the same string for the same name while the program runs.
+ * `name` NULL: the folder. */
 const char *scratch(const char *name);
 
 #endif

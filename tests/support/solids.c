@@ -20,7 +20,7 @@ static void *checked(void *block)
 
 static uint32_t vertex(ebpo_mesh *m, double x, double y, double z)
 {
-    if ((m->vertex_count & (m->vertex_count - 1)) == 0) /* full at each power of two */
+    if ((m->vertex_count & (m->vertex_count - 1)) == 0) /* arrays are full at each power of two */
         m->xyz64 = checked(
             realloc(m->xyz64, (m->vertex_count ? 2 * m->vertex_count : 1) * 3 * sizeof *m->xyz64));
     double *p = m->xyz64 + 3 * m->vertex_count;
@@ -37,7 +37,7 @@ static void face(ebpo_mesh *m, uint32_t a, uint32_t b, uint32_t c)
     f[0] = a, f[1] = b, f[2] = c;
 }
 
-/* a, b, c, d counter-clockwise. */
+/* Adds the two faces of a quadrilateral; a, b, c, d are counter-clockwise. */
 static void quad(ebpo_mesh *m, uint32_t a, uint32_t b, uint32_t c, uint32_t d)
 {
     face(m, a, b, c);
@@ -251,7 +251,7 @@ ebpo_mesh ebpo_test_tetrahedron(double size)
     return m;
 }
 
-/* Lattice points in a box, each made once. */
+/* Lattice points in a box; each becomes a vertex at its first use. */
 typedef struct lattice {
     ebpo_mesh *mesh;
     uint32_t n;
@@ -348,8 +348,8 @@ ebpo_mesh ebpo_test_voxels(const uint8_t *filled, uint32_t n, double cell)
     return m;
 }
 
-/* Splits 1 into 4, with midpoints found by linear search among the edges of the lower end: small
- * meshes only. */
+/* Splits each face into four. Midpoints are found by linear search among the edges of the lower
+ * end, so this is for small meshes only. */
 static ebpo_mesh subdivide(const ebpo_mesh *m)
 {
     ebpo_mesh out = empty();

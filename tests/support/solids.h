@@ -6,7 +6,7 @@
 #include <ebpo/file.h>
 
 /* All functions return a mesh that the caller frees with ebpo_mesh_free; they abort if memory is
- * short. Doubles, unless stated. */
+ * short. Coordinates are doubles, unless stated. */
 
 ebpo_mesh ebpo_test_tetrahedron(double size);
 /* Makes an axis-parallel box of 12 n^2 faces, each side n by n squares. Counter-clockwise seen from
@@ -15,7 +15,7 @@ ebpo_mesh ebpo_test_box(const double low[3], const double high[3], uint32_t n);
 /* Makes an icosahedron subdivided 1 to 4 times (`subdivisions`), vertices moved out to the sphere:
  * 20 * 4^subdivisions faces. */
 ebpo_mesh ebpo_test_sphere(const double centre[3], double radius, uint32_t subdivisions);
-/* 2 n m faces around the z axis; n around the axis, m around the tube. */
+/* Makes a torus of 2 n m faces around the z axis, n around the axis and m around the tube. */
 ebpo_mesh ebpo_test_torus(double radius, double tube, uint32_t n, uint32_t m);
 /* Makes a cone of 2 n faces with its apex on the z axis: slivers if n is large. */
 ebpo_mesh ebpo_test_cone(double radius, double height, uint32_t n);
@@ -27,7 +27,7 @@ ebpo_mesh ebpo_test_tetrahedra(uint32_t count);
 ebpo_mesh ebpo_test_voxels(const uint8_t *filled, uint32_t n, double cell);
 /* Fills voxels at random, about `percent` of n^3. */
 ebpo_mesh ebpo_test_blob(uint32_t n, uint32_t percent, uint64_t seed);
-/* n steps, each one cell high, deep and wide. */
+/* Makes n steps, each one cell high, deep and wide. */
 ebpo_mesh ebpo_test_staircase(uint32_t n);
 /* Makes a band of 2 n faces; it cannot be oriented if `twisted`. */
 ebpo_mesh ebpo_test_band(uint32_t n, bool twisted);
@@ -50,7 +50,7 @@ void ebpo_test_shuffle(ebpo_mesh *mesh, uint64_t seed);
 void ebpo_test_split_vertices(ebpo_mesh *mesh);
 void ebpo_test_point(const ebpo_mesh *mesh, uint64_t vertex, double out[3]);
 
-/* splitmix64 (Steele, Lea, Flood 2014). */
+/* Return random numbers by splitmix64 (Steele, Lea, Flood 2014). */
 uint64_t ebpo_test_random(uint64_t *state);
 double ebpo_test_random_unit(uint64_t *state); /* [0, 1) */
 /* Computes cosine and sine of the turn i / n, 0 <= i, within some ulps and without libm: the same
@@ -59,7 +59,7 @@ void ebpo_test_circle(uint32_t i, uint32_t n, double *cosine, double *sine);
 
 /* Returns EBPO_TEST_SCALE, 1 if not set: other compilers and sanitizers repeat less. */
 double ebpo_test_scale(void);
-/* Returns `count` scaled by it, at least 1. */
+/* Returns `count` times EBPO_TEST_SCALE, at least 1. */
 uint64_t ebpo_test_scaled(uint64_t count);
 /* Selects turns of a loop: every turn, or an evenly spaced share if EBPO_TEST_SCALE is below 1. */
 bool ebpo_test_wanted(int turn);

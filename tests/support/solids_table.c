@@ -103,8 +103,8 @@ static ebpo_mesh make_touching_at_face(void)
     return m;
 }
 
-/* The same two cubes with shared vertices: the face between them occurs twice, in both directions.
- */
+/* Makes the same two cubes with shared vertices: the side between the cubes occurs twice, in both
+ * orientations. */
 static ebpo_mesh make_coincident_opposite_faces(void)
 {
     ebpo_mesh m = make_touching_at_face();
@@ -169,7 +169,7 @@ static ebpo_mesh make_inside_out_cube(void)
     return m;
 }
 
-/* A tetrahedron with one edge split on one side only, closed by a face without area. */
+/* Makes a tetrahedron with one edge split on one side only, closed by a face without area. */
 static ebpo_mesh make_zero_area_face(void)
 {
     ebpo_mesh m = ebpo_test_tetrahedron(2);

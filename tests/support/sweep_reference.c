@@ -64,7 +64,7 @@ static bool not_negative(const hull *h, const mpz_t share)
     return mpz_sgn(share) * mpz_sgn(h->bottom) >= 0;
 }
 
-/* p = t d */
+/* Tries a corner of the hull: p = t d */
 static void try_one(hull *h, const whole *p)
 {
     cross(&h->n, p, &h->d);
@@ -75,7 +75,7 @@ static void try_one(hull *h, const whole *p)
     take(h);
 }
 
-/* p + x u = t d */
+/* Tries an edge of the hull: p + x u = t d */
 static void try_two(hull *h, const whole *p, const whole *q)
 {
     subtract(&h->u, q, p);
@@ -94,7 +94,8 @@ static void try_two(hull *h, const whole *p, const whole *q)
     take(h);
 }
 
-/* p + x u + y v = t d: t (d . n) = p . n, x = -(d . p cross v) / (d . n), ... */
+/* Tries a triangle of the hull: p + x u + y v = t d, so t (d . n) = p . n, x = -(d . p cross v) /
+ * (d . n), ... */
 static void try_three(hull *h, const whole *p, const whole *q, const whole *r)
 {
     subtract(&h->u, q, p);
@@ -177,7 +178,7 @@ static void set_points(hull *h, const double a[3][3], const double b[3][3], int 
     mpz_clear(x);
 }
 
-/* Multiplies by 2^steps. */
+/* Multiplies t by 2^steps. */
 static void scale(mpq_t t, int steps)
 {
     if (steps >= 0)

@@ -8,8 +8,8 @@
 #include <gmp.h>
 #include <stdbool.h>
 
-/* Sets `t` to the greatest value (may be negative) with a common point of a + t * direction and b,
- * if it is above `t` or if `any` is false. Returns true if it did. */
+/* Finds the greatest value (may be negative) for which a + value * direction and b have a common
+ * point. Sets `t` to this value, and returns true, if it is above `t` or if `any` is false. */
 bool sweep_reference(const double a[3][3], const double b[3][3], const double direction[3],
                      bool any, mpq_t t);
 

@@ -38,7 +38,7 @@ void two_layouts_close(two_layouts *l)
     ebpo_close(l->without);
 }
 
-/* FNV-1a. */
+/* Adds data to a checksum (FNV-1a). */
 static uint64_t add(uint64_t sum, const void *data, uint64_t bytes)
 {
     for (uint64_t i = 0; data && i < bytes; i++)
@@ -92,7 +92,7 @@ uint64_t *octcodes_of_level(const ebpo_file *file, int level, uint64_t *count)
 {
     const ebpo_info *info = ebpo_file_info(file);
     uint64_t *gray = malloc(sizeof *gray), *wanted = NULL, grays = 1, wanteds = 0;
-    gray[0] = 0; /* above the root, whose octcode is 1 */
+    gray[0] = 0; /* stands for the parent of the root, whose octcode is 1 */
     for (int i = 0; i <= level; i++) {
         ebpo_level l;
         ebpo_error error = EBPO_ERROR_INIT;

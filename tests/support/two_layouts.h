@@ -9,8 +9,8 @@ typedef struct two_layouts {
     ebpo_file *with, *without;  /* both open files */
 } two_layouts;
 
-/* Takes the tree, or builds one of the mesh, which it takes. Aborts on failure. `parts`: ebpo_part
- * bits. */
+/* Write both files of a tree, or of the tree that is built of a mesh; consume the tree or mesh.
+ * Abort on failure. `parts`: ebpo_part bits. */
 void two_layouts_write(two_layouts *out, ebpo_tree *tree, uint32_t parts, ebpo_codec codec,
                        uint64_t subtree_faces);
 void two_layouts_build(two_layouts *out, ebpo_mesh mesh, uint32_t leaf_faces, uint32_t parts,

@@ -37,7 +37,7 @@ bool web_start(const char *script, const void *data, size_t size)
     }
     close(in[0]);
     close(out[1]);
-    server_input = in[1]; /* closes on exec, and when this process ends */
+    server_input = in[1]; /* closed on exec, and when this process ends */
     FILE *reported = fdopen(out[0], "r");
     bool good = server > 0 && reported && fscanf(reported, "%d", &port) == 1;
     if (reported)

@@ -3,8 +3,8 @@
 #ifndef EBPO_TESTS_WEB_H
 #define EBPO_TESTS_WEB_H
 
-/* Serves these bytes as a file; returns false if Python is not available. The server reads from a
- * pipe that the system closes with this process. */
+/* Serves these bytes as a file; returns false if Python is not available. The server ends when this
+ * process ends, as the system then closes a pipe from which the server reads. */
 #include <stdbool.h>
 #include <stddef.h>
 

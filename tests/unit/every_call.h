@@ -29,12 +29,12 @@ void every_call_points(double (*points)[3]);
 ebpo_status every_call_read(every_call_env *e, const char *name, ebpo_mesh *mesh);
 ebpo_status every_call_prepare(ebpo_mesh *mesh, ebpo_prepared *out, ebpo_error *error);
 
-/* In every_call_extras.c, for a call of every_call_results.c. */
+/* Defined in every_call_extras.c, called by every_call_results.c. */
 ebpo_status every_call_two_models(ebpo_model *model, bool whole, ebpo_error *error);
 
 /* Inputs of the calls, below the scratch folder. */
 #define EVERY_CALL_MODEL     "model.ebpo.h5"
-#define EVERY_CALL_ROWS      "rows.h5" /* of coordinates, at EVERY_CALL_ROWS_PATH */
+#define EVERY_CALL_ROWS      "rows.h5" /* rows of coordinates, at EVERY_CALL_ROWS_PATH */
 #define EVERY_CALL_ROWS_PATH "/VTKHDF/Points"
 #define EVERY_CALL_PLY       "torus.ply"
 #define EVERY_CALL_SPLIT     "split.ply"    /* without shared vertices */
@@ -47,7 +47,8 @@ ebpo_status every_call_two_models(ebpo_model *model, bool whole, ebpo_error *err
 /* Returns a URL of the model; NULL: no server. */
 const char *every_call_url(void);
 
-/* Lets all allocations succeed until every_call_resume: for allocations of the tests themselves. */
+/* Lets all allocations succeed until every_call_resume. Used for allocations of the tests
+ * themselves. */
 void every_call_pause(void);
 void every_call_resume(void);
 

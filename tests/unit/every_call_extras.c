@@ -265,7 +265,8 @@ static ebpo_status touch(ebpo_model *model, ebpo_error *error)
     static const double turn[4] = { 0, 0, 0, 1 };
     ebpo_haptic_step_ball(touch, away, &result);
     (void)ebpo_haptic_ball_path(touch, way);
-    ebpo_haptic_step_probe(touch, away, &sensed); /* wrong kind: reports it */
+    ebpo_haptic_step_probe(touch, away,
+                           &sensed); /* a device of the wrong kind: an error is reported */
     ebpo_haptic_step_tool(touch, away, turn, &turned);
     (void)ebpo_haptic_tool_path(touch, poses);
     status = ebpo_haptic_reset(touch, closer, error);
@@ -420,7 +421,7 @@ static bool count_crossings(void *user, const ebpo_crossing *crossings, uint64_t
     return true;
 }
 
-/* It consumes the mesh. */
+/* Finds crossings, which consumes the mesh. */
 static ebpo_status call_crossings(every_call_env *e)
 {
     ebpo_mesh mesh;
@@ -515,7 +516,7 @@ static ebpo_status record_scene(const ebpo_scene *scene, const ebpo_scene_clash 
                                 ebpo_error *error)
 {
     ebpo_scene_report *record;
-    ebpo_scene_frame frame = { .time = 1, .queried = 1 };
+    ebpo_scene_frame frame = { .time = 1, .tested = 1 };
     ebpo_status status = ebpo_scene_report_new(scene, scratch("report.h5"), &record, error);
     if (status == EBPO_OK)
         status = ebpo_scene_report_add(record, &frame, clash, 1, error);

@@ -220,7 +220,7 @@ static ebpo_status call_repeated(every_call_env *e)
     return status;
 }
 
-/* With a file without names. */
+/* Reads the groups of a file without names of groups. */
 static ebpo_status call_groups(every_call_env *e)
 {
     ebpo_mesh mesh;

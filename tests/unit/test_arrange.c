@@ -113,8 +113,8 @@ static ebpo_mesh some_mesh(int i)
     return m;
 }
 
-/* Returns bit by bit whether the vertex is in the cell, whose upper faces belong to the next cells.
- */
+/* Returns true when the vertex is in the cell, compared bit by bit. The upper faces of a cell
+ * belong to the next cells. */
 static bool lies_in(const ebpo_box *box, const ebpo_mesh *m, uint64_t v, ebpo_cell cell)
 {
     double p[3];
@@ -176,8 +176,10 @@ START_TEST(test_arranged_mesh_has_same_faces)
         ck_assert_msg(ebpo_mesh_arrange(&m, 1, silent, &error) == EBPO_OK, "%s", error.message);
         expect_arranged(&m, &source);
         ck_assert(ebpo_mesh_check(&m, 2, silent, &after, &error) == EBPO_OK);
-        ck_assert_msg(memcmp(&before, &after, sizeof before) == 0, "mesh %d: another report", _i);
-        /* From any order, with other threads, and repeated. */
+        ck_assert_msg(memcmp(&before, &after, sizeof before) == 0, "mesh %d: the report differs",
+                      _i);
+        /* The result is the same from any order, with other numbers of threads, and when repeated.
+         */
         ck_assert(ebpo_arrange(&again, 3, 4, &silent, &error) == EBPO_OK &&
                   again.arrangement->box.grid_level == 3);
         expect_arranged(&again, &source);

@@ -47,7 +47,7 @@ static void check_lane(reading *r, uint32_t block, unsigned lane, double base[3]
         }
 }
 
-/* Empty lanes repeat a face: bounds of all lanes bound only the faces. */
+/* Checks that empty lanes repeat a face, so that bounds of all lanes bound only the faces. */
 static void check_idle(const ebpo_accel *s, uint32_t block, unsigned lane,
                        double read[3][3][EBPO_BLOCK])
 {
@@ -116,7 +116,8 @@ static void check_estimate(const ebpo_accel *s, const ebpo_slice_size *size, con
 
 enum { FACES = 500 };
 
-/* Corners from a moving pool of vertices: the larger it is, the fewer are shared. */
+/* Makes faces with corners from a moving pool of vertices. The larger the pool, the fewer vertices
+ * are shared. */
 static ebpo_mesh random_mesh(uint64_t *state, uint32_t pool, bool doubles)
 {
     ebpo_mesh mesh = { .vertex_count = FACES / 8 * (pool / 4) + 2 * pool, .face_count = FACES };
@@ -255,7 +256,7 @@ END_TEST
 
 enum { LEVELS = 4, LEAVES = 512, NINES = LEAVES / 2 * 10 };
 
-/* A soup. */
+/* Makes a mesh whose faces share no vertices. */
 static ebpo_mesh spread_mesh(bool doubles)
 {
     ebpo_mesh mesh = { .vertex_count = 3 * NINES, .face_count = NINES };

@@ -46,7 +46,8 @@ static void assert_counts(const ebpo_tree *tree)
     ck_assert_uint_eq(tree->level[tree->info.level_count - 1].gray_count, 0);
 }
 
-/* Checks that every face is new once, in the first leaf that lists it, and lists repeat no face. */
+/* Checks that each face is new exactly once, in the first leaf that lists the face, and that no
+ * list repeats a face. */
 static void assert_lists(const ebpo_tree *tree)
 {
     uint8_t *seen = calloc(tree->mesh.face_count + 1, 1);
@@ -95,8 +96,8 @@ static double level_volume(const ebpo_tree *tree, int level)
     return sum + tree->level[level].gray_volume;
 }
 
-/* Where winding numbers stay below 2 the integral of the winding number is the volume of the solid.
- */
+/* Returns true when all winding numbers are below 2: then the integral of the winding number is the
+ * volume of the solid. */
 static bool single_shell_everywhere(const ebpo_tree *tree)
 {
     for (int i = 0; i < tree->info.level_count; i++) {

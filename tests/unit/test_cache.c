@@ -316,7 +316,7 @@ START_TEST(test_cache_pinned_items_stay)
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert_int_eq(ebpo_cache_get(cache, 3, &it, NULL, &error), EBPO_E_LIMIT);
     ck_assert_ptr_null(it);
-    ck_assert_msg(strstr(error.message, "budget of 320 would do"), "%s", error.message);
+    ck_assert_msg(strstr(error.message, "budget of 320 would suffice"), "%s", error.message);
     ck_assert(ebpo_cache_try(cache, 1, &it));
     ebpo_cache_unpin(cache, 1);
     ebpo_cache_unpin(cache, 1);
@@ -329,8 +329,8 @@ START_TEST(test_cache_pinned_items_stay)
 }
 END_TEST
 
-/* Items are evicted for it, items in use are not; a load that would need the memory is refused
- * before it is taken. */
+/* Items are evicted for a reservation, except items in use. A load that would need the reserved
+ * memory is refused before memory is taken. */
 START_TEST(test_cache_reserve_evicts_items_when_needed)
 {
     begin_with(400, 100, 100);
@@ -351,7 +351,7 @@ START_TEST(test_cache_reserve_evicts_items_when_needed)
     void *it;
     ebpo_error error = EBPO_ERROR_INIT;
     ck_assert_int_eq(ebpo_cache_get(cache, 5, &it, NULL, &error), EBPO_E_LIMIT);
-    ck_assert_msg(strstr(error.message, "budget of 450 would do"), "%s", error.message);
+    ck_assert_msg(strstr(error.message, "budget of 450 would suffice"), "%s", error.message);
     ebpo_cache_unpin(cache, 2);
     ebpo_cache_unpin(cache, 3);
     ck_assert(!use(5));
@@ -361,7 +361,7 @@ END_TEST
 
 /* --- shared --- */
 
-/* Both of one source, with different keys. */
+/* Two caches of one source, with different keys. */
 static ebpo_cache_pool *pool;
 static ebpo_cache *other;
 
@@ -421,7 +421,7 @@ START_TEST(test_shared_budget_permanent_use_evicts_items)
     use_other(11);
     get(2);
     ck_assert_int_eq(ebpo_cache_pool_take(pool, 301, &error), EBPO_E_LIMIT);
-    ck_assert_msg(strstr(error.message, "301 bytes of a shared budget are not free"), "%s",
+    ck_assert_msg(strstr(error.message, "301 bytes are not free in a shared budget"), "%s",
                   error.message);
     ck_assert_int_eq(ebpo_cache_pool_take(pool, 250, NULL), EBPO_OK);
     ck_assert(!src->live[1] && !src->live[11] && src->live[2]);
@@ -455,7 +455,7 @@ static void *use_either(void *context)
     return NULL;
 }
 
-/* The source counts all bytes of both, at all times. */
+/* The source counts all bytes of both caches at all times. */
 START_TEST(test_shared_budget_holds_with_four_threads)
 {
     pthread_t thread[4];
@@ -508,7 +508,7 @@ START_TEST(test_item_beyond_estimate_keeps_budget)
 }
 END_TEST
 
-/* Finds while loading that it needs more memory than stated. */
+/* A load that needs more memory than stated, which it finds while loading. */
 static ebpo_status load_more(void *user, uint64_t key, uint64_t limit, void **out, uint64_t *bytes,
                              ebpo_error *error)
 {
@@ -516,7 +516,7 @@ static ebpo_status load_more(void *user, uint64_t key, uint64_t limit, void **ou
     if (limit >= s->peak[key])
         return load(user, key, limit, out, bytes, error);
     *bytes = limit + 60 < s->peak[key] ? limit + 60 : s->peak[key];
-    return ebpo_fail(error, EBPO_E_LIMIT, "%d bytes do not do", (int)limit);
+    return ebpo_fail(error, EBPO_E_LIMIT, "%d bytes are not enough", (int)limit);
 }
 
 START_TEST(test_load_can_request_more_memory)
@@ -640,14 +640,14 @@ START_TEST(test_get_waits_for_memory_of_load)
     pthread_join(a.thread, NULL);
     pthread_join(b.thread, NULL);
     ck_assert_int_eq(a.status, EBPO_OK);
-    /* refused if it came while 1 was in use */
+    /* refused if the request came while item 1 was in use */
     ck_assert(b.status == EBPO_OK || b.status == EBPO_E_LIMIT);
     finish();
 }
 END_TEST
 
-/* Small loads, one after the other on several threads, never leave space for a large one by chance.
- */
+/* Runs small loads one after the other; on several threads they never leave space for a large load
+ * by chance. */
 static void *run_small(void *context)
 {
     atomic_bool *stop = context;
@@ -666,7 +666,8 @@ START_TEST(test_large_load_is_not_starved)
     atomic_bool stop = false;
     begin_with(400, 100, 100);
     src->jitter = true;
-    /* a small one in use leaves no space: that is a refusal; beside loads it waits */
+    /* a small item in use leaves no space: the large load is refused; beside small loads it waits
+     */
     src->size[200] = src->peak[200] = 290;
     for (int i = 0; i < 3; i++)
         pthread_create(&small[i], NULL, run_small, &stop);

@@ -36,7 +36,7 @@ static void check_cell_faces(const ebpo_box *box, uint64_t *state)
                                     (uint32_t)reference_integer(state, 0, last) };
             for (int i = 0; i < 5; i++)
                 ck_assert_msg(cell_face_is_exact(box, axis, level, k[i]),
-                              "axis %d level %d wall %u", axis, level, k[i]);
+                              "axis %d level %d cell face %u", axis, level, k[i]);
         }
 }
 
@@ -110,7 +110,8 @@ START_TEST(test_box_grows_at_most_one_millionth)
 }
 END_TEST
 
-/* The finest step that 53 bits allow 1e7 from 0 is 2^-29: 2^20 cells of it make 2^-9. */
+/* At a distance of 1e7 from 0 the finest step that 53 bits allow is 2^-29, and 2^20 cells of this
+ * size are 2^-9 long. */
 START_TEST(test_box_of_translated_model_is_tight)
 {
     const double min[3] = { 1e7, 1e7, 1e7 }, max[3] = { 1e7 + 1e-3, 1e7 + 1e-3, 1e7 + 1e-3 };
@@ -199,7 +200,7 @@ END_TEST
 
 /* --- octcodes --- */
 
-/* Bit by bit, from the root down. */
+/* Computes an octcode bit by bit, from the root down. */
 static ebpo_octcode plain_octcode(ebpo_cell cell)
 {
     ebpo_octcode code = 1;

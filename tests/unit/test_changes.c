@@ -1,5 +1,5 @@
-/* Files that other programs change while they are read: an error that reports it, or the data of
- * one version. */
+/* Files that other programs change while they are read: the result is an error that reports the
+ * change, or the data of one version. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -179,7 +179,7 @@ static double first_x(const ebpo_mesh *mesh)
     return mesh->xyz32 ? (double)mesh->xyz32[0] : mesh->xyz64[0];
 }
 
-/* Opens it, then another version replaces or overwrites it. */
+/* Opens a file; then another version replaces or overwrites the file. */
 static ebpo_status read_after(bool renamed, double *expected, double *x, ebpo_error *error)
 {
     ebpo_file *file;

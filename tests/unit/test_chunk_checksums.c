@@ -28,8 +28,8 @@ static bytes slurp(const char *path)
     return b;
 }
 
-/* All of a kind have the same topology: files of one codec without compression have chunks of the
- * same sizes. `wide`: how large. */
+/* Writes a torus. All have the same topology, so files of one codec without compression have chunks
+ * of the same sizes. `wide`: the size of the torus. */
 static bytes write_torus(const char *name, double wide, ebpo_codec codec, uint64_t subtree_faces,
                          ebpo_chunk_checksums checksums)
 {
@@ -104,7 +104,7 @@ static ebpo_status pass(void *context, const ebpo_array_in *array, uint64_t chun
     return EBPO_OK;
 }
 
-/* Returns true when reading array n of these bytes reports chunk `chunk` as a wrong one. */
+/* Returns true when reading array n of these bytes reports that chunk `chunk` is wrong. */
 static bool is_noticed(const bytes *b, int n, uint64_t chunk)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
@@ -119,7 +119,8 @@ static bool is_noticed(const bytes *b, int n, uint64_t chunk)
     return status == EBPO_E_FORMAT && strstr(error.message, expected);
 }
 
-/* Each chunk of one file in the other: all have the same length, and valid checksums. */
+/* Puts each chunk of one file into the other: the chunks have the same length, and valid checksums.
+ */
 START_TEST(test_chunks_of_other_version_are_refused)
 {
     uint64_t subtrees = _i ? 8 : EBPO_NO_SUBTREES, found = 0;
@@ -152,7 +153,7 @@ START_TEST(test_chunks_of_other_version_are_refused)
 }
 END_TEST
 
-/* Such files report nothing. */
+/* Files without checksums report no error. */
 START_TEST(test_files_without_checksums_are_equal)
 {
     bytes with = write_torus("a.ebpo.h5", 1, EBPO_CODEC_NONE, 8, EBPO_CHECKSUMS_DEFAULT),

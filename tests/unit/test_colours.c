@@ -7,8 +7,8 @@
 #include "check_main.h"
 #include "scratch.h"
 
-/* Reads a triangle with attributes of vertices and of the face; each is lines of a PLY header with
- * the values of the first row after a "|". */
+/* Reads a triangle with attributes of vertices and of the face; each text has lines of a PLY
+ * header, a "|", and the values of the first row. */
 static ebpo_colours colours_of(const char *vertex, const char *face, ebpo_error *error)
 {
     ebpo_mesh mesh;

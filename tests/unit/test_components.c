@@ -27,8 +27,8 @@ static void add_box(ebpo_mesh *m, double x, double half, bool reversed)
     ebpo_mesh_free(&box);
 }
 
-/* Boxes in boxes: solids, cavities, islands in cavities, cavities in those, and two separate ones.
- */
+/* Makes boxes in boxes: solids, cavities, islands in cavities, cavities in these, and two separate
+ * boxes. */
 static ebpo_mesh nested(uint64_t *state)
 {
     double low[3] = { -40, -40, -40 }, high[3] = { 40, 40, 40 };
@@ -44,8 +44,8 @@ static ebpo_mesh nested(uint64_t *state)
     return m;
 }
 
-/* An open component, one in it, one that is not oriented, faces with a repeated vertex, unused
- * vertices. */
+/* Makes an open component, a component in it, one that is not oriented, faces with a repeated
+ * vertex, and unused vertices. */
 static ebpo_mesh awkward(uint64_t *state)
 {
     ebpo_mesh m = nested(state), sheet = ebpo_test_sheet(30, 3), band = ebpo_test_band(9, true);

@@ -109,8 +109,8 @@ static void same_tree(const ebpo_tree *a, const ebpo_tree *b)
               a->info.epsilon == b->info.epsilon);
 }
 
-/* Shapes of trees: single leaf, several levels, many items (index arrays, several chunks), odd
- * windings, surface, doubles, leaf planes. */
+/* Shapes of trees: a single leaf, several levels, many items (index arrays, several chunks), odd
+ * winding numbers, a surface, doubles, leaf planes. */
 static const random_tree_options shapes[] = {
     { 1, 1, 0, 9, true, false, false, false },     { 2, 2, 0, 5, true, false, false, false },
     { 3, 5, 8, 6, true, true, true, false },       { 4, 6, 7, 9, false, false, false, true },
@@ -202,7 +202,7 @@ static herr_t check_chunks(hid_t group, const char *name, const H5L_info_t *info
             ck_assert_int_ge(H5Dget_chunk_info(object, space, i, at, &mask, &address, &size), 0);
             ck_assert_uint_ge(address, m->head);
             ck_assert(address + size <= m->index || address >= m->index + m->index_bytes);
-            /* metadata needed to find them comes before them */
+            /* metadata that is needed to find an array comes before the array */
             ck_assert(count == 1 || address >= m->index + m->index_bytes);
             m->chunk_bytes += size;
         }
@@ -212,7 +212,8 @@ static herr_t check_chunks(hid_t group, const char *name, const H5L_info_t *info
     return 0;
 }
 
-/* Headers, the first levels, the index of large arrays, all other data; no gaps. */
+/* The file has headers, the first levels, the index of large arrays, then all other data, without
+ * gaps. */
 START_TEST(test_metadata_is_in_two_blocks)
 {
     ebpo_tree tree;
@@ -240,8 +241,8 @@ START_TEST(test_metadata_is_in_two_blocks)
 }
 END_TEST
 
-/* Checksums at the end of headers that end in zero bytes, and files with one array: sizes of
- * metadata are correct in all cases. */
+/* The sizes of metadata are correct also for headers whose checksums end in zero bytes, and for
+ * files with one array. */
 START_TEST(test_files_have_no_gaps)
 {
     static const uint32_t parts[] = { ~0u, EBPO_PART_PLANES, 0, EBPO_PART_MESH };
@@ -440,8 +441,8 @@ START_TEST(test_bit_flips_after_header_are_detected)
 }
 END_TEST
 
-/* Flips in the header: refused, or without effect (bytes that HDF5 leaves unused); never a crash,
- * never other content. */
+/* A flipped bit in the header is refused, or has no effect (in bytes that HDF5 leaves unused). It
+ * never causes a crash or other content. */
 START_TEST(test_bit_flips_in_header_are_harmless)
 {
     ebpo_tree tree, back;
@@ -659,7 +660,7 @@ START_TEST(test_chunk_round_trip_in_all_pipelines)
 }
 END_TEST
 
-/* The two lowest bits of the modes of sequences, which zstd ignores and no checksum covers. */
+/* Sets the two lowest bits of the modes of sequences, which zstd ignores and no checksum covers. */
 START_TEST(test_unused_frame_bits_are_refused)
 {
     static const struct {
@@ -720,7 +721,7 @@ START_TEST(test_byte_planes_are_compressed_separately)
 }
 END_TEST
 
-/* Empty data: nothing is allocated and sorted, which sanitizers check. */
+/* For empty data nothing is allocated or sorted, which sanitizers check. */
 START_TEST(test_checksum_of_empty_content)
 {
     static const uint8_t of_nothing[4] = { 0xe3, 0xb0, 0xc4, 0x42 }; /* SHA-256 begins with it */

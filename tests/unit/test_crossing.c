@@ -93,7 +93,7 @@ static bool inside_face(vector x, vector corner[3], vector normal)
     return inside;
 }
 
-/* p + shift with d0 = 2^-s, d1 = 2^-3s, d2 = 2^-7s. */
+/* out = p + (2^-s, 2^-3s, 2^-7s) */
 static void set_shifted(vector out, const double p[3], unsigned s)
 {
     static const unsigned factor[3] = { 1, 3, 7 };
@@ -284,7 +284,8 @@ static void add_voxels(soup *mesh, const bool *voxel, uint64_t *state)
                 }
 }
 
-/* Voxels share edges and corners here; by the shift, each of them owns its low sides. */
+/* Voxels share edges and corners here. By the shift, each voxel contains its low sides and not its
+ * high sides. */
 START_TEST(test_winding_of_voxel_solids)
 {
     static soup mesh;
@@ -305,7 +306,7 @@ START_TEST(test_winding_of_voxel_solids)
 }
 END_TEST
 
-/* Overlapping tetrahedra, in contact, and flat, in either orientation. */
+/* Tetrahedra that overlap, are in contact, or are flat, in either orientation. */
 START_TEST(test_winding_of_tetrahedra_ignores_path)
 {
     static soup mesh;
@@ -335,7 +336,7 @@ START_TEST(test_winding_of_tetrahedra_ignores_path)
 }
 END_TEST
 
-/* Solid angles count a point well inside once: determines the sign. */
+/* For a point well inside, the sum of solid angles is one turn; this determines the sign. */
 START_TEST(test_winding_inside_tetrahedron_is_one)
 {
     static soup mesh;
@@ -353,8 +354,8 @@ END_TEST
 
 /* --- points on faces --- */
 
-/* Returns true when p = sum w_i corner_i for weights i/n with n = 0 .. 60: complete for lattice
- * points of faces this small. */
+/* Returns true when p = sum w_i corner_i for some weights i/n with n = 0 .. 60. This finds all
+ * lattice points of faces this small. */
 static bool plain_point_on_triangle(const double p[3], const double *f)
 {
     for (int n = 1; n <= 48; n++)

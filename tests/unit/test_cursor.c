@@ -1,4 +1,5 @@
-/* Cursors: the same nodes in every representation, as listed by a plain traversal of the levels. */
+/* Cursors visit the same nodes in every representation, the nodes that a plain traversal of the
+ * levels lists. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -233,7 +234,7 @@ static void walk_all(whole *w, holder which)
     }
     ck_assert_uint_eq(i, w->reference.count);
     ck_assert_uint_eq(ebpo_cursor_octcode(&c), 1);
-    /* over: only for children of the root */
+    /* from here on the cursor skips the subtrees of the root's children */
     fine(ebpo_cursor_next(&c, false, &more, &error), &error);
     for (ebpo_octcode code = 8; more; code++) {
         ck_assert_uint_eq(ebpo_cursor_octcode(&c), code);
@@ -242,7 +243,8 @@ static void walk_all(whole *w, holder which)
     }
 }
 
-/* Random jumps: cells of any level, points, back up; each time the deepest node around. */
+/* Jumps at random to cells of any level, to points, and back up; checks each time that the cursor
+ * is at the deepest node around the target. */
 static void jump_about(whole *w, holder which, uint64_t seed, uint64_t jumps)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -262,7 +264,8 @@ static void jump_about(whole *w, holder which, uint64_t seed, uint64_t jumps)
             double p[3];
             bool within;
             for (int k = 0; k < 3; k++)
-                p[k] = ebpo_cell_face(&box, k, cell.level, cell.at[k]); /* belongs to the cell */
+                p[k] = ebpo_cell_face(&box, k, cell.level,
+                                      cell.at[k]); /* this point belongs to the cell */
             fine(ebpo_cursor_to_point(&c, &box, p, cell.level, &within, &error), &error);
             ck_assert(within);
         } else {
@@ -350,7 +353,8 @@ static void compare_envelopes(whole *w, holder which, uint64_t seed, uint64_t ju
         ck_assert_mem_eq(a->vertex, b->vertex, (size_t)a->vertex_count * sizeof a->vertex[0]);
         if (n->type == EBPO_BLACK) {
             ck_assert_double_eq(ebpo_polytope_volume(a), 1);
-        } else if (w->model && n->type != EBPO_WHITE) { /* of a shape: it never becomes empty */
+        } else if (w->model &&
+                   n->type != EBPO_WHITE) { /* the envelope of a shape, which never becomes empty */
             ebpo_half_spaces_cut(&expected, 0, &cut);
             ck_assert_double_eq_tol(ebpo_polytope_volume(a), ebpo_polytope_volume(&cut), 1e-6);
         }

@@ -1,5 +1,5 @@
-/* Small files as other programs write them: which are read, with which warning, and which are
- * refused with which message. docs/guide/formats.md describes the same. */
+/* Small files as other programs write them: the tables state which files are read, with which
+ * warning, and which are refused, with which message. docs/guide/formats.md describes the same. */
 #include <stdio.h>
 #include <string.h>
 
@@ -11,7 +11,7 @@
 typedef struct dialect {
     const char *name, *text;
     size_t bytes;
-    uint64_t vertices, faces; /* 0: it is refused */
+    uint64_t vertices, faces; /* 0: the file is refused */
     const char *words;        /* text of the error, or of the warning; NULL: there is no warning */
 } dialect;
 
@@ -109,7 +109,8 @@ static const dialect dialects[] = {
     { "signs.obj", FILE_OF("v 3.1+e2 0 0\nv 310 0 0\nv 3100-E1 1 0\nv 0 1 0\nf 1 3 4\nf 2 4 3\n"),
       3, 2, NULL },
     { "vn_ind.obj", FILE_OF(V4 "vn -nan(ind) 0 0\nvn 0\nf 1//1 2//1 3//2\n"), 3, 1, NULL },
-    { "lfs.obj", FILE_OF(LFS), 0, 0, "is a Git LFS pointer, not the file itself; fetch that: git" },
+    { "lfs.obj", FILE_OF(LFS), 0, 0,
+      "is a Git LFS pointer, not the file itself; fetch the file: git" },
     { "utf16_no_mark.obj", FILE_OF("v\0 \0001\0 \0002\0 \0003\0\n\0v\0"), 0, 0,
       "(UTF-16); save it" },
     { "utf16_be.obj", FILE_OF("\0v\0 \0001\0 \0002\0 \0003\0\n\0v"), 0, 0, "(UTF-16); save it" },
@@ -373,7 +374,7 @@ START_TEST(test_ply_dialects_are_read_or_refused)
 }
 END_TEST
 
-/* With every byte changed, and cut at every length: an error or a complete mesh. */
+/* Files with each byte changed, and cut at each length, give an error or a complete mesh. */
 START_TEST(test_damaged_ply_dialects)
 {
     const dialect *d = &dialects[_i];

@@ -1,5 +1,6 @@
-/* Point and triangle, against rationals: the definition (the minimum of the distance from the
- * plane, if the point projects inside, and from the three edges), computed with mpq. */
+/* The distance of point and triangle against its definition in rational arithmetic (mpq): the
+ * minimum of the distance from the plane, if the point projects inside, and of the distances from
+ * the three edges. */
 #include <float.h>
 #include <gmp.h>
 #include <math.h>
@@ -138,7 +139,8 @@ static void exact_square(mpq_t out, const double p[3], const double t[3][3])
     clear(&w);
 }
 
-/* Returns the sign of d^2 - square, d a double or the middle between two neighbours. */
+/* Returns the sign of d^2 - square, where d is a double or the middle between two neighbouring
+ * doubles. */
 static int compare_square(double d, double next, const mpq_t square)
 {
     mpq_t x, y;
@@ -161,8 +163,8 @@ static bool rounded_correctly(double d, const mpq_t square)
            compare_square(d, nextafter(d, INFINITY), square) >= 0;
 }
 
-/* Far away on some axes, up to the range of doubles, and among the coordinates of the triangle on
- * others. */
+/* Makes a point that is far away on some axes, up to the range of doubles, and among the
+ * coordinates of the triangle on others. */
 static void make_far_case(int kind, double p[3], double t[3][3])
 {
     double scale = kind == 13 ? 0x1p-1070 : 1;
@@ -224,7 +226,7 @@ START_TEST(test_distance_rounding_and_bounds)
         double normal[3], alone[3];
         ebpo_triangle_nearest_exact(p, (const double(*)[3])t, NULL, normal, &n);
         ebpo_triangle_unit_normal((const double(*)[3])t, alone);
-        ck_assert_msg(memcmp(normal, alone, sizeof normal) == 0, "case %d: another normal", i);
+        ck_assert_msg(memcmp(normal, alone, sizeof normal) == 0, "case %d: the normal differs", i);
         ebpo_triangle_distance_bounds(p, (const double(*)[3])t, &b);
         ck_assert_msg(rounded_correctly(n.distance, square), "case %d: %a is not the distance", i,
                       n.distance);
@@ -267,7 +269,7 @@ START_TEST(test_distance_comparisons_are_exact)
 }
 END_TEST
 
-/* |normal component| squared within 3 ulp of n_k^2 / n . n, and its sign. */
+/* The square of each component is within 3 ulp of n_k^2 / n . n, and its sign is correct. */
 START_TEST(test_unit_normals_of_slivers)
 {
     mpq_t nn, y;

@@ -47,7 +47,7 @@ START_TEST(test_error_of_ply_has_byte_offset)
 }
 END_TEST
 
-/* Bits of the arrays: libhdf5 checks the header. */
+/* Flips bits of the arrays, as libhdf5 checks the header. */
 START_TEST(test_error_of_damaged_array)
 {
     static const query_variant standard = { "default", 4, 4, EBPO_RULE_NONZERO, 0 };

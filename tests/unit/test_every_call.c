@@ -234,10 +234,11 @@ END_TEST
 
 enum {
     MEMORY = FAULT_MALLOC | FAULT_MMAP | FAULT_THREAD,
-    IN_PART = FAULT_SHORT_READ | FAULT_SHORT_WRITE /* no failures: the call continues */
+    IN_PART = FAULT_SHORT_READ | FAULT_SHORT_WRITE /* not failures: the call continues */
 };
 
-/* Fails the n-th call of these kinds, or all from it on. Returns true when there are more calls. */
+/* Lets the n-th system call of these kinds fail, or all from the n-th on. Returns true when there
+ * are more calls to fail. */
 static bool call_with_failure(const every_call *c, every_call_env *e, unsigned kinds, uint64_t n,
                               bool onward)
 {
@@ -252,7 +253,7 @@ static bool call_with_failure(const every_call *c, every_call_env *e, unsigned k
                   number, error.message);
     ck_assert_msg(status == EBPO_OK || error.message[0], "%s: %#x, %llu: no message", c->name,
                   kinds, number);
-    ck_assert_msg(status != EBPO_E_FORMAT, "%s: %#x, %llu: called damaged: %s", c->name, kinds,
+    ck_assert_msg(status != EBPO_E_FORMAT, "%s: %#x, %llu: reported as damage: %s", c->name, kinds,
                   number, error.message);
     expect_workspace_empty(e, c->name);
     ck_assert_msg(open_files() <= files, "%s: %#x, %llu: a file stays open", c->name, kinds,

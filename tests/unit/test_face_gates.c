@@ -17,7 +17,7 @@ enum { ROWS = 4096, BYTES = ROWS * EBPO_GATES_COLS };
 
 static uint64_t pick(uint64_t *state, uint64_t below) { return ebpo_random_next(state) % below; }
 
-/* A strip, row after row, of a grid, as in scans. */
+/* Makes a face of a grid, strip after strip and row after row, as in scans. */
 static void grid_face(uint64_t i, uint32_t width, uint32_t *face)
 {
     uint32_t square = (uint32_t)(i / 2), x = square % width, y = square / width,
@@ -44,8 +44,8 @@ static void any_face(int kind, uint64_t i, uint64_t *state, uint32_t *face)
     memcpy(face, turned, sizeof turned);
 }
 
-/* Makes high-water codes: of faces whose vertices are numbered by first use, of which `before` were
- * seen before. Returns how many are seen afterwards. */
+/* Renumbers vertices by first use, as high-water codes need, when `before` vertices were seen
+ * before. Returns the number of vertices seen afterwards. */
 static uint64_t number_by_use(uint32_t *faces, uint32_t rows, uint64_t before, uint64_t *state)
 {
     static uint32_t number[400000];
@@ -109,7 +109,7 @@ START_TEST(test_face_encoding_round_trip)
 }
 END_TEST
 
-/* Changed bytes are read as by the reference implementation, or refused by both. */
+/* Changed bytes give the result of the reference implementation, or are refused by both readers. */
 START_TEST(test_changed_face_bytes_match_reference)
 {
     uint64_t state = (uint64_t)_i + 100, taken = 0, refused = 0;
@@ -150,7 +150,7 @@ START_TEST(test_noise_face_bytes_match_reference)
 }
 END_TEST
 
-/* A grid takes two bytes a face and hardly any index; the others are stored as codes. */
+/* A grid takes two bytes a face and hardly any index; other faces are stored as codes. */
 START_TEST(test_face_stream_lengths)
 {
     uint64_t state = 3;

@@ -90,7 +90,7 @@ START_TEST(test_ply_elements_beyond_4_gib)
     ck_assert_uint_eq(count, 4);
     ck_assert_double_eq(points[11], 1);
     free(points);
-    /* One byte less, or a bad corner: the message has the offset, above 2^32. */
+    /* With one byte less, or an invalid corner, the message has the offset, which is above 2^32. */
     ck_assert_int_eq(ebpo_ply_parse_memory(&mesh, data, size - 1, "far.ply", NULL, 0, NULL, &error),
                      EBPO_E_FORMAT);
     data[size - 1] = 1;
@@ -103,7 +103,8 @@ START_TEST(test_ply_elements_beyond_4_gib)
 }
 END_TEST
 
-/* Reads a file with such a header, that is as long as stated, or a few bytes only. */
+/* Reads a file with these counts in its header and the given size; 0: only the header and a few
+ * bytes. */
 static ebpo_status claims(const char *vertices, const char *faces, uint64_t size, ebpo_error *error)
 {
     uint64_t space = size < 4096 ? 4096 : size;
@@ -156,7 +157,7 @@ START_TEST(test_ply_counts_beyond_limit_are_refused)
 }
 END_TEST
 
-/* Three times the face count is 2 in 32 bits. */
+/* In 32 bits, three times this face count would be 2. */
 START_TEST(test_stl_corners_beyond_limit_are_refused)
 {
     const uint32_t faces = 1431655766;
@@ -208,7 +209,7 @@ END_TEST
 
 /* --- containers --- */
 
-/* Bytes of 8 * count that would be few with 32-bit arithmetic. */
+/* With 32-bit arithmetic, 8 * count would be a small number of bytes. */
 START_TEST(test_lists_beyond_array_limit_are_refused)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -230,11 +231,11 @@ START_TEST(test_lists_beyond_array_limit_are_refused)
 }
 END_TEST
 
-/* A container whose arrays follow 8 GiB of zeros: its metadata is unchanged except for offsets
- * greater by that amount. */
+/* A container whose arrays follow 8 GiB of zeros. Its metadata is unchanged, except that offsets
+ * are greater by 8 GiB. */
 typedef struct shifted {
     uint8_t *bytes;
-    uint64_t size, from, by; /* bytes from `from` on are `by` farther */
+    uint64_t size, from, by; /* bytes from `from` on are shifted by `by` */
     uint64_t beyond, hinted; /* reads, and ranges of prefetch hints, beyond 2^32 */
 } shifted;
 
@@ -264,14 +265,14 @@ static ebpo_status read_shifted(void *user, uint64_t offset, uint64_t size, void
     return EBPO_OK;
 }
 
-/* The checksum of metadata follows it. */
+/* Computes the checksum of metadata, which is stored after the metadata. */
 static void sum_again(uint8_t *at, uint64_t bytes)
 {
     ebpo_store32(at + bytes, ebpo_lookup3(at, bytes));
 }
 
-/* A continuation block of an object header, which a message with its offset and length refers to.
- */
+/* Updates the checksum of a continuation block of an object header. A message of the header has the
+ * offset and length of the block. */
 static void sum_piece_again(shifted *s, uint64_t place)
 {
     for (uint64_t i = 48; i + 16 < s->from; i++)
@@ -279,10 +280,11 @@ static void sum_piece_again(shifted *s, uint64_t place)
             sum_again(s->bytes + place, ebpo_load64(s->bytes + i + 8) - 4);
             return;
         }
-    ck_abort_msg("nothing leads to the piece at %llu", (unsigned long long)place);
+    ck_abort_msg("no message refers to the block at %llu", (unsigned long long)place);
 }
 
-/* Superblock and object headers, as in the HDF5 file format specification. */
+/* Updates the checksums of superblock and object headers, as in the HDF5 file format specification.
+ */
 static void sum_metadata_again(shifted *s)
 {
     uint8_t *b = s->bytes;
@@ -311,7 +313,7 @@ static void move_address(shifted *s, uint64_t address)
     ck_assert_int_eq(found, 1);
 }
 
-/* Increases all chunk offsets by this amount; the file was opened from the original bytes. */
+/* Increases all chunk offsets by `by`; the file was opened from the original bytes. */
 static void shift(shifted *s, const ebpo_file *file)
 {
     uint64_t places[256];
@@ -452,8 +454,8 @@ START_TEST(test_container_uses_8_byte_addresses)
 }
 END_TEST
 
-/* A leaf whose references begin at row 2^32 + 65536, behind a row of the index that states it:
- * encoded by the writer. */
+/* The writer encodes a leaf whose references begin at row 2^32 + 65536, which a row of the index
+ * before them states. */
 START_TEST(test_references_beyond_32_bits)
 {
     enum { ROWS = 16384, LEAVES = EBPO_INDEX_ROWS + 1 };
@@ -504,7 +506,8 @@ END_TEST
 
 /* --- workspace --- */
 
-/* Returns false when addresses have 32 bits, and there is no such array. */
+/* Checks an array of more than 2^32 bytes. Returns false when addresses have 32 bits, so that there
+ * is no such array. */
 static bool haptic_ends(ebpo_workspace *w)
 {
     uint64_t count = FAR / 8 + 1000;

@@ -130,8 +130,8 @@ static uint64_t first_like(const ebpo_mesh *m, uint64_t face)
     return face;
 }
 
-/* Checks faces: all around an edge or vertex, a repeated face and its first occurrence, the face of
- * an index. */
+/* Checks the reported faces: all faces around an edge or vertex; a repeated face and its first
+ * occurrence; the face of an index. */
 static void judge_faces(const ebpo_mesh *m, const reported *t)
 {
     const ebpo_mesh_finding *p = &t->place;
@@ -193,7 +193,7 @@ static void judge(const ebpo_mesh *m, const all *a, const ebpo_mesh_report *r)
         const ebpo_mesh_finding *p = &a->item[i].place, *q = i ? &a->item[i - 1].place : NULL;
         count[p->kind]++;
         ck_assert(!q || p->kind >= q->kind);
-        /* each once */
+        /* each item is reported once */
         ck_assert(!q || memcmp(&a->item[i], &a->item[i - 1], sizeof a->item[i]) != 0 ||
                   p->kind == EBPO_FOUND_REPEATED_FACE || p->kind == EBPO_FOUND_ZERO_AREA_FACE ||
                   p->kind == EBPO_FOUND_INDEX_REPEATED_FACE);
@@ -236,7 +236,8 @@ static bool count_places(void *user, const ebpo_mesh_finding *place)
     return true;
 }
 
-/* One face, repeated very often: as much work for each as for a few (it took a minute before). */
+/* One face that is repeated very often takes as little time for each occurrence as a few
+ * repetitions do. */
 START_TEST(test_locations_of_many_repeated_faces)
 {
     enum { MANY = 40000 };

@@ -1,4 +1,4 @@
-/* Models of ebpo-generate have no intersections with themselves, and its proof of that is correct.
+/* Models of ebpo-generate do not intersect themselves, and the program's proof of this is correct.
  */
 #include <stdlib.h>
 #include <string.h>

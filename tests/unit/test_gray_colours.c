@@ -1,5 +1,5 @@
-/* Colours of envelopes: every builder and the verifier compute the same; subsets keep them; levels
- * and streams return them. */
+/* Colours of envelopes: all builders and the verifier compute the same colours, subsets keep these,
+ * and levels and streams return them. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -208,7 +208,7 @@ START_TEST(test_gray_colours_in_levels_and_streams)
 }
 END_TEST
 
-/* Rows stay; a former leaf has the colour of its parent. */
+/* Subsets keep the rows; a leaf of the original file has the colour of its parent. */
 START_TEST(test_gray_colours_in_subsets)
 {
     ebpo_tree tree, part;

@@ -46,7 +46,7 @@ static void key_of(int kind, uint64_t i, uint64_t key[3])
     key[1] = key[2] = 0;
 }
 
-/* Each key is found where it was put, no other is found, and few slots are visited. */
+/* Each key is found in its slot, no other key is found, and few slots are visited. */
 START_TEST(test_hash_lookup_finds_keys)
 {
     table *t = calloc(1, sizeof *t);
@@ -60,7 +60,7 @@ START_TEST(test_hash_lookup_finds_keys)
     }
     uint64_t missing[3] = { UINT64_MAX, 1, 2 };
     ck_assert(!t->used[find(t, ebpo_hash_three(missing), missing)]);
-    /* for random keys two and a half in a full table, fewer before */
+    /* random keys visit two and a half slots in the full table, and fewer before */
     ck_assert_uint_lt(t->probes, 2 * KEYS * 3);
     free(t);
 }

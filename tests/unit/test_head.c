@@ -148,7 +148,8 @@ static void compare_array(subject *s, hid_t set, const char *path)
     free(places);
 }
 
-/* Names that begin with x- and objects below `extra` belong to others (vector 19). */
+/* Compares an object. Names that begin with x- and objects below `extra` belong to other programs
+ * (vector 19). */
 static herr_t compare_object(hid_t file, const char *name, const H5O_info_t *info, void *user)
 {
     char path[256];
@@ -227,7 +228,7 @@ static const char *const queried[] = {
 
 enum { QUERIED = sizeof queried / sizeof queried[0] };
 
-/* Combines the data of each array into one number: 0 when it is refused. */
+/* Combines the data of each array into one number; 0: the array is refused. */
 static void results(subject *s, const uint8_t *data, size_t size, uint32_t sum[QUERIED])
 {
     ebpo_status status = open_bytes(s, data, size, NULL);
@@ -248,8 +249,7 @@ static void results(subject *s, const uint8_t *data, size_t size, uint32_t sum[Q
     close_bytes(s, status);
 }
 
-/* A flipped bit never changes data: the array is refused, or the bit is unused. So only some arrays
- * give data. */
+/* Checks that a flipped bit never changes data: the array is refused, or the bit is unused. */
 static void flip_bits(subject *s)
 {
     uint32_t whole[QUERIED];
@@ -286,7 +286,7 @@ END_TEST
 START_TEST(test_header_truncation_is_refused) { ck_assert_uint_ge(each_vector(cut_off), 32); }
 END_TEST
 
-/* Values of Jenkins' driver program, for seeds of 0. */
+/* The expected values are those of Jenkins' driver program, for seeds of 0. */
 START_TEST(test_header_checksums_match_lookup3)
 {
     const uint8_t *text = (const uint8_t *)"Four score and seven years ago";

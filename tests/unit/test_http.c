@@ -143,7 +143,8 @@ START_TEST(test_http_harmless_faults_give_same_bytes)
 }
 END_TEST
 
-/* Without a version, one response must hold all data: two could be of different files. */
+/* Without a version, one response must hold all data, as two responses could be from different
+ * files. */
 START_TEST(test_http_unversioned_parts_are_not_joined)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -155,8 +156,8 @@ START_TEST(test_http_unversioned_parts_are_not_joined)
     ck_assert_int_eq(s.read(s.user, 0, DATA_BYTES, got, &error), EBPO_OK);
     bool turned = got[0] != data[0];
     for (uint64_t i = 0; i < DATA_BYTES; i++)
-        ck_assert_msg(got[i] == (turned ? 255 - data[i] : data[i]), "byte %d is of the other file",
-                      (int)i);
+        ck_assert_msg(got[i] == (turned ? 255 - data[i] : data[i]),
+                      "byte %d is from the other file", (int)i);
     s.close(s.user);
     free(got);
 }
@@ -194,7 +195,7 @@ static const struct {
     { "star", EBPO_E_IO, "does not report the file's size" },
     { "two_ranges", EBPO_E_IO, "Content-Range" },
     { "wide", EBPO_E_IO, "for a request of 0 to 131071" },
-    { "longer", EBPO_E_IO, "more bytes than requested" },
+    { "longer", EBPO_E_IO, "more bytes than its Content-Range" },
     { "multipart", EBPO_E_IO, "Content-Range" },
     { "gzip", EBPO_E_IO, "Content-Encoding" },
     { "gzip_whole", EBPO_E_IO, "Content-Encoding" },
@@ -317,7 +318,8 @@ START_TEST(test_http_unversioned_file_is_one_response)
     uint8_t *got = malloc(DATA_BYTES);
     ck_assert_int_eq(s.read(s.user, 0, DATA_BYTES, got, &error), EBPO_OK);
     for (size_t i = 0; i < DATA_BYTES; i++)
-        ck_assert_uint_eq(got[i], data[DATA_BYTES - 1 - i]); /* the second version, all of it */
+        ck_assert_uint_eq(got[i],
+                          data[DATA_BYTES - 1 - i]); /* all bytes are of the second version */
     free(got);
     s.close(s.user);
 }
@@ -514,7 +516,8 @@ START_TEST(test_http_credentials_are_never_shown)
 }
 END_TEST
 
-/* Also when redirected back: a redirect chooses its target. */
+/* Headers go to no other server. They are not sent either when another server redirects back, as
+ * that server chose the target. */
 START_TEST(test_http_headers_stay_with_their_server)
 {
     static const char *const headers[] = { "X-Key: 7", NULL };
@@ -571,7 +574,7 @@ END_TEST
 
 static const char *cache;
 
-/* Calls for each file; returns how many there are. */
+/* Calls `what` for each file of the cache folder; returns the number of files. */
 static int each_file(void (*what)(const char *name))
 {
     int count = 0;

@@ -60,7 +60,7 @@ START_TEST(test_import_weld_keeps_first_position)
 }
 END_TEST
 
-/* Binary fractions: exact in any decimal reader. */
+/* Binary fractions, which any reader of decimals reads exactly. */
 static const float corner[4][3] = {
     { 0.5f, 0.25f, 0.125f }, { 2, 0.25f, 0.125f }, { 0.5f, 3, 0.125f }, { 0.5f, 0.25f, -4 }
 };
@@ -169,8 +169,8 @@ static const struct {
     { "t.stl", "solid x\nendsolid x\n", "t.stl: " },
 };
 
-/* Makes a strip of so many squares, each vertex with a colour; the last one ends with these digits.
- */
+/* Makes a strip of squares whose vertices have colours; a coordinate of the last vertex ends with
+ * `digits`. */
 static char *long_strip(unsigned squares, const char *digits)
 {
     char *text = malloc(squares * 120 + 100), *at = text;
@@ -213,7 +213,8 @@ START_TEST(test_import_result_ignores_memory_budget)
 }
 END_TEST
 
-/* Decimals become the nearest floats: other readers get the neighbouring floats for these. */
+/* Decimals become the nearest floats. For these decimals, other readers return neighbouring floats.
+ */
 START_TEST(test_import_numbers_are_rounded_correctly)
 {
     static const char obj[] = "v 2.96501994e-01 5.3e-31 16777216.0000000000\n"

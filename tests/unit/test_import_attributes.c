@@ -211,7 +211,8 @@ START_TEST(test_import_off_face_colours)
 }
 END_TEST
 
-/* Faces without them have zeros; named but missing values are reported. */
+/* Faces without references have zeros. Values that faces refer to but the file lacks are reported.
+ */
 START_TEST(test_import_reports_missing_references)
 {
     static const float texture[] = { 0.5f, 0.25f, 0, 0, 0, 0, 0, 0, 0, 0, 0.5f, 0.25f };

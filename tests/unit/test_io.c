@@ -213,7 +213,7 @@ START_TEST(test_lock_wait_can_be_cancelled)
 }
 END_TEST
 
-/* Drops the privileges of root, who may write to all files. */
+/* Takes the lock without the privileges of root, who may write to all files. */
 static int lock_as_nobody(void)
 {
     enum { NOBODY = 65534 };
@@ -258,7 +258,7 @@ START_TEST(test_lock_keeps_unrelated_file)
 }
 END_TEST
 
-/* Many processes increase the number in the file by one: no increase is lost. */
+/* Increases the number in the file by one; many processes run this, and no increase is lost. */
 static int count_up(void)
 {
     for (int i = 0; i < 25; i++) {
@@ -375,7 +375,7 @@ START_TEST(test_output_keeps_mode_and_attributes)
     check_content(target, "new");
     ck_assert(stat(target, &st) == 0 && (st.st_mode & 07777) == 0604);
 #ifndef EBPO_HAVE_XATTR
-    has = false; /* nor do all systems: then they are lost */
+    has = false; /* nor do all systems; then the attributes are lost */
 #endif
     ck_assert(!has || (getxattr(target, "user.ebpo", value, sizeof value) == 4 &&
                        memcmp(value, "kept", 4) == 0));

@@ -182,7 +182,7 @@ START_TEST(test_header_level_counts_use_64_bits)
     info->level[11].plane_count++;
     ck_assert_int_eq(check_head(info, &error), EBPO_E_FORMAT);
     info->level[11].plane_count--;
-    info->level[12].leaf_count += TWO32; /* the same in 32 bits */
+    info->level[12].leaf_count += TWO32; /* in 32 bits the count would be the same */
     ck_assert_int_eq(check_head(info, &error), EBPO_E_FORMAT);
     free(info);
 }
@@ -255,7 +255,7 @@ START_TEST(test_huge_source_counts_take_no_memory)
                   "%s", error.message);
     getrusage(RUSAGE_SELF, &after);
     ck_assert(ordered);
-    /* KiB; a number for each would take 16 GiB, and sanitizers need memory, too */
+    /* KiB; a number for each vertex and face would take 16 GiB; sanitizers also need memory */
     ck_assert_int_lt(after.ru_maxrss - before.ru_maxrss, 1 << 20);
     uint64_t last = mesh.vertex_count - 1;
     size_t size = tree.mesh.xyz32 ? 3 * sizeof(float) : 3 * sizeof(double);
@@ -281,7 +281,7 @@ END_TEST
 
 /* --- subtrees --- */
 
-/* One leaf with faces in no array. */
+/* Returns a slice of one leaf whose faces are in no array. */
 static ebpo_slice leaf_slice(uint16_t *types, uint64_t *first, uint32_t *news, uint32_t *refs)
 {
     ebpo_slice slice = { .root = { .type = EBPO_LEAF }, .level_count = 1, .face_count = *news };
@@ -313,7 +313,7 @@ START_TEST(test_subtree_block_limit)
 }
 END_TEST
 
-/* Separately allocated, as they are freed. */
+/* Returns a slice with separately allocated arrays, as these are freed. */
 static ebpo_slice fake_slice(void)
 {
     uint16_t *types = malloc(sizeof *types);
@@ -342,11 +342,12 @@ START_TEST(test_subtree_count_limit)
     slice.mesh.face_count = UINT64_C(1) << 31; /* faces are numbered in 31 bits */
     ck_assert_int_eq(ebpo_accel_make(&subtree, &slice, info, true, 1, &error), EBPO_E_LIMIT);
     slice = fake_slice();
-    slice.level[0].plane_count = TWO32; /* planes in 32 */
+    slice.level[0].plane_count = TWO32; /* planes are numbered in 32 bits */
     ck_assert_int_eq(ebpo_accel_make(&subtree, &slice, info, true, 1, &error), EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "planes") != NULL, "%s", error.message);
     slice = fake_slice();
-    slice.level[1].leaf_count = slice.level[1].group_count = EBPO_ENTRY_ZERO; /* nodes in 29 */
+    slice.level[1].leaf_count = slice.level[1].group_count =
+        EBPO_ENTRY_ZERO; /* nodes are numbered in 29 bits */
     slice.level_count = 2;
     ck_assert_int_eq(ebpo_accel_make(&subtree, &slice, info, true, 1, &error), EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "nodes") != NULL, "%s", error.message);

@@ -51,7 +51,7 @@ static double take(ebpo_file *file, int level, bool cell_faces, unsigned threads
     return volume;
 }
 
-/* Signed volume of a closed mesh. */
+/* Returns the signed volume of a closed mesh. */
 static double mesh_volume(const ebpo_mesh *mesh)
 {
     double sum = 0;

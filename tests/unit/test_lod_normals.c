@@ -1,5 +1,5 @@
-/* Normals for the lighting of polygons of a level: against the definition, node by node and without
- * tables; and against spheres, whose normals are known. */
+/* Normals for the lighting of polygons of a level. They are compared with the definition, computed
+ * node by node without tables, and with the known normals of spheres. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -215,7 +215,7 @@ START_TEST(test_lod_normals_match_definition)
 }
 END_TEST
 
-/* Cell faces with outward normals, visible and hidden ones, by area. */
+/* Nearly all cell faces by area, visible and hidden, have outward normals. */
 START_TEST(test_lod_normals_of_sphere_cell_faces)
 {
     level l = take(ebpo_test_make("sphere"), 4, 3);

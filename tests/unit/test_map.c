@@ -102,7 +102,8 @@ START_TEST(test_map_of_box_matches_formula)
 }
 END_TEST
 
-/* Skewed, in two loading modes, on one thread and many: each value equals a single query. */
+/* On a skewed lattice, in two loading modes, on one thread and many, each value equals a single
+ * query. */
 START_TEST(test_map_values_match_single_queries)
 {
     const ebpo_lattice l = { { -3, -3, -1.5 },
@@ -230,7 +231,7 @@ static void check_stats(const double *values, int count, double scale)
     ck_assert_double_eq_tol(s.mean / scale, (double)(sum / count), 1e-15);
     ck_assert_double_eq_tol(s.mean_unsigned / scale, (double)(size / count), 1e-15);
     ck_assert_double_eq_tol(s.rms / scale, (double)sqrtl(square / count), 1e-15);
-    ck_assert_double_eq_tol(s.error_bound / scale,
+    ck_assert_double_eq_tol(s.standard_deviation / scale,
                             (double)sqrtl(square / count - sum / count * (sum / count)), 1e-14);
     for (int i = 0; i < EBPO_MAP_PERCENTILES; i++) {
         int below = 0; /* the least value that this percentage does not exceed */
@@ -296,7 +297,8 @@ static double reach_of_samples(ebpo_model *model, const ebpo_mesh *m, int steps)
     return s.farthest;
 }
 
-/* A triangle whose corners are close to the model and whose middle is not; and a rotated torus. */
+/* Tests a triangle whose corners are close to the model and whose middle is not, and a rotated
+ * torus. */
 START_TEST(test_map_error_bounds_hold_between_vertices)
 {
     for (int which = 0; which < 2; which++) {
@@ -324,12 +326,12 @@ START_TEST(test_map_error_bounds_hold_between_vertices)
                       "%.9g to %.9g, sampled %.9g", one.lo, one.hi, sampled);
         ck_assert_msg(one.hi <= one.lo * 1.0201, "%.9g to %.9g", one.lo, one.hi);
         ck_assert_uint_gt(one.queries, 0);
-        options.queries = 1; /* too few: wider, and still certain */
+        options.queries = 1; /* too few queries: the bounds are wider, and still certain */
         model_must(ebpo_map_find_range(o.model, &m, away, &options, &many, &error), "reach",
                    &error);
         ck_assert(sampled <= many.hi && many.hi >= one.hi && many.lo <= one.lo);
         double widest = many.hi;
-        options.queries = 300; /* used where the bounds are widest, and no more */
+        options.queries = 300; /* these are used where the bounds are widest; no more are made */
         model_must(ebpo_map_find_range(o.model, &m, away, &options, &many, &error), "reach",
                    &error);
         ck_assert(sampled <= many.hi && many.hi < widest && many.queries <= 303);

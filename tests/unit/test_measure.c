@@ -36,9 +36,10 @@ static ebpo_mesh copy_of(const ebpo_mesh *mesh)
     return copy;
 }
 
-/* Makes a file of the mesh, which the caller keeps. */
+/* The rule of files that are made. */
 static ebpo_rule file_rule;
 
+/* Makes a file of the mesh, which the caller keeps. */
 static ebpo_file *file_of(const ebpo_mesh *mesh, uint32_t parts)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -479,8 +480,8 @@ static ebpo_mass mass_of_two(bool turn_outer, bool turn_inner, ebpo_rule rule)
     return m;
 }
 
-/* By outer and inner cube, original or reversed, and by rule: winding numbers are 1, 2; 1, 0; -1,
- * 0; -1, -2. */
+/* Tests outer and inner cubes, original or reversed, with each rule. The winding numbers are 1, 2;
+ * 1, 0; -1, 0; -1, -2. */
 START_TEST(test_mass_follows_inside_rule)
 {
     static const double volumes[4][3] = {
@@ -527,7 +528,8 @@ START_TEST(test_surface_mass_has_area_only)
 }
 END_TEST
 
-/* Two sides of one sheet: a solid of volume 0, also when rounding would leave something. */
+/* The two sides of a sheet are a solid of volume 0, also where rounding would give another volume.
+ */
 START_TEST(test_zero_volume_solid_has_no_centroid)
 {
     ebpo_mesh mesh = ebpo_test_sheet(.7, 5), back = ebpo_test_sheet(.7, 5);

@@ -344,8 +344,8 @@ START_TEST(test_orient_flips_inverted_component)
 }
 END_TEST
 
-/* Boxes in boxes, two side by side in the second, in any order and each reversed or not; and one
- * that extends through the outermost, which is in none. */
+/* Tests boxes in boxes, with two side by side in the second, in any order and each reversed or not,
+ * and a box that extends through the outermost, so that it is in no box. */
 START_TEST(test_orient_outer_shells_and_cavities)
 {
     static const double low[6][3] = { { 0, 0, 0 }, { 1, 1, 1 }, { 2, 2, 2 },
@@ -442,8 +442,8 @@ START_TEST(test_fill_closes_open_box)
 }
 END_TEST
 
-/* A cylinder without lids whose rim has n edges: lids by least area up to 256 edges, by ears above.
- */
+/* Fills a cylinder without lids whose rim has n edges. Lids have the least area up to 256 edges;
+ * larger lids are made by cutting ears. */
 START_TEST(test_fill_closes_both_tube_ends)
 {
     static const uint32_t sizes[] = { 3, 4, 20, 256, 257, 3000 };

@@ -28,7 +28,7 @@ enum { MAX_PROPERTIES = 12 };
 
 typedef struct random_property {
     char name[24];
-    int type, count; /* count: -1: no list; else the type of its length */
+    int type, count; /* count: -1: not a list; else the type of the list's length */
     bool equal;      /* lists of one length */
     char axis;       /* x, y, z or v for corners; 0: none of these */
 } random_property;
@@ -64,7 +64,7 @@ static void put_bits(ply_text *p, int type, uint64_t bits)
     }
 }
 
-/* The bits of a value of the type, in its low bytes. */
+/* Writes a value of the type; `bits` has the bits of the value in its low bytes. */
 static void put_value(ply_text *p, int type, uint64_t bits)
 {
     float narrow;
@@ -88,7 +88,7 @@ static void put_value(ply_text *p, int type, uint64_t bits)
     }
 }
 
-/* Floats are finite: text has only one NaN. */
+/* Returns random bits. Floats are finite, as text has only one NaN. */
 static uint64_t random_bits(ply_text *p, int type)
 {
     float narrow = (float)draw(p, 1000000) / 1000 - 500;
@@ -589,7 +589,7 @@ START_TEST(test_attributes_of_elements_with_equal_name)
 }
 END_TEST
 
-/* Colours of 28 vertices with one byte each, their other names, and values of other files. */
+/* Lists colours of vertices with one byte each, also by other names, and other values. */
 START_TEST(test_attributes_are_listed_by_file)
 {
     ebpo_mesh mesh = parse_text(

@@ -46,7 +46,7 @@ static ebpo_mesh copy_of(const ebpo_mesh *m)
     return c;
 }
 
-/* Checks that the arranged mesh, in source indices, equals the other. */
+/* Checks that the arranged mesh, in source indices, equals the plain mesh. */
 static void expect_same(const ebpo_mesh *arranged, const ebpo_mesh *plain)
 {
     const struct ebpo_arrangement *a = arranged->arrangement;
@@ -102,8 +102,8 @@ static void expect_same_report(const ebpo_mesh *plain, const ebpo_mesh *m)
     expect_equal_reports(a, b);
 }
 
-/* Repairs `plain` unchanged, and a copy that is arranged and in the workspace; both are arranged at
- * the end, and equal. Frees `plain`. */
+/* Repairs `plain` in source order, and an arranged copy in the workspace; then arranges both, and
+ * checks that they are equal. Frees `plain`. */
 static void repair_both(ebpo_mesh plain, int steps, ebpo_workspace *workspace)
 {
     ebpo_mesh m = copy_of(&plain);
@@ -165,7 +165,8 @@ START_TEST(test_repair_random_meshes_in_any_order)
 }
 END_TEST
 
-/* 1: the same three distinct vertices in the same order, -1: in the other one. */
+/* Returns 1 for the same three distinct vertices in the same orientation, -1 in the opposite one,
+ * else 0. */
 static int repeats(const uint32_t *a, const uint32_t *b)
 {
     for (int turn = 0; turn < 3 && a[0] != a[1] && a[1] != a[2] && a[2] != a[0]; turn++) {
@@ -178,8 +179,8 @@ static int repeats(const uint32_t *a, const uint32_t *b)
     return 0;
 }
 
-/* Against the reference implementation: each face is compared with all earlier faces that are kept.
- */
+/* Checks the dropped faces against a reference implementation, which compares each face with all
+ * earlier faces that are kept. */
 static void expect_dropped(ebpo_mesh *m)
 {
     ebpo_mesh reference = copy_of(m);
@@ -225,7 +226,7 @@ START_TEST(test_repair_drops_repeated_faces)
 }
 END_TEST
 
-/* Faces reversed and omitted, vertices separate or shared, some unused. */
+/* Makes a mesh with reversed and omitted faces, and separate, shared and unused vertices. */
 static ebpo_mesh damaged(int i)
 {
     ebpo_mesh m = i < ebpo_test_solid_count ? ebpo_test_solids[i].make()

@@ -144,7 +144,8 @@ START_TEST(test_random_model_memory_stays_below_estimate)
 }
 END_TEST
 
-/* Triangles without shared vertices, of doubles: six of them take as much as eight. */
+/* Makes triangles of doubles without shared vertices: a block of six takes as much memory as a
+ * block of eight. */
 static ebpo_mesh soup(uint32_t faces, double size)
 {
     uint64_t state = 5;
@@ -268,7 +269,7 @@ static void check_near(const char *name, ebpo_mesh mesh)
         ck_assert_uint_eq(plan.subtrees, r.top->below_count);
         ck_assert_msg((double)plan.subtree_bytes >= mean &&
                           (double)plan.subtree_bytes <= 1.5 * mean,
-                      "%s %d: %.0f, %llu foretold", name, cut_level, mean,
+                      "%s %d: %.0f, %llu predicted", name, cut_level, mean,
                       (unsigned long long)plan.subtree_bytes);
         ck_assert_uint_eq(r.beyond, 0);
         ck_assert_uint_le(r.refused, r.top->below_count / 50);
@@ -325,7 +326,7 @@ static int check_results(const query_model *m, uint64_t memory)
     return results;
 }
 
-/* Large triangles, each in many subtrees, and many across borders. */
+/* The triangles are large: each is in many subtrees, and many cross borders of subtrees. */
 START_TEST(test_budget_holds_for_unusual_subtrees)
 {
     static const query_variant fine = { "fine", 16, 6, EBPO_RULE_NONZERO, 0 };
@@ -344,7 +345,7 @@ START_TEST(test_budget_holds_for_unusual_subtrees)
         results += (uint64_t)check_results(&m, memory);
     ck_assert_uint_gt(refused, 0);
     if (getenv("EBPO_TEST_SHOW"))
-        printf("soup: least %llu, whole %llu, %d refused, %d answers\n",
+        printf("soup: least %llu, whole %llu, %d refused, %d results\n",
                (unsigned long long)plan.least, (unsigned long long)plan.whole, (int)refused,
                (int)results);
     ck_assert(results > 0 || plan.least == plan.whole);

@@ -56,7 +56,8 @@ START_TEST(test_random_decimals_round_like_c_library)
 }
 END_TEST
 
-/* Midpoints of neighbouring floats, and slightly above and below: where double rounding fails. */
+/* Tests midpoints of neighbouring floats, and numbers slightly above and below, where rounding
+ * twice fails. */
 START_TEST(test_float_midpoints_are_rounded_once)
 {
     locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
@@ -82,7 +83,8 @@ START_TEST(test_float_midpoints_are_rounded_once)
 }
 END_TEST
 
-/* Prints as many digits after the point as the text has, as the declaration says. */
+/* Returns true when printing with as many digits after the point gives the same text, as the
+ * declaration requires. */
 static bool prints_again(const char *s, float value)
 {
     char text[400];

@@ -70,7 +70,7 @@ static void check_written(double v)
     ck_assert_msg(!strchr(text, 'e') == !strchr(plain, 'e') &&
                       !strchr(text, '-') == !strchr(plain, '-') &&
                       strcspn(text, ".e") == strcspn(plain, ".e"),
-                  "%s is not laid out as %s", text, plain);
+                  "%s does not have the layout of %s", text, plain);
 }
 
 START_TEST(test_number_text_round_trip_is_short)

@@ -96,7 +96,7 @@ START_TEST(test_cells_and_octcodes_stay_consistent)
 }
 END_TEST
 
-/* In a root cell of size 1, where these doubles are exact. */
+/* Returns true when two cells touch, in a root cell of size 1, where these doubles are exact. */
 static bool plainly_touch(ebpo_cell a, ebpo_cell b)
 {
     for (int k = 0; k < 3; k++) {

@@ -16,8 +16,8 @@ static uint64_t state;
 
 static uint32_t below(uint32_t n) { return (uint32_t)(ebpo_test_random(&state) % n); }
 
-/* Twelve faces for each cell, over the vertices of a lattice: adjacent cells share vertices and
- * edges, and have coincident faces. */
+/* Makes twelve faces for each filled cell, over the vertices of a lattice. Adjacent cells share
+ * vertices and edges, and have coincident faces. */
 static ebpo_mesh mesh_of(const bool filled[CELLS])
 {
     static const uint32_t quad[6][4] = { { 0, 2, 3, 1 }, { 4, 5, 7, 6 }, { 0, 1, 5, 4 },
@@ -137,7 +137,7 @@ START_TEST(test_orient_random_cells_point_outwards)
 }
 END_TEST
 
-/* Together such cubes have no volume: each is counted. */
+/* Each cube is oriented, although such cubes have no volume together. */
 START_TEST(test_orient_shells_sharing_vertex_or_edge)
 {
     for (int other = 4; other <= 13; other += 9) {

@@ -82,7 +82,7 @@ static ebpo_workspace *small_workspace(void)
     return w;
 }
 
-/* Checks that nothing of it is in use. */
+/* Checks that no memory of the workspace is in use, and frees it. */
 static void end_workspace(ebpo_workspace *w)
 {
     ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;

@@ -59,7 +59,7 @@ static ebpo_paint_point point_at(const opened *o, double x, double y, double z)
     return out;
 }
 
-/* A stroke of one point. */
+/* Adds a stroke of one point. */
 static void add_dab(opened *o, uint64_t layer, uint32_t colour, double radius, double x, double y,
                     double z)
 {
@@ -171,7 +171,7 @@ START_TEST(test_paint_file_round_trip)
     model_must(ebpo_paint_open(scratch("p.paint.h5"), &read, &error), "reading", &error);
     same_paint(o.paint, read);
     same_paint(read, o.paint);
-    /* in its own place, and saved there again */
+    /* saved again to the file that it was read from */
     model_must(ebpo_paint_save(read, scratch("p.paint.h5"), &error), "saving", &error);
     ebpo_paint_free(read);
     model_must(ebpo_paint_open(scratch("p.paint.h5"), &read, &error), "reading", &error);
@@ -206,7 +206,7 @@ START_TEST(test_paint_second_save_is_refused)
     ebpo_paint *one = opened_paint(), *other = opened_paint();
     ck_assert(ebpo_paint_add_layer(one, NULL, NULL, NULL) == EBPO_OK);
     model_must(ebpo_paint_save(one, scratch("p.paint.h5"), &error), "saving", &error);
-    /* so is the handle that made the file, which has not read it again either */
+    /* the handle that made the file is also refused, as it has not read the file again */
     ck_assert(ebpo_paint_save(other, scratch("p.paint.h5"), &error) == EBPO_E_IO);
     ck_assert(strstr(error.message, "another program has changed it") != NULL);
     ck_assert(ebpo_paint_save(o.paint, scratch("p.paint.h5"), NULL) == EBPO_E_IO);
@@ -249,11 +249,11 @@ START_TEST(test_paint_file_is_locked_for_changes)
     const char *path = scratch("p.paint.h5");
     ck_assert(ebpo_paint_open_to_change(path, NULL, 0, NULL, &one, &error) == EBPO_E_IO);
     ck_assert(ebpo_paint_open_to_change(path, NULL, NAN, NULL, &one, NULL) == EBPO_E_ARGUMENT);
-    /* a new one: others wait for it, too */
+    /* for a new paint, too, others wait */
     model_must(ebpo_paint_open_to_change(path, o.file, 0, NULL, &one, &error), "new", &error);
     ck_assert(ebpo_paint_open_to_change(path, o.file, 0.05, NULL, &other, &error) == EBPO_E_IO);
     ck_assert(strstr(error.message, "another program has been changing it") && !other);
-    /* a save to another path, even a failed one, does not release it */
+    /* a save to another path, even a failed one, does not release the lock */
     ck_assert(ebpo_paint_save(one, scratch("absent/q.paint.h5"), NULL) == EBPO_E_IO);
     ck_assert(ebpo_paint_save(one, scratch(NULL), NULL) == EBPO_E_IO);
     model_must(ebpo_paint_save(one, scratch("q.paint.h5"), &error), "saving", &error);
@@ -453,7 +453,7 @@ static sides sides_of(const opened *o, uint64_t stroke)
     return s;
 }
 
-/* A plate of 2 x 2 x 0.1: a ball through it paints one side; at its rim both. */
+/* The plate is 2 x 2 x 0.1. A ball through it paints one side; at the rim it paints both. */
 START_TEST(test_paint_spares_back_of_thin_plate)
 {
     for (int cut = -1; cut <= 1; cut += 2) {
@@ -497,8 +497,8 @@ static double lens(double r, double d)
     return 2 * r * r * acos(d / (2 * r)) - d / 2 * sqrt(4 * r * r - d * d);
 }
 
-/* On a square of 8: a disc, a second one that overlaps it, one that erases a part of both, and a
- * disc in a layer above. */
+/* On a square of side 8 there are a disc, a second disc that overlaps it, a disc that erases a part
+ * of both, and a disc in a layer above. */
 START_TEST(test_paint_areas_match_discs)
 {
     for (int cut = -1; cut <= 1; cut += 2) {
@@ -534,7 +534,8 @@ START_TEST(test_paint_areas_match_discs)
 }
 END_TEST
 
-/* Balls below the resolution of doubles there; large ones beside them. */
+/* Tests balls that are smaller than the spacing of doubles at their position, beside large balls.
+ */
 START_TEST(test_paint_smallest_balls_terminate)
 {
     opened o = open_model(ebpo_test_sheet(8, 3), -1);

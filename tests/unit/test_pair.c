@@ -112,8 +112,8 @@ typedef struct batch {
     float a[72], b[72], error;
 } batch;
 
-/* Converts to floats as a caller does: relative to a point, with an error of up to `blur` of their
- * size. */
+/* Converts coordinates to floats as a caller does: relative to a point, with an error of up to
+ * `blur` of their size. */
 static void to_floats(batch *g, double blur, uint64_t *state)
 {
     double most = 0;
@@ -165,7 +165,7 @@ static void check_builds(const batch *g, ebpo_pair_masks masks)
     }
 }
 
-/* Kinds of numbers that floats can hold. */
+/* Returns true for kinds of numbers that floats can represent. */
 static bool fit_for_floats(int kind) { return kind != 12 && kind != 13; }
 
 START_TEST(test_pair_filter_matches_exact_result)
@@ -239,7 +239,8 @@ typedef struct posed_model {
     ebpo_posed_block posed;
 } posed_model;
 
-/* Equal poses keep degenerate cases nearly degenerate; `turn`: none, a quarter, or neither. */
+/* Returns a pose; equal poses of two faces keep degenerate cases nearly degenerate. `turn`: no
+ * rotation, a quarter turn, or any rotation. */
 static ebpo_pose pose_by(int turn)
 {
     static const double rotations[3][3][3] = {
@@ -252,7 +253,7 @@ static ebpo_pose pose_by(int turn)
     return pose;
 }
 
-/* Eight faces without common vertices, and back. */
+/* Converts a block to eight faces without common vertices. */
 static void to_vertices(const float block[72], float vertex[3][24])
 {
     for (int i = 0; i < 72; i++)
@@ -337,7 +338,7 @@ END_TEST
 
 /* --- the filter near its bounds --- */
 
-/* Two triples of corners by index, and the determinant of four of them. */
+/* Returns the determinant of four of six corners, given by index. */
 static double determinant(double *const corner[6], const int of[4])
 {
     double d[3][3];

@@ -83,7 +83,7 @@ START_TEST(test_pair_distance_comparisons_are_exact)
 }
 END_TEST
 
-/* Across axis k, at a level; corners on a grid of 4. */
+/* Makes a face across axis k at `level`, with corners on a grid of 4. */
 static void level_face(double t[3][3], int k, double level, uint64_t *state)
 {
     for (int i = 0; i < 3; i++)
@@ -91,7 +91,8 @@ static void level_face(double t[3][3], int k, double level, uint64_t *state)
             t[i][j] = j == k ? level : (double)(reference_random(state) % 4);
 }
 
-/* Pairs of flat sides at one distance, which other pairs on the same sides may not have. */
+/* Tests equal distances of pairs of faces on two parallel sides, where other pairs on these sides
+ * may be farther apart. */
 START_TEST(test_pair_distance_equality_is_exact)
 {
     uint64_t state = 5, equal = 0;

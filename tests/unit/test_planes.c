@@ -49,8 +49,7 @@ static ebpo_box box_of(int i, int grid_level)
     return box;
 }
 
-/* Checks the relative position in the cell, and whether rounding of the sampled point could matter.
- */
+/* Returns true when the point is in the cell, and rounding of the sampled point cannot matter. */
 static bool clearly_in(const ebpo_box *box, ebpo_cell cell, const double p[3])
 {
     for (int k = 0; k < 3; k++) {

@@ -150,7 +150,7 @@ static void make_cube(bytes *b, enum encoding e, bool faces_first, int width, co
 
 static ebpo_status parse(ebpo_mesh *mesh, const bytes *b, ebpo_error *error)
 {
-    /* A block of exactly this size, so that the sanitizer detects a read after its end. */
+    /* the block has exactly this size, so that the sanitizer detects a read after its end */
     uint8_t *copy = malloc(b->size ? b->size : 1);
     memcpy(copy, b->data, b->size);
     ebpo_status status =
@@ -574,7 +574,7 @@ enum error_bound {
 
 enum { MANY_VERTICES = 40000, MANY_FACES = 90000 };
 
-/* Without Check's overhead for every value, of which there are a million. */
+/* Writes a value without the overhead of Check, as there are a million values. */
 static uint8_t *put_raw(uint8_t *to, enum encoding e, uint64_t raw, int width)
 {
     for (int i = 0; i < width; i++)

@@ -32,7 +32,7 @@ static double twice_area(const double a[2], const double b[2], const double c[2]
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-/* Places it in the plane across `axis`, from behind when `mirrored`. */
+/* Cuts the shape in the plane across `axis`, seen from behind when `mirrored`. */
 static ebpo_polygon_kind cut(int axis, bool mirrored)
 {
     static double corner[LIMIT][3];
@@ -211,7 +211,7 @@ static uint32_t check_exactly(bool planar)
         flat += own[0] == 0 && own[1] == 0 && own[2] == 0;
         for (int k = 0; k < 3; k++) {
             ck_assert_msg(!planar || own[k] == 0 || (own[k] > 0) == (outline[k] > 0),
-                          "triangle %u is turned", i);
+                          "triangle %u is reversed", i);
             sum[k] += own[k];
         }
     }
@@ -226,8 +226,9 @@ static void insert_corner(uint32_t before, const int64_t p[2])
     memcpy(w.at[before], p, 2 * sizeof *p);
 }
 
-/* Half squares of a grid, glued along the edges of a tree: an outline with coincident edges and
- * corners, covered by these half squares. The diagonal of a square runs from low to high. */
+/* Makes an outline with coincident edges and corners: half squares of a grid, joined along the
+ * edges of a tree. The half squares cover the outline. The diagonal of a square runs from low to
+ * high. */
 static void grow_glued(uint32_t side, uint32_t corners)
 {
     static bool used[400 * 400 * 2];
@@ -268,10 +269,10 @@ static void grow_glued(uint32_t side, uint32_t corners)
     int64_t twice[3] = { 0 };
     for (uint32_t i = 1; i + 1 < w.n; i++)
         add_area(w.at[0], w.at[i], w.at[i + 1], twice);
-    ck_assert_int_eq(twice[2], w.n - 2); /* half squares, each once */
+    ck_assert_int_eq(twice[2], w.n - 2); /* the triangles are the half squares, each once */
 }
 
-/* Spikes without area, inwards and outwards. */
+/* Adds spikes without area, inwards and outwards. */
 static void add_spikes(uint32_t count)
 {
     for (uint32_t i = 0; i < count; i++) {
@@ -283,7 +284,7 @@ static void add_spikes(uint32_t count)
     }
 }
 
-/* Places it in the plane z = x + 2 y, with another first corner, or seen from behind. */
+/* Moves the outline into the plane z = x + 2 y, with another first corner, or seen from behind. */
 static void place_in_space(uint32_t begin, bool behind)
 {
     static int64_t copy[LARGEST][3];
@@ -323,7 +324,7 @@ START_TEST(test_polygon_spikes_are_covered)
 }
 END_TEST
 
-/* A plate with a slit of no width: every triangle has an area. */
+/* In a plate with slits of no width every triangle has an area. */
 START_TEST(test_polygon_slits_need_no_empty_triangle)
 {
     static const int64_t slit[][2] = { { 0, 0 }, { 10, 0 }, { 10, 10 }, { 5, 10 },
@@ -506,7 +507,7 @@ static void make_comb(void)
     memcpy(w.at[w.n++], under, sizeof under);
 }
 
-/* Two arms side by side, inwards and out again. */
+/* Makes a spiral of two arms side by side, inwards and out again. */
 static void make_spiral(void)
 {
     w.n = 0;
@@ -519,7 +520,7 @@ static void make_spiral(void)
         }
 }
 
-/* Triangles with one common corner. */
+/* Makes triangles with one common corner. */
 static void make_petals(void)
 {
     w.n = 0;

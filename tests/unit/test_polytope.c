@@ -194,7 +194,7 @@ END_TEST
 
 START_TEST(test_plane_is_same_in_child_cell)
 {
-    /* Points on a fine dyadic grid: all exact in integers. */
+    /* points on a fine dyadic grid, where all results are exact in integers */
     uint64_t seed = 6;
     for (uint64_t i = 0; i < ebpo_test_scaled(300000); i++) {
         int32_t n[3], d32;

@@ -18,7 +18,8 @@ static ebpo_pose unmoved(void)
     return (ebpo_pose){ { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, { 0, 0, 0 }, 1 };
 }
 
-/* Entries over the common denominator: the rotation of a quaternion of integers. */
+/* Computes the rotation of a quaternion of integers: entries m, and their common denominator as the
+ * result. */
 static int64_t exact_rotation(int64_t m[3][3], uint64_t *state)
 {
     int64_t q[4], n = 0;
@@ -37,7 +38,7 @@ static int64_t exact_rotation(int64_t m[3][3], uint64_t *state)
     return n;
 }
 
-/* |given - (scale Q x + t)| <= bound on one axis; Q: row / n. */
+/* Returns true when |given - (scale Q x + t)| <= bound on one axis, where Q is row / n. */
 static bool within_bound(double given, const int64_t row[3], int64_t n, const ebpo_pose *pose,
                          const double x[3], double t, double bound)
 {
@@ -64,8 +65,8 @@ static bool within_bound(double given, const int64_t row[3], int64_t n, const eb
     return within;
 }
 
-/* The exact rotation, rounded, stretched by a symmetric matrix of up to `stretch`: the nearest
- * rotation is unchanged. */
+/* Rounds the exact rotation, and stretches it by a symmetric matrix of up to `stretch`, which does
+ * not change the nearest rotation. */
 static void stretched(const int64_t m[3][3], int64_t n, double stretch, double out[3][3],
                       uint64_t *state)
 {
@@ -110,7 +111,7 @@ START_TEST(test_posed_points_are_within_error_bound)
 }
 END_TEST
 
-/* One rounding for each operation, in the stated order. */
+/* Posed points have one rounding for each operation, in the stated order. */
 START_TEST(test_posed_points_match_definition)
 {
     uint64_t state = 5;

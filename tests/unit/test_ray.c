@@ -14,7 +14,7 @@
 
 enum { ROUNDS = 11000, RAY_KINDS = 12, BOX_KINDS = 7 };
 
-/* At least a tenth, so that each case occurs. */
+/* Returns the scaled number of rounds, at least a tenth, so that each case occurs. */
 static int scaled_rounds(int most)
 {
     return (int)ebpo_test_scaled((uint64_t)most * 9 / 10) + most / 10;
@@ -116,7 +116,7 @@ static void keep_zero(interval *r, mpq_t c0, mpq_t c1)
     keep(r, c0, c1);
 }
 
-/* Condition normal . (origin + t direction - at) >= 0, or = 0. */
+/* Keeps the t with normal . (origin + t direction - at) >= 0, or = 0. */
 static void keep_plane(interval *r, const rational3 *normal, const rational3 *origin,
                        const rational3 *direction, const rational3 *at, bool equal)
 {
@@ -408,14 +408,14 @@ static void check_ray(const ebpo_segment *ray, const double triangle[3][3], int 
     ebpo_ray_intersection m;
     int facing, side = reference_ray(ray, triangle, &r, &facing);
     ebpo_ray_triangle(ray, triangle, &m);
-    ck_assert_msg(m.meets == r.any, "kind %d, case %ld: meets %d, twin %d", kind, count->cases,
+    ck_assert_msg(m.meets == r.any, "kind %d, case %ld: meets %d, reference %d", kind, count->cases,
                   m.meets, r.any);
     if (m.meets) {
-        ck_assert_msg(m.side == side, "kind %d, case %ld: side %d, twin %d", kind, count->cases,
-                      m.side, side);
-        ck_assert_msg(m.facing == facing, "kind %d, case %ld: facing %d, twin %d", kind,
+        ck_assert_msg(m.side == side, "kind %d, case %ld: side %d, reference %d", kind,
+                      count->cases, m.side, side);
+        ck_assert_msg(m.facing == facing, "kind %d, case %ld: facing %d, reference %d", kind,
                       count->cases, m.facing, facing);
-        ck_assert_msg(is_rounded(m.t, r.low), "kind %d, case %ld: t %a, twin %a", kind,
+        ck_assert_msg(is_rounded(m.t, r.low), "kind %d, case %ld: t %a, reference %a", kind,
                       count->cases, m.t, mpq_get_d(r.low));
         ck_assert(m.t <= ray->t_max);
     }
@@ -426,7 +426,7 @@ static void check_ray(const ebpo_segment *ray, const double triangle[3][3], int 
     interval_clear(&r);
 }
 
-/* The limit exactly at the hit, and next to it, when the t of the hit is a double. */
+/* Checks limits exactly at the hit, and next to the hit, when the t of the hit is a double. */
 static void check_limits(ebpo_segment *ray, const double triangle[3][3], int kind, tally *count)
 {
     ebpo_ray_intersection m;
@@ -673,7 +673,8 @@ static void box_case(int kind, double triangle[3][3], double min[3], double max[
                    : kind == 1 ? small(state, 20)
                                : centre[k] - 2 * half * reference_uniform(state);
         double b = kind == 0 ? small(state, 3) : kind == 1 ? a + 16 : a + half;
-        /* A corner of the box on the triangle, or one step off; flat boxes and points. */
+        /* Makes a box with a corner on the triangle, or one step off; also flat boxes and points.
+         */
         if (kind == 2 || kind == 5) {
             a = nudged(centre[k], state);
             b = a + half;
@@ -708,11 +709,12 @@ START_TEST(test_box_triangle_matches_rational_clipping)
         bool expected = reference_box((const double(*)[3])triangle, min, max);
         ck_assert_msg(ebpo_triangle_intersects_box((const double(*)[3])triangle, min, max) ==
                           expected,
-                      "kind %d, case %d: twin says %d", _i, i, expected);
+                      "kind %d, case %d: reference %d", _i, i, expected);
         meets += expected;
         apart += !expected;
     }
-    ck_assert_msg(meets > least && apart > least, "kind %d: %ld meet, %ld apart", _i, meets, apart);
+    ck_assert_msg(meets > least && apart > least, "kind %d: %ld intersect, %ld apart", _i, meets,
+                  apart);
 }
 END_TEST
 

@@ -21,7 +21,7 @@ typedef struct result {
     uint64_t waves;
 } result;
 
-/* Runs one cold query: its distance, or the class of the point. */
+/* Runs one cold query for the distance, or for the class of the point. */
 static result run_query(const ebpo_file *file, const counted_source *far, const double p[3],
                         bool inside)
 {
@@ -42,7 +42,8 @@ static result run_query(const ebpo_file *file, const counted_source *far, const 
     return (result){ distance.distance, where.where, far ? far->batches + far->alone - opened : 0 };
 }
 
-/* Distance or inside of points near the surface: maximum of round trips after opening. */
+/* Distance and inside queries of points near the surface need at most this number of round trips
+ * after opening. */
 START_TEST(test_remote_query_round_trips)
 {
     enum { WAVES = 4 };
@@ -70,7 +71,7 @@ static bool add_up(void *user, const ebpo_near_face *face)
     return true;
 }
 
-/* Cold. */
+/* Returns the sum of the distances of faces within a radius, by a cold query. */
 static double sum_within(const ebpo_file *file, const double p[3], double radius)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
@@ -109,8 +110,8 @@ END_TEST
 
 /* --- parts of the file --- */
 
-/* After the header: the top levels, rows of the table, nodes with lists, faces with their vertices.
- */
+/* After the header there is a round trip for each of these: the top levels, rows of the table,
+ * nodes with lists, faces with their vertices. */
 START_TEST(test_remote_box_query_round_trips)
 {
     enum { WAVES = 4 };
@@ -149,7 +150,8 @@ static uint64_t count_nodes(const ebpo_file *file, const ebpo_view_options *opti
     return count;
 }
 
-/* The torus seen from outside: with planes, and without invisible parts. */
+/* Returns the options of a view of the torus from outside, with planes and without invisible parts.
+ */
 static ebpo_view_options look(ebpo_observer *observer, ebpo_priority order)
 {
     ebpo_view_options view = EBPO_VIEW_OPTIONS_INIT;

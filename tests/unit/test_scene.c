@@ -249,7 +249,7 @@ static void some_route(ebpo_scene_route *route, uint64_t *state, int keys)
     }
 }
 
-/* By sines, as in textbooks. */
+/* Interpolates quaternions by sines, as in textbooks. */
 static void sine_reference(const double a[4], const double b[4], double u, double q[4])
 {
     double dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
@@ -387,7 +387,7 @@ START_TEST(test_scene_motion_bounds_hold)
 }
 END_TEST
 
-/* Tests that bounds are tight: a quarter turn at arm's length, a straight path. */
+/* bounds are tight for a quarter turn at arm's length and for a straight path */
 /* An arm that turns by a right angle, its tip on the x axis halfway, and translates by its length:
  * squares of these lengths are no doubles. */
 START_TEST(test_scene_motion_bounds_of_any_size)
@@ -490,7 +490,8 @@ static void all_pairs(const ebpo_scene *s, double from, double to, found *f)
         }
 }
 
-/* Few lines and many, of instances with few groups and many: each line is evaluated in order. */
+/* Tests few and many lines of rules, for instances with few and many groups: the lines are
+ * evaluated in order. */
 START_TEST(test_scene_rules_match_reference)
 {
     enum { INSTANCES = 8, LIMIT = 60 };

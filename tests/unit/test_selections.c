@@ -458,7 +458,8 @@ static double root_excess(const ebpo_build_options *options)
     return volume / solid - 1;
 }
 
-/* Clusters of normals are not nested: a step may lose at most so much of the excess. */
+/* Clusters of normals are not nested, so a greater number of planes may increase the excess, at
+ * most by this share. */
 static const double step_may_lose = 0.02;
 
 static void falls(ebpo_build_options *o, double *option, const double *value, int count)
@@ -477,8 +478,8 @@ static void falls(ebpo_build_options *o, double *option, const double *value, in
                   ebpo_selection_describe(o->select)->name, first, now);
 }
 
-/* As in the theses (BP 2008, tables 3.6 to 3.8; EBP 2017, table 20). The last settings request more
- * planes than a node stores. */
+/* Uses the settings of the theses (BP 2008, tables 3.6 to 3.8; EBP 2017, table 20). The last
+ * settings request more planes than a node stores. */
 START_TEST(test_more_planes_tighten_root)
 {
     static const double percent[] = { 5, 10, 20, 40, 80 }, k_root[] = { 20, 60, 200, 400, 1200 };

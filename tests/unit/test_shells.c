@@ -25,7 +25,7 @@ static void position(const ebpo_mesh *m, uint64_t corner, double out[3])
     ebpo_mesh_position(m, m->faces[corner], out);
 }
 
-/* Also distinguishes points with one equal coordinate. */
+/* Orders points by coordinate d, and points with this coordinate equal by the others. */
 static bool before(const double a[3], const double b[3], int d)
 {
     int axis = d / 2;
@@ -177,8 +177,8 @@ START_TEST(test_shell_nesting_matches_reference)
 }
 END_TEST
 
-/* So many nested components that every host is crowded; each with a small one beside its inner
- * ones. */
+/* Makes so many nested components that each contains many, and each also contains a separate small
+ * one. */
 START_TEST(test_shell_chain_depth)
 {
     enum { CHAIN = 150 };

@@ -108,7 +108,8 @@ START_TEST(test_output_structs_are_filled_by_size)
 }
 END_TEST
 
-/* Each public call with an uninitialized struct: refused with its name, nothing is made. */
+/* Expects that a public call with an uninitialized struct is refused, with a message that names the
+ * struct, and makes nothing. */
 #define REFUSED(type, call)                                                                   \
     do {                                                                                      \
         ebpo_error error_ = EBPO_ERROR_INIT, *error = &error_;                                \

@@ -575,7 +575,7 @@ static bool try_all(const ebpo_file *file, ebpo_chunks *chunks, uint64_t *state)
     return well;
 }
 
-/* Changes numbers of a chunk in the cache: as if the file had them. */
+/* Changes numbers of a chunk in the cache, as if the file had these numbers. */
 static bool try_changed(whole *w, ebpo_array_id id, int level, uint64_t *state)
 {
     ebpo_held_chunk view = { .array = ebpo_reader_array(w->file, id, level) };
@@ -642,8 +642,8 @@ START_TEST(test_slice_counts_beyond_types_are_refused)
 }
 END_TEST
 
-/* Errors in these are also detected in parts; others are refused at opening, or only when the whole
- * file is checked. */
+/* Errors in these vectors are also detected when a part is read. Other vectors are refused at
+ * opening, or only when the whole file is checked. */
 START_TEST(test_slice_of_invalid_vectors_fails)
 {
     static const char *const sure[] = { "vertex_nan",

@@ -137,7 +137,7 @@ static ebpo_status open_probe(ebpo_file **file, probe *p, ebpo_error *error)
     return ebpo_open_source(&source, "afar", file, error);
 }
 
-/* The same content as arranged by libhdf5: distributed metadata. By default there are chunks in
+/* Writes the same content by libhdf5, with distributed metadata. By default there are chunks in
  * B-trees and no checksums; `kept`: with the layout of this format. */
 static void rewrite(bool kept)
 {
@@ -430,7 +430,7 @@ START_TEST(test_files_without_checksums_are_refused)
 }
 END_TEST
 
-/* libhdf5 runs in a separate process: an error, or the same content. */
+/* The result is an error or the same content. libhdf5 runs in a separate process. */
 START_TEST(test_damage_without_checksums_is_harmless)
 {
     make_file(&small, EBPO_CODEC_ZSTD);

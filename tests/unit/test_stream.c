@@ -320,7 +320,7 @@ static void expect_closed(const ebpo_stream_node *node)
     ck_assert(closed && within);
 }
 
-/* Relative to the lowest corner of the cell, so that little cancels. */
+/* Computes a volume relative to the lowest corner of the cell, so that little cancels. */
 static double polygon_volume(const ebpo_stream_node *node)
 {
     double sum = 0;
@@ -405,7 +405,7 @@ static void set_cross(mpq_t out, const double a[3], mpq_t p[3])
     mpq_clear(t);
 }
 
-/* n . xi - d / 4096 at a point of the unit cube. */
+/* out = n . xi - d / 4096 at a point of the unit cube */
 static void set_excess(mpq_t out, const int32_t n[3], int32_t d, mpq_t xi[3])
 {
     mpq_t t;
@@ -594,7 +594,7 @@ static int by_octcode(const void *a, const void *b)
     return (p->octcode > q->octcode) - (p->octcode < q->octcode);
 }
 
-/* Sorts the vertices by their cell of `level` (lower cell faces belong to it). */
+/* Sorts the vertices by their cell of `level`; the lower faces of a cell belong to the cell. */
 static void place(placed *list, const ebpo_mesh *mesh, uint64_t count, const ebpo_box *box,
                   int level)
 {

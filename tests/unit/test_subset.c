@@ -1,4 +1,4 @@
-/* Subsets: all their results equal those of the whole file, and missing data is reported. */
+/* All results of subsets equal those of the whole file, and missing data is reported. */
 #include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
@@ -182,7 +182,8 @@ static void query_rays(tally *t, query_model *m, part *p, int way, uint64_t seed
         if (answered(t,
                      ebpo_ray_first(p->context[way], origin, direction, t_max, &near, &too, &error),
                      &error))
-            /* among faces at one t the first in its file is returned, which may be another one */
+            /* among faces with equal t the first in the file is returned, which may be another face
+             * in the subset */
             ck_assert(hit == too && (!hit || far.t == near.t));
         fine(ebpo_ray_all(m->context, origin, direction, t_max, &all, &count, &error), &error);
         if (answered(t,
@@ -334,7 +335,7 @@ START_TEST(test_subset_results_match_whole)
             compare_one(&m, 1000 * i + k, &t);
         query_model_free(&m);
     }
-    ck_assert_msg(t.given > 100 && t.refused > 100, "%llu answers, %llu refused",
+    ck_assert_msg(t.given > 100 && t.refused > 100, "%llu results, %llu refused",
                   (unsigned long long)t.given, (unsigned long long)t.refused);
 }
 END_TEST
@@ -469,7 +470,7 @@ START_TEST(test_subset_bytes_same_for_any_threads)
 }
 END_TEST
 
-/* A file that another program has put in the place of an open file is not replaced by one made from
+/* A file that another program has put in the place of an open file is not replaced by a subset of
  * the old file. */
 START_TEST(test_subset_of_replaced_file_is_refused)
 {
@@ -543,8 +544,8 @@ START_TEST(test_subset_measure_is_refused)
 }
 END_TEST
 
-/* Bytes of the header changed one by one, mostly detected by checksums of HDF5; and the library
- * itself with a file of wrong counts. */
+/* Changes bytes of the header one by one, which checksums of HDF5 mostly detect; then tests the
+ * library with a file of wrong counts. */
 START_TEST(test_damaged_subsets_are_harmless)
 {
     ebpo_error error = EBPO_ERROR_INIT;

@@ -217,7 +217,7 @@ static void compare_children(const pair *p)
             ck_assert(p->nodes.octcodes[first + octant] == (p->nodes.octcodes[i] << 3 | octant));
         linked += 8;
     }
-    ck_assert(linked == p->nodes.node_count); /* each has its parent */
+    ck_assert(linked == p->nodes.node_count); /* each node has its parent */
 }
 
 static void compare_corner(const pair *p, uint64_t face, int corner)
@@ -370,7 +370,7 @@ START_TEST(test_subtrees_of_solids_match_file)
 }
 END_TEST
 
-/* Index arrays, dozens of chunks. */
+/* These trees have index arrays and dozens of chunks. */
 START_TEST(test_subtrees_of_larger_trees_match_file)
 {
     ebpo_file *file =
@@ -381,7 +381,7 @@ START_TEST(test_subtrees_of_larger_trees_match_file)
 }
 END_TEST
 
-/* A subset of a solid, or of a tree whose white nodes have winding numbers. */
+/* Writes a subset of a solid, or of a tree whose white nodes have winding numbers. */
 static ebpo_file *write_subset(bool windings)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -559,7 +559,7 @@ END_TEST
 
 /* --- remote files --- */
 
-/* In a file with subtrees, one takes few round trips, for any size. */
+/* In a file with subtrees, opening a subtree takes few round trips, whatever its size. */
 START_TEST(test_remote_subtree_needs_few_batches)
 {
     reference t;
@@ -746,7 +746,7 @@ START_TEST(test_subtree_without_faces_gives_reason)
 }
 END_TEST
 
-/* Returns the limit named by a refusal; 0: it is enough. */
+/* Returns the limit that the error message names; 0: `memory` is enough. */
 static uint64_t named_limit(const ebpo_file *file, uint64_t octcode, uint64_t memory)
 {
     ebpo_error error = EBPO_ERROR_INIT;

@@ -49,7 +49,7 @@ static void foresee(void *user, const ebpo_range *ranges, size_t count)
         ck_assert(ranges[i].offset <= b->size && ranges[i].size <= b->size - ranges[i].offset);
 }
 
-/* Returns NULL when it is refused. */
+/* Returns NULL when the file is refused. */
 static ebpo_file *open_bytes(far_bytes *b, bool far)
 {
     ebpo_file *file = NULL;

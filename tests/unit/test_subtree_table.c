@@ -28,7 +28,7 @@ typedef struct plain_table {
     int level;
     unsigned cols;
     uint64_t subtrees;
-    uint64_t (*sum)[EBPO_SUBTREE_COLS]; /* [subtrees + 1] before each */
+    uint64_t (*sum)[EBPO_SUBTREE_COLS]; /* [subtrees + 1] sums before each subtree */
 } plain_table;
 
 /* Returns the subtree of each group of a level; the gray nodes of the level give the next one. */
@@ -105,7 +105,7 @@ static void plain_free(plain_table *t)
     free(t->sum);
 }
 
-/* Faces and vertices are checked by the verifier; here only that they are consecutive. */
+/* Checks that faces and vertices are consecutive; the verifier checks the rest. */
 static void check_faces(const plain_table *t, const ebpo_subtree_row *row, uint64_t *face,
                         uint64_t *vertex)
 {

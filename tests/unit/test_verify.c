@@ -1,5 +1,5 @@
-/* The verifier on correct trees, and on trees with one error each: detected, and in the correct
- * kind. */
+/* The verifier on correct trees, and on trees with one error each: each error is detected in the
+ * correct kind of check. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

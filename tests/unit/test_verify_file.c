@@ -181,8 +181,8 @@ START_TEST(test_verify_names_coordinates_of_old_version)
 }
 END_TEST
 
-/* Flips bits of the arrays (libhdf5 leaks memory when its header is damaged): a finding, or an
- * unused byte, but never a crash and never a failed call. */
+/* Flips bits of the arrays (not of the header, as libhdf5 leaks memory when that is damaged). The
+ * result is a finding, or the byte is unused; there is never a crash or a failed call. */
 START_TEST(test_verify_reports_damage_as_findings)
 {
     write_file(ebpo_test_make("sphere"), false, ~0u);
@@ -243,7 +243,7 @@ static bool stop_at_unused(void *user, const char *stage, uint64_t done, uint64_
     return strcmp(stage, "looking at unused bytes") != 0;
 }
 
-/* As in sparse files, which take no space. */
+/* Unused bytes as in sparse files, which take no space. */
 START_TEST(test_verify_unused_bytes_and_cancel)
 {
     enum { UNUSED = 1 << 20 };

@@ -81,7 +81,7 @@ START_TEST(test_single_point_contact_is_contact)
 }
 END_TEST
 
-/* Counts through the checking function, compared with clipping in rationals. */
+/* Compares the counts of the checking function with clipping in rationals. */
 START_TEST(test_half_space_certificates_match_rational)
 {
     uint64_t state = 2;

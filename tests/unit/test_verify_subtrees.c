@@ -68,7 +68,7 @@ static void expect_named(changeable *c, ebpo_array_id id, uint64_t item, uint64_
     changeable_put(c, id, item, before);
 }
 
-/* For arrays with many numbers, some of each column. */
+/* Changes every number of an array; in large arrays, some of each column. */
 static void change_array(changeable *c, ebpo_array_id id, uint64_t step)
 {
     uint64_t count = changeable_count(c, id);
@@ -96,7 +96,7 @@ START_TEST(test_verify_recounts_subtree_table)
 }
 END_TEST
 
-/* The reader itself refuses some of them. */
+/* The reader itself refuses some of the changed offsets. */
 START_TEST(test_verify_subtree_offsets_against_index)
 {
     changeable c;
@@ -130,7 +130,7 @@ START_TEST(test_verify_chunk_checksums)
 }
 END_TEST
 
-/* Rows of the list in another order, with equal sizes. */
+/* Two rows of the list with equal sizes are exchanged. */
 START_TEST(test_verify_detects_swapped_chunks)
 {
     changeable c;

@@ -161,7 +161,7 @@ static double plain_dot(const double a[3], const double b[3])
 }
 
 /* Returns how far the cell extends into the half-space of the view in which it is least: negative
- * means invisible. Relative to the distances. */
+ * means invisible. The result is relative to the distances. */
 static double plain_reach(const ebpo_observer *o, const record *r)
 {
     double right[3], up[3], least = INFINITY, length = sqrt(plain_dot(o->direction, o->direction));
@@ -305,7 +305,7 @@ static double plain_key(const viewer *v, uint64_t i)
     }
 }
 
-/* `parent` is about to be refined: no earlier one may be pending. */
+/* Checks that no node that comes before `parent` is pending when `parent` is refined. */
 static void expect_first(const viewer *v, uint64_t parent)
 {
     double key = plain_key(v, parent);
@@ -327,7 +327,7 @@ static void take(viewer *v, const ebpo_view_node *n, bool check_order)
 {
     uint64_t i = find(v->all, n->node.octcode), parent = n->node.octcode >> 3;
     record r = record_of(&n->node);
-    ck_assert_msg(same(&r, &v->all->at[i]), "node %llu is not what the file says",
+    ck_assert_msg(same(&r, &v->all->at[i]), "node %llu differs from the file",
                   (unsigned long long)r.octcode);
     ck_assert(!v->come[i] && n->level == level_of(r.octcode));
     if (v->observer) {
@@ -394,8 +394,8 @@ static void random_ray(uint64_t *random, double out[3])
         out[k] = ebpo_test_random_unit(random) - 0.5 + 1e-6;
 }
 
-/* Checks that it covers the root cell once, and equals the cut of a viewer that follows the header.
- */
+/* Checks that the cut covers the root cell once, and equals the cut of a viewer that follows the
+ * header. */
 static void expect_cut(const viewer *v, ebpo_view_stream *stream, uint64_t *random)
 {
     double ray[3];
@@ -500,7 +500,8 @@ static bool add_share(void *user, const ebpo_view_node *n)
     return true;
 }
 
-/* Nothing is known below a pruned node: it stays, as nothing else covers its cell. */
+/* Nothing is known below a pruned node. The node stays in the cut, as nothing else covers its cell.
+ */
 START_TEST(test_view_cut_keeps_pruned_subset_nodes)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -712,7 +713,7 @@ START_TEST(test_view_byte_budget_truncates_sequence)
             bytes = ebpo_test_file_stats(file).bytes_read;
             uint64_t allowed = options.bytes < opening ? opening : options.bytes;
             ck_assert_msg(bytes <= allowed && c.queried <= allowed,
-                          "%llu read, %llu asked for, %llu allowed", (unsigned long long)bytes,
+                          "%llu read, %llu requested, %llu allowed", (unsigned long long)bytes,
                           (unsigned long long)c.queried, (unsigned long long)allowed);
             if (end == EBPO_VIEW_DONE)
                 break;

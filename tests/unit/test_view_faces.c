@@ -35,7 +35,8 @@ static void write_solid(ebpo_mesh mesh, uint32_t parts, uint64_t subtree_faces)
     write_tree(&tree, subtree_faces);
 }
 
-/* Even numbers: a solid with floats; odd ones: a tree of any nodes. From 2 on with subtrees. */
+/* Writes model i: for even i a solid with floats, for odd i a tree of random nodes; from 2 on with
+ * subtrees. */
 static void write_model(int i)
 {
     uint64_t subtree_faces = i < 2 ? EBPO_NO_SUBTREES : 100;
@@ -165,7 +166,7 @@ START_TEST(test_view_faces_are_new_once)
         ck_assert_int_eq(take_all(stream, whole, &t), EBPO_VIEW_DONE);
         ck_assert_uint_eq(t.fresh, t.mesh.face_count);
         ck_assert_uint_gt(t.repeated, 0);
-        if (far) /* hardly any wait is for a single item */
+        if (far) /* hardly any read is for a single item */
             ck_assert_msg(c.alone < 16 && c.batches > 0, "%llu reads, %llu batches",
                           (unsigned long long)c.alone, (unsigned long long)c.batches);
         ebpo_view_stream_free(stream);
@@ -192,7 +193,7 @@ START_TEST(test_view_faces_count_in_byte_budget)
     while ((end = take_all(stream, whole, &t)) == EBPO_VIEW_BYTES) {
         uint64_t bytes = ebpo_test_file_stats(file).bytes_read;
         ck_assert_msg(bytes <= options.bytes && c.queried <= options.bytes,
-                      "%llu read, %llu asked for, %llu allowed", (unsigned long long)bytes,
+                      "%llu read, %llu requested, %llu allowed", (unsigned long long)bytes,
                       (unsigned long long)c.queried, (unsigned long long)options.bytes);
         options.bytes += c.size / 24;
         ck_assert(ebpo_view_stream_change(stream, &options, NULL) == EBPO_OK);

@@ -163,7 +163,8 @@ START_TEST(test_weld_within_matches_all_pairs)
 }
 END_TEST
 
-/* A soup of triangles of a sphere whose corners have an error of up to a tenth of the distance. */
+/* Welds separate triangles of a sphere, whose corners have an error of up to a tenth of the weld
+ * distance. */
 START_TEST(test_weld_within_noisy_soup)
 {
     ebpo_mesh mesh = ebpo_test_make("torus");

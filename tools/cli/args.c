@@ -164,7 +164,7 @@ static arg_result fail_unknown(const arg_spec *spec, const char *shown, const ch
 
 typedef struct parser {
     const arg_spec *spec;
-    int argc, at; /* at: the argument under the cursor */
+    int argc, at; /* at: index of the next argument */
     char **argv;
     void *values;
     const char *output; /* given as an option in place of an operand, or NULL */
@@ -202,7 +202,8 @@ static arg_result take_long(parser *p)
     return take_option(p, o, name[length] ? name + length + 1 : NULL);
 }
 
-/* -qh is -q -h; behind a letter with a value, the rest is the value. */
+/* Parses letters: -qh means -q -h. After a letter that takes a value, the rest of the argument is
+ * the value. */
 static arg_result take_letters(parser *p)
 {
     const char *shown = p->argv[p->at];

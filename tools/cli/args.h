@@ -46,14 +46,17 @@ typedef struct arg_spec {
     const char *summary;  /* one line */
     const char *text;     /* more for --help, or NULL */
     const arg_option *options;
-    /* Meaning of "-", one letter for each operand: 'i' standard input and 'o' output, by way of a
-     * file (standard_files.h); 'p' the command interprets it; a blank, the end or NULL: refused. */
+    /* Meaning of "-", one letter for each operand:
+     *   i  standard input, by way of a file (standard_files.h)
+     *   o  standard output, likewise
+     *   p  the command interprets "-"
+     * A blank, the end of the text or NULL: "-" is refused. */
     const char *dash;
     /* Endings allowed for the second operand, "h5 hdf5"; endings of other formats are refused. */
     const char *writes;
 } arg_spec;
 
-/* Returns the letter of an operand, or a blank. */
+/* Returns the letter of an operand in `dash`, or a blank. */
 char args_dash(const arg_spec *spec, int operand);
 
 typedef enum arg_result { ARGS_RUN, ARGS_HELPED, ARGS_WRONG } arg_result;

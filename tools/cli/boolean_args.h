@@ -11,9 +11,13 @@ typedef struct boolean_nodes {
     uint32_t count;
 } boolean_nodes;
 
-/* Parses "A - (B | C)": | or + union, & or * intersection, - difference, ^ symmetric difference; &
- * and * bind first, the others from left to right. A is operand 0. Returns false after an error,
- * reported on stderr for the command `name` (exit with EXIT_USAGE). */
+/* Parses an expression such as "A - (B | C)":
+ *   | or +  union
+ *   & or *  intersection
+ *   -       difference
+ *   ^       symmetric difference
+ * & and * bind first; the other operators are evaluated from left to right. A is operand 0. Returns
+ * false after an error, reported on stderr for the command `name` (exit with EXIT_USAGE). */
 bool boolean_read(const char *name, const char *text, uint32_t operands, boolean_nodes *out);
 
 /* Reads each text as a model and a pose (see pose_read) into pose[operands], which the caller has

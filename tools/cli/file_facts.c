@@ -114,8 +114,8 @@ static void print_subset(FILE *out, const ebpo_info *info)
     if (info->cut_levels)
         fprintf(out, " levels 0 to %d", info->cut_levels - 1);
     if (info->boxed)
-        fprintf(out, "%s what meets %.9g,%.9g,%.9g,%.9g,%.9g,%.9g", info->cut_levels ? "," : "",
-                b[0], b[1], b[2], b[3], b[4], b[5]);
+        fprintf(out, "%s the part in box %.9g,%.9g,%.9g,%.9g,%.9g,%.9g",
+                info->cut_levels ? "," : "", b[0], b[1], b[2], b[3], b[4], b[5]);
     if (info->kept_error > 0)
         fprintf(out, "%s pruned where envelopes extend at most %.9g beyond the model",
                 info->cut_levels || info->boxed ? "," : "", info->kept_error);

@@ -132,7 +132,7 @@ static void warn_of_repeated_positions(FILE *out, const char *command, const cha
             (unsigned long long)p->repeated.place[0], p->repeated.count > 1 ? ", ..." : "");
 }
 
-/* Returns the result of dropping them, if it was tried. */
+/* Returns the result of dropping repeated faces alone, if this was tried. */
 static const ebpo_repair_try *dropping_alone(const mesh_input *p)
 {
     for (uint64_t i = 0; p->tried && i < p->repairs.count; i++) {

@@ -11,8 +11,9 @@
 ebpo_solid_volume findings_solid(const ebpo_mesh_report *report, ebpo_rule rule,
                                  const ebpo_shells *shells, const ebpo_info *info);
 static inline bool findings_knows(const ebpo_solid_volume *solid) { return solid->lo >= solid->hi; }
-/* Writes "volume" and the volume or its bounds, or, when the volume differs from it, "integral of
- * the winding number". `unit`: as for table_unit. */
+/* Writes "volume" and the volume or its bounds. When the integral of the winding number differs
+ * from the volume, also writes the integral; when no bounds are known, writes only the integral.
+ * `unit`: as for table_unit. */
 enum { FINDINGS_VOLUME = 320 };
 const char *findings_volume(char text[FINDINGS_VOLUME], const ebpo_solid_volume *solid,
                             const ebpo_mesh_report *report, const char *unit);

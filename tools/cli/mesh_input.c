@@ -76,7 +76,7 @@ static ebpo_status try_and_repair(mesh_input *p, repairing queried, ebpo_prepare
     return p->tried && queried.repair && p->repairs.chosen >= 0 ? do_chosen(p, how, error) : status;
 }
 
-/* When no vertices coincide, the check has counted them. */
+/* Counts repeated faces. When no vertices coincide, the check has counted them before. */
 static ebpo_status count_repeated(mesh_input *p, unsigned threads, ebpo_error *error)
 {
     p->repeated = p->prepared.report.repeated_faces;

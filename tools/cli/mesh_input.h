@@ -10,10 +10,11 @@
 
 typedef struct repairing {
     bool weld, drop_duplicates, orient, flip, fill_holes;
-    bool repair;          /* apply the shortest sequence of these that gives a plausible solid */
-    double weld_distance; /* above 0: merges vertices within it before repairs are tried */
-    bool advise;          /* no option: without any of these, search the repairs that `repair` would
-                           * apply */
+    bool repair; /* apply the shortest sequence of these that gives a plausible solid */
+    double
+        weld_distance; /* above 0: merges vertices within this distance before repairs are tried */
+    bool advise; /* not an option: when no repair is requested, search the repairs that `repair`
+                    would apply */
 } repairing;
 
 typedef struct mesh_input {

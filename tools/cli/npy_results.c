@@ -9,7 +9,7 @@
 
 #include "cli/command.h"
 
-/* Magic, version and length of the header, whose total size is this. */
+/* BEFORE: bytes of the magic, the version and the length; HEAD: bytes of the whole header. */
 enum { BEFORE = 10, HEAD = 192 };
 
 static void write_head(char head[HEAD], const char *dtype, uint64_t count)

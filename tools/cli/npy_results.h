@@ -12,9 +12,9 @@ typedef struct npy_results {
     off_t begin; /* offset of the header in standard output; -1: the count was known */
 } npy_results;
 
-/* Writes the header, which states the number of results. It is set at the end when standard output
- * is a file, otherwise the input must state it. Returns false when neither holds or writing failed;
- * reported on stderr. */
+/* Writes the header, which states the number of results. When standard output is a file, npy_end
+ * sets the number; otherwise the input must state it. Returns false when the number cannot be known
+ * or writing failed (reported on stderr). */
 bool npy_begin(npy_results *npy, points *in);
 /* Returns false as above. */
 bool npy_end(npy_results *npy);

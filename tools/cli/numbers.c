@@ -7,15 +7,16 @@
 
 /* --- reading --- */
 
-/* Characters that may follow a number: then the fast reader and strtod read the same number. */
+/* Returns true for characters that may follow a number. Before such a character the fast reader and
+ * strtod read the same number. */
 static bool ends_number(char c)
 {
     return c == 0 || c == ' ' || c == '\t' || c == ',' || c == '\r' || c == '\v' || c == '\f' ||
            c == '#' || c == '\n';
 }
 
-/* Microsoft's C library writes 1.#INF, 1.#IND, 1.#QNAN and 1.#SNAN for non-finite numbers: the
- * number does not end before the '#'. */
+/* Moves *after behind a name such as #INF. Microsoft's C library writes 1.#INF, 1.#IND, 1.#QNAN and
+ * 1.#SNAN for non-finite numbers. */
 static double pass_names(double v, const char **after)
 {
     const char *at = *after;

@@ -1,5 +1,6 @@
 /* Converts numbers and text exactly: reads as strtod does, prints the fewest digits that read back
- * as the same double. Any thread; the program never leaves the "C" locale. */
+ * as the same double. All threads may call these functions; the program never leaves the "C"
+ * locale. */
 #ifndef EBPO_TOOLS_NUMBERS_H
 #define EBPO_TOOLS_NUMBERS_H
 
@@ -9,9 +10,9 @@
 /* Size of the output of the functions below, which has no zero byte at its end. */
 enum { NUMBER_CAPACITY = 32 };
 
-/* Reads the number at `text`, which must end in a character that continues no number, at the latest
- * a zero byte. *after: its end, or `text` when there is none. It never ends before `end`, the end
- * of the text of the line. */
+/* Reads the number at `text`. A character that cannot be part of a number, such as a zero byte,
+ * must follow the number. *after: the end of the number, or `text` when there is none. `end`: the
+ * end of the text of the line; no number may continue beyond it. */
 double number_read(const char *text, const char *end, const char **after);
 
 /* Returns the beginning of the text of a file, after a byte order mark, if any. */
@@ -26,8 +27,9 @@ char *number_write_int(char *out, int64_t v);
 #ifdef __cplusplus
 extern "C" {
 #endif
-/* Parts done by the C++ library, when available (EBPO_HAVE_CHARCONV). False: strtod decides.
- * Digits: as printf's %e, with the fewest digits; returns their end. */
+/* Parts done by the C++ library, when available (EBPO_HAVE_CHARCONV). Reading returns false when
+ * strtod must decide. Writing uses the layout of printf's %e with the fewest digits, and returns
+ * the end of the text. */
 bool number_charconv_read(const char *text, const char *end, const char **after, double *out);
 char *number_charconv_digits(char *out, double v);
 #ifdef __cplusplus

@@ -60,7 +60,7 @@ static bool cut_held(points *p, uint64_t number, uint64_t of)
 /* --- text --- */
 
 /* Returns the beginning of the first line that begins at `at` or later, in a file of `size` bytes;
- * UINT64_MAX after an error (reported on stderr). `begin`: of the first line. */
+ * UINT64_MAX after an error (reported on stderr). `begin`: offset of the first line. */
 static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
 {
     char piece[1 << 14];
@@ -82,8 +82,8 @@ static uint64_t next_line(points *p, uint64_t begin, uint64_t at, uint64_t size)
     return size;
 }
 
-/* All parts need the names of columns; the lines after the names are shared out. `begin`: of the
- * first line; *out: of the first line after the names. */
+/* Takes the names of columns, which all parts need; the parts share the lines after the names.
+ * `begin`: offset of the first line; *out: offset of the first line after the names. */
 static bool take_names(points *p, uint64_t begin, uint64_t *out)
 {
     points_block b = { .bytes = malloc(POINTS_LINE + 1), .first = true };

@@ -8,8 +8,8 @@
  * nothing was taken; `header` must be set before. The parts hold all rows, in order, each once; a
  * part may be empty. Numbers are cut between rows, so that parts differ by at most one row. Text is
  * cut by bytes, at the next line. Only these bytes and the beginning of the file are read. A PLY
- * has been read completely; of a dataset points_open_shard has read only this part. Returns false
- * when it is not a file, or is invalid, which has been reported on stderr. */
+ * file has been read completely; of a dataset, points_open_shard has read only this part. Returns
+ * false when the input is not a file, or is invalid; this has been reported on stderr. */
 bool points_cut(points *p, uint64_t number, uint64_t of);
 
 #endif

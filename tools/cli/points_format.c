@@ -38,7 +38,8 @@ static bool read_ply(points *p, points_block *b)
 
 /* --- NumPy arrays --- */
 
-/* Returns the word behind 'name': in the header, which is a Python dictionary; or NULL. */
+/* Returns the value after 'name': in the header, which is a Python dictionary; NULL: no such name.
+ */
 static const char *npy_value(const char *head, const char *name)
 {
     const char *at = strstr(head, name);
@@ -51,7 +52,7 @@ static const char *npy_value(const char *head, const char *name)
 static bool npy_type(points *p, const char *descr)
 {
     if (strnlen(descr, 5) < 5)
-        return false; /* the header ends in it */
+        return false; /* the header ends within the value */
     p->layout.big_endian = descr[1] == '>';
     p->layout.bytes = descr[3] == '4' ? 4 : 8;
     return strchr("<>", descr[1]) && descr[2] == 'f' && strchr("48", descr[3]) && descr[4] == '\'';
@@ -147,7 +148,7 @@ static bool read_npy(points *p, points_block *b)
     memcpy(head, p->rest + before, length);
     head[length] = 0;
     for (char *quote = head; (quote = strchr(quote, '"'));)
-        *quote = '\''; /* Python uses both */
+        *quote = '\''; /* Python writes ' or " */
     points_drop(p, before + length);
     p->raw = true;
     return npy_head(p, b, head);
@@ -293,7 +294,7 @@ static bool recognise_format(points *p, points_block *b)
     return p->raw || !is_foreign(p);
 }
 
-/* Does not wait for more when a short line of text is there. */
+/* Does not wait for more bytes when a short line of text has arrived. */
 bool points_recognise(points *p, points_block *b)
 {
     for (;;) {

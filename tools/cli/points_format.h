@@ -8,14 +8,14 @@
  * holds the error. */
 bool points_recognise(points *p, points_block *b);
 
-/* The same for "FILE.h5:/path" where FILE.h5 is a file. Returns false after an error, which has
- * been reported. */
+/* Returns true for "FILE.h5:/path" where FILE.h5 is a file. */
 bool points_is_dataset(const char *path);
-/* Finds the file that holds them; false: there is none. *dataset: the text after the file name, or
- * "". */
+/* Finds the file that holds the points; returns false when there is none. *dataset: the text after
+ * the file name, or "". */
 struct stat;
 bool points_file(const char *path, struct stat *st, const char **dataset);
-/* Opens part `number` of `of`, as points_cut takes them. */
+/* Opens part `number` of `of` of a dataset, the same part as points_cut takes. Returns false after
+ * an error, which has been reported. */
 bool points_open_dataset(points *p, const char *path, uint64_t number, uint64_t of);
 
 #endif

@@ -26,7 +26,7 @@ static char *trim_field(char *s, char *end)
     return s;
 }
 
-/* Returns the end of the field: a separator outside quotes. */
+/* Returns the end of the field: the first separator outside quotes, or `end`. */
 static char *field_end(char separator, char *s, const char *end)
 {
     for (bool quoted = false; s < end; s++) {

@@ -4,8 +4,8 @@
 
 #include "cli/points_input.h"
 
-/* Takes the line of names if it is in the block; the block then begins after it and its contents
- * are in `p`. On false the block holds the error. */
+/* Takes the line of names if it is in the block; the block then begins after this line, and the
+ * names are in `p`. On false the block holds the error. */
 bool points_take_header(points *p, points_block *b);
 /* Splits a line that ends at `end` with a zero byte into fields, without surrounding blanks and
  * quotes, each ended by a zero byte. Returns their number. */

@@ -37,7 +37,7 @@ typedef struct points_block {
     uint64_t capacity_rows;
     uint64_t lines;    /* lines of text, including those before `begin` */
     bool first;        /* true for the first block of the input */
-    bool failed;       /* an error follows its last row: */
+    bool failed;       /* an error follows the last row of the block: */
     uint64_t fault_at; /* line or row from 1 in this block, 0: the input as a whole */
     char fault[200];
 } points_block;
@@ -45,14 +45,14 @@ typedef struct points_block {
 typedef struct points {
     const char *command, *name; /* for messages */
     points_kind kind;
-    bool raw;      /* doubles, or as in `layout` */
+    bool raw;      /* the input is doubles, or numbers as in `layout` */
     bool header;   /* the first line of text names columns; may be set after points_open */
     bool headless; /* the command accepts no header line */
     double tmax;   /* default for rays without it */
     int fd;
     int wake; /* when this becomes readable, waiting ends as at the end of the input; -1: none */
     uint64_t bytes_total, bytes_taken; /* bytes of a file; 0: unknown */
-    bool limited;                      /* limits the bytes still to read: */
+    bool limited;                      /* only the following number of bytes may still be read */
     uint64_t bytes_left;
     char *rest; /* [rest_capacity] bytes read and not yet taken */
     size_t rest_count, rest_capacity;
@@ -62,14 +62,14 @@ typedef struct points {
     uint64_t line_from;  /* lines are counted from this byte of the file */
     uint64_t together;   /* rows of a block in binary input */
     points_layout layout;
-    bool rows_known;          /* the total number is known: */
+    bool rows_known;          /* the following total number of rows is known */
     uint64_t rows_total;      /* the input may have fewer */
-    bool rows_reported;       /* stated by the header of an array, which must match */
+    bool rows_reported;       /* the header of an array states the total number, which must match */
     uint64_t rows_taken;      /* rows taken of such an array */
     bool from_zero;           /* messages call rows "vertex 0" */
     double *held;             /* all rows of input that is read completely; or NULL */
     uint64_t held_at;         /* number of rows taken */
-    bool held_part;           /* they are already the part that points_cut would take */
+    bool held_part;           /* these rows are already the part that points_cut would take */
     int field[POINTS_WIDEST]; /* with a header: position of each number; -1: none */
     int fields;               /* fields in a line; 0: not known yet */
     char separator;           /* between fields; 0: blanks */
@@ -80,7 +80,7 @@ typedef struct points {
 /* Longest line of text; bytes read at a time; maximum number of columns in a header. */
 enum { POINTS_LINE = 1 << 18, POINTS_TEXT = 1 << 17, POINTS_FIELDS = 256 };
 
-/* For `fault_at`: the line after the block. */
+/* Value of `fault_at` for the line after the block. */
 #define POINTS_BEHIND UINT64_MAX
 
 /* Records an error behind the last row of a block; `at` as in `fault_at`. Returns false. */

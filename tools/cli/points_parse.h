@@ -4,7 +4,7 @@
 
 #include "cli/points_input.h"
 
-/* Any thread. */
+/* All threads may call this. */
 void points_parse(const points *p, points_block *block);
 
 #endif

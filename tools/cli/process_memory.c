@@ -14,8 +14,8 @@ static uint64_t limit_bytes;
 static bool limit_given;
 static rlim_t before_us = RLIM_INFINITY; /* limit inherited from the parent process */
 
-/* Memory that counts is already in use: private writable memory, which under sanitizers is most of
- * the address space. */
+/* Returns the memory that counts and is already in use: private writable memory, which under
+ * sanitizers is most of the address space. */
 static uint64_t taken_already(void)
 {
     unsigned long long pages = 0;
@@ -28,8 +28,8 @@ static uint64_t taken_already(void)
     return pages * (uint64_t)sysconf(_SC_PAGESIZE);
 }
 
-/* Stacks of threads count completely, although little of them is used. Number of threads; 0: one
- * for each core. */
+/* Returns the bytes of the stacks of threads. Stacks count completely, although little of each is
+ * used. `threads`: number of threads; 0: one for each core. */
 static uint64_t bytes_of_stacks(int64_t threads)
 {
     struct rlimit stack;
@@ -41,7 +41,8 @@ static uint64_t bytes_of_stacks(int64_t threads)
     return each * (uint64_t)(most < 1 ? 1 : most > THREADS_MAX ? THREADS_MAX : most);
 }
 
-/* 0: no additional limit. Never exceeds the limit inherited from the parent process. */
+/* Sets the limit, which never exceeds the limit inherited from the parent process. `bytes` 0: no
+ * additional limit. */
 static void limit_to(uint64_t bytes, int64_t threads, bool given)
 {
     struct rlimit limit;

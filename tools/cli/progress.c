@@ -55,7 +55,7 @@ void progress_end_stage(progress_line *line)
     line->begun = now;
 }
 
-/* Counts further stages with the last one. */
+/* Begins a stage. When there is no space for another stage, counts it with the last one. */
 static void begin_stage(progress_line *line, const char *stage)
 {
     int i = 0;

@@ -34,7 +34,7 @@ void progress_plan(progress_line *line, const int *plan, int count, const uint64
 /* Wipes the line; call before printing anything else. May be called at any time. */
 void progress_wipe(progress_line *line);
 
-/* Ends the times of stages; call before reading them. */
+/* Ends the time of the last stage; call before reading the times of stages. */
 void progress_end_stage(progress_line *line);
 
 /* Returns seconds on a monotonic clock. */

@@ -46,20 +46,20 @@ static inline bool query_lists(const query_values *v)
 /* Returns false when one of the options `idle` was given, which has no effect with `with`, such as
  * "--mode leaves"; reported on stderr (exit with EXIT_USAGE). */
 bool query_accepts(const char *name, const query_values *v, unsigned idle, const char *with);
-/* The same for the modes of each query, and --max-level for distances, leave without
- * effect. */
+/* Returns false, with a report on stderr (exit with EXIT_USAGE), when an option has no effect with
+ * the given --mode, or for distances with --max-level. */
 bool query_inside_fits(const char *name, const query_values *v);
 bool query_distance_fits(const char *name, const query_values *v);
 
-/* Converts both forms; `name` is the command, for messages. Returns false for conflicting values,
- * reported on stderr (exit with EXIT_USAGE). */
+/* Converts the values to options of the library; `name` is the command, for messages. Returns false
+ * for conflicting values, reported on stderr (exit with EXIT_USAGE). */
 bool query_options_from(const char *name, const query_values *v, ebpo_model_options *model,
                         ebpo_inside_options *inside, ebpo_distance_options *distance);
 
 /* Reads the value of --deadline in ns. Returns false as above. */
 bool query_read_time(const char *name, const char *text, uint64_t *out);
 
-/* A file, its model in memory, and a context. */
+/* A file, the model of the file in memory, and a context. */
 typedef struct query_session {
     ebpo_file *file;
     ebpo_model *model;
@@ -74,7 +74,7 @@ typedef struct query_session {
  * requested). Call query_close in any case. */
 int query_open(query_session *s, const char *name, const char *path,
                const ebpo_model_options *options, int level, const remote_values *remote);
-/* The same in two steps, without a context. */
+/* Does the same in two steps, without a context. */
 int query_open_file(query_session *s, const char *name, const char *path,
                     const ebpo_model_options *options, int level, const remote_values *remote);
 int query_open_model(query_session *s, const char *name, const ebpo_model_options *options);

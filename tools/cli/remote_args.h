@@ -29,7 +29,7 @@ typedef struct remote_values {
 EBPO_MUST_USE ebpo_status remote_open(ebpo_file **out, const char *name,
                                       const remote_values *values, ebpo_error *error);
 
-/* Opens the output of the command itself, with no limit of decoding. */
+/* Opens the file that the command itself has written, without a limit on the decoded size. */
 EBPO_MUST_USE ebpo_status remote_open_own(const char *path, ebpo_file **out, ebpo_error *error);
 
 /* Returns the name to print: a URL without password and query. Valid until the next call. */

@@ -7,7 +7,7 @@ static const struct {
     const char *old, *now;
 } commands[] = { { "repair", "recover" }, { "touch", "haptic" } };
 
-/* Former options; command NULL: of every command. */
+/* Former options; command NULL: an option of every command. */
 static const struct {
     const char *command, *old, *now;
 } options[] = {

@@ -7,8 +7,8 @@
 /* Returns the current name of a command, or NULL when `name` is no former name. */
 const char *renamed_command(const char *name);
 
-/* Returns the current option, "--parts (for example --parts -mesh)", or NULL when `name` is no
- * former option of the command. */
+/* Returns the current option, for example "--parts (for example --parts -mesh)"; NULL when `name`
+ * is no former option of the command. */
 const char *renamed_option(const char *command, const char *name, size_t length);
 
 /* Returns the current value of an option, or NULL when `word` is no former value. */

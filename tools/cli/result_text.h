@@ -1,4 +1,4 @@
-/* Buffers results as bytes until they are written; the buffer grows and records where each result
+/* Buffers results as bytes until they are written. The buffer grows, and records where each result
  * ends. */
 #ifndef EBPO_TOOLS_RESULT_TEXT_H
 #define EBPO_TOOLS_RESULT_TEXT_H
@@ -79,7 +79,7 @@ static inline bool result_text_is_over(const result_text *t)
 /* Drops the text behind the last complete row. The caller must add the same bytes again; bytes that
  * were already written are not written twice. */
 void result_text_retry(result_text *t);
-/* Discards the text; later text is discarded, too, when it would be written. */
+/* Discards the text. Later text is discarded, too, at the time when it would be written. */
 void result_text_lose(result_text *t);
 
 /* Writes the text to standard output (to a pipe in pieces) and empties the buffer. Returns false

@@ -75,7 +75,8 @@ void raw_double(FILE *out, double v)
 
 /* --- attributes: behind their face --- */
 
-/* `face` may be none. This cannot fail: the queried file has the attributes of `sampler`. */
+/* Writes the attributes of `face`, which may be none. This cannot fail, as the file of the queries
+ * has the attributes of `sampler`. */
 static char *put_attributes(char *at, result_form form, const ebpo_sampler *sampler,
                             const double point[3], uint64_t face)
 {
@@ -101,7 +102,8 @@ static char *put_attributes(char *at, result_form form, const ebpo_sampler *samp
 
 /* --- the model of a catalogue --- */
 
-/* NULL: there is only one model. UINT64_MAX: none. */
+/* Writes the index of the model. `model` NULL: there is no catalogue; *model UINT64_MAX: no model.
+ */
 static char *put_model(char *at, result_form form, const uint64_t *model)
 {
     if (!model)

@@ -14,13 +14,14 @@ extern const char *const where_words[]; /* OUT, IN, ON, MAYBE */
 
 void results_inside(result_text *t, result_form form, const ebpo_inside_result *results,
                     uint64_t count);
-/* `limited`: lo and hi only. `sampler`, here and below: attributes follow the face; or NULL.
- * `model`, likewise: [count] index of the model in the catalogue, UINT64_MAX for none; or NULL. */
+/* `limited`: writes lo and hi only. `sampler`, here and below: attributes to write after the face;
+ * or NULL. `model`, here and below: [count] indices of models in the catalogue, UINT64_MAX for
+ * none; or NULL. */
 void results_distance(result_text *t, result_form form, bool limited,
                       const ebpo_distance_result *results, uint64_t count,
                       const ebpo_sampler *sampler, const uint64_t *model);
-/* Writes the nearest faces of one point in order: each with the text before it, then the text after
- * the last one. */
+/* Writes one of the nearest faces of a point, with the text before it; after the last face the text
+ * that ends the list. */
 void results_near(result_text *t, result_form form, const ebpo_near_face *face, bool first,
                   const ebpo_sampler *sampler);
 void results_near_end(result_text *t, result_form form, bool none, const ebpo_sampler *sampler);
@@ -38,7 +39,7 @@ void results_box(result_text *t, result_form form, const uint64_t *faces, uint64
 enum { RESULT_NAMES = 400 };
 void results_header(result_text *t, result_form form, const char *names, const char *attributes);
 
-/* Little-endian, as all raw results. */
+/* Writes a little-endian number, as in all raw results. */
 void raw_u64(FILE *out, uint64_t v);
 void raw_double(FILE *out, double v);
 

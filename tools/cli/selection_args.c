@@ -9,7 +9,7 @@
 
 static const double max_planes = 1e9; /* same limit as ebpo_build */
 
-/* Reads "500", or "1%", which is a share. */
+/* Reads a number such as "500", or a share such as "1%". */
 static bool read_k_root(const char *text, double *k, bool *share)
 {
     char *end;

@@ -18,7 +18,7 @@ typedef struct selection_options {
 int selection_check(const char *name, const selection_options *o);
 
 /* Returns planes at the root, 1 to 1e9, from a checked text: "500", or "1%" of `faces`, at least 1.
- * NULL: 0. EBPO_E_ARGUMENT: the share is more than 1e9 planes. */
+ * `text` NULL: 0. EBPO_E_ARGUMENT: the share is more than 1e9 planes. */
 EBPO_MUST_USE ebpo_status selection_k_root(const char *text, uint64_t faces, double *out,
                                            ebpo_error *error);
 

@@ -1,5 +1,5 @@
-/* Handles SIGINT, SIGTERM, SIGHUP and SIGPIPE: removes temporary files, and the process ends by
- * that signal. SIGXFSZ becomes a write error. */
+/* Handles SIGINT, SIGTERM, SIGHUP and SIGPIPE: removes temporary files and ends the process by the
+ * same signal. SIGXFSZ becomes a write error. */
 #ifndef EBPO_TOOLS_SIGNALS_H
 #define EBPO_TOOLS_SIGNALS_H
 
@@ -9,7 +9,7 @@ void signals_install(void);
  */
 void signals_also(void (*clean_up)(void));
 
-/* The same for temporary files that exist during a whole command. */
+/* Does the same for temporary files that exist during a whole command. */
 void signals_scratch(void (*clean_up)(void));
 
 #endif

@@ -6,8 +6,8 @@
 #include <stdio.h>
 
 /* Returns the volume of the envelopes that represent the model at `level`: its gray nodes, and the
- * leaves and black nodes of levels 0 .. level. Leaves count as the file states them; planes that
- * readers derive cut off more. */
+ * leaves and black nodes of levels 0 .. level. Leaves count with the volume that the file states;
+ * the planes that readers derive would cut off more. */
 double facts_volume(const ebpo_info *info, int level);
 /* Returns the same with leaves cut by planes derived from their faces, when the file has faces and
  * no planes of leaves; reads them. */
@@ -15,7 +15,7 @@ EBPO_MUST_USE ebpo_status facts_derived(ebpo_file *file, int level, unsigned thr
                                         ebpo_progress progress, double *volume, ebpo_error *error);
 /* Returns the bounds of the volume of the solid. `shells`: as for ebpo_solid_volume_of. */
 ebpo_solid_volume facts_solid(const ebpo_info *info, const ebpo_shells *shells);
-/* Returns the same with the measurements of the mesh. */
+/* Returns the same bounds with the measurements of the mesh. */
 ebpo_solid_volume facts_measured(const ebpo_info *info, const ebpo_mass *mass);
 /* Returns the base of percentages: "solid"; "box", the root box, for a surface; "integral", of the
  * winding number, when the volume of the solid is not known. */
@@ -30,7 +30,7 @@ double facts_share(const ebpo_info *info, const ebpo_solid_volume *solid, double
  * for a solid with no volume or an unknown one. */
 double facts_excess(const ebpo_info *info, const ebpo_solid_volume *solid, double volume);
 /* Returns the excess of `volume` / excess of `limit`, the volume of the convex hulls; NAN when one
- * of them has none, or when the hulls equal the solid except for rounding. */
+ * of the two volumes has no excess, or when the hulls equal the solid except for rounding. */
 double facts_excess_ratio(const ebpo_info *info, const ebpo_solid_volume *solid, double volume,
                           double limit);
 

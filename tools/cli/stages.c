@@ -119,7 +119,7 @@ static void thesis_numbers(json *j, unsigned thesis)
     json_end(j);
 }
 
-/* Writes a stage of the thesis, and the rows that do its work; the last one is the sum. */
+/* Writes a stage of the thesis, and the rows that do its work. The last stage is the sum. */
 static void thesis_stage(json *j, int number, const stage_facts *f, const bool began[STAGE_ROWS],
                          const double taken[STAGE_ROWS])
 {

@@ -12,7 +12,7 @@
 
 typedef struct stage_facts {
     bool was_repaired, solid, from_leaves, judged; /* from_leaves: selections of the theses */
-    bool leaf_planes;                              /* they are made, not derived by readers */
+    bool leaf_planes; /* leaf planes are stored, not derived by readers */
     uint64_t faces;
     ebpo_build_times times;
 } stage_facts;

@@ -13,13 +13,13 @@
 
 enum { PATH_MAX = 4096, PIECE = 1 << 16 };
 
-/* A signal handler reads this, too: files that do not exist have empty names. */
+/* Also read by a signal handler. Files that do not exist have empty names. */
 static char folder[PATH_MAX], input[PATH_MAX], output[PATH_MAX];
 static int printed_to = -1; /* copy of standard output while it is redirected */
 
-/* Opened files get the lowest free descriptors: without this, a file could get one of 0 to 2, and
- * prints would go into it. The files put there can neither be read as input nor written as output,
- * so that using them fails as a closed stream does (EBADF). */
+/* Occupies closed descriptors 0 to 2. An opened file gets the lowest free descriptor, so it could
+ * otherwise get one of these, and prints would go into the file. The files put there can neither be
+ * read as input nor written as output, so that using them fails as a closed stream does (EBADF). */
 bool standard_files_occupy(void)
 {
     for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++) {

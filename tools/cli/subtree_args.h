@@ -10,8 +10,8 @@
 /* In the order of ebpo_face_coding. */
 extern const char *const face_coding_words[];
 
-/* Reads the member of the same name of ebpo_write_options; `text` may be NULL. Returns false, with
- * the usage message printed, for an invalid number. */
+/* Reads --subtree-faces as the member subtree_faces of ebpo_write_options; `text` may be NULL.
+ * Returns false, with the usage message printed, for an invalid number. */
 bool subtree_faces_read(const char *command, const char *text, uint64_t *out);
 
 #endif

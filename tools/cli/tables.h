@@ -17,14 +17,14 @@ void table_legend(FILE *out);
 /* Prints x by the printf `format` with one conversion of a double; "-" when x is not finite. */
 const char *table_cell(char out[TABLE_CELL], const char *format, double x);
 
-/* As above; when x is not finite, words that follow "volume". */
+/* Does the same, but when x is not finite returns words that can follow "volume". */
 const char *table_volume(char out[TABLE_CELL], const char *format, double x);
 
 /* Prints the meaning of "-" in columns of volumes, below a table that has some. */
 void table_beyond(FILE *out);
 
-/* Writes x * 2^exponent with so many significant digits, 1 to 17, as %g does; beyond the range of a
- * double with at most 9, such as 4.2e+901. */
+/* Writes x * 2^exponent with `digits` significant digits, 1 to 17, as %g does; beyond the range of
+ * a double with at most 9, such as 4.2e+901. */
 const char *table_scaled(char out[TABLE_CELL], int digits, double x, int64_t exponent);
 
 /* Writes x * 2^exponent as a number; beyond the range of a double as the same text. */

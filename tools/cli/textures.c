@@ -97,7 +97,7 @@ bool textures_same(const ebpo_file *a, const ebpo_file *b)
 
 /* --- facts --- */
 
-/* Also when they were not read. */
+/* Returns the number of bytes of an image, also when the bytes were not read. */
 static uint64_t byte_count(const textures *t, uint64_t row)
 {
     const uint64_t *ends = t->list[BYTES].ends;
@@ -125,7 +125,7 @@ static char *text_of(span s)
     return text;
 }
 
-/* Writes "" when there is none. */
+/* Writes the digest in hexadecimal; "" when there is none. */
 static void digest_of(const textures *t, uint64_t row, char hex[2 * DIGEST + 1])
 {
     span s = list_of(t, SHA256, row);
@@ -184,7 +184,7 @@ static ebpo_status fail_system(ebpo_error *error, const char *path)
     return fail_file(error, EBPO_E_IO, path, strerror(errno));
 }
 
-/* Returns true for words between slashes, none of which leads upwards. */
+/* Returns true when no word between the slashes of the name leads upwards, as ".." does. */
 static bool leads_below(const char *name)
 {
     size_t n = 0;
@@ -216,8 +216,8 @@ static void tidy_name(char *name)
     *to = 0;
 }
 
-/* Returns the name without backslashes. NULL: memory is short, or it is not the name of a file
- * below. */
+/* Returns the name without backslashes. NULL: memory is short, or the name is not that of a file
+ * below the folder. */
 static char *safe_name(span s)
 {
     char *name = strndup(s.s, s.n);
@@ -277,7 +277,7 @@ static int open_nameless(int folder)
     return -1;
 }
 
-/* Names the file last, so that the name never refers to a part of the image. */
+/* Gives the complete file its name, so that the name never refers to a part of the image. */
 static bool give_name(int fd, int folder, const char *name)
 {
     char path[64];

@@ -32,9 +32,9 @@ void textures_print(FILE *out, const textures *t);
 void textures_json(json *j, const textures *t);
 
 /* Writes all images in the file to the folder, under their names; creates the folder if needed.
- * Refuses names that lead out of it before anything is written. Existing files stay unchanged:
- * EBPO_E_FORMAT, EBPO_E_IO. EBPO_E_ABSENT: there are no images. `t` must have been read with bytes.
- */
+ * Refuses names that lead out of the folder before anything is written (EBPO_E_FORMAT). Existing
+ * files stay unchanged (EBPO_E_IO). EBPO_E_ABSENT: there are no images. `t` must have been read
+ * with bytes. */
 EBPO_MUST_USE ebpo_status textures_write(const textures *t, const char *folder, uint64_t *written,
                                          ebpo_error *error);
 

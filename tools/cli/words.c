@@ -141,8 +141,8 @@ static bool read_amount(const char *text, const char **end, uint64_t *whole, con
     return *end > *fraction;
 }
 
-/* Returns the fraction of the factor, rounded down: from the last digit on, each remainder is
- * exact. */
+/* Returns the decimal fraction times the factor, rounded down. The digits are taken from the last
+ * one on, so that each remainder is exact. */
 static uint64_t fraction_of(const char *digits, const char *end, uint64_t factor)
 {
     uint64_t sum = 0;

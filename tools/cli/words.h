@@ -24,7 +24,7 @@ char *words_plural(char *out, size_t capacity, uint64_t count, const char *one, 
 char *words_parts(char *out, size_t capacity, uint32_t parts);
 /* Writes "1.0". */
 char *words_format(char *out, size_t capacity, int major, int minor);
-/* Writes "#ff8000" of red + 256 green + 65,536 blue. */
+/* Writes "#ff8000" for the colour red + 256 green + 65,536 blue. */
 char *words_colour(char out[8], uint32_t colour);
 const char *words_node_type(ebpo_node_type type);
 const char *words_rule(ebpo_rule rule);
@@ -40,7 +40,8 @@ bool words_read_size(const char *text, uint64_t *out);
 typedef struct word_levels {
     uint32_t set; /* one bit for each level */
     int first, last;
-    bool to_end; /* open range: levels beyond the deepest were not requested by number */
+    bool to_end; /* the range is open ("3-"): levels below the deepest were not requested by number
+                  */
     bool is_run; /* no level between the first and the last is missing */
 } word_levels;
 

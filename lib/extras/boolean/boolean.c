@@ -1,11 +1,11 @@
 /* Boolean expressions over solids at poses: union, intersection, difference and symmetric
  * difference, evaluated at points of the world.
  *
- * An expression is a list of nodes, each of which refers to earlier nodes or operands. The state of
- * the operands (in, out, or unknown) gives the possible results; an operand on whose boundary a
- * point lies counts with both sides. Only operands that can still change the result are queried.
- * Proofs: docs/develop/booleans.md. The object is immutable after creation; each thread has
- * separate contexts. */
+ * An expression is a list of nodes, each of which refers to earlier nodes or to operands. The state
+ * of the operands (in, out, or unknown) gives the possible results. If a point is on the boundary
+ * of an operand, both sides of the operand count. Only operands that can still change the result
+ * are queried. Proofs: docs/develop/booleans.md. The object is immutable after creation; each
+ * thread has separate contexts. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -43,7 +43,7 @@ static ebpo_status check_node(const ebpo_boolean_node *node, uint32_t number, ui
     return EBPO_OK;
 }
 
-/* Fails with EBPO_E_LIMIT, EBPO_E_ARGUMENT as documented at ebpo_boolean_new. */
+/* Fails with EBPO_E_LIMIT and EBPO_E_ARGUMENT, as documented at ebpo_boolean_new. */
 static ebpo_status make_expression(ebpo_expression *out, const ebpo_boolean_node *nodes,
                                    uint32_t count, uint32_t operands, ebpo_error *error)
 {
@@ -65,7 +65,8 @@ static unsigned may_not(unsigned may)
     return (may & EBPO_MAY_IN ? EBPO_MAY_OUT : 0u) | (may & EBPO_MAY_OUT ? EBPO_MAY_IN : 0u);
 }
 
-/* In both: possible if it may be in both; not in both: possible if it may be out of either. */
+/* Returns the possible states of an intersection. It may be in if both operands may be in, and out
+ * if either may be out. */
 static unsigned may_in_both(unsigned a, unsigned b)
 {
     return (a & b & EBPO_MAY_IN) | ((a | b) & EBPO_MAY_OUT);
@@ -124,7 +125,7 @@ static void combine_boxes(int32_t operation, const double a[6], const double b[6
         out[3 + k] = smaller ? fmin(a[3 + k], b[3 + k]) : fmax(a[3 + k], b[3 + k]);
     }
     if (out[0] > out[3] || out[1] > out[4] || out[2] > out[5])
-        for (int k = 0; k < 3; k++) { /* so that a union takes no part of an empty operand */
+        for (int k = 0; k < 3; k++) { /* an empty box does not extend the box of a union */
             out[k] = INFINITY;
             out[3 + k] = -INFINITY;
         }
@@ -234,10 +235,11 @@ void ebpo_boolean_free(ebpo_boolean *b)
 
 /* --- points --- */
 
-/* States of the operands at a point; an operand on whose boundary it lies has two sides. */
+/* States of the operands at a point. If the point is on the boundary of an operand, the operand has
+ * two sides. */
 typedef struct opinion {
-    uint64_t known;        /* operands whose inside is the same on both sides */
-    uint64_t above, below; /* operands that are inside on that side */
+    uint64_t known;        /* operands that are in the same state on both sides, a bit for each */
+    uint64_t above, below; /* operands that are in on each side */
     bool flat;             /* all faces through the point are in one plane */
     bool on;
     double plane[3][3];
@@ -255,7 +257,8 @@ static void add_opinion(opinion *o, uint32_t i, ebpo_rule rule, const ebpo_posed
 {
     uint64_t above = ebpo_rule_inside(rule, sides->above),
              below = ebpo_rule_inside(rule, sides->below);
-    if (sides->flat && above == below) { /* not its boundary, even if faces are there */
+    if (sides->flat && above == below) { /* the point is not on the operand's boundary, even if
+                                          * faces are there */
         o->known |= UINT64_C(1) << i;
         o->above |= above << i;
         o->below |= above << i;

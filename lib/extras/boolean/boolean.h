@@ -1,5 +1,5 @@
-/* Boolean expressions over solids at poses, evaluated from operands that are in, out or unknown.
- * Expressions: pure functions, any thread. */
+/* Boolean expressions over solids at poses. They are evaluated from the states of operands: in, out
+ * or unknown. Functions on expressions are pure; any thread may call them. */
 #ifndef EBPO_BOOLEAN_BOOLEAN_H
 #define EBPO_BOOLEAN_BOOLEAN_H
 
@@ -15,16 +15,16 @@ typedef struct ebpo_expression {
     uint32_t count;
 } ebpo_expression;
 
-/* Evaluates an expression. If bit i of `known` is set, bit i of `in` is the state of operand i.
- * MAY_IN or MAY_OUT is certain; MAY_BOTH may be more than is possible where an operand is used
- * twice. */
+/* Returns the possible states of an expression. If bit i of `known` is set, bit i of `in` is the
+ * state of operand i. MAY_IN or MAY_OUT alone is certain; MAY_BOTH may be returned although only
+ * one is possible, if an operand is used twice. */
 unsigned ebpo_expression_value(const ebpo_expression *e, uint64_t known, uint64_t in);
 
-/* Returns the operands that the result depends on, a bit for each. */
+/* Returns the operands on which the result depends, a bit for each. */
 uint64_t ebpo_expression_operands(const ebpo_expression *e);
 
-/* Computes a box that contains the result, low[3] and high[3] in turn, from the operands' boxes.
- * Empty: a low above its high. */
+/* Computes a box that contains the result from the operands' boxes: low[3], then high[3]. If the
+ * result is empty, a low is above its high. */
 void ebpo_expression_box(const ebpo_expression *e, const double (*box)[6], double out[6]);
 
 /* An expression with its operands. */
@@ -33,7 +33,7 @@ struct ebpo_boolean {
     ebpo_expression expression;
     uint32_t count; /* number of operands */
     ebpo_posed_solid *solid;
-    ebpo_pose *pose; /* poses of the operands, as given */
+    ebpo_pose *pose; /* poses of the operands, as the caller gave them */
     unsigned threads;
     ebpo_context **context; /* [threads][count] */
 };
@@ -49,7 +49,8 @@ EBPO_MUST_USE ebpo_status ebpo_boolean_query(const ebpo_boolean *b, unsigned wor
                                              const double w[3], ebpo_boolean_result *out,
                                              ebpo_error *error);
 
-/* Fails with the error of a call about an operand: "FILE: operand 1: ...", from 1 on. */
+/* Fails with the error of a call about an operand. The message begins with "FILE: operand 1: ...";
+ * operands are numbered from 1. */
 ebpo_status ebpo_fail_operand(const ebpo_model *model, uint32_t number, const ebpo_error *cause,
                               ebpo_error *error);
 

@@ -1,10 +1,10 @@
 /* The cells of the result of a boolean expression: cells of an octree of the world that are
- * entirely inside, and mixed ones of the finest level.
+ * entirely inside (in-cells), and undecided cells of the finest level (mixed).
  *
- * Level by level the children of all mixed cells are classified on all processor cores, and the
- * mixed ones continue to the next level. Everything is kept in the order of octcodes, so the result
- * does not depend on the number of threads. The cells' volumes bound the volume of the result. The
- * surface between cells that are taken and others is a mesh of squares. */
+ * Level by level the children of all mixed cells are classified on all processor cores; those that
+ * are mixed continue to the next level. Cells are kept in the order of octcodes, so the result does
+ * not depend on the number of threads. The cells' volumes bound the volume of the result. The
+ * surface between the chosen cells and the other ones is a mesh of squares. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -20,7 +20,7 @@
 #include "extras/collide/collider.h"
 #include "geometry/cells.h"
 
-/* A run of inside cells, as octcodes of the finest level. */
+/* A run of in-cells, as octcodes of the finest level. */
 typedef struct in_run {
     ebpo_octcode first;
     uint64_t count;
@@ -28,9 +28,9 @@ typedef struct in_run {
 
 struct ebpo_boolean_cells {
     ebpo_world world;
-    in_run *in; /* ascending */
+    in_run *in; /* in ascending order */
     uint64_t in_count, in_capacity;
-    ebpo_octcode *mixed; /* mixed cells of the finest level, ascending */
+    ebpo_octcode *mixed; /* mixed cells of the finest level, in ascending order */
     uint64_t mixed_count, mixed_capacity;
     uint64_t ways[EBPO_CUBE_WAYS];
 };
@@ -203,13 +203,14 @@ void ebpo_boolean_cells_free(ebpo_boolean_cells *cells)
     free(cells);
 }
 
-/* Returns the volume of this many finest cells, rounded down or up. */
+/* Returns the volume of this many cells of the finest level, rounded down or up. */
 static double cells_volume(const ebpo_boolean_cells *c, uint64_t count, bool up)
 {
     double cells = (double)count, edge = ebpo_world_edge(&c->world, c->world.level);
     if (count >> 53)
         cells = nextafter(cells, up ? INFINITY : 0);
-    return cells * (edge * edge * edge); /* a power of two, within the range */
+    return cells * (edge * edge * edge); /* exact: the edge is a power of two, and its cube is in
+                                          * the range of doubles */
 }
 
 ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells, ebpo_boolean_volume *out)
@@ -228,21 +229,21 @@ ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells, ebpo_bool
                               .by_box = cells->ways[EBPO_CUBE_BY_BOX],
                               .by_nodes = cells->ways[EBPO_CUBE_BY_NODES],
                               .by_faces = cells->ways[EBPO_CUBE_BY_FACES] };
-    v.metric = ebpo_certain_of(v.lo, v.hi).metric;
+    v.kind = ebpo_certain_of(v.lo, v.hi).kind;
     return EBPO_GIVE(ebpo_boolean_volume, out, &v);
 }
 
 /* --- the mesh: in-cells and out-cells share no cell face, so each square is a side of a mixed cell
  * --- */
 
-/* A corner of finest cells: x, y and z, 21 bits each. */
+/* A corner of cells of the finest level: x, y and z, 21 bits each. */
 typedef uint64_t corner;
 
 typedef struct squares {
     const ebpo_boolean_cells *cells;
-    corner (*list)[4]; /* counter-clockwise seen from outside */
+    corner (*list)[4]; /* corners in counter-clockwise order, seen from outside */
     uint64_t count, capacity;
-    corner *vertex; /* ascending */
+    corner *vertex; /* in ascending order */
     uint64_t vertex_count;
 } squares;
 
@@ -259,7 +260,8 @@ static bool is_mixed(const ebpo_boolean_cells *c, ebpo_octcode code)
 
 static bool is_in(const ebpo_boolean_cells *c, ebpo_octcode code)
 {
-    uint64_t low = 0, high = c->in_count; /* all of the runs below `low` begin at or before code */
+    uint64_t low = 0, high = c->in_count; /* invariant: all runs before number `low` begin at or
+                                           * before `code` */
     while (low < high) {
         uint64_t middle = low + (high - low) / 2;
         if (c->in[middle].first <= code)
@@ -275,7 +277,7 @@ static corner corner_at(const uint32_t at[3])
     return (uint64_t)at[2] << 42 | (uint64_t)at[1] << 21 | at[0];
 }
 
-/* Adds a side of a cell, seen from outside the cell, or else from within. */
+/* Adds a square, a side of a cell. from_outside: its front is outside the cell, else inside. */
 static ebpo_status add_square(squares *s, ebpo_cell cell, int axis, bool upper, bool from_outside,
                               ebpo_error *error)
 {
@@ -283,7 +285,8 @@ static ebpo_status add_square(squares *s, ebpo_cell cell, int axis, bool upper, 
         return ebpo_fail_memory(error, (s->count + 1) * sizeof *s->list);
     corner *out = s->list[s->count++];
     int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
-    for (unsigned i = 0; i < 4; i++) { /* counter-clockwise seen from above */
+    for (unsigned i = 0; i < 4; i++) { /* corners in counter-clockwise order, seen from the upper
+                                        * side of the axis */
         uint32_t at[3] = { cell.at[0], cell.at[1], cell.at[2] };
         at[axis] += upper;
         at[u] += i == 1 || i == 2;

@@ -1,9 +1,10 @@
 /* Computes the distance of a point to the boundary of the result of a boolean expression.
  *
  * The boundary is a part of the operands' faces, so no point of it is nearer than the nearest face.
- * If the result changes just behind that face, that is the distance. If not, a search over cells of
- * the world, the nearest first, bounds the distance to the other side: decided cells end the
- * search, mixed ones are divided down to the tolerance or the greatest number of cells. */
+ * If the result changes just behind that face, the face's distance is the result. If not, a search
+ * over cells of the world, the nearest first, bounds the distance to the other side: decided cells
+ * end the search, mixed cells are divided down to the tolerance or up to the maximum number of
+ * cells. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -28,12 +29,12 @@ static inline double scaled_length(const double x[3])
 typedef struct boundary_search {
     const ebpo_boolean *boolean;
     const double *point;
-    unsigned side; /* EBPO_MAY_IN or EBPO_MAY_OUT: the side of the point */
+    unsigned side; /* state of the result at the point: EBPO_MAY_IN or EBPO_MAY_OUT */
     double tolerance;
-    uint64_t most;  /* most cells */
+    uint64_t most;  /* maximum number of cells */
     uint64_t cells; /* number of cells so far */
-    /* Bounds of the distance to the other side, certain; hi is first the known bound. Both
-     * INFINITY: there is none. */
+    /* Certain bounds of the distance to the other side. Initially hi is the known bound. Both are
+     * INFINITY if there is no other side. */
     double lo, hi;
 } boundary_search;
 
@@ -77,7 +78,7 @@ static ebpo_status push_cell(const boundary_search *s, const ebpo_world *w, queu
     return near < s->hi ? push_waiting(q, (waiting){ near, *c }, error) : EBPO_OK;
 }
 
-/* Beyond the root everything is out. */
+/* Takes the region outside the root cell into account, where everything is out. */
 static void look_beyond_root(boundary_search *s, const ebpo_world *w)
 {
     for (int k = 0; k < 3 && s->side == EBPO_MAY_IN; k++)
@@ -86,8 +87,7 @@ static void look_beyond_root(boundary_search *s, const ebpo_world *w)
                                 (1 + 0x1p-46));
 }
 
-/* Decides the current cell; *unclear: the least distance at which cells of the finest level are
- * mixed. */
+/* Decides the current cell. *unclear: least distance of mixed cells of the finest level. */
 static ebpo_status settle_cell(boundary_search *s, const ebpo_world *w, queue *q, waiting *at,
                                double *unclear, ebpo_error *error)
 {
@@ -134,7 +134,7 @@ static ebpo_status search_cells(boundary_search *s, const ebpo_world *w, queue *
 /* Makes the finest world that doubles allow. */
 static ebpo_status make_world(ebpo_world *w, const ebpo_boolean *b, ebpo_error *error)
 {
-    int level = EBPO_BOOLEAN_LEVEL_MAX - 1; /* centres are one level finer */
+    int level = EBPO_BOOLEAN_LEVEL_MAX - 1; /* one level is left for the centres of cells */
     while (level > 0 && ebpo_world_make(w, b, level, NULL) != EBPO_OK)
         level--;
     return ebpo_world_make(w, b, level, error);
@@ -160,7 +160,7 @@ typedef struct measuring {
     ebpo_boundary_distance *out;
 } measuring;
 
-/* Tries a point beside w: if it is on the other side, the boundary is no farther. */
+/* Tries a point near w: if it is on the other side, the boundary is no farther than this point. */
 static ebpo_status try_point(const measuring *m, const double q[3], ebpo_error *error)
 {
     ebpo_boolean_result there;
@@ -174,7 +174,7 @@ static ebpo_status try_point(const measuring *m, const double q[3], ebpo_error *
     return status;
 }
 
-/* Tries points on the line through the nearest point y of an operand and a little farther. */
+/* Tries points on the line from w through y, the nearest point of an operand, slightly behind y. */
 static ebpo_status try_behind(const measuring *m, const ebpo_posed_solid *s, const double y[3],
                               ebpo_error *error)
 {
@@ -190,7 +190,7 @@ static ebpo_status try_behind(const measuring *m, const ebpo_posed_solid *s, con
     return status;
 }
 
-/* Sets *lo: no posed face of the operand is nearer. */
+/* Sets *lo to a lower bound of the distance of the operand's posed faces. */
 static ebpo_status inspect_operand(const measuring *m, uint32_t operand, double *lo,
                                    ebpo_error *error)
 {
@@ -201,7 +201,7 @@ static ebpo_status inspect_operand(const measuring *m, uint32_t operand, double 
     *lo = 0;
     ebpo_unpose(s, m->w, p, &doubt);
     if (!(fabs(p[0]) < 0x1p1000 && fabs(p[1]) < 0x1p1000 && fabs(p[2]) < 0x1p1000))
-        return EBPO_OK; /* so far away that its position in the model is no double */
+        return EBPO_OK; /* the point is so far away that its position in the model is no double */
     o.unsigned_distance = true;
     ebpo_status status =
         ebpo_distance(ebpo_boolean_context(m->b, 0, operand), p, &o, &nearest, error);
@@ -255,7 +255,8 @@ static ebpo_status measure_off(const measuring *m, const ebpo_boundary_options *
     return status;
 }
 
-/* Perhaps on edges: the boundary is no farther than inside points, nor than outside points. */
+/* Handles a point that may be on the boundary, for example on edges: the boundary is no farther
+ * than a point that is in, nor than a point that is out. */
 static ebpo_status measure_unsure(const measuring *m, const ebpo_boundary_options *o,
                                   ebpo_error *error)
 {

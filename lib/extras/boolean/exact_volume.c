@@ -1,12 +1,12 @@
-/* Computes the exact volume of the result of a boolean expression, where no face of an operand
- * intersects one of another.
+/* Computes the exact volume of the result of a boolean expression, if no face of an operand
+ * intersects a face of another operand.
  *
- * Each patch of connected faces is then in or out of every other operand as a whole. So it bounds
- * the result, from within or from without, or it does not. The signed volumes below the bounding
- * faces add up to the volume. They are summed without rounding: in a long accumulator of doubles'
- * products where these are doubles, otherwise in integers (GMP); the sum is rounded once. Where
- * faces intersect, the result gives the pair, and why there is no exact volume. Proof:
- * docs/develop/booleans.md, "Exact volumes". */
+ * Each patch of connected faces is then in or out of every other operand as a whole. So the whole
+ * patch bounds the result, from inside or from outside, or no face of it does. The signed volumes
+ * below the bounding faces add up to the volume. They are summed without rounding: in a long
+ * accumulator if products of coordinates are exact in doubles, otherwise in integers (GMP); the sum
+ * is rounded once. If faces intersect, the result has the pair, and the reason why there is no
+ * exact volume. Proof: docs/develop/booleans.md, "Exact volumes". */
 #include "core/strict_fp.h"
 
 #include <gmp.h>
@@ -31,37 +31,37 @@
 
 /* --- sums of signed volumes --- */
 
-/* Six times the volumes of tetrahedra from the origin. */
+/* Sum of six times the signed volumes of the tetrahedra from the origin to faces. */
 typedef struct volume_sum {
-    ebpo_sum standard; /* sum for faces whose products are exact in doubles */
-    mpz_t other;       /* sum for all others, in units of 2^EBPO_VOLUME_UNIT */
+    ebpo_sum by_doubles; /* sum for faces whose products are exact in doubles */
+    mpz_t other;         /* sum for all other faces, in units of 2^EBPO_VOLUME_UNIT */
 } volume_sum;
 
-/* Sum of products of three doubles; it holds all 53 bits of each, also of the least one, 2^-1074.
- */
+/* Exponent of the unit for products of three doubles: it represents all 53 bits of each double,
+ * also of the least one, 2^-1074. */
 enum { EBPO_VOLUME_UNIT = -3 * (1074 + 52) };
 
 static void volume_sum_begin(volume_sum *s)
 {
-    s->standard = (ebpo_sum){ 0 };
+    s->by_doubles = (ebpo_sum){ 0 };
     mpz_init(s->other);
 }
 
 static void volume_sum_end(volume_sum *s) { mpz_clear(s->other); }
 
-/* Returns true if products of three such numbers and their rounding errors are doubles: their
- * lowest bit is at most 3 (250 + 52) below 1. */
-static bool is_default(const double t[3][3])
+/* Returns true if products of three of these numbers and their rounding errors are doubles: the
+ * lowest bit of a product is at least 2^(-3 (250 + 52)). */
+static bool has_exact_products(const double t[3][3])
 {
-    bool standard = true;
+    bool by_doubles = true;
     for (int i = 0; i < 9; i++) {
         double x = fabs(t[i / 3][i % 3]);
-        standard &= x == 0 || (x >= 0x1p-250 && x <= 0x1p250);
+        by_doubles &= x == 0 || (x >= 0x1p-250 && x <= 0x1p250);
     }
-    return standard;
+    return by_doubles;
 }
 
-/* Adds x y z, exactly. */
+/* Adds the product x y z, exactly. */
 static void add_product(ebpo_sum *s, double x, double y, double z)
 {
     double product[2], all[4];
@@ -71,7 +71,7 @@ static void add_product(ebpo_sum *s, double x, double y, double z)
         ebpo_sum_add(s, all[i]);
 }
 
-static void add_default(ebpo_sum *s, const double t[3][3], int times)
+static void add_by_doubles(ebpo_sum *s, const double t[3][3], int times)
 {
     for (int k = 0; k < 3; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
@@ -101,22 +101,23 @@ static void add_other(mpz_t sum, const double t[3][3], int times)
     mpz_clear(volume);
 }
 
-/* Adds the face t, counter-clockwise seen from outside; times: 1 or -1. Corners must be finite. */
+/* Adds the volume below the face t, whose corners are counter-clockwise seen from outside and
+ * finite; times: 1 or -1. */
 static void volume_sum_add(volume_sum *s, const double t[3][3], int times)
 {
-    if (is_default(t))
-        add_default(&s->standard, t, times);
+    if (has_exact_products(t))
+        add_by_doubles(&s->by_doubles, t, times);
     else
         add_other(s->other, t, times);
 }
 
 static void volume_sum_merge(volume_sum *s, const volume_sum *more)
 {
-    ebpo_sum_merge(&s->standard, &more->standard);
+    ebpo_sum_merge(&s->by_doubles, &more->by_doubles);
     mpz_add(s->other, s->other, more->other);
 }
 
-/* Converts the limbs to units of 2^-1074. */
+/* Converts the accumulator to an integer in units of 2^-1074. */
 static void to_integer(mpz_t out, const ebpo_sum *sum)
 {
     ebpo_sum s = *sum;
@@ -131,14 +132,15 @@ static void to_integer(mpz_t out, const ebpo_sum *sum)
     }
 }
 
-/* Returns the double nearest to the volume, ties to even; infinite beyond doubles. Sets *scaled to
- * the volume in units of 2^*exponent, in which it is about 1, rounded likewise. */
+/* Returns the double nearest to the volume, ties to even; infinite beyond the range of doubles.
+ * Sets *scaled, about 1, and *exponent, so that the volume is *scaled * 2^*exponent, rounded
+ * likewise. */
 static double volume_sum_value(const volume_sum *s, double *scaled, int64_t *exponent)
 {
     mpz_t all, six;
     mpz_init(all);
     mpz_init_set_ui(six, 6);
-    to_integer(all, &s->standard);
+    to_integer(all, &s->by_doubles);
     mpz_mul_2exp(all, all, -1074 - EBPO_VOLUME_UNIT);
     mpz_add(all, all, s->other);
     double value = ebpo_round_quotient(all, six, EBPO_VOLUME_UNIT);
@@ -159,13 +161,14 @@ typedef struct measuring {
     const ebpo_boolean *b;
     ebpo_volume_options options;
     ebpo_exact_volume *out;
-    uint64_t first;                           /* queried operands, a bit for each, and */
-    uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]; /* for each of these: the operands that are equal to
+    uint64_t first;                           /* first operands of each group of equal ones, a bit
+                                               * for each */
+    uint64_t same[EBPO_BOOLEAN_OPERANDS_MAX]; /* for each of these, the operands that are equal to
                                                * it */
     volume_sum *sum;                          /* [threads] */
 } measuring;
 
-static bool is_queried(const measuring *m, uint32_t i) { return m->first >> i & 1; }
+static bool is_first(const measuring *m, uint32_t i) { return m->first >> i & 1; }
 
 /* --- operands of the expression --- */
 
@@ -182,7 +185,7 @@ static void find_equal(measuring *m)
         uint32_t k = 0;
         if (!(used >> i & 1))
             continue;
-        while (k < i && !(is_queried(m, k) && equal_operands(m->b, k, i)))
+        while (k < i && !(is_first(m, k) && equal_operands(m->b, k, i)))
             k++;
         m->first |= UINT64_C(1) << k;
         m->same[k] |= UINT64_C(1) << i;
@@ -216,9 +219,9 @@ static void check_models(measuring *m)
 {
     for (uint32_t i = 0; i < m->b->count && !m->out->doubt; i++) {
         const ebpo_model *model = m->b->solid[i].model;
-        if (is_queried(m, i) && model->info->pruned)
+        if (is_first(m, i) && model->info->pruned)
             note_doubt(m, EBPO_VOLUME_SUBSET, i, i);
-        else if (is_queried(m, i) && !model->whole)
+        else if (is_first(m, i) && !model->whole)
             note_doubt(m, EBPO_VOLUME_IN_PARTS, i, i);
     }
 }
@@ -272,7 +275,7 @@ static ebpo_status check_pairs(measuring *m, ebpo_error *error)
     ebpo_status status = EBPO_OK;
     for (uint32_t i = 0; i < m->b->count && status == EBPO_OK; i++)
         for (uint32_t k = i + 1; k < m->b->count && status == EBPO_OK && !m->out->doubt; k++)
-            if (is_queried(m, i) && is_queried(m, k))
+            if (is_first(m, i) && is_first(m, k))
                 status = check_pair(m, i, k, error);
     return status;
 }
@@ -283,10 +286,11 @@ typedef struct operand {
     measuring *m;
     uint32_t number;
     const ebpo_posed_solid *solid;
-    uint32_t *slots, *patch; /* for each face, by its number in the file */
-    uint32_t *head;          /* first faces of the patches, */
+    uint32_t *slots, *patch; /* for each face, by its number in the file: its slot, and the first
+                              * face of its patch */
+    uint32_t *head;          /* first faces of the patches */
     uint64_t heads;
-    int8_t *times; /* how often faces of the patch that begins with this one count: -1, 0, 1 */
+    int8_t *times; /* for each patch, by its first face: how often its faces count: -1, 0 or 1 */
 } operand;
 
 static void pose_face(const operand *o, uint64_t face, double t[3][3])
@@ -306,7 +310,7 @@ static bool take_self(void *user, const ebpo_face_pair *pairs, uint64_t count)
     const operand *o = user;
     for (uint64_t i = 0; i < count && !o->m->out->doubt; i++) {
         if (!has_area(o, pairs[i].file_face_a) || !has_area(o, pairs[i].file_face_b))
-            continue; /* no bound of the result */
+            continue; /* the patch does not bound the result */
         note_doubt(o->m, EBPO_VOLUME_FACES_INTERSECT, o->number, o->number);
         name_faces(o->m->out, &pairs[i]);
     }
@@ -327,7 +331,8 @@ static ebpo_status check_self(operand *o, ebpo_error *error)
 
 /* --- patches that bound the result --- */
 
-/* Computes the winding number in the middle of the face, which no other face intersects. */
+/* Computes the operand's winding number in the middle of the face, which no other face intersects.
+ */
 static ebpo_status own_winding(const operand *o, ebpo_context *context, const double t[3][3],
                                int32_t *winding, ebpo_error *error)
 {
@@ -347,7 +352,7 @@ static ebpo_status own_winding(const operand *o, ebpo_context *context, const do
     return status;
 }
 
-/* Computes the winding number on the side where the normal points. */
+/* Computes the winding number on the side to which the normal points. */
 static ebpo_status winding_in_front(const operand *o, unsigned worker, const double t[3][3],
                                     int32_t *front, ebpo_error *error)
 {
@@ -360,7 +365,7 @@ static ebpo_status winding_in_front(const operand *o, unsigned worker, const dou
     return status;
 }
 
-/* Finds other operands that contain the face, as bits. */
+/* Finds the other operands that contain the face, a bit for each. */
 static ebpo_status find_around(const operand *o, unsigned worker, const double w[3], uint64_t *in,
                                ebpo_error *error)
 {
@@ -370,7 +375,7 @@ static ebpo_status find_around(const operand *o, unsigned worker, const double w
     for (uint32_t i = 0; i < m->b->count && status == EBPO_OK; i++) {
         ebpo_posed_sides sides;
         const ebpo_posed_solid *solid = &m->b->solid[i];
-        if (i == o->number || !is_queried(m, i))
+        if (i == o->number || !is_first(m, i))
             continue;
         status =
             ebpo_posed_solid_sides(solid, ebpo_boolean_context(m->b, worker, i), w, &sides, error);
@@ -485,7 +490,7 @@ static ebpo_status add_operands(measuring *m, ebpo_error *error)
         volume_sum_begin(&m->sum[i]);
     for (uint32_t i = 0; i < m->b->count && status == EBPO_OK && !m->out->doubt; i++) {
         ebpo_error cause = EBPO_ERROR_INIT;
-        if (is_queried(m, i) && add_operand(m, i, &cause) != EBPO_OK)
+        if (is_first(m, i) && add_operand(m, i, &cause) != EBPO_OK)
             status = ebpo_fail_operand(m->b->solid[i].model, i, &cause, error);
     }
     for (unsigned i = 1; i < threads; i++)

@@ -1,10 +1,11 @@
-/* Cells of an octree of the world; decides if the result of a boolean expression is the same in all
- * of a cell.
+/* Cells of an octree of the world; decides if the result of a boolean expression is the same in a
+ * whole cell.
  *
- * For each operand the ball around the cell is brought into the model. The box, then the white and
- * black nodes of the model's tree, then the nearest face decide if the cell is inside, outside, or
- * may contain a face. A cell keeps the state of the operands, so that its children need not query
- * them again. The root is a power of two in size, so corners and centres are exact. */
+ * For each operand the ball around the cell is transformed into the model's coordinates. The
+ * model's box, then the white and black nodes of its tree, then the nearest face decide if the cell
+ * is inside, outside, or may contain a face. A cell keeps the states of the operands, so that its
+ * children need not query them again. The size of the root is a power of two, so corners and
+ * centres are exact. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -15,8 +16,9 @@
 #include "query/query_node.h"
 
 enum {
-    SEEN_FACES = 4, /* beside EBPO_MAY_IN and EBPO_MAY_OUT: perhaps faces */
-    NODES_MAX = 64  /* visited for a black and a white one once faces are seen */
+    SEEN_FACES = 4, /* in addition to EBPO_MAY_IN and EBPO_MAY_OUT: there may be faces */
+    NODES_MAX = 64  /* maximum number of nodes that are visited to find a black and a white one,
+                     * once faces may be in the ball */
 };
 
 typedef struct ball {
@@ -29,8 +31,8 @@ typedef struct ball {
     unsigned nodes;
 } ball;
 
-/* Returns the squared distance of the cell, with a relative error of 2^-50 unless it is almost 0.
- */
+/* Returns the squared distance of the cell from the ball's centre, with a relative error of 2^-50
+ * unless it is almost 0. */
 static double square_to(const ball *b, ebpo_cell cell)
 {
     double low[3], high[3], sum = 0;
@@ -63,8 +65,9 @@ static void inspect_node(ball *b, const ebpo_node *node)
     }
 }
 
-/* Returns EBPO_MAY_IN or EBPO_MAY_OUT if no face is in the ball, EBPO_MAY_BOTH if one is, 0 if
- * unknown. The result equals the faces' result, so it does not depend on what is in memory. */
+/* Decides the ball by nodes. Returns EBPO_MAY_IN or EBPO_MAY_OUT if no face is in the ball,
+ * EBPO_MAY_BOTH if a face is, 0 if that is unknown. A test of the faces would give the same result,
+ * so the result does not depend on what is in memory. */
 static unsigned decide_by_nodes(const ebpo_model *model, const double p[3], double radius)
 {
     ball b = { .model = model,
@@ -75,7 +78,7 @@ static unsigned decide_by_nodes(const ebpo_model *model, const double p[3], doub
     double low[3], high[3];
     ebpo_node root = ebpo_model_root(model);
     ebpo_cell_bounds(&b.box, root.cell, low, high);
-    for (int k = 0; k < 3; k++) { /* beyond the root cell everything is out */
+    for (int k = 0; k < 3; k++) { /* everything outside the root cell is out */
         double beyond = radius - fmin(p[k] - low[k], high[k] - p[k]);
         if (!(beyond < -0x1p-48 * radius))
             b.seen |= EBPO_MAY_OUT;
@@ -83,7 +86,7 @@ static unsigned decide_by_nodes(const ebpo_model *model, const double p[3], doub
             b.sure |= EBPO_MAY_OUT;
     }
     inspect_node(&b, &root);
-    if (b.sure == EBPO_MAY_BOTH) /* between a black and a white point there is a face */
+    if (b.sure == EBPO_MAY_BOTH) /* there is a face between a black and a white point */
         return EBPO_MAY_BOTH;
     return b.seen == EBPO_MAY_IN || b.seen == EBPO_MAY_OUT ? b.seen : 0;
 }
@@ -107,9 +110,10 @@ static ebpo_status inspect_faces(ebpo_context *context, const double p[3], doubl
     return status;
 }
 
-/* Decides an axis-parallel cube, given by its centre and half its edge. *may: EBPO_MAY_IN when all
- * of the closed cube is inside the solid, EBPO_MAY_OUT when all of it is outside, on posed
- * coordinates; EBPO_MAY_BOTH when a face may be within half the cube's diagonal of its centre. */
+/* Decides an axis-parallel cube, given by its centre and half its edge, for posed coordinates.
+ * *may: EBPO_MAY_IN when the whole closed cube is inside the solid, EBPO_MAY_OUT when it is
+ * outside, EBPO_MAY_BOTH when a face may be within half the cube's diagonal of its centre. *way:
+ * the stage that has decided. */
 static ebpo_status solid_in_cube(const ebpo_posed_solid *s, ebpo_context *context,
                                  const double centre[3], double half, unsigned *may, unsigned *way,
                                  ebpo_error *error)
@@ -130,7 +134,7 @@ static ebpo_status solid_in_cube(const ebpo_posed_solid *s, ebpo_context *contex
     return inspect_faces(context, p, radius, may, error);
 }
 
-/* Beyond 2^+-this, volumes of cells would leave the range of doubles. */
+/* If the edge is beyond 2^+- this exponent, volumes of cells leave the range of doubles. */
 enum { MAX_POWER = 300 };
 
 static ebpo_status fail_place(const double box[6], int level, ebpo_error *error)
@@ -162,7 +166,8 @@ ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, e
     if (box[0] > box[3])
         return EBPO_OK;
     double most = fmax(box[3] - box[0], fmax(box[4] - box[1], box[5] - box[2]));
-    frexp(1.07 * most, &power); /* 16 / 15 and its rounding: the origin is on a grid of 1 / 16 */
+    frexp(1.07 * most, &power); /* factor 16 / 15 with its rounding: the origin is on a grid of 1 /
+                                 * 16 of the edge */
     if (most == 0 || power < -MAX_POWER || power > MAX_POWER)
         return fail_range(most, error);
     out->edge = ldexp(1, power);

@@ -6,12 +6,12 @@
 #include "extras/collide/posed_solid.h"
 #include "geometry/cells.h"
 
-/* Stages that can decide. */
+/* Stages of the decision. */
 enum { EBPO_CUBE_BY_BOX, EBPO_CUBE_BY_NODES, EBPO_CUBE_BY_FACES, EBPO_CUBE_WAYS };
 
-/* The root: corners and centres of cells down to `level` are exact. */
+/* The root of the octree: corners and centres of cells down to `level` are exact. */
 typedef struct ebpo_world {
-    double origin[3], edge; /* a power of two; 0: empty */
+    double origin[3], edge; /* edge: a power of two; 0: the world is empty */
     int level;
 } ebpo_world;
 
@@ -21,7 +21,7 @@ EBPO_MUST_USE ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b
 
 typedef struct ebpo_world_cell {
     ebpo_cell cell;
-    uint64_t known, in; /* operands, as for ebpo_expression_value */
+    uint64_t known, in; /* states of operands, as for ebpo_expression_value */
 } ebpo_world_cell;
 
 static inline double ebpo_world_edge(const ebpo_world *w, int level)
@@ -39,8 +39,8 @@ static inline ebpo_world_cell ebpo_world_child(const ebpo_world_cell *c, unsigne
     return (ebpo_world_cell){ ebpo_cell_child(c->cell, octant), c->known, c->in };
 }
 
-/* Queries the operands whose state the cell does not know yet, until the expression is decided:
- * *may. Adds to ways[EBPO_CUBE_WAYS]. */
+/* Queries the operands whose state in the cell is not known yet, until the expression is decided.
+ * *may: possible states of the result. Counts the deciding stages in ways[EBPO_CUBE_WAYS]. */
 EBPO_MUST_USE ebpo_status ebpo_world_cell_query(const ebpo_boolean *b, unsigned worker,
                                                 const ebpo_world *w, ebpo_world_cell *c,
                                                 unsigned *may, uint8_t *ways, ebpo_error *error);

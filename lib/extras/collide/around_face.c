@@ -1,6 +1,6 @@
 /* Finds what is on either side of a posed face of two models. The face is cut into pieces along the
- * faces of both models that intersect it (face_pieces.h). For a point of each piece, the winding
- * numbers of both models give the sides on which each model is.
+ * faces of both models that intersect it (face_pieces.h). At a point of each piece, the winding
+ * numbers of both models give the sides of the piece that are in each model.
  *
  * All decisions are exact: points are fractions, and posed coordinates are the doubles that
  * geometry/pose.h defines. Only the faces near a point are looked up in the models' hierarchies, so
@@ -78,7 +78,7 @@ typedef struct cutting {
     ebpo_face_cuts *pieces;
     double low[3], high[3]; /* box of the face */
     int model;              /* model whose faces are visited */
-    uint64_t own;           /* number of the face itself, or EBPO_NO_FACE */
+    uint64_t own;           /* number of the cut face, which does not cut itself; or EBPO_NO_FACE */
 } cutting;
 
 static bool near_box(const cutting *c, const double t[3][3])
@@ -136,7 +136,8 @@ typedef struct looking {
     bool only_at_target;
 } looking;
 
-/* Returns true if the normal points to x + (d0, d1, d2). */
+/* Returns true if the normal points towards x + (d0, d1, d2), the shifted point of
+ * ebpo_exact_winding. */
 static bool shift_is_front(const ebpo_face_cuts *f)
 {
     int sign = 0;
@@ -176,7 +177,8 @@ static ebpo_status look_around_piece(void *user, const ebpo_piece *piece, ebpo_e
     return status;
 }
 
-/* `look` alone returns EBPO_E_CANCELLED; it means that enough was found. */
+/* Visits the pieces. look_around_piece returns EBPO_E_CANCELLED when the visitor has found enough;
+ * that is no failure. */
 static ebpo_status visit_pieces(looking *l, ebpo_face_cuts *pieces, ebpo_error *error)
 {
     ebpo_status status = ebpo_face_pieces_visit(pieces, look_around_piece, l, error);
@@ -233,7 +235,7 @@ static ebpo_status find_faces(ebpo_two_models *two, int m, const mpq_t x[3], fac
 typedef struct querying {
     ebpo_two_models *two;
     int m;
-    bool in; /* the model is on a side of a piece at the point */
+    bool in; /* near the point, the model is on a side of some piece */
     bool on; /* a face with an area contains the point */
 } querying;
 
@@ -264,7 +266,7 @@ static ebpo_status query_face(querying *a, uint64_t face, const mpq_t x[3], ebpo
     return status == EBPO_OK && !a->in ? visit_pieces(&l, &two->others, error) : status;
 }
 
-/* Sets whether model m, as a closed set, contains the point. */
+/* Finds if model m, as a closed set, contains the point. */
 static ebpo_status has_point(ebpo_two_models *two, int m, const mpq_t x[3], bool *has,
                              ebpo_error *error)
 {

@@ -1,10 +1,10 @@
-/* Computes how deep the surface of one model is in the solid of another: the greatest distance of a
- * point of the surface inside the solid to the boundary of the solid.
+/* Computes how deep the surface of one model is in the solid of another: the greatest distance from
+ * a point of the surface inside the solid to the boundary of the solid.
  *
- * A branch-and-bound search goes through the cells of the surface's octree, then through faces and
- * parts of faces. Each is enclosed in a ball; the distance at its centre bounds the depth of its
- * points. A heap gives the part that may be deepest. The search ends when no part can be deeper
- * than the best point and the tolerance, or at the deadline; lo and hi then bound the depth. The
+ * A branch-and-bound search visits the cells of the surface's octree, then faces and parts of
+ * faces. Each of these is enclosed in a ball; the distance at the ball's centre bounds the depth of
+ * its points. A heap gives the part that may be deepest. The search ends when no part can be deeper
+ * than the best point plus the tolerance, or at the deadline; lo and hi then bound the depth. The
  * steps do not depend on what is in memory. Bounds: docs/develop/collision.md, "Depth". One thread.
  */
 #include "core/strict_fp.h"
@@ -40,34 +40,34 @@ typedef struct depth_search {
     /* Input: */
     ebpo_context *from; /* context of the surface's model */
     const ebpo_posing *posing;
-    double reach; /* greatest size of its posed coordinates */
+    double reach; /* greatest size of the surface's posed coordinates */
     const ebpo_posed_solid *solid;
     ebpo_context *context; /* separate context of the solid's model */
     double tolerance;
-    uint64_t late; /* deadline by ebpo_clock; UINT64_MAX: none */
+    uint64_t late; /* deadline, a time of ebpo_clock; UINT64_MAX: none */
     const ebpo_progress *progress;
     /* Output: lo <= depth <= hi. */
     double lo, hi;
     /* Initially 0: */
-    double left, lost; /* greatest `most` of the omitted parts; bound of how far rounding moves
+    double left, lost; /* greatest `most` of the dropped parts; bound of how far rounding moves
                         * points */
     depth_part *part;  /* a heap, the greatest first */
     uint64_t count, capacity, queried;
 } depth_search;
 
-/* All of a piece of the surface is within `radius` of a point. One of its points is certainly
- * within `far`; INFINITY if that is not known. */
+/* A ball that contains a part of the surface: all points of the part are within `radius` of the
+ * centre. One of the points is certainly within `far`; INFINITY if that is not known. */
 typedef struct depth_ball {
     double radius, far;
-    /* Output: true if the ball still matters, and a bound of its depth. */
+    /* Output: true if the part still matters, and a bound of its depth. */
     bool open;
     double most;
 } depth_ball;
 
 /* --- one point --- */
 
-/* Bounds the depth in the solid by *lo .. *hi; it is negative outside. rounding: how far the point
- * may be from its exact position. */
+/* Bounds the depth of the point in the solid by *lo .. *hi; the depth is negative outside.
+ * rounding: how far the point may be from its exact position. */
 static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, double *hi,
                             double *rounding, ebpo_error *error)
 {
@@ -82,7 +82,7 @@ static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, doub
     double size = fabs(r.distance), off = 2 * doubt + 0x1p-50 * size;
     *hi = (size + off) * scale;
     *lo = -*hi;
-    if (!(size > off)) /* a face may be on either side of the point */
+    if (!(size > off)) /* the rounded point may be on either side of a face */
         return EBPO_OK;
     if (r.distance < 0)
         *lo = (size - off) * scale;
@@ -91,8 +91,9 @@ static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, doub
     return EBPO_OK;
 }
 
-/* No point of the triangle in the solid is deeper than its distance from the face that was nearest
- * to the last queried point. That distance is convex, so the corners bound it. */
+/* Bounds the depth of a triangle by one face: the face that was nearest to the last query point. No
+ * point of the triangle inside the solid is deeper than its distance from that face. The distance
+ * is convex, so its values at the corners bound it. */
 static double max_at_corners(const depth_search *s, const double corner[3][3])
 {
     double most = 0, p[3], doubt;
@@ -126,8 +127,8 @@ static bool is_search_late(const depth_search *s)
     return s->late != UINT64_MAX && ebpo_clock() >= s->late;
 }
 
-/* A doubt that rounding alone causes is no reason to divide: parts of faces that lie on other faces
- * would be divided forever. */
+/* Returns true if the part is not to be divided. A doubt that only rounding causes is no reason to
+ * divide: parts of faces that lie on other faces would be divided forever. */
 static bool is_enough(depth_search *s, double most, double rounding)
 {
     if (most > s->lo + s->tolerance + 4 * (rounding + s->lost))
@@ -157,7 +158,8 @@ static ebpo_status query_ball(depth_search *s, const double middle[3], depth_bal
     return EBPO_OK;
 }
 
-/* Offers a part that is within `radius` of the centre, one of its points. */
+/* Adds a part to the heap if it may matter. All its points are within `radius` of the centre, which
+ * is one of them. */
 static ebpo_status offer_part(depth_search *s, depth_part *part, const double centre[3],
                               double radius, ebpo_error *error)
 {
@@ -201,14 +203,14 @@ static ebpo_status offer_face(depth_search *s, const double corner[3][3], ebpo_e
     return offer_triangle(s, corner[0], corner[1], corner[2], error);
 }
 
-/* Computes the middle of corner k and the next one. */
+/* Computes the middle between corner k and the next one. */
 static void middle_of(const depth_part *p, int k, double out[3])
 {
     for (int i = 0; i < 3; i++)
         out[i] = p->corner[k][i] + (p->corner[(k + 1) % 3][i] - p->corner[k][i]) / 2;
 }
 
-/* Halves the triangle by the middle of edge k. */
+/* Splits the triangle in two at the middle of edge k. */
 static ebpo_status halve_triangle(depth_search *s, const depth_part *p, int k, ebpo_error *error)
 {
     double middle[3];
@@ -219,8 +221,9 @@ static ebpo_status halve_triangle(depth_search *s, const depth_part *p, int k, e
                              : status;
 }
 
-/* Divides the triangle into four by the middles of its edges. Halves a long one: its quarters would
- * lie side by side, and their number would grow without limit near another face. */
+/* Divides the triangle into four at the middles of its edges. A long triangle is halved instead:
+ * its quarters would lie side by side, and their number would grow without limit near another face.
+ */
 static ebpo_status divide_triangle(depth_search *s, const depth_part *p, ebpo_error *error)
 {
     double middle[3][3], length[3];
@@ -240,13 +243,13 @@ static ebpo_status divide_triangle(depth_search *s, const depth_part *p, ebpo_er
     return status;
 }
 
-/* Returns true if no waiting part is deeper than the known depth and the tolerance. */
+/* Returns true if no waiting part is deeper than the known depth plus the tolerance. */
 static bool is_search_done(const depth_search *s)
 {
     return s->count == 0 || !(s->part[0].most > s->lo + s->tolerance);
 }
 
-/* Divides the part that may be deepest; it is not yet decided. */
+/* Takes the part that may be deepest from the heap, and divides it. */
 static ebpo_status divide_next(depth_search *s, ebpo_error *error)
 {
     depth_part part = heap_take(s->part, s->count--);
@@ -273,13 +276,13 @@ typedef struct listed_face {
 typedef struct going_down {
     depth_search *s;
     ebpo_posed_subtrees at; /* the pose of the surface */
-    open_cell *open, *next; /* cells of a level, and of the level below it */
+    open_cell *open, *next; /* cells of the current level, and of the level below it */
     uint64_t open_count, open_capacity, next_count, next_capacity;
     listed_face *face; /* faces of leaves, waiting to be offered */
     uint64_t face_count, face_capacity;
 } going_down;
 
-/* Least number of faces that wait. */
+/* Waiting faces are offered when there are at least this many. */
 enum { FACES_AT_ONCE = 16384 };
 
 /* --- faces --- */
@@ -413,7 +416,7 @@ static void swap_levels(going_down *g)
     g->next_capacity = capacity;
 }
 
-/* Offers all faces that may matter; they then wait. Fails as run_depth_search. */
+/* Visits the cells and offers all faces that may matter to the heap. Fails as run_depth_search. */
 static ebpo_status offer_cells(depth_search *s, ebpo_error *error)
 {
     going_down g = { .s = s, .at = { .model = s->from->model, .posing = *s->posing } };
@@ -454,7 +457,7 @@ static ebpo_status run_depth_search(depth_search *s, ebpo_error *error)
 
 /* --- the query --- */
 
-/* Computes the depth in the caller's model `solid` (0: A) of the other one's surface. */
+/* Computes how deep the surface of one model is in the other, the caller's model `solid` (0: A). */
 static ebpo_status depth_in(const ebpo_collision *q, int solid, double tolerance, ebpo_certain *out,
                             ebpo_error *error)
 {

@@ -1,13 +1,13 @@
 /* Computes the distance of two models at poses, and a pair of faces at that distance.
  *
- * The kernels of gap_walk_kernels.c walk through pairs of nodes in floats and drop what is
- * certainly farther than the limit. The remaining pairs wait and are decided here: in doubles with
- * error bounds (ebpo_triangles_distance_bounds), and exactly where the bounds overlap. Of pairs at
- * the same distance the first in file order wins, so the result is the same with every processor
- * and number of threads.
+ * The kernels of gap_walk_kernels.c walk through pairs of nodes in floats and drop pairs that are
+ * certainly farther apart than the limit. The remaining pairs wait and are decided here: in doubles
+ * with error bounds (ebpo_triangles_distance_bounds), and exactly where the bounds overlap. Of
+ * pairs at the same distance the first in file order is returned, so the result is the same with
+ * every processor and number of threads.
  *
  * Models in parts are searched in pairs of subtrees, the smallest gap of envelopes first; a subtree
- * is loaded only if its envelope is nearer than the best pair so far. A collider remembers its last
+ * is loaded only if its envelope is nearer than the best pair so far. A collider keeps its last
  * pair, from which the next search begins. Bounds: docs/develop/collision.md. */
 #include "core/strict_fp.h"
 
@@ -27,27 +27,27 @@
 #include "extras/collide/subtree_search.h"
 #include "geometry/triangle_pair.h"
 
-/* Two faces, as in their files and at their poses. */
+/* Two faces, with coordinates as in their files (`own`) and at their poses (`corner`). */
 typedef struct ebpo_face_two {
     uint64_t file[2], source[2]; /* face numbers in the file and in the source */
     double own[2][3][3], corner[2][3][3];
     ebpo_pair_distance_bounds bounds;
 } ebpo_face_two;
 
-/* Search for the nearest pair of one pair of accels, or of several in sequence. */
+/* Search for the nearest pair of faces of two accels, or of several pairs of accels in sequence. */
 typedef struct nearest_pair {
     /* Input: */
     double tolerance; /* 0: exact */
-    double at_least;  /* NAN: not queried */
-    uint64_t late;    /* deadline by ebpo_clock; UINT64_MAX: none */
+    double at_least;  /* compare the distance with this value; NAN: do not compare */
+    uint64_t late;    /* deadline, a time of ebpo_clock; UINT64_MAX: none */
     const ebpo_progress *progress;
     /* Output: lo <= distance <= hi, equal if the result is exact. */
     double lo, hi;
     bool found;
-    bool meets;      /* `best` intersects, and is not the least such pair */
-    int is_at_least; /* 1, 0; -1: not queried, or undecided */
+    bool meets;      /* the faces of `best` intersect; a pair that is first may exist */
+    int is_at_least; /* 1: yes, 0: no, -1: no comparison wanted, or undecided */
     ebpo_face_two best;
-    bool ended; /* ended early: all that was not visited is at least this far away: */
+    bool ended; /* the search ended early: everything not visited is at least this far apart */
     double left;
     ebpo_error *error; /* error of `status` during the search */
     ebpo_status status;
@@ -105,8 +105,9 @@ static float to_unit(const ebpo_gap_search *g, double distance)
     return (float)(distance * g->posing[0].unit * (1 + 0x1p-22)) + 0x1p-100f;
 }
 
-/* Compares a pair that is apart with `at_least`. Returns false if that decides. */
-static bool compare_to_queried(nearest_pair *n, const ebpo_face_two *f)
+/* Compares the distance of two disjoint faces with `at_least`. Returns false if that decides the
+ * comparison. */
+static bool compare_with_at_least(nearest_pair *n, const ebpo_face_two *f)
 {
     if (!(f->bounds.lo < n->at_least) ||
         (!(f->bounds.hi < n->at_least) &&
@@ -118,9 +119,9 @@ static bool compare_to_queried(nearest_pair *n, const ebpo_face_two *f)
     return false;
 }
 
-/* With a tolerance only the least bounds are kept. For a gap that is tiny beside its faces, the
- * bounds are too wide, because doubles hardly give its direction; then the exact distance is
- * rounded. */
+/* With a tolerance, keeps only the least bounds. When a gap is tiny compared with its faces, the
+ * bounds are too wide, because doubles hardly give the direction of the gap; then the exact
+ * distance is rounded. */
 static void take_within_tolerance(nearest_pair *n, const ebpo_face_two *given)
 {
     ebpo_face_two f = *given;
@@ -146,7 +147,7 @@ static bool consider_faces(nearest_pair *n, const ebpo_face_two *f)
         return false;
     }
     if (!isnan(n->at_least))
-        return compare_to_queried(n, f);
+        return compare_with_at_least(n, f);
     if (n->tolerance > 0)
         take_within_tolerance(n, f);
     else if (!n->found || is_nearer(f, &n->best)) {
@@ -184,8 +185,8 @@ static double least_waiting(const ebpo_gap_search *g, unsigned first)
     return fmax(least / g->posing[0].unit * (1 - 0x1p-20), 0);
 }
 
-/* Decides the waiting pairs. Many may be at nearly the same distance where models have flat parts.
- */
+/* Decides the waiting pairs. Many pairs may be at nearly the same distance where models have flat
+ * parts. */
 static bool judge_waiting(ebpo_gap_search *g)
 {
     nearest_pair *n = g->user;
@@ -202,7 +203,7 @@ static bool judge_waiting(ebpo_gap_search *g)
 
 /* --- the result --- */
 
-/* Returns a lower bound for what has not been visited. */
+/* Returns a lower bound for the pairs that have not been visited. */
 static double left_over(const ebpo_gap_search *g)
 {
     double least = INFINITY;
@@ -283,7 +284,7 @@ static void nearest_pair_found(nearest_pair *n, const ebpo_gap_search *g, const 
     n->found = n->meets = true;
 }
 
-/* Returns the distance beyond which nothing matters any more. */
+/* Returns the distance beyond which pairs do not matter any more. */
 static double nearest_pair_limit(const nearest_pair *n)
 {
     if (!isnan(n->at_least))
@@ -291,7 +292,7 @@ static double nearest_pair_limit(const nearest_pair *n)
     return n->found ? n->best.bounds.hi - n->tolerance : INFINITY;
 }
 
-/* Returns true if nothing remains to be found. */
+/* Returns true if further pairs cannot change the result. */
 static bool nearest_pair_is_done(const nearest_pair *n)
 {
     return n->meets || n->is_at_least >= 0 || n->ended || n->status != EBPO_OK;
@@ -309,7 +310,8 @@ static void begin_search(const nearest_pair *n, ebpo_gap_search *g)
     }
 }
 
-/* Decides the waiting pairs, and an undecided pair whose bound is less than `before`. */
+/* Decides the waiting pairs, and also the known pair if it is undecided and its bound is less than
+ * `before`. */
 static void judge_rest(ebpo_gap_search *g, nearest_pair *n, float before)
 {
     if (nearest_pair_is_done(n) || !judge_waiting(g) || n->meets || !isnan(n->at_least))
@@ -342,13 +344,13 @@ static const char stage[] = "distance";
 typedef struct searching {
     ebpo_subtree_search subtrees;
     nearest_pair *n;
-    double hi; /* upper bound of the distance by the cells */
+    double hi; /* upper bound of the distance, from the cells */
 } searching;
 
 /* --- two accels --- */
 
-/* Continues `n` in two more accels of the query's models. `may_intersect`: searches for the first
- * contact before, as bounds are weak where faces intersect. */
+/* Continues `n` in two more accels of the query's models. `may_intersect`: first searches for a
+ * contact, as bounds are weak where faces intersect. */
 static ebpo_status distance_of_accels(const ebpo_collision *q, const ebpo_accel *const accel[2],
                                       bool may_intersect, nearest_pair *n, ebpo_error *error)
 {
@@ -394,7 +396,7 @@ static ebpo_status add_node_pair(searching *s, const ebpo_posed_node node[2], do
         if (ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_UNIFORM)
             return EBPO_OK;
     ebpo_status status = ebpo_node_gap_of(nodes, node, &pair.gap, error);
-    pair.gap = fmax(pair.gap, gap); /* the gap of the nodes above is a bound, too */
+    pair.gap = fmax(pair.gap, gap); /* the gap of their parents is a bound, too */
     if (status != EBPO_OK || pair.gap > fmin(s->hi, nearest_pair_limit(s->n)))
         return status;
     if (!model[0]->info->pruned && !model[1]->info->pruned)
@@ -413,7 +415,8 @@ static ebpo_status divide_pair(searching *s, const ebpo_node_gap *pair, int side
     return status;
 }
 
-/* Pairs come in the order of their gaps: the search ends at the first that is too far away. */
+/* Visits pairs of nodes in the order of their gaps. The search ends at the first pair that is too
+ * far apart. */
 static ebpo_status search_subtrees(searching *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -459,12 +462,13 @@ static ebpo_status check_options(const ebpo_clearance_options *o, ebpo_error *er
 {
     if (!(o->tolerance >= 0 && o->tolerance < INFINITY) || isnan(o->at_least))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the distance's tolerance must be 0 or more and finite, and the queried "
-                         "distance must be a number");
+                         "the tolerance of the distance must be 0 or more and finite, and the "
+                         "distance to compare with must be a number");
     return EBPO_OK;
 }
 
-/* Computes a common point: an end of the common segment, or a point of the nearest features. */
+/* Computes a common point of two faces: an end of the common segment, or a point of the nearest
+ * features. */
 static void clash_point(const ebpo_face_two *f, ebpo_pair_kind kind, double point[2][3])
 {
     ebpo_contact_end end[2];
@@ -529,7 +533,7 @@ static void start_search(const ebpo_collision *q, nearest_pair *n)
         nearest_pair_leave(n, 0);
 }
 
-/* --- the search --- */
+/* --- the search of a query --- */
 
 static bool has_faces(const ebpo_model *m)
 {

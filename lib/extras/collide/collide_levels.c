@@ -1,10 +1,11 @@
 /* Bounds the distance of two models at poses from the levels of their octrees, without their faces,
- * and finds whether both solids certainly have a common point.
+ * and finds if both solids certainly have a common point.
  *
- * Pairs of nodes come by the gaps of their envelopes, the smallest first (subtree_search.h). A gap
- * is a lower bound of the distance. Two nodes with faces give an upper bound. A black cell belongs
- * to its solid as a whole: if it contains a whole cell with faces of the other model, or a point of
- * a black one, both solids have a common point. One thread. */
+ * Pairs of nodes come in the order of the gaps between their envelopes, the smallest first
+ * (subtree_search.h). A gap is a lower bound of the distance. Two nodes with faces give an upper
+ * bound. A black cell belongs to its solid as a whole. So both solids have a common point if a
+ * black cell contains a whole cell with faces of the other model, or a point of a black cell of the
+ * other model. One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,12 +23,13 @@ typedef struct level_search {
     double lo, hi;       /* bounds of the distance of faces */
     uint64_t open_pairs; /* pairs whose faces may intersect */
     bool meets;          /* the solids or faces certainly have a common point */
-    bool may_intersect;  /* a remaining pair may have such a point */
+    bool may_intersect;  /* an undecided pair may have a common point */
 } level_search;
 
 static const char stage[] = "pairs of nodes";
 
-/* Share of a black cell's side, near its cell faces, that is not examined. */
+/* Margin inside a black cell, next to its cell faces, that is not used: as a share of the cell's
+ * side. */
 static const double cell_face_share = 0x1p-14;
 
 /* --- nodes --- */
@@ -72,7 +74,7 @@ static bool is_within(const double corner[8][3], const double p[3], double reach
     return true;
 }
 
-/* Widens a cell by the margin that faces of a node may be outside it. */
+/* Widens a cell by the margin within which faces of its node may be outside the cell. */
 static void widen_cell(double corner[8][3], double share)
 {
     double middle[3];
@@ -83,8 +85,9 @@ static void widen_cell(double corner[8][3], double share)
             corner[c][i] = middle[i] + (corner[c][i] - middle[i]) * (1 + share);
 }
 
-/* Returns true if `solid`, a black node's cell, contains all of the region in which the other node
- * has a face or, if the other node is black too, one of some of its points. */
+/* Returns true if `solid`, a black node's cell, certainly has a common point with the content of
+ * the other node: `solid` contains the whole region in which the other node has a face, or
+ * (`black`: the other node is black, too) one of some points of the other cell. */
 static bool shares_point(const level_search *g, double solid[8][3], double other[8][3], bool black)
 {
     int within = 0;
@@ -124,7 +127,7 @@ static ebpo_status add_node_pair(level_search *g, const ebpo_posed_node node[2],
     if (has[0] == NOTHING || has[1] == NOTHING || (!faces && g->meets))
         return EBPO_OK;
     ebpo_status status = ebpo_node_gap_of(&g->nodes, node, &pair.gap, error);
-    pair.gap = fmax(pair.gap, gap); /* the gap of the nodes above is a bound, too */
+    pair.gap = fmax(pair.gap, gap); /* the gap of their parents is a bound, too */
     if (status != EBPO_OK || pair.gap > g->hi || (!faces && pair.gap > 0))
         return status;
     if (faces)
@@ -181,8 +184,8 @@ static bool is_full(const level_search *g)
            g->current_query->collider->options.memory;
 }
 
-/* Pairs come in the order of their gaps: the search ends after the first closed pair and the pairs
- * that may intersect. */
+/* Visits pairs in the order of their gaps. The search ends after the first pair that is not
+ * divided, and after the pairs that may intersect. */
 static ebpo_status search_levels(level_search *g, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -232,10 +235,10 @@ static int32_t last_level(const ebpo_model *m, int level)
 static void fill_result(const ebpo_collision *q, const level_search *g, ebpo_level_result *out)
 {
     double lo = fmin(g->lo, g->hi);
-    int32_t metric = isinf(lo)                 ? EBPO_VALUE_EXACT
-                     : lo == 0 || isinf(g->hi) ? EBPO_VALUE_BOUND
-                                               : EBPO_VALUE_INTERVAL;
-    out->distance = (ebpo_certain){ lo, g->hi, metric, 0 };
+    int32_t value_kind = isinf(lo)                 ? EBPO_VALUE_EXACT
+                         : lo == 0 || isinf(g->hi) ? EBPO_VALUE_BOUND
+                                                   : EBPO_VALUE_INTERVAL;
+    out->distance = (ebpo_certain){ lo, g->hi, value_kind, 0 };
     out->common = g->meets ? 1 : g->may_intersect ? -1 : 0;
     out->contact = g->open_pairs ? -1 : 0;
     out->open_pairs = g->open_pairs;

@@ -1,11 +1,11 @@
-/* Finds the pairs of faces of two models that intersect: the first contact, or all pairs in one
+/* Finds the pairs of faces of two models that intersect: the first contact, or all pairs in a fixed
  * order.
  *
  * All pairs: the walk through both hierarchies (pair_walk_kernels.c) is expanded to enough pairs of
  * nodes, which threads share. Their results are sorted by the numbers of the first face, then of
  * the second, so the order does not depend on the number of threads. When the collider's memory is
- * too small for all pairs, runs of the first model's faces are searched one after the other.
- * subtree_walk.h handles models in parts. */
+ * too small for all pairs, runs of the first model's faces are searched one after the other. Models
+ * in parts are searched by subtree_walk.h. */
 #include "core/strict_fp.h"
 
 #include <stdatomic.h>
@@ -27,9 +27,9 @@ typedef struct gathering {
     bool self;
     ebpo_node_pair *part; /* pairs of nodes from which threads continue */
     uint64_t parts, part_capacity;
-    ebpo_pair_walk *walk; /* one for each thread */
+    ebpo_pair_walk *walk; /* one walk for each thread */
     unsigned threads;
-    uint64_t most; /* most pairs */
+    uint64_t most; /* maximum number of pairs */
     _Atomic uint64_t found;
     _Atomic bool full; /* there are more than `most` pairs */
     ebpo_found_pair *intersected;
@@ -38,8 +38,8 @@ typedef struct gathering {
 
 /* --- sorting --- */
 
-/* Radix sort from the least digit. The digit size is chosen so that counting digits takes no longer
- * than moving the pairs. */
+/* Radix sort, beginning with the least significant digit. The size of digits is chosen so that
+ * counting digits takes no longer than moving the pairs. */
 enum { LEAST_BITS = 4, MAX_BITS = 11 };
 
 static inline uint32_t digit_of(const ebpo_found_pair *m, bool by_a, unsigned shift, unsigned bits)
@@ -68,12 +68,12 @@ static unsigned bits_for(uint64_t count)
     return bits;
 }
 
-/* Sorts pairs; `spare` has space for as many, and the result is in `intersected`. The numbers are
+/* Sorts pairs. `spare` has space for as many; the result is in `pairs`. Face numbers are
  * below max_a and max_b. */
-static void sort_found_pairs(ebpo_found_pair *intersected, ebpo_found_pair *spare, uint64_t count,
+static void sort_found_pairs(ebpo_found_pair *pairs, ebpo_found_pair *spare, uint64_t count,
                              uint32_t max_a, uint32_t max_b)
 {
-    ebpo_found_pair *from = intersected, *to = spare;
+    ebpo_found_pair *from = pairs, *to = spare;
     unsigned bits = bits_for(count);
     if (count < 2)
         return;
@@ -84,13 +84,13 @@ static void sort_found_pairs(ebpo_found_pair *intersected, ebpo_found_pair *spar
             from = to;
             to = other;
         }
-    if (from != intersected)
-        memcpy(intersected, from, count * sizeof *intersected);
+    if (from != pairs)
+        memcpy(pairs, from, count * sizeof *pairs);
 }
 
 /* --- the first contact --- */
 
-/* Searches for the first contact. The result is -1 when the deadline has passed. */
+/* Searches for the first contact. *found is -1 when the deadline has passed. */
 static ebpo_status search_first(const ebpo_collision *q, ebpo_pair_walk *w, const char *stage,
                                 int32_t *found, ebpo_error *error)
 {
@@ -152,7 +152,8 @@ ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *opt
 
 static const char stage[] = "pairs of faces";
 
-/* Enough for any number of threads. The results do not depend on it, only the balance of work. */
+/* Enough parts for any number of threads. The results do not depend on the number of parts, only
+ * the balance of work does. */
 enum { PARTS = 512, PARTS_EACH = 64 };
 
 static ebpo_status no_memory(const ebpo_pair_walk *w, ebpo_error *error)
@@ -170,7 +171,7 @@ static bool hold_node_pairs(gathering *g, const ebpo_node_pair *pairs, uint64_t 
     return true;
 }
 
-/* Expands the walk by whole generations until there are enough parts or only blocks. */
+/* Divides all pairs of nodes repeatedly, until there are enough parts or only pairs of blocks. */
 static bool make_parts(gathering *g, ebpo_pair_walk *w)
 {
     bool fine = w->kernels->start(w) && hold_node_pairs(g, w->stack, w->top);
@@ -208,8 +209,8 @@ static ebpo_status run_parts(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Takes the collider's walks if they are not in use: a callback that receives pairs may send
- * another query. */
+/* Takes the collider's walks if they are not in use: they are when the callback that receives pairs
+ * sends another query. */
 static bool take_walks(gathering *g)
 {
     ebpo_collider *c = g->current_query->collider;
@@ -263,8 +264,8 @@ static ebpo_status put_together(gathering *g, const ebpo_accel_pair *pair, ebpo_
     return EBPO_OK;
 }
 
-/* Gathers pairs of faces `begin` to `end` of the pair's first accel: fills in `intersected`,
- * sorted, or sets `full`. */
+/* Gathers pairs of faces `begin` to `end` of the pair's first accel. Fills `intersected`, sorted;
+ * or sets `full` if there are too many. */
 static ebpo_status gather_pairs(gathering *g, const ebpo_accel_pair *pair, uint32_t begin,
                                 uint32_t end, ebpo_error *error)
 {
@@ -283,7 +284,7 @@ static ebpo_status gather_pairs(gathering *g, const ebpo_accel_pair *pair, uint3
     return put_together(g, pair, error);
 }
 
-/* Returns walks for the next query; stacks and pairs may have grown. */
+/* Returns the walks to the collider for the next query, which reuses their memory. */
 static void give_walks_back(gathering *g)
 {
     ebpo_collider *c = g->current_query->collider;
@@ -306,7 +307,7 @@ static void gathering_free(gathering *g)
 
 /* --- all pairs --- */
 
-/* State of handing out pairs. */
+/* State of passing pairs to the caller. */
 typedef struct giving {
     const ebpo_collision *current_query;
     const ebpo_accel_pair *pair;
@@ -329,8 +330,8 @@ static void give_pairs(giving *v, const ebpo_found_pair *intersected, uint64_t c
     }
 }
 
-/* Searches runs of faces of the first model. A run is halved until its pairs fit in memory, and
- * doubled after one that fits. A single face may use more memory. */
+/* Searches runs of faces of the first model. A run is halved until its pairs fit in memory; after a
+ * run that fits, the next one is twice as long. A single face may use more memory. */
 static ebpo_status in_runs(giving *v, gathering *g, ebpo_error *error)
 {
     uint32_t faces = v->pair->accel[0]->face_count, run = faces;

@@ -1,13 +1,12 @@
 /* Computes how far one model has to move along a direction until both models have no common point:
  * the last time of contact.
  *
- * A heap holds pairs of nodes, those first that may separate last. Their extents along the
- * direction and along two axes perpendicular to it bound the time of the last contact. Pairs of
+ * A heap holds pairs of nodes, first the pair that may separate last. The nodes' extents along the
+ * direction and along two axes perpendicular to it bound the time of their last contact. Pairs of
  * faces are bounded in doubles (ebpo_sweep_max) and decided exactly (ebpo_sweep_last). Models in
  * parts are searched in pairs of subtrees: a subtree is loaded only if its envelope may separate
  * later than the last contact found. Bounds: docs/develop/collision.md, "Separation distance along
- * a direction". One thread.
- */
+ * a direction". One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -25,12 +24,12 @@
 
 /* A pair of children of nodes, each as the node's number * 8 + lane. */
 typedef struct way_pair {
-    double most; /* bound of the last time with a common point */
+    double most; /* upper bound of the last time at which they have a common point */
     uint32_t a, b;
 } way_pair;
 
-/* One model relative to the direction: its posed frame axes along three perpendicular axes, of
- * which the first is the direction. */
+/* One model relative to the direction: the axes of its posed frame, as components along three
+ * perpendicular axes. The first of these is the direction. */
 typedef struct way_side {
     const ebpo_accel *accel;
     const ebpo_posing *posing;
@@ -40,22 +39,24 @@ typedef struct way_side {
 typedef struct way_search {
     /* Input: */
     const ebpo_collision *current_query;
-    double direction[3]; /* in which the query's first model moves; the greatest component is 1/2 ..
-                          * 1 */
-    /* Output: the last contact in units of that direction, and its pair; none before 0. */
+    double direction[3]; /* direction in which the query's first model moves; the greatest component
+                          * is 1/2 .. 1 */
+    /* Output: the last contact, in units of that direction, and its pair. Contacts before time 0 do
+     * not count. */
     ebpo_sweep_time last;
     ebpo_face_pair pair; /* faces of the caller's A and B */
-    double hi;           /* omitted pairs are certainly not later; negative: none was omitted */
+    double hi;           /* dropped pairs are certainly not later; negative: none was dropped */
     /* Initially 0: */
     way_side side[2];
-    double axis[3][3]; /* perpendicular; the first is the direction */
-    double step, lost; /* direction along the first axis; bound of how far rounding moves extents */
-    double sure;       /* `last` is not earlier */
+    double axis[3][3]; /* three perpendicular axes; the first is the direction */
+    double step, lost; /* component of the direction along the first axis; bound of how far rounding
+                        * moves extents */
+    double sure;       /* `last` is certainly not earlier */
     way_pair *pairs;   /* a heap, the greatest first */
     uint64_t count, capacity, looked;
 } way_search;
 
-/* Extents along the axes of a convex set or its content. */
+/* Extents along the axes of a convex set, or of a set that it contains. */
 typedef struct way_extent {
     double low[3], high[3];
 } way_extent;
@@ -97,8 +98,8 @@ static way_extent extent_of(const way_search *s, int which, uint32_t ref)
     return out;
 }
 
-/* Returns the greatest t at which sets with these extents may have a common point; negative: none.
- */
+/* Returns the greatest t at which sets with these extents may have a common point; negative: there
+ * is none. */
 static double way_max(const way_search *s, const way_extent *a, const way_extent *b)
 {
     for (int i = 1; i < 3; i++)
@@ -210,7 +211,7 @@ static double size_of(const way_extent *e)
     return e->high[0] - e->low[0] + (e->high[1] - e->low[1]) + (e->high[2] - e->low[2]);
 }
 
-/* Pairs all children of one node with one child, or a node's children, of the other model. */
+/* Adds pairs: each child of one node with `other`, a child of the other model's node. */
 static ebpo_status offer_children(way_search *s, int which, uint32_t node, uint32_t other,
                                   ebpo_error *error)
 {
@@ -230,7 +231,7 @@ static ebpo_status offer_children(way_search *s, int which, uint32_t node, uint3
     return EBPO_OK;
 }
 
-/* Divides the larger one, if both are nodes. */
+/* Divides a pair of nodes, the larger node if both can be divided. */
 static ebpo_status divide_pair(way_search *s, const way_pair *pair, ebpo_error *error)
 {
     uint32_t child[2] = { child_of(s, 0, pair->a), child_of(s, 1, pair->b) };
@@ -244,7 +245,7 @@ static ebpo_status divide_pair(way_search *s, const way_pair *pair, ebpo_error *
     return offer_children(s, which, child[which], which ? pair->a : pair->b, error);
 }
 
-/* Begins a search, once; the caller clears `last`. */
+/* Begins a search; called once. The caller clears `last`. */
 static void way_search_begin(way_search *s)
 {
     ebpo_sweep_time_init(&s->last);
@@ -296,11 +297,13 @@ static ebpo_status way_search_run(way_search *s, const ebpo_accel *const accel[2
 
 /* --- pairs of subtrees --- */
 
-/* When one model has been moved, the last common point of two faces is in a cell of each model that
- * lists its face. So both subtrees' envelopes contain it and do not separate before. */
+/* State of a search in pairs of subtrees. A subtree lists the faces in its cell. If moved faces
+ * have a last common point, the point is in such a cell of each model. So both subtrees' envelopes
+ * contain the point and do not separate before. */
 
 typedef struct searching {
-    ebpo_subtree_search subtrees; /* `gap`: negative of the time until which they may intersect */
+    ebpo_subtree_search
+        subtrees; /* its `gap` is minus the time until which envelopes may intersect */
     way_search *way;
 } searching;
 

@@ -1,9 +1,9 @@
-/* Writes results for other programs: pairs of intersecting faces in an HDF5 file, and meshes in a
- * PLY file with the faces that matter in red.
+/* Writes results for other programs: pairs of intersecting faces to an HDF5 file, and meshes to a
+ * PLY file that shows the intersecting faces in red.
  *
- * Rows are written in blocks as they are found, so memory does not grow with their number. PLY
- * files read vertices and faces from a source in ascending order: a mesh in memory or a model in
- * parts. Output files appear only when they are complete (io/publish.h). */
+ * Rows are written in blocks as they are found, so memory does not grow with their number. The
+ * writer of PLY files reads vertices and faces from a source in ascending order: a mesh in memory
+ * or a model in parts. Output files appear only when they are complete (io/publish.h). */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -105,8 +105,6 @@ ebpo_status ebpo_red_meshes_print(const ebpo_red_mesh *meshes, int count, ebpo_p
                      : EBPO_OK;
 }
 
-/* --- pairs of two models --- */
-
 /* --- HDF5 --- */
 
 enum { PAIR_FACES, PAIR_FILE_FACES, PAIR_KIND, POINTS, CONTACT_FACES, CONTACT_ON, TABLES };
@@ -134,7 +132,7 @@ typedef struct writing {
     int64_t faces[ROWS][2], file_faces[ROWS][2], contact_faces[ROWS][2];
     uint8_t kind[ROWS], on[ROWS][4];
     double points[ROWS][6];
-    uint64_t pairs, contacts; /* waiting rows */
+    uint64_t pairs, contacts; /* rows waiting to be written */
     ebpo_error *error;
     ebpo_status status;
 } writing;
@@ -243,7 +241,8 @@ static ebpo_status write_hdf5(const ebpo_collision *q, const char *path, ebpo_pu
 
 /* --- PLY --- */
 
-/* A model in parts is read a chunk at a time; the mesh of a whole model is read once more. */
+/* Source of a mesh for PLY. A model in parts is read chunk by chunk; the mesh of a whole model is
+ * read once more. */
 typedef struct painted {
     ebpo_mesh mesh;
     ebpo_faces_by_number parts;
@@ -252,7 +251,7 @@ typedef struct painted {
 } painted;
 
 typedef struct painting {
-    painted side[2]; /* the caller's A and B */
+    painted side[2]; /* meshes of the caller's A and B */
 } painting;
 
 static bool take_found(void *user, const ebpo_face_pair *pairs, uint64_t count)
@@ -322,7 +321,7 @@ static ebpo_status write_ply(const ebpo_collision *q, ebpo_publish *target, ebpo
     return status;
 }
 
-/* --- either --- */
+/* --- both formats --- */
 
 ebpo_status ebpo_collide_write(ebpo_collider *c, const ebpo_collide_options *options,
                                ebpo_pairs_format format, const char *path, ebpo_error *error)

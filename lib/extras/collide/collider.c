@@ -1,6 +1,6 @@
 /* A collider: two models, options, and data that queries keep for the next ones. All queries begin
- * with ebpo_collision_begin. It checks the options and puts the models in an order that swapping
- * them does not change, so results do not depend on the caller's order.
+ * with ebpo_collision_begin. It checks the options and puts the models in an order that does not
+ * change when the caller swaps them, so results do not depend on the caller's order.
  *
  * A collider belongs to one thread at a time. Colliders of models that are subsets are refused,
  * except where the caller knows what is omitted (ebpo_collider_of_parts). */
@@ -105,7 +105,8 @@ ebpo_status ebpo_collider_get_stats(const ebpo_collider *c, ebpo_collider_stats 
 
 /* --- queries --- */
 
-/* Orders by files, then by poses, compared as bits: the order needs no meaning. */
+/* Returns true if the caller's A comes second. Orders by files, then by poses, compared as bits:
+ * the order has no meaning. */
 static bool comes_second(const ebpo_collider *c, const ebpo_collide_options *o)
 {
     int by_file = memcmp(c->model[0]->info->content_sha256, c->model[1]->info->content_sha256,
@@ -156,7 +157,7 @@ bool ebpo_collision_is_late(const ebpo_collision *q)
     return q->late != UINT64_MAX && ebpo_clock() >= q->late;
 }
 
-/* Counts both files; a file that both models use counts once. */
+/* A file that both models use counts once. */
 uint64_t ebpo_collision_bytes_read(const ebpo_collision *q)
 {
     uint64_t bytes = 0;

@@ -1,4 +1,4 @@
-/* A collider, and the common beginning of all queries of two models. */
+/* A collider, and the common first step of all queries of two models. */
 #ifndef EBPO_COLLIDE_COLLIDER_H
 #define EBPO_COLLIDE_COLLIDER_H
 
@@ -19,18 +19,19 @@ struct ebpo_collider {
     ebpo_model *model[2]; /* in the caller's order */
     ebpo_collider_options options;
     ebpo_pair_walk walk;   /* walk of the calling thread */
-    ebpo_pair_walk *walks; /* walks of the threads of all pairs, between queries; NULL: none are
-                            * kept */
+    ebpo_pair_walk *walks; /* walks of the threads that find all pairs, between queries; NULL: none
+                            * are kept */
     unsigned walk_count;
     uint64_t node_pairs, block_pairs, exact;
-    uint64_t subtree_pairs, subtrees, loads, bytes_read; /* for models in parts */
-    struct ebpo_gap_search *gap;   /* state of distances, after the first such query */
+    uint64_t subtree_pairs, subtrees, loads, bytes_read; /* counts for models in parts */
+    struct ebpo_gap_search *gap;   /* state of distance queries, after the first one */
     struct ebpo_face_two *nearest; /* the last nearest pair, of the caller's A and B; or NULL */
-    ebpo_context *context[2]; /* contexts of depths, after the first such query of that model */
-    uint32_t *slots[2];       /* by numbers in the file, after the first query that needs them */
+    ebpo_context *context[2]; /* contexts of depth queries, after the first one of that model */
+    uint32_t *slots[2];       /* slots of faces by numbers in the file, after the first query that
+                               * needs them */
 };
 
-/* A query: options checked, models in the order that swapping does not change. */
+/* A query: options checked, models in an order that does not change when the caller swaps them. */
 typedef struct ebpo_collision {
     ebpo_collider *collider;
     ebpo_collide_options options;
@@ -38,7 +39,7 @@ typedef struct ebpo_collision {
     ebpo_model *model[2];
     ebpo_block_posing posing[2];
     double reach;  /* greatest size of posed coordinates */
-    uint64_t late; /* deadline by ebpo_clock; UINT64_MAX: none */
+    uint64_t late; /* deadline, a time of ebpo_clock; UINT64_MAX: none */
 } ebpo_collision;
 
 EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collider *collider,
@@ -47,20 +48,20 @@ EBPO_MUST_USE ebpo_status ebpo_collision_begin(ebpo_collision *out, ebpo_collide
 
 bool ebpo_collision_is_late(const ebpo_collision *collision);
 
-/* Finds the first contact of two accels of the query's models: the collider's walk has it as met[0]
- * and found_slot. found: as of ebpo_collide_first. */
+/* Finds the first contact of two accels of the query's models. The collider's walk then has it in
+ * intersected[0] and found_slot. *found is set as by ebpo_collide_first. */
 EBPO_MUST_USE ebpo_status ebpo_collision_first(const ebpo_collision *collision,
                                                const ebpo_accel *const accel[2], const char *stage,
                                                int32_t *found, ebpo_error *error);
 
-/* Returns the bytes that have been read of both files. */
+/* Returns the number of bytes that have been read from both files. */
 uint64_t ebpo_collision_bytes_read(const ebpo_collision *collision);
 
 /* Returns true if a model is not entirely in memory. */
 bool ebpo_collision_is_in_parts(const ebpo_collision *collision);
 
-/* Begins a walk that is zero or was used before; its memory is reused. The pair must live as long
- * as the walk is used. */
+/* Begins a walk. A walk that was used before reuses its memory; a new one must be zero. The pair
+ * must live as long as the walk is used. */
 void ebpo_pair_walk_begin(ebpo_pair_walk *walk, const ebpo_accel_pair *pair);
 
 /* Adds a walk's counts to the collider's. */
@@ -70,7 +71,7 @@ void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *collision, const ebpo_accel *first,
                                    const ebpo_accel *second, const ebpo_found_pair *intersected);
 
-/* As ebpo_collide_self, at the pose that the options have twice. */
+/* As ebpo_collide_self; both poses of the options are equal. */
 EBPO_MUST_USE ebpo_status ebpo_collide_self_posed(ebpo_collider *collider,
                                                   const ebpo_collide_options *options,
                                                   ebpo_pairs_fn take, void *user,

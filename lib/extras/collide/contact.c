@@ -16,7 +16,8 @@
 #include "geometry/integer_vectors.h"
 #include "geometry/triangle_pair.h"
 
-/* An edge from below to above a plane; edge and plane in the order of coordinates. */
+/* An edge that goes from below a plane to above it; edge and plane are in the order of coordinates.
+ */
 typedef struct piercing {
     const double *end[2], *plane[3];
 } piercing;
@@ -55,8 +56,8 @@ static double height_over(const ebpo_pair normal[3], const double products[3], c
     return sum;
 }
 
-/* Computes the fraction along the edge: height[0] / (height[0] - height[1]). Returns false if it is
- * not certain enough. */
+/* Computes the position of the point as a fraction of the edge: height[0] / (height[0] -
+ * height[1]). Returns false if it is not certain enough. */
 static bool share_of_edge(const piercing *p, ebpo_pair *share)
 {
     ebpo_pair e[3], f[3], normal[3], height[2];
@@ -75,7 +76,7 @@ static bool share_of_edge(const piercing *p, ebpo_pair *share)
     return most <= 0x1p30 * fabs(both.head) && fabs(both.head) >= 0x1p-600;
 }
 
-/* Returns false if numbers are so large or small that the bounds do not hold. */
+/* Returns false if numbers are so large or small that the error bounds do not hold. */
 static bool is_ordinary(const piercing *p)
 {
     const double *const all[] = { p->end[0], p->end[1], p->plane[0], p->plane[1], p->plane[2] };
@@ -168,7 +169,8 @@ static void compute_piercing(const piercing *p, double out[3])
 
 /* --- which edge pierces --- */
 
-/* An edge of a face, from the corner that is alone on its side of the other's plane. */
+/* An edge of a face, beginning at the corner that is alone on its side of the other face's plane.
+ */
 typedef struct edge {
     const double (*face)[3], (*plane)[3];
     int from, to;
@@ -193,7 +195,8 @@ static void end_of(const edge *e, double out[3])
     compute_piercing(&p, out);
 }
 
-/* Chooses from two intersecting edges the one that ends there, else the lesser one. */
+/* Chooses one of two edges that intersect the other plane: the one that ends there, else the lesser
+ * one. */
 static const edge *choose_edge(const edge *a, const edge *b)
 {
     if (a->ends_there || b->ends_there)
@@ -204,8 +207,8 @@ static const edge *choose_edge(const edge *a, const edge *b)
     return (order != 0 ? order : ebpo_corner_order(p.end[1], q.end[1])) <= 0 ? a : b;
 }
 
-/* Sets an end of the segment by `order`: negative: it is the end of A's edge, positive: of B's, 0:
- * of both. */
+/* Sets an end of the segment. The end is where A's edge pierces B (order < 0), where B's edge
+ * pierces A (order > 0), or both (0). */
 static void set_end(const edge *a, const edge *b, int order, ebpo_contact_end *out)
 {
     end_of(order < 0 ? a : order > 0 ? b : choose_edge(a, b), out->point);
@@ -225,7 +228,8 @@ void ebpo_triangle_contact(const double a[3][3], const double b[3][3], ebpo_cont
         of_a[i] = (edge){ a, b, t.a[0], t.a[i + 1], t.side_a[t.a[i + 1]] == 0 };
         of_b[i] = (edge){ b, a, t.b[0], t.b[i + 1], t.side_b[t.b[i + 1]] == 0 };
     }
-    /* A's interval goes from its edge to corner 2 to its edge to corner 1, B's the other way. */
+    /* A's interval goes from its edge to corner 2 to its edge to corner 1; B's interval goes the
+     * opposite way. */
     set_end(&of_a[1], &of_b[0], ebpo_compare_ends(a, b, &t, 2, 1), &out[reversed]);
     set_end(&of_a[0], &of_b[1], -ebpo_compare_ends(a, b, &t, 1, 2), &out[!reversed]);
 }

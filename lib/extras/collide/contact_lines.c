@@ -1,8 +1,8 @@
-/* Joins the segments of all crossing pairs to lines of contact where they end at the same features
- * of the same faces.
+/* Joins the segments of all crossing pairs to lines of contact, where segments end at the same
+ * features of the same faces.
  *
  * Each end has a key: the edge or corner of the face that contains it, and the face of the other
- * model. Ends with equal keys are the same point. Equal corner coordinates have equal numbers
+ * model. Ends with equal keys are the same point. Corners with equal coordinates have equal numbers
  * (face_patches.h). A line continues where exactly one segment ends and one begins; elsewhere it
  * ends. */
 #include "core/strict_fp.h"
@@ -19,8 +19,8 @@
 
 #define NONE UINT32_MAX
 
-/* The features of each model that contain an end: two corners of an edge, the lesser first; a
- * corner and NONE; NONE and a face. */
+/* Key of an end: for each model the feature that contains it. Two corners, the lesser first: an
+ * edge; a corner and NONE; NONE and a face. */
 typedef struct end_key {
     uint32_t on[2][2];
     uint32_t end; /* twice the segment's number, plus 1 for its second end */
@@ -29,13 +29,13 @@ typedef struct end_key {
 typedef struct segment {
     ebpo_contact_segment contact;
     double normal[2][3];
-    uint32_t after, before; /* neighbouring segments, or NONE */
+    uint32_t after, before; /* neighbouring segments in the line, or NONE */
     bool reported;
 } segment;
 
 typedef struct lines {
     ebpo_pair_faces places;
-    uint64_t most; /* most segments */
+    uint64_t most; /* maximum number of segments */
     segment *segment;
     end_key *key; /* two for each segment */
     uint64_t count, capacity, key_capacity;
@@ -71,8 +71,8 @@ static void unit_normal(const double t[3][3], double out[3])
         out[k] /= length;
 }
 
-/* Sets the feature that `on` names, of a face of the caller's model m, with its corners in the
- * file. */
+/* Sets the feature that `on` gives, of a face of the caller's model m, with the face's corners as
+ * in the file. Returns false without memory. */
 static bool set_feature(lines *l, int m, uint64_t face, const double t[3][3], unsigned on,
                         uint32_t out[2])
 {
@@ -176,14 +176,14 @@ static void join_segments(lines *l)
 static bool add_point(lines *l, const double at[3])
 {
     const double x[3] = { at[0], at[1],
-                          at[2] }; /* copied: `at` may point into the array that grows */
+                          at[2] }; /* a copy: `at` may point into the array that grows */
     if (!ebpo_grow(&l->points, &l->points_capacity, 3 * (l->line.count + 1), sizeof *l->points))
         return false;
     memcpy(l->points + 3 * l->line.count++, x, sizeof x);
     return true;
 }
 
-/* Adds the first point of a segment; its end is the first point of the next one. */
+/* Adds the first point of a segment. The next segment begins at this segment's end. */
 static bool add_to_line(lines *l, segment *s)
 {
     uint64_t n = l->line.count;

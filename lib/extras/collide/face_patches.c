@@ -1,10 +1,10 @@
-/* Finds patches of faces: the connected components of a mesh, over corners with equal coordinates
- * or over edges that two faces share. Faces are joined with a disjoint-set forest whose roots are
- * the first faces of their patches. A hash table numbers corners: equal coordinates, equal numbers
- * (0 and -0 are equal).
+/* Finds patches of faces: the connected components of a mesh. Faces are connected by corners with
+ * equal coordinates, or by edges that two faces share. Faces are joined with a disjoint-set forest
+ * whose roots are the first faces of their patches. A hash table numbers corners: equal coordinates
+ * have equal numbers (0 and -0 are equal).
  *
- * A patch whose faces intersect no face of the other model lies entirely on one side of it. The
- * relation of two models and exact volumes of results rely on that. */
+ * A patch whose faces intersect no face of the other model lies entirely on one side of that model.
+ * The relation of two models and exact volumes of results rely on this. */
 #include "core/strict_fp.h"
 
 #include <stdint.h>
@@ -19,7 +19,7 @@
 
 /* --- joined faces --- */
 
-/* Returns the first face that is joined with `face` so far, and shortens paths. At first
+/* Returns the first face that is joined with `face` so far, and shortens paths. Initially
  * first[face] = face. */
 static inline uint32_t first_joined(uint32_t *first, uint32_t face)
 {
@@ -53,7 +53,7 @@ static bool same_corner(const double p[3], const double q[3])
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-/* Returns the corner's entry of the table, or a free one. */
+/* Returns the corner's entry of the table, or a free entry. */
 static uint32_t *find_corner(const ebpo_corner_ids *ids, const double x[3])
 {
     uint64_t i = hash_of(x) & (ids->table_size - 1);
@@ -78,7 +78,7 @@ static bool enlarge_table(ebpo_corner_ids *ids)
 
 bool ebpo_corner_id(ebpo_corner_ids *ids, const double x[3], uint32_t *id)
 {
-    const double corner[3] = { x[0] + 0.0, x[1] + 0.0, x[2] + 0.0 }; /* no -0 */
+    const double corner[3] = { x[0] + 0.0, x[1] + 0.0, x[2] + 0.0 }; /* turns -0 into 0 */
     if ((2 * ids->count >= ids->table_size && !enlarge_table(ids)) || ids->count >= UINT32_MAX - 1)
         return false;
     uint32_t *at = find_corner(ids, corner);
@@ -152,15 +152,15 @@ ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
 
 /* --- patches over edges --- */
 
-/* Each edge is listed at its corner with the smaller number, as the other corner and the face. Two
- * equal entries of a sorted list connect their faces. */
+/* Each edge is listed at its corner with the smaller number; an entry has the other corner and the
+ * face. Two equal entries of a sorted list connect their faces. */
 
 #define NO_CORNER UINT32_MAX
 
 typedef struct edges {
     const ebpo_accel *whole;
     uint32_t (*corner)[3]; /* corners of each face; NO_CORNER: the face has no area */
-    uint64_t *end;  /* end of each corner's list, which begins at the end of the list before */
+    uint64_t *end;  /* end of each corner's list, which begins at the end of the previous list */
     uint64_t *edge; /* other corner << 32 | face */
     uint32_t *patch;
 } edges;

@@ -1,4 +1,4 @@
-/* Patches of connected faces, and numbers of corners, which find them. */
+/* Patches of connected faces, and the numbers of corners that are used to find them. */
 #ifndef EBPO_COLLIDE_FACE_PATCHES_H
 #define EBPO_COLLIDE_FACE_PATCHES_H
 
@@ -12,7 +12,7 @@
 typedef struct ebpo_corner_ids {
     double (*at)[3]; /* [count] */
     uint64_t count, capacity;
-    uint32_t *table; /* open addressing: number + 1; 0: free */
+    uint32_t *table; /* open addressing: the corner's number + 1; 0: free */
     uint64_t table_size;
 } ebpo_corner_ids;
 
@@ -20,17 +20,17 @@ typedef struct ebpo_corner_ids {
 bool ebpo_corner_id(ebpo_corner_ids *ids, const double x[3], uint32_t *id);
 void ebpo_corner_ids_free(ebpo_corner_ids *ids);
 
-/* Finds for each owned face of a subtree, by its number in the file less first_face, the first face
- * of its patch: the faces connected to it by corners (equal coordinates) of owned faces that are
- * not omitted (a bit for each face of the file). An omitted face is alone. The caller frees the
- * result. */
+/* Finds the patches of a subtree's owned faces, connected by corners with equal coordinates.
+ * (*out)[i], for the owned face with the number first_face + i in the file, is the first face of
+ * its patch. Omitted faces (`omitted` has a bit for each face of the file) connect no others; each
+ * is alone. The caller frees the result. */
 EBPO_MUST_USE ebpo_status ebpo_face_patches(const ebpo_accel *subtree, const uint32_t *slots,
                                             const uint64_t *omitted, uint32_t **out,
                                             ebpo_error *error);
 
-/* Finds for each face of a whole model at a pose, by its number in the file, the first face of its
- * patch: the faces connected to it over edges (equal posed corners) that exactly two faces with an
- * area share. A face without area is alone. The caller frees the result. */
+/* Finds the patches of a whole model at a pose, connected by edges (equal posed corners) that
+ * exactly two faces with an area share. (*out)[i], for the face with the number i in the file, is
+ * the first face of its patch. A face without area is alone. The caller frees the result. */
 EBPO_MUST_USE ebpo_status ebpo_edge_patches(const ebpo_accel *whole, const uint32_t *slots,
                                             const ebpo_posing *posing, uint32_t **out,
                                             ebpo_error *error);

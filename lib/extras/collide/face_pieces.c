@@ -1,11 +1,11 @@
 /* Finds the pieces of a face that other faces cut: an exact point of each piece.
  *
- * Other faces cut the face in segments in its plane, seen along the axis of the largest component
- * of its normal: p and q are the two other coordinates. Coordinates are GMP fractions. Values of p
- * at which a cut begins, ends or crosses another one are events. Between neighbouring events (a
- * strip) the cuts have one order in q, so the strip is divided into parts without a cut inside.
- * Parts of neighbouring strips that share an open interval belong to one piece. Faces in the same
- * plane count by their winding. docs/develop/collision.md, "Relation of two models". One thread. */
+ * The face is seen along the axis on which its normal has the largest component; p and q are the
+ * two other coordinates, GMP fractions. Other faces cut it in segments, the cuts. Values of p at
+ * which a cut begins, ends or crosses another one are events. Between neighbouring events (a strip)
+ * the cuts have one order in q, so the strip is divided into parts without a cut inside. Parts of
+ * neighbouring strips that share an open interval belong to one piece. Faces in the same plane
+ * count by their winding. See docs/develop/collision.md, "Relation of two models". One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -30,7 +30,7 @@ static bool capacity_for_cut(ebpo_face_cuts *f)
     return true;
 }
 
-/* Adds a value of p, or a point (p, q); without memory, records it in the face. */
+/* Adds a value of p, or a point (p, q). Without memory, records that in `f`. */
 static void add_event(ebpo_face_cuts *f, const mpq_t p)
 {
     if (!ebpo_grow(&f->event, &f->event_capacity, f->events + 1, sizeof *f->event)) {
@@ -107,7 +107,7 @@ static void set_plane(ebpo_face_cuts *f)
     }
 }
 
-/* Orients and adds the cut whose ends are in cut[cuts]. */
+/* Orients the cut whose ends are in cut[cuts], and adds it. */
 static void finish_cut(ebpo_face_cuts *f)
 {
     ebpo_face_cut *c = &f->cut[f->cuts];
@@ -179,7 +179,7 @@ static int side_in_view(const ebpo_face_cuts *f, int i, const double x[3])
                                    (double[]){ x[f->u], x[f->v] });
 }
 
-/* Returns true if all of t lies beyond an edge of the face or on the edge. */
+/* Returns true if all of t is beyond an edge of the face or on the edge. */
 static bool beyond_an_edge(const ebpo_face_cuts *f, const double t[3][3])
 {
     for (int i = 0; i < 3; i++)
@@ -189,8 +189,8 @@ static bool beyond_an_edge(const ebpo_face_cuts *f, const double t[3][3])
     return false;
 }
 
-/* Sets a cut's end to the point where the edge from a to b, which has ends on both sides of the
- * plane, pierces it. */
+/* Sets a cut's end to the point where the edge from a to b pierces the plane; a and b are on
+ * different sides of the plane. */
 static void set_piercing(ebpo_face_cuts *f, int end, const double a[3], const double b[3])
 {
     mpq_t *s = f->scratch;
@@ -266,7 +266,7 @@ void ebpo_face_cuts_add(ebpo_face_cuts *f, const double t[3][3], int model)
         f->no_memory = true;
 }
 
-/* Returns the sign of the turn from a to b to the point. */
+/* Returns the side of the line from a to b on which (p, q) is: positive: left, negative: right. */
 static int side_of_edge(ebpo_face_cuts *f, const double a[3], const double b[3], const mpq_t p,
                         const mpq_t q)
 {
@@ -368,7 +368,7 @@ static void cross_two(ebpo_face_cuts *f, const ebpo_face_cut *a, const ebpo_face
     add_vertex(f, s[1], s[2]);
 }
 
-/* Adds the crossing with a vertical cut; its p is already an event. */
+/* Adds the crossing of a cut with a vertical one, whose p is already an event. */
 static void cross_upright(ebpo_face_cuts *f, const ebpo_face_cut *upright, const ebpo_face_cut *c)
 {
     if (!f->all_cuts || is_upright(c) || !cut_reaches(c, upright->p[0]))
@@ -405,7 +405,8 @@ static void find_events(ebpo_face_cuts *f)
 
 /* --- strips --- */
 
-/* Computes a fraction between both, with few bits where a double is between them. */
+/* Computes a fraction between `low` and `high`. The fraction has few bits if a double is between
+ * them. */
 static void fraction_between(const mpq_t low, const mpq_t high, mpq_t out)
 {
     double middle = mpq_get_d(low) / 2 + mpq_get_d(high) / 2;
@@ -439,8 +440,8 @@ static bool capacity_for_values(ebpo_face_cuts *f)
     return true;
 }
 
-/* Collects the cuts through the strip between two events within the face, in the order of q in the
- * middle. */
+/* Collects the cuts that go through the strip between two events, within the face, in the order of
+ * q in the middle of the strip. */
 static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
 {
     uint64_t n = 0, kept = 0;
@@ -471,8 +472,8 @@ static uint64_t cuts_of_strip(ebpo_face_cuts *f, const mpq_t p[3])
     return kept;
 }
 
-/* Returns true if a part of the strip before shares an open interval of the border with this one.
- */
+/* Returns true if a part of the previous strip shares an open interval of the border between the
+ * strips with this part. */
 static bool goes_on(const ebpo_face_cuts *f, int before, const mpq_t low, const mpq_t high)
 {
     for (uint64_t i = 0; i < f->ends[before]; i++) {
@@ -491,7 +492,7 @@ static bool upright_at(const ebpo_face_cuts *f, const mpq_t p)
     return false;
 }
 
-/* Computes x in the plane at p, q. */
+/* Computes the point x of the plane that has the coordinates p, q. */
 static void point_at(ebpo_face_cuts *f, const mpq_t p, const mpq_t q, mpq_t x[3])
 {
     mpq_set(x[f->u], p);

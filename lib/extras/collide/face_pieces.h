@@ -1,5 +1,5 @@
-/* Computes the pieces of a face that other faces cut, exactly: a point of each, in fractions, on
- * none of the cuts. One thread. */
+/* Computes the pieces of a face that other faces cut. Exact: for each piece a point, in fractions,
+ * that is on no cut. One thread. */
 #ifndef EBPO_COLLIDE_FACE_PIECES_H
 #define EBPO_COLLIDE_FACE_PIECES_H
 
@@ -9,7 +9,7 @@
 
 #include <ebpo/base.h>
 
-/* A cut in the view along an axis: p[0] <= p[1]. */
+/* A cut, seen along an axis: p[0] <= p[1]. */
 typedef struct ebpo_face_cut {
     mpq_t p[2], q[2], slope; /* slope: dq / dp, for cuts with p[0] < p[1] */
 } ebpo_face_cut;
@@ -18,10 +18,11 @@ typedef struct ebpo_face_cut {
 typedef struct ebpo_flat_face {
     double corner[3][3];
     int model;
-    bool same_way; /* its normal has the direction of the face's normal */
+    bool same_way; /* its normal and the normal of the cut face have the same direction */
 } ebpo_flat_face;
 
-/* The bounds of a piece in a strip between two neighbouring events, at the strip's right end. */
+/* Bounds of a piece at the right end of a strip. A strip is the part of the view between two
+ * neighbouring events. */
 typedef struct ebpo_piece_end {
     mpq_t low, high;
 } ebpo_piece_end;
@@ -30,13 +31,13 @@ typedef struct ebpo_piece_end {
 typedef struct ebpo_face_cuts {
     double corner[3][3];
     int axis, u, v;          /* the view is along `axis`: p is coordinate u, q coordinate v */
-    int turn;                /* orientation of the corners in this view */
-    mpq_t normal[3], offset; /* normal . x = offset */
+    int turn;                /* orientation of the corners in the view */
+    mpq_t normal[3], offset; /* the face's plane: normal . x = offset */
     mpq_t scratch[8];
     bool made, no_memory;
     bool all_cuts; /* includes cuts that only touch the face's border */
     bool has_target;
-    mpq_t target[2]; /* point for which pieces are distinguished */
+    mpq_t target[2]; /* the point that pieces are tested to contain */
     ebpo_face_cut *cut;
     uint64_t cuts, cuts_made, cut_capacity;
     mpq_t *event; /* values of p between which no cut begins, ends or crosses */
@@ -45,11 +46,11 @@ typedef struct ebpo_face_cuts {
     uint64_t vertices, vertices_made, vertex_capacity;
     ebpo_flat_face *flat;
     uint64_t flats, flat_capacity;
-    mpq_t *value; /* values of q, at three positions, for each cut */
+    mpq_t *value; /* three values of q for each cut, at three positions */
     uint64_t values_made, value_capacity;
     uint32_t *order;
     uint64_t order_capacity;
-    ebpo_piece_end *end[2]; /* of this strip and the one before */
+    ebpo_piece_end *end[2]; /* of the current strip and the previous one */
     uint64_t ends[2], ends_made[2], end_capacity[2];
 } ebpo_face_cuts;
 
@@ -57,19 +58,19 @@ typedef struct ebpo_face_cuts {
 void ebpo_face_cuts_begin(ebpo_face_cuts *f, const double corner[3][3], bool all_cuts);
 /* Adds another face, of model 0 or 1. */
 void ebpo_face_cuts_add(ebpo_face_cuts *f, const double other[3][3], int model);
-/* Sets a target; needs all cuts. Returns false if x is not on the face. Otherwise each piece says
- * if it contains x. */
+/* Sets a target; needs all cuts. Returns false if x is not on the face. Otherwise each piece that
+ * is visited later has at_target set or not. */
 bool ebpo_face_cuts_target(ebpo_face_cuts *f, const mpq_t x[3]);
 void ebpo_face_cuts_free(ebpo_face_cuts *f);
 
 /* --- pieces --- */
 
-/* Surroundings of a piece's point. */
+/* A point of a piece, and what is around it. */
 typedef struct ebpo_piece {
-    const mpq_t *x; /* [3] */
-    /* For each model: faces of it in the face's plane at the point (not the face itself), and their
-     * share of the winding number behind the face less the one in front, where its normal points
-     * to. */
+    const mpq_t *x; /* [3] the point */
+    /* For each model: other faces of it that are in the face's plane at the point. `covered`: there
+     * are any. `jump`: their contribution to the winding number behind the face less the one in
+     * front (the normal points to the front). */
     bool covered[2];
     int32_t jump[2];
     bool at_target; /* the target is in the piece or on its border */
@@ -77,12 +78,13 @@ typedef struct ebpo_piece {
 
 typedef ebpo_status (*ebpo_piece_fn)(void *user, const ebpo_piece *piece, ebpo_error *error);
 
-/* Calls `visit` for a point of each piece; some pieces (with all cuts, all pieces) may have several
- * points. Fails with EBPO_E_MEMORY and the errors of `visit`. */
+/* Calls `visit` for a point of each piece; some pieces are visited at several points (with all
+ * cuts, any piece may be). Fails with EBPO_E_MEMORY and the errors of `visit`. */
 EBPO_MUST_USE ebpo_status ebpo_face_pieces_visit(ebpo_face_cuts *f, ebpo_piece_fn visit, void *user,
                                                  ebpo_error *error);
-/* With all cuts: visits the corners, ends of cuts and intersections of two, on the closed face;
- * some repeatedly. Uses up the state. */
+/* With all cuts: visits the points of the closed face that are corners, ends of cuts or
+ * intersections of two cuts; some of them repeatedly. Afterwards `f` must not be used until the
+ * next begin. */
 typedef ebpo_status (*ebpo_vertex_fn)(void *user, const mpq_t x[3], ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_face_pieces_vertices(ebpo_face_cuts *f, ebpo_vertex_fn visit,
                                                     void *user, ebpo_error *error);

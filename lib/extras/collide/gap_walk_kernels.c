@@ -1,12 +1,12 @@
 /* Walks through pairs of nodes of two hierarchies for the distance of two models, eight children at
  * a time, in floats. It is compiled for several instruction sets with the same results.
  *
- * Gaps of boxes, of bounding cylinders and along the direction of the best pair bound the distance
- * of two nodes from below. Until a limit is known the walk is depth-first; then a heap gives the
- * smallest bound first. Pairs of blocks give pairs of faces with the bounds that a nearest pair of
- * points proves. No dropped pair is nearer than the limit; collide_distance.c decides the remaining
- * ones. Bounds: docs/develop/collision.md, "Bounds of pairs of nodes" and "Distance of two faces".
- */
+ * The distance of two nodes has three lower bounds: the gaps of their boxes, of their bounding
+ * cylinders, and along the direction of the best pair. Until a limit is known the walk is
+ * depth-first; then a heap gives the smallest bound first. Pairs of blocks give pairs of faces with
+ * the bounds that a nearest pair of points proves. No dropped pair is nearer than the limit;
+ * collide_distance.c decides the remaining ones. Bounds: docs/develop/collision.md, "Bounds of
+ * pairs of nodes" and "Distance of two faces". */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -102,7 +102,8 @@ EBPO_EIGHT void offer_edges8(nearest8 *n, const place8 *p, const edges8 *a, int 
     offer_nearest8(n, &way, place_dot8(&way, &way));
 }
 
-/* Offers the corners that lie over the inner part of the face. sign: 1 when the corners are A's. */
+/* Offers corners that are above the interior of the face. sign: 1 when the corners are A's, else
+ * -1. */
 EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 *of,
                                const triangle8 *corners, float sign)
 {
@@ -125,8 +126,8 @@ EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 
     }
 }
 
-/* Bounds eight distances. No coordinate is greater than `size`, or farther than `error` from its
- * exact value. */
+/* Bounds eight distances. No coordinate is greater than `size` or differs by more than `error` from
+ * its exact value. */
 EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float size, float error,
                                  f8 *low, f8 *high, place8 *way)
 {
@@ -170,7 +171,8 @@ EBPO_EIGHT void node_boxes(ebpo_gap_node *out, const ebpo_bound *b, const ebpo_t
     }
 }
 
-/* Decodes bounding cylinders. One without an axis gives no bound: it is as thick as everything. */
+/* Decodes bounding cylinders. A cylinder without an axis is decoded as extremely thick, so it gives
+ * no bound. */
 EBPO_EIGHT void node_slabs(ebpo_gap_node *out, const ebpo_bound_slab *b, const ebpo_turned_frame *f,
                            float slack)
 {
@@ -237,8 +239,8 @@ static const ebpo_gap_node *take_node(ebpo_gap_search *g, int side, uint32_t nod
 
 /* --- pairs of nodes --- */
 
-/* Returns the sum of the squared gaps of eight boxes to the one in lane j of the other node, along
- * the axes of one of the frames (f: 0 the frame of the eight); *most: the greatest gap. */
+/* Returns the sums of the squared gaps between eight boxes and the box in lane j of the other node,
+ * along the axes of frame f (0: the frame of the eight). *most: the greatest gaps. */
 EBPO_EIGHT f8 box_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j, int f, f8 slack,
                         f8 *most)
 {
@@ -287,8 +289,8 @@ EBPO_EIGHT f8 slab_gaps8(const ebpo_gap_node *p, const ebpo_gap_node *q, int j)
     return f8_max3(far_p, far_q, none);
 }
 
-/* Returns squared lower bounds of eight children's distances to one; negative where boxes
- * intersect. */
+/* Returns squared lower bounds of the distances between eight children and child j; negative where
+ * boxes intersect. */
 EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const ebpo_gap_node *q,
                         int j)
 {
@@ -306,7 +308,7 @@ EBPO_EIGHT f8 gap_keys8(const ebpo_gap_search *g, const ebpo_gap_node *p, const 
 
 /* --- pairs to be visited --- */
 
-/* Prefetches the pair that comes next unless a nearer one is found. */
+/* Prefetches the pair that is visited next if no nearer one is found. */
 EBPO_EIGHT void fetch_next(const ebpo_gap_search *g)
 {
     if (g->count == 0)
@@ -316,7 +318,7 @@ EBPO_EIGHT void fetch_next(const ebpo_gap_search *g)
         fetch_below(g->accel[i], below_child(g->accel[i], v->child[i]), true);
 }
 
-/* Before the heap: puts the least key on top of the pairs added since `base`. */
+/* Pushes a pair while there is no heap: the least key added since `base` stays on top. */
 EBPO_EIGHT void push_visit(ebpo_gap_search *g, uint64_t base, ebpo_gap_visit v)
 {
     uint64_t at = g->count++;
@@ -341,8 +343,8 @@ static void sift_down(ebpo_gap_search *g, uint64_t at, ebpo_gap_visit v)
     g->stack[at] = v;
 }
 
-/* Makes the heap: from now on the least key comes first, so nothing is visited that a perfect start
- * would skip. */
+/* Makes the heap: from now on the least key comes first. So no pair is visited whose bound is
+ * beyond the final distance. */
 static void make_heap(ebpo_gap_search *g)
 {
     uint64_t kept = 0;
@@ -465,7 +467,8 @@ EBPO_EIGHT triangle8 load_faces8(const ebpo_posed_faces *f, const int32_t *lane,
     return out;
 }
 
-/* Takes a pair nearer than all before: its direction is the search's from now on. */
+/* Takes a pair nearer than all previous ones. The direction of the search becomes that of this
+ * pair. */
 EBPO_EIGHT void take_nearer(ebpo_gap_search *g, f8 high, const place8 *way, unsigned used,
                             const uint32_t block[2], const near_lanes *near, unsigned at)
 {
@@ -487,8 +490,8 @@ EBPO_EIGHT void take_nearer(ebpo_gap_search *g, f8 high, const place8 *way, unsi
     ebpo_gap_set_way(g, (const float[3]){ ways[0][best], ways[1][best], ways[2][best] });
 }
 
-/* Adds the pairs that may be near enough to the waiting ones. Returns true if one of them may
- * intersect. */
+/* Adds the pairs that may be near enough to the waiting pairs. Returns true if one of the added
+ * pairs may intersect. */
 EBPO_EIGHT bool let_wait(ebpo_gap_search *g, f8 low, unsigned used, const uint32_t block[2],
                          const near_lanes *near, unsigned at)
 {
@@ -542,7 +545,8 @@ static bool block_pair(ebpo_gap_search *g, const uint32_t block[2])
 
 /* --- the walk --- */
 
-/* Rechecks a key that is older than the direction. */
+/* Tests a pair again if its key was computed for an earlier direction. Returns true if it is too
+ * far apart. */
 static bool far_along(ebpo_gap_search *g, const ebpo_gap_visit *v)
 {
     if (v->way == g->way_number)
@@ -553,14 +557,14 @@ static bool far_along(ebpo_gap_search *g, const ebpo_gap_visit *v)
     return gap > 0 && gap * gap > g->square;
 }
 
-/* Returns the sum of a box's half sides: the larger box is divided. */
+/* Returns the sum of a box's half sides. Of two boxes, the one with the larger sum is divided. */
 static float child_size(ebpo_gap_search *g, int side, uint32_t child)
 {
     const ebpo_gap_node *n = take_node(g, side, child / 8);
     return (n->half[0][0][child % 8] + n->half[0][1][child % 8]) + n->half[0][2][child % 8];
 }
 
-/* Pushes the pairs below; returns false when enough is known. */
+/* Pushes the pairs of children; returns false when enough is known. */
 static bool visit_pair(ebpo_gap_search *g, const ebpo_gap_visit *v)
 {
     uint32_t child[2];
@@ -600,7 +604,7 @@ static void walk_gaps(ebpo_gap_search *g)
         fetch_next(g);
         if (far_along(g, &v) || visit_pair(g, &v))
             continue;
-        g->stack[g->count++] = v; /* the pair was visited only in part, or not at all */
+        g->stack[g->count++] = v; /* the pair has been visited only in part, or not at all */
         g->ended = true;
         return;
     }

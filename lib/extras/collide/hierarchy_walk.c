@@ -44,7 +44,7 @@ void ebpo_posed_triangle(const ebpo_accel *accel, const ebpo_posing *posing, uin
         ebpo_posing_apply(posing, t[i], out[i]);
 }
 
-/* Makes the edge opposite corner i, as a face without area. */
+/* Makes the edge opposite corner i, in the form of a face without area. */
 static void edge_opposite(const double a[3][3], int i, double out[3][3])
 {
     memcpy(out[0], a[(i + 1) % 3], sizeof out[0]);
@@ -59,8 +59,9 @@ static bool edge_intersects(const double a[3][3], int i, const double b[3][3])
     return ebpo_triangle_pair((const double(*)[3])edge, b) != EBPO_PAIR_APART;
 }
 
-/* Two convex sets have one common corner. They have another common point only if a ray from the
- * corner reaches the opposite edge of one face while still in the other face. */
+/* Decides two faces with one common corner, i of a and k of b. Two convex sets have another common
+ * point only if a ray from the common corner reaches the opposite edge of one face while it is
+ * still in the other face. */
 static ebpo_pair_kind one_corner(const double a[3][3], int i, const double b[3][3], int k)
 {
     ebpo_pair_kind kind = ebpo_triangle_pair(a, b);
@@ -69,7 +70,7 @@ static ebpo_pair_kind one_corner(const double a[3][3], int i, const double b[3][
     return kind;
 }
 
-/* With a common edge, faces in different planes have no other common point. */
+/* Decides two faces with a common edge. Faces in different planes have no other common point. */
 static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3])
 {
     for (int k = 0; k < 3; k++)
@@ -78,8 +79,9 @@ static ebpo_pair_kind one_edge(const double a[3][3], const double b[3][3])
     return ebpo_triangle_pair(a, b) == EBPO_PAIR_COPLANAR ? EBPO_PAIR_COPLANAR : EBPO_PAIR_APART;
 }
 
-/* As ebpo_triangle_pair, but returns EBPO_PAIR_APART where the common points are the corner, or the
- * edge between corners, that both faces have (equal coordinates). Swapping changes nothing. */
+/* As ebpo_triangle_pair, but returns EBPO_PAIR_APART if the only common points are a corner, or the
+ * edge between corners, that both faces have (equal coordinates). The result does not change when
+ * the faces are swapped. */
 static ebpo_pair_kind neighbour_kind(const double a[3][3], const double b[3][3])
 {
     int shared = 0, in_a = 0, in_b = 0;
@@ -152,7 +154,7 @@ void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
     g->limit = g->square = g->best = INFINITY;
     g->tolerance = 0;
     g->way_number = 0;
-    for (int k = 0; k < 3; k++) /* use the direction of the centres instead */
+    for (int k = 0; k < 3; k++) /* use the direction between the centres instead */
         g->way[k] = k == 0;
     ebpo_gap_set_way(g, g->way);
     double centre[2][3];
@@ -196,7 +198,7 @@ static float float_dot(const float a[3], const float b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Makes the direction shorter than 1, so that gaps along it are not too great. */
+/* Makes the direction slightly shorter than 1, so that computed gaps along it are not too great. */
 void ebpo_gap_set_way(ebpo_gap_search *g, const float way[3])
 {
     float length = sqrtf(float_dot(way, way));

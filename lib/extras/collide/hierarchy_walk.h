@@ -9,10 +9,10 @@
 #include "extras/collide/face_pairs.h"
 #include "extras/collide/posed_frames.h"
 
-/* Children of nodes, each as the node's number << 3 | lane. */
+/* A pair of children of nodes, each given as the node's number << 3 | lane. */
 typedef struct ebpo_node_pair {
     uint32_t a, b;
-    float key; /* the first contact visits greater keys first */
+    float key; /* the search for the first contact visits greater keys first */
 } ebpo_node_pair;
 
 /* Intersecting faces, by their local numbers. */
@@ -21,17 +21,19 @@ typedef struct ebpo_found_pair {
     int32_t kind; /* ebpo_pair_kind, not EBPO_PAIR_APART */
 } ebpo_found_pair;
 
-/* A node's children in both frames: rotated relative to the node's origin, not moved to the
- * other's. */
+/* A node's children in the frames of both models. Coordinates are relative to the node's origin:
+ * rotated to the other frame, but not translated. */
 typedef struct ebpo_turned_node {
     _Alignas(32) float c[3][8], e[3][8]; /* middles and half sides of boxes */
-    float c2[3][8], e2[3][8];            /* boxes around these along the other's axes */
+    float c2[3][8], e2[3][8];            /* boxes around these boxes, along the axes of the other
+                                          * frame */
     float axis[3][8], axis2[3][8];       /* axes of cylinders, of length 1 */
     float mid[3][8], mid2[3][8];         /* middles of cylinders */
     float half[8], radius[8], extent[8]; /* extent: the sum of the half sides */
-    double origin[3];                    /* in the first's frame, for both */
-    float size;                          /* no box is longer */
-    uint32_t node;                       /* EBPO_NO_CHILD: none is kept here */
+    double origin[3];                    /* the node's origin in the first model's frame, for nodes
+                                          * of both models */
+    float size;                          /* longest side of all boxes */
+    uint32_t node;                       /* EBPO_NO_CHILD: the entry is empty */
     uint8_t lanes;
     bool slabs; /* at least one child has a cylinder */
 } ebpo_turned_node;
@@ -55,10 +57,11 @@ struct ebpo_pair_walk {
     const ebpo_accel_pair *pair;
     const ebpo_walk_kernels *kernels;
     const ebpo_pair_kernels *filter;
-    bool first;          /* ends with the first intersecting pair; visits siblings by greatest
-                          * overlap */
-    bool self;           /* both are one accel at one pose: each pair of faces comes once */
-    bool neighbours;     /* the faces are of one mesh: a common corner or edge is no contact */
+    bool first;      /* the walk ends with the first intersecting pair; it visits siblings by
+                      * greatest overlap */
+    bool self;       /* both accels are the same one at one pose: each pair of faces comes once */
+    bool neighbours; /* the faces are of one mesh: a common corner or edge of neighbours is no
+                      * contact */
     uint32_t begin, end; /* range of faces of the first accel */
     ebpo_node_pair *stack;
     uint64_t top, capacity;
@@ -74,7 +77,8 @@ struct ebpo_pair_walk {
 
 void ebpo_pair_walk_free(ebpo_pair_walk *walk);
 
-/* For kernels: decides the open pairs of two blocks. Returns false without memory. */
+/* For kernels: decides the pairs of two blocks that the filter has left. Returns false without
+ * memory. */
 bool ebpo_pair_walk_decide(ebpo_pair_walk *walk, uint32_t block_a, uint32_t block_b,
                            const ebpo_block_pairs *pairs);
 /* For kernels: makes space for more pairs on the stack. */
@@ -86,14 +90,15 @@ void ebpo_posed_triangle(const ebpo_accel *accel, const ebpo_posing *posing, uin
 
 /* --- the nearest pair of faces ---
  *
- * Lengths are those of the world times the posings' unit. No dropped pair is nearer than `limit`.
+ * All lengths are world lengths times the posings' unit. No dropped pair is nearer than `limit`.
  * Bounds: docs/develop/collision.md, "Bounds of pairs of nodes". */
 
-/* A pair of children: node * 8 + lane of each. */
+/* A pair of children, each given as the node's number * 8 + lane. */
 typedef struct ebpo_gap_visit {
-    float key; /* squared lower bound; where nodes intersect, negative: how little they overlap */
+    float key; /* squared lower bound; negative where nodes intersect: the nearer to 0, the less
+                * they overlap */
     uint32_t child[2];
-    uint32_t way; /* the direction that the key includes */
+    uint32_t way; /* number of the direction for which the key was computed */
 } ebpo_gap_visit;
 
 /* A pair of faces, by slots, whose distance is at least `low`. */
@@ -102,12 +107,12 @@ typedef struct ebpo_gap_candidate {
     uint32_t slot[2];
 } ebpo_gap_candidate;
 
-/* Eight children of a node in their own frame and in the other one. */
+/* Eight children of a node, in the node's frame and in the other model's frame. */
 typedef struct ebpo_gap_node {
     _Alignas(32) float centre[2][3][8], half[2][3][8]; /* boxes */
     float axis[2][3][8], middle[2][3][8];              /* middles and unit axes of cylinders */
     float thick[8], radius[8];                         /* half-widths along the axis and radii */
-    float reach[8]; /* extents along the direction of the search, in its frame */
+    float reach[8]; /* extents along the direction of the search, in the node's frame */
     uint32_t node, way;
 } ebpo_gap_node;
 
@@ -118,24 +123,27 @@ struct ebpo_gap_search {
     const ebpo_accel *accel[2];
     ebpo_block_posing posing[2];
     ebpo_two_frames frames;
-    float limit;     /* pairs that are certainly farther do not matter */
+    float limit;     /* pairs that are certainly farther apart do not matter */
     float square;    /* the value that squared lower bounds are compared with */
     float tolerance; /* an improvement smaller than this does not matter */
-    float best; /* upper bound of the distance of the pair best_slot; INFINITY: none is known */
+    float best; /* upper bound of the distance of the faces best_slot; INFINITY: no pair is known */
     uint32_t best_slot[2];
-    float way[3]; /* a direction in the world, from A to B, along which they may be far apart */
-    float along[2][3], along_shift; /* the same in both frames, each towards the other model */
+    float
+        way[3]; /* a direction in the world, from A to B, along which the models may be far apart */
+    float along[2][3], along_shift; /* the same direction in both frames, in each one towards the
+                                     * other model */
     uint32_t way_number;
 
     void *user;
     bool (*judge)(ebpo_gap_search *search); /* decides all waiting pairs; returns false when enough
                                              * is known */
-    bool (*go_on)(ebpo_gap_search *search); /* called from time to time */
-    bool ended;                             /* before all pairs were visited */
+    bool (*go_on)(ebpo_gap_search *search); /* called from time to time; returns false to end the
+                                             * walk */
+    bool ended;                             /* the walk ended before all pairs were visited */
     bool no_memory;
 
-    /* Pairs to be visited. Until a limit is known it is a stack; then a heap with the least key
-     * first: stack[i] has no greater key than stack[2 i + 1] and stack[2 i + 2]. */
+    /* Pairs to be visited. Until a limit is known this is a stack; then a heap with the least key
+     * first: the key of stack[i] is at most the keys of stack[2 i + 1] and stack[2 i + 2]. */
     ebpo_gap_visit *stack;
     uint64_t count, capacity;
     bool is_heap;
@@ -150,8 +158,8 @@ struct ebpo_gap_search {
 /* Returns NULL without memory. */
 ebpo_gap_search *ebpo_gap_new(void);
 void ebpo_gap_free(ebpo_gap_search *g);
-/* Sets all but user, judge, go_on; the distance is unknown, the tolerance is 0. `reach` as for
- * ebpo_block_unit. */
+/* Sets all members except user, judge and go_on; the distance is unknown, the tolerance is 0.
+ * `reach` is as for ebpo_block_unit. */
 void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
                     const ebpo_posing posing[2], double reach);
 /* Sets the limit beyond which pairs do not matter. It is never raised. */
@@ -166,8 +174,9 @@ bool ebpo_gap_capacity(ebpo_gap_search *g);
 /* Makes space for a block's pairs among the waiting ones. Returns false if judge returned false. */
 bool ebpo_gap_wait_capacity(ebpo_gap_search *g);
 
-/* Walks through all pairs from the tops on; the waiting pairs may then be nearest. After an early
- * end the stack has the unvisited pairs. Compiled twice, with the same results. */
+/* Walks through all pairs, beginning with the tops. Afterwards, the waiting pairs may be nearest.
+ * After an early end, the stack has the pairs that were not visited. Compiled twice, with the same
+ * results. */
 typedef struct ebpo_gap_kernels {
     void (*walk)(ebpo_gap_search *g);
 } ebpo_gap_kernels;

@@ -1,10 +1,10 @@
 /* Finds faces of one mesh that intersect other than as neighbours.
  *
- * The mesh becomes a temporary file, which is opened as a model with a memory budget, so the mesh
- * may be larger than memory. Only its faces matter, so it is built as a surface without planes,
- * which takes a fraction of the time. The crossings are those of the model with itself
- * (ebpo_collide_self_posed); the mesh in memory gives their positions. An optional PLY file shows
- * the faces in red. */
+ * The mesh is written to a temporary file, which is opened as a model with a memory budget, so the
+ * mesh may be larger than memory. The search needs only the faces, so the model is built as a
+ * surface without planes, which takes a fraction of the time. The crossings are those of the model
+ * with itself (ebpo_collide_self_posed); the mesh in memory gives their positions. An optional PLY
+ * file shows the faces in red. */
 #include "core/strict_fp.h"
 
 #include <stdio.h>
@@ -30,7 +30,7 @@ typedef struct crossings {
     ebpo_file *file;
     ebpo_model *model;
     ebpo_collider *collider;
-    ebpo_publish target; /* target of the PLY file, if one is wanted */
+    ebpo_publish target; /* the PLY file, if the caller wants one */
     ebpo_crossings_summary sum;
     uint64_t *intersected; /* a bit for each face, by its number in the source */
     bool enough;
@@ -50,14 +50,15 @@ static ebpo_status build_model(crossings *c, ebpo_mesh *mesh, const ebpo_mesh_re
     return ebpo_build(mesh, &surface, NULL, &how, &c->tree, error);
 }
 
-/* Frees the levels: besides the file, the search needs only the mesh, for positions. */
+/* Frees the levels: after writing, the search needs only the file, and the mesh for positions. */
 static void drop_levels(ebpo_tree *tree)
 {
     for (int i = 0; i < tree->info.level_count; i++)
         ebpo_level_free(&tree->level[i]);
 }
 
-/* libhdf5 needs a name, so the file has one until it is open. */
+/* Writes the temporary file and opens it. libhdf5 needs a name, so the file has a name until it is
+ * open. */
 static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *error)
 {
     ebpo_write_options how = EBPO_WRITE_OPTIONS_INIT;
@@ -76,9 +77,9 @@ static ebpo_status store_model(crossings *c, const char *folder, ebpo_error *err
     return status;
 }
 
-/* The workspace has half of the allowed memory. Of the rest the model has half, and waiting pairs
- * an eighth. */
-enum { LEAST_MODEL = 1 << 20 }; /* for workspaces of tests; others have more */
+/* The workspace has half of the allowed memory. Of the other half, the model has half and waiting
+ * pairs have an eighth. */
+enum { LEAST_MODEL = 1 << 20 }; /* for tests with small workspaces; others have more */
 
 static ebpo_status make_collider(crossings *c, uint64_t memory, ebpo_error *error)
 {

@@ -1,11 +1,12 @@
 /* Computes the distance of two triangles: bounds in doubles, and exact comparisons.
  *
- * Bounds come from a pair of near points, which need not be the nearest: its distance bounds from
- * above, the planes perpendicular to the line between the points from below. All coordinates are
- * relative to A's first corner, so the position of the faces does not matter. Where bounds do not
- * decide, the squared distance is a fraction of integers: the least over corners and faces, and
- * over edges whose inner points are nearest. docs/develop/collision.md, "Distance of two faces".
- * Pure functions, any thread; the results are the same with every compiler and its flags. */
+ * Bounds come from a pair of near points, which need not be the nearest. The distance of these
+ * points is an upper bound. The planes through them, perpendicular to the line between them, give a
+ * lower bound. All coordinates are relative to A's first corner, so the position of the faces does
+ * not matter. Where bounds do not decide, the squared distance is computed as a fraction of
+ * integers: the least value over corners and faces, and over edges whose inner points are nearest.
+ * See docs/develop/collision.md, "Distance of two faces". Pure functions, any thread; the results
+ * are the same with every compiler and its flags. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -25,11 +26,11 @@ static double within_unit(double t) { return t > 0 ? (t < 1 ? t : 1) : 0; }
 /* The best pair of points so far, relative to A's first corner. */
 typedef struct search {
     double face[2][3][3];
-    double reach; /* bound of the 1-norms of corners */
+    double reach; /* bound of the corners' 1-norms */
     double square, point[2][3];
     int feature[2];
-    double
-        space; /* of the points: distance from the ends of their features, as a part of the reach */
+    double space; /* distance of the points from the ends of their features, as a fraction of
+                     `reach` */
 } search;
 
 static void offer_points(search *s, int first, const double p[3], const double q[3], int on_p,
@@ -58,7 +59,8 @@ static void point_along(const double from[3], const double edge[3], double t, do
 
 static int on_edge(int i, double t) { return t == 0 ? i : t == 1 ? (i + 1) % 3 : 3 + i; }
 
-/* Returns the length to the nearer end; ends are exact. */
+/* Returns the length from the point to the nearer end of the edge; INFINITY at an end, as ends are
+ * exact. */
 static double capacity_on_edge(double t, double square)
 {
     return t == 0 || t == 1 ? INFINITY : fmin(t, 1 - t) * sqrt(square);
@@ -87,7 +89,8 @@ static void offer_edges(search *s, int i, int j)
 
 /* --- corners with planes --- */
 
-/* Only corners over the inner part matter: edges cover the rest. */
+/* Offers a corner that is above the interior of the other face. Other corners do not matter: edges
+ * cover them. */
 static void offer_corner(search *s, int of, int i)
 {
     double(*plane)[3] = s->face[!of];
@@ -132,7 +135,7 @@ static bool see_from_corner(const double a[3][3], const double b[3][3], search *
     return s->reach < max_reach && s->reach > least_reach;
 }
 
-/* Returns the gap between the faces along n, which is not 0, less a bound of the rounding. */
+/* Returns the gap between the faces along n, less a bound of the rounding. n is not 0. */
 static double gap_along(const search *s, const double n[3])
 {
     double least = INFINITY, most = -INFINITY, d[3];
@@ -154,9 +157,9 @@ static bool is_on(int corner, int feature)
            (feature >= 3 && (corner == feature - 3 || corner == (feature - 2) % 3));
 }
 
-/* Returns true if all corners outside the points' features are strictly behind A's point and ahead
- * of B's along n, by more than the error of n and the points: docs/develop/collision.md, "Which
- * features are nearest". */
+/* Returns true if the features of the points are certainly nearest. Then, along n, A's other
+ * corners are strictly behind A's point and B's other corners are ahead of B's point, by more than
+ * the error of n and of the points: docs/develop/collision.md, "Which features are nearest". */
 static bool features_certain(const search *s, const double n[3])
 {
     const double enough = 0x1p-24;
@@ -173,7 +176,8 @@ static bool features_certain(const search *s, const double n[3])
     return true;
 }
 
-/* Compares the corners of two features in a canonical order. */
+/* Returns true if the corners of two features are equal; corners are compared in a canonical order.
+ */
 static bool same_feature(const double a[3][3], int on_a, const double b[3][3], int on_b)
 {
     int count = on_a < 3 ? 1 : on_a < 6 ? 2 : 3, most = on_b < 3 ? 1 : on_b < 6 ? 2 : 3;
@@ -190,8 +194,8 @@ static bool same_feature(const double a[3][3], int on_a, const double b[3][3], i
     return true;
 }
 
-/* Returns true if each face lies in a plane across one axis and one is over the other: their
- * distance is that of these two planes. */
+/* Returns true if each face lies in a plane perpendicular to the same axis and one face is above
+ * the other: their distance is that of the two planes. */
 static bool level_faces(const double a[3][3], const double b[3][3], double level[2])
 {
     for (int k = 0; k < 3; k++) {
@@ -276,7 +280,7 @@ static int fraction_compare(const fraction *f, const fraction *g)
     return order;
 }
 
-/* Takes the lesser one; a denominator of 0 means none so far. */
+/* Takes the lesser fraction. A denominator of 0 means: none so far. */
 static void take_lesser(fraction *best, const fraction *other)
 {
     if (mpz_sgn(best->denominator) != 0 && fraction_compare(other, best) >= 0)
@@ -327,7 +331,8 @@ static bool within_edge(edges *e, int of)
     return mpz_sgn(e->share) >= 0 && mpz_cmp(e->share, e->length2) <= 0;
 }
 
-/* Returns false if the edges are parallel or an end is nearer. */
+/* Computes the squared distance of two edges. Returns false if they are parallel or an end is
+ * nearer. */
 static bool edges_square(edges *e, fraction *out)
 {
     ebpo_vectorz_subtract(&e->between, &e->from[1], &e->from[0]);
@@ -405,7 +410,7 @@ static void squared_distance(const double a[3][3], const double b[3][3], int uni
         mpz_set_ui(out->denominator, 1);
         return;
     }
-    ebpo_pair_distance_bounds bounds; /* a farther pair is not the least */
+    ebpo_pair_distance_bounds bounds; /* a pair that is farther is not the nearest one */
     ebpo_triangles_distance_bounds(a, b, &bounds);
     mpz_set_ui(out->denominator, 0);
     take_corners(out, a, b, bounds.hi, unit);

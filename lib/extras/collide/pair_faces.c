@@ -1,5 +1,5 @@
-/* Looks up the faces of pairs by their numbers in the file, and computes where crossing ones
- * intersect.
+/* Looks up the faces of pairs by their numbers in the file, and computes the intersections of
+ * crossing faces.
  *
  * A whole model is in memory: its slots give the position of each face in the blocks. Faces of a
  * model in parts are read through the cache of chunks. ebpo_posing_apply poses a pair, as in all
@@ -94,7 +94,8 @@ ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face, dou
 
 /* --- contact segments --- */
 
-/* Makes slots of the models that are in memory, once for a collider. Fails with EBPO_E_MEMORY. */
+/* Makes the slots of the models that are in memory, once for each collider. Fails with
+ * EBPO_E_MEMORY. */
 static ebpo_status make_slots(ebpo_collider *c, ebpo_error *error)
 {
     for (int i = 0; i < 2; i++) {

@@ -1,5 +1,5 @@
-/* Looks up the faces of pairs by their numbers in the file, at their poses, and computes where
- * crossing ones intersect. */
+/* Looks up the faces of pairs by their numbers in the file, at their poses, and computes the
+ * intersections of crossing faces. */
 #ifndef EBPO_COLLIDE_PAIR_FACES_H
 #define EBPO_COLLIDE_PAIR_FACES_H
 
@@ -7,18 +7,18 @@
 #include "query/accel.h"
 #include "query/query_model.h"
 
-/* Returns the slots of the faces in the blocks of a subtree or a whole model, by local numbers,
- * which in a whole model are those in the file. Returns NULL without memory. The caller frees it.
- */
+/* Returns the slot of each face in the blocks of a subtree or a whole model. The index is the
+ * face's local number, which in a whole model is its number in the file. Returns NULL without
+ * memory. The caller frees the array. */
 uint32_t *ebpo_face_slots(const ebpo_accel *subtree);
 
-/* Reads corners of single faces by their numbers in the file: of a whole model from its blocks, of
- * one in parts through its cache of chunks. One thread. */
+/* Reads corners of single faces by their numbers in the file: faces of a whole model from its
+ * blocks, faces of a model in parts through its cache of chunks. One thread. */
 
 typedef struct ebpo_faces_by_number {
     const ebpo_model *model;
     const uint32_t *slots;           /* for a whole model: ebpo_face_slots; else NULL */
-    ebpo_held_chunk faces, vertices; /* the last chunks */
+    ebpo_held_chunk faces, vertices; /* the chunks that were used last */
 } ebpo_faces_by_number;
 
 void ebpo_faces_by_number_begin(ebpo_faces_by_number *f, const ebpo_model *model,
@@ -26,15 +26,17 @@ void ebpo_faces_by_number_begin(ebpo_faces_by_number *f, const ebpo_model *model
 /* Returns the exact corners in the file. Fails with the errors of reading. */
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_get(ebpo_faces_by_number *f, uint64_t face,
                                                    double out[3][3], ebpo_error *error);
-/* Returns, for a model in parts, a face's vertices, and a vertex, as in the file. */
+/* For a model in parts: return a face's vertices, and the coordinates of a vertex, as in the file.
+ */
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_corners(ebpo_faces_by_number *f, uint64_t face,
                                                        uint32_t out[3], ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_faces_by_number_vertex(ebpo_faces_by_number *f, uint64_t vertex,
                                                       double out[3], ebpo_error *error);
-/* Releases the chunks that it holds; a zero struct is allowed. */
+/* Releases the chunks that `f` holds; a zero struct is allowed. */
 void ebpo_faces_by_number_end(ebpo_faces_by_number *f);
 
-/* A pair with its faces, of the caller's A and B: as in the files, and at their poses. */
+/* A pair with its faces, of the caller's A and B: with coordinates as in the files, and at their
+ * poses. */
 typedef struct ebpo_posed_pair {
     double own[2][3][3], corner[2][3][3];
 } ebpo_posed_pair;

@@ -1,9 +1,9 @@
-/* Filters pairs of faces, eight at a time in floats: finds which are certainly apart and which
- * certainly cross. It is compiled for several instruction sets with the same results.
+/* Filters pairs of faces, eight at a time in floats: finds pairs that are certainly apart and pairs
+ * that certainly cross. It is compiled for several instruction sets with the same results.
  *
  * Boxes are compared first, then the sides of both planes, then the intervals on the common line of
- * the planes, each with a proved error bound. All others are open and are decided exactly. Letters
- * are those of docs/develop/collision.md. */
+ * the planes, each with a proved error bound. All other pairs are undecided; the caller decides
+ * them exactly. Letters are those of docs/develop/collision.md. */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -82,7 +82,8 @@ typedef struct sides8 {
     unsigned same, certain;
 } sides8;
 
-/* d: corners of the other face less the plane's first one; bound: error of determinants. */
+/* Finds the sides of a plane. d: corners of the other face less the plane's first corner; bound:
+ * error of determinants. */
 EBPO_EIGHT sides8 sides_of8(vector8 e1, vector8 e2, const vector8 d[3], f8 bound)
 {
     vector8 n = vector8_cross(e1, e2);
@@ -102,8 +103,8 @@ EBPO_EIGHT sides8 sides_of8(vector8 e1, vector8 e2, const vector8 d[3], f8 bound
 
 /* --- the common line --- */
 
-/* Masks of the corner that is alone on its side (2 where neither 0 nor 1), and of its being above.
- */
+/* Masks for a face: which corner is alone on its side of the other plane (corner 2 if neither 0 nor
+ * 1), and if that corner is above the plane. */
 typedef struct alone8 {
     f8 is0, is1, above;
 } alone8;
@@ -119,7 +120,7 @@ EBPO_EIGHT alone8 alone_of8(const f8 above[3])
     return out;
 }
 
-/* Returns corner `first` after the one that is alone. */
+/* Returns the corner that follows the corner that is alone, by `first` positions. */
 EBPO_EIGHT vector8 turned_corner8(const face8 *f, const alone8 *alone, int first)
 {
     const vector8 *c = f->corner;
@@ -127,7 +128,8 @@ EBPO_EIGHT vector8 turned_corner8(const face8 *f, const alone8 *alone, int first
                         vector8_pick(alone->is1, c[(first + 1) % 3], c[(first + 2) % 3]));
 }
 
-/* Decides pairs whose signs are certain: intervals on the common line are apart, or overlap. */
+/* Decides pairs whose signs are certain: their intervals on the common line are apart, or overlap.
+ */
 EBPO_EIGHT ebpo_pair_masks on_line8(const face8 *a, const face8 *b, const sides8 *side_a,
                                     const sides8 *side_b, f8 bound)
 {
@@ -167,7 +169,7 @@ EBPO_EIGHT f8 edges_size8(vector8 e1, vector8 e2, f8 e)
     return f8_add(f8_max(vector8_size(e1), vector8_size(e2)), f8_mul(e, f8_all(4)));
 }
 
-/* Decides faces without boxes. `out`: those known to be apart. */
+/* Decides faces without comparing boxes. `out`: pairs that are already known to be apart. */
 EBPO_EIGHT ebpo_pair_masks decide_faces8(const face8 *a, const face8 *b, f8 e, ebpo_pair_masks out)
 {
     vector8 e1 = vector8_less(a->corner[1], a->corner[0]),

@@ -2,9 +2,9 @@
  * have a common point.
  *
  * Seen along the direction both faces are convex polygons with heights. The difference of heights
- * is concave where they overlap, so it is greatest over a corner of one polygon or where edges
- * cross. The exact time is a fraction of integers (GMP). A bound in doubles comes from separating
- * axes: normals, and products of edges with each other and with the direction.
+ * is concave where the polygons overlap, so it is greatest over a corner of one polygon or where
+ * edges cross. The exact time is a fraction of integers (GMP). A bound in doubles comes from
+ * separating axes: normals, and cross products of edges with each other and with the direction. See
  * docs/develop/collision.md, "Separation distance along a direction". Pure functions, any thread.
  */
 #include "core/strict_fp.h"
@@ -57,7 +57,7 @@ double ebpo_sweep_time_round(const ebpo_sweep_time *t)
 /* --- in integers --- */
 
 typedef struct sweep {
-    ebpo_vectorz d, corner[2][3]; /* corners of the moving face, and of the other */
+    ebpo_vectorz d, corner[2][3]; /* direction; corners of the moving face, and of the other face */
     ebpo_vectorz u, v, w, n, m;
     mpz_t top, bottom, share;
     ebpo_sweep_time *best;
@@ -91,8 +91,8 @@ static void triple_product(sweep *s, mpz_t out, const ebpo_vectorz *x, const ebp
     ebpo_vectorz_dot(out, x, &s->m);
 }
 
-/* Takes top / bottom as a time of contact. `other`: it was computed from the face that does not
- * move, so its sign is reversed. */
+/* Takes top / bottom as a time of contact. `other`: the time was computed from the face that does
+ * not move, so its sign is reversed. */
 static void take_time(sweep *s, bool other)
 {
     if (mpz_sgn(s->bottom) < 0) {
@@ -148,7 +148,7 @@ static bool is_over(sweep *s, const ebpo_vectorz *corner, int of)
     return signs[0] == 0 || signs[2] == 0;
 }
 
-/* Compares corners of face `of` with the other one, which is not parallel to the direction. */
+/* Compares the other face's corners with face `of`, which is not parallel to the direction. */
 static void corners_and_face(sweep *s, int of)
 {
     (void)find_normal(s, !of);
@@ -255,11 +255,12 @@ void ebpo_sweep_last(const double a[3][3], const double b[3][3], const double di
 
 /* --- bounds --- */
 
-/* Times that each direction n restricts in turn: n . d t lies between the extents' differences. */
+/* Interval of times, which each separating direction n restricts in turn: n . d t is between the
+ * differences of the extents. */
 typedef struct bounding {
-    double x[3][3], y[3][3], reach; /* relative to the first corner */
+    double x[3][3], y[3][3], reach; /* corners relative to the first corner */
     const double *d;
-    double most; /* negative: none */
+    double most; /* negative: there is no time */
 } bounding;
 
 static void bound_by(bounding *b, const double n[3])

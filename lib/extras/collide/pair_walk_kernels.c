@@ -2,10 +2,10 @@
  * floats. It is compiled for several instruction sets with the same results.
  *
  * Boxes and bounding cylinders of one model's nodes are transformed into the other model's frame
- * and compared on the axes of both. Bounds are rounded outwards, so nothing is lost. The larger of
- * two nodes is divided first. Two blocks go to the filter of pairs (pair_filter_kernels.c);
- * ebpo_pair_walk_decide decides the open ones. docs/develop/collision.md, "Going down two
- * hierarchies". */
+ * and compared along the axes of both. Bounds are rounded outwards, so no pair is lost. The larger
+ * of two nodes is divided first. Two blocks go to the filter of pairs (pair_filter_kernels.c);
+ * ebpo_pair_walk_decide decides the pairs that the filter leaves undecided. See
+ * docs/develop/collision.md, "Going down two hierarchies". */
 #include "core/strict_fp.h"
 
 #include "core/simd.h"
@@ -46,7 +46,7 @@ EBPO_EIGHT void turn_boxes(const ebpo_accel_pair *p, int side, const ebpo_bound 
     store_vector8(out->e2, e2);
 }
 
-/* A cylinder without an axis gives no bound. */
+/* Decodes and rotates bounding cylinders. A cylinder without an axis gives no bound. */
 EBPO_EIGHT void turn_slabs(const ebpo_accel_pair *p, int side, const ebpo_bound_slab *s,
                            ebpo_turned_node *out, const f8 c[3])
 {
@@ -98,8 +98,8 @@ EBPO_EIGHT const ebpo_turned_node *turned_node(ebpo_pair_walk *w, int side, uint
 
 /* --- eight children against one --- */
 
-/* Compares P's and Q's eight children; `in_p`: Q's origin less P's along P's axes, `in_q`: P's less
- * Q's along Q's axes. */
+/* Eight children of P and eight of Q. `in_p`: Q's origin less P's, in P's frame; `in_q`: P's origin
+ * less Q's, in Q's frame. */
 typedef struct two_nodes {
     const ebpo_turned_node *p, *q;
     float in_p[3], in_q[3];
@@ -149,7 +149,7 @@ EBPO_EIGHT f8 box_gaps(const two_nodes *t, int j)
     return gap;
 }
 
-/* Returns the same along both cylinders' axes; everything is in P's frame. */
+/* Returns the greatest gap along the axes of both cylinders; all coordinates are in P's frame. */
 EBPO_EIGHT f8 slab_gaps(const two_nodes *t, int j)
 {
     const ebpo_turned_node *p = t->p, *q = t->q;
@@ -203,16 +203,17 @@ EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, floa
 
 /* --- pairs of nodes --- */
 
-/* For the first contact, the pairs into which one pair of nodes was divided are a group, at the top
- * of the stack. Its deepest overlap is found only when needed, as most groups are left early. Below
- * a group is a mark with the start of the group before it. */
+/* For the first contact, the pairs into which one pair of nodes was divided are a group at the top
+ * of the stack. The group's deepest overlap is found only when needed, as most groups are left
+ * early. Below each group is a mark with the start of the previous group. */
 EBPO_EIGHT void open_group(ebpo_pair_walk *w)
 {
     w->stack[w->top++] = (ebpo_node_pair){ 0, (uint32_t)w->group, 0 };
     w->group = w->top;
 }
 
-/* Pops the deepest overlap; of equals the last one. Returns false if there is none. */
+/* Pops the pair with the deepest overlap; of equals, the last one. Returns false if there is none.
+ */
 EBPO_EIGHT bool pop_deepest(ebpo_pair_walk *w, ebpo_node_pair *out)
 {
     ebpo_node_pair *s = w->stack;
@@ -237,8 +238,9 @@ EBPO_EIGHT void push_pair(ebpo_pair_walk *w, uint32_t a, uint32_t b, float key)
     w->stack[w->top++] = (ebpo_node_pair){ a, b, key };
 }
 
-/* Pairs the children of A's node with those of B's among `of_b`. Collects a bit for each pair
- * first: the processor predicts one loop over these better than one for each child. */
+/* Pairs the children of A's node with those children of B's node that are in `of_b`. Collects a bit
+ * for each pair first: the processor predicts one loop over these bits better than a loop for each
+ * child. */
 EBPO_EIGHT void both_down(ebpo_pair_walk *w, const ebpo_turned_node *p, const ebpo_turned_node *q,
                           unsigned of_b, bool first)
 {
@@ -272,7 +274,7 @@ EBPO_EIGHT unsigned near_one(const ebpo_pair_walk *w, int side, const ebpo_turne
     return near_children_of(&t, (int)(one & 7), first, key);
 }
 
-/* Pairs the children on side `down` with the other one, an undivided child of q. */
+/* Pairs the children on side `down` with the undivided child of q on the other side. */
 EBPO_EIGHT void one_down(ebpo_pair_walk *w, ebpo_node_pair r, int down, uint32_t node,
                          const ebpo_turned_node *q, bool first)
 {
@@ -287,7 +289,7 @@ EBPO_EIGHT void one_down(ebpo_pair_walk *w, ebpo_node_pair r, int down, uint32_t
     }
 }
 
-/* If one child is this many times longer, it is divided first. */
+/* A child this many times longer than the other one is divided first. */
 #define LONGER 4.0f
 
 /* Returns which of two children is divided: 0, 1, or 2 for both. */
@@ -328,8 +330,8 @@ static const ebpo_posed_faces *posed_faces(ebpo_pair_walk *w, int side, uint32_t
     return posed_faces_of(w->posed[side], w->pair->accel[side], w->pair->posing[side], block);
 }
 
-/* Moves the second's faces relative to the first's base; ebpo_posed_block_place explains the error.
- */
+/* Moves the second model's faces: makes them relative to the first one's base. The error is
+ * explained at ebpo_posed_block_place. */
 EBPO_EIGHT float place_faces(const ebpo_posed_faces *b, double unit, const double origin[3],
                              float out[9][8])
 {

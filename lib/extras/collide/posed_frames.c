@@ -4,8 +4,8 @@
  * A unit, a power of two, brings posed coordinates into the range of floats. Blocks are rotated in
  * floats and placed relative to their first vertex, whose posed coordinates are doubles. Matrices
  * between frames come with the sizes of their entries, from which the kernels bound their errors.
- * Where frames are too different for floats, nothing is dropped. docs/develop/collision.md, "From
- * blocks to the filter". Pure functions, any thread. */
+ * Where two frames are too different for floats, no pair is dropped. See docs/develop/collision.md,
+ * "From blocks to the filter". Pure functions, any thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -120,7 +120,8 @@ static void to_floats(const double m[3][3], float out[3][3], float size[3][3])
     }
 }
 
-/* Visits every pair of nodes: the frames are too different or too extreme for floats. */
+/* Makes the walk visit every pair of nodes: the frames are too different or too extreme for floats.
+ */
 static void inspect_all(ebpo_accel_pair *out)
 {
     out->unit[0] = out->unit[1] = 1;
@@ -133,7 +134,8 @@ static void inspect_all(ebpo_accel_pair *out)
     out->slabs = out->apart = false;
 }
 
-/* Compares along the axes of the first's frame; spheres would not be better. */
+/* Returns true if the boxes of both models are certainly apart. Compares along the axes of the
+ * first model's frame; spheres would not be better. */
 static bool turned_boxes_apart(const ebpo_accel_pair *p)
 {
     double first = p->accel[0]->reach * (double)p->unit[0],
@@ -148,7 +150,7 @@ static bool turned_boxes_apart(const ebpo_accel_pair *p)
     return false;
 }
 
-/* per_world: lengths in each frame for one in the world. */
+/* Chooses the unit of both frames. per_world: length in each frame of a world length of 1. */
 static void choose_units(ebpo_accel_pair *out, const double per_world[2])
 {
     double ratio = per_world[0] / per_world[1];
@@ -203,7 +205,8 @@ static double greatest_coordinate(const double x[3])
     return fmax(fabs(x[0]), fmax(fabs(x[1]), fabs(x[2])));
 }
 
-/* Computes frame `from` relative to frame `to`; offset: from's centre less to's, in the world. */
+/* Computes the position of frame `from` in frame `to`; offset: centre of `from` less centre of
+ * `to`, in the world. */
 static void turn_into(ebpo_turned_frame *out, double from[3][3], double to[3][3],
                       const double offset[3])
 {

@@ -1,10 +1,10 @@
-/* Classifies points of the world by the sides of posed solids, exact on posed coordinates.
+/* Classifies points of the world by the sides of posed solids, exactly for posed coordinates.
  *
- * The point is brought into the model's coordinates with an error bound. If no face is near, the
- * result is the winding number there. Otherwise the faces near the point are posed and decide.
- * Axis-parallel segments lead from a point farther away, whose winding number is known, to the
- * queried point, and their crossings are counted exactly. Points with fractions as coordinates are
- * reached from the nearest double in three such segments.
+ * The point is transformed into the model's coordinates with an error bound. If no face is near,
+ * the result is the winding number there. Otherwise the faces near the point are posed, and they
+ * decide: axis-parallel segments lead from a point farther away, whose winding number is known, to
+ * the query point, and their crossings with faces are counted exactly. A point with fractions as
+ * coordinates is reached from the nearest double in three such segments.
  *
  * Solids are not changed: any thread may use them, each with a separate context. Proofs:
  * docs/develop/booleans.md and docs/develop/collision.md, "Relation of two models". */
@@ -61,7 +61,7 @@ bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b)
 
 /* --- points in the coordinates of the model --- */
 
-/* Factor above the rounding of a bound's own computation. */
+/* Factor that covers the rounding of a bound's own computation. */
 static const double more = 1 + 0x1p-40;
 
 static void bound_box(ebpo_posed_solid *s)
@@ -147,7 +147,7 @@ void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double 
     }
 }
 
-/* Finds whether certainly no face of the model is within `doubt` of p. */
+/* Sets *clear to true if certainly no face of the model is within `doubt` of p. */
 static ebpo_status is_clear_of_faces(ebpo_context *context, const double p[3], double doubt,
                                      bool *clear, ebpo_error *error)
 {
@@ -165,19 +165,18 @@ static ebpo_status is_clear_of_faces(ebpo_context *context, const double p[3], d
 
 /* --- sides of a point --- */
 
-/* --- faces --- */
-
 typedef struct looking {
     const ebpo_posed_solid *solid;
     const double *w;
-    int axis;              /* axis of the segment, */
-    double low[3], to;     /* from `low` to `to` */
-    int32_t crossed, jump; /* winding numbers: end less beginning; above less below */
+    int axis;              /* axis of the segment */
+    double low[3], to;     /* the segment goes from `low` to coordinate `to` */
+    int32_t crossed, jump; /* winding number at the end less the one at the beginning; above the
+                            * point less below it */
     ebpo_posed_sides *out;
 } looking;
 
-/* Returns the axis that separates the two sides of a face: the first one that its plane is not
- * parallel to; -1: no area. */
+/* Returns the axis that separates the two sides of a face: the first axis that is not parallel to
+ * its plane; -1: the face has no area. */
 static int side_axis(const double t[3][3])
 {
     for (int k = 0; k < 3; k++)
@@ -198,7 +197,7 @@ static void take_on(looking *l, const double t[3][3])
 {
     int axis = side_axis(t);
     if (axis < 0)
-        return; /* gives no bound */
+        return; /* this point gives no bound */
     if (!l->out->on)
         memcpy(l->out->plane, t, sizeof l->out->plane);
     else if (!in_plane((const double(*)[3])l->out->plane, t))
@@ -227,8 +226,8 @@ static bool take_near_triangles(void *user, const ebpo_triangles *triangles)
 
 typedef struct anchor {
     double at[3];
-    int axis;        /* axis along which it is away from w */
-    int32_t winding; /* winding number there */
+    int axis;        /* axis along which the anchor is displaced from w */
+    int32_t winding; /* winding number at the anchor */
 } anchor;
 
 static ebpo_status try_anchor(const ebpo_posed_solid *s, ebpo_context *context, anchor *a,
@@ -248,7 +247,8 @@ static ebpo_status try_anchor(const ebpo_posed_solid *s, ebpo_context *context, 
     return status;
 }
 
-/* Tries points at increasing distances; one beyond the solid's box always succeeds. */
+/* Finds an anchor. Tries points at increasing distances from w; a point beyond the solid's box
+ * always succeeds. */
 static ebpo_status find_anchor(const ebpo_posed_solid *s, ebpo_context *context, const double w[3],
                                double step, anchor *a, ebpo_error *error)
 {
@@ -309,13 +309,14 @@ ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo_context *cont
 
 /* --- winding numbers at points with fractions --- */
 
-/* Points in units of 2^unit / denominator. */
+/* A path from w to x; coordinates in units of 2^unit / denominator. */
 typedef struct path {
     const ebpo_posed_solid *solid;
     const mpq_t *x;
     double w[3];
-    mpz_t denominator, number[4]; /* number: scratch */
-    ebpo_vectorz at[4];           /* w, then one coordinate after the other of x */
+    mpz_t denominator, number[4]; /* number: temporary values */
+    ebpo_vectorz at[4];           /* the point w, then one coordinate after the other is replaced by
+                                   * that of x */
     ebpo_vectorz corner[3];
     int32_t crossed;
 } path;
@@ -344,7 +345,7 @@ static void clear_path(path *p)
         ebpo_vectorz_clear(&p->corner[i]);
 }
 
-/* unit: 0 or less, so that x is an integer. */
+/* Converts the corners to integers. unit: 0 or less. */
 static void set_points(path *p, const double t[3][3], int unit)
 {
     for (int i = 0; i < 3; i++)
@@ -363,7 +364,7 @@ static void set_points(path *p, const double t[3][3], int unit)
     }
 }
 
-/* Returns the orientation of a, b, c seen against the axis. */
+/* Returns the orientation of a, b, c, seen in the direction opposite to the axis. */
 static int turn_of(path *p, int axis, const ebpo_vectorz *a, const ebpo_vectorz *b,
                    const ebpo_vectorz *c)
 {
@@ -409,7 +410,8 @@ static int side_of_plane(path *p, const ebpo_vectorz *at)
     return sign;
 }
 
-/* Counts the crossing of a face, along the axis from one point to another above it. */
+/* Counts the crossing of a face by the segment along the axis from one point to another above it.
+ */
 static int count_crossing(path *p, int axis, const ebpo_vectorz *from, const ebpo_vectorz *to)
 {
     int turn = side_of_line(p, axis, 0, from);

@@ -1,6 +1,6 @@
-/* Models at poses: their extent, and the exact side of a solid at a point of the world, on posed
- * coordinates. Proofs: docs/develop/booleans.md. Solids are not changed: any thread may use them,
- * each with a separate context. */
+/* Models at poses: their extent, and the exact side of a point of the world relative to a posed
+ * solid. Exact means: for posed coordinates. Proofs: docs/develop/booleans.md. Solids are not
+ * changed: any thread may use them, each with a separate context. */
 #ifndef EBPO_COLLIDE_POSED_SOLID_H
 #define EBPO_COLLIDE_POSED_SOLID_H
 
@@ -16,23 +16,24 @@ void ebpo_model_extent(const ebpo_model *model, double reach[3]);
 /* Returns a bound of the sizes of the posed vertex coordinates. */
 double ebpo_posed_extent(const ebpo_posing *posing, const double reach[3]);
 
-/* Returns true for one file, or two with the same content: the same faces with the same meaning. */
+/* Returns true for one file, or for two files with the same content: the same faces with the same
+ * meaning. */
 bool ebpo_same_model(const ebpo_model *a, const ebpo_model *b);
 
 typedef struct ebpo_posed_solid {
     ebpo_model *model;
     ebpo_posing posing;
     double rotation[3][3];
-    double box[6]; /* low and high: no posed vertex is beyond */
-    double moved;  /* bound of the distance of posed vertices from their exact motion */
+    double box[6]; /* low and high: all posed vertices are in this box */
+    double moved;  /* bound of the distance between a posed vertex and its exact motion */
 } ebpo_posed_solid;
 
-/* Also makes surfaces, whose winding numbers must not be queried. Fails with EBPO_E_ARGUMENT (the
- * pose), EBPO_E_ABSENT (a model without its mesh). */
+/* Also accepts surfaces; their winding numbers must not be queried. Fails with EBPO_E_ARGUMENT (the
+ * pose) and EBPO_E_ABSENT (a model without its mesh). */
 EBPO_MUST_USE ebpo_status ebpo_posed_solid_make(ebpo_posed_solid *out, ebpo_model *model,
                                                 const ebpo_pose *pose, ebpo_error *error);
 
-/* Returns false if w is certainly outside: beyond the box by more than `margin` (0 or more) on an
+/* Returns false if w is certainly outside: beyond the box by more than `margin` (0 or more) on some
  * axis. */
 bool ebpo_posed_solid_near(const ebpo_posed_solid *s, const double w[3], double margin);
 
@@ -46,24 +47,26 @@ static inline double ebpo_box_gap(const double a_low[3], const double a_high[3],
     return most;
 }
 
-/* Computes the point p in the model's coordinates that the exact motion brings to w. *doubt bounds
+/* Computes the point p in the model's coordinates that the exact motion maps to w. *doubt bounds
  * the error of p and of rounded coordinates. If no face of the model is within *doubt of p, the
- * posed model has at w the winding number that the model has at p. */
+ * winding number of the posed model at w is that of the model at p. */
 void ebpo_unpose(const ebpo_posed_solid *s, const double w[3], double p[3], double *doubt);
 
-/* Computes the box, in the model, of all faces that may contain, when posed, a point of the box
- * between a and b (its corners, in any order). */
+/* Computes a box in the model's coordinates for a box in the world. a and b are opposite corners of
+ * the world box, in any order. The result contains all faces that, when posed, may have a point in
+ * the world box. */
 void ebpo_unpose_box(const ebpo_posed_solid *s, const double a[3], const double b[3], double low[3],
                      double high[3]);
 
 /* The sides of a solid around a point of the world. */
 typedef struct ebpo_posed_sides {
-    bool on;            /* a posed face with an area contains it */
+    bool on;            /* a posed face with an area contains the point */
     bool flat;          /* all such faces are in one plane */
     double plane[3][3]; /* if on: corners of one of them */
     /* Winding numbers close to the point: `above` on the side that is greater in x (or, if the
-     * plane is parallel to the x axis, in y, or else in z), `below` on the other. Equal unless
-     * `on`. If on and not flat, only `above` is valid, somewhere near the point. */
+     * plane is parallel to the x axis, in y, or else in z), `below` on the other side. Equal unless
+     * `on`. If `on` and not `flat`, only `above` is valid: the winding number at some point near
+     * this one. */
     int32_t above, below;
 } ebpo_posed_sides;
 
@@ -71,8 +74,9 @@ EBPO_MUST_USE ebpo_status ebpo_posed_solid_sides(const ebpo_posed_solid *s, ebpo
                                                  const double w[3], ebpo_posed_sides *out,
                                                  ebpo_error *error);
 
-/* Computes the winding number at x, whose coordinates are canonical fractions within the range of
- * doubles, shifted by (d0, d1, d2) as in ebpo_axis_crossing: never on a face. */
+/* Computes the winding number at x shifted by (d0, d1, d2), the infinitesimal shift of
+ * ebpo_axis_crossing; the shifted point is on no face. The coordinates of x are canonical fractions
+ * within the range of doubles. */
 EBPO_MUST_USE ebpo_status ebpo_exact_winding(const ebpo_posed_solid *s, ebpo_context *context,
                                              const mpq_t x[3], int32_t *winding, ebpo_error *error);
 

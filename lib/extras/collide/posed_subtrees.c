@@ -1,10 +1,10 @@
 /* Subtrees of a model at a pose, with convex envelopes of their faces, and gaps between envelopes.
- * A model in parts has the subtrees that are loaded on demand; a whole model is a single one.
+ * A model in parts has the subtrees that are loaded on demand; a whole model is a single subtree.
  *
- * An envelope is the cell's polytope, cut by the planes in memory for it and for its last
- * ancestors, then posed. A hash table keeps envelopes by octcode. Gaps are lower bounds of the
- * distance of two convex sets, found by the iteration of Gilbert (1966): every direction gives a
- * bound, so it may stop at any time. */
+ * An envelope is made from the cell's polytope: it is cut by the planes in memory of the node and
+ * of its last ancestors, then posed. A hash table keeps envelopes by octcode. Gaps are lower bounds
+ * of the distance of two convex sets, found by the iteration of Gilbert (1966): every direction
+ * gives a bound, so the iteration may stop at any time. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -30,7 +30,7 @@ static void middle_of(const ebpo_convex *c, double out[3])
     }
 }
 
-/* Returns the farthest point along a direction, or (sign -1) against it. */
+/* Returns the point that is farthest along a direction, or (sign -1) opposite to it. */
 static const double *farthest_point(const ebpo_convex *c, const double n[3], double sign)
 {
     int best = 0;
@@ -45,12 +45,13 @@ static const double *farthest_point(const ebpo_convex *c, const double n[3], dou
     return c->point[best];
 }
 
-/* Most directions that are tried; sets nearly in contact would take more. */
+/* Maximum number of directions that are tried; sets nearly in contact would take more. */
 enum { DIRECTIONS = 32 };
 
-/* `v` is a difference of points of B and A near the origin. The line from it to the difference that
- * is farthest back along v comes nearer (Gilbert 1966). Any v bounds the distance: all differences
- * are at least as far along it as that one. */
+/* `v` is a difference of a point of B and a point of A, and near the origin. Each step moves v
+ * towards the difference that is least along v, to the nearest point of the line between them
+ * (Gilbert 1966). Any v gives a lower bound of the distance: along v, all differences are at least
+ * as far as the least one. */
 double ebpo_convex_gap(const ebpo_convex *a, const ebpo_convex *b, double enough)
 {
     double v[3], w[3], from[3], best = 0;
@@ -98,17 +99,17 @@ typedef struct posed_hull {
     double point[][3];
 } posed_hull;
 
-/* Number of levels whose planes cut an envelope. It limits how far rounding in doubles moves
+/* Number of levels whose planes cut an envelope. This limits how far rounding in doubles moves
  * corners from level to level. */
 enum { LEVELS_OF_PLANES = 8 };
-/* Share of a cell's side: 255 planes a level, each off by 1e-10 of its cell, and the error of the
- * levels above. */
+/* Error of a cut as a share of the cell's side: 255 planes a level, each with an error of 1e-10 of
+ * its cell, and the error of the levels above. */
 static const double cut_share = 0x1p-15;
 
-/* --- their order --- */
+/* --- order of subtrees --- */
 
 typedef struct place {
-    uint64_t code; /* code of the first cell of its deepest level */
+    uint64_t code; /* octcode of its first cell at the deepest level */
     uint32_t number;
 } place;
 
@@ -157,7 +158,7 @@ void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s)
     s->rank = NULL;
 }
 
-/* --- where they are --- */
+/* --- tables of nodes --- */
 
 static const ebpo_node_table *nodes_of(const ebpo_posed_subtrees *s)
 {
@@ -224,7 +225,7 @@ static void cut_node(const ebpo_posed_subtrees *s, const ebpo_posed_node *node,
     ebpo_planes_cut(envelope, codes, count);
 }
 
-/* Cuts the envelope in the cell's coordinates. */
+/* Cuts the envelope, in the coordinates of the cell. */
 static void cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_polytope *out)
 {
     ebpo_posed_node node = ebpo_posed_root(s);
@@ -240,7 +241,8 @@ static void cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_poly
         node = ebpo_posed_child(s, &node, octant);
         if (matters) {
             ebpo_polytope_copy(&above, out);
-            (void)ebpo_polytope_child(&above, octant, out); /* or a box around the content */
+            (void)ebpo_polytope_child(&above, octant, out); /* otherwise the result is a box around
+                                                             * the content */
         }
     }
 }
@@ -272,7 +274,7 @@ static posed_hull **find_hull(posed_hull **hull, uint64_t slots, ebpo_octcode co
     return &hull[at];
 }
 
-/* Makes space for one more. */
+/* Makes space for one more entry. */
 static bool widen_table(ebpo_posed_subtrees *s)
 {
     if (4 * (s->hulls + 1) <= 3 * s->slots)

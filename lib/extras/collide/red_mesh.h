@@ -1,4 +1,4 @@
-/* Writes meshes to a PLY file for viewing, with the faces that matter in red. */
+/* Writes meshes to a PLY file for viewing, with marked faces in red. */
 #ifndef EBPO_COLLIDE_RED_MESH_H
 #define EBPO_COLLIDE_RED_MESH_H
 
@@ -7,8 +7,8 @@
 #include "io/publish.h"
 #include "geometry/pose.h"
 
-/* Source of a mesh: functions that return a vertex, and the corners of a face, called in ascending
- * order. */
+/* Source of a mesh: functions that return a vertex, and the corners of a face. They are called in
+ * ascending order. */
 typedef struct ebpo_red_source {
     uint64_t vertices, faces;
     void *user;
@@ -16,14 +16,14 @@ typedef struct ebpo_red_source {
     ebpo_status (*face)(void *user, uint64_t number, uint32_t out[3], ebpo_error *error);
 } ebpo_red_source;
 
-/* Returns a source for a mesh in memory, which must stay there. */
+/* Returns a source for a mesh in memory; the mesh must outlive the source. */
 ebpo_red_source ebpo_red_source_of(const ebpo_mesh *mesh);
 
 typedef struct ebpo_red_mesh {
     ebpo_red_source source;
-    const ebpo_posing *posing; /* NULL: unchanged */
-    const uint64_t *red;       /* a bit for each face */
-    const char *colour;        /* colour of the others: "r g b" */
+    const ebpo_posing *posing; /* NULL: coordinates are not changed */
+    const uint64_t *red;       /* a bit for each face: it is red */
+    const char *colour;        /* colour of the other faces: "r g b" */
 } ebpo_red_mesh;
 
 /* Prints the meshes in sequence. Fails with EBPO_E_LIMIT (more than 2^32 - 1 vertices), EBPO_E_IO,

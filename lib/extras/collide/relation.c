@@ -1,13 +1,13 @@
 /* Finds the relation of two models at poses: disjoint, touching, intersecting, one inside the
  * other, or equal.
  *
- * The boundary of two models divides space into parts; the relation depends on which of these
- * exist: in both, in the first alone, in the second alone. Each part is bounded by pieces of faces,
- * so it is found around them (around_face.h). A crossing pair nearly always decides. If not, all
- * faces that intersect the other model are examined, then one face of each patch that does not:
- * such a patch is on one side as a whole. A patch whose side would add nothing is skipped, without
- * loading its subtree where the side is known. If the deadline passes, the relation is open.
- * docs/develop/collision.md, "Relation of two models". One thread. */
+ * The boundaries of two models divide space into parts. The relation depends on which kinds of part
+ * exist: in both models, in the first alone, in the second alone. Each part is bounded by pieces of
+ * faces, so it is found around these pieces (around_face.h). A crossing pair nearly always decides.
+ * If not, all faces that intersect the other model are examined, then one face of each patch that
+ * does not: such a patch is on one side as a whole. A patch is skipped if a face on its side would
+ * not change the result; its subtree is not loaded if the side is known. If the deadline passes,
+ * the relation is open. See docs/develop/collision.md, "Relation of two models". One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -29,39 +29,42 @@
 
 /* --- patches without contact --- */
 
-/* Subtrees of one of a query's models; a whole model is its only subtree. */
-typedef struct unmet_patches {
+/* Patches without contact, in the subtrees of one of the query's models; a whole model is its only
+ * subtree. */
+typedef struct separate_patches {
     const ebpo_collision *current_query;
     ebpo_two_models *two;
     int m;
     uint64_t subtrees;
-    /* The owned faces of the last queried subtree, by numbers in the file, and for each the first
-     * of its patch (face_patches.h), less `first`. */
+    /* The owned faces of the last examined subtree, by numbers in the file; for each face the first
+     * face of its patch (face_patches.h), less `first`. */
     uint64_t first, count;
     uint32_t *patch;
-} unmet_patches;
+} separate_patches;
 
-static void unmet_patches_begin(unmet_patches *u, const ebpo_collision *current_query,
-                                ebpo_two_models *two, int m)
+static void separate_patches_begin(separate_patches *u, const ebpo_collision *current_query,
+                                   ebpo_two_models *two, int m)
 {
     const ebpo_model *model = current_query->model[m];
-    *u = (unmet_patches){ .current_query = current_query, .two = two, .m = m };
+    *u = (separate_patches){ .current_query = current_query, .two = two, .m = m };
     u->subtrees = model->whole ? 1 : model->top->below_count;
 }
 
-static void unmet_patches_end(unmet_patches *u) { free(u->patch); }
+static void separate_patches_end(separate_patches *u) { free(u->patch); }
 
-static ebpo_status find_patches(unmet_patches *u, const ebpo_accel *subtree, const uint32_t *slots,
-                                const uint64_t *intersected, ebpo_error *error)
+static ebpo_status find_patches(separate_patches *u, const ebpo_accel *subtree,
+                                const uint32_t *slots, const uint64_t *intersected,
+                                ebpo_error *error)
 {
     u->first = subtree->first_face;
     u->count = subtree->face_count - subtree->shared_count;
     return ebpo_face_patches(subtree, slots, intersected, &u->patch, error);
 }
 
-/* Loads the subtree, finds its patches and releases it. met: a bit for each face of the model. */
-static ebpo_status unmet_patches_find(unmet_patches *u, uint64_t number,
-                                      const uint64_t *intersected, ebpo_error *error)
+/* Loads the subtree, finds its patches and releases it. intersected: a bit for each face of the
+ * model. */
+static ebpo_status separate_patches_find(separate_patches *u, uint64_t number,
+                                         const uint64_t *intersected, ebpo_error *error)
 {
     const ebpo_model *model = u->current_query->model[u->m];
     ebpo_context *context = u->two->context[u->m];
@@ -88,8 +91,8 @@ static bool note_any(void *user, const ebpo_triangles *triangles)
     return !*any;
 }
 
-/* Finds whether all of a ball around a point of the world is inside, or outside, the solid. */
-static ebpo_status side_of_ball(const unmet_patches *u, const double middle[3], double radius,
+/* Finds if all of a ball around a point of the world is inside, or outside, the solid. */
+static ebpo_status side_of_ball(const separate_patches *u, const double middle[3], double radius,
                                 int *in, ebpo_error *error)
 {
     const ebpo_posed_solid *other = &u->two->model[!u->m];
@@ -111,11 +114,11 @@ static ebpo_status side_of_ball(const unmet_patches *u, const double middle[3], 
     return status;
 }
 
-/* The cell, and so the ball around it, contains a point of each of its owned faces. If no face of
- * the other model comes near the ball, it is on one side, and so is each face that intersects none.
- */
-static ebpo_status unmet_patches_side(const unmet_patches *u, uint64_t number, int *in,
-                                      ebpo_error *error)
+/* Finds the side of all faces of a subtree that intersect no face of the other model. The cell, and
+ * so the ball around the cell, contains a point of each owned face. If no face of the other model
+ * is near the ball, the ball is on one side, and so is each of these faces. */
+static ebpo_status separate_patches_side(const separate_patches *u, uint64_t number, int *in,
+                                         ebpo_error *error)
 {
     const ebpo_model *model = u->current_query->model[u->m];
     ebpo_posed_subtrees as = { .model = model, .posing = u->current_query->posing[u->m].posing };
@@ -145,10 +148,11 @@ typedef struct relating {
     ebpo_pair_faces places;
     ebpo_two_models two;
     ebpo_relation_result *out;
-    uint64_t *intersected[2], *seen[2]; /* bits for each face: it intersects the other model; it was
-                                         * examined */
-    bool both, only[2];   /* there are inner points of both; of one that are not in the other */
-    bool reported;        /* a face with an area has been examined */
+    uint64_t *intersected[2], *seen[2]; /* bits for each face: it intersects the other model; it has
+                                         * been examined */
+    bool both, only[2];   /* there are inner points of both models; inner points of one model that
+                           * are not in the other */
+    bool examined;        /* a face with an area has been examined */
     bool touch, doubtful; /* a common point exists; undecided pairs exist */
     unsigned last[2];     /* `in` of the last examined piece */
     uint64_t inspected;
@@ -161,7 +165,7 @@ static bool is_mixed(const relating *r) { return r->two.solid[0] != r->two.solid
 
 static bool are_surfaces(const relating *r) { return !r->two.solid[0] && !r->two.solid[1]; }
 
-/* Returns true if no remaining face can change the relation. */
+/* Returns true if no further face can change the relation. */
 static bool is_decided(const relating *r)
 {
     if (is_mixed(r))
@@ -198,7 +202,7 @@ static bool note_piece(void *user, const ebpo_around *a)
     const facing *f = user;
     relating *r = f->r;
     unsigned other = a->in[!f->m];
-    r->reported = true;
+    r->examined = true;
     memcpy(r->last, a->in, sizeof r->last);
     if (r->two.solid[0] && r->two.solid[1])
         note_solids(r, a);
@@ -209,8 +213,8 @@ static bool note_piece(void *user, const ebpo_around *a)
     return !is_decided(r);
 }
 
-/* Examines a face once. Returns false when enough is known, or for `status`. Of a solid and a
- * surface, the surface's faces decide. */
+/* Examines a face once. Returns false when enough is known, or after a failure (`status`). Of a
+ * solid and a surface, the surface's faces decide. */
 static bool inspect_pair_one(relating *r, int m, uint64_t face)
 {
     facing f = { r, m };
@@ -246,7 +250,7 @@ static bool all_have_area(relating *r, const ebpo_face_pair *pair)
     return r->status == EBPO_OK;
 }
 
-/* Records a pair of two surfaces. Returns false for `status`. */
+/* Records a pair of two surfaces. Returns false after a failure (`status`). */
 static bool note_pair(relating *r, const ebpo_face_pair *pair)
 {
     r->both |= pair->kind != EBPO_PAIR_TOUCHING;
@@ -309,25 +313,25 @@ static void inspect_found(relating *r)
 
 /* --- faces without contact --- */
 
-/* Patches without contact are on one side of the other model. Returns true if another face on that
- * side (`in`: inside) adds nothing. */
-static bool side_is_reported(const relating *r, int m, bool in)
+/* Returns true if another face on this side (`in`: inside) of the other model adds no information.
+ * Patches without contact are on one side as a whole. */
+static bool side_adds_nothing(const relating *r, int m, bool in)
 {
     if (is_mixed(r))
         return in ? r->both : r->only[m];
     return in ? r->both && r->only[!m] : r->only[m];
 }
 
-/* Examines owned faces of a subtree that intersect none of the other model, as long as their patch
- * may add information. */
-static void look_through(relating *r, const unmet_patches *u, uint64_t *done)
+/* Examines owned faces of a subtree that intersect no face of the other model, as long as their
+ * patch may add information. */
+static void look_through(relating *r, const separate_patches *u, uint64_t *done)
 {
     for (uint64_t i = 0; i < u->count && goes_on(r); i++) {
         if (has_bit(r->intersected[u->m], u->first + i) || has_bit(done, u->patch[i]))
             continue;
-        r->reported = false;
+        r->examined = false;
         (void)inspect_pair_one(r, u->m, u->first + i);
-        if (r->reported && side_is_reported(r, u->m, r->last[!u->m] != 0))
+        if (r->examined && side_adds_nothing(r, u->m, r->last[!u->m] != 0))
             set_bit(done, u->patch[i]);
     }
 }
@@ -339,9 +343,9 @@ static ebpo_status fail_bits(uint64_t count, ebpo_error *error)
     return ebpo_fail_memory(error, count / 8);
 }
 
-static void inspect_subtree(relating *r, unmet_patches *u, uint64_t number)
+static void inspect_subtree(relating *r, separate_patches *u, uint64_t number)
 {
-    r->status = unmet_patches_find(u, number, r->intersected[u->m], r->error);
+    r->status = separate_patches_find(u, number, r->intersected[u->m], r->error);
     if (r->status != EBPO_OK)
         return;
     uint64_t *done = make_bits(u->count);
@@ -352,27 +356,28 @@ static void inspect_subtree(relating *r, unmet_patches *u, uint64_t number)
     free(done);
 }
 
-/* Returns true if all faces of the subtree are on a known side: it need not be loaded. */
-static bool is_settled(relating *r, const unmet_patches *u, uint64_t number)
+/* Returns true if all faces of the subtree are on a known side and add no information: the subtree
+ * need not be loaded. */
+static bool is_settled(relating *r, const separate_patches *u, uint64_t number)
 {
     int in = -1;
-    if (side_is_reported(r, u->m, true) || side_is_reported(r, u->m, false))
-        r->status = unmet_patches_side(u, number, &in, r->error);
-    return in >= 0 && side_is_reported(r, u->m, in);
+    if (side_adds_nothing(r, u->m, true) || side_adds_nothing(r, u->m, false))
+        r->status = separate_patches_side(u, number, &in, r->error);
+    return in >= 0 && side_adds_nothing(r, u->m, in);
 }
 
 static void inspect_patches(relating *r, int m)
 {
-    unmet_patches u;
+    separate_patches u;
     if (is_mixed(r) && r->two.solid[m])
         return;
-    unmet_patches_begin(&u, r->current_query, &r->two, m);
+    separate_patches_begin(&u, r->current_query, &r->two, m);
     for (uint64_t i = 0; i < u.subtrees && goes_on(r); i++) {
         if (!is_settled(r, &u, i) && r->status == EBPO_OK)
             inspect_subtree(r, &u, i);
         r->open |= ebpo_collision_is_late(r->current_query);
     }
-    unmet_patches_end(&u);
+    separate_patches_end(&u);
 }
 
 /* --- common points of models without common inner points --- */
@@ -380,20 +385,20 @@ static void inspect_patches(relating *r, int m)
 static bool note_sound(void *user, const ebpo_around *a)
 {
     const facing *f = user;
-    f->r->reported = true;
+    f->r->examined = true;
     f->r->doubtful |= a->in[f->m] == 0;
     return !f->r->doubtful;
 }
 
-/* Returns true if every piece of the face belongs to its model; then every point of a contact does.
- */
+/* Returns true if every piece of the face belongs to the face's model; then every point of a
+ * contact does. */
 static bool is_sound(relating *r, int m, uint64_t face)
 {
     facing f = { r, m };
-    r->reported = r->doubtful = false;
+    r->examined = r->doubtful = false;
     if (r->status == EBPO_OK)
         r->status = ebpo_look_around_face(&r->two, m, face, note_sound, &f, r->error);
-    return r->status == EBPO_OK && r->reported && !r->doubtful;
+    return r->status == EBPO_OK && r->examined && !r->doubtful;
 }
 
 static bool take_sound(void *user, const ebpo_face_pair *pairs, uint64_t count)
@@ -422,7 +427,7 @@ static ebpo_status find_haptic(relating *r, ebpo_error *error)
 
 /* --- the relation --- */
 
-static bool has_unmet_area(relating *r, int m)
+static bool has_separate_area(relating *r, int m)
 {
     bool has = false;
     for (uint64_t f = 0; f < face_count(r, m) && r->status == EBPO_OK && !has; f++) {
@@ -433,25 +438,26 @@ static bool has_unmet_area(relating *r, int m)
     return has;
 }
 
-/* Returns true for one file twice, at one pose. */
+/* Returns true if both models are one file at one pose. */
 static bool is_same(const ebpo_collision *q)
 {
     return ebpo_same_model(q->model[0], q->model[1]) &&
            memcmp(&q->options.pose_a, &q->options.pose_b, sizeof q->options.pose_a) == 0;
 }
 
-/* Finds whether identical models have a common point. */
+/* Finds if identical models have a point. */
 static void find_any(relating *r)
 {
     uint64_t count = face_count(r, 0);
     r->out->contact = count > 0;
     if (are_surfaces(r))
-        r->both = r->touch = has_unmet_area(r, 0);
+        r->both = r->touch = has_separate_area(r, 0);
     for (uint64_t f = 0; f < count && goes_on(r) && !r->both; f++)
         (void)inspect_pair_one(r, 0, f);
 }
 
-/* Finds an intersecting pair, and examines its faces: if they cross, that nearly always decides. */
+/* Finds an intersecting pair, and examines its faces: if they cross, this pair nearly always
+ * decides. */
 static ebpo_status inspect_first(relating *r, ebpo_error *error)
 {
     const ebpo_collision *q = r->current_query;
@@ -469,7 +475,7 @@ static ebpo_status inspect_contacts(relating *r, ebpo_error *error)
 {
     ebpo_status status = take_pairs(r, take_contacts, error);
     for (int m = 0; m < 2 && r->both && are_surfaces(r) && goes_on(r); m++)
-        r->only[m] = has_unmet_area(r, m);
+        r->only[m] = has_separate_area(r, m);
     if (status == EBPO_OK && (r->both || !are_surfaces(r)))
         inspect_found(r);
     return status == EBPO_OK ? r->status : status;
@@ -542,12 +548,12 @@ static ebpo_status find_relation(relating *r, ebpo_error *error)
     return r->status;
 }
 
-/* Counts the cost of subtrees, in nested queries and here. */
-static void count_loads(const relating *r, uint64_t bytes_reported, uint64_t read_before)
+/* Counts the loads and the bytes read, in nested queries and here. */
+static void count_loads(const relating *r, uint64_t bytes_before, uint64_t read_before)
 {
     ebpo_collider *c = r->current_query->collider;
     c->loads += ebpo_two_models_loads(&r->two);
-    c->bytes_read = bytes_reported + ebpo_collision_bytes_read(r->current_query) - read_before;
+    c->bytes_read = bytes_before + ebpo_collision_bytes_read(r->current_query) - read_before;
 }
 
 static void end_relating(relating *r)
@@ -572,11 +578,11 @@ ebpo_status ebpo_collide_relation(ebpo_collider *c, const ebpo_collide_options *
         status = ebpo_pair_faces_begin(&r.places, &q, error);
     if (status != EBPO_OK)
         return status;
-    uint64_t reported = c->bytes_read, before = ebpo_collision_bytes_read(&q);
+    uint64_t bytes_before = c->bytes_read, before = ebpo_collision_bytes_read(&q);
     status = find_relation(&r, error);
     ebpo_relation relation = relation_of(&r);
     out->relation = (int32_t)(q.turned ? turned_relation(relation) : relation);
-    count_loads(&r, reported, before);
+    count_loads(&r, bytes_before, before);
     end_relating(&r);
     return status;
 }

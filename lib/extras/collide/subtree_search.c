@@ -1,10 +1,10 @@
 /* Visits pairs of nodes of two posed trees, the smallest gap first, down to subtrees that are
  * loaded on demand. The gap of two envelopes bounds the distance of the nodes' contents.
  *
- * Depth, levels, distances and separation distances along a direction use it; each has a separate
- * measure of the best result and of when to stop. The larger of two nodes is divided first. Several
- * pairs of nodes of a whole model and one in parts may need the same subtree: it is visited once.
- * One thread. */
+ * Depth, levels, distances and separation distances along a direction use this search; each has its
+ * own measure of the best result and decides when to stop. The larger of two nodes is divided
+ * first. Several pairs of nodes of a whole model and a model in parts may need the same subtree: it
+ * is visited once. One thread. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -115,8 +115,8 @@ static bool is_gray(const ebpo_posed_node *node)
     return ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_GRAY;
 }
 
-/* Nodes of a whole model are divided only for their bounds, not below the size of the other one's
- * subtree. */
+/* Nodes of a whole model are divided only to get better bounds, and not below the size of the other
+ * model's subtree. */
 int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node node[2])
 {
     int larger = ebpo_node_larger(&s->nodes, node);
@@ -125,8 +125,8 @@ int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node
     return is_gray(&node[!larger]) && !s->current_query->model[!larger]->whole ? !larger : -1;
 }
 
-/* Returns true if a pair of subtrees was visited: with a whole model and one in parts, several
- * pairs of nodes need the same one. */
+/* Returns true if a pair of subtrees has been visited. With a whole model and a model in parts,
+ * several pairs of nodes need the same pair of subtrees. */
 static bool was_seen(const ebpo_subtree_search *s, const uint32_t number[2])
 {
     for (int i = 0; i < 2; i++)

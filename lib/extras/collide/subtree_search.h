@@ -5,21 +5,21 @@
 #include "extras/collide/collider.h"
 #include "extras/collide/posed_subtrees.h"
 
-/* Two nodes with content of each model; `gap`: lower bound of their distance. */
+/* A node of each model, both with content; `gap`: lower bound of their distance. */
 typedef struct ebpo_node_gap {
     ebpo_posed_node node[2];
     double gap;
 } ebpo_node_gap;
 
-/* Zero at first. */
+/* Heap of pairs of nodes. Zero at first. */
 typedef struct ebpo_node_gaps {
     ebpo_posed_subtrees side[2];
     double reach;        /* bound of posed coordinates */
-    ebpo_node_gap *heap; /* the least gap first */
+    ebpo_node_gap *heap; /* a heap: the least gap first */
     uint64_t count, capacity;
 } ebpo_node_gaps;
 
-/* Must be freed, also after a failure. */
+/* Begins a heap, which must be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_node_gaps_begin(ebpo_node_gaps *g,
                                                const ebpo_collision *current_query,
                                                ebpo_error *error);
@@ -27,20 +27,20 @@ void ebpo_node_gaps_free(ebpo_node_gaps *g);
 
 EBPO_MUST_USE ebpo_status ebpo_node_gaps_push(ebpo_node_gaps *g, const ebpo_node_gap *pair,
                                               ebpo_error *error);
-/* Removes and returns the least one; the heap must not be empty. */
+/* Removes and returns the pair with the least gap; the heap must not be empty. */
 ebpo_node_gap ebpo_node_gaps_pop(ebpo_node_gaps *g);
 
 /* Computes a certain lower bound of the gap of two nodes' envelopes, 0 or more. */
 EBPO_MUST_USE ebpo_status ebpo_node_gap_of(ebpo_node_gaps *g, const ebpo_posed_node node[2],
                                            double *out, ebpo_error *error);
-/* Bounds from above the distance of two nodes with faces, which have one each in or near the cell.
+/* Returns an upper bound of the distance of two nodes that each have a face in or near their cell.
  */
 double ebpo_node_far_bound(const ebpo_node_gaps *g, const ebpo_posed_node node[2]);
-/* Returns which of two nodes, both gray or neither, is divided first. */
+/* Returns which of two nodes is divided first; both are gray, or neither is. */
 int ebpo_node_larger(const ebpo_node_gaps *g, const ebpo_posed_node node[2]);
 
-/* A node may list a face that only comes near, within 1/256 of the cell's size on each axis
- * (format-spec, section 5); plus a margin for rounding. */
+/* A node may list a face that is outside its cell but near it: within 1/256 of the cell's size on
+ * each axis (format-spec, section 5). This value adds a margin for rounding. */
 #define EBPO_NEAR_SHARE 0x1.1p-8
 
 /* Zero at first. */
@@ -52,18 +52,18 @@ typedef struct ebpo_subtree_search {
     uint64_t read_before;
 } ebpo_subtree_search;
 
-/* Must be ended, also after a failure. */
+/* Begins a search, which must be freed, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_search_begin(ebpo_subtree_search *s,
                                                     const ebpo_collision *current_query,
                                                     ebpo_error *error);
 /* Adds the loads and bytes read to the collider's counts. */
 void ebpo_subtree_search_end(ebpo_subtree_search *s);
 
-/* Returns which of two nodes is divided; -1: neither, they are visited. */
+/* Returns which of two nodes is divided; -1: neither, the pair is to be visited. */
 int ebpo_subtree_search_side(const ebpo_subtree_search *s, const ebpo_posed_node node[2]);
 
 /* Returns the accels of two undivided nodes, loaded if necessary; they are valid until the next
- * call. *there: false if there is nothing to visit, or it was visited before. */
+ * call. *there is false if there is nothing to visit, or if the pair was visited before. */
 EBPO_MUST_USE ebpo_status ebpo_subtree_search_load(ebpo_subtree_search *s,
                                                    const ebpo_posed_node node[2],
                                                    const ebpo_accel *accel[2], bool *there,

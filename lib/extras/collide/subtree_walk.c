@@ -4,11 +4,12 @@
  * Two faces with a common point are listed by the subtrees whose cells contain that point, so it
  * suffices to search pairs of subtrees whose envelopes may touch. These pairs are found before a
  * subtree is loaded, and sorted so that a loaded subtree is soon reused. Several threads search
- * pairs of subtrees. A face that several subtrees list is found more than once. So pairs wait, are
- * sorted and made unique; they are returned in order as soon as no earlier one can come.
+ * pairs of subtrees. A face that several subtrees list is found more than once. So pairs of faces
+ * wait, are sorted and made unique; they are returned in order, each one as soon as no earlier pair
+ * can come.
  *
- * When too many wait for the collider's memory, pairs of the first model's later faces are dropped
- * and found again in another round. */
+ * When more pairs wait than the collider's memory holds, the pairs of the first model's later faces
+ * are dropped; another round finds them again. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -24,20 +25,20 @@
 #include "extras/collide/posed_subtrees.h"
 #include "geometry/vec3.h"
 
-/* Subtrees that may have faces that intersect. */
+/* Two subtrees that may have intersecting faces. */
 typedef struct subtree_pair {
     uint32_t a, b;
-    uint32_t rank_a, rank_b; /* in the order of the files' faces */
-    double apart;            /* distance of their middles over the sum of their sizes */
+    uint32_t rank_a, rank_b; /* ranks in the order of the files' faces */
+    double apart;            /* distance of their middles, divided by the sum of their sizes */
 } subtree_pair;
 
 typedef struct subtree_pairs {
     subtree_pair *pair;
     uint64_t count, capacity;
-    uint64_t subtrees[2]; /* number of different ones of each model */
+    uint64_t subtrees[2]; /* number of different subtrees of each model */
 } subtree_pairs;
 
-/* Intersecting faces, with their numbers: [0] of the query's first model. */
+/* Two intersecting faces, with their numbers; [0] is the face of the query's first model. */
 typedef struct stored_pair {
     uint32_t file[2], source[2];
     int32_t kind;
@@ -49,10 +50,11 @@ typedef struct subtree_walk {
     bool self;
     ebpo_context *context[2]; /* for models in parts */
     ebpo_pair_walk walk;
-    stored_pair *reported; /* pairs of the last pair of subtrees, unordered; no face with itself */
+    stored_pair *stored; /* pairs of faces of the last pair of subtrees, unordered; no face with
+                          * itself */
     uint64_t count, capacity;
-    uint64_t first_end; /* faces that the first's subtree lists have lesser numbers */
-    bool late;          /* the deadline has passed before all was found */
+    uint64_t first_end; /* all faces that the first subtree lists have lesser numbers */
+    bool late;          /* the deadline passed before all pairs were found */
 } subtree_walk;
 
 typedef struct finding {
@@ -146,7 +148,7 @@ static ebpo_status descend_pair(const finding *f, const ebpo_posed_node node[2])
     return status;
 }
 
-/* --- their order --- */
+/* --- order of pairs --- */
 
 static int by_places(const void *x, const void *y)
 {
@@ -191,10 +193,11 @@ static ebpo_status count_seconds(subtree_pairs *p, uint64_t most, ebpo_error *er
 }
 
 /* Finds the pairs of subtrees that may have intersecting faces. Two such faces have a common point,
- * in a cell of each model that lists its face: so the subtrees of one of these pairs list them. The
- * pairs are sorted by the first's position, back and forth in the second's, so that loaded subtrees
- * are reused soon. `self`: both are one model at one pose; each pair comes once, the first's
- * position not behind the second's. The caller frees the pairs (`pair`), also after a failure. */
+ * which is in a cell of each model that lists the face: so the subtrees of one of these pairs list
+ * them. The pairs are sorted by the position of the first subtree, and for each first subtree back
+ * or forth by the position of the second, so that loaded subtrees are reused soon. `self`: both are
+ * one model at one pose; each pair comes once, with the first subtree's position not behind the
+ * second's. The caller frees the pairs (`pair`), also after a failure. */
 static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a,
                                       ebpo_posed_subtrees *b, double reach, bool self,
                                       ebpo_error *error)
@@ -238,7 +241,7 @@ static ebpo_status subtree_walk_begin(subtree_walk *w, const ebpo_collision *cur
     return EBPO_OK;
 }
 
-/* Returns the number of subtrees that it loaded. */
+/* Returns the number of subtrees that the walk has loaded. */
 static uint64_t subtree_walk_loads(const subtree_walk *w)
 {
     uint64_t loads = 0;
@@ -247,7 +250,7 @@ static uint64_t subtree_walk_loads(const subtree_walk *w)
     return loads;
 }
 
-/* Releases the memory of its subtrees for other users. */
+/* Releases the memory of the walk's subtrees for other users. */
 static void subtree_walk_let_go(subtree_walk *w)
 {
     for (int i = 0; i < 2; i++)
@@ -259,7 +262,7 @@ static void subtree_walk_free(subtree_walk *w)
     for (int i = 0; i < 2; i++)
         ebpo_context_free(w->context[i]);
     ebpo_pair_walk_free(&w->walk);
-    free(w->reported);
+    free(w->stored);
 }
 
 static int compare_stored_pairs(const void *x, const void *y)
@@ -270,7 +273,7 @@ static int compare_stored_pairs(const void *x, const void *y)
     return (p->file[1] > q->file[1]) - (p->file[1] < q->file[1]);
 }
 
-static ebpo_face_pair report_stored_pair(const ebpo_collision *q, const stored_pair *t)
+static ebpo_face_pair face_pair_of(const ebpo_collision *q, const stored_pair *t)
 {
     int a = q->turned, b = !q->turned;
     return (ebpo_face_pair){ t->source[a], t->source[b], t->file[a], t->file[b], t->kind, 0 };
@@ -288,12 +291,11 @@ static ebpo_status load_subtree(subtree_walk *w, int side, uint32_t number, cons
     return status;
 }
 
-static ebpo_status report_pairs(subtree_walk *w, const ebpo_accel *const accel[2],
-                                ebpo_error *error)
+static ebpo_status store_pairs(subtree_walk *w, const ebpo_accel *const accel[2], ebpo_error *error)
 {
     const ebpo_pair_walk *found = &w->walk;
-    if (!ebpo_grow(&w->reported, &w->capacity, found->found_count, sizeof *w->reported))
-        return ebpo_fail_memory(error, found->found_count * sizeof *w->reported);
+    if (!ebpo_grow(&w->stored, &w->capacity, found->found_count, sizeof *w->stored))
+        return ebpo_fail_memory(error, found->found_count * sizeof *w->stored);
     for (uint64_t i = 0; i < found->found_count; i++) {
         uint32_t local[2] = { found->intersected[i].a, found->intersected[i].b };
         stored_pair t = { .kind = found->intersected[i].kind };
@@ -305,7 +307,7 @@ static ebpo_status report_pairs(subtree_walk *w, const ebpo_accel *const accel[2
             continue;
         if (w->self && t.file[0] > t.file[1])
             t = (stored_pair){ { t.file[1], t.file[0] }, { t.source[1], t.source[0] }, t.kind };
-        w->reported[w->count++] = t;
+        w->stored[w->count++] = t;
     }
     return EBPO_OK;
 }
@@ -336,10 +338,10 @@ static ebpo_status walk_down(subtree_walk *w, const ebpo_accel *const accel[2], 
         if ((w->late = ebpo_collision_is_late(q)))
             return EBPO_OK;
     }
-    return report_pairs(w, accel, error);
+    return store_pairs(w, accel, error);
 }
 
-/* Fills in the pairs found. */
+/* Finds the intersecting faces of a pair of subtrees. */
 static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, ebpo_error *error)
 {
     const ebpo_accel *accel[2];
@@ -357,11 +359,11 @@ static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, 
     return walk_down(w, accel, error);
 }
 
-/* --- waiting pairs --- */
+/* --- state of all threads --- */
 
 static const char stage[] = "pairs of subtrees";
 
-/* Number of pairs in a row for one thread; they have the first's subtree in common. */
+/* Number of consecutive pairs that one thread takes; they have the first subtree in common. */
 enum { PAIRS_IN_A_ROW = 4 };
 
 typedef struct gathering_parts {
@@ -369,16 +371,16 @@ typedef struct gathering_parts {
     bool self;
     ebpo_posed_subtrees subtrees[2];
     subtree_pairs pairs;
-    uint64_t *end; /* for each of the first's subtrees: its faces are before this number; 0: not
-                    * known yet */
+    uint64_t *end; /* for each subtree of the first model: the numbers of its faces are below this
+                    * one; 0: not known yet */
     subtree_walk *walk; /* one for each thread */
     unsigned threads;
     uint64_t read_before;
     pthread_mutex_t lock; /* protects the members below */
     uint64_t from, to;    /* range of faces of the first model in this round */
-    stored_pair *reported;
+    stored_pair *stored;
     uint64_t count, capacity;
-    uint64_t most; /* most waiting pairs */
+    uint64_t most; /* maximum number of waiting pairs */
 } gathering_parts;
 
 static void count_walk(const gathering_parts *g, subtree_walk *w)
@@ -393,25 +395,25 @@ static void sort_once(gathering_parts *g)
 {
     uint64_t kept = 0;
     if (g->count)
-        qsort(g->reported, g->count, sizeof *g->reported, compare_stored_pairs);
+        qsort(g->stored, g->count, sizeof *g->stored, compare_stored_pairs);
     for (uint64_t i = 0; i < g->count; i++)
-        if (kept == 0 || compare_stored_pairs(&g->reported[kept - 1], &g->reported[i]) != 0)
-            g->reported[kept++] = g->reported[i];
+        if (kept == 0 || compare_stored_pairs(&g->stored[kept - 1], &g->stored[i]) != 0)
+            g->stored[kept++] = g->stored[i];
     g->count = kept;
 }
 
-/* Keeps half of the pairs that may wait; those of a single face always stay. */
+/* Drops pairs until half of the maximum waits; the pairs of a single face always stay. */
 static void reserve_space(gathering_parts *g)
 {
     sort_once(g);
     uint64_t half = g->most / 2;
     if (g->count <= half)
         return;
-    uint64_t cut = g->reported[half].file[0];
-    if (cut == g->reported[0].file[0])
+    uint64_t cut = g->stored[half].file[0];
+    if (cut == g->stored[0].file[0])
         cut++;
     g->to = cut;
-    while (g->count > 0 && g->reported[g->count - 1].file[0] >= cut)
+    while (g->count > 0 && g->stored[g->count - 1].file[0] >= cut)
         g->count--;
     if (g->most < 2 * g->count)
         g->most = 2 * g->count;
@@ -420,22 +422,22 @@ static void reserve_space(gathering_parts *g)
 static ebpo_status hold_pairs(gathering_parts *g, const subtree_walk *w, ebpo_error *error)
 {
     for (uint64_t i = 0; i < w->count; i++) {
-        if (w->reported[i].file[0] < g->from || w->reported[i].file[0] >= g->to)
+        if (w->stored[i].file[0] < g->from || w->stored[i].file[0] >= g->to)
             continue;
         if (g->count >= g->most)
             reserve_space(g);
-        if (w->reported[i].file[0] >= g->to)
+        if (w->stored[i].file[0] >= g->to)
             continue;
-        if (!ebpo_grow(&g->reported, &g->capacity, g->count + 1, sizeof *g->reported))
-            return ebpo_fail_memory(error, (g->count + 1) * sizeof *g->reported);
-        g->reported[g->count++] = w->reported[i];
+        if (!ebpo_grow(&g->stored, &g->capacity, g->count + 1, sizeof *g->stored))
+            return ebpo_fail_memory(error, (g->count + 1) * sizeof *g->stored);
+        g->stored[g->count++] = w->stored[i];
     }
     return EBPO_OK;
 }
 
 /* --- searching --- */
 
-/* Returns true if all faces that its first subtree lists are done. */
+/* Returns true if all faces that the pair's first subtree lists are done. */
 static bool is_done(gathering_parts *g, const subtree_pair *pair)
 {
     (void)pthread_mutex_lock(&g->lock);
@@ -474,7 +476,8 @@ static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned 
     return EBPO_OK;
 }
 
-/* Several threads hold several subtrees; where the budget is too small for these, one continues. */
+/* Runs all threads. Each holds several subtrees; where the budget is too small for all threads, one
+ * thread continues. */
 static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
 {
     const ebpo_progress *progress = &g->current_query->options.progress;
@@ -501,16 +504,17 @@ static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
 
 enum { GIVEN_AT_ONCE = 1024 };
 
-/* Returns false when the caller wants no more. */
+/* Passes waiting pairs to the caller. Returns false when the caller wants no more. */
 static bool give_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *user)
 {
     ebpo_face_pair out[GIVEN_AT_ONCE];
-    for (unsigned i = 0; i < g->threads; i++) /* the receiver may need the memory */
+    for (unsigned i = 0; i < g->threads; i++) /* the callback that receives the pairs may need the
+                                               * memory */
         subtree_walk_let_go(&g->walk[i]);
     for (uint64_t at = 0; at < g->count; at += GIVEN_AT_ONCE) {
         uint64_t n = g->count - at < GIVEN_AT_ONCE ? g->count - at : GIVEN_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
-            out[i] = report_stored_pair(g->current_query, &g->reported[at + i]);
+            out[i] = face_pair_of(g->current_query, &g->stored[at + i]);
         if (!take(user, out, n))
             return false;
     }
@@ -519,7 +523,7 @@ static bool give_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *use
 
 static ebpo_status in_passes(gathering_parts *g, ebpo_pairs_fn take, void *user, ebpo_error *error)
 {
-    uint64_t most = g->current_query->collider->options.memory / (2 * sizeof *g->reported) + 2;
+    uint64_t most = g->current_query->collider->options.memory / (2 * sizeof *g->stored) + 2;
     for (g->from = 0; g->from < UINT64_MAX; g->from = g->to) {
         g->to = UINT64_MAX;
         g->count = 0;
@@ -574,7 +578,7 @@ static void end_gathering(gathering_parts *g)
     free(g->walk);
     free(g->pairs.pair);
     free(g->end);
-    free(g->reported);
+    free(g->stored);
     (void)pthread_mutex_destroy(&g->lock);
 }
 
@@ -591,7 +595,7 @@ ebpo_status ebpo_gather_parts(const ebpo_collision *q, bool self, ebpo_pairs_fn 
     return status;
 }
 
-/* Finds the least pair of faces of the first two subtrees that have intersecting faces. */
+/* Finds the least pair of intersecting faces in the first two subtrees that have such a pair. */
 static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, int32_t *found,
                                       ebpo_error *error)
 {
@@ -605,8 +609,8 @@ static ebpo_status search_first_parts(gathering_parts *g, ebpo_face_pair *out, i
         if (*found < 0)
             return EBPO_OK;
         if (*found) {
-            qsort(w->reported, w->count, sizeof *w->reported, compare_stored_pairs);
-            *out = report_stored_pair(q, &w->reported[0]);
+            qsort(w->stored, w->count, sizeof *w->stored, compare_stored_pairs);
+            *out = face_pair_of(q, &w->stored[0]);
             return EBPO_OK;
         }
         if (!ebpo_progress_step(&q->options.progress, stage, i, g->pairs.count, error))

@@ -1,16 +1,18 @@
 /* Follows a ball along a straight piece of its path to the first face in contact, and checks that
  * its centre crosses no face.
  *
- * Nodes of the tree over the faces are visited in the order of possible contact, until the next one
- * comes after the contact with a known face. The distance from a box or a face is convex along a
- * line: Newton's steps towards the ball's radius never go too far. Of the nodes already in contact
- * the closest come first.
+ * Nodes of the tree over the faces are visited in the order of possible contact, until the next
+ * node can only be in contact later than a known face. The distance from a box or a face is convex
+ * along a line, so Newton's steps towards the ball's radius never go too far. Of the nodes already
+ * in contact the closest come first.
  *
  * The work is bounded for each haptic step. After an early end, the ball goes as far as the next
- * node allows. If the known contacts hold it in place, it stays; otherwise the next step continues.
+ * node allows. If the known contacts hold the ball in place, it stays; otherwise the next step
+ * continues.
  *
- * The nearest point of the cone that planes leave free is inside it, on a plane or on the line of
- * two planes: all are tried, since there are few; otherwise it is the apex. */
+ * The planes of the contacts leave a cone of free directions. The point of the cone that is nearest
+ * to the wanted path is the wanted point itself, or on a plane or on the line of two planes;
+ * otherwise it is the apex. All of these are tried, since there are few planes. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -97,16 +99,17 @@ void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3])
 
 enum {
     STEPS = 6,
-    /* Work of a haptic step that is reserved for the check. */
+    /* Work of a haptic step that is reserved for the check of crossings. */
     KEPT_FACES = 64,
     KEPT_NODES = 256,
-    /* Number of further faces that are visited where one holds the ball in place. */
+    /* Number of further faces that are visited when a face holds the ball in place. */
     HELD_FACES = 48
 };
 
-static const double worth = 1.0 / 32; /* least part of a path worth an early end */
+static const double worth =
+    1.0 / 32; /* shortest part of a path at which ending early is worthwhile */
 
-/* Returns the space for waiting nodes: at most as many parts of the tree as it has leaves. */
+/* Returns the number of nodes that can wait: at most as many parts of the tree as it has leaves. */
 static uint64_t capacity_for(uint64_t faces) { return ebpo_face_box_leaves(faces) + 1; }
 
 uint64_t ebpo_ball_walk_bytes(uint64_t faces)
@@ -130,7 +133,8 @@ void ebpo_ball_walk_free(ebpo_ball_walk *w)
     w->queue.item = NULL;
 }
 
-/* Returns true if the ball comes no nearer to the content of `e`. The slacks cover rounding. */
+/* Returns true if the ball does not come nearer to the content of `e`. The slacks cover rounding.
+ */
 static bool goes_away(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double least = 0;
@@ -139,9 +143,9 @@ static bool goes_away(const ebpo_ball_walk *w, const ebpo_extent *e)
     return least >= 0;
 }
 
-/* Returns a lower bound of the part of the path at which the ball touches the content of `e`. If it
- * may touch it now, returns the negative overlap. INFINITY: not before the known contact, or not at
- * all. */
+/* Returns a lower bound of the part of the path at which the ball touches the content of `e`. If
+ * the ball may touch it now, returns minus the overlap. INFINITY: not before the known contact, or
+ * not at all. */
 static double ball_walk_soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double part = 0;
@@ -200,8 +204,8 @@ static void inspect_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
     }
 }
 
-/* Ends the path before the first waiting node; what was not visited is farther. Returns false if
- * hardly any path remains. */
+/* Ends the path before the first waiting node; all nodes not visited are farther along the path.
+ * Returns false if hardly any path remains. */
 static bool end_before_that(ebpo_ball_walk *w)
 {
     if (w->part <= 0)
@@ -216,7 +220,7 @@ static bool end_before_that(ebpo_ball_walk *w)
 
 static bool ball_walk_look(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
-    uint32_t held = work->faces; /* before the contact */
+    uint32_t held = work->faces; /* number of faces visited before the contact */
     while (w->queue.count > 0 && w->queue.item[0].key < w->part) {
         if (w->part <= 0 &&
             (w->intersected.count == EBPO_PLANES_LIMIT || work->faces >= held + HELD_FACES))
@@ -250,8 +254,8 @@ static void begin_check(ebpo_ball_walk *w)
         w->stack[w->depth++] = 1;
 }
 
-/* Returns true if the segment may intersect `e`. It is widened by more than the rounding of its
- * entry and exit, and by less than the ball's distance from faces. */
+/* Returns true if the segment may intersect `e`. `e` is widened by more than the rounding of the
+ * segment's entry and exit, and by less than the ball's distance from faces. */
 static bool may_cross(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double enters = 0, leaves = 1, wider = 16 * w->band;

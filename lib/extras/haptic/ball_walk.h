@@ -8,27 +8,27 @@
 enum { EBPO_PLANES_LIMIT = 12 };
 
 typedef struct ebpo_held_planes {
-    double normal[EBPO_PLANES_LIMIT][3]; /* unit vectors to the free side */
+    double normal[EBPO_PLANES_LIMIT][3]; /* unit vectors that point to the free side */
     int count;
 } ebpo_held_planes;
 
 /* Adds a plane, unless it is present or there is no space. */
 void ebpo_held_planes_add(ebpo_held_planes *planes, const double normal[3]);
 
-/* Projects the path `want` onto the cone n . x >= 0 for all planes; `out` is 0 if rounding finds
- * none. Returns how far below 0 n . out may be. */
+/* Projects the path `want` onto the cone n . x >= 0 for all planes; `out` is 0 if rounding finds no
+ * such path. Returns how far below 0 n . out may be. */
 double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], double out[3]);
 
-/* Limits of a haptic step's work. It continues in the next one, so any number of faces may surround
- * a ball. */
+/* Limits of the work in a haptic step. The work continues in the next step, so any number of faces
+ * may surround a ball. */
 
 enum {
-    /* For each haptic step. */
+    /* Maximum number of faces and of nodes in each haptic step. */
     EBPO_BALL_FACES = 512,
     EBPO_BALL_NODES = 2048
 };
 
-/* Work done; all pieces of a haptic step add to it. */
+/* Work done in a haptic step; all pieces of path add to it. */
 typedef struct ebpo_ball_work {
     uint32_t faces, nodes;
 } ebpo_ball_work;
@@ -46,26 +46,26 @@ typedef struct ebpo_ball_walk {
     double reach, band, slack, least_slack; /* as in ebpo_ball_way */
     double part;                            /* part of the path until the first contact */
     ebpo_held_planes intersected;           /* normals of the contacts there */
-    bool cut;                               /* it ends before the contact, because the work was used
-                                             * up */
-    double to[3];                           /* known after the search */
-    ebpo_near_queue queue;                  /* for LOOKS */
-    uint64_t stack[64];                     /* for CHECKS; each level leaves one */
+    bool cut;                               /* the path ends before the contact, because the work
+                                             * was used up */
+    double to[3];                           /* end of the piece, known after the search */
+    ebpo_near_queue queue;                  /* used at EBPO_BALL_LOOKS */
+    uint64_t stack[64]; /* used at EBPO_BALL_CHECKS; each level leaves one node */
     int depth;
 } ebpo_ball_walk;
 
-/* Allocates for boxes of this many faces; writes all pages. */
+/* Allocates memory for boxes of this many faces; writes all pages. */
 EBPO_MUST_USE ebpo_status ebpo_ball_walk_new(ebpo_ball_walk *w, uint64_t faces, ebpo_error *error);
 void ebpo_ball_walk_free(ebpo_ball_walk *w);
 uint64_t ebpo_ball_walk_bytes(uint64_t faces);
 
-/* Begins; from, way, box, reach, band and slacks must be set. */
+/* Begins a piece; from, way, box, reach, band and slacks must be set. */
 void ebpo_ball_set_out(ebpo_ball_walk *w);
 
 typedef enum ebpo_ball_end {
-    EBPO_BALL_LATER,  /* more work remains than a haptic step may do */
+    EBPO_BALL_LATER,  /* more work remains than a haptic step may do; the next step continues */
     EBPO_BALL_THERE,  /* the path to `to` is free; the ball stops */
-    EBPO_BALL_THROUGH /* exact arithmetic finds a crossing; the ball stops */
+    EBPO_BALL_THROUGH /* exact arithmetic finds that the centre crosses a face; the ball stops */
 } ebpo_ball_end;
 
 ebpo_ball_end ebpo_ball_go_on(ebpo_ball_walk *w, ebpo_ball_work *work);

@@ -1,14 +1,13 @@
-/* The faces in a box around the proxy, with a tree of boxes over them: all that a haptic step
+/* The faces in a box around the proxy, with a tree of boxes over them: all data that a haptic step
  * reads.
  *
  * The loading thread makes a box; a box never changes while a step uses it. Faces keep the order of
- * the file, which follows a curve, so the tree needs no sorting. Functions that steps call allocate
- * no memory, and limits of the callers bound their work.
+ * the file, which follows a space-filling curve, so the tree needs no sorting. Functions that steps
+ * call allocate no memory; their callers limit their work.
  *
  * Distances are in doubles, correct to a few ulps. The side of a point is exact: its winding number
- * changes at each face that a straight path crosses through its inside. Where the path crosses an
- * edge, or begins in a face's plane, it is redirected through another point; almost every one
- * works. */
+ * changes at each face whose interior a straight path crosses. Where the path crosses an edge, or
+ * begins in a face's plane, it takes a detour through another point; almost every point works. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -35,7 +34,7 @@ uint64_t ebpo_face_box_bytes(uint64_t capacity)
            2 * ebpo_face_box_leaves(capacity) * sizeof(ebpo_extent);
 }
 
-/* Writes all pages here, so that no haptic step is the first to use one. */
+/* All pages are written here, so that no haptic step is the first to use a page. */
 ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacity, ebpo_error *error)
 {
     *out = (ebpo_face_box){ .capacity = capacity, .leaves = 1 };
@@ -49,9 +48,9 @@ ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacity, ebpo_error 
     }
     memset(out->corner, 0xff, capacity * sizeof *out->corner);
     memset(out->face, 0xff, capacity * sizeof *out->face);
-    memset(out->node, 0xff, nodes * sizeof *out->node); /* NAN: intersects nothing */
+    memset(out->node, 0xff, nodes * sizeof *out->node); /* NAN: the node intersects nothing */
     for (int i = 0; i < 3; i++)
-        out->centres.min[i] = out->centres.max[i] = NAN; /* contains nothing */
+        out->centres.min[i] = out->centres.max[i] = NAN; /* NAN: the box contains nothing */
     return EBPO_OK;
 }
 
@@ -150,7 +149,7 @@ static bool face_intersects(const double face[3][3], const ebpo_extent *around)
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
                         uint32_t most, uint32_t *visits, uint32_t *count)
 {
-    uint64_t stack[64]; /* each level leaves one */
+    uint64_t stack[64]; /* each level leaves one node */
     int depth = 0;
     *count = 0;
     stack[depth++] = 1;
@@ -177,7 +176,7 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
     return true;
 }
 
-/* Returns the squared distance. */
+/* Returns the squared distance of two boxes. */
 static double face_box_between(const ebpo_extent *a, const ebpo_extent *b)
 {
     double square = 0;
@@ -209,7 +208,7 @@ static double find_square(const ebpo_face_box *box, const ebpo_extent *around, u
     struct {
         uint64_t node;
         double lower;
-    } stack[64]; /* each level leaves one */
+    } stack[64]; /* each level leaves one node */
     int depth = 0;
     double least = INFINITY;
     if (box->count == 0)
@@ -229,7 +228,7 @@ static double find_square(const ebpo_face_box *box, const ebpo_extent *around, u
         } else {
             double l = face_box_between(&box->node[2 * node], around);
             double r = face_box_between(&box->node[2 * node + 1], around);
-            bool first = l <= r; /* visited first, so pushed last */
+            bool first = l <= r; /* the child that is visited first is pushed last */
             stack[depth].node = 2 * node + first;
             stack[depth++].lower = first ? r : l;
             stack[depth].node = 2 * node + !first;
@@ -247,13 +246,13 @@ double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *arou
 
 /* --- the nearest point of a face --- */
 
-/* The distance from a face, a convex set, is convex along a line: where it falls, tangents lie
- * below it, so Newton's steps towards a distance never go too far. That finds when a ball touches a
- * face, at any of its features. */
+/* The distance from a face, a convex set, is convex along a line. Where it decreases, its tangents
+ * are below it, so Newton's steps towards a distance never go too far. So they find when a ball
+ * touches a face, at any of the face's features. */
 
 typedef struct nearest {
     double square, offset[3]; /* vector from the nearest point to p */
-    int edge;                 /* from corner k to k + 1 */
+    int edge;                 /* edge from corner `edge` to the next one */
     double part;              /* position on the edge */
 } nearest;
 
@@ -276,7 +275,7 @@ static void try_edge(const double p[3], const double face[3][3], int k, nearest 
     }
 }
 
-/* Handles a p that is above the inside of the face. */
+/* Handles a point p that is above the interior of the face. */
 static bool near_inside(const double p[3], const double face[3][3], ebpo_face_near *out)
 {
     double e[3], f[3], n[3], d[3], c[3];
@@ -357,13 +356,14 @@ static int volume_sign(const double a[3], const double b[3], const double c[3], 
         sum += (fabs(l) + fabs(r)) * fabs(w[i]);
         last += fabs(w[i]);
     }
-    /* the bound of ebpo_orient3d, which may allocate memory where expansions do not suffice */
+    /* the error bound of ebpo_orient3d; that function may allocate memory where expansions do not
+     * suffice */
     double bound = 0x1p-50 * sum + 0x1p-960 * (1 + last);
     return value > bound ? 1 : value < -bound ? -1 : ebpo_orient3d_expansion(a, b, c, d);
 }
 
-/* In the face's plane, seen along an axis: returns false if a line along an edge or along pq
- * separates them. */
+/* Tests the segment and the face in the face's plane, seen along an axis. Returns false if a line
+ * along an edge or along pq separates them. */
 static bool intersects_in_plane(const double p[3], const double q[3], const double face[3][3],
                                 int axis)
 {
@@ -384,7 +384,7 @@ static bool intersects_in_plane(const double p[3], const double q[3], const doub
         if (ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], a) == -way &&
             ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], b) == -way)
             return false;
-    /* on the line of a flat view: compare along the line, too */
+    /* the view is a line: compare along this line, too */
     for (int i = 0; i < 2; i++)
         if (fmax(a[i], b[i]) < fmin(corner[0][i], fmin(corner[1][i], corner[2][i])) ||
             fmin(a[i], b[i]) > fmax(corner[0][i], fmax(corner[1][i], corner[2][i])))
@@ -392,8 +392,8 @@ static bool intersects_in_plane(const double p[3], const double q[3], const doub
     return true;
 }
 
-/* Compares along each axis in which the face is not a line; a face without area is one along all.
- */
+/* Compares along each axis along which the face is not seen as a line; a face without area is
+ * always seen as one. */
 static bool intersects_flat(const double p[3], const double q[3], const double face[3][3])
 {
     for (int axis = 0; axis < 3; axis++) {
@@ -441,7 +441,7 @@ static int segment_crosses(const double p[3], const double q[3], const double fa
         if (sign != 1 && sign != -1)
             return EBPO_CROSSES_BADLY;
     }
-    return at_p; /* from its outer side */
+    return at_p; /* the path comes from the face's outer side */
 }
 
 void ebpo_near_push(ebpo_near_queue *queue, double key, uint64_t node)
@@ -505,7 +505,7 @@ static crossing cross_faces(ebpo_side *side, const ebpo_face_box *box, const dou
     return CROSSED;
 }
 
-/* Chooses a point near the middle of the path, a different one each time. */
+/* Chooses a point for a detour near the middle of the path, a different one each time. */
 static void go_round(ebpo_side *side, const double to[3], const ebpo_extent *within, double via[3])
 {
     double length = 0;

@@ -1,5 +1,5 @@
-/* The faces in a box with a tree of boxes over them, for haptic steps; distances from faces and the
- * side of a point. The loading thread makes a box; it never changes while a step uses it. */
+/* The faces in a box, with a tree of boxes over them, for haptic steps; distances from faces and
+ * the side of a point. The loading thread makes a box; a box never changes while a step uses it. */
 #ifndef EBPO_HAPTIC_FACE_BOX_H
 #define EBPO_HAPTIC_FACE_BOX_H
 
@@ -23,42 +23,46 @@ static inline bool ebpo_extent_holds(const ebpo_extent *e, const double p[3])
 }
 
 typedef struct ebpo_face_box {
-    /* Centres of balls for which the box has all faces within the margin. */
+    /* Box of ball centres for which all faces within the margin are loaded. */
     ebpo_extent centres;
-    ebpo_extent loaded;               /* the box has all faces that intersect it */
+    ebpo_extent loaded;               /* all faces that intersect this extent are in the box */
     uint64_t count, capacity, leaves; /* leaves: a power of two */
     double (*corner)[3][3];           /* [capacity] */
-    uint64_t *face;                   /* [capacity] numbers for callers */
-    ebpo_extent *node;                /* [2 leaves] the root is 1, children of n are 2 n, 2 n + 1 */
+    uint64_t *face;                   /* [capacity] face numbers that callers get */
+    ebpo_extent *node;                /* [2 leaves] the root is node 1, the children of node n are 2
+                                       * n and 2 n + 1 */
 } ebpo_face_box;
 
 EBPO_MUST_USE ebpo_status ebpo_face_box_new(ebpo_face_box *out, uint64_t capacity,
                                             ebpo_error *error);
 void ebpo_face_box_free(ebpo_face_box *box);
 uint64_t ebpo_face_box_bytes(uint64_t capacity);
-uint64_t ebpo_face_box_leaves(uint64_t capacity); /* Returns the most leaves of its tree. */
+uint64_t ebpo_face_box_leaves(uint64_t capacity); /* Returns the maximum number of leaves of a box's
+                                                   * tree. */
 
-/* Loads the faces within `margin` of the centres. *fits is false if there are more than there is
- * memory for. */
+/* Loads the faces within `margin` of the centres. *fits is false if there are more faces than the
+ * box has memory for. */
 EBPO_MUST_USE ebpo_status ebpo_face_box_load(ebpo_face_box *box, ebpo_context *context,
                                              const ebpo_extent *centres, double margin, bool *fits,
                                              ebpo_error *error);
 
-/* Finds faces whose boxes intersect `around`, into found[most]. Returns false if there are more, or
- * more than *visits nodes to visit; *visits is reduced by the visited nodes. */
+/* Finds faces whose boxes intersect `around`, into found[most]. Returns false if there are more
+ * than `most` faces, or more than *visits nodes to visit. *visits is reduced by the number of
+ * visited nodes. */
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
                         uint32_t most, uint32_t *visits, uint32_t *count);
 
-/* Returns a lower bound of the distance of `around` from the faces of the box; it is weaker when
- * the limit of nodes is reached. *visits counts them. */
+/* Returns a lower bound of the distance of `around` from the faces of the box. The bound is weaker
+ * when the limit of nodes is reached. Adds the visited nodes to *visits. */
 double ebpo_face_box_clearance(const ebpo_face_box *box, const ebpo_extent *around,
                                uint32_t max_visits, uint64_t *visits);
 
-/* Distance of a point from a face, computed fast; also for a moving ball. */
+/* The distance of a point from a face, computed fast; moving balls use it, too. */
 
 typedef struct ebpo_face_near {
     double distance;
-    double away[3];   /* unit vector from the nearest point of the face; 0 at distance 0 */
+    double away[3];   /* unit vector that points away from the nearest point of the face; 0 at
+                       * distance 0 */
     double weight[3]; /* weights of the corners at the nearest point */
 } ebpo_face_near;
 
@@ -67,27 +71,28 @@ void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_nea
 
 typedef struct ebpo_ball_way {
     const double *from, *way; /* [3] */
-    double reach, band;       /* the ball's radius; contact begins at that distance plus the band */
-    /* An approach to a face by less than this over the whole path is none; least_slack where the
-     * ball is closer than its radius already. */
+    double reach, band;       /* the ball's radius; contact begins at a distance of reach + band */
+    /* If the ball comes nearer to a face by less than this over the whole path, that is no
+     * approach. least_slack is used where the ball is already closer than its radius. */
     double slack, least_slack;
 } ebpo_ball_way;
 
-/* Returns the part 0 to 1 of the path at which the ball touches the face, or a little less; 2 if it
- * does not. `away` as above at that point. */
+/* Returns the part of the path, 0 to 1 or slightly less, at which the ball touches the face; 2 if
+ * it does not. `away` is as in ebpo_face_near, at that point. */
 double ebpo_ball_intersects(const ebpo_ball_way *w, const double face[3][3], double away[3]);
 
-/* Returns false if the closed segment and the closed face certainly have no common point; true if
- * they have one, or if numbers are so large or small that only integers of any size could decide.
- * Faces without area have none. Allocates no memory. */
+/* Returns false if the closed segment and the closed face certainly have no common point. Returns
+ * true if they have one, or if numbers are so large or small that only integers of any size could
+ * decide. A face without area has no common point. Allocates no memory. */
 bool ebpo_segment_may_intersect(const double p[3], const double q[3], const double face[3][3]);
 
-/* Returns the change of the winding number from p to q through the face: 1 from outside to inside,
- * -1 back, 0: no common point. EBPO_CROSSES_BADLY: through an edge, a corner, from or to the face's
- * plane, or perhaps not at all. Allocates no memory. */
+/* Returns the change of the winding number from p to q by this face: 1 from outside to inside, -1
+ * from inside to outside, 0 without a common point. EBPO_CROSSES_BADLY: the segment crosses an edge
+ * or a corner, begins or ends in the face's plane, or may not cross at all. Allocates no memory. */
 enum { EBPO_CROSSES_BADLY = 2 };
 
-/* A heap of nodes of the tree over a box's faces, the least key first, in an array of its owner. */
+/* A heap of nodes of the tree over a box's faces, the least key first. The caller owns the array.
+ */
 
 typedef struct ebpo_near_node {
     double key; /* not NAN */
@@ -95,27 +100,28 @@ typedef struct ebpo_near_node {
 } ebpo_near_node;
 
 typedef struct ebpo_near_queue {
-    ebpo_near_node *item; /* with space for all that are pushed */
+    ebpo_near_node *item; /* space for all nodes that are pushed */
     uint64_t count;
 } ebpo_near_queue;
 
 void ebpo_near_push(ebpo_near_queue *queue, double key, uint64_t node);
-/* Removes and returns item[0], the first. */
+/* Removes and returns item[0], the node with the least key. */
 ebpo_near_node ebpo_near_pop(ebpo_near_queue *queue);
 
-/* The side of a probe: its winding number, which exact arithmetic changes at each face that it
- * crosses. */
+/* The side of a probe: its winding number, which exact arithmetic changes at each face that the
+ * probe crosses. */
 
 typedef struct ebpo_side {
-    double at[3]; /* for this point, which is on no face */
+    double at[3]; /* the point of this winding number; it is on no face */
     int32_t winding;
     bool known;
     uint32_t turns; /* number of detours around degenerate crossings */
 } ebpo_side;
 
-/* Continues to `place`, as far as bounded work allows: at most `most` faces for each of some
- * pieces, into found[most]. Returns true if it is there. Otherwise it stops where the winding
- * number is known, or has left the box (then known is false). */
+/* Moves the side to `place`, as far as bounded work allows: in a few pieces of path, with at most
+ * `most` faces for each, into found[most]. Returns true if `place` is reached. Otherwise the side
+ * stops at a point where the winding number is known, or has left the box (then `known` is false).
+ */
 bool ebpo_side_go(ebpo_side *side, const ebpo_face_box *box, const double place[3], uint32_t *found,
                   uint32_t most, uint32_t visits, uint64_t *work);
 

@@ -1,10 +1,10 @@
 /* The object of a haptic session: its options and memory, the step of a ball, and the placement of
  * the proxy.
  *
- * A step moves the proxy towards the device (haptic_step.c), held back by the planes in contact
- * with it. It returns the force of a spring between them, with friction along the surface. A step
- * allocates no memory, takes no lock and reads no file: all that it uses is made before or comes
- * from the loading thread. A device position at infinity or NaN is ignored.
+ * A step moves the proxy towards the device (haptic_step.c); the planes in contact with the proxy
+ * hold it back. The step returns the force of a spring between proxy and device, with friction
+ * along the surface. A step allocates no memory, takes no lock and reads no file: its data are made
+ * before or come from the loading thread. A device position at infinity or NaN is ignored.
  *
  * Documentation: docs/guide/haptic.md. */
 #include "core/strict_fp.h"
@@ -37,8 +37,8 @@ uint32_t ebpo_haptic_stopped(const ebpo_haptic *t)
 
 static bool move_stands(const ebpo_haptic *t) { return t->walk.stage == EBPO_BALL_STANDS; }
 
-/* Applies Coulomb friction: the proxy, which slid from `from` without friction, follows only as far
- * as the tangential part of the spring exceeds the friction. */
+/* Applies Coulomb friction. Without friction the proxy has slid from `from`; with friction it
+ * follows only as far as the tangential part of the spring exceeds the friction. */
 static uint32_t move_rub(ebpo_haptic *t, const double from[3], const double device[3],
                          ebpo_ball_work *work)
 {
@@ -55,12 +55,12 @@ static uint32_t move_rub(ebpo_haptic *t, const double from[3], const double devi
     if (part > 0)
         return ebpo_haptic_go(t, goal, work);
     if (length > 0 && memcmp(from, t->along_at, sizeof t->along_at) == 0)
-        t->planes = t->along; /* the proxy is there again */
+        t->planes = t->along; /* the proxy is back at `from` */
     return 0;
 }
 
-/* Computes the vector from the device to the proxy; where the proxy waits, only the part that faces
- * hold back. */
+/* Computes the vector from the device to the proxy. Where the proxy waits for the loading thread,
+ * this is only the part that faces hold back. */
 static void find_depth(const ebpo_haptic *t, const double device[3], uint32_t flags, double out[3])
 {
     double want[3], way[3];
@@ -72,11 +72,12 @@ static void find_depth(const ebpo_haptic *t, const double device[3], uint32_t fl
     ebpo_vec3_subtract(way, want, out);
 }
 
-/* The vector from device to proxy is not exactly along the faces' normals: the proxy's remaining
- * path, rounding far from 0, and friction tilt it. Damping across it may pull towards faces, and
- * huge damping with full force: that part is removed, without increasing the force. The first
- * contact may be the edge of a face that the ball is beside, by a tiny distance: so the nearest
- * face counts, too. A face that the spring itself pulls to is another one of a narrow corner. */
+/* Removes the part of the force that pulls towards faces, without increasing the force. The vector
+ * from device to proxy is not exactly along the faces' normals: the proxy's remaining path,
+ * rounding far from 0, and friction tilt it. So damping across the vector may pull towards faces,
+ * and very high damping pulls with full force. The first contact may be the edge of a face that is
+ * a tiny distance beside the ball, so the nearest face counts, too. If the spring itself pulls to a
+ * face, that face is another one of a narrow corner. */
 static void keep_from_faces(const ebpo_haptic *t, bool near, const double depth[3], double force[3])
 {
     ebpo_held_planes off = { .count = 0 };
@@ -167,10 +168,10 @@ ebpo_status ebpo_haptic_get_stats(const ebpo_haptic *t, ebpo_haptic_stats *out)
     return EBPO_GIVE(ebpo_haptic_stats, out, &s);
 }
 
-uint32_t ebpo_haptic_ball_path(const ebpo_haptic *t, double way[EBPO_HAPTIC_PATH_MAX][3])
+uint32_t ebpo_haptic_ball_path(const ebpo_haptic *t, double path[EBPO_HAPTIC_PATH_MAX][3])
 {
     for (uint32_t i = 0; i < t->way_count; i++)
-        ebpo_vec3_copy(t->way[i], way[i]);
+        ebpo_vec3_copy(t->way[i], path[i]);
     return t->way_count;
 }
 
@@ -181,7 +182,8 @@ static bool is_amount(double x) { return x >= 0 && x <= 0x1p200; }
 static ebpo_status check_options(const ebpo_haptic_options *o, ebpo_error *error)
 {
     if (!is_amount(o->radius) || !is_amount(o->skin) || !is_amount(o->search_radius))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "radius, skin and look must be 0 to 2^200");
+        return ebpo_fail(error, EBPO_E_ARGUMENT,
+                         "radius, skin and search radius must be 0 to 2^200");
     if (!is_amount(o->stiffness) || !is_amount(o->damping) || !is_amount(o->friction))
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "stiffness, damping and friction must be 0 to 2^200");
@@ -194,9 +196,7 @@ static ebpo_status check_options(const ebpo_haptic_options *o, ebpo_error *error
         return ebpo_fail(error, EBPO_E_ARGUMENT, "only balls have a radius");
     if ((o->kind == EBPO_HAPTIC_TOOL) != (o->points != NULL && o->point_count > 0) ||
         o->point_count > EBPO_TOOL_POINTS)
-        return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "expected 1 to %d points for a tool, and none "
-                         "for other kinds",
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "a tool needs 1 to %d points, other kinds none",
                          EBPO_TOOL_POINTS);
     for (uint64_t i = 0; i < 3 * o->point_count; i++)
         if (!(fabs(o->points[i / 3][i % 3]) <= 0x1p200))
@@ -216,7 +216,7 @@ static ebpo_status new_measure(ebpo_haptic *t, ebpo_error *error)
     t->solid = info->solid;
     for (int i = 0; i < 3; i++) {
         double low = info->box_origin[i], high = low + info->box_size[i];
-        double wider = 0x1p-50 * (fabs(low) + fabs(high)); /* rounding of the sum */
+        double wider = 0x1p-50 * (fabs(low) + fabs(high)); /* rounding of low + high */
         t->root.min[i] = low - wider;
         t->root.max[i] = high + wider;
         most = fmax(most, fmax(fabs(t->root.min[i]), fabs(t->root.max[i])));
@@ -226,7 +226,7 @@ static ebpo_status new_measure(ebpo_haptic *t, ebpo_error *error)
         return ebpo_fail(error, EBPO_E_UNSUPPORTED,
                          "coordinates are too large or too small for haptics");
     double wide = t->tool ? t->tool->radius * (1 + 0x1p-40) : t->options.radius;
-    most += wide; /* possible device position at contact */
+    most += wide; /* positions of the device at contact */
     double least = fmax(0x1p-30 * t->diagonal, 0x1p-42 * most);
     if (t->options.skin == 0)
         t->options.skin = fmax((t->tool ? 0x1p-15 : 0x1p-20) * t->diagonal, least);
@@ -273,7 +273,8 @@ static ebpo_status check_point(ebpo_haptic *t, const double place[3], double rea
     ebpo_status status = ebpo_distance(t->querying, place, &options, &near, error);
     if (status == EBPO_OK && near.distance <= options.max_distance && near.distance >= 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the device is %g from a face there; it must be farther than %g",
+                         "the distance of the device from a face is %g there; it must be greater "
+                         "than %g",
                          near.distance, options.max_distance);
     if (status != EBPO_OK || !t->solid)
         return status;
@@ -284,7 +285,8 @@ static ebpo_status check_point(ebpo_haptic *t, const double place[3], double rea
                : ebpo_fail(error, EBPO_E_ARGUMENT, "the position is in the solid; begin outside");
 }
 
-/* A probe may be anywhere; a tool has its axes along the model's. */
+/* Checks the initial position. A probe may be anywhere; a tool begins with its axes along the
+ * model's. */
 static ebpo_status check_place(ebpo_haptic *t, const double place[3], ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -302,8 +304,9 @@ static ebpo_status check_place(ebpo_haptic *t, const double place[3], ebpo_error
     return status;
 }
 
-/* The box before counts, too: it may be the last one loaded, which a haptic step discarded because
- * it was made for another position; no other comes for this one. */
+/* Returns true if a box contains the proxy. The previous box counts, too: it may be the last one
+ * loaded, which a haptic step discarded because the box was made for another position; then the
+ * loader makes no other box for this position. */
 static bool has_box(ebpo_haptic *t)
 {
     if (ebpo_extent_holds(&t->box[t->at].centres, t->proxy) || ebpo_haptic_take_box(t))
@@ -334,7 +337,8 @@ ebpo_status ebpo_haptic_reset(ebpo_haptic *t, const double place[3], ebpo_error 
     ebpo_status status = check_place(t, place, error);
     if (status != EBPO_OK)
         return status;
-    t->walk.stage = EBPO_BALL_STANDS; /* also after a failure: it continues from its position */
+    t->walk.stage = EBPO_BALL_STANDS; /* also after a failure: the session continues from its
+                                       * position */
     ebpo_vec3_copy(place, t->proxy);
     ebpo_vec3_copy(place, t->device);
     ebpo_haptic_report(t, place);

@@ -1,9 +1,9 @@
 /* The thread that loads boxes of faces ahead of the haptic device, and exact results for probes.
  *
- * A haptic step never waits for it. Boxes and results are passed through buffers that are exchanged
- * atomically: the loader writes its buffer and swaps it with the middle one, which the step swaps
- * with its own. The position of the device is predicted from its speed. When a box has more faces
- * than there is memory for, a smaller one is loaded. */
+ * A haptic step never waits for this thread. Boxes and results are passed through buffers that are
+ * exchanged atomically: the loader writes its buffer and swaps it with the middle one; the step
+ * swaps the middle one with its own. The position of the device is predicted from its speed. When a
+ * box has more faces than there is memory for, a smaller box is loaded. */
 #include "core/strict_fp.h"
 
 #include <errno.h>
@@ -35,7 +35,8 @@ static ebpo_status known_query(ebpo_haptic *t, ebpo_known_place *out, ebpo_error
     return EBPO_OK;
 }
 
-/* Queries the probe's position in the loading thread. *moved: true if it has moved. */
+/* Queries the distance and the side at the probe's position, in the loading thread. *moved: true if
+ * the position has changed. */
 static ebpo_status learn_place(ebpo_haptic *t, bool *moved, ebpo_error *error)
 {
     ebpo_known_place *known = &t->known[t->own_known];
@@ -66,9 +67,9 @@ const ebpo_known_place *ebpo_haptic_known(ebpo_haptic *t)
 
 /* --- boxes --- */
 
-/* Seconds of prediction for a box, and over which the speed is measured. As a part of half a box's
- * side: the greatest distance of the proxy from the middle of a new box, and the motion of the
- * middle that requires another box. */
+/* Seconds of prediction for a box (ahead), and seconds over which the speed is measured (measured).
+ * As a part of half a box's side: greatest distance of the proxy from the middle of a new box
+ * (aside), and motion of the middle that requires another box (enough). */
 static const double ahead = 0.05, measured = 0.02, aside = 0.6, enough = 0.25;
 
 static void wait_a_little(void)
@@ -96,7 +97,8 @@ static void loader_foresee(ebpo_haptic *t, double out[3])
         t->when_before = now;
 }
 
-/* Computes the centres of a box around the proxy, shifted towards the predicted position. */
+/* Computes the extent of a box around the proxy: the centres, shifted towards the predicted
+ * position. */
 static void place_box(const ebpo_haptic *t, const double goal[3], ebpo_extent *out)
 {
     for (int i = 0; i < 3; i++) {
@@ -150,7 +152,8 @@ static ebpo_status loader_load(ebpo_haptic *t, const double goal[3], ebpo_error 
                 (unsigned long long)t->options.faces);
     }
     t->last = centres;
-    bool few = box->count < box->capacity / 4; /* and the haptic step owns the box from here on */
+    bool few = box->count < box->capacity / 4; /* read first: after the exchange, the haptic step
+                                                * owns the box */
     hand_over(t, began);
     if (few)
         t->half = fmin(1.5 * t->half, t->diagonal);
@@ -187,7 +190,7 @@ static void *loader_run(void *user)
 ebpo_status ebpo_haptic_loader_start(ebpo_haptic *t, ebpo_error *error)
 {
     for (int i = 0; i < 3; i++) {
-        t->last.min[i] = t->last.max[i] = NAN; /* far from all */
+        t->last.min[i] = t->last.max[i] = NAN; /* NAN: far from every position */
         t->queried[i] = NAN;
         t->device_before[i] = atomic_load(&t->device_reported[i]);
     }

@@ -1,4 +1,4 @@
-/* The object of a haptic session; says which thread may use which part of it. */
+/* The object of a haptic session, with comments on which thread may use which part. */
 #ifndef EBPO_HAPTIC_HAPTIC_PARTS_H
 #define EBPO_HAPTIC_HAPTIC_PARTS_H
 
@@ -12,76 +12,79 @@
 #include "extras/haptic/tool.h"
 
 enum {
-    /* Boxes: the step's current one, its previous one, the middle one, the one being loaded. */
+    /* Number of boxes: the current one of the step, its previous one, the middle one, the one being
+     * loaded. */
     EBPO_HAPTIC_BOXES = 4,
-    EBPO_HAPTIC_FRESH = 8, /* beside a box's number: the haptic step has not seen it */
+    EBPO_HAPTIC_FRESH = 8, /* flag beside a box's number: the haptic step has not seen the box */
 
-    /* Most faces and nodes examined for the normal, and for the side of a probe. */
+    /* Maximum number of faces and nodes that are examined for the normal, and for the side of a
+     * probe. */
     EBPO_HAPTIC_FACES = 384,
     EBPO_HAPTIC_VISITS = 1024,
 
     EBPO_HAPTIC_PIECES = EBPO_HAPTIC_PATH_MAX - 1
 };
 
-/* Results of the loading thread for a position, for probes. */
+/* Results of the loading thread for a position of a probe. */
 typedef struct ebpo_known_place {
     double place[3];
-    double distance; /* unsigned; infinite without faces */
+    double distance; /* without a sign; infinite if the model has no faces */
     double point[3], normal[3];
     int32_t winding;
     bool there, on;
 } ebpo_known_place;
 
 struct ebpo_haptic {
-    /* constant */
+    /* --- constant members --- */
     ebpo_model *model;
     ebpo_haptic_options options;
-    ebpo_extent root; /* no face is outside */
+    ebpo_extent root; /* all faces are inside */
     double diagonal;  /* diagonal of the root cell */
     double reach, band, margin;
     bool solid;
     ebpo_held_levels levels; /* for probes */
 
-    /* used by the thread of haptic steps */
-    unsigned at, seen; /* boxes */
+    /* --- used by the thread of haptic steps --- */
+    unsigned at, seen; /* numbers of the current and the previous box */
     double proxy[3], device[3], force[3];
     bool touching;
     ebpo_ball_walk walk;     /* the current piece of path */
-    ebpo_held_planes along;  /* contacts of the ball */
-    double along_at[3];      /* with its centre here */
-    ebpo_held_planes planes; /* planes that hold the proxy, after the last complete piece */
-    uint32_t cut;            /* flags if the piece's end is reached */
+    ebpo_held_planes along;  /* contacts of the ball when its centre is at along_at */
+    double along_at[3];      /* position of the centre for these contacts */
+    ebpo_held_planes planes; /* planes that hold the proxy after the last complete piece */
+    uint32_t cut;            /* flags to return when the end of the piece is reached */
     bool felt;               /* a complete piece leads to the device's position */
     double way[EBPO_HAPTIC_PATH_MAX][3];
     uint32_t way_count;
-    double stride; /* most length of a piece of a tool's path */
+    double stride; /* maximum length of a piece of a tool's path */
     ebpo_passive passive;
     struct ebpo_tool *tool; /* or NULL */
     ebpo_haptic_stats stats;
     uint32_t found[EBPO_HAPTIC_FACES];
     ebpo_near_node looking[EBPO_HAPTIC_VISITS + 2];
     double gap[EBPO_HAPTIC_FACES];
-    double away[3];         /* from the nearest face, if one was found */
-    ebpo_context *querying; /* for positions */
+    double away[3];         /* direction away from the nearest face, if one was found */
+    ebpo_context *querying; /* for placing the proxy */
     ebpo_side side;
-    unsigned result; /* number of a known position */
+    unsigned result; /* number of the step's entry of known[] */
 
-    /* exchanged */
+    /* --- exchanged between the threads --- */
     ebpo_face_box box[EBPO_HAPTIC_BOXES];
-    atomic_uint between;              /* a box, possibly fresh */
-    _Atomic double proxy_reported[3]; /* atomic by component: the loader accepts a mixture */
-    _Atomic double
-        device_reported[3]; /* the step checks if a box that was made for a mixture fits */
+    atomic_uint between; /* number of the middle box, possibly with EBPO_HAPTIC_FRESH */
+    _Atomic double proxy_reported[3]; /* Each component is atomic: the loader may read a mixture of
+                                       * two positions. The step checks that a box that was made for
+                                       * a mixture contains the proxy. */
+    _Atomic double device_reported[3];
     ebpo_known_place known[3];
-    atomic_uint known_between;  /* as `between` */
-    _Atomic bool stop, stopped; /* stopped: by a failure, which is set before */
+    atomic_uint known_between;  /* as `between`, for known[] */
+    _Atomic bool stop, stopped; /* stopped: by a failure; `failure` is set before */
     atomic_uint_fast64_t loads, too_many, load_ns, load_ns_max;
 
-    /* used by the loading thread */
+    /* --- used by the loading thread --- */
     ebpo_context *loading;
-    unsigned own; /* box */
+    unsigned own; /* number of its box */
     unsigned own_known;
-    double queried[3]; /* the last queried position */
+    double queried[3]; /* position of the last query */
     ebpo_extent last;
     double half; /* half a box's side */
     double device_before[3], speed[3];
@@ -93,29 +96,28 @@ struct ebpo_haptic {
     ebpo_error failure;
 };
 
-/* haptic_step.c: moves the proxy towards the goal, as far as faces and the current box allow;
- * returns bits of ebpo_haptic_flag. */
+/* haptic_step.c: moves the proxy towards the goal, as far as faces and the current box allow.
+ * Returns bits of ebpo_haptic_flag. */
 uint32_t ebpo_haptic_go(ebpo_haptic *t, const double goal[3], ebpo_ball_work *work);
 
-/* Returns the part of the proxy's path, itself between the ends of a straight one, for which all
- * faces within `reach` are known: up to the boundary of the current box, or all of it where no face
- * can be. */
+/* Returns the part of the straight path `way` of the proxy for which all faces within `reach` are
+ * known: up to the boundary of the current box, or the whole path where no face can be. */
 double ebpo_haptic_known_part(const ebpo_haptic *t, const double way[3], double reach);
 
 /* haptic_step.c: finds the nearest face, weights, depth and the smooth normal; sets t->away. */
 void ebpo_haptic_look(ebpo_haptic *t, ebpo_haptic_ball_result *out);
 
-/* Returns the last known result. */
+/* Returns the last result of the loading thread. */
 const ebpo_known_place *ebpo_haptic_known(ebpo_haptic *t);
 
 /* haptic_loader.c */
 EBPO_MUST_USE ebpo_status ebpo_haptic_loader_start(ebpo_haptic *t, ebpo_error *error);
 void ebpo_haptic_loader_stop(ebpo_haptic *t);
 
-/* haptic_step.c: makes a fresh box that contains the proxy the current one. Returns true if there
- * was one. */
+/* haptic_step.c: replaces the current box by a fresh one that contains the proxy. Returns true if
+ * there was one. */
 bool ebpo_haptic_take_box(ebpo_haptic *t);
-/* Takes the previous box if it contains the proxy: it may extend further. */
+/* Returns to the previous box if it contains the proxy: it may extend further. */
 void ebpo_haptic_try_other(ebpo_haptic *t);
 
 /* haptic_ball.c: returns EBPO_HAPTIC_STOPPED, or 0. */

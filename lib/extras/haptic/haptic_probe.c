@@ -1,9 +1,10 @@
 /* The haptic step of a probe: bounds of its distance to the surface, and its side.
  *
  * Bounds come from three sources, all certain: the faces of the current box, the exact result for a
- * recent position of the probe, and the first levels of the octree. Their intersection is returned.
- * The side is the winding number, which exact arithmetic changes at each face that the probe
- * crosses; it is EBPO_MAYBE where a step is too short to find it. */
+ * recent position of the probe, and the first levels of the octree. The step returns the
+ * intersection of their intervals. The side is the winding number, which exact arithmetic changes
+ * at each face that the probe crosses; the side is EBPO_MAYBE where a step is too short to find it.
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -15,7 +16,7 @@
 
 enum { VISITS = 512 };
 
-/* Unsigned bounds. */
+/* Bounds of the distance without a sign. */
 typedef struct bounds {
     double lo, hi;
 } bounds;
@@ -26,13 +27,14 @@ static void sense_narrow(bounds *b, double lo, double hi)
     b->hi = fmin(b->hi, hi);
 }
 
-/* Bounds the rounding of the model's coordinates and of such a length. */
+/* Bounds the rounding error of the model's coordinates and of such a length. */
 static double rounding_of(const ebpo_haptic *t, double length)
 {
     return t->levels.slack + EBPO_LENGTH_SLACK * length;
 }
 
-/* Bounds the distance by the faces of the current box. Returns true if the nearest is known. */
+/* Bounds the distance by the faces of the current box. Returns true if the nearest face is known.
+ */
 static bool sense_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out,
                         bounds *b)
 {
@@ -72,7 +74,7 @@ static bool sense_known(ebpo_haptic *t, const double place[3], ebpo_haptic_probe
     return far == 0;
 }
 
-/* Restarts the side at the position of the recent result, if that is in the box. */
+/* If the position of the recent result is in the box, restarts the search for the side there. */
 static bool find_side(ebpo_haptic *t, const double place[3], ebpo_haptic_probe_result *out)
 {
     const ebpo_known_place *known = &t->known[t->result];

@@ -1,9 +1,9 @@
 /* The path of the proxy in a haptic step: straight until the ball is in contact, then along the
- * contacts, a few times.
+ * contacts, repeated a few times.
  *
- * Each straight piece is decided twice: by distances, which find where the ball stops, and by exact
- * arithmetic, which finds that the centre crossed no face. A piece takes several steps if very many
- * faces are around.
+ * Each straight piece is decided twice: distances find where the ball stops, and exact arithmetic
+ * checks that the centre has crossed no face. A piece takes several steps if very many faces are
+ * around the ball.
  *
  * Also here: the exchange of a box that the loading thread has made, and the nearest face with a
  * normal that changes continuously. */
@@ -30,7 +30,7 @@ bool ebpo_haptic_take_box(ebpo_haptic *t)
     unsigned got = atomic_exchange_explicit(&t->between, t->seen, memory_order_acq_rel);
     t->seen = got & ~(unsigned)EBPO_HAPTIC_FRESH;
     if (!ebpo_extent_holds(&t->box[t->seen].centres, t->proxy))
-        return false; /* it was made for another position */
+        return false; /* the box was made for another position */
     swap_boxes(t);
     t->stats.taken++;
     return true;
@@ -48,15 +48,15 @@ typedef struct around {
     ebpo_haptic *t;
     const ebpo_face_box *box;
     ebpo_near_queue queue;
-    double search_radius; /* all faces that are closer to the ball are found */
-    double nearest;       /* from centre to face */
+    double search_radius; /* all faces that are closer to the ball than this have been found */
+    double nearest;       /* distance from the centre to the nearest face */
     uint32_t looked;
-    uint32_t count; /* entries of t->found */
+    uint32_t count; /* number of entries of t->found */
     ebpo_haptic_ball_result *out;
 } around;
 
-/* Adds a normal, weighted by area and a factor that falls to 0 at the search distance. It points to
- * the proxy's side; of a solid always outwards. */
+/* Adds a normal, weighted by the face's area and by a factor that falls to 0 at the search radius.
+ * The normal points to the proxy's side; that of a solid always points outwards. */
 static void add_normal(const around *a, const double face[3][3], double gap, double sum[3])
 {
     double e[3], f[3], n[3], d[3];
@@ -104,8 +104,8 @@ static void wait_for(around *a, uint64_t node)
         ebpo_near_push(&a->queue, least, node);
 }
 
-/* Finds the nearest faces first. When there are too many, the farthest are omitted, and the normal
- * uses those that are surely closer. */
+/* Finds the faces around the ball, the nearest first. When there are too many, the farthest are
+ * omitted, and the normal uses only faces that are closer than all omitted ones. */
 static void find_faces(around *a)
 {
     for (uint32_t visits = 0; a->queue.count > 0; visits++) {
@@ -135,8 +135,8 @@ static bool no_face_close(const ebpo_haptic *t)
     return false;
 }
 
-/* Sets the normal away from the nearest face when too many faces surround the ball to be sure of
- * all. */
+/* Sets the normal to the direction away from the nearest face, when too many faces surround the
+ * ball to find all. */
 static void report_normal(const around *a, double out[3])
 {
     double sum[3] = { 0 };
@@ -205,8 +205,8 @@ static void step_shorten(double way[3], double part)
         way[i] *= part;
 }
 
-/* Returns the part of the path until the boundary of `e`, from within; slightly less, so that
- * rounding stays inside. */
+/* Returns the part of the path from a point inside `e` to the boundary of `e`; slightly less, so
+ * that the rounded end is inside. */
 static double part_inside(const double p[3], const double way[3], const ebpo_extent *e)
 {
     double part = 1;
@@ -271,13 +271,14 @@ static bool set_out(step *s)
     t->cut = 0;
     if (!keep_known(s))
         return false;
-    /* Slacks are those of the whole path: for a distant device they would be those of long pieces.
-     */
+    /* Slacks for the whole path, scaled to this part: for a distant device they would otherwise be
+     * those of long pieces. */
     double share = sqrt(ebpo_vec3_dot(s->way, s->way)) / whole;
     const ebpo_face_box *box = &t->box[t->at];
     ebpo_vec3_copy(t->proxy, w->from);
     ebpo_vec3_copy(s->way, w->way);
-    w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL; /* see keep_known */
+    w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL; /* NULL is possible: see
+                                                                       * keep_known */
     w->reach = t->reach;
     w->band = t->band;
     w->slack = s->slack * share;
@@ -286,7 +287,8 @@ static bool set_out(step *s)
     return true;
 }
 
-/* Three planes are enough to hold back: drops those along which the last path did not go. */
+/* Makes space for more planes: drops planes along which the last path did not go. Three planes are
+ * enough to hold the proxy. */
 static void reserve_space(ebpo_held_planes *along, const double way[3])
 {
     double length = sqrt(ebpo_vec3_dot(way, way));
@@ -309,8 +311,8 @@ static void add_planes(ebpo_haptic *t)
     ebpo_vec3_copy(t->proxy, t->along_at);
 }
 
-/* Ends the piece. The ball then slides along its contacts there; after a motion, only along those.
- * Returns false if it has no contact and stops for this haptic step. */
+/* Ends the piece. The ball then slides along the contacts there; after a motion, only along those.
+ * Returns false if the ball has no contact and stops for this haptic step. */
 static bool step_settle(step *s)
 {
     ebpo_haptic *t = s->t;
@@ -328,7 +330,7 @@ static bool step_settle(step *s)
     return touches;
 }
 
-/* Until more is known, the previous contacts hold the proxy. */
+/* Returns flags: until more is known, the previous contacts hold the proxy. */
 static uint32_t still_held(const step *s)
 {
     const ebpo_haptic *t = s->t;

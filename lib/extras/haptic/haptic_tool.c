@@ -1,11 +1,12 @@
 /* A haptic step of a tool. Gauss' principle for a body without mass: of all motions that its
- * contacts allow, the nearest to the device (Ortega, Redon, Coquillart 2007).
+ * contacts allow, the tool makes the one nearest to the device's motion (Ortega, Redon, Coquillart
+ * 2007).
  *
  * A piece of the path is decided in two passes. First each point that may hit a face is followed
- * along it, up to where the first one comes too close. Then all these points are examined at their
- * new positions: exact arithmetic finds that they crossed no face, and distances find that they are
- * not too close. Only then the tool moves there. Both passes may take several steps, if many points
- * are close. */
+ * along the path, up to where the first point comes too close to a face. Then all these points are
+ * examined at their new positions: exact arithmetic checks that they have crossed no face, and
+ * distances check that they are not too close. Only then the tool moves there. Both passes may take
+ * several steps, if many points are close. */
 #include "core/strict_fp.h"
 
 #include "core/fp_env.h"
@@ -15,15 +16,16 @@
 
 enum { CLUSTER_VISITS = 64, POINT_VISITS = 48, FACE_VISITS = 256, FACE_COST = 6 };
 
-/* In units of the skin: distance at which faces are examined; distance at which a point ends the
- * path; least distance at its end. Rotation adds less than a bend to straight paths (see limit). */
-static const double looks = 2.5, blocks = 0.75, least = 0.5, bend = 0.125;
+/* Distances in units of the skin. Faces are examined within `search`. A point closer than `blocks`
+ * ends the path. At the path's end, no point may be closer than `least`. Rotation adds less than
+ * `bend` to straight paths (see tool_step_limit). */
+static const double search = 2.5, blocks = 0.75, least = 0.5, bend = 0.125;
 
 typedef struct tool_piece {
     ebpo_haptic *t;
     ebpo_tool *tool;
     const ebpo_face_box *box; /* NULL: no faces are on the path */
-    double skin, turned;      /* the angle of the whole path */
+    double skin, turned;      /* skin, and angle of the whole path */
     uint64_t *work;
 } tool_piece;
 
@@ -48,8 +50,8 @@ static void tool_step_around(const double p[3], const double q[3], double wide, 
     }
 }
 
-/* Returns a distance within which no face is near `e`: by the faces of the box, by the end of the
- * loaded region, and by the end of the model. */
+/* Returns a distance from `e` within which no face is. Sources: the faces of the box, the boundary
+ * of the loaded region, and the model's box. */
 static double tool_step_clearance(const tool_piece *p, const ebpo_extent *e, uint32_t visits)
 {
     double out = 0, inside = INFINITY;
@@ -63,7 +65,7 @@ static double tool_step_clearance(const tool_piece *p, const ebpo_extent *e, uin
     return fmax(out, fmin(inside, ebpo_face_box_clearance(p->box, e, visits, p->work)));
 }
 
-/* Bounds the motion of a point from its lever arm about the middle of the rotation. */
+/* Bounds the motion of a point, given its lever arm about the centre of rotation. */
 static double tool_step_far(const tool_piece *p, double lever)
 {
     return sqrt(ebpo_vec3_dot(p->tool->way, p->tool->way)) + lever * p->turned;
@@ -76,7 +78,8 @@ static double max_way(const tool_piece *p, const ebpo_tool_cluster *c)
     return tool_step_far(p, lever_of(c->middle) + c->radius) * (1 + 0x1p-40);
 }
 
-/* Returns false if the pool is full, or too many faces are at one point. */
+/* Adds a close point with its faces. Returns false if the pool is full, or too many faces are
+ * around the point. */
 static bool add_close(const tool_piece *p, uint32_t point)
 {
     ebpo_tool *tool = p->tool;
@@ -88,7 +91,7 @@ static bool add_close(const tool_piece *p, uint32_t point)
     for (int i = 0; i < 3; i++)
         to[i] = tool->proxy.place[i] + tool->way[i] + way[i];
     ebpo_vec3_subtract(to, from, way);
-    tool_step_around(from, to, looks * p->skin, &e);
+    tool_step_around(from, to, search * p->skin, &e);
     if (tool->pool_count + EBPO_TOOL_NEAR > EBPO_TOOL_POOL)
         return false;
     bool all = ebpo_face_box_find(p->box, &e, tool->pool + tool->pool_count, EBPO_TOOL_NEAR,
@@ -109,14 +112,14 @@ static bool add_close(const tool_piece *p, uint32_t point)
     return true;
 }
 
-/* Examines points of a cluster that as a whole may hit faces. */
+/* Examines the points of a cluster whose bounding box may hit faces. */
 static bool inspect_points(const tool_piece *p, uint32_t number)
 {
     ebpo_tool *tool = p->tool;
     ebpo_tool_cluster *c = &tool->cluster[number];
-    double need = looks * p->skin;
+    double need = search * p->skin;
     double all = INFINITY;
-    c->free = 0; /* if it is given up */
+    c->free = 0; /* 0 remains if the path is given up */
     for (uint32_t i = c->first; i < c->first + c->count; i++) {
         double way = tool_step_far(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
         if (tool->free[i] - c->gone - way <= 0) {
@@ -146,7 +149,7 @@ static bool inspect_cluster(const tool_piece *p, uint32_t number)
     ebpo_extent e;
     ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, c->middle, at);
     tool_step_around(at, at, c->radius, &e);
-    from_all = tool_step_clearance(p, &e, CLUSTER_VISITS) - looks * p->skin;
+    from_all = tool_step_clearance(p, &e, CLUSTER_VISITS) - search * p->skin;
     if (from_all - way <= 0)
         return inspect_points(p, number);
     c->free = c->gone + from_all;
@@ -173,9 +176,9 @@ static void add_contact(const tool_piece *p, const ebpo_tool_close *close, uint3
     ebpo_tool_contact_add(&tool->next, &c);
 }
 
-/* Where faces share an edge, one is below the point and pushes it straight away; the others would
- * hold it back obliquely. So a face counts if its nearest point is in its inside, or if it is the
- * nearest of all. */
+/* Adds the contacts of a point. Where faces share an edge, one face is below the point and pushes
+ * it straight away; the other faces would hold it back obliquely. So a face counts if its nearest
+ * point is in its interior, or if it is the nearest face. */
 static void add_contacts(const tool_piece *p, const ebpo_tool_close *close,
                          const ebpo_face_near *near)
 {
@@ -185,7 +188,7 @@ static void add_contacts(const tool_piece *p, const ebpo_tool_close *close,
     for (uint32_t i = 0; i < close->count; i++) {
         const double *w = near[i].weight;
         bool straight = w[0] > 0 && w[1] > 0 && w[2] > 0;
-        if (near[i].distance < looks * p->skin &&
+        if (near[i].distance < search * p->skin &&
             (straight || near[i].distance <= nearest + 0x1p-10 * p->skin))
             add_contact(p, close, p->tool->pool[close->first + i], &near[i]);
     }
@@ -223,7 +226,7 @@ static void begin_check(ebpo_tool *tool)
     ebpo_rigid_matrix(&tool->end, tool->end_matrix);
 }
 
-/* Moves the tool there and reduces the free distance of each point. */
+/* Moves the tool to the end of the piece and reduces the free distance of each point. */
 static void tool_step_arrive(const tool_piece *p)
 {
     ebpo_tool *tool = p->tool;
@@ -234,7 +237,8 @@ static void tool_step_arrive(const tool_piece *p)
     tool->stage = EBPO_TOOL_STANDS;
 }
 
-/* Limits the angle: straight paths and rotations differ by at most lever times angle^2 / 8. */
+/* Limits the angle: the path of a point differs from a straight one by at most lever * angle^2 / 8.
+ */
 static void tool_step_limit(ebpo_haptic *t, double way[EBPO_SCREW], uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
@@ -252,7 +256,8 @@ static void tool_step_limit(ebpo_haptic *t, double way[EBPO_SCREW], uint32_t *fl
         way[k] *= part;
 }
 
-/* Begins a tool's next piece; flags are returned at its end. Returns false if it cannot begin. */
+/* Begins a tool's next piece; `flags` are returned at its end. Returns false if the piece cannot
+ * begin. */
 static bool begin_tool_way(ebpo_haptic *t, const double wanted[EBPO_SCREW], uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
@@ -260,7 +265,7 @@ static bool begin_tool_way(ebpo_haptic *t, const double wanted[EBPO_SCREW], uint
         tool->way[k] = wanted[k];
     tool->flags = 0;
     tool_step_limit(t, tool->way, &tool->flags);
-    double part = ebpo_haptic_known_part(t, tool->way, tool->radius + looks * t->options.skin);
+    double part = ebpo_haptic_known_part(t, tool->way, tool->radius + search * t->options.skin);
     if (part < 1) {
         tool->flags |= EBPO_HAPTIC_WAITING;
         if (part <= 0) {
@@ -288,7 +293,7 @@ static uint32_t give_up(tool_piece *p)
     return EBPO_HAPTIC_INCOMPLETE;
 }
 
-/* Continues the piece; returns bits of ebpo_haptic_flag. */
+/* Continues the piece; returns bits of ebpo_haptic_flag. *arrived: the end is reached. */
 static uint32_t continue_tool_way(ebpo_haptic *t, uint64_t *work, bool *arrived)
 {
     tool_piece p = piece_of(t, work);
@@ -319,8 +324,8 @@ static uint32_t continue_tool_way(ebpo_haptic *t, uint64_t *work, bool *arrived)
 
 static double turn_closeness(const ebpo_haptic *t) { return 0x1p-6 * t->options.skin; }
 
-/* Applies Coulomb friction: along the contacts, it removes friction times the held-back part from
- * the path. */
+/* Applies Coulomb friction: shortens the path along the contacts by the friction times the part
+ * that the contacts hold back. */
 static void turn_rub(const ebpo_haptic *t, const double want[EBPO_SCREW], double way[EBPO_SCREW])
 {
     double held[EBPO_SCREW];
@@ -372,7 +377,7 @@ static uint32_t turn_go(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *work
     return flags | EBPO_HAPTIC_INCOMPLETE;
 }
 
-/* Computes the part of the vector from device to proxy that contacts cause; returns the number of
+/* Computes the part of the vector from device to proxy that contacts cause. Returns the number of
  * these contacts. */
 static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t flags,
                       double out[EBPO_SCREW])
@@ -456,13 +461,13 @@ void ebpo_haptic_step_tool(ebpo_haptic *t, const double place[3], const double t
     ebpo_haptic_report(t, device.place);
 }
 
-uint32_t ebpo_haptic_tool_path(const ebpo_haptic *t, double way[EBPO_HAPTIC_PATH_MAX][7])
+uint32_t ebpo_haptic_tool_path(const ebpo_haptic *t, double path[EBPO_HAPTIC_PATH_MAX][7])
 {
     uint32_t count = t->tool ? t->tool->way_count : 0;
     for (uint32_t i = 0; i < count; i++) {
-        ebpo_vec3_copy(t->tool->way_of[i].place, way[i]);
+        ebpo_vec3_copy(t->tool->way_of[i].place, path[i]);
         for (int k = 0; k < 4; k++)
-            way[i][3 + k] = t->tool->way_of[i].turn[k];
+            path[i][3 + k] = t->tool->way_of[i].turn[k];
     }
     return count;
 }

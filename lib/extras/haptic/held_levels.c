@@ -1,10 +1,10 @@
 /* Keeps the first levels of an octree in memory for probes: bounds of the distance to the surface,
- * and the winding number of cells without faces.
+ * and the winding numbers of cells without faces.
  *
  * There are at most 2^17 nodes, of 6 levels or fewer below the root. A node has its box, its
- * children, whether any face comes near its cell, and otherwise its winding number. Bounds are
+ * children, a flag for faces in or near its cell, and without faces its winding number. Bounds are
  * certain: they include the rounding of the model's coordinates. A query visits at most as many
- * nodes as its caller allows; its bounds are wider when that is too few. */
+ * nodes as its caller allows; when that is too few, its bounds are wider. */
 #include "core/strict_fp.h"
 
 #include "extras/haptic/held_levels.h"
@@ -113,7 +113,7 @@ static void add_children(const ebpo_held_levels *levels, const double p[3], uint
 void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], int visits,
                             double *lo, double *hi)
 {
-    waiting stack[8 * (DEEPEST + 1)]; /* each level leaves seven at most */
+    waiting stack[8 * (DEEPEST + 1)]; /* each level leaves at most seven */
     int depth = 0;
     double lower = INFINITY, upper = INFINITY;
     if (levels->node[0].has_faces)
@@ -129,7 +129,7 @@ void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], i
         else
             add_children(levels, p, n->children, lower, stack, &depth);
     }
-    /* Without faces both are infinite. */
+    /* without faces both bounds are infinite */
     *lo = isfinite(lower) ? fmax(0, lower - levels->slack - EBPO_LENGTH_SLACK * lower) : lower;
     *hi = upper + levels->slack + EBPO_LENGTH_SLACK * upper;
 }
@@ -142,7 +142,8 @@ bool ebpo_held_levels_winding(const ebpo_held_levels *levels, const double p[3],
         return true;
     while (n->children != EBPO_NO_CHILDREN) {
         uint32_t octant = 0;
-        const ebpo_held_node *low = &levels->node[n->children]; /* its high corner is the middle */
+        const ebpo_held_node *low = &levels->node[n->children]; /* first child; its high corner is
+                                                                 * the middle of the cell */
         for (int i = 0; i < 3; i++)
             octant |= (uint32_t)(p[i] >= low->high[i]) << i;
         n = low + octant;

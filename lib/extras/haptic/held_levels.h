@@ -6,32 +6,34 @@
 #include <ebpo/query.h>
 
 /* Relative rounding error of a length between two points: a few units in the last place. For
- * distant points that exceeds `slack`. */
+ * distant points this error is greater than `slack`. */
 #define EBPO_LENGTH_SLACK 0x1p-48
 
 typedef struct ebpo_held_node {
     double low[3], high[3];
-    uint32_t children; /* the first of eight; EBPO_NO_CHILDREN */
-    int32_t winding;   /* for a cell without faces */
-    bool has_faces;    /* one or more, within `slack` of the cell */
+    uint32_t children; /* number of the first of eight; EBPO_NO_CHILDREN */
+    int32_t winding;   /* winding number of a cell without faces */
+    bool has_faces;    /* there are faces within `slack` of the cell */
 } ebpo_held_node;
 
 typedef struct ebpo_held_levels {
-    ebpo_held_node *node; /* [count] the first is the root */
+    ebpo_held_node *node; /* [count] node[0] is the root */
     uint64_t count;
     double slack; /* bound of the rounding of the model's coordinates */
 } ebpo_held_levels;
 
-/* Reads as many levels as have at most 2^17 nodes, 6 or fewer below the root. */
+/* Reads the first levels, as many as have at most 2^17 nodes together, 6 or fewer below the root.
+ */
 EBPO_MUST_USE ebpo_status ebpo_held_levels_read(const ebpo_file *file, ebpo_held_levels *out,
                                                 ebpo_error *error);
 void ebpo_held_levels_free(ebpo_held_levels *levels);
 
-/* Bounds the distance to the nearest face by *lo and *hi. Visits at most this many nodes. */
+/* Bounds the distance to the nearest face by *lo and *hi. Visits at most `visits` nodes. */
 void ebpo_held_levels_bound(const ebpo_held_levels *levels, const double p[3], int visits,
                             double *lo, double *hi);
 
-/* Returns true if p is in a cell without faces, with this winding number, or outside all cells. */
+/* Returns true if p is in a cell without faces, whose winding number is *winding, or outside all
+ * cells (then 0). */
 bool ebpo_held_levels_winding(const ebpo_held_levels *levels, const double p[3], int32_t *winding);
 
 #endif

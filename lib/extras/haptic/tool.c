@@ -1,11 +1,11 @@
-/* A tool: a rigid set of points that move together, the contacts that hold it, and its forces.
+/* A tool: a rigid set of points, the contacts that hold it, and its forces.
  *
  * Points are split at the middle of their longest side into clusters of few points. A rotation is
  * measured as a length: its angle times the tool's arm.
  *
- * Contacts constrain the path of a tool: it is the nearest one to the wanted path that brings no
- * point closer to a face than allowed. Hildreth's method solves that for the contacts that matter,
- * which are added one at a time, the most violated first.
+ * Contacts constrain the path of a tool: the path is the nearest one to the wanted path that brings
+ * no point closer to a face than allowed. Hildreth's method solves that for the contacts that
+ * matter, which are added one at a time, the most violated first.
  *
  * Forces are passive: they are reduced where the device would receive more energy than it gave. */
 #include "core/strict_fp.h"
@@ -31,13 +31,13 @@ void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *move
     p->longest_step = fmax(p->longest_step, sqrt(passive_product(moved, moved, n)));
 }
 
-/* Limits the force F so that the energy given in total, `given`, never exceeds A = stiffness s^2, s
- * being the longest motion of the device in one haptic step. With g = -given, a step of s' gives at
- * most F s', and F s' - g must not exceed stiffness max(s, s')^2. That is so for all s' where F^2
- * <= 4 stiffness g; and where F <= 2 stiffness s and F s - g <= A, as from s on the right side then
- * grows faster than the left one. A spring that was pressed steadily to the depth d has F =
- * stiffness d and g at least stiffness d^2 / 2: there one of the two holds, and the force is not
- * reduced. */
+/* Limits the force F so that the energy given in total, `given`, never exceeds A = stiffness s^2,
+ * where s is the longest motion of the device in one haptic step. Let g = -given. A step of length
+ * s' gives at most F s', and F s' - g must not exceed stiffness max(s, s')^2. This holds for all s'
+ * in two cases. First, if F^2 <= 4 stiffness g. Second, if F <= 2 stiffness s and F s - g <= A, as
+ * from s on the right side then grows faster than the left one. A spring that was pressed steadily
+ * to the depth d has F = stiffness d and g at least stiffness d^2 / 2: then one of the two cases
+ * holds, and the force is not reduced. */
 static double max_force(const ebpo_passive *p)
 {
     double k = p->stiffness, g = -p->energy, s = p->longest_step;
@@ -212,7 +212,8 @@ static int max_offended(const held *h, double close, const double way[EBPO_SCREW
     }
     for (int i = 0; i < h->count; i++)
         if (h->active[i] == found)
-            return -1; /* more sweeps would converge; the rest is checked when points move */
+            return -1; /* more sweeps would improve it; violations are found when points are checked
+                        */
     return found;
 }
 
@@ -325,8 +326,10 @@ static void tool_new_fill(ebpo_tool *t, const double (*points)[3], placed *p)
         t->close[i] = (ebpo_tool_close){ 0 };
     }
     for (uint64_t i = 0; i < EBPO_TOOL_POOL; i++)
-        t->pool[i] = 0;                     /* no haptic step is the first to use a page */
-    t->arm = square > 0 ? sqrt(square) : 1; /* one point in the middle: rotation has no effect */
+        t->pool[i] = 0;                     /* write each page here, so that no haptic step is the
+                                             * first to use it */
+    t->arm = square > 0 ? sqrt(square) : 1; /* otherwise the only point is in the middle: rotation
+                                             * has no effect */
 }
 
 uint64_t ebpo_tool_bytes(const ebpo_tool *t)

@@ -1,5 +1,6 @@
 /* A tool: points that move together, its contacts, rigid motions, and passive forces. For each
- * point a distance free of faces is known; only points beyond it are examined. */
+ * point a distance without faces is known; the point is examined only after it has moved farther
+ * than that. */
 #ifndef EBPO_HAPTIC_TOOL_H
 #define EBPO_HAPTIC_TOOL_H
 
@@ -17,8 +18,8 @@ typedef struct ebpo_passive {
 /* Records that the device has moved against the force of the last haptic step. */
 void ebpo_passive_moved(ebpo_passive *p, const double *force, const double *moved, int n);
 
-/* Computes the force of a spring from the device along `depth` to the proxy, less `damping` times
- * `moved`, and never against `depth`. */
+/* Computes the force of a spring along `depth`, the vector from device to proxy, less `damping`
+ * times `moved`. The force never opposes `depth`. */
 void ebpo_passive_push(const ebpo_passive *p, double damping, const double *depth,
                        const double *moved, int n, double *force);
 
@@ -28,12 +29,12 @@ typedef struct ebpo_rigid {
     double place[3], turn[4]; /* a unit quaternion x, y, z, w */
 } ebpo_rigid;
 
-enum { EBPO_SCREW = 6 }; /* a translation, and a rotation vector times the arm */
+enum { EBPO_SCREW = 6 }; /* translation, then rotation vector times the arm */
 
 /* Returns false if values are not finite or the quaternion is invalid. */
 bool ebpo_rigid_read(const double place[3], const double turn[4], ebpo_rigid *out);
 
-/* Computes the motion from a to b, in the axes of the world, by the shorter rotation. */
+/* Computes the motion from a to b, in the world's axes, by the shorter rotation. */
 void ebpo_rigid_between(const ebpo_rigid *a, const ebpo_rigid *b, double arm,
                         double out[EBPO_SCREW]);
 
@@ -59,30 +60,31 @@ static inline double ebpo_screw_length(const double a[EBPO_SCREW])
     return sqrt(ebpo_screw_dot(a, a));
 }
 
-/* A tool's motion under its contacts: the nearest one to the wanted motion that takes no point
- * closer to a face than allowed. */
+/* A tool's motion under its contacts: of the motions that take no point closer to a face than
+ * allowed, the one nearest to the wanted motion. */
 
 enum { EBPO_CONTACTS_MAX = 256 };
 
 typedef struct ebpo_tool_contact {
-    double grip[EBPO_SCREW]; /* grip . way: how far the point moves away from the face */
-    double space;            /* how far it may come closer; negative: it must move away */
+    double grip[EBPO_SCREW]; /* grip . way is how far the point moves away from the face */
+    double space;            /* how far the point may come closer to the face; negative: it must
+                              * move away */
     double gap;
-    uint64_t point, face; /* numbers for callers */
+    uint64_t point, face; /* numbers that callers get */
     double normal[3];
 } ebpo_tool_contact;
 
 typedef struct ebpo_tool_contacts {
-    ebpo_tool_contact at[EBPO_CONTACTS_MAX]; /* a heap: the largest gap first */
+    ebpo_tool_contact at[EBPO_CONTACTS_MAX]; /* a heap: the contact with the largest gap first */
     int count;
 } ebpo_tool_contacts;
 
-/* Adds a contact; when full, it replaces the one with the largest gap. */
+/* Adds a contact; when the heap is full, it replaces the contact with the largest gap. */
 void ebpo_tool_contact_add(ebpo_tool_contacts *all, const ebpo_tool_contact *contact);
 
-/* Computes `out` with grip . out >= -space for all contacts, up to `close` and as far as bounded
- * work finds it; without `release` no contact has to move away. Returns the number of contacts that
- * hold. */
+/* Computes `out` with grip . out >= -space for all contacts, with an error of at most `close`, as
+ * far as bounded work allows. Without `release` no contact has to move away. Returns the number of
+ * contacts that hold. */
 int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW], double close,
                    bool release, double out[EBPO_SCREW]);
 
@@ -91,20 +93,20 @@ int ebpo_tool_hold(const ebpo_tool_contacts *all, const double want[EBPO_SCREW],
 enum {
     EBPO_TOOL_POINTS = 10000,
     EBPO_TOOL_CLUSTER = 8,
-    EBPO_TOOL_PIECES = 6,     /* pieces of path in a haptic step */
+    EBPO_TOOL_PIECES = 6,     /* pieces of path in each haptic step */
     EBPO_TOOL_POOL = 1 << 16, /* faces around all points in total */
     EBPO_TOOL_NEAR = 64,      /* faces around one point */
     EBPO_TOOL_WORK = 4000     /* for each haptic step: visited nodes, plus six for each face */
 };
 
 typedef struct ebpo_tool_cluster {
-    uint32_t first, count; /* points */
+    uint32_t first, count; /* points of the cluster */
     double middle[3], radius;
     double gone; /* bound of the motion of each of its points, summed over all steps */
     double free; /* until `gone` reaches this, no point hits a face */
 } ebpo_tool_cluster;
 
-/* A point that may hit faces in a piece of path; its faces start at pool[first]. */
+/* A point that may hit faces in a piece of path; its faces begin at pool[first]. */
 typedef struct ebpo_tool_close {
     uint32_t point, first, count;
 } ebpo_tool_close;
@@ -118,26 +120,26 @@ typedef enum ebpo_tool_stage {
 typedef struct ebpo_tool {
     uint64_t count, cluster_count;
     double (*point)[3]; /* in the tool's coordinates, cluster after cluster */
-    uint32_t *number;   /* numbers for the caller */
+    uint32_t *number;   /* [count] numbers that the caller gets */
     double *free;       /* [count] as for clusters */
-    double radius, arm; /* greatest distance of all points, and root of the mean square of their
-                         * distances */
+    double radius, arm; /* greatest distance of the points from the centre; root of the mean square
+                         * of these distances */
     ebpo_tool_cluster *cluster;
 
     ebpo_rigid proxy, device;
-    ebpo_rigid way_of[EBPO_TOOL_PIECES + 1]; /* positions in the last haptic step */
+    ebpo_rigid way_of[EBPO_TOOL_PIECES + 1]; /* positions of the proxy in the last haptic step */
     uint32_t way_count;
     double force[EBPO_SCREW];
     ebpo_tool_contacts contacts,
         next; /* contacts at the proxy, and at the end of the checked path */
 
-    /* A piece of path; the next haptic step continues it. */
+    /* The current piece of path; the next haptic step continues it. */
     ebpo_tool_stage stage;
-    double way[EBPO_SCREW], part; /* free up to this part */
+    double way[EBPO_SCREW], part; /* the piece is free up to this part */
     ebpo_rigid end;
     double from_matrix[3][3], to_matrix[3][3], end_matrix[3][3];
     uint32_t flags;
-    uint64_t at; /* cluster, or close point */
+    uint64_t at; /* number of the next cluster, or of the next close point */
     ebpo_tool_close *close;
     uint64_t close_count;
     uint32_t *pool;
@@ -149,7 +151,7 @@ EBPO_MUST_USE ebpo_status ebpo_tool_new(const double (*points)[3], uint64_t coun
 void ebpo_tool_free(ebpo_tool *tool);
 uint64_t ebpo_tool_bytes(const ebpo_tool *tool);
 
-/* Places the tool without a path: everything known is discarded. */
+/* Places the tool without a path: all known distances are discarded. */
 void ebpo_tool_put(ebpo_tool *tool, const ebpo_rigid *at);
 
 static inline void ebpo_tool_at(const ebpo_rigid *r, const double matrix[3][3], const double p[3],

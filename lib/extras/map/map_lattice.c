@@ -1,8 +1,9 @@
 /* Computes distances of given points and of the points of a lattice.
  *
- * A lattice is evaluated in groups of layers, and each group in bricks, whose points are close to
- * each other, so that subtrees are loaded few times and caches are warm. Each thread has a separate
- * query context, made when it is first used. Results do not depend on the number of threads.
+ * A lattice is evaluated in groups of layers. Each group is evaluated in bricks, whose points are
+ * close to each other, so that subtrees are loaded few times and the processor's caches hold their
+ * data. Each thread has a separate query context, made when it is first used. Results do not depend
+ * on the number of threads.
  *
  * Source: docs/guide/maps.md. */
 #include "core/strict_fp.h"
@@ -39,7 +40,7 @@ ebpo_status ebpo_map_askers_make(ebpo_map_askers *out, ebpo_model *model,
     distance.unsigned_distance = options->unsigned_distance;
     *out = (ebpo_map_askers){ .model = model, .distance = distance };
     out->threads = ebpo_thread_count(options->threads);
-    /* reports an unusable model before anything is made */
+    /* fails for an unusable model before anything is made */
     ebpo_status status = ebpo_context_new(model, &out->context[0], error);
     return status == EBPO_OK ? ebpo_distance_many(out->context[0], NULL, 0, &distance, NULL, error)
                              : status;
@@ -66,7 +67,7 @@ ebpo_status ebpo_map_query(ebpo_map_askers *askers, unsigned worker, const doubl
 typedef struct points_job {
     ebpo_map_askers askers;
     const double *points;
-    const uint64_t *order; /* along the curve; NULL: in input order */
+    const uint64_t *order; /* order along the Morton curve; NULL: input order */
     double *distances;
 } points_job;
 
@@ -105,11 +106,12 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
         return status;
     ebpo_box box = ebpo_model_box(model);
     uint64_t *order = model->whole ? NULL : ebpo_curve_order(&box, points, count);
-    job.order = order; /* without memory for it, in input order: slower, with the same results */
+    job.order = order; /* without memory for it, points are in input order: slower, with the same
+                        * results */
     status = ebpo_map_askers_make(&job.askers, model, &o, error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(job.askers.threads, NULL, count, EBPO_MAP_PIECE, query_piece,
-                                   &job, &o.progress, "asking for distances", error);
+                                   &job, &o.progress, "computing distances", error);
     ebpo_map_askers_free(&job.askers);
     free(order);
     return status;
@@ -123,7 +125,7 @@ enum { BRICK = 16, SLAB_VALUES = 8 << 20 };
 typedef struct slab_job {
     ebpo_map_askers askers;
     const ebpo_lattice *lattice;
-    uint64_t first, layers; /* layers of the group */
+    uint64_t first, layers; /* first layer and number of layers of the group */
     uint64_t bricks[3];
     double *values; /* [layers][count[1]][count[0]] */
 } slab_job;
@@ -136,7 +138,7 @@ static void point_of(const ebpo_lattice *l, uint64_t i, uint64_t j, uint64_t k, 
 }
 
 typedef struct brick {
-    uint64_t low[3], high[3]; /* range of points of the group, high ones excluded */
+    uint64_t low[3], high[3]; /* range of points of the group, high numbers excluded */
 } brick;
 
 static brick brick_of(const slab_job *j, uint64_t number)
@@ -190,8 +192,8 @@ static ebpo_status query_bricks(void *context, uint64_t begin, uint64_t end, uns
     return status;
 }
 
-/* Checks that corners, and the sums leading to them, are finite. Then all points are: each
- * coordinate is monotonous in i, j and k. */
+/* Checks that corners, and the sums from which they are computed, are finite. Then all points are
+ * finite: each coordinate is monotonous in i, j and k. */
 static ebpo_status check_lattice(const ebpo_lattice *l, ebpo_error *error)
 {
     uint64_t points = 0;
@@ -232,7 +234,7 @@ static ebpo_status map_slab(slab_job *j, const ebpo_map_options *o, ebpo_error *
         bricks *= j->bricks[c];
     }
     return ebpo_parallel_for(j->askers.threads, NULL, bricks, 1, query_bricks, j, &progress,
-                             "asking for distances", error);
+                             "computing distances", error);
 }
 
 ebpo_status ebpo_map_lattice(ebpo_model *model, const ebpo_lattice *lattice,

@@ -14,12 +14,14 @@ typedef struct ebpo_map_askers {
     ebpo_context *context[EBPO_MAP_THREADS];
 } ebpo_map_askers;
 
-/* Reads the caller's options. Free it by ebpo_map_askers_free, also after a failure. */
+/* Reads the caller's options. The result must be freed by ebpo_map_askers_free, also after a
+ * failure. */
 EBPO_MUST_USE ebpo_status ebpo_map_askers_make(ebpo_map_askers *out, ebpo_model *model,
                                                const ebpo_map_options *options, ebpo_error *error);
 void ebpo_map_askers_free(ebpo_map_askers *askers);
 
-/* Evaluates points[count][3], at most EBPO_MAP_PIECE, into results[count]. */
+/* Computes the distances of points[count][3], at most EBPO_MAP_PIECE of them, into results[count].
+ */
 EBPO_MUST_USE ebpo_status ebpo_map_query(ebpo_map_askers *askers, unsigned worker,
                                          const double *points, uint64_t count,
                                          ebpo_distance_result *results, ebpo_error *error);

@@ -1,10 +1,10 @@
 /* Maps distances to colours, and adds distances with their colours as attributes of a mesh's
  * vertices.
  *
- * The diverging palette is made in OKLab (B. Ottosson, 2020: the matrices below are its
+ * The diverging palette is computed in OKLab (B. Ottosson, 2020: the matrices below are its
  * definition), whose lightness agrees with perception. The other palette is that of the thesis.
  *
- * Vertex attributes named distance, red, green or blue are replaced. */
+ * Existing vertex attributes named distance, red, green or blue are replaced. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -53,7 +53,7 @@ static void of_oklab(double light, double a, double b, uint8_t rgb[3])
             srgb_of(to_rgb[i][0] * cone[0] + to_rgb[i][1] * cone[1] + to_rgb[i][2] * cone[2]));
 }
 
-/* Hues of 255 and 50 degrees, which are distinct for colour-blind readers. */
+/* The hues are 255 and 50 degrees, which colour-blind readers can distinguish. */
 static void palette_diverging(double share, uint8_t rgb[3])
 {
     static const double cosine[2] = { -0.2588190451, 0.6427876097 },
@@ -63,7 +63,7 @@ static void palette_diverging(double share, uint8_t rgb[3])
     of_oklab(light, chroma * cosine[outside], chroma * sine[outside], rgb);
 }
 
-/* Returns red over green to blue, each a third of the circle of hues. */
+/* Goes from red over green to blue; each of the two ranges is a third of the circle of hues. */
 static void palette_thesis(double share, uint8_t rgb[3])
 {
     double far = fabs(share), turn = 4 * far; /* red, yellow, green, cyan, blue */
@@ -147,7 +147,7 @@ ebpo_status ebpo_map_paint(ebpo_mesh *mesh, const double *distances, ebpo_map_pa
                          "the mesh has too many attributes to add more; omit some");
     ebpo_attribute *colour =
         mesh->attributes ? paint_add(mesh, "red green blue", EBPO_ATTRIBUTE_UINT8, 3) : NULL;
-    uint8_t *rgb = colour ? colour->values : NULL; /* adding moves the struct */
+    uint8_t *rgb = colour ? colour->values : NULL; /* adding the next attribute moves the struct */
     ebpo_attribute *distance =
         colour ? paint_add(mesh, "distance", EBPO_ATTRIBUTE_FLOAT64, 1) : NULL;
     if (!distance)

@@ -1,10 +1,10 @@
-/* Computes certain bounds of the greatest distance of a mesh's faces, including their interior,
- * from a model (a one-sided Hausdorff distance).
+/* Computes certain bounds of the greatest distance from a mesh's faces, including their interior,
+ * to a model (a one-sided Hausdorff distance).
  *
- * Branch and bound over triangles, which are divided into four. The distance changes by no more
- * than its argument moves, so each point of a triangle is at most as far as a corner plus the
- * longest way from that corner. Each round divides the triangles with the greatest bounds at once,
- * so the result is independent of threads. */
+ * Branch and bound over triangles, which are divided into four. When a point moves, its distance
+ * changes by at most the length of the motion. So the distance of each point of a triangle is at
+ * most that of a corner plus the longest way from that corner. Each round divides the triangles
+ * with the greatest bounds together, so the result does not depend on threads. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -18,8 +18,8 @@
 #include "core/parallel.h"
 #include "extras/map/map_lattice.h"
 
-/* Number of faces evaluated together; and the number of triangles of a round, beyond which their
- * bounds are used unchanged. */
+/* Number of faces evaluated together; maximum number of triangles of a round. For further triangles
+ * the bounds are used unchanged. */
 enum { FACES_AT_A_TIME = 1 << 17, TRIANGLES_MAX = 1 << 20 };
 
 typedef struct triangle {
@@ -37,12 +37,14 @@ typedef struct search {
     const ebpo_mesh *mesh;
     const double *distances;
     ebpo_map_range_options o;
-    double slack; /* above the effect of rounding on positions and lengths */
+    double slack; /* more than the effect of rounding on positions and lengths */
     ebpo_map_range reach;
-    uint64_t allowed; /* queries allowed up to the end of these faces */
+    uint64_t allowed; /* maximum number of queries until the current faces are done */
     triangles now, next;
-    uint64_t cut;                              /* the first ones of `now`, divided in this round */
-    double (*middle)[3][3], (*middle_away)[3]; /* [cut], for the edge after each corner */
+    uint64_t cut;                              /* number of triangles, the first ones of `now`, that
+                                                * this round divides */
+    double (*middle)[3][3], (*middle_away)[3]; /* [cut] middle of the edge after each corner, and
+                                                * its distance */
     uint64_t middle_capacity, away_capacity;
 } search;
 
@@ -120,15 +122,15 @@ static void child_of(const search *s, uint64_t i, int which, triangle *out)
 {
     const triangle *t = &s->now.item[i];
     for (int k = 0; k < 3; k++) {
-        bool corner = which < 3 && k == which; /* else the middle of an edge beside it */
+        bool corner = which < 3 && k == which; /* otherwise it is the middle of an adjacent edge */
         int edge = which == 3 ? k : k == (which + 1) % 3 ? which : (which + 2) % 3;
         memcpy(out->corner[k], corner ? t->corner[k] : s->middle[i][edge], sizeof out->corner[k]);
         out->away[k] = corner ? t->away[k] : s->middle_away[i][edge];
     }
 }
 
-/* Moves triangles with bounds above half of the greatest one to the front: dividing others does not
- * help yet. */
+/* Moves triangles with bounds of at least half of the greatest one to the front: dividing other
+ * triangles does not help yet. */
 static void reach_choose(search *s)
 {
     double most = 0;
@@ -196,7 +198,8 @@ static void corner_of(const ebpo_mesh *m, uint32_t vertex, double out[3])
 static ebpo_status inspect_faces(search *s, uint64_t begin, uint64_t end, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    double share = (double)end / (double)s->mesh->face_count; /* all these faces are done */
+    double share = (double)end / (double)s->mesh->face_count; /* faces that are done, including
+                                                               * these */
     s->allowed =
         end == s->mesh->face_count ? s->o.queries : (uint64_t)((double)s->o.queries * share);
     s->now.count = 0;

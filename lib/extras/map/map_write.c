@@ -3,7 +3,7 @@
  * Sums are exact (mesh/sum.h), in three ranges of size so that neither values nor squares overflow:
  * statistics depend neither on the order of values nor on threads.
  *
- * A lattice is written layer by layer as NRRD (teem, "Definition of NRRD File Format") or as a
+ * A lattice is written layer by layer, as NRRD (teem, "Definition of NRRD File Format") or as a
  * VTKHDF 1.0 image (VTK's documentation, "VTKHDF file format"). The file is replaced atomically. */
 #include "core/strict_fp.h"
 
@@ -23,14 +23,14 @@
 #include "io/publish.h"
 #include "mesh/sum.h"
 
-/* Statistics while values are added, excluding percentiles. */
+/* State of statistics while values are added; percentiles are computed separately. */
 
 enum { MAP_BINS = 3, MAP_BIN_UNIT = 600 };
 
 typedef struct map_sums {
     ebpo_map_stats stats; /* counts, min and max */
-    /* sums of small, ordinary and large values: the unit of bin i is 2^(MAP_BIN_UNIT (i - 1)), for
-     * squares its square */
+    /* Sums of small, ordinary and large values: the unit of bin i is 2^(MAP_BIN_UNIT (i - 1)). The
+     * unit of sums of squares is the square of that. */
     ebpo_sum sum[MAP_BINS], sum_unsigned[MAP_BINS], squares[MAP_BINS];
 } map_sums;
 
@@ -39,8 +39,8 @@ typedef struct map_sums {
 typedef struct map_file {
     const ebpo_lattice *lattice;
     const char *shown;
-    const char *path; /* name of the file, for HDF5 */
-    FILE *stream;     /* NRRD */
+    const char *path; /* name of the file, for HDF5 only */
+    FILE *stream;     /* for NRRD only */
     ebpo_h5_out out;
     ebpo_h5_id values;
 } map_file;
@@ -54,7 +54,7 @@ double ebpo_map_percent(int index)
 
 /* --- sums --- */
 
-/* Returns new sums, to be freed by free(); NULL when memory is short. */
+/* Returns new sums, which free() frees; NULL without memory. */
 static map_sums *map_sums_new(void)
 {
     map_sums *s = ebpo_alloc_zero(1, sizeof *s);
@@ -63,8 +63,8 @@ static map_sums *map_sums_new(void)
     return s;
 }
 
-/* Adds a multiple of a power of two that suits the value's size, so that neither sums nor squares
- * overflow or underflow, and the result does not depend on the order. */
+/* Adds a value to the bin of its size. Each bin has a power of two as its unit, so that neither
+ * sums nor squares overflow or underflow, and the result does not depend on the order. */
 static void add_to(ebpo_sum bins[MAP_BINS], double value, bool square)
 {
     double size = fabs(value);
@@ -73,7 +73,7 @@ static void add_to(ebpo_sum bins[MAP_BINS], double value, bool square)
     ebpo_sum_add(&bins[bin], square ? scaled * scaled : scaled);
 }
 
-/* Returns the sum divided by count, as a multiple of 2^unit. */
+/* Returns the sum divided by count, in units of 2^unit. */
 static double mean_of(const ebpo_sum bins[MAP_BINS], bool square, uint64_t count, int unit)
 {
     double sum = 0;
@@ -105,8 +105,8 @@ static void map_sums_add(map_sums *s, const double *values, uint64_t count)
 static ebpo_map_stats describe_nothing(const ebpo_map_stats *s)
 {
     ebpo_map_stats out = *s;
-    out.min = out.max = out.farthest = out.mean = out.mean_unsigned = out.rms = out.error_bound =
-        NAN;
+    out.min = out.max = out.farthest = out.mean = out.mean_unsigned = out.rms =
+        out.standard_deviation = NAN;
     return out;
 }
 
@@ -125,7 +125,7 @@ static ebpo_map_stats map_sums_stats(const map_sums *s)
     out.mean = ldexp(mean, unit);
     out.mean_unsigned = ldexp(mean_of(s->sum_unsigned, false, out.count, unit), unit);
     out.rms = ldexp(sqrt(square), unit);
-    out.error_bound = ldexp(sqrt(fmax(square - mean * mean, 0)), unit);
+    out.standard_deviation = ldexp(sqrt(fmax(square - mean * mean, 0)), unit);
     return out;
 }
 
@@ -191,8 +191,8 @@ static void put_vector(FILE *to, const double v[3])
     fprintf(to, " (%.17g,%.17g,%.17g)", v[0], v[1], v[2]);
 }
 
-/* Begins an NRRD file. Each format has functions for the header, the layers in order, and the end,
- * which reports late failures; `discard` after a failure. */
+/* Begins an NRRD file. Each format has functions for the header, for the layers in order, and for
+ * the end, which returns late failures; `discard` is called after a failure. */
 static ebpo_status map_nrrd_begin(map_file *f, ebpo_error *error)
 {
     const ebpo_lattice *l = f->lattice;
@@ -262,7 +262,8 @@ static ebpo_status find_axes(const ebpo_lattice *l, double spacing[3], double di
             return ebpo_fail(error, EBPO_E_ARGUMENT,
                              "VTKHDF needs steps at right angles; write NRRD");
         for (int c = 0; c < 3; c++)
-            direction[3 * c + i] = axis[i][c]; /* axes are its columns */
+            direction[3 * c + i] =
+                axis[i][c]; /* the axes are the columns of the direction matrix */
     }
     return EBPO_OK;
 }

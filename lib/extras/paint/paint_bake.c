@@ -1,9 +1,9 @@
 /* Turns paint into colours of a mesh's vertices, and finds the faces that a stroke covers.
  *
- * The strokes of a layer are applied in order to the vertices that their points reach; then the
- * layers are blended in order over the colours of vertices. Colours are stored in the mesh's
- * existing columns, in their types; other meshes get columns for them. A stroke covers the faces of
- * its points' reaches.
+ * The strokes of a layer are applied in order to the vertices in the reaches of their points
+ * (paint_reach.h); then the layers are blended in order over the colours of vertices. Colours are
+ * stored in the mesh's existing columns, in their types; other meshes get columns for them. A
+ * stroke covers the faces of its points' reaches.
  *
  * Source: format-spec/paint.md, section 5. */
 #include "core/strict_fp.h"
@@ -35,7 +35,7 @@ static void put_byte(const ebpo_colour_column *c, uint64_t row, uint8_t value)
     const float share = (float)(value / 255.0);
     const double exact = value / 255.0;
     switch (c->of->type) {
-    case EBPO_ATTRIBUTE_INT8: *to = value < 127 ? value : 127; break; /* limit of the type */
+    case EBPO_ATTRIBUTE_INT8: *to = value < 127 ? value : 127; break; /* maximum of the type */
     case EBPO_ATTRIBUTE_UINT8: *to = value; break;
     case EBPO_ATTRIBUTE_INT16: memcpy(to, &two, sizeof two); break;
     case EBPO_ATTRIBUTE_UINT16: memcpy(to, &full, sizeof full); break;
@@ -197,10 +197,10 @@ ebpo_status ebpo_paint_check_points(const ebpo_paint *p, ebpo_context *context,
 
 /* A vertex that a stroke covers. */
 typedef struct dyed {
-    double colour[3];   /* including the layers before */
-    double paint[3], a; /* for the current layer */
+    double colour[3];   /* colour with the previous layers */
+    double paint[3], a; /* colour and opacity of the current layer */
     uint32_t vertex;
-    uint32_t layer, stroke; /* the last layer and stroke that covered it, plus 1 */
+    uint32_t layer, stroke; /* numbers of the last layer and stroke that covered it, plus 1 */
 } dyed;
 
 typedef struct bake {
@@ -211,7 +211,7 @@ typedef struct bake {
     ebpo_context *context;
     ebpo_reacher *reacher;
     uint32_t
-        *numbers;   /* numbers of the mesh's faces in the source, ascending; NULL: 0, 1, 2, ... */
+        *numbers;   /* source numbers of the mesh's faces, in ascending order; NULL: 0, 1, 2, ... */
     uint32_t *slot; /* [vertex_count] index in `dyed`, plus 1; 0: none */
     dyed *dyed;
     uint64_t count, capacity, done;
@@ -226,8 +226,8 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Reads the face numbers of a mesh in the source's order whose numbers have gaps, or go beyond the
- * source. */
+/* Reads the source numbers of the mesh's faces, if they have gaps or go beyond the mesh's number of
+ * faces. The mesh is in the source's order. */
 static ebpo_status read_numbers(bake *b, ebpo_error *error)
 {
     const ebpo_file *file = b->context->model->file;
@@ -250,7 +250,7 @@ static ebpo_status read_numbers(bake *b, ebpo_error *error)
     return status;
 }
 
-/* Returns the row of the mesh. */
+/* Returns the row of a face in the mesh. */
 static uint64_t row_of(const bake *b, uint64_t face)
 {
     uint32_t number = (uint32_t)face;
@@ -277,7 +277,7 @@ static ebpo_status find_dyed(bake *b, uint32_t vertex, dyed **out, ebpo_error *e
     return EBPO_OK;
 }
 
-/* Applies a stroke, which covers each vertex once. */
+/* Applies a stroke to a vertex; each stroke covers a vertex once. */
 static void bake_apply(dyed *d, const ebpo_stroke_held *s, uint32_t number)
 {
     double share = s->rgba[3] / 255.0;
@@ -339,7 +339,7 @@ static ebpo_status dye_stroke(bake *b, uint32_t number, ebpo_error *error)
     return status;
 }
 
-/* Blends the current layer over those before. */
+/* Blends the current layer over the previous ones. */
 static void put_layer_over(bake *b, uint32_t layer)
 {
     double opacity = (double)b->p->layer[layer].opacity / 255.0;

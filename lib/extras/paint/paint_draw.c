@@ -1,5 +1,5 @@
-/* Makes strokes from the path of a pen: points at even steps along it, more of them at each step
- * with more pressure.
+/* Makes strokes from the path of a pen: points at even steps along the path; with more pressure
+ * there are more points at each step.
  *
  * Every point is on a face of the model, and is stored as the face and three integer weights of its
  * corners. The scatter of points is pseudorandom with a seed, so that a path makes the same stroke
@@ -38,7 +38,7 @@ typedef struct drawing {
     ebpo_paint_point *point;
     run *run;
     uint64_t point_count, point_capacity, run_count, run_capacity, random, space;
-    bool down;    /* the pen painted at the previous step */
+    bool down;    /* the pen was painting at the previous step */
     double begun; /* time at which the stroke began */
     ebpo_paint_drawn drawn;
 } drawing;
@@ -130,8 +130,8 @@ static bool draw_found(const ebpo_distance_result *at)
     return at->face != EBPO_NO_FACE && isfinite(at->distance);
 }
 
-/* Finds the reach of a ball around a nearest point. EBPO_E_ABSENT: a subset lacks some of the faces
- * there. */
+/* Finds the reach of a ball around a nearest point. Fails with EBPO_E_ABSENT if some of the faces
+ * there are omitted from a subset. */
 static ebpo_status reach_around(ebpo_reach *reach, const ebpo_distance_result *at, double radius,
                                 ebpo_error *error)
 {
@@ -204,7 +204,7 @@ static void make_frame(const double normal[3], double u[3], double v[3])
     ebpo_vec3_cross(n, u, v);
 }
 
-/* Returns a point, uniformly distributed within the unit disc. */
+/* Computes a random point, uniformly distributed in the unit disc. */
 static void random_in_disc(uint64_t *state, double out[2])
 {
     do {
@@ -301,7 +301,7 @@ static double length_between(const ebpo_paint_input *a, const ebpo_paint_input *
     return sqrt(ebpo_vec3_dot(d, d));
 }
 
-/* Follows the path; steps are at whole multiples of their length, from the first position on. */
+/* Follows the path. Steps are at multiples of their length from the first position on. */
 static ebpo_status draw_go(drawing *l, const ebpo_paint_input *input, uint64_t count,
                            ebpo_error *error)
 {

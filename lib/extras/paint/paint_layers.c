@@ -166,7 +166,7 @@ bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS])
     return copy_texts(none, text);
 }
 
-/* Checks texts before anything is changed, and copies them. `known` is accepted as a date without a
+/* Checks texts before anything is changed, and copies them. The date `known` is accepted without a
  * check, because texts of other programs are kept. */
 static ebpo_status take_texts(const char *const from[EBPO_PAINT_TEXTS],
                               const ebpo_paint_text_kind *kinds, const char *of, const char *known,
@@ -268,7 +268,7 @@ ebpo_status ebpo_paint_set_layer(ebpo_paint *p, uint64_t number, const ebpo_pain
     return EBPO_OK;
 }
 
-/* Keeps strokes of other layers, with their points. */
+/* Removes the strokes of a layer with their points; keeps those of other layers. */
 static void drop_strokes(ebpo_paint *p, uint64_t layer)
 {
     uint64_t strokes = 0, points = 0;
@@ -337,7 +337,7 @@ ebpo_status ebpo_paint_add_note(ebpo_paint *p, const ebpo_paint_note *given, ebp
     ebpo_status status = EBPO_TAKE(ebpo_paint_note, &note, given, error);
     if (status != EBPO_OK)
         return status;
-    note.at.size = EBPO_PAINT_FULL; /* unused in notes */
+    note.at.size = EBPO_PAINT_FULL; /* not used in notes */
     note.at.pressure = 0;
     note.at.time = note.at.reserved = 0;
     const char *wrong = ebpo_paint_point_wrong(&note.at);
@@ -378,7 +378,7 @@ static void write_hex(const uint8_t digest[32], char out[65])
         snprintf(out + 2 * i, 3, "%02x", digest[i]);
 }
 
-/* Writes the digest of the model that a paint made on this file belongs to: format-spec/paint.md,
+/* Writes the digest that identifies the model of a paint made on this file: format-spec/paint.md,
  * section 2. */
 static void name_model(const ebpo_info *info, char out[65])
 {

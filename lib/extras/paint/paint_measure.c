@@ -1,9 +1,9 @@
 /* Measures the painted area, by stroke, by colour, by layer and in total.
  *
- * Faces are halved across their longest edge until the stroke of a part is certain, or the part is
+ * Faces are halved at their longest edge until the stroke of a part is certain, or the part is
  * small. In each layer the last stroke decides: if one of its balls contains the part, the part
- * belongs to this stroke; if a ball only intersects it, earlier strokes may own the uncovered rest.
- * So lower and upper bounds are summed.
+ * belongs to this stroke. If a ball only intersects the part, the uncovered rest may belong to
+ * earlier strokes; so lower and upper bounds are summed.
  *
  * Faces are distributed to a fixed number of pieces of work, whose sums are added in order: results
  * do not depend on the number of threads.
@@ -25,13 +25,14 @@
 #include "extras/paint/paint_parts.h"
 #include "extras/paint/paint_reach.h"
 
-/* A ball whose reach contains a face. */
+/* A ball of a point whose reach contains a face. */
 typedef struct area_ball {
     double centre[3], radius;
     uint32_t layer, stroke;
 } area_ball;
 
-/* Areas by stroke, by colour, by layer and in total, consecutively: area_key_count of them. */
+/* Keys of areas: strokes, colours, layers and the total, consecutively; area_key_count is their
+ * number. */
 typedef struct area_keys {
     const ebpo_paint *p;
     uint32_t *colour; /* [strokes] index of a stroke's colour */
@@ -47,10 +48,10 @@ static inline uint64_t area_key_count(const area_keys *k)
 typedef struct area_cut {
     const area_keys *keys;
     double fineness;
-    ebpo_paint_area *area; /* [keys] sums */
-    area_ball *ball;       /* a stack: for each part the balls that intersect it */
+    ebpo_paint_area *area; /* [keys] sums of areas */
+    area_ball *ball;       /* a stack: for each part the balls that may intersect it */
     uint64_t ball_capacity;
-    uint64_t *seen; /* [colours] the last part for which a colour was noted */
+    uint64_t *seen; /* [colours] the last part for which each colour was added */
     uint64_t part;
 } area_cut;
 
@@ -60,7 +61,7 @@ typedef struct triangle {
     double p[3][3], area;
 } triangle;
 
-/* Allocates the data of a thread; `area` stays the caller's. Returns false if memory is short. */
+/* Allocates the data of a thread; the caller owns `area`. Returns false without memory. */
 static bool area_cut_begin(area_cut *c, const area_keys *keys, double fineness)
 {
     *c = (area_cut){ .keys = keys, .fineness = fineness };
@@ -109,13 +110,13 @@ static bool area_cut_intersects(const area_ball *ball, const triangle *t)
 
 /* --- balls that intersect a part --- */
 
-/* Copies those of a layer's balls at [from, end) that may contain a part of the triangle to `to`,
- * up to the first stroke with a ball that contains all of it; of this stroke that ball is
- * sufficient. Returns their number; *sure: the layer is decided. */
+/* Copies the balls of a layer at [from, end) that may contain a part of the triangle to `to`. Stops
+ * after the first stroke with a ball that contains the whole triangle; of this stroke only that
+ * ball is copied. Returns the number of balls; *sure: the layer is decided. */
 static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64_t end, uint64_t to,
                            bool *sure)
 {
-    uint64_t kept = 0, first = 0; /* first: the first ball of the current stroke */
+    uint64_t kept = 0, first = 0; /* first: position of the first ball of the current stroke */
     *sure = false;
     for (uint64_t i = from; i < end; i++) {
         const area_ball *b = &c->ball[i];
@@ -133,7 +134,7 @@ static uint64_t sift_layer(area_cut *c, const triangle *t, uint64_t from, uint64
     return kept;
 }
 
-/* Same for all layers at [from, from + count), copying behind them. */
+/* Calls sift_layer for all layers at [from, from + count), and copies their balls behind these. */
 static uint64_t area_cut_sift(area_cut *c, const triangle *t, uint64_t from, uint64_t count,
                               bool *sure)
 {
@@ -168,10 +169,10 @@ static void area_cut_add(ebpo_paint_area *to, double area, bool certain, bool va
 
 /* The result of a layer for a small or decided triangle. */
 typedef struct verdict {
-    bool painted, unpainted; /* possible states */
-    uint32_t at_centre;      /* the stroke at the centre; UINT32_MAX: none */
+    bool painted, unpainted; /* the triangle may be painted, unpainted */
+    uint32_t at_centre;      /* stroke at the centre; UINT32_MAX: none */
     uint32_t colour;         /* the first possible colour */
-    bool one_colour;         /* it is the only possible one */
+    bool one_colour;         /* this colour is the only possible one */
 } verdict;
 
 static bool area_cut_paints(const area_cut *c, uint32_t stroke)
@@ -197,7 +198,8 @@ static verdict judge_layer(const area_cut *c, const triangle *t, const double ce
             first = false;
         }
     }
-    if (end > from && area_cut_holds(&c->ball[end - 1], t)) { /* the last stroke covers all */
+    if (end > from && area_cut_holds(&c->ball[end - 1], t)) { /* the last stroke covers the whole
+                                                               * triangle */
         v.unpainted = false;
         for (uint64_t i = from; i < end; i++)
             v.unpainted = v.unpainted || !area_cut_paints(c, c->ball[i].stroke);
@@ -273,8 +275,8 @@ static bool find_middle(const double a[3], const double b[3], double middle[3])
     return memcmp(middle, a, 3 * sizeof *a) != 0 && memcmp(middle, b, 3 * sizeof *b) != 0;
 }
 
-/* Divides a triangle. Its balls are at [from, from + count); deeper parts use the stack behind
- * them. */
+/* Divides a triangle. Its balls are at [from, from + count); the stack behind them is used for the
+ * parts. */
 static bool area_cut_cut(area_cut *c, const triangle *t, uint64_t from, uint64_t count, int depth)
 {
     bool sure;
@@ -301,8 +303,8 @@ static bool area_cut_cut(area_cut *c, const triangle *t, uint64_t from, uint64_t
     return area_cut_cut(c, &half, at, kept, depth + 1);
 }
 
-/* Adds a face whose `count` balls are at cut->ball, by layer, within a layer the last stroke first.
- * Returns false if memory is short. */
+/* Adds a face. Its `count` balls are at cut->ball, ordered by layer, in each layer the last stroke
+ * first. Returns false without memory. */
 static bool area_cut_face(area_cut *c, const double corner[3][3], uint64_t count)
 {
     triangle t;
@@ -317,8 +319,8 @@ enum { PIECES_MAX = 64, SUMS_MAX = 1 << 22, FINENESS_MAX = 1 << 16 };
 
 /* A face in a point's reach. */
 typedef struct hit {
-    uint32_t face, layer, stroke, point; /* face: index among the reached ones; point: index among
-                                          * all */
+    uint32_t face, layer, stroke, point; /* face: index among the faces in all reaches; point: index
+                                          * among all points */
 } hit;
 
 typedef struct measure {
@@ -327,7 +329,7 @@ typedef struct measure {
     ebpo_found_faces intersected;
     hit *hit;
     uint64_t hit_count, hit_capacity, elsewhere;
-    uint64_t *first; /* [met.count + 1] first hit of each face */
+    uint64_t *first; /* [intersected.count + 1] first hit of each face */
     area_keys keys;
     ebpo_paint_colour_area *colour; /* [keys.colours] */
     uint64_t pieces;
@@ -418,7 +420,7 @@ static ebpo_paint_colour_area colour_of(const ebpo_stroke_held *s)
     return (ebpo_paint_colour_area){ .layer = s->layer, .colour = ebpo_paint_pack(s->rgba) };
 }
 
-/* Finds the colours of strokes that paint, each once in its layer. */
+/* Finds the colours of strokes that paint (not of those that erase), each once for its layer. */
 static ebpo_status find_colours(measure *m, ebpo_error *error)
 {
     const ebpo_paint *p = m->p;

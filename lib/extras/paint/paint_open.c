@@ -58,7 +58,7 @@ ebpo_shape ebpo_paint_column_shape(const ebpo_paint_column *c, uint64_t rows)
                          .pipeline = EBPO_PIPELINE_CHECKSUM };
 }
 
-/* Returns the member in a row. */
+/* Returns the address of the column's member in a row. */
 static uint8_t *member_of(const ebpo_paint *p, const ebpo_paint_column *c, uint64_t row)
 {
     uint8_t *rows = c->of_points ? (uint8_t *)p->point : (uint8_t *)p->stroke;
@@ -80,7 +80,7 @@ static void take_value(const uint8_t *from, unsigned bytes, uint8_t *to)
 
 static unsigned values_of(const ebpo_paint_column *c) { return c->cols ? c->cols : 1; }
 
-/* Copies consecutive rows between members and the bytes of a file. */
+/* Copies consecutive rows from the bytes of a file to members. */
 static void take_column(ebpo_paint *p, const ebpo_paint_column *c, const uint8_t *bytes)
 {
     for (uint64_t row = 0; row < ebpo_paint_column_rows(p, c); row++)
@@ -88,7 +88,7 @@ static void take_column(ebpo_paint *p, const ebpo_paint_column *c, const uint8_t
             take_value(bytes, c->element, member_of(p, c, row) + k * c->element);
 }
 
-/* Writes a column; swapping bytes is its own inverse. */
+/* Writes members to the bytes of a column; swapping bytes is its own inverse. */
 void ebpo_paint_column_give(const ebpo_paint *p, const ebpo_paint_column *c, uint8_t *bytes)
 {
     for (uint64_t row = 0; row < ebpo_paint_column_rows(p, c); row++)
@@ -102,7 +102,7 @@ typedef struct reader {
     ebpo_head head;
     ebpo_input input;
     ebpo_paint *p;
-    uint64_t text_bytes; /* bytes of all texts */
+    uint64_t text_bytes; /* number of bytes of all texts */
     char text[EBPO_PAINT_TEXT_MAX + 1];
 } reader;
 
@@ -146,7 +146,7 @@ static ebpo_status get_count(reader *r, ebpo_head_object object, const char *pat
     return open_wrong(r, path, what, error);
 }
 
-/* Checks the kind of the file, before all else. */
+/* Checks first that the file is a paint file. */
 static ebpo_status open_judge(reader *r, ebpo_head_object root, ebpo_error *error)
 {
     char format[64];
@@ -289,7 +289,8 @@ static ebpo_status read_note(reader *r, uint64_t number, ebpo_error *error)
     return status == EBPO_OK ? read_note_place(r, group, path, n, error) : status;
 }
 
-/* Allocates labels with empty texts; counts grow as labels are read, so that freeing is right. */
+/* Allocates labels with empty texts. The counts grow as labels are read, so that a failure frees
+ * the right ones. */
 static ebpo_status read_labels(reader *r, uint64_t layers, uint64_t notes, ebpo_error *error)
 {
     ebpo_paint *p = r->p;
@@ -317,7 +318,8 @@ static ebpo_status read_labels(reader *r, uint64_t layers, uint64_t notes, ebpo_
 
 /* --- strokes and points --- */
 
-/* Finds the array's bytes. They are within the file, which bounds the memory allocated for them. */
+/* Finds the array's bytes. They are within the file, so the file's size bounds the memory that is
+ * allocated for them. */
 static ebpo_status find_column(reader *r, const ebpo_paint_column *c, uint64_t rows,
                                ebpo_chunk_location *place, ebpo_error *error)
 {
@@ -446,7 +448,7 @@ static ebpo_status keep_version(const reader *r, ebpo_error *error)
     char *path = fd >= 0 ? realpath(r->input.shown, NULL) : NULL;
     if (fd >= 0 && !path && errno == ENOMEM)
         return ebpo_fail_memory(error, strlen(r->input.shown));
-    if (!path) /* memory, or a file that has lost its name */
+    if (!path) /* no memory, or the file has no name any more */
         return EBPO_OK;
     f->path = path;
     f->fd = fcntl(fd, F_DUPFD_CLOEXEC, 3);
@@ -499,8 +501,8 @@ ebpo_status ebpo_paint_open(const char *path, ebpo_paint **out, ebpo_error *erro
     return open_path(path, out, error);
 }
 
-/* Makes the paint of a file that does not exist. Its path is recorded, so that saving it replaces
- * no file that another program has made there meanwhile. */
+/* Makes the paint of a file that does not exist. The path is recorded, so that saving fails if
+ * another program has made a file there meanwhile. */
 static ebpo_status make_at(const char *path, const ebpo_file *model, ebpo_paint **out,
                            ebpo_error *error)
 {

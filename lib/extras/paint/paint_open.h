@@ -8,10 +8,10 @@
 
 typedef struct ebpo_paint_column {
     const char *path;
-    uint8_t element; /* bytes, as in memory */
-    uint8_t cols;    /* 0: one dimension */
-    bool of_points;  /* false: of strokes */
-    size_t offset;   /* offset of the member */
+    uint8_t element; /* bytes of an element, as in memory */
+    uint8_t cols;    /* number of columns; 0: the array has one dimension */
+    bool of_points;  /* true: a column of points, false: of strokes */
+    size_t offset;   /* offset of the member in its struct */
 } ebpo_paint_column;
 
 enum { EBPO_PAINT_COLUMNS = 12 };
@@ -22,7 +22,7 @@ static inline uint64_t ebpo_paint_column_rows(const ebpo_paint *p, const ebpo_pa
     return c->of_points ? p->point_count : p->stroke_count;
 }
 
-/* Returns the shape: one chunk, of all rows; rows > 0. */
+/* Returns the shape of an array: all rows in one chunk; rows > 0. */
 ebpo_shape ebpo_paint_column_shape(const ebpo_paint_column *column, uint64_t rows);
 
 void ebpo_paint_column_give(const ebpo_paint *paint, const ebpo_paint_column *column,

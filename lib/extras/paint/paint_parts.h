@@ -46,20 +46,20 @@ typedef struct ebpo_note_held {
 
 typedef struct ebpo_stroke_held {
     double radius;
-    uint64_t time, first; /* first: its first point */
+    uint64_t time, first; /* first: index of its first point */
     uint32_t layer, kind, count;
     uint8_t rgba[4];
 } ebpo_stroke_held;
 
-/* The file that a paint belongs to, and the version that the paint was read from, or saved as.
- * Saving changes this struct, and not the paint. */
+/* The file that a paint belongs to, and the version of the file from which the paint was read, or
+ * as which it was saved. Saving changes this struct, but not the paint. */
 typedef struct ebpo_paint_file {
-    pthread_mutex_t mutex; /* guards the rest while saving */
-    char *path;            /* absolute; NULL: none yet */
-    int fd;                /* keeps the version open, so that no later file gets its inode; -1: no
-                            * file */
+    pthread_mutex_t mutex; /* protects the other members during saving */
+    char *path;            /* absolute path; NULL: no file yet */
+    int fd;                /* keeps the version open, so that no later file gets the same inode; -1:
+                            * no file */
     ebpo_file_version version;
-    ebpo_file_lock lock; /* while it is open to change */
+    ebpo_file_lock lock; /* held while the paint is open for changes */
 } ebpo_paint_file;
 
 struct ebpo_paint {
@@ -86,7 +86,7 @@ static inline double ebpo_paint_radius(const ebpo_stroke_held *stroke,
     return stroke->radius * point->size * 0x1p-15;
 }
 
-/* Returns an error text, or NULL. */
+/* Returns a text that says what is wrong with the point, or NULL. */
 const char *ebpo_paint_point_wrong(const ebpo_paint_point *point);
 const char *ebpo_paint_stroke_wrong(const ebpo_stroke_held *stroke, uint64_t layers);
 
@@ -96,7 +96,8 @@ bool ebpo_paint_texts_begin(char *text[EBPO_PAINT_TEXTS]);
 /* Returns an empty paint, without a file; NULL if memory is short. */
 ebpo_paint *ebpo_paint_begin(void);
 
-/* Returns EBPO_E_ARGUMENT when the context has another model, or one too far from 0. */
+/* Returns EBPO_E_ARGUMENT when the context is of another model, or of one whose coordinates are too
+ * large. */
 EBPO_MUST_USE ebpo_status ebpo_paint_check_context(const ebpo_paint *paint,
                                                    const ebpo_context *context, ebpo_error *error);
 

@@ -1,8 +1,9 @@
-/* The reach of a point: the faces that are connected with the point's own face within its ball.
+/* The reach of a point: the faces that are connected with the point's own face within the point's
+ * ball.
  *
- * Faces in the ball's box are joined at common corners and edges, by position, where these are
- * within the ball or cross it; the set that contains the point's face is the reach. So paint does
- * not pass through a wall thinner than the ball.
+ * Faces in the ball's box are joined at common corners (equal positions) that are within the ball,
+ * and at common edges that cross it; the set that contains the point's face is the reach. So paint
+ * does not pass through a part of a model that is thinner than the ball.
  *
  * Points of a stroke are evaluated in batches on all cores; a reach is kept until it is requested.
  * Results do not depend on the number of threads.
@@ -65,7 +66,7 @@ static int by_number(const void *a, const void *b)
     return (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
-/* Gathers faces around a slightly larger ball, because its bounds are rounded here. */
+/* Gathers faces around a slightly larger ball, because the ball's bounds are rounded here. */
 static ebpo_status reach_gather(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo_error *error)
 {
     double min[3], max[3], wide = fmax(ball->radius, r->tolerance) * (1 + 0x1p-40);
@@ -83,7 +84,7 @@ static ebpo_status reach_gather(ebpo_reach *r, const ebpo_reach_ball *ball, ebpo
                            FACES_MAX);
     if (status == EBPO_OK && r->short_of_memory)
         status = ebpo_fail_memory(error, (r->count + EBPO_TRIANGLES_MAX) * sizeof *r->face);
-    if (status == EBPO_OK && r->count) /* a position far from all faces has none */
+    if (status == EBPO_OK && r->count) /* a position that is far from all faces has no reach */
         qsort(r->face, r->count, sizeof *r->face, by_number);
     return status;
 }
@@ -94,7 +95,7 @@ static uint64_t position_hash(const double p[3])
 {
     uint64_t key[3];
     for (int i = 0; i < 3; i++) {
-        double v = p[i] + 0.0; /* -0 is 0 */
+        double v = p[i] + 0.0; /* turns -0 into 0 */
         memcpy(&key[i], &v, sizeof v);
     }
     return ebpo_hash_three(key);
@@ -190,7 +191,8 @@ static void join_at_corners(ebpo_reach *r)
             reach_join(r, i / 3, r->count + r->face[i / 3].at[i % 3]);
 }
 
-/* Joins faces at edges. Edges with an end within the ball have joined their faces there already. */
+/* Joins faces at edges. If an end of an edge is within the ball, that corner has joined the faces
+ * already. */
 static void join_at_edges(ebpo_reach *r, const ebpo_reach_ball *ball)
 {
     uint64_t first = r->count + r->position_count, at;
@@ -241,7 +243,7 @@ static void keep_reach(ebpo_reach *r)
     r->own = own;
 }
 
-/* --- all of it --- */
+/* --- the whole reach --- */
 
 static bool find_own(ebpo_reach *r, uint64_t face)
 {
@@ -254,13 +256,13 @@ static bool find_own(ebpo_reach *r, uint64_t face)
 static ebpo_status fail_place(const ebpo_reach *r, uint64_t face, ebpo_error *error)
 {
     return ebpo_fail_file(error, EBPO_E_FORMAT, r->context->model->file->in.shown,
-                          "a point of the paint is not on face %llu, which it names: the paint "
-                          "does not fit the model",
+                          "a point of the paint is not on its face %llu: the paint does not fit "
+                          "the model",
                           (unsigned long long)face);
 }
 
 /* Gathers the faces around the ball, and finds the given face among them. *on: the position is on
- * it. */
+ * that face. */
 static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *here, bool *on,
                              ebpo_error *error)
 {
@@ -269,7 +271,7 @@ static ebpo_status find_face(ebpo_reach *r, const ebpo_reach_ball *ball, bool *h
     ebpo_error cause = EBPO_ERROR_INIT;
     *here = *on = false;
     ebpo_status status = reach_gather(r, ball, &cause);
-    if (status == EBPO_E_ABSENT && subset) /* connectivity is not known there */
+    if (status == EBPO_E_ABSENT && subset) /* in the omitted part, connectivity is not known */
         return EBPO_OK;
     if (status != EBPO_OK)
         return ebpo_fail_with(error, &cause);
@@ -370,7 +372,8 @@ void ebpo_found_faces_free(ebpo_found_faces *intersected)
 /* Number of points that are evaluated together, unless they already reach too many faces. */
 enum { TOGETHER = 1024, FACES_TOGETHER = 1 << 20, GRAIN = 8 };
 
-/* Part of the budget for each thread: more threads load items that others have just dropped. */
+/* Part of the budget that each thread needs: with less, threads load items that others have just
+ * dropped. */
 enum { THREAD_CAPACITY = 1 << 20 };
 
 typedef struct found {
@@ -382,9 +385,9 @@ typedef struct found {
 struct ebpo_reacher {
     const ebpo_paint *p;
     unsigned threads;
-    ebpo_reach *reach; /* one for each worker */
+    ebpo_reach *reach; /* one reach for each worker */
     found found[TOGETHER];
-    uint32_t stroke, first, count; /* the current points */
+    uint32_t stroke, first, count; /* the points of the current batch */
     atomic_uint_least64_t faces;
 };
 
@@ -403,8 +406,8 @@ static ebpo_status reached_keep(found *f, const ebpo_reach *reach, ebpo_error *e
     return EBPO_OK;
 }
 
-/* Evaluates some points. Points skipped because there are too many faces are requested again; the
- * first is never skipped. */
+/* Evaluates some points. If there are too many faces, further points are skipped; they are
+ * requested again later. The first point is never skipped. */
 static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
                              ebpo_error *error)
 {
@@ -422,11 +425,11 @@ static ebpo_status find_some(void *context, uint64_t begin, uint64_t end, unsign
         f->done = status == EBPO_OK;
     }
     ebpo_context_let_go(
-        reach->context); /* a waiting thread must not hold memory that others need */
+        reach->context); /* a thread that waits must not hold memory that others need */
     return status;
 }
 
-/* Begins a batch. Large reaches are freed: the memory of all reaches is bounded. */
+/* Begins a batch. Frees large reaches first, so that the memory of all reaches is bounded. */
 static void begin_batch(ebpo_reacher *r, uint32_t stroke, uint32_t i)
 {
     uint32_t left = r->p->stroke[stroke].count - i;

@@ -1,5 +1,5 @@
-/* The reach of a point: the faces that are connected with it within its ball. See
- * format-spec/paint.md, section 4. */
+/* The reach of a point: the faces that are connected with the point's face within the point's ball.
+ * See format-spec/paint.md, section 4. */
 #ifndef EBPO_PAINT_PAINT_REACH_H
 #define EBPO_PAINT_PAINT_REACH_H
 
@@ -10,8 +10,8 @@
 typedef struct ebpo_reach_face {
     double corner[3][3];
     uint64_t face, file_face; /* as in ebpo_paint_face */
-    uint32_t at[3];           /* indices of its corners among the positions */
-    bool within[3];           /* these corners are within the ball */
+    uint32_t at[3];           /* indices of the face's corners among the positions */
+    bool within[3];           /* for each corner: it is within the ball */
 } ebpo_reach_face;
 
 typedef struct ebpo_reach_position {
@@ -19,28 +19,31 @@ typedef struct ebpo_reach_position {
     bool within;
 } ebpo_reach_position;
 
-/* An edge that crosses the ball between two positions outside of it. */
+/* An edge that crosses the ball, between two positions outside the ball. */
 typedef struct ebpo_reach_edge {
-    uint32_t a, b; /* indices of positions, a < b */
+    uint32_t a, b; /* indices of the two positions, a < b */
 } ebpo_reach_edge;
 
-/* State for evaluating many points in sequence; for one thread. */
+/* State for evaluating many points one after the other, in one thread. */
 typedef struct ebpo_reach {
     ebpo_context *context;
-    double tolerance;      /* allowed distance of a point from its face */
-    ebpo_reach_face *face; /* [count] after finding: only the reach, in the order of the file */
+    double tolerance;      /* maximum distance of a point from its face */
+    ebpo_reach_face *face; /* [count] afterwards only the faces of the reach, in the order of the
+                            * file */
     uint64_t count, capacity;
-    uint64_t own; /* index of the point's face among them */
+    uint64_t own; /* index of the point's face in `face` */
     ebpo_reach_position *position;
     ebpo_reach_edge *edge;
     uint64_t position_count, position_capacity, edge_count, edge_capacity;
-    uint32_t *slot; /* hash table of positions, then of edges; 0: free, else the index plus 1 */
-    uint32_t *root; /* sets of faces, positions and edges: each names another member of its set */
+    uint32_t *slot; /* hash table of positions, later of edges; an entry is 0 (free) or the index
+                     * plus 1 */
+    uint32_t *root; /* sets of faces, positions and edges: each entry is the number of another
+                     * member of its set */
     uint64_t slots, slot_capacity, root_capacity;
     bool short_of_memory, too_many;
 } ebpo_reach;
 
-/* The position of the ball, and its face. */
+/* A ball around a point, with the point's face. */
 typedef struct ebpo_reach_ball {
     double place[3], radius;
     uint64_t face;
@@ -49,17 +52,18 @@ typedef struct ebpo_reach_ball {
 void ebpo_reach_begin(ebpo_reach *reach, ebpo_context *context);
 void ebpo_reach_end(ebpo_reach *reach);
 
-/* Finds the reach of a ball. *here false: a subset lacks the face, or some of the faces around it.
- * EBPO_E_FORMAT: the position is not on that face. EBPO_E_LIMIT, EBPO_E_MEMORY, and the errors of
- * reading. */
+/* Finds the reach of a ball. *here is false if a subset omits the face, or some of the faces around
+ * it. Fails with EBPO_E_FORMAT if the position is not on that face, EBPO_E_LIMIT, EBPO_E_MEMORY,
+ * and the errors of reading. */
 EBPO_MUST_USE ebpo_status ebpo_reach_find(ebpo_reach *reach, const ebpo_reach_ball *ball,
                                           bool *here, ebpo_error *error);
 
-/* Sets *fits to true if a position is on that face, or may be where a subset is pruned. */
+/* Sets *fits to true if a position is on that face, or may be on it because a subset is pruned
+ * there. */
 EBPO_MUST_USE ebpo_status ebpo_reach_check(ebpo_reach *reach, const double place[3], uint64_t face,
                                            bool *fits, ebpo_error *error);
 
-/* Returns true if a position is within the ball: section 4. */
+/* Returns true if a position is within the ball: format-spec/paint.md, section 4. */
 static inline bool ebpo_ball_holds(const double centre[3], double square, const double q[3])
 {
     double x = q[0] - centre[0], y = q[1] - centre[1], z = q[2] - centre[2];
@@ -77,17 +81,17 @@ typedef struct ebpo_found_face {
 typedef struct ebpo_found_faces {
     ebpo_found_face *face;
     uint64_t count, capacity;
-    uint32_t *slot; /* hash table by file_face; 0: free, else the index plus 1 */
+    uint32_t *slot; /* hash table by file_face; an entry is 0 (free) or the index plus 1 */
     uint64_t slots;
 } ebpo_found_faces;
 
-/* Finds or adds a face, and returns its index. EBPO_E_LIMIT, EBPO_E_MEMORY. */
+/* Finds or adds a face, and sets its index. Fails with EBPO_E_LIMIT, EBPO_E_MEMORY. */
 EBPO_MUST_USE ebpo_status ebpo_found_faces_add(ebpo_found_faces *intersected,
                                                const ebpo_reach_face *face, uint32_t *number,
                                                ebpo_error *error);
 void ebpo_found_faces_free(ebpo_found_faces *intersected);
 
-/* The reach of a stroke's point. */
+/* --- the reach of a stroke's point --- */
 
 /* Returns point `i` of a stroke as a ball. */
 static inline ebpo_reach_ball ebpo_paint_ball(const ebpo_paint *p, uint64_t stroke, uint32_t i)
@@ -99,7 +103,7 @@ static inline ebpo_reach_ball ebpo_paint_ball(const ebpo_paint *p, uint64_t stro
                               q->face };
 }
 
-/* Same as ebpo_reach_find, for a stroke's point. */
+/* As ebpo_reach_find, for point `i` of a stroke. */
 EBPO_MUST_USE static inline ebpo_status ebpo_paint_reach(ebpo_reach *reach, const ebpo_paint *p,
                                                          uint64_t stroke, uint32_t i, bool *here,
                                                          ebpo_error *error)
@@ -119,19 +123,19 @@ typedef struct ebpo_reached_face {
 typedef struct ebpo_reached {
     const ebpo_reached_face *face;
     uint64_t count;
-    bool here; /* false: a subset lacks a part of it */
+    bool here; /* false: a subset omits a part of the reach */
 } ebpo_reached;
 
 typedef struct ebpo_reacher ebpo_reacher;
 
-/* Makes a reacher. `threads` 0: all cores; fewer where the model's budget is small. Uses the
- * context, and makes others of its model. On failure NULL. */
+/* Makes a reacher. It uses the context, and makes others of the same model. `threads` 0: all cores,
+ * or fewer if the model's budget is small. After a failure *out is NULL. */
 EBPO_MUST_USE ebpo_status ebpo_reacher_new(const ebpo_paint *p, ebpo_context *context,
                                            unsigned threads, ebpo_reacher **out, ebpo_error *error);
 void ebpo_reacher_free(ebpo_reacher *r);
 
-/* Returns the reach of a stroke's point `i`, valid until the next call. It also finds the reaches
- * of the following points of the stroke: request them in order. Errors are those of
+/* Returns the reach of a stroke's point `i`, valid until the next call. The call also finds the
+ * reaches of the next points of the stroke, so request points in order. Fails with the errors of
  * ebpo_reach_find. */
 EBPO_MUST_USE ebpo_status ebpo_reacher_find(ebpo_reacher *r, uint32_t stroke, uint32_t i,
                                             ebpo_reached *out, ebpo_error *error);

@@ -1,8 +1,8 @@
 /* Writes paint files by the table of paint_open.c.
  *
- * A file is written to a temporary one and published when it is complete. The file that a paint
- * belongs to is replaced only while it is the version that the paint was read from or last saved
- * as, so that a change by another program is not lost.
+ * A file is written under a temporary name and published when it is complete. The file that a paint
+ * belongs to is replaced only if it is still the version from which the paint was read or as which
+ * it was last saved, so that a change by another program is not lost.
  *
  * Source: format-spec/paint.md. */
 #include "core/strict_fp.h"
@@ -167,7 +167,7 @@ static uint64_t head_bytes(const ebpo_paint *p)
     return sum;
 }
 
-/* Records after a save that the file at `path` is the paint's. */
+/* Records, after saving, that the file at `path` is the paint's current version. */
 static void take_version(ebpo_paint_file *f, char *path, int fd)
 {
     if (f->fd >= 0)
@@ -205,7 +205,8 @@ static ebpo_status paint_save_save(const ebpo_paint *p, const char *path, ebpo_e
     if (status == EBPO_OK)
         status = ebpo_publish_commit(&publish, error);
     ebpo_publish_abort(&publish);
-    if (own) /* also after a failure: other programs need not wait for a paint in memory */
+    if (own) /* also after a failure: other programs need not wait for a paint that is only in
+              * memory */
         ebpo_file_lock_release(&f->lock);
     if (status == EBPO_OK && fd >= 0) {
         take_version(f, place, fd);

@@ -1,12 +1,13 @@
 /* Searches along the routes of pairs of instances: the first time at which a pair comes within its
  * clearance, and the least distance of a pair over an interval of time.
  *
- * Both depend on one bound: the distance of two instances changes by at most their motion. The
- * first search goes from look to look, so that in between the motion is shorter than the gap to the
- * clearance and no contact is missed. The second one keeps parts of the interval in a heap by the
- * least distance that each allows, and halves the first until the result is within the tolerance.
- * Jumps of routes are ends of parts. A result is a pair of certain bounds; a search that needs too
- * many looks returns its current bounds.
+ * Both searches evaluate the distance at some times, and use one bound: the distance of two
+ * instances changes by at most their motion. The first search goes from one evaluation to the next,
+ * so that in between the motion is shorter than the gap to the clearance and no contact is missed.
+ * The second search keeps parts of the interval in a heap by the least distance that each part
+ * allows, and halves the first part until the result is within the tolerance. Jumps of routes are
+ * ends of parts. A result is a pair of certain bounds; a search that needs too many evaluations
+ * returns its current bounds.
  *
  * Source: docs/guide/scenes.md. */
 #include "core/strict_fp.h"
@@ -26,22 +27,22 @@ typedef struct travel {
     double from, to;
 } travel;
 
-/* Returns the next time to look: until then the motion is shorter than `gap`; w->time if there is
- * none. */
-static ebpo_status next_look(const travel *t, const ebpo_scene_evaluations *looks,
-                             const ebpo_scene_approach_result *w, double gap, double *next,
-                             ebpo_error *error)
+/* Returns the time of the next evaluation: until then the motion is shorter than `gap`. Returns
+ * w->time if there is no such time. */
+static ebpo_status next_evaluation(const travel *t, const ebpo_scene_evaluations *evaluations,
+                                   const ebpo_scene_approach_result *w, double gap, double *next,
+                                   ebpo_error *error)
 {
     double low = w->time, high = t->to, at = high, length = 0;
-    ebpo_status status = ebpo_scene_evaluations_motion(looks, low, at, &length, error);
+    ebpo_status status = ebpo_scene_evaluations_motion(evaluations, low, at, &length, error);
     if (status != EBPO_OK || length < gap) {
         *next = at;
         return status;
     }
-    /* halved until it fits, then lengthened slightly */
+    /* the interval is halved until it fits, then lengthened slightly */
     for (int n = 0; n < 70 && status == EBPO_OK && (low == w->time || n < 8); n++) {
         at = low + (high - low) / 2;
-        status = ebpo_scene_evaluations_motion(looks, w->time, at, &length, error);
+        status = ebpo_scene_evaluations_motion(evaluations, w->time, at, &length, error);
         if (length < gap)
             low = at;
         else
@@ -51,14 +52,14 @@ static ebpo_status next_look(const travel *t, const ebpo_scene_evaluations *look
     return status;
 }
 
-/* Moves past a jump. *next stays unchanged if there is none: there rounding alone may exceed the
+/* Moves past a jump. *next stays unchanged if there is no jump: then rounding alone may exceed the
  * gap, however short the time. */
-static ebpo_status approach_jump(const ebpo_scene_evaluations *looks,
+static ebpo_status approach_jump(const ebpo_scene_evaluations *evaluations,
                                  const ebpo_scene_approach_result *w, double *next,
                                  ebpo_error *error)
 {
     double length, at = nextafter(w->time, INFINITY);
-    ebpo_status status = ebpo_scene_evaluations_motion(looks, w->time, at, &length, error);
+    ebpo_status status = ebpo_scene_evaluations_motion(evaluations, w->time, at, &length, error);
     if (status == EBPO_OK && length == INFINITY)
         *next = at;
     return status;
@@ -69,33 +70,34 @@ static bool is_reached(const travel *t, const ebpo_scene_approach_result *w)
     return ebpo_scene_is_within(w->hi, w->clearance, t->how.tolerance);
 }
 
-static ebpo_status approach_look(const travel *t, ebpo_scene_evaluations *looks,
-                                 ebpo_scene_approach_result *w, ebpo_error *error)
+static ebpo_status approach_evaluate(const travel *t, ebpo_scene_evaluations *evaluations,
+                                     ebpo_scene_approach_result *w, ebpo_error *error)
 {
-    ebpo_status status = ebpo_scene_evaluate(looks, w->time, &w->lo, &w->hi, error);
-    w->looks++;
-    if (status != EBPO_OK || is_reached(t, w) || looks->gap > w->clearance)
+    ebpo_status status = ebpo_scene_evaluate(evaluations, w->time, &w->lo, &w->hi, error);
+    w->evaluations++;
+    if (status != EBPO_OK || is_reached(t, w) || evaluations->gap > w->clearance)
         return status;
-    return ebpo_scene_lacks(t->scene, looks->pair, looks->lacking, w->time, false, error);
+    return ebpo_scene_lacks(t->scene, evaluations->pair, evaluations->lacking, w->time, false,
+                            error);
 }
 
-static ebpo_status approach_go(const travel *t, ebpo_scene_evaluations *looks,
+static ebpo_status approach_go(const travel *t, ebpo_scene_evaluations *evaluations,
                                ebpo_scene_approach_result *w, ebpo_error *error)
 {
     for (;;) {
         double next;
-        ebpo_status status = approach_look(t, looks, w, error);
+        ebpo_status status = approach_evaluate(t, evaluations, w, error);
         if (status != EBPO_OK)
             return status;
         w->reached = is_reached(t, w);
         if (w->reached || w->time >= t->to)
             return EBPO_OK;
-        status = next_look(t, looks, w, w->lo - w->clearance, &next, error);
+        status = next_evaluation(t, evaluations, w, w->lo - w->clearance, &next, error);
         if (status == EBPO_OK && !(next > w->time))
-            status = approach_jump(looks, w, &next, error);
+            status = approach_jump(evaluations, w, &next, error);
         if (status != EBPO_OK)
             return status;
-        if (w->looks >= t->how.max_evaluations || !(next > w->time)) {
+        if (w->evaluations >= t->how.max_evaluations || !(next > w->time)) {
             w->reached = -1;
             return EBPO_OK;
         }
@@ -108,15 +110,15 @@ static ebpo_status find_way(const void *how, const ebpo_scene_pair *pair, void *
 {
     const travel *t = how;
     ebpo_scene_approach_result *way = result;
-    ebpo_scene_evaluations looks;
+    ebpo_scene_evaluations evaluations;
     *way = (ebpo_scene_approach_result){
         .a = pair->a, .b = pair->b, .time = t->from, .clearance = pair->clearance
     };
     ebpo_status status =
-        ebpo_scene_evaluations_begin(&looks, t->scene, pair, t->how.tolerance, error);
+        ebpo_scene_evaluations_begin(&evaluations, t->scene, pair, t->how.tolerance, error);
     if (status == EBPO_OK)
-        status = approach_go(t, &looks, way, error);
-    ebpo_collider_free(looks.collider);
+        status = approach_go(t, &evaluations, way, error);
+    ebpo_collider_free(evaluations.collider);
     return status;
 }
 
@@ -152,19 +154,19 @@ typedef struct least_search {
     uint64_t max_evaluations;
 } least_search;
 
-/* A part of the time, without a jump within. */
+/* A part of the interval of time, without a jump within. */
 typedef struct part {
     double from, to;
-    double at_from, at_to; /* lower bounds of the distance there */
-    double motion;         /* bound of the motion of both */
-    double least;          /* a lower bound of the distance in it */
+    double at_from, at_to; /* lower bounds of the distance at the ends */
+    double motion;         /* bound of the motion of both instances */
+    double least;          /* lower bound of the distance in the part */
 } part;
 
 typedef struct part_search {
-    ebpo_scene_evaluations looks;
+    ebpo_scene_evaluations evaluations;
     ebpo_scene_least *out;
-    double limit; /* the least bound from omitted faces so far: no better bound is possible */
-    EBPO_SCENE_LIST(part, parts); /* a heap: the one with the least `least` first */
+    double limit; /* least bound by omitted faces so far: the result cannot be better */
+    EBPO_SCENE_LIST(part, parts); /* a heap: the part with the least `least` first */
 } part_search;
 
 /* --- parts --- */
@@ -182,14 +184,15 @@ static ebpo_status put_part(part_search *s, const part *p, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* --- looking --- */
+/* --- evaluations --- */
 
-static ebpo_status least_distance_look(part_search *s, double time, double *lo, ebpo_error *error)
+static ebpo_status least_distance_evaluate(part_search *s, double time, double *lo,
+                                           ebpo_error *error)
 {
     double hi;
-    ebpo_status status = ebpo_scene_evaluate(&s->looks, time, lo, &hi, error);
-    s->out->looks++;
-    if (status == EBPO_OK && s->looks.gap < hi)
+    ebpo_status status = ebpo_scene_evaluate(&s->evaluations, time, lo, &hi, error);
+    s->out->evaluations++;
+    if (status == EBPO_OK && s->evaluations.gap < hi)
         s->limit = fmin(s->limit, *lo);
     if (status == EBPO_OK && hi < s->out->hi) {
         s->out->hi = hi;
@@ -198,10 +201,12 @@ static ebpo_status least_distance_look(part_search *s, double time, double *lo, 
     return status;
 }
 
-/* Adds a part. Between its ends the distance can be less by half of the remaining motion. */
+/* Adds a part. Between its ends the distance may be less than at the ends: by half of the motion
+ * that remains. */
 static ebpo_status add_part(part_search *s, part p, ebpo_error *error)
 {
-    ebpo_status status = ebpo_scene_evaluations_motion(&s->looks, p.from, p.to, &p.motion, error);
+    ebpo_status status =
+        ebpo_scene_evaluations_motion(&s->evaluations, p.from, p.to, &p.motion, error);
     if (status != EBPO_OK)
         return status;
     p.least = fmin(fmin(p.at_from, p.at_to), (p.at_from + p.at_to - p.motion) / 2);
@@ -213,7 +218,7 @@ static ebpo_status least_distance_halve(part_search *s, const part *p, double mi
                                         ebpo_error *error)
 {
     double at_middle;
-    ebpo_status status = least_distance_look(s, middle, &at_middle, error);
+    ebpo_status status = least_distance_evaluate(s, middle, &at_middle, error);
     if (status == EBPO_OK)
         status = add_part(s, (part){ p->from, middle, p->at_from, at_middle, 0, 0 }, error);
     return status == EBPO_OK
@@ -221,23 +226,26 @@ static ebpo_status least_distance_halve(part_search *s, const part *p, double mi
                : status;
 }
 
-/* Returns the next key, where routes may jump; pairs on one route do not jump. */
+/* Returns the time of the next key, where routes may jump. If both instances follow one route,
+ * their pair does not jump. */
 static double next_jump(const part_search *s, double from, double to)
 {
-    return s->looks.rides ? to : ebpo_scene_pair_next(s->looks.scene, s->looks.pair, from, to);
+    return s->evaluations.rides
+               ? to
+               : ebpo_scene_pair_next(s->evaluations.scene, s->evaluations.pair, from, to);
 }
 
-/* Makes parts from key to key, so that routes jump only between parts. */
+/* Makes parts between consecutive keys, so that routes jump only between parts. */
 static ebpo_status begin_parts(part_search *s, double from, double to, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     for (double at = from; status == EBPO_OK;) {
         double next = next_jump(s, at, to), end = next > at ? nextafter(next, -INFINITY) : at;
         part p = { .from = at, .to = end };
-        status = least_distance_look(s, at, &p.at_from, error);
+        status = least_distance_evaluate(s, at, &p.at_from, error);
         p.at_to = p.at_from;
         if (status == EBPO_OK && end > at)
-            status = least_distance_look(s, end, &p.at_to, error);
+            status = least_distance_evaluate(s, end, &p.at_to, error);
         if (status == EBPO_OK)
             status = add_part(s, p, error);
         if (!(next > at))
@@ -247,20 +255,21 @@ static ebpo_status begin_parts(part_search *s, double from, double to, ebpo_erro
     return status;
 }
 
-/* Returns true if the least part is good enough, or cannot be improved. */
+/* Returns true if the bound of the first part is good enough, or cannot be improved. */
 static bool is_done(const part_search *s, const part *p, double middle, const least_search *how)
 {
-    double hi = s->out->hi, open = hi - s->limit; /* below 0: no omitted face matters */
+    double hi = s->out->hi, open = hi - s->limit; /* open below 0: no omitted face matters */
     return ebpo_scene_is_within(hi, p->least, how->tolerance) || s->limit - p->least <= open / 8 ||
-           s->out->looks >= how->max_evaluations || p->motion <= how->tolerance / 8 ||
+           s->out->evaluations >= how->max_evaluations || p->motion <= how->tolerance / 8 ||
            !(middle > p->from && middle < p->to);
 }
 
-/* Returns true if rounding, which does not shrink with the part, is nearly all of its motion. */
+/* Returns true if nearly all of the part's motion is rounding, which does not shrink with the part.
+ */
 static ebpo_status is_rounding(const part_search *s, const part *p, bool *out, ebpo_error *error)
 {
     double least = 0;
-    ebpo_status status = ebpo_scene_evaluations_motion(&s->looks, p->from,
+    ebpo_status status = ebpo_scene_evaluations_motion(&s->evaluations, p->from,
                                                        nextafter(p->from, INFINITY), &least, error);
     *out = p->motion <= 2 * least;
     return status;
@@ -294,12 +303,12 @@ static ebpo_status find_least(const void *context, const ebpo_scene_pair *pair, 
         .a = pair->a, .b = pair->b, .time = how->from, .hi = INFINITY, .clearance = pair->clearance
     };
     ebpo_status status =
-        ebpo_scene_evaluations_begin(&s.looks, how->scene, pair, how->tolerance, error);
+        ebpo_scene_evaluations_begin(&s.evaluations, how->scene, pair, how->tolerance, error);
     if (status == EBPO_OK)
         status = begin_parts(&s, how->from, how->to, error);
     if (status == EBPO_OK)
         status = least_distance_narrow(&s, how, error);
-    ebpo_collider_free(s.looks.collider);
+    ebpo_collider_free(s.evaluations.collider);
     free(s.parts);
     return status;
 }

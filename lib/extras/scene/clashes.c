@@ -2,9 +2,9 @@
  * describes each contact.
  *
  * Pairs come from the broad phase (scene_pairs.c), and are evaluated on all cores. For each pair
- * whose faces intersect, the result has the faces, place, number and depth of contacts; for the
- * others, as far as the options request, the relation of the solids and whether the clearance is
- * kept. Parts omitted from a subset must not matter: where they may, the query fails with
+ * whose faces intersect, the result has the faces, the place, the number and the depth of contacts.
+ * For other pairs it has, as far as the options request, the relation of the solids and whether the
+ * clearance is kept. Parts omitted from a subset must not matter: if they may, the query fails with
  * EBPO_E_ABSENT instead of guessing.
  *
  * Source: docs/guide/scenes.md. */
@@ -43,7 +43,7 @@ static void scene_forget_facts(ebpo_scene_clash *m)
     m->depth[0] = m->depth[1] = unknown;
 }
 
-/* Widens the box of places; if one of two values is NAN, the result is the other. */
+/* Widens the box of places. If one of two values is NAN, the result is the other one. */
 static void clash_facts_widen(ebpo_scene_clash *m, const double p[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -60,8 +60,8 @@ static void set_place(ebpo_scene_clash *m, const double place[3])
 
 /* --- all pairs --- */
 
-/* Counts pairs of faces by kind, and keeps the first by numbers; or stops at the first crossing
- * pair, where that is enough. */
+/* Counts pairs of faces by kind, and keeps the first one by numbers. Stops at the first crossing
+ * pair if the options need no more. */
 typedef struct tally {
     ebpo_scene_clash *m;
     ebpo_pair_faces *faces; /* for finding places; NULL: not requested */
@@ -113,8 +113,8 @@ static bool count_lines(void *user, const ebpo_polyline *line)
     return true;
 }
 
-/* Sets the lines of contact. Exceeding the collider's memory for segments is not a failure of a
- * report; other errors are. */
+/* Sets the lines of contact. If the collider's memory for segments does not suffice, the report has
+ * no lines, but does not fail; other errors are failures. */
 static ebpo_status report_lines(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
     if (m->crossing > ebpo_contact_lines_max(two->collider)) {
@@ -149,8 +149,8 @@ static ebpo_status common_point(ebpo_pair_faces *of, const ebpo_face_pair *pair,
     return EBPO_OK;
 }
 
-/* Finds a place. The distance query of intersecting models begins with their first contact and
- * returns a point of it, which needs no table of all faces. */
+/* Finds a place of contact. The distance query of intersecting models begins with their first
+ * contact and returns a point of it; this needs no table of all faces. */
 static ebpo_status place_of_first(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
     ebpo_clearance found;
@@ -176,7 +176,7 @@ static void scene_report_nearest(const scene_two *two, const ebpo_clearance *nea
 
 /* --- intersecting faces --- */
 
-/* Counts pairs. `faces`: NULL, or for finding places. */
+/* Counts pairs of faces. `faces`: NULL, or for finding places. */
 static ebpo_status count_all(const scene_two *two, ebpo_pair_faces *faces,
                              const ebpo_face_pair *first, ebpo_scene_clash *m, ebpo_error *error)
 {
@@ -232,15 +232,15 @@ static ebpo_status scene_report_contacts(const scene_two *two, const ebpo_face_p
     return status == EBPO_OK && two->how->places ? place_of_first(two, m, error) : status;
 }
 
-/* Returns true if a point of one is inside the other; otherwise the depth is 0, which a search
- * would take long to find for faces that are on each other. */
+/* Returns true if a point of one model is inside the other. Otherwise the depth is 0, and a search
+ * would take long to find that for faces that are on each other. */
 static bool is_any_inner(int32_t relation)
 {
     return relation == EBPO_INTERSECTING || relation == EBPO_A_INSIDE_B ||
            relation == EBPO_B_INSIDE_A;
 }
 
-/* Sets the depth of each in the other. */
+/* Sets the depth of each instance in the other. */
 static ebpo_status scene_report_depths(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
     static const ebpo_certain none = { 0, 0, EBPO_VALUE_EXACT, 0 };
@@ -272,7 +272,8 @@ static ebpo_clash_kind kind_of(const ebpo_scene_clash *m)
                          : EBPO_CLASH_NONE;
 }
 
-/* Checks the clearance, which ends sooner; if it is not kept, finds the distance. */
+/* Checks the clearance, which takes less time than the distance; if the clearance is not kept,
+ * finds the distance. */
 static ebpo_status query_clearance(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
     ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
@@ -288,7 +289,7 @@ static ebpo_status query_clearance(const scene_two *two, ebpo_scene_clash *m, eb
     return status;
 }
 
-/* Sets the relation; that of solids is more specific than that of faces. */
+/* Sets the relation. The relation of solids is more specific than that of faces. */
 static ebpo_status query_relation(const scene_two *two, ebpo_scene_clash *m, ebpo_error *error)
 {
     ebpo_relation_result found;
@@ -335,7 +336,8 @@ static ebpo_status query_faces(const scene_two *two, ebpo_scene_clash *m, ebpo_e
     return status == EBPO_OK ? scene_report_depths(two, m, error) : status;
 }
 
-/* Checks that parts omitted from a file do not matter; inside a solid any face may. */
+/* Checks that parts omitted from a file do not matter. If one instance is inside a solid, any face
+ * may matter. */
 static ebpo_status check_omitted(const querying *a, const ebpo_scene_pair *pair, ebpo_error *error)
 {
     double gap = INFINITY;
@@ -387,7 +389,7 @@ static void clashes_give(ebpo_scene_clash *clashes, uint64_t count, ebpo_scene_c
 
 ebpo_status ebpo_scene_find_clashes(ebpo_scene *scene, double time,
                                     const ebpo_scene_clash_options *options,
-                                    ebpo_scene_clashes_fn take, void *user, uint64_t *queried,
+                                    ebpo_scene_clashes_fn take, void *user, uint64_t *tested,
                                     ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
@@ -400,14 +402,15 @@ ebpo_status ebpo_scene_find_clashes(ebpo_scene *scene, double time,
                          a.how.depth);
     a.how.relate |= a.how.depth > 0;
     ebpo_scene_search search = {
-        query_pair, &a, sizeof(ebpo_scene_clash), 4, a.how.threads, &a.how.progress, "asking pairs"
+        query_pair,        &a, sizeof(ebpo_scene_clash), 4, a.how.threads, &a.how.progress,
+        "evaluating pairs"
     };
     if (status == EBPO_OK)
         status = ebpo_scene_find_in_pairs(scene, time, time, &search, &clashes, &count, error);
     if (status == EBPO_OK)
         clashes_give(clashes, count, take, user);
-    if (queried)
-        *queried = count;
+    if (tested)
+        *tested = count;
     free(clashes);
     return status;
 }

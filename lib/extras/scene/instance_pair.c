@@ -3,8 +3,8 @@
  *
  * Boxes and lengths are rounded outwards, so that every bound is certain in spite of rounding. A
  * file that is a subset has only the faces of its kept box: the omitted part is bounded by up to
- * six boxes around that box. Two instances that follow one route have no relative motion but that
- * of rounding and scale.
+ * six boxes around that box. Two instances that follow one route have no relative motion except by
+ * rounding and scale.
  *
  * ebpo_scene_find_in_pairs evaluates a list of pairs on all cores, each pair with a separate
  * collider, so that results do not depend on the number of threads. */
@@ -21,7 +21,7 @@
 #include "extras/scene/instance_pair.h"
 #include "geometry/pose.h"
 
-/* for sums of a few products: far above their rounding */
+/* relative margin for sums of a few products: far above their rounding */
 static const double slack = 0x1p-44;
 
 static const ebpo_scene_model_entry *omitted_model_of(const ebpo_scene *scene, uint64_t instance)
@@ -41,7 +41,8 @@ static ebpo_status posing_of(const ebpo_scene *scene, uint64_t instance, double 
     return status == EBPO_OK ? ebpo_posing_make(out, &pose, reach, error) : status;
 }
 
-/* The box of a model in the world: its centre, and half of it along each of its axes. */
+/* The box of a model in the world: its centre, and a vector of half its size along each of its
+ * axes. */
 typedef struct posed_box {
     double middle[3], half[3][3], size;
 } posed_box;
@@ -108,7 +109,8 @@ double ebpo_scene_space_gap(const ebpo_scene_space *a, const ebpo_scene_space *b
     return ebpo_scene_length_above(apart) * (1 - 8 * slack);
 }
 
-/* Returns the part of a model's box whose faces its file has; false: all. */
+/* Computes the part of a model's box whose faces are in its file. Returns false if the file has all
+ * faces. */
 static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_space *out)
 {
     const ebpo_info *info =
@@ -124,8 +126,8 @@ static bool held_box(const ebpo_scene *scene, uint64_t instance, ebpo_scene_spac
     return true;
 }
 
-/* Returns the distance of `other` from the part of the box `all` that is not in `held`: up to six
- * boxes on its sides. */
+/* Returns the distance of `other` from the part of the box `all` that is outside `held`. That part
+ * consists of up to six boxes on the sides of `held`. */
 static double gap_around(const ebpo_scene_space *all, const ebpo_scene_space *held,
                          const ebpo_scene_space *other)
 {
@@ -192,8 +194,8 @@ static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instan
     return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
 }
 
-/* Returns true if both follow one route, or two with the same keys: only rounding changes between
- * them, and their size where the route's scale changes. */
+/* Returns true if both instances follow one route, or two routes with the same keys. Then their
+ * relation changes only by rounding, and in size where the route's scale changes. */
 static bool pair_rides(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     const ebpo_scene_route *a = route_of(scene, pair->a), *b = route_of(scene, pair->b);
@@ -203,8 +205,8 @@ static bool pair_rides(const ebpo_scene *scene, const ebpo_scene_pair *pair)
                       memcmp(a->keys, b->keys, a->count * sizeof *a->keys) == 0);
 }
 
-/* Returns the order of the effect of rounding on their distance on all their ways; 0: neither
- * moves. */
+/* Returns how much rounding changes the distance of the pair on its routes, in order of magnitude;
+ * 0: neither instance moves. */
 static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair)
 {
     double sum = 0;
@@ -219,9 +221,9 @@ static double pair_rounding(const ebpo_scene *scene, const ebpo_scene_pair *pair
     return sum;
 }
 
-/* Bounds the motion of a pair on one route. The pose of the route is the same for both, to the last
- * bit: points of theirs that are at most `reach` apart at the beginning of the route are scale
- * times that apart. */
+/* Bounds the motion of a pair on one route. The pose of the route is the same for both instances,
+ * to the last bit. So if two of their points are at most `reach` apart at the beginning of the
+ * route, their distance later is scale times that. */
 static double pair_motion_ride(const ebpo_scene *scene, const ebpo_scene_pair *pair, double from,
                                double to)
 {
@@ -231,8 +233,8 @@ static double pair_motion_ride(const ebpo_scene *scene, const ebpo_scene_pair *p
                                    (ebpo_scene_reach){ a.length + b.length, a.size + b.size });
 }
 
-/* Bounds the change of their distance between two times by *out, INFINITY over a jump. rides:
- * result of pair_rides. */
+/* Sets *out to a bound of the change of the pair's distance between two times; INFINITY over a
+ * jump. rides: result of pair_rides. */
 static ebpo_status pair_motion(const ebpo_scene *scene, const ebpo_scene_pair *pair, bool rides,
                                double from, double to, double *out, ebpo_error *error)
 {
@@ -294,7 +296,8 @@ ebpo_status ebpo_scene_keep_pairs(const ebpo_scene *scene, double from, double t
     return status;
 }
 
-/* Same, and makes their models. On failure there is nothing to free. */
+/* As ebpo_scene_keep_pairs, and makes the models of the pairs. On failure there is nothing to free.
+ */
 static ebpo_status list_pairs(ebpo_scene *scene, double from, double to, ebpo_scene_pairs_list *out,
                               ebpo_error *error)
 {
@@ -375,7 +378,7 @@ ebpo_status ebpo_scene_pose_pair(const ebpo_scene *scene, const ebpo_scene_pair 
     return status == EBPO_OK ? ebpo_scene_pose(scene, pair->b, time, &out->pose_b, error) : status;
 }
 
-/* Returns the distance; a missing collider has no faces to be near. */
+/* Bounds the distance; without a collider there are no faces that could be near. */
 static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double *lo, double *hi,
                                   ebpo_error *error)
 {
@@ -383,7 +386,8 @@ static ebpo_status query_distance(ebpo_scene_evaluations *l, double time, double
     ebpo_clearance_options how = EBPO_CLEARANCE_OPTIONS_INIT;
     ebpo_clearance found = { .distance = { .lo = INFINITY, .hi = INFINITY } };
     how.tolerance = l->tolerance;
-    how.warm = true; /* lo and hi may depend on it: each pair has a separate collider */
+    how.warm =
+        true; /* lo and hi may depend on the last pair, so each pair has a separate collider */
     ebpo_status status = ebpo_scene_pose_pair(l->scene, l->pair, time, &options, error);
     if (status == EBPO_OK && l->collider)
         status = ebpo_collide_distance(l->collider, &options, &how, &found, error);
@@ -408,7 +412,7 @@ ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *l, const ebpo_s
                                          ebpo_error *error)
 {
     *l = (ebpo_scene_evaluations){ .scene = scene, .pair = pair, .tolerance = tolerance / 4 };
-    /* smaller ones would take long, for digits that change with the next pose */
+    /* a smaller tolerance would take long, for digits that change with the next pose */
     l->tolerance = fmax(l->tolerance, pair_rounding(scene, pair) / 16);
     l->rides = pair_rides(scene, pair);
     return ebpo_scene_collider(scene, pair, 1, &l->collider, error);

@@ -15,11 +15,11 @@ typedef struct ebpo_scene_space {
 typedef struct ebpo_scene_seen {
     ebpo_scene_space box;
     double rounding; /* widening of the box for rounding */
-    double unit;     /* least length of one of these coordinates in the world */
+    double unit;     /* least length in the world of a length of 1 in these coordinates */
 } ebpo_scene_seen;
 
-/* Returns a box in the coordinates of the instance `of` that holds the box of `other` at a time.
- * EBPO_E_ARGUMENT: a pose. */
+/* Returns a box in the coordinates of the instance `of` that contains the box of `other` at a time.
+ * Fails with EBPO_E_ARGUMENT (a pose). */
 EBPO_MUST_USE ebpo_status ebpo_scene_seen_from(const ebpo_scene *scene, uint64_t of, uint64_t other,
                                                double time, ebpo_scene_seen *out,
                                                ebpo_error *error);
@@ -29,7 +29,7 @@ double ebpo_scene_space_gap(const ebpo_scene_space *a, const ebpo_scene_space *b
 
 /* Bounds the distance of omitted faces of a pair at a time: no two faces of which one is omitted
  * from its model's file are nearer than *gap; INFINITY: nothing is omitted. *lacking: an instance
- * whose file lacks some. */
+ * whose file omits faces. */
 EBPO_MUST_USE ebpo_status ebpo_scene_omitted(const ebpo_scene *scene, const ebpo_scene_pair *pair,
                                              double time, double *gap, uint64_t *lacking,
                                              ebpo_error *error);
@@ -95,14 +95,14 @@ typedef struct ebpo_scene_evaluations {
     const ebpo_scene *scene;
     const ebpo_scene_pair *pair;
     ebpo_collider *collider; /* from ebpo_scene_collider; must be freed */
-    double tolerance;        /* tolerance of a look */
+    double tolerance;        /* tolerance of one evaluation */
     bool rides;              /* both follow one route */
-    double gap;              /* result of ebpo_scene_omitted at the last look, */
-    uint64_t lacking;        /* and its instance */
+    double gap;              /* result of ebpo_scene_omitted at the last evaluation */
+    uint64_t lacking;        /* instance whose file omits faces, from the same call */
 } ebpo_scene_evaluations;
 
-/* Begins looks. `tolerance`: that of the result; looks take a quarter of it, or the limit of
- * rounding. Free the collider, also on failure. */
+/* Begins evaluations. `tolerance`: that of the result; an evaluation uses a quarter of it, or the
+ * limit of rounding. Free the collider, also on failure. */
 EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_begin(ebpo_scene_evaluations *looks,
                                                        const ebpo_scene *scene,
                                                        const ebpo_scene_pair *pair,
@@ -113,15 +113,15 @@ EBPO_MUST_USE ebpo_status ebpo_scene_evaluations_motion(const ebpo_scene_evaluat
                                                         double from, double to, double *out,
                                                         ebpo_error *error);
 
-/* Bounds the distance of their faces at a time, including omitted faces. */
+/* Bounds the distance of the pair's faces at a time, including omitted faces. */
 EBPO_MUST_USE ebpo_status ebpo_scene_evaluate(ebpo_scene_evaluations *looks, double time,
                                               double *lo, double *hi, ebpo_error *error);
 
 /* Returns true if `hi` is at most the tolerance above `lo`, in real numbers. */
 bool ebpo_scene_is_within(double hi, double lo, double tolerance);
 
-/* Reads the options, with the default number of looks. EBPO_E_ARGUMENT: the tolerance is not above
- * 0. */
+/* Reads the options, with the default number of evaluations. Fails with EBPO_E_ARGUMENT if the
+ * tolerance is not above 0. */
 EBPO_MUST_USE ebpo_status
 ebpo_scene_take_approach_options(ebpo_scene_approach_options *own,
                                  const ebpo_scene_approach_options *options, ebpo_error *error);

@@ -1,12 +1,14 @@
-/* Reads members of a scene file; every error names the line, the path of the value and the
- * expectation.
+/* Reads members of a scene file. Every error names the line, the path of the value and what was
+ * expected.
  *
  * A scene file is untrusted input. Before jansson parses the text, one pass compares the number and
  * the depth of its values with the limits, so that parsing takes bounded memory. jansson keeps no
- * positions: a second pass over the text follows the path of a member to find its line.
+ * positions: after an error, a second pass over the text follows the path of the member to find its
+ * line.
  *
- * A reader keeps that path: ebpo_json_enter and ebpo_json_leave bracket the evaluation of a value.
- * Unknown members are errors, except private ones, whose names begin with "x-".
+ * A reader keeps the path of the current value: ebpo_json_enter and ebpo_json_leave must bracket
+ * the evaluation of each value. Unknown members are errors, except private ones, whose names begin
+ * with "x-".
  *
  * Source: format-spec/scene.md. */
 #include "core/strict_fp.h"
@@ -25,7 +27,7 @@ size_t ebpo_scene_text_mark(const char *text, size_t size)
     return (size_t)ebpo_text_mark(text, size);
 }
 
-/* Returns the index behind the string that begins at text[i], or `size`. */
+/* Returns the index after the string that begins at text[i], or `size`. */
 static size_t skip_string(const char *text, size_t size, size_t i)
 {
     for (i++; i < size && text[i] != '"'; i++)
@@ -103,7 +105,8 @@ static bool key_is(const cursor *c, const char *key)
     return *c->at == '"' && strncmp(c->at + 1, key, size) == 0 && c->at[1 + size] == '"';
 }
 
-/* Moves from the bracket at `c` to the value in it that `at` names. */
+/* Moves from the bracket at `c` to the value in it that has the key or index `at`. Returns false if
+ * there is none. */
 static bool json_text_enter(cursor *c, const ebpo_scene_at *at)
 {
     bool object = *c->at == '{';
@@ -125,8 +128,8 @@ static bool json_text_enter(cursor *c, const ebpo_scene_at *at)
     return false;
 }
 
-/* Returns the line, from 1, on which the value at path[count] begins in valid JSON; if it does not
- * exist, that of the deepest existing value above it. */
+/* Returns the line, from 1, on which the value at path[count] begins in valid JSON. If the value
+ * does not exist, returns the line of the deepest existing value on its path. */
 static uint64_t find_line(const char *text, const ebpo_scene_at *path, int count)
 {
     cursor c = { text, 1 };

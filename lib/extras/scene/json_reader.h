@@ -1,4 +1,4 @@
-/* Reads members of a scene file, and reports errors with line, path and expectation. */
+/* Reads members of a scene file; errors name the line, the path and what was expected. */
 #ifndef EBPO_SCENE_JSON_READER_H
 #define EBPO_SCENE_JSON_READER_H
 
@@ -8,28 +8,30 @@ typedef struct ebpo_json_reader {
     ebpo_scene *scene;
     const char *text, *name;
     const ebpo_scene_options *options;
-    uint64_t pose_bytes; /* remaining limit for other files */
+    uint64_t pose_bytes; /* number of bytes that may still be read from files of poses */
     ebpo_scene_at path[EBPO_SCENE_DEPTH];
     int depth;
     ebpo_error *error;
 } ebpo_json_reader;
 
-/* Enters a member, or an item where `key` is NULL; and leaves it. */
+/* The first function enters a member, or an item if `key` is NULL; the second leaves it. */
 void ebpo_json_enter(ebpo_json_reader *r, const char *key, uint64_t item);
 void ebpo_json_leave(ebpo_json_reader *r);
 
-/* Returns EBPO_E_FORMAT about the entered value. */
+/* Returns EBPO_E_FORMAT with a message about the entered value. */
 ebpo_status ebpo_json_bad(ebpo_json_reader *r, const char *format, ...) EBPO_PRINTF(2, 3);
-/* Same about its member. */
+/* Returns EBPO_E_FORMAT with a message about the member `key` of the entered value. */
 ebpo_status ebpo_json_bad_at(ebpo_json_reader *r, const char *key, const char *what);
-/* Turns EBPO_E_ARGUMENT into ebpo_json_bad; passes on other errors. */
+/* Turns EBPO_E_ARGUMENT into the error of ebpo_json_bad; returns other errors unchanged. */
 ebpo_status ebpo_json_judge(ebpo_json_reader *r, ebpo_status status, const ebpo_error *why);
 
-/* Checks for an object with these members (NULL ends the list) and private ones, "x-...". */
+/* Checks that the value is an object with only these members (NULL ends the list) and private ones,
+ * "x-...". */
 EBPO_MUST_USE ebpo_status ebpo_json_members(ebpo_json_reader *r, const json_t *value,
                                             const char *const *known);
 
-/* Reads a member. If it is missing, *out stays unchanged; EBPO_E_FORMAT if it is needed. */
+/* Reads a member. If it is missing, *out stays unchanged; EBPO_E_FORMAT if it is missing and
+ * needed. */
 EBPO_MUST_USE ebpo_status ebpo_json_get_text(ebpo_json_reader *r, const json_t *object,
                                              const char *key, bool needed, const char **out);
 EBPO_MUST_USE ebpo_status ebpo_json_get_flag(ebpo_json_reader *r, const json_t *object,
@@ -40,8 +42,8 @@ EBPO_MUST_USE ebpo_status ebpo_json_get_reals(ebpo_json_reader *r, const json_t 
                                               const char *key, bool needed, double *out,
                                               size_t count);
 
-/* Called for each member (or item) of the member `key`, which may be missing; it is entered. `name`
- * is NULL in arrays. */
+/* Called for each member (or item) of the member `key`, if that exists; the member (or item) has
+ * been entered. `name` is NULL in arrays. */
 typedef ebpo_status (*ebpo_json_each_fn)(ebpo_json_reader *r, const char *name,
                                          const json_t *value);
 EBPO_MUST_USE ebpo_status ebpo_json_each_member(ebpo_json_reader *r, const json_t *object,

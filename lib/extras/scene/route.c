@@ -4,8 +4,8 @@
  * sums, products, quotients and square roots are used, so that a pose has the same bits on every
  * machine.
  *
- * Bounds hold between two times without a key between them: the length of the motion, the deviation
- * from a straight line, and the part of it due to rounding alone. They are rounded upwards. */
+ * Bounds hold between two times without a key between them: the length of the motion, how far it
+ * leaves the straight line, and the part that rounding alone causes. They are rounded upwards. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -16,7 +16,7 @@
 #include "geometry/pose.h"
 #include "extras/scene/scene_parts.h"
 
-/* Relative rounding of lengths after a few dozen operations, each 2^-53. */
+/* Relative rounding error of lengths after a few dozen operations, each with an error of 2^-53. */
 static const double slack = 0x1p-44;
 /* Differences of greater times would not be finite. */
 static const double max_time = 0x1p1000;
@@ -63,8 +63,8 @@ ebpo_status ebpo_scene_add_key(ebpo_scene_route *route, const ebpo_route_key *ke
     if (!ebpo_quaternion_normalise(k.turn))
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the quaternion is 0 or too long");
     if (route->count && !(k.time > route->keys[route->count - 1].time))
-        return ebpo_fail(error, EBPO_E_ARGUMENT, "time %g is not above the one before, %g", k.time,
-                         route->keys[route->count - 1].time);
+        return ebpo_fail(error, EBPO_E_ARGUMENT, "time %g is not above the previous one, %g",
+                         k.time, route->keys[route->count - 1].time);
     if (!ebpo_grow(&route->keys, &route->capacity, route->count + 1, sizeof *route->keys))
         return ebpo_fail_memory(error, (route->count + 1) * sizeof *route->keys);
     route->keys[route->count++] = k;
@@ -85,7 +85,8 @@ static uint64_t key_at(const ebpo_scene_route *route, double time)
     return low;
 }
 
-/* Interpolates at even speed along the shorter arc: halved until chord and arc are equal. */
+/* Interpolates at constant speed along the shorter arc. The arc is halved until chord and arc are
+ * equal. */
 static void turn_between(const double from[4], const double to[4], double u, double out[4])
 {
     double a[4], b[4];
@@ -98,7 +99,8 @@ static void turn_between(const double from[4], const double to[4], double u, dou
         double middle[4];
         for (int k = 0; k < 4; k++)
             middle[k] = a[k] + b[k];
-        ebpo_quaternion_normalise(middle); /* at most a right angle apart: far from 0 */
+        ebpo_quaternion_normalise(middle); /* both are at most a right angle apart, so their sum is
+                                            * far from 0 */
         bool later = u >= 0.5;
         memcpy(later ? a : b, middle, sizeof middle);
         u = later ? 2 * u - 1 : 2 * u;
@@ -150,8 +152,8 @@ double ebpo_scene_route_next(const ebpo_scene_route *route, double from, double 
     return n + 1 < route->count ? fmin(to, route->keys[n + 1].time) : to;
 }
 
-/* Returns an upper bound of the angle of a rotation, in radians: twice that of quaternions, from
- * the series of asin. */
+/* Returns an upper bound of the angle of a rotation, in radians. The angle is twice that between
+ * the quaternions, from the series of asin. */
 static double angle_between(const double a[4], const double b[4])
 {
     double less[4], more[4];
@@ -168,7 +170,8 @@ static double angle_between(const double a[4], const double b[4])
         term *= square * (2 * n - 1) / (2 * n);
         sum += term / (2 * n + 1);
     }
-    return 4 * (sum + term) * (1 + slack); /* the rest is below its first term / (1 - 1/2) */
+    return 4 * (sum + term) * (1 + slack); /* the remaining terms are in total below the first of
+                                            * them / (1 - 1/2) */
 }
 
 double ebpo_scene_length_above(const double way[3])
@@ -207,7 +210,8 @@ ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from
     };
 }
 
-/* A pose between two times. */
+/* Poses of a route one after the other: the last scale, the sum of its changes, the greatest scale,
+ * and the greatest 1-norm of a translation. */
 typedef struct growing {
     double scale, grown, most, size;
 } growing;

@@ -29,7 +29,7 @@ static const char *const columns[COLUMNS] = {
 typedef struct lines {
     const char *at, *end, *name;
     uint64_t line;
-    int field[COLUMNS]; /* index of each column; -1: missing */
+    int field[COLUMNS]; /* number of the field of each column; -1: missing */
     int fields;
     locale_t c_locale;
 } lines;
@@ -63,7 +63,7 @@ static bool next_line(lines *l, csv_text *out)
     return false;
 }
 
-/* Splits fields at commas or semicolons; -1: too many. */
+/* Splits fields at commas or semicolons; returns -1 if there are too many. */
 static int csv_split(csv_text line, csv_text field[FIELDS_MAX])
 {
     int count = 0;
@@ -170,7 +170,7 @@ static ebpo_status read_text(const ebpo_whole_file *file, ebpo_scene_route *rout
     return status;
 }
 
-/* Adds a file of poses to a route. *left: bytes that may still be read. */
+/* Adds the poses of a file to a route. *left: number of bytes that may still be read. */
 static ebpo_status read_csv_file(ebpo_scene_route *route, const char *path, uint64_t *left,
                                  ebpo_error *error)
 {
@@ -256,7 +256,7 @@ static ebpo_status json_read_pose(ebpo_json_reader *r, const json_t *object, con
         free(alone.keys);
     }
     ebpo_json_leave(r);
-    *out = p.pose; /* from a matrix: checked with the instance */
+    *out = p.pose; /* a rotation given as a matrix is checked with the instance */
     return status;
 }
 
@@ -442,7 +442,8 @@ static ebpo_status read_model(ebpo_json_reader *r, const char *name, const json_
 
 /* --- instances --- */
 
-/* Returns the number of the member that `key` names; *number stays unchanged when it is missing. */
+/* Finds the object whose name is the value of the member `key`, and sets *number; *number stays
+ * unchanged when the member is missing. */
 static ebpo_status json_find(ebpo_json_reader *r, const json_t *object, const char *key,
                              const char *kind, bool needed, uint64_t *number)
 {

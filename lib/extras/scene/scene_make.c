@@ -1,9 +1,9 @@
-/* A scene as an object: its names, the files that it may name, adding its members, and returning
- * them.
+/* A scene as an object: its names, checks of the files that it names, adding its members, and
+ * returning them.
  *
  * Each kind of member has separate names; layers, groups and instances share one space of
- * selectors, which rules use. A selector is a set: every instance belongs to the set of all, to its
- * own, to that of its layer and to those of its groups.
+ * selectors, which rules use. A selector is a set. Every instance belongs to the set of all, to its
+ * own set, to that of its layer and to those of its groups.
  *
  * A scene that is untrusted input may name only files below its own folder, unless the options
  * allow others; symbolic links that lead out of the folder are rejected. */
@@ -34,8 +34,8 @@ static bool is_plain(const char *name)
     return text != NULL;
 }
 
-/* Checks a name: 1 to 255 bytes of UTF-8 without control characters, not beginning as selectors do.
- */
+/* Checks a name: 1 to 255 bytes of UTF-8 without control characters, which do not begin like a
+ * selector. */
 static ebpo_status check_name(const char *name, const char *what, ebpo_error *error)
 {
     size_t size = name ? strnlen(name, NAME_MAX + 1) : 0;
@@ -68,7 +68,8 @@ uint64_t ebpo_scene_find_name(const ebpo_scene *scene, const char *kind, const c
     return number ? (uint64_t)json_integer_value(number) : EBPO_SCENE_NONE;
 }
 
-/* Assigns a number to `kind` and `name`. EBPO_E_ARGUMENT: the name exists already. */
+/* Stores the number of the object with this kind and name. Fails with EBPO_E_ARGUMENT if the name
+ * exists already. */
 static ebpo_status put_name(ebpo_scene *scene, const char *kind, const char *name, uint64_t number,
                             ebpo_error *error)
 {
@@ -142,11 +143,11 @@ char *ebpo_scene_join_path(const char *folder, const char *path)
 static bool is_below(const char *folder, const char *path)
 {
     size_t size = strlen(folder);
-    size -= size && folder[size - 1] == '/'; /* the root only */
+    size -= size && folder[size - 1] == '/'; /* only the root keeps its final slash */
     return strncmp(folder, path, size) == 0 && path[size] == '/';
 }
 
-/* Checks names of files without links. */
+/* Checks that the real path of a file, without links, is in the folder. */
 static ebpo_status check_real(const char *folder, const char *real, const char *path,
                               ebpo_error *error)
 {
@@ -280,7 +281,7 @@ ebpo_status ebpo_scene_add_model(ebpo_scene *scene, const char *name, const char
                                    .file = EBPO_SCENE_NONE };
     if (digest)
         memcpy(m->digest, digest, sizeof m->digest);
-    scene->models_count++; /* freed with the scene, complete or not */
+    scene->models_count++; /* from here on the model is freed with the scene, complete or not */
     if (!m->name || !m->path)
         return ebpo_fail_memory(error, strlen(name) + strlen(path));
     if (number)

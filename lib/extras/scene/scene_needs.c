@@ -1,9 +1,9 @@
 /* Finds the part of each model's file that a scene needs in an interval of time: a box for
  * collisions and for inside tests, and the last level for views.
  *
- * Boxes are in the model's own coordinates, and hold all parts that another instance comes near,
- * over steps of time so short that no instance moves far. They are rounded outwards, so that a
- * subset by them returns the same results as the whole file.
+ * Boxes are in the model's own coordinates, and contain all parts that another instance comes near.
+ * They are computed over steps of time so short that no instance moves far. They are rounded
+ * outwards, so that queries in a subset of this box return the same results as in the whole file.
  *
  * A view needs the levels whose cells are larger than a pixel: a node's envelope and its content
  * are both in its cell, so a camera cannot distinguish finer levels. */
@@ -22,12 +22,12 @@
 
 enum { HALVINGS = 12 };
 
-/* One instance that another one approaches. */
+/* An instance that another one approaches. */
 typedef struct nearing {
     ebpo_scene_needs *needs;
     const ebpo_scene *scene;
     uint64_t of, other;
-    double clearance, margin; /* in the world's unit */
+    double clearance, margin; /* lengths in the world */
     ebpo_scene_file_need *need;
 } nearing;
 
@@ -42,8 +42,8 @@ static const ebpo_scene_route *route_of(const ebpo_scene *scene, uint64_t instan
     return route == EBPO_SCENE_NONE ? NULL : &scene->routes[route];
 }
 
-/* Bounds the distance of points near the other instance from the origin of the route, in its unit.
- */
+/* Bounds the distance of points near the other instance from the origin of the route, in the
+ * route's unit. */
 static ebpo_status reach_of_other(const nearing *n, const ebpo_scene_route *route, double from,
                                   double to, double *reach)
 {
@@ -62,8 +62,8 @@ static ebpo_status reach_of_other(const nearing *n, const ebpo_scene_route *rout
     return status;
 }
 
-/* Bounds the motion of the other instance relative to this one, in the world's unit; no key is
- * between the times. */
+/* Bounds the motion of the other instance relative to this one, in the world's unit. There must be
+ * no key between the times. */
 static ebpo_status motion_seen(const nearing *n, double from, double to, double *out)
 {
     const ebpo_scene_route *route = route_of(n->scene, n->of);
@@ -77,8 +77,8 @@ static ebpo_status motion_seen(const nearing *n, double from, double to, double 
     return status;
 }
 
-/* Returns the part of the model's box that the other instance may come near between two times;
- * false: nothing. */
+/* Computes the part of the model's box that the other instance may come near between two times.
+ * *any is false if there is no such part. */
 static ebpo_status near_box(const nearing *n, double from, double to, double motion,
                             ebpo_scene_space *out, bool *any)
 {
@@ -89,13 +89,13 @@ static ebpo_status near_box(const nearing *n, double from, double to, double mot
         status = ebpo_scene_seen_from(n->scene, n->of, n->other, to, &later, n->needs->error);
     if (status != EBPO_OK)
         return status;
-    /* above the effect of rounding between these times: also where nothing else is added */
+    /* more than the effect of rounding between these times, also where nothing else is added */
     double grow = (n->clearance + n->margin + motion) / fmin(at.unit, later.unit) * (1 + 0x1p-40) +
                   2 * fmax(at.rounding, later.rounding);
     *any = true;
     for (int k = 0; k < 3; k++) {
         double low = at.box.min[k] - grow, high = at.box.max[k] + grow;
-        /* after an overflow it may be anywhere */
+        /* after an overflow the box is unknown: use the model's whole box */
         out->min[k] = low > n->need->whole.min[k] ? low : n->need->whole.min[k];
         out->max[k] = high < n->need->whole.max[k] ? high : n->need->whole.max[k];
         *any = *any && out->min[k] <= out->max[k];
@@ -140,8 +140,8 @@ static ebpo_status come_near(const nearing *n, double from, double to, int halvi
     return status == EBPO_OK ? come_near(n, middle, to, halvings - 1) : status;
 }
 
-/* Goes from key to key of either; a key itself begins the next part, because routes may jump there.
- */
+/* Goes from key to key of both routes; the time of a key begins the next part, because routes may
+ * jump there. */
 static ebpo_status come_near_along(const nearing *n)
 {
     const ebpo_scene_pair pair = { n->of, n->other, 0 };
@@ -176,12 +176,12 @@ static double default_margin(const ebpo_scene_needs *needs, const ebpo_scene_pai
     return (fmin(a, b) > 0 ? fmin(a, b) : fmax(a, b)) / 32;
 }
 
-/* Adds all faces, because any of them may be around the other instance. */
+/* Adds all faces of a model to the need, because any of them may be around the other instance. */
 static void add_whole(ebpo_scene_needs *needs, const ebpo_scene_pair *pair)
 {
     for (int i = 0; i < 2; i++) {
         ebpo_scene_file_need *need = need_of(needs, i ? pair->b : pair->a);
-        need->askers++;
+        need->users++;
         need->any = true;
         need->box = need->whole;
     }
@@ -204,7 +204,7 @@ static ebpo_status add_pair(ebpo_scene_needs *needs, const ebpo_scene_pair *pair
                       .clearance = inside ? 0 : pair->clearance,
                       .margin = margin };
         n.need = need_of(needs, n.of);
-        n.need->askers++;
+        n.need->users++;
         status = come_near_along(&n);
     }
     return status;
@@ -217,15 +217,16 @@ ebpo_status ebpo_scene_add_near(ebpo_scene_needs *needs)
         ebpo_scene_keep_pairs(needs->scene, needs->from, needs->to, &list, needs->error);
     for (uint64_t i = 0; i < list.count && status == EBPO_OK; i++) {
         status = add_pair(needs, &list.pairs[i]);
-        if (status == EBPO_OK && !ebpo_progress_step(&needs->how.progress, "finding what is needed",
-                                                     i + 1, list.count, needs->error))
+        if (status == EBPO_OK &&
+            !ebpo_progress_step(&needs->how.progress, "finding the needed parts", i + 1, list.count,
+                                needs->error))
             status = EBPO_E_CANCELLED;
     }
     free(list.pairs);
     return status;
 }
 
-/* Initialises files; two models of one file have one box. */
+/* Initialises the needs of files; two models of one file have one box. */
 static void begin_files(ebpo_scene_needs *needs)
 {
     for (uint64_t i = 0; i < needs->scene->models_count; i++) {
@@ -289,7 +290,7 @@ ebpo_status ebpo_scene_report_need(const ebpo_scene_needs *needs, uint64_t model
     ebpo_subset_reads reads;
     *out = (ebpo_scene_need)EBPO_SCENE_NEED_INIT;
     out->model = model;
-    out->askers = need->askers;
+    out->users = need->users;
     out->boxed = o.boxed;
     out->parts = info->parts & o.parts;
     out->last_level = o.last_level < 0 ? info->level_count - 1 : o.last_level;
@@ -306,7 +307,7 @@ ebpo_status ebpo_scene_report_need(const ebpo_scene_needs *needs, uint64_t model
 
 /* --- views --- */
 
-enum { STEPS = 16 }; /* parts of a camera's way from key to key */
+enum { STEPS = 16 }; /* number of parts of a camera's path between two keys */
 
 typedef struct seeing {
     ebpo_scene_needs *needs;
@@ -314,7 +315,8 @@ typedef struct seeing {
     double pixel; /* width of a pixel at a distance of 1 */
 } seeing;
 
-/* Returns a box of the eye between two times without a key of the camera's route between them. */
+/* Computes a box that contains the camera's eye between two times, without a key of the camera's
+ * route between them. */
 static void eye_box(const seeing *s, double from, double to, ebpo_scene_space *out)
 {
     const ebpo_scene_camera *c = s->camera;
@@ -339,7 +341,8 @@ static void eye_box(const seeing *s, double from, double to, ebpo_scene_space *o
     }
 }
 
-/* Returns the least distance of an instance over a part of the time, and its greatest scale. */
+/* Computes the least distance of an instance from the eye over a part of the time, and the
+ * instance's greatest scale. */
 static ebpo_status distance_between(const seeing *s, uint64_t instance, double from, double to,
                                     double *distance, double *scale)
 {
@@ -357,7 +360,7 @@ static ebpo_status distance_between(const seeing *s, uint64_t instance, double f
     return EBPO_OK;
 }
 
-/* Returns true if a box is behind a static camera, which cannot see it. */
+/* Returns true if a box is behind a static camera, which then cannot see it. */
 static bool is_behind(const seeing *s, const ebpo_scene_space *box)
 {
     const ebpo_scene_camera *c = s->camera;
@@ -372,7 +375,7 @@ static bool is_behind(const seeing *s, const ebpo_scene_space *box)
     return c->route == EBPO_SCENE_NONE && most < 0;
 }
 
-/* Returns the first level whose cells are at most of this size; -1: the last one is needed. */
+/* Returns the first level whose cells are at most of this size; -1: all levels are needed. */
 static int level_for(const ebpo_info *info, double size)
 {
     double cell = ebpo_scene_length_above(info->box_size);
@@ -438,7 +441,7 @@ ebpo_status ebpo_scene_add_views(ebpo_scene_needs *needs)
         seeing s = { needs, c, 2 * tan(half) / c->height };
         status = see_along(&s);
         for (uint64_t f = 0; f < needs->scene->files_count; f++)
-            needs->files[f].askers++;
+            needs->files[f].users++;
     }
     return status;
 }

@@ -5,11 +5,11 @@
 #include "extras/scene/instance_pair.h"
 
 typedef struct ebpo_scene_file_need {
-    uint64_t askers;        /* number of pairs, or cameras that may see it */
+    uint64_t users;         /* number of pairs, or of cameras that may see the file's models */
     bool any;               /* false: only the root is needed */
-    ebpo_scene_space box;   /* for collide, inside */
+    ebpo_scene_space box;   /* part that collisions and inside tests need */
     ebpo_scene_space whole; /* box of all faces */
-    int last_level;         /* for view; else -1 */
+    int last_level;         /* last level that views need; otherwise -1 */
     uint32_t parts;
 } ebpo_scene_file_need;
 
@@ -24,10 +24,10 @@ typedef struct ebpo_scene_needs {
 /* Initialises `files`; the options have been checked. Free `files`, also on failure. */
 EBPO_MUST_USE ebpo_status ebpo_scene_begin_needs(ebpo_scene_needs *needs);
 
-/* Adds the parts that pairs come near. */
+/* Adds the parts of models that other instances of pairs come near. */
 EBPO_MUST_USE ebpo_status ebpo_scene_add_near(ebpo_scene_needs *needs);
 
-/* Completes the needs; files without additions need only the root. */
+/* Completes the needs; of files without additions only the root is needed. */
 void ebpo_scene_end_needs(ebpo_scene_needs *needs);
 
 /* Returns the need of a file as options for a subset. */

@@ -1,9 +1,9 @@
 /* Opens scene files, and loads the models that they name.
  *
  * Models of the same path share one open file. Where a scene file states a digest, the
- * content_sha256 of the model's file must be equal. Loading sets the box of each model, which
- * bounds of motion use; until then a scene has no boxes. A model for queries is made when it is
- * first needed. */
+ * content_sha256 of the model's file must be equal to it. Loading sets the box of each model, which
+ * bounds of motion use; until then the models of a scene have no boxes. A model for queries is made
+ * when it is first needed. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -34,7 +34,7 @@ static ebpo_status take_options(ebpo_scene_options *own, const ebpo_scene_option
     return status;
 }
 
-/* Keeps the text for packing. */
+/* Keeps the scene file's text for packing. */
 static ebpo_status keep_text(ebpo_scene *scene, const char *text, size_t size, ebpo_error *error)
 {
     scene->text = malloc(size + 1);
@@ -47,7 +47,7 @@ static ebpo_status keep_text(ebpo_scene *scene, const char *text, size_t size, e
     return EBPO_OK;
 }
 
-/* Takes ownership of `folder`; NULL: memory was short. */
+/* Makes a scene of the text. Takes ownership of `folder`; NULL: allocating it has failed. */
 static ebpo_status open_parse(const char *text, size_t size, const char *name, char *folder,
                               const ebpo_scene_options *options, ebpo_scene **out,
                               ebpo_error *error)
@@ -154,8 +154,8 @@ static ebpo_status open_file(ebpo_scene *scene, const char *path, uint64_t max_e
     return EBPO_OK;
 }
 
-/* Sets the box of the faces, as the file states it, if it is within the root cell; else the root
- * cell. */
+/* Sets the model's box to the box of its faces, as the file states it, if that is within the root
+ * cell; else to the root cell. */
 static void box_of(ebpo_scene_model_entry *m, const ebpo_info *info)
 {
     for (int k = 0; k < 3; k++) {
@@ -176,7 +176,7 @@ static ebpo_status check_digest(const ebpo_scene_model_entry *m, const ebpo_info
     char shown[256];
     return ebpo_fail_file(error, EBPO_E_FORMAT, ebpo_url_redact(m->path, shown, sizeof shown),
                           "is not the file that the scene means by model '%.80s': its "
-                          "content_sha256 is another",
+                          "content_sha256 is different",
                           m->name);
 }
 

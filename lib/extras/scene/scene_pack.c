@@ -1,5 +1,5 @@
-/* Plans and packs a scene: finds the bytes of its models that are needed, and writes a folder that
- * has only those.
+/* Plans and packs a scene: finds the bytes of its models' files that are needed, and writes a
+ * folder that has only those.
  *
  * Packing writes a subset of each file (scene_needs.c), copies the files of poses, and writes a
  * scene file like the original with other paths and digests. The folder is written beside its
@@ -27,7 +27,8 @@
 #include "format/file_in.h"
 #include "io/file_source.h"
 
-/* Names in the folder: of the scene, a file of scene->files, a route's poses. */
+/* Names in the folder: of the scene file, of the number of a file in scene->files, of a route's
+ * poses. */
 #define SCENE_PACKED "packed.scene.json"
 
 /* Reads the options; the scene and its times are valid. */
@@ -183,11 +184,11 @@ static ebpo_status copy_routes(json_t *root, const ebpo_scene *scene, const char
     return status;
 }
 
-/* Writes the scene into the folder, and files of poses. files: [scene->files_count] */
+/* Writes the scene file and the files of poses into the folder. files: [scene->files_count] */
 static ebpo_status scene_write_packed(const ebpo_scene *scene, const ebpo_scene_packed *files,
                                       const char *folder, ebpo_error *error)
 {
-    /* it has been parsed once already */
+    /* the text is valid: it has been parsed before */
     json_t *root = json_loadb(scene->text, scene->text_size,
                               JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, NULL);
     if (!root)
@@ -261,7 +262,7 @@ static ebpo_status publish_folder(packing *p)
 
 /* --- models --- */
 
-/* Reads the size and digest of the file on disk. */
+/* Reads the size and the digest of a file on disk. */
 static ebpo_status inspect_file(packing *p, const char *path, ebpo_scene_packed *out)
 {
     ebpo_file *file = NULL;
@@ -315,8 +316,8 @@ static uint64_t sum_of_files(const packing *p)
     return sum;
 }
 
-/* Reduces a plan that is too large: each file by the same share, except files of which nothing is
- * needed. */
+/* Reduces a plan that is too large: the need of each file by the same share, except of files of
+ * which nothing is needed. */
 static ebpo_status pack_shrink(packing *p)
 {
     uint64_t fixed = 0, sum = sum_of_files(p), target = p->how.target_bytes;
@@ -365,7 +366,8 @@ static ebpo_status pack_check(packing *p, const ebpo_pack_options *options)
     return scene_plan_check(&p->needs, &plan);
 }
 
-/* Lists the packed files of models, before publishing, because nothing may fail after it. */
+/* Lists the packed files of models. This is done before publishing, because nothing may fail
+ * afterwards. */
 static ebpo_status list_packed(const packing *p, ebpo_scene_packed **out)
 {
     const ebpo_scene *scene = p->needs.scene;

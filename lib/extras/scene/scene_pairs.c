@@ -1,14 +1,14 @@
 /* The broad phase of a scene: finds the pairs of instances that may come near each other in an
  * interval of time.
  *
- * Rules select the pairs and their clearances: of several rules for a pair the greatest clearance
- * applies, and one that ignores the pair overrides all others.
+ * Rules select the pairs and their clearances. Of several rules for a pair the greatest clearance
+ * applies; a rule that ignores the pair overrides all others.
  *
- * The box of an instance holds it at all times of the interval. Between keys it is made in steps of
- * little rotation, each widened by the deviation of the motion from a straight line.
+ * The box of an instance contains it at all times of the interval. Between keys the box is made in
+ * steps of little rotation, each widened by how far the motion leaves the straight line.
  *
  * Sweep and prune sorts boxes along the axis with the least expected overlap. Pairs are returned in
- * the order of their instances. All tests err towards an unneeded pair. */
+ * the order of their instances. If a test is in doubt, the pair is returned. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -35,7 +35,7 @@ static int compare_sets(const void *a, const void *b)
     return (*x > *y) - (*x < *y);
 }
 
-/* Sorts sets in ascending order, each once. */
+/* Sorts the instance's sets in ascending order and removes duplicates. */
 static void sort_sets(ebpo_scene_instance_entry *i)
 {
     uint32_t kept = 0;
@@ -47,7 +47,7 @@ static void sort_sets(ebpo_scene_instance_entry *i)
     i->set_count = kept;
 }
 
-/* Keeps one rule for each pair of sets: ignored if any rule ignores it, else the greatest
+/* Keeps one rule for each pair of sets: it ignores pairs if any rule does, else it has the greatest
  * clearance. */
 void ebpo_scene_sort_rules(ebpo_scene *scene)
 {
@@ -69,7 +69,8 @@ void ebpo_scene_sort_rules(ebpo_scene *scene)
         sort_sets(&scene->instances[i]);
 }
 
-/* Returns the rule of two sets: below 0 ignored, 0 also without a rule. */
+/* Returns the clearance of the rule of two sets; below 0: pairs are ignored; 0 also if there is no
+ * rule. */
 static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
 {
     ebpo_scene_rule_entry wanted = { a < b ? a : b, a < b ? b : a, 0 };
@@ -78,7 +79,7 @@ static double rule_of(const ebpo_scene *scene, uint64_t a, uint64_t b)
     return rule ? rule->clearance : 0;
 }
 
-/* Applies a rule to a pair; false: it is ignored. */
+/* Applies a rule to a pair; returns false if the rule ignores the pair. */
 static bool take_rule(double rule, double *clearance)
 {
     *clearance = fmax(*clearance, rule);
@@ -120,7 +121,7 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
     const ebpo_scene_instance_entry *x = &scene->instances[a], *y = &scene->instances[b];
     if (x->as.fixed && y->as.fixed)
         return false;
-    /* all pairs of groups would take hours where both instances have 100,000 */
+    /* if both instances have 100,000 groups, looking up all pairs of groups would take hours */
     bool few = scene->rules_count < (uint64_t)x->set_count * y->set_count;
     return (few ? by_rules : by_sets)(scene, x, y, clearance);
 }
@@ -128,7 +129,7 @@ bool ebpo_scene_pair_rule(const ebpo_scene *scene, uint64_t a, uint64_t b, doubl
 /* --- poses, boxes and motion --- */
 
 static const double slack = 0x1p-44;
-/* Rotation, in radians, in one step of a box. */
+/* Rotation in one step of a box, in radians. */
 static const double step_turn = 0.125;
 
 static const ebpo_scene_route *route_of(const ebpo_scene *scene, const ebpo_scene_instance_entry *i)
@@ -181,7 +182,7 @@ ebpo_status ebpo_scene_pose(const ebpo_scene *scene, uint64_t instance, double t
     return status;
 }
 
-/* Returns a box of the posed vertices, including rounding. */
+/* Computes a box of the posed vertices, including rounding. */
 static void posed_box(const ebpo_pose *pose, const ebpo_scene_model_entry *m, double min[3],
                       double max[3])
 {
@@ -199,7 +200,7 @@ static void posed_box(const ebpo_pose *pose, const ebpo_scene_model_entry *m, do
     }
 }
 
-/* Returns `all` after an overflow, when the bound may be anywhere. */
+/* Returns x, or `all` if x is NaN: after an overflow the bound is unknown. */
 static double or_else(double x, double all) { return isnan(x) ? all : x; }
 
 static void join_box(double min[3], double max[3], const double low[3], const double high[3],
@@ -244,7 +245,8 @@ static void box_at(const ebpo_scene *scene, const ebpo_scene_instance_entry *i, 
     join_box(min, max, low, high, by);
 }
 
-/* Returns a box between two times without a key between them, in steps of little rotation. */
+/* Computes a box that contains the instance between two times, without a key between them, in steps
+ * of little rotation. */
 static void box_between(const ebpo_scene *scene, const ebpo_scene_instance_entry *i,
                         ebpo_scene_reach reach, double from, double to, double min[3],
                         double max[3])
@@ -329,7 +331,7 @@ ebpo_status ebpo_scene_box(const ebpo_scene *scene, double from, double to, doub
 
 /* --- sweep and prune --- */
 
-/* These take 400 MB while they are sorted. */
+/* Maximum number of pairs; they take 400 MB while they are sorted. */
 static const uint64_t max_pairs = UINT64_C(1) << 23;
 
 typedef struct box {
@@ -341,7 +343,7 @@ typedef struct sweep {
     const ebpo_scene *scene;
     box *boxes;
     uint64_t count;
-    double clearance; /* the greatest of any rule */
+    double clearance; /* greatest clearance of all rules */
     EBPO_SCENE_LIST(ebpo_scene_pair, pairs);
 } sweep;
 
@@ -356,7 +358,8 @@ static ebpo_status make_boxes(sweep *s, double from, double to, ebpo_error *erro
     return status;
 }
 
-/* Returns the axis with the least expected overlap: sizes of boxes relative to the size of all. */
+/* Returns the axis with the least expected overlap. It is estimated from the sizes of boxes
+ * relative to the size of the box around all. */
 static int best_axis(const sweep *s)
 {
     int best = 0;
@@ -377,7 +380,8 @@ static int best_axis(const sweep *s)
     return best;
 }
 
-/* Moves the axis of comparison to the front of each box while boxes are sorted and swept. */
+/* Exchanges axes in each box, so that the axis of comparison is the first one while boxes are
+ * sorted and swept. */
 static void turn_axis(sweep *s, int axis)
 {
     for (uint64_t i = 0; i < s->count; i++) {
@@ -398,8 +402,8 @@ static int compare_boxes(const void *a, const void *b)
     return (x->instance > y->instance) - (x->instance < y->instance);
 }
 
-/* Returns true if they are at most `by` apart on each axis; errs towards true, because the rounding
- * of differences is added. */
+/* Returns true if two boxes are at most `by` apart on each axis. The rounding of differences is
+ * added, so the result may be true in doubt. */
 static bool near_each_other(const box *x, const box *y, double by)
 {
     for (int k = 0; k < 3; k++) {

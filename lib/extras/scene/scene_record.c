@@ -1,8 +1,8 @@
 /* Records results of a scene at several times in an HDF5 file, for other programs.
  *
  * The file has the names of instances and models, a row for each time, and a row for each pair
- * found, with its kind, place and depth. Tables grow by rows while times are added. The file is
- * published when it is finished, and is absent after a failure. */
+ * found, with the pair's kind, place and depth. Tables grow by rows while times are added. The file
+ * is published when it is finished; after a failure there is no file. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -253,7 +253,7 @@ typedef struct rows {
     double clearance[ROWS], distance[ROWS], place[ROWS][3], place_box[ROWS][6], depth[ROWS][4];
 } rows;
 
-/* Returns -1 for the number of a missing object. */
+/* Returns the number of an object, or -1 if it is missing. */
 static int64_t record_number(uint64_t n) { return n > INT64_MAX ? -1 : (int64_t)n; }
 
 static void fill_row(rows *out, uint64_t i, const ebpo_scene_clash *m, int64_t frame)
@@ -297,7 +297,7 @@ static ebpo_status put_frame(ebpo_scene_report *r, const ebpo_scene_frame *f, ui
 {
     const int64_t n[] = { r->clashes,
                           record_number(clashes),
-                          record_number(f->queried),
+                          record_number(f->tested),
                           record_number(f->nanoseconds),
                           record_number(f->bytes_read),
                           record_number(f->models),

@@ -19,7 +19,7 @@
  * ebpo_..._open opened. Both accept NULL. "Lent" memory belongs to the library. "Borrowed" memory
  * belongs to the caller and must stay unchanged for the stated time.
  *
- * Failure: a function that fails makes nothing. Its output for a new object is NULL.
+ * Failure: a function that fails makes no object. Its output for a new object is NULL.
  *
  * Callbacks that receive results return false to stop. They are then not called again, and the call
  * succeeds.
@@ -33,8 +33,8 @@
  * on it.
  *
  * "Threads:" in a comment says which threads may call a function at the same time:
- *   any           any number of threads, also with the same arguments, while no thread changes
- *                 these
+ *   any           any number of threads, also with the same arguments, as long as no thread changes
+ *                 the arguments
  *   one per X     one thread at a time for each object X; different objects are independent
  * The last thread that uses an object frees it. A function may start other threads; they end before
  * it returns, unless its comment says otherwise.
@@ -65,9 +65,9 @@
  *     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
  *
  * From version 1.0 on, a program then runs with every later library of the same major version:
- * members that its structs lack keep their default values or are not filled in. It also runs with
- * an earlier library, unless it sets a member that this library does not know (EBPO_E_UNSUPPORTED).
- * A wrong struct_size is EBPO_E_ARGUMENT.
+ * members that the program's structs lack keep their default values or are not filled in. The
+ * program also runs with an earlier library, unless it sets a member that the earlier library does
+ * not know (EBPO_E_UNSUPPORTED). A wrong struct_size is EBPO_E_ARGUMENT.
  *
  * All other structs keep their layout within a major version. Their reserved members are 0.
  */
@@ -144,7 +144,7 @@ typedef enum ebpo_status {
     EBPO_E_IO = -3,          /* the operating system or a server reported an error */
     EBPO_E_FORMAT = -4,      /* a file has the wrong format or is damaged */
     EBPO_E_VERSION = -5,     /* a file needs a newer reader */
-    EBPO_E_UNSUPPORTED = -6, /* valid, but this build or version cannot do it */
+    EBPO_E_UNSUPPORTED = -6, /* valid, but not supported by this build or version */
     EBPO_E_NOT_SOLID = -7,   /* a solid is required, and the mesh is not balanced */
     EBPO_E_LIMIT = -8,       /* a count or size exceeds a stated limit */
     EBPO_E_CANCELLED = -9,   /* a callback requested to stop */
@@ -159,8 +159,8 @@ typedef struct ebpo_error {
     ebpo_status status;
 
     /*
-     * The error, its location and the remedy: one sentence of UTF-8 without a newline. It begins
-     * with `file` and `object` if these are known.
+     * Description of the error, its location and the remedy: UTF-8 without a newline. The text
+     * begins with `file` and `object` if these are known.
      */
     char message[480];
 
@@ -202,8 +202,9 @@ EBPO_API bool ebpo_is_date(const char *text);
 /* ---- progress ---- */
 
 /*
- * Called by the thread that called the library, when a stage begins and then at most a few times a
- * second. `stage` is a static string. `done` counts up to `total`, which is 0 if unknown.
+ * Reports progress. The library calls it in the thread of the caller, when a stage begins and then
+ * at most a few times a second. `stage` is a static string. `done` counts up to `total`, which is 0
+ * if unknown.
  *
  * Return false to stop: the running call returns EBPO_E_CANCELLED and leaves no file.
  */
@@ -217,8 +218,8 @@ typedef struct ebpo_progress {
 /* ---- outputs ---- */
 
 /*
- * Writes `size` bytes to a file, which is replaced atomically: they are written under a temporary
- * name, synced and renamed. EBPO_E_IO: the file could not be written.
+ * Writes `size` bytes to a file, which is replaced atomically: a temporary file is written, synced
+ * and renamed. EBPO_E_IO: the file could not be written.
  *
  * Threads: any.
  */
@@ -233,7 +234,7 @@ typedef struct ebpo_output ebpo_output;
  * called. Temporary files of killed programs for the same path are removed.
  *
  * out          ended by ebpo_output_end or ebpo_output_abandon
- * descriptor   for writing, and for reading written data; closed with the output
+ * descriptor   for writing, and for reading data that was written; closed with the output
  *
  * EBPO_E_IO: as ebpo_check_output. EBPO_E_LIMIT: more than 32 outputs at the same time.
  *
@@ -266,19 +267,20 @@ EBPO_API void ebpo_output_abandon(ebpo_output *out);
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_check_output(const char *path, ebpo_error *error);
 
 /*
- * Removes the temporary files of all outputs that this process is writing; they cannot be completed
- * afterwards. For signal handlers just before the process ends: it calls only unlink.
+ * Removes the temporary files of all outputs that this process is writing. These outputs cannot be
+ * completed afterwards. For signal handlers just before the process ends: the function calls only
+ * unlink.
  *
  * Threads: any.
  */
 EBPO_API void ebpo_abandon_outputs(void);
 
 /*
- * Makes a folder beside `folder`, which the caller fills and ebpo_folder_publish then renames. The
- * caller removes the new folder and its contents if it is not published. Folders of killed programs
- * for the same `folder` are removed.
+ * Makes a temporary folder beside `folder`. The caller fills it, and ebpo_folder_publish renames it
+ * to `folder`. If the caller does not publish the temporary folder, the caller removes it and its
+ * contents. Temporary folders of killed programs for the same `folder` are removed.
  *
- * making   path of the new folder; freed by free()
+ * making   path of the temporary folder; freed by free()
  *
  * EBPO_E_IO: `folder` exists already, or no folder can be made beside it.
  *
@@ -289,7 +291,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_folder_begin(const char *folder, char **
 
 /*
  * Renames the folder `making` to `folder` atomically, with the default permissions of a new folder.
- * EBPO_E_IO: the folder cannot be renamed; it is still at `making`.
+ * EBPO_E_IO: the folder cannot be renamed, and is still at `making`.
  *
  * Threads: one at a time in the process, because the umask is read.
  */

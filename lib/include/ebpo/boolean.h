@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * Evaluates unions, intersections and differences of solids at poses, by query.
+ * Evaluates queries of unions, intersections and differences of solids at poses.
  *
  *   Expressions     ebpo_boolean_new
  *   Point in solid  ebpo_boolean_inside, ebpo_boolean_inside_many
@@ -7,12 +7,13 @@
  *   Exact volume    ebpo_boolean_exact_volume
  *   Cells           ebpo_boolean_cells_new, ebpo_boolean_cells_volume, ebpo_boolean_cells_mesh
  *
- * No mesh of the result is computed: queries of the result are evaluated by queries of the models.
- * Decisions equal those of arithmetic without rounding on posed coordinates (pose.h).
+ * The *result* is the solid that an expression of solids describes. No mesh of the result is
+ * computed: a query of the result is evaluated by queries of the models. Decisions equal those of
+ * arithmetic without rounding on posed coordinates (pose.h).
  *
- * The result is *regularised*: an operand is the closure of the points that its rule puts inside,
- * and the result is the closure of its own interior. So two boxes with a common side are one box,
- * and a box minus an equal box is empty.
+ * The result is *regularised*: an operand is the closure of the points that are inside by its rule,
+ * and the result is the closure of its own interior. So the union of two boxes with a common side
+ * is one box, and a box minus an equal box is empty.
  */
 #ifndef EBPO_BOOLEAN_H
 #define EBPO_BOOLEAN_H
@@ -28,10 +29,10 @@ extern "C" {
 
 typedef enum ebpo_boolean_operation {
     EBPO_BOOLEAN_OPERAND = 0,             /* the operand with index `left` */
-    EBPO_BOOLEAN_UNION = 1,               /* in at least one */
-    EBPO_BOOLEAN_INTERSECTION = 2,        /* in both */
-    EBPO_BOOLEAN_DIFFERENCE = 3,          /* in `left`, not in `right` */
-    EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE = 4 /* in exactly one */
+    EBPO_BOOLEAN_UNION = 1,               /* in `left`, in `right`, or in both */
+    EBPO_BOOLEAN_INTERSECTION = 2,        /* in `left` and in `right` */
+    EBPO_BOOLEAN_DIFFERENCE = 3,          /* in `left` and not in `right` */
+    EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE = 4 /* in `left` or in `right`, not in both */
 } ebpo_boolean_operation;
 
 /* Node of the expression tree; `left` and `right` are indices of earlier nodes. */
@@ -47,14 +48,14 @@ typedef struct ebpo_boolean_operand {
     ebpo_pose pose;
 } ebpo_boolean_operand;
 
-/* Maximum numbers. */
+/* Maximum numbers of operands and nodes. */
 #define EBPO_BOOLEAN_OPERANDS_MAX 64
 #define EBPO_BOOLEAN_NODES_MAX    256
 
 typedef struct ebpo_boolean_options {
     size_t struct_size;
 
-    /* For many points, and for cells. 0: all cores. */
+    /* Number of threads for many points, and for cells. 0: all cores. */
     unsigned threads;
 
     uint32_t reserved;
@@ -62,7 +63,7 @@ typedef struct ebpo_boolean_options {
 
 #define EBPO_BOOLEAN_OPTIONS_INIT EBPO_SIZED(ebpo_boolean_options)
 
-/* An expression with a context of each operand for each thread. */
+/* An expression. It contains a context (query.h) of each operand for each thread. */
 typedef struct ebpo_boolean ebpo_boolean;
 
 /*
@@ -70,10 +71,10 @@ typedef struct ebpo_boolean ebpo_boolean;
  * root. Several nodes may share a node or an operand. Both arrays are copied; the models must
  * outlive the expression.
  *
- * EBPO_E_ARGUMENT: an index is out of range or not of an earlier node; an invalid operation; a pose
- * (ebpo_pose_check). EBPO_E_LIMIT: no or too many operands or nodes. EBPO_E_NOT_SOLID: an operand
- * is a surface. EBPO_E_ABSENT: an operand's file has no mesh. Messages give the index of the node,
- * or the file of the operand and its position from 1 on.
+ * EBPO_E_ARGUMENT: an index is out of range or not of an earlier node, an operation is not valid,
+ * or a pose is not valid (ebpo_pose_check). EBPO_E_LIMIT: no or too many operands or nodes.
+ * EBPO_E_NOT_SOLID: an operand is a surface. EBPO_E_ABSENT: an operand's file has no mesh. Messages
+ * give the index of the node, or the number of the operand (from 1 on) and its file.
  *
  * Threads: any.
  */
@@ -85,7 +86,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_new(const ebpo_boolean_operand *
                                                     ebpo_boolean **out, ebpo_error *error);
 
 /*
- * Frees an expression. Free its models later.
+ * Frees an expression. Free its models after this call.
  *
  * Threads: one per expression.
  */
@@ -95,15 +96,16 @@ EBPO_API void ebpo_boolean_free(ebpo_boolean *boolean);
 
 typedef struct ebpo_boolean_result {
     /*
-     * EBPO_IN: certainly an interior point of the result; EBPO_OUT: certainly an interior point of
-     * its complement. EBPO_ON: on a posed face, and the other operands do not decide.
+     * ebpo_where. EBPO_IN: certainly an interior point of the result. EBPO_OUT: certainly an
+     * interior point of the complement of the result. EBPO_ON: the point is on a posed face of an
+     * operand, and the other operands do not decide.
      */
     int32_t where;
 
     /*
-     * 1: `where` is certain; with EBPO_ON: a boundary point of the result. 0, only with EBPO_ON:
-     * faces of several planes intersect at the point, as on edges and at vertices; it may be a
-     * boundary point or not.
+     * 1: `where` is certain; with EBPO_ON, the point is a boundary point of the result. 0 (only
+     * with EBPO_ON): faces in different planes intersect at the point, as on edges and at vertices;
+     * the point may or may not be a boundary point.
      */
     int32_t certain;
 } ebpo_boolean_result;
@@ -135,10 +137,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolea
 typedef struct ebpo_boundary_options {
     size_t struct_size;
 
-    /* Stops when hi - lo <= tolerance hi; at least 0. */
+    /* The search stops when hi - lo <= tolerance * hi. At least 0. */
     double tolerance;
 
-    /* Stops after about this many cells of the world, with the bounds known so far. 0: 100,000. */
+    /*
+     * The search stops after about this many cells of the world, with the bounds known so far. 0:
+     * 100,000.
+     */
     uint64_t cells;
 } ebpo_boundary_options;
 
@@ -149,8 +154,9 @@ typedef struct ebpo_boundary_options {
 
 typedef struct ebpo_boundary_distance {
     /*
-     * Bounds of the unsigned distance to the result's boundary, in the unit of the world. 0 .. 0:
-     * on the boundary. INFINITY .. INFINITY: the result is empty; only hi INFINITY: perhaps empty.
+     * Bounds of the unsigned distance to the result's boundary, in the unit of the world. Both 0:
+     * the point is on the boundary. Both INFINITY: the result is empty. Only hi is INFINITY: the
+     * result may be empty.
      */
     double lo, hi;
 
@@ -166,8 +172,8 @@ typedef struct ebpo_boundary_distance {
  * result. If the nearest face of all operands is part of that boundary, two distances suffice, and
  * `lo` and `hi` differ only by rounding. Elsewhere cells of the world are searched, nearest first.
  *
- * EBPO_E_ARGUMENT: the point or the tolerance. EBPO_E_LIMIT: as ebpo_boolean_cells_new, for level
- * 0. The errors of ebpo_boolean_inside.
+ * EBPO_E_ARGUMENT: the point or the tolerance is not valid. EBPO_E_LIMIT: as for
+ * ebpo_boolean_cells_new with level 0. Other errors are those of ebpo_boolean_inside.
  *
  * Threads: one per expression.
  */
@@ -188,12 +194,12 @@ typedef struct ebpo_volume_options {
 
 /* Reason why a volume is not exact. */
 typedef enum ebpo_volume_doubt {
-    EBPO_VOLUME_CERTAIN = 0,            /* it is exact */
+    EBPO_VOLUME_CERTAIN = 0,            /* the volume is exact */
     EBPO_VOLUME_OPERANDS_INTERSECT = 1, /* a face of operand[0] intersects one of operand[1] */
     EBPO_VOLUME_FACES_INTERSECT =
         2,                    /* two faces of operand[0] intersect other than as neighbours */
     EBPO_VOLUME_IN_PARTS = 3, /* the model of operand[0] is not entirely in memory */
-    EBPO_VOLUME_SUBSET = 4    /* its file is a subset */
+    EBPO_VOLUME_SUBSET = 4    /* the file of operand[0] is a subset */
 } ebpo_volume_doubt;
 
 typedef struct ebpo_exact_volume {
@@ -201,9 +207,10 @@ typedef struct ebpo_exact_volume {
 
     /*
      * Volume of the result, in the cube of the world's unit. EBPO_VALUE_EXACT: lo and hi are the
-     * double nearest to the volume of posed coordinates, ties to even (INFINITY or 0 beyond the
-     * range of doubles); if `scaled` is 0, the result is empty. EBPO_VALUE_BOUND: from 0 to the
-     * volume of a box around the result; cells give better bounds.
+     * double nearest to the exact volume for posed coordinates, ties to even; INFINITY or 0 if the
+     * volume is out of the range of doubles. The result is empty if `scaled` is 0.
+     * EBPO_VALUE_BOUND: from 0 to the volume of a box around the result; ebpo_boolean_cells_volume
+     * gives better bounds.
      */
     ebpo_certain volume;
 
@@ -214,21 +221,24 @@ typedef struct ebpo_exact_volume {
     uint32_t reserved;
 
     /*
-     * EBPO_VOLUME_OPERANDS_INTERSECT: a face of each; EBPO_VOLUME_FACES_INTERSECT: two intersecting
-     * faces; indices in the files. Else EBPO_NO_FACE.
+     * Two intersecting faces, as indices in the files. EBPO_VOLUME_OPERANDS_INTERSECT: one of each
+     * operand. EBPO_VOLUME_FACES_INTERSECT: both of operand[0]. Else EBPO_NO_FACE.
      */
     uint64_t file_face[2];
 
     /*
-     * For an exact volume: parts of the operands' surfaces that were tested, and those that bound
-     * the result.
+     * For an exact volume: number of parts of the operands' surfaces that were tested, and of parts
+     * that bound the result.
      */
     uint64_t patches, bounding;
 
-    /* The same faces by source indices (ebpo_face_pair). */
+    /* The two faces of `file_face`, with indices as in ebpo_face_pair. */
     uint64_t face[2];
 
-    /* The exact volume with the same rounding and unlimited range: scaled * 2^exponent. */
+    /*
+     * The exact volume is scaled * 2^exponent, rounded in the same way, without the limited range
+     * of doubles.
+     */
     double scaled;
     int64_t exponent;
 } ebpo_exact_volume;
@@ -238,10 +248,10 @@ typedef struct ebpo_exact_volume {
 /*
  * Computes the exact volume of the result if the operands' faces allow it. No face may intersect a
  * face of another operand, not even in a point. Faces of one operand, except those without area,
- * may intersect only as neighbours (ebpo_collide_self, at their poses). So shells may be apart,
- * nested and inverted, with any winding numbers. Equal operands (models of equal content at bitwise
- * equal poses) count as one, and unused operands are not tested. If the condition does not hold,
- * the call succeeds and `doubt` gives the reason.
+ * may intersect only as neighbours (ebpo_collide_self, at their poses). Shells may be apart, nested
+ * or inverted, with any winding numbers. Equal operands (models of equal content at bitwise equal
+ * poses) count as one, and unused operands are not tested. If the condition does not hold, the call
+ * succeeds and `doubt` gives the reason.
  *
  * Takes about 80 bytes for each face of one operand at a time.
  *
@@ -265,8 +275,8 @@ typedef struct ebpo_cells_options {
     uint32_t reserved;
 
     /*
-     * EBPO_E_LIMIT if a level has more mixed cells. Each takes 32 bytes while the next level is
-     * made. 0: 2^25.
+     * Maximum number of mixed cells of a level; with more, EBPO_E_LIMIT. A mixed cell takes 32
+     * bytes while the next level is made. 0: 2^25.
      */
     uint64_t most;
 
@@ -281,23 +291,23 @@ typedef struct ebpo_cells_options {
     }
 
 /*
- * Cells of an octree of the world, a cube around the result's box. A cell is *in* if the closed
- * cell is certainly in the interior of the result, *out* if certainly no point belongs to the
- * result, else *mixed*. Mixed cells are subdivided down to the level.
+ * Cells of an octree of the world, whose root is a cube around the result's box. A cell is *in* if
+ * the closed cell is certainly in the interior of the result, *out* if certainly no point belongs
+ * to the result, else *mixed*. Mixed cells are subdivided down to the level.
  */
 typedef struct ebpo_boolean_cells ebpo_boolean_cells;
 
 /*
  * Makes the cells. Each operand is tested in a ball around the cell: first by the white and black
  * nodes of its tree, which usually decide while cells are larger than leaves, then by its faces. An
- * operand that no longer matters is not tested again. An operand that is used twice counts as two:
- * cells at its own boundary are mixed.
+ * operand that cannot change the result in a cell is not tested in its children. An operand that is
+ * used twice counts as two operands, so cells at its boundary are mixed.
  *
  * The cells stay valid after the expression is freed.
  *
- * EBPO_E_ARGUMENT: the level. EBPO_E_LIMIT: too many cells (`most`). Also if the result is too
- * small or too far from the origin, so that doubles cannot hold the corners of cells, or larger
- * than 2^300 or smaller than 2^-300, so that volumes are out of range. The errors of
+ * EBPO_E_ARGUMENT: the level is not valid. EBPO_E_LIMIT: too many cells (`most`); the result is too
+ * small or too far from the origin for corners of cells in doubles; or it is larger than 2^300 or
+ * smaller than 2^-300, so that volumes are out of range. Other errors are those of
  * ebpo_boolean_inside.
  *
  * Threads: one per expression.
@@ -318,22 +328,24 @@ typedef struct ebpo_boolean_volume {
     size_t struct_size;
 
     /*
-     * Bounds of the result's volume, in the cube of the world's unit: all in-cells, and these plus
-     * all mixed cells. Exact on posed coordinates; 0 .. 0: the result is empty.
+     * Bounds of the result's volume, in the cube of the world's unit: lo is that of all in-cells,
+     * hi that of all in-cells and mixed cells. Exact on posed coordinates. Both 0: the result is
+     * empty.
      */
     double lo, hi;
 
     /*
-     * Lowest corner and edge of the root cell; the edge is a power of two; 0: the result is empty.
+     * Lowest corner of the root cell, and length of its edge, which is a power of two. 0: the
+     * result is empty.
      */
     double origin[3], edge;
 
-    /* In-cells of any level; mixed cells of the finest level. */
+    /* Number of in-cells of all levels, and of mixed cells of the finest level. */
     uint64_t in_cells, mixed_cells;
 
     /*
-     * Tests of an operand against a cell that were decided by the operand's box, by its white and
-     * black nodes, and by its faces.
+     * Number of tests of an operand against a cell that were decided by the operand's box, by its
+     * white and black nodes, and by its faces.
      */
     uint64_t by_box, by_nodes, by_faces;
 
@@ -341,7 +353,7 @@ typedef struct ebpo_boolean_volume {
      * Accuracy of lo and hi, an ebpo_value_kind: EBPO_VALUE_INTERVAL; EBPO_VALUE_BOUND if no cell
      * is in; EBPO_VALUE_EXACT for an empty result.
      */
-    int32_t metric;
+    int32_t kind;
 
     int32_t reserved;
 } ebpo_boolean_volume;
@@ -362,9 +374,9 @@ typedef enum ebpo_boolean_side {
 } ebpo_boolean_side;
 
 /*
- * Makes the surface of these cells: squares of the finest level, two triangles each, in doubles. It
- * is balanced, with winding numbers 0 and 1. Where cells touch along edges or at corners, more than
- * two faces share an edge or vertex. The mesh may be written or converted: an .ebpo.h5 file of the
+ * Makes the surface of these cells: squares of the finest level, two triangles each, in doubles.
+ * The mesh is balanced, with winding numbers 0 and 1. Where cells touch only along an edge or at a
+ * corner, it is not a 2-manifold. The mesh may be written or converted: an .ebpo.h5 file of the
  * outer cells, and its envelopes, contain the result.
  *
  * out   freed by ebpo_mesh_free; without faces if there are no such cells

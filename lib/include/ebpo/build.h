@@ -27,20 +27,20 @@ extern "C" {
  */
 typedef enum ebpo_selection {
     /*
-     * From the root down, among the directions of the hull of the solid in the cell. A node starts
-     * from its parent's envelope. It adds planes greedily by the volume that they remove, if this
-     * is at least epsilon, then planes that cut off needles.
+     * From the root down. Candidates are the directions of the hull of the solid in the cell. A
+     * node starts with its parent's envelope. Planes are added greedily by the volume that they
+     * remove, if this is at least epsilon; then planes that cut off needles.
      */
     EBPO_SELECT_INHERIT = 0,
 
     /*
-     * The other three selections are from the theses, among the normals of the faces below the
-     * node. They go from the leaves up, with the children's planes and around the polygons of these
-     * planes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
+     * The other three selections are from the theses. Candidates are the normals of the faces below
+     * the node. These selections go from the leaves up: the planes of a node are placed around the
+     * polygons of its children's planes (EBP 2017, 3.3.4.3 and 3.4.1; BP 2008, 3.4).
      */
     EBPO_SELECT_KMEDOIDS = 1, /* medoids of clusters of normals */
     EBPO_SELECT_OFFSET = 2,   /* planes that moved least from their faces */
-    EBPO_SELECT_RANDOM = 3,   /* consecutive planes from a random one on */
+    EBPO_SELECT_RANDOM = 3,   /* consecutive planes, from a random plane on */
 
     /* Number of selections. */
     EBPO_SELECTION_COUNT
@@ -51,10 +51,10 @@ typedef struct ebpo_selection_traits {
     /* Name in files and commands, such as "inherit". */
     const char *name;
 
-    /* From the leaves up: uses percent or k_root, not epsilon. */
+    /* True: from the leaves up; uses percent or k_root, not epsilon. */
     bool from_leaves;
 
-    /* Uses the distance of normals. */
+    /* True: uses the distance of normals (ebpo_normal_distance). */
     bool takes_normals;
 
     bool takes_seed;
@@ -80,8 +80,8 @@ typedef enum ebpo_normal_distance {
 } ebpo_normal_distance;
 
 /*
- * Seconds of two steps that progress does not separate, because each piece of a tree passes both at
- * once. Summed over all threads.
+ * Seconds of two steps that `progress` does not separate, because both are done together for each
+ * part of a tree. Summed over all threads.
  */
 typedef struct ebpo_build_times {
     size_t struct_size;
@@ -108,16 +108,16 @@ typedef struct ebpo_build_options {
     uint32_t leaf_faces;
 
     /*
-     * For EBPO_SELECT_INHERIT, and for leaf planes that are stored with it. A plane is kept if it
-     * removes at least this share of the cell, 0 to 1, or cuts off a part that extends a tenth of
-     * the cell beyond it. In levels 0 to 4 the share is a tenth of it, or less where the solid is
-     * thin.
+     * For EBPO_SELECT_INHERIT, and for leaf planes that are stored with it: 0 to 1. A plane is kept
+     * if it removes at least this share of the cell, or cuts off a part that extends beyond the
+     * plane by a tenth of the cell. In levels 0 to 4 the share is epsilon / 10, or less where the
+     * solid is thin.
      */
     double epsilon;
 
     /*
-     * ebpo_part bits. Leaf planes are stored only on request. Colours are stored only if the mesh
-     * has colours, and only with EBPO_PART_MESH.
+     * ebpo_part bits: parts to make. Leaf planes are made only on request. Colours are stored only
+     * if the mesh has colours, and only with EBPO_PART_MESH.
      */
     uint32_t parts;
 
@@ -133,15 +133,15 @@ typedef struct ebpo_build_options {
 
     /*
      * For the selections of the theses: share of the candidates that is selected, in percent, above
-     * 0 and at most 100, rounded up (EBP 2017, equation 5). At most 255 planes are stored, also
-     * with k_root.
+     * 0 and at most 100. The number is rounded up (EBP 2017, equation 5). At most 255 planes are
+     * stored, also with k_root.
      */
     double percent;
 
     /*
      * If not 0, used instead of percent: number of planes at the root. Each next level has half as
-     * many. In a node the number is halved until it is less than the number of its candidates (BP
-     * 2008, 3.5.1).
+     * many planes. In a node, the number is halved until it is less than the number of candidates
+     * (BP 2008, 3.5.1).
      */
     double k_root;
 
@@ -152,8 +152,8 @@ typedef struct ebpo_build_options {
     uint64_t seed;
 
     /*
-     * Notes for the file: UTF-8 without control characters, or NULL. `ebpo convert` accepts a date
-     * only if ebpo_is_date is true.
+     * Unit, coordinate reference system and date, stored in the file: UTF-8 without control
+     * characters, or NULL. `ebpo convert` accepts a date only if ebpo_is_date is true.
      */
     const char *unit, *crs, *date;
 
@@ -176,11 +176,12 @@ typedef struct ebpo_build_options {
  * Builds the tree of a checked mesh. The arrays of the mesh are moved into `out` and reordered: the
  * mesh is empty afterwards, also on failure. `out` is freed by ebpo_tree_free.
  *
- * report   from ebpo_mesh_check or ebpo_mesh_prepare; copied into the file's metadata
- * repair_record   repairs that were made, copied as well; NULL: none
+ * report          from ebpo_mesh_check or ebpo_mesh_prepare; copied into the file's metadata
+ * repair_record   repairs that were made; copied as well. NULL: none
  *
  * EBPO_E_ARGUMENT: an option is out of range. EBPO_E_NOT_SOLID: see require_solid. EBPO_E_FORMAT,
- * EBPO_E_LIMIT: as ebpo_mesh_check and ebpo_mesh_arrange. EBPO_E_IO: no space for the workspace.
+ * EBPO_E_LIMIT: as ebpo_mesh_check and ebpo_mesh_arrange. EBPO_E_IO: no disk space for the
+ * workspace.
  *
  * Threads: one per mesh.
  */

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT
- * Queries many models together, or the parts of one model that is too large for a file.
+ * Queries many models together, or the parts of one model that is too large for one file.
  *
  *   Catalogues   ebpo_catalogue_open (a file), ebpo_catalogue_new (of entries),
- *                ebpo_catalogue_entry_of (a model's), ebpo_catalogue_save
+ *                ebpo_catalogue_entry_of, ebpo_catalogue_save
  *   Contents     ebpo_catalogue_get_facts, ebpo_catalogue_get_entry
- *   Open models  ebpo_catalogue_models_new: of any catalogues, within one budget
+ *   Open models  ebpo_catalogue_models_new (of any catalogues, within one budget)
  *   Queries      ebpo_catalogue_inside, ebpo_catalogue_distance, ebpo_catalogue_ray
  *
  *     ebpo_catalogue *catalogue = NULL;
@@ -13,10 +13,12 @@
  *     ebpo_catalogue_models_new(NULL, &models, &error);
  *     ebpo_catalogue_inside(catalogue, models, points, count, NULL, out, &error);
  *
- * A query opens only the models whose boxes it reaches. An opened model must agree with the
- * catalogue in digest, box and number of face indices; otherwise the query returns EBPO_E_FORMAT.
- * Results are those of the models (query.h); they do not depend on the budget.
- * docs/guide/clusters.md describes the file format and the results of parts.
+ * A *catalogue* is a list of models with boxes and digests. *Parts* are files of one model that was
+ * cut; *caps* are faces that close a part where it was cut. A query opens only the models whose
+ * boxes can contribute to the result. An opened model must agree with the catalogue in digest, box
+ * and number of face indices; otherwise the query returns EBPO_E_FORMAT. Results are those of the
+ * models (query.h); they do not depend on the budget. docs/guide/clusters.md describes the file
+ * format and the results of parts.
  */
 #ifndef EBPO_CATALOGUE_H
 #define EBPO_CATALOGUE_H
@@ -29,7 +31,7 @@ extern "C" {
 
 /* ---- catalogues ---- */
 
-/* An immutable list of entries. Threads share it. */
+/* An immutable list of entries. Threads may share a catalogue. */
 typedef struct ebpo_catalogue ebpo_catalogue;
 
 /* Description of a model in a catalogue. */
@@ -37,12 +39,15 @@ typedef struct ebpo_catalogue_entry {
     /* Path or URL of the model for winding numbers. Not NULL, not empty. */
     const char *path;
 
-    /* Part: model without caps, for distances and rays. NULL: the same model. */
+    /*
+     * For a part: path or URL of the model without caps, for distances and rays. NULL: the model at
+     * `path`.
+     */
     const char *surface;
 
     /*
-     * Part: .npy file of integers, the indices of the surface's faces in the whole model; not
-     * empty. NULL: faces keep their indices.
+     * For a part: .npy file of integers, which are the indices of the surface's faces in the whole
+     * model; not empty. NULL: faces keep their indices.
      */
     const char *numbers;
 
@@ -53,8 +58,8 @@ typedef struct ebpo_catalogue_entry {
     double min[3], max[3];
 
     /*
-     * Data from the head of the file, for readers of the catalogue; queries do not use it. If
-     * file_bytes is 0, these six are unknown and not written.
+     * Data from the header of the file, for programs that read the catalogue; queries do not use
+     * it. If file_bytes is 0, these six members are unknown and not written.
      */
     uint64_t file_bytes, face_count, vertex_count;
     ebpo_rule rule;
@@ -62,22 +67,22 @@ typedef struct ebpo_catalogue_entry {
 
     bool solid;
 
-    /* Part that consists only of caps: distances and rays ignore it. */
+    /* True for a part that consists only of caps: distances and rays ignore it. */
     bool unseen;
 
     uint64_t reserved[4];
 } ebpo_catalogue_entry;
 
 /*
- * Opens a file for a query, by a path or URL of the catalogue; the query returns its errors. Called
- * from any thread, including threads of the library.
+ * Opens a file for a query, by a path or URL of the catalogue. If this function fails, the query
+ * returns its error. Called from any thread, including threads of the library.
  */
 typedef ebpo_status (*ebpo_catalogue_open_fn)(void *user, const char *path, ebpo_file **out,
                                               ebpo_error *error);
 
 /*
- * Closes the file, in any thread. It must not call a function of the same ebpo_catalogue_models,
- * whose lock is held.
+ * Closes the file, in any thread. This function must not call functions of the same
+ * ebpo_catalogue_models, because its lock is held.
  */
 typedef void (*ebpo_catalogue_close_fn)(void *user, ebpo_file *file);
 
@@ -141,16 +146,16 @@ EBPO_API void ebpo_catalogue_entry_of(const ebpo_file *file, const char *path,
                                       ebpo_catalogue_entry *out);
 
 /*
- * Frees a catalogue after all queries. Its open models stay open.
+ * Frees a catalogue; only after all its queries. Models that queries opened stay open.
  *
  * Threads: one per catalogue.
  */
 EBPO_API void ebpo_catalogue_free(ebpo_catalogue *catalogue);
 
 /*
- * Writes the catalogue as a JSON file, which is replaced atomically. Paths that begin literally
- * with the folder of `path` become relative; others are unchanged. When read again, relative paths
- * are based on that folder.
+ * Writes the catalogue as a JSON file, which is replaced atomically. Paths that begin with the same
+ * bytes as the folder of `path` become relative; others are unchanged. When read again, relative
+ * paths are based on that folder.
  *
  * EBPO_E_ARGUMENT: a path is not UTF-8. EBPO_E_IO.
  *
@@ -162,13 +167,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_save(const ebpo_catalogue *cat
 typedef struct ebpo_catalogue_facts {
     size_t struct_size;
 
-    /* Path of the file that was read, lent. NULL: made of entries. */
+    /* Path of the file that was read, lent. NULL: the catalogue was made of entries. */
     const char *path;
 
     /* Number of entries, at least 1. */
     uint64_t count;
 
-    /* Size of the file, and the FNV-1a hash of its bytes. 0: made of entries. */
+    /* Size of the file, and the FNV-1a hash of its bytes. 0: the catalogue was made of entries. */
     uint64_t file_bytes, file_hash;
 
     /* As in ebpo_catalogue_options. */
@@ -201,7 +206,7 @@ EBPO_API const ebpo_catalogue_entry *ebpo_catalogue_get_entry(const ebpo_catalog
 
 /*
  * Open models of any number of catalogues. The first query that needs a model opens it. If memory
- * is needed, the least recently queried model is closed. Threads share it.
+ * is needed, the least recently queried model is closed. Threads may share this object.
  */
 typedef struct ebpo_catalogue_models ebpo_catalogue_models;
 
@@ -214,7 +219,7 @@ typedef struct ebpo_catalogue_models_options {
      */
     uint64_t memory;
 
-    /* For opening a model. 0: all cores. */
+    /* Number of threads for opening a model. 0: all cores. */
     unsigned threads;
 
     uint8_t reserved[4];
@@ -238,7 +243,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_models_new(
 EBPO_API void ebpo_catalogue_models_free(ebpo_catalogue_models *models);
 
 /*
- * Sets another budget, from the next query on; idle models are closed when memory is needed.
+ * Sets another memory limit, from the next query on. Idle models are closed when memory is needed.
  *
  * Threads: any.
  */
@@ -254,7 +259,7 @@ EBPO_API void ebpo_catalogue_models_close_idle(ebpo_catalogue_models *models);
 typedef struct ebpo_catalogue_models_stats {
     size_t struct_size;
 
-    /* Models opened and closed since the beginning; models open now. */
+    /* Number of models opened and closed since the beginning, and of models open now. */
     uint64_t opened, closed, open;
 } ebpo_catalogue_models_stats;
 
@@ -263,8 +268,8 @@ typedef struct ebpo_catalogue_models_stats {
 /*
  * Gets statistics.
  *
- * sums   over all models, including closed ones; but `memory` is the current use, and `budget` is
- *        the total budget. May be NULL
+ * sums   sums over all models, including closed ones; but `memory` is the current use, and `budget`
+ *        is the total budget. May be NULL
  *
  * Threads: any.
  */
@@ -275,19 +280,19 @@ EBPO_API ebpo_status ebpo_catalogue_models_get_stats(ebpo_catalogue_models *mode
 /* ---- queries ---- */
 
 /*
- * Points and rays are as in query.h; others are EBPO_E_ARGUMENT with their index. Points are
- * processed along a curve, so that models and subtrees are opened few times. On failure the results
- * are unspecified. Errors are those of opening and querying models. EBPO_E_LIMIT: the budget is too
- * small for a model's share.
+ * Points and rays are as in query.h; for other values queries return EBPO_E_ARGUMENT with the
+ * index. Points are processed along a curve, so that models and subtrees are opened few times. On
+ * failure the results are unspecified. Errors are those of opening and querying models.
+ * EBPO_E_LIMIT: the budget is too small for a model's share.
  *
- * A query waits while others use the budget: a callback of a query, such as the one that opens
- * files, must not query the same models.
+ * A query waits while other queries use the budget. Therefore a callback of a query, such as the
+ * one that opens files, must not query the same ebpo_catalogue_models.
  */
 
 typedef struct ebpo_catalogue_query_options {
     size_t struct_size;
 
-    /* Completed points or rays, in any order. */
+    /* Counts completed points or rays, in any order. */
     ebpo_progress progress;
 
     /* Distances: as in ebpo_distance_options. */
@@ -319,8 +324,8 @@ typedef struct ebpo_catalogue_query_options {
 
 /*
  * Classifies points[count][3] into out[count]. The winding number is the sum over the models; a
- * model with the point on a face adds 0. A point is inside if it is inside any model, else on a
- * face if it is on any.
+ * model with the point on a face adds 0. A point is inside if it is inside any model; else it is on
+ * a face if it is on a face of any model.
  *
  * For parts the result is exactly that of the whole model, also on caps: the rule is applied to the
  * sum. EBPO_E_LIMIT: 64 rays from a point on a cap all hit edges. EBPO_E_ABSENT: a point is on a
@@ -337,9 +342,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_inside(
 
 /*
  * Finds the nearest face of any model within max_distance, for points[count][3]. Of several models
- * at the same rounded distance, returns the first. Distances are negative inside
- * (ebpo_catalogue_inside) if all models are solids. `lo` and `hi` both are the unsigned distance,
- * or 0 without a result.
+ * at the same rounded distance, the first is used. If all models are solids, distances of points
+ * inside (ebpo_catalogue_inside) are negative. `lo` and `hi` are both the unsigned distance, or 0
+ * without a result.
  *
  * model   [count] index of the entry; EBPO_CATALOGUE_NO_MODEL: no such face
  *
@@ -354,7 +359,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_catalogue_distance(
 
 /*
  * Finds the first face of any model hit by each of rays[count]. Of several models at the same
- * rounded t, returns the first. If t is INFINITY for several, a longer direction decides
+ * rounded t, the first is used. If t is INFINITY for several, a longer direction decides
  * (ebpo_ray_hit).
  *
  * model   as for ebpo_catalogue_distance

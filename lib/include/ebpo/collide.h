@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * Detects collisions of two models, and self-intersections of one.
  *
- *   Two models            ebpo_collider_new, one for each thread
+ *   Two models            ebpo_collider_new (one collider for each thread)
  *   Any contact           ebpo_collide_first
  *   Relation              ebpo_collide_relation
  *   All pairs of faces    ebpo_collide_all, ebpo_collide_self
@@ -14,10 +14,10 @@
  *   One mesh              ebpo_mesh_crossings
  *
  * Decisions are exact on posed coordinates (pose.h). Results do not depend on the order of the
- * models or on the machine. They do not depend on budgets either, with two exceptions: the pair of
- * intersecting faces of ebpo_collide_first and ebpo_collide_distance, and distances within a
- * tolerance. Every query supports models that are loaded in parts (query.h: a budget, a cut level).
- * docs/develop/collision.md explains the kinds of pairs.
+ * models or on the machine. Results do not depend on budgets either, with two exceptions: the pair
+ * of intersecting faces that ebpo_collide_first and ebpo_collide_distance return, and distances
+ * within a tolerance. Every query supports models that are loaded in parts, because of a budget or
+ * a cut level (query.h). docs/develop/collision.md explains the kinds of pairs.
  */
 #ifndef EBPO_COLLIDE_H
 #define EBPO_COLLIDE_H
@@ -35,12 +35,15 @@ extern "C" {
 typedef struct ebpo_collider_options {
     size_t struct_size;
 
-    /* For all pairs. 0: all cores. Other queries use the calling thread. */
+    /*
+     * Number of threads for queries of all pairs of faces. 0: all cores. Other queries use the
+     * calling thread.
+     */
     unsigned threads;
 
     /*
-     * Bytes for pairs that wait for sorting, besides the models' budgets. 0: 64 MiB. If all pairs
-     * need more, the models are traversed several times.
+     * Memory in bytes for pairs before sorting, besides the models' budgets. 0: 64 MiB. If all
+     * pairs need more, the models are traversed several times.
      */
     uint64_t memory;
 } ebpo_collider_options;
@@ -50,7 +53,7 @@ typedef struct ebpo_collider_options {
         sizeof(ebpo_collider_options), 0, 0 \
     }
 
-/* Two models (or one, twice) and scratch memory, for queries of one thread. */
+/* Two models (or the same model twice) and scratch memory, for queries of one thread. */
 typedef struct ebpo_collider ebpo_collider;
 
 /*
@@ -74,28 +77,28 @@ EBPO_API void ebpo_collider_free(ebpo_collider *collider);
 /*
  * Checks that a model can be queried at a pose.
  *
- * EBPO_E_ARGUMENT: the matrix is not a rotation; the message gives the deviation of its columns
- * from length 1 or from right angles (2^-20 is allowed), or reports a mirror. Also a value that is
- * not finite, or a scale or posed model out of range.
+ * EBPO_E_ARGUMENT: the matrix is not a rotation, a value is not finite, or the scale or the posed
+ * model is out of range. For a matrix, the message gives the difference of its columns from length
+ * 1 or from right angles (2^-20 is allowed), or reports a mirror image.
  *
  * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_pose_check(const ebpo_model *model, const ebpo_pose *pose,
                                                    ebpo_error *error);
 
-/* Options of all queries. NULL: both models as in their files, no deadline. */
+/* Options of all queries. NULL: no poses (both models as in their files), and no deadline. */
 typedef struct ebpo_collide_options {
     size_t struct_size;
 
-    /* Valid for ebpo_pose_check. */
+    /* Poses of both models; they must pass ebpo_pose_check. */
     ebpo_pose pose_a, pose_b;
 
-    /* Stops after about this many nanoseconds. 0: no deadline. */
+    /* The query stops after about this many nanoseconds. 0: no deadline. */
     uint64_t deadline_ns;
 
     ebpo_progress progress;
 
-    /* For ebpo_collide_levels: uses only levels 0 to `level`. -1: all in memory. */
+    /* For ebpo_collide_levels, which uses only levels 0 to `level`. -1: all levels in memory. */
     int32_t level;
 
     int32_t reserved;
@@ -112,19 +115,21 @@ typedef struct ebpo_collide_options {
 typedef struct ebpo_face_pair {
     uint64_t face_a, face_b, file_face_a, file_face_b;
 
-    /* ebpo_pair_kind; EBPO_PAIR_APART if none was found, or for a nearest pair. */
+    /* ebpo_pair_kind; EBPO_PAIR_APART if no pair was found, or for a nearest pair. */
     int32_t kind;
 
     int32_t reserved;
 } ebpo_face_pair;
 
 /*
- * Finds a pair of intersecting faces. It is the same for the same files and poses on every machine,
- * but not the lowest in any order. For models in parts (a budget, a cut level) it also depends on
- * the parts, because few of them are loaded; the first pair of ebpo_collide_all does not. *found: 1
- * yes, 0 none, -1 undecided at the deadline. A solid inside another is not a contact.
+ * Finds a pair of intersecting faces. *found: 1: a pair was found; 0: no faces intersect; -1:
+ * undecided at the deadline. A solid inside another is not a contact.
  *
- * EBPO_E_ARGUMENT: a pose (ebpo_pose_check). EBPO_E_LIMIT, and the errors of reading.
+ * For the same files and poses, the pair is the same on every machine, but it is not the first pair
+ * of ebpo_collide_all. For models in parts (a budget, a cut level) it also depends on the parts,
+ * because few of them are loaded.
+ *
+ * EBPO_E_ARGUMENT: a pose is not valid (ebpo_pose_check). EBPO_E_LIMIT, and the errors of reading.
  *
  * Threads: one per collider.
  */
@@ -137,16 +142,16 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_first(ebpo_collider *collider,
 
 /*
  * Relation of two point sets at their poses. The set of a solid is the closure of the points that
- * its rule puts inside; the set of a surface is its faces. Faces without area are ignored. The
- * first relation that is true applies:
+ * are inside by its rule. The set of a surface is its faces. Faces without area are ignored. The
+ * first relation of this list that is true applies.
  */
 typedef enum ebpo_relation {
     EBPO_DISJOINT = 0,     /* no common point */
     EBPO_TOUCHING = 1,     /* a common point, but none in the interior of both */
-    EBPO_INTERSECTING = 2, /* common interior points, and none of the following: */
-    EBPO_A_INSIDE_B = 3,   /* B is a solid and contains all points of A; they are not equal */
+    EBPO_INTERSECTING = 2, /* common interior points, and none of the following relations */
+    EBPO_A_INSIDE_B = 3,   /* B is a solid and contains all points of A; the sets are not equal */
     EBPO_B_INSIDE_A = 4,   /* the reverse */
-    EBPO_EQUAL = 5,        /* the same points, not empty */
+    EBPO_EQUAL = 5,        /* the same points; the sets are not empty */
     EBPO_RELATION_OPEN = 6 /* undecided at the deadline */
 } ebpo_relation;
 
@@ -155,23 +160,23 @@ typedef struct ebpo_relation_result {
     int32_t relation;
 
     /*
-     * True if faces intersect, as in ebpo_collide_first: 1 yes, 0 no, -1 unknown. A solid inside
-     * another may touch it from inside.
+     * Intersecting faces, as in ebpo_collide_first: 1: some intersect; 0: none; -1: unknown. A
+     * solid inside another may touch the other from inside.
      */
     int32_t contact;
 } ebpo_relation_result;
 
 /*
- * Computes the exact relation of the models. A pair of crossing faces usually decides, and one face
- * of each shell without contacts. If models only touch, every face in contact is tested.
+ * Computes the exact relation of the models. Usually one pair of crossing faces decides; without
+ * contacts, one face of each shell decides. If models only touch, every face in contact is tested.
  *
  * Memory: a model entirely in memory takes 4 bytes per face in the collider, and about 60 during
- * the call. A model in parts takes half a byte per face, and about 60 per face of a subtree. Then
- * subtrees with faces in contact are loaded, and of other faces those that may be on a side of the
- * other model where none has been found.
+ * the call. A model in parts takes half a byte per face, and about 60 per face of a subtree.
+ * Subtrees of a model in parts are loaded if they have faces in contact, or faces that may be on a
+ * side of the other model on which no face has been found yet.
  *
- * Errors are those of ebpo_collide_first; after the deadline it succeeds. EBPO_E_ABSENT: as for
- * ebpo_inside.
+ * Errors are those of ebpo_collide_first; after the deadline the call succeeds. EBPO_E_ABSENT: as
+ * for ebpo_inside.
  *
  * Threads: one per collider.
  */
@@ -186,13 +191,14 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_relation(ebpo_collider *collider
 typedef bool (*ebpo_pairs_fn)(void *user, const ebpo_face_pair *pairs, uint64_t count);
 
 /*
- * Finds every pair of intersecting faces once. They are sorted by their positions in the files:
- * first those of the first model (with the lower content_sha256, then the lower pose bit by bit),
- * then those of the other. Models in parts give the same. Subtrees whose envelopes may intersect
- * are loaded, each about once if `memory` holds all pairs and the budgets about a hundred subtrees.
+ * Finds every pair of intersecting faces once. Pairs are sorted by the index in the file of the
+ * first model, then by that of the other model. The first model is the one with the lower
+ * content_sha256; if these are equal, the one with the lower pose, compared bit by bit. Models in
+ * parts give the same pairs in the same order. Subtrees whose envelopes may intersect are loaded;
+ * each about once if `memory` holds all pairs and the budgets hold about a hundred subtrees.
  *
- * EBPO_E_CANCELLED: also at the deadline; the pairs passed so far are the first ones. Other errors
- * are those of ebpo_collide_first.
+ * EBPO_E_CANCELLED: also at the deadline. The pairs passed so far are then the first ones. Other
+ * errors are those of ebpo_collide_first.
  *
  * Threads: one per collider.
  */
@@ -202,10 +208,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_all(ebpo_collider *collider,
                                                     ebpo_error *error);
 
 /*
- * Finds the self-intersections of one model, as it is in its file: pairs of faces that intersect
- * other than as neighbours, face_a before face_b in the file. Common points of two faces at equal
- * corners, or along the edge between two equal corners, do not count. EBPO_PAIR_COPLANAR counts (a
- * fold, or a repeated face). The collider must contain one model, twice.
+ * Finds the self-intersections of one model without a pose: pairs of faces that intersect other
+ * than as neighbours; face_a is before face_b in the file. Common points of two faces at equal
+ * corners, or along the edge between two equal corners, do not count. EBPO_PAIR_COPLANAR counts,
+ * for example a fold or a repeated face. The collider must contain one model, twice.
  *
  * EBPO_E_ARGUMENT: two different models. Other errors are those of ebpo_collide_all.
  *
@@ -219,17 +225,18 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_self(ebpo_collider *collider,
 /* ---- intersection lines ---- */
 
 /*
- * Intersection of two crossing faces, from point[0] to point[1] in the direction of A's normal x
- * B's normal. The error of coordinates is at most 0.51 units in the last place, and 2^-60 of the
- * greatest coordinate of the edge that ends there. Indices of faces as in ebpo_distance_result.
+ * Intersection of two crossing faces, from point[0] to point[1] in the direction of the cross
+ * product of A's normal and B's normal. The error of a coordinate is at most 0.51 units in the last
+ * place plus 2^-60 of the greatest coordinate of the edge on which the point is. Indices of faces
+ * as in ebpo_distance_result.
  */
 typedef struct ebpo_contact_segment {
     double point[2][3];
     uint64_t face_a, face_b;
 
     /*
-     * Location of the ends: 0 to 2: that corner; 3 to 5: edge from corner k - 3 to the next; 6:
-     * interior.
+     * Location of both ends on the faces: 0 to 2: this corner; 3 to 5: the edge from corner k - 3
+     * to the next; 6: interior.
      */
     uint8_t on_a[2], on_b[2];
 
@@ -240,9 +247,10 @@ typedef struct ebpo_contact_segment {
 typedef bool (*ebpo_segments_fn)(void *user, const ebpo_contact_segment *segments, uint64_t count);
 
 /*
- * Computes the segments of the EBPO_PAIR_CROSSING pairs of ebpo_collide_all, in that order. Swapped
- * models give the same segments with exchanged ends. A model entirely in memory takes 4 bytes per
- * face more in the collider; the faces of a model in parts are read once more, by chunks.
+ * Computes the segments of the EBPO_PAIR_CROSSING pairs of ebpo_collide_all, in that order. With
+ * models A and B swapped, segments are the same with exchanged ends. For a model entirely in memory
+ * the collider takes 4 more bytes per face. The faces of a model in parts are read once more, by
+ * chunks.
  *
  * Errors are those of ebpo_collide_all.
  *
@@ -267,11 +275,12 @@ typedef struct ebpo_polyline {
 typedef bool (*ebpo_polylines_fn)(void *user, const ebpo_polyline *line);
 
 /*
- * Joins the segments of ebpo_collide_contacts to lines, each in one line. Segments are joined where
- * exactly one ends and one begins at the same corners, edges or faces of both models. Corners with
- * equal coordinates in the model are the same; other points that are equal by chance are not
- * joined. Lines are sorted by their first segment, with which closed lines begin. Swapped models
- * give lines in reverse direction.
+ * Joins the segments of ebpo_collide_contacts to lines. Each segment is in one line. Two segments
+ * are joined where one ends and the other begins at the same corner, edge or face of both models,
+ * and no third segment does. Corners of a model with equal coordinates count as the same corner;
+ * other points that are equal by chance are not joined. Lines are sorted by their first segments; a
+ * closed line begins with its first segment in the order of ebpo_collide_contacts. With models A
+ * and B swapped, lines have the reverse direction.
  *
  * EBPO_E_LIMIT: `memory` does not hold 256 bytes per segment. Other errors are those of
  * ebpo_collide_all.
@@ -287,18 +296,19 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_polylines(ebpo_collider *collide
 
 typedef enum ebpo_pairs_format {
     /*
-     * All pairs and segments in the order of ebpo_collide_all, for HDF5 from 1.8 on:
+     * All pairs and segments in the order of ebpo_collide_all, as HDF5 that version 1.8 and later
+     * can read:
      *   /pairs/faces       int64 [n][2]  of A and of B, as in ebpo_distance_result
      *   /pairs/file_faces  int64 [n][2]  in the files
      *   /pairs/kind        uint8 [n]     ebpo_pair_kind
-     *   /contacts/points   double [m][6] of crossing pairs: both ends of the segment
+     *   /contacts/points   double [m][6] for crossing pairs: both ends of the segment
      *   /contacts/faces    int64 [m][2]  as /pairs/faces
      *   /contacts/on       uint8 [m][4]  on_a and on_b of the first end, then of the second
      */
     EBPO_PAIRS_HDF5 = 0,
 
     /*
-     * Both meshes at their poses, A first, in the order of the files. Faces that intersect the
+     * PLY: both meshes at their poses, A first, in the order of the files. Faces that intersect the
      * other model are red (255, 0, 0), others grey. The mesh of a model entirely in memory is read
      * once more, outside all budgets.
      */
@@ -306,9 +316,9 @@ typedef enum ebpo_pairs_format {
 } ebpo_pairs_format;
 
 /*
- * Writes a file, which is replaced atomically.
+ * Writes all pairs to a file, which is replaced atomically.
  *
- * EBPO_E_IO: it cannot be written. EBPO_E_LIMIT: also too many vertices for a PLY file. Other
+ * EBPO_E_IO: the file cannot be written. EBPO_E_LIMIT: also too many vertices for a PLY file. Other
  * errors are those of ebpo_collide_all.
  *
  * Threads: one per collider.
@@ -324,14 +334,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_write(ebpo_collider *collider,
 typedef enum ebpo_value_kind {
     EBPO_VALUE_EXACT = 0,    /* lo = hi: the double nearest to the true value */
     EBPO_VALUE_INTERVAL = 1, /* the true value is certainly in lo .. hi, both approximated */
-    EBPO_VALUE_BOUND = 2     /* certainly in lo .. hi, but one of them is only 0 or INFINITY */
+    EBPO_VALUE_BOUND = 2     /* in lo .. hi, but lo is only 0 or hi only INFINITY */
 } ebpo_value_kind;
 
+/* A value with certain bounds. */
 typedef struct ebpo_certain {
     double lo, hi;
 
     /* ebpo_value_kind */
-    int32_t metric;
+    int32_t kind;
 
     int32_t reserved;
 } ebpo_certain;
@@ -342,13 +353,13 @@ typedef struct ebpo_clearance_options {
     /* Allowed hi - lo of the result, in the world's unit; 0: exact. */
     double tolerance;
 
-    /* Only decides if the distance is at least this value. Less than 0: not requested. */
+    /* If 0 or more: only decide if the distance is at least this value. */
     double at_least;
 
     /*
-     * Starts with the last pair of this collider, which is faster if poses change little. Exact
-     * distances and decisions do not depend on it; lo and hi of intervals, and the reported pair of
-     * intersecting faces, may.
+     * True: starts with the last pair of this collider, which is faster if poses change little.
+     * Exact distances and decisions do not depend on it. The bounds of intervals, and the reported
+     * pair of intersecting faces, may depend on it.
      */
     bool warm;
 
@@ -362,37 +373,46 @@ typedef struct ebpo_clearance_options {
 
 typedef struct ebpo_clearance {
     /*
-     * Distance of the faces, in the world's unit: 0 if any intersect, not negative inside a solid.
+     * Distance of the faces, in the world's unit. 0 if any faces intersect; never negative, also
+     * inside a solid.
      */
     ebpo_certain distance;
 
-    /* 1 or 0, decided exactly; -1: not requested, or undecided. */
+    /*
+     * 1: the distance is at least `at_least` of the options; 0: it is less; both are exact. -1: not
+     * requested, or undecided.
+     */
     int32_t at_least;
 
     int32_t reserved;
 
     /*
-     * Faces at `distance` (with a tolerance, at hi or less); of equal distances the first in the
-     * order of ebpo_collide_all. If faces intersect, such a pair. EBPO_NO_FACE: none was found.
+     * Pair of faces at this distance (with a tolerance, at distance.hi or less); of several pairs,
+     * the first in the order of ebpo_collide_all. If faces intersect: a pair of intersecting faces.
+     * EBPO_NO_FACE: none was found.
      */
     ebpo_face_pair pair;
 
-    /* Their nearest points, approximated in doubles; a common point if they intersect. */
+    /*
+     * Nearest points of the two faces, approximated in doubles; a common point if the faces
+     * intersect.
+     */
     double point_a[3], point_b[3];
 } ebpo_clearance;
 
 /*
  * Computes the minimum distance between the faces of A and B; INFINITY if a model has no faces. For
- * a solid inside another it is the distance of their surfaces. With `at_least` the search ends when
- * this is decided. 1: the distance is in at_least .. INFINITY, without a pair; 0: the returned pair
- * is nearer. After the deadline `distance` is the bounds known so far.
+ * a solid inside another, the result is the distance of their surfaces. With `at_least` the search
+ * ends when this is decided. If the result is 1, `distance` is at_least .. INFINITY, without a
+ * pair. If it is 0, the returned pair is nearer. After the deadline, `distance` has the bounds
+ * known so far.
  *
  * For models in parts, subtrees whose envelopes are not farther apart than the best result are
  * loaded, nearest first. Exact distances and their pairs do not depend on the parts. Bounds of
- * intervals and the reported pair of intersecting faces do.
+ * intervals, and the reported pair of intersecting faces, do.
  *
- * EBPO_E_ARGUMENT: also a tolerance below 0 or infinite, or at_least is NAN. Other errors are those
- * of ebpo_collide_first.
+ * EBPO_E_ARGUMENT: also if the tolerance is below 0 or infinite, or at_least is NAN. Other errors
+ * are those of ebpo_collide_first.
  *
  * Threads: one per collider.
  */
@@ -403,17 +423,17 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_distance(ebpo_collider *collider
 
 /*
  * Computes the depth of A's surface in the solid B: the maximum distance to B's nearest face over
- * the points of A's faces that are in B; and vice versa. 0: no such point. The result is an
- * interval, because the deepest point need not be a corner. hi - lo is at most `tolerance` plus the
- * rounding of posed points (2^-40 of the coordinates, more for matrices that are not exact
- * rotations), unless the deadline ends it. The depth is not the minimum motion that separates the
- * models.
+ * the points of A's faces that are in B. Also computes the depth of B's surface in A. 0: there is
+ * no such point. The result is an interval, because the deepest point need not be a corner. hi - lo
+ * is at most `tolerance` plus the rounding of posed points (2^-40 of the coordinates, more for
+ * matrices that are not exact rotations), unless the deadline ends the search. The depth is not the
+ * minimum motion that separates the models.
  *
  * tolerance        greater than 0, in the world's unit; a smaller one takes longer
  * a_in_b, b_in_a   NULL: not requested
  *
- * EBPO_E_NOT_SOLID: the containing model is a surface. EBPO_E_ARGUMENT: also the tolerance.
- * Candidates use memory outside the budgets. Other errors are those of ebpo_collide_first.
+ * EBPO_E_NOT_SOLID: the containing model is a surface. EBPO_E_ARGUMENT: also for the tolerance.
+ * Other errors are those of ebpo_collide_first. The search uses memory outside the budgets.
  *
  * Threads: one per collider.
  */
@@ -425,12 +445,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_collide_depth(ebpo_collider *collider,
 /* ---- separation distance along a direction ---- */
 
 typedef struct ebpo_separation {
-    /* Exact: the nearest double; after the deadline an interval or a bound. */
+    /*
+     * The separation distance. EBPO_VALUE_EXACT: the nearest double; after the deadline an interval
+     * or a bound.
+     */
     ebpo_certain t;
 
     /*
-     * The faces that separate last; of several, the first in the order of ebpo_collide_all.
-     * EBPO_NO_FACE: none was found.
+     * Pair of faces that separate last; of several pairs, the first in the order of
+     * ebpo_collide_all. EBPO_NO_FACE: none was found.
      */
     ebpo_face_pair pair;
 } ebpo_separation;
@@ -438,16 +461,17 @@ typedef struct ebpo_separation {
 /*
  * Computes the separation distance of A from B along a direction: the least t >= 0 so that A, moved
  * by any t' * direction with t' > t, has no point in common with B (for solids, also no interior
- * point). Moved by t, they touch in the returned pair. Without a pair (t is 0) they intersect
- * neither now nor during the motion. Posed coordinates are moved without rounding. t is not the
- * first separation, because later contacts count.
+ * point). With A moved by t, the models touch in the returned pair. Without a pair (t is 0), the
+ * models intersect neither at their poses nor during the motion. Posed coordinates are moved
+ * without rounding. The models may also be apart for a smaller t, and have contacts again later; t
+ * is the last contact.
  *
  * For models in parts, subtrees whose envelopes separate later than the best result are loaded.
  *
- * direction   any length, which is the unit of t; its 1-norm within 2^-500 .. 2^500
+ * direction   of any length, which is the unit of t; its 1-norm must be within 2^-500 .. 2^500
  *
- * EBPO_E_ARGUMENT: also the direction. Other errors are those of ebpo_collide_first; after the
- * deadline it succeeds.
+ * EBPO_E_ARGUMENT: also for the direction. Other errors are those of ebpo_collide_first; after the
+ * deadline the call succeeds.
  *
  * Threads: one per collider.
  */
@@ -471,18 +495,18 @@ typedef struct ebpo_level_result {
     /* Number of pairs of nodes that may have intersecting faces. */
     uint64_t open_pairs;
 
-    /* Levels of A and of B that were used; for models in parts not below the cut level. */
+    /* Deepest levels of A and of B that were used; for models in parts, at most the cut level. */
     int32_t level_a, level_b;
 } ebpo_level_result;
 
 /*
- * Computes certain results from levels alone, without faces. Separate envelopes bound the distance
- * from below, nodes with faces from above. Solids intersect if a cell inside one contains a point
- * of the other. Reads no data; works for models with only a few levels in memory (a cut level). It
- * stops at the deadline, or when pairs of nodes need more than the collider's memory, with the
- * results known so far.
+ * Computes certain results from levels alone, without faces. Envelopes bound the distance from
+ * below; nodes with faces bound it from above. Solids intersect if a cell inside one contains a
+ * point of the other. Reads no data; works for models with only a few levels in memory (a cut
+ * level). The search stops at the deadline, or when pairs of nodes need more than the collider's
+ * memory, with the results known so far.
  *
- * EBPO_E_ARGUMENT: a pose (ebpo_pose_check).
+ * EBPO_E_ARGUMENT: a pose is not valid (ebpo_pose_check).
  *
  * Threads: one per collider.
  */
@@ -545,18 +569,18 @@ typedef struct ebpo_crossings_summary {
 #define EBPO_CROSSINGS_SUMMARY_INIT EBPO_SIZED(ebpo_crossings_summary)
 
 /*
- * Finds the self-intersections of a mesh as ebpo_collide_self does, without a file of the caller.
- * Each pair is reported once, in an order that depends only on the mesh. Coordinates are compared
- * exactly, so unwelded meshes give the same result. Memory is limited by the mesh's workspace
- * (none: the default of ebpo_workspace_new), which also holds a temporary file of about 20 bytes
- * per face. The mesh is empty afterwards, also on failure.
+ * Finds the self-intersections of a mesh as ebpo_collide_self does for a model, without an .ebpo.h5
+ * file. Each pair is reported once, in an order that depends only on the mesh. Coordinates are
+ * compared exactly, so unwelded meshes give the same result. Memory is limited by the mesh's
+ * workspace (if NULL, by one with default options), which also holds a temporary file of about 20
+ * bytes per face. The mesh is empty afterwards, also on failure.
  *
  * report   from ebpo_mesh_check or ebpo_mesh_prepare
  * take     NULL: only the summary
  * out      may be NULL
  *
  * EBPO_E_LIMIT: coordinates are too large for an exact grid, as for ebpo_build, or too little
- * memory. EBPO_E_IO: no space in the workspace, or `ply` cannot be written. EBPO_E_FORMAT: as
+ * memory. EBPO_E_IO: no space in the workspace, or `ply` cannot be written. EBPO_E_FORMAT: as for
  * ebpo_build.
  *
  * Threads: one per mesh.
@@ -569,12 +593,16 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_crossings(
 typedef struct ebpo_collider_stats {
     size_t struct_size;
 
-    /* Tested pairs of nodes and of blocks of faces; pairs of faces that needed the exact test. */
+    /*
+     * Number of tested pairs of nodes, of tested pairs of blocks (of up to eight faces), and of
+     * pairs of faces that needed the exact test.
+     */
     uint64_t node_pairs, block_pairs, exact;
 
     /*
-     * For models in parts: pairs of subtrees with near envelopes, number of these subtrees, number
-     * of loads, and bytes read from the files during that time, also by others.
+     * For models in parts: number of pairs of subtrees with near envelopes, of subtrees in these
+     * pairs, of loads, and of bytes read from the files during the queries, including reads by
+     * others.
      */
     uint64_t subtree_pairs, subtrees, loads, bytes_read;
 } ebpo_collider_stats;

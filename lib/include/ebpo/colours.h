@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * Returns the colours of vertices and faces.
+ * Gets the colours of vertices and faces of a mesh.
  */
 #ifndef EBPO_COLOURS_H
 #define EBPO_COLOURS_H
@@ -18,15 +18,17 @@ typedef struct ebpo_colours {
     /* [face_count][4]; NULL: faces have no colours. */
     uint8_t *face;
 
-    /* 1: prefer the colours of faces, because vertices have none or all have the same */
+    /*
+     * 1: prefer the colours of faces, because vertices have no colours or all have the same colour
+     */
     uint64_t by_face;
 } ebpo_colours;
 
 /*
  * Gets the colours from a mesh's attributes: properties red, green, blue and, if present, alpha,
- * else diffuse_red, diffuse_green and diffuse_blue. uint16 is scaled from 65,535 and floats from 1;
- * other integers count from 0 to 255. Values out of range are clamped; NaN is 0. A mesh without
- * attributes has no colours.
+ * else diffuse_red, diffuse_green and diffuse_blue. Values are scaled to 0 .. 255: for uint16 the
+ * maximum is 65,535, for floats 1, for other integers 255. Values out of range are clamped; NaN
+ * becomes 0. A mesh without attributes has no colours.
  *
  * On failure `out` is cleared.
  *

@@ -5,7 +5,7 @@
  *   workspace.h   memory limits
  *   memory.h      available memory
  *   mesh.h        triangle meshes: reading, checking, repairing
- *   findings.h      locations of the findings of a mesh check
+ *   findings.h    locations of the findings of a mesh check
  *   repair.h      trying repairs that make a mesh solid
  *   groups.h      named groups of faces
  *   rows.h        rows of numbers from any HDF5 file
@@ -24,7 +24,7 @@
  *   export.h      levels and the mesh in other programs' formats
  *   subset.h      a smaller file from a file
  *   verify.h      verifying the guarantees of a file
- *   error_bound.h   error bound of a level
+ *   error_bound.h error bound of a level
  *   limit.h       least possible volume of convex envelopes
  *
  * Extras: headers of functions that are built on queries. They are installed unless the library was
@@ -34,7 +34,7 @@
  *   collide.h     collision of two models
  *   scene.h       animated rigid instances of models
  *   map.h         maps of distance: planes, grids, two scans
- *   haptic.h       haptic rendering at a steady rate
+ *   haptic.h      haptic rendering at a steady rate
  *   paint.h       colours and notes on a model, in a separate file
  */
 #ifndef EBPO_EBPO_H

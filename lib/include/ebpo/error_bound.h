@@ -14,20 +14,20 @@ typedef struct ebpo_error_bound_options {
     size_t struct_size;
 
     /*
-     * Bounds are refined until hi <= (1 + tolerance) lo, or until no relevant node may compute more
-     * distances (see below). Above 0.
+     * Bounds are refined until hi <= (1 + tolerance) lo, or until the relevant nodes have reached
+     * their limits of distances (ebpo_level_error_bound). Above 0.
      */
     double tolerance;
 
-    /* Points on the level's polygons, for mean and rms. 0: none. */
+    /* Number of points on the level's polygons, for `mean` and `rms`. 0: none. */
     uint64_t samples;
 
-    /* For the samples: equal seeds give equal points. */
+    /* Seed for the sample points: equal seeds give equal points. */
     uint64_t seed;
 
     /*
-     * Refining stops after about this many distances, with the bounds known so far. Two for each
-     * node are always computed. 0: up to 65,536 for each node.
+     * Refining stops after about this many distances, with the bounds known so far. Two distances
+     * for each node are always computed. 0: at most 65,536 for each node.
      */
     uint64_t queries;
 
@@ -36,9 +36,9 @@ typedef struct ebpo_error_bound_options {
     ebpo_progress progress;
 
     /*
-     * `hi` of a coarser level of the same file, if known. Envelopes are nested, so it also bounds
-     * this level. 0: unknown; a level that reaches its limit of distances before the tolerance then
-     * also computes the coarser levels, each with as many distances.
+     * `hi` of a coarser level of the same file, if known. Envelopes are nested, so this value also
+     * bounds this level. 0: unknown. If the limit of distances is reached before the tolerance, the
+     * coarser levels are then also computed, each with as many distances.
      */
     double at_most;
 } ebpo_error_bound_options;
@@ -61,13 +61,16 @@ typedef struct ebpo_error_bound {
     /* Point of an envelope, about lo away from the model; zeros if lo is 0. */
     double place[3];
 
-    /* Mean distance of the level's surface, weighted by area. NAN if no sample is on it. */
+    /*
+     * Mean and root mean square distance of the level's surface from the model, weighted by area.
+     * NAN if no sample is on the surface.
+     */
     double mean, rms;
 
     /* Number of samples on the level's surface. */
     uint64_t samples;
 
-    /* Number of distances for the bounds, including coarser levels. */
+    /* Number of distances computed for the bounds, including those for coarser levels. */
     uint64_t queries;
 } ebpo_error_bound;
 
@@ -80,21 +83,23 @@ typedef struct ebpo_error_bound {
  * envelope counts. The model is the closed solid with all its faces, so the distance is 0 inside;
  * for a surface, its faces.
  *
- * `hi` holds for the decoded half-spaces and includes all rounding. Its excess is therefore at
- * least about 1e-6 of a node's cell, or some ulp of the coordinates. The tolerance is not reached
- * for smaller error bounds, or if a node has computed 65,536 distances: the bounds are then wider,
- * and still certain.
+ * `hi` is a bound for the decoded half-spaces and includes all rounding errors. Therefore `hi`
+ * exceeds the true value by at least about 1e-6 of a node's cell, or a few ulp of the coordinates.
+ * The tolerance is not reached if the error bound is smaller than this excess, or if a node has
+ * reached its limit of 65,536 distances. The bounds are then wider, but still certain.
  *
- * The level's surface, for mean and rms, is the part of the envelopes' polygons that is in no other
- * envelope.
+ * The level's surface, for `mean` and `rms`, is the part of the envelopes' polygons that is in no
+ * other envelope.
  *
- * model    of the same file, with its mesh, or of the file of which `file` is a subset of any kind
- * memory   the model's entire tree and mesh besides `model`, and 80 bytes for each node of the
- *          level
+ * model    made of the same file, which has a mesh; or of the file of which `file` is a subset of
+ *          any kind
  *
- * EBPO_E_ABSENT: the model has no mesh, or is itself a subset. EBPO_E_ARGUMENT: invalid level; a
- * tolerance of 0; an at_most below 0; or `file` is not the model's file or a subset of it, by
- * digests, or else by sources and build options. The errors of reading.
+ * Memory: the entire tree and mesh of the model, besides `model`, and 80 bytes for each node of the
+ * level.
+ *
+ * EBPO_E_ABSENT: the model has no mesh, or is itself a subset. EBPO_E_ARGUMENT: the level is not
+ * valid, the tolerance is 0, at_most is below 0, or `file` is neither the model's file nor a subset
+ * of it. Digests are compared, or else sources and build options. The errors of reading.
  *
  * Threads: any.
  */

@@ -49,16 +49,16 @@ typedef struct ebpo_export_options {
     int first_level, last_level;
 
     /*
-     * Exports the mesh. XDMF and VTKHDF have it in the file's order with source indices; others in
-     * the source's order if the file has maps.
+     * True: exports the mesh. XDMF and VTKHDF contain it in the file's order, with source indices;
+     * other formats in the source's order if the file has maps.
      *
      * Colours (colours.h) are exported if present. XDMF and VTKHDF: arrays `rgba` of 4 bytes, for
      * vertices and faces. glTF: COLOR_0, linear, with alpha although the material is opaque. OBJ:
      * red, green and blue after a vertex, 0 to 1. STL has no colours; glTF and OBJ have none for
      * faces.
      *
-     * Levels likewise, if the file has their colours: each vertex has the colour of its node. In
-     * VTKHDF, items without colours are white.
+     * Colours of levels are exported in the same way if the file has them; each vertex has the
+     * colour of its node. In VTKHDF, items without colours are white.
      */
     bool mesh;
 
@@ -67,9 +67,9 @@ typedef struct ebpo_export_options {
     ebpo_progress progress;
 
     /*
-     * glTF and OBJ: colours for the mesh's vertices instead of its own, [vertex_count][4] red,
-     * green, blue and alpha in the order of ebpo_file_read_source_mesh; NULL: its own. Other
-     * formats: EBPO_E_ARGUMENT.
+     * glTF and OBJ: [vertex_count][4] colours for the mesh's vertices, as red, green, blue and
+     * alpha, in the order of ebpo_file_read_source_mesh. NULL: the mesh's own colours. With other
+     * formats, EBPO_E_ARGUMENT unless NULL.
      */
     const uint8_t *vertex_colours;
 } ebpo_export_options;
@@ -118,7 +118,8 @@ typedef struct ebpo_export_report {
 
 /*
  * Writes the name of the second file of `path` to `out`, of `space` bytes; "" if there is none.
- * Returns false if it does not fit, or if the format does not support this name (":" for XDMF).
+ * Returns false if the name does not fit, or if the format does not support it (XDMF: a name with
+ * ":").
  *
  * Threads: any.
  */
@@ -127,9 +128,10 @@ EBPO_API bool ebpo_export_second_file(ebpo_export_format format, const char *pat
 
 /*
  * Exports levels and the mesh to a file, which is replaced atomically. A second file is replaced
- * just before it, so it may be new if replacing the first one fails (EBPO_E_IO).
+ * just before the first one; if replacing the first one then fails (EBPO_E_IO), the second file is
+ * already new.
  *
- * XDMF and VTKHDF hold one level in memory at a time, other formats all of them.
+ * For XDMF and VTKHDF one level is in memory at a time, for other formats all levels.
  *
  * report   may be NULL
  *

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT
  * Reads and writes .ebpo.h5 files. format-spec/ describes the format byte by byte.
  *
- *   Contents   ebpo_level, ebpo_info, ebpo_tree: a whole model in memory
+ *   Contents   ebpo_tree (a whole model in memory), ebpo_level, ebpo_info
  *   Writing    ebpo_tree_write
- *   Sources    ebpo_source: bytes from any storage
+ *   Sources    ebpo_source (bytes from any storage)
  *   Opening    ebpo_open, ebpo_open_with, ebpo_open_memory, ebpo_open_source, ebpo_close
  *   Metadata   ebpo_file_info, ebpo_file_get_stats, ebpo_file_locate
  *   Reading    ebpo_file_read_level, ebpo_file_read_mesh, ebpo_file_read_tree ...
@@ -27,12 +27,15 @@ extern "C" {
 
 /* ---- contents of a file ---- */
 
-/* Type of a node, two bits in `types` of ebpo_level. The cell of a node is closed. */
+/* Type of a node: two bits in `types` of ebpo_level. The cell of a node includes its boundary. */
 typedef enum ebpo_node_type {
-    /* No face intersects the cell. In a solid, the cell is outside. */
+    /*
+     * No face intersects the cell. The cell is outside the solid (of a surface, there is no
+     * inside).
+     */
     EBPO_WHITE = 0,
 
-    /* No face intersects the cell, and the cell is inside. */
+    /* No face intersects the cell. The cell is inside the solid. */
     EBPO_BLACK = 1,
 
     /* The node lists its faces and has no children. */
@@ -65,25 +68,25 @@ typedef enum ebpo_codec {
     EBPO_CODEC_NONE = 2
 } ebpo_codec;
 
-/* Coding of the corners of faces (format-spec/README.md, section 7). */
+/* Coding of the vertex indices of faces (format-spec/README.md, section 7). */
 typedef enum ebpo_face_coding {
-    /* The coding of the source when copying (except for EBPO_CODEC_NONE); else `high-water`. */
+    /* When copying a file: its coding, except for EBPO_CODEC_NONE. Else EBPO_FACES_HIGH_WATER. */
     EBPO_FACES_DEFAULT = 0,
 
     /*
-     * Across edges of preceding faces: whole files are 7 to 11 % smaller, decoding takes longer
-     * (docs/develop/codings.md). Since format 1.1.
+     * Relative to edges of preceding faces. Whole files are 7 to 11 % smaller; decoding takes
+     * longer (docs/develop/codings.md). Since format 1.1.
      */
     EBPO_FACES_GATES = 1,
 
-    /* By index, as in format 1.0. */
+    /* As indices, as in format 1.0. */
     EBPO_FACES_HIGH_WATER = 2
 } ebpo_face_coding;
 
 /*
- * One level: all nodes in the order of their octcodes. The i-th gray node of a level has the i-th
- * group of eight children in the next level. An array is NULL if its count is 0 or the file does
- * not have its part.
+ * One level: all its nodes in the order of their octcodes. The eight children of the i-th gray node
+ * of a level are the i-th group of the next level. An array is NULL if its count is 0 or the file
+ * does not have its part.
  */
 typedef struct ebpo_level {
     /* Groups of eight siblings. Level 0 has one group, of which only octant 0 exists. */
@@ -94,7 +97,7 @@ typedef struct ebpo_level {
     /* [group_count] type of octant i in bits 2i, 2i + 1; octant: bit 0 x, bit 1 y, bit 2 z */
     uint16_t *types;
 
-    /* [gray_count] planes that the node adds to its parent's envelope */
+    /* [gray_count] number of planes that the node adds to its parent's envelope */
     uint8_t *plane_counts;
 
     /* [plane_count] codes (ebpo_plane_decode), in the order of the nodes */
@@ -103,30 +106,36 @@ typedef struct ebpo_level {
     uint64_t plane_count;
 
     /*
-     * [leaf_count] winding number at the leaf's lowest corner, shifted (see format-spec); solids
-     * only
+     * [leaf_count] winding number at the leaf's lowest corner, shifted (format-spec/README.md);
+     * solids only
      */
     int32_t *leaf_winding;
 
-    /* [black_count], NULL: all 1 */
+    /* [black_count] winding number of the cell. NULL: all 1 */
     int32_t *black_winding;
 
-    /* [white_count], NULL: all 0 */
+    /* [white_count] winding number of the cell. NULL: all 0 */
     int32_t *white_winding;
 
     /* [leaf_count] index of the leaf's first new face */
     uint64_t *leaf_first;
 
     /*
-     * [leaf_count] faces leaf_first .. leaf_first + leaf_new - 1 intersect this leaf and no earlier
-     * leaf
+     * [leaf_count] number of new faces: faces leaf_first .. leaf_first + leaf_new - 1 intersect
+     * this leaf and no earlier leaf
      */
     uint32_t *leaf_new;
 
-    /* [leaf_count] number of further faces, whose indices are below leaf_first */
+    /*
+     * [leaf_count] number of other faces that intersect this leaf; their indices are below
+     * leaf_first
+     */
     uint32_t *leaf_ref_count;
 
-    /* [ref_count] their indices, ascending within each leaf, in the order of the leaves */
+    /*
+     * [ref_count] indices of these other faces, in the order of the leaves, ascending within each
+     * leaf
+     */
     uint32_t *leaf_refs;
 
     uint64_t ref_count;
@@ -137,7 +146,7 @@ typedef struct ebpo_level {
     /* [leaf_count] number of planes of each leaf; part EBPO_PART_LEAF_PLANES */
     uint8_t *leaf_plane_counts;
 
-    /* [leaf_plane_count] codes */
+    /* [leaf_plane_count] codes, in the order of the leaves */
     uint32_t *leaf_planes;
 
     uint64_t leaf_plane_count;
@@ -146,18 +155,18 @@ typedef struct ebpo_level {
     double gray_volume;
 
     /*
-     * The same for its leaves: envelopes cut by stored planes, else inherited. Planes that readers
-     * derive cut off more.
+     * Volume of the envelopes of this level's leaves, cut by the stored planes of the leaves, else
+     * only by the planes of their ancestors. Planes that readers derive from faces cut off more.
      */
     double leaf_volume;
 
     /*
-     * Number of pruned gray nodes. Their groups in the next level are 0 and count as eight white
-     * nodes. On the last level all gray nodes are pruned and have no groups.
+     * Number of pruned gray nodes. The group of a pruned node in the next level is 0 and counts as
+     * eight white nodes. On the last level, all gray nodes are pruned and have no groups.
      */
     uint64_t pruned_count;
 
-    /* Owns all arrays; NULL: allocated with malloc. */
+    /* Owns all arrays. NULL: they were allocated with malloc. */
     ebpo_workspace *workspace;
 
     /*
@@ -176,25 +185,25 @@ EBPO_API void ebpo_level_free(ebpo_level *level);
 
 /*
  * Decodes the half-space of a plane code. Coordinates are those of the node's cell: xi = (p -
- * corner) / cell size on each axis, 0 to 1. The envelope keeps the points with 4096 * (n . xi) <=
- * d. All values are integers, |n0| + |n1| + |n2| = 511, and readers never round. Returns false for
- * invalid codes.
+ * corner) / cell size on each axis, 0 to 1. The half-space contains the points with 4096 * (n . xi)
+ * <= d. All values are integers, |n0| + |n1| + |n2| = 511, and readers never round. Returns false
+ * for invalid codes.
  *
  * Threads: any.
  */
 EBPO_API bool ebpo_plane_decode(uint32_t code, int32_t n[3], int32_t *d);
 
-/* Summary of a level, from the head of the file. */
+/* Summary of a level, from the header of the file. */
 typedef struct ebpo_level_summary {
     uint64_t gray_count, leaf_count, white_count, black_count;
     uint64_t plane_count, leaf_plane_count;
 
-    /* Faces first listed, and faces referenced again. */
+    /* Number of faces that leaves list first, and number of repeated references to faces. */
     uint64_t new_count, ref_count;
 
     double gray_volume, leaf_volume;
 
-    /* Gray nodes without children; white_count of the next level counts eight for each. */
+    /* Number of pruned gray nodes. For each, white_count of the next level includes eight. */
     uint64_t pruned_count;
 } ebpo_level_summary;
 
@@ -227,7 +236,7 @@ typedef struct ebpo_info {
     /* Deepest level for which the coordinates of cells are exact. */
     int grid_level;
 
-    /* Deepest level allowed in building. */
+    /* Deepest level that was allowed in building. */
     int max_level;
 
     /* Levels 0 .. level_count - 1 are present. */
@@ -239,13 +248,13 @@ typedef struct ebpo_info {
     /* ebpo_selection (build.h) that selected the planes. */
     int selection;
 
-    /* For the selections of the theses: one of the two; else 0. */
+    /* For the selections of the theses: one of the two is set; else both are 0. */
     double percent, k_root;
 
-    /* ebpo_normal_distance, for k-medoids. */
+    /* ebpo_normal_distance, for EBPO_SELECT_KMEDOIDS. */
     int normals;
 
-    /* For k-medoids and random; else 0. */
+    /* For EBPO_SELECT_KMEDOIDS and EBPO_SELECT_RANDOM; else 0. */
     uint64_t seed;
 
     ebpo_repair_record repair_record;
@@ -260,26 +269,26 @@ typedef struct ebpo_info {
     uint8_t content_sha256[32];
 
     /*
-     * Location of the chunk directory of large arrays, behind the first levels. It only serves
-     * prefetching. 0: none, or not recorded.
+     * Location of the chunk directory of large arrays, which is behind the first levels. Used only
+     * for prefetching. 0: none, or not recorded.
      */
     uint64_t chunk_index_offset, chunk_index_bytes;
 
     /*
-     * Level whose gray nodes are the roots of subtrees. Each subtree is contiguous in the file, and
-     * a table gives its location. 0: no table.
+     * Level whose gray nodes are the roots of subtrees. The data of each subtree is contiguous in
+     * the file, and a table contains the locations of the subtrees. 0: no table.
      */
     int subtree_level;
 
     /*
-     * With a table: number of bytes at the beginning that contain all data for finding a subtree.
-     * 0: not recorded.
+     * With a table of subtrees: the first `top_bytes` bytes of the file contain all data that is
+     * needed to locate a subtree. 0: not recorded.
      */
     uint64_t top_bytes;
 
     /*
      * True for a subset: children of some gray nodes were omitted (ebpo_subset). The following
-     * members contain the request.
+     * members describe what was requested.
      */
     bool pruned;
 
@@ -301,10 +310,10 @@ typedef struct ebpo_info {
 
     ebpo_level_summary level[EBPO_LEVELS_MAX];
 
-    /* Set when reading. head_bytes: bytes before the first level. */
+    /* Size of the file, and number of bytes before the first level. Set when reading. */
     uint64_t file_bytes, head_bytes;
 
-    /* Set when reading: first level that also needs the chunk directory; level_count: none. */
+    /* First level whose reading needs the chunk directory. level_count: none. Set when reading. */
     int index_level;
 
     /* Checksum of the colours, with EBPO_PART_COLOURS. */
@@ -327,7 +336,9 @@ typedef struct ebpo_tree {
     /* [vertex_count] source index, or NULL */
     uint32_t *vertex_source;
 
-    /* [face_count] source index; >= source_face_count: face added by filling holes */
+    /*
+     * [face_count] source index, or NULL; source_face_count or more: face that filling holes added
+     */
     uint32_t *face_source;
 
     /* Owns both arrays; NULL: allocated with malloc. */
@@ -344,8 +355,9 @@ EBPO_API void ebpo_tree_free(ebpo_tree *tree);
 /* ---- writing ---- */
 
 /*
- * Chunk checksums: list of the checksum at the end of each chunk (format-spec/README.md, section
- * 20). With it, readers detect a chunk that was exchanged with another one or with another version.
+ * Chunk checksums: a list that repeats the checksum at the end of each chunk
+ * (format-spec/README.md, section 20). With this list, readers detect a chunk that was exchanged
+ * with another chunk or with another version of the chunk.
  */
 typedef enum ebpo_chunk_checksums {
     EBPO_CHECKSUMS_DEFAULT = 0, /* written */
@@ -358,27 +370,28 @@ typedef struct ebpo_write_options {
     ebpo_codec codec;
 
     /*
-     * 0: the default. deflate: 6. zstd: 3 for small chunks; from 4 KiB on 7 without matches of less
-     * than six bytes.
+     * 0: the default. For deflate: 6. For zstd: 3 for small chunks; 7 for chunks from 4 KiB on,
+     * without matches of less than six bytes.
      */
     int codec_level;
 
     unsigned threads;
 
-    /* ebpo_part bits: parts to write if the tree has them. */
+    /* ebpo_part bits: parts to write, of those that the tree has. */
     uint32_t parts;
 
     ebpo_progress progress;
 
     /*
      * Minimum mean number of faces per gray node of the level of subtrees (format-spec/README.md,
-     * section 9). A subtree is contiguous, so that one read loads it. The deepest level with this
-     * mean is used, or level 1 if that has fewer. 0: 1,024, but no subtrees below 131,072 faces.
-     * EBPO_NO_SUBTREES: none, as in format 1.0. Trees of fewer than three levels have none.
+     * section 9). The data of a subtree is contiguous, so that one read loads it. The deepest level
+     * with at least this mean is used, or level 1 if no level has it. 0: 1,024, but no subtrees for
+     * fewer than 131,072 faces. EBPO_NO_SUBTREES: no subtrees, as in format 1.0. Trees of fewer
+     * than three levels have no subtrees.
      */
     uint64_t subtree_faces;
 
-    /* For the mesh, if it is written. */
+    /* Coding of the faces, if the mesh is written. */
     ebpo_face_coding face_coding;
 
     ebpo_chunk_checksums chunk_checksums;
@@ -393,8 +406,8 @@ typedef struct ebpo_write_options {
     }
 
 /*
- * Writes a tree to a file, which is replaced atomically: it is written under a temporary name,
- * synced and renamed, and its folder is synced. Equal trees give identical bytes.
+ * Writes a tree to a file, which is replaced atomically: the new file is written under a temporary
+ * name, synced and renamed; then its folder is synced. Equal trees give identical bytes.
  *
  * EBPO_E_ARGUMENT: the tree or the codec is not valid. EBPO_E_IO.
  *
@@ -412,8 +425,8 @@ typedef struct ebpo_range {
 } ebpo_range;
 
 /*
- * Source of bytes. Initialize it with EBPO_SOURCE_INIT. Several threads may call its functions at
- * the same time, except `close`.
+ * Source of bytes. Initialize it with EBPO_SOURCE_INIT. The library may call its functions from
+ * several threads at the same time, except `close`.
  */
 typedef struct ebpo_source {
     size_t struct_size;
@@ -426,7 +439,7 @@ typedef struct ebpo_source {
 
     /*
      * Fills `data` with `size` bytes from `offset` on, or fails. The range is within the source.
-     * Any thread that uses the file may call it.
+     * Called by any thread that uses the file.
      */
     ebpo_status (*read)(void *user, uint64_t offset, uint64_t size, void *data, ebpo_error *error);
 
@@ -434,16 +447,16 @@ typedef struct ebpo_source {
     void (*close)(void *user);
 
     /*
-     * Prefetch hint: ranges that will be read soon, about once each. A remote source fetches them
-     * together and in advance. It returns immediately, and results do not depend on it. May be
-     * NULL.
+     * Prefetch hint: these ranges will be read soon, about once each. A remote source fetches them
+     * together and in advance. The function returns immediately, and results do not depend on it.
+     * May be NULL.
      */
     void (*prefetch)(void *user, const ebpo_range *ranges, size_t count);
 
     /*
-     * With `prefetch`: number of bytes at the beginning that are available already. If they are not
-     * the whole file, opening reads only these; the chunk offsets of arrays of several chunks are
-     * read when needed, or by ebpo_file_locate.
+     * With `prefetch`: number of bytes at the beginning of the file that are already available. If
+     * this is not the whole file, opening reads only these bytes. Chunk offsets of arrays of
+     * several chunks are then read when needed, or by ebpo_file_locate.
      */
     uint64_t prefetched;
 } ebpo_source;
@@ -452,35 +465,37 @@ typedef struct ebpo_source {
 
 /* ---- opening ---- */
 
-/* An open file. It does not change, so any number of threads may use it at the same time. */
+/*
+ * An open file. This object does not change, so any number of threads may use it at the same time.
+ */
 typedef struct ebpo_file ebpo_file;
 
 /*
- * Opens a file by its path or URL (http.h) and reads only its head: metadata and chunk offsets.
+ * Opens a file by its path or URL (http.h) and reads only its header: metadata and chunk offsets.
  * Neither this nor later reading uses libhdf5 or its plugins.
  *
  * Safe for untrusted files: for any bytes, memory accesses stay within allocations, and no code is
- * loaded or executed. Results of a deceptive file are correct for that file; ebpo_verify proves
- * that its parts are consistent.
+ * loaded or executed. Results for a manipulated file are those of its data; ebpo_verify checks that
+ * its parts are consistent.
  *
  * If another program truncates or damages an open file, reading returns EBPO_E_IO or EBPO_E_FORMAT.
  * Chunks have checksums, and the list of chunk checksums (ebpo_chunk_checksums) also detects
- * exchanged chunks. For files without that list, ebpo_file_check_content detects them. If chunks
- * have no checksums, as in copies by other programs, opening reads the whole file and compares
- * content_sha256; later changes are not detected.
+ * exchanged chunks. For files without this list, ebpo_file_check_content detects exchanged chunks.
+ * If chunks have no checksums, as in copies by other programs, opening reads the whole file and
+ * compares content_sha256; changes after opening are not detected.
  *
- * EBPO_E_IO. EBPO_E_FORMAT: not an .ebpo.h5 file, or damaged. EBPO_E_VERSION: another major
- * version, or an unknown part. EBPO_E_UNSUPPORTED: another program, such as h5repack, wrote a
- * layout that this library does not write. EBPO_E_LIMIT: the decoded arrays are too large for the
- * file size (ebpo_open_options).
+ * EBPO_E_IO. EBPO_E_FORMAT: not an .ebpo.h5 file, or damaged. EBPO_E_VERSION: the file has another
+ * major version, or a part that this library does not know. EBPO_E_UNSUPPORTED: another program,
+ * such as h5repack, wrote a layout that this library does not write. EBPO_E_LIMIT: the decoded
+ * arrays are too large for the file size (ebpo_open_options).
  *
  * Threads: any.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open(const char *path, ebpo_file **out, ebpo_error *error);
 
 /*
- * Limits for the size of the decoded arrays: multiple of the file size, and size in bytes that is
- * always allowed.
+ * Limits for the total size of the decoded arrays: EBPO_EXPANSION_MAX times the file size.
+ * EBPO_EXPANSION_FREE bytes are always allowed.
  */
 #define EBPO_EXPANSION_MAX  256
 #define EBPO_EXPANSION_FREE (UINT64_C(64) << 20)
@@ -492,7 +507,10 @@ typedef struct ebpo_open_options {
     /* Used instead of EBPO_EXPANSION_MAX; UINT64_MAX: no limit. */
     uint64_t max_expansion;
 
-    /* Opens this source instead; the path is only for messages. Closed as by ebpo_open_source. */
+    /*
+     * Opens this source instead of the path, which is then only for messages. The source is closed
+     * as by ebpo_open_source.
+     */
     const ebpo_source *source;
 
     /* Options for a URL (http.h). */
@@ -515,15 +533,18 @@ typedef struct ebpo_compat_options {
     size_t struct_size;
 
     /*
-     * Memory limit of the other process, in bytes in addition to the memory of this process; 0: 1
-     * GiB.
+     * Memory limit of the separate process in bytes, in addition to the memory of this process. 0:
+     * 1 GiB.
      */
     uint64_t memory_bytes;
 
-    /* Limit of its processor time in seconds; 0: 60, plus one for each 4 MiB of the file. */
+    /*
+     * Limit of the processor time of the separate process, in seconds. 0: 60, plus one for each 4
+     * MiB of the file.
+     */
     unsigned seconds;
 
-    /* For checking the content; 0: all cores. */
+    /* Number of threads for checking the content. 0: all cores. */
     unsigned threads;
 
     /* Options for a URL (http.h). NULL: defaults. */
@@ -538,20 +559,21 @@ typedef struct ebpo_compat_options {
 /*
  * Opens a file as ebpo_open does. A file that ebpo_open rejects with EBPO_E_UNSUPPORTED is
  * converted with libhdf5 in a separate process, without plugins and with limits on memory, time and
- * output. That process copies the chunks to an unnamed file in TMPDIR, about as large as the
- * original. It encodes chunks again if their filters, size or byte order differ from the format. A
- * URL is first fetched completely to TMPDIR.
+ * output. The separate process copies the chunks to an unnamed file in TMPDIR, which is about as
+ * large as the original. Chunks are encoded again if their filters, size or byte order differ from
+ * the format. A file at a URL is first fetched completely to TMPDIR.
  *
  * The copy is then opened like any other file, and its content checksum is compared. This checksum
- * does not include attributes, such as the root's box, and the heads of these files have no
- * checksums: ebpo_verify finds errors there. ebpo_info describes the bytes of the copy.
+ * does not include attributes, such as the root's box, and the headers of these files have no
+ * checksums: use ebpo_verify to find errors in attributes. Sizes in ebpo_info are those of the
+ * copy.
  *
  * Errors are those of ebpo_open. EBPO_E_FORMAT: libhdf5 rejected the file or crashed, or the
- * content differs from the head. EBPO_E_IO: no process or no file could be made.
- * EBPO_E_UNSUPPORTED: the library was built without libhdf5.
+ * content does not match its checksum. EBPO_E_IO: the process or the temporary file could not be
+ * made. EBPO_E_UNSUPPORTED: the library was built without libhdf5.
  *
- * Threads: any. The process is forked during the call. A SIGCHLD handler that reaps other children
- * causes EBPO_E_FORMAT.
+ * Threads: any. The call forks the process. A SIGCHLD handler that waits for all children causes
+ * EBPO_E_FORMAT.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_compat(const char *path,
                                                     const ebpo_compat_options *options,
@@ -568,8 +590,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_memory(const void *data, uint64_t s
                                                     ebpo_error *error);
 
 /*
- * Opens a file from any source. The source is closed with the file. It is also closed if opening
- * fails, unless its struct_size is not set.
+ * Opens a file from any source. The source is closed with the file, and also if opening fails
+ * (except if its struct_size is not set).
  *
  * Threads: any.
  */
@@ -592,7 +614,7 @@ EBPO_API void ebpo_close(ebpo_file *file);
  */
 EBPO_API const ebpo_info *ebpo_file_info(const ebpo_file *file);
 
-/* Sums since opening, including the reading of the head. */
+/* Sums since opening, including the reading of the header. */
 typedef struct ebpo_file_stats {
     size_t struct_size;
 
@@ -627,8 +649,8 @@ typedef struct ebpo_array_facts {
 #define EBPO_ARRAY_FACTS_INIT EBPO_SIZED(ebpo_array_facts)
 
 /*
- * Describes the n-th array of the file, in the order of their bytes. Returns false if there are
- * fewer; `out` is then unchanged.
+ * Describes the n-th array of the file; arrays are in the order of their bytes in the file. Returns
+ * false if the file has fewer arrays; `out` is then unchanged.
  *
  * Threads: any.
  */
@@ -649,16 +671,16 @@ typedef struct ebpo_attribute_facts {
 
     uint64_t rows;
 
-    /* List: number of items if equal in all rows; else 0. */
+    /* Number of columns. For lists: number of items if this is equal in all rows; else 0. */
     uint64_t columns;
 
     /* 1: each row is a list. */
     uint64_t list;
 
-    /* 1: the file states the range. */
+    /* 1: the file has the range of the values. */
     uint64_t has_range;
 
-    /* Minimum and maximum of all values. */
+    /* Minimum and maximum of all values, if has_range is 1. */
     double range[2];
 
     /* Compressed size; set after ebpo_file_locate. */
@@ -668,7 +690,7 @@ typedef struct ebpo_attribute_facts {
 #define EBPO_ATTRIBUTE_FACTS_INIT EBPO_SIZED(ebpo_attribute_facts)
 
 /*
- * Describes the n-th array of attributes. Returns false if there are fewer; `out` is then
+ * Describes the n-th array of attributes. Returns false if the file has fewer; `out` is then
  * unchanged.
  *
  * Threads: any.
@@ -701,8 +723,8 @@ typedef struct ebpo_stored_sizes {
 #define EBPO_STORED_SIZES_INIT EBPO_SIZED(ebpo_stored_sizes)
 
 /*
- * Reads all chunk offsets, if not done yet (remote files, `prefetched` of ebpo_source), and sums
- * the sizes. `out` may be NULL.
+ * Reads all chunk offsets that opening did not read (see `prefetched` of ebpo_source), and computes
+ * the compressed sizes. `out` may be NULL.
  *
  * EBPO_E_IO, EBPO_E_FORMAT.
  *
@@ -712,9 +734,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_locate(const ebpo_file *file, ebpo_
                                                     ebpo_error *error);
 
 /*
- * Prefetch hint: levels `first` to `last` (or to the last level) will be read. A remote source then
- * fetches them with as few requests as possible. Waits only for the chunk directory
- * (ebpo_file_locate). Errors are reported by later reads.
+ * Prefetch hint: levels `first` to `last` will be read; `last` may be beyond the last level. A
+ * remote source then fetches them with as few requests as possible. Waits only for the chunk
+ * directory (ebpo_file_locate). Errors are reported by later reads.
  *
  * Threads: any.
  */
@@ -728,13 +750,13 @@ typedef struct ebpo_read_options {
     /* 0: all cores */
     unsigned threads;
 
-    /* Owns the results, and is freed after them; NULL: malloc. */
+    /* Owns the results; free it after them. NULL: results are allocated with malloc. */
     ebpo_workspace *workspace;
 
     /*
-     * For ebpo_file_read_level: ebpo_part bits that are not read. Their arrays are NULL, their
-     * counts are set. Must be 0 for whole trees (ebpo_file_read_tree, ebpo_file_repack): otherwise
-     * EBPO_E_ARGUMENT.
+     * For ebpo_file_read_level: ebpo_part bits of the parts to omit. The arrays of these parts are
+     * NULL; their counts are set. For whole trees (ebpo_file_read_tree, ebpo_file_repack) it must
+     * be 0, else EBPO_E_ARGUMENT.
      */
     uint64_t without;
 
@@ -788,8 +810,8 @@ typedef struct ebpo_maps {
 } ebpo_maps;
 
 /*
- * Reads the maps. They are checked to be permutations of 0 .. count - 1; after welding, to be
- * distinct indices below source_vertex_count.
+ * Reads the maps, and checks that each is a permutation of 0 .. count - 1. After welding, the
+ * indices of vertices must be distinct and below source_vertex_count.
  *
  * EBPO_E_ABSENT: the file has no maps.
  *
@@ -809,12 +831,14 @@ EBPO_API void ebpo_maps_free(ebpo_maps *maps);
 /* Values of an array of attributes. */
 typedef struct ebpo_attribute_values {
     /*
-     * [rows][columns] of the array's type, in native byte order; lists of different lengths: the
-     * items of all rows in order
+     * [rows][columns] values of the array's type, in native byte order. For lists of different
+     * lengths: the items of all rows, in order
      */
     void *values;
 
-    /* [rows] for such lists: number of items in all rows up to this one; else NULL */
+    /*
+     * [rows] for lists of different lengths: number of items in all rows up to this one; else NULL
+     */
     uint64_t *ends;
 
     /* Number of items in `values`. */
@@ -883,10 +907,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_read_source_mesh(const ebpo_file *f
                                                               ebpo_error *error);
 
 /*
- * Computes the content checksum from all arrays and compares it. Reads the whole file; memory holds
- * a few chunks per thread, and the embedded images.
+ * Computes the content checksum from all arrays, and compares it with content_sha256 of the file.
+ * Reads the whole file. Memory: a few chunks per thread, and the embedded images.
  *
- * EBPO_E_FORMAT: it differs from the head. EBPO_E_IO.
+ * EBPO_E_FORMAT: the checksums differ. EBPO_E_IO.
  *
  * Threads: any.
  */
@@ -896,14 +920,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_check_content(const ebpo_file *file
 
 /*
  * Writes the whole content of a file to a new file with the layout of `write` (codec, subtrees;
- * `parts` is ignored). `path` is replaced atomically and may be the path of `file`. Before that the
- * new file is read again: its content_sha256 must be that of `file`, which also checks `file`. The
- * whole model is in memory, limited by `read`.
+ * `parts` is ignored). `path` is replaced atomically and may be the path of `file`. Before it is
+ * replaced, the new file is read again: its content_sha256 must be that of `file`, which also
+ * checks `file`. The whole model is in memory, limited by the workspace of `read`.
  *
- * EBPO_E_FORMAT: the content of `file` differs from its checksum. EBPO_E_UNSUPPORTED: the checksum
- * is correct, but this library would write other arrays (for example, another program chose wider
- * types than needed); nothing is written. EBPO_E_IO: also if `path` is that of `file` and another
- * program has replaced it since opening. Other errors are those of reading and writing.
+ * EBPO_E_FORMAT: the content of `file` differs from its checksum. EBPO_E_UNSUPPORTED: the content
+ * is correct, but this library would write the arrays in another way (for example, another program
+ * chose wider types than needed); nothing is written. EBPO_E_IO: also if `path` is the path of
+ * `file` and another program has replaced the file since opening. Other errors are those of reading
+ * and writing.
  *
  * Threads: any.
  */

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT
  * Locates the findings of a mesh check.
  *
- *   ebpo_mesh_findings        all findings, and their picture as a coloured PLY file
- *   ebpo_finding_name       name of a kind
- *   ebpo_finding_colour     colour of a kind in the picture
+ *   ebpo_mesh_findings    all findings, and their picture as a coloured PLY file
+ *   ebpo_finding_name     name of a kind
+ *   ebpo_finding_colour   colour of a kind in the picture
  */
 #ifndef EBPO_FINDINGS_H
 #define EBPO_FINDINGS_H
@@ -15,8 +15,8 @@ extern "C" {
 #endif
 
 /*
- * Kinds of findings, as ebpo_mesh_report counts them. The picture shows the first of several kinds
- * of a face.
+ * Kinds of findings, as ebpo_mesh_report counts them. If a face has findings of several kinds, the
+ * picture shows the first kind.
  */
 typedef enum ebpo_finding_kind {
     EBPO_FOUND_BOUNDARY_EDGE,
@@ -34,14 +34,16 @@ typedef enum ebpo_finding_kind {
 #define EBPO_FINDING_KINDS 10
 
 /*
- * Returns the name of the report's member, such as "boundary_edges". NULL: not a kind.
+ * Returns the name of the member of ebpo_mesh_report, such as "boundary_edges". NULL: the kind is
+ * not valid.
  *
  * Threads: any.
  */
 EBPO_API const char *ebpo_finding_name(int32_t kind);
 
 /*
- * Gets red, green and blue, 0 to 255 each; grey for an invalid kind.
+ * Gets the colour of a kind in the picture: red, green and blue, 0 to 255 each. Grey for an invalid
+ * kind.
  *
  * Threads: any.
  */
@@ -61,13 +63,15 @@ typedef struct ebpo_mesh_finding {
     uint32_t component;
 
     /*
-     * Edge: its ends, the lower index first. Vertex: its index, twice. Face: its first two corners.
+     * For an edge: its ends, the lower index first. For a vertex: its index, twice. For a face: its
+     * first two corners.
      */
     uint64_t vertex[2];
 
     /*
-     * Edge or vertex: all faces that use it. Repeated face: this face and the first face with its
-     * vertices. Other face: this face. Ascending; lent until the callback returns. NULL: none.
+     * For an edge or a vertex: all faces that use it. For a repeated face: this face, and the first
+     * face with the same vertices. For another face: this face. Ascending; lent until the callback
+     * returns. NULL: none.
      */
     const uint64_t *faces;
     uint64_t face_count;
@@ -77,7 +81,7 @@ typedef struct ebpo_mesh_finding {
 } ebpo_mesh_finding;
 
 /* Return false to stop. */
-typedef bool (*ebpo_findings_fn)(void *user, const ebpo_mesh_finding *place);
+typedef bool (*ebpo_findings_fn)(void *user, const ebpo_mesh_finding *finding);
 
 typedef struct ebpo_findings_options {
     size_t struct_size;
@@ -87,10 +91,11 @@ typedef struct ebpo_findings_options {
     ebpo_progress progress;
 
     /*
-     * Binary PLY file to write, replaced atomically; NULL: none. It contains the mesh in the
-     * source's order without dropped faces, and positions as doubles. Faces with findings have the
-     * colours of their kinds, all others are grey (200, 200, 200). Its comments are the legend.
-     * Vertices have no colours, because most programs would show them instead.
+     * Binary PLY file to write, replaced atomically; NULL: none. The file contains the mesh in the
+     * source's order, without dropped faces, and coordinates as doubles. Faces with findings have
+     * the colours of their kinds; all others are grey (200, 200, 200). Comments in the file explain
+     * the colours. Vertices have no colours, because most programs would show these instead of the
+     * colours of faces.
      */
     const char *ply;
 } ebpo_findings_options;
@@ -102,8 +107,8 @@ typedef struct ebpo_findings_options {
 
 /*
  * Checks a mesh as ebpo_mesh_check does, and passes every counted finding to `take`: by kind, then
- * by the lowest face, then by the vertices. It uses about 80 bytes per finding of the mesh's
- * workspace during sorting and 16 afterwards, besides the memory of checking; with `ply` also at
+ * by the lowest face, then by the vertices. Besides the memory of checking, it uses about 80 bytes
+ * per finding during sorting and 16 bytes afterwards, from the mesh's workspace; with `ply` also at
  * most 13 bytes per face and vertex.
  *
  * take     may be NULL. If it returns false, `ply` is complete nevertheless

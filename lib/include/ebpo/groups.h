@@ -2,7 +2,7 @@
  * Reads the named groups of faces of an OBJ file.
  *
  *   ebpo_mesh_read_groups      a mesh and its groups
- * ebpo_mesh_groups_count, ebpo_mesh_groups_get, ebpo_mesh_groups_free
+ *   ebpo_mesh_groups_count, ebpo_mesh_groups_get, ebpo_mesh_groups_free
  *   ebpo_components_of_groups  each group as a separate mesh
  */
 #ifndef EBPO_GROUPS_H
@@ -31,7 +31,7 @@ typedef struct ebpo_mesh_group {
      */
     const char *name;
 
-    /* 0: the file names the group, but it has no faces. */
+    /* Number of faces. 0: the file contains the name, but the group has no faces. */
     uint64_t face_count;
 
     /* Lowest source index of its faces. */
@@ -79,12 +79,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_groups_get(const ebpo_mesh_groups *
                                                         ebpo_error *error);
 
 /*
- * Makes one component (ebpo_components_new) of each group with faces, with the group's number. A
- * vertex may be in several groups. Components are not tested for closedness (use ebpo_mesh_check on
- * their meshes) and are never cavities.
+ * Makes a component (ebpo_components_new) of each group with faces. Component and group have the
+ * same number. A vertex may be in several groups. The components are never cavities, and `closed`
+ * is not tested: use ebpo_mesh_check for their meshes.
  *
- * mesh   the mesh read with the groups; faces may have been turned and vertices welded, but no
- *        holes filled. Mesh and groups are borrowed until ebpo_components_free.
+ * mesh   the mesh that was read with the groups. It may have been oriented and welded, but no holes
+ *        may have been filled. Mesh and groups are borrowed until ebpo_components_free.
  * out    freed by ebpo_components_free
  *
  * EBPO_E_ARGUMENT: the groups are NULL or not of this mesh. EBPO_E_FORMAT, EBPO_E_IO.

@@ -5,9 +5,9 @@
  *   Making    ebpo_haptic_new, ebpo_haptic_free
  *
  *   A step    ebpo_haptic_step_ball, ebpo_haptic_ball_path: a ball
- *             ebpo_haptic_step_probe: a probe, a point without collisions
- *             ebpo_haptic_step_tool, ebpo_haptic_tool_path: a tool of many points, with force and
- * torque
+ *             ebpo_haptic_step_probe: a probe, which is a point without collisions
+ *             ebpo_haptic_step_tool, ebpo_haptic_tool_path: a tool of many points,
+ *             with force and torque
  *
  *   Other     ebpo_haptic_reset, ebpo_haptic_check, ebpo_haptic_get_stats
  *
@@ -19,20 +19,22 @@
  *         send(result.force);
  *     }
  *
- * The ball (or point) follows the haptic device. Where the device passes through a face, a proxy of
- * the ball stays on the side from which it came. Every step of the proxy's centre is a segment
- * that, by exact arithmetic, intersects no face. So the proxy passes through no wall of any
- * thickness at any speed. Faces count from both sides, so surfaces work like solids.
+ * The *proxy* is a ball (or a point, or a tool) that follows the haptic device. Where the device
+ * passes through a face, the proxy stays on the side from which it came. Every step of the proxy's
+ * centre is a segment that, by exact arithmetic, intersects no face. So the proxy passes through no
+ * face, at any speed, and however thin the solid is. Faces count from both sides, so surfaces work
+ * like solids.
  *
- * A haptic step uses only data in memory: a limited number of faces in a box around the device. A
- * thread of the object loads the next box ahead of the device and passes it by one atomic exchange.
- * A step takes no lock, allocates no memory and reads no file. If the device leaves the box before
- * the next one is loaded, the proxy waits at the boundary of the box (EBPO_HAPTIC_WAITING), so
- * deadlines are kept. If no further box can be loaded, because reading failed or there are too many
- * faces, steps report EBPO_HAPTIC_STOPPED.
+ * A *haptic step* is one cycle of the force computation. It uses only data in memory: a limited
+ * number of faces in a box around the device. It takes no lock, allocates no memory and reads no
+ * file. A separate thread loads the next box ahead of the device, and passes the box to the steps
+ * by one atomic exchange. If the device leaves the box before the next one is loaded, the proxy
+ * waits at the boundary of the box (EBPO_HAPTIC_WAITING), so deadlines are kept. If no further box
+ * can be loaded, because reading failed or there are too many faces, steps report
+ * EBPO_HAPTIC_STOPPED.
  *
- * Methods: EBP 2017, section 4.5; Zilles and Salisbury 1995 (god-object); Ruspini, Kolarov and
- * Khatib 1997 (proxy of a size).
+ * Methods: EBP 2017, section 4.5; Zilles and Salisbury 1995 (proxy that is a point, "god-object");
+ * Ruspini, Kolarov and Khatib 1997 (proxy that is a ball).
  */
 #ifndef EBPO_HAPTIC_H
 #define EBPO_HAPTIC_H
@@ -45,7 +47,7 @@ extern "C" {
 
 typedef struct ebpo_haptic ebpo_haptic;
 
-/* Kind of the haptic object; decides which step function is allowed. */
+/* Kind of the haptic object. Only the step function of this kind is allowed. */
 typedef enum ebpo_haptic_kind {
     EBPO_HAPTIC_BALL = 0,  /* ebpo_haptic_step_ball */
     EBPO_HAPTIC_PROBE = 1, /* ebpo_haptic_step_probe */
@@ -56,51 +58,51 @@ typedef struct ebpo_haptic_options {
     size_t struct_size;
 
     /*
-     * Radius of the ball in the model's unit, at least 0. 0: a point. All faces within the radius
-     * and `search_radius` must fit into a box (`faces`). A step tests at most 512 of them, in the
-     * order in which the ball may touch them; the next steps continue with the others.
+     * Radius of the ball in the model's unit, at least 0. 0: a point. A box must hold all faces
+     * within the radius plus `search_radius` (see `faces`). A step tests at most 512 of these, in
+     * the order in which the ball may touch them; the next steps continue with the others.
      */
     double radius;
 
     /*
-     * Distance beyond the radius that the proxy keeps from faces because of rounding, in the
-     * model's unit. 0: 2^-20 of the diagonal of the model's root cell. Else at least 2^-30 of it,
-     * and 2^-42 of the coordinates and the radius.
+     * Additional distance that the proxy keeps from faces because of rounding, in the model's unit.
+     * 0: 2^-20 of the diagonal of the model's root cell. Else at least 2^-30 of this diagonal, and
+     * at least 2^-42 of the coordinates and of the radius.
      */
     double skin;
 
     /*
      * Search distance for the nearest face, in the model's unit, at least 0. Faces within this
-     * distance of the ball contribute to the smooth normal, nearer ones more. 0: 3 times the
-     * diagonal divided by the square root of the number of faces, some edge lengths of an even
-     * mesh.
+     * distance of the ball contribute to the smooth normal; nearer faces contribute more. 0: 3
+     * times the diagonal of the root cell, divided by the square root of the number of faces; this
+     * is a few edge lengths if all edges are similar.
      */
     double search_radius;
 
     /*
-     * Force per unit of depth; force per unit of device speed (units per second) during contact; at
-     * least 0.
+     * Stiffness: force per unit of depth. Damping: force per unit of device speed (units per
+     * second) during contact. Both at least 0.
      */
     double stiffness, damping;
 
     /*
-     * Coefficient of Coulomb friction: the proxy slides where the tangential force exceeds this
-     * part of the normal force. At least 0.
+     * Coefficient of Coulomb friction, at least 0. The proxy slides if the tangential force exceeds
+     * the normal force times this coefficient.
      */
     double friction;
 
-    /* Seconds between calls of ebpo_haptic_step_ball; above 0. */
+    /* Seconds between steps; above 0. */
     double step_seconds;
 
     /*
-     * Maximum number of faces of a box; 64 to 2^20. Four boxes are held: about 550 bytes per face
-     * in total, besides the model's budget.
+     * Maximum number of faces of a box; 64 to 2^20. Four boxes are in memory. They take about 550
+     * bytes per face in total, besides the model's budget.
      */
     uint64_t faces;
 
     /*
-     * Tool: points[point_count][3] in its own coordinates, 1 to 10,000; copied. Points stay on the
-     * side of faces from which they came, and need no normals. Other kinds: NULL and 0.
+     * Tool: points[point_count][3] in the tool's coordinates, 1 to 10,000; copied. Each point stays
+     * on the side of a face from which it came; points need no normals. Other kinds: NULL and 0.
      */
     const double (*points)[3];
     uint64_t point_count;
@@ -117,9 +119,10 @@ typedef struct ebpo_haptic_options {
 /*
  * Makes a haptic object at a position and starts loading around it.
  *
- * model   must outlive the object; other contexts may use it at the same time. Its budget limits
+ * model   must outlive the object. Contexts may use the model at the same time. Its budget limits
  *         loading (ebpo_model_options.memory)
- * place   three finite doubles, outside the solid, and farther from every face than the ball needs
+ * place   position: three finite doubles. Ball and tool: outside the solid, with no face within the
+ *         radius and 1.5 skins (tool: of any point). Probe: anywhere
  *
  * EBPO_E_ARGUMENT: an option or the position is not valid. EBPO_E_UNSUPPORTED: coordinates are
  * beyond 2^200. EBPO_E_ABSENT: the file has no mesh, or is a subset without the surroundings of the
@@ -139,23 +142,23 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_haptic_new(ebpo_model *model,
  */
 EBPO_API void ebpo_haptic_free(ebpo_haptic *haptic);
 
-/* State of a haptic step: bits. */
+/* Flags of a haptic step: bits. */
 typedef enum ebpo_haptic_flag {
     /* A face keeps the proxy away from the device. */
     EBPO_HAPTIC_CONTACT = 1,
 
-    /* The proxy waits at the boundary of the loaded box; this causes no force. */
+    /* The proxy waits at the boundary of the loaded box. Waiting causes no force. */
     EBPO_HAPTIC_WAITING = 2,
 
     /*
-     * The work of a step ended before the path; the next step continues. A ball in contact stays in
-     * contact with the same faces meanwhile.
+     * The work limit of the step was reached before the end of the path; the next step continues.
+     * Until then, a ball in contact stays in contact with the same faces.
      */
     EBPO_HAPTIC_INCOMPLETE = 4,
 
     /*
      * Some faces within `search_radius` were not tested (the farthest ones) or not loaded. Nearest
-     * face, distance and normal are those of the others.
+     * face, distance and normal are those of the tested faces.
      */
     EBPO_HAPTIC_PARTIAL = 8,
 
@@ -169,35 +172,38 @@ typedef enum ebpo_haptic_flag {
     EBPO_HAPTIC_ACCURATE = 64,
 
     /*
-     * Loading has ended permanently, see ebpo_haptic_check. The proxy moves only in the loaded box.
-     * Set in all steps after the failure.
+     * Loading has failed and ended permanently, see ebpo_haptic_check. The proxy moves only in the
+     * loaded box. Set in all later steps.
      */
     EBPO_HAPTIC_STOPPED = 128
 } ebpo_haptic_flag;
 
 typedef struct ebpo_haptic_ball_result {
-    /* Centre of the ball on the free side. */
+    /* Centre of the proxy's ball. */
     double proxy[3];
 
     /* Force for the device; 0 unless EBPO_HAPTIC_CONTACT. */
     double force[3];
 
     /*
-     * Unit vector away from the near faces: weighted mean of their normals on the proxy's side. It
-     * turns steadily when the proxy passes an edge. (0, 0, 0) if no face is within `search_radius`.
+     * Unit vector away from the near faces: weighted mean of their normals on the proxy's side. The
+     * vector turns steadily when the proxy passes an edge. (0, 0, 0) if no face is within
+     * `search_radius`.
      */
     double normal[3];
 
     /*
-     * In contact: distance of the device behind the proxy. Else minus the distance from the ball to
-     * the nearest face. Minus `search_radius` if none is that near: the distance is then at least
-     * `search_radius`, unless EBPO_HAPTIC_PARTIAL.
+     * In contact: distance between proxy and device; with EBPO_HAPTIC_WAITING or
+     * EBPO_HAPTIC_INCOMPLETE, only the part of this vector that faces prevent. Else minus the
+     * distance from the ball to the nearest face; or minus `search_radius` if no face is within
+     * `search_radius`. With EBPO_HAPTIC_PARTIAL, a face that was not tested may be nearer.
      */
     double depth;
 
     /*
-     * Nearest face within `search_radius`: its index as in ebpo_distance_result (EBPO_NO_FACE:
-     * none), the nearest point, and the weights of its corners there, whose sum is 1.
+     * Nearest face within `search_radius`: the index as in ebpo_distance_result (EBPO_NO_FACE:
+     * none), the nearest point on the face, and the weights of the face's corners at this point,
+     * whose sum is 1.
      */
     uint64_t face;
     double point[3], weight[3];
@@ -205,19 +211,20 @@ typedef struct ebpo_haptic_ball_result {
     /* ebpo_haptic_flag bits */
     uint32_t flags;
 
-    /* Faces tested in this step. */
+    /* Number of faces tested in this step. */
     uint32_t work;
 } ebpo_haptic_ball_result;
 
 /*
  * Computes one haptic step with the device at `device`. Takes bounded time, without locks,
- * allocation or reading. After EBPO_HAPTIC_WAITING or EBPO_HAPTIC_INCOMPLETE the proxy's progress
- * depends on when boxes were loaded.
+ * allocation or reading. Results are reproducible, except after EBPO_HAPTIC_WAITING or
+ * EBPO_HAPTIC_INCOMPLETE: then the proxy's path depends on the times at which boxes were loaded.
  *
  * The force is stiffness times the vector from device to proxy, minus damping times the device
- * velocity. It never points towards faces that the spring pushes away from, except for 1e-7 of
- * itself. It is reduced to bound the total energy given to the device for any motion: at most the
- * energy taken from it, plus stiffness times the square of its longest step.
+ * velocity. The force never points towards faces that the spring pushes away from, except for 1e-7
+ * of its length. The force is reduced if needed, so that for any motion the total energy given to
+ * the device is at most the energy taken from the device, plus stiffness times the square of the
+ * longest step of the device.
  *
  * Threads: one per object.
  */
@@ -228,40 +235,42 @@ EBPO_API void ebpo_haptic_step_ball(ebpo_haptic *haptic, const double device[3],
 enum { EBPO_HAPTIC_PATH_MAX = 17 };
 
 /*
- * Gets the path of a tool in the last step, as ebpo_haptic_ball_path does: a position and a
- * quaternion each. Each point of the tool moved straight from one of its positions to the next.
+ * Gets the path of a tool's proxy in the last step, as ebpo_haptic_ball_path does for a ball. Each
+ * item is a position and a quaternion x, y, z, w. Between two items, each point of the tool moved
+ * along a segment.
  *
  * Threads: one per object.
  */
 EBPO_API uint32_t ebpo_haptic_tool_path(const ebpo_haptic *haptic,
-                                        double way[EBPO_HAPTIC_PATH_MAX][7]);
+                                        double path[EBPO_HAPTIC_PATH_MAX][7]);
 
 /*
- * Gets the path of the proxy in the last step: segments between way[0] and way[n - 1] that
+ * Gets the path of the proxy in the last step: the segments from path[0] to path[n - 1], which
  * intersect no face. Returns n, which is 1 if the proxy did not move, and 0 before the first step.
  *
  * Threads: one per object.
  */
 EBPO_API uint32_t ebpo_haptic_ball_path(const ebpo_haptic *haptic,
-                                        double way[EBPO_HAPTIC_PATH_MAX][3]);
+                                        double path[EBPO_HAPTIC_PATH_MAX][3]);
 
 /* Result of a probe at a position. */
 typedef struct ebpo_haptic_probe_result {
     /*
-     * Negative inside a solid. With EBPO_HAPTIC_ACCURATE correct except for some roundings of the
-     * coordinates, else NAN: only the bounds are known. ebpo_map_colour gives its colour.
+     * Signed distance, negative inside a solid. With EBPO_HAPTIC_ACCURATE: correct except for a few
+     * rounding errors of the coordinates. Otherwise NAN: only the bounds are known. ebpo_map_colour
+     * (map.h) converts a distance to a colour.
      */
     double distance;
 
     /*
-     * Bounds of the signed distance; from -hi to hi if it is unknown whether the position is
-     * inside.
+     * Bounds of the signed distance. lo = -hi: the position may be inside or outside.
      */
     double lo, hi;
 
     /*
-     * Unit vector, outward for solids: as in ebpo_haptic_ball_result if a face is within
-     * `search_radius`; else that of the previous nearest face, or (0, 0, 0) if there was none.
+     * Unit vector, outward for solids. As in ebpo_haptic_ball_result if a face is within
+     * `search_radius`; else the normal of the previous nearest face, or (0, 0, 0) if there was
+     * none.
      */
     double normal[3];
 
@@ -275,20 +284,19 @@ typedef struct ebpo_haptic_probe_result {
     /* ebpo_haptic_flag bits */
     uint32_t flags;
 
-    /* Faces tested in this step. */
+    /* Number of faces tested in this step. */
     uint64_t work;
 } ebpo_haptic_probe_result;
 
 /*
- * Computes one haptic step of a probe, which has no collisions: bounds of the distance from its
- * position to the model, from data in memory. The bounds combine
- *   - the near faces, and by exact arithmetic the side of each on which the probe passed through
- *     it: within `search_radius` of a face the result is exact except for rounding;
- *   - the first levels of the octree, at most 2^17 nodes: cells with faces, and cells without faces
- *     that are inside;
- *   - the exact result for a previous position of the probe, from the loading thread: the distance
- *     has changed by at most the path since.
- * Time, locks, memory and reading are as in ebpo_haptic_step_ball.
+ * Computes one haptic step of a probe, which has no collisions: bounds of the distance from the
+ * position `place` to the model, from data in memory. The bounds combine
+ *   - the near faces, and the sides of these faces on which the probe is, which are tracked by
+ *   exact arithmetic: within `search_radius` of a face the result is exact except for rounding;
+ *   - the first levels of the octree, at most 2^17 nodes: leaves and gray nodes, and black nodes;
+ *   - the exact result for a previous position of the probe, from the loading thread: since then
+ *   the distance has changed by at most the length of the path. Time, locks, memory and reading are
+ *   as in ebpo_haptic_step_ball.
  *
  * Threads: one per object.
  */
@@ -297,32 +305,32 @@ EBPO_API void ebpo_haptic_step_probe(ebpo_haptic *haptic, const double place[3],
 
 /* Result of a haptic step of a tool. */
 typedef struct ebpo_haptic_tool_result {
-    /* Pose of the tool on the free side: position, and rotation as a unit quaternion x, y, z, w. */
+    /* Pose of the proxy: position, and rotation as a unit quaternion x, y, z, w. */
     double proxy[3], turn[4];
 
     /*
-     * Force and torque for the device, in the axes of the model; the torque is about the tool's
+     * Force and torque for the device, along the axes of the model. The torque is about the tool's
      * position. 0 unless EBPO_HAPTIC_CONTACT.
      */
     double force[3], torque[3];
 
     /*
-     * In contact: distance of the device behind the proxy along motions that contacts prevent, with
-     * angles as lengths (ebpo_haptic_step_tool). Else 0.
+     * In contact: length of the motion from proxy to device that contacts prevent, with angles as
+     * lengths (ebpo_haptic_step_tool). Else 0.
      */
     double depth;
 
     /*
-     * The point nearest to a face, if within 2 skins: its index in the tool (EBPO_NO_FACE: none),
-     * the face as in ebpo_distance_result, and the unit vector from the face to the point.
+     * The point nearest to a face, if within 2 skins: index of the point in the tool (EBPO_NO_FACE:
+     * none), the face as in ebpo_distance_result, and the unit vector from the face to the point.
      */
     uint64_t point, face;
     double normal[3];
 
-    /* Number of pairs of a point and a face that near, at most 256. */
+    /* Number of pairs of a point and a face within 2 skins, at most 256. */
     uint64_t contacts;
 
-    /* Nodes visited in this step, plus six for each face. */
+    /* Number of nodes visited in this step, plus six for each tested face. */
     uint64_t work;
 
     /* ebpo_haptic_flag bits */
@@ -331,24 +339,25 @@ typedef struct ebpo_haptic_tool_result {
 } ebpo_haptic_tool_result;
 
 /*
- * Computes one haptic step of a tool with the device at `place`, rotated by the quaternion x, y, z,
- * w of any length. No point of the tool passes through a face, or comes closer than half a skin to
- * one; each step is decided as for a ball. Between its points a tool has no collisions, so their
- * spacing must be finer than the features to feel.
+ * Computes one haptic step of a tool with the device at position `place`, rotated by the quaternion
+ * `turn` (x, y, z, w, of any length). No point of the tool passes through a face, or comes closer
+ * than half a skin to a face; this is decided by exact arithmetic, as for a ball. Between its
+ * points a tool has no collisions, so the spacing of points must be finer than the features to
+ * feel.
  *
  * A rotation counts as its angle times the arm of the tool, the root mean square distance of the
  * points from the tool's position. Among all motions that the contacts allow, the proxy takes the
  * one that ends nearest to the device. Force and torque are those of a spring of `stiffness` for
- * the prevented motion (for an angle, stiffness times arm^2). They are reduced by the energy rule
- * of ebpo_haptic_step_ball, which includes rotations as lengths.
+ * the prevented motion (for an angle, stiffness times arm^2). They are reduced as in
+ * ebpo_haptic_step_ball to bound the energy, with rotations as lengths.
  *
- * Time is bounded as in ebpo_haptic_step_ball. Points that cannot have come near since their last
- * test take almost no time. If many points are near and the work exceeds a step, the next steps
- * continue it (EBPO_HAPTIC_INCOMPLETE), and the tool does not move until then.
+ * Time is bounded as in ebpo_haptic_step_ball. Points that cannot have come near a face since their
+ * last test take almost no time. If many points are near and the work exceeds a step, the next
+ * steps continue it (EBPO_HAPTIC_INCOMPLETE), and the tool does not move until then.
  *
  * Methods: Ortega, Redon and Coquillart 2007 (six degrees of freedom, motion by Gauss' principle);
  * McNeely, Puterbaugh and Troy 1999 (points for a tool); Barbic and James 2008 (clusters of points,
- * tested only if they can have come near).
+ * tested only if they can have come near a face).
  *
  * Threads: one per object.
  */
@@ -385,22 +394,25 @@ typedef struct ebpo_haptic_stats {
     /* Number of steps with each of these flags. */
     uint64_t contacts, waiting, incomplete, partial;
 
-    /* Boxes loaded, boxes used by steps, boxes cancelled because of too many faces. */
+    /*
+     * Number of boxes loaded, of boxes used by steps, and of boxes cancelled because of too many
+     * faces.
+     */
     uint64_t loads, taken, too_many;
 
     /* Faces of the current box; maximum number of faces tested in a step. */
     uint64_t faces, work_max;
 
     /*
-     * Energy given to the device by forces minus energy taken; its maximum over time. Longest step
-     * of the device.
+     * Energy given to the device by forces minus energy taken from the device; the maximum of this
+     * difference over time; longest step of the device.
      */
     double energy, energy_max, longest_step;
 
-    /* Bytes of the boxes. */
+    /* Memory of the boxes in bytes. */
     uint64_t memory;
 
-    /* Seconds of loading: total, and maximum of one box. */
+    /* Seconds of loading: total, and maximum for one box. */
     double load_seconds, load_seconds_max;
 
     /* Number of steps with EBPO_HAPTIC_STOPPED. */

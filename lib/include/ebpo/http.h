@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * Reads files on web servers and object stores by ranges.
+ * Reads files on web servers and object stores, by HTTP range requests.
  *
  *     ebpo_open("https://example.org/model.ebpo.h5", &file, &error);
  *
@@ -9,12 +9,13 @@
  *     options.cache_folder = "/var/cache/models";
  *     ebpo_open_url("https://example.org/model.ebpo.h5", &options, &file, &error);
  *
- * The server must respond to "Range: bytes=a-b" with 206. Opening takes one request for the first
- * 128 KiB, which usually include levels 0 to 4. Later data is fetched in advance in requests of up
- * to 4 MiB, several at a time.
+ * The server must respond to "Range: bytes=a-b" with the status code 206. Opening takes one request
+ * for the first 128 KiB, which usually include levels 0 to 4. Later data is fetched in advance in
+ * requests of up to 4 MiB, several at a time.
  *
- * Every response is checked: its range, its size, and the version of the file (ETag, weak or not,
- * else Last-Modified, and size), which must be that of the opened file.
+ * Every response is checked: its range, its size, and the version of the file, which must be that
+ * of the opened file. The version is the size and the ETag, weak or not; without ETag,
+ * Last-Modified.
  *
  * Without libcurl the functions return EBPO_E_UNSUPPORTED.
  */
@@ -40,8 +41,7 @@ typedef struct ebpo_http_options {
     double stall_timeout;
 
     /*
-     * Seconds for one request with all retries and pauses; above 0. Reading a piece never takes
-     * longer.
+     * Seconds for one request with all retries and pauses; above 0. No single read takes longer.
      */
     double time_limit;
 
@@ -51,29 +51,32 @@ typedef struct ebpo_http_options {
      */
     unsigned retries;
 
-    /* Requests at the same time, 1 to 32; at most six above 1 MiB. */
+    /*
+     * Maximum number of requests at the same time, 1 to 32. At most six of them are for more than 1
+     * MiB.
+     */
     unsigned connections;
 
     /*
-     * Limit in bytes for prefetched and recently read data; exceeded while readers wait for pieces
-     * of 4 MiB. Not part of a model's budget.
+     * Memory limit in bytes for prefetched and recently read data. It is exceeded while readers
+     * wait for responses of up to 4 MiB. Not part of a model's budget.
      */
     uint64_t memory;
 
     /*
-     * A file of at most this many bytes is read completely into memory if the server does not
-     * support ranges or sends no version.
+     * If the server does not support ranges or sends no version, a file of at most this many bytes
+     * is read completely into memory.
      */
     uint64_t whole_limit;
 
     /*
-     * Compares only the size of the file, for servers that send neither ETag nor Last-Modified, and
-     * for addresses of several servers with different ETags. A change during reading may not be
-     * detected.
+     * True: only the size of the file is compared. For servers that send neither ETag nor
+     * Last-Modified, and for addresses of several servers that send different ETags. A change
+     * during reading may then not be detected.
      */
     bool unversioned;
 
-    /* Reads names and passwords from ~/.netrc. */
+    /* True: reads user names and passwords from ~/.netrc. */
     bool netrc;
 
     /* "name:password" for basic authentication, or NULL. */
@@ -83,12 +86,12 @@ typedef struct ebpo_http_options {
     const char *ca_file;
 
     /*
-     * In the form of libcurl. NULL: from the environment (http_proxy, https_proxy, no_proxy). "":
-     * none.
+     * Proxy, as for CURLOPT_PROXY of libcurl. NULL: from the environment (http_proxy, https_proxy,
+     * no_proxy). "": none.
      */
     const char *proxy;
 
-    /* NULL: libebpo/VERSION. */
+    /* Header User-Agent. NULL: libebpo/VERSION. */
     const char *user_agent;
 
     /*
@@ -98,12 +101,12 @@ typedef struct ebpo_http_options {
     const char *const *headers;
 
     /*
-     * Folder that keeps fetched bytes for later use; it and its parents are made if missing. Any
-     * number of processes may share it. NULL: none.
+     * Cache folder, which keeps fetched bytes for later use. The folder and its parents are made if
+     * missing. Any number of processes may share it. NULL: none.
      */
     const char *cache_folder;
 
-    /* Size limit of the folder in bytes. The least recently used blocks are removed first. */
+    /* Size limit of the cache folder in bytes. The least recently used blocks are removed first. */
     uint64_t cache_bytes;
 
     /*
@@ -114,9 +117,9 @@ typedef struct ebpo_http_options {
     void *stop_user;
 
     /*
-     * Block size of the folder in bytes, a power of two from 4 KiB to 128 KiB; 0: 32 KiB. Fetched
-     * ranges are rounded outward to whole blocks. Smaller blocks reduce the transferred bytes and
-     * increase the number of blocks. Blocks of other sizes are not found.
+     * Block size of the cache folder in bytes, a power of two from 4 KiB to 128 KiB; 0: 32 KiB.
+     * Fetched ranges are rounded outward to whole blocks. Smaller blocks reduce the transferred
+     * bytes and increase the number of blocks. Blocks of other sizes are not found.
      */
     unsigned cache_block;
 
@@ -133,23 +136,24 @@ typedef struct ebpo_http_options {
 typedef struct ebpo_http_stats {
     size_t struct_size;
 
-    /* Requests sent, including retries and redirects. */
+    /* Number of requests sent, including retries and redirects. */
     uint64_t requests;
 
-    /* Requests that were repeated after a failure. */
+    /* Number of requests that were repeated after a failure. */
     uint64_t retries;
 
-    /* Connections made. */
+    /* Number of connections made. */
     uint64_t connections;
 
-    /* Bytes received in bodies. */
+    /* Bytes received in the bodies of responses. */
     uint64_t bytes;
 
-    /* Requests served from the cache folder, and their bytes. */
+    /* Number of requests that the cache folder served completely, and bytes served from it. */
     uint64_t cache_hits, cache_bytes;
 
     /*
-     * Bytes in the folder at opening: of this version of the file, and of other files and versions.
+     * Bytes in the cache folder at opening: of this version of the file, and of other files and
+     * versions.
      */
     uint64_t cache_held, cache_others;
 
@@ -160,15 +164,15 @@ typedef struct ebpo_http_stats {
 #define EBPO_HTTP_STATS_INIT EBPO_SIZED(ebpo_http_stats)
 
 /*
- * Writes a URL for messages to `out`: without user, password and the part from "?" on. Other names
- * are unchanged. Truncates to `space` bytes. Returns `out`.
+ * Writes a URL for messages to `out`, without user name, password and the part from "?" on. Names
+ * that are not URLs are unchanged. Truncates to `space` bytes. Returns `out`.
  *
  * Threads: any.
  */
 EBPO_API char *ebpo_url_redact(const char *name, char *out, size_t space);
 
 /*
- * True for names that begin with http:// or https://.
+ * Returns true for names that begin with http:// or https://.
  *
  * Threads: any.
  */
@@ -178,10 +182,10 @@ EBPO_API bool ebpo_is_url(const char *name);
  * Makes a source for a URL, after the first response was received. Texts of the options are copied.
  * Initialize `out` with EBPO_SOURCE_INIT. Close it by out->close, or pass it to ebpo_open_source.
  *
- * EBPO_E_IO: the server was not reached, refused, or sent wrong responses. EBPO_E_UNSUPPORTED: the
- * server does not support ranges and the file is too large, or the library was built without HTTP.
- * EBPO_E_ARGUMENT: not a URL, options out of range, or a cache folder that cannot be used.
- * EBPO_E_CANCELLED.
+ * EBPO_E_IO: the server was not reached, refused the request, or sent wrong responses.
+ * EBPO_E_UNSUPPORTED: the server does not support ranges and the file is too large, or the library
+ * was built without HTTP. EBPO_E_ARGUMENT: not a URL, options out of range, or a cache folder that
+ * cannot be used. EBPO_E_CANCELLED.
  *
  * Reading can return EBPO_E_IO and EBPO_E_CANCELLED. If the file on the server has changed since
  * opening, all reads fail.
@@ -201,8 +205,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_open_url(const char *url, const ebpo_htt
                                                  ebpo_file **out, ebpo_error *error);
 
 /*
- * Gets statistics of network transfers. EBPO_E_ABSENT, and zeros: the file was not opened by its
- * URL.
+ * Gets statistics of network transfers. EBPO_E_ABSENT: the file was not opened by its URL; the
+ * statistics are zeros.
  *
  * Threads: any.
  */

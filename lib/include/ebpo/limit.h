@@ -18,8 +18,8 @@ typedef struct ebpo_limit_options {
     ebpo_progress progress;
 
     /*
-     * 1: volumes in units of the root cell, 0 to 1, independent of the model's scale. 0: in the
-     * cube of its unit.
+     * 1: volumes as fractions of the root cell, 0 to 1, independent of the model's scale. 0:
+     * volumes in the cube of the model's unit.
      */
     uint64_t in_root_cells;
 } ebpo_limit_options;
@@ -34,8 +34,8 @@ typedef struct ebpo_limit {
     size_t struct_size;
 
     /*
-     * Volume of the level: hulls of gray nodes and leaves, cells of black nodes, for the nodes of
-     * ebpo_lod_level.
+     * Volume of the level: sum over the nodes of ebpo_lod_level; hulls of gray nodes and leaves,
+     * cells of black nodes.
      */
     double volume;
 
@@ -53,15 +53,16 @@ typedef struct ebpo_limit {
 
 /*
  * Computes the volume of the convex hull of the solid in each cell (for a surface: of its faces
- * there), summed over a level. qhull computes it from the parts of faces in the cell and the cell's
- * corners that are inside.
+ * there), summed over a level. qhull computes the hull from the parts of faces in the cell, and
+ * from the corners of the cell that are inside the solid.
  *
- * The sum is rounded and not certified: use it for comparison. In the cube of the model's unit it
- * is infinite or 0 if a double cannot hold the volume of a cell, with coordinates beyond about
+ * The sum is rounded and not certified: use it for comparison. In the cube of the model's unit, the
+ * sum is infinite or 0 if a double cannot hold the volume of a cell, with coordinates beyond about
  * 1e102 or below 1e-102.
  *
- * The decoded tree and mesh are in memory, and a number for each node of the level; the cost of a
- * hull depends on its faces. Memory and time have no other limit, except by `progress`.
+ * The decoded tree and mesh are in memory, and a number for each node of the level. The cost of a
+ * hull depends on the faces in the cell. Memory and time are not limited; `progress` can stop the
+ * call.
  *
  * EBPO_E_ABSENT: the file has no mesh, or the library was built without qhull. The errors of
  * reading.

@@ -14,7 +14,7 @@ extern "C" {
 typedef struct ebpo_lod_options {
     size_t struct_size;
 
-    /* Keeps polygons on cell faces, so that each envelope is closed. */
+    /* True: polygons on cell faces are kept, so that each envelope is closed. */
     bool cell_faces;
 
     unsigned threads;
@@ -31,10 +31,10 @@ typedef struct ebpo_lod_options {
     }
 
 /*
- * Computes the envelopes of `level`: of its gray nodes, and of the leaves and black nodes of levels
- * 0 to `level`. Each is a convex polyhedron, cut from its cell by the half-spaces of the node and
- * its ancestors. Leaves are cut by stored planes if the file has them, else by planes derived from
- * their faces (EBP 2017, 3.4).
+ * Computes the envelopes of a level: those of its gray nodes, and of the leaves and black nodes of
+ * levels 0 to `level`. Each envelope is a convex polyhedron, cut from the node's cell by the
+ * half-spaces of the node and its ancestors. Leaves are cut by stored planes if the file has them,
+ * else by planes derived from their faces (EBP 2017, 3.4).
  *
  * The polygons are rounded. Only the decoded half-spaces are guaranteed to contain the solid.
  *
@@ -42,8 +42,8 @@ typedef struct ebpo_lod_options {
  *          Freed by ebpo_mesh_free. NULL: only the volume.
  * volume   sum of the polyhedra's volumes, in the cube of the model's unit; or NULL
  *
- * The level's nodes, their polygons and `out` are in memory independent of `workspace`. Memory and
- * time depend on the level without other limit, except by `progress`.
+ * The level's nodes, their polygons and `out` are in memory that `workspace` does not limit. Memory
+ * and time depend on the level; `progress` can stop the call.
  *
  * EBPO_E_LIMIT: more than 2^32 - 2 vertices or triangles. The errors of reading.
  *
@@ -60,7 +60,9 @@ typedef struct ebpo_lod_node {
     /* Volume of the envelope, in the cube of the model's unit. */
     double volume;
 
-    /* Black: in the cell. Leaf: at the lowest corner. Gray, and surfaces: 0. */
+    /*
+     * Winding number. Black: in the cell. Leaf: at the lowest corner. Gray nodes, and surfaces: 0.
+     */
     int32_t winding;
 
     /* EBPO_GRAY (only on the requested level), EBPO_LEAF or EBPO_BLACK. */
@@ -70,8 +72,8 @@ typedef struct ebpo_lod_node {
     uint32_t vertex_count, polygon_count;
 
     /*
-     * Red + 256 green + 65,536 blue, sRGB. Gray nodes: their own colour; leaves and black nodes:
-     * their parent's. Gray (0x808080) if `coloured` is 0.
+     * Colour: red + 256 green + 65,536 blue, sRGB. A gray node has its own colour; leaves and black
+     * nodes have that of their parent. 0x808080 if `coloured` is 0.
      */
     uint32_t colour;
 
@@ -115,8 +117,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_level_nodes(const ebpo_file *file, i
                                                         double *volume, ebpo_error *error);
 
 /*
- * Gets the colours of a level's vertices, those of their nodes; none if the file has no colours.
- * Faces have none.
+ * Gets the colours of a level's vertices, which are those of their nodes. If the file has no
+ * colours, there are none. Faces have no colours.
  *
  * vertex_count  of the mesh returned with the nodes
  * out           freed by ebpo_colours_free; cleared on failure
@@ -130,10 +132,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes,
                                                     ebpo_error *error);
 
 /*
- * Computes normals for shading a level's polygons. Polygons on planes have their own normal.
- * Polygons on faces between cells are steps, not surface: they have the area-weighted mean normal
- * of the surrounding planes that face the same side, or their own if there is none. Faces of the
- * root cell count as planes. For images only: rounded, without guarantee about the solid.
+ * Computes normals for shading a level's polygons. A polygon on a plane of the envelope gets its
+ * own normal. A polygon on a cell face is only a step between two envelopes; it gets the
+ * area-weighted mean normal of the surrounding planes that face the same side, or its own normal if
+ * there are none. Faces of the root cell count as planes. For images only: rounded, without
+ * guarantee about the solid.
  *
  * info  of the file of the level
  * mesh  returned with the nodes

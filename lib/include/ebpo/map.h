@@ -3,9 +3,9 @@
  * model, with statistics and colours.
  *
  *   Distances     ebpo_map_points, ebpo_map_lattice
- *   Files         ebpo_map_write: HDF5 for VTK, NRRD
- *   Two scans     ebpo_map_points for the vertices of one, ebpo_map_describe, ebpo_map_range,
- *                 ebpo_map_paint
+ *   Files         ebpo_map_write (HDF5 for VTK, NRRD)
+ *   Two scans     ebpo_map_points (for the vertices of one scan), ebpo_map_describe,
+ *                 ebpo_map_find_range, ebpo_map_paint
  *   Colours       ebpo_map_colour
  *
  * Sources: BP 2008, figures 5.8 and 5.9; EBP 2017, section 4.4 and figures 90 to 92.
@@ -25,10 +25,12 @@ extern "C" {
 typedef struct ebpo_map_options {
     size_t struct_size;
 
-    /* Points farther away, in the model's unit, get INFINITY, which is faster; at least 0. */
+    /*
+     * Points farther away than this get INFINITY, which is faster. In the model's unit; at least 0.
+     */
     double max_distance;
 
-    /* True: without signs. Surfaces have none. */
+    /* True: distances have no signs. Distances from surfaces never have signs. */
     bool unsigned_distance;
 
     uint8_t reserved[3];
@@ -83,15 +85,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lattice_of_box(const double low[3], cons
 
 /*
  * Receives values[layers][count[1]][count[0]], lent until it returns, in the lattice's order, from
- * layer `first` on. Any result except EBPO_OK ends the map with that status; the function then
- * fills in `error`.
+ * layer `first` on. Any return value except EBPO_OK ends the map with that status; the callback
+ * then fills in `error`.
  */
 typedef ebpo_status (*ebpo_map_fn)(void *user, const double *values, uint64_t first,
                                    uint64_t layers, ebpo_error *error);
 
 /*
- * Computes the distances at a lattice's points and passes them to `take` by layers. Takes memory
- * for some layers, 8 bytes per point: about 64 MiB, or one layer if that is more.
+ * Computes the distances at a lattice's points and passes them to `take` by layers. Memory: a few
+ * layers, 8 bytes per point; about 64 MiB in total, or one layer if that is more.
  *
  * EBPO_E_ARGUMENT: also a lattice with points that are not finite, or too many. Other errors are
  * those of ebpo_map_points.
@@ -124,11 +126,11 @@ typedef struct ebpo_map_stats {
     double farthest;
 
     /* Mean of the values; mean of absolute values; root mean square; standard deviation. */
-    double mean, mean_unsigned, rms, error_bound;
+    double mean, mean_unsigned, rms, standard_deviation;
 
     /*
-     * The least value that this percentage of the finite values does not exceed; signed and
-     * absolute.
+     * For each percentage (ebpo_map_percent): the least value that this percentage of the finite
+     * values does not exceed. For signed and for absolute values.
      */
     double percentile[EBPO_MAP_PERCENTILES], percentile_unsigned[EBPO_MAP_PERCENTILES];
 } ebpo_map_stats;
@@ -157,7 +159,10 @@ typedef struct ebpo_map_range_options {
     /* Bounds are refined until hi <= (1 + tolerance) lo. Above 0. */
     double tolerance;
 
-    /* Stops after about this many distances besides those of vertices. 0: 16 for each face. */
+    /*
+     * The search stops after about this many distances, besides those of vertices. 0: 16 for each
+     * face.
+     */
     uint64_t queries;
 
     unsigned threads; /* 0: all cores */
@@ -180,7 +185,7 @@ typedef struct ebpo_map_range {
      */
     double lo, hi;
 
-    /* Point of a face at distance lo. */
+    /* Point on a face of the mesh, at distance lo from the model. */
     double place[3];
 
     uint64_t queries;
@@ -214,7 +219,10 @@ typedef enum ebpo_map_palette {
      */
     EBPO_MAP_DIVERGING = 0,
 
-    /* EBP 2017, section 4.4: black on the surface, red close to it, green near, blue far. */
+    /*
+     * As in EBP 2017, section 4.4: black on the surface, then red, green, and blue for the
+     * farthest.
+     */
     EBPO_MAP_THESIS = 1,
     EBPO_MAP_PALETTES
 } ebpo_map_palette;
@@ -227,7 +235,8 @@ typedef enum ebpo_map_palette {
 EBPO_API const char *ebpo_map_palette_name(ebpo_map_palette palette);
 
 /*
- * Gets the sRGB colour of a distance, clamped to `range`, which is above 0. Not finite: grey.
+ * Gets the sRGB colour of a distance. The distance is clamped to -range .. range; `range` is above
+ * 0. A distance that is not finite is grey.
  *
  * Threads: any.
  */

@@ -3,7 +3,7 @@
  *
  *   Reading      ebpo_mesh_read, ebpo_points_parse_ply
  *   Writing      ebpo_mesh_write_ply
- *   Preparing    ebpo_mesh_prepare: the following steps in the best order
+ *   Preparing    ebpo_mesh_prepare (the following steps, in the best order)
  *   Checking     ebpo_mesh_check
  *   Order        ebpo_mesh_arrange
  *   Repairing    ebpo_mesh_weld, ebpo_mesh_weld_within, ebpo_mesh_drop_duplicates,
@@ -35,18 +35,18 @@ typedef enum ebpo_attribute_type {
 } ebpo_attribute_type;
 
 /*
- * An indexed triangle mesh, as plain data. Callers may read the members. A caller that makes a mesh
- * clears the struct, sets the members, allocates the arrays with malloc, and frees the mesh with
- * ebpo_mesh_free. At most 2^32 - 2 vertices and 2^32 - 2 faces.
+ * An indexed triangle mesh, as plain data, of at most 2^32 - 2 vertices and 2^32 - 2 faces. Callers
+ * may read the members. To make a mesh, clear the struct, set the members, and allocate the arrays
+ * with malloc. Free the mesh with ebpo_mesh_free.
  */
 typedef struct ebpo_mesh {
     uint64_t vertex_count;
     uint64_t face_count;
 
     /*
-     * [vertex_count][3] Exactly one of the two is set, the other is NULL. xyz32: the source has
-     * floats, or text that floats represent (ebpo_mesh_read). xyz64: it has doubles, or text with
-     * more digits.
+     * [vertex_count][3] coordinates. Exactly one of the two arrays is set, the other is NULL.
+     * xyz32: the source has floats, or text that floats represent (ebpo_mesh_read). xyz64: the
+     * source has doubles, or text with more digits.
      */
     float *xyz32;
     double *xyz64;
@@ -55,8 +55,8 @@ typedef struct ebpo_mesh {
     uint32_t *faces;
 
     /*
-     * Source faces that were changed by reading: polygons of more than three corners, the concave
-     * ones among them, triangle strips, and omitted faces of fewer than three corners.
+     * Number of faces of the source that reading changed: polygons of more than three corners,
+     * concave polygons among these, triangle strips, and omitted faces of fewer than three corners.
      */
     uint64_t polygons_triangulated;
     uint64_t polygons_concave;
@@ -83,7 +83,7 @@ typedef struct ebpo_mesh {
 
     /*
      * Limits the memory for checking and building. NULL: no limit. The arrays may be allocated from
-     * it or with malloc.
+     * the workspace or with malloc.
      */
     ebpo_workspace *workspace;
 
@@ -94,8 +94,8 @@ typedef struct ebpo_mesh {
     struct ebpo_attributes *attributes;
 
     /*
-     * Triangulated polygons whose outline crosses itself: their triangles of least area are a
-     * guess. Index of the first triangle of the first one.
+     * Number of triangulated polygons whose outline crosses itself (their triangulation of least
+     * area is a guess), and index of the first triangle of the first such polygon.
      */
     uint64_t polygons_guessed;
     uint64_t first_guessed_face;
@@ -109,25 +109,26 @@ typedef struct ebpo_mesh {
 EBPO_API void ebpo_mesh_free(ebpo_mesh *mesh);
 
 /*
- * Returns a text on the attributes of the file that could not be kept. NULL: none was lost, or none
- * was requested. Valid as long as the mesh.
+ * Returns a text that names the attributes of the file that could not be kept. NULL: all were kept,
+ * or none were requested. Valid as long as the mesh.
  *
  * Threads: any.
  */
 EBPO_API const char *ebpo_mesh_attributes_lost(const ebpo_mesh *mesh);
 
 /*
- * Returns a text on the data of the mesh that was omitted or not found: values that the header of a
- * PLY file does not describe, texture coordinates that faces of an OBJ file name and that are
- * missing. Also reports when no attributes were requested. NULL: none. Valid as long as the mesh.
+ * Returns a text that describes data of the file that was omitted or not found: values that the
+ * header of a PLY file does not describe, and missing texture coordinates to which faces of an OBJ
+ * file refer. The text also describes data that was not read because no attributes were requested.
+ * NULL: no such data. Valid as long as the mesh.
  *
  * Threads: any.
  */
 EBPO_API const char *ebpo_mesh_ignored(const ebpo_mesh *mesh);
 
 /*
- * Returns 1 if the mesh has attributes or comments of a PLY file. Returns 0 if it has none; some
- * may have been lost.
+ * Returns 1 if the mesh has attributes, or comments of a PLY file; else 0. Attributes that could
+ * not be kept do not count.
  *
  * Threads: any.
  */
@@ -143,15 +144,16 @@ typedef struct ebpo_mesh_read_options {
     ebpo_progress progress;
 
     /*
-     * Limits the memory for the mesh and all work with it. Free it after the mesh. NULL: no limit.
+     * Limits the memory for the mesh, and for checking and building it. Free the workspace after
+     * the mesh. NULL: no limit.
      */
     ebpo_workspace *workspace;
 
     /*
-     * 1: also reads attributes, which ebpo_build takes over. PLY: all properties of vertices, faces
-     * and other elements, and comments. Other formats: colours, normals, texture coordinates, names
-     * of materials. For images that a PLY file or the material libraries of an OBJ file name: the
-     * names, and the digests of images in the file's folder or below. 0: none.
+     * 1: also reads attributes, which ebpo_build stores. PLY: all properties of vertices, faces and
+     * other elements, and comments. Other formats: colours, normals, texture coordinates, names of
+     * materials. Images to which a PLY file, or the material libraries of an OBJ file, refer: their
+     * names, and the digests of images in the file's folder or below. 0: reads no attributes.
      */
     uint64_t attributes;
 
@@ -165,23 +167,24 @@ typedef struct ebpo_mesh_read_options {
     }
 
 /*
- * Reads a PLY, OBJ, STL or OFF file. The format is recognised by the first bytes, then by the file
- * name, then, for OBJ, by the first word.
+ * Reads a PLY, OBJ, STL or OFF file. The format is recognised by the first bytes, else by the file
+ * name, else (OBJ) by the first word.
  *
  * Polygons are triangulated, including concave ones and those that touch themselves (slits, bridges
- * to holes, pinched corners). An outline that crosses itself, such as a folded quad, gets the
- * triangles of least area if it has at most 64 corners, and is counted in `polygons_guessed`.
- * Strips are unrolled.
+ * to holes, pinched corners). A polygon whose outline crosses itself, such as a folded quad, is
+ * counted in `polygons_guessed`; if it has at most 64 corners, it gets the triangles of least area.
+ * Triangle strips are converted to triangles.
  *
- * Binary positions keep every bit. Text of a PLY file is rounded correctly to the type in its
- * header. Text of other formats becomes floats if, for every coordinate, the nearest float rounded
- * to the last digit of the text gives the text again; otherwise all coordinates become doubles. In
- * these formats, vertices of equal position are merged, and unreferenced vertices are omitted.
- * Unreferenced vertices of a PLY file are omitted if their coordinates are not finite.
- * ebpo_mesh_ignored reports unread data and the largest difference between floats and the text of a
- * PLY file.
+ * Binary coordinates keep every bit. Text of a PLY file is rounded correctly to the type in the
+ * header. Text of other formats becomes floats if every coordinate is represented: the nearest
+ * float, rounded to the last digit of the text, gives the text again. Otherwise all coordinates
+ * become doubles. In files of other formats than PLY, vertices of equal position are merged, and
+ * unreferenced vertices are omitted. In PLY files, unreferenced vertices are omitted if their
+ * coordinates are not finite. ebpo_mesh_ignored describes unread data, and the largest difference
+ * between floats and the text of a PLY file.
  *
- * Safe for untrusted files. The whole file is read into an array of `workspace`.
+ * Safe for untrusted files. The whole file is read into memory, or with `workspace` into one of its
+ * arrays.
  *
  * EBPO_E_IO: also if another program changes the file during reading. EBPO_E_FORMAT: not a mesh, or
  * damaged. EBPO_E_LIMIT: too large. EBPO_E_UNSUPPORTED: a variant that is not supported, such as
@@ -194,12 +197,13 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_read(const char *path,
                                                   ebpo_mesh *out, ebpo_error *error);
 
 /*
- * Reads the vertices of a PLY file in memory, of every variant that ebpo_mesh_read supports. Faces
- * are ignored and may be missing. Coordinates may be NaN or infinite. Safe for untrusted data.
+ * Reads the vertices of a PLY file that is in memory. All variants that ebpo_mesh_read supports are
+ * allowed. Faces are ignored and may be missing. Coordinates may be NaN or infinite. Safe for
+ * untrusted data.
  *
  * name    for messages
- * xyz     [*count][3] doubles; floats and integers are widened exactly. Text of type float that a
- *         float does not represent becomes the nearest double. Freed by free().
+ * xyz     [*count][3] doubles; floats and integers are converted exactly. Text of type float that
+ *         no float represents becomes the nearest double. Freed by free().
  *
  * EBPO_E_FORMAT, EBPO_E_LIMIT.
  *
@@ -235,14 +239,15 @@ typedef struct ebpo_finding {
 } ebpo_finding;
 
 /*
- * Properties of a mesh. Edges are undirected pairs of distinct vertex indices. The index of an edge
- * is the lowest face that uses it; a face with two such edges is listed twice.
+ * Properties of a mesh. Edges are undirected pairs of distinct vertex indices. The location of an
+ * edge is the index of the lowest face that uses the edge; a face with two such edges is listed
+ * twice.
  */
 typedef struct ebpo_mesh_report {
     /*
      * True if each edge is used equally often in both directions. Then winding numbers are well
-     * defined and the mesh is a solid; the class is wider than the closed 2-manifolds of the
-     * theses.
+     * defined, and the mesh is a solid. Not every such mesh is a closed 2-manifold, as the theses
+     * require.
      */
     bool balanced;
 
@@ -258,16 +263,19 @@ typedef struct ebpo_mesh_report {
     /* Edges that are used twice in the same direction. */
     ebpo_finding misoriented_edges;
 
-    /* Edges whose directions do not cancel: all of the above except those that cancel. */
+    /*
+     * Edges that are not used equally often in both directions. They are among the three previous
+     * kinds.
+     */
     ebpo_finding unbalanced_edges;
 
     /*
-     * Vertices whose faces form more than one fan (a chain across edges used twice), including the
-     * ends of non-manifold edges.
+     * Vertices whose faces form more than one fan, including the ends of non-manifold edges. A fan
+     * is a chain of faces connected by edges that are used twice.
      */
     ebpo_finding bowtie_vertices;
 
-    /* By an exact test; includes index_repeated_faces. */
+    /* Faces without area, by an exact test; includes index_repeated_faces. */
     ebpo_finding zero_area_faces;
 
     /* Faces that use a vertex twice. */
@@ -286,22 +294,26 @@ typedef struct ebpo_mesh_report {
 
     uint64_t edges;
 
-    /* Parts of the mesh that share no vertex; vertices without faces are not counted. */
+    /*
+     * Number of parts of the mesh that share no vertices. Vertices without faces are not counted.
+     */
     uint64_t components;
 
-    /* Holes: closed chains of boundary edges, split where they pass a vertex twice. */
+    /*
+     * Number of holes: closed chains of boundary edges, split where a chain passes a vertex twice.
+     */
     uint64_t boundary_loops;
 
     /* Sum of the genus of all components; known only for a closed 2-manifold. */
     bool genus_known;
     int64_t genus;
 
-    /* In the square of the source's unit. */
+    /* Area, in the square of the source's unit. */
     double area;
 
     /*
-     * In the cube of the source's unit, signed: the integral of the winding number
-     * (ebpo_solid_volume_of, query.h). 0 for a surface.
+     * Signed volume, in the cube of the source's unit: the integral of the winding number (see
+     * ebpo_solid_volume_of in query.h). 0 for a surface.
      */
     double volume;
 
@@ -315,8 +327,8 @@ typedef struct ebpo_mesh_report {
 /*
  * Checks a mesh and counts findings.
  *
- * EBPO_E_FORMAT: a coordinate is NaN or infinite, a vertex index is out of range, or there are no
- * faces; the message gives the location. EBPO_E_ARGUMENT: the struct is not valid. EBPO_E_LIMIT,
+ * EBPO_E_FORMAT: a coordinate is NaN or infinite, a vertex index is out of range, or the mesh has
+ * no faces; the message gives the location. EBPO_E_ARGUMENT: the struct is not valid. EBPO_E_LIMIT,
  * EBPO_E_IO.
  *
  * Threads: any.
@@ -328,10 +340,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_check(const ebpo_mesh *mesh, unsign
 /*
  * Sorts vertices and faces along a Morton curve, so that neighbours in space are neighbours in
  * memory. Checking and building then access memory in order, so a mesh can be larger than memory.
- * The mesh keeps the original indices; reports and files use them. ebpo_build calls it if needed.
+ * The mesh keeps the source indices, which reports and files use. ebpo_build calls this function if
+ * needed.
  *
- * Errors are those of ebpo_mesh_check for the struct, coordinates and faces. EBPO_E_LIMIT:
- * coordinates are too large for an exact grid. On failure the mesh is unchanged.
+ * Errors are those of ebpo_mesh_check. EBPO_E_LIMIT: coordinates are too large for an exact grid.
+ * On failure the mesh is unchanged.
  *
  * Threads: one per mesh.
  */
@@ -340,7 +353,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_arrange(ebpo_mesh *mesh, unsigned t
 
 /* ---- repairing ---- */
 
-/* Repairs that were made. They are recorded in the file. */
+/* Repairs that were made. ebpo_build stores them in the file. */
 typedef struct ebpo_repair_record {
     /* Requested steps. */
     bool weld, orient, fill_holes, drop_duplicates;
@@ -350,12 +363,15 @@ typedef struct ebpo_repair_record {
 
     uint64_t flipped_faces;
 
-    /* Components that cannot be oriented, or whose faces around an edge cannot alternate. */
+    /*
+     * Components that cannot be oriented, or whose faces around an edge cannot have alternating
+     * directions.
+     */
     uint64_t unorientable_components;
 
     uint64_t filled_holes;
 
-    /* They are at the end of the list of faces. */
+    /* Faces that fill holes; at the end of the list of faces. */
     uint64_t added_faces;
 
     /* Chains of boundary edges that are not simple loops. */
@@ -368,8 +384,8 @@ typedef struct ebpo_repair_record {
     uint64_t dropped_opposite;
 
     /*
-     * Distance given to ebpo_mesh_weld_within, and the largest distance that it moved a vertex; 0:
-     * not called.
+     * Distance given to ebpo_mesh_weld_within, and the largest distance by which it moved a vertex.
+     * 0: it was not called.
      */
     double weld_distance;
     double weld_moved;
@@ -379,8 +395,8 @@ typedef struct ebpo_repair_record {
 } ebpo_repair_record;
 
 /*
- * Repair functions. They add their counts to `record`, which begins with zeros and may be NULL.
- * They use all cores.
+ * Rules for the repair functions: they add their counts to `record`, which the caller clears first,
+ * and which may be NULL. They use all cores.
  *
  * EBPO_E_FORMAT: a vertex index is out of range. EBPO_E_LIMIT: more than 2^32 - 2 faces. EBPO_E_IO.
  * On failure the mesh is unchanged.
@@ -401,10 +417,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld(ebpo_mesh *mesh, ebpo_repair_r
  * vertex is within the distance. Each other vertex is merged into the nearest kept vertex (the
  * first of several at equal distance). Distances are compared exactly.
  *
- * No vertex moves farther than the distance, chains of near vertices do not drift, and no two kept
- * vertices are within the distance. The result does not depend on the order of vertices. A kept
- * vertex keeps its position, index and attributes. Faces that then use a vertex twice stay and are
- * counted in `collapsed_faces`.
+ * No vertex moves farther than the distance, also in a chain of near vertices. No two kept vertices
+ * are within the distance. The result does not depend on the order of vertices. A kept vertex keeps
+ * its position, index and attributes. Faces that then use a vertex twice stay and are counted in
+ * `collapsed_faces`.
  *
  * distance   in the mesh's unit; above 0, and less than the longest side of the bounding box of all
  *            vertices
@@ -423,10 +439,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_weld_within(ebpo_mesh *mesh, double
  * orientation, the first of the source stays. `repeated_faces` counts the others. The order and the
  * source indices are kept, and attributes of faces remain assigned by source index.
  *
- * A second face of the same orientation counts winding numbers and volume twice. Two faces of
- * opposite orientation cancel, as the sides of a sheet and the boundaries between solids do, so a
- * mesh may be balanced with both and not with one. `dropped_opposite` counts them; ebpo_mesh_check
- * and ebpo_mesh_try_repairs show the effect.
+ * A second face of the same orientation counts twice in winding numbers and volume. Two faces of
+ * opposite orientation cancel, for example the two sides of a sheet, or the boundaries between
+ * solids. So a mesh may be balanced with both and not with one of them. `dropped_opposite` counts
+ * dropped faces of opposite orientation; ebpo_mesh_check and ebpo_mesh_try_repairs show the effect.
  *
  * EBPO_E_ARGUMENT: a component (ebpo_components_mesh) with repeated faces.
  *
@@ -437,9 +453,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_drop_duplicates(ebpo_mesh *mesh,
                                                              ebpo_error *error);
 
 /*
- * Counts the faces that ebpo_mesh_drop_duplicates would remove after vertices of equal position
- * were merged: faces at the three positions of an earlier face. If a report has no
- * `repeated_positions`, this is its `repeated_faces`.
+ * Counts the faces that ebpo_mesh_drop_duplicates would remove after ebpo_mesh_weld: faces at the
+ * three positions of an earlier face. If no positions are repeated (ebpo_mesh_report), the result
+ * is that of `repeated_faces`.
  *
  * out        count and first indices
  * opposite   count of faces whose orientation is opposite to that of the kept face
@@ -453,19 +469,19 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_count_repeated(const ebpo_mesh *mes
                                                             ebpo_error *error);
 
 /*
- * Orients neighbouring faces consistently across edges that are used twice, and orients shells
+ * Orients faces consistently: neighbours across edges that are used twice, and then shells
  * outwards, or inwards if they bound a cavity.
  *
- * A shell is a closed set of faces: it uses each edge equally often in both directions. It consists
- * of faces connected by edges that are used twice (for example each of two cubes that share a
- * vertex or an edge). If such a set is not closed, it is joined with others around edges that are
- * used more often, where faces of alternating direction close it (stacked cubes). The order around
- * an edge is decided exactly; faces in one plane are ordered by index. Faces that already alternate
- * are unchanged.
+ * A *shell* is a closed set of faces, which uses each edge equally often in both directions. Its
+ * faces are connected by edges that are used twice; so each of two cubes that share a vertex or an
+ * edge is a shell. If a set of connected faces is not closed, it is joined with other sets around
+ * edges that are used more often, so that faces of alternating direction close it (stacked cubes).
+ * The order around an edge is decided exactly; faces in one plane are ordered by index. Faces that
+ * already alternate are unchanged.
  *
  * A shell gets a positive volume, or a negative one if it is inside an odd number of other shells.
- * It is inside another shell if its least and greatest vertices along each axis are, by the exact
- * winding number (not zero). Open parts are turned so that most of their faces are unchanged. A
+ * A shell is inside another one if its least and greatest vertices along each axis are: their exact
+ * winding number is not zero. Open parts are turned so that most of their faces are unchanged. A
  * part that cannot be oriented is unchanged and counted. A part whose faces around an edge cannot
  * alternate is counted and oriented without this edge. Do not orient a mesh that has intended
  * solids inside other solids.
@@ -484,12 +500,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_flip(ebpo_mesh *mesh, ebpo_repair_r
                                                   ebpo_error *error);
 
 /*
- * Closes each boundary loop (boundary_loops) by triangles over its own vertices, appended at the
- * end. No vertices are added.
+ * Closes each boundary loop (boundary_loops of ebpo_mesh_report) by triangles between its vertices.
+ * The triangles are appended at the end; no vertices are added.
  *
- * Loops of up to 256 edges get the triangulation of least area that, if possible, creates no
- * existing edge. Longer loops are closed by ear clipping. Chains that do not close because
- * orientations differ (ebpo_mesh_orient) stay and are counted.
+ * A loop of up to 256 edges gets the triangulation of least area that, if possible, does not use an
+ * existing edge again. Longer loops are closed by ear clipping. Chains of boundary edges that do
+ * not close because orientations differ (see ebpo_mesh_orient) are unchanged, and counted.
  *
  * Threads: one per mesh.
  */
@@ -520,7 +536,7 @@ typedef struct ebpo_prepare_options {
     /* 1: also ebpo_mesh_drop_duplicates. */
     uint64_t drop_duplicates;
 
-    /* Above 0: ebpo_mesh_weld_within this distance instead of ebpo_mesh_weld. */
+    /* Above 0: ebpo_mesh_weld_within with this distance, instead of ebpo_mesh_weld. */
     double weld_distance;
 } ebpo_prepare_options;
 
@@ -532,7 +548,7 @@ typedef struct ebpo_prepare_options {
 typedef struct ebpo_prepared {
     size_t struct_size;
 
-    /* True if something was repaired: the two reports may differ. */
+    /* True if the mesh was repaired. The two reports may then differ. */
     bool was_repaired;
 
     /* Repairs that were made. */
@@ -546,9 +562,10 @@ typedef struct ebpo_prepared {
 #define EBPO_PREPARED_INIT EBPO_SIZED(ebpo_prepared)
 
 /*
- * Prepares a mesh for ebpo_build: arranges it, repairs it as requested, and checks it before and
- * after. Single calls give the same mesh and reports but may need more memory. A mesh too large for
- * an exact grid is checked as well; ebpo_build rejects it.
+ * Prepares a mesh for ebpo_build: arranges the mesh, repairs it as requested, and checks it before
+ * and after. Calls of the single functions give the same mesh and reports, but may need more
+ * memory. A mesh whose coordinates are too large for an exact grid is checked as well, but
+ * ebpo_build rejects it.
  *
  * Errors are those of the single calls. On failure `out` is cleared; the mesh is valid and includes
  * the steps that were completed.
@@ -562,11 +579,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_prepare(ebpo_mesh *mesh,
 /* ---- components ---- */
 
 /*
- * Components of a mesh. Faces that share vertices are a component. A component is closed if it uses
- * each edge equally often in both directions. A closed component of negative volume is a cavity. It
- * is assigned to the closed component of positive volume that contains its first vertex (of its
- * first face in the source), by the exact winding number (not zero); of several, to the one of
- * least volume. A cavity in no other component, and each open component, is a separate component.
+ * Components of a mesh. Faces that share vertices are in one component. A component is closed if it
+ * uses each edge equally often in both directions. A closed component of negative volume is a
+ * cavity. A cavity is joined to the closed component of positive volume that contains the first
+ * vertex of the cavity's first face in the source: the exact winding number is not zero. Of several
+ * such components, the one of least volume is used. A cavity that is in no other component stays a
+ * separate component.
  */
 typedef struct ebpo_components ebpo_components;
 
@@ -581,7 +599,7 @@ typedef struct ebpo_component {
 
     bool closed;
 
-    /* Cavities that were assigned to it. */
+    /* Number of cavities that were joined to this component. */
     uint64_t cavities;
 } ebpo_component;
 
@@ -626,8 +644,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_components_get(const ebpo_components *co
                                                        ebpo_error *error);
 
 /*
- * Returns component `number` as a mesh in the workspace of the whole mesh. It keeps the source
- * indices, which reports and files use. Repair the whole mesh before: ebpo_mesh_weld,
+ * Makes component `number` as a mesh, in the workspace of the whole mesh. It keeps the source
+ * indices, which reports and files use. Repair the whole mesh before this call: ebpo_mesh_weld,
  * ebpo_mesh_drop_duplicates and ebpo_mesh_fill_holes reject a component that they would change.
  *
  * out   freed by ebpo_mesh_free; cleared on failure

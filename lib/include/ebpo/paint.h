@@ -8,7 +8,7 @@
  *              ebpo_paint_remove_layer
  *   Notes      ebpo_paint_get_note, ebpo_paint_add_note, ebpo_paint_remove_note
  *   Strokes    ebpo_paint_get_stroke, ebpo_paint_add_stroke, ebpo_paint_remove_stroke
- *   A pen      ebpo_paint_draw, ebpo_paint_locate: from device positions to strokes and notes
+ *   A pen      ebpo_paint_draw (strokes from device positions), ebpo_paint_locate
  *   Results    ebpo_paint_cover, ebpo_paint_bake, ebpo_paint_colour_mesh, ebpo_paint_measure
  *
  *     ebpo_paint *paint = NULL;
@@ -21,14 +21,14 @@
  *     ebpo_paint_draw(paint, context, input, count, &pen, NULL, &error);
  *     ebpo_paint_save(paint, "model.paint.h5", &error);
  *
- * format-spec/paint.md defines the file and the painted area. A stroke is a sequence of points on
- * faces. Each point has a ball; it paints the part of the surface in the ball that is connected to
- * the point. Later strokes cover earlier ones; removing the last stroke undoes it. The model is
- * never changed.
+ * format-spec/paint.md defines the file and the painted area. A *stroke* is a sequence of points on
+ * faces. Each point has a ball: the point paints the part of the surface in the ball that is
+ * connected to the point. Later strokes cover earlier ones. To undo the last stroke, remove it. The
+ * model is never changed.
  *
- * A paint is entirely in memory, 48 bytes per point, and keeps a descriptor of its file open.
- * Queries of the model stay within the model's budget, plus the memory stated for each function.
- * Returned texts and arrays are lent until the paint is changed or freed.
+ * An ebpo_paint is entirely in memory, 48 bytes per point, and keeps a descriptor of its file open.
+ * Memory for queries of the model is that of the model's budget, plus the memory stated for each
+ * function. Returned texts and arrays are lent until the paint is changed or freed.
  *
  * Application: EBP 2017, section 4.5 (painting by a haptic device).
  */
@@ -44,7 +44,7 @@ extern "C" {
 
 typedef struct ebpo_paint ebpo_paint;
 
-/* Maximum numbers in a file. */
+/* Maximum numbers of layers, notes, strokes and points in a file. */
 enum {
     EBPO_PAINT_LAYERS = 1024,
     EBPO_PAINT_NOTES = 4096,
@@ -88,8 +88,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_memory(const void *data, uint
 /*
  * Opens a file for a change, and locks it against other changes. Until the first ebpo_paint_save to
  * `path`, or ebpo_paint_free, no other process or thread can open the file with this function, and
- * no other ebpo_paint_save replaces it. So changes of several programs are sequential, and none is
- * lost:
+ * no other ebpo_paint_save replaces it. So changes by several programs are sequential, and no
+ * change is lost:
  *
  *     ebpo_paint_open_to_change("model.paint.h5", model, 60, NULL, &paint, &error);
  *     ebpo_paint_add_layer(paint, &layer, NULL, &error);
@@ -101,10 +101,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_memory(const void *data, uint
  * wait       maximum waiting time in seconds
  * progress   stage "waiting"; or NULL
  *
- * A thread that opens two files this way can cause a deadlock of two programs, which ends after
- * `wait`. While the lock is held, an empty file ".NAME.lock" is in the same folder. There is no
- * lock in three cases, but ebpo_paint_save still compares: the file system has no locks (NFS
- * without its lock service), the folder is not writable, or ".NAME.lock" is not an empty file.
+ * If two programs each open two files this way, they can block each other; this ends after `wait`.
+ * While the lock is held, an empty file ".NAME.lock" is in the same folder. There is no lock if the
+ * file system has no locks (NFS without its lock service), the folder is not writable, or
+ * ".NAME.lock" is not an empty file. Even then, ebpo_paint_save detects changes by others.
  *
  * EBPO_E_IO: also if the lock is not free within `wait`. EBPO_E_CANCELLED, and the errors of
  * ebpo_paint_open and ebpo_paint_new.
@@ -119,14 +119,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_open_to_change(const char *path,
 /*
  * Writes the paint to a file, which is replaced atomically.
  *
- * A paint belongs to the file that it was read from, or else to the first file that it was saved
- * as. A save to this path fails with EBPO_E_IO if another program, or another ebpo_paint, has
+ * A paint belongs to the file from which it was read, or else to the first file to which it was
+ * saved. A save to this path fails with EBPO_E_IO if another program, or another ebpo_paint, has
  * changed or replaced the file since this paint read or saved it. Then open the file again and
  * repeat the change, or save to another path. A save to any other path replaces the file there.
  *
- * A lock protects comparing and replacing against all users of this library, in any process and
- * thread. Other programs may replace the file between the two. Without locks (see
- * ebpo_paint_open_to_change) a short time between the two remains.
+ * The save compares the file with what this paint read or saved, and then replaces it. A lock
+ * protects both steps against all users of this library, in any process and thread. Programs that
+ * do not use this library may still replace the file between the two steps; without locks (see
+ * ebpo_paint_open_to_change), so may users of this library.
  *
  * EBPO_E_UNSUPPORTED: the library was built without libhdf5. EBPO_E_IO: also if another user has
  * had the file open to change for 10 seconds.
@@ -147,8 +148,8 @@ typedef struct ebpo_paint_info {
     size_t struct_size;
 
     /*
-     * Program that wrote the file; content_sha256 of the model, 64 hexadecimal digits; name and
-     * unit of the model; "": unknown.
+     * Program that wrote the file; content_sha256 of the model as 64 hexadecimal digits; name and
+     * unit of the model. "": unknown.
      */
     const char *generator, *model_sha256, *model_name, *unit;
 
@@ -170,8 +171,8 @@ EBPO_API ebpo_status ebpo_paint_get_info(const ebpo_paint *paint, ebpo_paint_inf
 /*
  * Checks that the paint belongs to this model, or to the model of which this is a subset.
  *
- * EBPO_E_ARGUMENT: it does not; the message names its model. EBPO_E_ABSENT: the model has no mesh,
- * or lacks the required source indices.
+ * EBPO_E_ARGUMENT: it does not; the message names the model of the paint. EBPO_E_ABSENT: the model
+ * has no mesh, or lacks the required source indices.
  *
  * Threads: any.
  */
@@ -182,8 +183,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_check_model(const ebpo_paint *pain
 /*
  * Checks that every point and note is on its face. Points whose face or surroundings are missing in
  * a subset pass. The checksums of the file do not ensure this, because the program that wrote the
- * file may have stored other positions. Functions that query the model for a point check that
- * point, too; use this function for data that is only stored.
+ * file may have stored wrong positions. Functions that query the model at a point also check that
+ * point. Use this function for points that are only stored.
  *
  * context    of a matching model
  * progress   stage "checking"; or NULL
@@ -208,12 +209,12 @@ typedef struct ebpo_paint_layer {
     size_t struct_size;
 
     /*
-     * At most 255, 255, 31 and 4,095 bytes. The date is "" or valid for ebpo_is_date. An existing
-     * date of a file may be any text, and may be kept.
+     * At most 255, 255, 31 and 4,095 bytes. The date is "" or valid for ebpo_is_date. A date that
+     * was read from a file may be any text, and may be kept.
      */
     const char *title, *author, *date, *description;
 
-    /* Colour in lists, and default for pens: 0xRRGGBBAA. */
+    /* Colour of the layer in lists, and default colour for pens: 0xRRGGBBAA. */
     uint32_t colour;
 
     /* Opacity of the whole layer, 0 to 255. */
@@ -239,7 +240,7 @@ EBPO_API ebpo_status ebpo_paint_get_layer(const ebpo_paint *paint, uint64_t numb
 /*
  * Adds a layer above all others.
  *
- * number   its index; or NULL
+ * number   index of the new layer; or NULL
  *
  * EBPO_E_ARGUMENT: a member is not valid. EBPO_E_LIMIT: EBPO_PAINT_LAYERS layers exist.
  *
@@ -272,15 +273,18 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_remove_layer(ebpo_paint *paint, ui
 
 /* A point on a face. */
 typedef struct ebpo_paint_point {
-    /* In the model's unit, finite, -2^200 to 2^200. */
+    /* Position in the model's unit: finite, -2^200 to 2^200. */
     double place[3];
 
-    /* Index in the source or in the file, see ebpo_paint_info: 0 to 2^32 - 2. */
+    /*
+     * Index of the face in the source or in the file (source_numbers of ebpo_paint_info): 0 to 2^32
+     * - 2.
+     */
     uint32_t face;
 
     /*
-     * Barycentric weights of the second and third corner, in units of 2^-30; their sum is at most
-     * 2^30. The first corner has the rest.
+     * Barycentric weights of the second and third corner, in units of 2^-30. Their sum is at most
+     * 2^30; the rest is the weight of the first corner.
      */
     uint32_t weight[2];
 
@@ -304,7 +308,7 @@ typedef struct ebpo_paint_note {
     /* At most 255, 255, 31 and 32,767 bytes; rules as for layers. */
     const char *title, *author, *date, *body;
 
-    /* Index of its layer. */
+    /* Index of the layer of the note. */
     uint64_t layer;
 
     /* Position; size, pressure and time are ignored. */
@@ -401,7 +405,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_remove_stroke(ebpo_paint *paint, u
 typedef struct ebpo_paint_input {
     double place[3];
 
-    /* 0 to 1; 0: does not paint. */
+    /* Pressure of the pen, 0 to 1. 0: does not paint. */
     double pressure;
 
     /* Milliseconds since the first sample, at most 2^32 - 1. */
@@ -425,8 +429,8 @@ typedef struct ebpo_paint_pen {
     double spread;
 
     /*
-     * Points per step at full pressure, 1 to 10,000. At pressure p: p times this, rounded, at least
-     * 1. Without spread it is 1.
+     * Number of points per step at full pressure, 1 to 10,000. At pressure p the number is p times
+     * this, rounded, at least 1. If `spread` is 0, it is 1.
      */
     uint32_t density;
 
@@ -449,7 +453,7 @@ typedef struct ebpo_paint_pen {
      */
     double within;
 
-    /* For the positions of points. */
+    /* Seed for the positions of points. */
     uint64_t seed;
 
     /* As in strokes. */
@@ -470,10 +474,15 @@ typedef struct ebpo_paint_pen {
 typedef struct ebpo_paint_drawn {
     size_t struct_size;
 
-    /* Strokes and their points; steps that painted, and steps with the pen lifted. */
+    /*
+     * Number of strokes, of their points, of steps that painted, and of steps with the pen lifted.
+     */
     uint64_t strokes, points, steps, lifted;
 
-    /* Points that were discarded: not within the spread, or on another fold. */
+    /*
+     * Number of points that were discarded, because they were not within the spread or not on the
+     * connected part of the surface.
+     */
     uint64_t strayed;
 } ebpo_paint_drawn;
 
@@ -481,12 +490,12 @@ typedef struct ebpo_paint_drawn {
 
 /*
  * Converts the path of a device to strokes, with a new stroke after each lift of the pen. The path
- * is straight between samples. At each step along the path the pen is at the nearest point of the
- * surface. More pressure gives more points; their positions depend only on the seed.
+ * is straight between samples. At each step along the path, the pen is at the nearest point of the
+ * surface. More pressure gives more points. Equal inputs and seeds give equal points.
  *
  * context   of a matching model
- * input      [count], at least 1
- * drawn      statistics; or NULL
+ * input     [count], at least 1
+ * drawn     statistics; or NULL
  *
  * On failure no stroke is added. EBPO_E_ARGUMENT: a value is not valid, or the model does not
  * match. EBPO_E_ABSENT, EBPO_E_LIMIT, and the errors of reading.
@@ -499,8 +508,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_draw(ebpo_paint *paint, ebpo_conte
                                                    ebpo_paint_drawn *drawn, ebpo_error *error);
 
 /*
- * Finds the point of the surface nearest to a position, with full size, pressure 0 and time 0: for
- * notes and custom pens.
+ * Finds the point of the surface nearest to a position, for notes and custom pens. The point has
+ * full size, pressure 0 and time 0.
  *
  * Errors are those of ebpo_distance. EBPO_E_ARGUMENT: also if the model does not match.
  *
@@ -517,13 +526,13 @@ typedef struct ebpo_paint_options {
     size_t struct_size;
 
     /*
-     * For areas, 1 to 65,536. A part of a face that cannot be assigned to a stroke is subdivided
-     * down to 1/fineness of the least radius around. 256 gives bounds of the area of a disc to 1 %,
-     * and `value` to 0.1 %.
+     * For areas, 1 to 65,536. A part of a face that is partly covered is subdivided down to
+     * 1/fineness of the least radius of points around. With 256, the bounds of the area of a disc
+     * are within 1 %, and `value` is within 0.1 %.
      */
     unsigned fineness;
 
-    /* For areas and baking. 0: all cores. */
+    /* Number of threads for ebpo_paint_measure and ebpo_paint_bake. 0: all cores. */
     unsigned threads;
 
     ebpo_progress progress;
@@ -534,7 +543,7 @@ typedef struct ebpo_paint_options {
         sizeof(ebpo_paint_options), 256, 0, { NULL, NULL } \
     }
 
-/* A face within the reach of a stroke; lent until the callback returns. */
+/* A face that intersects the ball of a point of a stroke; lent until the callback returns. */
 typedef struct ebpo_paint_face {
     /* As in ebpo_distance_result; index in the file. */
     uint64_t face, file_face;
@@ -552,9 +561,9 @@ typedef struct ebpo_paint_face {
 typedef bool (*ebpo_paint_face_fn)(void *user, const ebpo_paint_face *face);
 
 /*
- * Passes the faces within the reach of a stroke's points, and their covered corners, to `take`:
- * each once, in the order of the file. Like the following functions, it takes 110 bytes per face,
- * and 300 for each face that intersects the box around one point.
+ * Passes the faces that intersect the balls of a stroke's points, and their covered corners, to
+ * `take`: each once, in the order of the file. This and the following functions take 110 bytes per
+ * face, and 300 for each face that intersects the box around one point.
  *
  * context     of a matching model
  * elsewhere   number of points whose faces a subset lacks; or NULL
@@ -573,12 +582,12 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_cover(const ebpo_paint *paint, ebp
 typedef struct ebpo_paint_baked {
     size_t struct_size;
 
-    /* Vertices covered by a stroke of a visible layer, including erased ones. */
+    /* Number of vertices that strokes of visible layers cover, including erased ones. */
     uint64_t vertices;
 
     /*
-     * Points of visible layers; points whose faces a subset lacks; points that cover no vertex
-     * because they are smaller than their faces.
+     * Number of points of visible layers, of points whose faces a subset lacks, and of points that
+     * cover no vertex because their balls are smaller than the faces.
      */
     uint64_t points, elsewhere, between;
 } ebpo_paint_baked;
@@ -589,9 +598,9 @@ typedef struct ebpo_paint_baked {
  * Applies the visible layers to the colours of vertices.
  *
  * context   of a matching model
- * mesh      of that model, from ebpo_file_read_source_mesh: its faces are needed
- * rgba      [vertex_count][4] in its order: the model's own colours, replaced by the new ones.
- *           Alpha is kept, and so are the colours of uncovered vertices.
+ * mesh      mesh of that model, with faces, from ebpo_file_read_source_mesh
+ * rgba      [vertex_count][4] in the order of the mesh. Input: the model's own colours. Output: the
+ *           new colours; alpha and the colours of uncovered vertices are kept
  * baked     statistics; or NULL
  *
  * Takes, besides the mesh, 4 bytes per vertex, 72 per covered vertex, and 4 per face if source
@@ -609,9 +618,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_bake(const ebpo_paint *paint, ebpo
 
 /*
  * Sets the colours of a mesh's vertices where they differ from the current ones
- * (ebpo_mesh_colours). It sets the properties red, green and blue (or diffuse_red and so on) and
- * keeps their types (int8 holds at most 127). A mesh without these gets them as uint8, for all
- * vertices. All other data is unchanged.
+ * (ebpo_mesh_colours). The properties red, green and blue (or diffuse_red and so on) are set and
+ * keep their types (int8 holds at most 127). A mesh without these properties gets them as uint8,
+ * for all vertices. All other data is unchanged.
  *
  * rgba   [vertex_count][4]; alpha is ignored
  *
@@ -623,8 +632,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_paint_colour_mesh(ebpo_mesh *mesh, const
                                                           ebpo_error *error);
 
 /*
- * In the square of the model's unit. `lo` and `hi` are bounds, except for the rounding of sums
- * (2^-40 of them); `value` is near the area.
+ * An area, in the square of the model's unit. `lo` and `hi` are bounds of the area, except for the
+ * rounding of sums (2^-40 of the area). `value` is an estimate.
  */
 typedef struct ebpo_paint_area {
     double lo, value, hi;
@@ -644,14 +653,14 @@ typedef struct ebpo_paint_areas {
     /* All layers together. */
     ebpo_paint_area all;
 
-    /* [layer_count], [stroke_count] of the paint; 0 for erasing strokes */
+    /* [layer_count] and [stroke_count] areas; 0 for erasing strokes */
     ebpo_paint_area *layers, *strokes;
 
     /* [colour_count] by layer, then by colour */
     uint64_t colour_count;
     ebpo_paint_colour_area *colours;
 
-    /* Faces within all reaches; points whose faces a subset lacks. */
+    /* Number of faces that intersect balls of points, and of points whose faces a subset lacks. */
     uint64_t faces, elsewhere;
 } ebpo_paint_areas;
 
@@ -663,7 +672,8 @@ typedef struct ebpo_paint_areas {
  *
  * out   freed by ebpo_paint_areas_free
  *
- * Takes 24 bytes for each pair of a face and a point that reaches it, and 80 for each such face.
+ * Takes 24 bytes for each pair of a face and a point whose ball intersects the face, and 80 for
+ * each such face.
  *
  * Errors are those of ebpo_paint_cover. EBPO_E_ARGUMENT: also for the fineness. EBPO_E_CANCELLED.
  *

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT
  * Pose of a model in the world.
  *
- * The pose transforms each vertex to the world in doubles, with one rounding per operation in a
- * defined order (docs/develop/collision.md, "Posed coordinates"). Decisions equal those of
- * arithmetic without rounding on these coordinates, as if files had been written with them. Lengths
- * are in the unit of the world: the model's unit times the scale.
+ * A pose transforms each vertex to the world in doubles, with one rounding per operation in a
+ * defined order (docs/develop/collision.md, "Posed coordinates"). The results are the *posed
+ * coordinates*. Decisions equal those of arithmetic without rounding on posed coordinates, as if
+ * the files contained them. Lengths are in the unit of the world: the model's unit times the scale.
  */
 #ifndef EBPO_POSE_H
 #define EBPO_POSE_H
@@ -16,8 +16,9 @@ extern "C" {
 #endif
 
 /*
- * Transforms x of the model to rotation (scale x) + translation. All finite; scale from 2^-300 to
- * 2^300. rotation[i][k] multiplies x_k: its rows are the axes of the world in model coordinates.
+ * Transforms a point x of the model to rotation (scale x) + translation. All values are finite;
+ * `scale` is from 2^-300 to 2^300. rotation[i][k] multiplies x_k: its rows are the axes of the
+ * world in model coordinates.
  */
 typedef struct ebpo_pose {
     double rotation[3][3];

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT
- * Queries a file, within a memory budget.
+ * Evaluates queries of a file, within a memory budget.
  *
  *   Models           ebpo_model_new, ebpo_context_new (one per thread), ebpo_model_memory
  *   Shared budget    ebpo_budget_new
  *   Point in solid   ebpo_inside, ebpo_inside_many
  *   Distance         ebpo_distance, ebpo_distance_many, ebpo_distance_within
- *   Rays             ebpo_ray_first, ebpo_ray_any, ebpo_ray_all, and each for many rays
- *   Attributes       ebpo_sampler_new, ebpo_sample: at points on faces
+ *   Rays             ebpo_ray_first, ebpo_ray_any, ebpo_ray_all; ebpo_ray_first_many and so on
+ *   Attributes       ebpo_sampler_new, ebpo_sample (at points on faces)
  *   Boxes            ebpo_faces_in_box, ebpo_triangles_in_box
  *   Mass             ebpo_measure, ebpo_solid_volume_of
  *
@@ -16,10 +16,10 @@
  *     ebpo_open("model.ebpo.h5", &file, &error);
  *     ebpo_model_new(file, NULL, &model, &error);
  *     ebpo_context_new(model, &context, &error);
- *     ebpo_inside(context, point, NULL, &answer, &error);
+ *     ebpo_inside(context, point, NULL, &result, &error);
  *
  * Results are exact: decisions equal those of arithmetic without rounding on the file's
- * coordinates, for all finite doubles. They do not depend on the compiler, the floating-point
+ * coordinates, for all finite doubles. Results do not depend on the compiler, the floating-point
  * environment, the number of threads, the memory budget or the loading mode.
  *
  * Methods: BP 2008, chapter 5; EBP 2017, chapter 4; format-spec/README.md, section 5.
@@ -44,10 +44,10 @@ typedef enum ebpo_loading {
      */
     EBPO_LOAD_CACHE = 0,
 
-    /* One whole subtree at a time; no other is kept (4.2.5). */
+    /* One whole subtree at a time; no other subtree is kept (4.2.5). */
     EBPO_LOAD_SUBTREE = 1,
 
-    /* Only the nodes on the path and the leaf; none is kept (4.2.4). */
+    /* Only the nodes on the path from the root to the leaf; no node is kept (4.2.4). */
     EBPO_LOAD_NODES = 2
 } ebpo_loading;
 
@@ -59,22 +59,23 @@ typedef struct ebpo_model_options {
 
     /*
      * Memory limit of the model in bytes, including its caches and buffers for loading. 0: no
-     * limit; but 256 MiB for a file on a server (http.h) of more than 2 MiB if `cut_level` is not
-     * given. Such a file with subtrees (ebpo_info.subtree_level) is loaded in parts for any budget.
-     * Not included: the chunk directory of the file (24 bytes per chunk), decoders (about 250 kB
-     * per loading thread) and contexts. Contexts hold results, and for distances 4 bytes per
-     * subtree below the cut level and a queue of nodes.
+     * limit; but 256 MiB for a file on a server (http.h) of more than 2 MiB if `cut_level` is -1.
+     * Such a file is loaded in parts for any budget if it has subtrees (ebpo_info.subtree_level).
+     *
+     * Not included are the chunk directory of the file (24 bytes per chunk), decoders (about 250 kB
+     * per loading thread) and contexts. A context holds results; for distances also 4 bytes per
+     * subtree below the cut level, and a queue of nodes.
      */
     uint64_t memory;
 
     /*
      * Levels 0 to cut_level stay in memory, and the subtrees below are loaded on demand. -1: chosen
-     * by the budget; everything is loaded at once if it fits. For a file on a server of more than 2
-     * MiB with subtrees, never everything.
+     * by the budget; everything is loaded at once if it fits. A file on a server of more than 2 MiB
+     * with subtrees is never loaded at once.
      */
     int cut_level;
 
-    /* Used only if not everything fits, or with a cut level. */
+    /* Used only if not everything fits, or if cut_level is given. */
     ebpo_loading loading;
 
     /*
@@ -83,15 +84,15 @@ typedef struct ebpo_model_options {
      */
     bool prefetch;
 
-    /* For making the model. 0: all cores. */
+    /* Number of threads for making the model. 0: all cores. */
     unsigned threads;
 
     ebpo_progress progress;
 
     /*
      * Shared budget, used instead of `memory`; NULL: none. Requires EBPO_LOAD_CACHE. The model is
-     * entirely in memory if all such models together take up to half of the budget; else it is
-     * loaded in parts.
+     * entirely in memory if it and the other models that are entirely in memory take at most half
+     * of the budget; else it is loaded in parts.
      */
     ebpo_budget *budget;
 } ebpo_model_options;
@@ -101,7 +102,7 @@ typedef struct ebpo_model_options {
         sizeof(ebpo_model_options), 0, -1, EBPO_LOAD_CACHE, false, 0, { NULL, NULL }, NULL \
     }
 
-/* The part of a file that is in memory, prepared for fast queries. Threads share it. */
+/* The part of a file that is in memory, prepared for fast queries. Threads share a model. */
 typedef struct ebpo_model ebpo_model;
 
 /*
@@ -119,10 +120,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_model_new(const ebpo_file *file,
                                                   ebpo_model **out, ebpo_error *error);
 
 /*
- * Estimated memory use for a budget. Bytes are upper bounds for ordinary models: for subtrees 1.05
- * to 1.4 times the actual use. If the actual use is higher, the budget still holds: other data is
- * removed, or loading fails. All members except `budget`, `whole` and `least` are 0 if everything
- * will be in memory.
+ * Estimated memory use for a budget. Numbers of bytes are upper bounds for ordinary models; for
+ * subtrees they are 1.05 to 1.4 times the actual use. If the actual use is higher, the budget still
+ * holds: other data is removed, or loading fails. If everything will be in memory, all members
+ * except `resident`, `budget`, `whole` and `least` are 0.
  */
 typedef struct ebpo_model_plan {
     size_t struct_size;
@@ -136,21 +137,21 @@ typedef struct ebpo_model_plan {
     uint64_t budget;
 
     /*
-     * Budget from which on everything is in memory (remote files: see ebpo_model_options.memory; a
-     * model that takes more is loaded in parts), and a sufficient budget, slightly above the
-     * minimum. With the latter, few subtrees are in memory at a time.
+     * whole: least budget with which everything is in memory (remote files: see
+     * ebpo_model_options.memory). least: a sufficient budget, slightly above the minimum; with it,
+     * few subtrees are in memory at a time.
      */
     uint64_t whole, least;
 
     /*
-     * Parts of the budget: levels down to the cut level; decoded chunks; retained data of subtrees
-     * that are not in memory. Subtrees use the rest.
+     * Parts of the budget in bytes: for levels down to the cut level, for decoded chunks, and for
+     * skeletons (retained data of subtrees that are not in memory). Subtrees use the rest.
      */
     uint64_t top, chunks, skeletons;
 
     /*
-     * Number of subtrees below the cut level; bytes of the average subtree; number of subtrees in
-     * memory at a time, while none is being loaded.
+     * Number of subtrees below the cut level; bytes of the average subtree; number of subtrees that
+     * are in memory at a time while no subtree is being loaded.
      */
     uint64_t subtrees, subtree_bytes, subtrees_held;
 } ebpo_model_plan;
@@ -186,19 +187,19 @@ typedef struct ebpo_model_stats {
     /* 0 if resident. */
     int cut_level;
 
-    /* Current and peak bytes: tree, caches, buffers for loading. */
+    /* Current and peak memory in bytes: tree, caches, buffers for loading. */
     uint64_t memory, memory_peak;
 
-    /* Bytes. 0: none. */
+    /* Budget in bytes. 0: none. */
     uint64_t budget;
 
-    /* Subtrees found in memory, and subtrees loaded for a query. */
+    /* Number of times that a query found a subtree in memory, and loaded a subtree. */
     uint64_t hits, loads;
 
-    /* Subtrees loaded in the background. */
+    /* Number of subtrees loaded in the background. */
     uint64_t prefetched;
 
-    /* Subtrees removed from memory. */
+    /* Number of subtrees removed from memory. */
     uint64_t evicted;
 
     /* Bytes and number of reads from the source, including opening of the file. */
@@ -211,23 +212,27 @@ typedef struct ebpo_model_stats {
     double load_seconds;
 
     /*
-     * Leaves in memory, and the frequently queried leaves by kind: general, one plane, two planes,
-     * convex set, concave set.
+     * Number of leaves in memory, and of frequently queried leaves by kind: general, one plane, two
+     * planes, convex set, concave set.
      */
     uint64_t leaves, leaves_of_kind[5];
 
-    /* General leaves with a cell face that no face intersects; there one segment decides. */
+    /*
+     * Number of general leaves with a cell face that no face of the mesh intersects. In these
+     * leaves one segment decides.
+     */
     uint64_t leaves_one_cell_face;
 
     /*
-     * For distances while not everything was in memory: number of points, subtrees searched, and
-     * loads including those for the sign. Their ratios give the cost of a query.
+     * For distances while not everything was in memory: number of points, of subtrees searched, and
+     * of loads including those for the sign. Divided by the number of points, they are the cost of
+     * a query.
      */
     uint64_t distances, distance_subtrees, distance_loads;
 
     /*
-     * Bytes of `memory` for retained data of subtrees that are not in memory; it avoids unnecessary
-     * loads.
+     * Part of `memory` in bytes for skeletons: retained data of subtrees that are not in memory,
+     * which avoids unnecessary loads.
      */
     uint64_t skeleton_bytes;
 } ebpo_model_stats;
@@ -251,7 +256,7 @@ EBPO_API ebpo_status ebpo_model_get_stats(const ebpo_model *model, ebpo_model_st
  *
  * bytes   greater than 0
  *
- * EBPO_E_LIMIT: too few for any model.
+ * EBPO_E_LIMIT: too few bytes for any model.
  *
  * Threads: any; different threads may query its models.
  */
@@ -284,7 +289,8 @@ EBPO_API ebpo_status ebpo_budget_get_stats(const ebpo_budget *budget, ebpo_budge
 /* ---- contexts ---- */
 
 /*
- * State of one thread that queries a model: position, scratch memory, data that it holds in memory.
+ * State of one thread that queries a model: position in the tree, scratch memory, and data that
+ * stays in memory for the thread.
  */
 typedef struct ebpo_context ebpo_context;
 
@@ -306,12 +312,13 @@ EBPO_API void ebpo_context_free(ebpo_context *context);
 /* ---- rules for all queries ---- */
 
 /*
- * Points are three finite doubles in the model's unit; others are EBPO_E_ARGUMENT with the index of
- * the point. A query of many points gives the same results as single queries. On failure results
- * are unspecified. All queries can return the errors of reading, and EBPO_E_LIMIT (ebpo_model_new).
+ * Points are three finite doubles in the model's unit; for other values, queries return
+ * EBPO_E_ARGUMENT with the index of the point. A query of many points gives the same results as
+ * single queries. On failure results are unspecified. All queries can return the errors of reading,
+ * and EBPO_E_LIMIT (ebpo_model_new).
  */
 
-/* Level for exact results. */
+/* Value of `level` for exact results. */
 enum { EBPO_LEVEL_ALL = -1 };
 
 /* ---- point in solid ---- */
@@ -327,16 +334,16 @@ typedef struct ebpo_inside_options {
     size_t struct_size;
 
     /*
-     * Uses only levels 0 to `level` and returns a certain result or EBPO_MAYBE. EBPO_LEVEL_ALL:
-     * exact results.
+     * The query uses only levels 0 to `level`, and returns a certain result or EBPO_MAYBE.
+     * EBPO_LEVEL_ALL: exact results.
      */
     int level;
 
     ebpo_envelopes envelopes;
 
     /*
-     * Stops after about this many nanoseconds per point and returns a certain result or EBPO_MAYBE.
-     * 0: no deadline. A started subtree or leaf is completed.
+     * The query stops after about this many nanoseconds per point, and returns a certain result or
+     * EBPO_MAYBE. 0: no deadline. A started subtree or leaf is completed.
      */
     uint64_t deadline_ns;
 } ebpo_inside_options;
@@ -358,21 +365,22 @@ typedef struct ebpo_inside_result {
     int32_t where;
 
     /*
-     * Winding number. 0 for EBPO_ON and EBPO_MAYBE, and if an envelope decided because a level or
-     * deadline is given. In that case, with rules other than nonzero, the true value may be another
-     * one that is not inside.
+     * Winding number. 0 for EBPO_ON and EBPO_MAYBE. With a level or deadline, 0 also if an envelope
+     * decided that the point is outside; with rules other than EBPO_RULE_NONZERO the true winding
+     * number may then be another number that is outside.
      */
     int32_t winding;
 
     /*
-     * EBPO_MAYBE: upper bound of the distance to the surface (the diagonal of the cell reached).
-     * Else 0.
+     * EBPO_MAYBE: upper bound of the distance to the surface, which is the diagonal of the deepest
+     * visited cell. Else 0.
      */
     double doubt;
 } ebpo_inside_result;
 
 /*
- * Classifies a point as inside, outside or on the surface. BP 2008, section 5.1; EBP 2017, 4.2.
+ * Classifies a point as inside, outside or on the surface (BP 2008, section 5.1; EBP 2017, section
+ * 4.2).
  *
  * EBPO_E_NOT_SOLID: the model is a surface. EBPO_E_ABSENT: the file has no mesh and no level is
  * given, or a subset lacks the required data.
@@ -395,21 +403,23 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_inside_many(ebpo_context *context, const
 
 /* ---- distance ---- */
 
+/* Faces that a distance query uses. */
 typedef enum ebpo_distance_mode {
+    /* All faces. */
     EBPO_DISTANCE_EXACT = 0,
 
     /*
-     * The faces below the deepest gray node around the point; not always the minimum (EBP 2017,
-     * 4.4).
+     * Only the faces below the deepest gray node around the point. The result is not always the
+     * minimum (EBP 2017, 4.4).
      */
     EBPO_DISTANCE_RECURSIVE = 1,
 
-    /* The faces of the leaf around the point; no result elsewhere. */
+    /* Only the faces of the leaf around the point. Points outside leaves have no result. */
     EBPO_DISTANCE_LEAVES = 2,
 
     /*
-     * The envelope of the deepest gray node around the point, at most at `level`. Unsigned, not
-     * always the minimum; max_distance is ignored.
+     * No faces: the distance from the envelope of the deepest gray node around the point, at most
+     * at `level`. The result is unsigned and not always the minimum; max_distance is ignored.
      */
     EBPO_DISTANCE_ENVELOPE = 3
 } ebpo_distance_mode;
@@ -428,12 +438,12 @@ typedef struct ebpo_distance_options {
     /* Faces farther away are ignored; in the model's unit, at least 0. INFINITY: no limit. */
     double max_distance;
 
-    /* True: do not compute the sign, which is faster. Surfaces have no sign. */
+    /* True: the sign is not computed, which is faster. Surfaces have no sign. */
     bool unsigned_distance;
 
     /*
-     * Starts from the previous result of this context, which is faster for nearby points. Results
-     * do not depend on it.
+     * True: starts from the previous result of this context, which is faster for nearby points.
+     * Results do not depend on it.
      */
     bool warm;
 
@@ -454,9 +464,9 @@ typedef struct ebpo_distance_options {
 
 typedef struct ebpo_distance_result {
     /*
-     * Correctly rounded. Negative inside a solid, unless unsigned (-0.0 if it underflows).
-     * INFINITY: without a face, nothing within max_distance; with a face, larger than every double.
-     * NAN: not determined, see `lo` and `hi`.
+     * Correctly rounded. Negative inside a solid (-0.0 if it underflows), unless unsigned_distance
+     * is true. INFINITY without a face: no face is within max_distance. INFINITY with a face: the
+     * distance is larger than every double. NAN: not determined, see `lo` and `hi`.
      */
     double distance;
 
@@ -470,16 +480,17 @@ typedef struct ebpo_distance_result {
     double normal[3];
 
     /*
-     * Source index of the triangle if the file has maps, else its index in the file. Of several at
-     * exactly the same distance, the first one in the file. EBPO_NO_FACE: none (limited results,
-     * envelopes).
+     * Nearest face: its source index if the file has maps, else its index in the file. Of several
+     * faces at exactly the same distance, the first one in the file. EBPO_NO_FACE: none, for
+     * example with a level, a deadline or EBPO_DISTANCE_ENVELOPE.
      */
     uint64_t face;
 } ebpo_distance_result;
 
 /*
- * Computes the distance from a point to the model, and the nearest face. EBP 2017, 4.4. With a
- * level or a deadline the result is `lo` and `hi`, and the distance if both are equal.
+ * Computes the distance from a point to the model, and the nearest face (EBP 2017, 4.4). With a
+ * level or a deadline the result is `lo` and `hi`; the distance is determined only if they are
+ * equal.
  *
  * EBPO_E_ABSENT: the file has no mesh, no level is given, and the mode is not
  * EBPO_DISTANCE_ENVELOPE; or a subset lacks the required data.
@@ -530,7 +541,7 @@ typedef struct ebpo_near_face {
     /* As in ebpo_distance_result. */
     double point[3], normal[3];
 
-    /* As in ebpo_distance_result; index in the file. */
+    /* Index as in ebpo_distance_result, and index in the file. */
     uint64_t face, file_face;
 
     uint64_t reserved[3];
@@ -540,7 +551,7 @@ typedef struct ebpo_near_face {
 typedef bool (*ebpo_near_fn)(void *user, const ebpo_near_face *face);
 
 /*
- * Passes the nearest faces of a point, or all faces within a radius, to `take`, each once, in
+ * Passes the faces nearest to a point, or all faces within a radius, to `take`: each once, in
  * ascending order of exact distance. Faces at the same distance are in the order of the file, so
  * the first face is that of ebpo_distance.
  *
@@ -548,12 +559,12 @@ typedef bool (*ebpo_near_fn)(void *user, const ebpo_near_face *face);
  * take      must not use the context
  *
  * Uses at most 16 MiB besides the model's budget, for any number of faces: after every 65,536 faces
- * (without `most` also after some of the first ones) the search restarts behind the last one.
- * Subtrees are loaded in order of distance, and only if they may contain a result; each once, if
- * the budget holds them long enough.
+ * (without `most` also a few times at the beginning) the search starts again behind the last face.
+ * Subtrees are loaded in order of distance, and only if they may contain a result. Each is loaded
+ * once, if the budget is large enough to keep it.
  *
- * EBPO_E_ABSENT: as for ebpo_distance; in a subset perhaps after some faces, which are correct.
- * EBPO_E_ARGUMENT: only before the first face.
+ * EBPO_E_ABSENT: as for ebpo_distance. In a subset the call may pass some faces, which are correct,
+ * before it returns this. EBPO_E_ARGUMENT: returned before the first face.
  *
  * Threads: one per context.
  */
@@ -567,9 +578,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_distance_within(ebpo_context *context,
 
 typedef struct ebpo_ray_hit {
     /*
-     * The hit is at origin + t direction. Correctly rounded; INFINITY if larger than every double,
-     * for very short directions. This is a hit with a face; a direction longer by a power of two
-     * gives a finite t for the same face. Hits are sorted by exact values.
+     * The hit is at origin + t direction. Correctly rounded. INFINITY with a face: t is larger than
+     * every double, because the direction is very short; a direction longer by a power of two gives
+     * a finite t for the same face. Hits are sorted by exact values.
      */
     double t;
 
@@ -577,15 +588,17 @@ typedef struct ebpo_ray_hit {
     uint64_t face;
 
     /*
-     * 1: the ray enters through the interior of the face. -1: it leaves. 0: it hits an edge or a
-     * vertex, is within the face's plane, or the face has no area.
+     * 1: the ray passes through the interior of the face against its normal (enters). -1: along its
+     * normal (leaves). 0: the ray hits an edge or a vertex, or is in the face's plane, or the face
+     * has no area.
      */
     int32_t side;
 } ebpo_ray_hit;
 
 /*
- * Finds the first closed triangle that intersects the ray origin + t direction, t from 0 to t_max.
- * Of several at the same t, returns the first one in the file. *hit is false if there is none.
+ * Finds the first triangle (including its boundary) that intersects the ray origin + t direction, t
+ * from 0 to t_max. Of several triangles at the same t, the result is the first one in the file.
+ * *hit is false if no triangle intersects the ray.
  *
  * direction   of any length except 0
  * t_max       at least 0; INFINITY: unbounded
@@ -619,14 +632,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_ray_any(ebpo_context *context, const dou
                                                 ebpo_error *error);
 
 /*
- * Sides of triangles that count. Only the normals decide, at any point of a triangle, so there are
- * no gaps between triangles: an edge or a vertex belongs to all its triangles. Triangles without
- * area, and those whose plane contains the ray, count only with EBPO_RAY_BOTH.
+ * Sides of triangles that count. Only the normal of a triangle decides, at any of its points. An
+ * edge or a vertex belongs to all its triangles, so there are no gaps between triangles. Triangles
+ * without area, and those whose plane contains the ray, count only with EBPO_RAY_BOTH.
  */
 typedef enum ebpo_ray_sides {
-    EBPO_RAY_BOTH = 0,  /* all */
-    EBPO_RAY_FRONT = 1, /* hit against their normal: from outside, for a solid */
-    EBPO_RAY_BACK = 2   /* hit along their normal */
+    EBPO_RAY_BOTH = 0, /* all */
+    EBPO_RAY_FRONT =
+        1, /* triangles that the ray hits against their normal: from outside, for a solid */
+    EBPO_RAY_BACK = 2 /* triangles that the ray hits along their normal */
 } ebpo_ray_sides;
 
 typedef struct ebpo_ray_options {
@@ -635,8 +649,8 @@ typedef struct ebpo_ray_options {
     ebpo_ray_sides sides;
 
     /*
-     * 0: all cores. Fewer are used for few rays, and one for loading modes other than
-     * EBPO_LOAD_CACHE.
+     * 0: all cores. Fewer threads are used for few rays, and one thread for loading modes other
+     * than EBPO_LOAD_CACHE.
      */
     unsigned threads;
 } ebpo_ray_options;
@@ -658,8 +672,9 @@ typedef struct ebpo_ray {
  * everything is in memory, rays are ordered along a curve by their entry into the model, so that
  * subtrees are loaded few times.
  *
- * EBPO_E_ARGUMENT, with the index of the ray: before any is computed. Else the errors of
- * ebpo_ray_first, for the first failed ray in processing order. On failure `out` is unspecified.
+ * EBPO_E_ARGUMENT: a ray is not valid; the message has its index, and no ray is computed. Other
+ * errors are those of ebpo_ray_first, for the first failed ray in processing order. On failure
+ * `out` is unspecified.
  *
  * Threads: one per context.
  */
@@ -700,13 +715,14 @@ enum { EBPO_SAMPLER_MAX = 16 };
 typedef struct ebpo_sampler ebpo_sampler;
 
 /*
- * Reads the named attributes and the data to locate them, independent of the model's budget: the
- * maps if present (4 bytes per face), and for attributes of vertices the mesh (12 bytes per face,
- * 12 or 24 per vertex). The file must stay open as long as the sampler.
+ * Reads the named attributes, and the data to find the values of a face. Memory, outside the
+ * budgets of models: the values, the maps if present (4 bytes per face), and for attributes of
+ * vertices the mesh (12 bytes per face, 12 or 24 per vertex). The file must stay open as long as
+ * the sampler.
  *
  * names   separated by commas: "quality", "red,green,blue", or with the element, "face:red".
- *         Without an element, vertices precede faces; of equal names the first in the file is used.
- *         Lists are not found
+ *         Without an element, attributes of vertices are preferred to those of faces; of several
+ *         with equal names, the first in the file is used. Lists are not supported
  *
  * EBPO_E_ABSENT: no such attribute, or the file has no mesh. EBPO_E_ARGUMENT: more than
  * EBPO_SAMPLER_MAX names. Other errors are those of reading.
@@ -732,10 +748,10 @@ EBPO_API void ebpo_sampler_free(ebpo_sampler *sampler);
 EBPO_API unsigned ebpo_sampler_columns(const ebpo_sampler *sampler);
 
 /*
- * Samples attributes at points on faces, as distances (`point` and `face`) and rays (origin + t
- * direction) return them. Attributes of faces give the face's value. Attributes of vertices give a
- * mean of the values A, B and C at the corners a, b and c, weighted by the position of the point p;
- * this includes labels.
+ * Samples attributes at points on faces. Points and faces are those that distances (`point` and
+ * `face`) and rays (origin + t direction) return. An attribute of faces gives the face's value. An
+ * attribute of vertices gives a mean of the values A, B and C at the corners a, b and c, weighted
+ * by the position of the point p; also if the values are labels.
  *
  * In doubles without fused operations: e = b - a, f = c - a, d = p - a, scaled by powers of two; D
  * = (e.e)(f.f) - (e.f)(e.f); w_b = ((f.f)(d.e) - (e.f)(d.f)) / D and w_c = ((e.e)(d.f) -
@@ -763,9 +779,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_sample(const ebpo_sampler *sampler, cons
 /* ---- boxes ---- */
 
 /*
- * Finds the closed triangles that intersect the closed box min .. max (min <= max on each axis), in
- * the order of the file; indices as in ebpo_distance_result. `faces` is lent until the next call
- * with the context. Errors are those of ebpo_ray_first.
+ * Finds the triangles that intersect the box min .. max (min <= max on each axis), in the order of
+ * the file. Triangles and box include their boundaries. Indices are as in ebpo_distance_result.
+ * `faces` is lent until the next call with the context. Errors are those of ebpo_ray_first.
  *
  * Threads: one per context.
  */
@@ -784,7 +800,7 @@ typedef struct ebpo_triangles {
     /* [count] corners, in the model's unit: exactly the stored values */
     const double (*corners)[3][3];
 
-    /* [count] as in ebpo_distance_result; indices in the file */
+    /* [count] indices as in ebpo_distance_result, and indices in the file */
     const uint64_t *faces, *file_faces;
 
     uint64_t reserved[4];
@@ -796,10 +812,10 @@ typedef bool (*ebpo_triangles_fn)(void *user, const ebpo_triangles *triangles);
 /*
  * Passes the triangles of ebpo_faces_in_box with their corners to `take`, each once, in blocks.
  * Memory stays within the model's budget for any number of triangles, plus 4 bytes for each
- * triangle of one subtree (if all is resident, of the result).
+ * triangle of one subtree (or of the result, if everything is in memory).
  *
- * The order is that of the file if all is resident. Else it is by subtree (cut level), depth first,
- * and within each in the order of the file.
+ * Triangles are in the order of the file if everything is in memory. Else subtrees (below the cut
+ * level) are depth first, and the triangles of a subtree are in the order of the file.
  *
  * take   must not use the context
  *
@@ -820,9 +836,10 @@ typedef struct ebpo_solid_volume {
     size_t struct_size;
 
     /*
-     * Bounds of the volume. lo == hi: known except for rounding, if no component intersects itself,
-     * which is not tested. lo < hi: components intersect or repeat each other, or the mesh is not a
-     * 2-manifold; without `info` the bounds are then 0 and INFINITY. 0 for a surface.
+     * Bounds of the volume. lo == hi: the volume is known except for rounding, if no component
+     * intersects itself, which is not tested. lo < hi: components intersect or repeat each other,
+     * or the mesh is not a 2-manifold; without `info` the bounds are then 0 and INFINITY. 0 and 0
+     * for a surface.
      */
     double lo, hi;
 
@@ -838,10 +855,10 @@ typedef struct ebpo_solid_volume {
 /*
  * Computes bounds of the volume of the solid, in negligible time.
  *
- * report    of the mesh (ebpo_mesh_check); for a file &info->report
- * rule      for a file info->rule
- * shells    of the mesh (ebpo_mesh_count_shells); NULL: not counted, and the volume of several
- *           components is unknown
+ * report    of the mesh (ebpo_mesh_check); of a file: &info->report
+ * rule      of a file: info->rule
+ * shells    of the mesh (ebpo_mesh_count_shells); NULL: not counted; the volume of several
+ *           components is then unknown
  * info      of the mesh's file, whose black cells and envelopes bound the volume; NULL: no file
  *
  * Threads: any.
@@ -851,7 +868,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_solid_volume_of(const ebpo_mesh_report *
                                                         const ebpo_info *info,
                                                         ebpo_solid_volume *out, ebpo_error *error);
 
-/* In the model's unit, squared, cubed and so on. */
+/* Area, volume, centroid and inertia, in powers of the model's unit. */
 typedef struct ebpo_mass {
     size_t struct_size;
 
@@ -870,8 +887,8 @@ typedef struct ebpo_mass {
     double inertia[3][3];
 
     /*
-     * The same in a unit of 2^exponent of the model's unit, in which the model is about 1 long. For
-     * very large or very small models, whose values above are infinite or 0.
+     * Area, volume and inertia in a unit of 2^exponent of the model's unit, in which the model is
+     * about 1 long. For very large or very small models, whose values above are infinite or 0.
      */
     double scaled_area, scaled_volume, scaled_inertia[3][3];
     int64_t exponent;
@@ -879,7 +896,10 @@ typedef struct ebpo_mass {
     /* Bounds of the volume; equal to `volume` if it is known. */
     double volume_lo, volume_hi;
 
-    /* Integral of the winding number (ebpo_solid_volume), and in the scaled unit. */
+    /*
+     * Integral of the winding number (ebpo_solid_volume), in the model's unit and in the scaled
+     * unit.
+     */
     double integral, scaled_integral;
 } ebpo_mass;
 

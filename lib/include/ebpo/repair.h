@@ -30,7 +30,7 @@ typedef enum ebpo_doubt {
 
     /*
      * The volume is that of a sheet: at most the cube of 1/100 of the square root of the area. If
-     * coordinates are so far from 1 that a double cannot hold the volume: there is no thickness.
+     * coordinates are so large or small that a double cannot hold the volume: the thickness is 0.
      */
     EBPO_DOUBT_NO_VOLUME = 1 << 4,
 
@@ -41,7 +41,7 @@ typedef enum ebpo_doubt {
 /*
  * Returns the doubts about the current mesh.
  *
- * area     of the mesh before repairs; 0: unknown, and the added area is not tested
+ * area     of the mesh before repairs. 0: unknown; the added area is then not tested
  * report   of the current mesh
  * record   repairs that were made; NULL: none
  *
@@ -72,7 +72,8 @@ typedef struct ebpo_repairs {
     ebpo_repair_try tries[EBPO_REPAIR_TRIES];
 
     /*
-     * Index of the try without doubts, which is then the last one; -1: none, or no doubts before.
+     * Index of the try without doubts, which is then the last try. -1: no try is without doubts, or
+     * the mesh had none before.
      */
     int64_t chosen;
 } ebpo_repairs;
@@ -96,8 +97,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_try_repairs(const ebpo_mesh *mesh,
                                                          ebpo_repairs *out, ebpo_error *error);
 
 /*
- * Shells by the regions that they bound, including shells that share vertices or edges
- * (ebpo_mesh_orient).
+ * Number of shells by kind, and properties of their components. Shells are defined at
+ * ebpo_mesh_orient; they may share vertices or edges.
  */
 typedef struct ebpo_shells {
     size_t struct_size;
@@ -105,21 +106,22 @@ typedef struct ebpo_shells {
     /* Number of shells with a volume other than 0. */
     uint64_t closed;
 
-    /* Closed shells inside an even number of others that are oriented inwards. */
+    /* Closed shells that are oriented inwards, inside an even number of other shells. */
     uint64_t inside_out;
 
-    /* Closed shells inside an odd number of others that are oriented inwards. */
+    /* Closed shells that are oriented inwards, inside an odd number of other shells. */
     uint64_t cavities;
 
     /*
-     * Closed shells inside an odd number of others that are oriented outwards: a solid inside
-     * another.
+     * Closed shells that are oriented outwards, inside an odd number of other shells: a solid
+     * inside another.
      */
     uint64_t nested;
 
     /*
      * 1: every component is closed, and no faces of two components have a common point;
-     * intersections within one component are not tested. 0: otherwise, or too crowded to decide.
+     * intersections within one component are not tested. 0: otherwise, or the search was stopped
+     * (ebpo_mesh_count_shells).
      */
     int32_t apart;
 
@@ -127,8 +129,8 @@ typedef struct ebpo_shells {
 
     /*
      * Indexed by ebpo_rule, for components that are apart: volume of the solid minus the integral
-     * of the winding number, in the cube of the source's unit. 0 if each component is oriented
-     * outwards in the open and inwards in a solid.
+     * of the winding number, in the cube of the source's unit. 0 if each component outside all
+     * solids is oriented outwards, and each component in a solid inwards.
      */
     double beyond[3];
 } ebpo_shells;

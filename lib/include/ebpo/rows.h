@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * Reads rows of numbers from any HDF5 file, as input of queries.
+ * Reads rows of numbers from any HDF5 file, as input for queries.
  */
 #ifndef EBPO_ROWS_H
 #define EBPO_ROWS_H
@@ -11,19 +11,19 @@ extern "C" {
 #endif
 
 /*
- * Reads a whole dataset of rows x columns as doubles. It may hold integers or floats of any size
- * and byte order; values are rounded to the nearest double.
+ * Reads a whole dataset of rows x columns as doubles. The dataset may contain integers or floats of
+ * any size and byte order. Values are rounded to the nearest double.
  *
  * dataset        such as "/points". NULL or "": reads none; the error message lists the candidates
  * least, most    allowed number of columns, 1 to 64
- * fill           value of the columns from the dataset's number of columns to `most`
+ * fill           value for missing columns, if the dataset has fewer than `most`
  * rows           [*count][most] doubles; freed by free()
  *
  * EBPO_E_IO: the file cannot be read, or another program has it open for writing. EBPO_E_FORMAT:
  * not an HDF5 file; no such dataset; another shape or type (for example complex numbers, or an
  * array of an .ebpo.h5 file, which holds codes); or the values are in another file. EBPO_E_ABSENT:
  * no dataset was named, and there is no candidate. EBPO_E_LIMIT: the rows would take more than 64
- * MiB and more than 1,024 times the file size. EBPO_E_UNSUPPORTED: the library was built without
+ * MiB, and more than 1,024 times the file size. EBPO_E_UNSUPPORTED: the library was built without
  * libhdf5.
  *
  * libhdf5 reads the file in a separate process, with limits on memory and time and without plugins.
@@ -41,8 +41,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_rows_read(const char *path, const char *
  * contain these rows are read.
  *
  * first, max_rows   first row, and maximum number of rows; 0 rows: only sets *total
- * count              number of rows read
- * total              number of rows of the dataset; 0 on failure
+ * count             number of rows read
+ * total             number of rows of the dataset; 0 on failure
  *
  * Threads: any.
  */

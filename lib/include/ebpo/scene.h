@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * Scenes: animated rigid instances of models, and their collisions.
+ * Makes scenes of animated rigid instances of models, and finds their collisions.
  *
  *   Making      ebpo_scene_open (a file: format-spec/scene.md), ebpo_scene_new,
  *               ebpo_scene_add_model, ebpo_scene_add_instance
@@ -8,8 +8,10 @@
  *               ebpo_scene_get_camera, ebpo_scene_get_stats, ebpo_scene_pair_rule
  *   Models      ebpo_scene_load, ebpo_scene_file, ebpo_scene_model
  *   In time     ebpo_scene_pose, ebpo_scene_motion, ebpo_scene_instance_box, ebpo_scene_box
- *   Collisions  ebpo_scene_pairs (boxes), ebpo_scene_find_clashes (faces), ebpo_scene_collide (of
- * two), ebpo_scene_approach, ebpo_scene_least_distances (all times) As a file ebpo_scene_report_new
+ *   Collisions  ebpo_scene_pairs (boxes), ebpo_scene_find_clashes (faces),
+ *               ebpo_scene_collide (two instances)
+ *   All times   ebpo_scene_approach, ebpo_scene_least_distances
+ *   As a file   ebpo_scene_report_new
  *   Subsets     ebpo_scene_plan, ebpo_scene_pack
  *
  *     ebpo_scene *scene = NULL;
@@ -18,9 +20,13 @@
  *     ebpo_scene_box(scene, 0, 10, min, max, &error);
  *     ebpo_scene_pairs(scene, 0, 10, take, NULL, &error);
  *
+ * An *instance* is a model at a pose. A *route* is a list of poses with times; an instance or a
+ * camera with a route moves along it. Layers and groups are named sets of instances; an instance is
+ * in at most one layer and in any number of groups.
+ *
  * Models, instances and cameras are numbered in the order in which they were added. Times are in
- * seconds. Before the first time of its route an instance is at the begin of the route, after the
- * last time at its end. Poses, boxes and pairs are the same on every machine.
+ * seconds. Before the first time of its route, an instance has the first pose of the route; after
+ * the last time, it has the last pose. Poses, boxes and pairs are the same on every machine.
  */
 #ifndef EBPO_SCENE_H
 #define EBPO_SCENE_H
@@ -41,24 +47,25 @@ typedef struct ebpo_scene_options {
     size_t struct_size;
 
     /*
-     * Limits in bytes for the scene file and for all files of poses that it names; 0: 64 MiB, 256
-     * MiB.
+     * Limits in bytes for the scene file, and for all pose files that it names together. 0: 64 MiB
+     * and 256 MiB.
      */
     uint64_t max_bytes, max_pose_bytes;
 
     /*
-     * Maximum number of values (objects, arrays, strings, numbers) in the scene file; each takes
-     * about 250 bytes during reading. 0: 4 million.
+     * Maximum number of values (objects, arrays, strings, numbers) in the scene file. A value takes
+     * about 250 bytes of memory during reading. 0: 4 million.
      */
     uint64_t max_values;
 
     /*
      * True: files named by the scene may be anywhere. False: they must be in the scene's folder or
-     * below. Their paths are then relative without "..", and no link leads out of the folder.
+     * below. Their paths must then be relative and without "..", and no link may lead out of the
+     * folder.
      */
     bool outside;
 
-    /* True: models on web servers are allowed, with their digests. */
+    /* True: models on web servers are allowed. The scene must state their digests. */
     bool remote;
 
     uint8_t reserved[6];
@@ -67,7 +74,7 @@ typedef struct ebpo_scene_options {
 #define EBPO_SCENE_OPTIONS_INIT EBPO_SIZED(ebpo_scene_options)
 
 /*
- * Reads a scene file and its files of poses, but no model.
+ * Reads a scene file and its pose files, but no model.
  *
  * EBPO_E_FORMAT: not a scene file; the message has the line and the path of the member, such as
  * "line 12: instances[3].pose.scale". EBPO_E_VERSION: another major version. EBPO_E_LIMIT: a limit
@@ -122,7 +129,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_add_model(ebpo_scene *scene, const
                                                         const char *path, const uint8_t digest[32],
                                                         uint64_t *number, ebpo_error *error);
 
-/* Index of no route or layer. */
+/* Index of a route or layer: none. */
 #define EBPO_SCENE_NONE UINT64_MAX
 
 typedef struct ebpo_scene_instance {
@@ -133,10 +140,10 @@ typedef struct ebpo_scene_instance {
 
     uint64_t model;
 
-    /* Pose in the world; with a route, pose relative to the moving frame of the route. */
+    /* Pose in the world. With a route: pose relative to the moving frame of the route. */
     ebpo_pose pose;
 
-    /* Index of the route, and of the layer (`ebpo_scene_get_layer`). */
+    /* Index of the route, and of the layer (ebpo_scene_get_layer). EBPO_SCENE_NONE: none. */
     uint64_t route, layer;
 
     /* Pairs of two fixed instances are not tested. An instance with a route is not fixed. */
@@ -155,11 +162,11 @@ typedef struct ebpo_scene_instance {
     }
 
 /*
- * Adds an instance of a model. Once its model is loaded, later boxes include it. `number` may be
- * NULL.
+ * Adds an instance of a model. If the model is loaded, boxes computed later include the instance.
+ * `number` may be NULL.
  *
- * EBPO_E_ARGUMENT: invalid name, model, route, layer or pose (ebpo_pose_check tests more, for a
- * model); or fixed with a route.
+ * EBPO_E_ARGUMENT: the name, model, route, layer or pose is not valid (for a loaded model
+ * ebpo_pose_check tests more), or the instance is fixed and has a route.
  *
  * Threads: one per scene.
  */
@@ -174,7 +181,10 @@ typedef struct ebpo_scene_counts {
 
     uint64_t models, instances, layers, groups, routes, cameras;
 
-    /* Poses of all routes; entries of "ignore" and "clearance"; fixed instances. */
+    /*
+     * Number of poses of all routes, of entries of "ignore", of entries of "clearance", and of
+     * fixed instances.
+     */
     uint64_t poses, ignored, clearances, fixed;
 
     /* First and last time of all routes. 0, 0: no instance moves. */
@@ -196,12 +206,15 @@ typedef struct ebpo_scene_model_facts {
     /* Lent until the scene is freed. The path is as in the scene file. */
     const char *name, *path;
 
-    /* All 0: not stated. */
+    /* content_sha256 that the file must have. All 0: not stated. */
     uint8_t digest[32];
 
     uint64_t instances;
 
-    /* True if its file is open. Then the box of its faces, in its own unit. */
+    /*
+     * True if the file of the model is open. Then `min` and `max` are the box of its faces, in the
+     * model's unit.
+     */
     bool loaded;
     uint8_t reserved[7];
     double min[3], max[3];
@@ -220,13 +233,13 @@ EBPO_API ebpo_status ebpo_scene_get_model(const ebpo_scene *scene, uint64_t mode
 typedef struct ebpo_scene_stats {
     size_t struct_size;
 
-    /* Open files, and files with a model in memory. */
+    /* Number of open files, and of files with a model in memory. */
     uint64_t files, models;
 
     /* Bytes of memory of these models. */
     uint64_t memory;
 
-    /* Bytes and number of reads. */
+    /* Number of bytes read, and number of reads. */
     uint64_t bytes_read, reads;
 
     /* Subtrees loaded for queries, of models that are not entirely in memory. */
@@ -299,9 +312,9 @@ EBPO_API ebpo_status ebpo_scene_get_camera(const ebpo_scene *scene, uint64_t cam
                                            ebpo_scene_camera *out);
 
 /*
- * Returns true if a pair is to be tested: the scene does not ignore it, the instances are not both
- * fixed and not the same. *clearance is then the greatest distance that the scene requires between
- * them, 0 if none, in the world's unit. Returns false also for indices out of range.
+ * Returns true if a pair is to be tested: the scene does not ignore the pair, and the instances are
+ * different and not both fixed. *clearance is then the greatest distance that the scene requires
+ * between the instances, in the world's unit; 0: none. Returns false also for indices out of range.
  *
  * Threads: any.
  */
@@ -314,8 +327,8 @@ typedef struct ebpo_load_options {
     size_t struct_size;
 
     /*
-     * Memory limit in bytes for all queried models together (ebpo_budget_new); set by the first
-     * call that gives one. 0: no limit.
+     * Memory limit in bytes for all queried models together (ebpo_budget_new). The first call with
+     * a value other than 0 sets the limit. 0: no limit.
      */
     uint64_t memory;
 
@@ -328,12 +341,13 @@ typedef struct ebpo_load_options {
 #define EBPO_LOAD_OPTIONS_INIT EBPO_SIZED(ebpo_load_options)
 
 /*
- * Opens the files of models that are not open yet (only heads, one for each path), compares
- * digests, and computes boxes. Files of models without instances are opened as well.
+ * Opens the files of models that are not open yet, one for each path. Compares the digests and
+ * computes the boxes. Only the headers of the files are read. Files of models without instances are
+ * opened as well.
  *
- * EBPO_E_FORMAT: a file is not an .ebpo.h5 file or not the one that the scene refers to, or links
- * lead out of the scene's folder (ebpo_scene_options.outside). EBPO_E_ARGUMENT: a model cannot have
- * the pose of one of its instances, which the message names. EBPO_E_IO.
+ * EBPO_E_FORMAT: a file is not an .ebpo.h5 file, its digest differs from that in the scene, or a
+ * link leads out of the scene's folder (ebpo_scene_options.outside). EBPO_E_ARGUMENT: an instance
+ * has a pose that its model cannot have; the message names the instance. EBPO_E_IO.
  *
  * Threads: one per scene.
  */
@@ -343,15 +357,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_load(ebpo_scene *scene,
 
 /*
  * Returns the open file of a model, owned by the scene; NULL: not loaded, or `model` is out of
- * range. Models of the same path share it.
+ * range. Models of the same path share the file.
  *
  * Threads: any.
  */
 EBPO_API const ebpo_file *ebpo_scene_file(const ebpo_scene *scene, uint64_t model);
 
 /*
- * Gets the queryable model, owned by the scene and made at the first call. All instances and all
- * models of a file share it.
+ * Gets the model for queries (query.h). The scene owns it, and makes it at the first call. All
+ * instances of a file share one ebpo_model.
  *
  * EBPO_E_ARGUMENT: not loaded. The errors of ebpo_model_new.
  *
@@ -372,8 +386,8 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_pose(const ebpo_scene *scene, uint
 
 /*
  * Computes an upper bound of the distance that any point of the instance's model moves between any
- * two times of from .. to, in the world's unit. It also holds for its posed coordinates. INFINITY
- * if a route jumps; 0 if it does not move.
+ * two times in from .. to, in the world's unit. The bound also holds for posed coordinates, which
+ * are rounded. INFINITY: the route jumps. 0: the instance does not move.
  *
  * EBPO_E_ARGUMENT: not loaded, or not from <= to, both finite.
  *
@@ -384,7 +398,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_motion(const ebpo_scene *scene, ui
                                                      ebpo_error *error);
 
 /*
- * Computes a box that contains the instance's posed vertices at all times of from .. to. Errors are
+ * Computes a box that contains the instance's posed vertices at all times in from .. to. Errors are
  * those of ebpo_scene_motion.
  *
  * Threads: any.
@@ -395,9 +409,11 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_instance_box(const ebpo_scene *sce
                                                            ebpo_error *error);
 
 /*
- * Computes a box that contains all instances at all times of from .. to (EBP 2017, 5.6.1). Without
- * instances min is INFINITY and max is -INFINITY. Errors are those of ebpo_scene_motion.
- * EBPO_E_ARGUMENT: also for instances whose models were added after the last ebpo_scene_load.
+ * Computes a box that contains all instances at all times in from .. to (EBP 2017, 5.6.1). Without
+ * instances, `min` is INFINITY and `max` is -INFINITY.
+ *
+ * Errors are those of ebpo_scene_motion. EBPO_E_ARGUMENT: also if the model of an instance was
+ * added after the last ebpo_scene_load.
  *
  * Threads: any.
  */
@@ -406,7 +422,7 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_box(const ebpo_scene *scene, doubl
 
 /* ---- collisions ---- */
 
-/* Two instances, a < b, whose boxes are within `clearance` of each other. */
+/* Two instances, a < b, whose boxes are at most `clearance` apart on each axis. */
 typedef struct ebpo_scene_pair {
     uint64_t a, b;
     double clearance;
@@ -418,7 +434,7 @@ typedef bool (*ebpo_scene_pairs_fn)(void *user, const ebpo_scene_pair *pairs, ui
 /*
  * Broad phase: finds the pairs that ebpo_scene_pair_rule allows and whose boxes
  * (ebpo_scene_instance_box) are at most their clearance apart on each axis, in ascending order of
- * a, then b. No other pair comes that close at any time of from .. to.
+ * a, then b. The instances of any other pair are farther apart at all times in from .. to.
  *
  * EBPO_E_ARGUMENT: not loaded, or not from <= to, both finite. EBPO_E_LIMIT: more than 2^23 pairs.
  *
@@ -429,15 +445,15 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_pairs(const ebpo_scene *scene, dou
                                                     ebpo_error *error);
 
 typedef enum ebpo_clash_kind {
-    EBPO_CLASH_NONE = 0,     /* no faces intersect; one may be inside the other */
-    EBPO_CLASH_NEAR = 1,     /* no faces intersect, but they are nearer than their clearance */
+    EBPO_CLASH_NONE = 0,     /* no faces intersect; one instance may be inside the other */
+    EBPO_CLASH_NEAR = 1,     /* no faces intersect, but some are nearer than the clearance */
     EBPO_CLASH_TOUCHING = 2, /* faces have common points, but none in the interior of both */
     EBPO_CLASH_COPLANAR = 3, /* faces are coplanar and overlap, none cross */
     EBPO_CLASH_CROSSING = 4, /* faces cross */
 
-    /* Only with ebpo_scene_clash_options.relate, instead of the above: */
-    EBPO_CLASH_PROTRUDING = 5, /* a part of one is inside the other, a solid; a part is outside */
-    EBPO_CLASH_ENCLOSED = 6,   /* one is inside the other, a solid; it may touch it from inside */
+    /* Only with ebpo_scene_clash_options.relate, instead of the previous kinds: */
+    EBPO_CLASH_PROTRUDING = 5, /* one is partly inside the other, a solid */
+    EBPO_CLASH_ENCLOSED = 6,   /* one is inside the other, a solid; faces may touch */
     EBPO_CLASH_DUPLICATE = 7   /* both are the same point set */
 } ebpo_clash_kind;
 
@@ -449,7 +465,7 @@ typedef struct ebpo_scene_clash {
 
     /*
      * A pair of intersecting faces: the first by index if all are counted, else the pair of
-     * ebpo_collide_first; or the nearest pair.
+     * ebpo_collide_first. If no faces intersect: the nearest pair.
      */
     uint64_t face_a, face_b;
 
@@ -460,26 +476,26 @@ typedef struct ebpo_scene_clash {
     uint64_t touching, crossing, coplanar;
 
     /*
-     * Required clearance, and exact distance of the faces, for EBPO_CLASH_NEAR and for one inside
-     * the other without contact; else 0.
+     * Required clearance. Exact distance of the faces for EBPO_CLASH_NEAR, and if one instance is
+     * inside the other without contact; else 0.
      */
     double clearance, distance;
 
-    /* ebpo_clash_kind; without `relate` the greatest of any pair of faces. */
+    /* ebpo_clash_kind. Without `relate`: the greatest kind of any pair of faces. */
     int32_t kind;
 
     /* ebpo_relation of a to b with ebpo_scene_clash_options.relate, else EBPO_RELATION_OPEN. */
     int32_t relation;
 
     /*
-     * Number of intersection lines (ebpo_collide_polylines), with ebpo_scene_clash_options.count;
-     * UINT64_MAX: more segments than a collider joins.
+     * Number of intersection lines (ebpo_collide_polylines), with ebpo_scene_clash_options.count.
+     * UINT64_MAX: the collider's memory does not hold all segments.
      */
     uint64_t contacts;
 
     /*
-     * With ebpo_scene_clash_options.places: a point in the world, approximated in doubles; a common
-     * point of the two faces, or the middle of their nearest points. NAN: not requested.
+     * With ebpo_scene_clash_options.places: a common point of the two faces, or the middle of their
+     * nearest points. In the world's coordinates, approximated in doubles. NAN: not requested.
      */
     double place[3];
 
@@ -487,13 +503,14 @@ typedef struct ebpo_scene_clash {
     double place_min[3], place_max[3];
 
     /*
-     * Depth of a in b and of b in a (ebpo_collide_depth) within ebpo_scene_clash_options.depth; 0
-     * to INFINITY: not requested, or in a surface.
+     * Depth of a in b, and of b in a (ebpo_collide_depth), with the tolerance
+     * ebpo_scene_clash_options.depth. 0 to INFINITY: not requested, or the other instance is a
+     * surface.
      */
     ebpo_certain depth[2];
 } ebpo_scene_clash;
 
-/* Receives contacts, lent until it returns. Return false to stop. */
+/* Receives clashes, lent until it returns. Return false to stop. */
 typedef bool (*ebpo_scene_clashes_fn)(void *user, const ebpo_scene_clash *clashes, uint64_t count);
 
 typedef struct ebpo_scene_clash_options {
@@ -503,23 +520,23 @@ typedef struct ebpo_scene_clash_options {
 
     unsigned threads;
 
-    /* Counts all pairs of intersecting faces, and intersection lines. */
+    /* Counts all pairs of intersecting faces, and the intersection lines. */
     bool count;
 
-    /* Computes locations. */
+    /* Computes `place`, `place_min` and `place_max` of ebpo_scene_clash. */
     bool places;
 
     /*
-     * Computes the relation of solids (ebpo_collide_relation) for all tested pairs; takes about 60
-     * bytes per face of both models for each thread.
+     * Computes the relation of solids (ebpo_collide_relation) for all tested pairs. Takes about 60
+     * bytes per face of both models, for each thread.
      */
     bool relate;
 
     uint8_t reserved;
 
     /*
-     * Computes penetration depths with this tolerance, in the world's unit; implies `relate`. 0:
-     * does not.
+     * Computes penetration depths with this tolerance, in the world's unit. Implies `relate`. 0:
+     * computes no depths.
      */
     double depth;
 } ebpo_scene_clash_options;
@@ -527,23 +544,23 @@ typedef struct ebpo_scene_clash_options {
 #define EBPO_SCENE_CLASH_OPTIONS_INIT EBPO_SIZED(ebpo_scene_clash_options)
 
 /*
- * Narrow phase at a time: finds the pairs of ebpo_scene_pairs whose faces intersect or are nearer
- * than the clearance, exact on posed coordinates (collide.h), in ascending order of a, then b. An
- * instance inside another without near faces is reported only with options.relate. Models are made
- * as by ebpo_scene_model; all pairs of a model use the same one.
+ * Narrow phase: finds the pairs of ebpo_scene_pairs whose faces intersect at a time, or are nearer
+ * than the clearance. Decisions are exact on posed coordinates (collide.h). Clashes are in
+ * ascending order of a, then b. An instance inside another without near faces is reported only with
+ * options.relate. Models are those of ebpo_scene_model.
  *
- * asked   number of tested pairs; may be NULL
+ * tested   number of tested pairs; may be NULL
  *
  * EBPO_E_ARGUMENT: not loaded, or invalid time, pose (ebpo_pose_check) or options.depth.
- * EBPO_E_ABSENT: a model has no mesh, or is a subset without required faces (with `relate` all are
- * required). EBPO_E_LIMIT: too little memory (ebpo_load_options). The errors of reading.
+ * EBPO_E_ABSENT: a model has no mesh, or is a subset without required faces (`relate` requires all
+ * faces). EBPO_E_LIMIT: too little memory (ebpo_load_options). The errors of reading.
  *
  * Threads: one per scene.
  */
 EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_find_clashes(ebpo_scene *scene, double time,
                                                            const ebpo_scene_clash_options *options,
                                                            ebpo_scene_clashes_fn take, void *user,
-                                                           uint64_t *queried, ebpo_error *error);
+                                                           uint64_t *tested, ebpo_error *error);
 
 /*
  * Finds all pairs of intersecting faces of two instances at a time, as ebpo_collide_all does for
@@ -558,42 +575,43 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_
 
 /* ---- as a file ---- */
 
-/* A report on several times that is being written. */
+/* A report on several times, which is being written to a file. */
 typedef struct ebpo_scene_report ebpo_scene_report;
 
 /* One time of a report. */
 typedef struct ebpo_scene_frame {
     double time;
 
-    /* Tested pairs; duration in nanoseconds. */
-    uint64_t queried, nanoseconds;
+    /* Number of tested pairs; duration in nanoseconds. */
+    uint64_t tested, nanoseconds;
 
     /* During the frame: bytes read, models made, subtrees loaded (ebpo_scene_stats). */
     uint64_t bytes_read, models, loads;
 } ebpo_scene_frame;
 
 /*
- * Begins an HDF5 file (readable from HDF5 1.8 on) that appears atomically when it is finished.
- * Arrays have an attribute `meaning` with a description.
+ * Begins an HDF5 file, which HDF5 1.8 and later can read. The file appears atomically at
+ * ebpo_scene_report_finish. Each array has an attribute `meaning` with a description.
  *
  *   /instances/names       uint8 [bytes]  names in order, each terminated by 0
- *   /instances/model       int64 [i]      index in /models
+ *   /instances/model       int64 [i]      index in /models/names
  *   /models/names          uint8 [bytes]
  *   /frames/time           double [n]     in seconds
  *   /frames/first_clash    int64 [n]      first index in /clashes
  *   /frames/clashes        int64 [n]      number of clashes
- *   /frames/tested, nanoseconds, bytes_read, models, loads   int64 [n]   of ebpo_scene_frame
+ *   /frames/tested, nanoseconds, bytes_read, models, loads   int64 [n]   members of
+ *                           ebpo_scene_frame
  *   /clashes/frame         int64 [m]
  *   /clashes/instances     int64 [m][2]   a and b
  *   /clashes/kind          uint8 [m]      ebpo_clash_kind
  *   /clashes/relation      uint8 [m]      ebpo_relation
  *   /clashes/faces         int64 [m][2]   of a and of b, source indices; -1: none
- *   /clashes/pairs         int64 [m][3]   of faces: touching, coplanar, crossing
+ *   /clashes/pairs         int64 [m][3]   number of pairs of faces: touching, coplanar, crossing
  *   /clashes/contacts      int64 [m]      -1: not computed
  *   /clashes/clearance, distance   double [m]
  *   /clashes/location      double [m][3]  NAN: not requested
  *   /clashes/location_box  double [m][6]  lower corner, upper corner
- *   /clashes/depth         double [m][4]  of a in b from, to; of b in a from, to
+ *   /clashes/depth         double [m][4]  bounds of the depth of a in b, then of b in a
  *
  * EBPO_E_IO: the file cannot be written.
  *
@@ -606,9 +624,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_new(const ebpo_scene *scene
 /*
  * Adds a time with the results of ebpo_scene_find_clashes. EBPO_E_IO.
  *
- * Threads: one per record.
+ * Threads: one per report.
  */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_add(ebpo_scene_report *record,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_add(ebpo_scene_report *report,
                                                          const ebpo_scene_frame *frame,
                                                          const ebpo_scene_clash *clashes,
                                                          uint64_t count, ebpo_error *error);
@@ -616,17 +634,17 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_add(ebpo_scene_report *reco
 /*
  * Completes the file. EBPO_E_IO.
  *
- * Threads: one per record.
+ * Threads: one per report.
  */
-EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_finish(ebpo_scene_report *record,
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_report_finish(ebpo_scene_report *report,
                                                             ebpo_error *error);
 
 /*
- * Frees a record. An unfinished file is removed.
+ * Frees a report. An unfinished file is removed.
  *
- * Threads: one per record.
+ * Threads: one per report.
  */
-EBPO_API void ebpo_scene_report_free(ebpo_scene_report *record);
+EBPO_API void ebpo_scene_report_free(ebpo_scene_report *report);
 
 /* ---- over time ---- */
 
@@ -634,7 +652,7 @@ EBPO_API void ebpo_scene_report_free(ebpo_scene_report *record);
 typedef struct ebpo_scene_approach_result {
     uint64_t a, b;
 
-    /* At all earlier times their faces are certainly farther apart than their clearance. */
+    /* At all earlier times, the faces of a and b are certainly farther apart than the clearance. */
     double time;
 
     /* Bounds of the distance of their faces at `time`. */
@@ -643,13 +661,12 @@ typedef struct ebpo_scene_approach_result {
     double clearance;
 
     /* Number of evaluated times. */
-    uint64_t looks;
+    uint64_t evaluations;
 
     /*
-     * 1: at `time` they are at most clearance + tolerance apart. 0: they are farther apart up to
-     * the last time, which is `time`. -1: undecided; lo and hi are the bounds at `time`. The search
-     * ended after options.max_evaluations, or the tolerance is finer than the rounding of
-     * coordinates.
+     * 1: at `time` the faces are at most clearance + tolerance apart. 0: they are farther apart up
+     * to the last time, which is `time`. -1: undecided. The search ended at `time` after
+     * options.max_evaluations, or because the tolerance is finer than the rounding of coordinates.
      */
     int32_t reached;
 
@@ -657,7 +674,7 @@ typedef struct ebpo_scene_approach_result {
 } ebpo_scene_approach_result;
 
 /* Receives results, lent until it returns. Return false to stop. */
-typedef bool (*ebpo_scene_approaches_fn)(void *user, const ebpo_scene_approach_result *ways,
+typedef bool (*ebpo_scene_approaches_fn)(void *user, const ebpo_scene_approach_result *results,
                                          uint64_t count);
 
 typedef struct ebpo_scene_approach_options {
@@ -665,7 +682,10 @@ typedef struct ebpo_scene_approach_options {
 
     ebpo_progress progress;
 
-    /* Greater than 0, in the world's unit. A smaller tolerance needs more evaluations. */
+    /*
+     * Tolerance of distances, in the world's unit; above 0. A smaller tolerance needs more
+     * evaluations.
+     */
     double tolerance;
 
     /* Maximum number of evaluations per pair. 0: 10,000. */
@@ -679,10 +699,11 @@ typedef struct ebpo_scene_approach_options {
 #define EBPO_SCENE_APPROACH_OPTIONS_INIT EBPO_SIZED(ebpo_scene_approach_options)
 
 /*
- * Finds when instances first come near each other, with no time missed. For each pair of
- * ebpo_scene_pairs (from, to), the distance at a time and ebpo_scene_motion give the next time at
- * which something can happen. One result per pair, in ascending order of a, then b. An instance
- * that is inside another from the beginning, without near faces, counts as apart.
+ * Finds when instances first come within their clearance of each other; no time is missed. For each
+ * pair of ebpo_scene_pairs (from, to) the distance is evaluated at a time. This distance and
+ * ebpo_scene_motion give the next time at which the instances can be near. There is one result per
+ * pair, in ascending order of a, then b. An instance that is inside another from the beginning,
+ * without near faces, counts as apart.
  *
  * Errors are those of ebpo_scene_find_clashes. EBPO_E_ARGUMENT: also if the tolerance is not above
  * 0.
@@ -698,28 +719,28 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_scene_approach(ebpo_scene *scene, double
 typedef struct ebpo_scene_least {
     uint64_t a, b;
 
-    /* A time at which they are at most `hi` apart. */
+    /* A time at which the faces are at most `hi` apart. */
     double time;
 
     /*
      * Bounds of the minimum distance of their faces over all times. They differ by at most the
-     * tolerance, unless options.max_evaluations was reached, or missing data of a file or the
-     * rounding of coordinates leaves it undecided.
+     * tolerance, unless options.max_evaluations was reached, a file lacks data, or the tolerance is
+     * finer than the rounding of coordinates.
      */
     double lo, hi;
 
     double clearance;
 
     /* Number of evaluated times. */
-    uint64_t looks;
+    uint64_t evaluations;
 } ebpo_scene_least;
 
 /* Receives minimum distances, lent until it returns. The return value is ignored. */
 typedef bool (*ebpo_scene_least_fn)(void *user, const ebpo_scene_least *list, uint64_t count);
 
 /*
- * Computes the minimum distance of instances over all times of from .. to, and its time, for each
- * pair of ebpo_scene_pairs (from, to), in ascending order of a, then b. Options and errors are
+ * Computes for each pair of ebpo_scene_pairs (from, to) the minimum distance over all times in from
+ * .. to, and a time of it. Results are in ascending order of a, then b. Options and errors are
  * those of ebpo_scene_approach.
  *
  * Threads: one per scene.
@@ -741,9 +762,9 @@ typedef enum ebpo_scene_purpose {
     EBPO_SCENE_FOR_INSIDE = 2,
 
     /*
-     * As EBPO_SCENE_FOR_COLLIDE, with options.relate and options.depth of ebpo_scene_find_clashes:
-     * needs all faces of instances near others, because a face anywhere may enclose the other
-     * instance.
+     * As EBPO_SCENE_FOR_COLLIDE, with options.relate and options.depth of ebpo_scene_find_clashes.
+     * Needs all faces of an instance that is near another one, because any face may be part of a
+     * surface around the other instance.
      */
     EBPO_SCENE_FOR_SOLIDS = 3
 } ebpo_scene_purpose;
@@ -754,9 +775,9 @@ typedef struct ebpo_plan_options {
     ebpo_progress progress;
 
     /*
-     * Distance beyond the clearance within which data is included, in the world's unit; with a
-     * larger margin ebpo_scene_approach needs fewer evaluations. 0: for each pair 1/32 of the
-     * longest side of the smaller box.
+     * Data within the clearance plus this distance of another instance is included; in the world's
+     * unit. With a larger margin, ebpo_scene_approach needs fewer evaluations. 0: for each pair,
+     * 1/32 of the longest side of the smaller box.
      */
     double margin;
 
@@ -771,31 +792,34 @@ typedef struct ebpo_plan_options {
         sizeof(ebpo_plan_options), { NULL, NULL }, 0, EBPO_SCENE_FOR_COLLIDE, 0 \
     }
 
-/* Data of a model that a scene can need. Models of the same file need the same. */
+/* Data of a model that queries of a scene can need. Models of the same file need the same data. */
 typedef struct ebpo_scene_need {
     size_t struct_size;
 
     uint64_t model;
 
     /*
-     * Pairs that include an instance of this model's file, counted twice if both are of this file;
-     * or cameras.
+     * EBPO_SCENE_FOR_VIEW: number of cameras. Else: number of pairs that include an instance of
+     * this model's file; a pair of two such instances counts twice.
      */
-    uint64_t askers;
+    uint64_t users;
 
-    /* Subtrees of the file that intersect the box, and all subtrees. 0, 0: the file has none. */
+    /* Number of subtrees that intersect the box, and of all subtrees. 0, 0: the file has none. */
     uint64_t subtrees, of_subtrees;
 
-    /* Size of the required chunks, each counted once; size of the file. */
+    /* Size of the required chunks, each counted once, and size of the file; in bytes. */
     uint64_t bytes, file_bytes;
 
-    /* Box in the model's unit; no face outside is needed. */
+    /* Box in the model's unit. Faces outside the box are not needed. */
     double min[3], max[3];
 
-    /* Levels 0 to last_level are needed; number of levels. */
+    /* Deepest level that is needed, and number of levels of the file. */
     int32_t last_level, level_count;
 
-    /* ebpo_part bits of the needed parts that the file has. Without the mesh: no queries. */
+    /*
+     * ebpo_part bits: needed parts that the file has. Without EBPO_PART_MESH, the model is not
+     * queried.
+     */
     uint32_t parts;
 
     /* True if the box does not contain all faces. */
@@ -810,9 +834,9 @@ typedef struct ebpo_scene_need {
 typedef bool (*ebpo_scene_needs_fn)(void *user, const ebpo_scene_need *needs, uint64_t count);
 
 /*
- * Finds for each model the data that queries of a purpose at any time of from .. to can need: for
- * collisions and containment the parts that other instances come near, for images levels. Reads
- * only heads and tables of files.
+ * Finds for each model the data that queries of a purpose can need at any time in from .. to. For
+ * collisions and containment, this is the data near other instances; for images, levels. Reads only
+ * headers and tables of files.
  *
  * EBPO_E_ARGUMENT: not loaded, not from <= to, invalid purpose, or a margin below 0. The errors of
  * reading.
@@ -833,8 +857,8 @@ typedef struct ebpo_pack_options {
     double margin;
 
     /*
-     * Maximum total size of all models in bytes. Larger models are all reduced by the same ratio,
-     * with the smallest possible error bound (ebpo_subset). 0: no target.
+     * Maximum total size of all models in bytes. If they are larger, each is reduced by the same
+     * ratio, with the smallest possible error bound (ebpo_subset). 0: no target.
      */
     uint64_t target_bytes;
 
@@ -855,16 +879,22 @@ typedef struct ebpo_scene_packed {
 
     uint64_t model;
 
-    /* Size of the new file; size of the source file; bytes read from it. */
+    /* Size of the new file, size of the source file, and bytes read from the source file. */
     uint64_t bytes, source_bytes, bytes_read;
 
-    /* Error bound of the envelopes where the model was reduced, in its unit; else 0. */
+    /*
+     * Error bound of the envelopes where the model was reduced, in the model's unit. 0: not
+     * reduced.
+     */
     double max_error;
 
     /* content_sha256 of both files. */
     uint8_t digest[32], source_digest[32];
 
-    /* True if all planned queries are supported; false if target_bytes prevents exact queries. */
+    /*
+     * True: all planned queries are supported. False: some exact queries are not, because of
+     * target_bytes.
+     */
     bool complete;
 
     uint8_t reserved[7];
@@ -877,15 +907,15 @@ typedef bool (*ebpo_scene_packs_fn)(void *user, const ebpo_scene_packed *models,
 
 /*
  * Writes the result of ebpo_scene_plan to a new folder, which appears atomically. It contains
- * subsets of the models' files, files of poses, and packed.scene.json: the scene with these files,
- * their digests and those of their sources. `take` may be NULL.
+ * subsets of the models' files, pose files, and packed.scene.json, which is the scene with these
+ * files, their digests and the digests of the source files. `take` may be NULL.
  *
- * Queries of the purpose at times of from .. to have the same results there. ebpo_scene_approach
- * may use other evaluations, and intervals of distances beyond the clearance may be wider. Queries
- * that need more data return EBPO_E_ABSENT.
+ * Queries of the purpose at times in from .. to have the same results in the new scene.
+ * ebpo_scene_approach may evaluate other times, and intervals of distances beyond the clearance may
+ * be wider. Queries that need more data return EBPO_E_ABSENT.
  *
- * EBPO_E_ARGUMENT: as for ebpo_scene_plan; the scene was not read from a file, or was added to;
- * target_bytes is below the minimum of a model. EBPO_E_ABSENT: with target_bytes, a file is a
+ * EBPO_E_ARGUMENT: as for ebpo_scene_plan; the scene was not read from a file, or was changed after
+ * reading; or target_bytes is too small for a model. EBPO_E_ABSENT: with target_bytes, a file is a
  * subset or has no mesh. EBPO_E_IO: also if the folder exists. The errors of reading.
  *
  * Threads: one per scene.

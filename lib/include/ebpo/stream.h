@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * Streams levels, coarse to fine.
+ * Streams the nodes of a file by levels, coarse to fine.
  *
  *     ebpo_stream_new(file, NULL, &stream, &error);
  *     while (ebpo_stream_next_level(stream, &level, &more, &error) == EBPO_OK && more)
@@ -19,10 +19,10 @@ extern "C" {
 typedef struct ebpo_stream_options {
     size_t struct_size;
 
-    /* Returns the half-spaces of nodes. Otherwise plane_count is 0. */
+    /* True: returns the half-spaces of nodes. False: plane_count is 0. */
     bool planes;
 
-    /* Computes the polygons and volumes of envelopes. Implies planes. */
+    /* True: computes the polygons and volumes of envelopes. Implies `planes`. */
     bool polygons;
 
     unsigned threads;
@@ -35,8 +35,8 @@ typedef struct ebpo_stream_options {
 
 /*
  * One node. Its pointers are lent until the next call with the stream. The mesh is never read. A
- * leaf of a file without EBPO_PART_LEAF_PLANES has no planes: its envelope is its parent's
- * within the leaf's cell.
+ * leaf of a file without EBPO_PART_LEAF_PLANES has no planes: its envelope is the part of its
+ * parent's envelope in the leaf's cell.
  *
  * Polygons are rounded, and negligible cuts are omitted: drawn envelopes are too large rather than
  * too small.
@@ -50,29 +50,29 @@ typedef struct ebpo_stream_node {
     /* Exact bounds of the cell. */
     double min[3], max[3];
 
-    /* White, black: in the cell. Leaf: at the lowest corner. Gray: 0. */
+    /* Winding number. White and black: in the cell. Leaf: at the lowest corner. Gray: 0. */
     int32_t winding;
 
     /*
-     * Number of the node's own planes: of gray nodes, and stored ones of leaves. The planes of all
-     * ancestors also cut the envelope.
+     * Number of the node's own planes: those of a gray node, and those stored for a leaf. The
+     * planes of all ancestors also cut the envelope.
      */
     uint32_t plane_count;
 
     /*
-     * [plane_count] a x + b y + c z <= d, in the model's unit, with unit normals, rounded outward:
-     * points of the cell that satisfy the code satisfy this, also when the left side is computed in
-     * doubles.
+     * [plane_count] coefficients a, b, c, d of the half-space a x + b y + c z <= d, in the model's
+     * unit, with a unit normal. They are rounded outward: points of the cell that are in the
+     * half-space of the code satisfy this inequality, also if the left side is computed in doubles.
      */
     const double (*planes)[4];
 
     /*
-     * With `polygons`: volume of the envelope, in the cube of the model's unit. Black nodes: always
-     * that of the cell. White nodes: 0.
+     * With `polygons`: volume of the envelope, in the cube of the model's unit. Black nodes: volume
+     * of the cell, also without `polygons`. White nodes: 0.
      */
     double volume;
 
-    /* With `polygons`: for gray nodes, leaves and black nodes. */
+    /* With `polygons`: counts for gray nodes, leaves and black nodes; else 0. */
     uint32_t vertex_count, polygon_count;
 
     /* [vertex_count] */
@@ -85,8 +85,8 @@ typedef struct ebpo_stream_node {
     const uint32_t *corners;
 
     /*
-     * Red + 256 green + 65,536 blue, sRGB. Gray nodes: their own colour; others: their parent's.
-     * Gray (0x808080) if `coloured` is 0.
+     * Colour: red + 256 green + 65,536 blue, sRGB. A gray node has its own colour, others that of
+     * their parent. 0x808080 if `coloured` is 0.
      */
     uint32_t colour;
 
@@ -100,7 +100,7 @@ typedef struct ebpo_stream_level {
     /* Nodes of all types. */
     uint64_t node_count;
 
-    /* Bytes of the file for levels 0 to `level`, including the head. */
+    /* Bytes of the file for levels 0 to `level`, including the header. */
     uint64_t cumulative_bytes;
 
     /*
@@ -108,10 +108,11 @@ typedef struct ebpo_stream_level {
      * all leaves so far, and all black cells so far. With `polygons` it is the sum of the nodes'
      * volumes, otherwise the value stored in the file.
      *
-     * Leaves are cut by stored planes, or have inherited planes. Planes derived from their faces
-     * would cut off more (ebpo_lod_level).
+     * Leaves are cut by stored planes if the file has them, else only by the planes of their
+     * ancestors. Planes derived from the faces would cut off more (ebpo_lod_level).
      *
-     * Subset: volume of its content. Nodes omitted by a box count only at their own level.
+     * In a subset, it is the volume of the kept nodes. Nodes omitted by a box count only at their
+     * own level.
      */
     double volume;
 } ebpo_stream_level;
@@ -119,8 +120,8 @@ typedef struct ebpo_stream_level {
 typedef struct ebpo_stream ebpo_stream;
 
 /*
- * Makes a stream of an open file, which must stay open. Reads nothing yet. For earlier levels only
- * node types stay in memory, and with `polygons` their planes.
+ * Makes a stream of an open file, which must stay open. Reads nothing yet. Of earlier levels, only
+ * the node types stay in memory, and with `polygons` the planes.
  *
  * Threads: any.
  */
@@ -144,8 +145,8 @@ EBPO_API void ebpo_stream_free(ebpo_stream *stream);
 EBPO_API void ebpo_stream_prefetch(const ebpo_stream *stream, int last);
 
 /*
- * Reads the next level, from level 0 on, and no deeper one. After the last one, *more is false and
- * *out is unchanged. The caller may pause at any level, and may retry after a failure.
+ * Reads the next level, from level 0 on, and no data of deeper levels. After the last one, *more is
+ * false and *out is unchanged. The caller may pause at any level, and may retry after a failure.
  *
  * Threads: one per stream.
  */

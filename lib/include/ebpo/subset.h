@@ -8,9 +8,10 @@
  *
  * `file` may be opened by its URL: only kept data is fetched.
  *
- * The tree is cut at gray nodes, which are then "pruned": they have envelopes and no children
- * (format-spec, section 5). Results from such a file are never wrong. Where data is missing,
- * queries with a level return EBPO_MAYBE or a wider interval, and exact queries EBPO_E_ABSENT.
+ * The tree is cut at gray nodes, which are then *pruned*: they have envelopes and no children
+ * (format-spec/README.md, section 5). Results from such a file are never wrong. Where data is
+ * missing, queries with a level return EBPO_MAYBE or a wider interval, and exact queries
+ * EBPO_E_ABSENT.
  */
 #ifndef EBPO_SUBSET_H
 #define EBPO_SUBSET_H
@@ -21,7 +22,7 @@
 extern "C" {
 #endif
 
-/* Sets of parts for a purpose. */
+/* Sets of parts for common purposes. */
 typedef enum ebpo_profile {
     /* All parts, for an archive. */
     EBPO_PROFILE_FULL = 0,
@@ -47,26 +48,26 @@ typedef struct ebpo_subset_options {
     size_t struct_size;
 
     /*
-     * Keeps levels 0 to last_level. -1: all. For a subset, levels that only the whole file had are
-     * also allowed: all existing levels are kept.
+     * Levels 0 to last_level are kept. -1: all. If the file is itself a subset, the value may be
+     * any level of the original file; all existing levels up to it are kept.
      */
     int last_level;
 
     /*
-     * With target_bytes, instead of `parts`: selects the first of the profiles full, collision and
-     * lod that fits completely, else lod with a max_error.
+     * True: target_bytes selects the parts, and `parts` is ignored. The first of the profiles full,
+     * collision and lod that fits completely is used; if none fits, lod with a max_error.
      */
     bool choose_parts;
 
-    /* Omits data that does not intersect the closed box min .. max. */
+    /* True: omits data that does not intersect the closed box min .. max. */
     bool boxed;
 
     /* In the model's unit: finite, min <= max on each axis. */
     double min[3], max[3];
 
     /*
-     * ebpo_part bits to keep, of those the file has. Of the mesh, only faces listed by kept leaves.
-     * Without mesh there are no maps.
+     * ebpo_part bits: parts to keep, of those that the file has. Of the mesh, only faces that kept
+     * leaves list are kept. Without the mesh, maps are not kept.
      */
     uint32_t parts;
 
@@ -81,8 +82,9 @@ typedef struct ebpo_subset_options {
     double max_error;
 
     /*
-     * Finds the least max_error, to 1 %, with which the file has at most this size in bytes; none
-     * if all fits. 0: no target. Not together with max_error.
+     * Maximum size of the new file in bytes: the least max_error (to 1 %) with this size is found
+     * and used; if everything fits, no max_error is used. 0: no target. Not together with
+     * max_error.
      */
     uint64_t target_bytes;
 
@@ -90,7 +92,7 @@ typedef struct ebpo_subset_options {
 
     ebpo_progress progress;
 
-    /* As in ebpo_write_options, for the subset's faces. */
+    /* As in ebpo_write_options, for the faces of the subset. */
     uint64_t subtree_faces;
 
     /* As in ebpo_write_options. */
@@ -105,27 +107,27 @@ typedef struct ebpo_subset_options {
     }
 
 /*
- * Estimates the bytes of memory for max_error or target_bytes, for which the whole model is opened
- * in memory. Measured for models with this number of faces, built with this number of faces per
- * leaf.
+ * Estimates the memory in bytes that ebpo_subset needs with max_error or target_bytes, because it
+ * then opens the whole model in memory. The estimate is from measurements of models with such
+ * numbers of faces, and of faces per leaf.
  *
  * Threads: any.
  */
 EBPO_API uint64_t ebpo_subset_memory(uint64_t face_count, uint32_t leaf_faces);
 
 /*
- * Writes the subset of a file to a file, which is replaced atomically. If everything is kept, its
- * content (content_sha256) is that of `file`. The result is in memory, and up to 64 MiB of the data
+ * Writes the subset of a file to another file, which is replaced atomically. If everything is kept,
+ * the content (content_sha256) is that of `file`. Memory: the result, and up to 64 MiB of the data
  * read.
  *
  * Guarantee of max_error for every node that was pruned for it: no point of its envelope, including
  * the interior, is farther than max_error from the solid and its faces (for a surface: from its
- * faces). `kept_error` of ebpo_info contains it. Leaves become pruned nodes without planes if their
- * parent's planes suffice. Remaining leaves keep the error bound of the file's leaves, which may be
- * larger. A smaller max_error keeps all nodes that a larger one keeps. The whole model is opened in
- * memory, see ebpo_subset_memory.
+ * faces). `kept_error` of ebpo_info is this max_error. A leaf becomes a pruned node without planes
+ * if the planes of its parent suffice. Leaves that are kept have the error bound that they have in
+ * `file`, which may be larger than max_error. A smaller max_error keeps all nodes that a larger one
+ * keeps. The whole model is opened in memory, see ebpo_subset_memory.
  *
- * EBPO_E_ARGUMENT: invalid level; a box without points, or one that does not intersect the model's
+ * EBPO_E_ARGUMENT: the level is not valid; the box has no points, or does not intersect the model's
  * root cell or the box of an earlier subset; or target_bytes is too small, and the message gives
  * the minimum. EBPO_E_ABSENT: max_error or target_bytes, and the file has no mesh or is a subset.
  * EBPO_E_IO: also if `path` is that of `file`, and another program has replaced it since opening.
@@ -138,8 +140,9 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subset(const ebpo_file *file, const char
                                                ebpo_error *error);
 
 /*
- * Writes the subset of a tree: the same bytes as from the file of ebpo_tree_write, which is
- * temporarily written beside `path`. The tree is freed, also on failure.
+ * Writes the subset of a tree. The tree is first written to a temporary file beside `path`, as by
+ * ebpo_tree_write; the result is that of ebpo_subset for this file. The tree is freed, also on
+ * failure.
  *
  * Threads: one per tree.
  */

@@ -9,8 +9,8 @@
  *     ebpo_subtree_close(subtree);
  *
  * Little more of the file is read than needed; remote files (http.h) take a few requests. Octcodes
- * are those of ebpo_stream_node and ebpo_view_node; ebpo_octcode_at returns that of the cell around
- * a point.
+ * are those of ebpo_stream_node and ebpo_view_node; ebpo_octcode_at returns the octcode of the cell
+ * that contains a point.
  */
 #ifndef EBPO_SUBTREE_H
 #define EBPO_SUBTREE_H
@@ -27,14 +27,14 @@ typedef struct ebpo_subtree_options {
     size_t struct_size;
 
     /*
-     * ebpo_part bits to read, of those the file has: envelopes, faces, source indices, stored
-     * planes of leaves. Nodes are always read.
+     * ebpo_part bits: parts to read if the file has them (envelopes, faces, source indices, stored
+     * planes of leaves). Nodes are always read.
      */
     uint32_t parts;
 
     /*
-     * Number of levels below the subtree's root. -1: all. Otherwise there are no faces, because
-     * faces are those of the whole subtree.
+     * Number of levels below the subtree's root. -1: all. With another value no faces are read,
+     * because faces are those of the whole subtree.
      */
     int levels;
 
@@ -44,11 +44,12 @@ typedef struct ebpo_subtree_options {
      */
     uint64_t memory;
 
-    /* Also returns the coordinates of the corners of each face. */
+    /* True: also returns the coordinates of the corners of each face. */
     bool corners;
 
     /*
-     * If the tree ends above the octcode, opens the leaf there. Otherwise that is EBPO_E_ARGUMENT.
+     * True: if the tree ends at a leaf above the octcode, opens this leaf. False: returns
+     * EBPO_E_ARGUMENT in this case.
      */
     bool or_leaf_above;
 
@@ -98,7 +99,7 @@ EBPO_API uint64_t ebpo_octcode_at(const ebpo_info *info, const double point[3], 
 
 /* ---- nodes ---- */
 
-/* In `children`: the node has none here. */
+/* In `children`: the node has no children in this subtree. */
 #define EBPO_NO_CHILDREN UINT32_MAX
 
 /*
@@ -108,7 +109,7 @@ EBPO_API uint64_t ebpo_octcode_at(const ebpo_info *info, const double point[3], 
 typedef struct ebpo_subtree_nodes {
     size_t struct_size;
 
-    /* Level of the subtree's root in the tree; number of levels of the subtree. */
+    /* Level of the subtree's root in the tree, and number of levels of the subtree. */
     int level, level_count;
 
     uint64_t node_count;
@@ -129,16 +130,16 @@ typedef struct ebpo_subtree_nodes {
     const int32_t *windings;
 
     /*
-     * [node_count] first of a gray node's eight children, which are in the order of octants.
-     * EBPO_NO_CHILDREN: the node is not gray, its children are beyond options.levels, or it is
-     * pruned.
+     * [node_count] index of the first of a gray node's eight children, which are in the order of
+     * octants. EBPO_NO_CHILDREN: the node is not gray, its children are beyond options.levels, or
+     * it is pruned.
      */
     const uint32_t *children;
 
     /*
-     * [node_count + 1] first index of each node's own planes in `planes`: those that a gray node
-     * adds to its parent's envelope, and those stored for a leaf. NULL: not requested, or not in
-     * the file.
+     * [node_count + 1] index in `planes` of each node's first own plane. Own planes are those that
+     * a gray node adds to its parent's envelope, and those stored for a leaf. NULL: not requested,
+     * or not in the file.
      */
     const uint32_t *plane_first;
 
@@ -146,13 +147,13 @@ typedef struct ebpo_subtree_nodes {
     const uint32_t *planes;
 
     /*
-     * [level + 1] first index in `above_planes` of the planes of each node above the subtree's
-     * root, from the tree's root down. They also bound all envelopes of the subtree. NULL as
+     * [level + 1] index in `above_planes` of the first plane of each node above the subtree's root,
+     * from the tree's root down. These planes also bound all envelopes of the subtree. NULL: as for
      * plane_first.
      */
     const uint32_t *above_first;
 
-    /* Codes in coordinates of that node's cell. */
+    /* Codes, in coordinates of the cell of the node above. */
     const uint32_t *above_planes;
 
     /* Total memory of the subtree in bytes. */
@@ -168,17 +169,17 @@ typedef struct ebpo_subtree_nodes {
  */
 EBPO_API ebpo_status ebpo_subtree_get_nodes(const ebpo_subtree *subtree, ebpo_subtree_nodes *out);
 
-/* A node in the model's coordinates. */
+/* A node, with planes and vertices in the model's coordinates. */
 typedef struct ebpo_subtree_node {
     size_t struct_size;
 
     /*
-     * As in streams, with polygons only if requested. Leaves without stored planes have planes
-     * derived from their faces if the subtree has faces (EBP 2017, 3.4).
+     * As in streams (stream.h), with polygons only if requested. Leaves without stored planes have
+     * planes derived from their faces if the subtree has faces (EBP 2017, 3.4).
      */
     ebpo_stream_node node;
 
-    /* Half-spaces of the nodes above it, from the tree's root down. */
+    /* Number of half-spaces of the nodes above this node, from the tree's root down. */
     uint32_t inherited_count;
 
     /* [inherited_count] as `planes` of ebpo_stream_node */
@@ -201,28 +202,31 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_subtree_get_node(ebpo_subtree *subtree, 
 /* ---- faces ---- */
 
 /*
- * All faces that intersect the subtree's cell, in the order of the file. Its leaves may also list
- * faces outside within a rounding error. Shared faces, which an earlier leaf outside the subtree
- * owns, come first; then owned faces. Of all disjoint subtrees that list a face, one owns it; the
- * whole tree owns all. In a subset (ebpo_subset), faces that are only below pruned nodes are
- * missing. Arrays are lent until the subtree is closed.
+ * All faces that intersect the subtree's cell, in the order of the file. Leaves may also list faces
+ * that are outside the cell by a rounding error. Shared faces come first: those that a leaf before
+ * this subtree lists first. The others are owned faces. So of all disjoint subtrees that list a
+ * face, exactly one owns the face; the whole tree owns all faces. In a subset (ebpo_subset), faces
+ * that are only below pruned nodes are missing. Arrays are lent until the subtree is closed.
  */
 typedef struct ebpo_subtree_faces {
     size_t struct_size;
 
-    /* Number of faces; number of shared faces, which are first. */
+    /* Number of faces, and number of shared faces, which are first. */
     uint64_t face_count, shared_count;
 
     uint64_t vertex_count;
 
-    /* [vertex_count][3] in the model's unit, as stored; one of the two, the other is NULL */
+    /*
+     * [vertex_count][3] coordinates in the model's unit, as stored. One of the two arrays is set,
+     * the other is NULL
+     */
     const float *xyz32;
     const double *xyz64;
 
     /* [face_count][3] vertex indices in this subtree */
     const uint32_t *faces;
 
-    /* [face_count][3][3] corners, with options.corners; one of the two */
+    /* [face_count][3][3] corners, with options.corners. One of the two arrays is set */
     const float *corners32;
     const double *corners64;
 
@@ -232,7 +236,7 @@ typedef struct ebpo_subtree_faces {
     /* [face_count] source indices; NULL: not requested, or the file has no maps */
     const uint32_t *source;
 
-    /* [node_count + 1] first index of each node's faces in `list`; only leaves have faces */
+    /* [node_count + 1] index in `list` of each node's first face; only leaves have faces */
     const uint32_t *list_first;
 
     /* Face indices in this subtree, ascending within each leaf. */

@@ -14,22 +14,22 @@ extern "C" {
 typedef struct ebpo_verify_count {
     uint64_t checks, violations;
 
-    /* First violation in the order of the file; "" if none. */
+    /* Description of the first violation in the order of the file; "" if there is none. */
     char first[240];
 } ebpo_verify_count;
 
 typedef struct ebpo_verify_report {
     size_t struct_size;
 
-    /* Head, shapes, counts, index arrays, order. */
+    /* Header, shapes and counts of arrays, index arrays, order. */
     ebpo_verify_count structure;
 
     /* Content checksum. */
     ebpo_verify_count content;
 
     /*
-     * Vertices, clipped faces and corners inside, against every half-space on the path from the
-     * root.
+     * In each cell: vertices, parts of faces, and corners of the cell that are inside the solid,
+     * are in every half-space on the path from the root.
      */
     ebpo_verify_count containment;
 
@@ -37,8 +37,8 @@ typedef struct ebpo_verify_report {
     ebpo_verify_count nesting;
 
     /*
-     * White and black cells, and winding numbers of corners, against independently computed winding
-     * numbers.
+     * White and black cells, and winding numbers of corners, agree with independently computed
+     * winding numbers.
      */
     ebpo_verify_count labels;
 
@@ -52,9 +52,10 @@ typedef struct ebpo_verify_report {
     uint64_t checks, violations;
 
     /*
-     * Unused bytes of the file, outside headers, indexes and chunks, and how many of these are not
-     * zero: 0 in files of this library. They change no result and are not violations. Remote files
-     * (http.h): 0, they are not read.
+     * Number of unused bytes of the file, which are outside headers, chunk directories and chunks;
+     * and number of unused bytes that are not zero, which is 0 in files of this library. Unused
+     * bytes change no result and are not violations. For remote files (http.h) both are 0, because
+     * unused bytes are not read.
      */
     uint64_t spare_bytes, spare_filled;
 } ebpo_verify_report;
@@ -65,16 +66,16 @@ typedef struct ebpo_verify_options {
     size_t struct_size;
 
     /*
-     * The mesh as it was read, not repaired or arranged; or NULL. Repairs that the file records are
-     * repeated.
+     * The source mesh as ebpo_mesh_read returns it, neither repaired nor arranged. NULL: not
+     * compared. The repairs that the file records are applied to a copy.
      */
     const ebpo_mesh *source;
 
     unsigned threads;
 
     /*
-     * Number of cells whose labels are checked, at least one of each level and type. 0: all of up
-     * to 2^22, or 2^20 of more; 4096 if that would take more than some seconds.
+     * Number of cells whose labels are checked, at least one of each level and type. 0: all cells
+     * if there are at most 2^22, else 2^20; 4096 if this would take more than a few seconds.
      */
     uint64_t label_samples;
 

@@ -30,22 +30,22 @@ extern "C" {
 #endif
 
 /*
- * Order in which gray nodes of the cut are refined. Ties are broken by coarser level first, then by
- * the order of octcodes.
+ * Order in which gray nodes of the cut are refined. Of nodes with equal priority, the coarser level
+ * is first, then the lower octcode.
  */
 typedef enum ebpo_priority {
     /* Level by level, by octcode: the order of the file. */
     EBPO_PRIORITY_LEVEL = 0,
 
-    /* Distance from the eye to the nearest point of the cell. */
+    /* By distance from the eye to the nearest point of the cell, the nearest first. */
     EBPO_PRIORITY_DISTANCE = 1,
 
-    /* Size in the image, the largest first: `pixels` of ebpo_view_node. */
+    /* By size in the image (`pixels` of ebpo_view_node), the largest first. */
     EBPO_PRIORITY_PIXELS = 2,
 
     /*
-     * Front to back: of two cells on a ray from the eye, the nearer one first with all its
-     * descendants. The eight children of a node are also front to back.
+     * Front to back: of two cells on a ray from the eye, the nearer one and all its descendants are
+     * first. The eight children of a node are also front to back.
      */
     EBPO_PRIORITY_FRONT_TO_BACK = 3
 } ebpo_priority;
@@ -54,15 +54,15 @@ typedef enum ebpo_priority {
 typedef struct ebpo_observer {
     size_t struct_size;
 
-    /* In the model's unit. */
+    /* Position of the eye, in the model's unit. */
     double eye[3];
 
     /* Viewing direction of any length. (0, 0, 0): all directions, all nodes are visible. */
     double direction[3];
 
     /*
-     * Upward direction in the image: any length, not along `direction`. Ignored with all
-     * directions.
+     * Upward direction in the image, of any length; not parallel to `direction`. Ignored if
+     * `direction` is (0, 0, 0).
      */
     double up[3];
 
@@ -87,51 +87,54 @@ typedef enum ebpo_unseen {
 typedef struct ebpo_view_options {
     size_t struct_size;
 
-    /* ---- ebpo_view_stream_change may change these ---- */
+    /* ---- members that ebpo_view_stream_change may change ---- */
 
     ebpo_priority priority;
 
-    /* Copied. NULL: none, allowed only with EBPO_PRIORITY_LEVEL. */
+    /* The observer; copied. NULL: no observer, allowed only with EBPO_PRIORITY_LEVEL. */
     const ebpo_observer *observer;
 
     ebpo_unseen unseen;
 
-    /* Nodes up to this size in the image are not refined. 0: all are. */
+    /* Nodes up to this size in the image are not refined. 0: no limit. */
     double pixels;
 
-    /* Nodes farther from the eye, in the model's unit, are not refined. INFINITY: all are. */
+    /*
+     * Nodes farther from the eye than this, in the model's unit, are not refined. INFINITY: no
+     * limit.
+     */
     double distance;
 
     /* Deepest level to deliver. -1: all. */
     int level;
 
     /*
-     * Stops before the bytes read from the file since opening (ebpo_file_get_stats) exceed this. 0:
-     * no limit.
+     * Maximum number of bytes read from the file since opening (ebpo_file_get_stats). The stream
+     * stops before this is exceeded. 0: no limit.
      */
     uint64_t bytes;
 
-    /* Stops before more nodes are delivered. 0: no limit. */
+    /* Maximum number of delivered nodes. 0: no limit. */
     uint64_t nodes;
 
-    /* ---- fixed options ---- */
+    /* ---- members that ebpo_view_stream_change may not change ---- */
 
     /* As in ebpo_stream_options. If both are false, no planes are read. */
     bool planes, polygons;
 
-    /* Reads winding numbers; otherwise those of nodes are 0. */
+    /* True: reads winding numbers. False: winding numbers of nodes are 0. */
     bool windings;
 
     /*
-     * Bytes for decoded chunks, at least 1 MiB; removed chunks are read again when needed. 0: no
-     * limit. The stream also takes about 10 bytes per delivered node, 4 more with winding numbers,
-     * 32 per gray node of the cut, and the plane codes.
+     * Memory limit in bytes for decoded chunks, at least 1 MiB. Chunks that were removed are read
+     * again when needed. 0: no limit. The stream also takes about 10 bytes per delivered node, 4
+     * more with winding numbers, 32 per gray node of the cut, and the plane codes.
      */
     uint64_t memory;
 
     /*
-     * Reads the faces of each leaf (ebpo_view_stream_get_faces), within the limits of bytes and
-     * memory. The stream then also takes one bit per face of the file.
+     * True: reads the faces of each leaf (ebpo_view_stream_get_faces), within the limits `bytes`
+     * and `memory`. The stream then also takes one bit per face of the file.
      */
     bool faces;
 
@@ -152,24 +155,24 @@ typedef struct ebpo_view_node {
 
     int level;
 
-    /* True for the last of eight siblings: they now replace their parent. True for the root. */
+    /* True for the last of eight siblings, which now replace their parent; and for the root. */
     bool complete;
 
     /*
-     * True if the cell is at least partly in the image; may be true for others. True without an
-     * observer.
+     * True if the cell is at least partly in the image. May also be true for other cells. True
+     * without an observer.
      */
     bool seen;
 
     /*
      * Distance from the eye to the nearest point of the cell, in the model's unit. 0: the eye is in
-     * it. NAN without an observer.
+     * the cell. NAN without an observer.
      */
     double distance;
 
     /*
-     * Size of the cell's diagonal at this distance, in the middle of the image. INFINITY: the eye
-     * is in the cell. NAN without an observer.
+     * Size of the cell's diagonal in pixels, at this distance and in the middle of the image.
+     * INFINITY: the eye is in the cell. NAN without an observer.
      */
     double pixels;
 } ebpo_view_node;
@@ -184,8 +187,8 @@ typedef enum ebpo_view_end {
 typedef struct ebpo_view_stream ebpo_view_stream;
 
 /*
- * Makes a stream of an open file, which must stay open. Reads nothing yet. Others may use the file,
- * but their reads count as well (options.bytes).
+ * Makes a stream of an open file, which must stay open. Reads nothing yet. Other users of the file
+ * are allowed, but their reads count as well (options.bytes).
  *
  * EBPO_E_ARGUMENT: invalid options. EBPO_E_ABSENT: faces are requested, and the file has no mesh.
  *
@@ -206,13 +209,13 @@ EBPO_API void ebpo_view_stream_free(ebpo_view_stream *stream);
  * Gets the next node; its pointers are lent until the next call with the stream. Unless *end is
  * EBPO_VIEW_NODE, there is no node and *out is unchanged.
  *
- * Reads the chunks of the node and its siblings, unless they are in memory. A remote file also
- * prefetches the next ones in the order, within the budget.
+ * Reads the chunks of the node and its siblings, unless they are in memory. For a remote file,
+ * chunks of the next nodes are also prefetched, within options.bytes.
  *
  * The caller may pause at any time, and may retry after EBPO_E_IO and EBPO_E_MEMORY. EBPO_E_FORMAT
  * is permanent, and so is EBPO_E_LIMIT (more than 2^32 groups of siblings).
  *
- * The sequence depends only on the file and the options. A budget only truncates it.
+ * The sequence of nodes depends only on the file and the options. Limits only truncate it.
  *
  * Threads: one per stream.
  */
@@ -234,8 +237,8 @@ typedef struct ebpo_view_faces {
     const uint32_t *numbers;
 
     /*
-     * [face_count] 1: an earlier leaf delivered it, so that a viewer can draw each face once; else
-     * 0
+     * [face_count] 1: an earlier leaf delivered this face; else 0. So a viewer can draw each face
+     * once
      */
     const uint8_t *repeated;
 } ebpo_view_faces;
@@ -246,8 +249,8 @@ typedef struct ebpo_view_faces {
  * Gets the faces of the last node of ebpo_view_stream_next if it was a leaf, with options.faces;
  * otherwise none. Arrays are lent until the next call with the stream.
  *
- * Faces are read with the leaf and its siblings, within options.bytes: if their faces would exceed
- * it, the siblings are not delivered.
+ * Faces are read with the leaf and its siblings. If the faces would exceed options.bytes, the leaf
+ * and its siblings are not delivered.
  *
  * Threads: one per stream.
  */
@@ -255,9 +258,9 @@ EBPO_API ebpo_status ebpo_view_stream_get_faces(const ebpo_view_stream *stream,
                                                 ebpo_view_faces *out);
 
 /*
- * Sets other options, for example a moved observer. The cut is kept. The next nodes are selected
- * again, after the current group of siblings. On failure nothing changes. `options` must not be
- * NULL.
+ * Sets other options, for example a moved observer. The cut is kept. After the current group of
+ * siblings, the next nodes are selected by the new options. On failure nothing changes. `options`
+ * must not be NULL.
  *
  * EBPO_E_ARGUMENT: invalid options, or a fixed option differs.
  *
@@ -272,8 +275,8 @@ typedef bool (*ebpo_view_visit_fn)(void *user, const ebpo_view_node *node);
 
 /*
  * Visits the cut: all nodes that are not replaced, including white ones. The order is front to back
- * of the observer, or by octcode and depth first without one. `complete` is always true. There are
- * no nodes before the root is delivered. Reads nothing. `visit` must not use the stream.
+ * of the observer, or, without an observer, depth first by octcode. `complete` is always true.
+ * There are no nodes before the root is delivered. Reads nothing. `visit` must not use the stream.
  *
  * Threads: one per stream.
  */

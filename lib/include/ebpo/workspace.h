@@ -38,7 +38,7 @@ typedef struct ebpo_workspace_options {
     uint64_t memory;
 
     /*
-     * Folder for temporary files; it should be on a disk, not in memory. NULL: $TMPDIR, else
+     * Folder for temporary files. It should be on a disk, not in memory. NULL: $TMPDIR, else
      * /var/tmp.
      */
     const char *temp_dir;

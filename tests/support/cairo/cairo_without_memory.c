@@ -1,5 +1,5 @@
 /* Replaces libcairo.so.2, and draws nothing. The environment selects the call that runs out of
- * memory: EBPO_TEST_CAIRO=drawing or surface; without it none does. */
+ * memory: EBPO_TEST_CAIRO=drawing or surface; without the variable no call does. */
 #include <cairo.h>
 #include <stdbool.h>
 #include <stdlib.h>

@@ -9,15 +9,19 @@ typedef struct bench_scene {
     double low[3], high[3];
 } bench_scene;
 
-/* Rays from points in the box, directions uniform over the sphere. */
+/* Generates rays from points in the box, with directions uniform over the sphere. */
 void bench_rays_uniform(const bench_scene *scene, uint64_t seed, uint64_t count, double *rows);
-/* The same, but each ends after a twentieth of the box's diagonal, at t = 1. */
+/* Generates the same rays, but each ends after a twentieth of the box's diagonal, at t = 1. */
 void bench_rays_segments(const bench_scene *scene, uint64_t seed, uint64_t count, double *rows);
-/* Rays through the pixels of a square picture, row by row: the box fills it, the eye is one and a
- * half diagonals away. */
+/* Generates rays through the pixels of a square picture, row by row. The box fills the picture, and
+ * the eye is one and a half diagonals away. */
 void bench_rays_camera(const bench_scene *scene, uint64_t seed, uint64_t count, double *rows);
-/* In turn: from a point in the box to a vertex, to the middle of an edge; from a vertex in any
- * direction; along an axis through a vertex, from outside. Origins are floats. */
+/* Generates four kinds of rays in turn:
+ * - from a point in the box to a vertex
+ * - from a point in the box to the middle of an edge
+ * - from a vertex in any direction
+ * - from outside along an axis through a vertex
+ * Origins are floats. */
 void bench_rays_degenerate(const bench_scene *scene, const ebpo_mesh *mesh, uint64_t seed,
                            uint64_t count, double *rows);
 

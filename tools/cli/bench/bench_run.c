@@ -128,7 +128,8 @@ ebpo_status bench_run_query(const bench_job *job, ebpo_context *context, uint64_
     return query_into(job, context, number, job->result_values, error);
 }
 
-/* Returns the least of ascending times that no more than 1 - thousandths / 1000 of them exceed. */
+/* Returns a quantile of ascending times: the least time that at most a share of 1 - thousandths /
+ * 1000 of the times exceeds. */
 static uint64_t time_quantile(const uint64_t *sorted, uint64_t count, unsigned thousandths)
 {
     uint64_t below = count / 1000 * thousandths + (count % 1000 * thousandths + 999) / 1000;

@@ -6,7 +6,7 @@
 
 #include "cli/tool_clock.h"
 
-/* Queries from BENCH_RAY on are about rays: the first hit, any, all. */
+/* Queries from BENCH_RAY on are ray queries: the first hit, any hit, all hits. */
 typedef enum bench_query {
     BENCH_INSIDE,
     BENCH_DISTANCE,
@@ -53,7 +53,7 @@ EBPO_MUST_USE ebpo_status bench_run_query(const bench_job *job, ebpo_context *co
 EBPO_MUST_USE ebpo_status bench_singly(const bench_job *job, ebpo_context *context,
                                        uint64_t clock_cost, bench_metrics *out, ebpo_error *error);
 /* Runs all queries in a batch by the functions for many points or rays, on one thread, into
- * `result_values`, which has the size of job->answers. */
+ * `result_values`, which has the size of job->result_values. */
 EBPO_MUST_USE ebpo_status bench_batch(const bench_job *job, ebpo_context *context,
                                       void *result_values, bench_metrics *out, ebpo_error *error);
 

@@ -13,7 +13,7 @@ typedef struct walker {
     uint64_t random;
     uint64_t face;
     double corner[3][3], n[3]; /* corners of the face; unit normal */
-    double p[3], d[3];         /* position, and a unit vector in the plane of the face: direction */
+    double p[3], d[3];         /* position; direction, a unit vector in the plane of the face */
     double turn;               /* radians per step, to the left */
     double side[3];            /* smoothed normals along the path */
 } walker;

@@ -71,8 +71,8 @@ static void print_words(const places *p, const ebpo_crossings_summary *s)
         printf("    ... (--json prints all)\n");
 }
 
-/* Leaves the outermost object open. After a failure it holds the pairs found so far, and no count.
- */
+/* Leaves the outermost object open. After a failure the object holds the pairs found so far, and no
+ * count. */
 static void end_json(json *j, const ebpo_crossings_summary *s, bool found)
 {
     json_end(j);

@@ -1,5 +1,5 @@
-/* Collects clashes of a scene: each pair of instances that intersected at some time, once, the
- * worst first. */
+/* Collects clashes of a scene: each pair of instances with a clash at some time occurs once, the
+ * worst pair first. */
 #ifndef EBPO_TOOLS_CLASH_LIST_H
 #define EBPO_TOOLS_CLASH_LIST_H
 

@@ -93,7 +93,7 @@ static void note_again(clash *c, double time, const ebpo_scene_clash *m)
     }
 }
 
-/* Both lists are in the order of pairs. */
+/* Merges clashes into the list; both are in the order of pairs. */
 ebpo_status clash_add(clash_list *list, double time, const ebpo_scene_clash *found_clashes,
                       uint64_t count, ebpo_error *error)
 {
@@ -229,7 +229,7 @@ static const char *const meanings[] = {
     "",
     "closer than the clearance",
     "faces touch, nothing enters",
-    "faces lie on each other",
+    "faces overlap in one plane",
     "surfaces cut each other",
     "one runs into the other",
     "one is completely within the other",
@@ -308,7 +308,7 @@ static void put_depth(FILE *f, const char *what, const ebpo_certain *depth)
 static void put_measure(FILE *f, const ebpo_scene_clash *m)
 {
     if (m->kind == EBPO_CLASH_NEAR)
-        fprintf(f, "%.4g apart, wanted %.4g", m->distance, m->clearance);
+        fprintf(f, "%.4g apart, required %.4g", m->distance, m->clearance);
     if (m->kind == EBPO_CLASH_ENCLOSED)
         fprintf(f, "%s is inside<br>", m->relation == EBPO_A_INSIDE_B ? "A" : "B");
     put_depth(f, "A in B", &m->depth[0]);

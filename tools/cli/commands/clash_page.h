@@ -4,9 +4,11 @@
 
 #include "cli/commands/clash_list.h"
 
-/* Sorts the list; the first clashes have pictures. Replaces the file atomically.
+/* Sorts the list, and writes its page; replaces the file `path` atomically. The first clashes have
+ * pictures.
  *
- * title    the scene's file frames   number of evaluated times, from `from` to `to` */
+ *   title   name of the scene's file
+ *   frames  number of evaluated times, from `from` to `to` */
 EBPO_MUST_USE ebpo_status clash_page(const clash_list *list, const ebpo_scene *scene,
                                      const char *title, double from, double to, uint64_t frames,
                                      const char *path, ebpo_error *error);

@@ -208,7 +208,8 @@ void clash_strip_free(clash_strip *s)
     free(s);
 }
 
-/* Finds bytes of red faces of each intersecting instance, else NULL. */
+/* Sets red[i] to the bytes that mark the red faces of instance i; NULL stays where no face
+ * intersects. */
 static ebpo_status find_red(clash_strip *s, double time, const ebpo_scene_clash *found_clashes,
                             uint64_t count, uint8_t **red, ebpo_error *error)
 {

@@ -13,7 +13,7 @@ const char *clash_pictures_missing(void);
 EBPO_MUST_USE ebpo_status clash_draw(ebpo_scene *scene, clash *c, unsigned threads,
                                      ebpo_error *error);
 
-/* The scene at several times, side by side, from one viewpoint. */
+/* A picture of the scene at several times, side by side, from one viewpoint. */
 typedef struct clash_strip clash_strip;
 
 enum { CLASH_TILES = 24 };

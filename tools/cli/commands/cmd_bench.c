@@ -29,7 +29,7 @@ static const char *const query_words[] = {
     "inside", "distance", "ray", "ray-any", "ray-all", NULL
 };
 enum { REPEAT_MAX = 99 };
-/* Outcomes of a distance or ray query. Interval: level or deadline did not suffice. */
+/* Outcomes of a distance or ray query. INTERVAL: the level or the deadline did not suffice. */
 enum { NOTHING, FOUND, INTERVAL };
 
 #include "cli/options/bench.inc"
@@ -259,7 +259,7 @@ static int result_kinds(const values *v)
 static void print_results_of(const values *v, const results *r)
 {
     int count = result_kinds(v);
-    printf("\n%-12s", "answers");
+    printf("\n%-12s", "results");
     for (int i = 0; i < count; i++)
         printf(" %11s", v->query == BENCH_INSIDE ? inside_names[i] : other_names[i]);
     printf("\n%-12s", "");
@@ -285,8 +285,8 @@ static void print_results(const values *v, const char *path, uint64_t count, con
 {
     const bench_metrics *f = &r->metrics;
     char bytes[40];
-    printf("%s: %s, %s, %" PRIu64 " questions\n\n", path, query_words[v->query], v->points, count);
-    printf("%-12s %11s %11s %11s %11s %11s\n", "ns/question", "mean", "p50", "p99", "p99.9", "max");
+    printf("%s: %s, %s, %" PRIu64 " queries\n\n", path, query_words[v->query], v->points, count);
+    printf("%-12s %11s %11s %11s %11s %11s\n", "ns/query", "mean", "p50", "p99", "p99.9", "max");
     printf("%-12s %11.1f %11" PRIu64 " %11" PRIu64 " %11" PRIu64 " %11" PRIu64 "\n", "single",
            f->mean, f->p50, f->p99, f->p999, f->max);
     printf("%-12s %11.1f\n", "batch", f->batch);

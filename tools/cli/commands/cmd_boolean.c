@@ -1,4 +1,4 @@
-/* ebpo boolean: queries unions, intersections and differences of models at poses. */
+/* ebpo boolean: evaluates queries on unions, intersections and differences of models at poses. */
 #include <inttypes.h>
 #include <math.h>
 #include <stddef.h>
@@ -71,18 +71,18 @@ typedef struct cell_result {
     const char **models; /* in the order of the command line */
     ebpo_exact_volume exact;
     ebpo_boolean_volume cells;
-    /* the volume is exact, but no cells can be made, with the reason */
+    /* the volume is exact, but no cells can be made; `why_no_cells` is the reason */
     bool no_cells;
     char why_no_cells[1024];
     bool volume; /* requested */
     uint64_t faces_written;
 } cell_result;
 
-static bool is_exact(const cell_result *a) { return a->exact.volume.metric == EBPO_VALUE_EXACT; }
+static bool is_exact(const cell_result *a) { return a->exact.volume.kind == EBPO_VALUE_EXACT; }
 
 static int32_t metric_of(const cell_result *a)
 {
-    return is_exact(a) ? (int32_t)EBPO_VALUE_EXACT : a->cells.metric;
+    return is_exact(a) ? (int32_t)EBPO_VALUE_EXACT : a->cells.kind;
 }
 
 /* Writes why the volume is not exact. */
@@ -132,7 +132,7 @@ static void print_volume(const cell_result *a)
         printf("by cells  %s to %s\n", words_real(b->lo, lo), words_real(b->hi, hi));
     else
         printf("volume    %s to %s, %s: %s\n", words_real(b->lo, lo), words_real(b->hi, hi),
-               b->metric == EBPO_VALUE_BOUND ? "a bound" : "an interval", why);
+               b->kind == EBPO_VALUE_BOUND ? "a bound" : "an interval", why);
     printf("cells     %" PRIu64 " in, %" PRIu64 " mixed of level %" PRId64
            ", edge %g\ndecided   %" PRIu64 " by boxes, %" PRIu64 " by nodes, %" PRIu64
            " by faces\n",

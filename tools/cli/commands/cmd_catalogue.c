@@ -210,7 +210,7 @@ static char *way_between(const char *a, const char *b)
     return way;
 }
 
-/* Returns the exit code. */
+/* Finds the prefix of paths in the catalogue. Returns the exit code. */
 static int find_way(catalogue *c)
 {
     char *a = real_folder(c->out), *b = a ? realpath(c->folder, NULL) : NULL;

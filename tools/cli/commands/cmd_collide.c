@@ -36,7 +36,7 @@ typedef struct collide_far {
 
 /* --- relation of models --- */
 
-/* Indexed by ebpo_relation. */
+/* Names, indexed by ebpo_relation. */
 static const char *const collide_relations[] = { "DISJOINT",   "TOUCHING",   "INTERSECTING",
                                                  "A_INSIDE_B", "B_INSIDE_A", "EQUAL",
                                                  "not known" };
@@ -58,7 +58,8 @@ static ebpo_status collide_unmet(ebpo_collider *c, const ebpo_collide_options *h
     return EBPO_OK;
 }
 
-/* Prints it at the end of the line: " NAME", or as a member of JSON. NULL: nothing. */
+/* Prints the relation at the end of the line: " NAME", or as a member of JSON. NULL: prints
+ * nothing. */
 static void collide_print_unmet(bool as_json, const char *relation)
 {
     bool open = relation == collide_relations[EBPO_RELATION_OPEN];
@@ -111,7 +112,7 @@ static bool collide_far_fits(collide_far *f, bool others)
     return !wrong;
 }
 
-/* Prints certain bounds. */
+/* Prints the two bounds. */
 static void print_bounds(bool as_json, const ebpo_certain *d)
 {
     char lo[32], hi[32];
@@ -241,7 +242,7 @@ static ebpo_status query_separation(const collide_far *f, bool as_json, ebpo_col
     printf("%s", as_json ? "{" : "");
     print_bounds(as_json, &w.t);
     if (as_json)
-        printf(", \"figure\": \"%s\"", metrics[w.t.metric]);
+        printf(", \"figure\": \"%s\"", metrics[w.t.kind]);
     if (any)
         printf(as_json ? ", \"face_a\": %" PRIu64 ", \"face_b\": %" PRIu64
                        : " %" PRIu64 " %" PRIu64,
@@ -397,7 +398,7 @@ static ebpo_status query_pairs(collide_values *v, ebpo_collider *c, const ebpo_c
     return EBPO_OK;
 }
 
-/* Reported on standard error, as results are on standard output. */
+/* Writes --output. The report goes to standard error, as results go to standard output. */
 static ebpo_status write_pairs(const collide_values *v, ebpo_collider *c,
                                const ebpo_collide_options *how, ebpo_error *error)
 {
@@ -558,7 +559,7 @@ static int run_collide(void *given, const char **operand)
     ebpo_distance_options distance = EBPO_DISTANCE_OPTIONS_INIT;
     query_session a = QUERY_SESSION_INIT, b = QUERY_SESSION_INIT;
     if (v->self == (operand[1] != NULL))
-        return command_usage("collide", "two models, or one and --self");
+        return command_usage("collide", "expected two models, or one model and --self");
     if (!collide_far_fits(&v->far, v->query.all || v->self))
         return EXIT_USAGE;
     if (v->self && (v->query.all || v->pose_a || v->pose_b || v->relation || v->out))

@@ -31,7 +31,7 @@
 /* Facts to report, and their form. */
 typedef struct convert_reported {
     const char *in, *out; /* `in` as in messages */
-    bool piped;           /* it came from standard input */
+    bool piped;           /* the mesh came from standard input */
     bool json, quiet, timings;
     bool repaired, chosen; /* --repair was given; the parts were chosen by size */
     bool by_groups;        /* warnings are reported for each group, not here */
@@ -217,7 +217,7 @@ typedef struct values {
 
 #include "cli/options/convert.inc"
 
-/* Returns the parts of --parts, with all that they need, or 0 when the list is not usable. */
+/* Returns the parts of --parts, with the parts that these need; 0: the list is not valid. */
 static uint32_t listed_parts(const char *text)
 {
     uint32_t parts = 0;
@@ -266,8 +266,9 @@ static int check_values(const values *v, const char *in, const char *out)
     if (v->split_components && v->split_groups)
         return command_usage("convert", "--split-components and --split-groups: choose one");
     if (v->split_groups && (v->repair_record.fill_holes || v->repair_record.repair))
-        return command_usage("convert", "--fill-holes and --repair do not go with --split-groups: "
-                                        "what they add is in no group");
+        return command_usage("convert",
+                             "--fill-holes and --repair cannot be used with --split-groups: "
+                             "faces that they add are in no group");
     if (v->date && !ebpo_is_date(v->date))
         return command_usage("convert", "--date '%s': expected " WORDS_DATE_EXPECTED, v->date);
     uint64_t subtree_faces;
@@ -468,7 +469,7 @@ static const values standard = { .max_level = -1,
                                  .normals = -1,
                                  .seed = -1 };
 
-/* The mesh must not be built. */
+/* Returns the error for a mesh that must not be built. */
 static ebpo_status refuse_mesh(const values *v, const mesh_input *p, const char *in,
                                const ebpo_workspace *workspace, ebpo_error *error)
 {

@@ -9,7 +9,7 @@
 
 #include "cli/options/distance.inc"
 
-/* Then the result is only a certain interval. */
+/* Returns true when the options allow an interval as the result. */
 static bool is_limited(const ebpo_distance_options *o)
 {
     return o->mode == EBPO_DISTANCE_EXACT && (o->level >= 0 || o->deadline_ns);

@@ -30,7 +30,8 @@ typedef struct values {
     remote_values remote;
 } values;
 
-/* All octcodes are smaller; limits of options are doubles, which represent this one exactly. */
+/* All octcodes are smaller than this value. Limits of options are doubles, which represent the
+ * value exactly. */
 #define OCTCODE_MAX (INT64_C(1) << 61)
 
 #include "cli/options/extract.inc"
@@ -41,7 +42,7 @@ static int check_values(const values *v, const char *in, const char *out)
     if (v->textures && strcmp(v->textures, "-") == 0)
         return command_usage("extract", "--textures: '-': a folder's name is needed here");
     if (queried == 0 && v->textures && !out)
-        return v->json ? command_usage("extract", "--json does not go with --textures alone")
+        return v->json ? command_usage("extract", "--json cannot be used with --textures alone")
                        : EXIT_FINE;
     if (queried == 0)
         return command_usage("extract", "specify --level N, --mesh or --subtree OCTCODE");
@@ -51,7 +52,7 @@ static int check_values(const values *v, const char *in, const char *out)
         return command_usage("extract", "--level, --mesh and --subtree cannot be used together");
     if (v->level < 0 && v->no_cell_faces)
         return command_usage("extract",
-                             "--no-cell-faces belongs to --level; the model has no cell walls");
+                             "--no-cell-faces belongs to --level; the model has no cell faces");
     if (command_overwrites("extract", in, out))
         return EXIT_USAGE;
     return EXIT_FINE;
@@ -98,7 +99,8 @@ static ebpo_status take_subtree(const ebpo_file *file, const values *v, const ch
     return status;
 }
 
-/* Data of other elements is written when vertex indices are those of the source. */
+/* Warns that data of other elements is omitted: it is written only when vertex indices are those of
+ * the source. */
 static void warn_of_elements(const ebpo_file *file, bool source_order, const char *path)
 {
     ebpo_attribute_facts a = EBPO_ATTRIBUTE_FACTS_INIT;

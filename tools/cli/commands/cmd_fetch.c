@@ -47,7 +47,7 @@ static void remove_part(const char *folder)
 
 typedef struct ticker {
     _Atomic bool active;
-    _Atomic bool shown;        /* called by the thread of transfers */
+    _Atomic bool shown;        /* set by the thread of transfers */
     _Atomic(ebpo_file *) file; /* NULL while it is being opened */
     double last;
 } ticker;
@@ -154,7 +154,7 @@ static int fetch_subset(subset_values *v, const char *url, const char *out, cons
                  (usage && !held))) /* an error in an option never removes existing data */
         remove_part(part);
     if (part && status != EBPO_OK && !usage && access(part, F_OK) == 0 &&
-        rmdir(part) != 0) { /* an empty one is of no use */
+        rmdir(part) != 0) { /* an empty folder is removed */
         int code = command_failed("fetch", &error);
         fprintf(stderr,
                 "ebpo fetch: the fetched data is kept in %s; run the same command to resume\n",
@@ -191,7 +191,8 @@ static int run_fetch(void *given, const char **operand)
         return code;
     if (!command_wants_hdf5("fetch", operand[0]))
         return EXIT_FAILED;
-    char *part = NULL; /* with a cache folder of the user, that one keeps the data */
+    char *part = NULL; /* with --http-cache, the cache folder keeps the data, and there is no folder
+                          OUT.part */
     if (ebpo_is_url(operand[0]) && !v->remote.cache && asprintf(&part, "%s.part", operand[1]) < 0)
         return command_no_memory("fetch");
     code = out_fits(operand[1], part) ? fetch_subset(v, operand[0], operand[1], part, &subset)

@@ -32,10 +32,10 @@ enum { HAPTIC_BINS = 16 };
 
 typedef struct haptic_times {
     uint64_t step_count, late;            /* not finished a period after their due times */
-    double p50, p99, p99_9, p99_99, most; /* seconds from begin to end of a step */
-    double wake_p99_9, wake_max;          /* seconds from the due time of a step to its begin */
-    double cpu_p99_9, cpu_max;            /* processor time from begin to end of a step */
-    uint64_t over_ms;                     /* took more than a millisecond from begin to end */
+    double p50, p99, p99_9, p99_99, most; /* seconds from the start to the end of a step */
+    double wake_p99_9, wake_max;          /* seconds from the due time of a step to its start */
+    double cpu_p99_9, cpu_max;            /* processor time from the start to the end of a step */
+    uint64_t over_ms; /* steps that took more than a millisecond from start to end */
     uint64_t bins[HAPTIC_BINS];
     uint64_t page_faults;             /* page faults of the thread of steps */
     double between_mean, between_max; /* widths of the bounds of a probe */
@@ -47,7 +47,7 @@ typedef struct haptic_play {
     const haptic_device *device; /* source of positions */
     ebpo_haptic_kind kind;
     double range;        /* range of the colours, for probes */
-    haptic_pose *record; /* [ticks] positions of the device, or NULL */
+    haptic_pose *record; /* one for each step: positions of the device; or NULL */
 } haptic_play;
 
 /* Requests real-time scheduling for this thread and locked memory for the process. Returns a text
@@ -82,7 +82,7 @@ static int compare_times(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Returns the least time that this part of all times does not exceed. */
+/* Returns the least time that a share of `part` of all times does not exceed. */
 static double time_quantile(const float *sorted, uint64_t count, double part)
 {
     uint64_t rank = (uint64_t)ceil(part * (double)count);
@@ -202,7 +202,8 @@ static bool play_step(const haptic_play *p, uint64_t i, haptic_times *out)
     return true;
 }
 
-/* Plays late steps, too, and the following ones at their due times. Returns how many there were. */
+/* Plays late steps, too, and the steps after them at their due times. Returns the number of steps.
+ */
 static uint64_t play_all(const haptic_play *p, uint64_t count, const spans *s, haptic_times *out)
 {
     const double period = 1e9 / p->rate;
@@ -294,7 +295,7 @@ static void print_times(const char *name, const haptic_times *t)
 
 static void print_bins(const haptic_times *t)
 {
-    puts("  microseconds from begin to end: steps");
+    puts("  microseconds from start to end: steps");
     for (int i = 0; i < HAPTIC_BINS; i++)
         if (t->bins[i])
             printf("  %6d %s %llu\n", i ? 1 << (i - 1) : 0,
@@ -500,8 +501,8 @@ static ebpo_status no_memory(ebpo_error *error, const char *what)
     return EBPO_E_MEMORY;
 }
 
-/* Plays an empty loop of a tenth of the length: the delay of the machine itself. Before a device
- * begins. */
+/* Plays an empty loop of a tenth of the length, to measure the delay of the machine itself. Called
+ * before a device starts. */
 static ebpo_status play_nothing(job *j, ebpo_error *error)
 {
     const values *v = j->v;
@@ -536,7 +537,7 @@ static ebpo_status play_device(job *j, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Writes it as --path reads it, with all bits of each number. */
+/* Writes the recorded positions in the format that --path reads, with all bits of each number. */
 static ebpo_status write_record(const job *j, ebpo_error *error)
 {
     enum { LINE = 7 * (NUMBER_CAPACITY + 1) };

@@ -70,7 +70,7 @@ static int find_box(const map_job *j, double low[3], double high[3])
             low[c] = info->box_origin[c] - j->v->margin * longest;
             high[c] = info->box_origin[c] + info->box_size[c] + j->v->margin * longest;
         }
-        if (!isfinite(high[c] - low[c])) /* results would be no numbers */
+        if (!isfinite(high[c] - low[c])) /* results would be NaN */
             return command_usage("map", "the edges of the box are beyond the range of a double");
     }
     return EXIT_FINE;
@@ -102,7 +102,8 @@ static bool read_place(const map_job *j, const char *text, int *axis, double *at
     return isfinite(*at);
 }
 
-/* Right and up for the viewer: x and y, x and z, or y and z. */
+/* Finds the edges of the rectangle: right and up for the viewer are x and y, x and z, or y and z.
+ */
 static int find_rectangle(const map_job *j, rectangle *r)
 {
     double all[9], low[3], high[3], at;
@@ -586,7 +587,7 @@ static void print_stats(const map_job *j)
     printf("\n  from       %.9g to %.9g, farthest without signs %.9g\n", s->min, s->max,
            s->farthest);
     printf("  mean       %.9g, without signs %.9g\n  rms        %.9g, standard deviation %.9g\n",
-           s->mean, s->mean_unsigned, s->rms, s->error_bound);
+           s->mean, s->mean_unsigned, s->rms, s->standard_deviation);
     if (isfinite(s->percentile[0]))
         print_percentiles(s);
     if (j->v->bounds)
@@ -613,7 +614,7 @@ static void json_stats(const map_job *j, json *out)
     json_real(out, "mean", s->mean);
     json_real(out, "mean_unsigned", s->mean_unsigned);
     json_real(out, "rms", s->rms);
-    json_real(out, "standard_deviation", s->error_bound);
+    json_real(out, "standard_deviation", s->standard_deviation);
     if (isfinite(s->percentile[0])) {
         json_reals(out, "percents", percents, EBPO_MAP_PERCENTILES);
         json_reals(out, "percentiles", s->percentile, EBPO_MAP_PERCENTILES);

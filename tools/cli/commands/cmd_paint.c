@@ -468,16 +468,18 @@ static int check_values(const paint_values *v)
     int kinds = count_removals(v) + (v->new_layer || v->path || v->note || sets_layer(v)) +
                 (v->bake != NULL) + v->area;
     if (kinds > 1)
-        return command_usage("paint", "one thing at a time: add or change, --undo or one --remove, "
-                                      "--bake, --area");
+        return command_usage("paint",
+                             "only one action at a time: add or change, --undo or one --remove, "
+                             "--bake, --area");
     if ((v->path || v->note) && !v->new_layer && says_of_layer(v))
         return command_usage("paint", "--description, --opacity, --show and --hide belong to a "
-                                      "layer: --new-layer, or a run of their own");
+                                      "layer: use them with --new-layer or in a separate run");
     if (v->new_layer && (v->layer >= 0 || v->title || v->note))
         return command_usage("paint", "--new-layer has its title, and goes with neither --layer, "
                                       "--title nor --note");
     if (v->path && v->note)
-        return command_usage("paint", "--path and --note are runs of their own");
+        return command_usage("paint",
+                             "--path and --note cannot be used together; use separate runs");
     if (v->path && !v->new_layer && (v->title || v->author || v->date))
         return command_usage("paint", "--title, --author and --date belong to layers and notes");
     if (v->show && v->hide)

@@ -1,5 +1,5 @@
-/* ebpo recover: makes a new file from the readable parts of a damaged one. The tree is made anew
- * of the mesh; the mesh is read from the file or from its source. */
+/* ebpo recover: makes a new file from the readable parts of a damaged one. The tree is built again
+ * from the mesh; the mesh is read from the file or from its source. */
 #include <inttypes.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -116,7 +116,7 @@ static ebpo_status inspect_attributes(patient *p, ebpo_error *error)
         ebpo_attribute_values got;
         status = ebpo_file_read_attribute(p->file, n, &read, &got, &reported);
         ebpo_attribute_values_free(&got);
-        if (status == EBPO_E_ABSENT) /* that was the last one */
+        if (status == EBPO_E_ABSENT) /* there are no more attributes */
             return EBPO_OK;
         status = take_down(p, ATTRIBUTES, status, &reported, error);
     }
@@ -155,7 +155,7 @@ static ebpo_status inspect_all(patient *p, ebpo_error *error)
     return status == EBPO_OK ? inspect_levels(p, error) : status;
 }
 
-/* Opens it without its list, if its content then matches the header. */
+/* Opens the file without its list of chunk ends, if its content then matches the header. */
 static ebpo_status open_unlisted(const patient *p, ebpo_file **out, ebpo_error *error)
 {
     ebpo_read_options read = patient_reading(p);
@@ -225,7 +225,7 @@ static int in_order(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Returns the numbers of a map, ascending. */
+/* Returns the source indices of a map, ascending. */
 static uint32_t *sorted_numbers(const uint32_t *map, uint64_t count)
 {
     uint32_t *out = malloc(count * sizeof *out);

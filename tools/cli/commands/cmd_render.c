@@ -89,7 +89,7 @@ static bool add_levels(job *j, const char *text)
     return true;
 }
 
-/* In the order of the command line. */
+/* Adds levels in the order of the command line. */
 static bool parse_levels(job *j)
 {
     for (const char *at = j->v.levels;; at++) {

@@ -130,7 +130,7 @@ static int run_repack(void *given, const char **operand)
     ebpo_close(file);
     ebpo_workspace_free(read.workspace);
     code = status == EBPO_OK ? EXIT_FINE : command_failed("repack", &error);
-    /* when the output is the cause, this build cannot write it at all */
+    /* when the error is about the output, this build cannot write the output at all */
     bool differs = written == EBPO_E_UNSUPPORTED && strcmp(error.file, operand[1]) != 0;
     return differs ? EXIT_DIFFERS : code;
 }

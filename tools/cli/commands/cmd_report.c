@@ -1,4 +1,4 @@
-/* ebpo report: compares methods level by level: bytes, error, run time. */
+/* ebpo report: compares the bytes, the error and the run time of methods, level by level. */
 #include <errno.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -57,7 +57,7 @@ static int add_setting(comparison *c, const report_values *v, const char *word)
     return selection_check("report", &chosen);
 }
 
-/* Reads the numbers of planes for the selections of the theses. */
+/* Reads --percent or --k-root, the numbers of planes for the selections of the theses. */
 static int read_settings(comparison *c, const report_values *v)
 {
     const char *list = v->percent ? v->percent : v->k_root;

@@ -216,7 +216,8 @@ static ebpo_status scene_pairs(const scene_values *v, const char *path, ebpo_sce
     return status;
 }
 
-/* The times when instances of a scene first come near each other; and their least distances. */
+/* Lists the times when instances of a scene first come near each other, or their least distances.
+ */
 
 typedef struct listing {
     const scene_values *v;
@@ -248,7 +249,7 @@ static void way_json(listing *l, const ebpo_scene_approach_result *w)
     json_real(j, "distance_lo", w->lo);
     json_real(j, "distance_hi", w->hi);
     json_real(j, "clearance", w->clearance);
-    json_uint(j, "evaluations", w->looks);
+    json_uint(j, "evaluations", w->evaluations);
     json_end(j);
 }
 
@@ -271,7 +272,7 @@ static bool print_ways(void *user, const ebpo_scene_approach_result *ways, uint6
         const ebpo_scene_approach_result *w = &ways[i];
         l->reached += w->reached > 0;
         l->open += w->reached < 0;
-        l->looks += w->looks;
+        l->looks += w->evaluations;
         if (l->v->json)
             way_json(l, w);
         else
@@ -298,7 +299,7 @@ static void least_json(listing *l, const ebpo_scene_least *w)
     json_real(j, "distance_hi", w->hi);
     json_bool(j, "open", is_open(l, w));
     json_real(j, "clearance", w->clearance);
-    json_uint(j, "evaluations", w->looks);
+    json_uint(j, "evaluations", w->evaluations);
     json_end(j);
 }
 
@@ -318,7 +319,7 @@ static bool print_leasts(void *user, const ebpo_scene_least *list, uint64_t coun
         l->reached += w->lo <= w->clearance;
         bool open = is_open(l, w);
         l->open += open;
-        l->looks += w->looks;
+        l->looks += w->evaluations;
         if (l->v->json)
             least_json(l, w);
         else
@@ -352,7 +353,7 @@ static ebpo_status scene_approach(const scene_values *v, const char *path, ebpo_
     if (v->json)
         json_finish(&l.j);
     else if (!v->quiet)
-        fprintf(stderr, "%s: %llu come near, %llu open; %llu looks; %.3g s\n",
+        fprintf(stderr, "%s: %llu come near, %llu open; %llu evaluations; %.3g s\n",
                 words_plural((char[40]){ 0 }, 40, l.ways, "pair", "pairs"),
                 (unsigned long long)l.reached, (unsigned long long)l.open,
                 (unsigned long long)l.looks, progress_now() - begun);
@@ -365,7 +366,8 @@ static const char *const purpose_words[] = { "collide", "view", "inside", "solid
 
 #include "cli/options/scene.inc"
 
-/* Sets the times: one, unless a span is given, or `spans` makes it the default. */
+/* Sets the times. There is one time, unless a span is given, or `spans` makes the whole span the
+ * default. */
 static bool settle_times(scene_values *v, bool spans, const ebpo_scene *scene)
 {
     ebpo_scene_counts c = EBPO_SCENE_COUNTS_INIT;
@@ -388,12 +390,12 @@ enum { FRAMES_MAX = 10000000 };
 static const char *wrong_report(const scene_values *v)
 {
     if (v->json && v->csv)
-        return "--json and --csv exclude each other";
+        return "--json and --csv cannot be used together";
     if (v->out && !words_end_with(v->out, ".h5") && !words_end_with(v->out, ".html") &&
         !words_end_with(v->out, ".png"))
         return "--output of a report ends in .h5, .html or .png";
     if (v->to > v->from && !(v->step > 0))
-        return "from one time to another a report needs --step";
+        return "a report from one time to another needs --step";
     if (v->to > v->from && !((v->to - v->from) / v->step < FRAMES_MAX))
         return "--step is so small that there are more than ten million times";
     return NULL;
@@ -464,7 +466,7 @@ static int run_scene(void *given, const char **operand)
     const char *wrong = NULL;
     ebpo_status status = ebpo_scene_open(operand[1], &how, &scene, &error);
     if (status == EBPO_OK && !settle_times(v, is_for_all(deed), scene))
-        wrong = "--time stands alone; --from is not after --to";
+        wrong = "--time cannot be used with --from or --to; --from must not be after --to";
     else if (status == EBPO_OK)
         wrong = wrong_options(deed, v, &load);
     if (wrong) {

@@ -40,7 +40,7 @@ static const ebpo_verify_count *count_of(const ebpo_verify_report *report, int i
     return (const ebpo_verify_count *)(const void *)((const char *)report + kinds[i].offset);
 }
 
-/* Data of the source that could not be compared, as the file does not have it. */
+/* Data of the source that could not be compared, as the file does not have the data. */
 typedef struct unseen {
     char words[900]; /* "": nothing */
 } unseen;

@@ -1,4 +1,5 @@
-/* Lists the commands: one cmd_NAME.c for each. Their table is in options/meson.build. */
+/* Lists the commands. Each command is in a file cmd_NAME.c; the table of commands is in
+ * options/meson.build. */
 #ifndef EBPO_TOOLS_COMMANDS_H
 #define EBPO_TOOLS_COMMANDS_H
 
@@ -8,7 +9,7 @@
 typedef struct command {
     const arg_spec *spec;
     size_t size;          /* size of the struct that spec->options fills */
-    const void *standard; /* its defaults */
+    const void *standard; /* the defaults of that struct */
     /* operand[ARGS_OPERANDS_MAX], NULL where none was given; returns the exit code */
     int (*run)(void *values, const char **operand);
 } command;

@@ -31,8 +31,8 @@ static bool is_safe(char c)
            c == '_';
 }
 
-/* Writes "KIND-NUMBER-NAME", with letters, digits, '-' and '_' only; the number, with so many
- * digits, makes it unique. `own`: NULL: without a name. */
+/* Writes "KIND-NUMBER-NAME", with letters, digits, '-' and '_' only. The number has `digits` digits
+ * and makes the name unique. `own`: the NAME; NULL: none. */
 static void part_file_name(char out[PART_NAME_SIZE], const char *kind, int digits, uint64_t number,
                            const char *own)
 {
@@ -99,7 +99,7 @@ static size_t spell_name(char *out, const char *own)
     return size;
 }
 
-/* Writes the name of the group, when a scene can have it; else a derived name with a number.
+/* Writes the name of the group when a scene can have this name, else a derived name with a number.
  * `taken`: sorted names that are used unchanged. */
 static void part_shown_name(char out[PART_SHOWN_SIZE], const char *own, uint64_t number,
                             const char *const *taken, uint64_t taken_count)
@@ -320,7 +320,7 @@ static ebpo_status inspect_part(part *p, const char *path, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Takes the mesh of a part, checked; repairs were made on the whole mesh. */
+/* Takes the mesh of a part and checks it. Repairs were made on the whole mesh before. */
 static ebpo_status take_mesh(const writing *w, uint64_t number, mesh_input *out, ebpo_error *error)
 {
     ebpo_progress progress = { report_part, (void *)(uintptr_t)w };
@@ -519,7 +519,7 @@ ebpo_status parts_write(const parts_run *run, mesh_input *whole, double begun, e
     ebpo_components_free(w.components);
     ebpo_mesh_free(&whole->mesh);
     if (status == EBPO_OK) {
-        made_count = 0; /* it is complete, and stays */
+        made_count = 0; /* the folder is complete, and is kept */
         free(making);
         making = NULL;
         progress_wipe(run->line);

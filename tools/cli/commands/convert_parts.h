@@ -21,15 +21,16 @@ typedef struct parts_run {
     ebpo_progress progress;
 } parts_run;
 
-/* Makes the folder beside its place, before anything is read, and registers clean-up at exit. */
+/* Makes a temporary folder beside `folder`, before anything is read, and registers clean-up at
+ * exit. */
 EBPO_MUST_USE ebpo_status parts_begin(const char *folder, bool groups, ebpo_error *error);
 
-/* Writes the parts of the repaired mesh, and frees it. Then moves the folder to its place, and
- * reports its contents. */
+/* Writes the parts of the repaired mesh, and frees the mesh. Then gives the folder its final name,
+ * and reports the contents of the folder. */
 EBPO_MUST_USE ebpo_status parts_write(const parts_run *run, mesh_input *whole, double begun,
                                       ebpo_error *error);
 
-/* Removes parts that were made and not moved to their place. May be called at any time. */
+/* Removes parts whose folder does not have its final name. May be called at any time. */
 void parts_end(void);
 
 #endif

@@ -13,11 +13,11 @@ typedef struct haptic_pose {
     double place[3], turn[4];
 } haptic_pose;
 
-/* Feedback: for a probe distance, lo, hi and where, for others the rest. */
+/* Feedback. A probe uses distance, lo, hi and where; other tools use the other members. */
 typedef struct haptic_result {
     haptic_pose proxy;
     double force[3], torque[3], normal[3];
-    double depth; /* as in ebpo_haptic_ball_result; of a probe its distance, perhaps NAN */
+    double depth; /* as in ebpo_haptic_ball_result; for a probe its distance, which may be NAN */
     double lo, hi;
     uint64_t face;
     uint32_t flags;
@@ -25,27 +25,29 @@ typedef struct haptic_result {
 } haptic_result;
 
 typedef struct haptic_device {
-    /* Waits for the first position, at most so long. Returns false after an error, reported on
+    /* Waits at most `seconds` for the first position. Returns false after an error, reported on
      * stderr. */
     bool (*begin)(void *self, double seconds, haptic_pose *first);
     /* Called in a haptic step: never waits. Returns false at the end. */
     bool (*read)(void *self, uint64_t step_seconds, haptic_pose *out);
     void (*write)(void *self, const haptic_result *result);
-    /* Returns the number of its steps; 0: as many as requested. */
+    /* Returns the number of steps of the device; 0: as many as requested. */
     uint64_t (*step_count)(void *self);
     void (*end)(void *self);
     void *self;
 } haptic_device;
 
-/* haptic_path.c: lines 'x y z' or 'x y z qx qy qz qw' of a file, '-': standard input. Returns false
- * after an error, reported on stderr. Call `end` in any case. */
+/* haptic_path.c: opens a file of lines 'x y z' or 'x y z qx qy qz qw'; '-': standard input. Returns
+ * false after an error, reported on stderr. Call `end` in any case. */
 bool haptic_path_open(haptic_device *out, const char *path);
 
-/* haptic_udp.c: 'udp:PORT' or 'udp:ADDRESS:PORT', checked by haptic_udp_named. */
+/* haptic_udp.c: opens 'udp:PORT' or 'udp:ADDRESS:PORT', a name that haptic_udp_named has checked.
+ */
 bool haptic_udp_named(const char *name);
 bool haptic_udp_open(haptic_device *out, const char *name);
 
-/* haptic_path_own.c: goes around the model, into its surface and out again. */
+/* haptic_path_own.c: opens a built-in device that moves around the model, into its surface and out
+ * again. */
 ebpo_status haptic_own_open(haptic_device *out, ebpo_model *model, const ebpo_info *info,
                             double rate, double clear, ebpo_error *error);
 

@@ -16,7 +16,8 @@ typedef struct own {
     double hit[HIGH][ROUND]; /* distances from the axis, in sizes of the box; 0.1 without a hit */
 } own;
 
-/* In box coordinates: an angle, a height from -0.5, distance from the axis. */
+/* Computes a point in box coordinates from an angle, a height from -0.5 and a distance from the
+ * axis. */
 static void place_at(const own *o, double angle, double height, double radius, double out[3])
 {
     int u = (o->up + 1) % 3, v = (o->up + 2) % 3;

@@ -87,7 +87,7 @@ static bool read_pose(const uint8_t *p, haptic_pose *out)
     return square >= 0.25 && square <= 4;
 }
 
-/* Returns false when it is no packet of the device, or an old one. */
+/* Returns false when the packet is not from the device, or is old. */
 static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct sockaddr_in *from)
 {
     haptic_pose pose;
@@ -118,7 +118,7 @@ static void take_all(udp *u)
         socklen_t length = sizeof from;
         ssize_t size = recvfrom(u->socket, bytes, sizeof bytes, MSG_DONTWAIT | MSG_TRUNC,
                                 (struct sockaddr *)&from, &length);
-        if (size < 0 && errno != ECONNREFUSED) /* the device is not reachable: it may return */
+        if (size < 0 && errno != ECONNREFUSED) /* the device is not reachable now, and may return */
             return;
         if (size >= 0 && !(length == sizeof from && take_packet(u, bytes, size, &from)))
             u->ignored++;

@@ -15,7 +15,7 @@
 #include "cli/commands/version_facts.h"
 #include "ebpo_config.h"
 
-/* The commands of one part of `ebpo help`; without extras some are absent. */
+/* The commands of one part of `ebpo help`. Builds without extras lack some of the commands. */
 typedef struct command_group {
     const char *title;
     const command *const *commands; /* NULL ends it */
@@ -96,7 +96,7 @@ static int unknown_command(const char *name)
     return EXIT_USAGE;
 }
 
-/* The options for URLs, which all commands that read files share. */
+/* Prints the options for URLs, which all commands that read files share. */
 static void print_remote(void)
 {
     printf("A command that reads an .ebpo.h5 file also accepts its URL, http:// or https://.\n"

@@ -14,12 +14,12 @@ static const char *colour_text(uint32_t colour, char out[12])
     return out;
 }
 
-/* Counts of each layer. */
+/* Counts of one layer. */
 typedef struct counts {
     uint64_t strokes, points, notes;
 } counts;
 
-/* NULL: no memory. */
+/* Returns the counts of all layers; NULL: no memory. */
 static counts *count_layers(const ebpo_paint *p, const ebpo_paint_info *info)
 {
     counts *c = calloc(info->layer_count + 1, sizeof *c);

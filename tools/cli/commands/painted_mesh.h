@@ -12,8 +12,8 @@ typedef struct painted_mesh {
 
 void painted_free(painted_mesh *p);
 
-/* Finds intersecting faces of two instances at a time: bytes by face index in the files, to be
- * freed. */
+/* Finds intersecting faces of two instances at a time: bytes by face index in the files, which the
+ * caller frees. */
 EBPO_MUST_USE ebpo_status painted_find_red(ebpo_scene *scene, uint64_t a, uint64_t b, double time,
                                            unsigned threads, uint8_t *red[2], ebpo_error *error);
 
@@ -22,7 +22,7 @@ EBPO_MUST_USE ebpo_status painted_add(painted_mesh *p, const ebpo_scene *scene, 
                                       double time, const uint8_t *red, uint8_t paint,
                                       ebpo_error *error);
 
-/* Adds the bounding box of its model instead. */
+/* Adds the bounding box of the instance's model instead of its faces. */
 EBPO_MUST_USE ebpo_status painted_add_box(painted_mesh *p, const ebpo_scene *scene,
                                           uint64_t instance, double time, uint8_t paint,
                                           ebpo_error *error);

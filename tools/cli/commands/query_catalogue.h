@@ -19,8 +19,8 @@ ebpo_catalogue_query_options query_catalogue_options(const query_job *job);
 /* Prints statistics for --stats. */
 void query_catalogue_report(const query_job *job);
 
-/* Writes the catalogue data that results depend on as members of the note of a shard: the file, and
- * the sizes and times of files with numbers. Returns an exit code. */
+/* Writes, as members of the note of a shard, the data of the catalogue that results depend on: the
+ * file, and the sizes and times of files with numbers. Returns an exit code. */
 int query_catalogue_facts(json *j, const char *command, const char *path);
 
 #endif

@@ -7,7 +7,7 @@
 #include "cli/command.h"
 #include "cli/words.h"
 
-/* Size that is always loaded completely: takes some milliseconds. */
+/* A model of at most this size is always loaded completely, which takes some milliseconds. */
 enum { SMALL = 16 << 20 };
 
 /* Number of loads before their mean is used; and the factor by which the estimate must exceed all
@@ -16,7 +16,7 @@ enum { LOADS_BELIEVED = 8, CERTAIN = 4 };
 
 /* --- opening --- */
 
-/* As if not everything fitted: cuts a model with subtrees at their roots, each of which is one
+/* Cuts a model with subtrees at their roots, as if the whole model did not fit. Each subtree is one
  * read. */
 static void cut_at_subtrees(query_holding *h)
 {
@@ -170,7 +170,8 @@ static ebpo_status bring_in_all(query_holding *h, ebpo_error *error)
     h->session.model = NULL;
     ebpo_status status = ebpo_model_new(h->session.file, &all, &h->session.model, error);
     h->whole_later = status == EBPO_OK;
-    if (status == EBPO_E_LIMIT || status == EBPO_E_MEMORY) /* more than estimated by its counts */
+    if (status == EBPO_E_LIMIT ||
+        status == EBPO_E_MEMORY) /* the model needs more memory than its counts suggest */
         status = ebpo_model_new(h->session.file, &h->options, &h->session.model, error);
     return status;
 }

@@ -1,6 +1,6 @@
 /* Holds the model of a query command for all threads. Without --memory and similar options it
  * adapts: it begins with the upper levels and the subtrees that queries need, and loads the whole
- * model when parts have cost as much as that would. */
+ * model when loading parts has cost as much as loading the whole model would. */
 #ifndef EBPO_TOOLS_QUERY_HOLDING_H
 #define EBPO_TOOLS_QUERY_HOLDING_H
 
@@ -21,13 +21,13 @@ typedef struct query_holding {
     ebpo_context **context[QUERY_THREADS_MAX]; /* existing contexts; protected by `books` */
     unsigned contexts;
     pthread_mutex_t books;
-    bool elsewhere; /* the job holds its own data: nothing is done here */
+    bool elsewhere; /* the job holds its own data, and these functions do nothing */
     /* policy */
     bool automatic;      /* no memory limit was given */
     atomic_bool waiting; /* the whole model may still be loaded */
-    bool whole_later;    /* it was loaded, after: */
+    bool whole_later;    /* the whole model was loaded, for these two costs: */
     uint64_t queries_before, loads_before;
-    /* cost of parts beyond loading each once; estimated cost of loading everything */
+    /* cost of parts beyond loading each part once; estimated cost of loading everything */
     double extra_seconds, whole_seconds;
     double parts_share;      /* extra share of the time of a query in parts, compared with the whole
                               * model */
@@ -49,11 +49,11 @@ void query_holding_elsewhere(query_holding *h, const char *command);
 void query_holding_close(query_holding *h);
 
 /* Call before a thread queries: *context (NULL at first) then belongs to the model as it is
- * currently held. `total`: number of queries, 0: not known. Then call query_holding_leave with the
- * number of queries done and their time, unless this failed. */
+ * currently held. `total`: number of queries; 0: not known. After success, call query_holding_leave
+ * with the number of queries done and their time. */
 EBPO_MUST_USE ebpo_status query_holding_enter(query_holding *h, ebpo_context **context,
                                               double total, ebpo_error *error);
-/* The same with exclusive access to the model. False: not entered. */
+/* Does the same with exclusive access to the model. Returns false when this failed. */
 bool query_holding_enter_alone(query_holding *h, ebpo_context **context);
 void query_holding_leave(query_holding *h, uint64_t queries, double seconds);
 void query_holding_forget(query_holding *h, ebpo_context **context);

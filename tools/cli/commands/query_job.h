@@ -22,7 +22,7 @@ struct query_job {
     const query_values *values;
     points_kind kind;
     size_t result_bytes; /* size of the result of one row */
-    double parts_share;  /* as for query_holding_open */
+    double parts_share;  /* see query_holding_open */
     /* Evaluates rows[count][points_width(kind)], while the model is held: results of one size go to
      * `results`; lists are printed until the text is over. Called with no rows first, so that an
      * unsupported query is reported before the command waits for input. */

@@ -12,7 +12,7 @@
 /* Blocks in progress for each thread: while the oldest one is pending, others are evaluated. Fewer
  * for large blocks. */
 enum { BLOCKS_EACH = 4, LARGE_EACH = 2, FIRST_PIECE = 16 };
-/* Results of a block that are kept, for each of its rows. */
+/* Bytes of results that a block keeps, for each of its rows. */
 enum { KEPT_EACH = 128 };
 
 /* A block of queries, and its results. */
@@ -348,7 +348,7 @@ static void free_slots(pipe_line *p)
     free(p->crew);
 }
 
-/* Reports unsupported queries, and writes the line of names. */
+/* Reports unsupported queries, and writes the line of column names. */
 static int query_nothing(pipe_line *p, query_worker *w)
 {
     ebpo_error error = EBPO_ERROR_INIT;
@@ -386,7 +386,7 @@ int query_pipe_run(const query_job *job, query_holding *holding, points *in, uns
         for (unsigned i = 1; i < p.working; i++)
             pthread_join(p.crew[i].thread, NULL);
         if (p.code == EXIT_FINE && !result_text_leave(&p.slot[0].text, job->command))
-            p.code = EXIT_FAILED; /* a line of names without results */
+            p.code = EXIT_FAILED; /* only the line of column names was written, without results */
         if (p.code == EXIT_FINE && in->failed)
             p.code = EXIT_FAILED;
     }

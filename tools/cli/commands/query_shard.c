@@ -169,7 +169,7 @@ static int report_facts(const query_shard *s, const query_job *job, const struct
     return code;
 }
 
-/* The current header of the model and file of points. */
+/* Reads the current header of the model, and the current size and time of the file of points. */
 static int inspect_inputs(const query_shard *s, const query_job *job, char **facts)
 {
     struct stat st;
@@ -210,8 +210,8 @@ static bool file_is(const char *path, const char *text)
     return same;
 }
 
-/* A file in the place of the note that is no note, such as an input, is kept: it is reported before
- * the work begins. */
+/* Returns false when a file that is not a note, such as an input, has the name of the note. The
+ * file is kept, and is reported before the work begins. */
 static bool note_is_free(const query_shard *s)
 {
     static const char begins[] = "{\n  \"format\": \"ebpo-shard\",\n";
@@ -322,8 +322,8 @@ static int write_note(const query_shard *s, const struct stat *results)
 }
 
 /* Removes the old note first, and writes the new note last: if the process is killed at any time,
- * the note is never beside other results. `answers` is their descriptor: another command may have
- * replaced them. */
+ * the note is never beside other results. `results` is the descriptor of the results: another
+ * command may have replaced the file. */
 static int put_in_place(query_shard *s, int results)
 {
     struct stat st;

@@ -9,7 +9,7 @@ typedef struct query_shard {
     const char *command;
     const query_values *v;
     const char *model, *points; /* paths */
-    uint64_t number, of;        /* number of shards; of 0: no shard */
+    uint64_t number, of;        /* shard `number` of `of` shards; `of` 0: no shard */
     char *facts;                /* all inputs of the results, as in the note */
     char *note;                 /* its path */
     ebpo_output *out;

@@ -32,7 +32,7 @@ static bool is_first(const ebpo_scene *scene, uint64_t model)
 static void need_json(json *j, const ebpo_scene *scene, const ebpo_scene_need *need)
 {
     json_text(j, "model", name_of(scene, need->model));
-    json_uint(j, "pairs_using", need->askers);
+    json_uint(j, "pairs_using", need->users);
     json_int(j, "last_level", need->last_level);
     json_uint(j, "levels", (uint64_t)need->level_count);
     json_array(j, "parts");

@@ -89,8 +89,9 @@ static void scene_head_csv(const scene_values *v)
            v->depth > 0 ? ",a_in_b_lo,a_in_b_hi,b_in_a_lo,b_in_a_hi" : "");
 }
 
-/* Doubles quotes. Spreadsheets take some beginnings for a formula: then a ' precedes the text, also
- * before an existing ', so that removing the first one restores the text. */
+/* Writes the text with doubled quotes. Spreadsheets take some beginnings for a formula: then a '
+ * precedes the text. A ' also precedes a text that begins with ', so that removing the first '
+ * restores the text. */
 static void csv_text(const char *text)
 {
     putchar('"');
@@ -219,7 +220,7 @@ static ebpo_status query_frame(report *r, double time, ebpo_error *error)
     f->count = 0;
     f->cost = (ebpo_scene_frame){ .time = time };
     ebpo_status status =
-        ebpo_scene_find_clashes(r->scene, time, &r->how, keep_clashes, r, &f->cost.queried, error);
+        ebpo_scene_find_clashes(r->scene, time, &r->how, keep_clashes, r, &f->cost.tested, error);
     if (status == EBPO_OK && f->count && !f->found_clashes) {
         snprintf(error->message, sizeof error->message, "no memory for %llu clashes",
                  (unsigned long long)f->count);
@@ -230,7 +231,7 @@ static ebpo_status query_frame(report *r, double time, ebpo_error *error)
     f->cost.bytes_read = after.bytes_read - before.bytes_read;
     f->cost.models = after.models - before.models;
     f->cost.loads = after.loads - before.loads;
-    r->queried += f->cost.queried;
+    r->queried += f->cost.tested;
     r->found_clashes += f->count;
     r->frames_found += f->count > 0;
     return status;
@@ -247,7 +248,7 @@ static void frame_json(report *r)
     for (uint64_t i = 0; i < r->frame.count; i++)
         scene_row_json(&r->j, r->v, r->scene, &r->frame.found_clashes[i]);
     json_end(&r->j);
-    json_uint(&r->j, "pairs_tested", cost->queried);
+    json_uint(&r->j, "pairs_tested", cost->tested);
     json_real(&r->j, "seconds", (double)cost->nanoseconds * 1e-9);
     json_uint(&r->j, "bytes_read", cost->bytes_read);
     json_uint(&r->j, "models_read", cost->models);
@@ -265,7 +266,8 @@ static void print_frame(report *r)
                                                       &f->found_clashes[i]);
 }
 
-/* As many frames as pictures, or frames spread evenly. */
+/* Returns true when the strip shows this frame: all frames if there are as many as pictures, else
+ * frames spread evenly. */
 static bool is_pictured(const report *r)
 {
     uint64_t n = r->reported, most = r->frames < CLASH_TILES ? r->frames : CLASH_TILES;
@@ -316,7 +318,7 @@ static ebpo_status begin_report(report *r, ebpo_error *error)
     return out && !r->page ? ebpo_scene_report_new(r->scene, out, &r->record, error) : EBPO_OK;
 }
 
-/* Number of the worst clashes with pictures. */
+/* Maximum number of clashes with pictures, the worst first. */
 enum { PICTURES_MAX = 60 };
 
 static ebpo_status write_page(report *r, ebpo_error *error)

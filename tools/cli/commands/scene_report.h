@@ -5,7 +5,7 @@
 
 #include "cli/commands/scene_run.h"
 
-/* Queries and results at a time. */
+/* The cost and the clashes of one time. */
 typedef struct scene_frame {
     ebpo_scene_frame cost;
     ebpo_scene_clash *found_clashes;

@@ -1,5 +1,5 @@
-/* Shared by `ebpo subset` and `ebpo fetch`: options for a part of a file, and the report of the
- * result. */
+/* Defines the options for a part of a file and the report of the result, shared by `ebpo subset`
+ * and `ebpo fetch`. */
 #ifndef EBPO_TOOLS_SUBSET_RUN_H
 #define EBPO_TOOLS_SUBSET_RUN_H
 
@@ -25,14 +25,14 @@ typedef struct subset_values {
 
 extern const char *const profile_words[];
 
-/* Reads --parts: part names separated by commas, or, with a minus sign before each, `base` without
- * these parts. Returns false when the list is neither. */
+/* Reads --parts: a list of part names separated by commas; with a minus sign before each name, the
+ * parts are `base` without these. Returns false when the list is invalid. */
 bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts);
 #define SUBSET_PARTS_EXPECTED                                                                     \
     "is not a list of mesh, maps, attributes, envelopes, leaf-planes, colours, or of these with " \
     "a minus sign before each"
 
-/* The the two; returns the exit code. */
+/* Sets *out from --max-error and --target-size; returns the exit code. */
 int subset_need(const char *name, double max_error, const char *target_size,
                 ebpo_subset_options *out);
 

@@ -21,8 +21,8 @@ const char *__lsan_default_suppressions(void) { return "leak:libfontconfig"; }
 const char *__lsan_default_options(void) { return "print_suppressions=0"; }
 #endif
 
-/* Loaded when the first caption is drawn: cairo needs fifteen libraries, which every command would
- * otherwise load at start. */
+/* Functions of cairo, which is loaded when the first caption is drawn: cairo needs fifteen
+ * libraries, which every command would otherwise load at start. */
 #define CAIRO_FUNCTIONS(X)      \
     X(image_surface_create)     \
     X(image_surface_get_data)   \
@@ -44,8 +44,8 @@ static struct {
 #undef MEMBER
 } lib;
 
-/* MISSING: it is not installed. FAILED: it is installed, but could not be loaded: a picture without
- * captions would not be the requested one. */
+/* MISSING: cairo is not installed, and captions are omitted. FAILED: cairo is installed but could
+ * not be loaded; this is an error, as a picture without captions would not be the requested one. */
 static enum { UNTRIED, LOADED, MISSING, FAILED } loaded;
 
 static void load_cairo(void)

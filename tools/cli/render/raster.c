@@ -105,7 +105,8 @@ static unsigned outline_sides(const raster *r, uint64_t face, const double norma
     return sides;
 }
 
-/* Side i from corner i to the next: value >= 0 inside, in samples from the side. */
+/* The sides of a triangle. Side i leads from corner i to the next one; its value is the distance
+ * from the side in samples, >= 0 inside. */
 typedef struct sides {
     double a[3], b[3], c[3];
 } sides;
@@ -205,8 +206,8 @@ static void sample_position(const raster *r, int x, int y, double inverse, doubl
     out[2] = r->view->distance - depth;
 }
 
-/* Returns the hidden share of the sky near a sample, 0 .. 1: from points on a spiral around it that
- * are above its plane. */
+/* Returns the hidden share of the sky near a sample, 0 .. 1. It is estimated from points on a
+ * spiral around the sample that are above the plane of the sample. */
 static double sky_hidden(const raster *r, int x, int y, const sample *at, const float n[3],
                          double reach)
 {

@@ -27,15 +27,15 @@ typedef struct raster_style {
     bool closed;          /* back faces are never visible: skip them */
     bool edges;           /* draw the outlines of polygons */
     const uint8_t *paint; /* painting of each face; NULL: RASTER_PLAIN, in `colour` */
-    /* Replace `colour`, sRGB and a fourth byte each: of faces, or of vertices, interpolated on
-     * faces; NULL: none. */
+    /* Colours that replace `colour`, each sRGB and a fourth byte: of faces, or of vertices,
+     * interpolated on faces. NULL: none. */
     const uint8_t *face_colours, *vertex_colours;
     /* [face_count][3] unit normals for lighting, or 0: geometric normal; NULL: all geometric */
     const float *normals;
 } raster_style;
 
 /* Draws the mesh over the rectangle (x, y, width, height) of the picture. `threads` 1 to 64; the
- * picture does not depend on it. */
+ * picture does not depend on their number. */
 EBPO_MUST_USE ebpo_status raster_draw(picture *out, int x, int y, int width, int height,
                                       const camera *view, const ebpo_mesh *mesh,
                                       const raster_style *style, unsigned threads,

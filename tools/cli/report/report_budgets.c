@@ -1,5 +1,5 @@
-/* Measures distances under a memory budget: the part in memory gives an interval at once; the exact
- * result loads subtrees. */
+/* Measures distances under a memory budget. The part of the model in memory gives an interval at
+ * once; the exact result loads subtrees. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -43,7 +43,7 @@ static ebpo_status query_within_budget(const comparison *c, ebpo_model *model, i
     return status;
 }
 
-/* A budget that is too small, according to the error, has no results. */
+/* Measures one budget. When the error says that the budget is too small, there are no results. */
 static ebpo_status one_budget(comparison *c, method *m, ebpo_file *file, int i, ebpo_error *error)
 {
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
@@ -108,7 +108,7 @@ ebpo_status report_budgets(comparison *c, method *m, ebpo_file *file, ebpo_error
             m->budget[i][k] = NAN;
         method_note(m, "memory budgets", error->message);
         *error = (ebpo_error)EBPO_ERROR_INIT;
-        return EBPO_OK; /* smaller budgets are too small as well */
+        return EBPO_OK; /* the smaller budgets that follow are too small as well */
     }
     return EBPO_OK;
 }

@@ -3,7 +3,7 @@
 
 #include "cli/report/report_data.h"
 
-/* Names have no commas; an empty value means that it is not available. */
+/* Prints a line. Names have no commas; an empty value means that the value is not available. */
 static void print_metric(FILE *out, const char *name, int level, const char *parameter,
                          const metric_name *q, double v)
 {

@@ -174,7 +174,7 @@ const metric_name need_metrics[NEED_METRICS] = {
     [OF_NEED_RATIO] = { "need_ratio", "1", false,
                         "need_hausdorff_hi / the requested error, or / the error of the whole "
                         "file if larger (leaves cannot be refined); need_bytes / the size: 1 or "
-                        "less meets the request",
+                        "less satisfies the request",
                         NO_MESH },
     [OF_NEED_SECONDS] = { "need_seconds", "s", true, "to make the file", NULL },
 };

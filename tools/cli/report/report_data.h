@@ -1,5 +1,5 @@
-/* Data of `ebpo report`: values of methods by level, and the tables that name them. CSV, JSON and
- * the page are written from here. */
+/* Data of `ebpo report`: values of methods by level, and the tables that name the values. CSV, JSON
+ * and the page are written from these data. */
 #ifndef EBPO_TOOLS_REPORT_DATA_H
 #define EBPO_TOOLS_REPORT_DATA_H
 
@@ -22,7 +22,7 @@ enum {
         200000 /* limits the bounds of a level's error: flat and huge models would take too long */
 };
 
-/* For each level; the table level_metrics describes them. */
+/* Values of each level; the table level_metrics describes them. */
 typedef enum level_metric {
     OF_BYTES,
     OF_CUMULATIVE_BYTES,
@@ -59,7 +59,7 @@ typedef enum level_metric {
     LEVEL_METRICS
 } level_metric;
 
-/* For a whole method. */
+/* Values of a whole method. */
 typedef enum whole_metric {
     OF_FILE_BYTES,
     OF_HEAD_BYTES,
@@ -72,7 +72,7 @@ typedef enum whole_metric {
     WHOLE_METRICS
 } whole_metric;
 
-/* For a deadline, for distances. */
+/* Values of distance queries with a deadline. */
 typedef enum deadline_metric {
     OF_DUE_EXACT,
     OF_DUE_WIDTH_MEDIAN,
@@ -84,7 +84,7 @@ typedef enum deadline_metric {
     DEADLINE_METRICS
 } deadline_metric;
 
-/* For a memory budget. */
+/* Values of a memory budget. */
 typedef enum budget_metric {
     OF_BUDGET_BYTES,
     OF_BUDGET_LEVEL,
@@ -95,7 +95,7 @@ typedef enum budget_metric {
     BUDGET_METRICS
 } budget_metric;
 
-/* For a file that was cut to a need. */
+/* Values of a file that was cut to a need: a requested error or size. */
 typedef enum need_metric {
     OF_NEED_BYTES,
     OF_NEED_FAR_LO,
@@ -108,7 +108,7 @@ typedef enum need_metric {
 typedef struct metric_name {
     /* unit "1": a share or a ratio; "model": the model's unit of length, "model^3" its cube */
     const char *name, *unit;
-    bool timed; /* differs from run to run */
+    bool timed; /* the value differs from run to run */
     const char *meaning;
     /* why it may be absent, when no note of the method gives a reason */
     const char *absent;
@@ -139,7 +139,7 @@ typedef struct round_times {
 typedef struct method {
     char name[64], path[4096];
     ebpo_info info;
-    ebpo_solid_volume solid; /* bounds of its volume */
+    ebpo_solid_volume solid; /* bounds of the volume of the solid */
     /* when volumes are beyond the range of a double: share of the root cell inside the solid, the
      * base of excess; else 0 */
     double solid_share;
@@ -166,11 +166,11 @@ typedef struct report_values {
     remote_values remote;
 } report_values;
 
-/* Number of planes for the selections of the theses; each setting makes a method of each selection.
- */
+/* Number of planes for the selections of the theses. Each setting makes one method for each
+ * selection. */
 typedef struct plane_setting {
     double percent;
-    char k_root[24]; /* instead, if not "" */
+    char k_root[24]; /* --k-root, used instead if not "" */
     char word[32];   /* suffix of the selection's name; "" when there is one setting */
 } plane_setting;
 
@@ -211,8 +211,8 @@ void report_stem(const char *path, char *out, size_t capacity);
 /* Notes once why a build or a file has no results of a kind; other failures stay errors. */
 ebpo_status method_without(method *m, const char *what, ebpo_status status, ebpo_error *error);
 
-/* Returns value `share` (0 .. 1) of ascending values, the least that no more than 1 - share of them
- * exceed; NAN if there is none. Sorts. */
+/* Sorts the values, and returns the quantile `share` (0 .. 1): the least value that at most 1 -
+ * share of the values exceed; NAN if there is none. */
 double quantile_of(double *values, uint64_t count, double share);
 
 /* The steps in order; each fills values of one method. */

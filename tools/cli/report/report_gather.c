@@ -1,5 +1,5 @@
-/* Gathers the results of one method except times: header, volumes, limit, error bounds; then needs
- * and the costs of the theses. */
+/* Gathers the results of one method except times: values of the header, volumes, hulls and error
+ * bounds, then needs and the costs of the theses. */
 #include <stdio.h>
 #include <string.h>
 
@@ -56,7 +56,7 @@ static double share_of_root(const ebpo_info *info, const ebpo_mesh *mesh)
     return fabs(sum) / 6;
 }
 
-/* Used when volumes are beyond the range of a double. */
+/* Computes solid_share, which is used when volumes are beyond the range of a double. */
 static ebpo_status solid_in_root(const comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
@@ -102,7 +102,7 @@ static ebpo_status solid_volume(const comparison *c, method *m, const ebpo_file 
     return status;
 }
 
-/* Uses all data of the file. */
+/* Computes volumes from all data of the file. */
 static ebpo_status gather_volumes(comparison *c, method *m, ebpo_file *file, ebpo_error *error)
 {
     ebpo_status status = solid_volume(c, m, file, error);
@@ -131,7 +131,7 @@ static ebpo_status levels_alone(comparison *c, method *m, ebpo_file *file, ebpo_
         status = ebpo_stream_next_level(stream, &reported, &more, error);
         if (status == EBPO_OK && i >= c->first) {
             m->level[i][OF_LEVELS_VOLUME] = reported.volume;
-            /* with leaf planes in the file, the levels alone are all known data */
+            /* a file with leaf planes has all these data in its levels */
             m->level[i][OF_LEVELS_EXCESS] =
                 !(m->solid_share > 0) ? facts_excess(&m->info, &m->solid, reported.volume)
                 : m->info.parts & EBPO_PART_LEAF_PLANES ? m->level[i][OF_EXCESS]
@@ -179,8 +179,8 @@ static ebpo_status gather_error_bounds(comparison *c, method *m, ebpo_file *file
     options.seed = (uint64_t)c->v->seed;
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
-    /* from the root on: the bound of a level is at most that of the previous one, whichever are
-     * requested */
+    /* begins at the root whichever levels are requested, as the bound of a level is at most the
+     * bound of the level above */
     for (int i = 0; i <= method_last(c, m); i++) {
         ebpo_error_bound far = EBPO_ERROR_BOUND_INIT;
         double *f = m->level[i];

@@ -25,7 +25,7 @@ static void vertex_of(const ebpo_mesh *mesh, uint64_t face, int corner, double o
         out[k] = mesh->xyz32 ? (double)mesh->xyz32[3 * v + k] : mesh->xyz64[3 * v + k];
 }
 
-/* In units of the diagonal, so that no square overflows. */
+/* Returns an area in units of the diagonal, so that no square overflows. */
 static double area_of(const ebpo_mesh *mesh, uint64_t face, double unit)
 {
     double p[3][3], a[3], b[3];
@@ -128,7 +128,7 @@ typedef struct querier {
     bool first; /* round: later ones only measure times */
 } querier;
 
-/* Returns nanoseconds per point; results are in a->distance or a->inside. */
+/* Measures nanoseconds per point; results are in a->distance or a->inside. */
 static ebpo_status time_queries(querier *a, bool distance, const double *points, int level,
                                 double *ns, ebpo_error *error)
 {
@@ -187,7 +187,7 @@ static ebpo_status distance_at(querier *a, int level, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Needs the mesh. */
+/* Measures exact queries, which need the mesh. */
 static ebpo_status time_exact(querier *a, ebpo_error *error)
 {
     ebpo_status status = a->m->info.solid ? time_queries(a, false, a->c->uniform, EBPO_LEVEL_ALL,

@@ -1,4 +1,4 @@
-/* Cuts files to a need, an error or a size, and compares the result with the request. */
+/* Cuts files to a need, which is an error or a size, and compares the result with the request. */
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -32,7 +32,7 @@ static ebpo_status measure_reach(const comparison *c, ebpo_model *model, const c
     ebpo_error_bound far = EBPO_ERROR_BOUND_INIT;
     ebpo_file *file = NULL;
     options.samples = 0;
-    options.tolerance = 0.01; /* otherwise a met bound would seem exceeded */
+    options.tolerance = 0.01; /* otherwise a bound that is kept would seem exceeded */
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
     ebpo_status status = ebpo_open(path, &file, error);

@@ -1,4 +1,5 @@
-/* Makes the folder of a report beside its place, and moves it there when complete. */
+/* Makes a temporary folder beside the folder `place` of a report, and gives it the name `place`
+ * when it is complete. */
 #ifndef EBPO_TOOLS_REPORT_OUTPUT_H
 #define EBPO_TOOLS_REPORT_OUTPUT_H
 
@@ -10,7 +11,7 @@
  * (NULL-terminated) is in the report that would be replaced. A report: a folder with only files of
  * a report, including report.json. */
 int output_begin(const char *place, const char *const *operand, char *folder, size_t capacity);
-/* Moves the folder to its place and replaces an existing report. Returns false after a failure,
+/* Gives the folder the name `place` and replaces an existing report. Returns false after a failure,
  * reported on stderr. */
 bool output_commit(const char *place, const char *folder);
 /* Removes the folder and its contents, if it exists. */

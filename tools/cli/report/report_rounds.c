@@ -77,7 +77,7 @@ ebpo_status report_round(comparison *c, method *m, int round, ebpo_error *error)
 
 #define MEDIAN(field) median_of_rounds(m->round[0].field, m->round[1].field, m->round[2].field)
 
-/* NAN when one of them is: then the value is not available. */
+/* Returns NAN when one of the values is NAN: then the value is not available. */
 static double median_of_rounds(double a, double b, double c)
 {
     double v[ROUNDS] = { a, b, c };

@@ -1,8 +1,10 @@
 /* Computes the cost of sending each level of a tree in the cost model of the theses (BP 2008,
- * section 4.2): uncompressed, level after level from the root, a leaf with its faces and their
- * vertices. A leaf: 1 byte for its corners. A plane: 16 bytes the first time its normal occurs,
- * else 4, and 4 for its offset. A face: 12 bytes the first time, else 4. A vertex of a leaf: 12
- * bytes the first time, else 4. */
+ * section 4.2): uncompressed, level after level from the root, each leaf with its faces and their
+ * vertices. The costs are:
+ *   leaf              1 byte for its corners
+ *   plane             16 bytes the first time that its normal occurs, else 4; and 4 for its offset
+ *   face              12 bytes the first time, else 4
+ *   vertex of a leaf  12 bytes the first time, else 4 */
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,7 +21,7 @@ typedef struct sent {
     uint64_t leaves;
 } sent;
 
-/* Returns true the first time. */
+/* Sets bit i; returns true when it was not set before. */
 static bool first_time(uint8_t *bits, uint64_t i)
 {
     bool before = bits[i >> 3] >> (i & 7) & 1;
@@ -27,7 +29,8 @@ static bool first_time(uint8_t *bits, uint64_t i)
     return !before;
 }
 
-/* The half-spaces of one cell shape: equal integers are equal directions at every level. */
+/* Returns the bytes of the planes of a cell. All cells have one shape, so equal integers are equal
+ * directions at every level. */
 static double plane_costs(sent *s, const uint32_t *codes, uint64_t count)
 {
     double sum = 0;
