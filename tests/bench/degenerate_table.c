@@ -1,7 +1,7 @@
 /* Prints docs/measured/degenerate.md: the results of each degenerate or ill-conditioned case,
  * compared with a well-conditioned model of about as many faces.
  *
- *     stiff_table [TEXT] > docs/measured/degenerate.md
+ *     degenerate_table [TEXT] > docs/measured/degenerate.md
  *
  * TEXT: only the cases whose name contains it.
  */
@@ -141,7 +141,7 @@ static void row(const degenerate_case *c, FILE *out, totals *sum)
 static const char introduction[] =
     "## Measurement\n"
     "\n"
-    "Made by `ninja -C build tests/bench/stiff_table && build/tests/bench/stiff_table >\n"
+    "Made by `ninja -C build tests/bench/degenerate_table && build/tests/bench/degenerate_table >\n"
     "docs/measured/degenerate.md`. Each case is one line of `tests/support/degenerate_cases.c` "
     "(test suite `stiff`).\n"
     "\n"
