@@ -57,7 +57,7 @@ static uint64_t longest_run(const ebpo_catalogue_pairs *pairs)
     return longest;
 }
 
-ebpo_status ebpo_catalogue_query_runs(const ebpo_catalogue_querier *a, ebpo_catalogue_pairs *pairs,
+ebpo_status ebpo_catalogue_query_runs(const ebpo_catalogue_batch *a, ebpo_catalogue_pairs *pairs,
                                       const double *rows, size_t width, bool surface,
                                       ebpo_catalogue_query run_query, void *user, ebpo_error *error)
 {
@@ -93,7 +93,7 @@ bool ebpo_catalogue_find_ray(const ebpo_catalogue_boxes *boxes, const double *ro
     return ebpo_catalogue_boxes_on_ray(boxes, row, row + 3, item, out);
 }
 
-ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_querier *a, const double *rows,
+ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_batch *a, const double *rows,
                                      uint32_t count, size_t width, ebpo_catalogue_find find,
                                      bool surface, ebpo_catalogue_query run_query, void *user,
                                      ebpo_error *error)
@@ -127,7 +127,7 @@ static ebpo_status query_gathered(const ebpo_catalogue_job *j, const uint32_t *o
 {
     for (uint32_t i = 0; i < count; i++)
         memcpy(g->rows + i * j->width, j->rows + order[i] * j->width, j->width * sizeof *g->rows);
-    ebpo_status status = j->run_query(&j->querier, g->rows, count, g->out, g->model, error);
+    ebpo_status status = j->run_query(&j->batch, g->rows, count, g->out, g->model, error);
     for (uint32_t i = 0; i < count && status == EBPO_OK; i++) {
         memcpy(j->out + order[i] * j->result, g->out + i * j->result, j->result);
         if (j->model)
@@ -143,7 +143,7 @@ static ebpo_status query_stretch(void *context, uint64_t begin, uint64_t end, un
     uint32_t count = (uint32_t)(end - begin);
     (void)worker;
     if (!j->order)
-        return j->run_query(&j->querier, j->rows + begin * j->width, count,
+        return j->run_query(&j->batch, j->rows + begin * j->width, count,
                             j->out + begin * j->result, j->model ? j->model + begin : NULL, error);
     gathered g = { ebpo_alloc(count, j->width * sizeof *g.rows), ebpo_alloc(count, j->result),
                    ebpo_alloc(count, sizeof *g.model) };
@@ -163,14 +163,14 @@ static ebpo_status query_stretch(void *context, uint64_t begin, uint64_t end, un
 static bool needs_order(const ebpo_catalogue_job *j, uint64_t count)
 {
     return j->ordered && count > UNORDERED &&
-           !ebpo_catalogue_in_memory(j->querier.models, j->querier.c);
+           !ebpo_catalogue_in_memory(j->batch.models, j->batch.c);
 }
 
 static ebpo_status query_lap(ebpo_catalogue_job *j, uint64_t count, bool in_order,
                              const ebpo_progress *progress, ebpo_error *error)
 {
-    const ebpo_catalogue_box *box = j->querier.c->all.box[j->querier.c->all.levels - 1];
-    unsigned threads = ebpo_thread_count(j->querier.options->threads);
+    const ebpo_catalogue_box *box = j->batch.c->all.box[j->batch.c->all.levels - 1];
+    unsigned threads = ebpo_thread_count(j->batch.options->threads);
     uint64_t grain = count / ((uint64_t)threads * STRETCHES_EACH) + 1;
     uint32_t *order = in_order ? ebpo_alloc(count, sizeof *order) : NULL;
     if (in_order &&
@@ -195,7 +195,7 @@ ebpo_status ebpo_catalogue_query_rows(ebpo_catalogue_job *j, uint64_t count, ebp
     ebpo_status status = EBPO_OK;
     for (uint64_t at = 0; at < count && status == EBPO_OK; at += LAP) {
         uint64_t here = count - at < LAP ? count - at : LAP;
-        ebpo_pass pass = { &j->querier.options->progress, at, at + here, count };
+        ebpo_pass pass = { &j->batch.options->progress, at, at + here, count };
         ebpo_progress reported = ebpo_pass_progress(&pass);
         status = query_lap(j, here, in_order, count > LAP ? &reported : pass.to, error);
         j->rows += here * j->width;

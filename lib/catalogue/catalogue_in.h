@@ -77,11 +77,11 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_numbers_get(const ebpo_catalogue_number
 
 /* --- each model once, by one thread: catalogue_ask.c --- */
 
-typedef struct ebpo_catalogue_querier {
+typedef struct ebpo_catalogue_batch {
     const ebpo_catalogue *c;
     ebpo_catalogue_models *models;
     const ebpo_catalogue_query_options *options;
-} ebpo_catalogue_querier;
+} ebpo_catalogue_batch;
 
 /* Maximum number of pairs in memory; the pairs of one query may be more. */
 enum { EBPO_CATALOGUE_PAIRS = 1 << 21 };
@@ -97,7 +97,7 @@ typedef struct ebpo_catalogue_run {
 
 /* Queries each model of `pairs` (sorted by model, then by query) once, for the rows of its items.
  * The callback gets an ebpo_catalogue_run as its `user`; the run has the `user` given here. */
-EBPO_MUST_USE ebpo_status ebpo_catalogue_query_runs(const ebpo_catalogue_querier *a,
+EBPO_MUST_USE ebpo_status ebpo_catalogue_query_runs(const ebpo_catalogue_batch *a,
                                                     ebpo_catalogue_pairs *pairs, const double *rows,
                                                     size_t width, bool surface,
                                                     ebpo_catalogue_query run_query, void *user,
@@ -113,7 +113,7 @@ bool ebpo_catalogue_find_ray(const ebpo_catalogue_boxes *boxes, const double *ro
 
 /* As ebpo_catalogue_query_runs, for rows[count]: `find` gives the boxes that each row reaches. With
  * `surface` these are the boxes of models that rays and distances use. */
-EBPO_MUST_USE ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_querier *a,
+EBPO_MUST_USE ebpo_status ebpo_catalogue_query_all(const ebpo_catalogue_batch *a,
                                                    const double *rows, uint32_t count, size_t width,
                                                    ebpo_catalogue_find find, bool surface,
                                                    ebpo_catalogue_query run_query, void *user,
@@ -125,12 +125,12 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_need_surface(const ebpo_catalogue *c, e
 /* --- many rows, by any number of threads: catalogue_ask.c --- */
 
 /* Processes a stretch of rows in one thread. A row is a point, or an ebpo_ray as numbers. */
-typedef ebpo_status (*ebpo_catalogue_stretch)(const ebpo_catalogue_querier *a, const double *rows,
+typedef ebpo_status (*ebpo_catalogue_stretch)(const ebpo_catalogue_batch *a, const double *rows,
                                               uint32_t count, void *out, uint64_t *model,
                                               ebpo_error *error);
 
 typedef struct ebpo_catalogue_job {
-    ebpo_catalogue_querier querier;
+    ebpo_catalogue_batch batch;
     ebpo_catalogue_stretch run_query;
     const char *stage;
     size_t width, result; /* numbers in a row; bytes of a result */
@@ -149,7 +149,7 @@ EBPO_MUST_USE ebpo_status ebpo_catalogue_take_options(ebpo_catalogue_query_optio
 
 /* --- points inside, for a stretch of points: catalogue_inside.c --- */
 
-EBPO_MUST_USE ebpo_status ebpo_catalogue_query_inside(const ebpo_catalogue_querier *a,
+EBPO_MUST_USE ebpo_status ebpo_catalogue_query_inside(const ebpo_catalogue_batch *a,
                                                       const double *rows, uint32_t count, void *out,
                                                       uint64_t *model, ebpo_error *error);
 

@@ -125,7 +125,7 @@ static ebpo_status query_crossings(ebpo_context *context, const ebpo_catalogue_h
 }
 
 /* Casts one ray from each of the remaining points. */
-static ebpo_status cast_rays(const ebpo_catalogue_querier *a, doubtful *d, uint64_t *state,
+static ebpo_status cast_rays(const ebpo_catalogue_batch *a, doubtful *d, uint64_t *state,
                              ebpo_error *error)
 {
     double direction[3];
@@ -142,7 +142,7 @@ static ebpo_status cast_rays(const ebpo_catalogue_querier *a, doubtful *d, uint6
                                     query_crossings, d, error);
 }
 
-static ebpo_status judge_points(const ebpo_catalogue_querier *a, doubtful *d, found *all,
+static ebpo_status judge_points(const ebpo_catalogue_batch *a, doubtful *d, found *all,
                                 ebpo_error *error)
 {
     uint64_t state = 20;
@@ -166,7 +166,7 @@ static ebpo_status judge_points(const ebpo_catalogue_querier *a, doubtful *d, fo
 
 /* --- parts together --- */
 
-static ebpo_status judge_doubtful(const ebpo_catalogue_querier *a, const double *points,
+static ebpo_status judge_doubtful(const ebpo_catalogue_batch *a, const double *points,
                                   uint32_t count, found *all, ebpo_error *error)
 {
     uint32_t most = 0;
@@ -204,7 +204,7 @@ static bool is_inside(ebpo_rule rule, int64_t winding)
                                        : winding > 0;
 }
 
-ebpo_status ebpo_catalogue_query_inside(const ebpo_catalogue_querier *a, const double *rows,
+ebpo_status ebpo_catalogue_query_inside(const ebpo_catalogue_batch *a, const double *rows,
                                         uint32_t count, void *out, uint64_t *model,
                                         ebpo_error *error)
 {

@@ -25,7 +25,7 @@
 
 /* Points of a stretch, and their results so far. */
 typedef struct search {
-    const ebpo_catalogue_querier *a;
+    const ebpo_catalogue_batch *a;
     const double *points;
     uint32_t count;
     double max_distance;
@@ -150,7 +150,7 @@ static ebpo_status query_nearest(search *s, ebpo_error *error)
     return status;
 }
 
-static ebpo_status sign_distances(const ebpo_catalogue_querier *a, const double *points,
+static ebpo_status sign_distances(const ebpo_catalogue_batch *a, const double *points,
                                   uint32_t count, ebpo_distance_result *out, ebpo_error *error)
 {
     ebpo_inside_result *where = ebpo_alloc(count, sizeof *where);
@@ -163,8 +163,8 @@ static ebpo_status sign_distances(const ebpo_catalogue_querier *a, const double 
     return status;
 }
 
-static ebpo_status query_distance(const ebpo_catalogue_querier *a, const double *rows,
-                                  uint32_t count, void *out, uint64_t *model, ebpo_error *error)
+static ebpo_status query_distance(const ebpo_catalogue_batch *a, const double *rows, uint32_t count,
+                                  void *out, uint64_t *model, ebpo_error *error)
 {
     ebpo_distance_result *reported = out;
     search s = { .a = a,
@@ -295,7 +295,7 @@ static ebpo_status query_hits(ebpo_context *context, const ebpo_catalogue_held *
     return status;
 }
 
-static ebpo_status query_rays(const ebpo_catalogue_querier *a, const double *rows, uint32_t count,
+static ebpo_status query_rays(const ebpo_catalogue_batch *a, const double *rows, uint32_t count,
                               void *out, uint64_t *model, ebpo_error *error)
 {
     shot s = { a->options->sides, out, model, ebpo_alloc(count, sizeof *s.far) };

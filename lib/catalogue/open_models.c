@@ -43,8 +43,8 @@ struct ebpo_catalogue_held {
     unsigned users;                       /* `users` and the next fields are protected by the lock
                                            * of all models */
     uint64_t bytes;                       /* bytes that are counted for the model */
-    pthread_mutex_t opening;   /* protects the contexts, and the next fields until `model` is set */
-    pthread_rwlock_t querying; /* locked exclusively for a query that must run alone */
+    pthread_mutex_t opening; /* protects the contexts, and the next fields until `model` is set */
+    pthread_rwlock_t query_lock; /* locked exclusively for a query that must run alone */
     ebpo_file *file;
     ebpo_model *_Atomic model; /* for sums it is read without that lock */
     ebpo_catalogue_numbers numbers;
@@ -186,7 +186,7 @@ static void held_free(ebpo_catalogue_held *m)
 {
     close_model(m);
     pthread_mutex_destroy(&m->opening);
-    pthread_rwlock_destroy(&m->querying);
+    pthread_rwlock_destroy(&m->query_lock);
     free((char *)m->key.path);
     free((char *)m->key.numbers);
     free(m);
@@ -202,7 +202,7 @@ static ebpo_catalogue_held *held_new(const wanted *key)
     m->key.numbers = key->numbers ? strdup(key->numbers) : NULL;
     m->numbers.fd = -1;
     pthread_mutex_init(&m->opening, NULL);
-    pthread_rwlock_init(&m->querying, NULL);
+    pthread_rwlock_init(&m->query_lock, NULL);
     if (m->key.path && !m->key.numbers == !key->numbers)
         return m;
     held_free(m);
@@ -356,14 +356,14 @@ static ebpo_status query_alone(ebpo_catalogue_held *m, ebpo_catalogue_query run_
                                ebpo_error *error)
 {
     ebpo_context *context = NULL;
-    pthread_rwlock_wrlock(&m->querying);
+    pthread_rwlock_wrlock(&m->query_lock);
     while (m->idle_count)
         ebpo_context_free(m->idle[--m->idle_count]);
     ebpo_status status = ebpo_context_new(m->model, &context, error);
     if (status == EBPO_OK)
         status = run_query(context, m, user, error);
     put_by(m, context);
-    pthread_rwlock_unlock(&m->querying);
+    pthread_rwlock_unlock(&m->query_lock);
     return status;
 }
 
@@ -388,7 +388,7 @@ ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models, const ebpo_catalo
     ebpo_catalogue_held *m = take_model(models, c, &key);
     if (!m)
         return ebpo_fail_memory(error, sizeof *m);
-    pthread_rwlock_rdlock(&m->querying);
+    pthread_rwlock_rdlock(&m->query_lock);
     ebpo_status status = ready_model(models, c, m, &context, error);
     if (status == EBPO_OK)
         status = check_box(c, e, m, error);
@@ -396,7 +396,7 @@ ebpo_status ebpo_catalogue_lend(ebpo_catalogue_models *models, const ebpo_catalo
         status = run_query(context, m, user, error);
     bool again = status == EBPO_E_LIMIT && context;
     put_by(m, context);
-    pthread_rwlock_unlock(&m->querying);
+    pthread_rwlock_unlock(&m->query_lock);
     if (again)
         status = query_alone(m, run_query, user, error);
     give_back(models, m);

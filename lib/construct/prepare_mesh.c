@@ -40,7 +40,7 @@ static ebpo_status unless_too_large(ebpo_status status, const ebpo_error *local,
     return status;
 }
 
-static ebpo_status repair_as_queried(const preparation *p, bool weld, ebpo_error *error)
+static ebpo_status repair_as_requested(const preparation *p, bool weld, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
     unsigned steps = (weld ? EBPO_REPAIR_WELD : 0) | (o->orient ? EBPO_REPAIR_ORIENT : 0) |
@@ -61,7 +61,7 @@ static ebpo_status arrange_and_repair(const preparation *p, bool weld, ebpo_erro
     status = unless_too_large(status, &local, error);
     if (status == EBPO_OK)
         status = ebpo_mesh_check(p->mesh, o->threads, o->progress, &p->out->before, error);
-    return status == EBPO_OK ? repair_as_queried(p, weld, error) : status;
+    return status == EBPO_OK ? repair_as_requested(p, weld, error) : status;
 }
 
 static ebpo_status prepare_in_order(const preparation *p, ebpo_error *error)

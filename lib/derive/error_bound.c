@@ -238,7 +238,7 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
 {
     ebpo_reach_bound found;
     ebpo_bound_goal now = *goal;
-    uint64_t queried = 0;
+    uint64_t queries_done = 0;
     ebpo_status status = EBPO_OK;
     if (isinf(out->hi)) {
         ebpo_cell_frame frame;
@@ -249,16 +249,16 @@ ebpo_status ebpo_bound_closely(ebpo_bounder *b, ebpo_cell cell, const ebpo_bound
     }
     for (;;) {
         double good = fmax(goal->enough, goal->ratio * out->lo);
-        if (status != EBPO_OK || out->hi <= good || queried >= goal->queries ||
+        if (status != EBPO_OK || out->hi <= good || queries_done >= goal->queries ||
             out->lo > goal->too_much)
             return status;
         now.enough = fmax(out->hi / 2, good);
-        now.queries = goal->queries - queried;
+        now.queries = goal->queries - queries_done;
         status = ebpo_bound_envelope(b, cell, &now, &found, error);
         if (status != EBPO_OK)
             return status;
         bool stuck = found.hi >= out->hi && found.lo <= out->lo;
-        queried += found.queries;
+        queries_done += found.queries;
         merge_bounds(out, &found);
         if (stuck)
             return EBPO_OK; /* only rounding remains */
@@ -353,7 +353,7 @@ static ebpo_status judge_node(ebpo_tolerance *n, ebpo_bounder *b, ebpo_tolerance
     ebpo_reach_bound found;
     ebpo_bound_goal goal = { n->max_error, n->max_error, 0, QUERIES };
     node->enough = false;
-    if (!node->queried)
+    if (!node->required)
         return EBPO_OK;
     if (!ebpo_tree_find(&n->tree, node->cell, &own) ||
         (own.type != EBPO_GRAY && own.type != EBPO_LEAF))

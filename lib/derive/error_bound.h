@@ -51,8 +51,8 @@ typedef struct ebpo_tolerance ebpo_tolerance;
 /* A gray node, as stored; or a leaf, with its parent's envelope in its cell. */
 typedef struct ebpo_tolerance_node {
     ebpo_cell cell;
-    bool queried; /* if false, the result does not matter */
-    bool enough;  /* the result; false where not queried */
+    bool required; /* if false, the result does not matter */
+    bool enough;   /* the result; false where not required */
 } ebpo_tolerance_node;
 
 /* Opens a model of all of the file. Fails with EBPO_E_ABSENT for a file without mesh or a subset.

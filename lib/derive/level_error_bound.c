@@ -395,10 +395,10 @@ static uint64_t count_queries(const survey *s)
  * next. */
 static ebpo_status search_nodes(survey *s, const ebpo_error_bound_options *o, ebpo_error_bound *out)
 {
-    uint64_t done = 0, block = 4, queried = count_queries(s);
+    uint64_t done = 0, block = 4, queries_done = count_queries(s);
     ebpo_status status = EBPO_OK;
     s->goal.ratio = 1 + o->tolerance;
-    while (done < s->count && status == EBPO_OK && (!o->queries || queried < o->queries)) {
+    while (done < s->count && status == EBPO_OK && (!o->queries || queries_done < o->queries)) {
         uint64_t size = 0;
         s->goal.enough = (1 + o->tolerance) * out->lo;
         while (size < block && done + size < s->count &&
@@ -406,7 +406,7 @@ static ebpo_status search_nodes(survey *s, const ebpo_error_bound_options *o, eb
             size++;
         if (!size)
             break;
-        s->goal.queries = o->queries ? (o->queries - queried) / size + 1 : QUERIES_MAX;
+        s->goal.queries = o->queries ? (o->queries - queries_done) / size + 1 : QUERIES_MAX;
         s->first = done;
         uint64_t before = 0, after = 0;
         for (uint64_t i = 0; i < size; i++)
@@ -414,7 +414,7 @@ static ebpo_status search_nodes(survey *s, const ebpo_error_bound_options *o, eb
         status = ebpo_parallel_for(s->threads, NULL, size, 1, bound_some, s, NULL, NULL, s->error);
         for (uint64_t i = 0; i < size; i++)
             after += s->nodes[s->order[done + i]].bound.queries;
-        queried += after - before;
+        queries_done += after - before;
         gather_survey(s, done, done + size, out);
         done += size;
         block = block < BLOCK_MAX ? 2 * block : block;

@@ -439,8 +439,8 @@ static ebpo_status judge_level(descent *d)
                 continue;
             ebpo_tolerance_node *node = &d->judged[count++];
             node->cell = child_cell(d, i, octant);
-            node->queried = intersects_box(d->c, node->cell) &&
-                            (type == EBPO_LEAF || may_go_on(d->c, d->level));
+            node->required = intersects_box(d->c, node->cell) &&
+                             (type == EBPO_LEAF || may_go_on(d->c, d->level));
         }
     }
     return ebpo_tolerance_judge(d->c->need, d->judged, count, d->c->options->max_error,

@@ -30,7 +30,7 @@ typedef enum ebpo_leaf_kind {
 } ebpo_leaf_kind;
 /* Finding a free cell face takes as long as one query, finding the kind as long as dozens of
  * queries. Each is done after this number of queries. */
-enum { EBPO_LEAF_CELL_FACE_QUERIED = 1, EBPO_LEAF_KIND_QUERIED = 128 };
+enum { EBPO_LEAF_CELL_FACE_QUERIES = 1, EBPO_LEAF_KIND_QUERIES = 128 };
 enum { EBPO_NO_CELL_FACE = 6, EBPO_KIND_PLANES_MAX = 16 };
 
 /* A block in a leaf's list. Bits 0 to 28 are the block's number. Bit 29 is set in the last entry of
@@ -61,7 +61,7 @@ typedef struct ebpo_accel_leaf {
                               * 5) */
     uint32_t rows;           /* for kinds other than general: EBPO_KIND_ROW */
     _Atomic uint8_t kind;    /* ebpo_leaf_kind; for surfaces always EBPO_LEAF_GENERAL */
-    _Atomic uint8_t queried; /* approximate number of queries until the kind is known */
+    _Atomic uint8_t queries; /* approximate number of queries until the kind is known */
     /* 2 axis + side (1: upper) of a cell face that no face intersects, or EBPO_NO_CELL_FACE */
     uint8_t cell_face;
     int8_t cell_face_step; /* winding number on that cell face less the one at the lowest corner */
@@ -241,8 +241,8 @@ typedef unsigned ebpo_cell_faces_fn(const ebpo_accel *subtree, ebpo_listed_block
                                     ebpo_cell cell);
 
 /* Counts a query in a leaf of a solid whose kind is not known. Query number
- * EBPO_LEAF_CELL_FACE_QUERIED finds the free cell face and the boxes of the leaf's list. Query
- * number EBPO_LEAF_KIND_QUERIED finds the kind. Returns true when this query has found the kind.
+ * EBPO_LEAF_CELL_FACE_QUERIES finds the free cell face and the boxes of the leaf's list. Query
+ * number EBPO_LEAF_KIND_QUERIES finds the kind. Returns true when this query has found the kind.
  * Without memory the leaf stays general. */
 bool ebpo_leaf_query(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell cell,
                      ebpo_cell_faces_fn *cell_faces);

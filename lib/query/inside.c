@@ -428,7 +428,7 @@ static bool uses_envelopes(const ebpo_context *c, const ebpo_inside_options *o)
            o->deadline_ns;
 }
 
-typedef struct querying {
+typedef struct inside_query {
     ebpo_context *context;
     const ebpo_inside_options *options;
     ebpo_box box;
@@ -436,14 +436,14 @@ typedef struct querying {
     uint64_t deadline; /* a time of ebpo_clock; 0: none */
     const double *p;
     ebpo_position place;
-} querying;
+} inside_query;
 
-static void give_maybe(const querying *a, ebpo_cell cell, ebpo_inside_result *out)
+static void give_maybe(const inside_query *a, ebpo_cell cell, ebpo_inside_result *out)
 {
     *out = (ebpo_inside_result){ EBPO_MAYBE, 0, ebpo_cell_diagonal(&a->box, cell) };
 }
 
-static bool outside_envelope(const querying *a, const ebpo_node *node)
+static bool outside_envelope(const inside_query *a, const ebpo_node *node)
 {
     uint32_t count;
     const uint32_t *codes =
@@ -451,9 +451,9 @@ static bool outside_envelope(const querying *a, const ebpo_node *node)
     return codes && ebpo_outside_planes(&a->box, node->cell, codes, count, a->p);
 }
 
-static bool is_late(const querying *a) { return a->deadline && ebpo_clock() > a->deadline; }
+static bool is_late(const inside_query *a) { return a->deadline && ebpo_clock() > a->deadline; }
 
-static bool stops_here(const querying *a, const ebpo_node *node)
+static bool stops_here(const inside_query *a, const ebpo_node *node)
 {
     if (a->options->level >= 0 &&
         (node->cell.level >= a->options->level || node->type != EBPO_GRAY || node->pruned))
@@ -463,7 +463,7 @@ static bool stops_here(const querying *a, const ebpo_node *node)
 
 /* Decides the point at a node of the top or of a subtree, without visiting the node's children.
  * Returns false if that is not possible. */
-static inline bool decide_at(const querying *a, const ebpo_node *node, ebpo_inside_result *out)
+static inline bool decide_at(const inside_query *a, const ebpo_node *node, ebpo_inside_result *out)
 {
     if (ebpo_node_is_uniform(node))
         inside_uniform(a->context, node->entry, out);
@@ -476,7 +476,7 @@ static inline bool decide_at(const querying *a, const ebpo_node *node, ebpo_insi
     return true;
 }
 
-static ebpo_status walk_down(querying *a, ebpo_inside_result *out, ebpo_error *error)
+static ebpo_status walk_down(inside_query *a, ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
     int fine = m->info->level_count - 1;
@@ -501,7 +501,7 @@ static ebpo_status walk_down(querying *a, ebpo_inside_result *out, ebpo_error *e
 /* --- node by node from the file: only nodes on the way are read, and only decoded chunks are kept
  * --- */
 
-static ebpo_status leaf_from_file(querying *a, const ebpo_node *leaf, ebpo_inside_result *out,
+static ebpo_status leaf_from_file(inside_query *a, const ebpo_node *leaf, ebpo_inside_result *out,
                                   ebpo_error *error)
 {
     ebpo_model *m = a->context->model;
@@ -522,8 +522,8 @@ static ebpo_status leaf_from_file(querying *a, const ebpo_node *leaf, ebpo_insid
     return status;
 }
 
-static ebpo_status uniform_from_file(querying *a, const ebpo_node *node, ebpo_inside_result *out,
-                                     ebpo_error *error)
+static ebpo_status uniform_from_file(inside_query *a, const ebpo_node *node,
+                                     ebpo_inside_result *out, ebpo_error *error)
 {
     int32_t winding;
     ebpo_status status = ebpo_chunks_winding(a->context->model->chunks, node, &winding, error);
@@ -534,7 +534,7 @@ static ebpo_status uniform_from_file(querying *a, const ebpo_node *node, ebpo_in
 
 /* Handles a gray node on the way; sets *done when the node decides. Only after its children have
  * been requested, it is known if the node is pruned. */
-static ebpo_status pass_gray(querying *a, ebpo_cursor *c, bool *done, ebpo_inside_result *out,
+static ebpo_status pass_gray(inside_query *a, ebpo_cursor *c, bool *done, ebpo_inside_result *out,
                              ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
@@ -571,7 +571,7 @@ static ebpo_status pass_gray(querying *a, ebpo_cursor *c, bool *done, ebpo_insid
 }
 
 /* Walks down from a node of the kind BELOW (the root of a subtree that is not in the top). */
-static ebpo_status walk_file(querying *a, const ebpo_node *below, ebpo_inside_result *out,
+static ebpo_status walk_file(inside_query *a, const ebpo_node *below, ebpo_inside_result *out,
                              ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
@@ -593,7 +593,7 @@ static ebpo_status walk_file(querying *a, const ebpo_node *below, ebpo_inside_re
                                    : uniform_from_file(a, node, out, error);
 }
 
-static ebpo_status walk_nodes(querying *a, ebpo_inside_result *out, ebpo_error *error)
+static ebpo_status walk_nodes(inside_query *a, ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
     int fine = m->info->level_count - 1;
@@ -608,7 +608,7 @@ static ebpo_status walk_nodes(querying *a, ebpo_inside_result *out, ebpo_error *
 
 /* Returns the subtree that the context holds if its cell contains p, else NULL. *entry: the result
  * of the levels above, when they decide. */
-static const ebpo_accel *held_around(const querying *a, uint32_t *entry)
+static const ebpo_accel *held_around(const inside_query *a, uint32_t *entry)
 {
     const ebpo_context *c = a->context;
     *entry = ebpo_entry(EBPO_ENTRY_BELOW, 0);
@@ -622,7 +622,7 @@ static const ebpo_accel *held_around(const querying *a, uint32_t *entry)
 
 /* Returns true when the context holds all data that p needs: then envelopes save nothing, and only
  * the faces of a leaf take time. */
-static bool result_at_hand(querying *a, ebpo_inside_result *out, ebpo_status *status,
+static bool result_at_hand(inside_query *a, ebpo_inside_result *out, ebpo_status *status,
                            ebpo_error *error)
 {
     const ebpo_model *m = a->context->model;
@@ -661,7 +661,7 @@ static ebpo_status inside_pruned(ebpo_context *context, const double p[3], ebpo_
 {
     const ebpo_model *m = context->model;
     ebpo_inside_options options = EBPO_INSIDE_OPTIONS_INIT;
-    querying a = {
+    inside_query a = {
         .context = context, .options = &options, .box = ebpo_model_box(m), .envelopes = true, .p = p
     };
     if (!ebpo_locator_find(&m->locator, p, &a.place))
@@ -681,11 +681,11 @@ static ebpo_status inside_walk(ebpo_context *context, const double p[3],
                                ebpo_error *error)
 {
     const ebpo_model *m = context->model;
-    querying a = { .context = context,
-                   .options = options,
-                   .box = ebpo_model_box(m),
-                   .envelopes = uses_envelopes(context, options),
-                   .p = p };
+    inside_query a = { .context = context,
+                       .options = options,
+                       .box = ebpo_model_box(m),
+                       .envelopes = uses_envelopes(context, options),
+                       .p = p };
     if (options->deadline_ns)
         a.deadline = ebpo_clock() + options->deadline_ns;
     if (!ebpo_locator_find(&m->locator, p, &a.place)) {

@@ -467,13 +467,13 @@ bool ebpo_leaf_query(const ebpo_accel *s, ebpo_accel_leaf *leaf, ebpo_cell cell,
                      ebpo_cell_faces_fn *cell_faces)
 {
     /* threads may overwrite each other's counts; the kind is then found slightly later */
-    int queried = atomic_load_explicit(&leaf->queried, memory_order_relaxed) + 1;
+    int queries = atomic_load_explicit(&leaf->queries, memory_order_relaxed) + 1;
     bool found = false;
-    if (queried >= EBPO_LEAF_CELL_FACE_QUERIED)
+    if (queries >= EBPO_LEAF_CELL_FACE_QUERIES)
         find_cell_face(s, leaf, cell, cell_faces);
-    if (queried >= EBPO_LEAF_KIND_QUERIED)
+    if (queries >= EBPO_LEAF_KIND_QUERIES)
         found = find_kind(s, leaf, cell);
     else
-        atomic_store_explicit(&leaf->queried, (uint8_t)queried, memory_order_relaxed);
+        atomic_store_explicit(&leaf->queries, (uint8_t)queries, memory_order_relaxed);
     return found;
 }

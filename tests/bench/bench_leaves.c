@@ -44,7 +44,7 @@ static void fail(const ebpo_error *error)
 static void know_below(const ebpo_accel *s, const ebpo_node *node)
 {
     for (int i = 0;
-         i < EBPO_LEAF_KIND_QUERIED && ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_LEAF; i++)
+         i < EBPO_LEAF_KIND_QUERIES && ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_LEAF; i++)
         (void)ebpo_leaf_query(s, &s->leaf[ebpo_entry_value(node->entry)], node->cell,
                               ebpo_inside_kernels_best()->cell_faces);
     for (unsigned octant = 0; octant < 8 && node->type == EBPO_GRAY && !node->pruned; octant++) {

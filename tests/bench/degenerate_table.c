@@ -130,7 +130,7 @@ static void row(const degenerate_case *c, FILE *out, totals *sum)
             r.fault[0]   ? "**not stable**"
             : c->surface ? "surface"
                          : "solid",
-            (unsigned long long)r.queried);
+            (unsigned long long)r.queries);
     put(out, " %.1g |", r.has_volume ? r.volume_error : NAN);
     put(out, " %.3g |", r.has_volume ? 100 * r.excess : NAN);
     put(out, " %.2g |", build_ratio(c, &tame));

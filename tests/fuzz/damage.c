@@ -40,7 +40,7 @@ typedef struct damage {
     unsigned every;
     bool verify;
     bytes good, now;
-    queried right;
+    query_results right;
     ebpo_file *file; /* the good file */
     how way;
     uint64_t tried[WAYS], refused[WAYS], noticed[WAYS], harmless[WAYS], wrong[WAYS], unseen[WAYS];
@@ -106,12 +106,12 @@ static void keep(const damage *d, uint64_t number)
         perror(path);
 }
 
-static bool differs(const damage *d, const queried *a, int kind)
+static bool differs(const damage *d, const query_results *a, int kind)
 {
     return d->right.status[kind] != a->status[kind] || d->right.hash[kind] != a->hash[kind];
 }
 
-static void report_wrong(damage *d, const queried *a, uint64_t at)
+static void report_wrong(damage *d, const query_results *a, uint64_t at)
 {
     if (d->keep)
         keep(d, at);
@@ -120,9 +120,9 @@ static void report_wrong(damage *d, const queried *a, uint64_t at)
     printf("%s: %s, byte %" PRIu64 " (", d->name, ways[d->way], at);
     report_place(d, at);
     printf("):");
-    for (int i = 0; i < QUERIED_KINDS; i++)
+    for (int i = 0; i < QUERY_KINDS; i++)
         if (differs(d, a, i) && a->status[i] == EBPO_OK)
-            printf(" %s", queried_names[i]);
+            printf(" %s", query_names[i]);
     printf(": wrong, and nothing is said\n");
 }
 
@@ -137,7 +137,7 @@ static void report_unseen(damage *d, uint64_t at)
 
 static void judge(damage *d, uint64_t at)
 {
-    queried a;
+    query_results a;
     bool wrong = false, noticed = false;
     uint8_t *exact = malloc(d->now.size ? d->now.size : 1); /* so that a read after its end is
                                                              * detected */
@@ -152,7 +152,7 @@ static void judge(damage *d, uint64_t at)
         d->refused[d->way]++;
         return;
     }
-    for (int i = 0; i < QUERIED_KINDS; i++)
+    for (int i = 0; i < QUERY_KINDS; i++)
         if (differs(d, &a, i)) {
             wrong |= a.status[i] == EBPO_OK;
             noticed |= a.status[i] != EBPO_OK;

@@ -11,21 +11,21 @@
 
 static const ebpo_http_version version = { 100000, "\"tag\"", "Mon, 23 Nov 2026 09:00:00 GMT" };
 
-static void judge(const ebpo_http_response *result, const ebpo_http_request *queried)
+static void judge(const ebpo_http_response *result, const ebpo_http_request *request)
 {
     char why[EBPO_WHY_BYTES] = "";
     ebpo_status status = EBPO_OK;
-    ebpo_verdict verdict = ebpo_http_response_judge(result, queried, &status, why);
+    ebpo_verdict verdict = ebpo_http_response_judge(result, request, &status, why);
     fuzz_must(memchr(why, 0, sizeof why) != NULL);
     switch (verdict) {
     case EBPO_HTTP_PART:
-        fuzz_must(result->code == 206 && result->has_range && result->begin == queried->begin &&
-                  result->last >= result->begin && result->last < queried->end &&
+        fuzz_must(result->code == 206 && result->has_range && result->begin == request->begin &&
+                  result->last >= result->begin && result->last < request->end &&
                   result->last < result->total);
-        fuzz_must(!queried->pinned || result->total == queried->pinned->size);
-        fuzz_must(!queried->pinned || strcmp(result->etag, queried->pinned->etag) == 0);
+        fuzz_must(!request->pinned || result->total == request->pinned->size);
+        fuzz_must(!request->pinned || strcmp(result->etag, request->pinned->etag) == 0);
         break;
-    case EBPO_HTTP_WHOLE: fuzz_must(result->code == 200 && !queried->pinned); break;
+    case EBPO_HTTP_WHOLE: fuzz_must(result->code == 200 && !request->pinned); break;
     case EBPO_HTTP_LATER: fuzz_must(*why); break;
     case EBPO_HTTP_REFUSED: fuzz_must(*why && status != EBPO_OK); break;
     }
@@ -49,9 +49,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     if (size < 3)
         return 0;
-    ebpo_http_request queried = { .begin = data[1] | (uint64_t)data[2] << 8, .whole_limit = 65536 };
-    queried.end = queried.begin + 1 + (data[0] >> 1) * UINT64_C(100);
-    queried.pinned = data[0] & 1 ? &version : NULL;
+    ebpo_http_request request = { .begin = data[1] | (uint64_t)data[2] << 8, .whole_limit = 65536 };
+    request.end = request.begin + 1 + (data[0] >> 1) * UINT64_C(100);
+    request.pinned = data[0] & 1 ? &version : NULL;
     ebpo_http_response result = { .code = 0 };
     const uint8_t *at = data + 3, *end = data + size;
     while (at < end) {
@@ -64,7 +64,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     fuzz_must(memchr(result.etag, 0, sizeof result.etag) &&
               memchr(result.modified, 0, sizeof result.modified));
-    judge(&result, &queried);
+    judge(&result, &request);
     redact(data + 3, size - 3);
     return 0;
 }

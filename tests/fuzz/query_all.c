@@ -373,31 +373,31 @@ static ebpo_status subtrees(ebpo_file *file, uint64_t *h)
     return EBPO_OK;
 }
 
-const char *const queried_names[QUERIED_KINDS] = { "facts",
-                                                   "levels",
-                                                   "mesh",
-                                                   "source mesh",
-                                                   "attributes",
-                                                   "questions",
-                                                   "questions by parts",
-                                                   "questions by level",
-                                                   "stream",
-                                                   "view",
-                                                   "subset",
-                                                   "cut level",
-                                                   "subtrees" };
-static query_fn *const kinds[QUERIED_KINDS] = { facts,      levels,      mesh,   source_mesh,
-                                                attributes, whole_model, parts,  by_level,
-                                                stream,     view,        subset, cut,
-                                                subtrees };
+const char *const query_names[QUERY_KINDS] = { "facts",
+                                               "levels",
+                                               "mesh",
+                                               "source mesh",
+                                               "attributes",
+                                               "questions",
+                                               "questions by parts",
+                                               "questions by level",
+                                               "stream",
+                                               "view",
+                                               "subset",
+                                               "cut level",
+                                               "subtrees" };
+static query_fn *const kinds[QUERY_KINDS] = { facts,      levels,      mesh,   source_mesh,
+                                              attributes, whole_model, parts,  by_level,
+                                              stream,     view,        subset, cut,
+                                              subtrees };
 
-void query_all(const uint8_t *data, size_t size, bool verified, queried *out)
+void query_all(const uint8_t *data, size_t size, bool verified, query_results *out)
 {
     ebpo_file *file;
-    *out = (queried){ .open = ebpo_open_memory(data, size, "damaged", &file, NULL) };
+    *out = (query_results){ .open = ebpo_open_memory(data, size, "damaged", &file, NULL) };
     if (out->open != EBPO_OK)
         return;
-    for (int i = 0; i < QUERIED_KINDS; i++) {
+    for (int i = 0; i < QUERY_KINDS; i++) {
         out->hash[i] = UINT64_C(14695981039346656037);
         out->status[i] = kinds[i](file, &out->hash[i]);
     }

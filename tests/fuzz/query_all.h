@@ -6,21 +6,21 @@
 
 #include <ebpo/file.h>
 
-enum { QUERIED_KINDS = 13 };
+enum { QUERY_KINDS = 13 };
 
-typedef struct queried {
+typedef struct query_results {
     ebpo_status open; /* no other member is set unless EBPO_OK */
-    ebpo_status status[QUERIED_KINDS];
-    uint64_t hash[QUERIED_KINDS];
+    ebpo_status status[QUERY_KINDS];
+    uint64_t hash[QUERY_KINDS];
     /* result of `ebpo verify`; EBPO_OK and no violations: the file is correct */
     ebpo_status verify;
     uint64_t violations;
     uint64_t spare_filled; /* unused bytes that are not zero */
-} queried;
+} query_results;
 
-extern const char *const queried_names[QUERIED_KINDS];
+extern const char *const query_names[QUERY_KINDS];
 
 /* `verified`: also verifies, which takes longest. */
-void query_all(const uint8_t *data, size_t size, bool verified, queried *out);
+void query_all(const uint8_t *data, size_t size, bool verified, query_results *out);
 
 #endif

@@ -27,7 +27,7 @@ static uint64_t add_number(uint64_t hash, uint64_t n) { return add(hash, &n, siz
 /* --- query points --- */
 
 /* Returns a point in the bounding box of the model, or slightly outside. */
-static void point_of(const mix_querier *a, uint64_t number, double point[3])
+static void point_of(const mix_session *a, uint64_t number, double point[3])
 {
     const ebpo_info *info = ebpo_file_info(a->file);
     uint64_t state = number * 7919 + 1;
@@ -36,7 +36,7 @@ static void point_of(const mix_querier *a, uint64_t number, double point[3])
             info->box_origin[k] + info->box_size[k] * (1.2 * ebpo_test_random_unit(&state) - 0.1);
 }
 
-static ebpo_ray ray_of(const mix_querier *a, uint64_t number)
+static ebpo_ray ray_of(const mix_session *a, uint64_t number)
 {
     ebpo_ray ray = { .t_max = INFINITY };
     double to[3];
@@ -47,7 +47,7 @@ static ebpo_ray ray_of(const mix_querier *a, uint64_t number)
     return ray;
 }
 
-static void box_of(const mix_querier *a, uint64_t number, double min[3], double max[3])
+static void box_of(const mix_session *a, uint64_t number, double min[3], double max[3])
 {
     const ebpo_info *info = ebpo_file_info(a->file);
     point_of(a, number, min);
@@ -57,7 +57,7 @@ static void box_of(const mix_querier *a, uint64_t number, double min[3], double 
 
 /* --- queries --- */
 
-static ebpo_status query_inside(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_inside(const mix_session *a, uint64_t number, uint64_t *hash,
                                 ebpo_error *error)
 {
     double point[3];
@@ -71,7 +71,7 @@ static ebpo_status query_inside(const mix_querier *a, uint64_t number, uint64_t 
 
 enum { MANY = 12 };
 
-static ebpo_status query_inside_many(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_inside_many(const mix_session *a, uint64_t number, uint64_t *hash,
                                      ebpo_error *error)
 {
     double points[MANY][3];
@@ -84,7 +84,7 @@ static ebpo_status query_inside_many(const mix_querier *a, uint64_t number, uint
     return status;
 }
 
-static ebpo_status query_distance(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_distance(const mix_session *a, uint64_t number, uint64_t *hash,
                                   ebpo_error *error)
 {
     double point[3];
@@ -96,7 +96,7 @@ static ebpo_status query_distance(const mix_querier *a, uint64_t number, uint64_
     return status;
 }
 
-static ebpo_status query_distance_many(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_distance_many(const mix_session *a, uint64_t number, uint64_t *hash,
                                        ebpo_error *error)
 {
     double points[MANY][3];
@@ -117,7 +117,7 @@ static bool take_near(void *user, const ebpo_near_face *face)
     return true;
 }
 
-static ebpo_status query_within(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_within(const mix_session *a, uint64_t number, uint64_t *hash,
                                 ebpo_error *error)
 {
     ebpo_within_options options = EBPO_WITHIN_OPTIONS_INIT;
@@ -134,7 +134,7 @@ static uint64_t add_hit(uint64_t hash, const ebpo_ray_hit *hit)
     return add_number(add_number(hash, hit->face), (uint64_t)hit->side);
 }
 
-static ebpo_status query_ray(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_ray(const mix_session *a, uint64_t number, uint64_t *hash,
                              ebpo_error *error)
 {
     ebpo_ray ray = ray_of(a, number);
@@ -149,7 +149,7 @@ static ebpo_status query_ray(const mix_querier *a, uint64_t number, uint64_t *ha
     return status;
 }
 
-static ebpo_status query_ray_all(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_ray_all(const mix_session *a, uint64_t number, uint64_t *hash,
                                  ebpo_error *error)
 {
     ebpo_ray ray = ray_of(a, number);
@@ -162,7 +162,7 @@ static ebpo_status query_ray_all(const mix_querier *a, uint64_t number, uint64_t
     return status;
 }
 
-static ebpo_status query_rays(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_rays(const mix_session *a, uint64_t number, uint64_t *hash,
                               ebpo_error *error)
 {
     ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
@@ -177,7 +177,7 @@ static ebpo_status query_rays(const mix_querier *a, uint64_t number, uint64_t *h
     return status;
 }
 
-static ebpo_status query_box(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_box(const mix_session *a, uint64_t number, uint64_t *hash,
                              ebpo_error *error)
 {
     double min[3], max[3];
@@ -199,7 +199,7 @@ static bool take_triangles(void *user, const ebpo_triangles *t)
     return true;
 }
 
-static ebpo_status query_triangles(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_triangles(const mix_session *a, uint64_t number, uint64_t *hash,
                                    ebpo_error *error)
 {
     double min[3], max[3];
@@ -236,7 +236,7 @@ static ebpo_status stream_levels(ebpo_stream *stream, int last, uint64_t *hash, 
     return status;
 }
 
-static ebpo_status query_stream(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_stream(const mix_session *a, uint64_t number, uint64_t *hash,
                                 ebpo_error *error)
 {
     ebpo_stream_options options = EBPO_STREAM_OPTIONS_INIT;
@@ -263,7 +263,7 @@ static ebpo_status view_nodes(ebpo_view_stream *stream, uint64_t *hash, ebpo_err
     return status;
 }
 
-static ebpo_status query_view(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_view(const mix_session *a, uint64_t number, uint64_t *hash,
                               ebpo_error *error)
 {
     ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
@@ -282,7 +282,7 @@ static ebpo_status query_view(const mix_querier *a, uint64_t number, uint64_t *h
     return status;
 }
 
-static ebpo_status query_subtree(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_subtree(const mix_session *a, uint64_t number, uint64_t *hash,
                                  ebpo_error *error)
 {
     ebpo_subtree_options options = EBPO_SUBTREE_OPTIONS_INIT;
@@ -313,7 +313,7 @@ static ebpo_status query_subtree(const mix_querier *a, uint64_t number, uint64_t
     return status;
 }
 
-static ebpo_status query_level(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_level(const mix_session *a, uint64_t number, uint64_t *hash,
                                ebpo_error *error)
 {
     ebpo_read_options options = EBPO_READ_OPTIONS_INIT;
@@ -331,7 +331,7 @@ static ebpo_status query_level(const mix_querier *a, uint64_t number, uint64_t *
 
 /* --- queries without a fixed result --- */
 
-static ebpo_status query_counts(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_counts(const mix_session *a, uint64_t number, uint64_t *hash,
                                 ebpo_error *error)
 {
     ebpo_model_stats model = EBPO_MODEL_STATS_INIT;
@@ -344,7 +344,7 @@ static ebpo_status query_counts(const mix_querier *a, uint64_t number, uint64_t 
 
 #if EBPO_HAVE_EXTRAS
 /* Moves a haptic device through the model; its contacts depend on the loaded data. */
-static ebpo_status query_haptic(const mix_querier *a, uint64_t number, uint64_t *hash,
+static ebpo_status query_haptic(const mix_session *a, uint64_t number, uint64_t *hash,
                                 ebpo_error *error)
 {
     enum { TICKS = 40 };
@@ -377,7 +377,7 @@ static ebpo_status query_haptic(const mix_querier *a, uint64_t number, uint64_t 
 
 /* --- */
 
-typedef ebpo_status (*query_fn)(const mix_querier *querier, uint64_t number, uint64_t *hash,
+typedef ebpo_status (*query_fn)(const mix_session *session, uint64_t number, uint64_t *hash,
                                 ebpo_error *error);
 static const query_fn run_query[MIX_KINDS] = {
     query_inside, query_inside_many, query_distance, query_distance_many, query_within,
@@ -398,9 +398,9 @@ const char *const mix_names[MIX_KINDS] = {
 
 bool mix_has_workers(int kind) { return kind == RAYS || kind == TOUCH; }
 
-ebpo_status mix_query(const mix_querier *querier, int kind, uint64_t number, uint64_t *hash,
+ebpo_status mix_query(const mix_session *session, int kind, uint64_t number, uint64_t *hash,
                       ebpo_error *error)
 {
     *hash = basis;
-    return run_query[kind](querier, number, hash, error);
+    return run_query[kind](session, number, hash, error);
 }

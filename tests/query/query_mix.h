@@ -7,12 +7,12 @@
 
 #include <ebpo/query.h>
 
-/* Data of a querying thread: its context, and the file. */
-typedef struct mix_querier {
+/* Data of one thread that runs queries: its context and the file. */
+typedef struct mix_session {
     const ebpo_file *file;
     ebpo_model *model;
     ebpo_context *context;
-} mix_querier;
+} mix_session;
 
 enum { MIX_KINDS = EBPO_HAVE_EXTRAS ? 16 : 15 };
 extern const char *const mix_names[MIX_KINDS];
@@ -22,7 +22,7 @@ bool mix_has_workers(int kind);
 
 /* Runs query `number` of a kind. *hash is 0 for queries without a fixed result (haptic devices,
  * counts). */
-ebpo_status mix_query(const mix_querier *querier, int kind, uint64_t number, uint64_t *hash,
+ebpo_status mix_query(const mix_session *session, int kind, uint64_t number, uint64_t *hash,
                       ebpo_error *error);
 
 #endif

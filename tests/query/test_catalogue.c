@@ -68,14 +68,15 @@ static void free_models(void)
 
 /* --- queries, and results of each model --- */
 
-typedef struct queried {
+typedef struct open_catalogue {
     ebpo_catalogue *catalogue;
     ebpo_catalogue_models *models;
-} queried;
+} open_catalogue;
 
-static queried query_entries(const ebpo_catalogue_entry *entries, uint64_t count, uint64_t memory)
+static open_catalogue query_entries(const ebpo_catalogue_entry *entries, uint64_t count,
+                                    uint64_t memory)
 {
-    queried a = { NULL, NULL };
+    open_catalogue a = { NULL, NULL };
     ebpo_catalogue_models_options o = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
     o.memory = memory;
     o.threads = 1;
@@ -84,7 +85,7 @@ static queried query_entries(const ebpo_catalogue_entry *entries, uint64_t count
     return a;
 }
 
-static void end_querying(queried *a)
+static void end_queries(open_catalogue *a)
 {
     ebpo_catalogue_models_free(a->models);
     ebpo_catalogue_free(a->catalogue);
@@ -163,7 +164,7 @@ static void judge_rays(const ebpo_ray_hit *got, const uint64_t *intersected)
     }
 }
 
-static void query_everything(queried *a, unsigned threads)
+static void query_everything(open_catalogue *a, unsigned threads)
 {
     ebpo_catalogue_query_options o = on_threads(threads);
     ebpo_inside_result *inside = query_capacity(POINTS, sizeof *inside);
@@ -190,10 +191,10 @@ static void query_everything(queried *a, unsigned threads)
 
 START_TEST(test_catalogue_queries_many_models)
 {
-    queried a = query_entries(entry, MODELS, 0);
+    open_catalogue a = query_entries(entry, MODELS, 0);
     query_everything(&a, 1);
     query_everything(&a, 3);
-    end_querying(&a);
+    end_queries(&a);
 }
 END_TEST
 
@@ -209,7 +210,7 @@ static uint64_t little_memory(void)
     return 8 * most;
 }
 
-static ebpo_catalogue_models_stats stats_of(const queried *a, ebpo_model_stats *sums)
+static ebpo_catalogue_models_stats stats_of(const open_catalogue *a, ebpo_model_stats *sums)
 {
     ebpo_catalogue_models_stats stats = EBPO_CATALOGUE_MODELS_STATS_INIT;
     *sums = (ebpo_model_stats)EBPO_MODEL_STATS_INIT;
@@ -221,7 +222,7 @@ START_TEST(test_catalogue_closes_and_reopens_models)
 {
     ebpo_model_stats sums;
     uint64_t memory = little_memory();
-    queried a = query_entries(entry, MODELS, memory);
+    open_catalogue a = query_entries(entry, MODELS, memory);
     query_everything(&a, 1);
     ebpo_catalogue_models_stats stats = stats_of(&a, &sums);
     ck_assert_uint_gt(stats.closed, 0);
@@ -235,7 +236,7 @@ START_TEST(test_catalogue_closes_and_reopens_models)
     ebpo_catalogue_models_close_idle(a.models);
     ck_assert_uint_eq(stats_of(&a, &sums).open, 0);
     ck_assert_uint_eq(sums.memory, 0);
-    end_querying(&a);
+    end_queries(&a);
 }
 END_TEST
 
@@ -244,11 +245,11 @@ START_TEST(test_catalogue_budget_too_small_is_refused)
     ebpo_error reported = EBPO_ERROR_INIT;
     ebpo_inside_result out[1];
     const double middle[3] = { 0.5, 0.5, 0.5 };
-    queried a = query_entries(entry, MODELS, 1000);
+    open_catalogue a = query_entries(entry, MODELS, 1000);
     ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, middle, 1, NULL, out, &reported),
                      EBPO_E_LIMIT);
     ck_assert_ptr_nonnull(strstr(reported.message, "one part in 8"));
-    end_querying(&a);
+    end_queries(&a);
 }
 END_TEST
 
@@ -274,7 +275,7 @@ static ebpo_mesh half_box(int side, bool capped)
 typedef struct halves {
     query_model closed[2], open[2], whole;
     ebpo_catalogue_entry entry[2];
-    queried a;
+    open_catalogue a;
 } halves;
 
 static void make_halves(halves *h)
@@ -300,7 +301,7 @@ static void make_halves(halves *h)
 
 static void free_halves(halves *h)
 {
-    end_querying(&h->a);
+    end_queries(&h->a);
     for (int i = 0; i < 2; i++) {
         query_model_free(&h->closed[i]);
         query_model_free(&h->open[i]);
@@ -367,13 +368,13 @@ START_TEST(test_catalogue_of_caps_has_no_surface)
     uint64_t number;
     const double middle[3] = { 0.5, 0.5, 0.5 };
     caps.unseen = true;
-    queried a = query_entries(&caps, 1, 0);
+    open_catalogue a = query_entries(&caps, 1, 0);
     ASSERT_OK(ebpo_catalogue_inside(a.catalogue, a.models, middle, 1, NULL, &where, error));
     ck_assert_int_eq(where.where, EBPO_IN);
     ck_assert_int_eq(ebpo_catalogue_distance(a.catalogue, a.models, middle, 1, NULL, &distance,
                                              &number, &reported),
                      EBPO_E_ABSENT);
-    end_querying(&a);
+    end_queries(&a);
 }
 END_TEST
 
@@ -409,7 +410,7 @@ START_TEST(test_catalogue_uses_callers_open_function)
     ebpo_catalogue_options how = EBPO_CATALOGUE_OPTIONS_INIT;
     ebpo_catalogue_models_options few = EBPO_CATALOGUE_MODELS_OPTIONS_INIT;
     ebpo_inside_result *out = query_capacity(POINTS, sizeof *out);
-    queried a;
+    open_catalogue a;
     how.open_file = open_counted;
     how.close_file = close_counted;
     how.user = &o;
@@ -423,7 +424,7 @@ START_TEST(test_catalogue_uses_callers_open_function)
     o.fails = 0;
     query_everything(&a, 2);
     ck_assert_int_gt(o.closed, 0);
-    end_querying(&a);
+    end_queries(&a);
     ck_assert_int_eq(o.opened, o.closed);
     free(out);
 }
@@ -448,7 +449,7 @@ START_TEST(test_catalogue_query_validation_and_cancel)
     ebpo_ray_hit hit;
     uint64_t number;
     int calls = 0;
-    queried a = query_entries(entry, MODELS, 0);
+    open_catalogue a = query_entries(entry, MODELS, 0);
     ebpo_model_stats sums;
     double far[6] = { 99, 99, 99, 99, NAN, 99 };
     ck_assert_int_eq(ebpo_catalogue_inside(a.catalogue, a.models, far, 2, &o, out, &reported),
@@ -470,7 +471,7 @@ START_TEST(test_catalogue_query_validation_and_cancel)
                                            &reported),
                      EBPO_E_CANCELLED);
     ck_assert_int_eq(calls, 1);
-    end_querying(&a);
+    end_queries(&a);
     free(out);
 }
 END_TEST

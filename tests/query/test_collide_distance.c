@@ -101,15 +101,16 @@ static void check_intervals(const two_models *t, const ebpo_pose *a, const ebpo_
 static void check_at_least(const two_models *t, const ebpo_pose *a, const ebpo_pose *b,
                            double distance, const char *what)
 {
-    const double queried[] = { 0, distance / 2, nextafter(distance, 0),
-                               nextafter(distance, INFINITY), 2 * distance + 1 };
+    const double thresholds[] = { 0, distance / 2, nextafter(distance, 0),
+                                  nextafter(distance, INFINITY), 2 * distance + 1 };
     for (int i = 0; i < 5; i++) {
-        ebpo_clearance c = run_query(t->collider, a, b, 0, queried[i], false);
-        int want = queried[i] <= distance;
-        ck_assert_msg(c.at_least == want, "%s: at least %.17g: %d", what, queried[i], c.at_least);
+        ebpo_clearance c = run_query(t->collider, a, b, 0, thresholds[i], false);
+        int want = thresholds[i] <= distance;
+        ck_assert_msg(c.at_least == want, "%s: at least %.17g: %d", what, thresholds[i],
+                      c.at_least);
         ck_assert(c.distance.lo <= distance && distance <= c.distance.hi);
         if (!want)
-            ck_assert(c.pair.face_a != EBPO_NO_FACE && c.distance.lo <= queried[i]);
+            ck_assert(c.pair.face_a != EBPO_NO_FACE && c.distance.lo <= thresholds[i]);
     }
 }
 

@@ -157,10 +157,11 @@ static void check_distances(const two_models *t, const ebpo_pose pose[2], const 
 static void check_others(const two_models *t, const ebpo_pose pose[2], const char *what)
 {
     double d = run_query(t->whole, pose, 0, -1, false).distance.hi, size = t->model[0].size;
-    const double queried[] = { d / 2, nextafter(d, 0), nextafter(d, INFINITY), 2 * d + 1 };
+    const double thresholds[] = { d / 2, nextafter(d, 0), nextafter(d, INFINITY), 2 * d + 1 };
     for (int i = 0; i < 4; i++) {
-        ebpo_clearance c = run_query(i % 2 ? t->one : t->parts, pose, 0, queried[i], i > 1);
-        ck_assert_msg(c.at_least == (queried[i] <= d), "%s: at least %.17g", what, queried[i]);
+        ebpo_clearance c = run_query(i % 2 ? t->one : t->parts, pose, 0, thresholds[i], i > 1);
+        ck_assert_msg(c.at_least == (thresholds[i] <= d), "%s: at least %.17g", what,
+                      thresholds[i]);
         ck_assert_msg(c.distance.lo <= d && d <= c.distance.hi, "%s: %.17g not in %.17g .. %.17g",
                       what, d, c.distance.lo, c.distance.hi);
     }

@@ -127,7 +127,7 @@ static ebpo_file *open_from(int place, int which)
 static void query_alone(int which)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    mix_querier a = { .file = model_open(scratch(names[which])) };
+    mix_session a = { .file = model_open(scratch(names[which])) };
     must(ebpo_model_new(a.file, NULL, &a.model, &error), "model", &error);
     must(ebpo_context_new(a.model, &a.context, &error), "context", &error);
     for (int kind = 0; kind < MIX_KINDS; kind++)
@@ -169,7 +169,7 @@ typedef struct shared {
     double until; /* seconds; 0: limited by count */
     uint64_t count;
     _Atomic bool enough;
-    _Atomic uint64_t queried[MIX_KINDS], refused, wrong;
+    _Atomic uint64_t queries[MIX_KINDS], refused, wrong;
     _Atomic unsigned reported;
 } shared;
 
@@ -177,7 +177,7 @@ typedef struct worker {
     shared *s;
     unsigned number;
     uint64_t state;
-    mix_querier querier;
+    mix_session session;
     int which;
 } worker;
 
@@ -216,9 +216,9 @@ static void query_one(worker *w, bool first)
     uint64_t number = draw(w, NUMBERS), hash = 0;
     ebpo_error error = EBPO_ERROR_INIT;
     fail_in = first && wanted ? 1 : wanted ? 1 + (unsigned)draw(w, 4) : 0;
-    ebpo_status status = mix_query(&w->querier, kind, number, &hash, &error);
+    ebpo_status status = mix_query(&w->session, kind, number, &hash, &error);
     fail_in = 0;
-    w->s->queried[kind]++;
+    w->s->queries[kind]++;
     if (status != EBPO_OK) {
         w->s->refused++;
         if (status != EBPO_E_IO || !is_own(w, kind, wanted, &error))
@@ -232,12 +232,12 @@ static void query_one(worker *w, bool first)
 static bool change_context(worker *w)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_context_free(w->querier.context);
-    w->querier.context = NULL;
+    ebpo_context_free(w->session.context);
+    w->session.context = NULL;
     w->which = (int)draw(w, MODELS);
-    w->querier.file = w->s->file[w->which];
-    w->querier.model = w->s->model[w->which];
-    if (ebpo_context_new(w->querier.model, &w->querier.context, &error) == EBPO_OK)
+    w->session.file = w->s->file[w->which];
+    w->session.model = w->s->model[w->which];
+    if (ebpo_context_new(w->session.model, &w->session.context, &error) == EBPO_OK)
         return true;
     report(w, 0, 0, error.message);
     return false;
@@ -258,7 +258,7 @@ static void *work(void *user)
         if (ebpo_budget_get_stats(s->budget, &stats) != EBPO_OK || stats.memory > stats.budget)
             report(w, 0, 0, "more memory is used than the budget");
     }
-    ebpo_context_free(w->querier.context);
+    ebpo_context_free(w->session.context);
     return NULL;
 }
 
@@ -318,7 +318,7 @@ START_TEST(test_many_threads_match_single_thread)
     static worker w[THREADS];
     pthread_t thread[THREADS];
     shared s = { .place = _i, .count = ebpo_test_scaled(60) };
-    uint64_t queried = 0;
+    uint64_t total = 0;
     if (s.place == FROM_SERVER && !served)
         return;
     background_fails = false;
@@ -332,8 +332,8 @@ START_TEST(test_many_threads_match_single_thread)
     for (int i = 0; i < THREADS; i++)
         pthread_join(thread[i], NULL);
     for (int kind = 0; kind < MIX_KINDS; kind++)
-        queried += s.queried[kind];
-    printf("%" PRIu64 " queries, %" PRIu64 " refused, %" PRIu64 " wrong\n", queried, s.refused,
+        total += s.queries[kind];
+    printf("%" PRIu64 " queries, %" PRIu64 " refused, %" PRIu64 " wrong\n", total, s.refused,
            s.wrong);
     free_models(&s);
     ck_assert_uint_eq(s.wrong, 0);

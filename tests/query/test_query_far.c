@@ -86,15 +86,15 @@ static void far_point(const query_model *m, uint64_t *state, double p[3])
     }
 }
 
-typedef struct queried {
+typedef struct fixture {
     query_model m;
     uint64_t count;
     double *points;
     query_truth *truth;
     ebpo_distance_result *got;
-} queried;
+} fixture;
 
-static void begin(queried *a, int i)
+static void begin(fixture *a, int i)
 {
     uint64_t state = (uint64_t)i + 7;
     query_model_make(&a->m, cases[i].name, query_solid_by_name(cases[i].name),
@@ -108,7 +108,7 @@ static void begin(queried *a, int i)
     query_find_truths(&a->m, a->points, a->count, a->truth);
 }
 
-static void end(queried *a)
+static void end(fixture *a)
 {
     query_model_free(&a->m);
     free(a->points);
@@ -116,7 +116,7 @@ static void end(queried *a)
     free(a->got);
 }
 
-static void run_query(queried *a, ebpo_context *c, const char *how)
+static void run_query(fixture *a, ebpo_context *c, const char *how)
 {
     ASSERT_OK(ebpo_distance_many(c, a->points, a->count, NULL, a->got, error));
     ck_assert_msg(query_wrong_distance(&a->m, a->points, a->truth, a->count, false, a->got) == 0,
@@ -125,7 +125,7 @@ static void run_query(queried *a, ebpo_context *c, const char *how)
 
 START_TEST(test_distant_points_ignore_load_mode)
 {
-    queried a;
+    fixture a;
     begin(&a, _i);
     run_query(&a, a.m.context, "whole");
     for (int cut = 0; cut < 3 && cut < a.m.info.level_count; cut++) {
@@ -147,7 +147,7 @@ END_TEST
 
 START_TEST(test_distant_point_limits_are_exact)
 {
-    queried a;
+    fixture a;
     begin(&a, _i);
     for (uint64_t k = 0; k < a.count; k++) {
         const double *p = a.points + 3 * k;
@@ -170,7 +170,7 @@ END_TEST
 
 START_TEST(test_distant_point_levels_and_deadlines)
 {
-    queried a;
+    fixture a;
     begin(&a, _i);
     for (int level = -1; level < a.m.info.level_count; level += 2) {
         ebpo_distance_options o = EBPO_DISTANCE_OPTIONS_INIT;

@@ -22,16 +22,16 @@ static const struct {
 enum { CASES = sizeof cases / sizeof *cases };
 
 /* A model, points, and the exact results for them. */
-typedef struct queried {
+typedef struct fixture {
     query_model m;
     uint64_t count;
     double *points;
     query_truth *truth;
     ebpo_inside_result *inside;
     ebpo_distance_result *distance;
-} queried;
+} fixture;
 
-static void reserve_space(queried *a, uint64_t count)
+static void reserve_space(fixture *a, uint64_t count)
 {
     a->count = count;
     a->points = query_capacity(count, 3 * sizeof *a->points);
@@ -40,7 +40,7 @@ static void reserve_space(queried *a, uint64_t count)
     a->distance = query_capacity(count, sizeof *a->distance);
 }
 
-static void begin(queried *a, int i, uint64_t count)
+static void begin(fixture *a, int i, uint64_t count)
 {
     query_model_make(&a->m, cases[i].name, query_solid_by_name(cases[i].name),
                      &query_variants[cases[i].variant]);
@@ -49,7 +49,7 @@ static void begin(queried *a, int i, uint64_t count)
     query_find_truths(&a->m, a->points, a->count, a->truth);
 }
 
-static void end(queried *a)
+static void end(fixture *a)
 {
     query_model_free(&a->m);
     free(a->points);
@@ -58,7 +58,7 @@ static void end(queried *a)
     free(a->distance);
 }
 
-static void query_exactly(queried *a, ebpo_context *context, const ebpo_inside_options *inside,
+static void query_exactly(fixture *a, ebpo_context *context, const ebpo_inside_options *inside,
                           const ebpo_distance_options *options)
 {
     ASSERT_OK(ebpo_inside_many(context, a->points, a->count, inside, a->inside, error));
@@ -71,7 +71,7 @@ static void query_exactly(queried *a, ebpo_context *context, const ebpo_inside_o
 
 /* --- loading and memory --- */
 
-static void query_loaded(queried *a, const ebpo_model_options *how)
+static void query_loaded(fixture *a, const ebpo_model_options *how)
 {
     ebpo_model *model;
     ebpo_context *context;
@@ -93,7 +93,7 @@ START_TEST(test_results_same_in_all_load_modes)
 {
     if (!ebpo_test_wanted(_i + 1))
         return;
-    queried a;
+    fixture a;
     begin(&a, _i, 300);
     for (int loading = 0; loading < 3; loading++)
         for (int cut = -1; cut < 5; cut++) {
@@ -109,7 +109,7 @@ START_TEST(test_results_same_in_all_load_modes)
 END_TEST
 
 /* Returns true when the budget allowed a model and a context. */
-static bool query_within(queried *a, uint64_t budget, bool *resident)
+static bool query_within(fixture *a, uint64_t budget, bool *resident)
 {
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model *model = NULL;
@@ -141,7 +141,7 @@ START_TEST(test_results_same_for_any_budget)
 {
     if (!ebpo_test_wanted(_i + 2))
         return;
-    queried a;
+    fixture a;
     begin(&a, _i, 300);
     bool resident = false, fits = false;
     ck_assert(!query_within(&a, 1, &resident));
@@ -161,7 +161,7 @@ START_TEST(test_batches_match_single_queries)
 {
     if (!ebpo_test_wanted(_i + 3))
         return;
-    queried a;
+    fixture a;
     begin(&a, _i, 1000);
     query_exactly(&a, a.m.context, NULL, NULL);
     for (uint64_t i = 0; i < a.count; i++) {
@@ -180,7 +180,7 @@ START_TEST(test_results_ignore_warm_start_and_sign)
 {
     if (!ebpo_test_wanted(_i + 4))
         return;
-    queried a;
+    fixture a;
     begin(&a, _i, 600);
     for (int form = 0; form < 4; form++) {
         ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
@@ -207,7 +207,7 @@ START_TEST(test_results_beyond_max_distance_are_omitted)
 {
     if (!ebpo_test_wanted(_i + 5))
         return;
-    queried a;
+    fixture a;
     begin(&a, _i, 500);
     for (uint64_t i = 0; i < a.count; i++) {
         double d = a.truth[i].distance;
@@ -242,7 +242,7 @@ END_TEST
 
 /* --- limits --- */
 
-static void query_limited(queried *a, ebpo_context *context, ebpo_envelopes envelopes,
+static void query_limited(fixture *a, ebpo_context *context, ebpo_envelopes envelopes,
                           const ebpo_distance_options *options)
 {
     ebpo_inside_options inside = query_inside_like(options);
@@ -260,7 +260,7 @@ START_TEST(test_level_limited_results_are_certain)
 {
     if (!ebpo_test_wanted(_i + 6))
         return;
-    queried a;
+    fixture a;
     begin(&a, _i, 600);
     for (int level = 0; level < a.m.info.level_count; level++)
         for (int envelopes = 0; envelopes < 3; envelopes++) {
@@ -276,7 +276,7 @@ START_TEST(test_level_limited_results_ignore_loaded_data)
 {
     if (!ebpo_test_wanted(_i + 7))
         return;
-    queried a;
+    fixture a;
     begin(&a, _i, 300);
     ebpo_distance_result *first = query_capacity(a.count, sizeof *first);
     ebpo_inside_result *where = query_capacity(a.count, sizeof *where);
@@ -309,7 +309,7 @@ START_TEST(test_deadline_limited_results_are_certain)
     if (!ebpo_test_wanted(_i + 8))
         return;
     static const uint64_t deadlines[] = { 1, 100, 1000, 10000, 100000, 1000000 };
-    queried a;
+    fixture a;
     begin(&a, _i, 300);
     for (size_t d = 0; d < sizeof deadlines / sizeof *deadlines; d++)
         for (int cut = -1; cut < 2 && cut < a.m.info.level_count; cut++) {
@@ -340,7 +340,7 @@ START_TEST(test_thesis_mode_bounds_hold)
 {
     if (!ebpo_test_wanted(_i + 9))
         return;
-    queried a;
+    fixture a;
     begin(&a, _i, 600);
     for (int mode = EBPO_DISTANCE_RECURSIVE; mode <= EBPO_DISTANCE_ENVELOPE; mode++) {
         ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
@@ -368,7 +368,7 @@ START_TEST(test_cached_envelopes_match_fresh_ones)
 {
     if (!ebpo_test_wanted(_i + 11))
         return;
-    queried a;
+    fixture a;
     begin(&a, _i, 300);
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     options.mode = EBPO_DISTANCE_ENVELOPE;
@@ -395,7 +395,7 @@ START_TEST(test_thesis_modes_ignore_loaded_data)
 {
     if (!ebpo_test_wanted(_i + 10))
         return;
-    queried a;
+    fixture a;
     begin(&a, _i, 300);
     ebpo_distance_result *resident = calloc(a.count, sizeof *resident);
     for (int mode = EBPO_DISTANCE_RECURSIVE; mode <= EBPO_DISTANCE_ENVELOPE; mode++) {
@@ -435,7 +435,7 @@ START_TEST(test_file_without_mesh_allows_level_queries)
     if (!ebpo_test_wanted(_i + 11))
         return;
     static const query_variant bare = { "planes only", 4, -1, EBPO_RULE_NONZERO, EBPO_PART_PLANES };
-    queried a;
+    fixture a;
     begin(&a, _i, 500);
     query_model m;
     query_model_make(&m, cases[_i].name, query_solid_by_name(cases[_i].name), &bare);
@@ -472,7 +472,7 @@ END_TEST
 /* --- threads --- */
 
 typedef struct thread_job {
-    queried *a;
+    fixture *a;
     ebpo_model *model;
     unsigned number;
     ebpo_status status;
@@ -483,7 +483,7 @@ typedef struct thread_job {
 static void *query_in_thread(void *user)
 {
     thread_job *job = user;
-    queried *a = job->a;
+    fixture *a = job->a;
     ebpo_context *context;
     job->status = ebpo_context_new(job->model, &context, NULL);
     for (uint64_t i = 0; i < a->count && job->status == EBPO_OK; i++) {
@@ -501,7 +501,7 @@ static void *query_in_thread(void *user)
     return NULL;
 }
 
-static void in_threads(queried *a, const ebpo_model_options *how, void *(*run_query)(void *job),
+static void in_threads(fixture *a, const ebpo_model_options *how, void *(*run_query)(void *job),
                        ebpo_model_stats *stats)
 {
     enum { THREADS = 4 };
@@ -523,7 +523,7 @@ static void in_threads(queried *a, const ebpo_model_options *how, void *(*run_qu
     ebpo_model_free(model);
 }
 
-static void query_in_threads(queried *a, const ebpo_model_options *how)
+static void query_in_threads(fixture *a, const ebpo_model_options *how)
 {
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     in_threads(a, how, query_in_thread, &stats);
@@ -535,7 +535,7 @@ START_TEST(test_four_threads_match_single_thread)
 {
     if (!ebpo_test_wanted(_i + 12))
         return;
-    queried a;
+    fixture a;
     begin(&a, _i, 400);
     query_exactly(&a, a.m.context, NULL, NULL);
     for (int loading = 0; loading < 3; loading++)
@@ -556,7 +556,7 @@ START_TEST(test_four_threads_share_small_budget)
 {
     if (!ebpo_test_wanted(_i + 13))
         return;
-    queried a;
+    fixture a;
     begin(&a, _i, 400);
     query_exactly(&a, a.m.context, NULL, NULL);
     int runs = 0;
@@ -583,12 +583,12 @@ END_TEST
 
 /* The cell faces of a leaf are computed by its first query, its planes by the 128th, during other
  * queries. */
-enum { POINTS_QUERIED_OFTEN = 12, OFTEN = 200 };
+enum { REPEATED_POINTS = 12, OFTEN = 200 };
 
 static void *query_often(void *user)
 {
     thread_job *job = user;
-    queried *a = job->a;
+    fixture *a = job->a;
     ebpo_context *context;
     job->status = ebpo_context_new(job->model, &context, NULL);
     for (uint64_t i = 0; i < OFTEN * a->count && job->status == EBPO_OK; i++) {
@@ -602,11 +602,11 @@ static void *query_often(void *user)
 }
 
 /* Points close to faces, on either side: so that they are in leaves. */
-static void begin_in_leaves(queried *a, int number)
+static void begin_in_leaves(fixture *a, int number)
 {
     query_model_make(&a->m, cases[number].name, query_solid_by_name(cases[number].name),
                      &query_variants[cases[number].variant]);
-    reserve_space(a, POINTS_QUERIED_OFTEN);
+    reserve_space(a, REPEATED_POINTS);
     const ebpo_mesh *mesh = &a->m.mesh;
     for (uint64_t i = 0; i < a->count; i++) {
         const uint32_t *corner = mesh->faces + 3 * (i * mesh->face_count / a->count);
@@ -623,7 +623,7 @@ static void begin_in_leaves(queried *a, int number)
 
 START_TEST(test_leaves_classified_concurrently)
 {
-    queried a;
+    fixture a;
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     uint64_t found = 0;
     begin_in_leaves(&a, _i);

@@ -59,16 +59,16 @@ static void convert(const char *ply, const char *path, uint32_t without)
     ebpo_tree_free(&tree);
 }
 
-typedef struct queried {
+typedef struct fixture {
     ebpo_file *file;
     ebpo_model *model;
     ebpo_context *context;
     ebpo_sampler *sampler;
-} queried;
+} fixture;
 
-static queried run_query(const char *path, const char *names)
+static fixture run_query(const char *path, const char *names)
 {
-    queried a = { .file = NULL };
+    fixture a = { .file = NULL };
     fine(ebpo_open(path, &a.file, &error));
     fine(ebpo_model_new(a.file, NULL, &a.model, &error));
     fine(ebpo_context_new(a.model, &a.context, &error));
@@ -76,7 +76,7 @@ static queried run_query(const char *path, const char *names)
     return a;
 }
 
-static void answered(queried *a)
+static void answered(fixture *a)
 {
     ebpo_sampler_free(a->sampler);
     ebpo_context_free(a->context);
@@ -109,7 +109,7 @@ static void expect_values(const double values[3], uint64_t face, const double po
 static void query_points(bool maps)
 {
     uint64_t state = 7;
-    queried a = run_query(scratch("a.ebpo.h5"), "linear,same,face:red");
+    fixture a = run_query(scratch("a.ebpo.h5"), "linear,same,face:red");
     ck_assert_uint_eq(ebpo_sampler_columns(a.sampler), 3);
     for (uint64_t i = 0; i < ebpo_test_scaled(400); i++) {
         double point[3], towards[3], values[3];
@@ -147,7 +147,7 @@ START_TEST(test_sample_at_vertex_is_vertex_value)
 {
     ebpo_mesh mesh = torus(scratch("a.ply"));
     convert(scratch("a.ply"), scratch("a.ebpo.h5"), 0);
-    queried a = run_query(scratch("a.ebpo.h5"), "red,linear");
+    fixture a = run_query(scratch("a.ebpo.h5"), "red,linear");
     for (uint64_t f = 0; f < mesh.face_count; f++)
         for (int i = 0; i < 3; i++) {
             uint32_t v = mesh.faces[3 * f + (uint64_t)i];
@@ -167,12 +167,12 @@ START_TEST(test_sample_of_subset_matches_whole)
     ebpo_subset_options cut = EBPO_SUBSET_OPTIONS_INIT;
     uint64_t state = 3, count = 0;
     convert(scratch("a.ply"), scratch("a.ebpo.h5"), 0);
-    queried whole = run_query(scratch("a.ebpo.h5"), "red,face:red");
+    fixture whole = run_query(scratch("a.ebpo.h5"), "red,face:red");
     cut.boxed = true;
     for (int k = 0; k < 3; k++)
         cut.min[k] = 0, cut.max[k] = 1;
     fine(ebpo_subset(whole.file, scratch("b.ebpo.h5"), &cut, &error));
-    queried part = run_query(scratch("b.ebpo.h5"), "red,face:red");
+    fixture part = run_query(scratch("b.ebpo.h5"), "red,face:red");
     for (uint64_t f = 0; f < mesh.face_count; f++) {
         double point[3], one[2], other[2];
         random_point(&state, point);
@@ -203,7 +203,7 @@ static void write_hard(double size)
     fclose(out);
 }
 
-static double at(const queried *a, uint64_t face, double x, double y, double z)
+static double at(const fixture *a, uint64_t face, double x, double y, double z)
 {
     double value, point[3] = { x, y, z };
     fine(ebpo_sample(a->sampler, point, &face, 1, &value, &error));
@@ -217,7 +217,7 @@ START_TEST(test_sample_of_slivers_at_any_scale)
         double s = sizes[i];
         write_hard(s);
         convert(scratch("h.ply"), scratch("h.ebpo.h5"), 0);
-        queried a = run_query(scratch("h.ebpo.h5"), "q");
+        fixture a = run_query(scratch("h.ebpo.h5"), "q");
         ck_assert_double_eq(at(&a, 0, s / 4, s / 2, 0), 0.25 * 1 + 0.5 * 4 + 0.25 * 2);
         ck_assert_double_eq(at(&a, 0, s / 2, 0, 0), 1.5);  /* vertex 2 has weight 0 */
         ck_assert_double_eq(at(&a, 0, -s, s / 2, 0), 2.5); /* beside it: nearest by weights */
@@ -244,7 +244,7 @@ START_TEST(test_sample_of_missing_attribute_is_refused)
     const uint64_t beyond = mesh.face_count, none = EBPO_NO_FACE, first = 0;
     double value, point[3] = { 1, 0, NAN };
     convert(scratch("a.ply"), scratch("a.ebpo.h5"), 0);
-    queried a = run_query(scratch("a.ebpo.h5"), "vertex:red");
+    fixture a = run_query(scratch("a.ebpo.h5"), "vertex:red");
     expect_refused(a.file, "blue", EBPO_E_ABSENT);
     expect_refused(a.file, "", EBPO_E_ABSENT);
     expect_refused(a.file, "red,", EBPO_E_ABSENT);

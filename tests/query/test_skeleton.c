@@ -166,7 +166,7 @@ END_TEST
 
 /* --- use --- */
 
-typedef struct queried {
+typedef struct fixture {
     query_model m;
     ebpo_model *model;
     ebpo_context *context;
@@ -174,9 +174,9 @@ typedef struct queried {
     double *points;
     query_truth *truth;
     ebpo_distance_result *got;
-} queried;
+} fixture;
 
-static void begin(queried *s, int solid, int variant, const ebpo_model_options *how, uint64_t count)
+static void begin(fixture *s, int solid, int variant, const ebpo_model_options *how, uint64_t count)
 {
     query_model_make(&s->m, query_solid_name(solid), query_solid_make(solid),
                      &query_variants[variant]);
@@ -190,7 +190,7 @@ static void begin(queried *s, int solid, int variant, const ebpo_model_options *
     query_find_truths(&s->m, s->points, s->count, s->truth);
 }
 
-static void end(queried *s)
+static void end(fixture *s)
 {
     ebpo_context_free(s->context);
     ebpo_model_free(s->model);
@@ -201,7 +201,7 @@ static void end(queried *s)
 }
 
 /* Returns the number of subtrees searched, with none in memory at the beginning. */
-static uint64_t subtrees_searched(queried *s)
+static uint64_t subtrees_searched(fixture *s)
 {
     ebpo_model_stats before = EBPO_MODEL_STATS_INIT, after = EBPO_MODEL_STATS_INIT;
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
@@ -220,7 +220,7 @@ static uint64_t subtrees_searched(queried *s)
  * without the levels below the cut. */
 START_TEST(test_results_do_not_depend_on_skeletons)
 {
-    queried s;
+    fixture s;
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
     how.cut_level = 1 + _i % 3;
@@ -252,7 +252,7 @@ static int find_solid(const char *name)
 
 START_TEST(test_skeleton_avoids_subtree_searches)
 {
-    queried s;
+    fixture s;
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = 2;
     begin(&s, find_solid("sphere"), 5, &how, 300);
@@ -272,7 +272,7 @@ END_TEST
  * skeletons yet. */
 static uint64_t searched_at_first(int solid, int cut_level, bool deep)
 {
-    queried s;
+    fixture s;
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = cut_level;
     begin(&s, solid, 5, &how, 20);
@@ -302,7 +302,7 @@ END_TEST
  */
 START_TEST(test_levels_below_cut_load_on_demand)
 {
-    queried s;
+    fixture s;
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = 2;
     begin(&s, find_solid("sphere"), 5, &how, 1);
@@ -324,7 +324,7 @@ static bool add_distance(void *user, const ebpo_near_face *face)
 
 /* Returns the number of subtrees loaded for all faces within a radius, with none in memory at the
  * beginning; *sum: sum of the distances of these faces, in order. */
-static uint64_t loaded_within(queried *s, double *sum)
+static uint64_t loaded_within(fixture *s, double *sum)
 {
     ebpo_within_options how = EBPO_WITHIN_OPTIONS_INIT;
     uint64_t loads = s->context->loaded;
@@ -340,7 +340,7 @@ static uint64_t loaded_within(queried *s, double *sum)
 
 START_TEST(test_skeleton_limits_radius_search)
 {
-    queried s;
+    fixture s;
     double sums[3];
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = 3;
@@ -361,7 +361,7 @@ END_TEST
 
 START_TEST(test_skeleton_memory_limit_is_kept)
 {
-    queried s;
+    fixture s;
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     how.cut_level = 2;
     begin(&s, find_solid("sphere"), 5, &how, 300);

@@ -31,7 +31,7 @@ static const char *model_path(void) { return scratch("torus.ebpo.h5"); }
 enum { ENVELOPE = MIX_KINDS, LEVEL, DEADLINE, KINDS };
 static const char *const more_names[] = { "envelope", "to a level", "within a time" };
 
-static ebpo_status query_limited(const mix_querier *a, int kind, uint64_t number, ebpo_error *error)
+static ebpo_status query_limited(const mix_session *a, int kind, uint64_t number, ebpo_error *error)
 {
     const ebpo_info *info = ebpo_file_info(a->file);
     ebpo_inside_options inside = EBPO_INSIDE_OPTIONS_INIT;
@@ -54,7 +54,7 @@ static ebpo_status query_limited(const mix_querier *a, int kind, uint64_t number
 /* --- on a painted stack --- */
 
 typedef struct run {
-    const mix_querier *querier;
+    const mix_session *session;
     int kind;
     ebpo_status status;
     ebpo_error error;
@@ -65,8 +65,8 @@ static void *query_some(void *user)
     run *r = user;
     uint64_t hash;
     for (uint64_t i = 0; i < NUMBERS && r->status == EBPO_OK; i++)
-        r->status = r->kind < MIX_KINDS ? mix_query(r->querier, r->kind, i, &hash, &r->error)
-                                        : query_limited(r->querier, r->kind, i, &r->error);
+        r->status = r->kind < MIX_KINDS ? mix_query(r->session, r->kind, i, &hash, &r->error)
+                                        : query_limited(r->session, r->kind, i, &r->error);
     return NULL;
 }
 
@@ -103,22 +103,22 @@ static void check_stacks(uint64_t memory)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
-    mix_querier querier = { .file = model_open(model_path()) };
+    mix_session session = { .file = model_open(model_path()) };
     options.memory = memory;
-    model_must(ebpo_model_new(querier.file, &options, &querier.model, &error), "a model", &error);
+    model_must(ebpo_model_new(session.file, &options, &session.model, &error), "a model", &error);
     for (int kind = 0; kind < KINDS; kind++) {
-        model_must(ebpo_context_new(querier.model, &querier.context, &error), "a context", &error);
-        run r = { .querier = &querier, .kind = kind, .error = EBPO_ERROR_INIT };
+        model_must(ebpo_context_new(session.model, &session.context, &error), "a context", &error);
+        run r = { .session = &session, .kind = kind, .error = EBPO_ERROR_INIT };
         size_t bytes = stack_of(query_some, &r);
         model_must(r.status, "asking", &r.error);
         const char *name = kind < MIX_KINDS ? mix_names[kind] : more_names[kind - MIX_KINDS];
         printf("%s: %zu bytes of stack\n", name, bytes);
         if (is_query(kind))
             ck_assert_msg(bytes <= PROMISED - BESIDE, "%s: %zu bytes of stack", name, bytes);
-        ebpo_context_free(querier.context);
+        ebpo_context_free(session.context);
     }
-    ebpo_model_free(querier.model);
-    ebpo_close((ebpo_file *)querier.file);
+    ebpo_model_free(session.model);
+    ebpo_close((ebpo_file *)session.file);
 }
 
 START_TEST(test_query_stack_size)

@@ -6,12 +6,12 @@
 
 static bool touch(counted_source *c, uint64_t offset, uint64_t size)
 {
-    uint64_t before = c->queried;
+    uint64_t before = c->requested;
     for (uint64_t i = offset; i < offset + size; i++) {
-        c->queried += !c->touched[i];
+        c->requested += !c->touched[i];
         c->touched[i] = 1;
     }
-    return c->queried > before;
+    return c->requested > before;
 }
 
 static ebpo_status read_counted(void *user, uint64_t offset, uint64_t size, void *data,

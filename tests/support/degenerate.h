@@ -49,7 +49,7 @@ typedef struct degenerate_result {
     ebpo_status status; /* of converting */
     char message[480];
     uint64_t checks, violations; /* of verify */
-    uint64_t queried, wrong;     /* results */
+    uint64_t queries, wrong;     /* results */
     bool has_volume;             /* the exact volume is a normal double: the following values are
                                   * meaningful */
     double volume, volume_error; /* exact volume; relative error of ebpo_measure */

@@ -93,11 +93,11 @@ static bool query_points(query_model *m, uint64_t count, degenerate_result *r)
         if (m->info.solid) {
             fine = ebpo_inside_many(m->context, p, n, NULL, inside, &error) == EBPO_OK;
             r->wrong += fine ? query_wrong_inside(m, p, truth, n, inside) : 0;
-            r->queried += n;
+            r->queries += n;
         }
         fine = fine && ebpo_distance_many(m->context, p, n, NULL, distance, &error) == EBPO_OK;
         r->wrong += fine ? query_wrong_distance(m, p, truth, n, false, distance) : 0;
-        r->queried += n;
+        r->queries += n;
     }
     if (!fine)
         fault(r, "a query fails: %s", error.message);
@@ -121,7 +121,7 @@ static void query_rays(query_model *m, uint64_t count, degenerate_result *r)
                 ray.direction[k] = copysign(DBL_MAX, ray.direction[k]);
         }
         r->wrong += !query_one_ray(m, m->context, &ray);
-        r->queried++;
+        r->queries++;
     }
 }
 
@@ -216,7 +216,7 @@ static void run_converted(const degenerate_case *c, query_model *m, const ebpo_m
         query_rays(m, queries / 4 + 1, r);
     if (r->wrong)
         fault(r, "%llu wrong results of %llu", (unsigned long long)r->wrong,
-              (unsigned long long)r->queried);
+              (unsigned long long)r->queries);
 }
 
 void degenerate_run(const degenerate_case *c, uint64_t queries, degenerate_result *r)

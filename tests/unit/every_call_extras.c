@@ -551,13 +551,13 @@ static ebpo_status inspect_clash(ebpo_scene *scene, ebpo_error *error)
 
 static ebpo_status intersect_in_scene(ebpo_scene *scene, ebpo_error *error)
 {
-    uint64_t clashes = 0, queried = 0;
+    uint64_t clashes = 0, tested = 0;
     ebpo_scene_clash_options how = EBPO_SCENE_CLASH_OPTIONS_INIT;
     how.threads = 1;
     how.count = how.places = how.relate = true;
     how.depth = 0.1;
     ebpo_status status =
-        ebpo_scene_find_clashes(scene, 1, &how, count_clashes, &clashes, &queried, error);
+        ebpo_scene_find_clashes(scene, 1, &how, count_clashes, &clashes, &tested, error);
     ebpo_scene_approach_options along = EBPO_SCENE_APPROACH_OPTIONS_INIT;
     uint64_t ways = 0;
     if (status == EBPO_OK)
@@ -568,8 +568,8 @@ static ebpo_status intersect_in_scene(ebpo_scene *scene, ebpo_error *error)
         status = ebpo_scene_approach(scene, 0, 1, &along, count_ways, &ways, error);
     if (status == EBPO_OK)
         status = ebpo_scene_least_distances(scene, 0, 1, &along, count_leasts, &ways, error);
-    return status == EBPO_OK && (clashes != 1 || queried != 1 || ways != 2) ? EBPO_E_ARGUMENT
-                                                                            : status;
+    return status == EBPO_OK && (clashes != 1 || tested != 1 || ways != 2) ? EBPO_E_ARGUMENT
+                                                                           : status;
 }
 
 static ebpo_status query_scene(ebpo_scene *scene, ebpo_error *error)

@@ -221,24 +221,22 @@ START_TEST(test_header_vectors_match_libhdf5)
 }
 END_TEST
 
-static const char *const queried[] = {
-    "/levels/00/types", "/levels/00/planes", "/mesh/vertices",
-    "/mesh/faces",      "/maps/face_source", "/subtrees/counts"
-};
+static const char *const arrays[] = { "/levels/00/types", "/levels/00/planes", "/mesh/vertices",
+                                      "/mesh/faces",      "/maps/face_source", "/subtrees/counts" };
 
-enum { QUERIED = sizeof queried / sizeof queried[0] };
+enum { ARRAYS = sizeof arrays / sizeof arrays[0] };
 
 /* Combines the data of each array into one number; 0: the array is refused. */
-static void results(subject *s, const uint8_t *data, size_t size, uint32_t sum[QUERIED])
+static void results(subject *s, const uint8_t *data, size_t size, uint32_t sum[ARRAYS])
 {
     ebpo_status status = open_bytes(s, data, size, NULL);
-    for (int i = 0; i < QUERIED; i++) {
+    for (int i = 0; i < ARRAYS; i++) {
         ebpo_shape shape = { .rows = 0 };
         ebpo_chunk_location *places;
         uint64_t stored;
         sum[i] = 0;
         if (status != EBPO_OK ||
-            ebpo_head_read_array(&s->head, queried[i], UINT64_MAX, EBPO_HEAD_ROWS_POWER, &shape,
+            ebpo_head_read_array(&s->head, arrays[i], UINT64_MAX, EBPO_HEAD_ROWS_POWER, &shape,
                                  NULL, &places, &stored, NULL) != EBPO_OK)
             continue;
         for (uint64_t k = 0; k < ebpo_shape_chunks(&shape); k++)
@@ -252,17 +250,17 @@ static void results(subject *s, const uint8_t *data, size_t size, uint32_t sum[Q
 /* Checks that a flipped bit never changes data: the array is refused, or the bit is unused. */
 static void flip_bits(subject *s)
 {
-    uint32_t whole[QUERIED];
+    uint32_t whole[ARRAYS];
     results(s, s->data, s->size, whole);
     size_t head = s->size < 6000 ? s->size : 6000;
     for (size_t i = 0; i < head * 8; i += 61) {
-        uint32_t now[QUERIED];
+        uint32_t now[ARRAYS];
         s->data[i / 8] ^= (uint8_t)(1 << i % 8);
         results(s, s->data, s->size, now);
         s->data[i / 8] ^= (uint8_t)(1 << i % 8);
-        for (int k = 0; k < QUERIED; k++)
+        for (int k = 0; k < ARRAYS; k++)
             ck_assert_msg(now[k] == 0 || now[k] == whole[k], "%s: bit %zu: %s", s->path, i,
-                          queried[k]);
+                          arrays[k]);
     }
 }
 

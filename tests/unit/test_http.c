@@ -740,12 +740,12 @@ static ebpo_verdict judged(const char *const *lines, const ebpo_http_version *pi
                            char why[EBPO_WHY_BYTES])
 {
     ebpo_http_response result = { .code = 0 };
-    ebpo_http_request queried = { 100, 200, pinned, 1000, false };
+    ebpo_http_request request = { 100, 200, pinned, 1000, false };
     ebpo_status status;
     for (; *lines; lines++)
         ebpo_http_response_line(&result, *lines, strlen(*lines));
     *why = 0;
-    return ebpo_http_response_judge(&result, &queried, &status, why);
+    return ebpo_http_response_judge(&result, &request, &status, why);
 }
 
 #define JUDGED(...) judged((const char *const[]){ __VA_ARGS__, NULL }, &pinned, why)
@@ -819,13 +819,13 @@ START_TEST(test_http_ranges_beyond_4_gib)
     };
     for (size_t i = 0; i < sizeof results / sizeof *results; i++) {
         ebpo_http_response result = { .code = 0 };
-        ebpo_http_request queried = { UINT64_C(8589934592), UINT64_C(8589934692), &pinned, 1000,
+        ebpo_http_request request = { UINT64_C(8589934592), UINT64_C(8589934692), &pinned, 1000,
                                       false };
         ebpo_status status;
         const char *const lines[] = { "HTTP/1.1 206 Partial", "ETag: \"a\"", results[i].line };
         for (int k = 0; k < 3; k++)
             ebpo_http_response_line(&result, lines[k], strlen(lines[k]));
-        ck_assert_msg(ebpo_http_response_judge(&result, &queried, &status, why) ==
+        ck_assert_msg(ebpo_http_response_judge(&result, &request, &status, why) ==
                           results[i].verdict,
                       "%s", results[i].line);
         if (results[i].verdict == EBPO_HTTP_PART)
@@ -848,12 +848,12 @@ START_TEST(test_http_long_etags_compare_fully)
     ebpo_http_response second = {
         .code = 206, .has_range = true, .has_total = true, .begin = 100, .last = 199, .total = 5000
     };
-    ebpo_http_request queried = { 100, 200, &pinned, 1000, false };
+    ebpo_http_request request = { 100, 200, &pinned, 1000, false };
     ebpo_status status;
     ebpo_http_response_line(&second, line, sizeof line);
-    ck_assert_int_eq(ebpo_http_response_judge(&second, &queried, &status, why), EBPO_HTTP_PART);
+    ck_assert_int_eq(ebpo_http_response_judge(&second, &request, &status, why), EBPO_HTTP_PART);
     ebpo_http_response_line(&second, other, sizeof other);
-    ck_assert_int_eq(ebpo_http_response_judge(&second, &queried, &status, why), EBPO_HTTP_REFUSED);
+    ck_assert_int_eq(ebpo_http_response_judge(&second, &request, &status, why), EBPO_HTTP_REFUSED);
 }
 END_TEST
 

@@ -129,7 +129,7 @@ START_TEST(test_remote_box_query_round_trips)
     ck_assert(ebpo_subset(far, scratch("box.ebpo.h5"), &box, NULL) == EBPO_OK);
     ck_assert_msg(c.batches + c.alone - opened <= WAVES, "%d waves",
                   (int)(c.batches + c.alone - opened));
-    ck_assert_msg(c.queried < c.size / 2, "%d of %d bytes", (int)c.queried, (int)c.size);
+    ck_assert_msg(c.requested < c.size / 2, "%d of %d bytes", (int)c.requested, (int)c.size);
     counted_close(&c, far);
     two_layouts_close(&l);
 }
@@ -224,7 +224,7 @@ START_TEST(test_remote_limited_view_round_trips)
         uint64_t opened = c.batches + c.alone, nodes = count_nodes(far, &view),
                  waves = c.batches + c.alone - opened;
         ck_assert_msg(waves <= ends[i].waves, "%d waves of view %d", (int)waves, (int)i);
-        ck_assert(c.queried <= (view.bytes ? view.bytes : c.size / 5));
+        ck_assert(c.requested <= (view.bytes ? view.bytes : c.size / 5));
         ck_assert(view.bytes || nodes == count_nodes(l.without, &view));
         counted_close(&c, far);
     }

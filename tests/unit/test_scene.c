@@ -172,8 +172,8 @@ START_TEST(test_scene_ignore_and_clearance_rules)
     for (uint64_t a = 0; a < 4; a++)
         for (uint64_t b = 0; b < 4; b++) {
             double clearance;
-            bool queried = ebpo_scene_pair_rule(s, a, b, &clearance);
-            ck_assert_msg((queried ? clearance : -1) == want[a][b], "%d %d", (int)a, (int)b);
+            bool tested = ebpo_scene_pair_rule(s, a, b, &clearance);
+            ck_assert_msg((tested ? clearance : -1) == want[a][b], "%d %d", (int)a, (int)b);
         }
     ck_assert_str_eq(ebpo_scene_get_layer(s, 0), "l");
     ck_assert_ptr_null(ebpo_scene_get_layer(s, 1));
@@ -531,8 +531,8 @@ START_TEST(test_scene_rules_match_reference)
                 if ((in[a][line[i].a] && in[b][line[i].b]) ||
                     (in[a][line[i].b] && in[b][line[i].a]))
                     want = line[i].clearance < 0 ? -1 : fmax(want, line[i].clearance);
-            bool queried = ebpo_scene_pair_rule(s, a, b, &got);
-            ck_assert(a == b ? !queried : queried ? got == want : want < 0);
+            bool tested = ebpo_scene_pair_rule(s, a, b, &got);
+            ck_assert(a == b ? !tested : tested ? got == want : want < 0);
         }
     ebpo_scene_free(s);
 }

@@ -712,9 +712,9 @@ START_TEST(test_view_byte_budget_truncates_sequence)
             free(some);
             bytes = ebpo_test_file_stats(file).bytes_read;
             uint64_t allowed = options.bytes < opening ? opening : options.bytes;
-            ck_assert_msg(bytes <= allowed && c.queried <= allowed,
+            ck_assert_msg(bytes <= allowed && c.requested <= allowed,
                           "%llu read, %llu requested, %llu allowed", (unsigned long long)bytes,
-                          (unsigned long long)c.queried, (unsigned long long)allowed);
+                          (unsigned long long)c.requested, (unsigned long long)allowed);
             if (end == EBPO_VIEW_DONE)
                 break;
             ck_assert_int_eq(end, EBPO_VIEW_BYTES);

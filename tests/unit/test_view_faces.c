@@ -192,9 +192,9 @@ START_TEST(test_view_faces_count_in_byte_budget)
     ck_assert(ebpo_view_stream_new(file, &options, &stream, NULL) == EBPO_OK);
     while ((end = take_all(stream, whole, &t)) == EBPO_VIEW_BYTES) {
         uint64_t bytes = ebpo_test_file_stats(file).bytes_read;
-        ck_assert_msg(bytes <= options.bytes && c.queried <= options.bytes,
+        ck_assert_msg(bytes <= options.bytes && c.requested <= options.bytes,
                       "%llu read, %llu requested, %llu allowed", (unsigned long long)bytes,
-                      (unsigned long long)c.queried, (unsigned long long)options.bytes);
+                      (unsigned long long)c.requested, (unsigned long long)options.bytes);
         options.bytes += c.size / 24;
         ck_assert(ebpo_view_stream_change(stream, &options, NULL) == EBPO_OK);
         ck_assert_uint_lt(stops++, 500);

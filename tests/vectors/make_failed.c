@@ -88,7 +88,7 @@ static void v_dropped(void) { set_count("/", "mend_dropped_faces", 7); }
 static void v_dropped_kept(void) { set_count("/", "mend_dropped_faces", 4); }
 static void v_weld_none(void) { set_reals("mend_weld_distance", 0, 0, 0); }
 static void v_weld_infinite(void) { set_reals("mend_weld_distance", INFINITY, 0, 0); }
-static void v_weld_not_queried(void) { set_count("/", "mend_weld", 0); }
+static void v_weld_not_requested(void) { set_count("/", "mend_weld", 0); }
 static void v_weld_moved(void) { set_reals("mend_weld_moved", -1, 0, 0); }
 static void v_weld_moved_missing(void) { drop_attribute("/", "mend_weld_moved"); }
 static void v_source_less(void) { set_count("/", "source_vertex_count", 3); }
@@ -498,7 +498,7 @@ static const failed_vector failed[] = {
       "more `mend_dropped_faces`" },
     { "weld_distance_0", WELDED, v_weld_none, NONE, "3", "not finite and above 0" },
     { "weld_distance_infinite", WELDED, v_weld_infinite, NONE, "3", "not finite and above 0" },
-    { "weld_distance_without_welding", WELDED, v_weld_not_queried, NONE, "3",
+    { "weld_distance_without_welding", WELDED, v_weld_not_requested, NONE, "3",
       "`mend_weld` is 0 beside it" },
     { "weld_moved_negative", WELDED, v_weld_moved, NONE, "3",
       "beside it only: negative or not finite" },

@@ -7,21 +7,21 @@
 #include "cli/command.h"
 #include "cli/mesh_findings.h"
 
-static bool steps_given(repairing queried)
+static bool steps_given(repairing requested)
 {
-    return queried.weld || queried.drop_duplicates || queried.orient || queried.flip ||
-           queried.fill_holes;
+    return requested.weld || requested.drop_duplicates || requested.orient || requested.flip ||
+           requested.fill_holes;
 }
 
-int repair_check(const char *command, repairing queried)
+int repair_check(const char *command, repairing requested)
 {
-    if (queried.repair && steps_given(queried))
+    if (requested.repair && steps_given(requested))
         return command_usage(command,
                              "--repair chooses from --weld, --drop-duplicates, --orient and "
                              "--fill-holes; omit these and --flip");
-    if (queried.weld && queried.weld_distance > 0)
+    if (requested.weld && requested.weld_distance > 0)
         return command_usage(command, "--weld-distance includes --weld; choose one");
-    if (queried.orient && queried.flip)
+    if (requested.orient && requested.flip)
         return command_usage(command, "--orient sets the orientation of faces; omit --flip");
     return EXIT_FINE;
 }
@@ -65,15 +65,16 @@ static ebpo_status do_chosen(mesh_input *p, ebpo_prepare_options *how, ebpo_erro
     return status;
 }
 
-static ebpo_status try_and_repair(mesh_input *p, repairing queried, ebpo_prepare_options *how,
+static ebpo_status try_and_repair(mesh_input *p, repairing requested, ebpo_prepare_options *how,
                                   ebpo_error *error)
 {
-    if (steps_given(queried) || !(queried.repair || queried.advise))
+    if (steps_given(requested) || !(requested.repair || requested.advise))
         return EBPO_OK;
     ebpo_status status = ebpo_mesh_try_repairs(&p->mesh, &p->prepared.report, how->threads,
                                                how->progress, &p->repairs, error);
     p->tried = status == EBPO_OK && p->repairs.count > 0;
-    return p->tried && queried.repair && p->repairs.chosen >= 0 ? do_chosen(p, how, error) : status;
+    return p->tried && requested.repair && p->repairs.chosen >= 0 ? do_chosen(p, how, error)
+                                                                  : status;
 }
 
 /* Counts repeated faces. When no vertices coincide, the check has counted them before. */
@@ -113,7 +114,7 @@ ebpo_solid_volume mesh_input_solid(const mesh_input *p, bool after)
     return solid;
 }
 
-ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repairing queried,
+ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repairing requested,
                                    mesh_reading more, ebpo_mesh_groups **groups,
                                    ebpo_workspace *workspace, unsigned threads,
                                    ebpo_progress progress, ebpo_error *error)
@@ -125,12 +126,12 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repairing 
     how.workspace = workspace;
     how.attributes = more != READ_MESH;
     how.embed_textures = more == READ_TEXTURES;
-    wanted.weld = queried.weld;
-    wanted.weld_distance = queried.weld_distance;
-    wanted.drop_duplicates = queried.drop_duplicates;
-    wanted.orient = queried.orient;
-    wanted.flip = queried.flip;
-    wanted.fill_holes = queried.fill_holes;
+    wanted.weld = requested.weld;
+    wanted.weld_distance = requested.weld_distance;
+    wanted.drop_duplicates = requested.drop_duplicates;
+    wanted.orient = requested.orient;
+    wanted.flip = requested.flip;
+    wanted.fill_holes = requested.fill_holes;
     memset(out, 0, sizeof *out);
     out->prepared = (ebpo_prepared)EBPO_PREPARED_INIT;
     out->repairs = (ebpo_repairs)EBPO_REPAIRS_INIT;
@@ -145,7 +146,7 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repairing 
     out->as_read.attributes = NULL;
     status = ebpo_mesh_prepare(&out->mesh, &wanted, &out->prepared, error);
     if (status == EBPO_OK)
-        status = try_and_repair(out, queried, &wanted, error);
+        status = try_and_repair(out, requested, &wanted, error);
     if (status == EBPO_OK)
         status = count_repeated(out, threads, error);
     if (status == EBPO_OK)
@@ -162,11 +163,11 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repairing 
     return status;
 }
 
-ebpo_status mesh_input_read(mesh_input *out, const char *path, repairing queried, mesh_reading more,
-                            ebpo_workspace *workspace, unsigned threads, ebpo_progress progress,
-                            ebpo_error *error)
+ebpo_status mesh_input_read(mesh_input *out, const char *path, repairing requested,
+                            mesh_reading more, ebpo_workspace *workspace, unsigned threads,
+                            ebpo_progress progress, ebpo_error *error)
 {
-    return mesh_input_read_groups(out, path, queried, more, NULL, workspace, threads, progress,
+    return mesh_input_read_groups(out, path, requested, more, NULL, workspace, threads, progress,
                                   error);
 }
 

@@ -36,7 +36,7 @@ typedef struct mesh_input {
 
 /* Returns EXIT_USAGE with a message when --repair is combined with options that it chooses itself.
  */
-int repair_check(const char *command, repairing queried);
+int repair_check(const char *command, repairing requested);
 
 /* Data that is read beside positions and corners. */
 typedef enum mesh_reading {
@@ -46,14 +46,14 @@ typedef enum mesh_reading {
 } mesh_reading;
 
 /* On failure nothing is left to free; otherwise call ebpo_mesh_free(&out->mesh). */
-EBPO_MUST_USE ebpo_status mesh_input_read(mesh_input *out, const char *path, repairing queried,
+EBPO_MUST_USE ebpo_status mesh_input_read(mesh_input *out, const char *path, repairing requested,
                                           mesh_reading more, ebpo_workspace *workspace,
                                           unsigned threads, ebpo_progress progress,
                                           ebpo_error *error);
 
 /* Also reads the groups of the file: see ebpo_mesh_read_groups. */
 EBPO_MUST_USE ebpo_status mesh_input_read_groups(mesh_input *out, const char *path,
-                                                 repairing queried, mesh_reading more,
+                                                 repairing requested, mesh_reading more,
                                                  ebpo_mesh_groups **groups,
                                                  ebpo_workspace *workspace, unsigned threads,
                                                  ebpo_progress progress, ebpo_error *error);

@@ -304,16 +304,16 @@ ebpo_status ebpo_boolean_query(const ebpo_boolean *b, unsigned worker, const dou
     return EBPO_OK;
 }
 
-typedef struct querying {
+typedef struct point_queries {
     const ebpo_boolean *b;
     const double *points;
     ebpo_boolean_result *out;
-} querying;
+} point_queries;
 
 static ebpo_status query_some(void *context, uint64_t begin, uint64_t end, unsigned worker,
                               ebpo_error *error)
 {
-    const querying *a = context;
+    const point_queries *a = context;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
         status = ebpo_boolean_query(a->b, worker, a->points + 3 * i, &a->out[i], error);
@@ -325,7 +325,7 @@ ebpo_status ebpo_boolean_inside_many(ebpo_boolean *boolean, const double *points
 {
     EBPO_DEFAULT_FP;
     enum { GRAIN = 256 };
-    querying a = { boolean, points, out };
+    point_queries a = { boolean, points, out };
     ebpo_status status = ebpo_check_points(points, count, error);
     if (status != EBPO_OK)
         return status;

@@ -48,7 +48,7 @@ typedef struct walk {
     const ebpo_boolean *boolean;
     ebpo_boolean_cells *cells;
     ebpo_cells_options options;
-    candidate *queried; /* [8 * PARENTS] */
+    candidate *candidates; /* [8 * PARENTS] */
     ebpo_world_cell *parents, *next;
     uint64_t parent_count, parent_capacity, next_count, next_capacity;
     int level; /* level of these cells */
@@ -60,7 +60,7 @@ static ebpo_status query_some(void *context, uint64_t begin, uint64_t end, unsig
     walk *w = context;
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
-        candidate *c = &w->queried[i];
+        candidate *c = &w->candidates[i];
         status = ebpo_world_cell_query(w->boolean, worker, &w->cells->world, &c->cell, &c->may,
                                        c->ways, error);
     }
@@ -104,7 +104,7 @@ static ebpo_status query_and_keep(walk *w, uint64_t count, ebpo_error *error)
     ebpo_status status = ebpo_parallel_for(count <= GRAIN ? 1 : w->boolean->threads, NULL, count,
                                            GRAIN, query_some, w, NULL, "cells", error);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
-        const candidate *c = &w->queried[i];
+        const candidate *c = &w->candidates[i];
         for (int k = 0; k < EBPO_CUBE_WAYS; k++)
             w->cells->ways[k] += c->ways[k];
         if (c->may == EBPO_MAY_IN)
@@ -125,7 +125,7 @@ static ebpo_status next_level(walk *w, ebpo_error *error)
         if (!ebpo_progress_step(&w->options.progress, "cells", done, total, error))
             return EBPO_E_CANCELLED;
         for (uint64_t i = 0; i < 8 * count; i++)
-            w->queried[i] =
+            w->candidates[i] =
                 (candidate){ .cell = ebpo_world_child(&w->parents[at + i / 8], (unsigned)(i % 8)) };
         status = query_and_keep(w, 8 * count, error);
     }
@@ -152,10 +152,10 @@ static int by_first(const void *a, const void *b)
 
 static ebpo_status walk_levels(walk *w, ebpo_error *error)
 {
-    w->queried = ebpo_alloc(8 * PARENTS, sizeof *w->queried);
-    if (!w->queried)
-        return ebpo_fail_memory(error, 8 * PARENTS * sizeof *w->queried);
-    w->queried[0] = (candidate){ .cell = { { 0, { 0, 0, 0 } }, 0, 0 } };
+    w->candidates = ebpo_alloc(8 * PARENTS, sizeof *w->candidates);
+    if (!w->candidates)
+        return ebpo_fail_memory(error, 8 * PARENTS * sizeof *w->candidates);
+    w->candidates[0] = (candidate){ .cell = { { 0, { 0, 0, 0 } }, 0, 0 } };
     ebpo_status status = query_and_keep(w, 1, error);
     for (w->level = 1; w->level <= w->cells->world.level && status == EBPO_OK; w->level++) {
         swap_lists(w);
@@ -163,7 +163,7 @@ static ebpo_status walk_levels(walk *w, ebpo_error *error)
     }
     if (w->cells->in_count)
         qsort(w->cells->in, w->cells->in_count, sizeof *w->cells->in, by_first);
-    free(w->queried);
+    free(w->candidates);
     free(w->parents);
     free(w->next);
     return status;

@@ -232,22 +232,22 @@ static ebpo_status find_faces(ebpo_two_models *two, int m, const mpq_t x[3], fac
     return status;
 }
 
-typedef struct querying {
+typedef struct face_query {
     ebpo_two_models *two;
     int m;
     bool in; /* near the point, the model is on a side of some piece */
     bool on; /* a face with an area contains the point */
-} querying;
+} face_query;
 
 static bool note_side(void *user, const ebpo_around *around)
 {
-    querying *a = user;
+    face_query *a = user;
     a->in = around->in[a->m] != 0;
     return !a->in;
 }
 
 /* Examines one face that may contain the point. */
-static ebpo_status query_face(querying *a, uint64_t face, const mpq_t x[3], ebpo_error *error)
+static ebpo_status query_face(face_query *a, uint64_t face, const mpq_t x[3], ebpo_error *error)
 {
     double t[3][3];
     bool has_area;
@@ -270,7 +270,7 @@ static ebpo_status query_face(querying *a, uint64_t face, const mpq_t x[3], ebpo
 static ebpo_status has_point(ebpo_two_models *two, int m, const mpq_t x[3], bool *has,
                              ebpo_error *error)
 {
-    querying a = { .two = two, .m = m };
+    face_query a = { .two = two, .m = m };
     faces_at near = { 0 };
     int32_t winding = 0;
     ebpo_status status = find_faces(two, m, x, &near, error);

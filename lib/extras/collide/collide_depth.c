@@ -52,7 +52,7 @@ typedef struct depth_search {
     double left, lost; /* greatest `most` of the dropped parts; bound of how far rounding moves
                         * points */
     depth_part *part;  /* a heap, the greatest first */
-    uint64_t count, capacity, queried;
+    uint64_t count, capacity, evaluations;
 } depth_search;
 
 /* A ball that contains a part of the surface: all points of the part are within `radius` of the
@@ -75,7 +75,7 @@ static ebpo_status depth_at(depth_search *s, const double w[3], double *lo, doub
     ebpo_distance_result r;
     ebpo_unpose(s->solid, w, p, &doubt);
     *rounding = doubt * scale;
-    s->queried++;
+    s->evaluations++;
     ebpo_status status = ebpo_distance(s->context, p, NULL, &r, error);
     if (status != EBPO_OK)
         return status;
@@ -434,7 +434,7 @@ static ebpo_status search_parts(depth_search *s, ebpo_error *error)
 {
     ebpo_status status = offer_cells(s, error);
     while (status == EBPO_OK && !is_search_done(s) && !is_search_late(s)) {
-        if (s->queried % 64 == 0 && !ebpo_progress_step(s->progress, "depth", 0, 0, error))
+        if (s->evaluations % 64 == 0 && !ebpo_progress_step(s->progress, "depth", 0, 0, error))
             return EBPO_E_CANCELLED;
         status = divide_next(s, error);
     }

@@ -231,11 +231,11 @@ static void end_open(nearest_pair *n)
 
 static void nearest_pair_end(nearest_pair *n)
 {
-    bool queried = !isnan(n->at_least);
+    bool has_threshold = !isnan(n->at_least);
     if (n->meets) {
         n->lo = n->hi = 0;
-        n->is_at_least = queried ? n->at_least <= 0 : -1;
-    } else if (queried) {
+        n->is_at_least = has_threshold ? n->at_least <= 0 : -1;
+    } else if (has_threshold) {
         if (n->is_at_least < 0 && !n->ended)
             n->is_at_least = 1;
         n->lo = n->is_at_least == 1 ? n->at_least : fmin(n->lo, n->at_least);

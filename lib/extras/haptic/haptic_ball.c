@@ -247,7 +247,7 @@ static ebpo_status new_measure(ebpo_haptic *t, ebpo_error *error)
 
 static ebpo_status make_parts(ebpo_haptic *t, ebpo_error *error)
 {
-    ebpo_status status = ebpo_context_new(t->model, &t->querying, error);
+    ebpo_status status = ebpo_context_new(t->model, &t->proxy_context, error);
     if (status == EBPO_OK)
         status = ebpo_context_new(t->model, &t->loading, error);
     for (int i = 0; i < EBPO_HAPTIC_BOXES && status == EBPO_OK; i++)
@@ -270,7 +270,7 @@ static ebpo_status check_point(ebpo_haptic *t, const double place[3], double rea
     ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
     ebpo_distance_result near;
     options.max_distance = reach + t->options.skin / 2;
-    ebpo_status status = ebpo_distance(t->querying, place, &options, &near, error);
+    ebpo_status status = ebpo_distance(t->proxy_context, place, &options, &near, error);
     if (status == EBPO_OK && near.distance <= options.max_distance && near.distance >= 0)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
                          "the distance of the device from a face is %g there; it must be greater "
@@ -279,7 +279,7 @@ static ebpo_status check_point(ebpo_haptic *t, const double place[3], double rea
     if (status != EBPO_OK || !t->solid)
         return status;
     ebpo_inside_result inside;
-    status = ebpo_inside(t->querying, place, NULL, &inside, error);
+    status = ebpo_inside(t->proxy_context, place, NULL, &inside, error);
     return status != EBPO_OK || inside.where == EBPO_OUT
                ? status
                : ebpo_fail(error, EBPO_E_ARGUMENT, "the position is in the solid; begin outside");
@@ -417,7 +417,7 @@ void ebpo_haptic_free(ebpo_haptic *t)
     ebpo_ball_walk_free(&t->walk);
     ebpo_held_levels_free(&t->levels);
     ebpo_tool_free(t->tool);
-    ebpo_context_free(t->querying);
+    ebpo_context_free(t->proxy_context);
     ebpo_context_free(t->loading);
     pthread_mutex_destroy(&t->mutex);
     free(t);

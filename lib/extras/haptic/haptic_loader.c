@@ -42,14 +42,14 @@ static ebpo_status learn_place(ebpo_haptic *t, bool *moved, ebpo_error *error)
     ebpo_known_place *known = &t->known[t->own_known];
     for (int i = 0; i < 3; i++)
         known->place[i] = atomic_load_explicit(&t->device_reported[i], memory_order_relaxed);
-    *moved = known->place[0] != t->queried[0] || known->place[1] != t->queried[1] ||
-             known->place[2] != t->queried[2];
+    *moved = known->place[0] != t->last_query[0] || known->place[1] != t->last_query[1] ||
+             known->place[2] != t->last_query[2];
     if (!*moved)
         return EBPO_OK;
     ebpo_status status = known_query(t, known, error);
     if (status != EBPO_OK)
         return status;
-    ebpo_vec3_copy(known->place, t->queried);
+    ebpo_vec3_copy(known->place, t->last_query);
     unsigned got = atomic_exchange_explicit(&t->known_between, t->own_known | EBPO_HAPTIC_FRESH,
                                             memory_order_acq_rel);
     t->own_known = got & ~(unsigned)EBPO_HAPTIC_FRESH;
@@ -191,7 +191,7 @@ ebpo_status ebpo_haptic_loader_start(ebpo_haptic *t, ebpo_error *error)
 {
     for (int i = 0; i < 3; i++) {
         t->last.min[i] = t->last.max[i] = NAN; /* NAN: far from every position */
-        t->queried[i] = NAN;
+        t->last_query[i] = NAN;
         t->device_before[i] = atomic_load(&t->device_reported[i]);
     }
     t->when_before = ebpo_clock();

@@ -63,8 +63,8 @@ struct ebpo_haptic {
     uint32_t found[EBPO_HAPTIC_FACES];
     ebpo_near_node looking[EBPO_HAPTIC_VISITS + 2];
     double gap[EBPO_HAPTIC_FACES];
-    double away[3];         /* direction away from the nearest face, if one was found */
-    ebpo_context *querying; /* for placing the proxy */
+    double away[3];              /* direction away from the nearest face, if one was found */
+    ebpo_context *proxy_context; /* for placing the proxy */
     ebpo_side side;
     unsigned result; /* number of the step's entry of known[] */
 
@@ -84,7 +84,7 @@ struct ebpo_haptic {
     ebpo_context *loading;
     unsigned own; /* number of its box */
     unsigned own_known;
-    double queried[3]; /* position of the last query */
+    double last_query[3]; /* position of the last query */
     ebpo_extent last;
     double half; /* half a box's side */
     double device_before[3], speed[3];

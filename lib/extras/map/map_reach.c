@@ -272,7 +272,7 @@ ebpo_status ebpo_map_find_range(ebpo_model *model, const ebpo_mesh *mesh, const 
                                 ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    ebpo_map_options querying = EBPO_MAP_OPTIONS_INIT;
+    ebpo_map_options query_options = EBPO_MAP_OPTIONS_INIT;
     search s = { .mesh = mesh, .distances = distances };
     ebpo_status status = EBPO_CHECK_SIZED(ebpo_map_range, out, error);
     if (status == EBPO_OK)
@@ -281,9 +281,9 @@ ebpo_status ebpo_map_find_range(ebpo_model *model, const ebpo_mesh *mesh, const 
         status = reach_begin(&s, error);
     if (status != EBPO_OK)
         return status;
-    querying.unsigned_distance = true;
-    querying.threads = s.o.threads;
-    status = ebpo_map_askers_make(&s.askers, model, &querying, error);
+    query_options.unsigned_distance = true;
+    query_options.threads = s.o.threads;
+    status = ebpo_map_askers_make(&s.askers, model, &query_options, error);
     if (status == EBPO_OK)
         status = search_all(&s, error);
     ebpo_map_askers_free(&s.askers);

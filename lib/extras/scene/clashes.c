@@ -258,11 +258,11 @@ static ebpo_status scene_report_depths(const scene_two *two, ebpo_scene_clash *m
 
 /* --- pairs of instances --- */
 
-typedef struct querying {
+typedef struct clash_query {
     const ebpo_scene *scene;
     ebpo_scene_clash_options how;
     double time;
-} querying;
+} clash_query;
 
 static ebpo_clash_kind kind_of(const ebpo_scene_clash *m)
 {
@@ -338,7 +338,8 @@ static ebpo_status query_faces(const scene_two *two, ebpo_scene_clash *m, ebpo_e
 
 /* Checks that parts omitted from a file do not matter. If one instance is inside a solid, any face
  * may matter. */
-static ebpo_status check_omitted(const querying *a, const ebpo_scene_pair *pair, ebpo_error *error)
+static ebpo_status check_omitted(const clash_query *a, const ebpo_scene_pair *pair,
+                                 ebpo_error *error)
 {
     double gap = INFINITY;
     uint64_t lacking = 0;
@@ -356,7 +357,7 @@ static bool is_solid(const ebpo_scene *scene, uint64_t instance)
 static ebpo_status query_pair(const void *how, const ebpo_scene_pair *pair, void *result,
                               ebpo_error *error)
 {
-    const querying *a = how;
+    const clash_query *a = how;
     ebpo_scene_clash *m = result;
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;
@@ -393,7 +394,7 @@ ebpo_status ebpo_scene_find_clashes(ebpo_scene *scene, double time,
                                     ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    querying a = { .scene = scene, .how = EBPO_SCENE_CLASH_OPTIONS_INIT, .time = time };
+    clash_query a = { .scene = scene, .how = EBPO_SCENE_CLASH_OPTIONS_INIT, .time = time };
     void *clashes = NULL;
     uint64_t count = 0;
     ebpo_status status = EBPO_TAKE(ebpo_scene_clash_options, &a.how, options, error);
@@ -419,7 +420,7 @@ ebpo_status ebpo_scene_collide(ebpo_scene *scene, uint64_t a, uint64_t b, double
                                unsigned threads, ebpo_pairs_fn take, void *user, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    querying one = { .scene = scene, .time = time };
+    clash_query one = { .scene = scene, .time = time };
     ebpo_scene_pair pair = { a, b, 0 };
     ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
     ebpo_collider *collider = NULL;

@@ -347,10 +347,10 @@ static int make_cells(const values *v, const char **models, ebpo_boolean *b)
 
 static int check_values(const values *v, const char **models, uint32_t count)
 {
-    bool points_queried = v->inside || v->distance;
+    bool has_point_queries = v->inside || v->distance;
     if (v->inside && v->distance)
         return command_usage("boolean", "--inside and --distance cannot be used together");
-    if (points_queried && (v->volume || v->out || v->inner))
+    if (has_point_queries && (v->volume || v->out || v->inner))
         return command_usage("boolean",
                              "%s queries points; --volume, --output and --inner need cells; run "
                              "them separately",

@@ -85,7 +85,7 @@ static bool read_direction(const char *text, double out[3])
     return text[strspn(text, " \t")] == '\0';
 }
 
-static bool collide_far_queried(const collide_far *f)
+static bool collide_far_requested(const collide_far *f)
 {
     return f->distance || f->depth || f->separation;
 }
@@ -95,7 +95,7 @@ static bool collide_far_queried(const collide_far *f)
 static bool collide_far_fits(collide_far *f, bool others)
 {
     const char *wrong = NULL;
-    if ((collide_far_queried(f) && others) ||
+    if ((collide_far_requested(f) && others) ||
         f->distance + f->depth + (f->separation != NULL) > 1 ||
         (!f->distance && !f->depth && f->tolerance > 0))
         wrong =
@@ -429,7 +429,7 @@ static ebpo_status query_all(collide_values *v, ebpo_collider *c, const ebpo_col
         status = query_relation(v, c, how, error);
     if (status == EBPO_OK && v->out)
         status = write_pairs(v, c, how, error);
-    if (status == EBPO_OK && collide_far_queried(&v->far))
+    if (status == EBPO_OK && collide_far_requested(&v->far))
         return collide_far_query(&v->far, v->query.json, c, how, error);
     if (status == EBPO_OK && (v->query.all || v->self))
         return query_pairs(v, c, how, error);
@@ -565,14 +565,14 @@ static int run_collide(void *given, const char **operand)
     if (v->self && (v->query.all || v->pose_a || v->pose_b || v->relation || v->out))
         return command_usage("collide",
                              "--self takes neither --all nor poses, --relation or --output");
-    if (v->first && (v->self || v->query.all || collide_far_queried(&v->far)))
+    if (v->first && (v->self || v->query.all || collide_far_requested(&v->far)))
         return command_usage("collide", "--first takes neither --all, --self, --distance, --depth "
                                         "nor --separation");
     if (v->out && !words_end_with(v->out, ".h5") && !words_end_with(v->out, ".ply"))
         return command_usage("collide", "--output %s: expected a name that ends in .h5 or .ply",
                              v->out);
     if (v->query.level >= 0 && (v->first || v->self || v->query.all ||
-                                collide_far_queried(&v->far) || v->relation || v->out))
+                                collide_far_requested(&v->far) || v->relation || v->out))
         return command_usage("collide", "--max-level allows no other query");
     if (!read_pose("pose-a", v->pose_a, &how.pose_a) ||
         !read_pose("pose-b", v->pose_b, &how.pose_b) ||

@@ -38,17 +38,17 @@ typedef struct values {
 
 static int check_values(const values *v, const char *in, const char *out)
 {
-    int queried = (v->level >= 0) + v->mesh + (v->subtree > 0);
+    int requested = (v->level >= 0) + v->mesh + (v->subtree > 0);
     if (v->textures && strcmp(v->textures, "-") == 0)
         return command_usage("extract", "--textures: '-': a folder's name is needed here");
-    if (queried == 0 && v->textures && !out)
+    if (requested == 0 && v->textures && !out)
         return v->json ? command_usage("extract", "--json cannot be used with --textures alone")
                        : EXIT_FINE;
-    if (queried == 0)
+    if (requested == 0)
         return command_usage("extract", "specify --level N, --mesh or --subtree OCTCODE");
     if (!out)
         return command_usage("extract", "missing operand; expected: FILE OUT.ply");
-    if (queried > 1)
+    if (requested > 1)
         return command_usage("extract", "--level, --mesh and --subtree cannot be used together");
     if (v->level < 0 && v->no_cell_faces)
         return command_usage("extract",

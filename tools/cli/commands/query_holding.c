@@ -145,13 +145,12 @@ static bool loading_pays(query_holding *h, double total)
     if (ebpo_model_get_stats(h->session.model, &s) != EBPO_OK || s.loads < LOADS_BELIEVED)
         return false;
     pthread_mutex_lock(&h->books);
-    double each = s.load_seconds / (double)s.loads, queried = (double)h->queries,
+    double each = s.load_seconds / (double)s.loads, queries = (double)h->queries,
            again = (double)(s.evicted < s.loads ? s.evicted : s.loads) * each,
-           querying =
-               h->querying_seconds > s.load_seconds ? h->querying_seconds - s.load_seconds : 0,
-           foretold = queried > 0 ? (double)s.loads / queried * (total - queried) : 0;
+           query_time = h->query_seconds > s.load_seconds ? h->query_seconds - s.load_seconds : 0,
+           foretold = queries > 0 ? (double)s.loads / queries * (total - queries) : 0;
     h->whole_seconds = each * (double)h->subtrees;
-    h->extra_seconds = again + h->parts_share * querying;
+    h->extra_seconds = again + h->parts_share * query_time;
     h->queries_before = h->queries;
     h->loads_before = s.loads;
     bool does = h->extra_seconds >= h->whole_seconds ||
@@ -225,7 +224,7 @@ void query_holding_leave(query_holding *h, uint64_t queries, double seconds)
 {
     pthread_mutex_lock(&h->books);
     h->queries += queries;
-    h->querying_seconds += seconds;
+    h->query_seconds += seconds;
     pthread_mutex_unlock(&h->books);
     pthread_rwlock_unlock(&h->lock);
 }

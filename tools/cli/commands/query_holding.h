@@ -29,14 +29,14 @@ typedef struct query_holding {
     uint64_t queries_before, loads_before;
     /* cost of parts beyond loading each part once; estimated cost of loading everything */
     double extra_seconds, whole_seconds;
-    double parts_share;      /* extra share of the time of a query in parts, compared with the whole
-                              * model */
-    ebpo_model_plan plan;    /* for half of the free memory */
-    uint64_t free_memory;    /* bytes, before the model was made */
-    uint64_t subtrees;       /* number of subtrees at first; 0: in one piece */
-    uint64_t queries;        /* number of queries and their time, including loads; protected by
-                              * `books` */
-    double querying_seconds; /* sum of all threads */
+    double parts_share;   /* extra share of the time of a query in parts, compared with the whole
+                           * model */
+    ebpo_model_plan plan; /* for half of the free memory */
+    uint64_t free_memory; /* bytes, before the model was made */
+    uint64_t subtrees;    /* number of subtrees at first; 0: in one piece */
+    uint64_t queries;     /* number of queries and their time, including loads; protected by
+                           * `books` */
+    double query_seconds; /* sum of all threads */
 } query_holding;
 
 /* Opens the model; `parts_share`: as the member. Returns an exit code; errors were reported. Call

@@ -123,8 +123,8 @@ static uint64_t bytes_together(const query_values *v, const query_holding *holdi
     return parts ? TOGETHER_IN_PARTS : POINTS_BATCH;
 }
 
-static int open_queried(query_job *job, const char *model, const ebpo_model_options *options,
-                        query_holding *holding)
+static int open_model(query_job *job, const char *model, const ebpo_model_options *options,
+                      query_holding *holding)
 {
     if (!query_catalogue_named(model))
         return query_holding_open(holding, job->command, model, job->values, options,
@@ -140,7 +140,7 @@ static int run_query(query_job *job, const char *model, points *in,
 {
     query_holding holding;
     ebpo_sampler *sampler = NULL;
-    int code = open_queried(job, model, options, &holding);
+    int code = open_model(job, model, options, &holding);
     if (code == EXIT_FINE)
         code = open_sampler(job, &holding, &sampler);
     if (code == EXIT_FINE)

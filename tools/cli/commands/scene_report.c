@@ -181,7 +181,7 @@ typedef struct report {
     const scene_values *v;
     ebpo_scene *scene;
     ebpo_scene_clash_options how;
-    uint64_t found_clashes, frames_found, queried;
+    uint64_t found_clashes, frames_found, tested;
     scene_frame frame;
     uint64_t capacity; /* capacity for contacts */
     bool prints;       /* rows on standard output */
@@ -231,7 +231,7 @@ static ebpo_status query_frame(report *r, double time, ebpo_error *error)
     f->cost.bytes_read = after.bytes_read - before.bytes_read;
     f->cost.models = after.models - before.models;
     f->cost.loads = after.loads - before.loads;
-    r->queried += f->cost.tested;
+    r->tested += f->cost.tested;
     r->found_clashes += f->count;
     r->frames_found += f->count > 0;
     return status;
@@ -345,16 +345,16 @@ static void finish_report(report *r, double seconds)
 {
     if (r->prints && r->v->json) {
         json_end(&r->j);
-        json_uint(&r->j, "pairs_tested", r->queried);
+        json_uint(&r->j, "pairs_tested", r->tested);
         json_uint(&r->j, "pairs_clashing", r->found_clashes);
         json_real(&r->j, "seconds", seconds);
         json_finish(&r->j);
     } else if (!r->v->quiet) {
-        char times[40], queried[40];
+        char times[40], tested[40];
         words_plural(times, sizeof times, r->frames, "time", "times");
-        words_plural(queried, sizeof queried, r->queried, "pair", "pairs");
+        words_plural(tested, sizeof tested, r->tested, "pair", "pairs");
         fprintf(stderr, "%s, %llu with contacts; %s tested, %llu in contact%s; %.3g s\n", times,
-                (unsigned long long)r->frames_found, queried, (unsigned long long)r->found_clashes,
+                (unsigned long long)r->frames_found, tested, (unsigned long long)r->found_clashes,
                 r->how.relate ? "" : " (enclosed instances are not checked without --solids)",
                 seconds);
     }

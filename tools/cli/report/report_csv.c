@@ -36,7 +36,8 @@ static void one_method(FILE *out, const comparison *c, const method *m)
     }
     for (int i = 0; i < m->need_count; i++) {
         snprintf(parameter, sizeof parameter, "%s=%.17g",
-                 m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes", m->need[i].queried);
+                 m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes",
+                 m->need[i].requested);
         for (int k = 0; k < NEED_METRICS; k++)
             print_metric(out, m->name, -1, parameter, &need_metrics[k], m->need[i].metric[k]);
     }

@@ -123,7 +123,7 @@ typedef enum need_kind { NEED_ERROR, NEED_SIZE } need_kind;
 
 typedef struct need_result {
     need_kind kind;
-    double queried; /* model's unit, or bytes */
+    double requested; /* model's unit, or bytes */
     double metric[NEED_METRICS];
 } need_result;
 

@@ -18,9 +18,9 @@ static ebpo_status cut_subset(const comparison *c, ebpo_file *file, const need_r
     options.threads = (unsigned)c->v->threads;
     options.progress = c->progress;
     if (n->kind == NEED_ERROR)
-        options.max_error = n->queried;
+        options.max_error = n->requested;
     else
-        options.target_bytes = (uint64_t)n->queried;
+        options.target_bytes = (uint64_t)n->requested;
     return ebpo_subset(file, path, &options, error);
 }
 
@@ -73,11 +73,11 @@ static ebpo_status own_reach(const comparison *c, method *m, ebpo_file *file, eb
 }
 
 static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_model *model,
-                            need_kind kind, double queried, double own, ebpo_error *error)
+                            need_kind kind, double requested, double own, ebpo_error *error)
 {
     char path[sizeof c->folder + 16];
     need_result *n = &m->need[m->need_count];
-    *n = (need_result){ kind, queried, { NAN, NAN, NAN, NAN, NAN } };
+    *n = (need_result){ kind, requested, { NAN, NAN, NAN, NAN, NAN } };
     snprintf(path, sizeof path, "%s/need.ebpo.h5", c->folder);
     uint64_t begin = tool_clock();
     ebpo_status status = cut_subset(c, file, n, path, error);
@@ -85,8 +85,8 @@ static ebpo_status one_need(comparison *c, method *m, ebpo_file *file, ebpo_mode
     if (status == EBPO_OK)
         status = measure_reach(c, model, path, n, error);
     unlink(path);
-    n->metric[OF_NEED_RATIO] = kind == NEED_ERROR ? n->metric[OF_NEED_FAR_HI] / fmax(queried, own)
-                                                  : n->metric[OF_NEED_BYTES] / queried;
+    n->metric[OF_NEED_RATIO] = kind == NEED_ERROR ? n->metric[OF_NEED_FAR_HI] / fmax(requested, own)
+                                                  : n->metric[OF_NEED_BYTES] / requested;
     if (status == EBPO_OK || status == EBPO_E_ABSENT)
         m->need_count++;
     return status;
@@ -100,11 +100,11 @@ ebpo_status report_needs(comparison *c, method *m, ebpo_file *file, ebpo_model *
     ebpo_status status = own_reach(c, m, file, model, &own, error);
     for (unsigned i = 0; i < NEEDS && status == EBPO_OK; i++) {
         bool by_error = i < NEEDS / 2;
-        double queried =
+        double requested =
             by_error ? errors[i] / 100 * c->diagonal
                      : floor(sizes[i - NEEDS / 2] / 100 * (double)c->methods[0].info.file_bytes);
         status =
-            one_need(c, m, file, model, by_error ? NEED_ERROR : NEED_SIZE, queried, own, error);
+            one_need(c, m, file, model, by_error ? NEED_ERROR : NEED_SIZE, requested, own, error);
         if (status == EBPO_E_MEMORY || status == EBPO_E_IO || status == EBPO_E_CANCELLED)
             return status;
         if (status != EBPO_OK)

@@ -68,7 +68,7 @@ static void one_method(json *j, const comparison *c, const method *m)
     for (int i = 0; i < m->need_count; i++) {
         json_object(j, NULL);
         json_real(j, m->need[i].kind == NEED_ERROR ? "max_error" : "target_bytes",
-                  m->need[i].queried);
+                  m->need[i].requested);
         print_metrics(j, need_metrics, m->need[i].metric, NEED_METRICS);
         json_end(j);
     }

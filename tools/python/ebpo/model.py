@@ -19,7 +19,7 @@ from .errors import ArgumentError, LimitError, NoMemory
 from .parts import Attributes, Info, Level, Maps, Mass, Mesh, Subtree, read_level, read_maps, read_mesh
 from .sources import opened
 
-# Rays that are asked about at a time: the library puts them in order by itself.
+# Number of rays of one library call. The library sorts the rays of a call.
 RAYS = 1 << 18
 
 INSIDE = np.dtype(c.ebpo_inside_result)
@@ -27,14 +27,20 @@ DISTANCE = np.dtype(c.ebpo_distance_result)
 HIT = np.dtype(c.ebpo_ray_hit)
 NEAR = np.dtype(c.ebpo_near_face)
 
-# The share of a query's time that parts cost (docs/measured/queries.md).
+# For each kind of query: the share of its time that partial loading costs
+# (docs/measured/queries.md).
 PARTS_SHARE = {"inside": 0.05, "distance": 0.65, "rays": 0.6, "box": 0.25}
 
 Progress = Callable[[str, int, int], Any]
 
 
 class Located(NamedTuple):
-    """where: int8, a Where. winding: int32, 0 on faces. doubt: float64, see `Model.locate`."""
+    """Results of `Model.locate`.
+
+    where: int8, a Where.
+    winding: int32, 0 on faces.
+    doubt: float64, the greatest possible distance to the surface where `where` is MAYBE; else 0.
+    """
 
     where: Any
     winding: Any
@@ -42,7 +48,10 @@ class Located(NamedTuple):
 
 
 class Nearest(NamedTuple):
-    """distance: float64. point, normal: (.., 3) float64. face: int64. See `Model.distance`."""
+    """Results of `Model.distance`.
+
+    distance: float64. point, normal: (.., 3) float64. face: int64.
+    """
 
     distance: Any
     point: Any
@@ -51,14 +60,20 @@ class Nearest(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """lo, hi: float64; the distance is certainly within, unsigned."""
+    """Bounds of distances.
+
+    lo, hi: float64, unsigned. The distance is certainly in [lo, hi].
+    """
 
     lo: Any
     hi: Any
 
 
 class Hits(NamedTuple):
-    """t: float64. face: int64. side: int32. See `Model.ray`."""
+    """Results of `Model.ray`.
+
+    t: float64. face: int64. side: int32.
+    """
 
     t: Any
     face: Any
@@ -66,7 +81,12 @@ class Hits(NamedTuple):
 
 
 class AllHits(NamedTuple):
-    """t, face, side: of all hits, ray after ray. ray: int64, whose each is. begin: (n + 1,) int64."""
+    """Results of `Model.ray_all`: k hits of n rays, ray after ray.
+
+    t, face, side: (k,), as in `Hits`.
+    ray: (k,) int64, the index of the hit's ray.
+    begin: (n + 1,) int64, the index of each ray's first hit.
+    """
 
     t: np.ndarray
     face: np.ndarray
@@ -78,22 +98,26 @@ class AllHits(NamedTuple):
 def open(source: Any, *, memory: int | str | None = None, cut_level: int | None = None,
          prefetch: bool = False, threads: int | None = None,
          storage_options: dict | None = None, max_expansion: int | None = None, **http: Any) -> Model:
-    """Opens a file. Reads only its head; other data is read when it is needed.
+    """Open a file. Reads only its header; other data is read when a query needs it.
 
-    source: a path; a URL (http, https, or what fsspec knows); bytes, an mmap or an array of them, which
-        are not copied; a file with seek and read; an object with `size` and `read_range(offset, size)`,
-        which several threads call at once. It has to stay until the model is gone, and must itself not
-        open .ebpo.h5 files while it is read.
-    memory: bytes that questions may hold of the model: 500000000, "500M", "2GiB". None, as in the command: of
-        a file on this machine at most half of what is free, and of that only the subtrees that questions
-        come to, until all of the model at once is cheaper; of a file of more than 2 MiB that is elsewhere
-        (a URL, an object with ranges, a file object that the system does not read) 256 MiB.
-    cut_level: levels that stay in memory; None: by the budget.
-    prefetch: subtrees around the last questions are loaded in the background.
-    threads: so many work at questions and at reading. None: all cores.
-    storage_options: fsspec's, of the URL.
-    max_expansion: how often the file's bytes its decoded arrays may take. None: 256 times, and 64 MiB in
-        any case; beyond that a file is refused (LimitError), as it may be made to exhaust memory.
+    source: one of these:
+        a path;
+        a URL (http, https, or a scheme that fsspec supports);
+        bytes, an mmap or an array of bytes, which are not copied;
+        a file object with seek and read;
+        an object with `size` and `read_range(offset, size)`, which several threads call at the same time.
+        The source must exist as long as the model. Its methods must not open .ebpo.h5 files.
+    memory: budget in bytes for data that the model keeps in memory: 500000000, "500M", "2GiB".
+        None, local file: at most half of the free memory. The model first loads only the subtrees that
+        queries need; it loads the whole model when that becomes cheaper. The command does the same.
+        None, a source of more than 2 MiB elsewhere (a URL, an object with ranges, a file object that the
+        system does not read): 256 MiB.
+    cut_level: the levels above it stay in memory. None: the budget determines it.
+    prefetch: a background thread loads the subtrees around the last queries.
+    threads: number of threads for queries and for reading. None: all cores.
+    storage_options: options of fsspec for the URL.
+    max_expansion: largest ratio of the decoded arrays to the file size. None: 256; 64 MiB are always
+        allowed. A file beyond the limit is refused (LimitError): it may be made to exhaust memory.
     http: members of ebpo_http_options in ebpo/http.h: headers={"Name": "value"}, user="name:password",
         cache_folder=..., retries=...
 
@@ -113,15 +137,18 @@ def _again(source: Any, options: dict) -> Model:
 
 
 class Model:
-    """An open file. Made by `open`; pickled as what it was opened with.
+    """An open file. `open` makes it. A pickle contains the arguments of `open`, not the data.
 
-    Any number of threads may ask it. Points are (n, 3), or (3,) for a single one, whose answer has one
-    dimension less; doubles in rows one after the other are not copied, anything else is converted block
-    by block: float32, integers, slices, memory maps, datasets of h5py. Numbers must be finite
-    (ArgumentError). Lengths are in the model's unit (`info.unit`). Faces have the numbers of the source,
-    or of the file where it has no maps (`info.parts`).
+    Any number of threads may query a model at the same time.
 
-    Answers are exact for every double. Those of threads, budgets and ways of loading are the same.
+    Points have the shape (n, 3), or (3,) for a single point, whose result has one dimension less.
+    Contiguous rows of doubles are not copied. Other input is converted block by block: float32, integers,
+    slices, memory maps, datasets of h5py. Coordinates must be finite (ArgumentError).
+
+    Lengths are in the model's unit (`info.unit`). Face indices are those of the source, or those of the file
+    when the file has no maps (`info.parts`).
+
+    Results are exact for every double. They do not depend on threads, budgets or the way of loading.
     """
 
     def __init__(self, source: Any, options: dict) -> None:
@@ -137,9 +164,9 @@ class Model:
         self._file: Handle | None = opened(source, http, options["storage_options"],
                                             options.get("max_expansion") or 0)
         self._lock = threading.RLock()
-        self._back = threading.Condition(self._lock)  # contexts are back, or the whole model is there
+        self._back = threading.Condition(self._lock)  # signals returned contexts and the end of _bring_in_all
         self._bringing = False
-        self._lent = [0, 0]  # contexts: of calls that may run functions of the caller; of questions, which do not
+        self._lent = [0, 0]  # contexts in use: [0] of calls that may run the caller's functions, [1] of queries, which never do
         self._made: Handle | None = None
         self._contexts: collections.deque[Handle] = collections.deque()
         self._samplers: dict[str, Handle] = {}
@@ -162,7 +189,7 @@ class Model:
                            keep=(self.file,))
 
     def _current(self) -> Handle:
-        """Returns the model that is queried, made when it is first needed."""
+        """Return the current model handle; make it at the first call."""
         with self._lock:
             if self._made is None:
                 self._made = self._new_model(self._model_options)
@@ -170,18 +197,22 @@ class Model:
 
     @property
     def model(self) -> Handle:
-        """Returns the model for objects that keep it, such as a `Collider`: without a budget all of it, if that fits."""
+        """Return the handle for objects that keep it, such as a `Collider`.
+
+        Without a budget, load the whole model first if it fits into memory.
+        """
         with self._lock:
             if self._automatic.waiting:
                 self._bring_in_all()
-                self._automatic.waiting = False  # parts stay where they are kept
+                self._automatic.waiting = False  # from now on the model stays partially loaded
             return self._current()
 
     def _bring_in_all(self) -> None:
-        """Replaces the parts by the whole model, when no thread asks the parts: both may not fit into memory.
+        """Replace the partially loaded model by the whole model when no query uses the former.
 
-        While functions of a caller may run within a context it returns with the parts: such a function may
-        itself wait for this thread, or be what asks here.
+        Memory may be too small for both at the same time. While functions of the caller may run in a
+        context, the method returns without a change: such a function may wait for this thread, or may have
+        called this method.
         """
         with self._lock:
             while self._bringing:
@@ -193,13 +224,13 @@ class Model:
                 while self._lent[1]:
                     self._back.wait()
                 self._automatic.waiting = False
-                for context in self._contexts:  # now: variables of other threads may still name them
+                for context in self._contexts:  # free now: variables of other threads may still refer to the contexts
                     context.end_now()
                 self._contexts.clear()
                 if self._made is not None:
                     self._made.end_now()
                 self._made = None
-                with contextlib.suppress(LimitError, NoMemory):  # it takes more than estimated
+                with contextlib.suppress(LimitError, NoMemory):  # the model needs more memory than estimated
                     self._made = self._new_model(self._automatic.whole())
             finally:
                 self._bringing = False
@@ -207,13 +238,14 @@ class Model:
 
     @contextlib.contextmanager
     def _context(self, queries: int = 0, total: int = 0, kind: str = "") -> Iterator[Handle]:
-        """A context of the model for one thread.
+        """Lend a context of the model to one thread.
 
-        queries: so many will be asked of `total` that are known to come, without functions of the caller;
-        kind: of PARTS_SHARE.
+        queries: number of queries that follow in this context, and that run no function of the caller.
+        total: number of queries of the whole call.
+        kind: a key of PARTS_SHARE.
         """
-        began, querying = time.perf_counter(), queries > 0
-        if querying and self._automatic.waiting:
+        began, has_queries = time.perf_counter(), queries > 0
+        if has_queries and self._automatic.waiting:
             with self._lock:
                 pays = self._automatic.waiting and self._automatic.pays(self._current(), total, PARTS_SHARE[kind])
             if pays:
@@ -221,12 +253,12 @@ class Model:
         with self._lock:
             while self._bringing:
                 self._back.wait()
-            model, waiting = self._current(), querying and self._automatic.waiting
+            model, waiting = self._current(), has_queries and self._automatic.waiting
             try:
                 context = self._contexts.pop()
             except IndexError:
                 context = Handle.made("ebpo_context_new", model, free="ebpo_context_free", keep=(model,))
-            self._lent[querying] += 1
+            self._lent[has_queries] += 1
         try:
             yield context
         finally:
@@ -235,12 +267,12 @@ class Model:
             with self._lock:
                 if self._made is model:
                     self._contexts.append(context)
-                self._lent[querying] -= 1
+                self._lent[has_queries] -= 1
                 if self._bringing:
                     self._back.notify_all()
 
     def close(self) -> None:
-        """Frees what the model holds; arrays that were given stay. The last reference does the same."""
+        """Free the model's data. Returned arrays remain valid. The end of the last reference also frees it."""
         with self._lock:
             self._contexts.clear()
             self._samplers.clear()
@@ -261,9 +293,9 @@ class Model:
 
     @property
     def stats(self) -> dict[str, Any]:
-        """What questions have cost so far: members of ebpo_model_stats in ebpo/query.h."""
+        """Return the cost of all queries so far: the members of ebpo_model_stats in ebpo/query.h."""
         stats = made(c.ebpo_model_stats)
-        with self._lock:  # the parts may be freed by another thread
+        with self._lock:  # another thread may replace the model
             lib.ebpo_model_get_stats(self._current(), ctypes.byref(stats))
         return {name: getattr(stats, name) if not isinstance(getattr(stats, name), ctypes.Array)
                 else list(getattr(stats, name)) for name, _ in stats._fields_[1:]}
@@ -272,7 +304,7 @@ class Model:
 
     def _query(self, rows: Rows, function: str, options: Any, dtype: np.dtype, put: Callable, threads: int | None,
                progress: Progress | None, stage: str) -> None:
-        """Has `function` answer rows, and put(results, begin, end) keep them."""
+        """Let the library function `function` process the rows; put(results, begin, end) stores the results."""
         entry = function
 
         @contextlib.contextmanager
@@ -300,22 +332,24 @@ class Model:
             yield work
 
         share(rows.count, threads or self._threads, worker, progress, stage)
-        if rows.count == 0:  # says what a question would, such as that the model is a surface
+        if rows.count == 0:  # raises the errors of a query, such as NotSolidError
             with self._context() as context:
                 call(entry, context, None, 0, ctypes.byref(options), None)
 
     def locate(self, points: Any, *, level: int | None = None, deadline: float | None = None,
                threads: int | None = None, progress: Progress | None = None) -> Located:
-        """Classifies points as outside, inside or on a face.
+        """Classify points as outside, inside or on a face.
 
-        level: look at levels 0 to `level` only, and say what is certain by these.
-        deadline: seconds for each point, after which what is certain is said.
+        level: visit levels 0 to `level` only, and return what these levels prove.
+        deadline: time limit in seconds for each point; then the result is what is proved so far.
 
-        Returns where: (n,) int8, Where.OUT, IN, ON or MAYBE; winding: (n,) int32, the winding number, 0
-        on faces, and where an envelope decided because of a level or a deadline; doubt: (n,) float64, of
-        MAYBE: the surface is at most so far away, else 0.
+        Returns
+            where: (n,) int8, Where.OUT, IN, ON or MAYBE;
+            winding: (n,) int32, the winding number. It is 0 on faces, and where an envelope decided because of
+            a level or a deadline;
+            doubt: (n,) float64, the greatest possible distance to the surface where `where` is MAYBE; else 0.
 
-        Raises NotSolidError for a surface, AbsentError where a subset does not hold what decides.
+        Raises NotSolidError for a surface, and AbsentError when a subset lacks the data that decides.
 
         >>> cube.locate([[.5, .5, .5], [2, 0, 0], [1, .25, .5]]).where.tolist()
         [1, 0, 2]
@@ -344,11 +378,11 @@ class Model:
 
     def inside(self, points: Any, *, boundary: bool = True, threads: int | None = None,
                progress: Progress | None = None) -> Any:
-        """Returns True for points in the solid.
+        """Return True for points in the solid.
 
-        boundary: points on faces are.
+        boundary: the result for points on faces.
 
-        Returns (n,) bool. Raises as `locate`.
+        Returns (n,) bool. Raises the errors of `locate`.
 
         >>> cube.inside([[.5, .5, .5], [2, 0, 0], [1, .25, .5]])
         array([ True, False,  True])
@@ -359,7 +393,7 @@ class Model:
         out = np.empty(rows.count, bool)
 
         def put(results: np.ndarray, begin: int, end: int) -> None:
-            if boundary:  # of OUT, IN and ON, all but the first
+            if boundary:  # True for IN and ON
                 np.not_equal(results["where"], c.EBPO_OUT, out=out[begin:end])
             else:
                 np.equal(results["where"], c.EBPO_IN, out=out[begin:end])
@@ -368,7 +402,7 @@ class Model:
         return out[0] if rows.single else out
 
     def winding(self, points: Any, *, threads: int | None = None, progress: Progress | None = None) -> Any:
-        """Returns winding numbers of points: (n,) int32, 0 on faces. Raises as `locate`.
+        """Return winding numbers of points: (n,) int32, 0 on faces. Raises the errors of `locate`.
 
         >>> cube.winding([[.5, .5, .5], [2, 0, 0]])
         array([1, 0], dtype=int32)
@@ -379,17 +413,19 @@ class Model:
 
     def distance(self, points: Any, *, max_distance: float = float("inf"), signed: bool = True,
                  threads: int | None = None, progress: Progress | None = None) -> Nearest:
-        """Returns the distance of points to the model, and the nearest faces.
+        """Return the distances of points to the model, and the nearest faces.
 
         max_distance: faces farther away are ignored.
-        signed: distances are negative inside solids; False is faster.
+        signed: distances are negative inside solids. False is faster.
 
-        Returns distance: (n,) float64, correctly rounded, inf: nothing within max_distance, or, where there is
-        a face, farther than every double; point:
-        (n, 3) the nearest one, rounded, nan: none; normal: (n, 3) the face's unit normal, 0 of a face
-        without area; face: (n,) int64, of several at the same distance the first in the file, -1: none.
+        Returns
+            distance: (n,) float64, correctly rounded. inf: no face within max_distance, or (with a face) the
+            distance is greater than every double;
+            point: (n, 3) the nearest point, rounded; nan: none;
+            normal: (n, 3) the face's unit normal; 0 for a face without area;
+            face: (n,) int64; of several faces at the same distance the first in the file; -1: none.
 
-        Raises AbsentError where the file has no mesh, or a subset does not hold what decides.
+        Raises AbsentError when the file has no mesh, or a subset lacks the data that decides.
 
         >>> d, point, normal, face = cube.distance([[.5, .25, .5], [3, .25, .5]])
         >>> d
@@ -412,9 +448,12 @@ class Model:
 
     def distance_bounds(self, points: Any, *, level: int | None = None, deadline: float | None = None,
                         threads: int | None = None, progress: Progress | None = None) -> Bounds:
-        """Returns certain bounds of distances from levels 0 to `level`, or in `deadline` seconds for each point.
+        """Return certain bounds of distances.
 
-        Returns lo, hi: (n,) float64, unsigned; equal where the distance is known.
+        level: visit levels 0 to `level` only.
+        deadline: time limit in seconds for each point.
+
+        Returns lo, hi: (n,) float64, unsigned. They are equal where the distance is known.
 
         >>> lo, hi = cube.distance_bounds([3., .25, .5], level=1)
         >>> bool(lo <= 2 <= hi)
@@ -435,11 +474,11 @@ class Model:
         return Bounds(*(array[0] for array in out)) if rows.single else out
 
     def near(self, point: Any, *, radius: float = float("inf"), count: int | None = None) -> Nearest:
-        """Returns the faces nearest to one point, by their exact unsigned distances.
+        """Return the faces nearest to one point, sorted by their exact unsigned distances.
 
-        radius: at most so far away. count: at most so many; None: all.
+        radius: greatest distance. count: greatest number of faces; None: no limit.
 
-        Returns arrays as `distance`, of k faces.
+        Returns the arrays of `distance`, for k faces.
 
         >>> cube.near([.5, .5, 2], radius=1).distance
         array([1., 1.])
@@ -465,7 +504,7 @@ class Model:
     # ---- rays ----
 
     def _rays(self, origins: Any, directions: Any, t_max: Any) -> tuple[int, bool, Callable]:
-        """Their number, whether it is a single one, and a function that gives rays begin to end - 1."""
+        """Return the number of rays, True for a single ray, and a function that returns rays begin to end - 1."""
         o, d = Rows(origins, "origins"), Rows(directions, "directions")
         count = max(o.count, d.count)
         if o.count != d.count and not (o.single or d.single):
@@ -500,7 +539,7 @@ class Model:
             try:
                 with self._context(end - begin, count, "rays") as context:
                     call(function, context, given_rays.ctypes.data, end - begin, ctypes.byref(options), *out)
-                    keep(begin, end, *out)  # lists of hits are the context's
+                    keep(begin, end, *out)  # the context owns the lists of hits
             except ArgumentError as error:
                 if begin:
                     error.args = (f"of rays from {begin} on: {error}",)
@@ -509,7 +548,7 @@ class Model:
         if count:
             report(count)
         else:
-            self._current()  # says what a question would
+            self._current()  # raises the errors of a query
 
     @staticmethod
     def _sides(sides: str) -> int:
@@ -520,16 +559,18 @@ class Model:
 
     def ray(self, origins: Any, directions: Any, *, t_max: Any = float("inf"), sides: str = "both",
             threads: int | None = None, progress: Progress | None = None) -> Hits:
-        """Returns the first face that each ray origin + t direction intersects, with t from 0 to t_max.
+        """Return the first face that each ray origin + t direction intersects, with t from 0 to t_max.
 
-        origins, directions: (n, 3); one of both may be (3,). Directions are of any length but 0.
+        origins, directions: (n, 3); one of the two may be (3,). Directions have any length except 0.
         t_max: a number, or (n,).
-        sides: "both"; "front": faces that are met against their normals; "back": along them.
+        sides: "both"; "front": faces that the ray hits against their normals; "back": along their normals.
 
-        Returns t: (n,) float64, inf: nothing is met, or, where there is a face, t is greater than every double
-        (a longer direction gives it a finite one); face: (n,) int64, -1: none; side: (n,) int32, 1: the
-        ray goes in through the face's inner part, -1: out, 0: it meets an edge or a vertex, runs in the
-        face's plane, or the face has no area.
+        Returns
+            t: (n,) float64. inf: no hit, or (with a face) t is greater than every double; a longer direction
+            then gives a finite t;
+            face: (n,) int64, -1: none;
+            side: (n,) int32, 1: the ray enters through the interior of the face; -1: the ray leaves; 0: the ray
+            hits an edge or a vertex, runs in the face's plane, or the face has no area.
 
         >>> cube.ray([.5, .25, 3], [0, 0, -1]).t
         2.0
@@ -545,7 +586,7 @@ class Model:
 
     def ray_any(self, origins: Any, directions: Any, *, t_max: Any = float("inf"), sides: str = "both",
                 threads: int | None = None, progress: Progress | None = None) -> Any:
-        """Returns True for rays that intersect any face, (n,) bool. Faster than `ray`.
+        """Return True for rays that intersect any face, (n,) bool. Faster than `ray`.
 
         >>> cube.ray_any([[.5, .25, 3], [5, 5, 5]], [0, 0, -1.])
         array([ True, False])
@@ -558,10 +599,12 @@ class Model:
 
     def ray_all(self, origins: Any, directions: Any, *, t_max: Any = float("inf"), sides: str = "both",
                 threads: int | None = None, progress: Progress | None = None) -> AllHits:
-        """Returns all faces that each ray intersects, by t, then in the order of the file.
+        """Return all faces that each ray intersects, sorted by t, then by their order in the file.
 
-        Returns t, face, side: (k,) as `ray`, ray after ray; ray: (k,) int64, the number of its ray;
-        begin: (n + 1,) int64, hits begin[i] to begin[i + 1] - 1 are those of ray i.
+        Returns
+            t, face, side: (k,) as in `ray`, ray after ray;
+            ray: (k,) int64, the index of the ray;
+            begin: (n + 1,) int64; ray i has the hits begin[i] to begin[i + 1] - 1.
 
         >>> cube.ray_all([.5, .25, 3], [0, 0, -1]).t
         array([2., 3.])
@@ -591,9 +634,9 @@ class Model:
         return corners
 
     def faces_in_box(self, low: Any, high: Any) -> np.ndarray:
-        """Returns the closed triangles that intersect the closed box from `low` to `high`, (3,) each.
+        """Return the closed triangles that intersect the closed box from `low` to `high`, (3,) each.
 
-        Returns (k,) int64, in the order of the file.
+        Returns (k,) int64, face indices in the order of the file.
 
         >>> len(cube.faces_in_box([-1, -1, -1], [2, 2, .5]))
         10
@@ -606,10 +649,13 @@ class Model:
             return copied(faces.value, (count.value,), np.int64)
 
     def triangles_in_box(self, low: Any, high: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the triangles of `faces_in_box` with their corners, within the memory budget.
+        """Return the triangles of `faces_in_box` with their corners, within the memory budget.
 
-        Returns corners: (k, 3, 3) float64, what the file stores exactly, and faces: (k,) int64. Their
-        order is that of the file if all of the model is in memory, else subtree by subtree.
+        Returns
+            corners: (k, 3, 3) float64, exactly the stored coordinates;
+            faces: (k,) int64.
+
+        The order is that of the file when the whole model is in memory, else subtree after subtree.
 
         >>> corners, faces = cube.triangles_in_box([0, 0, 0], [1, 1, 1])
         >>> corners.shape
@@ -631,14 +677,14 @@ class Model:
     # ---- attributes, mass ----
 
     def sample(self, names: str, points: Any, faces: Any) -> np.ndarray:
-        """Returns attributes at points on faces, such as results of `distance` and `ray`.
+        """Return attributes at points on faces, such as results of `distance` and `ray`.
 
-        names: separated by commas: "red,green,blue", "face:label". Of vertices they are weighed by where
-            the point is on its face.
-        points: (n, 3); faces: (n,) integers, -1 for none.
+        names: attribute names separated by commas: "red,green,blue", "face:label". Values of vertices are
+            interpolated at the point.
+        points: (n, 3). faces: (n,) integers, -1: no face.
 
-        Returns (n, columns) float64; nan for no face. It holds the attributes and the mesh until the
-        model is closed. Raises AbsentError where there is no such attribute.
+        Returns (n, columns) float64; nan where there is no face. The model keeps the attributes and the mesh in
+        memory until it is closed. Raises AbsentError when an attribute does not exist.
         """
         rows = Rows(points)
         numbers = integers(faces, np.int64, "faces").reshape(-1)
@@ -651,12 +697,12 @@ class Model:
             sampler = self._samplers[names]
         out = np.empty((rows.count, lib.ebpo_sampler_columns(sampler)))
         given = rows[0:rows.count].copy()
-        given[numbers < 0] = 0  # of no face there is no point either
+        given[numbers < 0] = 0  # a point without a face may be nan
         call("ebpo_sample", sampler, given.ctypes.data, numbers.ctypes.data, rows.count, out.ctypes.data)
         return out[0] if rows.single else out
 
     def measure(self, *, threads: int | None = None) -> Mass:
-        """Returns area, volume, centroid and inertia.
+        """Return area, volume, centroid and inertia.
 
         >>> cube.measure().volume, cube.measure().area
         (1.0, 6.0)
@@ -669,9 +715,11 @@ class Model:
     # ---- parts ----
 
     def mesh(self, *, order: str = "file") -> Mesh:
-        """Returns the whole mesh. order: "file", or "source" as in the PLY, bit for bit.
+        """Return the whole mesh.
 
-        Returns vertices and faces, which are the library's own arrays, read-only.
+        order: "file"; "source": vertices and faces equal those of the PLY file bit for bit.
+
+        Returns vertices and faces: read-only arrays in memory of the library.
 
         >>> vertices, faces = cube.mesh()
         >>> vertices.shape, faces.shape
@@ -680,7 +728,7 @@ class Model:
         return read_mesh(self.file, order, self._threads)
 
     def maps(self) -> Maps:
-        """Returns the source indices of the file's vertices and faces. AbsentError: the file has none."""
+        """Return the source indices of the file's vertices and faces. Raises AbsentError when the file has no maps."""
         return read_maps(self.file, self.info, self._threads)
 
     @property
@@ -689,12 +737,12 @@ class Model:
         return Attributes(self.file, self._threads)
 
     def level(self, level: int, *, cell_faces: bool = True, progress: Progress | None = None) -> Level:
-        """Returns the envelopes of a level, 0 to info.level_count - 1, as triangles.
+        """Return the envelopes of a level, 0 to info.level_count - 1, as triangles.
 
-        cell_faces: with polygons on walls of cells, so that each envelope is closed.
+        cell_faces: include the polygons on cell faces, so that each envelope is closed.
 
-        Of the level's gray nodes, and of the leaves and black nodes of this one and those above. What is
-        guaranteed to hold the solid is the half-spaces; polygons are these, rounded.
+        The envelopes are those of the level's gray nodes, and of the leaves and black nodes of this level and
+        of the levels above. The half-spaces are guaranteed to contain the solid; the polygons are rounded.
 
         >>> cube.level(0).node.max()
         0
@@ -703,7 +751,7 @@ class Model:
             return read_level(self.file, level, cell_faces, self._threads, reported)
 
     def octcode(self, point: Any, level: int) -> int:
-        """Returns the octcode of the cell of a level that contains a point; 0: the point is not in the root cell.
+        """Return the octcode of the cell of a level that contains a point. Returns 0 for a point outside the root cell.
 
         >>> cube.octcode([.1, .1, .1], 1)
         8
@@ -716,13 +764,13 @@ class Model:
 
     def subtree(self, octcode: int = 1, *, levels: int | None = None, memory: int | str | None = None,
                 or_leaf_above: bool = True) -> Subtree:
-        """The subtree of a gray node or leaf; 1: the whole tree. About that is read which is given.
+        """Return the subtree of a gray node or leaf; octcode 1 is the whole tree. Reads about the bytes of the subtree.
 
-        levels: nodes of at most so many levels below, and no faces then.
-        memory: bytes that it may take; LimitError names enough.
-        or_leaf_above: where the tree ends above the octcode, take the leaf there.
+        levels: include only this number of levels below the node, and no faces.
+        memory: budget in bytes. The message of LimitError states a sufficient budget.
+        or_leaf_above: when the tree ends above the octcode, return the leaf there.
 
-        Raises ArgumentError where there is no such node, or a white or black one.
+        Raises ArgumentError when the node does not exist, or is white or black.
 
         >>> cube.subtree().faces.shape
         (12, 3)

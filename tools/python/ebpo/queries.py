@@ -1,4 +1,4 @@
-"""Runs many queries on all cores: blocks of rows, a context for each thread."""
+"""Runs many queries on all cores: blocks of rows, one context for each thread."""
 from __future__ import annotations
 
 import ctypes
@@ -11,8 +11,8 @@ import numpy as np
 
 from ._checked import doubles, integer_as
 
-# Rows whose answers stay in a core's cache until they have been put where they belong; and so many that
-# Python's lock, which is taken after each block, does not matter.
+# Rows of a block. Results of a block stay in the core's cache until they are stored. A block is
+# long enough to make the cost of Python's global lock, which is taken after each block, negligible.
 BLOCK = 1 << 15
 thread_count = integer_as(ctypes.c_uint)
 
@@ -21,10 +21,13 @@ CODES = "codes of the .ebpo.h5 format; Model.mesh() gives the vertices"
 
 
 def holds_codes(values: Any) -> bool:
-    """Returns True for an array of an .ebpo.h5 file that has a coding; files of others may use that word too."""
+    """Return True for an array of an .ebpo.h5 file with a coding.
+
+    Files of other formats may also have an attribute `coding`.
+    """
     if "coding" not in getattr(values, "attrs", ()):
         return False
-    root = getattr(getattr(values, "file", None), "attrs", None)  # of a dataset of h5py
+    root = getattr(getattr(values, "file", None), "attrs", None)  # the file of a dataset of h5py
     if root is None:
         return True
     name = root.get("format", "")
@@ -40,9 +43,9 @@ def cores() -> int:
 
 
 class Rows:
-    """Points, or anything of three columns, as contiguous doubles block by block.
+    """Points, or other rows of three columns, as contiguous doubles block by block.
 
-    What is that already is not copied. Anything with a shape and slices will do.
+    Contiguous doubles are not copied. The input needs a shape and slices.
     """
 
     def __init__(self, values: Any, what: str = "points") -> None:
@@ -66,7 +69,10 @@ class Rows:
         return doubles(self.values[part], self.what)
 
     def check(self, begin: int, end: int) -> None:
-        """The library numbers the points of a block; here the one that is not finite has its own number."""
+        """Raise ArgumentError for the first row that is not finite, with its number among all rows.
+
+        The library numbers the points of one block only.
+        """
         bad = ~np.isfinite(self[begin:end]).all(axis=1)
         if bad.any():
             number = begin + int(bad.argmax())
@@ -76,7 +82,7 @@ class Rows:
 
 
 class StageProgress:
-    """Progress over all threads, reported by the querying thread."""
+    """Progress over all threads. The thread that started the queries reports it."""
 
     def __init__(self, progress: Callable | None, stage: str, total: int) -> None:
         self.progress, self.stage, self.total = progress, stage, total
@@ -94,10 +100,11 @@ def block_of(count: int, threads: int) -> int:
 
 def share(count: int, threads: int | None, worker: Callable[[], Any], progress: Callable | None = None,
           stage: str = "querying") -> None:
-    """Processes rows 0 to count - 1 block by block.
+    """Process rows 0 to count - 1 block by block.
 
-    worker() is a context manager that gives a function work(begin, end); each thread has its own. The
-    calling thread is one of them. Of several failures the one of the first block is raised.
+    worker() returns a context manager that gives a function work(begin, end). Each thread has its own
+    worker; the calling thread is one of the threads. When several blocks fail, the exception of the first
+    failed block is raised.
     """
     threads = thread_count(threads or cores(), "threads")
     size = block_of(count, threads)
@@ -135,7 +142,7 @@ def share(count: int, threads: int | None, worker: Callable[[], Any], progress: 
     try:
         for thread in others:
             thread.join()
-    except BaseException:  # interrupted: the others end with their blocks
+    except BaseException:  # the other threads stop after their current block
         failed[-1] = None
         raise
     if failed:
@@ -173,7 +180,7 @@ def bar(make: Callable[..., Any], **options: Any) -> Callable[[str, int, int], b
             close()
         if not now:
             if total and done >= total:
-                return True  # reported again after the bar was closed
+                return True  # a later report after the bar is closed
             now.update(stage=stage, done=0, bar=make(total=total or None, desc=stage, **options))
         if done > now["done"]:
             now["bar"].update(done - now["done"])
