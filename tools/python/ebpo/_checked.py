@@ -1,14 +1,15 @@
 """Converts values of Python to values of C, for the whole package.
 
-Every argument of a library function, every struct member and every array passes through this module. Nothing is
-cut, wrapped or rounded silently:
+Every argument of a library function, every struct member and every array passes through this module. No value is
+truncated, wrapped or rounded silently:
 
-integers    Python's and numpy's, and bools as 0 and 1; out of the range of the C type: ArgumentError. A float
-            is a TypeError, whole or not.
-bools       True, False, 0 and 1; another integer: ArgumentError.
-reals       what float() takes, except texts; an integer that no double equals: ArgumentError.
-texts       str as UTF-8, paths by os.fsencode, bytes; a NUL, or a character that UTF-8 does not have: ArgumentError.
-arrays      of numbers; integers as above, item by item.
+integers    Integers of Python and numpy; bools become 0 and 1. A value out of the range of the C type raises
+            ArgumentError. A float raises TypeError, even when it is an integral number.
+bools       True, False, 0 and 1. Another integer raises ArgumentError.
+reals       Every value that float() accepts, except texts. An integer that no double equals raises ArgumentError.
+texts       str as UTF-8, paths by os.fsencode, bytes. A NUL, or a character without an encoding in UTF-8,
+            raises ArgumentError.
+arrays      Arrays of numbers. The rules for integers apply to each item.
 
 ArgumentError is a ValueError.
 """
@@ -29,12 +30,12 @@ REALS = {ctypes.c_float, ctypes.c_double}
 
 
 def refused(what: str, why: str) -> ArgumentError:
-    """Returns the exception for an argument or option, `what`."""
+    """Return the exception for an invalid argument or option named `what`."""
     return ArgumentError(f"{what}: {why}", "EBPO_E_ARGUMENT")
 
 
 def index_of(value: Any, what: str) -> int:
-    """Returns the integer that a value is. TypeError: it is none."""
+    """Return the value as an int. Raises TypeError when it is not an integer."""
     try:
         return operator.index(bool(value) if isinstance(value, np.bool_) else value)
     except TypeError:
@@ -42,7 +43,7 @@ def index_of(value: Any, what: str) -> int:
 
 
 def within(number: int, low: int, high: int, what: str) -> int:
-    """Returns a number that is in a range. ArgumentError: it is not."""
+    """Return the number if it is from low to high. Raises ArgumentError otherwise."""
     if not low <= number <= high:
         shown = str(number) if number.bit_length() <= 128 else f"an integer of {number.bit_length()} bits"
         raise refused(what, f"{shown} is out of range; give {low} to {high}")
@@ -50,7 +51,7 @@ def within(number: int, low: int, high: int, what: str) -> int:
 
 
 def integer_as(kind: Any) -> Callable:
-    """Returns a function that checks integers of a C type."""
+    """Return a function that checks integers of a C type."""
     bits, signed = 8 * ctypes.sizeof(kind), kind(-1).value < 0
     low, high = (-2**(bits - 1), 2**(bits - 1) - 1) if signed else (0, 2**bits - 1)
 
@@ -63,7 +64,7 @@ def integer_as(kind: Any) -> Callable:
 
 
 def truth(value: Any, what: str) -> bool:
-    """Converts a bool, or 0 or 1."""
+    """Convert a bool, or 0 or 1."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     if not isinstance(value, (int, np.integer)):
@@ -72,7 +73,7 @@ def truth(value: Any, what: str) -> bool:
 
 
 def real(value: Any, what: str) -> float:
-    """Converts a number to the nearest double; an integer must equal it."""
+    """Convert a number to the nearest double. Raises ArgumentError for an integer that no double equals."""
     if type(value) is float:
         return value
     if isinstance(value, (str, bytes, np.complexfloating)):
@@ -89,7 +90,7 @@ def real(value: Any, what: str) -> float:
 
 
 def text(value: Any, what: str) -> bytes | None:
-    """Converts a text to UTF-8, and a path to the bytes of the system."""
+    """Convert a text to UTF-8, and a path to the bytes of the system."""
     if value is None:
         return None
     if isinstance(value, str):
@@ -107,7 +108,7 @@ def text(value: Any, what: str) -> bytes | None:
 
 
 def path(value: Any, what: str = "path") -> bytes:
-    """Converts the name of a file to the bytes of the system. TypeError: neither str, bytes nor os.PathLike."""
+    """Convert a file name to the bytes of the system. Raises TypeError unless it is str, bytes or os.PathLike."""
     try:
         return text(os.fsencode(value), what) or b""
     except UnicodeEncodeError as error:
@@ -115,7 +116,7 @@ def path(value: Any, what: str = "path") -> bytes:
 
 
 def texts_of(size: int) -> Callable:
-    """Returns a function that checks texts of a member char[size], where a NUL ends them."""
+    """Return a function that checks texts for a member char[size], which ends with a NUL."""
     def convert(value: Any, what: str) -> bytes:
         found = text(value, what) or b""
         if len(found) >= size:
@@ -126,7 +127,7 @@ def texts_of(size: int) -> Callable:
 
 
 def items_of(kind: Any) -> Callable:
-    """Returns a function that checks the items of an array member."""
+    """Return a function that checks the items of an array member."""
     def convert(values: Any, what: str) -> Any:
         if isinstance(values, kind):
             return values
@@ -140,8 +141,10 @@ def items_of(kind: Any) -> Callable:
 
 
 def converter(kind: Any) -> Callable | None:
-    """Returns a function that checks values of a C type. None: for structs, whose type ctypes checks, and for
-    addresses, which only this package sets."""
+    """Return a function that checks values of a C type.
+
+    Returns None for structs, whose type ctypes checks, and for addresses, which only this package sets.
+    """
     if kind in INTEGERS:
         return integer_as(kind)
     if kind in REALS:
@@ -156,14 +159,14 @@ def converter(kind: Any) -> Callable | None:
 
 
 def is_own(kind: Any) -> bool:
-    """Returns True for members that only this package sets: pointers, functions, and structs of these."""
+    """Return True for types of members that only this package sets: pointers, functions, structs with such members."""
     if issubclass(kind, ctypes.Structure):
         return any(is_own(member) for _, member in kind._fields_)
     return kind is ctypes.c_void_p or issubclass(kind, ctypes._CFuncPtr)
 
 
 class Structure(ctypes.Structure):
-    """A struct of C whose members are checked when they are set."""
+    """A C struct that checks the values of its members when they are set."""
 
     _checks: dict = {}
 
@@ -179,7 +182,7 @@ class Structure(ctypes.Structure):
 
 
 def checked(entry: Any, kinds: list, names: list) -> Any:
-    """Returns a function of C that checks its integers, reals, bools and texts."""
+    """Return a wrapper of a C function that checks integers, reals, bools and texts."""
     checks = [(i, converter(kind), name) for i, (kind, name) in enumerate(zip(kinds, names)) if converter(kind)]
     if not checks:
         return entry
@@ -194,7 +197,7 @@ def checked(entry: Any, kinds: list, names: list) -> Any:
 
 
 def doubles(values: Any, what: str) -> np.ndarray:
-    """Converts numbers to contiguous doubles, without a copy where they are. Wider floats are rounded."""
+    """Convert numbers to contiguous doubles; contiguous doubles are not copied. Wider floats are rounded."""
     given = np.asarray(values)
     if given.dtype.kind == "O":
         given = np.array([real(value, what) for value in given.ravel()], np.float64).reshape(given.shape)
@@ -208,7 +211,7 @@ def doubles(values: Any, what: str) -> np.ndarray:
 
 
 def integers(values: Any, dtype: Any, what: str) -> np.ndarray:
-    """Converts integers to a contiguous array of a type that must hold each. TypeError: they are floats or bools."""
+    """Convert integers to a contiguous array of a type that holds each of them. Raises TypeError for floats and bools."""
     given, range_ = np.asarray(values), np.iinfo(dtype)
     if given.dtype.kind == "O":
         flat = [within(index_of(value, what), int(range_.min), int(range_.max), what) for value in given.ravel()]
@@ -222,8 +225,8 @@ def integers(values: Any, dtype: Any, what: str) -> np.ndarray:
 
 
 def nanoseconds(seconds: Any, what: str = "deadline") -> int:
-    """Returns a number of seconds as nanoseconds, which fit into 64 bits."""
+    """Return seconds as nanoseconds. Raises ArgumentError when they do not fit into 64 bits."""
     number = real(seconds, what)
     if not 0 <= number < 2**64 / 1e9:
-        raise refused(what, f"{number} is no number of seconds; give 0 or more")
+        raise refused(what, f"{number} is not a valid time in seconds; give 0 or more")
     return int(number * 1e9)

@@ -21,12 +21,12 @@ HERE = pathlib.Path(__file__).resolve().parent
 
 
 def candidates():
-    """Returns names of libraries; the first library that exists is used."""
+    """Generate the candidates for the library; the first one that exists is used."""
     if os.environ.get("EBPO_LIBRARY"):
         yield os.environ["EBPO_LIBRARY"]
         return
-    yield from map(str, sorted(HERE.glob("libebpo.so*")))  # of a wheel
-    several = sysconfig.get_config_var("MULTIARCH") or "."  # Debian has the libraries of each machine apart
+    yield from map(str, sorted(HERE.glob("libebpo.so*")))  # the library in a wheel
+    several = sysconfig.get_config_var("MULTIARCH") or "."  # Debian has a folder for each machine type
     for folder in (HERE.parents[2], HERE.parents[2] / "lib", HERE.parents[2] / several):  # prefix, build, Debian
         yield from map(str, sorted(folder.glob("libebpo.so.?")))
     try:
@@ -42,7 +42,7 @@ def candidates():
 
 
 def absent(function, library):
-    """Returns a replacement for a function that the library lacks because it was built without extras."""
+    """Return a replacement for a function that the library lacks because it was built without extras."""
     def refuse(*_):
         raise UnsupportedError(f"{library} has no {function}: it was built with -Dextras=disabled; build it with "
                           "-Dextras=enabled", "EBPO_E_UNSUPPORTED", "", "", None)
@@ -50,7 +50,7 @@ def absent(function, library):
 
 
 def load():
-    """Loads the library and declares the arguments and results of its functions."""
+    """Load the library and declares the arguments and results of its functions."""
     name = next(candidates(), None)
     if name is None:
         raise ImportError("libebpo is not found; install it, or name it in EBPO_LIBRARY")
@@ -75,11 +75,11 @@ def load():
 
 
 lib = load()
-BEGUN: dict = {}  # bytes of structs as their INIT macros begin them
+BEGUN: dict = {}  # for each struct its initial bytes, from its INIT macro
 
 
 def fill(struct, values):
-    """Members in turn from the list that an INIT macro gives."""
+    """Set members of a struct in order, from the values of an INIT macro."""
     for (name, kind), value in zip(struct._fields_, values):
         if isinstance(value, list):
             member = getattr(struct, name)
@@ -100,7 +100,7 @@ def set_items(array, values):
 
 
 def made(kind, /, **members):
-    """A struct as its INIT macro begins it, and then with these members."""
+    """Return a struct with the values of its INIT macro, then with the given members."""
     if kind not in BEGUN:
         struct = kind()
         fill(struct, c.INIT.get(kind, []))
@@ -112,7 +112,7 @@ def made(kind, /, **members):
 
 
 def of_members(kind, members, /, **own):
-    """A struct with members that a user names. TypeError: it has no such member, or one that is not a user's."""
+    """Return a struct with the given members. Raises TypeError for members that are unknown or not set by users."""
     known = {name for name, member in kind._fields_ if not is_own(member)} - {"struct_size", "reserved", *own}
     for name in members:
         if name not in known:
@@ -125,7 +125,7 @@ def text(raw):
 
 
 def error_of(error):
-    """Returns the Python exception of an ebpo_error."""
+    """Return the Python exception of an ebpo_error."""
     kind = BY_STATUS.get(error.status, Error)
     name = text(lib.ebpo_status_name(error.status))
     return kind(text(error.message), name, text(error.file), text(error.object),
@@ -133,14 +133,14 @@ def error_of(error):
 
 
 def call(name, *arguments):
-    """Calls a function that can fail, and raises its error."""
+    """Call a function that can fail, and raises its error."""
     error = made(c.ebpo_error)
     if getattr(lib, name)(*arguments, ctypes.byref(error)) != 0:
         raise error_of(error)
 
 
 class Owned:
-    """Memory that something else owns, as numpy takes it: the array keeps its owner alive."""
+    """An array interface for memory of another object. The numpy array keeps `owner` alive."""
 
     def __init__(self, owner, address, shape, dtype, writable=False):
         self.owner = owner
@@ -149,32 +149,32 @@ class Owned:
 
 
 def array(owner, address, shape, dtype):
-    """Returns a read-only array over memory of `owner`; an empty array for NULL."""
+    """Return a read-only array over memory of `owner`; None, or an empty array of an empty shape, for NULL."""
     if not address or 0 in shape:
         return np.zeros(shape, dtype) if 0 in shape else None
     return np.asarray(Owned(owner, address, shape, dtype))
 
 
 def copied(address, shape, dtype):
-    """Returns a copy of memory that will be freed."""
+    """Return a copy of memory that will be freed."""
     dtype = np.dtype(dtype)
     if not address or 0 in shape:
         return np.zeros(shape, dtype)
-    if dtype.names:  # __array_interface__ alone does not tell members
+    if dtype.names:  # __array_interface__ alone does not describe members
         return np.array(Owned(None, address, (*shape, dtype.itemsize), np.uint8)).view(dtype).reshape(shape)
     return np.array(Owned(None, address, shape, dtype))
 
 
 class Handle:
-    """An object of the library, freed with the last Python object that uses it.
+    """An object of the library. It is freed with the last Python object that refers to it.
 
-    `keep` is what it is made of, which is freed after it.
+    `keep` are the objects that it needs; they are freed after it.
     """
 
     def __init__(self, pointer, free, *keep):
         self.pointer, self.keep = pointer, keep
         self._end = weakref.finalize(self, Handle.end, getattr(lib, free), pointer, keep)
-        self._end.atexit = False  # the process ends anyway; threads may still be asking
+        self._end.atexit = False  # the process ends, and threads may still run queries
 
     @staticmethod
     def end(free, pointer, keep):
@@ -182,12 +182,12 @@ class Handle:
         del keep
 
     def end_now(self):
-        """Frees the object before the last reference is dropped. The object must not be used afterwards."""
+        """Free the object before the last reference is dropped. The object must not be used afterwards."""
         self._end()
 
     @classmethod
     def made(cls, function, *arguments, free, keep=()):
-        """Of functions whose last arguments are the object that is made, and the error."""
+        """Call a function whose last arguments are the address of the new object and the error; return a Handle."""
         pointer = ctypes.c_void_p()
         call(function, *arguments, ctypes.byref(pointer))
         return cls(pointer, free, *keep)
@@ -198,7 +198,7 @@ class Handle:
 
 
 class Struct:
-    """A struct whose arrays the library frees, before what it is made of (`keep`)."""
+    """A struct with arrays that the library frees. They are freed before the objects that they need (`keep`)."""
 
     def __init__(self, kind, free, *keep, **members):
         self.c = made(kind, **members)
@@ -211,9 +211,10 @@ class Struct:
 
 
 class Callback:
-    """A Python function for the library, which calls it in the querying thread.
+    """A Python function that the library calls in the querying thread.
 
-    An exception of the function stops the library call and is raised from it. ctypes alone would continue.
+    An exception of the function stops the library call, and is raised after the call. ctypes alone would
+    ignore the exception.
     """
 
     def __init__(self, kind, function):
@@ -236,7 +237,7 @@ class Callback:
 
 
 class Reporter(Callback):
-    """A progress callback of Python, as a struct of the library; or None."""
+    """A progress callback of Python, or None, as a struct of the library."""
 
     def __init__(self, progress):
         super().__init__(c.ebpo_progress_fn, lambda _user, stage, done, total:
@@ -245,13 +246,13 @@ class Reporter(Callback):
 
 
 def size_in_bytes(size):
-    """Bytes of 512000000, "512M", "4G", "64KiB" or None: 0."""
+    """Return a size in bytes from 512000000, "512M", "4G" or "64KiB"; 0 for None."""
     if size is None:
         return 0
     if isinstance(size, str):
         found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([kKMGT]?)(i?)B?\s*", size)
         if not found:
-            raise ValueError(f"{size!r} is no size; 500000000, '500M' and '2GiB' are")
+            raise ValueError(f"{size!r} is not a size; examples: 500000000, '500M', '2GiB'")
         power = " KMGT".index(found[2].upper() or " ")
         size = int(fractions.Fraction(found[1]) * (1024 if found[3] else 1000) ** power)
     return within(index_of(size, "a size"), 0, 2**64 - 1, "a size")

@@ -166,7 +166,8 @@ class Model:
         self._lock = threading.RLock()
         self._back = threading.Condition(self._lock)  # signals returned contexts and the end of _bring_in_all
         self._bringing = False
-        self._lent = [0, 0]  # contexts in use: [0] of calls that may run the caller's functions, [1] of queries, which never do
+        # Contexts in use: [0] by calls that may run functions of the caller, [1] by queries, which do not.
+        self._lent = [0, 0]
         self._made: Handle | None = None
         self._contexts: collections.deque[Handle] = collections.deque()
         self._samplers: dict[str, Handle] = {}
@@ -733,7 +734,7 @@ class Model:
 
     @property
     def attributes(self) -> Attributes:
-        """Returns the attributes of vertices and faces of the source."""
+        """Return the attributes of vertices and faces of the source."""
         return Attributes(self.file, self._threads)
 
     def level(self, level: int, *, cell_faces: bool = True, progress: Progress | None = None) -> Level:
@@ -764,7 +765,7 @@ class Model:
 
     def subtree(self, octcode: int = 1, *, levels: int | None = None, memory: int | str | None = None,
                 or_leaf_above: bool = True) -> Subtree:
-        """Return the subtree of a gray node or leaf; octcode 1 is the whole tree. Reads about the bytes of the subtree.
+        """Return the subtree of a gray node or leaf; octcode 1 is the whole tree.
 
         levels: include only this number of levels below the node, and no faces.
         memory: budget in bytes. The message of LimitError states a sufficient budget.
@@ -780,16 +781,16 @@ class Model:
     # ---- other packages ----
 
     def as_trimesh(self) -> Any:
-        """Returns an object with the queries of a trimesh.Trimesh: `contains`, `ray`, `nearest`, `bounds`."""
+        """Return an object with the queries of a trimesh.Trimesh: `contains`, `ray`, `nearest`, `bounds`."""
         from .adapters import TrimeshLike
         return TrimeshLike(self)
 
     def to_trimesh(self, **options: Any) -> Any:
-        """Returns the mesh as an unprocessed trimesh.Trimesh, in the source's order if the file has maps."""
+        """Return the mesh as an unprocessed trimesh.Trimesh, in the source's order if the file has maps."""
         from .adapters import to_trimesh
         return to_trimesh(self, **options)
 
     def to_pyvista(self, level: int | None = None) -> Any:
-        """Returns the mesh, or the envelopes of a level with their nodes' data, as a pyvista.PolyData."""
+        """Return the mesh, or the envelopes of a level with their nodes' data, as a pyvista.PolyData."""
         from .adapters import to_pyvista
         return to_pyvista(self, level)

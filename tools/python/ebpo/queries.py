@@ -35,7 +35,7 @@ def holds_codes(values: Any) -> bool:
 
 
 def cores() -> int:
-    """Returns the number of processors that this process may use."""
+    """Return the number of processors that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:
@@ -94,7 +94,7 @@ class StageProgress:
 
 
 def block_of(count: int, threads: int) -> int:
-    """Returns the block size: a few blocks for each thread, none larger than BLOCK."""
+    """Return the block size: a few blocks for each thread, none larger than BLOCK."""
     return max(64, min(BLOCK, -(-count // (8 * threads))))
 
 
@@ -152,7 +152,7 @@ def share(count: int, threads: int | None, worker: Callable[[], Any], progress: 
 
 
 def bar(make: Callable[..., Any], **options: Any) -> Callable[[str, int, int], bool]:
-    """Returns a progress callback for bars like those of tqdm: `progress=ebpo.bar(tqdm.tqdm)`.
+    """Return a progress callback for bars like those of tqdm: `progress=ebpo.bar(tqdm.tqdm)`.
 
     make(total=, desc=, **options) gives a bar with update(n) and close(); each stage has its own.
 
