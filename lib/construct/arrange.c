@@ -1,12 +1,12 @@
 /* Sorts a mesh's vertices and faces along a Morton curve. Afterwards the vertices of every cell are
  * one run, and neighbours in space are neighbours in memory.
  *
- * The curve's box is chosen first: a cell face has to be exact in doubles at every level in use.
- * Vertices are sorted by the octcode of their cell and, within a cell, by position, so that equal
- * positions are neighbours; vertices without faces go behind the others. Faces follow their least
- * vertex. Sorting uses the mesh's workspace, so that meshes larger than memory are sorted too. The
- * order of the source is kept in the mesh's arrangement. The result depends on the mesh alone, not
- * on the number of threads. */
+ * The curve's box is chosen first: every cell face has to be exact in doubles, at every level in
+ * use. Vertices are sorted by the octcode of their cell and, within a cell, by position, so that
+ * equal positions are neighbours; vertices without faces go behind the others. Faces are sorted by
+ * their least vertex. Sorting uses the mesh's workspace, so that meshes larger than memory are
+ * sorted too. The order of the source is kept in the mesh's arrangement. The result depends on the
+ * mesh alone, not on the number of threads. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -37,7 +37,7 @@ typedef struct arranging {
     float *xyz32;
     double *xyz64;
     uint32_t *rank, *corners, *faces;
-    /* the window of `rank`: vertices with these source numbers */
+    /* the window of `rank`: vertices with these old numbers */
     uint64_t rank_first, rank_count;
 } arranging;
 
@@ -97,8 +97,8 @@ static ebpo_status find_bounds(void *context, uint64_t begin, uint64_t end, unsi
     return EBPO_OK;
 }
 
-/* Chooses the deepest level at which exact cell faces hardly enlarge the box; they enlarge it
- * around a small model far from the origin. */
+/* Chooses the deepest level at which the condition of exact cell faces hardly enlarges the box.
+ * Around a small model far from the origin, this condition can enlarge the box much. */
 static bool choose_box(ebpo_box *out, const double min[3], const double max[3], int level)
 {
     static const double larger = 1 + 0x1p-16;
@@ -124,9 +124,8 @@ static ebpo_status measure_all(arranging *a, int level, ebpo_error *error)
     if (!a->referenced || !a->bounds)
         return ebpo_workspace_fail(mesh->workspace,
                                    mesh->vertex_count / 8 + blocks * sizeof *a->bounds, error);
-    ebpo_status status =
-        ebpo_parallel_for(a->threads, mesh->workspace, mesh->face_count, GRAIN, mark_vertices, a,
-                          a->progress, "looking at faces", error);
+    ebpo_status status = ebpo_parallel_for(a->threads, mesh->workspace, mesh->face_count, GRAIN,
+                                           mark_vertices, a, a->progress, "checking faces", error);
     if (status == EBPO_OK)
         status = ebpo_parallel_for(a->threads, mesh->workspace, mesh->vertex_count, GRAIN,
                                    find_bounds, a, a->progress, "measuring the box", error);
@@ -163,8 +162,8 @@ typedef struct float_record {
     float p[3];
 } float_record;
 
-/* Returns the number of the cell that holds a coordinate; division may round to the wrong side of a
- * cell face, comparing with the exact cell face does not. */
+/* Returns the index of the cell that contains a coordinate. The division may round to the wrong
+ * side of a cell face; the comparison with the exact cell face corrects this. */
 static uint32_t cell_slot(const ebpo_box *box, int axis, int level, double x)
 {
     double cells = (double)(1u << level), at = (x - box->origin[axis]) / (box->size[axis] / cells);
@@ -176,8 +175,8 @@ static uint32_t cell_slot(const ebpo_box *box, int axis, int level, double x)
     return k;
 }
 
-/* Returns an octcode as if of level 20, so that sorting knows the position of its leading bits.
- * Vertices without faces go behind all others. */
+/* Returns an octcode, shifted as if it were of level 20, so that its leading bits are always at the
+ * same position. Vertices without faces go behind all others. */
 static uint64_t key_of(const arranging *a, uint64_t v)
 {
     const ebpo_box *box = &a->to->box;
@@ -311,16 +310,16 @@ static ebpo_status translate_corners(void *context, uint64_t begin, uint64_t end
     return EBPO_OK;
 }
 
-/* Translates faces by windows of vertices that fit into memory, all faces for each: memory is
- * accessed in order, except in the window. */
+/* Translates the faces in passes. Each pass handles a window of vertices that fits into memory, and
+ * reads all faces. So memory is accessed in order, except in the window. */
 static ebpo_status translate_faces(arranging *a, uint64_t *passes, ebpo_error *error)
 {
     ebpo_mesh *mesh = a->mesh;
-    ebpo_workspace_stats metrics = EBPO_WORKSPACE_STATS_INIT;
-    metrics.memory = UINT64_MAX;
+    ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
+    stats.memory = UINT64_MAX;
     if (mesh->workspace)
-        ebpo_workspace_get_stats(mesh->workspace, &metrics);
-    uint64_t window = metrics.memory / 8 / sizeof *a->rank;
+        ebpo_workspace_get_stats(mesh->workspace, &stats);
+    uint64_t window = stats.memory / 8 / sizeof *a->rank;
     a->rank_count = mesh->vertex_count < window ? mesh->vertex_count : window ? window : 1;
     a->rank = ebpo_alloc(a->rank_count, sizeof *a->rank);
     a->corners = ebpo_array_alloc(mesh->workspace, mesh->face_count, 3 * sizeof *a->corners);
@@ -419,8 +418,8 @@ static ebpo_status sort_faces(arranging *a, ebpo_error *error)
 
 /* --- the whole mesh --- */
 
-/* Composes the maps of a mesh that was arranged already: the source's numbers of vertices come from
- * its map; those of faces were the sort keys. */
+/* Composes the maps of a mesh that was arranged already: the source numbers of vertices come from
+ * its map. The source numbers of faces were part of the sort keys. */
 static void compose_maps(const struct ebpo_arrangement *before, ebpo_workspace *workspace,
                          uint32_t *map, uint64_t count)
 {

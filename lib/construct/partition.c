@@ -1,14 +1,12 @@
 /* Assigns faces to cells. First the top of the tree is cut until the pieces below it are small
  * enough to be processed in parallel; then each piece becomes a subtree, depth first.
  *
- * A node depends on its cell and its faces alone, and the end of the top on the model alone, so the
- * result is independent of pieces, threads and machine. Sources: EBP 2017, 3.3 (assignment of faces
- * to leaves); BP 2008, 3.3.1 (coalescing nodes with few faces).
+ * A node depends on its cell and its faces alone, and the depth of the top depends on the model
+ * alone, so the result is independent of pieces, threads and machine. Sources: EBP 2017, 3.3
+ * (assignment of faces to leaves); BP 2008, 3.3.1 (coalescing nodes with few faces).
  *
- * The cut of the top also computes the input of a piece that depends on others: which of its faces
- * no earlier piece lists ("fresh"), and the winding numbers at its corners. A mesh with huge faces
- * and a deep maximum level would list every face in millions of cells: leaves and entries are
- * limited by the number of faces. */
+ * While the top is cut, two inputs of each piece are computed that depend on other pieces: which of
+ * its faces no earlier piece lists ("fresh" faces), and the winding numbers at its corners. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -28,11 +26,13 @@
 
 enum { RELEASE_FACES = 1 << 13 };
 
-/* A mesh with huge faces and a deep maximum level would list every face in millions of cells. */
+/* Limits of leaves and listed faces: a mesh with huge faces and a deep maximum level would list
+ * every face in millions of cells. */
 static const uint64_t leaves_per_face = 64, leaves_always = 1 << 22, entries_per_face = 512,
                       entries_always = 1 << 26;
 
-/* Faces found below a node; a round number saves clearing. */
+/* Set of faces found below a node. A slot is used if its round is the current round, so the set is
+ * emptied without clearing it. */
 typedef struct face_set {
     struct {
         uint32_t face, round;
@@ -77,8 +77,8 @@ static ebpo_status no_memory_for_cells(ebpo_error *error)
     return ebpo_fail(error, EBPO_E_MEMORY, "out of memory while assigning faces to cells");
 }
 
-/* Notes faces that cross the cell's faces (or touch an upper one): they have a vertex outside the
- * cell's run of vertices. */
+/* Lists the faces that cross the cell's faces (or touch an upper cell face): such a face has a
+ * vertex outside the cell's run of vertices. */
 static bool note_crossing(const ebpo_builder *b, ebpo_branch *s, ebpo_cell cell,
                           const uint32_t *list, uint64_t count, ebpo_build_detail *detail)
 {
@@ -171,7 +171,7 @@ static bool set_has(const face_set *set, uint32_t face)
     return set->slots[set_slot(set, face)].round == set->round;
 }
 
-/* Prepares for one face more than a leaf may list. */
+/* Empties the set, which has space for one face more than a leaf may list. */
 static bool set_start(face_set *set, uint64_t most)
 {
     if (!set->slots) {
@@ -184,9 +184,9 @@ static bool set_start(face_set *set, uint64_t most)
     return set->slots != NULL;
 }
 
-/* Collapses a gray node with few faces. A face at the distance of a rounding error may be listed
- * here but not in smaller cells. When the leaves below a gray node list no more faces than one leaf
- * may, the node becomes a leaf of these faces; when they list none, it is empty. */
+/* Collapses a gray node with few faces. A face that misses the cell by a rounding error may be
+ * listed here but not in smaller cells. When the leaves below a gray node list no more faces than
+ * one leaf may, the node becomes a leaf of these faces; when they list none, it is empty. */
 static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, uint64_t at,
                                    uint64_t count)
 {
@@ -202,7 +202,7 @@ static ebpo_status collapse_if_few(grower *g, uint32_t index, ebpo_cell cell, ui
         if (g->set.slots[slot].round == g->set.round)
             continue;
         if (g->set.count++ == most)
-            return EBPO_OK; /* it stays gray */
+            return EBPO_OK; /* the node stays gray */
         g->set.slots[slot].face = s->entries[i];
         g->set.slots[slot].round = g->set.round;
     }
@@ -297,21 +297,22 @@ static ebpo_status no_memory_for_pieces(const ebpo_builder *b, ebpo_error *error
     return ebpo_workspace_fail_while(b->workspace, "while cutting the tree into pieces", error);
 }
 
-/* A node of the top: its faces are classified in blocks, which are then distributed to the
- * children's lists in parallel. */
+/* The task of splitting a node of the top: its faces are classified in blocks, and the blocks are
+ * then distributed to the children's lists in parallel. */
 typedef struct top_split {
     const ebpo_builder *b;
     ebpo_cell cell;
     const uint32_t *list;
     uint64_t count;
     uint64_t first_vertex, end_vertex; /* in the cell */
-    uint16_t *mask;       /* bits 0 to 7: octants; bit 8: the face crosses the cell's faces */
-    uint64_t (*begin)[9]; /* count of each bit for each block; then its destination */
+    uint16_t *mask; /* bits 0 to 7: octants; bit 8: the face crosses the cell's faces */
+    /* for each block and bit: the number of faces, later the position in the list */
+    uint64_t (*begin)[9];
     uint32_t *to[9];
 } top_split;
 
-/* Returns the octants, exact where needed: each face that a piece lists must be in one of its
- * leaves. */
+/* Returns a mask of the octants that the face touches. An exact test decides where several octants
+ * are possible, as each face that a piece lists must be in one of its leaves. */
 static unsigned octants_exactly(const ebpo_builder *b, ebpo_cell cell, const ebpo_triangle *face)
 {
     unsigned mask = ebpo_octants_visited(&b->box, cell, face);
@@ -354,8 +355,8 @@ static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsig
     return EBPO_OK;
 }
 
-static ebpo_status device_out(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                              ebpo_error *error)
+static ebpo_status distribute_faces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                    ebpo_error *error)
 {
     top_split *t = context;
     uint64_t *next = t->begin[begin / SPLIT_GRAIN];
@@ -375,7 +376,7 @@ static uint64_t faces_done(const ebpo_builder *b)
     return last ? last->first + last->fresh_count : 0;
 }
 
-/* Turns sizes of blocks into positions of blocks. */
+/* Replaces the numbers of faces of blocks by positions of blocks, and sets `sizes` to the sums. */
 static void add_up(top_split *t, uint64_t sizes[9])
 {
     memset(sizes, 0, 9 * sizeof *sizes);
@@ -387,7 +388,7 @@ static void add_up(top_split *t, uint64_t sizes[9])
         }
 }
 
-/* Makes space for lists. Faces that cross the cell's faces are appended to the top's. */
+/* Allocates the children's lists, and extends the top's list of crossing faces. */
 static ebpo_status reserve_space(ebpo_builder *b, top_split *t, uint32_t *lists[8],
                                  uint64_t sizes[9], ebpo_error *error)
 {
@@ -398,7 +399,7 @@ static ebpo_status reserve_space(ebpo_builder *b, top_split *t, uint32_t *lists[
     if (!ebpo_array_grow_late(b->workspace, &s->crossing, &s->cross_capacity,
                               s->cross_count + sizes[8], sizeof *s->crossing))
         return no_memory_for_pieces(b, error);
-    /* without any, there is no array yet */
+    /* NULL while no face crosses */
     t->to[8] = s->crossing ? s->crossing + s->cross_count : NULL;
     s->cross_count += sizes[8];
     return EBPO_OK;
@@ -407,7 +408,7 @@ static ebpo_status reserve_space(ebpo_builder *b, top_split *t, uint32_t *lists[
 static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *list, uint64_t count,
                              uint32_t *lists[8], uint64_t sizes[9], ebpo_error *error)
 {
-    /* constant for the node; called to allow cancellation */
+    /* the progress is constant during this node; it is reported only to allow cancellation */
     uint64_t done = faces_done(b);
     ebpo_pass pass = { &b->options->progress, done, done, b->face_count };
     ebpo_progress progress = ebpo_pass_progress(&pass);
@@ -427,8 +428,8 @@ static ebpo_status split_top(ebpo_builder *b, ebpo_cell cell, const uint32_t *li
         status = reserve_space(b, &t, lists, sizes, error);
     }
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, b->workspace, count, SPLIT_GRAIN, device_out, &t,
-                                   &progress, "cutting into pieces", error);
+        status = ebpo_parallel_for(b->threads, b->workspace, count, SPLIT_GRAIN, distribute_faces,
+                                   &t, &progress, "cutting into pieces", error);
     ebpo_array_free(b->workspace, t.mask);
     free(t.begin);
     return status;
@@ -454,7 +455,7 @@ static bool mark_fresh(ebpo_builder *b, ebpo_branch *s, uint8_t *listed)
 
 typedef struct cutting {
     ebpo_builder *b;
-    uint64_t piece;
+    uint64_t piece;   /* a node with at most this many faces becomes a piece */
     uint8_t *listed;  /* bit f: a piece lists face f */
     uint64_t entries; /* entries of the pieces' lists */
     ebpo_error *error;
@@ -529,7 +530,8 @@ static ebpo_status cut_top(ebpo_builder *b, ebpo_error *error)
                                                            : PIECE_FACES,
                   ebpo_array_zero(b->workspace, b->face_count / 8 + 1, 1), 0, error };
     if (c.piece <
-        2 * (uint64_t)b->options->leaf_faces) /* so that no node of the top can become a leaf */
+        /* so that collapse_if_few cannot make a leaf of a node of the top */
+        2 * (uint64_t)b->options->leaf_faces)
         c.piece = 2 * (uint64_t)b->options->leaf_faces;
     ebpo_status status = EBPO_OK;
     if (!all || !c.listed ||
@@ -566,28 +568,29 @@ static ebpo_status corners_of_pieces(void *context, uint64_t begin, uint64_t end
     return EBPO_OK;
 }
 
-/* Limits the number of threads to those that fit into half of the budget. A piece is processed in
- * its thread's memory, and cells of the deepest level are not cut, however many faces they list. */
+/* Limits the number of threads so that half of the memory budget is enough for the largest piece in
+ * each thread. A piece is processed in memory, and a cell of the deepest level is not cut, however
+ * many faces it lists. */
 static ebpo_status fit_largest_piece(ebpo_builder *b, ebpo_error *error)
 {
-    /* points of a hull; measured: a million faces at one vertex */
+    /* memory for the points of a hull, measured with a million faces at one vertex */
     enum { BYTES_A_FACE = 160 };
-    ebpo_workspace_stats metrics = EBPO_WORKSPACE_STATS_INIT;
-    metrics.memory = 0;
+    ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
+    stats.memory = 0;
     uint64_t most = 1;
     if (b->workspace)
-        ebpo_workspace_get_stats(b->workspace, &metrics);
-    if (metrics.memory < EBPO_WORKSPACE_MIN)
-        return EBPO_OK; /* none, or one of a test */
+        ebpo_workspace_get_stats(b->workspace, &stats);
+    if (stats.memory < EBPO_WORKSPACE_MIN)
+        return EBPO_OK; /* no budget, or a small budget of a test */
     for (uint64_t i = 0; i < b->sub_count; i++)
         most = b->sub[i].list_count > most ? b->sub[i].list_count : most;
-    uint64_t fit = metrics.memory / 2 / BYTES_A_FACE / most;
+    uint64_t fit = stats.memory / 2 / BYTES_A_FACE / most;
     if (fit < 1)
         return ebpo_fail(
             error, EBPO_E_LIMIT,
             "a cell of level %d, the deepest allowed level, lists %llu faces, for which half of "
             "the memory budget of %llu bytes is too small; allow more levels or more memory",
-            b->max_level, (unsigned long long)most, (unsigned long long)metrics.memory);
+            b->max_level, (unsigned long long)most, (unsigned long long)stats.memory);
     b->threads = b->threads < fit ? b->threads : (unsigned)fit;
     return EBPO_OK;
 }

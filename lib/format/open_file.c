@@ -63,7 +63,7 @@ static ebpo_status open_array(ebpo_file *file, ebpo_head *head, ebpo_array_id id
     bool gates = id == EBPO_A_FACES && file->info.gates;
     *a = (ebpo_array_in){ .id = id, .level = level };
     ebpo_schema_path(id, level, a->path);
-    if (rows == 0 || (spec->if_needed && ebpo_head_look(head, a->path) == EBPO_HEAD_ABSENT))
+    if (rows == 0 || (spec->if_needed && ebpo_head_find_kind(head, a->path) == EBPO_HEAD_ABSENT))
         return EBPO_OK;
     /* offsets of several chunks are in the index or in a list */
     uint64_t most = ebpo_input_is_far(&file->in) || file->has_places ? 1 : UINT64_MAX;
@@ -565,7 +565,7 @@ static bool copy_lacks(int copy, const char *shown, const char *object)
         ebpo_input_open(&input, &source, shown, NULL) != EBPO_OK)
         return false;
     ebpo_status status = ebpo_head_open(&head, &input, NULL);
-    bool absent = status == EBPO_OK && ebpo_head_look(&head, object) == EBPO_HEAD_ABSENT;
+    bool absent = status == EBPO_OK && ebpo_head_find_kind(&head, object) == EBPO_HEAD_ABSENT;
     (void)!ebpo_head_close(&head, status, NULL);
     ebpo_input_close(&input);
     return absent;

@@ -203,7 +203,7 @@ static ebpo_status open_one(ebpo_file *file, ebpo_head *head, uint64_t n, ebpo_e
     if (what)
         return attribute_head_wrong(file, values->path, what, error);
     ebpo_attribute_path(ebpo_items_number(n), path);
-    if (status == EBPO_OK && to->different && ebpo_head_look(head, path) != EBPO_HEAD_ABSENT)
+    if (status == EBPO_OK && to->different && ebpo_head_find_kind(head, path) != EBPO_HEAD_ABSENT)
         status = open_items(file, head, n, error);
     what = status == EBPO_OK ? check_textures(to, items) : NULL;
     return what ? attribute_head_wrong(file, values->path, what, error) : status;
@@ -214,7 +214,7 @@ static ebpo_status open_header(ebpo_file *file, ebpo_head *head, ebpo_error *err
     const ebpo_array_in *header = &file->attributes.array[0];
     char path[EBPO_PATH_BYTES];
     ebpo_attribute_path(0, path);
-    if (ebpo_head_look(head, path) == EBPO_HEAD_ABSENT)
+    if (ebpo_head_find_kind(head, path) == EBPO_HEAD_ABSENT)
         return EBPO_OK;
     ebpo_status status = open_array(file, head, 0, error);
     if (status == EBPO_OK &&

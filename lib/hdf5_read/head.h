@@ -57,7 +57,7 @@ typedef enum ebpo_head_kind {
     EBPO_HEAD_ARRAY,
     EBPO_HEAD_OTHER
 } ebpo_head_kind;
-ebpo_head_kind ebpo_head_look(ebpo_head *head, const char *path);
+ebpo_head_kind ebpo_head_find_kind(ebpo_head *head, const char *path);
 
 EBPO_MUST_USE ebpo_status ebpo_head_open_group(ebpo_head *head, const char *path,
                                                ebpo_head_object *object, ebpo_error *error);

@@ -176,7 +176,7 @@ ebpo_head_kind ebpo_head_find(ebpo_head_state *s, const char *path, ebpo_head_ob
     return h ? h->kind : EBPO_HEAD_OTHER;
 }
 
-ebpo_head_kind ebpo_head_look(ebpo_head *head, const char *path)
+ebpo_head_kind ebpo_head_find_kind(ebpo_head *head, const char *path)
 {
     ebpo_head_object object;
     return ebpo_head_find(head->state, path, &object);

@@ -254,7 +254,7 @@ static ebpo_status inspect_pruned(ebpo_context *c, ebpo_nearest *n, ebpo_error *
     return status;
 }
 
-static void look_ahead(ebpo_context *c, const double p[3], double reach)
+static void prefetch_around(ebpo_context *c, const double p[3], double reach)
 {
     if (ebpo_model_prefetches(c->model))
         ebpo_context_prefetch(c, p, reach);
@@ -285,11 +285,11 @@ static ebpo_status exact_distance(ebpo_context *c, const double p[3],
         double hi = fmin(n.upper, ebpo_cell_far(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, p)),
                lo = fmin(fmin(n.passed_over, n.found ? n.bounds.lo : n.upper), hi);
         *out = (ebpo_distance_result){ NAN, lo, hi, { NAN, NAN, NAN }, { 0, 0, 0 }, EBPO_NO_FACE };
-        look_ahead(c, p, hi);
+        prefetch_around(c, p, hi);
         return EBPO_OK;
     }
     ebpo_nearest_end(&n, o->max_distance, out);
-    look_ahead(c, p, out->face == EBPO_NO_FACE ? o->max_distance : out->distance);
+    prefetch_around(c, p, out->face == EBPO_NO_FACE ? o->max_distance : out->distance);
     if (out->face == EBPO_NO_FACE)
         return EBPO_OK;
     c->warm = true;

@@ -28,14 +28,14 @@ typedef struct wanted {
 } wanted;
 
 /* Search for the nearest subtrees within `limit` of p. */
-typedef struct looking {
+typedef struct subtree_search {
     ebpo_ranking ranking;
     double limit;
     unsigned count;
     wanted list[EBPO_CACHE_AHEAD]; /* the nearest first */
-} looking;
+} subtree_search;
 
-static void add_subtree(looking *l, uint64_t key, double lower)
+static void add_subtree(subtree_search *l, uint64_t key, double lower)
 {
     unsigned at = l->count < EBPO_CACHE_AHEAD ? l->count++ : EBPO_CACHE_AHEAD - 1;
     for (; at > 0 && l->list[at - 1].lower > lower; at--)
@@ -45,7 +45,7 @@ static void add_subtree(looking *l, uint64_t key, double lower)
         l->limit = fmin(l->limit, l->list[EBPO_CACHE_AHEAD - 1].lower);
 }
 
-static void look_around(looking *l, ebpo_node node, double lower)
+static void search_below(subtree_search *l, ebpo_node node, double lower)
 {
     if (lower > l->limit || ebpo_node_is_uniform(&node) || node.pruned)
         return;
@@ -56,14 +56,14 @@ static void look_around(looking *l, ebpo_node node, double lower)
     ebpo_ranked child[8];
     int count = ebpo_rank_children(&l->ranking, &node, lower, l->limit, child);
     for (int i = 0; i < count; i++)
-        look_around(l, child[i].node, child[i].lower);
+        search_below(l, child[i].node, child[i].lower);
 }
 
 unsigned ebpo_subtrees_near(const ebpo_model *m, const double p[3], double limit,
                             uint64_t keys[EBPO_CACHE_AHEAD])
 {
-    looking l = { .ranking = ebpo_ranking_of(m, p, NULL), .limit = limit };
-    look_around(&l, ebpo_model_root(m), ebpo_rank_root(&l.ranking));
+    subtree_search l = { .ranking = ebpo_ranking_of(m, p, NULL), .limit = limit };
+    search_below(&l, ebpo_model_root(m), ebpo_rank_root(&l.ranking));
     for (unsigned i = 0; i < l.count; i++)
         keys[i] = l.list[i].key;
     return l.count;

@@ -219,8 +219,8 @@ typedef struct nearest_place {
 
 /* Searches below these children of a node for a child nearer than `best`. Bounding cylinders are
  * tested only where boxes do not decide. */
-static void look_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes, const double p[3],
-                       double parent, nearest_place *best)
+static void search_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes, const double p[3],
+                         double parent, nearest_place *best)
 {
     kept_node *n = node_at(k, number);
     double lower2[8];
@@ -242,7 +242,7 @@ static void look_below(const ebpo_skeleton *k, uint32_t number, unsigned lanes, 
         lanes &= ~(1u << lane);
         uint32_t child = child_of(n, lane);
         if (is_kept(child))
-            look_below(k, child & ~IS_KEPT, 255, p, lower2[lane], best);
+            search_below(k, child & ~IS_KEPT, 255, p, lower2[lane], best);
         else
             *best = (nearest_place){ lower2[lane], &n->bound.child[lane] };
     }
@@ -272,7 +272,7 @@ static double lower_bound(const ebpo_skeleton *k, unsigned lanes, const double p
 {
     nearest_place best = { limit2, NULL };
     if (lanes)
-        look_below(k, 0, lanes, p, 0, &best);
+        search_below(k, 0, lanes, p, 0, &best);
     return best.place ? sqrt(best.lower2) * certainly / k->scale : INFINITY;
 }
 
@@ -295,7 +295,7 @@ typedef struct far_search {
     double best;
 } far_search;
 
-static void look_from_afar(far_search *g, uint32_t number, unsigned lanes)
+static void search_below_far(far_search *g, uint32_t number, unsigned lanes)
 {
     const kept_node *n = node_at(g->skeleton, number);
     double lower[8];
@@ -308,7 +308,7 @@ static void look_from_afar(far_search *g, uint32_t number, unsigned lanes)
         if (fmax(lower[lane], slab) >= g->best)
             continue;
         if (is_kept(child))
-            look_from_afar(g, child & ~IS_KEPT, 255);
+            search_below_far(g, child & ~IS_KEPT, 255);
         else
             g->best = fmax(lower[lane], slab);
     }
@@ -323,8 +323,8 @@ ebpo_skeleton_bounds ebpo_skeleton_far_bounds(const ebpo_skeleton *k, const ebpo
         reach = fmax(reach, fabs((double)top->origin[i]) + 255 * (double)top->step[i]);
     far_search own = { k, far, ebpo_far_frame_of(far, k->centre, k->scale, reach), beyond },
                outer = own;
-    look_from_afar(&own, 0, k->own);
-    look_from_afar(&outer, 0, k->outer);
+    search_below_far(&own, 0, k->own);
+    search_below_far(&outer, 0, k->outer);
     return (ebpo_skeleton_bounds){ k->own ? own.best : INFINITY, k->outer ? outer.best : INFINITY };
 }
 
@@ -352,7 +352,7 @@ void ebpo_skeleton_grow(ebpo_skeleton *k, const ebpo_accel *s, const double poin
         return;
     for (int added = 0; added < GROWN_AT_ONCE; added++) {
         nearest_place best = { limit2, NULL };
-        look_below(k, 0, k->own, p, 0, &best);
+        search_below(k, 0, k->own, p, 0, &best);
         if (!best.place || *best.place & EBPO_IS_BLOCK || !has_place(k, take, user))
             return;
         keep_child(k, s, best.place);

@@ -473,7 +473,7 @@ static ebpo_status inspect_gap(const survey *s, ebpo_range gap, uint64_t *filled
     ebpo_status status = EBPO_OK;
     while (gap.size && status == EBPO_OK) {
         uint64_t size = gap.size < PIECE ? gap.size : PIECE;
-        if (!ebpo_progress_step(s->progress, "looking at unused bytes", gap.offset, in->source.size,
+        if (!ebpo_progress_step(s->progress, "checking unused bytes", gap.offset, in->source.size,
                                 error))
             return EBPO_E_CANCELLED;
         status = ebpo_input_read(in, gap.offset, size, piece, error);

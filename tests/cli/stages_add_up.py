@@ -7,7 +7,7 @@ import sys
 NAMES = ["leaf creation", "corner labels", "leaf planes", "tree paths", "leaf clipping",
          "storing and propagating", "total"]
 ROWS = ["reading", "repairing", "ordering", "checking", "cutting", "corners", "cells", "choosing",
-        "top", "envelopes", "joining", "numbering", "writing", "judging"]
+        "top", "envelopes", "joining", "numbering", "writing", "selecting"]
 
 
 def main():

@@ -162,7 +162,7 @@ static herr_t compare_object(hid_t file, const char *name, const H5O_info_t *inf
     ebpo_head_kind kind = info->type == H5O_TYPE_GROUP     ? EBPO_HEAD_GROUP
                           : info->type == H5O_TYPE_DATASET ? EBPO_HEAD_ARRAY
                                                            : EBPO_HEAD_OTHER;
-    ck_assert_msg(ebpo_head_look(head, path) == kind, "%s: %s", o.s->path, path);
+    ck_assert_msg(ebpo_head_find_kind(head, path) == kind, "%s: %s", o.s->path, path);
     ebpo_status status = kind == EBPO_HEAD_GROUP
                              ? ebpo_head_open_group(head, path, &o.object, NULL)
                              : ebpo_head_open_array(head, path, &o.object, NULL);
@@ -185,7 +185,7 @@ static void compare_file(subject *s)
     ck_assert_int_eq(open_bytes(s, s->data, s->size, NULL), EBPO_OK);
     ck_assert_int_eq(H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, compare_object, s, H5O_INFO_BASIC),
                      0);
-    ck_assert_int_eq(ebpo_head_look(&s->head, "/levels/99"), EBPO_HEAD_ABSENT);
+    ck_assert_int_eq(ebpo_head_find_kind(&s->head, "/levels/99"), EBPO_HEAD_ABSENT);
     ck_assert_int_eq(close_bytes(s, EBPO_OK), EBPO_OK);
     H5Fclose(file);
 }

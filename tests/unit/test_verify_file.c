@@ -240,7 +240,7 @@ END_TEST
 static bool stop_at_unused(void *user, const char *stage, uint64_t done, uint64_t total)
 {
     (void)user, (void)done, (void)total;
-    return strcmp(stage, "looking at unused bytes") != 0;
+    return strcmp(stage, "checking unused bytes") != 0;
 }
 
 /* Unused bytes as in sparse files, which take no space. */
@@ -258,7 +258,7 @@ START_TEST(test_verify_unused_bytes_and_cancel)
     ck_assert(report.spare_bytes >= UNUSED && report.spare_filled == 0 && !report.violations);
     options.progress.report = stop_at_unused;
     ck_assert(ebpo_verify(file, &options, &report, &error) == EBPO_E_CANCELLED);
-    ck_assert_str_eq(error.message, "stopped on request during looking at unused bytes");
+    ck_assert_str_eq(error.message, "stopped on request during checking unused bytes");
     ebpo_close(file);
 }
 END_TEST

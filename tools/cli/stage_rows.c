@@ -7,7 +7,7 @@ const stage_name stage_names[STAGE_ROWS] = {
     [STAGE_REPAIR] = { "repairing", 0, { "repairing", "trying repairs" } },
     [STAGE_ORDERING] = { "ordering",
                          THESIS_LEAVES,
-                         { "looking at faces", "measuring the box", "ordering vertices",
+                         { "checking faces", "measuring the box", "ordering vertices",
                            "ordering faces", "bounds" } },
     [STAGE_CHECKING] = { "checking",
                          0,
@@ -25,9 +25,9 @@ const stage_name stage_names[STAGE_ROWS] = {
     [STAGE_JOINING] = { "joining", THESIS_STORING, { "joining levels" } },
     [STAGE_NUMBERING] = { "numbering", THESIS_STORING, { "numbering vertices" } },
     [STAGE_WRITING] = { "writing", THESIS_STORING, { "writing" } },
-    [STAGE_JUDGING] = { "judging",
-                        0,
-                        { "reading levels", "measuring envelopes", "bounding envelopes" } },
+    [STAGE_SELECTING] = { "selecting",
+                          0,
+                          { "reading levels", "measuring envelopes", "bounding envelopes" } },
     [STAGE_OTHER] = { "other", 0, { NULL } },
 };
 

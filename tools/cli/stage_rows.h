@@ -17,7 +17,7 @@ typedef enum stage_row {
     STAGE_JOINING,
     STAGE_NUMBERING,
     STAGE_WRITING,
-    STAGE_JUDGING,
+    STAGE_SELECTING,
     STAGE_OTHER,
     STAGE_ROWS
 } stage_row;

@@ -22,7 +22,7 @@ int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX])
         bool omitted = (r == STAGE_REPAIR && !f->was_repaired) ||
                        (r == STAGE_CORNERS && !f->solid) || r == STAGE_CELLS ||
                        (r == STAGE_CHOOSING && !f->from_leaves) || /* cells are split off later */
-                       (r == STAGE_JUDGING && !f->judged);
+                       (r == STAGE_SELECTING && !f->selected);
         if (r == STAGE_REPAIR && f->was_repaired) {
             plan[n++] = STAGE_ORDERING;
             plan[n++] = STAGE_CHECKING;
@@ -30,7 +30,7 @@ int stages_plan(const stage_facts *f, int plan[STAGE_PLAN_MAX])
         if (!omitted)
             plan[n++] = r;
     }
-    if (f->judged)
+    if (f->selected)
         plan[n++] = STAGE_WRITING;
     return n;
 }

@@ -11,7 +11,7 @@
 #include "cli/stage_rows.h"
 
 typedef struct stage_facts {
-    bool was_repaired, solid, from_leaves, judged; /* from_leaves: selections of the theses */
+    bool was_repaired, solid, from_leaves, selected; /* from_leaves: selections of the theses */
     bool leaf_planes; /* leaf planes are stored, not derived by readers */
     uint64_t faces;
     ebpo_build_times times;

@@ -32,7 +32,7 @@ struct ebpo_boolean_cells {
     uint64_t in_count, in_capacity;
     ebpo_octcode *mixed; /* mixed cells of the finest level, in ascending order */
     uint64_t mixed_count, mixed_capacity;
-    uint64_t ways[EBPO_CUBE_WAYS];
+    uint64_t stages[EBPO_CUBE_STAGES];
 };
 
 enum { PARENTS = 1 << 14, GRAIN = 64 };
@@ -41,7 +41,7 @@ enum { PARENTS = 1 << 14, GRAIN = 64 };
 typedef struct candidate {
     ebpo_world_cell cell;
     unsigned may;
-    uint8_t ways[EBPO_CUBE_WAYS];
+    uint8_t stages[EBPO_CUBE_STAGES];
 } candidate;
 
 typedef struct walk {
@@ -62,7 +62,7 @@ static ebpo_status query_some(void *context, uint64_t begin, uint64_t end, unsig
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
         candidate *c = &w->candidates[i];
         status = ebpo_world_cell_query(w->boolean, worker, &w->cells->world, &c->cell, &c->may,
-                                       c->ways, error);
+                                       c->stages, error);
     }
     return status;
 }
@@ -105,8 +105,8 @@ static ebpo_status query_and_keep(walk *w, uint64_t count, ebpo_error *error)
                                            GRAIN, query_some, w, NULL, "cells", error);
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         const candidate *c = &w->candidates[i];
-        for (int k = 0; k < EBPO_CUBE_WAYS; k++)
-            w->cells->ways[k] += c->ways[k];
+        for (int k = 0; k < EBPO_CUBE_STAGES; k++)
+            w->cells->stages[k] += c->stages[k];
         if (c->may == EBPO_MAY_IN)
             status = keep_in(w->cells, c->cell.cell, error);
         else if (c->may != EBPO_MAY_OUT)
@@ -226,9 +226,9 @@ ebpo_status ebpo_boolean_cells_volume(const ebpo_boolean_cells *cells, ebpo_bool
                               .edge = w->edge,
                               .in_cells = cells->in_count,
                               .mixed_cells = cells->mixed_count,
-                              .by_box = cells->ways[EBPO_CUBE_BY_BOX],
-                              .by_nodes = cells->ways[EBPO_CUBE_BY_NODES],
-                              .by_faces = cells->ways[EBPO_CUBE_BY_FACES] };
+                              .by_box = cells->stages[EBPO_CUBE_BY_BOX],
+                              .by_nodes = cells->stages[EBPO_CUBE_BY_NODES],
+                              .by_faces = cells->stages[EBPO_CUBE_BY_FACES] };
     v.kind = ebpo_certain_of(v.lo, v.hi).kind;
     return EBPO_GIVE(ebpo_boolean_volume, out, &v);
 }

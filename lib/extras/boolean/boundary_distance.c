@@ -79,7 +79,7 @@ static ebpo_status push_cell(const boundary_search *s, const ebpo_world *w, queu
 }
 
 /* Takes the region outside the root cell into account, where everything is out. */
-static void look_beyond_root(boundary_search *s, const ebpo_world *w)
+static void bound_by_root_sides(boundary_search *s, const ebpo_world *w)
 {
     for (int k = 0; k < 3 && s->side == EBPO_MAY_IN; k++)
         s->hi = fmin(s->hi, fmin(fabs(s->point[k] - w->origin[k]),
@@ -92,8 +92,8 @@ static ebpo_status settle_cell(boundary_search *s, const ebpo_world *w, queue *q
                                double *unclear, ebpo_error *error)
 {
     unsigned may;
-    uint8_t ways[EBPO_CUBE_WAYS] = { 0 };
-    ebpo_status status = ebpo_world_cell_query(s->boolean, 0, w, &at->cell, &may, ways, error);
+    uint8_t stages[EBPO_CUBE_STAGES] = { 0 };
+    ebpo_status status = ebpo_world_cell_query(s->boolean, 0, w, &at->cell, &may, stages, error);
     if (status != EBPO_OK || may == s->side)
         return status;
     if (may != EBPO_MAY_BOTH) {
@@ -115,7 +115,7 @@ static ebpo_status search_cells(boundary_search *s, const ebpo_world *w, queue *
 {
     const ebpo_world_cell root = { { 0, { 0, 0, 0 } }, 0, 0 };
     double unclear = INFINITY;
-    look_beyond_root(s, w);
+    bound_by_root_sides(s, w);
     ebpo_status status = push_cell(s, w, q, &root, error);
     uint64_t begun = s->cells;
     while (status == EBPO_OK && q->count) {
@@ -164,8 +164,8 @@ typedef struct measuring {
 static ebpo_status try_point(const measuring *m, const double q[3], ebpo_error *error)
 {
     ebpo_boolean_result there;
-    const double way[3] = { q[0] - m->w[0], q[1] - m->w[1], q[2] - m->w[2] };
-    double away = scaled_length(way) * (1 + 0x1p-46);
+    const double offset[3] = { q[0] - m->w[0], q[1] - m->w[1], q[2] - m->w[2] };
+    double away = scaled_length(offset) * (1 + 0x1p-46);
     if (!(away < m->out->hi))
         return EBPO_OK;
     ebpo_status status = ebpo_boolean_query(m->b, 0, q, &there, error);

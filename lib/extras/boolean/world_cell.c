@@ -112,14 +112,14 @@ static ebpo_status inspect_faces(ebpo_context *context, const double p[3], doubl
 
 /* Decides an axis-parallel cube, given by its centre and half its edge, for posed coordinates.
  * *may: EBPO_MAY_IN when the whole closed cube is inside the solid, EBPO_MAY_OUT when it is
- * outside, EBPO_MAY_BOTH when a face may be within half the cube's diagonal of its centre. *way:
+ * outside, EBPO_MAY_BOTH when a face may be within half the cube's diagonal of its centre. *stage:
  * the stage that has decided. */
 static ebpo_status solid_in_cube(const ebpo_posed_solid *s, ebpo_context *context,
-                                 const double centre[3], double half, unsigned *may, unsigned *way,
-                                 ebpo_error *error)
+                                 const double centre[3], double half, unsigned *may,
+                                 unsigned *stage, ebpo_error *error)
 {
     double p[3], doubt;
-    *way = EBPO_CUBE_BY_BOX;
+    *stage = EBPO_CUBE_BY_BOX;
     *may = EBPO_MAY_OUT;
     if (!ebpo_posed_solid_near(s, centre, half))
         return EBPO_OK;
@@ -127,10 +127,10 @@ static ebpo_status solid_in_cube(const ebpo_posed_solid *s, ebpo_context *contex
     /* 1.7321 is more than the root of 3 */
     double radius = 1.7321 * half / s->posing.scale * (1 + 0x1p-40) + doubt;
     *may = decide_by_nodes(s->model, p, radius);
-    *way = EBPO_CUBE_BY_NODES;
+    *stage = EBPO_CUBE_BY_NODES;
     if (*may)
         return EBPO_OK;
-    *way = EBPO_CUBE_BY_FACES;
+    *stage = EBPO_CUBE_BY_FACES;
     return inspect_faces(context, p, radius, may, error);
 }
 
@@ -181,7 +181,7 @@ ebpo_status ebpo_world_make(ebpo_world *out, const ebpo_boolean *b, int level, e
 }
 
 ebpo_status ebpo_world_cell_query(const ebpo_boolean *b, unsigned worker, const ebpo_world *w,
-                                  ebpo_world_cell *c, unsigned *may, uint8_t *ways,
+                                  ebpo_world_cell *c, unsigned *may, uint8_t *stages,
                                   ebpo_error *error)
 {
     double centre[3], half = ebpo_world_edge(w, c->cell.level + 1);
@@ -189,14 +189,14 @@ ebpo_status ebpo_world_cell_query(const ebpo_boolean *b, unsigned worker, const 
         centre[k] = ebpo_world_cell_face(w, k, c->cell.level + 1, 2 * c->cell.at[k] + 1);
     *may = ebpo_expression_value(&b->expression, c->known, c->in);
     for (uint32_t i = 0; i < b->count && *may == EBPO_MAY_BOTH; i++) {
-        unsigned operand, way;
+        unsigned operand, stage;
         if (c->known >> i & 1)
             continue;
         ebpo_status status = solid_in_cube(&b->solid[i], ebpo_boolean_context(b, worker, i), centre,
-                                           half, &operand, &way, error);
+                                           half, &operand, &stage, error);
         if (status != EBPO_OK)
             return status;
-        ways[way]++;
+        stages[stage]++;
         if (operand == EBPO_MAY_BOTH)
             continue;
         c->known |= UINT64_C(1) << i;

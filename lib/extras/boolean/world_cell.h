@@ -7,7 +7,7 @@
 #include "geometry/cells.h"
 
 /* Stages of the decision. */
-enum { EBPO_CUBE_BY_BOX, EBPO_CUBE_BY_NODES, EBPO_CUBE_BY_FACES, EBPO_CUBE_WAYS };
+enum { EBPO_CUBE_BY_BOX, EBPO_CUBE_BY_NODES, EBPO_CUBE_BY_FACES, EBPO_CUBE_STAGES };
 
 /* The root of the octree: corners and centres of cells down to `level` are exact. */
 typedef struct ebpo_world {
@@ -40,9 +40,9 @@ static inline ebpo_world_cell ebpo_world_child(const ebpo_world_cell *c, unsigne
 }
 
 /* Queries the operands whose state in the cell is not known yet, until the expression is decided.
- * *may: possible states of the result. Counts the deciding stages in ways[EBPO_CUBE_WAYS]. */
+ * *may: possible states of the result. Counts the deciding stages in stages[EBPO_CUBE_STAGES]. */
 EBPO_MUST_USE ebpo_status ebpo_world_cell_query(const ebpo_boolean *b, unsigned worker,
                                                 const ebpo_world *w, ebpo_world_cell *c,
-                                                unsigned *may, uint8_t *ways, ebpo_error *error);
+                                                unsigned *may, uint8_t *stages, ebpo_error *error);
 
 #endif

@@ -127,14 +127,14 @@ static ebpo_status cut_face(ebpo_two_models *two, ebpo_face_cuts *pieces, int m,
 
 /* --- winding numbers --- */
 
-typedef struct looking {
+typedef struct piece_visit {
     ebpo_two_models *two;
     const ebpo_face_cuts *pieces;
     int m;
     ebpo_around_fn visit;
     void *user;
     bool only_at_target;
-} looking;
+} piece_visit;
 
 /* Returns true if the normal points towards x + (d0, d1, d2), the shifted point of
  * ebpo_exact_winding. */
@@ -146,8 +146,8 @@ static bool shift_is_front(const ebpo_face_cuts *f)
     return sign > 0;
 }
 
-static ebpo_status sides_of_solid(const looking *l, const ebpo_piece *piece, int i, unsigned *in,
-                                  ebpo_error *error)
+static ebpo_status sides_of_solid(const piece_visit *l, const ebpo_piece *piece, int i,
+                                  unsigned *in, ebpo_error *error)
 {
     ebpo_two_models *two = l->two;
     int32_t winding, jump = piece->jump[i] + (i == l->m);
@@ -159,9 +159,9 @@ static ebpo_status sides_of_solid(const looking *l, const ebpo_piece *piece, int
     return status;
 }
 
-static ebpo_status look_around_piece(void *user, const ebpo_piece *piece, ebpo_error *error)
+static ebpo_status visit_around_piece(void *user, const ebpo_piece *piece, ebpo_error *error)
 {
-    const looking *l = user;
+    const piece_visit *l = user;
     ebpo_around around;
     ebpo_status status = EBPO_OK;
     if (l->only_at_target && !piece->at_target)
@@ -177,11 +177,11 @@ static ebpo_status look_around_piece(void *user, const ebpo_piece *piece, ebpo_e
     return status;
 }
 
-/* Visits the pieces. look_around_piece returns EBPO_E_CANCELLED when the visitor has found enough;
+/* Visits the pieces. visit_around_piece returns EBPO_E_CANCELLED when the visitor has found enough;
  * that is no failure. */
-static ebpo_status visit_pieces(looking *l, ebpo_face_cuts *pieces, ebpo_error *error)
+static ebpo_status visit_pieces(piece_visit *l, ebpo_face_cuts *pieces, ebpo_error *error)
 {
-    ebpo_status status = ebpo_face_pieces_visit(pieces, look_around_piece, l, error);
+    ebpo_status status = ebpo_face_pieces_visit(pieces, visit_around_piece, l, error);
     return status == EBPO_E_CANCELLED ? EBPO_OK : status;
 }
 
@@ -195,7 +195,7 @@ ebpo_status ebpo_look_around_face(ebpo_two_models *two, int m, uint64_t face, eb
         return status;
     ebpo_face_cuts_begin(&two->pieces, (const double(*)[3])t, false);
     status = cut_face(two, &two->pieces, m, face, (const double(*)[3])t, error);
-    looking l = { two, &two->pieces, m, visit, user, false };
+    piece_visit l = { two, &two->pieces, m, visit, user, false };
     return status == EBPO_OK ? visit_pieces(&l, &two->pieces, error) : status;
 }
 
@@ -262,7 +262,7 @@ static ebpo_status query_face(face_query *a, uint64_t face, const mpq_t x[3], eb
     a->in = !two->solid[a->m];
     if (!a->in)
         status = cut_face(two, &two->others, a->m, face, (const double(*)[3])t, error);
-    looking l = { two, &two->others, a->m, note_side, a, true };
+    piece_visit l = { two, &two->others, a->m, note_side, a, true };
     return status == EBPO_OK && !a->in ? visit_pieces(&l, &two->others, error) : status;
 }
 

@@ -23,20 +23,20 @@
 #include "geometry/vec3.h"
 
 /* A pair of children of nodes, each as the node's number * 8 + lane. */
-typedef struct way_pair {
+typedef struct separation_pair {
     double most; /* upper bound of the last time at which they have a common point */
     uint32_t a, b;
-} way_pair;
+} separation_pair;
 
 /* One model relative to the direction: the axes of its posed frame, as components along three
  * perpendicular axes. The first of these is the direction. */
-typedef struct way_side {
+typedef struct separation_side {
     const ebpo_accel *accel;
     const ebpo_posing *posing;
     double row[3][3], base[3];
-} way_side;
+} separation_side;
 
-typedef struct way_search {
+typedef struct separation_search {
     /* Input: */
     const ebpo_collision *current_query;
     double direction[3]; /* direction in which the query's first model moves; the greatest component
@@ -47,27 +47,30 @@ typedef struct way_search {
     ebpo_face_pair pair; /* faces of the caller's A and B */
     double hi;           /* dropped pairs are certainly not later; negative: none was dropped */
     /* Initially 0: */
-    way_side side[2];
+    separation_side side[2];
     double axis[3][3]; /* three perpendicular axes; the first is the direction */
     double step, lost; /* component of the direction along the first axis; bound of how far rounding
                         * moves extents */
     double sure;       /* `last` is certainly not earlier */
-    way_pair *pairs;   /* a heap, the greatest first */
+    separation_pair *pairs; /* a heap, the greatest first */
     uint64_t count, capacity, looked;
-} way_search;
+} separation_search;
 
 /* Extents along the axes of a convex set, or of a set that it contains. */
-typedef struct way_extent {
+typedef struct separation_extent {
     double low[3], high[3];
-} way_extent;
+} separation_extent;
 
 /* --- the heap --- */
 
-static bool is_later(const way_pair *a, const way_pair *b) { return a->most > b->most; }
+static bool is_later(const separation_pair *a, const separation_pair *b)
+{
+    return a->most > b->most;
+}
 
-EBPO_HEAP(heap, way_pair, is_later)
+EBPO_HEAP(heap, separation_pair, is_later)
 
-static bool push_pair(way_search *s, const way_pair *pair)
+static bool push_pair(separation_search *s, const separation_pair *pair)
 {
     if (!ebpo_grow(&s->pairs, &s->capacity, s->count + 1, sizeof *s->pairs))
         return false;
@@ -77,12 +80,12 @@ static bool push_pair(way_search *s, const way_pair *pair)
 
 /* --- extents along the three axes --- */
 
-static way_extent extent_of(const way_search *s, int which, uint32_t ref)
+static separation_extent extent_of(const separation_search *s, int which, uint32_t ref)
 {
-    const way_side *side = &s->side[which];
+    const separation_side *side = &s->side[which];
     const ebpo_bound *b = &side->accel->bound[ref / 8];
     double middle[3], half[3];
-    way_extent out;
+    separation_extent out;
     for (int k = 0; k < 3; k++) {
         ebpo_bound_sides ends = ebpo_bound_side(b, (int)(ref % 8), k);
         middle[k] = (ends.low + ends.high) / 2;
@@ -100,7 +103,8 @@ static way_extent extent_of(const way_search *s, int which, uint32_t ref)
 
 /* Returns the greatest t at which sets with these extents may have a common point; negative: there
  * is none. */
-static double way_max(const way_search *s, const way_extent *a, const way_extent *b)
+static double separation_max(const separation_search *s, const separation_extent *a,
+                             const separation_extent *b)
 {
     for (int i = 1; i < 3; i++)
         if (b->low[i] - a->high[i] > s->lost || a->low[i] - b->high[i] > s->lost)
@@ -129,9 +133,9 @@ static void make_axes(const double d[3], double axis[3][3])
     }
 }
 
-static void make_side(way_search *s, int which, const ebpo_accel *accel)
+static void make_side(separation_search *s, int which, const ebpo_accel *accel)
 {
-    way_side *side = &s->side[which];
+    separation_side *side = &s->side[which];
     double centre[3];
     side->accel = accel;
     side->posing = &s->current_query->posing[which].posing;
@@ -149,7 +153,7 @@ static void make_side(way_search *s, int which, const ebpo_accel *accel)
 /* --- faces --- */
 
 /* Returns true if x precedes y in the order of the query's models. */
-static bool comes_first(const way_search *s, const ebpo_found_pair *x)
+static bool comes_first(const separation_search *s, const ebpo_found_pair *x)
 {
     uint64_t a = ebpo_accel_file_face(s->side[0].accel, x->a),
              b = ebpo_accel_file_face(s->side[1].accel, x->b);
@@ -158,7 +162,7 @@ static bool comes_first(const way_search *s, const ebpo_found_pair *x)
     return a != has[turned] ? a < has[turned] : b < has[!turned];
 }
 
-static void inspect_faces(way_search *s, const double a[3][3], const double b[3][3],
+static void inspect_faces(separation_search *s, const double a[3][3], const double b[3][3],
                           const ebpo_found_pair *pair)
 {
     double most = ebpo_sweep_max(a, b, s->direction, INFINITY);
@@ -180,7 +184,7 @@ static void inspect_faces(way_search *s, const double a[3][3], const double b[3]
     ebpo_sweep_time_clear(&t);
 }
 
-static void inspect_blocks(way_search *s, uint32_t block_a, uint32_t block_b)
+static void inspect_blocks(separation_search *s, uint32_t block_a, uint32_t block_b)
 {
     const uint32_t block[2] = { block_a, block_b };
     const ebpo_meshlet *m[2];
@@ -201,28 +205,28 @@ static void inspect_blocks(way_search *s, uint32_t block_a, uint32_t block_b)
 
 /* --- the search --- */
 
-static uint32_t child_of(const way_search *s, int which, uint32_t ref)
+static uint32_t child_of(const separation_search *s, int which, uint32_t ref)
 {
     return s->side[which].accel->bound[ref / 8].child[ref % 8];
 }
 
-static double size_of(const way_extent *e)
+static double size_of(const separation_extent *e)
 {
     return e->high[0] - e->low[0] + (e->high[1] - e->low[1]) + (e->high[2] - e->low[2]);
 }
 
 /* Adds pairs: each child of one node with `other`, a child of the other model's node. */
-static ebpo_status offer_children(way_search *s, int which, uint32_t node, uint32_t other,
+static ebpo_status offer_children(separation_search *s, int which, uint32_t node, uint32_t other,
                                   ebpo_error *error)
 {
-    way_extent seen[2];
+    separation_extent seen[2];
     seen[!which] = extent_of(s, !which, other);
     for (uint32_t i = 0; i < s->side[which].accel->bound[node].count; i++) {
         uint32_t ref[2];
         ref[which] = node * 8 + i;
         ref[!which] = other;
         seen[which] = extent_of(s, which, ref[which]);
-        way_pair pair = { way_max(s, &seen[0], &seen[1]), ref[0], ref[1] };
+        separation_pair pair = { separation_max(s, &seen[0], &seen[1]), ref[0], ref[1] };
         if (pair.most < s->sure)
             continue;
         if (!push_pair(s, &pair))
@@ -232,7 +236,7 @@ static ebpo_status offer_children(way_search *s, int which, uint32_t node, uint3
 }
 
 /* Divides a pair of nodes, the larger node if both can be divided. */
-static ebpo_status divide_pair(way_search *s, const way_pair *pair, ebpo_error *error)
+static ebpo_status divide_pair(separation_search *s, const separation_pair *pair, ebpo_error *error)
 {
     uint32_t child[2] = { child_of(s, 0, pair->a), child_of(s, 1, pair->b) };
     bool block[2] = { child[0] & EBPO_IS_BLOCK, child[1] & EBPO_IS_BLOCK };
@@ -240,13 +244,13 @@ static ebpo_status divide_pair(way_search *s, const way_pair *pair, ebpo_error *
         inspect_blocks(s, child[0] & ~EBPO_IS_BLOCK, child[1] & ~EBPO_IS_BLOCK);
         return EBPO_OK;
     }
-    way_extent a = extent_of(s, 0, pair->a), b = extent_of(s, 1, pair->b);
+    separation_extent a = extent_of(s, 0, pair->a), b = extent_of(s, 1, pair->b);
     int which = block[0] || (!block[1] && size_of(&b) > size_of(&a));
     return offer_children(s, which, child[which], which ? pair->a : pair->b, error);
 }
 
 /* Begins a search; called once. The caller clears `last`. */
-static void way_search_begin(way_search *s)
+static void separation_search_begin(separation_search *s)
 {
     ebpo_sweep_time_init(&s->last);
     make_axes(s->direction, s->axis);
@@ -257,7 +261,7 @@ static void way_search_begin(way_search *s)
                                 EBPO_NO_FACE, EBPO_PAIR_APART, 0 };
 }
 
-static ebpo_status offer_tops(way_search *s, ebpo_error *error)
+static ebpo_status offer_tops(separation_search *s, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     const ebpo_accel *b = s->side[1].accel;
@@ -267,8 +271,8 @@ static ebpo_status offer_tops(way_search *s, ebpo_error *error)
 }
 
 /* Continues with two accels of the query's models. Fails with EBPO_E_MEMORY, EBPO_E_CANCELLED. */
-static ebpo_status way_search_run(way_search *s, const ebpo_accel *const accel[2],
-                                  ebpo_error *error)
+static ebpo_status separation_search_run(separation_search *s, const ebpo_accel *const accel[2],
+                                         ebpo_error *error)
 {
     const ebpo_progress *progress = &s->current_query->options.progress;
     if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
@@ -284,7 +288,7 @@ static ebpo_status way_search_run(way_search *s, const ebpo_accel *const accel[2
             status = EBPO_E_CANCELLED;
             break;
         }
-        way_pair pair = heap_take(s->pairs, s->count--);
+        separation_pair pair = heap_take(s->pairs, s->count--);
         status = divide_pair(s, &pair, error);
     }
     if (s->count > 0 && s->pairs[0].most >= s->sure)
@@ -304,10 +308,10 @@ static ebpo_status way_search_run(way_search *s, const ebpo_accel *const accel[2
 typedef struct searching {
     ebpo_subtree_search
         subtrees; /* its `gap` is minus the time until which envelopes may intersect */
-    way_search *way;
+    separation_search *search;
 } searching;
 
-static ebpo_status cell_extent(searching *s, int which, ebpo_cell cell, way_extent *out,
+static ebpo_status cell_extent(searching *s, int which, ebpo_cell cell, separation_extent *out,
                                ebpo_error *error)
 {
     ebpo_posed_subtrees *side = &s->subtrees.nodes.side[which];
@@ -315,7 +319,7 @@ static ebpo_status cell_extent(searching *s, int which, ebpo_cell cell, way_exte
     double slack = ebpo_posed_slack(side, cell, s->subtrees.current_query->reach);
     ebpo_status status = ebpo_posed_envelope(side, cell, &hull, error);
     for (int i = 0; i < 3 && status == EBPO_OK; i++) {
-        const double *axis = s->way->axis[i];
+        const double *axis = s->search->axis[i];
         out->low[i] = INFINITY;
         out->high[i] = -INFINITY;
         for (int v = 0; v < hull.count; v++) {
@@ -330,7 +334,7 @@ static ebpo_status cell_extent(searching *s, int which, ebpo_cell cell, way_exte
 
 static ebpo_status add_node_pair(searching *s, const ebpo_posed_node node[2], ebpo_error *error)
 {
-    way_extent extent[2];
+    separation_extent extent[2];
     for (int i = 0; i < 2; i++) {
         if (ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_UNIFORM)
             return EBPO_OK;
@@ -338,9 +342,10 @@ static ebpo_status add_node_pair(searching *s, const ebpo_posed_node node[2], eb
         if (status != EBPO_OK)
             return status;
     }
-    ebpo_node_gap pair = { { node[0], node[1] }, -way_max(s->way, &extent[0], &extent[1]) };
-    return -pair.gap < s->way->sure ? EBPO_OK
-                                    : ebpo_node_gaps_push(&s->subtrees.nodes, &pair, error);
+    ebpo_node_gap pair = { { node[0], node[1] },
+                           -separation_max(s->search, &extent[0], &extent[1]) };
+    return -pair.gap < s->search->sure ? EBPO_OK
+                                       : ebpo_node_gaps_push(&s->subtrees.nodes, &pair, error);
 }
 
 static ebpo_status divide_node_pair(searching *s, const ebpo_node_gap *pair, int side,
@@ -363,7 +368,7 @@ static ebpo_status inspect_pair(searching *s, const ebpo_node_gap *pair, ebpo_er
     if (side >= 0)
         return divide_node_pair(s, pair, side, error);
     ebpo_status status = ebpo_subtree_search_load(&s->subtrees, pair->node, accel, &there, error);
-    return status == EBPO_OK && there ? way_search_run(s->way, accel, error) : status;
+    return status == EBPO_OK && there ? separation_search_run(s->search, accel, error) : status;
 }
 
 static ebpo_status search_node_pairs(searching *s, ebpo_error *error)
@@ -375,10 +380,10 @@ static ebpo_status search_node_pairs(searching *s, ebpo_error *error)
     ebpo_status status = add_node_pair(s, root, error);
     while (status == EBPO_OK && nodes->count > 0) {
         ebpo_node_gap pair = ebpo_node_gaps_pop(nodes);
-        if (-pair.gap < s->way->sure)
+        if (-pair.gap < s->search->sure)
             return EBPO_OK;
         if (ebpo_collision_is_late(q)) {
-            s->way->hi = fmax(s->way->hi, -pair.gap);
+            s->search->hi = fmax(s->search->hi, -pair.gap);
             return EBPO_OK;
         }
         status = inspect_pair(s, &pair, error);
@@ -390,10 +395,10 @@ static ebpo_status search_node_pairs(searching *s, ebpo_error *error)
 
 /* Continues in all pairs of subtrees whose envelopes may separate as late as the last contact
  * found, the latest first. Gives the same result as whole models. */
-static ebpo_status way_of_parts(way_search *way, ebpo_error *error)
+static ebpo_status separation_of_parts(separation_search *search, ebpo_error *error)
 {
-    searching s = { .way = way };
-    ebpo_status status = ebpo_subtree_search_begin(&s.subtrees, way->current_query, error);
+    searching s = { .search = search };
+    ebpo_status status = ebpo_subtree_search_begin(&s.subtrees, search->current_query, error);
     if (status == EBPO_OK)
         status = search_node_pairs(&s, error);
     ebpo_subtree_search_end(&s.subtrees);
@@ -403,7 +408,7 @@ static ebpo_status way_of_parts(way_search *way, ebpo_error *error)
 /* --- the query --- */
 
 /* Sets the direction of the query's first model, times a power of two, and returns the exponent. */
-static int set_direction(way_search *s, const double direction[3])
+static int set_direction(separation_search *s, const double direction[3])
 {
     int exponent;
     (void)frexp(fmax(fabs(direction[0]), fmax(fabs(direction[1]), fabs(direction[2]))), &exponent);
@@ -413,7 +418,7 @@ static int set_direction(way_search *s, const double direction[3])
     return exponent;
 }
 
-static void fill_separation(const way_search *s, int exponent, ebpo_separation *out)
+static void fill_separation(const separation_search *s, int exponent, ebpo_separation *out)
 {
     double lo = 0, hi = ldexp(s->hi, -exponent) * (1 + 0x1p-50);
     *out = (ebpo_separation){ .pair = s->pair };
@@ -438,12 +443,12 @@ ebpo_status ebpo_collide_separation(ebpo_collider *c, const ebpo_collide_options
     ebpo_status status = ebpo_collision_begin(&q, c, options, error);
     if (status != EBPO_OK)
         return status;
-    way_search s = { .current_query = &q };
+    separation_search s = { .current_query = &q };
     int exponent = set_direction(&s, direction);
-    way_search_begin(&s);
+    separation_search_begin(&s);
     const ebpo_accel *const whole[2] = { q.model[0]->whole, q.model[1]->whole };
-    status =
-        ebpo_collision_is_in_parts(&q) ? way_of_parts(&s, error) : way_search_run(&s, whole, error);
+    status = ebpo_collision_is_in_parts(&q) ? separation_of_parts(&s, error)
+                                            : separation_search_run(&s, whole, error);
     if (status == EBPO_OK)
         fill_separation(&s, exponent, out);
     ebpo_sweep_time_clear(&s.last);

@@ -243,7 +243,7 @@ static void add_flat(ebpo_face_cuts *f, const double t[3][3], int model)
                       (double[]){ t[2][f->u], t[2][f->v] });
     memcpy(flat->corner, t, sizeof flat->corner);
     flat->model = model;
-    flat->same_way = turn == f->turn;
+    flat->same_direction = turn == f->turn;
     cut_along_edges(f, t);
 }
 
@@ -506,7 +506,7 @@ static void point_at(ebpo_face_cuts *f, const mpq_t p, const mpq_t q, mpq_t x[3]
 
 static bool is_in_flat(ebpo_face_cuts *f, const ebpo_flat_face *t, const mpq_t p, const mpq_t q)
 {
-    int turn = t->same_way ? f->turn : -f->turn;
+    int turn = t->same_direction ? f->turn : -f->turn;
     for (int i = 0; i < 3; i++)
         if (side_of_edge(f, t->corner[i], t->corner[(i + 1) % 3], p, q) * turn <= 0)
             return false;
@@ -520,7 +520,7 @@ static ebpo_status visit_at(ebpo_face_cuts *f, const mpq_t p, const mpq_t q, mpq
     for (uint64_t i = 0; i < f->flats; i++)
         if (is_in_flat(f, &f->flat[i], p, q)) {
             piece.covered[f->flat[i].model] = true;
-            piece.jump[f->flat[i].model] += f->flat[i].same_way ? 1 : -1;
+            piece.jump[f->flat[i].model] += f->flat[i].same_direction ? 1 : -1;
         }
     point_at(f, p, q, x);
     return visit(user, &piece, error);

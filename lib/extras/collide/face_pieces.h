@@ -18,7 +18,7 @@ typedef struct ebpo_face_cut {
 typedef struct ebpo_flat_face {
     double corner[3][3];
     int model;
-    bool same_way; /* its normal and the normal of the cut face have the same direction */
+    bool same_direction; /* its normal and the normal of the cut face have the same direction */
 } ebpo_flat_face;
 
 /* Bounds of a piece at the right end of a strip. A strip is the part of the view between two

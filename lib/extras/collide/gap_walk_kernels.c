@@ -58,15 +58,15 @@ EBPO_EIGHT f8 within_unit8(f8 t) { return f8_min(f8_max(t, f8_all(0)), f8_all(1)
 /* The best pair of points so far: the vector from A's to B's. */
 typedef struct nearest8 {
     f8 square;
-    place8 way;
+    place8 direction;
 } nearest8;
 
-EBPO_EIGHT void offer_nearest8(nearest8 *n, const place8 *way, f8 square)
+EBPO_EIGHT void offer_nearest8(nearest8 *n, const place8 *direction, f8 square)
 {
     f8 better = f8_less(square, n->square);
     n->square = f8_pick(better, square, n->square);
     for (int k = 0; k < 3; k++)
-        n->way.x[k] = f8_pick(better, way->x[k], n->way.x[k]);
+        n->direction.x[k] = f8_pick(better, direction->x[k], n->direction.x[k]);
 }
 
 /* Edges with their squared lengths and the reciprocals. */
@@ -97,9 +97,9 @@ EBPO_EIGHT void offer_edges8(nearest8 *n, const place8 *p, const edges8 *a, int 
     f8 s = within_unit8(f8_div(minor_of8(ew, fw, ef, b->square[j]), area));
     f8 t = within_unit8(f8_mul(f8_sub(f8_mul(s, ef), fw), b->inverse[j]));
     s = within_unit8(f8_mul(f8_add(f8_mul(t, ef), ew), a->inverse[i]));
-    place8 way = place_along8(&w, t, f);
-    way = place_along8(&way, f8_sub(f8_all(0), s), e);
-    offer_nearest8(n, &way, place_dot8(&way, &way));
+    place8 direction = place_along8(&w, t, f);
+    direction = place_along8(&direction, f8_sub(f8_all(0), s), e);
+    offer_nearest8(n, &direction, place_dot8(&direction, &direction));
 }
 
 /* Offers corners that are above the interior of the face. sign: 1 when the corners are A's, else
@@ -129,7 +129,7 @@ EBPO_EIGHT void offer_corners8(nearest8 *n, const triangle8 *face, const edges8 
 /* Bounds eight distances. No coordinate is greater than `size` or differs by more than `error` from
  * its exact value. */
 EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float size, float error,
-                                 f8 *low, f8 *high, place8 *way)
+                                 f8 *low, f8 *high, place8 *direction)
 {
     edges8 of_a = edges_of8(a), of_b = edges_of8(b);
     nearest8 n = { f8_all(INFINITY), { { f8_all(0), f8_all(0), f8_all(0) } } };
@@ -140,15 +140,17 @@ EBPO_EIGHT void bounds_of_pairs8(const triangle8 *a, const triangle8 *b, float s
             offer_edges8(&n, &a->corner[i], &of_a, i, &b->corner[j], &of_b, j);
     offer_corners8(&n, a, &of_a, b, -1);
     offer_corners8(&n, b, &of_b, a, 1);
-    f8 most = f8_max3(place_dot8(&n.way, &a->corner[0]), place_dot8(&n.way, &a->corner[1]),
-                      place_dot8(&n.way, &a->corner[2])),
-       least = f8_min3(place_dot8(&n.way, &b->corner[0]), place_dot8(&n.way, &b->corner[1]),
-                       place_dot8(&n.way, &b->corner[2]));
+    f8 most =
+           f8_max3(place_dot8(&n.direction, &a->corner[0]), place_dot8(&n.direction, &a->corner[1]),
+                   place_dot8(&n.direction, &a->corner[2])),
+       least =
+           f8_min3(place_dot8(&n.direction, &b->corner[0]), place_dot8(&n.direction, &b->corner[1]),
+                   place_dot8(&n.direction, &b->corner[2]));
     f8 length = f8_sqrt(n.square), lost = f8_all(40 * 0x1p-24f * size + 4 * error + 0x1p-60f);
     f8 gap = f8_div(f8_mul(f8_sub(least, most), f8_all(1 - 0x1p-20f)), length);
     *low = f8_pick(f8_less(f8_all(0x1p-110f), n.square), f8_sub(gap, lost), f8_all(-1));
     *high = f8_add(f8_mul(length, f8_all(1 + 0x1p-20f)), lost);
-    *way = n.way;
+    *direction = n.direction;
 }
 
 /* --- nodes --- */
@@ -228,11 +230,11 @@ static const ebpo_gap_node *take_node(ebpo_gap_search *g, int side, uint32_t nod
         node_boxes(out, &s->bound[node], &g->frames.frame[side]);
         node_slabs(out, &s->slab[node], &g->frames.frame[side], g->frames.slack);
         out->node = node;
-        out->way = 0;
+        out->direction = 0;
     }
-    if (out->way != g->way_number) {
+    if (out->direction != g->direction_number) {
         node_reach(out, g->along[side]);
-        out->way = g->way_number;
+        out->direction = g->direction_number;
     }
     return out;
 }
@@ -378,7 +380,7 @@ EBPO_EIGHT void push_eight(ebpo_gap_search *g, uint64_t base, int side, const eb
     f8_store(key, keys);
     for (; near; near &= near - 1) {
         unsigned lane = (unsigned)__builtin_ctz(near);
-        ebpo_gap_visit v = { .key = key[lane], .way = g->way_number };
+        ebpo_gap_visit v = { .key = key[lane], .direction = g->direction_number };
         v.child[side] = p->node * 8 + lane;
         v.child[1 - side] = q->node * 8 + (uint32_t)j;
         push_visit(g, base, v);
@@ -420,9 +422,10 @@ EBPO_EIGHT void near_by_boxes(const ebpo_gap_search *g, const ebpo_posed_faces *
         f8 a_at = zero, b_at = zero;
 #pragma GCC unroll 3
         for (int k = 0; k < 3; k++) {
-            f8 way = f8_all(g->way[k]);
-            a_at = f8_add(a_at, f8_mul(f8_load(a->x[3 * i + k]), way));
-            b_at = f8_add(b_at, f8_mul(f8_add(f8_load(b->x[3 * i + k]), f8_all(shift[k])), way));
+            f8 direction = f8_all(g->direction[k]);
+            a_at = f8_add(a_at, f8_mul(f8_load(a->x[3 * i + k]), direction));
+            b_at =
+                f8_add(b_at, f8_mul(f8_add(f8_load(b->x[3 * i + k]), f8_all(shift[k])), direction));
         }
         ahead = i ? f8_max(ahead, a_at) : a_at;
         behind = i ? f8_min(behind, b_at) : b_at;
@@ -469,13 +472,13 @@ EBPO_EIGHT triangle8 load_faces8(const ebpo_posed_faces *f, const int32_t *lane,
 
 /* Takes a pair nearer than all previous ones. The direction of the search becomes that of this
  * pair. */
-EBPO_EIGHT void take_nearer(ebpo_gap_search *g, f8 high, const place8 *way, unsigned used,
+EBPO_EIGHT void take_nearer(ebpo_gap_search *g, f8 high, const place8 *direction, unsigned used,
                             const uint32_t block[2], const near_lanes *near, unsigned at)
 {
     unsigned nearer = used & f8_bits(f8_less(high, f8_all(g->best)));
     if (!nearer)
         return;
-    float highs[8], ways[3][8];
+    float highs[8], directions[3][8];
     int best = -1;
     f8_store(highs, high);
     for (; nearer; nearer &= nearer - 1) {
@@ -484,10 +487,11 @@ EBPO_EIGHT void take_nearer(ebpo_gap_search *g, f8 high, const place8 *way, unsi
             best = i;
     }
     for (int k = 0; k < 3; k++)
-        f8_store(ways[k], way->x[k]);
+        f8_store(directions[k], direction->x[k]);
     ebpo_gap_set_best(g, highs[best], block[0] * 8 + (uint32_t)near->lane[0][at + (unsigned)best],
                       block[1] * 8 + (uint32_t)near->lane[1][at + (unsigned)best]);
-    ebpo_gap_set_way(g, (const float[3]){ ways[0][best], ways[1][best], ways[2][best] });
+    ebpo_gap_set_direction(g, (const float[3]){ directions[0][best], directions[1][best],
+                                                directions[2][best] });
 }
 
 /* Adds the pairs that may be near enough to the waiting pairs. Returns true if one of the added
@@ -535,9 +539,9 @@ static bool block_pair(ebpo_gap_search *g, const uint32_t block[2])
                   q = load_faces8(b, near.lane[1] + at, shift);
         unsigned used = near.count - at < 8 ? (1u << (near.count - at)) - 1 : 255;
         f8 low, high;
-        place8 way;
-        bounds_of_pairs8(&p, &q, size, error, &low, &high, &way);
-        take_nearer(g, high, &way, used, block, &near, at);
+        place8 direction;
+        bounds_of_pairs8(&p, &q, size, error, &low, &high, &direction);
+        take_nearer(g, high, &direction, used, block, &near, at);
         meets |= let_wait(g, low, used, block, &near, at);
     }
     return !meets || g->judge(g);
@@ -549,7 +553,7 @@ static bool block_pair(ebpo_gap_search *g, const uint32_t block[2])
  * far apart. */
 static bool far_along(ebpo_gap_search *g, const ebpo_gap_visit *v)
 {
-    if (v->way == g->way_number)
+    if (v->direction == g->direction_number)
         return false;
     float gap = g->along_shift - 8 * g->frames.slack;
     for (int s = 0; s < 2; s++)

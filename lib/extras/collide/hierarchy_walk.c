@@ -153,17 +153,17 @@ void ebpo_gap_begin(ebpo_gap_search *g, const ebpo_accel *const accel[2],
     g->ended = g->no_memory = g->is_heap = false;
     g->limit = g->square = g->best = INFINITY;
     g->tolerance = 0;
-    g->way_number = 0;
+    g->direction_number = 0;
     for (int k = 0; k < 3; k++) /* use the direction between the centres instead */
-        g->way[k] = k == 0;
-    ebpo_gap_set_way(g, g->way);
+        g->direction[k] = k == 0;
+    ebpo_gap_set_direction(g, g->direction);
     double centre[2][3];
-    float way[3];
+    float direction[3];
     for (int s = 0; s < 2; s++)
         ebpo_posing_apply(&posing[s], accel[s]->centre, centre[s]);
     for (int k = 0; k < 3; k++)
-        way[k] = (float)((centre[1][k] - centre[0][k]) * g->posing[0].unit);
-    ebpo_gap_set_way(g, way);
+        direction[k] = (float)((centre[1][k] - centre[0][k]) * g->posing[0].unit);
+    ebpo_gap_set_direction(g, direction);
 }
 
 ebpo_gap_search *ebpo_gap_new(void) { return ebpo_alloc_lines(1, sizeof(ebpo_gap_search)); }
@@ -199,19 +199,19 @@ static float float_dot(const float a[3], const float b[3])
 }
 
 /* Makes the direction slightly shorter than 1, so that computed gaps along it are not too great. */
-void ebpo_gap_set_way(ebpo_gap_search *g, const float way[3])
+void ebpo_gap_set_direction(ebpo_gap_search *g, const float direction[3])
 {
-    float length = sqrtf(float_dot(way, way));
+    float length = sqrtf(float_dot(direction, direction));
     if (!(length > 0x1p-50f && length < 0x1p60f))
         return;
     for (int k = 0; k < 3; k++)
-        g->way[k] = way[k] * ((1 - 0x1p-19f) / length);
-    g->way_number++;
+        g->direction[k] = direction[k] * ((1 - 0x1p-19f) / length);
+    g->direction_number++;
     for (int s = 0; s < 2; s++)
         for (int k = 0; k < 3; k++) {
             float sum = 0;
             for (int i = 0; i < 3; i++)
-                sum += g->frames.frame[s].in_world[i][k] * g->way[i];
+                sum += g->frames.frame[s].in_world[i][k] * g->direction[i];
             g->along[s][k] = s ? -sum : sum;
         }
     g->along_shift = float_dot(g->frames.frame[1].shift, g->along[0]);

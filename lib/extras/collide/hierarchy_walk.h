@@ -98,7 +98,7 @@ typedef struct ebpo_gap_visit {
     float key; /* squared lower bound; negative where nodes intersect: the nearer to 0, the less
                 * they overlap */
     uint32_t child[2];
-    uint32_t way; /* number of the direction for which the key was computed */
+    uint32_t direction; /* number of the direction for which the key was computed */
 } ebpo_gap_visit;
 
 /* A pair of faces, by slots, whose distance is at least `low`. */
@@ -113,7 +113,7 @@ typedef struct ebpo_gap_node {
     float axis[2][3][8], middle[2][3][8];              /* middles and unit axes of cylinders */
     float thick[8], radius[8];                         /* half-widths along the axis and radii */
     float reach[8]; /* extents along the direction of the search, in the node's frame */
-    uint32_t node, way;
+    uint32_t node, direction;
 } ebpo_gap_node;
 
 enum { EBPO_GAP_CANDIDATES = 256, EBPO_GAP_NODES = 16 };
@@ -128,11 +128,11 @@ struct ebpo_gap_search {
     float tolerance; /* an improvement smaller than this does not matter */
     float best; /* upper bound of the distance of the faces best_slot; INFINITY: no pair is known */
     uint32_t best_slot[2];
-    float
-        way[3]; /* a direction in the world, from A to B, along which the models may be far apart */
+    float direction[3]; /* a direction in the world, from A to B, along which the models may be far
+                           apart */
     float along[2][3], along_shift; /* the same direction in both frames, in each one towards the
                                      * other model */
-    uint32_t way_number;
+    uint32_t direction_number;
 
     void *user;
     bool (*judge)(ebpo_gap_search *search); /* decides all waiting pairs; returns false when enough
@@ -167,7 +167,7 @@ void ebpo_gap_set_limit(ebpo_gap_search *g, float limit);
 /* Records a pair of faces and an upper bound of its distance. */
 void ebpo_gap_set_best(ebpo_gap_search *g, float best, uint32_t slot_a, uint32_t slot_b);
 /* Sets the direction, of any length, in the world; 0 changes nothing. */
-void ebpo_gap_set_way(ebpo_gap_search *g, const float way[3]);
+void ebpo_gap_set_direction(ebpo_gap_search *g, const float direction[3]);
 
 /* Makes space for a node's pairs. */
 bool ebpo_gap_capacity(ebpo_gap_search *g);

@@ -165,7 +165,7 @@ static ebpo_status is_clear_of_faces(ebpo_context *context, const double p[3], d
 
 /* --- sides of a point --- */
 
-typedef struct looking {
+typedef struct side_segment {
     const ebpo_posed_solid *solid;
     const double *w;
     int axis;              /* axis of the segment */
@@ -173,7 +173,7 @@ typedef struct looking {
     int32_t crossed, jump; /* winding number at the end less the one at the beginning; above the
                             * point less below it */
     ebpo_posed_sides *out;
-} looking;
+} side_segment;
 
 /* Returns the axis that separates the two sides of a face: the first axis that is not parallel to
  * its plane; -1: the face has no area. */
@@ -193,7 +193,7 @@ static bool in_plane(const double plane[3][3], const double t[3][3])
 }
 
 /* Takes a face that contains w. */
-static void take_on(looking *l, const double t[3][3])
+static void take_on(side_segment *l, const double t[3][3])
 {
     int axis = side_axis(t);
     if (axis < 0)
@@ -210,7 +210,7 @@ static void take_on(looking *l, const double t[3][3])
 
 static bool take_near_triangles(void *user, const ebpo_triangles *triangles)
 {
-    looking *l = user;
+    side_segment *l = user;
     for (uint64_t i = 0; i < triangles->count; i++) {
         double t[3][3];
         for (int c = 0; c < 3; c++)
@@ -270,7 +270,7 @@ static ebpo_status decide_by_faces(const ebpo_posed_solid *s, ebpo_context *cont
 {
     anchor a;
     double low[3], high[3];
-    looking l = { .solid = s, .w = w, .out = out };
+    side_segment l = { .solid = s, .w = w, .out = out };
     ebpo_status status = find_anchor(s, context, w, 8 * doubt * s->posing.scale, &a, error);
     if (status != EBPO_OK)
         return status;

@@ -324,7 +324,7 @@ static bool side_adds_nothing(const relating *r, int m, bool in)
 
 /* Examines owned faces of a subtree that intersect no face of the other model, as long as their
  * patch may add information. */
-static void look_through(relating *r, const separate_patches *u, uint64_t *done)
+static void inspect_untouched_faces(relating *r, const separate_patches *u, uint64_t *done)
 {
     for (uint64_t i = 0; i < u->count && goes_on(r); i++) {
         if (has_bit(r->intersected[u->m], u->first + i) || has_bit(done, u->patch[i]))
@@ -350,7 +350,7 @@ static void inspect_subtree(relating *r, separate_patches *u, uint64_t number)
         return;
     uint64_t *done = make_bits(u->count);
     if (done)
-        look_through(r, u, done);
+        inspect_untouched_faces(r, u, done);
     else
         r->status = fail_bits(u->count, r->error);
     free(done);

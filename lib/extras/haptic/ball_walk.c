@@ -33,40 +33,40 @@ typedef struct trial {
     double *out;
 } trial;
 
-static void try_way(trial *t, const double way[3], double slack)
+static void try_motion(trial *t, const double motion[3], double slack)
 {
     double lost[3];
     for (int i = 0; i < t->planes->count; i++)
-        if (ebpo_vec3_dot(way, t->planes->normal[i]) < -slack)
+        if (ebpo_vec3_dot(motion, t->planes->normal[i]) < -slack)
             return;
-    ebpo_vec3_subtract(t->want, way, lost);
+    ebpo_vec3_subtract(t->want, motion, lost);
     double square = ebpo_vec3_dot(lost, lost);
     if (square < t->best) {
         t->best = square;
         t->slack = slack;
-        ebpo_vec3_copy(way, t->out);
+        ebpo_vec3_copy(motion, t->out);
     }
 }
 
 static void try_plane(trial *t, const double n[3], double slack)
 {
-    double way[3], into = ebpo_vec3_dot(t->want, n);
+    double motion[3], into = ebpo_vec3_dot(t->want, n);
     for (int i = 0; i < 3; i++)
-        way[i] = t->want[i] - into * n[i];
-    try_way(t, way, slack);
+        motion[i] = t->want[i] - into * n[i];
+    try_motion(t, motion, slack);
 }
 
 static void try_line(trial *t, const double m[3], const double n[3], double slack)
 {
-    double line[3], way[3];
+    double line[3], motion[3];
     ebpo_vec3_cross(m, n, line);
     double square = ebpo_vec3_dot(line, line);
     if (!(square > 0x1p-40))
         return;
     double part = ebpo_vec3_dot(t->want, line) / square;
     for (int i = 0; i < 3; i++)
-        way[i] = part * line[i];
-    try_way(t, way, slack / sqrt(square));
+        motion[i] = part * line[i];
+    try_motion(t, motion, slack / sqrt(square));
 }
 
 double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], double out[3])
@@ -75,7 +75,7 @@ double ebpo_hold_back(const ebpo_held_planes *planes, const double want[3], doub
     trial t = { planes, want, length, INFINITY, slack, out };
     for (int i = 0; i < 3; i++)
         out[i] = 0;
-    try_way(&t, want, slack);
+    try_motion(&t, want, slack);
     if (t.best == 0)
         return slack;
     for (int i = 0; i < planes->count; i++)
@@ -139,7 +139,7 @@ static bool goes_away(const ebpo_ball_walk *w, const ebpo_extent *e)
 {
     double least = 0;
     for (int i = 0; i < 3; i++)
-        least += w->way[i] * (w->from[i] - (w->way[i] > 0 ? e->max[i] : e->min[i]));
+        least += w->motion[i] * (w->from[i] - (w->motion[i] > 0 ? e->max[i] : e->min[i]));
     return least >= 0;
 }
 
@@ -152,13 +152,13 @@ static double ball_walk_soonest(const ebpo_ball_walk *w, const ebpo_extent *e)
     for (int step = 0; step < STEPS; step++) {
         double off[3];
         for (int i = 0; i < 3; i++) {
-            double x = w->from[i] + part * w->way[i];
+            double x = w->from[i] + part * w->motion[i];
             off[i] = x > e->max[i] ? x - e->max[i] : x < e->min[i] ? x - e->min[i] : 0;
         }
         double distance = sqrt(ebpo_vec3_dot(off, off)), gap = distance - (w->reach + 2 * w->band);
         if (gap <= 0)
             return part > 0 ? part : goes_away(w, e) ? INFINITY : gap;
-        double slope = ebpo_vec3_dot(off, w->way) / distance;
+        double slope = ebpo_vec3_dot(off, w->motion) / distance;
         if (!(slope < 0))
             return INFINITY;
         part -= gap / slope;
@@ -188,12 +188,13 @@ void ebpo_ball_set_out(ebpo_ball_walk *w)
 
 static void inspect_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
 {
-    const ebpo_ball_way way = { w->from, w->way, w->reach, w->band, w->slack, w->least_slack };
+    const ebpo_ball_motion motion = { w->from, w->motion, w->reach,
+                                      w->band, w->slack,  w->least_slack };
     uint64_t f = leaf * EBPO_FACE_BOX_LEAF, end = f + EBPO_FACE_BOX_LEAF;
     for (; f < end && f < w->box->count; f++) {
         double away[3];
         double intersected =
-            ebpo_ball_intersects(&way, (const double(*)[3])w->box->corner[f], away);
+            ebpo_ball_intersects(&motion, (const double(*)[3])w->box->corner[f], away);
         work->faces++;
         if (intersected > w->part)
             continue;
@@ -206,7 +207,7 @@ static void inspect_leaf(ebpo_ball_walk *w, uint64_t leaf, ebpo_ball_work *work)
 
 /* Ends the path before the first waiting node; all nodes not visited are farther along the path.
  * Returns false if hardly any path remains. */
-static bool end_before_that(ebpo_ball_walk *w)
+static bool end_before_waiting(ebpo_ball_walk *w)
 {
     if (w->part <= 0)
         return true;
@@ -218,7 +219,7 @@ static bool end_before_that(ebpo_ball_walk *w)
     return true;
 }
 
-static bool ball_walk_look(ebpo_ball_walk *w, ebpo_ball_work *work)
+static bool find_contact(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
     uint32_t held = work->faces; /* number of faces visited before the contact */
     while (w->queue.count > 0 && w->queue.item[0].key < w->part) {
@@ -227,7 +228,7 @@ static bool ball_walk_look(ebpo_ball_walk *w, ebpo_ball_work *work)
             break;
         if (work->faces + EBPO_FACE_BOX_LEAF + KEPT_FACES > EBPO_BALL_FACES ||
             work->nodes + 2 + KEPT_NODES > EBPO_BALL_NODES) {
-            if (!end_before_that(w))
+            if (!end_before_waiting(w))
                 return false;
             break;
         }
@@ -248,7 +249,7 @@ static void begin_check(ebpo_ball_walk *w)
 {
     w->stage = EBPO_BALL_CHECKS;
     for (int i = 0; i < 3; i++)
-        w->to[i] = w->from[i] + w->part * w->way[i];
+        w->to[i] = w->from[i] + w->part * w->motion[i];
     w->depth = 0;
     if (w->part > 0 && w->box && w->box->count > 0)
         w->stack[w->depth++] = 1;
@@ -306,7 +307,7 @@ static ebpo_ball_end ball_walk_check(ebpo_ball_walk *w, ebpo_ball_work *work)
 ebpo_ball_end ebpo_ball_go_on(ebpo_ball_walk *w, ebpo_ball_work *work)
 {
     if (w->stage == EBPO_BALL_LOOKS) {
-        if (!ball_walk_look(w, work))
+        if (!find_contact(w, work))
             return EBPO_BALL_LATER;
         begin_check(w);
     }

@@ -42,8 +42,8 @@ typedef enum ebpo_ball_stage {
 typedef struct ebpo_ball_walk {
     ebpo_ball_stage stage;
     const ebpo_face_box *box; /* unchanged until the ball stops; NULL: no faces are on the path */
-    double from[3], way[3];
-    double reach, band, slack, least_slack; /* as in ebpo_ball_way */
+    double from[3], motion[3];
+    double reach, band, slack, least_slack; /* as in ebpo_ball_motion */
     double part;                            /* part of the path until the first contact */
     ebpo_held_planes intersected;           /* normals of the contacts there */
     bool cut;                               /* the path ends before the contact, because the work
@@ -59,7 +59,7 @@ EBPO_MUST_USE ebpo_status ebpo_ball_walk_new(ebpo_ball_walk *w, uint64_t faces, 
 void ebpo_ball_walk_free(ebpo_ball_walk *w);
 uint64_t ebpo_ball_walk_bytes(uint64_t faces);
 
-/* Begins a piece; from, way, box, reach, band and slacks must be set. */
+/* Begins a piece; from, motion, box, reach, band and slacks must be set. */
 void ebpo_ball_set_out(ebpo_ball_walk *w);
 
 typedef enum ebpo_ball_end {

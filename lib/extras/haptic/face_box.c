@@ -320,16 +320,16 @@ void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_nea
 
 enum { STEPS = 24 };
 
-double ebpo_ball_intersects(const ebpo_ball_way *w, const double face[3][3], double away[3])
+double ebpo_ball_intersects(const ebpo_ball_motion *w, const double face[3][3], double away[3])
 {
     double part = 0;
     for (int step = 0; step < STEPS; step++) {
         double x[3];
         ebpo_face_near near;
         for (int i = 0; i < 3; i++)
-            x[i] = w->from[i] + part * w->way[i];
+            x[i] = w->from[i] + part * w->motion[i];
         ebpo_face_nearest(x, face, &near);
-        double gap = near.distance - w->reach, slope = ebpo_vec3_dot(near.away, w->way);
+        double gap = near.distance - w->reach, slope = ebpo_vec3_dot(near.away, w->motion);
         for (int i = 0; i < 3; i++)
             away[i] = near.away[i];
         if (slope >= -(gap > 0 ? w->slack : w->least_slack))
@@ -375,14 +375,14 @@ static bool intersects_in_plane(const double p[3], const double q[3], const doub
         corner[k][1] = face[k][v];
         turn[k] = ebpo_orient2d_expansion(a, b, corner[k]);
     }
-    int way = ebpo_orient2d_expansion(corner[0], corner[1], corner[2]);
-    if (way != 1 && way != -1)
-        return way != 0;
+    int turn = ebpo_orient2d_expansion(corner[0], corner[1], corner[2]);
+    if (turn != 1 && turn != -1)
+        return turn != 0;
     if (turn[0] == turn[1] && turn[1] == turn[2] && (turn[0] == 1 || turn[0] == -1))
         return false;
     for (int k = 0; k < 3; k++)
-        if (ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], a) == -way &&
-            ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], b) == -way)
+        if (ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], a) == -turn &&
+            ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], b) == -turn)
             return false;
     /* the view is a line: compare along this line, too */
     for (int i = 0; i < 2; i++)

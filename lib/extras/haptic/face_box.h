@@ -69,17 +69,17 @@ typedef struct ebpo_face_near {
 /* Computes in doubles: correct to some ulps of the coordinates. */
 void ebpo_face_nearest(const double p[3], const double face[3][3], ebpo_face_near *out);
 
-typedef struct ebpo_ball_way {
-    const double *from, *way; /* [3] */
-    double reach, band;       /* the ball's radius; contact begins at a distance of reach + band */
+typedef struct ebpo_ball_motion {
+    const double *from, *motion; /* [3] */
+    double reach, band; /* the ball's radius; contact begins at a distance of reach + band */
     /* If the ball comes nearer to a face by less than this over the whole path, that is no
      * approach. least_slack is used where the ball is already closer than its radius. */
     double slack, least_slack;
-} ebpo_ball_way;
+} ebpo_ball_motion;
 
 /* Returns the part of the path, 0 to 1 or slightly less, at which the ball touches the face; 2 if
  * it does not. `away` is as in ebpo_face_near, at that point. */
-double ebpo_ball_intersects(const ebpo_ball_way *w, const double face[3][3], double away[3]);
+double ebpo_ball_intersects(const ebpo_ball_motion *w, const double face[3][3], double away[3]);
 
 /* Returns false if the closed segment and the closed face certainly have no common point. Returns
  * true if they have one, or if numbers are so large or small that only integers of any size could

@@ -51,7 +51,7 @@ static uint32_t move_rub(ebpo_haptic *t, const double from[3], const double devi
     for (int i = 0; i < 3; i++)
         goal[i] = from[i] + part * slid[i] + (part > 0 ? depth[i] : 0);
     ebpo_vec3_copy(from, t->proxy);
-    t->way_count = 1;
+    t->path_count = 1;
     if (part > 0)
         return ebpo_haptic_go(t, goal, work);
     if (length > 0 && memcmp(from, t->along_at, sizeof t->along_at) == 0)
@@ -63,13 +63,13 @@ static uint32_t move_rub(ebpo_haptic *t, const double from[3], const double devi
  * this is only the part that faces hold back. */
 static void find_depth(const ebpo_haptic *t, const double device[3], uint32_t flags, double out[3])
 {
-    double want[3], way[3];
+    double want[3], motion[3];
     ebpo_vec3_subtract(t->proxy, device, out);
     if (!(flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE)))
         return;
     ebpo_vec3_subtract(device, t->proxy, want);
-    (void)ebpo_hold_back(&t->planes, want, way);
-    ebpo_vec3_subtract(way, want, out);
+    (void)ebpo_hold_back(&t->planes, want, motion);
+    ebpo_vec3_subtract(motion, want, out);
 }
 
 /* Removes the part of the force that pulls towards faces, without increasing the force. The vector
@@ -131,7 +131,7 @@ void ebpo_haptic_step_ball(ebpo_haptic *t, const double device[3], ebpo_haptic_b
     }
     out->work = work.faces;
     out->flags |= flags | ebpo_haptic_stopped(t);
-    ebpo_haptic_look(t, out);
+    ebpo_haptic_find_nearest(t, out);
     t->touching = (flags & EBPO_HAPTIC_CONTACT) != 0;
     if (t->touching) {
         double depth[3];
@@ -170,9 +170,9 @@ ebpo_status ebpo_haptic_get_stats(const ebpo_haptic *t, ebpo_haptic_stats *out)
 
 uint32_t ebpo_haptic_ball_path(const ebpo_haptic *t, double path[EBPO_HAPTIC_PATH_MAX][3])
 {
-    for (uint32_t i = 0; i < t->way_count; i++)
-        ebpo_vec3_copy(t->way[i], path[i]);
-    return t->way_count;
+    for (uint32_t i = 0; i < t->path_count; i++)
+        ebpo_vec3_copy(t->path[i], path[i]);
+    return t->path_count;
 }
 
 /* --- making the object --- */

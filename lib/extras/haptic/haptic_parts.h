@@ -54,14 +54,14 @@ struct ebpo_haptic {
     ebpo_held_planes planes; /* planes that hold the proxy after the last complete piece */
     uint32_t cut;            /* flags to return when the end of the piece is reached */
     bool felt;               /* a complete piece leads to the device's position */
-    double way[EBPO_HAPTIC_PATH_MAX][3];
-    uint32_t way_count;
+    double path[EBPO_HAPTIC_PATH_MAX][3];
+    uint32_t path_count;
     double stride; /* maximum length of a piece of a tool's path */
     ebpo_passive passive;
     struct ebpo_tool *tool; /* or NULL */
     ebpo_haptic_stats stats;
     uint32_t found[EBPO_HAPTIC_FACES];
-    ebpo_near_node looking[EBPO_HAPTIC_VISITS + 2];
+    ebpo_near_node nearest_queue[EBPO_HAPTIC_VISITS + 2];
     double gap[EBPO_HAPTIC_FACES];
     double away[3];              /* direction away from the nearest face, if one was found */
     ebpo_context *proxy_context; /* for placing the proxy */
@@ -100,12 +100,12 @@ struct ebpo_haptic {
  * Returns bits of ebpo_haptic_flag. */
 uint32_t ebpo_haptic_go(ebpo_haptic *t, const double goal[3], ebpo_ball_work *work);
 
-/* Returns the part of the straight path `way` of the proxy for which all faces within `reach` are
- * known: up to the boundary of the current box, or the whole path where no face can be. */
-double ebpo_haptic_known_part(const ebpo_haptic *t, const double way[3], double reach);
+/* Returns the part of the straight path `motion` of the proxy for which all faces within `reach`
+ * are known: up to the boundary of the current box, or the whole path where no face can be. */
+double ebpo_haptic_known_part(const ebpo_haptic *t, const double motion[3], double reach);
 
 /* haptic_step.c: finds the nearest face, weights, depth and the smooth normal; sets t->away. */
-void ebpo_haptic_look(ebpo_haptic *t, ebpo_haptic_ball_result *out);
+void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out);
 
 /* Returns the last result of the loading thread. */
 const ebpo_known_place *ebpo_haptic_known(ebpo_haptic *t);

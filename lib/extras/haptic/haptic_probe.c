@@ -39,7 +39,7 @@ static bool sense_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_probe
                         bounds *b)
 {
     ebpo_haptic_ball_result near = { 0 };
-    ebpo_haptic_look(t, &near);
+    ebpo_haptic_find_nearest(t, &near);
     out->work += near.work;
     out->flags |= near.flags;
     out->face = near.face;
@@ -49,9 +49,9 @@ static bool sense_faces(ebpo_haptic *t, const double place[3], ebpo_haptic_probe
     bool all = !(near.flags & EBPO_HAPTIC_PARTIAL);
     double distance = INFINITY, search_radius = t->options.search_radius;
     if (near.face != EBPO_NO_FACE) {
-        double way[3];
-        ebpo_vec3_subtract(place, near.point, way);
-        distance = sqrt(ebpo_vec3_dot(way, way));
+        double motion[3];
+        ebpo_vec3_subtract(place, near.point, motion);
+        distance = sqrt(ebpo_vec3_dot(motion, motion));
     }
     double nearer = fmin(distance, search_radius);
     sense_narrow(b, all ? nearer - rounding_of(t, nearer) : 0, distance + rounding_of(t, distance));
@@ -63,11 +63,12 @@ static bool sense_known(ebpo_haptic *t, const double place[3], ebpo_haptic_probe
                         bounds *b)
 {
     const ebpo_known_place *known = ebpo_haptic_known(t);
-    double way[3];
+    double motion[3];
     if (!known->there)
         return false;
-    ebpo_vec3_subtract(place, known->place, way);
-    double far = sqrt(ebpo_vec3_dot(way, way)), rounding = rounding_of(t, far + known->distance);
+    ebpo_vec3_subtract(place, known->place, motion);
+    double far = sqrt(ebpo_vec3_dot(motion, motion)),
+           rounding = rounding_of(t, far + known->distance);
     sense_narrow(b, known->distance - far - rounding, known->distance + far + rounding);
     if (out->normal[0] == 0 && out->normal[1] == 0 && out->normal[2] == 0)
         ebpo_vec3_copy(known->normal, out->normal);

@@ -152,11 +152,11 @@ static void report_normal(const around *a, double out[3])
         out[i] = length > 0 ? sum[i] / length : 0;
 }
 
-void ebpo_haptic_look(ebpo_haptic *t, ebpo_haptic_ball_result *out)
+void ebpo_haptic_find_nearest(ebpo_haptic *t, ebpo_haptic_ball_result *out)
 {
     around a = { .t = t,
                  .box = &t->box[t->at],
-                 .queue = { t->looking, 0 },
+                 .queue = { t->nearest_queue, 0 },
                  .search_radius = t->options.search_radius,
                  .nearest = INFINITY,
                  .out = out };
@@ -178,16 +178,16 @@ void ebpo_haptic_look(ebpo_haptic *t, ebpo_haptic_ball_result *out)
 typedef struct step {
     ebpo_haptic *t;
     const double *goal;
-    double way[3], slack, least_slack;
+    double motion[3], slack, least_slack;
     uint32_t flags;
     ebpo_ball_work *work;
 } step;
 
-static void step_swept(const double p[3], const double way[3], double wider, ebpo_extent *out)
+static void step_swept(const double p[3], const double motion[3], double wider, ebpo_extent *out)
 {
     for (int i = 0; i < 3; i++) {
-        out->min[i] = fmin(p[i], p[i] + way[i]) - wider;
-        out->max[i] = fmax(p[i], p[i] + way[i]) + wider;
+        out->min[i] = fmin(p[i], p[i] + motion[i]) - wider;
+        out->max[i] = fmax(p[i], p[i] + motion[i]) + wider;
     }
 }
 
@@ -199,45 +199,45 @@ static bool step_apart(const ebpo_extent *a, const ebpo_extent *b)
     return false;
 }
 
-static void step_shorten(double way[3], double part)
+static void step_shorten(double motion[3], double part)
 {
     for (int i = 0; i < 3; i++)
-        way[i] *= part;
+        motion[i] *= part;
 }
 
 /* Returns the part of the path from a point inside `e` to the boundary of `e`; slightly less, so
  * that the rounded end is inside. */
-static double part_inside(const double p[3], const double way[3], const ebpo_extent *e)
+static double part_inside(const double p[3], const double motion[3], const ebpo_extent *e)
 {
     double part = 1;
     for (int i = 0; i < 3; i++) {
-        double to = p[i] + way[i];
+        double to = p[i] + motion[i];
         if (to > e->max[i])
-            part = fmin(part, (e->max[i] - p[i]) / way[i]);
+            part = fmin(part, (e->max[i] - p[i]) / motion[i]);
         else if (to < e->min[i])
-            part = fmin(part, (e->min[i] - p[i]) / way[i]);
+            part = fmin(part, (e->min[i] - p[i]) / motion[i]);
     }
     return part < 1 ? fmax(0, part * (1 - 0x1p-20)) : 1;
 }
 
-double ebpo_haptic_known_part(const ebpo_haptic *t, const double way[3], double reach)
+double ebpo_haptic_known_part(const ebpo_haptic *t, const double motion[3], double reach)
 {
     const ebpo_extent *centres = &t->box[t->at].centres;
     ebpo_extent all;
-    step_swept(t->proxy, way, reach, &all);
+    step_swept(t->proxy, motion, reach, &all);
     if (step_apart(&all, &t->root))
         return 1;
-    return ebpo_extent_holds(centres, t->proxy) ? part_inside(t->proxy, way, centres) : 0;
+    return ebpo_extent_holds(centres, t->proxy) ? part_inside(t->proxy, motion, centres) : 0;
 }
 
 /* Cuts the path to the part where all faces around it are known. Returns false if there is none. */
 static bool keep_known(step *s)
 {
     ebpo_haptic *t = s->t;
-    double part = ebpo_haptic_known_part(t, s->way, t->reach + t->band);
+    double part = ebpo_haptic_known_part(t, s->motion, t->reach + t->band);
     if (part < 1) {
         t->cut = EBPO_HAPTIC_WAITING;
-        step_shorten(s->way, part);
+        step_shorten(s->motion, part);
     }
     if (part <= 0 && !ebpo_extent_holds(&t->box[t->at].centres, t->proxy)) {
         s->flags |= EBPO_HAPTIC_WAITING;
@@ -261,11 +261,11 @@ static bool set_out(step *s)
     if (memcmp(t->along_at, t->proxy, sizeof t->along_at) != 0)
         t->along.count = 0;
     ebpo_vec3_subtract(s->goal, t->proxy, want);
-    s->slack = ebpo_hold_back(&t->along, want, s->way);
-    if (step_differ(s->way, want))
+    s->slack = ebpo_hold_back(&t->along, want, s->motion);
+    if (step_differ(s->motion, want))
         s->flags |= EBPO_HAPTIC_CONTACT;
     s->least_slack = 0x1p-44 * sqrt(ebpo_vec3_dot(want, want));
-    double whole = sqrt(ebpo_vec3_dot(s->way, s->way));
+    double whole = sqrt(ebpo_vec3_dot(s->motion, s->motion));
     if (whole <= 0x1p-12 * t->options.skin)
         return false;
     t->cut = 0;
@@ -273,10 +273,10 @@ static bool set_out(step *s)
         return false;
     /* Slacks for the whole path, scaled to this part: for a distant device they would otherwise be
      * those of long pieces. */
-    double share = sqrt(ebpo_vec3_dot(s->way, s->way)) / whole;
+    double share = sqrt(ebpo_vec3_dot(s->motion, s->motion)) / whole;
     const ebpo_face_box *box = &t->box[t->at];
     ebpo_vec3_copy(t->proxy, w->from);
-    ebpo_vec3_copy(s->way, w->way);
+    ebpo_vec3_copy(s->motion, w->motion);
     w->box = ebpo_extent_holds(&box->centres, t->proxy) ? box : NULL; /* NULL is possible: see
                                                                        * keep_known */
     w->reach = t->reach;
@@ -289,12 +289,12 @@ static bool set_out(step *s)
 
 /* Makes space for more planes: drops planes along which the last path did not go. Three planes are
  * enough to hold the proxy. */
-static void reserve_space(ebpo_held_planes *along, const double way[3])
+static void reserve_space(ebpo_held_planes *along, const double motion[3])
 {
-    double length = sqrt(ebpo_vec3_dot(way, way));
+    double length = sqrt(ebpo_vec3_dot(motion, motion));
     int kept = 0;
     for (int i = 0; i < along->count; i++)
-        if (ebpo_vec3_dot(along->normal[i], way) <= 0x1p-30 * length)
+        if (ebpo_vec3_dot(along->normal[i], motion) <= 0x1p-30 * length)
             ebpo_vec3_copy(along->normal[i], along->normal[kept++]);
     along->count = kept < EBPO_PLANES_LIMIT ? kept : kept - 1;
 }
@@ -305,7 +305,7 @@ static void add_planes(ebpo_haptic *t)
     if (w->part > 0)
         t->along.count = 0;
     else if (t->along.count + w->intersected.count > EBPO_PLANES_LIMIT)
-        reserve_space(&t->along, w->way);
+        reserve_space(&t->along, w->motion);
     for (int i = 0; i < w->intersected.count; i++)
         ebpo_held_planes_add(&t->along, w->intersected.normal[i]);
     ebpo_vec3_copy(t->proxy, t->along_at);
@@ -320,7 +320,7 @@ static bool step_settle(step *s)
     bool touches = !w->cut && w->part < 1;
     if (w->part > 0) {
         ebpo_vec3_copy(w->to, t->proxy);
-        ebpo_vec3_copy(w->to, t->way[t->way_count++]);
+        ebpo_vec3_copy(w->to, t->path[t->path_count++]);
     }
     if (touches)
         add_planes(t);
@@ -334,12 +334,12 @@ static bool step_settle(step *s)
 static uint32_t still_held(const step *s)
 {
     const ebpo_haptic *t = s->t;
-    double want[3], way[3];
+    double want[3], motion[3];
     if (t->felt)
         return 0;
     ebpo_vec3_subtract(s->goal, t->proxy, want);
-    (void)ebpo_hold_back(&t->planes, want, way);
-    return step_differ(way, want) ? EBPO_HAPTIC_CONTACT : 0;
+    (void)ebpo_hold_back(&t->planes, want, motion);
+    return step_differ(motion, want) ? EBPO_HAPTIC_CONTACT : 0;
 }
 
 static uint32_t go_by_pieces(step *s)
@@ -370,8 +370,8 @@ uint32_t ebpo_haptic_go(ebpo_haptic *t, const double goal[3], ebpo_ball_work *wo
     step s = { .t = t, .goal = goal, .work = work };
     double left[3];
     t->felt = false;
-    t->way_count = 0;
-    ebpo_vec3_copy(t->proxy, t->way[t->way_count++]);
+    t->path_count = 0;
+    ebpo_vec3_copy(t->proxy, t->path[t->path_count++]);
     uint32_t flags = go_by_pieces(&s);
     ebpo_vec3_subtract(goal, t->proxy, left);
     bool there = sqrt(ebpo_vec3_dot(left, left)) <= 0x1p-12 * t->options.skin;

@@ -38,7 +38,7 @@ static tool_piece piece_of(ebpo_haptic *t, uint64_t *work)
                          tool,
                          known ? box : NULL,
                          t->options.skin,
-                         sqrt(ebpo_vec3_dot(tool->way + 3, tool->way + 3)) / tool->arm,
+                         sqrt(ebpo_vec3_dot(tool->motion + 3, tool->motion + 3)) / tool->arm,
                          work };
 }
 
@@ -68,12 +68,12 @@ static double tool_step_clearance(const tool_piece *p, const ebpo_extent *e, uin
 /* Bounds the motion of a point, given its lever arm about the centre of rotation. */
 static double tool_step_far(const tool_piece *p, double lever)
 {
-    return sqrt(ebpo_vec3_dot(p->tool->way, p->tool->way)) + lever * p->turned;
+    return sqrt(ebpo_vec3_dot(p->tool->motion, p->tool->motion)) + lever * p->turned;
 }
 
 static double lever_of(const double p[3]) { return sqrt(ebpo_vec3_dot(p, p)); }
 
-static double max_way(const tool_piece *p, const ebpo_tool_cluster *c)
+static double max_motion(const tool_piece *p, const ebpo_tool_cluster *c)
 {
     return tool_step_far(p, lever_of(c->middle) + c->radius) * (1 + 0x1p-40);
 }
@@ -83,14 +83,14 @@ static double max_way(const tool_piece *p, const ebpo_tool_cluster *c)
 static bool add_close(const tool_piece *p, uint32_t point)
 {
     ebpo_tool *tool = p->tool;
-    double from[3], way[3], to[3];
+    double from[3], motion[3], to[3];
     ebpo_extent e;
     uint32_t count, visits = FACE_VISITS;
     ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[point], from);
-    ebpo_rigid_lever((const double(*)[3])tool->to_matrix, tool->point[point], way);
+    ebpo_rigid_lever((const double(*)[3])tool->to_matrix, tool->point[point], motion);
     for (int i = 0; i < 3; i++)
-        to[i] = tool->proxy.place[i] + tool->way[i] + way[i];
-    ebpo_vec3_subtract(to, from, way);
+        to[i] = tool->proxy.place[i] + tool->motion[i] + motion[i];
+    ebpo_vec3_subtract(to, from, motion);
     tool_step_around(from, to, search * p->skin, &e);
     if (tool->pool_count + EBPO_TOOL_NEAR > EBPO_TOOL_POOL)
         return false;
@@ -99,7 +99,7 @@ static bool add_close(const tool_piece *p, uint32_t point)
     *p->work += FACE_VISITS - visits + FACE_COST * (uint64_t)count;
     if (!all)
         return false;
-    const ebpo_ball_way w = { from, way, blocks * p->skin, p->t->band, 0, 0 };
+    const ebpo_ball_motion w = { from, motion, blocks * p->skin, p->t->band, 0, 0 };
     for (uint32_t i = 0; i < count; i++) {
         double away[3];
         double intersected = ebpo_ball_intersects(
@@ -121,15 +121,15 @@ static bool inspect_points(const tool_piece *p, uint32_t number)
     double all = INFINITY;
     c->free = 0; /* 0 remains if the path is given up */
     for (uint32_t i = c->first; i < c->first + c->count; i++) {
-        double way = tool_step_far(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
-        if (tool->free[i] - c->gone - way <= 0) {
+        double motion = tool_step_far(p, lever_of(tool->point[i])) * (1 + 0x1p-40);
+        if (tool->free[i] - c->gone - motion <= 0) {
             double at[3];
             ebpo_extent e;
             ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, tool->point[i], at);
             tool_step_around(at, at, 0, &e);
             tool->free[i] = c->gone + tool_step_clearance(p, &e, POINT_VISITS) - need;
         }
-        if (tool->free[i] - c->gone - way <= 0 && !add_close(p, i))
+        if (tool->free[i] - c->gone - motion <= 0 && !add_close(p, i))
             return false;
         all = fmin(all, tool->free[i]);
     }
@@ -141,16 +141,16 @@ static bool inspect_cluster(const tool_piece *p, uint32_t number)
 {
     ebpo_tool *tool = p->tool;
     ebpo_tool_cluster *c = &tool->cluster[number];
-    double way = max_way(p, c);
+    double motion = max_motion(p, c);
     ++*p->work;
-    if (!p->box || c->free - c->gone - way > 0)
+    if (!p->box || c->free - c->gone - motion > 0)
         return true;
     double at[3], from_all;
     ebpo_extent e;
     ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, c->middle, at);
     tool_step_around(at, at, c->radius, &e);
     from_all = tool_step_clearance(p, &e, CLUSTER_VISITS) - search * p->skin;
-    if (from_all - way <= 0)
+    if (from_all - motion <= 0)
         return inspect_points(p, number);
     c->free = c->gone + from_all;
     for (uint32_t i = c->first; i < c->first + c->count; i++)
@@ -222,7 +222,7 @@ static void begin_check(ebpo_tool *tool)
     tool->next.count = 0;
     tool->end = tool->proxy;
     if (tool->part > 0)
-        ebpo_rigid_go(&tool->proxy, tool->way, tool->part, tool->arm, &tool->end);
+        ebpo_rigid_go(&tool->proxy, tool->motion, tool->part, tool->arm, &tool->end);
     ebpo_rigid_matrix(&tool->end, tool->end_matrix);
 }
 
@@ -231,7 +231,8 @@ static void tool_step_arrive(const tool_piece *p)
 {
     ebpo_tool *tool = p->tool;
     for (uint64_t i = 0; i < tool->cluster_count; i++)
-        tool->cluster[i].gone += tool->part * max_way(p, &tool->cluster[i]) + 0x1p-8 * p->t->band;
+        tool->cluster[i].gone +=
+            tool->part * max_motion(p, &tool->cluster[i]) + 0x1p-8 * p->t->band;
     tool->contacts = tool->next;
     tool->proxy = tool->end;
     tool->stage = EBPO_TOOL_STANDS;
@@ -239,33 +240,33 @@ static void tool_step_arrive(const tool_piece *p)
 
 /* Limits the angle: the path of a point differs from a straight one by at most lever * angle^2 / 8.
  */
-static void tool_step_limit(ebpo_haptic *t, double way[EBPO_SCREW], uint32_t *flags)
+static void tool_step_limit(ebpo_haptic *t, double motion[EBPO_SCREW], uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
     double most = fmin(0.25, sqrt(8 * bend * t->options.skin / tool->radius));
-    double angle = sqrt(ebpo_vec3_dot(way + 3, way + 3)) / tool->arm, part = 1;
+    double angle = sqrt(ebpo_vec3_dot(motion + 3, motion + 3)) / tool->arm, part = 1;
     if (angle > most)
         part = most / angle;
-    double length = ebpo_screw_length(way);
+    double length = ebpo_screw_length(motion);
     if (part * length > t->stride)
         part = t->stride / length;
     if (part >= 1)
         return;
     *flags |= EBPO_HAPTIC_INCOMPLETE;
     for (int k = 0; k < EBPO_SCREW; k++)
-        way[k] *= part;
+        motion[k] *= part;
 }
 
 /* Begins a tool's next piece; `flags` are returned at its end. Returns false if the piece cannot
  * begin. */
-static bool begin_tool_way(ebpo_haptic *t, const double wanted[EBPO_SCREW], uint32_t *flags)
+static bool begin_tool_motion(ebpo_haptic *t, const double wanted[EBPO_SCREW], uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
     for (int k = 0; k < EBPO_SCREW; k++)
-        tool->way[k] = wanted[k];
+        tool->motion[k] = wanted[k];
     tool->flags = 0;
-    tool_step_limit(t, tool->way, &tool->flags);
-    double part = ebpo_haptic_known_part(t, tool->way, tool->radius + search * t->options.skin);
+    tool_step_limit(t, tool->motion, &tool->flags);
+    double part = ebpo_haptic_known_part(t, tool->motion, tool->radius + search * t->options.skin);
     if (part < 1) {
         tool->flags |= EBPO_HAPTIC_WAITING;
         if (part <= 0) {
@@ -273,11 +274,11 @@ static bool begin_tool_way(ebpo_haptic *t, const double wanted[EBPO_SCREW], uint
             return false;
         }
         for (int k = 0; k < EBPO_SCREW; k++)
-            tool->way[k] *= part;
+            tool->motion[k] *= part;
     }
     ebpo_rigid_matrix(&tool->proxy, tool->from_matrix);
     ebpo_rigid end;
-    ebpo_rigid_go(&tool->proxy, tool->way, 1, tool->arm, &end);
+    ebpo_rigid_go(&tool->proxy, tool->motion, 1, tool->arm, &end);
     ebpo_rigid_matrix(&end, tool->to_matrix);
     tool->stage = EBPO_TOOL_LOOKS;
     tool->at = tool->close_count = tool->pool_count = 0;
@@ -288,13 +289,13 @@ static bool begin_tool_way(ebpo_haptic *t, const double wanted[EBPO_SCREW], uint
 /* Gives up a path with too many close faces; the next one is shorter. */
 static uint32_t give_up(tool_piece *p)
 {
-    p->t->stride = fmax(0.25 * ebpo_screw_length(p->tool->way), 0x1p-8 * p->skin);
+    p->t->stride = fmax(0.25 * ebpo_screw_length(p->tool->motion), 0x1p-8 * p->skin);
     p->tool->stage = EBPO_TOOL_STANDS;
     return EBPO_HAPTIC_INCOMPLETE;
 }
 
 /* Continues the piece; returns bits of ebpo_haptic_flag. *arrived: the end is reached. */
-static uint32_t continue_tool_way(ebpo_haptic *t, uint64_t *work, bool *arrived)
+static uint32_t continue_tool_motion(ebpo_haptic *t, uint64_t *work, bool *arrived)
 {
     tool_piece p = piece_of(t, work);
     ebpo_tool *tool = t->tool;
@@ -326,37 +327,38 @@ static double turn_closeness(const ebpo_haptic *t) { return 0x1p-6 * t->options.
 
 /* Applies Coulomb friction: shortens the path along the contacts by the friction times the part
  * that the contacts hold back. */
-static void turn_rub(const ebpo_haptic *t, const double want[EBPO_SCREW], double way[EBPO_SCREW])
+static void turn_rub(const ebpo_haptic *t, const double want[EBPO_SCREW], double motion[EBPO_SCREW])
 {
     double held[EBPO_SCREW];
     for (int k = 0; k < EBPO_SCREW; k++)
-        held[k] = want[k] - way[k];
-    double length = ebpo_screw_length(way), holds = t->options.friction * ebpo_screw_length(held);
+        held[k] = want[k] - motion[k];
+    double length = ebpo_screw_length(motion),
+           holds = t->options.friction * ebpo_screw_length(held);
     double part = length > holds ? 1 - holds / length : 0;
     for (int k = 0; k < EBPO_SCREW; k++)
-        way[k] *= part;
+        motion[k] *= part;
 }
 
 /* Begins the next piece. Returns false if the tool stays. */
 static bool set_out(ebpo_haptic *t, const ebpo_rigid *device, uint32_t *flags)
 {
     ebpo_tool *tool = t->tool;
-    double want[EBPO_SCREW], way[EBPO_SCREW];
+    double want[EBPO_SCREW], motion[EBPO_SCREW];
     ebpo_rigid_between(&tool->proxy, device, tool->arm, want);
-    int holding = ebpo_tool_hold(&tool->contacts, want, turn_closeness(t), true, way);
+    int holding = ebpo_tool_hold(&tool->contacts, want, turn_closeness(t), true, motion);
     if (holding > 0 && t->touching && t->options.friction > 0)
-        turn_rub(t, want, way);
-    if (ebpo_screw_length(way) <= turn_closeness(t) / 2)
+        turn_rub(t, want, motion);
+    if (ebpo_screw_length(motion) <= turn_closeness(t) / 2)
         return false;
-    return begin_tool_way(t, way, flags);
+    return begin_tool_motion(t, motion, flags);
 }
 
 static uint32_t turn_go(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *work)
 {
     ebpo_tool *tool = t->tool;
     uint32_t flags = 0;
-    tool->way_count = 1;
-    tool->way_of[0] = tool->proxy;
+    tool->path_count = 1;
+    tool->path[0] = tool->proxy;
     for (int piece = 0; piece < EBPO_TOOL_PIECES; piece++) {
         bool arrived;
         if (tool->stage == EBPO_TOOL_STANDS) {
@@ -367,10 +369,10 @@ static uint32_t turn_go(ebpo_haptic *t, const ebpo_rigid *device, uint64_t *work
             if (!set_out(t, device, &flags))
                 return flags;
         }
-        flags |= continue_tool_way(t, work, &arrived);
+        flags |= continue_tool_motion(t, work, &arrived);
         ebpo_vec3_copy(tool->proxy.place, t->proxy);
         if (arrived)
-            tool->way_of[tool->way_count++] = tool->proxy;
+            tool->path[tool->path_count++] = tool->proxy;
         if (!arrived || (flags & EBPO_HAPTIC_WAITING))
             return flags;
     }
@@ -383,12 +385,12 @@ static int find_depth(const ebpo_haptic *t, const ebpo_rigid *device, uint32_t f
                       double out[EBPO_SCREW])
 {
     const ebpo_tool *tool = t->tool;
-    double want[EBPO_SCREW], way[EBPO_SCREW];
+    double want[EBPO_SCREW], motion[EBPO_SCREW];
     ebpo_rigid_between(&tool->proxy, device, tool->arm, want);
-    int holding = ebpo_tool_hold(&tool->contacts, want, turn_closeness(t), false, way);
+    int holding = ebpo_tool_hold(&tool->contacts, want, turn_closeness(t), false, motion);
     bool part = flags & (EBPO_HAPTIC_WAITING | EBPO_HAPTIC_INCOMPLETE) || t->options.friction == 0;
     for (int k = 0; k < EBPO_SCREW; k++)
-        out[k] = (part ? way[k] : 0) - want[k];
+        out[k] = (part ? motion[k] : 0) - want[k];
     return holding;
 }
 
@@ -463,11 +465,11 @@ void ebpo_haptic_step_tool(ebpo_haptic *t, const double place[3], const double t
 
 uint32_t ebpo_haptic_tool_path(const ebpo_haptic *t, double path[EBPO_HAPTIC_PATH_MAX][7])
 {
-    uint32_t count = t->tool ? t->tool->way_count : 0;
+    uint32_t count = t->tool ? t->tool->path_count : 0;
     for (uint32_t i = 0; i < count; i++) {
-        ebpo_vec3_copy(t->tool->way_of[i].place, path[i]);
+        ebpo_vec3_copy(t->tool->path[i].place, path[i]);
         for (int k = 0; k < 4; k++)
-            path[i][3 + k] = t->tool->way_of[i].turn[k];
+            path[i][3 + k] = t->tool->path[i].turn[k];
     }
     return count;
 }

@@ -105,14 +105,14 @@ void ebpo_rigid_between(const ebpo_rigid *a, const ebpo_rigid *b, double arm,
         out[3 + i] = sine > 0 ? arm * (side * angle / sine) * q[i] : 0;
 }
 
-void ebpo_rigid_go(const ebpo_rigid *from, const double way[EBPO_SCREW], double part, double arm,
+void ebpo_rigid_go(const ebpo_rigid *from, const double motion[EBPO_SCREW], double part, double arm,
                    ebpo_rigid *out)
 {
     double by[4], q[4], place[3];
-    double angle = part * sqrt(ebpo_vec3_dot(way + 3, way + 3)) / arm;
+    double angle = part * sqrt(ebpo_vec3_dot(motion + 3, motion + 3)) / arm;
     for (int i = 0; i < 3; i++) {
-        place[i] = from->place[i] + part * way[i];
-        by[i] = angle > 0 ? sin(angle / 2) / angle * (part * way[3 + i] / arm) : 0;
+        place[i] = from->place[i] + part * motion[i];
+        by[i] = angle > 0 ? sin(angle / 2) / angle * (part * motion[3 + i] / arm) : 0;
     }
     by[3] = cos(angle / 2);
     rigid_multiply(by, from->turn, q);
@@ -176,22 +176,22 @@ typedef struct held {
 } held;
 
 static double tool_hold_lacks(const held *h, const ebpo_tool_contact *c,
-                              const double way[EBPO_SCREW])
+                              const double motion[EBPO_SCREW])
 {
     double space = h->release ? c->space : fmax(c->space, 0);
-    return -space - ebpo_screw_dot(c->grip, way);
+    return -space - ebpo_screw_dot(c->grip, motion);
 }
 
-static void tool_hold_sweep(held *h, double close, double way[EBPO_SCREW])
+static void tool_hold_sweep(held *h, double close, double motion[EBPO_SCREW])
 {
     for (int turn = 0; turn < SWEEPS; turn++) {
         double most = 0;
         for (int i = 0; i < h->count; i++) {
             const ebpo_tool_contact *c = &h->all->at[h->active[i]];
-            double by = fmax(tool_hold_lacks(h, c, way) / h->square[i], -h->force[i]);
+            double by = fmax(tool_hold_lacks(h, c, motion) / h->square[i], -h->force[i]);
             h->force[i] += by;
             for (int k = 0; k < EBPO_SCREW; k++)
-                way[k] += by * c->grip[k];
+                motion[k] += by * c->grip[k];
             most = fmax(most, fabs(by) * h->square[i]);
         }
         if (most <= close / 8)
@@ -199,12 +199,12 @@ static void tool_hold_sweep(held *h, double close, double way[EBPO_SCREW])
     }
 }
 
-static int max_offended(const held *h, double close, const double way[EBPO_SCREW])
+static int max_offended(const held *h, double close, const double motion[EBPO_SCREW])
 {
     int found = -1;
     double most = close;
     for (int i = 0; i < h->all->count; i++) {
-        double lack = tool_hold_lacks(h, &h->all->at[i], way);
+        double lack = tool_hold_lacks(h, &h->all->at[i], motion);
         if (lack > most) {
             most = lack;
             found = i;
@@ -378,7 +378,7 @@ void ebpo_tool_put(ebpo_tool *t, const ebpo_rigid *at)
     t->proxy = t->device = *at;
     t->stage = EBPO_TOOL_STANDS;
     t->contacts.count = 0;
-    t->way_count = 0;
+    t->path_count = 0;
     for (int k = 0; k < EBPO_SCREW; k++)
         t->force[k] = 0;
     for (uint64_t i = 0; i < t->cluster_count; i++)

@@ -39,7 +39,7 @@ void ebpo_rigid_between(const ebpo_rigid *a, const ebpo_rigid *b, double arm,
                         double out[EBPO_SCREW]);
 
 /* Moves by a part of the motion. */
-void ebpo_rigid_go(const ebpo_rigid *from, const double way[EBPO_SCREW], double part, double arm,
+void ebpo_rigid_go(const ebpo_rigid *from, const double motion[EBPO_SCREW], double part, double arm,
                    ebpo_rigid *out);
 
 void ebpo_rigid_matrix(const ebpo_rigid *r, double out[3][3]);
@@ -66,7 +66,7 @@ static inline double ebpo_screw_length(const double a[EBPO_SCREW])
 enum { EBPO_CONTACTS_MAX = 256 };
 
 typedef struct ebpo_tool_contact {
-    double grip[EBPO_SCREW]; /* grip . way is how far the point moves away from the face */
+    double grip[EBPO_SCREW]; /* grip . motion is how far the point moves away from the face */
     double space;            /* how far the point may come closer to the face; negative: it must
                               * move away */
     double gap;
@@ -127,15 +127,15 @@ typedef struct ebpo_tool {
     ebpo_tool_cluster *cluster;
 
     ebpo_rigid proxy, device;
-    ebpo_rigid way_of[EBPO_TOOL_PIECES + 1]; /* positions of the proxy in the last haptic step */
-    uint32_t way_count;
+    ebpo_rigid path[EBPO_TOOL_PIECES + 1]; /* positions of the proxy in the last haptic step */
+    uint32_t path_count;
     double force[EBPO_SCREW];
     ebpo_tool_contacts contacts,
         next; /* contacts at the proxy, and at the end of the checked path */
 
     /* The current piece of path; the next haptic step continues it. */
     ebpo_tool_stage stage;
-    double way[EBPO_SCREW], part; /* the piece is free up to this part */
+    double motion[EBPO_SCREW], part; /* the piece is free up to this part */
     ebpo_rigid end;
     double from_matrix[3][3], to_matrix[3][3], end_matrix[3][3];
     uint32_t flags;

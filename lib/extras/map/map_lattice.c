@@ -32,13 +32,13 @@ static ebpo_status take_map_options(ebpo_map_options *out, const ebpo_map_option
     return status;
 }
 
-ebpo_status ebpo_map_askers_make(ebpo_map_askers *out, ebpo_model *model,
-                                 const ebpo_map_options *options, ebpo_error *error)
+ebpo_status ebpo_map_queries_make(ebpo_map_queries *out, ebpo_model *model,
+                                  const ebpo_map_options *options, ebpo_error *error)
 {
     ebpo_distance_options distance = EBPO_DISTANCE_OPTIONS_INIT;
     distance.max_distance = options->max_distance;
     distance.unsigned_distance = options->unsigned_distance;
-    *out = (ebpo_map_askers){ .model = model, .distance = distance };
+    *out = (ebpo_map_queries){ .model = model, .distance = distance };
     out->threads = ebpo_thread_count(options->threads);
     /* fails for an unusable model before anything is made */
     ebpo_status status = ebpo_context_new(model, &out->context[0], error);
@@ -46,26 +46,26 @@ ebpo_status ebpo_map_askers_make(ebpo_map_askers *out, ebpo_model *model,
                              : status;
 }
 
-void ebpo_map_askers_free(ebpo_map_askers *askers)
+void ebpo_map_queries_free(ebpo_map_queries *queries)
 {
     for (int i = 0; i < EBPO_MAP_THREADS; i++)
-        ebpo_context_free(askers->context[i]);
+        ebpo_context_free(queries->context[i]);
 }
 
-ebpo_status ebpo_map_query(ebpo_map_askers *askers, unsigned worker, const double *points,
+ebpo_status ebpo_map_query(ebpo_map_queries *queries, unsigned worker, const double *points,
                            uint64_t count, ebpo_distance_result *results, ebpo_error *error)
 {
-    ebpo_context **own = &askers->context[worker];
-    ebpo_status status = *own ? EBPO_OK : ebpo_context_new(askers->model, own, error);
+    ebpo_context **own = &queries->context[worker];
+    ebpo_status status = *own ? EBPO_OK : ebpo_context_new(queries->model, own, error);
     return status == EBPO_OK
-               ? ebpo_distance_many(*own, points, count, &askers->distance, results, error)
+               ? ebpo_distance_many(*own, points, count, &queries->distance, results, error)
                : status;
 }
 
 /* --- given points --- */
 
 typedef struct points_job {
-    ebpo_map_askers askers;
+    ebpo_map_queries queries;
     const double *points;
     const uint64_t *order; /* order along the Morton curve; NULL: input order */
     double *distances;
@@ -85,7 +85,7 @@ static ebpo_status query_piece(void *context, uint64_t begin, uint64_t end, unsi
     for (uint64_t i = 0; status == EBPO_OK && i < count; i++)
         memcpy(points[i], j->points + 3 * place_of(j, begin + i), sizeof points[i]);
     if (status == EBPO_OK)
-        status = ebpo_map_query(&j->askers, worker, points[0], count, results, error);
+        status = ebpo_map_query(&j->queries, worker, points[0], count, results, error);
     for (uint64_t i = 0; status == EBPO_OK && i < count; i++)
         j->distances[place_of(j, begin + i)] = results[i].distance;
     free(points);
@@ -108,11 +108,11 @@ ebpo_status ebpo_map_points(ebpo_model *model, const double *points, uint64_t co
     uint64_t *order = model->whole ? NULL : ebpo_curve_order(&box, points, count);
     job.order = order; /* without memory for it, points are in input order: slower, with the same
                         * results */
-    status = ebpo_map_askers_make(&job.askers, model, &o, error);
+    status = ebpo_map_queries_make(&job.queries, model, &o, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(job.askers.threads, NULL, count, EBPO_MAP_PIECE, query_piece,
+        status = ebpo_parallel_for(job.queries.threads, NULL, count, EBPO_MAP_PIECE, query_piece,
                                    &job, &o.progress, "computing distances", error);
-    ebpo_map_askers_free(&job.askers);
+    ebpo_map_queries_free(&job.queries);
     free(order);
     return status;
 }
@@ -123,7 +123,7 @@ enum { BRICK = 16, SLAB_VALUES = 8 << 20 };
 #define POINTS_MAX (UINT64_C(1) << 40)
 
 typedef struct slab_job {
-    ebpo_map_askers askers;
+    ebpo_map_queries queries;
     const ebpo_lattice *lattice;
     uint64_t first, layers; /* first layer and number of layers of the group */
     uint64_t bricks[3];
@@ -182,8 +182,8 @@ static ebpo_status query_bricks(void *context, uint64_t begin, uint64_t end, uns
         points && results ? EBPO_OK : ebpo_fail_memory(error, EBPO_MAP_PIECE * sizeof *results);
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++) {
         brick b = brick_of(j, i);
-        status = ebpo_map_query(&j->askers, worker, points[0], lattice_fill(j, &b, points), results,
-                                error);
+        status = ebpo_map_query(&j->queries, worker, points[0], lattice_fill(j, &b, points),
+                                results, error);
         if (status == EBPO_OK)
             lattice_keep(j, &b, results);
     }
@@ -233,7 +233,7 @@ static ebpo_status map_slab(slab_job *j, const ebpo_map_options *o, ebpo_error *
         j->bricks[c] = (size[c] + BRICK - 1) / BRICK;
         bricks *= j->bricks[c];
     }
-    return ebpo_parallel_for(j->askers.threads, NULL, bricks, 1, query_bricks, j, &progress,
+    return ebpo_parallel_for(j->queries.threads, NULL, bricks, 1, query_bricks, j, &progress,
                              "computing distances", error);
 }
 
@@ -251,7 +251,7 @@ ebpo_status ebpo_map_lattice(ebpo_model *model, const ebpo_lattice *lattice,
         return status;
     uint64_t plane = lattice->count[0] * lattice->count[1], most = layers_of_slab(lattice);
     job.values = ebpo_alloc(most * plane, sizeof *job.values);
-    status = job.values ? ebpo_map_askers_make(&job.askers, model, &o, error)
+    status = job.values ? ebpo_map_queries_make(&job.queries, model, &o, error)
                         : ebpo_fail_memory(error, most * plane * sizeof *job.values);
     while (status == EBPO_OK && job.first < lattice->count[2]) {
         uint64_t left = lattice->count[2] - job.first;
@@ -261,7 +261,7 @@ ebpo_status ebpo_map_lattice(ebpo_model *model, const ebpo_lattice *lattice,
             status = take(user, job.values, job.first, job.layers, error);
         job.first += job.layers;
     }
-    ebpo_map_askers_free(&job.askers);
+    ebpo_map_queries_free(&job.queries);
     free(job.values);
     return status;
 }

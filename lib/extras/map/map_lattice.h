@@ -7,22 +7,22 @@
 enum { EBPO_MAP_THREADS = 256, EBPO_MAP_PIECE = 4096 };
 
 /* Query contexts: each worker has one, made at its first query. */
-typedef struct ebpo_map_askers {
+typedef struct ebpo_map_queries {
     ebpo_model *model;
     ebpo_distance_options distance;
     unsigned threads;
     ebpo_context *context[EBPO_MAP_THREADS];
-} ebpo_map_askers;
+} ebpo_map_queries;
 
-/* Reads the caller's options. The result must be freed by ebpo_map_askers_free, also after a
+/* Reads the caller's options. The result must be freed by ebpo_map_queries_free, also after a
  * failure. */
-EBPO_MUST_USE ebpo_status ebpo_map_askers_make(ebpo_map_askers *out, ebpo_model *model,
-                                               const ebpo_map_options *options, ebpo_error *error);
-void ebpo_map_askers_free(ebpo_map_askers *askers);
+EBPO_MUST_USE ebpo_status ebpo_map_queries_make(ebpo_map_queries *out, ebpo_model *model,
+                                                const ebpo_map_options *options, ebpo_error *error);
+void ebpo_map_queries_free(ebpo_map_queries *queries);
 
 /* Computes the distances of points[count][3], at most EBPO_MAP_PIECE of them, into results[count].
  */
-EBPO_MUST_USE ebpo_status ebpo_map_query(ebpo_map_askers *askers, unsigned worker,
+EBPO_MUST_USE ebpo_status ebpo_map_query(ebpo_map_queries *queries, unsigned worker,
                                          const double *points, uint64_t count,
                                          ebpo_distance_result *results, ebpo_error *error);
 

@@ -33,7 +33,7 @@ typedef struct triangles {
 } triangles;
 
 typedef struct search {
-    ebpo_map_askers askers;
+    ebpo_map_queries queries;
     const ebpo_mesh *mesh;
     const double *distances;
     ebpo_map_range_options o;
@@ -70,7 +70,7 @@ static void reach_bound(const search *s, triangle *t)
     t->upper += s->slack;
 }
 
-static bool in_the_way(const search *s, double upper)
+static bool needs_division(const search *s, double upper)
 {
     return upper > s->reach.lo * (1 + s->o.tolerance) && upper > s->reach.hi;
 }
@@ -78,7 +78,7 @@ static bool in_the_way(const search *s, double upper)
 /* Keeps a triangle for the next round, or uses its bound unchanged. */
 static ebpo_status reach_keep(search *s, triangles *list, const triangle *t, ebpo_error *error)
 {
-    if (!in_the_way(s, t->upper))
+    if (!needs_division(s, t->upper))
         return EBPO_OK;
     if (list->count == TRIANGLES_MAX || s->reach.queries >= s->allowed) {
         s->reach.hi = fmax(s->reach.hi, t->upper);
@@ -111,7 +111,7 @@ static ebpo_status query_middles(void *context, uint64_t begin, uint64_t end, un
                 s->middle[i][k][c] =
                     s->now.item[i].corner[k][c] / 2 + s->now.item[i].corner[(k + 1) % 3][c] / 2;
     ebpo_status status =
-        ebpo_map_query(&s->askers, worker, s->middle[begin][0], 3 * (end - begin), results, error);
+        ebpo_map_query(&s->queries, worker, s->middle[begin][0], 3 * (end - begin), results, error);
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
         for (int k = 0; k < 3; k++)
             s->middle_away[i][k] = fabs(results[3 * (i - begin) + (uint64_t)k].distance);
@@ -178,7 +178,7 @@ static ebpo_status reach_refine(search *s, ebpo_error *error)
         if (!ebpo_grow(&s->middle, &s->middle_capacity, s->cut, sizeof *s->middle) ||
             !ebpo_grow(&s->middle_away, &s->away_capacity, s->cut, sizeof *s->middle_away))
             return ebpo_fail_memory(error, s->cut * sizeof *s->middle);
-        status = ebpo_parallel_for(s->askers.threads, NULL, s->cut, 256, query_middles, s, &none,
+        status = ebpo_parallel_for(s->queries.threads, NULL, s->cut, 256, query_middles, s, &none,
                                    "", error);
         if (status == EBPO_OK)
             status = reach_cut(s, error);
@@ -283,10 +283,10 @@ ebpo_status ebpo_map_find_range(ebpo_model *model, const ebpo_mesh *mesh, const 
         return status;
     query_options.unsigned_distance = true;
     query_options.threads = s.o.threads;
-    status = ebpo_map_askers_make(&s.askers, model, &query_options, error);
+    status = ebpo_map_queries_make(&s.queries, model, &query_options, error);
     if (status == EBPO_OK)
         status = search_all(&s, error);
-    ebpo_map_askers_free(&s.askers);
+    ebpo_map_queries_free(&s.queries);
     free(s.now.item);
     free(s.next.item);
     free(s.middle);

@@ -105,19 +105,19 @@ static ebpo_status approach_go(const travel *t, ebpo_scene_evaluations *evaluati
     }
 }
 
-static ebpo_status find_way(const void *how, const ebpo_scene_pair *pair, void *result,
-                            ebpo_error *error)
+static ebpo_status find_approach(const void *how, const ebpo_scene_pair *pair, void *result,
+                                 ebpo_error *error)
 {
     const travel *t = how;
-    ebpo_scene_approach_result *way = result;
+    ebpo_scene_approach_result *approach = result;
     ebpo_scene_evaluations evaluations;
-    *way = (ebpo_scene_approach_result){
+    *approach = (ebpo_scene_approach_result){
         .a = pair->a, .b = pair->b, .time = t->from, .clearance = pair->clearance
     };
     ebpo_status status =
         ebpo_scene_evaluations_begin(&evaluations, t->scene, pair, t->how.tolerance, error);
     if (status == EBPO_OK)
-        status = approach_go(t, &evaluations, way, error);
+        status = approach_go(t, &evaluations, approach, error);
     ebpo_collider_free(evaluations.collider);
     return status;
 }
@@ -128,10 +128,10 @@ ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
 {
     EBPO_DEFAULT_FP;
     travel t = { .scene = scene, .how = EBPO_SCENE_APPROACH_OPTIONS_INIT, .from = from, .to = to };
-    void *ways = NULL;
+    void *approaches = NULL;
     uint64_t count = 0;
     ebpo_status status = ebpo_scene_take_approach_options(&t.how, options, error);
-    ebpo_scene_search search = { find_way,
+    ebpo_scene_search search = { find_approach,
                                  &t,
                                  sizeof(ebpo_scene_approach_result),
                                  1,
@@ -139,10 +139,10 @@ ebpo_status ebpo_scene_approach(ebpo_scene *scene, double from, double to,
                                  &t.how.progress,
                                  "following routes" };
     if (status == EBPO_OK)
-        status = ebpo_scene_find_in_pairs(scene, from, to, &search, &ways, &count, error);
+        status = ebpo_scene_find_in_pairs(scene, from, to, &search, &approaches, &count, error);
     if (status == EBPO_OK && count)
-        (void)take(user, ways, count);
-    free(ways);
+        (void)take(user, approaches, count);
+    free(approaches);
     return status;
 }
 

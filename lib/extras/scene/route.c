@@ -174,13 +174,13 @@ static double angle_between(const double a[4], const double b[4])
                                             * them / (1 - 1/2) */
 }
 
-double ebpo_scene_length_above(const double way[3])
+double ebpo_scene_length_above(const double vector[3])
 {
-    double most = fmax(fmax(fabs(way[0]), fabs(way[1])), fabs(way[2])), sum = 0;
+    double most = fmax(fmax(fabs(vector[0]), fabs(vector[1])), fabs(vector[2])), sum = 0;
     if (!(most > 0 && most < INFINITY))
         return most;
     for (int k = 0; k < 3; k++)
-        sum += (way[k] / most) * (way[k] / most);
+        sum += (vector[k] / most) * (vector[k] / most);
     return sqrt(sum) * (1 + slack) * most;
 }
 
@@ -193,9 +193,9 @@ ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from
     if (!(part > 0) || from < a->time || route->jumps)
         return (ebpo_scene_step){ 0, 0 };
     part = part * (1 + slack) + slack;
-    double way[3], size = 0;
+    double vector[3], size = 0;
     for (int k = 0; k < 3; k++) {
-        way[k] = b->translation[k] - a->translation[k];
+        vector[k] = b->translation[k] - a->translation[k];
         size += fabs(a->translation[k]) + fabs(b->translation[k]);
     }
     double angle = angle_between(a->turn, b->turn), scale = fmax(a->scale, b->scale);
@@ -203,7 +203,7 @@ ebpo_scene_step ebpo_scene_route_step(const ebpo_scene_route *route, double from
     double turned = angle * part, grown = grows * part;
     double rounding = slack * (size + (reach.length + reach.size) * scale);
     return (ebpo_scene_step){
-        (ebpo_scene_length_above(way) * part + reach.length * (scale * turned + grown)) *
+        (ebpo_scene_length_above(vector) * part + reach.length * (scale * turned + grown)) *
                 (1 + slack) +
             rounding,
         reach.length / 8 * (scale * turned * turned + 2 * grown * turned) * (1 + slack) + rounding,

@@ -135,7 +135,7 @@ void ebpo_scene_compose(const ebpo_pose *outer, const ebpo_pose *inner, ebpo_pos
 double ebpo_scene_route_next(const ebpo_scene_route *route, double from, double to);
 
 /* Returns an upper bound of the length of a vector, however small or large. */
-double ebpo_scene_length_above(const double way[3]);
+double ebpo_scene_length_above(const double vector[3]);
 
 /* Reach of points that follow a route: a bound of their distance from the route's origin, and the
  * size of the coordinates from which the bound is computed, which determines its rounding. */

@@ -242,7 +242,7 @@ static ebpo_status query_separation(const collide_far *f, bool as_json, ebpo_col
     printf("%s", as_json ? "{" : "");
     print_bounds(as_json, &w.t);
     if (as_json)
-        printf(", \"figure\": \"%s\"", metrics[w.t.kind]);
+        printf(", \"value_kind\": \"%s\"", metrics[w.t.kind]);
     if (any)
         printf(as_json ? ", \"face_a\": %" PRIu64 ", \"face_b\": %" PRIu64
                        : " %" PRIu64 " %" PRIu64,

@@ -278,12 +278,12 @@ static int check_values(const values *v, const char *in, const char *out)
     return EXIT_FINE;
 }
 
-static bool judges_file(const values *v) { return v->max_error > 0 || v->target_size; }
+static bool selects_levels(const values *v) { return v->max_error > 0 || v->target_size; }
 
 static int check_need(const values *v, ebpo_subset_options *need)
 {
     int code = subset_need("convert", v->max_error, v->target_size, need);
-    if (code == EXIT_FINE && judges_file(v) && v->parts &&
+    if (code == EXIT_FINE && selects_levels(v) && v->parts &&
         !(listed_parts(v->parts) & EBPO_PART_MESH))
         return command_usage("convert", "--max-error and --target-size measure against the mesh, "
                                         "which --parts omits; use --profile lod instead");
@@ -324,8 +324,8 @@ static convert_reported reported_of(const values *v, const char *in, const char 
 /* --- work --- */
 
 /* Reports before a long build that checking the error afterwards would need too much memory. */
-static ebpo_status capacity_to_judge(const values *v, uint64_t faces, const char *in,
-                                     const ebpo_workspace *workspace, ebpo_error *error)
+static ebpo_status capacity_to_select(const values *v, uint64_t faces, const char *in,
+                                      const ebpo_workspace *workspace, ebpo_error *error)
 {
     ebpo_workspace_stats metrics = EBPO_WORKSPACE_STATS_INIT;
     uint64_t needed = ebpo_subset_memory(faces, (uint32_t)v->leaf_faces);
@@ -412,7 +412,8 @@ typedef struct part_build {
 static ebpo_status part_fits(void *user, uint64_t faces, ebpo_error *error)
 {
     const part_build *b = user;
-    return judges_file(b->v) ? capacity_to_judge(b->v, faces, b->in, b->workspace, error) : EBPO_OK;
+    return selects_levels(b->v) ? capacity_to_select(b->v, faces, b->in, b->workspace, error)
+                                : EBPO_OK;
 }
 
 static ebpo_status build_part(void *user, mesh_input *part, const char *path,
@@ -456,7 +457,7 @@ static stage_facts plan_stages(const values *v, const char *in)
                           .solid = true,
                           .from_leaves =
                               ebpo_selection_describe((ebpo_selection)v->select)->from_leaves,
-                          .judged = judges_file(v),
+                          .selected = selects_levels(v),
                           .leaf_planes = parts_of(v) & EBPO_PART_LEAF_PLANES,
                           .times = EBPO_BUILD_TIMES_INIT };
 }
@@ -479,8 +480,8 @@ static ebpo_status refuse_mesh(const values *v, const mesh_input *p, const char 
                  p->doubts & EBPO_DOUBT_OPEN ? "not a solid" : "probably not the intended solid");
         return error->status = EBPO_E_NOT_SOLID;
     }
-    return judges_file(v) && !splits_mesh(v)
-               ? capacity_to_judge(v, p->mesh.face_count, in, workspace, error)
+    return selects_levels(v) && !splits_mesh(v)
+               ? capacity_to_select(v, p->mesh.face_count, in, workspace, error)
                : EBPO_OK;
 }
 

@@ -165,7 +165,7 @@ static ebpo_status open_unlisted(const patient *p, ebpo_file **out, ebpo_error *
 
 /* Nothing can be read without the list of chunk ends. When only this list is damaged, the content
  * without it matches the header. This proves that all content is intact, so all of it is kept. */
-static ebpo_status patient_look(patient *p, ebpo_error *error)
+static ebpo_status patient_inspect(patient *p, ebpo_error *error)
 {
     ebpo_stored_sizes stored = EBPO_STORED_SIZES_INIT;
     ebpo_error reported = EBPO_ERROR_INIT;
@@ -412,7 +412,7 @@ static ebpo_status repair_file(patient *p, ebpo_error *error)
             "the file is a subset: omitted parts cannot be rebuilt; make another subset of the "
             "original",
             error);
-    ebpo_status status = patient_look(p, error);
+    ebpo_status status = patient_inspect(p, error);
     if (status != EBPO_OK)
         return status;
     if (!p->v->source && p->fate[MESH] == LOST)

@@ -71,7 +71,7 @@ static bool report_unread(folder_files *f, const char *folder, const char *below
     return !f->no_memory;
 }
 
-static bool look_into(folder_files *f, const char *folder, const char *below);
+static bool search_folder(folder_files *f, const char *folder, const char *below);
 
 /* Does not follow links to folders, which may form cycles. */
 static bool inspect_entry(folder_files *f, DIR *dir, const char *folder, const char *below,
@@ -92,7 +92,7 @@ static bool inspect_entry(folder_files *f, DIR *dir, const char *folder, const c
     char *path = join_path(below, name);
     if (!path || !enter)
         return add_path(f, path);
-    bool fine = look_into(f, folder, path);
+    bool fine = search_folder(f, folder, path);
     free(path);
     return fine;
 }
@@ -108,7 +108,7 @@ static DIR *open_folder(folder_files *f, const char *folder, const char *below)
     return dir;
 }
 
-static bool look_into(folder_files *f, const char *folder, const char *below)
+static bool search_folder(folder_files *f, const char *folder, const char *below)
 {
     DIR *dir = open_folder(f, folder, below);
     if (!dir)
@@ -131,7 +131,7 @@ static int by_bytes(const void *a, const void *b)
 bool folder_files_find(folder_files *files, const char *command, const char *folder)
 {
     *files = (folder_files){ .command = command };
-    bool fine = look_into(files, folder, "");
+    bool fine = search_folder(files, folder, "");
     if (files->count)
         qsort(files->path, files->count, sizeof *files->path, by_bytes);
     return fine;

@@ -26,7 +26,7 @@ static void place_at(const own *o, double angle, double height, double radius, d
     out[o->up] = o->origin[o->up] + o->size[o->up] * (0.5 + height);
 }
 
-static ebpo_status look_around(own *o, ebpo_context *context, ebpo_error *error)
+static ebpo_status measure_radii(own *o, ebpo_context *context, ebpo_error *error)
 {
     for (int h = 0; h < HIGH; h++)
         for (int a = 0; a < ROUND; a++) {
@@ -107,7 +107,7 @@ ebpo_status haptic_own_open(haptic_device *out, ebpo_model *model, const ebpo_in
         if (o->size[k] > o->size[o->up])
             o->up = k;
     }
-    status = look_around(o, context, error);
+    status = measure_radii(o, context, error);
     ebpo_context_free(context);
     return status;
 }

@@ -289,7 +289,7 @@ int query_shard_begin(query_shard *s)
 }
 
 /* Checks that the inputs have not changed since the first check. */
-static int look_again(const query_shard *s, const query_job *job)
+static int check_unchanged(const query_shard *s, const query_job *job)
 {
     char *now = NULL;
     int code = inspect_inputs(s, job, &now);
@@ -352,7 +352,7 @@ int query_shard_end(query_shard *s, const query_job *job, int code)
     close(s->kept);
     s->kept = -1;
     if (code == EXIT_FINE && s->of)
-        code = look_again(s, job);
+        code = check_unchanged(s, job);
     if (code == EXIT_FINE)
         code = put_in_place(s, results);
     if (results >= 0)

@@ -73,7 +73,7 @@ static bool is_operand(const char *folder, const char *name, const char *const *
 
 /* Checks the existing folder, which would be deleted: it must be a report and must not hold an
  * operand. */
-static int look_into(const char *place, DIR *folder, const char *const *operand)
+static int check_folder(const char *place, DIR *folder, const char *const *operand)
 {
     char text[600];
     bool empty = true, report = false;
@@ -114,7 +114,7 @@ static int place_is_free(const char *place, const char *const *operand)
     if (!folder)
         return fail_output(EXIT_FAILED, place,
                            "exists and is not a folder; give another one with -o");
-    int code = look_into(place, folder, operand);
+    int code = check_folder(place, folder, operand);
     closedir(folder);
     return code;
 }

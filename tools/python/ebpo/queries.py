@@ -99,7 +99,7 @@ def block_of(count: int, threads: int) -> int:
 
 
 def share(count: int, threads: int | None, worker: Callable[[], Any], progress: Callable | None = None,
-          stage: str = "querying") -> None:
+          stage: str = "queries") -> None:
     """Process rows 0 to count - 1 block by block.
 
     worker() returns a context manager that gives a function work(begin, end). Each thread has its own
