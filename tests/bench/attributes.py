@@ -115,14 +115,15 @@ HEAD = """# Attributes
   more than 1000 faces). Models without attributes take at most {extra} bytes more.
 
 Made by `tests/bench/attributes.py EBPO {names} > docs/measured/attributes.md`; the results do not depend on
-the machine. `tests/cli/same_ply.py`, a separate PLY reader, compares four copies of each model: the whole
-file, a subset, the file by `ebpo fetch`, and the subset by `ebpo fetch`. The subset is one of the eight parts
-of the box. Every vertex and face of it must be in the source with its values and in the same order. Models
+the machine. `tests/cli/same_ply.py`, a separate PLY reader, compares each source with the mesh of four copies: the
+whole file, a subset, the file by `ebpo fetch`, and the subset by `ebpo fetch`. The subset is one of the eight parts
+of the box. Every vertex and face of the subset must be in the source, with its values and in the same order. Models
 whose subset is empty: {empty}. Polygons and strips become triangles with the corners and values of their
 source.
 """
 MORE = """
-*raw*: bytes of the values in a binary PLY. *more*: bytes that attributes add to the file: values,
+*PLY*: bytes of the source. *file without*, *with*: bytes of the file without and with attributes. "
+"*raw*: bytes of the values in a binary PLY. *more*: bytes that attributes add to the file: values,
 description, source header and colours of envelopes.
 """
 

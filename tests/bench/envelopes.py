@@ -77,8 +77,9 @@ HEAD = """# Envelope volumes compared with the limit
 
 ## Goals
 
-The table has the excess volume of `inherit` divided by that of the limit, for the worst level, and the bytes of all
-its levels divided by those of `kmedoids`.
+The first two columns have the excess volume of `inherit`, the default, divided by that of the limit, the smallest
+possible convex envelopes. The worst level counts. The last column has the bytes of all levels divided by those of
+`kmedoids`.
 
 {GOALS}
 ## Measurement
@@ -93,7 +94,8 @@ BP-Octree with K = 1 %. A node has at most 255 planes, so the upper levels of `B
 the thesis, which has 656 at the root of the bunny and 1,228 at that of the armadillo. [transmission.md](transmission.md)
 has the volumes of the thesis.
 
-All files have no coalescing (`--leaf-faces 0`) and stored leaf planes. `ebpo verify` reports 0 violations for each.
+All files are divided down to the deepest level (`--leaf-faces 0`) and store leaf planes. `ebpo verify` reports 0
+violations for each.
 
 The tables list by level the excess over the volume of the solid, divided by that of the limit. The row *limit* is the
 volume of the limit in percent of the solid.

@@ -70,7 +70,7 @@ def main(ebpo, model, seconds="600"):
     runs = [
         ("ball", ["--memory", "256M", "--seconds", str(long)]),
         ("ball", ["--memory", "256M", "--rate", "5000", "--seconds", short]),
-        ("probe", ["--memory", "256M", "--sense", "--seconds", short]),
+        ("probe", ["--memory", "256M", "--probe", "--seconds", short]),
         ("tool of 10,000 points", ["--memory", "256M", "--tool", tool, "--faces", "262144", "--seconds", short]),
     ]
     program, beside = sums_beside(folder, long)
@@ -86,7 +86,7 @@ def main(ebpo, model, seconds="600"):
 
 - With {info["faces"]:,} faces and a budget of 256 MiB, a step of the ball at 1 kHz takes {us(first["p50"])} us (median) and
   {us(first["p99_9"])} us (p99.9).
-- {first["over_ms"]} of {first["steps"]:,} steps take more than 1 ms, and at most {us(first["max"])} us.
+- {first["over_ms"]} of {first["steps"]:,} steps take more than 1 ms; the longest takes {us(first["max"])} us.
 - A loop of the same arithmetic without the library shows the delays of the machine (`tests/bench/tick_alone.c`):
   {sums}
 
@@ -104,7 +104,7 @@ Made by `python3 tests/bench/haptic_page.py EBPO {os.path.basename(model)} {seco
 {rows[0][2]["scheduling"]}; the loading thread has the default priority. *stolen*: CPU
 time that the host gave to other machines.
 
-Times of a step in us, wall-clock unless named CPU.
+Times of a step are in us. They are wall-clock times unless named CPU.
 
 | case | options | steps | over 1 ms | p50 | p99.9 | p99.99 | max | CPU p99.9 | stolen % |
 |---|---|---|---|---|---|---|---|---|---|""")
@@ -115,9 +115,10 @@ Times of a step in us, wall-clock unless named CPU.
               f"{us(t['p99_9'])} | {us(t['p99_99'])} | {us(t['max'])} | {us(t['cpu_p99_9'])} | "
               f"{r['steal']:.1f} |")
     print("""
-*late*: steps that miss the deadline of the next step for any cause. *wake*: delay of the start of a step, which the
-machine causes; *idle wake*: the same of an empty loop. *waits*: the proxy waits at the cell face of the loaded part (probe:
-only bounds of the distance are known). *short*: more faces are near than a step handles; the next step continues.
+*late*: steps that end more than a period after they are due, for any cause. *wake*: delay of the start of a step,
+which the machine causes; *idle wake*: the same for an empty loop. *waits*: steps in which the proxy waits at the
+boundary of the loaded box (probe: only bounds of the distance are known). *short*: steps with more near faces than
+one step handles; the next step continues.
 
 | case | late | wake p99.9 | max | idle wake p99.9 | in contact | waits | short | longest load, s |
 |---|---|---|---|---|---|---|---|---|""")

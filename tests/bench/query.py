@@ -130,10 +130,10 @@ def section_rays(page, results):
               "through the pixels of a picture. *segments*: uniform, 1/20 of the diagonal long. "
               "*degenerate*: to a vertex, to the middle of an edge, from a vertex, along an axis "
               "through a vertex. The table has the times and their ratio to Embree (robust "
-              "scene, high quality, single precision). *Embree differs*: number of first hits "
-              "that differ by more than 1e-6 of the box diagonal or exist in one program only, "
-              "and of rays with another number of hits: a degenerate ray hits all faces around "
-              "its vertex, which single precision rarely finds.")
+              "scene, high quality, single precision). *Embree differs, first*: number of first "
+              "hits that differ by more than 1e-6 of the box diagonal or that only one program "
+              "finds. *all*: number of rays with another number of hits. A degenerate ray hits all "
+              "faces around its vertex; single precision rarely finds all of them.")
     rows = []
     for model, cells in results.items():
         for points in RAYS:
@@ -172,8 +172,8 @@ def section_points(page, results, query, title, note):
 
 def section_tails(page, results):
     page.text("### Tails", "",
-              "The table has wall-clock times of single queries, without the cost of the clock, "
-              "for the smallest and the largest model.")
+              "The table has wall-clock times of single queries, minus the cost of reading the "
+              "clock, for the smallest and the largest model.")
     models = list(results)
     page.table(["model", "query", "points", "p50", "p99", "p99.9", "max", "Embree p99.9"],
                [[model.name, query, points]
@@ -207,8 +207,8 @@ def measure_memory(bench, model):
 def section_memory(page, memory):
     page.text("## Memory and loading", "",
               "The whole model is in memory. *Loading* ends when the first query can begin; the "
-              "file is in the page cache. For Embree it is the build of a robust scene from a mesh "
-              "in memory. *CPU s*: processor seconds on one thread; *all cores*: wall-clock "
+              "file is in the page cache. For Embree, loading is the build of a robust scene from "
+              "a mesh in memory. *CPU s*: processor seconds on one thread; *all cores*: wall-clock "
               "seconds. Embree's memory includes its single-precision mesh, which point queries "
               "need.")
     page.table(["model", "faces", "ours, B per face", "Embree tree", "with mesh", "ours / Embree",
@@ -450,11 +450,11 @@ def write(options, bench, page, goals, short):
     head.text("# Query times", "", *short)
     made.text("## Measurement", "",
               f"Made by `{command_line(options)}` on {processor()}. One thread on one core; "
-              f"medians of {options.rounds} turns (half of that above two million faces) of "
+              f"medians of {options.rounds} turns (half as many above two million faces) of "
               "processor time in us per query, unless a section says otherwise. *batch*: one "
               f"call for all points. Load average {statistics.median(bench.load):.1f} (median), "
               f"{max(bench.load):.1f} (maximum). Compare values within a row only. The results of "
-              "the theses are of other machines.")
+              "the theses come from other machines.")
     text = "\n".join(head.lines + goals.lines + made.lines + page.lines).rstrip("\n") + "\n"
     pathlib.Path(options.output).write_text(reflow(text + handwritten(options.output)))
 

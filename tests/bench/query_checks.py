@@ -47,11 +47,11 @@ def write_answers(page, model, rows):
               "(`tests/bench/exact_judge`). *hard*: queries on, at and through vertices, edges and "
               "planes. *wrong*: another classification, hit or number of hits, or a distance or "
               "position that differs by more than 1e-6 of the diagonal. *not rounded*: results of "
-              "ours that are not the correctly rounded value with the first face and the sign. "
-              "Embree rounds the query itself to single precision: its result is right for a nearby "
-              "point or ray. Programs that do not report points on the surface are not judged for "
-              f"them. Not shown: {len(rows) - len(shown)} rows of uniform points, paths and cameras "
-              "in which no program is wrong.")
+              "ours in which the correctly rounded value, the first face or the sign is wrong. Embree "
+              "rounds the query to single precision: its result is right for a nearby point or ray. A "
+              "program that does not report points on the surface is not judged for such points. The "
+              f"table omits {len(rows) - len(shown)} rows of uniform points, paths and cameras in "
+              "which no program is wrong.")
     page.table(["query", "points", "count", "ours, wrong", "ours, not rounded", "Embree, wrong",
                 "CGAL, wrong"],
                [[r["query"], r["which"], f"{r['count']:,}"]

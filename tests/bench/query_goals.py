@@ -81,8 +81,8 @@ def goals_table(results, memory, budget, tables, found):
         goals.rows.append(["results that rational arithmetic contradicts", 0,
                            f"{bad} of {asked:,}", "missed" if bad else "met"])
     page.text("## Goals", "",
-              "The table begins with missed goals. A goal is an upper limit; the values are "
-              "those of models of "
+              "The table begins with missed goals. A goal is an upper limit. Four values in a "
+              "cell are for the models of "
               f"{', '.join(SIZES)} faces. The estimate for fcpw, a nearest-point library, is the "
               "time of Embree's point query "
               f"times {', '.join(map(str, FCPW['path']))} (path) or "

@@ -120,12 +120,12 @@ def write(page, model, tables):
     if "distances" in tables:
         page.text("The second table is for distances. *exact* returns the minimum; the other "
                   "modes do not guarantee it. *recursive* is not comparable: for a point in a "
-                  "white node ours visits every leaf below the parent, which are millions of "
-                  "faces for random points.")
+                  "white node ours visits every leaf below the parent. For random points these "
+                  "leaves have millions of faces.")
         page.table(["mode", "uniform", "path", "EBP, random", "EBP, path"],
                    [[name, us(o["uniform"][0]), us(o["path"][0])]
                     + [figure(t) for t in thesis_distance(name) or ("-", "-")]
                     for name, o in tables["distances"].items()
                     if not name.startswith("`envelope`") or int(name.split()[-1]) in SHOWN_LEVELS])
     slower = [what for what, ours, theirs in cells(tables) if ours > theirs]
-    page.text("Slower than the thesis, of all levels: " + (", ".join(slower) or "none") + ".")
+    page.text("Slower than the thesis, at all levels: " + (", ".join(slower) or "none") + ".")

@@ -185,9 +185,9 @@ def growth(results):
 
 def section_build(page, scale, results):
     page.text("## Building", "",
-              f"`ebpo convert --memory {scale.options.memory}` of closed tori (`ebpo-generate "
-              "--base torus --faces N`), which have no self-intersections: the whole command "
-              "with a cold PLY, all cores. *Peak*: maximum resident memory, mapped files "
+              f"The times are those of the whole command `ebpo convert --memory {scale.options.memory}` "
+              "with a cold PLY, all cores. The models are closed tori (`ebpo-generate --base torus "
+              "--faces N`) without self-intersections. *Peak*: maximum resident memory, mapped files "
               "included. *Written*: bytes written to storage, with temporary files. *Verify*: "
               f"`ebpo verify {shlex.join(map(str, scale.verify_options[:2]))}`, cold file.")
     rows = []
@@ -204,8 +204,8 @@ def section_build(page, scale, results):
 
 def section_peers(page, results):
     page.text("### Trees in memory", "",
-              "Embree 3's BVH (medium quality, robust, single precision, "
-              "all cores) and CGAL's AABB tree (double, one core). The ratios include reading the "
+              "The trees are Embree 3's BVH (medium quality, robust, single precision, all cores) "
+              "and CGAL's AABB tree (double, one core). The ratios include reading the "
               "cold PLY. These trees stay in memory; ours is a file with levels of detail.")
     rows = []
     for r in results:
@@ -297,9 +297,9 @@ def section_goals(page, scale, results):
     checks = [("build, s", built(r), GOALS["build_seconds"], "most"),
               ("build, peak MiB", max(run["peak"] for run in r["builds"]["ebpo"]) / MIB,
                budget / MIB, "most"), ("growth, worst pair", worst, GOALS["growth"],
-                                       "most"), ("of plain PLY", s["file"] / s["plain_ply"],
+                                       "most"), ("file size / plain PLY", s["file"] / s["plain_ply"],
                                                  GOALS["ratio_full"], "most"),
-              ("of plain PLY, without maps", divided(s["without_maps"], s["plain_ply"]),
+              ("file size / plain PLY, without maps", divided(s["without_maps"], s["plain_ply"]),
                GOALS["ratio_without_maps"], "most"), ("levels 0 to 5, bytes", s["first_levels"],
                                                       GOALS["first_levels"], "most"),
               ("decoding, 10^6 B/s a core", r["decode"]
@@ -335,8 +335,8 @@ def section_goals(page, scale, results):
               else "- The first result of a cold file is not measured.",
               f"- Verifying it takes {figure(checks[7][1])} times as long as the build.")
     page.text("## Goals", "",
-              f"Missed goals first. All but the growth are of the model of {r['millions']:g} "
-              "million faces; first results, tails and peaks are the worst values. Growth "
+              f"Missed goals first. All values except the growth are for the model of {r['millions']:g} "
+              "million faces. First results, tails and peaks are the worst values. Growth "
               "compares the seconds per face of a larger and a smaller model, from a million "
               "faces on.")
     page.table(["what", "measured", "goal", "met"], sorted(rows, key=lambda row: row[3] != "no"))
@@ -356,7 +356,7 @@ def write(scale, results):
         section_goals(page, scale, results)
     page.text("## Measurement", "",
               f"Made by `{command_line(options)}` on {measured.machine()}. Medians of "
-              f"{options.rounds} rounds (a third of that from {LARGE:,} faces on); "
+              f"{options.rounds} rounds (a third of the rounds from {LARGE:,} faces on); "
               f"load average {statistics.median(scale.load):.1f} (median), "
               f"{max(scale.load):.1f} (maximum).")
     if results:

@@ -26,11 +26,11 @@ SOLIDS = ["bunny_closed", "armadillo", "dragon100k", "lucy100k", "igea", "skull"
 CHECK = """
 ## Check
 
-`ebpo check` measured separately, on two busy cores:
+`ebpo check` was measured separately, on two busy cores:
 
 - `--crossings --memory 256MiB` of a torus of 1,000,832 faces: 6.6 s of CPU time and 117 MB on one thread, 6.4 s and
   118 MB on two. It compares positions, not indices, and finds the same pairs for any number of threads.
-- 100,000 closed components within another (`tests/bench/many_shells.py`, 820,000 faces): 6.9 s and 135 MB. The time
+- 100,000 closed components within another component (`tests/bench/many_shells.py`, 820,000 faces): 6.9 s and 135 MB. The time
   grows linearly with the faces: 6.2 to 8.4 us per face.
 """
 found = {"size": [], "ratio": [], "rate": [], "violations": 0}
@@ -63,7 +63,8 @@ def head(*cells):
 
 
 def size_table(folder):
-    print("## Size\n\nB/face by part; *plain PLY*: 12 B per vertex and 13 B per face.\n")
+    print("## Size\n\nThe columns from *B/face* to *maps* are B per face, in total and by part. "
+    "*Plain PLY*: 12 B per vertex and 13 B per face.\n")
     head("model", "faces", "file", "B/face", "vertices", "faces", "lists and tree", "planes",
          "maps", "of plain PLY",
          "without maps")

@@ -196,19 +196,20 @@ results do not depend on the machine.
 - *Error bound*: an upper bound of that Hausdorff distance. It is the maximum diameter of an envelope in whose cell a
   face is; for nodes that a face is only near, it is the cell diagonal times 257/256.
 
-These values are those of a reader without the mesh: a leaf has its parent's envelope in its own cell, or its own with
-`convert --profile full`. With the mesh, `ebpo measure --derived` derives tighter leaf planes. The vertex distance
-can stay constant from level to level: a leaf with a concave surface is not refined.
+The values are for a reader without the mesh. For such a reader, the envelope of a leaf is the parent's envelope,
+cut to the leaf's cell. With `convert --profile full`, each leaf has stored planes. With the mesh, `ebpo measure
+--derived` derives tighter leaf planes. The vertex distance can stay constant from level to level, because a leaf
+with a concave surface is not refined.
 
 ## First level within an excess
 
-The cells have the bytes, their share of the compressed PLY, and the level.
+The table has the bytes, their share of the compressed PLY, and the level.
 """
 
 LEVELS = """## By level
 
-*file*: the whole file with the mesh, its source order and checksums. Distances end at the level that reaches the last
-goal. The columns *BP-Octree* are sums of tables 4.4 and 4.6 of Melero 2008: uncompressed, with the faces and vertices
+*file*: the whole file with the mesh, its source order and checksums. Vertex distances and error bounds end at the
+level that reaches the last goal. The columns *BP-Octree* are sums of tables 4.4 and 4.6 of Melero 2008: uncompressed, with the faces and vertices
 of each level's leaves, for a bunny of 71,040 and an armadillo of 150,000 faces.
 """
 

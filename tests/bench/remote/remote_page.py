@@ -130,8 +130,8 @@ def query_table(page, found):
               "and bytes (of bodies). *Round trips* are chains of dependent requests, counted with "
               f"`--http-connections {asked.CONNECTIONS}`: the minimum of {asked.TRIES} tries. All "
               "else is measured with the default connections.", "",
-              f"*Near*: at most {asked.NEAR:g} diagonals from the surface, where random lines enter "
-              f"the model. The commands are `ebpo distance` and `ebpo inside --memory {asked.BUDGET} "
+              f"*Near* points are at most {asked.NEAR:g} diagonals from the surface, at positions where "
+              f"random lines enter the model. The commands are `ebpo distance` and `ebpo inside --memory {asked.BUDGET} "
               "URL POINTS`, `ebpo fetch -q --box`, `ebpo levels --max-level` and `ebpo view --seen-only "
               "--pixels 16`.")
     page.table(["query", "round trips", "requests", "bytes", "s"],
@@ -141,9 +141,9 @@ def query_table(page, found):
                 for name, row in found.rows().items() if found.row(AFTER, name)])
     same = found.row(AFTER, "same")
     if same is not None:
-        page.text("The results for 10,000 points around the same positions by URL and from the file "
-                  f"on disk (`ebpo inside` and `ebpo distance`, `--memory {asked.BUDGET}`) are "
-                  f"{'the same' if same else 'NOT the same'}.")
+        page.text("For 10,000 points around the same positions, the results by URL and from the "
+                  f"file on disk are {'equal' if same else 'NOT equal'} (`ebpo inside` and `ebpo "
+                  f"distance`, `--memory {asked.BUDGET}`).")
 
 
 def viewer_table(page, found):
@@ -160,8 +160,8 @@ def viewer_table(page, found):
 
 def local_table(page, found):
     page.text("## Local file", "",
-              f"`ebpo bench --memory {asked.BUDGET} --query QUERY`: the first result from a cold "
-              "file (`--points path --count 1 --seed 1..5`), a path (`--points path --count 200000 "
+              f"The table has results of `ebpo bench --memory {asked.BUDGET} --query QUERY`: the first "
+              "result from a cold file (`--points path --count 1 --seed 1..5`), a path (`--points path --count 200000 "
               "--prefetch`), and uniform points (`--points uniform --count 1000`).")
     table = []
     for query, runs in (found.row(AFTER, "local") or {}).items():
