@@ -239,7 +239,7 @@ class Files(Case):
                 (folder / "000001.npy").write_bytes(b"none")
             else:
                 np.save(folder / "000001.npy", wrong)
-            with self.assertRaisesRegex(ValueError, "000001.npy.*made anew"):
+            with self.assertRaisesRegex(ValueError, "000001.npy.*compute it again"):
                 ed.to_file(inside, "joined.npy")
         os.remove(folder / "000001.npy")
         ed.to_file(inside, "joined.npy")

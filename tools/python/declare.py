@@ -34,7 +34,7 @@ class Unknown(Exception):
 
 
 def text_of(header, seen):
-    """Returns a header after the headers that it includes, each once, without comments."""
+    """Return a header after the headers that it includes, each once, without comments."""
     if header in seen:
         return ""
     seen.add(header)
@@ -62,7 +62,7 @@ def value_of(text, known):
 
 
 def written(value):
-    """Returns a value as Python text."""
+    """Return a value as Python text."""
     if isinstance(value, list):
         return "[" + ", ".join(map(written, value)) + "]"
     if isinstance(value, str):
@@ -137,7 +137,7 @@ class Headers:
         self.lines.append("\n")
 
     def type_of(self, text, declarator, in_call):
-        """Returns the ctypes type of a member or an argument, and its name."""
+        """Return the ctypes type of a member or an argument, and its name."""
         text = re.sub(r"\bstruct\b", "", text)
         name = re.search(r"\w+(?=\s*(?:\)|\[|$))", declarator)[0]
         sizes = re.findall(r"\[([^]]*)\]", declarator)

@@ -52,7 +52,7 @@ def package_in(folder):
 
 
 def build(folder, setup_args):
-    """Builds only the library and the package."""
+    """Build only the library and the package."""
     print(run("meson", "setup", folder, ROOT, *SETUP, *setup_args), flush=True)
     library = f"lib/libebpo.so.{version()}"
     modules = [f"tools/python/ebpo/{path.name}" for path in package_in(ROOT / "tools/python/ebpo")]
@@ -67,7 +67,7 @@ def needed(library, system):
 
 
 def bundle(library, folder, system):
-    """Copies a library and all that it needs to a folder, and makes them find each other there."""
+    """Copy a library and all that it needs to a folder, and makes them find each other there."""
     names, waiting = {}, [(copied(library, folder / "libebpo.so.0"), needed(library, system))]
     while waiting:
         file, needs = waiting.pop()
@@ -84,7 +84,7 @@ def bundle(library, folder, system):
 
 
 def copied(path, copy):
-    """Copies a library without debug symbols. Runs before patchelf, because strip breaks patched files."""
+    """Copy a library without debug symbols. Runs before patchelf, because strip breaks patched files."""
     shutil.copy(path, copy)
     copy.chmod(0o755)
     run("strip", "--strip-unneeded", copy)
@@ -189,7 +189,7 @@ def setup_args(config_settings):
 
 
 def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
-    """Writes the metadata, so that pip knows the name without building the library."""
+    """Write the metadata, so that pip knows the name without building the library."""
     about = pathlib.Path(metadata_directory) / f"ebpo-{version()}.dist-info"
     about.mkdir()
     (about / "METADATA").write_bytes(metadata())

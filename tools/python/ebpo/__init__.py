@@ -28,7 +28,7 @@ __version__: str = _lib.ebpo_version().decode()
 
 
 def library() -> str:
-    """Returns the path or name of the shared library that is used.
+    """Return the path or name of the shared library that is used.
 
     It is that of the variable EBPO_LIBRARY, else the one inside the package, else the one of the build
     folder that the package lies in, else that of the `ebpo` in PATH, else the system's.

@@ -211,7 +211,7 @@ def doubles(values: Any, what: str) -> np.ndarray:
 
 
 def integers(values: Any, dtype: Any, what: str) -> np.ndarray:
-    """Convert integers to a contiguous array of a type that holds each of them. Raises TypeError for floats and bools."""
+    """Convert integers to a contiguous array of a type that holds each. Raises TypeError for floats and bools."""
     given, range_ = np.asarray(values), np.iinfo(dtype)
     if given.dtype.kind == "O":
         flat = [within(index_of(value, what), int(range_.min), int(range_.max), what) for value in given.ravel()]

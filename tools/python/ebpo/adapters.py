@@ -9,7 +9,7 @@ from .model import Model
 
 
 def to_trimesh(model: Model, **options: Any) -> Any:
-    """Returns the mesh as a trimesh.Trimesh; options are those of trimesh. Not processed by default."""
+    """Return the mesh as a trimesh.Trimesh; options are those of trimesh. Not processed by default."""
     import trimesh
     mesh = model.mesh(order="source" if "maps" in model.info.parts else "file")
     return trimesh.Trimesh(vertices=np.array(mesh.vertices), faces=np.array(mesh.faces, dtype=np.int64),
@@ -17,13 +17,13 @@ def to_trimesh(model: Model, **options: Any) -> Any:
 
 
 def from_trimesh(mesh: Any, output: Any, **options: Any) -> Model:
-    """Converts a trimesh.Trimesh, or what else has vertices and faces, as `convert` does."""
+    """Convert a trimesh.Trimesh, or what else has vertices and faces, as `convert` does."""
     from .build import convert
     return convert((mesh.vertices, mesh.faces), output, **options)
 
 
 def to_pyvista(model: Model, level: int | None = None) -> Any:
-    """Returns the mesh, or a level's envelopes with octcode, type and volume of cells, as a pyvista.PolyData."""
+    """Return the mesh, or a level's envelopes with octcode, type and volume of cells, as a pyvista.PolyData."""
     import pyvista
     if level is None:
         mesh = model.mesh(order="source" if "maps" in model.info.parts else "file")

@@ -55,7 +55,7 @@ class Automatic:
         self.waiting = bool(plan.resident and self.subtrees)
 
     def piece(self) -> int:
-        """Returns how many queries at most come before the next decision."""
+        """Return how many queries at most come before the next decision."""
         return max(FIRST, self.queries) if self.waiting else 1 << 62
 
     def add(self, queries: int, seconds: float) -> None:
@@ -64,7 +64,7 @@ class Automatic:
             self.seconds += seconds
 
     def pays(self, model: Handle, total: int, parts_share: float) -> bool:
-        """Returns whether the whole model has become cheaper: parts have cost as much, or certainly will.
+        """Return whether the whole model has become cheaper: parts have cost as much, or certainly will.
 
         total: queries that are known to come; parts_share: of the time of queries, the cost of parts.
         """
@@ -83,7 +83,7 @@ class Automatic:
                                                  expected >= CERTAIN * self.subtrees)
 
     def whole(self) -> Any:
-        """Returns the options of a model that is all in memory."""
+        """Return the options of a model that is all in memory."""
         options = c.ebpo_model_options.from_buffer_copy(self.options)
         options.cut_level = -1
         return options

@@ -27,7 +27,7 @@ RULES = {rule.name.lower(): int(rule) for rule in c.Rule}
 def convert(mesh: Any, output: Any, *, parts: Any = None, rule: str = "nonzero", codec: str = "zstd",
             codec_level: int = 0, memory: int | str | None = None, temp_dir: Any = None,
             threads: int | None = None, progress: Callable | None = None, **options: Any) -> Model:
-    """Converts a mesh to an .ebpo.h5 file, which is replaced atomically, and opens it.
+    """Convert a mesh to an .ebpo.h5 file, which is replaced atomically, and opens it.
 
     mesh: the path of a PLY, OBJ, STL or OFF, or (vertices, faces): (v, 3) of float32, which stay such, or
         anything that float64 takes, and (f, 3) integers.
@@ -82,7 +82,7 @@ def convert(mesh: Any, output: Any, *, parts: Any = None, rule: str = "nonzero",
 
 
 def parts_of(parts: Any) -> int:
-    """Returns the bits of parts that are named as for `ebpo convert --parts`. ValueError: no such list."""
+    """Return the bits of parts that are named as for `ebpo convert --parts`. ValueError: no such list."""
     if parts is None:
         return DEFAULT_PARTS
     given = parts.split(",") if isinstance(parts, str) else list(parts)
@@ -128,7 +128,7 @@ def read_mesh(mesh: Any, workspace: Handle, attributes: bool, common: dict) -> S
 
 
 def of_malloc(values: np.ndarray) -> int:
-    """Returns a copy that free() frees."""
+    """Return a copy that free() frees."""
     values = np.ascontiguousarray(values)
     malloc = ctypes.CDLL(None).malloc
     malloc.restype, malloc.argtypes = ctypes.c_void_p, [ctypes.c_size_t]

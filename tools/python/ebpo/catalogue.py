@@ -1,4 +1,4 @@
-"""Catalogues: any number of models that are queried as one, or parts of a model that is too large for a file."""
+"""Catalogues: many models that are queried together, or the parts of a model that is too large for one file."""
 from __future__ import annotations
 
 import ctypes
@@ -21,8 +21,8 @@ from .queries import Rows, thread_count
 from .errors import ArgumentError, Error
 from .open_models import CLOSE_FILE, OPEN_FILE, opened_by, opener, process_models, raised_by
 
-BLOCK = 1 << 22  # rows whose answers are in memory twice; the library puts so many in order together
-LONG = 1 << 14  # rows that may take longer than one waits
+BLOCK = 1 << 22  # rows of one library call, which sorts them; two copies of their results are in memory
+LONG = 1 << 14  # calls of more rows run in a thread that an interrupt can stop
 RULES = ("nonzero", "evenodd", "positive")
 
 NEAREST = np.dtype([("distance", "f8"), ("point", "f8", 3), ("normal", "f8", 3), ("face", "i8"), ("model", "i8")])
@@ -31,9 +31,17 @@ LOCATED = np.dtype([("where", "i1"), ("winding", "i4")])
 
 
 class Entry(NamedTuple):
-    """A model: `path` is asked for winding numbers. Of parts: `surface`, which distances and rays are asked
-    of, has no caps; "": there are none, None: there is nothing else; `numbers`, a .npy, says which faces of
-    the whole its faces are."""
+    """A model of a catalogue.
+
+    path: the file for winding numbers.
+    content_sha256: the content digest of `path`.
+    solid: whether the model is a solid.
+    low, high: corners of the model's box.
+    surface: for a part, the file without caps, for distances and rays. "": the part has no caps, `path`
+        serves both. None: the part consists only of caps.
+    surface_sha256: the content digest of `surface`.
+    numbers: for a part, a .npy file with the index of each of its faces in the whole model.
+    """
 
     path: str
     content_sha256: str
@@ -46,11 +54,12 @@ class Entry(NamedTuple):
 
 
 class Catalogue:
-    """Many models, asked as one. Made by `Catalogue.open` or `Catalogue.of`; pickles.
+    """Many models that are queried together. Made by `Catalogue.open` or `Catalogue.of`. Can be pickled.
 
-    A point is asked of the models whose boxes hold it. Winding numbers are summed up. A point is inside
-    that is inside any model, or, of parts of one model, where the sum is inside by `rule`. Distances are
-    those to the nearest model, of several the first; negative inside. Numbers of models are rows here.
+    A query of a point uses the models whose boxes contain the point. Winding numbers are summed.
+    A point is inside if it is inside any model. For parts of one model, `rule` is applied to the sum.
+    Distances are those to the nearest model, or to the first of several at the same distance; they are
+    negative inside. A model's index is its index in the catalogue. Any number of threads may query.
 
     >>> two = Catalogue.of(["cube.ebpo.h5", "cube.ebpo.h5"])
     >>> two.winding([[.5, .5, .5], [2, 0, 0]])
@@ -59,7 +68,7 @@ class Catalogue:
 
     def __init__(self, entries: list[Entry], *, parts: bool = False, rule: str = "nonzero", **options: Any) -> None:
         if not entries:
-            raise ValueError("a catalogue has one model at least")
+            raise ValueError("a catalogue needs at least one model")
         if rule not in RULES:
             raise ValueError(f"rule is 'nonzero', 'evenodd' or 'positive', not {rule!r}")
         self.entries, self.parts, self.rule, self.options = list(entries), parts, rule, options
@@ -68,15 +77,15 @@ class Catalogue:
 
     @classmethod
     def of(cls, paths: Any, *, parts: bool = False, rule: str = "nonzero", **options: Any) -> Catalogue:
-        """Of paths and URLs, in this order; each is opened for its box and digest.
+        """Return a catalogue of paths and URLs, in this order. Opens each file for its box and digest.
 
-        options: of URLs, as `ebpo.open` takes them.
+        options: options for URLs, as for `ebpo.open`.
         """
         def entry(path: Any) -> Entry:
             name = os.fspath(path)
             name = name if "://" in name else os.path.join(os.getcwd(), name)
             file, entry, kept = opened_by(name, options), c.ebpo_catalogue_entry(), path_bytes(name)
-            lib.ebpo_catalogue_entry_of(file, kept, ctypes.byref(entry))  # whose path is that
+            lib.ebpo_catalogue_entry_of(file, kept, ctypes.byref(entry))  # the entry refers to the bytes of `kept`
             return entry_of(entry)
 
         with ThreadPoolExecutor(8) as pool:
@@ -84,7 +93,7 @@ class Catalogue:
 
     @classmethod
     def open(cls, path: Any, **options: Any) -> Catalogue:
-        """Of what `ebpo catalogue` or `save` has written. FormatError, VersionError: it is not that; IOFailure."""
+        """Open a file that `ebpo catalogue` or `save` has written. Raises FormatError, VersionError, IOFailure."""
         name = path_bytes(pathlib.Path(path).absolute())
         read = Handle.made("ebpo_catalogue_open", name, None, free="ebpo_catalogue_free")
         facts = made(c.ebpo_catalogue_facts)
@@ -94,12 +103,12 @@ class Catalogue:
         return cls(entries, parts=facts.parts, rule=RULES[facts.rule], **options)
 
     def save(self, path: Any) -> None:
-        """As a file that `open` reads, whole or not at all. Paths in its folder and below become relative."""
+        """Save the catalogue as a file, which is replaced atomically. Paths in its folder and below become relative."""
         call("ebpo_catalogue_save", self._made, path_bytes(pathlib.Path(path).absolute()))
 
     @functools.cached_property
     def _made(self) -> Handle:
-        """The catalogue of the library."""
+        """The handle of the catalogue in the library."""
         structs = (c.ebpo_catalogue_entry * len(self))()
         for struct, entry in zip(structs, self.entries):
             fill_entry(struct, entry)
@@ -112,7 +121,7 @@ class Catalogue:
         return {name: value for name, value in self.__dict__.items() if name != "_made"}
 
     def __dask_tokenize__(self) -> tuple:
-        """What answers depend on: equal in every process."""
+        """Return the data that determine results, equal in every process."""
         return "ebpo-catalogue", repr(self.entries), self.parts, self.rule
 
     def __len__(self) -> int:
@@ -121,11 +130,11 @@ class Catalogue:
     def __repr__(self) -> str:
         return f"<ebpo.Catalogue of {len(self)} {'parts of a model' if self.parts else 'models'}>"
 
-    # ---- asking ----
+    # ---- queries ----
 
     def _query(self, function: str, count: int, rows: Callable, result: Any, memory: int | str | None,
                threads: int | None, **options: Any) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
-        """Has the library answer rows(begin, end), block by block: where they are, answers, numbers of models."""
+        """Run a library function on blocks rows(begin, end); yield each slice with results and model indices."""
         models, limit = process_models(memory).models, min(count, BLOCK)
         results, numbers = np.empty(limit, result), np.empty(limit, np.uint64)
         threads = thread_count(threads or 0, "threads")
@@ -145,12 +154,12 @@ class Catalogue:
             yield slice(begin, end), results[:end - begin], numbers[:end - begin]
 
     def locate(self, points: Any, *, memory: int | str | None = None, threads: int | None = None) -> np.ndarray:
-        """Where points are: a structured array (n,), `where` as of `Model.locate`, `winding` the sum.
+        """Classify points. Returns a structured array (n,): `where` as in `Model.locate`, and `winding`, the sum.
 
-        Of parts, exactly what the whole would say, also on caps. Of others, `where` is IN where any says so,
-        else ON where any does; a model adds 0 to the sum at points on its faces.
+        For parts, the result is exactly that of the whole model, also on caps. For other models, `where` is IN
+        if the point is IN any model, else ON if it is ON any. A model adds 0 to the sum at points on its faces.
 
-        memory: bytes that models of this process may take, from now on; at first 1 GiB.
+        memory: budget in bytes for the open models of this process, from now on; initially 1 GiB.
 
         Raises NotSolidError if a model is a surface.
         """
@@ -164,26 +173,26 @@ class Catalogue:
 
     def inside(self, points: Any, *, boundary: bool = True, memory: int | str | None = None,
                threads: int | None = None) -> Any:
-        """Whether points are inside: (n,) bool. boundary: points on faces are, too. Raises as `locate`."""
+        """Return True for points inside: (n,) bool. boundary: the result on faces. Raises the errors of `locate`."""
         where = self.locate(points, memory=memory, threads=threads)["where"]
         return where != Where.OUT if boundary else where == Where.IN
 
     def winding(self, points: Any, *, memory: int | str | None = None, threads: int | None = None) -> Any:
-        """The sum of winding numbers: (n,) int32. Raises as `locate`."""
+        """Return the sums of winding numbers: (n,) int32. Raises the errors of `locate`."""
         return self.locate(points, memory=memory, threads=threads)["winding"].copy()
 
     def _need_surface(self) -> None:
         if all(entry.surface is None for entry in self.entries):
-            raise ValueError("the catalogue has caps alone, and no surface")
+            raise ValueError("the catalogue contains only caps and no surface")
 
     def distance(self, points: Any, *, max_distance: float = float("inf"), signed: bool = True,
                  memory: int | str | None = None, threads: int | None = None) -> np.ndarray:
-        """The nearest face of any model: a structured array (n,), `["distance"]` and so on.
+        """Return the nearest face of any model: a structured array (n,).
 
-        Its fields are those of `Model.distance`, and `model`, the number here.
+        Its fields are those of `Model.distance`, and `model`, the index of the model.
 
-        Negative inside (`inside`; not of catalogues in which there is a surface). Of models at the same
-        rounded distance the first is taken.
+        Distances are negative at points that are `inside`, except when a model is a surface. Of several models
+        at the same rounded distance the first is used.
         """
         self._need_surface()
         rows = Rows(points)
@@ -198,7 +207,7 @@ class Catalogue:
 
     def ray(self, origins: Any, directions: Any, *, t_max: float = float("inf"), memory: int | str | None = None,
             threads: int | None = None) -> np.ndarray:
-        """The first face that each ray meets: a structured array (n,), the fields of `Model.ray`, and `model`."""
+        """Return the first face that each ray hits: a structured array (n,), the fields of `Model.ray`, and `model`."""
         self._need_surface()
         o, d = Rows(origins, "origins"), Rows(directions, "directions")
         count = d.count if o.single else o.count
@@ -222,14 +231,14 @@ class Catalogue:
 
 
 def interruptible(work: Callable[[Any], None], rows: int) -> None:
-    """Calls work(progress). In the main thread, where an interrupt comes, another thread does what takes long."""
+    """Call work(progress). In the main thread, which receives interrupts, another thread runs long work."""
     if rows < LONG or threading.current_thread() is not threading.main_thread():
         work(c.ebpo_progress())
         return
     stopped, ended, once, failed = threading.Event(), threading.Event(), threading.Lock(), []
 
     def body() -> None:
-        if not once.acquire(blocking=False):  # an interrupt of start() may have it called again
+        if not once.acquire(blocking=False):  # after an interrupt of start() the thread may be started twice
             return
         try:
             work(progress)
@@ -238,8 +247,8 @@ def interruptible(work: Callable[[Any], None], rows: int) -> None:
         finally:
             ended.set()
 
-    # Not Thread.join: once interrupted, it takes a running thread for one that has ended, and the library
-    # would go on in memory that is freed.
+    # Not Thread.join: an interrupted join treats a running thread as ended. The library would then
+    # use memory that is freed.
     interrupt = None
     with Reporter(lambda *_: not stopped.is_set()) as progress:
         while not ended.is_set():
@@ -258,21 +267,21 @@ def interruptible(work: Callable[[Any], None], rows: int) -> None:
 
 
 def numbered(error: BaseException, first: int) -> BaseException:
-    """Of a block of rows: its message then has the number of a point or ray among all of them."""
+    """Return the error of a block with the number of the point or ray among all rows in its message."""
     if first and isinstance(error, ArgumentError):
         error.args = (re.sub(r"^(point|ray) (\d+)", lambda found: f"{found[1]} {int(found[2]) + first}", str(error)),)
     return error
 
 
 def entry_of(entry: Any) -> Entry:
-    """Of an ebpo_catalogue_entry."""
+    """Return the Entry of an ebpo_catalogue_entry."""
     surface, numbers = os.fsdecode(entry.surface or b""), os.fsdecode(entry.numbers or b"")
     return Entry(os.fsdecode(entry.path), bytes(entry.digest).hex(), entry.solid, tuple(entry.min), tuple(entry.max),
                  None if entry.unseen else surface, bytes(entry.surface_digest).hex() if surface else "", numbers)
 
 
 def fill_entry(struct: Any, entry: Entry) -> None:
-    """The reverse; the struct has its texts for itself."""
+    """Set an ebpo_catalogue_entry from an Entry. The struct refers to new copies of the texts."""
     struct.path, struct.digest = path_bytes(entry.path), bytes.fromhex(entry.content_sha256)
     struct.solid, struct.min, struct.max, struct.unseen = entry.solid, entry.low, entry.high, entry.surface is None
     if entry.surface:

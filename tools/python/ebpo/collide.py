@@ -17,7 +17,10 @@ SEGMENT = np.dtype(c.ebpo_contact_segment)
 
 
 class Pairs(NamedTuple):
-    """face_a, face_b: (k,) int64, of the sources. kind: (k,) int32, a PairKind."""
+    """Pairs of faces that intersect.
+
+    face_a, face_b: (k,) int64, face indices of the sources. kind: (k,) int32, a PairKind.
+    """
 
     face_a: np.ndarray
     face_b: np.ndarray
@@ -25,7 +28,10 @@ class Pairs(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """points: (k, 2, 3) float64, both ends of each segment. face_a, face_b: (k,) int64."""
+    """Intersections of pairs of faces.
+
+    points: (k, 2, 3) float64, both ends of each segment. face_a, face_b: (k,) int64.
+    """
 
     points: np.ndarray
     face_a: np.ndarray
@@ -33,8 +39,11 @@ class Contacts(NamedTuple):
 
 
 class Clearance(NamedTuple):
-    """lo, hi: the distance is certainly within, exact where they are equal. face_a, face_b: -1: none was
-    found. point_a, point_b: (3,) the nearest points."""
+    """The distance of two models.
+
+    lo, hi: certain bounds of the distance; equal when it is known. face_a, face_b: the nearest faces, -1:
+    not found. point_a, point_b: (3,) the nearest points.
+    """
 
     lo: float
     hi: float
@@ -45,7 +54,11 @@ class Clearance(NamedTuple):
 
 
 class Separation(NamedTuple):
-    """lo, hi: so many times the direction, exact where they are equal. face_a, face_b: part last."""
+    """The separation distance of two models.
+
+    lo, hi: certain bounds, in multiples of the direction's length; equal when the distance is known.
+    face_a, face_b: the faces that separate last.
+    """
 
     lo: float
     hi: float
@@ -58,17 +71,21 @@ def number(face: int) -> int:
 
 
 def pose(rotation: Any = None, translation: Any = None, scale: float = 1.0, quaternion: Any = None) -> Any:
-    """Where a model is: x becomes rotation (scale x) + translation.
+    """Return a pose of a model: x becomes rotation (scale x) + translation.
 
-    rotation: (3, 3), or quaternion: (4,) x, y, z, w of any length, with the bits that scenes give it.
-    translation: (3,). What takes a pose takes this, a (4, 4) matrix, or None: as in the file.
+    rotation: (3, 3).
+    quaternion: (4,) x, y, z, w of any length, instead of a rotation. The rotation has the same bits as in
+        scenes.
+    translation: (3,).
+
+    Functions that take a pose accept this object, a (4, 4) matrix, or None for the pose in the file.
 
     >>> list(pose(translation=[1, 2, 3]).translation)
     [1.0, 2.0, 3.0]
     """
     made_pose = made(c.ebpo_pose, scale=scale)
     if rotation is not None and quaternion is not None:
-        raise ValueError("a pose has a rotation or a quaternion")
+        raise ValueError("a pose has a rotation or a quaternion, not both")
     if rotation is not None:
         np.ctypeslib.as_array(made_pose.rotation)[:] = doubles(rotation, "rotation").reshape(3, 3)
     if translation is not None:
@@ -102,7 +119,7 @@ def matrix_of(value: Any) -> np.ndarray:
 
 
 class Gathered(Callback):
-    """Collects items that the library passes to a callback, as an array."""
+    """A callback that collects the items it receives in an array."""
 
     def __init__(self, function: Any, dtype: np.dtype) -> None:
         super().__init__(function, self.keep)
@@ -118,12 +135,15 @@ class Gathered(Callback):
 
 
 class Collider:
-    """Two models, or one twice, at poses. Decisions are exact on posed coordinates.
+    """Two models at poses, or one model twice. Decisions are exact for the posed coordinates.
 
-    pose_a, pose_b: what `pose` gives, a (4, 4) matrix, or None: as in the file. Lengths are in the unit
-    of the world: the model's, times the pose's scale. One thread asks at a time; others wait.
+    pose_a, pose_b: a result of `pose`, a (4, 4) matrix, or None for the pose in the file. Lengths are in the
+    world's unit, which is the model's unit times the pose's scale.
 
-    memory: bytes for pairs that wait to be given in order. threads: for `pairs`; None: all cores.
+    memory: bytes for pairs that wait for their turn in the order of results.
+    threads: number of threads for `pairs`; None: all cores.
+
+    One thread queries at a time; other threads wait.
 
     >>> c = Collider(cube, cube)
     >>> c.relation(pose_b=pose(translation=[.5, 0, 0])).name
@@ -150,8 +170,9 @@ class Collider:
             yield ctypes.byref(options)
 
     def first(self, pose_a: Any = None, pose_b: Any = None) -> tuple[int, int, c.PairKind] | None:
-        """A pair of faces that meet: face of a, face of b, kind. None: none do, though a solid may be
-        within the other.
+        """Return one pair of intersecting faces: face of a, face of b, kind.
+
+        Returns None when no faces intersect. A solid may nevertheless be inside the other.
 
         >>> Collider(cube, cube).first(pose_b=pose(translation=[3, 0, 0])) is None
         True
@@ -162,7 +183,7 @@ class Collider:
         return (pair.face_a, pair.face_b, c.PairKind(pair.kind)) if found.value == 1 else None
 
     def relation(self, pose_a: Any = None, pose_b: Any = None, *, deadline: float | None = None) -> c.Relation:
-        """Returns the exact Relation of the models. deadline: seconds, after which the result may be OPEN."""
+        """Return the exact Relation of the models. deadline: time limit in seconds; then the result may be OPEN."""
         result = c.ebpo_relation_result()
         with self._options((pose_a, pose_b), deadline) as options:
             call("ebpo_collide_relation", self._handle, options, ctypes.byref(result))
@@ -176,11 +197,13 @@ class Collider:
         return Pairs(pairs["face_a"].astype(np.int64), pairs["face_b"].astype(np.int64), pairs["kind"].copy())
 
     def pairs(self, pose_a: Any = None, pose_b: Any = None, *, progress: Callable | None = None) -> Pairs:
-        """Returns every pair of intersecting faces, once."""
+        """Return every pair of intersecting faces, once."""
         return self._pairs("ebpo_collide_all", (pose_a, pose_b), progress)
 
     def self_pairs(self, *, progress: Callable | None = None) -> Pairs:
-        """Returns pairs of faces of one model that intersect other than as neighbours. Needs a collider of one model with itself.
+        """Return the pairs of faces of one model that intersect and are not just neighbours.
+
+        The collider must consist of the same model twice.
 
         >>> len(Collider(cube, cube).self_pairs().kind)
         0
@@ -188,7 +211,7 @@ class Collider:
         return self._pairs("ebpo_collide_self", (None, None), progress)
 
     def contacts(self, pose_a: Any = None, pose_b: Any = None, *, progress: Callable | None = None) -> Contacts:
-        """Returns the intersections: a segment for each pair of crossing faces."""
+        """Return the intersections: a segment for each pair of crossing faces."""
         found = Gathered(c.ebpo_segments_fn, SEGMENT)
         with self._options((pose_a, pose_b), None, progress) as options, found as taking:
             call("ebpo_collide_contacts", self._handle, options, taking, None)
@@ -197,7 +220,7 @@ class Collider:
                         all_of_them["face_b"].astype(np.int64))
 
     def polylines(self, pose_a: Any = None, pose_b: Any = None) -> list[np.ndarray]:
-        """Returns the intersection lines: (k, 3) points each; in a closed line the last point equals the first.
+        """Return the intersection lines: (k, 3) points each; in a closed line the last point equals the first.
 
         >>> len(Collider(cube, cube).polylines(pose_b=pose(translation=[.5, .25, .25])))
         1
@@ -215,9 +238,10 @@ class Collider:
 
     def distance(self, pose_a: Any = None, pose_b: Any = None, *, tolerance: float = 0.0,
                  deadline: float | None = None) -> Clearance:
-        """Returns the least distance between the faces: 0 if any intersect, not negative inside a solid.
+        """Return the least distance between the faces. It is 0 if any intersect, and not negative inside a solid.
 
-        tolerance: hi - lo may be so much. deadline: seconds, after which the current bounds are returned.
+        tolerance: greatest allowed hi - lo.
+        deadline: time limit in seconds; then the current bounds are returned.
         """
         clearance, out = made(c.ebpo_clearance_options, tolerance=tolerance), c.ebpo_clearance()
         with self._options((pose_a, pose_b), deadline) as options:
@@ -226,7 +250,7 @@ class Collider:
                          np.array(out.point_a), np.array(out.point_b))
 
     def depth(self, tolerance: float, pose_a: Any = None, pose_b: Any = None) -> tuple[tuple, tuple]:
-        """Returns the depth of a's surface in b, and of b's surface in a: (lo, hi) each, at most `tolerance` apart.
+        """Return the depth of a's surface in b, and of b's surface in a: (lo, hi) each, at most `tolerance` apart.
 
         >>> (lo, hi), _ = Collider(cube, cube).depth(.01, pose_b=pose(translation=[.75, 0, 0]))
         >>> lo <= .25 <= hi
@@ -238,7 +262,7 @@ class Collider:
         return (a_in_b.lo, a_in_b.hi), (b_in_a.lo, b_in_a.hi)
 
     def separation(self, direction: Any, pose_a: Any = None, pose_b: Any = None) -> Separation:
-        """Returns the separation distance of a from b along a direction, in multiples of the direction's length.
+        """Return the separation distance of a from b along a direction, in multiples of the direction's length.
 
         >>> Collider(cube, cube).separation([1, 0, 0], pose_b=pose(translation=[-.25, 0, 0])).hi
         0.75

@@ -4,13 +4,13 @@
     import ebpo.dask
 
     client = Client("scheduler:8786")
-    P = ebpo.dask.points("points.npy")                   # or .h5, raw doubles; dask and numpy arrays do as well
+    P = ebpo.dask.points("points.npy")                   # or .h5, raw doubles, a dask or numpy array
     inside = ebpo.dask.inside("https://example.org/scan.ebpo.h5", P, memory="2G")
-    ebpo.dask.to_file(inside, "inside.npy")              # goes on where it was, if it was stopped
+    ebpo.dask.to_file(inside, "inside.npy")              # continues if it was stopped before
 
-Results are dask arrays, computed when they are needed. Each worker opens the model, or those of the
-catalogue that its points come to, by path or URL, and keeps them between tasks. Answers are the same, byte
-for byte, whatever the number of workers and the size of chunks. Dask is imported when it is needed.
+Results are dask arrays, which are computed when they are needed. Each worker opens the model, or the models
+of a catalogue that its points need, by path or URL, and keeps them open between tasks. Results are equal
+byte for byte for any number of workers and any size of chunks. Dask is imported when it is needed.
 """
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .errors import ArgumentError
 from .open_models import process_models
 from .point_files import HDF5, PointFile, h5py_of, load_npy, published, save_array, shape_of_npy
 
-CHUNK = 1 << 18  # points of a task
+CHUNK = 1 << 18  # points of one task
 DTYPES = {"inside": np.dtype(bool), "winding": np.dtype("i4"), "locate": cat.LOCATED, "distance": cat.NEAREST,
           "ray": cat.HIT}
 
@@ -54,7 +54,7 @@ class Hits(NamedTuple):
 
 
 def catalogue(model: Any, **options: Any) -> Catalogue:
-    """A catalogue of whatever can be asked: one, the path of one (.json), a path or URL of a model, a list."""
+    """Return a catalogue of a Catalogue, its path (.json), a path or URL of a model, or a list of paths and URLs."""
     if isinstance(model, Catalogue):
         return model
     if isinstance(model, (str, os.PathLike)):
@@ -63,14 +63,15 @@ def catalogue(model: Any, **options: Any) -> Catalogue:
         return Catalogue.of([model], **options)
     if isinstance(model, (list, tuple)):
         return Catalogue.of(model, **options)
-    raise TypeError(f"{type(model).__name__}: workers take a path, a URL, a list of such or a Catalogue")
+    raise TypeError(f"{type(model).__name__}: expected a path, a URL, a list of paths and URLs, or a Catalogue")
 
 
 def points(source: Any, dataset: str | None = None, *, chunk: int = CHUNK, columns: int = 3) -> Any:
-    """A dask array (n, columns) of a file of points; workers read it by stretches of `chunk` rows.
+    """Return a dask array (n, columns) of the points in a file. Workers read `chunk` rows at a time.
 
-    source: the path of a .npy, an HDF5 file (with h5py; `dataset`, or the only one that fits), or raw
-        doubles; it has to be the same for all workers. Or a dask array, or anything of numpy's.
+    source: the path of a .npy, an HDF5 file (with h5py; `dataset`, or the only suitable one), or raw
+        doubles. All workers must see the same file under this path. Or a dask array, or any input of
+        numpy.asarray.
     """
     import dask.array as da
     from dask.base import tokenize
@@ -97,7 +98,7 @@ def read_rows(file: tuple, begin: int, end: int) -> np.ndarray:
 
 
 class Means:
-    """What answers do not depend on, nor the names of their arrays."""
+    """Options that influence neither results nor the names of result arrays."""
 
     def __init__(self, memory: Any, threads: int) -> None:
         self.options = {"memory": memory, "threads": threads}
@@ -108,35 +109,36 @@ class Means:
 
 def query_block(block: np.ndarray, what: str, models: Catalogue, means: Means, options: tuple,
                 block_info: Any = None) -> np.ndarray:
-    """Of a chunk, in the worker. block_info: Dask's, where the chunk is in the whole."""
+    """Run the queries of one chunk, in a worker. block_info: Dask's description of the chunk's position."""
     block, query, rest = np.asarray(block), getattr(models, what), dict(options)
     rows = (block[:, :3], block[:, 3:]) if what == "ray" else (block,)
     try:
         return query(*rows, **rest, **means.options)
     except ArgumentError as error:
         begin = block_info[0]["array-location"][0][0] if block_info else np.nan
-        if begin == begin:  # of some chunks Dask does not know where they begin
+        if begin == begin:  # false for nan: Dask does not know the chunk's offset
             cat.numbered(error, int(begin))
         raise
 
 
 def query(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk: int = CHUNK,
           memory: int | str | None = None, threads: int = 1, http: dict | None = None, **options: Any) -> Any:
-    """A dask array (n,) of answers: bool, int32, or structured (`catalogue.LOCATED`, NEAREST, HIT).
+    """Return a dask array (n,) of results: bool, int32, or structured (`catalogue.LOCATED`, NEAREST, HIT).
 
     what: "inside", "winding", "locate", "distance" or "ray".
-    model: a path or URL that each worker can open, a list of such, a Catalogue, or the path of one (.json).
-    rows: as `points` takes them; of rays (n, 6), origins and directions.
-    memory: bytes for all models that a worker process holds; at first 1 GiB. It holds from then on.
-    threads: so many work at a chunk; Dask's workers have threads of their own.
-    http: options of URLs, such as headers.
+    model: a path or URL that each worker can open, a list of them, a Catalogue, or the path of one (.json).
+    rows: input of `points`; for rays (n, 6), origins and directions.
+    memory: budget in bytes for all models of a worker process, from then on; initially 1 GiB.
+    threads: number of threads for each chunk, in addition to the threads of Dask's workers.
+    http: options for URLs, such as headers.
     options: those of the method of Catalogue, such as boundary=False, max_distance, signed, t_max.
 
-    Numbers of points in errors are those among `rows`; within a chunk, where Dask does not know the chunks' sizes.
+    Errors state the number of a point among all `rows`. When Dask does not know the sizes of chunks, the
+    number is that within the chunk.
     """
     import dask.array as da
     if what not in DTYPES:
-        raise ValueError(f"{', '.join(DTYPES)} can be queried, not {what!r}")
+        raise ValueError(f"what={what!r}: only {', '.join(DTYPES)} can be queried")
     models = catalogue(model, **(http or {}))
     given = points(rows, dataset, chunk=chunk, columns=6 if what == "ray" else 3)
     columns = 6 if what == "ray" else 3
@@ -147,22 +149,25 @@ def query(what: str, model: Any, rows: Any, *, dataset: str | None = None, chunk
 
 
 def inside(model: Any, rows: Any, **options: Any) -> Any:
-    """Returns True for points inside: a dask array (n,) of bool. Options are those of `query`; boundary=True."""
+    """Return True for points inside: a dask array (n,) of bool. Options: those of `query`, and boundary."""
     return query("inside", model, rows, **options)
 
 
 def winding(model: Any, rows: Any, **options: Any) -> Any:
-    """Returns winding numbers, summed over models: a dask array (n,) of int32. Options are those of `query`."""
+    """Return winding numbers, summed over models: a dask array (n,) of int32. Options are those of `query`."""
     return query("winding", model, rows, **options)
 
 
 def distance(model: Any, rows: Any, **options: Any) -> Nearest:
-    """Returns nearest faces. Options are those of `query`; max_distance, signed. For files: `query("distance", ...)`."""
+    """Return nearest faces. Options: those of `query`, max_distance, signed. For files use `query("distance", ...)`."""
     return Nearest(*members(query("distance", model, rows, **options)))
 
 
 def ray(model: Any, origins: Any, directions: Any, **options: Any) -> Hits:
-    """Returns first hits of rays. origins: dask or numpy (n, 3); directions: the same, or (3,); t_max."""
+    """Return the first hits of rays. Options: those of `query`, and t_max.
+
+    origins: dask or numpy (n, 3). directions: the same, or (3,).
+    """
     import dask.array as da
     o = points(origins, chunk=options.get("chunk", CHUNK))
     if isinstance(directions, da.Array) or np.ndim(directions) == 2:
@@ -185,7 +190,7 @@ def member(block: np.ndarray, name: str) -> np.ndarray:
 
 
 def stats(client: Any = None) -> Any:
-    """What models have cost (`open_models.OpenModels.stats`): of this process, or a dict of the client's workers."""
+    """Return `open_models.OpenModels.stats` of this process, or a dict with those of each worker of the client."""
     return process_models().stats() if client is None else client.run(worker_stats)
 
 
@@ -193,26 +198,29 @@ def worker_stats() -> dict:
     return process_models().stats()
 
 
-# ---- files of answers ----
+# ---- files of results ----
 
 def to_file(results: Any, path: Any, *, dataset: str = "results", **compute: Any) -> None:
-    """Computes a dask array into a file, which is replaced atomically: .npy, HDF5 (.h5, with h5py), or else a folder.
+    """Compute a dask array into a file: .npy, HDF5 (.h5, with h5py), or, for another name, a folder.
 
-    Workers write their chunks to PATH.parts (a folder that they share with this process), each whole or not
-    at all. When it is called again after it was stopped, what is there is not computed again; chunks of
-    another question are refused (ValueError). In the end they become the file, and the folder goes; with a
-    path without such an ending, PATH itself is the folder, of 000000.npy and so on.
+    Workers write their chunks to the folder PATH.parts, which they must share with this process. Each chunk
+    is a file that is replaced atomically. A call after an interruption reuses the chunks that exist; chunks
+    of another query are refused (ValueError). At the end the chunks are joined into the file, which is
+    replaced atomically, and the folder is removed. When PATH has none of these suffixes, PATH is the folder
+    of the chunks 000000.npy and so on.
 
-    results: one array, also structured, as `query` gives it.
-    compute: for dask.compute, such as scheduler="threads".
+    results: one array, which may be structured, as `query` returns it.
+    compute: options of dask.compute, such as scheduler="threads".
+
+    Raises FileExistsError when the file exists.
     """
     import dask
     path = pathlib.Path(path).absolute()
     is_file = path.suffix in (".npy", *HDF5)
     if path.suffix in HDF5:
-        h5py_of(str(path))  # says now, not after hours, that it is missing
+        h5py_of(str(path))  # fails before the computation when h5py is missing
     if is_file and path.exists():
-        raise FileExistsError(f"{path} is there already")
+        raise FileExistsError(f"{path} already exists")
     folder = path.with_name(path.name + ".parts") if is_file else path
     begin_parts(folder, results)
     blocks = results.to_delayed().ravel()
@@ -221,7 +229,7 @@ def to_file(results: Any, path: Any, *, dataset: str = "results", **compute: Any
                    if not name.exists()], **compute)
     missing = [name for name in names if not name.exists()]
     if missing:
-        raise FileNotFoundError(f"{missing[0]}: workers have written it elsewhere; the folder has to be shared")
+        raise FileNotFoundError(f"{missing[0]}: not found, but workers wrote it; all workers must share the folder")
     check_parts(names, results)
     if is_file:
         join_parts(path, names, dataset)
@@ -234,12 +242,12 @@ def begin_parts(folder: pathlib.Path, results: Any) -> None:
     stated = folder / "query.json"
     if not stated.exists():
         if any(name.name[0] != "." for name in folder.iterdir()) and not stated.exists():
-            raise ValueError(f"{folder} is not empty, and has no query.json; remove it, or name another")
+            raise ValueError(f"{folder} is not empty and has no query.json; remove the folder, or use another name")
         with contextlib.suppress(FileExistsError), published(stated, new=True) as file:
             file.write(json.dumps(query).encode())
-    if json.loads(stated.read_bytes()) != query:  # also where another process has begun at the same time
-        raise ValueError(f"{folder} holds results of another query, or of other chunks; remove it, or name another "
-                         "file")
+    if json.loads(stated.read_bytes()) != query:  # another process may have begun at the same time
+        raise ValueError(f"{folder} holds results of another query, or of other chunks; remove the folder, or use "
+                                          "another name")
 
 
 def save_part(name: str, block: np.ndarray) -> None:
@@ -247,19 +255,19 @@ def save_part(name: str, block: np.ndarray) -> None:
 
 
 def check_parts(names: list, results: Any) -> None:
-    """ValueError: a chunk that was there is not one of these answers. Of some Dask knows no rows (NaN)."""
+    """Raise ValueError when a chunk file is not part of these results. Unknown row counts are NaN."""
     for name, rows in zip(names, results.chunks[0]):
         try:
             part = load_npy(str(name))
         except ValueError as error:
-            raise ValueError(f"{name}: no chunk of results ({error}); remove it, and it is made anew") from None
+            raise ValueError(f"{name}: not a chunk of results ({error}); remove the file to compute it again") from None
         if part.dtype != results.dtype or (rows == rows and len(part) != rows):
-            raise ValueError(f"{name}: {len(part)} rows of {part.dtype}, not {rows} of {results.dtype}; remove it, and "
-                             "it is made anew")
+            raise ValueError(f"{name}: expected {rows} rows of {results.dtype}, got {len(part)} of {part.dtype}; "
+                                              "remove the file to compute it again")
 
 
 def join_parts(path: pathlib.Path, names: list, dataset: str) -> None:
-    """Of chunks that are whole; one at a time is open, however many there are."""
+    """Join complete chunks into the file. Opens one chunk at a time."""
     heads = [shape_of_npy(str(name)) for name in names]
     shape, dtype = (sum(rows for (rows, *_), _ in heads), *heads[0][0][1:]), heads[0][1]
     parts = (load_npy(str(name)) for name in names)

@@ -31,7 +31,7 @@ ZSTD = 32015
 
 
 def plugin_folder() -> str | None:
-    """Returns the folder of the project's zstd plugin, as the `ebpo` in PATH prints it, or None."""
+    """Return the folder of the project's zstd plugin, as the `ebpo` in PATH prints it, or None."""
     try:
         printed = subprocess.run(["ebpo", "--version", "--verbose"], capture_output=True, text=True)
     except OSError:
@@ -41,7 +41,7 @@ def plugin_folder() -> str | None:
 
 
 def enable() -> str:
-    """Enables zstd for h5py in this process. Returns the name of the plugin. ImportError: no plugin found.
+    """Enable zstd for h5py in this process. Returns the name of the plugin. ImportError: no plugin found.
 
     Before the first file is opened: HDF5 remembers that it has found no plugin.
     """

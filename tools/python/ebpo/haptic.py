@@ -87,29 +87,29 @@ class Haptic:
                                    free="ebpo_haptic_free", keep=(model.model,))
 
     def step(self, device: Any) -> HapticResult:
-        """Computes a haptic step of a ball."""
+        """Compute a haptic step of a ball."""
         r = c.ebpo_haptic_ball_result()
         lib.ebpo_haptic_step_ball(self._handle, _vector(device, 3), ctypes.byref(r))
         return HapticResult(np.array(r.proxy), np.array(r.force), np.zeros(3), np.array([0, 0, 0, 1.0]),
                             np.array(r.normal), r.depth, _number(r.face), r.flags)
 
     def step_tool(self, place: Any, quaternion: Any) -> HapticResult:
-        """Computes a haptic step of a tool; quaternions are x, y, z, w."""
+        """Compute a haptic step of a tool; quaternions are x, y, z, w."""
         r = c.ebpo_haptic_tool_result()
         lib.ebpo_haptic_step_tool(self._handle, _vector(place, 3), _vector(quaternion, 4), ctypes.byref(r))
         return HapticResult(np.array(r.proxy), np.array(r.force), np.array(r.torque), np.array(r.turn),
                             np.array(r.normal), r.depth, _number(r.face), r.flags)
 
     def step_probe(self, place: Any) -> ProbeResult:
-        """Computes a haptic step of a probe."""
+        """Compute a haptic step of a probe."""
         r = c.ebpo_haptic_probe_result()
         lib.ebpo_haptic_step_probe(self._handle, _vector(place, 3), ctypes.byref(r))
         return ProbeResult(r.distance, r.lo, r.hi, np.array(r.normal), _number(r.face), r.where, r.flags)
 
     def reset(self, place: Any) -> None:
-        """Moves the device and the proxy to another position, without contact."""
+        """Move the device and the proxy to another position, without contact."""
         call("ebpo_haptic_reset", self._handle, _vector(place, 3))
 
     def check(self) -> None:
-        """Raises the error that stopped loading of faces, if any."""
+        """Raise the error that stopped loading of faces, if any."""
         call("ebpo_haptic_check", self._handle)

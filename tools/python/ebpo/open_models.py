@@ -101,7 +101,7 @@ class OpenModels:
         return dict(stats, opened=counts.opened, closed=counts.closed, open=counts.open)
 
     def clear(self) -> None:
-        """Closes models that are not in use."""
+        """Close models that are not in use."""
         lib.ebpo_catalogue_models_close_idle(self.models)
 
 

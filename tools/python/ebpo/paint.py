@@ -20,8 +20,15 @@ AREA = np.dtype(c.ebpo_paint_area)
 
 
 class Stroke(NamedTuple):
-    """layer: its number; kind: a PaintKind; colour: 0xRRGGBBAA; radius: of points of full size, in the
-    model's unit; time: milliseconds since 1970, 0: not known; points: structured as ebpo_paint_point."""
+    """A stroke.
+
+    layer: the index of its layer.
+    kind: a PaintKind.
+    colour: 0xRRGGBBAA.
+    radius: radius of points of full size, in the model's unit.
+    time: milliseconds since 1970; 0: unknown.
+    points: structured as ebpo_paint_point.
+    """
 
     layer: int
     kind: Any
@@ -32,9 +39,9 @@ class Stroke(NamedTuple):
 
 
 class Areas(NamedTuple):
-    """In the model's unit, squared, each as lo, value, hi: the area is from lo to hi.
+    """Painted areas, in the model's unit squared. Each has lo, value and hi; the exact area is in [lo, hi].
 
-    all: of all layers, (). layers, strokes: of each, structured arrays.
+    all: the area of all layers together, (). layers, strokes: structured arrays, one item each.
     """
 
     all: np.ndarray
@@ -43,9 +50,9 @@ class Areas(NamedTuple):
 
 
 class Paint:
-    """Paint on a model, which is never changed. Made by `Paint(model)`, or `Paint.open` of a file.
+    """Paint on a model. The model is never changed. Made by `Paint(model)`, or by `Paint.open` from a file.
 
-    The rules are those of ebpo/paint.h. Several threads may read it while none changes it.
+    The rules are those of ebpo/paint.h. Several threads may read a Paint while no thread changes it.
 
     >>> paint = Paint(cube)
     >>> layer = paint.add_layer(title="Cracks", colour=0x3366ffff)
@@ -59,7 +66,7 @@ class Paint:
     def __init__(self, model: Model | None = None, *, _handle: Handle | None = None) -> None:
         if _handle is None:
             if model is None:
-                raise TypeError("Paint() takes the model that it is on")
+                raise TypeError("Paint() needs a model")
             _handle = Handle.made("ebpo_paint_new", model.file, free="ebpo_paint_free")
         self._held: Handle | None = _handle
 
@@ -71,7 +78,7 @@ class Paint:
 
     @classmethod
     def open(cls, source: Any) -> Paint:
-        """Of a path, or the bytes of a file. FormatError, VersionError, IOFailure."""
+        """Open paint from a path, or from the bytes of a file. Raises FormatError, VersionError, IOFailure."""
         if isinstance(source, (str, os.PathLike)):
             return cls(_handle=Handle.made("ebpo_paint_open", path_in_c(source), free="ebpo_paint_free"))
         data = np.frombuffer(source, np.uint8)
@@ -81,13 +88,13 @@ class Paint:
     @classmethod
     @contextlib.contextmanager
     def change(cls, path: Any, model: Model | None = None, *, wait: float = 60) -> Iterator[Paint]:
-        """For `with`: opens a file, and saves it at the end, unless something was raised.
+        """Open a file for a change in a `with` statement; save it at the end, unless an exception was raised.
 
-        Others who open it so, in any process or thread, wait until then, up to `wait` seconds (IOFailure):
-        changes follow each other, and none is lost. See ebpo_paint_open_to_change.
+        Other `change` calls for the file, in any process or thread, wait up to `wait` seconds, then raise
+        IOFailure. So changes follow each other and none is lost. See ebpo_paint_open_to_change.
 
-        model: where there is no file, the paint is a new one for this model; the paint of a file is checked
-        as by `check` with points.
+        model: if the file does not exist, the paint is a new one for this model. Existing paint is checked as
+            by `check` with points.
 
         >>> for title in "Cracks", "Repairs":
         ...     with Paint.change("cube.paint.h5", cube) as paint:
@@ -95,7 +102,7 @@ class Paint:
         >>> len(Paint.open("cube.paint.h5").layers)
         2
         """
-        path = os.path.abspath(path)  # the same at the end
+        path = os.path.abspath(path)  # the working directory may change before the end
         paint = cls(_handle=Handle.made("ebpo_paint_open_to_change", path_in_c(path),
                                         None if model is None else model.file, wait, None, free="ebpo_paint_free"))
         try:
@@ -103,27 +110,31 @@ class Paint:
                 paint.check(model, points=True)
             yield paint
         except BaseException:
-            paint._handle._end()  # now, and not with the traceback: others wait
+            paint._handle._end()  # free it now, not together with the traceback: others wait
             paint._held = None
             raise
         paint.save(path)
 
     def save(self, path: Any) -> None:
-        """Whole or not at all. UnsupportedError: the library is one without libhdf5.
+        """Save the paint to a file, which is replaced atomically.
 
-        IOFailure: another program or Paint has changed the file that this one is of, since it was read
-        from it or saved there. Open it again and repeat the change, or save to another path.
+        Raises UnsupportedError when the library was built without libhdf5.
+
+        Raises IOFailure when the file of this paint was changed by another program or Paint since it was read
+        or saved here. Open it again and repeat the change, or save to another path.
         """
         call("ebpo_paint_save", self._handle, path_in_c(path))
 
     @property
     def info(self) -> dict[str, Any]:
-        """Members of ebpo_paint_info: layer_count, stroke_count, note_count, point_count, model_sha256, ..."""
+        """The members of ebpo_paint_info: layer_count, stroke_count, note_count, point_count, model_sha256, ..."""
         return facts(self._got("ebpo_paint_get_info", c.ebpo_paint_info))
 
     def check(self, model: Model, *, points: bool = False) -> None:
-        """Raises ArgumentError if it is paint of another model; with `points`, FormatError if a point or note is
-        not on its face."""
+        """Check that the paint belongs to a model. Raises ArgumentError otherwise.
+
+        points: also check that all points and notes are on their faces. Raises FormatError otherwise.
+        """
         call("ebpo_paint_check_model", self._handle, model.file)
         if points:
             with model._context() as context:
@@ -132,49 +143,49 @@ class Paint:
     def _got(self, function: str, kind: Any, *number: int) -> Any:
         struct = made(kind)
         if getattr(lib, function)(self._handle, *number, ctypes.byref(struct)) != 0:
-            raise IndexError(f"there is no number {number[0]}")
+            raise IndexError(f"index {number[0]} is out of range")
         return struct
 
     # ---- layers, notes, strokes ----
 
     @property
     def layers(self) -> list[dict]:
-        """Of each: title, author, date, description, colour (0xRRGGBBAA), opacity (0 to 255), visible (0, 1)."""
+        """The layers: title, author, date, description, colour (0xRRGGBBAA), opacity (0 to 255), visible (0, 1)."""
         return [facts(self._got("ebpo_paint_get_layer", c.ebpo_paint_layer, i)) for i in range(self.info["layer_count"])]
 
     def add_layer(self, **members: Any) -> int:
-        """Adds a layer above all others. Returns its number."""
+        """Add a layer above all others. Returns its index."""
         number = ctypes.c_uint64()
         call("ebpo_paint_add_layer", self._handle, ctypes.byref(of_members(c.ebpo_paint_layer, members)),
              ctypes.byref(number))
         return number.value
 
     def remove_layer(self, number: int) -> None:
-        """Removes a layer with its strokes and notes."""
+        """Remove a layer with its strokes and notes."""
         call("ebpo_paint_remove_layer", self._handle, number)
 
     @property
     def notes(self) -> list[dict]:
-        """Of each: title, author, date, body, layer, and `at`, structured as ebpo_paint_point."""
+        """The notes: title, author, date, body, layer, and `at`, structured as ebpo_paint_point."""
         return [facts(self._got("ebpo_paint_get_note", c.ebpo_paint_note, i)) for i in range(self.info["note_count"])]
 
     def add_note(self, model: Model, place: Any, *, layer: int = 0, **texts: Any) -> None:
-        """At the point of the surface nearest to a place. texts: title, author, date, body."""
+        """Add a note at the point of the surface nearest to `place`. texts: title, author, date, body."""
         note = of_members(c.ebpo_paint_note, {**texts, "layer": layer})
         at = doubles(place, "a place")
         if at.shape != (3,):
-            raise ValueError("a place has three numbers")
+            raise ValueError("place: expected three numbers")
         with model._context() as context:
             call("ebpo_paint_locate", self._handle, context, at.ctypes.data, ctypes.byref(note.at))
         call("ebpo_paint_add_note", self._handle, ctypes.byref(note))
 
     def remove_note(self, number: int) -> None:
-        """Removes a note. Later notes get the next lower numbers."""
+        """Remove a note. The indices of later notes decrease by one."""
         call("ebpo_paint_remove_note", self._handle, number)
 
     @property
     def strokes(self) -> list[Stroke]:
-        """Returns the strokes in the order in which they were made."""
+        """The strokes in the order in which they were made."""
         out = []
         for i in range(self.info["stroke_count"]):
             s = self._got("ebpo_paint_get_stroke", c.ebpo_paint_stroke, i)
@@ -183,16 +194,16 @@ class Paint:
         return out
 
     def remove_stroke(self, number: int) -> None:
-        """Removes a stroke. Removing the last stroke is an undo."""
+        """Remove a stroke. Removing the last stroke is an undo."""
         call("ebpo_paint_remove_stroke", self._handle, number)
 
     def draw(self, model: Model, input: Any, *, progress: Callable | None = None, **pen: Any) -> dict[str, int]:
-        """Adds strokes along the path of a haptic device.
+        """Add strokes along the path of a haptic device.
 
-        input: (n, 4), places and pressures of 0 to 1, or (n, 5), with milliseconds.
-        pen: members of ebpo_paint_pen: radius, which is needed, layer, colour, spread, density, seed, ...
+        input: (n, 4), positions and pressures of 0 to 1, or (n, 5), with times in milliseconds.
+        pen: members of ebpo_paint_pen: radius (required), layer, colour, spread, density, seed, ...
 
-        Returns members of ebpo_paint_drawn: strokes, points, steps, lifted, strayed.
+        Returns the members of ebpo_paint_drawn: strokes, points, steps, lifted, strayed.
         """
         rows = doubles(input, "input")
         if rows.ndim != 2 or rows.shape[1] not in (4, 5):
@@ -206,10 +217,10 @@ class Paint:
                  ctypes.byref(drawn))
         return facts(drawn)
 
-    # ---- answers ----
+    # ---- results ----
 
     def cover(self, model: Model, stroke: int) -> np.ndarray:
-        """Returns the faces that a stroke covers: structured as ebpo_paint_face, in the order of the file."""
+        """Return the faces that a stroke covers, structured as ebpo_paint_face, in the order of the file."""
         found = bytearray()
 
         def take(_user: int, face: int) -> bool:
@@ -221,7 +232,7 @@ class Paint:
         return np.frombuffer(bytes(found), FACE)
 
     def measure(self, model: Model, *, fineness: int = 256, progress: Callable | None = None) -> Areas:
-        """Returns the painted areas; see ebpo_paint_measure."""
+        """Return the painted areas; see ebpo_paint_measure."""
         areas = made(c.ebpo_paint_areas)
         with Reporter(progress) as reported, model._context() as context:
             options = made(c.ebpo_paint_options, fineness=fineness, threads=model._threads, progress=reported)

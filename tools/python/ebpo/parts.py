@@ -15,8 +15,8 @@ from ._library import Handle, Struct, array, call, copied, lib, made, text
 class Mesh(NamedTuple):
     """A triangle mesh.
 
-    vertices: (v, 3) float32 or float64, as the source has them, in the model's unit.
-    faces: (f, 3) uint32 numbers of vertices, counter-clockwise seen from outside.
+    vertices: (v, 3) float32 or float64, the type of the source, in the model's unit.
+    faces: (f, 3) uint32, vertex indices, counter-clockwise seen from outside.
     """
 
     vertices: np.ndarray
@@ -24,9 +24,11 @@ class Mesh(NamedTuple):
 
 
 class Maps(NamedTuple):
-    """Numbers in the source: vertex (v,) and face (f,), uint32, of those of the file.
+    """Indices in the source, for each vertex and face of the file.
 
-    Faces that were added by filling holes have numbers from `info.source_face_count` on.
+    vertex: (v,) uint32. face: (f,) uint32.
+
+    Faces that fill holes have indices from `info.source_face_count` on.
     """
 
     vertex: np.ndarray
@@ -34,16 +36,16 @@ class Maps(NamedTuple):
 
 
 class Level(NamedTuple):
-    """The envelopes of a level: closed convex polyhedra that hold the solid, as triangles.
+    """The envelopes of a level: closed convex polyhedra that contain the solid, as triangles.
 
-    vertices: (v, 3) float64, in the model's unit; nodes share none.
+    vertices: (v, 3) float64, in the model's unit; nodes share no vertices.
     faces: (f, 3) uint32.
-    node: (f,) int64, whose each face is: rows of what follows.
+    node: (f,) int64, the index of the face's node in the following arrays of n nodes.
     octcode: (n,) uint64.
     type: (n,) int8, a NodeType.
-    winding: (n,) int32; black: in the cell; leaf: at the lowest corner; else 0.
-    volume: (n,) float64, of each envelope, in the model's unit cubed.
-    colour: (n, 3) uint8, sRGB, or None where the file has no colours of nodes.
+    winding: (n,) int32; of a black node: in its cell; of a leaf: at its lowest corner; else 0.
+    volume: (n,) float64, the volume of each envelope, in the model's unit cubed.
+    colour: (n, 3) uint8, sRGB, or None when the file has no colours of nodes.
     """
 
     vertices: np.ndarray
@@ -57,14 +59,17 @@ class Level(NamedTuple):
 
 
 class Mass(NamedTuple):
-    """In the model's unit, squared, cubed and so on; of density 1.
+    """Area, volume, centroid and inertia, in powers of the model's unit; inertia for density 1.
 
-    area, volume: float; the volume of a surface is 0, and so is what follows. The volume is that of the points which
-    the file's rule puts inside; nan: it is not known, as components meet or repeat each other, or the mesh is no
-    2-manifold.
-    centroid: (3,); inertia: (3, 3) about it. Where the volume is nan, of the winding number as a density.
-    volume_bounds: (2,) the volume is certainly within.
-    integral: of the winding number; the volume if winding numbers are 0 and 1 only.
+    area: float.
+    volume: float, the volume of the points that are inside by the file's rule. nan: unknown, because
+        components intersect or coincide, or the mesh is not a 2-manifold. A surface has 0, and 0 in the
+        following members.
+    centroid: (3,). inertia: (3, 3), about the centroid. When the volume is nan, the winding number is the
+        density.
+    volume_bounds: (2,), certain bounds of the volume.
+    integral: float, the integral of the winding number. It equals the volume when winding numbers are only
+        0 and 1.
     """
 
     area: float
@@ -76,15 +81,17 @@ class Mass(NamedTuple):
 
 
 class Info:
-    """The facts of a file. Names are those of `ebpo_info` in ebpo/file.h, which says more.
+    """The facts of a file. Their names are those of the members of `ebpo_info`, which ebpo/file.h describes.
 
-    Texts are str, digests hexadecimal, arrays numpy's. In other form:
+    Texts are str, digests are hexadecimal, arrays are numpy arrays. These facts have another form:
 
     box: (2, 3) float64, lower and upper corner of the root cell.
-    rule: a Rule; parts: a set of names, such as {"planes", "mesh"}; codec, selection: int.
-    format: "1.1".
-    levels: a structured array, a row for each level: gray_count, leaf_count, ... of ebpo_level_summary.
-    source: the path, URL or object that was opened, as a text.
+    rule: a Rule.
+    parts: a set of names, such as {"planes", "mesh"}.
+    codec, selection: int.
+    format: a text such as "1.1".
+    levels: a structured array with one row for each level: gray_count, leaf_count, ... of ebpo_level_summary.
+    source: the opened path, URL or object, as a text.
     """
 
     def __init__(self, struct: Any, source: str) -> None:
@@ -114,7 +121,7 @@ class Info:
         try:
             return self.__dict__["_facts"][name]
         except KeyError:
-            raise AttributeError(f"there is no fact {name!r}; dir(info) names them") from None
+            raise AttributeError(f"there is no fact {name!r}; dir(info) lists the facts") from None
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self._facts]
@@ -153,7 +160,7 @@ def read_mesh(file: Handle, order: str, threads: int) -> Mesh:
         is_source = ctypes.c_bool()
         call("ebpo_file_read_source_mesh", file, ctypes.byref(options), mesh, ctypes.byref(is_source))
         if not is_source:
-            raise LookupError("the file has no maps: it does not say which order the source had")
+            raise LookupError("the file has no maps, so the order of the source is unknown")
     return mesh_of(mesh)
 
 
@@ -185,12 +192,13 @@ TYPES = [np.int8, np.uint8, np.int16, np.uint16, np.int32, np.uint32, np.float32
 
 
 class Attributes(Mapping):
-    """What the source says of vertices, faces and other elements beyond positions and corners.
+    """The attributes of the source: values of vertices, faces and other elements, except positions and corners.
 
-    A mapping from "element:name", such as "vertex:red", to arrays, which are read when they are asked
-    for: a row for each vertex or face in the order of the file (`Model.maps` has the source's). Without
-    the element the first of that name is meant, vertices first. Lists of one length have a row each;
-    of others there is a list of arrays.
+    A mapping from "element:name", such as "vertex:red", to arrays. An array is read when it is accessed.
+    It has a row for each vertex or face, in the order of the file (`Model.maps` has the source indices).
+    A name without an element means the first attribute of that name, vertices first.
+    Lists of equal length are an array with one row for each list. Lists of different lengths are a list of
+    arrays.
 
     >>> sorted(cube.attributes)
     []
@@ -219,7 +227,7 @@ class Attributes(Mapping):
         return self._places[name if name in self._places else found[0]]
 
     def facts(self, name: str) -> dict[str, Any]:
-        """Of the array that a name is in: its element, names, type, rows and range, unread."""
+        """Return element, names, type, row count and range of the array with an attribute. Reads no values."""
         facts = made(c.ebpo_attribute_facts)
         lib.ebpo_file_attribute(self._file, self._find(name)[0], ctypes.byref(facts))
         return {"element": text(facts.element), "names": text(facts.names).split(" "),
@@ -245,22 +253,29 @@ class Attributes(Mapping):
 
 
 class Subtree:
-    """A subtree of the octree as plain arrays, which are the library's own.
+    """A subtree of the octree, as read-only arrays in memory of the library.
 
-    Nodes, level after level, octcodes ascending; n of them:
+    The n nodes are sorted by level, then by octcode:
 
-    level: of its root; level_first: (levels + 1,) the first node of each level.
-    octcode: (n,) uint64; type: (n,) uint8, a NodeType; winding: (n,) int32 or None.
-    children: (n,) uint32, the first of eight, octant after octant; NO_CHILDREN: none here.
-    plane_first: (n + 1,) uint32, where each node's planes begin in planes: uint32 codes (see
-    `half_spaces`); None without them. above_first, above_planes: the same of the nodes above.
+    level: the level of the root.
+    level_first: (levels + 1,) the first node of each level.
+    octcode: (n,) uint64.
+    type: (n,) uint8, a NodeType.
+    winding: (n,) int32, or None.
+    children: (n,) uint32, the first of the eight children in octant order. NO_CHILDREN: the subtree has no
+        children of the node.
+    plane_first: (n + 1,) uint32, the index of each node's first plane in `planes`; None without planes.
+    planes: uint32 plane codes (see `half_spaces`).
+    above_first, above_planes: the same for the nodes above the root.
 
-    Faces, if the file has a mesh and no `levels` were given; else None:
+    Arrays of faces are None when the file has no mesh or `levels` was given:
 
-    vertices: (v, 3) float32 or float64; faces: (f, 3) uint32, of these vertices.
-    shared_count: so many of the faces, the first ones, are other subtrees' own.
-    number: (f,) uint32, in the file; source: (f,) uint32, in the source, or None.
-    list_first: (n + 1,) uint32, where each leaf's list of faces begins in list.
+    vertices: (v, 3) float32 or float64.
+    faces: (f, 3) uint32, indices in `vertices`.
+    shared_count: the number of shared faces, which are the first ones; other subtrees own them.
+    number: (f,) uint32, the index of each face in the file.
+    source: (f,) uint32, the index of each face in the source, or None.
+    list_first: (n + 1,) uint32, the index of each leaf's first face in `list`.
     """
 
     NO_CHILDREN = 2**32 - 1
@@ -317,7 +332,7 @@ class Subtree:
         self.list = self._array(faces.list, (int(self.list_first[-1]),), np.uint32)
 
     def faces_of(self, node: int) -> np.ndarray:
-        """Returns the faces of a leaf: rows of `faces`."""
+        """Return the faces of a leaf, as indices of rows of `faces`."""
         return self.list[self.list_first[node]:self.list_first[node + 1]]
 
     def __repr__(self) -> str:
@@ -325,10 +340,13 @@ class Subtree:
 
 
 def half_spaces(codes: Any) -> tuple[np.ndarray, np.ndarray]:
-    """The half-spaces of plane codes, in coordinates of their node's cell, where xi is 0 to 1.
+    """Return the half-spaces of plane codes, in coordinates xi from 0 to 1 in the node's cell.
 
-    codes: (k,) uint32. Returns n: (k, 3) int32, of 1-norm 511, and d: (k,) int32; a point is kept if
-    4096 n . xi <= d. A code that stands for no plane is a ValueError.
+    codes: (k,) uint32.
+
+    Returns n: (k, 3) int32, of 1-norm 511, and d: (k,) int32. The half-space is 4096 n . xi <= d.
+
+    Raises ValueError for a code that is not a plane.
 
     >>> n, d = half_spaces([511 | 1022 << 10 | 1000 << 20])
     >>> n.tolist()
@@ -338,5 +356,5 @@ def half_spaces(codes: Any) -> tuple[np.ndarray, np.ndarray]:
     n, d = np.zeros((len(codes), 3), np.int32), np.zeros(len(codes), np.int32)
     for i, code in enumerate(codes.tolist()):
         if not lib.ebpo_plane_decode(code, n[i].ctypes.data, d[i:].ctypes.data):
-            raise ValueError(f"{code:#x} is no plane")
+            raise ValueError(f"{code:#x} is not the code of a plane")
     return n, d

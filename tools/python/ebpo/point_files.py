@@ -37,7 +37,7 @@ def published(path: Any, *, new: bool = False) -> Iterator[Any]:
 
 
 def links(there: pathlib.Path, path: pathlib.Path) -> bool:
-    """Gives a file another name. False: the file system has no hard links."""
+    """Give a file another name. False: the file system has no hard links."""
     try:
         os.link(there, path)
     except FileExistsError:

@@ -33,7 +33,7 @@ class Piece:
 
 
 class Ranges:
-    """Reads an object with `size` and `read_range(offset, size)`, which several threads call at once.
+    """Read an object with `size` and `read_range(offset, size)`, which several threads call at once.
 
     As the library reads URLs (lib/io/http_cache.c): announced ranges are joined over small gaps, cut into
     requests of at most MOST bytes, and fetched ahead of the reader as long as they fit into `memory`.
@@ -56,14 +56,14 @@ class Ranges:
     # ---- pieces; the lock is held ----
 
     def _over(self, begin: int, end: int) -> Iterator[Piece]:
-        """Yields the pieces that overlap a range, in order."""
+        """Yield the pieces that overlap a range, in order."""
         at = max(0, bisect.bisect_right(self.begins, begin) - 1)
         for start in self.begins[at:bisect.bisect_left(self.begins, end)]:
             if self.pieces[start].end > begin:
                 yield self.pieces[start]
 
     def _cover(self, begin: int, end: int) -> None:
-        """Adds pieces for those bytes of a range that have none."""
+        """Add pieces for those bytes of a range that have none."""
         begin = max(begin, len(self.head))
         for piece in [*self._over(begin, end), None]:
             stop = piece.begin if piece else end
@@ -82,13 +82,13 @@ class Ranges:
         self.begins.pop(bisect.bisect_left(self.begins, piece.begin))
 
     def _drop(self, piece: Piece) -> None:
-        """Forgets the bytes of a piece, or its failure."""
+        """Forget the bytes of a piece, or its failure."""
         if piece.state in (COMING, THERE):
             self.held -= piece.size
         piece.state, piece.data, piece.error = NOTED, None, None
 
     def _reserve_space(self, size: int) -> None:
-        """Forgets what was read longest ago, then what was announced long ago, until `size` more bytes fit."""
+        """Forget what was read longest ago, then what was announced long ago, until `size` more bytes fit."""
         if self.held + size <= self.memory:
             return
         idle = [piece for piece in self.pieces.values() if piece.state == THERE and not piece.users and
@@ -120,7 +120,7 @@ class Ranges:
                 self.running -= 1
 
     def _ahead(self, begin: int) -> None:
-        """Requests announced pieces from an offset on, as far as they fit."""
+        """Request announced pieces from an offset on, as far as they fit."""
         for start in sorted(start for start in self.unrequested if start >= begin):
             piece = self.pieces[start]
             self._reserve_space(piece.size)
@@ -131,7 +131,7 @@ class Ranges:
     # ---- other threads ----
 
     def _work(self) -> None:
-        """Fetches pieces until none waits."""
+        """Fetch pieces until none waits."""
         while True:
             with self.changed:
                 if not self.queue:
@@ -181,7 +181,7 @@ class Ranges:
             self._ahead(0)
 
     def read_range(self, offset: int, size: int) -> bytes:
-        """Returns bytes; their pieces are requested at the same time."""
+        """Return bytes; their pieces are requested at the same time."""
         end = offset + size
         parts = [self.head[offset:end]] if offset < len(self.head) else []
         if end <= len(self.head):
@@ -204,7 +204,7 @@ class Ranges:
         return b"".join(parts)
 
     def _await(self, piece: Piece, pieces: list) -> None:
-        """Requests a piece and those behind it, and waits for it. Raises what went wrong."""
+        """Request a piece and those behind it, and waits for it. Raises what went wrong."""
         while piece.state != THERE:
             if piece.state == FAILED:
                 raise piece.error  # type: ignore[misc]
@@ -238,13 +238,13 @@ class Ranges:
         self._reserve_space(0)
 
     def close(self) -> None:
-        """Stops fetching; requests under way end by themselves."""
+        """Stop fetching; requests under way end by themselves."""
         with self.changed:
             self.queue.clear()
 
 
 def read_whole(source: Any, offset: int, size: int) -> Any:
-    """Reads a range of a source. OSError: it returned another number of bytes."""
+    """Read a range of a source. OSError: it returned another number of bytes."""
     data = memoryview(source.read_range(offset, size)).cast("B")
     if len(data) != size:
         raise OSError(f"{len(data)} bytes came instead of {size} at byte {offset}")

@@ -18,11 +18,11 @@ CLOSE = np.dtype(c.ebpo_scene_pair)
 
 def open_scene(path: Any, *, memory: int | str | None = None, allow_outside: bool = False, remote: bool = False,
                progress: Callable | None = None) -> Scene:
-    """Opens a scene file (format-spec/scene.md), and the heads of its models' files.
+    """Open a scene file (format-spec/scene.md), and the headers of its models' files.
 
-    memory: bytes for all models that are asked questions, together. None: as much as they need.
-    allow_outside: files that it names may lie anywhere, not only in its folder or below it.
-    remote: models on web servers may be named.
+    memory: budget in bytes for all queried models together. None: no limit.
+    allow_outside: files of the scene may be anywhere, not only in the scene's folder or below it.
+    remote: the scene may name models on web servers.
     """
     options = made(c.ebpo_scene_options, outside=allow_outside, remote=remote)
     handle = Handle.made("ebpo_scene_open", path_in_c(path), ctypes.byref(options), free="ebpo_scene_free")
@@ -33,10 +33,10 @@ def open_scene(path: Any, *, memory: int | str | None = None, allow_outside: boo
 
 
 class Scene:
-    """An open scene. Made by `open_scene`. One thread asks at a time; others wait.
+    """An open scene. Made by `open_scene`. One thread queries at a time; other threads wait.
 
-    models, instances: lists of names; numbers of instances are places in the list.
-    begin, end: from the first time of any route to the last, in the scene's seconds.
+    models, instances: lists of names. The index of an instance is its index in the list.
+    begin, end: the first time and the last time of all routes, in the scene's seconds.
     """
 
     def __init__(self, handle: Handle) -> None:
@@ -57,14 +57,14 @@ class Scene:
         return self.instances.index(instance) if isinstance(instance, str) else instance
 
     def pose(self, instance: Any, time: float = 0.0) -> np.ndarray:
-        """Where an instance, a number or a name, is at a time: a (4, 4) matrix."""
+        """Return the pose of an instance at a time: a (4, 4) matrix. instance: an index or a name."""
         out = c.ebpo_pose()
         with self._lock:
             call("ebpo_scene_pose", self._handle, self._number(instance), time, ctypes.byref(out))
         return matrix_of(out)
 
     def box(self, begin: float | None = None, end: float | None = None) -> np.ndarray:
-        """Returns a box (2, 3) that contains all instances at all times of begin to end; by default all times."""
+        """Return a box (2, 3) that contains all instances from time begin to time end. Default: all times."""
         out = np.empty((2, 3))
         with self._lock:
             call("ebpo_scene_box", self._handle, *self._times(begin, end), out.ctypes.data, out[1:].ctypes.data)
@@ -74,8 +74,10 @@ class Scene:
         return self.begin if begin is None else begin, self.end if end is None else end
 
     def pairs(self, begin: float | None = None, end: float | None = None) -> np.ndarray:
-        """Pairs whose boxes come within their clearance at some time: a structured array of a, b and
-        clearance, ascending. No other pair comes that close."""
+        """Return the pairs whose boxes come closer than their clearance at any time from begin to end.
+
+        Returns a structured array of a, b and clearance, ascending. No other pair comes that close.
+        """
         found = Gathered(c.ebpo_scene_pairs_fn, CLOSE)
         with self._lock, found as taking:
             call("ebpo_scene_pairs", self._handle, *self._times(begin, end), taking, None)
@@ -83,10 +85,12 @@ class Scene:
 
     def clashes(self, time: float = 0.0, *, count: bool = False, places: bool = False, relate: bool = False,
              depth: float = 0.0, threads: int | None = None, progress: Callable | None = None) -> np.ndarray:
-        """Pairs of instances that meet at a time, or are nearer than their clearance.
+        """Return pairs of instances that intersect at a time, or are closer than their clearance.
 
-        count: all pairs of faces, and lines. places: tell where. relate: tell how solids lie to each
-        other. depth: tell how deep, within so much.
+        count: count all pairs of intersecting faces, and intersection lines.
+        places: compute a common point and its box.
+        relate: compute the relation of solids.
+        depth: compute penetration depths with this tolerance, in the world's unit; implies `relate`. 0: none.
 
         Returns a structured array with the members of ebpo_scene_clash in ebpo/scene.h: a, b, kind (a
         ClashKind), relation (a Relation), face_a, face_b, distance, place ...
@@ -99,7 +103,7 @@ class Scene:
         return found.array
 
     def collide(self, a: Any, b: Any, time: float = 0.0, *, threads: int | None = None) -> Pairs:
-        """Returns every pair of faces of two instances that intersect at a time."""
+        """Return every pair of faces of two instances that intersect at a time."""
         found = Gathered(c.ebpo_pairs_fn, PAIR)
         with self._lock, found as taking:
             call("ebpo_scene_collide", self._handle, self._number(a), self._number(b), time, threads or 0, taking, None)

@@ -116,7 +116,7 @@ class Source:
 
 
 def shown(name: str) -> bytes:
-    """Returns a text for messages, without NULs."""
+    """Return a text for messages, without NULs."""
     return name.encode("utf-8", "replace").replace(b"\0", b"?")
 
 
@@ -143,7 +143,7 @@ def by_name(name: Any, max_expansion: int, keep: tuple = (), **members: Any) -> 
 
 @functools.lru_cache(1)
 def has_http() -> bool:
-    """Returns whether the library has HTTP. Without, it refuses every name (UnsupportedError); with, only this one."""
+    """Return whether the library has HTTP. Without, it refuses every name (UnsupportedError); with, only this one."""
     try:
         call("ebpo_source_of_url", "no URL", None, ctypes.byref(made(c.ebpo_source)))
     except UnsupportedError:
@@ -165,7 +165,7 @@ def by_url(url: str, http: dict, max_expansion: int) -> Handle:
 
 
 def by_ranges(ranges: Any, name: str, max_expansion: int = 0) -> Handle:
-    """Opens a Ranges, or an object with `size` and `read_range` on this machine."""
+    """Open a Ranges, or an object with `size` and `read_range` on this machine."""
     source = Source(ranges)
     return by_name(shown(name), max_expansion, keep=(source,), source=source.struct)
 
@@ -202,7 +202,7 @@ def opened(source: Any, http: dict, storage_options: dict | None, max_expansion:
 
 
 def far(source: Any, size: Any, name: str, **options: Any) -> Ranges:
-    """Reads the first bytes of a source elsewhere, and returns its ranges. IOFailure: they cannot be read."""
+    """Read the first bytes of a source elsewhere, and returns its ranges. IOFailure: they cannot be read."""
     try:
         return Ranges(source, size_in_bytes(size), **options)
     except (Error, TypeError):
@@ -212,7 +212,7 @@ def far(source: Any, size: Any, name: str, **options: Any) -> Ranges:
 
 
 def of_file(file: Any, name: str) -> Any:
-    """Returns what reads a file object: itself if it is on this machine, else its ranges."""
+    """Return what reads a file object: itself if it is on this machine, else its ranges."""
     if Uncached.fits(file):
         return far(Uncached(file), file.size, name)
     seekable = Seekable(file)
@@ -222,7 +222,7 @@ def of_file(file: Any, name: str) -> Any:
 
 
 def is_of_system(file: Any) -> bool:
-    """Returns True for files that the operating system reads."""
+    """Return True for files that the operating system reads."""
     try:
         return isinstance(file.fileno(), int)
     except (AttributeError, OSError):

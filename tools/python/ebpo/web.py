@@ -29,7 +29,7 @@ SILENT = 20.0  # seconds without a byte, or for a connection; then the request i
 
 
 class Timed(io.RawIOBase):
-    """Reads a socket until a time of time.monotonic. After it: TimeoutError."""
+    """Read a socket until a time of time.monotonic. After it: TimeoutError."""
 
     def __init__(self, raw: Any, sock: Any, end: float) -> None:
         self.raw, self.sock, self.end = raw, sock, end
@@ -83,7 +83,7 @@ class Request(urllib.request.Request):
 
 
 def opened(handler: Any, kind: Any, request: Any, **options: Any) -> Any:
-    """Sends a request, by a connection that an earlier one has left, and returns its answer, read up to its body."""
+    """Send a request, by a connection that an earlier one has left, and returns its answer, read up to its body."""
     def connection(*host: Any, **given: Any) -> Any:
         made = kind(*host, **given, **options)
         made.response_class = functools.partial(Response, end=request.end)
@@ -172,7 +172,7 @@ class Patience:
         self.began, self.seconds, self.retries, self.what, self.failures = time.monotonic(), seconds, retries, what, 0
 
     def wait(self, error: Exception) -> None:
-        """Waits before the next attempt. Raises IOFailure when the attempt would be too late or is useless."""
+        """Wait before the next attempt. Raises IOFailure when the attempt would be too late or is useless."""
         code, reason = getattr(error, "code", None), getattr(error, "reason", error)
         if code is not None and code not in self.AGAIN:
             raise self.failure(f"the server answered with status {code}") from error
@@ -195,7 +195,7 @@ class Patience:
 
     @staticmethod
     def retry_after(error: Exception) -> float:
-        """Returns the delay that a server requests, in seconds, from a number or a date; 0: none."""
+        """Return the delay that a server requests, in seconds, from a number or a date; 0: none."""
         text = (getattr(error, "headers", None) or {}).get("Retry-After") or ""
         if text.strip().isdecimal():
             return float(text)
@@ -245,7 +245,7 @@ class Web:
         self.head = self.first()
 
     def first(self) -> bytes:
-        """Reads the first bytes, the size and the version; from a server without ranges or versions the whole file."""
+        """Read the first bytes, the size and the version; from a server without ranges or versions the whole file."""
         data = self.get(0, HEAD)
         if len(data) < self.size and self.version[0] is None and not self.unversioned:
             if self.size > self.whole_limit:
@@ -256,13 +256,13 @@ class Web:
         return data
 
     def read_range(self, offset: int, size: int) -> bytes:
-        """Returns bytes. IOFailure: the server does not send them in time."""
+        """Return bytes. IOFailure: the server does not send them in time."""
         if offset + size <= len(self.head):
             return self.head[offset:offset + size]
         return self.get(offset, size)
 
     def get(self, offset: int, size: int, at_once: bool = False) -> bytes:
-        """Requests a range, or the whole file from a server without ranges. A server may send it in parts,
+        """Request a range, or the whole file from a server without ranges. A server may send it in parts,
         unless it must come at once."""
         patience, data = Patience(self.time_limit, self.retries, self.shown), bytearray()
         while True:
@@ -286,7 +286,7 @@ class Web:
                 data.clear()
 
     def send(self, begin: int, end: int, patience: Patience, data: bytearray) -> None:
-        """Sends one request, and appends the received bytes to `data`, also before a failure."""
+        """Send one request, and appends the received bytes to `data`, also before a failure."""
         request = Request(self.url, headers={**self.headers, "Range": f"bytes={begin}-{end - 1}"})
         if self.process != os.getpid():  # a process that was forked: the connections are those of the other one
             self.process, self.idle = os.getpid(), {}
@@ -307,7 +307,7 @@ class Web:
                 self.received += len(data) - before
 
     def range_of(self, response: Any, begin: int, end: int, patience: Patience) -> int:
-        """Returns how many bytes of the range the server sends: all, or fewer. IOFailure: another range or version."""
+        """Return how many bytes of the range the server sends: all, or fewer. IOFailure: another range or version."""
         if response.status != 206:
             raise patience.failure(f"the server does not answer ranges (status {response.status})")
         stated = re.fullmatch(r"bytes (\d{1,18})-(\d{1,18})/(\d{1,18})", (response.headers["Content-Range"] or "").strip())
@@ -326,7 +326,7 @@ class Web:
 
     @staticmethod
     def take(response: Any, size: int, patience: Patience, data: bytearray) -> None:
-        """Appends a body of so many bytes. ConnectionError: it is shorter; IOFailure: longer."""
+        """Append a body of so many bytes. ConnectionError: it is shorter; IOFailure: longer."""
         whole = len(data) + size
         while len(data) < whole + 1:
             some = response.read1(min(1 << 16, whole + 1 - len(data)))
@@ -339,7 +339,7 @@ class Web:
             raise ConnectionError(f"the connection ended after {len(data) - whole + size} bytes")
 
     def take_whole(self, response: Any, patience: Patience, data: bytearray) -> None:
-        """Appends the body of an answer of status 200, which must have an end that is certain."""
+        """Append the body of an answer of status 200, which must have an end that is certain."""
         try:
             self.take_all(response, patience, data)
         except BaseException:
