@@ -122,8 +122,8 @@ whose subset is empty: {empty}. Polygons and strips become triangles with the co
 source.
 """
 MORE = """
-*PLY*: bytes of the source. *file without*, *with*: bytes of the file without and with attributes. "
-"*raw*: bytes of the values in a binary PLY. *more*: bytes that attributes add to the file: values,
+*PLY*: bytes of the source. *file without*, *with*: bytes of the file without and with attributes.
+*raw*: bytes of the values in a binary PLY. *more*: bytes that attributes add to the file: values,
 description, source header and colours of envelopes.
 """
 

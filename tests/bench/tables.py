@@ -30,8 +30,8 @@ CHECK = """
 
 - `--crossings --memory 256MiB` of a torus of 1,000,832 faces: 6.6 s of CPU time and 117 MB on one thread, 6.4 s and
   118 MB on two. It compares positions, not indices, and finds the same pairs for any number of threads.
-- 100,000 closed components within another component (`tests/bench/many_shells.py`, 820,000 faces): 6.9 s and 135 MB. The time
-  grows linearly with the faces: 6.2 to 8.4 us per face.
+- 100,000 closed components within another component (`tests/bench/many_shells.py`, 820,000 faces): 6.9 s and 135 MB.
+  The time   grows linearly with the faces: 6.2 to 8.4 us per face.
 """
 found = {"size": [], "ratio": [], "rate": [], "violations": 0}
 
@@ -64,7 +64,7 @@ def head(*cells):
 
 def size_table(folder):
     print("## Size\n\nThe columns from *B/face* to *maps* are B per face, in total and by part. "
-    "*Plain PLY*: 12 B per vertex and 13 B per face.\n")
+          "*Plain PLY*: 12 B per vertex and 13 B per face.\n")
     head("model", "faces", "file", "B/face", "vertices", "faces", "lists and tree", "planes",
          "maps", "of plain PLY",
          "without maps")

@@ -209,8 +209,8 @@ The table has the bytes, their share of the compressed PLY, and the level.
 LEVELS = """## By level
 
 *file*: the whole file with the mesh, its source order and checksums. Vertex distances and error bounds end at the
-level that reaches the last goal. The columns *BP-Octree* are sums of tables 4.4 and 4.6 of Melero 2008: uncompressed, with the faces and vertices
-of each level's leaves, for a bunny of 71,040 and an armadillo of 150,000 faces.
+level that reaches the last goal. The columns *BP-Octree* are sums of tables 4.4 and 4.6 of Melero 2008: uncompressed,
+with the faces and vertices of each level's leaves, for a bunny of 71,040 and an armadillo of 150,000 faces.
 """
 
 

@@ -131,8 +131,8 @@ def query_table(page, found):
               f"`--http-connections {asked.CONNECTIONS}`: the minimum of {asked.TRIES} tries. All "
               "else is measured with the default connections.", "",
               f"*Near* points are at most {asked.NEAR:g} diagonals from the surface, at positions where "
-              f"random lines enter the model. The commands are `ebpo distance` and `ebpo inside --memory {asked.BUDGET} "
-              "URL POINTS`, `ebpo fetch -q --box`, `ebpo levels --max-level` and `ebpo view --seen-only "
+              f"random lines enter the model. The commands are `ebpo distance` and `ebpo inside "
+              f"--memory {asked.BUDGET} URL POINTS`, `ebpo fetch -q --box`, `ebpo levels --max-level` and `ebpo view --seen-only "
               "--pixels 16`.")
     page.table(["query", "round trips", "requests", "bytes", "s"],
                [[row["what"],
@@ -161,8 +161,8 @@ def viewer_table(page, found):
 def local_table(page, found):
     page.text("## Local file", "",
               f"The table has results of `ebpo bench --memory {asked.BUDGET} --query QUERY`: the first "
-              "result from a cold file (`--points path --count 1 --seed 1..5`), a path (`--points path --count 200000 "
-              "--prefetch`), and uniform points (`--points uniform --count 1000`).")
+              "result from a cold file (`--points path --count 1 --seed 1..5`), a path (`--points path "
+              "--count 200000 --prefetch`), and uniform points (`--points uniform --count 1000`).")
     table = []
     for query, runs in (found.row(AFTER, "local") or {}).items():
         path, cold = runs["path"], runs["first"]
