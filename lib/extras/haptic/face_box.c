@@ -375,14 +375,14 @@ static bool intersects_in_plane(const double p[3], const double q[3], const doub
         corner[k][1] = face[k][v];
         turn[k] = ebpo_orient2d_expansion(a, b, corner[k]);
     }
-    int turn = ebpo_orient2d_expansion(corner[0], corner[1], corner[2]);
-    if (turn != 1 && turn != -1)
-        return turn != 0;
+    int orientation = ebpo_orient2d_expansion(corner[0], corner[1], corner[2]);
+    if (orientation != 1 && orientation != -1)
+        return orientation != 0;
     if (turn[0] == turn[1] && turn[1] == turn[2] && (turn[0] == 1 || turn[0] == -1))
         return false;
     for (int k = 0; k < 3; k++)
-        if (ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], a) == -turn &&
-            ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], b) == -turn)
+        if (ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], a) == -orientation &&
+            ebpo_orient2d_expansion(corner[k], corner[(k + 1) % 3], b) == -orientation)
             return false;
     /* the view is a line: compare along this line, too */
     for (int i = 0; i < 2; i++)
