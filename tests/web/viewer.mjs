@@ -384,7 +384,7 @@ async function stalls(browser, { address, line }) {
     Object.assign(line, { mode: 'stall', most, sent: [] });
     const page = await show(browser, `${address}?file=models/ring.ebpo.h5`);
     await page.waitForSelector('#stall:not([hidden])', { timeout: 15000 });
-    assert.match(await page.textContent('#stallWhat'), /Nothing has come for \d+ s/);
+    assert.match(await page.textContent('#stallWhat'), /No data for \d+ s/);
     assert.match(await page.textContent('#stallNext'), most ? /Waiting for .*, \d+ kB of \d+ kB\./ : /Waiting for the first levels, 1\.05 MB of 1\.05 MB\./);
     assert.equal(await page.isVisible('#opening'), most === 0); // with so much there is a picture already
     assert.equal(await page.textContent('#openingName'), 'ring.ebpo.h5');
@@ -410,7 +410,7 @@ async function dies(browser, { address, line }) {
   line.mode = 'dead';
   for (let i = 0; i < 6; i++)
     await page.keyboard.press('ArrowRight');
-  await page.waitForSelector('#stall:not([hidden]):has-text("line is dead")', { timeout: 30000 });
+  await page.waitForSelector('#stall:not([hidden]):has-text("Connection lost")', { timeout: 30000 });
   line.mode = 'good';
   await page.click('#stallRetry');
   const state = await settled(page);
@@ -734,7 +734,7 @@ async function viewsAsFiles(browser, address) {
   await settled(page);
   await page.waitForSelector('#viewsFile', { state: 'attached' });
   await page.locator('#viewsFile').setInputFiles(file);
-  await page.waitForFunction(() => /these views are of "red"/.test(document.getElementById('errorWhat').textContent));
+  await page.waitForFunction(() => /these views belong to "red"/.test(document.getElementById('errorWhat').textContent));
   await page.close();
 }
 
@@ -863,7 +863,7 @@ async function servesOrSays() {
   mkdirSync(empty);
   assert.match(says(process.env, '--folder', empty), /^1 serve\.sh: .*no \.ebpo\.h5 file is there;.*--folder.*quickstart\.sh[^\n]*\n$/);
   writeFileSync(join(empty, 'torn.ebpo.h5'), readFileSync(join(models, 'ring.ebpo.h5')).subarray(0, 5000));
-  assert.match(says(process.env, '--folder', empty), /^1 list\.js: left out: torn\.ebpo\.h5: [^/\n]*cut off[^/\n]*\nserve\.sh: .*none of its files can be shown\n$/);
+  assert.match(says(process.env, '--folder', empty), /^1 list\.js: omitted: torn\.ebpo\.h5: [^/\n]*cut off[^/\n]*\nserve\.sh: .*none of its files can be shown\n$/);
   const list = JSON.parse(run('node', [join(root, 'tools/web/list.js'), join(empty, 'torn.ebpo.h5'), join(models, 'ring.ebpo.h5')]));
   assert.deepEqual(list.map((item) => item.file), ['ring.ebpo.h5']);
   rmSync(join(empty, 'torn.ebpo.h5'));

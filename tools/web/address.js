@@ -1,9 +1,12 @@
-// Writes views to addresses and reads them back. Lengths are those of the scene (cut.js): halves of the box's diagonal, from the box's centre.
-//   view=AZIMUTH,HEIGHT,DISTANCE[,X,Y,Z]   degrees around y from z and above; how far from what is looked at, and where that is
-//   clip=x0.25 or -x0.25                   a plane at a share of the box's side; keeps the part below it, with the minus sign the part above
+// Writes views to addresses and reads views from addresses. A length of 1 is half the diagonal of the model's box, as in the scene (cut.js);
+// the origin is the centre of the box.
+//   view=AZIMUTH,HEIGHT,DISTANCE[,X,Y,Z]   the first two in degrees: around y from z, and above the horizon; distance of the eye
+//                                          from the target; the target X,Y,Z
+//   clip=x0.25 or -x0.25                   a clipping plane at a share of the box's side; shows the part below the plane,
+//                                          or with the minus sign the part above
 //   box=X0,Y0,Z0,X1,Y1,Z1                  the visible box, in shares of the box's sides
 //   point=X,Y,Z                            the queried point, in the model's coordinates
-//   measure=X,Y,Z,X,Y,Z,...                points whose distances are shown, likewise
+//   measure=X,Y,Z,X,Y,Z,...                points whose distances are shown, in the model's coordinates
 const DEGREES = 180 / Math.PI;
 
 const numbers = (text, ...counts) => {
@@ -28,7 +31,7 @@ export function cameraText({ eye, target }) {
   return [...angles, short(distance, digits), ...(at.every((x) => Number(x) === 0) ? [] : at)].join(',');
 }
 
-/** A plane: { axis, at (0 to 1), flip }. */
+/** Returns the clipping plane { axis, at (0 to 1), flip }, or undefined when the text is not a plane. */
 export function clipOf(text) {
   const found = /^(-?)([xyz])(\d*\.?\d+)$/.exec(text ?? ''), at = Number(found?.[3]);
   return found && at <= 1 ? { axis: 'xyz'.indexOf(found[2]), at, flip: found[1] === '-' } : undefined;
@@ -36,7 +39,7 @@ export function clipOf(text) {
 
 export const clipText = ({ axis, at, flip }) => (axis === undefined ? undefined : `${flip ? '-' : ''}${'xyz'[axis]}${short(at, 3)}`);
 
-/** Six shares: the lower corner, then the upper. */
+/** Returns six shares, the lower corner and then the upper corner, or undefined when the text is not a box. */
 export function boxOf(text) {
   const box = numbers(text, 6);
   return box && box.every((x) => x >= 0 && x <= 1) && [0, 1, 2].every((k) => box[k] < box[k + 3]) ? box : undefined;
@@ -44,7 +47,7 @@ export function boxOf(text) {
 
 export const boxText = (box) => (box?.some((x, i) => x !== (i < 3 ? 0 : 1)) ? box.map((x) => short(x, 3)).join(',') : undefined);
 
-/** Returns the part of a model's box that a plane and a box keep, as corners in the scene: { low, high }; undefined for the whole box. */
+/** Returns the visible part of a model's box, given a clipping plane and a section box: corners { low, high } in the scene; undefined for the whole box. */
 export function cutOf(size, scale, clip, box) {
   const low = box?.slice(0, 3) ?? [0, 0, 0], high = box?.slice(3) ?? [1, 1, 1], k = clip?.axis;
   if (k !== undefined && clip.flip)
@@ -59,20 +62,20 @@ export function cutOf(size, scale, clip, box) {
 }
 const BEYOND = 9; // of the scene, which is 1 in size
 
-const POINTS_MOST = 1000; // an address may come from anybody, and each is drawn
+const POINTS_MOST = 1000; // limits untrusted addresses, because each point is drawn
 
 export function pointsOf(text) {
   const list = numbers(text);
   return list && list.length % 3 === 0 && list.length <= 3 * POINTS_MOST ? Array.from({ length: list.length / 3 }, (_, i) => list.slice(3 * i, 3 * i + 3)) : undefined;
 }
 
-/** Points to a millionth of `diagonal`, or better if that is as short. */
+/** Returns points as text, rounded to a millionth of `diagonal` or finer. */
 export function pointsText(points, diagonal) {
   const digits = 6 - Math.floor(Math.log10(diagonal));
   return points.flatMap((p) => p.map((x) => short(x, digits))).join(',');
 }
 
-/** Returns the address with replaced parameters: [name, text or undefined] each. Commas stay commas. */
+/** Returns the address with replaced parameters. `entries`: [name, text] each; undefined as text removes the parameter. Commas are not escaped. */
 export function withQuery(href, entries) {
   const url = new URL(href);
   for (const [name, text] of entries)

@@ -1,11 +1,11 @@
 // Computes ambient occlusion in screen space from the depths around each pixel. Source: McGuire, Mara, Luebke, "Scalable Ambient Obscurance",
-// 2012, for the weight of a sample; the rest is plain.
+// 2012, for the weight of a sample only.
 const VERTEX = 'void main() { gl_Position = vec4(position.xy, 0.0, 1.0); }';
 const FRAGMENT = `
   uniform sampler2D depths;
   uniform vec2 size;
   uniform mat4 back; // from the picture to the camera's coordinates
-  uniform float across; // pixels of a length of 1 at a distance of 1
+  uniform float across; // size in pixels of a length of 1 at a distance of 1
   vec3 place(vec2 at, float z) {
     vec4 p = back * vec4(at * 2.0 - 1.0, z * 2.0 - 1.0, 1.0);
     return p.xyz / p.w;
@@ -25,7 +25,7 @@ const FRAGMENT = `
     if (!(dot(n, n) > 0.0)) return;
     n = normalize(n);
     float far = -here.z, radius = RADIUS * min(1.0, far / 2.5), square = radius * radius, wide = radius * across / far;
-    float turned = dot(mod(floor(gl_FragCoord.xy), 4.0), vec2(1.0, 4.0)) * 0.392699; // another one for each of 16 pixels, over which the mean is taken later
+    float turned = dot(mod(floor(gl_FragCoord.xy), 4.0), vec2(1.0, 4.0)) * 0.392699; // a different angle for each of 16 pixels; SMOOTHED takes their mean later
     for (int i = 0; i < SAMPLES; i++) {
       float share = (float(i) + 0.5) / float(SAMPLES), angle = float(i) * 2.399963 + turned;
       vec2 there = at + vec2(cos(angle), sin(angle)) * max(1.0, share * wide) / size;
@@ -38,7 +38,10 @@ const FRAGMENT = `
     gl_FragColor = vec4(vec3(max(0.0, 1.0 - 7.0 * radius * sum / (square * square * square * float(SAMPLES)))), 1.0);
   }`;
 
-/** For the last step's shader, which has `depths` and `size`, too: the mean over 4 by 4 pixels that are about as far. `away(at)` is a logarithm of the distance. */
+/**
+ * Part of the last step's shader, which also declares `depths` and `size`. Computes the mean over those of 4 by 4 pixels that have a similar distance; `away(at)` is
+ * a logarithm of the distance.
+ */
 export const SMOOTHED = `
   uniform sampler2D ambient;
   float open(vec2 at, float here) {
@@ -53,7 +56,7 @@ export const SMOOTHED = `
   }`;
 
 export class Ambient {
-  /** `kit`: of scene.js; `quad`: the triangle that covers the picture, by its material. */
+  /** `kit`: as exported by scene.js; `quad(material)`: returns a scene with one triangle that covers the picture. */
   constructor(kit, quad) {
     this.kit = kit;
     this.material = new kit.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, depthTest: false, depthWrite: false, blending: 0, defines: { RADIUS: '0.12', SAMPLES: '16' },

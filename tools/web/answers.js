@@ -3,16 +3,16 @@ import { GRAY, LEAF, growForQuestion, nearestFace } from './reader/index.js';
 
 const ONE_WEIGHT = 2 ** 30;     // format-spec/paint.md
 const LEAVES_AT_ONCE = 1024, NODES_AT_ONCE = 256;
-const FACES_MOST = 4_000_000;   // of a section
+const FACES_MOST = 4_000_000;   // in a section
 
 const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]], dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-/** Returns the weights of a triangle's second and third corner at a point of it, in units of 2^-30. `corners`: nine numbers. */
+/** Returns the barycentric weights of a triangle's second and third corner at a point of the triangle, in units of 2^-30. `corners`: nine numbers. */
 export function weightsOf(p, corners) {
   const a = corners.subarray(0, 3), u = sub(corners.subarray(3, 6), a), v = sub(corners.subarray(6, 9), a), w = sub(p, a);
   const uu = dot(u, u), uv = dot(u, v), vv = dot(v, v), wu = dot(w, u), wv = dot(w, v), area = uu * vv - uv * uv;
-  if (!(area > 0)) // a segment or a point: along its longer side
+  if (!(area > 0)) // the triangle is a segment or a point: weights along its longer side
     return uu >= vv ? [unit(uu > 0 ? wu / uu : 0), 0] : [0, unit(wv / vv)];
   const second = unit((vv * wu - uv * wv) / area);
   return [second, Math.min(ONE_WEIGHT - second, unit((uu * wv - uv * wu) / area))];
@@ -20,7 +20,8 @@ export function weightsOf(p, corners) {
 const unit = (x) => Math.round(Math.min(1, Math.max(0, x)) * ONE_WEIGHT);
 
 /**
- * Returns the nearest positions on the faces: [{ face, weights, place, normal, distance }], `face` as paint files number them. In doubles. Needs the part `mesh`.
+ * Returns the nearest positions on the faces: [{ face, weights, place, normal, distance }]. `face` is the number that paint files use. Computes in double
+ * precision. The file must have the part `mesh`.
  */
 export async function placesOf(file, tree, points) {
   const found = [];
@@ -34,11 +35,12 @@ export async function placesOf(file, tree, points) {
 }
 
 /**
- * Cuts faces (nine numbers each) by a plane across an axis. Adds segments [u, v, u, v] to `out`, on the two axes after `axis`, with what is
- * inside of a closed mesh on their left as seen from the axis' upper end. Corners on the plane count as above it, so that outlines are closed.
+ * Cuts faces (nine numbers each) by a plane across an axis. Adds segments [u, v, u, v] to `out`, where u and v are coordinates on the two axes after `axis`.
+ * Seen from the axis' upper end, the interior of a closed mesh is on the left of each segment. Corners on the plane count as above the plane, so that
+ * outlines are closed.
  */
 export function cutFaces(faces, axis, at, out) {
-  const u = (axis + 1) % 3, v = (axis + 2) % 3, crossing = (low, high) => { // from below to above: both faces of an edge find the same
+  const u = (axis + 1) % 3, v = (axis + 2) % 3, crossing = (low, high) => { // from below to above, so that both faces of an edge compute the same point
     const t = (at - faces[low + axis]) / (faces[high + axis] - faces[low + axis]);
     return [faces[low + u] + t * (faces[high + u] - faces[low + u]), faces[low + v] + t * (faces[high + v] - faces[low + v])];
   };
@@ -58,9 +60,9 @@ export function cutFaces(faces, axis, at, out) {
   }
 }
 
-/** Returns { area, length } of segments from cutFaces(); the area counts each place as often as faces wind around it. */
+/** Returns { area, length } of segments from cutFaces(). The area is the integral of the winding number. */
 export function measureOf(segments) {
-  const [u, v] = segments; // near by, so that little is lost
+  const [u, v] = segments; // an origin near the segments reduces rounding errors
   let area = 0, length = 0;
   for (let i = 0; i < segments.length; i += 4) {
     const [a, b, c, d] = [segments[i] - u, segments[i + 1] - v, segments[i + 2] - u, segments[i + 3] - v];
@@ -71,8 +73,9 @@ export function measureOf(segments) {
 }
 
 /**
- * Computes the section of the real faces by a plane across an axis, in the model's coordinates. `tell` gets { looked, of } now and then, and in the end { segments,
- * area, length, faces, partial } or { fault }. Area only of solids. `partial`: a subset lacks part of the section.
+ * Computes the section of the real faces by a plane across an axis, in the model's coordinates. Calls `tell` repeatedly with the progress { looked, of }, and at
+ * the end with { segments, area, length, faces, partial } or { fault }. `area` is present only for solids. `partial`: the file is a subset and lacks part of
+ * the section.
  */
 export async function sectionOf(file, tree, axis, at, tell, ended) {
   const { info } = file;
@@ -87,7 +90,7 @@ export async function sectionOf(file, tree, axis, at, tell, ended) {
     leaves.push(...here.filter((node) => node.type === LEAF));
     const gray = here.filter((node) => node.type === GRAY && !tree.isPruned(node)), missing = gray.filter((node) => !tree.children(node));
     partial ||= gray.length < here.filter((node) => node.type === GRAY).length;
-    for (let i = 0; i < missing.length && !ended(); i += NODES_AT_ONCE) { // nodes keep their parts, which may go when others come
+    for (let i = 0; i < missing.length && !ended(); i += NODES_AT_ONCE) { // children are created at once, because the cache may drop these chunks when the next ones arrive
       await growForQuestion(file, tree, missing.slice(i, i + NODES_AT_ONCE));
       missing.slice(i, i + NODES_AT_ONCE).forEach((node) => tree.children(node));
     }
@@ -101,7 +104,7 @@ export async function sectionOf(file, tree, axis, at, tell, ended) {
       cutFaces(fresh.length === faces.numbers.length ? faces : Float64Array.from(fresh.flatMap((k) => [...faces.subarray(9 * k, 9 * k + 9)])), axis, at, segments);
     }
     if (seen.size > FACES_MOST) {
-      tell({ fault: `the section meets more than ${FACES_MOST / 1e6} million faces; cut a part of the model out with ebpo subset` });
+      tell({ fault: `the section intersects more than ${FACES_MOST / 1e6} million faces; cut a part of the model out with ebpo subset` });
       return;
     }
     tell({ looked: Math.min(leaves.length, i + LEAVES_AT_ONCE), of: leaves.length });

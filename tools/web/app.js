@@ -9,20 +9,20 @@ import { LEVEL_COLOURS, MESH_COLOUR, TYPE_COLOURS } from './shade.js';
 import { address, atHome, changed, said, shareOf, went, whereTo } from './share.js';
 import { $, count, on, state, tell, toModel } from './state.js';
 
-const MORE_MS = 5000; // after the first picture the tools are loaded, or when nothing more comes before
-const TRIANGLES_MOST = 2_000_000; // about; a tile more does no harm
+const MORE_MS = 5000; // the tools are loaded so long after the first picture, or earlier when all data has arrived
+const TRIANGLES_MOST = 2_000_000; // approximate limit
 
-let timer; // until the worker hears of the camera
-let coming; // more.js, once it has been asked for
+let timer; // until the camera is sent to the worker
+let coming; // a promise of more.js, once it has been requested
 
-const boot = window.ebpoBoot, { worker } = boot; // boot.js has begun, perhaps with a file
+const boot = window.ebpoBoot, { worker } = boot; // boot.js may already have requested a file
 const scene = new Scene($('canvas'), boot, { changed: cameraMoved, drawn: frameDrawn });
 probeWith(scene, worker);
 shareOf(scene);
 
 // --- opening ---
 
-// `begun`: boot.js has already sent the messages to the worker.
+// `begun`: true when boot.js has already sent the messages to the worker.
 function open(what, name, begun) {
   state.opening++;
   Object.assign(state, { info: undefined, depth: -1, idle: false, timeline: [], stats: undefined, probe: undefined, box: undefined, measured: undefined, error: undefined,
@@ -42,13 +42,13 @@ function open(what, name, begun) {
   ask();
 }
 
-// `step`: adds a step to the history; false when the step exists already, or when the page opens with this file.
+// `step`: true to add a step to the browser's history; false when the step exists already, or when the page opens with this file.
 function openUrl(text, { begun = false, step = true } = {}) {
   let url;
   try {
     url = new URL(text, location.href);
   } catch {
-    showError({ message: `${text}: this is no address; give one that begins with https://` });
+    showError({ message: `${text}: not a valid address; give an address that begins with https://` });
     return;
   }
   if (step)
@@ -63,10 +63,10 @@ function openFile(file, { step = true } = {}) {
   open(file, file.name);
 }
 
-// Several models or a scene: a page of another kind, until it is left.
+// Shows several models or a scene. The page stays in this mode until it is closed.
 async function openTogether(asked) {
-  if (state.info || coming || state.together) { // whose panel and tools are there already
-    showError({ message: 'other models are or were shown on this page; reload it, and open these files together then' });
+  if (state.info || coming || state.together) { // the panel and tools of one model exist already
+    showError({ message: 'this page already showed other models; reload the page, and then open these files together' });
     return;
   }
   try {
@@ -108,7 +108,7 @@ function close({ step = true } = {}) {
   $('url').focus();
 }
 
-// Returns the view of an address, or the default view.
+// Moves the camera to the view of an address, or to the default view.
 function home(camera) {
   scene.home();
   atHome();
@@ -227,7 +227,7 @@ function ask() {
   clearTimeout(timer);
   timer = undefined;
   const mesh = state.info?.parts.has('mesh') && Number($('level').value) === state.info.level_count;
-  const level = mesh ? 99 : state.info ? Number($('level').value) : state.levelAsked ?? 99; // already right while the file is being opened
+  const level = mesh ? 99 : state.info ? Number($('level').value) : state.levelAsked ?? 99; // while the file is being opened, the level of the address
   state.idle = false;
   if (state.info)
     busy(true);
@@ -236,7 +236,7 @@ function ask() {
     black: scene.cut !== undefined, lines: $('wire').checked, cells: $('cells').checked } });
 }
 
-// Automatic detail: 16 pixels, and when all of that is there 8 if the frames are fast, 32 if they are slow.
+// Automatic detail begins with 16 pixels. When this detail is complete, it changes to 8 pixels if frames are fast, and to 32 pixels if frames are slow.
 const AUTO = { first: 16, fast: 8, fastMs: 30, slow: 32, slowMs: 150 };
 const detail = () => ($('detail').value === 'auto' ? state.auto : Number($('detail').value));
 
@@ -270,11 +270,11 @@ function colouringChanged() {
     span.append(i, text);
     return span;
   };
-  $('legend').replaceChildren(...(mode === 'type' ? [key(TYPE_COLOURS[3], 'gray: goes on'), key(TYPE_COLOURS[2], 'leaf'), key(TYPE_COLOURS[1], 'black: full'), key(MESH_COLOUR, 'mesh')]
+  $('legend').replaceChildren(...(mode === 'type' ? [key(TYPE_COLOURS[3], 'gray: has children'), key(TYPE_COLOURS[2], 'leaf'), key(TYPE_COLOURS[1], 'black: inside'), key(MESH_COLOUR, 'mesh')]
     : mode === 'level' ? LEVEL_COLOURS.slice(0, state.info?.level_count ?? 9).map((c, l) => key(c, String(l))) : []));
 }
 
-// The plane and the box together: shares of the model's box, of each axis from and to.
+// Applies the clipping plane and the section box together. The box is given by shares of the model's box on each axis, from and to.
 function cutChanged() {
   const value = document.querySelector('input[name=clip]:checked').value, { clip } = state, was = scene.cut;
   Object.assign(clip, { axis: value === '' ? undefined : Number(value), at: Number($('clipAt').value) / 1000 });
@@ -289,7 +289,7 @@ function cutChanged() {
   tell('cut');
 }
 
-// Returns all parameters of a view in an address.
+// Applies all parameters of a view in an address.
 function shownAs({ camera, level, clip, box, point, measured, colouring, walls, detail: pixels }) {
   home(camera);
   $('level').value = level ?? $('level').max;
@@ -371,7 +371,7 @@ $('canvas').addEventListener('pointerup', (e) => {
     return;
   const point = scene.pick(e.clientX, e.clientY);
   if (point)
-    (state.clicked ?? ((p) => (state.together ? state.together.clicked(p) : probeAt(p))))(toModel(point)); // a tool may want the point
+    (state.clicked ?? ((p) => (state.together ? state.together.clicked(p) : probeAt(p))))(toModel(point)); // an active tool receives the point
 });
 
 addEventListener('dragover', (e) => {
@@ -387,7 +387,7 @@ addEventListener('drop', (e) => {
   $('dropHint').hidden = true;
   const { files } = e.dataTransfer, text = e.dataTransfer.getData('text/uri-list');
   if (state.together)
-    showError({ message: 'several models are shown here; go back to the first page to open others' });
+    showError({ message: 'several models are shown; return to the first page to open others' });
   else if (files.length)
     openFiles(files);
   else if (text)
@@ -415,10 +415,10 @@ const KEYS = {
     showError();
   },
 };
-// In the picture arrows turn (with Shift they move), and + and - go nearer and farther.
+// In the picture, arrow keys turn the model, or with Shift move it; + and - zoom.
 const STEER = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, 1], arrowdown: [0, -1], '+': 0.8, '=': 0.8, '-': 1.25 };
 
-// With several models there is no level to choose, and no clipping plane.
+// With several models there is neither a level to choose nor a clipping plane.
 const TOGETHER_KEYS = ['g', 'm', 'k', 'f', 't', 'p', '?', 'o'];
 
 addEventListener('keydown', (e) => {
@@ -465,7 +465,7 @@ addEventListener('popstate', (e) => {
 
 on('complaint', (message) => showError({ message }));
 
-// --- what comes later: measuring, notes, the pen, sharing ---
+// --- tools that are loaded later: measuring, notes, the pen, sharing ---
 
 function more() {
   coming ??= import('./more.js').then((m) => m.begin({ scene, worker, ask, cutChanged, changed, address, shownAs: (query) => shownAs(said(query)), layout, query: boot.query }),

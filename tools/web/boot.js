@@ -1,17 +1,17 @@
-// Runs before the rest of the page, which is still loading: reads the address, requests the model, starts the worker and sends it what to
-// open. What the worker has to say meanwhile waits for app.js. In a bundle this stands in index.html itself.
+// Runs while the rest of the page is still loading: reads the address, requests the model, starts the worker and sends the worker the address.
+// Messages from the worker are queued for app.js. A bundle contains this script inside index.html.
 (() => {
-  const FIRST_BYTES = 1 << 20;    // small models come whole with the first answer; of large ones the levels that any view begins with
-  const COARSE_BYTES = 1 << 17;   // where the address asks for few levels
+  const FIRST_BYTES = 1 << 20;    // the first response contains small models completely, and the upper levels of large models
+  const COARSE_BYTES = 1 << 17;   // when the address selects few levels
   const COARSE_LEVEL = 5;
-  const HEAD_BYTES = 1 << 17;     // what the worker can begin with
-  const PATIENCE_MS = 1500;       // that the page's code waits for them
-  const FIELD_OF_VIEW = 38;       // degrees, upwards
+  const HEAD_BYTES = 1 << 17;     // the worker can begin with so many bytes
+  const PATIENCE_MS = 1500;       // longest time for which app.js waits for HEAD_BYTES
+  const FIELD_OF_VIEW = 38;       // vertical, in degrees
 
   const query = new URLSearchParams(location.search), said = [];
   const number = (name) => (/^\d+$/.test(query.get(name) ?? '') ? Number(query.get(name)) : undefined);
   document.documentElement.dataset.theme = query.get('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark');
-  if (location.protocol === 'file:') { // browsers give pages from disk neither modules nor workers
+  if (location.protocol === 'file:') { // browsers load neither modules nor workers for pages opened from disk
     addEventListener('DOMContentLoaded', () => document.documentElement.classList.add('disk'));
     return;
   }
@@ -29,36 +29,36 @@
     }
   };
   boot.ahead = boot.level <= COARSE_LEVEL ? COARSE_BYTES : FIRST_BYTES;
-  // The picture's context takes long to make: between the page's first paint and its code there is time for it.
+  // Creating the WebGL context takes long. It is created after the first paint of the page, while the code is loading.
   document.addEventListener('readystatechange', () => requestAnimationFrame(() => setTimeout(() => {
     boot.context ??= document.getElementById('canvas').getContext('webgl2', boot.contextOptions);
   })), { once: true });
 
-  // app.js comes at the same time, but begins when the worker has what it needs: the answer goes through this thread, and three.js would be in its way.
+  // app.js is fetched in parallel, but run only when the worker has HEAD_BYTES: the response passes through this thread, and three.js would delay it.
   const begin = () => (boot.app ??= import('./app.js').catch((error) => boot.onerror?.(error)));
 
   try {
     boot.url = query.get('file') ? new URL(query.get('file'), location.href).href : undefined;
   } catch {
-    boot.url = undefined; // app.js says so
+    boot.url = undefined; // app.js reports the invalid address
   }
   setTimeout(begin, boot.url ? PATIENCE_MS : 0);
   if (!boot.url || !/^https?:/.test(boot.url))
     return;
 
-  // The worker's first request, made here. It gets the answer as if it had asked itself.
+  // Makes the worker's first request. handover.js gives the response to the worker as if the worker had sent the request.
   const post = (part, transfer = []) => worker.postMessage({ type: 'first', url: boot.url, ...part }, transfer), abort = new AbortController();
   boot.forget = () => abort.abort();
   boot.opening = 1;
   post({ range: `bytes=0-${boot.ahead - 1}` });
-  // The card before the first picture, until app.js takes over.
+  // Updates the card that is shown before the first picture, until app.js does so.
   let got = 0, last = performance.now();
   const name = boot.nameOf(boot.url), say = () => {
     const text = document.getElementById('openingText'), quiet = Math.floor((performance.now() - last) / 1000);
     if (!text)
       return;
     document.getElementById('openingName').textContent = name;
-    text.textContent = quiet > 2 ? `Nothing has come for ${quiet} s; waiting for ${got >= HEAD_BYTES ? "the page's code" : 'the model'}` : got ? `${Math.round(got / 1000)} kB` : 'Asked for';
+    text.textContent = quiet > 2 ? `Nothing has come for ${quiet} s; waiting for ${got >= HEAD_BYTES ? "the page's code" : 'the model'}` : got ? `${Math.round(got / 1000)} kB` : 'Requested';
   };
   const telling = setInterval(say, 200);
   document.documentElement.classList.add('opening');

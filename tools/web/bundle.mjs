@@ -1,6 +1,11 @@
-// node bundle.mjs FOLDER: the page in seven files and an icon: index.html with its style and boot.js, app.js with three.js, worker.js with the reader and zstd, and what the page loads
-// when its picture is there, more.js and more.css, or for several models together.js; smaller, and each again with .gz behind its name for servers that send such (nginx: gzip_static).
-// Writes FOLDER, nothing else.
+// node bundle.mjs FOLDER: bundles and minifies the page into FOLDER; writes no other files.
+//   index.html           with its style and boot.js
+//   app.js               with three.js
+//   worker.js            with the reader and zstd
+//   more.js, more.css    loaded after the first picture
+//   together.js          loaded for several models
+//   icon.svg
+// Each file is also written compressed, with .gz after its name, for servers that send compressed files (nginx: gzip_static).
 import { mkdirSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { gzipSync } from 'node:zlib';
@@ -11,10 +16,10 @@ const TARGET = 'es2022';
 const read = (name) => readFileSync(join(here, name), 'utf8');
 const small = async (name, loader) => (await transform(read(name), { loader, minify: true, target: TARGET })).code.trim();
 
-// Function and string: what stands in the page is text, so that no `$&` of it means anything.
+// The replacement is given as a function, so that `$&` in the text has no special meaning.
 function replace(page, from, to) {
   if (page.split(from).length !== 2)
-    throw new Error(`index.html: ${from} is expected once`);
+    throw new Error(`index.html: expected ${from} exactly once`);
   return page.replace(from, () => to);
 }
 
@@ -24,7 +29,7 @@ page = replace(page, '<script src="boot.js"></script>', `<script>${await small('
 page = replace(page, /<script type="importmap">[^]*?<\/script>\n/.exec(page)[0], '');
 
 const common = { outdir: folder, bundle: true, minify: true, format: 'esm', target: TARGET, legalComments: 'eof', write: false, logLevel: 'warning' };
-// What comes later takes from app.js what that has already: another copy would be another page's state, and another three.js.
+// Modules that are loaded later import shared modules from app.js. A second copy would have separate state and a second three.js.
 const fromApp = { name: 'from-app', setup: ({ onResolve }) => onResolve({ filter: /\/(state|scene|shade)\.js$/ }, () => ({ path: './app.js', external: true })) };
 const built = await Promise.all([
   build({ ...common, entryPoints: ['app.js', 'worker.js'].map((name) => join(here, name)), external: ['./more.js', './together.js', 'node:*'] }),

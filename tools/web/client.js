@@ -1,8 +1,8 @@
-// A worker with one open file, for other pages than the viewer. Queries return promises; other messages call functions.
-// Also finds the worker's code, in the package and in the viewer's folder.
+// A worker with one open file, for pages other than the viewer. Queries return promises; other messages call functions.
+// worker.js is beside this file, in the package and in the viewer's folder.
 const WORKER = new URL('./worker.js', import.meta.url);
 
-// Workers must come from the page's own origin; those of another one are loaded by a line that is of this one.
+// The script of a worker must have the page's own origin. A worker of another origin is imported by a one-line script of the page's origin.
 function start(address) {
   const url = new URL(address, location.href);
   if (url.origin === location.origin || !/^https?:/.test(url.protocol))
@@ -11,20 +11,20 @@ function start(address) {
   return new Worker(line, { type: 'module' });
 }
 
-const AHEAD = 1 << 20;    // bytes of the first request: small models come whole
-const WORKERS_MOST = 4;   // default number of workers of a crew
-const PATIENCE_MS = 90;   // at most so often the worker hears of the camera
+const AHEAD = 1 << 20;    // bytes of the first request, which contains small models completely
+const WORKERS_MOST = 4;   // default for the number of workers of a crew
+const PATIENCE_MS = 90;   // shortest time between two views sent to the worker
 
 /** Several workers for many files: each file goes to the worker with the fewest files. */
 export class Crew {
-  /** `worker`: the address of worker.js, or undefined for the one that lies beside this file; `most`: how many workers. */
+  /** `worker`: the address of worker.js; by default, worker.js beside this file. `most`: the greatest number of workers. */
   constructor({ worker = WORKER, most = Math.max(1, Math.min(WORKERS_MOST, (navigator.hardwareConcurrency ?? 2) - 1)) } = {}) {
     Object.assign(this, { address: worker, most });
     this.workers = []; // { worker, members: Map by the number of the file }
     this.files = 0;
   }
 
-  /** For one file more: `heard(message)`, `failed(error)`. Returns { post(message, transfer), leave() }. */
+  /** Adds a file. `heard(message)` receives the worker's messages about the file, `failed(error)` a failure of the worker. Returns { post(message, transfer), leave() }. */
   join({ heard, failed }) {
     const file = this.files++, fewest = () => this.workers.reduce((a, b) => (b.members.size < a.members.size ? b : a));
     const own = this.workers.length < this.most ? this.#another() : fewest();
@@ -44,7 +44,7 @@ export class Crew {
   #another() {
     const own = { worker: start(this.address), members: new Map() };
     own.worker.onmessage = ({ data }) => own.members.get(data.file)?.heard(data);
-    own.worker.onerror = (e) => { // files that come later get another one
+    own.worker.onerror = (e) => { // files that are added later get another worker
       const members = [...own.members.values()];
       own.members.clear();
       this.#dismiss(own);
@@ -63,11 +63,14 @@ export class Crew {
 const problemOf = ({ code, message }) => Object.assign(new Error(message), { name: 'EbpoError', code });
 
 export class Client {
-  /** `worker`: as of a Crew, for a worker of its own; or `crew`, to share some. `heard(type, news)` gets tiles, idle, line, failed, loaded, located. */
+  /**
+   * `worker`: the address of worker.js, for a separate worker; or `crew`: a Crew with shared workers. `heard(type, news)` receives the messages tiles, idle, line,
+   * failed, loaded and located.
+   */
   constructor({ worker, crew = new Crew({ worker, most: 1 }), heard }) {
     this.heard = heard;
     this.opening = this.want = this.asks = 0;
-    this.waiting = new Map(); // of questions about places, by their numbers
+    this.waiting = new Map(); // pending queries for positions, by their numbers
     this.worker = crew.join({ heard: (data) => this.#hear(data), failed: (error) => this.#failed(error) });
   }
 
@@ -94,7 +97,7 @@ export class Client {
     this.heard(data.type, data);
   }
 
-  // `late`: of what is drawn, not of a question.
+  // `late`: the error concerns drawing, not a query.
   #failed(error, late) {
     const problem = problemOf(error);
     if (!late)
@@ -102,7 +105,7 @@ export class Client {
     this.heard('failed', { error: problem });
   }
 
-  // Rejects requests that get no answer any more.
+  // Rejects pending requests, which will get no response.
   #forget(problem) {
     const all = [this.opened, this.asked, ...this.waiting.values()];
     this.opened = this.asked = undefined;
@@ -110,7 +113,10 @@ export class Client {
     all.forEach((one) => one?.fail(problem));
   }
 
-  /** An address, a File or a Blob; `ahead`: bytes of the first request, `cacheBytes`: of decoded chunks that are kept. Resolves when its head is there: { info, scene: { center, scale }, size }. */
+  /**
+   * Opens an address, a File or a Blob. `ahead`: bytes of the first request; `cacheBytes`: limit of the cache of decoded chunks.
+   * Resolves to { info, scene: { center, scale }, size } when the file's header has been read.
+   */
   open(what, { ahead = AHEAD, cacheBytes } = {}) {
     this.#forget(new DOMException('another file was opened', 'AbortError'));
     this.info = this.sent = undefined;
@@ -126,7 +132,10 @@ export class Client {
     this.worker.post({ type: 'close', opening: ++this.opening });
   }
 
-  /** What is seen (lookOf() of shade.js) and wanted: { level, mesh, pixels, triangles, black, lines, cells }. Sent to the worker if it is new, at a limited rate. Returns true when sent. */
+  /**
+   * Sends a view to the worker, at a limited rate. `view`: by lookOf() of shade.js; `wanted`: { level, mesh, pixels, triangles, black, lines, cells }.
+   * Returns false, and sends nothing, when nothing changed.
+   */
   look(view, wanted) {
     const text = JSON.stringify([view, wanted]);
     if (text === this.sent)
@@ -145,9 +154,9 @@ export class Client {
     return this.timer !== undefined;
   }
 
-  /** Queries a point of the model: { where, distance, nearest, lo, hi, exact, depth, ... }. A newer query cancels an older one: AbortError. */
+  /** Queries a point of the model: { where, distance, nearest, lo, hi, exact, depth, ... }. A newer query cancels an older one, which rejects with AbortError. */
   probe(point) {
-    this.asked?.fail(new DOMException('another point was asked about', 'AbortError'));
+    this.asked?.fail(new DOMException('a newer query cancelled this one', 'AbortError'));
     const promise = new Promise((done, fail) => (this.asked = { done, fail }));
     this.worker.post({ type: 'probe', opening: this.opening, point });
     return promise;
@@ -168,7 +177,7 @@ export class Client {
 
   end() {
     clearTimeout(this.timer);
-    this.#forget(new DOMException('the model was given up', 'AbortError'));
+    this.#forget(new DOMException('the model was disposed', 'AbortError'));
     this.worker.leave();
   }
 }

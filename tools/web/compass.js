@@ -1,20 +1,20 @@
-// Draws a cube with the orientation of the model, whose sides are buttons for views, and a scale bar with a round length.
+// Draws a cube with the orientation of the model and a scale bar with a round length. The cube's sides are buttons that select views.
 import { $, length, on, state } from './state.js';
 
 const SIDES = [['+X', 'right', 90, 0], ['−X', 'left', -90, 0], ['+Y', 'top', 0, 89.9], ['−Y', 'bottom', 0, -89.9], ['+Z', 'front', 0, 0], ['−Z', 'back', 180, 0]];
 const TURNS = ['rotateY(90deg)', 'rotateY(-90deg)', 'rotateX(90deg)', 'rotateX(-90deg)', '', 'rotateY(180deg)'];
-const BAR_PIXELS = [60, 160]; // least and most
+const BAR_PIXELS = [60, 160]; // least and greatest length
 
-// Where z is upwards the picture's y is z, and its z is -y.
+// Labels for models whose z axis points upwards: the picture's y is the model's z, the picture's z is the model's -y.
 const AXES = { '+Y': '+Z', '−Y': '−Z', '+Z': '−Y', '−Z': '+Y' };
 
-/** `up`: 2 if the model's z is upwards. */
+/** `up`: 2 if the model's z axis points upwards. */
 export function addCompass({ scene, changed, up }) {
   const box = document.createElement('div'), cube = document.createElement('div'), scale = document.createElement('div');
   box.id = 'compass';
   scale.id = 'scale';
   scale.innerHTML = '<i></i><span></span>';
-  scale.title = 'A length at the distance of what is looked at';
+  scale.title = 'A length at the distance of the target';
   SIDES.forEach(([side, from, azimuth, height], i) => {
     const b = document.createElement('button'), text = (up === 2 && AXES[side]) || side;
     b.textContent = text;
@@ -34,7 +34,7 @@ export function addCompass({ scene, changed, up }) {
     box.hidden = scale.hidden = !show;
     if (!show)
       return;
-    const m = scene.camera.matrixWorldInverse.elements; // its rotation; pages count y downwards
+    const m = scene.camera.matrixWorldInverse.elements; // its rotation; y points downwards on pages
     cube.style.transform = `matrix3d(${[m[0], -m[1], m[2], 0, -m[4], m[5], -m[6], 0, m[8], -m[9], m[10], 0, 0, 0, 0, 1].map((x) => x.toFixed(4)).join(',')})`;
     measure();
   };

@@ -1,7 +1,7 @@
-// Selects the nodes to draw: a cut through the tree that fits the camera, as a few hundred pieces of geometry ("tiles"). Only changed tiles are
-// made again. No DOM and no WebGL here: runs in the worker, and under node in the tests.
+// Selects the nodes to draw: a cut through the tree with the detail that the camera needs. Draws the nodes as a few hundred pieces of geometry
+// ("tiles"), and builds only changed tiles again. Uses neither DOM nor WebGL: runs in the worker, and under node in the tests.
 //
-// Coordinates of the scene: the model's box is centred on the origin and scaled so that half its diagonal is 1. Done in doubles, then rounded.
+// Coordinates of the scene: the model's box is centred on the origin and scaled so that half its diagonal is 1. They are computed in double precision and then rounded.
 import { Field } from './field.js';
 import { Hidden } from './hidden.js';
 import { MeshStore } from './mesh.js';
@@ -9,22 +9,22 @@ import { BLACK, GRAY, LEAF, WHITE } from './reader/index.js';
 import { TileMaker, planeVector } from './tile.js';
 import { Walls } from './walls.js';
 
-const TILE_NODES = 300;        // a tile's most: fewer tiles are fewer draw calls, smaller ones are made again faster
-const NODES_A_PASS = 2400;     // newly made in one pass, so that a picture comes early and improves; the first passes make fewer yet
-const POLYTOPES_KEPT = 40000;  // of about 1.3 kB, besides those of the cut itself
+const TILE_NODES = 300;        // most nodes of a tile: large tiles need fewer draw calls, small tiles are rebuilt faster
+const NODES_A_PASS = 2400;     // most new nodes of a pass, so that a picture appears early and improves; the first passes create even fewer
+const POLYTOPES_KEPT = 40000;  // in addition to the polytopes of the cut; about 1.3 kB each
 const PRUNE_PASSES = 64;
-const MESH_LEAVES = 1000;      // whose faces are asked for at once, about
-const MESH_SUBTREES = 16;      // the same where the file has subtrees
-const FACE_PIXELS = 10;        // of the picture for each face of a subtree, from which on its faces are fetched, at a detail of 16 pixels
-const NEARER_LEVELS = 2;       // nodes that lack so many more levels than others are fetched before these
+const MESH_LEAVES = 1000;      // whose faces are requested together, approximately
+const MESH_SUBTREES = 16;      // the same for files with subtrees
+const FACE_PIXELS = 10;        // a subtree's faces are fetched when it fills so many pixels per face, at a detail of 16 pixels
+const NEARER_LEVELS = 2;       // nodes that lack so many levels more than other nodes are fetched first
 const NODES_MISSING = 1 << 14; // most missing nodes reported in one pass
-const LEAF_SHARE = 4;          // in small files leaves' faces are taken even when so many times smaller than a gray node may be
-const GROUP_LEVELS = 3;        // leaves below one node so many levels above have neighbouring faces in the file
-const GROUP_LEAVES = 12;       // fewer wanted ones are not worth their chunks, unless they are large
+const LEAF_SHARE = 4;          // in small files, faces of a leaf are used even when the leaf is so many times smaller than the smallest refined gray node
+const GROUP_LEVELS = 3;        // leaves with a common ancestor so many levels above have faces near each other in the file
+const GROUP_LEAVES = 12;       // groups with fewer leaves are not fetched, unless the leaves are large
 const LARGE_LEAF = 6;
-const WHOLE_FACES = 1 << 18;   // of a small file all faces are drawn rather than envelopes, up to so many
-const WHOLE_PIXELS = 16;       // unless larger cells are asked for
-const FACES_KEPT = 1.5e6;      // besides those of the cut itself
+const WHOLE_FACES = 1 << 18;   // small files with at most so many faces are drawn with faces instead of envelopes
+const WHOLE_PIXELS = 16;       // unless larger cells are requested
+const FACES_KEPT = 1.5e6;      // in addition to the faces of the cut
 
 /** Returns the transformation from the model's to the scene's coordinates: scene = (model - center) * scale. */
 export function sceneOf(info) {
@@ -32,7 +32,7 @@ export function sceneOf(info) {
   return { center, scale: 2 / Math.hypot(...info.box_size) };
 }
 
-// Largest first.
+// A priority queue, largest first.
 class Heap {
   constructor() {
     this.items = [];
@@ -70,13 +70,13 @@ export class Cut {
     this.small = small;
     this.scene = sceneOf(tree.info);
     this.tiles = new Map(); // key: { signature, pass, nodes, triangles, meshTriangles, wallTriangles }
-    this.nodes = [];        // of the last cut
+    this.nodes = [];        // nodes of the last cut
     this.mesh = new MeshStore();
     this.field = new Field();
     this.pass = 0;
-    this.size = 0; // nodes of the last cut
+    this.size = 0; // number of nodes of the last cut
     this.ids = 0;
-    this.made = 0; // polytopes kept with their nodes, about
+    this.made = 0; // approximate number of polytopes that are kept with their nodes
     this.half = Array.from({ length: 21 }, (_, l) => tree.info.box_size.map((s) => s / 2 ** l / 2 * this.scene.scale));
     this.low = tree.info.box_size.map((s) => -s / 2 * this.scene.scale);
     const colour = tree.info.parts.has('colours') ? (node) => tree.colour(node) : undefined;
@@ -89,7 +89,7 @@ export class Cut {
     return { low: this.low.map((l, k) => l + 2 * node.at[k] * h[k]), size: h.map((x) => 2 * x) };
   }
 
-  // Projected size of the node's cell in pixels, the largest of all views; `unseen` says that it is out of sight in each.
+  // Returns the projected size of the node's cell in pixels, the largest of all views. Sets `unseen` when the cell is out of sight in every view.
   #pixels(node, view) {
     let px = this.#pixelsOf(node, view), { unseen } = this;
     for (const other of view.also ?? []) {
@@ -100,7 +100,7 @@ export class Cut {
     return px;
   }
 
-  // The size in one view; invisible nodes count a tenth.
+  // Returns the size in one view; a tenth of the size when the node is out of sight.
   #pixelsOf(node, view) {
     this.unseen = false;
     const h = this.half[node.level];
@@ -123,17 +123,23 @@ export class Cut {
   }
 
   /**
-   * One pass. `view`: { eye, planes, pixels, also } in scene coordinates, `pixels` those of a length 1 at distance 1, `also` other such views at the same time: of a
-   * model that is in the picture several times. `want`: { level (deepest), mesh
-   * (real faces in leaves), pixels (cells are refined until they are smaller), triangles (at most about), black (draw black nodes), lines, cells }.
-   * Returns { set: [tile], removed: [key], more, deeper, missing, leaves, stats }: `more`: another pass would refine further; `deeper`: nodes are
-   * missing: those below `missing`, [{ node, levels }], most important first, so many levels of them; `leaves`: leaves whose faces are missing, likewise.
+   * Performs one pass.
+   *
+   * `view`: { eye, planes, pixels, also } in scene coordinates. `pixels` is the size in pixels of a length of 1 at a distance of 1. `also` lists further views of
+   * the same kind, when the picture has several instances of the model.
+   *
+   * `want`: { level (deepest), mesh (draw real faces in leaves), pixels (cells are refined until they are smaller), triangles (approximate limit), black (draw
+   * black nodes), lines, cells }.
+   *
+   * Returns { set: [tile], removed: [key], more, deeper, missing, leaves, stats }. `more`: another pass would refine further. `deeper`: the descendants of some
+   * nodes are missing. `missing`: these nodes, [{ node, levels }], with the number of missing levels, most important first. `leaves`: leaves whose faces are
+   * missing, in the same order.
    */
   update(view, want) {
     this.pass++;
     const chosen = this.#choose(view, want), tiles = this.#tilesOf(chosen.nodes);
     this.#enter(chosen.nodes);
-    const flags = (want.lines ? 1 : 0) + (want.cells ? 2 : 0) + (want.black ? 4 : 0), set = [], removed = [], walls = want.black ? undefined : this.walls; // a section shows every wall
+    const flags = (want.lines ? 1 : 0) + (want.cells ? 2 : 0) + (want.black ? 4 : 0), set = [], removed = [], walls = want.black ? undefined : this.walls; // a section shows every cell face
     for (const [root, nodes] of tiles) {
       const key = root.id ??= ++this.ids, signature = signatureOf(nodes, flags), old = this.tiles.get(key);
       if (old?.signature === signature && (want.black || nodes.every((node) => this.field.changedAt(node) <= old.pass)))
@@ -152,10 +158,10 @@ export class Cut {
     return { set, removed, more: chosen.more, deeper: chosen.missing.length > 0, missing: chosen.missing, leaves: chosen.leaves, stats: { ...this.#stats(), levels: chosen.levels } };
   }
 
-  // Neighbouring nodes together: the subtrees with up to TILE_NODES of them.
+  // Groups neighbouring nodes: each tile is a subtree with at most TILE_NODES nodes of the cut.
   #tilesOf(nodes) {
     const tiles = new Map();
-    for (const node of nodes) // how many are below each node
+    for (const node of nodes) // counts the nodes of the cut below each node
       for (let n = node; n; n = n.parent) {
         n.below = n.counted === this.pass ? n.below + 1 : 1;
         n.counted = this.pass;
@@ -173,7 +179,7 @@ export class Cut {
     return tiles;
   }
 
-  // Updates new and changed nodes: which node draws which faces, and how envelopes are lit.
+  // Updates new and changed nodes: assigns faces to the nodes that draw them, and updates the normals that light envelopes.
   #enter(nodes) {
     const { pass } = this, entering = [], leaves = nodes.filter((node) => node.useMesh);
     for (const node of nodes) {
@@ -193,7 +199,7 @@ export class Cut {
   }
 
   #vectorOf(node) {
-    this.made += node.polytope ? 0 : 1.4; // and of nodes above
+    this.made += node.polytope ? 0 : 1.4; // the excess is for ancestors, which get polytopes too
     return planeVector(this.tree.polytope(node), this.half[node.level]);
   }
 
@@ -222,7 +228,7 @@ export class Cut {
         if (!node.mesh && (this.small || !unseen) && this.tree.info.parts.has('mesh'))
           this.#group(groups, node, px, px > want.pixels / share);
       }
-      estimate += node.useMesh ? node.mesh.length / 2 : 16; // about: faces are listed by several leaves
+      estimate += node.useMesh ? node.mesh.length / 2 : 16; // approximate, because several leaves list the same face
       out.nodes.push(node);
       out.levels[node.level] = (out.levels[node.level] ?? 0) + 1;
     };
@@ -264,13 +270,13 @@ export class Cut {
     return Object.assign(out, whole ?? { leaves: this.#leavesToFetch(groups, want) });
   }
 
-  // In a large file, nodes hidden by others are not fetched.
+  // Omits hidden nodes from the nodes to fetch, in large files.
   #leaveHidden(view, out, groups) {
     const hidden = new Hidden(view, out.nodes, (node) => {
       const { low, size } = this.#place(node);
       return { center: low.map((l, k) => l + size[k] / 2), radius: Math.hypot(...size) / 2 };
     });
-    const nearest = Math.max(...out.missing.map(({ levels }) => levels)) - NEARER_LEVELS; // hide others when they are there
+    const nearest = Math.max(...out.missing.map(({ levels }) => levels)) - NEARER_LEVELS; // the other nodes are fetched when these have arrived
     out.missing = out.missing.filter(({ node, levels }) => levels >= nearest && !hidden.has(node));
     for (const [root, group] of groups) {
       group.leaves = hidden.has(root) ? [] : group.leaves;
@@ -279,7 +285,7 @@ export class Cut {
     }
   }
 
-  // How many levels below a node are worth having at once: until cells are as small as is wanted.
+  // Returns the number of levels to fetch together below a node, until cells are as small as wanted.
   #levelsWanted(node, px, want) {
     return Math.max(1, Math.min(want.level - node.level, want.pixels > 0 ? Math.ceil(Math.log2(px / want.pixels)) : Infinity));
   }
@@ -296,13 +302,13 @@ export class Cut {
     group.most = Math.max(group.most, px);
   }
 
-  // A few faces are cheaper to draw than envelopes, and look better.
+  // Returns true when the whole mesh is drawn. Few faces are cheaper to draw than envelopes, and look better.
   #takesWhole(want) {
     const { info } = this.tree;
     return want.mesh && this.small && want.pixels <= WHOLE_PIXELS && info.parts.has('mesh') && info.face_count <= WHOLE_FACES;
   }
 
-  // All leaves as a cut, when their faces are there; else what is missing for that. What was chosen before is drawn meanwhile.
+  // Returns all leaves as a cut when their faces have been loaded. Otherwise returns the missing nodes and leaves; meanwhile the normal cut is drawn.
   #wholeMesh() {
     const nodes = [], missing = [], levels = [], walk = (node) => {
       if (node.type === LEAF) {
@@ -310,13 +316,13 @@ export class Cut {
         node.id ??= ++this.ids;
         levels[node.level] = (levels[node.level] ?? 0) + 1;
       } else if (node.type === GRAY && !this.tree.isPruned(node)) {
-        node.kept = this.pass; // is not tidied away
+        node.kept = this.pass; // #tidy() keeps this node's children
         const children = this.tree.children(node);
         if (!children && !this.tree.isPruned(node))
           missing.push({ node, levels: 99 });
         children?.forEach(walk);
       } else if (node.type === GRAY) {
-        nodes.push(node); // a subset's: its envelope stays
+        nodes.push(node); // pruned in a subset: its envelope is drawn
         node.id ??= ++this.ids;
       }
     };
@@ -329,14 +335,14 @@ export class Cut {
     return { nodes, more: false, missing, leaves, levels: Array.from(levels, (n) => n ?? 0) };
   }
 
-  // Neighbours together, the groups that are seen most first; scattered leaves would cost a chunk of 64 kB each, or the faces of a subtree. Of a group that is
-  // fetched all leaves are taken, for an envelope among faces would stick out.
+  // Returns the leaves whose faces are fetched next: groups of neighbouring leaves, the group with the largest visible area first. A scattered leaf would need a
+  // separate chunk of 64 kB, or the faces of a whole subtree. All leaves of a group are fetched, because single envelopes among real faces would be conspicuous.
   #leavesToFetch(groups, want) {
     const out = [], { info } = this.tree, C = info.subtree_level;
     const worth = C === undefined || this.small ? 0 : FACE_PIXELS * (want.pixels / 16) ** 2 * info.face_count / info.levels[C].gray;
     let subtrees = 0;
     for (const { leaves, area, most, large } of [...groups.values()].filter((g) => g.large).sort((a, b) => b.area - a.area))
-      if (C !== undefined) { // its faces and vertices lie together
+      if (C !== undefined) { // faces and vertices of a subtree are stored together
         if (area >= worth && subtrees++ < MESH_SUBTREES)
           out.push(...leaves);
       } else if (out.length < MESH_LEAVES && (this.small || large >= GROUP_LEAVES || most > LARGE_LEAF * want.pixels))
@@ -344,13 +350,13 @@ export class Cut {
     return out;
   }
 
-  /** Takes a leaf's faces (nine numbers each, the model's coordinates, and `numbers`: those of the faces). */
+  /** Adds a leaf's faces. `faces`: nine numbers each, in the model's coordinates; its members `numbers` and `colours` have the face numbers and the colours. */
   addMesh(leaf, faces) {
     const { center, scale } = this.scene;
     this.mesh.add(leaf, Float32Array.from(faces, (x, i) => (x - center[i % 3]) * scale), faces.numbers, faces.colours);
   }
 
-  // Nodes that were not refined for long lose what is below them; polytopes and faces of others than the cut's go when they are too many.
+  // Frees memory: removes the descendants of nodes that were not refined for PRUNE_PASSES passes. Frees polytopes and faces outside the cut when there are too many.
   #tidy() {
     if (this.mesh.faces > FACES_KEPT + 2 * this.leaves.reduce((sum, leaf) => sum + leaf.owned, 0)) {
       this.#forgetMeshes(this.tree.root);
@@ -379,7 +385,7 @@ export class Cut {
   }
 }
 
-// What a tile was made of: changes when it has to be made again, but for its neighbours.
+// Returns a hash of a tile's content. The tile is rebuilt when it changes; changes of neighbouring nodes are not included.
 function signatureOf(nodes, flags) {
   nodes.sort((a, b) => a.id - b.id);
   let signature = nodes.length * 8 + flags;

@@ -1,5 +1,5 @@
-// <ebpo-viewer src="statue.ebpo.h5">: the picture and its camera as an element for other pages. With <ebpo-part> children or a scene it shows several models. Importing this file
-// defines the element.
+// The element <ebpo-viewer src="statue.ebpo.h5">: shows a model, with a camera, on other pages. With <ebpo-part> children or a scene it shows several models.
+// Importing this file defines the element.
 import { boxOf, cameraOf, cameraText, clipOf, cutOf, pointsOf } from './address.js';
 import { Client } from './client.js';
 import { Scene } from './scene.js';
@@ -22,17 +22,17 @@ const STYLE = `
   #say:empty { display: none; }`;
 const STEER = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1], '+': 0.8, '=': 0.8, '-': 1.25 };
 
-// Returns the properties of parts that cannot change without opening the parts again.
+// Returns the properties of parts as text. When they change, the parts are opened again.
 const filesOf = (parts) => JSON.stringify(parts.map(({ src, colour, name }) => [src, colour, name]));
 
 export class EbpoViewerElement extends HTMLElement {
   static observedAttributes = [...OPENS, 'view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'theme', 'walls', 'time', 'hide', 'colours'];
-  /** Sets the address of worker.js, if it is not beside this file. Call it before the first element exists. */
+  /** The address of worker.js, if worker.js is not beside this file. Set it before the first element exists. */
   static worker = undefined;
 
-  #client;   // of one model
-  #several;  // in its place: several
-  #parts;    // as they were when they were opened; undefined if something else is shown than the attributes and parts say
+  #client;   // when one model is shown
+  #several;  // when several models are shown
+  #parts;    // the opened parts; undefined when load() or a scene selected the models
   #changes = new MutationObserver((all) => this.#partsChanged(all));
   #scene;
   #timer;
@@ -50,7 +50,7 @@ export class EbpoViewerElement extends HTMLElement {
     if (this.#scene)
       return;
     const canvas = this.#part('canvas');
-    canvas.ariaLabel = this.getAttribute('alt') ?? 'A model in three dimensions: drag or arrow keys turn it, wheel, + and - go nearer and farther';
+    canvas.ariaLabel = this.getAttribute('alt') ?? 'A model in three dimensions: drag or arrow keys turn it, wheel, + and - zoom';
     this.#scene = new Scene(canvas, { contextOptions: { antialias: true }, fieldOfView: FIELD_OF_VIEW }, { changed: () => this.#moved(), drawn() {} });
     this.#listen(canvas);
     EbpoViewerElement.observedAttributes.filter((name) => !OPENS.includes(name) && this.hasAttribute(name)).forEach((name) => this.#apply(name));
@@ -60,7 +60,7 @@ export class EbpoViewerElement extends HTMLElement {
     this.#open();
   }
 
-  // An element that is moved within its page is disconnected briefly.
+  // Frees everything when the element was removed. An element that moves within its page is disconnected only briefly.
   disconnectedCallback() {
     queueMicrotask(() => {
       if (this.isConnected || !this.#scene)
@@ -71,7 +71,7 @@ export class EbpoViewerElement extends HTMLElement {
       this.#several?.end();
       this.#scene.end();
       this.#scene = this.#client = this.#several = undefined;
-      this.#part('canvas').replaceWith(Object.assign(document.createElement('canvas'), { tabIndex: 0, role: 'img' })); // a lost context does not come back
+      this.#part('canvas').replaceWith(Object.assign(document.createElement('canvas'), { tabIndex: 0, role: 'img' })); // a canvas that has lost its context is not reusable
     });
   }
 
@@ -184,7 +184,7 @@ export class EbpoViewerElement extends HTMLElement {
       const { got, want, quiet } = news, bar = this.#part('#bar');
       bar.hidden = !(want > 0);
       bar.style.width = want > 0 ? `${100 * got / want}%` : '';
-      this.#say(news.trouble ?? (want > 0 && quiet > 3000 ? `Nothing has come for ${Math.floor(quiet / 1000)} s` : ''));
+      this.#say(news.trouble ?? (want > 0 && quiet > 3000 ? `No data for ${Math.floor(quiet / 1000)} s` : ''));
       this.#tell('progress', { got, want, quiet });
     } else if (type === 'idle') {
       this.#part('#bar').hidden = true;
@@ -200,7 +200,7 @@ export class EbpoViewerElement extends HTMLElement {
       this.#part('#say').textContent = text;
   }
 
-  // What has been open goes; what opens next says which kind it is.
+  // Closes what is open: one model or several.
   #close() {
     this.#client?.close();
     this.#several?.end();
@@ -224,7 +224,7 @@ export class EbpoViewerElement extends HTMLElement {
     this.#parts = scene ? undefined : filesOf(parts);
   }
 
-  // Parts that come while the page is being read come together.
+  // Handles added, removed and changed parts. Changes while the page is being parsed arrive together.
   #partsChanged(all) {
     if (!all.some(({ type, target }) => type === 'childList' || target.localName === PART) || !this.#scene || this.#parts === undefined)
       return;
@@ -233,7 +233,7 @@ export class EbpoViewerElement extends HTMLElement {
       this.#open();
       return;
     }
-    try { // the same ones, elsewhere
+    try { // the same files at other poses
       parts.forEach(({ pose, hidden }, i) => this.#several?.place(i, poseFrom(pose), hidden));
       this.#apply('hide');
     } catch (error) {
@@ -259,19 +259,19 @@ export class EbpoViewerElement extends HTMLElement {
 
   // --- for the page ---
 
-  /** The open file's facts, by the format's names; of several models { box_origin, box_size, from, to, models, instances }. */
+  /** The root attributes of the open file, by the format's names; for several models { box_origin, box_size, from, to, models, instances }. */
   get info() {
     return this.#several ? this.#several.assembly.box && this.#several.facts : this.#client?.info;
   }
 
-  /** The attributes of the <ebpo-part> children: [{ src, pose, name, colour, hidden }], texts as they are written. */
+  /** The attributes of the <ebpo-part> children, as unparsed texts: [{ src, pose, name, colour, hidden }]. */
   get parts() {
     const text = (part, name) => part.getAttribute(name) ?? undefined;
     return [...this.children].filter((part) => part.localName === PART && part.hasAttribute('src')).map((part) => ({ src: text(part, 'src'), pose: text(part, 'pose'),
       name: text(part, 'name'), colour: text(part, 'colour'), hidden: part.hasAttribute('hidden') }));
   }
 
-  /** The view, as in the viewer's address. */
+  /** The view, in the form of the parameter `view` of the viewer's address. */
   get view() {
     return this.#scene && cameraText(this.#scene.place);
   }
@@ -288,7 +288,7 @@ export class EbpoViewerElement extends HTMLElement {
     this.setAttribute('src', text);
   }
 
-  /** Opens an address, a File or a Blob (`src` does so, too), or a list of parts, as `parts` has them; their `src` may be Files or Blobs. Resolves to the facts. */
+  /** Opens an address, a File or a Blob, or a list of parts in the form of `parts`, whose `src` may be Files or Blobs. Resolves to the value of `info`. */
   async load(what) {
     this.#parts = undefined;
     if (Array.isArray(what))
@@ -306,18 +306,18 @@ export class EbpoViewerElement extends HTMLElement {
     return info;
   }
 
-  /** Shows all of the model. */
+  /** Moves the camera so that the whole model is visible. */
   home() {
     this.#scene.home();
   }
 
   /**
-   * Queries a point of the model and marks it: { point, where, distance, nearest, lo, hi, exact }; the event `point` has the same. Of several models: in the scene's coordinates,
-   * about the instance of this name.
+   * Queries a point and marks it. Resolves to { point, where, distance, nearest, lo, hi, exact }, which the event `point` also has. With several models, the point
+   * is in the scene's coordinates, and `instance` is the name of the queried instance.
    */
   async ask(point, instance) {
     if (!this.info)
-      throw new Error('nothing is open; ask after the event load');
+      throw new Error('no model is open; wait for the event load');
     const several = this.#several, inScene = several?.inPicture ?? ((p) => toPicture(p, this.#client.scene));
     this.#scene.showProbe(inScene(point));
     const answer = several ? await several.ask(point, instance) : await this.#askOne(point), { where, nearest } = answer;

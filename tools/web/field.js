@@ -1,5 +1,6 @@
-// Computes a smooth field of normals for envelopes: at each corner of a drawn cell the mean direction of the nodes around it, by area. Neighbouring nodes
-// have the same light at common corners, so that the steps between envelopes do not look like edges of the model. It also detects changes of a node's neighbours.
+// Computes a smooth field of normals for envelopes: at each corner of a drawn cell, the mean normal of the nodes around the corner, weighted by area.
+// Neighbouring nodes have the same normals at common corners, so that the steps between envelopes do not look like edges of the model. The field also
+// detects changes of a node's neighbours.
 const DEEPEST = 20;
 const NONE = 0xffffffff;
 
@@ -10,9 +11,9 @@ export class Field {
 
   clear(length) {
     this.count = 0;
-    this.xy = new Float64Array(length);  // of a corner, in cells of the deepest level
+    this.xy = new Float64Array(length);  // x and y of a corner, in cells of the deepest level
     this.z = new Uint32Array(length);
-    this.sum = new Float64Array(4 * length); // of the nodes' vectors, and of what they would be without cancelling
+    this.sum = new Float64Array(4 * length); // sum of the nodes' vectors, and sum of their lengths
     this.changed = new Uint32Array(length);
     this.table = new Uint32Array(2 * length).fill(NONE);
   }
@@ -38,7 +39,7 @@ export class Field {
     return slots;
   }
 
-  /** The nodes of a new cut in place of the last one's; `vector(node)` is [x, y, z, sum of lengths]. A node's `slots` are its corners here. */
+  /** Replaces the nodes of the last cut. `vector(node)` returns [x, y, z, sum of lengths]. Sets the member `slots` of a node: the indices of its corners in the field. */
   update(nodes, entering, leaving, pass, vector) {
     if (this.count + 8 * entering.length > this.xy.length) {
       this.clear(2 ** Math.ceil(Math.log2(16 * nodes.length + 1024)));
@@ -80,7 +81,7 @@ export class Field {
         this.here[3 * c + k] = this.sum[4 * slots[c] + k] / (this.sum[4 * slots[c] + 3] || 1);
   }
 
-  /** Evaluates the field at a position in the cell, 0 .. 1 on each axis, into `out`: its length is 1 where all nodes agree, and 0 where they cancel. */
+  /** Evaluates the field at a position in the cell, 0 to 1 on each axis, into `out`. The length of the result is 1 where all normals agree, and 0 where they cancel. */
   at(x, y, z, out) {
     out[0] = out[1] = out[2] = 0;
     for (let c = 0; c < 8; c++) {

@@ -2,7 +2,7 @@
 import { bytes } from './line.js';
 import { $, count, state, time } from './state.js';
 
-const bytesOf = (size) => (size >= 0 ? bytes(size) : 'not yet known how much');
+const bytesOf = (size) => (size >= 0 ? bytes(size) : 'size not yet known');
 
 /** Makes a button for each level and one for the mesh; a pressed button calls `choose(level)`. */
 export function makeLevels(choose) {
@@ -14,7 +14,7 @@ export function makeLevels(choose) {
     const b = document.createElement('button'), bar = document.createElement('i'), isMesh = l === i.level_count;
     bar.style.height = `${4 + 24 * Math.sqrt((size || 0) / most)}px`;
     b.append(bar, isMesh ? '▲' : String(l));
-    b.title = isMesh ? `The mesh: ${bytesOf(size)}, fetched where it is seen` : `Level ${l}: ${bytesOf(size)}; file up to here ${bytesOf(state.bytesTo[l])}`;
+    b.title = isMesh ? `The mesh: ${bytesOf(size)}, fetched where it is visible` : `Level ${l}: ${bytesOf(size)}; file up to here ${bytesOf(state.bytesTo[l])}`;
     b.ariaLabel = isMesh ? 'All levels, and the mesh' : `Level ${l}`;
     b.onclick = () => choose(l);
     return b;
@@ -33,18 +33,18 @@ export function showLevels() {
   });
 }
 
-/** Describes a level in words and by its volume. */
+/** Shows the chosen level, its size in the file and its volume excess. */
 export function showLevel() {
   const at = Number($('level').value), i = state.info, mesh = at === i.level_count;
   $('levelText').textContent = mesh ? 'all, and the mesh' : `0 to ${at}`;
-  $('levelHint').textContent = mesh ? 'Refined where it is seen; leaves show the real faces.' : `Envelopes of level ${at} and of leaves above it: ${bytesOf(state.bytesTo[at])} of the file.`;
+  $('levelHint').textContent = mesh ? 'Refined where it is visible; leaves show the real faces.' : `Envelopes of level ${at} and of leaves above it: ${bytesOf(state.bytesTo[at])} of the file.`;
   const excess = volumeExcess(Math.min(at, i.level_count - 1));
   $('sExcess').textContent = excess === undefined || mesh ? '–' : `+${excess < 10 ? excess.toFixed(2) : excess.toFixed(0)} %`;
   showLevels();
 }
 
-// The stated volumes: envelopes of the level's gray nodes, leaves and black cells so far, against the model. The file
-// states the integral of the winding number, which is the model's volume where there is a single shell.
+// Returns the excess of the volume at a level over the model's volume, in percent. The volume at a level is that of the envelopes of its gray nodes, and of
+// the leaves and black cells down to this level. The file stores the integral of the winding number, which is the model's volume only for a single shell.
 function volumeExcess(level) {
   const i = state.info;
   if (!i.solid || !(i.mesh_volume > 0) || !i.mesh_manifold || i.mesh_components !== 1)

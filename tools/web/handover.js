@@ -1,7 +1,7 @@
-// Passes the response to the page's first request, made by boot.js before this code was loaded, to the worker as its first response.
+// boot.js sends the page's first request before this code is loaded. This module gives the response to the worker as the response to the worker's first request.
 let first;
 
-/** A part of it, as the page sends them. */
+/** Takes a message from boot.js with a part of the response. */
 export function takeFirst({ url, range, head, bytes, end, failed }) {
   if (range) {
     first = { url, range, taken: false };
@@ -9,7 +9,7 @@ export function takeFirst({ url, range, head, bytes, end, failed }) {
     first.answer = new Promise((done, fail) => Object.assign(first, { done, fail }));
     first.answer.catch(() => {}); // the receiver reports the error
   } else if (first.ended) {
-    return; // nobody wants the rest
+    return; // the request was aborted or is complete
   } else if (head) {
     first.done(new Response(first.body, head));
   } else if (bytes) {
@@ -24,7 +24,7 @@ export function takeFirst({ url, range, head, bytes, end, failed }) {
   }
 }
 
-/** Acts like fetch, except for that one request. `forget()` is called when the response is no longer needed. */
+/** Returns a function like fetch() that uses the response of boot.js for the first request. Calls `forget()` when this response is no longer needed. */
 export const fetchAfter = (forget) => (url, init) => {
   if (!first || first.taken || url !== first.url || init.headers.Range !== first.range)
     return fetch(url, init);
@@ -33,7 +33,7 @@ export const fetchAfter = (forget) => (url, init) => {
   init.signal.addEventListener('abort', () => {
     if (first.ended)
       return;
-    takeFirst({ failed: 'it was ended' });
+    takeFirst({ failed: 'the request was aborted' });
     forget();
   });
   return answer;

@@ -1,12 +1,12 @@
-// Estimates which nodes are hidden behind nearer nodes and need not be fetched, from a coarse picture of the covered parts of the view and their
-// depths. This is no exact test of visibility: it only delays fetching.
+// Estimates which nodes are hidden behind nearer nodes and need not be fetched. Uses a coarse picture: the covered tiles of the view and their depths.
+// The test of visibility is not exact, because an error only delays fetching.
 const ACROSS = 48, DOWN = 32;
-const COVERED = 0.8; // times its area, until a tile counts as covered
+const COVERED = 0.8; // a tile counts as covered when nodes cover so much of its area
 
 const dot = (p, [x, y, z, w]) => x * p[0] + y * p[1] + z * p[2] + w;
 
 export class Hidden {
-  /** `view` as of Cut.update(); `place(node)`: { center, radius } in its coordinates. */
+  /** `view`: as for Cut.update(); `place(node)`: returns { center, radius } in the view's coordinates. */
   constructor(view, nodes, place) {
     Object.assign(this, { view, place });
     if (view.planes.length !== 4)
@@ -25,7 +25,7 @@ export class Hidden {
       });
   }
 
-  // The view's width or height at distance 1, from two opposite planes.
+  // Returns the view's width or height at distance 1, from two opposite planes.
   #opening(i) {
     const [a, b] = this.view.planes.slice(i, i + 2), cos = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     return 2 * Math.tan((Math.PI - Math.acos(Math.max(-1, Math.min(1, cos)))) / 2);
@@ -37,7 +37,7 @@ export class Hidden {
     return l + r > 0 && t + b > 0 ? { center, radius, distance, depth: (l + r) / this.forward, u: l / (l + r) * ACROSS, v: t / (t + b) * DOWN } : undefined;
   }
 
-  // Calls back with each tile that a node's surface may cover, and how much of it; true goes on.
+  // Calls `each` with each tile that a node's surface may cover, and the covered share of the tile. Stops when `each` returns false.
   #tiles({ radius, depth, u, v }, each) {
     const edge = 2 * radius / Math.sqrt(3) / Math.max(depth, radius), area = edge * edge / this.tileArea, half = Math.sqrt(area) / 2;
     const from = [Math.max(0, Math.floor(u - half)), Math.max(0, Math.floor(v - half))], to = [Math.min(ACROSS - 1, Math.floor(u + half)), Math.min(DOWN - 1, Math.floor(v + half))];

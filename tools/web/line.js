@@ -1,6 +1,6 @@
 // Shows the state of the connection: progress, waiting time, errors, and a button to retry.
 const $ = (id) => document.getElementById(id);
-const STALL_MS = 3000; // without a byte: it is said
+const STALL_MS = 3000; // the page reports a stall after so long without a byte
 
 export const bytes = (n) => (n < 1000 ? `${n} B` : n < 1e6 ? `${(n / 1e3).toFixed(n < 1e4 ? 1 : 0)} kB` : n < 1e9 ? `${(n / 1e6).toFixed(n < 1e7 ? 2 : 1)} MB` : `${(n / 1e9).toFixed(2)} GB`);
 
@@ -11,14 +11,17 @@ export function busy(on) {
     showLine({ got: 0, want: 0, quiet: 0 });
 }
 
-/** The card before the first picture; boot.js began it. */
+/** Shows the card before the first picture, which boot.js created; hides the card without a name. */
 export function showOpening(name) {
   document.documentElement.classList.toggle('opening', name !== undefined);
   if (name !== undefined)
     $('openingName').textContent = name;
 }
 
-/** Of what is under way: bytes that came and that were asked for, ms since the last one, what they are for, and why nothing comes, if that is known. */
+/**
+ * Shows the progress of all requests. `got`, `want`: received and requested bytes; `quiet`: milliseconds since the last byte; `what`: the purpose of the data;
+ * `trouble`: the reason of a stall, if known.
+ */
 export function showLine({ got, want, quiet, what, trouble }) {
   const share = want > 0 ? got / want : undefined, percent = Math.round(100 * (share ?? 0));
   for (const bar of [$('progress'), $('openingProgress')]) {
@@ -34,12 +37,12 @@ export function showLine({ got, want, quiet, what, trouble }) {
   const stalls = Boolean(trouble) || (want > 0 && quiet >= STALL_MS);
   $('stall').hidden = !stalls;
   if (stalls) {
-    $('stallWhat').textContent = trouble ? `The line is dead: ${trouble}` : `Nothing has come for ${Math.floor(quiet / 1000)} s`;
-    $('stallNext').textContent = `Waiting for ${what}, ${bytes(want - got)} of ${bytes(want)}. ${trouble ? 'It is asked for again now and then; what has come is kept.' : 'What has come is kept.'}`;
+    $('stallWhat').textContent = trouble ? `Connection lost: ${trouble}` : `No data for ${Math.floor(quiet / 1000)} s`;
+    $('stallNext').textContent = `Waiting for ${what}, ${bytes(want - got)} of ${bytes(want)}. ${trouble ? 'The page repeats the request from time to time; received data is kept.' : 'Received data is kept.'}`;
   }
 }
 
-/** `retry`: what the button does; without it there is none. */
+/** Shows an error, or hides the last one. `retry`: called by the button Retry; without `retry` the button is hidden. */
 export function showError(error, retry) {
   $('error').hidden = !error;
   if (!error)

@@ -1,10 +1,10 @@
-// node list.js FILE ...: a list of files, and scenes (.scene.json), for the viewer's first page (?samples=), as JSON. Files that
-// cannot be read are omitted with a message; the exit code is 1 when no file remains.
+// node list.js FILE ...: prints a list of files and scenes (.scene.json) as JSON, for the viewer's first page (?samples=). Omits files that
+// cannot be read, with a message. The exit code is 1 when no file remains.
 import { promises as fs } from 'node:fs';
 import { basename } from 'node:path';
 import { openEbpo } from './reader/index.js';
 
-// Ranges of a file on disk, so that large ones are not read whole.
+// Returns the list's entry of a model. Reads ranges, so that large files are not read completely.
 async function headOf(path) {
   const handle = await fs.open(path), { size } = await handle.stat();
   const read = async (offset, length) => (await handle.read(new Uint8Array(length), 0, length, offset)).buffer;
@@ -17,11 +17,11 @@ async function headOf(path) {
   }
 }
 
-// A scene's own words; its models are looked at when it is opened.
+// Returns the list's entry of a scene. The scene's models are not read.
 async function sceneOf(path) {
   const scene = JSON.parse(await fs.readFile(path, 'utf8'));
   if (typeof scene.ebpo_scene !== 'string')
-    throw new Error('this is no scene; it has no member ebpo_scene');
+    throw new Error('not a scene: the member ebpo_scene is missing');
   return { name: typeof scene.title === 'string' && scene.title ? scene.title : basename(path, '.scene.json'), scene: basename(path), instances: scene.instances?.length ?? 0 };
 }
 
@@ -30,7 +30,7 @@ for (const path of process.argv.slice(2).sort()) {
   try {
     list.push(await (path.endsWith('.scene.json') ? sceneOf : headOf)(path));
   } catch (error) {
-    console.error(`list.js: left out: ${basename(path)}: ${error.message.replace(`${path}: `, '')}`);
+    console.error(`list.js: omitted: ${basename(path)}: ${error.message.replace(`${path}: `, '')}`);
   }
 }
 if (!list.length)

@@ -15,7 +15,7 @@ const DISTANCES = `
   <p class="hint" id="measureHint">Points are put on the nearest faces; on a section they stay where they are clicked.</p>
   <ol id="measures" class="list"></ol>`;
 
-/** Distances only, as several models have them. `placeOf(point)` gives (a promise of) the place on a face that is meant by a point which was clicked. */
+/** Adds the measurement of distances, but no sections, for pages with several models. `page.placeOf(point)` resolves to the position on a face for a clicked point. */
 export function addDistances(page) {
   distances(page, section('Measure', DISTANCES));
 }
@@ -94,7 +94,7 @@ function sections({ worker }) {
   const ask = () => {
     const { axis, at } = state.clip;
     if (axis === undefined) {
-      complain('there is no section; choose an axis of the clipping plane first');
+      complain('no clipping plane is active; choose an axis of the clipping plane first');
       return;
     }
     const place = state.info.box_origin[axis] + at * state.info.box_size[axis];
@@ -115,7 +115,7 @@ function sections({ worker }) {
       forget();
       complain(news.fault);
     } else if (!news.segments) {
-      $('sectionOn').textContent = `Looking: ${Math.round(100 * news.looked / news.of)} %`;
+      $('sectionOn').textContent = `Computing: ${Math.round(100 * news.looked / news.of)} %`;
     } else {
       forget();
       outline = { ...news, share: state.clip.at };
@@ -135,7 +135,7 @@ function showOutline() {
   drawOutline();
 }
 
-/** A section's [u, v] as it is drawn: seen from the axis' upper end, y upwards if it lies in the plane, else -z. */
+/** Returns the drawn position of a section's [u, v]: seen from the axis' upper end, with y upwards, or with -z upwards for a section across y. */
 export const turned = ([u, v], axis) => [[-v, u], [v, -u], [u, v]][axis];
 
 function bounds() {
@@ -170,7 +170,7 @@ function drawOutline() {
   context.stroke();
 }
 
-/** Segments joined where one ends as another begins: lists of [u, v]. */
+/** Joins segments whose end is another segment's beginning. Returns polylines: lists of [u, v]. */
 export function chains(segments) {
   const next = new Map(), key = (i) => `${segments[i]},${segments[i + 1]}`, used = new Set(), out = [], begins = new Set();
   for (let i = 0; i < segments.length; i += 4)
@@ -179,7 +179,7 @@ export function chains(segments) {
   for (let i = 0; i < segments.length; i += 4)
     if (!ends.has(key(i)))
       begins.add(i);
-  for (const first of [...begins, ...Array.from({ length: segments.length / 4 }, (_, i) => 4 * i)]) { // open lines from their beginnings, then loops
+  for (const first of [...begins, ...Array.from({ length: segments.length / 4 }, (_, i) => 4 * i)]) { // open polylines first, from their beginnings, then loops
     if (used.has(first))
       continue;
     const line = [[segments[first], segments[first + 1]]];

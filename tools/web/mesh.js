@@ -1,5 +1,5 @@
-// Stores the received real faces, each once even if several leaves list it, with shared vertices for smooth drawing.
-const CREASE = 0.866;        // cosine: faces at a vertex that differ by more (30 degrees) keep their edge
+// Stores the received real faces, with shared vertices for smooth shading. A face that several leaves list is stored once.
+const CREASE = 0.866;        // cosine of 30 degrees: an edge between faces with a greater angle is drawn sharp
 const NONE = 0xffffffff;
 const EMPTY = new Uint32Array(0);
 
@@ -19,22 +19,25 @@ export class MeshStore {
 
   clear() {
     this.faces = this.vertices = 0;
-    this.byNumber = new Map();            // a face's number in the file: its place here
+    this.byNumber = new Map();            // maps a face's number in the file to its index in this store
     this.number = EMPTY;
-    this.corner = EMPTY;                  // three vertices a face
-    this.next = EMPTY;                    // of a corner: another one at the same vertex
-    this.normal = new Float32Array(0);    // of faces, of length 1 or 0
-    this.angle = new Float32Array(0);     // of corners
-    this.owner = new Int32Array(0);       // the id of the leaf that draws the face
-    this.colour = new Uint8Array(0);      // red, green, blue of corners, if `coloured`
+    this.corner = EMPTY;                  // three vertices of each face
+    this.next = EMPTY;                    // by corner: another corner at the same vertex
+    this.normal = new Float32Array(0);    // by face: the normal, of length 1 or 0
+    this.angle = new Float32Array(0);     // by corner: the face's angle
+    this.owner = new Int32Array(0);       // by face: the id of the leaf that draws the face
+    this.colour = new Uint8Array(0);      // by corner: red, green, blue, if `coloured`
     this.coloured = false;
     this.leafOf = [];                     // by face: a leaf that lists it, which is notified when its normals change
-    this.position = new Float32Array(0);  // of vertices
-    this.last = EMPTY;                    // of vertices: their newest corner
+    this.position = new Float32Array(0);  // by vertex
+    this.last = EMPTY;                    // by vertex: its newest corner
     this.table = new Uint32Array(4096).fill(NONE);
   }
 
-  /** Takes a leaf's faces, nine numbers each in the scene's coordinates, and their colours, if any, nine bytes each. The leaf gets their places, and the sum of their areas as vectors. */
+  /**
+   * Adds a leaf's faces: nine numbers each in the scene's coordinates, and their colours, if any, nine bytes each. Sets the leaf's `mesh`, the indices of the faces,
+   * and `vector`, the sum of their area vectors and the sum of their areas.
+   */
   add(leaf, positions, numbers, colours) {
     this.coloured ||= colours !== undefined;
     const sum = [0, 0, 0, 0];
@@ -55,7 +58,7 @@ export class MeshStore {
       this.colour.set(colours.subarray(at, at + 9), 9 * face);
     for (let k = 0; k < 3; k++) {
       const v = this.corner[c + k] = this.#vertex(x[at + 3 * k], x[at + 3 * k + 1], x[at + 3 * k + 2]);
-      for (let other = this.last[v]; other !== NONE; other = this.next[other]) { // normals there are others now
+      for (let other = this.last[v]; other !== NONE; other = this.next[other]) { // the normals at this vertex have changed
         const neighbour = this.leafOf[Math.floor(other / 3)];
         neighbour.stamp = (neighbour.stamp ?? 0) + 1;
       }
@@ -78,7 +81,7 @@ export class MeshStore {
     this.last = grown(this.last, this.vertices + 3);
   }
 
-  // Vertices with equal positions are one vertex.
+  // Returns the vertex at a position. Vertices with equal positions are one vertex.
   #vertex(x, y, z) {
     if (2 * this.vertices >= this.table.length)
       this.#rehash(2 * this.table.length);
@@ -117,7 +120,7 @@ export class MeshStore {
     }
   }
 
-  // The face's normal, and the angle at each corner.
+  // Computes the face's normal and the angle at each corner.
   #shape(face) {
     const { position, corner, normal, angle } = this, p = [0, 1, 2].map((k) => 3 * corner[3 * face + k]);
     const edge = (a, b) => [position[b] - position[a], position[b + 1] - position[a + 1], position[b + 2] - position[a + 2]];
@@ -140,7 +143,7 @@ export class MeshStore {
     sum[3] += Math.hypot(...n);
   }
 
-  /** The normal at a corner, into `out`: of the faces around its vertex that go on smoothly from this one, by their angles there. */
+  /** Computes the normal at a corner into `out`: the mean, by angles, of the faces around the vertex whose normals differ by at most 30 degrees from this face's. */
   cornerNormal(c, out) {
     const { normal, next, angle } = this, own = 3 * Math.floor(c / 3);
     out[0] = out[1] = out[2] = 0;
@@ -153,7 +156,7 @@ export class MeshStore {
     }
   }
 
-  /** Decides which of some leaves (with ids) draws a face: the one with the least id. Their `owned` shows when that has changed. */
+  /** Assigns each face to the one of `leaves` that draws the face: the leaf with the least id. Sets each leaf's `owned`, and `ownedHash`, which shows a change. */
   share(leaves) {
     const { owner } = this;
     for (const { mesh } of leaves)
@@ -172,7 +175,7 @@ export class MeshStore {
     }
   }
 
-  /** Forgets all faces but those of some leaves; the others have to be fetched again. */
+  /** Removes all faces except those of `leaves`. Removed faces must be fetched again before they are drawn. */
   keep(leaves) {
     const old = leaves.map((leaf) => {
       const numbers = Array.from(leaf.mesh, (face) => this.number[face]), positions = new Float32Array(9 * numbers.length);

@@ -18,7 +18,7 @@ const BEND = `
   }`;
 const LIGHT = 'mix(hue.rgb / 12.92, pow((hue.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, hue.rgb))';
 
-/** A MeshStandardMaterial, lit by the scene's own lights, that knows what the tiles' attributes mean. `parameters`: as its constructor's. */
+/** Returns a MeshStandardMaterial that evaluates the attributes of the tiles and is lit by the scene's lights. `parameters`: as for its constructor. */
 export function standardMaterial(parameters = {}, { low, high, clipping, own } = makeLook().uniforms) {
   const material = new MeshStandardMaterial({ color: '#c9cdd6', roughness: 0.75, metalness: 0, side: DoubleSide, ...parameters });
   material.defaultAttributeValues = NO_HUE;
@@ -36,7 +36,7 @@ export function standardMaterial(parameters = {}, { low, high, clipping, own } =
       if (ebpoClipping && (any(lessThan(ebpoPlace, ebpoLow)) || any(greaterThan(ebpoPlace, ebpoHigh)))) discard;`)
       .replace('#include <color_fragment>', '#include <color_fragment>\nif (ebpoOwn && ebpoHue.r >= 0.0) diffuseColor.rgb = ebpoHue;')
       .replace('#include <normal_fragment_begin>', `#include <normal_fragment_begin>
-      { // where the field of normals says little, the polygon's own
+      { // where the field of normals is weak, the polygon's normal is used
         vec3 flatly = normalize(cross(dFdx(vViewPosition), dFdy(vViewPosition)));
         normal = normalize(mix(flatly, normal, min(ebpoWeight, 1.0)) + 0.0001 * flatly);
       }`);
@@ -49,15 +49,16 @@ const heightOf = (renderer) => (typeof renderer === 'number' ? renderer : render
 
 export class EbpoModel extends Object3D {
   /**
-   * Options (all optional): `worker`, the address of worker.js; `material`, 'standard' (the scene's lights), 'viewer' (as the viewer's page
-   * draws) or one of standardMaterial(); `crew`, workers shared with other models (EbpoGroup has one); `detail`, `level`, `mesh`, `triangles`: as the members of these names.
+   * All options are optional. `worker`: the address of worker.js. `material`: 'standard' (lit by the scene's lights), 'viewer' (shaded as on the viewer's page)
+   * or a result of standardMaterial(). `crew`: workers shared with other models; EbpoGroup has a crew. `detail`, `level`, `mesh`, `triangles`: initial values of
+   * the members with these names.
    */
   constructor({ worker, crew, material = 'standard', detail = PIXELS, level = Infinity, mesh = true, triangles = TRIANGLES_MOST } = {}) {
     super();
     this.type = 'EbpoModel';
     Object.assign(this, { detail, level, mesh, triangles });
     this.info = undefined;                  // the root attributes of the open file, by the format's names
-    this.content = new Group();             // what is drawn, in coordinates of its own
+    this.content = new Group();             // the drawn objects, in the scene's coordinates (cut.js)
     this.content.matrixAutoUpdate = false;
     this.add(this.content);
     this.look = makeLook();
@@ -85,7 +86,7 @@ export class EbpoModel extends Object3D {
     }
   }
 
-  /** Opens an address, a File or a Blob. Resolves to its facts when its head is there; errors have a `code`, and a sentence that says what next. */
+  /** Opens an address, a File or a Blob. Resolves to `info` when the file's header has been read. Errors have a `code`, and a message that says what to do. */
   async load(what) {
     this.tiles.clear();
     this.info = undefined;
@@ -98,13 +99,13 @@ export class EbpoModel extends Object3D {
     return info;
   }
 
-  /** The root cell's box, in this object's coordinates; the model lies within. */
+  /** The box of the root cell, in this object's coordinates. The box contains the model. */
   get box() {
     const { box_origin: low, box_size: size } = this.info;
     return new Box3(new Vector3(...low), new Vector3(...low.map((x, k) => x + size[k])));
   }
 
-  /** Sends the current view to the worker; call it before each frame. `renderer`: the renderer, or the picture's height in CSS pixels. Cheap when nothing has moved. */
+  /** Sends the current view to the worker; call it before each frame. `renderer`: the renderer, or the picture's height in CSS pixels. The call is cheap when nothing has moved. */
   update(camera, renderer) {
     if (!this.info)
       return;
@@ -115,7 +116,7 @@ export class EbpoModel extends Object3D {
       { level: Math.min(level, 99), mesh: faces, pixels: detail, triangles: detail === 0 ? Infinity : triangles, black: this.cut !== undefined, lines: false, cells: false });
   }
 
-  /** Shows only what lies in a Box3 of this object's coordinates; everything if undefined. */
+  /** Shows only the part of the model inside a Box3, in this object's coordinates; undefined shows the whole model. */
   set clip(box) {
     this.cut = box;
     if (!this.info)
@@ -128,13 +129,13 @@ export class EbpoModel extends Object3D {
     return this.cut;
   }
 
-  /** Queries a point (Vector3) of this object's coordinates: { where, distance, nearest, lo, hi, exact }. */
+  /** Queries a point (Vector3) in this object's coordinates: { where, distance, nearest, lo, hi, exact }. */
   async probe(point) {
     const { where, distance, nearest, lo, hi, exact } = await this.client.probe(point.toArray());
     return { where, distance, nearest: nearest && new Vector3(...nearest), lo, hi, exact };
   }
 
-  /** Ends the worker and frees what the graphics card holds. */
+  /** Terminates the worker and frees the memory of the graphics card. */
   dispose() {
     this.client.end();
     this.tiles.clear();
@@ -142,9 +143,9 @@ export class EbpoModel extends Object3D {
   }
 }
 
-/** Several models that share workers and a budget of triangles: each has as much of it as it may fill of the picture. Where they are is up to you. */
+/** Several models that share workers and a budget of triangles. A model's share depends on its size in the picture. The caller places the models. */
 export class EbpoGroup extends Group {
-  /** `triangles`: of all models together, about; `worker`: the address of worker.js; `workers`: how many at most. */
+  /** `triangles`: approximate limit for all models together; `worker`: the address of worker.js; `workers`: the greatest number of workers. */
   constructor({ triangles = TRIANGLES_MOST, worker, workers } = {}) {
     super();
     this.type = 'EbpoGroup';
@@ -152,7 +153,7 @@ export class EbpoGroup extends Group {
     this.crew = new Crew({ ...(worker && { worker }), ...(workers && { most: workers }) });
   }
 
-  /** A new EbpoModel in this group; options as its constructor's. */
+  /** Creates an EbpoModel in this group. `options`: as for its constructor. */
   make(options = {}) {
     const model = new EbpoModel({ ...options, crew: this.crew });
     this.add(model);
@@ -174,7 +175,7 @@ export class EbpoGroup extends Group {
     });
   }
 
-  /** Ends all models, and their workers. */
+  /** Disposes all models and terminates their workers. */
   dispose() {
     this.models.forEach((model) => {
       this.remove(model);

@@ -20,7 +20,7 @@ export async function begin(page) {
   addMeasuring(page);
   const pipeline = scene.pipeline = new Pipeline(kit), pen = addPen(page, pipeline);
   addNotes(page, pen.drawing);
-  pen.begin(); // its section is last, and announces the loaded sections to the others
+  pen.begin(); // its section is the last one; it also notifies the other sections
   addShading(scene, pipeline);
   addSharing(page);
   addCompass(page);

@@ -7,7 +7,7 @@ import { mergedViews, readViews, viewOf, writeViews } from './views.js';
 
 const KEPT = 'Saved with the paint.';
 const HTML = `
-  <div class="row"><button id="noteAdd" class="small" aria-pressed="false" title="Then click the place (N)">Add a note</button><span class="hint" id="noteHint">${KEPT}</span></div>
+  <div class="row"><button id="noteAdd" class="small" aria-pressed="false" title="Then click a point of the model (N)">Add a note</button><span class="hint" id="noteHint">${KEPT}</span></div>
   <form id="noteForm" hidden><input id="noteTitle" type="text" placeholder="Title" aria-label="Title" maxlength="200">
     <textarea id="noteBody" rows="4" placeholder="Text" aria-label="Text" maxlength="16000"></textarea>
     <input id="noteAuthor" type="text" placeholder="Author" aria-label="Author" maxlength="200">
@@ -17,11 +17,11 @@ const HTML = `
   <ul id="views" class="list"></ul>
   <div class="buttons"><button id="viewsOut" class="small" hidden>Save as a file</button><button id="viewsIn" class="small">Open a file …</button></div>
   <input type="file" id="viewsFile" accept=".json" hidden>`;
-const NEAR = 0.35; // how far from a note the camera goes, at least
+const NEAR = 0.35; // least distance of the camera from a note
 
 export function addNotes({ scene, changed, shownAs }, drawing) {
   const details = section('Notes and views', HTML);
-  let shown = [], editing; // { note }, one of the list, or { place }
+  let shown = [], editing; // { note } of the list, or { place } for a new note
   const list = () => drawing().state.notes;
 
   const show = () => {
@@ -70,10 +70,10 @@ export function addNotes({ scene, changed, shownAs }, drawing) {
     const members = { title: cleanText($('noteTitle').value, MOST.title), body: cleanText($('noteBody').value, MOST.body), author: cleanText($('noteAuthor').value, MOST.author), date: today() };
     localStorage.setItem('ebpo:author', members.author);
     try {
-      if (editing.note) { // its number may be another one by now
+      if (editing.note) { // its index may have changed meanwhile
         const number = list().indexOf(editing.note);
         if (number < 0)
-          throw new Error('the note is not there any more; undo brings it back');
+          throw new Error('the note was removed; undo restores it');
         drawing().setNote(number, members);
       } else {
         const { face, weights, place } = editing.place;
@@ -105,7 +105,7 @@ export function addNotes({ scene, changed, shownAs }, drawing) {
     const begin = taken() !== tool;
     take(begin ? tool : undefined);
     button.ariaPressed = String(begin);
-    $('noteHint').textContent = begin ? 'Click the place on the model.' : KEPT;
+    $('noteHint').textContent = begin ? 'Click a point of the model.' : KEPT;
   };
   on('key', (e) => e.key.toLowerCase() === 'n' && button.click());
   on('drawing', show);
@@ -116,7 +116,7 @@ export function addNotes({ scene, changed, shownAs }, drawing) {
   savedViews({ shownAs });
 }
 
-// --- saved views: their addresses, by the model's digest ---
+// --- saved views: stored as addresses, by the model's digest ---
 
 function savedViews({ shownAs }) {
   const key = () => `ebpo:views:${state.info.content_sha256}`, read = () => {
@@ -130,7 +130,7 @@ function savedViews({ shownAs }) {
     try {
       localStorage.setItem(key(), JSON.stringify(list));
     } catch (error) {
-      complain(`the browser does not keep the view (${error.message}); copy its link instead`);
+      complain(`the browser cannot store the view (${error.message}); copy its link instead`);
     }
     show();
   };

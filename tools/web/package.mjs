@@ -1,5 +1,5 @@
-// node package.mjs FOLDER: the npm package "ebpo-viewer" as a folder for npm pack or npm publish: the element, the three.js object and the reader, each as one
-// module with its types, the worker with all that it needs, and a package.json. three.js is not in it. Writes FOLDER, nothing else.
+// node package.mjs FOLDER: writes the npm package "ebpo-viewer" into FOLDER, for npm pack or npm publish; writes no other files. The package contains the
+// element, the three.js object and the reader, each as one module with its types; the worker with its dependencies; and package.json. It does not contain three.js.
 import { copyFileSync, mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { build } from 'esbuild';

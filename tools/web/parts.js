@@ -1,7 +1,7 @@
 // Components of the page's tools: folding sections of the panel, marks over the picture, opening and saving files.
 import { $, on, state, tell } from './state.js';
 
-/** A folding section of the panel, before the statistics. `html` is ours; what users write is only ever set as text. */
+/** Adds a folding section to the panel, before the statistics. `html` must be trusted; texts of users are set only as text content. */
 export function section(title, html, { open = false } = {}) {
   const details = document.createElement('details'), part = document.createElement('section'), summary = document.createElement('summary');
   summary.textContent = title;
@@ -12,7 +12,7 @@ export function section(title, html, { open = false } = {}) {
   return details;
 }
 
-/** An element with text, which may be a user's. */
+/** Creates an element with text, which may come from a user. */
 export function make(name, text, members = {}) {
   const element = Object.assign(document.createElement(name), members);
   element.textContent = text;
@@ -22,7 +22,9 @@ export function make(name, text, members = {}) {
 // --- routing of clicks on the model ---
 
 let tool;
-/** One tool at a time: { click(point), end() }; `end` is called when another one takes its place, or Escape. Nothing: clicks ask about points again. */
+/**
+ * Activates a tool { click(point), end() } and ends the active one; the key Escape ends it, too. Without a tool, clicks query points.
+ */
 export function take(next) {
   const last = tool;
   tool = undefined;
@@ -39,7 +41,7 @@ on('closed', () => take());
 
 const marks = [];
 let project;
-/** `scene` computes the positions of points. */
+/** Creates the elements for marks. `scene` projects points to the page. */
 export function markOn(scene) {
   project = (point) => scene.project(point);
   const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg'), pins = document.createElement('div');
@@ -50,7 +52,10 @@ export function markOn(scene) {
   on('frame', placeMarks);
 }
 
-/** `points`: in the scene; `place(positions, element)` receives their positions on the page; the mark is hidden while one of them is behind the eye. Returns a function that takes the mark away. */
+/**
+ * Adds a mark at `points` of the scene. `place(positions, element)` receives their positions on the page. The mark is hidden while one of the points is behind the
+ * camera. Returns a function that removes the mark.
+ */
 export function mark(element, points, place) {
   const it = { element, points, place };
   $(element instanceof SVGElement ? 'lines' : 'pins').append(element);
@@ -88,17 +93,17 @@ export function save(name, bytes, type) {
   setTimeout(() => URL.revokeObjectURL(a.href), 10000);
 }
 
-/** The open file's name without what EBP-Octree files end with. */
+/** Returns the open file's name without the suffixes .ebpo.h5 and .h5. */
 export const modelName = () => (state.shownName ?? 'model').replace(/(\.ebpo)?\.h5$/, '');
 
-// --- what the worker is asked and answers ---
+// --- queries to the worker ---
 
 const waiting = new Map();
 let asks = 0;
-/** The nearest places on the faces to some points of the model: [{ face, weights, place, normal, distance }]. */
+/** Resolves to the nearest positions on the faces for points of the model: [{ face, weights, place, normal, distance }]. */
 export const placesOf = (worker, points) => ask(worker, 'places', points);
 
-/** Returns the faces that points of paint cover, from reachOf() of reach.js. */
+/** Resolves to the faces that points of paint cover: the result of reachOf() of reach.js. */
 export const reachOf = (worker, points) => ask(worker, 'reach', points);
 
 function ask(worker, type, points) {

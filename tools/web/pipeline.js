@@ -3,7 +3,7 @@
 import { Ambient, SMOOTHED } from './ambient.js';
 
 const FLOAT = 1015, HALF_FLOAT = 1016; // three.js' constants
-const SAMPLES = 4; // of a pixel; without a graphics card they would cost most of the time
+const SAMPLES = 4; // samples of a pixel; not used without a graphics card, because they would take most of the time
 
 function isSoftware(gl) {
   const names = gl.getExtension('WEBGL_debug_renderer_info');
@@ -14,7 +14,7 @@ const VERTEX = 'void main() { gl_Position = vec4(position.xy, 0.0, 1.0); }';
 const FRAGMENT = `
   uniform sampler2D picture, depths, paint;
   uniform vec2 size, nearFar;
-  uniform float strength, plain; // of the shading; luminance of the model's plain colour
+  uniform float strength, plain; // strength of the shading by depth; luminance of the model's plain colour
   uniform bool painted, surrounded;
   float away(vec2 at) {
     float z = texture2D(depths, at).r;
@@ -49,10 +49,10 @@ const STRENGTH = 9;
 const UNIFORMS = ['picture', 'depths', 'paint', 'size', 'nearFar', 'strength', 'plain', 'painted', 'ambient', 'surrounded'];
 
 export class Pipeline {
-  /** `kit`: of scene.js. */
+  /** `kit`: as exported by scene.js. */
   constructor(kit) {
     this.kit = kit;
-    this.dome = this.surroundings = false; // what is asked for: shading by depth, ambient occlusion
+    this.dome = this.surroundings = false; // enabled effects: shading by depth, ambient occlusion
     this.layers = undefined; // { render(renderer, camera, depths, size) -> texture or undefined }
     this.material = new kit.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, depthTest: false, depthWrite: false, transparent: true, blending: 0,
       premultipliedAlpha: true, defines: { RADIUS: '1.6' }, uniforms: Object.fromEntries(UNIFORMS.map((name) => [name, { value: null }])) });
@@ -60,7 +60,7 @@ export class Pipeline {
     this.ambient = new Ambient(kit, (material) => this.#over(material));
   }
 
-  // A scene of one triangle that covers the picture.
+  // Returns a scene with one triangle that covers the picture.
   #over(material) {
     const { kit } = this, scene = new kit.Scene(), geometry = (this.geometry ??= new kit.BufferGeometry().setAttribute('position',
       new kit.BufferAttribute(Float32Array.of(-1, -1, 0, 3, -1, 0, -1, 3, 0), 3))), triangle = new kit.Mesh(geometry, material);
@@ -91,7 +91,7 @@ export class Pipeline {
     this.samples ??= isSoftware(renderer.getContext()) ? 0 : SAMPLES;
     this.target ??= new kit.WebGLRenderTarget(size.x, size.y, { samples: this.samples, type: HALF_FLOAT, depthTexture: new kit.DepthTexture(size.x, size.y, FLOAT) });
     const { probe } = scene, marked = probe.visible;
-    probe.visible = false; // is drawn over all of it
+    probe.visible = false; // the probe is drawn over the effects
     renderer.setRenderTarget(this.target);
     renderer.clear();
     renderer.render(scene.scene, camera);

@@ -1,19 +1,19 @@
 // The queried point: its coordinates, result and marker.
 import { $, length, state, tell, toScene } from './state.js';
 
-let picture, questions;
+let picture, queries;
 
 /** `scene` shows the marker, `worker` evaluates the query. */
 export function probeWith(scene, worker) {
   picture = scene;
-  questions = worker;
+  queries = worker;
 }
 
 /** Queries a point of the model. Without a point, clears the last query. */
 export function probeAt(point) {
   state.probe = point && { point, pending: true };
   if (point)
-    questions.postMessage({ type: 'probe', opening: state.opening, point });
+    queries.postMessage({ type: 'probe', opening: state.opening, point });
   probeShown();
   tell('point');
 }
@@ -40,7 +40,7 @@ export function probeShown() {
   $('where').className = p.solid ? p.where : 'maybe';
   $('whereNote').textContent = !p.solid ? 'the model is a surface, not a solid'
     : p.exact ? 'exact'
-    : p.where === 'maybe' ? (p.done ? `levels 0–${p.depth} do not say; the file has no mesh` : 'asking the leaf …')
+    : p.where === 'maybe' ? (p.done ? `not decided by levels 0–${p.depth}; the file has no mesh` : 'querying the leaf …')
     : `certain by levels 0–${p.depth}`;
   if (p.exact) {
     $('distance').textContent = length(p.where === 'on' ? 0 : p.distance, 7);
@@ -52,7 +52,7 @@ export function probeShown() {
 }
 
 ['px', 'py', 'pz'].forEach((id, k) => {
-  $(id).onchange = () => { // the other coordinates keep the digits that are not shown
+  $(id).onchange = () => { // the other coordinates keep their digits beyond the displayed ones
     const point = [...state.probe.point], x = Number($(id).value);
     point[k] = x;
     if ($(id).value.trim() && Number.isFinite(x))

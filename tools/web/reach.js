@@ -1,11 +1,11 @@
-// Computes in the worker which faces a point of paint covers (format-spec/paint.md, section 4): the faces connected with its own face within its ball.
+// Computes in the worker which faces a point of paint covers (format-spec/paint.md, section 4): the faces that are connected with the point's face inside the ball.
 import { GRAY, LEAF, cellNear, growForQuestion, nearestOnTriangle } from './reader/index.js';
 
-const FACES_MOST = 100_000;   // around a point; beyond that the picture shows its ball
-const LEAVES_MOST = 20_000, LEAVES_AT_ONCE = 1024; // a ball may be as large as the model, which is not fetched for it
-const OFF = 2 ** -20;         // of the diagonal: so far a place may be from its face
+const FACES_MOST = 100_000;   // around a point; with more faces the whole ball is coloured
+const LEAVES_MOST = 20_000, LEAVES_AT_ONCE = 1024; // a ball may be as large as the model; the limit avoids fetching the whole model
+const OFF = 2 ** -20;         // greatest distance of a position from its face, in diagonals
 
-// The leaves whose cells come within a distance of a point; 'elsewhere' if a subset has left out some of them, 'many' if they are too many.
+// Returns the leaves whose cells are within a distance of a point; 'elsewhere' when the file is a subset without some of them, 'many' when they are too many.
 async function leavesAround(file, tree, point, distance) {
   const leaves = [], meets = (node) => (node.type === GRAY || node.type === LEAF) && cellNear(tree, node, point) <= distance;
   for (let nodes = [tree.root].filter(meets); nodes.length;) {
@@ -24,7 +24,7 @@ async function leavesAround(file, tree, point, distance) {
   return leaves;
 }
 
-// All faces that may meet a ball, each once: { numbers, corners: [nine numbers each] }; or 'elsewhere' or 'many', as above.
+// Returns all faces that may intersect a ball, each once: { numbers, corners: [nine numbers each] }; or 'elsewhere' or 'many', as leavesAround() does.
 async function facesAround(file, tree, point, radius) {
   const corners = new Map(), leaves = await leavesAround(file, tree, point, radius);
   if (!Array.isArray(leaves))
@@ -61,7 +61,7 @@ function segmentWithin(centre, square, p, q) {
   return holds(centre, square, [0, 1, 2].map((k) => a[k] + t * e[k]));
 }
 
-/** Of faces (nine numbers each), by their places in the list: those that hang together with one of them, `own`, within a ball. Ascending. */
+/** Returns the indices of the faces that are connected with the face `own` inside a ball, ascending. `faces`: nine numbers each. */
 export function hangTogether(faces, own, centre, radius) {
   const square = radius * radius, places = new Map(), root = faces.map((_, i) => i), edges = new Map();
   const setOf = (i) => {
@@ -76,7 +76,7 @@ export function hangTogether(faces, own, centre, radius) {
       const next = (c + 1) % 3;
       if (within[c])
         join(places, keys[c], i);
-      if (!within[c] && !within[next] && segmentWithin(centre, square, p[c], p[next])) // with an end within they are joined there
+      if (!within[c] && !within[next] && segmentWithin(centre, square, p[c], p[next])) // an edge with an end inside the ball is joined at this end
         join(edges, [keys[c], keys[next]].sort().join(' '), i);
     }
   });
@@ -85,24 +85,27 @@ export function hangTogether(faces, own, centre, radius) {
 }
 
 /**
- * Of points [{ face, place, radius }], `face` as paint files number it: [{ here, normal, faces }]. `here`: 'yes'; 'no', the named face is not where the point is; 'elsewhere', a
- * subset has left it out, or some of what is around it. `faces` (nine numbers each): of the reach, only where the ball meets others as well, which are not to be coloured; undefined
- * where the ball alone says it, or where there are too many. A radius of 0 asks for the face alone.
+ * Computes the covered faces of points [{ face, place, radius }]: [{ here, normal, faces }]. `face` is the number that paint files use.
+ *
+ * `here`: 'yes'; 'no' when the named face is not at the point; 'elsewhere' when the file is a subset without the face or without faces near it.
+ *
+ * `faces` (nine numbers each): the covered faces, when the ball also intersects faces that are not covered. `faces` is undefined when all faces in the ball are
+ * covered, when there are too many faces, and for a radius of 0.
  */
 export async function reachOf(file, tree, points) {
   const { info } = file, tolerance = OFF * Math.hypot(...info.box_size), subset = Boolean(info.subset_of), bySource = info.parts.has('maps'), out = [];
   for (const { face, place, radius } of points) {
     let around = await facesAround(file, tree, place, Math.max(radius, tolerance));
     const crowded = around === 'many';
-    if (crowded) // the face is near its place, whatever else the ball meets
+    if (crowded) // a smaller ball suffices to find the face
       around = await facesAround(file, tree, place, tolerance);
     const names = !around.numbers?.length ? [] : bySource ? await file.sourceFaces(Uint32Array.from(around.numbers)) : around.numbers, own = names.indexOf(face);
     if (own < 0 || !(nearestOnTriangle(place, around.corners[own], 0)[0] <= tolerance)) {
       out.push({ here: subset && own < 0 ? 'elsewhere' : 'no' });
       continue;
     }
-    const reach = crowded || !(radius > 0) ? undefined : hangTogether(around.corners, own, place, radius), met = reach && around.corners.filter((f) => nearestOnTriangle(place, f, 0)[0] <= radius);
-    const alone = reach && met.length > reach.filter((i) => nearestOnTriangle(place, around.corners[i], 0)[0] <= radius).length;
+    const reach = crowded || !(radius > 0) ? undefined : hangTogether(around.corners, own, place, radius), inBall = reach && around.corners.filter((f) => nearestOnTriangle(place, f, 0)[0] <= radius);
+    const alone = reach && inBall.length > reach.filter((i) => nearestOnTriangle(place, around.corners[i], 0)[0] <= radius).length;
     out.push({ here: 'yes', normal: normalOf(around.corners[own]), faces: alone ? Float64Array.from(reach.flatMap((i) => [...around.corners[i]])) : undefined });
   }
   return out;

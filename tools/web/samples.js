@@ -2,7 +2,7 @@
 import { bytes } from './line.js';
 import { $, count } from './state.js';
 
-/** Shows the list at an address; `open(url)` is called for one that is chosen. */
+/** Shows the list at an address. Calls `open(url)` for a chosen sample. */
 export async function listSamples(address, open) {
   const list = await (await fetch(address)).json();
   $('samples').hidden = list.length === 0;
@@ -10,7 +10,7 @@ export async function listSamples(address, open) {
     const li = document.createElement('li'), a = document.createElement('a'), small = document.createElement('small');
     const url = new URL(scene ?? file, new URL(address, location.href)).href;
     a.href = `?${scene ? 'scene' : 'file'}=${encodeURIComponent(url)}`;
-    if (!scene) // which is a page of its own
+    if (!scene) // a scene opens on a separate page
       a.onclick = (e) => {
         e.preventDefault();
         open(url);

@@ -1,18 +1,18 @@
-// The picture: tiles from the worker, the camera, clipping and the probe's marker. Drawn only after a change.
+// The picture: tiles from the worker, the camera, clipping and the probe's marker. It is drawn only after a change.
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { Tiles, lookOf, makeLook, setCut, setTheme } from './shade.js';
 
-/** For code that is loaded later, which must not load another copy of three.js. */
+/** Classes of three.js for code that is loaded later and must not load a second copy of three.js. */
 export const kit = { InstancedBufferAttribute: THREE.InstancedBufferAttribute, InstancedBufferGeometry: THREE.InstancedBufferGeometry, BufferAttribute: THREE.BufferAttribute,
   BufferGeometry: THREE.BufferGeometry, Color: THREE.Color, DepthTexture: THREE.DepthTexture, Frustum: THREE.Frustum, Group: THREE.Group, InstancedMesh: THREE.InstancedMesh,
     Matrix4: THREE.Matrix4, Mesh: THREE.Mesh, Scene: THREE.Scene, ShaderMaterial: THREE.ShaderMaterial, Sphere: THREE.Sphere,
   Vector2: THREE.Vector2, Vector3: THREE.Vector3, WebGLRenderTarget: THREE.WebGLRenderTarget };
 
-const TURN = Math.PI / 24, MOVE = 0.06; // of keys: radians, and shares of the distance
+const TURN = Math.PI / 24, MOVE = 0.06; // steps of the keys: radians, and shares of the distance
 
 export class Scene {
-  /** `changed()` is called when the camera moved, `drawn(ms)` after each frame. */
+  /** Calls `changed()` when the camera has moved, and `drawn(ms)` after each frame. */
   constructor(canvas, { context, contextOptions, fieldOfView }, { changed, drawn }) {
     this.canvas = canvas;
     this.drawn = drawn;
@@ -33,7 +33,7 @@ export class Scene {
     this.look = makeLook();
     this.uniforms = this.look.uniforms;
     this.tiles = new Tiles(this.scene, this.look);
-    this.pipeline = undefined; // { render(scene), resize(scene) } draws in place of the plain way
+    this.pipeline = undefined; // { render(scene), resize(scene) } draws instead of the renderer, if present
     this.#warmUp();
     this.#makeProbe();
     this.observer = new ResizeObserver(() => this.resize());
@@ -42,7 +42,7 @@ export class Scene {
     this.home();
   }
 
-  // The program is made while the model is on its way, by a triangle without area.
+  // Draws a triangle without area, so that the shaders are compiled while the model is being fetched.
   #warmUp() {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(9), 3));
@@ -66,7 +66,7 @@ export class Scene {
     this.scene.add(this.probe);
   }
 
-  /** Shows the probe at a point and, if known, the nearest point of the surface; nothing without a point. Scene coordinates. */
+  /** Shows the probe at a point and, if known, at the nearest point of the surface, both in scene coordinates. Hides the probe without a point. */
   showProbe(point, nearest, tint = '#ffb020') {
     this.probe.visible = Boolean(point);
     if (point) {
@@ -96,7 +96,7 @@ export class Scene {
     this.redraw();
   }
 
-  /** The size of panels at the right and the bottom, in pixels: the model is centred in the rest. */
+  /** Sets the size of the panels at the right and at the bottom, in pixels. The model is centred in the rest of the page. */
   setInsets(right, bottom) {
     this.insets = [right, bottom];
     this.#offset();
@@ -109,7 +109,7 @@ export class Scene {
     this.camera.updateProjectionMatrix();
   }
 
-  /** A view of everything. */
+  /** Moves the camera so that everything is visible. */
   home() {
     const { clientWidth: w, clientHeight: h } = this.canvas.parentElement, [right, bottom] = this.insets ?? [0, 0];
     const narrow = Math.min(h - bottom, w - right) / Math.max(h, 1), distance = 0.98 / Math.sin(this.camera.fov * Math.PI / 360) / Math.max(narrow, 0.25);
@@ -126,7 +126,7 @@ export class Scene {
     this.controls.update();
   }
 
-  /** By keys: [right, up] turns around what is looked at, or moves it if `move`; a number is a factor of the distance. */
+  /** Moves the camera by keys. `by`: [right, up] turns around the target, or with `move` moves the target; a number is a factor of the distance. */
   steer(by, move) {
     const { target, minDistance, maxDistance } = this.controls, offset = this.camera.position.clone().sub(target), distance = offset.length();
     if (typeof by === 'number') {
@@ -143,7 +143,7 @@ export class Scene {
     this.place = { eye: offset.add(target).toArray(), target: target.toArray() };
   }
 
-  /** What is looked at, and from where. */
+  /** The camera: { eye, target }. */
   get place() {
     return { eye: this.camera.position.toArray(), target: this.controls.target.toArray() };
   }
@@ -165,7 +165,7 @@ export class Scene {
     this.showProbe();
   }
 
-  /** All changes of one pass together. */
+  /** Applies all changes of one pass together. */
   setTiles(set, removed) {
     this.scene.remove(this.warm);
     this.tiles.set(set, removed);
@@ -186,13 +186,13 @@ export class Scene {
     this.redraw();
   }
 
-  /** Whether faces and envelopes show the model's colours in plain colouring. */
+  /** `own`: true when faces and envelopes show the model's colours in plain colouring. */
   setOwnColours(own) {
     this.uniforms.own.value = own;
     this.redraw();
   }
 
-  /** Shows what lies between two corners; everything without them. */
+  /** Shows only the box between two corners; everything without corners. */
   setCut(low, high) {
     this.cut = low && { low, high };
     setCut(this.look, low, high);
@@ -208,28 +208,28 @@ export class Scene {
     this.redraw();
   }
 
-  /** The point seen at a pixel, in scene coordinates: on the surface drawn, or where the ray comes into what is shown if that is inside a body. */
+  /** Returns the visible point at a pixel, in scene coordinates: on the drawn surface, or on the section where the ray enters the visible box inside a body. */
   pick(x, y) {
     const box = this.canvas.getBoundingClientRect(), ray = new THREE.Raycaster();
     ray.setFromCamera(new THREE.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height), this.camera);
-    const found = pickAlong(ray, (this.others ?? this.tiles).meshes, this.cut); // `others`: several models, in place of the one
+    const found = pickAlong(ray, (this.others ?? this.tiles).meshes, this.cut); // `others`: several models instead of one
     this.picked = found?.hit;
-    this.pickedCut = found?.onCut ?? false; // not on the surface, but where a body is cut
+    this.pickedCut = found?.onCut ?? false; // the point is on the section, not on the surface
     return found?.point;
   }
 
-  /** How many pixels of the page a length of 1 is at a point. */
+  /** Returns the size of a length of 1 at a point, in pixels of the page. */
   pixelsAt(point) {
     return this.canvas.clientHeight / (2 * Math.tan(this.camera.fov * Math.PI / 360)) / Math.max(1e-6, this.camera.position.distanceTo(new THREE.Vector3(...point)));
   }
 
-  /** Where a point of the scene is on the page: [x, y], or undefined behind the camera. */
+  /** Returns the position [x, y] on the page of a point of the scene; undefined for a point behind the camera. */
   project(point) {
     const p = new THREE.Vector3(...point).project(this.camera), { clientWidth: w, clientHeight: h } = this.canvas;
     return p.z < 1 ? [(p.x + 1) / 2 * w, (1 - p.y) / 2 * h] : undefined;
   }
 
-  /** Frees what the graphics card holds. */
+  /** Frees the memory of the graphics card. */
   end() {
     this.observer.disconnect();
     cancelAnimationFrame(this.asked);
@@ -246,7 +246,7 @@ export class Scene {
 
   #draw() {
     this.asked = undefined;
-    this.controls.update(); // damping asks for the next frame
+    this.controls.update(); // damping requests the next frame
     const distance = this.camera.position.length();
     this.camera.near = Math.max(0.0005, (distance - 1.05) * 0.5);
     this.camera.far = distance + 1.5;
@@ -265,7 +265,7 @@ export class Scene {
   }
 }
 
-// In the world, of any length: of an instance its mesh' normal is turned.
+// Returns the normal of a hit in world coordinates, of any length. The normal of an instance is rotated by the instance's matrix.
 function normalOf({ face, object, instanceId }) {
   if (instanceId === undefined)
     return face.normal;

@@ -1,7 +1,7 @@
 // Shades faces, envelopes and lines, and converts tiles from the worker to meshes, for the viewer's pages and for other three.js scenes.
 import * as THREE from 'three';
 
-// By node type (white, black, leaf, gray) and for real faces; by level from coarse to fine.
+// Colours by node type (white, black, leaf, gray), of real faces, and by level from coarse to fine.
 export const TYPE_COLOURS = ['#ffffff', '#52525b', '#2f9e8f', '#7c8db5'];
 export const MESH_COLOUR = '#d9b48f';
 export const LEVEL_COLOURS = ['#3d2c6b', '#473f8c', '#4257a0', '#3a6fa8', '#3387aa', '#319ea6', '#3fb49b', '#62c88a', '#93d975', '#c6e564', '#f2e960',
@@ -10,15 +10,15 @@ export const LEVEL_COLOURS = ['#3d2c6b', '#473f8c', '#4257a0', '#3a6fa8', '#3387
 const VERTEX = `
   attribute vec4 tag;
   attribute vec2 bend;
-  attribute vec4 hue; // of the model, sRGB; the last one is 1 where there is none
+  attribute vec4 hue; // the model's colour, sRGB; the last component is 1 where there is no colour
   varying vec3 eyeSpace;
   varying vec3 scenePlace;
   varying vec3 colour;
   varying vec3 lent;
   varying float turned;
   flat varying int kind;
-  uniform int colouring, chosen; // chosen: which instance stands out
-  uniform bool own; // the model's colours rather than the plain one
+  uniform int colouring, chosen; // chosen: the highlighted instance
+  uniform bool own; // use the model's colours instead of the plain colour
   uniform vec3 plain, mesh, accent, types[4], levels[21];
   void main() {
     kind = int(tag.y + 0.5) & 3;
@@ -28,7 +28,7 @@ const VERTEX = `
     vec4 placed = vec4(position, 1.0);
     #ifdef USE_INSTANCING
       placed = instanceMatrix * placed;
-      n = mat3(instanceMatrix) * n; // which turns and scales
+      n = mat3(instanceMatrix) * n; // rotates and scales
     #endif
     vec4 at = modelViewMatrix * placed;
     eyeSpace = at.xyz;
@@ -37,7 +37,7 @@ const VERTEX = `
     turned = face ? 1.0 : 0.0;
     colour = colouring == 0 ? plain : colouring == 1 ? levels[int(tag.x + 0.5)] : face ? mesh : types[kind];
     if (own && colouring == 0 && hue.w < 0.5)
-      colour = mix(hue.rgb / 12.92, pow((hue.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, hue.rgb)); // as light
+      colour = mix(hue.rgb / 12.92, pow((hue.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, hue.rgb)); // linear light
     #ifdef USE_INSTANCING
       if (gl_InstanceID == chosen) colour = mix(colour, accent, 0.55);
     #endif
@@ -49,23 +49,23 @@ const FRAGMENT = `
   varying vec3 scenePlace;
   varying vec3 colour;
   varying vec3 lent;
-  varying float turned; // 1 for faces, whose back is lit from there; that of an envelope is seen through cracks only
+  varying float turned; // 1 for real faces, whose back is lit like the front; the back of an envelope is visible only through cracks
   flat varying int kind;
-  uniform vec3 low, high; // what is shown
+  uniform vec3 low, high; // the visible box
   uniform bool clipping;
   uniform vec3 section, sky, ground;
   void main() {
     if (clipping && (any(lessThan(scenePlace, low)) || any(greaterThan(scenePlace, high)))) discard;
-    if (clipping && kind == 1 && gl_FrontFacing) discard; // what is full inside shows where it is cut only
+    if (clipping && kind == 1 && gl_FrontFacing) discard; // black nodes are visible only where they are cut
     vec3 toEye = normalize(-eyeSpace), flatly = cross(dFdx(eyeSpace), dFdy(eyeSpace));
-    float size = dot(flatly, flatly); // nothing to go by on slivers below a pixel
+    float size = dot(flatly, flatly); // zero or invalid on triangles smaller than a pixel
     vec3 n = size > 0.0 && size < 1.0 ? flatly * inversesqrt(size) : toEye;
     float weight = min(length(lent), 1.0);
     vec3 smoothly = lent * (gl_FrontFacing ? 1.0 : -1.0);
     n = normalize(mix(n, smoothly / max(weight, 0.001), weight) + 0.0001 * toEye);
-    if (!gl_FrontFacing && turned < 0.5) n = normalize(lent + toEye); // neither darker nor lighter than what is around the crack
+    if (!gl_FrontFacing && turned < 0.5) n = normalize(lent + toEye); // as bright as the surface around the crack
     n = normalize(n + toEye * max(0.0, 0.15 - dot(n, toEye)));
-    if (!gl_FrontFacing && clipping) { // the back of a closed body seen through the cut: fills the section
+    if (!gl_FrontFacing && clipping) { // the back of a closed body, visible through the cut, fills the section
       float hatch = abs(fract((gl_FragCoord.x + gl_FragCoord.y) / 9.0) - 0.5) < 0.07 ? 0.82 : 1.0;
       gl_FragColor = vec4(mix(section, colour, 0.22) * hatch, 1.0);
     } else {
@@ -81,7 +81,7 @@ const FRAGMENT = `
 
 const LINE_FRAGMENT = `
   varying vec3 scenePlace;
-  uniform vec3 low, high; // what is shown
+  uniform vec3 low, high; // the visible box
   uniform bool clipping;
   uniform vec3 line;
   uniform float opacity;
@@ -99,7 +99,7 @@ const LINE_VERTEX = `
 
 const colour = (text) => new THREE.Color(text);
 
-/** Materials and what they share: { uniforms, faces, wire, cells }. Coordinates are those of the scene (cut.js). */
+/** Returns materials and their shared uniforms: { uniforms, faces, wire, cells }. Coordinates are those of the scene (cut.js). */
 export function makeLook() {
   const uniforms = {
     colouring: { value: 0 }, own: { value: true }, plain: { value: colour('#c9cdd6') }, mesh: { value: colour(MESH_COLOUR) }, chosen: { value: -1 }, accent: { value: colour('#e8784f') },
@@ -114,7 +114,7 @@ export function makeLook() {
   return { uniforms, faces, wire: lines('#0b0d12', 0.55), cells: lines('#4cc2ff', 0.35) };
 }
 
-export const NO_HUE = { hue: [0, 0, 0, 1] }; // of tiles without
+export const NO_HUE = { hue: [0, 0, 0, 1] }; // for tiles without colours
 
 export function setTheme({ uniforms, wire, cells }, dark) {
   uniforms.plain.value.set(dark ? '#bcc3cf' : '#b9bfca');
@@ -124,7 +124,7 @@ export function setTheme({ uniforms, wire, cells }, dark) {
   cells.uniforms.line.value.set(dark ? '#5cc8ff' : '#0a6fb8');
 }
 
-/** Shows what lies between two corners; everything without them. */
+/** Shows only the box between two corners; everything without corners. */
 export function setCut({ uniforms }, low, high) {
   uniforms.clipping.value = Boolean(low);
   if (low) {
@@ -133,7 +133,7 @@ export function setCut({ uniforms }, low, high) {
   }
 }
 
-/** What the worker needs to choose nodes, for a picture of `height` pixels; `placed` is where the scene's coordinates are in the camera's world. */
+/** Returns the view with which the worker chooses nodes, for a picture of `height` pixels. `placed`: the matrix from the scene's coordinates to the camera's world. */
 export function lookOf(camera, height, placed) {
   camera.updateMatrixWorld();
   const toCamera = new THREE.Matrix4().multiplyMatrices(camera.matrixWorldInverse, placed), frustum = new THREE.Frustum();
@@ -141,13 +141,13 @@ export function lookOf(camera, height, placed) {
   const back = toCamera.clone().invert(), scale = toCamera.getMaxScaleOnAxis(), away = camera.isOrthographicCamera ? ORTHOGRAPHIC_AWAY : 0;
   return {
     eye: new THREE.Vector3(0, 0, away / scale).applyMatrix4(back).toArray(),
-    planes: frustum.planes.filter((_, i) => i !== 4 && i !== 5).map((p) => [...p.normal.toArray(), p.constant]), // near and far follow the model
+    planes: frustum.planes.filter((_, i) => i !== 4 && i !== 5).map((p) => [...p.normal.toArray(), p.constant]), // without near and far, which depend on the model
     pixels: camera.projectionMatrix.elements[5] * height / 2 * (away || 1),
   };
 }
-const ORTHOGRAPHIC_AWAY = 1000; // as if seen from very far
+const ORTHOGRAPHIC_AWAY = 1000; // distance of the eye that stands for an orthographic camera
 
-/** The worker's tiles as meshes below `parent`; `make(geometry, material)` makes another kind of mesh. */
+/** Converts the worker's tiles to meshes below `parent`. `make(geometry, material)` creates a mesh; the default is a THREE.Mesh. */
 export class Tiles {
   constructor(parent, { faces, wire, cells }, make = (geometry, material) => new THREE.Mesh(geometry, material)) {
     Object.assign(this, { parent, faces, wire, cells, make });
@@ -155,9 +155,9 @@ export class Tiles {
     this.walls = true;
   }
 
-  /** All changes of one pass together, so that no gap is ever seen. */
+  /** Applies all changes of one pass together, so that no gap becomes visible. */
   set(set, removed) {
-    this.faces.polygonOffset = set.some((t) => t.lines) || (this.faces.polygonOffset && !set.length); // for lines only: steep walls would sink into cracks
+    this.faces.polygonOffset = set.some((t) => t.lines) || (this.faces.polygonOffset && !set.length); // only with lines, because the offset would move steep cell faces into cracks
     removed.forEach((key) => this.#remove(key));
     for (const t of set) {
       this.#remove(t.key);
@@ -221,7 +221,7 @@ export class Tiles {
     this.byKey.forEach((tile) => this.#range(tile));
   }
 
-  /** Of what is drawn, for a THREE.Raycaster. */
+  /** The visible meshes, for a THREE.Raycaster. */
   get meshes() {
     return [...this.byKey.values()].filter((t) => t.mesh.visible).map((t) => t.mesh);
   }

@@ -1,13 +1,13 @@
-// The switch of shading by depth, and the style of all that the page loads later.
+// The switches for shading by depth and ambient occlusion, and the style of modules that are loaded later.
 import { $, on } from './state.js';
 
-/** When the style of what comes later is there. */
+/** Resolves when more.css is loaded. */
 export const styled = () => new Promise((done) => {
   const link = Object.assign(document.createElement('link'), { rel: 'stylesheet', href: new URL('more.css', import.meta.url).href, onload: done, onerror: done });
   document.head.append(link);
 });
 
-/** The switches of shading by depth and of ambient occlusion; `pipeline` draws them. */
+/** Adds the switches for shading by depth and ambient occlusion, which `pipeline` draws. */
 export function addShading(scene, pipeline) {
   let last = $('cells').closest('label');
   for (const [id, name, key, member] of [['dome', 'Shade by depth', 'E', 'dome'], ['ambient', 'Ambient occlusion', 'A', 'surroundings']]) {

@@ -2,22 +2,22 @@
 import { boxOf, boxText, cameraOf, cameraText, clipOf, clipText, pointsOf, pointsText, withQuery } from './address.js';
 import { $, state } from './state.js';
 
-const LATER_MS = 300; // browsers refuse when addresses change too often
+const LATER_MS = 300; // browsers reject changes of the address that are too frequent
 const OF_A_VIEW = ['view', 'level', 'clip', 'box', 'point', 'measure', 'colour', 'walls', 'detail'];
 
-const files = []; // from disk, by their number in the history's entries
+const files = []; // files from disk, by their number in the history's entries
 let timer, home, picture;
 
 export function shareOf(scene) {
   picture = scene;
 }
 
-/** The camera is where it is when nobody has moved it. */
+/** Takes the current camera as the default, which the address omits. */
 export function atHome() {
   home = cameraText(picture.place);
 }
 
-/** Another file, named by its address or as a File, or none: a step of the history. */
+/** Adds a step to the history: another file, by its address or as a File, or no file. */
 export function went(what) {
   clearTimeout(timer);
   timer = undefined;
@@ -27,20 +27,23 @@ export function went(what) {
     history.pushState({ local }, '', href);
 }
 
-/** What an entry of the history is about: an address, a File or nothing. */
+/** Returns the file of an entry of the history: an address, a File or undefined. */
 export const whereTo = (query, entry) => (entry?.local !== undefined ? files[entry.local] : query.get('file') ?? undefined);
 
-/** What an address says, of the open file: { camera, level, clip, box, point, measured, colouring, walls, detail }; members that it does not name are undefined. */
+/**
+ * Returns the parameters of an address about the open file: { camera, level, clip, box, point, measured, colouring, walls, detail }. Missing parameters are undefined,
+ * except for the last three, which have defaults.
+ */
 export function said(query) {
   const one = (name) => pointsOf(query.get(name))?.[0], level = query.get('level');
   return { camera: cameraOf(query.get('view')), level: /^\d+$/.test(level ?? '') ? Number(level) : undefined, clip: clipOf(query.get('clip')), box: boxOf(query.get('box')),
     point: one('point'), measured: pointsOf(query.get('measure')), colouring: query.get('colour') ?? 'plain', walls: query.get('walls') !== '0', detail: query.get('detail') ?? 'auto' };
 }
 
-/** The address of what is shown now. */
+/** Returns the address of the current view. */
 export function address() {
   const i = state.info, diagonal = Math.hypot(...i.box_size), view = cameraText(picture.place), chosen = (name) => document.querySelector(`input[name=${name}]:checked`).value;
-  const points = (list) => (list?.length ? pointsText(list, diagonal) : undefined), unless = (value, usual) => (value === usual ? undefined : value);
+  const points = (list) => (list?.length ? pointsText(list, diagonal) : undefined), unless = (value, defaultValue) => (value === defaultValue ? undefined : value);
   return withQuery(location.href, [['view', unless(view, home)], ['level', unless($('level').value, $('level').max)], ['clip', clipText(state.clip)], ['box', boxText(state.box)],
     ['point', points(state.probe && [state.probe.point])], ['measure', points(state.measured)], ['colour', unless(chosen('colouring'), 'plain')],
     ['walls', $('walls').checked ? undefined : '0'], ['detail', unless($('detail').value, 'auto')]]);
@@ -48,7 +51,7 @@ export function address() {
 
 /** Schedules an update of the address after a change. */
 export function changed() {
-  if (state.together) // which keeps an address of its own
+  if (state.together) // together/page.js keeps its address
     return;
   const { opening } = state;
   timer ??= setTimeout(() => {

@@ -4,7 +4,7 @@ import { $, state } from './state.js';
 
 const quoted = (text) => text.replace(/[&"<>]/g, (c) => ({ '&': '&amp;', '"': '&quot;', '<': '&lt;', '>': '&gt;' })[c]);
 
-/** `address()`: of this view. */
+/** `address()`: returns the address of this view. */
 export function addSharing({ address }) {
   const button = make('button', 'Share', { id: 'toolShare', className: 'ghost', title: 'Link, iframe, element (L)' }), dialog = document.createElement('dialog');
   dialog.id = 'share';
@@ -25,7 +25,7 @@ export function addSharing({ address }) {
   button.onclick = () => {
     const link = address(), query = new URL(link).searchParams, attributes = ['view', 'level', 'detail', 'clip', 'box', 'point', 'colour', 'walls'].filter((name) => query.has(name));
     const local = typeof state.what !== 'string';
-    $('shareHint').textContent = local ? 'This file is on this computer: others need it on a server, and its address in ?file=.' : '';
+    $('shareHint').textContent = local ? 'This file is on this computer. To share the view, put the file on a server and give its address in ?file=.' : '';
     $('shareLink').value = link;
     $('shareFrame').value = `<iframe src="${quoted(link)}" width="800" height="600" style="border:0" title="${quoted(state.shownName ?? '')}"></iframe>`;
     const chosen = attributes.map((name) => `${name}="${quoted(query.get(name))}" `).join('');

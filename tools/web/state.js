@@ -1,4 +1,4 @@
-// The page's state of the open file, shared by its modules, and the events between the modules.
+// The page's state of the open file, which the modules share, and the events between the modules.
 export const $ = (id) => document.getElementById(id);
 
 export const state = {
@@ -6,16 +6,16 @@ export const state = {
   clip: { axis: undefined, at: 0.5, flip: false }, box: undefined, measured: undefined, probe: undefined, frames: [],
 };
 
-// --- numbers for people ---
+// --- formatted numbers ---
 
 export const count = (n) => n.toLocaleString('en');
 export const time = (ms) => (ms < 1000 ? `${Math.round(ms)} ms` : `${(ms / 1000).toFixed(2)} s`);
-/** In the file's unit; `power` 2 for areas. */
+/** Returns a length as text with the file's unit; `power`: 2 for areas. */
 export const length = (x, digits = 5, power = 1) => `${Number(x.toPrecision(digits))}${state.info?.unit ? ` ${state.info.unit}${power > 1 ? '²' : ''}` : ''}`;
 
-// --- places ---
+// --- coordinates ---
 
-// The picture's y is upwards; `up` 2: the model's z is.
+// The picture's y axis points upwards; `up` is 2 when the model's z axis does. upright() converts to the picture's axes, laid() back.
 export const upright = ([x, y, z], up) => (up === 2 ? [x, z, -y] : [x, y, z]);
 export const laid = ([x, y, z], up) => (up === 2 ? [x, -z, y] : [x, y, z]);
 export const fromPicture = (p, { center, scale, up }) => laid(p, up).map((x, k) => x / scale + center[k]);
@@ -23,7 +23,7 @@ export const toPicture = (p, { center, scale, up }) => upright(p.map((x, k) => (
 export const toModel = (p) => fromPicture(p, state.scene);
 export const toScene = (p) => toPicture(p, state.scene);
 
-// --- news: frame, opened, closed, cut, theme, point, view (the user moved on), and what the worker says to parts that came later ---
+// --- events: frame, opened, closed, cut, theme, point, view (the camera has moved), and messages from the worker for modules that are loaded later ---
 
 const listeners = new Map();
 export function on(name, listener) {

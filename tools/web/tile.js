@@ -1,8 +1,8 @@
 // Builds the geometry of nodes of a cut as typed arrays: envelopes with visible cell faces, real faces, lines.
-// A vertex has a position, a tag [level, type, weight of its normal, 0] and a normal, octahedral in two numbers of 16 bits. In coloured tiles it
-// has a hue, too: [red, green, blue, 0], or 255 last where there is no colour.
-export const REAL_FACE = 4;  // in a tag's type, beside the node's
-const SURE = [0.25, 0.6];    // lengths of the field between which its weight goes from nothing to all: thin parts and edges are lit flat
+// A vertex has a position, a tag [level, type, weight of its normal, 0] and a normal, in octahedral encoding with two numbers of 16 bits. Vertices of
+// coloured tiles also have a hue: [red, green, blue, 0]; the last number is 255 where there is no colour.
+export const REAL_FACE = 4;  // flag in a tag's type, in addition to the node's type
+const SURE = [0.25, 0.6];    // the weight of the field rises from 0 to 1 between these lengths of the field; thin parts and edges are shaded flat
 
 function grown(array, count) {
   if (count <= array.length)
@@ -13,7 +13,7 @@ function grown(array, count) {
 }
 
 export class TileMaker {
-  /** `place(node)`: { low, size } of its cell in the scene; `colour(node)`: as tree.js, if envelopes have any; `walls` (walls.js) may be undefined in a call of make(): then all of them are drawn. */
+  /** `place(node)`: returns { low, size } of the node's cell in the scene; `colour(node)`: returns the envelope's colour (tree.js), if envelopes have colours. */
   constructor({ place, polytope, colour, field, mesh }) {
     Object.assign(this, { place, polytope, colour, field, mesh });
     this.position = new Float32Array(3 << 12);
@@ -23,12 +23,15 @@ export class TileMaker {
     this.inner = new Uint32Array(3 << 12);
     this.outer = new Uint32Array(3 << 12);
     this.line = new Uint32Array(2 << 12);
-    this.chain = new Int32Array(0);   // of mesh vertices: their newest vertex here, +1
+    this.chain = new Int32Array(0);   // by mesh vertex: its newest vertex in the tile, +1
     this.older = new Int32Array(1 << 12);
     this.n = [0, 0, 0];
   }
 
-  /** { key, position, tag, normal, index, inner, lines, cells, triangles, meshTriangles, wallTriangles }; plane triangles and faces come first in `index`. */
+  /**
+   * Returns { key, position, tag, normal, index, inner, lines, cells, triangles, meshTriangles, wallTriangles }. The triangles of planes and faces are first in
+   * `index`. `walls`: from walls.js; if undefined, all cell faces are drawn completely.
+   */
   make(key, nodes, want, walls) {
     this.vertices = this.inners = this.outers = this.lines = 0;
     this.wanted = want.lines;
@@ -51,7 +54,7 @@ export class TileMaker {
       triangles: index.length / 3, meshTriangles, wallTriangles: this.outers / 3 };
   }
 
-  // A vertex with the normal this.n, whose length is its weight.
+  // Adds a vertex with the normal this.n. The length of the normal is its weight.
   #vertex(x, y, z, level, type) {
     const i = this.vertices++, { n } = this;
     this.position = grown(this.position, 3 * i + 3);
@@ -132,7 +135,7 @@ export class TileMaker {
 
   // --- real faces ---
 
-  // The faces that are this leaf's to draw; vertices are shared within the tile where normal and level are the same.
+  // Adds the faces that this leaf draws. Corners of a tile with equal position, normal, level and colour share a vertex.
   #addFaces(leaf) {
     const { mesh } = this, type = leaf.type | REAL_FACE;
     this.chain = grown(this.chain, mesh.vertices);
@@ -190,7 +193,7 @@ export class TileMaker {
     for (const node of nodes) {
       const { low, size } = this.place(node);
       for (let axis = 0; axis < 3; axis++)
-        for (let i = 0; i < 8; i++) { // four edges along each axis, two ends each
+        for (let i = 0; i < 8; i++) { // four edges along each axis, with two ends each
           const end = i & 1, u = i >> 1 & 1, v = i >> 2, bit = [0, 0, 0];
           bit[axis] = end;
           bit[(axis + 1) % 3] = u;
@@ -203,7 +206,7 @@ export class TileMaker {
   }
 }
 
-/** The sum of a polytope's plane polygons as vectors, [x, y, z, sum of their lengths], for a cell of this size. */
+/** Returns the sum of the area vectors of a polytope's plane polygons, [x, y, z, sum of their lengths], for a cell of this size. */
 export function planeVector(p, size) {
   const sum = [0, 0, 0, 0], n = [0, 0, 0], at = (v, k) => p.x[3 * v + k] * size[k];
   for (let f = 0; f < p.faces; f++) {

@@ -1,9 +1,9 @@
-// Saved views as a file, to be sent with a model: JSON { ebpo_views: '1.0', model_sha256, model_name, views: [{ name, query }] }; `query` is what the page's address says of
-// the view. No DOM.
+// Reads and writes files of saved views: JSON { ebpo_views: '1.0', model_sha256, model_name, views: [{ name, query }] }. `query` is the part of the page's address
+// that describes the view. Uses no DOM.
 const OF_A_VIEW = ['view', 'level', 'clip', 'box', 'point', 'measure', 'colour', 'walls', 'detail'];
 const VIEWS_MOST = 1000, NAME_MOST = 100, QUERY_MOST = 20_000, BYTES_MOST = 1 << 22;
 
-/** What an address says of the view alone: neither the file nor what else is in it. */
+/** Returns the query of an address with only the parameters of the view. */
 export function viewOf(address) {
   const all = new URL(address, 'https://localhost/').searchParams, own = new URLSearchParams(OF_A_VIEW.filter((name) => all.has(name)).map((name) => [name, all.get(name)]));
   return `?${own}`;
@@ -11,7 +11,7 @@ export function viewOf(address) {
 
 const fits = (v) => typeof v?.name === 'string' && v.name.trim() !== '' && typeof v?.query === 'string' && v.query.length <= QUERY_MOST;
 
-/** A list of views with others behind it; those that are there already are left out, as is what is no view. */
+/** Returns a list of views with other views appended. Omits duplicates and invalid views. */
 export function mergedViews(list, others) {
   const out = [...list];
   for (const v of Array.isArray(others) ? others.filter(fits) : []) {
@@ -24,15 +24,15 @@ export function mergedViews(list, others) {
 
 export const writeViews = (views, digest, name) => `${JSON.stringify({ ebpo_views: '1.0', model_sha256: digest, model_name: name, views }, undefined, 1)}\n`;
 
-/** A file's views; throws an Error that says what is wrong. */
+/** Returns the views of a file. Throws an Error for invalid files and for views of another model. */
 export function readViews(text, digest) {
   let file;
   try {
     file = text.length <= BYTES_MOST ? JSON.parse(text) : undefined;
-  } catch { /* said below */ }
+  } catch { /* reported below */ }
   if (!/^1\.\d+$/.test(file?.ebpo_views ?? '') || !Array.isArray(file.views))
-    throw new Error('this is no file of views; open one that the viewer has saved, or a paint file by Open in the section Paint');
+    throw new Error('not a file of saved views; open a file that the viewer has saved, or open a paint file by Open in the section Paint');
   if (file.model_sha256 !== digest)
-    throw new Error(`these views are of ${typeof file.model_name === 'string' ? `"${file.model_name.slice(0, NAME_MOST)}"` : 'another model'}, not of the open one; open that model first`);
+    throw new Error(`these views belong to ${typeof file.model_name === 'string' ? `"${file.model_name.slice(0, NAME_MOST)}"` : 'another model'}, not to the open one; open that model first`);
   return file.views;
 }

@@ -2,7 +2,7 @@
 import { BLACK, WHITE } from './reader/index.js';
 
 const ON = 1e-9;           // in cells
-const THIN = 1 / 128;      // in cells: pieces that are not as wide on average are left out
+const THIN = 1 / 128;      // in cells: pieces with a smaller mean width are omitted
 const HIDDEN = [];
 const QUADRANT = (u, v) => [u, v, u + 0.5, v, u + 0.5, v + 0.5, u, v + 0.5];
 
@@ -13,7 +13,7 @@ const area = (p) => {
   return sum / 2;
 };
 
-// Both sides of the line through (x, y) with direction (dx, dy): left and right of it.
+// Splits a convex polygon by the line through (x, y) with direction (dx, dy). Returns the parts left and right of the line.
 function split(p, x, y, dx, dy) {
   const left = [], right = [], side = (i) => dx * (p[i + 1] - y) - dy * (p[i] - x);
   for (let i = 0; i < p.length; i += 2) {
@@ -38,7 +38,7 @@ function isSeen(p) {
   return 2 * Math.abs(area(p)) > THIN * around;
 }
 
-/** Convex polygons [u, v, u, v ...] without a convex one. */
+/** Subtracts the convex polygon `q` from convex polygons [u, v, u, v ...]. Returns convex polygons. */
 export function subtract(pieces, q) {
   if (area(q) < 0)
     q = q.map((_, i) => q[q.length - 2 - i + 2 * (i % 2)]); // counter-clockwise
@@ -52,12 +52,12 @@ export function subtract(pieces, q) {
         outside.push(right);
       piece = left.length > 4 && Math.abs(area(left)) > ON ? left : undefined;
     }
-    out.push(...outside); // what is left of the piece is hidden
+    out.push(...outside); // the remaining piece is inside q and hidden
   }
   return out;
 }
 
-/** By polygon: 2 axis + side of the wall that it lies on, or -1. Kept with the polytope. */
+/** Returns, for each polygon, 2 axis + side of the cell face that contains the polygon, or -1. Stores the result in the polytope. */
 export function sidesOf(p) {
   p.sides ??= Int8Array.from({ length: p.faces }, (_, f) => {
     for (let s = 0; p.wall[f] && s < 6; s++) {
@@ -72,7 +72,7 @@ export function sidesOf(p) {
   return p.sides;
 }
 
-// A polygon of node `of` as [u, v ...] in the cell of `node`, on the two axes after `axis`.
+// Returns a polygon of node `of` as [u, v ...] in coordinates of the cell of `node`, on the two axes after `axis`.
 function inCell(node, of, p, f, axis) {
   const scale = 2 ** (node.level - of.level), u = (axis + 1) % 3, v = (axis + 2) % 3, out = [];
   for (let i = p.first[f]; i < p.first[f + 1]; i++) {
@@ -83,7 +83,7 @@ function inCell(node, of, p, f, axis) {
 }
 
 export class Walls {
-  /** `drawn(node)`: whether a node is in the cut, `envelope(node)`: its polytope, or undefined where it is drawn otherwise. */
+  /** `drawn(node)`: returns true when a node is in the cut; `envelope(node)`: returns its polytope, or undefined when its real faces are drawn. */
   constructor(tree, drawn, envelope) {
     Object.assign(this, { tree, drawn, envelope });
   }
@@ -92,7 +92,7 @@ export class Walls {
     return sidesOf(p)[f];
   }
 
-  /** What is seen of polygon f of a node's polytope p, which lies on a wall: convex pieces [u, v ...], or undefined for all of it. */
+  /** Returns the visible part of polygon f of a node's polytope p, which is on a cell face: convex pieces [u, v ...], or undefined for the whole polygon. */
   seen(node, p, f) {
     const side = sidesOf(p)[f], axis = side >> 1;
     if (side < 0)
@@ -116,7 +116,7 @@ export class Walls {
     return pieces;
   }
 
-  // The neighbour is drawn by its children: the four at the wall.
+  // Subtracts the polygons of those four children of the neighbour that touch the common cell face.
   #belowOf(pieces, node, other, side) {
     const axis = side >> 1, u = (axis + 1) % 3, v = (axis + 2) % 3;
     for (const child of other.children)
@@ -129,14 +129,14 @@ export class Walls {
     return pieces;
   }
 
-  // The node behind a wall: of the same level, or a drawn or uniform one above that; undefined outside of the root.
+  // Returns the node behind a cell face: of the same level, or a drawn or uniform ancestor of that node; undefined outside the root cell.
   #across(node, axis, step) {
     const { level } = node, to = [...node.at];
     to[axis] += step;
     if (to[axis] < 0 || to[axis] >= 2 ** level)
       return undefined;
     let n = node, up = 0;
-    do { // up to an ancestor that has both
+    do { // up to a common ancestor
       n = n.parent;
       up++;
     } while (Math.floor(to[axis] / 2 ** up) !== n.at[axis]);

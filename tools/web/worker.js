@@ -1,6 +1,6 @@
 // Reads files, chooses nodes and builds tiles outside the page's thread.
-// The page sends 'open', 'close', 'end', 'view', 'probe', 'places', 'reach' and 'section'; it gets 'opened', 'located', 'tiles', 'loaded',
-// 'probed', 'places', 'section', 'idle' and 'failed'. Several files may be open: `file` says about which one a message is, both ways; it is 0 where nothing is said.
+// The page sends 'open', 'close', 'end', 'view', 'probe', 'places', 'reach' and 'section'. It receives 'opened', 'located', 'tiles', 'loaded',
+// 'probed', 'places', 'section', 'idle' and 'failed'. Several files may be open: the member `file` of each message, 0 by default, names the file.
 import { ZSTDDecoder } from './node_modules/zstddec/dist/zstddec.mjs'; // workers have no import maps
 import { placesOf, sectionOf } from './answers.js';
 import { reachOf } from './reach.js';
@@ -8,19 +8,19 @@ import { Cut } from './cut.js';
 import { fetchAfter, takeFirst } from './handover.js';
 import { GRAY, Tree, UrlSource, distanceInterval, growForQuestion, growForView, inside, insideLeaf, loadZstd, nearestFace, openEbpo, sourceOf } from './reader/index.js';
 
-const LINE_MS = 250;                      // the page hears so often of what is under way
-const TIMEOUT_MS = 20000;                 // without a byte
-const FIRST_LEVELS = 5;                   // come with the first request, as a rule
-const SMALL_MESH = 8 * 1024 * 1024;       // stored bytes
-const MESH_BYTES_A_VIEW = 16 * 1024 * 1024; // of larger ones, before the camera moves again
-const SUBTREE_BYTES_A_VIEW = 1.5 * 1024 * 1024; // the same where the file has subtrees, of which few bytes are for nothing
+const LINE_MS = 250;                      // interval between reports of progress to the page
+const TIMEOUT_MS = 20000;                 // longest time without a byte
+const FIRST_LEVELS = 5;                   // normally contained in the response to the first request
+const SMALL_MESH = 8 * 1024 * 1024;       // limit for small meshes, in stored bytes
+const MESH_BYTES_A_VIEW = 16 * 1024 * 1024; // for larger meshes: limit of fetched bytes until the camera moves
+const SUBTREE_BYTES_A_VIEW = 1.5 * 1024 * 1024; // the same limit for files with subtrees, where few fetched bytes are unused
 
 const PLACES_A_TREE = 5000;
 
-// By `file`: { number, current (an OpenFile), view, want, sections, silent }.
+// The open files by their member `file`: { number, current (an OpenFile), view, want, sections, silent }.
 const slots = new Map();
 const slotOf = (number = 0) => slots.get(number) ?? slots.set(number, { number, sections: 0, silent: true }).get(number);
-let zstd; // the decoder, soon
+let zstd; // a promise of the decoder
 
 const post = (slot, message, transfer = []) => self.postMessage({ file: slot.number, ...message }, transfer);
 
@@ -35,7 +35,7 @@ class OpenFile {
     this.busy = { level: undefined, nodes: false, mesh: false };
     this.running = this.again = false;
     this.probes = 0;
-    this.rooted = new Promise((done) => (this.root = done)); // when questions can be answered
+    this.rooted = new Promise((done) => (this.root = done)); // resolves when queries can be evaluated
   }
 
   get ended() {
@@ -43,7 +43,7 @@ class OpenFile {
   }
 
   async open(what, ahead, cacheBytes) {
-    zstd ??= loadZstd(ZSTDDecoder); // is made while the head comes
+    zstd ??= loadZstd(ZSTDDecoder); // is loaded while the header is being fetched
     this.source = typeof what === 'string' ? new UrlSource(what, { ahead, timeout: TIMEOUT_MS, patient: true, fetch: fetchAfter(() => post(this.slot, { type: 'forget' })) }) : sourceOf(what);
     this.file = await openEbpo(this.source, { zstd, ...(cacheBytes && { cacheBytes }) });
     const { info, source } = this.file;
@@ -65,7 +65,7 @@ class OpenFile {
     return this.file.info.levels.map((_, i) => this.file.bytesToLevel(i));
   }
 
-  /** Brings levels up to `last` into the tree. Callers that want the same level share the work. */
+  /** Loads levels up to `last` into the tree. Concurrent calls for the same level share the work. */
   async load(last) {
     while (this.tree.depth < last) {
       this.busy.level ??= this.#loadNext(last).finally(() => (this.busy.level = undefined));
@@ -95,7 +95,7 @@ class OpenFile {
     try {
       await this.#refine();
     } finally {
-      this.running = false; // also when something was wrong with the data: the next view tries again
+      this.running = false; // also after an error, so that the next view tries again
     }
   }
 
@@ -109,7 +109,7 @@ class OpenFile {
         this.#later(this.#loadNodes(result.missing));
       if (result.leaves.length && !this.busy.mesh && !result.more && !result.deeper && this.#meshAllowed())
         this.#later(this.#loadMesh(result.leaves));
-      await new Promise((done) => setTimeout(done)); // lets a newer view in
+      await new Promise((done) => setTimeout(done)); // handles a newer view first
     } while (!this.ended && (this.again || result.more));
     if (!this.ended && !this.busy.level && !this.busy.nodes && !this.busy.mesh)
       post(this.slot, { type: 'idle', opening: this.number, want: this.slot.want.number, traffic: this.file.traffic, deeper: result.deeper });
@@ -173,7 +173,7 @@ class OpenFile {
         await deeper([found.node]);
         found = inside(lean, point);
       }
-      if (found.where === 'maybe' && lean.isPruned(found.node)) { // a subset: no more is known here
+      if (found.where === 'maybe' && lean.isPruned(found.node)) { // the file is a subset without data here
         answer({ ...coarse, exact: false, done: true });
         return;
       }
@@ -207,10 +207,10 @@ async function answer(data, slot, mine) {
     tell({ error: describe(error) });
   }
   if ((mine.places = (mine.places ?? 0) + data.points.length) > PLACES_A_TREE)
-    mine.asked = mine.places = undefined; // what it has gathered goes
+    mine.asked = mine.places = undefined; // frees the nodes that these queries loaded
 }
 
-// Reports progress to the page, and the end of all work.
+// Reports progress to the page, and reports once when all requests have ended.
 function tellLine(slot) {
   const { current } = slot, underway = current?.source?.underway?.() ?? [];
   if (!underway.length && slot.silent)
@@ -244,7 +244,7 @@ async function heed(data, slot) {
     retry(slot);
   } else if (data.type === 'close') {
     end(slot);
-  } else if (data.type === 'end') { // nobody will ask about it again
+  } else if (data.type === 'end') { // no more messages will follow
     end(slot);
     slots.delete(slot.number);
   } else if (data.type === 'view') {
@@ -252,7 +252,7 @@ async function heed(data, slot) {
     if (ready)
       await current.pump();
   } else if (['probe', 'places', 'reach', 'section'].includes(data.type) && data.opening === current?.number) {
-    await current.rooted; // asked as soon as the head was there
+    await current.rooted; // queries may arrive before the first levels are loaded
     if (current.ended)
       return;
     await (data.type === 'probe' ? current.probe(data.point) : answer(data, slot, current));

@@ -16,8 +16,8 @@ test('views come back from a file as they were', () => {
 
 test('what is no list of views is refused, and what is no view is left out', () => {
   for (const text of ['', '{', '[]', '{"ebpo_views":"2.0","views":[]}', '{"ebpo_views":"1.0","views":5}', 'x'.repeat(1 << 23)])
-    assert.throws(() => readViews(text, DIGEST), /no file of views/);
-  assert.throws(() => readViews(writeViews([VIEW], 'b'.repeat(64), 'statue'), DIGEST), /of "statue"/);
+    assert.throws(() => readViews(text, DIGEST), /not a file of saved views/);
+  assert.throws(() => readViews(writeViews([VIEW], 'b'.repeat(64), 'statue'), DIGEST), /belong to "statue"/);
   assert.deepEqual(mergedViews([], [null, 5, { name: 1, query: '?' }, { name: ' ', query: '?' }, { name: 'a', query: 'x'.repeat(30000) }]), []);
   assert.deepEqual(mergedViews([], 'none'), []);
   assert.equal(mergedViews([], Array.from({ length: 2000 }, (_, i) => ({ name: `${i}`, query: '?' }))).length, 1000);
