@@ -132,8 +132,8 @@ def query_table(page, found):
               "else is measured with the default connections.", "",
               f"*Near* points are at most {asked.NEAR:g} diagonals from the surface, at positions where "
               f"random lines enter the model. The commands are `ebpo distance` and `ebpo inside "
-              f"--memory {asked.BUDGET} URL POINTS`, `ebpo fetch -q --box`, `ebpo levels --max-level` and `ebpo view --seen-only "
-              "--pixels 16`.")
+              f"--memory {asked.BUDGET} URL POINTS`, `ebpo fetch -q --box`, `ebpo levels --max-level` and `ebpo "
+              "view --seen-only --pixels 16`.")
     page.table(["query", "round trips", "requests", "bytes", "s"],
                [[row["what"],
                  *(middle(found.values(AFTER, name, what))
