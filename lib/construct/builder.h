@@ -45,8 +45,9 @@ typedef struct ebpo_build_detail {
     int32_t delta[8]; /* winding numbers of the corners minus that of corner 0 */
     /* range in `entries`: list of the leaf, or lists of all leaves below the gray node */
     uint64_t entry_begin, entry_end;
-    uint64_t cross_begin, cross_end; /* gray: faces that are not entirely inside, in `crossing` */
-    uint32_t first, new_count;       /* leaf: final number of its first new face */
+    /* gray: faces that are not entirely inside the cell, in `crossing` */
+    uint64_t cross_begin, cross_end;
+    uint32_t first, new_count; /* leaf: final number of its first new face */
 } ebpo_build_detail;
 
 /* A subtree: its nodes, depth first. nodes[0] is its root. */
@@ -70,12 +71,13 @@ typedef struct ebpo_branch {
     uint8_t root_type;
     int32_t root_delta[8];
     struct ebpo_proposals *proposals; /* NULL: planes are chosen on the way down */
-    struct ebpo_piece_level *out;     /* [EBPO_LEVELS_MAX] results of emit */
+    struct ebpo_piece_level *out;     /* [EBPO_LEVELS_MAX] results of ebpo_emit_piece */
     ebpo_polytope *above;             /* the parent's envelope cut to this cell */
     ebpo_workspace *workspace;        /* the builder's workspace, for all arrays */
 } ebpo_branch;
 
-/* Bounds of runs of vertices, 16 to a block, 16 blocks to a block above, and so on. */
+/* Boxes around runs of vertices, in a hierarchy: a block has 16 vertices, or 16 blocks of the level
+ * below. */
 enum { EBPO_BOUNDS_FAN = 16, EBPO_BOUNDS_LEVELS = 8 };
 typedef struct ebpo_bounds {
     double (*box[EBPO_BOUNDS_LEVELS])[2][3]; /* box[k][i]: box of vertices [i * 16^(k+1), ...) */
@@ -97,7 +99,7 @@ typedef struct ebpo_builder {
     const uint64_t *key; /* octcode of the vertex's cell at box.grid_level, ascending */
     const uint32_t (*face)[3];
     ebpo_bounds bounds;
-    uint32_t *number; /* final number of each face; a piece sets those of its fresh faces */
+    uint32_t *number; /* final number of each face; a piece sets the numbers of its fresh faces */
     /* nodes above the subtrees; `detail` of a leaf of the top is the number of a subtree */
     ebpo_branch top;
     ebpo_branch *sub;

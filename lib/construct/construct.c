@@ -1,11 +1,10 @@
-/* Builds the tree of a mesh: runs the stages that builder.h lists, in order, and fills in the facts
- * of the result.
+/* Builds the tree of a mesh: runs the stages that builder.h lists, in order, and fills in the
+ * result's ebpo_info.
  *
  * This file checks options and chooses the deepest level (EBP 2017, equation 3). All threads
  * process pieces. The envelopes of a piece need the envelope of its parent, so the top of the tree
  * comes first. With a selection from the leaves up, the planes of all nodes are chosen before the
- * top. ebpo_build takes
- * over the mesh and frees it, also on failure. */
+ * top. ebpo_build takes over the mesh and frees it, also on failure. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -215,7 +214,7 @@ typedef struct piece_job {
     _Atomic uint64_t cells_ns, envelopes_ns; /* sums over all threads */
 } piece_job;
 
-static ebpo_status work_on_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
+static ebpo_status process_pieces(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
     piece_job *job = context;
@@ -247,7 +246,7 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
     for (unsigned i = 0; i < b->threads && status == EBPO_OK; i++)
         status = ebpo_emit_scratch_make(&job.scratch[i], b->workspace, error);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, work_on_pieces, &job,
+        status = ebpo_parallel_for(b->threads, b->workspace, b->sub_count, 1, process_pieces, &job,
                                    &b->options->progress, "envelopes", error);
     for (unsigned i = 0; i < b->threads && job.scratch; i++)
         ebpo_emit_scratch_free(job.scratch[i]);
@@ -257,8 +256,9 @@ static ebpo_status build_pieces(ebpo_builder *b, ebpo_error *error)
     return status;
 }
 
-/* Builds the tree. From the root down, each piece is finished in one pass. From the leaves up, the
- * top needs all pieces first: the cells of the pieces are made twice, not kept. */
+/* Builds the tree. With a selection from the root down, each piece is finished in one pass. With a
+ * selection from the leaves up, the top needs the results of all pieces first: the pieces are
+ * partitioned twice, as their nodes are not kept. */
 static ebpo_status build_tree(ebpo_builder *b, ebpo_error *error)
 {
     ebpo_status status = ebpo_build_corner_windings(b, error);
@@ -307,7 +307,7 @@ ebpo_status ebpo_build(ebpo_mesh *mesh, const ebpo_mesh_report *report,
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
         out->level[i].workspace = mesh->workspace;
     ebpo_status status = EBPO_TAKE(ebpo_build_options, &wanted, options, error);
-    /* other bits request other arrays */
+    /* a build makes only these parts */
     wanted.parts &= EBPO_PART_PLANES | EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_LEAF_PLANES |
                     EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS;
     if (status == EBPO_OK && wanted.times)

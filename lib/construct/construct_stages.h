@@ -41,8 +41,8 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
 
 /* --- triangle_cell.c --- */
 
-/* Returns a mask; bit i set: the face, which touches the cell, may touch its closed octant i
- * (conservative). An octant that the face touches is never missing. */
+/* Returns a mask for a face that touches the cell: bit i is set when the face may touch the closed
+ * octant i of the cell. The mask never lacks an octant that the face touches. */
 unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face);
 
 /* --- face_numbers.c: final numbers, in the order in which leaves list them first --- */
@@ -69,14 +69,14 @@ void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, uint32_t c
                          int32_t offset[8]);
 /* Computes the corner differences of a cell from the piece's faces that touch the cell. The faces
  * are list[places[i]]; if `places` is NULL, the first `count` of the list. Long lists are processed
- * EBPO_CORNER_FACES at a time, so `capacity` has space for the lesser of EBPO_CORNER_FACES and
- * `count`. */
+ * EBPO_CORNER_FACES at a time, so `buffer` has space for the lesser of EBPO_CORNER_FACES and
+ * `count` triangles. */
 enum { EBPO_CORNER_FACES = 1 << 14 };
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
-                         const uint32_t *places, uint64_t count, ebpo_triangle *capacity,
+                         const uint32_t *places, uint64_t count, ebpo_triangle *buffer,
                          int32_t delta[8]);
-/* Computes a gray node's corner differences from its children's. Crossings along all paths between
- * two corners agree when the mesh balances; returns false when they do not. */
+/* Computes a gray node's corner differences from those of its children. Returns false when the
+ * crossings along two paths between corners disagree; then the mesh does not balance. */
 bool ebpo_gather_delta(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                        int32_t delta[8]);
 /* Returns a mask; bit i is set when corner i is inside by the builder's rule. */
@@ -88,9 +88,9 @@ typedef struct ebpo_envelope_scratch ebpo_envelope_scratch;
 ebpo_status ebpo_scratch_make(ebpo_envelope_scratch **out, ebpo_error *error);
 void ebpo_scratch_free(ebpo_envelope_scratch *scratch);
 
-/* Sets the planes that a gray node adds, chosen now or proposed before. On entry `envelope` is the
- * parent's envelope cut to the node's cell, on return the node's envelope. Returns the number of
- * planes, or -1 when out of memory. */
+/* Sets the planes that a gray node adds: planes proposed from the leaves up, or else planes chosen
+ * now. On entry `envelope` is the parent's envelope cut to the node's cell, on return the node's
+ * envelope. Returns the number of planes, or -1 when out of memory. */
 int ebpo_gray_planes(const ebpo_builder *b, ebpo_envelope_scratch *scratch, const ebpo_branch *s,
                      uint32_t detail, ebpo_cell cell, int32_t winding, ebpo_polytope *envelope,
                      uint32_t codes[EBPO_PLANES_STORED]);

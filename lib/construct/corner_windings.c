@@ -1,13 +1,13 @@
-/* Computes winding numbers at the corners of cells. They decide which corners, and which cells
- * without faces, are inside.
+/* Computes winding numbers at the corners of cells. These numbers decide which corners, and which
+ * cells without faces, are inside.
  *
  * In one cell, a corner's number follows from another's by the signed crossings of faces along the
  * cell's edges; all corners are shifted by the same infinitely small amount, so a face through a
  * corner is no special case (ebpo_axis_crossing). For the tree, each node keeps its corners'
- * differences from its corner 0. A gray node's come from its children's, added along the children's
- * edges. The root's lowest corner is outside the model: its winding number is 0. This replaces the
- * special cases of BP 2008, 3.4.1.1. Where two paths to a corner disagree the mesh does not
- * balance, and the model is a surface. */
+ * differences from its corner 0. The differences of a gray node are computed from those of its
+ * children, added along the children's edges. The root's lowest corner is outside the model: its
+ * winding number is 0. This replaces the special cases of BP 2008, 3.4.1.1. Where two paths to a
+ * corner disagree, the mesh does not balance, and the model is a surface. */
 #include "core/strict_fp.h"
 
 #include <string.h>
@@ -20,7 +20,7 @@
 /* --- the corners of a tree's nodes --- */
 
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
-                         const uint32_t *places, uint64_t count, ebpo_triangle *capacity,
+                         const uint32_t *places, uint64_t count, ebpo_triangle *buffer,
                          int32_t delta[8])
 {
     memset(delta, 0, 8 * sizeof *delta);
@@ -30,8 +30,8 @@ void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell 
         int32_t own[8];
         for (uint64_t i = 0; i < part; i++)
             ebpo_branch_triangle(b, s, places ? places[first + i] : (uint32_t)(first + i),
-                                 &capacity[i]);
-        ebpo_corner_windings(&b->box, cell, capacity, part, own);
+                                 &buffer[i]);
+        ebpo_corner_windings(&b->box, cell, buffer, part, own);
         for (int i = 0; i < 8; i++)
             delta[i] += own[i];
     }
@@ -57,7 +57,7 @@ static bool child_offsets(const int32_t *child_delta[8], int32_t offset[8])
     return agree;
 }
 
-/* Sets the corner differences of the eight children; those of empty ones are zero. */
+/* Sets the corner differences of the eight children; the differences of an empty child are zero. */
 static void child_deltas(const ebpo_builder *b, const ebpo_branch *s, uint32_t child,
                          const int32_t *child_delta[8])
 {
@@ -128,9 +128,10 @@ unsigned ebpo_inside_corners(const ebpo_builder *b, int32_t winding, const int32
 
 /* --- the corners of one cell --- */
 
-/* Returns the cell faces that a face reaches: bit 2 k lower, 2 k + 1 upper one of axis k. A face
- * strictly on one side of a cell face, or of the cell, crosses no edge there, however little the
- * edge is shifted. */
+/* Returns a mask of the cell faces that a face may touch: bit 2 k for the lower and bit 2 k + 1 for
+ * the upper cell face along axis k. A face strictly on one side of a cell face crosses none of its
+ * edges, nor does a face strictly on one side of the cell; the infinitely small shift changes
+ * nothing. */
 static unsigned cell_faces_reached(const double cell_face[3][2], const ebpo_triangle *f)
 {
     unsigned reached = 0;
@@ -147,8 +148,8 @@ static unsigned cell_faces_reached(const double cell_face[3][2], const ebpo_tria
     return reached;
 }
 
-/* The edge to each corner from an earlier one: its axis, that corner, and the two cell faces that
- * contain it. */
+/* For each corner, the edge from an earlier corner: the axis of the edge, the earlier corner, and a
+ * mask of the two cell faces that contain the edge. */
 static const struct {
     int axis, before;
     unsigned cell_faces;
@@ -166,7 +167,7 @@ void ebpo_corner_windings(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
     for (uint64_t i = 0; i < count; i++) {
         const ebpo_triangle *f = &faces[i];
         unsigned reached = cell_faces_reached((const double(*)[2])cell_face, f);
-        if ((reached & (reached - 1)) == 0) /* at least two */
+        if ((reached & (reached - 1)) == 0) /* an edge is in two cell faces */
             continue;
         for (int corner = 1; corner < 8; corner++) {
             int axis = edge_to[corner].axis, before = edge_to[corner].before;

@@ -30,8 +30,8 @@ struct ebpo_emit_scratch {
     ebpo_triangle *faces; /* faces of one leaf */
     uint64_t faces_capacity;
     ebpo_workspace *workspace;
-    /* [a level][3] halves of the envelopes on the path to a node, along z, y, x; too large for the
-     * stack, and allocated when the first node of the level has children */
+    /* [level][3] halves of the envelopes on the path to a node, cut along z, y, x. They are too
+     * large for the stack, and are allocated when the first node of the level has children. */
     ebpo_polytope (*half[EBPO_LEVELS_MAX])[3];
 };
 
@@ -113,8 +113,8 @@ static bool gather_faces(emitter *e, const ebpo_build_detail *d)
     return true;
 }
 
-/* Returns planes to be stored: those of the selection. Otherwise readers derive them. -1: out of
- * memory. */
+/* Writes the codes of the planes to be stored, which the selection chooses. (Readers derive planes
+ * that are not stored.) Returns the number of planes, or -1 when out of memory. */
 static int leaf_planes(emitter *e, uint32_t detail, ebpo_cell cell, int32_t winding,
                        ebpo_polytope *envelope, uint32_t *codes)
 {
@@ -178,8 +178,8 @@ static unsigned filled_children(const ebpo_branch *s, uint32_t child)
 }
 
 /* Emits children in octant order; neighbours share the halves that their envelopes are cut from. A
- * half that becomes empty by rounding stays the whole cube, and so do its parts: too large, never
- * too small. */
+ * half that becomes empty by rounding is replaced by the whole cube, and so are its parts: an
+ * envelope may be too large, never too small. */
 static bool emit_children(emitter *e, uint32_t child, ebpo_cell cell, int32_t winding,
                           const int32_t offset[8], const ebpo_polytope *envelope)
 {
@@ -258,7 +258,8 @@ ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, e
 
 typedef struct joiner {
     ebpo_builder *b;
-    ebpo_piece_level **stretch; /* depth first: alternately pieces of the top and whole subtrees */
+    /* in depth-first order: alternately stretches of the top and whole subtrees */
+    ebpo_piece_level **stretch;
     uint64_t count, capacity;
     ebpo_piece_level *current;
     ebpo_level *level; /* result */
@@ -355,12 +356,13 @@ static bool any_has(const joiner *j, int level, int id)
 
 static void fill_default(const joiner *j, char *to, uint64_t bytes, int id)
 {
-    int64_t standard = ebpo_schema[id].standard; /* files are little-endian, as is this machine */
+    /* the machine is little-endian, like the files */
+    int64_t value = ebpo_schema[id].standard;
     EBPO_FOR_ITEMS(j->b->workspace, i, 0, bytes / ebpo_schema[id].held_size)
-        memcpy(to + i * ebpo_schema[id].held_size, &standard, ebpo_schema[id].held_size);
+        memcpy(to + i * ebpo_schema[id].held_size, &value, ebpo_schema[id].held_size);
 }
 
-/* Joins an array; one that no stretch has is omitted. */
+/* Joins an array; omits an array that no stretch has. */
 static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
 {
     uint64_t total = ebpo_level_rows(out, id), size = ebpo_schema[id].held_size;
@@ -415,8 +417,8 @@ typedef struct numbering {
     uint64_t *first; /* start of each block of leaves in leaf_refs */
 } numbering;
 
-/* Replaces face numbers along the curve in the leaves by the final ones, now that those of all
- * pieces are known. */
+/* Replaces the leaves' face numbers along the curve by final numbers, now that the final numbers of
+ * all pieces are known. */
 static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                 ebpo_error *error)
 {
@@ -433,7 +435,8 @@ static ebpo_status number_block(void *context, uint64_t begin, uint64_t end, uns
     return EBPO_OK;
 }
 
-/* Numbers the references. `all`: references of all levels, of which `before` are numbered. */
+/* Numbers the references of a level. For progress: `all` is the number of references of all levels,
+ * of which `before` are numbered. */
 static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t before, uint64_t all,
                                ebpo_error *error)
 {
@@ -457,7 +460,7 @@ static ebpo_status number_refs(const ebpo_builder *b, ebpo_level *l, uint64_t be
 }
 
 /* Omits arrays with only default values, and arrays of unwanted parts. */
-static void leave_out(const ebpo_builder *b, ebpo_level *l)
+static void omit_arrays(const ebpo_builder *b, ebpo_level *l)
 {
     uint32_t parts = b->options->parts;
     ebpo_level_drop(l, ~(parts | (b->solid ? EBPO_NEEDS_SOLID : 0) | EBPO_NEEDS_ALWAYS));
@@ -496,7 +499,7 @@ static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uin
     ebpo_status status = j->b->options->parts & EBPO_PART_MESH
                              ? number_refs(j->b, out, before, all, error)
                              : EBPO_OK;
-    leave_out(j->b, out);
+    omit_arrays(j->b, out);
     return status;
 }
 

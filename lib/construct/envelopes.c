@@ -1,12 +1,12 @@
 /* Chooses the planes of gray nodes, from the root down. The candidates are directions of the convex
  * hull of the solid within the cell.
  *
- * - Few points: the facets of their hull.
- * - Many points, or points that span no volume: the hull of the extreme points. Each round finds
- *   the
- *   supports of the solid along the facets' normals (supports.h), and adds their points.
- * - Also normals of the faces below the node: where there are many, the mean of each occupied
- *   bin of the octahedral map, with bins no finer than needed.
+ * - Few points: the directions are the facets of the points' hull.
+ * - Many points, or points that span no volume: the directions are the facets of the hull of
+ *   extreme points. Each round finds the supports of the solid along the facets' normals
+ *   (supports.h), and adds the points of these supports to the hull.
+ * - In the second case, normals of the faces below the node are tried too. Many normals are grouped
+ *   in bins of the octahedral map, no finer than needed, and the mean of each bin is tried.
  *
  * The selection (selections.c) takes planes from the candidates. A support is an upper bound, so a
  * plane never cuts off a part of the solid, however bad a candidate is. The nodes above the pieces
@@ -42,7 +42,7 @@ typedef struct normal_bin {
 
 /* Memory of one thread, which is too large for its stack; initialised with zeros. */
 typedef struct candidates_scratch {
-    normal_bin table[CANDIDATES_BINS]; /* by hash; all are free between calls */
+    normal_bin table[CANDIDATES_BINS]; /* hash table; all bins are free between calls */
     uint32_t sample[CANDIDATES_SAMPLE];
     int slots[EBPO_PLANES_CANDIDATES]; /* the bins that are not free */
 } candidates_scratch;
@@ -57,7 +57,7 @@ static void sample_faces(const ebpo_builder *b, const ebpo_branch *s, const uint
         ebpo_triangle face;
         uint32_t normal;
         if (step > 64 &&
-            *count % 16 == 0) /* each is in a different part of the workspace's files */
+            *count % 16 == 0) /* each face is in a different part of the workspace's files */
             ebpo_release_pages(b->workspace);
         ebpo_branch_triangle(b, s, entries ? entries[i] : (uint32_t)i, &face);
         if (*count < CANDIDATES_SAMPLE && ebpo_face_normal_code(&b->box, &face, &normal))
@@ -133,9 +133,9 @@ static int build_candidates(const ebpo_builder *b, candidates_scratch *scratch,
 /* --- scratch memory and supports --- */
 
 enum {
-    TOP_LEVELS = 4,   /* levels that take hardly any bytes */
+    TOP_LEVELS = 4,   /* levels whose planes take hardly any bytes */
     MANY_LEVELS = 2,  /* round solids need more planes there: 73 nodes at most */
-    FACES_BELOW = 16, /* normals of faces that are tried below the top */
+    FACES_BELOW = 16, /* maximum number of face normals that are tried */
     HULL_BELOW = 24,  /* directions of the hull, per round below the top */
     HULL_ROUNDS = 3,
     HULL_DIRECTIONS = 160, /* maximum per round */
@@ -169,8 +169,8 @@ void ebpo_scratch_free(ebpo_envelope_scratch *scratch)
     free(scratch);
 }
 
-/* Returns the support below which a plane cannot remove epsilon or a needle: a cap of height h of a
- * body of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
+/* Returns the support from which on a plane can remove neither epsilon nor a needle: a cap of
+ * height h of a body of width H and volume V has at most V (1 - (1 - h/H)^3) <= 3 V h / H. */
 static double hopeless_below(const ebpo_polytope *envelope, double volume, const int32_t n[3],
                              double epsilon)
 {
@@ -185,8 +185,8 @@ static double hopeless_below(const ebpo_polytope *envelope, double volume, const
     return most - fmin((most - least) * epsilon / (3 * volume), ebpo_needle * length);
 }
 
-/* Tries one more direction. Drops it as soon as it cannot gain epsilon. Keeps the extreme point for
- * the hull. */
+/* Tries a direction. Drops it as soon as it cannot gain epsilon. Returns the extreme point in
+ * `where`. */
 static void try_normal(ebpo_envelope_scratch *s, uint32_t normal, const ebpo_polytope *envelope,
                        double volume, double epsilon, double where[3])
 {
@@ -220,8 +220,8 @@ static void add_core(ebpo_envelope_scratch *s, const double where[3])
     s->core_count++;
 }
 
-/* Tries the directions to the faces, edges and corners of a cell: then the hull is known from all
- * sides, independent of the faces. */
+/* Tries the directions to the faces, edges and corners of a cell. Then the hull has points on all
+ * sides, whatever the normals of the faces are. */
 static void try_all_around(ebpo_envelope_scratch *s)
 {
     for (int i = 0; i < 27; i++) {
@@ -244,8 +244,8 @@ static bool was_tried(const ebpo_envelope_scratch *s, uint32_t normal)
     return false;
 }
 
-/* Runs one round: tries the facets of the hull of the known points; an extreme point beyond a facet
- * is added. Returns false when nothing was new. */
+/* Runs one round: tries the facets of the hull of the known points, and adds the extreme points
+ * beyond facets. Returns false when no point was added. */
 static bool hull_round(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, double volume,
                        double epsilon, int most)
 {
@@ -281,8 +281,8 @@ static void try_hull(ebpo_envelope_scratch *s, const ebpo_polytope *envelope, do
 /* Points this near to the hull give nearly equal directions. */
 static const double hull_tolerance = 1e-3;
 
-/* Takes all points of the node; returns false when they are too many, or some are known by their
- * bounds only. */
+/* Takes all points of the node. Returns false when there are too many, or when vertices were not
+ * gathered as points. */
 static bool take_points(ebpo_envelope_scratch *s)
 {
     const ebpo_supports *from = &s->supports;
@@ -296,7 +296,7 @@ static bool take_points(ebpo_envelope_scratch *s)
     return true;
 }
 
-/* Returns false when the table has it. */
+/* Adds a normal to the table; returns false when the table has it already. */
 static bool new_normal(ebpo_envelope_scratch *s, uint32_t normal)
 {
     uint64_t at;
@@ -338,8 +338,8 @@ static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
 
 /* --- the node --- */
 
-/* Returns the share for top levels: they take hardly any bytes, and a needle that fills a
- * thousandth of its cell still needs planes. */
+/* Returns the factor of epsilon for top levels: their planes take hardly any bytes, and a needle
+ * that fills a thousandth of its cell still needs planes. */
 static double top_share(double volume) { return 0.1 * sqrt(fmax(0, volume)); }
 
 static void choose_directions(const ebpo_builder *b, ebpo_envelope_scratch *s,
@@ -406,21 +406,22 @@ typedef struct pending {
     ebpo_polytope *envelope; /* the parent's envelope cut to the cell, then its envelope */
 } pending;
 
-typedef struct wave {
+/* The gray nodes of the top that are processed together: those of one level. */
+typedef struct front {
     ebpo_builder *b;
     pending *nodes;
     uint64_t count, capacity;
-} wave;
+} front;
 
 static ebpo_status no_memory(const ebpo_builder *b, ebpo_error *error)
 {
     return ebpo_workspace_fail_while(b->workspace, "while computing envelopes", error);
 }
 
-static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                  ebpo_error *error)
+static ebpo_status front_envelopes(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                   ebpo_error *error)
 {
-    wave *w = context;
+    front *w = context;
     ebpo_builder *b = w->b;
     (void)worker;
     ebpo_envelope_scratch *scratch = NULL;
@@ -440,9 +441,9 @@ static ebpo_status wave_envelopes(void *context, uint64_t begin, uint64_t end, u
     return status;
 }
 
-/* Handles the children of a finished node: gray ones wait for the next round, subtrees get their
- * input. */
-static bool device_down(ebpo_builder *b, const pending *p, wave *next)
+/* Passes a finished node's envelope to its children: gray children join the next front, subtrees
+ * get their input. */
+static bool pass_down(ebpo_builder *b, const pending *p, front *next)
 {
     const ebpo_build_node *node = &b->top.nodes[p->node];
     int32_t offset[8];
@@ -470,15 +471,15 @@ static bool device_down(ebpo_builder *b, const pending *p, wave *next)
     return true;
 }
 
-static void wave_free(wave *w)
+static void front_free(front *w)
 {
     for (uint64_t i = 0; i < w->count; i++)
         ebpo_array_free(w->b->workspace, w->nodes[i].envelope);
     free(w->nodes);
-    *w = (wave){ .b = w->b };
+    *w = (front){ .b = w->b };
 }
 
-static ebpo_status wave_begin(ebpo_builder *b, wave *w, ebpo_error *error)
+static ebpo_status front_begin(ebpo_builder *b, front *w, ebpo_error *error)
 {
     ebpo_polytope *cube = ebpo_array_alloc(b->workspace, 1, sizeof *cube);
     if (!cube)
@@ -501,23 +502,23 @@ ebpo_status ebpo_build_top(ebpo_builder *b, ebpo_error *error)
     b->top_envelope = ebpo_alloc_zero(b->top.detail_count + 1, sizeof *b->top_envelope);
     if (!b->top_envelope)
         return no_memory(b, error);
-    wave now = { .b = b }, next = { .b = b };
-    ebpo_status status = wave_begin(b, &now, error);
+    front now = { .b = b }, next = { .b = b };
+    ebpo_status status = front_begin(b, &now, error);
     ebpo_pass pass = { &b->options->progress, 0, 0, b->top.detail_count };
     ebpo_progress progress = ebpo_pass_progress(&pass);
     while (status == EBPO_OK && now.count) {
         pass.begin = pass.end;
         pass.end += now.count;
-        status = ebpo_parallel_for(b->threads, NULL, now.count, 1, wave_envelopes, &now, &progress,
+        status = ebpo_parallel_for(b->threads, NULL, now.count, 1, front_envelopes, &now, &progress,
                                    "top envelopes", error);
         for (uint64_t i = 0; i < now.count && status == EBPO_OK; i++)
-            if (!device_down(b, &now.nodes[i], &next))
+            if (!pass_down(b, &now.nodes[i], &next))
                 status = no_memory(b, error);
-        wave_free(&now);
+        front_free(&now);
         now = next;
-        next = (wave){ .b = b };
+        next = (front){ .b = b };
     }
-    wave_free(&now);
-    wave_free(&next);
+    front_free(&now);
+    front_free(&next);
     return status;
 }

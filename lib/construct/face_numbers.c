@@ -1,10 +1,10 @@
 /* Gives faces and vertices their final numbers, and puts the mesh into that order.
  *
  * A face is numbered in the first leaf, depth first, that lists it; a vertex by the first face that
- * uses it. So a leaf's new faces are one range in the file, and only the others need references. A
- * piece numbers its fresh faces, which no earlier piece lists, so pieces are independent of each
- * other. Attributes move with their vertices and faces. The format describes the order in
- * format-spec/README.md. */
+ * uses it. So a leaf's new faces are one range in the file, and only the leaf's other faces need
+ * references. A piece numbers its fresh faces, which no earlier piece lists, so pieces are
+ * independent of each other. Attributes move with their vertices and faces. The format describes
+ * the order in format-spec/README.md. */
 #include "core/strict_fp.h"
 
 #include "construct/construct_stages.h"
@@ -52,7 +52,7 @@ ebpo_status ebpo_build_number(ebpo_builder *b, ebpo_branch *s, ebpo_error *error
     return EBPO_OK;
 }
 
-/* Sets order[i]: mesh vertex that gets final number i. */
+/* Sets order[i] to the mesh vertex that gets the final number i, and final[] to the inverse. */
 static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const uint32_t *face_at,
                            uint32_t *order, uint32_t *final)
 {
@@ -74,7 +74,7 @@ static void order_vertices(const ebpo_builder *b, const ebpo_mesh *mesh, const u
     }
 }
 
-/* Task after the order is known: moves data, on all cores. */
+/* Task of all cores after the order is known: moves the data. */
 typedef struct moving {
     const ebpo_builder *b;
     const ebpo_mesh *mesh;
@@ -85,8 +85,8 @@ typedef struct moving {
 
 enum { MOVE_GRAIN = 1 << 14 };
 
-static ebpo_status turn_around(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                               ebpo_error *error)
+static ebpo_status invert_numbers(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
 {
     moving *m = context;
     (void)worker, (void)error;
@@ -137,7 +137,7 @@ static ebpo_status move_all(moving *m, uint32_t *final, ebpo_error *error)
               place = { turn.to, 2 * faces, 2 * faces + vertices, all },
               move = { turn.to, 2 * faces + vertices, all, all };
     ebpo_progress progress = ebpo_pass_progress(&turn);
-    ebpo_status status = ebpo_parallel_for(b->threads, NULL, faces, MOVE_GRAIN, turn_around, m,
+    ebpo_status status = ebpo_parallel_for(b->threads, NULL, faces, MOVE_GRAIN, invert_numbers, m,
                                            &progress, stage, error);
     if (status != EBPO_OK)
         return status;

@@ -2,11 +2,10 @@
  * (format-spec/README.md, section 19).
  *
  * Levels go from the deepest up: a group of eight gives the sums of the gray node above it. Nothing
- * is kept for each face; a face's part is computed for each leaf that lists it, as leaves list few
- * more faces than there are. Weights and sums are integers, so the result is exact and does not
- * depend on the number of threads. The colours are those of the vertices; face colours are used
- * where vertices have none, or all the same. lib/verify computes the same colours in another way.
- */
+ * is kept for each face; a face's part is computed again for each leaf that lists the face, as most
+ * faces are in one leaf only. Weights and sums are integers, so the result is exact and does not
+ * depend on the number of threads. Vertex colours are used, or face colours if vertices have no
+ * colours or all the same. lib/verify computes the same colours with separate code. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -25,7 +24,8 @@ enum { GROUP_GRAIN = 1 << 12, GROUPS_A_TIME = 16 };
 
 /* Sums over the faces below a node, as often as leaves list them. */
 typedef struct colour_sums {
-    ebpo_wide colour[3], weight; /* weight times three times the colour; three times the weight */
+    ebpo_wide colour[3]; /* sums of 3 * weight * colour */
+    ebpo_wide weight;    /* sum of 3 * weight */
 } colour_sums;
 
 /* Counts before a block of groups in its level. */

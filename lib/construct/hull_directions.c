@@ -1,12 +1,12 @@
-/* Computes a small convex hull, of which only the directions of the facets are used: rounding
- * errors cost volume of an envelope, never containment.
+/* Computes a small convex hull. Only the directions of its facets are used, so that a rounding
+ * error may enlarge an envelope but never breaks containment.
  *
  * The hull grows point by point: each point beyond the hull replaces the facets that it sees (a
  * beneath-beyond algorithm in doubles). Points that are extreme along the axes and diagonals come
- * first, so that most others are never outside. Facets are kept as planes by coordinate, for the
- * kernel that tests a point against all of them (sweep.h). Limits: EBPO_HULL_POINTS points,
- * EBPO_HULL_FACETS facets; further ones are omitted. Ties are ordered by numbers of points, so that
- * all machines return the same facets in the same order. */
+ * first, so that most other points are inside the hull when they are tested. Facets are kept as
+ * planes by coordinate, for the kernel that tests a point against all of them (sweep.h). Limits:
+ * EBPO_HULL_POINTS points, EBPO_HULL_FACETS facets; further points and facets are omitted. Ties are
+ * ordered by indices of points, so that all machines return the same facets in the same order. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -17,7 +17,7 @@
 #include "construct/sweep.h"
 #include "geometry/vec3.h"
 
-static const double flat = 1e-9; /* points nearer to a plane are on it */
+static const double flat = 1e-9; /* a point nearer to a plane than this counts as on the plane */
 
 _Static_assert((int)EBPO_HULL_FACETS <= (int)EBPO_SWEEP_PLANES, "sweeps have space for the facets");
 
@@ -162,9 +162,10 @@ static bool first_facets(hull *h, const int c[4])
 
 /* --- adding a point --- */
 
-/* Lists edges as from << 16 | to, and reversed; padded to a multiple of four with invalid edges. */
+/* Lists the edges of the visible facets as from << 16 | to in `edges`, and as to << 16 | from in
+ * `reversed`. Pads `edges` to a multiple of four with invalid edges. */
 static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *edges,
-                    uint32_t *references)
+                    uint32_t *reversed)
 {
     int listed = 0;
     for (int i = 0; i < seen; i++) {
@@ -172,7 +173,7 @@ static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *
         for (int e = 0; e < 3; e++) {
             uint32_t from = corner[e], to = corner[e == 2 ? 0 : e + 1];
             edges[listed] = from << 16 | to;
-            references[listed++] = to << 16 | from;
+            reversed[listed++] = to << 16 | from;
         }
     }
     for (int i = listed; i % 4; i++)
@@ -180,7 +181,7 @@ static int edges_of(const hull *h, const uint16_t *visible, int seen, uint32_t *
     return listed;
 }
 
-/* Returns true if the edge is in the list. No early exit from the loop, so that compilers vectorise
+/* Returns true if the edge is in the list. The loop has no early exit, so that compilers vectorise
  * it. */
 static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
 {
@@ -190,7 +191,7 @@ static bool has_edge(const uint32_t *edges, int fours, uint32_t edge)
     return found;
 }
 
-/* Fills slots without a new facet from the end. */
+/* Fills the slots that got no new facet with facets from the end. */
 static void close_gaps(hull *h, const uint16_t *place, int from, int to, int count)
 {
     for (int i = to - 1; i >= from; i--) /* `place` ascends */
@@ -199,12 +200,12 @@ static void close_gaps(hull *h, const uint16_t *place, int from, int to, int cou
     set_count(h, count);
 }
 
-/* Returns false when no more points can be added: too many facets in one step. (Then facets may
- * overlap; they still give directions.) */
+/* Adds a point to the hull. Returns false when too many facets change in one step; then no more
+ * points can be added. (Facets may overlap then; they still give directions.) */
 static bool add_point(hull *h, int point)
 {
     uint16_t visible[VISIBLE];
-    uint32_t edges[3 * VISIBLE], references[3 * VISIBLE];
+    uint32_t edges[3 * VISIBLE], reversed[3 * VISIBLE];
     const ebpo_sweep_planes planes = { h->nx, h->ny, h->nz, h->d, (h->count + 3) / 4 };
     int seen = h->sweep->seen(&planes, h->p[point], h->beyond, flat, visible, VISIBLE), made = 0,
         count = h->count;
@@ -212,9 +213,9 @@ static bool add_point(hull *h, int point)
         return true;
     if (seen > VISIBLE)
         return false;
-    int listed = edges_of(h, visible, seen, edges, references);
+    int listed = edges_of(h, visible, seen, edges, reversed);
     for (int i = 0; i < listed; i++) {
-        if (has_edge(edges, (listed + 3) / 4, references[i]))
+        if (has_edge(edges, (listed + 3) / 4, reversed[i]))
             continue;
         if (made >= seen && count == h->capacity)
             return false;

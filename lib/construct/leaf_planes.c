@@ -2,10 +2,10 @@
  * from the same faces, bit for bit, so most files do not store them.
  *
  * The candidates' directions are those of the convex hull of the extreme points: the corners of the
- * faces' parts in the cell, and the cell's corners that are inside the solid. With too many points,
- * or with all in one plane, the directions are the normals of the faces. A plane's offset is the
- * support of all points, plus a bound of the rounding error, so no part of a face in the cell is
- * cut off. */
+ * faces' parts in the cell, and the cell's corners that are inside the solid. When there are too
+ * many points, or all are in one plane, the directions are the normals of the faces. A plane's
+ * offset is the support of all points, plus a bound of the rounding error, so no part of a face in
+ * the cell is cut off. */
 #include "core/strict_fp.h"
 
 #include <math.h>

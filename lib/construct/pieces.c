@@ -1,10 +1,10 @@
-/* Holds the data of the pieces of the tree during the build: nodes, details and lists; their
- * stretches of the levels' arrays; proposed planes; and the store.
+/* Manages the data of the pieces of the tree during the build: nodes, details, lists, stretches of
+ * the levels' arrays, proposed planes, and the store.
  *
  * A piece is a subtree that one thread builds. Its arrays grow in memory or in the builder's
- * workspace. When a piece is done, its results move to the store, blocks of the workspace that are
- * filled one after the other and read once, when the levels are joined. Without a workspace nothing
- * moves. */
+ * workspace. When a piece is done, its results move to the store. The store consists of blocks of
+ * the workspace, which are filled one after the other and read once, when the levels are joined.
+ * Without a workspace, results stay in memory. */
 #include "core/strict_fp.h"
 
 #include <pthread.h>
@@ -149,11 +149,11 @@ struct ebpo_store {
     pthread_mutex_t lock;
     char **blocks;
     uint64_t block_count, block_capacity;
-    size_t left; /* free bytes at the end of the last one */
+    size_t left; /* free bytes at the end of the last block */
     size_t last_bytes;
 };
 
-static size_t reserve_for(uint64_t count, size_t size)
+static size_t aligned_bytes(uint64_t count, size_t size)
 {
     return (count * size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
 }
@@ -198,13 +198,13 @@ static char *store_reserve(ebpo_builder *b, size_t bytes)
 
 void *ebpo_store_reserve(ebpo_builder *b, uint64_t bytes)
 {
-    return make_store(b) ? store_reserve(b, reserve_for(bytes, 1)) : NULL;
+    return make_store(b) ? store_reserve(b, aligned_bytes(bytes, 1)) : NULL;
 }
 
-static size_t capacity_of(const ebpo_level *level, int id)
+static size_t packed_bytes(const ebpo_level *level, int id)
 {
     return ebpo_schema_is_held(id) && ebpo_level_array(level, id)
-               ? reserve_for(ebpo_level_rows(level, id), ebpo_schema[id].held_size)
+               ? aligned_bytes(ebpo_level_rows(level, id), ebpo_schema[id].held_size)
                : 0;
 }
 
@@ -225,7 +225,7 @@ ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_piece_level *out, ebpo_error *
         return EBPO_OK;
     for (int level = 0; level < EBPO_LEVELS_MAX; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
-            bytes += capacity_of(&out[level].level, id);
+            bytes += packed_bytes(&out[level].level, id);
     char *to = ebpo_store_reserve(b, bytes);
     if (!to)
         return ebpo_workspace_fail(b->workspace, bytes, error);
@@ -233,7 +233,7 @@ ebpo_status ebpo_build_pack(ebpo_builder *b, ebpo_piece_level *out, ebpo_error *
         for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
             if (ebpo_schema_is_held(id)) {
                 pack_array(b, &out[level].level, id, to);
-                to += capacity_of(&out[level].level, id);
+                to += packed_bytes(&out[level].level, id);
             }
         out[level].packed = true;
     }

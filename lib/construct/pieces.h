@@ -23,8 +23,7 @@ bool ebpo_piece_level_add_empty(ebpo_piece_level *out, bool black, int32_t windi
 /* Frees the arrays of all levels of a piece. */
 void ebpo_piece_levels_free(ebpo_piece_level *out);
 
-/* --- planes that were chosen from the leaves up, and the data that nodes give to their parents ---
- */
+/* --- planes chosen from the leaves up, and the data that nodes pass to their parents --- */
 
 /* A plane that a node's parent may choose: its normal, and n . xi of its face. */
 typedef struct ebpo_offer {
@@ -32,8 +31,8 @@ typedef struct ebpo_offer {
     double origin;
 } ebpo_offer;
 
-/* Data that a node gives to its parent, in its cell's coordinates: its planes and the corners of
- * its envelope's polygons (EBP 2017, 3.4.1). */
+/* Data that a node passes to its parent, in the coordinates of the node's cell: its planes and the
+ * corners of its envelope's polygons (EBP 2017, 3.4.1). */
 typedef struct ebpo_handover {
     ebpo_offer *offers;
     double (*corner)[3];
@@ -82,7 +81,8 @@ ebpo_status ebpo_build_check_branch(const ebpo_branch *s, ebpo_error *error);
 
 /* Frees the results of partition for the piece; a second call of partition makes them again. */
 void ebpo_branch_forget(ebpo_branch *s);
-/* Frees the data that only partition and envelopes need; keeps `out` and the root's facts. */
+/* Frees the data that only partition and envelopes need; keeps `out` and the root's type and corner
+ * differences. */
 void ebpo_branch_release(ebpo_branch *s);
 void ebpo_branch_free(ebpo_branch *s);
 

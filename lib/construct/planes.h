@@ -16,13 +16,13 @@ enum {
      * planes of its parent */
     EBPO_PLANES_MAX = 32,
     EBPO_PLANES_CANDIDATES = 512, /* maximum number of candidates of such a node */
-    /* maximum number of planes that the selections of the theses choose, which start from the
-     * cell: a byte counts the planes */
+    /* maximum number of planes that the selections of the theses choose, which start from the cell;
+     * files store the number in a byte */
     EBPO_PLANES_STORED = 255
 };
 
-/* Parts of a solid that extend this far beyond a candidate plane, in cells, are cut off even
- * without volume. */
+/* A plane that cuts off a part of the envelope is stored if the part extends at least this far
+ * beyond the plane, in cells, however small its volume is. */
 static const double ebpo_needle = 0.1;
 
 /* A candidate for a plane of the envelope. */
@@ -40,21 +40,21 @@ typedef struct ebpo_choice {
     const ebpo_candidate *candidates; /* [count] no two have the same normal */
     int count;                        /* number of candidates */
     int most;                         /* maximum number of codes */
-    /* inherit: volume that no candidate can remove, in cells (0: not known) */
+    /* greedy selection: volume that no candidate can remove, in cells (0: not known) */
     double core;
-    double epsilon; /* inherit: a plane must remove at least this share of the cell, */
-    /* or cut off a part that extends beyond the plane by more than this, in cells (0: any part) */
-    double reach;
+    /* greedy selection: a plane must remove at least `epsilon` of the cell's volume, or cut off a
+     * part that extends more than `reach` cells beyond the plane (0: only volume counts) */
+    double epsilon, reach;
     int wanted;              /* selections of the theses: number of candidates to choose */
     const double *cell_size; /* [3] cell coordinates to the model's unit */
     ebpo_normal_distance normals;
     uint64_t seed; /* seed of this node */
 } ebpo_choice;
 
-/* A selection: takes planes from the candidates, clips `envelope` by them and writes their codes;
- * returns their number, or -1 when out of memory. Adding one: CONTRIBUTING.md, "A new plane
- * selection". Codes may come in any order. From the root down, there are at most
- * EBPO_PLANES_CANDIDATES candidates; from the leaves up any number. */
+/* A selection: takes planes from the candidates, clips `envelope` by these planes and writes their
+ * codes. Returns the number of codes, or -1 when out of memory. CONTRIBUTING.md, "A new plane
+ * selection", describes how to add a selection. Codes may come in any order. From the root down,
+ * there are at most EBPO_PLANES_CANDIDATES candidates; from the leaves up any number. */
 typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
 /* Returns the function of a selection, NULL if invalid. If from_leaves is true
@@ -63,8 +63,8 @@ typedef int (*ebpo_select_fn)(ebpo_polytope *envelope, const ebpo_choice *choice
  * from its parent's envelope. */
 ebpo_select_fn ebpo_selection_function(ebpo_selection selection);
 
-/* Selects greedily by removed volume, lazily re-evaluated, until the gain falls below epsilon *
- * cell volume. */
+/* Takes, again and again, the plane that removes the most volume, until the gain falls below
+ * epsilon * cell volume. Gains are evaluated lazily. */
 int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint32_t *codes);
 
 /* Returns how many of `count` candidates a selection of the theses chooses: `percent` of the
@@ -75,7 +75,8 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
 int ebpo_selection_wanted(int count, int level, double percent, double k_root);
 
 /* Selects every candidate that may remove 0.03 % of the cell or more, deepest cut first, then
- * needles: nearly the tightest envelope, and with few candidates the fastest to find. */
+ * planes that cut off needles. The result is nearly the tightest envelope, and with few candidates
+ * this selection takes the least time. */
 int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most,
                     uint32_t *codes);
 
@@ -84,10 +85,9 @@ typedef struct ebpo_triangle {
     double corner[3][3];
 } ebpo_triangle;
 
-/* Returns the number of extreme points of face ∩ cell in cell coordinates (polygon corners, at most
- * 9), and an error bound: the exact intersection is within `*slack` (cell units, each axis) of the
- * polygon's hull. Returns 0 when they do not
- * intersect. The cell is enlarged by the slack before clipping, so
+/* Computes the polygon face ∩ cell: its corners, at most 9, in cell coordinates. Returns their
+ * number, 0 when face and cell do not intersect. The exact intersection is within `*slack` (cell
+ * units, each axis) of the polygon's hull. The cell is enlarged by the slack before clipping, so
  * that a face touching the closed cell always gives points. */
 int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
                        double points[9][3], double *slack);
@@ -106,10 +106,10 @@ void ebpo_corner_windings(const ebpo_box *box, ebpo_cell cell, const ebpo_triang
                           uint64_t count, int32_t delta[8]);
 
 /* Computes a leaf's planes from its faces: on entry `envelope` is the parent's envelope cut to this
- * cell, on return the leaf's. `inside_corners`: bit i set when corner i is in the solid; `epsilon`
- * > 0: greedy selection, for planes that will be stored; 0: ebpo_select_all, for planes that are
- * derived and cost no byte. Writes at most EBPO_PLANES_MAX codes and returns their number. EBP
- * 2017, section 3.4. */
+ * cell, on return the leaf's. `inside_corners`: bit i is set when corner i is in the solid. With
+ * `epsilon` > 0, the selection is greedy, for planes that will be stored. With 0, it is
+ * ebpo_select_all, for planes that readers derive and that need no storage. Writes at most
+ * EBPO_PLANES_MAX codes and returns their number. EBP 2017, section 3.4. */
 int ebpo_leaf_planes(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *faces,
                      uint64_t count, unsigned inside_corners, double epsilon,
                      ebpo_polytope *envelope, uint32_t codes[EBPO_PLANES_MAX]);
@@ -124,11 +124,11 @@ typedef struct ebpo_hull_facet {
     double area;
 } ebpo_hull_facet;
 
-/* Computes triangles of the hull of points [count], at most EBPO_HULL_POINTS of them, of the order
- * of 1; returns their number, 0 when the points are (nearly) in a plane. `facets` has space for
- * `capacity`; a hull of n points has 2 n - 4, but rounding may make more, and further ones are
- * omitted. Points nearer than `tolerance` (at least 1e-9, or rounding makes facets) to the hull
- * found so far are omitted. */
+/* Computes the triangular facets of the hull of `count` points, at most EBPO_HULL_POINTS, with
+ * coordinates of the order of 1. Returns the number of facets, 0 when the points are (nearly) in a
+ * plane. `facets` has space for `capacity` facets; more are omitted. A hull of n points has 2 n - 4
+ * facets, but rounding may make more. Points nearer than `tolerance` to the hull found so far are
+ * omitted; a tolerance below 1e-9 makes facets of rounding errors. */
 int ebpo_hull_facets(const double (*points)[3], int count, double tolerance,
                      ebpo_hull_facet *facets, int capacity);
 

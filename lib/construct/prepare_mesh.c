@@ -29,8 +29,8 @@ typedef struct preparation {
     ebpo_prepared *out;
 } preparation;
 
-/* Accepts coordinates too large for an exact grid, as checking is still possible; building reports
- * them again. */
+/* Accepts coordinates that are too large for an exact grid, as checking is still possible. Building
+ * reports this error again. */
 static ebpo_status unless_too_large(ebpo_status status, const ebpo_error *local, ebpo_error *error)
 {
     if (status == EBPO_OK || status == EBPO_E_LIMIT)
@@ -51,8 +51,8 @@ static ebpo_status repair_as_requested(const preparation *p, bool weld, ebpo_err
     return ebpo_mesh_repair(p->mesh, steps, o->weld_distance, &p->out->record, error);
 }
 
-/* Sorts along the curve first, so that each step accesses memory in order, however little memory
- * there is. */
+/* Sorts along the curve first, so that each step accesses memory in order. This matters when memory
+ * is small. */
 static ebpo_status arrange_and_repair(const preparation *p, bool weld, ebpo_error *error)
 {
     const ebpo_prepare_options *o = p->options;
@@ -115,7 +115,7 @@ enum {
     DROP = EBPO_REPAIR_DROP
 };
 
-/* The square root of the area is a length; sheets are thinner than this share of it. */
+/* A sheet: the cube root of the volume is at most this share of the square root of the area. */
 static const double THIN = 0.01;
 
 typedef struct trying {
@@ -153,8 +153,8 @@ static uint32_t doubts_of_filling(double area, const ebpo_mesh_report *report,
 }
 
 /* Finds sheets and solids turned inside out. For coordinates far from 1, volume and area overflow
- * or vanish, though they keep their signs: then only a volume without thickness is certainly a
- * sheet. */
+ * or vanish, though the volume keeps its sign. Then only a mesh without extent along an axis counts
+ * as a sheet. */
 static uint32_t doubts_of_volume(const ebpo_mesh_report *report)
 {
     enum { FAR = 1000 };
@@ -208,7 +208,7 @@ static ebpo_status try_steps(trying *t, unsigned steps, ebpo_error *error)
     return EBPO_OK;
 }
 
-/* Returns true if steps after the one that found `base` may leave a solid. */
+/* Returns true if `steps`, applied to the mesh that `base` describes, may leave a solid. */
 static bool may_help(const ebpo_mesh_report *base, unsigned steps)
 {
     bool open = base->boundary_edges.count > 0;
@@ -219,7 +219,7 @@ static bool may_help(const ebpo_mesh_report *base, unsigned steps)
     return !(steps & ORIENT) || turned || open;
 }
 
-/* The steps done before, and the resulting mesh. */
+/* Start of a sequence: the steps done before, and the report on their result. */
 typedef struct start {
     unsigned steps;
     const ebpo_mesh_report *report; /* NULL: not done */
@@ -232,7 +232,7 @@ static ebpo_status try_more(trying *t, start from, unsigned more, ebpo_error *er
     return try_steps(t, from.steps | more, error);
 }
 
-/* Tries the result of the step alone; *then is the start for other steps. */
+/* Tries the step alone, and sets *then to the start for further steps. */
 static ebpo_status begin_with(trying *t, start from, unsigned step, start *then, ebpo_error *error)
 {
     if (t->out->chosen >= 0)
@@ -246,7 +246,8 @@ static ebpo_status drop_repeated(trying *t, start from, start *then, ebpo_error 
     return from.report->repeated_faces.count ? begin_with(t, from, DROP, then, error) : EBPO_OK;
 }
 
-/* Tries merging first where there are vertices to merge, unless nothing is open. */
+/* If there are vertices to merge, makes the welded mesh the start of the other sequences. Shorter
+ * sequences without welding are tried too. */
 static ebpo_status weld_first(trying *t, start *from, ebpo_error *error)
 {
     start bare = *from, dropped = { 0, NULL };
@@ -280,7 +281,8 @@ static ebpo_status try_all(trying *t, ebpo_error *error)
     return status == EBPO_OK ? try_more(t, dropped, ORIENT | FILL, error) : status;
 }
 
-/* Tries dropping on a plausible solid, for information; the solid is not changed. */
+/* Tries to drop the repeated faces of a plausible solid, for information only: no repair is chosen.
+ */
 static ebpo_status try_dropping(trying *t, ebpo_error *error)
 {
     ebpo_status status = try_steps(t, DROP, error);

@@ -2,10 +2,10 @@
  * from the root down writes the chosen planes later.
  *
  * A leaf's candidates are the planes of its faces; a gray node's are the planes that its children
- * have chosen. Each node clips the whole cell, and its support comes from the corners of the
- * children's envelopes and from the solid itself, so containment never depends on rounded corners.
- * Each piece is partitioned, its planes are chosen, and its nodes are freed again; then the nodes
- * of the top follow, deepest level first, those of one level in parallel. */
+ * have chosen. Each node clips the whole cell, and the supports are computed from the corners of
+ * the children's envelopes and from the solid itself, so containment never depends on rounded
+ * corners. Each piece is partitioned, its planes are chosen, and its nodes are freed again; then
+ * the nodes of the top follow, deepest level first, those of one level in parallel. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -22,8 +22,8 @@
 #include "geometry/cells.h"
 #include "geometry/polytope.h"
 
-/* Bound of the rounding error of corners of a child's envelope in a support, in cells, with a large
- * margin. */
+/* Bound, with a large margin, of the rounding error that the corners of a child's envelope have in
+ * a support, in cells. */
 static const double rounded = 1e-9;
 
 typedef struct proposer {
@@ -42,7 +42,7 @@ static int by_normal(const void *a, const void *b)
     const ebpo_offer *x = a, *y = b;
     if (x->normal != y->normal)
         return x->normal < y->normal ? -1 : 1;
-    /* among equal normals, the one that moves least */
+    /* among equal normals, the plane that moves least comes first */
     return x->origin > y->origin ? -1 : x->origin < y->origin;
 }
 
@@ -52,11 +52,11 @@ static int by_normal_alone(const void *a, const void *b)
     return (x->normal > y->normal) - (x->normal < y->normal);
 }
 
-/* More candidates than this are thinned out evenly: only leaves without a limit on faces have that
- * many, and k-medoids compares all pairs. */
+/* More candidates than this are thinned out evenly, as k-medoids compares all pairs. Only leaves
+ * without a limit on faces have more. */
 enum { CANDIDATES_MAX = 4096 };
 
-/* Keeps one of equal normals. Supports are computed later. */
+/* Makes a candidate for each distinct normal. Supports are computed later. */
 static bool make_candidates(proposer *p, ebpo_handover *given)
 {
     uint64_t kept = 0;
@@ -96,7 +96,7 @@ static double moved_by(const ebpo_offer *offer, double support, const double siz
     return (support - offer->origin) * least / sqrt(square);
 }
 
-/* Chooses among p->candidates, stores the planes and makes the data for the parent. */
+/* Chooses planes from p->candidates, stores them and makes the data for the parent. */
 static bool choose_planes(proposer *p, uint32_t detail, ebpo_cell cell, const ebpo_handover *given,
                           ebpo_handover *out)
 {
@@ -264,7 +264,8 @@ static void proposer_free(proposer *p)
     free(p->candidates);
 }
 
-/* Handles one gray node, from its children's data. Returns false when out of memory. */
+/* Chooses the planes of one gray node from its children's data. Returns false when out of memory.
+ */
 static bool propose_one_gray(const ebpo_builder *b, ebpo_branch *s, uint32_t detail, ebpo_cell cell,
                              int32_t winding, ebpo_handover *given, ebpo_handover *out)
 {
@@ -334,7 +335,8 @@ static ebpo_status propose_pieces(void *context, uint64_t first, uint64_t last, 
 
 /* --- the top --- */
 
-/* The top's gray nodes, deepest first; those of one level in parallel. */
+/* A gray node of the top. The deepest nodes are processed first, the nodes of one level in
+ * parallel. */
 typedef struct top_node {
     uint32_t node;
     ebpo_cell cell;
@@ -352,7 +354,8 @@ typedef struct top_list {
     uint64_t count, capacity, base;
 } top_list;
 
-/* Lists breadth first, so that a level's nodes are one stretch; passes windings down on the way. */
+/* Lists the gray nodes breadth first, so that the nodes of a level are consecutive. Also computes
+ * their winding numbers. */
 static bool list_top(top_list *t)
 {
     ebpo_builder *b = t->b;
@@ -418,7 +421,7 @@ static ebpo_status propose_top_nodes(void *context, uint64_t first, uint64_t las
     return status;
 }
 
-static bool note_top(top_list *t)
+static bool store_top(top_list *t)
 {
     ebpo_branch *s = &t->b->top;
     if (!ebpo_proposals_make(s))
@@ -481,7 +484,7 @@ ebpo_status ebpo_build_propose(ebpo_builder *b, ebpo_error *error)
     atomic_store(&b->entry_count, 0);
     if (status == EBPO_OK)
         status = propose_top(&t, &pass, error);
-    if (status == EBPO_OK && !note_top(&t))
+    if (status == EBPO_OK && !store_top(&t))
         status = no_memory(error);
     for (uint64_t i = 0; i < t.count; i++) {
         ebpo_handover_free(&t.nodes[i].given);

@@ -3,11 +3,11 @@
  * CONTRIBUTING.md describes how to add one.
  *
  * - greedy (inherit): the plane that removes most volume comes first. Gains only shrink while the
- *   envelope does, so an earlier gain bounds the present one, and most candidates are never
- *   evaluated again (lazy evaluation). Volume alone leaves needles; planes that cut off far
- *   parts come last.
+ *   envelope does. So an earlier gain bounds the present gain, and most candidates are never
+ *   evaluated again (lazy evaluation). A choice by volume alone leaves needles, so planes that cut
+ *   off needles come last.
  * - random, offset, k-medoids: from the theses (EBP 2017, 3.3.4.3; BP 2008, 3.4.2). They choose a
- *   number of candidates, whatever these cut.
+ *   fixed number of candidates, without regard to the volume that these cut off.
  *
  * A selection clips the given envelope and returns the codes of its planes. Results depend on the
  * arguments alone; random choices use the seed of the node. */
@@ -32,15 +32,15 @@ typedef struct ranked {
     int round; /* -1: never evaluated */
 } ranked;
 
-/* Candidates that may still be worth a plane: by removed volume (a heap), and by the extent of the
- * envelope beyond them. */
+/* Candidates that may still be chosen: a heap by removed volume, and a list by the extent of the
+ * envelope beyond the plane. */
 typedef struct contest {
     ranked by_gain[EBPO_PLANES_CANDIDATES], by_reach[EBPO_PLANES_CANDIDATES];
     int gains, reaches;
 } contest;
 
-/* Makes the plane of a candidate, for ebpo_polytope_clip; returns false when only the whole cell
- * would do. */
+/* Makes the plane of a candidate, for ebpo_polytope_clip. Returns false when no plane code has an
+ * offset that keeps the candidate's support. */
 static bool candidate_plane(const ebpo_candidate *candidate, uint32_t *code, double n[3],
                             double *offset)
 {
@@ -83,7 +83,8 @@ static void rank_candidates(const ebpo_polytope *envelope, double volume,
         r.gain = ebpo_polytope_cap_bound(volume, most - least, most - r.d);
         if (r.gain >= epsilon && r.gain > 0)
             c->by_gain[c->gains++] = r;
-        if (reach > 0 && most - r.d > reach * ebpo_vec3_length(r.n)) /* cutting only reduces it */
+        /* further cuts only reduce this extent */
+        if (reach > 0 && most - r.d > reach * ebpo_vec3_length(r.n))
             c->by_reach[c->reaches++] = r;
     }
 }
@@ -121,8 +122,8 @@ static void drop_first(ranked *heap, int *count)
         sift_down(heap, *count, 0);
 }
 
-/* Cuts off needles, which have hardly any volume, starting with the farthest. Skips a plane that
- * clipping refuses. */
+/* Cuts off needles, which have hardly any volume, the longest first. Skips a plane if clipping by
+ * it fails. */
 static int cut_needles(ebpo_polytope *envelope, contest *c, double reach, int most, int taken,
                        uint32_t *codes)
 {
@@ -180,7 +181,7 @@ int ebpo_select_greedy(ebpo_polytope *envelope, const ebpo_choice *choice, uint3
     return cut_needles(envelope, &c, choice->reach, most, taken, codes);
 }
 
-/* Share of the cell below which a derived plane is not worth the time of a clip. */
+/* A derived plane that removes less than this share of the cell is not worth the time of a clip. */
 static const double hardly_anything = 3e-4;
 
 int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, int count, int most,
@@ -197,9 +198,10 @@ int ebpo_select_all(ebpo_polytope *envelope, const ebpo_candidate *candidates, i
     return cut_needles(envelope, &c, ebpo_needle, most, taken, codes);
 }
 
-/* Clips by the chosen candidates in ascending order of their numbers. Drops those that then cut
- * nothing. No more than `most` are chosen (ebpo_selection_wanted): candidates are sorted by
- * direction, so candidates omitted here would all face in similar directions. */
+/* Clips by the chosen candidates in ascending order of their indices. Drops candidates that cut
+ * nothing by then. At most `most` candidates are chosen (ebpo_selection_wanted), so this loop omits
+ * none for lack of space: as candidates are sorted by direction, those would all face in similar
+ * directions. */
 static int clip_by_chosen(ebpo_polytope *envelope, const ebpo_choice *choice, const bool *chosen,
                           uint32_t *codes)
 {
@@ -282,7 +284,7 @@ typedef struct clustering {
 } clustering;
 
 /* Returns the angle of (x, y) from the x axis, -pi .. pi, to about 1e-15, by operations that round
- * identically everywhere: implementations of libm differ, and choices must not. */
+ * identically everywhere: implementations of libm differ, but the choices must be the same. */
 static double angle_of(double y, double x)
 {
     double least = fmin(fabs(x), fabs(y)), most = fmax(fabs(x), fabs(y));
@@ -302,7 +304,8 @@ static double angle_of(double y, double x)
     return y < 0 ? -angle : angle;
 }
 
-/* Sets the normal in the model's coordinates, as a unit vector or as the theses' two angles. */
+/* Computes the normal in the model's coordinates, as a unit vector or as the two angles of the
+ * theses. */
 static void place_normal(const ebpo_choice *choice, uint32_t normal, double out[3])
 {
     int32_t n[3], d;

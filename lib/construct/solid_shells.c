@@ -2,10 +2,11 @@
  *
  * Where no faces of two components have a common point, each component as a whole is inside or
  * outside every other one, and the winding numbers on its sides follow from the nesting. Faces are
- * compared only where the boxes of components do not decide: a face of a component whose box is not
- * within another one's, and that reaches that other box. Both passes stop after a number of steps
- * that is proportional to the faces; the components then count as not apart. `ebpo check` uses the
- * counts, the solid's volume the apart components. */
+ * compared only where the boxes of components do not decide: a first pass finds the faces that
+ * intersect the box of another component, unless that box contains the box of their own component.
+ * A second pass compares these faces. Both passes stop after a number of steps that is proportional
+ * to the number of faces; the components then count as not apart. `ebpo check` uses the counts; the
+ * computation of the solid's volume uses the components that are apart. */
 #include "core/strict_fp.h"
 
 #include "construct/solid_shells.h"
@@ -26,15 +27,16 @@ enum { RULES = 3, GRAIN = 1 << 13, STEPS_PER_FACE = 64, STEPS_AT_LEAST = 1 << 22
 
 typedef struct comparing {
     ebpo_solid_shells *s;
-    uint8_t *exposed;    /* [faces] the face reaches the box of a shell that does not contain its
-                          * shell's box */
-    uint8_t *reached;    /* [shells] some face of another shell reaches this box */
+    /* [faces] 1: the face's box intersects the box of another shell, which does not contain the box
+     * of the face's own shell */
+    uint8_t *exposed;
+    uint8_t *reached;    /* [shells] 1: a face of another shell intersects this shell's box */
     ebpo_box_tree faces; /* faces of reached shells; value: the shell */
     uint64_t steps, most;
     bool apart; /* result so far */
 } comparing;
 
-/* The face that others are compared with. */
+/* The walk for one face, which is compared with shells or with other faces. */
 typedef struct visitor {
     comparing *c;
     ebpo_point_box box;
@@ -135,17 +137,17 @@ static ebpo_status find_clash(void *context, uint64_t begin, uint64_t end, unsig
     return compare_faces(c, begin, end, &c->faces, visit_faces);
 }
 
-static ebpo_status plant_faces(comparing *c, ebpo_error *error)
+static ebpo_status build_face_tree(comparing *c, ebpo_error *error)
 {
     const ebpo_mesh *mesh = c->s->mesh;
-    bool planted = true;
+    bool added = true;
     c->faces.workspace = mesh->workspace;
     EBPO_FOR_ITEMS_SCATTERED(mesh->workspace, f, 0, mesh->face_count) {
         uint32_t one = shell_of_face(c, f);
-        if (planted && one != EBPO_NO_INDEX && c->reached[one])
-            planted = ebpo_face_add(&c->faces, mesh, (uint32_t)f, (int32_t)one);
+        if (added && one != EBPO_NO_INDEX && c->reached[one])
+            added = ebpo_face_add(&c->faces, mesh, (uint32_t)f, (int32_t)one);
     }
-    return planted && ebpo_box_tree_build(&c->faces, ebpo_face_box, mesh)
+    return added && ebpo_box_tree_build(&c->faces, ebpo_face_box, mesh)
                ? EBPO_OK
                : ebpo_workspace_fail(mesh->workspace, c->faces.count * sizeof(ebpo_tree_point),
                                      error);
@@ -165,7 +167,7 @@ static ebpo_status compare_shells(comparing *c, ebpo_error *error)
     ebpo_status status =
         ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_exposed, c, NULL, "", error);
     if (status == EBPO_OK && c->apart)
-        status = plant_faces(c, error);
+        status = build_face_tree(c, error);
     if (status == EBPO_OK && c->apart && c->faces.count)
         status =
             ebpo_parallel_for(n->threads, workspace, count, GRAIN, find_clash, c, NULL, "", error);
@@ -184,8 +186,9 @@ static ebpo_status find_apart(ebpo_solid_shells *s, ebpo_error *error)
     return status;
 }
 
-/* Returns false for an open component, and for one without volume that is not flat: it bounds parts
- * whose volumes cancel. Two closed faces are one face and its back. */
+/* Returns false for an open component. Also returns false for a component that has no volume but is
+ * not flat: it bounds parts whose volumes cancel. A closed component of two faces is flat: a face
+ * and its reverse. */
 static bool is_simple(const ebpo_components *c, uint64_t i)
 {
     const ebpo_found_component *one = &c->list[i];
@@ -248,7 +251,7 @@ static void count_one(const ebpo_nesting *n, const ebpo_shell *one, ebpo_shells 
     made->nested += !inwards && cavity;
 }
 
-/* Adds for each rule the volume of the solid beyond the integral of the winding number. */
+/* Sets, for each rule, the volume of the solid minus the integral of the winding number. */
 static void add_beyond(const ebpo_solid_shells *s, ebpo_shells *made)
 {
     ebpo_mesh_frame frame = ebpo_mesh_frame_of(s->mesh);

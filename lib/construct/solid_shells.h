@@ -10,14 +10,15 @@
 
 typedef struct ebpo_solid_shells {
     const ebpo_mesh *mesh; /* borrowed */
-    uint32_t *closed; /* result of ebpo_mesh_find_shells; `of_face` of the nesting's components */
+    /* result of ebpo_mesh_find_shells; the nesting uses it as `of_face` of its components */
+    uint32_t *closed;
     ebpo_nesting nesting;
     uint32_t *shell_of; /* [components] index among the shells; EBPO_NO_INDEX: without a volume */
     bool apart;         /* every component is closed, and no faces of two have a common point */
 } ebpo_solid_shells;
 
-/* Finds the components, their nesting, and sets `apart`. Takes as long as ebpo_mesh_count_shells.
- * The caller frees `out`, on failure as well. */
+/* Finds the components and their nesting, and sets `apart`. Takes as long as
+ * ebpo_mesh_count_shells. The caller frees `out`, on failure as well. */
 EBPO_MUST_USE ebpo_status ebpo_solid_shells_find(ebpo_solid_shells *out, const ebpo_mesh *mesh,
                                                  unsigned threads, const ebpo_progress *progress,
                                                  ebpo_error *error);
@@ -25,9 +26,9 @@ EBPO_MUST_USE ebpo_status ebpo_solid_shells_find(ebpo_solid_shells *out, const e
 void ebpo_solid_shells_count(const ebpo_solid_shells *shells, ebpo_shells *out);
 void ebpo_solid_shells_free(ebpo_solid_shells *shells);
 
-/* Returns how often the faces of a component bound the solid with their orientation: 1, 0 or -1;
- * only for components that are apart. Integrals over all faces with these factors are those of the
- * solid. */
+/* Returns how often the faces of a component bound the solid: 1, 0 (not at all) or -1 (with the
+ * opposite orientation). Only for components that are apart. An integral over all faces with these
+ * factors is the integral over the solid. */
 int ebpo_component_times(const ebpo_solid_shells *shells, uint32_t component, ebpo_rule rule);
 
 #endif

@@ -1,13 +1,13 @@
 /* Computes the support of the solid in a cell: the greatest n . xi over the mesh vertices in the
- * cell, the points where faces cross the cell's faces, and the corners of the cell inside. It is
- * the offset of a plane with normal n.
+ * cell, the points where faces cross the cell's faces, and the corners of the cell that are inside
+ * the solid. The support is the offset of a plane with normal n.
  *
- * With few vertices all points are gathered, each once, and searched in stretches that share a box.
- * With many, only crossings and corners are gathered; vertices are searched by a hierarchy of boxes
- * over their runs along the curve. Rounding is monotone: a box's bound, computed by the same
- * operations in the same order, is never below that of a point in it, so skipping a box never loses
- * the greatest point. Searches stop early at a support with which the plane could not gain
- * anything. */
+ * With few vertices, all points are gathered, each once, and searched in stretches that share a
+ * box. With many vertices, only crossings and corners are gathered; vertices are searched by a
+ * hierarchy of boxes over their runs along the curve. Rounding is monotone: a box's bound, computed
+ * by the same operations in the same order, is never below that of a point in it, so skipping a box
+ * never loses the greatest point. A search stops early when the support is so large that the plane
+ * would not be worth storing. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -109,7 +109,8 @@ static void visit_block(query *q, int level, uint64_t block)
 }
 
 /* Returns the greatest n . xi over vertices [begin, end), in coordinates of the cell that contains
- * them, and `least`; `*at`: the vertex, or EBPO_NO_VERTEX when `least` is the greatest. */
+ * them, but at least `least`. `*at` is the vertex, or EBPO_NO_VERTEX when no value exceeds `least`.
+ */
 static double bounds_support(const ebpo_builder *b, ebpo_cell cell, const double n[3],
                              uint64_t begin, uint64_t end, double least, uint64_t *at)
 {
@@ -196,7 +197,8 @@ static bool add_point(ebpo_supports *s, const double x[3], double slack)
     double(*p)[4] = s->point[s->count / 4],
     values[4] = { x[0], x[1], x[2], EBPO_NORMAL_NORM * slack };
     unsigned own = s->count % 4;
-    for (int k = 0; k < 4; k++) /* the others of four are copies of the first until they are set */
+    /* the other lanes of a four are copies of the first lane until they are set */
+    for (int k = 0; k < 4; k++)
         for (unsigned lane = own; lane < (own ? own + 1 : 4); lane++)
             p[k][lane] = values[k];
     s->count++;
@@ -228,7 +230,7 @@ static bool add_vertices(ebpo_supports *s, uint64_t begin, uint64_t end)
 
 static bool add_crossings(ebpo_supports *s, const ebpo_branch *branch, const ebpo_build_detail *d)
 {
-    /* for the top: each is in a different part of the workspace's files */
+    /* the faces of the top are in different parts of the workspace's files */
     const uint64_t every = branch->list ? 1024 : 32;
     EBPO_FOR_ITEMS_EVERY(s->workspace, every, i, d->cross_begin, d->cross_end) {
         ebpo_triangle face;
@@ -269,7 +271,7 @@ static bool gather_points(ebpo_supports *s, const ebpo_builder *b, const ebpo_br
         return false;
     s->begin = few ? 0 : begin;
     s->end = few ? 0 : end;
-    /* Corners first: they are far out and show early which directions are hopeless. */
+    /* Corners come first: they are far out, so searches for hopeless directions stop early. */
     unsigned corners = ebpo_inside_corners(b, winding, detail->delta);
     for (int i = 0; i < 8; i++)
         if (corners >> i & 1 &&
@@ -353,7 +355,7 @@ double ebpo_supports_find_from(const ebpo_supports *s, const int32_t normal[3], 
     among_points(s, n, enough, &support, where);
     if (s->begin >= s->end || support >= enough)
         return support;
-    ebpo_release_pages(s->workspace); /* that many vertices are spread over the whole file */
+    ebpo_release_pages(s->workspace); /* so many vertices are spread over the whole file */
     uint64_t at;
     double p[3] = { 0, 0, 0 };
     support = bounds_support(s->b, s->cell, n, s->begin, s->end, support, &at);

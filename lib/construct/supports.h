@@ -25,13 +25,13 @@ typedef struct ebpo_supports {
     double (*point)[4][4];
     uint64_t count, capacity; /* number of points; number of fours */
     const ebpo_sweep *sweep;
-    uint16_t *place; /* hash table: 1 + number of the point; most points occur several times */
+    uint16_t *place; /* hash table: 1 + index of the point, as most points occur several times */
     uint64_t place_capacity;
     uint64_t place_count; /* size of the table, a power of two */
     /* for each stretch of points: least and greatest coordinates, greatest slack */
     double (*box)[7];
     uint64_t box_capacity;
-    /* vertices that are not among the points: searched by their bounds */
+    /* range of vertices that are not among the points; they are searched by their bounds */
     uint64_t begin, end;
 } ebpo_supports;
 
@@ -39,14 +39,15 @@ typedef struct ebpo_supports {
 bool ebpo_supports_gather(ebpo_supports *s, const ebpo_builder *b, const ebpo_branch *branch,
                           const ebpo_build_detail *detail, ebpo_cell cell, int32_t winding);
 
-/* Returns an upper bound of n . xi, exact except for rounding errors that ebpo_plane_code_offset
- * allows for. The search ends when it reaches `enough`. `where` is the point of the maximum, in
- * cell coordinates. Returns -1e300 when there are no points. */
+/* Returns an upper bound of n . xi over the solid in the cell. The bound is exact except for
+ * rounding errors, for which ebpo_plane_code_offset has a margin. The search ends when it reaches
+ * `enough`. `where` is the point of the maximum, in cell coordinates. Returns -1e300 when there are
+ * no points. */
 double ebpo_supports_find(const ebpo_supports *s, const int32_t n[3], double enough,
                           double where[3]);
 
-/* Does the same with known points of the solid: the search among vertices begins with the best of
- * them. */
+/* Does the same as ebpo_supports_find with known points of the solid. The search among vertices
+ * begins with the greatest value of the known points. */
 double ebpo_supports_find_from(const ebpo_supports *s, const int32_t n[3], double enough,
                                const double (*known)[3], int known_count, double where[3]);
 

@@ -12,7 +12,8 @@ enum {
     EBPO_SWEEP_PLANES = 2048 /* maximum */
 };
 
-/* Planes n . x = d by coordinate; the padding of the last four is a plane that no point sees. */
+/* Planes n . x = d by coordinate; the padding of the last four is a plane that no point is above.
+ */
 typedef struct ebpo_sweep_planes {
     const double *nx, *ny, *nz, *d;
     int fours;
@@ -29,12 +30,13 @@ typedef struct ebpo_sweep_points {
 
 typedef struct ebpo_sweep {
     /* Finds planes that p is above by more than `above`, if it is beyond any by more than `beyond`
-     * (else none): writes the first `capacity` numbers and returns their total number. */
+     * (else none): writes the indices of the first `capacity` planes and returns the number of all
+     * planes found. */
     int (*seen)(const ebpo_sweep_planes *planes, const double p[3], double beyond, double above,
                 uint16_t *list, int capacity);
-    /* Raises *best to the greatest value among the points; ends when it has reached `enough`.
-     * Returns the first point's number of the stretch with this value; UINT64_MAX: none is greater.
-     */
+    /* Raises *best to the greatest value among the points; ends when *best has reached `enough`.
+     * Returns the index of the first point of the stretch with this value; UINT64_MAX when no value
+     * is greater. */
     uint64_t (*highest)(const ebpo_sweep_points *points, const double n[3], double enough,
                         double *best);
 } ebpo_sweep;

@@ -1,7 +1,7 @@
-/* The two inner loops of hulls and supports, four doubles at a time: planes that a point is above,
- * and the greatest value among points. meson.build compiles this file once for each instruction
- * set; the operations and their order are the same in each, so the results are the same. The
- * interface is sweep.h; core/cpu.h chooses the variant. */
+/* The two inner loops of hulls and supports, four doubles at a time. One finds the planes that a
+ * point is above, the other the greatest value among points. meson.build compiles this file once
+ * for each instruction set; the operations and their order are the same in each, so the results are
+ * the same. The interface is sweep.h; core/cpu.h chooses the variant. */
 #include "core/strict_fp.h"
 
 #include "construct/sweep.h"

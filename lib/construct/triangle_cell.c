@@ -1,11 +1,11 @@
-/* Tests a face against a cell: octants of the cell that it may touch, a test for no contact, and
- * its part within the cell as a polygon.
+/* Tests a face against a cell: finds the octants of the cell that the face may touch, tests if the
+ * face misses the cell, and clips the face to the cell.
  *
- * All tests are conservative by a bound of the rounding error, so no exact arithmetic is needed:
- * including a neighbour costs little, missing one is an error of the file. The tests use the face's
- * bounding box, its plane and the cross products of its edges with the axes (separating axes).
- * Clipping enlarges the cell by the bound, so that a face that touches the closed cell always
- * leaves points. */
+ * All tests are conservative by a bound of the rounding error, so no exact arithmetic is needed: a
+ * face that a cell lists without touching it costs little, but a missing face is an error of the
+ * file. The tests use the face's bounding box, its plane and the cross products of its edges with
+ * the axes (separating axes). Clipping enlarges the cell by the bound, so that a face that touches
+ * the closed cell always leaves points. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -33,9 +33,10 @@ static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *
     return most;
 }
 
-/* Returns the slack. With coordinates up to M: 2.01 u M from to_cell, and at most 8 u M for each of
- * six clips; 128 u M covers their sum. One value for all faces with small coordinates: then shared
- * points of two faces are computed identically from both. */
+/* Returns the slack. With coordinates up to M and u = 2^-53, the errors are 2.01 u M from to_cell
+ * and at most 8 u M for each of six clips; 128 u M covers their sum. All faces with small
+ * coordinates have the same slack, so that shared points of two faces are computed identically from
+ * both. */
 static double slack_for(double most) { return most <= 2 ? 0x1p-45 : most * 0x1p-46; }
 
 static int clip_cell_face(double in[9][3], int count, int axis, double sign, double limit,
@@ -98,8 +99,8 @@ static void separation_prepare(separation *s)
 }
 
 /* Returns true when the plane of the face or a cross product of one of its edges with an axis
- * separates it from the cube around `centre`. Errors: edges 4 u M; cross terms below 64 u M^2; the
- * plane's below 512 u M^3 (u = 2^-53). */
+ * separates it from the cube around `centre`. Rounding errors, with coordinates up to M and u =
+ * 2^-53: 4 u M of edges, below 64 u M^2 of cross terms, below 512 u M^3 of the plane. */
 static bool is_separated(const separation *s, const double centre[3], double half)
 {
     double m = s->most, tolerance = 0x1p-44 * m * m * m;
@@ -125,7 +126,8 @@ static bool is_separated(const separation *s, const double centre[3], double hal
     return false;
 }
 
-/* Uses the planes between the octants, which are exact. */
+/* Returns a mask of the octants that the face's bounds touch, by comparing with the exact planes
+ * between the octants. */
 static unsigned octants_of_bounds(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
 {
     static const unsigned low_side[3] = { 0x55, 0x33, 0x0f };

@@ -1,8 +1,8 @@
 /* Computes the polygons of a level: the envelopes of its nodes, as triangles.
  *
  * The walk goes from the root down; each envelope is cut from its parent's by the node's planes. A
- * leaf's planes come from the file, or from its faces (construct/leaf_planes.c), or it keeps its
- * parent's envelope. The top of the tree is walked first; threads then walk the independent
+ * leaf's planes come from the file, or from its faces (construct/leaf_planes.c), or the leaf keeps
+ * its parent's envelope. The top of the tree is walked first; threads then walk the independent
  * subtrees below it. The position of the split depends only on the tree, and pieces are joined in
  * octcode order, so the number of threads does not change the result.
  *
@@ -312,8 +312,8 @@ ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, ui
                           ? ebpo_lod_inside_corners(&model->box, cell, model->info->rule,
                                                     winding[leaf], scratch->faces, count)
                           : 0;
-    /* Derived planes cost no bytes: each plane that removes anything is used, as for the volumes
-     * stated in the file. */
+    /* Derived planes need no storage, so the selection is not limited by epsilon, as for the
+     * volumes stated in the file. */
     *plane_count =
         ebpo_leaf_planes(&model->box, cell, scratch->faces, count, inside, 0, envelope, codes);
     return EBPO_OK;
@@ -387,8 +387,8 @@ ebpo_status ebpo_lod_colours(const ebpo_lod_nodes *nodes, uint64_t vertex_count,
         sum += nodes->nodes[i].vertex_count;
     if (sum != vertex_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT,
-                         "the nodes have %llu vertices, but the mesh has %llu; pass both of one "
-                         "level",
+                         "the nodes have %llu vertices, but the mesh has %llu; pass nodes "
+                         "and mesh of one level",
                          (unsigned long long)sum, (unsigned long long)vertex_count);
     if (!are_coloured(nodes))
         return EBPO_OK;
@@ -421,10 +421,10 @@ typedef struct seed {
 
 typedef struct job {
     const ebpo_lod_model *model;
-    bool cell_faces,
-        polygons; /* keep polygons on cell faces; compute polygons, or only the volume */
-    bool nodes;   /* record the node of each polygon */
-    int split;    /* level at which the first walk creates seeds */
+    bool cell_faces; /* keep polygons on cell faces */
+    bool polygons;   /* compute polygons; false: only the volume */
+    bool nodes;      /* record the node of each polygon */
+    int split;       /* level at which the first walk creates seeds */
     seed *seeds;
     uint64_t seed_count;
     ebpo_polyhedra (
@@ -549,8 +549,8 @@ static ebpo_status walk_seeds(void *context, uint64_t begin, uint64_t end, unsig
     for (uint64_t i = begin; i < end; i++) {
         walker w = { j, j->pieces[1 + i], &j->scratch[worker], j->halves[worker], -1, error };
         seed *s = &j->seeds[i];
-        /* Seeds are all gray nodes of their level in octcode order: the i-th has the i-th group
-         * below it. */
+        /* The seeds are all gray nodes of their level in octcode order, so the children of seed i
+         * are group i of the next level. */
         ebpo_status status = is_pruned(j->model, s->cell.level, i)
                                  ? emit_polytope(&w, &s->envelope, s->cell, EBPO_GRAY)
                                  : visit_group(&w, i, s->cell, &s->envelope);
@@ -594,7 +594,7 @@ static ebpo_status job_walk(job *j, unsigned threads, const ebpo_progress *progr
                              "clipping envelopes", error);
 }
 
-/* Joins pieces level by level, and within a level the nodes of the top or of the seeds, in order.
+/* Joins the pieces level by level; within a level, the top comes first and then the seeds in order.
  */
 static ebpo_status job_join(job *j, ebpo_mesh *out, ebpo_lod_nodes *nodes, double *volume,
                             ebpo_error *error)

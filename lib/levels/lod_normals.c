@@ -6,7 +6,7 @@
  *
  * For each of the six sides, a normal is computed at every corner of a drawn cell: the mean,
  * weighted by area, of the plane polygons that face this side, over the nodes around the corner.
- * Between corners, normals are interpolated linearly. Planes on the other side of a thin part do
+ * Between corners, normals are interpolated linearly. So planes on the other side of a thin part do
  * not count. */
 #include "core/strict_fp.h"
 
@@ -46,7 +46,7 @@ typedef struct lighting {
 
 /* --- polygons --- */
 
-/* Adds a triangle, beginning with a node's first one. */
+/* Adds the area vector of a triangle. */
 static void add_triangle(const ebpo_mesh *mesh, const uint32_t *face, double area[3])
 {
     const double *a = mesh->xyz64 + 3 * (uint64_t)face[0], *b = mesh->xyz64 + 3 * (uint64_t)face[1],
@@ -64,8 +64,9 @@ static const double *corner_of(const ebpo_mesh *mesh, const uint32_t *face, unsi
     return mesh->xyz64 + 3 * (uint64_t)v;
 }
 
-/* Returns the side of a polygon. Corners on a cell face have exactly its coordinate. Outside the
- * root cell there is no neighbour, so polygons on its faces count as planes. */
+/* Returns the side of the cell that a polygon is on, or ON_PLANE. Corners on a cell face have
+ * exactly the cell face's coordinate. The root cell has no neighbours, so polygons on its cell
+ * faces count as planes. */
 static int side_of(const ebpo_box *box, ebpo_cell cell, const ebpo_mesh *mesh, const uint32_t *face,
                    unsigned corners)
 {
@@ -141,7 +142,7 @@ static bool number_corners(lighting *l)
 
 /* --- sides --- */
 
-/* Sums a node's planes that face a side. */
+/* Sums the area vectors of a node's plane polygons that face a side. */
 static void node_sum(const polygon *p, uint32_t count, int side, double out[4])
 {
     double sign = side % 2 ? 1 : -1;
@@ -235,8 +236,8 @@ static ebpo_status check_nodes(const ebpo_mesh *mesh, const ebpo_lod_nodes *node
     if (triangles == mesh->face_count)
         return EBPO_OK;
     return ebpo_fail(error, EBPO_E_ARGUMENT,
-                     "the nodes have %llu triangles, but the mesh has %llu; pass both of one "
-                     "level",
+                     "the nodes have %llu triangles, but the mesh has %llu; pass nodes "
+                     "and mesh of one level",
                      (unsigned long long)triangles, (unsigned long long)mesh->face_count);
 }
 

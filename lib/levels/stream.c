@@ -1,10 +1,10 @@
 /* Delivers a file level by level, node by node in octcode order, for programs that show or process
  * a model while it arrives.
  *
- * Only the types of completed levels stay in memory, and the planes if polygons are requested:
- * enough to walk down to the nodes of the next level. Within a level, the depth-first walk from the
- * root visits groups, nodes of each type and planes in stored order; running counts locate them,
- * without tables of sums.
+ * Only the types of completed levels stay in memory, and their planes if polygons are requested.
+ * This is enough to walk down to the nodes of the next level. Within a level, the depth-first walk
+ * from the root visits groups, nodes of each type and planes in stored order; running counts give
+ * their positions, without tables of sums.
  *
  * Half-spaces and polygons are converted from cell coordinates to model coordinates with bounded
  * rounding: a point of the cell that satisfies a plane's code also satisfies the delivered plane.
@@ -87,32 +87,32 @@ void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcod
 }
 
 void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes,
-                          unsigned count, ebpo_node_buffers *capacity)
+                          unsigned count, ebpo_node_buffers *buffers)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(out->octcode);
     for (unsigned i = 0; i < count; i++) {
         int32_t n[3], d;
         if (ebpo_plane_decode(codes[i], n, &d))
-            ebpo_plane_to_world(box, cell, n, d, capacity->planes[out->plane_count++]);
+            ebpo_plane_to_world(box, cell, n, d, buffers->planes[out->plane_count++]);
     }
-    out->planes = (const double(*)[4])capacity->planes;
+    out->planes = (const double(*)[4])buffers->planes;
 }
 
 void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box, const ebpo_polytope *p,
-                            ebpo_node_buffers *capacity)
+                            ebpo_node_buffers *buffers)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(out->octcode);
-    polytope_to_world(p, box, cell, capacity->vertices);
+    polytope_to_world(p, box, cell, buffers->vertices);
     for (int f = 0; f <= p->face_count; f++)
-        capacity->polygon_first[f] = p->first[f];
+        buffers->polygon_first[f] = p->first[f];
     for (int i = 0; i < p->corner_count; i++)
-        capacity->corners[i] = p->corner[i];
+        buffers->corners[i] = p->corner[i];
     out->volume = ebpo_polytope_volume(p) * ebpo_cell_volume(box, cell.level);
     out->vertex_count = (uint32_t)p->vertex_count;
     out->polygon_count = (uint32_t)p->face_count;
-    out->vertices = (const double(*)[3])capacity->vertices;
-    out->polygon_first = capacity->polygon_first;
-    out->corners = capacity->corners;
+    out->vertices = (const double(*)[3])buffers->vertices;
+    out->polygon_first = buffers->polygon_first;
+    out->corners = buffers->corners;
 }
 
 /* --- walking the nodes of one level --- */
@@ -131,9 +131,10 @@ typedef struct level_walk {
     int target, depth;
     bool pruned; /* the file is a subset: empty groups have no nodes */
     struct {
-        uint64_t group, rank[4], plane, leaf_plane; /* numbers of visited items in this level */
-        unsigned octant;                            /* next octant of the group */
-        /* last visited node: in levels above `depth` the ancestor */
+        /* numbers of items visited so far in this level */
+        uint64_t group, rank[4], plane, leaf_plane;
+        unsigned octant; /* next octant of the group */
+        /* last visited node; in levels above `depth`, it is the ancestor of the next node */
         level_walk_node node;
     } at[EBPO_LEVELS_MAX];
 } level_walk;
@@ -146,7 +147,7 @@ static void level_walk_begin(level_walk *walk, const ebpo_level *level, int targ
     walk->pruned = pruned;
 }
 
-/* Visits the next node of the level at `depth`, which exists. */
+/* Visits the next node of the level at `depth`; the caller ensures that there is one. */
 static level_walk_node *pass_node(level_walk *w, int depth)
 {
     const ebpo_level *level = &w->level[depth];
@@ -197,7 +198,8 @@ static bool level_walk_next(level_walk *w, level_walk_node *out)
     }
 }
 
-/* Returns the envelope of the ancestor at `depth`, and computes those above it. */
+/* Returns the envelope of the ancestor at `depth`, and computes the envelopes above the ancestor.
+ */
 static const ebpo_polytope *ancestor_envelope(const level_walk *w, int depth,
                                               ebpo_envelope_stack *e)
 {
@@ -222,7 +224,7 @@ static const ebpo_polytope *level_walk_envelope(const level_walk *w, const level
 
 /* --- the stream --- */
 
-enum { PIECE = 4096 };
+enum { PIECE = 4096 }; /* nodes of a piece, the unit of parallel work */
 
 struct ebpo_stream {
     const ebpo_file *file;
@@ -232,11 +234,11 @@ struct ebpo_stream {
     int level; /* last level read; -1: none */
     ebpo_level kept[EBPO_LEVELS_MAX];
     uint64_t bytes;
-    double
-        uniform_volume; /* volume of the leaves and black nodes in all levels before the next one */
+    /* volume of the leaves and black nodes in all levels up to `level` */
+    double terminal_volume;
     level_walk walk;
     ebpo_envelope_stack *envelopes; /* if polygons are requested */
-    ebpo_node_buffers capacity;
+    ebpo_node_buffers buffers;
 };
 
 ebpo_status ebpo_stream_new(const ebpo_file *file, const ebpo_stream_options *options,
@@ -319,7 +321,7 @@ static ebpo_status check_level(const ebpo_level *level, int number, uint64_t par
 /* --- volumes --- */
 
 typedef struct volumes {
-    double gray, uniform_volume;
+    double gray, terminal_volume;
 } volumes;
 
 typedef struct job {
@@ -341,7 +343,7 @@ static ebpo_status sum_pieces(void *context, uint64_t begin, uint64_t end, unsig
         level_walk_node node;
         for (int k = 0; k < PIECE && level_walk_next(&walk, &node); k++)
             if (node.type != EBPO_WHITE)
-                *(node.type == EBPO_GRAY ? &j->found[i].gray : &j->found[i].uniform_volume) +=
+                *(node.type == EBPO_GRAY ? &j->found[i].gray : &j->found[i].terminal_volume) +=
                     ebpo_polytope_volume(level_walk_envelope(&walk, &node, &j->envelopes[worker])) *
                     cell;
     }
@@ -382,7 +384,7 @@ static ebpo_status cut_volumes(const ebpo_stream *s, int target, uint64_t nodes,
                                error);
     for (uint64_t i = 0; i < pieces; i++) {
         out->gray += j.found[i].gray;
-        out->uniform_volume += j.found[i].uniform_volume;
+        out->terminal_volume += j.found[i].terminal_volume;
     }
 done:
     free(j.starts);
@@ -425,7 +427,7 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
     if (status != EBPO_OK)
         return status;
     volumes v = stated_volumes(s, next);
-    /* the head has been checked: at most all parents */
+    /* the header was checked: at most all parents are pruned */
     uint64_t nodes = next ? 8 * (parents - s->info->level[next - 1].pruned_count) : 1;
     status = check_level(level, next, parents, error);
     if (status == EBPO_OK && s->options.polygons) {
@@ -440,11 +442,11 @@ ebpo_status ebpo_stream_next_level(ebpo_stream *s, ebpo_stream_level *out, bool 
     if (next)
         drop_passed(&s->kept[next - 1], s->options.polygons);
     s->level = next;
-    s->uniform_volume += v.uniform_volume;
+    s->terminal_volume += v.terminal_volume;
     s->bytes += ebpo_reader_level_bytes(s->file, next) +
                 (next == s->info->index_level ? s->info->chunk_index_bytes : 0);
     level_walk_begin(&s->walk, s->kept, next, s->info->pruned);
-    *out = (ebpo_stream_level){ next, nodes, s->bytes, v.gray + s->uniform_volume };
+    *out = (ebpo_stream_level){ next, nodes, s->bytes, v.gray + s->terminal_volume };
     *more = true;
     return EBPO_OK;
 }
@@ -488,10 +490,10 @@ ebpo_status ebpo_stream_next_node(ebpo_stream *s, ebpo_stream_node *out, bool *m
     out->winding = winding_of(&s->kept[s->level], &node);
     add_colour(s, &node, out);
     if (s->options.planes || s->options.polygons)
-        ebpo_node_add_planes(out, &s->box, node.codes, node.code_count, &s->capacity);
+        ebpo_node_add_planes(out, &s->box, node.codes, node.code_count, &s->buffers);
     if (s->options.polygons && node.type != EBPO_WHITE)
         ebpo_node_add_polygons(out, &s->box, level_walk_envelope(&s->walk, &node, s->envelopes),
-                               &s->capacity);
+                               &s->buffers);
     *more = true;
     return EBPO_OK;
 }

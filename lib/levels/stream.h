@@ -14,9 +14,9 @@
 /* --- half-spaces --- */
 
 /* Converts the code's half-space 4096 (n . xi) <= d to out[0..2] . p <= out[3] with a unit normal
- * (to 4 ulps). Every real point p of the cell that satisfies the code satisfies the result, also
- * when the left side is evaluated in doubles in any order, for double p. The offset exceeds the
- * necessary offset by about 1e-14 of the cell's coordinates. */
+ * (to 4 ulps). Every real point p of the cell that satisfies the code satisfies the result. For
+ * double p, this is also true when the left side is evaluated in doubles, in any order. The offset
+ * exceeds the necessary offset by about 1e-14 of the cell's coordinates. */
 void ebpo_plane_to_world(const ebpo_box *box, ebpo_cell cell, const int32_t n[3], int32_t d,
                          double out[4]);
 
@@ -36,8 +36,8 @@ void ebpo_node_begin(ebpo_stream_node *out, const ebpo_box *box, uint64_t octcod
                      ebpo_node_type type);
 /* Adds at most EBPO_NODE_CODES codes. */
 void ebpo_node_add_planes(ebpo_stream_node *out, const ebpo_box *box, const uint32_t *codes,
-                          unsigned count, ebpo_node_buffers *capacity);
+                          unsigned count, ebpo_node_buffers *buffers);
 void ebpo_node_add_polygons(ebpo_stream_node *out, const ebpo_box *box,
-                            const ebpo_polytope *envelope, ebpo_node_buffers *capacity);
+                            const ebpo_polytope *envelope, ebpo_node_buffers *buffers);
 
 #endif

@@ -1,7 +1,7 @@
 /* Manages the cut of a view: the delivered nodes of the tree, and the order of refinement.
  *
  * - An observer, prepared as a viewpoint, computes the distance of a cell, its size in pixels, and
- *   its visibility in the frustum. It gives each node a key, the order of priority. Comparisons
+ *   its visibility in the frustum. It gives each node a key for the order of priority. Comparisons
  *   allow for rounding: a barely visible cell counts as visible.
  * - The partial tree holds the delivered groups of siblings, each linked to its parent once it is
  *   complete.
@@ -22,10 +22,11 @@
 
 /* --- the observer --- */
 
-/* generous bound for a sum of three products: barely visible cells count as visible */
+/* relative bound of the rounding error of a sum of three products, with a large margin, so that
+ * barely visible cells count as visible */
 static const double SLACK = 1e-12;
 
-/* Scales a vector to length 1, whatever its length; returns false for (0, 0, 0). */
+/* Scales a vector of any length to length 1; returns false for (0, 0, 0). */
 static bool normalise_vector(const double v[3], double out[3])
 {
     double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
@@ -154,8 +155,8 @@ unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *s, const ebpo_box *box, ebp
     return octant;
 }
 
-/* Returns the octants from the root down, each relative to the eye; as one number they give the
- * order of the enumeration. */
+/* Returns the octants from the root down, each relative to the eye's octant, as one number. These
+ * numbers have the order of the enumeration from front to back. */
 static uint64_t octants_key(const ebpo_viewpoint *s, const ebpo_box *box, ebpo_octcode octcode)
 {
     int level = ebpo_octcode_level(octcode);
@@ -221,9 +222,8 @@ ebpo_status ebpo_partial_add(ebpo_partial *g, const ebpo_info *info, uint64_t pa
 {
     int level = parent ? ebpo_octcode_level(parent) + 1 : 0;
     uint64_t grays = ebpo_group_count(read->types, EBPO_GRAY, 8);
-    if (grays >
-        info->level[level].gray_count - g->grays[level]) /* otherwise a damaged index could assign
-                                                          * one node to many parents, endlessly */
+    /* without this check, a damaged index could assign one node to many parents, endlessly */
+    if (grays > info->level[level].gray_count - g->grays[level])
         return ebpo_fail(
             error, EBPO_E_FORMAT,
             "level %d: its index gives more gray nodes than the head states; run ebpo verify",

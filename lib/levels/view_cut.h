@@ -1,4 +1,6 @@
-/* Cut of a view (view_cut.c): the observer, the delivered part of the tree, and the frontier. */
+/* State of a view (view_cut.c): the observer, the delivered part of the tree, and the frontier. The
+ * cut consists of the delivered nodes whose children are not delivered; the frontier has the gray
+ * nodes among them. */
 #ifndef EBPO_LEVELS_VIEW_CUT_H
 #define EBPO_LEVELS_VIEW_CUT_H
 
@@ -15,37 +17,39 @@
 /* A prepared observer. The unit of length is about the root cell's longest side (a power of two of
  * the model's unit), so that squares neither overflow nor underflow. */
 typedef struct ebpo_viewpoint {
-    bool given, everywhere;
-    double eye[3]; /* in the model's unit */
-    double unit;   /* size of the unit of length, in the model's unit */
-    double focal;  /* pixels of length 1 at distance 1 */
+    bool given;      /* false: there is no observer */
+    bool everywhere; /* the observer has no frustum, so every cell is visible */
+    double eye[3];   /* in the model's unit */
+    double unit;     /* size of the unit of length, in the model's unit */
+    double focal;    /* pixels of length 1 at distance 1 */
     /* normals of the frustum's planes, all through the eye, and of the plane through the eye
      * parallel to the picture */
     double inward[5][3];
     double diagonal2[EBPO_LEVELS_MAX]; /* squared diagonal of the cells of each level */
 } ebpo_viewpoint;
 
-/* Prepares an observer; `observer` may be NULL. Returns EBPO_E_ARGUMENT for an
- * invalid observer. */
+/* Prepares an observer; `observer` may be NULL. Returns EBPO_E_ARGUMENT for an invalid observer. */
 EBPO_MUST_USE ebpo_status ebpo_viewpoint_make(ebpo_viewpoint *out, const ebpo_box *box,
                                               const ebpo_observer *observer, ebpo_error *error);
 
 typedef struct ebpo_seen {
     double distance2; /* squared distance from the eye to the cell's nearest point */
-    bool seen;
+    bool seen;        /* the cell may intersect the frustum */
 } ebpo_seen;
 ebpo_seen ebpo_viewpoint_see(const ebpo_viewpoint *viewpoint, const ebpo_box *box, ebpo_cell cell);
 
-/* Returns the distance in the model's unit; ebpo_viewpoint_pixels: the size of a cell in pixels. */
+/* ebpo_viewpoint_distance returns the distance in the model's unit, ebpo_viewpoint_pixels the size
+ * of a cell in pixels. */
 double ebpo_viewpoint_distance(const ebpo_viewpoint *viewpoint, double distance2);
 double ebpo_viewpoint_pixels(const ebpo_viewpoint *viewpoint, int level, double distance2);
 
-/* Returns the octant of the cell that contains the eye or is nearest to it. No ray to a child p
- * passes through a child o if o ^ this has a bit that p ^ this lacks. */
+/* Returns the octant e of the cell that contains the eye or is nearest to it. No ray from the eye
+ * to a child p passes through a child o if o ^ e has a bit that p ^ e lacks. */
 unsigned ebpo_viewpoint_octant(const ebpo_viewpoint *viewpoint, const ebpo_box *box,
                                ebpo_cell cell);
 
-/* Returns the priority key: the least comes first. For cells that do not contain each other. */
+/* Returns the priority key: the node with the least key comes first. Keys are comparable for cells
+ * that do not contain each other. */
 uint64_t ebpo_viewpoint_key(const ebpo_viewpoint *viewpoint, const ebpo_box *box,
                             ebpo_priority priority, ebpo_octcode octcode, double distance2);
 
@@ -67,7 +71,8 @@ typedef struct ebpo_partial {
     int32_t (*winding)[8]; /* NULL: not requested */
     uint64_t group_count, group_capacity, winding_capacity, code_count, code_capacity;
     bool windings;
-    /* delivered gray nodes of each level; more than the file's header states: a damaged file */
+    /* number of delivered gray nodes of each level; in a damaged file, it would exceed the number
+     * in the header */
     uint64_t grays[EBPO_LEVELS_MAX];
 } ebpo_partial;
 
@@ -137,9 +142,10 @@ void ebpo_frontier_push(ebpo_frontier *frontier, ebpo_waiting node);
 ebpo_waiting ebpo_frontier_pop(ebpo_frontier *frontier);
 /* Restores the order after keys or turns have changed. */
 void ebpo_frontier_sort(ebpo_frontier *frontier);
-/* Finds the first node to be refined in each block of `span` children's groups of a level. Writes
- * their indices in `at`, in order; the top is the first. Returns their number, at most
- * EBPO_FRONTIER_BLOCKS. */
+/* The children's groups of a level form blocks of `span` groups. For each block, finds the node
+ * that will be refined first. Writes the indices of these nodes in frontier->at to `places`, in the
+ * order of refinement, beginning with the top. Returns their number, at most EBPO_FRONTIER_BLOCKS.
+ */
 enum { EBPO_FRONTIER_BLOCKS = 1024 };
 unsigned ebpo_frontier_blocks(const ebpo_frontier *frontier, uint64_t span,
                               uint64_t places[EBPO_FRONTIER_BLOCKS]);

@@ -29,8 +29,8 @@
 typedef struct view_leaves {
     const ebpo_info *info;
     ebpo_slice slice[8]; /* of the leaves among the siblings */
-    uint8_t *given;      /* one bit for each face of the file */
-    /* Faces of the last returned leaf, valid until the next one. */
+    uint8_t *given;      /* bit f: face f was delivered */
+    /* Faces of the last returned leaf, valid until the next node is returned. */
     double (*corners)[3][3];
     uint32_t *numbers;
     uint8_t *repeated;
@@ -67,7 +67,7 @@ struct ebpo_view_stream {
     uint64_t delivered, cut[4];
     ebpo_group read;
     ebpo_envelope_stack *envelopes; /* if polygons are requested */
-    ebpo_node_buffers capacity;
+    ebpo_node_buffers buffers;
     view_leaves *leaves; /* if faces are requested */
     /* nodes that are deeper, or smaller in pixels, are not prefetched yet */
     int soon_level;
@@ -81,7 +81,7 @@ static ebpo_status view_leaves_new(view_leaves **out, const ebpo_file *file, ebp
     if (!(info->parts & EBPO_PART_MESH))
         return ebpo_fail(error, EBPO_E_ABSENT,
                          "view options: faces are requested, and the file was written without "
-                         "its mesh; build it again with it");
+                         "its mesh; build it again with the mesh");
     view_leaves *l = ebpo_alloc_zero(1, sizeof *l);
     if (l)
         l->given = ebpo_alloc_zero(info->face_count / 8 + 1, 1);
@@ -158,8 +158,8 @@ static ebpo_status view_leaves_read(view_leaves *l, ebpo_chunks *chunks, const v
 
 /* --- faces of leaves: returning them --- */
 
-/* Clears `now`: no node. */
-static void give_no_leaf(view_leaves *l) { l->now = (ebpo_view_faces)EBPO_VIEW_FACES_INIT; }
+/* Clears `now`, for a node without faces. */
+static void clear_faces(view_leaves *l) { l->now = (ebpo_view_faces)EBPO_VIEW_FACES_INIT; }
 
 static void take_face(view_leaves *l, const ebpo_slice *slice, uint32_t face)
 {
@@ -175,11 +175,11 @@ static void take_face(view_leaves *l, const ebpo_slice *slice, uint32_t face)
     l->now.new_count += !l->repeated[face];
 }
 
-/* Sets `now` to the node of this octant, which was returned with it. */
-static void give_leaf(view_leaves *l, unsigned octant)
+/* Sets `now` to the faces of the node at this octant, none if the node is not a leaf. */
+static void set_faces(view_leaves *l, unsigned octant)
 {
     const ebpo_slice *slice = &l->slice[octant];
-    give_no_leaf(l);
+    clear_faces(l);
     l->now.face_count = slice->mesh.face_count;
     l->now.corners = (const double(*)[3][3])l->corners;
     l->now.numbers = l->numbers;
@@ -218,7 +218,7 @@ static unsigned coming_groups(const fetching *f, const view_group *first, unsign
     return count ? count : 1;
 }
 
-/* Reads all data of a group, only to find out which chunks are missing. */
+/* Reads all data of a group, only to record which chunks are missing. */
 static void try_group(const fetching *f, const view_group *group)
 {
     ebpo_group read;
@@ -263,7 +263,8 @@ typedef struct entering {
     entered list[SUBTREES_MAX];
 } entering;
 
-/* Lists the subtrees of these groups, each once; excludes nodes that wait at a root. */
+/* Lists the subtrees of these groups, each once. Without faces, skips the groups directly below a
+ * subtree's root, because enter_frontier lists their subtrees. */
 static void enter_groups(const fetching *f, const view_group *groups, unsigned count, entering *e)
 {
     int level = f->chunks->file->info.subtree_level;
@@ -279,8 +280,8 @@ static void enter_groups(const fetching *f, const view_group *groups, unsigned c
     }
 }
 
-/* Lists the subtrees that the view will enter from a node above them: the types of intermediate
- * levels are in memory, or are noted as missing. */
+/* Lists the subtrees that the view will enter from a node above them. Where types of intermediate
+ * levels are not in memory, their chunks are recorded as missing. */
 static void enter_below(const fetching *f, const view_group *children, entering *e)
 {
     int level = children->number.level;
@@ -300,7 +301,8 @@ static void enter_below(const fetching *f, const view_group *children, entering 
     }
 }
 
-/* Lists nodes of the frontier at the subtrees' roots and above. */
+/* Lists the subtrees that the view will enter from visible nodes of the frontier. These nodes are
+ * at the subtrees' roots or above. */
 static void enter_frontier(const fetching *f, entering *e)
 {
     int level = f->chunks->file->info.subtree_level;
@@ -315,8 +317,8 @@ static void enter_frontier(const fetching *f, entering *e)
 }
 
 /* Collects all chunks that the view needs from the subtrees of these groups, up to `most` bytes.
- * With faces, returns false if the view passes through so many subtrees that none will be completed
- * soon; the chunks of the next groups are then sufficient. */
+ * With faces, returns false if the view enters so many subtrees that none will be completed soon.
+ * Then the caller collects only the chunks of the next groups. */
 static bool try_subtrees(const fetching *f, const view_group *groups, unsigned count,
                          const ebpo_chunk_keys *keys, uint64_t most)
 {
@@ -341,12 +343,13 @@ static bool try_subtrees(const fetching *f, const view_group *groups, unsigned c
 
 /* --- fetching --- */
 
-/* Collects the missing chunks of the group and, unless they were prefetched before, those of the
- * next groups: so one batch is used up before the next one is requested. Returns the number of the
- * group's chunks. */
+/* Collects the missing chunks of the group. Unless these were prefetched before, also collects the
+ * missing chunks of the next groups; so one batch is used up before the next one is requested.
+ * Returns the number of the group's missing chunks. */
 static unsigned collect_chunks(const fetching *f, const view_group *group, ebpo_chunk_keys *keys)
 {
-    enum { FACES_BLOCK = 64, TRIED = 64 }; /* trying takes time */
+    /* at most this many groups are tried, as trying takes time */
+    enum { FACES_BLOCK = 64, TRIED = 64 };
     view_group groups[EBPO_FRONTIER_BLOCKS];
     ebpo_chunk_keys_begin(keys);
     ebpo_chunks_collect(f->chunks, keys);
@@ -355,16 +358,16 @@ static unsigned collect_chunks(const fetching *f, const view_group *group, ebpo_
     uint64_t most = keys->bytes + ebpo_chunks_capacity(f->chunks);
     if (own && !ebpo_chunks_hinted(f->chunks, keys)) {
         unsigned count = coming_groups(f, group, f->faces ? FACES_BLOCK : 1, groups);
-        bool reported = try_subtrees(f, groups, count, keys, most);
-        for (unsigned i = 1; i < count && i < TRIED && !reported && keys->bytes < most; i++)
+        bool collected = try_subtrees(f, groups, count, keys, most);
+        for (unsigned i = 1; i < count && i < TRIED && !collected && keys->bytes < most; i++)
             try_group(f, &groups[i]);
     }
     ebpo_chunks_collect(f->chunks, NULL);
     return own;
 }
 
-/* Fetches in passes: lists, references, faces, vertices, and ranks in between. Further chunks are
- * read without prefetching. */
+/* Fetches in passes, as lists, references, faces and vertices (and ranks in between) show in turn
+ * which chunks are needed next. Chunks that are missing after the last pass are read one by one. */
 static ebpo_status fetch_tried(const fetching *f, const view_group *group, ebpo_error *error)
 {
     enum { PASSES = 12 };
@@ -387,7 +390,7 @@ static ebpo_status fetch_nodes(const fetching *f, const view_group *group, ebpo_
     if (!ebpo_group_is_far(f->chunks, &group->number, f->wanted))
         return EBPO_OK;
     if (f->chunks->limit == UINT64_MAX)
-        ebpo_hint_top(f->chunks->file); /* with the first data of the subtrees */
+        ebpo_hint_top(f->chunks->file); /* together with the first data of the subtrees */
     unsigned count = coming_groups(f, group, EBPO_GROUP_BLOCK, groups);
     for (unsigned i = 0; i < count; i++)
         numbers[i] = groups[i].number;
@@ -395,8 +398,9 @@ static ebpo_status fetch_nodes(const fetching *f, const view_group *group, ebpo_
 }
 
 /* Fetches the missing chunks of the group (EBPO_GROUP_...) of a remote file and, with `faces`, of
- * its leaves. Also prefetches those of the next groups of the frontier; if the file has a table of
- * subtrees, all chunks of their subtrees. Counted chunks: EBPO_E_LIMIT as in ebpo_group_read. */
+ * its leaves. Also prefetches the chunks of the next groups of the frontier; if the file has a
+ * table of subtrees, all chunks of the groups' subtrees. When the limit of bytes is exceeded,
+ * returns EBPO_E_LIMIT as ebpo_group_read does. */
 static ebpo_status fetch_group(ebpo_chunks *chunks, const ebpo_partial *partial,
                                const ebpo_frontier *frontier, const view_group *group,
                                unsigned wanted, bool faces, const view_depth *depth,
@@ -503,26 +507,26 @@ void ebpo_view_stream_free(ebpo_view_stream *s)
 
 /* --- the next group --- */
 
-static ebpo_turn turn_of(const ebpo_view_stream *s, int level, ebpo_seen look)
+static ebpo_turn turn_of(const ebpo_view_stream *s, int level, ebpo_seen sight)
 {
     const ebpo_view_options *o = &s->options;
     if ((o->level >= 0 && level >= o->level) ||
         (o->pixels > 0 &&
-         ebpo_viewpoint_pixels(&s->viewpoint, level, look.distance2) <= o->pixels) ||
+         ebpo_viewpoint_pixels(&s->viewpoint, level, sight.distance2) <= o->pixels) ||
         (!isinf(o->distance) &&
-         ebpo_viewpoint_distance(&s->viewpoint, look.distance2) > o->distance))
+         ebpo_viewpoint_distance(&s->viewpoint, sight.distance2) > o->distance))
         return EBPO_TURN_NEVER;
-    if (look.seen)
+    if (sight.seen)
         return EBPO_TURN_SEEN;
     return o->unseen == EBPO_UNSEEN_NEVER ? EBPO_TURN_NEVER : EBPO_TURN_UNSEEN;
 }
 
 static void rank_waiting(const ebpo_view_stream *s, ebpo_waiting *w)
 {
-    ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(w->octcode));
-    w->key =
-        ebpo_viewpoint_key(&s->viewpoint, &s->box, s->options.priority, w->octcode, look.distance2);
-    w->turn = (uint8_t)turn_of(s, ebpo_octcode_level(w->octcode), look);
+    ebpo_seen sight = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(w->octcode));
+    w->key = ebpo_viewpoint_key(&s->viewpoint, &s->box, s->options.priority, w->octcode,
+                                sight.distance2);
+    w->turn = (uint8_t)turn_of(s, ebpo_octcode_level(w->octcode), sight);
 }
 
 ebpo_status ebpo_view_stream_change(ebpo_view_stream *s, const ebpo_view_options *options,
@@ -570,44 +574,44 @@ static bool read_at_once(ebpo_view_stream *s, const view_group *group, unsigned 
     return status == EBPO_OK && missing.count == 0;
 }
 
-/* If a view ends at a number of bytes or nodes, its depth is unknown: nodes that are this much
- * deeper or smaller than the next one are prefetched only when they are near in the order. */
+/* If a view ends at a number of bytes or nodes, its depth is unknown. Then a node that is this many
+ * levels deeper than the next node, or smaller by this power of two, is not prefetched yet. */
 enum { SOON_LEVELS = 2 };
 
 static void set_soon(ebpo_view_stream *s, uint64_t next)
 {
     int level = ebpo_octcode_level(next);
-    ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(next));
+    ebpo_seen sight = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(next));
     bool ends = s->options.bytes || s->options.nodes;
     s->soon_level =
         ends && s->options.priority == EBPO_PRIORITY_LEVEL ? level + SOON_LEVELS : EBPO_LEVELS_MAX;
     s->soon_pixels =
         ends && s->options.priority == EBPO_PRIORITY_PIXELS
-            ? ldexp(ebpo_viewpoint_pixels(&s->viewpoint, level, look.distance2), -SOON_LEVELS)
+            ? ldexp(ebpo_viewpoint_pixels(&s->viewpoint, level, sight.distance2), -SOON_LEVELS)
             : 0;
 }
 
-static bool is_late(const ebpo_view_stream *s, int level, ebpo_seen look)
+static bool is_late(const ebpo_view_stream *s, int level, ebpo_seen sight)
 {
     return level > s->soon_level ||
            (s->soon_pixels > 0 &&
-            ebpo_viewpoint_pixels(&s->viewpoint, level, look.distance2) < s->soon_pixels);
+            ebpo_viewpoint_pixels(&s->viewpoint, level, sight.distance2) < s->soon_pixels);
 }
 
-/* Returns the first level below which no descendant of the node will be refined soon, for the
- * nearest possible distance. */
+/* Returns the first level at which no descendant of the node will be refined soon, even at the
+ * node's own distance from the eye. */
 static int depth_below(const void *user, uint64_t octcode)
 {
     const ebpo_view_stream *s = user;
-    ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(octcode));
+    ebpo_seen sight = ebpo_viewpoint_see(&s->viewpoint, &s->box, ebpo_cell_of_octcode(octcode));
     int level = ebpo_octcode_level(octcode);
-    while (level < s->info->level_count && turn_of(s, level, look) != EBPO_TURN_NEVER &&
-           !is_late(s, level, look))
+    while (level < s->info->level_count && turn_of(s, level, sight) != EBPO_TURN_NEVER &&
+           !is_late(s, level, sight))
         level++;
     return level;
 }
 
-/* Reads into s->read, and with faces the faces of its leaves. */
+/* Reads a group into s->read; if faces are requested, also reads the faces of its leaves. */
 static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo_error *error)
 {
     unsigned wanted = (s->options.planes || s->options.polygons ? EBPO_GROUP_PLANES : 0u) |
@@ -625,8 +629,8 @@ static ebpo_status read_group(ebpo_view_stream *s, const view_group *group, ebpo
     return status == EBPO_OK ? read_now(s, group, wanted, error) : status;
 }
 
-/* Begins with the children of the top of the frontier, or with the root. A pruned node has none: it
- * stays in the cut, and the caller calls again. */
+/* Begins to deliver the children of the frontier's top, or the root. A pruned node has no children:
+ * it stays in the cut, and the caller calls this function again. */
 static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_error *error)
 {
     bool root = s->partial.group_count == 0;
@@ -675,7 +679,7 @@ static ebpo_status begin_group(ebpo_view_stream *s, ebpo_view_end *end, ebpo_err
     return EBPO_OK;
 }
 
-/* Replaces the parent by its siblings, which are complete. */
+/* Replaces the parent in the cut by its children, which are complete now. */
 static void end_group(ebpo_view_stream *s)
 {
     uint32_t group = (uint32_t)(s->partial.group_count - 1);
@@ -688,7 +692,8 @@ static void end_group(ebpo_view_stream *s)
         ebpo_node_type type = ebpo_partial_type(&s->partial, node);
         s->cut[type]++;
         if (type == EBPO_GRAY && ebpo_octcode_level(ebpo_partial_octcode(&s->partial, node)) + 1 <
-                                     s->info->level_count) { /* otherwise pruned */
+                                     /* a gray node of the last level is pruned */
+                                     s->info->level_count) {
             ebpo_waiting w = { .octcode = ebpo_partial_octcode(&s->partial, node),
                                .below = ebpo_partial_children(&s->partial, node),
                                .group = group,
@@ -709,22 +714,21 @@ static void fill_node(ebpo_view_stream *s, ebpo_partial_node node, ebpo_view_nod
     memset(out, 0, sizeof *out);
     ebpo_node_begin(&out->node, &s->box, ebpo_partial_octcode(&s->partial, node), type);
     ebpo_cell cell = ebpo_cell_of_octcode(out->node.octcode);
-    ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, cell);
+    ebpo_seen sight = ebpo_viewpoint_see(&s->viewpoint, &s->box, cell);
     out->level = cell.level;
-    out->seen = look.seen;
-    out->distance = ebpo_viewpoint_distance(&s->viewpoint, look.distance2);
-    out->pixels = ebpo_viewpoint_pixels(&s->viewpoint, cell.level, look.distance2);
+    out->seen = sight.seen;
+    out->distance = ebpo_viewpoint_distance(&s->viewpoint, sight.distance2);
+    out->pixels = ebpo_viewpoint_pixels(&s->viewpoint, cell.level, sight.distance2);
     if (s->partial.windings)
         out->node.winding = s->partial.winding[node.group][node.octant];
     if (s->options.planes || s->options.polygons) {
         unsigned count;
         const uint32_t *codes = ebpo_partial_codes(&s->partial, node, &count);
-        ebpo_node_add_planes(&out->node, &s->box, codes, count, &s->capacity);
+        ebpo_node_add_planes(&out->node, &s->box, codes, count, &s->buffers);
     }
     if (s->options.polygons && type != EBPO_WHITE)
         ebpo_node_add_polygons(&out->node, &s->box,
-                               ebpo_partial_envelope(&s->partial, node, s->envelopes),
-                               &s->capacity);
+                               ebpo_partial_envelope(&s->partial, node, s->envelopes), &s->buffers);
 }
 
 ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo_view_end *end,
@@ -733,7 +737,7 @@ ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo
     EBPO_DEFAULT_FP;
     *end = EBPO_VIEW_NODE;
     if (s->leaves)
-        give_no_leaf(s->leaves);
+        clear_faces(s->leaves);
     while (!s->delivering) {
         ebpo_status status = begin_group(s, end, error);
         if (status != EBPO_OK || *end != EBPO_VIEW_NODE)
@@ -743,7 +747,7 @@ ebpo_status ebpo_view_stream_next(ebpo_view_stream *s, ebpo_view_node *out, ebpo
     unsigned octant = s->step++ ^ s->flip;
     fill_node(s, (ebpo_partial_node){ group, (uint8_t)octant }, out);
     if (s->leaves)
-        give_leaf(s->leaves, octant);
+        set_faces(s->leaves, octant);
     s->delivered++;
     out->complete = s->step == (group ? 8 : 1);
     if (out->complete)
@@ -790,10 +794,10 @@ void ebpo_view_stream_cut(ebpo_view_stream *s, ebpo_view_visit_fn visit, void *u
 static void count_node(const ebpo_view_stream *s, const ebpo_waiting *w, ebpo_view_stats *out)
 {
     ebpo_cell cell = ebpo_cell_of_octcode(w->octcode);
-    ebpo_seen look = ebpo_viewpoint_see(&s->viewpoint, &s->box, cell);
-    if (look.seen)
+    ebpo_seen sight = ebpo_viewpoint_see(&s->viewpoint, &s->box, cell);
+    if (sight.seen)
         out->pixels =
-            fmax(out->pixels, ebpo_viewpoint_pixels(&s->viewpoint, cell.level, look.distance2));
+            fmax(out->pixels, ebpo_viewpoint_pixels(&s->viewpoint, cell.level, sight.distance2));
     out->waiting += w->turn != EBPO_TURN_NEVER;
 }
 
